@@ -1,0 +1,26 @@
+find_package(PkgConfig REQUIRED)
+find_package(Threads REQUIRED)
+find_package(Eigen3 REQUIRED NO_MODULE)
+find_package(yaml-cpp REQUIRED)
+find_package(fmt REQUIRED)
+find_package(spdlog REQUIRED)
+find_package(CLI11 REQUIRED)
+find_package(nlohmann_json REQUIRED)
+find_package(Boost REQUIRED)
+find_package(OpenCV REQUIRED COMPONENTS core imgproc imgcodecs videoio dnn aruco)
+find_package(octomap REQUIRED)
+find_package(Ceres REQUIRED)
+find_package(GTest REQUIRED)
+find_package(benchmark REQUIRED)
+pkg_check_modules(LCM REQUIRED IMPORTED_TARGET lcm)
+pkg_check_modules(SYSTEMD REQUIRED IMPORTED_TARGET libsystemd)
+pkg_check_modules(LZMA REQUIRED IMPORTED_TARGET liblzma)
+
+# PCL's own package file asks for MPI and VTK; its libraries need neither where we use them.
+pkg_check_modules(PCL REQUIRED IMPORTED_TARGET pcl_common pcl_kdtree pcl_search pcl_filters)
+
+find_library(EMBREE_LIBRARY embree3 REQUIRED)
+find_path(EMBREE_INCLUDE embree3/rtcore.h REQUIRED)
+add_library(embree INTERFACE IMPORTED)
+set_target_properties(embree PROPERTIES INTERFACE_LINK_LIBRARIES ${EMBREE_LIBRARY}
+                                        INTERFACE_INCLUDE_DIRECTORIES ${EMBREE_INCLUDE})

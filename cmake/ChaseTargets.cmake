@@ -1,0 +1,47 @@
+# Warnings, sanitizers and code generation flags that every target of ours shares.
+add_library(chase_options INTERFACE)
+target_compile_options(chase_options INTERFACE -Wall -Wextra -Wconversion -Wshadow -ffp-contract=off)
+target_include_directories(chase_options INTERFACE ${CMAKE_SOURCE_DIR})
+if(CHASE_WERROR)
+  target_compile_options(chase_options INTERFACE -Werror)
+endif()
+if(CHASE_NATIVE)
+  target_compile_options(chase_options INTERFACE -march=native)
+endif()
+foreach(sanitizer IN LISTS CHASE_SANITIZE)
+  target_compile_options(chase_options INTERFACE -fsanitize=${sanitizer} -fno-omit-frame-pointer)
+  target_link_options(chase_options INTERFACE -fsanitize=${sanitizer})
+endforeach()
+
+# chase_library(NAME sources...): a static library with our options.
+function(chase_library name)
+  add_library(${name} STATIC ${ARGN})
+  target_link_libraries(${name} PUBLIC chase_options)
+  set_target_properties(${name} PROPERTIES POSITION_INDEPENDENT_CODE ON)
+endfunction()
+
+# chase_program(NAME sources...): an executable in build/bin with our options.
+function(chase_program name)
+  add_executable(${name} ${ARGN})
+  target_link_libraries(${name} PRIVATE chase_options)
+endfunction()
+
+# chase_test(NAME LIBS... SOURCES... [TIMEOUT s]): a GoogleTest program registered with CTest.
+function(chase_test name)
+  cmake_parse_arguments(ARG "" "TIMEOUT" "LIBS;SOURCES" ${ARGN})
+  chase_program(${name} ${ARG_SOURCES})
+  target_link_libraries(${name} PRIVATE ${ARG_LIBS} GTest::gtest GTest::gtest_main)
+  set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/test)
+  add_test(NAME ${name} COMMAND ${name} WORKING_DIRECTORY ${CMAKE_SOURCE_DIR})
+  if(NOT ARG_TIMEOUT)
+    set(ARG_TIMEOUT 120)
+  endif()
+  set_tests_properties(${name} PROPERTIES TIMEOUT ${ARG_TIMEOUT})
+endfunction()
+
+# chase_benchmark(NAME LIBS... SOURCES...): a Google Benchmark program build/bin/bench_*.
+function(chase_benchmark name)
+  cmake_parse_arguments(ARG "" "" "LIBS;SOURCES" ${ARGN})
+  chase_program(${name} ${ARG_SOURCES})
+  target_link_libraries(${name} PRIVATE ${ARG_LIBS} benchmark::benchmark)
+endfunction()

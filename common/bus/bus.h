@@ -1,0 +1,95 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "common/bus/stage_clock.h"
+#include "common/bus/validation.h"
+
+namespace chase::bus {
+
+/// What a process saw on one channel.
+struct ChannelCounters {
+  int64_t received = 0;
+  int64_t dropped = 0;
+  int64_t malformed = 0;
+  int32_t last_seq = -1;
+};
+
+/// Typed publish and subscribe; the backends carry bytes. A subscription hands over good messages
+/// only: what does not decode, or breaks `Problem(message)`, is counted and left out.
+class Bus {
+ public:
+  using Bytes = std::vector<uint8_t>;
+  using RawHandler = std::function<void(const uint8_t* data, size_t size)>;
+
+  virtual ~Bus() = default;
+
+  /// Calls `handler` for every good message of `channel`. One handler per channel.
+  template <class T>
+  void Subscribe(const std::string& channel, std::function<void(const T&)> handler) {
+    auto& counters = counters_[channel];
+    SubscribeRaw(channel, [this, channel, &counters, handler](const uint8_t* data, size_t size) {
+      T message;
+      if (!Decode(channel, data, size, &message, &counters)) return;
+      Guarded(channel, [&] { handler(message); });
+    });
+  }
+
+  /// Numbers `message` (field seq) and sends it. The caller sets utime.
+  template <class T>
+  void Publish(const std::string& channel, T message) {
+    message.seq = next_seq_[channel]++;
+    Bytes bytes(static_cast<size_t>(message.getEncodedSize()));
+    message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
+    PublishRaw(channel, bytes);
+  }
+
+  /// Time of the event being handled, microseconds: logical where the backend is, else the wall's.
+  virtual int64_t Now() const = 0;
+
+  /// Measures wall time from here to the end of the returned object's life under `stage`.
+  StageClock::Scope Time(const std::string& stage) { return stages_.Measure(stage); }
+
+  /// Remembers the newest error for the status message.
+  void ReportError(const std::string& what) { last_error_ = what; }
+
+  const std::map<std::string, ChannelCounters>& counters() const { return counters_; }
+  const StageClock& stages() const { return stages_; }
+  const std::string& last_error() const { return last_error_; }
+
+ protected:
+  virtual void SubscribeRaw(const std::string& channel, RawHandler handler) = 0;
+  virtual void PublishRaw(const std::string& channel, const Bytes& bytes) = 0;
+
+ private:
+  template <class T>
+  bool Decode(const std::string& channel, const uint8_t* data, size_t size, T* message,
+              ChannelCounters* counters) {
+    std::string problem;
+    try {
+      if (message->decode(data, 0, static_cast<int>(size)) != static_cast<int>(size))
+        problem = "does not decode";
+      else
+        problem = Problem(*message);
+    } catch (const std::exception& e) {  // generated decoders throw on negative lengths
+      problem = std::string("does not decode: ") + e.what();
+    }
+    return Count(channel, problem, problem.empty() ? message->seq : 0, counters);
+  }
+
+  bool Count(const std::string& channel, const std::string& problem, int32_t seq,
+             ChannelCounters* counters);
+  void Guarded(const std::string& channel, const std::function<void()>& handler);
+
+  std::map<std::string, ChannelCounters> counters_;
+  std::map<std::string, int32_t> next_seq_;
+  StageClock stages_;
+  std::string last_error_;
+};
+
+}  // namespace chase::bus
