@@ -10,7 +10,8 @@ struct Solid {
   enum class Kind { kBox, kCylinder, kEllipsoid };  // cylinder: upright
   Kind kind = Kind::kBox;
   Eigen::Vector3d center = Eigen::Vector3d::Zero();
-  Eigen::Vector3d half_size = Eigen::Vector3d::Ones();  ///< box: half edges; cylinder: r, r, half height; ellipsoid: semi-axes
+  Eigen::Vector3d half_size = Eigen::Vector3d::Ones();  ///< box: half edges; cylinder: r, r, half
+                                                        ///< height; ellipsoid: semi-axes
   double yaw = 0.0;
 };
 
