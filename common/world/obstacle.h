@@ -6,14 +6,15 @@
 
 namespace chase::world {
 
-/// The ellipsoid { x : (x - c(t))' R (x - c(t)) <= 1 } of constant shape R. Jeon 2021, section II-B.
+/// The ellipsoid { x : (x - c(t))' R (x - c(t)) <= 1 } of constant shape R. Jeon 2021, section
+/// II-B.
 struct Obstacle {
   int id = 0;
   bool moving = false;
-  Trajectory center;                                      ///< c(t), frame W, m
-  Eigen::Matrix3d shape = Eigen::Matrix3d::Identity();    ///< R, frame W, 1/m^2, positive definite
-  double position_variance = 0.0;                         ///< isotropic, m^2
-  double velocity_variance = 0.0;                         ///< isotropic, m^2/s^2
+  Trajectory center;                                    ///< c(t), frame W, m
+  Eigen::Matrix3d shape = Eigen::Matrix3d::Identity();  ///< R, frame W, 1/m^2, positive definite
+  double position_variance = 0.0;                       ///< isotropic, m^2
+  double velocity_variance = 0.0;                       ///< isotropic, m^2/s^2
 
   /// ||x - c(t)||_R^2; below 1 inside.
   double SquaredDistance(const Eigen::Vector3d& x, double t) const {
@@ -22,7 +23,8 @@ struct Obstacle {
   }
 };
 
-/// min over s in [0,1] of ||(1-s) p + s q - c||_R^2, the feasibility function d of Jeon 2021, eq. (9).
+/// min over s in [0,1] of ||(1-s) p + s q - c||_R^2, the feasibility function d of Jeon 2021, eq.
+/// (9).
 double SegmentSquaredDistance(const Eigen::Vector3d& p, const Eigen::Vector3d& q,
                               const Eigen::Vector3d& c, const Eigen::Matrix3d& R);
 

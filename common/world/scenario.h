@@ -1,58 +1,80 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <map>
 #include <string>
 #include <vector>
 
+#include "common/world/path_motion.h"
 #include "common/world/shapes.h"
 
 namespace chase::world {
 
 // The structs below mirror the keys of a scenario file (deploy/scenarios/README.md). Lengths m,
-// speeds m/s, times s, angles as named; frame W.
+// speeds m/s, times s, angles as named; frame W. Each Problem() names the first field that makes no
+// sense, its value and the limit, and is empty when all is well.
 
 struct WallSpec {
   Eigen::Vector2d from = Eigen::Vector2d::Zero(), to = Eigen::Vector2d::UnitX();
   double height = 3.0, thickness = 0.2;
-  template <class V> void Visit(V& v) {
-    v("from", from, "x y, m"); v("to", to, "x y, m");
-    v("height", height, "m"); v("thickness", thickness, "m");
+  template <class V>
+  void Visit(V& v) {
+    v("from", from, "x y, m");
+    v("to", to, "x y, m");
+    v("height", height, "m");
+    v("thickness", thickness, "m");
   }
+  std::string Problem() const;
 };
 
 struct BoxSpec {
   Eigen::Vector3d center = Eigen::Vector3d::Zero(), size = Eigen::Vector3d::Ones();
   double yaw_deg = 0.0;
-  template <class V> void Visit(V& v) {
-    v("center", center, "m"); v("size", size, "edges, m"); v("yaw_deg", yaw_deg, "about z");
+  template <class V>
+  void Visit(V& v) {
+    v("center", center, "m");
+    v("size", size, "edges, m");
+    v("yaw_deg", yaw_deg, "about z");
   }
+  std::string Problem() const;
 };
 
 struct CylinderSpec {
   Eigen::Vector2d center = Eigen::Vector2d::Zero();
   double radius = 0.28, height = 3.0, base = 0.0;
-  template <class V> void Visit(V& v) {
-    v("center", center, "x y, m"); v("radius", radius, "m"); v("height", height, "m");
+  template <class V>
+  void Visit(V& v) {
+    v("center", center, "x y, m");
+    v("radius", radius, "m");
+    v("height", height, "m");
     v("base", base, "z of the lower end, m");
   }
+  std::string Problem() const;
 };
 
 struct EllipsoidSpec {
   Eigen::Vector3d center = Eigen::Vector3d::Zero(), radii = Eigen::Vector3d::Ones();
   double yaw_deg = 0.0;
-  template <class V> void Visit(V& v) {
-    v("center", center, "m"); v("radii", radii, "semi-axes, m"); v("yaw_deg", yaw_deg, "about z");
+  template <class V>
+  void Visit(V& v) {
+    v("center", center, "m");
+    v("radii", radii, "semi-axes, m");
+    v("yaw_deg", yaw_deg, "about z");
   }
+  std::string Problem() const;
 };
 
 struct TreeSpec {
   Eigen::Vector2d center = Eigen::Vector2d::Zero();
   double trunk_radius = 0.25, height = 8.0, crown_radius = 1.5, crown_base = 4.5;
-  template <class V> void Visit(V& v) {
-    v("center", center, "x y, m"); v("trunk_radius", trunk_radius, "m"); v("height", height, "m");
-    v("crown_radius", crown_radius, "m"); v("crown_base", crown_base, "z of the crown's lower end, m");
+  template <class V>
+  void Visit(V& v) {
+    v("center", center, "x y, m");
+    v("trunk_radius", trunk_radius, "m");
+    v("height", height, "m");
+    v("crown_radius", crown_radius, "m");
+    v("crown_base", crown_base, "z of the crown's lower end, m");
   }
+  std::string Problem() const;
 };
 
 /// Random trees, drawn from the scenario's own seed so that every flight has the same map.
@@ -61,21 +83,29 @@ struct ForestSpec {
   Eigen::Vector2d min = Eigen::Vector2d::Zero(), max = Eigen::Vector2d::Zero();
   double gap = 2.5, trunk_radius_min = 0.15, trunk_radius_max = 0.4, path_clearance = 1.0;
   int seed = 1;
-  template <class V> void Visit(V& v) {
-    v("count", count, "trees; 0: none"); v("min", min, "corner x y, m"); v("max", max, "corner x y, m");
+  template <class V>
+  void Visit(V& v) {
+    v("count", count, "trees; 0: none");
+    v("min", min, "corner x y, m");
+    v("max", max, "corner x y, m");
     v("gap", gap, "smallest free gap between trunks, m");
-    v("trunk_radius_min", trunk_radius_min, "m"); v("trunk_radius_max", trunk_radius_max, "m");
+    v("trunk_radius_min", trunk_radius_min, "m");
+    v("trunk_radius_max", trunk_radius_max, "m");
     v("path_clearance", path_clearance, "free distance kept to the target's path, m");
     v("seed", seed, "of the generator");
   }
+  std::string Problem() const;
 };
 
 struct GroundSpec {
   double height = 0.0, roughness = 0.0, wavelength = 8.0;
-  template <class V> void Visit(V& v) {
-    v("height", height, "z, m"); v("roughness", roughness, "amplitude of undulation, m");
+  template <class V>
+  void Visit(V& v) {
+    v("height", height, "z, m");
+    v("roughness", roughness, "amplitude of undulation, m");
     v("wavelength", wavelength, "of undulation, m");
   }
+  std::string Problem() const;
 };
 
 struct WorldSpec {
@@ -86,10 +116,17 @@ struct WorldSpec {
   std::vector<EllipsoidSpec> ellipsoids;
   std::vector<TreeSpec> trees;
   ForestSpec forest;
-  template <class V> void Visit(V& v) {
-    v("ground", ground, ""); v("walls", walls, ""); v("boxes", boxes, ""); v("cylinders", cylinders, "");
-    v("ellipsoids", ellipsoids, ""); v("trees", trees, ""); v("forest", forest, "generator");
+  template <class V>
+  void Visit(V& v) {
+    v("ground", ground, "");
+    v("walls", walls, "");
+    v("boxes", boxes, "");
+    v("cylinders", cylinders, "");
+    v("ellipsoids", ellipsoids, "");
+    v("trees", trees, "");
+    v("forest", forest, "generator");
   }
+  std::string Problem() const;
 };
 
 struct MoverSpec {
@@ -98,11 +135,16 @@ struct MoverSpec {
   std::vector<Eigen::Vector3d> waypoints;
   double speed = 1.0, start_time = 0.0;
   bool loop = false;
-  template <class V> void Visit(V& v) {
-    v("shape", shape, "box, cylinder or ellipsoid"); v("size", size, "length width height, m");
-    v("waypoints", waypoints, "of the centre, m"); v("speed", speed, "m/s");
-    v("start_time", start_time, "mission time at which it starts, s"); v("loop", loop, "back to the first waypoint");
+  template <class V>
+  void Visit(V& v) {
+    v("shape", shape, "box, cylinder or ellipsoid");
+    v("size", size, "length width height, m");
+    v("waypoints", waypoints, "of the centre, m");
+    v("speed", speed, "m/s");
+    v("start_time", start_time, "mission time at which it starts, s");
+    v("loop", loop, "back to the first waypoint");
   }
+  std::string Problem() const;
 };
 
 struct TargetSpec {
@@ -112,46 +154,68 @@ struct TargetSpec {
   std::vector<Eigen::Vector2d> waypoints;
   std::string path_file;  // CSV t,x,y instead of waypoints, relative to the scenario file
   double speed = 1.0, acceleration = 0.5, corner_radius = 0.8;
-  template <class V> void Visit(V& v) {
-    v("radius", radius, "of the upright cylinder, m"); v("height", height, "of the cylinder, m");
-    v("base", base, "z of the cylinder's lower end above the ground, m"); v("color", color, "r g b, 0 to 1");
+  template <class V>
+  void Visit(V& v) {
+    v("radius", radius, "of the upright cylinder, m");
+    v("height", height, "of the cylinder, m");
+    v("base", base, "z of the cylinder's lower end above the ground, m");
+    v("color", color, "r g b, 0 to 1");
     v("carrier_size", carrier_size, "box that carries it, length width height, m; zeros: none");
-    v("waypoints", waypoints, "on the ground, x y, m"); v("path_file", path_file, "CSV t,x,y instead of waypoints");
-    v("speed", speed, "greatest, m/s"); v("acceleration", acceleration, "along the path, m/s^2");
+    v("waypoints", waypoints, "on the ground, x y, m");
+    v("path_file", path_file, "CSV t,x,y instead of waypoints");
+    v("speed", speed, "greatest, m/s");
+    v("acceleration", acceleration, "along the path, m/s^2");
     v("corner_radius", corner_radius, "corners are rounded to this, m");
   }
+  std::string Problem() const;
 };
 
 struct ChaserSpec {
   Eigen::Vector3d start = {0.0, 0.0, 0.0};
   double yaw_deg = 0.0, takeoff_height = 1.5, desired_distance = 2.5, radius = 0.25;
-  template <class V> void Visit(V& v) {
-    v("start", start, "where it stands before take-off, m"); v("yaw_deg", yaw_deg, "at the start");
-    v("takeoff_height", takeoff_height, "m above the start; it hovers there until the target moves");
-    v("desired_distance", desired_distance, "l_des, m"); v("radius", radius, "of the drone's sphere, m");
+  template <class V>
+  void Visit(V& v) {
+    v("start", start, "where it stands before take-off, m");
+    v("yaw_deg", yaw_deg, "at the start");
+    v("takeoff_height", takeoff_height,
+      "m above the start; it hovers there until the target moves");
+    v("desired_distance", desired_distance, "l_des, m");
+    v("radius", radius, "of the drone's sphere, m");
   }
+  std::string Problem() const;
 };
 
 struct SensorsSpec {
   std::string mode = "raw";  // raw or truth
-  template <class V> void Visit(V& v) { v("mode", mode, "raw: sensors only; truth: true state, target and obstacles"); }
+  template <class V>
+  void Visit(V& v) {
+    v("mode", mode, "raw: sensors only; truth: true state, target and obstacles");
+  }
+  std::string Problem() const;
 };
 
 struct WindSpec {
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
   double gust = 0.0, gust_time = 2.0;
-  template <class V> void Visit(V& v) {
-    v("mean", mean, "m/s"); v("gust", gust, "standard deviation, m/s"); v("gust_time", gust_time, "correlation time, s");
+  template <class V>
+  void Visit(V& v) {
+    v("mean", mean, "m/s");
+    v("gust", gust, "standard deviation, m/s");
+    v("gust_time", gust_time, "correlation time, s");
   }
+  std::string Problem() const;
 };
 
 /// Limits that a flight must keep to pass; a negative limit is not checked.
 struct CriteriaSpec {
   double safe_ratio = 1.0, visible_ratio = 0.95, in_image_ratio = 0.9;
   double distance_ratio_max = -1.0, real_time_factor = -1.0;
-  template <class V> void Visit(V& v) {
-    v("safe_ratio", safe_ratio, "at least"); v("visible_ratio", visible_ratio, "at least");
-    v("in_image_ratio", in_image_ratio, "at least"); v("distance_ratio_max", distance_ratio_max, "at most");
+  template <class V>
+  void Visit(V& v) {
+    v("safe_ratio", safe_ratio, "at least");
+    v("visible_ratio", visible_ratio, "at least");
+    v("in_image_ratio", in_image_ratio, "at least");
+    v("distance_ratio_max", distance_ratio_max, "at most");
     v("real_time_factor", real_time_factor, "at least; live flights only");
   }
 };
@@ -160,8 +224,10 @@ struct CriteriaSpec {
 struct ServiceOverride {
   std::string name;
   std::string config;  // YAML text, as the service's --config file
-  template <class V> void Visit(V& v) {
-    v("name", name, "service"); v("config", config, "its overrides as YAML text");
+  template <class V>
+  void Visit(V& v) {
+    v("name", name, "service");
+    v("config", config, "its overrides as YAML text");
   }
 };
 
@@ -177,11 +243,21 @@ struct Scenario {
   WindSpec wind;
   CriteriaSpec criteria;
   std::vector<ServiceOverride> services;
-  template <class V> void Visit(V& v) {
-    v("name", name, ""); v("description", description, "one sentence"); v("duration_s", duration_s, "of the mission, s");
-    v("settle_s", settle_s, "from power-on to mission time zero, when the target starts to move, s");
-    v("world", world, ""); v("movers", movers, ""); v("target", target, ""); v("chaser", chaser, "");
-    v("sensors", sensors, ""); v("wind", wind, ""); v("criteria", criteria, ""); v("services", services, "");
+  template <class V>
+  void Visit(V& v) {
+    v("name", name, "");
+    v("description", description, "one sentence");
+    v("duration_s", duration_s, "of the mission, s");
+    v("settle_s", settle_s,
+      "from power-on to mission time zero, when the target starts to move, s");
+    v("world", world, "");
+    v("movers", movers, "");
+    v("target", target, "");
+    v("chaser", chaser, "");
+    v("sensors", sensors, "");
+    v("wind", wind, "");
+    v("criteria", criteria, "");
+    v("services", services, "");
   }
   /// Names the first field that makes no sense, its value and the limit; empty when all is well.
   std::string Problem() const;
@@ -202,22 +278,8 @@ std::vector<Solid> StaticSolids(const Scenario& scenario);
 /// Height of the ground at x, y [m].
 double GroundHeight(const GroundSpec& ground, double x, double y);
 
-/// Motion along waypoints with rounded corners and a trapezoidal speed profile.
-class PathMotion {
- public:
-  PathMotion() = default;
-  PathMotion(const std::vector<Eigen::Vector2d>& waypoints, double speed, double acceleration,
-             double corner_radius);
-  /// From samples (t, x, y).
-  explicit PathMotion(const std::vector<Eigen::Vector3d>& samples);
-  Eigen::Vector2d Position(double t) const;
-  Eigen::Vector2d Velocity(double t) const;
-
- private:
-  std::vector<double> t_;
-  std::vector<Eigen::Vector2d> p_, v_;
-};
-
+/// Motion of the target's centre over the ground from mission time 0; reads `path_file` if there is
+/// one.
 PathMotion TargetMotion(const Scenario& scenario);
 
 /// Centre and velocity of a mover and its solid at mission time t.

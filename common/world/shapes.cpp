@@ -69,7 +69,8 @@ double EllipsoidDistance(const Vector3d& e, const Vector3d& point) {
     if (y[k] > 0.0 && s > 0.0) x[k] = e[k] * e[k] * y[k] / s;
     rest -= x[k] * x[k] / (e[k] * e[k]);
   }
-  if (x[smallest] == 0.0) x[smallest] = e[smallest] * std::sqrt(std::max(0.0, rest));
+  if (t + e[smallest] * e[smallest] <= 0.0)
+    x[smallest] = e[smallest] * std::sqrt(std::max(0.0, rest));
   const double inside = y.cwiseQuotient(e).squaredNorm() < 1.0 ? -1.0 : 1.0;
   return inside * (x - y).norm();
 }

@@ -16,8 +16,8 @@ struct Trajectory {
   int degree() const { return static_cast<int>(coefficients.rows()) - 1; }
   double end() const { return start + duration; }
 
-  /// Derivative of the given order with respect to t at time t [m/s^order]. Evaluates the polynomial
-  /// as it is, also outside the interval.
+  /// Derivative of the given order with respect to t at time t [m/s^order]. Evaluates the
+  /// polynomial as it is, also outside the interval.
   Eigen::Vector3d Derivative(int order, double t) const;
   Eigen::Vector3d Position(double t) const { return Derivative(0, t); }
   Eigen::Vector3d Velocity(double t) const { return Derivative(1, t); }

@@ -1,0 +1,149 @@
+#include "common/world/scenario.h"
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <sstream>
+#include <stdexcept>
+
+#include "common/config/config.h"
+
+namespace chase::world {
+namespace {
+
+std::string Number(double value) { return config::detail::FormatNumber(value); }
+
+/// "field is value; it must be limit", or empty when `ok`.
+std::string Check(bool ok, const std::string& field, const std::string& value,
+                  const std::string& limit) {
+  return ok ? "" : field + " is " + value + "; it must be " + limit;
+}
+std::string Positive(const std::string& field, double value) {
+  return Check(value > 0.0 && std::isfinite(value), field, Number(value), "above 0");
+}
+std::string NotNegative(const std::string& field, double value) {
+  return Check(value >= 0.0 && std::isfinite(value), field, Number(value), "0 or more");
+}
+
+std::string First(std::initializer_list<std::string> problems) {
+  for (const auto& problem : problems)
+    if (!problem.empty()) return problem;
+  return "";
+}
+
+template <class Spec>
+std::string FirstOf(const std::string& name, const std::vector<Spec>& specs) {
+  for (std::size_t i = 0; i < specs.size(); ++i) {
+    const std::string problem = specs[i].Problem();
+    if (!problem.empty()) return name + "[" + std::to_string(i) + "]: " + problem;
+  }
+  return "";
+}
+
+template <class Spec>
+std::string Within(const std::string& name, const Spec& spec) {
+  const std::string problem = spec.Problem();
+  return problem.empty() ? "" : name + ": " + problem;
+}
+
+std::string Folder(const std::string& file) {
+  const auto slash = file.rfind('/');
+  return slash == std::string::npos ? "" : file.substr(0, slash + 1);
+}
+
+}  // namespace
+
+std::string WallSpec::Problem() const {
+  return First({Check((to - from).norm() > 0.0, "to", "equal to from", "another point"),
+                Positive("height", height), Positive("thickness", thickness)});
+}
+std::string BoxSpec::Problem() const { return Positive("size", size.minCoeff()); }
+std::string CylinderSpec::Problem() const {
+  return First({Positive("radius", radius), Positive("height", height)});
+}
+std::string EllipsoidSpec::Problem() const { return Positive("radii", radii.minCoeff()); }
+std::string TreeSpec::Problem() const {
+  return First({Positive("trunk_radius", trunk_radius), Positive("height", height),
+                NotNegative("crown_radius", crown_radius),
+                Check(crown_base < height, "crown_base", Number(crown_base), "below height")});
+}
+std::string ForestSpec::Problem() const {
+  if (count == 0) return "";
+  return First(
+      {Check(count > 0 && count <= 20000, "count", std::to_string(count), "0 to 20000"),
+       Check((max - min).minCoeff() > 0.0, "max", Number((max - min).minCoeff()) + " beyond min",
+             "greater than min in x and y"),
+       NotNegative("gap", gap), Positive("trunk_radius_min", trunk_radius_min),
+       Check(trunk_radius_max >= trunk_radius_min, "trunk_radius_max", Number(trunk_radius_max),
+             "at least trunk_radius_min"),
+       NotNegative("path_clearance", path_clearance)});
+}
+std::string GroundSpec::Problem() const {
+  return First({NotNegative("roughness", roughness), Positive("wavelength", wavelength)});
+}
+std::string MoverSpec::Problem() const {
+  return First({Check(shape == "box" || shape == "cylinder" || shape == "ellipsoid", "shape",
+                      "'" + shape + "'", "box, cylinder or ellipsoid"),
+                Positive("size", size.minCoeff()),
+                Check(!waypoints.empty(), "waypoints", "empty", "one point or more"),
+                NotNegative("speed", speed)});
+}
+std::string TargetSpec::Problem() const {
+  return First({Positive("radius", radius), Positive("height", height),
+                Check(color.minCoeff() >= 0.0 && color.maxCoeff() <= 1.0, "color", "outside 0 to 1",
+                      "within 0 to 1"),
+                NotNegative("carrier_size", carrier_size.minCoeff()), Positive("speed", speed),
+                Positive("acceleration", acceleration),
+                NotNegative("corner_radius", corner_radius)});
+}
+std::string ChaserSpec::Problem() const {
+  return First({Positive("takeoff_height", takeoff_height),
+                Positive("desired_distance", desired_distance), Positive("radius", radius)});
+}
+std::string SensorsSpec::Problem() const {
+  return Check(mode == "raw" || mode == "truth", "mode", "'" + mode + "'", "raw or truth");
+}
+std::string WindSpec::Problem() const {
+  return First({NotNegative("gust", gust), Positive("gust_time", gust_time)});
+}
+
+std::string WorldSpec::Problem() const {
+  return First({Within("ground", ground), FirstOf("walls", walls), FirstOf("boxes", boxes),
+                FirstOf("cylinders", cylinders), FirstOf("ellipsoids", ellipsoids),
+                FirstOf("trees", trees), Within("forest", forest)});
+}
+
+std::string Scenario::Problem() const {
+  const bool has_path = target.waypoints.size() >= 2 || !target.path_file.empty();
+  return First(
+      {Check(!name.empty(), "name", "missing", "given"), Positive("duration_s", duration_s),
+       NotNegative("settle_s", settle_s),
+       Check(has_path, "target.waypoints", std::to_string(target.waypoints.size()) + " points",
+             "2 or more, or target.path_file be given"),
+       Within("world", world), FirstOf("movers", movers), Within("target", target),
+       Within("chaser", chaser), Within("sensors", sensors), Within("wind", wind)});
+}
+
+Scenario ParseScenario(const std::string& yaml, const std::string& origin) {
+  Scenario scenario;
+  config::LoadText(yaml, origin, &scenario);
+  std::string& path = scenario.target.path_file;
+  if (!path.empty() && path.front() != '/') path = Folder(origin) + path;
+  return scenario;
+}
+
+Scenario LoadScenario(const std::string& file) {
+  std::ifstream in(file);
+  std::ostringstream text;
+  if (!in || !(text << in.rdbuf()))
+    throw std::runtime_error(file + ": scenario cannot be read; check the path and its rights");
+  return ParseScenario(text.str(), file);
+}
+
+std::string ServiceConfig(const Scenario& scenario, const std::string& service) {
+  for (const auto& entry : scenario.services)
+    if (entry.name == service) return entry.config;
+  return "";
+}
+
+}  // namespace chase::world
