@@ -12,8 +12,8 @@ struct NodeReport {
   std::string detail;
 };
 
-/// A node converts and wires. It is constructed as `SomeNode(Bus&, const SomeConfig&)`, subscribes in
-/// the constructor and moves only when a message arrives or when it is ticked.
+/// A node converts and wires. It is constructed as `SomeNode(Bus&, const SomeConfig&)`, subscribes
+/// in the constructor and moves only when a message arrives or when it is ticked.
 class Node {
  public:
   virtual ~Node() = default;

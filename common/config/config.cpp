@@ -47,7 +47,8 @@ YAML::Node ParseText(const std::string& text, const std::string& origin) {
 YAML::Node ParseFile(const std::string& file) {
   std::ifstream in(file);
   if (!in)
-    throw std::runtime_error(fmt::format("{}: cannot be read; check the path and its rights", file));
+    throw std::runtime_error(
+        fmt::format("{}: cannot be read; check the path and its rights", file));
   std::ostringstream text;
   text << in.rdbuf();
   return ParseText(text.str(), file);

@@ -198,8 +198,8 @@ YAML::Node ParseText(const std::string& text, const std::string& origin);
 }  // namespace detail
 
 /// Overrides fields of `config` by the keys of a YAML file. Throws std::runtime_error with one line
-/// "file:line: field: what is wrong" on a missing file, an unknown key, a wrong type or a value that
-/// Problem() refuses; `config` is then in an unspecified state.
+/// "file:line: field: what is wrong" on a missing file, an unknown key, a wrong type or a value
+/// that Problem() refuses; `config` is then in an unspecified state.
 template <class C>
 void Load(const std::string& file, C* config) {
   detail::Reader::ReadConfig(file, detail::ParseFile(file), "", config);

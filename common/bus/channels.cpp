@@ -1,0 +1,40 @@
+#include "common/bus/channels.h"
+
+#include <algorithm>
+#include <cctype>
+
+namespace chase::bus {
+
+const std::vector<ChannelRow>& ChannelTable() {
+  static const std::vector<ChannelRow> table = {
+      {"LIDAR_SCAN", "lidar_scan_t", "lidar, simulator", true},
+      {"CAMERA_IMAGE", "camera_image_t", "camera, simulator", true},
+      {"IMU", "imu_t", "fcu, simulator", false},
+      {"POSE", "pose_t", "odometry", false},
+      {"SCAN_REGISTERED", "scan_registered_t", "odometry", true},
+      {"OBSTACLES", "obstacles_t", "mapping", false},
+      {"MAP", "map_t", "mapping", true},
+      {"TARGET", "target_t", "perception", false},
+      {"PREDICTION", "prediction_t", "prediction", false},
+      {"PLAN", "plan_t", "planning", false},
+      {"ATTITUDE_SETPOINT", "attitude_setpoint_t", "control", false},
+      {"TRUTH", "truth_t", "simulator", false},
+      {"SCENARIO", "scenario_t", "simulator", false},
+  };
+  return table;
+}
+
+bool IsHeavy(const std::string& channel) {
+  for (const auto& row : ChannelTable())
+    if (row.channel == channel) return row.heavy;
+  return false;
+}
+
+std::string StatusChannel(const std::string& process) {
+  std::string name = process;
+  std::transform(name.begin(), name.end(), name.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::toupper(c)); });
+  return name + "_STATUS";
+}
+
+}  // namespace chase::bus

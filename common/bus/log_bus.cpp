@@ -1,0 +1,38 @@
+#include "common/bus/log_bus.h"
+
+#include <stdexcept>
+
+namespace chase::bus {
+
+LogBus::LogBus(const std::string& in, const std::string& out) : in_(in), out_(out) {}
+
+void LogBus::SubscribeRaw(const std::string& channel, RawHandler handler) {
+  handlers_[channel] = std::move(handler);
+}
+
+void LogBus::PublishRaw(const std::string& channel, const Bytes& bytes) {
+  out_.Write(now_, channel, bytes);
+}
+
+void LogBus::Run(Node* node) {
+  lcm::LogFile log(in_, "r");
+  if (!log.good()) throw std::runtime_error(in_ + ": cannot be read; --replay needs an LCM log");
+  const int64_t period = node->TickPeriod();
+  int64_t next_tick = -1;
+  while (const lcm::LogEvent* event = log.readNextEvent()) {
+    ++events_;
+    if (period > 0) {
+      if (next_tick < 0) next_tick = event->timestamp;
+      for (; next_tick <= event->timestamp; next_tick += period) node->Tick(now_ = next_tick);
+    }
+    now_ = event->timestamp;
+    const auto handler = handlers_.find(event->channel);
+    if (handler != handlers_.end())
+      handler->second(static_cast<const uint8_t*>(event->data),
+                      static_cast<size_t>(event->datalen));
+  }
+  if (events_ == 0) throw std::runtime_error(in_ + ": holds no event; is it an LCM log?");
+  out_.Close();
+}
+
+}  // namespace chase::bus

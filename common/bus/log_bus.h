@@ -1,0 +1,38 @@
+#pragma once
+
+#include <map>
+#include <memory>
+#include <string>
+
+#include "common/bus/bus.h"
+#include "common/bus/log_writer.h"
+#include "common/bus/node.h"
+
+namespace chase::bus {
+
+/// Replays a log file to one node in file order; what the node sends goes to another log file with
+/// the stamp of the event that it answers.
+class LogBus : public Bus {
+ public:
+  /// Throws std::runtime_error when a file cannot be opened.
+  LogBus(const std::string& in, const std::string& out);
+
+  /// Drives `node` through the whole log; ticks it at multiples of its period in between.
+  void Run(Node* node);
+
+  int64_t Now() const override { return now_; }
+  int64_t events() const { return events_; }
+
+ protected:
+  void SubscribeRaw(const std::string& channel, RawHandler handler) override;
+  void PublishRaw(const std::string& channel, const Bytes& bytes) override;
+
+ private:
+  std::string in_;
+  LogWriter out_;
+  std::map<std::string, RawHandler> handlers_;
+  int64_t now_ = 0;
+  int64_t events_ = 0;
+};
+
+}  // namespace chase::bus

@@ -1,0 +1,128 @@
+#include "common/bus/run_service.h"
+
+#include <fmt/format.h>
+#include <systemd/sd-daemon.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <atomic>
+#include <csignal>
+#include <cstdio>
+#include <cstdlib>
+
+#include "common/bus/channels.h"
+#include "common/bus/log_bus.h"
+#include "common/bus/status.h"
+#include "common/bus/udp_bus.h"
+
+namespace chase::bus {
+
+namespace {
+
+constexpr int64_t kStatusPeriod = 1000000;  // us
+constexpr int64_t kMaxLag = 500000;  // us that ticks may fall behind the clock before they slip
+
+volatile std::sig_atomic_t stop_requested = 0;
+
+void RequestStop(int) { stop_requested = 1; }
+
+struct Flags {
+  std::string config, url, prefix, replay, out;
+  bool dump_config = false;
+};
+
+std::string DefaultUrl() {
+  const char* url = std::getenv("LCM_DEFAULT_URL");
+  return url != nullptr && *url != '\0' ? url : kDefaultUrl;
+}
+
+void AddFlags(CLI::App* app, Flags* flags) {
+  flags->url = DefaultUrl();
+  app->add_option("--config", flags->config, "YAML file that overrides the defaults");
+  app->add_flag("--dump-config", flags->dump_config, "print the complete configuration and exit");
+  app->add_option("--lcm-url", flags->url,
+                  "LCM provider (default: $LCM_DEFAULT_URL, else built in)");
+  app->add_option("--channel-prefix", flags->prefix, "put in front of every channel's name");
+  app->add_option("--replay", flags->replay, "drive the service by this LCM log, in logical time");
+  app->add_option("--out", flags->out, "LCM log that --replay writes");
+  app->set_version_flag("--version", Version());
+}
+
+/// Live processing until a signal comes or the node is done.
+void RunLive(const ServiceSpec& spec, const Flags& flags) {
+  UdpBus bus(flags.url, flags.prefix);
+  const auto node = spec.make_node(bus);
+  StatusReporter reporter(spec.name);
+  const std::string channel = StatusChannel(spec.name);
+  const auto report = [&](int64_t now) {
+    bus.Publish(channel, reporter.Make(bus, *node, now, true));
+  };
+  sd_notify(0, "READY=1");
+  int64_t now = bus.Now();
+  const int64_t period = node->TickPeriod();
+  int64_t next_tick = now, next_status = now;
+  while (stop_requested == 0 && !node->Done()) {
+    now = bus.Now();
+    if (period > 0 && now >= next_tick) {
+      if (now - next_tick > kMaxLag) next_tick = now;
+      node->Tick(next_tick);
+      next_tick += period;
+    }
+    if (now >= next_status) {
+      report(now);
+      sd_notify(0, "WATCHDOG=1");
+      next_status = std::max(next_status + kStatusPeriod, now);
+    }
+    const int64_t due = period > 0 ? std::min(next_tick, next_status) : next_status;
+    bus.Handle(due - bus.Now());
+  }
+  report(bus.Now());
+  sd_notify(0, "STOPPING=1");
+}
+
+void RunReplay(const ServiceSpec& spec, const Flags& flags) {
+  if (flags.out.empty())
+    throw std::runtime_error("--replay needs --out FILE, where the outputs go");
+  if (flags.out == flags.replay)
+    throw std::runtime_error("--out " + flags.out + " is the log that is replayed; name another");
+  LogBus bus(flags.replay, flags.out);
+  const auto node = spec.make_node(bus);
+  bus.Run(node.get());
+}
+
+int Run(const ServiceSpec& spec, const Flags& flags) {
+  if (!flags.config.empty()) spec.load_config(flags.config);
+  if (flags.dump_config) {
+    std::fputs(spec.dump_config().c_str(), stdout);
+    return 0;
+  }
+  std::signal(SIGINT, RequestStop);
+  std::signal(SIGTERM, RequestStop);
+  if (!flags.replay.empty())
+    RunReplay(spec, flags);
+  else
+    RunLive(spec, flags);
+  return 0;
+}
+
+}  // namespace
+
+int RunService(const ServiceSpec& spec, int argc, char** argv) {
+  const std::string program = "chase-" + spec.name;
+  CLI::App app(spec.description, program);
+  Flags flags;
+  AddFlags(&app, &flags);
+  try {
+    app.parse(argc, argv);
+    return Run(spec, flags);
+  } catch (const CLI::Success& e) {  // --help, --version
+    return app.exit(e);
+  } catch (const CLI::ParseError& e) {
+    fmt::print(stderr, "{}: {}; see {} --help\n", program, e.what(), program);
+  } catch (const std::exception& e) {
+    fmt::print(stderr, "{}: {}\n", program, e.what());
+  }
+  return 1;
+}
+
+}  // namespace chase::bus

@@ -1,0 +1,84 @@
+#include "common/bus/status.h"
+
+#include <sys/resource.h>
+
+namespace chase::bus {
+
+namespace {
+
+double Seconds(const timeval& t) {
+  return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
+}
+
+void AddUsage(status_t* status) {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  status->cpu = Seconds(usage.ru_utime) + Seconds(usage.ru_stime);
+  status->rss_mb = static_cast<double>(usage.ru_maxrss) / 1024.0;
+}
+
+void AddStages(const StageClock& clock, status_t* status) {
+  for (const auto& [name, s] : clock.Summaries()) {
+    stage_status_t stage;
+    stage.name = name;
+    stage.count = s.count;
+    stage.mean_ms = s.mean_ms;
+    stage.p50_ms = s.p50_ms;
+    stage.p99_ms = s.p99_ms;
+    stage.max_ms = s.max_ms;
+    status->stages.push_back(stage);
+  }
+  status->n_stages = static_cast<int32_t>(status->stages.size());
+}
+
+int8_t StateCode(NodeReport::State state) {
+  switch (state) {
+    case NodeReport::State::kStarting:
+      return status_t::STARTING;
+    case NodeReport::State::kOk:
+      return status_t::OK;
+    case NodeReport::State::kDegraded:
+      return status_t::DEGRADED;
+    case NodeReport::State::kFailed:
+      break;
+  }
+  return status_t::FAILED;
+}
+
+}  // namespace
+
+std::string Version() { return CHASE_VERSION; }
+
+status_t StatusReporter::Make(const Bus& bus, const Node& node, int64_t utime, bool measured) {
+  if (start_ < 0) start_ = utime;
+  const NodeReport report = node.Report();
+  status_t status{};
+  status.utime = utime;
+  status.name = name_;
+  status.state = StateCode(report.state);
+  status.detail = report.detail;
+  status.last_error = bus.last_error();
+  status.version = Version();
+  status.uptime = static_cast<double>(utime - start_) * 1e-6;
+  const double elapsed = last_ < 0 ? 0.0 : static_cast<double>(utime - last_) * 1e-6;
+  for (const auto& [name, c] : bus.counters()) {
+    channel_status_t channel;
+    channel.channel = name;
+    channel.received = c.received;
+    channel.dropped = c.dropped;
+    channel.malformed = c.malformed;
+    int64_t& last = last_received_[name];
+    channel.rate_hz = elapsed > 0.0 ? static_cast<double>(c.received - last) / elapsed : 0.0;
+    last = c.received;
+    status.channels.push_back(channel);
+  }
+  status.n_channels = static_cast<int32_t>(status.channels.size());
+  last_ = utime;
+  if (measured) {
+    AddUsage(&status);
+    AddStages(bus.stages(), &status);
+  }
+  return status;
+}
+
+}  // namespace chase::bus

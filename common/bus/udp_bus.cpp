@@ -1,0 +1,69 @@
+#include "common/bus/udp_bus.h"
+
+#include <fmt/format.h>
+#include <poll.h>
+
+#include <algorithm>
+#include <chrono>
+#include <stdexcept>
+
+#include "common/bus/channels.h"
+#include "common/bus/loopback.h"
+
+namespace chase::bus {
+
+namespace {
+
+// LCM's default of 30 loses IMU samples while a process works; clouds and images are large.
+constexpr int kQueueLight = 400;
+constexpr int kQueueHeavy = 10;
+constexpr int kBurst = 64;  // messages handled before ticks and the clock are looked at again
+
+void Forward(const lcm::ReceiveBuffer* buffer, const std::string&, Bus::RawHandler* handler) {
+  (*handler)(static_cast<const uint8_t*>(buffer->data), buffer->data_size);
+}
+
+/// Checked before LCM opens its sockets: LCM itself would wait ten seconds and then abort.
+const std::string& Checked(const std::string& url) {
+  const std::string problem = LoopbackProblem(url);
+  if (!problem.empty()) throw std::runtime_error(problem);
+  return url;
+}
+
+}  // namespace
+
+UdpBus::UdpBus(const std::string& url, const std::string& prefix)
+    : lcm_(Checked(url)), prefix_(prefix) {
+  if (!lcm_.good())
+    throw std::runtime_error(fmt::format(
+        "{}: LCM cannot open it; check the address and port, or run deploy/doctor", url));
+}
+
+void UdpBus::Handle(int64_t timeout_us) {
+  pollfd fd{lcm_.getFileno(), POLLIN, 0};
+  timespec wait{};
+  timeout_us = std::max<int64_t>(timeout_us, 0);
+  wait.tv_sec = timeout_us / 1000000;
+  wait.tv_nsec = timeout_us % 1000000 * 1000;
+  if (ppoll(&fd, 1, &wait, nullptr) <= 0) return;
+  for (int i = 0; i < kBurst && lcm_.handleTimeout(0) > 0; ++i) {
+  }
+}
+
+int64_t UdpBus::Now() const {
+  using namespace std::chrono;
+  return duration_cast<microseconds>(system_clock::now().time_since_epoch()).count();
+}
+
+void UdpBus::SubscribeRaw(const std::string& channel, RawHandler handler) {
+  handlers_.push_back(std::move(handler));
+  auto* subscription = lcm_.subscribeFunction(prefix_ + channel, &Forward, &handlers_.back());
+  subscription->setQueueCapacity(IsHeavy(channel) ? kQueueHeavy : kQueueLight);
+}
+
+void UdpBus::PublishRaw(const std::string& channel, const Bytes& bytes) {
+  if (lcm_.publish(prefix_ + channel, bytes.data(), static_cast<unsigned>(bytes.size())) != 0)
+    ReportError(fmt::format("{}: could not be sent ({} bytes)", channel, bytes.size()));
+}
+
+}  // namespace chase::bus

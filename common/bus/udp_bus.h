@@ -1,0 +1,36 @@
+#pragma once
+
+#include <deque>
+#include <lcm/lcm-cpp.hpp>
+#include <memory>
+#include <string>
+
+#include "common/bus/bus.h"
+
+namespace chase::bus {
+
+/// UDP multicast that stays on this host, with room for a few sweeps and frames.
+inline constexpr char kDefaultUrl[] = "udpm://239.255.76.67:7667?ttl=0&recv_buf_size=8388608";
+
+/// Messages over LCM's UDP multicast. Every channel name gets `prefix` in front.
+class UdpBus : public Bus {
+ public:
+  /// Throws std::runtime_error, one line with the cure, when the bus does not carry messages.
+  UdpBus(const std::string& url, const std::string& prefix);
+
+  /// Waits at most `timeout_us` for messages and hands over those that are there.
+  void Handle(int64_t timeout_us);
+
+  int64_t Now() const override;
+
+ protected:
+  void SubscribeRaw(const std::string& channel, RawHandler handler) override;
+  void PublishRaw(const std::string& channel, const Bytes& bytes) override;
+
+ private:
+  lcm::LCM lcm_;
+  std::string prefix_;
+  std::deque<RawHandler> handlers_;  // addresses stay
+};
+
+}  // namespace chase::bus

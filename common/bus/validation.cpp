@@ -1,0 +1,210 @@
+#include "common/bus/validation.h"
+
+#include <cmath>
+#include <string>
+#include <vector>
+
+namespace chase::bus {
+
+namespace {
+
+constexpr double kMaxMagnitude = 1e7;  // no quantity on the bus comes near this
+
+bool Sane(double x) { return std::isfinite(x) && std::abs(x) < kMaxMagnitude; }
+
+template <int N>
+bool Sane(const double (&values)[N]) {
+  for (const double x : values)
+    if (!Sane(x)) return false;
+  return true;
+}
+
+bool Sane(const std::vector<double>& values) {
+  for (const double x : values)
+    if (!Sane(x)) return false;
+  return true;
+}
+
+/// Collects the first complaint.
+class Check {
+ public:
+  template <class T>
+  Check& Number(const char* field, const T& value) {
+    return That(Sane(value), field, "is not a finite number below 1e7");
+  }
+  Check& That(bool holds, const char* field, const char* what) {
+    if (!holds && problem_.empty()) problem_ = std::string("field ") + field + " " + what;
+    return *this;
+  }
+  Check& Time(int64_t utime) { return That(utime >= 0, "utime", "is negative"); }
+  Check& Quaternion(const double (&q)[4]) {
+    Number("orientation", q);
+    const double n = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
+    return That(std::abs(n - 1.0) < 1e-2, "orientation", "is not a unit quaternion");
+  }
+  Check& Polynomial(const char* field, const polynomial_t& p) {
+    That(std::isfinite(p.duration) && p.duration > 0.0 && p.duration < 1e4, field,
+         "has a duration that is not positive");
+    That(p.n_coefficients >= 3 && p.n_coefficients <= 3 * 16 && p.n_coefficients % 3 == 0, field,
+         "has a number of coefficients that is not 3 to 48 in steps of 3");
+    return Number(field, p.coefficients);
+  }
+  Check& Code(const char* field, int value, int last) {
+    return That(value >= 0 && value <= last, field, "is not one of the constants");
+  }
+  std::string Result() const { return problem_; }
+
+ private:
+  std::string problem_;
+};
+
+bool SomeFinite(const std::vector<float>& x) {
+  for (const float v : x)
+    if (std::isfinite(v)) return true;
+  return x.empty();
+}
+
+bool Positive(const double (&s)[6]) {
+  // Sylvester: the three leading minors of [xx xy xz; xy yy yz; xz yz zz].
+  const double m2 = s[0] * s[3] - s[1] * s[1];
+  const double det = s[0] * (s[3] * s[5] - s[4] * s[4]) - s[1] * (s[1] * s[5] - s[4] * s[2]) +
+                     s[2] * (s[1] * s[4] - s[3] * s[2]);
+  return s[0] > 0.0 && m2 > 0.0 && det > 0.0;
+}
+
+}  // namespace
+
+std::string Problem(const attitude_setpoint_t& m) {
+  return Check()
+      .Time(m.utime)
+      .Quaternion(m.orientation)
+      .Number("body_rate", m.body_rate)
+      .Number("thrust", m.thrust)
+      .That(m.thrust >= 0.0, "thrust", "is negative")
+      .Result();
+}
+
+std::string Problem(const camera_image_t& m) {
+  const bool shape = m.width > 0 && m.height > 0 && m.row_stride > 0 && m.width <= 16384 &&
+                     m.height <= 16384 && static_cast<int64_t>(m.row_stride) * m.height == m.size;
+  return Check()
+      .Time(m.utime)
+      .That(shape, "size", "does not agree with height and row_stride")
+      .Result();
+}
+
+std::string Problem(const imu_t& m) {
+  return Check().Time(m.utime).Number("accel", m.accel).Number("gyro", m.gyro).Result();
+}
+
+std::string Problem(const lidar_scan_t& m) {
+  return Check().Time(m.utime).That(SomeFinite(m.x), "x", "holds no finite number").Result();
+}
+
+std::string Problem(const map_t& m) {
+  return Check()
+      .Time(m.utime)
+      .Number("resolution", m.resolution)
+      .That(m.resolution > 0.0, "resolution", "is not positive")
+      .Result();
+}
+
+std::string Problem(const obstacles_t& m) {
+  Check check;
+  check.Time(m.utime);
+  for (const auto& o : m.obstacles) {
+    check.Polynomial("center", o.center).Number("shape", o.shape).Code("kind", o.kind, 1);
+    check.That(Positive(o.shape), "shape", "is not positive definite");
+    check.Number("position_variance", o.position_variance)
+        .Number("velocity_variance", o.velocity_variance);
+  }
+  return check.Result();
+}
+
+std::string Problem(const plan_t& m) {
+  return Check()
+      .Time(m.utime)
+      .Code("verdict", m.verdict, 5)
+      .Polynomial("position", m.position)
+      .That(m.n_yaw >= 1 && m.n_yaw <= 16, "n_yaw", "is not 1 to 16")
+      .Number("yaw", m.yaw)
+      .Polynomial("target", m.target)
+      .Result();
+}
+
+std::string Problem(const pose_t& m) {
+  return Check()
+      .Time(m.utime)
+      .Number("pos", m.pos)
+      .Number("vel", m.vel)
+      .Quaternion(m.orientation)
+      .Number("rotation_rate", m.rotation_rate)
+      .Number("accel", m.accel)
+      .Number("gyro_bias", m.gyro_bias)
+      .Number("accel_bias", m.accel_bias)
+      .Number("covariance", m.covariance)
+      .Code("health", m.health, 3)
+      .Result();
+}
+
+std::string Problem(const prediction_t& m) {
+  return Check()
+      .Time(m.utime)
+      .Code("verdict", m.verdict, 2)
+      .Polynomial("target", m.target)
+      .Number("covariance", m.covariance)
+      .Number("velocity_covariance", m.velocity_covariance)
+      .Number("radius", m.radius)
+      .Number("height", m.height)
+      .Result();
+}
+
+std::string Problem(const scan_registered_t& m) {
+  return Check()
+      .Time(m.utime)
+      .Number("pos", m.pos)
+      .Quaternion(m.orientation)
+      .Code("health", m.health, 3)
+      .That(SomeFinite(m.x), "x", "holds no finite number")
+      .Result();
+}
+
+std::string Problem(const scenario_t& m) {
+  return Check().Time(m.utime).That(!m.yaml.empty(), "yaml", "is empty").Result();
+}
+
+std::string Problem(const status_t& m) {
+  return Check()
+      .Time(m.utime)
+      .Code("state", m.state, 3)
+      .Number("cpu", m.cpu)
+      .Number("uptime", m.uptime)
+      .Result();
+}
+
+std::string Problem(const target_t& m) {
+  return Check()
+      .Time(m.utime)
+      .Code("state", m.state, 3)
+      .Number("mean", m.mean)
+      .Number("covariance", m.covariance)
+      .Number("velocity", m.velocity)
+      .Number("radius", m.radius)
+      .Number("height", m.height)
+      .Number("box_px", m.box_px)
+      .Number("score", m.score)
+      .Result();
+}
+
+std::string Problem(const truth_t& m) {
+  return Check()
+      .Time(m.utime)
+      .Number("mission_time", m.mission_time)
+      .Number("pos", m.pos)
+      .Number("vel", m.vel)
+      .Quaternion(m.orientation)
+      .Number("target_pos", m.target_pos)
+      .Result();
+}
+
+}  // namespace chase::bus
