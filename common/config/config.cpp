@@ -22,7 +22,18 @@ std::string FormatNumber(double value) {
   return fmt::format("{}", value);
 }
 
-std::string Quoted(const std::string& text) { return fmt::format("\"{}\"", text); }
+std::string Quoted(const std::string& text) {
+  std::string quoted = "\"";
+  for (const char c : text) {
+    if (c == '\n') {
+      quoted += "\\n";
+      continue;
+    }
+    if (c == '"' || c == '\\') quoted += '\\';
+    quoted += c;
+  }
+  return quoted + "\"";
+}
 
 void Reader::RefuseUnknownKeys() const {
   for (const auto& entry : node_) {

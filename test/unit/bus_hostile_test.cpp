@@ -1,0 +1,168 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "common/bus/bus.h"
+
+namespace chase::bus {
+namespace {
+
+/// A bus whose wire the test holds in its hand.
+class WireBus : public Bus {
+ public:
+  int64_t Now() const override { return 0; }
+  void Deliver(const Bytes& bytes) { handler_(bytes.data(), bytes.size()); }
+
+ protected:
+  void SubscribeRaw(const std::string&, RawHandler handler) override { handler_ = handler; }
+  void PublishRaw(const std::string&, const Bytes&) override {}
+
+ private:
+  RawHandler handler_;
+};
+
+template <class T>
+Bus::Bytes Encode(const T& message) {
+  Bus::Bytes bytes(static_cast<size_t>(message.getEncodedSize()));
+  message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
+  return bytes;
+}
+
+polynomial_t GoodPolynomial() {
+  polynomial_t p{};
+  p.duration = 1.0;
+  p.n_coefficients = 3;
+  p.coefficients = {1.0, 2.0, 3.0};
+  return p;
+}
+
+// One good message per type; Spoil puts a NaN, or what stands for one, into it.
+template <class T>
+struct Sample;
+
+#define CHASE_SAMPLE(Type, good, spoil)   \
+  template <>                             \
+  struct Sample<Type> {                   \
+    static Type Good() {                  \
+      Type m{};                           \
+      good;                               \
+      return m;                           \
+    }                                     \
+    static void Spoil(Type& m) { spoil; } \
+  };
+
+const double kNan = std::numeric_limits<double>::quiet_NaN();
+const float kNanF = std::numeric_limits<float>::quiet_NaN();
+
+template <class T>
+void FillCloud(T* m) {
+  m->size = 2;
+  m->x = m->y = m->z = {1.0f, 2.0f};
+  m->intensity = m->ring = {1, 2};
+}
+
+CHASE_SAMPLE(imu_t, , m.gyro[1] = kNan)
+CHASE_SAMPLE(attitude_setpoint_t, m.orientation[0] = 1.0, m.thrust = kNan)
+CHASE_SAMPLE(lidar_scan_t, FillCloud(&m); m.t = m.x, m.x.assign(2, kNanF))
+CHASE_SAMPLE(scan_registered_t, FillCloud(&m); m.orientation[0] = 1.0, m.pos[2] = kNan)
+CHASE_SAMPLE(camera_image_t, m.width = 2; m.height = 2; m.row_stride = 2; m.size = 4;
+             m.data.assign(4, 7), m.width = -1)
+CHASE_SAMPLE(pose_t, m.orientation[0] = 1.0, m.vel[0] = kNan)
+CHASE_SAMPLE(target_t, , m.mean[0] = kNan)
+CHASE_SAMPLE(map_t, m.resolution = 0.1; m.size = 1; m.data = {1}, m.resolution = kNan)
+CHASE_SAMPLE(prediction_t, m.target = GoodPolynomial(), m.target.coefficients[1] = kNan)
+CHASE_SAMPLE(scenario_t, m.yaml = "name: x", m.yaml.clear())
+CHASE_SAMPLE(status_t, , m.cpu = kNan)
+CHASE_SAMPLE(truth_t, m.orientation[0] = 1.0, m.pos[0] = kNan)
+CHASE_SAMPLE(plan_t, m.position = m.target = GoodPolynomial(); m.n_yaw = 1;
+             m.yaw = {0.0}, m.yaw[0] = kNan)
+
+obstacle_t GoodObstacle() {
+  obstacle_t o{};
+  o.center = GoodPolynomial();
+  o.shape[0] = o.shape[3] = o.shape[5] = 1.0;
+  return o;
+}
+CHASE_SAMPLE(obstacles_t, m.n_obstacles = 1;
+             m.obstacles = {GoodObstacle()}, m.obstacles[0].shape[0] = -1.0)
+#undef CHASE_SAMPLE
+
+template <class T>
+class HostileBus : public testing::Test {};
+using Types = testing::Types<imu_t, attitude_setpoint_t, lidar_scan_t, scan_registered_t,
+                             camera_image_t, pose_t, target_t, map_t, prediction_t, scenario_t,
+                             status_t, truth_t, plan_t, obstacles_t>;
+TYPED_TEST_SUITE(HostileBus, Types);
+
+/// Every truncation, every single corrupted byte position (among them all lengths set negative or
+/// huge), a wrong fingerprint, rubbish, an empty message and a NaN.
+template <class T>
+std::vector<Bus::Bytes> Attacks(size_t* n_must_fail) {
+  const T good = Sample<T>::Good();
+  const Bus::Bytes bytes = Encode(good);
+  std::vector<Bus::Bytes> attacks = {{}, Bus::Bytes(3, 0xff), Bus::Bytes(64, 0xff)};
+  for (size_t n = 0; n < bytes.size(); ++n)
+    attacks.emplace_back(bytes.begin(), bytes.begin() + static_cast<long>(n));
+  Bus::Bytes fingerprint = bytes;
+  fingerprint[0] ^= 0x55;
+  attacks.push_back(fingerprint);
+  T spoiled = good;
+  Sample<T>::Spoil(spoiled);
+  attacks.push_back(Encode(spoiled));
+  *n_must_fail = attacks.size();
+  for (size_t i = 8; i < bytes.size(); ++i)
+    for (const uint8_t value : std::initializer_list<uint8_t>{0x7f, 0x80, 0xff}) {
+      Bus::Bytes corrupt = bytes;
+      corrupt[i] = value;
+      attacks.push_back(corrupt);
+    }
+  return attacks;
+}
+
+TYPED_TEST(HostileBus, BadMessagesAreCountedAndTheNextGoodOneIsHandled) {
+  WireBus bus;
+  int handled = 0;
+  bus.Subscribe<TypeParam>("CHANNEL", [&](const TypeParam&) { ++handled; });
+  size_t n_must_fail = 0;
+  const auto attacks = Attacks<TypeParam>(&n_must_fail);
+  for (size_t i = 0; i < n_must_fail; ++i) bus.Deliver(attacks[i]);
+  const auto& counters = bus.counters().at("CHANNEL");
+  EXPECT_EQ(counters.malformed, static_cast<int64_t>(n_must_fail));
+  EXPECT_EQ(handled, 0);
+  EXPECT_FALSE(bus.last_error().empty());
+  bus.Deliver(Encode(Sample<TypeParam>::Good()));
+  EXPECT_EQ(handled, 1);
+  for (size_t i = n_must_fail; i < attacks.size(); ++i) bus.Deliver(attacks[i]);  // must not crash
+  EXPECT_EQ(counters.malformed + counters.received, static_cast<int64_t>(attacks.size()) + 1);
+}
+
+TEST(HostileBus, AHugeLengthIsRefusedBeforeItIsAllocated) {
+  Bus::Bytes bytes = Encode(Sample<lidar_scan_t>::Good());
+  bytes[8 + 8 + 4] = 0x7f;  // size becomes about two thousand million
+  lidar_scan_t message;
+  EXPECT_LT(message.decode(bytes.data(), 0, static_cast<int>(bytes.size())), 0);
+  EXPECT_TRUE(message.x.empty());
+}
+
+TEST(Bus, GapsInSeqAreCountedAsDrops) {
+  WireBus bus;
+  bus.Subscribe<imu_t>("IMU", [](const imu_t&) {});
+  imu_t imu{};
+  for (const int seq : {5, 6, 9, 10, 0, 1}) {  // two lost, then a restarted sender
+    imu.seq = seq;
+    bus.Deliver(Encode(imu));
+  }
+  EXPECT_EQ(bus.counters().at("IMU").dropped, 2);
+  EXPECT_EQ(bus.counters().at("IMU").received, 6);
+}
+
+TEST(Bus, AHandlerThatThrowsIsReportedAndContained) {
+  WireBus bus;
+  bus.Subscribe<imu_t>("IMU", [](const imu_t&) { throw std::runtime_error("inner"); });
+  bus.Deliver(Encode(imu_t{}));
+  EXPECT_NE(bus.last_error().find("inner"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace chase::bus

@@ -1,0 +1,143 @@
+#include "common/bus/bus.h"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cstdio>
+#include <fstream>
+#include <iterator>
+
+#include "common/bus/convert.h"
+#include "common/bus/lockstep.h"
+#include "common/bus/log_bus.h"
+
+namespace chase::bus {
+namespace {
+
+/// Answers every IMU sample by a setpoint that carries its time.
+class Echo : public Node {
+ public:
+  explicit Echo(Bus& bus) {
+    bus.Subscribe<imu_t>("IMU", [&bus](const imu_t& imu) {
+      attitude_setpoint_t out{};
+      out.utime = imu.utime;
+      out.orientation[0] = 1.0;
+      bus.Publish("ATTITUDE_SETPOINT", out);
+    });
+  }
+};
+
+/// Sends an IMU sample on each tick and notes when the setpoints arrive.
+class Source : public Node {
+ public:
+  explicit Source(Bus& bus) : bus_(bus) {
+    bus.Subscribe<attitude_setpoint_t>("ATTITUDE_SETPOINT", [this](const attitude_setpoint_t& m) {
+      delays.push_back(bus_.Now() - m.utime);
+    });
+  }
+  int64_t TickPeriod() const override { return 5000; }
+  void Tick(int64_t utime) override {
+    imu_t imu{};
+    imu.utime = utime;
+    bus_.Publish("IMU", imu);
+  }
+  std::vector<int64_t> delays;
+
+ private:
+  Bus& bus_;
+};
+
+std::string TempFile(const std::string& name) {
+  return testing::TempDir() + name + std::to_string(getpid());
+}
+
+std::string Bytes(const std::string& file) {
+  std::ifstream in(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+TEST(Lockstep, DeliversAfterEachProcessLatency) {
+  Lockstep lockstep(1000000);
+  Source* source = nullptr;
+  lockstep.Add("source", 0, [&](Bus& bus) {
+    auto node = std::make_unique<Source>(bus);
+    source = node.get();
+    return node;
+  });
+  lockstep.Add("echo", 3000, [](Bus& bus) { return std::make_unique<Echo>(bus); });
+  lockstep.RunUntil(1000000 + 100000);
+  ASSERT_EQ(source->delays.size(), 20u);  // the answer to the last tick is under way
+  for (const int64_t delay : source->delays) EXPECT_EQ(delay, 3000);
+}
+
+std::string RecordLockstep(const std::string& file) {
+  LogWriter log(file);
+  Lockstep lockstep(1000000);
+  lockstep.SetTap([&](int64_t utime, const std::string& channel, const Bus::Bytes& bytes) {
+    log.Write(utime, channel, bytes);
+  });
+  lockstep.Add("source", 0, [](Bus& bus) { return std::make_unique<Source>(bus); });
+  lockstep.Add("echo", 2000, [](Bus& bus) { return std::make_unique<Echo>(bus); });
+  lockstep.RunUntil(3500000);
+  log.Close();
+  return Bytes(file);
+}
+
+TEST(Lockstep, TwoRunsAreByteIdentical) {
+  const std::string a = RecordLockstep(TempFile("a")), b = RecordLockstep(TempFile("b"));
+  EXPECT_GT(a.size(), 10000u);
+  EXPECT_EQ(a, b);
+}
+
+TEST(LogBus, ReplayAnswersWithTheInputsStampAndRepeats) {
+  const std::string in = TempFile("in");
+  RecordLockstep(in);
+  std::string outputs[2];
+  for (auto& output : outputs) {
+    const std::string out = TempFile("out");
+    LogBus bus(in, out);
+    Echo echo(bus);
+    bus.Run(&echo);
+    output = Bytes(out);
+    lcm::LogFile log(out, "r");
+    int count = 0;
+    while (const lcm::LogEvent* event = log.readNextEvent()) {
+      attitude_setpoint_t m;
+      ASSERT_GT(m.decode(event->data, 0, event->datalen), 0);
+      EXPECT_EQ(m.utime, event->timestamp);
+      EXPECT_EQ(m.seq, count++);
+    }
+    EXPECT_EQ(count, 501);
+  }
+  EXPECT_EQ(outputs[0], outputs[1]);
+}
+
+TEST(LogBus, MissingInputIsAnErrorAndLeavesNoOutput) {
+  const std::string out = TempFile("none");
+  {
+    LogBus bus("/no/such.lcm", out);
+    Echo echo(bus);
+    EXPECT_THROW(bus.Run(&echo), std::runtime_error);
+  }
+  EXPECT_NE(access(out.c_str(), F_OK), 0);
+}
+
+TEST(Convert, ObstaclesSurviveTheWire) {
+  world::Obstacle o;
+  o.id = 4;
+  o.moving = true;
+  o.center.start = 12.5;
+  o.center.duration = 3.0;
+  o.center.coefficients.resize(2, 3);
+  o.center.coefficients << 1, 2, 3, 4, 5, 6;
+  o.shape << 4, 1, 0.5, 1, 3, 0.25, 0.5, 0.25, 2;
+  const int64_t origin = 1700000000000000;
+  const world::Obstacle back = FromMessage(ToMessage(o, origin), origin);
+  EXPECT_EQ(back.shape, o.shape);
+  EXPECT_EQ(back.center.coefficients, o.center.coefficients);
+  EXPECT_DOUBLE_EQ(back.center.start, 12.5);
+  EXPECT_TRUE(back.moving);
+}
+
+}  // namespace
+}  // namespace chase::bus
