@@ -1,0 +1,65 @@
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <csignal>
+#include <cstdio>
+#include <cstdlib>
+
+#include "common/bus/udp_bus.h"
+#include "deploy/flight/progress.h"
+
+namespace {
+
+volatile std::sig_atomic_t stop_requested = 0;
+constexpr int64_t kPeriod = 1000000;  // us between lines
+
+void Print(const chase::flight::Progress& progress, int64_t now) {
+  fmt::print(
+      "{{\"mission_time\": {:.2f}, \"duration\": {:.1f}, \"distance\": {:.2f}, "
+      "\"visible\": {:.3f}, \"rtf\": {:.3f}, \"done\": {}}}\n",
+      progress.mission_time(), progress.duration(), progress.distance(), progress.visible_ratio(),
+      progress.RealTimeFactor(now), progress.done());
+  std::fflush(stdout);
+}
+
+int Watch(const std::string& url, const std::string& prefix) {
+  chase::bus::UdpBus bus(url, prefix);
+  chase::flight::Progress progress;
+  bool moving = false;
+  bus.Subscribe<chase::scenario_t>(
+      "SCENARIO", [&](const chase::scenario_t& m) { progress.SetScenario(m); });
+  bus.Subscribe<chase::truth_t>("TRUTH", [&](const chase::truth_t& m) {
+    progress.NoteArrival(bus.Now());
+    progress.Add(m);
+    moving = true;
+  });
+  int64_t next = bus.Now() + kPeriod;
+  while (stop_requested == 0 && !progress.done()) {
+    bus.Handle(next - bus.Now());
+    if (bus.Now() < next) continue;
+    if (moving) Print(progress, bus.Now());
+    next += kPeriod;
+  }
+  Print(progress, bus.Now());
+  return progress.done() ? 0 : 1;
+}
+
+}  // namespace
+
+/// Prints one JSON line a second about the flight on the bus and ends with the mission.
+int main(int argc, char** argv) {
+  CLI::App app("Prints one JSON line a second about the flight on the bus; exits 0 at its end.");
+  const char* env = std::getenv("LCM_DEFAULT_URL");
+  std::string url = env != nullptr ? env : chase::bus::kDefaultUrl, prefix;
+  app.add_option("--lcm-url", url, "LCM provider (default: $LCM_DEFAULT_URL, else built in)");
+  app.add_option("--channel-prefix", prefix, "put in front of every channel's name");
+  CLI11_PARSE(app, argc, argv);
+  std::signal(SIGINT, [](int) { stop_requested = 1; });
+  std::signal(SIGTERM, [](int) { stop_requested = 1; });
+  try {
+    return Watch(url, prefix);
+  } catch (const std::exception& e) {
+    fmt::print(stderr, "chase-flight-monitor: {}\n", e.what());
+    return 1;
+  }
+}
