@@ -1,0 +1,46 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+
+namespace chase::control {
+
+/// Gains and limits of the controller. Per-axis values are in frame W.
+struct ControlConfig {
+  Eigen::Vector3d position_gain = {5.0, 5.0, 6.0};  ///< 1/s^2
+  Eigen::Vector3d velocity_gain = {3.6, 3.6, 4.0};  ///< 1/s
+  Eigen::Vector3d integral_gain = {1.2, 1.2, 2.0};  ///< 1/s^3
+  double integral_limit = 2.0;                      ///< per axis, m/s^2
+  double catch_up_speed = 2.0;                      ///< m/s
+  Eigen::Vector3d drag = {0.25, 0.25, 0.25};        ///< 1/s
+  double tilt_limit_deg = 35.0;
+  double min_thrust = 2.0;     ///< m/s^2
+  double max_thrust = 18.0;    ///< m/s^2
+  double max_body_rate = 4.0;  ///< rad/s
+  double max_yaw_error = 0.8;  ///< rad
+  double lead = 0.04;          ///< s
+  double slow_down = 0.6;      ///< s
+  double lost_descent = 0.15;  ///< m/s^2
+
+  template <class V>
+  void Visit(V& v) {
+    v("position_gain", position_gain, "acceleration per position error, x y z, 1/s^2");
+    v("velocity_gain", velocity_gain, "acceleration per velocity error, x y z, 1/s");
+    v("integral_gain", integral_gain, "growth of the integral per position error, x y z, 1/s^3");
+    v("integral_limit", integral_limit, "bound of the integral on each axis, m/s^2");
+    v("catch_up_speed", catch_up_speed, "speed at which a large position error is closed, m/s");
+    v("drag", drag, "linear drag over mass that is fed forward, x y z, 1/s");
+    v("tilt_limit_deg", tilt_limit_deg, "between the desired thrust and the vertical");
+    v("min_thrust", min_thrust, "collective thrust over mass, m/s^2");
+    v("max_thrust", max_thrust, "collective thrust over mass, m/s^2");
+    v("max_body_rate", max_body_rate, "bound of the feed-forward on each axis, rad/s");
+    v("max_yaw_error", max_yaw_error, "largest step of yaw asked for at once, rad");
+    v("lead", lead, "the plan's acceleration and yaw are taken this much ahead: attitude lag, s");
+    v("slow_down", slow_down, "last part of a plan, flown ever slower unless a new one comes, s");
+    v("lost_descent", lost_descent, "thrust short of hovering while the pose is lost, m/s^2");
+  }
+
+  std::string Problem() const;
+};
+
+}  // namespace chase::control
