@@ -13,8 +13,9 @@ int Degree(const Polynomial& p) { return static_cast<int>(p.size()) - 1; }
 Positivity DecideAtDepth(const Polynomial& b, double error, double step, int depth) {
   const double low = b.minCoeff();
   if (low > error) return Positivity::kPositive;
-  if (b[0] < -error || b[b.size() - 1] < -error) return Positivity::kNotPositive;
-  if (depth == 0) return Positivity::kUndecided;
+  const double lowest_end = std::min(b[0], b[b.size() - 1]);
+  if (lowest_end < -error) return Positivity::kNotPositive;
+  if (depth == 0 || lowest_end <= error) return Positivity::kUndecided;
   Polynomial left, right;
   SplitBernstein(b, 0.5, &left, &right);
   const Positivity first = DecideAtDepth(left, error + step, step, depth - 1);

@@ -42,30 +42,41 @@ Integers Multiply(const Integers& a, const Integers& b) {
   return r;
 }
 
-// A positive multiple of the remainder of r by b.
+int Degree(const Integers& p) { return static_cast<int>(p.size()) - 1; }
+
+// |lead(b)|^max(deg r - deg b + 1, 0) r modulo b: a positive multiple of the remainder.
 Integers Remainder(Integers r, const Integers& b) {
   const Integer lead = abs(b.back());
-  while (r.size() >= b.size()) {
-    const Integer factor = Sign(b.back()) > 0 ? r.back() : Integer(-r.back());
-    const size_t shift = r.size() - b.size();
+  for (int steps = Degree(r) - Degree(b) + 1; steps > 0; --steps) {
+    const bool reduces = r.size() >= b.size();
+    const Integer factor = !reduces ? Integer(0) : b.back() > 0 ? r.back() : Integer(-r.back());
     for (Integer& x : r) x *= lead;
+    if (!reduces) continue;
+    const size_t shift = r.size() - b.size();
     for (size_t j = 0; j < b.size(); ++j) r[shift + j] -= factor * b[j];
-    r.pop_back();
     Trim(&r);
   }
   return r;
 }
 
-// The signed remainder sequence of first and second, down to their greatest common divisor.
+// The signed remainder sequence of first and second (of lower degree), down to their greatest
+// common divisor, up to positive factors. Those are kept small by the divisors of the subresultant
+// algorithm (Collins 1967, Brown 1971), which divide exactly.
 std::vector<Integers> Chain(Integers first, Integers second) {
   MakePrimitive(&first);
   MakePrimitive(&second);
   std::vector<Integers> chain = {std::move(first)};
+  Integer g = 1, h = 1;
   while (!second.empty()) {
     chain.push_back(std::move(second));
-    second = Remainder(chain[chain.size() - 2], chain.back());
-    for (Integer& x : second) x = -x;
-    MakePrimitive(&second);
+    const Integers& a = chain[chain.size() - 2];
+    const Integers& b = chain.back();
+    const unsigned delta = static_cast<unsigned>(Degree(a) - Degree(b));
+    second = Remainder(a, b);
+    const Integer divisor = -g * pow(h, delta);
+    for (Integer& x : second) x /= divisor;
+    g = abs(b.back());
+    h = delta == 0 ? h : Integer(pow(g, delta) / pow(h, delta - 1));
   }
   return chain;
 }
@@ -94,9 +105,7 @@ int Variation(const std::vector<Integers>& chain) {
 
 // Sum over the distinct roots of p in (0,1) of the sign of q there (Tarski query). p(0), p(1) != 0.
 int TarskiQuery(const Integers& p, const Integers& q) {
-  Integers second = Multiply(Derivative(p), q);
-  Trim(&second);
-  return Variation(Chain(p, std::move(second)));
+  return Variation(Chain(p, Remainder(Multiply(Derivative(p), q), p)));
 }
 
 // Takes out the factors t^a and (1-t)^b, which are positive inside (0,1).
