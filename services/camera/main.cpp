@@ -1,0 +1,7 @@
+#include "common/bus/run_service.h"
+#include "services/camera/camera_node.h"
+
+int main(int argc, char** argv) {
+  return chase::bus::RunService<chase::camera::CameraNode, chase::camera::CameraConfig>(
+      "camera", "Publishes frames of a camera, a video or a folder of images.", argc, argv);
+}

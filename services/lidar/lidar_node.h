@@ -1,0 +1,43 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+
+#include "common/bus/bus.h"
+#include "common/bus/node.h"
+#include "services/lidar/clock_alignment.h"
+#include "services/lidar/config.h"
+#include "services/lidar/packet_source.h"
+#include "services/lidar/sweep_assembler.h"
+
+namespace chase::lidar {
+
+/// Publishes each whole sweep as LIDAR_SCAN. A recording plays at its own pace from the first tick.
+class LidarNode : public bus::Node {
+ public:
+  LidarNode(bus::Bus& bus, const LidarConfig& config);
+
+  int64_t TickPeriod() const override { return 10'000; }
+  void Tick(int64_t utime) override;
+  bool Done() const override { return done_; }
+  bus::NodeReport Report() const override;
+
+ private:
+  void TickDevice(int64_t utime);
+  void TickRecording(int64_t utime);
+  void Take(const RawPacket& packet);
+  void Publish(const Sweep& sweep);
+  void StopIfRefused();
+
+  bus::Bus& bus_;
+  SweepAssembler assembler_;
+  SweepAssembler clock_;  // only unwraps the stamps of packets that wait for their time
+  std::unique_ptr<PacketSource> source_;
+  ClockAlignment alignment_;
+  std::optional<RawPacket> next_;
+  std::optional<int64_t> first_tick_, first_device_us_;
+  long sweeps_ = 0;
+  bool done_ = false;
+};
+
+}  // namespace chase::lidar

@@ -1,0 +1,7 @@
+#include "common/bus/run_service.h"
+#include "services/lidar/lidar_node.h"
+
+int main(int argc, char** argv) {
+  return chase::bus::RunService<chase::lidar::LidarNode, chase::lidar::LidarConfig>(
+      "lidar", "Turns VLP-16 packets into sweeps.", argc, argv);
+}

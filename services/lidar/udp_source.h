@@ -1,0 +1,12 @@
+#pragma once
+
+#include <memory>
+
+#include "services/lidar/packet_source.h"
+
+namespace chase::lidar {
+
+/// Listens on every interface. Throws std::runtime_error when the port cannot be had.
+std::unique_ptr<PacketSource> OpenUdpSource(int port);
+
+}  // namespace chase::lidar

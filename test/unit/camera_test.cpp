@@ -1,0 +1,112 @@
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+#include <opencv2/videoio.hpp>
+
+#include "services/camera/config.h"
+#include "services/camera/frame_source.h"
+#include "services/camera/image.h"
+
+namespace chase::camera {
+namespace {
+
+namespace fs = std::filesystem;
+
+fs::path FreshFolder(const std::string& name) {
+  const fs::path folder = fs::path(::testing::TempDir()) / name;
+  fs::remove_all(folder);
+  fs::create_directories(folder);
+  return folder;
+}
+
+std::string ErrorOf(const std::string& source) {
+  try {
+    OpenFrameSource(source, 20.0);
+  } catch (const std::runtime_error& e) {
+    return e.what();
+  }
+  return "";
+}
+
+TEST(CameraImage, ChannelsComeOutAsRgb) {
+  const cv::Mat bgr(4, 6, CV_8UC3, cv::Scalar(10, 20, 30));
+  EXPECT_EQ(ToRgb(bgr, 0, 0).at<cv::Vec3b>(2, 3), cv::Vec3b(30, 20, 10));
+  const cv::Mat bgra(4, 6, CV_8UC4, cv::Scalar(10, 20, 30, 99));
+  EXPECT_EQ(ToRgb(bgra, 0, 0).at<cv::Vec3b>(0, 0), cv::Vec3b(30, 20, 10));
+  const cv::Mat grey(4, 6, CV_16UC1, cv::Scalar(65535));
+  EXPECT_EQ(ToRgb(grey, 0, 0).at<cv::Vec3b>(0, 0), cv::Vec3b(255, 255, 255));
+  EXPECT_TRUE(ToRgb({}, 0, 0).empty());
+  EXPECT_TRUE(ToRgb(cv::Mat(4, 4, CV_32FC1), 0, 0).empty());
+}
+
+/// A circle stays a circle whatever the aspect ratio that comes in.
+TEST(CameraImage, ResizingKeepsTheAspectRatio) {
+  for (const cv::Size size : {cv::Size(1280, 720), cv::Size(640, 480), cv::Size(400, 900)}) {
+    cv::Mat frame(size, CV_8UC3, cv::Scalar::all(0));
+    cv::circle(frame, {size.width / 2, size.height / 2}, 100, cv::Scalar::all(255), -1);
+    const cv::Mat out = ToRgb(frame, 376, 240);
+    ASSERT_EQ(out.size(), cv::Size(376, 240));
+    ASSERT_TRUE(out.isContinuous());
+    cv::Mat grey;
+    cv::cvtColor(out, grey, cv::COLOR_RGB2GRAY);
+    const cv::Rect box = cv::boundingRect(grey > 128);
+    EXPECT_NEAR(box.width, box.height, 2);
+    EXPECT_NEAR(box.x + box.width / 2.0, 188, 2);
+  }
+}
+
+TEST(CameraSource, AFolderGivesItsImagesByName) {
+  const fs::path folder = FreshFolder("camera_folder");
+  for (const int k : {2, 0, 1})
+    cv::imwrite((folder / ("frame_" + std::to_string(k) + ".png")).string(),
+                cv::Mat(8, 8, CV_8UC3, cv::Scalar::all(50 * k)));
+  std::ofstream(folder / "notes.txt") << "not an image";
+  std::ofstream(folder / "frame_1b.png") << "broken";
+  const auto source = OpenFrameSource(folder.string(), 20.0);
+  EXPECT_TRUE(source->IsRecording());
+  for (int k = 0; k < 3; ++k) {
+    const auto frame = source->Next();
+    ASSERT_TRUE(frame);
+    EXPECT_EQ(frame->at<cv::Vec3b>(0, 0)[0], 50 * k);
+  }
+  EXPECT_FALSE(source->Next());
+}
+
+TEST(CameraSource, AVideoGivesAllItsFrames) {
+  const std::string file = (FreshFolder("camera_video") / "v.avi").string();
+  cv::VideoWriter writer(file, cv::VideoWriter::fourcc('M', 'J', 'P', 'G'), 20.0, {64, 48});
+  ASSERT_TRUE(writer.isOpened());
+  for (int k = 0; k < 5; ++k) writer.write(cv::Mat(48, 64, CV_8UC3, cv::Scalar::all(40 * k)));
+  writer.release();
+  const auto source = OpenFrameSource(file, 20.0);
+  for (int k = 0; k < 5; ++k) {
+    const auto frame = source->Next();
+    ASSERT_TRUE(frame);
+    EXPECT_NEAR(frame->at<cv::Vec3b>(20, 20)[1], 40 * k, 4);
+  }
+  EXPECT_FALSE(source->Next());
+}
+
+TEST(CameraSource, BadSourcesAreRefusedInOneLine) {
+  EXPECT_NE(ErrorOf("/nonexistent/video").find("no such"), std::string::npos);
+  EXPECT_NE(ErrorOf(FreshFolder("camera_empty").string()).find("no image"), std::string::npos);
+  const fs::path text = FreshFolder("camera_text") / "a.txt";
+  std::ofstream(text) << "not a video";
+  EXPECT_NE(ErrorOf(text.string()).find("no video"), std::string::npos);
+}
+
+TEST(CameraConfig, ProblemsNameTheField) {
+  CameraConfig config;
+  EXPECT_EQ(config.Problem(), "");
+  config.rate_hz = 0.0;
+  EXPECT_NE(config.Problem().find("rate_hz"), std::string::npos);
+  config = {};
+  config.width_px = 0;
+  EXPECT_NE(config.Problem().find("height_px"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace chase::camera

@@ -1,0 +1,5 @@
+chase_test(lidar_test
+  LIBS lidar_core lidar_source
+  SOURCES ${CMAKE_CURRENT_LIST_DIR}/lidar_decoder_test.cpp
+          ${CMAKE_CURRENT_LIST_DIR}/lidar_sweep_test.cpp
+          ${CMAKE_CURRENT_LIST_DIR}/lidar_source_test.cpp)
