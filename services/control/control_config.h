@@ -12,7 +12,7 @@ struct ControlConfig {
   Eigen::Vector3d integral_gain = {1.2, 1.2, 2.0};  ///< 1/s^3
   double integral_limit = 2.0;                      ///< per axis, m/s^2
   double catch_up_speed = 2.0;                      ///< m/s
-  Eigen::Vector3d drag = {0.25, 0.25, 0.25};        ///< 1/s
+  Eigen::Vector3d drag = {0.25, 0.25, 0.15};        ///< 1/s
   double tilt_limit_deg = 35.0;
   double min_thrust = 2.0;     ///< m/s^2
   double max_thrust = 18.0;    ///< m/s^2

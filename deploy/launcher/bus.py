@@ -1,0 +1,95 @@
+"""The LCM URL, and what a multicast socket can tell about the network under it."""
+
+import os
+import re
+import socket
+import struct
+import time
+
+DEFAULT_URL = "udpm://239.255.76.67:7667?ttl=0&recv_buf_size=2097152"
+RECEIVE_BUFFER = 2097152  # bytes; a cloud of 400 kB needs several
+
+
+def url():
+    return os.environ.get("CHASE_LCM_URL", DEFAULT_URL)
+
+
+def endpoint(text):
+    """(group, port) of a udpm URL, or None where it is something else."""
+    match = re.fullmatch(r"udpm://([0-9.]+):(\d+)(\?.*)?", text)
+    return (match.group(1), int(match.group(2))) if match else None
+
+
+def listener(group, port):
+    """A socket that hears the group. OSError where the port is taken or the route is missing."""
+    sock = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    sock.bind(("", port))
+    request = struct.pack("=4s4s", socket.inet_aton(group), socket.inet_aton("0.0.0.0"))
+    sock.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, request)
+    return sock
+
+
+def route_cure(group):
+    return f"cure: ip link set lo up && ip route add {group}/32 dev lo"
+
+
+def loopback_problem(group, port):
+    """Sends one LCM message to ourselves; a sentence where it does not come back, else ''."""
+    packet = b"LC02" + struct.pack(">I", 0) + b"LOOPBACK_%d\0" % os.getpid()
+    try:
+        receiver = listener(group, port)
+        sender = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        sender.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, 0)
+        sender.sendto(packet, (group, port))
+    except OSError as error:
+        if error.errno == 98:
+            return f"port {port} is taken by a program that does not share it; {port_cure()}"
+        return f"no multicast on {group}:{port} ({error.strerror}); {route_cure(group)}"
+    deadline = time.monotonic() + 1.0
+    for heard in packets(receiver, deadline):
+        if heard == packet:
+            return ""
+    return (f"own messages to {group}:{port} do not come back: a firewall drops them or the route "
+            f"is missing; {route_cure(group)}")
+
+
+def port_cure():
+    return ("cure: stop that program, or choose another port: "
+            "CHASE_LCM_URL='udpm://239.255.76.67:7668?ttl=0&recv_buf_size=2097152'")
+
+
+def packets(sock, deadline):
+    while (left := deadline - time.monotonic()) > 0:
+        sock.settimeout(left)
+        try:
+            yield sock.recv(65536)
+        except socket.timeout:
+            return
+
+
+def channel_of(packet):
+    """Channel of an LCM packet; of a fragment after the first and of anything else ''."""
+    if packet[:4] == b"LC02":
+        start = 8
+    elif packet[:4] == b"LC03" and len(packet) > 20 and packet[16:18] == b"\0\0":
+        start = 20
+    else:
+        return ""
+    return packet[start:].split(b"\0", 1)[0].decode("ascii", "replace")
+
+
+def foreign_channels(group, port, seconds):
+    """Channels that someone else is sending on during `seconds`; any message of ours is foreign
+    before a flight. LCM binds every address: other groups on the same port are heard as well."""
+    heard = {channel_of(p) for p in packets(listener(group, port), time.monotonic() + seconds)}
+    return sorted(c for c in heard if c and not c.startswith("LOOPBACK_"))
+
+
+def kernel(name):
+    """An integer under /proc/sys, such as net/core/rmem_max; None where it cannot be read."""
+    try:
+        with open("/proc/sys/" + name, encoding="ascii") as file:
+            return int(file.read().split()[0])
+    except (OSError, ValueError):
+        return None

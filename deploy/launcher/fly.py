@@ -1,0 +1,231 @@
+"""Builds, starts every process with the simulator, watches the flight, and judges it."""
+
+import argparse
+import datetime
+import json
+import os
+import pathlib
+import signal
+import subprocess
+import sys
+import time
+
+import bus
+import processes
+import results
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+BIN = ROOT / "build" / "bin"
+SILENCE_LIMIT = 30.0  # s of wall time in which the mission's time must move
+TAIL = 1.0  # s recorded after the mission's end
+
+
+class FlightError(Exception):
+    """One line: what, where, cure."""
+
+
+class Parser(argparse.ArgumentParser):
+    def error(self, message):
+        raise FlightError(f"{message}; see deploy/fly --help")
+
+
+def parse(arguments):
+    parser = Parser(prog="deploy/fly", description=__doc__)
+    parser.add_argument("scenario", nargs="?", default="gym",
+                        help="name in deploy/scenarios, or a file (default: gym)")
+    parser.add_argument("--seed", type=int, default=1, help="of noise and gusts (default: 1)")
+    parser.add_argument("--view", action="store_true", help="look on with lcm-spy (needs a display)")
+    return parser.parse_args(arguments)
+
+
+def find_scenario(name):
+    scenarios = ROOT / "deploy" / "scenarios"
+    for path in (scenarios / f"{name}.yaml", pathlib.Path(name)):
+        if path.is_file():
+            return path.resolve()
+    known = ", ".join(sorted(str(p.relative_to(scenarios))[:-5] for p in scenarios.rglob("*.yaml")))
+    raise FlightError(f"no scenario '{name}'; there are: {known}")
+
+
+def flight_processes():
+    table = json.loads((ROOT / "deploy" / "processes.json").read_text(encoding="utf-8"))
+    return [row for row in table["processes"] if row["fly"]]
+
+
+def build():
+    if subprocess.run([ROOT / "deploy" / "build"], check=False).returncode:
+        raise FlightError("the build failed; its messages above say why")
+
+
+def raise_receive_buffers():
+    """Large messages need room in the kernel; LCM asks for it and gets at most rmem_max."""
+    if (bus.kernel("net/core/rmem_max") or 0) >= bus.RECEIVE_BUFFER:
+        return
+    command = ["sysctl", "-q", "-w", f"net.core.rmem_max={bus.RECEIVE_BUFFER}",
+               f"net.core.rmem_default={bus.RECEIVE_BUFFER}"]
+    if os.geteuid():
+        command = ["sudo", "-n"] + command
+    try:
+        subprocess.run(command, check=False, stderr=subprocess.DEVNULL)
+    except FileNotFoundError:
+        pass
+    if (bus.kernel("net/core/rmem_max") or 0) < bus.RECEIVE_BUFFER:
+        print("warning: net.core.rmem_max is small, sweeps and images will be lost; "
+              f"cure: sudo sysctl -w net.core.rmem_max={bus.RECEIVE_BUFFER}", file=sys.stderr)
+
+
+def check_bus(url):
+    where = bus.endpoint(url)
+    if not where:
+        raise FlightError(f"CHASE_LCM_URL={url}: not of the form udpm://ADDRESS:PORT?ttl=0")
+    if problem := bus.loopback_problem(*where):
+        raise FlightError(problem)
+    if others := bus.foreign_channels(*where, seconds=0.5):
+        raise FlightError(f"somebody is sending on port {where[1]} ({', '.join(others[:3])}); "
+                          f"{bus.port_cure()}")
+
+
+def flight_folder(scenario):
+    stamp = datetime.datetime.now().strftime("%Y%m%d-%H%M%S")
+    folder = ROOT / "logs" / f"{stamp}-{scenario.stem}"
+    folder.mkdir(parents=True)
+    return folder
+
+
+def write_config(folder, scenario, seed, name):
+    """The service's YAML for this scenario, as chase-flight would set it in lockstep."""
+    command = [BIN / "chase-flight", scenario, "--seed", str(seed), "--print-config", name]
+    answer = subprocess.run(command, capture_output=True, text=True, check=False)
+    if answer.returncode:
+        raise FlightError(answer.stderr.strip() or f"chase-flight --print-config {name} failed")
+    path = folder / f"{name}.yaml"
+    path.write_text(answer.stdout, encoding="utf-8")
+    return path
+
+
+class Flight:
+    """The processes of one flight and the folder that they leave."""
+
+    def __init__(self, scenario, seed, url):
+        self.folder = flight_folder(scenario)
+        self.scenario, self.seed = scenario, seed
+        self.env = {"LCM_DEFAULT_URL": url}
+        self.services, self.logger, self.monitor, self.spy = [], None, None, None
+
+    def child(self, name, command, **options):
+        return processes.Child(name, command, self.folder / f"{name}.log", self.env, **options)
+
+    def start(self, view):
+        rows = flight_processes()
+        configs = {row["name"]: write_config(self.folder, self.scenario, self.seed, row["name"])
+                   for row in rows}
+        self.logger = self.child("logger", ["lcm-logger", "-q", self.folder / "flight.lcm"])
+        self.monitor = self.child("monitor", [BIN / "chase-flight-monitor"], stdout=subprocess.PIPE)
+        os.set_blocking(self.monitor.process.stdout.fileno(), False)
+        if view:
+            self.spy = self.child("spy", [ROOT / "deploy" / "spy"])
+        # The simulator comes last: its clock starts when everybody listens.
+        for row in sorted(rows, key=lambda r: r["name"] == "simulator"):
+            if row["name"] == "simulator":
+                self.wait_ready()
+            command = [BIN / row["binary"], "--config", configs[row["name"]]]
+            self.services.append(self.child(row["name"], command, notifies=True))
+        self.wait_ready()
+
+    def wait_ready(self):
+        if not processes.wait_ready(self.services):
+            self.complain()
+            late = ", ".join(c.name for c in self.services if not c.ready())
+            raise FlightError(f"not ready after {processes.READY_LIMIT:.0f} s: {late}; "
+                              f"their logs are in {self.folder}")
+
+    def complain(self, *watchers):
+        """Raises when a process has ended or hangs; shows the end of its log."""
+        child, sentence = processes.first_problem(self.services + [self.logger, *watchers])
+        if child:
+            raise FlightError(f"{sentence}; the end of {child.log}:\n{child.log_tail()}")
+
+    def watch(self):
+        """Shows progress until the mission's end."""
+        last_time, moved = None, time.monotonic()
+        while True:
+            line = self.monitor.process.stdout.readline()
+            if line:
+                progress = json.loads(line)
+                show(progress)
+                if progress["done"]:
+                    return
+                if progress["mission_time"] != last_time:
+                    last_time, moved = progress["mission_time"], time.monotonic()
+            self.complain(self.monitor)
+            if time.monotonic() - moved > SILENCE_LIMIT:
+                raise FlightError(f"the mission's time has not moved for {SILENCE_LIMIT:.0f} s; "
+                                  f"the logs are in {self.folder}")
+            if not line:
+                time.sleep(0.1)
+
+    def stop(self):
+        """Services first, the logger last, so that the log holds their last words."""
+        extras = [c for c in (self.monitor, self.spy) if c]
+        processes.stop(self.services + extras)
+        if self.logger:
+            processes.stop([self.logger])
+
+
+def show(progress):
+    text = (f"t {progress['mission_time']:6.1f} / {progress.get('duration', 0):.0f} s   "
+            f"distance {progress['distance']:5.2f} m   visible {100 * progress['visible']:5.1f} %   "
+            f"real-time factor {progress['rtf']:.2f}")
+    if sys.stdout.isatty():
+        print("\r" + text, end="\n" if progress["done"] else "", flush=True)
+    else:
+        print(text, flush=True)
+
+
+def report(folder):
+    """Runs chase-report; prints the criteria. True when all hold."""
+    command = [BIN / "chase-report", folder / "flight.lcm", "--out", folder]
+    with open(folder / "report.log", "wb") as log:
+        code = subprocess.run(command, stdout=log, stderr=log, check=False).returncode
+    if code:
+        raise FlightError(f"chase-report failed (exit code {code}); see {folder / 'report.log'}")
+    metrics = results.load(folder / "metrics.json")
+    print("\n" + results.table(metrics))
+    print(f"\nreport   {folder / 'report.html'}\nmetrics  {folder / 'metrics.json'}\n"
+          f"log      {folder / 'flight.lcm'}")
+    return results.passed(metrics)
+
+
+def fly(options):
+    scenario = find_scenario(options.scenario)
+    build()
+    raise_receive_buffers()
+    url = bus.url()
+    check_bus(url)
+    flight = Flight(scenario, options.seed, url)
+    print(f"flying {scenario.stem}, seed {options.seed}, into {flight.folder}", flush=True)
+    try:
+        flight.start(options.view)
+        flight.watch()
+        time.sleep(TAIL)
+        flight.complain()
+    finally:
+        flight.stop()
+    return 0 if report(flight.folder) else 1
+
+
+def main():
+    # A terminal's Ctrl-C, a service manager's and a closed window's wishes end the flight alike.
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.default_int_handler)
+    try:
+        return fly(parse(sys.argv[1:]))
+    except FlightError as error:
+        print(f"deploy/fly: {error}", file=sys.stderr)
+    except KeyboardInterrupt:
+        print("deploy/fly: stopped; everything it started has ended", file=sys.stderr)
+    return 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

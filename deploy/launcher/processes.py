@@ -1,0 +1,113 @@
+"""Child processes: started in their own session, watched, stopped in order."""
+
+import ctypes
+import os
+import signal
+import socket
+import subprocess
+import time
+
+PR_SET_PDEATHSIG = 1
+READY_LIMIT = 30.0  # s
+WATCHDOG_LIMIT = 10.0  # s without a sign of life
+STOP_LIMIT = 5.0  # s from SIGINT to SIGKILL
+
+
+def _die_with_parent():
+    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+
+
+class Child:
+    """One process whose output goes to a file. With `notifies` it speaks sd_notify's protocol."""
+
+    def __init__(self, name, command, log, env=None, notifies=False, stdout=None):
+        self.name = name
+        self.log = log
+        self._socket = self._notify_socket() if notifies else None
+        self._ready = not notifies
+        self._last_sign = time.monotonic()
+        environment = dict(os.environ, **(env or {}))
+        environment.pop("NOTIFY_SOCKET", None)
+        if notifies:
+            environment["NOTIFY_SOCKET"] = self._address
+        with open(log, "ab") as file:
+            self.process = subprocess.Popen(
+                command, stdin=subprocess.DEVNULL, stdout=stdout or file, stderr=file,
+                env=environment, start_new_session=True, preexec_fn=_die_with_parent)
+
+    def _notify_socket(self):
+        self._address = f"@chase-{os.getpid()}-{self.name}"
+        sock = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+        sock.bind("\0" + self._address[1:])
+        sock.setblocking(False)
+        return sock
+
+    def _hear(self):
+        while self._socket:
+            try:
+                words = self._socket.recv(4096).decode("ascii", "replace").split("\n")
+            except BlockingIOError:
+                return
+            self._last_sign = time.monotonic()
+            self._ready = self._ready or "READY=1" in words
+
+    def ready(self):
+        self._hear()
+        return self._ready
+
+    def problem(self):
+        """A sentence when the process has ended or hangs, else ''."""
+        code = self.process.poll()
+        if code is not None:
+            how = f"exit code {code}" if code >= 0 else signal.Signals(-code).name
+            return f"{self.name} ended ({how})"
+        self._hear()
+        if self._socket and time.monotonic() - self._last_sign > WATCHDOG_LIMIT:
+            return f"{self.name} has given no sign of life for {WATCHDOG_LIMIT:.0f} s"
+        return ""
+
+    def log_tail(self, lines=8):
+        with open(self.log, encoding="utf-8", errors="replace") as file:
+            return "".join(file.readlines()[-lines:]).rstrip()
+
+    def ask_to_stop(self):
+        if self.process.poll() is None:
+            self.process.send_signal(signal.SIGINT)
+
+    def wait_stopped(self, deadline):
+        try:
+            self.process.wait(max(0.0, deadline - time.monotonic()))
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.wait()
+        if self._socket:
+            self._socket.close()
+
+
+def first_problem(children):
+    """(child, sentence) of the first that has ended or hangs, or (None, '')."""
+    for child in children:
+        if sentence := child.problem():
+            return child, sentence
+    return None, ""
+
+
+def wait_ready(children):
+    """True once all are ready; False when one ends or READY_LIMIT passes."""
+    deadline = time.monotonic() + READY_LIMIT
+    while time.monotonic() < deadline:
+        if first_problem(children)[0]:
+            return False
+        if all(child.ready() for child in children):
+            return True
+        time.sleep(0.05)
+    return False
+
+
+def stop(children):
+    """SIGINT to all, then SIGKILL to those that stay."""
+    for child in children:
+        child.ask_to_stop()
+    deadline = time.monotonic() + STOP_LIMIT
+    for child in children:
+        child.wait_stopped(deadline)
