@@ -1,0 +1,100 @@
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <stdexcept>
+
+#include "logs/src/diff.h"
+#include "logs/src/export.h"
+#include "logs/src/import.h"
+#include "logs/src/info.h"
+
+namespace {
+
+using namespace chase::logs;
+
+struct Arguments {
+  std::string in, out, other, format, channel;
+  std::vector<std::string> ignore;
+  bool tum = false, csv = false, mcap = false;
+};
+
+void AddInfo(CLI::App* app, Arguments* a) {
+  auto* sub = app->add_subcommand("info", "One line per channel: type, count, rate, bytes, times.");
+  sub->add_option("LOG", a->in, "LCM log")->required();
+  sub->callback([a] { std::fputs(Format(Describe(a->in)).c_str(), stdout); });
+}
+
+void RunImport(const Arguments& a) {
+  const int sweeps = a.format == "vlp16" ? ImportVlp16(a.in, a.out) : ImportKitti16(a.in, a.out);
+  std::printf("%s: %d sweeps\n", a.out.c_str(), sweeps);
+}
+
+void AddImport(CLI::App* app, Arguments* a) {
+  auto* sub = app->add_subcommand("import", "Turns a recording into a log of LIDAR_SCAN.");
+  sub->add_option("FORMAT", a->format,
+                  "vlp16: raw 1206-byte packets or .pcap; kitti16: 16-ring KITTI .bin or .bin.xz")
+      ->required()
+      ->check(CLI::IsMember({"vlp16", "kitti16"}));
+  sub->add_option("FILE", a->in, "recording")->required();
+  sub->add_option("OUT", a->out, "LCM log to write")->required();
+  sub->callback([a] { RunImport(*a); });
+}
+
+void RunExport(const Arguments& a) {
+  if (a.mcap)
+    throw std::runtime_error(a.out + ": --mcap is not supported; use --csv, or --tum for poses");
+  if (a.tum)
+    std::printf("%s: %ld poses\n", a.out.c_str(), ExportTum(a.in, a.out));
+  else
+    std::printf("%s: %d files\n", a.out.c_str(), ExportCsv(a.in, a.out, a.channel));
+}
+
+void AddExport(CLI::App* app, Arguments* a) {
+  auto* sub = app->add_subcommand("export", "Writes a log in a format that others read.");
+  auto* format = sub->add_option_group("format");
+  format->add_flag("--tum", a->tum, "trajectory of POSE: t x y z qx qy qz qw");
+  format->add_flag("--csv", a->csv, "OUT is a folder: one file per channel");
+  format->add_flag("--mcap", a->mcap, "refused: not supported");
+  format->require_option(1);
+  sub->add_option("--channel", a->channel, "--csv: this channel only, clouds and images included");
+  sub->add_option("LOG", a->in, "LCM log")->required();
+  sub->add_option("OUT", a->out, "file or folder to write")->required();
+  sub->callback([a] { RunExport(*a); });
+}
+
+void AddDiff(CLI::App* app, Arguments* a, int* exit_code) {
+  auto* sub =
+      app->add_subcommand("diff", "Compares two logs field by field; exit 1 if they differ.");
+  sub->add_option("A", a->in, "LCM log")->required();
+  sub->add_option("B", a->other, "LCM log")->required();
+  sub->add_option("--ignore", a->ignore,
+                  "CHANNEL.field left out, shell patterns allowed; CHANNEL alone: all of it");
+  sub->callback([a, exit_code] {
+    const auto differences = Diff(a->in, a->other, a->ignore);
+    std::fputs(differences.empty() ? "no difference\n" : Format(differences).c_str(), stdout);
+    *exit_code = differences.empty() ? 0 : 1;
+  });
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app{"Shows, imports, exports and compares LCM logs."};
+  app.name("chase-log");
+  app.set_version_flag("--version", CHASE_VERSION);
+  app.require_subcommand(1);
+  Arguments arguments;
+  int exit_code = 0;
+  AddInfo(&app, &arguments);
+  AddImport(&app, &arguments);
+  AddExport(&app, &arguments);
+  AddDiff(&app, &arguments, &exit_code);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    return app.exit(e) == 0 ? 0 : 1;
+  } catch (const std::exception& e) {
+    std::fprintf(stderr, "chase-log: %s\n", e.what());
+    return 1;
+  }
+  return exit_code;
+}

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+namespace chase::logs {
+
+/// How one field of a channel differs between two logs.
+struct FieldDifference {
+  long messages = 0;         ///< in which it differs
+  double greatest = 0.0;     ///< absolute difference of numbers
+  long first = 0;            ///< index of the first message in which it differs
+  std::string first_values;  ///< "1.5 against 1.7"
+};
+
+struct ChannelDifference {
+  long count_a = 0, count_b = 0;
+  std::map<std::string, FieldDifference> fields;  ///< by path; "event_time" is the log's own stamp
+};
+
+/// Compares the k-th message of each channel in A with the k-th in B, field by field. `ignore`
+/// holds shell patterns for "CHANNEL.field", such as "*_STATUS.*". The result holds the channels
+/// that differ. Throws std::runtime_error with one line when a log cannot be read.
+std::map<std::string, ChannelDifference> Diff(const std::string& a, const std::string& b,
+                                              const std::vector<std::string>& ignore);
+
+/// One line per channel and one per field that differs, for people.
+std::string Format(const std::map<std::string, ChannelDifference>& differences);
+
+}  // namespace chase::logs

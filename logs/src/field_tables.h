@@ -1,0 +1,263 @@
+#pragma once
+
+#include "chase/attitude_setpoint_t.hpp"
+#include "chase/camera_image_t.hpp"
+#include "chase/channel_status_t.hpp"
+#include "chase/imu_t.hpp"
+#include "chase/lidar_scan_t.hpp"
+#include "chase/map_t.hpp"
+#include "chase/mover_t.hpp"
+#include "chase/obstacle_t.hpp"
+#include "chase/obstacles_t.hpp"
+#include "chase/plan_t.hpp"
+#include "chase/polynomial_t.hpp"
+#include "chase/pose_t.hpp"
+#include "chase/prediction_t.hpp"
+#include "chase/scan_registered_t.hpp"
+#include "chase/scenario_t.hpp"
+#include "chase/stage_status_t.hpp"
+#include "chase/status_t.hpp"
+#include "chase/target_t.hpp"
+#include "chase/truth_t.hpp"
+
+/// The fields of every message type in wire order: `v(name, value)` for each. Tools that show,
+/// compare or export any message go through these tables.
+namespace chase::logs {
+
+template <class V>
+void VisitFields(const polynomial_t& m, V& v) {
+  v("utime", m.utime);
+  v("duration", m.duration);
+  v("n_coefficients", m.n_coefficients);
+  v("coefficients", m.coefficients);
+}
+
+template <class V>
+void VisitFields(const obstacle_t& m, V& v) {
+  v("id", m.id);
+  v("kind", m.kind);
+  v("center", m.center);
+  v("shape", m.shape);
+  v("position_variance", m.position_variance);
+  v("velocity_variance", m.velocity_variance);
+}
+
+template <class V>
+void VisitFields(const mover_t& m, V& v) {
+  v("pos", m.pos);
+  v("vel", m.vel);
+  v("yaw", m.yaw);
+}
+
+template <class V>
+void VisitFields(const channel_status_t& m, V& v) {
+  v("channel", m.channel);
+  v("received", m.received);
+  v("dropped", m.dropped);
+  v("malformed", m.malformed);
+  v("rate_hz", m.rate_hz);
+}
+
+template <class V>
+void VisitFields(const stage_status_t& m, V& v) {
+  v("name", m.name);
+  v("count", m.count);
+  v("mean_ms", m.mean_ms);
+  v("p50_ms", m.p50_ms);
+  v("p99_ms", m.p99_ms);
+  v("max_ms", m.max_ms);
+}
+
+template <class V>
+void VisitFields(const lidar_scan_t& m, V& v) {
+  v("utime", m.utime);
+  v("seq", m.seq);
+  v("size", m.size);
+  v("x", m.x);
+  v("y", m.y);
+  v("z", m.z);
+  v("t", m.t);
+  v("intensity", m.intensity);
+  v("ring", m.ring);
+}
+
+template <class V>
+void VisitFields(const camera_image_t& m, V& v) {
+  v("utime", m.utime);
+  v("seq", m.seq);
+  v("width", m.width);
+  v("height", m.height);
+  v("row_stride", m.row_stride);
+  v("pixelformat", m.pixelformat);
+  v("exposure", m.exposure);
+  v("size", m.size);
+  v("data", m.data);
+}
+
+template <class V>
+void VisitFields(const imu_t& m, V& v) {
+  v("utime", m.utime);
+  v("seq", m.seq);
+  v("accel", m.accel);
+  v("gyro", m.gyro);
+}
+
+template <class V>
+void VisitFields(const pose_t& m, V& v) {
+  v("utime", m.utime);
+  v("seq", m.seq);
+  v("pos", m.pos);
+  v("vel", m.vel);
+  v("orientation", m.orientation);
+  v("rotation_rate", m.rotation_rate);
+  v("accel", m.accel);
+  v("gyro_bias", m.gyro_bias);
+  v("accel_bias", m.accel_bias);
+  v("covariance", m.covariance);
+  v("health", m.health);
+  v("correcting", m.correcting);
+  v("reason", m.reason);
+}
+
+template <class V>
+void VisitFields(const scan_registered_t& m, V& v) {
+  v("utime", m.utime);
+  v("seq", m.seq);
+  v("pos", m.pos);
+  v("orientation", m.orientation);
+  v("health", m.health);
+  v("size", m.size);
+  v("x", m.x);
+  v("y", m.y);
+  v("z", m.z);
+  v("intensity", m.intensity);
+  v("ring", m.ring);
+}
+
+template <class V>
+void VisitFields(const obstacles_t& m, V& v) {
+  v("utime", m.utime);
+  v("seq", m.seq);
+  v("n_obstacles", m.n_obstacles);
+  v("n_cut", m.n_cut);
+  v("obstacles", m.obstacles);
+}
+
+template <class V>
+void VisitFields(const map_t& m, V& v) {
+  v("utime", m.utime);
+  v("seq", m.seq);
+  v("resolution", m.resolution);
+  v("n_occupied", m.n_occupied);
+  v("format", m.format);
+  v("size", m.size);
+  v("data", m.data);
+}
+
+template <class V>
+void VisitFields(const target_t& m, V& v) {
+  v("utime", m.utime);
+  v("seq", m.seq);
+  v("state", m.state);
+  v("mean", m.mean);
+  v("covariance", m.covariance);
+  v("velocity", m.velocity);
+  v("radius", m.radius);
+  v("height", m.height);
+  v("box_px", m.box_px);
+  v("score", m.score);
+  v("n_points", m.n_points);
+}
+
+template <class V>
+void VisitFields(const prediction_t& m, V& v) {
+  v("utime", m.utime);
+  v("seq", m.seq);
+  v("verdict", m.verdict);
+  v("reason", m.reason);
+  v("target", m.target);
+  v("covariance", m.covariance);
+  v("velocity_covariance", m.velocity_covariance);
+  v("radius", m.radius);
+  v("height", m.height);
+  v("cost", m.cost);
+  v("candidates", m.candidates);
+  v("checked", m.checked);
+  v("trigger", m.trigger);
+}
+
+template <class V>
+void VisitFields(const plan_t& m, V& v) {
+  v("utime", m.utime);
+  v("seq", m.seq);
+  v("verdict", m.verdict);
+  v("reason", m.reason);
+  v("position", m.position);
+  v("n_yaw", m.n_yaw);
+  v("yaw", m.yaw);
+  v("target", m.target);
+  v("cost", m.cost);
+  v("generated", m.generated);
+  v("checked", m.checked);
+  v("feasible", m.feasible);
+  v("n_obstacles", m.n_obstacles);
+}
+
+template <class V>
+void VisitFields(const attitude_setpoint_t& m, V& v) {
+  v("utime", m.utime);
+  v("seq", m.seq);
+  v("orientation", m.orientation);
+  v("body_rate", m.body_rate);
+  v("thrust", m.thrust);
+}
+
+template <class V>
+void VisitFields(const truth_t& m, V& v) {
+  v("utime", m.utime);
+  v("seq", m.seq);
+  v("mission_time", m.mission_time);
+  v("pos", m.pos);
+  v("vel", m.vel);
+  v("accel", m.accel);
+  v("orientation", m.orientation);
+  v("rotation_rate", m.rotation_rate);
+  v("target_pos", m.target_pos);
+  v("target_vel", m.target_vel);
+  v("target_yaw", m.target_yaw);
+  v("target_px", m.target_px);
+  v("target_in_image", m.target_in_image);
+  v("visible_share", m.visible_share);
+  v("n_movers", m.n_movers);
+  v("movers", m.movers);
+}
+
+template <class V>
+void VisitFields(const scenario_t& m, V& v) {
+  v("utime", m.utime);
+  v("seq", m.seq);
+  v("seed", m.seed);
+  v("start_utime", m.start_utime);
+  v("name", m.name);
+  v("yaml", m.yaml);
+}
+
+template <class V>
+void VisitFields(const status_t& m, V& v) {
+  v("utime", m.utime);
+  v("seq", m.seq);
+  v("name", m.name);
+  v("state", m.state);
+  v("detail", m.detail);
+  v("last_error", m.last_error);
+  v("version", m.version);
+  v("uptime", m.uptime);
+  v("cpu", m.cpu);
+  v("rss_mb", m.rss_mb);
+  v("n_channels", m.n_channels);
+  v("channels", m.channels);
+  v("n_stages", m.n_stages);
+  v("stages", m.stages);
+}
+
+}  // namespace chase::logs

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <string>
+
+#include "common/bus/log_writer.h"
+
+namespace chase::logs {
+
+/// Writes `text` beside `file` and renames it, so that nobody ever sees half a file. Throws
+/// std::runtime_error with one line.
+void WriteFile(const std::string& file, const std::string& text);
+
+/// A log that appears under its name when closed and leaves nothing behind when not.
+class OutputLog {
+ public:
+  explicit OutputLog(const std::string& file) : file_(file), writer_(file) {}
+  OutputLog(const OutputLog&) = delete;
+  OutputLog& operator=(const OutputLog&) = delete;
+  ~OutputLog();
+
+  template <class T>
+  void Write(int64_t utime, const std::string& channel, const T& message) {
+    std::vector<uint8_t> bytes(static_cast<size_t>(message.getEncodedSize()));
+    message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
+    writer_.Write(utime, channel, bytes);
+  }
+  void Close();
+
+ private:
+  std::string file_;
+  bus::LogWriter writer_;
+  bool closed_ = false;
+};
+
+}  // namespace chase::logs
