@@ -1,0 +1,143 @@
+#include "services/simulator/lidar.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "services/simulator/streams.h"
+
+namespace chase::simulator {
+namespace {
+
+using Eigen::Vector3d;
+using Eigen::Vector3f;
+
+constexpr double kPi = 3.14159265358979323846;
+constexpr double kResolution = 0.002;  // m, of a range
+
+/// Reflectivity at normal incidence, 0 to 255.
+float Reflectivity(Material material) {
+  switch (material) {
+    case Material::kNothing:
+      return 0.0f;
+    case Material::kGround:
+      return 30.0f;
+    case Material::kWall:
+      return 80.0f;
+    case Material::kBox:
+      return 70.0f;
+    case Material::kPillar:
+      return 95.0f;
+    case Material::kEllipsoid:
+      return 70.0f;
+    case Material::kTrunk:
+      return 45.0f;
+    case Material::kCrown:
+      return 55.0f;
+    case Material::kMover:
+      return 120.0f;
+    case Material::kCarrier:
+      return 20.0f;
+    case Material::kTarget:
+      return 180.0f;
+  }
+  return 0.0f;
+}
+
+}  // namespace
+
+std::string LidarConfig::Problem() const {
+  if (!(rate >= 0.0 && rate <= 10.0)) return "rate is not within 0 to 10 Hz";
+  if (!(noise >= 0.0)) return "noise is below 0 m";
+  if (!(dropout >= 0.0 && dropout <= 1.0)) return "dropout is not within 0 to 1";
+  if (!(min_range >= 0.0 && max_range > min_range)) return "max_range is not above min_range";
+  return "";
+}
+
+double LaserDelay(int ring) {
+  const int laser = ring < 8 ? 2 * ring : 2 * (ring - 8) + 1;
+  return laser * kLaserPeriod;
+}
+
+Vector3d LaserDirection(int firing, int ring) {
+  const double elevation = (2.0 * ring - 15.0) * kPi / 180.0;
+  const double step = firing + LaserDelay(ring) / kFiringPeriod;
+  const double turned = step * 2.0 * kPi / kFirings;
+  return {-std::cos(elevation) * std::cos(turned), std::cos(elevation) * std::sin(turned),
+          std::sin(elevation)};
+}
+
+TimedPose Interpolated(const TimedPose& a, const TimedPose& b, double t) {
+  const double s = b.t > a.t ? (t - a.t) / (b.t - a.t) : 0.0;
+  return {t, a.p + s * (b.p - a.p), a.q.slerp(s, b.q)};
+}
+
+Lidar::Lidar(const LidarConfig& config, const world::Rig& rig, uint64_t seed)
+    : config_(config), p_BL_(rig.lidar_position), q_BL_(rig.R_BL()), random_(seed, kLidarStream) {
+  for (int firing = 0; firing < kFirings; ++firing)
+    for (int ring = 0; ring < kRings; ++ring)
+      directions_.push_back(LaserDirection(firing, ring).cast<float>());
+}
+
+double Lidar::FiringTime() const {
+  return static_cast<double>(sweep_index_) / config_.rate + firing_ * kFiringPeriod;
+}
+
+void Lidar::Advance(const std::vector<TimedPose>& poses, const Scene& scene) {
+  if (config_.rate <= 0.0 || poses.size() < 2) return;
+  std::size_t i = 0;
+  for (double t = FiringTime(); t < poses.back().t; t = FiringTime()) {
+    while (i + 2 < poses.size() && poses[i + 1].t <= t) ++i;
+    if (firing_ == 0) sweep_.start = t;
+    Fire(Interpolated(poses[i], poses[i + 1], t), scene);
+    if (++firing_ < kFirings) continue;
+    complete_ = std::exchange(sweep_, Sweep{});
+    firing_ = 0;
+    ++sweep_index_;
+  }
+}
+
+void Lidar::Fire(const TimedPose& body, const Scene& scene) {
+  const Vector3f origin = (body.p + body.q * p_BL_).cast<float>();
+  const Eigen::Matrix3f R_WL = (body.q * q_BL_).toRotationMatrix().cast<float>();
+  const Vector3f* directions = &directions_[static_cast<std::size_t>(firing_ * kRings)];
+  for (int first = 0; first < kRings; first += 8) {
+    RayPacket rays;
+    for (int i = 0; i < 8; ++i) {
+      const Vector3f d = R_WL * directions[first + i];
+      rays.ox[i] = origin.x(), rays.oy[i] = origin.y(), rays.oz[i] = origin.z();
+      rays.dx[i] = d.x(), rays.dy[i] = d.y(), rays.dz[i] = d.z();
+    }
+    HitPacket hits;
+    scene.Trace(rays, &hits);
+    for (int i = 0; i < 8; ++i) {
+      const Vector3f normal(hits.nx[i], hits.ny[i], hits.nz[i]);
+      const Vector3f d(rays.dx[i], rays.dy[i], rays.dz[i]);
+      const float length = normal.norm();
+      const float incidence = length > 0.0f ? std::abs(normal.dot(d)) / length : 0.0f;
+      Record(first + i, hits.distance[i], incidence, hits.material[i]);
+    }
+  }
+}
+
+/// One draw of noise and one of loss for every laser, hit or not, so that what is seen does not
+/// shift the numbers of the lasers after it.
+void Lidar::Record(int ring, float range, float incidence, Material material) {
+  const double noise = config_.noise * random_.Gaussian();
+  const bool lost = random_.Uniform() < config_.dropout;
+  if (lost || !(range >= config_.min_range && range <= config_.max_range)) return;
+  const double measured = kResolution * std::round((range + noise) / kResolution);
+  const Vector3f p =
+      static_cast<float>(measured) * directions_[static_cast<std::size_t>(firing_ * kRings + ring)];
+  sweep_.x.push_back(p.x());
+  sweep_.y.push_back(p.y());
+  sweep_.z.push_back(p.z());
+  sweep_.t.push_back(static_cast<float>(firing_ * kFiringPeriod + LaserDelay(ring)));
+  const float intensity = Reflectivity(material) * (0.3f + 0.7f * incidence);
+  sweep_.intensity.push_back(static_cast<uint8_t>(std::clamp(intensity, 1.0f, 255.0f)));
+  sweep_.ring.push_back(static_cast<uint8_t>(ring));
+}
+
+std::optional<Sweep> Lidar::Take() { return std::exchange(complete_, std::nullopt); }
+
+}  // namespace chase::simulator

@@ -1,0 +1,38 @@
+#include "services/simulator/projection.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace chase::simulator {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+constexpr double kNearest = 0.05;  // m in front of the camera
+constexpr int kRim = 48;           // points on each rim
+
+}  // namespace
+
+PixelBox ProjectedBox(const world::Rig& rig, const Viewpoint& view, const world::Solid& cylinder) {
+  const double far = std::numeric_limits<double>::infinity();
+  PixelBox box{far, far, -far, -far};
+  int in_front = 0;
+  for (int i = 0; i < 2 * kRim; ++i) {
+    const double angle = 2.0 * kPi * (i / 2) / kRim, side = i & 1 ? 1.0 : -1.0;
+    const Eigen::Vector3d unit(std::cos(angle), std::sin(angle), side);
+    const Eigen::Vector3d p_W = cylinder.center + cylinder.half_size.cwiseProduct(unit);
+    const Eigen::Vector3d p_C = view.R_WC.transpose() * (p_W - view.p_WC);
+    if (p_C.z() < kNearest) continue;
+    ++in_front;
+    const Eigen::Vector2d px = rig.Project(p_C);
+    box = {std::min(box.left, px.x()), std::min(box.top, px.y()), std::max(box.right, px.x()),
+           std::max(box.bottom, px.y())};
+  }
+  const PixelBox image{-0.5, -0.5, rig.width_px - 0.5, rig.height_px - 0.5};
+  if (in_front == 0) return {};
+  if (in_front < 2 * kRim) return image;
+  return {std::max(box.left, image.left), std::max(box.top, image.top),
+          std::min(box.right, image.right), std::min(box.bottom, image.bottom)};
+}
+
+}  // namespace chase::simulator

@@ -1,0 +1,244 @@
+#include "services/simulator/scene.h"
+
+#include <embree3/rtcore.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "services/simulator/mesh.h"
+
+namespace chase::simulator {
+namespace {
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+using world::Solid;
+
+constexpr int kFine = 48, kCoarse = 20;  // edges around a solid
+constexpr double kMargin = 110.0;        // m of ground beyond what stands on it
+constexpr double kRoughMargin = 40.0;
+
+/// Numbers of things that move are those of the world's instances; the static world is number 0.
+struct Instance {
+  RTCGeometry geometry;
+  Material material;
+};
+
+void Attach(RTCDevice device, RTCScene scene, const Mesh& mesh) {
+  RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
+  void* vertices = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
+                                           3 * sizeof(float), mesh.vertices.size());
+  std::memcpy(vertices, mesh.vertices.data(), mesh.vertices.size() * 3 * sizeof(float));
+  void* indices = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
+                                          3 * sizeof(uint32_t), mesh.triangles.size());
+  std::memcpy(indices, mesh.triangles.data(), mesh.triangles.size() * 3 * sizeof(uint32_t));
+  rtcCommitGeometry(geometry);
+  rtcAttachGeometry(scene, geometry);
+  rtcReleaseGeometry(geometry);
+}
+
+/// Material of the i-th of StaticSolids(), which lists the world's parts in their order.
+Material StaticMaterial(const world::WorldSpec& world, std::size_t i, const Solid& solid) {
+  std::size_t end = world.walls.size();
+  if (i < end) return Material::kWall;
+  if (i < (end += world.boxes.size())) return Material::kBox;
+  if (i < (end += world.cylinders.size())) return Material::kPillar;
+  if (i < (end += world.ellipsoids.size())) return Material::kEllipsoid;
+  return solid.kind == Solid::Kind::kCylinder ? Material::kTrunk : Material::kCrown;
+}
+
+struct Rectangle {
+  Vector2d min, max;
+  void Add(const Vector2d& p, double margin) {
+    min = min.cwiseMin((p.array() - margin).matrix());
+    max = max.cwiseMax((p.array() + margin).matrix());
+  }
+};
+
+Rectangle GroundExtent(const world::Scenario& scenario, const std::vector<Solid>& solids) {
+  const double margin = scenario.world.ground.roughness > 0.0 ? kRoughMargin : kMargin;
+  const Vector2d start = scenario.chaser.start.head<2>();
+  Rectangle extent{start, start};
+  extent.Add(start, margin);
+  for (const auto& solid : solids) extent.Add(solid.center.head<2>(), margin);
+  for (const auto& p : scenario.target.waypoints) extent.Add(p, margin);
+  return extent;
+}
+
+/// Column-major 3x4: turn by the yaw, then to the centre.
+void SetPlace(const Instance& instance, const Solid& solid) {
+  const float c = static_cast<float>(std::cos(solid.yaw));
+  const float s = static_cast<float>(std::sin(solid.yaw));
+  const Eigen::Vector3f p = solid.center.cast<float>();
+  const float place[12] = {c, s, 0, -s, c, 0, 0, 0, 1, p.x(), p.y(), p.z()};
+  rtcSetGeometryTransform(instance.geometry, 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, place);
+  rtcCommitGeometry(instance.geometry);
+}
+
+void Fill(const RayPacket& rays, RTCRayHit8* out) {
+  std::memcpy(out->ray.org_x, rays.ox, sizeof rays.ox);
+  std::memcpy(out->ray.org_y, rays.oy, sizeof rays.oy);
+  std::memcpy(out->ray.org_z, rays.oz, sizeof rays.oz);
+  std::memcpy(out->ray.dir_x, rays.dx, sizeof rays.dx);
+  std::memcpy(out->ray.dir_y, rays.dy, sizeof rays.dy);
+  std::memcpy(out->ray.dir_z, rays.dz, sizeof rays.dz);
+  for (int i = 0; i < 8; ++i) {
+    out->ray.tnear[i] = out->ray.time[i] = 0.0f;
+    out->ray.tfar[i] = std::numeric_limits<float>::infinity();
+    out->ray.mask[i] = ~0u;
+    out->ray.id[i] = static_cast<unsigned>(i);
+    out->ray.flags[i] = 0;
+    out->hit.geomID[i] = out->hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
+  }
+}
+
+}  // namespace
+
+struct Scene::Impl {
+  explicit Impl(const world::Scenario& s) : scenario(s), actors(s) {}
+  ~Impl();
+
+  RTCScene NewScene() { return parts.emplace_back(rtcNewScene(device)); }
+  void BuildStatic();
+  void BuildMoving();
+  void AddInstance(RTCScene part, Material material);
+  RTCScene MovingPart(const Solid& solid);
+  Material HitMaterial(unsigned instance, unsigned geometry) const;
+
+  world::Scenario scenario;
+  Actors actors;
+  RTCDevice device = nullptr;
+  RTCScene top = nullptr, target = nullptr;
+  std::vector<RTCScene> parts;
+  std::vector<Instance> instances;
+  std::vector<Material> static_materials;
+  std::vector<Vector2d> turns;  // cos, sin of each instance's yaw
+  Vector3d target_center = Vector3d::Zero();
+};
+
+Scene::Impl::~Impl() {
+  for (auto& instance : instances) rtcReleaseGeometry(instance.geometry);
+  if (top) rtcReleaseScene(top);
+  for (auto part : parts) rtcReleaseScene(part);
+  if (device) rtcReleaseDevice(device);
+}
+
+void Scene::Impl::AddInstance(RTCScene part, Material material) {
+  RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_INSTANCE);
+  rtcSetGeometryInstancedScene(geometry, part);
+  instances.push_back({geometry, material});
+  turns.emplace_back(1.0, 0.0);
+  SetPlace(instances.back(), Solid{});
+  rtcAttachGeometry(top, geometry);
+}
+
+void Scene::Impl::BuildStatic() {
+  const auto solids = world::StaticSolids(scenario);
+  const RTCScene part = NewScene();
+  const Rectangle extent = GroundExtent(scenario, solids);
+  Attach(device, part, GroundMesh(scenario.world.ground, extent.min, extent.max));
+  static_materials.push_back(Material::kGround);
+  for (std::size_t i = 0; i < solids.size(); ++i) {
+    const Material material = StaticMaterial(scenario.world, i, solids[i]);
+    const bool tree = material == Material::kCrown || material == Material::kTrunk;
+    Attach(device, part, Placed(SolidMesh(solids[i], tree ? kCoarse : kFine), solids[i]));
+    static_materials.push_back(material);
+  }
+  rtcCommitScene(part);
+  AddInstance(part, Material::kNothing);
+}
+
+RTCScene Scene::Impl::MovingPart(const Solid& solid) {
+  const RTCScene part = NewScene();
+  Attach(device, part, SolidMesh(solid, kFine));
+  rtcCommitScene(part);
+  return part;
+}
+
+void Scene::Impl::BuildMoving() {
+  const TargetState state = actors.Target(0.0);
+  target = MovingPart(state.cylinder);
+  AddInstance(target, Material::kTarget);
+  if (state.has_carrier) AddInstance(MovingPart(state.carrier), Material::kCarrier);
+  for (const auto& mover : actors.Movers(0.0))
+    AddInstance(MovingPart(mover.solid), Material::kMover);
+}
+
+Material Scene::Impl::HitMaterial(unsigned instance, unsigned geometry) const {
+  if (geometry == RTC_INVALID_GEOMETRY_ID) return Material::kNothing;
+  return instance == 0 ? static_materials[geometry] : instances[instance].material;
+}
+
+Scene::Scene(const world::Scenario& scenario) : impl_(std::make_unique<Impl>(scenario)) {
+  impl_->device = rtcNewDevice("threads=1,isa=avx2");
+  if (!impl_->device)
+    throw std::runtime_error("simulator: Embree gives no device; a processor with AVX2 is needed");
+  impl_->top = rtcNewScene(impl_->device);
+  rtcSetSceneFlags(impl_->top, RTC_SCENE_FLAG_DYNAMIC);
+  rtcSetSceneBuildQuality(impl_->top, RTC_BUILD_QUALITY_LOW);
+  impl_->BuildStatic();
+  impl_->BuildMoving();
+  MoveTo(0.0);
+}
+
+Scene::~Scene() = default;
+
+void Scene::MoveTo(double t) {
+  std::vector<Solid> solids;
+  const TargetState target = impl_->actors.Target(t);
+  solids.push_back(target.cylinder);
+  if (target.has_carrier) solids.push_back(target.carrier);
+  for (const auto& mover : impl_->actors.Movers(t)) solids.push_back(mover.solid);
+  for (std::size_t i = 0; i < solids.size(); ++i) {
+    SetPlace(impl_->instances[i + 1], solids[i]);
+    impl_->turns[i + 1] = {std::cos(solids[i].yaw), std::sin(solids[i].yaw)};
+  }
+  impl_->target_center = target.center;
+  rtcCommitScene(impl_->top);
+}
+
+void Scene::Trace(const RayPacket& rays, HitPacket* hits) const {
+  alignas(32) int valid[8];
+  for (int i = 0; i < 8; ++i) valid[i] = i < rays.count ? -1 : 0;
+  alignas(32) RTCRayHit8 work;
+  Fill(rays, &work);
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+  rtcIntersect8(valid, impl_->top, &context, &work);
+  for (int i = 0; i < 8; ++i) {
+    const unsigned instance = work.hit.instID[0][i];
+    hits->material[i] = impl_->HitMaterial(instance, work.hit.geomID[i]);
+    const bool hit = hits->material[i] != Material::kNothing;
+    hits->distance[i] = hit ? work.ray.tfar[i] : std::numeric_limits<float>::infinity();
+    const Vector2d turn = hit ? impl_->turns[instance] : Vector2d(1.0, 0.0);
+    const float c = static_cast<float>(turn.x()), s = static_cast<float>(turn.y());
+    hits->nx[i] = c * work.hit.Ng_x[i] - s * work.hit.Ng_y[i];
+    hits->ny[i] = s * work.hit.Ng_x[i] + c * work.hit.Ng_y[i];
+    hits->nz[i] = work.hit.Ng_z[i];
+  }
+}
+
+void Scene::TraceTargetAlone(const RayPacket& rays, bool* hits) const {
+  alignas(32) int valid[8];
+  alignas(32) RTCRayHit8 work;
+  Fill(rays, &work);
+  const Eigen::Vector3f center = impl_->target_center.cast<float>();
+  for (int i = 0; i < 8; ++i) {
+    valid[i] = i < rays.count ? -1 : 0;
+    work.ray.org_x[i] -= center.x();
+    work.ray.org_y[i] -= center.y();
+    work.ray.org_z[i] -= center.z();
+  }
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  rtcIntersect8(valid, impl_->target, &context, &work);
+  for (int i = 0; i < 8; ++i) hits[i] = valid[i] && work.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID;
+}
+
+}  // namespace chase::simulator

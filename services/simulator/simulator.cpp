@@ -1,0 +1,127 @@
+#include "services/simulator/simulator.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace chase::simulator {
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr double kStep = 1e-3;        // s
+constexpr double kDescentGain = 2.0;  // 1/s
+constexpr double kPi = 3.14159265358979323846;
+
+/// Standing on its legs where the scenario puts it, or in the air if that is higher.
+BodyState StartState(const world::Scenario& scenario, const VehicleConfig& vehicle) {
+  const Vector3d& start = scenario.chaser.start;
+  const double ground = world::GroundHeight(scenario.world.ground, start.x(), start.y());
+  BodyState state;
+  state.p = {start.x(), start.y(), std::max(start.z(), ground + StandingHeight(vehicle))};
+  state.q = Eigen::AngleAxisd(scenario.chaser.yaw_deg * kPi / 180.0, Vector3d::UnitZ());
+  return state;
+}
+
+/// Upright with the heading kept.
+Eigen::Quaterniond Level(const Eigen::Quaterniond& q) {
+  const Vector3d forward = q * Vector3d::UnitX();
+  return Eigen::Quaterniond(
+      Eigen::AngleAxisd(std::atan2(forward.y(), forward.x()), Vector3d::UnitZ()));
+}
+
+std::string Named(const std::string& name, const std::string& problem) {
+  return problem.empty() ? "" : name + ": " + problem;
+}
+
+}  // namespace
+
+std::string SimulatorConfig::Problem() const {
+  if (!(setpoint_timeout > 0.0)) return "setpoint_timeout is not above 0 s";
+  if (!(descent_speed > 0.0)) return "descent_speed is not above 0 m/s";
+  if (rig.width_px < 8 || rig.height_px < 8) return "rig: the image is below 8 x 8 px";
+  if (!(rig.focal_px > 0.0)) return "rig: focal_px is not above 0";
+  for (const auto& problem :
+       {Named("vehicle", vehicle.Problem()), Named("attitude_loop", attitude_loop.Problem()),
+        Named("imu", imu.Problem()), Named("lidar", lidar.Problem()),
+        Named("camera", camera.Problem())})
+    if (!problem.empty()) return problem;
+  return "";
+}
+
+Simulator::Simulator(const world::Scenario& scenario, const SimulatorConfig& config)
+    : scenario_(scenario),
+      config_(config),
+      actors_(scenario),
+      scene_(scenario),
+      quadrotor_(config.vehicle, StartState(scenario, config.vehicle),
+                 [ground = scenario.world.ground](double x, double y) {
+                   return world::GroundHeight(ground, x, y);
+                 }),
+      attitude_loop_(config.attitude_loop, config.vehicle.inertia),
+      wind_(scenario.wind, static_cast<uint64_t>(config.seed)),
+      imu_(config.imu, static_cast<uint64_t>(config.seed)),
+      lidar_(config.lidar, config.rig, static_cast<uint64_t>(config.seed)),
+      camera_(config.camera, config.rig, scenario.target.color,
+              static_cast<uint64_t>(config.seed)) {}
+
+void Simulator::SetSetpoint(const AttitudeSetpoint& setpoint, double t) {
+  if (!(setpoint.orientation.norm() > 0.1)) return;
+  setpoint_ = setpoint;
+  setpoint_time_ = t;
+}
+
+bool Simulator::SetpointFresh() const { return now() - setpoint_time_ <= config_.setpoint_timeout; }
+
+/// The setpoint while it is fresh; without one, level descent in the air and rest on the ground.
+AttitudeSetpoint Simulator::ActiveSetpoint() const {
+  if (SetpointFresh()) return setpoint_;
+  const BodyState& body = quadrotor_.state();
+  AttitudeSetpoint descent;
+  descent.orientation = Level(body.q);
+  if (quadrotor_.on_ground() || steps_ == 0) return descent;
+  const double wanted = -config_.descent_speed - body.v.z();
+  descent.thrust = std::clamp(kGravity + kDescentGain * wanted, 0.0, config_.vehicle.max_thrust);
+  return descent;
+}
+
+void Simulator::StepPhysics() {
+  wind_.Step(kStep);
+  const bool resting = quadrotor_.on_ground() && !SetpointFresh();
+  const Wrench wrench =
+      attitude_loop_.Step(ActiveSetpoint(), quadrotor_.state(), quadrotor_.on_ground(), kStep);
+  quadrotor_.Step(resting ? Wrench{} : wrench, wind_.velocity(), kStep);
+  ++steps_;
+}
+
+TimedPose Simulator::Pose() const { return {now(), quadrotor_.state().p, quadrotor_.state().q}; }
+
+Output Simulator::Advance(double t) {
+  std::vector<TimedPose> poses = {Pose()};
+  const long target_step = static_cast<long>(std::floor(t / kStep + 1e-6));
+  while (steps_ < target_step) {
+    StepPhysics();
+    poses.push_back(Pose());
+  }
+  const double settle = scenario_.settle_s;
+  scene_.MoveTo(0.5 * (poses.front().t + poses.back().t) - settle);
+  lidar_.Advance(poses, scene_);
+
+  Output output;
+  Truth& truth = output.truth;
+  truth.mission_time = now() - settle;
+  truth.body = quadrotor_.state();
+  truth.target = actors_.Target(truth.mission_time);
+  truth.movers = actors_.Movers(truth.mission_time);
+  if (config_.camera.rate > 0.0 && now() >= static_cast<double>(frames_) / config_.camera.rate - 1e-9) {
+    frames_ = static_cast<long>(std::floor(now() * config_.camera.rate + 1e-6)) + 1;
+    scene_.MoveTo(truth.mission_time);
+    output.image = camera_.Render(truth.body.p, truth.body.q, now(), scene_, truth.target.cylinder);
+  }
+  truth.view = camera_.View();
+  output.imu = imu_.Measure(truth.body, now() - last_measurement_);
+  last_measurement_ = now();
+  output.sweep = lidar_.Take();
+  return output;
+}
+
+}  // namespace chase::simulator

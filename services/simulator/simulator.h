@@ -1,0 +1,102 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/world/rig.h"
+#include "common/world/scenario.h"
+#include "services/simulator/actors.h"
+#include "services/simulator/attitude_loop.h"
+#include "services/simulator/camera.h"
+#include "services/simulator/imu.h"
+#include "services/simulator/lidar.h"
+#include "services/simulator/quadrotor.h"
+#include "services/simulator/scene.h"
+#include "services/simulator/wind.h"
+
+namespace chase::simulator {
+
+struct SimulatorConfig {
+  std::string scenario = "deploy/scenarios/gym.yaml";
+  int64_t seed = 1;
+  double setpoint_timeout = 0.5;
+  double descent_speed = 0.5;
+  world::Rig rig;
+  VehicleConfig vehicle;
+  AttitudeLoopConfig attitude_loop;
+  ImuConfig imu;
+  LidarConfig lidar;
+  CameraConfig camera;
+
+  template <class V>
+  void Visit(V& v) {
+    v("scenario", scenario, "file that describes the world");
+    v("seed", seed, "of all noise and gusts");
+    v("setpoint_timeout", setpoint_timeout, "older setpoints give way to a level descent, s");
+    v("descent_speed", descent_speed, "of that descent, m/s");
+    v("rig", rig, "where the sensors sit");
+    v("vehicle", vehicle, "");
+    v("attitude_loop", attitude_loop, "");
+    v("imu", imu, "");
+    v("lidar", lidar, "");
+    v("camera", camera, "");
+  }
+  std::string Problem() const;
+};
+
+/// The truth at one time.
+struct Truth {
+  double mission_time = 0.0;  ///< s
+  BodyState body;
+  TargetState target;
+  TargetView view;  ///< in the last frame
+  std::vector<world::MoverState> movers;
+};
+
+/// What one step brings: a sample of the IMU always, a sweep or a frame when one is complete.
+struct Output {
+  ImuSample imu;
+  Truth truth;
+  std::optional<Sweep> sweep;
+  std::optional<Image> image;
+};
+
+/// The world, the vehicle and its sensors. Time counts from power-on; the mission starts at
+/// scenario.settle_s. The same seed, steps and setpoints give the same output, bit for bit.
+class Simulator {
+ public:
+  Simulator(const world::Scenario& scenario, const SimulatorConfig& config);
+
+  /// The flight controller's newest setpoint, received at t [s].
+  void SetSetpoint(const AttitudeSetpoint& setpoint, double t);
+
+  /// Advances to t [s] at 1 kHz, and measures there. Times must grow; the first is 0.
+  Output Advance(double t);
+
+ private:
+  void StepPhysics();
+  AttitudeSetpoint ActiveSetpoint() const;
+  bool SetpointFresh() const;
+  double now() const { return static_cast<double>(steps_) * 1e-3; }
+  TimedPose Pose() const;
+
+  world::Scenario scenario_;
+  SimulatorConfig config_;
+  Actors actors_;
+  Scene scene_;
+  Quadrotor quadrotor_;
+  AttitudeLoop attitude_loop_;
+  Wind wind_;
+  Imu imu_;
+  Lidar lidar_;
+  Camera camera_;
+  long steps_ = 0;   // of physics, 1 ms each
+  long frames_ = 0;  // of the camera
+  double last_measurement_ = 0.0;
+  AttitudeSetpoint setpoint_;
+  double setpoint_time_ = -1e9;
+};
+
+}  // namespace chase::simulator

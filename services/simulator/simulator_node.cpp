@@ -1,0 +1,152 @@
+#include "services/simulator/simulator_node.h"
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <sstream>
+#include <stdexcept>
+
+#include "chase/camera_image_t.hpp"
+#include "chase/imu_t.hpp"
+#include "chase/lidar_scan_t.hpp"
+#include "chase/scenario_t.hpp"
+#include "chase/truth_t.hpp"
+#include "common/bus/convert.h"
+
+namespace chase::simulator {
+namespace {
+
+constexpr int64_t kTruthTicks = 2;       // 100 Hz
+constexpr int64_t kScenarioTicks = 200;  // 1 Hz
+
+std::string ReadText(const std::string& file) {
+  std::ifstream in(file);
+  std::ostringstream text;
+  if (!in || !(text << in.rdbuf()))
+    throw std::runtime_error(file + ": scenario cannot be read; check the key 'scenario'");
+  return text.str();
+}
+
+}  // namespace
+
+SimulatorNode::SimulatorNode(bus::Bus& bus, const SimulatorConfig& config)
+    : bus_(bus),
+      config_(config),
+      yaml_(ReadText(config.scenario)),
+      scenario_(world::ParseScenario(yaml_, config.scenario)),
+      simulator_(scenario_, config) {
+  if (scenario_.sensors.mode == "truth")
+    truth_feed_ = std::make_unique<TruthFeed>(bus, scenario_, config.rig);
+  bus_.Subscribe<attitude_setpoint_t>("ATTITUDE_SETPOINT",
+                                      [this](const auto& message) { OnSetpoint(message); });
+}
+
+void SimulatorNode::OnSetpoint(const attitude_setpoint_t& message) {
+  if (!power_on_) return;
+  AttitudeSetpoint setpoint;
+  setpoint.orientation = bus::ToQuaternion(message.orientation);
+  setpoint.body_rate = bus::ToVector(message.body_rate);
+  setpoint.thrust = std::max(0.0, message.thrust);
+  const int64_t utime = std::min(message.utime, last_tick_);  // none counts as from the future
+  simulator_.SetSetpoint(setpoint, bus::Seconds(utime, *power_on_));
+}
+
+void SimulatorNode::Tick(int64_t utime) {
+  if (!power_on_) power_on_ = utime;
+  last_tick_ = utime;
+  Output output;
+  {
+    const auto timer = bus_.Time("step");
+    output = simulator_.Advance(bus::Seconds(utime, *power_on_));
+  }
+  PublishImu(output.imu, utime);
+  if (output.sweep) PublishSweep(*output.sweep);
+  if (output.image) PublishImage(*output.image, utime);
+  if (ticks_ % kTruthTicks == 0) PublishTruth(output.truth, utime);
+  if (ticks_ % kScenarioTicks == 0) PublishScenario(utime);
+  if (truth_feed_) truth_feed_->Publish(output.truth, utime, ticks_);
+  ++ticks_;
+}
+
+bus::NodeReport SimulatorNode::Report() const {
+  bus::NodeReport report;
+  if (!power_on_) {
+    report.state = bus::NodeReport::State::kStarting;
+    return report;
+  }
+  const double t = bus::Seconds(last_tick_, *power_on_) - scenario_.settle_s;
+  report.detail = scenario_.name + ", mission time " + std::to_string(std::lround(t)) + " s";
+  return report;
+}
+
+void SimulatorNode::PublishImu(const ImuSample& sample, int64_t utime) {
+  imu_t message{};
+  message.utime = utime;
+  bus::Set(message.accel, sample.accel);
+  bus::Set(message.gyro, sample.gyro);
+  bus_.Publish("IMU", message);
+}
+
+void SimulatorNode::PublishSweep(const Sweep& sweep) {
+  lidar_scan_t message{};
+  message.utime = bus::Utime(sweep.start, *power_on_);
+  message.size = static_cast<int32_t>(sweep.x.size());
+  message.x = sweep.x;
+  message.y = sweep.y;
+  message.z = sweep.z;
+  message.t = sweep.t;
+  message.intensity = sweep.intensity;
+  message.ring = sweep.ring;
+  bus_.Publish("LIDAR_SCAN", message);
+}
+
+void SimulatorNode::PublishImage(const Image& image, int64_t utime) {
+  camera_image_t message{};
+  message.utime = utime;
+  message.width = image.width;
+  message.height = image.height;
+  message.row_stride = 3 * image.width;
+  message.pixelformat = camera_image_t::PIXEL_FORMAT_RGB;
+  message.exposure = image.exposure;
+  message.size = static_cast<int32_t>(image.rgb.size());
+  message.data = image.rgb;
+  bus_.Publish("CAMERA_IMAGE", message);
+}
+
+void SimulatorNode::PublishTruth(const Truth& truth, int64_t utime) {
+  truth_t message{};
+  message.utime = utime;
+  message.mission_time = truth.mission_time;
+  bus::Set(message.pos, truth.body.p);
+  bus::Set(message.vel, truth.body.v);
+  bus::Set(message.accel, truth.body.a);
+  bus::Set(message.orientation, truth.body.q);
+  bus::Set(message.rotation_rate, truth.body.w);
+  bus::Set(message.target_pos, truth.target.center);
+  bus::Set(message.target_vel, truth.target.velocity);
+  message.target_yaw = truth.target.yaw;
+  message.target_px[0] = truth.view.px.x();
+  message.target_px[1] = truth.view.px.y();
+  message.target_in_image = truth.view.in_image ? 1 : 0;
+  message.visible_share = truth.view.visible_share;
+  message.n_movers = static_cast<int32_t>(truth.movers.size());
+  for (const auto& mover : truth.movers) {
+    mover_t& entry = message.movers.emplace_back();
+    bus::Set(entry.pos, mover.solid.center);
+    bus::Set(entry.vel, mover.velocity);
+    entry.yaw = mover.solid.yaw;
+  }
+  bus_.Publish("TRUTH", message);
+}
+
+void SimulatorNode::PublishScenario(int64_t utime) {
+  scenario_t message{};
+  message.utime = utime;
+  message.seed = config_.seed;
+  message.start_utime = bus::Utime(scenario_.settle_s, *power_on_);
+  message.name = scenario_.name;
+  message.yaml = yaml_;
+  bus_.Publish("SCENARIO", message);
+}
+
+}  // namespace chase::simulator

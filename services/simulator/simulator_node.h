@@ -1,0 +1,45 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "chase/attitude_setpoint_t.hpp"
+#include "common/bus/bus.h"
+#include "common/bus/node.h"
+#include "services/simulator/simulator.h"
+#include "services/simulator/truth_feed.h"
+
+namespace chase::simulator {
+
+/// ATTITUDE_SETPOINT -> simulator -> IMU, LIDAR_SCAN, CAMERA_IMAGE, TRUTH, SCENARIO. The first tick
+/// is power-on. Where the scenario's sensors.mode is "truth", also POSE, TARGET and OBSTACLES.
+class SimulatorNode : public bus::Node {
+ public:
+  SimulatorNode(bus::Bus& bus, const SimulatorConfig& config);
+
+  int64_t TickPeriod() const override { return 5000; }
+  void Tick(int64_t utime) override;
+  bus::NodeReport Report() const override;
+
+ private:
+  void OnSetpoint(const attitude_setpoint_t& message);
+  void PublishImu(const ImuSample& sample, int64_t utime);
+  void PublishSweep(const Sweep& sweep);
+  void PublishImage(const Image& image, int64_t utime);
+  void PublishTruth(const Truth& truth, int64_t utime);
+  void PublishScenario(int64_t utime);
+
+  bus::Bus& bus_;
+  SimulatorConfig config_;
+  std::string yaml_;
+  world::Scenario scenario_;
+  Simulator simulator_;
+  std::unique_ptr<TruthFeed> truth_feed_;
+  std::optional<int64_t> power_on_;  // utime of the first tick
+  int64_t last_tick_ = 0;
+  int64_t ticks_ = 0;
+};
+
+}  // namespace chase::simulator
