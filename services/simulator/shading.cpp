@@ -12,7 +12,11 @@ using Eigen::Vector3f;
 const Vector3f kSun = Vector3f(0.35f, 0.25f, 0.90f).normalized();
 constexpr float kAmbient = 0.45f, kDirect = 0.60f;
 
-int Cell(float x) { return static_cast<int>(std::floor(x)); }
+/// Floor, without the library call that floor() is on plain x86-64.
+int Cell(float x) {
+  const int i = static_cast<int>(x);
+  return i - (static_cast<float>(i) > x ? 1 : 0);
+}
 
 /// A number in [0, 1) that looks random, one for each cell.
 float Hash(int x, int y, int z) {
@@ -48,7 +52,7 @@ Vector3f Albedo(Material material, const Vector3f& p, const Vector3f& n,
     case Material::kNothing:
       return Vector3f::Zero();
     case Material::kGround:
-      return Grey(0.42f + 0.10f * Patches(p, 0.9f, 0.12f), 0.97f, 0.85f);
+      return Grey(0.42f + 0.10f * Patches({p.x(), p.y(), 0.0f}, 0.9f, 0.12f), 0.97f, 0.85f);
     case Material::kWall:
       return Grey(0.62f + 0.16f * Blocks(p, n), 1.02f, 0.97f);
     case Material::kBox:

@@ -38,6 +38,8 @@ std::string Named(const std::string& name, const std::string& problem) {
 std::string SimulatorConfig::Problem() const {
   if (!(setpoint_timeout > 0.0)) return "setpoint_timeout is not above 0 s";
   if (!(descent_speed > 0.0)) return "descent_speed is not above 0 m/s";
+  if (!sensors.empty() && sensors != "raw" && sensors != "truth")
+    return "sensors is '" + sensors + "', not raw or truth";
   if (rig.width_px < 8 || rig.height_px < 8) return "rig: the image is below 8 x 8 px";
   if (!(rig.focal_px > 0.0)) return "rig: focal_px is not above 0";
   for (const auto& problem :

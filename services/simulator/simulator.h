@@ -21,6 +21,7 @@ namespace chase::simulator {
 struct SimulatorConfig {
   std::string scenario = "deploy/scenarios/gym.yaml";
   int64_t seed = 1;
+  std::string sensors;
   double setpoint_timeout = 0.5;
   double descent_speed = 0.5;
   world::Rig rig;
@@ -34,6 +35,7 @@ struct SimulatorConfig {
   void Visit(V& v) {
     v("scenario", scenario, "file that describes the world");
     v("seed", seed, "of all noise and gusts");
+    v("sensors", sensors, "raw or truth; empty: as the scenario says");
     v("setpoint_timeout", setpoint_timeout, "older setpoints give way to a level descent, s");
     v("descent_speed", descent_speed, "of that descent, m/s");
     v("rig", rig, "where the sensors sit");
