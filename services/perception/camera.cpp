@@ -1,0 +1,46 @@
+#include "services/perception/camera.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace chase::perception {
+
+namespace {
+
+constexpr double kNearest = 0.05;  // m
+constexpr int kRimPoints = 16;
+
+}  // namespace
+
+Eigen::Vector3d Camera::Ray(double u, double v) const {
+  return R_WC * Eigen::Vector3d((u - rig.center_u_px) / rig.focal_px,
+                                (v - rig.center_v_px) / rig.focal_px, 1.0);
+}
+
+std::optional<Eigen::Vector2d> Camera::Project(const Eigen::Vector3d& p_W) const {
+  const Eigen::Vector3d p_C = R_WC.transpose() * (p_W - p_WC);
+  if (p_C.z() < kNearest) return std::nullopt;
+  return rig.Project(p_C);
+}
+
+Camera CameraAt(const PoseSample& pose, const world::Rig& rig) {
+  const Eigen::Matrix3d R_WB = pose.R_WB.toRotationMatrix();
+  return {rig, R_WB * rig.R_BC(), pose.p_WB + R_WB * rig.camera_position};
+}
+
+std::optional<cv::Rect2d> ProjectCylinder(const Camera& camera, const Eigen::Vector3d& p_WT,
+                                          double radius, double height) {
+  Eigen::Vector2d low(1e9, 1e9), high(-1e9, -1e9);
+  for (int i = 0; i < 2 * kRimPoints; ++i) {
+    const double angle = 2.0 * M_PI * (i / 2) / kRimPoints;
+    const Eigen::Vector3d rim(radius * std::cos(angle), radius * std::sin(angle),
+                              (i % 2 ? 0.5 : -0.5) * height);
+    const auto px = camera.Project(p_WT + rim);
+    if (!px) return std::nullopt;
+    low = low.cwiseMin(*px);
+    high = high.cwiseMax(*px);
+  }
+  return cv::Rect2d(low.x(), low.y(), high.x() - low.x(), high.y() - low.y());
+}
+
+}  // namespace chase::perception

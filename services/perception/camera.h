@@ -1,0 +1,32 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <opencv2/core.hpp>
+#include <optional>
+
+#include "common/world/rig.h"
+#include "services/perception/pose_history.h"
+
+namespace chase::perception {
+
+/// The camera at one time: X_WC and the pinhole.
+struct Camera {
+  world::Rig rig;
+  Eigen::Matrix3d R_WC = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d p_WC = Eigen::Vector3d::Zero();  ///< frame W, m
+
+  /// Direction of the line of sight through (u, v) px, frame W, z_C component 1.
+  Eigen::Vector3d Ray(double u, double v) const;
+  /// Pixel of p_W [m]; nothing when it lies behind or nearer than 5 cm.
+  std::optional<Eigen::Vector2d> Project(const Eigen::Vector3d& p_W) const;
+};
+
+/// The camera of a body at this pose.
+Camera CameraAt(const PoseSample& pose, const world::Rig& rig);
+
+/// Box [px] around an upright cylinder centred at p_WT, from its two rims; nothing when any part
+/// lies behind the camera.
+std::optional<cv::Rect2d> ProjectCylinder(const Camera& camera, const Eigen::Vector3d& p_WT,
+                                          double radius, double height);
+
+}  // namespace chase::perception

@@ -1,0 +1,81 @@
+#include "services/perception/color_detector.h"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+#include "services/perception/silhouette.h"
+
+namespace chase::perception {
+
+namespace {
+
+constexpr double kMaskScore = 127.0;  // half of full score: the blob's pixels
+
+double Bell(double x, double sigma) { return std::exp(-0.5 * (x / sigma) * (x / sigma)); }
+
+/// Pixels of the colour: small holes filled, threads between blobs cut.
+cv::Mat Mask(const cv::Mat& score) {
+  static const cv::Mat kCross = cv::getStructuringElement(cv::MORPH_CROSS, {3, 3});
+  cv::Mat mask;
+  cv::threshold(score, mask, kMaskScore, 255.0, cv::THRESH_BINARY);
+  cv::morphologyEx(mask, mask, cv::MORPH_CLOSE, kCross);
+  cv::morphologyEx(mask, mask, cv::MORPH_OPEN, kCross);
+  return mask;
+}
+
+}  // namespace
+
+double ColorDetector::ShapeScore(const Detection& d, double area, double hull_area) const {
+  const bool cut = d.cut[kLeft] || d.cut[kRight] || d.cut[kTop] || d.cut[kBottom];
+  const double solid = std::min(1.0, area / std::max(hull_area, 1.0));
+  if (cut) return 0.6 * solid;
+  const double aspect = d.box.width / d.box.height, fill = area / d.box.area();
+  return solid * Bell(std::log(aspect / shape_.aspect), shape_.aspect_tolerance) *
+         Bell(std::min(0.0, fill - shape_.fill), shape_.fill_tolerance);
+}
+
+Detection ColorDetector::Describe(const cv::Mat& bgr, const cv::Mat& score,
+                                  const std::vector<cv::Point>& contour) const {
+  Detection d;
+  d.mask_box = cv::boundingRect(contour);
+  d.box = EdgeBox(d.mask_box);
+  d.mask = cv::Mat::zeros(d.mask_box.size(), CV_8U);
+  cv::drawContours(d.mask, std::vector<std::vector<cv::Point>>{contour}, 0, 255, cv::FILLED,
+                   cv::LINE_8, cv::noArray(), INT_MAX, -d.mask_box.tl());
+  d.cut = CutSides(d.mask_box, bgr.size());
+  std::vector<cv::Point> hull;
+  cv::convexHull(contour, hull);
+  const double half_border = 0.5 * static_cast<double>(hull.size());  // contours run through
+  const double area = cv::countNonZero(d.mask);                       // pixel centres
+  const double hull_area =
+      cv::contourArea(hull) + std::max(half_border, 0.5 * cv::arcLength(hull, true));
+  const double color = cv::mean(score(d.mask_box), d.mask)[0] / 255.0;
+  d.score = color * ShapeScore(d, area, hull_area);
+  return d;
+}
+
+std::vector<Detection> ColorDetector::Detect(const cv::Mat& bgr) const {
+  const cv::Mat score = color_.Score(bgr);
+  std::vector<std::vector<cv::Point>> contours;
+  cv::findContours(Mask(score), contours, cv::RETR_EXTERNAL, cv::CHAIN_APPROX_NONE);
+  std::vector<Detection> found;
+  for (const auto& contour : contours) {
+    const cv::Rect box = cv::boundingRect(contour);
+    if (box.area() < shape_.min_area_px) continue;
+    Detection d = Describe(bgr, score, contour);
+    if (d.score >= shape_.min_score && cv::countNonZero(d.mask) >= shape_.min_area_px)
+      found.push_back(std::move(d));
+  }
+  std::stable_sort(found.begin(), found.end(),
+                   [](const Detection& a, const Detection& b) { return a.score > b.score; });
+  if (found.size() > static_cast<size_t>(shape_.max_candidates))
+    found.resize(static_cast<size_t>(shape_.max_candidates));
+  for (auto& d : found) {
+    d.silhouette = TraceSilhouette(bgr, d.mask, d.mask_box, d.cut);
+    d.silhouette.sigma_px = edge_sigma_px_;
+  }
+  return found;
+}
+
+}  // namespace chase::perception

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <vector>
+
+#include "services/perception/color_model.h"
+#include "services/perception/detector.h"
+
+namespace chase::perception {
+
+/// Blobs of the target's colour, ranked by how much they look like an upright cylinder.
+class ColorDetector : public Detector {
+ public:
+  ColorDetector(const DetectorConfig& config, double edge_sigma_px)
+      : shape_(config.shape), color_(config.color), edge_sigma_px_(edge_sigma_px) {}
+
+  std::vector<Detection> Detect(const cv::Mat& bgr) const override;
+
+ private:
+  Detection Describe(const cv::Mat& bgr, const cv::Mat& score,
+                     const std::vector<cv::Point>& contour) const;
+  /// 0 to 1 from aspect, fill and straightness; aspect and fill say nothing where the image ends.
+  double ShapeScore(const Detection& d, double area, double hull_area) const;
+
+  ShapeConfig shape_;
+  ColorModel color_;
+  double edge_sigma_px_;
+};
+
+}  // namespace chase::perception

@@ -1,0 +1,128 @@
+#include "services/perception/color_model.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace chase::perception {
+
+namespace {
+
+constexpr int kBits = 6, kLevels = 1 << kBits;
+constexpr double kGreySaturation = 0.35;  // pixels below tell the light's tint
+constexpr int kGreyMinimum = 200;         // sampled pixels needed for that
+constexpr int kGreyStep = 4;              // every so many rows and columns are sampled
+
+struct Hsv {
+  double hue_deg, saturation, value;
+};
+
+Hsv ToHsv(double b, double g, double r) {
+  const double high = std::max({b, g, r}), low = std::min({b, g, r}), span = high - low;
+  if (span <= 0.0) return {0.0, 0.0, high};
+  double hue = 0.0;
+  if (high == r)
+    hue = (g - b) / span;
+  else if (high == g)
+    hue = 2.0 + (b - r) / span;
+  else
+    hue = 4.0 + (r - g) / span;
+  return {hue < 0.0 ? 60.0 * hue + 360.0 : 60.0 * hue, span / high, high};
+}
+
+/// How far `hue` lies outside the range, degrees; 0 inside. The range may wrap.
+double HueOutside(double hue, double low, double high) {
+  const double width = std::fmod(high - low + 360.0, 360.0);
+  const double after = std::fmod(hue - low + 360.0, 360.0);
+  return after <= width ? 0.0 : std::min(after - width, 360.0 - after);
+}
+
+/// 1 at or above the limit, falling to 0 over `softness` below it.
+double Ramp(double x, double limit, double softness) {
+  return std::clamp(1.0 + (x - limit) / softness, 0.0, 1.0);
+}
+
+double Percentile(std::vector<double>* values, double share) {
+  const auto k = static_cast<std::ptrdiff_t>(share * static_cast<double>(values->size() - 1));
+  std::nth_element(values->begin(), values->begin() + k, values->end());
+  return (*values)[static_cast<size_t>(k)];
+}
+
+}  // namespace
+
+ColorModel::ColorModel(const ColorConfig& config) : config_(config) {
+  table_.resize(static_cast<size_t>(kLevels) * kLevels * kLevels);
+  const auto center = [](int level) { return (level + 0.5) / kLevels; };
+  size_t i = 0;
+  for (int b = 0; b < kLevels; ++b)
+    for (int g = 0; g < kLevels; ++g)
+      for (int r = 0; r < kLevels; ++r)
+        table_[i++] =
+            static_cast<uint8_t>(std::lround(255.0 * Score(center(b), center(g), center(r))));
+}
+
+double ColorModel::Score(double blue, double green, double red) const {
+  const Hsv c = ToHsv(blue, green, red);
+  const double outside = HueOutside(c.hue_deg, config_.hue_min_deg, config_.hue_max_deg);
+  return std::max(0.0, 1.0 - outside / config_.hue_softness_deg) *
+         Ramp(c.saturation, config_.saturation_min, config_.softness) *
+         Ramp(c.value, config_.value_min, config_.softness);
+}
+
+Eigen::Vector3d ColorModel::Gains(const cv::Mat& bgr) const {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  int count = 0;
+  for (int y = 0; y < bgr.rows; y += kGreyStep)
+    for (int x = 0; x < bgr.cols; x += kGreyStep) {
+      const auto& p = bgr.at<cv::Vec3b>(y, x);
+      const int high = std::max({p[0], p[1], p[2]}), low = std::min({p[0], p[1], p[2]});
+      if (high < 30 || high > 250 || high - low > kGreySaturation * high) continue;
+      sum += Eigen::Vector3d(p[0], p[1], p[2]);
+      ++count;
+    }
+  if (count < kGreyMinimum) return Eigen::Vector3d::Ones();
+  const Eigen::Vector3d gains = sum.mean() * sum.cwiseInverse();
+  return gains.cwiseMax(config_.min_gain).cwiseMin(config_.max_gain);
+}
+
+cv::Mat ColorModel::Score(const cv::Mat& bgr) const {
+  const Eigen::Vector3d gains = config_.white_balance ? Gains(bgr) : Eigen::Vector3d::Ones();
+  std::array<std::array<uint32_t, 256>, 3> index;
+  for (size_t c = 0; c < 3; ++c)
+    for (size_t i = 0; i < 256; ++i) {
+      const double balanced = std::min(255.0, static_cast<double>(i) * gains[static_cast<int>(c)]);
+      index[c][i] = (static_cast<uint32_t>(balanced) >> (8 - kBits)) << (kBits * (2 - c));
+    }
+  cv::Mat score(bgr.size(), CV_8U);
+  for (int y = 0; y < bgr.rows; ++y) {
+    const uint8_t* in = bgr.ptr<uint8_t>(y);
+    uint8_t* out = score.ptr<uint8_t>(y);
+    for (int x = 0; x < bgr.cols; ++x, in += 3)
+      out[x] = table_[index[0][in[0]] | index[1][in[1]] | index[2][in[2]]];
+  }
+  return score;
+}
+
+ColorConfig LearnColor(const std::vector<cv::Mat>& images, const std::vector<cv::Mat>& masks,
+                       const ColorConfig& base) {
+  std::vector<double> hue, saturation, value;
+  for (size_t i = 0; i < images.size(); ++i)
+    for (int y = 0; y < images[i].rows; ++y)
+      for (int x = 0; x < images[i].cols; ++x) {
+        if (masks[i].at<uint8_t>(y, x) == 0) continue;
+        const auto& p = images[i].at<cv::Vec3b>(y, x);
+        const Hsv c = ToHsv(p[0] / 255.0, p[1] / 255.0, p[2] / 255.0);
+        hue.push_back(std::fmod(c.hue_deg + 180.0, 360.0));  // red in the middle
+        saturation.push_back(c.saturation);
+        value.push_back(c.value);
+      }
+  ColorConfig learned = base;
+  if (hue.empty()) return learned;
+  learned.hue_min_deg = std::fmod(Percentile(&hue, 0.03) + 180.0, 360.0);
+  learned.hue_max_deg = std::fmod(Percentile(&hue, 0.97) + 180.0, 360.0);
+  learned.saturation_min = Percentile(&saturation, 0.03);
+  learned.value_min = Percentile(&value, 0.03);
+  return learned;
+}
+
+}  // namespace chase::perception

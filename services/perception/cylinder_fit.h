@@ -1,0 +1,60 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <optional>
+#include <vector>
+
+#include "services/perception/camera.h"
+#include "services/perception/detector.h"
+#include "services/perception/perception_config.h"
+#include "services/perception/point_selector.h"
+
+namespace chase::perception {
+
+using Vector6d = Eigen::Matrix<double, 6, 1>;
+using Matrix6d = Eigen::Matrix<double, 6, 6>;
+
+/// Gaussian of the target's position p_WT [m] and velocity v_WT [m/s], frame W, at one time.
+struct TargetGaussian {
+  Vector6d mean = Vector6d::Zero();
+  Matrix6d covariance = Matrix6d::Identity();
+
+  Eigen::Vector3d position() const { return mean.head<3>(); }
+  Eigen::Vector3d velocity() const { return mean.tail<3>(); }
+};
+
+/// Radius and height of the upright cylinder and how well they are known.
+struct TargetShape {
+  Eigen::Vector2d size = {0.15, 0.5};                  ///< radius, height, m
+  Eigen::Vector2d variance = Eigen::Vector2d::Zero();  ///< m^2
+};
+
+/// All that is known for one frame. The time of the frame is that of `prior`.
+struct FitInput {
+  TargetGaussian prior;
+  TargetShape shape;
+  Camera camera;
+  const Detection* detection = nullptr;
+  std::array<bool, 4> use_side = {true, true, true, true};  ///< by Side
+  std::vector<TargetPoint> points;
+};
+
+struct FitResult {
+  bool ok = false;  ///< solved, finite, covariance found
+  TargetGaussian posterior;
+  TargetShape shape;
+  std::array<double, 4> edge_px = {};  ///< by Side: mean residual, px, positive: seen outside fit
+  std::array<bool, 4> used = {};       ///< by Side
+  int n_points = 0;                    ///< LiDAR points in the fit
+  double point_rms = 0.0;              ///< distance of the points from the surface, m
+  double prior_distance = 0.0;         ///< squared Mahalanobis distance from the prior
+  double cost = 0.0;                   ///< half the robust sum of squares, prior included
+};
+
+/// The most likely position and velocity of an upright cylinder: silhouette, LiDAR points and
+/// prediction weighed together, with the covariance of that estimate. With `points` at times of
+/// their own it is one step of an iterated extended Kalman filter.
+FitResult FitCylinder(const FitInput& input, const FitConfig& config);
+
+}  // namespace chase::perception

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <memory>
+#include <opencv2/core.hpp>
+#include <optional>
+#include <vector>
+
+#include "services/perception/perception_config.h"
+
+namespace chase::perception {
+
+/// Sides of a silhouette. Image: u to the right, v down; the centre of the first pixel is (0, 0).
+enum Side { kLeft = 0, kRight = 1, kTop = 2, kBottom = 3 };
+
+/// Where the outline was seen, sample by sample.
+struct Silhouette {
+  std::array<std::vector<Eigen::Vector2d>, 4> samples;  ///< by Side, (u, v) px
+  double sigma_px = 0.5;                                ///< standard deviation of one edge
+};
+
+/// One thing in the image that may be the target.
+struct Detection {
+  cv::Rect2d box;                       ///< px, edges between pixels
+  double score = 0.0;                   ///< 0 to 1
+  std::array<bool, 4> cut = {};         ///< by Side: the image ends there
+  Silhouette silhouette;                ///< sides that are cut hold no samples
+  cv::Rect mask_box;                    ///< where `mask` lies in the image
+  cv::Mat mask;                         ///< 8 bit, 255 on the target; may be empty
+  std::optional<Eigen::Vector3d> p_CT;  ///< centre, frame C, m, if the detector knows it
+  Eigen::Matrix3d p_CT_covariance = Eigen::Matrix3d::Identity();  ///< frame C, m^2
+};
+
+/// Finds things in one image that may be the target, best first.
+class Detector {
+ public:
+  virtual ~Detector() = default;
+  /// `bgr`: 8 bit, 3 channels, not empty.
+  virtual std::vector<Detection> Detect(const cv::Mat& bgr) const = 0;
+};
+
+/// The detector that the config asks for. Throws std::runtime_error when a file or name in it is
+/// not usable.
+std::unique_ptr<Detector> MakeDetector(const DetectorConfig& config, double edge_sigma_px,
+                                       const world::Rig& rig);
+
+}  // namespace chase::perception

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <optional>
+
+#include "services/perception/cylinder_fit.h"
+
+namespace chase::perception {
+
+/// Turns one detection and the LiDAR points on it into a position, or refuses it: what hides part
+/// of the target, or only looks like it, must not bend the estimate.
+class Localiser {
+ public:
+  explicit Localiser(const PerceptionConfig& config) : config_(config) {}
+
+  /// Corrects a predicted target. Sides of the silhouette that lie too far inside are taken as
+  /// hidden and left out; nothing when no reading of the detection agrees with the prediction.
+  std::optional<FitResult> Correct(const FitInput& predicted, const Clusters& clusters) const;
+
+  /// Places a target of which nothing is known: range from the points, or from the apparent size
+  /// when no point hits. Nothing when size, points and outline contradict each other.
+  std::optional<FitResult> Acquire(const TargetShape& shape, const Camera& camera,
+                                   const Detection& detection, const Clusters& clusters) const;
+
+ private:
+  std::optional<FitResult> BestReading(FitInput* input) const;
+  bool Agrees(const FitResult& fit, double prior_gate) const;
+  TargetGaussian Guess(const Camera& camera, const Detection& detection, double range,
+                       double range_sigma) const;
+
+  PerceptionConfig config_;
+};
+
+}  // namespace chase::perception

@@ -1,0 +1,122 @@
+#include "services/perception/messages.h"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+#include "common/bus/convert.h"
+
+namespace chase::perception {
+
+namespace {
+
+/// Bytes of a pixel, 0 when the format is unknown.
+int Channels(int32_t pixelformat) {
+  switch (pixelformat) {
+    case camera_image_t::PIXEL_FORMAT_GRAY:
+      return 1;
+    case camera_image_t::PIXEL_FORMAT_RGB:
+    case camera_image_t::PIXEL_FORMAT_BGR:
+      return 3;
+    default:
+      return 0;
+  }
+}
+
+cv::Mat ToBgr(const cv::Mat& image, int32_t pixelformat) {
+  cv::Mat bgr;
+  if (pixelformat == camera_image_t::PIXEL_FORMAT_GRAY)
+    cv::cvtColor(image, bgr, cv::COLOR_GRAY2BGR);
+  else if (pixelformat == camera_image_t::PIXEL_FORMAT_RGB)
+    cv::cvtColor(image, bgr, cv::COLOR_RGB2BGR);
+  else
+    image.copyTo(bgr);
+  return bgr;
+}
+
+int8_t Code(TargetState state) {
+  switch (state) {
+    case TargetState::kSearching:
+      return target_t::SEARCHING;
+    case TargetState::kTracking:
+      return target_t::TRACKING;
+    case TargetState::kOccluded:
+      return target_t::OCCLUDED;
+    case TargetState::kLost:
+      break;
+  }
+  return target_t::LOST;
+}
+
+}  // namespace
+
+Frame FromMessage(const camera_image_t& m, int64_t origin) {
+  Frame frame;
+  frame.t = bus::Seconds(m.utime, origin);
+  const int channels = Channels(m.pixelformat);
+  if (channels == 0) {
+    frame.problem = "pixel format " + std::to_string(m.pixelformat) + " is unknown";
+  } else if (m.width <= 0 || m.height <= 0 || m.row_stride < channels * m.width ||
+             static_cast<int64_t>(m.row_stride) * m.height > static_cast<int64_t>(m.data.size())) {
+    frame.problem = "image is shorter than its width and height say";
+  } else if (m.row_stride >= 2 * channels * m.width) {
+    frame.problem = "image is not 8 bit";
+  } else {
+    const cv::Mat view(m.height, m.width, CV_8UC(channels), const_cast<uint8_t*>(m.data.data()),
+                       static_cast<size_t>(m.row_stride));
+    frame.bgr = ToBgr(view, m.pixelformat);
+  }
+  return frame;
+}
+
+Sweep FromMessage(const lidar_scan_t& m, int64_t origin) {
+  Sweep sweep;
+  sweep.t = bus::Seconds(m.utime, origin);
+  sweep.points.reserve(m.x.size());
+  sweep.times.reserve(m.x.size());
+  for (size_t i = 0; i < m.x.size(); ++i) {
+    const Eigen::Vector3f p(m.x[i], m.y[i], m.z[i]);
+    if (!p.allFinite() || !std::isfinite(m.t[i])) continue;
+    sweep.points.push_back(p);
+    sweep.times.push_back(m.t[i]);
+  }
+  return sweep;
+}
+
+bool Usable(const pose_t& m) {
+  return m.health == pose_t::HEALTH_OK || m.health == pose_t::HEALTH_DEGRADED;
+}
+
+PoseSample FromMessage(const pose_t& m, int64_t origin) {
+  using Covariance = Eigen::Matrix<double, 9, 9, Eigen::RowMajor>;
+  const Eigen::Map<const Covariance> C(m.covariance);
+  PoseSample pose;
+  pose.t = bus::Seconds(m.utime, origin);
+  pose.p_WB = bus::ToVector(m.pos);
+  pose.v_WB = bus::ToVector(m.vel);
+  pose.a_WB = bus::ToVector(m.accel);
+  pose.R_WB = bus::ToQuaternion(m.orientation).normalized();
+  pose.w_WB_B = bus::ToVector(m.rotation_rate);
+  pose.covariance << C.topLeftCorner<3, 3>(), C.topRightCorner<3, 3>(), C.bottomLeftCorner<3, 3>(),
+      C.bottomRightCorner<3, 3>();
+  return pose;
+}
+
+target_t ToMessage(const TargetEstimate& target, int64_t utime) {
+  target_t m;
+  m.utime = utime;
+  m.state = Code(target.state);
+  bus::Set(m.mean, target.p_WT);
+  bus::Set(m.covariance, target.covariance);
+  bus::Set(m.velocity, target.v_WT);
+  m.radius = target.size[0];
+  m.height = target.size[1];
+  const cv::Rect2d& b = target.box;
+  const double box[4] = {b.x + 0.5 * b.width, b.y + 0.5 * b.height, b.width, b.height};
+  std::copy(box, box + 4, m.box_px);
+  m.score = target.score;
+  m.n_points = target.n_points;
+  return m;
+}
+
+}  // namespace chase::perception

@@ -1,0 +1,198 @@
+#pragma once
+
+#include <string>
+
+#include "common/world/rig.h"
+
+namespace chase::perception {
+
+/// The target's colour. A soft score: 1 inside the range, falling to 0 over `softness` outside it.
+struct ColorConfig {
+  double hue_min_deg = 10.0, hue_max_deg = 42.0;  ///< may wrap: 350 to 20
+  double saturation_min = 0.55, value_min = 0.16;
+  double hue_softness_deg = 6.0, softness = 0.12;
+  bool white_balance = true;
+  double min_gain = 0.75, max_gain = 1.33;
+
+  template <class V>
+  void Visit(V& v) {
+    v("hue_min_deg", hue_min_deg, "0 red, 30 orange, 60 yellow; may be above hue_max_deg: wraps");
+    v("hue_max_deg", hue_max_deg, "upper end of the hue");
+    v("saturation_min", saturation_min, "0 grey to 1 pure");
+    v("value_min", value_min, "brightest channel, 0 to 1");
+    v("hue_softness_deg", hue_softness_deg, "width over which the score falls outside the range");
+    v("softness", softness, "the same for saturation and value, 0 to 1");
+    v("white_balance", white_balance, "undo the tint of the light, estimated on greyish pixels");
+    v("min_gain", min_gain, "least gain of a channel");
+    v("max_gain", max_gain, "greatest gain of a channel");
+  }
+  std::string Problem() const;
+};
+
+/// What the target's blob looks like in the image.
+struct ShapeConfig {
+  double aspect = 0.57, aspect_tolerance = 0.35;
+  double fill = 0.93, fill_tolerance = 0.2;
+  double min_area_px = 24.0, min_score = 0.05;
+  int max_candidates = 8;
+
+  template <class V>
+  void Visit(V& v) {
+    v("aspect", aspect, "width over height of the whole blob");
+    v("aspect_tolerance", aspect_tolerance, "one standard deviation of its logarithm");
+    v("fill", fill, "share of its box that the blob fills");
+    v("fill_tolerance", fill_tolerance, "one standard deviation");
+    v("min_area_px", min_area_px, "smaller blobs are noise, px^2");
+    v("min_score", min_score, "candidates below are not looked at, 0 to 1");
+    v("max_candidates", max_candidates, "the best so many are looked at");
+  }
+  std::string Problem() const;
+};
+
+struct MarkerConfig {
+  std::string dictionary = "DICT_4X4_50";
+  int id = 0;
+  double side = 0.2, depth = 0.15;
+  double corner_sigma_px = 0.5;
+
+  template <class V>
+  void Visit(V& v) {
+    v("dictionary", dictionary, "OpenCV's name, as DICT_4X4_50 or DICT_APRILTAG_36h11");
+    v("id", id, "the target's marker; -1: any");
+    v("side", side, "edge of the black square, m");
+    v("depth", depth, "from the marker along the line of sight to the target's centre, m");
+    v("corner_sigma_px", corner_sigma_px, "standard deviation of a corner");
+  }
+  std::string Problem() const;
+};
+
+struct NetworkConfig {
+  std::string file;
+  int input_width_px = 320, input_height_px = 320;
+  int class_id = 0;
+  double min_score = 0.5, overlap = 0.45, edge_sigma_px = 2.5;
+
+  template <class V>
+  void Visit(V& v) {
+    v("file", file, "ONNX file; output rows: centre x, centre y, width, height (input px), scores");
+    v("input_width_px", input_width_px, "the image is scaled to this");
+    v("input_height_px", input_height_px, "the image is scaled to this");
+    v("class_id", class_id, "which score is the target's");
+    v("min_score", min_score, "boxes below are left out, 0 to 1");
+    v("overlap", overlap, "boxes that overlap more than this are one, 0 to 1");
+    v("edge_sigma_px", edge_sigma_px, "standard deviation of a box's edge");
+  }
+  std::string Problem() const;
+};
+
+struct DetectorConfig {
+  std::string kind = "color";
+  ColorConfig color;
+  ShapeConfig shape;
+  MarkerConfig marker;
+  NetworkConfig network;
+
+  template <class V>
+  void Visit(V& v) {
+    v("kind", kind, "color, marker or network");
+    v("color", color, "of the target");
+    v("shape", shape, "of the target's blob");
+    v("marker", marker, "for kind marker");
+    v("network", network, "for kind network");
+  }
+  std::string Problem() const;
+};
+
+/// Standard deviations of what is measured and limits of what is believed.
+struct FitConfig {
+  double edge_sigma_px = 0.45, edge_weight = 2.0;
+  double lidar_sigma = 0.03, lidar_weight = 8.0;
+  double edge_gate = 3.2, prior_gate = 30.0, lidar_gate = 0.35;
+  bool estimate_shape = false;
+  double shape_sigma = 0.03;
+  int max_iterations = 8;
+
+  template <class V>
+  void Visit(V& v) {
+    v("edge_sigma_px", edge_sigma_px, "of one edge of the silhouette");
+    v("edge_weight", edge_weight, "independent samples that one edge counts for");
+    v("lidar_sigma", lidar_sigma, "of one LiDAR point, m");
+    v("lidar_weight", lidar_weight,
+      "independent samples that one sweep's points count for at most");
+    v("edge_gate", edge_gate, "an edge further off is taken as hidden, standard deviations");
+    v("prior_gate", prior_gate, "greatest squared Mahalanobis distance from the prediction, 6 dof");
+    v("lidar_gate", lidar_gate, "points further from the expected surface are something else, m");
+    v("estimate_shape", estimate_shape, "estimate radius and height as well");
+    v("shape_sigma", shape_sigma, "of the configured radius and height when estimated, m");
+    v("max_iterations", max_iterations, "of the solver");
+  }
+  std::string Problem() const;
+};
+
+/// Constant velocity with white acceleration, and the honesty of what is published.
+struct MotionConfig {
+  double acceleration_density = 1.0, vertical_density = 0.02;
+  double initial_speed_sigma = 1.2, initial_vertical_speed_sigma = 0.1;
+  double max_speed = 5.0;
+  double floor_sigma = 0.012, pose_sigma = 0.01, pose_angle_sigma_deg = 0.2;
+
+  template <class V>
+  void Visit(V& v) {
+    v("acceleration_density", acceleration_density, "of horizontal acceleration, m^2/s^3");
+    v("vertical_density", vertical_density, "of vertical acceleration, m^2/s^3");
+    v("initial_speed_sigma", initial_speed_sigma, "of a new target, horizontal, m/s");
+    v("initial_vertical_speed_sigma", initial_vertical_speed_sigma, "of a new target, m/s");
+    v("max_speed", max_speed, "a target found again lies where this speed reaches, m/s");
+    v("floor_sigma", floor_sigma, "added to every axis of the covariance sent out, m");
+    v("pose_sigma", pose_sigma, "least standard deviation of the drone's position, m");
+    v("pose_angle_sigma_deg", pose_angle_sigma_deg, "least standard deviation of its attitude");
+  }
+  std::string Problem() const;
+};
+
+/// When the target counts as found, hidden and lost.
+struct StateConfig {
+  double acquire_score = 0.35;
+  int confirm_frames = 3;
+  double hidden_after = 0.08, lost_after = 4.0, lost_sigma = 1.5;
+  double decoy_radius = 0.5, decoy_memory = 60.0;
+
+  template <class V>
+  void Visit(V& v) {
+    v("acquire_score", acquire_score, "least score of a detection that starts a track, 0 to 1");
+    v("confirm_frames", confirm_frames, "frames that must agree before a new target is believed");
+    v("hidden_after", hidden_after, "unseen for longer: occluded, s");
+    v("lost_after", lost_after, "unseen for longer: lost, s");
+    v("lost_sigma", lost_sigma, "horizontal standard deviation above which the target is lost, m");
+    v("decoy_radius", decoy_radius, "look-alikes seen beside the target are refused here, m");
+    v("decoy_memory", decoy_memory, "for so long, s");
+  }
+  std::string Problem() const;
+};
+
+struct PerceptionConfig {
+  world::Rig rig;
+  double target_radius = 0.15, target_height = 0.5;
+  DetectorConfig detector;
+  FitConfig fit;
+  MotionConfig motion;
+  StateConfig state;
+  double max_extrapolation = 0.05, max_pose_age = 0.2, max_sweep_age = 0.3;
+
+  template <class V>
+  void Visit(V& v) {
+    v("rig", rig, "calibration: where the sensors sit, the pinhole camera");
+    v("target_radius", target_radius, "of the target's upright cylinder, m");
+    v("target_height", target_height, "of the cylinder, m");
+    v("detector", detector, "finds the target in the image");
+    v("fit", fit, "places it in space");
+    v("motion", motion, "how it may move, what is sent out");
+    v("state", state, "found, hidden, lost");
+    v("max_extrapolation", max_extrapolation, "a pose is carried forward this far, s");
+    v("max_pose_age", max_pose_age, "a frame without a pose this near is not used, s");
+    v("max_sweep_age", max_sweep_age, "older LiDAR points are not used, s");
+  }
+  std::string Problem() const;
+};
+
+}  // namespace chase::perception

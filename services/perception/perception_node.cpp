@@ -1,0 +1,62 @@
+#include "services/perception/perception_node.h"
+
+#include <fmt/format.h>
+
+#include <opencv2/core.hpp>
+
+#include "services/perception/messages.h"
+
+namespace chase::perception {
+
+PerceptionNode::PerceptionNode(bus::Bus& bus, const PerceptionConfig& config)
+    : bus_(bus), perceiver_(config) {
+  cv::setNumThreads(1);  // the same sums in the same order, and no threads beside the flight's
+  bus_.Subscribe<camera_image_t>("CAMERA_IMAGE", [this](const camera_image_t& m) { OnImage(m); });
+  bus_.Subscribe<lidar_scan_t>("LIDAR_SCAN", [this](const lidar_scan_t& m) { OnScan(m); });
+  bus_.Subscribe<pose_t>("POSE", [this](const pose_t& m) { OnPose(m); });
+}
+
+void PerceptionNode::OnPose(const pose_t& message) {
+  if (Usable(message)) perceiver_.AddPose(FromMessage(message, Origin(message.utime)));
+}
+
+void PerceptionNode::OnScan(const lidar_scan_t& message) {
+  perceiver_.AddSweep(FromMessage(message, Origin(message.utime)));
+}
+
+void PerceptionNode::OnImage(const camera_image_t& message) {
+  {
+    auto timer = bus_.Time("perceive");
+    last_ = perceiver_.See(FromMessage(message, Origin(message.utime)));
+  }
+  if (!last_->note.empty()) bus_.ReportError("frame not used: " + last_->note);
+  Send(message.utime, *last_);
+}
+
+void PerceptionNode::Send(int64_t utime, const TargetEstimate& target) {
+  bus_.Publish("TARGET", ToMessage(target, utime));
+}
+
+int64_t PerceptionNode::Origin(int64_t utime) {
+  if (!origin_) origin_ = utime;
+  return *origin_;
+}
+
+bus::NodeReport PerceptionNode::Report() const {
+  using State = bus::NodeReport::State;
+  if (!last_) return {State::kStarting, "waiting for an image"};
+  if (!last_->note.empty()) return {State::kDegraded, last_->note};
+  switch (last_->state) {
+    case TargetState::kSearching:
+      return {State::kStarting, "searching the target"};
+    case TargetState::kTracking:
+      return {State::kOk, fmt::format("tracking, {} LiDAR points", last_->n_points)};
+    case TargetState::kOccluded:
+      return {State::kDegraded, "target occluded"};
+    case TargetState::kLost:
+      break;
+  }
+  return {State::kDegraded, "target lost"};
+}
+
+}  // namespace chase::perception

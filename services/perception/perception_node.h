@@ -1,0 +1,35 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "chase/camera_image_t.hpp"
+#include "chase/lidar_scan_t.hpp"
+#include "chase/pose_t.hpp"
+#include "common/bus/bus.h"
+#include "common/bus/node.h"
+#include "services/perception/perceiver.h"
+
+namespace chase::perception {
+
+/// CAMERA_IMAGE, LIDAR_SCAN and POSE in, TARGET out; every image triggers, and is answered for its
+/// own time.
+class PerceptionNode : public bus::Node {
+ public:
+  PerceptionNode(bus::Bus& bus, const PerceptionConfig& config);
+  bus::NodeReport Report() const override;
+
+ private:
+  void OnImage(const camera_image_t& message);
+  void OnScan(const lidar_scan_t& message);
+  void OnPose(const pose_t& message);
+  void Send(int64_t utime, const TargetEstimate& target);
+  int64_t Origin(int64_t utime);
+
+  bus::Bus& bus_;
+  Perceiver perceiver_;
+  std::optional<TargetEstimate> last_;
+  std::optional<int64_t> origin_;  ///< utime that the core's seconds count from
+};
+
+}  // namespace chase::perception

@@ -1,0 +1,25 @@
+#pragma once
+
+#include <array>
+#include <opencv2/core.hpp>
+
+#include "services/perception/detector.h"
+
+namespace chase::perception {
+
+/// Outline of a blob: `mask` (8 bit, 255 on the blob) lies at `roi` in `bgr`. Each edge is placed
+/// between pixels from how the colour goes over from the blob to what lies beside it. Sides in
+/// `cut` get no samples.
+Silhouette TraceSilhouette(const cv::Mat& bgr, const cv::Mat& mask, const cv::Rect& roi,
+                           const std::array<bool, 4>& cut);
+
+/// Edges of a block of pixels where the first pixel's centre is (0, 0).
+cv::Rect2d EdgeBox(const cv::Rect& roi);
+
+/// Which sides of `roi` lie at the border of an image of this size.
+std::array<bool, 4> CutSides(const cv::Rect& roi, const cv::Size& image);
+
+/// One detection out of several pieces: the union of their masks. All must carry masks.
+Detection Merge(const cv::Mat& bgr, const std::vector<Detection>& pieces);
+
+}  // namespace chase::perception

@@ -1,0 +1,52 @@
+#include "services/perception/target_track.h"
+
+#include <cmath>
+
+#include "common/math/gaussian.h"
+#include "common/math/rotation.h"
+
+namespace chase::perception {
+
+void TargetTrack::Predict(double to, const MotionConfig& config) {
+  const double dt = to - t;
+  if (!(dt > 0.0)) return;
+  Matrix6d F = Matrix6d::Identity();
+  F.topRightCorner<3, 3>() = dt * Eigen::Matrix3d::Identity();
+  const Eigen::Vector3d q(config.acceleration_density, config.acceleration_density,
+                          config.vertical_density);
+  Matrix6d Q = Matrix6d::Zero();
+  Q.topLeftCorner<3, 3>() = (q * dt * dt * dt / 3.0).asDiagonal();
+  Q.topRightCorner<3, 3>() = (q * dt * dt / 2.0).asDiagonal();
+  Q.bottomLeftCorner<3, 3>() = Q.topRightCorner<3, 3>();
+  Q.bottomRightCorner<3, 3>() = (q * dt).asDiagonal();
+  state.mean = F * state.mean;
+  state.covariance = F * state.covariance * F.transpose() + Q;
+  t = to;
+}
+
+void TargetTrack::Correct(const FitResult& fit) {
+  state = fit.posterior;
+  shape = fit.shape;
+  seen = t;
+  misses = 0;
+  ++hits;
+}
+
+Eigen::Matrix3d PublishedCovariance(const TargetTrack& track, const PoseSample& pose,
+                                    const MotionConfig& config) {
+  const double angle = config.pose_angle_sigma_deg * M_PI / 180.0;
+  Eigen::Matrix<double, 6, 6> C = pose.covariance;
+  for (int i = 0; i < 3; ++i) {
+    C(i, i) = std::max(C(i, i), config.pose_sigma * config.pose_sigma);
+    C(i + 3, i + 3) = std::max(C(i + 3, i + 3), angle * angle);
+  }
+  // p_WT = p_WB + R_WB p_BT: a small rotation dr of the body in W moves it by dr x (p_WT - p_WB).
+  Eigen::Matrix<double, 3, 6> J;
+  J << Eigen::Matrix3d::Identity(), -math::Hat(track.state.position() - pose.p_WB);
+  const double floor = config.floor_sigma * config.floor_sigma;
+  const Eigen::Matrix3d P = track.state.covariance.topLeftCorner<3, 3>() + J * C * J.transpose() +
+                            floor * Eigen::Matrix3d::Identity();
+  return math::MadePositiveDefinite(P, floor);
+}
+
+}  // namespace chase::perception

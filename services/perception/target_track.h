@@ -1,0 +1,27 @@
+#pragma once
+
+#include "services/perception/cylinder_fit.h"
+
+namespace chase::perception {
+
+/// One thing believed to be the target, followed from frame to frame.
+struct TargetTrack {
+  TargetGaussian state;  ///< at time t
+  TargetShape shape;
+  double t = 0.0;     ///< s
+  double seen = 0.0;  ///< time of the last correction, s
+  int hits = 0, misses = 0;
+
+  /// Constant velocity with white acceleration up to time `to`; does nothing backwards.
+  void Predict(double to, const MotionConfig& config);
+
+  /// Takes over a correction at the track's time.
+  void Correct(const FitResult& fit);
+};
+
+/// Covariance of the target's position [m^2, frame W] with what the filter cannot know of itself:
+/// the drone's pose, which shifts all measurements alike, and a floor.
+Eigen::Matrix3d PublishedCovariance(const TargetTrack& track, const PoseSample& pose,
+                                    const MotionConfig& config);
+
+}  // namespace chase::perception
