@@ -1,5 +1,6 @@
 """The LCM URL, and what a multicast socket can tell about the network under it."""
 
+import errno
 import os
 import re
 import socket
@@ -23,11 +24,21 @@ def endpoint(text):
 def listener(group, port):
     """A socket that hears the group. OSError where the port is taken or the route is missing."""
     sock = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-    sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-    sock.bind(("", port))
     request = struct.pack("=4s4s", socket.inet_aton(group), socket.inet_aton("0.0.0.0"))
-    sock.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, request)
+    try:
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        sock.bind(("", port))
+        sock.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, request)
+    except OSError:
+        sock.close()
+        raise
     return sock
+
+
+def send(packet, group, port):
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
+        sock.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, 0)
+        sock.sendto(packet, (group, port))
 
 
 def route_cure(group):
@@ -38,18 +49,14 @@ def loopback_problem(group, port):
     """Sends one LCM message to ourselves; a sentence where it does not come back, else ''."""
     packet = b"LC02" + struct.pack(">I", 0) + b"LOOPBACK_%d\0" % os.getpid()
     try:
-        receiver = listener(group, port)
-        sender = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        sender.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, 0)
-        sender.sendto(packet, (group, port))
+        with listener(group, port) as receiver:
+            send(packet, group, port)
+            if packet in packets(receiver, time.monotonic() + 1.0):
+                return ""
     except OSError as error:
-        if error.errno == 98:
+        if error.errno == errno.EADDRINUSE:
             return f"port {port} is taken by a program that does not share it; {port_cure()}"
         return f"no multicast on {group}:{port} ({error.strerror}); {route_cure(group)}"
-    deadline = time.monotonic() + 1.0
-    for heard in packets(receiver, deadline):
-        if heard == packet:
-            return ""
     return (f"own messages to {group}:{port} do not come back: a firewall drops them or the route "
             f"is missing; {route_cure(group)}")
 
@@ -82,7 +89,8 @@ def channel_of(packet):
 def foreign_channels(group, port, seconds):
     """Channels that someone else is sending on during `seconds`; any message of ours is foreign
     before a flight. LCM binds every address: other groups on the same port are heard as well."""
-    heard = {channel_of(p) for p in packets(listener(group, port), time.monotonic() + seconds)}
+    with listener(group, port) as sock:
+        heard = {channel_of(p) for p in packets(sock, time.monotonic() + seconds)}
     return sorted(c for c in heard if c and not c.startswith("LOOPBACK_"))
 
 

@@ -80,8 +80,9 @@ class Child:
         except subprocess.TimeoutExpired:
             self.process.kill()
             self.process.wait()
-        if self._socket:
-            self._socket.close()
+        for opened in (self._socket, self.process.stdout):
+            if opened:
+                opened.close()
 
 
 def first_problem(children):

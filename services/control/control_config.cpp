@@ -41,7 +41,7 @@ std::string ControlConfig::Problem() const {
     bounds.push_back({"integral_gain", integral_gain[i], 0.0, velocity_gain[i] * position_gain[i]});
   }
   for (const Bound& bound : bounds)
-    if (const std::string complaint = Complaint(bound); !complaint.empty()) return complaint;
+    if (std::string complaint = Complaint(bound); !complaint.empty()) return complaint;
   return "";
 }
 

@@ -1,0 +1,160 @@
+"""Bad use of every program: one line on stderr that says what, where and how to mend it; exit 1.
+
+bad_use.py BIN_DIR SERVICE..."""
+
+import pathlib
+import re
+import socket
+import subprocess
+import sys
+import tempfile
+import unittest
+
+BIN = pathlib.Path(sys.argv[1])
+SERVICES = sys.argv[2:]
+TOOLS = ["chase-flight", "chase-plan", "chase-predict", "chase-report"]
+TOOL_SERVICES = {"lidar", "camera", "odometry", "mapping", "perception", "prediction", "planning",
+                 "control", "simulator"}
+LIMIT = 20  # s
+
+
+def run(program, *arguments):
+    return subprocess.run([BIN / program, *map(str, arguments)], capture_output=True, text=True,
+                          timeout=LIMIT, check=False)
+
+
+def first_scalar(dump):
+    """Path of keys to the first scalar field of a dumped config."""
+    path = []
+    for line in dump.splitlines():
+        match = re.match(r"^( *)(\w+):(.*)$", line)
+        if not match:
+            continue
+        depth = len(match.group(1)) // 2
+        path = path[:depth] + [match.group(2)]
+        value = re.sub(r"\s+#.*$", "", match.group(3)).strip()
+        if value and not value.startswith("["):
+            return path
+    return []
+
+
+def nested(path, value):
+    lines = ["  " * i + f"{key}:" for i, key in enumerate(path)]
+    return "\n".join(lines) + f" {value}\n"
+
+
+class BadUse(unittest.TestCase):
+    def setUp(self):
+        self.folder = tempfile.TemporaryDirectory()
+        self.addCleanup(self.folder.cleanup)
+
+    def file(self, text):
+        path = pathlib.Path(self.folder.name) / "config.yaml"
+        path.write_text(text, encoding="utf-8")
+        return path
+
+    def assert_refused(self, answer, *words):
+        line = answer.stderr
+        self.assertEqual(answer.returncode, 1, line)
+        self.assertEqual(line.count("\n"), 1, f"not one line: {line!r}")
+        self.assertEqual(answer.stdout, "", "an error belongs on stderr")
+        for word in words:
+            self.assertIn(str(word), line)
+
+    def for_each(self, programs, check):
+        for program in programs:
+            with self.subTest(program=program):
+                check(program)
+
+    def services(self):
+        return [f"chase-{name}" for name in SERVICES]
+
+    def test_good_use(self):
+        def check(program):
+            for flag in ("--help", "--version", "--dump-config"):
+                answer = run(program, flag)
+                self.assertEqual((answer.returncode, answer.stderr), (0, ""), flag)
+                self.assertTrue(answer.stdout.strip(), flag)
+        self.for_each(self.services(), check)
+
+    def test_dumped_config_loads_again(self):
+        def check(program):
+            dump = run(program, "--dump-config").stdout
+            again = run(program, "--config", self.file(dump), "--dump-config")
+            self.assertEqual((again.stdout, again.stderr), (dump, ""))
+        self.for_each(self.services(), check)
+
+    def test_unknown_key(self):
+        def check(program):
+            path = self.file("# one\n\nno_such_key: 1\n")
+            self.assert_refused(run(program, "--config", path), f"{path}:3", "no_such_key")
+        self.for_each(self.services(), check)
+
+    def test_wrong_type(self):
+        def check(program):
+            keys = first_scalar(run(program, "--dump-config").stdout)
+            path = self.file(nested(keys, "{not: a scalar}"))
+            self.assert_refused(run(program, "--config", path), path, keys[-1])
+        self.for_each(self.services(), check)
+
+    def test_not_yaml(self):
+        def check(program):
+            path = self.file("a: [1, 2\nb: }\n")
+            self.assert_refused(run(program, "--config", path), path)
+        self.for_each(self.services(), check)
+
+    def test_missing_config(self):
+        self.for_each(self.services(), lambda program: self.assert_refused(
+            run(program, "--config", "no/such.yaml"), "no/such.yaml"))
+
+    def test_bad_flag(self):
+        self.for_each(self.services(), lambda program: self.assert_refused(
+            run(program, "--no-such-flag"), "--no-such-flag", "--help"))
+
+    def test_bad_url(self):
+        self.for_each(self.services(), lambda program: self.assert_refused(
+            run(program, "--lcm-url", "udpm://nonsense"), "udpm://nonsense"))
+
+    def test_missing_replay(self):
+        out = pathlib.Path(self.folder.name) / "out.lcm"
+        self.for_each(self.services(), lambda program: self.assert_refused(
+            run(program, "--replay", "no/such.lcm", "--out", out), "no/such.lcm"))
+
+    def test_replay_without_out(self):
+        self.for_each(self.services(), lambda program: self.assert_refused(
+            run(program, "--replay", "no/such.lcm"), "--out"))
+
+    def test_port_in_use(self):
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
+            taken.bind(("", 0))  # without SO_REUSEADDR: not shared
+            port = taken.getsockname()[1]
+            self.for_each(self.services(), lambda program: self.assert_refused(
+                run(program, "--lcm-url", f"udpm://239.255.76.67:{port}?ttl=0"), port, "in use"))
+
+    def test_missing_route(self):
+        bare = ["unshare", "--net"]
+        if subprocess.run([*bare, "true"], capture_output=True, check=False).returncode:
+            self.skipTest("skipped: no right to make a network namespace")
+
+        def check(program):
+            answer = subprocess.run([*bare, BIN / program], capture_output=True, text=True,
+                                    timeout=LIMIT, check=False)
+            self.assert_refused(answer, "ip route add")
+        self.for_each(self.services(), check)
+
+    def tools(self):
+        if not TOOL_SERVICES <= set(SERVICES):
+            self.skipTest("skipped: this build has not all services")
+        return TOOLS
+
+    def test_tools_bad_flag(self):
+        self.for_each(self.tools(), lambda program: self.assert_refused(
+            run(program, "no/such.file", "--no-such-flag")))
+
+    def test_tools_missing_file(self):
+        self.for_each(self.tools(), lambda program: self.assert_refused(
+            run(program, "no/such.file"), "no/such.file"))
+
+
+if __name__ == "__main__":
+    unittest.main(argv=sys.argv[:1])

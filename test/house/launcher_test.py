@@ -1,0 +1,241 @@
+"""The launcher of deploy/fly, flown with small stand-ins for the programs."""
+
+import contextlib
+import io
+import json
+import os
+import pathlib
+import signal
+import socket
+import struct
+import subprocess
+import sys
+import tempfile
+import textwrap
+import time
+import unittest
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "deploy" / "launcher"))
+
+import bus  # noqa: E402
+import fly  # noqa: E402
+import processes  # noqa: E402
+import results  # noqa: E402
+
+GROUP = "239.255.76.67"
+
+SERVICE = """
+    import os, signal, socket, sys, time
+    signal.signal(signal.SIGINT, lambda *_: sys.exit(0))
+    address = "\\0" + os.environ["NOTIFY_SOCKET"][1:]
+    notify = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+    notify.sendto(b"READY=1", address)
+    print("working", flush=True)
+    {behaviour}
+    while True:
+        time.sleep(0.1)
+"""
+MONITOR = """
+    import json, time
+    for i in range(3):
+        time.sleep(0.2)
+        print(json.dumps(dict(mission_time=i, duration=2, distance=2.5, visible=1.0, rtf=1.0,
+                              done=i == 2)), flush=True)
+"""
+REPORT = """
+    import json, pathlib, sys
+    out = pathlib.Path(sys.argv[sys.argv.index("--out") + 1])
+    (out / "metrics.json").write_text(json.dumps({metrics}))
+"""
+PASSED = {"safe_ratio": 1.0, "criteria": {"safe_ratio": True, "in_image_ratio": True}}
+FAILED = {"safe_ratio": 0.9, "criteria": {"safe_ratio": False, "in_image_ratio": True}}
+
+
+def free_port():
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sock:
+        sock.bind(("", 0))
+        return sock.getsockname()[1]
+
+
+def lcm_packet(channel):
+    return b"LC02" + struct.pack(">I", 7) + channel.encode() + b"\0payload"
+
+
+class FlightTest(unittest.TestCase):
+    """deploy/fly's own steps after the build, with programs that only pretend."""
+
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.bin = pathlib.Path(folder.name)
+        self.patch(fly, "BIN", self.bin)
+        self.patch(fly, "TAIL", 0.1)
+        self.patch(fly, "build", lambda: None)
+        self.patch(fly, "flight_folder", lambda scenario: self.make_folder())
+        port = free_port()
+        self.patch(os, "environ", dict(os.environ, CHASE_LCM_URL=f"udpm://{GROUP}:{port}?ttl=0"))
+        for row in fly.flight_processes():
+            self.program(row["binary"], SERVICE.format(behaviour=""))
+        self.program("chase-flight", "print('{}')")
+        self.program("chase-flight-monitor", MONITOR)
+        self.program("chase-report", REPORT.format(metrics=PASSED))
+
+    def patch(self, place, name, value):
+        self.addCleanup(setattr, place, name, getattr(place, name))
+        setattr(place, name, value)
+
+    def make_folder(self):
+        self.folder = self.bin / "flight"
+        self.folder.mkdir()
+        return self.folder
+
+    def program(self, name, source):
+        path = self.bin / name
+        path.write_text(f"#!{sys.executable}\n" + textwrap.dedent(source), encoding="utf-8")
+        path.chmod(0o755)
+
+    def fly(self):
+        """Exit code, and what deploy/fly printed on both streams."""
+        scenario = self.bin / "hall.yaml"
+        scenario.write_text("{}", encoding="utf-8")
+        self.patch(sys, "argv", ["fly", str(scenario)])
+        out, err = io.StringIO(), io.StringIO()
+        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+            code = fly.main()
+        return code, out.getvalue(), err.getvalue()
+
+    def test_flight_that_passes(self):
+        code, out, err = self.fly()
+        self.assertEqual((code, err), (0, ""))
+        self.assertIn("t    2.0 / 2 s   distance  2.50 m   visible 100.0 %", out)
+        self.assertRegex(out, r"safe_ratio +1 +passed")
+        self.assertTrue((self.folder / "flight.lcm").exists())
+        self.assertIn("working", (self.folder / "odometry.log").read_text(encoding="utf-8"))
+
+    def test_criterion_that_fails(self):
+        self.program("chase-report", REPORT.format(metrics=FAILED))
+        code, out, _ = self.fly()
+        self.assertEqual(code, 1)
+        self.assertRegex(out, r"safe_ratio +0.9 +FAILED")
+
+    def test_no_criteria_is_no_pass(self):
+        self.program("chase-report", REPORT.format(metrics={}))
+        self.assertEqual(self.fly()[0], 1)
+
+    def test_process_that_dies_ends_the_flight(self):
+        dying = "time.sleep(0.3); print('broken wing', flush=True); sys.exit(3)"
+        self.program("chase-mapping", SERVICE.format(behaviour=dying))
+        self.program("chase-flight-monitor", "import time; time.sleep(60)")
+        code, _, err = self.fly()
+        self.assertEqual(code, 1)
+        self.assertIn("mapping ended (exit code 3)", err)
+        self.assertIn("broken wing", err)
+
+    def test_process_that_refuses_to_start(self):
+        self.program("chase-planning", "import sys; sys.exit('planning.yaml:1: no_such: unknown')")
+        code, _, err = self.fly()
+        self.assertEqual(code, 1)
+        self.assertIn("planning ended (exit code 1)", err)
+        self.assertIn("no_such: unknown", err)
+
+    def test_nobody_is_left_behind(self):
+        self.fly()
+        left = subprocess.run(["pgrep", "-f", str(self.bin)], capture_output=True, text=True,
+                              check=False).stdout
+        self.assertEqual(left, "")
+
+    def test_interrupt_stops_everything(self):
+        self.program("chase-flight-monitor",
+                     f"import os, signal, time\nos.kill({os.getpid()}, signal.SIGINT)\n"
+                     "time.sleep(60)")
+        code, _, err = self.fly()
+        self.assertEqual(code, 1)
+        self.assertIn("stopped", err)
+
+    def test_others_on_the_port_are_an_error(self):
+        port = bus.endpoint(os.environ["CHASE_LCM_URL"])[1]
+        talker = subprocess.Popen([sys.executable, "-c", textwrap.dedent(f"""
+            import socket, time
+            sock = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+            while True:
+                sock.sendto({lcm_packet("OTHER")!r}, ("{GROUP}", {port}))
+                time.sleep(0.02)
+            """)])
+        self.addCleanup(talker.wait)
+        self.addCleanup(talker.kill)
+        code, _, err = self.fly()
+        self.assertEqual(code, 1)
+        self.assertIn("OTHER", err)
+        self.assertIn("cure", err)
+
+
+class Processes(unittest.TestCase):
+    def child(self, source, **options):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        child = processes.Child("some", [sys.executable, "-c", textwrap.dedent(source)],
+                                pathlib.Path(folder.name) / "some.log", **options)
+        self.addCleanup(processes.stop, [child])
+        return child
+
+    def test_ready(self):
+        self.assertTrue(processes.wait_ready([self.child(SERVICE.format(behaviour=""),
+                                                         notifies=True)]))
+
+    def test_silence_is_a_problem(self):
+        child = self.child(SERVICE.format(behaviour=""), notifies=True)
+        self.assertTrue(processes.wait_ready([child]))
+        child._last_sign = time.monotonic() - processes.WATCHDOG_LIMIT - 1
+        self.assertIn("no sign of life", child.problem())
+
+    def test_signal_is_named(self):
+        child = self.child("import os; os.abort()")
+        child.process.wait()
+        self.assertIn("SIGABRT", child.problem())
+
+    def test_stubborn_child_is_killed(self):
+        child = self.child("import signal, time; signal.signal(signal.SIGINT, signal.SIG_IGN)\n"
+                           "print('deaf', flush=True); time.sleep(60)")
+        while "deaf" not in child.log_tail():
+            time.sleep(0.02)
+        child.ask_to_stop()
+        child.wait_stopped(time.monotonic() + 0.2)
+        self.assertEqual(child.process.returncode, -signal.SIGKILL)
+
+
+class Bus(unittest.TestCase):
+    def test_endpoint(self):
+        self.assertEqual(bus.endpoint(bus.DEFAULT_URL), (GROUP, 7667))
+        self.assertIsNone(bus.endpoint("file://a.lcm"))
+
+    def test_channel_of(self):
+        first = b"LC03" + struct.pack(">IIIHH", 1, 9, 0, 0, 2)
+        later = b"LC03" + struct.pack(">IIIHH", 1, 9, 5, 1, 2)
+        self.assertEqual(bus.channel_of(lcm_packet("POSE")), "POSE")
+        self.assertEqual(bus.channel_of(first + b"MAP\0data"), "MAP")
+        self.assertEqual(bus.channel_of(later + b"MAP\0data"), "")
+        self.assertEqual(bus.channel_of(b"\0"), "")
+
+    def test_loopback(self):
+        self.assertEqual(bus.loopback_problem(GROUP, free_port()), "")
+
+    def test_port_in_use(self):
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
+            taken.bind(("", 0))
+            self.assertIn("taken", bus.loopback_problem(GROUP, taken.getsockname()[1]))
+
+
+class Results(unittest.TestCase):
+    def test_passed_needs_all_criteria(self):
+        self.assertTrue(results.passed(PASSED))
+        self.assertFalse(results.passed(FAILED))
+        self.assertFalse(results.passed({}))
+
+    def test_table(self):
+        text = results.table(json.loads(json.dumps(FAILED)))
+        self.assertRegex(text, r"safe_ratio +0.9 +FAILED\nin_image_ratio +passed")
+
+
+if __name__ == "__main__":
+    unittest.main()
