@@ -26,8 +26,8 @@ int Watch(const std::string& url, const std::string& prefix) {
   chase::bus::UdpBus bus(url, prefix);
   chase::flight::Progress progress;
   bool moving = false;
-  bus.Subscribe<chase::scenario_t>(
-      "SCENARIO", [&](const chase::scenario_t& m) { progress.SetScenario(m); });
+  bus.Subscribe<chase::scenario_t>("SCENARIO",
+                                   [&](const chase::scenario_t& m) { progress.SetScenario(m); });
   bus.Subscribe<chase::truth_t>("TRUTH", [&](const chase::truth_t& m) {
     progress.NoteArrival(bus.Now());
     progress.Add(m);

@@ -1,0 +1,62 @@
+#include "deploy/flight/flight_configs.h"
+
+#include <filesystem>
+#include <stdexcept>
+
+#include "common/config/config.h"
+
+namespace chase::flight {
+
+namespace {
+
+template <class Config>
+void Override(const world::Scenario& scenario, const std::string& service, Config* config) {
+  const std::string origin = "scenario " + scenario.name + ", services: " + service;
+  config::LoadText(world::ServiceConfig(scenario, service), origin, config);
+}
+
+/// What every process could read off its own data sheet: the start, sizes and the desired distance.
+void Derive(const world::Scenario& scenario, FlightConfigs* configs) {
+  const world::ChaserSpec& chaser = scenario.chaser;
+  configs->odometry.initial_position = chaser.start;
+  configs->odometry.initial_yaw_deg = chaser.yaw_deg;
+  configs->perception.target_radius = scenario.target.radius;
+  configs->perception.target_height = scenario.target.height;
+  configs->planning.takeoff_height = chaser.takeoff_height;
+  configs->planning.planner.desired_distance = chaser.desired_distance;
+  configs->planning.planner.drone_radius = chaser.radius;
+}
+
+}  // namespace
+
+FlightConfigs Configure(const world::Scenario& scenario, const FlightOptions& options) {
+  FlightConfigs configs;
+  configs.simulator.scenario = std::filesystem::absolute(options.scenario_file).string();
+  configs.simulator.seed = options.seed;
+  Derive(scenario, &configs);
+  Override(scenario, "simulator", &configs.simulator);
+  Override(scenario, "odometry", &configs.odometry);
+  Override(scenario, "mapping", &configs.mapping);
+  Override(scenario, "perception", &configs.perception);
+  Override(scenario, "prediction", &configs.prediction);
+  Override(scenario, "planning", &configs.planning);
+  Override(scenario, "control", &configs.control);
+  if (!options.sensors.empty()) configs.simulator.sensors = options.sensors;
+  if (!options.planner.empty()) configs.planning.algorithm = options.planner;
+  return configs;
+}
+
+std::string DumpService(const FlightConfigs& configs, const std::string& service) {
+  if (service == "simulator") return config::Dump(configs.simulator);
+  if (service == "odometry") return config::Dump(configs.odometry);
+  if (service == "mapping") return config::Dump(configs.mapping);
+  if (service == "perception") return config::Dump(configs.perception);
+  if (service == "prediction") return config::Dump(configs.prediction);
+  if (service == "planning") return config::Dump(configs.planning);
+  if (service == "control") return config::Dump(configs.control);
+  throw std::runtime_error("--print-config " + service +
+                           ": no such process in a flight; use simulator, odometry, mapping, "
+                           "perception, prediction, planning or control");
+}
+
+}  // namespace chase::flight

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "common/world/scenario.h"
+#include "services/control/control_node.h"
+#include "services/mapping/mapping_node.h"
+#include "services/odometry/odometry_node.h"
+#include "services/perception/perception_node.h"
+#include "services/planning/planning_node.h"
+#include "services/prediction/prediction_node.h"
+#include "services/simulator/simulator_node.h"
+
+namespace chase::flight {
+
+/// What the command line says about a flight.
+struct FlightOptions {
+  std::string scenario_file;
+  int64_t seed = 1;
+  std::string sensors;  ///< raw or truth; empty: as the scenario says
+  std::string planner;  ///< empty: planning's default
+};
+
+/// The configuration of every process of one flight.
+struct FlightConfigs {
+  simulator::SimulatorConfig simulator;
+  odometry::OdometryConfig odometry;
+  mapping::MappingConfig mapping;
+  perception::PerceptionConfig perception;
+  prediction::PredictionConfig prediction;
+  planning::PlanningConfig planning;
+  control::ControlConfig control;
+};
+
+/// Defaults, then what follows from the scenario (the start, sizes, the desired distance), then the
+/// scenario's own `services` overrides. Throws std::runtime_error, one line, on a bad override.
+FlightConfigs Configure(const world::Scenario& scenario, const FlightOptions& options);
+
+/// The configuration of one process as YAML that its --config loads. Throws std::runtime_error on
+/// an unknown name.
+std::string DumpService(const FlightConfigs& configs, const std::string& service);
+
+}  // namespace chase::flight

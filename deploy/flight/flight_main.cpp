@@ -1,0 +1,166 @@
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <chrono>
+#include <cstdio>
+#include <filesystem>
+#include <optional>
+
+#include "common/bus/channels.h"
+#include "deploy/flight/flight.h"
+#include "deploy/flight/progress.h"
+#include "logs/src/metrics.h"
+#include "logs/src/read_flight.h"
+
+namespace chase::flight {
+namespace {
+
+struct Arguments {
+  FlightOptions options;
+  std::string log, metrics, print_config;
+  double until = -1.0;
+  bool quiet = false;
+};
+
+/// Decodes what the progress line needs out of the stream of messages.
+void Observe(const std::string& channel, const bus::Bus::Bytes& bytes, Progress* progress) {
+  const int size = static_cast<int>(bytes.size());
+  scenario_t scenario;
+  truth_t truth;
+  if (channel == "SCENARIO" && scenario.decode(bytes.data(), 0, size) > 0)
+    progress->SetScenario(scenario);
+  if (channel == "TRUTH" && truth.decode(bytes.data(), 0, size) > 0) progress->Add(truth);
+}
+
+void PrintProgress(const world::Scenario& scenario, const Progress& progress, double t,
+                   double factor) {
+  fmt::print(
+      stderr,
+      "\r{}: {:6.1f} of {:.0f} s  distance {:5.2f} m  visible {:5.1f} %  {:5.2f} x real time",
+      scenario.name, t, scenario.duration_s, progress.distance(), 100.0 * progress.visible_ratio(),
+      factor);
+}
+
+/// Adds what was measured while flying to what the log holds.
+logs::FlightRecord Record(const std::string& log, const bus::Lockstep& lockstep,
+                          double real_time_factor) {
+  logs::FlightRecord record = logs::ReadFlight(log);
+  record.stages.clear();
+  for (const auto& [process, usage] : lockstep.Usages()) {
+    record.cpu_s[process] = usage.cpu_s;
+    for (const auto& [stage, s] : usage.stages)
+      record.stages.push_back({process, stage, s.count, s.mean_ms, s.p50_ms, s.p99_ms, s.max_ms});
+  }
+  record.real_time_factor = real_time_factor;
+  return record;
+}
+
+int PrintCriteria(const logs::Metrics& metrics) {
+  for (const auto& [name, passed] : metrics.criteria)
+    fmt::print("{:<20} {}\n", name, passed ? "passed" : "FAILED");
+  return metrics.Passed() ? 0 : 2;
+}
+
+/// Without --log a file of light messages is kept only as long as the metrics need it.
+class Recording {
+ public:
+  explicit Recording(const std::string& log)
+      : temporary_(log.empty()),
+        file_(log.empty() ? (std::filesystem::temp_directory_path() /
+                             fmt::format("chase-flight-{}.lcm", getpid()))
+                                .string()
+                          : log),
+        writer_(std::in_place, file_) {}
+  ~Recording() {
+    std::error_code ignored;
+    if (temporary_) std::filesystem::remove(file_, ignored);
+  }
+  Recording(const Recording&) = delete;
+  Recording& operator=(const Recording&) = delete;
+
+  void Write(int64_t utime, const std::string& channel, const bus::Bus::Bytes& bytes) {
+    if (!temporary_ || !bus::IsHeavy(channel)) writer_->Write(utime, channel, bytes);
+  }
+  const std::string& Close() {
+    writer_->Close();
+    return file_;
+  }
+
+ private:
+  bool temporary_;
+  std::string file_;
+  std::optional<bus::LogWriter> writer_;
+};
+
+int Fly(const world::Scenario& scenario, const Arguments& arguments) {
+  using Clock = std::chrono::steady_clock;
+  Flight flight(scenario, Configure(scenario, arguments.options));
+  Recording recording(arguments.log);
+  Progress progress;
+  flight.lockstep().SetTap(
+      [&](int64_t utime, const std::string& channel, const bus::Bus::Bytes& bytes) {
+        recording.Write(utime, channel, bytes);
+        Observe(channel, bytes, &progress);
+      });
+  const double end = arguments.until > 0.0 ? arguments.until : scenario.duration_s + 0.1;
+  const auto start = Clock::now();
+  double factor = 0.0;
+  for (double t = -scenario.settle_s; t < end;) {
+    t = std::min(t + 1.0, end);
+    flight.RunUntil(t);
+    const double wall = std::chrono::duration<double>(Clock::now() - start).count();
+    factor = (t + scenario.settle_s) / wall;
+    if (!arguments.quiet) PrintProgress(scenario, progress, t, factor);
+  }
+  if (!arguments.quiet) fmt::print(stderr, "\n");
+  const auto record = Record(recording.Close(), flight.lockstep(), factor);
+  const logs::Metrics metrics = logs::Compute(record);
+  if (!arguments.metrics.empty()) logs::WriteMetricsJson(arguments.metrics, record, metrics);
+  if (arguments.until > 0.0) return 0;  // criteria are for whole missions
+  return PrintCriteria(metrics);
+}
+
+int Run(const Arguments& arguments) {
+  const world::Scenario scenario = world::LoadScenario(arguments.options.scenario_file);
+  if (arguments.print_config.empty()) return Fly(scenario, arguments);
+  fmt::print("{}", DumpService(Configure(scenario, arguments.options), arguments.print_config));
+  return 0;
+}
+
+void AddOptions(CLI::App* app, Arguments* a) {
+  app->add_option("scenario", a->options.scenario_file, "scenario file")->required();
+  app->add_option("--seed", a->options.seed, "of all noise (default 1)");
+  app->add_option("--sensors", a->options.sensors, "raw or truth (default: the scenario's)")
+      ->check(CLI::IsMember({"raw", "truth"}));
+  app->add_option("--planner", a->options.planner, "planning algorithm (default: chase)");
+  app->add_option("--log", a->log, "record every message into this LCM log");
+  app->add_option("--metrics", a->metrics, "write the figures of the flight into this JSON file");
+  app->add_option("--until", a->until, "stop at this mission time, s");
+  app->add_option("--print-config", a->print_config,
+                  "print the configuration of this process in this scenario and exit");
+  app->add_flag("--quiet", a->quiet, "no progress line");
+}
+
+}  // namespace
+}  // namespace chase::flight
+
+/// Flies a scenario with all nodes in lockstep. Exit codes: 0 flown and the criteria hold, 1 bad
+/// use, 2 flown and a criterion failed.
+int main(int argc, char** argv) {
+  CLI::App app("Flies a scenario with every node in one thread and in logical time.",
+               "chase-flight");
+  chase::flight::Arguments arguments;
+  chase::flight::AddOptions(&app, &arguments);
+  try {
+    app.parse(argc, argv);
+    return chase::flight::Run(arguments);
+  } catch (const CLI::Success& e) {
+    return app.exit(e);
+  } catch (const CLI::ParseError& e) {
+    fmt::print(stderr, "chase-flight: {}; see chase-flight --help\n", e.what());
+  } catch (const std::exception& e) {
+    fmt::print(stderr, "chase-flight: {}\n", e.what());
+  }
+  return 1;
+}

@@ -1,0 +1,23 @@
+# Closed-loop flights: in lockstep (twice, byte for byte), its replays, and live over UDP.
+set(scenario ${CMAKE_SOURCE_DIR}/deploy/scenarios/gym.yaml)
+set(flight ${CMAKE_BINARY_DIR}/test/flight.lcm)
+set(bin ${CMAKE_BINARY_DIR}/bin)
+
+add_test(NAME flight_lockstep
+  COMMAND ${CMAKE_SOURCE_DIR}/test/flight/lockstep.sh ${bin} ${scenario} ${flight})
+set_tests_properties(flight_lockstep PROPERTIES TIMEOUT 300 FIXTURES_SETUP recorded_flight)
+
+foreach(row IN ITEMS "odometry:POSE;SCAN_REGISTERED" "mapping:OBSTACLES;MAP" "perception:TARGET"
+                     "prediction:PREDICTION" "planning:PLAN" "control:ATTITUDE_SETPOINT"
+                     "simulator:TRUTH;IMU;LIDAR_SCAN;CAMERA_IMAGE")
+  string(REGEX REPLACE ":.*" "" service "${row}")
+  string(REGEX REPLACE ".*:" "" channels "${row}")
+  add_test(NAME replay_${service}
+    COMMAND python3 ${CMAKE_SOURCE_DIR}/test/replay/replay_check.py ${bin} ${service} ${scenario}
+            ${flight} ${channels})
+  set_tests_properties(replay_${service} PROPERTIES TIMEOUT 300 FIXTURES_REQUIRED recorded_flight)
+endforeach()
+
+add_test(NAME flight_live COMMAND ${CMAKE_SOURCE_DIR}/test/flight/live.sh ${bin} gym 1
+  WORKING_DIRECTORY ${CMAKE_SOURCE_DIR})
+set_tests_properties(flight_live PROPERTIES TIMEOUT 300 RUN_SERIAL TRUE)
