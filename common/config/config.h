@@ -57,8 +57,8 @@ void CheckProblem(const std::string& origin, const YAML::Node& node, const std::
 
 class Reader {
  public:
-  Reader(std::string origin, YAML::Node node, std::string path)
-      : origin_(std::move(origin)), node_(std::move(node)), path_(std::move(path)) {}
+  Reader(std::string origin, const YAML::Node& node, std::string path)
+      : origin_(std::move(origin)), node_(node), path_(std::move(path)) {}
 
   template <class T>
   void operator()(const char* name, T& field, const char* /*doc*/) {
