@@ -11,8 +11,8 @@ import sys
 import tree
 
 ONE_SCREEN = 60  # lines
-FOLDERS = ("common", "common/*", "deploy", "deploy/*", "lcmtypes", "logs", "services", "services/*",
-           "test", "test/*")
+FOLDERS = ("common", "common/*", "deploy", "deploy/*", "lcmtypes", "logs", "services/*", "test",
+           "test/house")
 BLOCK = re.compile(r"^```\w*\n(.*?)^```", re.MULTILINE | re.DOTALL)
 LINK = re.compile(r"\]\(([^)#]+)[^)]*\)")
 RUN_ELSEWHERE = ("deploy/fly", "test/run")
