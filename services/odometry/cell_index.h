@@ -1,0 +1,77 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
+namespace chase::odometry {
+
+/// The cube of edge 1/inverse_size that holds p, as one number: 21 bits per axis.
+inline uint64_t CellKey(const Eigen::Vector3f& p, float inverse_size) {
+  const auto cell = [](float x) {
+    return static_cast<uint64_t>(static_cast<int64_t>(std::floor(x)) + (1 << 20)) & 0x1fffffu;
+  };
+  return cell(p.x() * inverse_size) | cell(p.y() * inverse_size) << 21 |
+         cell(p.z() * inverse_size) << 42;
+}
+
+/// Numbers cells 0, 1, 2, ... in the order of their first appearance: an open-addressing hash table
+/// whose content never depends on addresses or seeds.
+class CellIndex {
+ public:
+  static constexpr int kNone = -1;
+
+  explicit CellIndex(size_t expected = 64) { Resize(expected); }
+
+  size_t size() const { return count_; }
+
+  /// The cell's number, or kNone.
+  int Find(uint64_t key) const { return slots_[Slot(key)].number; }
+
+  int FindOrAdd(uint64_t key, bool* added) {
+    if (2 * (count_ + 1) > slots_.size()) Grow();
+    Entry& entry = slots_[Slot(key)];
+    *added = entry.number == kNone;
+    if (*added) entry = {key, static_cast<int>(count_++)};
+    return entry.number;
+  }
+
+  void Clear(size_t expected = 64) {
+    count_ = 0;
+    Resize(expected);
+  }
+
+  size_t MemoryBytes() const { return slots_.capacity() * sizeof(Entry); }
+
+ private:
+  struct Entry {
+    uint64_t key = 0;
+    int number = kNone;
+  };
+
+  void Resize(size_t expected) {
+    size_t n = 64;
+    while (n < 2 * expected + 2) n *= 2;
+    slots_.assign(n, Entry{});
+  }
+
+  void Grow() {
+    std::vector<Entry> old(slots_.size() * 2);
+    old.swap(slots_);
+    for (const Entry& entry : old)
+      if (entry.number != kNone) slots_[Slot(entry.key)] = entry;
+  }
+
+  size_t Slot(uint64_t key) const {
+    const size_t mask = slots_.size() - 1;
+    size_t slot = static_cast<size_t>((key * 0x9e3779b97f4a7c15ull) >> 20) & mask;
+    while (slots_[slot].number != kNone && slots_[slot].key != key) slot = (slot + 1) & mask;
+    return slot;
+  }
+
+  std::vector<Entry> slots_;
+  size_t count_ = 0;
+};
+
+}  // namespace chase::odometry

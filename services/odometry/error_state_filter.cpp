@@ -1,0 +1,120 @@
+#include "services/odometry/error_state_filter.h"
+
+#include <Eigen/Cholesky>
+
+#include "common/math/rotation.h"
+
+namespace chase::odometry {
+
+namespace {
+
+using math::ExpSO3;
+using math::Hat;
+using math::LogSO3;
+
+/// P <- F P F' for F = I + dt A with A's only blocks (p,v), (v,theta), (v,ba), (v,g), (theta,bg).
+void PropagateCovariance(const Eigen::Matrix3d& R, const Eigen::Vector3d& force_W, double dt,
+                         ErrorCovariance* P) {
+  ErrorCovariance F = ErrorCovariance::Identity();
+  F.block<3, 3>(kP, kV) = dt * Eigen::Matrix3d::Identity();
+  F.block<3, 3>(kV, kTheta) = -dt * Hat(force_W);
+  F.block<3, 3>(kV, kAccelBias) = -dt * R;
+  F.block<3, 3>(kV, kGravity) = dt * Eigen::Matrix3d::Identity();
+  F.block<3, 3>(kTheta, kGyroBias) = -dt * R;
+  const ErrorCovariance FP = F * *P;
+  P->noalias() = FP * F.transpose();
+}
+
+void AddDiagonal(int block, double variance, ErrorCovariance* P) {
+  for (int i = 0; i < 3; ++i) (*P)(block + i, block + i) += variance;
+}
+
+void Symmetrise(ErrorCovariance* P) { *P = (0.5 * (*P + P->transpose())).eval(); }
+
+}  // namespace
+
+void Propagate(const FilterConfig& config, const ImuSample& imu, NavState* state) {
+  const double dt = imu.t - state->t;
+  if (!(dt > 0.0)) return;
+  const Eigen::Vector3d w = imu.gyro - state->gyro_bias;
+  const Eigen::Quaterniond middle = state->R_WB * ExpSO3(0.5 * dt * w);
+  const Eigen::Vector3d force_W = middle * (imu.accel - state->accel_bias);
+  const Eigen::Vector3d a = force_W + state->g;
+  PropagateCovariance(middle.toRotationMatrix(), force_W, dt, &state->P);
+  AddDiagonal(kV, config.accel_noise * config.accel_noise * dt, &state->P);
+  AddDiagonal(kTheta, config.gyro_noise * config.gyro_noise * dt, &state->P);
+  AddDiagonal(kGyroBias, config.gyro_bias_walk * config.gyro_bias_walk * dt, &state->P);
+  AddDiagonal(kAccelBias, config.accel_bias_walk * config.accel_bias_walk * dt, &state->P);
+  state->p += dt * state->v + 0.5 * dt * dt * a;
+  state->v += dt * a;
+  state->R_WB = (state->R_WB * ExpSO3(dt * w)).normalized();
+  state->w_B = w;
+  state->a = a;
+  state->t = imu.t;
+}
+
+void PropagateBlind(const FilterConfig& config, double t, NavState* state) {
+  const double dt = t - state->t;
+  if (!(dt > 0.0)) return;
+  state->p += dt * state->v;
+  state->R_WB = (state->R_WB * ExpSO3(dt * state->w_B)).normalized();
+  state->a.setZero();
+  ErrorCovariance F = ErrorCovariance::Identity();
+  F.block<3, 3>(kP, kV) = dt * Eigen::Matrix3d::Identity();
+  state->P = (F * state->P * F.transpose()).eval();
+  const double a2 = config.blind_accel * config.blind_accel;
+  const double dt2 = dt * dt;
+  for (int i = 0; i < 3; ++i) {  // an unknown constant acceleration over dt
+    state->P(kP + i, kP + i) += 0.25 * a2 * dt2 * dt2;
+    state->P(kV + i, kV + i) += a2 * dt2;
+    state->P(kP + i, kV + i) += 0.5 * a2 * dt2 * dt;
+    state->P(kV + i, kP + i) += 0.5 * a2 * dt2 * dt;
+  }
+  AddDiagonal(kTheta, config.blind_rate * config.blind_rate * dt2, &state->P);
+  state->t = t;
+}
+
+void Inject(const ErrorVector& dx, NavState* state) {
+  state->p += dx.segment<3>(kP);
+  state->v += dx.segment<3>(kV);
+  state->R_WB = (ExpSO3(dx.segment<3>(kTheta)) * state->R_WB).normalized();
+  state->gyro_bias += dx.segment<3>(kGyroBias);
+  state->accel_bias += dx.segment<3>(kAccelBias);
+  state->g += dx.segment<3>(kGravity);
+}
+
+UpdateResult Update(const FilterConfig& config, const PoseMeasurement& z, NavState* state) {
+  const auto& V = z.known;
+  const Eigen::Index k = V.cols();
+  if (k == 0) return {};
+  Eigen::Matrix<double, 6, 1> e;
+  e << z.X_WB.p - state->p, LogSO3(z.X_WB.R * state->R_WB.conjugate());
+  // The floor stands for the map's own errors, which do not average out over features.
+  const Eigen::MatrixXd reduced = V.transpose() * z.information * V;
+  Eigen::Matrix<double, 6, 1> floor;
+  floor << Eigen::Vector3d::Constant(config.match_position_floor),
+      Eigen::Vector3d::Constant(config.match_rotation_floor);
+  const Eigen::LDLT<Eigen::MatrixXd> information(reduced);
+  if (information.info() != Eigen::Success || !information.isPositive()) return {};
+  const Eigen::MatrixXd onto = (V.transpose() * V).ldlt().solve(V.transpose());  // V onto = proj.
+  const Eigen::MatrixXd noise = information.solve(Eigen::MatrixXd::Identity(k, k)) +
+                                onto * floor.cwiseAbs2().asDiagonal() * onto.transpose();
+  Eigen::Matrix<double, Eigen::Dynamic, kStates> H(k, kStates);
+  H.setZero();
+  H.middleCols<3>(kP) = onto.leftCols<3>();
+  H.middleCols<3>(kTheta) = onto.rightCols<3>();
+  const Eigen::MatrixXd S = H * state->P * H.transpose() + noise;
+  const Eigen::LDLT<Eigen::MatrixXd> solver(S);
+  if (solver.info() != Eigen::Success || !solver.isPositive()) return {};
+  const Eigen::MatrixXd K = solver.solve(H * state->P).transpose();
+  const Eigen::VectorXd innovation = onto * e;
+  const ErrorVector dx = K * innovation;
+  if (!dx.allFinite()) return {};
+  Inject(dx, state);
+  const ErrorCovariance I_KH = ErrorCovariance::Identity() - K * H;
+  state->P = (I_KH * state->P * I_KH.transpose() + K * noise * K.transpose()).eval();
+  Symmetrise(&state->P);
+  return {true, innovation.dot(solver.solve(innovation)) / static_cast<double>(k)};
+}
+
+}  // namespace chase::odometry

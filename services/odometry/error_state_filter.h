@@ -1,0 +1,88 @@
+#pragma once
+
+#include <Eigen/Core>
+
+#include "services/odometry/sweep.h"
+
+namespace chase::odometry {
+
+struct FilterConfig {
+  double gyro_noise = 0.003;             ///< rad/s/sqrt(Hz)
+  double accel_noise = 0.03;             ///< m/s^2/sqrt(Hz)
+  double gyro_bias_walk = 2e-5;          ///< rad/s^2/sqrt(Hz)
+  double accel_bias_walk = 4e-4;         ///< m/s^3/sqrt(Hz)
+  double gravity = 9.81;                 ///< m/s^2
+  double accel_bias_sigma = 0.10;        ///< at the start, m/s^2
+  double gyro_bias_sigma = 0.003;        ///< after an alignment at rest, rad/s
+  double blind_accel = 3.0;              ///< what a body without IMU may do, m/s^2
+  double blind_rate = 1.0;               ///< rad/s
+  double match_position_floor = 0.004;   ///< what a scan match never gets below, m
+  double match_rotation_floor = 0.0015;  ///< rad
+
+  template <class V>
+  void Visit(V& v) {
+    v("gyro_noise", gyro_noise, "rad/s/sqrt(Hz)");
+    v("accel_noise", accel_noise, "m/s^2/sqrt(Hz)");
+    v("gyro_bias_walk", gyro_bias_walk, "rad/s^2/sqrt(Hz)");
+    v("accel_bias_walk", accel_bias_walk, "m/s^3/sqrt(Hz)");
+    v("gravity", gravity, "m/s^2");
+    v("accel_bias_sigma", accel_bias_sigma, "at the start, m/s^2");
+    v("gyro_bias_sigma", gyro_bias_sigma, "after an alignment at rest, rad/s");
+    v("blind_accel", blind_accel, "what the body may do while the IMU is silent, m/s^2");
+    v("blind_rate", blind_rate, "the same for rotation, rad/s");
+    v("match_position_floor", match_position_floor, "no scan match is better than this, m");
+    v("match_rotation_floor", match_rotation_floor, "no scan match is better than this, rad");
+  }
+};
+
+/// Order of the error state: each block three wide.
+enum ErrorBlock { kP = 0, kV = 3, kTheta = 6, kGyroBias = 9, kAccelBias = 12, kGravity = 15 };
+constexpr int kStates = 18;
+using ErrorCovariance = Eigen::Matrix<double, kStates, kStates>;
+using ErrorVector = Eigen::Matrix<double, kStates, 1>;
+
+/// What the filter knows of the body. Frame W unless named otherwise. The rotation error is in W:
+/// R_WB(true) = Exp(d_theta) R_WB.
+struct NavState {
+  double t = 0.0;  ///< s
+  Eigen::Quaterniond R_WB = Eigen::Quaterniond::Identity();
+  Eigen::Vector3d p = Eigen::Vector3d::Zero();           ///< m
+  Eigen::Vector3d v = Eigen::Vector3d::Zero();           ///< m/s
+  Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero();   ///< frame B, rad/s
+  Eigen::Vector3d accel_bias = Eigen::Vector3d::Zero();  ///< frame B, m/s^2
+  Eigen::Vector3d g = {0.0, 0.0, -9.81};                 ///< gravity, m/s^2
+  Eigen::Vector3d w_B = Eigen::Vector3d::Zero();         ///< last w_WB_B, rad/s
+  Eigen::Vector3d a = Eigen::Vector3d::Zero();           ///< last a_WB, m/s^2
+  ErrorCovariance P = ErrorCovariance::Zero();
+
+  Pose pose() const { return {R_WB, p}; }
+};
+
+/// Advances to `imu.t` under constant specific force and angular velocity. Solà 2017, "Quaternion
+/// kinematics for the error-state Kalman filter", section 5, with the rotation error on the left.
+void Propagate(const FilterConfig& config, const ImuSample& imu, NavState* state);
+
+/// Advances to `t` at constant velocity and angular velocity: all one can do while the IMU is
+/// silent.
+void PropagateBlind(const FilterConfig& config, double t, NavState* state);
+
+/// Adds `dx` to the state.
+void Inject(const ErrorVector& dx, NavState* state);
+
+/// A pose as measured, of which only the directions `known` (columns: p, rotation error in W)
+/// count.
+struct PoseMeasurement {
+  Pose X_WB;
+  Eigen::Matrix<double, 6, Eigen::Dynamic> known;
+  Eigen::Matrix<double, 6, 6> information;  ///< of (p, rotation error in W)
+};
+
+struct UpdateResult {
+  bool applied = false;
+  double nis = 0.0;  ///< normalised innovation squared per known direction
+};
+
+/// Kalman update; leaves the state as it is where the numbers do not allow one.
+UpdateResult Update(const FilterConfig& config, const PoseMeasurement& z, NavState* state);
+
+}  // namespace chase::odometry

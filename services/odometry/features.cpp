@@ -1,0 +1,158 @@
+#include "services/odometry/features.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "services/odometry/cell_index.h"
+
+namespace chase::odometry {
+
+namespace {
+
+constexpr int kRings = 128;
+constexpr int kSectors = 6;
+constexpr float kLongestSweep = 0.2f;  // s
+
+bool Usable(const FeatureConfig& config, const SweepPoint& point) {
+  if (!point.p.allFinite() || !(point.t >= 0.0f && point.t <= kLongestSweep)) return false;
+  const double r2 = point.p.cast<double>().squaredNorm();
+  return r2 >= config.min_range * config.min_range && r2 <= config.max_range * config.max_range &&
+         point.ring < kRings;
+}
+
+/// The indices of each ring's points in the order of firing.
+std::array<std::vector<int>, kRings> SplitByRing(const std::vector<SweepPoint>& points) {
+  std::array<std::vector<int>, kRings> rings;
+  for (int i = 0; i < static_cast<int>(points.size()); ++i)
+    rings[points[static_cast<size_t>(i)].ring].push_back(i);
+  const auto earlier = [&](int a, int b) {
+    return points[static_cast<size_t>(a)].t < points[static_cast<size_t>(b)].t;
+  };
+  for (auto& ring : rings)
+    if (!std::is_sorted(ring.begin(), ring.end(), earlier))
+      std::stable_sort(ring.begin(), ring.end(), earlier);
+  return rings;
+}
+
+/// One ring, with running sums so that a window's mean costs the same at any length.
+class Ring {
+ public:
+  Ring(const FeatureConfig& config, const std::vector<SweepPoint>& points,
+       const std::vector<int>& order)
+      : config_(config), n_(static_cast<int>(order.size())) {
+    p_.reserve(order.size());
+    sum_.reserve(order.size() + 1);
+    sum_.push_back(Eigen::Vector3d::Zero());
+    for (int i : order) {
+      p_.push_back(points[static_cast<size_t>(i)].p);
+      sum_.push_back(sum_.back() + p_.back().cast<double>());
+    }
+    jumps_.assign(order.size() + 1, 0);
+    for (int i = 1; i < n_; ++i) jumps_[At(i) + 1] = jumps_[At(i)] + (Jump(i) ? 1 : 0);
+    if (n_ > 0) spacing_ = 2.0f * static_cast<float>(M_PI) / static_cast<float>(std::max(n_, 600));
+  }
+
+  int size() const { return n_; }
+
+  /// Half length of the window round point i, in points.
+  int HalfWindow(int i) const {
+    const float step = std::max(1e-4f, p_[At(i)].norm() * spacing_);
+    return std::clamp(static_cast<int>(static_cast<float>(config_.window) / step), 4, 12);
+  }
+
+  /// How far point i stands off the middle of its window, perpendicular to the ring [m]; negative
+  /// where the window leaves the ring or a jump lies in it.
+  float Bend(int i) const {
+    const int k = HalfWindow(i);
+    if (i < k || i + k >= n_ || jumps_[At(i + k) + 1] != jumps_[At(i - k) + 1]) return -1.0f;
+    const Eigen::Vector3d sum = sum_[At(i + k) + 1] - sum_[At(i - k)];
+    const Eigen::Vector3f mean = (sum / (2 * k + 1)).cast<float>();
+    const Eigen::Vector3f along = p_[At(i + k)] - p_[At(i - k)];
+    const float length2 = along.squaredNorm();
+    if (length2 < 1e-8f) return -1.0f;
+    const Eigen::Vector3f d = p_[At(i)] - mean;
+    return (d - along * (along.dot(d) / length2)).norm();
+  }
+
+  float Range(int i) const { return p_[At(i)].norm(); }
+
+ private:
+  static size_t At(int i) { return static_cast<size_t>(i); }
+  /// True when the surface breaks between points i-1 and i, or is seen at too flat an angle.
+  bool Jump(int i) const {
+    const float r = std::min(p_[At(i)].norm(), p_[At(i - 1)].norm());
+    return (p_[At(i)] - p_[At(i - 1)]).squaredNorm() > std::pow(0.08f + 0.035f * r, 2.0f);
+  }
+
+  const FeatureConfig& config_;
+  int n_;
+  float spacing_ = 0.0f;  // rad
+  std::vector<Eigen::Vector3f> p_;
+  std::vector<Eigen::Vector3d> sum_;
+  std::vector<int> jumps_;  // number of jumps up to a point
+};
+
+/// Appends the sharpest points of a sector, no two of them within five points of each other.
+void AppendEdges(const FeatureConfig& config, const std::vector<float>& bend,
+                 const std::vector<int>& order, int begin, int end, std::vector<int>* edges) {
+  std::vector<int> candidates;
+  for (int i = begin; i < end; ++i)
+    if (bend[static_cast<size_t>(i)] > config.edge_deviation) candidates.push_back(i);
+  std::stable_sort(candidates.begin(), candidates.end(), [&](int a, int b) {
+    return bend[static_cast<size_t>(a)] > bend[static_cast<size_t>(b)];
+  });
+  std::vector<int> chosen;
+  for (int i : candidates) {
+    if (static_cast<int>(chosen.size()) >= config.edges_per_sector) break;
+    const bool near = std::any_of(chosen.begin(), chosen.end(),
+                                  [i](int other) { return std::abs(i - other) <= 5; });
+    if (!near) chosen.push_back(i);
+  }
+  for (int i : chosen) edges->push_back(order[static_cast<size_t>(i)]);
+}
+
+void AppendRing(const FeatureConfig& config, const std::vector<SweepPoint>& points,
+                const std::vector<int>& order, FeatureSet* features) {
+  const Ring ring(config, points, order);
+  std::vector<float> bend(order.size(), -1.0f);
+  for (int i = 0; i < ring.size(); ++i) {
+    const float b = bend[static_cast<size_t>(i)] = ring.Bend(i);
+    const double limit = config.plane_deviation + config.plane_deviation_ratio * ring.Range(i);
+    if (b >= 0.0f && b < limit) features->planes.push_back(order[static_cast<size_t>(i)]);
+  }
+  for (int s = 0; s < kSectors; ++s)
+    AppendEdges(config, bend, order, ring.size() * s / kSectors, ring.size() * (s + 1) / kSectors,
+                &features->edges);
+}
+
+}  // namespace
+
+void RemoveUnusable(const FeatureConfig& config, std::vector<SweepPoint>* points) {
+  points->erase(std::remove_if(points->begin(), points->end(),
+                               [&](const SweepPoint& point) { return !Usable(config, point); }),
+                points->end());
+}
+
+FeatureSet ExtractFeatures(const FeatureConfig& config, const std::vector<SweepPoint>& points) {
+  FeatureSet features;
+  features.planes.reserve(points.size());
+  for (const auto& order : SplitByRing(points))
+    if (!order.empty()) AppendRing(config, points, order, &features);
+  return features;
+}
+
+std::vector<int> Thinned(const std::vector<SweepPoint>& points, const std::vector<int>& indices,
+                         double size) {
+  CellIndex seen(indices.size());
+  std::vector<int> kept;
+  for (int i : indices) {
+    bool added = false;
+    seen.FindOrAdd(CellKey(points[static_cast<size_t>(i)].p, static_cast<float>(1.0 / size)),
+                   &added);
+    if (added) kept.push_back(i);
+  }
+  return kept;
+}
+
+}  // namespace chase::odometry

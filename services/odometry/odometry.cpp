@@ -1,0 +1,322 @@
+#include "services/odometry/odometry.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/math/rotation.h"
+
+namespace chase::odometry {
+
+namespace {
+
+constexpr double kKnotStep = 0.005;         // s, of the motion over a sweep
+constexpr double kLongestReplay = 3.0;      // s of inertial samples kept for late sweeps
+constexpr double kWaitForImu = 0.08;        // s that a sweep may be ahead of the IMU
+constexpr double kLargestInnovation = 1.5;  // m
+constexpr int kBootstrapPasses = 3;
+
+Pose ExtrinsicsOf(const world::Rig& rig) {
+  return {Eigen::Quaterniond(rig.R_BL()), rig.lidar_position};
+}
+
+bool Plausible(const ImuSample& imu) {
+  return imu.accel.allFinite() && imu.gyro.allFinite() && imu.accel.norm() < 400.0 &&
+         imu.gyro.norm() < 100.0;
+}
+
+double LastTime(const std::vector<SweepPoint>& points) {
+  float last = 0.0f;
+  for (const SweepPoint& point : points) last = std::max(last, point.t);
+  return static_cast<double>(last);
+}
+
+}  // namespace
+
+Odometry::Odometry(const OdometryConfig& config)
+    : config_(config),
+      X_BL_(ExtrinsicsOf(config.rig)),
+      matcher_(config.match),
+      planes_(config.map, SurfaceKind::kPlane),
+      edges_(config.map, SurfaceKind::kLine),
+      imu_(config.filter, config.health.imu_gap),
+      alignment_(config.alignment),
+      blend_(config.blend),
+      health_(config.health) {}
+
+std::optional<PoseEstimate> Odometry::AddImu(const ImuSample& imu) {
+  if (!Plausible(imu) || imu.t <= imu_.newest()) {
+    ++dropped_samples_;
+    return std::nullopt;
+  }
+  const double previous = imu_.newest();
+  imu_.Add(imu);
+  if (!fused_) return Align(imu);
+  health_.OnImu(imu.t, previous);
+  const double dt = imu.t - live_.t;
+  imu_.Advance(imu.t, &live_);
+  blend_.Decay(dt);
+  if (imu.t - base_.t > kLongestReplay) {
+    imu_.Advance(imu.t - 0.5 * kLongestReplay, &base_);
+    imu_.DropBefore(base_.t);
+  }
+  return Estimate();
+}
+
+std::optional<PoseEstimate> Odometry::Align(const ImuSample& imu) {
+  aligning_ = true;
+  alignment_.Add(imu);
+  const bool was_started = started_;
+  if (alignment_.Complete()) {
+    if (started_) PropagateBlind(config_.filter, imu.t, &base_);
+    base_ = started_ ? alignment_.ResultAt(config_.filter, base_)
+                     : alignment_.Result(config_.filter, config_.initial_position,
+                                         config_.initial_yaw_deg * M_PI / 180.0);
+    if (!started_) health_.OnStarted(alignment_.AtRest(), imu.t);
+    if (!started_ && !alignment_.AtRest()) sweeps_to_anchor_ = 2;
+    live_ = base_;
+    fused_ = started_ = true;
+    imu_.DropBefore(base_.t);
+    return Estimate();
+  }
+  if (was_started) return std::nullopt;
+  live_.t = imu.t;
+  live_.p = config_.initial_position;
+  live_.R_WB = math::FromYaw(config_.initial_yaw_deg * M_PI / 180.0);
+  return Estimate();
+}
+
+void Odometry::StartBlind(double t) {
+  base_.t = t;
+  base_.p = config_.initial_position;
+  base_.R_WB = math::FromYaw(config_.initial_yaw_deg * M_PI / 180.0);
+  base_.P.setZero();
+  base_.P.diagonal().segment<3>(kP).setConstant(1e-6);
+  base_.P.diagonal().segment<3>(kV).setConstant(100.0);
+  base_.P.diagonal().segment<3>(kTheta).setConstant(1e-6);
+  live_ = base_;
+  started_ = true;
+  health_.OnStarted(true, t);
+}
+
+void Odometry::AddSweep(Sweep sweep) {
+  const bool wait_for_alignment = aligning_ && !started_;
+  if (wait_for_alignment || !std::isfinite(sweep.start)) {
+    ++dropped_sweeps_;
+    return;
+  }
+  pending_.push_back(std::move(sweep));
+}
+
+bool Odometry::SweepReady() const {
+  if (pending_.empty()) return false;
+  if (!fused_ || pending_.size() > 1) return true;
+  const double end = pending_.front().start + LastTime(pending_.front().points);
+  return imu_.newest() >= end || imu_.newest() < end - kWaitForImu;
+}
+
+SweepResult Odometry::ProcessSweep() {
+  SweepResult result;
+  Prepared prepared;
+  Sweep sweep = std::move(pending_.front());
+  pending_.pop_front();
+  if (!Prepare(std::move(sweep), &prepared)) return result;
+  const bool blind = Blind(prepared.end);
+  result.match = Match(&prepared);
+  const bool first = planes_.cells() == 0;
+  const bool applied = first || Apply(prepared, result.match);
+  if (first || !applied) base_ = prepared.predicted;
+  if (first) result.match.valid = applied;
+  health_.OnMatch(prepared.end, result.match, applied);
+  if (blind && applied && !first)
+    base_.w_B = math::LogSO3(prepared.track.front().R_WB.conjugate() * base_.R_WB) /
+                std::max(1e-3, prepared.end - prepared.track.front().t);
+  if (sweeps_to_anchor_ > 0 && applied && !first && --sweeps_to_anchor_ == 0) {
+    planes_.Clear();
+    edges_.Clear();
+  }
+  RestartMapWhenLost(prepared.end);
+  if (applied || planes_.cells() == 0) Learn(prepared, base_.pose());
+  Catchup();
+  result.registered = Registered(prepared);
+  if (blind) result.pose = Estimate();
+  result.registered->health = Estimate().health.health;
+  if (first && !fused_) first_ = std::move(prepared);
+  return result;
+}
+
+bool Odometry::Prepare(Sweep sweep, Prepared* prepared) {
+  RemoveUnusable(config_.features, &sweep.points);
+  const int returns = static_cast<int>(sweep.points.size());
+  prepared->end = sweep.start + LastTime(sweep.points);
+  if (!started_ && returns > 0) StartBlind(prepared->end - 1e-6);
+  if (!started_) return false;
+  const bool silent = fused_ && imu_.newest() < prepared->end - kWaitForImu;
+  health_.OnSweep(prepared->end, returns, fused_ ? imu_.newest() : prepared->end, silent);
+  if (returns == 0) {
+    health_.OnMatch(prepared->end, MatchResult{}, false);
+    return false;
+  }
+  if (prepared->end <= base_.t) {
+    ++dropped_sweeps_;
+    return false;
+  }
+  prepared->sweep = std::move(sweep);
+  prepared->features = ExtractFeatures(config_.features, prepared->sweep.points);
+  prepared->matched_planes = Thinned(prepared->sweep.points, prepared->features.planes, thin_size_);
+  const double ratio = static_cast<double>(prepared->matched_planes.size()) / config_.match_points;
+  thin_size_ = std::clamp(thin_size_ * std::sqrt(std::clamp(ratio, 0.5, 2.0)), 0.05, 3.0);
+  prepared->track = {base_};
+  prepared->predicted = base_;
+  imu_.Advance(prepared->end, &prepared->predicted, &prepared->track);
+  return true;
+}
+
+SweepMotion Odometry::MotionOver(const Prepared& prepared) const {
+  const double length = prepared.end - prepared.sweep.start;
+  const int steps = std::max(1, static_cast<int>(std::ceil(length / kKnotStep)));
+  const double step = std::max(length / steps, 1e-6);
+  return SweepMotion(PosesOver(prepared.track, prepared.sweep.start, step, steps + 1), step);
+}
+
+Features Odometry::FeaturesIn(const Prepared& prepared, const SweepMotion& motion) const {
+  const auto& points = prepared.sweep.points;
+  return {Deskewed(points, prepared.matched_planes, X_BL_, motion),
+          Deskewed(points, prepared.features.edges, X_BL_, motion)};
+}
+
+MatchResult Odometry::Match(Prepared* prepared) {
+  const Features features = FeaturesIn(*prepared, MotionOver(*prepared));
+  if (planes_.cells() == 0) return {};
+  MatchResult match = matcher_.Match(features, planes_, edges_, prepared->predicted.pose());
+  if (Blind(prepared->end)) MatchBlind(prepared, &match);
+  return match;
+}
+
+/// Without IMU the motion over the sweep is what the match makes of it: deskew and match again.
+void Odometry::MatchBlind(Prepared* prepared, MatchResult* match) {
+  if (!match->valid) return;
+  if (first_) return Bootstrap(prepared, match);
+  Bend(match->X_WB, prepared);
+  const Features features = FeaturesIn(*prepared, MotionOver(*prepared));
+  const MatchResult again = matcher_.Match(features, planes_, edges_, match->X_WB);
+  if (again.valid) *match = again;
+}
+
+/// The first sweep was learnt and put out as if at rest: once the second one gives the velocity, it
+/// is learnt anew. What was put out showed the world as seen from about the middle of the sweep, so
+/// the initial pose is taken to be that of the middle.
+void Odometry::Bootstrap(Prepared* prepared, MatchResult* match) {
+  const Eigen::Quaterniond start = math::FromYaw(config_.initial_yaw_deg * M_PI / 180.0);
+  for (int i = 0; i < kBootstrapPasses && match->valid; ++i) {
+    Bend(match->X_WB, prepared);
+    NavState& last = first_->track.back();
+    last.v = prepared->track.front().v;
+    last.w_B = prepared->track.front().w_B;
+    const double half = 0.5 * (first_->end - first_->sweep.start);
+    last.p = config_.initial_position + half * last.v;
+    last.R_WB = start * math::ExpSO3(half * last.w_B);
+    base_.p = last.p;
+    base_.R_WB = last.R_WB;
+    prepared->track.front() = base_;
+    first_->track = {last};
+    planes_.Clear();
+    edges_.Clear();
+    Learn(*first_, last.pose());
+    const Features features = FeaturesIn(*prepared, MotionOver(*prepared));
+    *match = matcher_.Match(features, planes_, edges_, match->X_WB);
+  }
+  first_.reset();
+}
+
+/// Replaces the track by the uniform motion from its first state to X_WB.
+void Odometry::Bend(const Pose& X_WB, Prepared* prepared) const {
+  NavState from = prepared->track.front(), to = prepared->track.back();
+  const double dt = std::max(1e-3, to.t - from.t);
+  from.v = (X_WB.p - from.p) / dt;
+  from.w_B = math::LogSO3(from.R_WB.conjugate() * X_WB.R) / dt;
+  to.p = X_WB.p;
+  to.R_WB = X_WB.R;
+  prepared->track = {from, to};
+}
+
+bool Odometry::Apply(const Prepared& prepared, const MatchResult& match) {
+  if (!match.valid) return false;
+  NavState state = prepared.predicted;
+  const double allowed = kLargestInnovation + 3.0 * std::sqrt(state.P.block<3, 3>(kP, kP).trace());
+  if ((match.X_WB.p - state.p).norm() > allowed) return false;
+  const UpdateResult update =
+      Update(config_.filter, {match.X_WB, match.known, match.information}, &state);
+  if (!update.applied) return false;
+  base_ = state;
+  return true;
+}
+
+void Odometry::Learn(const Prepared& prepared, const Pose& X_WB) {
+  const SweepMotion motion = MotionOver(prepared);
+  const Eigen::Matrix3f R = X_WB.R.toRotationMatrix().cast<float>();
+  const Eigen::Vector3f p = X_WB.p.cast<float>();
+  std::vector<int> planes;
+  for (size_t i = 0; i < prepared.features.planes.size();
+       i += static_cast<size_t>(config_.map_stride))
+    planes.push_back(prepared.features.planes[i]);
+  const auto& points = prepared.sweep.points;
+  for (const FeaturePoint& point : Deskewed(points, planes, X_BL_, motion))
+    planes_.Add(R * point.p + p);
+  for (const FeaturePoint& point : Deskewed(points, prepared.features.edges, X_BL_, motion))
+    edges_.Add(R * point.p + p);
+  planes_.Prune(p);
+  edges_.Prune(p);
+}
+
+void Odometry::RestartMapWhenLost(double end) {
+  const double patience =
+      3.0 * (fused_ ? config_.health.lost_after : config_.health.lost_after_blind);
+  if (end - health_.last_good_sweep() < patience) return;
+  planes_.Clear();
+  edges_.Clear();
+}
+
+/// Brings the newest state up from the last sweep; what is put out moves there smoothly.
+void Odometry::Catchup() {
+  const NavState before = live_;
+  live_ = base_;
+  if (!fused_) return;
+  imu_.DropBefore(base_.t);
+  if (before.t > live_.t) imu_.Advance(before.t, &live_);
+  NavState comparable = before;
+  if (live_.t > comparable.t) imu_.Advance(live_.t, &comparable);
+  blend_.Absorb(comparable.pose(), comparable.v, live_.pose(), live_.v);
+}
+
+RegisteredSweep Odometry::Registered(const Prepared& prepared) const {
+  RegisteredSweep out;
+  out.t = prepared.end;
+  out.X_WL = base_.pose() * X_BL_;
+  const SweepMotion motion = MotionOver(prepared);
+  const Eigen::Matrix3f R_WB = base_.R_WB.toRotationMatrix().cast<float>();
+  const Eigen::Vector3f p_WB = base_.p.cast<float>();
+  const Eigen::Matrix3f R_BL = X_BL_.R.toRotationMatrix().cast<float>();
+  const Eigen::Vector3f p_BL = X_BL_.p.cast<float>();
+  out.points = prepared.sweep.points;
+  for (SweepPoint& point : out.points)
+    point.p = R_WB * motion.ToEnd(R_BL * point.p + p_BL, point.t) + p_WB;
+  return out;
+}
+
+PoseEstimate Odometry::Estimate() const {
+  PoseEstimate out;
+  out.t = live_.t;
+  out.X_WB = blend_.Applied(live_.pose());
+  out.v = blend_.AppliedVelocity(live_.v);
+  out.w_B = live_.w_B;
+  out.a = live_.a;
+  out.gyro_bias = live_.gyro_bias;
+  out.accel_bias = live_.accel_bias;
+  out.covariance = live_.P.topLeftCorner<9, 9>();
+  const double sigma = std::sqrt(std::max(0.0, out.covariance.topLeftCorner<3, 3>().trace()));
+  out.health = health_.At(live_.t, fused_, sigma);
+  out.correcting = blend_.correcting();
+  return out;
+}
+
+}  // namespace chase::odometry

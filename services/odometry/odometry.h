@@ -1,0 +1,111 @@
+#pragma once
+
+#include <deque>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "services/odometry/deskew.h"
+#include "services/odometry/imu_buffer.h"
+#include "services/odometry/odometry_config.h"
+
+namespace chase::odometry {
+
+/// The body as estimated at one instant. Frame W unless named otherwise.
+struct PoseEstimate {
+  double t = 0.0;  ///< s
+  Pose X_WB;
+  Eigen::Vector3d v = Eigen::Vector3d::Zero();           ///< m/s
+  Eigen::Vector3d w_B = Eigen::Vector3d::Zero();         ///< frame B, rad/s
+  Eigen::Vector3d a = Eigen::Vector3d::Zero();           ///< without gravity, m/s^2
+  Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero();   ///< frame B, rad/s
+  Eigen::Vector3d accel_bias = Eigen::Vector3d::Zero();  ///< frame B, m/s^2
+  Eigen::Matrix<double, 9, 9> covariance = Eigen::Matrix<double, 9, 9>::Zero();  ///< p, v, theta
+  HealthReport health;
+  bool correcting = false;
+};
+
+/// A sweep deskewed to its end.
+struct RegisteredSweep {
+  double t = 0.0;  ///< the sweep's end, s
+  Pose X_WL;       ///< at that time
+  Health health = Health::kOk;
+  std::vector<SweepPoint> points;  ///< p in frame W
+};
+
+struct SweepResult {
+  std::optional<PoseEstimate> pose;  ///< only where no IMU carries the pose
+  std::optional<RegisteredSweep> registered;
+  MatchResult match;
+};
+
+/// LiDAR odometry fused with an IMU. The filter's state at the end of the last good sweep is kept;
+/// each sweep advances it through the inertial samples, deskews, matches against the local map and
+/// updates it; the newest state follows from there through the remaining samples. Works without
+/// IMU.
+class Odometry {
+ public:
+  explicit Odometry(const OdometryConfig& config);
+
+  /// The pose at the sample's time; none for a sample that is out of order or not finite.
+  std::optional<PoseEstimate> AddImu(const ImuSample& imu);
+
+  /// Queues a sweep. It waits until the IMU's samples reach its end, or until they stay away.
+  void AddSweep(Sweep sweep);
+  bool SweepReady() const;
+  SweepResult ProcessSweep();
+
+  int64_t dropped_sweeps() const { return dropped_sweeps_; }
+  int64_t dropped_samples() const { return dropped_samples_; }
+  size_t MapBytes() const { return planes_.MemoryBytes() + edges_.MemoryBytes(); }
+  size_t map_cells() const { return planes_.cells() + edges_.cells(); }
+
+ private:
+  struct Prepared {
+    Sweep sweep;
+    double end = 0.0;
+    FeatureSet features;
+    std::vector<int> matched_planes;
+    NavState predicted;           // at the sweep's end
+    std::vector<NavState> track;  // from the last state to the sweep's end; for deskewing
+  };
+
+  std::optional<PoseEstimate> Align(const ImuSample& imu);
+  void StartBlind(double t);
+  bool Prepare(Sweep sweep, Prepared* prepared);
+  SweepMotion MotionOver(const Prepared& prepared) const;
+  Features FeaturesIn(const Prepared& prepared, const SweepMotion& motion) const;
+  MatchResult Match(Prepared* prepared);
+  void MatchBlind(Prepared* prepared, MatchResult* match);
+  void Bootstrap(Prepared* prepared, MatchResult* match);
+  void Bend(const Pose& X_WB, Prepared* prepared) const;
+  bool Apply(const Prepared& prepared, const MatchResult& match);
+  void Learn(const Prepared& prepared, const Pose& X_WB);
+  void RestartMapWhenLost(double end);
+  void Catchup();
+  RegisteredSweep Registered(const Prepared& prepared) const;
+  PoseEstimate Estimate() const;
+  bool Blind(double end) const { return !fused_ || imu_.newest() < end - config_.health.imu_gap; }
+
+  OdometryConfig config_;
+  Pose X_BL_;
+  ScanMatcher matcher_;
+  SurfaceMap planes_, edges_;
+  ImuBuffer imu_;
+  Alignment alignment_;
+  CorrectionBlend blend_;
+  HealthMonitor health_;
+
+  bool fused_ = false;    // the IMU carries the state
+  bool started_ = false;  // there is a state at all
+  bool aligning_ = false;
+  int sweeps_to_anchor_ = 0;  // after a start in motion the map begins again this many sweeps later
+  NavState base_;             // at the end of the last sweep
+  NavState live_;             // at the newest sample
+  std::deque<Sweep> pending_;
+  std::optional<Prepared> first_;  // of a start without IMU, until the velocity is known
+  double thin_size_ = 0.3;         // m
+  int64_t dropped_sweeps_ = 0, dropped_samples_ = 0;
+};
+
+}  // namespace chase::odometry

@@ -1,0 +1,120 @@
+#include "services/odometry/odometry_node.h"
+
+#include "chase/pose_t.hpp"
+#include "chase/scan_registered_t.hpp"
+#include "common/bus/convert.h"
+
+namespace chase::odometry {
+
+namespace {
+
+Sweep FromMessage(const lidar_scan_t& m, double start) {
+  Sweep sweep;
+  sweep.start = start;
+  sweep.points.resize(static_cast<size_t>(m.size));
+  for (size_t i = 0; i < sweep.points.size(); ++i)
+    sweep.points[i] = {{m.x[i], m.y[i], m.z[i]}, m.t[i], m.intensity[i], m.ring[i]};
+  return sweep;
+}
+
+pose_t ToMessage(const PoseEstimate& estimate, int64_t origin) {
+  pose_t m;
+  m.utime = bus::Utime(estimate.t, origin);
+  bus::Set(m.pos, estimate.X_WB.p);
+  bus::Set(m.vel, estimate.v);
+  bus::Set(m.orientation, estimate.X_WB.R);
+  bus::Set(m.rotation_rate, estimate.w_B);
+  bus::Set(m.accel, estimate.a);
+  bus::Set(m.gyro_bias, estimate.gyro_bias);
+  bus::Set(m.accel_bias, estimate.accel_bias);
+  Eigen::Map<Eigen::Matrix<double, 9, 9, Eigen::RowMajor>>(m.covariance) = estimate.covariance;
+  m.health = static_cast<int8_t>(estimate.health.health);
+  m.correcting = estimate.correcting ? 1 : 0;
+  m.reason = estimate.health.reason;
+  return m;
+}
+
+scan_registered_t ToMessage(const RegisteredSweep& sweep, int64_t origin) {
+  scan_registered_t m;
+  m.utime = bus::Utime(sweep.t, origin);
+  bus::Set(m.pos, sweep.X_WL.p);
+  bus::Set(m.orientation, sweep.X_WL.R);
+  m.health = static_cast<int8_t>(sweep.health);
+  m.size = static_cast<int32_t>(sweep.points.size());
+  const size_t n = sweep.points.size();
+  m.x.resize(n), m.y.resize(n), m.z.resize(n), m.intensity.resize(n), m.ring.resize(n);
+  for (size_t i = 0; i < n; ++i) {
+    const SweepPoint& point = sweep.points[i];
+    m.x[i] = point.p.x(), m.y[i] = point.p.y(), m.z[i] = point.p.z();
+    m.intensity[i] = point.intensity;
+    m.ring[i] = point.ring;
+  }
+  return m;
+}
+
+}  // namespace
+
+OdometryNode::OdometryNode(bus::Bus& bus, const OdometryConfig& config)
+    : bus_(bus), odometry_(config) {
+  bus_.Subscribe<imu_t>("IMU", [this](const imu_t& m) { OnImu(m); });
+  bus_.Subscribe<lidar_scan_t>("LIDAR_SCAN", [this](const lidar_scan_t& m) { OnScan(m); });
+}
+
+double OdometryNode::SecondsOf(int64_t utime) {
+  if (!has_origin_) origin_ = utime;
+  has_origin_ = true;
+  return bus::Seconds(utime, origin_);
+}
+
+void OdometryNode::OnImu(const imu_t& m) {
+  std::optional<PoseEstimate> pose;
+  {
+    const auto timer = bus_.Time("imu");
+    pose = odometry_.AddImu({SecondsOf(m.utime), bus::ToVector(m.accel), bus::ToVector(m.gyro)});
+  }
+  if (pose) Publish(*pose);
+  ProcessSweeps();
+}
+
+void OdometryNode::OnScan(const lidar_scan_t& m) {
+  odometry_.AddSweep(FromMessage(m, SecondsOf(m.utime)));
+  ProcessSweeps();
+}
+
+void OdometryNode::ProcessSweeps() {
+  while (odometry_.SweepReady()) {
+    SweepResult result;
+    {
+      const auto timer = bus_.Time("sweep");
+      result = odometry_.ProcessSweep();
+    }
+    if (result.pose) Publish(*result.pose);
+    if (result.registered) Publish(*result.registered);
+  }
+}
+
+void OdometryNode::Publish(const PoseEstimate& estimate) {
+  health_ = estimate.health;
+  bus_.Publish("POSE", ToMessage(estimate, origin_));
+}
+
+void OdometryNode::Publish(const RegisteredSweep& sweep) {
+  bus_.Publish("SCAN_REGISTERED", ToMessage(sweep, origin_));
+}
+
+bus::NodeReport OdometryNode::Report() const {
+  using State = bus::NodeReport::State;
+  switch (health_.health) {
+    case Health::kOk:
+      return {State::kOk, ""};
+    case Health::kDegraded:
+      return {State::kDegraded, health_.reason};
+    case Health::kLost:
+      return {State::kFailed, health_.reason};
+    case Health::kStarting:
+      break;
+  }
+  return {State::kStarting, health_.reason};
+}
+
+}  // namespace chase::odometry

@@ -1,0 +1,125 @@
+#include "services/odometry/scan_matcher.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+
+#include "common/math/rotation.h"
+
+namespace chase::odometry {
+
+/// Normal equations of one linearisation.
+struct ScanMatcher::System {
+  Matrix6d H = Matrix6d::Zero();
+  Vector6d b = Vector6d::Zero();
+  double weight = 0.0;   // sum of the features' weights
+  double squares = 0.0;  // weighted squares of the residuals
+  double lever2 = 0.0;   // weighted squares of the distances to the body, m^2
+  int matched = 0, inliers = 0, total = 0;
+
+  void Add(double residual, double w, const Vector6d& J, double range2) {
+    H.selfadjointView<Eigen::Lower>().rankUpdate(J, w);
+    b -= w * residual * J;
+    weight += w;
+    squares += w * residual * residual;
+    lever2 += w * range2;
+  }
+};
+
+double PlaneResidual(const Eigen::Vector3d& p_W, const Eigen::Vector3d& rotated,
+                     const Surface& plane, Vector6d* jacobian) {
+  const Eigen::Vector3d n = plane.direction.cast<double>();
+  *jacobian << n, rotated.cross(n);
+  return n.dot(p_W - plane.center.cast<double>());
+}
+
+double EdgeResidual(const Eigen::Vector3d& p_W, const Eigen::Vector3d& rotated, const Surface& line,
+                    Vector6d* jacobian) {
+  const Eigen::Vector3d u = line.direction.cast<double>();
+  const Eigen::Vector3d d = p_W - line.center.cast<double>();
+  const Eigen::Vector3d across = d - u * u.dot(d);
+  const double distance = across.norm();
+  const Eigen::Vector3d n = distance > 1e-9 ? across / distance : u.unitOrthogonal();
+  *jacobian << n, rotated.cross(n);
+  return distance;
+}
+
+ScanMatcher::System ScanMatcher::Linearise(const Features& features, const SurfaceMap& planes,
+                                           const SurfaceMap& edges, const Pose& X_WB,
+                                           double kernel) const {
+  System system;
+  const Eigen::Matrix3d R = X_WB.R.toRotationMatrix();
+  const double k2 = kernel * kernel;
+  const auto add = [&](const FeaturePoint& point, const SurfaceMap& map, auto&& residual_of,
+                       double weight) {
+    ++system.total;
+    const Eigen::Vector3d rotated = R * point.p.cast<double>();
+    const Eigen::Vector3d p_W = rotated + X_WB.p;
+    const Surface* surface = map.Find(p_W.cast<float>());
+    if (!surface) return;
+    Vector6d J;
+    const double r = residual_of(p_W, rotated, *surface, &J);
+    if (std::abs(r) > config_.gate) return;
+    ++system.matched;
+    if (std::abs(r) < kernel) ++system.inliers;
+    const double robust = k2 / (k2 + r * r);
+    const double noise2 = config_.range_noise * config_.range_noise;
+    const double trust = noise2 / (noise2 + static_cast<double>(surface->variance));
+    system.Add(r, weight * trust * robust * robust, J, rotated.squaredNorm());
+  };
+  for (const FeaturePoint& point : features.planes) add(point, planes, PlaneResidual, 1.0);
+  for (const FeaturePoint& point : features.edges)
+    add(point, edges, EdgeResidual, config_.edge_weight);
+  system.H = system.H.selfadjointView<Eigen::Lower>();
+  return system;
+}
+
+void ScanMatcher::Analyse(const System& system, MatchResult* result) const {
+  // Rotations are scaled by the features' mean distance, so that all six directions compare.
+  const double lever = std::sqrt(std::max(system.lever2 / system.weight, 1e-6));
+  Vector6d scale;
+  scale << 1.0, 1.0, 1.0, 1.0 / lever, 1.0 / lever, 1.0 / lever;
+  const Matrix6d normalised = scale.asDiagonal() * system.H * scale.asDiagonal() / system.weight;
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(normalised);
+  result->strength = eigen.eigenvalues();
+  result->weakest = eigen.eigenvectors().col(0);
+  int first = 0;
+  while (first < 6 && result->strength[first] < config_.min_information) ++first;
+  result->known = (scale.asDiagonal() * eigen.eigenvectors()).rightCols(6 - first);
+  for (int i = 0; i < result->known.cols(); ++i) result->known.col(i).normalize();
+}
+
+MatchResult ScanMatcher::Match(const Features& features, const SurfaceMap& planes,
+                               const SurfaceMap& edges, const Pose& predicted) const {
+  MatchResult result;
+  result.X_WB = predicted;
+  double kernel = std::max(config_.kernel, config_.gate);
+  System system;
+  for (int i = 0; i < config_.max_iterations; ++i) {
+    system = Linearise(features, planes, edges, result.X_WB, kernel);
+    result.iterations = i + 1;
+    if (system.matched < config_.min_features || system.weight < 1e-6) return result;
+    Analyse(system, &result);
+    // The step within the span of the known directions.
+    const auto& V = result.known;
+    if (V.cols() == 0) return result;
+    const Eigen::MatrixXd reduced = V.transpose() * system.H * V;
+    const Eigen::LDLT<Eigen::MatrixXd> solver(reduced);
+    const Vector6d step = V * solver.solve(V.transpose() * system.b);
+    if (!step.allFinite()) return result;
+    result.X_WB.p += step.head<3>();
+    result.X_WB.R = (math::ExpSO3(step.tail<3>()) * result.X_WB.R).normalized();
+    const bool settled = step.head<3>().norm() < 1e-3 && step.tail<3>().norm() < 1e-4;
+    if (settled && kernel <= config_.kernel) break;
+    kernel = std::max(config_.kernel, 0.5 * kernel);
+  }
+  result.rms = std::sqrt(system.squares / system.weight);
+  result.inliers = static_cast<double>(system.inliers) / std::max(system.total, 1);
+  const double sigma2 = std::max(system.squares / system.weight, std::pow(config_.range_noise, 2));
+  result.information = system.H / sigma2;
+  result.valid = result.inliers >= config_.min_inliers;
+  return result;
+}
+
+}  // namespace chase::odometry

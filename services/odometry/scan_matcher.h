@@ -1,0 +1,82 @@
+#pragma once
+
+#include <vector>
+
+#include "services/odometry/surface_map.h"
+#include "services/odometry/sweep.h"
+
+namespace chase::odometry {
+
+using Matrix6d = Eigen::Matrix<double, 6, 6>;
+using Vector6d = Eigen::Matrix<double, 6, 1>;
+
+struct MatchConfig {
+  int max_iterations = 8;
+  double gate = 0.6;               ///< features farther from their surface are left out, m
+  double kernel = 0.10;            ///< scale of the robust kernel at the end, m
+  double range_noise = 0.02;       ///< standard deviation of a residual, m
+  double min_information = 0.006;  ///< least share of the features that must hold each direction
+  int min_features = 80;
+  double min_inliers = 0.3;  ///< least share of features that find a surface within the kernel
+  double edge_weight = 1.0;  ///< of an edge feature against a plane feature
+
+  template <class V>
+  void Visit(V& v) {
+    v("max_iterations", max_iterations, "of Gauss-Newton");
+    v("gate", gate, "features farther from their surface are left out, m");
+    v("kernel", kernel, "scale of the robust kernel at the end, m");
+    v("range_noise", range_noise, "smallest standard deviation of a residual, m");
+    v("min_information", min_information, "share of the features that must hold each direction");
+    v("min_features", min_features, "a sweep with fewer matched features says nothing");
+    v("min_inliers", min_inliers, "least share of features within the kernel of their surface");
+    v("edge_weight", edge_weight, "of an edge feature against a plane feature");
+  }
+};
+
+struct Features {
+  std::vector<FeaturePoint> planes, edges;  ///< frame B at the sweep's end, m
+};
+
+struct MatchResult {
+  bool valid = false;
+  Pose X_WB;
+  /// Columns span the directions of (p, rotation error in W) that the sweep determines; the others
+  /// keep the prediction's value in X_WB.
+  Eigen::Matrix<double, 6, Eigen::Dynamic> known = Eigen::MatrixXd::Zero(6, 0);
+  Matrix6d information = Matrix6d::Zero();  ///< inverse covariance of (p, rotation error in W)
+  Vector6d strength = Vector6d::Zero();     ///< share of the features that hold each eigenvector
+  Vector6d weakest = Vector6d::Zero();      ///< eigenvector of the least strength
+  double inliers = 0.0;                     ///< share of the features
+  double rms = 0.0;                         ///< of the inliers' residuals, m
+  int iterations = 0;
+
+  bool degenerate() const { return valid && known.cols() < 6; }
+};
+
+/// Residual of a feature against a surface and its derivative with respect to (p, rotation error in
+/// W) where R_WB <- Exp(d_theta) R_WB. `rotated` is R_WB p_B.
+double PlaneResidual(const Eigen::Vector3d& p_W, const Eigen::Vector3d& rotated,
+                     const Surface& plane, Vector6d* jacobian);
+double EdgeResidual(const Eigen::Vector3d& p_W, const Eigen::Vector3d& rotated, const Surface& line,
+                    Vector6d* jacobian);
+
+/// Sweep against map: Gauss-Newton on the manifold over point-to-plane and point-to-line distances
+/// with a Geman-McClure kernel that narrows. Zhang & Singh 2014 (LOAM), eqs. (2) to (4); directions
+/// without information are left at the prediction as in Zhang, Kaess & Singh 2016.
+class ScanMatcher {
+ public:
+  explicit ScanMatcher(const MatchConfig& config) : config_(config) {}
+
+  MatchResult Match(const Features& features, const SurfaceMap& planes, const SurfaceMap& edges,
+                    const Pose& predicted) const;
+
+ private:
+  struct System;
+  System Linearise(const Features& features, const SurfaceMap& planes, const SurfaceMap& edges,
+                   const Pose& X_WB, double kernel) const;
+  void Analyse(const System& system, MatchResult* result) const;
+
+  MatchConfig config_;
+};
+
+}  // namespace chase::odometry
