@@ -1,0 +1,171 @@
+#include "services/mapping/integration.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace chase::mapping {
+
+namespace {
+
+constexpr double kNoise = 0.08;       // m, an interval's difference that may be noise
+constexpr double kNearMiss = 0.35;    // cells, a ray this near to a cell's returns contradicts them
+constexpr int kLowShare = 3;          // free cells keep limit / this, so that they can fill again
+constexpr int kSettleSweeps = 20;     // moving returns this long in one cell stand still
+constexpr size_t kMostChanges = 400000;
+
+uint8_t Increment(uint8_t n) { return n < 255 ? static_cast<uint8_t>(n + 1) : n; }
+
+}  // namespace
+
+void Integrator::Insert(const Eigen::Vector3d& origin, const std::vector<Return>& returns) {
+  ++sweep_;
+  Gather(returns);
+  for (auto& cell : cells_) Hit(&cell);
+  for (const auto& cell : cells_)
+    CastRay(origin, (cell.sum / static_cast<float>(cell.count)).cast<double>(), cell.key);
+}
+
+void Integrator::Gather(const std::vector<Return>& returns) {
+  cells_.clear();
+  for (const auto& r : returns) {
+    auto& column = grid_.Touch(r.key.x, r.key.y);
+    Voxel& voxel = column.voxels[VoxelGrid::Level(r.key.z)];
+    const size_t slot = static_cast<size_t>(voxel.slot);
+    if (slot >= cells_.size() || cells_[slot].voxel != &voxel) {
+      voxel.slot = static_cast<int32_t>(cells_.size());
+      cells_.emplace_back();
+      cells_.back().key = r.key;
+      cells_.back().column = &column;
+      cells_.back().voxel = &voxel;
+    }
+    HitCell& cell = cells_[static_cast<size_t>(voxel.slot)];
+    cell.sum += r.p;
+    ++cell.count;
+    cell.ground += r.label == Label::kGround;
+    cell.moving += r.label == Label::kMoving;
+    if (r.label != Label::kStatic) continue;
+    ++cell.solid;
+    cell.meter.Add(r.p - grid_.Center(r.key).cast<float>());
+  }
+}
+
+void Integrator::Hit(HitCell* cell) {
+  Voxel& voxel = *cell->voxel;
+  if (cell->solid + cell->ground == 0) {
+    if (cell->moving == 0) return;
+    voxel.sweep = sweep_;
+    voxel.moving_hits = Increment(voxel.moving_hits);
+    if (voxel.moving_hits >= kSettleSweeps) voxel.free_sweeps = 0;
+    return;
+  }
+  const bool strong = cell->solid + cell->ground >= 2;
+  voxel.sweep = sweep_;
+  voxel.free_sweeps = 0;
+  voxel.hits = Increment(voxel.hits);
+  voxel.log_odds = static_cast<int8_t>(
+      std::min(config_.limit, voxel.log_odds + (strong ? 2 : 1) * config_.hit));
+  const bool had_extent = !voxel.extent.empty();
+  if (cell->solid > 0) Follow(cell->meter, grid_.step(), kNoise, &voxel.extent);
+  if (!voxel.occupied && voxel.log_odds >= config_.occupied)
+    SetOccupied(cell->column, &voxel, cell->key);
+  else if (voxel.occupied && !had_extent && cell->solid > 0)
+    ++cell->column->occupied;
+}
+
+void Integrator::SetOccupied(VoxelGrid::Column* column, Voxel* voxel, const Key& key) {
+  voxel->occupied = true;
+  if (!voxel->extent.empty()) ++column->occupied;
+  Queue(voxel, key);
+}
+
+void Integrator::Reset(VoxelGrid::Column* column, Voxel* voxel, const Key& key) {
+  if (voxel->occupied) {
+    if (!voxel->extent.empty()) --column->occupied;
+    voxel->occupied = false;
+    Queue(voxel, key);
+  }
+  voxel->extent = Extent::Nothing();
+  voxel->hits = 0;
+  voxel->log_odds = static_cast<int8_t>(std::min<int>(voxel->log_odds, 0));
+}
+
+void Integrator::Queue(Voxel* voxel, const Key& key) {
+  if (voxel->queued || changes_.size() >= kMostChanges) return;
+  voxel->queued = true;
+  changes_.push_back(key);
+}
+
+bool Integrator::PassesReturns(const Voxel& voxel, const Key& key) const {
+  const Extent& e = voxel.extent;
+  const Eigen::Vector3d middle(e.low[0] + e.high[0], e.low[1] + e.high[1], e.low[4] + e.high[4]);
+  const Eigen::Vector3d d = grid_.Center(key) + 0.5 * grid_.step() * middle - ray_origin_;
+  const double squared = d.squaredNorm() - std::pow(d.dot(ray_direction_), 2);
+  return squared < std::pow(kNearMiss * grid_.resolution(), 2);
+}
+
+void Integrator::Miss(const Key& key, VoxelGrid::Column* column, Voxel* voxel) {
+  if (voxel->sweep == sweep_) return;
+  if (!voxel->extent.empty() && !PassesReturns(*voxel, key)) return;
+  voxel->sweep = sweep_;
+  voxel->moving_hits = 0;
+  voxel->log_odds = static_cast<int8_t>(
+      std::max(-config_.limit / kLowShare, voxel->log_odds + config_.miss));
+  if (voxel->log_odds > 0) return;
+  if (voxel->hits > 0) Reset(column, voxel, key);
+  voxel->free_sweeps = Increment(voxel->free_sweeps);
+  if (voxel->free_sweeps == 2) Queue(voxel, key);
+}
+
+/// Walks the cells between two points (Amanatides and Woo 1987), the last one excluded.
+void Integrator::CastRay(const Eigen::Vector3d& origin, const Eigen::Vector3d& end,
+                         const Key& last) {
+  const Eigen::Vector3d d = end - origin;
+  const double length = d.norm();
+  if (!(length > 1e-6)) return;
+  ray_origin_ = origin;
+  ray_direction_ = d / length;
+  const Key start = grid_.ToKey(origin);
+  int cell[3] = {start.x, start.y, start.z};
+  const int goal[3] = {last.x, last.y, last.z};
+  int step[3];
+  double next[3], delta[3];  // in shares of the ray's length
+  for (int i = 0; i < 3; ++i) {
+    step[i] = d[i] > 0.0 ? 1 : -1;
+    const double border = grid_.resolution() * (cell[i] + (d[i] > 0.0 ? 1 : 0));
+    next[i] = std::abs(d[i]) > 1e-12 ? (border - origin[i]) / d[i] : INFINITY;
+    delta[i] = std::abs(d[i]) > 1e-12 ? grid_.resolution() / std::abs(d[i]) : INFINITY;
+  }
+  VoxelGrid::Column* column = &grid_.Touch(cell[0], cell[1]);
+  while (cell[0] != goal[0] || cell[1] != goal[1] || cell[2] != goal[2]) {
+    Miss({cell[0], cell[1], cell[2]}, column, &column->voxels[VoxelGrid::Level(cell[2])]);
+    const int i = next[0] < next[1] ? (next[0] < next[2] ? 0 : 2) : (next[1] < next[2] ? 1 : 2);
+    if (next[i] > 1.0) return;  // rounding let the ray slip past the last cell
+    cell[i] += step[i];
+    next[i] += delta[i];
+    if (!grid_.Contains({cell[0], cell[1], cell[2]})) return;
+    if (i != 2) column = &grid_.Touch(cell[0], cell[1]);
+  }
+}
+
+void Integrator::ClearDisc(const Eigen::Vector2d& center, double radius, double bottom, double top,
+                           int settled, bool also_hit) {
+  const Eigen::Vector3d reach(radius, radius, 0.0);
+  const Key low = grid_.ToKey(Eigen::Vector3d(center.x(), center.y(), bottom) - reach);
+  const Key high = grid_.ToKey(Eigen::Vector3d(center.x(), center.y(), top) + reach);
+  for (int x = low.x; x <= high.x; ++x) {
+    for (int y = low.y; y <= high.y; ++y) {
+      VoxelGrid::Column* column = grid_.Find(x, y);
+      if (!column || column->occupied == 0) continue;
+      const Eigen::Vector2d d = grid_.Center({x, y, 0}).head<2>() - center;
+      if (d.squaredNorm() > radius * radius) continue;
+      for (int z = low.z; z <= high.z; ++z) {
+        if (!grid_.ContainsLevel(z)) continue;
+        Voxel& voxel = column->voxels[VoxelGrid::Level(z)];
+        if (voxel.hits > settled || (voxel.sweep == sweep_ && voxel.hits > 0 && !also_hit)) continue;
+        Reset(column, &voxel, {x, y, z});
+      }
+    }
+  }
+}
+
+}  // namespace chase::mapping

@@ -1,0 +1,244 @@
+#include "services/mapping/mapper.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace chase::mapping {
+
+namespace {
+
+constexpr int kSettledHits = 15;      // sweeps after which a cell outside the target's core stays
+constexpr double kGhostMargin = 0.2;  // m around a mover within which doubtful cells are cleared
+constexpr double kWindowMargin = 1.0; // m beyond the list's radius that the decomposition sees
+constexpr double kMostCoordinate = 6000.0;  // m, what the octree's keys can hold at 0.2 m
+
+/// Distance from p to the surface of an upright ellipse about c, roughly: along the line between.
+double PlanDistance(const world::Obstacle& o, const Eigen::Vector3d& p) {
+  const Eigen::Vector2d d = (p - o.center.coefficients.row(0).transpose()).head<2>();
+  const double level = std::sqrt(d.dot(o.shape.topLeftCorner<2, 2>() * d));
+  return level > 1.0 ? d.norm() * (1.0 - 1.0 / level) : 0.0;
+}
+
+}  // namespace
+
+int KeepNearest(const Eigen::Vector3d& origin, int most, std::vector<world::Obstacle>* obstacles) {
+  std::stable_sort(obstacles->begin(), obstacles->end(),
+                   [&](const world::Obstacle& a, const world::Obstacle& b) {
+                     return PlanDistance(a, origin) < PlanDistance(b, origin);
+                   });
+  const int cut = std::max(0, static_cast<int>(obstacles->size()) - most);
+  obstacles->resize(obstacles->size() - static_cast<size_t>(cut));
+  return cut;
+}
+
+Mapper::Mapper(const MappingConfig& config)
+    : config_(config),
+      grid_(config.grid.resolution),
+      integrator_(config.grid, &grid_),
+      ground_(config.ground),
+      zone_(config.target),
+      detector_(config.movers, config.grid),
+      tracker_(config.movers),
+      decomposition_(config.statics, config.grid.resolution),
+      tree_(config.grid.resolution) {}
+
+/// Shortens a ray to the range and to the window's levels; true if it had to.
+bool Mapper::Shorten(const Eigen::Vector3d& origin, Eigen::Vector3d* end) const {
+  const Eigen::Vector3d d = *end - origin;
+  double share = std::min(1.0, config_.grid.range / d.norm());
+  const double low = grid_.resolution() * (grid_.z0() + 0.5);
+  const double high = grid_.resolution() * (grid_.z0() + VoxelGrid::kLevels - 0.5);
+  if (origin.z() + share * d.z() > high) share = (high - origin.z()) / d.z();
+  if (origin.z() + share * d.z() < low) share = (low - origin.z()) / d.z();
+  if (share >= 1.0) return false;
+  *end = origin + std::max(0.0, share) * d;
+  return true;
+}
+
+void Mapper::Prepare(const Sweep& sweep) {
+  returns_.clear();
+  near_.clear();
+  const double min2 = config_.grid.min_range * config_.grid.min_range;
+  for (const auto& p : sweep.points) {
+    if (!p.allFinite()) continue;
+    Eigen::Vector3d end = p.cast<double>();
+    if ((end - sweep.origin).squaredNorm() < min2) continue;
+    Return r;
+    r.label = Shorten(sweep.origin, &end) ? Label::kFar : Label::kStatic;
+    r.p = end.cast<float>();
+    r.key = grid_.ToKey(end);
+    if (!grid_.Contains(r.key)) continue;
+    if (r.label == Label::kStatic) near_.push_back(r.p);
+    returns_.push_back(r);
+  }
+  ground_.Update(near_, sweep.origin);
+  for (auto& r : returns_)
+    if (r.label == Label::kStatic && ground_.IsGround(r.p)) r.label = Label::kGround;
+}
+
+/// Returns near the target are its own, unless a settled cell outside its core explains them.
+void Mapper::MarkTarget() {
+  if (!zone_.active()) return;
+  for (auto& r : returns_) {
+    if (r.label != Label::kStatic || !zone_.Holds(r.p)) continue;
+    const Voxel* voxel = grid_.At(r.key);
+    const bool settled = voxel && voxel->occupied && voxel->hits > kSettledHits;
+    const double distance = (r.p.head<2>().cast<double>() - zone_.center()).norm();
+    if (!settled || distance < zone_.core()) r.label = Label::kTarget;
+  }
+}
+
+void Mapper::TrackMovers(double t) {
+  tracker_.Predict(t);
+  if (zone_.active()) tracker_.Forget(zone_.center(), zone_.outer());
+  auto clusters = detector_.Detect(returns_, &grid_, tracker_.Expected());
+  tracker_.Update(&clusters);
+  for (const auto& cluster : clusters) {
+    if (!tracker_.Moves(cluster.track)) continue;
+    for (const int i : cluster.members) returns_[static_cast<size_t>(i)].label = Label::kMoving;
+  }
+}
+
+/// Empties cells where the target or a mover is, or a mover was before it was known as one.
+void Mapper::ClearGhosts() {
+  if (zone_.active()) {
+    const double bottom = ground_.Height(zone_.center().x(), zone_.center().y());
+    integrator_.ClearDisc(zone_.center(), zone_.outer(), bottom, zone_.top(), kSettledHits, false);
+    integrator_.ClearDisc(zone_.center(), zone_.core(), bottom, zone_.top(), 255, true);
+  }
+  for (const auto& track : tracker_.tracks()) {
+    if (!track.confirmed) continue;
+    const double radius = track.Radius() + kGhostMargin;
+    const double bottom = track.p.z() - 5.0, top = track.p.z() + 5.0;
+    integrator_.ClearDisc(track.p.head<2>(), radius, bottom, top, kSettledHits, false);
+    if (!track.fresh) continue;
+    for (const auto& place : track.trail)
+      integrator_.ClearDisc(place, radius, bottom, top, kSettledHits, false);
+  }
+}
+
+/// Extent in plan of a column's occupied cells within the flight volume; false if there are none.
+bool Mapper::ColumnExtent(const VoxelGrid::Column& column, Extent* extent) {
+  const Eigen::Vector3d center = grid_.Center({column.x, column.y, column.z0});
+  const double ground = ground_.Height(center.x(), center.y());
+  const double low = ground + config_.statics.band_low, high = ground + config_.statics.band_high;
+  *extent = Extent::Nothing();
+  for (int i = 0; i < VoxelGrid::kLevels; ++i) {
+    const Voxel& voxel = column.voxels[VoxelGrid::Level(column.z0 + i)];
+    if (!voxel.occupied || voxel.extent.empty()) continue;
+    const double z = center.z() + grid_.resolution() * i;
+    if (z + grid_.step() * voxel.extent.high[4] < low) continue;
+    if (z + grid_.step() * voxel.extent.low[4] > high) break;
+    *extent = Union(*extent, voxel.extent);
+  }
+  return !extent->empty();
+}
+
+std::vector<Cell> Mapper::OccupiedColumns(const Eigen::Vector3d& origin) {
+  std::vector<Cell> cells;
+  const double reach = config_.statics.radius + kWindowMargin;
+  const Key middle = grid_.ToKey(origin);
+  const int n = static_cast<int>(std::ceil(reach / grid_.resolution()));
+  std::array<Eigen::Vector2d, 8> corners;
+  Extent extent;
+  for (int x = middle.x - n; x <= middle.x + n; ++x) {
+    for (int y = middle.y - n; y <= middle.y + n; ++y) {
+      VoxelGrid::Column* column = grid_.Find(x, y);
+      if (!column) continue;
+      const Eigen::Vector2d center = grid_.Center({x, y, 0}).head<2>();
+      if (column->occupied == 0 || !ColumnExtent(*column, &extent)) {
+        column->piece = 0;
+        continue;
+      }
+      if ((center - origin.head<2>()).norm() > reach) continue;
+      Cell cell{x, y, column->piece, {}, 0.0};
+      const int k = PlanCorners(extent, center, grid_.step(), &corners);
+      cell.corners.assign(corners.begin(), corners.begin() + k);
+      cell.area = std::pow(grid_.step(), 2) * (extent.high[0] - extent.low[0]) *
+                  (extent.high[1] - extent.low[1]);
+      cells.push_back(std::move(cell));
+    }
+  }
+  return cells;
+}
+
+std::vector<world::Obstacle> Mapper::Statics(const Eigen::Vector3d& origin, double t,
+                                             int* dropped) {
+  auto cells = OccupiedColumns(origin);
+  const Eigen::Vector2d target = zone_.center();
+  const auto pieces =
+      decomposition_.Update(&cells, zone_.active() ? &target : nullptr, zone_.keep_out());
+  *dropped = decomposition_.dropped();
+  for (const auto& cell : cells) grid_.Touch(cell.x, cell.y).piece = cell.piece;
+  const StaticConfig& c = config_.statics;
+  const double half_band = 0.5 * (c.band_high - c.band_low);
+  // The ellipsoid's section must hold the outline at both ends of the flight volume.
+  const double grow = 1.0 / std::sqrt(1.0 - std::pow(half_band / c.semi_height, 2));
+  std::vector<world::Obstacle> obstacles;
+  for (const auto& piece : pieces) {
+    world::Obstacle o;
+    o.id = piece.id;
+    Eigen::Vector3d center;
+    center << piece.outline.center,
+        ground_.Height(piece.outline.center.x(), piece.outline.center.y()) + c.band_low + half_band;
+    o.center = world::Trajectory::Constant(center, t, config_.movers.horizon);
+    o.shape.setZero();
+    o.shape.topLeftCorner<2, 2>() = piece.outline.Scaled(grow).shape;
+    o.shape(2, 2) = 1.0 / (c.semi_height * c.semi_height);
+    if (PlanDistance(o, origin) <= c.radius && o.shape.allFinite()) obstacles.push_back(o);
+  }
+  return obstacles;
+}
+
+ObstacleList Mapper::Insert(const Sweep& sweep) {
+  ObstacleList list;
+  if (!(sweep.origin.cwiseAbs().maxCoeff() < kMostCoordinate)) return list;
+  origin_ = sweep.origin;
+  grid_.MoveTo(sweep.origin);
+  zone_.MoveTo(sweep.t);
+  Prepare(sweep);
+  MarkTarget();
+  TrackMovers(sweep.t);
+  integrator_.Insert(sweep.origin, returns_);
+  ClearGhosts();
+  list.obstacles = Statics(sweep.origin, sweep.t, &list.n_dropped);
+  list.n_static = static_cast<int>(list.obstacles.size());
+  const StaticConfig& c = config_.statics;
+  const double middle = ground_.Height(sweep.origin.x(), sweep.origin.y()) +
+                        0.5 * (c.band_low + c.band_high);
+  for (auto& o : tracker_.Obstacles(middle, c.semi_height, 1.02)) {
+    ++list.n_moving;
+    list.obstacles.push_back(std::move(o));
+  }
+  list.n_cut = KeepNearest(sweep.origin, config_.max_obstacles, &list.obstacles);
+  return list;
+}
+
+void Mapper::SetTree(int most) {
+  auto& changes = integrator_.changes();
+  for (int i = 0; i < most && !changes.empty(); ++i) {
+    const Key key = changes.front();
+    changes.pop_front();
+    Voxel* voxel = grid_.At(key);
+    if (!voxel || !voxel->queued) continue;  // rolled out of the window meanwhile
+    voxel->queued = false;
+    tree_.Set(key, voxel->occupied);
+  }
+}
+
+void Mapper::UpdateTree() {
+  SetTree(config_.tree.updates_per_sweep);
+  tree_.Forget(origin_, config_.tree.keep_radius, config_.tree.keep_tiles ? &tiles_ : nullptr);
+}
+
+std::string Mapper::WriteTree(int* occupied) {
+  SetTree(static_cast<int>(integrator_.changes().size()));
+  return tree_.Write(occupied);
+}
+
+std::vector<SavedTile> Mapper::TakeTiles() { return std::exchange(tiles_, {}); }
+
+size_t Mapper::Bytes() const { return grid_.Bytes() + tree_.Bytes(); }
+
+}  // namespace chase::mapping

@@ -1,0 +1,81 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "common/world/obstacle.h"
+#include "services/mapping/decomposition.h"
+#include "services/mapping/ground.h"
+#include "services/mapping/integration.h"
+#include "services/mapping/mapping_config.h"
+#include "services/mapping/movers.h"
+#include "services/mapping/occupancy_tree.h"
+#include "services/mapping/sweep.h"
+#include "services/mapping/target_zone.h"
+#include "services/mapping/voxel_grid.h"
+
+namespace chase::mapping {
+
+/// What the planner should know after a sweep.
+struct ObstacleList {
+  std::vector<world::Obstacle> obstacles;  ///< nearest to the drone first; frame W
+  int n_cut = 0;                           ///< left out because the list is bounded
+  int n_static = 0, n_moving = 0;          ///< listed and cut
+  int n_dropped = 0;                       ///< single columns left out because the target is there
+};
+
+/// Sweeps in, obstacles and an octree out. Everything solid above the ground near the flight volume
+/// is enclosed by upright ellipsoids; what moves is tracked apart; the target is neither.
+class Mapper {
+ public:
+  explicit Mapper(const MappingConfig& config);
+
+  void ObserveTarget(const TargetEstimate& estimate) { zone_.Observe(estimate); }
+  /// Maps a sweep. Cost is bounded by the size of the sweep and of the window.
+  ObstacleList Insert(const Sweep& sweep);
+  /// Hands news to the octree, at most updates_per_sweep cells. Call after the list went out.
+  void UpdateTree();
+
+  /// The octree in OctoMap's "bt" format, complete up to the last sweep.
+  std::string WriteTree(int* occupied);
+  /// Tiles that left the octree since the last call (config tree.keep_tiles).
+  std::vector<SavedTile> TakeTiles();
+
+  VoxelGrid& grid() { return grid_; }
+  const OccupancyTree& tree() const { return tree_; }
+  GroundModel& ground() { return ground_; }
+  const Tracker& tracker() const { return tracker_; }
+  size_t Bytes() const;
+
+ private:
+  void Prepare(const Sweep& sweep);
+  bool Shorten(const Eigen::Vector3d& origin, Eigen::Vector3d* end) const;
+  void MarkTarget();
+  void TrackMovers(double t);
+  void ClearGhosts();
+  std::vector<Cell> OccupiedColumns(const Eigen::Vector3d& origin);
+  bool ColumnExtent(const VoxelGrid::Column& column, Extent* extent);
+  std::vector<world::Obstacle> Statics(const Eigen::Vector3d& origin, double t, int* dropped);
+  void SetTree(int most);
+
+  MappingConfig config_;
+  VoxelGrid grid_;
+  Integrator integrator_;
+  GroundModel ground_;
+  TargetZone zone_;
+  MotionDetector detector_;
+  Tracker tracker_;
+  Decomposition decomposition_;
+  OccupancyTree tree_;
+  std::vector<Return> returns_;
+  std::vector<Eigen::Vector3f> near_;
+  std::vector<SavedTile> tiles_;
+  Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();
+};
+
+/// Sorts by distance of the outline from `origin` at the obstacles' own start and keeps `most`.
+/// Returns how many were cut.
+int KeepNearest(const Eigen::Vector3d& origin, int most, std::vector<world::Obstacle>* obstacles);
+
+}  // namespace chase::mapping

@@ -1,0 +1,114 @@
+#include "services/mapping/occupancy_tree.h"
+
+#include <octomap/octomap.h>
+
+#include <sstream>
+
+namespace chase::mapping {
+
+namespace {
+
+constexpr int kMiddle = 32768;     // OctoMap's key of the cell that starts at zero
+constexpr int kTileLevels = 7;     // 2^7 cells
+constexpr float kOccupied = 2.0f;  // log-odds written
+constexpr float kFree = -1.0f;
+
+octomap::OcTreeKey TreeKey(const Key& key) {
+  const auto unsign = [](int k) { return static_cast<octomap::key_type>(k + kMiddle); };
+  return {unsign(key.x), unsign(key.y), unsign(key.z)};
+}
+
+bool InTree(const Key& key) {
+  const auto in = [](int k) { return k >= -kMiddle && k < kMiddle; };
+  return in(key.x) && in(key.y) && in(key.z);
+}
+
+/// Gives all children below a node the same value and removes them. OctoMap frees a node's list of
+/// children only by pruning.
+void Collapse(octomap::OcTree* tree, octomap::OcTreeNode* node) {
+  if (!tree->nodeHasChildren(node)) return;
+  for (unsigned i = 0; i < 8; ++i) {
+    if (!tree->nodeChildExists(node, i)) tree->createNodeChild(node, i);
+    octomap::OcTreeNode* child = tree->getNodeChild(node, i);
+    Collapse(tree, child);
+    child->setLogOdds(0.0f);
+  }
+  tree->pruneNode(node);
+}
+
+}  // namespace
+
+OccupancyTree::OccupancyTree(double resolution)
+    : tree_(std::make_unique<octomap::OcTree>(resolution)) {}
+
+OccupancyTree::~OccupancyTree() = default;
+
+void OccupancyTree::Set(const Key& key, bool occupied) {
+  if (!InTree(key)) return;
+  tree_->setNodeValue(TreeKey(key), occupied ? kOccupied : kFree, true);
+  tiles_.insert({key.x >> kTileLevels, key.y >> kTileLevels, key.z >> kTileLevels});
+}
+
+void OccupancyTree::Forget(const Eigen::Vector3d& p, double radius,
+                           std::vector<SavedTile>* saved) {
+  const double edge = kTileCells * tree_->getResolution();
+  for (auto it = tiles_.begin(); it != tiles_.end();) {
+    const auto [x, y, z] = *it;
+    const Eigen::Vector2d center(edge * (x + 0.5), edge * (y + 0.5));
+    if ((center - p.head<2>()).norm() <= radius + 0.5 * edge) {
+      ++it;
+      continue;
+    }
+    if (saved) saved->push_back({x, y, z, Serialise(*it)});
+    Drop(*it);
+    it = tiles_.erase(it);
+  }
+}
+
+std::string OccupancyTree::Serialise(const Tile& tile) const {
+  const auto [x, y, z] = tile;
+  octomap::OcTree part(tree_->getResolution());
+  const auto corner = [](int t, int cell) {
+    return static_cast<octomap::key_type>(t * kTileCells + cell + kMiddle);
+  };
+  const octomap::OcTreeKey low(corner(x, 0), corner(y, 0), corner(z, 0));
+  const int last = kTileCells - 1;
+  const octomap::OcTreeKey high(corner(x, last), corner(y, last), corner(z, last));
+  for (auto it = tree_->begin_leafs_bbx(low, high), end = tree_->end_leafs_bbx(); it != end; ++it)
+    part.setNodeValue(it.getKey(), it->getLogOdds(), true);
+  part.updateInnerOccupancy();
+  std::ostringstream stream;
+  part.writeBinary(stream);
+  return stream.str();
+}
+
+void OccupancyTree::Drop(const Tile& tile) {
+  const auto [x, y, z] = tile;
+  const octomap::OcTreeKey key = TreeKey({x * kTileCells, y * kTileCells, z * kTileCells});
+  const unsigned depth = tree_->getTreeDepth() - kTileLevels;
+  octomap::OcTreeNode* node = tree_->search(key, depth);
+  if (!node) return;
+  Collapse(tree_.get(), node);
+  tree_->deleteNode(key, depth);
+}
+
+std::string OccupancyTree::Write(int* occupied) {
+  tree_->updateInnerOccupancy();
+  tree_->prune();
+  std::ostringstream stream;
+  tree_->writeBinaryConst(stream);
+  *occupied = 0;
+  for (auto it = tree_->begin_leafs(), end = tree_->end_leafs(); it != end; ++it)
+    if (tree_->isNodeOccupied(*it))
+      *occupied += 1 << (3 * (tree_->getTreeDepth() - it.getDepth()));
+  return stream.str();
+}
+
+int OccupancyTree::State(const Eigen::Vector3d& p) const {
+  const octomap::OcTreeNode* node = tree_->search(p.x(), p.y(), p.z());
+  return node ? (tree_->isNodeOccupied(node) ? 1 : 0) : -1;
+}
+
+size_t OccupancyTree::Bytes() const { return tree_->memoryUsage(); }
+
+}  // namespace chase::mapping

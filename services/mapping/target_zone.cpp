@@ -1,0 +1,38 @@
+#include "services/mapping/target_zone.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace chase::mapping {
+
+namespace {
+
+constexpr double kSlowDown = 1.0;   // s, time constant with which an unseen target is led
+constexpr double kMostSigma = 0.15; // m, of the estimate that widens the zone
+constexpr double kSpread = 0.15;    // m/s, growth of the zone while unseen
+constexpr double kMostSpread = 0.3; // m
+
+}  // namespace
+
+void TargetZone::Observe(const TargetEstimate& estimate) {
+  if (seen_ && estimate.t < last_.t) return;
+  if (!estimate.seen && (!seen_ || estimate.t - last_seen_ > config_.hold)) return;
+  if (estimate.seen) last_seen_ = estimate.t;
+  last_ = estimate;
+  seen_ = true;
+}
+
+void TargetZone::MoveTo(double t) {
+  const double age = t - last_.t;
+  active_ = seen_ && age <= config_.hold && age >= -config_.hold;
+  if (!active_) return;
+  const double lead = age > 0.0 ? kSlowDown * (1.0 - std::exp(-age / kSlowDown)) : age;
+  center_ = last_.mean.head<2>() + lead * last_.velocity.head<2>();
+  const double spread = std::clamp(kSpread * (age - 0.2), 0.0, kMostSpread);
+  const double sigma = std::min(kMostSigma, last_.sigma);
+  outer_ = last_.radius + config_.margin + 2.0 * sigma + spread;
+  core_ = last_.radius + config_.core;
+  top_ = last_.mean.z() + 0.5 * last_.height + config_.margin;
+}
+
+}  // namespace chase::mapping

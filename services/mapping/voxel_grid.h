@@ -1,0 +1,109 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "services/mapping/mapping_config.h"
+
+namespace chase::mapping {
+
+/// Integer cell coordinates: floor(x / resolution), frame W.
+struct Key {
+  int x = 0, y = 0, z = 0;
+  bool operator==(const Key& o) const { return x == o.x && y == o.y && z == o.z; }
+};
+
+/// Where in a cell its returns lie: intervals along x, y, (x+y)/sqrt2, (x-y)/sqrt2 and z about the
+/// cell's centre. An octagon in plan that hugs round and slanted surfaces where a cell does not.
+struct Extent {
+  static constexpr int kAxes = 5;
+  std::array<int8_t, kAxes> low{}, high{};  ///< in steps of VoxelGrid::step()
+  bool empty() const { return low[0] > high[0]; }
+  static Extent Nothing();
+};
+
+struct Voxel {
+  int8_t log_odds = 0;        ///< tenths
+  uint8_t free_sweeps = 0;    ///< consecutive sweeps seen free
+  uint8_t hits = 0;           ///< sweeps that hit it since it was last free
+  uint8_t moving_hits = 0;    ///< consecutive sweeps in which moving returns lay in it
+  bool occupied = false;
+  bool queued = false;        ///< waits for being written to the octree
+  Extent extent = Extent::Nothing();  ///< of its returns above the ground
+  uint32_t sweep = 0;         ///< last sweep that touched it
+  int32_t slot = 0;           ///< index into that sweep's hit cells
+};
+
+/// Rolling window of cells around the drone, kSide x kSide columns of kLevels cells. A column is
+/// reset when it is first touched after the window moved onto it, so that moving costs nothing.
+class VoxelGrid {
+ public:
+  static constexpr int kSide = 256, kLevels = 32;
+
+  struct Column {
+    int x = INT32_MIN, y = INT32_MIN, z0 = 0;  ///< the cells that it stands for
+    int piece = 0;                             ///< of the static decomposition; 0: none
+    int occupied = 0;                          ///< cells that are occupied with an extent
+    std::array<Voxel, kLevels> voxels;
+  };
+
+  explicit VoxelGrid(double resolution);
+
+  double resolution() const { return resolution_; }
+  /// Length of one step of an Extent, m.
+  double step() const { return step_; }
+  Key ToKey(const Eigen::Vector3d& p) const;
+  Eigen::Vector3d Center(const Key& k) const;
+
+  /// Centres the window on p. Forgets what falls out.
+  void MoveTo(const Eigen::Vector3d& p);
+  bool Contains(const Key& k) const { return ContainsColumn(k.x, k.y) && ContainsLevel(k.z); }
+  bool ContainsColumn(int x, int y) const {
+    return x >= x0_ && x < x0_ + kSide && y >= y0_ && y < y0_ + kSide;
+  }
+  bool ContainsLevel(int z) const { return z >= z0_ && z < z0_ + kLevels; }
+  int z0() const { return z0_; }
+
+  /// The column of (x, y), which must be in the window; reset if it was another's.
+  Column& Touch(int x, int y);
+  /// The column of (x, y), or null where nothing was seen.
+  Column* Find(int x, int y);
+  static size_t Level(int z) { return static_cast<size_t>(z & (kLevels - 1)); }
+  /// The voxel, or null where nothing was seen.
+  Voxel* At(const Key& k);
+
+  size_t Bytes() const { return columns_.size() * sizeof(Column); }
+
+ private:
+  Column& Slot(int x, int y) {
+    return columns_[static_cast<size_t>((x & (kSide - 1)) * kSide + (y & (kSide - 1)))];
+  }
+  void Renew(Column* column, int x, int y) const;
+
+  double resolution_, step_;
+  int x0_ = 0, y0_ = 0, z0_ = 0;
+  bool placed_ = false;
+  std::vector<Column> columns_;
+};
+
+/// Interval of a point set within one cell; metres about the cell's centre.
+struct ExtentMeter {
+  std::array<float, Extent::kAxes> low, high;
+  ExtentMeter();
+  void Add(const Eigen::Vector3f& d);
+};
+
+/// Lets `extent` follow a sweep's interval: outward by half of the difference, inward by a tenth
+/// where the difference is of the size of noise (`noise` m), not of a partial view.
+void Follow(const ExtentMeter& seen, double step, double noise, Extent* extent);
+
+/// Corners in plan (x, y; frame W, m) of the octagon that bounds the extent, up to eight.
+int PlanCorners(const Extent& extent, const Eigen::Vector2d& center, double step,
+                std::array<Eigen::Vector2d, 8>* corners);
+
+/// The smallest extent that holds both.
+Extent Union(const Extent& a, const Extent& b);
+
+}  // namespace chase::mapping
