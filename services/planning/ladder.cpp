@@ -1,0 +1,191 @@
+#include "services/planning/ladder.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "services/planning/cost.h"
+#include "services/planning/refinement.h"
+#include "services/planning/skeletons.h"
+
+namespace chase::planning {
+namespace {
+
+world::Trajectory ToTrajectory(const Curve& curve, double start, double duration) {
+  return {start, duration, curve};
+}
+
+PlannerConfig WithSmallerMargins(PlannerConfig config) {
+  config.safety_margin *= 0.5;
+  config.sight_margin *= 0.5;
+  return config;
+}
+
+PlanRequest OverRestOf(const PlanRequest& request, const world::Trajectory& plan) {
+  PlanRequest rest = request;
+  rest.start = plan.At(request.t0);
+  rest.horizon = plan.end() - request.t0;
+  return rest;
+}
+
+class Ladder : public Planner {
+ public:
+  Ladder(const PlannerConfig& config, std::unique_ptr<Search> search)
+      : config_(config), search_(std::move(search)) {}
+
+  PlanResult Plan(const PlanRequest& request) override {
+    std::string notes;
+    Problem problem = MakeProblem(config_, request, &notes);
+    PlanResult result;
+    if (TryChase(&problem, &result) || TryKeep(request, &result) ||
+        TrySafeOnly(&problem, &result)) {
+      if (result.verdict != Verdict::kKept)
+        result.trajectory.start = request.t0, result.trajectory.duration = request.horizon;
+    } else {
+      Brake(request, &result);
+    }
+    if (!notes.empty()) {
+      if (IsInSightVerdict(result.verdict) && WeakensSight(problem))
+        result.verdict = Verdict::kSafeOnly;
+      result.reason += (result.reason.empty() ? "" : "; ") + notes;
+    }
+    result.yaw = FitYaw(result.trajectory, request.target, request.yaw, config_.max_yaw_rate);
+    return result;
+  }
+
+  bool IsCertified(const PlanRequest& request, const world::Trajectory& plan) override {
+    const PlanRequest rest = OverRestOf(request, plan);
+    if (!(rest.horizon > 0.05)) return false;
+    const Problem problem = MakeProblem(WithSmallerMargins(config_), rest, nullptr);
+    return IsFeasible(ToCurve(plan, rest.t0, rest.horizon), problem, 0.0, config_.exact_visibility,
+                      Arithmetic::kCertified);
+  }
+
+ private:
+  static bool IsInSightVerdict(Verdict v) {
+    return v == Verdict::kChase || v == Verdict::kWider || v == Verdict::kKept;
+  }
+  static bool WeakensSight(const Problem& problem) {
+    return std::any_of(problem.obstacles.begin(), problem.obstacles.end(), [](const Ellipsoid& e) {
+      return e.sight_from > 0.0 || e.safety_from > 0.0;
+    });
+  }
+
+  bool TrySearch(const Problem& problem, double sight_from, PlanResult* result) {
+    Found found = search_->Best(problem, sight_from);
+    result->generated += found.generated;
+    result->checked += found.checked;
+    result->feasible += found.feasible;
+    if (found.index < 0) return false;
+    result->winner = found.index;
+    if (config_.refine && Refine(config_, problem, sight_from, &found.plan, &found.cost))
+      result->winner = -1;
+    result->cost = found.cost;
+    result->trajectory.coefficients = found.plan;
+    return true;
+  }
+
+  bool TryChase(Problem* problem, PlanResult* result) {
+    PlaceSkeletons(config_, Layout::kNormal, problem);
+    result->verdict = Verdict::kChase;
+    if (TrySearch(*problem, 0.0, result)) return true;
+    PlaceSkeletons(config_, Layout::kWide, problem);
+    result->verdict = Verdict::kWider;
+    result->reason = "no candidate of the normal skeletons is feasible";
+    return TrySearch(*problem, 0.0, result);
+  }
+
+  bool TryKeep(const PlanRequest& request, PlanResult* result) {
+    if (!request.running || request.running->end() - request.t0 < 0.3 ||
+        !IsCertified(request, *request.running))
+      return false;
+    const PlanRequest rest = OverRestOf(request, *request.running);
+    const Curve curve = ToCurve(*request.running, rest.t0, rest.horizon);
+    result->verdict = Verdict::kKept;
+    result->reason = "no candidate is feasible, the running plan still is";
+    result->trajectory = ToTrajectory(curve, rest.t0, rest.horizon);
+    result->cost = Evaluate(config_, MakeProblem(config_, rest, nullptr), curve);
+    return true;
+  }
+
+  // Sight asked from ever later on, then not at all.
+  bool TrySafeOnly(Problem* problem, PlanResult* result) {
+    result->verdict = Verdict::kSafeOnly;
+    PlaceSkeletons(config_, Layout::kNormal, problem);
+    for (double sight_from : {0.25, 0.5, 0.75, 1.0}) {
+      if (!TrySearch(*problem, sight_from, result)) continue;
+      result->reason = sight_from < 1.0 ? "no candidate keeps sight; this one has it from " +
+                                              std::to_string(static_cast<int>(100 * sight_from)) +
+                                              " % of the horizon on"
+                                        : "no candidate keeps or regains sight";
+      return true;
+    }
+    return false;
+  }
+
+  void Brake(const PlanRequest& request, PlanResult* result) {
+    bool safe = false;
+    result->verdict = Verdict::kBrake;
+    result->trajectory = BrakePlan(config_, request, &safe);
+    result->reason = safe ? "no candidate is safe" : "no candidate is safe, nor is braking";
+    PlanRequest rest = request;
+    rest.horizon = result->trajectory.duration;
+    result->cost = Evaluate(config_, MakeProblem(config_, rest, nullptr),
+                            Curve(result->trajectory.coefficients));
+  }
+
+  PlannerConfig config_;
+  std::unique_ptr<Search> search_;
+};
+
+Curve BrakeCurve(const world::State& s, double T) {
+  const Eigen::Vector3d b0 = s.p, b1 = b0 + T / 5.0 * s.v;
+  const Eigen::Vector3d b2 = 2.0 * b1 - b0 + T * T / 20.0 * s.a;
+  const Eigen::Vector3d b3 = 3.0 * b2 - 3.0 * b1 + b0 + T * T * T / 60.0 * s.j;
+  const Eigen::Vector3d b[6] = {b0, b1, b2, b3, b3, b3};
+  Curve c = Curve::Zero(6, 3);
+  for (int k = 0; k <= 5; ++k)
+    for (int i = 0; i <= k; ++i) {
+      double weight = (k - i) % 2 ? -1.0 : 1.0;
+      for (int m = 0; m < k; ++m) weight *= (5.0 - m) / (m + 1.0);
+      for (int m = 0; m < i; ++m) weight *= (k - m) / (m + 1.0);
+      c.row(k) += weight * b[i].transpose();
+    }
+  return c;
+}
+
+double Clearance(const Curve& plan, const Problem& problem) {
+  double low = HUGE_VAL;
+  for (int i = 1; i <= 30; ++i)
+    for (const Ellipsoid& e : problem.obstacles) {
+      const Eigen::Vector3d d = Evaluate(plan, i / 30.0) - Evaluate(e.center, i / 30.0);
+      low = std::min(low, d.dot(e.safety * d));
+    }
+  return low;
+}
+
+}  // namespace
+
+std::unique_ptr<Planner> MakeLadder(const PlannerConfig& config, std::unique_ptr<Search> search) {
+  return std::make_unique<Ladder>(config, std::move(search));
+}
+
+world::Trajectory BrakePlan(const PlannerConfig& config, const PlanRequest& request, bool* safe) {
+  world::Trajectory best;
+  double best_clearance = -1.0;
+  for (double T : {0.6, 0.8, 1.0, 1.3, 1.7, 2.2, 3.0}) {
+    PlanRequest rest = request;
+    rest.horizon = T;
+    Problem problem = MakeProblem(config, rest, nullptr);
+    problem.limits.tan_elevation = problem.limits.min_distance = 0.0;
+    const Curve curve = BrakeCurve(request.start, T);
+    *safe = curve.allFinite() && IsFeasible(curve, problem, 1.0, false, Arithmetic::kCertified);
+    if (*safe) return ToTrajectory(curve, request.t0, T);
+    const double clearance = Clearance(curve, problem);
+    if (clearance <= best_clearance) continue;
+    best_clearance = clearance;
+    best = ToTrajectory(curve, request.t0, T);
+  }
+  return best;
+}
+
+}  // namespace chase::planning

@@ -1,0 +1,168 @@
+#include "services/planning/pilot.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/math/rotation.h"
+#include "services/planning/ladder.h"
+
+namespace chase::planning {
+namespace {
+
+constexpr double kHoverDuration = 2.0;  // s
+constexpr double kShortestHorizon = 1.0;
+
+// Rest to rest from a to b, minimum jerk.
+world::Trajectory RestToRest(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double start,
+                             double duration) {
+  Eigen::Matrix<double, Eigen::Dynamic, 3> c = Eigen::MatrixXd::Zero(6, 3);
+  c.row(0) = a.transpose();
+  c.row(3) = 10.0 * (b - a).transpose();
+  c.row(4) = -15.0 * (b - a).transpose();
+  c.row(5) = 6.0 * (b - a).transpose();
+  return {start, duration, c};
+}
+
+bool IsAtRest(const world::State& s) { return s.v.norm() < 0.05 && s.a.norm() < 0.1; }
+
+PlanResult Waiting(const std::string& reason, const world::Trajectory& trajectory,
+                   const std::vector<double>& yaw) {
+  PlanResult result;
+  result.verdict = Verdict::kWait;
+  result.reason = reason;
+  result.trajectory = trajectory;
+  result.yaw = yaw;
+  return result;
+}
+
+bool IsFinite(const PlanResult& plan) {
+  if (!plan.trajectory.coefficients.allFinite()) return false;
+  return std::all_of(plan.yaw.begin(), plan.yaw.end(), [](double y) { return std::isfinite(y); });
+}
+
+}  // namespace
+
+Pilot::Pilot(const PlanningConfig& config)
+    : config_(config), planner_(MakePlanner(config.planner_name, config.planner)) {}
+
+void Pilot::SetForecast(const Forecast& forecast) {
+  forecast_ = forecast;
+  news_ = true;
+}
+
+void Pilot::SetObstacles(double /*t*/, std::vector<world::Obstacle> obstacles) {
+  obstacles_ = std::move(obstacles);
+  obstacles_changed_ = true;
+}
+
+bool Pilot::HasTarget(double t) const {
+  return forecast_ && forecast_->has_target && t - forecast_->t < config_.stale_prediction;
+}
+
+bool Pilot::IsDue(double t) const {
+  const double age = t - last_planned_;
+  if (!has_running_ || age >= config_.replan_period - 1e-6) return true;
+  return news_ && age >= config_.min_period - 1e-6;
+}
+
+std::optional<PlanResult> Pilot::Update(double t, const BodyEstimate& body) {
+  const double t0 = t + config_.latency;
+  const Start start = StartAt(t, t0, body);
+  if (obstacles_changed_ && has_running_ && HasTarget(t)) {
+    obstacles_changed_ = false;
+    news_ = news_ || !planner_->IsCertified(Request(t0, start), running_.trajectory);
+  }
+  if (!IsDue(t)) return std::nullopt;
+  PlanResult plan = airborne_ && HasTarget(t) ? Chase(t0, start) : Wait(t0, start, body);
+  if (!IsFinite(plan)) plan = Hover(t0, {{body.p, {}, {}, {}}, {body.yaw, 0.0}});
+  running_ = plan;
+  has_running_ = true;
+  last_planned_ = t;
+  news_ = false;
+  return plan;
+}
+
+// On the running plan, at its end once it is over; on the estimate when there is no plan or the
+// body is too far from it.
+Pilot::Start Pilot::StartAt(double t, double t0, const BodyEstimate& body) const {
+  const world::Trajectory& plan = running_.trajectory;
+  const double now = std::clamp(t, plan.start, plan.end());
+  if (!has_running_ || (plan.Position(now) - body.p).norm() > config_.reset_threshold)
+    return {{body.p, has_running_ ? body.v : Eigen::Vector3d::Zero(), {}, {}}, {body.yaw, 0.0}};
+  const double tau = std::clamp((t0 - plan.start) / plan.duration, 0.0, 1.0);
+  Start start{plan.At(plan.start + tau * plan.duration), YawAt(running_.yaw, tau, plan.duration)};
+  if (t0 >= plan.end()) {
+    start.state.v = start.state.a = start.state.j = Eigen::Vector3d::Zero();
+    start.yaw.rate = 0.0;
+  }
+  return start;
+}
+
+PlanRequest Pilot::Request(double t0, const Start& start) const {
+  PlanRequest request;
+  request.t0 = t0;
+  request.start = start.state;
+  request.yaw = start.yaw;
+  request.obstacles = obstacles_;
+  request.horizon = config_.horizon;
+  request.target = world::Trajectory::Constant(start.state.p, t0, config_.horizon);
+  if (!forecast_ || !forecast_->has_target) return request;
+  request.target = forecast_->target;
+  request.target_sigma = forecast_->sigma;
+  request.horizon = std::clamp(forecast_->target.end() - t0, kShortestHorizon, config_.horizon);
+  if (has_running_) request.running = running_.trajectory;
+  return request;
+}
+
+PlanResult Pilot::Chase(double t0, const Start& start) {
+  had_target_ = true;
+  const PlanResult plan = planner_->Plan(Request(t0, start));
+  if (plan.yaw.size() > 1) {
+    const double turned = EvaluateYaw(plan.yaw, 1.0) - plan.yaw[0];
+    if (std::abs(turned) > 0.05) search_turn_ = turned > 0.0 ? 1.0 : -1.0;
+  }
+  return plan;
+}
+
+PlanResult Pilot::Wait(double t0, const Start& start, const BodyEstimate& body) {
+  if (!airborne_ && !has_running_) {
+    climb_end_ = t0 + config_.takeoff_time;
+    return Climb(t0, {{body.p, {}, {}, {}}, {body.yaw, 0.0}});
+  }
+  if (!airborne_ && t0 < climb_end_) {
+    PlanResult same = running_;  // still climbing
+    return same;
+  }
+  airborne_ = true;
+  if (HasTarget(t0 - config_.latency)) return Chase(t0, start);
+  return had_target_ ? BrakeAndLook(t0, start) : Hover(t0, start);
+}
+
+PlanResult Pilot::Climb(double t0, const Start& start) const {
+  const Eigen::Vector3d top = start.state.p + config_.takeoff_height * Eigen::Vector3d::UnitZ();
+  return Waiting("climbing", RestToRest(start.state.p, top, t0, config_.takeoff_time),
+                 {start.yaw.yaw});
+}
+
+PlanResult Pilot::Hover(double t0, const Start& start) const {
+  return Waiting("nothing to chase yet",
+                 world::Trajectory::Constant(start.state.p, t0, kHoverDuration), {start.yaw.yaw});
+}
+
+PlanResult Pilot::BrakeAndLook(double t0, const Start& start) const {
+  const YawStart turning{start.yaw.yaw, search_turn_ * config_.search_yaw_rate};
+  if (IsAtRest(start.state))
+    return Waiting("target lost, looking around",
+                   world::Trajectory::Constant(start.state.p, t0, kHoverDuration),
+                   TurningYaw(turning, kHoverDuration));
+  PlanRequest request = Request(t0, start);
+  bool safe = false;
+  PlanResult result;
+  result.verdict = Verdict::kBrake;
+  result.trajectory = BrakePlan(config_.planner, request, &safe);
+  result.reason = safe ? "target lost" : "target lost, braking is not certified safe";
+  result.yaw = TurningYaw(turning, result.trajectory.duration);
+  return result;
+}
+
+}  // namespace chase::planning

@@ -1,0 +1,76 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "services/planning/planner.h"
+#include "services/planning/planning_config.h"
+
+namespace chase::planning {
+
+/// The newest forecast of the target. Times in seconds from the pilot's origin.
+struct Forecast {
+  double t = 0.0;            ///< made for this instant, s
+  bool has_target = false;   ///< false: nothing to chase
+  world::Trajectory target;  ///< p_WT(t)
+  double sigma = 0.0;        ///< largest standard deviation of the position at t, m
+};
+
+/// The body as estimated, frame W.
+struct BodyEstimate {
+  Eigen::Vector3d p = Eigen::Vector3d::Zero();  ///< p_WB, m
+  Eigen::Vector3d v = Eigen::Vector3d::Zero();  ///< v_WB, m/s
+  double yaw = 0.0;                             ///< rad
+};
+
+/// Decides when to plan, from which state, and what to fly when there is nothing to chase: climb,
+/// hover, brake, look around. Keeps the plan being flown.
+class Pilot {
+ public:
+  explicit Pilot(const PlanningConfig& config);
+
+  void SetForecast(const Forecast& forecast);
+  void SetObstacles(double t, std::vector<world::Obstacle> obstacles);
+
+  /// A new plan if one is due at time t [s]; it starts `latency` later.
+  std::optional<PlanResult> Update(double t, const BodyEstimate& body);
+
+  const PlanResult& running() const { return running_; }
+  const std::optional<Forecast>& forecast() const { return forecast_; }
+  int n_obstacles() const { return static_cast<int>(obstacles_.size()); }
+
+ private:
+  struct Start {
+    world::State state;
+    YawStart yaw;
+  };
+
+  bool IsDue(double t) const;
+  bool HasTarget(double t) const;
+  Start StartAt(double t, double t0, const BodyEstimate& body) const;
+  PlanRequest Request(double t0, const Start& start) const;
+  PlanResult Chase(double t0, const Start& start);
+  PlanResult Wait(double t0, const Start& start, const BodyEstimate& body);
+  PlanResult Climb(double t0, const Start& start) const;
+  PlanResult Hover(double t0, const Start& start) const;
+  PlanResult BrakeAndLook(double t0, const Start& start) const;
+
+  PlanningConfig config_;
+  std::unique_ptr<Planner> planner_;
+  std::optional<Forecast> forecast_;
+  std::vector<world::Obstacle> obstacles_;
+  PlanResult running_;
+  bool has_running_ = false;
+  double last_planned_ = -1e9;
+  bool news_ = false;
+  bool obstacles_changed_ = false;
+  bool airborne_ = false;
+  bool had_target_ = false;
+  double climb_end_ = 0.0;
+  double search_turn_ = 1.0;
+};
+
+}  // namespace chase::planning

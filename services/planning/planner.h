@@ -1,0 +1,73 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/world/obstacle.h"
+#include "common/world/state.h"
+#include "common/world/trajectory.h"
+#include "services/planning/planner_config.h"
+#include "services/planning/yaw.h"
+
+namespace chase::planning {
+
+/// Rung of the ladder that the plan stands on; the numbers of plan_t.
+enum class Verdict { kChase = 0, kWider = 1, kKept = 2, kSafeOnly = 3, kBrake = 4, kWait = 5 };
+const char* Name(Verdict verdict);
+
+/// One chasing problem (Jeon 2021, Problem 2). Frame W; times in seconds from a common origin.
+struct PlanRequest {
+  double t0 = 0.0;                           ///< start of the horizon, s
+  double horizon = 2.5;                      ///< T, s
+  world::State start;                        ///< at t0
+  std::optional<YawStart> yaw;               ///< at t0; none: towards the target
+  world::Trajectory target;                  ///< p_WT(t)
+  double target_sigma = 0.0;                 ///< largest standard deviation of p_WT, m
+  std::vector<world::Obstacle> obstacles;    ///< at their true size
+  std::optional<world::Trajectory> running;  ///< the plan being flown, if any
+};
+
+/// Terms of the objective of Problem 2, unweighted, and the weighted total.
+struct Cost {
+  double j1 = 0.0;  ///< eq. (1): smoothness
+  double j2 = 0.0;  ///< eq. (2): nearness of obstacles
+  double j3 = 0.0;  ///< eq. (4): distance to the target
+  double j4 = 0.0;  ///< eq. (5): yaw rate
+  double total = 0.0;
+};
+
+struct PlanResult {
+  Verdict verdict = Verdict::kBrake;
+  std::string reason;            ///< why the verdict is not kChase; else empty
+  world::Trajectory trajectory;  ///< p_WB(t) from t0
+  std::vector<double> yaw;       ///< power basis in tau, unwrapped, rad
+  Cost cost;
+  int generated = 0;  ///< candidates in the set
+  int checked = 0;    ///< candidates tested for feasibility
+  int feasible = 0;   ///< of those, feasible
+  int winner = -1;    ///< index of the winning candidate; -1: none, or refined
+};
+
+/// Answers chasing problems. The same request gets the same answer, bit for bit, whatever was asked
+/// before; the object only keeps working memory.
+class Planner {
+ public:
+  virtual ~Planner() = default;
+
+  /// The best certified plan, or the lowest rung of the ladder that can be had.
+  virtual PlanResult Plan(const PlanRequest& request) = 0;
+
+  /// True when `plan` is still certified against the request's obstacles, target and limits from
+  /// t0 on; what to do with a plan being flown when the world changes.
+  virtual bool IsCertified(const PlanRequest& request, const world::Trajectory& plan) = 0;
+};
+
+/// "chase", "reference" (exact Sturm, exhaustive) or "reference-double" (Sturm in double,
+/// exhaustive). Throws std::invalid_argument on another name; the message lists the known ones.
+std::unique_ptr<Planner> MakePlanner(const std::string& name, const PlannerConfig& config);
+std::vector<std::string> PlannerNames();
+
+}  // namespace chase::planning

@@ -1,0 +1,51 @@
+#include "services/planning/planner_config.h"
+
+#include <cmath>
+#include <cstdio>
+
+namespace chase::planning {
+namespace {
+
+std::string Say(const char* field, double value, const char* limit) {
+  char text[160];
+  std::snprintf(text, sizeof text, "%s is %g, must be %s", field, value, limit);
+  return text;
+}
+
+}  // namespace
+
+std::string PlannerConfig::Problem() const {
+  if (degree < 5 || degree > 6) return Say("degree", degree, "5 or 6");
+  if (steps < 2 || steps > 6) return Say("steps", steps, "2 to 6");
+  if (skeletons < 1 || skeletons > 24) return Say("skeletons", skeletons, "1 to 24");
+  if (!(std::pow(skeletons, steps) <= 200000.0))
+    return Say("skeletons ^ steps", std::pow(skeletons, steps), "at most 200000");
+  if (!(desired_distance > 0.1)) return Say("desired_distance", desired_distance, "above 0.1 m");
+  if (!(radius_spread >= 0.0 && radius_spread < 0.9))
+    return Say("radius_spread", radius_spread, "in [0, 0.9)");
+  if (!(waypoint_weight > 0.0)) return Say("waypoint_weight", waypoint_weight, "above 0");
+  for (double w : {weight_smooth, weight_obstacle, weight_distance, weight_yaw, rho_acceleration,
+                   rho_jerk, cost_min, cost_max})
+    if (!(w >= 0.0)) return Say("a weight", w, "at least 0");
+  if (!(cost_max >= cost_min)) return Say("cost_max", cost_max, "at least cost_min");
+  if (!(cost_range > 0.0)) return Say("cost_range", cost_range, "above 0");
+  for (double m : {drone_radius, safety_margin, sight_margin, sigmas, max_inflation, max_speed,
+                   max_acceleration, min_distance})
+    if (!(m >= 0.0)) return Say("a margin or limit", m, "at least 0");
+  if (!(z_max >= z_min)) return Say("z_max", z_max, "at least z_min");
+  if (!(max_elevation_deg >= 0.0 && max_elevation_deg < 90.0))
+    return Say("max_elevation_deg", max_elevation_deg, "in [0, 90)");
+  if (!(max_yaw_rate > 0.0)) return Say("max_yaw_rate", max_yaw_rate, "above 0");
+  return "";
+}
+
+PlannerConfig PlannerConfig::Literal() {
+  PlannerConfig c;
+  c.adaptive = c.refine = false;
+  c.drone_radius = c.safety_margin = c.sight_margin = c.sigmas = c.max_inflation = 0.0;
+  c.max_speed = c.max_acceleration = c.max_elevation_deg = c.min_distance = 0.0;
+  c.z_min = c.z_max = 0.0;
+  return c;
+}
+
+}  // namespace chase::planning

@@ -1,0 +1,29 @@
+#include "services/planning/planning_config.h"
+
+#include <algorithm>
+#include <cstdio>
+
+#include "services/planning/planner.h"
+
+namespace chase::planning {
+
+std::string PlanningConfig::Problem() const {
+  char text[160] = "";
+  const auto below = [&text](const char* field, double value, const char* limit) {
+    std::snprintf(text, sizeof text, "%s is %g, must be %s", field, value, limit);
+  };
+  const auto names = PlannerNames();
+  if (std::find(names.begin(), names.end(), planner_name) == names.end())
+    return "planner_name is '" + planner_name + "', must be chase, reference or reference-double";
+  if (!(horizon >= 0.5 && horizon <= 20.0)) below("horizon", horizon, "0.5 to 20 s");
+  if (!(min_period > 0.0)) below("min_period", min_period, "above 0 s");
+  if (!(replan_period >= min_period)) below("replan_period", replan_period, "at least min_period");
+  if (!(latency >= 0.0 && latency <= 0.5)) below("latency", latency, "0 to 0.5 s");
+  if (!(reset_threshold > 0.0)) below("reset_threshold", reset_threshold, "above 0 m");
+  if (!(stale_prediction > 0.0)) below("stale_prediction", stale_prediction, "above 0 s");
+  if (!(takeoff_height >= 0.0)) below("takeoff_height", takeoff_height, "at least 0 m");
+  if (!(takeoff_time > 0.5)) below("takeoff_time", takeoff_time, "above 0.5 s");
+  return text;
+}
+
+}  // namespace chase::planning

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <string>
+
+#include "services/planning/planner_config.h"
+
+namespace chase::planning {
+
+/// Parameters of the planning process.
+struct PlanningConfig {
+  std::string planner_name = "chase";
+  double horizon = 2.5;
+  double replan_period = 0.2;
+  double min_period = 0.04;
+  double latency = 0.04;
+  double reset_threshold = 0.7;
+  double stale_prediction = 1.4;
+  double takeoff_height = 1.2;
+  double takeoff_time = 3.0;
+  double search_yaw_rate = 0.6;
+  PlannerConfig planner;
+
+  template <class V>
+  void Visit(V& v) {
+    v("planner_name", planner_name, "chase, reference or reference-double");
+    v("horizon", horizon, "length of a plan [T], s");
+    v("replan_period", replan_period, "age at which a plan is renewed without other cause, s");
+    v("min_period", min_period, "least time between plans, s");
+    v("latency", latency, "a plan starts this long after the pose that triggered it, s");
+    v("reset_threshold", reset_threshold,
+      "tracking error above which a plan starts from the estimate, m");
+    v("stale_prediction", stale_prediction, "age at which a prediction counts as none, s");
+    v("takeoff_height", takeoff_height, "climb before the chase, above the start, m");
+    v("takeoff_time", takeoff_time, "duration of that climb, s");
+    v("search_yaw_rate", search_yaw_rate, "turning while the target is lost, rad/s");
+    v("planner", planner, "of Problem 2");
+  }
+  std::string Problem() const;
+};
+
+}  // namespace chase::planning

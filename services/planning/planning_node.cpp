@@ -1,0 +1,123 @@
+#include "services/planning/planning_node.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Eigenvalues>
+#include <cmath>
+
+#include "common/bus/convert.h"
+#include "common/math/rotation.h"
+
+namespace chase::planning {
+namespace {
+
+constexpr int kMaxCoefficients = 3 * 9;  // degree 8
+constexpr size_t kMaxObstacles = 1000;
+
+double LargestSigma(const Eigen::Matrix3d& covariance) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(covariance, Eigen::EigenvaluesOnly);
+  return std::sqrt(std::max(0.0, eigen.eigenvalues().maxCoeff()));
+}
+
+BodyEstimate FromMessage(const pose_t& m) {
+  return {bus::ToVector(m.pos), bus::ToVector(m.vel), math::Yaw(bus::ToQuaternion(m.orientation))};
+}
+
+polynomial_t At(const Eigen::Vector3d& p, int64_t utime, double duration) {
+  polynomial_t m;
+  m.utime = utime;
+  m.duration = duration;
+  m.n_coefficients = 3;
+  m.coefficients = {p.x(), p.y(), p.z()};
+  return m;
+}
+
+plan_t ToMessage(const PlanResult& plan, int64_t origin) {
+  plan_t m;
+  m.utime = bus::Utime(plan.trajectory.start, origin);
+  m.verdict = static_cast<int8_t>(plan.verdict);
+  m.reason = plan.reason;
+  m.position = bus::ToMessage(plan.trajectory, origin);
+  m.n_yaw = static_cast<int32_t>(plan.yaw.size());
+  m.yaw = plan.yaw;
+  const double cost[5] = {plan.cost.j1, plan.cost.j2, plan.cost.j3, plan.cost.j4, plan.cost.total};
+  for (int i = 0; i < 5; ++i) m.cost[i] = std::isfinite(cost[i]) ? cost[i] : 0.0;
+  m.generated = plan.generated;
+  m.checked = plan.checked;
+  m.feasible = plan.feasible;
+  return m;
+}
+
+}  // namespace
+
+PlanningNode::PlanningNode(bus::Bus& bus, const PlanningConfig& config)
+    : bus_(bus), pilot_(config) {
+  bus_.Subscribe<prediction_t>("PREDICTION", [this](const prediction_t& m) { OnPrediction(m); });
+  bus_.Subscribe<obstacles_t>("OBSTACLES", [this](const obstacles_t& m) { OnObstacles(m); });
+  bus_.Subscribe<pose_t>("POSE", [this](const pose_t& m) { OnPose(m); });
+}
+
+void PlanningNode::OnPrediction(const prediction_t& message) {
+  const int64_t origin = Origin(message.utime);
+  Forecast forecast;
+  forecast.t = bus::Seconds(message.utime, origin);
+  forecast.has_target = message.verdict != prediction_t::NO_TARGET &&
+                        message.target.n_coefficients >= 3 &&
+                        message.target.n_coefficients <= kMaxCoefficients;
+  if (forecast.has_target) {
+    forecast.target = bus::FromMessage(message.target, origin);
+    forecast.sigma = LargestSigma(bus::ToMatrix(message.covariance));
+    target_ = message.target;
+  }
+  pilot_.SetForecast(forecast);
+}
+
+void PlanningNode::OnObstacles(const obstacles_t& message) {
+  const int64_t origin = Origin(message.utime);
+  std::vector<world::Obstacle> obstacles;
+  for (const obstacle_t& o : message.obstacles)
+    if (o.center.n_coefficients <= kMaxCoefficients && obstacles.size() < kMaxObstacles)
+      obstacles.push_back(bus::FromMessage(o, origin));
+  pilot_.SetObstacles(bus::Seconds(message.utime, origin), std::move(obstacles));
+}
+
+void PlanningNode::OnPose(const pose_t& message) {
+  if (message.health != pose_t::HEALTH_OK && message.health != pose_t::HEALTH_DEGRADED) return;
+  const double t = bus::Seconds(message.utime, Origin(message.utime));
+  std::optional<PlanResult> plan;
+  {
+    auto timer = bus_.Time("plan");
+    plan = pilot_.Update(t, FromMessage(message));
+  }
+  if (plan) Send(*plan);
+}
+
+void PlanningNode::Send(const PlanResult& plan) {
+  plan_t m = ToMessage(plan, *origin_);
+  m.n_obstacles = pilot_.n_obstacles();
+  m.target = target_.n_coefficients > 0
+                 ? target_
+                 : At(plan.trajectory.Position(plan.trajectory.end()), m.utime, 1.0);
+  bus_.Publish("PLAN", m);
+  ++n_plans_;
+  ++n_verdicts_[m.verdict];
+}
+
+int64_t PlanningNode::Origin(int64_t utime) {
+  if (!origin_) origin_ = utime;
+  return *origin_;
+}
+
+bus::NodeReport PlanningNode::Report() const {
+  using State = bus::NodeReport::State;
+  if (n_plans_ == 0) return {State::kStarting, "waiting for a pose"};
+  const PlanResult& plan = pilot_.running();
+  const bool well = plan.verdict == Verdict::kChase || plan.verdict == Verdict::kWait;
+  return {
+      well ? State::kOk : State::kDegraded,
+      fmt::format("{}{}{}; {} plans: chase {}, wider {}, kept {}, safe only {}, brake {}",
+                  Name(plan.verdict), plan.reason.empty() ? "" : ": ", plan.reason, n_plans_,
+                  n_verdicts_[0], n_verdicts_[1], n_verdicts_[2], n_verdicts_[3], n_verdicts_[4])};
+}
+
+}  // namespace chase::planning

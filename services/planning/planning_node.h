@@ -1,0 +1,37 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "chase/obstacles_t.hpp"
+#include "chase/plan_t.hpp"
+#include "chase/pose_t.hpp"
+#include "chase/prediction_t.hpp"
+#include "common/bus/bus.h"
+#include "common/bus/node.h"
+#include "services/planning/pilot.h"
+
+namespace chase::planning {
+
+/// PREDICTION, OBSTACLES and POSE in, PLAN out; POSE is the clock.
+class PlanningNode : public bus::Node {
+ public:
+  PlanningNode(bus::Bus& bus, const PlanningConfig& config);
+  bus::NodeReport Report() const override;
+
+ private:
+  void OnPrediction(const prediction_t& message);
+  void OnObstacles(const obstacles_t& message);
+  void OnPose(const pose_t& message);
+  void Send(const PlanResult& plan);
+  int64_t Origin(int64_t utime);
+
+  bus::Bus& bus_;
+  Pilot pilot_;
+  std::optional<int64_t> origin_;  // utime that the core's seconds count from
+  polynomial_t target_;            // as predicted
+  int64_t n_plans_ = 0;
+  int64_t n_verdicts_[6] = {};
+};
+
+}  // namespace chase::planning

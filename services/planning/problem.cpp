@@ -1,0 +1,156 @@
+#include "services/planning/problem.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace chase::planning {
+namespace {
+
+// Margins are taken back in these shares until the start, or the target, is outside the shape.
+constexpr double kShares[] = {1.0, 0.75, 0.5, 0.25, 0.0};
+constexpr double kClear = 1.02;
+constexpr double kLeaveBy = 0.25;  // tau by which a plan has left an obstacle that it starts in
+
+double SquaredNorm(const Eigen::Matrix3d& R, const Eigen::Vector3d& x) { return x.dot(R * x); }
+
+Eigen::Matrix3d Grown(const Eigen::Matrix3d& R, double margin) {
+  return margin > 0.0 ? world::Inflated(R, margin) : R;
+}
+
+double Uncertainty(const PlannerConfig& config, const world::Obstacle& o, double duration) {
+  const double half = 0.5 * duration;
+  const double sigma = std::sqrt(o.position_variance + o.velocity_variance * half * half);
+  return std::min(config.max_inflation, config.sigmas * sigma);
+}
+
+// Lowest squared distance of the curve's samples from the ellipsoid's centre.
+double LowestDistance(const Curve& curve, const Curve& center, const Eigen::Matrix3d& R) {
+  constexpr int kSamples = 24;
+  double low = HUGE_VAL;
+  for (int i = 0; i <= kSamples; ++i) {
+    const double tau = static_cast<double>(i) / kSamples;
+    low = std::min(low, SquaredNorm(R, Evaluate(curve, tau) - Evaluate(center, tau)));
+  }
+  return low;
+}
+
+void Note(std::string* notes, const std::string& text) {
+  if (!notes) return;
+  if (!notes->empty()) *notes += "; ";
+  *notes += text;
+}
+
+void SetSafetyShape(const PlannerConfig& config, const world::Obstacle& o, const Problem& problem,
+                    Ellipsoid* e, std::string* notes) {
+  const double margin =
+      config.drone_radius + config.safety_margin + Uncertainty(config, o, problem.duration);
+  const Eigen::Vector3d offset = Evaluate(problem.start, 0.0) - Evaluate(e->center, 0.0);
+  for (double share : kShares) {
+    e->safety = Grown(o.shape, share * margin);
+    if (SquaredNorm(e->safety, offset) > (share > 0.0 ? kClear : 1.0)) {
+      if (share < 0.5) Note(notes, "starts within the margin of obstacle " + std::to_string(e->id));
+      return;
+    }
+  }
+  e->safety_from = kLeaveBy;
+  Note(notes, "starts inside obstacle " + std::to_string(e->id));
+}
+
+void SetSightShape(const PlannerConfig& config, const world::Obstacle& o, double target_growth,
+                   const Problem& problem, Ellipsoid* e, std::string* notes) {
+  const double margin = config.sight_margin + target_growth;
+  for (double share : kShares) {
+    e->sight = Grown(o.shape, share * margin);
+    if (margin == 0.0 || LowestDistance(problem.target, e->center, e->sight) > kClear) break;
+  }
+  if (LowestDistance(problem.target, e->center, e->sight) > 1.0) return;
+  e->sight_from = 1.0;
+  Note(notes, "obstacle " + std::to_string(e->id) + " holds the target, its shadow is ignored");
+}
+
+Ellipsoid MakeEllipsoid(const PlannerConfig& config, const PlanRequest& request,
+                        const world::Obstacle& o, const Problem& problem, std::string* notes) {
+  Ellipsoid e;
+  e.id = o.id;
+  e.center = ToCurve(o.center, request.t0, request.horizon);
+  SetSafetyShape(config, o, problem, &e, notes);
+  const double growth = std::min(config.max_inflation, config.sigmas * request.target_sigma);
+  SetSightShape(config, o, growth, problem, &e, notes);
+  return e;
+}
+
+// Limits that the start already breaks give way to just above what it has: the plan may not get
+// worse than that.
+Limits MakeLimits(const PlannerConfig& c, const world::State& s, const Eigen::Vector3d& target) {
+  Limits limits;
+  limits.speed = c.max_speed > 0.0 ? std::max(c.max_speed, 1.1 * s.v.norm() + 0.05) : 0.0;
+  limits.acceleration =
+      c.max_acceleration > 0.0 ? std::max(c.max_acceleration, 1.2 * s.a.norm() + 0.1) : 0.0;
+  limits.height = c.z_max > c.z_min;
+  const double sink = std::max(0.0, -s.v.z()) * 0.5 + 0.1,
+               rise = std::max(0.0, s.v.z()) * 0.5 + 0.1;
+  limits.z_min = std::min(c.z_min, s.p.z() - sink);
+  limits.z_max = std::max(c.z_max, s.p.z() + rise);
+  const Eigen::Vector3d r = target - s.p;
+  const double tangent = std::tan(c.max_elevation_deg * M_PI / 180.0);
+  const bool in_field = std::abs(r.z()) < 0.95 * tangent * r.head<2>().norm();
+  limits.tan_elevation = in_field ? tangent : 0.0;
+  limits.min_distance = std::min(c.min_distance, 0.9 * r.norm());
+  return limits;
+}
+
+Curve StartCurve(const world::State& s, double T) {
+  Curve c(4, 3);
+  c.row(0) = s.p.transpose();
+  c.row(1) = T * s.v.transpose();
+  c.row(2) = T * T / 2.0 * s.a.transpose();
+  c.row(3) = T * T * T / 6.0 * s.j.transpose();
+  return c;
+}
+
+}  // namespace
+
+int Problem::n_candidates() const {
+  int n = 1;
+  for (const auto& choices : skeletons) n *= static_cast<int>(choices.size());
+  return n;
+}
+
+Problem MakeProblem(const PlannerConfig& config, const PlanRequest& request, std::string* notes) {
+  Problem problem;
+  problem.duration = request.horizon;
+  problem.degree = config.degree;
+  problem.start = StartCurve(request.start, request.horizon);
+  problem.target = ToCurve(request.target, request.t0, request.horizon);
+  problem.limits = MakeLimits(config, request.start, problem.target.row(0).transpose());
+  problem.obstacles.reserve(request.obstacles.size());
+  for (const world::Obstacle& o : request.obstacles)
+    problem.obstacles.push_back(MakeEllipsoid(config, request, o, problem, notes));
+  return problem;
+}
+
+Curve ToCurve(const world::Trajectory& trajectory, double start, double duration) {
+  Curve c = trajectory.coefficients;
+  const double a = (start - trajectory.start) / trajectory.duration;
+  const double b = duration / trajectory.duration;
+  if (a == 0.0 && b == 1.0) return c;
+  c.setZero();
+  const Eigen::Index n = c.rows() - 1;
+  for (Eigen::Index k = n; k >= 0; --k) {
+    for (Eigen::Index i = n; i > 0; --i) c.row(i) = a * c.row(i) + b * c.row(i - 1);
+    c.row(0) = a * c.row(0) + trajectory.coefficients.row(k);
+  }
+  return c;
+}
+
+Eigen::Vector3d Evaluate(const Curve& curve, double tau, int order) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (Eigen::Index k = curve.rows() - 1; k >= order; --k) {
+    double falling = 1.0;
+    for (int i = 0; i < order; ++i) falling *= static_cast<double>(k - i);
+    sum = sum * tau + falling * curve.row(k).transpose();
+  }
+  return sum;
+}
+
+}  // namespace chase::planning

@@ -1,0 +1,60 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "services/planning/planner.h"
+
+namespace chase::planning {
+
+/// Power-basis coefficients of a curve in normalised time tau in [0,1]; row k: tau^k, frame W, m.
+using Curve = Eigen::Matrix<double, Eigen::Dynamic, 3, 0, 16, 3>;
+constexpr int kMaxCurveDegree = 12;
+
+/// An obstacle as the planner sees it: the true ellipsoid grown for the drone's safety and, less,
+/// for the line of sight.
+struct Ellipsoid {
+  int id = 0;
+  Curve center;
+  Eigen::Matrix3d safety;  ///< must not hold the drone's centre
+  Eigen::Matrix3d sight;   ///< must not cross the segment from drone to target
+  double safety_from =
+      0.0;                  ///< tau from which safety is asked; above 0 only if the start is inside
+  double sight_from = 0.0;  ///< tau from which sight is asked; 1: never
+};
+
+/// Limits of the plan; infinity (or nothing) where there is none.
+struct Limits {
+  double speed = 0.0;         ///< m/s; 0: none
+  double acceleration = 0.0;  ///< m/s^2; 0: none
+  bool height = false;        ///< whether z_min and z_max apply
+  double z_min = 0.0, z_max = 0.0;
+  double tan_elevation = 0.0;  ///< of the target seen from the drone; 0: none
+  double min_distance = 0.0;   ///< m; 0: none
+};
+
+/// Problem 2 of Jeon 2021 in normalised time, ready to be searched.
+struct Problem {
+  double duration = 1.0;  ///< T, s
+  int degree = 5;         ///< of the candidates
+  Curve start;            ///< first four power coefficients of every candidate
+  Curve target;
+  std::vector<Ellipsoid> obstacles;
+  Limits limits;
+  std::vector<std::vector<Eigen::Vector3d>> skeletons;  ///< [step][choice], frame W, m
+  int n_candidates() const;
+};
+
+/// Puts the request into normalised time, grows the obstacles and relaxes what the start already
+/// breaks; `notes` gets one clause for each such relaxation that weakens the certificate. Leaves
+/// the skeletons empty.
+Problem MakeProblem(const PlannerConfig& config, const PlanRequest& request, std::string* notes);
+
+/// `trajectory` over [start, start + duration] in normalised time.
+Curve ToCurve(const world::Trajectory& trajectory, double start, double duration);
+
+/// Value of the curve's derivative of the given order with respect to tau.
+Eigen::Vector3d Evaluate(const Curve& curve, double tau, int order = 0);
+
+}  // namespace chase::planning

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <memory>
+
+#include "services/planning/certificate.h"
+#include "services/planning/problem.h"
+
+namespace chase::planning {
+
+struct Found {
+  int index = -1;  ///< of the winner, -1: none is feasible
+  Curve plan;      ///< in power basis, as published
+  Cost cost;
+  int generated = 0, checked = 0, feasible = 0;
+};
+
+/// Finds the cheapest feasible candidate of a problem. Candidate i takes choice (i / N_s^n) mod N_s
+/// at step n.
+class Search {
+ public:
+  virtual ~Search() = default;
+  /// Sight is asked from tau = `sight_from` on (1: never); a multiple of 1/4.
+  virtual Found Best(const Problem& problem, double sight_from) = 0;
+};
+
+/// Jeon 2021, sections IV and V, in the plainest code: the KKT system of eq. (12) in the power
+/// basis (of normalised time), every candidate checked and the feasible ones weighed.
+std::unique_ptr<Search> MakeReferenceSearch(const PlannerConfig& config, Arithmetic arithmetic);
+
+/// The same answer in a fraction of the time: see fast_search.h.
+std::unique_ptr<Search> MakeFastSearch(const PlannerConfig& config);
+
+}  // namespace chase::planning

@@ -1,0 +1,133 @@
+#include "services/planning/skeletons.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace chase::planning {
+namespace {
+
+constexpr int kMaxCandidates = 4096;  // that adaptation may grow to
+
+struct Spread {
+  double radius_near, radius_far;  // m
+  double low, high;                // elevations, rad
+};
+
+Eigen::Vector3d OnSphere(const Eigen::Vector3d& center, double radius, double azimuth,
+                         double elevation) {
+  return center + radius * Eigen::Vector3d(std::cos(azimuth) * std::cos(elevation),
+                                           std::sin(azimuth) * std::cos(elevation),
+                                           std::sin(elevation));
+}
+
+// Offset of choice i from the present bearing: 0, then pairs to both sides, ever further apart, up
+// to half a turn.
+double AzimuthOffset(int i, int choices) {
+  if (i == 0) return 0.0;
+  const int pairs = choices / 2;
+  const double share = static_cast<double>((i + 1) / 2) / std::max(1, pairs);
+  const double offset = M_PI * std::pow(share, 1.4) * (choices % 2 ? 1.0 - 0.5 / pairs : 1.0);
+  return i % 2 ? offset : -offset;
+}
+
+bool IsFree(const Problem& problem, double tau, const Eigen::Vector3d& u) {
+  const Eigen::Vector3d q = Evaluate(problem.target, tau);
+  for (const Ellipsoid& e : problem.obstacles) {
+    const Eigen::Vector3d c = Evaluate(e.center, tau);
+    if ((u - c).dot(e.safety * (u - c)) < 1.05) return false;
+    if (e.sight_from < 1.0 && world::SegmentSquaredDistance(u, q, c, e.sight) < 1.05) return false;
+  }
+  return true;
+}
+
+Eigen::Vector3d Slid(const Problem& problem, double tau, double radius, double azimuth,
+                     double elevation) {
+  const Eigen::Vector3d q = Evaluate(problem.target, tau);
+  const Eigen::Vector3d first = OnSphere(q, radius, azimuth, elevation);
+  if (IsFree(problem, tau, first)) return first;
+  for (double r : {1.0, 0.75, 1.3})
+    for (double turn : {0.0, 0.15, -0.15, 0.3, -0.3, 0.45, -0.45}) {
+      const Eigen::Vector3d u = OnSphere(q, r * radius, azimuth + turn, elevation);
+      if (IsFree(problem, tau, u)) return u;
+    }
+  return first;
+}
+
+// Obstacles whose centre comes within reach of the ring around the target.
+int Clutter(const PlannerConfig& config, const Problem& problem) {
+  int n = 0;
+  for (const Ellipsoid& e : problem.obstacles) {
+    double nearest = HUGE_VAL;
+    for (double tau : {0.0, 0.5, 1.0}) {
+      const Eigen::Vector3d d = Evaluate(e.center, tau) - Evaluate(problem.target, tau);
+      nearest = std::min(nearest, d.head<2>().norm());
+    }
+    n += nearest < 1.3 * config.desired_distance;
+  }
+  return n;
+}
+
+double Bearing(const Problem& problem) {
+  const Eigen::Vector3d r = Evaluate(problem.start, 0.0) - Evaluate(problem.target, 0.0);
+  if (r.head<2>().norm() > 1e-3) return std::atan2(r.y(), r.x());
+  const Eigen::Vector3d v = Evaluate(problem.target, 0.0, 1);  // on top of it: get behind it
+  return std::atan2(-v.y(), -v.x());
+}
+
+void Place(const PlannerConfig& config, int steps, int choices, const Spread& spread, bool slide,
+           Problem* problem) {
+  const double bearing = Bearing(*problem);
+  problem->skeletons.assign(static_cast<size_t>(steps), {});
+  for (int n = 1; n <= steps; ++n) {
+    const double tau = static_cast<double>(n) / steps;
+    for (int i = 0; i < choices; ++i) {
+      const double radius = (i + n) % 2 ? spread.radius_near : spread.radius_far;
+      const double elevation = (i / 2 + n) % 2 ? spread.low : spread.high;
+      const double azimuth = bearing + AzimuthOffset(i, choices);
+      const Eigen::Vector3d q = Evaluate(problem->target, tau);
+      problem->skeletons[static_cast<size_t>(n - 1)].push_back(
+          slide ? Slid(*problem, tau, radius, azimuth, elevation)
+                : OnSphere(q, radius, azimuth, elevation));
+    }
+  }
+  if (!(config.z_max > config.z_min)) return;
+  for (auto& choices_at : problem->skeletons)
+    for (auto& u : choices_at) u.z() = std::clamp(u.z(), config.z_min, config.z_max);
+}
+
+Spread NormalSpread(const PlannerConfig& c) {
+  const double deg = M_PI / 180.0;
+  return {(1.0 - c.radius_spread) * c.desired_distance,
+          (1.0 + c.radius_spread) * c.desired_distance, c.elevation_low_deg * deg,
+          c.elevation_high_deg * deg};
+}
+
+int AffordableChoices(int wanted, int steps) {
+  while (wanted > 1 && std::pow(wanted, steps) > kMaxCandidates) --wanted;
+  return wanted;
+}
+
+}  // namespace
+
+void PlaceRing(const PlannerConfig& config, int steps, int choices, Problem* problem) {
+  Place(config, steps, choices, NormalSpread(config), false, problem);
+}
+
+void PlaceSkeletons(const PlannerConfig& config, Layout layout, Problem* problem) {
+  if (layout == Layout::kWide) {
+    Spread spread = NormalSpread(config);
+    spread.radius_near *= 0.7;
+    spread.radius_far *= 1.35;
+    spread.high *= 1.6;
+    const int steps = std::min(config.steps, 3);
+    Place(config, steps, AffordableChoices(2 * config.skeletons, steps), spread, true, problem);
+    return;
+  }
+  if (!config.adaptive) return PlaceRing(config, config.steps, config.skeletons, problem);
+  const int extra = std::min(3, Clutter(config, *problem) / 2);
+  const int choices =
+      std::max(config.skeletons, AffordableChoices(config.skeletons + extra, config.steps));
+  Place(config, config.steps, choices, NormalSpread(config), true, problem);
+}
+
+}  // namespace chase::planning
