@@ -7,9 +7,9 @@ namespace chase::control {
 
 /// Gains and limits of the controller. Per-axis values are in frame W.
 struct ControlConfig {
-  Eigen::Vector3d position_gain = {5.0, 5.0, 6.0};  ///< 1/s^2
-  Eigen::Vector3d velocity_gain = {3.6, 3.6, 4.0};  ///< 1/s
-  Eigen::Vector3d integral_gain = {1.2, 1.2, 2.0};  ///< 1/s^3
+  Eigen::Vector3d position_gain = {6.0, 6.0, 6.0};  ///< 1/s^2
+  Eigen::Vector3d velocity_gain = {4.0, 4.0, 4.0};  ///< 1/s
+  Eigen::Vector3d integral_gain = {1.5, 1.5, 2.0};  ///< 1/s^3
   double integral_limit = 2.0;                      ///< per axis, m/s^2
   double catch_up_speed = 2.0;                      ///< m/s
   Eigen::Vector3d drag = {0.25, 0.25, 0.15};        ///< 1/s
@@ -18,7 +18,7 @@ struct ControlConfig {
   double max_thrust = 18.0;    ///< m/s^2
   double max_body_rate = 4.0;  ///< rad/s
   double max_yaw_error = 0.8;  ///< rad
-  double lead = 0.04;          ///< s
+  double lead = 0.02;          ///< s
   double slow_down = 0.6;      ///< s
   double lost_descent = 0.15;  ///< m/s^2
 

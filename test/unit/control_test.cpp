@@ -262,6 +262,7 @@ TEST(ControlConfig, NamesFieldValueAndLimit) {
   config.lead = kNaN;
   EXPECT_NE(config.Problem().find("lead"), std::string::npos);
   config = {};
+  config.position_gain.y() = 2.0;
   config.integral_gain.y() = 19.0;  // unstable by Routh although within its own range
   EXPECT_NE(config.Problem().find("integral_gain"), std::string::npos);
 }
