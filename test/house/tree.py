@@ -14,7 +14,11 @@ def files(*patterns):
         found = (pathlib.Path(line) for line in answer.stdout.splitlines())
         return sorted({path for path in found if (ROOT / path).is_file()})
     found = (p.relative_to(ROOT) for pattern in patterns or ["*"] for p in ROOT.rglob(pattern))
-    return sorted({p for p in found if (ROOT / p).is_file() and not p.parts[0].startswith("build")})
+    return sorted({path for path in found if (ROOT / path).is_file() and not generated(path)})
+
+
+def generated(path):
+    return path.parts[0].startswith("build") or "node_modules" in path.parts
 
 
 def text(path):
