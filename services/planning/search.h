@@ -23,11 +23,7 @@ class Search {
   virtual Found Best(const Problem& problem, double sight_from) = 0;
 };
 
-/// Jeon 2021, sections IV and V, in the plainest code: the KKT system of eq. (12) in the power
-/// basis (of normalised time), every candidate checked and the feasible ones weighed.
-std::unique_ptr<Search> MakeReferenceSearch(const PlannerConfig& config, Arithmetic arithmetic);
-
-/// The same answer in a fraction of the time: see fast_search.h.
+/// The reference's answer (reference_search.h) in a fraction of the time: see fast_search.h.
 std::unique_ptr<Search> MakeFastSearch(const PlannerConfig& config);
 
 }  // namespace chase::planning
