@@ -8,7 +8,7 @@ namespace {
 
 using Eigen::Vector2d;
 
-constexpr double kStep = 0.05;  // s between the samples of a motion along waypoints
+constexpr double kStep = 0.02;  // s between the samples of a motion along waypoints
 
 /// A straight line or an arc of constant curvature [1/m], positive to the left.
 struct Piece {

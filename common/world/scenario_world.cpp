@@ -56,20 +56,39 @@ bool Fits(const TreeSpec& tree, const std::vector<TreeSpec>& others, double gap)
   });
 }
 
-bool Clear(const Vector2d& center, double distance, const std::vector<Vector2d>& points) {
-  return std::all_of(points.begin(), points.end(), [&](const Vector2d& p) {
-    return (center - p).squaredNorm() >= distance * distance;
+/// A place that no trunk may come nearer to than `distance`.
+struct FreePlace {
+  Vector2d center;
+  double distance;
+};
+
+bool Clear(const TreeSpec& tree, const std::vector<FreePlace>& places) {
+  return std::all_of(places.begin(), places.end(), [&](const FreePlace& place) {
+    const double apart = place.distance + tree.trunk_radius;
+    return (tree.center - place.center).squaredNorm() >= apart * apart;
   });
 }
 
-/// Random sequential placement: a tree stands where it keeps the gap to those placed before it, the
-/// path's clearance, and the same clearance around the chaser's start. May end short of `count`.
+/// Along the target's path, around the chaser's start, and where the movers' bodies pass.
+std::vector<FreePlace> FreePlaces(const Scenario& scenario) {
+  const double clearance = scenario.world.forest.path_clearance;
+  std::vector<FreePlace> places = {{scenario.chaser.start.head<2>(), clearance}};
+  for (const Vector2d& p : SampledPath(scenario)) places.push_back({p, clearance});
+  for (const auto& mover : scenario.movers) {
+    const double reach = 0.5 * mover.size.head<2>().norm() + 0.3;
+    for (double t = 0.0; t <= scenario.duration_s; t += 0.1)
+      places.push_back({MoverAt(mover, t).solid.center.head<2>(), reach});
+  }
+  return places;
+}
+
+/// Random sequential placement: a tree stands where it keeps the gap to those placed before it and
+/// leaves the free places free. May end short of `count`.
 std::vector<TreeSpec> GrowForest(const Scenario& scenario) {
   const ForestSpec& forest = scenario.world.forest;
   std::vector<TreeSpec> trees;
   if (forest.count <= 0) return trees;
-  auto keep_clear = SampledPath(scenario);
-  keep_clear.emplace_back(scenario.chaser.start.head<2>());
+  const auto places = FreePlaces(scenario);
   Random random(static_cast<uint64_t>(forest.seed));
   const int attempts = 400 * forest.count;
   for (int i = 0; i < attempts && static_cast<int>(trees.size()) < forest.count; ++i) {
@@ -80,9 +99,7 @@ std::vector<TreeSpec> GrowForest(const Scenario& scenario) {
     tree.height = random.Uniform(7.0, 10.0);
     tree.crown_radius = random.Uniform(1.0, 1.8);
     tree.crown_base = random.Uniform(4.5, 5.5);
-    if (Fits(tree, trees, forest.gap) &&
-        Clear(tree.center, tree.trunk_radius + forest.path_clearance, keep_clear))
-      trees.push_back(tree);
+    if (Fits(tree, trees, forest.gap) && Clear(tree, places)) trees.push_back(tree);
   }
   return trees;
 }

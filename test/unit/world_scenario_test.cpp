@@ -1,0 +1,320 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <fstream>
+
+#include "common/world/random.h"
+#include "common/world/scenario.h"
+
+namespace chase::world {
+namespace {
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+const std::string kGood = R"(name: small
+target:
+  waypoints:
+    - [0, 0]
+    - [5, 0]
+)";
+
+/// The error of a text that must be refused.
+std::string Refusal(const std::string& yaml) {
+  try {
+    ParseScenario(yaml, "s.yaml");
+  } catch (const std::runtime_error& e) {
+    return e.what();
+  }
+  return "accepted";
+}
+
+#define EXPECT_CONTAINS(text, part) \
+  EXPECT_NE((text).find(part), std::string::npos) << "'" << (text) << "' lacks '" << (part) << "'"
+
+TEST(ScenarioFile, SmallestFileIsAccepted) {
+  const Scenario scenario = ParseScenario(kGood, "s.yaml");
+  EXPECT_EQ(scenario.name, "small");
+  EXPECT_EQ(scenario.target.waypoints.size(), 2u);
+  EXPECT_TRUE(scenario.Problem().empty());
+}
+
+TEST(ScenarioFile, UnknownKeyNamesItsLine) {
+  const std::string error = Refusal(kGood + "  spede: 2\n");
+  EXPECT_CONTAINS(error, "s.yaml:6");
+  EXPECT_CONTAINS(error, "spede");
+  EXPECT_EQ(error.find('\n'), std::string::npos);
+}
+
+TEST(ScenarioFile, BadSpeedIsRefused) {
+  const std::string error = Refusal(kGood + "  speed: -1\n");
+  EXPECT_CONTAINS(error, "speed is -1");
+  EXPECT_CONTAINS(error, "s.yaml:");
+  EXPECT_CONTAINS(Refusal(kGood + "  speed: fast\n"), "s.yaml:6");
+  EXPECT_CONTAINS(Refusal(kGood + "  speed: .nan\n"), "speed");
+}
+
+TEST(ScenarioFile, EveryPartIsChecked) {
+  EXPECT_CONTAINS(Refusal("target: {waypoints: [[0, 0], [1, 0]]}\n"), "name");
+  EXPECT_CONTAINS(Refusal("name: x\n"), "target.waypoints");
+  EXPECT_CONTAINS(Refusal(kGood + "sensors: {mode: magic}\n"), "'magic'");
+  EXPECT_CONTAINS(Refusal(kGood + "world: {cylinders: [{center: [1, 1], radius: 0}]}\n"),
+                  "radius is 0");
+  EXPECT_CONTAINS(Refusal(kGood + "world: {walls: [{from: [1, 1], to: [1, 1]}]}\n"), "from");
+  EXPECT_CONTAINS(Refusal(kGood + "movers: [{shape: cone, waypoints: [[0, 0, 1]]}]\n"), "'cone'");
+  EXPECT_CONTAINS(Refusal(kGood + "movers: [{shape: box}]\n"), "waypoints");
+  EXPECT_CONTAINS(Refusal(kGood + "duration_s: 0\n"), "duration_s");
+  EXPECT_CONTAINS(Refusal(kGood + "wind: {gust_time: 0}\n"), "gust_time");
+  EXPECT_CONTAINS(Refusal(kGood + "chaser: {start: [1, 2]}\n"), "3 numbers");
+}
+
+TEST(ScenarioFile, MissingFileIsNamed) {
+  try {
+    LoadScenario("/nowhere/at_all.yaml");
+    FAIL() << "accepted";
+  } catch (const std::runtime_error& e) {
+    EXPECT_CONTAINS(std::string(e.what()), "/nowhere/at_all.yaml");
+  }
+}
+
+TEST(ScenarioFile, OverridesOfAServiceAreFound) {
+  const Scenario scenario =
+      ParseScenario(kGood + "services: [{name: planning, config: \"horizon: 2.5\"}]\n", "s.yaml");
+  EXPECT_EQ(ServiceConfig(scenario, "planning"), "horizon: 2.5");
+  EXPECT_EQ(ServiceConfig(scenario, "mapping"), "");
+}
+
+TEST(ScenarioFile, PathFileIsReadRelativeToTheScenario) {
+  const std::string folder = ::testing::TempDir();
+  std::ofstream(folder + "/path.csv") << "t,x,y\n0,0,0\n1,1,0\n2,2,1\n";
+  std::ofstream(folder + "/path.yaml") << "name: csv\ntarget: {path_file: path.csv}\n";
+  const PathMotion path = TargetMotion(LoadScenario(folder + "/path.yaml"));
+  EXPECT_NEAR((path.Position(1.0) - Vector2d(1.0, 0.0)).norm(), 0.0, 1e-12);
+  EXPECT_NEAR((path.Position(9.0) - Vector2d(2.0, 1.0)).norm(), 0.0, 1e-12);
+  EXPECT_NEAR((path.Velocity(1.0) - Vector2d(1.0, 0.5)).norm(), 0.0, 1e-12);
+  std::ofstream(folder + "/path.csv") << "0,0,0\n0,1,0\n";
+  EXPECT_THROW(TargetMotion(LoadScenario(folder + "/path.yaml")), std::runtime_error);
+}
+
+/// Random walks of legs, as a driver might lay them.
+std::vector<Vector2d> RandomWaypoints(Random* random) {
+  std::vector<Vector2d> points = {Vector2d::Zero()};
+  double angle = 0.0;
+  for (int i = 0; i < 8; ++i) {
+    angle += random->Uniform(-2.0, 2.0);
+    const double length = random->Uniform(2.0, 6.0);
+    points.push_back(points.back() + length * Vector2d(std::cos(angle), std::sin(angle)));
+  }
+  return points;
+}
+
+TEST(Path, KeepsItsLimitsAndItsVelocityIsItsDerivative) {
+  Random random(5);
+  for (int n = 0; n < 20; ++n) {
+    const auto points = RandomWaypoints(&random);
+    const double speed = random.Uniform(0.5, 3.0), acceleration = random.Uniform(0.3, 1.5);
+    const PathMotion path(points, speed, acceleration, 0.8);
+    EXPECT_EQ(path.Position(-1.0), points.front());
+    EXPECT_NEAR((path.Position(path.Duration() + 1.0) - points.back()).norm(), 0.0, 1e-6);
+    for (double t = 0.01; t < path.Duration(); t += 0.0173) {
+      EXPECT_LE(path.Velocity(t).norm(), 1.02 * speed);
+      const Vector2d slope = (path.Position(t + 1e-5) - path.Position(t - 1e-5)) / 2e-5;
+      EXPECT_NEAR((slope - path.Velocity(t)).norm(), 0.0, 1e-3 + 0.02 * speed);
+    }
+  }
+}
+
+TEST(Path, SpeedIsTrapezoidalOnAStraightLeg) {
+  const PathMotion path({{0.0, 0.0}, {10.0, 0.0}}, 1.0, 0.5, 0.8);
+  EXPECT_NEAR(path.Duration(), 12.0, 1e-9);
+  EXPECT_NEAR(path.Position(1.0).x(), 0.25, 1e-9);
+  EXPECT_NEAR(path.Velocity(1.0).x(), 0.5, 1e-9);
+  EXPECT_NEAR(path.Position(6.0).x(), 5.0, 1e-9);
+  EXPECT_NEAR(path.Velocity(6.0).x(), 1.0, 1e-9);
+  EXPECT_NEAR(path.Position(11.0).x(), 9.75, 1e-9);
+}
+
+TEST(Path, CornersAreRoundedToTheRadius) {
+  const PathMotion path({{0.0, 0.0}, {10.0, 0.0}, {10.0, 10.0}}, 1.0, 10.0, 2.0);
+  const Vector2d center(8.0, 2.0);
+  int on_arc = 0;
+  for (double t = 0.0; t < path.Duration(); t += 0.01) {
+    const Vector2d p = path.Position(t);
+    if (p.x() < 8.0 || p.y() > 2.0) continue;
+    ++on_arc;
+    EXPECT_NEAR((p - center).norm(), 2.0, 1e-3);
+  }
+  EXPECT_GT(on_arc, 200);
+}
+
+TEST(Path, OneWaypointStandsStill) {
+  const PathMotion path({{1.0, 2.0}}, 1.0, 0.5, 0.8);
+  EXPECT_EQ(path.Position(3.0), Vector2d(1.0, 2.0));
+  EXPECT_EQ(path.Velocity(3.0), Vector2d(0.0, 0.0));
+}
+
+TEST(Mover, WaitsRunsAndStops) {
+  MoverSpec mover;
+  mover.waypoints = {{0.0, 0.0, 1.0}, {4.0, 0.0, 1.0}, {4.0, 4.0, 1.0}};
+  mover.speed = 2.0;
+  mover.start_time = 1.0;
+  EXPECT_EQ(MoverAt(mover, 0.5).solid.center, Vector3d(0.0, 0.0, 1.0));
+  EXPECT_EQ(MoverAt(mover, 0.5).velocity, Vector3d(0.0, 0.0, 0.0));
+  EXPECT_EQ(MoverAt(mover, 2.0).solid.center, Vector3d(2.0, 0.0, 1.0));
+  EXPECT_EQ(MoverAt(mover, 4.0).velocity, Vector3d(0.0, 2.0, 0.0));
+  EXPECT_EQ(MoverAt(mover, 9.0).solid.center, Vector3d(4.0, 4.0, 1.0));
+  EXPECT_EQ(MoverAt(mover, 9.0).velocity, Vector3d(0.0, 0.0, 0.0));
+  mover.loop = true;
+  const double round = 8.0 + std::sqrt(32.0);
+  EXPECT_NEAR(
+      (MoverAt(mover, 1.0 + 1.0 + 0.5 * round).solid.center - Vector3d(2.0, 0.0, 1.0)).norm(), 0.0,
+      1e-9);
+}
+
+TEST(Ground, StaysWithinItsRoughness) {
+  GroundSpec ground;
+  ground.height = 0.5;
+  ground.roughness = 0.2;
+  double least = 1e9, most = -1e9;
+  for (double x = -30.0; x < 30.0; x += 0.37)
+    for (double y = -30.0; y < 30.0; y += 0.41) {
+      least = std::min(least, GroundHeight(ground, x, y));
+      most = std::max(most, GroundHeight(ground, x, y));
+    }
+  EXPECT_GE(least, 0.3);
+  EXPECT_LE(most, 0.7);
+  EXPECT_GT(most - least, 0.2);
+}
+
+std::string Shipped(const std::string& name) {
+  return std::string(CHASE_SOURCE_DIR) + "/deploy/scenarios/" + name + ".yaml";
+}
+
+/// Free way of the target's cylinder and carrier to everything that stands in the scenario.
+double LeastClearance(const Scenario& scenario) {
+  const PathMotion path = TargetMotion(scenario);
+  const auto solids = StaticSolids(scenario);
+  double least = 1e9;
+  for (double t = 0.0; t < path.Duration(); t += 0.1) {
+    const Vector2d p = path.Position(t);
+    for (const auto& solid : solids)
+      least = std::min(least, SignedDistance(solid, {p.x(), p.y(), 0.5}));
+  }
+  return least;
+}
+
+TEST(Gym, IsTheHallOfThePaper) {
+  const Scenario gym = LoadScenario(Shipped("gym"));
+  ASSERT_EQ(gym.world.cylinders.size(), 7u);
+  for (const auto& cylinder : gym.world.cylinders) EXPECT_EQ(cylinder.radius, 0.28);
+  int gates = 0;
+  for (int i = 0; i + 1 < 4; ++i) {
+    const auto& a = gym.world.cylinders[static_cast<std::size_t>(i)];
+    const auto& b = gym.world.cylinders[static_cast<std::size_t>(i) + 1];
+    const double gap = (a.center - b.center).norm() - 0.56;
+    gates += gap > 1.4 && gap < 1.8;
+  }
+  EXPECT_EQ(gates, 3);
+  EXPECT_LE(gym.target.speed, 1.0);
+  EXPECT_EQ(gym.duration_s, 60.0);
+  EXPECT_GT(TargetMotion(gym).Duration(), 55.0);
+  EXPECT_GT(LeastClearance(gym), 0.6);
+}
+
+TEST(Gym, PathKeepsItsDistanceFromTheWalls) {
+  const PathMotion path = TargetMotion(LoadScenario(Shipped("gym")));
+  for (double t = 0.0; t < path.Duration(); t += 0.05) {
+    const Vector2d p = path.Position(t);
+    EXPECT_LE(std::abs(p.y()), 4.0 - 0.75);
+    EXPECT_LE(std::abs(p.x() - 7.5), 7.5 - 0.75);
+  }
+}
+
+/// At every time there is a stand 2 to 3 m from the target, 0.5 m free of everything, that sees it.
+TEST(Gym, AChaserFindsRoomAllTheWay) {
+  const Scenario gym = LoadScenario(Shipped("gym"));
+  const PathMotion path = TargetMotion(gym);
+  const auto solids = StaticSolids(gym);
+  for (double t = 0.0; t < gym.duration_s; t += 0.5) {
+    const Vector2d p = path.Position(t);
+    const Vector3d target(p.x(), p.y(), gym.target.base + 0.5 * gym.target.height);
+    int stands = 0;
+    for (int i = 0; i < 72; ++i) {
+      const double angle = i * 0.0872664626;
+      const Vector3d stand(p.x() + 2.5 * std::cos(angle), p.y() + 2.5 * std::sin(angle), 1.3);
+      if (std::abs(stand.y()) > 4.0 || stand.x() < 0.0 || stand.x() > 15.0) continue;
+      bool good = true;
+      for (const auto& solid : solids)
+        good = good && SignedDistance(solid, stand) > 0.5 && !SegmentHits(solid, stand, target);
+      stands += good;
+    }
+    EXPECT_GE(stands, 8) << "at " << t << " s";
+  }
+}
+
+TEST(Forest, HasItsTreesGapsAndFreePath) {
+  const Scenario forest = LoadScenario(Shipped("forest"));
+  std::vector<Solid> trunks;
+  for (const auto& solid : StaticSolids(forest))
+    if (solid.kind == Solid::Kind::kCylinder) trunks.push_back(solid);
+  EXPECT_GE(trunks.size(), 450u);
+  EXPECT_LE(trunks.size(), 550u);
+  for (std::size_t i = 0; i < trunks.size(); ++i) {
+    EXPECT_GE(trunks[i].half_size.x(), 0.15);
+    EXPECT_LE(trunks[i].half_size.x(), 0.4);
+    for (std::size_t j = 0; j < i; ++j) {
+      const double apart = (trunks[i].center - trunks[j].center).head<2>().norm();
+      EXPECT_GE(apart - trunks[i].half_size.x() - trunks[j].half_size.x(), 2.5 - 1e-9);
+    }
+  }
+  EXPECT_GE(LeastClearance(forest), forest.world.forest.path_clearance - 0.1);
+}
+
+TEST(Forest, IsTheSameEveryTime) {
+  const Scenario forest = LoadScenario(Shipped("forest"));
+  const auto a = StaticSolids(forest), b = StaticSolids(forest);
+  ASSERT_EQ(a.size(), b.size());
+  for (std::size_t i = 0; i < a.size(); ++i) EXPECT_EQ(a[i].center, b[i].center);
+}
+
+TEST(Forest, MoversCrossTheChaseInTwoRegions) {
+  const Scenario forest = LoadScenario(Shipped("forest"));
+  const PathMotion path = TargetMotion(forest);
+  EXPECT_GT(path.Duration(), 50.0);
+  ASSERT_EQ(forest.movers.size(), 2u);
+  std::vector<Vector2d> places;
+  for (const auto& mover : forest.movers) {
+    EXPECT_LE(mover.speed, 4.0);
+    double least = 1e9;
+    Vector2d place;
+    for (double t = 0.0; t < forest.duration_s; t += 0.05) {
+      const Vector2d p = path.Position(t);
+      const Solid solid = MoverAt(mover, t).solid;
+      const double d = SignedDistance(solid, {p.x(), p.y(), solid.center.z()});
+      if (d < least) place = p, least = d;
+    }
+    EXPECT_GT(least, 0.6);  // misses the target
+    EXPECT_LT(least, 4.0);  // but crosses where the chaser flies
+    places.push_back(place);
+  }
+  EXPECT_GT((places[0] - places[1]).norm(), 15.0);
+}
+
+TEST(Forest, MoversPassBetweenTheTrees) {
+  const Scenario forest = LoadScenario(Shipped("forest"));
+  const auto solids = StaticSolids(forest);
+  for (const auto& mover : forest.movers)
+    for (double t = 0.0; t < forest.duration_s; t += 0.1) {
+      const MoverState state = MoverAt(mover, t);
+      for (const auto& solid : solids) {
+        if (solid.kind != Solid::Kind::kCylinder) continue;
+        if ((solid.center - state.solid.center).head<2>().norm() > 3.0) continue;
+        Vector3d trunk = solid.center;
+        trunk.z() = state.solid.center.z();
+        EXPECT_GT(SignedDistance(state.solid, trunk), solid.half_size.x()) << "at " << t << " s";
+      }
+    }
+}
+
+}  // namespace
+}  // namespace chase::world
