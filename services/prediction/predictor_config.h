@@ -1,0 +1,49 @@
+#pragma once
+
+#include <string>
+
+namespace chase::prediction {
+
+/// Parameters of Problem 1 of Jeon 2021 and of its search.
+struct PredictorConfig {
+  int samples = 5;
+  int degree = 3;
+  double horizon = 2.5;
+  double fit_weight = 30.0;
+  double damping = 0.03;
+  double density_weight = 0.01;
+  double contour_sigmas = 2.0;
+  double sigma_floor = 0.05;
+  bool planar = true;
+  double max_target_speed = 4.0;
+  double inflation = 1.0;
+  double overlap_tolerance = 0.15;
+  double smallest_shrink = 0.5;
+  int table_limit = 400000;
+  int node_limit = 4000;
+
+  template <class V>
+  void Visit(V& v) {
+    v("samples", samples, "N_v, points per observation: its mean and a contour around it");
+    v("degree", degree, "m_q of the prediction, 1 to 7");
+    v("horizon", horizon, "T, length of the prediction, s");
+    v("fit_weight", fit_weight, "w of eq. (2), pull towards the points, 1/s^3");
+    v("damping", damping, "weight of the squared speed in eq. (2), 1/s^2; 0: the paper's");
+    v("density_weight", density_weight, "w_q of Problem 1, relative to the densities at the means");
+    v("contour_sigmas", contour_sigmas, "radius of the contour, standard deviations");
+    v("sigma_floor", sigma_floor, "least standard deviation of an observation, m");
+    v("planar", planar, "hold z at the mean height: a target on the ground");
+    v("max_target_speed", max_target_speed, "the mean prediction is slowed down to this, m/s");
+    v("inflation", inflation, "share of the target's radius that obstacles grow by");
+    v("overlap_tolerance", overlap_tolerance,
+      "an obstacle that covers the target shrinks to leave this share of its size free");
+    v("smallest_shrink", smallest_shrink, "an obstacle that would shrink below this is left out");
+    v("table_limit", table_limit, "up to so many candidates two tables are searched, then a tree");
+    v("node_limit", node_limit, "of the tree; the gap to the optimum is reported");
+  }
+
+  /// Names the first field that makes no sense, its value and the limit; empty when all is well.
+  std::string Problem() const;
+};
+
+}  // namespace chase::prediction
