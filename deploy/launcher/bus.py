@@ -21,6 +21,10 @@ def endpoint(text):
     return (match.group(1), int(match.group(2))) if match else None
 
 
+def stays_on_host(text):
+    return "ttl=0" in re.split(r"[?&]", text)[1:]
+
+
 def listener(group, port):
     """A socket that hears the group. OSError where the port is taken or the route is missing."""
     sock = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)

@@ -78,6 +78,9 @@ def check_bus(url):
     where = bus.endpoint(url)
     if not where:
         raise FlightError(f"CHASE_LCM_URL={url}: not of the form udpm://ADDRESS:PORT?ttl=0")
+    if any(row["heavy"] for row in flight_processes()) and not bus.stays_on_host(url):
+        raise FlightError(f"CHASE_LCM_URL={url}: sweeps and images must stay on this host; "
+                          "cure: add ttl=0")
     if problem := bus.loopback_problem(*where):
         raise FlightError(problem)
     if others := bus.foreign_channels(*where, seconds=0.5):
@@ -128,21 +131,26 @@ class Flight:
         for row in sorted(rows, key=lambda r: r["name"] == "simulator"):
             if row["name"] == "simulator":
                 self.wait_ready()
-            command = [BIN / row["binary"], "--config", configs[row["name"]]]
-            self.services.append(self.child(row["name"], command, notifies=True))
+            command = ["nice", "-n", str(row["nice"]), BIN / row["binary"], "--config",
+                       configs[row["name"]]]
+            self.services.append(self.child(row["name"], command, notifies=True,
+                                            restarts=row["restart"] == "always"))
         self.wait_ready()
 
     def wait_ready(self):
         if not processes.wait_ready(self.services):
-            self.complain()
+            self.complain(mend=False)
             late = ", ".join(c.name for c in self.services if not c.ready())
             raise FlightError(f"not ready after {processes.READY_LIMIT:.0f} s: {late}; "
                               f"their logs are in {self.folder}")
 
-    def complain(self, *watchers):
-        """Raises when a process has ended or hangs; shows the end of its log."""
+    def complain(self, *watchers, mend=True):
+        """Restarts what may be restarted; else raises when a process has ended or hangs."""
         child, sentence = processes.first_problem(self.services + [self.logger, *watchers])
-        if child:
+        if child and child.restarts and mend:
+            print(f"\n{sentence}: restarted", file=sys.stderr)
+            child.restart()
+        elif child:
             raise FlightError(f"{sentence}; the end of {child.log}:\n{child.log_tail()}")
 
     def watch(self):

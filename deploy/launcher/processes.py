@@ -18,27 +18,35 @@ def _die_with_parent():
 
 
 class Child:
-    """One process whose output goes to a file. With `notifies` it speaks sd_notify's protocol."""
+    """One process whose output goes to a file. With `notifies` it speaks sd_notify's protocol; with
+    `restarts` its end is mended by restart()."""
 
-    def __init__(self, name, command, log, env=None, notifies=False, stdout=None):
-        self.name = name
-        self.log = log
+    def __init__(self, name, command, log, env=None, notifies=False, restarts=False, stdout=None):
+        self.name, self.log, self.restarts = name, log, restarts
+        self._command, self._stdout = command, stdout
+        self._environment = dict(os.environ, **(env or {}))
+        self._environment.pop("NOTIFY_SOCKET", None)
         self._socket = self._notify_socket() if notifies else None
-        self._ready = not notifies
+        self.start()
+
+    def start(self):
+        self._ready = not self._socket
         self._last_sign = time.monotonic()
-        environment = dict(os.environ, **(env or {}))
-        environment.pop("NOTIFY_SOCKET", None)
-        if notifies:
-            environment["NOTIFY_SOCKET"] = self._address
-        with open(log, "ab") as file:
+        with open(self.log, "ab") as file:
             self.process = subprocess.Popen(
-                command, stdin=subprocess.DEVNULL, stdout=stdout or file, stderr=file,
-                env=environment, start_new_session=True, preexec_fn=_die_with_parent)
+                self._command, stdin=subprocess.DEVNULL, stdout=self._stdout or file, stderr=file,
+                env=self._environment, start_new_session=True, preexec_fn=_die_with_parent)
+
+    def restart(self):
+        self.process.kill()  # where it hangs rather than has ended
+        self.process.wait()
+        self.start()
 
     def _notify_socket(self):
-        self._address = f"@chase-{os.getpid()}-{self.name}"
+        address = f"chase-{os.getpid()}-{self.name}"  # abstract: "@" outside, a zero byte inside
+        self._environment["NOTIFY_SOCKET"] = "@" + address
         sock = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
-        sock.bind("\0" + self._address[1:])
+        sock.bind("\0" + address)
         sock.setblocking(False)
         return sock
 

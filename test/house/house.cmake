@@ -10,6 +10,7 @@ endfunction()
 
 house_check(includes includes.py)
 house_check(words words.py)
+house_check(channels channels.py)
 house_check(documents documents.py ${CMAKE_BINARY_DIR}/bin)
 house_check(launcher launcher_test.py)
 house_check(setup setup_test.py)

@@ -132,6 +132,25 @@ class FlightTest(unittest.TestCase):
         self.assertIn("mapping ended (exit code 3)", err)
         self.assertIn("broken wing", err)
 
+    def test_process_that_may_be_restarted(self):
+        rows = fly.flight_processes()
+        self.patch(fly, "flight_processes", lambda: [
+            dict(row, restart="always" if row["name"] == "mapping" else "never") for row in rows])
+        mark = self.bin / "died"
+        once = f"open({str(mark)!r}, 'x'); time.sleep(1.5); sys.exit(3)"
+        self.program("chase-mapping", SERVICE.format(
+            behaviour=f"if not os.path.exists({str(mark)!r}): {once}"))
+        self.program("chase-flight-monitor", "import time; time.sleep(2)\n" + textwrap.dedent(MONITOR))
+        code, _, err = self.fly()
+        self.assertEqual(code, 0, err)
+        self.assertIn("mapping ended (exit code 3): restarted", err)
+
+    def test_sweeps_stay_on_the_host(self):
+        os.environ["CHASE_LCM_URL"] = f"udpm://{GROUP}:{free_port()}?ttl=1"
+        code, _, err = self.fly()
+        self.assertEqual(code, 1)
+        self.assertIn("ttl=0", err)
+
     def test_process_that_refuses_to_start(self):
         self.program("chase-planning", "import sys; sys.exit('planning.yaml:1: no_such: unknown')")
         code, _, err = self.fly()

@@ -1,0 +1,50 @@
+"""Checks who listens to what: no ground truth in the loop, no channel that the table does not name."""
+
+import re
+import sys
+
+import tree
+
+LISTENS = {
+    "lidar": set(),
+    "camera": set(),
+    "odometry": {"LIDAR_SCAN", "IMU"},
+    "mapping": {"SCAN_REGISTERED", "TARGET"},
+    "perception": {"CAMERA_IMAGE", "LIDAR_SCAN", "POSE"},
+    "prediction": {"TARGET", "OBSTACLES"},
+    "planning": {"PREDICTION", "OBSTACLES", "POSE"},
+    "control": {"PLAN", "POSE"},
+    "simulator": {"ATTITUDE_SETPOINT"},
+}
+SUBSCRIBE = re.compile(r'Subscribe<[\w:]+>\(\s*(?:/\*.*?\*/\s*)?([^,]+),')
+
+
+def subscriptions(service):
+    for path in tree.files(f"services/{service}/*.h", f"services/{service}/*.cpp"):
+        for argument in SUBSCRIBE.findall(tree.text(path)):
+            yield path, argument.strip()
+
+
+def check(service):
+    heard = set()
+    for path, argument in subscriptions(service):
+        channel = argument.strip('"')
+        heard.add(channel)
+        if not re.fullmatch(r'"\w+"', argument):
+            yield f"{path}: subscribes to {argument}: spell the channel where it is subscribed to"
+        elif channel not in LISTENS[service]:
+            yield f"{path}: listens to {channel}, which is not for {service}"
+    for channel in sorted(LISTENS[service] - heard):
+        yield f"services/{service}: does not listen to {channel}"
+
+
+def main():
+    problems = [p for service in LISTENS for p in check(service)]
+    for path in tree.files("services/*.h", "services/*.cpp", "common/*.cpp"):
+        if path.parts[1] != "simulator" and "truth_t" in tree.text(path) and path.parts[1] != "bus":
+            problems.append(f"{path}: knows truth_t: ground truth stays out of the loop")
+    return tree.report(problems)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
