@@ -1,0 +1,92 @@
+#include "logs/src/estimate_errors.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+
+namespace chase::logs {
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr double kTimeTolerance = 1e-6;  // s
+constexpr double kLargestGap = 0.1;      // s between truth samples to interpolate over
+
+bool InMission(const FlightRecord& record, double t) {
+  return t >= -kTimeTolerance && t <= record.scenario.duration_s + kTimeTolerance;
+}
+
+double Rmse(const Eigen::Matrix3Xd& a, const Eigen::Matrix3Xd& b) {
+  return std::sqrt((a - b).squaredNorm() / static_cast<double>(a.cols()));
+}
+
+/// Estimates and the truth of the same times, one column each.
+struct Pairs {
+  std::vector<Vector3d> estimate, truth;
+
+  void Add(const Vector3d& e, const Vector3d& t) {
+    estimate.push_back(e);
+    truth.push_back(t);
+  }
+  static Eigen::Matrix3Xd Columns(const std::vector<Vector3d>& v) {
+    return Eigen::Map<const Eigen::Matrix3Xd>(v.data()->data(), 3, static_cast<long>(v.size()));
+  }
+};
+
+}  // namespace
+
+std::optional<TruePositions> TruthAt(const std::vector<TruthSample>& truth, double t) {
+  const auto after = std::lower_bound(truth.begin(), truth.end(), t - kTimeTolerance,
+                                      [](const TruthSample& s, double time) { return s.t < time; });
+  if (after == truth.end()) return std::nullopt;
+  if (std::abs(after->t - t) <= kTimeTolerance) return TruePositions{after->p, after->target};
+  if (after == truth.begin()) return std::nullopt;
+  const auto before = after - 1;
+  const double gap = after->t - before->t;
+  if (gap > kLargestGap) return std::nullopt;
+  const double s = (t - before->t) / gap;
+  return TruePositions{before->p + s * (after->p - before->p),
+                       before->target + s * (after->target - before->target)};
+}
+
+TrajectoryError OdometryError(const FlightRecord& record) {
+  Pairs pairs;
+  for (const PoseSample& pose : record.poses) {
+    const auto truth = TruthAt(record.truth, pose.t);
+    if (truth && InMission(record, pose.t)) pairs.Add(pose.p, truth->body);
+  }
+  if (pairs.estimate.empty()) return {};
+  const auto estimate = Pairs::Columns(pairs.estimate), truth = Pairs::Columns(pairs.truth);
+  TrajectoryError error;
+  error.raw = Rmse(estimate, truth);
+  if (estimate.cols() < 3) return error;
+  const Eigen::Isometry3d fit(Eigen::umeyama(estimate, truth, false));
+  error.aligned = Rmse(fit * estimate.colwise().homogeneous(), truth);
+  return error;
+}
+
+std::optional<double> TargetRmse(const FlightRecord& record) {
+  Pairs pairs;
+  for (const TargetSample& target : record.targets) {
+    if (!target.tracking || !InMission(record, target.t)) continue;
+    if (const auto truth = TruthAt(record.truth, target.t)) pairs.Add(target.mean, truth->target);
+  }
+  if (pairs.estimate.empty()) return std::nullopt;
+  return Rmse(Pairs::Columns(pairs.estimate), Pairs::Columns(pairs.truth));
+}
+
+std::optional<double> PredictionError(const FlightRecord& record, double horizon) {
+  double sum = 0.0;
+  long count = 0;
+  for (const PredictionSample& p : record.predictions) {
+    const double t = p.t + horizon;
+    if (!p.usable || !InMission(record, p.t) || t > p.target.end() + kTimeTolerance) continue;
+    const auto truth = TruthAt(record.truth, t);
+    if (!truth) continue;
+    sum += (p.target.Position(t) - truth->target).norm();
+    ++count;
+  }
+  return count > 0 ? std::optional<double>(sum / static_cast<double>(count)) : std::nullopt;
+}
+
+}  // namespace chase::logs

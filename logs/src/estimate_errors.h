@@ -1,0 +1,29 @@
+#pragma once
+
+#include <optional>
+
+#include "logs/src/flight_record.h"
+
+namespace chase::logs {
+
+/// p_WB and p_WT of the truth at mission time t, linear between samples; nothing outside them.
+struct TruePositions {
+  Eigen::Vector3d body, target;
+};
+std::optional<TruePositions> TruthAt(const std::vector<TruthSample>& truth, double t);
+
+/// RMSE of POSE against the truth of the same time over the mission, m: as it is (both are in W)
+/// and after the best rigid alignment.
+struct TrajectoryError {
+  std::optional<double> raw, aligned;
+};
+TrajectoryError OdometryError(const FlightRecord& record);
+
+/// RMSE of the tracked target's mean over the mission, m.
+std::optional<double> TargetRmse(const FlightRecord& record);
+
+/// Mean distance between the predicted and the true target `horizon` s after the predictions'
+/// start, over the mission's predictions that reach so far, m.
+std::optional<double> PredictionError(const FlightRecord& record, double horizon);
+
+}  // namespace chase::logs

@@ -1,0 +1,79 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/world/scenario.h"
+#include "common/world/trajectory.h"
+
+/// A flight as metrics need it: plain structs, frame W, m and s; `t` is mission time, negative
+/// before the target starts to move.
+namespace chase::logs {
+
+struct TruthSample {
+  double t = 0.0;
+  Eigen::Vector3d p = Eigen::Vector3d::Zero();       ///< p_WB
+  Eigen::Vector3d a = Eigen::Vector3d::Zero();       ///< a_WB, m/s^2
+  double yaw = 0.0;                                  ///< of the body, rad
+  Eigen::Vector3d target = Eigen::Vector3d::Zero();  ///< p_WT
+  Eigen::Vector2d target_px = Eigen::Vector2d::Zero();
+  bool target_in_image = false;
+  double visible_share = 0.0;  ///< of the target's pixels in the last image
+};
+
+struct PoseSample {
+  double t = 0.0;
+  Eigen::Vector3d p = Eigen::Vector3d::Zero();  ///< p_WB as estimated
+};
+
+struct TargetSample {
+  double t = 0.0;
+  bool tracking = false;
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();  ///< p_WT as perceived
+};
+
+struct PredictionSample {
+  double t = 0.0;
+  bool usable = false;       ///< false: there was nothing to predict
+  world::Trajectory target;  ///< p_WT(t), in mission time
+};
+
+struct PlanSample {
+  double t = 0.0;
+  int verdict = 0;             ///< plan_t's constants
+  world::Trajectory position;  ///< p_WB(t), in mission time
+};
+
+/// Figures of one stage of one process, ms.
+struct StageFigures {
+  std::string process, stage;
+  long count = 0;
+  double mean_ms = 0.0, p50_ms = 0.0, p99_ms = 0.0, max_ms = 0.0;
+};
+
+/// An obstacle as the chaser believed it to be at the end of the flight, for pictures.
+struct PerceivedObstacle {
+  Eigen::Vector3d center = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d shape = Eigen::Matrix3d::Identity();  ///< R, 1/m^2
+  bool moving = false;
+};
+
+struct FlightRecord {
+  world::Scenario scenario;
+  int64_t seed = 0;
+  std::vector<TruthSample> truth;  ///< 100 Hz, in time order
+  std::vector<PoseSample> poses;
+  std::vector<TargetSample> targets;
+  std::vector<PredictionSample> predictions;
+  std::vector<PlanSample> plans;
+  std::vector<StageFigures> stages;
+  std::vector<PerceivedObstacle> obstacles;
+  std::map<std::string, double> cpu_s;     ///< by process
+  std::optional<double> real_time_factor;  ///< logical over wall time
+};
+
+}  // namespace chase::logs

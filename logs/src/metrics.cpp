@@ -1,0 +1,153 @@
+#include "logs/src/metrics.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+
+#include "logs/src/estimate_errors.h"
+
+namespace chase::logs {
+namespace {
+
+constexpr double kTimeTolerance = 1e-6;  // s
+constexpr double kEndTolerance = 0.1;    // s of the mission that may be missing at its end
+
+using Figure = Metrics::Figure;
+
+bool InMission(const FlightRecord& record, double t) {
+  return t >= -kTimeTolerance && t <= record.scenario.duration_s + kTimeTolerance;
+}
+
+std::vector<TruthSample> MissionTruth(const FlightRecord& record) {
+  std::vector<TruthSample> out;
+  std::copy_if(record.truth.begin(), record.truth.end(), std::back_inserter(out),
+               [&](const TruthSample& s) { return InMission(record, s.t); });
+  return out;
+}
+
+template <class Items, class F>
+Figure Mean(const Items& items, F value) {
+  if (items.empty()) return std::nullopt;
+  double sum = 0.0;
+  for (const auto& item : items) sum += value(item);
+  return sum / static_cast<double>(items.size());
+}
+
+double WrappedAngle(double a) { return std::remainder(a, 2.0 * M_PI); }
+
+/// Figures over consecutive pairs of samples (time step dt > 0).
+template <class F>
+Figure MeanOverSteps(const std::vector<TruthSample>& truth, F value) {
+  double sum = 0.0;
+  long count = 0;
+  for (size_t i = 1; i < truth.size(); ++i) {
+    const double dt = truth[i].t - truth[i - 1].t;
+    if (dt <= 0.0) continue;
+    sum += value(truth[i - 1], truth[i], dt);
+    ++count;
+  }
+  return count > 0 ? Figure(sum / static_cast<double>(count)) : std::nullopt;
+}
+
+void AddRatios(const FlightRecord& record, const std::vector<SampleScore>& scores, Metrics* m) {
+  const double desired = record.scenario.chaser.desired_distance;
+  m->safe_ratio = Mean(scores, [](const SampleScore& s) { return s.clearance > 0.0 ? 1.0 : 0.0; });
+  m->visible_ratio = Mean(scores, [](const SampleScore& s) { return s.visible ? 1.0 : 0.0; });
+  for (const SampleScore& s : scores)
+    m->min_clearance_m = std::min(m->min_clearance_m.value_or(s.clearance), s.clearance);
+  if (desired <= 0.0) return;
+  m->distance_ratio = Mean(scores, [&](const SampleScore& s) { return s.distance / desired; });
+  m->distance_error =
+      Mean(scores, [&](const SampleScore& s) { return std::abs(s.distance / desired - 1.0); });
+}
+
+void AddMotion(const std::vector<TruthSample>& truth, Metrics* m) {
+  m->in_image_ratio =
+      Mean(truth, [](const TruthSample& s) { return s.target_in_image ? 1.0 : 0.0; });
+  m->acceleration_cost = Mean(truth, [](const TruthSample& s) { return s.a.squaredNorm(); });
+  m->jerk_cost = MeanOverSteps(truth, [](const TruthSample& a, const TruthSample& b, double dt) {
+    return ((b.a - a.a) / dt).squaredNorm();
+  });
+  const Figure yaw_rate =
+      MeanOverSteps(truth, [](const TruthSample& a, const TruthSample& b, double dt) {
+        return std::pow(WrappedAngle(b.yaw - a.yaw) / dt, 2);
+      });
+  if (yaw_rate) m->yaw_rate_rms = std::sqrt(*yaw_rate);
+  double chaser = 0.0, target = 0.0;
+  for (size_t i = 1; i < truth.size(); ++i) {
+    chaser += (truth[i].p - truth[i - 1].p).norm();
+    target += (truth[i].target - truth[i - 1].target).norm();
+  }
+  if (target > 0.0) m->travel_ratio = chaser / target;
+}
+
+std::optional<TimeFigures> Stage(const FlightRecord& record, const std::string& process,
+                                 const std::string& stage) {
+  for (const StageFigures& s : record.stages)
+    if (s.process == process && s.stage == stage)
+      return TimeFigures{s.mean_ms, s.p50_ms, s.p99_ms, s.max_ms};
+  return std::nullopt;
+}
+
+void AddPlans(const FlightRecord& record, Metrics* m) {
+  constexpr int kWider = 1;  // plan_t's CHASE and WIDER are what planning is for
+  for (const PlanSample& plan : record.plans) {
+    if (!InMission(record, plan.t)) continue;
+    ++m->replans;
+    m->fallbacks += plan.verdict > kWider;
+  }
+  m->plan_ms = Stage(record, "planning", "plan");
+  m->predict_ms = Stage(record, "prediction", "predict");
+}
+
+void AddEstimates(const FlightRecord& record, Metrics* m) {
+  const auto ate = OdometryError(record);
+  m->odometry_ate_m = ate.raw;
+  m->odometry_ate_aligned_m = ate.aligned;
+  m->target_rmse_m = TargetRmse(record);
+  for (const double horizon : {0.5, 1.0, 1.5, 2.0, 2.5})
+    if (const Figure e = PredictionError(record, horizon))
+      m->prediction_error_by_horizon_m[horizon] = *e;
+  m->prediction_error_m = PredictionError(record, 1.0);
+}
+
+bool AtLeast(const Figure& figure, double limit) { return figure && *figure >= limit; }
+bool AtMost(const Figure& figure, double limit) { return figure && *figure <= limit; }
+
+void AddCriteria(const world::Scenario& scenario, Metrics* m) {
+  const world::CriteriaSpec& c = scenario.criteria;
+  m->criteria["complete"] = m->flown_s >= scenario.duration_s - kEndTolerance;
+  if (c.safe_ratio >= 0.0) m->criteria["safe_ratio"] = AtLeast(m->safe_ratio, c.safe_ratio);
+  if (c.visible_ratio >= 0.0)
+    m->criteria["visible_ratio"] = AtLeast(m->visible_ratio, c.visible_ratio);
+  if (c.in_image_ratio >= 0.0)
+    m->criteria["in_image_ratio"] = AtLeast(m->in_image_ratio, c.in_image_ratio);
+  if (c.distance_ratio_max >= 0.0)
+    m->criteria["distance_ratio_max"] = AtMost(m->distance_ratio, c.distance_ratio_max);
+  if (c.real_time_factor >= 0.0 && m->real_time_factor)
+    m->criteria["real_time_factor"] = AtLeast(m->real_time_factor, c.real_time_factor);
+}
+
+}  // namespace
+
+bool Metrics::Passed() const {
+  return !criteria.empty() &&
+         std::all_of(criteria.begin(), criteria.end(), [](const auto& c) { return c.second; });
+}
+
+Metrics Compute(const FlightRecord& record) { return Compute(record, Score(record)); }
+
+Metrics Compute(const FlightRecord& record, const std::vector<SampleScore>& scores) {
+  Metrics m;
+  m.flown_s = scores.empty() ? 0.0 : scores.back().t;
+  m.cpu_s = record.cpu_s;
+  m.real_time_factor = record.real_time_factor;
+  AddRatios(record, scores, &m);
+  AddMotion(MissionTruth(record), &m);
+  AddPlans(record, &m);
+  AddEstimates(record, &m);
+  AddCriteria(record.scenario, &m);
+  return m;
+}
+
+}  // namespace chase::logs

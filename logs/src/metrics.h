@@ -1,0 +1,56 @@
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "logs/src/flight_record.h"
+
+namespace chase::logs {
+
+/// What one truth sample of the mission scores.
+struct SampleScore {
+  double t = 0.0;          ///< mission time, s
+  double distance = 0.0;   ///< |p_WB - p_WT|, m
+  double clearance = 0.0;  ///< from the drone's sphere to the nearest solid, m; negative: touching
+  bool visible = false;    ///< the segment from drone to target's centre touches no obstacle
+};
+
+struct TimeFigures {
+  double mean = 0.0, p50 = 0.0, p99 = 0.0, max = 0.0;  ///< ms
+};
+
+/// Figures of a flight; empty where the log holds nothing to compute them from. Definitions: see
+/// logs/README.md.
+struct Metrics {
+  using Figure = std::optional<double>;
+
+  Figure safe_ratio, min_clearance_m, visible_ratio, in_image_ratio;
+  Figure distance_ratio, distance_error, travel_ratio;
+  Figure acceleration_cost, jerk_cost, yaw_rate_rms;
+  std::optional<TimeFigures> plan_ms, predict_ms;
+  long replans = 0, fallbacks = 0;
+  Figure odometry_ate_m, odometry_ate_aligned_m, target_rmse_m, prediction_error_m;
+  std::map<double, double> prediction_error_by_horizon_m;  ///< horizon in s
+  std::map<std::string, double> cpu_s;                     ///< by process
+  Figure real_time_factor;
+  double flown_s = 0.0;  ///< of the mission
+  std::map<std::string, bool> criteria;
+
+  bool Passed() const;
+};
+
+/// Scores of every truth sample with 0 <= t <= duration_s. Obstacles are the scenario's own solids;
+/// the ground and the target's body count for clearance, not for sight.
+std::vector<SampleScore> Score(const FlightRecord& record);
+
+Metrics Compute(const FlightRecord& record);
+Metrics Compute(const FlightRecord& record, const std::vector<SampleScore>& scores);
+
+/// The keys of metrics.json; what could not be computed is null.
+std::string MetricsJson(const FlightRecord& record, const Metrics& metrics);
+/// Throws std::runtime_error with one line when the file cannot be written.
+void WriteMetricsJson(const std::string& file, const FlightRecord& record, const Metrics& metrics);
+
+}  // namespace chase::logs

@@ -1,0 +1,68 @@
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "logs/src/metrics.h"
+#include "logs/src/output.h"
+
+namespace chase::logs {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json Number(const Metrics::Figure& figure) {
+  return figure && std::isfinite(*figure) ? Json(*figure) : Json();
+}
+
+Json Times(const std::optional<TimeFigures>& t) {
+  if (!t) return {};
+  return {{"mean", t->mean}, {"p50", t->p50}, {"p99", t->p99}, {"max", t->max}};
+}
+
+Json ByHorizon(const std::map<double, double>& errors) {
+  Json out = Json::object();
+  for (const auto& [horizon, error] : errors) {
+    std::string key = std::to_string(horizon);
+    out[key.substr(0, key.find('.') + 2)] = error;
+  }
+  return out;
+}
+
+}  // namespace
+
+std::string MetricsJson(const FlightRecord& record, const Metrics& m) {
+  Json j;
+  j["scenario"] = record.scenario.name;
+  j["seed"] = record.seed;
+  j["duration_s"] = record.scenario.duration_s;
+  j["flown_s"] = m.flown_s;
+  j["passed"] = m.Passed();
+  j["safe_ratio"] = Number(m.safe_ratio);
+  j["min_clearance_m"] = Number(m.min_clearance_m);
+  j["visible_ratio"] = Number(m.visible_ratio);
+  j["in_image_ratio"] = Number(m.in_image_ratio);
+  j["distance_ratio"] = Number(m.distance_ratio);
+  j["distance_error"] = Number(m.distance_error);
+  j["travel_ratio"] = Number(m.travel_ratio);
+  j["acceleration_cost"] = Number(m.acceleration_cost);
+  j["jerk_cost"] = Number(m.jerk_cost);
+  j["yaw_rate_rms"] = Number(m.yaw_rate_rms);
+  j["plan_ms"] = Times(m.plan_ms);
+  j["predict_ms"] = Times(m.predict_ms);
+  j["replans"] = m.replans;
+  j["fallbacks"] = m.fallbacks;
+  j["odometry_ate_m"] = Number(m.odometry_ate_m);
+  j["odometry_ate_aligned_m"] = Number(m.odometry_ate_aligned_m);
+  j["target_rmse_m"] = Number(m.target_rmse_m);
+  j["prediction_error_m"] = Number(m.prediction_error_m);
+  j["prediction_error_by_horizon_m"] = ByHorizon(m.prediction_error_by_horizon_m);
+  j["cpu_s"] = Json(m.cpu_s);
+  j["real_time_factor"] = Number(m.real_time_factor);
+  j["criteria"] = Json(m.criteria);
+  return j.dump(2) + "\n";
+}
+
+void WriteMetricsJson(const std::string& file, const FlightRecord& record, const Metrics& metrics) {
+  WriteFile(file, MetricsJson(record, metrics));
+}
+
+}  // namespace chase::logs

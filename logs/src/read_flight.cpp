@@ -1,0 +1,169 @@
+#include "logs/src/read_flight.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <stdexcept>
+
+#include "chase/obstacles_t.hpp"
+#include "chase/plan_t.hpp"
+#include "chase/pose_t.hpp"
+#include "chase/prediction_t.hpp"
+#include "chase/scenario_t.hpp"
+#include "chase/status_t.hpp"
+#include "chase/target_t.hpp"
+#include "chase/truth_t.hpp"
+#include "common/bus/convert.h"
+#include "common/bus/validation.h"
+#include "logs/src/log_reader.h"
+
+namespace chase::logs {
+namespace {
+
+bool EndsWith(const std::string& text, const std::string& end) {
+  return text.size() >= end.size() && text.compare(text.size() - end.size(), end.size(), end) == 0;
+}
+
+double Yaw(const double (&q)[4]) {
+  return std::atan2(2 * (q[0] * q[3] + q[1] * q[2]), 1 - 2 * (q[2] * q[2] + q[3] * q[3]));
+}
+
+/// Gathers messages as they are; times are settled at the end, when the mission's start is known.
+class Gatherer {
+ public:
+  void Add(const Event& e) {
+    if (Take(e, "TRUTH", &truth_)) {
+      if (!first_event_) first_event_ = e.utime;
+      last_event_ = e.utime;
+    }
+    Take(e, "POSE", &poses_);
+    Take(e, "TARGET", &targets_);
+    Take(e, "PREDICTION", &predictions_);
+    Take(e, "PLAN", &plans_);
+    TakeLast(e, "SCENARIO", &scenario_);
+    TakeLast(e, "OBSTACLES", &obstacles_);
+    status_t status;
+    if (Good(e, "_STATUS", &status)) statuses_[status.name] = status;
+  }
+
+  FlightRecord Record(const std::string& log) {
+    if (truth_.empty())
+      throw std::runtime_error(log + ": holds no TRUTH; only a simulated flight can be reported");
+    if (!scenario_)
+      throw std::runtime_error(log + ": holds no SCENARIO; record the flight from its beginning");
+    FlightRecord record;
+    record.scenario = world::ParseScenario(scenario_->yaml, log + ": SCENARIO");
+    record.seed = scenario_->seed;
+    origin_ = truth_.front().utime - std::llround(truth_.front().mission_time * 1e6);
+    AddTruth(&record);
+    AddEstimates(&record);
+    AddPlans(&record);
+    AddStatuses(&record);
+    AddObstacles(&record);
+    AddRealTimeFactor(&record);
+    return record;
+  }
+
+ private:
+  /// A vehicle's prefix may stand before the channel's name.
+  template <class T>
+  static bool Good(const Event& e, const std::string& name, T* message) {
+    return EndsWith(e.channel, name) && DecodeEvent(e, message) && bus::Problem(*message).empty();
+  }
+  template <class T>
+  static bool Take(const Event& e, const std::string& name, std::vector<T>* messages) {
+    T message;
+    if (!Good(e, name, &message)) return false;
+    messages->push_back(std::move(message));
+    return true;
+  }
+  template <class T>
+  static void TakeLast(const Event& e, const std::string& name, std::optional<T>* message) {
+    T fresh;
+    if (Good(e, name, &fresh)) *message = std::move(fresh);
+  }
+
+  double Time(int64_t utime) const { return bus::Seconds(utime, origin_); }
+
+  void AddTruth(FlightRecord* record) const {
+    for (const truth_t& m : truth_) {
+      TruthSample s;
+      s.t = Time(m.utime);
+      s.p = bus::ToVector(m.pos);
+      s.a = bus::ToVector(m.accel);
+      s.yaw = Yaw(m.orientation);
+      s.target = bus::ToVector(m.target_pos);
+      s.target_px = {m.target_px[0], m.target_px[1]};
+      s.target_in_image = m.target_in_image != 0;
+      s.visible_share = m.visible_share;
+      record->truth.push_back(s);
+    }
+    std::stable_sort(record->truth.begin(), record->truth.end(),
+                     [](const TruthSample& a, const TruthSample& b) { return a.t < b.t; });
+  }
+
+  void AddEstimates(FlightRecord* record) const {
+    for (const pose_t& m : poses_)
+      if (m.health != pose_t::HEALTH_STARTING)
+        record->poses.push_back({Time(m.utime), bus::ToVector(m.pos)});
+    for (const target_t& m : targets_)
+      record->targets.push_back(
+          {Time(m.utime), m.state == target_t::TRACKING, bus::ToVector(m.mean)});
+  }
+
+  void AddPlans(FlightRecord* record) const {
+    for (const prediction_t& m : predictions_)
+      record->predictions.push_back({Time(m.utime), m.verdict != prediction_t::NO_TARGET,
+                                     bus::FromMessage(m.target, origin_)});
+    for (const plan_t& m : plans_)
+      record->plans.push_back({Time(m.utime), m.verdict, bus::FromMessage(m.position, origin_)});
+  }
+
+  void AddStatuses(FlightRecord* record) const {
+    for (const auto& [name, status] : statuses_) {
+      record->cpu_s[name] = status.cpu;
+      for (const stage_status_t& s : status.stages)
+        record->stages.push_back(
+            {name, s.name, static_cast<long>(s.count), s.mean_ms, s.p50_ms, s.p99_ms, s.max_ms});
+    }
+  }
+
+  void AddObstacles(FlightRecord* record) const {
+    if (!obstacles_) return;
+    for (const obstacle_t& m : obstacles_->obstacles) {
+      const world::Obstacle o = bus::FromMessage(m, origin_);
+      record->obstacles.push_back({o.center.Position(Time(obstacles_->utime)), o.shape, o.moving});
+    }
+  }
+
+  /// Logical time over the log's own stamps; a lockstep log's stamps are logical too, so it has
+  /// none worth the name.
+  void AddRealTimeFactor(FlightRecord* record) const {
+    const double logical = bus::Seconds(truth_.back().utime, truth_.front().utime);
+    const double logged = bus::Seconds(last_event_, first_event_.value_or(last_event_));
+    if (logged > 0.0) record->real_time_factor = logical / logged;
+  }
+
+  int64_t origin_ = 0;
+  std::optional<int64_t> first_event_;
+  int64_t last_event_ = 0;
+  std::vector<truth_t> truth_;
+  std::vector<pose_t> poses_;
+  std::vector<target_t> targets_;
+  std::vector<prediction_t> predictions_;
+  std::vector<plan_t> plans_;
+  std::optional<scenario_t> scenario_;
+  std::optional<obstacles_t> obstacles_;
+  std::map<std::string, status_t> statuses_;
+};
+
+}  // namespace
+
+FlightRecord ReadFlight(const std::string& log) {
+  LogReader reader(log);
+  Gatherer gatherer;
+  for (Event e; reader.Next(&e);) gatherer.Add(e);
+  return gatherer.Record(log);
+}
+
+}  // namespace chase::logs

@@ -1,0 +1,206 @@
+#include "logs/src/report_data.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+
+namespace chase::logs {
+namespace {
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+using world::Solid;
+
+constexpr double kPathStep = 0.1;     // s
+constexpr double kSeriesStep = 0.05;  // s
+constexpr double kFanStep = 0.5;      // s from fan to fan
+constexpr double kMoverStep = 5.0;    // s from outline to outline
+constexpr int kFanPoints = 16;
+constexpr int kCirclePoints = 48;
+
+/// Passes the first item and then each that is at least `step` later than the last passed.
+class Thinner {
+ public:
+  explicit Thinner(double step) : step_(step) {}
+  bool Pass(double t) {
+    if (t < next_) return false;
+    next_ = t + step_ - 1e-6;
+    return true;
+  }
+
+ private:
+  double step_, next_ = -1e300;
+};
+
+/// The unit circle under the linear map A, about c.
+Outline Ellipse(const Vector2d& c, const Eigen::Matrix2d& A) {
+  Outline out;
+  for (int i = 0; i < kCirclePoints; ++i) {
+    const double a = 2 * M_PI * i / kCirclePoints;
+    out.push_back(c + A * Vector2d(std::cos(a), std::sin(a)));
+  }
+  return out;
+}
+
+Outline Footprint(const Solid& s) {
+  const Eigen::Matrix2d turn = Eigen::Rotation2Dd(s.yaw).toRotationMatrix();
+  const Vector2d c = s.center.head<2>(), h = s.half_size.head<2>();
+  if (s.kind != Solid::Kind::kBox) return Ellipse(c, turn * h.asDiagonal());
+  Outline out;
+  for (const Vector2d& corner :
+       {Vector2d(1, 1), Vector2d(-1, 1), Vector2d(-1, -1), Vector2d(1, -1)})
+    out.push_back(c + turn * corner.cwiseProduct(h));
+  return out;
+}
+
+/// Shadow of an ellipsoid on the ground: the xy block of the inverse of R.
+Outline Shadow(const PerceivedObstacle& o) {
+  const Eigen::Matrix2d cov = o.shape.inverse().topLeftCorner<2, 2>();
+  return Ellipse(o.center.head<2>(), cov.llt().matrixL());
+}
+
+Outline Sampled(const world::Trajectory& trajectory) {
+  Outline out;
+  for (int i = 0; i <= kFanPoints; ++i)
+    out.push_back(
+        trajectory.Position(trajectory.start + trajectory.duration * i / kFanPoints).head<2>());
+  return out;
+}
+
+bool InMission(const FlightRecord& record, double t) {
+  return t >= 0.0 && t <= record.scenario.duration_s;
+}
+
+void AddWorld(const FlightRecord& record, ReportData* data) {
+  double highest = 0.0;
+  for (const TruthSample& s : record.truth) highest = std::max(highest, s.p.z());
+  for (const Solid& s : world::StaticSolids(record.scenario)) {
+    const bool above = s.center.z() - s.half_size.z() > highest;
+    (above ? data->crowns : data->solids).push_back(Footprint(s));
+  }
+  for (const auto& mover : record.scenario.movers)
+    for (double t = 0.0; t <= record.scenario.duration_s; t += kMoverStep)
+      data->movers.push_back(Footprint(world::MoverAt(mover, t).solid));
+  for (const PerceivedObstacle& o : record.obstacles) data->perceived.push_back(Shadow(o));
+}
+
+void AddPaths(const FlightRecord& record, ReportData* data) {
+  Thinner truth(kPathStep), pose(kPathStep), prediction(kFanStep), plan(kFanStep);
+  for (const TruthSample& s : record.truth) {
+    if (!InMission(record, s.t) || !truth.Pass(s.t)) continue;
+    data->chaser.push_back(s.p.head<2>());
+    data->target.push_back(s.target.head<2>());
+  }
+  for (const PoseSample& s : record.poses)
+    if (InMission(record, s.t) && pose.Pass(s.t)) data->estimated.push_back(s.p.head<2>());
+  for (const PredictionSample& s : record.predictions)
+    if (s.usable && InMission(record, s.t) && prediction.Pass(s.t))
+      data->predictions.push_back(Sampled(s.target));
+  for (const PlanSample& s : record.plans)
+    if (InMission(record, s.t) && plan.Pass(s.t)) data->plans.push_back(Sampled(s.position));
+}
+
+void Add(double t, double value, ReportData::Series* series) {
+  series->t.push_back(t);
+  series->value.push_back(value);
+}
+
+void AddSeries(const FlightRecord& record, const std::vector<SampleScore>& scores,
+               ReportData* data) {
+  Thinner score(kSeriesStep), truth(kSeriesStep);
+  for (const SampleScore& s : scores) {
+    if (!score.Pass(s.t)) continue;
+    Add(s.t, s.distance, &data->distance);
+    Add(s.t, s.clearance, &data->clearance);
+    Add(s.t, s.visible ? 1.0 : 0.0, &data->visible);
+  }
+  for (const TruthSample& s : record.truth) {
+    if (!InMission(record, s.t) || !truth.Pass(s.t)) continue;
+    Add(s.t, s.visible_share, &data->visible_share);
+    if (!s.target_in_image) continue;
+    Add(s.t, s.target_px.x(), &data->pixel_u);
+    Add(s.t, s.target_px.y(), &data->pixel_v);
+  }
+}
+
+void AddCosts(const FlightRecord& record, ReportData* data) {
+  data->stages = record.stages;
+  std::stable_sort(data->stages.begin(), data->stages.end(),
+                   [](const auto& a, const auto& b) { return a.mean_ms > b.mean_ms; });
+  if (record.truth.empty()) return;
+  const double flown = record.truth.back().t - record.truth.front().t;
+  for (const auto& [process, cpu] : record.cpu_s)
+    if (flown > 0.0) data->cpu_share.push_back({process, 100.0 * cpu / flown});
+}
+
+nlohmann::ordered_json Points(const Outline& outline, bool closed) {
+  nlohmann::ordered_json x = nlohmann::ordered_json::array(), y = x;
+  const auto add = [&](const Vector2d& p) {
+    x.push_back(std::round(p.x() * 1e3) / 1e3);
+    y.push_back(std::round(p.y() * 1e3) / 1e3);
+  };
+  for (const Vector2d& p : outline) add(p);
+  if (closed && !outline.empty()) add(outline.front());
+  return {{"x", x}, {"y", y}};
+}
+
+nlohmann::ordered_json Points(const std::vector<Outline>& outlines, bool closed) {
+  auto out = nlohmann::ordered_json::array();
+  for (const Outline& o : outlines) out.push_back(Points(o, closed));
+  return out;
+}
+
+nlohmann::ordered_json ToJson(const ReportData::Series& s) {
+  auto t = nlohmann::ordered_json::array(), value = t;
+  for (const double v : s.t) t.push_back(std::round(v * 1e3) / 1e3);
+  for (const double v : s.value) value.push_back(std::round(v * 1e4) / 1e4);
+  return {{"t", t}, {"value", value}};
+}
+
+}  // namespace
+
+ReportData PrepareReport(const FlightRecord& record, const std::vector<SampleScore>& scores) {
+  ReportData data;
+  data.title = record.scenario.name + ", seed " + std::to_string(record.seed);
+  data.desired_distance = record.scenario.chaser.desired_distance;
+  AddWorld(record, &data);
+  AddPaths(record, &data);
+  AddSeries(record, scores, &data);
+  AddCosts(record, &data);
+  return data;
+}
+
+nlohmann::ordered_json ToJson(const ReportData& d) {
+  nlohmann::ordered_json j;
+  j["title"] = d.title;
+  j["desired_distance"] = d.desired_distance;
+  j["image_px"] = {d.width_px, d.height_px};
+  j["solids"] = Points(d.solids, true);
+  j["crowns"] = Points(d.crowns, true);
+  j["movers"] = Points(d.movers, true);
+  j["perceived"] = Points(d.perceived, true);
+  j["chaser"] = Points(d.chaser, false);
+  j["target"] = Points(d.target, false);
+  j["estimated"] = Points(d.estimated, false);
+  j["predictions"] = Points(d.predictions, false);
+  j["plans"] = Points(d.plans, false);
+  j["distance"] = ToJson(d.distance);
+  j["clearance"] = ToJson(d.clearance);
+  j["visible"] = ToJson(d.visible);
+  j["visible_share"] = ToJson(d.visible_share);
+  j["pixel_u"] = ToJson(d.pixel_u);
+  j["pixel_v"] = ToJson(d.pixel_v);
+  j["stages"] = nlohmann::ordered_json::array();
+  for (const StageFigures& s : d.stages)
+    j["stages"].push_back({{"name", s.process + " " + s.stage},
+                           {"count", s.count},
+                           {"mean", s.mean_ms},
+                           {"p99", s.p99_ms},
+                           {"max", s.max_ms}});
+  j["cpu"] = nlohmann::ordered_json::array();
+  for (const NamedValue& c : d.cpu_share)
+    j["cpu"].push_back({{"name", c.name}, {"share", c.value}});
+  return j;
+}
+
+}  // namespace chase::logs

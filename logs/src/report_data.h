@@ -1,0 +1,38 @@
+#pragma once
+
+#include <nlohmann/json.hpp>
+
+#include "logs/src/metrics.h"
+
+namespace chase::logs {
+
+using Outline = std::vector<Eigen::Vector2d>;  ///< closed polygon seen from above, m
+
+struct NamedValue {
+  std::string name;
+  double value;
+};
+
+/// The series that the report's pictures show, thinned to what an eye can see.
+struct ReportData {
+  struct Series {
+    std::vector<double> t, value;
+  };
+
+  std::string title;
+  double desired_distance = 0.0;  ///< m
+  int width_px = 376, height_px = 240;
+  std::vector<Outline> solids, crowns, movers, perceived;
+  Outline chaser, target, estimated;        ///< paths, open
+  std::vector<Outline> predictions, plans;  ///< fans, open
+  Series distance, clearance, visible, visible_share;
+  Series pixel_u, pixel_v;            ///< of frames with the target in the image
+  std::vector<StageFigures> stages;   ///< slowest first
+  std::vector<NamedValue> cpu_share;  ///< processor time over flight time, per cent
+};
+
+ReportData PrepareReport(const FlightRecord& record, const std::vector<SampleScore>& scores);
+
+nlohmann::ordered_json ToJson(const ReportData& data);
+
+}  // namespace chase::logs

@@ -1,0 +1,243 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <random>
+
+#include "logs/src/estimate_errors.h"
+#include "logs/src/metrics.h"
+
+namespace chase::logs {
+namespace {
+
+using Eigen::Vector3d;
+
+/// One pillar at the origin; the chaser stands at p and the target at q for ten seconds.
+FlightRecord Standing(const Vector3d& p, const Vector3d& q) {
+  FlightRecord record;
+  record.scenario.duration_s = 10.0;
+  record.scenario.chaser.radius = 0.25;
+  record.scenario.chaser.desired_distance = 2.5;
+  record.scenario.world.cylinders.push_back({{0.0, 0.0}, 0.28, 3.0, 0.0});
+  for (int k = -100; k <= 1100; ++k) {
+    TruthSample s;
+    s.t = k * 0.01;
+    s.p = p;
+    s.target = q;
+    s.target_in_image = true;
+    record.truth.push_back(s);
+  }
+  return record;
+}
+
+TEST(Metrics, OnlyTheMissionCounts) {
+  FlightRecord record = Standing({3, 0, 1.5}, {5.5, 0, 1.5});
+  for (TruthSample& s : record.truth)
+    if (s.t < -1e-9 || s.t > 10.0 + 1e-9) s.p = Vector3d::Zero();  // inside the pillar
+  EXPECT_EQ(Score(record).size(), 1001u);
+  EXPECT_EQ(*Compute(record).safe_ratio, 1.0);
+}
+
+TEST(Metrics, ASphereThatTouchesIsNotSafe) {
+  const double touching = 0.28 + 0.25;
+  for (const double gap : {-0.01, 0.01}) {
+    const Metrics m = Compute(Standing({0, touching + gap, 1.5}, {0, 3.0, 1.5}));
+    EXPECT_EQ(*m.safe_ratio, gap > 0.0 ? 1.0 : 0.0);
+    EXPECT_NEAR(*m.min_clearance_m, gap, 1e-9);
+  }
+}
+
+TEST(Metrics, GroundAndTargetCountForClearanceButNotForSight) {
+  const Metrics low = Compute(Standing({5, 0, 0.2}, {8, 0, 0.5}));
+  EXPECT_EQ(*low.safe_ratio, 0.0);
+  EXPECT_NEAR(*low.min_clearance_m, -0.05, 1e-9);
+  const Metrics close = Compute(Standing({5, 0, 1.5}, {5.3, 0, 1.5}));
+  EXPECT_NEAR(*close.min_clearance_m, 0.3 - 0.15 - 0.25, 1e-9);
+  EXPECT_EQ(*close.visible_ratio, 1.0);
+}
+
+TEST(Metrics, ASegmentThroughThePillarIsBlind) {
+  EXPECT_EQ(*Compute(Standing({-2, 0, 1.5}, {2, 0, 1.5})).visible_ratio, 0.0);
+  EXPECT_EQ(*Compute(Standing({-2, 0.29, 1.5}, {2, 0.29, 1.5})).visible_ratio, 1.0);
+  EXPECT_EQ(*Compute(Standing({-2, 0.27, 1.5}, {2, 0.27, 1.5})).visible_ratio, 0.0);
+  EXPECT_EQ(*Compute(Standing({-2, 0, 5.5}, {2, 0, 5.5})).visible_ratio, 1.0);  // over its top
+}
+
+/// Random segments and points against dense sampling of the pillar.
+TEST(Metrics, ScoresAgreeWithDenseSampling) {
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> xy(-2.0, 2.0), z(0.6, 2.4);
+  for (int trial = 0; trial < 200; ++trial) {
+    const Vector3d p(xy(random), xy(random), z(random)), q(xy(random), xy(random), z(random));
+    FlightRecord record = Standing(p, q);
+    record.truth.resize(101);
+    const SampleScore score = Score(record).at(0);
+    double nearest_axis = 1e9;
+    for (int i = 0; i <= 2000; ++i)
+      nearest_axis = std::min(nearest_axis, (p + (q - p) * (i / 2000.0)).head<2>().norm());
+    const bool grazing = std::abs(nearest_axis - 0.28) < 2e-3;
+    EXPECT_TRUE(grazing || score.visible == (nearest_axis > 0.28)) << "trial " << trial;
+    const double pillar = p.head<2>().norm() - 0.28 - 0.25;
+    EXPECT_LE(score.clearance, pillar + 1e-9) << "trial " << trial;
+  }
+}
+
+TEST(Metrics, MoversBlockAndTouchWhereTheyAreAtTheTime) {
+  FlightRecord record = Standing({4, 0, 1.5}, {6, 0, 1.5});
+  world::MoverSpec mover;
+  mover.size = {0.5, 0.5, 0.5};
+  mover.waypoints = {{5, -5, 1.5}, {5, 5, 1.5}};
+  mover.speed = 1.0;
+  record.scenario.movers.push_back(mover);
+  double blocked = 0.0;
+  for (const TruthSample& s : record.truth) {
+    if (s.t < -1e-9 || s.t > 10.0 + 1e-9) continue;
+    const auto solid = world::MoverAt(mover, s.t).solid;
+    blocked += world::SegmentHits(solid, s.p, s.target) ? 1.0 : 0.0;
+  }
+  ASSERT_GT(blocked, 10.0);
+  EXPECT_NEAR(*Compute(record).visible_ratio, 1.0 - blocked / 1001.0, 1e-12);
+}
+
+/// The chaser circles at 2 m radius and 1 rad/s, facing along its path, about a target that is
+/// still but for a short drive.
+TEST(Metrics, FiguresOfACircleAreTheClosedForms) {
+  FlightRecord record = Standing({0, 0, 0}, {0, 0, 0});
+  record.scenario.world.cylinders.clear();
+  for (TruthSample& s : record.truth) {
+    const double t = s.t;
+    s.p = {2 * std::cos(t), 2 * std::sin(t), 5.0};
+    s.a = {-2 * std::cos(t), -2 * std::sin(t), 0.0};
+    s.yaw = std::remainder(t + M_PI / 2, 2 * M_PI);
+    s.target = {0.0, 0.0, 3.5 + 0.1 * t};
+  }
+  const Metrics m = Compute(record);
+  EXPECT_NEAR(*m.acceleration_cost, 4.0, 1e-9);
+  EXPECT_NEAR(*m.jerk_cost, 4.0, 1e-3);
+  EXPECT_NEAR(*m.yaw_rate_rms, 1.0, 1e-9);
+  EXPECT_NEAR(*m.travel_ratio, 20.0, 1e-3);
+  double ratio = 0.0, error = 0.0;
+  for (int k = 0; k <= 1000; ++k) {
+    const double d = std::hypot(2.0, 1.5 - 0.001 * k) / 2.5;
+    ratio += d / 1001.0;
+    error += std::abs(d - 1.0) / 1001.0;
+  }
+  EXPECT_NEAR(*m.distance_ratio, ratio, 1e-9);
+  EXPECT_NEAR(*m.distance_error, error, 1e-9);
+}
+
+TEST(Metrics, EstimatesAreComparedAtTheSameTime) {
+  FlightRecord record = Standing({0, 0, 0}, {0, 0, 0});
+  for (TruthSample& s : record.truth) {
+    s.p = {3 * std::cos(s.t), 3 * std::sin(s.t), s.t};
+    s.target = {s.t, 0, 1};
+  }
+  const Eigen::Isometry3d shift =
+      Eigen::Translation3d(0.3, 0.0, 0.4) * Eigen::AngleAxisd(0.0, Vector3d::UnitZ());
+  for (double t = 0.0025; t < 9.9; t += 0.005) {  // between the truth's samples too
+    record.poses.push_back({t, shift * Vector3d(3 * std::cos(t), 3 * std::sin(t), t)});
+    record.targets.push_back({t, true, Vector3d(t, 0.2, 1)});
+    record.targets.push_back({t, false, Vector3d(99, 99, 99)});
+  }
+  const Metrics m = Compute(record);
+  EXPECT_NEAR(*m.odometry_ate_m, 0.5, 1e-4);
+  EXPECT_NEAR(*m.odometry_ate_aligned_m, 0.0, 1e-4);
+  EXPECT_NEAR(*m.target_rmse_m, 0.2, 1e-9);
+}
+
+TEST(Metrics, PredictionsAreJudgedAtTheirHorizon) {
+  FlightRecord record = Standing({0, 0, 0}, {0, 0, 0});
+  for (TruthSample& s : record.truth) s.target = {0.5 * s.t * s.t, 0, 0};  // accelerates at 1
+  for (int k = 0; k < 8; ++k) {
+    PredictionSample p;
+    p.t = k;
+    p.usable = true;
+    p.target.start = k;
+    p.target.duration = 2.0;
+    p.target.coefficients = Eigen::MatrixXd::Zero(2, 3);
+    p.target.coefficients(0, 0) = 0.5 * k * k;
+    p.target.coefficients(1, 0) = k * 2.0;  // constant velocity
+    record.predictions.push_back(p);
+    p.usable = false;
+    p.target.coefficients.setConstant(77.0);
+    record.predictions.push_back(p);
+  }
+  const Metrics m = Compute(record);
+  EXPECT_NEAR(*m.prediction_error_m, 0.5, 1e-9);
+  EXPECT_NEAR(m.prediction_error_by_horizon_m.at(2.0), 2.0, 1e-9);
+  EXPECT_EQ(m.prediction_error_by_horizon_m.count(2.5), 0u);
+}
+
+TEST(Metrics, PlansAndStagesAreCounted) {
+  FlightRecord record = Standing({3, 0, 1.5}, {5.5, 0, 1.5});
+  const std::vector<std::pair<double, int>> plans = {{-0.5, 5}, {0.0, 0}, {1.0, 1},
+                                                     {2.0, 2},  {3.0, 3}, {4.0, 4}};
+  for (const auto& [t, verdict] : plans) record.plans.push_back({t, verdict, {}});
+  record.stages.push_back({"planning", "plan", 10, 1.0, 2.0, 3.0, 4.0});
+  const Metrics m = Compute(record);
+  EXPECT_EQ(m.replans, 5);
+  EXPECT_EQ(m.fallbacks, 3);
+  EXPECT_EQ(m.plan_ms->p99, 3.0);
+  EXPECT_FALSE(m.predict_ms);
+}
+
+TEST(Metrics, CriteriaFollowTheScenario) {
+  FlightRecord record = Standing({3, 0, 1.5}, {5.5, 0, 1.5});
+  record.scenario.criteria = {1.0, 0.95, 0.9, 1.2, 0.95};
+  record.real_time_factor = 0.99;
+  Metrics m = Compute(record);
+  EXPECT_TRUE(m.Passed());
+  EXPECT_EQ(m.criteria.size(), 6u);
+  record.real_time_factor = 0.9;
+  EXPECT_FALSE(Compute(record).criteria.at("real_time_factor"));
+  record.scenario.criteria.real_time_factor = -1.0;
+  EXPECT_TRUE(Compute(record).Passed());
+  record.scenario.criteria.distance_ratio_max = 0.9;
+  EXPECT_FALSE(Compute(record).criteria.at("distance_ratio_max"));
+}
+
+TEST(Metrics, AFlightThatStopsEarlyFails) {
+  FlightRecord record = Standing({3, 0, 1.5}, {5.5, 0, 1.5});
+  record.truth.resize(900);
+  const Metrics m = Compute(record);
+  EXPECT_EQ(*m.safe_ratio, 1.0);
+  EXPECT_FALSE(m.criteria.at("complete"));
+  EXPECT_FALSE(m.Passed());
+}
+
+TEST(Metrics, AnEmptyFlightHasNoFiguresAndFails) {
+  FlightRecord record;
+  const Metrics m = Compute(record);
+  EXPECT_FALSE(m.safe_ratio);
+  EXPECT_FALSE(m.Passed());
+  const auto json = nlohmann::json::parse(MetricsJson(record, m));
+  EXPECT_TRUE(json.at("safe_ratio").is_null());
+}
+
+TEST(Metrics, JsonHasTheAgreedKeys) {
+  const FlightRecord record = Standing({3, 0, 1.5}, {5.5, 0, 1.5});
+  const auto json = nlohmann::json::parse(MetricsJson(record, Compute(record)));
+  for (const char* key :
+       {"safe_ratio", "min_clearance_m", "visible_ratio", "in_image_ratio", "distance_ratio",
+        "distance_error", "travel_ratio", "acceleration_cost", "jerk_cost", "yaw_rate_rms",
+        "plan_ms", "predict_ms", "replans", "fallbacks", "odometry_ate_m", "target_rmse_m",
+        "prediction_error_m", "cpu_s", "criteria"})
+    EXPECT_TRUE(json.contains(key)) << key;
+}
+
+TEST(TruthAt, InterpolatesOnlyOverSmallGaps) {
+  std::vector<TruthSample> truth(3);
+  truth[0].t = 0.0;
+  truth[1].t = 0.01;
+  truth[1].p.x() = 1.0;
+  truth[2].t = 5.0;
+  EXPECT_NEAR(TruthAt(truth, 0.0025)->body.x(), 0.25, 1e-12);
+  EXPECT_FALSE(TruthAt(truth, 1.0));
+  EXPECT_FALSE(TruthAt(truth, -1.0));
+  EXPECT_FALSE(TruthAt(truth, 6.0));
+  EXPECT_TRUE(TruthAt(truth, 5.0));
+  EXPECT_FALSE(TruthAt({}, 0.0));
+}
+
+}  // namespace
+}  // namespace chase::logs

@@ -1,0 +1,290 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <sstream>
+
+#include "chase/imu_t.hpp"
+#include "chase/obstacles_t.hpp"
+#include "chase/pose_t.hpp"
+#include "logs/src/diff.h"
+#include "logs/src/export.h"
+#include "logs/src/import.h"
+#include "logs/src/info.h"
+#include "logs/src/log_reader.h"
+#include "logs/src/message_fields.h"
+#include "logs/src/output.h"
+
+namespace chase::logs {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string Temp(const std::string& name) {
+  const fs::path file = fs::path(::testing::TempDir()) / ("chase_logs_" + name);
+  fs::remove_all(file);
+  return file.string();
+}
+
+std::string WriteText(const std::string& name, const std::string& text) {
+  const std::string file = Temp(name);
+  std::ofstream(file, std::ios::binary) << text;
+  return file;
+}
+
+std::string ReadText(const std::string& file) {
+  std::ifstream in(file, std::ios::binary);
+  std::ostringstream text;
+  text << in.rdbuf();
+  return text.str();
+}
+
+std::string ErrorOf(const std::function<void()>& call) {
+  try {
+    call();
+  } catch (const std::runtime_error& e) {
+    return e.what();
+  }
+  return "";
+}
+
+imu_t Imu(int k) {
+  imu_t m{};
+  m.utime = 5000 * k;
+  m.seq = k;
+  m.accel[2] = 9.81;
+  m.gyro[0] = 0.1 * k;
+  return m;
+}
+
+obstacles_t Obstacles(int count) {
+  obstacles_t m{};
+  m.n_obstacles = count;
+  for (int i = 0; i < count; ++i) {
+    obstacle_t o{};
+    o.id = 10 + i;
+    o.center.duration = 1.0;
+    o.center.n_coefficients = 3;
+    o.center.coefficients = {1.0 * i, 2.0, 3.0};
+    m.obstacles.push_back(o);
+  }
+  return m;
+}
+
+/// 20 IMU samples, one of them changed by `change`, and a few obstacle lists.
+std::string WriteLog(const std::string& name, const std::function<void(int, imu_t*)>& change = {},
+                     int imus = 20) {
+  const std::string file = Temp(name);
+  OutputLog log(file);
+  for (int k = 0; k < imus; ++k) {
+    imu_t m = Imu(k);
+    if (change) change(k, &m);
+    log.Write(m.utime, "IMU", m);
+    if (k % 5 == 0) log.Write(m.utime, "OBSTACLES", Obstacles(k / 5));
+  }
+  log.Close();
+  return file;
+}
+
+Bytes Encoded(const obstacles_t& m) {
+  Bytes bytes(static_cast<size_t>(m.getEncodedSize()));
+  m.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
+  return bytes;
+}
+
+const Field* Find(const std::vector<Field>& fields, const std::string& path) {
+  for (const Field& f : fields)
+    if (f.path == path) return &f;
+  return nullptr;
+}
+
+TEST(MessageFields, NestedListsAreFlattenedInOrder) {
+  const Bytes bytes = Encoded(Obstacles(2));
+  EXPECT_EQ(TypeOf(bytes), "obstacles_t");
+  const auto fields = FieldsOf(bytes);
+  ASSERT_TRUE(fields);
+  EXPECT_EQ(Find(*fields, "n_obstacles")->numbers, std::vector<double>({2}));
+  EXPECT_EQ(Find(*fields, "obstacles.id")->numbers, std::vector<double>({10, 11}));
+  EXPECT_EQ(Find(*fields, "obstacles.center.coefficients")->numbers,
+            std::vector<double>({0, 2, 3, 1, 2, 3}));
+  EXPECT_TRUE(Find(*fields, "obstacles.id")->is_list);
+  EXPECT_FALSE(Find(*fields, "utime")->is_list);
+}
+
+TEST(MessageFields, ForeignTruncatedAndNegativeLengthsAreRefused) {
+  EXPECT_EQ(TypeOf({1, 2, 3}), "");
+  EXPECT_EQ(TypeOf(Bytes(64, 7)), "");
+  Bytes bytes = Encoded(Obstacles(2));
+  for (size_t n = 8; n < bytes.size(); n += 7)
+    EXPECT_FALSE(FieldsOf({bytes.begin(), bytes.begin() + static_cast<long>(n)}));
+  std::fill(bytes.begin() + 20, bytes.begin() + 24, 0xff);  // n_obstacles = -1
+  EXPECT_FALSE(FieldsOf(bytes));
+}
+
+TEST(LogInfo, CountsAndTypesEveryChannel) {
+  const LogInfo info = Describe(WriteLog("info.lcm"));
+  ASSERT_EQ(info.channels.size(), 2u);
+  EXPECT_EQ(info.channels[0].channel, "IMU");
+  EXPECT_EQ(info.channels[0].type, "imu_t");
+  EXPECT_EQ(info.channels[0].count, 20);
+  EXPECT_NEAR(info.channels[0].RateHz(), 200.0, 1e-9);
+  EXPECT_EQ(info.channels[1].count, 4);
+  EXPECT_EQ(info.unread_bytes, 0);
+}
+
+TEST(LogInfo, ALogCutOffAnywhereIsReadAsFarAsItGoes) {
+  const std::string whole = ReadText(WriteLog("whole.lcm"));
+  for (size_t n = 4; n < whole.size(); n += 101) {
+    const LogInfo info = Describe(WriteText("cut.lcm", whole.substr(0, n)));
+    long count = 0;
+    for (const auto& c : info.channels) count += c.count;
+    EXPECT_LT(count, 24);
+    EXPECT_GE(info.unread_bytes, 0);
+  }
+}
+
+TEST(LogInfo, WhatIsNoLogIsRefusedInOneLine) {
+  EXPECT_NE(ErrorOf([] { Describe("/nonexistent.lcm"); }).find("no such file"), std::string::npos);
+  EXPECT_NE(ErrorOf([] { Describe(WriteText("t.lcm", "text")); }).find("no LCM log"),
+            std::string::npos);
+  EXPECT_NE(ErrorOf([] { Describe(WriteText("e.lcm", "")); }).find("empty"), std::string::npos);
+  EXPECT_NE(ErrorOf([] { Describe("/tmp"); }).find("no such file"), std::string::npos);
+}
+
+TEST(LogDiff, EqualLogsDoNotDiffer) {
+  EXPECT_TRUE(Diff(WriteLog("a.lcm"), WriteLog("b.lcm"), {}).empty());
+}
+
+TEST(LogDiff, OneChangedFieldIsFoundAndCanBeIgnored) {
+  const std::string a = WriteLog("a.lcm");
+  const std::string b = WriteLog("b.lcm", [](int k, imu_t* m) {
+    if (k == 7) m->gyro[1] += 0.25;
+  });
+  const auto d = Diff(a, b, {});
+  ASSERT_EQ(d.size(), 1u);
+  const auto& field = d.at("IMU").fields.at("gyro");
+  EXPECT_EQ(d.at("IMU").fields.size(), 1u);
+  EXPECT_EQ(field.messages, 1);
+  EXPECT_EQ(field.first, 7);
+  EXPECT_DOUBLE_EQ(field.greatest, 0.25);
+  EXPECT_NE(Format(d).find("gyro"), std::string::npos);
+  EXPECT_TRUE(Diff(a, b, {"IMU.gyro"}).empty());
+  EXPECT_TRUE(Diff(a, b, {"IMU"}).empty());
+  EXPECT_TRUE(Diff(a, b, {"I*.g*"}).empty());
+  EXPECT_FALSE(Diff(a, b, {"IMU.accel"}).empty());
+}
+
+TEST(LogDiff, MissingMessagesAndShiftedStampsAreFound) {
+  const auto fewer = Diff(WriteLog("a.lcm"), WriteLog("b.lcm", {}, 18), {});
+  ASSERT_EQ(fewer.size(), 1u);
+  EXPECT_EQ(fewer.at("IMU").count_a, 20);
+  EXPECT_EQ(fewer.at("IMU").count_b, 18);
+  const auto later =
+      Diff(WriteLog("a.lcm"), WriteLog("b.lcm", [](int, imu_t* m) { m->utime++; }), {});
+  EXPECT_EQ(later.at("IMU").fields.at("event_time").messages, 20);
+  EXPECT_EQ(later.at("IMU").fields.at("utime").messages, 20);
+}
+
+TEST(LogDiff, NotANumberEqualsItself) {
+  const auto nan = [](int, imu_t* m) { m->gyro[2] = NAN; };
+  EXPECT_TRUE(Diff(WriteLog("a.lcm", nan), WriteLog("b.lcm", nan), {}).empty());
+  const auto d = Diff(WriteLog("a.lcm", nan), WriteLog("b.lcm"), {});
+  EXPECT_TRUE(std::isinf(d.at("IMU").fields.at("gyro").greatest));
+}
+
+TEST(LogExport, TumHasOneLinePerPose) {
+  const std::string log = Temp("pose.lcm"), out = Temp("pose.tum");
+  OutputLog writer(log);
+  pose_t pose{};
+  pose.utime = 1'500'000;
+  pose.pos[0] = 1.0;
+  pose.pos[1] = -2.0;
+  pose.orientation[0] = 0.6;
+  pose.orientation[3] = 0.8;
+  writer.Write(pose.utime, "POSE", pose);
+  writer.Close();
+  EXPECT_EQ(ExportTum(log, out), 1);
+  EXPECT_EQ(ReadText(out),
+            "1.500000 1.000000 -2.000000 0.000000 0.000000000 0.000000000 0.800000000 "
+            "0.600000000\n");
+  EXPECT_NE(ErrorOf([] { ExportTum(WriteLog("n.lcm"), Temp("n.tum")); }).find("no POSE"),
+            std::string::npos);
+}
+
+TEST(LogExport, CsvRowsLineUpWithTheHeader) {
+  const std::string folder = Temp("csv");
+  EXPECT_EQ(ExportCsv(WriteLog("c.lcm"), folder, ""), 2);
+  for (const char* name : {"IMU.csv", "OBSTACLES.csv"}) {
+    std::istringstream text(ReadText((fs::path(folder) / name).string()));
+    std::string line;
+    std::getline(text, line);
+    const auto columns = std::count(line.begin(), line.end(), ',');
+    int rows = 0;
+    for (; std::getline(text, line); ++rows)
+      EXPECT_EQ(std::count(line.begin(), line.end(), ','), columns) << line;
+    EXPECT_EQ(rows, std::string(name) == "IMU.csv" ? 20 : 4);
+  }
+  const std::string obstacles = ReadText((fs::path(folder) / "OBSTACLES.csv").string());
+  EXPECT_NE(obstacles.find(",10 11 12,"), std::string::npos);
+}
+
+TEST(LogImport, KittiTimesFollowTheAzimuthAndRingZeroIsLowest) {
+  const auto put = [](std::vector<uint8_t>* out, int x, int y, int ring) {
+    for (const int v : {x, y, 0})
+      for (const int shift : {0, 8}) out->push_back(static_cast<uint8_t>((v >> shift) & 0xff));
+    out->push_back(99);
+    out->push_back(static_cast<uint8_t>(ring));
+  };
+  std::vector<uint8_t> records;
+  put(&records, 0, -1000, 0);  // right
+  put(&records, 1000, 0, 15);  // forward
+  put(&records, -1000, 1, 3);  // behind, on the left: the sweep's start
+  put(&records, 0, 1000, 8);   // left
+  const lidar_scan_t scan = KittiScan(records.data(), 4, 300000);
+  ASSERT_EQ(scan.size, 4);
+  EXPECT_EQ(scan.utime, 300000);
+  const float expected[] = {0.0f, 0.025f, 0.05f, 0.075f};
+  for (size_t i = 0; i < 4; ++i) EXPECT_NEAR(scan.t[i], expected[i], 2e-4);
+  EXPECT_NEAR(scan.x[0], -4.0, 1e-6);
+  EXPECT_EQ(scan.ring[0], 12);
+  EXPECT_EQ(scan.ring[2], 0);
+  EXPECT_EQ(scan.ring[3], 15);
+  EXPECT_EQ(scan.intensity[1], 99);
+}
+
+TEST(LogImport, DamagedKittiFilesLeaveNoOutput) {
+  const std::string out = Temp("kitti.lcm");
+  const std::string header("\x05\0\0\0", 4);
+  EXPECT_NE(
+      ErrorOf([&] { ImportKitti16(WriteText("k.bin", header + "abc"), out); }).find("frame 0"),
+      std::string::npos);
+  EXPECT_NE(ErrorOf([&] { ImportKitti16(WriteText("k.bin.xz", "no xz"), out); }).find("damaged"),
+            std::string::npos);
+  EXPECT_NE(ErrorOf([&] { ImportKitti16("/nonexistent", out); }).find("no such file"),
+            std::string::npos);
+  EXPECT_FALSE(fs::exists(out));
+  EXPECT_FALSE(fs::exists(out + ".tmp"));
+}
+
+TEST(LogImport, RealRecordings) {
+  const fs::path data = "../shared/data";
+  if (!fs::exists(data / "vlp16") || !fs::exists(data / "kitti"))
+    GTEST_SKIP() << "skipped: real recordings not present";
+  const std::string out = Temp("real.lcm");
+  EXPECT_EQ(ImportVlp16((data / "vlp16/einride_recording.bin").string(), out), 13);
+  EXPECT_EQ(Describe(out).channels.at(0).count, 13);
+  fs::remove(out);
+  const std::string refused =
+      ErrorOf([&] { ImportVlp16((data / "vlp16/mrpt_sample_velodyne_hdl32.pcap").string(), out); });
+  EXPECT_NE(refused.find("HDL-32E"), std::string::npos) << refused;
+  EXPECT_FALSE(fs::exists(out));
+  EXPECT_FALSE(fs::exists(out + ".tmp"));
+  EXPECT_EQ(ImportKitti16((data / "kitti/raw_2011_09_26_drive_0005_16ring.bin.xz").string(), out),
+            154);
+  EXPECT_EQ(Describe(out).channels.at(0).count, 154);
+}
+
+}  // namespace
+}  // namespace chase::logs
