@@ -120,6 +120,53 @@ Integers WithoutEndRoots(Integers p) {
   return p;
 }
 
+// n! times the Bernstein coefficients of degree n of the polynomial (of lower or equal degree).
+Integers ScaledBernstein(const Integers& p, int n) {
+  std::vector<Integer> factorial = {1};
+  for (int k = 1; k <= n; ++k) factorial.push_back(factorial.back() * k);
+  const auto choose = [&](int a, int b) {
+    return Integer(factorial[static_cast<size_t>(a)] /
+                   (factorial[static_cast<size_t>(b)] * factorial[static_cast<size_t>(a - b)]));
+  };
+  Integers b(static_cast<size_t>(n) + 1, Integer(0));
+  for (int j = 0; j <= n; ++j)
+    for (int k = 0; k <= std::min(j, Degree(p)); ++k)
+      b[static_cast<size_t>(j)] += p[static_cast<size_t>(k)] * choose(j, k) *
+                                   (factorial[static_cast<size_t>(n)] / choose(n, k));
+  return b;
+}
+
+// 2^n times the Bernstein coefficients of both halves.
+void Halve(const Integers& b, Integers* left, Integers* right) {
+  *right = b;
+  left->assign(b.size(), Integer(0));
+  const size_t n = b.size() - 1;
+  for (size_t k = 0; k <= n; ++k) {
+    for (size_t i = 0; k > 0 && i <= n - k; ++i) (*right)[i] += (*right)[i + 1];
+    (*left)[k] = (*right)[0] << static_cast<unsigned>(n - k);
+  }
+  for (size_t i = 0; i <= n; ++i) (*right)[i] <<= static_cast<unsigned>(i);
+}
+
+// P, Q, S to a common scale in Bernstein form, P and Q positive everywhere.
+Positivity DecideSight(const Integers& P, const Integers& Q, const Integers& S, int depth) {
+  const Integer s = *std::min_element(S.begin(), S.end());
+  if (s > 0) return Positivity::kPositive;
+  const Integer p = *std::min_element(P.begin(), P.end());
+  const Integer q = *std::min_element(Q.begin(), Q.end());
+  if (p > 0 && q > 0 && p * q > s * s) return Positivity::kPositive;
+  for (size_t e : {size_t{0}, P.size() - 1})
+    if (S[e] <= 0 && P[e] * Q[e] <= S[e] * S[e]) return Positivity::kNotPositive;
+  if (depth == 0) return Positivity::kUndecided;
+  Integers halves[2][3];
+  Halve(P, &halves[0][0], &halves[1][0]);
+  Halve(Q, &halves[0][1], &halves[1][1]);
+  Halve(S, &halves[0][2], &halves[1][2]);
+  const Positivity first = DecideSight(halves[0][0], halves[0][1], halves[0][2], depth - 1);
+  if (first != Positivity::kPositive) return first;
+  return DecideSight(halves[1][0], halves[1][1], halves[1][2], depth - 1);
+}
+
 Integers Scaled(const ExactPolynomial& p, int exponent) {
   Integers r = p.c;
   for (Integer& x : r) x <<= static_cast<unsigned>(p.exponent - exponent);
@@ -135,6 +182,18 @@ ExactPolynomial Combine(const ExactPolynomial& a, const ExactPolynomial& b, int 
   r.c.resize(std::max(r.c.size(), other.size()), Integer(0));
   for (size_t k = 0; k < other.size(); ++k) r.c[k] += sign * other[k];
   return r;
+}
+
+Positivity DecideSightBySubdivision(const ExactPolynomial& P, const ExactPolynomial& Q,
+                                    const ExactPolynomial& S) {
+  constexpr int kDepth = 24;
+  const int exponent = S.c.empty() ? std::min(P.exponent, Q.exponent)
+                                   : std::min({P.exponent, Q.exponent, S.exponent});
+  const size_t n = std::max({P.c.size(), Q.c.size(), S.c.size()}) - 1;
+  const auto bernstein = [&](const ExactPolynomial& p) {
+    return ScaledBernstein(Scaled(p, exponent), static_cast<int>(n));
+  };
+  return DecideSight(bernstein(P), bernstein(Q), bernstein(S), kDepth);
 }
 
 }  // namespace
@@ -199,11 +258,14 @@ bool IsPositive(const Polynomial& p) {
 bool IsSightClearExact(const ExactPolynomial& P, const ExactPolynomial& Q,
                        const ExactPolynomial& S) {
   if (!IsPositiveExact(P) || !IsPositiveExact(Q)) return false;
+  const Positivity decided = DecideSightBySubdivision(P, Q, S);
+  if (decided != Positivity::kUndecided) return decided == Positivity::kPositive;
   const ExactPolynomial W = P * Q - S * S;
   if (SignAtZero(S) <= 0 && SignAtZero(W) <= 0) return false;
   if (SignAtOne(S) <= 0 && SignAtOne(W) <= 0) return false;
-  // The set { S <= 0, W <= 0 } is closed and, W being P Q > 0 where S = 0, starts at a root of W
-  // with S < 0. It is empty when S > 0 at every root of W inside.
+  // Subdivision does not end where S < 0 and P Q touches S^2. The set { S <= 0, W <= 0 } is closed
+  // and, W being P Q > 0 where S = 0, starts at a root of W with S < 0. It is empty when S > 0 at
+  // every root of W inside.
   const Integers inside = WithoutEndRoots(W.c);
   if (inside.empty()) return true;  // W = 0: S = +-sqrt(PQ) keeps its sign, positive at 0
   Integers s = S.c;

@@ -31,7 +31,7 @@ class Item {
     if (!Has(key)) Fail(std::string("missing key '") + key + "'");
     return {*origin_, node_[key], path_.empty() ? key : path_ + "." + key};
   }
-  Item operator[](std::size_t i) const {
+  Item At(std::size_t i) const {
     return {*origin_, node_[i], path_ + "[" + std::to_string(i) + "]"};
   }
 
@@ -58,7 +58,7 @@ class Item {
 
   Eigen::Vector3d Vector3() const {
     Length(3, 3, "numbers");
-    return {(*this)[0].Number(), (*this)[1].Number(), (*this)[2].Number()};
+    return {At(0).Number(), At(1).Number(), At(2).Number()};
   }
 
   /// A list of rows, or a map with that list under `coefficients`.
@@ -70,7 +70,7 @@ class Item {
     const std::size_t n = Length(1, kMaxSceneDegree + 1, "coefficient rows [x, y, z]");
     Eigen::Matrix<double, Eigen::Dynamic, 3> rows(static_cast<Eigen::Index>(n), 3);
     for (std::size_t k = 0; k < n; ++k)
-      rows.row(static_cast<Eigen::Index>(k)) = (*this)[k].Vector3().transpose();
+      rows.row(static_cast<Eigen::Index>(k)) = At(k).Vector3().transpose();
     return rows;
   }
 
@@ -79,11 +79,10 @@ class Item {
     Eigen::Matrix3d m;
     if (node_.IsSequence() && node_.size() == 9)
       for (std::size_t i = 0; i < 9; ++i)
-        m(static_cast<int>(i / 3), static_cast<int>(i % 3)) = (*this)[i].Number();
+        m(static_cast<int>(i / 3), static_cast<int>(i % 3)) = At(i).Number();
     else {
       Length(3, 3, "rows of 3 numbers");
-      for (std::size_t i = 0; i < 3; ++i)
-        m.row(static_cast<int>(i)) = (*this)[i].Vector3().transpose();
+      for (std::size_t i = 0; i < 3; ++i) m.row(static_cast<int>(i)) = At(i).Vector3().transpose();
     }
     if ((m - m.transpose()).cwiseAbs().maxCoeff() > 1e-9 * m.cwiseAbs().maxCoeff())
       Fail("is not symmetric");
@@ -154,12 +153,12 @@ Scene Read(const Item& root) {
     const Item list = root["obstacles"];
     const std::size_t n = list.Length(0, kMaxSceneObstacles, "obstacles");
     for (std::size_t i = 0; i < n; ++i)
-      scene.obstacles.push_back(ReadObstacle(list[i], scene.horizon_s, static_cast<int>(i)));
+      scene.obstacles.push_back(ReadObstacle(list.At(i), scene.horizon_s, static_cast<int>(i)));
   }
   if (root.Has("observations")) {
     const Item list = root["observations"];
     const std::size_t n = list.Length(1, 1000, "observations");
-    for (std::size_t i = 0; i < n; ++i) scene.observations.push_back(ReadObservation(list[i]));
+    for (std::size_t i = 0; i < n; ++i) scene.observations.push_back(ReadObservation(list.At(i)));
   }
   if (root.Has("planner")) scene.planner = root["planner"].Text();
   if (root.Has("predictor")) scene.predictor = root["predictor"].Text();
