@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 #include <sys/wait.h>
 
+#include <Eigen/Geometry>
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <iterator>
@@ -57,7 +59,8 @@ void Begin(Script* s, const std::string& file, const std::string& title, int wid
   s->Line("set title " + Quoted(title) + " noenhanced");
   s->Line("set grid lc rgb '#e3e6ea' lt 1");
   s->Line("set border lc rgb '#60656d'");
-  s->Line("set key noenhanced");
+  s->Line("set key noenhanced tmargin center horizontal samplen 2.5");
+  s->Line("set style fill solid 0.85");
 }
 
 void RunGnuplot(const std::string& script) {
@@ -88,8 +91,20 @@ void Picture(const std::string& folder, const std::string& name, Draw draw) {
   std::filesystem::rename(temporary, file);
 }
 
+/// Height of the picture that leaves no empty bands above and below equal axes, px.
+int TopViewHeight(const ReportData& d, int width) {
+  constexpr int kFrame = 130;  // title, key, tics and labels
+  Eigen::AlignedBox2d box;
+  for (const auto& outlines : {d.solids, d.movers, {d.chaser, d.target}})
+    for (const Outline& o : outlines)
+      for (const auto& p : o) box.extend(p);
+  const double ratio = box.sizes().y() / std::max(box.sizes().x(), 1.0);
+  return kFrame + std::clamp(static_cast<int>(ratio * width), 300, 1300);
+}
+
 void TopView(const ReportData& d, Script* s, const std::string& file) {
-  Begin(s, file, d.title + ": top view", 1100, 900);
+  const int width = 1100;
+  Begin(s, file, d.title + ": top view", width, TopViewHeight(d, width));
   s->Block("solids", d.solids, true);
   s->Block("crowns", d.crowns, true);
   s->Block("movers", d.movers, true);
@@ -98,7 +113,6 @@ void TopView(const ReportData& d, Script* s, const std::string& file) {
   s->Block("target", {d.target}, false);
   s->Block("ends", {{d.chaser.front()}, {d.target.front()}}, false);
   s->Line("set size ratio -1; set xlabel 'x, east [m]'; set ylabel 'y, north [m]'");
-  s->Line("set key outside bottom center horizontal");
   std::string plot = "plot ";
   if (!d.crowns.empty()) plot += "$crowns with lines lc rgb '#a9c9a4' title 'crowns', ";
   if (!d.solids.empty())
@@ -107,8 +121,8 @@ void TopView(const ReportData& d, Script* s, const std::string& file) {
     plot += "$movers with lines dt 2 lc rgb '#9c27b0' title 'movers, every 5 s', ";
   if (!d.predictions.empty())
     plot += "$predictions with lines lc rgb '#f6c08a' title 'predictions', ";
-  plot += fmt::format("$target with lines lw 2.5 lc rgb '{}' title 'target', ", kTarget);
-  plot += fmt::format("$chaser with lines lw 2.5 lc rgb '{}' title 'chaser', ", kChaser);
+  plot += fmt::format("$chaser with lines lw 3 lc rgb '{}' title 'chaser', ", kChaser);
+  plot += fmt::format("$target with lines lw 1.8 lc rgb '{}' title 'target', ", kTarget);
   plot += "$ends with points pt 7 ps 1.3 lc rgb '#202020' title 'start'";
   s->Line(plot);
 }
@@ -128,7 +142,6 @@ void Visibility(const ReportData& d, Script* s, const std::string& file) {
   s->Block("visible", d.visible);
   s->Block("share", d.visible_share);
   s->Line("set xlabel 'mission time [s]'; set ylabel 'share'; set yrange [0:1.08]");
-  s->Line("set key outside bottom center horizontal");
   s->Line(
       fmt::format("plot $visible using 1:(1-$2) with fillsteps fc rgb '#e89a9a' title 'line of "
                   "sight blocked', $share with lines lw 1.6 lc rgb '{}' title 'visible share of "
@@ -167,7 +180,7 @@ void Bars(Script* s, const std::vector<NamedValue>& bars, const std::string& lab
   for (size_t i = 0; i < bars.size(); ++i)
     s->Line(fmt::format("{} {:.5g} \"{}\"", i, bars[i].value, bars[i].name));
   s->Line("EOD");
-  s->Line("set style fill solid 0.85; set boxwidth 0.7; unset key; set yrange [0:*]");
+  s->Line("set boxwidth 0.7; unset key; set yrange [0:*]");
   s->Line("set xtics rotate by -35 noenhanced; set ylabel " + Quoted(label));
   s->Line(fmt::format("set xrange [-0.6:{}]", static_cast<double>(bars.size()) - 0.4));
 }
@@ -177,7 +190,7 @@ void Stages(const ReportData& d, Script* s, const std::string& file) {
   std::vector<NamedValue> means;
   for (const StageFigures& f : d.stages) means.push_back({f.process + " " + f.stage, f.mean_ms});
   Bars(s, means, "time per call [ms]");
-  s->Line("set key top right; set yrange [*:*]; set logscale y");
+  s->Line("set key on; set yrange [*:*]; set logscale y");
   s->Line("$p99 << EOD");
   for (size_t i = 0; i < d.stages.size(); ++i) s->Row(static_cast<double>(i), d.stages[i].p99_ms);
   s->Line("EOD");

@@ -1,3 +1,4 @@
 chase_test(camera_test
-  LIBS camera_core camera_source
-  SOURCES ${CMAKE_CURRENT_LIST_DIR}/camera_test.cpp)
+  LIBS camera_core camera_source camera_node
+  SOURCES ${CMAKE_CURRENT_LIST_DIR}/camera_test.cpp
+          ${CMAKE_CURRENT_LIST_DIR}/camera_node_test.cpp)

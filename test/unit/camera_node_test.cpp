@@ -1,0 +1,53 @@
+#include "services/camera/camera_node.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <opencv2/imgcodecs.hpp>
+
+#include "chase/camera_image_t.hpp"
+#include "common/bus/lockstep.h"
+
+namespace chase::camera {
+namespace {
+
+namespace fs = std::filesystem;
+
+TEST(CameraNode, AFolderIsPublishedAtTheRateAndThenItIsDone) {
+  const fs::path folder = fs::path(::testing::TempDir()) / "camera_node";
+  fs::remove_all(folder);
+  fs::create_directories(folder);
+  for (int k = 0; k < 4; ++k)
+    cv::imwrite((folder / ("f" + std::to_string(k) + ".png")).string(),
+                cv::Mat(480, 752, CV_8UC3, cv::Scalar(0, 0, 40 * k)));
+  CameraConfig config;
+  config.source = folder.string();
+  std::vector<camera_image_t> images;
+  const bus::Node* node = nullptr;
+  bus::Lockstep lockstep(1'000'000);
+  lockstep.Add("camera", 0, [&](bus::Bus& bus) {
+    auto made = std::make_unique<CameraNode>(bus, config);
+    node = made.get();
+    return made;
+  });
+  lockstep.SetTap([&](int64_t, const std::string& channel, const bus::Bus::Bytes& bytes) {
+    camera_image_t image;
+    if (channel == "CAMERA_IMAGE" &&
+        image.decode(bytes.data(), 0, static_cast<int>(bytes.size())) > 0)
+      images.push_back(image);
+  });
+  lockstep.RunUntil(1'500'000);
+  ASSERT_EQ(images.size(), 4u);
+  for (size_t k = 0; k < images.size(); ++k) {
+    EXPECT_EQ(images[k].width, 376);
+    EXPECT_EQ(images[k].height, 240);
+    EXPECT_EQ(images[k].size, 3 * 376 * 240);
+    EXPECT_EQ(images[k].data[0], 40 * k);  // red comes first
+    EXPECT_EQ(images[k].data[2], 0);
+    EXPECT_EQ(images[k].utime, images[0].utime + 50'000 * static_cast<int64_t>(k));
+  }
+  EXPECT_TRUE(node->Done());
+}
+
+}  // namespace
+}  // namespace chase::camera

@@ -1,0 +1,88 @@
+#include "services/lidar/lidar_node.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "chase/lidar_scan_t.hpp"
+#include "common/bus/lockstep.h"
+#include "lidar_packets.h"
+
+namespace chase::lidar {
+namespace {
+
+constexpr int64_t kStart = 50'000'000;
+
+std::string WritePackets(const std::string& name, int packets, uint8_t product = 0x22) {
+  const std::string file = ::testing::TempDir() + name;
+  std::ofstream out(file, std::ios::binary);
+  for (int k = 0; k < packets; ++k) {
+    auto bytes = testing::StreamPacket(k, 150.0, 777000);
+    bytes[1205] = product;
+    out.write(reinterpret_cast<const char*>(bytes.data()), static_cast<long>(bytes.size()));
+  }
+  return file;
+}
+
+struct Flown {
+  std::vector<std::pair<int64_t, lidar_scan_t>> scans;
+  bool done = false;
+  bus::NodeReport report;
+};
+
+Flown Fly(const std::string& file, int64_t duration_us) {
+  Flown flown;
+  LidarConfig config;
+  config.source = file;
+  bus::Lockstep lockstep(kStart);
+  const bus::Node* node = nullptr;
+  lockstep.Add("lidar", 0, [&](bus::Bus& bus) {
+    auto made = std::make_unique<LidarNode>(bus, config);
+    node = made.get();
+    return made;
+  });
+  lockstep.SetTap([&](int64_t utime, const std::string& channel, const bus::Bus::Bytes& bytes) {
+    lidar_scan_t scan;
+    if (channel == "LIDAR_SCAN" && scan.decode(bytes.data(), 0, static_cast<int>(bytes.size())) > 0)
+      flown.scans.emplace_back(utime, scan);
+  });
+  lockstep.RunUntil(kStart + duration_us);
+  flown.done = node->Done();
+  flown.report = node->Report();
+  return flown;
+}
+
+TEST(LidarNode, ARecordingPlaysAtItsOwnPace) {
+  const Flown flown = Fly(WritePackets("node.bin", 500), 1'000'000);  // 0.66 s
+  ASSERT_EQ(flown.scans.size(), 6u);
+  for (size_t i = 0; i < flown.scans.size(); ++i) {
+    const auto& [sent, scan] = flown.scans[i];
+    EXPECT_EQ(scan.seq, static_cast<int>(i));
+    EXPECT_GE(sent, scan.utime + 99'900);  // not before it is complete
+    EXPECT_LE(sent, scan.utime + 130'000);
+    EXPECT_GT(scan.size, 28000);
+    EXPECT_EQ(static_cast<size_t>(scan.size), scan.ring.size());
+  }
+  EXPECT_NEAR(static_cast<double>(flown.scans[1].second.utime - flown.scans[0].second.utime), 1e5,
+              100.0);
+  EXPECT_TRUE(flown.done);
+  EXPECT_EQ(flown.report.state, bus::NodeReport::State::kOk);
+}
+
+TEST(LidarNode, HalfARecordingIsNotDone) {
+  const Flown flown = Fly(WritePackets("half.bin", 500), 300'000);
+  EXPECT_FALSE(flown.done);
+  EXPECT_EQ(flown.scans.size(), 2u);
+}
+
+TEST(LidarNode, AnotherSensorIsReportedAndPublishesNothing) {
+  const Flown flown = Fly(WritePackets("hires.bin", 500, 0x24), 1'000'000);
+  EXPECT_TRUE(flown.scans.empty());
+  EXPECT_TRUE(flown.done);
+  EXPECT_EQ(flown.report.state, bus::NodeReport::State::kFailed);
+  EXPECT_NE(flown.report.detail.find("Hi-Res"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace chase::lidar
