@@ -203,29 +203,36 @@ void Odometry::MatchBlind(Prepared* prepared, MatchResult* match) {
 }
 
 /// The first sweep was learnt and put out as if at rest: once the second one gives the velocity, it
-/// is learnt anew. What was put out showed the world as seen from about the middle of the sweep, so
-/// the initial pose is taken to be that of the middle.
+/// is learnt anew. W stays the frame in which the first sweep fits the world as it was put out,
+/// which makes the initial pose that of about the sweep's middle.
 void Odometry::Bootstrap(Prepared* prepared, MatchResult* match) {
-  const Eigen::Quaterniond start = math::FromYaw(config_.initial_yaw_deg * M_PI / 180.0);
+  const Pose initial = base_.pose();
   for (int i = 0; i < kBootstrapPasses && match->valid; ++i) {
     Bend(match->X_WB, prepared);
-    NavState& last = first_->track.back();
-    last.v = prepared->track.front().v;
-    last.w_B = prepared->track.front().w_B;
+    const Eigen::Vector3d v = prepared->track.front().v, w_B = prepared->track.front().w_B;
     const double half = 0.5 * (first_->end - first_->sweep.start);
-    last.p = config_.initial_position + half * last.v;
-    last.R_WB = start * math::ExpSO3(half * last.w_B);
-    base_.p = last.p;
-    base_.R_WB = last.R_WB;
+    const Pose end{initial.R * math::ExpSO3(half * w_B), initial.p + half * v};
+    PlaceFirst(end, v, w_B);
+    const MatchResult raw =
+        matcher_.Match(FeaturesIn(*first_, SweepMotion::Still()), planes_, edges_, initial);
+    if (raw.valid) PlaceFirst(initial * raw.X_WB.Inverse() * end, v, w_B);
     prepared->track.front() = base_;
-    first_->track = {last};
-    planes_.Clear();
-    edges_.Clear();
-    Learn(*first_, last.pose());
     const Features features = FeaturesIn(*prepared, MotionOver(*prepared));
     *match = matcher_.Match(features, planes_, edges_, match->X_WB);
   }
   first_.reset();
+}
+
+/// Makes the map that of the first sweep, which ended at X_WB in uniform motion.
+void Odometry::PlaceFirst(const Pose& X_WB, const Eigen::Vector3d& v, const Eigen::Vector3d& w_B) {
+  base_.p = X_WB.p;
+  base_.R_WB = X_WB.R;
+  first_->track = {base_};
+  first_->track.front().v = v;
+  first_->track.front().w_B = w_B;
+  planes_.Clear();
+  edges_.Clear();
+  Learn(*first_, X_WB);
 }
 
 /// Replaces the track by the uniform motion from its first state to X_WB.

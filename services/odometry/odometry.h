@@ -78,6 +78,7 @@ class Odometry {
   MatchResult Match(Prepared* prepared);
   void MatchBlind(Prepared* prepared, MatchResult* match);
   void Bootstrap(Prepared* prepared, MatchResult* match);
+  void PlaceFirst(const Pose& X_WB, const Eigen::Vector3d& v, const Eigen::Vector3d& w_B);
   void Bend(const Pose& X_WB, Prepared* prepared) const;
   bool Apply(const Prepared& prepared, const MatchResult& match);
   void Learn(const Prepared& prepared, const Pose& X_WB);

@@ -15,7 +15,7 @@ struct MatchConfig {
   double gate = 0.6;               ///< features farther from their surface are left out, m
   double kernel = 0.10;            ///< scale of the robust kernel at the end, m
   double range_noise = 0.02;       ///< standard deviation of a residual, m
-  double min_information = 0.006;  ///< least share of the features that must hold each direction
+  double min_information = 0.002;  ///< least share of the features that must hold each direction
   int min_features = 80;
   double min_inliers = 0.3;  ///< least share of features that find a surface within the kernel
   double edge_weight = 1.0;  ///< of an edge feature against a plane feature
