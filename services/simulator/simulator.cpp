@@ -114,7 +114,8 @@ Output Simulator::Advance(double t) {
   truth.body = quadrotor_.state();
   truth.target = actors_.Target(truth.mission_time);
   truth.movers = actors_.Movers(truth.mission_time);
-  if (config_.camera.rate > 0.0 && now() >= static_cast<double>(frames_) / config_.camera.rate - 1e-9) {
+  if (config_.camera.rate > 0.0 &&
+      now() >= static_cast<double>(frames_) / config_.camera.rate - 1e-9) {
     frames_ = static_cast<long>(std::floor(now() * config_.camera.rate + 1e-6)) + 1;
     scene_.MoveTo(truth.mission_time);
     output.image = camera_.Render(truth.body.p, truth.body.q, now(), scene_, truth.target.cylinder);

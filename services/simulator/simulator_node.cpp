@@ -36,8 +36,7 @@ SimulatorNode::SimulatorNode(bus::Bus& bus, const SimulatorConfig& config)
       scenario_(world::ParseScenario(yaml_, config.scenario)),
       simulator_(scenario_, config) {
   const std::string& sensors = config.sensors.empty() ? scenario_.sensors.mode : config.sensors;
-  if (sensors == "truth")
-    truth_feed_ = std::make_unique<TruthFeed>(bus, scenario_, config.rig);
+  if (sensors == "truth") truth_feed_ = std::make_unique<TruthFeed>(bus, scenario_, config.rig);
   bus_.Subscribe<attitude_setpoint_t>("ATTITUDE_SETPOINT",
                                       [this](const auto& message) { OnSetpoint(message); });
 }

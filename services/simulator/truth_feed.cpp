@@ -31,11 +31,16 @@ world::Obstacle ToObstacle(const world::Solid& solid, int id) {
 world::Obstacle ToObstacle(const world::MoverState& mover, int id) {
   world::Obstacle obstacle = ToObstacle(mover.solid, id);
   obstacle.moving = true;
-  obstacle.center.coefficients.resize(2, 3);
-  obstacle.center.coefficients.row(0) = mover.solid.center.transpose();
-  obstacle.center.coefficients.row(1) = kForecast * mover.velocity.transpose();
+  Eigen::Matrix<double, Eigen::Dynamic, 3> rows(2, 3);
+  rows << mover.solid.center.transpose(), kForecast * mover.velocity.transpose();
+  obstacle.center.coefficients.swap(rows);
   obstacle.position_variance = obstacle.velocity_variance = kVariance;
   return obstacle;
+}
+
+bool Nearer(const std::pair<double, const world::Obstacle*>& a,
+            const std::pair<double, const world::Obstacle*>& b) {
+  return a.first < b.first;
 }
 
 }  // namespace
@@ -100,30 +105,32 @@ void TruthFeed::PublishTarget(const Truth& truth, int64_t utime) {
   bus_.Publish("TARGET", message);
 }
 
-/// Movers all, then the nearest of the static world; the whole list sorted nearest first.
+std::vector<TruthFeed::Ranked> TruthFeed::NearestStatics(const Vector3d& p_WB) const {
+  std::vector<Ranked> list;
+  for (std::size_t i = 0; i < statics_.size(); ++i)
+    list.emplace_back((statics_[i].center.Position(0.0) - p_WB).norm() - reach_[i], &statics_[i]);
+  std::stable_sort(list.begin(), list.end(), Nearer);
+  return list;
+}
+
+/// The movers and the nearest of the static world, nearest first.
 void TruthFeed::PublishObstacles(const Truth& truth, int64_t utime) {
-  std::vector<std::pair<double, const world::Obstacle*>> near;
-  for (std::size_t i = 0; i < statics_.size(); ++i) {
-    const double apart = (statics_[i].center.Position(0.0) - truth.body.p).norm() - reach_[i];
-    near.emplace_back(apart, &statics_[i]);
-  }
-  std::stable_sort(near.begin(), near.end(),
-                   [](const auto& a, const auto& b) { return a.first < b.first; });
-  const std::size_t kept = std::min(near.size(), kMostStatics);
-  std::vector<std::pair<double, world::Obstacle>> list;
-  for (std::size_t i = 0; i < kept; ++i) list.emplace_back(near[i].first, *near[i].second);
-  for (std::size_t i = 0; i < truth.movers.size(); ++i) {
-    const auto& mover = truth.movers[i];
-    const double apart = (mover.solid.center - truth.body.p).norm() - mover.solid.half_size.norm();
-    list.emplace_back(apart, ToObstacle(mover, static_cast<int>(i)));
-  }
-  std::stable_sort(list.begin(), list.end(),
-                   [](const auto& a, const auto& b) { return a.first < b.first; });
+  std::vector<world::Obstacle> movers;
+  for (const auto& mover : truth.movers)
+    movers.push_back(ToObstacle(mover, static_cast<int>(movers.size())));
+  std::vector<Ranked> list = NearestStatics(truth.body.p);
+  const std::size_t kept = std::min(list.size(), kMostStatics);
   obstacles_t message{};
+  message.n_cut = static_cast<int32_t>(list.size() - kept);
+  list.resize(kept);
+  for (std::size_t i = 0; i < movers.size(); ++i) {
+    const world::Solid& solid = truth.movers[i].solid;
+    list.emplace_back((solid.center - truth.body.p).norm() - solid.half_size.norm(), &movers[i]);
+  }
+  std::stable_sort(list.begin(), list.end(), Nearer);
   message.utime = utime;
   message.n_obstacles = static_cast<int32_t>(list.size());
-  message.n_cut = static_cast<int32_t>(near.size() - kept);
-  for (const auto& entry : list) message.obstacles.push_back(bus::ToMessage(entry.second, utime));
+  for (const auto& entry : list) message.obstacles.push_back(bus::ToMessage(*entry.second, utime));
   bus_.Publish("OBSTACLES", message);
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "common/bus/bus.h"
@@ -25,6 +26,9 @@ class TruthFeed {
   void Publish(const Truth& truth, int64_t utime, int64_t tick);
 
  private:
+  using Ranked = std::pair<double, const world::Obstacle*>;  // distance from the drone, m
+
+  std::vector<Ranked> NearestStatics(const Eigen::Vector3d& p_WB) const;
   void PublishPose(const Truth& truth, int64_t utime);
   void PublishTarget(const Truth& truth, int64_t utime);
   void PublishObstacles(const Truth& truth, int64_t utime);

@@ -1,0 +1,159 @@
+#include "services/simulator/simulator_node.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Eigenvalues>
+#include <fstream>
+#include <iterator>
+#include <map>
+
+#include "chase/camera_image_t.hpp"
+#include "chase/imu_t.hpp"
+#include "chase/lidar_scan_t.hpp"
+#include "chase/obstacles_t.hpp"
+#include "chase/pose_t.hpp"
+#include "chase/scenario_t.hpp"
+#include "chase/target_t.hpp"
+#include "chase/truth_t.hpp"
+#include "common/bus/convert.h"
+#include "common/bus/lockstep.h"
+
+namespace chase::simulator {
+namespace {
+
+constexpr int64_t kStart = 1700000000000000;
+
+/// Every message of a run, as bytes by channel.
+using Record = std::map<std::string, std::vector<std::pair<int64_t, bus::Bus::Bytes>>>;
+
+Record Simulated(const SimulatorConfig& config, int64_t duration_us) {
+  Record record;
+  bus::Lockstep lockstep(kStart);
+  lockstep.SetTap([&](int64_t utime, const std::string& channel, const bus::Bus::Bytes& bytes) {
+    record[channel].emplace_back(utime, bytes);
+  });
+  lockstep.Add("simulator", 0,
+               [&](bus::Bus& bus) { return std::make_unique<SimulatorNode>(bus, config); });
+  lockstep.RunUntil(kStart + duration_us);
+  record.erase("SIMULATOR_STATUS");  // says how long things took
+  return record;
+}
+
+SimulatorConfig Config(const std::string& scenario = "gym") {
+  SimulatorConfig config;
+  config.scenario = std::string(CHASE_SOURCE_DIR) + "/deploy/scenarios/" + scenario + ".yaml";
+  return config;
+}
+
+/// The gym, fed the truth.
+SimulatorConfig TruthConfig() {
+  std::ifstream in(Config().scenario);
+  std::string text((std::istreambuf_iterator<char>(in)), {});
+  const std::string raw = "mode: raw";
+  text.replace(text.find(raw), raw.size(), "mode: truth");
+  SimulatorConfig config;
+  config.scenario = ::testing::TempDir() + "chase_truth.yaml";
+  std::ofstream(config.scenario) << text;
+  return config;
+}
+
+template <class T>
+T Message(const Record& record, const std::string& channel, std::size_t i) {
+  const auto& bytes = record.at(channel).at(i).second;
+  T message;
+  EXPECT_EQ(message.decode(bytes.data(), 0, static_cast<int>(bytes.size())),
+            static_cast<int>(bytes.size()));
+  EXPECT_EQ(bus::Problem(message), "") << channel;
+  return message;
+}
+
+TEST(SimulatorNode, PublishesEveryChannelAtItsRate) {
+  const Record record = Simulated(Config(), 2000000);
+  EXPECT_EQ(record.at("IMU").size(), 401u);
+  EXPECT_EQ(record.at("TRUTH").size(), 201u);
+  EXPECT_EQ(record.at("CAMERA_IMAGE").size(), 41u);
+  EXPECT_EQ(record.at("LIDAR_SCAN").size(), 20u);
+  EXPECT_EQ(record.at("SCENARIO").size(), 3u);
+  EXPECT_EQ(record.size(), 5u);  // nothing of the truth feed
+  for (std::size_t i = 0; i < 20; ++i) {
+    const auto scan = Message<lidar_scan_t>(record, "LIDAR_SCAN", i);
+    EXPECT_EQ(scan.utime, kStart + static_cast<int64_t>(i) * 100000);
+    EXPECT_EQ(scan.seq, static_cast<int32_t>(i));
+    EXPECT_GE(record.at("LIDAR_SCAN")[i].first, scan.utime + 99533);
+  }
+  const auto image = Message<camera_image_t>(record, "CAMERA_IMAGE", 3);
+  EXPECT_EQ(image.utime, kStart + 150000);
+  EXPECT_EQ(image.size, 376 * 240 * 3);
+}
+
+TEST(SimulatorNode, TheScenarioExplainsTheLog) {
+  const Record record = Simulated(Config(), 1000);
+  const auto message = Message<scenario_t>(record, "SCENARIO", 0);
+  EXPECT_EQ(message.start_utime, kStart + 8000000);
+  EXPECT_EQ(message.name, "gym");
+  EXPECT_EQ(world::ParseScenario(message.yaml, "log").world.cylinders.size(), 7u);
+}
+
+TEST(SimulatorNode, SameSeedSameBytes) {
+  const SimulatorConfig config = Config();
+  EXPECT_EQ(Simulated(config, 1500000), Simulated(config, 1500000));
+}
+
+TEST(SimulatorNode, AnotherSeedIsAnotherFlight) {
+  SimulatorConfig other = Config();
+  other.seed = 2;
+  const Record a = Simulated(Config(), 200000), b = Simulated(other, 200000);
+  EXPECT_NE(a.at("IMU"), b.at("IMU"));
+  EXPECT_NE(a.at("LIDAR_SCAN"), b.at("LIDAR_SCAN"));
+  EXPECT_NE(a.at("CAMERA_IMAGE"), b.at("CAMERA_IMAGE"));
+}
+
+TEST(SimulatorNode, MissingOrBrokenScenarioIsRefusedAtTheStart) {
+  SimulatorConfig config;
+  config.scenario = "/nowhere.yaml";
+  bus::Lockstep lockstep(kStart);
+  const auto make = [&](bus::Bus& bus) { return std::make_unique<SimulatorNode>(bus, config); };
+  EXPECT_THROW(lockstep.Add("simulator", 0, make), std::runtime_error);
+  config.scenario = ::testing::TempDir() + "chase_broken.yaml";
+  std::ofstream(config.scenario) << "name: x\nworlds: {}\n";
+  EXPECT_THROW(lockstep.Add("simulator", 0, make), std::runtime_error);
+}
+
+TEST(TruthFeed, StandsInForOdometryPerceptionAndMapping) {
+  const Record record = Simulated(TruthConfig(), 1000000);
+  EXPECT_EQ(record.at("POSE").size(), 201u);
+  EXPECT_EQ(record.at("TARGET").size(), 21u);
+  EXPECT_EQ(record.at("OBSTACLES").size(), 11u);
+  const auto pose = Message<pose_t>(record, "POSE", 100);
+  const auto truth = Message<truth_t>(record, "TRUTH", 50);
+  EXPECT_EQ(pose.utime, truth.utime);
+  EXPECT_EQ(bus::ToVector(pose.pos), bus::ToVector(truth.pos));
+  EXPECT_EQ(pose.health, int{pose_t::HEALTH_OK});
+  const auto target = Message<target_t>(record, "TARGET", 5);
+  EXPECT_EQ(bus::ToVector(target.mean), bus::ToVector(truth.target_pos));
+  EXPECT_EQ(target.state, int{target_t::TRACKING});
+  EXPECT_GT(target.box_px[2] * target.box_px[3], 100.0);
+  EXPECT_EQ(Message<obstacles_t>(record, "OBSTACLES", 3).n_obstacles, 11);
+}
+
+TEST(TruthFeed, ShapesEncloseTheirSolids) {
+  world::Random random(4);
+  for (const auto kind :
+       {world::Solid::Kind::kBox, world::Solid::Kind::kCylinder, world::Solid::Kind::kEllipsoid}) {
+    world::Solid solid;
+    solid.kind = kind;
+    solid.half_size = {0.4, kind == world::Solid::Kind::kBox ? 1.3 : 0.4, 1.7};
+    solid.yaw = 0.7;
+    const Eigen::Matrix3d R = EnclosingShape(solid);
+    double most = 0.0;
+    for (int i = 0; i < 20000; ++i) {
+      Eigen::Vector3d x(random.Uniform(-2, 2), random.Uniform(-2, 2), random.Uniform(-2, 2));
+      if (world::SignedDistance(solid, x) <= 0.0) most = std::max(most, x.dot(R * x));
+    }
+    EXPECT_LE(most, 1.0 + 1e-9);
+    EXPECT_GT(most, 0.8);
+  }
+}
+
+}  // namespace
+}  // namespace chase::simulator
