@@ -7,10 +7,12 @@ namespace chase::perception {
 
 namespace {
 
-constexpr double kHiddenBy = 1.0;          // px that a hidden side lies inside the outline at least
-constexpr double kDropPenalty = 4.0;       // cost of calling a side hidden
+constexpr double kHiddenBy = 1.0;          // px that a side left out lies off the outline at least
+constexpr double kDropPenalty = 4.0;       // cost of leaving out a side
 constexpr int kMinPoints = 3;              // of a cluster that gives a range
-constexpr int kManyPoints = 8;             // that hit something else: the detection is that thing
+constexpr int kManyPoints = 5;             // that went through it: the target is not there
+constexpr double kCore = 0.6;              // share of the cylinder that such a ray goes through
+constexpr double kBehind = 0.25;           // m behind the target where such a ray ends at least
 constexpr double kMinVisible = 0.15;       // share of the expected box that a detection must cover
 constexpr double kMaxRangeError = 0.15;    // share of the range; a worse first fix is none
 constexpr double kHiddenPriorShare = 0.6;  // of the prior's gate where sides are left out
@@ -56,11 +58,23 @@ std::vector<TargetPoint> PointsOnTarget(const FitInput& input, const Clusters& c
   return {};
 }
 
-int PointsBehind(const FitInput& input, const Clusters& clusters, double gate) {
-  const double expected = (input.prior.position() - input.camera.p_WC).norm();
+/// True when the lidar looked well through where the target should be, and hit something behind.
+bool SawThrough(const TargetPoint& point, const FitInput& input) {
+  const Eigen::Vector3d center = input.prior.position() - point.age * input.prior.velocity();
+  const Eigen::Vector3d ray = point.p_W - point.p_WL, to_center = center - point.p_WL;
+  const double length = std::max(1e-6, ray.head<2>().norm());
+  const double along = ray.head<2>().dot(to_center.head<2>()) / length;
+  const double beside = std::abs(ray.x() * to_center.y() - ray.y() * to_center.x()) / length;
+  const double above = point.p_WL.z() + along / length * ray.z() - center.z();
+  return beside < kCore * input.shape.size[0] &&
+         std::abs(above) < kCore * 0.5 * input.shape.size[1] &&
+         length > along + input.shape.size[0] + kBehind + 2.0 * RangeSigma(input);
+}
+
+int CountSeenThrough(const FitInput& input, const Clusters& clusters) {
   int count = 0;
   for (const auto& cluster : clusters)
-    for (const auto& p : cluster) count += p.range > expected + gate;
+    for (const auto& p : cluster) count += SawThrough(p, input);
   return count;
 }
 
@@ -84,28 +98,38 @@ bool Localiser::Agrees(const FitResult& fit, double prior_gate) const {
   return true;
 }
 
+bool Localiser::EdgesAgree(const FitResult& fit, const FitInput& input) const {
+  const double gate = config_.fit.edge_gate * input.detection->silhouette.sigma_px;
+  for (size_t side = 0; side < 4; ++side) {
+    if (fit.used[side] && std::abs(fit.edge_px[side]) > gate) return false;
+    const bool left_out =
+        !input.use_side[side] && !input.detection->silhouette.samples[side].empty();
+    if (left_out && std::abs(fit.edge_px[side]) < kHiddenBy) return false;
+  }
+  return true;
+}
+
+std::optional<FitResult> Localiser::WholeReading(FitInput* input) const {
+  input->use_side = kReadings[0];
+  FitResult fit = FitCylinder(*input, config_.fit);
+  if (!Agrees(fit, config_.fit.prior_gate) || !EdgesAgree(fit, *input)) return std::nullopt;
+  return fit;
+}
+
 std::optional<FitResult> Localiser::BestReading(FitInput* input) const {
-  const double gate = config_.fit.edge_gate * input->detection->silhouette.sigma_px;
-  std::optional<FitResult> best;
+  std::optional<FitResult> best = WholeReading(input);
+  if (best) return best;
   double best_cost = 0.0;
-  for (size_t k = 0; k < kReadings.size(); ++k) {
+  for (size_t k = 1; k < kReadings.size(); ++k) {
     input->use_side = kReadings[k];
     FitResult fit = FitCylinder(*input, config_.fit);
-    if (!Agrees(fit, config_.fit.prior_gate * (k == 0 ? 1.0 : kHiddenPriorShare))) continue;
-    bool fits = true;
-    int dropped = 0;
-    for (size_t side = 0; side < 4; ++side) {
-      if (fit.used[side] && std::abs(fit.edge_px[side]) > gate) fits = false;
-      if (kReadings[k][side] || input->detection->silhouette.samples[side].empty()) continue;
-      ++dropped;
-      if (fit.edge_px[side] > -kHiddenBy) fits = false;
-    }
-    if (!fits) continue;
-    if (k == 0) return fit;
-    const double cost = fit.cost + kDropPenalty * dropped;
-    if (best && cost >= best_cost) continue;
+    if (!Agrees(fit, kHiddenPriorShare * config_.fit.prior_gate) || !EdgesAgree(fit, *input))
+      continue;
+    fit.cost += kDropPenalty * static_cast<double>(std::count(input->use_side.begin(),
+                                                              input->use_side.end(), false));
+    if (best && fit.cost >= best_cost) continue;
     best = fit;
-    best_cost = cost;
+    best_cost = fit.cost;
   }
   return best;
 }
@@ -116,7 +140,7 @@ std::optional<FitResult> Localiser::Correct(const FitInput& predicted,
   FitInput input = predicted;
   const double gate = config_.fit.lidar_gate + 2.0 * RangeSigma(predicted);
   input.points = PointsOnTarget(predicted, clusters, gate);
-  if (input.points.empty() && PointsBehind(predicted, clusters, gate) >= kManyPoints)
+  if (input.points.empty() && CountSeenThrough(predicted, clusters) >= kManyPoints)
     return std::nullopt;
   return BestReading(&input);
 }
@@ -154,17 +178,14 @@ std::optional<FitResult> Localiser::Acquire(const TargetShape& shape, const Came
   input.shape = shape;
   input.camera = camera;
   input.detection = &detection;
-  int points = 0;
   for (const auto& cluster : clusters) {
-    points += static_cast<int>(cluster.size());
     if (static_cast<int>(cluster.size()) < kMinPoints) continue;
     const double range = MedianRange(cluster) + shape.size[0];
     input.prior = Guess(camera, detection, range, 0.3);
     input.points = PointsOnTarget(input, {cluster}, 2.0 * config_.fit.lidar_gate);
-    const auto fit = BestReading(&input);
+    const auto fit = WholeReading(&input);
     if (good(fit)) return fit;
   }
-  if (points >= kManyPoints) return std::nullopt;
   // From the size alone: every side must be seen, since nothing tells what is hidden.
   const auto& cut = detection.cut;
   const bool whole = !cut[kLeft] && !cut[kRight] && !cut[kTop] && !cut[kBottom];
@@ -174,12 +195,11 @@ std::optional<FitResult> Localiser::Acquire(const TargetShape& shape, const Came
                                             std::max(1.0, detection.box.width);
   input.prior = Guess(camera, detection, range, 0.4 * range);
   input.points.clear();
-  const double gate = config_.fit.edge_gate * detection.silhouette.sigma_px;
-  FitResult fit = FitCylinder(input, config_.fit);
-  if (!Agrees(fit, config_.fit.prior_gate)) return std::nullopt;
-  for (size_t side = 0; side < 4; ++side)
-    if (fit.used[side] && std::abs(fit.edge_px[side]) > gate) return std::nullopt;
-  return good(fit) ? std::optional(fit) : std::nullopt;
+  const auto fit = WholeReading(&input);
+  if (!good(fit)) return std::nullopt;
+  input.prior = fit->posterior;
+  if (CountSeenThrough(input, clusters) >= kManyPoints) return std::nullopt;
+  return fit;
 }
 
 }  // namespace chase::perception

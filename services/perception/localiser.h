@@ -22,7 +22,11 @@ class Localiser {
                                    const Detection& detection, const Clusters& clusters) const;
 
  private:
+  /// The fit to all sides, if it agrees with all of them.
+  std::optional<FitResult> WholeReading(FitInput* input) const;
+  /// The same, or the best that leaves out sides which are hidden or run into the like colour.
   std::optional<FitResult> BestReading(FitInput* input) const;
+  bool EdgesAgree(const FitResult& fit, const FitInput& input) const;
   bool Agrees(const FitResult& fit, double prior_gate) const;
   TargetGaussian Guess(const Camera& camera, const Detection& detection, double range,
                        double range_sigma) const;

@@ -34,6 +34,16 @@ std::optional<cv::Rect2d> SearchBox(const TargetTrack& track, const Camera& came
   return cv::Rect2d(box->x - dx, box->y - dy, box->width + 2 * dx, box->height + 2 * dy);
 }
 
+/// The part of a detection that may be the target: like colours behind it go on outside.
+std::optional<Detection> Within(const cv::Rect2d& search, const cv::Mat& bgr,
+                                const Detection& detection) {
+  if (detection.mask.empty() || (detection.box & search) == detection.box) return detection;
+  const cv::Rect window(
+      static_cast<int>(std::floor(search.x)), static_cast<int>(std::floor(search.y)),
+      static_cast<int>(std::ceil(search.width)), static_cast<int>(std::ceil(search.height)));
+  return CropTo(bgr, detection, window);
+}
+
 }  // namespace
 
 Perceiver::Perceiver(const PerceptionConfig& config)
@@ -103,7 +113,9 @@ std::optional<Perceiver::Sighting> Perceiver::Find(const TargetTrack& track, Vie
     if (!view->taken[i] && (view->detections[i].box & *search).area() > 0.0) inside.push_back(i);
   std::optional<Sighting> best;
   for (const size_t i : inside) {
-    const auto s = Try(track, *view, view->detections[i], fresh_sweeps_only);
+    const auto piece = Within(*search, view->bgr, view->detections[i]);
+    if (!piece) continue;
+    const auto s = Try(track, *view, *piece, fresh_sweeps_only);
     if (s && (!best || s->fit.cost < best->fit.cost)) best = s;
   }
   if (!best && inside.size() >= 2 &&

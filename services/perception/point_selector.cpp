@@ -45,12 +45,13 @@ class Placer {
   Placer(const Sweep& sweep, const PoseHistory& poses, const world::Rig& rig)
       : sweep_(sweep), poses_(poses), R_BL_(rig.R_BL()), p_BL_(rig.lidar_position) {}
 
-  bool Place(size_t i, Eigen::Vector3d* p_W) {
+  bool Place(size_t i, TargetPoint* out) {
     const double t = sweep_.t + static_cast<double>(sweep_.times[i]);
     if (!pose_ || std::abs(t - pose_->t) > 5e-4) pose_ = poses_.At(t, kExtrapolation);
     if (!pose_) return false;
     const Eigen::Vector3d p_B = p_BL_ + R_BL_ * sweep_.points[i].cast<double>();
-    *p_W = pose_->p_WB + pose_->R_WB * p_B;
+    out->p_W = pose_->p_WB + pose_->R_WB * p_B;
+    out->p_WL = pose_->p_WB + pose_->R_WB * p_BL_;
     return true;
   }
 
@@ -84,7 +85,7 @@ Clusters SelectPoints(const Sweep& sweep, const PoseHistory& poses, const Camera
     if (!(range > static_cast<float>(kMinRange)) || p_L.dot(sight_L) < cosine * range) continue;
     if (!(sweep.times[i] >= 0.0f && sweep.times[i] < static_cast<float>(kMaxSweepLength))) continue;
     TargetPoint hit;
-    if (!placer.Place(i, &hit.p_W)) continue;
+    if (!placer.Place(i, &hit)) continue;
     hit.age = t_frame - sweep.t - static_cast<double>(sweep.times[i]);
     const Eigen::Vector3d now = hit.p_W + hit.age * v_WT;
     const auto px = camera.Project(now);

@@ -18,9 +18,10 @@ struct Sweep {
 
 /// One LiDAR point placed in the world.
 struct TargetPoint {
-  Eigen::Vector3d p_W;  ///< frame W, m
-  double age = 0.0;     ///< time of the frame minus the point's own, s
-  double range = 0.0;   ///< from the camera, after compensation of the target's motion, m
+  Eigen::Vector3d p_W;   ///< frame W, m
+  Eigen::Vector3d p_WL;  ///< the lidar when it fired, frame W, m
+  double age = 0.0;      ///< time of the frame minus the point's own, s
+  double range = 0.0;    ///< from the camera, after compensation of the target's motion, m
 };
 
 /// Points that fall on a detection, in groups from near to far.

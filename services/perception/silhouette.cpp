@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <opencv2/imgproc.hpp>
 
 namespace chase::perception {
 
@@ -117,6 +118,31 @@ std::array<bool, 4> CutSides(const cv::Rect& roi, const cv::Size& image) {
   cut[kTop] = roi.y <= kBorder;
   cut[kBottom] = roi.y + roi.height >= image.height - kBorder;
   return cut;
+}
+
+std::optional<Detection> CropTo(const cv::Mat& bgr, const Detection& detection,
+                                const cv::Rect& window) {
+  const cv::Rect view = detection.mask_box & window;
+  if (view.empty()) return std::nullopt;
+  const cv::Mat seen = detection.mask(view - detection.mask_box.tl());
+  const cv::Rect tight = cv::boundingRect(seen);
+  if (tight.empty()) return std::nullopt;
+  Detection out = detection;
+  out.mask_box = tight + view.tl();
+  out.mask = seen(tight).clone();
+  out.box = EdgeBox(out.mask_box);
+  const auto image_cut = CutSides(out.mask_box, bgr.size());
+  const auto goes_on = [&](Side side, bool at_window, bool beyond) {
+    out.cut[side] = image_cut[side] || (at_window && beyond);
+  };
+  const cv::Rect &a = out.mask_box, &b = detection.mask_box;
+  goes_on(kLeft, a.x == window.x, b.x < a.x);
+  goes_on(kRight, a.br().x == window.br().x, b.br().x > a.br().x);
+  goes_on(kTop, a.y == window.y, b.y < a.y);
+  goes_on(kBottom, a.br().y == window.br().y, b.br().y > a.br().y);
+  out.silhouette = TraceSilhouette(bgr, out.mask, out.mask_box, out.cut);
+  out.silhouette.sigma_px = detection.silhouette.sigma_px;
+  return out;
 }
 
 Detection Merge(const cv::Mat& bgr, const std::vector<Detection>& pieces) {

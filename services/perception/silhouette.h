@@ -2,6 +2,8 @@
 
 #include <array>
 #include <opencv2/core.hpp>
+#include <optional>
+#include <vector>
 
 #include "services/perception/detector.h"
 
@@ -18,6 +20,11 @@ cv::Rect2d EdgeBox(const cv::Rect& roi);
 
 /// Which sides of `roi` lie at the border of an image of this size.
 std::array<bool, 4> CutSides(const cv::Rect& roi, const cv::Size& image);
+
+/// The part of a detection inside `window`, px; the sides at which it goes on are cut. The
+/// detection must carry a mask; nothing when no part of it lies inside.
+std::optional<Detection> CropTo(const cv::Mat& bgr, const Detection& detection,
+                                const cv::Rect& window);
 
 /// One detection out of several pieces: the union of their masks. All must carry masks.
 Detection Merge(const cv::Mat& bgr, const std::vector<Detection>& pieces);
