@@ -56,7 +56,6 @@ class TrackingLaw {
 
   /// Acceleration that the integral asks for, m/s^2.
   const Eigen::Vector3d& integral() const { return integral_; }
-  void ResetIntegral() { integral_.setZero(); }
 
  private:
   Eigen::Vector3d Feedback(const Estimate& estimate, const world::State& reference) const;
