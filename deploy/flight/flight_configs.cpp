@@ -42,7 +42,7 @@ FlightConfigs Configure(const world::Scenario& scenario, const FlightOptions& op
   Override(scenario, "planning", &configs.planning);
   Override(scenario, "control", &configs.control);
   if (!options.sensors.empty()) configs.simulator.sensors = options.sensors;
-  if (!options.planner.empty()) configs.planning.algorithm = options.planner;
+  if (!options.planner.empty()) configs.planning.planner_name = options.planner;
   return configs;
 }
 

@@ -18,6 +18,6 @@ foreach(row IN ITEMS "odometry:POSE;SCAN_REGISTERED" "mapping:OBSTACLES;MAP" "pe
   set_tests_properties(replay_${service} PROPERTIES TIMEOUT 300 FIXTURES_REQUIRED recorded_flight)
 endforeach()
 
-add_test(NAME flight_live COMMAND ${CMAKE_SOURCE_DIR}/test/flight/live.sh ${bin} gym 1
+add_test(NAME flight_live COMMAND ${CMAKE_SOURCE_DIR}/test/flight/live.sh gym 1
   WORKING_DIRECTORY ${CMAKE_SOURCE_DIR})
 set_tests_properties(flight_live PROPERTIES TIMEOUT 300 RUN_SERIAL TRUE)
