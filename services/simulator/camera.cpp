@@ -65,6 +65,15 @@ RayPacket Camera::Rays(int row, int column) const {
   return rays;
 }
 
+/// Light that comes back along ray i, before the exposure.
+Vector3f Camera::Color(const RayPacket& rays, const HitPacket& hits, int i) const {
+  const Vector3f d(rays.dx[i], rays.dy[i], rays.dz[i]);
+  if (hits.material[i] == Material::kNothing) return Sky(d.normalized());
+  const Vector3f p = Vector3f(rays.ox[i], rays.oy[i], rays.oz[i]) + hits.distance[i] * d;
+  const Vector3f n = Vector3f(hits.nx[i], hits.ny[i], hits.nz[i]).normalized();
+  return Lambert(n) * Albedo(hits.material[i], p, n, target_color_);
+}
+
 void Camera::TraceRow(int row, const Scene& scene, Image* image) {
   uint8_t* out = &image->rgb[static_cast<std::size_t>(3 * row * rig_.width_px)];
   for (int column = 0; column < rig_.width_px; column += 8) {
@@ -72,17 +81,9 @@ void Camera::TraceRow(int row, const Scene& scene, Image* image) {
     HitPacket hits;
     scene.Trace(rays, &hits);
     for (int i = 0; i < rays.count; ++i) {
-      const Vector3f d(rays.dx[i], rays.dy[i], rays.dz[i]);
-      Vector3f color;
-      if (hits.material[i] == Material::kNothing) {
-        color = Sky(d.normalized());
-      } else {
-        const Vector3f p = Vector3f(rays.ox[i], rays.oy[i], rays.oz[i]) + hits.distance[i] * d;
-        const Vector3f n = Vector3f(hits.nx[i], hits.ny[i], hits.nz[i]).normalized();
-        color = Lambert(n) * Albedo(hits.material[i], p, n, target_color_);
-      }
+      const Vector3f color = brightness_ * Color(rays, hits, i);
+      for (int k = 0; k < 3; ++k) *out++ = ToByte(color[k]);
       visible_px_ += hits.material[i] == Material::kTarget;
-      for (int k = 0; k < 3; ++k) *out++ = ToByte(brightness_ * color[k]);
     }
   }
 }

@@ -60,6 +60,7 @@ class Camera {
   TargetView View() const;
 
  private:
+  Eigen::Vector3f Color(const RayPacket& rays, const HitPacket& hits, int i) const;
   void TraceRow(int row, const Scene& scene, Image* image);
   double NextBrightness(double t);
   RayPacket Rays(int row, int column) const;

@@ -97,31 +97,44 @@ void Simulator::StepPhysics() {
 
 TimedPose Simulator::Pose() const { return {now(), quadrotor_.state().p, quadrotor_.state().q}; }
 
-Output Simulator::Advance(double t) {
+/// Steps to t and returns the poses on the way, the first included.
+std::vector<TimedPose> Simulator::Fly(double t) {
   std::vector<TimedPose> poses = {Pose()};
-  const long target_step = static_cast<long>(std::floor(t / kStep + 1e-6));
-  while (steps_ < target_step) {
+  const long last = static_cast<long>(std::floor(t / kStep + 1e-6));
+  while (steps_ < last) {
     StepPhysics();
     poses.push_back(Pose());
   }
-  const double settle = scenario_.settle_s;
-  scene_.MoveTo(0.5 * (poses.front().t + poses.back().t) - settle);
-  lidar_.Advance(poses, scene_);
+  return poses;
+}
 
-  Output output;
-  Truth& truth = output.truth;
-  truth.mission_time = now() - settle;
+Truth Simulator::TruthNow() const {
+  Truth truth;
+  truth.mission_time = now() - scenario_.settle_s;
   truth.body = quadrotor_.state();
   truth.target = actors_.Target(truth.mission_time);
   truth.movers = actors_.Movers(truth.mission_time);
-  if (config_.camera.rate > 0.0 &&
-      now() >= static_cast<double>(frames_) / config_.camera.rate - 1e-9) {
-    frames_ = static_cast<long>(std::floor(now() * config_.camera.rate + 1e-6)) + 1;
-    scene_.MoveTo(truth.mission_time);
-    output.image = camera_.Render(truth.body.p, truth.body.q, now(), scene_, truth.target.cylinder);
-  }
-  truth.view = camera_.View();
-  output.imu = imu_.Measure(truth.body, now() - last_measurement_);
+  return truth;
+}
+
+/// The frame due by now, if any; late frames are not made up for.
+std::optional<Image> Simulator::TakeFrame(const Truth& truth) {
+  const double rate = config_.camera.rate;
+  if (rate <= 0.0 || now() < static_cast<double>(frames_) / rate - 1e-9) return std::nullopt;
+  frames_ = static_cast<long>(std::floor(now() * rate + 1e-6)) + 1;
+  scene_.MoveTo(truth.mission_time);
+  return camera_.Render(truth.body.p, truth.body.q, now(), scene_, truth.target.cylinder);
+}
+
+Output Simulator::Advance(double t) {
+  const std::vector<TimedPose> poses = Fly(t);
+  scene_.MoveTo(0.5 * (poses.front().t + poses.back().t) - scenario_.settle_s);
+  lidar_.Advance(poses, scene_);
+  Output output;
+  output.truth = TruthNow();
+  output.image = TakeFrame(output.truth);
+  output.truth.view = camera_.View();
+  output.imu = imu_.Measure(output.truth.body, now() - last_measurement_);
   last_measurement_ = now();
   output.sweep = lidar_.Take();
   return output;

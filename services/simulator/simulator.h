@@ -78,6 +78,9 @@ class Simulator {
   Output Advance(double t);
 
  private:
+  std::vector<TimedPose> Fly(double t);
+  Truth TruthNow() const;
+  std::optional<Image> TakeFrame(const Truth& truth);
   void StepPhysics();
   AttitudeSetpoint ActiveSetpoint() const;
   bool SetpointFresh() const;
