@@ -91,7 +91,9 @@ int main(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
-    return app.exit(e) == 0 ? 0 : 1;
+    if (e.get_exit_code() == 0) return app.exit(e);
+    std::fprintf(stderr, "chase-log: %s; see chase-log --help\n", e.what());
+    return 1;
   } catch (const std::exception& e) {
     std::fprintf(stderr, "chase-log: %s\n", e.what());
     return 1;

@@ -58,7 +58,9 @@ int main(int argc, char** argv) {
     app.parse(argc, argv);
     Report(log, out);
   } catch (const CLI::ParseError& e) {
-    return app.exit(e) == 0 ? 0 : 1;
+    if (e.get_exit_code() == 0) return app.exit(e);
+    std::fprintf(stderr, "chase-report: %s; see chase-report --help\n", e.what());
+    return 1;
   } catch (const std::exception& e) {
     std::fprintf(stderr, "chase-report: %s\n", e.what());
     return 1;

@@ -8,6 +8,7 @@
 #include <deque>
 #include <optional>
 
+#include "logs/src/info.h"
 #include "logs/src/log_reader.h"
 #include "logs/src/message_fields.h"
 
@@ -50,12 +51,25 @@ std::optional<Change> Compare(const Field& a, const Field& b) {
   return change;
 }
 
+using CountMap = std::map<std::string, long>;
+
 class Comparison {
  public:
-  explicit Comparison(std::vector<std::string> ignore) : ignore_(std::move(ignore)) {}
+  Comparison(std::vector<std::string> ignore, CountMap a, CountMap b)
+      : ignore_(std::move(ignore)), counts_a_(std::move(a)), counts_b_(std::move(b)) {
+    CountMap all = counts_a_;
+    all.insert(counts_b_.begin(), counts_b_.end());
+    for (const auto& [channel, count] : all) {
+      common_[channel] = std::min(counts_a_[channel], counts_b_[channel]);
+      if (counts_a_[channel] != counts_b_[channel] && !Ignored(channel, "count")) result_[channel];
+    }
+  }
+
+  /// Messages of each channel that have a partner.
+  const CountMap& common() const { return common_; }
 
   void AddPair(const Event& a, const Event& b) {
-    index_ = counts_[a.channel]++;
+    index_ = compared_[a.channel]++;
     channel_ = a.channel;
     if (a.utime != b.utime)
       Note("event_time", {static_cast<double>(std::abs(a.utime - b.utime)),
@@ -63,15 +77,11 @@ class Comparison {
     if (a.bytes != b.bytes) ComparePayload(a.bytes, b.bytes);
   }
 
-  void AddSurplus(const std::string& channel, long in_a, long in_b) {
-    if (Ignored(channel, "count")) return;
-    result_[channel].count_a = counts_[channel] + in_a;
-    result_[channel].count_b = counts_[channel] + in_b;
-  }
-
   std::map<std::string, ChannelDifference> Take() {
-    for (auto& [channel, d] : result_)
-      if (d.count_a == 0 && d.count_b == 0) d.count_a = d.count_b = counts_[channel];
+    for (auto& [channel, d] : result_) {
+      d.count_a = counts_a_[channel];
+      d.count_b = counts_b_[channel];
+    }
     return std::move(result_);
   }
 
@@ -111,53 +121,57 @@ class Comparison {
   }
 
   std::vector<std::string> ignore_;
-  std::map<std::string, long> counts_;
+  CountMap counts_a_, counts_b_, common_, compared_;
   std::map<std::string, ChannelDifference> result_;
   std::string channel_;
   long index_ = 0;
 };
 
-/// Events of one log that wait for their partner in the other.
-using Waiting = std::map<std::string, std::deque<Event>>;
+/// One of the two logs: how many messages of each channel it has given, and those that wait for
+/// their partner in the other.
+struct Side {
+  explicit Side(const std::string& file) : log(file) {}
+  LogReader log;
+  bool more = true;
+  CountMap given;
+  std::map<std::string, std::deque<Event>> waiting;
+};
 
-void Match(Event event, bool from_a, Waiting* own, Waiting* other, Comparison* comparison) {
-  auto& partners = (*other)[event.channel];
-  if (partners.empty()) {
-    (*own)[event.channel].push_back(std::move(event));
-    return;
-  }
-  if (from_a)
-    comparison->AddPair(event, partners.front());
-  else
-    comparison->AddPair(partners.front(), event);
-  partners.pop_front();
+CountMap Counts(const std::string& file) {
+  CountMap counts;
+  for (const ChannelInfo& c : Describe(file).channels) counts[c.channel] = c.count;
+  return counts;
 }
 
-void NoteSurplus(const Waiting& a, const Waiting& b, Comparison* comparison) {
-  std::map<std::string, std::pair<long, long>> surplus;
-  for (const auto& [channel, events] : a) surplus[channel].first = static_cast<long>(events.size());
-  for (const auto& [channel, events] : b)
-    surplus[channel].second = static_cast<long>(events.size());
-  for (const auto& [channel, n] : surplus)
-    if (n.first != n.second) comparison->AddSurplus(channel, n.first, n.second);
+/// Takes the next event of `own`; returns its partner if that has come already.
+std::optional<std::pair<Event, Event>> Step(const CountMap& common, Side* own, Side* other) {
+  Event e;
+  if (!own->more || !(own->more = own->log.Next(&e))) return std::nullopt;
+  const auto limit = common.find(e.channel);
+  if (limit == common.end() || own->given[e.channel]++ >= limit->second) return std::nullopt;
+  auto& partners = other->waiting[e.channel];
+  if (partners.empty()) {
+    own->waiting[e.channel].push_back(std::move(e));
+    return std::nullopt;
+  }
+  std::pair<Event, Event> pair(std::move(e), std::move(partners.front()));
+  partners.pop_front();
+  return pair;
 }
 
 }  // namespace
 
 std::map<std::string, ChannelDifference> Diff(const std::string& a, const std::string& b,
                                               const std::vector<std::string>& ignore) {
-  LogReader log_a(a), log_b(b);
-  Comparison comparison(ignore);
-  Waiting waiting_a, waiting_b;
-  bool more_a = true, more_b = true;
-  while (more_a || more_b) {
-    Event e;
-    if (more_a && (more_a = log_a.Next(&e)))
-      Match(std::move(e), true, &waiting_a, &waiting_b, &comparison);
-    if (more_b && (more_b = log_b.Next(&e)))
-      Match(std::move(e), false, &waiting_b, &waiting_a, &comparison);
+  const auto counts_a = Counts(a), counts_b = Counts(b);
+  Comparison comparison(ignore, counts_a, counts_b);
+  Side side_a(a), side_b(b);
+  while (side_a.more || side_b.more) {
+    if (const auto pair = Step(comparison.common(), &side_a, &side_b))
+      comparison.AddPair(pair->first, pair->second);
+    if (const auto pair = Step(comparison.common(), &side_b, &side_a))
+      comparison.AddPair(pair->second, pair->first);
   }
-  NoteSurplus(waiting_a, waiting_b, &comparison);
   return comparison.Take();
 }
 

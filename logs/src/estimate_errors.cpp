@@ -12,10 +12,6 @@ using Eigen::Vector3d;
 constexpr double kTimeTolerance = 1e-6;  // s
 constexpr double kLargestGap = 0.1;      // s between truth samples to interpolate over
 
-bool InMission(const FlightRecord& record, double t) {
-  return t >= -kTimeTolerance && t <= record.scenario.duration_s + kTimeTolerance;
-}
-
 double Rmse(const Eigen::Matrix3Xd& a, const Eigen::Matrix3Xd& b) {
   return std::sqrt((a - b).squaredNorm() / static_cast<double>(a.cols()));
 }
@@ -53,7 +49,7 @@ TrajectoryError OdometryError(const FlightRecord& record) {
   Pairs pairs;
   for (const PoseSample& pose : record.poses) {
     const auto truth = TruthAt(record.truth, pose.t);
-    if (truth && InMission(record, pose.t)) pairs.Add(pose.p, truth->body);
+    if (truth && record.InMission(pose.t)) pairs.Add(pose.p, truth->body);
   }
   if (pairs.estimate.empty()) return {};
   const auto estimate = Pairs::Columns(pairs.estimate), truth = Pairs::Columns(pairs.truth);
@@ -68,7 +64,7 @@ TrajectoryError OdometryError(const FlightRecord& record) {
 std::optional<double> TargetRmse(const FlightRecord& record) {
   Pairs pairs;
   for (const TargetSample& target : record.targets) {
-    if (!target.tracking || !InMission(record, target.t)) continue;
+    if (!target.tracking || !record.InMission(target.t)) continue;
     if (const auto truth = TruthAt(record.truth, target.t)) pairs.Add(target.mean, truth->target);
   }
   if (pairs.estimate.empty()) return std::nullopt;
@@ -80,7 +76,7 @@ std::optional<double> PredictionError(const FlightRecord& record, double horizon
   long count = 0;
   for (const PredictionSample& p : record.predictions) {
     const double t = p.t + horizon;
-    if (!p.usable || !InMission(record, p.t) || t > p.target.end() + kTimeTolerance) continue;
+    if (!p.usable || !record.InMission(p.t) || t > p.target.end() + kTimeTolerance) continue;
     const auto truth = TruthAt(record.truth, t);
     if (!truth) continue;
     sum += (p.target.Position(t) - truth->target).norm();

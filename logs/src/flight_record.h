@@ -74,6 +74,9 @@ struct FlightRecord {
   std::vector<PerceivedObstacle> obstacles;
   std::map<std::string, double> cpu_s;     ///< by process
   std::optional<double> real_time_factor;  ///< logical over wall time
+
+  /// True while the mission lasts: 0 <= t <= duration_s, give or take a microsecond.
+  bool InMission(double t) const { return t >= -1e-6 && t <= scenario.duration_s + 1e-6; }
 };
 
 }  // namespace chase::logs

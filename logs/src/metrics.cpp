@@ -9,19 +9,14 @@
 namespace chase::logs {
 namespace {
 
-constexpr double kTimeTolerance = 1e-6;  // s
-constexpr double kEndTolerance = 0.1;    // s of the mission that may be missing at its end
+constexpr double kEndTolerance = 0.1;  // s of the mission that may be missing at its end
 
 using Figure = Metrics::Figure;
-
-bool InMission(const FlightRecord& record, double t) {
-  return t >= -kTimeTolerance && t <= record.scenario.duration_s + kTimeTolerance;
-}
 
 std::vector<TruthSample> MissionTruth(const FlightRecord& record) {
   std::vector<TruthSample> out;
   std::copy_if(record.truth.begin(), record.truth.end(), std::back_inserter(out),
-               [&](const TruthSample& s) { return InMission(record, s.t); });
+               [&](const TruthSample& s) { return record.InMission(s.t); });
   return out;
 }
 
@@ -92,7 +87,7 @@ std::optional<TimeFigures> Stage(const FlightRecord& record, const std::string& 
 void AddPlans(const FlightRecord& record, Metrics* m) {
   constexpr int kWider = 1;  // plan_t's CHASE and WIDER are what planning is for
   for (const PlanSample& plan : record.plans) {
-    if (!InMission(record, plan.t)) continue;
+    if (!record.InMission(plan.t)) continue;
     ++m->replans;
     m->fallbacks += plan.verdict > kWider;
   }

@@ -67,10 +67,6 @@ Outline Sampled(const world::Trajectory& trajectory) {
   return out;
 }
 
-bool InMission(const FlightRecord& record, double t) {
-  return t >= 0.0 && t <= record.scenario.duration_s;
-}
-
 void AddWorld(const FlightRecord& record, ReportData* data) {
   double highest = 0.0;
   for (const TruthSample& s : record.truth) highest = std::max(highest, s.p.z());
@@ -87,17 +83,17 @@ void AddWorld(const FlightRecord& record, ReportData* data) {
 void AddPaths(const FlightRecord& record, ReportData* data) {
   Thinner truth(kPathStep), pose(kPathStep), prediction(kFanStep), plan(kFanStep);
   for (const TruthSample& s : record.truth) {
-    if (!InMission(record, s.t) || !truth.Pass(s.t)) continue;
+    if (!record.InMission(s.t) || !truth.Pass(s.t)) continue;
     data->chaser.push_back(s.p.head<2>());
     data->target.push_back(s.target.head<2>());
   }
   for (const PoseSample& s : record.poses)
-    if (InMission(record, s.t) && pose.Pass(s.t)) data->estimated.push_back(s.p.head<2>());
+    if (record.InMission(s.t) && pose.Pass(s.t)) data->estimated.push_back(s.p.head<2>());
   for (const PredictionSample& s : record.predictions)
-    if (s.usable && InMission(record, s.t) && prediction.Pass(s.t))
+    if (s.usable && record.InMission(s.t) && prediction.Pass(s.t))
       data->predictions.push_back(Sampled(s.target));
   for (const PlanSample& s : record.plans)
-    if (InMission(record, s.t) && plan.Pass(s.t)) data->plans.push_back(Sampled(s.position));
+    if (record.InMission(s.t) && plan.Pass(s.t)) data->plans.push_back(Sampled(s.position));
 }
 
 void Add(double t, double value, ReportData::Series* series) {
@@ -115,7 +111,7 @@ void AddSeries(const FlightRecord& record, const std::vector<SampleScore>& score
     Add(s.t, s.visible ? 1.0 : 0.0, &data->visible);
   }
   for (const TruthSample& s : record.truth) {
-    if (!InMission(record, s.t) || !truth.Pass(s.t)) continue;
+    if (!record.InMission(s.t) || !truth.Pass(s.t)) continue;
     Add(s.t, s.visible_share, &data->visible_share);
     if (!s.target_in_image) continue;
     Add(s.t, s.target_px.x(), &data->pixel_u);

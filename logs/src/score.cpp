@@ -8,8 +8,6 @@ namespace {
 using Eigen::Vector3d;
 using world::Solid;
 
-constexpr double kTimeTolerance = 1e-6;  // s
-
 /// A solid with the radius of a sphere that encloses it, so that distant ones cost nothing.
 struct Bounded {
   Solid solid;
@@ -86,8 +84,7 @@ std::vector<SampleScore> Score(const FlightRecord& record) {
   const Scorer score(record.scenario);
   std::vector<SampleScore> scores;
   for (const TruthSample& s : record.truth)
-    if (s.t >= -kTimeTolerance && s.t <= record.scenario.duration_s + kTimeTolerance)
-      scores.push_back(score(s));
+    if (record.InMission(s.t)) scores.push_back(score(s));
   return scores;
 }
 

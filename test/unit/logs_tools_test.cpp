@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <regex>
 #include <sstream>
 
 #include "chase/imu_t.hpp"
@@ -121,6 +122,32 @@ TEST(MessageFields, ForeignTruncatedAndNegativeLengthsAreRefused) {
     EXPECT_FALSE(FieldsOf({bytes.begin(), bytes.begin() + static_cast<long>(n)}));
   std::fill(bytes.begin() + 20, bytes.begin() + 24, 0xff);  // n_obstacles = -1
   EXPECT_FALSE(FieldsOf(bytes));
+}
+
+/// Names of the fields that an .lcm file declares, in order.
+std::vector<std::string> Declared(const std::string& lcm) {
+  const std::string body =
+      std::regex_replace(lcm.substr(lcm.find('{')), std::regex("//[^\n]*"), "");
+  const std::regex field("(\\w+)\\s+(\\w+)\\s*(\\[\\w+\\])?\\s*;");
+  std::vector<std::string> names;
+  for (std::sregex_iterator at(body.begin(), body.end(), field), end; at != end; ++at)
+    names.push_back((*at)[2]);
+  return names;
+}
+
+TEST(FieldTables, ListEveryFieldOfEveryTypeInWireOrder) {
+  const std::string tables = ReadText("logs/src/field_tables.h");
+  int types = 0;
+  for (const auto& entry : fs::directory_iterator("lcmtypes")) {
+    if (entry.path().extension() != ".lcm") continue;
+    std::string expected =
+        "void VisitFields(const " + entry.path().stem().string() + "& m, V& v) {\n";
+    for (const std::string& name : Declared(ReadText(entry.path().string())))
+      expected += "  v(\"" + name + "\", m." + name + ");\n";
+    EXPECT_NE(tables.find(expected + "}"), std::string::npos) << entry.path();
+    ++types;
+  }
+  EXPECT_GE(types, 19);
 }
 
 TEST(LogInfo, CountsAndTypesEveryChannel) {
