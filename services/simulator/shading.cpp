@@ -27,19 +27,21 @@ float Hash(int x, int y, int z) {
   return static_cast<float>((h ^ (h >> 15)) >> 8) * 0x1p-24f;
 }
 
-/// Patches of two sizes [m], in [-1, 1].
+float Cells(const Vector3f& p, int salt) {
+  return Hash(Cell(p.x()), Cell(p.y()), Cell(p.z()) + salt) - 0.5f;
+}
+
+/// Patches of two sizes, in [-1, 1]: so many a metre.
 float Patches(const Vector3f& p, float coarse, float fine) {
-  const float a = Hash(Cell(p.x() / coarse), Cell(p.y() / coarse), Cell(p.z() / coarse));
-  const float b = Hash(Cell(p.x() / fine), Cell(p.y() / fine), Cell(p.z() / fine) + 7);
-  return 1.2f * (a - 0.5f) + 0.8f * (b - 0.5f);
+  return 1.2f * Cells(coarse * p, 0) + 0.8f * Cells(fine * p, 7);
 }
 
 /// Courses of blocks on an upright surface.
 float Blocks(const Vector3f& p, const Vector3f& n) {
   const float along = std::abs(n.x()) > std::abs(n.y()) ? p.y() : p.x();
-  const int course = Cell(p.z() / 0.25f);
+  const int course = Cell(4.0f * p.z());
   const float shift = course & 1 ? 0.25f : 0.0f;
-  return Hash(Cell((along + shift) / 0.5f), course, 3) - 0.5f;
+  return Hash(Cell(2.0f * (along + shift)), course, 3) - 0.5f;
 }
 
 Vector3f Grey(float value, float red, float blue) { return {value * red, value, value * blue}; }
@@ -52,21 +54,21 @@ Vector3f Albedo(Material material, const Vector3f& p, const Vector3f& n,
     case Material::kNothing:
       return Vector3f::Zero();
     case Material::kGround:
-      return Grey(0.42f + 0.10f * Patches({p.x(), p.y(), 0.0f}, 0.9f, 0.12f), 0.97f, 0.85f);
+      return Grey(0.42f + 0.10f * Patches({p.x(), p.y(), 0.0f}, 1.11f, 8.33f), 0.97f, 0.85f);
     case Material::kWall:
       return Grey(0.62f + 0.16f * Blocks(p, n), 1.02f, 0.97f);
     case Material::kBox:
-      return Grey(0.45f + 0.08f * Patches(p, 0.4f, 0.08f), 0.9f, 1.1f);
+      return Grey(0.45f + 0.08f * Patches(p, 2.5f, 12.5f), 0.9f, 1.1f);
     case Material::kPillar:
-      return Grey(0.50f + 0.12f * (Cell(p.z() / 0.5f) & 1 ? 1.0f : -1.0f), 0.85f, 1.15f);
+      return Grey(0.50f + 0.12f * (Cell(2.0f * p.z()) & 1 ? 1.0f : -1.0f), 0.85f, 1.15f);
     case Material::kEllipsoid:
-      return Grey(0.45f + 0.08f * Patches(p, 0.5f, 0.1f), 0.8f, 1.2f);
+      return Grey(0.45f + 0.08f * Patches(p, 2.0f, 10.0f), 0.8f, 1.2f);
     case Material::kTrunk:
-      return Grey(0.26f + 0.10f * Patches(p, 0.3f, 0.06f), 1.10f, 0.85f);
+      return Grey(0.26f + 0.10f * Patches(p, 3.33f, 16.7f), 1.10f, 0.85f);
     case Material::kCrown:
-      return Grey(0.38f + 0.16f * Patches(p, 0.5f, 0.15f), 0.70f, 0.55f);
+      return Grey(0.38f + 0.16f * Patches(p, 2.0f, 6.67f), 0.70f, 0.55f);
     case Material::kMover:
-      return Grey(0.40f + 0.06f * Patches(p, 0.5f, 0.2f), 0.55f, 1.60f);
+      return Grey(0.40f + 0.06f * Patches(p, 2.0f, 5.0f), 0.55f, 1.60f);
     case Material::kCarrier:
       return Vector3f::Constant(0.12f);
     case Material::kTarget:
