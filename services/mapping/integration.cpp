@@ -92,7 +92,10 @@ void Integrator::Reset(VoxelGrid::Column* column, Voxel* voxel, const Key& key) 
 void Integrator::Queue(Voxel* voxel, const Key& key) {
   if (voxel->queued || changes_.size() >= kMostChanges) return;
   voxel->queued = true;
-  changes_.push_back(key);
+  if (voxel->free_sweeps > 0)
+    changes_.push_back(key);
+  else
+    changes_.push_front(key);  // news of obstacles first
 }
 
 bool Integrator::PassesReturns(const Voxel& voxel, const Key& key) const {

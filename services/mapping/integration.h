@@ -22,7 +22,7 @@ class Integrator {
   void ClearDisc(const Eigen::Vector2d& center, double radius, double bottom, double top,
                  int settled, bool also_hit);
 
-  /// Cells whose state changed and that the octree does not know yet, oldest first.
+  /// Cells whose state changed and that the octree does not know yet, most urgent first.
   std::deque<Key>& changes() { return changes_; }
   uint32_t sweep() const { return sweep_; }
 

@@ -68,6 +68,7 @@ void Mapper::Prepare(const Sweep& sweep) {
     r.label = Shorten(sweep.origin, &end) ? Label::kFar : Label::kStatic;
     r.p = end.cast<float>();
     r.key = grid_.ToKey(end);
+    if (r.label == Label::kFar) r.key.x &= ~1, r.key.y &= ~1;  // rays end together: fewer of them
     if (!grid_.Contains(r.key)) continue;
     if (r.label == Label::kStatic) near_.push_back(r.p);
     returns_.push_back(r);
@@ -232,10 +233,7 @@ void Mapper::UpdateTree() {
   tree_.Forget(origin_, config_.tree.keep_radius, config_.tree.keep_tiles ? &tiles_ : nullptr);
 }
 
-std::string Mapper::WriteTree(int* occupied) {
-  SetTree(static_cast<int>(integrator_.changes().size()));
-  return tree_.Write(occupied);
-}
+void Mapper::CompleteTree() { SetTree(static_cast<int>(integrator_.changes().size())); }
 
 std::vector<SavedTile> Mapper::TakeTiles() { return std::exchange(tiles_, {}); }
 

@@ -37,8 +37,10 @@ class Mapper {
   /// Hands news to the octree, at most updates_per_sweep cells. Call after the list went out.
   void UpdateTree();
 
-  /// The octree in OctoMap's "bt" format, complete up to the last sweep.
-  std::string WriteTree(int* occupied);
+  /// Hands all pending news to the octree, whatever that costs. For the end of a flight.
+  void CompleteTree();
+  /// The octree in OctoMap's "bt" format, and the number of its occupied cells.
+  std::string WriteTree(int* occupied) { return tree_.Write(occupied); }
   /// Tiles that left the octree since the last call (config tree.keep_tiles).
   std::vector<SavedTile> TakeTiles();
 

@@ -38,6 +38,7 @@ MappingNode::MappingNode(bus::Bus& bus, const MappingConfig& config)
 MappingNode::~MappingNode() {
   if (config_.save_map.empty() || !last_scan_) return;
   int occupied = 0;
+  mapper_.CompleteTree();
   Write(config_.save_map, mapper_.WriteTree(&occupied));
 }
 
@@ -82,7 +83,7 @@ void MappingNode::OnScan(const scan_registered_t& m) {
 }
 
 void MappingNode::PublishObstacles(const ObstacleList& list, int64_t utime) {
-  obstacles_t out;
+  obstacles_t out{};
   out.utime = utime;
   out.n_cut = list.n_cut;
   for (const auto& obstacle : list.obstacles)
@@ -94,7 +95,7 @@ void MappingNode::PublishObstacles(const ObstacleList& list, int64_t utime) {
 void MappingNode::PublishMap(int64_t utime) {
   auto timer = bus_.Time("write_map");
   last_map_ = utime;
-  map_t out;
+  map_t out{};
   out.utime = utime;
   out.resolution = config_.grid.resolution;
   out.format = "bt";

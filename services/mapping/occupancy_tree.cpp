@@ -36,6 +36,35 @@ void Collapse(octomap::OcTree* tree, octomap::OcTreeNode* node) {
   tree->pruneNode(node);
 }
 
+/// Removes the node of `key` at `depth` from below `node`, which lies at depth `level`. True if
+/// `node` is then empty itself. (OctoMap's own deleteNode keeps lists of children alive.)
+bool Remove(octomap::OcTree* tree, octomap::OcTreeNode* node, const octomap::OcTreeKey& key,
+            unsigned depth, unsigned level) {
+  if (level == depth) {
+    Collapse(tree, node);
+    return true;
+  }
+  const unsigned i = octomap::computeChildIdx(key, static_cast<int>(tree->getTreeDepth() - 1 - level));
+  if (!tree->nodeHasChildren(node) || !tree->nodeChildExists(node, i)) return false;
+  if (!Remove(tree, tree->getNodeChild(node, i), key, depth, level + 1)) return false;
+  tree->deleteNodeChild(node, i);
+  if (tree->nodeHasChildren(node)) return false;
+  tree->createNodeChild(node, 0);
+  Collapse(tree, node);
+  return true;
+}
+
+/// OctoMap's "bt" stream. Its own writer does the same but prints to the console.
+std::string ToBytes(const octomap::OcTree& tree) {
+  std::ostringstream out;
+  out << "# Octomap OcTree binary file\n# (feel free to add / change comments, but leave the first "
+         "line as it is!)\n#\nid "
+      << tree.getTreeType() << "\nsize " << tree.size() << "\nres " << tree.getResolution()
+      << "\ndata\n";
+  tree.writeBinaryData(out);
+  return out.str();
+}
+
 }  // namespace
 
 OccupancyTree::OccupancyTree(double resolution)
@@ -45,7 +74,7 @@ OccupancyTree::~OccupancyTree() = default;
 
 void OccupancyTree::Set(const Key& key, bool occupied) {
   if (!InTree(key)) return;
-  tree_->setNodeValue(TreeKey(key), occupied ? kOccupied : kFree, true);
+  tree_->setNodeValue(TreeKey(key), occupied ? kOccupied : kFree);
   tiles_.insert({key.x >> kTileLevels, key.y >> kTileLevels, key.z >> kTileLevels});
 }
 
@@ -75,33 +104,23 @@ std::string OccupancyTree::Serialise(const Tile& tile) const {
   const int last = kTileCells - 1;
   const octomap::OcTreeKey high(corner(x, last), corner(y, last), corner(z, last));
   for (auto it = tree_->begin_leafs_bbx(low, high), end = tree_->end_leafs_bbx(); it != end; ++it)
-    part.setNodeValue(it.getKey(), it->getLogOdds(), true);
-  part.updateInnerOccupancy();
-  std::ostringstream stream;
-  part.writeBinary(stream);
-  return stream.str();
+    part.setNodeValue(it.getKey(), it->getLogOdds());
+  return ToBytes(part);
 }
 
 void OccupancyTree::Drop(const Tile& tile) {
   const auto [x, y, z] = tile;
   const octomap::OcTreeKey key = TreeKey({x * kTileCells, y * kTileCells, z * kTileCells});
   const unsigned depth = tree_->getTreeDepth() - kTileLevels;
-  octomap::OcTreeNode* node = tree_->search(key, depth);
-  if (!node) return;
-  Collapse(tree_.get(), node);
-  tree_->deleteNode(key, depth);
+  if (tree_->getRoot() && Remove(tree_.get(), tree_->getRoot(), key, depth, 0)) tree_->clear();
 }
 
 std::string OccupancyTree::Write(int* occupied) {
-  tree_->updateInnerOccupancy();
-  tree_->prune();
-  std::ostringstream stream;
-  tree_->writeBinaryConst(stream);
   *occupied = 0;
   for (auto it = tree_->begin_leafs(), end = tree_->end_leafs(); it != end; ++it)
     if (tree_->isNodeOccupied(*it))
       *occupied += 1 << (3 * (tree_->getTreeDepth() - it.getDepth()));
-  return stream.str();
+  return ToBytes(*tree_);
 }
 
 int OccupancyTree::State(const Eigen::Vector3d& p) const {

@@ -31,7 +31,7 @@ class OccupancyTree {
   explicit OccupancyTree(double resolution);
   ~OccupancyTree();
 
-  /// Sets the state of a cell; inner nodes follow with the next Write.
+  /// Sets the state of a cell.
   void Set(const Key& key, bool occupied);
   /// Drops tiles whose centre is farther than `radius` m from p in plan; appends them to `saved`
   /// if that is given.

@@ -55,12 +55,6 @@ void VoxelGrid::MoveTo(const Eigen::Vector3d& p) {
   placed_ = true;
 }
 
-VoxelGrid::Column& VoxelGrid::Touch(int x, int y) {
-  Column& column = Slot(x, y);
-  if (column.x != x || column.y != y || column.z0 != z0_) Renew(&column, x, y);
-  return column;
-}
-
 VoxelGrid::Column* VoxelGrid::Find(int x, int y) {
   if (!ContainsColumn(x, y)) return nullptr;
   Column& column = Slot(x, y);

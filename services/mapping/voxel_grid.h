@@ -67,7 +67,11 @@ class VoxelGrid {
   int z0() const { return z0_; }
 
   /// The column of (x, y), which must be in the window; reset if it was another's.
-  Column& Touch(int x, int y);
+  Column& Touch(int x, int y) {
+    Column& column = Slot(x, y);
+    if (column.x != x || column.y != y || column.z0 != z0_) Renew(&column, x, y);
+    return column;
+  }
   /// The column of (x, y), or null where nothing was seen.
   Column* Find(int x, int y);
   static size_t Level(int z) { return static_cast<size_t>(z & (kLevels - 1)); }

@@ -1,0 +1,88 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+#include <set>
+
+#include "mapping_metrics.h"
+#include "mapping_world.h"
+#include "services/mapping/mapper.h"
+
+namespace chase::mapping {
+namespace {
+
+constexpr double kStart = 2.0;  // s, when the mover enters
+
+/// A 2.2 m long box that drives along y through a wood of eight trunks.
+struct Scene {
+  double speed = 2.0;
+  Eigen::Vector2d Place(double t) const { return {8.0, -9.0 + speed * (t - kStart)}; }
+  testing::World At(double t) const {
+    testing::World world;
+    for (const double y : {-5.0, 0.0, 5.0}) {
+      world.cylinders.push_back({{12.0, y}, 0.3, 0.0, 8.0});
+      world.cylinders.push_back({{-5.0, y}, 0.3, 0.0, 8.0});
+    }
+    world.cylinders.push_back({{4.0, 0.3}, 0.3, 0.0, 8.0});  // hides the mover for a moment
+    for (const double x : {-20.0, 25.0}) world.boxes.push_back({{x, 0, 2}, {0.1, 30, 2}});
+    const Eigen::Vector2d p = Place(t);
+    if (t >= kStart) world.boxes.push_back({{p.x(), p.y(), 1.0}, {0.5, 1.1, 1.0}});
+    return world;
+  }
+};
+
+TEST(MappingMover, IsFoundTrackedAndForgotten) {
+  for (const double speed : {1.0, 2.0, 4.0}) {
+    Scene scene{speed};
+    std::mt19937 random(3);
+    Mapper mapper(MappingConfig{});
+    std::set<int> ids;
+    double found = -1.0, worst = 0.0;
+    const double end = kStart + 18.0 / speed;
+    for (double t = 0.0; t < end + 1.5; t += 0.1) {
+      const testing::World world = t < end ? scene.At(t) : scene.At(0.0);
+      const auto list = mapper.Insert(
+          testing::Scan(world, {0.2 * std::sin(t), 0.1 * t, 1.5}, t, {0.02, 0.01}, &random));
+      for (const auto& o : list.obstacles) {
+        if (!o.moving) continue;
+        ids.insert(o.id);
+        if (found < 0.0) found = t;
+        EXPECT_EQ(o.center.degree(), 1);
+        EXPECT_GT(o.velocity_variance, 0.0);
+        if (t < found + 1.0 || t > end) continue;
+        worst = std::max(worst, (o.center.Velocity(t).head<2>() - Eigen::Vector2d(0, speed)).norm());
+        EXPECT_NE(testing::Holding({o}, {scene.Place(t).x(), scene.Place(t).y(), 1.0}, t), nullptr);
+      }
+      if (t > end + 1.0) {
+        EXPECT_EQ(list.n_moving, 0) << "ghost at " << t - end;
+      }
+      for (double y = -8.0; y < 8.0 && t > end + 1.0; y += 0.2)
+        EXPECT_EQ(testing::Holding(list.obstacles, {8.0, y, 1.0}, t), nullptr) << "trail " << y;
+    }
+    EXPECT_GE(found, 0.0) << speed;
+    EXPECT_LT(found, kStart + 0.9) << speed;
+    EXPECT_EQ(ids.size(), 1u) << speed;
+    EXPECT_LT(worst, 0.5) << speed;
+  }
+}
+
+TEST(MappingMover, WhatStopsBecomesStatic) {
+  std::mt19937 random(3);
+  Mapper mapper(MappingConfig{});
+  ObstacleList list;
+  const auto place = [](double t) { return Eigen::Vector2d(6.0, std::min(0.0, -6.0 + 2.0 * (t - kStart))); };
+  double t = 0.0;
+  for (; t < 12.0; t += 0.1) {
+    testing::World world;
+    world.boxes = {{{-20.0, 0, 2}, {0.1, 30, 2}}, {{15.0, 0, 2}, {0.1, 30, 2}}};
+    if (t > kStart) world.boxes.push_back({{place(t).x(), place(t).y(), 1.0}, {0.5, 0.5, 1.0}});
+    list = mapper.Insert(testing::Scan(world, {0, 0, 1.5}, t, {0.02, 0.01}, &random));
+  }
+  EXPECT_EQ(list.n_moving, 0);
+  const auto* o = testing::Holding(list.obstacles, {5.5, 0.0, 1.0}, t);
+  ASSERT_NE(o, nullptr);
+  EXPECT_FALSE(o->moving);
+}
+
+}  // namespace
+}  // namespace chase::mapping

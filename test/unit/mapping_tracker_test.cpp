@@ -1,0 +1,93 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <map>
+#include <random>
+
+#include "services/mapping/movers.h"
+
+namespace chase::mapping {
+namespace {
+
+Cluster BoxCluster(const Eigen::Vector2d& center, double half) {
+  Cluster cluster;
+  cluster.members = {0};
+  for (const double dx : {-half, half})
+    for (const double dy : {-half, half}) cluster.hull.push_back(center + Eigen::Vector2d(dx, dy));
+  cluster.hull = ConvexHull(cluster.hull);
+  cluster.center << center, 1.0;
+  cluster.half_length = half;
+  return cluster;
+}
+
+/// Two movers whose paths cross at the same time, 1.2 m apart there, with noisy centres.
+struct Crossing {
+  Eigen::Vector2d First(double t) const { return {-4.0 + 2.0 * t, -0.6 + 0.3 * (t - 2.0)}; }
+  Eigen::Vector2d Second(double t) const { return {4.0 - 2.0 * t, 0.6 - 0.3 * (t - 2.0)}; }
+};
+
+TEST(MappingTracker, IdsSurviveACrossing) {
+  for (unsigned seed = 0; seed < 10; ++seed) {
+    std::mt19937 random(seed);
+    std::normal_distribution<double> normal(0.0, 0.05);
+    Tracker tracker(MoverConfig{});
+    const Crossing crossing;
+    std::map<int, int> first, second;
+    for (double t = 0.0; t < 4.0; t += 0.1) {
+      tracker.Predict(t);
+      const Eigen::Vector2d noise(normal(random), normal(random));
+      std::vector<Cluster> clusters = {BoxCluster(crossing.Second(t) - noise, 0.4),
+                                       BoxCluster(crossing.First(t) + noise, 0.4)};
+      tracker.Update(&clusters);
+      ASSERT_EQ(clusters.size(), 2u) << "seed " << seed << " t " << t;
+      ++second[clusters[0].track];
+      ++first[clusters[1].track];
+    }
+    EXPECT_EQ(first.size(), 1u) << "seed " << seed;
+    EXPECT_EQ(second.size(), 1u) << "seed " << seed;
+    for (const auto& o : tracker.Obstacles(1.5, 8.0, 1.0))
+      EXPECT_NEAR(std::abs(o.center.Velocity(4.0).x()), 2.0, 0.3);
+  }
+}
+
+TEST(MappingTracker, IdSurvivesAShortOcclusionAndGhostIsNotListed) {
+  Tracker tracker(MoverConfig{});
+  int id = -1;
+  for (double t = 0.0; t < 4.0; t += 0.1) {
+    tracker.Predict(t);
+    std::vector<Cluster> clusters;
+    if (t < 1.5 || t > 2.5) clusters.push_back(BoxCluster({1.5 * t, 0.0}, 0.5));
+    tracker.Update(&clusters);
+    if (t > 0.9 && t < 1.4) id = clusters[0].track;
+    if (t > 2.2 && t < 2.4) {
+      EXPECT_TRUE(tracker.Obstacles(1.5, 8.0, 1.0).empty());
+    }
+    if (t > 2.6) {
+      EXPECT_EQ(clusters[0].track, id);
+    }
+  }
+}
+
+TEST(MappingTracker, WhatStandsIsNeverListed) {
+  std::mt19937 random(1);
+  std::normal_distribution<double> normal(0.0, 0.05);
+  Tracker tracker(MoverConfig{});
+  for (double t = 0.0; t < 20.0; t += 0.1) {
+    tracker.Predict(t);
+    std::vector<Cluster> clusters = {BoxCluster({3.0 + normal(random), normal(random)}, 0.3)};
+    tracker.Update(&clusters);
+    EXPECT_TRUE(tracker.Obstacles(1.5, 8.0, 1.0).empty()) << t;
+  }
+}
+
+TEST(MappingTracker, NumberOfTracksIsBounded) {
+  Tracker tracker(MoverConfig{});
+  std::vector<Cluster> clusters;
+  for (int i = 0; i < 500; ++i) clusters.push_back(BoxCluster({10.0 * i, 0.0}, 0.3));
+  tracker.Predict(0.0);
+  tracker.Update(&clusters);
+  EXPECT_LE(tracker.tracks().size(), 64u);
+}
+
+}  // namespace
+}  // namespace chase::mapping
