@@ -18,6 +18,13 @@ foreach(row IN ITEMS "odometry:POSE;SCAN_REGISTERED" "mapping:OBSTACLES;MAP" "pe
   set_tests_properties(replay_${service} PROPERTIES TIMEOUT 300 FIXTURES_REQUIRED recorded_flight)
 endforeach()
 
-add_test(NAME flight_live COMMAND ${CMAKE_SOURCE_DIR}/test/flight/live.sh gym 1
+add_test(NAME hostile_bus
+  COMMAND ${CMAKE_SOURCE_DIR}/test/flight/in_namespace.sh
+          python3 ${CMAKE_SOURCE_DIR}/test/flight/hostile_bus.py ${bin} ${flight}
+  WORKING_DIRECTORY ${CMAKE_SOURCE_DIR})
+set_tests_properties(hostile_bus PROPERTIES TIMEOUT 200 FIXTURES_REQUIRED recorded_flight)
+
+add_test(NAME flight_live
+  COMMAND ${CMAKE_SOURCE_DIR}/test/flight/in_namespace.sh deploy/fly gym --seed 1
   WORKING_DIRECTORY ${CMAKE_SOURCE_DIR})
 set_tests_properties(flight_live PROPERTIES TIMEOUT 300 RUN_SERIAL TRUE)

@@ -1,0 +1,148 @@
+#!/usr/bin/env python3
+"""Sends damaged messages to every live service on every channel that it listens to: nothing may crash,
+each must be counted in the status, and the next good message must be handled.
+
+Usage: hostile_bus.py BIN_DIR FLIGHT.lcm   (run it in a network namespace of its own)
+"""
+import pathlib
+import socket
+import struct
+import subprocess
+import sys
+import time
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "replay"))
+import lcmlog
+
+GROUP, PORT = "239.255.76.67", 7667
+NAN = struct.pack(">d", float("nan"))
+LISTENS = {
+    "odometry": ["LIDAR_SCAN", "IMU"],
+    "mapping": ["SCAN_REGISTERED", "TARGET"],
+    "perception": ["CAMERA_IMAGE", "LIDAR_SCAN", "POSE"],
+    "prediction": ["TARGET", "OBSTACLES"],
+    "planning": ["PREDICTION", "OBSTACLES", "POSE"],
+    "control": ["PLAN", "POSE"],
+    "simulator": ["ATTITUDE_SETPOINT"],
+}
+# Where the first double of a message stands behind the fingerprint, utime and seq.
+FIRST_DOUBLE = {"IMU": 20, "POSE": 20, "TARGET": 21, "ATTITUDE_SETPOINT": 20,
+                "SCAN_REGISTERED": 20}
+# Where an array's length stands.
+LENGTH = {"LIDAR_SCAN": 20, "OBSTACLES": 20, "SCAN_REGISTERED": 77, "CAMERA_IMAGE": 44}
+
+
+class Bus:
+    """LCM's UDP multicast protocol: short messages and fragments."""
+
+    def __init__(self):
+        self.out = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.out.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, 0)
+        self.into = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.into.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        self.into.bind(("", PORT))
+        membership = socket.inet_aton(GROUP) + socket.inet_aton("0.0.0.0")
+        self.into.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, membership)
+        self.seq = 0
+
+    def send(self, channel, data):
+        self.seq += 1
+        name = channel.encode() + b"\0"
+        if len(data) < 1400:
+            packets = [struct.pack(">4sI", b"LC02", self.seq) + name + data]
+        else:
+            chunks = [data[i:i + 60000] for i in range(0, len(data), 60000)]
+            packets = [struct.pack(">4sIIIHH", b"LC03", self.seq, len(data), 60000 * i, i, len(chunks))
+                       + (name if i == 0 else b"") + chunk for i, chunk in enumerate(chunks)]
+        for packet in packets:
+            self.out.sendto(packet, (GROUP, PORT))
+            time.sleep(0.001)
+
+    def status(self, name, seconds):
+        """The newest status within the time: {channel: (received, malformed)}."""
+        newest, end = None, time.monotonic() + seconds
+        while (left := end - time.monotonic()) > 0:
+            self.into.settimeout(left)
+            try:
+                packet = self.into.recv(65536)
+            except socket.timeout:
+                break
+            channel, _, data = packet[8:].partition(b"\0")
+            if packet[:4] == b"LC02" and channel.decode(errors="replace") == f"{name.upper()}_STATUS":
+                newest = parse_status(data)
+        return newest
+
+
+def parse_status(data):
+    at = 20
+
+    def take(form):
+        nonlocal at
+        value = struct.unpack_from(">" + form, data, at)[0]
+        at += struct.calcsize(form if form != "q" and form != "d" else ">" + form)
+        return value
+
+    def text():
+        nonlocal at
+        length = take("i")
+        value = data[at:at + length - 1].decode()
+        at += length
+        return value
+
+    text(), take("b"), text(), text(), text(), take("d"), take("d"), take("d")
+    channels = {}
+    for _ in range(take("i")):
+        name, received, _, malformed, _ = text(), take("q"), take("q"), take("q"), take("d")
+        channels[name] = (received, malformed)
+    return channels
+
+
+def attacks(channel, good):
+    yield b""
+    yield b"\xff" * 40
+    for n in {7, 12, 19, len(good) // 2, len(good) - 1}:
+        yield good[:n]
+    yield bytes([good[0] ^ 0x55]) + good[1:]
+    if channel in FIRST_DOUBLE:
+        at = FIRST_DOUBLE[channel]
+        yield good[:at] + NAN + good[at + 8:]
+    if channel in LENGTH:
+        at = LENGTH[channel]
+        for length in (b"\xff\xff\xff\xff", b"\x80\x00\x00\x00", b"\x7f\xff\xff\xff"):
+            yield good[:at] + length + good[at + 4:]
+
+
+def check(bus, bin_dir, service, samples):
+    process = subprocess.Popen([f"{bin_dir}/chase-{service}"])
+    try:
+        if bus.status(service, 6.0) is None:
+            sys.exit(f"{service}: no status")
+        for channel in LISTENS[service]:
+            good = samples[channel]
+            bad = list(attacks(channel, good))
+            for data in bad:
+                bus.send(channel, data)
+            bus.send(channel, good)
+            received, malformed = bus.status(service, 2.5)[channel]
+            if process.poll() is not None:
+                sys.exit(f"{service}: died of {channel}")
+            if malformed != len(bad):
+                sys.exit(f"{service}: {channel}: {malformed} of {len(bad)} counted as malformed")
+            if received != 1:
+                sys.exit(f"{service}: {channel}: the good message was not handled")
+            print(f"{service}: {channel}: {malformed} refused, then 1 handled")
+    finally:
+        process.terminate()
+        process.wait(timeout=10)
+
+
+def main(bin_dir, flight):
+    samples = {}
+    for _, channel, data in lcmlog.read(flight):
+        samples.setdefault(channel, data)
+    bus = Bus()
+    for service in LISTENS:
+        check(bus, bin_dir, service, samples)
+
+
+main(*sys.argv[1:])
