@@ -16,6 +16,12 @@ bool Usable(const Estimate& e) {
          std::abs(e.R_WB.norm() - 1.0) < 1e-2;
 }
 
+bool Finite(const Reference& r) {
+  const world::State& s = r.state;
+  return s.p.allFinite() && s.v.allFinite() && s.a.allFinite() && s.j.allFinite() &&
+         std::isfinite(r.yaw) && std::isfinite(r.yaw_rate);
+}
+
 bool Finite(const Setpoint& s) {
   return s.R_WB.coeffs().allFinite() && s.w_WB_B.allFinite() && std::isfinite(s.thrust);
 }
@@ -36,6 +42,7 @@ std::optional<Setpoint> Controller::Update(double t, const Estimate& estimate, H
     mode_ = Mode::kIdle;
     return std::nullopt;
   }
+  if (!Finite(*now) || !Finite(*ahead)) return Level();  // a plan of finite numbers may overflow
   const Setpoint setpoint = law_.Track(estimate, *now, *ahead, flying_ ? dt : 0.0);
   if (!Finite(setpoint)) return Level();
   flying_ = true;

@@ -242,6 +242,10 @@ TEST(Controller, NeverSendsNaNForOverflowingPlan) {
   const auto s = controller.Update(0.005, {}, Health::kUsable);
   ASSERT_TRUE(s);
   EXPECT_TRUE(s->R_WB.coeffs().allFinite() && s->w_WB_B.allFinite() && std::isfinite(s->thrust));
+  EXPECT_EQ(controller.mode(), Mode::kLevel);
+  controller.AddPlan(PointPlan({0, 0, 0}, 0.008));  // and a good plan mends it
+  EXPECT_NEAR(controller.Update(0.010, {}, Health::kUsable)->thrust, 9.81, 0.5);
+  EXPECT_EQ(controller.mode(), Mode::kTracking);
 }
 
 TEST(Controller, StartsAnewWhenTimeJumpsBack) {
