@@ -43,8 +43,9 @@ def find_scenario(name):
     for path in (scenarios / f"{name}.yaml", pathlib.Path(name)):
         if path.is_file():
             return path.resolve()
-    known = ", ".join(sorted(str(p.relative_to(scenarios))[:-5] for p in scenarios.rglob("*.yaml")))
-    raise FlightError(f"no scenario '{name}'; there are: {known}")
+    known = sorted(str(path.relative_to(scenarios).with_suffix(""))
+                   for path in scenarios.rglob("*.yaml") if path.parent.name != "scenes")
+    raise FlightError(f"no scenario '{name}'; there are: {', '.join(known)}")
 
 
 def flight_processes():
