@@ -2,6 +2,7 @@
 
 #include <stdexcept>
 
+#include "services/planning/fast_search.h"
 #include "services/planning/ladder.h"
 #include "services/planning/reference_search.h"
 

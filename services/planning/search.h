@@ -23,7 +23,4 @@ class Search {
   virtual Found Best(const Problem& problem, double sight_from) = 0;
 };
 
-/// The reference's answer (reference_search.h) in a fraction of the time: see fast_search.h.
-std::unique_ptr<Search> MakeFastSearch(const PlannerConfig& config);
-
 }  // namespace chase::planning

@@ -1,0 +1,71 @@
+#include <gtest/gtest.h>
+
+#include "services/planning/fast_search.h"
+#include "services/planning/reference_search.h"
+#include "test/unit/planning_instances.h"
+
+namespace chase::planning {
+namespace {
+
+struct Row {
+  const char* name;
+  PlannerConfig config;
+  InstanceSpec spec;
+  int n;
+};
+
+PlannerConfig Literal(int degree, int steps, int skeletons, bool exact) {
+  PlannerConfig c = PlannerConfig::Literal();
+  c.degree = degree;
+  c.steps = steps;
+  c.skeletons = skeletons;
+  c.exact_visibility = exact;
+  return c;
+}
+
+InstanceSpec Spec(double horizon, int n_obstacles, bool hard) {
+  InstanceSpec s;
+  s.horizon = horizon;
+  s.n_obstacles = n_obstacles;
+  if (hard) s.feasible_low = 0.0, s.feasible_high = 0.06, s.extent = 2.0;
+  return s;
+}
+
+void ExpectSameWinner(const PlannerConfig& config, const InstanceSpec& spec, Arithmetic arithmetic,
+                      unsigned seed, int n) {
+  const InstanceGenerator generator(config, spec);
+  const auto fast = MakeFastSearch(config), reference = MakeReferenceSearch(config, arithmetic);
+  for (int i = 0; i < n; ++i) {
+    const PlanRequest request = generator.Make(seed + static_cast<unsigned>(i));
+    Problem problem = MakeProblem(config, request, nullptr);
+    PlaceSkeletons(config, Layout::kNormal, &problem);
+    const Found a = fast->Best(problem, 0.0), b = reference->Best(problem, 0.0);
+    ASSERT_EQ(a.index, b.index) << "seed " << seed + static_cast<unsigned>(i) << " cost "
+                                << a.cost.total << " against " << b.cost.total;
+    if (a.index < 0) continue;
+    ASSERT_NEAR(a.cost.total, b.cost.total, 1e-8 * b.cost.total);
+    ASSERT_NEAR(a.cost.j1, b.cost.j1, 1e-6 * (1 + b.cost.j1));
+    ASSERT_NEAR(a.cost.j2, b.cost.j2, 1e-8);
+    ASSERT_NEAR(a.cost.j4, b.cost.j4, 1e-6 * (1 + b.cost.j4));
+    ASSERT_EQ(SampleFaults(a.plan, problem, 0.0, 300), "");
+  }
+}
+
+TEST(FastSearch, FindsTheReferencesWinner) {
+  ExpectSameWinner(Literal(5, 3, 8, false), Spec(5.0, 20, false), Arithmetic::kDoubleSturm, 100,
+                   40);
+  ExpectSameWinner(Literal(6, 3, 6, false), Spec(5.0, 20, false), Arithmetic::kDoubleSturm, 200,
+                   40);
+  ExpectSameWinner(Literal(5, 4, 5, false), Spec(2.5, 50, false), Arithmetic::kDoubleSturm, 300,
+                   40);
+  ExpectSameWinner(Literal(5, 3, 8, false), Spec(5.0, 50, true), Arithmetic::kDoubleSturm, 400, 40);
+}
+
+TEST(FastSearch, FindsTheCertifiedWinnerWithExactVisibility) {
+  ExpectSameWinner(Literal(5, 3, 8, true), Spec(5.0, 20, false), Arithmetic::kCertified, 500, 15);
+  ExpectSameWinner(Literal(5, 3, 6, true), Spec(5.0, 50, true), Arithmetic::kCertified, 600, 15);
+  ExpectSameWinner(Literal(6, 3, 5, true), Spec(5.0, 50, true), Arithmetic::kCertified, 700, 15);
+}
+
+}  // namespace
+}  // namespace chase::planning
