@@ -14,6 +14,7 @@ constexpr double kLongestReplay = 3.0;      // s of inertial samples kept for la
 constexpr double kWaitForImu = 0.08;        // s that a sweep may be ahead of the IMU
 constexpr double kLargestInnovation = 1.5;  // m
 constexpr int kBootstrapPasses = 3;
+constexpr double kUnknown = 1e3;  // m, an uncertainty that leaves the gate wide
 
 Pose ExtrinsicsOf(const world::Rig& rig) {
   return {Eigen::Quaterniond(rig.R_BL()), rig.lidar_position};
@@ -28,6 +29,14 @@ double LastTime(const std::vector<SweepPoint>& points) {
   float last = 0.0f;
   for (const SweepPoint& point : points) last = std::max(last, point.t);
   return static_cast<double>(last);
+}
+
+/// Standard deviation of where points at a usual distance are predicted [m].
+double UncertaintyOf(const NavState& state) {
+  constexpr double kUsualRange = 8.0;  // m
+  const double p2 = state.P.block<3, 3>(kP, kP).trace();
+  const double theta2 = state.P.block<3, 3>(kTheta, kTheta).trace();
+  return std::sqrt(std::max(0.0, p2 + kUsualRange * kUsualRange * theta2));
 }
 
 }  // namespace
@@ -187,7 +196,8 @@ Features Odometry::FeaturesIn(const Prepared& prepared, const SweepMotion& motio
 MatchResult Odometry::Match(Prepared* prepared) {
   const Features features = FeaturesIn(*prepared, MotionOver(*prepared));
   if (planes_.cells() == 0) return {};
-  MatchResult match = matcher_.Match(features, planes_, edges_, prepared->predicted.pose());
+  MatchResult match = matcher_.Match(features, planes_, edges_, prepared->predicted.pose(),
+                                     UncertaintyOf(prepared->predicted));
   if (Blind(prepared->end)) MatchBlind(prepared, &match);
   return match;
 }
@@ -198,7 +208,7 @@ void Odometry::MatchBlind(Prepared* prepared, MatchResult* match) {
   if (first_) return Bootstrap(prepared, match);
   Bend(match->X_WB, prepared);
   const Features features = FeaturesIn(*prepared, MotionOver(*prepared));
-  const MatchResult again = matcher_.Match(features, planes_, edges_, match->X_WB);
+  const MatchResult again = matcher_.Match(features, planes_, edges_, match->X_WB, kUnknown);
   if (again.valid) *match = again;
 }
 
@@ -213,12 +223,12 @@ void Odometry::Bootstrap(Prepared* prepared, MatchResult* match) {
     const double half = 0.5 * (first_->end - first_->sweep.start);
     const Pose end{initial.R * math::ExpSO3(half * w_B), initial.p + half * v};
     PlaceFirst(end, v, w_B);
-    const MatchResult raw =
-        matcher_.Match(FeaturesIn(*first_, SweepMotion::Still()), planes_, edges_, initial);
+    const MatchResult raw = matcher_.Match(FeaturesIn(*first_, SweepMotion::Still()), planes_,
+                                           edges_, initial, kUnknown);
     if (raw.valid) PlaceFirst(initial * raw.X_WB.Inverse() * end, v, w_B);
     prepared->track.front() = base_;
     const Features features = FeaturesIn(*prepared, MotionOver(*prepared));
-    *match = matcher_.Match(features, planes_, edges_, match->X_WB);
+    *match = matcher_.Match(features, planes_, edges_, match->X_WB, kUnknown);
   }
   first_.reset();
 }

@@ -46,8 +46,8 @@ double EdgeResidual(const Eigen::Vector3d& p_W, const Eigen::Vector3d& rotated, 
 }
 
 ScanMatcher::System ScanMatcher::Linearise(const Features& features, const SurfaceMap& planes,
-                                           const SurfaceMap& edges, const Pose& X_WB,
-                                           double kernel) const {
+                                           const SurfaceMap& edges, const Pose& X_WB, double kernel,
+                                           double gate) const {
   System system;
   const Eigen::Matrix3d R = X_WB.R.toRotationMatrix();
   const double k2 = kernel * kernel;
@@ -60,7 +60,7 @@ ScanMatcher::System ScanMatcher::Linearise(const Features& features, const Surfa
     if (!surface) return;
     Vector6d J;
     const double r = residual_of(p_W, rotated, *surface, &J);
-    if (std::abs(r) > config_.gate) return;
+    if (std::abs(r) > gate) return;
     ++system.matched;
     if (std::abs(r) < kernel) ++system.inliers;
     const double robust = k2 / (k2 + r * r);
@@ -91,13 +91,16 @@ void ScanMatcher::Analyse(const System& system, MatchResult* result) const {
 }
 
 MatchResult ScanMatcher::Match(const Features& features, const SurfaceMap& planes,
-                               const SurfaceMap& edges, const Pose& predicted) const {
+                               const SurfaceMap& edges, const Pose& predicted,
+                               double uncertainty) const {
   MatchResult result;
   result.X_WB = predicted;
-  double kernel = std::max(config_.kernel, config_.gate);
+  const double gate =
+      std::clamp(config_.least_gate + 3.0 * uncertainty, config_.least_gate, config_.gate);
+  double kernel = std::max(config_.kernel, gate);
   System system;
   for (int i = 0; i < config_.max_iterations; ++i) {
-    system = Linearise(features, planes, edges, result.X_WB, kernel);
+    system = Linearise(features, planes, edges, result.X_WB, kernel, gate);
     result.iterations = i + 1;
     if (system.matched < config_.min_features || system.weight < 1e-6) return result;
     Analyse(system, &result);

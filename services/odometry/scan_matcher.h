@@ -13,9 +13,10 @@ using Vector6d = Eigen::Matrix<double, 6, 1>;
 struct MatchConfig {
   int max_iterations = 8;
   double gate = 0.6;               ///< features farther from their surface are left out, m
+  double least_gate = 0.15;        ///< the same where the prediction is certain, m
   double kernel = 0.10;            ///< scale of the robust kernel at the end, m
   double range_noise = 0.02;       ///< standard deviation of a residual, m
-  double min_information = 0.002;  ///< least share of the features that must hold each direction
+  double min_information = 0.004;  ///< least share of the features that must hold each direction
   int min_features = 80;
   double min_inliers = 0.3;  ///< least share of features that find a surface within the kernel
   double edge_weight = 1.0;  ///< of an edge feature against a plane feature
@@ -24,6 +25,7 @@ struct MatchConfig {
   void Visit(V& v) {
     v("max_iterations", max_iterations, "of Gauss-Newton");
     v("gate", gate, "features farther from their surface are left out, m");
+    v("least_gate", least_gate, "the same where the prediction is certain, m");
     v("kernel", kernel, "scale of the robust kernel at the end, m");
     v("range_noise", range_noise, "smallest standard deviation of a residual, m");
     v("min_information", min_information, "share of the features that must hold each direction");
@@ -67,13 +69,14 @@ class ScanMatcher {
  public:
   explicit ScanMatcher(const MatchConfig& config) : config_(config) {}
 
+  /// `uncertainty`: standard deviation of the features' predicted places, m; narrows the gate.
   MatchResult Match(const Features& features, const SurfaceMap& planes, const SurfaceMap& edges,
-                    const Pose& predicted) const;
+                    const Pose& predicted, double uncertainty) const;
 
  private:
   struct System;
   System Linearise(const Features& features, const SurfaceMap& planes, const SurfaceMap& edges,
-                   const Pose& X_WB, double kernel) const;
+                   const Pose& X_WB, double kernel, double gate) const;
   void Analyse(const System& system, MatchResult* result) const;
 
   MatchConfig config_;

@@ -13,7 +13,8 @@ struct Course {
   Hall hall;
   Flight flight;
   SensorModel sensors;
-  double duration = 20.0;  ///< s
+  double duration = 20.0;                         ///< s
+  double corridor_from = 1e9, corridor_to = 1e9;  ///< the hall has no ends in this time, s
   unsigned seed = 1;
   /// May change or remove (by returning false) what the sensors give.
   std::function<bool(Sweep*)> on_sweep;

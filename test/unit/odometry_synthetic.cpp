@@ -52,7 +52,7 @@ Pose Flight::X_WB(double t) const {
   const double blend = SmoothStep(s / kRamp);
   Eigen::Vector3d p = start;
   for (int i = 0; i < 3; ++i) p[i] += blend * amplitude[i] * std::sin(rate[i] * s);
-  p.z() += climb * SmoothStep(s / (2.0 * kRamp));
+  p.z() += climb * blend;
   const double yaw = blend * yaw_amplitude * std::sin(yaw_rate * s);
   const double roll = blend * tilt_amplitude * std::sin(tilt_rate * s);
   const double pitch = blend * tilt_amplitude * std::sin(1.3 * tilt_rate * s + 0.5);
@@ -76,7 +76,7 @@ Flight Flight::Aggressive() {
   Flight flight;
   flight.amplitude = {1.8, 4.0, 0.9};
   flight.rate = {1.3, 0.7, 3.0};  // climbs of 2.7 m/s
-  flight.climb = 1.4;
+  flight.climb = 1.7;
   flight.yaw_rate = 0.8;
   flight.tilt_amplitude = 35.0 * M_PI / 180.0;
   flight.tilt_rate = 2.5;
