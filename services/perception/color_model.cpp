@@ -11,6 +11,7 @@ namespace {
 constexpr int kBits = 6, kLevels = 1 << kBits;
 constexpr double kGreySaturation = 0.35;  // pixels below tell the light's tint
 constexpr int kGreyMinimum = 200;         // sampled pixels needed for that
+constexpr double kShade = 0.5;            // brightness in shade, share of the darkest one learned
 constexpr int kGreyStep = 4;              // every so many rows and columns are sampled
 
 struct Hsv {
@@ -121,7 +122,7 @@ ColorConfig LearnColor(const std::vector<cv::Mat>& images, const std::vector<cv:
   learned.hue_min_deg = std::fmod(Percentile(&hue, 0.03) + 180.0, 360.0);
   learned.hue_max_deg = std::fmod(Percentile(&hue, 0.97) + 180.0, 360.0);
   learned.saturation_min = Percentile(&saturation, 0.03);
-  learned.value_min = Percentile(&value, 0.03);
+  learned.value_min = kShade * Percentile(&value, 0.03);
   return learned;
 }
 

@@ -84,7 +84,7 @@ struct Outcome {
   perception::TargetEstimate estimate;
 };
 
-struct RunOptions {
+struct FlyOptions {
   double duration = 10.0;
   bool lidar = true;
   double lidar_delay = 0.002;  ///< s after the end of the sweep
@@ -93,8 +93,8 @@ struct RunOptions {
 };
 
 /// Flies through the world and shows everything to a Perceiver at the times when it would arrive.
-std::vector<Outcome> Run(const World& world, const perception::PerceptionConfig& config,
-                         const RunOptions& options = {});
+std::vector<Outcome> Fly(const World& world, const perception::PerceptionConfig& config,
+                         const FlyOptions& options = {});
 
 /// A hall with pillars, a winding target at up to 1 m/s on its carrier, drone 2 to 4 m away.
 World GymWorld(uint32_t seed);

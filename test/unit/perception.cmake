@@ -1,0 +1,14 @@
+set(perception_test_dir ${CMAKE_CURRENT_LIST_DIR})
+add_library(perception_world STATIC ${perception_test_dir}/perception_world.cpp)
+target_link_libraries(perception_world PUBLIC perception_core)
+target_include_directories(perception_world PUBLIC ${perception_test_dir})
+
+chase_test(perception_image_test
+  LIBS perception_world opencv_imgproc opencv_imgcodecs opencv_aruco opencv_dnn
+  SOURCES ${perception_test_dir}/perception_detector_test.cpp
+          ${perception_test_dir}/perception_photo_test.cpp)
+chase_test(perception_test LIBS perception_world
+  SOURCES ${perception_test_dir}/perception_fit_test.cpp
+          ${perception_test_dir}/perception_flight_test.cpp)
+chase_test(perception_node_test LIBS perception_world perception_node
+  SOURCES ${perception_test_dir}/perception_node_test.cpp)

@@ -1,0 +1,295 @@
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <opencv2/aruco.hpp>
+#include <opencv2/imgproc.hpp>
+#include <string>
+
+#include "perception_world.h"
+#include "services/perception/color_detector.h"
+#include "services/perception/image_check.h"
+#include "services/perception/marker_detector.h"
+#include "services/perception/network_detector.h"
+#include "services/perception/silhouette.h"
+
+namespace chase::perception {
+namespace {
+
+using perception_test::GymWorld;
+using perception_test::Renderer;
+using perception_test::StillWorld;
+
+cv::Mat Grey(int level = 120) { return {240, 376, CV_8UC3, cv::Scalar(level, level, level)}; }
+
+const cv::Scalar kOrangeBgr(12, 105, 235);
+
+TEST(PerceptionColor, ScoresOrangeAndNotItsNeighbours) {
+  const ColorModel model{ColorConfig{}};
+  EXPECT_GT(model.Score(0.05, 0.45, 1.0), 0.99);
+  EXPECT_GT(model.Score(0.02, 0.18, 0.4), 0.99) << "in shade";
+  EXPECT_LT(model.Score(0.5, 0.5, 0.5), 0.01) << "grey";
+  EXPECT_LT(model.Score(0.05, 0.05, 0.9), 0.5) << "red";
+  EXPECT_LT(model.Score(0.1, 0.9, 0.9), 0.5) << "yellow";
+  EXPECT_LT(model.Score(0.16, 0.25, 0.35), 0.5) << "bark";
+}
+
+TEST(PerceptionColor, RangeOfHueMayWrap) {
+  ColorConfig config;
+  config.hue_min_deg = 350;
+  config.hue_max_deg = 10;
+  const ColorModel model(config);
+  EXPECT_GT(model.Score(0.05, 0.0, 1.0), 0.99);
+  EXPECT_GT(model.Score(0.0, 0.05, 1.0), 0.99);
+  EXPECT_LT(model.Score(0.05, 0.45, 1.0), 0.01);
+}
+
+TEST(PerceptionColor, GainsUndoWarmLight) {
+  cv::Mat warm = Grey();
+  warm.setTo(cv::Scalar(90, 115, 135));
+  const Eigen::Vector3d gains = ColorModel{ColorConfig{}}.Gains(warm);
+  EXPECT_NEAR(gains[0] * 90, gains[2] * 135, 1.0);
+}
+
+TEST(PerceptionColor, FindsTheTargetUnderTintedLight) {
+  for (const auto& light : {Eigen::Vector3d(1.08, 0.92, 0.7), Eigen::Vector3d(0.85, 0.95, 1.05),
+                            Eigen::Vector3d(0.4, 0.4, 0.4)}) {
+    auto world = StillWorld(3.0);
+    world.light = light;
+    const auto shot = Renderer(world).Image(0.0);
+    const auto found = ColorDetector(DetectorConfig{}, 0.45).Detect(shot.bgr);
+    ASSERT_EQ(found.size(), 1u) << light.transpose();
+    EXPECT_GT(found[0].score, 0.7);
+    EXPECT_GT((found[0].box & shot.box).area() / (found[0].box | shot.box).area(), 0.85);
+  }
+}
+
+TEST(PerceptionSilhouette, EdgesLieBetweenPixels) {
+  for (const double shift : {0.0, 0.25, 0.5, 0.75}) {
+    // A bright block from u = 100.5 + shift to 140.5 + shift, drawn by area.
+    cv::Mat image = Grey(60);
+    cv::rectangle(image, {101, 80}, {140, 150}, kOrangeBgr, cv::FILLED);
+    const auto mix = [&](int x, double share) {
+      const cv::Scalar c = kOrangeBgr * share + cv::Scalar::all(60) * (1.0 - share);
+      cv::line(image, {x, 80}, {x, 150}, c);
+    };
+    mix(101, 1.0 - shift);
+    mix(141, shift);
+    const auto found = ColorDetector(DetectorConfig{}, 0.45).Detect(image);
+    ASSERT_EQ(found.size(), 1u);
+    for (const auto& s : found[0].silhouette.samples[kLeft]) EXPECT_NEAR(s.x(), 100.5 + shift, 0.1);
+    for (const auto& s : found[0].silhouette.samples[kRight])
+      EXPECT_NEAR(s.x(), 140.5 + shift, 0.1);
+    for (const auto& s : found[0].silhouette.samples[kTop]) EXPECT_NEAR(s.y(), 79.5, 0.1);
+  }
+}
+
+TEST(PerceptionSilhouette, SidesAtTheImagesBorderAreCut) {
+  cv::Mat image = Grey();
+  cv::rectangle(image, {0, 80}, {25, 150}, kOrangeBgr, cv::FILLED);
+  const auto found = ColorDetector(DetectorConfig{}, 0.45).Detect(image);
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_TRUE(found[0].cut[kLeft]);
+  EXPECT_TRUE(found[0].silhouette.samples[kLeft].empty());
+  EXPECT_FALSE(found[0].silhouette.samples[kRight].empty());
+}
+
+TEST(PerceptionSilhouette, CropAndMergeAreInverse) {
+  cv::Mat image = Grey();
+  cv::rectangle(image, {100, 60}, {140, 130}, kOrangeBgr, cv::FILLED);
+  const auto whole = ColorDetector(DetectorConfig{}, 0.45).Detect(image).at(0);
+  const auto left = CropTo(image, whole, {0, 0, 120, 240});
+  const auto right = CropTo(image, whole, {120, 0, 256, 240});
+  ASSERT_TRUE(left && right);
+  EXPECT_TRUE(left->cut[kRight]);
+  EXPECT_FALSE(left->cut[kLeft]);
+  EXPECT_FALSE(CropTo(image, whole, {200, 0, 50, 240}));
+  const auto merged = Merge(image, {*left, *right});
+  EXPECT_EQ(merged.mask_box, whole.mask_box);
+  EXPECT_EQ(cv::countNonZero(merged.mask != whole.mask), 0);
+}
+
+TEST(PerceptionShape, ACylinderBeatsABallAndABoard) {
+  cv::Mat image = Grey();
+  cv::rectangle(image, {60, 60}, {86, 106}, kOrangeBgr, cv::FILLED);
+  cv::circle(image, {180, 90}, 30, kOrangeBgr, cv::FILLED);
+  cv::rectangle(image, {260, 60}, {350, 80}, kOrangeBgr, cv::FILLED);
+  const auto found = ColorDetector(DetectorConfig{}, 0.45).Detect(image);
+  ASSERT_FALSE(found.empty());
+  EXPECT_EQ(found[0].mask_box.x, 60);
+  for (size_t i = 1; i < found.size(); ++i) EXPECT_LT(found[i].score, 0.6 * found[0].score);
+}
+
+TEST(PerceptionImage, EveryFaultIsNamed) {
+  const world::Rig rig;
+  const cv::Mat good = Renderer(GymWorld(1)).Image(0.0).bgr;
+  EXPECT_EQ(ImageProblem(good, rig), "");
+  EXPECT_NE(ImageProblem({}, rig), "");
+  EXPECT_NE(ImageProblem(cv::Mat(240, 376, CV_16UC3, cv::Scalar::all(9)), rig), "");
+  EXPECT_NE(ImageProblem(cv::Mat(240, 376, CV_8UC1, cv::Scalar(9)), rig), "");
+  EXPECT_NE(ImageProblem(cv::Mat(120, 188, CV_8UC3, cv::Scalar::all(90)), rig), "");
+  EXPECT_EQ(ImageProblem(Grey(0), rig), "image is black");
+  EXPECT_EQ(ImageProblem(Grey(255), rig), "image is saturated");
+  cv::Mat torn = good.clone();
+  torn.rowRange(150, 240).setTo(cv::Scalar::all(0));
+  EXPECT_EQ(ImageProblem(torn, rig), "image lacks rows");
+}
+
+/// A picture of the marker, `side_px` wide, its corner at (u, v), on white.
+cv::Mat MarkerImage(const std::string& name, int id, int side_px, int u, int v) {
+  const int code = name == "DICT_4X4_50" ? cv::aruco::DICT_4X4_50 : cv::aruco::DICT_APRILTAG_36h11;
+  cv::Mat marker, image = Grey(220);
+  cv::aruco::drawMarker(cv::aruco::getPredefinedDictionary(code), id, side_px, marker, 1);
+  cv::cvtColor(marker, marker, cv::COLOR_GRAY2BGR);
+  marker.copyTo(image(cv::Rect(u, v, side_px, side_px)));
+  return image;
+}
+
+TEST(PerceptionMarker, ArUcoAndAprilTagGiveThePosition) {
+  for (const std::string name : {"DICT_4X4_50", "DICT_APRILTAG_36h11"}) {
+    MarkerConfig config;
+    config.dictionary = name;
+    config.id = 7;
+    config.depth = 0.0;
+    const MarkerDetector detector(config, {});
+    const auto found = detector.Detect(MarkerImage(name, 7, 44, 210, 90));
+    ASSERT_EQ(found.size(), 1u) << name;
+    ASSERT_TRUE(found[0].p_CT);
+    // 44 px wide at 220 px focal length: 0.2 m is 1 m away; centre at pixel (231.5, 111.5).
+    const Eigen::Vector3d expected(0.2, -8.0 / 220.0, 1.0);
+    EXPECT_LT((*found[0].p_CT - expected).norm(), 0.03) << found[0].p_CT->transpose();
+    EXPECT_TRUE(detector.Detect(MarkerImage(name, 8, 44, 210, 90)).empty()) << "another marker";
+    EXPECT_TRUE(detector.Detect(Grey()).empty());
+  }
+}
+
+TEST(PerceptionMarker, UnknownDictionaryIsRefusedWithTheKnownOnes) {
+  MarkerConfig config;
+  config.dictionary = "DICT_NONE";
+  try {
+    MarkerDetector detector(config, {});
+    FAIL();
+  } catch (const std::runtime_error& e) {
+    EXPECT_NE(std::string(e.what()).find("DICT_4X4_50"), std::string::npos);
+  }
+}
+
+/// Just enough of the protocol buffers' wire format to write an ONNX file.
+class Proto {
+ public:
+  Proto& Int(int field, uint64_t value) {
+    Varint(static_cast<uint64_t>(field) << 3);
+    Varint(value);
+    return *this;
+  }
+  Proto& Bytes(int field, const std::string& bytes) {
+    Varint(static_cast<uint64_t>(field) << 3 | 2);
+    Varint(bytes.size());
+    text_ += bytes;
+    return *this;
+  }
+  const std::string& text() const { return text_; }
+
+ private:
+  void Varint(uint64_t v) {
+    for (; v >= 128; v >>= 7) text_ += static_cast<char>(v | 128);
+    text_ += static_cast<char>(v);
+  }
+  std::string text_;
+};
+
+template <class T>
+std::string Tensor(const std::string& name, std::vector<uint64_t> dims, int type,
+                   const std::vector<T>& values) {
+  Proto p;
+  for (const auto d : dims) p.Int(1, d);
+  std::string raw(values.size() * sizeof(T), '\0');
+  std::memcpy(raw.data(), values.data(), raw.size());
+  return p.Int(2, static_cast<uint64_t>(type)).Bytes(8, name).Bytes(9, raw).text();
+}
+
+std::string Operation(const std::string& type, const std::vector<std::string>& in,
+                      const std::string& out) {
+  Proto p;
+  for (const auto& i : in) p.Bytes(1, i);
+  return p.Bytes(2, out).Bytes(3, type + "_" + out).Bytes(4, type).text();
+}
+
+std::string Value(const std::string& name, const std::vector<uint64_t>& dims) {
+  Proto shape;
+  for (const auto d : dims) shape.Bytes(1, Proto().Int(1, d).text());
+  const std::string type = Proto().Bytes(1, Proto().Int(1, 1).Bytes(2, shape.text()).text()).text();
+  return Proto().Bytes(1, name).Bytes(2, type).text();
+}
+
+constexpr int kNetWidth = 47, kNetHeight = 30;
+
+/// A network of one linear layer: the centre of mass of (red - blue), for blobs of known mass.
+void WriteNetwork(const std::string& file, double mass) {
+  std::vector<float> weights(3 * kNetWidth * kNetHeight * 5, 0.0f);
+  for (int channel : {0, 2})
+    for (int y = 0; y < kNetHeight; ++y)
+      for (int x = 0; x < kNetWidth; ++x) {
+        float* row =
+            &weights[static_cast<size_t>(((channel * kNetHeight + y) * kNetWidth + x) * 5)];
+        const double unit = (channel == 0 ? 1.0 : -1.0) / mass;
+        row[0] = static_cast<float>(unit * (x + 0.5));
+        row[1] = static_cast<float>(unit * (y + 0.5));
+        row[4] = static_cast<float>(unit);
+      }
+  const std::vector<float> bias = {0.0f, 0.0f, 4.0f, 6.0f, 0.0f};
+  Proto graph;
+  graph.Bytes(1, Operation("Flatten", {"image"}, "flat"));
+  graph.Bytes(1, Operation("Gemm", {"flat", "weights", "bias"}, "row"));
+  graph.Bytes(1, Operation("Reshape", {"row", "shape"}, "boxes"));
+  graph.Bytes(2, "tiny");
+  graph.Bytes(5, Tensor("weights", {3 * kNetWidth * kNetHeight, 5}, 1, weights));
+  graph.Bytes(5, Tensor("bias", {5}, 1, bias));
+  graph.Bytes(5, Tensor<int64_t>("shape", {3}, 7, {1, 1, 5}));
+  graph.Bytes(11, Value("image", {1, 3, kNetHeight, kNetWidth}));
+  graph.Bytes(12, Value("boxes", {1, 1, 5}));
+  const std::string model = Proto()
+                                .Int(1, 7)
+                                .Bytes(8, Proto().Bytes(1, "").Int(2, 11).text())
+                                .Bytes(7, graph.text())
+                                .text();
+  std::ofstream(file, std::ios::binary) << model;
+}
+
+TEST(PerceptionNetwork, BoxesComeFromAnOnnxFile) {
+  const std::string file = testing::TempDir() + "perception_tiny.onnx";
+  // Orange (235 - 12) / 255 on 4 x 6 pixels of the network's input, 8 x 8 image pixels each.
+  WriteNetwork(file, 24.0 * (235.0 - 12.0) / 255.0);
+  NetworkConfig config;
+  config.file = file;
+  config.input_width_px = kNetWidth;
+  config.input_height_px = kNetHeight;
+  const NetworkDetector detector(config, {});
+  for (const cv::Point corner : {cv::Point(80, 64), cv::Point(240, 120)}) {
+    cv::Mat image = Grey();
+    cv::rectangle(image, cv::Rect(corner, cv::Size(32, 48)), kOrangeBgr, cv::FILLED);
+    const auto found = detector.Detect(image);
+    ASSERT_EQ(found.size(), 1u);
+    EXPECT_NEAR(found[0].box.x, corner.x - 0.5, 0.5);
+    EXPECT_NEAR(found[0].box.y, corner.y - 0.5, 0.5);
+    EXPECT_NEAR(found[0].box.width, 32, 0.5);
+    EXPECT_NEAR(found[0].box.height, 48, 0.5);
+    EXPECT_NEAR(found[0].score, 1.0, 0.05);
+    EXPECT_EQ(found[0].silhouette.samples[kLeft].size(), 1u);
+  }
+  EXPECT_TRUE(detector.Detect(Grey()).empty());
+  std::filesystem::remove(file);
+}
+
+TEST(PerceptionNetwork, MissingAndBrokenFilesAreRefused) {
+  NetworkConfig config;
+  config.file = testing::TempDir() + "perception_none.onnx";
+  EXPECT_THROW(NetworkDetector(config, {}), std::runtime_error);
+  std::ofstream(config.file) << "no network";
+  EXPECT_THROW(NetworkDetector(config, {}), std::runtime_error);
+  std::filesystem::remove(config.file);
+}
+
+}  // namespace
+}  // namespace chase::perception
