@@ -40,10 +40,10 @@ void AddImport(CLI::App* app, Arguments* a) {
 }
 
 void RunExport(const Arguments& a) {
-  if (a.mcap)
-    throw std::runtime_error(a.out + ": --mcap is not supported; use --csv, or --tum for poses");
   if (a.tum)
     std::printf("%s: %ld poses\n", a.out.c_str(), ExportTum(a.in, a.out));
+  else if (a.mcap)
+    std::printf("%s: %ld messages\n", a.out.c_str(), ExportMcap(a.in, a.out));
   else
     std::printf("%s: %d files\n", a.out.c_str(), ExportCsv(a.in, a.out, a.channel));
 }
@@ -53,7 +53,8 @@ void AddExport(CLI::App* app, Arguments* a) {
   auto* format = sub->add_option_group("format");
   format->add_flag("--tum", a->tum, "trajectory of POSE: t x y z qx qy qz qw");
   format->add_flag("--csv", a->csv, "OUT is a folder: one file per channel");
-  format->add_flag("--mcap", a->mcap, "refused: not supported");
+  format->add_flag("--mcap", a->mcap,
+                   "JSON messages for Foxglove; clouds and images in its schemas");
   format->require_option(1);
   sub->add_option("--channel", a->channel, "--csv: this channel only, clouds and images included");
   sub->add_option("LOG", a->in, "LCM log")->required();

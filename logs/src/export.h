@@ -13,4 +13,8 @@ long ExportTum(const std::string& log, const std::string& out);
 /// them; with `channel` nothing else is written. Returns the number of files.
 int ExportCsv(const std::string& log, const std::string& out, const std::string& channel);
 
+/// Every message as JSON in an MCAP file for Foxglove and the like; clouds and images in Foxglove's
+/// own schemas. Returns the number of messages.
+long ExportMcap(const std::string& log, const std::string& out);
+
 }  // namespace chase::logs

@@ -6,6 +6,7 @@
 #include "chase/pose_t.hpp"
 #include "logs/src/export.h"
 #include "logs/src/log_reader.h"
+#include "logs/src/message_types.h"
 #include "logs/src/output.h"
 
 namespace chase::logs {
@@ -16,7 +17,7 @@ long ExportTum(const std::string& log, const std::string& out) {
   long count = 0;
   pose_t pose;
   for (Event e; reader.Next(&e);) {
-    if (e.channel != "POSE" || !DecodeEvent(e, &pose)) continue;
+    if (e.channel != "POSE" || !DecodeBytes(e.bytes, &pose)) continue;
     const double *p = pose.pos, *q = pose.orientation;
     fmt::format_to(
         std::back_inserter(text), "{:.6f} {:.6f} {:.6f} {:.6f} {:.9f} {:.9f} {:.9f} {:.9f}\n",

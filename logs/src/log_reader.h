@@ -33,15 +33,4 @@ class LogReader {
   int64_t size_ = 0, read_ = 0;
 };
 
-/// Decodes one message; false when the bytes are not a T.
-template <class T>
-bool DecodeEvent(const Event& event, T* message) {
-  try {
-    const auto size = static_cast<int>(event.bytes.size());
-    return message->decode(event.bytes.data(), 0, size) == size;
-  } catch (const std::exception&) {  // generated decoders throw on negative lengths
-    return false;
-  }
-}
-
 }  // namespace chase::logs

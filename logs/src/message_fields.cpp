@@ -3,7 +3,7 @@
 #include <map>
 #include <type_traits>
 
-#include "logs/src/field_tables.h"
+#include "logs/src/message_types.h"
 
 namespace chase::logs {
 namespace {
@@ -56,51 +56,27 @@ class Collector {
   std::map<std::string, size_t> index_;
 };
 
-template <class T>
-std::optional<std::vector<Field>> DecodeFields(const Bytes& bytes) {
-  T message;
-  try {
-    const auto size = static_cast<int>(bytes.size());
-    if (message.decode(bytes.data(), 0, size) != size) return std::nullopt;
-  } catch (const std::exception&) {  // generated decoders throw on negative lengths
-    return std::nullopt;
-  }
-  Collector collector;
-  VisitFields(message, collector);
-  return collector.Take();
-}
-
-struct Type {
-  std::string name;
-  std::optional<std::vector<Field>> (*decode)(const Bytes&);
-};
-
 template <class... T>
-std::map<int64_t, Type> MakeTable() {
-  return {{T::getHash(), Type{T::getTypeName(), &DecodeFields<T>}}...};
-}
-
-const Type* Find(const Bytes& bytes) {
-  static const auto table = MakeTable<attitude_setpoint_t, camera_image_t, imu_t, lidar_scan_t,
-                                      map_t, obstacles_t, plan_t, pose_t, prediction_t,
-                                      scan_registered_t, scenario_t, status_t, target_t, truth_t>();
-  if (bytes.size() < 8) return nullptr;
-  uint64_t fingerprint = 0;
-  for (size_t i = 0; i < 8; ++i) fingerprint = fingerprint << 8 | bytes[i];
-  const auto at = table.find(static_cast<int64_t>(fingerprint));
-  return at == table.end() ? nullptr : &at->second;
+std::map<int64_t, std::string> Names(const std::tuple<T...>*) {
+  return {{T::getHash(), T::getTypeName()}...};
 }
 
 }  // namespace
 
 std::string TypeOf(const Bytes& message) {
-  const Type* type = Find(message);
-  return type ? type->name : "";
+  static const auto names = Names(static_cast<const MessageTypes*>(nullptr));
+  const auto at = names.find(Fingerprint(message));
+  return at == names.end() ? "" : at->second;
 }
 
-std::optional<std::vector<Field>> FieldsOf(const Bytes& message) {
-  const Type* type = Find(message);
-  return type ? type->decode(message) : std::nullopt;
+std::optional<std::vector<Field>> FieldsOf(const Bytes& bytes) {
+  std::optional<std::vector<Field>> fields;
+  WithMessage(bytes, [&](const auto& message) {
+    Collector collector;
+    VisitFields(message, collector);
+    fields = collector.Take();
+  });
+  return fields;
 }
 
 }  // namespace chase::logs

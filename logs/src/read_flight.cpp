@@ -16,6 +16,7 @@
 #include "common/bus/convert.h"
 #include "common/bus/validation.h"
 #include "logs/src/log_reader.h"
+#include "logs/src/message_types.h"
 
 namespace chase::logs {
 namespace {
@@ -68,7 +69,8 @@ class Gatherer {
   /// A vehicle's prefix may stand before the channel's name.
   template <class T>
   static bool Good(const Event& e, const std::string& name, T* message) {
-    return EndsWith(e.channel, name) && DecodeEvent(e, message) && bus::Problem(*message).empty();
+    return EndsWith(e.channel, name) && DecodeBytes(e.bytes, message) &&
+           bus::Problem(*message).empty();
   }
   template <class T>
   static bool Take(const Event& e, const std::string& name, std::vector<T>* messages) {

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <map>
 #include <regex>
 #include <sstream>
 
@@ -255,6 +256,43 @@ TEST(LogExport, CsvRowsLineUpWithTheHeader) {
   }
   const std::string obstacles = ReadText((fs::path(folder) / "OBSTACLES.csv").string());
   EXPECT_NE(obstacles.find(",10 11 12,"), std::string::npos);
+}
+
+/// Walks the records of an MCAP file; checked against the reference reader of npm @mcap/core.
+TEST(LogExport, McapHoldsEveryMessageBetweenItsMagics) {
+  const std::string out = Temp("m.mcap"), magic("\x89MCAP0\r\n", 8);
+  EXPECT_EQ(ExportMcap(WriteLog("m.lcm"), out), 24);
+  const std::string bytes = ReadText(out);
+  ASSERT_EQ(bytes.substr(0, 8), magic);
+  ASSERT_EQ(bytes.substr(bytes.size() - 8), magic);
+  const auto number = [&](size_t at) {
+    uint64_t v = 0;
+    for (size_t i = 8; i-- > 0;) v = v << 8 | static_cast<uint8_t>(bytes[at + i]);
+    return v;
+  };
+  std::map<int, int> records;
+  uint64_t counted = 0;
+  size_t at = 8;
+  for (; at + 9 < bytes.size() - 8; at += 9 + number(at + 1)) {
+    ++records[bytes[at]];
+    if (bytes[at] == 11) counted = number(at + 9);
+  }
+  EXPECT_EQ(at, bytes.size() - 8);
+  EXPECT_EQ(counted, 24u);
+  const std::map<int, int> expected = {{1, 1}, {2, 1}, {3, 2},  {4, 2}, {6, 1},
+                                       {7, 2}, {8, 1}, {11, 1}, {15, 1}};
+  EXPECT_EQ(records, expected);
+  EXPECT_NE(bytes.find("\"gyro\":[0.1,0.0,0.0]"), std::string::npos);
+}
+
+TEST(LogExport, McapOfNothingLeavesNoFile) {
+  const std::string log = Temp("foreign.lcm"), out = Temp("foreign.mcap");
+  bus::LogWriter writer(log);
+  writer.Write(1, "X", Bytes(20, 7));
+  writer.Close();
+  EXPECT_NE(ErrorOf([&] { ExportMcap(log, out); }).find("no message of ours"), std::string::npos);
+  EXPECT_FALSE(fs::exists(out));
+  EXPECT_FALSE(fs::exists(out + ".tmp"));
 }
 
 TEST(LogImport, KittiTimesFollowTheAzimuthAndRingZeroIsLowest) {
