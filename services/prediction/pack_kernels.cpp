@@ -1,7 +1,6 @@
 #include "services/prediction/pack_kernels.h"
 
 #include <algorithm>
-#include <cstring>
 #include <limits>
 
 // One body, compiled for the baseline and for AVX2; the processor decides at run time.
@@ -14,43 +13,61 @@ namespace {
 
 #define CHASE_INLINE __attribute__((always_inline)) inline
 
+// Eight lanes at any address; the compiler lowers them to what the target has.
+typedef float Floats __attribute__((vector_size(32), aligned(4), may_alias));
+typedef int Ints __attribute__((vector_size(32), aligned(4), may_alias));
+constexpr int kPack = 8, kPacks = kLanes / kPack;
+
 CHASE_INLINE float AffineRowBody(const float* constant, const float* table, const float* factors,
                                  int dims, int blocks, float* out) {
-  float least[kLanes];
-  for (int l = 0; l < kLanes; ++l) least[l] = std::numeric_limits<float>::max();
+  Floats least = Floats{} + std::numeric_limits<float>::max();
   for (int block = 0; block < blocks; ++block) {
-    float sum[kLanes];
-    for (int l = 0; l < kLanes; ++l) sum[l] = constant[l];
-    for (int d = 0; d < dims; ++d)
-      for (int l = 0; l < kLanes; ++l) sum[l] += factors[d] * table[d * kLanes + l];
-    for (int l = 0; l < kLanes; ++l) {
-      out[l] = sum[l];
-      least[l] = sum[l] < least[l] ? sum[l] : least[l];
+    const Floats* in = reinterpret_cast<const Floats*>(constant + block * kLanes);
+    Floats sum[kPacks] = {in[0], in[1], in[2], in[3]};
+    for (int d = 0; d < dims; ++d) {
+      const Floats* t = reinterpret_cast<const Floats*>(table + (block * dims + d) * kLanes);
+      for (int p = 0; p < kPacks; ++p) sum[p] += factors[d] * t[p];
     }
-    constant += kLanes;
-    table += static_cast<ptrdiff_t>(dims) * kLanes;
-    out += kLanes;
+    for (int p = 0; p < kPacks; ++p) {
+      reinterpret_cast<Floats*>(out + block * kLanes)[p] = sum[p];
+      least = sum[p] < least ? sum[p] : least;
+    }
   }
-  return *std::min_element(least, least + kLanes);
+  float result = least[0];
+  for (int l = 1; l < kPack; ++l) result = std::min(result, static_cast<float>(least[l]));
+  return result;
+}
+
+CHASE_INLINE int Sum(const Ints& lanes) {
+  int sum = 0;
+  for (int l = 0; l < kPack; ++l) sum += lanes[l];
+  return sum;
+}
+
+CHASE_INLINE int KeepBelowBody(const float* values, float limit, int blocks, int* alive) {
+  Ints count = {};
+  for (int p = 0; p < blocks * kPacks; ++p) {
+    Ints& a = reinterpret_cast<Ints*>(alive)[p];
+    a = (reinterpret_cast<const Floats*>(values)[p] < limit) & 1;
+    count += a;
+  }
+  return Sum(count);
 }
 
 CHASE_INLINE int MaskInsideBody(const float* points, const float origin[3], float limit, int blocks,
                                 int* alive) {
-  int left[kLanes] = {};
+  Ints left = {};
   for (int block = 0; block < blocks; ++block) {
-    for (int l = 0; l < kLanes; ++l) {
-      const float x = origin[0] + points[l], y = origin[1] + points[kLanes + l],
-                  z = origin[2] + points[2 * kLanes + l];
-      const int keep = (x * x + y * y + z * z) >= limit ? alive[l] : 0;
-      left[l] += keep;
-      alive[l] = keep;
+    const Floats* t = reinterpret_cast<const Floats*>(points + block * 3 * kLanes);
+    Ints* a = reinterpret_cast<Ints*>(alive + block * kLanes);
+    for (int p = 0; p < kPacks; ++p) {
+      const Floats x = origin[0] + t[p], y = origin[1] + t[kPacks + p],
+                   z = origin[2] + t[2 * kPacks + p];
+      a[p] &= (x * x + y * y + z * z) >= limit;
+      left += a[p];
     }
-    points += 3 * kLanes;
-    alive += kLanes;
   }
-  int sum = 0;
-  for (int l = 0; l < kLanes; ++l) sum += left[l];
-  return sum;
+  return Sum(left);
 }
 
 #ifdef CHASE_HAS_AVX2_BUILD
@@ -62,6 +79,10 @@ __attribute__((target("avx2"))) float AffineRowAvx2(const float* constant, const
 __attribute__((target("avx2"))) int MaskInsideAvx2(const float* points, const float origin[3],
                                                    float limit, int blocks, int* alive) {
   return MaskInsideBody(points, origin, limit, blocks, alive);
+}
+__attribute__((target("avx2"))) int KeepBelowAvx2(const float* values, float limit, int blocks,
+                                                  int* alive) {
+  return KeepBelowBody(values, limit, blocks, alive);
 }
 bool HasAvx2() {
   static const bool kHas = __builtin_cpu_supports("avx2");
@@ -77,6 +98,13 @@ float AffineRow(const float* constant, const float* table, const float* factors,
   if (HasAvx2()) return AffineRowAvx2(constant, table, factors, dims, blocks, out);
 #endif
   return AffineRowBody(constant, table, factors, dims, blocks, out);
+}
+
+int KeepBelow(const float* values, float limit, int blocks, int* alive) {
+#ifdef CHASE_HAS_AVX2_BUILD
+  if (HasAvx2()) return KeepBelowAvx2(values, limit, blocks, alive);
+#endif
+  return KeepBelowBody(values, limit, blocks, alive);
 }
 
 int MaskInside(const float* points, const float origin[3], float limit, int blocks, int* alive) {

@@ -13,6 +13,9 @@ constexpr int kLanes = 32;
 float AffineRow(const float* constant, const float* table, const float* factors, int dims,
                 int blocks, float* out);
 
+/// alive[j] = 1 where values[j] < limit, else 0. Returns how many are 1.
+int KeepBelow(const float* values, float limit, int blocks, int* alive);
+
 /// Sets alive[j] = 0 where the point origin + points[:, j] (3 rows, same layout) lies within the
 /// sphere of squared radius `limit` about zero. Returns how many stay at 1.
 int MaskInside(const float* points, const float origin[3], float limit, int blocks, int* alive);

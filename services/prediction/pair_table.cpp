@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "services/prediction/pack_kernels.h"
 
@@ -11,6 +12,7 @@ namespace chase::prediction {
 namespace {
 
 constexpr double kFloatRounding = 0x1p-24;
+constexpr int kExtraRowSteps = 0;
 
 int Power(int base, int exponent) {
   int value = 1;
@@ -29,25 +31,45 @@ std::vector<float> ToLanes(const Eigen::MatrixXd& columns, int blocks) {
   return lanes;
 }
 
+// Steps by how far their points move the end of the prediction, the farthest first.
+std::vector<int> StepsByReach(const CandidateSet& candidates) {
+  std::vector<std::pair<double, int>> reach;
+  const int n = candidates.rows();
+  for (int step = 0; step < candidates.steps(); ++step) {
+    Eigen::ArrayXd squared = Eigen::ArrayXd::Zero(candidates.samples());
+    for (int a = 0; a < candidates.axes(); ++a)
+      squared +=
+          candidates.contributions(step).middleRows(a * n, n).colwise().sum().array().square();
+    reach.emplace_back(-squared.maxCoeff(), step);
+  }
+  std::sort(reach.begin(), reach.end());
+  std::vector<int> steps;
+  for (const auto& entry : reach) steps.push_back(entry.second);
+  return steps;
+}
+
 }  // namespace
 
 PairTable::PairTable(const CandidateSet& candidates) : candidates_(candidates) {
-  const int half = candidates.steps() / 2;
-  rows_ = MakeHalf(0, half);
-  columns_ = MakeHalf(half, candidates.steps() - half);
+  const std::vector<int> steps = StepsByReach(candidates);
+  const auto half = steps.begin() + (candidates.steps() + kExtraRowSteps) / 2;
+  rows_ = MakeHalf({steps.begin(), half});
+  columns_ = MakeHalf({half, steps.end()});
   row_smoothness_ = 2.0 * candidates.smoothness().hessian_half * rows_.delta;
   row_exponent_ = 2.0 * candidates.exponent().hessian_half * rows_.delta;
   blocks_ = (columns() + kLanes - 1) / kLanes;
   column_table_ = ToLanes(columns_.delta, blocks_);
 }
 
-PairTable::Half PairTable::MakeHalf(int first_step, int steps) const {
-  const int samples = candidates_.samples(), size = Power(samples, steps);
-  Half half{steps, Eigen::MatrixXd::Zero(candidates_.dims(), size), {}, {}};
-  for (int n = 0, filled = 1; n < steps; ++n, filled *= samples) {
-    const Eigen::MatrixXd& c = candidates_.contributions(first_step + n);
+PairTable::Half PairTable::MakeHalf(std::vector<int> steps) const {
+  const int samples = candidates_.samples(), size = Power(samples, static_cast<int>(steps.size()));
+  Half half{std::move(steps), Eigen::MatrixXd::Zero(candidates_.dims(), size), {}, {}};
+  int filled = 1;
+  for (const int step : half.steps) {
+    const Eigen::MatrixXd& c = candidates_.contributions(step);
     for (int i = samples - 1; i >= 0; --i)
       half.delta.middleCols(i * filled, filled) = half.delta.leftCols(filled).colwise() + c.col(i);
+    filled *= samples;
   }
   const auto own = [&half](const CandidateSet::Quadratic& f) -> Eigen::VectorXd {
     const Eigen::MatrixXd image = (f.hessian_half * half.delta).colwise() + f.gradient;
@@ -70,11 +92,14 @@ double PairTable::Cost(int row, int column) const {
 }
 
 Choice PairTable::ChoiceOf(int row, int column) const {
-  Choice choice;
-  for (int n = 0; n < rows_.steps; ++n, row /= candidates_.samples())
-    choice.push_back(row % candidates_.samples());
-  for (int n = 0; n < columns_.steps; ++n, column /= candidates_.samples())
-    choice.push_back(column % candidates_.samples());
+  Choice choice(static_cast<size_t>(candidates_.steps()));
+  for (const auto& [half, number] : {std::pair(&rows_, row), std::pair(&columns_, column)}) {
+    int rest = number;
+    for (const int step : half->steps) {
+      choice[static_cast<size_t>(step)] = rest % candidates_.samples();
+      rest /= candidates_.samples();
+    }
+  }
   return choice;
 }
 
@@ -95,7 +120,8 @@ PairTable::Bounds PairTable::MakeBounds(double tangent) const {
       factors.cwiseAbs().rowwise().maxCoeff().dot(columns_.delta.cwiseAbs().rowwise().maxCoeff());
   const double margin = 1.01 * (candidates_.dims() + 4) * kFloatRounding * largest +
                         1e-12 * (std::abs(base) + row_own.cwiseAbs().maxCoeff());
-  bounds.own.assign(static_cast<size_t>(blocks_ * kLanes), std::numeric_limits<float>::max());
+  bounds.own.assign(static_cast<size_t>(blocks_ * kLanes),
+                    std::numeric_limits<float>::infinity());  // padding is never cheap
   Eigen::Map<Eigen::VectorXf>(bounds.own.data(), columns()) = column_own.cast<float>();
   bounds.factors.resize(static_cast<size_t>(factors.size()));
   Eigen::Map<Eigen::MatrixXf>(bounds.factors.data(), factors.rows(), factors.cols()) =
@@ -131,6 +157,11 @@ PairTable::Blocker PairTable::MakeBlocker(const HorizonObstacle& obstacle, doubl
   const double scale =
       1.0 + blocker.row_points.cwiseAbs().maxCoeff() + points.cwiseAbs().maxCoeff();
   blocker.limit = static_cast<float>(1.0 - 1e-5 * scale * scale);
+  const Eigen::Vector3d center = points.rowwise().mean();
+  const double radius = (points.colwise() - center).colwise().norm().maxCoeff();
+  for (int row = 0; row < rows(); ++row)
+    if ((blocker.row_points.col(row) + center).norm() + radius < 1.0 - 1e-9)
+      blocker.blocked_rows.push_back(row);
   return blocker;
 }
 

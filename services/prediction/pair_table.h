@@ -9,8 +9,9 @@
 namespace chase::prediction {
 
 /// The candidates as pairs: the observations are split in two halves, a row is an arrangement of
-/// the first half, a column one of the second, and delta is the sum of two half-sums. Costs and
-/// places of a pair are inner products of table entries.
+/// one half, a column one of the other, and delta is the sum of two half-sums. Costs and places of
+/// a pair are inner products of table entries. Rows take the observations that move the end of the
+/// prediction most, so that the candidates of one row stay close together.
 class PairTable {
  public:
   explicit PairTable(const CandidateSet& candidates);
@@ -44,6 +45,7 @@ class PairTable {
     Eigen::Matrix3Xd row_points;       ///< y of each row's half-sum and of the mean fit
     std::vector<float> column_points;  ///< [block][3][lane]
     float limit = 0.0F;                ///< squared radius of what is inside in spite of rounding
+    std::vector<int> blocked_rows;     ///< rows whose every pair is inside
   };
   Blocker MakeBlocker(const HorizonObstacle& obstacle, double tau) const;
   /// Zeroes alive[j] where the pair is known to collide; returns how many stay.
@@ -52,11 +54,11 @@ class PairTable {
  private:
   // Sums of contributions over half of the steps, one per arrangement of that half.
   struct Half {
-    int steps = 0;
+    std::vector<int> steps;
     Eigen::MatrixXd delta;                 // column per arrangement
     Eigen::VectorXd smoothness, exponent;  // own part of A and of x
   };
-  Half MakeHalf(int first_step, int steps) const;
+  Half MakeHalf(std::vector<int> steps) const;
 
   const CandidateSet& candidates_;
   Half rows_, columns_;

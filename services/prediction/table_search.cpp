@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <memory>
 #include <utility>
 
 #include "services/prediction/pack_kernels.h"
@@ -11,6 +13,7 @@ namespace {
 
 constexpr size_t kMaxBlockers = 32;
 constexpr int kBlockerSamples = 24;
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
 constexpr double kSharp = 1.0;  // bounds are made anew when log e^x has moved by more
 
 // One run through the table.
@@ -23,12 +26,13 @@ class Progress {
         obstacles_(obstacles),
         rest_(static_cast<size_t>(table.blocks() * kLanes)),
         alive_(rest_.size()),
-        opened_(static_cast<size_t>(table.rows()), false) {}
+        done_(static_cast<size_t>(table.rows()), false) {}
 
   SearchResult Run() {
     SortRows();
     for (size_t next = 0; next < order_.size(); ++next) {
       const auto [bound, row] = order_[next];
+      if (done_[static_cast<size_t>(row)]) continue;
       if (bound >= result_.cost * bounds_.scale) break;
       OpenRow(row);
       if (!result_.found() || std::abs(exponent_ - bounds_.tangent) <= kSharp) continue;
@@ -44,7 +48,7 @@ class Progress {
   void SortRows() {
     order_.clear();
     for (int row = 0; row < table_.rows(); ++row)
-      if (!opened_[static_cast<size_t>(row)])
+      if (!done_[static_cast<size_t>(row)])
         order_.emplace_back(bounds_.row[static_cast<size_t>(row)] +
                                 static_cast<double>(table_.FillRow(bounds_, row, rest_.data())),
                             row);
@@ -53,27 +57,31 @@ class Progress {
 
   void OpenRow(int row) {
     ++result_.nodes;
-    opened_[static_cast<size_t>(row)] = true;
+    done_[static_cast<size_t>(row)] = true;
     table_.FillRow(bounds_, row, rest_.data());
-    if (KeepCheap(row) == 0) return;
-    for (size_t i = 0; i < blockers_.size(); ++i)
-      if (table_.Mask(blockers_[i], row, alive_.data()) == 0) {
-        std::rotate(blockers_.begin(), blockers_.begin() + static_cast<ptrdiff_t>(i),
-                    blockers_.begin() + static_cast<ptrdiff_t>(i) + 1);  // likely again
-        return;
-      }
+    const int cheap = KeepCheap(row);
+    if (cheap == 0 || MaskAll(row, cheap) == 0) return;
     if (!result_.found()) FindFirst(row);
     if (result_.found()) FindCheaper(row);
   }
 
+  // Blockers that block most go first.
+  int MaskAll(int row, int left) {
+    for (size_t i = 0; i < blockers_.size() && left > 0; ++i) {
+      const int before = left;
+      left = table_.Mask(*blockers_[i].blocker, row, alive_.data());
+      blockers_[i].kills += before - left;
+      if (i > 0 && blockers_[i].kills > blockers_[i - 1].kills)
+        std::swap(blockers_[i], blockers_[i - 1]);
+    }
+    return left;
+  }
+
+  // Rounded up, so that nothing cheap is lost.
   int KeepCheap(int row) {
     const double room = result_.cost * bounds_.scale - bounds_.row[static_cast<size_t>(row)];
-    int count = 0;
-    for (size_t j = 0; j < alive_.size(); ++j) {
-      alive_[j] = static_cast<double>(rest_[j]) < room && j < static_cast<size_t>(table_.columns());
-      count += alive_[j];
-    }
-    return count;
+    const float limit = std::nextafter(static_cast<float>(room), kInfinity);
+    return KeepBelow(rest_.data(), limit, table_.blocks(), alive_.data());
   }
 
   // Until something is known to be clear: by bounds, which saves the exact costs.
@@ -126,8 +134,11 @@ class Progress {
     const HorizonObstacle& obstacle = obstacles_[static_cast<size_t>(hit_)];
     const Nearest nearest = NearestApproach(q, obstacle, kBlockerSamples);
     if (nearest.distance > 0.95) return;
-    blockers_.push_back(table_.MakeBlocker(obstacle, nearest.tau));
-    table_.Mask(blockers_.back(), row, alive_.data());
+    blockers_.push_back(
+        {std::make_unique<PairTable::Blocker>(table_.MakeBlocker(obstacle, nearest.tau)), 0});
+    const PairTable::Blocker& added = *blockers_.back().blocker;
+    for (const int blocked : added.blocked_rows) done_[static_cast<size_t>(blocked)] = true;
+    table_.Mask(added, row, alive_.data());
   }
 
   const PairTable& table_;
@@ -135,11 +146,15 @@ class Progress {
   const std::vector<HorizonObstacle>& obstacles_;
   SearchResult result_;
   double exponent_ = 0.0;  // of the best
-  std::vector<PairTable::Blocker> blockers_;
+  struct Counted {
+    std::unique_ptr<PairTable::Blocker> blocker;
+    int64_t kills;
+  };
+  std::vector<Counted> blockers_;
   std::vector<std::pair<double, int>> order_, open_;  // bound or cost, row or column
   std::vector<float> rest_;
   std::vector<int> alive_;
-  std::vector<bool> opened_;
+  std::vector<bool> done_;  // rows that were opened or are known to collide as a whole
   int hit_ = -1;
 };
 
