@@ -123,7 +123,7 @@ class Gatherer {
 
   void AddStatuses(FlightRecord* record) const {
     for (const auto& [name, status] : statuses_) {
-      record->cpu_s[name] = status.cpu;
+      if (status.cpu > 0.0) record->cpu_s[name] = status.cpu;  // not measured in lockstep
       for (const stage_status_t& s : status.stages)
         record->stages.push_back(
             {name, s.name, static_cast<long>(s.count), s.mean_ms, s.p50_ms, s.p99_ms, s.max_ms});
