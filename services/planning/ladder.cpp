@@ -110,7 +110,8 @@ class Ladder : public Planner {
   // Sight asked from ever later on, then not at all.
   bool TrySafeOnly(Problem* problem, PlanResult* result) {
     result->verdict = Verdict::kSafeOnly;
-    PlaceSkeletons(config_, Layout::kNormal, problem);
+    problem->limits.tan_elevation = 0.0;
+    PlaceSkeletons(config_, Layout::kCautious, problem);
     for (double sight_from : {0.25, 0.5, 0.75, 1.0}) {
       if (!TrySearch(*problem, sight_from, result)) continue;
       result->reason = sight_from < 1.0 ? "no candidate keeps sight; this one has it from " +

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "services/planning/candidate_set.h"
+
 namespace chase::planning {
 namespace {
 
@@ -23,15 +25,26 @@ double Uncertainty(const PlannerConfig& config, const world::Obstacle& o, double
   return std::min(config.max_inflation, config.sigmas * sigma);
 }
 
-// Lowest squared distance of the curve's samples from the ellipsoid's centre.
-double LowestDistance(const Curve& curve, const Curve& center, const Eigen::Matrix3d& R) {
+// d(x) >= (m' R x)^2 / (m' R m) for any m (Cauchy-Schwarz): with m the mean of the control points
+// of curve - center, a quick sufficient test that the curve stays out.
+bool IsPlainlyOutside(const Points& curve, const Points& center, const Eigen::Matrix3d& R) {
+  const Points x = curve - center;
+  const Eigen::Vector3d mean = x.colwise().mean().transpose();
+  const Eigen::Vector3d Rm = R * mean;
+  const double low = (x * Rm).minCoeff();
+  return low > 0.0 && low * low > kClear * Rm.dot(mean);
+}
+
+bool StaysOutside(const Curve& curve, const Curve& center, const Eigen::Matrix3d& R, double limit) {
+  if (curve.rows() <= 7 && center.rows() <= 7 &&
+      IsPlainlyOutside(ToPoints(curve, 6), ToPoints(center, 6), R))
+    return true;
   constexpr int kSamples = 24;
-  double low = HUGE_VAL;
   for (int i = 0; i <= kSamples; ++i) {
     const double tau = static_cast<double>(i) / kSamples;
-    low = std::min(low, SquaredNorm(R, Evaluate(curve, tau) - Evaluate(center, tau)));
+    if (SquaredNorm(R, Evaluate(curve, tau) - Evaluate(center, tau)) <= limit) return false;
   }
-  return low;
+  return true;
 }
 
 void Note(std::string* notes, const std::string& text) {
@@ -61,9 +74,9 @@ void SetSightShape(const PlannerConfig& config, const world::Obstacle& o, double
   const double margin = config.sight_margin + target_growth;
   for (double share : kShares) {
     e->sight = Grown(o.shape, share * margin);
-    if (margin == 0.0 || LowestDistance(problem.target, e->center, e->sight) > kClear) break;
+    if (margin == 0.0 || StaysOutside(problem.target, e->center, e->sight, kClear)) break;
   }
-  if (LowestDistance(problem.target, e->center, e->sight) > 1.0) return;
+  if (StaysOutside(problem.target, e->center, e->sight, 1.0)) return;
   e->sight_from = 1.0;
   Note(notes, "obstacle " + std::to_string(e->id) + " holds the target, its shadow is ignored");
 }

@@ -74,14 +74,44 @@ double Bearing(const Problem& problem) {
   return std::atan2(-v.y(), -v.x());
 }
 
+// Radii at tau are this much larger than wanted: from the present distance to the desired one at a
+// speed that leaves room below the limit.
+double RadiusScale(const PlannerConfig& config, const Problem& problem, double tau) {
+  constexpr double kStartsAfter = 0.5;  // s, to gather speed
+  const double distance =
+      (Evaluate(problem.start, 0.0) - Evaluate(problem.target, 0.0)).head<2>().norm();
+  const double target_speed = Evaluate(problem.target, tau, 1).norm() / problem.duration;
+  const double fastest = config.max_speed > 0.0 ? 0.6 * config.max_speed : 3.0;
+  const double closing = std::max(0.4, fastest - target_speed);
+  const double moved = closing * std::max(0.0, tau * problem.duration - kStartsAfter);
+  const double want = config.desired_distance;
+  const double radius =
+      distance > want ? std::max(want, distance - moved) : std::min(want, distance + moved);
+  return std::abs(radius - want) < 0.3 * want ? 1.0 : std::max(0.4, radius / want);
+}
+
+void AddNearDrone(Problem* problem) {
+  const Eigen::Vector3d p = Evaluate(problem->start, 0.0);
+  const Eigen::Vector3d v = Evaluate(problem->start, 0.0, 1) / problem->duration;
+  const Eigen::Vector3d stop = p + 0.3 * v;
+  for (size_t n = 0; n < problem->skeletons.size(); ++n) {
+    const double reach = 0.4 * static_cast<double>(n + 1);
+    problem->skeletons[n].push_back(stop);
+    for (int k = 0; k < 4; ++k)
+      problem->skeletons[n].push_back(
+          stop + reach * Eigen::Vector3d(std::cos(0.5 * M_PI * k), std::sin(0.5 * M_PI * k), 0.0));
+  }
+}
+
 void Place(const PlannerConfig& config, int steps, int choices, const Spread& spread, bool slide,
            Problem* problem) {
   const double bearing = Bearing(*problem);
   problem->skeletons.assign(static_cast<size_t>(steps), {});
   for (int n = 1; n <= steps; ++n) {
     const double tau = static_cast<double>(n) / steps;
+    const double scale = slide ? RadiusScale(config, *problem, tau) : 1.0;
     for (int i = 0; i < choices; ++i) {
-      const double radius = (i + n) % 2 ? spread.radius_near : spread.radius_far;
+      const double radius = scale * ((i + n) % 2 ? spread.radius_near : spread.radius_far);
       const double elevation = (i / 2 + n) % 2 ? spread.low : spread.high;
       const double azimuth = bearing + AzimuthOffset(i, choices);
       const Eigen::Vector3d q = Evaluate(problem->target, tau);
@@ -122,6 +152,11 @@ void PlaceSkeletons(const PlannerConfig& config, Layout layout, Problem* problem
     const int steps = std::min(config.steps, 3);
     Place(config, steps, AffordableChoices(2 * config.skeletons, steps), spread, true, problem);
     return;
+  }
+  if (layout == Layout::kCautious) {
+    const int steps = std::min(config.steps, 3);
+    Place(config, steps, 7, NormalSpread(config), true, problem);
+    return AddNearDrone(problem);
   }
   if (!config.adaptive) return PlaceRing(config, config.steps, config.skeletons, problem);
   const int extra = std::min(3, Clutter(config, *problem) / 2);

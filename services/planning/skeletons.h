@@ -4,7 +4,7 @@
 
 namespace chase::planning {
 
-enum class Layout { kNormal, kWide };
+enum class Layout { kNormal, kWide, kCautious };
 
 /// View skeletons (Jeon 2021, section IV-A): at the times n T / N, points around the target at
 /// radii (1 -+ spread) l_des and low elevations. Azimuths lie densest around the drone's present

@@ -1,3 +1,7 @@
 chase_test(planning_search_test
   LIBS planning_core math_exact
   SOURCES ${CMAKE_CURRENT_LIST_DIR}/planning_search_test.cpp)
+chase_test(planning_test
+  LIBS planning_core math_exact
+  SOURCES ${CMAKE_CURRENT_LIST_DIR}/planning_ladder_test.cpp
+          ${CMAKE_CURRENT_LIST_DIR}/planning_pilot_test.cpp)

@@ -30,16 +30,17 @@ class InstanceGenerator {
   PlanRequest Make(unsigned seed) const {
     std::mt19937 g(seed);
     PlanRequest request = TargetAndStart(g);
-    const std::vector<Curve> paths = SamplePaths(request, g);
+    const std::vector<Path> paths = SamplePaths(request, g);
     std::vector<char> alive(paths.size(), 1);
     const double share = Uniform(g, spec_.feasible_low, spec_.feasible_high);
     for (int tries = 1; static_cast<int>(request.obstacles.size()) < spec_.n_obstacles; ++tries) {
       const world::Obstacle o = RandomObstacle(request, g, 1.0 + tries / 400.0);
       if (HoldsTarget(o, request) || BlocksStart(o, request)) continue;
+      const Centers centers = CentersOf(o, request);
       std::vector<char> left = alive;
       int count = 0;
       for (size_t i = 0; i < paths.size(); ++i) {
-        left[i] = static_cast<char>(left[i] && !Blocks(o, paths[i], request));
+        left[i] = static_cast<char>(left[i] && !Blocks(o, centers, paths[i]));
         count += left[i];
       }
       if (count < share * static_cast<double>(paths.size())) continue;
@@ -91,13 +92,17 @@ class InstanceGenerator {
     return request;
   }
 
-  std::vector<Curve> SamplePaths(const PlanRequest& request, std::mt19937& g) const {
+  using Path = Eigen::Matrix<double, 3, 25>;
+  std::vector<Path> SamplePaths(const PlanRequest& request, std::mt19937& g) const {
     Problem problem = MakeProblem(config_, request, nullptr);
     PlaceRing(config_, config_.steps, config_.skeletons, &problem);
-    std::vector<Curve> paths;
+    const Eigen::MatrixXd inverse = InverseKkt(config_, problem);
+    std::vector<Path> paths;
     for (int i = 0; i < 96; ++i) {
       const int index = static_cast<int>(g() % static_cast<unsigned>(problem.n_candidates()));
-      paths.push_back(ReferenceCandidate(config_, problem, InverseKkt(config_, problem), index));
+      const Curve candidate = ReferenceCandidate(config_, problem, inverse, index);
+      paths.emplace_back();
+      for (int k = 0; k <= 24; ++k) paths.back().col(k) = Evaluate(candidate, k / 24.0);
     }
     return paths;
   }
@@ -136,13 +141,24 @@ class InstanceGenerator {
     const Eigen::Vector3d q = request.target.Position(0.0) - o.center.Position(0.0);
     return p.dot(o.shape * p) < 1.1 || p.dot(o.shape * q) < 1.05;
   }
-  bool Blocks(const world::Obstacle& o, const Curve& path, const PlanRequest& request) const {
+  /// Squared radii of a path's samples, and with the target's: the paper's d_p and d_s.
+  struct Centers {
+    Eigen::Matrix<double, 3, 25> c, y;  ///< centre; R (q - c)
+  };
+  Centers CentersOf(const world::Obstacle& o, const PlanRequest& request) const {
+    Centers centers;
     for (int i = 0; i <= 24; ++i) {
       const double t = spec_.horizon * i / 24.0;
-      const Eigen::Vector3d c = o.center.Position(t);
-      const Eigen::Vector3d x = Evaluate(path, i / 24.0) - c;
-      const Eigen::Vector3d y = request.target.Position(t) - c;
-      if (x.dot(o.shape * x) < 1.0 || x.dot(o.shape * y) < 1.0) return true;
+      centers.c.col(i) = o.center.Position(t);
+      centers.y.col(i) = o.shape * (request.target.Position(t) - centers.c.col(i));
+    }
+    return centers;
+  }
+  static bool Blocks(const world::Obstacle& o, const Centers& centers,
+                     const Eigen::Matrix<double, 3, 25>& path) {
+    for (int i = 0; i <= 24; ++i) {
+      const Eigen::Vector3d x = path.col(i) - centers.c.col(i);
+      if (x.dot(o.shape * x) < 1.0 || x.dot(centers.y.col(i)) < 1.0) return true;
     }
     return false;
   }

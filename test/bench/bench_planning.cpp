@@ -1,0 +1,200 @@
+// Speed of the planner against its own references. Every row plans seeded instances: full 3x3
+// shapes, every other obstacle moving, all costs on. A plan is timed by the processor time of this
+// process, median of `repeats` runs. Counters:
+//   p50_us p99_us max_us   over the instances
+//   ratio                  p50 of the double-Sturm reference over p50 of ours, both on the first
+//                          `reference_instances` instances
+//   same_winner            share of instances with the winner of the exhaustive search
+//   feasible_share         of the candidates, on the reference's instances
+
+#include <benchmark/benchmark.h>
+
+#include <algorithm>
+#include <cmath>
+#include <ctime>
+#include <vector>
+
+#include "services/planning/fast_search.h"
+#include "services/planning/reference_search.h"
+#include "test/unit/planning_instances.h"
+
+namespace chase::planning {
+namespace {
+
+constexpr int kInstances = 500;
+
+double CpuMicroseconds() {
+  timespec t{};
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
+  return 1e6 * static_cast<double>(t.tv_sec) + 1e-3 * static_cast<double>(t.tv_nsec);
+}
+
+double Quantile(std::vector<double> v, double share) {
+  if (v.empty()) return 0.0;
+  std::sort(v.begin(), v.end());
+  return v[std::min(v.size() - 1, static_cast<size_t>(share * static_cast<double>(v.size())))];
+}
+
+template <class F>
+double MedianMicroseconds(int repeats, F&& run) {
+  std::vector<double> times;
+  for (int i = 0; i < repeats; ++i) {
+    const double before = CpuMicroseconds();
+    run();
+    times.push_back(CpuMicroseconds() - before);
+  }
+  return Quantile(times, 0.5);
+}
+
+PlannerConfig Config(int steps, int skeletons, bool exact) {
+  PlannerConfig c = PlannerConfig::Literal();
+  c.steps = steps;
+  c.skeletons = skeletons;
+  c.exact_visibility = exact;
+  return c;
+}
+
+InstanceSpec Spec(int n_obstacles, bool hard) {
+  InstanceSpec s;
+  s.n_obstacles = n_obstacles;
+  if (hard) s.feasible_low = 0.0, s.feasible_high = 0.06, s.extent = 2.0;
+  return s;
+}
+
+Found Search1(Search* search, const PlannerConfig& config, const PlanRequest& request) {
+  Problem problem = MakeProblem(config, request, nullptr);
+  PlaceSkeletons(config, Layout::kNormal, &problem);
+  return search->Best(problem, 0.0);
+}
+
+void Count(benchmark::State& state, const std::vector<double>& us) {
+  state.counters["p50_us"] = Quantile(us, 0.5);
+  state.counters["p99_us"] = Quantile(us, 0.99);
+  state.counters["max_us"] = Quantile(us, 1.0);
+  state.counters["instances"] = static_cast<double>(us.size());
+}
+
+/// One row: `n_reference` of the instances go through the reference as well.
+void Plan(benchmark::State& state, int steps, int skeletons, int n_obstacles, bool hard,
+          int n_instances, int n_reference, int repeats) {
+  const PlannerConfig config = Config(steps, skeletons, false);
+  const InstanceGenerator generator(config, Spec(n_obstacles, hard));
+  const auto fast = MakeFastSearch(config);
+  const auto reference = MakeReferenceSearch(config, Arithmetic::kDoubleSturm);
+  std::vector<double> us, subset, reference_us;
+  int same = 0;
+  double feasible = 0.0;
+  for (auto _ : state) {
+    for (int i = 0; i < n_instances; ++i) {
+      const PlanRequest request = generator.Make(1000u + static_cast<unsigned>(i));
+      Found found;
+      us.push_back(
+          MedianMicroseconds(repeats, [&] { found = Search1(fast.get(), config, request); }));
+      if (i >= n_reference) continue;
+      Found expected;
+      reference_us.push_back(
+          MedianMicroseconds(1, [&] { expected = Search1(reference.get(), config, request); }));
+      subset.push_back(us.back());
+      same += found.index == expected.index;
+      feasible += static_cast<double>(expected.feasible) / expected.generated;
+    }
+  }
+  Count(state, us);
+  state.counters["ratio"] = Quantile(reference_us, 0.5) / Quantile(subset, 0.5);
+  state.counters["reference_p50_us"] = Quantile(reference_us, 0.5);
+  state.counters["same_winner"] = static_cast<double>(same) / std::max(1, n_reference);
+  state.counters["reference_instances"] = n_reference;
+  state.counters["feasible_share"] = feasible / std::max(1, n_reference);
+  state.counters["repeats"] = repeats;
+}
+
+/// Exact visibility against the paper's bound on the same instances.
+void ExactVisibility(benchmark::State& state, bool hard) {
+  const PlannerConfig bound = Config(3, 12, false), exact = Config(3, 12, true);
+  const InstanceGenerator generator(bound, Spec(50, hard));
+  const auto with_bound = MakeFastSearch(bound), with_exact = MakeFastSearch(exact);
+  std::vector<double> bound_us, us;
+  int better = 0, worse = 0;
+  for (auto _ : state) {
+    for (int i = 0; i < 200; ++i) {
+      const PlanRequest request = generator.Make(1000u + static_cast<unsigned>(i));
+      Found a, b;
+      bound_us.push_back(
+          MedianMicroseconds(5, [&] { a = Search1(with_bound.get(), bound, request); }));
+      us.push_back(MedianMicroseconds(5, [&] { b = Search1(with_exact.get(), exact, request); }));
+      const double cost_a = a.index < 0 ? HUGE_VAL : a.cost.total;
+      const double cost_b = b.index < 0 ? HUGE_VAL : b.cost.total;
+      better += cost_b < cost_a;
+      worse += cost_b > cost_a;
+    }
+  }
+  Count(state, us);
+  state.counters["time_ratio"] = Quantile(us, 0.5) / Quantile(bound_us, 0.5);
+  state.counters["better_share"] = better / 200.0;
+  state.counters["worse"] = worse;
+}
+
+double SearchP50(int steps, int skeletons, int n_obstacles) {
+  const PlannerConfig config = Config(steps, skeletons, true);
+  const InstanceGenerator generator(config, Spec(n_obstacles, false));
+  const auto fast = MakeFastSearch(config);
+  std::vector<double> us;
+  for (unsigned i = 0; i < 25; ++i) {
+    const PlanRequest request = generator.Make(3000u + i);
+    us.push_back(MedianMicroseconds(3, [&] { Search1(fast.get(), config, request); }));
+  }
+  return Quantile(us, 0.5);
+}
+
+/// Slope of log(time) over log(size), least squares.
+double Exponent(const std::vector<double>& size, const std::vector<double>& time) {
+  double sx = 0, sy = 0, sxx = 0, sxy = 0;
+  const double n = static_cast<double>(size.size());
+  for (size_t i = 0; i < size.size(); ++i) {
+    const double x = std::log(size[i]), y = std::log(time[i]);
+    sx += x, sy += y, sxx += x * x, sxy += x * y;
+  }
+  return (n * sxy - sx * sy) / (n * sxx - sx * sx);
+}
+
+void Growth(benchmark::State& state) {
+  std::vector<double> n, n_us, o, o_us;
+  for (auto _ : state) {
+    for (int skeletons : {5, 10, 22, 46}) {
+      const int choices = std::min(skeletons, 24), steps = skeletons > 24 ? 4 : 3;
+      const int used = skeletons > 24 ? 17 : choices;
+      n.push_back(std::pow(used, steps));
+      n_us.push_back(SearchP50(steps, used, 50));
+    }
+    for (int obstacles : {5, 20, 80, 300, 500}) {
+      o.push_back(obstacles);
+      o_us.push_back(SearchP50(3, 12, obstacles));
+    }
+  }
+  state.counters["exponent_candidates"] = Exponent(n, n_us);
+  state.counters["exponent_obstacles"] = Exponent(o, o_us);
+}
+
+void Register() {
+  const auto row = [](const char* name, auto&& f) {
+    benchmark::RegisterBenchmark(name, f)->Iterations(1)->Unit(benchmark::kMillisecond);
+  };
+  row("plan/1728x50", [](benchmark::State& s) { Plan(s, 3, 12, 50, false, kInstances, 60, 5); });
+  row("plan/20736x50", [](benchmark::State& s) { Plan(s, 4, 12, 50, false, kInstances, 6, 3); });
+  row("plan/hard/1728x50",
+      [](benchmark::State& s) { Plan(s, 3, 12, 50, true, kInstances, 60, 5); });
+  row("exact_visibility/1728x50", [](benchmark::State& s) { ExactVisibility(s, false); });
+  row("exact_visibility/hard/1728x50", [](benchmark::State& s) { ExactVisibility(s, true); });
+  row("growth", Growth);
+}
+
+}  // namespace
+}  // namespace chase::planning
+
+int main(int argc, char** argv) {
+  chase::planning::Register();
+  benchmark::Initialize(&argc, argv);
+  if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 1;
+  benchmark::RunSpecifiedBenchmarks();
+  return 0;
+}

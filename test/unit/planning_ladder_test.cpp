@@ -1,0 +1,164 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "services/planning/certificate.h"
+#include "services/planning/ladder.h"
+#include "services/planning/planner.h"
+#include "services/planning/problem.h"
+
+namespace chase::planning {
+namespace {
+
+PlannerConfig Config() {
+  PlannerConfig c;
+  c.skeletons = 6;
+  c.steps = 3;
+  return c;
+}
+
+/// A target walking east at 1 m/s, the drone 2.5 m behind it.
+PlanRequest Walk() {
+  PlanRequest r;
+  r.horizon = 2.5;
+  r.start.p = {-2.5, 0.0, 1.4};
+  r.start.v = {1.0, 0.0, 0.0};
+  r.target = {0.0, 2.5, Eigen::MatrixXd::Zero(2, 3)};
+  r.target.coefficients << 0.0, 0.0, 0.8, 2.5, 0.0, 0.0;
+  return r;
+}
+
+world::Obstacle Pillar(int id, double x, double y, double radius) {
+  world::Obstacle o;
+  o.id = id;
+  o.center = world::Trajectory::Constant({x, y, 1.0}, 0.0, 2.5);
+  const double r = 1.0 / (radius * radius);
+  o.shape = Eigen::Vector3d(r, r, 0.1).asDiagonal();
+  return o;
+}
+
+void ExpectContinues(const PlanResult& plan, const PlanRequest& request) {
+  const world::State s = plan.trajectory.At(request.t0);
+  EXPECT_LT((s.p - request.start.p).norm(), 1e-9);
+  EXPECT_LT((s.v - request.start.v).norm(), 1e-9);
+  EXPECT_LT((s.a - request.start.a).norm(), 1e-9);
+  EXPECT_LT((s.j - request.start.j).norm(), 1e-9);
+  EXPECT_TRUE(plan.trajectory.coefficients.allFinite());
+  for (double y : plan.yaw) EXPECT_TRUE(std::isfinite(y));
+}
+
+TEST(Ladder, OpenFieldIsAChaseInSight) {
+  const auto planner = MakePlanner("chase", Config());
+  PlanRequest request = Walk();
+  request.obstacles = {Pillar(1, 1.0, 1.2, 0.3), Pillar(2, 1.0, -1.4, 0.3)};
+  const PlanResult plan = planner->Plan(request);
+  EXPECT_EQ(plan.verdict, Verdict::kChase) << plan.reason;
+  EXPECT_EQ(plan.reason, "");
+  ExpectContinues(plan, request);
+  EXPECT_TRUE(planner->IsCertified(request, plan.trajectory));
+  EXPECT_GT(plan.feasible, 0);
+  const Problem problem = MakeProblem(Config(), request, nullptr);
+  EXPECT_EQ(SampleFaults(plan.trajectory.coefficients, problem, 0.0, 500), "");
+}
+
+TEST(Ladder, SameRequestSameBits) {
+  const auto a = MakePlanner("chase", Config()), b = MakePlanner("chase", Config());
+  PlanRequest request = Walk();
+  request.obstacles = {Pillar(1, 1.0, 1.0, 0.3)};
+  b->Plan(Walk());
+  const PlanResult x = a->Plan(request), y = b->Plan(request);
+  EXPECT_EQ(x.trajectory.coefficients, y.trajectory.coefficients);
+  EXPECT_EQ(x.yaw, y.yaw);
+  EXPECT_EQ(x.checked, y.checked);
+}
+
+TEST(Ladder, StartInsideTheMarginStillPlans) {
+  PlanRequest request = Walk();
+  request.obstacles = {Pillar(1, -2.5, 0.55, 0.3)};  // 0.25 m from the drone's centre
+  const PlanResult plan = MakePlanner("chase", Config())->Plan(request);
+  EXPECT_EQ(plan.verdict, Verdict::kChase) << plan.reason;
+  EXPECT_NE(plan.reason.find("margin of obstacle 1"), std::string::npos) << plan.reason;
+}
+
+TEST(Ladder, TargetAlreadyHiddenGivesASafePlanThatRegainsSight) {
+  PlanRequest request = Walk();
+  request.obstacles = {Pillar(1, -1.0, 0.0, 0.3)};  // right between the two
+  const PlanResult plan = MakePlanner("chase", Config())->Plan(request);
+  EXPECT_EQ(plan.verdict, Verdict::kSafeOnly) << plan.reason;
+  ExpectContinues(plan, request);
+  const Problem problem = MakeProblem(Config(), request, nullptr);
+  EXPECT_EQ(SampleFaults(plan.trajectory.coefficients, problem, 1.0, 500), "");
+}
+
+TEST(Ladder, TargetInsideAnObstacleIsSaidAndDoesNotBlockEverything) {
+  PlanRequest request = Walk();
+  request.obstacles = {Pillar(7, 1.0, 0.0, 0.3)};  // the target walks through it
+  const PlanResult plan = MakePlanner("chase", Config())->Plan(request);
+  EXPECT_EQ(plan.verdict, Verdict::kSafeOnly);
+  EXPECT_NE(plan.reason.find("obstacle 7 holds the target"), std::string::npos) << plan.reason;
+}
+
+TEST(Ladder, NothingFeasibleBrakesToRest) {
+  PlanRequest request = Walk();
+  for (int i = 0; i < 16; ++i) {  // a cage around the drone
+    const double angle = 2.0 * M_PI * i / 16;
+    request.obstacles.push_back(
+        Pillar(i, -2.5 + 1.5 * std::cos(angle), 1.5 * std::sin(angle), 0.4));
+  }
+  const PlanResult plan = MakePlanner("chase", Config())->Plan(request);
+  EXPECT_EQ(plan.verdict, Verdict::kBrake) << plan.reason;
+  ExpectContinues(plan, request);
+  const world::State end = plan.trajectory.At(plan.trajectory.end());
+  EXPECT_LT(end.v.norm() + end.a.norm(), 1e-9);
+}
+
+TEST(Ladder, KeepsTheRunningPlanWhileItIsCertified) {
+  PlannerConfig config = Config();
+  PlanRequest request = Walk();
+  request.obstacles = {Pillar(1, 0.0, 1.4, 0.3), Pillar(2, 0.0, -1.4, 0.3)};
+  const PlanResult first = MakePlanner("chase", config)->Plan(request);
+  ASSERT_EQ(first.verdict, Verdict::kChase);
+  config.desired_distance = 40.0;  // its candidates now all break the speed limit
+  request.t0 = 0.2;
+  request.start = first.trajectory.At(0.2);
+  request.running = first.trajectory;
+  const PlanResult kept = MakePlanner("chase", config)->Plan(request);
+  EXPECT_EQ(kept.verdict, Verdict::kKept) << kept.reason;
+  EXPECT_LT((kept.trajectory.Position(1.5) - first.trajectory.Position(1.5)).norm(), 1e-9);
+}
+
+TEST(Ladder, ObstacleOnTheRunningPlanEndsItsCertificate) {
+  const auto planner = MakePlanner("chase", Config());
+  PlanRequest request = Walk();
+  const PlanResult plan = planner->Plan(request);
+  EXPECT_TRUE(planner->IsCertified(request, plan.trajectory));
+  const Eigen::Vector3d ahead = plan.trajectory.Position(1.5);
+  request.obstacles = {Pillar(3, ahead.x(), ahead.y(), 0.3)};
+  EXPECT_FALSE(planner->IsCertified(request, plan.trajectory));
+}
+
+TEST(Ladder, TargetOnTopOfTheDroneIsSurvived) {
+  PlanRequest request = Walk();
+  request.start.p = request.target.Position(0.0);
+  const PlanResult plan = MakePlanner("chase", Config())->Plan(request);
+  ExpectContinues(plan, request);
+}
+
+TEST(Ladder, NotFiniteRequestGivesNoFeasibleCandidate) {
+  PlanRequest request = Walk();
+  request.start.v.x() = std::nan("");
+  const PlanResult plan = MakePlanner("chase", Config())->Plan(request);
+  EXPECT_EQ(plan.verdict, Verdict::kBrake);
+}
+
+TEST(Planner, UnknownNameIsRefusedWithTheKnownOnes) {
+  try {
+    MakePlanner("fastest", PlannerConfig());
+    FAIL();
+  } catch (const std::invalid_argument& e) {
+    EXPECT_NE(std::string(e.what()).find("reference-double"), std::string::npos);
+  }
+}
+
+}  // namespace
+}  // namespace chase::planning

@@ -1,0 +1,128 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "services/planning/pilot.h"
+
+namespace chase::planning {
+namespace {
+
+constexpr double kPeriod = 0.005;
+
+Forecast Walking(double t) {
+  Forecast f;
+  f.t = t;
+  f.has_target = true;
+  f.target = {t, 2.5, Eigen::MatrixXd::Zero(2, 3)};
+  f.target.coefficients << 2.5 + 0.8 * t, 0.0, 0.5, 0.8 * 2.5, 0.0, 0.0;
+  return f;
+}
+
+/// Flies the pilot's plans perfectly.
+class Flight {
+ public:
+  explicit Flight(const PlanningConfig& config) : pilot(config) {}
+
+  void Run(double seconds, bool with_target) {
+    for (const double end = t + seconds; t < end; t += kPeriod) {
+      if (with_target && std::fmod(t, 0.3) < kPeriod) pilot.SetForecast(Walking(t));
+      if (const auto plan = pilot.Update(t, Body())) {
+        plans.push_back(*plan);
+        waiting = *plan;
+      }
+      if (waiting && waiting->trajectory.start <= t) Switch();
+      if (flown) largest_step = std::max(largest_step, (Body().p - last).norm());
+      last = Body().p;
+    }
+  }
+
+  BodyEstimate Body() const {
+    if (!flown) return {{0.0, 0.0, 0.1}, {0.0, 0.0, 0.0}, 0.0};
+    const double now = std::min(t, flown->trajectory.end());
+    return {flown->trajectory.Position(now), flown->trajectory.Velocity(now), 0.0};
+  }
+
+  Pilot pilot;
+  double t = 0.0;
+  double largest_step = 0.0, largest_kink = 0.0;
+  std::vector<PlanResult> plans;
+  std::optional<PlanResult> flown, waiting;
+
+ private:
+  void Switch() {
+    if (flown) {
+      const double before = std::min(waiting->trajectory.start, flown->trajectory.end());
+      largest_kink =
+          std::max(largest_kink, (flown->trajectory.Position(before) -
+                                  waiting->trajectory.Position(waiting->trajectory.start))
+                                     .norm());
+    }
+    flown = waiting;
+    waiting.reset();
+  }
+  Eigen::Vector3d last = Eigen::Vector3d::Zero();
+};
+
+TEST(Pilot, ClimbsAndHoversWithoutATarget) {
+  Flight flight{PlanningConfig()};
+  flight.Run(6.0, false);
+  EXPECT_EQ(flight.plans.front().verdict, Verdict::kWait);
+  EXPECT_EQ(flight.plans.back().verdict, Verdict::kWait);
+  EXPECT_NEAR(flight.Body().p.z(), 0.1 + PlanningConfig().takeoff_height, 1e-6);
+  EXPECT_LT(flight.largest_kink, 1e-6);
+}
+
+TEST(Pilot, ChasesFollowsAndHoversWhenTheTargetIsLost) {
+  Flight flight{PlanningConfig()};
+  flight.Run(4.0, false);
+  flight.Run(8.0, true);
+  EXPECT_EQ(flight.plans.back().verdict, Verdict::kChase) << flight.plans.back().reason;
+  const Eigen::Vector3d r = Walking(flight.t).target.Position(flight.t) - flight.Body().p;
+  EXPECT_GT(r.norm(), 1.5);
+  EXPECT_LT(r.norm(), 3.6);
+  flight.Run(8.0, false);
+  EXPECT_EQ(flight.plans.back().verdict, Verdict::kWait);
+  EXPECT_NE(flight.plans.back().reason.find("looking around"), std::string::npos);
+  EXPECT_LT(flight.Body().v.norm(), 0.05);
+  EXPECT_LT(flight.largest_kink, 1e-6) << "plans continue where the one before is left";
+  EXPECT_LT(flight.largest_step, 0.05);
+}
+
+TEST(Pilot, NeverPlansFasterThanItsLeastPeriod) {
+  PlanningConfig config;
+  Flight flight(config);
+  flight.Run(4.0, false);
+  const size_t before = flight.plans.size();
+  flight.Run(2.0, true);
+  EXPECT_LE(flight.plans.size() - before, static_cast<size_t>(2.0 / config.min_period) + 2);
+  EXPECT_GE(flight.plans.size() - before, static_cast<size_t>(2.0 / config.replan_period) - 2);
+}
+
+TEST(Pilot, LargeTrackingErrorRestartsFromTheEstimate) {
+  Pilot pilot{PlanningConfig()};
+  pilot.Update(0.0, {{0.0, 0.0, 0.0}, {}, 0.0});
+  for (double t = 0.005; t < 5.0; t += kPeriod)
+    pilot.Update(t, pilot.running().trajectory.degree()
+                        ? BodyEstimate{pilot.running().trajectory.Position(
+                                           std::min(t, pilot.running().trajectory.end())),
+                                       {},
+                                       0.0}
+                        : BodyEstimate{pilot.running().trajectory.Position(t), {}, 0.0});
+  const Eigen::Vector3d away = pilot.running().trajectory.Position(5.0) + Eigen::Vector3d(1, 0, 0);
+  const auto plan = pilot.Update(6.0, {away, {}, 0.0});
+  ASSERT_TRUE(plan);
+  EXPECT_LT((plan->trajectory.Position(plan->trajectory.start) - away).norm(), 1e-9);
+}
+
+TEST(PlanningConfig, DefaultsAreFineAndBadValuesAreNamed) {
+  PlanningConfig config;
+  EXPECT_EQ(config.Problem(), "");
+  EXPECT_EQ(config.planner.Problem(), "");
+  config.horizon = 0.0;
+  EXPECT_NE(config.Problem().find("horizon"), std::string::npos);
+  config.planner.skeletons = 100;
+  EXPECT_NE(config.planner.Problem().find("skeletons"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace chase::planning
