@@ -11,7 +11,7 @@
 namespace chase::prediction {
 namespace {
 
-constexpr size_t kMaxBlockers = 32;
+constexpr size_t kMaxBlockers = 128;
 constexpr int kBlockerSamples = 24;
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 constexpr double kSharp = 1.0;  // bounds are made anew when log e^x has moved by more

@@ -78,8 +78,8 @@ TEST(Predictor, OkMeansClearOfEveryObstacleAtEveryTime) {
 }
 
 TEST(Predictor, SaysSoWhenEverythingCollidesAndOffersTheLeastBad) {
-  PredictRequest request = Straight(0.8);
-  world::Obstacle wall = Pillar(0.42, 0.0, 0.3);
+  PredictRequest request = Straight(2.0);
+  world::Obstacle wall = Pillar(0.6, 0.0, 0.3);
   wall.shape(1, 1) = 0.01;
   request.obstacles.push_back(wall);
   const PredictResult result = Predictor({}).Predict(request);
