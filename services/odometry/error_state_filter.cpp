@@ -95,7 +95,7 @@ UpdateResult Update(const FilterConfig& config, const PoseMeasurement& z, NavSta
   floor << Eigen::Vector3d::Constant(config.match_position_floor),
       Eigen::Vector3d::Constant(config.match_rotation_floor);
   const Eigen::LDLT<Eigen::MatrixXd> information(reduced);
-  if (information.info() != Eigen::Success || !information.isPositive()) return {};
+  if (information.info() != Eigen::Success || !(information.vectorD().minCoeff() > 0.0)) return {};
   const Eigen::MatrixXd onto = (V.transpose() * V).ldlt().solve(V.transpose());  // V onto = proj.
   const Eigen::MatrixXd noise = information.solve(Eigen::MatrixXd::Identity(k, k)) +
                                 onto * floor.cwiseAbs2().asDiagonal() * onto.transpose();
@@ -105,7 +105,7 @@ UpdateResult Update(const FilterConfig& config, const PoseMeasurement& z, NavSta
   H.middleCols<3>(kTheta) = onto.rightCols<3>();
   const Eigen::MatrixXd S = H * state->P * H.transpose() + noise;
   const Eigen::LDLT<Eigen::MatrixXd> solver(S);
-  if (solver.info() != Eigen::Success || !solver.isPositive()) return {};
+  if (solver.info() != Eigen::Success || !(solver.vectorD().minCoeff() > 0.0)) return {};
   const Eigen::MatrixXd K = solver.solve(H * state->P).transpose();
   const Eigen::VectorXd innovation = onto * e;
   const ErrorVector dx = K * innovation;

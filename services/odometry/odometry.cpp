@@ -113,22 +113,22 @@ void Odometry::AddSweep(Sweep sweep) {
     ++dropped_sweeps_;
     return;
   }
-  pending_.push_back(std::move(sweep));
+  pending_.push_back({std::move(sweep), imu_.newest()});
 }
 
 bool Odometry::SweepReady() const {
   if (pending_.empty()) return false;
   if (!fused_ || pending_.size() > 1) return true;
-  const double end = pending_.front().start + LastTime(pending_.front().points);
+  const double end = pending_.front().sweep.start + LastTime(pending_.front().sweep.points);
   return imu_.newest() >= end || imu_.newest() < end - kWaitForImu;
 }
 
 SweepResult Odometry::ProcessSweep() {
   SweepResult result;
   Prepared prepared;
-  Sweep sweep = std::move(pending_.front());
+  Pending pending = std::move(pending_.front());
   pending_.pop_front();
-  if (!Prepare(std::move(sweep), &prepared)) return result;
+  if (!Prepare(std::move(pending), &prepared)) return result;
   const bool blind = Blind(prepared.end);
   result.match = Match(&prepared);
   const bool first = planes_.cells() == 0;
@@ -153,14 +153,15 @@ SweepResult Odometry::ProcessSweep() {
   return result;
 }
 
-bool Odometry::Prepare(Sweep sweep, Prepared* prepared) {
+bool Odometry::Prepare(Pending pending, Prepared* prepared) {
+  Sweep& sweep = pending.sweep;
   RemoveUnusable(config_.features, &sweep.points);
   const int returns = static_cast<int>(sweep.points.size());
   prepared->end = sweep.start + LastTime(sweep.points);
   if (!started_ && returns > 0) StartBlind(prepared->end - 1e-6);
   if (!started_) return false;
   const bool silent = fused_ && imu_.newest() < prepared->end - kWaitForImu;
-  health_.OnSweep(prepared->end, returns, fused_ ? imu_.newest() : prepared->end, silent);
+  health_.OnSweep(prepared->end, returns, fused_ ? pending.imu_t : prepared->end, silent);
   if (returns == 0) {
     health_.OnMatch(prepared->end, MatchResult{}, false);
     return false;

@@ -61,6 +61,10 @@ class Odometry {
   size_t map_cells() const { return planes_.cells() + edges_.cells(); }
 
  private:
+  struct Pending {
+    Sweep sweep;
+    double imu_t;  // of the newest sample when the sweep came
+  };
   struct Prepared {
     Sweep sweep;
     double end = 0.0;
@@ -72,7 +76,7 @@ class Odometry {
 
   std::optional<PoseEstimate> Align(const ImuSample& imu);
   void StartBlind(double t);
-  bool Prepare(Sweep sweep, Prepared* prepared);
+  bool Prepare(Pending pending, Prepared* prepared);
   SweepMotion MotionOver(const Prepared& prepared) const;
   Features FeaturesIn(const Prepared& prepared, const SweepMotion& motion) const;
   MatchResult Match(Prepared* prepared);
@@ -103,7 +107,7 @@ class Odometry {
   int sweeps_to_anchor_ = 0;  // after a start in motion the map begins again this many sweeps later
   NavState base_;             // at the end of the last sweep
   NavState live_;             // at the newest sample
-  std::deque<Sweep> pending_;
+  std::deque<Pending> pending_;
   std::optional<Prepared> first_;  // of a start without IMU, until the velocity is known
   double thin_size_ = 0.3;         // m
   int64_t dropped_sweeps_ = 0, dropped_samples_ = 0;

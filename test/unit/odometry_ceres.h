@@ -1,0 +1,12 @@
+#pragma once
+
+#include "services/odometry/scan_matcher.h"
+
+namespace chase::odometry::test {
+
+/// The matching problem at fixed correspondences (those at `start`) solved by Ceres with automatic
+/// derivatives: the reference for the hand-made Gauss-Newton. `kernel` as in MatchConfig, m.
+Pose MatchWithCeres(const std::vector<FeaturePoint>& planes, const SurfaceMap& map,
+                    const Pose& start, double kernel);
+
+}  // namespace chase::odometry::test

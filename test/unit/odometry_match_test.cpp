@@ -1,0 +1,141 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "common/math/rotation.h"
+#include "services/odometry/deskew.h"
+#include "services/odometry/features.h"
+#include "services/odometry/scan_matcher.h"
+#include "test/unit/odometry_ceres.h"
+#include "test/unit/odometry_synthetic.h"
+
+namespace chase::odometry {
+namespace {
+
+using test::Hall;
+using test::Noise;
+using test::SensorModel;
+
+const Pose kStill{};
+
+/// A map of the hall from a few places, and a sweep from another place.
+struct Room {
+  SurfaceMap planes{MapConfig{}, SurfaceKind::kPlane};
+  SurfaceMap edges{MapConfig{}, SurfaceKind::kLine};
+  Features features;
+  Pose truth{math::ExpSO3({0.05, -0.04, 0.6}), {0.4, 1.0, 1.4}};
+
+  explicit Room(const Hall& hall) {
+    Noise noise(1);
+    for (int i = 0; i < 5; ++i) {
+      const Pose at{math::FromYaw(0.3 * i), {0.3 * i - 0.6, 0.5 * i, 1.2 + 0.1 * i}};
+      const Features seen = FeaturesFrom(hall, at, 1, &noise);
+      for (const auto& point : seen.planes) planes.Add((at * point.p.cast<double>()).cast<float>());
+      for (const auto& point : seen.edges) edges.Add((at * point.p.cast<double>()).cast<float>());
+    }
+    features = FeaturesFrom(hall, truth, 10, &noise);
+  }
+
+  static Features FeaturesFrom(const Hall& hall, const Pose& at, size_t stride, Noise* noise) {
+    const Sweep sweep = test::Scan(
+        hall, [&](double) { return at; }, 0.0, SensorModel{}, noise);
+    const FeatureSet set = ExtractFeatures(FeatureConfig{}, sweep.points);
+    std::vector<int> planes;
+    for (size_t i = 0; i < set.planes.size(); i += stride) planes.push_back(set.planes[i]);
+    return {Deskewed(sweep.points, planes, kStill, SweepMotion::Still()),
+            Deskewed(sweep.points, set.edges, kStill, SweepMotion::Still())};
+  }
+};
+
+Pose Disturbed(const Pose& pose, Noise* noise, double position, double rotation) {
+  return {math::ExpSO3(noise->Vector(rotation)) * pose.R, pose.p + noise->Vector(position)};
+}
+
+TEST(ScanMatcher, JacobiansAgreeWithFiniteDifferences) {
+  Noise noise(2);
+  constexpr double h = 1e-6;
+  for (int trial = 0; trial < 50; ++trial) {
+    Surface surface;
+    surface.center = noise.Vector(3.0).cast<float>();
+    surface.direction = noise.Vector(1.0).normalized().cast<float>();
+    const Pose X{math::ExpSO3(noise.Vector(1.0)), noise.Vector(2.0)};
+    const Eigen::Vector3d p_B = noise.Vector(4.0);
+    for (auto* residual : {&PlaneResidual, &EdgeResidual}) {
+      Vector6d J, unused;
+      const double r = (*residual)(X * p_B, X.R * p_B, surface, &J);
+      for (int i = 0; i < 6; ++i) {
+        Vector6d step = Vector6d::Zero();
+        step[i] = h;
+        const Eigen::Quaterniond R = math::ExpSO3(step.tail<3>()) * X.R;
+        const Eigen::Vector3d p_W = R * p_B + X.p + step.head<3>();
+        const double moved = (*residual)(p_W, R * p_B, surface, &unused);
+        EXPECT_NEAR((moved - r) / h, J[i], 2e-4) << "trial " << trial << " column " << i;
+      }
+    }
+  }
+}
+
+TEST(ScanMatcher, FindsThePoseFromDisturbedStarts) {
+  const Room room(Hall{});
+  const ScanMatcher matcher(MatchConfig{});
+  Noise noise(3);
+  for (int trial = 0; trial < 10; ++trial) {
+    const Pose start = Disturbed(room.truth, &noise, 0.08, 0.02);
+    const MatchResult match = matcher.Match(room.features, room.planes, room.edges, start, 0.3);
+    ASSERT_TRUE(match.valid) << "trial " << trial;
+    EXPECT_FALSE(match.degenerate());
+    EXPECT_LT((match.X_WB.p - room.truth.p).norm(), 0.02) << "trial " << trial;
+    EXPECT_LT(match.X_WB.R.angularDistance(room.truth.R), 0.004) << "trial " << trial;
+  }
+}
+
+TEST(ScanMatcher, AgreesWithCeres) {
+  const Room room(Hall{});
+  MatchConfig config;
+  config.max_iterations = 30;
+  const ScanMatcher matcher(config);
+  Features planes_only{room.features.planes, {}};
+  const SurfaceMap no_edges(MapConfig{}, SurfaceKind::kLine);
+  const MatchResult ours = matcher.Match(planes_only, room.planes, no_edges, room.truth, 0.3);
+  ASSERT_TRUE(ours.valid);
+  const Pose reference =
+      test::MatchWithCeres(planes_only.planes, room.planes, ours.X_WB, config.kernel);
+  // Ceres does not weigh surfaces by their variance; the minimum is the same to a few millimetres.
+  EXPECT_LT((ours.X_WB.p - reference.p).norm(), 0.005);
+  EXPECT_LT(ours.X_WB.R.angularDistance(reference.R), 0.001);
+}
+
+TEST(ScanMatcher, CorridorLeavesItsAxisToThePrediction) {
+  Hall corridor;
+  corridor.ends_open = true;
+  const Room room(corridor);
+  const ScanMatcher matcher(MatchConfig{});
+  Pose start = room.truth;
+  start.p += Eigen::Vector3d(0.05, 0.20, -0.03);
+  const MatchResult match = matcher.Match(room.features, room.planes, room.edges, start, 0.3);
+  ASSERT_TRUE(match.valid);
+  EXPECT_TRUE(match.degenerate());
+  EXPECT_GT(std::abs(match.weakest[1]), 0.9);
+  EXPECT_NEAR(match.X_WB.p.x(), room.truth.p.x(), 0.02);
+  EXPECT_NEAR(match.X_WB.p.y(), start.p.y(), 0.05);
+}
+
+TEST(ScanMatcher, NoFeaturesIsNoMatch) {
+  const Room room(Hall{});
+  const MatchResult match =
+      ScanMatcher(MatchConfig{}).Match({}, room.planes, room.edges, room.truth, 0.1);
+  EXPECT_FALSE(match.valid);
+  EXPECT_TRUE(match.X_WB.p.allFinite());
+}
+
+TEST(ScanMatcher, AnotherPlaceIsNoMatch) {
+  const Room room(Hall{});
+  Pose elsewhere = room.truth;
+  elsewhere.p += Eigen::Vector3d(60.0, 0.0, 0.0);
+  EXPECT_FALSE(ScanMatcher(MatchConfig{})
+                   .Match(room.features, room.planes, room.edges, elsewhere, 0.1)
+                   .valid);
+}
+
+}  // namespace
+}  // namespace chase::odometry

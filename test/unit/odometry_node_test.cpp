@@ -1,0 +1,98 @@
+#include "services/odometry/odometry_node.h"
+
+#include <gtest/gtest.h>
+
+#include <memory>
+#include <vector>
+
+#include "chase/pose_t.hpp"
+#include "chase/scan_registered_t.hpp"
+#include "common/bus/convert.h"
+#include "common/bus/lockstep.h"
+#include "test/unit/odometry_synthetic.h"
+
+namespace chase::odometry {
+namespace {
+
+constexpr int64_t kStart = 1'700'000'000'000'000;  // microseconds
+
+class Silent : public bus::Node {};
+
+/// The node on an in-memory bus, with a hand on both ends.
+class Bench {
+ public:
+  Bench() {
+    lockstep_.Add("test", 0, [this](bus::Bus& bus) {
+      bus_ = &bus;
+      bus.Subscribe<pose_t>("POSE", [this](const pose_t& m) { poses.push_back(m); });
+      bus.Subscribe<scan_registered_t>("SCAN_REGISTERED",
+                                       [this](const scan_registered_t& m) { sweeps.push_back(m); });
+      return std::make_unique<Silent>();
+    });
+    lockstep_.Add("odometry", 0, [](bus::Bus& bus) {
+      return std::make_unique<OdometryNode>(bus, OdometryConfig{});
+    });
+  }
+
+  void SendImu(int64_t utime) {
+    imu_t m{};
+    m.utime = utime;
+    bus::Set(m.accel, Eigen::Vector3d(0.0, 0.0, 9.81));
+    bus_->Publish("IMU", m);
+    lockstep_.RunUntil(utime);
+  }
+
+  void SendScan(int64_t utime, int64_t now) {
+    const auto X_WL = [](double) { return Pose{Eigen::Quaterniond::Identity(), {0, 0, 0.3}}; };
+    const Sweep sweep = test::Scan(test::Hall{}, X_WL, 0.0, test::SensorModel{}, &noise_);
+    lidar_scan_t m{};
+    m.utime = utime;
+    m.size = static_cast<int32_t>(sweep.points.size());
+    for (const auto& point : sweep.points) {
+      m.x.push_back(point.p.x()), m.y.push_back(point.p.y()), m.z.push_back(point.p.z());
+      m.t.push_back(point.t);
+      m.intensity.push_back(point.intensity), m.ring.push_back(point.ring);
+    }
+    bus_->Publish("LIDAR_SCAN", m);
+    lockstep_.RunUntil(now);
+  }
+
+  std::vector<pose_t> poses;
+  std::vector<scan_registered_t> sweeps;
+
+ private:
+  bus::Lockstep lockstep_{kStart};
+  bus::Bus* bus_ = nullptr;
+  test::Noise noise_{1};
+};
+
+TEST(OdometryNode, PoseAtEverySampleAndOneRegisteredSweepPerScan) {
+  Bench bench;
+  for (int i = 0; i <= 300; ++i) {
+    const int64_t now = kStart + 5000 * i;
+    bench.SendImu(now);
+    if (i > 0 && i % 20 == 0) bench.SendScan(now - 100000, now);
+  }
+  ASSERT_EQ(bench.poses.size(), 301u);
+  EXPECT_EQ(bench.poses.front().health, int{pose_t::HEALTH_STARTING});
+  EXPECT_EQ(bench.poses.back().health, int{pose_t::HEALTH_OK}) << bench.poses.back().reason;
+  EXPECT_EQ(bench.poses.back().utime, kStart + 5000 * 300);
+  for (size_t i = 1; i < bench.poses.size(); ++i)
+    EXPECT_EQ(bench.poses[i].utime - bench.poses[i - 1].utime, 5000);
+  ASSERT_GE(bench.sweeps.size(), 9u);
+  const scan_registered_t& sweep = bench.sweeps.back();
+  EXPECT_EQ(sweep.health, int{pose_t::HEALTH_OK});
+  EXPECT_GT(sweep.size, 20000);
+  EXPECT_NEAR(static_cast<double>(sweep.utime - kStart), 1.5e6, 1000.0);
+  EXPECT_NEAR(sweep.pos[2], 0.1, 0.02);  // the rig's lidar above a body at the origin
+}
+
+TEST(OdometryNode, WithoutImuOnePosePerScan) {
+  Bench bench;
+  for (int i = 0; i < 5; ++i) bench.SendScan(kStart + 100000 * i, kStart + 100000 * (i + 1));
+  EXPECT_EQ(bench.poses.size(), 5u);
+  EXPECT_EQ(bench.sweeps.size(), 5u);
+}
+
+}  // namespace
+}  // namespace chase::odometry

@@ -1,0 +1,228 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "common/math/rotation.h"
+#include "services/odometry/correction_blend.h"
+#include "services/odometry/deskew.h"
+#include "services/odometry/error_state_filter.h"
+#include "services/odometry/features.h"
+#include "services/odometry/odometry_config.h"
+#include "services/odometry/surface_map.h"
+#include "test/unit/odometry_synthetic.h"
+
+namespace chase::odometry {
+namespace {
+
+using test::Flight;
+using test::Hall;
+using test::Noise;
+using test::SensorModel;
+
+Pose TwistedPose(double t) {
+  return {math::ExpSO3({0.3 * t, -0.5 * t, 1.5 * t}), {2.0 * t, -t, 0.5 * t}};
+}
+
+SensorModel Noiseless() {
+  SensorModel model;
+  model.range_noise = 0.0;
+  return model;
+}
+
+TEST(Deskew, SweepTakenInMotionMatchesSweepTakenAtRestAtItsEnd) {
+  Hall hall;
+  hall.pillars.clear();
+  Noise noise(1);
+  const auto X_WL = [](double t) {
+    Pose pose = TwistedPose(t);
+    pose.p.z() += 1.5;
+    return pose;
+  };
+  const Sweep sweep = test::Scan(hall, X_WL, 0.0, Noiseless(), &noise);
+  std::vector<Pose> poses;
+  for (int i = 0; i <= 20; ++i) poses.push_back(X_WL(0.005 * i));
+  const SweepMotion motion(poses, 0.005);
+  const Pose end = X_WL(0.1);
+  for (size_t i = 0; i < sweep.points.size(); i += 37) {
+    const SweepPoint& point = sweep.points[i];
+    const Eigen::Vector3d p_W = end * motion.ToEnd(point.p, point.t).cast<double>();
+    const Eigen::Vector3d truth = X_WL(point.t) * point.p.cast<double>();
+    EXPECT_LT((p_W - truth).norm(), 1.5e-3) << "point " << i;
+    // Every return lies on a wall again.
+    const double gap =
+        std::min((p_W - hall.min).cwiseAbs().minCoeff(), (p_W - hall.max).cwiseAbs().minCoeff());
+    EXPECT_LT(gap, 1.5e-3);
+  }
+}
+
+TEST(Deskew, StillBodyChangesNothing) {
+  const Eigen::Vector3f p(1.0f, 2.0f, 3.0f);
+  EXPECT_TRUE(SweepMotion::Still().ToEnd(p, 0.07f).isApprox(p));
+}
+
+TEST(FeaturesOfARoom, WallsGivePlanesAndCornersGiveEdges) {
+  Hall hall;
+  hall.pillars.clear();
+  Noise noise(2);
+  const auto X_WL = [](double) { return Pose{Eigen::Quaterniond::Identity(), {0.5, 0.5, 1.5}}; };
+  const Sweep sweep = test::Scan(hall, X_WL, 0.0, SensorModel{}, &noise);
+  const FeatureSet features = ExtractFeatures(FeatureConfig{}, sweep.points);
+  EXPECT_GT(features.planes.size(), sweep.points.size() / 2);
+  ASSERT_GT(features.edges.size(), 10u);
+  int at_corner = 0;
+  for (int i : features.edges) {
+    const Eigen::Vector3d p_W = sweep.points[static_cast<size_t>(i)].p.cast<double>() + X_WL(0).p;
+    const Eigen::Vector3d gap = (p_W - hall.min).cwiseAbs().cwiseMin((p_W - hall.max).cwiseAbs());
+    int near = 0;
+    for (int axis = 0; axis < 3; ++axis) near += gap[axis] < 0.25 ? 1 : 0;
+    at_corner += near >= 2 ? 1 : 0;
+  }
+  EXPECT_GT(at_corner, 0.9 * static_cast<double>(features.edges.size()));
+}
+
+TEST(FeaturesOfARoom, UnusablePointsAreRemoved) {
+  std::vector<SweepPoint> points(6);
+  points[0].p = {std::nanf(""), 0.0f, 0.0f};
+  points[1].p = {0.1f, 0.0f, 0.0f};
+  points[2].p = {500.0f, 0.0f, 0.0f};
+  points[3].p = points[4].p = points[5].p = {5.0f, 0.0f, 0.0f};
+  points[3].t = -1.0f;
+  points[4].t = std::nanf("");
+  RemoveUnusable(FeatureConfig{}, &points);
+  EXPECT_EQ(points.size(), 1u);
+}
+
+TEST(SurfaceMap, FindsThePlaneThatItsPointsCameFrom) {
+  Noise noise(3);
+  SurfaceMap map(MapConfig{}, SurfaceKind::kPlane);
+  const Eigen::Vector3d normal = Eigen::Vector3d(1.0, 2.0, -0.5).normalized();
+  const Eigen::Vector3d u = normal.unitOrthogonal(), v = normal.cross(u);
+  for (int i = 0; i < 20000; ++i)
+    map.Add((4.0 * (noise.Uniform() - 0.5) * u + 4.0 * (noise.Uniform() - 0.5) * v +
+             noise.Gauss(0.01) * normal)
+                .cast<float>());
+  const Surface* surface = map.Find(Eigen::Vector3f::Zero());
+  ASSERT_NE(surface, nullptr);
+  EXPECT_GT(std::abs(surface->direction.cast<double>().dot(normal)), 0.99);
+  EXPECT_LT(std::abs(surface->center.cast<double>().dot(normal)), 0.01);
+  EXPECT_EQ(map.Find(Eigen::Vector3f(50.0f, 0.0f, 0.0f)), nullptr);
+}
+
+TEST(SurfaceMap, MemoryStaysBoundedOverALongWay) {
+  MapConfig config;
+  config.max_cells = 5000;
+  SurfaceMap map(config, SurfaceKind::kPlane);
+  Noise noise(4);
+  size_t half_way = 0;
+  for (int i = 0; i < 400000; ++i) {
+    const Eigen::Vector3f at(0.005f * static_cast<float>(i), 0.0f, 0.0f);
+    map.Add(at + noise.Vector(10.0).cast<float>());
+    if (i % 500 == 0) map.Prune(at);
+    if (i == 200000) half_way = map.MemoryBytes();
+  }
+  EXPECT_LE(map.cells(), 4u * 5000u);
+  EXPECT_LE(static_cast<double>(map.MemoryBytes()), 1.05 * static_cast<double>(half_way));
+}
+
+TEST(ErrorStateFilter, CovarianceFollowsTheNonlinearMotion) {
+  FilterConfig quiet;
+  quiet.gyro_noise = quiet.accel_noise = quiet.gyro_bias_walk = quiet.accel_bias_walk = 0.0;
+  Noise noise(5);
+  for (int trial = 0; trial < 20; ++trial) {
+    NavState state;
+    state.R_WB = math::ExpSO3(noise.Vector(1.0));
+    state.v = noise.Vector(2.0);
+    ErrorVector dx;
+    for (int i = 0; i < kStates; ++i) dx[i] = noise.Gauss(1e-5);
+    NavState other = state;
+    Inject(dx, &other);
+    state.P = dx * dx.transpose();
+    const ImuSample imu{0.005, noise.Vector(5.0), noise.Vector(1.0)};
+    Propagate(quiet, imu, &state);
+    Propagate(quiet, imu, &other);
+    ErrorVector moved = dx;
+    moved.segment<3>(kP) = other.p - state.p;
+    moved.segment<3>(kV) = other.v - state.v;
+    moved.segment<3>(kTheta) = math::LogSO3(other.R_WB * state.R_WB.conjugate());
+    const ErrorCovariance expected = moved * moved.transpose();
+    EXPECT_LT((state.P - expected).norm(), 2e-3 * expected.norm()) << "trial " << trial;
+  }
+}
+
+TEST(ErrorStateFilter, InertialMotionFollowsAnAnalyticFlight) {
+  const Flight flight = Flight::Aggressive();
+  SensorModel perfect;
+  perfect.gyro_noise = perfect.accel_noise = 0.0;
+  perfect.gyro_bias.setZero();
+  perfect.accel_bias.setZero();
+  Noise noise(6);
+  NavState state;
+  state.t = 4.0;
+  state.p = flight.X_WB(4.0).p;
+  state.R_WB = flight.X_WB(4.0).R;
+  state.v = flight.Velocity(4.0);
+  for (int i = 1; i <= 400; ++i) {
+    ImuSample imu = test::Measure(flight, 4.0 + 0.005 * i - 0.0025, perfect, &noise);
+    imu.t += 0.0025;  // the middle of the interval stands for all of it
+    Propagate(FilterConfig{}, imu, &state);
+  }
+  EXPECT_LT((state.p - flight.X_WB(6.0).p).norm(), 5e-3);
+  EXPECT_LT((state.v - flight.Velocity(6.0)).norm(), 5e-3);
+}
+
+TEST(ErrorStateFilter, UpdateLeavesUnknownDirectionsAlone) {
+  NavState state;
+  state.P = 0.01 * ErrorCovariance::Identity();
+  PoseMeasurement z;
+  z.X_WB.p = {0.1, 0.1, 0.1};
+  z.known = Eigen::MatrixXd::Zero(6, 5);
+  for (int i = 0; i < 5; ++i) z.known(i < 1 ? 0 : i + 1, i) = 1.0;  // all but y
+  z.information = 1e4 * Eigen::Matrix<double, 6, 6>::Identity();
+  const UpdateResult result = Update(FilterConfig{}, z, &state);
+  EXPECT_TRUE(result.applied);
+  EXPECT_NEAR(state.p.y(), 0.0, 1e-12);
+  EXPECT_GT(state.p.x(), 0.09);
+  EXPECT_NEAR(state.P(1, 1), 0.01, 1e-12);
+  EXPECT_LT(state.P(0, 0), 0.001);
+}
+
+TEST(ErrorStateFilter, UpdateWithoutInformationIsRefused) {
+  NavState state;
+  PoseMeasurement z;
+  z.known = Eigen::MatrixXd::Identity(6, 6);
+  z.information.setZero();
+  EXPECT_FALSE(Update(FilterConfig{}, z, &state).applied);
+  EXPECT_TRUE(state.p.allFinite());
+}
+
+TEST(CorrectionBlend, SpreadsAJumpWithoutLosingIt) {
+  CorrectionBlend blend{BlendConfig{}};
+  const Pose before{Eigen::Quaterniond::Identity(), {1.0, 0.0, 0.0}};
+  const Pose after{math::FromYaw(0.1), {1.3, 0.0, 0.0}};
+  blend.Absorb(before, Eigen::Vector3d::Zero(), after, Eigen::Vector3d::Zero());
+  EXPECT_LT((blend.Applied(after).p - before.p).norm(), 1e-12);
+  EXPECT_TRUE(blend.correcting());
+  Eigen::Vector3d last = before.p;
+  for (int i = 0; i < 400; ++i) {
+    blend.Decay(0.005);
+    const Eigen::Vector3d p = blend.Applied(after).p;
+    EXPECT_LE((p - last).norm(), 0.4 * 0.005 + 1e-12);
+    last = p;
+  }
+  EXPECT_LT((last - after.p).norm(), 1e-3);
+  EXPECT_LT(blend.Applied(after).R.angularDistance(after.R), 1e-3);
+  EXPECT_FALSE(blend.correcting());
+}
+
+TEST(OdometryConfig, ProblemsNameFieldAndValue) {
+  EXPECT_EQ(OdometryConfig{}.Problem(), "");
+  OdometryConfig config;
+  config.map.cell_size = -1.0;
+  EXPECT_NE(config.Problem().find("map.cell_size is -1"), std::string::npos);
+  config = {};
+  config.match_points = 10;
+  EXPECT_NE(config.Problem().find("match_points"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace chase::odometry
