@@ -20,8 +20,6 @@ math::ExactPolynomial ExactColumn(const Coefficients& c, int axis) {
 }
 
 bool IsClearBySturm(const Coefficients& q, const HorizonObstacle& obstacle) {
-  // A place well inside settles it; this saves the exact arithmetic in most collisions.
-  if (NearestApproach(q, obstacle, 20).distance < 1.0 - 1e-6) return false;
   math::ExactPolynomial excess = math::MakeExact(-1.0);  // d_q - 1
   for (int a = 0; a < 3; ++a)
     for (int b = 0; b < 3; ++b)
@@ -29,6 +27,14 @@ bool IsClearBySturm(const Coefficients& q, const HorizonObstacle& obstacle) {
                             (ExactColumn(q, a) - ExactColumn(obstacle.center, a)) *
                             (ExactColumn(q, b) - ExactColumn(obstacle.center, b));
   return math::SignAtZero(excess) > 0 && math::CountRootsExact(excess) == 0;
+}
+
+bool IsClearOfAll(const Coefficients& q, const std::vector<HorizonObstacle>& obstacles) {
+  // A place well inside settles it; this saves the exact arithmetic in most collisions.
+  for (const HorizonObstacle& o : obstacles)
+    if (NearestApproach(q, o, 20).distance < 1.0 - 1e-6) return false;
+  return std::all_of(obstacles.begin(), obstacles.end(),
+                     [&q](const HorizonObstacle& o) { return IsClearBySturm(q, o); });
 }
 
 }  // namespace
@@ -44,9 +50,7 @@ SearchResult ReferenceSearch(const CandidateSet& candidates,
     const Choice choice = Arrangement(candidates, number);
     const Coefficients q = candidates.CoefficientsOf(candidates.Delta(choice));
     ++result.checked;
-    if (!std::all_of(obstacles.begin(), obstacles.end(),
-                     [&q](const HorizonObstacle& o) { return IsClearBySturm(q, o); }))
-      continue;
+    if (!IsClearOfAll(q, obstacles)) continue;
     result.choice = choice;
     result.cost = cost;
     break;

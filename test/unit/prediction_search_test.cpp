@@ -67,7 +67,7 @@ TEST(PredictionSearch, EqualsBruteForceOnSmallInstances) {
 }
 
 TEST(PredictionSearch, EqualsBruteForceOnFullSizeInstances) {
-  for (int seed = 1000; seed < 1002; ++seed) {
+  for (int seed = 1000; seed < 1010; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     InstanceGenerator generator(static_cast<uint64_t>(seed));
     const Problem p = MakeProblem({}, generator.Make(8, 10, 0.5));
