@@ -10,7 +10,7 @@ struct ControlConfig {
   Eigen::Vector3d position_gain = {6.0, 6.0, 6.0};  ///< 1/s^2
   Eigen::Vector3d velocity_gain = {4.0, 4.0, 4.0};  ///< 1/s
   Eigen::Vector3d integral_gain = {1.5, 1.5, 2.0};  ///< 1/s^3
-  double integral_limit = 2.0;                      ///< per axis, m/s^2
+  double integral_limit = 1.5;                      ///< per axis, m/s^2
   double catch_up_speed = 2.0;                      ///< m/s
   Eigen::Vector3d drag = {0.25, 0.25, 0.15};        ///< 1/s
   double tilt_limit_deg = 35.0;

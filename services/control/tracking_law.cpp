@@ -11,6 +11,7 @@ namespace {
 
 using Eigen::Vector3d;
 
+constexpr double kTrimTime = 5.0;      // s that the trim averages over
 constexpr double kLongestStep = 0.05;  // s; a gap in the estimates must not wind the integral up
 
 Vector3d Shortened(const Vector3d& v, double limit) {
@@ -73,7 +74,7 @@ Setpoint TrackingLaw::Track(const Estimate& estimate, const Reference& now, cons
 }
 
 Setpoint TrackingLaw::LevelDescent(double yaw) const {
-  const double thrust = kGravity + integral_.z() - config_.lost_descent;
+  const double thrust = kGravity + trim_ - config_.lost_descent;
   Setpoint result = AttitudeFor(Vector3d::UnitZ(), Vector3d::Zero(), yaw, 0.0);
   result.thrust = std::clamp(thrust, config_.min_thrust, config_.max_thrust);
   return result;
@@ -100,6 +101,7 @@ void TrackingLaw::Integrate(const Vector3d& position_error, double dt) {
     integral_[i] = std::clamp(integral_[i] + config_.integral_gain[i] * position_error[i] * step,
                               -config_.integral_limit, config_.integral_limit);
   }
+  trim_ += step / kTrimTime * (std::clamp(integral_.z(), -kLargestTrim, kLargestTrim) - trim_);
 }
 
 }  // namespace chase::control

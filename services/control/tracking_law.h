@@ -28,7 +28,8 @@ struct Setpoint {
   double thrust = 9.81;                              ///< collective over mass, m/s^2
 };
 
-constexpr double kGravity = 9.81;  ///< m/s^2
+constexpr double kGravity = 9.81;     ///< m/s^2
+constexpr double kLargestTrim = 0.4;  ///< m/s^2; 4 % of weight or thrust
 
 /// Specific thrust (acceleration without gravity, m/s^2, frame W) cut to what may be asked for: the
 /// vertical part first, within [min_thrust, max_thrust], then the horizontal part within the tilt
@@ -51,7 +52,9 @@ class TrackingLaw {
   /// and yaw fed forward. `dt` is the time since the last call, s: 0 leaves the integral alone.
   Setpoint Track(const Estimate& estimate, const Reference& now, const Reference& ahead, double dt);
 
-  /// Level attitude at the given yaw with a thrust a little short of hovering.
+  /// Level attitude at the given yaw with a thrust a little short of hovering: gravity plus what
+  /// the integral asked for on average of late, within kLargestTrim. A pose that is about to be
+  /// lost winds the integral up.
   Setpoint LevelDescent(double yaw) const;
 
   /// Acceleration that the integral asks for, m/s^2.
@@ -63,6 +66,7 @@ class TrackingLaw {
 
   ControlConfig config_;
   Eigen::Vector3d integral_ = Eigen::Vector3d::Zero();
+  double trim_ = 0.0;  // vertical integral, averaged, m/s^2
 };
 
 }  // namespace chase::control

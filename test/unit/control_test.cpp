@@ -211,6 +211,25 @@ TEST(Controller, SinksNoFasterThanDragAllows) {
   EXPECT_GT(body.v.z(), -0.7);
 }
 
+TEST(Controller, PoseGoingWrongBeforeItIsLostMakesItSinkAllTheSame) {
+  Controller controller(ControlConfig{});
+  controller.AddPlan(PointPlan({0, 0, 1}));
+  Estimate sinking;  // says 1 m too low, for as long as it takes to wind the integral up
+  for (int i = 0; i < 4000; ++i) controller.Update(i * kStep, sinking, Health::kUsable);
+  EXPECT_LT(controller.Update(20.0, sinking, Health::kLost)->thrust, 9.81 + kLargestTrim);
+}
+
+TEST(Controller, LevelDescentKnowsTheTrueHoverThrust) {
+  Body body;
+  body.mass_factor = 1.03;
+  Controller controller(ControlConfig{});
+  controller.AddPlan(PointPlan({0, 0, 0}));
+  for (int i = 0; i < 5000; ++i)
+    body.Step(*controller.Update(i * kStep, body.Measured(), Health::kUsable));
+  const auto s = controller.Update(25.0, body.Measured(), Health::kLost);
+  EXPECT_NEAR(s->thrust / body.mass_factor, 9.81 - ControlConfig{}.lost_descent, 0.05);
+}
+
 TEST(Controller, NeverSendsNaN) {
   const double bad[] = {kNaN, std::numeric_limits<double>::infinity(), 1e308, -1e308};
   for (const double value : bad) {
