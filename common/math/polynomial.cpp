@@ -67,6 +67,22 @@ int SignChanges(const SturmChain& chain, double t) {
   return changes;
 }
 
+double ComputeBinomial(int n, int k) {
+  double value = 1.0;
+  for (int i = 0; i < k; ++i) value = value * (n - i) / (i + 1);
+  return value;
+}
+
+constexpr int kTableSize = 33;
+
+struct BinomialTable {
+  double value[kTableSize][kTableSize];
+  BinomialTable() {
+    for (int n = 0; n < kTableSize; ++n)
+      for (int k = 0; k < kTableSize; ++k) value[n][k] = k <= n ? ComputeBinomial(n, k) : 0.0;
+  }
+};
+
 }  // namespace
 
 double Evaluate(const Polynomial& p, double t) {
@@ -104,10 +120,9 @@ int CountRootsSturm(const Polynomial& p, double lower, double upper, double tole
 }
 
 double Binomial(int n, int k) {
+  static const BinomialTable table;
   if (k < 0 || k > n) return 0.0;
-  double value = 1.0;
-  for (int i = 0; i < k; ++i) value = value * (n - i) / (i + 1);
-  return value;
+  return n < kTableSize ? table.value[n][k] : ComputeBinomial(n, k);
 }
 
 }  // namespace chase::math

@@ -5,6 +5,7 @@
 
 #include "common/math/bernstein.h"
 #include "common/math/exact.h"
+#include "services/planning/product_weights.h"
 
 namespace chase::planning {
 namespace {
@@ -52,11 +53,15 @@ Relative MakeRelative(const Curve& curve, const Curve& center, int degree) {
 Bounded Form(const Relative& x, const Eigen::Matrix3d& R, const Relative& y) {
   const int n = static_cast<int>(x.points.cols()) - 1;
   Bounded f{Polynomial::Constant(2 * n + 1, -1.0), 0.0};
+  const bool tabled = n == 5 || n == 6;
   for (int i = 0; i <= n; ++i) {
     const Eigen::Vector3d Rx = R * x.points.col(i);
-    for (int j = 0; j <= n; ++j)
-      f.b[i + j] += math::Binomial(n, i) * math::Binomial(n, j) / math::Binomial(2 * n, i + j) *
-                    Rx.dot(y.points.col(j));
+    for (int j = 0; j <= n; ++j) {
+      const double weight =
+          tabled ? ProductWeights(n).value[i][j]
+                 : math::Binomial(n, i) * math::Binomial(n, j) / math::Binomial(2 * n, i + j);
+      f.b[i + j] += weight * Rx.dot(y.points.col(j));
+    }
   }
   f.error = 64.0 * kRounding * (1.0 + x.magnitude * y.magnitude * R.cwiseAbs().sum());
   return f;

@@ -6,7 +6,7 @@
 
 #include "services/planning/candidate_set.h"
 #include "services/planning/fast_kernels.h"
-#include "services/planning/fast_proof.h"
+#include "services/planning/product_weights.h"
 #include "services/planning/reference_search.h"
 
 namespace chase::planning {

@@ -61,7 +61,7 @@ void SetSafetyShape(const PlannerConfig& config, const world::Obstacle& o, const
   for (double share : kShares) {
     e->safety = Grown(o.shape, share * margin);
     if (SquaredNorm(e->safety, offset) > (share > 0.0 ? kClear : 1.0)) {
-      if (share < 0.5) Note(notes, "starts within the margin of obstacle " + std::to_string(e->id));
+      if (share < 1.0) Note(notes, "starts within the margin of obstacle " + std::to_string(e->id));
       return;
     }
   }

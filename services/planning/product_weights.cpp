@@ -1,4 +1,4 @@
-#include "services/planning/fast_proof.h"
+#include "services/planning/product_weights.h"
 
 #include "common/math/polynomial.h"
 
