@@ -31,8 +31,8 @@ class FolderSource : public FrameSource {
 
 class VideoSource : public FrameSource {
  public:
-  VideoSource(cv::VideoCapture capture, bool recording)
-      : capture_(std::move(capture)), recording_(recording) {}
+  VideoSource(const cv::VideoCapture& capture, bool recording)
+      : capture_(capture), recording_(recording) {}
   std::optional<cv::Mat> Next() override {
     cv::Mat frame;
     if (!capture_.read(frame) || frame.empty()) return std::nullopt;

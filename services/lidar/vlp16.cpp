@@ -86,7 +86,8 @@ void DecodeBlock(const uint8_t* data, int block, int stride, const Limits& limit
     const double into = half * kFiringPeriod;
     Firing firing;
     firing.azimuth_deg = Degrees(AzimuthTicks(data, block) * 0.01 + rate * into);
-    firing.t = (block / stride) * kBlockPeriod + into;
+    const int slot = block / stride;  // a dual packet carries each firing twice
+    firing.t = slot * kBlockPeriod + into;
     firing.begin = out->points.size();
     const uint8_t* first = nullptr;
     for (int k = 0; k < stride; ++k) {
