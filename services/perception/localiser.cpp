@@ -17,6 +17,9 @@ constexpr double kMinVisible = 0.15;       // share of the expected box that a d
 constexpr double kMaxRangeError = 0.15;    // share of the range; a worse first fix is none
 constexpr double kHiddenPriorShare = 0.6;  // of the prior's gate where sides are left out
 
+constexpr double kKnownRange = 0.25;  // m, standard deviation of the prediction
+constexpr size_t kOneHidden = 5;      // readings with at most one side left out
+
 using Sides = std::array<bool, 4>;
 
 /// Readings of a silhouette from all sides seen to two sides hidden (left right top bottom).
@@ -46,16 +49,14 @@ double RangeSigma(const FitInput& input) {
   return std::sqrt(sight.dot(input.prior.covariance.topLeftCorner<3, 3>() * sight));
 }
 
-/// The nearest cluster that lies on the predicted cylinder, without its stray points.
-std::vector<TargetPoint> PointsOnTarget(const FitInput& input, const Clusters& clusters,
-                                        double gate) {
-  for (const auto& cluster : clusters) {
-    std::vector<TargetPoint> kept;
-    for (const auto& p : cluster)
-      if (std::abs(SurfaceDistance(p, input)) < gate) kept.push_back(p);
-    if (static_cast<int>(kept.size()) >= kMinPoints) return kept;
-  }
-  return {};
+/// The points of a cluster that lie near the predicted cylinder; none when they are too few.
+std::vector<TargetPoint> PointsOnTarget(const FitInput& input,
+                                        const std::vector<TargetPoint>& cluster, double gate) {
+  std::vector<TargetPoint> kept;
+  for (const auto& p : cluster)
+    if (std::abs(SurfaceDistance(p, input)) < gate) kept.push_back(p);
+  if (static_cast<int>(kept.size()) < kMinPoints) kept.clear();
+  return kept;
 }
 
 /// True when the lidar looked well through where the target should be, and hit something behind.
@@ -120,7 +121,9 @@ std::optional<FitResult> Localiser::BestReading(FitInput* input) const {
   std::optional<FitResult> best = WholeReading(input);
   if (best) return best;
   double best_cost = 0.0;
-  for (size_t k = 1; k < kReadings.size(); ++k) {
+  // Where the range is not known, two opposite sides must give it.
+  const size_t readings = RangeSigma(*input) < kKnownRange ? kReadings.size() : kOneHidden;
+  for (size_t k = 1; k < readings; ++k) {
     input->use_side = kReadings[k];
     FitResult fit = FitCylinder(*input, config_.fit);
     if (!Agrees(fit, kHiddenPriorShare * config_.fit.prior_gate) || !EdgesAgree(fit, *input))
@@ -139,9 +142,16 @@ std::optional<FitResult> Localiser::Correct(const FitInput& predicted,
   if (!Visible(predicted)) return std::nullopt;
   FitInput input = predicted;
   const double gate = config_.fit.lidar_gate + 2.0 * RangeSigma(predicted);
-  input.points = PointsOnTarget(predicted, clusters, gate);
-  if (input.points.empty() && CountSeenThrough(predicted, clusters) >= kManyPoints)
-    return std::nullopt;
+  // Near to far: what stands before the target may lend the blob's edge a few points, and only
+  // the fit tells that they do not belong to it.
+  for (const auto& cluster : clusters) {
+    input.points = PointsOnTarget(predicted, cluster, gate);
+    if (input.points.empty()) continue;
+    const auto fit = BestReading(&input);
+    if (fit) return fit;
+  }
+  input.points.clear();
+  if (CountSeenThrough(predicted, clusters) >= kManyPoints) return std::nullopt;
   return BestReading(&input);
 }
 
@@ -182,7 +192,7 @@ std::optional<FitResult> Localiser::Acquire(const TargetShape& shape, const Came
     if (static_cast<int>(cluster.size()) < kMinPoints) continue;
     const double range = MedianRange(cluster) + shape.size[0];
     input.prior = Guess(camera, detection, range, 0.3);
-    input.points = PointsOnTarget(input, {cluster}, 2.0 * config_.fit.lidar_gate);
+    input.points = PointsOnTarget(input, cluster, 2.0 * config_.fit.lidar_gate);
     const auto fit = WholeReading(&input);
     if (good(fit)) return fit;
   }

@@ -207,7 +207,7 @@ TEST(PerceptionFaults, NoPoseIsSaid) {
       EXPECT_TRUE(Detected(o));
     }
     if (o.t > 0.7) {
-      EXPECT_EQ(o.estimate.note, o.t > 0.8 ? "no pose" : "the pose is too old") << o.t;
+      EXPECT_EQ(o.estimate.note, o.t > 0.81 ? "no pose" : "the pose is too old") << o.t;
     }
     if (o.t > 0.78) {
       EXPECT_EQ(o.estimate.state, TargetState::kOccluded) << o.t;

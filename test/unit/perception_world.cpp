@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <ctime>
+#include <deque>
+#include <utility>
 
 namespace chase::perception_test {
 
@@ -231,20 +233,14 @@ std::vector<Outcome> Fly(const World& world, const perception::PerceptionConfig&
   Renderer renderer(world);
   perception::Perceiver perceiver(config);
   std::vector<Outcome> outcomes;
-  perception::Sweep pending;
-  double pending_at = 1e18;
+  std::deque<std::pair<double, perception::Sweep>> pending;  // by the time of arrival
   const int ticks = static_cast<int>(std::lround(options.duration * 200.0));
   for (int k = 0; k <= ticks; ++k) {  // 200 Hz; a frame sees the pose of 5 ms ago as the newest
     const double t = k * 0.005;
-    if (t >= pending_at) {
-      perceiver.AddSweep(pending);
-      pending_at = 1e18;
-    }
-    if (options.lidar && k % 20 == 0) {
-      // Cast with the start's pose noise only; delivered after its end.
-      pending = renderer.Lidar(t - 0.1);
-      pending_at = t + options.lidar_delay;
-    }
+    for (; !pending.empty() && t >= pending.front().first; pending.pop_front())
+      perceiver.AddSweep(std::move(pending.front().second));
+    if (options.lidar && k % 20 == 0)
+      pending.emplace_back(t + options.lidar_delay, renderer.Lidar(t - 0.1));
     if (k % 10 == 0 && k > 0) {
       Shot shot = renderer.Image(t);
       if (options.spoil_image) options.spoil_image(t, &shot.bgr);
