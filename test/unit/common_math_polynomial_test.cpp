@@ -121,7 +121,7 @@ TEST(Exact, AgreesWithSturmOnWellSeparatedPolynomials) {
 TEST(Positivity, DecisionsOnRandomPolynomialsAreExact) {
   auto g = Generator(5);
   int positive = 0;
-  for (int i = 0; i < 20000; ++i) {
+  for (int i = 0; i < 100000; ++i) {
     Polynomial p = Product(Random(g, 5), Random(g, 5));
     p[0] += Uniform(g, -0.1, 0.6);
     const Positivity decided = DecidePositive(PowerToBernstein(p), PowerToBernsteinError(p));
@@ -131,14 +131,14 @@ TEST(Positivity, DecisionsOnRandomPolynomialsAreExact) {
     ASSERT_EQ(IsPositive(p), exact) << i;
     ASSERT_TRUE(!exact || MinimumBySampling(p, 50) > 0.0) << i;
   }
-  EXPECT_GT(positive, 2000);
-  EXPECT_LT(positive, 18000);
+  EXPECT_GT(positive, 10000);
+  EXPECT_LT(positive, 90000);
 }
 
 // A double root inside: touching zero is not positive, and no rounding may hide it.
 TEST(Positivity, DoubleRootsAreNeverAccepted) {
   auto g = Generator(6);
-  for (int i = 0; i < 1000; ++i) {
+  for (int i = 0; i < 2700; ++i) {
     const double r = std::floor(Uniform(g, 1.0, 63.0)) / 64.0;
     Polynomial u(5);
     for (auto& c : u) c = std::floor(Uniform(g, -8.0, 8.0));
