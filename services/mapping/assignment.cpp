@@ -28,8 +28,8 @@ std::vector<int> Assign(const Eigen::MatrixXd& cost, double unassigned) {
       size_t j1 = 0;
       for (size_t j = 1; j <= static_cast<size_t>(m); ++j) {
         if (used[j]) continue;
-        const double reduced = price(row - 1, static_cast<int>(j) - 1) -
-                               u[static_cast<size_t>(row)] - v[j];
+        const double reduced =
+            price(row - 1, static_cast<int>(j) - 1) - u[static_cast<size_t>(row)] - v[j];
         if (reduced < slack[j]) slack[j] = reduced, previous[j] = static_cast<int>(j0);
         if (slack[j] < delta) delta = slack[j], j1 = j;
       }
@@ -51,7 +51,8 @@ std::vector<int> Assign(const Eigen::MatrixXd& cost, double unassigned) {
   }
   std::vector<int> result(static_cast<size_t>(rows), -1);
   for (int j = 1; j <= columns; ++j)
-    if (owner[static_cast<size_t>(j)]) result[static_cast<size_t>(owner[static_cast<size_t>(j)]) - 1] = j - 1;
+    if (owner[static_cast<size_t>(j)])
+      result[static_cast<size_t>(owner[static_cast<size_t>(j)]) - 1] = j - 1;
   return result;
 }
 

@@ -14,8 +14,9 @@ constexpr double kWallAspect = 3.0;   // length over width from which a piece co
 constexpr double kThinnest = 0.01;    // m, half width of a degenerate piece
 constexpr double kWasteShare = 0.65;  // an ellipse around a filled rectangle wastes 57 %
 constexpr double kSplitStrictness = 1.5, kMergeStrictness = 0.8;  // apart: no flutter
+constexpr int kMergeRounds = 6;
 constexpr int kForcedCuts = 4;
-constexpr int kForcedIds = 1 << 24;   // ids of parts that only keep the target free
+constexpr int kForcedIds = 1 << 24;  // ids of parts that only keep the target free
 
 /// Cells by column, to find neighbours.
 class Neighbours {
@@ -95,8 +96,8 @@ bool Decomposition::Tight(const std::vector<Cell>& cells, const Group& group,
   if (axes.x() <= config_.compact_radius * (axes.x() < 1.05 * axes.y() ? 1.0 : 0.5)) return true;
   if (length > config_.max_length + slack) return false;
   const double filled = FilledArea(cells, group);
-  return outline.Area() - filled <= strictness * std::max(config_.waste * length,
-                                                          kWasteShare * filled);
+  return outline.Area() - filled <=
+         strictness * std::max(config_.waste * length, kWasteShare * filled);
 }
 
 /// Cuts a group in two: a long one into equal parts, another where two rectangles waste least.
@@ -124,11 +125,12 @@ bool Decomposition::Cut(const std::vector<Cell>& cells, const Group& group, Grou
   const Eigen::Vector2d u = box.axes.col(0), v = box.axes.col(1);
   for (const Eigen::Vector2d& axis :
        {u, v, Eigen::Vector2d((u + v).normalized()), Eigen::Vector2d((u - v).normalized())}) {
-    const double reach = std::abs(axis.dot(u)) * box.half.x() + std::abs(axis.dot(v)) * box.half.y();
+    const double reach =
+        std::abs(axis.dot(u)) * box.half.x() + std::abs(axis.dot(v)) * box.half.y();
     for (const double share : {-0.7, -0.4, -0.2, 0.0, 0.2, 0.4, 0.7}) {
       if (!divide(axis, share * reach, &low, &high)) continue;
-      const double area = SmallestRectangle(Hull(cells, low)).Area() +
-                          SmallestRectangle(Hull(cells, high)).Area();
+      const double area =
+          SmallestRectangle(Hull(cells, low)).Area() + SmallestRectangle(Hull(cells, high)).Area();
       if (area >= best) continue;
       best = area;
       *a = low;
@@ -220,8 +222,8 @@ void Decomposition::SplitWasteful(const std::vector<Cell>& cells, std::map<int, 
   }
 }
 
-/// Neighbouring pieces become one, under the older id, where that wastes nothing.
-void Decomposition::Merge(const std::vector<Cell>& cells, std::map<int, Group>* groups) const {
+/// Neighbouring pieces become one, under the older id, where that wastes nothing. True if some did.
+bool Decomposition::Merge(const std::vector<Cell>& cells, std::map<int, Group>* groups) const {
   const Neighbours neighbours(cells);
   std::vector<int> piece(cells.size(), 0);
   for (const auto& [id, group] : *groups)
@@ -234,6 +236,7 @@ void Decomposition::Merge(const std::vector<Cell>& cells, std::map<int, Group>* 
       if (a && b && a < b) pairs.insert({a, b});
     });
   }
+  bool merged = false;
   for (const auto& [a, b] : pairs) {
     const auto first = groups->find(a), second = groups->find(b);
     if (first == groups->end() || second == groups->end()) continue;
@@ -242,7 +245,9 @@ void Decomposition::Merge(const std::vector<Cell>& cells, std::map<int, Group>* 
     if (!Tight(cells, both, kMergeStrictness)) continue;
     first->second = std::move(both);
     groups->erase(second);
+    merged = true;
   }
+  return merged;
 }
 
 void Decomposition::Emit(const std::vector<Cell>& cells, int id, const Group& group,
@@ -274,7 +279,8 @@ std::vector<Piece> Decomposition::Update(std::vector<Cell>* cells, const Eigen::
   Adopt(*cells, &groups, &orphans);
   AddNew(*cells, orphans, &groups);
   SplitWasteful(*cells, &groups);
-  Merge(*cells, &groups);
+  for (int round = 0; round < kMergeRounds && Merge(*cells, &groups); ++round) {
+  }
   std::vector<Piece> pieces;
   dropped_ = 0;
   for (const auto& [id, group] : groups) {

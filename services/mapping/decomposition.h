@@ -11,10 +11,10 @@ namespace chase::mapping {
 
 /// An occupied column in plan: the octagon around its returns.
 struct Cell {
-  int x = 0, y = 0;     ///< column
-  int piece = 0;        ///< that it belonged to; 0: none. Written by Decomposition::Update.
-  Points2 corners;      ///< frame W, m
-  double area = 0.0;    ///< of the octagon's bounding box, m^2
+  int x = 0, y = 0;   ///< column
+  int piece = 0;      ///< that it belonged to; 0: none. Written by Decomposition::Update.
+  Points2 corners;    ///< frame W, m
+  double area = 0.0;  ///< of the octagon's bounding box, m^2
 };
 
 /// Part of the static world that one upright elliptic column encloses.
@@ -51,7 +51,7 @@ class Decomposition {
   void Adopt(const std::vector<Cell>& cells, std::map<int, Group>* groups, Group* orphans) const;
   void AddNew(const std::vector<Cell>& cells, const Group& orphans, std::map<int, Group>* groups);
   void SplitWasteful(const std::vector<Cell>& cells, std::map<int, Group>* groups);
-  void Merge(const std::vector<Cell>& cells, std::map<int, Group>* groups) const;
+  bool Merge(const std::vector<Cell>& cells, std::map<int, Group>* groups) const;
   void Emit(const std::vector<Cell>& cells, int id, const Group& group,
             const Eigen::Vector2d* keep_out, double keep_out_radius, int depth,
             std::vector<Piece>* pieces);

@@ -53,7 +53,8 @@ struct Khachiyan {
   std::vector<double> u, m;
 
   explicit Khachiyan(const std::vector<Eigen::Matrix<double, N, 1>>& points)
-      : q(points.size()), u(points.size(), 1.0 / static_cast<double>(points.size())),
+      : q(points.size()),
+        u(points.size(), 1.0 / static_cast<double>(points.size())),
         m(points.size()) {
     for (size_t i = 0; i < points.size(); ++i) q[i] << points[i], 1.0;
   }
@@ -99,7 +100,8 @@ void Enclose(const std::vector<Eigen::Matrix<double, N, 1>>& points, double tole
   std::vector<Vector> set;  // each point with a small cross around it, so that the set has a volume
   for (const auto& p : points)
     for (int axis = 0; axis < N; ++axis)
-      for (const double side : {-thinnest, thinnest}) set.push_back(p - origin + side * Vector::Unit(axis));
+      for (const double side : {-thinnest, thinnest})
+        set.push_back(p - origin + side * Vector::Unit(axis));
   Khachiyan<N> dual(set);
   dual.Solve(tolerance);
   Vector mean = Vector::Zero();
@@ -192,8 +194,8 @@ Ellipse SmallestEllipse(const Points2& points, double tolerance, double thinnest
 
 Ellipse EllipseAround(const Rectangle& r) {
   // (1/1.1547)^2 + (1/2)^2 = 1: the corners lie on the ellipse.
-  const Eigen::Array2d axes = r.half.array().max(0.01) * Eigen::Array2d(2.0 / std::sqrt(3.0), 2.0) *
-                              (1.0 + 1e-9);
+  const Eigen::Array2d axes =
+      r.half.array().max(0.01) * Eigen::Array2d(2.0 / std::sqrt(3.0), 2.0) * (1.0 + 1e-9);
   return {r.center, r.axes * axes.square().inverse().matrix().asDiagonal() * r.axes.transpose()};
 }
 

@@ -9,8 +9,8 @@ using Points2 = std::vector<Eigen::Vector2d>;
 
 /// { x : (x - center)' shape (x - center) <= 1 } in the plane.
 struct Ellipse {
-  Eigen::Vector2d center = Eigen::Vector2d::Zero();        ///< m
-  Eigen::Matrix2d shape = Eigen::Matrix2d::Identity();     ///< 1/m^2, positive definite
+  Eigen::Vector2d center = Eigen::Vector2d::Zero();     ///< m
+  Eigen::Matrix2d shape = Eigen::Matrix2d::Identity();  ///< 1/m^2, positive definite
   double Level(const Eigen::Vector2d& x) const { return (x - center).dot(shape * (x - center)); }
   double Area() const;
   /// Larger and smaller semi-axis, m.

@@ -7,12 +7,12 @@ namespace chase::mapping {
 
 namespace {
 
-constexpr double kNear = 12.0;       // m, returns that the start looks at
-constexpr double kLayer = 0.12;      // m above the lowest return of a tile: taken for the ground
-constexpr int kReach = 4;            // tiles, how far neighbours stand in
-constexpr double kFollow = 0.25;     // share of a sweep's news that a tile takes over
-constexpr double kUphill = 0.5;      // share of the step that is allowed upward
-constexpr size_t kFewest = 20;       // returns without which there is no start
+constexpr double kNear = 12.0;    // m, returns that the start looks at
+constexpr double kLayer = 0.12;   // m above the lowest return of a tile: taken for the ground
+constexpr int kReach = 4;         // tiles, how far neighbours stand in
+constexpr double kFollow = 0.25;  // share of a sweep's news that a tile takes over
+constexpr double kUphill = 0.5;   // share of the step that a tile may stand out upward
+constexpr size_t kFewest = 20;    // returns without which there is no start
 
 }  // namespace
 
@@ -34,30 +34,29 @@ GroundModel::Tile& GroundModel::At(int x, int y) {
 double GroundModel::Estimate(int x, int y) {
   Tile& tile = At(x, y);
   if (tile.cached == sweep_) return tile.estimate;
-  const double estimate = tile.known ? tile.z : Infer(x, y);
+  const double estimate = tile.known ? tile.z : Surroundings(x, y);
   tile.estimate = estimate;
   tile.cached = sweep_;
   return estimate;
 }
 
-/// Mean of the known tiles on the nearest ring that has any.
-double GroundModel::Infer(int x, int y) {
-  for (int ring = 1; ring <= kReach; ++ring) {
-    double sum = 0.0;
-    int n = 0;
+/// Mean of the known tiles around one, without itself: of the nearest two rings, else of the next.
+double GroundModel::Surroundings(int x, int y) {
+  double sum = 0.0;
+  int n = 0;
+  for (int ring = 1; ring <= kReach && (ring <= 2 || n == 0); ++ring) {
     for (int dx = -ring; dx <= ring; ++dx) {
       const int stride = std::abs(dx) == ring ? 1 : 2 * ring;
       for (int dy = -ring; dy <= ring; dy += stride) {
-        const Tile& tile =
-            tiles_[static_cast<size_t>(((x + dx) & (kSide - 1)) * kSide + ((y + dy) & (kSide - 1)))];
+        const Tile& tile = tiles_[static_cast<size_t>(((x + dx) & (kSide - 1)) * kSide +
+                                                      ((y + dy) & (kSide - 1)))];
         if (!tile.known || tile.x != x + dx || tile.y != y + dy) continue;
         sum += tile.z;
         ++n;
       }
     }
-    if (n > 0) return sum / n;
   }
-  return mean_;
+  return n > 0 ? sum / n : mean_;
 }
 
 /// The lowest layer of returns near the sensor, where at least a twentieth of them lie.
@@ -93,8 +92,9 @@ void GroundModel::Update(const std::vector<Eigen::Vector3f>& points,
   double sum = 0.0;
   for (Tile* tile : seen_) {
     const double z = tile->low + 0.25 * kLayer;  // the lowest of many noisy returns lies below
-    // Feet of walls must not lift the ground from tile to tile: up is harder than down.
-    if (z - tile->estimate > kUphill * config_.step) continue;
+    // Feet of walls must not lift the ground, sweep by sweep or tile by tile: what surrounds a tile
+    // limits it.
+    if (z - Surroundings(tile->x, tile->y) > kUphill * config_.step) continue;
     tile->z = tile->known ? tile->z + kFollow * (z - tile->z) : z;
     tile->known = true;
     sum += tile->z;

@@ -8,8 +8,8 @@
 
 namespace chase::mapping {
 
-/// Height of the ground in tiles of one metre. A tile follows the mean of its lowest returns, which
-/// must fit to the neighbouring tiles; where none was seen the neighbours, then the mean, stand in.
+/// Height of the ground in tiles of one metre. A tile follows its lowest returns where they fit to
+/// the tiles around it; where none was seen those stand in, then the mean of all.
 class GroundModel {
  public:
   explicit GroundModel(const GroundConfig& config);
@@ -18,9 +18,7 @@ class GroundModel {
   void Update(const std::vector<Eigen::Vector3f>& points, const Eigen::Vector3d& origin);
   /// z of the ground at (x, y), m.
   double Height(double x, double y) { return Estimate(TileOf(x), TileOf(y)); }
-  bool IsGround(const Eigen::Vector3f& p) {
-    return p.z() < Height(p.x(), p.y()) + config_.margin;
-  }
+  bool IsGround(const Eigen::Vector3f& p) { return p.z() < Height(p.x(), p.y()) + config_.margin; }
   double mean() const { return mean_; }
 
  private:
@@ -28,16 +26,16 @@ class GroundModel {
   struct Tile {
     int x = INT32_MIN, y = 0;
     bool known = false;
-    double z = 0.0;            ///< m
-    uint32_t cached = 0;       ///< sweep that `estimate` belongs to
-    double estimate = 0.0;     ///< m
-    uint32_t sweep = 0;        ///< sweep that the sums belong to
-    float low = 0.0f;          ///< lowest return of that sweep
+    double z = 0.0;         ///< m
+    uint32_t cached = 0;    ///< sweep that `estimate` belongs to
+    double estimate = 0.0;  ///< m
+    uint32_t sweep = 0;     ///< sweep that the sums belong to
+    float low = 0.0f;       ///< lowest return of that sweep
   };
   static int TileOf(double x);
   Tile& At(int x, int y);
   double Estimate(int x, int y);
-  double Infer(int x, int y);
+  double Surroundings(int x, int y);
   void Start(const std::vector<Eigen::Vector3f>& points, const Eigen::Vector3d& origin);
 
   GroundConfig config_;

@@ -7,10 +7,10 @@ namespace chase::mapping {
 
 namespace {
 
-constexpr double kNoise = 0.08;       // m, an interval's difference that may be noise
-constexpr double kNearMiss = 0.35;    // cells, a ray this near to a cell's returns contradicts them
-constexpr int kLowShare = 3;          // free cells keep limit / this, so that they can fill again
-constexpr int kSettleSweeps = 20;     // moving returns this long in one cell stand still
+constexpr double kNoise = 0.08;     // m, an interval's difference that may be noise
+constexpr double kNearMiss = 0.35;  // cells, a ray this near to a cell's returns contradicts them
+constexpr int kLowShare = 3;        // free cells keep limit / this, so that they can fill again
+constexpr int kSettleSweeps = 20;   // moving returns this long in one cell stand still
 constexpr size_t kMostChanges = 400000;
 
 uint8_t Increment(uint8_t n) { return n < 255 ? static_cast<uint8_t>(n + 1) : n; }
@@ -62,8 +62,8 @@ void Integrator::Hit(HitCell* cell) {
   voxel.sweep = sweep_;
   voxel.free_sweeps = 0;
   voxel.hits = Increment(voxel.hits);
-  voxel.log_odds = static_cast<int8_t>(
-      std::min(config_.limit, voxel.log_odds + (strong ? 2 : 1) * config_.hit));
+  voxel.log_odds =
+      static_cast<int8_t>(std::min(config_.limit, voxel.log_odds + (strong ? 2 : 1) * config_.hit));
   const bool had_extent = !voxel.extent.empty();
   if (cell->solid > 0) Follow(cell->meter, grid_.step(), kNoise, &voxel.extent);
   if (!voxel.occupied && voxel.log_odds >= config_.occupied)
@@ -111,8 +111,8 @@ void Integrator::Miss(const Key& key, VoxelGrid::Column* column, Voxel* voxel) {
   if (!voxel->extent.empty() && !PassesReturns(*voxel, key)) return;
   voxel->sweep = sweep_;
   voxel->moving_hits = 0;
-  voxel->log_odds = static_cast<int8_t>(
-      std::max(-config_.limit / kLowShare, voxel->log_odds + config_.miss));
+  voxel->log_odds =
+      static_cast<int8_t>(std::max(-config_.limit / kLowShare, voxel->log_odds + config_.miss));
   if (voxel->log_odds > 0) return;
   if (voxel->hits > 0) Reset(column, voxel, key);
   voxel->free_sweeps = Increment(voxel->free_sweeps);
@@ -164,7 +164,8 @@ void Integrator::ClearDisc(const Eigen::Vector2d& center, double radius, double 
       for (int z = low.z; z <= high.z; ++z) {
         if (!grid_.ContainsLevel(z)) continue;
         Voxel& voxel = column->voxels[VoxelGrid::Level(z)];
-        if (voxel.hits > settled || (voxel.sweep == sweep_ && voxel.hits > 0 && !also_hit)) continue;
+        if (voxel.hits > settled || (voxel.sweep == sweep_ && voxel.hits > 0 && !also_hit))
+          continue;
         Reset(column, &voxel, {x, y, z});
       }
     }

@@ -8,8 +8,8 @@
 
 namespace chase::mapping {
 
-/// Puts sweeps into the grid: one hit per cell and sweep, one ray per hit cell, at most one miss per
-/// cell and sweep. Cost is bounded by the returns of a sweep, whatever was mapped before.
+/// Puts sweeps into the grid: one hit per cell and sweep, one ray per hit cell, at most one miss
+/// per cell and sweep. Cost is bounded by the returns of a sweep, whatever was mapped before.
 class Integrator {
  public:
   Integrator(const GridConfig& config, VoxelGrid* grid) : config_(config), grid_(*grid) {}

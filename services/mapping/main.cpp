@@ -3,5 +3,6 @@
 
 int main(int argc, char** argv) {
   return chase::bus::RunService<chase::mapping::MappingNode, chase::mapping::MappingConfig>(
-      "mapping", "Maps registered sweeps: octree, static ellipsoids and moving tracks.", argc, argv);
+      "mapping", "Maps registered sweeps: octree, static ellipsoids and moving tracks.", argc,
+      argv);
 }

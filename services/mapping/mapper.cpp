@@ -8,9 +8,9 @@ namespace chase::mapping {
 
 namespace {
 
-constexpr int kSettledHits = 15;      // sweeps after which a cell outside the target's core stays
-constexpr double kGhostMargin = 0.2;  // m around a mover within which doubtful cells are cleared
-constexpr double kWindowMargin = 1.0; // m beyond the list's radius that the decomposition sees
+constexpr int kSettledHits = 15;       // sweeps after which a cell outside the target's core stays
+constexpr double kGhostMargin = 0.2;   // m around a mover within which doubtful cells are cleared
+constexpr double kWindowMargin = 1.0;  // m beyond the list's radius that the decomposition sees
 constexpr double kMostCoordinate = 6000.0;  // m, what the octree's keys can hold at 0.2 m
 
 /// Distance from p to the surface of an upright ellipse about c, roughly: along the line between.
@@ -90,10 +90,10 @@ void Mapper::MarkTarget() {
   }
 }
 
-void Mapper::TrackMovers(double t) {
+void Mapper::TrackMovers(const Eigen::Vector3d& origin, double t) {
   tracker_.Predict(t);
   if (zone_.active()) tracker_.Forget(zone_.center(), zone_.outer());
-  auto clusters = detector_.Detect(returns_, &grid_, tracker_.Expected());
+  auto clusters = detector_.Detect(origin, returns_, &grid_, tracker_.Expected());
   tracker_.Update(&clusters);
   for (const auto& cluster : clusters) {
     if (!tracker_.Moves(cluster.track)) continue;
@@ -200,14 +200,14 @@ ObstacleList Mapper::Insert(const Sweep& sweep) {
   zone_.MoveTo(sweep.t);
   Prepare(sweep);
   MarkTarget();
-  TrackMovers(sweep.t);
+  TrackMovers(sweep.origin, sweep.t);
   integrator_.Insert(sweep.origin, returns_);
   ClearGhosts();
   list.obstacles = Statics(sweep.origin, sweep.t, &list.n_dropped);
   list.n_static = static_cast<int>(list.obstacles.size());
   const StaticConfig& c = config_.statics;
-  const double middle = ground_.Height(sweep.origin.x(), sweep.origin.y()) +
-                        0.5 * (c.band_low + c.band_high);
+  const double middle =
+      ground_.Height(sweep.origin.x(), sweep.origin.y()) + 0.5 * (c.band_low + c.band_high);
   for (auto& o : tracker_.Obstacles(middle, c.semi_height, 1.02)) {
     ++list.n_moving;
     list.obstacles.push_back(std::move(o));

@@ -54,7 +54,7 @@ class Mapper {
   void Prepare(const Sweep& sweep);
   bool Shorten(const Eigen::Vector3d& origin, Eigen::Vector3d* end) const;
   void MarkTarget();
-  void TrackMovers(double t);
+  void TrackMovers(const Eigen::Vector3d& origin, double t);
   void ClearGhosts();
   std::vector<Cell> OccupiedColumns(const Eigen::Vector3d& origin);
   bool ColumnExtent(const VoxelGrid::Column& column, Extent* extent);

@@ -6,14 +6,14 @@ namespace chase::mapping {
 
 /// Local voxel grid: occupancy and free space around the drone.
 struct GridConfig {
-  double resolution = 0.2;  ///< edge of a cell, m
-  double range = 20.0;      ///< returns beyond it only clear space up to it, m
-  double min_range = 0.5;   ///< returns nearer are the drone itself, m
-  int hit = 8;              ///< log-odds that a sweep's hit adds, tenths
-  int miss = -4;            ///< log-odds that a sweep's ray through the cell adds, tenths
-  int limit = 36;           ///< log-odds are kept within +- this, tenths
-  int occupied = 12;        ///< a cell becomes occupied at this, and free again at zero or below
-  int ever_free_sweeps = 8; ///< consecutive free sweeps after which a return means motion
+  double resolution = 0.2;   ///< edge of a cell, m
+  double range = 20.0;       ///< returns beyond it only clear space up to it, m
+  double min_range = 0.5;    ///< returns nearer are the drone itself, m
+  int hit = 8;               ///< log-odds that a sweep's hit adds, tenths
+  int miss = -4;             ///< log-odds that a sweep's ray through the cell adds, tenths
+  int limit = 36;            ///< log-odds are kept within +- this, tenths
+  int occupied = 12;         ///< a cell becomes occupied at this, and free again at zero or below
+  int ever_free_sweeps = 8;  ///< consecutive free sweeps after which a return means motion
 
   template <class V>
   void Visit(V& v) {
@@ -44,14 +44,14 @@ struct GroundConfig {
 
 /// Decomposition of occupied columns into upright ellipsoids.
 struct StaticConfig {
-  double radius = 9.0;         ///< obstacles within this of the drone are listed, m
-  double band_low = 0.3;       ///< flight volume above the ground, m
-  double band_high = 3.0;      ///< the same, upper end, m
-  double semi_height = 8.0;    ///< vertical semi-axis of the ellipsoids, m
-  double max_length = 2.5;     ///< longest piece of a wall, m
-  double compact_radius = 0.6; ///< pieces within such a circle count as round, m
-  double waste = 0.15;         ///< blocked but not occupied area per length of a piece, m
-  int tolerance_permille = 5;  ///< of the enclosing ellipses' area
+  double radius = 9.0;          ///< obstacles within this of the drone are listed, m
+  double band_low = 0.3;        ///< flight volume above the ground, m
+  double band_high = 3.0;       ///< the same, upper end, m
+  double semi_height = 8.0;     ///< vertical semi-axis of the ellipsoids, m
+  double max_length = 2.5;      ///< longest piece of a wall, m
+  double compact_radius = 0.5;  ///< pieces within such a circle count as round, m
+  double waste = 0.2;           ///< blocked but not occupied area per length of a piece, m
+  int tolerance_permille = 5;   ///< of the enclosing ellipses' area
 
   template <class V>
   void Visit(V& v) {
@@ -69,19 +69,19 @@ struct StaticConfig {
 
 /// Detection and tracking of what moves.
 struct MoverConfig {
-  int min_points = 8;            ///< returns of a cluster
-  double cluster_cell = 0.4;     ///< clusters are connected in cells of this edge, m
-  double max_size = 6.0;         ///< larger clusters are no movers, m
-  double gate = 4.0;             ///< of the innovation, standard deviations
-  double acceleration = 1.5;     ///< process noise, m/s^2
-  double measurement = 0.12;     ///< standard deviation of a cluster's centre, m
-  int confirm_sweeps = 3;        ///< detections before a track may be listed
-  double confirm_distance = 0.3; ///< net travel before a track may be listed, m
-  double confirm_speed = 0.4;    ///< speed before a track may be listed, m/s
-  double coast_listed = 0.6;     ///< unseen tracks stay listed for this, s
-  double coast = 2.0;            ///< unseen tracks keep their id for this, s
-  double settle = 2.0;           ///< what does not move for this becomes static, s
-  double horizon = 3.0;          ///< length of the centre polynomials, s
+  int min_points = 8;             ///< returns of a cluster
+  double cluster_cell = 0.4;      ///< clusters are connected in cells of this edge, m
+  double max_size = 6.0;          ///< larger clusters are no movers, m
+  double gate = 4.0;              ///< of the innovation, standard deviations
+  double acceleration = 1.5;      ///< process noise, m/s^2
+  double measurement = 0.12;      ///< standard deviation of a cluster's centre, m
+  int confirm_sweeps = 3;         ///< detections before a track may be listed
+  double confirm_distance = 0.3;  ///< net travel before a track may be listed, m
+  double confirm_speed = 0.4;     ///< speed before a track may be listed, m/s
+  double coast_listed = 0.6;      ///< unseen tracks stay listed for this, s
+  double coast = 2.0;             ///< unseen tracks keep their id for this, s
+  double settle = 2.0;            ///< what does not move for this becomes static, s
+  double horizon = 3.0;           ///< length of the centre polynomials, s
 
   template <class V>
   void Visit(V& v) {

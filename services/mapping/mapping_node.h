@@ -32,8 +32,8 @@ class MappingNode : public bus::Node {
   MappingConfig config_;
   Mapper mapper_;
   std::optional<int64_t> origin_, last_scan_, last_map_;  ///< utime
-  int refused_ = 0;       ///< sweeps that odometry calls unusable, or that come from the past
-  bool lost_ = false;     ///< the last sweep was unusable
+  int refused_ = 0;    ///< sweeps that odometry calls unusable, or that come from the past
+  bool lost_ = false;  ///< the last sweep was unusable
   ObstacleList last_list_;
 };
 

@@ -8,6 +8,7 @@ namespace chase::mapping {
 namespace {
 
 constexpr int kSettledHits = 15;       // sweeps after which an occupied cell is not doubted
+constexpr double kLeastDepth = 0.4;    // of a mover's width over its length
 constexpr double kFewestSeeds = 0.25;  // share of a cluster's returns in ever-free space
 
 int64_t Code(int x, int y) {
@@ -56,7 +57,10 @@ std::vector<MotionDetector::Candidate> MotionDetector::Candidates(
   return candidates;
 }
 
-bool MotionDetector::Finish(const std::vector<Return>& returns, Cluster* cluster) const {
+/// The hull of what was seen, and a little beyond on the side that faces away: of a mover seen from
+/// one side only, a thin shell would be tracked as if there were nothing behind.
+bool MotionDetector::Finish(const Eigen::Vector3d& origin, const std::vector<Return>& returns,
+                            Cluster* cluster) const {
   if (static_cast<int>(cluster->members.size()) < config_.min_points) return false;
   Points2 points;
   float low = INFINITY, high = -INFINITY;
@@ -67,13 +71,24 @@ bool MotionDetector::Finish(const std::vector<Return>& returns, Cluster* cluster
     high = std::max(high, p.z());
   }
   cluster->hull = ConvexHull(std::move(points));
-  const Rectangle box = SmallestRectangle(cluster->hull);
+  Rectangle box = SmallestRectangle(cluster->hull);
+  const double missing = 2.0 * (kLeastDepth * box.half.x() - box.half.y());
+  if (missing > 0.0) {
+    Eigen::Vector2d away = box.axes.col(1);
+    if (away.dot(box.center - origin.head<2>()) < 0.0) away = -away;
+    for (const double side : {-1.0, 1.0})
+      cluster->hull.push_back(box.center + side * box.half.x() * box.axes.col(0) +
+                              (box.half.y() + missing) * away);
+    cluster->hull = ConvexHull(cluster->hull);
+    box.center += 0.5 * missing * away;
+  }
   cluster->center << box.center, 0.5 * (low + high);
   cluster->half_length = box.half.x();
   return 2.0 * box.half.x() <= config_.max_size;
 }
 
-std::vector<Cluster> MotionDetector::Detect(const std::vector<Return>& returns, VoxelGrid* grid,
+std::vector<Cluster> MotionDetector::Detect(const Eigen::Vector3d& origin,
+                                            const std::vector<Return>& returns, VoxelGrid* grid,
                                             const std::vector<Ellipse>& expected) const {
   const auto candidates = Candidates(returns, grid, expected);
   struct Bin {
@@ -115,7 +130,7 @@ std::vector<Cluster> MotionDetector::Detect(const std::vector<Return>& returns, 
         }
     }
     if (seeds < kFewestSeeds * static_cast<double>(cluster.members.size())) continue;
-    if (Finish(returns, &cluster)) clusters.push_back(std::move(cluster));
+    if (Finish(origin, returns, &cluster)) clusters.push_back(std::move(cluster));
   }
   return clusters;
 }

@@ -13,8 +13,8 @@ namespace chase::mapping {
 /// Returns that moved together. Frame W.
 struct Cluster {
   std::vector<int> members;                          ///< indices into the sweep's returns
-  Points2 hull;                                      ///< in plan, m
-  Eigen::Vector3d center = Eigen::Vector3d::Zero();  ///< of the smallest rectangle in plan, m
+  Points2 hull;                                      ///< in plan, with the side not seen, m
+  Eigen::Vector3d center = Eigen::Vector3d::Zero();  ///< of the box around hull, m
   double half_length = 0.0;                          ///< of that rectangle, m
   int track = -1;                                    ///< id of the track that it belongs to
 };
@@ -25,10 +25,10 @@ class MotionDetector {
   MotionDetector(const MoverConfig& movers, const GridConfig& grid)
       : config_(movers), ever_free_(grid.ever_free_sweeps) {}
 
-  /// Looks at returns labelled kStatic. `expected`: outlines where movers should be now; returns
-  /// there count as moving unless a settled cell holds them.
-  std::vector<Cluster> Detect(const std::vector<Return>& returns, VoxelGrid* grid,
-                              const std::vector<Ellipse>& expected) const;
+  /// Looks at returns labelled kStatic, seen from `origin`. `expected`: outlines where movers
+  /// should be now; returns there count as moving unless a settled cell holds them.
+  std::vector<Cluster> Detect(const Eigen::Vector3d& origin, const std::vector<Return>& returns,
+                              VoxelGrid* grid, const std::vector<Ellipse>& expected) const;
 
  private:
   struct Candidate {
@@ -39,7 +39,8 @@ class MotionDetector {
   std::vector<Candidate> Candidates(const std::vector<Return>& returns, VoxelGrid* grid,
                                     const std::vector<Ellipse>& expected) const;
   bool InEverFree(const Key& key, VoxelGrid* grid) const;
-  bool Finish(const std::vector<Return>& returns, Cluster* cluster) const;
+  bool Finish(const Eigen::Vector3d& origin, const std::vector<Return>& returns,
+              Cluster* cluster) const;
 
   MoverConfig config_;
   int ever_free_;
@@ -52,12 +53,13 @@ struct Track {
   Eigen::Vector3d v = Eigen::Vector3d::Zero();  ///< m/s
   double pp = 0.0, pv = 0.0, vv = 0.0;          ///< covariance per axis
   Eigen::Vector3d birth = Eigen::Vector3d::Zero();
-  double born = 0.0, seen = 0.0, moved = 0.0;   ///< s: first, last detection; last time not at rest
+  double born = 0.0, seen = 0.0, moved = 0.0;  ///< s: first, last detection; last time not at rest
+  double whole = 0.0;                          ///< s, last detection of its whole length
   int detections = 0;
-  bool confirmed = false, fresh = false;        ///< fresh: confirmed by the last update
-  Points2 hull;                                 ///< of the last cluster about its centre, m
-  double half_length = 0.0;                     ///< largest seen of late, m
-  std::vector<Eigen::Vector2d> trail;           ///< centres until the confirmation
+  bool confirmed = false, fresh = false;  ///< fresh: confirmed by the last update
+  Points2 hull;                           ///< of the last cluster about its centre, m
+  double half_length = 0.0;               ///< largest seen of late, m
+  std::vector<Eigen::Vector2d> trail;     ///< centres until the confirmation
 
   /// Outline in plan about the present centre that holds the last cluster; thinnest half width m.
   Ellipse Outline() const;
@@ -86,6 +88,7 @@ class Tracker {
 
  private:
   void Join(std::vector<Cluster>* clusters) const;
+  bool HalfHidden(const Cluster& cluster, const Track& track) const;
   void Correct(const Cluster& cluster, Track* track) const;
   void Birth(Cluster* cluster);
   void Confirm(Track* track) const;

@@ -44,7 +44,8 @@ bool Remove(octomap::OcTree* tree, octomap::OcTreeNode* node, const octomap::OcT
     Collapse(tree, node);
     return true;
   }
-  const unsigned i = octomap::computeChildIdx(key, static_cast<int>(tree->getTreeDepth() - 1 - level));
+  const unsigned i =
+      octomap::computeChildIdx(key, static_cast<int>(tree->getTreeDepth() - 1 - level));
   if (!tree->nodeHasChildren(node) || !tree->nodeChildExists(node, i)) return false;
   if (!Remove(tree, tree->getNodeChild(node, i), key, depth, level + 1)) return false;
   tree->deleteNodeChild(node, i);
@@ -78,8 +79,7 @@ void OccupancyTree::Set(const Key& key, bool occupied) {
   tiles_.insert({key.x >> kTileLevels, key.y >> kTileLevels, key.z >> kTileLevels});
 }
 
-void OccupancyTree::Forget(const Eigen::Vector3d& p, double radius,
-                           std::vector<SavedTile>* saved) {
+void OccupancyTree::Forget(const Eigen::Vector3d& p, double radius, std::vector<SavedTile>* saved) {
   const double edge = kTileCells * tree_->getResolution();
   for (auto it = tiles_.begin(); it != tiles_.end();) {
     const auto [x, y, z] = *it;
@@ -118,8 +118,7 @@ void OccupancyTree::Drop(const Tile& tile) {
 std::string OccupancyTree::Write(int* occupied) {
   *occupied = 0;
   for (auto it = tree_->begin_leafs(), end = tree_->end_leafs(); it != end; ++it)
-    if (tree_->isNodeOccupied(*it))
-      *occupied += 1 << (3 * (tree_->getTreeDepth() - it.getDepth()));
+    if (tree_->isNodeOccupied(*it)) *occupied += 1 << (3 * (tree_->getTreeDepth() - it.getDepth()));
   return ToBytes(*tree_);
 }
 

@@ -7,10 +7,10 @@ namespace chase::mapping {
 
 namespace {
 
-constexpr double kSlowDown = 1.0;   // s, time constant with which an unseen target is led
-constexpr double kMostSigma = 0.15; // m, of the estimate that widens the zone
-constexpr double kSpread = 0.15;    // m/s, growth of the zone while unseen
-constexpr double kMostSpread = 0.3; // m
+constexpr double kSlowDown = 1.0;    // s, time constant with which an unseen target is led
+constexpr double kMostSigma = 0.15;  // m, of the estimate that widens the zone
+constexpr double kSpread = 0.15;     // m/s, growth of the zone while unseen
+constexpr double kMostSpread = 0.3;  // m
 
 }  // namespace
 

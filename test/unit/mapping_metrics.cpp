@@ -17,8 +17,7 @@ void HitCounter::Add(const Truth& truth) {
 }
 
 double HitCounter::Coverage(const std::vector<world::Obstacle>& obstacles,
-                            const Eigen::Vector3d& at, double radius, double t,
-                            int* points) const {
+                            const Eigen::Vector3d& at, double radius, double t, int* points) const {
   int all = 0, inside = 0;
   for (const auto& [cell, entry] : entries_) {
     if (entry.count < 3 || (entry.point - at).head<2>().norm() > radius) continue;

@@ -37,7 +37,7 @@ TEST(MappingMover, IsFoundTrackedAndForgotten) {
     std::mt19937 random(3);
     Mapper mapper(MappingConfig{});
     std::set<int> ids;
-    double found = -1.0, worst = 0.0;
+    double found = -1.0, worst = 0.0, worst_hidden = 0.0;
     const double end = kStart + 18.0 / speed;
     for (double t = 0.0; t < end + 1.5; t += 0.1) {
       const testing::World world = t < end ? scene.At(t) : scene.At(0.0);
@@ -50,8 +50,12 @@ TEST(MappingMover, IsFoundTrackedAndForgotten) {
         EXPECT_EQ(o.center.degree(), 1);
         EXPECT_GT(o.velocity_variance, 0.0);
         if (t < found + 1.0 || t > end) continue;
-        worst = std::max(worst, (o.center.Velocity(t).head<2>() - Eigen::Vector2d(0, speed)).norm());
-        EXPECT_NE(testing::Holding({o}, {scene.Place(t).x(), scene.Place(t).y(), 1.0}, t), nullptr);
+        const double error = (o.center.Velocity(t).head<2>() - Eigen::Vector2d(0, speed)).norm();
+        const bool hidden = std::abs(scene.Place(t).y()) < 4.2;  // by the trunk in front, in part
+        (hidden ? worst_hidden : worst) = std::max(hidden ? worst_hidden : worst, error);
+        // The middle of the side that can be seen.
+        const Eigen::Vector3d seen(scene.Place(t).x() - 0.45, scene.Place(t).y(), 1.0);
+        EXPECT_NE(testing::Holding({o}, seen, t), nullptr) << t;
       }
       if (t > end + 1.0) {
         EXPECT_EQ(list.n_moving, 0) << "ghost at " << t - end;
@@ -60,9 +64,10 @@ TEST(MappingMover, IsFoundTrackedAndForgotten) {
         EXPECT_EQ(testing::Holding(list.obstacles, {8.0, y, 1.0}, t), nullptr) << "trail " << y;
     }
     EXPECT_GE(found, 0.0) << speed;
-    EXPECT_LT(found, kStart + 0.9) << speed;
+    EXPECT_LT(found, kStart + 0.55) << speed;
     EXPECT_EQ(ids.size(), 1u) << speed;
-    EXPECT_LT(worst, 0.5) << speed;
+    EXPECT_LT(worst, 0.3) << speed;
+    EXPECT_LT(worst_hidden, 0.9) << speed;
   }
 }
 
@@ -70,7 +75,9 @@ TEST(MappingMover, WhatStopsBecomesStatic) {
   std::mt19937 random(3);
   Mapper mapper(MappingConfig{});
   ObstacleList list;
-  const auto place = [](double t) { return Eigen::Vector2d(6.0, std::min(0.0, -6.0 + 2.0 * (t - kStart))); };
+  const auto place = [](double t) {
+    return Eigen::Vector2d(6.0, std::min(0.0, -6.0 + 2.0 * (t - kStart)));
+  };
   double t = 0.0;
   for (; t < 12.0; t += 0.1) {
     testing::World world;

@@ -17,7 +17,8 @@ TEST(MappingTree, BytesAreReadByOctomap) {
   std::mt19937 random(1);
   std::uniform_int_distribution<int> cell(-60, 60);
   std::vector<std::pair<Key, bool>> cells;
-  for (int i = 0; i < 3000; ++i) cells.push_back({{cell(random), cell(random), cell(random)}, i % 3 == 0});
+  for (int i = 0; i < 3000; ++i)
+    cells.push_back({{cell(random), cell(random), cell(random)}, i % 3 == 0});
   for (const auto& [key, occupied] : cells) tree.Set(key, occupied);
   int occupied = 0;
   std::istringstream stream(tree.Write(&occupied));

@@ -55,13 +55,21 @@ double World::Cast(const Eigen::Vector3d& from, const Eigen::Vector3d& direction
                    int* object) const {
   double best = INFINITY;
   int hit = -1;
-  if (direction.z() < -1e-6) {  // fixed point iteration: slopes are gentle
-    double s = (Ground(from.x(), from.y()) - from.z()) / direction.z();
-    for (int i = 0; i < 8 && roughness > 0.0; ++i) {
+  if (direction.z() < -1e-6) {
+    const auto above = [&](double s) {
       const Eigen::Vector3d p = from + s * direction;
-      s += 0.6 * (Ground(p.x(), p.y()) - p.z()) / direction.z();
+      return p.z() - Ground(p.x(), p.y());
+    };
+    // Between the crests' and the troughs' height the ray may meet the ground: march, then bisect.
+    double high = std::max(0.0, (roughness - from.z()) / direction.z());
+    const double last = std::min(100.0, (-roughness - from.z()) / direction.z());
+    double low = high;
+    while (above(low) > 0.0 && low < last) high = low, low = std::min(last, low + 0.25);
+    for (int i = 0; i < 25 && roughness > 0.0; ++i) {
+      const double middle = 0.5 * (low + high);
+      (above(middle) > 0.0 ? high : low) = middle;
     }
-    if (s > 0.0 && s < 100.0) best = s, hit = 0;
+    if (low > 0.0 && low < 100.0) best = low, hit = 0;
   }
   for (size_t i = 0; i < boxes.size(); ++i) {
     const double s = CastBox(boxes[i], from, direction);
@@ -103,9 +111,9 @@ World Forest(double side, int trunks, unsigned seed) {
   for (int tries = 0; tries < 100 * trunks; ++tries) {
     if (static_cast<int>(world.cylinders.size()) >= trunks) break;
     Cylinder c{{place(random), place(random)}, radius(random), -1.0, 8.0};
-    const bool free = std::all_of(world.cylinders.begin(), world.cylinders.end(), [&](const auto& o) {
-      return (o.center - c.center).norm() > o.radius + c.radius + 2.5;
-    });
+    const bool free = std::all_of(
+        world.cylinders.begin(), world.cylinders.end(),
+        [&](const auto& o) { return (o.center - c.center).norm() > o.radius + c.radius + 2.5; });
     if (free && std::abs(c.center.y() - 0.5 * side) > 1.2) world.cylinders.push_back(c);
   }
   return world;
