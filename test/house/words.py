@@ -12,7 +12,7 @@ RULES = [
     (r"^\s*using namespace\b", "using namespace in a header", (".cpp",)),
 ]
 SOURCES = ("*.h", "*.cpp", "*.py", "*.cmake", "*CMakeLists.txt", "*.lcm", "*.md", "*.yaml")
-LONGEST = 400  # lines of a source file
+LONGEST = 400  # lines of a source file before it is worth a hard look
 
 
 def check(path):
@@ -22,7 +22,7 @@ def check(path):
             if path.suffix not in exempt and re.search(pattern, line):
                 yield f"{path}:{number}: {what}: {line.strip()[:80]}"
     if path.suffix in (".h", ".cpp") and len(lines) > LONGEST:
-        yield f"{path}: {len(lines)} lines; is it still one idea?"
+        print(f"note: {path}: {len(lines)} lines; is it still one idea?")
 
 
 def main():
