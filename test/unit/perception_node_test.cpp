@@ -111,9 +111,9 @@ TEST(PerceptionNode, AnswersEveryImageForItsOwnTime) {
   ASSERT_EQ(bench.out.size(), 12u);
   for (size_t i = 0; i < bench.out.size(); ++i)
     EXPECT_EQ(bench.out[i].utime, Bench::At(0.025 + 0.05 * static_cast<double>(i)));
-  EXPECT_EQ(bench.out[0].state, target_t::SEARCHING);
+  EXPECT_EQ(bench.out[0].state, +target_t::SEARCHING);
   const target_t& last = bench.out.back();
-  EXPECT_EQ(last.state, target_t::TRACKING);
+  EXPECT_EQ(last.state, +target_t::TRACKING);
   EXPECT_NEAR(last.mean[0], kDistance, 0.05);
   EXPECT_NEAR(last.mean[1], 0.0, 0.03);
   EXPECT_NEAR(last.mean[2], 0.55, 0.03);
@@ -129,7 +129,7 @@ TEST(PerceptionNode, StartsWaitingAndSearches) {
   EXPECT_EQ(bench.Report().state, bus::NodeReport::State::kStarting);
   bench.Send(bench.Image(0.0));
   ASSERT_EQ(bench.out.size(), 1u);
-  EXPECT_EQ(bench.out[0].state, target_t::SEARCHING);
+  EXPECT_EQ(bench.out[0].state, +target_t::SEARCHING);
   EXPECT_EQ(bench.Report().detail, "no pose");
 }
 
@@ -178,7 +178,7 @@ TEST(PerceptionNode, RgbAndBgrAreTheSamePicture) {
   m.pixelformat = camera_image_t::PIXEL_FORMAT_RGB;
   for (size_t i = 0; i < m.data.size(); i += 3) std::swap(m.data[i], m.data[i + 2]);
   bench.Send(m);
-  EXPECT_EQ(bench.out.back().state, target_t::TRACKING);
+  EXPECT_EQ(bench.out.back().state, +target_t::TRACKING);
   EXPECT_GT(bench.out.back().score, 0.5);
 }
 
