@@ -13,6 +13,7 @@ namespace {
 constexpr size_t kMaxSweeps = 4;
 constexpr double kUnknownVariance = 1e4;  // m^2, while nothing is known
 constexpr double kBoxMargin = 0.25;       // share of the expected box in which a piece may lie
+constexpr double kLarger = 1.3;           // times the expected size: more than the target
 constexpr double kBoxMarginPx = 4.0;
 constexpr double kGateSigmas = 3.0;
 constexpr int kCandidateMisses = 2;   // frames without it that end a candidate
@@ -34,10 +35,13 @@ std::optional<cv::Rect2d> SearchBox(const TargetTrack& track, const Camera& came
   return cv::Rect2d(box->x - dx, box->y - dy, box->width + 2 * dx, box->height + 2 * dy);
 }
 
-/// The part of a detection that may be the target: like colours behind it go on outside.
-std::optional<Detection> Within(const cv::Rect2d& search, const cv::Mat& bgr,
-                                const Detection& detection) {
-  if (detection.mask.empty() || (detection.box & search) == detection.box) return detection;
+/// The part of a detection that may be the target: where it is larger than the target, a like
+/// colour behind goes on outside.
+std::optional<Detection> Within(const cv::Rect2d& search, const cv::Rect2d& expected,
+                                const cv::Mat& bgr, const Detection& detection) {
+  const bool larger = detection.box.width > kLarger * expected.width ||
+                      detection.box.height > kLarger * expected.height;
+  if (detection.mask.empty() || !larger) return detection;
   const cv::Rect window(
       static_cast<int>(std::floor(search.x)), static_cast<int>(std::floor(search.y)),
       static_cast<int>(std::ceil(search.width)), static_cast<int>(std::ceil(search.height)));
@@ -106,6 +110,9 @@ std::optional<Perceiver::Sighting> Perceiver::Try(const TargetTrack& track, cons
 
 std::optional<Perceiver::Sighting> Perceiver::Find(const TargetTrack& track, View* view,
                                                    bool fresh_sweeps_only) {
+  const auto expected = ProjectCylinder(view->camera, track.state.position(), track.shape.size[0],
+                                        track.shape.size[1]);
+  if (!expected) return std::nullopt;
   const auto search = SearchBox(track, view->camera);
   if (!search) return std::nullopt;
   std::vector<size_t> inside;
@@ -113,9 +120,10 @@ std::optional<Perceiver::Sighting> Perceiver::Find(const TargetTrack& track, Vie
     if (!view->taken[i] && (view->detections[i].box & *search).area() > 0.0) inside.push_back(i);
   std::optional<Sighting> best;
   for (const size_t i : inside) {
-    const auto piece = Within(*search, view->bgr, view->detections[i]);
+    const auto piece = Within(*search, *expected, view->bgr, view->detections[i]);
     if (!piece) continue;
     const auto s = Try(track, *view, *piece, fresh_sweeps_only);
+    if (s && IsDecoy(s->fit.posterior.position())) continue;
     if (s && (!best || s->fit.cost < best->fit.cost)) best = s;
   }
   if (!best && inside.size() >= 2 &&
