@@ -20,7 +20,7 @@ namespace chase::bus {
 namespace {
 
 constexpr int64_t kStatusPeriod = 1000000;  // us
-constexpr int64_t kMaxLag = 500000;  // us that ticks may fall behind the clock before they slip
+constexpr int64_t kMaxLag = 500000;  // us that ticks may fall behind the clock before time slips
 
 volatile std::sig_atomic_t stop_requested = 0;
 
@@ -61,11 +61,15 @@ void RunLive(const ServiceSpec& spec, const Flags& flags) {
   int64_t now = bus.Now();
   const int64_t period = node->TickPeriod();
   int64_t next_tick = now, next_status = now;
+  int64_t slip = 0;  // a node that cannot keep up loses time, never a tick
   while (stop_requested == 0 && !node->Done()) {
     now = bus.Now();
     if (period > 0 && now >= next_tick) {
-      if (now - next_tick > kMaxLag) next_tick = now;
-      node->Tick(next_tick);
+      if (now - next_tick > kMaxLag) {
+        slip += now - next_tick;
+        next_tick = now;
+      }
+      node->Tick(next_tick - slip);
       next_tick += period;
     }
     if (now >= next_status) {

@@ -14,6 +14,7 @@ using namespace chase::logs;
 struct Arguments {
   std::string in, out, other, format, channel;
   std::vector<std::string> ignore;
+  double tolerance = 0.0;
   bool tum = false, csv = false, mcap = false;
 };
 
@@ -67,10 +68,13 @@ void AddDiff(CLI::App* app, Arguments* a, int* exit_code) {
       app->add_subcommand("diff", "Compares two logs field by field; exit 1 if they differ.");
   sub->add_option("A", a->in, "LCM log")->required();
   sub->add_option("B", a->other, "LCM log")->required();
+  sub->add_option("--tolerance", a->tolerance,
+                  "numbers this close are the same: absolute below 1, relative above")
+      ->check(CLI::NonNegativeNumber);
   sub->add_option("--ignore", a->ignore,
                   "CHANNEL.field left out, shell patterns allowed; CHANNEL alone: all of it");
   sub->callback([a, exit_code] {
-    const auto differences = Diff(a->in, a->other, a->ignore);
+    const auto differences = Diff(a->in, a->other, a->ignore, a->tolerance);
     std::fputs(differences.empty() ? "no difference\n" : Format(differences).c_str(), stdout);
     *exit_code = differences.empty() ? 0 : 1;
   });

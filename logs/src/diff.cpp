@@ -15,7 +15,10 @@
 namespace chase::logs {
 namespace {
 
-bool SameNumber(double a, double b) { return a == b || (std::isnan(a) && std::isnan(b)); }
+bool SameNumber(double a, double b, double tolerance) {
+  if (a == b || (std::isnan(a) && std::isnan(b))) return true;
+  return std::abs(a - b) <= tolerance * std::max({1.0, std::abs(a), std::abs(b)});
+}
 
 std::string Show(const Field& f, size_t index) {
   if (index < f.texts.size()) return "'" + f.texts[index].substr(0, 60) + "'";
@@ -33,7 +36,7 @@ Change SizeChange(const Field& a, const Field& b) {
                            b.numbers.size() + b.texts.size())};
 }
 
-std::optional<Change> Compare(const Field& a, const Field& b) {
+std::optional<Change> Compare(const Field& a, const Field& b, double tolerance) {
   if (a.numbers.size() != b.numbers.size() || a.texts.size() != b.texts.size())
     return SizeChange(a, b);
   std::optional<Change> change;
@@ -41,7 +44,7 @@ std::optional<Change> Compare(const Field& a, const Field& b) {
     if (!change) change = Change{0.0, Show(a, i) + " against " + Show(b, i)};
   };
   for (size_t i = 0; i < a.numbers.size(); ++i) {
-    if (SameNumber(a.numbers[i], b.numbers[i])) continue;
+    if (SameNumber(a.numbers[i], b.numbers[i], tolerance)) continue;
     note(i);
     const double d = std::abs(a.numbers[i] - b.numbers[i]);
     change->greatest = std::isnan(d) ? INFINITY : std::max(change->greatest, d);
@@ -55,8 +58,11 @@ using CountMap = std::map<std::string, long>;
 
 class Comparison {
  public:
-  Comparison(std::vector<std::string> ignore, CountMap a, CountMap b)
-      : ignore_(std::move(ignore)), counts_a_(std::move(a)), counts_b_(std::move(b)) {
+  Comparison(std::vector<std::string> ignore, double tolerance, CountMap a, CountMap b)
+      : ignore_(std::move(ignore)),
+        tolerance_(tolerance),
+        counts_a_(std::move(a)),
+        counts_b_(std::move(b)) {
     CountMap all = counts_a_;
     all.insert(counts_b_.begin(), counts_b_.end());
     for (const auto& [channel, count] : all) {
@@ -96,7 +102,7 @@ class Comparison {
     for (const Field& f : *fields_a) {
       const auto at = in_b.find(f.path);
       const Field none{f.path, {}, {}, f.is_list};
-      if (const auto change = Compare(f, at == in_b.end() ? none : *at->second))
+      if (const auto change = Compare(f, at == in_b.end() ? none : *at->second, tolerance_))
         Note(f.path, *change);
       if (at != in_b.end()) in_b.erase(at);
     }
@@ -121,6 +127,7 @@ class Comparison {
   }
 
   std::vector<std::string> ignore_;
+  double tolerance_;
   CountMap counts_a_, counts_b_, common_, compared_;
   std::map<std::string, ChannelDifference> result_;
   std::string channel_;
@@ -162,9 +169,10 @@ std::optional<std::pair<Event, Event>> Step(const CountMap& common, Side* own, S
 }  // namespace
 
 std::map<std::string, ChannelDifference> Diff(const std::string& a, const std::string& b,
-                                              const std::vector<std::string>& ignore) {
+                                              const std::vector<std::string>& ignore,
+                                              double tolerance) {
   const auto counts_a = Counts(a), counts_b = Counts(b);
-  Comparison comparison(ignore, counts_a, counts_b);
+  Comparison comparison(ignore, tolerance, counts_a, counts_b);
   Side side_a(a), side_b(b);
   while (side_a.more || side_b.more) {
     if (const auto pair = Step(comparison.common(), &side_a, &side_b))

@@ -22,9 +22,11 @@ struct ChannelDifference {
 
 /// Compares the k-th message of each channel in A with the k-th in B, field by field. `ignore`
 /// holds shell patterns for "CHANNEL.field", such as "*_STATUS.*". The result holds the channels
-/// that differ. Throws std::runtime_error with one line when a log cannot be read.
+/// that differ. Numbers within `tolerance` of each other, absolute below 1 and relative above, are
+/// the same. Throws std::runtime_error with one line when a log cannot be read.
 std::map<std::string, ChannelDifference> Diff(const std::string& a, const std::string& b,
-                                              const std::vector<std::string>& ignore);
+                                              const std::vector<std::string>& ignore,
+                                              double tolerance = 0.0);
 
 /// One line per channel and one per field that differs, for people.
 std::string Format(const std::map<std::string, ChannelDifference>& differences);

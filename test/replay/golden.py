@@ -1,0 +1,108 @@
+#!/usr/bin/env python3
+"""Golden replays: a service driven by a short recorded input must send what it sent when the golden was
+made.
+
+Usage: golden.py check BIN_DIR SCENARIO SERVICE
+       golden.py record BIN_DIR SCENARIO FLIGHT.lcm [SERVICE...]   (prints what changed)
+
+Inputs are slices of a flight of chase-flight with sweeps thinned to some columns of a sweep, so that the
+files stay small. The configuration is today's for the scenario: a new default shows up as a difference.
+"""
+import lzma
+import pathlib
+import struct
+import subprocess
+import sys
+import tempfile
+
+sys.path.insert(0, str(pathlib.Path(__file__).parent))
+import lcmlog
+
+GOLDEN = pathlib.Path(__file__).resolve().parents[2] / "logs" / "golden"
+TOLERANCE = "1e-6"  # relative; another processor's mathematics library may round differently
+
+# service: inputs, outputs, from and to [s of the flight's clock], one of how many columns is kept
+SLICES = {
+    "odometry": (["LIDAR_SCAN", "IMU"], ["POSE", "SCAN_REGISTERED"], 1.0, 3.4, 8),
+    "mapping": (["SCAN_REGISTERED", "TARGET"], ["OBSTACLES"], 20.0, 21.6, 6),
+    "perception": (["CAMERA_IMAGE", "LIDAR_SCAN", "POSE"], ["TARGET"], 20.0, 20.35, 4),
+    "prediction": (["TARGET", "OBSTACLES"], ["PREDICTION"], 20.0, 25.0, 1),
+    "planning": (["PREDICTION", "OBSTACLES", "POSE"], ["PLAN"], 20.0, 23.0, 1),
+    "control": (["PLAN", "POSE"], ["ATTITUDE_SETPOINT"], 20.0, 22.0, 1),
+    "simulator": (["ATTITUDE_SETPOINT"], ["TRUTH", "IMU"], 1.0, 5.0, 1),
+}
+# Where a cloud's size stands, and how many float and byte arrays follow.
+CLOUDS = {"LIDAR_SCAN": (20, 4, 2), "SCAN_REGISTERED": (77, 3, 2)}
+
+
+def thin(channel, data, step):
+    """Keeps every step-th group of 16 points, which is a column of a sweep."""
+    if channel not in CLOUDS or step == 1:
+        return data
+    at, n_float, n_byte = CLOUDS[channel]
+    size, = struct.unpack_from(">i", data, at)
+    keep = [i for i in range(size) if i // 16 % step == 0]
+    out, pos = data[:at] + struct.pack(">i", len(keep)), at + 4
+    for width in [4] * n_float + [1] * n_byte:
+        out += b"".join(data[pos + width * i:pos + width * (i + 1)] for i in keep)
+        pos += width * size
+    return out
+
+
+def run_service(bin_dir, scenario, service, source, folder):
+    """Replays `source`; returns the events of the golden's channels."""
+    text = subprocess.run([f"{bin_dir}/chase-flight", scenario, "--print-config", service],
+                          check=True, capture_output=True, text=True).stdout
+    config, out = f"{folder}/config.yaml", f"{folder}/out.lcm"
+    pathlib.Path(config).write_text(text)
+    subprocess.run([f"{bin_dir}/chase-{service}", "--config", config, "--replay", source, "--out", out],
+                   check=True)
+    outputs = SLICES[service][1]
+    return [(t, c, thin(c, d, 40)) for t, c, d in lcmlog.read(out) if c in outputs]
+
+
+def unpack(name, folder):
+    path = f"{folder}/{name}"
+    pathlib.Path(path).write_bytes(lzma.decompress((GOLDEN / f"{name}.xz").read_bytes()))
+    return path
+
+
+def difference(bin_dir, a, b):
+    return subprocess.run([f"{bin_dir}/chase-log", "diff", a, b, "--tolerance", TOLERANCE],
+                          capture_output=True, text=True)
+
+
+def check(bin_dir, scenario, service):
+    with tempfile.TemporaryDirectory() as folder:
+        source, expected = unpack(f"{service}.in.lcm", folder), unpack(f"{service}.out.lcm", folder)
+        events = run_service(bin_dir, scenario, service, source, folder)
+        if not events:
+            sys.exit(f"{service}: the replay gave nothing")
+        lcmlog.write(f"{folder}/now.lcm", events)
+        result = difference(bin_dir, expected, f"{folder}/now.lcm")
+        if result.returncode:
+            sys.exit(f"{service} differs from its golden:\n{result.stdout}{result.stderr}"
+                     "If that is meant, record it anew: test/replay/golden.py record ...")
+        print(f"{service}: {len(events)} messages as in the golden")
+
+
+def record(bin_dir, scenario, flight, *services):
+    GOLDEN.mkdir(exist_ok=True)
+    for service in services or SLICES:
+        inputs, _, begin, end, step = SLICES[service]
+        events = [(t, c, thin(c, d, step)) for t, c, d in lcmlog.read(flight)
+                  if c in inputs and begin <= t * 1e-6 < end]
+        with tempfile.TemporaryDirectory() as folder:
+            source = f"{folder}/{service}.in.lcm"
+            lcmlog.write(source, events)
+            lcmlog.write(f"{folder}/new.lcm", run_service(bin_dir, scenario, service, source, folder))
+            if (GOLDEN / f"{service}.out.lcm.xz").exists():
+                print(difference(bin_dir, unpack(f"{service}.out.lcm", folder),
+                                 f"{folder}/new.lcm").stdout)
+            for name, path in (("in", source), ("out", f"{folder}/new.lcm")):
+                packed = lzma.compress(pathlib.Path(path).read_bytes(), preset=9)
+                (GOLDEN / f"{service}.{name}.lcm.xz").write_bytes(packed)
+                print(f"{service}.{name}.lcm.xz: {len(packed) // 1024} KiB")
+
+
+{"check": check, "record": record}[sys.argv[1]](*sys.argv[2:])
