@@ -29,7 +29,7 @@ class PlanningNode : public bus::Node {
   bus::Bus& bus_;
   Pilot pilot_;
   std::optional<int64_t> origin_;  // utime that the core's seconds count from
-  polynomial_t target_;            // as predicted
+  polynomial_t target_{};          // as predicted; no coefficients: none yet
   int64_t n_plans_ = 0;
   int64_t n_verdicts_[6] = {};
 };
