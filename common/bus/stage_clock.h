@@ -21,7 +21,10 @@ class StageClock {
     Scope(std::vector<float>* sink) : sink_(sink), start_(std::chrono::steady_clock::now()) {}
     Scope(const Scope&) = delete;
     Scope& operator=(const Scope&) = delete;
+    /// Forgets this measurement: there was nothing to do.
+    void Cancel() { sink_ = nullptr; }
     ~Scope() {
+      if (sink_ == nullptr) return;
       const std::chrono::duration<float, std::milli> d = std::chrono::steady_clock::now() - start_;
       sink_->push_back(d.count());
     }

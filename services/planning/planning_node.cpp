@@ -88,6 +88,7 @@ void PlanningNode::OnPose(const pose_t& message) {
   {
     auto timer = bus_.Time("plan");
     plan = pilot_.Update(t, FromMessage(message));
+    if (!plan) timer.Cancel();  // no plan was due
   }
   if (plan) Send(*plan);
 }

@@ -6,3 +6,8 @@ foreach(service IN ITEMS odometry mapping perception prediction planning control
     WORKING_DIRECTORY ${CMAKE_SOURCE_DIR})
   set_tests_properties(golden_replay_${service} PROPERTIES TIMEOUT 120)
 endforeach()
+
+# A recorded drive through the programs; skips where the recording is not at hand.
+chase_test(kitti_map_test LIBS lcmtypes fmt::fmt octomap octomath TIMEOUT 200
+  SOURCES ${CMAKE_CURRENT_LIST_DIR}/kitti_map_test.cpp)
+target_compile_definitions(kitti_map_test PRIVATE CHASE_BIN="${CMAKE_BINARY_DIR}/bin")
