@@ -17,8 +17,10 @@ Sweep FromMessage(const lidar_scan_t& m, double start) {
   return sweep;
 }
 
+constexpr double kMostVariance = 1e6;  // m^2, m^2/s^2, rad^2
+
 pose_t ToMessage(const PoseEstimate& estimate, int64_t origin) {
-  pose_t m;
+  pose_t m{};
   m.utime = bus::Utime(estimate.t, origin);
   bus::Set(m.pos, estimate.X_WB.p);
   bus::Set(m.vel, estimate.v);
@@ -27,7 +29,9 @@ pose_t ToMessage(const PoseEstimate& estimate, int64_t origin) {
   bus::Set(m.accel, estimate.a);
   bus::Set(m.gyro_bias, estimate.gyro_bias);
   bus::Set(m.accel_bias, estimate.accel_bias);
-  Eigen::Map<Eigen::Matrix<double, 9, 9, Eigen::RowMajor>>(m.covariance) = estimate.covariance;
+  // A lost filter's covariance grows without bound; the bus refuses numbers from 1e7 on.
+  Eigen::Map<Eigen::Matrix<double, 9, 9, Eigen::RowMajor>>(m.covariance) =
+      estimate.covariance.cwiseMax(-kMostVariance).cwiseMin(kMostVariance);
   m.health = static_cast<int8_t>(estimate.health.health);
   m.correcting = estimate.correcting ? 1 : 0;
   m.reason = estimate.health.reason;
