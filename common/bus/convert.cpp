@@ -17,7 +17,7 @@ world::Trajectory FromMessage(const polynomial_t& m, int64_t origin) {
 }
 
 polynomial_t ToMessage(const world::Trajectory& trajectory, int64_t origin) {
-  polynomial_t m;
+  polynomial_t m{};
   m.utime = Utime(trajectory.start, origin);
   m.duration = trajectory.duration;
   m.n_coefficients = 3 * (trajectory.degree() + 1);
@@ -39,7 +39,7 @@ world::Obstacle FromMessage(const obstacle_t& m, int64_t origin) {
 }
 
 obstacle_t ToMessage(const world::Obstacle& o, int64_t origin) {
-  obstacle_t m;
+  obstacle_t m{};
   m.id = o.id;
   m.kind = o.moving ? obstacle_t::MOVING : obstacle_t::STATIC;
   m.center = ToMessage(o.center, origin);

@@ -19,7 +19,7 @@ void AddUsage(status_t* status) {
 
 void AddStages(const StageClock& clock, status_t* status) {
   for (const auto& [name, s] : clock.Summaries()) {
-    stage_status_t stage;
+    stage_status_t stage{};
     stage.name = name;
     stage.count = s.count;
     stage.mean_ms = s.mean_ms;
@@ -62,7 +62,7 @@ status_t StatusReporter::Make(const Bus& bus, const Node& node, int64_t utime, b
   status.uptime = static_cast<double>(utime - start_) * 1e-6;
   const double elapsed = last_ < 0 ? 0.0 : static_cast<double>(utime - last_) * 1e-6;
   for (const auto& [name, c] : bus.counters()) {
-    channel_status_t channel;
+    channel_status_t channel{};
     channel.channel = name;
     channel.received = c.received;
     channel.dropped = c.dropped;

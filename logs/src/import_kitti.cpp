@@ -57,9 +57,8 @@ lidar_scan_t KittiScan(const uint8_t* records, size_t count, int64_t utime) {
   for (size_t i = 0; i < count; ++i) points[i] = Parse(records + kRecordBytes * i);
   std::stable_sort(points.begin(), points.end(),
                    [](const Record& a, const Record& b) { return a.t < b.t; });
-  lidar_scan_t scan;
+  lidar_scan_t scan{};
   scan.utime = utime;
-  scan.seq = 0;
   scan.size = static_cast<int32_t>(count);
   for (const Record& p : points) {
     scan.x.push_back(static_cast<float>(p.x));

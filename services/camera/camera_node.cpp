@@ -33,8 +33,7 @@ void CameraNode::Miss() {
 }
 
 void CameraNode::Publish(const cv::Mat& rgb, int64_t utime) {
-  camera_image_t m;
-  m.seq = 0;  // numbered by the bus
+  camera_image_t m{};
   m.utime = utime;
   m.width = rgb.cols;
   m.height = rgb.rows;

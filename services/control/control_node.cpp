@@ -49,7 +49,7 @@ void ControlNode::OnPose(const pose_t& message) {
 }
 
 void ControlNode::Send(int64_t utime, const Setpoint& setpoint) {
-  attitude_setpoint_t m;
+  attitude_setpoint_t m{};
   m.utime = utime;
   bus::Set(m.orientation, setpoint.R_WB);
   bus::Set(m.body_rate, setpoint.w_WB_B);

@@ -3,9 +3,8 @@
 namespace chase::lidar {
 
 lidar_scan_t ToMessage(const Sweep& sweep, int64_t utime) {
-  lidar_scan_t m;
+  lidar_scan_t m{};
   m.utime = utime;
-  m.seq = 0;
   m.size = static_cast<int32_t>(sweep.points.size());
   for (auto* list : {&m.x, &m.y, &m.z, &m.t}) list->reserve(sweep.points.size());
   for (auto* list : {&m.intensity, &m.ring}) list->reserve(sweep.points.size());

@@ -39,7 +39,7 @@ pose_t ToMessage(const PoseEstimate& estimate, int64_t origin) {
 }
 
 scan_registered_t ToMessage(const RegisteredSweep& sweep, int64_t origin) {
-  scan_registered_t m;
+  scan_registered_t m{};
   m.utime = bus::Utime(sweep.t, origin);
   bus::Set(m.pos, sweep.X_WL.p);
   bus::Set(m.orientation, sweep.X_WL.R);

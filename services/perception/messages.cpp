@@ -103,7 +103,7 @@ PoseSample FromMessage(const pose_t& m, int64_t origin) {
 }
 
 target_t ToMessage(const TargetEstimate& target, int64_t utime) {
-  target_t m;
+  target_t m{};
   m.utime = utime;
   m.state = Code(target.state);
   bus::Set(m.mean, target.p_WT);

@@ -24,7 +24,7 @@ BodyEstimate FromMessage(const pose_t& m) {
 }
 
 polynomial_t At(const Eigen::Vector3d& p, int64_t utime, double duration) {
-  polynomial_t m;
+  polynomial_t m{};
   m.utime = utime;
   m.duration = duration;
   m.n_coefficients = 3;
@@ -33,7 +33,7 @@ polynomial_t At(const Eigen::Vector3d& p, int64_t utime, double duration) {
 }
 
 plan_t ToMessage(const PlanResult& plan, int64_t origin) {
-  plan_t m;
+  plan_t m{};
   m.utime = bus::Utime(plan.trajectory.start, origin);
   m.verdict = static_cast<int8_t>(plan.verdict);
   m.reason = plan.reason;

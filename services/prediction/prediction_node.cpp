@@ -111,7 +111,7 @@ void PredictionNode::Send(const target_t& target, const PredictResult& result, i
   no_target_utime_ = result.verdict == PredictResult::Verdict::kNoTarget
                          ? std::optional<int64_t>(target.utime)
                          : std::nullopt;
-  prediction_t m;
+  prediction_t m{};
   m.utime = target.utime;
   m.verdict = WireVerdict(result.verdict);
   m.reason = result.reason;
