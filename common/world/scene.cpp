@@ -15,8 +15,8 @@ namespace {
 /// A node with the path to it, for errors.
 class Item {
  public:
-  Item(const std::string& origin, YAML::Node node, std::string path)
-      : origin_(&origin), node_(std::move(node)), path_(std::move(path)) {}
+  Item(const std::string& origin, const YAML::Node& node, std::string path)
+      : origin_(&origin), node_(node), path_(std::move(path)) {}
 
   [[noreturn]] void Fail(const std::string& what) const {
     std::ostringstream text;
