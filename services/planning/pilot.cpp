@@ -74,7 +74,7 @@ std::optional<PlanResult> Pilot::Update(double t, const BodyEstimate& body) {
   }
   if (!IsDue(t)) return std::nullopt;
   PlanResult plan = airborne_ && HasTarget(t) ? Chase(t0, start) : Wait(t0, start, body);
-  if (!IsFinite(plan)) plan = Hover(t0, {{body.p, {}, {}, {}}, {body.yaw, 0.0}});
+  if (!IsFinite(plan)) plan = Hover(t0, {{body.p}, {body.yaw, 0.0}});
   running_ = plan;
   has_running_ = true;
   last_planned_ = t;
@@ -88,7 +88,7 @@ Pilot::Start Pilot::StartAt(double t, double t0, const BodyEstimate& body) const
   const world::Trajectory& plan = running_.trajectory;
   const double now = std::clamp(t, plan.start, plan.end());
   if (!has_running_ || (plan.Position(now) - body.p).norm() > config_.reset_threshold)
-    return {{body.p, has_running_ ? body.v : Eigen::Vector3d::Zero(), {}, {}}, {body.yaw, 0.0}};
+    return {{body.p, has_running_ ? body.v : Eigen::Vector3d::Zero()}, {body.yaw, 0.0}};
   const double tau = std::clamp((t0 - plan.start) / plan.duration, 0.0, 1.0);
   Start start{plan.At(plan.start + tau * plan.duration), YawAt(running_.yaw, tau, plan.duration)};
   if (t0 >= plan.end()) {
@@ -127,7 +127,7 @@ PlanResult Pilot::Chase(double t0, const Start& start) {
 PlanResult Pilot::Wait(double t0, const Start& start, const BodyEstimate& body) {
   if (!airborne_ && !has_running_) {
     climb_end_ = t0 + config_.takeoff_time;
-    return Climb(t0, {{body.p, {}, {}, {}}, {body.yaw, 0.0}});
+    return Climb(t0, {{body.p}, {body.yaw, 0.0}});
   }
   if (!airborne_ && t0 < climb_end_) {
     PlanResult same = running_;  // still climbing

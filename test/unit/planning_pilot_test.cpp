@@ -100,18 +100,32 @@ TEST(Pilot, NeverPlansFasterThanItsLeastPeriod) {
 
 TEST(Pilot, LargeTrackingErrorRestartsFromTheEstimate) {
   Pilot pilot{PlanningConfig()};
-  pilot.Update(0.0, {{0.0, 0.0, 0.0}, {}, 0.0});
-  for (double t = 0.005; t < 5.0; t += kPeriod)
-    pilot.Update(t, pilot.running().trajectory.degree()
-                        ? BodyEstimate{pilot.running().trajectory.Position(
-                                           std::min(t, pilot.running().trajectory.end())),
-                                       {},
-                                       0.0}
-                        : BodyEstimate{pilot.running().trajectory.Position(t), {}, 0.0});
+  const Eigen::Vector3d zero = Eigen::Vector3d::Zero();
+  pilot.Update(0.0, {zero, zero, 0.0});
+  for (double t = 0.005; t < 5.0; t += kPeriod) {
+    const world::Trajectory& plan = pilot.running().trajectory;
+    const double now = plan.degree() ? std::min(t, plan.end()) : t;
+    pilot.Update(t, {plan.Position(now), zero, 0.0});
+  }
   const Eigen::Vector3d away = pilot.running().trajectory.Position(5.0) + Eigen::Vector3d(1, 0, 0);
-  const auto plan = pilot.Update(6.0, {away, {}, 0.0});
+  const auto plan = pilot.Update(6.0, {away, zero, 0.0});
   ASSERT_TRUE(plan);
   EXPECT_LT((plan->trajectory.Position(plan->trajectory.start) - away).norm(), 1e-9);
+}
+
+TEST(Pilot, ARestartedChaseBeginsAtTheEstimatesVelocityWithoutAcceleration) {
+  Flight flight{PlanningConfig()};
+  flight.Run(4.0, false);
+  flight.Run(4.0, true);
+  const BodyEstimate pushed{flight.Body().p + Eigen::Vector3d(0, 1, 0), flight.Body().v, 0.0};
+  std::optional<PlanResult> plan;
+  for (double t = flight.t; !plan && t < flight.t + 1.0; t += kPeriod)
+    plan = flight.pilot.Update(t, pushed);
+  ASSERT_TRUE(plan);
+  const world::State start = plan->trajectory.At(plan->trajectory.start);
+  EXPECT_LT((start.p - pushed.p).norm(), 1e-6);
+  EXPECT_LT((start.v - pushed.v).norm(), 1e-6);
+  EXPECT_LT(start.a.norm(), 1e-6);
 }
 
 TEST(PlanningConfig, DefaultsAreFineAndBadValuesAreNamed) {
