@@ -24,7 +24,7 @@ struct Obstacle {
 };
 
 /// min over s in [0,1] of ||(1-s) p + s q - c||_R^2, the feasibility function d of Jeon 2021, eq.
-/// (9).
+/// (6).
 double SegmentSquaredDistance(const Eigen::Vector3d& p, const Eigen::Vector3d& q,
                               const Eigen::Vector3d& c, const Eigen::Matrix3d& R);
 

@@ -9,7 +9,7 @@
 namespace chase::planning {
 
 /// What depends on horizon, degree and number of steps only. Candidates in Bernstein form over
-/// normalised time: the start fixes b0..b3, and the objective (9) of Jeon 2021 makes the free
+/// normalised time: the start fixes b0..b3, and the objective (11) of Jeon 2021 makes the free
 /// points b4.. affine in those and in the skeletons: b_f = sum_i fixed(f,i) b_i + sum_n pull(f,n)
 /// u_n. This is the reduced form of the paper's KKT system, well conditioned (1e4 instead of 1e10).
 struct CandidateTables {

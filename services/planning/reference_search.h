@@ -6,7 +6,7 @@
 
 namespace chase::planning {
 
-/// K^-1 of Jeon 2021, section IV-B, with the objective (9) in normalised time.
+/// K^-1 of Jeon 2021, section IV-B, with the objective (11) in normalised time.
 Eigen::MatrixXd InverseKkt(const PlannerConfig& config, const Problem& problem);
 
 /// Candidate `index` from the KKT system.

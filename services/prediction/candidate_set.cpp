@@ -88,7 +88,7 @@ int64_t CandidateSet::count() const {
   return count;
 }
 
-// Jeon 2021, eq. (3) and (4) in normalised time, per metre of each point.
+// Jeon 2021, eq. (9) and (10) in normalised time, per metre of each point.
 void CandidateSet::Fit(const PredictorConfig& config,
                        const std::vector<Observation>& observations) {
   const double T = horizon_, w = config.fit_weight;

@@ -22,7 +22,7 @@ double GuardedExpSlope(double x);
 
 /// All N_v^N_o candidates of Jeon 2021, section III-A, as sums of contributions.
 ///
-/// The coefficients that minimise eq. (2) are linear in the points V, q = q_mean + sum_n c(n, V_n),
+/// The coefficients that minimise eq. (8) are linear in the points V, q = q_mean + sum_n c(n, V_n),
 /// where c(n, i) belongs to the offset of point i from mean n. With delta = sum_n c(n, V_n) the
 /// objective of Problem 1 is
 ///   J(delta) = A(delta) + GuardedExp(log w_q + B(delta)),
@@ -30,7 +30,7 @@ double GuardedExpSlope(double x);
 /// Both are convex quadratics. The constant prod_n p_N(mean_n)^-1, the same for every candidate, is
 /// taken into w_q, so that candidates rank as in the paper and nothing overflows.
 ///
-/// On purpose different from eq. (2): the integrals start at the newest observation when that is
+/// On purpose different from eq. (8): the integrals start at the newest observation when that is
 /// older than `now`, so that a fit to old observations does not swing in between; the squared speed
 /// is weighed in with `damping`; covariances have a floor; and when the fit through the means is
 /// faster than max_target_speed, the coefficients of tau^1 and up are scaled down for all

@@ -27,8 +27,8 @@ struct PredictorConfig {
     v("samples", samples, "N_v, points per observation: its mean and a contour around it");
     v("degree", degree, "m_q of the prediction, 1 to 7");
     v("horizon", horizon, "T, length of the prediction, s");
-    v("fit_weight", fit_weight, "w of eq. (2), pull towards the points, 1/s^3");
-    v("damping", damping, "weight of the squared speed in eq. (2), 1/s^2; 0: the paper's");
+    v("fit_weight", fit_weight, "w of eq. (8), pull towards the points, 1/s^3");
+    v("damping", damping, "weight of the squared speed in eq. (8), 1/s^2; 0: the paper's");
     v("density_weight", density_weight, "w_q of Problem 1, relative to the densities at the means");
     v("contour_sigmas", contour_sigmas, "radius of the contour, standard deviations");
     v("sigma_floor", sigma_floor, "least standard deviation of an observation, m");
