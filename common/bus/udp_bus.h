@@ -10,7 +10,7 @@
 namespace chase::bus {
 
 /// UDP multicast that stays on this host, with room for a few sweeps and frames.
-inline constexpr char kDefaultUrl[] = "udpm://239.255.76.67:7667?ttl=0&recv_buf_size=8388608";
+inline constexpr char kDefaultUrl[] = "udpm://239.255.76.67:7667?ttl=0&recv_buf_size=2097152";
 
 /// Messages over LCM's UDP multicast. Every channel name gets `prefix` in front.
 class UdpBus : public Bus {

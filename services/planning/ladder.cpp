@@ -171,7 +171,7 @@ std::unique_ptr<Planner> MakeLadder(const PlannerConfig& config, std::unique_ptr
 }
 
 world::Trajectory BrakePlan(const PlannerConfig& config, const PlanRequest& request, bool* safe) {
-  world::Trajectory best;
+  world::Trajectory best = world::Trajectory::Constant(request.start.p, request.t0, 1.0);
   double best_clearance = -1.0;
   for (double T : {0.6, 0.8, 1.0, 1.3, 1.7, 2.2, 3.0}) {
     PlanRequest rest = request;

@@ -90,7 +90,8 @@ Pilot::Start Pilot::StartAt(double t, double t0, const BodyEstimate& body) const
   if (!has_running_ || (plan.Position(now) - body.p).norm() > config_.reset_threshold)
     return {{body.p, has_running_ ? body.v : Eigen::Vector3d::Zero()}, {body.yaw, 0.0}};
   const double tau = std::clamp((t0 - plan.start) / plan.duration, 0.0, 1.0);
-  Start start{plan.At(plan.start + tau * plan.duration), YawAt(running_.yaw, tau, plan.duration)};
+  Start start{plan.At(plan.start + tau * plan.duration), YawAt(running_.yaw, tau, plan.duration),
+              true};
   if (t0 >= plan.end()) {
     start.state.v = start.state.a = start.state.j = Eigen::Vector3d::Zero();
     start.yaw.rate = 0.0;
@@ -110,7 +111,7 @@ PlanRequest Pilot::Request(double t0, const Start& start) const {
   request.target = forecast_->target;
   request.target_sigma = forecast_->sigma;
   request.horizon = std::clamp(forecast_->target.end() - t0, kShortestHorizon, config_.horizon);
-  if (has_running_) request.running = running_.trajectory;
+  if (start.on_plan) request.running = running_.trajectory;  // off it, it is no way out
   return request;
 }
 

@@ -46,6 +46,7 @@ class Pilot {
   struct Start {
     world::State state;
     YawStart yaw;
+    bool on_plan = false;  ///< taken from the running plan, not from the estimate
   };
 
   bool IsDue(double t) const;
