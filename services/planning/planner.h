@@ -20,14 +20,15 @@ const char* Name(Verdict verdict);
 
 /// One chasing problem (Jeon 2021, Problem 2). Frame W; times in seconds from a common origin.
 struct PlanRequest {
-  double t0 = 0.0;                           ///< start of the horizon, s
-  double horizon = 2.5;                      ///< T, s
-  world::State start;                        ///< at t0
-  std::optional<YawStart> yaw;               ///< at t0; none: towards the target
-  world::Trajectory target;                  ///< p_WT(t)
-  double target_sigma = 0.0;                 ///< largest standard deviation of p_WT, m
-  std::vector<world::Obstacle> obstacles;    ///< at their true size
-  std::optional<world::Trajectory> running;  ///< the plan being flown, if any
+  double t0 = 0.0;                              ///< start of the horizon, s
+  double horizon = 2.5;                         ///< T, s
+  world::State start;                           ///< at t0
+  std::optional<YawStart> yaw;                  ///< at t0; none: towards the target
+  world::Trajectory target;                     ///< p_WT(t)
+  double target_sigma = 0.0;                    ///< largest standard deviation of p_WT, m
+  std::vector<world::Obstacle> obstacles;       ///< at their true size
+  std::optional<world::Trajectory> running;     ///< the plan being flown, if any
+  std::vector<world::Trajectory> running_rest;  ///< its further pieces, in order, if it has any
 };
 
 /// Terms of the objective of Problem 2, unweighted, and the weighted total.
@@ -43,7 +44,10 @@ struct PlanResult {
   Verdict verdict = Verdict::kBrake;
   std::string reason;            ///< why the verdict is not kChase; else empty
   world::Trajectory trajectory;  ///< p_WB(t) from t0
-  std::vector<double> yaw;       ///< power basis in tau, unwrapped, rad
+  /// Further pieces, each from the end of the one before. Ours has none; planners of other kinds,
+  /// such as splines, need them.
+  std::vector<world::Trajectory> rest;
+  std::vector<double> yaw;  ///< power basis in tau, unwrapped, rad
   Cost cost;
   int generated = 0;  ///< candidates in the set
   int checked = 0;    ///< candidates tested for feasibility
