@@ -1,0 +1,86 @@
+#include "test/compare/results.h"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <stdexcept>
+
+#include "test/compare/flight_file.h"
+
+namespace chase::compare {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+const std::vector<std::string> kColumns = {"scenario",
+                                           "planner",
+                                           "parameter_set",
+                                           "seed",
+                                           "safe_ratio",
+                                           "visible_ratio",
+                                           "visible_ratio_physical",
+                                           "min_clearance_m",
+                                           "min_sight_clearance_m",
+                                           "proved_safe",
+                                           "distance_ratio",
+                                           "distance_error",
+                                           "travel_ratio",
+                                           "acceleration_cost",
+                                           "jerk_cost",
+                                           "yaw_rate_rms",
+                                           "peak_speed",
+                                           "peak_acceleration",
+                                           "replans",
+                                           "fallbacks"};
+
+std::string Csv(const std::vector<Json>& flights) {
+  std::string text;
+  for (const std::string& column : kColumns) text += column + ",";
+  text += "plan_ms_mean,plan_ms_p95,plan_ms_max,plan_cpu_ms_mean\n";
+  for (const Json& flight : flights) {
+    const Json& m = flight["metrics"];
+    for (const std::string& column : kColumns)
+      text += (!m.contains(column)     ? ""
+               : m[column].is_string() ? m[column].get<std::string>()
+                                       : m[column].dump()) +
+              std::string(",");
+    text += fmt::format("{:.6g},{:.6g},{:.6g},{:.6g}\n", m["plan_ms"]["mean"].get<double>(),
+                        m["plan_ms"]["p95"].get<double>(), m["plan_ms"]["max"].get<double>(),
+                        m["plan_cpu_ms"]["mean"].get<double>());
+  }
+  return text;
+}
+
+void PrintTable(const std::vector<Json>& flights) {
+  fmt::print("{:<12} {:<18} {:>6} {:>8} {:>9} {:>9} {:>11} {:>10}\n", "scenario", "planner", "safe",
+             "visible", "distance", "travel", "accel cost", "plan [ms]");
+  for (const Json& flight : flights) {
+    const Json& m = flight["metrics"];
+    std::string planner = m["planner"];
+    if (m.contains("parameter_set")) planner += fmt::format(":{}", m["parameter_set"].get<int>());
+    fmt::print("{:<12} {:<18} {:6.4f} {:8.4f} {:9.3f} {:9.3f} {:11.4f} {:10.3f}\n",
+               m["scenario"].get<std::string>(), planner, m["safe_ratio"].get<double>(),
+               m["visible_ratio"].get<double>(), m["distance_ratio"].get<double>(),
+               m["travel_ratio"].get<double>(), m["acceleration_cost"].get<double>(),
+               m["plan_ms"]["mean"].get<double>());
+  }
+}
+
+}  // namespace
+
+std::vector<nlohmann::ordered_json> ReadFlights(const std::vector<Job>& jobs) {
+  std::vector<Json> flights;
+  for (const Job& job : jobs) flights.push_back(Json::parse(ReadText(job.file)));
+  return flights;
+}
+
+void WriteResults(const std::vector<Job>& jobs, const std::string& folder) {
+  const std::vector<Json> flights = ReadFlights(jobs);
+  Json list = Json::array();
+  for (const Json& flight : flights) list.push_back(flight["metrics"]);
+  WriteText((std::filesystem::path(folder) / "flights.json").string(), list.dump(1) + "\n");
+  WriteText((std::filesystem::path(folder) / "flights.csv").string(), Csv(flights));
+  PrintTable(flights);
+}
+
+}  // namespace chase::compare
