@@ -4,49 +4,73 @@
 
 namespace chase::planning::kernels {
 
-/// Plain arrays shared by the fast search and its vector kernels. The kernels are compiled twice
-/// from one source (fast_kernels.inc), for AVX2 and for any processor, work on 8 lanes either way
-/// and use no fused operations: both give the same bits.
-constexpr int kLanes = 8;
+/// Plain arrays shared by the fast search and its vector kernels. The kernels are compiled from one
+/// source (fast_*.inc) for AVX-512, AVX2 and any processor; every lane goes through the same
+/// operations in the same order whatever the width, so all of them give the same bits.
+constexpr int kPad = 16;  // candidates and obstacles are padded to multiples of this
+constexpr int kBatch = 16;
 constexpr int kMaxDegree = 6;
 constexpr int kMaxFree = kMaxDegree - 3;     // control points that the start leaves free
 constexpr int kMaxProduct = 2 * kMaxDegree;  // degree of d_p, d_q, d_s
+constexpr int kMaxCenter = 7;                // power coefficients of a centre
 constexpr int kQuadratureNodes = 20;
 constexpr int kSplitDepth = 4;
 constexpr int kTreeNodes = 2 << kSplitDepth;
 
-/// One obstacle shape in whitened coordinates z = L' (x - c), |z| > 1 outside, as single precision
-/// data for all candidates. Local frame: origin at the target's start.
-struct Entry {
-  float L[6];                                 ///< L00 L10 L20 L11 L21 L22
-  float center[kMaxFree][3];                  ///< whitened centres at the free control points
-  float p_const[kMaxProduct + 1];             ///< coefficients of d_p without free points
-  float p_lin[kMaxProduct + 1][kMaxFree][3];  ///< and linear in them
-  float s_const[kMaxProduct + 1];             ///< the same for d_s
-  float s_lin[kMaxProduct + 1][kMaxFree][3];
-  float plane[3];            ///< x-space normal of a plane that the fixed points clear
-  float plane_at[kMaxFree];  ///< free point f clears it too where plane . x > plane_at[f]
-  float margin;              ///< bounds the error of a coefficient of d_p, d_s
-  float from;                ///< tau from which the entry is asked
-  int asks_safety;           ///< P > 0 over all of it
-  int asks_sight;            ///< the line of sight
-  int exact;                 ///< exact sight condition, else the paper's bound
-  uint32_t q_ready;          ///< bit per node: q_* are filled
-  float q[kTreeNodes][kMaxProduct + 1];  ///< d_q over the dyadic intervals of [from, 1]
-  float q_low[kTreeNodes];               ///< lower bound of d_q - 1
+/// Floats of the tables that `shape` leaves for one obstacle (see fast_shape.inc).
+constexpr int kTableSize = 6 + 3 * kMaxFree + 2 * (kMaxProduct + 1) + (kMaxProduct + 1) +
+                           3 * kMaxFree * 4 + 3 * kMaxFree * (kMaxDegree + 1) + 3 + kMaxFree + 2;
+
+/// What one obstacle shape is asked. Local frame: origin at the target's start.
+struct Row {
+  float from;        ///< tau from which it is asked
+  bool asks_safety;  ///< P > 0 over all of it
+  bool asks_sight;   ///< the line of sight
 };
 
-/// An obstacle near enough at a quadrature node to cost anything there.
+/// d_q of a row over the dyadic intervals of [from, 1], filled when first needed.
+struct Shadow {
+  uint32_t ready;  ///< bit per node
+  float low[kTreeNodes];
+  float q[kTreeNodes][kMaxProduct + 1];
+};
+
+/// A shape near enough at a quadrature node to cost anything there.
 struct NearNode {
   float L[6];
   float center[3];
   float weight;
+  int row;
+};
+
+/// All obstacle shapes in columns of n, and what all candidates share.
+struct ShapeInput {
+  int degree, n, center_rows;  ///< n: padded
+  const double* R;             ///< [6][n]: R00 R01 R02 R11 R12 R22
+  const float* center;         ///< [center_rows][3][n]: power coefficients, local
+  const Row* rows;             ///< [n]
+  float fixed[4][3], mid[kMaxFree][3], half[kMaxFree][3];
+  float target[kMaxDegree + 1][3];
+  float reach;  ///< bounds the coordinates of fixed, free and target points
+  float node_mid[kQuadratureNodes][3], node_half[kQuadratureNodes][3];
+  float node_tau[kQuadratureNodes], node_weight[kQuadratureNodes];
+  float cost_range;
+};
+
+struct ShapeOutput {
+  float* tables;      ///< kTableSize x n, read by the other kernels only
+  float* L;           ///< [6][n] Cholesky factors: L00 L10 L20 L11 L21 L22
+  float* low_plan;    ///< [n] lower bound of the plane distance over all candidates
+  float* low_target;  ///< [n] and of the target
+  float* margin;      ///< [n] bounds the error of a coefficient of d_p, d_q, d_s
+  NearNode* near;     ///< room for kQuadratureNodes x n
+  int near_begin[kQuadratureNodes + 1];
 };
 
 struct Context {
   int degree;  ///< M
   int n_candidates;
-  int stride;  ///< of the rows of x, a multiple of kLanes
+  int stride;  ///< of the rows of x, a multiple of kPad
   float* x;    ///< [3 (M - 3)][stride]: free control points of all candidates
   float* j1;   ///< [stride]: weighted J1
   // J1 = j1_offset + |j1_factor (x - j1_center)|^2 per axis
@@ -60,57 +84,57 @@ struct Context {
   float weight3[kQuadratureNodes], weight4[kQuadratureNodes];
   float desired_distance, yaw_floor;
   float cost_range;
-  const NearNode* near_nodes;
-  int near_begin[kQuadratureNodes + 1];
-  Entry* entries;
-  int* order;  ///< of the entries, the most refusing first
-  int n_entries;
+  const NearNode* near;
+  const int* near_begin;  ///< [kQuadratureNodes + 1]
+  const Row* rows;
+  const float* tables;
+  const float* margin;
+  Shadow* shadows;
+  int exact;  ///< exact sight condition, else the paper's bound
+  int* order;  ///< rows that have to be tested, the most refusing first
+  int n_rows;
 };
 
-/// Obstacles in columns, padded to kLanes, and what all candidates share, for Cull.
-struct CullInput {
-  int degree, n;   ///< n: padded
-  const float* L;  ///< [6][n]
-  const float* o;  ///< [M + 1][3][n]: Bernstein points of the centre
-  float fixed[4][3], mid[kMaxFree][3], half[kMaxFree][3];
-  float target[kMaxDegree + 1][3];
-  float node_mid[kQuadratureNodes][3], node_half[kQuadratureNodes][3];
-  float node_tau[kQuadratureNodes];
-  float cost_range;
-};
-
-/// Per obstacle, columns of n.
-struct CullOutput {
-  float* low_plan;    ///< lower bound of the plane distance over all candidates
-  float* low_fixed;   ///< the same of the fixed points alone
-  float* low_target;  ///< and of the target
-  float* normal;      ///< [3][n]: whitened unit normal
-  uint32_t* near;     ///< bit k: may cost at node k
+/// Shapes in columns of n, double precision, for Separate.
+struct ProofInput {
+  int n;                 ///< padded
+  const double* R;       ///< [6][n]
+  const double* sum_R;   ///< [n]: sum of |R_ab|
+  const double* center;  ///< [2][3][n]: centres are linear in tau
+  int n_points;          ///< control points of plan and target
+  double plan[kMaxDegree + 1][3], target[kMaxDegree + 1][3];
+  double size;  ///< bounds |coordinates| of points and centres, summed over power coefficients
 };
 
 enum State : uint8_t { kClear = 0, kUnsure = 1, kDead = 2 };
 
 struct Table {
+  /// Bounds, tables and near nodes of all shapes.
+  void (*shape)(const ShapeInput& in, ShapeOutput& out);
   /// Free points of all candidates: those of a prefix plus those of the first step's choices.
   void (*generate)(Context& c, const float* prefix, int n_prefix, const float* first, int choices);
-  /// Indices i with low < j1[i] <= high, ascending; `ids` needs room for stride + kLanes.
+  /// Indices i with low < j1[i] <= high, ascending; `ids` needs room for stride + kPad.
   int (*select)(const Context& c, float low, float high, int* ids);
   /// Adds quadrature nodes [begin, end) of the node order to value[i] of ids[i] and keeps those
-  /// below `limit`; returns how many. Node order: kNodeOrder.
+  /// below `limit`; returns how many.
   int (*distance_and_yaw)(const Context& c, int* ids, float* value, int n, float limit, int begin,
                           int end);
   /// Adds J2 to value[i].
   void (*obstacles)(const Context& c, const int* ids, float* value, int n);
-  /// Tests the candidates against all entries. Dead ones leave the list; returns how many stay and
-  /// their states.
+  /// Tests the candidates against all rows of `order`. Dead ones leave the list; returns how many
+  /// stay and their states.
   int (*check)(Context& c, int* ids, uint8_t* state, int n);
-  void (*cull)(const CullInput& in, CullOutput& out);
+  /// The same for up to kBatch candidates, in registers.
+  int (*check_batch)(Context& c, int* ids, uint8_t* state, int n);
+  /// cleared[j] = 1 where a plane proves that plan and target stay on one side of shape j.
+  void (*separate)(const ProofInput& in, uint8_t* cleared);
   const char* name;
 };
 
-/// The kernels for this processor; CHASE_KERNELS is not consulted: results do not depend on it.
+/// The kernels for this processor.
 const Table& Kernels();
 const Table& PortableKernels();
-const Table* Avx2Kernels();  ///< nullptr where the processor has none
+const Table* Avx2Kernels();    ///< nullptr where the processor has none
+const Table* Avx512Kernels();  ///< nullptr where the processor has none
 
 }  // namespace chase::planning::kernels

@@ -1,3 +1,4 @@
+#define CHASE_LANES 8
 #define CHASE_KERNELS_NAME "portable"
 #include "services/planning/fast_kernels.inc"
 
@@ -6,8 +7,9 @@ namespace chase::planning::kernels {
 const Table& PortableKernels() { return kTable; }
 
 const Table& Kernels() {
-  const Table* avx2 = Avx2Kernels();
-  return avx2 != nullptr ? *avx2 : kTable;
+  if (const Table* avx512 = Avx512Kernels()) return *avx512;
+  if (const Table* avx2 = Avx2Kernels()) return *avx2;
+  return kTable;
 }
 
 }  // namespace chase::planning::kernels

@@ -25,20 +25,38 @@ double Uncertainty(const PlannerConfig& config, const world::Obstacle& o, double
   return std::min(config.max_inflation, config.sigmas * sigma);
 }
 
+// Control points of a curve at degree 6, or none where its degree is higher.
+struct Hull {
+  Points points;
+  bool known = false;
+
+  explicit Hull(const Curve& curve) : known(curve.rows() <= 7) {
+    if (known) points = ToPoints(curve, 6);
+  }
+};
+
 // d(x) >= (m' R x)^2 / (m' R m) for any m (Cauchy-Schwarz): with m the mean of the control points
 // of curve - center, a quick sufficient test that the curve stays out.
-bool IsPlainlyOutside(const Points& curve, const Points& center, const Eigen::Matrix3d& R) {
-  const Points x = curve - center;
+bool IsPlainlyOutside(const Hull& curve, const Curve& center, const Eigen::Matrix3d& R) {
+  if (!curve.known || center.rows() > 7) return false;
+  Points x = curve.points;
+  if (center.rows() <= 2) {
+    for (int i = 0; i <= 6; ++i) {
+      x.row(i) -= center.row(0);
+      if (center.rows() == 2) x.row(i) -= (i / 6.0) * center.row(1);
+    }
+  } else {
+    x -= ToPoints(center, 6);
+  }
   const Eigen::Vector3d mean = x.colwise().mean().transpose();
   const Eigen::Vector3d Rm = R * mean;
-  const double low = (x * Rm).minCoeff();
+  double low = HUGE_VAL;
+  for (int i = 0; i <= 6; ++i)
+    low = std::min(low, x(i, 0) * Rm[0] + x(i, 1) * Rm[1] + x(i, 2) * Rm[2]);
   return low > 0.0 && low * low > kClear * Rm.dot(mean);
 }
 
 bool StaysOutside(const Curve& curve, const Curve& center, const Eigen::Matrix3d& R, double limit) {
-  if (curve.rows() <= 7 && center.rows() <= 7 &&
-      IsPlainlyOutside(ToPoints(curve, 6), ToPoints(center, 6), R))
-    return true;
   constexpr int kSamples = 24;
   for (int i = 0; i <= kSamples; ++i) {
     const double tau = static_cast<double>(i) / kSamples;
@@ -70,10 +88,11 @@ void SetSafetyShape(const PlannerConfig& config, const world::Obstacle& o, const
 }
 
 void SetSightShape(const PlannerConfig& config, const world::Obstacle& o, double target_growth,
-                   const Problem& problem, Ellipsoid* e, std::string* notes) {
+                   const Problem& problem, const Hull& target, Ellipsoid* e, std::string* notes) {
   const double margin = config.sight_margin + target_growth;
   for (double share : kShares) {
     e->sight = Grown(o.shape, share * margin);
+    if (IsPlainlyOutside(target, e->center, e->sight)) return;
     if (margin == 0.0 || StaysOutside(problem.target, e->center, e->sight, kClear)) break;
   }
   if (StaysOutside(problem.target, e->center, e->sight, 1.0)) return;
@@ -81,15 +100,14 @@ void SetSightShape(const PlannerConfig& config, const world::Obstacle& o, double
   Note(notes, "obstacle " + std::to_string(e->id) + " holds the target, its shadow is ignored");
 }
 
-Ellipsoid MakeEllipsoid(const PlannerConfig& config, const PlanRequest& request,
-                        const world::Obstacle& o, const Problem& problem, std::string* notes) {
-  Ellipsoid e;
-  e.id = o.id;
-  e.center = ToCurve(o.center, request.t0, request.horizon);
-  SetSafetyShape(config, o, problem, &e, notes);
+void SetEllipsoid(const PlannerConfig& config, const PlanRequest& request, const Hull& target,
+                  const world::Obstacle& o, const Problem& problem, Ellipsoid* e,
+                  std::string* notes) {
+  e->id = o.id;
+  e->center = ToCurve(o.center, request.t0, request.horizon);
+  SetSafetyShape(config, o, problem, e, notes);
   const double growth = std::min(config.max_inflation, config.sigmas * request.target_sigma);
-  SetSightShape(config, o, growth, problem, &e, notes);
-  return e;
+  SetSightShape(config, o, growth, problem, target, e, notes);
 }
 
 // Limits that the start already breaks give way to just above what it has: the plan may not get
@@ -137,8 +155,11 @@ Problem MakeProblem(const PlannerConfig& config, const PlanRequest& request, std
   problem.target = ToCurve(request.target, request.t0, request.horizon);
   problem.limits = MakeLimits(config, request.start, problem.target.row(0).transpose());
   problem.obstacles.reserve(request.obstacles.size());
-  for (const world::Obstacle& o : request.obstacles)
-    problem.obstacles.push_back(MakeEllipsoid(config, request, o, problem, notes));
+  const Hull target(problem.target);
+  for (const world::Obstacle& o : request.obstacles) {
+    problem.obstacles.emplace_back();
+    SetEllipsoid(config, request, target, o, problem, &problem.obstacles.back(), notes);
+  }
   return problem;
 }
 

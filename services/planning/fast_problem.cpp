@@ -1,0 +1,371 @@
+#include "services/planning/fast_problem.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+namespace chase::planning {
+
+using kernels::kPad;
+
+namespace {
+
+int Padded(int n) { return (n + kPad - 1) / kPad * kPad; }
+
+}  // namespace
+
+bool FastProblem::Set(const Problem& problem, const PlanProof& proof) {
+  problem_ = &problem;
+  const int M = problem.degree;
+  if (!proof.IsUsable() || problem.target.rows() > M + 1 || problem.skeletons.empty() ||
+      problem.skeletons.size() > 8 || problem.n_candidates() < 1)
+    return false;
+  for (const Ellipsoid& e : problem.obstacles)
+    if (e.center.rows() > M + 1) return false;
+  n_ = problem.n_candidates();
+  free_ = M - 3;
+  const int steps = static_cast<int>(problem.skeletons.size());
+  if (tables_.degree != M || tables_.steps != steps || tables_.duration != problem.duration)
+    tables_ = CandidateTables(config_, M, steps, problem.duration);
+  if (!SetCandidates()) return false;
+  SetShapes(proof);
+  kernels::Context& c = context_;
+  c.degree = M;
+  c.n_candidates = n_;
+  c.stride = Padded(n_) + 4 * kPad;
+  x_.resize(static_cast<size_t>(3 * free_ * c.stride));
+  j1_.resize(static_cast<size_t>(c.stride));
+  c.x = x_.data();
+  c.j1 = j1_.data();
+  c.desired_distance = static_cast<float>(config_.desired_distance);
+  c.yaw_floor = static_cast<float>(kYawDistanceFloor * kYawDistanceFloor);
+  c.cost_range = static_cast<float>(config_.cost_range);
+  c.exact = config_.exact_visibility ? 1 : 0;
+  if (blocked_) return true;
+  SetSmoothness();
+  SetNodes();
+  Generate();
+  return true;
+}
+
+bool FastProblem::SetCandidates() {
+  const Problem& p = *problem_;
+  const int M = p.degree;
+  origin_ = p.target.row(0).transpose();
+  Curve target = p.target, start = p.start;
+  target.row(0).setZero();
+  start.row(0) -= origin_.transpose();
+  target_ = ToPoints(target, M);
+  start_ = ToPoints(start, M);
+  double largest = 0.0;
+  for (int f = 0; f < free_; ++f)
+    for (int a = 0; a < 3; ++a) {
+      double sum = 0.0;
+      for (int i = 0; i < 4; ++i) sum += tables_.fixed(f, i) * start_(i, a);
+      base_[3 * f + a] = low_(f, a) = high_(f, a) = sum;
+      largest = std::max(largest, std::abs(sum));
+    }
+  choices_.clear();
+  pulls_.clear();
+  for (size_t n = 0; n < p.skeletons.size(); ++n) {
+    choices_.push_back(static_cast<int>(p.skeletons[n].size()));
+    double low[9], high[9], top = 0.0;
+    std::fill(low, low + 9, HUGE_VAL);
+    std::fill(high, high + 9, -HUGE_VAL);
+    for (const Eigen::Vector3d& u : p.skeletons[n])
+      for (int f = 0; f < free_; ++f)
+        for (int a = 0; a < 3; ++a) {
+          const double pull = tables_.pull(f, static_cast<int>(n)) * (u[a] - origin_[a]);
+          pulls_.push_back(pull);
+          low[3 * f + a] = std::min(low[3 * f + a], pull);
+          high[3 * f + a] = std::max(high[3 * f + a], pull);
+          top = std::max(top, std::abs(pull));
+        }
+    largest += top;
+    for (int f = 0; f < free_; ++f)
+      for (int a = 0; a < 3; ++a) {
+        low_(f, a) += low[3 * f + a];
+        high_(f, a) += high[3 * f + a];
+      }
+  }
+  reach_ = std::max(
+      {start_.topRows(4).cwiseAbs().maxCoeff(), target_.cwiseAbs().maxCoeff(), largest});
+  return reach_ < 1e4;
+}
+
+void FastProblem::SetShapeInput(const PlanProof& proof, kernels::ShapeInput* in) {
+  const int M = problem_->degree;
+  in->degree = M;
+  in->n = proof.padded();
+  in->R = proof.shapes();
+  in->center = centers_.data();
+  in->rows = rows_.data();
+  in->cost_range = static_cast<float>(config_.cost_range);
+  in->reach = static_cast<float>(reach_ * 1.0001);
+  for (int a = 0; a < 3; ++a) {
+    for (int i = 0; i <= M; ++i) in->target[i][a] = static_cast<float>(target_(i, a));
+    for (int i = 0; i < 4; ++i) in->fixed[i][a] = static_cast<float>(start_(i, a));
+    for (int f = 0; f < free_; ++f) {
+      in->mid[f][a] = static_cast<float>(0.5 * (low_(f, a) + high_(f, a)));
+      in->half[f][a] =
+          static_cast<float>(0.5 * (high_(f, a) - low_(f, a)) * (1 + 1e-6) + 1e-6 * reach_ + 1e-6);
+    }
+  }
+  const double weight = config_.weight_obstacle * problem_->duration *
+                        (config_.cost_max - config_.cost_min) /
+                        (config_.cost_range * config_.cost_range);
+  for (int k = 0; k < kNodes; ++k) {
+    in->node_tau[k] = static_cast<float>(GaussNodes().tau[k]);
+    in->node_weight[k] = static_cast<float>(weight * GaussNodes().weight[k]);
+    for (int a = 0; a < 3; ++a) {
+      double mid = 0.0, half = 0.0;
+      for (int i = 0; i < 4; ++i) mid += tables_.phi[k][i] * start_(i, a);
+      for (int f = 0; f < free_; ++f) {
+        mid += tables_.phi[k][4 + f] * 0.5 * (low_(f, a) + high_(f, a));
+        half += tables_.phi[k][4 + f] * 0.5 * (high_(f, a) - low_(f, a));
+      }
+      in->node_mid[k][a] = static_cast<float>(mid);
+      in->node_half[k][a] = static_cast<float>(half + 1e-5);
+    }
+  }
+}
+
+void FastProblem::SetShapes(const PlanProof& proof) {
+  const Problem& p = *problem_;
+  const int columns = proof.padded();
+  const auto n = static_cast<size_t>(columns);
+  n_shapes_ = static_cast<int>(proof.rows().size());
+  Eigen::Index center_rows = 1;
+  for (const Ellipsoid& e : p.obstacles) center_rows = std::max(center_rows, e.center.rows());
+  rows_.resize(n);
+  obstacle_of_.resize(n);
+  centers_.assign(static_cast<size_t>(3 * center_rows) * n, 0.0f);
+  for (int column = 0; column < columns && n_shapes_ > 0; ++column) {
+    const bool real = column < n_shapes_;
+    const PlanProof::Row& row = proof.rows()[static_cast<size_t>(std::min(column, n_shapes_ - 1))];
+    const auto at = static_cast<size_t>(column);
+    rows_[at] = {static_cast<float>(row.from), real && row.safety, real && row.sight};
+    obstacle_of_[at] = row.obstacle;
+    const Curve& c = p.obstacles[static_cast<size_t>(row.obstacle)].center;
+    for (Eigen::Index k = 0; k < c.rows(); ++k)
+      for (int a = 0; a < 3; ++a)
+        centers_[static_cast<size_t>(3 * k + a) * n + at] =
+            static_cast<float>(k == 0 ? c(0, a) - origin_[a] : c(k, a));
+  }
+  tables_of_shapes_.resize(static_cast<size_t>(kernels::kTableSize) * n);
+  factors_.resize(6 * n);
+  low_plan_.resize(n);
+  low_target_.resize(n);
+  margin_.resize(n);
+  near_.resize(static_cast<size_t>(kNodes) * n);
+  if (shadows_.size() < n) shadows_.resize(n);
+  if (n_shapes_ > 0) {
+    kernels::ShapeInput in;
+    in.center_rows = static_cast<int>(center_rows);
+    SetShapeInput(proof, &in);
+    kernels::ShapeOutput out;
+    out.tables = tables_of_shapes_.data();
+    out.L = factors_.data();
+    out.low_plan = low_plan_.data();
+    out.low_target = low_target_.data();
+    out.margin = margin_.data();
+    out.near = near_.data();
+    kernels_.shape(in, out);
+    std::copy(out.near_begin, out.near_begin + kNodes + 1, near_begin_);
+  } else {
+    std::fill(near_begin_, near_begin_ + kNodes + 1, 0);
+  }
+  SetOrder(proof);
+  context_.near = near_.data();
+  context_.near_begin = near_begin_;
+  context_.rows = rows_.data();
+  context_.tables = tables_of_shapes_.data();
+  context_.margin = margin_.data();
+  context_.shadows = shadows_.data();
+}
+
+// Rows that no plane settles for all candidates, the nearest to the plans first.
+void FastProblem::SetOrder(const PlanProof& proof) {
+  order_.clear();
+  blocked_ = false;
+  for (int r = 0; r < n_shapes_; ++r) {
+    const auto at = static_cast<size_t>(r);
+    const bool target_clear = low_target_[at] > 1.0f || rows_[at].asks_sight == 0;
+    if (low_plan_[at] > 1.0f && target_clear) continue;
+    order_.push_back(r);
+    shadows_[at].ready = 0;
+    blocked_ = blocked_ || (!target_clear && !proof.TargetIsOutside(r));
+  }
+  std::sort(order_.begin(), order_.end(), [this](int a, int b) {
+    const float x = low_plan_[static_cast<size_t>(a)], y = low_plan_[static_cast<size_t>(b)];
+    return x != y ? x < y : a < b;
+  });
+  context_.order = order_.data();
+  context_.n_rows = static_cast<int>(order_.size());
+}
+
+// w1 J1 = sum over axes of (x - x*)' H (x - x*) + rest, H = U' U.
+void FastProblem::SetSmoothness() {
+  kernels::Context& c = context_;
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 3, 3> H =
+      tables_.smooth.block(4, 4, free_, free_);
+  H.diagonal().array() += 1e-12;
+  const Eigen::LLT<decltype(H)> llt(H);
+  const decltype(H) U = llt.matrixU();
+  double offset = 0.0;
+  for (int a = 0; a < 3; ++a) {
+    const Eigen::Vector4d b = start_.col(a).head<4>();
+    const Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 3, 1> h =
+        tables_.smooth.block(4, 0, free_, 4) * b;
+    const Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 3, 1> best = -llt.solve(h);
+    offset += b.dot(tables_.smooth.topLeftCorner<4, 4>() * b) + h.dot(best);
+    for (int f = 0; f < free_; ++f) c.j1_center[f][a] = static_cast<float>(best[f]);
+  }
+  c.j1_offset = static_cast<float>(std::max(0.0, offset));
+  for (int f = 0; f < free_; ++f)
+    for (int g = 0; g < free_; ++g) c.j1_factor[f][g] = static_cast<float>(g >= f ? U(f, g) : 0.0);
+}
+
+void FastProblem::SetNodes() {
+  kernels::Context& c = context_;
+  const double T = problem_->duration;
+  for (int k = 0; k < kNodes; ++k) {
+    for (int f = 0; f < free_; ++f) {
+      c.phi[k][f] = static_cast<float>(tables_.phi[k][4 + f]);
+      c.slope[k][f] = static_cast<float>(tables_.slope[k][4 + f]);
+    }
+    for (int a = 0; a < 3; ++a) {
+      double p = 0.0, q = 0.0, v = 0.0, w = 0.0;
+      for (int i = 0; i <= problem_->degree; ++i) {
+        q += tables_.phi[k][i] * target_(i, a);
+        w += tables_.slope[k][i] * target_(i, a);
+        if (i >= 4) continue;
+        p += tables_.phi[k][i] * start_(i, a);
+        v += tables_.slope[k][i] * start_(i, a);
+      }
+      c.rel[k][a] = static_cast<float>(p - q);
+      c.target[k][a] = static_cast<float>(q);
+      if (a < 2) c.rel_rate[k][a] = static_cast<float>(v - w);
+    }
+    c.weight3[k] = static_cast<float>(config_.weight_distance * T * GaussNodes().weight[k]);
+    c.weight4[k] = static_cast<float>(config_.weight_yaw * T * GaussNodes().weight[k]);
+  }
+}
+
+// Free points of all combinations of the later steps, then the first step's choices on top.
+void FastProblem::Generate() {
+  const int nx = 3 * free_, first = choices_[0], row = Padded(first), n_prefix = n_ / first;
+  prefix_.resize(static_cast<size_t>(n_prefix * nx));
+  for (int i = 0; i < n_prefix; ++i) {
+    double z[9];
+    std::copy(base_, base_ + nx, z);
+    int rest = i;
+    size_t at = static_cast<size_t>(first * nx);
+    for (size_t s = 1; s < choices_.size(); ++s) {
+      const double* pull = &pulls_[at + static_cast<size_t>((rest % choices_[s]) * nx)];
+      for (int k = 0; k < nx; ++k) z[k] += pull[k];
+      rest /= choices_[s];
+      at += static_cast<size_t>(choices_[s] * nx);
+    }
+    for (int k = 0; k < nx; ++k)
+      prefix_[static_cast<size_t>(i * nx + k)] = static_cast<float>(z[k]);
+  }
+  first_.assign(static_cast<size_t>(nx * row), 0.0f);
+  for (int s = 0; s < first; ++s)
+    for (int k = 0; k < nx; ++k)
+      first_[static_cast<size_t>(k * row + s)] =
+          static_cast<float>(pulls_[static_cast<size_t>(s * nx + k)]);
+  kernels_.generate(context_, prefix_.data(), n_prefix, first_.data(), first);
+}
+
+Points FastProblem::PointsOf(int index) const {
+  double z[9];
+  const int nx = 3 * free_;
+  std::copy(base_, base_ + nx, z);
+  size_t at = 0;
+  for (int choices : choices_) {
+    const double* pull = &pulls_[at + static_cast<size_t>((index % choices) * nx)];
+    for (int k = 0; k < nx; ++k) z[k] += pull[k];
+    index /= choices;
+    at += static_cast<size_t>(choices * nx);
+  }
+  Points b = start_;
+  for (int f = 0; f < free_; ++f)
+    for (int a = 0; a < 3; ++a) b(4 + f, a) = z[3 * f + a];
+  return b;
+}
+
+Curve FastProblem::PlanOf(int index) const {
+  Curve plan = ToPower(PointsOf(index), problem_->degree);
+  plan.topRows(4) = problem_->start;
+  return plan;
+}
+
+// J2 above its constant part, at one node, p local.
+double FastProblem::ObstacleCost(int node, const double* p) const {
+  const double tau = GaussNodes().tau[node];
+  double sum = 0.0;
+  for (int e = near_begin_[node]; e < near_begin_[node + 1]; ++e) {
+    const int row = near_[static_cast<size_t>(e)].row;
+    const Ellipsoid& o =
+        problem_->obstacles[static_cast<size_t>(obstacle_of_[static_cast<size_t>(row)])];
+    double d[3];
+    for (int a = 0; a < 3; ++a) {
+      double c = 0.0;
+      for (Eigen::Index k = o.center.rows() - 1; k > 0; --k) c = (c + o.center(k, a)) * tau;
+      d[a] = p[a] - (c + (o.center(0, a) - origin_[a]));
+    }
+    const Eigen::Matrix3d& R = o.safety;
+    const double s = d[0] * (R(0, 0) * d[0] + R(0, 1) * d[1] + R(0, 2) * d[2]) +
+                     d[1] * (R(1, 0) * d[0] + R(1, 1) * d[1] + R(1, 2) * d[2]) +
+                     d[2] * (R(2, 0) * d[0] + R(2, 1) * d[1] + R(2, 2) * d[2]);
+    if (s >= config_.cost_range * config_.cost_range) continue;
+    const double l = std::sqrt(s) - config_.cost_range;
+    sum += l * l;
+  }
+  return sum;
+}
+
+Cost FastProblem::CostOf(int index) const {
+  const int M = problem_->degree;
+  const double T = problem_->duration;
+  const Points b = PointsOf(index);
+  double r[7][3];
+  for (int i = 0; i <= M; ++i)
+    for (int a = 0; a < 3; ++a) r[i][a] = target_(i, a) - b(i, a);
+  Cost cost;
+  double j1 = 0.0, near = 0.0;
+  for (int i = 0; i <= M; ++i) {
+    j1 += tables_.smooth(i, i) * b.row(i).squaredNorm();
+    for (int j = i + 1; j <= M; ++j) j1 += 2.0 * tables_.smooth(i, j) * b.row(i).dot(b.row(j));
+  }
+  for (int k = 0; k < kNodes; ++k) {
+    const double weight = T * GaussNodes().weight[k];
+    double d[3] = {}, v[2] = {};
+    for (int i = 0; i <= M; ++i) {
+      for (int a = 0; a < 3; ++a) d[a] += tables_.phi[k][i] * r[i][a];
+      for (int a = 0; a < 2; ++a) v[a] += tables_.slope[k][i] * r[i][a];
+    }
+    const double h = d[0] * d[0] + d[1] * d[1];
+    const double excess = std::sqrt(h + d[2] * d[2]) - config_.desired_distance;
+    const double rate =
+        (d[0] * v[1] - d[1] * v[0]) / std::max(h, kYawDistanceFloor * kYawDistanceFloor);
+    cost.j3 += weight * excess * excess;
+    cost.j4 += weight * rate * rate;
+    if (near_begin_[k] == near_begin_[k + 1]) continue;
+    double p[3] = {};
+    for (int i = 0; i <= M; ++i)
+      for (int a = 0; a < 3; ++a) p[a] += tables_.phi[k][i] * b(i, a);
+    near += weight * ObstacleCost(k, p);
+  }
+  const double scale =
+      (config_.cost_max - config_.cost_min) / (config_.cost_range * config_.cost_range);
+  cost.j1 = config_.weight_smooth > 0.0 ? j1 / config_.weight_smooth : 0.0;
+  cost.j2 =
+      scale * near + config_.cost_min * T * static_cast<double>(problem_->obstacles.size());
+  cost.total = j1 + config_.weight_obstacle * cost.j2 + config_.weight_distance * cost.j3 +
+               config_.weight_yaw * cost.j4;
+  return cost;
+}
+
+}  // namespace chase::planning

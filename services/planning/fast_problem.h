@@ -1,0 +1,68 @@
+#pragma once
+
+#include <vector>
+
+#include "services/planning/candidate_set.h"
+#include "services/planning/plan_proof.h"
+#include "services/planning/planner_config.h"
+
+namespace chase::planning {
+
+/// A problem laid out for the vector kernels: local frame (origin at the target's start),
+/// normalised time, Bernstein form, shapes and candidates in columns. Keeps its memory from one
+/// problem to the next.
+class FastProblem {
+ public:
+  FastProblem(const PlannerConfig& config, const kernels::Table& kernels)
+      : config_(config), kernels_(kernels) {}
+
+  /// False where the kernels do not apply: degrees above 6, more than 8 steps, shapes that are not
+  /// positive definite, coordinates beyond 10 km. `proof` has been reset to the problem.
+  bool Set(const Problem& problem, const PlanProof& proof);
+
+  kernels::Context& context() { return context_; }
+  int n_candidates() const { return n_; }
+  /// True when the target is inside a shape while sight is asked: nothing is feasible.
+  bool IsBlocked() const { return blocked_; }
+
+  Points PointsOf(int index) const;
+  Curve PlanOf(int index) const;
+  Cost CostOf(int index) const;
+
+ private:
+  bool SetCandidates();
+  void SetShapes(const PlanProof& proof);
+  void SetShapeInput(const PlanProof& proof, kernels::ShapeInput* in);
+  void SetOrder(const PlanProof& proof);
+  void SetSmoothness();
+  void SetNodes();
+  void Generate();
+  double ObstacleCost(int node, const double* p) const;
+
+  PlannerConfig config_;
+  const kernels::Table& kernels_;
+  const Problem* problem_ = nullptr;
+  CandidateTables tables_;
+  kernels::Context context_{};
+
+  int n_ = 0, free_ = 0, n_shapes_ = 0;
+  Eigen::Vector3d origin_;
+  Points start_, target_;                   // local control points; of the start rows 0..3
+  std::vector<double> pulls_;               // [step][choice][3 free]: pull of each skeleton
+  std::vector<int> choices_;                // per step
+  double base_[9];                          // free points without skeletons
+  Eigen::Matrix<double, 3, 3> low_, high_;  // of the free points, rows f
+  double reach_ = 0.0;                      // bounds coordinates and their parts
+  bool blocked_ = false;
+
+  std::vector<kernels::Row> rows_;
+  std::vector<int> obstacle_of_;  // row -> obstacle
+  std::vector<float> centers_, tables_of_shapes_, factors_, low_plan_, low_target_, margin_;
+  std::vector<kernels::NearNode> near_;
+  int near_begin_[kernels::kQuadratureNodes + 1];
+  std::vector<kernels::Shadow> shadows_;
+  std::vector<int> order_;
+  std::vector<float> x_, j1_, prefix_, first_;
+};
+
+}  // namespace chase::planning

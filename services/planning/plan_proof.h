@@ -1,0 +1,70 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "services/planning/fast_kernels.h"
+#include "services/planning/problem.h"
+
+namespace chase::planning {
+
+/// Proves plans safe and in sight of the target, one problem, many plans in a row. A plan is
+/// accepted only where bounds that include all rounding, or exact arithmetic, say so: first planes
+/// that separate (many shapes at a time), then Bernstein forms in double with subdivision, then
+/// Sturm's theorem in integers. The verdict is that of IsFeasible with exact arithmetic, limits
+/// aside.
+class PlanProof {
+ public:
+  /// A shape of one obstacle and what it is asked: one row where safety and sight ask the same,
+  /// else two.
+  struct Row {
+    int obstacle;
+    bool safety, sight;
+    double from;  ///< tau
+  };
+
+  explicit PlanProof(const kernels::Table& kernels = kernels::Kernels()) : kernels_(&kernels) {}
+
+  /// Keeps a pointer to `problem`. Sight is asked from tau = `sight_from` on (1: never); `exact` as
+  /// for IsInSight.
+  void Reset(const Problem& problem, double sight_from, bool exact);
+
+  bool Holds(const Curve& plan);
+  /// Whether the target itself stays outside the row's shape while sight is asked.
+  bool TargetIsOutside(int row) const;
+
+  const std::vector<Row>& rows() const { return rows_; }
+  /// [6][padded]: R00 R01 R02 R11 R12 R22 of the rows, the last repeated; one column at least.
+  const double* shapes() const { return shapes_.data(); }
+  int padded() const { return input_.n; }
+  const Eigen::Vector3d& origin() const { return origin_; }
+  /// False where a shape is not finite and positive definite: nothing is proven then.
+  bool IsUsable() const { return usable_; }
+  /// Rows of the last Holds that took more than a plane, and exact arithmetic.
+  int examined() const { return examined_; }
+  int exact() const { return n_exact_; }
+
+ private:
+  struct Local {
+    double point[kernels::kMaxDegree + 1][3];
+    double size;  ///< largest sum of absolute power coefficients of a coordinate
+  };
+  bool MakeLocal(const Curve& curve, int degree, Local* out) const;
+  void PutRow(int column, const Row& row);
+  /// `p`: the plan's control points; null where its degree is too high for them.
+  bool RowHolds(const Row& row, const Curve& plan, const Local* p);
+
+  const kernels::Table* kernels_;
+  const Problem* problem_ = nullptr;
+  bool exact_sight_ = true, usable_ = false, small_ = false, linear_ = true;
+  int degree_ = 5, examined_ = 0, n_exact_ = 0;
+  Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();
+  Local target_{};
+  double center_size_ = 0.0;
+  std::vector<Row> rows_;
+  std::vector<double> shapes_, sums_, centers_;
+  std::vector<uint8_t> cleared_;
+  kernels::ProofInput input_{};
+};
+
+}  // namespace chase::planning
