@@ -1,6 +1,6 @@
 #pragma once
 
-#include <optional>
+#include <deque>
 
 #include "services/odometry/error_state_filter.h"
 
@@ -8,28 +8,37 @@ namespace chase::odometry {
 
 struct AlignmentConfig {
   double duration = 0.5;     ///< s
+  double patience = 2.0;     ///< s
   double still_rate = 0.05;  ///< largest spread and mean of the gyro at rest, rad/s
   double still_accel = 0.6;  ///< largest spread of the accelerometer at rest, m/s^2
 
   template <class V>
   void Visit(V& v) {
     v("duration", duration, "of inertial samples averaged at the start, s");
+    v("patience", patience, "a body that is settling is waited for so long, s");
     v("still_rate", still_rate, "largest spread and mean of the gyro at rest, rad/s");
     v("still_accel", still_accel, "largest spread of the accelerometer at rest, m/s^2");
   }
 };
 
-/// Averages the first inertial samples to find where up is and how the gyro is biased.
+/// What a stretch of inertial samples has in common.
+struct ImuStatistics {
+  ImuSample mean;                                ///< `t` is the last sample's
+  double accel_spread = 0.0, gyro_spread = 0.0;  ///< largest standard deviation of an axis
+};
+
+/// Averages the newest inertial samples to find where up is and how the gyro is biased. A body that
+/// comes to rest meanwhile is waited for; one that flies is not.
 class Alignment {
  public:
   explicit Alignment(const AlignmentConfig& config) : config_(config) {}
 
   void Add(const ImuSample& imu);
   bool Complete() const;
-  bool AtRest() const;
-  double t() const { return last_.t; }
+  bool AtRest() const { return AtRest(statistics()); }
+  ImuStatistics statistics() const { return Statistics(0, window_.size()); }
 
-  /// State at the last sample: level at heading `yaw` [rad] and position `p` [m, frame W]. In
+  /// State at the last sample: level at heading `yaw` [rad] and position `p` [m, frame M]. In
   /// motion the gyro's bias is unknown and up is the mean of the felt force.
   NavState Result(const FilterConfig& filter, const Eigen::Vector3d& p, double yaw) const;
 
@@ -37,16 +46,14 @@ class Alignment {
   NavState ResultAt(const FilterConfig& filter, const NavState& known) const;
 
  private:
-  Eigen::Vector3d MeanAccel() const { return sum_accel_ / n_; }
-  Eigen::Vector3d MeanGyro() const { return sum_gyro_ / n_; }
-  void SetBiasCovariance(const FilterConfig& filter, NavState* state) const;
+  ImuStatistics Statistics(size_t begin, size_t end) const;
+  bool AtRest(const ImuStatistics& s) const;
+  void SetBiases(const FilterConfig& filter, NavState* state) const;
+  void CoupleTiltAndBias(const FilterConfig& filter, NavState* state) const;
 
   AlignmentConfig config_;
   double first_t_ = 0.0;
-  ImuSample last_;
-  double n_ = 0.0;
-  Eigen::Vector3d sum_accel_ = Eigen::Vector3d::Zero(), sum_gyro_ = Eigen::Vector3d::Zero();
-  Eigen::Vector3d squares_accel_ = Eigen::Vector3d::Zero(), squares_gyro_ = Eigen::Vector3d::Zero();
+  std::deque<ImuSample> window_;
 };
 
 }  // namespace chase::odometry

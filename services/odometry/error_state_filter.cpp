@@ -29,7 +29,26 @@ void AddDiagonal(int block, double variance, ErrorCovariance* P) {
   for (int i = 0; i < 3; ++i) (*P)(block + i, block + i) += variance;
 }
 
+using JacobianRows = Eigen::Matrix<double, Eigen::Dynamic, kStates>;
+
 void Symmetrise(ErrorCovariance* P) { *P = (0.5 * (*P + P->transpose())).eval(); }
+
+/// Kalman update in Joseph's form; refused where the innovation's covariance is singular.
+UpdateResult Correct(const JacobianRows& H, const Eigen::VectorXd& innovation,
+                     const Eigen::MatrixXd& noise, NavState* state) {
+  const Eigen::MatrixXd S = H * state->P * H.transpose() + noise;
+  const Eigen::LDLT<Eigen::MatrixXd> solver(S);
+  if (solver.info() != Eigen::Success || !(solver.vectorD().minCoeff() > 0.0)) return {};
+  const Eigen::MatrixXd K = solver.solve(H * state->P).transpose();
+  const ErrorVector dx = K * innovation;
+  if (!dx.allFinite()) return {};
+  Inject(dx, state);
+  const ErrorCovariance I_KH = ErrorCovariance::Identity() - K * H;
+  state->P = (I_KH * state->P * I_KH.transpose() + K * noise * K.transpose()).eval();
+  Symmetrise(&state->P);
+  const double k = static_cast<double>(innovation.size());
+  return {true, innovation.dot(solver.solve(innovation)) / k};
+}
 
 }  // namespace
 
@@ -99,22 +118,22 @@ UpdateResult Update(const FilterConfig& config, const PoseMeasurement& z, NavSta
   const Eigen::MatrixXd onto = (V.transpose() * V).ldlt().solve(V.transpose());  // V onto = proj.
   const Eigen::MatrixXd noise = information.solve(Eigen::MatrixXd::Identity(k, k)) +
                                 onto * floor.cwiseAbs2().asDiagonal() * onto.transpose();
-  Eigen::Matrix<double, Eigen::Dynamic, kStates> H(k, kStates);
+  JacobianRows H(k, kStates);
   H.setZero();
   H.middleCols<3>(kP) = onto.leftCols<3>();
   H.middleCols<3>(kTheta) = onto.rightCols<3>();
-  const Eigen::MatrixXd S = H * state->P * H.transpose() + noise;
-  const Eigen::LDLT<Eigen::MatrixXd> solver(S);
-  if (solver.info() != Eigen::Success || !(solver.vectorD().minCoeff() > 0.0)) return {};
-  const Eigen::MatrixXd K = solver.solve(H * state->P).transpose();
-  const Eigen::VectorXd innovation = onto * e;
-  const ErrorVector dx = K * innovation;
-  if (!dx.allFinite()) return {};
-  Inject(dx, state);
-  const ErrorCovariance I_KH = ErrorCovariance::Identity() - K * H;
-  state->P = (I_KH * state->P * I_KH.transpose() + K * noise * K.transpose()).eval();
-  Symmetrise(&state->P);
-  return {true, innovation.dot(solver.solve(innovation)) / static_cast<double>(k)};
+  return Correct(H, onto * e, noise, state);
+}
+
+void HoldStill(const Eigen::Vector3d& gyro, NavState* state) {
+  constexpr double kSpeed = 3e-3, kTurn = 1e-3;  // m/s and rad/s
+  JacobianRows H = JacobianRows::Zero(6, kStates);
+  H.block<3, 3>(0, kV).setIdentity();
+  H.block<3, 3>(3, kGyroBias).setIdentity();
+  Eigen::VectorXd innovation(6), sigma(6);
+  innovation << -state->v, gyro - state->gyro_bias;
+  sigma << Eigen::Vector3d::Constant(kSpeed), Eigen::Vector3d::Constant(kTurn);
+  Correct(H, innovation, sigma.cwiseAbs2().asDiagonal(), state);
 }
 
 }  // namespace chase::odometry

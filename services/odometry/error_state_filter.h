@@ -7,17 +7,17 @@
 namespace chase::odometry {
 
 struct FilterConfig {
-  double gyro_noise = 0.003;             ///< rad/s/sqrt(Hz)
-  double accel_noise = 0.03;             ///< m/s^2/sqrt(Hz)
-  double gyro_bias_walk = 2e-5;          ///< rad/s^2/sqrt(Hz)
-  double accel_bias_walk = 4e-4;         ///< m/s^3/sqrt(Hz)
-  double gravity = 9.81;                 ///< m/s^2
-  double accel_bias_sigma = 0.10;        ///< at the start, m/s^2
-  double gyro_bias_sigma = 0.003;        ///< after an alignment at rest, rad/s
-  double blind_accel = 3.0;              ///< what a body without IMU may do, m/s^2
-  double blind_rate = 1.0;               ///< rad/s
-  double match_position_floor = 0.004;   ///< what a scan match never gets below, m
-  double match_rotation_floor = 0.0015;  ///< rad
+  double gyro_noise = 0.0005;           ///< rad/s/sqrt(Hz)
+  double accel_noise = 0.006;           ///< m/s^2/sqrt(Hz)
+  double gyro_bias_walk = 1e-4;         ///< rad/s^2/sqrt(Hz)
+  double accel_bias_walk = 1e-3;        ///< m/s^3/sqrt(Hz)
+  double gravity = 9.81;                ///< m/s^2
+  double accel_bias_sigma = 0.06;       ///< at the start, m/s^2
+  double gyro_bias_sigma = 0.0005;      ///< after an alignment at rest, rad/s
+  double blind_accel = 3.0;             ///< what a body without IMU may do, m/s^2
+  double blind_rate = 1.0;              ///< rad/s
+  double match_position_floor = 0.008;  ///< what a scan match never gets below, m
+  double match_rotation_floor = 0.003;  ///< rad
 
   template <class V>
   void Visit(V& v) {
@@ -76,6 +76,9 @@ struct PoseMeasurement {
   Eigen::Matrix<double, 6, Eigen::Dynamic> known;
   Eigen::Matrix<double, 6, 6> information;  ///< of (p, rotation error in W)
 };
+
+/// Update of a body that stands: no velocity, and what the gyroscope shows [rad/s] is its bias.
+void HoldStill(const Eigen::Vector3d& gyro, NavState* state);
 
 struct UpdateResult {
   bool applied = false;

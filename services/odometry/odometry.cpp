@@ -49,6 +49,7 @@ Odometry::Odometry(const OdometryConfig& config)
       edges_(config.map, SurfaceKind::kLine),
       imu_(config.filter, config.health.imu_gap),
       alignment_(config.alignment),
+      level_(config.initial_position),
       blend_(config.blend),
       health_(config.health) {}
 
@@ -61,6 +62,7 @@ std::optional<PoseEstimate> Odometry::AddImu(const ImuSample& imu) {
   imu_.Add(imu);
   if (!fused_) return Align(imu);
   health_.OnImu(imu.t, previous);
+  standing_.Add(imu);
   const double dt = imu.t - live_.t;
   imu_.Advance(imu.t, &live_);
   blend_.Decay(dt);
@@ -82,7 +84,15 @@ std::optional<PoseEstimate> Odometry::Align(const ImuSample& imu) {
                                          config_.initial_yaw_deg * M_PI / 180.0);
     if (!started_) health_.OnStarted(alignment_.AtRest(), imu.t);
     if (!started_ && !alignment_.AtRest()) sweeps_to_anchor_ = 2;
+    if (!started_ && alignment_.AtRest()) {
+      const ImuStatistics rest = alignment_.statistics();
+      standing_.Begin(rest.mean, rest.accel_spread, rest.gyro_spread, base_.p);
+    }
+    const bool was_blind = started_;
+    const Pose shown = level_.ToWorld(base_.pose());
     live_ = base_;
+    level_.SetGravity(base_.g);
+    if (was_blind) blend_.Absorb(shown, base_.v, level_.ToWorld(base_.pose()), base_.v);
     fused_ = started_ = true;
     imu_.DropBefore(base_.t);
     return Estimate();
@@ -260,6 +270,8 @@ void Odometry::Bend(const Pose& X_WB, Prepared* prepared) const {
 bool Odometry::Apply(const Prepared& prepared, const MatchResult& match) {
   if (!match.valid) return false;
   NavState state = prepared.predicted;
+  standing_.See(match.X_WB.p);
+  if (standing_.holds()) HoldStill(standing_.gyro(), &state);
   const double allowed = kLargestInnovation + 3.0 * std::sqrt(state.P.block<3, 3>(kP, kP).trace());
   if ((match.X_WB.p - state.p).norm() > allowed) return false;
   const UpdateResult update =
@@ -296,23 +308,27 @@ void Odometry::RestartMapWhenLost(double end) {
 
 /// Brings the newest state up from the last sweep; what is put out moves there smoothly.
 void Odometry::Catchup() {
-  const NavState before = live_;
+  const double t = live_.t;
+  NavState before = live_;
   live_ = base_;
   if (!fused_) return;
   imu_.DropBefore(base_.t);
-  if (before.t > live_.t) imu_.Advance(before.t, &live_);
-  NavState comparable = before;
-  if (live_.t > comparable.t) imu_.Advance(live_.t, &comparable);
-  blend_.Absorb(comparable.pose(), comparable.v, live_.pose(), live_.v);
+  if (t > live_.t) imu_.Advance(t, &live_);
+  if (live_.t > t) imu_.Advance(live_.t, &before);
+  const Pose shown = level_.ToWorld(before.pose());
+  const Eigen::Vector3d shown_v = level_.R_WM() * before.v;
+  level_.SetGravity(live_.g);
+  blend_.Absorb(shown, shown_v, level_.ToWorld(live_.pose()), level_.R_WM() * live_.v);
 }
 
 RegisteredSweep Odometry::Registered(const Prepared& prepared) const {
   RegisteredSweep out;
   out.t = prepared.end;
-  out.X_WL = base_.pose() * X_BL_;
+  const Pose X_WB = level_.ToWorld(base_.pose());
+  out.X_WL = X_WB * X_BL_;
   const SweepMotion motion = MotionOver(prepared);
-  const Eigen::Matrix3f R_WB = base_.R_WB.toRotationMatrix().cast<float>();
-  const Eigen::Vector3f p_WB = base_.p.cast<float>();
+  const Eigen::Matrix3f R_WB = X_WB.R.toRotationMatrix().cast<float>();
+  const Eigen::Vector3f p_WB = X_WB.p.cast<float>();
   const Eigen::Matrix3f R_BL = X_BL_.R.toRotationMatrix().cast<float>();
   const Eigen::Vector3f p_BL = X_BL_.p.cast<float>();
   out.points = prepared.sweep.points;
@@ -324,14 +340,14 @@ RegisteredSweep Odometry::Registered(const Prepared& prepared) const {
 PoseEstimate Odometry::Estimate() const {
   PoseEstimate out;
   out.t = live_.t;
-  out.X_WB = blend_.Applied(live_.pose());
-  out.v = blend_.AppliedVelocity(live_.v);
+  out.X_WB = blend_.Applied(level_.ToWorld(live_.pose()));
+  out.v = blend_.AppliedVelocity(level_.R_WM() * live_.v);
   out.w_B = live_.w_B;
-  out.a = live_.a;
+  out.a = level_.R_WM() * live_.a;
   out.gyro_bias = live_.gyro_bias;
   out.accel_bias = live_.accel_bias;
-  out.covariance = live_.P.topLeftCorner<9, 9>();
-  const double sigma = std::sqrt(std::max(0.0, out.covariance.topLeftCorner<3, 3>().trace()));
+  out.covariance = level_.CovarianceInWorld(live_);
+  const double sigma = std::sqrt(std::max(0.0, live_.P.topLeftCorner<3, 3>().trace()));
   out.health = health_.At(live_.t, fused_, sigma);
   out.correcting = blend_.correcting();
   return out;

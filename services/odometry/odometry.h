@@ -7,7 +7,9 @@
 
 #include "services/odometry/deskew.h"
 #include "services/odometry/imu_buffer.h"
+#include "services/odometry/level_frame.h"
 #include "services/odometry/odometry_config.h"
+#include "services/odometry/standing.h"
 
 namespace chase::odometry {
 
@@ -98,6 +100,8 @@ class Odometry {
   SurfaceMap planes_, edges_;
   ImuBuffer imu_;
   Alignment alignment_;
+  Standing standing_;
+  LevelFrame level_;
   CorrectionBlend blend_;
   HealthMonitor health_;
 

@@ -14,6 +14,8 @@ class OdometryNode : public bus::Node {
  public:
   OdometryNode(bus::Bus& bus, const OdometryConfig& config);
   bus::NodeReport Report() const override;
+  /// What the local map holds.
+  size_t MapBytes() const { return odometry_.MapBytes(); }
 
  private:
   void OnImu(const imu_t& m);

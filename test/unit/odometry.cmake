@@ -13,3 +13,4 @@ chase_test(odometry_kitti_test LIBS odometry_test_support
   SOURCES ${ODOMETRY_TEST_DIR}/odometry_kitti_test.cpp)
 chase_test(odometry_node_test LIBS odometry_test_support odometry_node
   SOURCES ${ODOMETRY_TEST_DIR}/odometry_node_test.cpp)
+include(${ODOMETRY_TEST_DIR}/../odometry/odometry.cmake)
