@@ -55,6 +55,7 @@ struct ShapeInput {
   float node_mid[kQuadratureNodes][3], node_half[kQuadratureNodes][3];
   float node_tau[kQuadratureNodes], node_weight[kQuadratureNodes];
   float cost_range;
+  bool exact;  ///< exact sight condition, else the paper's bound
 };
 
 struct ShapeOutput {
@@ -62,6 +63,7 @@ struct ShapeOutput {
   float* L;           ///< [6][n] Cholesky factors: L00 L10 L20 L11 L21 L22
   float* low_plan;    ///< [n] lower bound of the plane distance over all candidates
   float* low_target;  ///< [n] and of the target
+  float* low_sight;   ///< [n] above 1 where sight is clear for all candidates outside the shape
   float* margin;      ///< [n] bounds the error of a coefficient of d_p, d_q, d_s
   NearNode* near;     ///< room for kQuadratureNodes x n
   int near_begin[kQuadratureNodes + 1];
@@ -70,9 +72,11 @@ struct ShapeOutput {
 struct Context {
   int degree;  ///< M
   int n_candidates;
-  int stride;  ///< of the rows of x, a multiple of kPad
-  float* x;    ///< [3 (M - 3)][stride]: free control points of all candidates
-  float* j1;   ///< [stride]: weighted J1
+  int stride;       ///< of the rows of x, a multiple of kPad
+  float* x;         ///< [3 (M - 3)][stride]: free control points of all candidates
+  float* j1;        ///< [stride]: weighted J1
+  float* work;      ///< as x, for `check`
+  uint32_t* alive;  ///< [stride / 8], for `check`
   // J1 = j1_offset + |j1_factor (x - j1_center)|^2 per axis
   float j1_factor[kMaxFree][kMaxFree];
   float j1_center[kMaxFree][3];
@@ -90,23 +94,26 @@ struct Context {
   const float* tables;
   const float* margin;
   Shadow* shadows;
-  int exact;  ///< exact sight condition, else the paper's bound
+  int exact;   ///< exact sight condition, else the paper's bound
   int* order;  ///< rows that have to be tested, the most refusing first
   int n_rows;
 };
 
-/// Shapes in columns of n, double precision, for Separate.
+/// Shapes in columns of n, double precision, for `prove`.
 struct ProofInput {
   int n;                 ///< padded
   const double* R;       ///< [6][n]
   const double* sum_R;   ///< [n]: sum of |R_ab|
   const double* center;  ///< [2][3][n]: centres are linear in tau
-  int n_points;          ///< control points of plan and target
+  const uint8_t* sight;  ///< [n]: asks for sight
+  bool exact;            ///< exact sight condition, else the paper's bound
+  int degree;            ///< of plan and target, 5 or 6
   double plan[kMaxDegree + 1][3], target[kMaxDegree + 1][3];
   double size;  ///< bounds |coordinates| of points and centres, summed over power coefficients
 };
 
-enum State : uint8_t { kClear = 0, kUnsure = 1, kDead = 2 };
+/// Verdict on a candidate, or the row (>= 0) whose test single precision left open.
+enum State : int { kClear = -1, kDead = -2 };
 
 struct Table {
   /// Bounds, tables and near nodes of all shapes.
@@ -123,11 +130,11 @@ struct Table {
   void (*obstacles)(const Context& c, const int* ids, float* value, int n);
   /// Tests the candidates against all rows of `order`. Dead ones leave the list; returns how many
   /// stay and their states.
-  int (*check)(Context& c, int* ids, uint8_t* state, int n);
+  int (*check)(Context& c, int* ids, int* state, int n);
   /// The same for up to kBatch candidates, in registers.
-  int (*check_batch)(Context& c, int* ids, uint8_t* state, int n);
-  /// cleared[j] = 1 where a plane proves that plan and target stay on one side of shape j.
-  void (*separate)(const ProofInput& in, uint8_t* cleared);
+  int (*check_batch)(Context& c, int* ids, int* state, int n);
+  /// holds[j] = 1 where bounds over the whole horizon prove what shape j asks.
+  void (*prove)(const ProofInput& in, uint8_t* holds);
   const char* name;
 };
 

@@ -37,6 +37,10 @@ bool FastProblem::Set(const Problem& problem, const PlanProof& proof) {
   j1_.resize(static_cast<size_t>(c.stride));
   c.x = x_.data();
   c.j1 = j1_.data();
+  work_.resize(x_.size());
+  alive_.resize(j1_.size() / 8);
+  c.work = work_.data();
+  c.alive = alive_.data();
   c.desired_distance = static_cast<float>(config_.desired_distance);
   c.yaw_floor = static_cast<float>(kYawDistanceFloor * kYawDistanceFloor);
   c.cost_range = static_cast<float>(config_.cost_range);
@@ -88,8 +92,8 @@ bool FastProblem::SetCandidates() {
         high_(f, a) += high[3 * f + a];
       }
   }
-  reach_ = std::max(
-      {start_.topRows(4).cwiseAbs().maxCoeff(), target_.cwiseAbs().maxCoeff(), largest});
+  reach_ =
+      std::max({start_.topRows(4).cwiseAbs().maxCoeff(), target_.cwiseAbs().maxCoeff(), largest});
   return reach_ < 1e4;
 }
 
@@ -101,6 +105,7 @@ void FastProblem::SetShapeInput(const PlanProof& proof, kernels::ShapeInput* in)
   in->center = centers_.data();
   in->rows = rows_.data();
   in->cost_range = static_cast<float>(config_.cost_range);
+  in->exact = config_.exact_visibility;
   in->reach = static_cast<float>(reach_ * 1.0001);
   for (int a = 0; a < 3; ++a) {
     for (int i = 0; i <= M; ++i) in->target[i][a] = static_cast<float>(target_(i, a));
@@ -156,6 +161,7 @@ void FastProblem::SetShapes(const PlanProof& proof) {
   factors_.resize(6 * n);
   low_plan_.resize(n);
   low_target_.resize(n);
+  low_sight_.resize(n);
   margin_.resize(n);
   near_.resize(static_cast<size_t>(kNodes) * n);
   if (shadows_.size() < n) shadows_.resize(n);
@@ -168,6 +174,7 @@ void FastProblem::SetShapes(const PlanProof& proof) {
     out.L = factors_.data();
     out.low_plan = low_plan_.data();
     out.low_target = low_target_.data();
+    out.low_sight = low_sight_.data();
     out.margin = margin_.data();
     out.near = near_.data();
     kernels_.shape(in, out);
@@ -190,11 +197,11 @@ void FastProblem::SetOrder(const PlanProof& proof) {
   blocked_ = false;
   for (int r = 0; r < n_shapes_; ++r) {
     const auto at = static_cast<size_t>(r);
-    const bool target_clear = low_target_[at] > 1.0f || rows_[at].asks_sight == 0;
-    if (low_plan_[at] > 1.0f && target_clear) continue;
+    const bool asks_sight = rows_[at].asks_sight;
+    if (low_plan_[at] > 1.0f && (!asks_sight || low_sight_[at] > 1.0f)) continue;
     order_.push_back(r);
     shadows_[at].ready = 0;
-    blocked_ = blocked_ || (!target_clear && !proof.TargetIsOutside(r));
+    blocked_ = blocked_ || (asks_sight && !(low_target_[at] > 1.0f) && !proof.TargetIsOutside(r));
   }
   std::sort(order_.begin(), order_.end(), [this](int a, int b) {
     const float x = low_plan_[static_cast<size_t>(a)], y = low_plan_[static_cast<size_t>(b)];
@@ -361,8 +368,7 @@ Cost FastProblem::CostOf(int index) const {
   const double scale =
       (config_.cost_max - config_.cost_min) / (config_.cost_range * config_.cost_range);
   cost.j1 = config_.weight_smooth > 0.0 ? j1 / config_.weight_smooth : 0.0;
-  cost.j2 =
-      scale * near + config_.cost_min * T * static_cast<double>(problem_->obstacles.size());
+  cost.j2 = scale * near + config_.cost_min * T * static_cast<double>(problem_->obstacles.size());
   cost.total = j1 + config_.weight_obstacle * cost.j2 + config_.weight_distance * cost.j3 +
                config_.weight_yaw * cost.j4;
   return cost;

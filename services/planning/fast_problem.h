@@ -57,12 +57,14 @@ class FastProblem {
 
   std::vector<kernels::Row> rows_;
   std::vector<int> obstacle_of_;  // row -> obstacle
-  std::vector<float> centers_, tables_of_shapes_, factors_, low_plan_, low_target_, margin_;
+  std::vector<float> centers_, tables_of_shapes_, factors_, low_plan_, low_target_, low_sight_,
+      margin_;
   std::vector<kernels::NearNode> near_;
   int near_begin_[kernels::kQuadratureNodes + 1];
   std::vector<kernels::Shadow> shadows_;
   std::vector<int> order_;
-  std::vector<float> x_, j1_, prefix_, first_;
+  std::vector<float> x_, j1_, work_, prefix_, first_;
+  std::vector<uint32_t> alive_;
 };
 
 }  // namespace chase::planning

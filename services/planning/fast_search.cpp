@@ -66,6 +66,11 @@ class FastSearch : public Search {
                      l.min_distance > 0.0;
     return !any || KeepsLimits(fast_.PlanOf(id), *problem_);
   }
+  // The row that is open decides most of them.
+  bool IsProven(int id, int row) {
+    const Curve plan = fast_.PlanOf(id);
+    return proof_.RowHolds(row, plan) && proof_.Holds(plan);
+  }
   float Limit() const { return best_ * (1.0f + kSlack); }
 
   PlannerConfig config_;
@@ -77,7 +82,7 @@ class FastSearch : public Search {
 
   std::vector<int> ids_, refused_;
   std::vector<float> values_;
-  std::vector<uint8_t> states_;
+  std::vector<int> states_;
   std::vector<Entry> heap_, accepted_;
   int checked_ = 0, feasible_ = 0;
   float best_ = 0.0f;
@@ -96,7 +101,7 @@ void FastSearch::Batch(int* ids, float* lower, int n) {
   if (count == 0) return;
   std::sort(sorted, sorted + count);
   int left[kBatch];
-  uint8_t states[kBatch];
+  int states[kBatch];
   for (int i = 0; i < count; ++i) left[i] = sorted[i].second;
   checked_ += count;
   const int kept = kernels_.check_batch(fast_.context(), left, states, count);
@@ -106,7 +111,7 @@ void FastSearch::Batch(int* ids, float* lower, int n) {
     const float cost = sorted[at].first;
     if (!(cost < Limit())) break;
     if (!KeepsLimitsOf(left[i])) continue;
-    if (states[i] == kernels::kUnsure && !proof_.Holds(fast_.PlanOf(left[i]))) continue;
+    if (states[i] >= 0 && !IsProven(left[i], states[i])) continue;
     ++feasible_;
     accepted_.push_back({cost, left[i]});
     best_ = std::min(best_, cost);
@@ -120,8 +125,7 @@ void FastSearch::Weigh(float low, float high) {
   ids_.resize(static_cast<size_t>(c.stride + kPad));
   int n = kernels_.select(c, low, high, ids_.data());
   values_.resize(static_cast<size_t>(n + kPad));
-  for (int i = 0; i < n; ++i)
-    values_[static_cast<size_t>(i)] = c.j1[ids_[static_cast<size_t>(i)]];
+  for (int i = 0; i < n; ++i) values_[static_cast<size_t>(i)] = c.j1[ids_[static_cast<size_t>(i)]];
   constexpr int kFirst = 4;  // of the nodes: most candidates end there
   n = kernels_.distance_and_yaw(c, ids_.data(), values_.data(), n, Limit(), 0, kFirst);
   n = kernels_.distance_and_yaw(c, ids_.data(), values_.data(), n, Limit(), kFirst, kNodes);
@@ -154,8 +158,7 @@ void FastSearch::CheckAll() {
             [](const Entry& a, const Entry& b) { return a.second < b.second; });
   ids_.resize(static_cast<size_t>(n + kPad));
   states_.resize(static_cast<size_t>(n + kPad));
-  for (int i = 0; i < n; ++i)
-    ids_[static_cast<size_t>(i)] = heap_[static_cast<size_t>(i)].second;
+  for (int i = 0; i < n; ++i) ids_[static_cast<size_t>(i)] = heap_[static_cast<size_t>(i)].second;
   checked_ += n;
   n = kernels_.check(fast_.context(), ids_.data(), states_.data(), n);
   size_t at = 0;

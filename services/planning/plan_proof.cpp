@@ -54,6 +54,7 @@ void PlanProof::Reset(const Problem& problem, double sight_from, bool exact) {
   shapes_.resize(6 * columns);
   sums_.resize(columns);
   centers_.resize(6 * columns);
+  sight_.resize(columns);
   cleared_.assign(columns, 0);
   for (int column = 0; column < input_.n; ++column) {
     if (rows_.empty()) break;
@@ -62,7 +63,9 @@ void PlanProof::Reset(const Problem& problem, double sight_from, bool exact) {
   input_.R = shapes_.data();
   input_.sum_R = sums_.data();
   input_.center = centers_.data();
-  input_.n_points = degree_ + 1;
+  input_.sight = sight_.data();
+  input_.exact = exact;
+  input_.degree = degree_;
   if (!small_ || !MakeLocal(problem.target, degree_, &target_)) return;
   for (int i = 0; i <= degree_; ++i)
     std::copy(target_.point[i], target_.point[i] + 3, input_.target[i]);
@@ -75,6 +78,7 @@ void PlanProof::PutRow(int column, const Row& row) {
                             R(1, 1), 0.5 * (R(1, 2) + R(2, 1)), R(2, 2)};
   for (int i = 0; i < 6; ++i) shapes_[static_cast<size_t>(i * input_.n + column)] = values[i];
   sums_[static_cast<size_t>(column)] = R.cwiseAbs().sum();
+  sight_[static_cast<size_t>(column)] = row.sight;
   usable_ = usable_ && IsPositiveDefinite(R);
   for (int a = 0; a < 3; ++a) {
     centers_[static_cast<size_t>(a * input_.n + column)] = e.center(0, a) - origin_[a];
@@ -90,8 +94,7 @@ bool PlanProof::MakeLocal(const Curve& curve, int degree, Local* out) const {
   local.row(0) -= origin_.transpose();
   const Points b = ToPoints(local, degree);
   for (int a = 0; a < 3; ++a) {
-    out->size =
-        std::max(out->size, curve.col(a).cwiseAbs().sum() + std::abs(origin_[a]));
+    out->size = std::max(out->size, curve.col(a).cwiseAbs().sum() + std::abs(origin_[a]));
     for (int i = 0; i <= degree; ++i) out->point[i][a] = b(i, a);
   }
   return true;
@@ -133,8 +136,14 @@ bool PlanProof::RowHolds(const Row& row, const Curve& plan, const Local* p) {
   if (decided != Positivity::kUndecided) return decided == Positivity::kPositive;
   ++n_exact_;
   return (!row.safety || IsSafe(plan, e, Arithmetic::kExactSturm)) &&
-         (!row.sight || IsInSight(plan, problem_->target, e, row.from, exact_sight_,
-                                  Arithmetic::kExactSturm));
+         (!row.sight ||
+          IsInSight(plan, problem_->target, e, row.from, exact_sight_, Arithmetic::kExactSturm));
+}
+
+bool PlanProof::RowHolds(int row, const Curve& plan) {
+  Local p{};
+  const bool small = small_ && MakeLocal(plan, degree_, &p);
+  return usable_ && RowHolds(rows_[static_cast<size_t>(row)], plan, small ? &p : nullptr);
 }
 
 bool PlanProof::Holds(const Curve& plan) {
@@ -142,14 +151,14 @@ bool PlanProof::Holds(const Curve& plan) {
   if (!usable_ || !plan.allFinite()) return false;
   if (rows_.empty()) return true;
   Local p{};
-  const bool small = small_ && MakeLocal(plan, degree_, &p), planes = small && linear_;
-  if (planes) {
+  const bool small = small_ && MakeLocal(plan, degree_, &p), bounds = small && linear_;
+  if (bounds) {
     for (int i = 0; i <= degree_; ++i) std::copy(p.point[i], p.point[i] + 3, input_.plan[i]);
     input_.size = std::max(p.size, target_.size) + center_size_ + origin_.cwiseAbs().maxCoeff();
-    kernels_->separate(input_, cleared_.data());
+    kernels_->prove(input_, cleared_.data());
   }
   for (size_t j = 0; j < rows_.size(); ++j) {
-    if (planes && cleared_[j]) continue;
+    if (bounds && cleared_[j]) continue;
     ++examined_;
     if (!RowHolds(rows_[j], plan, small ? &p : nullptr)) return false;
   }

@@ -10,7 +10,7 @@ namespace chase::planning {
 
 /// Proves plans safe and in sight of the target, one problem, many plans in a row. A plan is
 /// accepted only where bounds that include all rounding, or exact arithmetic, say so: first planes
-/// that separate (many shapes at a time), then Bernstein forms in double with subdivision, then
+/// that separate and bounds on d_p, d_q, d_s (many shapes at a time), then subdivision, then
 /// Sturm's theorem in integers. The verdict is that of IsFeasible with exact arithmetic, limits
 /// aside.
 class PlanProof {
@@ -30,6 +30,8 @@ class PlanProof {
   void Reset(const Problem& problem, double sight_from, bool exact);
 
   bool Holds(const Curve& plan);
+  /// The same for one row only.
+  bool RowHolds(int row, const Curve& plan);
   /// Whether the target itself stays outside the row's shape while sight is asked.
   bool TargetIsOutside(int row) const;
 
@@ -40,7 +42,7 @@ class PlanProof {
   const Eigen::Vector3d& origin() const { return origin_; }
   /// False where a shape is not finite and positive definite: nothing is proven then.
   bool IsUsable() const { return usable_; }
-  /// Rows of the last Holds that took more than a plane, and exact arithmetic.
+  /// Rows of the last Holds that took subdivision, and exact arithmetic.
   int examined() const { return examined_; }
   int exact() const { return n_exact_; }
 
@@ -63,7 +65,7 @@ class PlanProof {
   double center_size_ = 0.0;
   std::vector<Row> rows_;
   std::vector<double> shapes_, sums_, centers_;
-  std::vector<uint8_t> cleared_;
+  std::vector<uint8_t> sight_, cleared_;
   kernels::ProofInput input_{};
 };
 

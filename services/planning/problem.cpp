@@ -25,13 +25,18 @@ double Uncertainty(const PlannerConfig& config, const world::Obstacle& o, double
   return std::min(config.max_inflation, config.sigmas * sigma);
 }
 
-// Control points of a curve at degree 6, or none where its degree is higher.
+constexpr int kSamples = 24;
+
+// Control points of a curve at degree 6, where its degree is not higher, and samples.
 struct Hull {
   Points points;
   bool known = false;
+  Eigen::Vector3d samples[kSamples + 1];
 
   explicit Hull(const Curve& curve) : known(curve.rows() <= 7) {
     if (known) points = ToPoints(curve, 6);
+    for (int i = 0; i <= kSamples; ++i)
+      samples[i] = Evaluate(curve, static_cast<double>(i) / kSamples);
   }
 };
 
@@ -56,11 +61,17 @@ bool IsPlainlyOutside(const Hull& curve, const Curve& center, const Eigen::Matri
   return low > 0.0 && low * low > kClear * Rm.dot(mean);
 }
 
-bool StaysOutside(const Curve& curve, const Curve& center, const Eigen::Matrix3d& R, double limit) {
-  constexpr int kSamples = 24;
+bool StaysOutside(const Hull& curve, const Curve& center, const Eigen::Matrix3d& R, double limit) {
   for (int i = 0; i <= kSamples; ++i) {
+    Eigen::Vector3d x = curve.samples[i];
     const double tau = static_cast<double>(i) / kSamples;
-    if (SquaredNorm(R, Evaluate(curve, tau) - Evaluate(center, tau)) <= limit) return false;
+    if (center.rows() <= 2) {
+      for (int a = 0; a < 3; ++a)
+        x[a] -= center(0, a) + (center.rows() == 2 ? tau * center(1, a) : 0.0);
+    } else {
+      x -= Evaluate(center, tau);
+    }
+    if (SquaredNorm(R, x) <= limit) return false;
   }
   return true;
 }
@@ -88,14 +99,14 @@ void SetSafetyShape(const PlannerConfig& config, const world::Obstacle& o, const
 }
 
 void SetSightShape(const PlannerConfig& config, const world::Obstacle& o, double target_growth,
-                   const Problem& problem, const Hull& target, Ellipsoid* e, std::string* notes) {
+                   const Hull& target, Ellipsoid* e, std::string* notes) {
   const double margin = config.sight_margin + target_growth;
   for (double share : kShares) {
     e->sight = Grown(o.shape, share * margin);
     if (IsPlainlyOutside(target, e->center, e->sight)) return;
-    if (margin == 0.0 || StaysOutside(problem.target, e->center, e->sight, kClear)) break;
+    if (margin == 0.0 || StaysOutside(target, e->center, e->sight, kClear)) break;
   }
-  if (StaysOutside(problem.target, e->center, e->sight, 1.0)) return;
+  if (StaysOutside(target, e->center, e->sight, 1.0)) return;
   e->sight_from = 1.0;
   Note(notes, "obstacle " + std::to_string(e->id) + " holds the target, its shadow is ignored");
 }
@@ -107,7 +118,7 @@ void SetEllipsoid(const PlannerConfig& config, const PlanRequest& request, const
   e->center = ToCurve(o.center, request.t0, request.horizon);
   SetSafetyShape(config, o, problem, e, notes);
   const double growth = std::min(config.max_inflation, config.sigmas * request.target_sigma);
-  SetSightShape(config, o, growth, problem, target, e, notes);
+  SetSightShape(config, o, growth, target, e, notes);
 }
 
 // Limits that the start already breaks give way to just above what it has: the plan may not get

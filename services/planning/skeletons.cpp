@@ -13,12 +13,16 @@ struct Spread {
   double low, high;                // elevations, rad
 };
 
-Eigen::Vector3d OnSphere(const Eigen::Vector3d& center, double radius, double azimuth,
-                         double elevation) {
-  return center + radius * Eigen::Vector3d(std::cos(azimuth) * std::cos(elevation),
-                                           std::sin(azimuth) * std::cos(elevation),
-                                           std::sin(elevation));
-}
+struct Direction {
+  double azimuth, elevation;  // rad
+  Eigen::Vector3d unit;
+
+  Direction(double azimuth_, double elevation_)
+      : azimuth(azimuth_),
+        elevation(elevation_),
+        unit(std::cos(azimuth_) * std::cos(elevation_), std::sin(azimuth_) * std::cos(elevation_),
+             std::sin(elevation_)) {}
+};
 
 // Offset of choice i from the present bearing: 0, then pairs to both sides, ever further apart, up
 // to half a turn.
@@ -30,8 +34,8 @@ double AzimuthOffset(int i, int choices) {
   return i % 2 ? offset : -offset;
 }
 
-bool IsFree(const Problem& problem, double tau, const Eigen::Vector3d& u) {
-  const Eigen::Vector3d q = Evaluate(problem.target, tau);
+bool IsFree(const Problem& problem, double tau, const Eigen::Vector3d& q,
+            const Eigen::Vector3d& u) {
   for (const Ellipsoid& e : problem.obstacles) {
     const Eigen::Vector3d c = Evaluate(e.center, tau);
     if ((u - c).dot(e.safety * (u - c)) < 1.05) return false;
@@ -40,16 +44,17 @@ bool IsFree(const Problem& problem, double tau, const Eigen::Vector3d& u) {
   return true;
 }
 
-Eigen::Vector3d Slid(const Problem& problem, double tau, double radius, double azimuth,
-                     double elevation) {
-  const Eigen::Vector3d q = Evaluate(problem.target, tau);
-  const Eigen::Vector3d first = OnSphere(q, radius, azimuth, elevation);
-  if (IsFree(problem, tau, first)) return first;
-  for (double r : {1.0, 0.75, 1.3})
-    for (double turn : {0.0, 0.15, -0.15, 0.3, -0.3, 0.45, -0.45}) {
-      const Eigen::Vector3d u = OnSphere(q, r * radius, azimuth + turn, elevation);
-      if (IsFree(problem, tau, u)) return u;
+// `first`, or the nearest free place around the target q that small changes of it reach.
+Eigen::Vector3d Slid(const Problem& problem, double tau, const Eigen::Vector3d& q,
+                     const Eigen::Vector3d& first, double radius, const Direction& d) {
+  if (IsFree(problem, tau, q, first)) return first;
+  for (double turn : {0.0, 0.15, -0.15, 0.3, -0.3, 0.45, -0.45}) {
+    const Direction turned(d.azimuth + turn, d.elevation);
+    for (double r : {1.0, 0.75, 1.3}) {
+      const Eigen::Vector3d u = q + r * radius * turned.unit;
+      if (IsFree(problem, tau, q, u)) return u;
     }
+  }
   return first;
 }
 
@@ -107,17 +112,21 @@ void Place(const PlannerConfig& config, int steps, int choices, const Spread& sp
            Problem* problem) {
   const double bearing = Bearing(*problem);
   problem->skeletons.assign(static_cast<size_t>(steps), {});
+  std::vector<Direction> directions;  // [choice][low, high]
+  for (int i = 0; i < choices; ++i)
+    for (double elevation : {spread.low, spread.high})
+      directions.emplace_back(bearing + AzimuthOffset(i, choices), elevation);
   for (int n = 1; n <= steps; ++n) {
     const double tau = static_cast<double>(n) / steps;
     const double scale = slide ? RadiusScale(config, *problem, tau) : 1.0;
+    const Eigen::Vector3d q = Evaluate(problem->target, tau);
+    auto& at = problem->skeletons[static_cast<size_t>(n - 1)];
+    at.reserve(static_cast<size_t>(choices));
     for (int i = 0; i < choices; ++i) {
       const double radius = scale * ((i + n) % 2 ? spread.radius_near : spread.radius_far);
-      const double elevation = (i / 2 + n) % 2 ? spread.low : spread.high;
-      const double azimuth = bearing + AzimuthOffset(i, choices);
-      const Eigen::Vector3d q = Evaluate(problem->target, tau);
-      problem->skeletons[static_cast<size_t>(n - 1)].push_back(
-          slide ? Slid(*problem, tau, radius, azimuth, elevation)
-                : OnSphere(q, radius, azimuth, elevation));
+      const Direction& d = directions[static_cast<size_t>(2 * i + ((i / 2 + n) % 2 ? 0 : 1))];
+      const Eigen::Vector3d u = q + radius * d.unit;
+      at.push_back(slide ? Slid(*problem, tau, q, u, radius, d) : u);
     }
   }
   if (!(config.z_max > config.z_min)) return;

@@ -101,8 +101,7 @@ Positivity DecideSight(int degree, const SmallForm& P, const SmallForm& Q, const
     return Positivity::kPositive;
   bool open = false;
   for (const int e : {0, degree}) {
-    const Positivity end =
-        AtEnd(P.b[e], P.error, Q.b[e], Q.error, S.b[e], S.error, exact);
+    const Positivity end = AtEnd(P.b[e], P.error, Q.b[e], Q.error, S.b[e], S.error, exact);
     if (end == Positivity::kNotPositive) return end;
     open = open || end == Positivity::kUndecided;
   }
