@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "common/math/gaussian.h"
+#include "services/prediction/steady_motion.h"
 
 namespace chase::prediction {
 namespace {
@@ -62,18 +63,22 @@ double GuardedExp(double x) {
 
 double GuardedExpSlope(double x) { return std::exp(std::min(x, kExpLimit)); }
 
-CandidateSet::CandidateSet(const PredictorConfig& config,
-                           const std::vector<Observation>& observations, double now)
+CandidateSet::CandidateSet(const PredictorConfig& config, const std::vector<Observation>& all,
+                           double now)
     : samples_(config.samples),
       rows_(config.degree + 1),
       axes_(config.planar ? 2 : 3),
       horizon_(config.horizon),
-      powers_(Powers(observations, now, config.horizon, rows_)) {
+      relative_(config.motion.steady) {
+  const size_t steps = std::min(all.size(), static_cast<size_t>(config.steps));
+  const std::vector<Observation> observations(all.end() - static_cast<ptrdiff_t>(steps), all.end());
+  powers_ = Powers(observations, now, config.horizon, rows_);
   from_ = std::min(0.0, powers_.row(1).maxCoeff());
   for (const Observation& o : observations)
     covariances_.push_back(
         math::MadePositiveDefinite(o.covariance, config.sigma_floor * config.sigma_floor));
   Fit(config, observations);
+  if (relative_) FitSteady(config, all, now);
   Slow(config.max_target_speed);
   AddPoints(config);
   MakeSmoothness();
@@ -117,6 +122,15 @@ void CandidateSet::Fit(const PredictorConfig& config,
   mean_fit_.row(0) += origin.transpose();
 }
 
+void CandidateSet::FitSteady(const PredictorConfig& config, const std::vector<Observation>& all,
+                             double now) {
+  const Eigen::RowVector3d at = mean_fit_.row(0);
+  mean_fit_ = SteadyForecast(config.motion, all, now, horizon_, rows_, config.max_target_speed);
+  if (axes_ == 3) return;
+  mean_fit_.col(2).setZero();
+  mean_fit_(0, 2) = at.z();
+}
+
 void CandidateSet::Slow(double max_speed) {
   double fastest = 0.0;
   for (double tau = 0.0; tau <= 1.0; tau += 0.0625) {
@@ -148,7 +162,8 @@ void CandidateSet::MakeSmoothness() {
   smoothness_.gradient = Eigen::VectorXd::Zero(dims());
   smoothness_.hessian_half = Eigen::MatrixXd::Zero(dims(), dims());
   for (int a = 0; a < axes_; ++a) {
-    const Eigen::VectorXd q = mean_fit_.col(a);
+    Eigen::VectorXd q = mean_fit_.col(a);
+    if (relative_) q.setZero();
     smoothness_.constant += q.dot(H * q);
     smoothness_.gradient.segment(a * rows_, rows_) = 2.0 * H * q;
     smoothness_.hessian_half.block(a * rows_, a * rows_, rows_, rows_) = H;
@@ -165,8 +180,9 @@ void CandidateSet::MakeExponent(const PredictorConfig& config,
     const Eigen::MatrixXd Q =
         covariances_[static_cast<size_t>(n)].topLeftCorner(axes_, axes_).inverse();
     const Eigen::VectorXd phi = powers_.col(n);
-    const Eigen::VectorXd e = (mean_fit_.transpose() * phi).head(axes_) -
-                              observations[static_cast<size_t>(n)].mean.head(axes_);
+    Eigen::VectorXd e = (mean_fit_.transpose() * phi).head(axes_) -
+                        observations[static_cast<size_t>(n)].mean.head(axes_);
+    if (relative_) e.setZero();
     const Eigen::VectorXd Qe = Q * e;
     exponent_.constant += 0.5 * e.dot(Qe);
     for (int a = 0; a < axes_; ++a) {

@@ -30,14 +30,20 @@ double GuardedExpSlope(double x);
 /// Both are convex quadratics. The constant prod_n p_N(mean_n)^-1, the same for every candidate, is
 /// taken into w_q, so that candidates rank as in the paper and nothing overflows.
 ///
-/// On purpose different from eq. (8): the integrals start at the newest observation when that is
+/// On purpose different from the paper, with `motion.steady`: the fit through the means is replaced
+/// by the forecast of a steadily driving target (steady_motion.h), the densities are centred on
+/// that motion, and accelerations count relative to it: the candidates are its deviations, and the
+/// smoothest likely one that is clear wins. Without, q_mean is eq. (8)'s own.
+///
+/// On purpose different from eq. (8) in both: points are sampled around the newest `steps`
+/// observations; the integrals start at the newest observation when that is
 /// older than `now`, so that a fit to old observations does not swing in between; the squared speed
-/// is weighed in with `damping`; covariances have a floor; and when the fit through the means is
+/// is weighed in with `damping`; covariances have a floor; and when the middle of the candidates is
 /// faster than max_target_speed, the coefficients of tau^1 and up are scaled down for all
 /// candidates alike.
 class CandidateSet {
  public:
-  /// `observations` at least one, at times <= now, finite.
+  /// `observations` at least one, sorted, at times <= now, finite.
   CandidateSet(const PredictorConfig& config, const std::vector<Observation>& observations,
                double now);
 
@@ -56,6 +62,9 @@ class CandidateSet {
   }
   Eigen::VectorXd Delta(const Choice& choice) const;
   Coefficients CoefficientsOf(const Eigen::VectorXd& delta) const;
+  /// The middle of the candidates: all offsets zero.
+  /// True when it is a candidate, and no other costs less.
+  bool IsMiddleCheapest() const { return relative_; }
   const Coefficients& mean_fit() const { return mean_fit_; }
 
   /// Quadratic a0 + g' delta + delta' H delta.
@@ -80,6 +89,8 @@ class CandidateSet {
  private:
   Eigen::Matrix3d Covariance(int row) const;
   void Fit(const PredictorConfig& config, const std::vector<Observation>& observations);
+  void FitSteady(const PredictorConfig& config, const std::vector<Observation>& observations,
+                 double now);
   void Slow(double max_speed);
   void AddPoints(const PredictorConfig& config);
   void MakeSmoothness();
@@ -87,6 +98,7 @@ class CandidateSet {
 
   int samples_, rows_, axes_;
   double horizon_;
+  bool relative_;                             // costs count from the steady motion
   double from_;                               // tau where the integrals start, <= 0
   Eigen::MatrixXd powers_;                    // column n: tau_n^k
   Eigen::MatrixXd map_;                       // column n: coefficients per metre of point n

@@ -153,10 +153,15 @@ Nearest NearestApproach(const Coefficients& q, const HorizonObstacle& obstacle, 
     for (Eigen::Index k = p.rows(); k-- > 0;) x = x * tau + p.row(k).transpose();
     return x;
   };
-  for (int i = 0; i <= samples; ++i) {
-    const double tau = static_cast<double>(i) / samples;
+  const auto look = [&](double tau) {
     const double d = RMetric(at(q, tau) - at(obstacle.center, tau), obstacle.shape);
     if (d < nearest.distance) nearest = {d, tau};
+  };
+  for (int i = 0; i <= samples; ++i) look(static_cast<double>(i) / samples);
+  for (double step = 0.5 / samples; step > 1e-4; step *= 0.5) {
+    const double middle = nearest.tau;
+    look(std::max(0.0, middle - step));
+    look(std::min(1.0, middle + step));
   }
   return nearest;
 }

@@ -24,7 +24,8 @@ bool IsClear(const Coefficients& q, const HorizonObstacle& obstacle);
 /// that `hit` names on entry is tested first.
 bool IsClear(const Coefficients& q, const std::vector<HorizonObstacle>& obstacles, int* hit);
 
-/// Smallest ||q - c||_R over `samples` + 1 times and the time tau where it is.
+/// Smallest ||q - c||_R over `samples` + 1 times, refined by halving steps, and the time tau where
+/// it is.
 struct Nearest {
   double distance, tau;
 };

@@ -67,8 +67,9 @@ std::string WindowConfig::Problem() const {
     const char* field;
     double value, low, high;
   } limits[] = {
-      {"observations", static_cast<double>(observations), 2, 16},
+      {"observations", static_cast<double>(observations), 2, 32},
       {"length", length, 0.05, 60},
+      {"gate_span", gate_span, 0.05, 60},
       {"gate_sigmas", gate_sigmas, 0.1, 1e3},
       {"gate_acceleration", gate_acceleration, 0, 1e3},
       {"gate_recovery", static_cast<double>(gate_recovery), 1, 1000},
@@ -104,12 +105,12 @@ ObservationWindow::Outcome ObservationWindow::Add(const Observation& o) {
   return Outcome::kTaken;
 }
 
-// The line through the last half of the window, allowed to be off by what the acceleration does
+// The line through the newest observations, allowed to be off by what the acceleration does
 // between its middle and the new stamp.
 bool ObservationWindow::IsOutlier(const Observation& o) const {
   std::vector<Observation> recent;
   for (const Observation& k : kept_)
-    if (k.t >= o.t - config_.length && k.t >= newest() - 0.5 * config_.length) recent.push_back(k);
+    if (k.t >= o.t - config_.length && k.t >= newest() - config_.gate_span) recent.push_back(k);
   if (static_cast<int>(recent.size()) < kGateMinimum) return false;
   const LinePrediction line = Extrapolate(recent, o.t);
   double middle = 0.0;

@@ -8,8 +8,9 @@
 namespace chase::prediction {
 
 struct WindowConfig {
-  int observations = 8;
-  double length = 1.0;
+  int observations = 24;
+  double length = 3.0;
+  double gate_span = 0.5;
   double gate_sigmas = 4.0;
   double gate_acceleration = 3.0;
   int gate_recovery = 5;
@@ -17,8 +18,9 @@ struct WindowConfig {
 
   template <class V>
   void Visit(V& v) {
-    v("observations", observations, "N_o, at most so many merged observations, 2 to 16");
+    v("observations", observations, "at most so many merged observations, 2 to 32");
     v("length", length, "observations older than this are forgotten, s");
+    v("gate_span", gate_span, "the gate extrapolates the observations of the last so many s");
     v("gate_sigmas", gate_sigmas, "an observation further off than this is an outlier");
     v("gate_acceleration", gate_acceleration, "that the gate allows for, m/s^2");
     v("gate_recovery", gate_recovery, "so many outliers in a row start the window anew");

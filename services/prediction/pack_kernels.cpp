@@ -1,7 +1,7 @@
 #include "services/prediction/pack_kernels.h"
 
 #include <algorithm>
-#include <limits>
+#include <cmath>
 
 // One body, compiled for the baseline and for AVX2; the processor decides at run time.
 #if defined(__x86_64__) && defined(__GNUC__)
@@ -16,102 +16,111 @@ namespace {
 // Eight lanes at any address; the compiler lowers them to what the target has.
 typedef float Floats __attribute__((vector_size(32), aligned(4), may_alias));
 typedef int Ints __attribute__((vector_size(32), aligned(4), may_alias));
-constexpr int kPack = 8, kPacks = kLanes / kPack;
+constexpr int kPack = 8;
+constexpr float kMargin = 1e-5F;
 
-CHASE_INLINE float AffineRowBody(const float* constant, const float* table, const float* factors,
-                                 int dims, int blocks, float* out) {
-  Floats least = Floats{} + std::numeric_limits<float>::max();
-  for (int block = 0; block < blocks; ++block) {
-    const Floats* in = reinterpret_cast<const Floats*>(constant + block * kLanes);
-    Floats sum[kPacks] = {in[0], in[1], in[2], in[3]};
-    for (int d = 0; d < dims; ++d) {
-      const Floats* t = reinterpret_cast<const Floats*>(table + (block * dims + d) * kLanes);
-      for (int p = 0; p < kPacks; ++p) sum[p] += factors[d] * t[p];
-    }
-    for (int p = 0; p < kPacks; ++p) {
-      reinterpret_cast<Floats*>(out + block * kLanes)[p] = sum[p];
-      least = sum[p] < least ? sum[p] : least;
-    }
+CHASE_INLINE Floats All(float x) { return Floats{} + x; }
+
+// e^x for -80 <= x <= 80: 2^n e^r with |r| <= ln(2) / 2, the Taylor series of e^r to r^7. Relative
+// error below 1e-6.
+CHASE_INLINE Floats Exp(Floats x) {
+  const Floats scaled = x * 1.44269504F;
+  const Ints n = __builtin_convertvector(scaled + (scaled < 0.0F ? All(-0.5F) : All(0.5F)), Ints);
+  const Floats whole = __builtin_convertvector(n, Floats);
+  const Floats r = (x - whole * 0.693359375F) + whole * 2.12194440e-4F;
+  Floats e = All(1.0F / 5040);
+  e = e * r + 1.0F / 720;
+  e = e * r + 1.0F / 120;
+  e = e * r + 1.0F / 24;
+  e = e * r + 1.0F / 6;
+  e = e * r + 0.5F;
+  e = e * r + 1.0F;
+  e = e * r + 1.0F;
+  const Ints power = (n + 127) << 23;
+  return e * reinterpret_cast<const Floats&>(power);
+}
+
+// Lower bound of constant + (||origin + point|| - radius)^2.
+CHASE_INLINE Floats Squares(const SquaresTerm& term, const float* table, const float* origin,
+                            int pack) {
+  Floats sum{};
+  for (int d = 0; d < term.dims; ++d) {
+    const Floats x =
+        origin[d] + *reinterpret_cast<const Floats*>(table + d * kLanes + pack * kPack);
+    sum += x * x;
   }
-  float result = least[0];
-  for (int l = 1; l < kPack; ++l) result = std::min(result, static_cast<float>(least[l]));
-  return result;
+  float roots[kPack];
+  *reinterpret_cast<Floats*>(roots) = sum;
+  for (float& root : roots) root = std::sqrt(root);
+  Floats norm = *reinterpret_cast<const Floats*>(roots) - term.radius;
+  norm = norm > 0.0F ? norm : All(0.0F);
+  const Floats squares = norm * norm;
+  return (term.constant + squares) - kMargin * (std::abs(term.constant) + squares);
 }
 
-CHASE_INLINE int Sum(const Ints& lanes) {
-  int sum = 0;
-  for (int l = 0; l < kPack; ++l) sum += lanes[l];
-  return sum;
-}
-
-CHASE_INLINE int KeepBelowBody(const float* values, float limit, int blocks, int* alive) {
-  Ints count = {};
-  for (int p = 0; p < blocks * kPacks; ++p) {
-    Ints& a = reinterpret_cast<Ints*>(alive)[p];
-    a = (reinterpret_cast<const Floats*>(values)[p] < limit) & 1;
-    count += a;
+CHASE_INLINE void CostBoundsBody(const SquaresTerm& sum, const SquaresTerm& exponent,
+                                 const float* table, const float* origin, uint32_t wanted,
+                                 float* out) {
+  for (int pack = 0; pack < kLanes / kPack; ++pack) {
+    if ((wanted >> (pack * kPack) & 0xFFU) == 0) continue;
+    const Floats a = Squares(sum, table, origin, pack);
+    const Floats x = Squares(exponent, table + sum.dims * kLanes, origin + sum.dims, pack);
+    const Floats high = x < 80.0F ? x : All(80.0F);
+    const Floats held = high > -80.0F ? high : All(-80.0F);
+    const Floats e = x < -80.0F ? All(0.0F) : Exp(held) * (1.0F - kMargin);
+    *reinterpret_cast<Floats*>(out + pack * kPack) = a + e;
   }
-  return Sum(count);
 }
 
-CHASE_INLINE int MaskInsideBody(const float* points, const float origin[3], float limit, int blocks,
-                                int* alive) {
-  Ints left = {};
-  for (int block = 0; block < blocks; ++block) {
-    const Floats* t = reinterpret_cast<const Floats*>(points + block * 3 * kLanes);
-    Ints* a = reinterpret_cast<Ints*>(alive + block * kLanes);
-    for (int p = 0; p < kPacks; ++p) {
-      const Floats x = origin[0] + t[p], y = origin[1] + t[kPacks + p],
-                   z = origin[2] + t[2 * kPacks + p];
-      a[p] &= (x * x + y * y + z * z) >= limit;
-      left += a[p];
-    }
+CHASE_INLINE uint32_t InsideBody(const float* table, const float* origin, uint32_t wanted,
+                                 float limit) {
+  Ints bits{};
+  const Ints lane = {1, 2, 4, 8, 16, 32, 64, 128};
+  for (int pack = 0; pack < kLanes / kPack; ++pack) {
+    if ((wanted >> (pack * kPack) & 0xFFU) == 0) continue;
+    const Floats* t = reinterpret_cast<const Floats*>(table + pack * kPack);
+    const Floats x = origin[0] + t[0], y = origin[1] + t[kLanes / kPack],
+                 z = origin[2] + t[2 * kLanes / kPack];
+    bits |= ((x * x + y * y + z * z) < limit) & (lane << (pack * kPack));
   }
-  return Sum(left);
+  uint32_t all = 0;
+  for (int l = 0; l < kPack; ++l) all |= static_cast<uint32_t>(bits[l]);
+  return all & wanted;
 }
+
+void CostBoundsBaseline(const SquaresTerm& sum, const SquaresTerm& exponent, const float* table,
+                        const float* origin, uint32_t wanted, float* out) {
+  CostBoundsBody(sum, exponent, table, origin, wanted, out);
+}
+uint32_t InsideBaseline(const float* table, const float* origin, uint32_t wanted, float limit) {
+  return InsideBody(table, origin, wanted, limit);
+}
+constexpr Kernels kBaseline = {CostBoundsBaseline, InsideBaseline};
 
 #ifdef CHASE_HAS_AVX2_BUILD
-__attribute__((target("avx2"))) float AffineRowAvx2(const float* constant, const float* table,
-                                                    const float* factors, int dims, int blocks,
+__attribute__((target("avx2"))) void CostBoundsAvx2(const SquaresTerm& sum,
+                                                    const SquaresTerm& exponent, const float* table,
+                                                    const float* origin, uint32_t wanted,
                                                     float* out) {
-  return AffineRowBody(constant, table, factors, dims, blocks, out);
+  CostBoundsBody(sum, exponent, table, origin, wanted, out);
 }
-__attribute__((target("avx2"))) int MaskInsideAvx2(const float* points, const float origin[3],
-                                                   float limit, int blocks, int* alive) {
-  return MaskInsideBody(points, origin, limit, blocks, alive);
+__attribute__((target("avx2"))) uint32_t InsideAvx2(const float* table, const float* origin,
+                                                    uint32_t wanted, float limit) {
+  return InsideBody(table, origin, wanted, limit);
 }
-__attribute__((target("avx2"))) int KeepBelowAvx2(const float* values, float limit, int blocks,
-                                                  int* alive) {
-  return KeepBelowBody(values, limit, blocks, alive);
-}
-bool HasAvx2() {
-  static const bool kHas = __builtin_cpu_supports("avx2");
-  return kHas;
-}
+constexpr Kernels kAvx2 = {CostBoundsAvx2, InsideAvx2};
 #endif
 
 }  // namespace
 
-float AffineRow(const float* constant, const float* table, const float* factors, int dims,
-                int blocks, float* out) {
-#ifdef CHASE_HAS_AVX2_BUILD
-  if (HasAvx2()) return AffineRowAvx2(constant, table, factors, dims, blocks, out);
-#endif
-  return AffineRowBody(constant, table, factors, dims, blocks, out);
-}
+const Kernels& BaselineKernels() { return kBaseline; }
 
-int KeepBelow(const float* values, float limit, int blocks, int* alive) {
+const Kernels& BestKernels() {
 #ifdef CHASE_HAS_AVX2_BUILD
-  if (HasAvx2()) return KeepBelowAvx2(values, limit, blocks, alive);
+  static const bool kHasAvx2 = __builtin_cpu_supports("avx2");
+  if (kHasAvx2) return kAvx2;
 #endif
-  return KeepBelowBody(values, limit, blocks, alive);
-}
-
-int MaskInside(const float* points, const float origin[3], float limit, int blocks, int* alive) {
-#ifdef CHASE_HAS_AVX2_BUILD
-  if (HasAvx2()) return MaskInsideAvx2(points, origin, limit, blocks, alive);
-#endif
-  return MaskInsideBody(points, origin, limit, blocks, alive);
+  return kBaseline;
 }
 
 }  // namespace chase::prediction

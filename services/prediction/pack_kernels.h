@@ -1,23 +1,34 @@
 #pragma once
 
-#include <cstddef>
+#include <cstdint>
 
 namespace chase::prediction {
 
-/// Columns are handled in blocks of this many; tables are laid out [block][dimension][lane].
+/// Points are handled in blocks of this many; a table of `dims` rows is laid out [dims][lane].
 constexpr int kLanes = 32;
 
-/// out[j] = constant[j] + sum_d factors[d] table[d, j] for `blocks` blocks of columns; returns the
-/// least. Every lane does the same operations in the same order at every vector width, without
-/// fused multiply-adds, so that results do not depend on the processor.
-float AffineRow(const float* constant, const float* table, const float* factors, int dims,
-                int blocks, float* out);
+/// A sum of squares about `constant`, for the points of a table: its first `dims` rows.
+struct SquaresTerm {
+  int dims = 0;
+  float constant = 0.0F;
+  float radius = 0.0F;  ///< the points may be off by so much
+};
 
-/// alive[j] = 1 where values[j] < limit, else 0. Returns how many are 1.
-int KeepBelow(const float* values, float limit, int blocks, int* alive);
+/// The vector kernels, one set per instruction set. Every lane does the same operations in the same
+/// order, without fused multiply-adds, so that results do not depend on the processor.
+struct Kernels {
+  /// out[j] = a lower bound of sum + exp(exponent), each of them constant + ||origin + point_j||^2;
+  /// the rows of `sum` come first in `table` and `origin`, then those of `exponent`. Relative
+  /// margin for rounding 1e-5; of points whose bit in `wanted` is not set any number may be
+  /// written; the exponential is held at e^80.
+  void (*cost_bounds)(const SquaresTerm& sum, const SquaresTerm& exponent, const float* table,
+                      const float* origin, uint32_t wanted, float* out);
+  /// Bit j is set where ||origin + point_j||^2 < limit; 3 rows; bits not `wanted` stay off.
+  uint32_t (*inside)(const float* table, const float* origin, uint32_t wanted, float limit);
+};
 
-/// Sets alive[j] = 0 where the point origin + points[:, j] (3 rows, same layout) lies within the
-/// sphere of squared radius `limit` about zero. Returns how many stay at 1.
-int MaskInside(const float* points, const float origin[3], float limit, int blocks, int* alive);
+const Kernels& BaselineKernels();
+/// The best that this processor can run.
+const Kernels& BestKernels();
 
 }  // namespace chase::prediction

@@ -35,19 +35,34 @@ std::vector<HorizonObstacle> Shrunk(std::vector<HorizonObstacle> obstacles, doub
   return obstacles;
 }
 
-// Chooses the search by the size of the set; the table is built once for all runs.
+// Chooses the search by the size of the set; the table is built once for all runs, when needed.
 class Searcher {
  public:
   Searcher(const PredictorConfig& config, const CandidateSet& candidates)
-      : config_(config), candidates_(candidates) {
-    if (candidates.count() <= config.table_limit) table_.emplace_back(candidates);
-  }
-  SearchResult Run(const std::vector<HorizonObstacle>& obstacles) const {
-    return table_.empty() ? BranchSearch(candidates_, obstacles, config_.node_limit)
-                          : table_.front().Run(obstacles);
+      : config_(config), candidates_(candidates) {}
+
+  SearchResult Run(const std::vector<HorizonObstacle>& obstacles) {
+    if (candidates_.IsMiddleCheapest() && IsMiddleClear(obstacles)) return Middle();
+    if (candidates_.count() > config_.table_limit)
+      return BranchSearch(candidates_, obstacles, config_.node_limit);
+    if (table_.empty()) table_.emplace_back(candidates_);
+    return table_.front().Run(obstacles, config_.visit_limit);
   }
 
  private:
+  bool IsMiddleClear(const std::vector<HorizonObstacle>& obstacles) const {
+    int hit = -1;
+    return IsClear(candidates_.mean_fit(), obstacles, &hit);
+  }
+  SearchResult Middle() const {
+    SearchResult result;
+    result.choice = Choice(static_cast<size_t>(candidates_.steps()), 0);
+    result.cost = candidates_.Cost(Eigen::VectorXd::Zero(candidates_.dims()));
+    result.lower_bound = result.cost;
+    result.checked = 1;
+    return result;
+  }
+
   const PredictorConfig& config_;
   const CandidateSet& candidates_;
   std::vector<TableSearch> table_;
@@ -64,7 +79,7 @@ void SetOutcome(const CandidateSet& candidates, const SearchResult& found, doubl
 void SearchAndRelax(const PredictorConfig& config, const CandidateSet& candidates,
                     const std::vector<HorizonObstacle>& obstacles, double now,
                     PredictResult* result) {
-  const Searcher searcher(config, candidates);
+  Searcher searcher(config, candidates);
   SearchResult found = searcher.Run(obstacles);
   result->checked = found.checked;
   result->nodes = found.nodes;

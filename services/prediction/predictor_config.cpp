@@ -21,6 +21,7 @@ std::string PredictorConfig::Problem() const {
     double value, low, high;
   } limits[] = {
       {"samples", static_cast<double>(samples), 1, 16},
+      {"steps", static_cast<double>(steps), 2, 32},
       {"degree", static_cast<double>(degree), 1, 7},
       {"horizon", horizon, 0.1, 20},
       {"fit_weight", fit_weight, 1e-6, 1e6},
@@ -33,13 +34,15 @@ std::string PredictorConfig::Problem() const {
       {"overlap_tolerance", overlap_tolerance, 0, 0.9},
       {"smallest_shrink", smallest_shrink, 0, 1},
       {"table_limit", static_cast<double>(table_limit), 1, 4e6},
+      {"visit_limit", static_cast<double>(visit_limit), 1, 1e9},
       {"node_limit", static_cast<double>(node_limit), 1, 1e6},
   };
   for (const auto& limit : limits) {
     const std::string problem = OutOfRange(limit.field, limit.value, limit.low, limit.high);
     if (!problem.empty()) return problem;
   }
-  return "";
+  const std::string problem = motion.Problem();
+  return problem.empty() ? "" : "motion." + problem;
 }
 
 }  // namespace chase::prediction

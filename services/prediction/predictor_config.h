@@ -2,11 +2,15 @@
 
 #include <string>
 
+#include "services/prediction/steady_motion.h"
+
 namespace chase::prediction {
 
 /// Parameters of Problem 1 of Jeon 2021 and of its search.
 struct PredictorConfig {
+  MotionConfig motion;
   int samples = 5;
+  int steps = 8;
   int degree = 3;
   double horizon = 2.5;
   double fit_weight = 30.0;
@@ -20,11 +24,14 @@ struct PredictorConfig {
   double overlap_tolerance = 0.15;
   double smallest_shrink = 0.5;
   int table_limit = 400000;
+  int visit_limit = 60000;
   int node_limit = 4000;
 
   template <class V>
   void Visit(V& v) {
+    v("motion", motion, "");
     v("samples", samples, "N_v, points per observation: its mean and a contour around it");
+    v("steps", steps, "N_o, points are sampled around the newest so many observations");
     v("degree", degree, "m_q of the prediction, 1 to 7");
     v("horizon", horizon, "T, length of the prediction, s");
     v("fit_weight", fit_weight, "w of eq. (8), pull towards the points, 1/s^3");
@@ -39,6 +46,7 @@ struct PredictorConfig {
       "an obstacle that covers the target shrinks to leave this share of its size free");
     v("smallest_shrink", smallest_shrink, "an obstacle that would shrink below this is left out");
     v("table_limit", table_limit, "up to so many candidates two tables are searched, then a tree");
+    v("visit_limit", visit_limit, "of the tables; the gap to the optimum is reported");
     v("node_limit", node_limit, "of the tree; the gap to the optimum is reported");
   }
 

@@ -1,167 +1,139 @@
 #include "services/prediction/table_search.h"
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
-#include <memory>
 #include <utility>
-
-#include "services/prediction/pack_kernels.h"
 
 namespace chase::prediction {
 namespace {
 
-constexpr size_t kMaxBlockers = 128;
+constexpr size_t kMaxBlockers = 400;
 constexpr int kBlockerSamples = 24;
-constexpr float kInfinity = std::numeric_limits<float>::infinity();
-constexpr double kSharp = 1.0;  // bounds are made anew when log e^x has moved by more
+constexpr double kDeepEnough = 0.999;  // a place less deep inside blocks little
+
+int FirstBit(uint32_t bits) { return __builtin_ctz(bits); }
+uint32_t FirstBits(int count) { return count >= 32 ? ~0U : (1U << count) - 1U; }
 
 // One run through the table.
 class Progress {
  public:
-  Progress(const PairTable& table, const PairTable::Bounds& bounds,
-           const std::vector<HorizonObstacle>& obstacles)
-      : table_(table),
-        bounds_(bounds),
-        obstacles_(obstacles),
-        rest_(static_cast<size_t>(table.blocks() * kLanes)),
-        alive_(rest_.size()),
-        done_(static_cast<size_t>(table.rows()), false) {}
+  Progress(const CandidateTable& table, const std::vector<HorizonObstacle>& obstacles,
+           int64_t visit_limit)
+      : table_(table), obstacles_(obstacles), visit_limit_(visit_limit) {}
 
   SearchResult Run() {
-    SortRows();
-    for (size_t next = 0; next < order_.size(); ++next) {
-      const auto [bound, row] = order_[next];
-      if (done_[static_cast<size_t>(row)]) continue;
-      if (bound >= result_.cost * bounds_.scale) break;
-      OpenRow(row);
-      if (!result_.found() || std::abs(exponent_ - bounds_.tangent) <= kSharp) continue;
-      bounds_ = table_.MakeBounds(exponent_);
-      SortRows();
-      next = static_cast<size_t>(-1);
+    const std::vector<float> bounds = table_.RowBounds(), middles = table_.RowMiddles();
+    std::vector<std::pair<float, int>> order;
+    for (int row = 0; row < table_.rows(); ++row)
+      order.emplace_back(middles[static_cast<size_t>(row)], row);
+    std::sort(order.begin(), order.end());
+    result_.lower_bound = std::numeric_limits<double>::infinity();
+    for (const auto& [middle, row] : order) {
+      const double bound = static_cast<double>(bounds[static_cast<size_t>(row)]);
+      if (bound >= result_.cost) continue;
+      result_.complete = result_.complete && result_.nodes < visit_limit_;
+      if (result_.complete)
+        OpenRow(row);
+      else
+        result_.lower_bound = std::min(result_.lower_bound, bound);
     }
-    result_.lower_bound = result_.cost;
+    result_.lower_bound = std::min(result_.lower_bound, result_.cost);
     return result_;
   }
 
  private:
-  void SortRows() {
-    order_.clear();
-    for (int row = 0; row < table_.rows(); ++row)
-      if (!done_[static_cast<size_t>(row)])
-        order_.emplace_back(bounds_.row[static_cast<size_t>(row)] +
-                                static_cast<double>(table_.FillRow(bounds_, row, rest_.data())),
-                            row);
-    std::sort(order_.begin(), order_.end());
-  }
+  struct Open {
+    float bound;
+    int group, point;
+    bool operator<(const Open& other) const {  // the cheapest on top of a heap
+      return bound != other.bound ? bound > other.bound
+                                  : std::pair(group, point) > std::pair(other.group, other.point);
+    }
+  };
 
   void OpenRow(int row) {
     ++result_.nodes;
-    done_[static_cast<size_t>(row)] = true;
-    table_.FillRow(bounds_, row, rest_.data());
-    const int cheap = KeepCheap(row);
-    if (cheap == 0 || MaskAll(row, cheap) == 0) return;
-    if (!result_.found()) FindFirst(row);
-    if (result_.found()) FindCheaper(row);
+    open_.clear();
+    const size_t known = blockers_.size();
+    const CandidateTable::Lanes bounds = table_.GroupBounds(row);
+    for (uint32_t left = GroupsLeft(row, bounds); left != 0; left &= left - 1U)
+      OpenGroup(row, FirstBit(left));
+    std::make_heap(open_.begin(), open_.end());
+    while (!open_.empty() && static_cast<double>(open_.front().bound) < result_.cost) {
+      std::pop_heap(open_.begin(), open_.end());
+      const Open next = open_.back();
+      open_.pop_back();
+      if (!IsBlocked(row, next, known)) Test(row, next);
+    }
   }
 
-  // Blockers that block most go first.
-  int MaskAll(int row, int left) {
-    for (size_t i = 0; i < blockers_.size() && left > 0; ++i) {
-      const int before = left;
-      left = table_.Mask(*blockers_[i].blocker, row, alive_.data());
-      blockers_[i].kills += before - left;
-      if (i > 0 && blockers_[i].kills > blockers_[i - 1].kills)
-        std::swap(blockers_[i], blockers_[i - 1]);
-    }
+  // Groups that may hold something cheap and clear.
+  uint32_t GroupsLeft(int row, const CandidateTable::Lanes& bounds) const {
+    uint32_t left = 0;
+    for (int g = 0; g < table_.groups(); ++g)
+      if (static_cast<double>(bounds[static_cast<size_t>(g)]) < result_.cost) left |= 1U << g;
+    for (size_t i = blockers_.size(); i-- > 0 && left != 0;)
+      left &= ~table_.BlockedGroups(blockers_[i], row, left);
     return left;
   }
 
-  // Rounded up, so that nothing cheap is lost.
-  int KeepCheap(int row) {
-    const double room = result_.cost * bounds_.scale - bounds_.row[static_cast<size_t>(row)];
-    const float limit = std::nextafter(static_cast<float>(room), kInfinity);
-    return KeepBelow(rest_.data(), limit, table_.blocks(), alive_.data());
-  }
-
-  // Until something is known to be clear: by bounds, which saves the exact costs.
-  void FindFirst(int row) {
-    while (!result_.found()) {
-      int least = -1;
-      for (int j = 0; j < table_.columns(); ++j)
-        if (alive_[static_cast<size_t>(j)] &&
-            (least < 0 || rest_[static_cast<size_t>(j)] < rest_[static_cast<size_t>(least)]))
-          least = j;
-      if (least < 0) return;
-      Test(row, least);
+  void OpenGroup(int row, int group) {
+    ++result_.nodes;
+    uint32_t left = FirstBits(table_.points());
+    for (size_t i = blockers_.size(); i-- > 0 && left != 0;)
+      left &= ~table_.BlockedPoints(blockers_[i], row, group, left);
+    if (left == 0) return;
+    const CandidateTable::Lanes bounds = table_.PointBounds(row, group, left);
+    for (; left != 0; left &= left - 1U) {
+      const int point = FirstBit(left);
+      const float bound = bounds[static_cast<size_t>(point)];
+      if (static_cast<double>(bound) < result_.cost) open_.push_back({bound, group, point});
     }
   }
 
-  void FindCheaper(int row) {
-    open_.clear();
-    const double room = result_.cost * bounds_.scale - bounds_.row[static_cast<size_t>(row)];
-    for (int j = 0; j < table_.columns(); ++j) {
-      if (!alive_[static_cast<size_t>(j)] ||
-          static_cast<double>(rest_[static_cast<size_t>(j)]) >= room)
-        continue;
-      const double cost = table_.Cost(row, j);
-      if (cost < result_.cost) open_.emplace_back(cost, j);
-    }
-    std::sort(open_.begin(), open_.end());
-    for (const auto& [cost, column] : open_)
-      if (alive_[static_cast<size_t>(column)] && Test(row, column)) return;
+  // By what was struck out since the row was opened.
+  bool IsBlocked(int row, const Open& open, size_t known) const {
+    for (size_t i = known; i < blockers_.size(); ++i)
+      if (table_.BlockedPoints(blockers_[i], row, open.group, 1U << open.point) != 0) return true;
+    return false;
   }
 
-  // Certified test of one pair; takes it as the best when it is clear.
-  bool Test(int row, int column) {
-    ++result_.checked;
-    alive_[static_cast<size_t>(column)] = 0;
-    Choice choice = table_.ChoiceOf(row, column);
+  // Certified test; takes the candidate as the best when it is clear and cheaper.
+  void Test(int row, const Open& open) {
     const CandidateSet& candidates = table_.candidates();
-    const Coefficients q = candidates.CoefficientsOf(candidates.Delta(choice));
-    if (!IsClear(q, obstacles_, &hit_)) {
-      AddBlocker(q, row);
-      return false;
-    }
-    result_.choice = std::move(choice);
-    result_.cost = table_.Cost(row, column);
-    exponent_ = table_.Exponent(row, column);
-    return true;
+    const Choice choice = table_.ChoiceOf(row, open.group, open.point);
+    const Eigen::VectorXd delta = candidates.Delta(choice);
+    const double cost = candidates.Cost(delta);
+    if (!(cost < result_.cost)) return;
+    ++result_.checked;
+    const Coefficients q = candidates.CoefficientsOf(delta);
+    if (!IsClear(q, obstacles_, &hit_)) return AddBlocker(q);
+    result_.choice = choice;
+    result_.cost = cost;
   }
 
-  void AddBlocker(const Coefficients& q, int row) {
+  void AddBlocker(const Coefficients& q) {
     if (blockers_.size() >= kMaxBlockers) return;
     const HorizonObstacle& obstacle = obstacles_[static_cast<size_t>(hit_)];
     const Nearest nearest = NearestApproach(q, obstacle, kBlockerSamples);
-    if (nearest.distance > 0.95) return;
-    blockers_.push_back(
-        {std::make_unique<PairTable::Blocker>(table_.MakeBlocker(obstacle, nearest.tau)), 0});
-    const PairTable::Blocker& added = *blockers_.back().blocker;
-    for (const int blocked : added.blocked_rows) done_[static_cast<size_t>(blocked)] = true;
-    table_.Mask(added, row, alive_.data());
+    if (nearest.distance < kDeepEnough)
+      blockers_.push_back(table_.MakeBlocker(obstacle, nearest.tau));
   }
 
-  const PairTable& table_;
-  PairTable::Bounds bounds_;
+  const CandidateTable& table_;
   const std::vector<HorizonObstacle>& obstacles_;
+  int64_t visit_limit_;
   SearchResult result_;
-  double exponent_ = 0.0;  // of the best
-  struct Counted {
-    std::unique_ptr<PairTable::Blocker> blocker;
-    int64_t kills;
-  };
-  std::vector<Counted> blockers_;
-  std::vector<std::pair<double, int>> order_, open_;  // bound or cost, row or column
-  std::vector<float> rest_;
-  std::vector<int> alive_;
-  std::vector<bool> done_;  // rows that were opened or are known to collide as a whole
+  std::vector<CandidateTable::Blocker> blockers_;
+  std::vector<Open> open_;  // candidates of the row, a heap
   int hit_ = -1;
 };
 
 }  // namespace
 
-SearchResult TableSearch::Run(const std::vector<HorizonObstacle>& obstacles) const {
-  return Progress(table_, bounds_, obstacles).Run();
+SearchResult TableSearch::Run(const std::vector<HorizonObstacle>& obstacles,
+                              int64_t visit_limit) const {
+  return Progress(table_, obstacles, visit_limit).Run();
 }
 
 }  // namespace chase::prediction

@@ -1,26 +1,25 @@
 #pragma once
 
-#include "services/prediction/pair_table.h"
+#include "services/prediction/candidate_table.h"
 #include "services/prediction/search.h"
 
 namespace chase::prediction {
 
-/// Exact search for N_v^N_o up to some hundred thousand. Rows of the pair table are visited by the
-/// lower bound of their cheapest candidate, and opened only while that is below the cheapest clear
-/// candidate known. In a row, pairs whose bound is too high go first, then those that lie inside an
-/// obstacle at a time where others collided, and the rest are tested with certified tests. When
-/// the known candidate is far from where the bounds are sharp, they are made anew there.
+/// Exact search for N_v^N_o up to some hundred thousand: rows of the table from the cheapest middle
+/// on, in each the groups and points whose lower bounds are below the cheapest clear candidate
+/// known, the cheapest first. Each gets the certified test; where it collides, everything that lies
+/// inside the same obstacle at the same time is struck out, group-wise where that is possible.
+/// Stops after `visit_limit` rows and groups; then lower_bound certifies how far off the result can
+/// be at most.
 class TableSearch {
  public:
-  explicit TableSearch(const CandidateSet& candidates)
-      : table_(candidates), bounds_(table_.MakeBounds(candidates.exponent().constant)) {}
+  explicit TableSearch(const CandidateSet& candidates, const Kernels& kernels = BestKernels())
+      : table_(candidates, kernels) {}
 
-  /// The optimum among all candidates.
-  SearchResult Run(const std::vector<HorizonObstacle>& obstacles) const;
+  SearchResult Run(const std::vector<HorizonObstacle>& obstacles, int64_t visit_limit) const;
 
  private:
-  PairTable table_;
-  PairTable::Bounds bounds_;  // sharp near the fit through the means
+  CandidateTable table_;
 };
 
 }  // namespace chase::prediction

@@ -43,18 +43,19 @@ struct Tally {
 
 TEST(PredictionSearch, EqualsBruteForceOnSmallInstances) {
   Tally tally;
-  for (int seed = 0; seed < 240; ++seed) {
+  for (int seed = 0; seed < 360; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     InstanceGenerator generator(static_cast<uint64_t>(seed));
     PredictorConfig config;
     config.samples = seed % 3 == 0 ? 4 : 5;
     config.degree = seed % 4 == 3 ? 5 : 3;
     config.planar = seed % 5 != 4;
+    config.motion.steady = seed % 2 == 0;
     const Problem p = MakeProblem(
-        config, generator.Make(seed % 8 == 7 ? 5 : 3 + seed % 2, 10, seed % 2 ? 0.7 : 0.4));
+        config, generator.Make(seed % 8 == 7 ? 5 : 3 + seed / 2 % 2, 10, seed / 2 % 2 ? 0.7 : 0.4));
     const SearchResult expected = ReferenceSearch(p.candidates, p.obstacles);
     tally.Add(expected);
-    ExpectSameOptimum(TableSearch(p.candidates).Run(p.obstacles), expected);
+    ExpectSameOptimum(TableSearch(p.candidates).Run(p.obstacles, 1 << 30), expected);
     if (seed % 3 == 0) {
       ExpectSameOptimum(BranchSearch(p.candidates, p.obstacles, 1000000), expected);
     }
@@ -70,9 +71,29 @@ TEST(PredictionSearch, EqualsBruteForceOnFullSizeInstances) {
   for (int seed = 1000; seed < 1010; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     InstanceGenerator generator(static_cast<uint64_t>(seed));
-    const Problem p = MakeProblem({}, generator.Make(8, 10, 0.5));
+    PredictorConfig config;
+    config.motion.steady = seed % 3 != 0;
+    const Problem p = MakeProblem(config, generator.Make(8, 10, 0.5));
     const SearchResult expected = ReferenceSearch(p.candidates, p.obstacles);
-    ExpectSameOptimum(TableSearch(p.candidates).Run(p.obstacles), expected);
+    ExpectSameOptimum(TableSearch(p.candidates).Run(p.obstacles, 1 << 30), expected);
+  }
+}
+
+// The searches take the same way at every vector width, not only to the same end.
+TEST(PredictionSearch, DoesNotDependOnTheVectorWidth) {
+  for (int seed = 0; seed < 40; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    InstanceGenerator generator(static_cast<uint64_t>(seed));
+    PredictorConfig config;
+    config.degree = 3 + seed % 3;
+    const Problem p = MakeProblem(config, generator.Make(seed % 4 ? 6 : 8, 10, 0.5));
+    const SearchResult narrow =
+        TableSearch(p.candidates, BaselineKernels()).Run(p.obstacles, 1 << 30);
+    const SearchResult best = TableSearch(p.candidates, BestKernels()).Run(p.obstacles, 1 << 30);
+    EXPECT_EQ(narrow.choice, best.choice);
+    EXPECT_EQ(narrow.cost, best.cost);
+    EXPECT_EQ(narrow.checked, best.checked);
+    EXPECT_EQ(narrow.nodes, best.nodes);
   }
 }
 

@@ -18,8 +18,15 @@ Observation At(double t, const Eigen::Vector3d& mean, double sigma = 0.04) {
 }
 Eigen::Vector3d Walk(double t) { return {0.8 * t, 0.3 * t * t, 0.5}; }
 
+WindowConfig Short() {
+  WindowConfig config;
+  config.observations = 8;
+  config.length = 1.0;
+  return config;
+}
+
 ObservationWindow Filled(double until, double period = 0.05) {
-  ObservationWindow window{WindowConfig{}};
+  ObservationWindow window{Short()};
   for (int i = 0; i * period <= until + 1e-9; ++i) window.Add(At(i * period, Walk(i * period)));
   return window;
 }
@@ -41,7 +48,7 @@ TEST(ObservationWindow, MergesTheWindowIntoAtMostTheAskedNumber) {
 }
 
 TEST(ObservationWindow, MergingWeighsByInformation) {
-  WindowConfig config;
+  WindowConfig config = Short();
   config.observations = 2;
   ObservationWindow window(config);
   window.Add(At(0.0, {0, 0, 0}, 0.1));
