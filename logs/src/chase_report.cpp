@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <stdexcept>
 
+#include "logs/src/page_template.h"
 #include "logs/src/read_flight.h"
 #include "logs/src/report_page.h"
 #include "logs/src/report_plots.h"
@@ -11,11 +12,6 @@ namespace {
 
 namespace fs = std::filesystem;
 using namespace chase::logs;
-
-/// share/chase beside the folder of this program.
-fs::path ShareFolder() {
-  return fs::read_symlink("/proc/self/exe").parent_path().parent_path() / "share" / "chase";
-}
 
 fs::path OutputFolder(const std::string& log, const std::string& out) {
   fs::path folder = out.empty() ? fs::path(log).parent_path() : fs::path(out);
@@ -40,8 +36,8 @@ void Report(const std::string& log, const std::string& out) {
   WriteMetricsJson((folder / "metrics.json").string(), record, metrics);
   const ReportData data = PrepareReport(record, scores);
   WritePlots(folder.string(), data);
-  WritePage((folder / "report.html").string(), (ShareFolder() / "report.html").string(),
-            (ShareFolder() / "plotly.min.js").string(), data, MetricsJson(record, metrics));
+  WritePage((folder / "report.html").string(), ShareFolder() + "/report.html",
+            ShareFolder() + "/plotly.min.js", data, MetricsJson(record, metrics));
   PrintSummary(metrics, folder);
 }
 

@@ -1,14 +1,13 @@
 #include "logs/src/report_plots.h"
 
 #include <fmt/format.h>
-#include <sys/wait.h>
 
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <cstdio>
 #include <filesystem>
 #include <iterator>
-#include <stdexcept>
+
+#include "logs/src/gnuplot.h"
 
 namespace chase::logs {
 namespace {
@@ -47,11 +46,7 @@ class Script {
   std::string text_;
 };
 
-std::string Quoted(const std::string& text) {
-  std::string out = "'";
-  for (const char c : text) out += c == '\'' ? std::string("''") : std::string(1, c);
-  return out + "'";
-}
+std::string Quoted(const std::string& text) { return GnuplotString(text); }
 
 void Begin(Script* s, const std::string& file, const std::string& title, int width, int height) {
   s->Line(fmt::format("set terminal pngcairo size {},{} font 'DejaVu Sans,11'", width, height));
@@ -63,32 +58,13 @@ void Begin(Script* s, const std::string& file, const std::string& title, int wid
   s->Line("set style fill solid 0.85");
 }
 
-void RunGnuplot(const std::string& script) {
-  constexpr int kNotFound = 127;  // the shell's
-  FILE* pipe = popen("gnuplot", "w");
-  if (!pipe) throw std::runtime_error("gnuplot: cannot be started");
-  const bool written = std::fwrite(script.data(), 1, script.size(), pipe) == script.size();
-  const int status = pclose(pipe);
-  if (WIFEXITED(status) && WEXITSTATUS(status) == kNotFound)
-    throw std::runtime_error("gnuplot: not found; install it with apt-get install gnuplot-nox");
-  if (!written || status != 0) throw std::runtime_error("gnuplot: refused a script, see above");
-}
-
-/// Draws into a temporary file first, so that a broken run leaves no half picture.
 template <class Draw>
 void Picture(const std::string& folder, const std::string& name, Draw draw) {
-  const auto file = std::filesystem::path(folder) / name;
-  const std::string temporary = (std::filesystem::path(folder) / ("." + name + ".tmp")).string();
-  Script script;
-  draw(&script, temporary);
-  script.Line("unset output");
-  try {
-    RunGnuplot(script.text());
-  } catch (...) {
-    std::filesystem::remove(temporary);
-    throw;
-  }
-  std::filesystem::rename(temporary, file);
+  DrawPng((std::filesystem::path(folder) / name).string(), [&](const std::string& temporary) {
+    Script script;
+    draw(&script, temporary);
+    return script.text();
+  });
 }
 
 /// Height of the picture that leaves no empty bands above and below equal axes, px.

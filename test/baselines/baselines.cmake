@@ -7,6 +7,7 @@ add_library(baselines OBJECT
   ${CMAKE_CURRENT_LIST_DIR}/rival.cpp
   ${CMAKE_CURRENT_LIST_DIR}/nlp.cpp
   ${CMAKE_CURRENT_LIST_DIR}/tuning.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/example/follow_behind.cpp
   ${CMAKE_CURRENT_LIST_DIR}/hierarchical/distance_field.cpp
   ${CMAKE_CURRENT_LIST_DIR}/hierarchical/view_graph.cpp
   ${CMAKE_CURRENT_LIST_DIR}/hierarchical/quadratic_program.cpp
@@ -24,3 +25,7 @@ chase_test(baselines_test
   LIBS baselines
   SOURCES ${CMAKE_CURRENT_LIST_DIR}/gradient_test.cpp
           ${CMAKE_CURRENT_LIST_DIR}/hierarchical/hierarchical_test.cpp)
+chase_test(planner_contract_test
+  LIBS baselines compare
+  SOURCES ${CMAKE_CURRENT_LIST_DIR}/contract_test.cpp
+  TIMEOUT 300)

@@ -100,6 +100,7 @@ nlohmann::ordered_json FlightJson(const Mission& mission, const std::string& pla
   Json j;
   j["metrics"] = Metrics(mission, planner, score);
   j["desired_distance"] = mission.desired_distance;
+  j["drone_radius"] = mission.drone_radius;
   Json circles = Json::array();
   for (const auto& o : mission.obstacles)
     circles.push_back({Rounded(o.center.coefficients(0, 0)), Rounded(o.center.coefficients(0, 1)),

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <stdexcept>
 
+#include "test/compare/figure.h"
 #include "test/compare/flight_file.h"
 
 namespace chase::compare {
@@ -66,6 +67,23 @@ void PrintTable(const std::vector<Json>& flights) {
   }
 }
 
+/// The pictured ones among the twelve; the last scenario where none of them was flown.
+std::vector<std::string> Pictured(const std::vector<std::string>& scenarios) {
+  std::vector<std::string> pictured;
+  for (const std::string& s : scenarios)
+    if (s == "S3" || s == "S6" || s == "S9" || s == "S12") pictured.push_back(s);
+  if (pictured.empty()) pictured.push_back(scenarios.back());
+  return pictured;
+}
+
+void DrawAll(const std::vector<Json>& flights, const std::filesystem::path& folder) {
+  DrawPanels(flights, (folder / "comparison.png").string());
+  const auto pictured = Pictured(ScenariosOf(flights));
+  for (const std::string& scenario : pictured)
+    DrawTopView(flights, scenario, (folder / ("top_view_" + scenario + ".png")).string());
+  WritePage(flights, pictured, (folder / "comparison.html").string());
+}
+
 }  // namespace
 
 std::vector<nlohmann::ordered_json> ReadFlights(const std::vector<Job>& jobs) {
@@ -81,6 +99,9 @@ void WriteResults(const std::vector<Job>& jobs, const std::string& folder) {
   WriteText((std::filesystem::path(folder) / "flights.json").string(), list.dump(1) + "\n");
   WriteText((std::filesystem::path(folder) / "flights.csv").string(), Csv(flights));
   PrintTable(flights);
+  if (flights.empty()) return;
+  DrawAll(flights, folder);
+  fmt::print("{}\n", (std::filesystem::path(folder) / "comparison.html").string());
 }
 
 }  // namespace chase::compare
