@@ -12,6 +12,7 @@ struct Arguments {
   int jobs = 1;
   std::string out = "compare";
   bool quiet = false;
+  bool pictures = true;
 };
 
 /// One flight of a campaign, one process.

@@ -50,6 +50,17 @@ std::string PanelRows(const Flights& flights, const std::string& planner,
   return rows;
 }
 
+/// Around 1 and all values, so that a straight line at 1 has a range, too.
+std::string RatioRange(const Flights& flights, const Panel& panel) {
+  double low = 0.99, high = 1.0;
+  for (const Json& f : flights) {
+    low = std::min(low, panel.value(f["metrics"]));
+    high = std::max(high, panel.value(f["metrics"]));
+  }
+  const double rim = 0.06 * (high - low);
+  return fmt::format("set yrange [{}:{}]\n", low - rim, high + rim);
+}
+
 std::string ScenarioTics(const std::vector<std::string>& scenarios) {
   std::string tics = "set xtics (";
   const size_t every = scenarios.size() / 30 + 1;
@@ -146,7 +157,7 @@ void DrawPanels(const Flights& flights, const std::string& file) {
       const Panel& p = Panels()[panel];
       s += "set title " + GnuplotString(p.title) + " offset 0,-0.6\n";
       s += p.logarithmic ? "set logscale y\nset yrange [*:*]\n"
-                         : "unset logscale y\nset yrange [*:*]\n";
+                         : "unset logscale y\n" + RatioRange(flights, p);
       s += panel == 0 ? "set key noenhanced at screen 0.5,0.985 center horizontal samplen 2.5\n"
                       : "unset key\n";
       s += "plot ";

@@ -30,7 +30,7 @@ void Execute(const Options& options) {
     return;
   }
   Run(jobs, campaign);
-  WriteResults(jobs, campaign.out);
+  WriteResults(jobs, campaign);
 }
 
 }  // namespace
@@ -50,6 +50,7 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(1, 1024));
   app.add_option("--out", o.campaign.out, "folder of the results (default compare)");
   app.add_flag("--quiet", o.campaign.quiet, "no progress bar");
+  app.add_flag("!--no-pictures", o.campaign.pictures, "tables only");
   app.add_flag("--list", o.list, "print one command per flight and fly nothing");
   app.add_option("--fly", o.fly, "one flight of this scenario in this process");
   app.add_option("--result", o.result, "file for the result of --fly");

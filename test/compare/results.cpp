@@ -92,16 +92,21 @@ std::vector<nlohmann::ordered_json> ReadFlights(const std::vector<Job>& jobs) {
   return flights;
 }
 
-void WriteResults(const std::vector<Job>& jobs, const std::string& folder) {
+void WriteResults(const std::vector<Job>& jobs, const Arguments& arguments) {
+  const std::filesystem::path folder(arguments.out);
   const std::vector<Json> flights = ReadFlights(jobs);
   Json list = Json::array();
   for (const Json& flight : flights) list.push_back(flight["metrics"]);
-  WriteText((std::filesystem::path(folder) / "flights.json").string(), list.dump(1) + "\n");
-  WriteText((std::filesystem::path(folder) / "flights.csv").string(), Csv(flights));
+  WriteText((folder / "flights.json").string(), list.dump(1) + "\n");
+  WriteText((folder / "flights.csv").string(), Csv(flights));
   PrintTable(flights);
-  if (flights.empty()) return;
-  DrawAll(flights, folder);
-  fmt::print("{}\n", (std::filesystem::path(folder) / "comparison.html").string());
+  if (!arguments.pictures) return;
+  try {
+    DrawAll(flights, folder);
+    fmt::print("{}\n", (folder / "comparison.html").string());
+  } catch (const std::exception& e) {
+    fmt::print(stderr, "chase-compare: no pictures: {}\n", e.what());
+  }
 }
 
 }  // namespace chase::compare

@@ -12,6 +12,7 @@ namespace chase::compare {
 std::vector<nlohmann::ordered_json> ReadFlights(const std::vector<Job>& jobs);
 
 /// flights.csv, flights.json, the figure as PNG and HTML and the top views, and a table on stdout.
-void WriteResults(const std::vector<Job>& jobs, const std::string& folder);
+/// A picture that cannot be drawn is said on stderr: the figures stand without it.
+void WriteResults(const std::vector<Job>& jobs, const Arguments& arguments);
 
 }  // namespace chase::compare
