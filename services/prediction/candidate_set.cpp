@@ -74,9 +74,12 @@ CandidateSet::CandidateSet(const PredictorConfig& config, const std::vector<Obse
   const std::vector<Observation> observations(all.end() - static_cast<ptrdiff_t>(steps), all.end());
   powers_ = Powers(observations, now, config.horizon, rows_);
   from_ = std::min(0.0, powers_.row(1).maxCoeff());
-  for (const Observation& o : observations)
+  for (const Observation& o : observations) {
     covariances_.push_back(
         math::MadePositiveDefinite(o.covariance, config.sigma_floor * config.sigma_floor));
+    const double spread = std::max(config.sigma_floor, config.spread);
+    spreads_.push_back(math::MadePositiveDefinite(o.covariance, spread * spread));
+  }
   Fit(config, observations);
   if (relative_) FitSteady(config, all, now);
   Slow(config.max_target_speed);
@@ -145,7 +148,7 @@ void CandidateSet::Slow(double max_speed) {
 
 void CandidateSet::AddPoints(const PredictorConfig& config) {
   for (Eigen::Index n = 0; n < map_.cols(); ++n) {
-    const Eigen::Matrix3d& covariance = covariances_[static_cast<size_t>(n)];
+    const Eigen::Matrix3d& covariance = spreads_[static_cast<size_t>(n)];
     const auto points = axes_ == 2 ? math::ContourPoints({Eigen::Vector3d::Zero(), covariance},
                                                          config.contour_sigmas, samples_)
                                    : SpatialPoints(covariance, config.contour_sigmas, samples_);
@@ -178,7 +181,7 @@ void CandidateSet::MakeExponent(const PredictorConfig& config,
   exponent_.hessian_half = Eigen::MatrixXd::Zero(dims(), dims());
   for (int n = 0; n < steps(); ++n) {
     const Eigen::MatrixXd Q =
-        covariances_[static_cast<size_t>(n)].topLeftCorner(axes_, axes_).inverse();
+        spreads_[static_cast<size_t>(n)].topLeftCorner(axes_, axes_).inverse();
     const Eigen::VectorXd phi = powers_.col(n);
     Eigen::VectorXd e = (mean_fit_.transpose() * phi).head(axes_) -
                         observations[static_cast<size_t>(n)].mean.head(axes_);

@@ -38,9 +38,9 @@ double GuardedExpSlope(double x);
 /// On purpose different from eq. (8) in both: points are sampled around the newest `steps`
 /// observations; the integrals start at the newest observation when that is
 /// older than `now`, so that a fit to old observations does not swing in between; the squared speed
-/// is weighed in with `damping`; covariances have a floor; and when the middle of the candidates is
-/// faster than max_target_speed, the coefficients of tau^1 and up are scaled down for all
-/// candidates alike.
+/// is weighed in with `damping`; covariances have a floor, `spread` where points are sampled; and
+/// when the middle of the candidates is faster than max_target_speed, the coefficients of tau^1 and
+/// up are scaled down for all candidates alike.
 class CandidateSet {
  public:
   /// `observations` at least one, sorted, at times <= now, finite.
@@ -103,6 +103,7 @@ class CandidateSet {
   Eigen::MatrixXd powers_;                    // column n: tau_n^k
   Eigen::MatrixXd map_;                       // column n: coefficients per metre of point n
   std::vector<Eigen::Matrix3d> covariances_;  // floored, m^2
+  std::vector<Eigen::Matrix3d> spreads_;      // that points are sampled from, m^2
   std::vector<Eigen::MatrixXd> contributions_;
   Coefficients mean_fit_;
   Quadratic smoothness_, exponent_;

@@ -29,6 +29,7 @@ std::string PredictorConfig::Problem() const {
       {"density_weight", density_weight, 0, 1e12},
       {"contour_sigmas", contour_sigmas, 0, 20},
       {"sigma_floor", sigma_floor, 1e-4, 10},
+      {"spread", spread, 1e-4, 10},
       {"max_target_speed", max_target_speed, 0.01, 100},
       {"inflation", inflation, 0, 10},
       {"overlap_tolerance", overlap_tolerance, 0, 0.9},

@@ -13,11 +13,12 @@ struct PredictorConfig {
   int steps = 8;
   int degree = 3;
   double horizon = 2.5;
-  double fit_weight = 30.0;
-  double damping = 0.03;
-  double density_weight = 0.01;
-  double contour_sigmas = 2.0;
+  double fit_weight = 100.0;
+  double damping = 0.0;
+  double density_weight = 1.0;
+  double contour_sigmas = 3.0;
   double sigma_floor = 0.05;
+  double spread = 0.2;
   bool planar = true;
   double max_target_speed = 4.0;
   double inflation = 1.0;
@@ -39,6 +40,8 @@ struct PredictorConfig {
     v("density_weight", density_weight, "w_q of Problem 1, relative to the densities at the means");
     v("contour_sigmas", contour_sigmas, "radius of the contour, standard deviations");
     v("sigma_floor", sigma_floor, "least standard deviation of an observation, m");
+    v("spread", spread,
+      "least standard deviation that points are sampled with, m: how wide the candidates fan out");
     v("planar", planar, "hold z at the mean height: a target on the ground");
     v("max_target_speed", max_target_speed, "the mean prediction is slowed down to this, m/s");
     v("inflation", inflation, "share of the target's radius that obstacles grow by");

@@ -179,7 +179,9 @@ AccuracyResult MeasureAccuracy(const Course& course, const PredictorConfig& conf
                 sigma * sigma * Eigen::Matrix3d::Identity()});
     if (i < 200 || i % kForecast != 0) continue;
     request.observations = window.Merged();
-    const auto forecast = predictor.Predict(request).trajectory;
+    const PredictResult predicted = predictor.Predict(request);
+    const auto forecast_verdict = predicted.verdict;
+    const auto& forecast = predicted.trajectory;
     for (int k = 0; k < 3; ++k) {
       const double h = kAhead[k];
       const Vector2d there = course.truth[i + static_cast<size_t>(std::lround(100 * h))];
@@ -190,6 +192,7 @@ AccuracyResult MeasureAccuracy(const Course& course, const PredictorConfig& conf
       result.acceleration[k] += squared(Extrapolated(seen, 41, 2, h));
     }
     ++result.forecasts;
+    result.colliding += forecast_verdict == PredictResult::Verdict::kColliding;
   }
   for (Errors* e :
        {&result.ours, &result.velocity_short, &result.velocity_long, &result.acceleration})

@@ -38,6 +38,7 @@ struct AccuracyResult {
   Errors velocity_long = Errors::Zero();   ///< over 1 s
   Errors acceleration = Errors::Zero();    ///< least-squares parabola over 2 s
   int forecasts = 0;
+  int colliding = 0;  ///< forecasts with this verdict
 };
 
 /// A target seen at 20 Hz with `sigma` m of noise in x and y; a forecast every 0.25 s.

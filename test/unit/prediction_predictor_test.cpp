@@ -83,7 +83,10 @@ TEST(Predictor, SaysSoWhenEverythingCollidesAndOffersTheLeastBad) {
   world::Obstacle wall = Pillar(0.6, 0.0, 0.3);
   wall.shape(1, 1) = 0.01;
   request.obstacles.push_back(wall);
-  const PredictResult result = Predictor({}).Predict(request);
+  PredictorConfig narrow;
+  narrow.spread = narrow.sigma_floor;
+  narrow.contour_sigmas = 1.0;
+  const PredictResult result = Predictor(narrow).Predict(request);
   EXPECT_EQ(result.verdict, Verdict::kColliding);
   EXPECT_FALSE(result.reason.empty());
   EXPECT_LT(result.free_share, 1.0);
@@ -252,6 +255,7 @@ TEST(CandidateSet, RanksAsThePapersCost) {
   config.damping = 0.0;
   config.planar = false;
   config.sigma_floor = 1e-3;
+  config.spread = 1e-3;
   const CandidateSet set(config, request.observations, request.now);
   double log_densities_at_means = 0.0;
   for (const Observation& o : request.observations)
@@ -306,6 +310,7 @@ TEST(CandidateSet, CountsFromTheSteadyMotion) {
   PredictorConfig config;
   config.planar = false;
   config.sigma_floor = 1e-3;
+  config.spread = 1e-3;
   const CandidateSet set(config, request.observations, request.now);
   const world::Trajectory middle{request.now, set.horizon(), set.mean_fit()};
   EXPECT_NEAR(set.Cost(set.Delta({0, 0, 0, 0})), config.density_weight, 1e-12);
