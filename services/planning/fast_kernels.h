@@ -15,6 +15,7 @@ constexpr int kMaxProduct = 2 * kMaxDegree;  // degree of d_p, d_q, d_s
 constexpr int kMaxCenter = 7;                // power coefficients of a centre
 constexpr int kQuadratureNodes = 20;
 constexpr int kSplitDepth = 4;
+constexpr int kGroupDepth = 2;  // of the test of groups, which may leave any open
 constexpr int kTreeNodes = 2 << kSplitDepth;
 
 /// Floats of the tables that `shape` leaves for one obstacle (see fast_shape.inc).
@@ -93,6 +94,7 @@ struct Context {
   const Row* rows;
   const float* tables;
   const float* margin;
+  const float* slack;  ///< [n] of a group of candidates; null: single ones
   Shadow* shadows;
   int exact;   ///< exact sight condition, else the paper's bound
   int* order;  ///< rows that have to be tested, the most refusing first
@@ -131,7 +133,11 @@ struct Table {
   /// Tests the candidates against all rows of `order`. Dead ones leave the list; returns how many
   /// stay and their states.
   int (*check)(Context& c, int* ids, int* state, int n);
-  /// The same for up to kBatch candidates, in registers.
+  /// Tests groups of candidates, group g at prefix g + mid: `ids` gets those with members that may
+  /// be feasible. Needs c.slack.
+  int (*check_groups)(Context& c, const float* prefix, const float* mid, int n, int* ids,
+                      int* state);
+  /// As `check` for up to kBatch candidates, in registers.
   int (*check_batch)(Context& c, int* ids, int* state, int n);
   /// holds[j] = 1 where bounds over the whole horizon prove what shape j asks.
   void (*prove)(const ProofInput& in, uint8_t* holds);

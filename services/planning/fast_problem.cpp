@@ -285,6 +285,40 @@ void FastProblem::Generate() {
   kernels_.generate(context_, prefix_.data(), n_prefix, first_.data(), first);
 }
 
+void FastProblem::AliveGroups(std::vector<int>* groups) {
+  const int nx = 3 * free_, first = choices_[0], n = n_ / first;
+  float mid[9], half[9];
+  for (int k = 0; k < nx; ++k) {
+    double low = HUGE_VAL, high = -HUGE_VAL;
+    for (int s = 0; s < first; ++s) {
+      low = std::min(low, pulls_[static_cast<size_t>(s * nx + k)]);
+      high = std::max(high, pulls_[static_cast<size_t>(s * nx + k)]);
+    }
+    mid[k] = static_cast<float>(0.5 * (low + high));
+    half[k] = static_cast<float>(0.5 * (high - low) * (1 + 1e-5) + 1e-6);
+  }
+  const int columns = static_cast<int>(low_plan_.size());
+  slack_.resize(low_plan_.size());
+  for (const int r : order_) {
+    float L[6], largest = 0.0f;
+    for (int i = 0; i < 6; ++i) L[i] = std::abs(factors_[static_cast<size_t>(i * columns + r)]);
+    for (int f = 0; f < free_; ++f) {
+      const float* h = half + 3 * f;
+      const float z[3] = {L[0] * h[0] + L[1] * h[1] + L[2] * h[2], L[3] * h[1] + L[4] * h[2],
+                          L[5] * h[2]};
+      largest = std::max(largest, z[0] * z[0] + z[1] * z[1] + z[2] * z[2]);
+    }
+    slack_[static_cast<size_t>(r)] = std::min(1.0f, 1.0001f * std::sqrt(largest));
+  }
+  groups->resize(static_cast<size_t>(n + kPad));
+  states_.resize(static_cast<size_t>(n + kPad));
+  context_.slack = slack_.data();
+  groups->resize(static_cast<size_t>(
+      kernels_.check_groups(context_, prefix_.data(), mid, n, groups->data(), states_.data())));
+  context_.slack = nullptr;
+  std::sort(groups->begin(), groups->end());
+}
+
 Points FastProblem::PointsOf(int index) const {
   double z[9];
   const int nx = 3 * free_;

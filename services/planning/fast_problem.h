@@ -25,6 +25,11 @@ class FastProblem {
   /// True when the target is inside a shape while sight is asked: nothing is feasible.
   bool IsBlocked() const { return blocked_; }
 
+  /// Candidates that differ in the first step only come in groups, `first_choices` a group, in the
+  /// order of their indices: those of groups that may hold feasible ones, ascending.
+  void AliveGroups(std::vector<int>* groups);
+  int first_choices() const { return choices_[0]; }
+
   Points PointsOf(int index) const;
   Curve PlanOf(int index) const;
   Cost CostOf(int index) const;
@@ -58,11 +63,11 @@ class FastProblem {
   std::vector<kernels::Row> rows_;
   std::vector<int> obstacle_of_;  // row -> obstacle
   std::vector<float> centers_, tables_of_shapes_, factors_, low_plan_, low_target_, low_sight_,
-      margin_;
+      margin_, slack_;
   std::vector<kernels::NearNode> near_;
   int near_begin_[kernels::kQuadratureNodes + 1];
   std::vector<kernels::Shadow> shadows_;
-  std::vector<int> order_;
+  std::vector<int> order_, states_;
   std::vector<float> x_, j1_, work_, prefix_, first_;
   std::vector<uint32_t> alive_;
 };

@@ -53,6 +53,8 @@ class FastSearch : public Search {
 
   int Run();
   void Weigh(float low, float high);
+  void WeighListed(int n);
+  void SearchGroups(const float* levels, int n_levels);
   void Drain(int max_batches);
   void Batch(int* ids, float* lower, int n);
   void CheckAll();
@@ -80,7 +82,7 @@ class FastSearch : public Search {
   std::unique_ptr<Search> fallback_;
   const Problem* problem_ = nullptr;
 
-  std::vector<int> ids_, refused_;
+  std::vector<int> ids_, groups_, refused_;
   std::vector<float> values_;
   std::vector<int> states_;
   std::vector<Entry> heap_, accepted_;
@@ -89,32 +91,42 @@ class FastSearch : public Search {
   Cost winner_cost_;
 };
 
-// Tests up to kBatch candidates with their lower bounds J1 + J3 + J4, J2 on top first; in the order
-// of their costs, so that the certificate is asked for as few as possible.
+// Tests up to kBatch candidates with their lower bounds J1 + J3 + J4. J2 comes on top first where
+// there is a bound to prune by, else only for what is feasible; then they are taken in the order of
+// their costs, so that the certificate is asked for as few as possible.
 void FastSearch::Batch(int* ids, float* lower, int n) {
   for (int i = n; i < kBatch + kPad; ++i) lower[i] = 0.0f;
-  kernels_.obstacles(fast_.context(), ids, lower, n);
-  Entry sorted[kBatch];
+  const bool prune = !accepted_.empty();
+  if (prune) kernels_.obstacles(fast_.context(), ids, lower, n);
+  int left[kBatch + kPad], states[kBatch];
+  float cost[kBatch + kPad];
   int count = 0;
-  for (int i = 0; i < n; ++i)
-    if (lower[i] < Limit() && !IsRefused(ids[i])) sorted[count++] = {lower[i], ids[i]};
+  for (int i = 0; i < n; ++i) {
+    if (!(lower[i] < Limit()) || IsRefused(ids[i])) continue;
+    cost[count] = lower[i];
+    left[count++] = ids[i];
+  }
   if (count == 0) return;
-  std::sort(sorted, sorted + count);
-  int left[kBatch];
-  int states[kBatch];
-  for (int i = 0; i < count; ++i) left[i] = sorted[i].second;
   checked_ += count;
+  int before[kBatch];
+  std::copy(left, left + count, before);
   const int kept = kernels_.check_batch(fast_.context(), left, states, count);
-  int at = 0;
+  if (kept == 0) return;
+  for (int i = 0, at = 0; i < kept; ++i, ++at) {
+    while (before[at] != left[i]) ++at;
+    cost[i] = cost[at];
+  }
+  if (!prune) kernels_.obstacles(fast_.context(), left, cost, kept);
+  std::pair<float, int> sorted[kBatch];
+  for (int i = 0; i < kept; ++i) sorted[i] = {cost[i], i};
+  std::sort(sorted, sorted + kept);
   for (int i = 0; i < kept; ++i) {
-    while (sorted[at].second != left[i]) ++at;
-    const float cost = sorted[at].first;
-    if (!(cost < Limit())) break;
-    if (!KeepsLimitsOf(left[i])) continue;
-    if (states[i] >= 0 && !IsProven(left[i], states[i])) continue;
+    if (!(sorted[i].first < Limit())) break;
+    const int id = left[sorted[i].second], open = states[sorted[i].second];
+    if (!KeepsLimitsOf(id) || (open >= 0 && !IsProven(id, open))) continue;
     ++feasible_;
-    accepted_.push_back({cost, left[i]});
-    best_ = std::min(best_, cost);
+    accepted_.push_back({sorted[i].first, id});
+    best_ = std::min(best_, sorted[i].first);
   }
 }
 
@@ -123,7 +135,12 @@ void FastSearch::Batch(int* ids, float* lower, int n) {
 void FastSearch::Weigh(float low, float high) {
   const kernels::Context& c = fast_.context();
   ids_.resize(static_cast<size_t>(c.stride + kPad));
-  int n = kernels_.select(c, low, high, ids_.data());
+  const int n = kernels_.select(c, low, high, ids_.data());
+  WeighListed(n);
+}
+
+void FastSearch::WeighListed(int n) {
+  const kernels::Context& c = fast_.context();
   values_.resize(static_cast<size_t>(n + kPad));
   for (int i = 0; i < n; ++i) values_[static_cast<size_t>(i)] = c.j1[ids_[static_cast<size_t>(i)]];
   constexpr int kFirst = 4;  // of the nodes: most candidates end there
@@ -131,6 +148,33 @@ void FastSearch::Weigh(float low, float high) {
   n = kernels_.distance_and_yaw(c, ids_.data(), values_.data(), n, Limit(), kFirst, kNodes);
   for (int i = 0; i < n; ++i)
     heap_.push_back({values_[static_cast<size_t>(i)], ids_[static_cast<size_t>(i)]});
+}
+
+// Nothing found among the cheapest: whole groups of candidates are ruled out by one test each, and
+// what is left is taken in shares of ever higher J1, from above levels[0] on.
+void FastSearch::SearchGroups(const float* levels, int n_levels) {
+  const kernels::Context& c = fast_.context();
+  const int size = fast_.first_choices();
+  fast_.AliveGroups(&groups_);
+  const auto is_ruled_out = [&](const Entry& e) {
+    return !std::binary_search(groups_.begin(), groups_.end(), e.second / size);
+  };
+  heap_.erase(std::remove_if(heap_.begin(), heap_.end(), is_ruled_out), heap_.end());
+  for (int level = 0; level < n_levels; ++level) {
+    const float low = levels[level];
+    const float high = std::min(Limit(), level + 1 < n_levels ? levels[level + 1] : HUGE_VALF);
+    ids_.resize(groups_.size() * static_cast<size_t>(size) + kPad);
+    int n = 0;
+    for (const int g : groups_)
+      for (int id = g * size; id < (g + 1) * size; ++id) {
+        ids_[static_cast<size_t>(n)] = id;
+        n += (c.j1[id] > low) & (c.j1[id] <= high);
+      }
+    WeighListed(n);
+    Drain(8);
+    if (accepted_.empty()) CheckAll();
+    Drain(1 << 30);
+  }
 }
 
 void FastSearch::Drain(int max_batches) {
@@ -197,12 +241,19 @@ int FastSearch::Run() {
   const int rank =
       std::min(samples - 1, static_cast<int>(static_cast<int64_t>(samples) * wanted / n));
   std::nth_element(sample, sample + rank, sample + samples);
-  Weigh(-1.0f, sample[rank]);
+  const float cheapest = sample[rank];
+  Weigh(-1.0f, cheapest);
   Drain(8);
-  Weigh(sample[rank], Limit());
   if (accepted_.empty()) {
-    Drain(std::max(2, n / 64));
-    if (accepted_.empty()) CheckAll();
+    float levels[3] = {cheapest, cheapest, cheapest};
+    for (const int part : {1, 2}) {  // above the cheapest: to an eighth of all, to a half, the rest
+      const int at = std::max(rank, part == 1 ? samples / 8 : samples / 2);
+      std::nth_element(sample, sample + at, sample + samples);
+      levels[part] = sample[at];
+    }
+    SearchGroups(levels, 3);
+  } else {
+    Weigh(cheapest, Limit());
   }
   Drain(1 << 30);
   return CheapestAccepted();

@@ -121,17 +121,9 @@ bool PlanProof::RowHolds(const Row& row, const Curve& plan, const Local* p) {
       }
     const double X = p->size + c.size, Y = target_.size + c.size;
     const Eigen::Matrix3d& R = row.safety ? e.safety : e.sight;
-    const int D = 2 * degree_;
-    SmallForm P = MakeForm(degree_, x, X, R, x, X);
-    CutFrom(D, row.from, &P);
-    if (!row.sight) {
-      decided = DecideSafe(D, P, kDepth);
-    } else {
-      SmallForm Q = MakeForm(degree_, y, Y, R, y, Y), S = MakeForm(degree_, x, X, R, y, Y);
-      CutFrom(D, row.from, &Q);
-      CutFrom(D, row.from, &S);
-      decided = DecideSight(D, P, Q, S, exact_sight_, kDepth);
-    }
+    SmallForms forms(degree_, x, X, y, Y, R);
+    forms.CutFrom(row.from);
+    decided = row.sight ? forms.DecideSight(exact_sight_, kDepth) : forms.DecideSafe(kDepth);
   }
   if (decided != Positivity::kUndecided) return decided == Positivity::kPositive;
   ++n_exact_;

@@ -6,38 +6,13 @@
 #include "services/planning/product_weights.h"
 
 namespace chase::planning {
-namespace {
 
 using math::Positivity;
 
+namespace {
+
 constexpr double kRounding = 0x1p-53;
 constexpr double kUp = 1.0 + 1e-14, kDown = 1.0 - 1e-14;  // above the rounding of a product
-
-double Lowest(int degree, const SmallForm& f) {
-  double low = f.b[0];
-  for (int k = 1; k <= degree; ++k) low = std::min(low, f.b[k]);
-  return low - f.error;
-}
-
-double Largest(int degree, const SmallForm& f) {
-  double high = 0.0;
-  for (int k = 0; k <= degree; ++k) high = std::max(high, std::abs(f.b[k]));
-  return high;
-}
-
-// Halves; an average rounds by at most u times the largest coefficient, `degree` times over.
-void Halve(int degree, const SmallForm& f, SmallForm* left, SmallForm* right) {
-  double t[13];
-  std::copy(f.b, f.b + degree + 1, t);
-  left->b[0] = t[0];
-  right->b[degree] = t[degree];
-  for (int k = 1; k <= degree; ++k) {
-    for (int i = 0; i <= degree - k; ++i) t[i] = 0.5 * (t[i] + t[i + 1]);
-    left->b[k] = t[0];
-    right->b[degree - k] = t[degree - k];
-  }
-  left->error = right->error = f.error + 1.01 * degree * kRounding * Largest(degree, f);
-}
 
 Positivity Both(Positivity first, Positivity second) {
   if (first == Positivity::kNotPositive || second == Positivity::kNotPositive)
@@ -45,74 +20,116 @@ Positivity Both(Positivity first, Positivity second) {
   return first == Positivity::kPositive ? second : first;
 }
 
-/// Verdict at one end of an interval.
-Positivity AtEnd(double p, double pe, double q, double qe, double s, double se, bool exact) {
-  if (p < -pe || q < -qe) return Positivity::kNotPositive;
-  const double p_high = std::max(0.0, p + pe), q_high = std::max(0.0, q + qe), s_high = s + se;
-  if (s_high < 0.0 && (!exact || p_high * q_high * kUp < s_high * s_high))
-    return Positivity::kNotPositive;
-  const double p_low = p - pe, q_low = q - qe, s_low = s - se;
-  const bool clear = p_low > 0.0 && q_low > 0.0 &&
-                     (s_low > 0.0 || (exact && p_low * q_low * kDown > s_low * s_low));
+}  // namespace
+
+SmallForms::SmallForms(int n, const double (*x)[3], double X, const double (*y)[3], double Y,
+                       const Eigen::Matrix3d& R)
+    : degree_(2 * n) {
+  const WeightTable& w = ProductWeights(n);
+  for (int k = 0; k <= degree_; ++k) root_.b[k] = Lanes{-1.0, -1.0, -1.0, 0.0};
+  Lanes right[7][3];
+  for (int j = 0; j <= n; ++j)
+    for (int a = 0; a < 3; ++a) right[j][a] = Lanes{x[j][a], y[j][a], y[j][a], 0.0};
+  for (int i = 0; i <= n; ++i) {
+    Lanes left[3];
+    for (int a = 0; a < 3; ++a) {
+      const double p = R(a, 0) * x[i][0] + R(a, 1) * x[i][1] + R(a, 2) * x[i][2];
+      const double q = R(a, 0) * y[i][0] + R(a, 1) * y[i][1] + R(a, 2) * y[i][2];
+      left[a] = Lanes{p, q, p, 0.0};
+    }
+    for (int j = 0; j <= n; ++j) {
+      const double v = w.value[i][j];
+      root_.b[i + j] += Lanes{v, v, v, v} *
+                        (left[0] * right[j][0] + left[1] * right[j][1] + left[2] * right[j][2]);
+    }
+  }
+  const double unit = 64.0 * kRounding, sum = R.cwiseAbs().sum();
+  root_.error = Lanes{unit * (1.0 + X * X * sum), unit * (1.0 + Y * Y * sum),
+                      unit * (1.0 + X * Y * sum), 0.0};
+  Lanes largest{};
+  for (int k = 0; k <= degree_; ++k) largest = -Min(-largest, Min(root_.b[k], -root_.b[k]));
+  const double s = 1.01 * degree_ * kRounding;
+  step_ = Lanes{s, s, s, s} * largest;
+}
+
+void SmallForms::CutFrom(double from) {
+  if (from <= 0.0) return;
+  const Lanes at{from, from, from, from}, rest = Lanes{1.0, 1.0, 1.0, 1.0} - at;
+  for (int k = degree_; k > 0; --k)
+    for (int i = 0; i < k; ++i) root_.b[i] = rest * root_.b[i] + at * root_.b[i + 1];
+  root_.error += Lanes{6.0, 6.0, 6.0, 6.0} * step_;
+}
+
+template <int D>
+SmallForms::Lanes SmallForms::Lowest(const Piece& f) const {
+  Lanes low = f.b[0];
+#pragma GCC unroll 16
+  for (int k = 1; k <= D; ++k) low = Min(low, f.b[k]);
+  return low - f.error;
+}
+
+template <int D>
+void SmallForms::Halve(const Piece& f, Piece* left, Piece* right) const {
+  Lanes t[D + 1];
+  for (int k = 0; k <= D; ++k) t[k] = f.b[k];
+  left->b[0] = t[0];
+  right->b[D] = t[D];
+  double scale = 1.0;  // exact powers of two: sums instead of means
+#pragma GCC unroll 16
+  for (int k = 1; k <= D; ++k) {
+#pragma GCC unroll 16
+    for (int i = 0; i <= D - k; ++i) t[i] = t[i] + t[i + 1];
+    scale *= 0.5;
+    left->b[k] = t[0] * Lanes{scale, scale, scale, scale};
+    right->b[D - k] = t[D - k] * Lanes{scale, scale, scale, scale};
+  }
+  left->error = right->error = f.error + step_;
+}
+
+Positivity SmallForms::AtEnd(Question question, Lanes value, Lanes error) {
+  const Lanes low = value - error, high = value + error;
+  if (question == kSafe)
+    return high[0] < 0.0  ? Positivity::kNotPositive
+           : low[0] > 0.0 ? Positivity::kPositive
+                          : Positivity::kUndecided;
+  if (high[0] < 0.0 || high[1] < 0.0) return Positivity::kNotPositive;
+  const bool exact = question == kExactSight;
+  const double p = std::max(0.0, high[0]), q = std::max(0.0, high[1]);
+  if (high[2] < 0.0 && (!exact || p * q * kUp < high[2] * high[2])) return Positivity::kNotPositive;
+  const bool clear = low[0] > 0.0 && low[1] > 0.0 &&
+                     (low[2] > 0.0 || (exact && low[0] * low[1] * kDown > low[2] * low[2]));
   return clear ? Positivity::kPositive : Positivity::kUndecided;
 }
 
-}  // namespace
-
-SmallForm MakeForm(int n, const double (*x)[3], double X, const Eigen::Matrix3d& R,
-                   const double (*y)[3], double Y) {
-  SmallForm f{};
-  const WeightTable& w = ProductWeights(n);
-  double sum = 0.0;
-  for (int i = 0; i < 9; ++i) sum += std::abs(R.data()[i]);
-  for (int k = 0; k <= 2 * n; ++k) f.b[k] = -1.0;
-  for (int i = 0; i <= n; ++i) {
-    double z[3];
-    for (int a = 0; a < 3; ++a) z[a] = R(a, 0) * x[i][0] + R(a, 1) * x[i][1] + R(a, 2) * x[i][2];
-    for (int j = 0; j <= n; ++j)
-      f.b[i + j] += w.value[i][j] * (z[0] * y[j][0] + z[1] * y[j][1] + z[2] * y[j][2]);
-  }
-  f.error = 64.0 * kRounding * (1.0 + X * Y * sum);
-  return f;
-}
-
-void CutFrom(int degree, double from, SmallForm* f) {
-  if (from <= 0.0) return;
-  f->error += 4.0 * (degree + 1) * kRounding * Largest(degree, *f);
-  for (int k = degree; k > 0; --k)
-    for (int i = 0; i < k; ++i) f->b[i] = (1.0 - from) * f->b[i] + from * f->b[i + 1];
-}
-
-Positivity DecideSafe(int degree, const SmallForm& P, int depth) {
-  if (Lowest(degree, P) > 0.0) return Positivity::kPositive;
-  if (P.b[0] < -P.error || P.b[degree] < -P.error) return Positivity::kNotPositive;
-  if (depth == 0 || P.b[0] <= P.error || P.b[degree] <= P.error) return Positivity::kUndecided;
-  SmallForm left, right;
-  Halve(degree, P, &left, &right);
-  const Positivity first = DecideSafe(degree, left, depth - 1);
-  if (first == Positivity::kNotPositive) return first;
-  return Both(first, DecideSafe(degree, right, depth - 1));
-}
-
-Positivity DecideSight(int degree, const SmallForm& P, const SmallForm& Q, const SmallForm& S,
-                       bool exact, int depth) {
-  const double p = Lowest(degree, P), q = Lowest(degree, Q), s = Lowest(degree, S);
-  if (p > 0.0 && q > 0.0 && (s > 0.0 || (exact && p * q * kDown > s * s)))
+template <int D>
+Positivity SmallForms::Decide(Question question, const Piece& f, int depth) const {
+  const Lanes low = Lowest<D>(f);
+  if (low[0] > 0.0 &&
+      (question == kSafe ||
+       (low[1] > 0.0 &&
+        (low[2] > 0.0 || (question == kExactSight && low[0] * low[1] * kDown > low[2] * low[2])))))
     return Positivity::kPositive;
-  bool open = false;
-  for (const int e : {0, degree}) {
-    const Positivity end = AtEnd(P.b[e], P.error, Q.b[e], Q.error, S.b[e], S.error, exact);
-    if (end == Positivity::kNotPositive) return end;
-    open = open || end == Positivity::kUndecided;
-  }
-  if (depth == 0 || open) return Positivity::kUndecided;
-  SmallForm left[3], right[3];
-  Halve(degree, P, &left[0], &right[0]);
-  Halve(degree, Q, &left[1], &right[1]);
-  Halve(degree, S, &left[2], &right[2]);
-  const Positivity first = DecideSight(degree, left[0], left[1], left[2], exact, depth - 1);
+  const Positivity first = AtEnd(question, f.b[0], f.error);
   if (first == Positivity::kNotPositive) return first;
-  return Both(first, DecideSight(degree, right[0], right[1], right[2], exact, depth - 1));
+  const Positivity last = AtEnd(question, f.b[D], f.error);
+  if (last == Positivity::kNotPositive) return last;
+  if (depth == 0 || first == Positivity::kUndecided || last == Positivity::kUndecided)
+    return Positivity::kUndecided;
+  Piece left, right;
+  Halve<D>(f, &left, &right);
+  const Positivity before = Decide<D>(question, left, depth - 1);
+  if (before == Positivity::kNotPositive) return before;
+  return Both(before, Decide<D>(question, right, depth - 1));
+}
+
+Positivity SmallForms::Decide(Question question, int depth) const {
+  return degree_ == 10 ? Decide<10>(question, root_, depth) : Decide<12>(question, root_, depth);
+}
+
+Positivity SmallForms::DecideSafe(int depth) const { return Decide(kSafe, depth); }
+
+Positivity SmallForms::DecideSight(bool exact, int depth) const {
+  return Decide(exact ? kExactSight : kBoundedSight, depth);
 }
 
 }  // namespace chase::planning

@@ -6,29 +6,50 @@
 
 namespace chase::planning {
 
-/// A polynomial of degree up to 12 in Bernstein form over [0,1] with a bound on the error of its
-/// coefficients: d_p - 1, d_q - 1 or d_s - 1 of one obstacle.
-struct SmallForm {
-  double b[13];
-  double error;
+/// d_p - 1, d_q - 1 and d_s - 1 of one obstacle over [0,1] side by side, of degree 2n <= 12 in
+/// Bernstein form, with a bound on the error of their coefficients.
+///
+/// From control points x of the plan and y of the target, degree n <= 6, relative to the centre:
+/// every coordinate of x is at most X in magnitude and off by at most (n + 10) u X, u = 2^-53, and
+/// so for y. The coefficients are means of x' R x, y' R y, x' R y, sums of terms below X Y
+/// sum|R_ab| that take 7 + n roundings and 4 for the weight: less than 64 u (1 + X Y sum|R_ab|) in
+/// all.
+class SmallForms {
+ public:
+  SmallForms(int n, const double (*x)[3], double X, const double (*y)[3], double Y,
+             const Eigen::Matrix3d& R);
+
+  /// The part on [from, 1].
+  void CutFrom(double from);
+
+  /// d_p > 1 on all of it.
+  math::Positivity DecideSafe(int depth) const;
+
+  /// d_p, d_q > 1 and (`exact`: d_s > 1 or (d_p - 1)(d_q - 1) > (d_s - 1)^2; else d_s > 1) on all
+  /// of it, by joint subdivision: on a piece with lower bounds p, q, s, fine if s > 0, or if
+  /// p q > s^2. Broken where an end shows it.
+  math::Positivity DecideSight(bool exact, int depth) const;
+
+ private:
+  typedef double Lanes __attribute__((vector_size(32)));  // P, Q, S, unused
+  struct Piece {
+    Lanes b[13], error;
+  };
+  enum Question { kSafe, kExactSight, kBoundedSight };
+
+  static Lanes Min(Lanes a, Lanes b) { return a < b ? a : b; }
+  static math::Positivity AtEnd(Question question, Lanes value, Lanes error);
+  template <int D>
+  Lanes Lowest(const Piece& f) const;
+  template <int D>
+  void Halve(const Piece& f, Piece* left, Piece* right) const;
+  template <int D>
+  math::Positivity Decide(Question question, const Piece& f, int depth) const;
+  math::Positivity Decide(Question question, int depth) const;
+
+  int degree_;
+  Piece root_;
+  Lanes step_;  // error that a split adds: every average rounds by at most u times the largest
 };
-
-/// x' R y - 1 for control points x and y of degree n <= 6, relative to the centre. Every coordinate
-/// of x is at most X in magnitude and off by at most (n + 10) u X, u = 2^-53, and so for y. Terms
-/// w_ij x_i' R y_j with weights that sum to 1 over i + j = k are at most X Y sum|R_ab| in sum, 7 +
-/// n roundings and 4 for the weight on top: less than 64 u (1 + X Y sum|R_ab|) in all.
-SmallForm MakeForm(int n, const double (*x)[3], double X, const Eigen::Matrix3d& R,
-                   const double (*y)[3], double Y);
-
-/// The part on [from, 1]; `degree` is that of the form.
-void CutFrom(int degree, double from, SmallForm* f);
-
-/// P > 0 on [0,1].
-math::Positivity DecideSafe(int degree, const SmallForm& P, int depth);
-
-/// P, Q > 0 and (`exact`: S > 0 or P Q > S^2; else S > 0) on [0,1], by joint subdivision: on a
-/// piece with lower bounds p, q, s, fine if s > 0, or if p q > s^2. Broken where an end shows it.
-math::Positivity DecideSight(int degree, const SmallForm& P, const SmallForm& Q, const SmallForm& S,
-                             bool exact, int depth);
 
 }  // namespace chase::planning
