@@ -11,6 +11,9 @@ namespace chase::perception {
 namespace {
 
 constexpr double kMaskScore = 127.0;  // half of full score: the blob's pixels
+constexpr double kWellShaped = 0.35;  // score of a blob that is one thing
+constexpr int kSplitArea = 60;        // px^2 of a blob that may be several
+constexpr size_t kMostPieces = 6;
 
 double Bell(double x, double sigma) { return std::exp(-0.5 * (x / sigma) * (x / sigma)); }
 
@@ -44,15 +47,36 @@ Detection ColorDetector::Describe(const cv::Mat& bgr, const cv::Mat& score,
   cv::drawContours(d.mask, std::vector<std::vector<cv::Point>>{contour}, 0, 255, cv::FILLED,
                    cv::LINE_8, cv::noArray(), INT_MAX, -d.mask_box.tl());
   d.cut = CutSides(d.mask_box, bgr.size());
-  std::vector<cv::Point> hull;
-  cv::convexHull(contour, hull);
-  const double half_border = 0.5 * static_cast<double>(hull.size());  // contours run through
-  const double area = cv::countNonZero(d.mask);                       // pixel centres
+  Rate(score, &d);
+  return d;
+}
+
+void ColorDetector::Rate(const cv::Mat& score, Detection* d) const {
+  std::vector<cv::Point> points, hull;
+  cv::findNonZero(d->mask, points);
+  cv::convexHull(points, hull);
+  const double half_border = 0.5 * static_cast<double>(hull.size());  // hulls run through
+  const double area = cv::countNonZero(d->mask);                      // pixel centres
   const double hull_area =
       cv::contourArea(hull) + std::max(half_border, 0.5 * cv::arcLength(hull, true));
-  const double color = cv::mean(score(d.mask_box), d.mask)[0] / 255.0;
-  d.score = color * ShapeScore(d, area, hull_area);
-  return d;
+  const double color = cv::mean(score(d->mask_box), d->mask)[0] / 255.0;
+  d->score = color * ShapeScore(*d, area, hull_area);
+}
+
+void ColorDetector::AddPieces(const cv::Mat& bgr, const cv::Mat& score,
+                              std::vector<Detection>* found) const {
+  std::vector<Detection> pieces;
+  for (const auto& whole : *found) {
+    if (whole.score > kWellShaped || cv::countNonZero(whole.mask) < kSplitArea) continue;
+    for (auto& piece : SplitColumns(bgr, whole)) {
+      Rate(score, &piece);
+      if (piece.score > kWellShaped) pieces.push_back(std::move(piece));
+    }
+  }
+  std::stable_sort(pieces.begin(), pieces.end(),
+                   [](const Detection& a, const Detection& b) { return a.score > b.score; });
+  if (pieces.size() > kMostPieces) pieces.resize(kMostPieces);
+  for (auto& piece : pieces) found->push_back(std::move(piece));
 }
 
 std::vector<Detection> ColorDetector::Detect(const cv::Mat& bgr) const {
@@ -75,6 +99,7 @@ std::vector<Detection> ColorDetector::Detect(const cv::Mat& bgr) const {
     d.silhouette = TraceSilhouette(bgr, d.mask, d.mask_box, d.cut);
     d.silhouette.sigma_px = edge_sigma_px_;
   }
+  AddPieces(bgr, score, &found);
   return found;
 }
 

@@ -18,6 +18,9 @@ class ColorDetector : public Detector {
  private:
   Detection Describe(const cv::Mat& bgr, const cv::Mat& score,
                      const std::vector<cv::Point>& contour) const;
+  void Rate(const cv::Mat& score, Detection* d) const;
+  /// Adds the well shaped pieces of blobs that are badly shaped as a whole.
+  void AddPieces(const cv::Mat& bgr, const cv::Mat& score, std::vector<Detection>* found) const;
   /// 0 to 1 from aspect, fill and straightness; aspect and fill say nothing where the image ends.
   double ShapeScore(const Detection& d, double area, double hull_area) const;
 

@@ -9,10 +9,11 @@ namespace chase::perception {
 namespace {
 
 constexpr int kBits = 6, kLevels = 1 << kBits;
-constexpr double kGreySaturation = 0.35;  // pixels below tell the light's tint
-constexpr int kGreyMinimum = 200;         // sampled pixels needed for that
-constexpr double kShade = 0.5;            // brightness in shade, share of the darkest one learned
-constexpr int kGreyStep = 4;              // every so many rows and columns are sampled
+// Pixels below tell the light's tint: earth, bark and concrete under a warm lamp reach 0.5.
+constexpr double kGreySaturation = 0.6;
+constexpr int kGreyMinimum = 200;  // sampled pixels needed for that
+constexpr double kShade = 0.5;     // brightness in shade, share of the darkest one learned
+constexpr int kGreyStep = 4;       // every so many rows and columns are sampled
 
 struct Hsv {
   double hue_deg, saturation, value;
@@ -82,7 +83,11 @@ Eigen::Vector3d ColorModel::Gains(const cv::Mat& bgr) const {
       ++count;
     }
   if (count < kGreyMinimum) return Eigen::Vector3d::Ones();
-  const Eigen::Vector3d gains = sum.mean() * sum.cwiseInverse();
+  Eigen::Vector3d gains = sum.mean() * sum.cwiseInverse();
+  // Warm light only: that is what makes earth and bark orange, while a large blue thing in view
+  // would otherwise do the same.
+  gains[0] = std::max(gains[0], 1.0);
+  gains[2] = std::min(gains[2], 1.0);
   return gains.cwiseMax(config_.min_gain).cwiseMin(config_.max_gain);
 }
 

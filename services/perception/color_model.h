@@ -20,7 +20,8 @@ class ColorModel {
   /// Score of one colour, 0 to 1; channels 0 to 1.
   double Score(double blue, double green, double red) const;
 
-  /// Gains of blue, green and red that make greyish pixels grey; ones where there are too few.
+  /// Gains of blue, green and red that take the warmth off greyish pixels; ones where there are too
+  /// few.
   Eigen::Vector3d Gains(const cv::Mat& bgr) const;
 
  private:

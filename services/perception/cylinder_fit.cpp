@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 
 #include "services/perception/cylinder_residuals.h"
 
@@ -11,8 +12,9 @@ namespace chase::perception {
 
 namespace {
 
-constexpr double kEdgeLoss = 2.0, kPointLoss = 2.0;  // standard deviations where outliers begin
-constexpr double kShapeFloor = 1e-6;                 // m^2
+constexpr double kOutlier = 2.0;      // standard deviations where outliers begin
+constexpr double kWorst = 3.0;        // standard deviations that an outlier counts for
+constexpr double kShapeFloor = 1e-6;  // m^2
 
 PlanRay ToPlan(const Camera& camera, const Eigen::Vector2d& px) {
   const Eigen::Vector3d ray = camera.Ray(px.x(), px.y());
@@ -33,6 +35,21 @@ double SlopePerPixel(const Camera& camera, const Eigen::Vector2d& px) {
                   ToPlan(camera, px - Eigen::Vector2d(0, 0.5)).slope);
 }
 
+double Median(std::vector<double> values) {
+  if (values.empty()) return 0.0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+/// Half the sum of squares of samples that count for at most `weight` together.
+double BoundedCost(const std::vector<double>& residuals, double sigma, double weight) {
+  if (residuals.empty()) return 0.0;
+  double sum = 0.0;
+  for (double r : residuals) sum += 0.5 * std::min(kWorst * kWorst, r * r / (sigma * sigma));
+  return sum * std::min(1.0, weight / static_cast<double>(residuals.size()));
+}
+
 /// One Ceres problem and the bookkeeping to read its residuals afterwards.
 class Fit {
  public:
@@ -41,9 +58,7 @@ class Fit {
         config_(config),
         x_(input.prior.mean),
         s_(input.shape.size),
-        problem_(Options()),
-        edge_loss_(kEdgeLoss),
-        point_loss_(kPointLoss) {}
+        problem_(Options()) {}
 
   FitResult Run() {
     if (!AddPrior()) return {};
@@ -59,6 +74,7 @@ class Fit {
     out.cost = summary.final_cost;
     out.ok = ReadCovariance(&out);
     ReadResiduals(&out);
+    out.ok = out.ok && ReadEvidence(&out);
     return out;
   }
 
@@ -80,8 +96,8 @@ class Fit {
     return options;
   }
 
-  template <class Residual, class Loss>
-  void AddScaled(const Residual& residual, Loss* loss) {
+  template <class Residual>
+  void AddScaled(const Residual& residual, ceres::LossFunction* loss) {
     problem_.AddResidualBlock(
         new ceres::AutoDiffCostFunction<Residual, 1, 6, 2>(new Residual(residual)), loss, x_.data(),
         s_.data());
@@ -110,42 +126,45 @@ class Fit {
     return true;
   }
 
-  /// 1/m: turns metres beside the line of sight into standard deviations of one sample.
-  double EdgeScale(double meters_per_px, size_t samples) const {
-    const double sigma =
-        input_.detection->silhouette.sigma_px *
-        std::sqrt(std::max(1.0, static_cast<double>(samples) / config_.edge_weight));
-    return 1.0 / (sigma * std::max(1e-6, meters_per_px));
+  /// Robust loss of one of `samples` that count for `weight` independent ones together.
+  ceres::LossFunction* Loss(size_t samples, double weight) {
+    const double share = std::min(1.0, weight / static_cast<double>(samples));
+    losses_.push_back(std::make_unique<ceres::ScaledLoss>(new ceres::CauchyLoss(kOutlier), share,
+                                                          ceres::TAKE_OWNERSHIP));
+    return losses_.back().get();
   }
 
   void AddEdges() {
     if (!input_.detection) return;
+    const double sigma = input_.detection->silhouette.sigma_px;
     const double range =
         std::max(0.2, (input_.prior.position() - input_.camera.p_WC).head<2>().norm());
     for (int side = 0; side < 4; ++side) {
-      if (!input_.use_side[static_cast<size_t>(side)]) continue;
       const auto& samples = input_.detection->silhouette.samples[static_cast<size_t>(side)];
+      if (!input_.use_side[static_cast<size_t>(side)] || samples.empty()) continue;
+      ceres::LossFunction* loss = Loss(samples.size(), config_.edge_weight);
+      const double sign = side == kRight || side == kTop ? 1.0 : -1.0;
       for (const auto& px : samples) {
         const PlanRay ray = ToPlan(input_.camera, px);
         if (side == kLeft || side == kRight)
-          AddScaled(
-              SideResidual{ray, side == kRight ? 1.0 : -1.0,
-                           EdgeScale(range * PlanAnglePerPixel(input_.camera, px), samples.size())},
-              &edge_loss_);
+          AddScaled(SideResidual{ray, sign, 1.0 / (sigma * range * Turn(px))}, loss);
         else
-          AddScaled(
-              CapResidual{ray, side == kTop ? 1.0 : -1.0,
-                          EdgeScale(range * SlopePerPixel(input_.camera, px), samples.size())},
-              &edge_loss_);
+          AddScaled(CapResidual{ray, sign, 1.0 / (sigma * range * Climb(px))}, loss);
       }
     }
   }
+  double Turn(const Eigen::Vector2d& px) const {
+    return std::max(1e-6, PlanAnglePerPixel(input_.camera, px));
+  }
+  double Climb(const Eigen::Vector2d& px) const {
+    return std::max(1e-6, SlopePerPixel(input_.camera, px));
+  }
 
   void AddPoints() {
-    const double n = static_cast<double>(input_.points.size());
-    const double sigma = config_.lidar_sigma * std::sqrt(std::max(1.0, n / config_.lidar_weight));
+    if (input_.points.empty()) return;
+    ceres::LossFunction* loss = Loss(input_.points.size(), config_.lidar_weight);
     for (const auto& p : input_.points)
-      AddScaled(PointResidual{p.p_W, p.age, 1.0 / sigma}, &point_loss_);
+      AddScaled(PointResidual{p.p_W, p.age, 1.0 / config_.lidar_sigma}, loss);
   }
 
   void AddPosition() {
@@ -157,7 +176,7 @@ class Fit {
         new ceres::AutoDiffCostFunction<PositionResidual, 3, 6>(
             new PositionResidual{input_.camera.p_WC + R * *input_.detection->p_CT,
                                  llt.matrixL().solve(Eigen::Matrix3d::Identity())}),
-        &edge_loss_, x_.data());
+        Loss(1, 1.0), x_.data());
   }
 
   bool ReadCovariance(FitResult* out) {
@@ -180,43 +199,67 @@ class Fit {
     return out->posterior.covariance.allFinite();
   }
 
-  /// Mean residual of one side in px at the solution, without loss or weights.
-  double EdgeResidual(size_t side, double range) const {
-    double sum = 0.0;
-    const auto& samples = input_.detection->silhouette.samples[side];
-    for (const auto& px : samples) {
+  /// Residuals of one side in px at the solution, without loss or weights.
+  std::vector<double> EdgeResiduals(size_t side, double range) const {
+    std::vector<double> all;
+    for (const auto& px : input_.detection->silhouette.samples[side]) {
       const PlanRay ray = ToPlan(input_.camera, px);
+      const double sign = side == kRight || side == kTop ? 1.0 : -1.0;
       double r = 0.0;
       if (side == kLeft || side == kRight)
-        SideResidual{ray, side == kRight ? 1.0 : -1.0,
-                     1.0 / (range * PlanAnglePerPixel(input_.camera, px))}(x_.data(), s_.data(),
-                                                                           &r);
+        SideResidual{ray, sign, 1.0 / (range * Turn(px))}(x_.data(), s_.data(), &r);
       else
-        CapResidual{ray, side == kTop ? 1.0 : -1.0,
-                    1.0 / (range * SlopePerPixel(input_.camera, px))}(x_.data(), s_.data(), &r);
-      sum += r;
+        CapResidual{ray, sign, 1.0 / (range * Climb(px))}(x_.data(), s_.data(), &r);
+      all.push_back(r);
     }
-    return samples.empty() ? 0.0 : sum / static_cast<double>(samples.size());
+    return all;
+  }
+
+  std::vector<double> PointResiduals() const {
+    std::vector<double> all;
+    for (const auto& p : input_.points) {
+      double r = 0.0;
+      PointResidual{p.p_W, p.age, 1.0}(x_.data(), s_.data(), &r);
+      all.push_back(r);
+    }
+    return all;
+  }
+
+  /// -cost + log sqrt(det posterior / det prior). What single outliers cost is bounded.
+  bool ReadEvidence(FitResult* out) const {
+    const Eigen::LLT<Matrix6d> posterior(out->posterior.covariance);
+    if (posterior.info() != Eigen::Success) return false;
+    const double log_posterior = posterior.matrixLLT().diagonal().array().log().sum();
+    const double log_prior = -root_.diagonal().array().log().sum();
+    double cost = 0.5 * out->prior_distance;
+    for (size_t side = 0; input_.detection && side < 4; ++side)
+      if (out->used[side])
+        cost += BoundedCost(EdgeResiduals(side, Range()), input_.detection->silhouette.sigma_px,
+                            config_.edge_weight);
+    cost += BoundedCost(PointResiduals(), config_.lidar_sigma, config_.lidar_weight);
+    out->log_evidence = -cost + log_posterior - log_prior;
+    return std::isfinite(out->log_evidence);
+  }
+
+  double Range() const {
+    return std::max(0.2, (x_.head<3>() - input_.camera.p_WC).head<2>().norm());
   }
 
   void ReadResiduals(FitResult* out) const {
     const Vector6d d = root_ * (x_ - input_.prior.mean);
     out->prior_distance = d.squaredNorm();
-    const double range = std::max(0.2, (x_.head<3>() - input_.camera.p_WC).head<2>().norm());
     for (size_t side = 0; input_.detection && side < 4; ++side) {
-      out->edge_px[side] = EdgeResidual(side, range);
+      if (!input_.use_side[side] && !input_.detection->silhouette.samples[side].empty())
+        out->whole = false;
+      out->edge_px[side] = Median(EdgeResiduals(side, Range()));
       out->used[side] =
           input_.use_side[side] && !input_.detection->silhouette.samples[side].empty();
     }
     out->n_points = static_cast<int>(input_.points.size());
+    const auto distances = PointResiduals();
     double sum = 0.0;
-    for (const auto& p : input_.points) {
-      double r = 0.0;
-      PointResidual{p.p_W, p.age, 1.0}(x_.data(), s_.data(), &r);
-      sum += r * r;
-    }
-    if (!input_.points.empty())
-      out->point_rms = std::sqrt(sum / static_cast<double>(input_.points.size()));
+    for (double r : distances) sum += r * r;
+    if (!distances.empty()) out->point_rms = std::sqrt(sum / static_cast<double>(distances.size()));
   }
 
   const FitInput& input_;
@@ -224,9 +267,8 @@ class Fit {
   Vector6d x_;
   Eigen::Vector2d s_;
   Matrix6d root_ = Matrix6d::Zero();
+  std::vector<std::unique_ptr<ceres::LossFunction>> losses_;  // outlive the problem
   ceres::Problem problem_;
-  ceres::HuberLoss edge_loss_;
-  ceres::CauchyLoss point_loss_;
 };
 
 }  // namespace

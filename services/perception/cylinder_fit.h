@@ -44,12 +44,17 @@ struct FitResult {
   bool ok = false;  ///< solved, finite, covariance found
   TargetGaussian posterior;
   TargetShape shape;
-  std::array<double, 4> edge_px = {};  ///< by Side: mean residual, px, positive: seen outside fit
+  std::array<double, 4> edge_px = {};  ///< by Side: median residual, px, positive: seen outside fit
   std::array<bool, 4> used = {};       ///< by Side
+  bool whole = true;                   ///< no side that the detection shows is left out
   int n_points = 0;                    ///< LiDAR points in the fit
   double point_rms = 0.0;              ///< distance of the points from the surface, m
   double prior_distance = 0.0;         ///< squared Mahalanobis distance from the prior
   double cost = 0.0;                   ///< half the robust sum of squares, prior included
+  /// Logarithm of the prediction's density of these measurements, but for what the measurements'
+  /// own densities add: Laplace's approximation around the solution.
+  double log_evidence = 0.0;
+  double log_odds = 0.0;  ///< of being the target rather than anything else of its colour
 };
 
 /// The most likely position and velocity of an upright cylinder: silhouette, LiDAR points and

@@ -2,23 +2,40 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 
 namespace chase::perception {
 
 namespace {
 
-constexpr double kHiddenBy = 1.0;          // px that a side left out lies off the outline at least
-constexpr double kDropPenalty = 4.0;       // cost of leaving out a side
-constexpr int kMinPoints = 3;              // of a cluster that gives a range
-constexpr int kManyPoints = 5;             // that went through it: the target is not there
-constexpr double kCore = 0.6;              // share of the cylinder that such a ray goes through
-constexpr double kBehind = 0.25;           // m behind the target where such a ray ends at least
-constexpr double kMinVisible = 0.15;       // share of the expected box that a detection must cover
-constexpr double kMaxRangeError = 0.15;    // share of the range; a worse first fix is none
+constexpr double kHiddenBy = 1.0;        // px that a side left out lies off the outline at least
+constexpr double kHidden = 0.02;         // how often a given side is hidden
+constexpr double kRunsOn = 0.002;        // how often a like colour goes on beyond a side
+constexpr double kSharpTurn = 0.02;      // how often the target does what the motion leaves out:
+constexpr double kTurnSpeed = 1.0;       // m/s, standard deviation of the speed it gains so
+constexpr double kTurnShift = 0.12;      // m, and of the place
+constexpr double kClear = 3.0;           // squared distance from the prediction that needs no other
+constexpr double kNegligible = 7.0;      // logarithm of the odds of a hypothesis that is left out
+constexpr int kSidesOfNew = 3;           // of what nothing is known of yet
+constexpr int kLeastSides = 2;           // that must be seen
+constexpr int kMinPoints = 3;            // of a cluster that gives a range
+constexpr size_t kMostPoints = 40;       // in a fit
+constexpr int kMostClusters = 2;         // that are tried
+constexpr int kManyPoints = 5;           // that went through it: the target is not there
+constexpr double kCore = 0.6;            // share of the cylinder that such a ray goes through
+constexpr double kBehind = 0.25;         // m behind the target where such a ray ends at least
+constexpr double kMinVisible = 0.15;     // share of the expected box that a detection must cover
+constexpr double kMaxRangeError = 0.15;  // share of the range; a worse first fix is none
 constexpr double kHiddenPriorShare = 0.6;  // of the prior's gate where sides are left out
 
+constexpr double kKnownShare = 0.03;  // of the range, likewise
 constexpr double kKnownRange = 0.25;  // m, standard deviation of the prediction
 constexpr size_t kOneHidden = 5;      // readings with at most one side left out
+
+// What else has the target's colour: so many blobs a frame, anywhere in the image, sides so far
+// apart, as far away as may be.
+constexpr double kClutter = 0.3, kClutterSidePx = 60.0, kClutterDepth = 10.0;
+constexpr double kUnexplained = 0.5, kMostUnexplained = 6.0;  // odds for points at other ranges
 
 using Sides = std::array<bool, 4>;
 
@@ -55,8 +72,11 @@ std::vector<TargetPoint> PointsOnTarget(const FitInput& input,
   std::vector<TargetPoint> kept;
   for (const auto& p : cluster)
     if (std::abs(SurfaceDistance(p, input)) < gate) kept.push_back(p);
-  if (static_cast<int>(kept.size()) < kMinPoints) kept.clear();
-  return kept;
+  if (static_cast<int>(kept.size()) < kMinPoints) return {};
+  const size_t step = 1 + kept.size() / kMostPoints;  // more would not tell more
+  std::vector<TargetPoint> some;
+  for (size_t i = 0; i < kept.size(); i += step) some.push_back(kept[i]);
+  return some;
 }
 
 /// True when the lidar looked well through where the target should be, and hit something behind.
@@ -79,6 +99,12 @@ int CountSeenThrough(const FitInput& input, const Clusters& clusters) {
   return count;
 }
 
+double CountPoints(const Clusters& clusters) {
+  size_t count = 0;
+  for (const auto& cluster : clusters) count += cluster.size();
+  return static_cast<double>(count);
+}
+
 double MedianRange(const std::vector<TargetPoint>& cluster) {
   return cluster[cluster.size() / 2].range;
 }
@@ -88,6 +114,54 @@ bool Visible(const FitInput& input) {
   const auto expected = ProjectCylinder(input.camera, input.prior.position(), input.shape.size[0],
                                         input.shape.size[1]);
   return !expected || input.detection->box.area() >= kMinVisible * expected->area();
+}
+
+/// The same prediction of a target that has just braked, turned or been pushed; across the line of
+/// sight only unless points tell the range, since the apparent size alone would take every pixel
+/// that is hidden for a leap.
+TargetGaussian AfterASharpTurn(const FitInput& input) {
+  Eigen::Vector2d sight = (input.prior.position() - input.camera.p_WC).head<2>().normalized();
+  Eigen::Matrix2d across = Eigen::Matrix2d::Identity();
+  if (input.points.empty()) across -= sight * sight.transpose();
+  TargetGaussian g = input.prior;
+  g.covariance.topLeftCorner<2, 2>() += kTurnShift * kTurnShift * across;
+  g.covariance.block<2, 2>(3, 3) += kTurnSpeed * kTurnSpeed * across;
+  return g;
+}
+
+/// Tells which readings may hold: sides are hidden only where the blob is smaller than expected,
+/// and go on only where it is larger. All may hold while the range is not known.
+std::function<bool(const Sides&)> Sensible(const FitInput& input) {
+  const auto expected = ProjectCylinder(input.camera, input.prior.position(), input.shape.size[0],
+                                        input.shape.size[1]);
+  const double range = (input.prior.position() - input.camera.p_WC).norm();
+  if (!expected || RangeSigma(input) > kKnownShare * range)
+    return [](const Sides&) { return true; };
+  const auto fits = [](double seen, double wanted) {
+    return std::abs(seen - wanted) < kHiddenBy + 3.0 * kKnownShare * wanted;
+  };
+  const bool wide = fits(input.detection->box.width, expected->width);
+  const bool high = fits(input.detection->box.height, expected->height);
+  return [wide, high](const Sides& use) {
+    const bool sides = use[kLeft] && use[kRight], caps = use[kTop] && use[kBottom];
+    return (sides || !wide) && (caps || !high);
+  };
+}
+
+/// Logarithm of the density of the same sides and points where they belong to something else.
+double LogClutter(const FitInput& input) {
+  const auto& samples = input.detection->silhouette.samples;
+  const auto& rig = input.camera.rig;
+  double sum = std::log(kClutter);
+  const auto add = [&](Side a, Side b, double extent) {
+    const int seen = !samples[a].empty() + !samples[b].empty();
+    if (seen > 0) sum -= std::log(extent);
+    if (seen > 1) sum -= std::log(kClutterSidePx);
+  };
+  add(kLeft, kRight, rig.width_px);
+  add(kTop, kBottom, rig.height_px);
+  if (!input.points.empty()) sum -= std::log(kClutterDepth);
+  return sum;
 }
 
 }  // namespace
@@ -100,7 +174,10 @@ bool Localiser::Agrees(const FitResult& fit, double prior_gate) const {
 }
 
 bool Localiser::EdgesAgree(const FitResult& fit, const FitInput& input) const {
-  const double gate = config_.fit.edge_gate * input.detection->silhouette.sigma_px;
+  if (!input.detection->p_CT && std::count(fit.used.begin(), fit.used.end(), true) < kLeastSides)
+    return false;
+  const double gate =
+      std::max(config_.fit.edge_gate_px, 1.6 * input.detection->silhouette.sigma_px);
   for (size_t side = 0; side < 4; ++side) {
     if (fit.used[side] && std::abs(fit.edge_px[side]) > gate) return false;
     const bool left_out =
@@ -110,6 +187,34 @@ bool Localiser::EdgesAgree(const FitResult& fit, const FitInput& input) const {
   return true;
 }
 
+/// One Gaussian with the mean and covariance of the mixture; all else from the likeliest.
+FitResult Localiser::Joined(const std::vector<Hypothesis>& all) {
+  const auto& best = *std::max_element(
+      all.begin(), all.end(),
+      [](const Hypothesis& a, const Hypothesis& b) { return a.log_weight < b.log_weight; });
+  FitResult out = best.fit;
+  double total = 0.0;
+  Vector6d mean = Vector6d::Zero();
+  for (const auto& h : all) {
+    const double weight = std::exp(h.log_weight - best.log_weight);
+    if (weight < std::exp(-kNegligible)) continue;
+    total += weight;
+    mean += weight * h.fit.posterior.mean;
+  }
+  mean /= total;
+  Matrix6d covariance = Matrix6d::Zero();
+  for (const auto& h : all) {
+    const double weight = std::exp(h.log_weight - best.log_weight);
+    if (weight < std::exp(-kNegligible)) continue;
+    const Vector6d d = h.fit.posterior.mean - mean;
+    covariance += weight / total * (h.fit.posterior.covariance + d * d.transpose());
+  }
+  out.posterior.mean = mean;
+  out.posterior.covariance = covariance;
+  out.log_odds = best.log_weight + std::log(total);
+  return out;
+}
+
 std::optional<FitResult> Localiser::WholeReading(FitInput* input) const {
   input->use_side = kReadings[0];
   FitResult fit = FitCylinder(*input, config_.fit);
@@ -117,24 +222,67 @@ std::optional<FitResult> Localiser::WholeReading(FitInput* input) const {
   return fit;
 }
 
-std::optional<FitResult> Localiser::BestReading(FitInput* input) const {
-  std::optional<FitResult> best = WholeReading(input);
-  if (best) return best;
-  double best_cost = 0.0;
-  // Where the range is not known, two opposite sides must give it.
-  const size_t readings = RangeSigma(*input) < kKnownRange ? kReadings.size() : kOneHidden;
-  for (size_t k = 1; k < readings; ++k) {
-    input->use_side = kReadings[k];
-    FitResult fit = FitCylinder(*input, config_.fit);
-    if (!Agrees(fit, kHiddenPriorShare * config_.fit.prior_gate) || !EdgesAgree(fit, *input))
-      continue;
-    fit.cost += kDropPenalty * static_cast<double>(std::count(input->use_side.begin(),
-                                                              input->use_side.end(), false));
-    if (best && fit.cost >= best_cost) continue;
-    best = fit;
-    best_cost = fit.cost;
+double Localiser::LogSides(const FitResult& fit, const FitInput& input) const {
+  const double sigma = input.detection->silhouette.sigma_px / std::sqrt(config_.fit.edge_weight);
+  const double range = (fit.posterior.position() - input.camera.p_WC).norm();
+  const double px = input.camera.rig.focal_px / std::max(0.2, range);
+  double sum = 0.0;
+  for (size_t side = 0; side < 4; ++side) {
+    if (input.detection->silhouette.samples[side].empty()) continue;
+    const double extent = std::max(
+        2.0,
+        px * (side == kLeft || side == kRight ? 2.0 * input.shape.size[0] : input.shape.size[1]));
+    if (fit.used[side])
+      sum -= std::log(sigma * std::sqrt(2.0 * M_PI));
+    else
+      sum += std::log((fit.edge_px[side] < 0.0 ? kHidden : kRunsOn) / extent);
   }
-  return best;
+  return sum;
+}
+
+double Localiser::LogTarget(const FitResult& fit, const FitInput& input) const {
+  double sum = fit.log_evidence + LogSides(fit, input);
+  if (fit.n_points > 0) {
+    const double n = std::min(config_.fit.lidar_weight, static_cast<double>(fit.n_points));
+    sum -= std::log(config_.fit.lidar_sigma / std::sqrt(n) * std::sqrt(2.0 * M_PI));
+  }
+  return sum;
+}
+
+void Localiser::Weigh(const FitInput& given, double log_prior, size_t readings,
+                      std::vector<Hypothesis>* out) const {
+  FitInput input = given;
+  const double prior_gate = config_.fit.prior_gate;
+  const auto sensible = Sensible(input);
+  for (size_t k = 0; k < readings; ++k) {
+    if (k >= kOneHidden && !out->empty()) return;
+    if (!sensible(kReadings[k])) continue;
+    input.use_side = kReadings[k];
+    const FitResult fit = FitCylinder(input, config_.fit);
+    const double gate = k == 0 ? prior_gate : kHiddenPriorShare * prior_gate;
+    if (Agrees(fit, gate) && EdgesAgree(fit, input))
+      out->push_back({fit, log_prior + LogTarget(fit, input)});
+  }
+}
+
+std::optional<FitResult> Localiser::JoinedReading(FitInput* input) const {
+  const double log_clutter = LogClutter(*input);
+  auto whole = WholeReading(input);
+  if (whole && whole->prior_distance < kClear) {
+    whole->log_odds = LogTarget(*whole, *input) - log_clutter;
+    return whole;
+  }
+  std::vector<Hypothesis> all;
+  // Where the range is not known, two opposite sides must give it.
+  const bool known = RangeSigma(*input) < kKnownRange;
+  Weigh(*input, std::log(1.0 - kSharpTurn), known ? kReadings.size() : kOneHidden, &all);
+  FitInput turned = *input;
+  turned.prior = AfterASharpTurn(*input);
+  Weigh(turned, std::log(kSharpTurn), kOneHidden, &all);
+  if (all.empty()) return std::nullopt;
+  FitResult fit = Joined(all);
+  fit.log_odds -= log_clutter;
+  return fit;
 }
 
 std::optional<FitResult> Localiser::Correct(const FitInput& predicted,
@@ -144,15 +292,19 @@ std::optional<FitResult> Localiser::Correct(const FitInput& predicted,
   const double gate = config_.fit.lidar_gate + 2.0 * RangeSigma(predicted);
   // Near to far: what stands before the target may lend the blob's edge a few points, and only
   // the fit tells that they do not belong to it.
+  int tried = 0;
   for (const auto& cluster : clusters) {
     input.points = PointsOnTarget(predicted, cluster, gate);
     if (input.points.empty()) continue;
-    const auto fit = BestReading(&input);
+    if (++tried > kMostClusters) break;
+    const auto fit = JoinedReading(&input);
     if (fit) return fit;
   }
   input.points.clear();
   if (CountSeenThrough(predicted, clusters) >= kManyPoints) return std::nullopt;
-  return BestReading(&input);
+  auto fit = JoinedReading(&input);
+  if (fit) fit->log_odds -= std::min(kMostUnexplained, kUnexplained * CountPoints(clusters));
+  return fit;
 }
 
 TargetGaussian Localiser::Guess(const Camera& camera, const Detection& detection, double range,
@@ -178,6 +330,8 @@ std::optional<FitResult> Localiser::Acquire(const TargetShape& shape, const Came
                                             const Clusters& clusters) const {
   const auto good = [&](const std::optional<FitResult>& fit) {
     if (!fit) return false;
+    if (!detection.p_CT && std::count(fit->used.begin(), fit->used.end(), true) < kSidesOfNew)
+      return false;
     const Eigen::Vector3d sight = fit->posterior.position() - camera.p_WC;
     const double range = sight.norm();
     const Eigen::Vector3d n = sight / range;

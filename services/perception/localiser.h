@@ -1,6 +1,7 @@
 #pragma once
 
 #include <optional>
+#include <vector>
 
 #include "services/perception/cylinder_fit.h"
 
@@ -22,10 +23,23 @@ class Localiser {
                                    const Detection& detection, const Clusters& clusters) const;
 
  private:
+  /// One way to explain a detection: which sides are seen, whether the target turned sharply.
+  struct Hypothesis {
+    FitResult fit;
+    double log_weight = 0.0;
+  };
+
   /// The fit to all sides, if it agrees with all of them.
   std::optional<FitResult> WholeReading(FitInput* input) const;
-  /// The same, or the best that leaves out sides which are hidden or run into the like colour.
-  std::optional<FitResult> BestReading(FitInput* input) const;
+  /// All hypotheses that agree with the prediction, weighed and joined into one Gaussian.
+  std::optional<FitResult> JoinedReading(FitInput* input) const;
+  static FitResult Joined(const std::vector<Hypothesis>& all);
+  void Weigh(const FitInput& input, double log_prior, size_t readings,
+             std::vector<Hypothesis>* out) const;
+  /// Logarithm of the density of sides and points where they are the target's.
+  double LogTarget(const FitResult& fit, const FitInput& input) const;
+  /// Logarithm of the density of the sides as they were seen, hidden ones anywhere inside.
+  double LogSides(const FitResult& fit, const FitInput& input) const;
   bool EdgesAgree(const FitResult& fit, const FitInput& input) const;
   bool Agrees(const FitResult& fit, double prior_gate) const;
   TargetGaussian Guess(const Camera& camera, const Detection& detection, double range,

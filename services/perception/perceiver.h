@@ -67,8 +67,9 @@ class Perceiver {
     int n_points = 0;
   };
   struct Decoy {
-    Eigen::Vector3d p_W;
-    double t;
+    Eigen::Vector3d p_W, start;  ///< now and when first seen, frame W, m
+    double t;                    ///< last seen, s
+    int hits;
   };
 
   std::optional<View> Look(const Frame& frame, std::string* note) const;
@@ -86,7 +87,9 @@ class Perceiver {
   Clusters Points(const View& view, const Detection& detection, const Eigen::Vector3d& v_WT,
                   bool fresh_only) const;
   bool Plausible(const Eigen::Vector3d& p_WT, double t) const;
-  bool IsDecoy(const Eigen::Vector3d& p_WT) const;
+  const Decoy* DecoyAt(const Eigen::Vector3d& p_WT) const;
+  bool IsRatherDecoy(const Sighting& s, const View& view, const Detection& detection) const;
+  void NoteDecoy(const Sighting& s, double t);
   void ForgetIfTimeRanBack(double t);
 
   PerceptionConfig config_;
@@ -99,6 +102,8 @@ class Perceiver {
   std::optional<TargetTrack> track_, candidate_;
   std::optional<Sighting> sighting_;  ///< of the last frame
   std::vector<Decoy> decoys_;
+  size_t turn_ = 0;                                  ///< detection that is looked at next
+  Eigen::Vector3d start_ = Eigen::Vector3d::Zero();  ///< where the track began, frame W, m
   double last_t_ = -1e18;
 };
 

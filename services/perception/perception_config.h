@@ -9,7 +9,7 @@ namespace chase::perception {
 /// The target's colour. A soft score: 1 inside the range, falling to 0 over `softness` outside it.
 struct ColorConfig {
   double hue_min_deg = 10.0, hue_max_deg = 42.0;  ///< may wrap: 350 to 20
-  double saturation_min = 0.55, value_min = 0.16;
+  double saturation_min = 0.6, value_min = 0.16;
   double hue_softness_deg = 6.0, softness = 0.12;
   bool white_balance = true;
   double min_gain = 0.75, max_gain = 1.33;
@@ -33,8 +33,8 @@ struct ColorConfig {
 struct ShapeConfig {
   double aspect = 0.57, aspect_tolerance = 0.35;
   double fill = 0.93, fill_tolerance = 0.2;
-  double min_area_px = 24.0, min_score = 0.05;
-  int max_candidates = 8;
+  double min_area_px = 20.0, min_score = 0.0;
+  int max_candidates = 16;
 
   template <class V>
   void Visit(V& v) {
@@ -105,9 +105,9 @@ struct DetectorConfig {
 
 /// Standard deviations of what is measured and limits of what is believed.
 struct FitConfig {
-  double edge_sigma_px = 0.45, edge_weight = 2.0;
+  double edge_sigma_px = 0.9, edge_weight = 2.0;
   double lidar_sigma = 0.03, lidar_weight = 8.0;
-  double edge_gate = 3.2, prior_gate = 30.0, lidar_gate = 0.35;
+  double edge_gate_px = 1.5, prior_gate = 30.0, lidar_gate = 0.35;
   bool estimate_shape = false;
   double shape_sigma = 0.03;
   int max_iterations = 8;
@@ -119,7 +119,7 @@ struct FitConfig {
     v("lidar_sigma", lidar_sigma, "of one LiDAR point, m");
     v("lidar_weight", lidar_weight,
       "independent samples that one sweep's points count for at most");
-    v("edge_gate", edge_gate, "an edge further off is taken as hidden, standard deviations");
+    v("edge_gate_px", edge_gate_px, "an edge further off is taken as hidden");
     v("prior_gate", prior_gate, "greatest squared Mahalanobis distance from the prediction, 6 dof");
     v("lidar_gate", lidar_gate, "points further from the expected surface are something else, m");
     v("estimate_shape", estimate_shape, "estimate radius and height as well");
@@ -133,7 +133,7 @@ struct FitConfig {
 struct MotionConfig {
   double acceleration_density = 1.0, vertical_density = 0.02;
   double initial_speed_sigma = 1.2, initial_vertical_speed_sigma = 0.1;
-  double max_speed = 5.0;
+  double max_speed = 5.0, hidden_time = 3.0, ground_sigma = 0.15;
   double floor_sigma = 0.012, pose_sigma = 0.01, pose_angle_sigma_deg = 0.2;
 
   template <class V>
@@ -143,6 +143,8 @@ struct MotionConfig {
     v("initial_speed_sigma", initial_speed_sigma, "of a new target, horizontal, m/s");
     v("initial_vertical_speed_sigma", initial_vertical_speed_sigma, "of a new target, m/s");
     v("max_speed", max_speed, "a target found again lies where this speed reaches, m/s");
+    v("hidden_time", hidden_time, "over which a target that is not seen may stop or turn, s");
+    v("ground_sigma", ground_sigma, "how far the ground rises or falls meanwhile, m");
     v("floor_sigma", floor_sigma, "added to every axis of the covariance sent out, m");
     v("pose_sigma", pose_sigma, "least standard deviation of the drone's position, m");
     v("pose_angle_sigma_deg", pose_angle_sigma_deg, "least standard deviation of its attitude");
@@ -154,7 +156,7 @@ struct MotionConfig {
 struct StateConfig {
   double acquire_score = 0.35;
   int confirm_frames = 3;
-  double hidden_after = 0.08, lost_after = 4.0, lost_sigma = 1.5;
+  double hidden_after = 0.08, lost_after = 5.0, lost_sigma = 3.0;
   double decoy_radius = 0.5, decoy_memory = 60.0;
 
   template <class V>

@@ -8,12 +8,14 @@ namespace chase::perception {
 
 namespace {
 
-constexpr int kMaxSamples = 12;         // a side
+constexpr int kMaxSamples = 8;          // a side
 constexpr double kSideFrom = 0.25;      // rows used for left and right, share of the height:
 constexpr double kSideTo = 0.85;        // without the caps
 constexpr double kCapHalfWidth = 0.22;  // columns used for top and bottom, around the middle
 constexpr double kMinContrast = 30.0;   // colour difference that allows placing between pixels
 constexpr int kReach = 3;               // pixels looked at on either side of an edge
+constexpr size_t kMostLines = 6;        // that a blob is split along
+constexpr int kLeastPiece = 5;          // px, width of a piece
 constexpr int kBorder = 1;              // px; nearer to the image's border counts as cut
 
 using Color = Eigen::Vector3d;
@@ -96,6 +98,48 @@ void TraceCaps(const cv::Mat& bgr, const cv::Mat& mask, const cv::Rect& roi,
   }
 }
 
+/// True when the blob goes on at this pixel.
+bool On(const Detection& d, int x, int y) {
+  const cv::Point p(x - d.mask_box.x, y - d.mask_box.y);
+  return p.x >= 0 && p.y >= 0 && p.x < d.mask.cols && p.y < d.mask.rows &&
+         d.mask.at<uint8_t>(p) != 0;
+}
+
+/// Takes out what the window has cut off: samples beyond which the blob goes on, and sides of which
+/// no sample is left.
+void LeaveOutCut(const Detection& whole, const cv::Rect& window, Detection* piece) {
+  for (size_t side = 0; side < 4; ++side) {
+    auto& samples = piece->silhouette.samples[side];
+    const bool upright = side == kLeft || side == kRight;
+    const int beyond = side == kLeft    ? window.x - 1
+                       : side == kRight ? window.br().x
+                       : side == kTop   ? window.y - 1
+                                        : window.br().y;
+    const auto goes_on = [&](const Eigen::Vector2d& px) {
+      const int along = static_cast<int>(std::lround(upright ? px.y() : px.x()));
+      return std::abs((upright ? px.x() : px.y()) - beyond) < kReach &&
+             (upright ? On(whole, beyond, along) : On(whole, along, beyond));
+    };
+    const bool some = !samples.empty();
+    samples.erase(std::remove_if(samples.begin(), samples.end(), goes_on), samples.end());
+    if (some && samples.empty()) piece->cut[side] = true;
+  }
+}
+
+/// Columns at which the blob's upper or lower end jumps: there one thing ends before another.
+std::vector<int> Jumps(const cv::Mat& mask) {
+  const int least = std::max(3, mask.rows / 12);
+  std::vector<std::pair<int, int>> ends;
+  for (int x = 0; x < mask.cols; ++x) ends.push_back(Extent(mask.col(x)));
+  std::vector<int> jumps;
+  for (int x = 1; x < mask.cols; ++x) {
+    const auto &a = ends[static_cast<size_t>(x - 1)], &b = ends[static_cast<size_t>(x)];
+    const int jump = std::max(std::abs(a.first - b.first), std::abs(a.second - b.second));
+    if (jump >= least) jumps.push_back(x);
+  }
+  return jumps;
+}
+
 }  // namespace
 
 Silhouette TraceSilhouette(const cv::Mat& bgr, const cv::Mat& mask, const cv::Rect& roi,
@@ -131,18 +175,28 @@ std::optional<Detection> CropTo(const cv::Mat& bgr, const Detection& detection,
   out.mask_box = tight + view.tl();
   out.mask = seen(tight).clone();
   out.box = EdgeBox(out.mask_box);
-  const auto image_cut = CutSides(out.mask_box, bgr.size());
-  const auto goes_on = [&](Side side, bool at_window, bool beyond) {
-    out.cut[side] = image_cut[side] || (at_window && beyond);
-  };
-  const cv::Rect &a = out.mask_box, &b = detection.mask_box;
-  goes_on(kLeft, a.x == window.x, b.x < a.x);
-  goes_on(kRight, a.br().x == window.br().x, b.br().x > a.br().x);
-  goes_on(kTop, a.y == window.y, b.y < a.y);
-  goes_on(kBottom, a.br().y == window.br().y, b.br().y > a.br().y);
+  out.cut = CutSides(out.mask_box, bgr.size());
   out.silhouette = TraceSilhouette(bgr, out.mask, out.mask_box, out.cut);
+  LeaveOutCut(detection, window, &out);
   out.silhouette.sigma_px = detection.silhouette.sigma_px;
   return out;
+}
+
+std::vector<Detection> SplitColumns(const cv::Mat& bgr, const Detection& detection) {
+  std::vector<int> lines = {0};
+  for (int x : Jumps(detection.mask)) lines.push_back(x);
+  lines.push_back(detection.mask.cols);
+  std::vector<Detection> pieces;
+  const size_t n = lines.size();
+  if (n < 3 || n > kMostLines) return pieces;
+  for (size_t a = 0; a + 1 < n; ++a)
+    for (size_t b = a + 1; b < n; ++b) {
+      if (b - a == n - 1 || lines[b] - lines[a] < kLeastPiece) continue;
+      const cv::Rect window(detection.mask_box.x + lines[a], detection.mask_box.y,
+                            lines[b] - lines[a], detection.mask_box.height);
+      if (auto piece = CropTo(bgr, detection, window)) pieces.push_back(std::move(*piece));
+    }
+  return pieces;
 }
 
 Detection Merge(const cv::Mat& bgr, const std::vector<Detection>& pieces) {

@@ -21,10 +21,14 @@ cv::Rect2d EdgeBox(const cv::Rect& roi);
 /// Which sides of `roi` lie at the border of an image of this size.
 std::array<bool, 4> CutSides(const cv::Rect& roi, const cv::Size& image);
 
-/// The part of a detection inside `window`, px; the sides at which it goes on are cut. The
-/// detection must carry a mask; nothing when no part of it lies inside.
+/// The part of a detection inside `window`, px; samples at which it goes on are left out, and sides
+/// without any are cut. The detection must carry a mask; nothing when no part of it lies inside.
 std::optional<Detection> CropTo(const cv::Mat& bgr, const Detection& detection,
                                 const cv::Rect& window);
+
+/// Upright pieces of a blob that several things of one colour make up together, split where its
+/// upper or lower end jumps; none where it does not.
+std::vector<Detection> SplitColumns(const cv::Mat& bgr, const Detection& detection);
 
 /// One detection out of several pieces: the union of their masks. All must carry masks.
 Detection Merge(const cv::Mat& bgr, const std::vector<Detection>& pieces);

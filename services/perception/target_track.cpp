@@ -12,6 +12,7 @@ void TargetTrack::Predict(double to, const MotionConfig& config) {
   if (!(dt > 0.0)) return;
   Matrix6d F = Matrix6d::Identity();
   F.topRightCorner<3, 3>() = dt * Eigen::Matrix3d::Identity();
+  if (misses > 0) F.bottomRightCorner<3, 3>() *= std::exp(-dt / config.hidden_time);
   const Eigen::Vector3d q(config.acceleration_density, config.acceleration_density,
                           config.vertical_density);
   Matrix6d Q = Matrix6d::Zero();
@@ -22,6 +23,11 @@ void TargetTrack::Predict(double to, const MotionConfig& config) {
   state.mean = F * state.mean;
   state.covariance = F * state.covariance * F.transpose() + Q;
   t = to;
+  const double most = config.ground_sigma * config.ground_sigma;  // it stays on the ground
+  if (misses == 0 || state.covariance(2, 2) < most) return;
+  const double share = std::sqrt(most / state.covariance(2, 2));
+  state.covariance.row(2) *= share;
+  state.covariance.col(2) *= share;
 }
 
 void TargetTrack::Correct(const FitResult& fit) {

@@ -12,7 +12,8 @@ struct TargetTrack {
   double seen = 0.0;  ///< time of the last correction, s
   int hits = 0, misses = 0;
 
-  /// Constant velocity with white acceleration up to time `to`; does nothing backwards.
+  /// Constant velocity with white acceleration up to time `to`; does nothing backwards. While it is
+  /// not seen, the velocity fades: it may have stopped or turned behind what hides it.
   void Predict(double to, const MotionConfig& config);
 
   /// Takes over a correction at the track's time.

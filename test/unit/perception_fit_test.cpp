@@ -181,6 +181,9 @@ TEST(PerceptionLocaliser, HiddenHalfDoesNotBendTheEstimate) {
     auto input = InputFor(BodyAt({0, 0, 1.2}, 0, 0, 0), target + Vector3d(0.02, 0.01, 0.0), 0.06);
     auto outline = DenseOutline(input.camera, target);
     const double by = 0.5 * (side < 2 ? outline.box.width : outline.box.height);
+    (side < 2 ? outline.box.width : outline.box.height) -= by;
+    if (side == kLeft) outline.box.x += by;
+    if (side == kTop) outline.box.y += by;
     for (auto& s : outline.silhouette.samples[static_cast<size_t>(side)])
       s[side < 2 ? 0 : 1] += side == kLeft || side == kTop ? by : -by;
     input.detection = &outline;

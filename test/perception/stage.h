@@ -1,0 +1,82 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "common/world/scenario.h"
+#include "services/perception/perceiver.h"
+
+/// Flights for perception made with the simulator's own world, camera and LiDAR: the target drives
+/// its scenario's path, the drone follows it on rails, poses carry the errors of odometry.
+namespace chase::perception_stage {
+
+/// Errors of odometry's poses: standard deviations and correlation time of a slow drift.
+struct OdometryErrors {
+  Eigen::Vector3d position = {0.01, 0.01, 0.01};  ///< m
+  Eigen::Vector3d angle = {0.002, 0.002, 0.002};  ///< about the axes of W, rad
+  double velocity = 0.02;                         ///< m/s, from sample to sample
+  double correlation = 5.0;                       ///< s
+};
+
+struct StageOptions {
+  std::string scenario = "deploy/scenarios/gym.yaml";
+  uint64_t seed = 1;
+  double duration = 20.0;  ///< s
+  bool distractors = true, screens = true, warm = true;
+  OdometryErrors errors;
+};
+
+/// A flight's cast: the scenario with what the seed adds to it, and the drone's rails.
+class Stage {
+ public:
+  explicit Stage(const StageOptions& options);
+
+  struct Body {
+    Eigen::Vector3d p = Eigen::Vector3d::Zero();
+    Eigen::Quaterniond q = Eigen::Quaterniond::Identity();
+  };
+  /// The drone at t s after the flight's start. Frame W.
+  Body BodyAt(double t) const;
+
+  const world::Scenario& scenario() const { return scenario_; }
+  const std::vector<world::Solid>& orange() const { return orange_; }
+  double mission_start() const { return start_; }
+  Eigen::Vector3d light() const { return light_; }
+  const StageOptions& options() const { return options_; }
+
+ private:
+  Eigen::Vector2d Rail(double t) const;
+  Eigen::Vector2d Smooth(double t) const;
+  double Delay(double t) const;
+  void AddDistractors();
+  void AddScreens();
+
+  StageOptions options_;
+  world::Scenario scenario_;
+  world::PathMotion path_;
+  double start_ = 0.0;
+  double base_delay_ = 2.0, delay_swing_ = 0.5, sway_ = 0.25, rise_ = 0.6;
+  double phase_[4] = {};
+  Eigen::Vector3d light_ = Eigen::Vector3d::Ones();
+  std::vector<world::Solid> orange_;
+};
+
+/// What came out for one frame, beside the truth.
+struct Outcome {
+  double t = 0.0;              ///< s
+  double visible_share = 0.0;  ///< of all the target's pixels, those outside the image included
+  double range = 0.0;          ///< from the body, m
+  double milliseconds = 0.0;   ///< processor time
+  Eigen::Vector3d truth = Eigen::Vector3d::Zero(), velocity = Eigen::Vector3d::Zero();
+  perception::TargetEstimate estimate;
+};
+
+/// The config that a flight of this scenario gives perception.
+perception::PerceptionConfig ConfigFor(const world::Scenario& scenario);
+
+/// Flies and shows everything to a Perceiver when it would arrive.
+std::vector<Outcome> Fly(const Stage& stage, const perception::PerceptionConfig& config);
+
+}  // namespace chase::perception_stage
