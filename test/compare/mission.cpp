@@ -76,7 +76,9 @@ Vector3d Mission::Target(double t) const {
 }
 
 Vector3d Mission::TargetVelocity(double t) const {
-  const Vector2d v = path.Velocity(t);
+  constexpr double kFirst = 0.1;  // s; a sampled path is at rest at its very beginning
+  const Vector2d v = t < kFirst ? Vector2d((path.Position(kFirst) - path.Position(0.0)) / kFirst)
+                                : path.Velocity(t);
   return {v.x(), v.y(), 0.0};
 }
 
