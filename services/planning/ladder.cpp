@@ -30,7 +30,7 @@ PlanRequest OverRestOf(const PlanRequest& request, const world::Trajectory& plan
 class Ladder : public Planner {
  public:
   Ladder(const PlannerConfig& config, std::unique_ptr<Search> search)
-      : config_(config), search_(std::move(search)) {}
+      : config_(config), search_(std::move(search)), refiner_(config) {}
 
   PlanResult Plan(const PlanRequest& request) override {
     std::string notes;
@@ -77,7 +77,7 @@ class Ladder : public Planner {
     result->feasible += found.feasible;
     if (found.index < 0) return false;
     result->winner = found.index;
-    if (config_.refine && Refine(config_, problem, sight_from, &found.plan, &found.cost))
+    if (config_.refine && refiner_.Improve(problem, sight_from, &found.plan, &found.cost))
       result->winner = -1;
     result->cost = found.cost;
     result->trajectory.coefficients = found.plan;
@@ -136,6 +136,7 @@ class Ladder : public Planner {
 
   PlannerConfig config_;
   std::unique_ptr<Search> search_;
+  Refiner refiner_;
 };
 
 Curve BrakeCurve(const world::State& s, double T) {

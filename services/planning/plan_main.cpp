@@ -19,8 +19,10 @@ using chase::planning::PlanResult;
 using nlohmann::ordered_json;
 
 PlanRequest MakeRequest(const chase::world::Scene& scene, const std::string& file) {
-  if (!scene.has_initial) throw std::runtime_error(file + ": missing key 'initial'");
-  if (!scene.has_target) throw std::runtime_error(file + ": missing key 'target'");
+  if (!scene.has_initial)
+    throw std::runtime_error(file + ": missing key 'initial': give p of the drone, m");
+  if (!scene.has_target)
+    throw std::runtime_error(file + ": missing key 'target': give its coefficients");
   PlanRequest request;
   request.horizon = scene.horizon_s;
   request.start = scene.initial;
