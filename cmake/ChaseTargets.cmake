@@ -1,13 +1,16 @@
 # Warnings, sanitizers and code generation flags that every target of ours shares.
 add_library(chase_options INTERFACE)
-target_compile_options(chase_options INTERFACE -Wall -Wextra -Wconversion -Wshadow -ffp-contract=off)
-target_include_directories(chase_options INTERFACE ${CMAKE_SOURCE_DIR})
+target_compile_options(chase_options INTERFACE
+  "$<BUILD_INTERFACE:-Wall;-Wextra;-Wconversion;-Wshadow;-ffp-contract=off>")
+target_include_directories(chase_options INTERFACE
+  $<BUILD_INTERFACE:${CMAKE_SOURCE_DIR}> $<INSTALL_INTERFACE:include/chase>)
 if(CHASE_WERROR)
   # GCC 12 sees a use after free in Eigen's own allocator where there is none.
-  target_compile_options(chase_options INTERFACE -Werror -Wno-error=use-after-free)
+  target_compile_options(chase_options INTERFACE
+    "$<BUILD_INTERFACE:-Werror;-Wno-error=use-after-free>")
 endif()
 if(CHASE_NATIVE)
-  target_compile_options(chase_options INTERFACE -march=native)
+  target_compile_options(chase_options INTERFACE "$<BUILD_INTERFACE:-march=native>")
 endif()
 foreach(sanitizer IN LISTS CHASE_SANITIZE)
   target_compile_options(chase_options INTERFACE -fsanitize=${sanitizer} -fno-omit-frame-pointer)

@@ -3,6 +3,8 @@
 #include <yaml-cpp/yaml.h>
 
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <cmath>
 #include <fstream>
 #include <set>
@@ -52,7 +54,8 @@ class Item {
     } catch (const YAML::Exception&) {
       Fail(node_.IsScalar() ? "'" + node_.Scalar() + "' is not a number" : "is not a number");
     }
-    if (!std::isfinite(value)) Fail("'" + node_.Scalar() + "' is not finite");
+    if (!std::isfinite(value))
+      Fail("'" + node_.Scalar() + "' is not finite, must be a finite number");
     return value;
   }
 
@@ -74,8 +77,8 @@ class Item {
     return rows;
   }
 
-  /// 3x3, as three rows or nine numbers.
-  Eigen::Matrix3d PositiveDefinite() const {
+  /// 3x3, as three rows or nine numbers. `hint` says what belongs there.
+  Eigen::Matrix3d PositiveDefinite(const std::string& hint) const {
     Eigen::Matrix3d m;
     if (node_.IsSequence() && node_.size() == 9)
       for (std::size_t i = 0; i < 9; ++i)
@@ -85,12 +88,17 @@ class Item {
       for (std::size_t i = 0; i < 3; ++i) m.row(static_cast<int>(i)) = At(i).Vector3().transpose();
     }
     if ((m - m.transpose()).cwiseAbs().maxCoeff() > 1e-9 * m.cwiseAbs().maxCoeff())
-      Fail("is not symmetric");
+      Fail("is not symmetric: transposed entries differ by " +
+           Text((m - m.transpose()).cwiseAbs().maxCoeff()) + ", must be equal; " + hint);
     m = 0.5 * (m + m.transpose()).eval();
     const Eigen::LLT<Eigen::Matrix3d> llt(m);
     const Eigen::Vector3d d = Eigen::Matrix3d(llt.matrixL()).diagonal();
-    if (llt.info() != Eigen::Success || !(d.minCoeff() > 1e-7 * d.maxCoeff()))
-      Fail("is not positive definite");
+    if (llt.info() != Eigen::Success || !(d.minCoeff() > 1e-7 * d.maxCoeff())) {
+      const Eigen::Vector3d values =
+          Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(m, Eigen::EigenvaluesOnly).eigenvalues();
+      Fail("is not positive definite: its least eigenvalue is " + Text(values[0]) +
+           ", must be above 0 and 1e-14 of the largest; " + hint);
+    }
     return m;
   }
 
@@ -98,7 +106,20 @@ class Item {
     if (!node_.IsMap()) Fail("is not a map of keys and values");
     for (const auto& entry : node_)
       if (const auto key = entry.first.as<std::string>(""); allowed.count(key) == 0)
-        Item(*origin_, entry.first, path_).Fail("unknown key '" + key + "'");
+        Item(*origin_, entry.first, path_)
+            .Fail("unknown key '" + key + "'; known here: " + List(allowed));
+  }
+
+  static std::string List(const std::set<std::string>& keys) {
+    std::string list;
+    for (const std::string& key : keys) list += (list.empty() ? "" : ", ") + key;
+    return list;
+  }
+
+  static std::string Text(double value) {
+    std::ostringstream text;
+    text << value;
+    return text.str();
   }
 
   std::string Text() const {
@@ -129,13 +150,15 @@ Obstacle ReadObstacle(const Item& item, double horizon, int id) {
   o.id = id;
   o.center = {0.0, horizon, item["center"].Rows()};
   o.moving = o.center.degree() > 0;
-  o.shape = item["shape"].PositiveDefinite();
+  o.shape = item["shape"].PositiveDefinite(
+      "for semi-axes a b c along x y z give 1/a^2 1/b^2 1/c^2 on the diagonal");
   return o;
 }
 
 Observation ReadObservation(const Item& item) {
   item.AllowKeys({"t", "mean", "covariance"});
-  return {item["t"].Number(), item["mean"].Vector3(), item["covariance"].PositiveDefinite()};
+  return {item["t"].Number(), item["mean"].Vector3(),
+          item["covariance"].PositiveDefinite("give variances in m^2 on the diagonal")};
 }
 
 Scene Read(const Item& root) {
@@ -144,7 +167,8 @@ Scene Read(const Item& root) {
   Scene scene;
   scene.horizon_s = root["horizon_s"].Number();
   if (!(scene.horizon_s > 0.0 && scene.horizon_s <= 60.0))
-    root["horizon_s"].Fail("must be above 0 and at most 60 s");
+    root["horizon_s"].Fail("is " + Item::Text(scene.horizon_s) +
+                           ", must be above 0 and at most 60 s");
   scene.has_initial = root.Has("initial");
   if (scene.has_initial) scene.initial = ReadState(root["initial"]);
   scene.has_target = root.Has("target");
@@ -165,13 +189,16 @@ Scene Read(const Item& root) {
   return scene;
 }
 
+[[noreturn]] void FailOnSize(const std::string& origin, std::size_t bytes) {
+  throw std::runtime_error(origin + ": obstacles: the file has " + std::to_string(bytes >> 20) +
+                           " MiB, must be at most 4 MiB and " + std::to_string(kMaxSceneObstacles) +
+                           " obstacles; leave out those that are far away");
+}
+
 }  // namespace
 
 Scene ParseScene(const std::string& yaml, const std::string& origin) {
-  if (yaml.size() > kMaxSceneBytes)
-    throw std::runtime_error(origin + ": is " + std::to_string(yaml.size() >> 20) +
-                             " MiB, at most 4 MiB and " + std::to_string(kMaxSceneObstacles) +
-                             " obstacles are read");
+  if (yaml.size() > kMaxSceneBytes) FailOnSize(origin, yaml.size());
   try {
     return Read(Item(origin, YAML::Load(yaml), ""));
   } catch (const YAML::Exception& e) {
@@ -188,9 +215,11 @@ Scene LoadScene(const std::string& file) {
     throw std::runtime_error(file + ": cannot be read; give the path of a scene file");
   in.read(text.data(), static_cast<std::streamsize>(text.size()));
   text.resize(static_cast<std::size_t>(std::max<std::streamsize>(0, in.gcount())));
-  if (text.size() > kMaxSceneBytes)
-    throw std::runtime_error(file + ": is larger than 4 MiB; at most " +
-                             std::to_string(kMaxSceneObstacles) + " obstacles are read");
+  if (text.size() > kMaxSceneBytes) {
+    in.clear();
+    in.seekg(0, std::ios::end);
+    FailOnSize(file, static_cast<std::size_t>(std::max<std::streamoff>(0, in.tellg())));
+  }
   return ParseScene(text, file);
 }
 

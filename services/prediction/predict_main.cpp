@@ -19,9 +19,13 @@ using nlohmann::ordered_json;
 
 PredictRequest MakeRequest(const chase::world::Scene& scene, const std::string& file) {
   if (scene.observations.size() < 2)
-    throw std::runtime_error(file + ": 'observations' must list at least 2");
+    throw std::runtime_error(file + ": observations: has " +
+                             std::to_string(scene.observations.size()) +
+                             " entries, must be 2 to 32; a forecast needs where the target was");
   if (scene.observations.size() > 32)
-    throw std::runtime_error(file + ": 'observations' may list at most 32");
+    throw std::runtime_error(file + ": observations: has " +
+                             std::to_string(scene.observations.size()) +
+                             " entries, must be 2 to 32; merge or leave out old ones");
   PredictRequest request;
   for (const auto& o : scene.observations)
     request.observations.push_back({o.t, o.mean, o.covariance});

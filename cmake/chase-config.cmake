@@ -1,0 +1,5 @@
+include(CMakeFindDependencyMacro)
+find_dependency(Eigen3 NO_MODULE)
+find_dependency(Boost)
+find_dependency(yaml-cpp)
+include(${CMAKE_CURRENT_LIST_DIR}/chase-targets.cmake)
