@@ -58,7 +58,7 @@ class Ring {
   /// Half length of the window round point i, in points.
   int HalfWindow(int i) const {
     const float step = std::max(1e-4f, p_[At(i)].norm() * spacing_);
-    return std::clamp(static_cast<int>(static_cast<float>(config_.window) / step), 4, 12);
+    return std::clamp(static_cast<int>(static_cast<float>(config_.window) / step), 2, 12);
   }
 
   /// How far point i stands off the middle of its window, perpendicular to the ring [m]; negative

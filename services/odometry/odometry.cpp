@@ -50,6 +50,7 @@ Odometry::Odometry(const OdometryConfig& config)
       imu_(config.filter, config.health.imu_gap),
       alignment_(config.alignment),
       level_(config.initial_position),
+      drift_(config.drift),
       blend_(config.blend),
       health_(config.health) {}
 
@@ -155,6 +156,7 @@ SweepResult Odometry::ProcessSweep() {
   }
   RestartMapWhenLost(prepared.end);
   if (applied || planes_.cells() == 0) Learn(prepared, base_.pose());
+  if (applied && result.match.valid) drift_.MoveTo(base_.p, result.match.view);
   Catchup();
   result.registered = Registered(prepared);
   if (blind) result.pose = Estimate();
@@ -347,6 +349,10 @@ PoseEstimate Odometry::Estimate() const {
   out.gyro_bias = live_.gyro_bias;
   out.accel_bias = live_.accel_bias;
   out.covariance = level_.CovarianceInWorld(live_);
+  out.covariance.topLeftCorner<3, 3>() += drift_.covariance().topLeftCorner<3, 3>();
+  out.covariance.block<3, 1>(0, 8) += drift_.covariance().topRightCorner<3, 1>();
+  out.covariance.block<1, 3>(8, 0) += drift_.covariance().bottomLeftCorner<1, 3>();
+  out.covariance(8, 8) += drift_.covariance()(3, 3);
   const double sigma = std::sqrt(std::max(0.0, live_.P.topLeftCorner<3, 3>().trace()));
   out.health = health_.At(live_.t, fused_, sigma);
   out.correcting = blend_.correcting();

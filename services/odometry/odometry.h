@@ -102,6 +102,7 @@ class Odometry {
   Alignment alignment_;
   Standing standing_;
   LevelFrame level_;
+  MapDrift drift_;
   CorrectionBlend blend_;
   HealthMonitor health_;
 

@@ -7,6 +7,7 @@
 #include "services/odometry/correction_blend.h"
 #include "services/odometry/features.h"
 #include "services/odometry/health_monitor.h"
+#include "services/odometry/map_drift.h"
 #include "services/odometry/scan_matcher.h"
 #include "services/odometry/surface_map.h"
 
@@ -16,11 +17,12 @@ struct OdometryConfig {
   world::Rig rig;
   Eigen::Vector3d initial_position = Eigen::Vector3d::Zero();  ///< p_WB at power-on, m
   double initial_yaw_deg = 0.0;                                ///< heading at power-on
-  int match_points = 2000;  ///< plane features matched per sweep, about
+  int match_points = 3000;  ///< plane features matched per sweep, about
   int map_stride = 2;       ///< every how many-th plane feature the map learns
   AlignmentConfig alignment;
   FeatureConfig features;
   MapConfig map;
+  DriftConfig drift;
   MatchConfig match;
   FilterConfig filter;
   BlendConfig blend;
@@ -36,6 +38,7 @@ struct OdometryConfig {
     v("alignment", alignment, "start-up at rest");
     v("features", features, "edge and plane features");
     v("map", map, "local map");
+    v("drift", drift, "how far the local map goes astray");
     v("match", match, "scan to map");
     v("filter", filter, "error-state filter");
     v("blend", blend, "how corrections are spread on POSE");

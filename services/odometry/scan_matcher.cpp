@@ -78,6 +78,7 @@ ScanMatcher::System ScanMatcher::Linearise(const Features& features, const Surfa
 void ScanMatcher::Analyse(const System& system, MatchResult* result) const {
   // Rotations are scaled by the features' mean distance, so that all six directions compare.
   const double lever = std::sqrt(std::max(system.lever2 / system.weight, 1e-6));
+  result->view = lever;
   Vector6d scale;
   scale << 1.0, 1.0, 1.0, 1.0 / lever, 1.0 / lever, 1.0 / lever;
   const Matrix6d normalised = scale.asDiagonal() * system.H * scale.asDiagonal() / system.weight;

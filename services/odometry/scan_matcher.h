@@ -14,7 +14,7 @@ struct MatchConfig {
   int max_iterations = 8;
   double gate = 0.6;               ///< features farther from their surface are left out, m
   double least_gate = 0.15;        ///< the same where the prediction is certain, m
-  double kernel = 0.10;            ///< scale of the robust kernel at the end, m
+  double kernel = 0.07;            ///< scale of the robust kernel at the end, m
   double range_noise = 0.02;       ///< standard deviation of a residual, m
   double min_information = 0.004;  ///< least share of the features that must hold each direction
   int min_features = 80;
@@ -49,6 +49,7 @@ struct MatchResult {
   Vector6d strength = Vector6d::Zero();     ///< share of the features that hold each eigenvector
   Vector6d weakest = Vector6d::Zero();      ///< eigenvector of the least strength
   double inliers = 0.0;                     ///< share of the features
+  double view = 0.0;                        ///< the features' usual distance, m
   double rms = 0.0;                         ///< of the inliers' residuals, m
   int iterations = 0;
 

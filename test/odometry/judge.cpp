@@ -112,19 +112,34 @@ double FirstHealth(const std::vector<Pair>& all, double from, bool ok) {
   return -1.0;
 }
 
+/// Truth at `utime`, between two samples on the straight and on the great circle; nothing outside.
+bool TruthAt(const std::map<int64_t, truth_t>& truth, int64_t utime, Pair* pair) {
+  const auto after = truth.lower_bound(utime);
+  if (after == truth.end() || (after == truth.begin() && after->first != utime)) return false;
+  const truth_t& b = after->second;
+  const truth_t& a = after->first == utime ? b : std::prev(after)->second;
+  const double s = after->first == utime ? 0.0
+                                         : static_cast<double>(utime - a.utime) /
+                                               static_cast<double>(b.utime - a.utime);
+  const auto mixed = [s](const double(&x)[3], const double(&y)[3]) {
+    return Vector3d((1.0 - s) * bus::ToVector(x) + s * bus::ToVector(y));
+  };
+  pair->t = (1.0 - s) * a.mission_time + s * b.mission_time;
+  pair->X_truth = Eigen::Translation3d(mixed(a.pos, b.pos)) *
+                  bus::ToQuaternion(a.orientation).slerp(s, bus::ToQuaternion(b.orientation));
+  pair->dv = bus::ToVector(pair->estimate.vel) - mixed(a.vel, b.vel);
+  return true;
+}
+
 std::vector<Pair> Pairs(const JudgeOptions& options) {
   std::map<int64_t, truth_t> truth;
   for (const truth_t& m : Messages<truth_t>(options.truth, "TRUTH")) truth.emplace(m.utime, m);
   std::vector<Pair> pairs;
   for (const pose_t& m : Messages<pose_t>(options.pose, "POSE")) {
-    const auto at = truth.find(m.utime);
-    if (at == truth.end() || m.health == pose_t::HEALTH_STARTING) continue;
     Pair pair;
-    pair.t = at->second.mission_time;
     pair.estimate = m;
+    if (m.health == pose_t::HEALTH_STARTING || !TruthAt(truth, m.utime, &pair)) continue;
     pair.X_estimate = PoseOf(m.pos, m.orientation);
-    pair.X_truth = PoseOf(at->second.pos, at->second.orientation);
-    pair.dv = bus::ToVector(m.vel) - bus::ToVector(at->second.vel);
     pairs.push_back(pair);
   }
   if (pairs.empty()) throw std::runtime_error(options.pose + ": no POSE at a time of TRUTH");

@@ -1,0 +1,62 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+namespace chase::odometry {
+
+struct DriftConfig {
+  double view_error = 0.0085;      ///< m
+  double position = 0.0003;        ///< m per root m
+  double first_position = 0.0003;  ///< m
+  double first_yaw = 3e-4;         ///< rad
+  double spacing = 3.0;            ///< m
+  double sight = 9.0;              ///< m
+
+  template <class V>
+  void Visit(V& v) {
+    v("view_error", view_error, "how exactly one view is joined to the next at its rim, m");
+    v("position", position, "error that the map gathers on its way, m per root m");
+    v("first_position", first_position, "error of the map at the start, m");
+    v("first_yaw", first_yaw, "the same of its heading, rad");
+    v("spacing", spacing, "of the places that are remembered, m");
+    v("sight", sight, "a remembered place this near still holds the body, m");
+  }
+};
+
+/// How far the local map may be off where the body is. A match with the map tells where the body is
+/// in it, however often it is repeated; the map itself was placed sweep by sweep, and its heading
+/// and place went astray like a random walk along the way on which it was made. Coming back to a
+/// place that was mapped early brings back that place's small error: the shortest chain of
+/// remembered places counts.
+class MapDrift {
+ public:
+  using Covariance = Eigen::Matrix4d;  ///< of (p, yaw) of the map: m, rad
+
+  explicit MapDrift(const DriftConfig& config) : config_(config) { Begin(Covariance::Zero()); }
+
+  /// The body is at `p_M` [m] and sees features at a usual distance of `view` [m]; remembers the
+  /// place if it is new.
+  void MoveTo(const Eigen::Vector3d& p_M, double view);
+
+  /// A new map, begun where the body's own place is known as well as `before`.
+  void Begin(const Covariance& before);
+
+  const Covariance& covariance() const { return covariance_; }
+  size_t places() const { return places_.size(); }
+
+ private:
+  struct Place {
+    Eigen::Vector3d p;
+    Covariance covariance;
+  };
+  Covariance Carried(const Place& from, const Eigen::Vector3d& to) const;
+  void Remember(const Eigen::Vector3d& p);
+
+  DriftConfig config_;
+  double view_ = 8.0;  // m
+  Covariance covariance_;
+  std::vector<Place> places_;
+};
+
+}  // namespace chase::odometry
