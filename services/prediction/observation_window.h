@@ -8,8 +8,8 @@
 namespace chase::prediction {
 
 struct WindowConfig {
-  int observations = 24;
-  double length = 3.0;
+  int observations = 18;
+  double length = 2.4;
   double gate_span = 0.5;
   double gate_sigmas = 4.0;
   double gate_acceleration = 3.0;

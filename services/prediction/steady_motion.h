@@ -14,7 +14,7 @@ struct MotionConfig {
   double turn_sigma = 0.35;
   double straight_share = 0.6;
   double turn_memory = 1.5;
-  double change_cost = 1.7;
+  double change_cost = 1.6;
   double sigma_floor = 0.02;
 
   template <class V>
