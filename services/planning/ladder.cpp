@@ -1,9 +1,12 @@
 #include "services/planning/ladder.h"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 
+#include "services/planning/certificate.h"
 #include "services/planning/cost.h"
+#include "services/planning/field_of_view.h"
 #include "services/planning/refinement.h"
 #include "services/planning/skeletons.h"
 
@@ -49,6 +52,7 @@ class Ladder : public Planner {
       result.reason += (result.reason.empty() ? "" : "; ") + notes;
     }
     result.yaw = FitYaw(result.trajectory, request.target, request.yaw, config_.max_yaw_rate);
+    SetField(request, &result);
     return result;
   }
 
@@ -56,8 +60,9 @@ class Ladder : public Planner {
     const PlanRequest rest = OverRestOf(request, plan);
     if (!(rest.horizon > 0.05)) return false;
     const Problem problem = MakeProblem(WithSmallerMargins(config_), rest, nullptr);
-    return IsFeasible(ToCurve(plan, rest.t0, rest.horizon), problem, 0.0, config_.exact_visibility,
-                      Arithmetic::kCertified);
+    const Curve curve = ToCurve(plan, rest.t0, rest.horizon);
+    proof_.Reset(problem, 0.0, config_.exact_visibility);
+    return proof_.Holds(curve) && KeepsLimits(curve, problem);
   }
 
  private:
@@ -70,6 +75,18 @@ class Ladder : public Planner {
     });
   }
 
+  // Position decides safety and sight; the yaw may still have to catch up with the target.
+  void SetField(const PlanRequest& request, PlanResult* result) const {
+    const world::Trajectory& plan = result->trajectory;
+    result->in_field =
+        config_.max_bearing_deg <= 0.0 ||
+        KeepsBearing(Curve(plan.coefficients), ToCurve(request.target, plan.start, plan.duration),
+                     result->yaw, config_.max_bearing_deg * M_PI / 180.0);
+    if (result->in_field || !IsInSightVerdict(result->verdict)) return;
+    result->reason += (result->reason.empty() ? "" : "; ");
+    result->reason += "the target leaves the horizontal field of view";
+  }
+
   bool TrySearch(const Problem& problem, double sight_from, PlanResult* result) {
     Found found = search_->Best(problem, sight_from);
     result->generated += found.generated;
@@ -79,6 +96,7 @@ class Ladder : public Planner {
     result->winner = found.index;
     if (config_.refine && refiner_.Improve(problem, sight_from, &found.plan, &found.cost))
       result->winner = -1;
+    assert(SampleFaults(found.plan, problem, sight_from, 200).empty());
     result->cost = found.cost;
     result->trajectory.coefficients = found.plan;
     return true;
@@ -137,6 +155,7 @@ class Ladder : public Planner {
   PlannerConfig config_;
   std::unique_ptr<Search> search_;
   Refiner refiner_;
+  PlanProof proof_;
 };
 
 Curve BrakeCurve(const world::State& s, double T) {

@@ -42,12 +42,13 @@ struct Cost {
 
 struct PlanResult {
   Verdict verdict = Verdict::kBrake;
-  std::string reason;            ///< why the verdict is not kChase; else empty
+  std::string reason;            ///< why the verdict is not kChase, and what weakens it; else empty
   world::Trajectory trajectory;  ///< p_WB(t) from t0
   /// Further pieces, each from the end of the one before. Ours has none; planners of other kinds,
   /// such as splines, need them.
   std::vector<world::Trajectory> rest;
   std::vector<double> yaw;  ///< power basis in tau, unwrapped, rad
+  bool in_field = false;    ///< certified: the bearing stays within max_bearing_deg of the yaw
   Cost cost;
   int generated = 0;  ///< candidates in the set
   int checked = 0;    ///< candidates tested for feasibility

@@ -35,6 +35,8 @@ std::string PlannerConfig::Problem() const {
   if (!(z_max >= z_min)) return Say("z_max", z_max, "at least z_min");
   if (!(max_elevation_deg >= 0.0 && max_elevation_deg < 90.0))
     return Say("max_elevation_deg", max_elevation_deg, "in [0, 90)");
+  if (!(max_bearing_deg >= 0.0 && max_bearing_deg < 90.0))
+    return Say("max_bearing_deg", max_bearing_deg, "in [0, 90)");
   if (!(max_yaw_rate > 0.0)) return Say("max_yaw_rate", max_yaw_rate, "above 0");
   return "";
 }
@@ -43,7 +45,8 @@ PlannerConfig PlannerConfig::Literal() {
   PlannerConfig c;
   c.adaptive = c.refine = false;
   c.drone_radius = c.safety_margin = c.sight_margin = c.sigmas = c.max_inflation = 0.0;
-  c.max_speed = c.max_acceleration = c.max_elevation_deg = c.min_distance = 0.0;
+  c.max_speed = c.max_acceleration = c.max_elevation_deg = c.max_bearing_deg = 0.0;
+  c.min_distance = 0.0;
   c.z_min = c.z_max = 0.0;
   return c;
 }

@@ -33,6 +33,7 @@ struct PlannerConfig {
   double z_min = 0.4;
   double z_max = 3.5;
   double max_elevation_deg = 28.0;
+  double max_bearing_deg = 38.0;
   double min_distance = 0.8;
   double max_yaw_rate = 2.5;
 
@@ -68,6 +69,8 @@ struct PlannerConfig {
     v("z_min", z_min, "lowest height of a plan, m; z_min = z_max: no limits");
     v("z_max", z_max, "greatest height of a plan, m");
     v("max_elevation_deg", max_elevation_deg, "of the target out of the level; 0: no limit");
+    v("max_bearing_deg", max_bearing_deg,
+      "of the target off the yaw, said when broken; 0: no limit");
     v("min_distance", min_distance, "from the drone to the target's centre, m; 0: no limit");
     v("max_yaw_rate", max_yaw_rate, "of the plan's yaw, rad/s");
   }

@@ -31,25 +31,11 @@ class SmallForms {
   math::Positivity DecideSight(bool exact, int depth) const;
 
  private:
-  typedef double Lanes __attribute__((vector_size(32)));  // P, Q, S, unused
-  struct Piece {
-    Lanes b[13], error;
-  };
-  enum Question { kSafe, kExactSight, kBoundedSight };
-
-  static Lanes Min(Lanes a, Lanes b) { return a < b ? a : b; }
-  static math::Positivity AtEnd(Question question, Lanes value, Lanes error);
-  template <int D>
-  Lanes Lowest(const Piece& f) const;
-  template <int D>
-  void Halve(const Piece& f, Piece* left, Piece* right) const;
-  template <int D>
-  math::Positivity Decide(Question question, const Piece& f, int depth) const;
-  math::Positivity Decide(Question question, int depth) const;
-
+  friend class FormDecision;
   int degree_;
-  Piece root_;
-  Lanes step_;  // error that a split adds: every average rounds by at most u times the largest
+  double root_[13][4];  // coefficients of P, Q, S, unused
+  double error_[4];
+  double step_[4];  // error that a split adds: every average rounds by at most u times the largest
 };
 
 }  // namespace chase::planning

@@ -1,11 +1,13 @@
 // Speed of the planner against its own references. Every row plans seeded instances: full 3x3
-// shapes, every other obstacle moving, all costs on. A plan is timed by the processor time of this
-// process, median of `repeats` runs. Counters:
+// shapes, every other obstacle moving, all costs on. A plan, from the request to the proven winner,
+// is timed by the processor time of this process, median of `repeats` runs. Counters:
 //   p50_us p99_us max_us   over the instances
 //   ratio                  p50 of the double-Sturm reference over p50 of ours, both on the first
 //                          `reference_instances` instances
-//   same_winner            share of instances with the winner of the exhaustive search
-//   feasible_share         of the candidates, on the reference's instances
+//   same_winner            share of the first `compared` instances with the winner of testing every
+//                          candidate with the certificate
+//   same_as_double         share of the reference's instances with its winner
+//   feasible_share         of the candidates, on the compared instances
 
 #include <benchmark/benchmark.h>
 
@@ -14,8 +16,11 @@
 #include <ctime>
 #include <vector>
 
+#include "services/planning/fast_problem.h"
 #include "services/planning/fast_search.h"
 #include "services/planning/reference_search.h"
+#include "services/planning/refinement.h"
+#include "services/planning/skeletons.h"
 #include "test/unit/planning_instances.h"
 
 namespace chase::planning {
@@ -74,38 +79,49 @@ void Count(benchmark::State& state, const std::vector<double>& us) {
   state.counters["instances"] = static_cast<double>(us.size());
 }
 
-/// One row: `n_reference` of the instances go through the reference as well.
-void Plan(benchmark::State& state, int steps, int skeletons, int n_obstacles, bool hard,
-          int n_instances, int n_reference, int repeats) {
-  const PlannerConfig config = Config(steps, skeletons, false);
-  const InstanceGenerator generator(config, Spec(n_obstacles, hard));
+struct Size {
+  int steps, skeletons, obstacles;
+  bool hard;
+  int reference, compared, repeats;
+};
+
+void Plan(benchmark::State& state, const Size& size) {
+  const PlannerConfig config = Config(size.steps, size.skeletons, false);
+  const InstanceGenerator generator(config, Spec(size.obstacles, size.hard));
   const auto fast = MakeFastSearch(config);
-  const auto reference = MakeReferenceSearch(config, Arithmetic::kDoubleSturm);
+  const auto reference = MakeReferenceSearch(config, Arithmetic::kDoubleSturm),
+             all = MakeReferenceSearch(config, Arithmetic::kCertified);
   std::vector<double> us, subset, reference_us;
-  int same = 0;
+  int same = 0, same_as_double = 0;
   double feasible = 0.0;
   for (auto _ : state) {
-    for (int i = 0; i < n_instances; ++i) {
+    for (int i = 0; i < kInstances; ++i) {
       const PlanRequest request = generator.Make(1000u + static_cast<unsigned>(i));
       Found found;
       us.push_back(
-          MedianMicroseconds(repeats, [&] { found = Search1(fast.get(), config, request); }));
-      if (i >= n_reference) continue;
+          MedianMicroseconds(size.repeats, [&] { found = Search1(fast.get(), config, request); }));
+      if (i < size.compared) {
+        const Found expected = Search1(all.get(), config, request);
+        same += found.index == expected.index;
+        feasible += static_cast<double>(expected.feasible) / expected.generated;
+      }
+      if (i >= size.reference) continue;
       Found expected;
       reference_us.push_back(
           MedianMicroseconds(1, [&] { expected = Search1(reference.get(), config, request); }));
       subset.push_back(us.back());
-      same += found.index == expected.index;
-      feasible += static_cast<double>(expected.feasible) / expected.generated;
+      same_as_double += found.index == expected.index;
     }
   }
   Count(state, us);
   state.counters["ratio"] = Quantile(reference_us, 0.5) / Quantile(subset, 0.5);
   state.counters["reference_p50_us"] = Quantile(reference_us, 0.5);
-  state.counters["same_winner"] = static_cast<double>(same) / std::max(1, n_reference);
-  state.counters["reference_instances"] = n_reference;
-  state.counters["feasible_share"] = feasible / std::max(1, n_reference);
-  state.counters["repeats"] = repeats;
+  state.counters["reference_instances"] = size.reference;
+  state.counters["same_winner"] = static_cast<double>(same) / size.compared;
+  state.counters["same_as_double"] = static_cast<double>(same_as_double) / size.reference;
+  state.counters["compared"] = size.compared;
+  state.counters["feasible_share"] = feasible / size.compared;
+  state.counters["repeats"] = size.repeats;
 }
 
 /// Exact visibility against the paper's bound on the same instances.
@@ -116,7 +132,7 @@ void ExactVisibility(benchmark::State& state, bool hard) {
   std::vector<double> bound_us, us;
   int better = 0, worse = 0;
   for (auto _ : state) {
-    for (int i = 0; i < 200; ++i) {
+    for (int i = 0; i < kInstances; ++i) {
       const PlanRequest request = generator.Make(1000u + static_cast<unsigned>(i));
       Found a, b;
       bound_us.push_back(
@@ -130,16 +146,78 @@ void ExactVisibility(benchmark::State& state, bool hard) {
   }
   Count(state, us);
   state.counters["time_ratio"] = Quantile(us, 0.5) / Quantile(bound_us, 0.5);
-  state.counters["better_share"] = better / 200.0;
+  state.counters["better_share"] = static_cast<double>(better) / kInstances;
+  state.counters["worse"] = worse;
+}
+
+/// Feasibility of all candidates, none left out: the kernels' tables are made, then everything is
+/// tested.
+void CheckAll(benchmark::State& state) {
+  const PlannerConfig config = Config(3, 12, true);
+  const InstanceGenerator generator(Config(3, 12, false), Spec(50, false));
+  PlanProof proof;
+  FastProblem fast(config, kernels::Kernels());
+  std::vector<double> us;
+  double candidates = 0.0;
+  for (auto _ : state) {
+    for (int i = 0; i < kInstances; ++i) {
+      const PlanRequest request = generator.Make(1000u + static_cast<unsigned>(i));
+      Problem problem = MakeProblem(config, request, nullptr);
+      PlaceSkeletons(config, Layout::kNormal, &problem);
+      proof.Reset(problem, 0.0, true);
+      if (!fast.Set(problem, proof)) continue;
+      const int n = fast.n_candidates();
+      std::vector<int> ids(static_cast<size_t>(n + kernels::kPad)), states(ids.size());
+      us.push_back(MedianMicroseconds(5, [&] {
+        for (int k = 0; k < n; ++k) ids[static_cast<size_t>(k)] = k;
+        kernels::Kernels().check(fast.context(), ids.data(), states.data(), n);
+      }));
+      candidates += n;
+    }
+  }
+  double total = 0.0;
+  for (double t : us) total += t;
+  Count(state, us);
+  state.counters["candidates_per_s"] = 1e6 * candidates / total;
+}
+
+/// What refinement adds to a plan, and what it gains.
+void Refinement(benchmark::State& state) {
+  const PlannerConfig config = Config(3, 12, true);
+  const InstanceGenerator generator(Config(3, 12, false), Spec(50, false));
+  const auto fast = MakeFastSearch(config);
+  Refiner refiner(config);
+  std::vector<double> us, gain;
+  int worse = 0;
+  for (auto _ : state) {
+    for (int i = 0; i < kInstances; ++i) {
+      const PlanRequest request = generator.Make(1000u + static_cast<unsigned>(i));
+      Problem problem = MakeProblem(config, request, nullptr);
+      PlaceSkeletons(config, Layout::kNormal, &problem);
+      const Found found = fast->Best(problem, 0.0);
+      if (found.index < 0) continue;
+      Curve plan;
+      Cost cost;
+      us.push_back(MedianMicroseconds(5, [&] {
+        plan = found.plan;
+        cost = found.cost;
+        refiner.Improve(problem, 0.0, &plan, &cost);
+      }));
+      worse += cost.total > found.cost.total;
+      gain.push_back(1.0 - cost.total / found.cost.total);
+    }
+  }
+  Count(state, us);
+  state.counters["gain_median_percent"] = 100.0 * Quantile(gain, 0.5);
   state.counters["worse"] = worse;
 }
 
 double SearchP50(int steps, int skeletons, int n_obstacles) {
   const PlannerConfig config = Config(steps, skeletons, true);
-  const InstanceGenerator generator(config, Spec(n_obstacles, false));
+  const InstanceGenerator generator(Config(3, 12, false), Spec(n_obstacles, false));
   const auto fast = MakeFastSearch(config);
   std::vector<double> us;
-  for (unsigned i = 0; i < 25; ++i) {
+  for (unsigned i = 0; i < 100; ++i) {
     const PlanRequest request = generator.Make(3000u + i);
     us.push_back(MedianMicroseconds(3, [&] { Search1(fast.get(), config, request); }));
   }
@@ -160,15 +238,15 @@ double Exponent(const std::vector<double>& size, const std::vector<double>& time
 void Growth(benchmark::State& state) {
   std::vector<double> n, n_us, o, o_us;
   for (auto _ : state) {
-    for (int skeletons : {5, 10, 22, 46}) {
-      const int choices = std::min(skeletons, 24), steps = skeletons > 24 ? 4 : 3;
-      const int used = skeletons > 24 ? 17 : choices;
-      n.push_back(std::pow(used, steps));
-      n_us.push_back(SearchP50(steps, used, 50));
+    for (int steps : {2, 3, 4, 5}) {  // 10^2 to 10^5 candidates
+      n.push_back(std::pow(10.0, steps));
+      n_us.push_back(SearchP50(steps, 10, 50));
+      state.counters["us_10^" + std::to_string(steps)] = n_us.back();
     }
-    for (int obstacles : {5, 20, 80, 300, 500}) {
+    for (int obstacles : {5, 16, 50, 160, 500}) {
       o.push_back(obstacles);
       o_us.push_back(SearchP50(3, 12, obstacles));
+      state.counters["us_" + std::to_string(obstacles) + "_obstacles"] = o_us.back();
     }
   }
   state.counters["exponent_candidates"] = Exponent(n, n_us);
@@ -179,12 +257,15 @@ void Register() {
   const auto row = [](const char* name, auto&& f) {
     benchmark::RegisterBenchmark(name, f)->Iterations(1)->Unit(benchmark::kMillisecond);
   };
-  row("plan/1728x50", [](benchmark::State& s) { Plan(s, 3, 12, 50, false, kInstances, 60, 5); });
-  row("plan/20736x50", [](benchmark::State& s) { Plan(s, 4, 12, 50, false, kInstances, 6, 3); });
-  row("plan/hard/1728x50",
-      [](benchmark::State& s) { Plan(s, 3, 12, 50, true, kInstances, 60, 5); });
+  row("plan/1728x50", [](benchmark::State& s) { Plan(s, {3, 12, 50, false, 60, kInstances, 5}); });
+  row("plan/20736x50", [](benchmark::State& s) { Plan(s, {4, 12, 50, false, 6, 50, 3}); });
+  row("plan/hard/1728x50", [](benchmark::State& s) {
+    Plan(s, {3, 12, 50, true, 60, kInstances, 5});
+  });
   row("exact_visibility/1728x50", [](benchmark::State& s) { ExactVisibility(s, false); });
   row("exact_visibility/hard/1728x50", [](benchmark::State& s) { ExactVisibility(s, true); });
+  row("check_all/1728x50", CheckAll);
+  row("refinement/1728x50", Refinement);
   row("growth", Growth);
 }
 
