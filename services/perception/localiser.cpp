@@ -183,6 +183,8 @@ bool Localiser::EdgesAgree(const FitResult& fit, const FitInput& input) const {
     const bool left_out =
         !input.use_side[side] && !input.detection->silhouette.samples[side].empty();
     if (left_out && std::abs(fit.edge_px[side]) < kHiddenBy) return false;
+    // Where the range is not known, what goes on beyond a side is a larger thing.
+    if (left_out && fit.edge_px[side] > 0.0 && RangeSigma(input) > kKnownRange) return false;
   }
   return true;
 }
@@ -290,21 +292,32 @@ std::optional<FitResult> Localiser::Correct(const FitInput& predicted,
   if (!Visible(predicted)) return std::nullopt;
   FitInput input = predicted;
   const double gate = config_.fit.lidar_gate + 2.0 * RangeSigma(predicted);
-  // Near to far: what stands before the target may lend the blob's edge a few points, and only
-  // the fit tells that they do not belong to it.
+  const double all = CountPoints(clusters);
+  const auto unexplained = [&](double explained) {
+    return std::min(kMostUnexplained, kUnexplained * (all - explained));
+  };
+  // What stands before the target may lend the blob's edge a few points, and what stands behind it
+  // too: the fit that explains most of them is taken.
+  std::optional<FitResult> best;
+  double best_score = 0.0;
   int tried = 0;
   for (const auto& cluster : clusters) {
     input.points = PointsOnTarget(predicted, cluster, gate);
     if (input.points.empty()) continue;
     if (++tried > kMostClusters) break;
-    const auto fit = JoinedReading(&input);
-    if (fit) return fit;
+    auto fit = JoinedReading(&input);
+    if (!fit) continue;
+    const double score = fit->log_odds - unexplained(static_cast<double>(cluster.size()));
+    if (best && score <= best_score) continue;
+    best = fit;
+    best_score = score;
   }
+  if (best) return best;
   input.points.clear();
   if (CountSeenThrough(predicted, clusters) >= kManyPoints) return std::nullopt;
-  auto fit = JoinedReading(&input);
-  if (fit) fit->log_odds -= std::min(kMostUnexplained, kUnexplained * CountPoints(clusters));
-  return fit;
+  best = JoinedReading(&input);
+  if (best) best->log_odds -= unexplained(0.0);
+  return best;
 }
 
 TargetGaussian Localiser::Guess(const Camera& camera, const Detection& detection, double range,

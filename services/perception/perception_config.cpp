@@ -109,7 +109,8 @@ std::string MotionConfig::Problem() const {
       .In("ground_sigma", ground_sigma, 0.01, 100)
       .In("floor_sigma", floor_sigma, 1e-4, 1)
       .In("pose_sigma", pose_sigma, 0, 1)
-      .In("pose_angle_sigma_deg", pose_angle_sigma_deg, 0, 20)
+      .In("tilt_sigma_deg", tilt_sigma_deg, 0, 20)
+      .In("heading_sigma_deg", heading_sigma_deg, 0, 20)
       .Result();
 }
 

@@ -105,8 +105,8 @@ struct DetectorConfig {
 
 /// Standard deviations of what is measured and limits of what is believed.
 struct FitConfig {
-  double edge_sigma_px = 0.9, edge_weight = 2.0;
-  double lidar_sigma = 0.03, lidar_weight = 8.0;
+  double edge_sigma_px = 0.5, edge_weight = 2.0;
+  double lidar_sigma = 0.025, lidar_weight = 8.0;
   double edge_gate_px = 1.5, prior_gate = 30.0, lidar_gate = 0.35;
   bool estimate_shape = false;
   double shape_sigma = 0.03;
@@ -131,10 +131,10 @@ struct FitConfig {
 
 /// Constant velocity with white acceleration, and the honesty of what is published.
 struct MotionConfig {
-  double acceleration_density = 1.0, vertical_density = 0.02;
+  double acceleration_density = 0.5, vertical_density = 0.02;
   double initial_speed_sigma = 1.2, initial_vertical_speed_sigma = 0.1;
   double max_speed = 5.0, hidden_time = 3.0, ground_sigma = 0.15;
-  double floor_sigma = 0.012, pose_sigma = 0.01, pose_angle_sigma_deg = 0.2;
+  double floor_sigma = 0.004, pose_sigma = 0.006, tilt_sigma_deg = 0.35, heading_sigma_deg = 0.12;
 
   template <class V>
   void Visit(V& v) {
@@ -147,7 +147,8 @@ struct MotionConfig {
     v("ground_sigma", ground_sigma, "how far the ground rises or falls meanwhile, m");
     v("floor_sigma", floor_sigma, "added to every axis of the covariance sent out, m");
     v("pose_sigma", pose_sigma, "least standard deviation of the drone's position, m");
-    v("pose_angle_sigma_deg", pose_angle_sigma_deg, "least standard deviation of its attitude");
+    v("tilt_sigma_deg", tilt_sigma_deg, "least standard deviation of its roll and pitch");
+    v("heading_sigma_deg", heading_sigma_deg, "least standard deviation of its heading");
   }
   std::string Problem() const;
 };
@@ -155,7 +156,7 @@ struct MotionConfig {
 /// When the target counts as found, hidden and lost.
 struct StateConfig {
   double acquire_score = 0.35;
-  int confirm_frames = 3;
+  int confirm_frames = 2;
   double hidden_after = 0.08, lost_after = 5.0, lost_sigma = 3.0;
   double decoy_radius = 0.5, decoy_memory = 60.0;
 

@@ -40,10 +40,12 @@ void TargetTrack::Correct(const FitResult& fit) {
 
 Eigen::Matrix3d PublishedCovariance(const TargetTrack& track, const PoseSample& pose,
                                     const MotionConfig& config) {
-  const double angle = config.pose_angle_sigma_deg * M_PI / 180.0;
+  const double tilt = config.tilt_sigma_deg * M_PI / 180.0;
+  const double heading = config.heading_sigma_deg * M_PI / 180.0;
   Eigen::Matrix<double, 6, 6> C = pose.covariance;
   for (int i = 0; i < 3; ++i) {
     C(i, i) = std::max(C(i, i), config.pose_sigma * config.pose_sigma);
+    const double angle = i < 2 ? tilt : heading;
     C(i + 3, i + 3) = std::max(C(i + 3, i + 3), angle * angle);
   }
   // p_WT = p_WB + R_WB p_BT: a small rotation dr of the body in W moves it by dr x (p_WT - p_WB).

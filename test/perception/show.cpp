@@ -59,7 +59,11 @@ Show::Show(const Stage& stage, const world::Rig& rig)
       scene_(stage.scenario()),
       camera_({}, rig, stage.scenario().target.color, stage.options().seed),
       lidar_({}, rig, stage.options().seed),
-      random_(stage.options().seed * 7919 + 5) {}
+      random_(stage.options().seed * 7919 + 5) {
+  const OdometryErrors& error = stage.options().errors;
+  tilt_ = {error.tilt * normal_(random_), error.tilt * normal_(random_),
+           error.heading * normal_(random_)};
+}
 
 simulator::TargetState Show::Target(double t) const {
   return actors_.Target(stage_.mission_start() + t);
@@ -163,10 +167,8 @@ perception::PoseSample Show::Pose(double t) {
   const OdometryErrors& error = stage_.options().errors;
   const double decay = std::exp(-std::clamp(t - last_pose_t_, 0.0, 1e3) / error.correlation);
   const double fresh = std::sqrt(1.0 - decay * decay);
-  for (int i = 0; i < 3; ++i) {
+  for (int i = 0; i < 3; ++i)
     drift_[i] = decay * drift_[i] + fresh * error.position[i] * normal_(random_);
-    tilt_[i] = decay * tilt_[i] + fresh * error.angle[i] * normal_(random_);
-  }
   last_pose_t_ = t;
   const double h = 2e-3;
   const auto at = stage_.BodyAt(t), before = stage_.BodyAt(t - h), after = stage_.BodyAt(t + h);
@@ -179,7 +181,8 @@ perception::PoseSample Show::Pose(double t) {
               error.velocity * Vector3d(normal_(random_), normal_(random_), normal_(random_));
   const Eigen::AngleAxisd turn(before.q.conjugate() * after.q);
   pose.w_WB_B = turn.angle() * turn.axis() / (2.0 * h);
-  pose.covariance.diagonal() << error.position.cwiseAbs2(), error.angle.cwiseAbs2();
+  pose.covariance.diagonal() << Vector3d::Constant(error.claimed_position * error.claimed_position),
+      Vector3d::Constant(error.claimed_angle * error.claimed_angle);
   return pose;
 }
 
