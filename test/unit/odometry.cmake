@@ -5,6 +5,8 @@ target_link_libraries(odometry_test_support PUBLIC odometry_core PRIVATE PkgConf
 
 chase_test(odometry_parts_test LIBS odometry_test_support
   SOURCES ${ODOMETRY_TEST_DIR}/odometry_parts_test.cpp)
+chase_test(odometry_level_test LIBS odometry_test_support
+  SOURCES ${ODOMETRY_TEST_DIR}/odometry_level_test.cpp)
 chase_test(odometry_match_test LIBS odometry_test_support Ceres::ceres
   SOURCES ${ODOMETRY_TEST_DIR}/odometry_match_test.cpp ${ODOMETRY_TEST_DIR}/odometry_ceres.cpp)
 chase_test(odometry_flight_test LIBS odometry_test_support

@@ -1,0 +1,213 @@
+#include <gtest/gtest.h>
+
+#include <Eigen/Eigenvalues>
+#include <cmath>
+
+#include "common/math/rotation.h"
+#include "services/odometry/alignment.h"
+#include "services/odometry/level_frame.h"
+#include "services/odometry/map_drift.h"
+#include "services/odometry/standing.h"
+#include "test/unit/odometry_course.h"
+
+namespace chase::odometry {
+namespace {
+
+using test::Course;
+using test::CourseResult;
+using test::Flight;
+using test::Noise;
+
+ImuSample AtRest(double t, const Eigen::Vector3d& bias, Noise* noise) {
+  return {t, Eigen::Vector3d(0.0, 0.0, 9.81) + bias + noise->Vector(0.02), noise->Vector(0.002)};
+}
+
+NavState Aligned(const Eigen::Vector3d& bias, unsigned seed) {
+  Alignment alignment(AlignmentConfig{});
+  Noise noise(seed);
+  for (int i = 0; !alignment.Complete(); ++i) alignment.Add(AtRest(0.005 * i, bias, &noise));
+  return alignment.Result(FilterConfig{}, Eigen::Vector3d::Zero(), 0.0);
+}
+
+TEST(Alignment, TiltAndBiasAreOneUnknownAtRest) {
+  const NavState state = Aligned({0.08, -0.05, 0.03}, 1);
+  const auto P = state.P;
+  for (int axis : {0, 1}) {
+    const double correlation =
+        P(kGravity + axis, kAccelBias + axis) /
+        std::sqrt(P(kGravity + axis, kGravity + axis) * P(kAccelBias + axis, kAccelBias + axis));
+    EXPECT_GT(correlation, 0.98) << "axis " << axis;
+  }
+  // What the accelerometer shows is explained whichever way the two are split.
+  const Eigen::Vector3d felt = state.R_WB.conjugate() * (-state.g) + state.accel_bias;
+  EXPECT_LT((felt - Eigen::Vector3d(0.08, -0.05, 9.84)).norm(), 0.01);
+  EXPECT_NEAR(state.accel_bias.z(), 0.03, 0.01);  // |g| is known
+}
+
+TEST(Alignment, SettlingBodyIsWaitedForAFlyingOneIsNot) {
+  for (const double until : {0.2, 1e9}) {
+    Alignment alignment(AlignmentConfig{});
+    Noise noise(2);
+    double t = 0.0;
+    for (; !alignment.Complete(); t += 0.005) {
+      ImuSample imu = AtRest(t, Eigen::Vector3d::Zero(), &noise);
+      if (t < until) imu.gyro.x() += std::cos(20.0 * t);
+      alignment.Add(imu);
+    }
+    EXPECT_EQ(alignment.AtRest(), until < 1.0);
+    EXPECT_NEAR(t, until < 1.0 ? 0.7 : 0.5, 0.06);
+  }
+}
+
+TEST(LevelFrame, GravityIsDownAndTheStartStaysWhereItIs) {
+  Noise noise(3);
+  for (int trial = 0; trial < 50; ++trial) {
+    const Eigen::Vector3d start = noise.Vector(5.0);
+    LevelFrame level(start);
+    const Eigen::Vector3d g = Eigen::Vector3d(0.0, 0.0, -9.81) + noise.Vector(0.5);
+    level.SetGravity(g);
+    EXPECT_LT((level.R_WM() * g.normalized() + Eigen::Vector3d::UnitZ()).norm(), 1e-12);
+    EXPECT_LT((level.ToWorld(start) - start).norm(), 1e-12);
+    EXPECT_LT(std::abs(math::LogSO3(level.R_WM()).z()), 1e-9);  // no heading is changed
+  }
+}
+
+TEST(LevelFrame, CovarianceIsThatOfTheNonlinearMap) {
+  Noise noise(4);
+  for (int trial = 0; trial < 30; ++trial) {
+    NavState state;
+    state.p = noise.Vector(20.0);
+    state.v = noise.Vector(2.0);
+    state.R_WB = math::ExpSO3(noise.Vector(0.5));
+    state.g = Eigen::Vector3d(0.0, 0.0, -9.81) + noise.Vector(0.05);
+    ErrorVector dx;
+    for (int i = 0; i < kStates; ++i) dx[i] = noise.Gauss(1e-6);
+    NavState other = state;
+    Inject(dx, &other);
+    state.P = dx * dx.transpose();
+    LevelFrame level(noise.Vector(1.0)), moved = level;
+    level.SetGravity(state.g);
+    moved.SetGravity(other.g);
+    const Pose a = level.ToWorld(state.pose()), b = moved.ToWorld(other.pose());
+    Eigen::Matrix<double, 9, 1> e;
+    e << b.p - a.p, moved.R_WM() * other.v - level.R_WM() * state.v,
+        math::LogSO3(b.R * a.R.conjugate());
+    const Eigen::Matrix<double, 9, 9> expected = e * e.transpose();
+    EXPECT_LT((level.CovarianceInWorld(state) - expected).norm(), 0.02 * expected.norm()) << trial;
+  }
+}
+
+/// Far from the start a wrong tilt is metres of error; the flight itself must mend it.
+TEST(LevelFrame, FlightTellsTiltFromBias) {
+  Course course;
+  course.duration = 20.0;
+  course.sensors.azimuths = 900;
+  course.sensors.accel_bias = {0.09, -0.08, 0.02};  // 12 mrad
+  course.flight.yaw_amplitude = 1.6;
+  const CourseResult result = test::Fly(course, test::ConfigFor(course.flight));
+  const auto tilt_at = [&](double t) {
+    const auto& visit = result.visits[static_cast<size_t>(t / 0.005)].estimate;
+    const Eigen::Vector3d error =
+        math::LogSO3(visit.X_WB.R * course.flight.X_WB(visit.t).R.conjugate());
+    return error.head<2>().norm();
+  };
+  EXPECT_GT(tilt_at(0.7), 0.008);
+  EXPECT_LT(tilt_at(19.9), 0.003);
+}
+
+TEST(Standing, EndsWithTheFirstMotionAndOnlyThen) {
+  Noise noise(5);
+  Standing standing;
+  ImuSample mean;
+  mean.accel.z() = 9.81;
+  standing.Begin(mean, 0.02, 0.002, Eigen::Vector3d::Zero());
+  double t = 0.0;
+  for (; t < 30.0; t += 0.005) standing.Add(AtRest(t, Eigen::Vector3d::Zero(), &noise));
+  EXPECT_TRUE(standing.holds());
+  const double lift = t;
+  for (; t < lift + 0.25; t += 0.005) standing.Add(AtRest(t, {0.0, 0.0, 0.9 * (t - lift)}, &noise));
+  EXPECT_FALSE(standing.holds());
+  standing.Begin(mean, 0.02, 0.002, Eigen::Vector3d::Zero());
+  standing.See({0.0, 0.3, 0.0});  // carried without being felt
+  EXPECT_FALSE(standing.holds());
+}
+
+TEST(MapDrift, GrowsWithTheWayAndIsForgottenAtHome) {
+  MapDrift drift(DriftConfig{});
+  const auto sigma = [&] { return std::sqrt(drift.covariance().topLeftCorner<3, 3>().trace()); };
+  double last = 0.0;
+  for (int i = 0; i <= 100; ++i) {
+    drift.MoveTo({static_cast<double>(i), 0.0, 0.0}, 15.0);
+    EXPECT_GE(sigma(), 0.999 * last) << i;
+    last = sigma();
+  }
+  EXPECT_GT(drift.covariance()(1, 1), 10.0 * drift.covariance()(0, 0));  // heading: sideways
+  for (int i = 100; i >= 0; --i) drift.MoveTo({static_cast<double>(i), 0.0, 0.0}, 15.0);
+  EXPECT_LT(sigma(), 0.1 * last);
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix4d> eigen(drift.covariance());
+  EXPECT_GT(eigen.eigenvalues().minCoeff(), 0.0);
+}
+
+TEST(MapDrift, RemembersABoundedNumberOfPlaces) {
+  MapDrift drift(DriftConfig{});
+  for (int i = 0; i < 20000; ++i) drift.MoveTo({1.0 * i, 0.0, 0.0}, 10.0);
+  EXPECT_LE(drift.places(), 500u);
+  EXPECT_TRUE(drift.covariance().allFinite());
+}
+
+/// Mean normalised squared errors over seeds and time lie where chi-square says for ten runs.
+TEST(Consistency, ErrorsAreAsLargeAsTheCovarianceSays) {
+  double position = 0.0, yaw = 0.0, n = 0.0;
+  for (unsigned seed = 1; seed <= 10; ++seed) {
+    Course course;
+    course.duration = 8.0;
+    course.seed = seed;
+    course.sensors.azimuths = 450;
+    Noise noise(100 + seed);
+    course.sensors.accel_bias = noise.Vector(0.05);
+    course.sensors.gyro_bias = noise.Vector(0.003);
+    const CourseResult result = test::Fly(course, test::ConfigFor(course.flight));
+    for (size_t i = 400; i < result.visits.size(); i += 100) {
+      const auto& visit = result.visits[i];
+      const auto& P = visit.estimate.covariance;
+      const Eigen::Vector3d e = visit.estimate.X_WB.p - course.flight.X_WB(visit.estimate.t).p;
+      const Eigen::Matrix3d P_p = P.topLeftCorner<3, 3>();
+      position += e.dot(P_p.ldlt().solve(e));
+      yaw += visit.yaw_error * visit.yaw_error / P(8, 8);
+      n += 1.0;
+    }
+  }
+  EXPECT_GT(position / n, 1.38);
+  EXPECT_LT(position / n, 5.37);
+  EXPECT_GT(yaw / n, 0.216);
+  EXPECT_LT(yaw / n, 2.52);
+}
+
+/// After the loss of all sweeps the estimate is wrong by decimetres; it comes back without a jump
+/// and says so.
+TEST(LostRecovery, ComesBackWithoutAJumpAndSaysSo) {
+  Course course;
+  course.duration = 14.0;
+  course.sensors.azimuths = 900;
+  course.on_sweep = [](Sweep* s) { return s->start < 5.0 || s->start > 8.5; };
+  course.on_imu = [](ImuSample* s) {
+    if (s->t > 5.2 && s->t < 8.4) s->accel.x() += 0.12;  // so that there is something to correct
+    return true;
+  };
+  const CourseResult result = test::Fly(course, test::ConfigFor(course.flight));
+  EXPECT_TRUE(result.Finite());
+  bool lost = false, flagged = false;
+  for (const auto& visit : result.visits) {
+    lost |= visit.estimate.health.health == Health::kLost;
+    flagged |= visit.estimate.correcting;
+  }
+  EXPECT_TRUE(lost);
+  EXPECT_TRUE(flagged);
+  EXPECT_GT(result.WorstPosition(), 0.2) << "nothing was corrected";
+  EXPECT_LT(result.WorstPosition(10.5), 0.1);
+  EXPECT_LT(result.WorstJump(), 0.006);
+  EXPECT_LT(result.FirstTime(8.7, true), 9.7);
+}
+
+}  // namespace
+}  // namespace chase::odometry
