@@ -32,7 +32,8 @@ std::optional<cv::Rect2d> ProjectCylinder(const Camera& camera, const Eigen::Vec
                                           double radius, double height) {
   Eigen::Vector2d low(1e9, 1e9), high(-1e9, -1e9);
   for (int i = 0; i < 2 * kRimPoints; ++i) {
-    const double angle = 2.0 * M_PI * (i / 2) / kRimPoints;
+    const int around = i / 2;
+    const double angle = 2.0 * M_PI * around / kRimPoints;
     const Eigen::Vector3d rim(radius * std::cos(angle), radius * std::sin(angle),
                               (i % 2 ? 0.5 : -0.5) * height);
     const auto px = camera.Project(p_WT + rim);
