@@ -243,7 +243,7 @@ int FastSearch::Run() {
   std::nth_element(sample, sample + rank, sample + samples);
   const float cheapest = sample[rank];
   Weigh(-1.0f, cheapest);
-  Drain(8);
+  Drain(6);
   if (accepted_.empty()) {
     float levels[3] = {cheapest, cheapest, cheapest};
     for (const int part : {1, 2}) {  // above the cheapest: to an eighth of all, to a half, the rest
