@@ -6,7 +6,7 @@
 namespace chase::odometry {
 
 struct DriftConfig {
-  double view_error = 0.0085;      ///< m
+  double view_error = 0.0065;      ///< m
   double position = 0.0003;        ///< m per root m
   double first_position = 0.0003;  ///< m
   double first_yaw = 3e-4;         ///< rad
