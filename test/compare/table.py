@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Table of a campaign for a README: table.py OUT/flights.json prints Markdown.
 
-Per scenario and planner: acceleration cost [m^2/s^4], mean time to plan [ms], and, in brackets, safe and
+Per scenario and planner: acceleration cost [m^2/s^4], mean processor time to plan [ms], and, in brackets, safe and
 visible ratio where one is below 1."""
 
 import json
@@ -10,7 +10,7 @@ import sys
 
 
 def cell(flight):
-    text = f"{flight['acceleration_cost']:.3f}, {flight['plan_ms']['mean']:.2f}"
+    text = f"{flight['acceleration_cost']:.3f}, {flight['plan_cpu_ms']['mean']:.2f}"
     safe, visible = flight["safe_ratio"], flight["visible_ratio"]
     return text + (f" ({safe:.3f} {visible:.3f})" if min(safe, visible) < 1 else "")
 
