@@ -11,3 +11,4 @@ chase_test(mapping_test LIBS mapping_core octomap octomath SOURCES
 chase_test(mapping_node_test LIBS mapping_node SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/mapping_world.cpp
   ${CMAKE_CURRENT_LIST_DIR}/mapping_node_test.cpp)
+include(${CMAKE_CURRENT_LIST_DIR}/../mapping/mapping.cmake)
