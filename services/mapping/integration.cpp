@@ -11,6 +11,7 @@ constexpr double kNoise = 0.08;     // m, an interval's difference that may be n
 constexpr double kNearMiss = 0.35;  // cells, a ray this near to a cell's returns contradicts them
 constexpr int kLowShare = 3;        // free cells keep limit / this, so that they can fill again
 constexpr int kSettleSweeps = 20;   // moving returns this long in one cell stand still
+constexpr int kDoubtSweeps = 10;    // hits after which a cell that was long free is no longer
 constexpr size_t kMostChanges = 400000;
 
 uint8_t Increment(uint8_t n) { return n < 255 ? static_cast<uint8_t>(n + 1) : n; }
@@ -60,8 +61,9 @@ void Integrator::Hit(HitCell* cell) {
   }
   const bool strong = cell->solid + cell->ground >= 2;
   voxel.sweep = sweep_;
-  voxel.free_sweeps = 0;
   voxel.hits = Increment(voxel.hits);
+  const bool doubted = voxel.free_sweeps >= config_.ever_free_sweeps && voxel.hits < kDoubtSweeps;
+  if (cell->solid == 0 || !doubted) voxel.free_sweeps = 0;
   voxel.log_odds =
       static_cast<int8_t>(std::min(config_.limit, voxel.log_odds + (strong ? 2 : 1) * config_.hit));
   const bool had_extent = !voxel.extent.empty();
@@ -92,7 +94,7 @@ void Integrator::Reset(VoxelGrid::Column* column, Voxel* voxel, const Key& key) 
 void Integrator::Queue(Voxel* voxel, const Key& key) {
   if (voxel->queued || changes_.size() >= kMostChanges) return;
   voxel->queued = true;
-  if (voxel->free_sweeps > 0)
+  if (!voxel->occupied)
     changes_.push_back(key);
   else
     changes_.push_front(key);  // news of obstacles first

@@ -30,7 +30,8 @@ bool MotionDetector::InEverFree(const Key& key, VoxelGrid* grid) const {
     for (int dy = -1; dy <= 1; ++dy)
       for (int dz = -1; dz <= 1; ++dz) {
         const Voxel* near = grid->At({key.x + dx, key.y + dy, key.z + dz});
-        if (near && (near->occupied || near->log_odds > 0)) return false;
+        if (near && near->free_sweeps < ever_free_ && (near->occupied || near->log_odds > 0))
+          return false;
       }
   return true;
 }
@@ -45,7 +46,9 @@ std::vector<MotionDetector::Candidate> MotionDetector::Candidates(
     const Voxel* voxel = grid->At(r.key);
     const Eigen::Vector2d p = r.p.head<2>().cast<double>();
     const bool awaited = !expected.empty() && Inside(expected, p);
-    if (voxel && voxel->occupied && !(awaited && voxel->hits < kSettledHits)) continue;
+    const bool doubted =
+        voxel && (voxel->free_sweeps >= ever_free_ || (awaited && voxel->hits < kSettledHits));
+    if (voxel && voxel->occupied && !doubted) continue;
     const bool seed = awaited || InEverFree(r.key, grid);
     candidates.push_back({Code(static_cast<int>(std::floor(p.x() / config_.cluster_cell)),
                                static_cast<int>(std::floor(p.y() / config_.cluster_cell))),

@@ -26,7 +26,7 @@ struct Extent {
 
 struct Voxel {
   int8_t log_odds = 0;      ///< tenths
-  uint8_t free_sweeps = 0;  ///< consecutive sweeps seen free
+  uint8_t free_sweeps = 0;  ///< consecutive sweeps seen free; kept through the first hits
   uint8_t hits = 0;         ///< sweeps that hit it since it was last free
   uint8_t moving_hits = 0;  ///< consecutive sweeps in which moving returns lay in it
   bool occupied = false;

@@ -15,6 +15,7 @@ constexpr double kCoverRadius = 8.0;        // m, of the drone: coverage
 constexpr double kFreeRadius = 5.0;         // m, of the drone: free volume
 constexpr double kLow = 0.35, kHigh = 2.9;  // m above the ground: the flight volume
 constexpr double kSightRange = 12.0;        // m
+constexpr double kMatchReach = 0.6;         // m, of a listed mover's centre from the true mover
 constexpr int kSightHits = 8;               // returns in a sweep with which a mover is in sight
 constexpr double kNewSight = 2.0;           // s out of sight after which it comes into sight anew
 constexpr double kWholeShare = 0.8;         // of a mover's usual returns: all of it is in sight
@@ -124,7 +125,21 @@ void Score::FollowMovers(const Shot& shot, const std::vector<Obstacle>& obstacle
     ++mover_points;
     mover_points_held += Holder(obstacles, hit.point, t) != nullptr;
   }
-  std::vector<char> taken(obstacles.size(), 0);
+  // A listed mover stands for the nearest true one within reach, and for nothing otherwise.
+  std::vector<int> owner(obstacles.size(), -1);
+  bool wrong = false;
+  for (size_t i = 0; i < obstacles.size(); ++i) {
+    if (!obstacles[i].moving) continue;
+    const Vector3d p = obstacles[i].center.Position(t);
+    double best = kMatchReach;
+    for (size_t k = 0; k < movers.size(); ++k) {
+      const auto& solid = shot.movers[k].solid;
+      const double d = world::SignedDistance(solid, {p.x(), p.y(), solid.center.z()});
+      if (d < best) best = d, owner[i] = static_cast<int>(k);
+    }
+    wrong |= owner[i] < 0;
+  }
+  false_movers += wrong;
   for (size_t k = 0; k < movers.size(); ++k) {
     MoverScore& score = movers[k];
     const auto& truth = shot.movers[k];
@@ -139,12 +154,9 @@ void Score::FollowMovers(const Shot& shot, const std::vector<Obstacle>& obstacle
       ++score.sights;
     }
     if (visible) score.last_sight = t;
-    const double reach = truth.solid.half_size.head<2>().norm() + 0.5;
     for (size_t i = 0; i < obstacles.size(); ++i) {
       const auto& o = obstacles[i];
-      if (!o.moving || (o.center.Position(t) - truth.solid.center).head<2>().norm() > reach)
-        continue;
-      taken[i] = 1;
+      if (owner[i] != static_cast<int>(k)) continue;
       if (!visible) continue;
       score.ids.insert(o.id);
       if (score.listed < 0.0) {
@@ -164,9 +176,6 @@ void Score::FollowMovers(const Shot& shot, const std::vector<Obstacle>& obstacle
       ++score.updates;
     }
   }
-  bool wrong = false;
-  for (size_t i = 0; i < obstacles.size(); ++i) wrong |= obstacles[i].moving && !taken[i];
-  false_movers += wrong;
 }
 
 /// Where movers were 1 to 6 s ago and nothing is now, nothing may stand within 8 m of the drone.
