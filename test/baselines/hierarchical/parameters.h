@@ -19,7 +19,7 @@ struct HierarchicalParameters {
   double connect = 2.5;          ///< longest edge per second of a layer, m [3, 2]
   double weight_sight = 5.0;     ///< [5, 6]
   double weight_distance = 7.5;  ///< [7.5]
-  double corridor = 0.28;         ///< half edge of the boxes, m [0.2, 0.3]
+  double corridor = 0.28;        ///< half edge of the boxes, m [0.2, 0.3]
   int corridor_points = 3;       ///< per leg [3, 2]
   double weight_waypoint = 5.5;  ///< [5.5]
   double retry_factor = 1.5;     ///< on `connect`, then on `corridor`
