@@ -39,13 +39,9 @@ class Ladder : public Planner {
     std::string notes;
     Problem problem = MakeProblem(config_, request, &notes);
     PlanResult result;
-    if (TryChase(&problem, &result) || TryKeep(request, &result) ||
-        TrySafeOnly(&problem, &result)) {
-      if (result.verdict != Verdict::kKept)
-        result.trajectory.start = request.t0, result.trajectory.duration = request.horizon;
-    } else {
+    if (!TryChase(request, &problem, &notes, &result) && !TryKeep(request, &result) &&
+        !TrySafeOnly(request, &problem, &result))
       Brake(request, &result);
-    }
     if (!notes.empty()) {
       if (IsInSightVerdict(result.verdict) && WeakensSight(problem))
         result.verdict = Verdict::kSafeOnly;
@@ -102,14 +98,50 @@ class Ladder : public Planner {
     return true;
   }
 
-  bool TryChase(Problem* problem, PlanResult* result) {
-    PlaceSkeletons(config_, Layout::kNormal, problem);
-    result->verdict = Verdict::kChase;
-    if (TrySearch(*problem, 0.0, result)) return true;
-    PlaceSkeletons(config_, Layout::kWide, problem);
-    result->verdict = Verdict::kWider;
-    result->reason = "no candidate of the normal skeletons is feasible";
-    return TrySearch(*problem, 0.0, result);
+  // Over the whole horizon, then over shorter ones: a plan that sees the target for the next
+  // seconds is renewed before it ends, and a shorter polynomial turns more sharply. Wide skeletons
+  // cost most and come last.
+  bool TryChase(const PlanRequest& request, Problem* problem, std::string* notes,
+                PlanResult* result) {
+    struct Try {
+      Layout layout;
+      double share;
+    };
+    constexpr Try kTries[] = {{Layout::kNormal, 1.0}, {Layout::kNormal, 0.7},
+                              {Layout::kNormal, 0.5}, {Layout::kNormal, 0.35},
+                              {Layout::kWide, 1.0},   {Layout::kWide, 0.5}};
+    for (const Try& t : kTries) {
+      if (!TryOver(request, t.layout, t.share, problem, notes, result)) continue;
+      const bool plain = t.layout == Layout::kNormal && t.share == 1.0;
+      result->verdict = plain ? Verdict::kChase : Verdict::kWider;
+      if (t.layout == Layout::kWide)
+        result->reason = "no candidate of the normal skeletons is feasible";
+      if (t.share < 1.0)
+        result->reason = "sight over " + std::to_string(static_cast<int>(100.0 * t.share)) +
+                         " % of the horizon only";
+      return true;
+    }
+    return false;
+  }
+
+  // On success `problem` and `notes` are those of the horizon that was planned.
+  bool TryOver(const PlanRequest& request, Layout layout, double share, Problem* problem,
+               std::string* notes, PlanResult* result) {
+    PlanRequest shorter = request;
+    shorter.horizon = share * request.horizon;
+    std::string their_notes = *notes;
+    Problem theirs = *problem;
+    if (share < 1.0) {
+      their_notes.clear();
+      theirs = MakeProblem(config_, shorter, &their_notes);
+    }
+    PlaceSkeletons(config_, layout, &theirs);
+    if (!TrySearch(theirs, 0.0, result)) return false;
+    result->trajectory.start = request.t0;
+    result->trajectory.duration = shorter.horizon;
+    *notes = their_notes;
+    *problem = theirs;
+    return true;
   }
 
   bool TryKeep(const PlanRequest& request, PlanResult* result) {
@@ -126,12 +158,14 @@ class Ladder : public Planner {
   }
 
   // Sight asked from ever later on, then not at all.
-  bool TrySafeOnly(Problem* problem, PlanResult* result) {
+  bool TrySafeOnly(const PlanRequest& request, Problem* problem, PlanResult* result) {
     result->verdict = Verdict::kSafeOnly;
     problem->limits.tan_elevation = 0.0;
     PlaceSkeletons(config_, Layout::kCautious, problem);
     for (double sight_from : {0.25, 0.5, 0.75, 1.0}) {
       if (!TrySearch(*problem, sight_from, result)) continue;
+      result->trajectory.start = request.t0;
+      result->trajectory.duration = request.horizon;
       result->reason = sight_from < 1.0 ? "no candidate keeps sight; this one has it from " +
                                               std::to_string(static_cast<int>(100 * sight_from)) +
                                               " % of the horizon on"
