@@ -10,6 +10,8 @@ namespace {
 
 constexpr int kSettledHits = 15;       // sweeps after which a cell outside the target's core stays
 constexpr double kGhostMargin = 0.2;   // m around a mover within which doubtful cells are cleared
+constexpr double kOwnPlace = 0.6;      // m around the drone that are free since it is there
+constexpr int kOwnLevels = 1;          // cells above and below it that count as its height
 constexpr double kWindowMargin = 1.0;  // m beyond the list's radius that the decomposition sees
 constexpr double kMostCoordinate = 6000.0;  // m, what the octree's keys can hold at 0.2 m
 
@@ -136,6 +138,21 @@ bool Mapper::ColumnExtent(const VoxelGrid::Column& column, Extent* extent) {
   return !extent->empty();
 }
 
+/// A column near the drone of which nothing was seen at the drone's own height, while unseen space
+/// is not to be trusted. The drone's own place is known to be free.
+bool Mapper::Closed(const VoxelGrid::Column* column, const Eigen::Vector2d& center,
+                    const Eigen::Vector3d& origin) const {
+  const double distance = (center - origin.head<2>()).norm();
+  if (distance > config_.statics.closed || distance < kOwnPlace) return false;
+  if (zone_.active() && (center - zone_.center()).norm() < zone_.outer()) return false;
+  if (!column) return true;
+  if (column->occupied > 0) return false;
+  const int middle = grid_.ToKey(origin).z;
+  for (int z = middle - kOwnLevels; z <= middle + kOwnLevels; ++z)
+    if (grid_.ContainsLevel(z) && column->voxels[VoxelGrid::Level(z)].sweep > 0) return false;
+  return true;
+}
+
 std::vector<Cell> Mapper::OccupiedColumns(const Eigen::Vector3d& origin) {
   std::vector<Cell> cells;
   const double reach = config_.statics.radius + kWindowMargin;
@@ -146,8 +163,19 @@ std::vector<Cell> Mapper::OccupiedColumns(const Eigen::Vector3d& origin) {
   for (int x = middle.x - n; x <= middle.x + n; ++x) {
     for (int y = middle.y - n; y <= middle.y + n; ++y) {
       VoxelGrid::Column* column = grid_.Find(x, y);
-      if (!column) continue;
       const Eigen::Vector2d center = grid_.Center({x, y, 0}).head<2>();
+      if (Closed(column, center, origin)) {
+        const int piece = column ? column->piece : 0;
+        const Eigen::Vector2d half = Eigen::Vector2d::Constant(0.5 * grid_.resolution());
+        Cell cell{x, y, piece, {}, grid_.resolution() * grid_.resolution()};
+        for (const double side : {-1.0, 1.0}) {
+          cell.corners.push_back(center + side * half);
+          cell.corners.emplace_back(center.x() + side * half.x(), center.y() - side * half.y());
+        }
+        cells.push_back(std::move(cell));
+        continue;
+      }
+      if (!column) continue;
       if (column->occupied == 0 || !ColumnExtent(*column, &extent)) {
         column->piece = 0;
         continue;

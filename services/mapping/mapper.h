@@ -56,6 +56,8 @@ class Mapper {
   void MarkTarget();
   void TrackMovers(const Eigen::Vector3d& origin, double t);
   void ClearGhosts();
+  bool Closed(const VoxelGrid::Column* column, const Eigen::Vector2d& center,
+              const Eigen::Vector3d& origin) const;
   std::vector<Cell> OccupiedColumns(const Eigen::Vector3d& origin);
   bool ColumnExtent(const VoxelGrid::Column& column, Extent* extent);
   std::vector<world::Obstacle> Statics(const Eigen::Vector3d& origin, double t, int* dropped);

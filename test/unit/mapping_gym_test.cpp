@@ -147,6 +147,33 @@ TEST(MappingGym, ListIsNearestFirstAndSaysWhatItCut) {
   EXPECT_NEAR(list.obstacles[1].center.Position(0.0).x(), 6.0, 0.2);
 }
 
+/// Behind the pillar at (4, 5.8) nothing was seen; from the other side it is.
+TEST(MappingGym, UnseenSpaceIsClosedOnRequestUntilItIsSeen) {
+  const testing::World world = testing::Gym();
+  for (const double closed : {0.0, 5.0}) {
+    MappingConfig config;
+    config.statics.closed = closed;
+    Mapper mapper(config);
+    std::mt19937 random(1);
+    double t = 0.0;
+    const auto look = [&](const Eigen::Vector3d& from) {
+      ObstacleList list;
+      for (int i = 0; i < 10; ++i, t += 0.1)
+        list = mapper.Insert(testing::Scan(world, from, t, {}, &random));
+      return list.obstacles;
+    };
+    const auto shadow = look({4.0, 4.0, 1.3});
+    for (const double y : {6.5, 7.0, 7.5})
+      EXPECT_EQ(testing::Holding(shadow, {4.0, y, 1.3}, t) != nullptr, closed > 0.0) << y;
+    for (const double y : {3.0, 4.0, 5.0})  // in full sight
+      EXPECT_EQ(testing::Holding(shadow, {4.0, y, 1.3}, t), nullptr) << y;
+    const auto seen = look({6.0, 7.2, 1.3});
+    for (const double y : {6.5, 7.0, 7.5})
+      EXPECT_EQ(testing::Holding(seen, {4.0, y, 1.3}, t), nullptr) << y;
+    EXPECT_NE(testing::Holding(seen, {4.0, 5.8, 1.3}, t), nullptr);
+  }
+}
+
 TEST(MappingGym, SameInputGivesSameBytes) {
   std::vector<double> first, second;
   for (auto* sink : {&first, &second})
