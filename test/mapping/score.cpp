@@ -76,7 +76,7 @@ void Score::CheckVolume(const Shot& shot, const std::vector<Obstacle>& obstacles
 }
 
 /// A place keeps its id while the obstacle of that id still holds it. Places: the axis of each
-/// pillar or trunk, and surfaces of everything else in squares of 1 m.
+/// pillar or trunk, and of everything else the first point that was hit in squares of 1 m.
 void Score::FollowIds(const Shot& shot, const std::vector<Obstacle>& obstacles) {
   std::map<Cell, Vector3d> places;
   for (const auto& hit : shot.hits) {
@@ -88,12 +88,9 @@ void Score::FollowIds(const Shot& shot, const std::vector<Obstacle>& obstacles) 
       const Vector2d c = solid.center.head<2>();
       places[{hit.solid, 0, 0}] = {c.x(), c.y(), hit.point.z()};
     } else {
-      const Vector2d c = (hit.point.head<2>().array().floor() + 0.5).matrix();
-      const auto [it, is_new] = places.insert(
-          {{hit.solid, static_cast<int>(std::floor(c.x())), static_cast<int>(std::floor(c.y()))},
-           hit.point});
-      if (!is_new && (hit.point.head<2>() - c).norm() < (it->second.head<2>() - c).norm())
-        it->second = hit.point;
+      const auto square = [](double x) { return static_cast<int>(std::floor(x + 0.37)); };
+      const Cell key{hit.solid, square(hit.point.x()), square(hit.point.y())};
+      places[key] = places_.insert({key, hit.point}).first->second;
     }
   }
   for (const auto& [key, p] : places) {

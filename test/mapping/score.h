@@ -62,6 +62,7 @@ class Score {
   const Course& course_;
   const Stage& stage_;
   std::map<Cell, Seen> seen_;
+  std::map<Cell, Eigen::Vector3d> places_;
   std::map<Cell, int> ids_;  ///< of a place on an obstacle: who holds it
   std::vector<std::vector<std::pair<double, Eigen::Vector3d>>> trails_;
 };
