@@ -109,7 +109,6 @@ bool Integrator::PassesReturns(const Voxel& voxel, const Key& key) const {
 }
 
 void Integrator::Miss(const Key& key, VoxelGrid::Column* column, Voxel* voxel) {
-  if (voxel->sweep == sweep_) return;
   if (!voxel->extent.empty() && !PassesReturns(*voxel, key)) return;
   voxel->sweep = sweep_;
   voxel->moving_hits = 0;
@@ -121,7 +120,8 @@ void Integrator::Miss(const Key& key, VoxelGrid::Column* column, Voxel* voxel) {
   if (voxel->free_sweeps == 2) Queue(voxel, key);
 }
 
-/// Walks the cells between two points (Amanatides and Woo 1987), the last one excluded.
+/// Walks the cells between two points of the window (Amanatides and Woo 1987), the last one
+/// excluded. What lies between is in the window too.
 void Integrator::CastRay(const Eigen::Vector3d& origin, const Eigen::Vector3d& end,
                          const Key& last) {
   const Eigen::Vector3d d = end - origin;
@@ -142,12 +142,12 @@ void Integrator::CastRay(const Eigen::Vector3d& origin, const Eigen::Vector3d& e
   }
   VoxelGrid::Column* column = &grid_.Touch(cell[0], cell[1]);
   while (cell[0] != goal[0] || cell[1] != goal[1] || cell[2] != goal[2]) {
-    Miss({cell[0], cell[1], cell[2]}, column, &column->voxels[VoxelGrid::Level(cell[2])]);
+    Voxel& voxel = column->voxels[VoxelGrid::Level(cell[2])];
+    if (voxel.sweep != sweep_) Miss({cell[0], cell[1], cell[2]}, column, &voxel);
     const int i = next[0] < next[1] ? (next[0] < next[2] ? 0 : 2) : (next[1] < next[2] ? 1 : 2);
     if (next[i] > 1.0) return;  // rounding let the ray slip past the last cell
     cell[i] += step[i];
     next[i] += delta[i];
-    if (!grid_.Contains({cell[0], cell[1], cell[2]})) return;
     if (i != 2) column = &grid_.Touch(cell[0], cell[1]);
   }
 }

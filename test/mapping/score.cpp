@@ -118,7 +118,8 @@ void Score::FollowMovers(const Shot& shot, const std::vector<Obstacle>& obstacle
   for (const auto& hit : shot.hits) {
     if (hit.mover < 0) continue;
     ++hits[static_cast<size_t>(hit.mover)];
-    if (t - movers[static_cast<size_t>(hit.mover)].in_sight < 0.5) continue;
+    const double since = movers[static_cast<size_t>(hit.mover)].in_sight;
+    if (since < 0.0 || t - since < 0.5) continue;
     ++mover_points;
     mover_points_held += Holder(obstacles, hit.point, t) != nullptr;
   }
