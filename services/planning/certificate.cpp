@@ -219,6 +219,7 @@ Polynomial DerivativeOf(const Curve& plan, int axis, int order, double duration)
 }
 
 bool KeepsNorm(const Curve& plan, int order, double limit, double duration) {
+  if (plan.rows() <= order) return true;  // of a lower degree: the derivative is zero
   SquareSum sum(static_cast<int>(plan.rows()) - 1 - order, limit * limit);
   for (int a = 0; a < 3; ++a) sum.Add(-1.0, DerivativeOf(plan, a, order, duration));
   return sum.IsPositive();

@@ -165,7 +165,7 @@ void CheckAll(benchmark::State& state) {
       Problem problem = MakeProblem(config, request, nullptr);
       PlaceSkeletons(config, Layout::kNormal, &problem);
       proof.Reset(problem, 0.0, true);
-      if (!fast.Set(problem, proof)) continue;
+      if (!fast.Set(problem, proof) || fast.IsBlocked()) continue;
       const int n = fast.n_candidates();
       std::vector<int> ids(static_cast<size_t>(n + kernels::kPad)), states(ids.size());
       us.push_back(MedianMicroseconds(5, [&] {

@@ -137,6 +137,18 @@ TEST(Ladder, ObstacleOnTheRunningPlanEndsItsCertificate) {
   EXPECT_FALSE(planner->IsCertified(request, plan.trajectory));
 }
 
+TEST(Ladder, AHoverIsCertifiedInFreeSpaceOnly) {
+  const auto planner = MakePlanner("chase", Config());
+  PlanRequest request = Walk();
+  request.start.v.setZero();
+  const world::Trajectory hover =
+      world::Trajectory::Constant(request.start.p, request.t0, request.horizon);
+  request.obstacles = {Pillar(1, 1.0, 4.0, 0.3)};
+  EXPECT_TRUE(planner->IsCertified(request, hover));
+  request.obstacles = {Pillar(1, request.start.p.x(), request.start.p.y(), 0.3)};
+  EXPECT_FALSE(planner->IsCertified(request, hover));
+}
+
 TEST(Ladder, TargetOnTopOfTheDroneIsSurvived) {
   PlanRequest request = Walk();
   request.start.p = request.target.Position(0.0);

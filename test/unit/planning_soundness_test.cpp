@@ -267,7 +267,8 @@ TEST(WholePlans, AreSoundAndTheBest) {
   }
 }
 
-// Every candidate that the kernels clear or condemn, not only the winner.
+// Winner, plan, cost and how many were tested: one candidate cleared or condemned otherwise shows in
+// the counts.
 TEST(Kernels, AllGiveTheSameBits) {
   std::vector<const kernels::Table*> tables = {&kernels::PortableKernels()};
   if (kernels::Avx2Kernels()) tables.push_back(kernels::Avx2Kernels());
