@@ -267,8 +267,8 @@ TEST(WholePlans, AreSoundAndTheBest) {
   }
 }
 
-// Winner, plan, cost and how many were tested: one candidate cleared or condemned otherwise shows in
-// the counts.
+// Winner, plan, cost and how many were tested: one candidate cleared or condemned otherwise shows
+// in the counts.
 TEST(Kernels, AllGiveTheSameBits) {
   std::vector<const kernels::Table*> tables = {&kernels::PortableKernels()};
   if (kernels::Avx2Kernels()) tables.push_back(kernels::Avx2Kernels());
