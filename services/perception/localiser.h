@@ -34,12 +34,8 @@ class Localiser {
   /// All hypotheses that agree with the prediction, weighed and joined into one Gaussian.
   std::optional<FitResult> JoinedReading(FitInput* input) const;
   static FitResult Joined(const std::vector<Hypothesis>& all);
-  void Weigh(const FitInput& input, double log_prior, size_t readings,
+  void Weigh(const FitInput& input, double log_prior, size_t readings, bool all,
              std::vector<Hypothesis>* out) const;
-  /// Logarithm of the density of sides and points where they are the target's.
-  double LogTarget(const FitResult& fit, const FitInput& input) const;
-  /// Logarithm of the density of the sides as they were seen, hidden ones anywhere inside.
-  double LogSides(const FitResult& fit, const FitInput& input) const;
   bool EdgesAgree(const FitResult& fit, const FitInput& input) const;
   bool Agrees(const FitResult& fit, double prior_gate) const;
   TargetGaussian Guess(const Camera& camera, const Detection& detection, double range,

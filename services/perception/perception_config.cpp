@@ -121,6 +121,9 @@ std::string StateConfig::Problem() const {
       .In("hidden_after", hidden_after, 0.01, 5)
       .In("lost_after", lost_after, hidden_after, 60)
       .In("lost_sigma", lost_sigma, 0.1, 20)
+      .In("sure_sigma", sure_sigma, 0.01, 20)
+      .In("standing_after", standing_after, 0, 60)
+      .In("standing_range", standing_range, 0, 100)
       .In("decoy_radius", decoy_radius, 0, 10)
       .In("decoy_memory", decoy_memory, 0, 1e6)
       .Result();

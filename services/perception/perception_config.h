@@ -134,7 +134,7 @@ struct MotionConfig {
   double acceleration_density = 0.5, vertical_density = 0.02;
   double initial_speed_sigma = 1.2, initial_vertical_speed_sigma = 0.1;
   double max_speed = 5.0, hidden_time = 3.0, ground_sigma = 0.15;
-  double floor_sigma = 0.004, pose_sigma = 0.006, tilt_sigma_deg = 0.35, heading_sigma_deg = 0.12;
+  double floor_sigma = 0.003, pose_sigma = 0.005, tilt_sigma_deg = 0.35, heading_sigma_deg = 0.12;
 
   template <class V>
   void Visit(V& v) {
@@ -158,6 +158,7 @@ struct StateConfig {
   double acquire_score = 0.35;
   int confirm_frames = 2;
   double hidden_after = 0.08, lost_after = 5.0, lost_sigma = 3.0;
+  double sure_sigma = 0.6, standing_after = 1.0, standing_range = 10.0;
   double decoy_radius = 0.5, decoy_memory = 60.0;
 
   template <class V>
@@ -167,6 +168,10 @@ struct StateConfig {
     v("hidden_after", hidden_after, "unseen for longer: occluded, s");
     v("lost_after", lost_after, "unseen for longer: lost, s");
     v("lost_sigma", lost_sigma, "horizontal standard deviation above which the target is lost, m");
+    v("sure_sigma", sure_sigma,
+      "horizontal standard deviation of a hidden target above which what is found must drive, m");
+    v("standing_after", standing_after, "what stands is taken for the target after so long, s");
+    v("standing_range", standing_range, "and only nearer than this, m");
     v("decoy_radius", decoy_radius, "look-alikes seen beside the target are refused here, m");
     v("decoy_memory", decoy_memory, "for so long, s");
   }

@@ -20,6 +20,7 @@ void TargetTrack::Predict(double to, const MotionConfig& config) {
   Q.topRightCorner<3, 3>() = (q * dt * dt / 2.0).asDiagonal();
   Q.bottomLeftCorner<3, 3>() = Q.topRightCorner<3, 3>();
   Q.bottomRightCorner<3, 3>() = (q * dt).asDiagonal();
+  if (misses > 0) state.mean[5] = 0.0;  // slopes end, and what was measured of one may be noise
   state.mean = F * state.mean;
   state.covariance = F * state.covariance * F.transpose() + Q;
   t = to;

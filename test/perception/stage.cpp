@@ -18,6 +18,7 @@ constexpr double kTurn = 2.0 * M_PI;
 constexpr double kLevelled = 0.5;  // s that the rail is smoothed over, to either side
 constexpr int kSmoothing = 24;     // samples of that
 constexpr double kGravity = 9.81;
+constexpr double kBraking = 4.0;      // m/s^2, of the drone before the target's start
 constexpr double kScreenTime = 2.6;   // s that a screen takes from side to side
 constexpr double kScreenReach = 3.2;  // m, where it starts and ends beside the line of sight
 constexpr uint64_t kStream = 77;
@@ -55,12 +56,15 @@ double Stage::Delay(double t) const {
   return base_delay_ + delay_swing_ * std::sin(0.45 * t + phase_[0]);
 }
 
-/// Where the target was some seconds ago; straight back from its start before that.
+/// Where the target was some seconds ago; before that straight back from its start, where the drone
+/// comes to a stop as the target starts from one: no step of the speed, which nothing flies.
 Vector2d Stage::Rail(double t) const {
   const double s = start_ + t - Delay(t);
   if (s >= 0.0) return path_.Position(s);
   const Vector2d ahead = (path_.Position(1.0) - path_.Position(0.0)).normalized();
-  return path_.Position(0.0) + scenario_.target.speed * s * ahead;
+  const double v = scenario_.target.speed, braking = v / kBraking;  // s
+  const double back = -s < braking ? 0.5 * kBraking * s * s : v * (-s - 0.5 * braking);
+  return path_.Position(0.0) - back * ahead;
 }
 
 Vector2d Stage::Smooth(double t) const {

@@ -16,6 +16,7 @@ using perception_test::GymWorld;
 using perception_test::kOrange;
 using perception_test::Outcome;
 using perception_test::StillWorld;
+using perception_test::TakenAtOnce;
 using perception_test::Thing;
 using perception_test::World;
 
@@ -102,7 +103,7 @@ TEST(PerceptionFlight, ALookAlikeIsNotTakenWhileTheTargetIsHidden) {
 TEST(PerceptionFlight, ANewTargetElsewhereInTheImageIsTakenAfterALoss) {
   World w = StillWorld(3.0);
   w.target = [](double t) { return Vector3d(3.0, t < 1.0 ? 0.8 : (t < 4.0 ? 40.0 : -0.9), 0.55); };
-  PerceptionConfig config;
+  PerceptionConfig config = TakenAtOnce();
   config.state.lost_after = 2.0;
   FlyOptions options;
   options.duration = 4.6;
@@ -126,7 +127,7 @@ TEST(PerceptionFlight, SizeGivesTheRangeWithoutTheLidar) {
   FlyOptions options;
   options.duration = 1.5;
   options.lidar = false;
-  for (const auto& o : Fly(StillWorld(2.5), {}, options)) {
+  for (const auto& o : Fly(StillWorld(2.5), TakenAtOnce(), options)) {
     if (o.t < 0.3) continue;
     EXPECT_TRUE(Detected(o));
     EXPECT_EQ(o.estimate.n_points, 0);
@@ -171,7 +172,7 @@ TEST(PerceptionFaults, SpoiltImagesAreSaid) {
       if (t >= 0.6) fault.spoil(m);
     };
     double trace = 0.0;
-    for (const auto& o : Fly(StillWorld(2.5), {}, options)) {
+    for (const auto& o : Fly(StillWorld(2.5), TakenAtOnce(), options)) {
       EXPECT_TRUE(o.estimate.p_WT.allFinite() && o.estimate.covariance.allFinite());
       if (o.t > 0.4 && o.t < 0.6) {
         EXPECT_TRUE(Detected(o)) << fault.name;
@@ -195,7 +196,7 @@ TEST(PerceptionFaults, ImagesTornSidewaysDoNotMoveTheTarget) {
     cv::Mat lower = m->rowRange(140, 240), copy = lower.clone();
     copy.colRange(0, 336).copyTo(lower.colRange(40, 376));
   };
-  for (const auto& o : Fly(StillWorld(2.5), {}, options)) {
+  for (const auto& o : Fly(StillWorld(2.5), TakenAtOnce(), options)) {
     if (o.t < 0.3) continue;
     const Vector3d e = o.estimate.p_WT - o.truth;
     EXPECT_LT(e.norm(), 0.15 + 3.0 * std::sqrt(o.estimate.covariance.trace())) << o.t;
@@ -206,7 +207,7 @@ TEST(PerceptionFaults, NoPoseIsSaid) {
   FlyOptions options;
   options.duration = 1.1;
   options.pose_arrives = [](double t) { return t < 0.6; };
-  for (const auto& o : Fly(StillWorld(2.5), {}, options)) {
+  for (const auto& o : Fly(StillWorld(2.5), TakenAtOnce(), options)) {
     if (o.t > 0.4 && o.t < 0.6) {
       EXPECT_TRUE(Detected(o));
     }
@@ -219,7 +220,7 @@ TEST(PerceptionFaults, NoPoseIsSaid) {
   }
   options.pose_arrives = [](double) { return false; };
   options.duration = 0.3;
-  for (const auto& o : Fly(StillWorld(2.5), {}, options)) {
+  for (const auto& o : Fly(StillWorld(2.5), TakenAtOnce(), options)) {
     EXPECT_EQ(o.estimate.state, TargetState::kSearching);
     EXPECT_EQ(o.estimate.note, "no pose");
   }

@@ -28,7 +28,7 @@ class Bench {
       return std::make_unique<Silent>();
     });
     lockstep_.Add("perception", 0, [this](bus::Bus& bus) {
-      auto node = std::make_unique<PerceptionNode>(bus, PerceptionConfig{});
+      auto node = std::make_unique<PerceptionNode>(bus, perception_test::TakenAtOnce());
       node_ = node.get();
       return node;
     });

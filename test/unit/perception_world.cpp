@@ -260,6 +260,12 @@ std::vector<Outcome> Fly(const World& world, const perception::PerceptionConfig&
   return outcomes;
 }
 
+perception::PerceptionConfig TakenAtOnce() {
+  perception::PerceptionConfig config;
+  config.state.standing_after = 0.0;
+  return config;
+}
+
 World StillWorld(double distance) {
   World w;
   w.target = [distance](double) { return Vector3d(distance, 0.0, 0.55); };

@@ -100,6 +100,8 @@ std::vector<Outcome> Fly(const World& world, const perception::PerceptionConfig&
 World GymWorld(uint32_t seed);
 /// Trunks, a target at 3 m/s, drone 3 to 8 m away.
 World ForestWorld(uint32_t seed);
+/// The config of tests with a standing target: it is taken without waiting whether it drives.
+perception::PerceptionConfig TakenAtOnce();
 /// Drone hovering at the origin 1.2 m up, target standing `distance` m ahead, nothing else.
 World StillWorld(double distance);
 

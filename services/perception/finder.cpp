@@ -1,0 +1,158 @@
+#include "services/perception/finder.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "services/perception/image_check.h"
+#include "services/perception/silhouette.h"
+
+namespace chase::perception {
+
+namespace {
+
+constexpr size_t kMaxSweeps = 4;
+constexpr double kOdds = 0.0;           // logarithm of the odds that a sighting needs,
+constexpr double kOddsAfterMiss = 1.5;  // and where the frame before had none
+constexpr double kSureOdds = 8.0;       // and with which no other is tried
+constexpr double kRival = 6.0;          // less, of something else that makes a sighting contested
+constexpr size_t kMostTried = 4;        // detections a track and frame
+constexpr double kLargest = 1.3, kLargestPx = 4.0;  // of pieces together, times what is expected
+constexpr double kTimeJump = 1.0;                   // s back that count as a new recording
+
+bool Overlap(const Detection& a, const Detection& b) { return (a.box & b.box).area() > 0.0; }
+
+}  // namespace
+
+Finder::Finder(const PerceptionConfig& config)
+    : config_(config),
+      detector_(MakeDetector(config.detector, config.fit.edge_sigma_px, config.rig)),
+      localiser_(config) {
+  const double variance = config.fit.shape_sigma * config.fit.shape_sigma;
+  shape_.size = {config.target_radius, config.target_height};
+  shape_.variance = {variance, variance};
+}
+
+void Finder::AddSweep(Sweep sweep) {
+  if (!sweeps_.empty() && sweep.t < sweeps_.back().sweep.t - kTimeJump) sweeps_.clear();
+  sweeps_.push_back({std::move(sweep), false});
+  if (sweeps_.size() > kMaxSweeps) sweeps_.pop_front();
+}
+
+void Finder::MarkSweepsUsed() {
+  for (auto& s : sweeps_) s.used = true;
+}
+
+std::optional<View> Finder::Look(const Frame& frame, std::string* note) const {
+  *note = frame.problem.empty() ? ImageProblem(frame.bgr, config_.rig) : frame.problem;
+  if (!note->empty()) return std::nullopt;
+  const auto pose = poses_.At(frame.t, config_.max_extrapolation);
+  if (!pose) {
+    *note = poses_.Nearest(frame.t, config_.max_pose_age) ? "the pose is too old" : "no pose";
+    return std::nullopt;
+  }
+  View view{frame.t, *pose, CameraAt(*pose, config_.rig), frame.bgr, {}, {}};
+  view.detections = detector_->Detect(frame.bgr);
+  view.taken.assign(view.detections.size(), false);
+  return view;
+}
+
+Clusters Finder::Points(const View& view, const Detection& detection, const Eigen::Vector3d& v_WT,
+                        bool fresh_only) const {
+  Clusters all;
+  for (auto it = sweeps_.rbegin(); it != sweeps_.rend(); ++it) {
+    if ((fresh_only && it->used) || view.t - it->sweep.t > config_.max_sweep_age) continue;
+    if (it->sweep.t > view.t) continue;
+    Clusters clusters = SelectPoints(it->sweep, poses_, view.camera, view.t, detection, v_WT);
+    for (auto& c : clusters) all.push_back(std::move(c));
+    if (!fresh_only) break;  // only the newest
+  }
+  std::stable_sort(all.begin(), all.end(),
+                   [](const auto& a, const auto& b) { return a.front().range < b.front().range; });
+  return all;
+}
+
+std::optional<Sighting> Finder::Try(const TargetTrack& track, const View& view,
+                                    const Detection& detection, bool fresh_sweeps_only) const {
+  FitInput input;
+  input.prior = track.state;
+  input.shape = track.shape;
+  input.camera = view.camera;
+  input.detection = &detection;
+  const auto fit =
+      localiser_.Correct(input, Points(view, detection, track.state.velocity(), fresh_sweeps_only));
+  if (!fit || fit->log_odds < (track.misses > 0 ? kOddsAfterMiss : kOdds)) return std::nullopt;
+  return Sighting{*fit, detection, fit->n_points};
+}
+
+std::optional<Sighting> Finder::FindWhole(const TargetTrack& track, const View& view,
+                                          const std::vector<size_t>& inside, const Refuses& refuses,
+                                          const SearchBoxes& boxes) const {
+  std::vector<Sighting> found;
+  std::vector<cv::Rect> tried;
+  for (const size_t i : inside) {
+    if (tried.size() >= kMostTried) break;
+    const auto piece = Within(boxes, view.bgr, view.detections[i]);
+    if (!piece || std::count(tried.begin(), tried.end(), piece->mask_box) > 0) continue;
+    tried.push_back(piece->mask_box);
+    const auto s = Try(track, view, *piece, true);
+    if (!s || refuses(*s)) continue;
+    found.push_back(*s);
+    if (track.misses == 0 && s->fit.whole && s->fit.log_odds > kSureOdds) break;
+  }
+  if (found.empty()) return std::nullopt;
+  auto best = *std::max_element(found.begin(), found.end(), [](const auto& a, const auto& b) {
+    return a.fit.log_odds < b.fit.log_odds;
+  });
+  best.contested = std::any_of(found.begin(), found.end(), [&](const Sighting& s) {
+    return s.fit.log_odds > best.fit.log_odds - kRival && !Overlap(s.detection, best.detection);
+  });
+  return best;
+}
+
+/// Pieces of one thing, parted by what hides it.
+std::optional<Sighting> Finder::FindPieces(const TargetTrack& track, const View& view,
+                                           const std::vector<size_t>& inside,
+                                           const SearchBoxes& boxes) const {
+  if (inside.size() < 2 || inside.size() > kMostTried) return std::nullopt;
+  std::vector<Detection> pieces;
+  for (const size_t i : inside)
+    if (!view.detections[i].mask.empty()) pieces.push_back(view.detections[i]);
+  if (pieces.size() < 2) return std::nullopt;
+  const Detection merged = Merge(view.bgr, pieces);
+  const auto too_large = [](double seen, double wanted) {
+    return seen > kLargest * wanted + kLargestPx;
+  };
+  if (too_large(merged.box.width, boxes.expected.width) ||
+      too_large(merged.box.height, boxes.expected.height))
+    return std::nullopt;
+  return Try(track, view, merged, true);
+}
+
+std::optional<Sighting> Finder::Find(const TargetTrack& track, View* view,
+                                     const Refuses& refuses) const {
+  const auto boxes = WhereToLook(track, view->camera);
+  if (!boxes) return std::nullopt;
+  std::vector<size_t> inside;
+  for (size_t i = 0; i < view->detections.size(); ++i)
+    if (!view->taken[i] && (view->detections[i].box & boxes->search).area() > 0.0)
+      inside.push_back(i);
+  std::stable_sort(inside.begin(), inside.end(), [&](size_t a, size_t b) {
+    return Likeness(view->detections[a].box, *boxes) > Likeness(view->detections[b].box, *boxes);
+  });
+  if (inside.size() > kMostTried) inside.resize(kMostTried);
+  auto best = FindWhole(track, *view, inside, refuses, *boxes);
+  if (!best) best = FindPieces(track, *view, inside, *boxes);
+  if (best)
+    for (const size_t i : inside)
+      view->taken[i] = view->taken[i] || Overlap(view->detections[i], best->detection);
+  return best;
+}
+
+std::optional<Sighting> Finder::Acquire(const View& view, const Detection& detection) const {
+  const auto fit = localiser_.Acquire(shape_, view.camera, detection,
+                                      Points(view, detection, Eigen::Vector3d::Zero(), false));
+  if (!fit) return std::nullopt;
+  return Sighting{*fit, detection, fit->n_points};
+}
+
+}  // namespace chase::perception

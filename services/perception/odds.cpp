@@ -1,0 +1,73 @@
+#include "services/perception/odds.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace chase::perception {
+
+namespace {
+
+constexpr double kHidden = 0.02;    // how often a given side is hidden
+constexpr double kRunsOn = 0.01;    // how often a like colour goes on beyond a side,
+constexpr double kRunsOnToo = 0.3;  // and beyond another one then
+
+// What else has the target's colour: so many blobs a frame, anywhere in the image, sides so far
+// apart, as far away as may be.
+constexpr double kClutter = 0.3, kClutterSidePx = 60.0, kClutterDepth = 10.0;
+constexpr double kUnexplained = 0.5, kMostUnexplained = 6.0;  // for points at other ranges
+
+/// Density of the sides as they were seen, hidden ones anywhere inside.
+double LogSides(const FitResult& fit, const FitInput& input, const FitConfig& config) {
+  const double sigma = input.detection->silhouette.sigma_px / std::sqrt(config.edge_weight);
+  const double range = (fit.posterior.position() - input.camera.p_WC).norm();
+  const double px = input.camera.rig.focal_px / std::max(0.2, range);
+  double sum = 0.0;
+  double runs_on = kRunsOn;
+  for (size_t side = 0; side < 4; ++side) {
+    if (input.detection->silhouette.samples[side].empty()) continue;
+    const double extent = std::max(
+        2.0,
+        px * (side == kLeft || side == kRight ? 2.0 * input.shape.size[0] : input.shape.size[1]));
+    if (fit.used[side]) {
+      sum -= std::log(sigma * std::sqrt(2.0 * M_PI));
+    } else if (fit.edge_px[side] < 0.0) {
+      sum += std::log(kHidden / extent);
+    } else {
+      sum += std::log(runs_on / extent);
+      runs_on = kRunsOnToo;
+    }
+  }
+  return sum;
+}
+
+}  // namespace
+
+double LogTarget(const FitResult& fit, const FitInput& input, const FitConfig& config) {
+  double sum = fit.log_evidence + LogSides(fit, input, config);
+  if (fit.n_points > 0) {
+    const double n = std::min(config.lidar_weight, static_cast<double>(fit.n_points));
+    sum -= std::log(config.lidar_sigma / std::sqrt(n) * std::sqrt(2.0 * M_PI));
+  }
+  return sum;
+}
+
+double LogClutter(const FitInput& input) {
+  const auto& samples = input.detection->silhouette.samples;
+  const auto& rig = input.camera.rig;
+  double sum = std::log(kClutter);
+  const auto add = [&](Side a, Side b, double extent) {
+    const int seen = !samples[a].empty() + !samples[b].empty();
+    if (seen > 0) sum -= std::log(extent);
+    if (seen > 1) sum -= std::log(kClutterSidePx);
+  };
+  add(kLeft, kRight, rig.width_px);
+  add(kTop, kBottom, rig.height_px);
+  if (!input.points.empty()) sum -= std::log(kClutterDepth);
+  return sum;
+}
+
+double LogUnexplained(double unexplained) {
+  return std::min(kMostUnexplained, kUnexplained * unexplained);
+}
+
+}  // namespace chase::perception

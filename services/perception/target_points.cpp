@@ -1,0 +1,75 @@
+#include "services/perception/target_points.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace chase::perception {
+
+namespace {
+
+constexpr size_t kMinPoints = 3;    // of a cluster that gives a range
+constexpr size_t kMostPoints = 40;  // in a fit
+constexpr int kManyPoints = 5;      // that went through it: the target is not there
+constexpr double kCore = 0.6;       // share of the cylinder that such a ray goes through
+constexpr double kBehind = 0.25;    // m behind the target where such a ray ends at least
+
+double SurfaceDistance(const TargetPoint& point, const FitInput& input) {
+  const Eigen::Vector3d q =
+      point.p_W - (input.prior.position() - point.age * input.prior.velocity());
+  const double side = q.head<2>().norm() - input.shape.size[0];
+  const double cap = std::abs(q.z()) - 0.5 * input.shape.size[1];
+  return side > 0.0 && cap > 0.0 ? std::hypot(side, cap) : std::max(side, cap);
+}
+
+/// True when the lidar looked well through where the target should be, and hit something behind.
+bool SawThrough(const TargetPoint& point, const FitInput& input) {
+  const Eigen::Vector3d center = input.prior.position() - point.age * input.prior.velocity();
+  const Eigen::Vector3d ray = point.p_W - point.p_WL, to_center = center - point.p_WL;
+  const double length = std::max(1e-6, ray.head<2>().norm());
+  const double along = ray.head<2>().dot(to_center.head<2>()) / length;
+  const double beside = std::abs(ray.x() * to_center.y() - ray.y() * to_center.x()) / length;
+  const double above = point.p_WL.z() + along / length * ray.z() - center.z();
+  return beside < kCore * input.shape.size[0] &&
+         std::abs(above) < kCore * 0.5 * input.shape.size[1] &&
+         length > along + input.shape.size[0] + kBehind + 2.0 * RangeSigma(input);
+}
+
+}  // namespace
+
+double RangeSigma(const FitInput& input) {
+  const Eigen::Vector3d sight = (input.prior.position() - input.camera.p_WC).normalized();
+  return std::sqrt(sight.dot(input.prior.covariance.topLeftCorner<3, 3>() * sight));
+}
+
+std::vector<TargetPoint> PointsOnTarget(const FitInput& input,
+                                        const std::vector<TargetPoint>& cluster, double gate) {
+  std::vector<TargetPoint> kept;
+  for (const auto& p : cluster)
+    if (std::abs(SurfaceDistance(p, input)) < gate) kept.push_back(p);
+  if (!GivesRange(kept)) return {};
+  const size_t step = 1 + kept.size() / kMostPoints;  // more would not tell more
+  std::vector<TargetPoint> some;
+  for (size_t i = 0; i < kept.size(); i += step) some.push_back(kept[i]);
+  return some;
+}
+
+bool SeenThrough(const FitInput& input, const Clusters& clusters) {
+  int count = 0;
+  for (const auto& cluster : clusters)
+    for (const auto& p : cluster) count += SawThrough(p, input);
+  return count >= kManyPoints;
+}
+
+double CountPoints(const Clusters& clusters) {
+  size_t count = 0;
+  for (const auto& cluster : clusters) count += cluster.size();
+  return static_cast<double>(count);
+}
+
+double MedianRange(const std::vector<TargetPoint>& cluster) {
+  return cluster[cluster.size() / 2].range;
+}
+
+bool GivesRange(const std::vector<TargetPoint>& cluster) { return cluster.size() >= kMinPoints; }
+
+}  // namespace chase::perception

@@ -1,0 +1,133 @@
+// Things that look just like the target: what drives is the target, what stands is not.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "perception_world.h"
+#include "services/perception/candidate.h"
+
+namespace chase::perception {
+namespace {
+
+using Eigen::Vector3d;
+using perception_test::Fly;
+using perception_test::FlyOptions;
+using perception_test::kOrange;
+using perception_test::Outcome;
+using perception_test::StillWorld;
+using perception_test::Thing;
+using perception_test::World;
+
+double Error(const Outcome& o) { return (o.estimate.p_WT - o.truth).norm(); }
+bool Detected(const Outcome& o) {
+  return o.estimate.state == TargetState::kTracking && o.estimate.box.width > 0.0;
+}
+bool Inside(const Outcome& o, double gate) {
+  const Vector3d e = o.estimate.p_WT - o.truth;
+  return e.dot(o.estimate.covariance.ldlt().solve(e)) < gate;
+}
+
+/// Just like the target.
+Thing Twin(double x, double y) {
+  return {Thing::Kind::kCylinder, {x, y, 0.55}, {0.15, 0.15, 0.25}, kOrange};
+}
+
+Candidate CandidateAt(const Vector3d& first, const Vector3d& now, double sigma) {
+  Candidate c;
+  c.first.mean << first, Vector3d::Zero();
+  c.first.covariance = sigma * sigma * Matrix6d::Identity();
+  c.track.state = c.first;
+  c.track.state.mean.head<3>() = now;
+  c.px = 3.0 / 220.0;
+  return c;
+}
+
+TEST(PerceptionCandidate, DrivesOnceItsWayIsMoreThanItsErrorsAndItsEdges) {
+  const Vector3d p(3.0, 0.0, 0.55);
+  EXPECT_FALSE(CandidateAt(p, p, 0.01).Drives());
+  EXPECT_FALSE(CandidateAt(p, p + Vector3d(0.05, 0.0, 0.0), 0.001).Drives());
+  EXPECT_TRUE(CandidateAt(p, p + Vector3d(0.0, 0.10, 0.0), 0.01).Drives());
+  EXPECT_FALSE(CandidateAt(p, p + Vector3d(0.0, 0.10, 0.0), 0.05).Drives());
+  EXPECT_FALSE(CandidateAt(p, p + Vector3d(0.0, 0.0, 1.0), 0.01).Drives()) << "up is not away";
+}
+
+TEST(PerceptionAlike, WhatStandsIsTakenAfterAWhile) {
+  FlyOptions options;
+  options.duration = 1.5;
+  PerceptionConfig config;
+  for (const auto& o : Fly(StillWorld(2.5), config, options)) {
+    if (o.t < config.state.standing_after) {
+      EXPECT_EQ(o.estimate.state, TargetState::kSearching) << o.t;
+      EXPECT_GT(o.estimate.covariance(0, 0), 100.0) << o.t;
+    }
+    if (o.t > config.state.standing_after + 0.15) {
+      EXPECT_TRUE(Detected(o) && Error(o) < 0.1) << o.t;
+    }
+  }
+}
+
+TEST(PerceptionAlike, WhatDrivesIsTakenAtOnce) {
+  for (const double heading : {0.0, 0.8, 1.6, 2.4, 3.1}) {
+    World w = StillWorld(3.0);
+    w.target = [heading](double t) {
+      return Vector3d(3.0 + 0.8 * t * std::cos(heading), 0.8 * t * std::sin(heading), 0.55);
+    };
+    FlyOptions options;
+    options.duration = 0.8;
+    for (const auto& o : Fly(w, {}, options))
+      if (o.t > 0.5) {
+        EXPECT_TRUE(Detected(o) && Error(o) < 0.15) << "heading " << heading << ", t " << o.t;
+      }
+  }
+}
+
+TEST(PerceptionAlike, OfTwoAlikeTheOneThatDrivesIsTheTarget) {
+  World w = StillWorld(3.0);  // the twin is nearer the middle; the target starts at 1.5 s
+  w.things.push_back(Twin(3.0, 0.1));
+  w.target = [](double t) { return Vector3d(3.2, -0.9 - 0.6 * std::max(0.0, t - 1.5), 0.55); };
+  FlyOptions options;
+  options.duration = 2.6;
+  int tracked = 0;
+  for (const auto& o : Fly(w, {}, options)) {
+    if (o.t < 2.3) continue;
+    tracked += Detected(o);
+    EXPECT_LT(Error(o), 0.2) << o.t;
+  }
+  EXPECT_GE(tracked, 5);
+}
+
+/// A wall hides the target, which stops behind it for 3 s and goes on; a twin stands in view.
+TEST(PerceptionAlike, ALongStopBehindAWallIsEndedByTheTargetAndNotByItsTwin) {
+  World w = StillWorld(3.5);
+  w.things.push_back({Thing::Kind::kBox, {2.2, 0.0, 1.0}, {0.05, 0.55, 1.0}, {0.5, 0.6, 0.7}});
+  w.things.push_back(Twin(4.2, 1.75));
+  w.target = [](double t) {
+    const double driven = std::min(t, 1.8) + std::max(0.0, t - 4.8);
+    return Vector3d(3.5, -1.35 + 0.8 * driven, 0.55);
+  };
+  FlyOptions options;
+  options.duration = 7.2;
+  double back_since = -1.0, found = -1.0;
+  int hidden = 0, said = 0;
+  for (const auto& o : Fly(w, {}, options)) {
+    if (o.t < 0.5) continue;
+    if (Detected(o)) {
+      EXPECT_LT(Error(o), 0.3) << o.t;
+    }
+    if (o.visible_share == 0.0) {
+      ++hidden;
+      said += o.estimate.state == TargetState::kOccluded;
+      EXPECT_TRUE(Inside(o, 16.3)) << o.t << " error " << Error(o);  // 99.9 %
+    }
+    if (hidden > 0 && o.visible_share >= 0.5 && back_since < 0.0) back_since = o.t;
+    if (back_since > 0.0 && found < 0.0 && Detected(o)) found = o.t;
+  }
+  EXPECT_GT(hidden, 70);
+  EXPECT_GE(said, hidden - 2);
+  ASSERT_GT(back_since, 0.0);
+  ASSERT_GT(found, 0.0);
+  EXPECT_LE(found, back_since + 0.3);
+}
+
+}  // namespace
+}  // namespace chase::perception
