@@ -4,15 +4,15 @@
 #include <array>
 #include <cmath>
 
-#include "services/odometry/cell_index.h"
-
 namespace chase::odometry {
 
 namespace {
 
 constexpr int kRings = 128;
 constexpr int kSectors = 6;
-constexpr float kLongestSweep = 0.2f;  // s
+constexpr float kLongestSweep = 0.2f;     // s
+constexpr double kBetweenBeams = 0.0035;  // rad along a ring, about
+constexpr double kBetweenRings = 0.035;   // rad, of a sensor of 16 rings
 
 bool Usable(const FeatureConfig& config, const SweepPoint& point) {
   if (!point.p.allFinite() || !(point.t >= 0.0f && point.t <= kLongestSweep)) return false;
@@ -142,16 +142,19 @@ FeatureSet ExtractFeatures(const FeatureConfig& config, const std::vector<SweepP
   return features;
 }
 
-std::vector<int> Thinned(const std::vector<SweepPoint>& points, const std::vector<int>& indices,
-                         double size) {
-  CellIndex seen(indices.size());
+std::vector<int> Thinning::Evenly(const std::vector<SweepPoint>& points,
+                                  const std::vector<int>& indices, int wanted) {
   std::vector<int> kept;
+  double due = 0.0;
   for (int i : indices) {
-    bool added = false;
-    seen.FindOrAdd(CellKey(points[static_cast<size_t>(i)].p, static_cast<float>(1.0 / size)),
-                   &added);
-    if (added) kept.push_back(i);
+    const double r = static_cast<double>(points[static_cast<size_t>(i)].p.norm()) / size_;
+    due += std::min(1.0, kBetweenBeams * r) * std::min(1.0, kBetweenRings * r);
+    if (due < 1.0) continue;
+    due -= 1.0;
+    kept.push_back(i);
   }
+  const double ratio = static_cast<double>(kept.size()) / wanted;
+  size_ = std::clamp(size_ * std::sqrt(std::clamp(ratio, 0.5, 2.0)), 0.001, 3.0);
   return kept;
 }
 

@@ -42,8 +42,18 @@ void RemoveUnusable(const FeatureConfig& config, std::vector<SweepPoint>* points
 /// the view.
 FeatureSet ExtractFeatures(const FeatureConfig& config, const std::vector<SweepPoint>& points);
 
-/// Keeps the first of `indices` in every cube of edge `size` m, in their order.
-std::vector<int> Thinned(const std::vector<SweepPoint>& points, const std::vector<int>& indices,
-                         double size);
+/// Takes features so that each stands for about the same area of what the sensor sees. The choice
+/// goes by the density of the beams at the point's range alone: whoever takes one point of every
+/// cube of space prefers those that noise has pushed into a cube of their own, in the sense of the
+/// revolution, and turns the pose by a milliradian.
+class Thinning {
+ public:
+  /// About `wanted` of `indices` in their order; the area is adapted from call to call.
+  std::vector<int> Evenly(const std::vector<SweepPoint>& points, const std::vector<int>& indices,
+                          int wanted);
+
+ private:
+  double size_ = 0.1;  // edge of the area, m
+};
 
 }  // namespace chase::odometry

@@ -184,9 +184,8 @@ bool Odometry::Prepare(Pending pending, Prepared* prepared) {
   }
   prepared->sweep = std::move(sweep);
   prepared->features = ExtractFeatures(config_.features, prepared->sweep.points);
-  prepared->matched_planes = Thinned(prepared->sweep.points, prepared->features.planes, thin_size_);
-  const double ratio = static_cast<double>(prepared->matched_planes.size()) / config_.match_points;
-  thin_size_ = std::clamp(thin_size_ * std::sqrt(std::clamp(ratio, 0.5, 2.0)), 0.05, 3.0);
+  prepared->matched_planes =
+      thinning_.Evenly(prepared->sweep.points, prepared->features.planes, config_.match_points);
   prepared->track = {base_};
   prepared->predicted = base_;
   imu_.Advance(prepared->end, &prepared->predicted, &prepared->track);

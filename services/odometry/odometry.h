@@ -114,7 +114,7 @@ class Odometry {
   NavState live_;             // at the newest sample
   std::deque<Pending> pending_;
   std::optional<Prepared> first_;  // of a start without IMU, until the velocity is known
-  double thin_size_ = 0.3;         // m
+  Thinning thinning_;
   int64_t dropped_sweeps_ = 0, dropped_samples_ = 0;
 };
 

@@ -5,6 +5,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <fstream>
 #include <functional>
 #include <limits>
 #include <map>
@@ -105,6 +106,30 @@ std::string NeesSeries(const std::vector<Pair>& pairs) {
   return out;
 }
 
+/// Ten times a second, as CSV: the errors (rotation error in W) and what POSE says of them.
+void WriteSeries(const std::vector<Pair>& pairs, const std::string& path) {
+  std::ofstream out(path);
+  out << "t,ex,ey,ez,rx,ry,rz,vx,vy,vz,sx,sy,sz,srx,sry,srz,nees_p,nees_yaw,px,py,pz,wx,wy,wz\n";
+  double next = pairs.front().t;
+  for (const Pair& pair : pairs) {
+    if (pair.t < next - 1e-6) continue;
+    next += 0.1;
+    const Vector3d e = pair.Error(), p = pair.X_truth.translation();
+    const Vector3d r = math::LogSO3(
+        Eigen::Quaterniond(pair.X_estimate.linear() * pair.X_truth.linear().transpose()));
+    const auto sigma = [&](int i) { return std::sqrt(pair.estimate.covariance[10 * i]); };
+    const double* w = pair.estimate.rotation_rate;
+    out << fmt::format("{:.3f},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f},{:.5f},{:.5f},{:.5f},",
+                       pair.t, e.x(), e.y(), e.z(), r.x(), r.y(), r.z(), pair.dv.x(), pair.dv.y(),
+                       pair.dv.z());
+    out << fmt::format("{:.6f},{:.6f},{:.6f},{:.6f},{:.6f},{:.6f},{:.4f},{:.4f},", sigma(0),
+                       sigma(1), sigma(2), sigma(6), sigma(7), sigma(8), PositionNees(pair),
+                       YawNees(pair));
+    out << fmt::format("{:.3f},{:.3f},{:.3f},{:.4f},{:.4f},{:.4f}\n", p.x(), p.y(), p.z(), w[0],
+                       w[1], w[2]);
+  }
+}
+
 /// First mission time from `from` on at which the health is (not) OK; -1: never.
 double FirstHealth(const std::vector<Pair>& all, double from, bool ok) {
   for (const Pair& pair : all)
@@ -187,6 +212,7 @@ std::string Judge(const JudgeOptions& options) {
         ",\"said_after_s\":{:.3f},\"well_after_s\":{:.3f},\"worst_from_fault_m\":{:.4f}",
         said < 0.0 ? -1.0 : said - options.fault_at, well < 0.0 ? -1.0 : well - over, on_the_way);
   }
+  if (!options.series.empty()) WriteSeries(pairs, options.series);
   return out + fmt::format(",\"nees\":[{}]}}", NeesSeries(pairs));
 }
 

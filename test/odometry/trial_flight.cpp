@@ -70,6 +70,10 @@ simulator::SimulatorConfig SimulatorFor(const FlightOptions& options) {
   config.seed = options.seed;
   config.sensors = "raw";
   config.camera.rate = 0.0;
+  for (double* sigma : {&config.lidar.noise, &config.lidar.dropout, &config.imu.accel_noise,
+                        &config.imu.gyro_noise, &config.imu.accel_bias, &config.imu.gyro_bias,
+                        &config.imu.accel_walk, &config.imu.gyro_walk})
+    *sigma *= options.noise;
   return config;
 }
 

@@ -7,6 +7,7 @@ namespace chase::odometry::trial {
 struct FlightOptions {
   std::string scenario, course = "follow";
   int64_t seed = 1;
+  double noise = 1.0;   ///< factor on the noise, biases and dropouts of the sensors
   double until = -1.0;  ///< mission time, s; negative: the scenario's end
   std::string fault = "none";
   double fault_at = 10.0;  ///< mission time, s

@@ -20,6 +20,7 @@ void AddFlightOptions(CLI::App* app, Arguments* a) {
   app->add_option("scenario", a->flight.scenario, "scenario file")->required();
   app->add_option("--course", a->flight.course, "follow, aggressive, hover or rest");
   app->add_option("--seed", a->flight.seed, "of all noise");
+  app->add_option("--noise", a->flight.noise, "factor on the sensors' noise; 0: exact sensors");
 }
 
 int Run(int argc, char** argv) {
@@ -41,6 +42,7 @@ int Run(int argc, char** argv) {
   judge->add_option("--until", a.judge.until, "mission time, s");
   judge->add_option("--fault-at", a.judge.fault_at, "mission time, s");
   judge->add_option("--fault-length", a.judge.fault_length, "s");
+  judge->add_option("--series", a.judge.series, "CSV of the errors over time to write");
   CLI::App* endure = app.add_subcommand("endure", "memory over a long flight with odometry");
   AddFlightOptions(endure, &a);
   endure->add_option("--minutes", a.minutes, "simulated");
