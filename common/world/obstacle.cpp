@@ -15,6 +15,10 @@ double SegmentSquaredDistance(const Eigen::Vector3d& p, const Eigen::Vector3d& q
 }
 
 Eigen::Matrix3d Inflated(const Eigen::Matrix3d& R, double margin) {
+  if (R(0, 1) == 0.0 && R(0, 2) == 0.0 && R(1, 2) == 0.0) {  // the axes are those of the frame
+    const Eigen::Array3d radius = R.diagonal().array().sqrt().inverse() + margin;
+    return radius.square().inverse().matrix().asDiagonal();
+  }
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(R);
   const Eigen::Array3d radius = eigen.eigenvalues().array().rsqrt() + margin;
   return eigen.eigenvectors() * radius.square().inverse().matrix().asDiagonal() *

@@ -1,6 +1,7 @@
 #include "services/planning/candidate_set.h"
 
 #include <Eigen/Cholesky>
+#include <algorithm>
 #include <cmath>
 
 #include "common/math/bernstein.h"
@@ -58,13 +59,138 @@ CandidateTables::CandidateTables(const PlannerConfig& config, int degree_, int s
     }
 }
 
+const CandidateTables& TableShelf::Get(int degree, int steps, double duration) {
+  constexpr size_t kKept = 8;
+  for (const CandidateTables& t : tables_)
+    if (t.degree == degree && t.steps == steps && t.duration == duration) return t;
+  if (tables_.size() < kKept) {
+    tables_.reserve(kKept);
+    tables_.emplace_back(config_, degree, steps, duration);
+    return tables_.back();
+  }
+  next_ = (next_ + 1) % kKept;
+  return tables_[next_] = CandidateTables(config_, degree, steps, duration);
+}
+
+namespace {
+
+void Extend(const Points& points, int n, Box* box) {
+  for (int i = 0; i < n; ++i) {
+    box->low = box->low.min(points.row(i).transpose().array());
+    box->high = box->high.max(points.row(i).transpose().array());
+  }
+}
+
+// From the box to the nearest place of the centre, per axis; negative where they overlap.
+Eigen::Array3d GapTo(const Box& box, const Curve& center) {
+  Eigen::Array3d low = center.row(0).transpose().array(), high = low;
+  for (Eigen::Index k = 1; k < center.rows(); ++k) {  // tau^k is in [0,1]
+    low += center.row(k).transpose().array().min(0.0);
+    high += center.row(k).transpose().array().max(0.0);
+  }
+  return (low - box.high).max(box.low - high);
+}
+
+}  // namespace
+
+Box BoxOf(const Points& points, int n, double beyond) {
+  Box box{Eigen::Array3d::Constant(HUGE_VAL), Eigen::Array3d::Constant(-HUGE_VAL)};
+  Extend(points, n, &box);
+  box.low -= beyond;
+  box.high += beyond;
+  return box;
+}
+
+bool Contains(const Box& box, const Curve& curve) {
+  if (curve.rows() > 7) return false;
+  const Points points = ToPoints(curve, 6);
+  for (int i = 0; i < 7; ++i)
+    for (int a = 0; a < 3; ++a)
+      if (!(points(i, a) >= box.low[a] && points(i, a) <= box.high[a])) return false;
+  return true;
+}
+
+// Along an axis the ellipsoid reaches the root of an entry of the inverse of R from its centre.
+bool MayTouch(const Box& box, const Curve& center, const Eigen::Matrix3d& R, double by) {
+  const double minor[3] = {R(1, 1) * R(2, 2) - R(1, 2) * R(1, 2),
+                           R(0, 0) * R(2, 2) - R(0, 2) * R(0, 2),
+                           R(0, 0) * R(1, 1) - R(0, 1) * R(0, 1)};
+  const double det = R(0, 0) * minor[0] - R(0, 1) * (R(0, 1) * R(2, 2) - R(1, 2) * R(0, 2)) +
+                     R(0, 2) * (R(0, 1) * R(1, 2) - R(1, 1) * R(0, 2));
+  // An ill-conditioned inverse is not trusted.
+  if (!(det > 1e-9 * R(0, 0) * R(1, 1) * R(2, 2))) return true;
+  const Eigen::Array3d gap = GapTo(box, center);
+  for (int a = 0; a < 3; ++a)
+    if (gap[a] > 0.0 && gap[a] * gap[a] * det > 1.001 * by * by * minor[a]) return false;
+  return true;
+}
+
+void LimitToReach(const PlannerConfig& config, const CandidateTables& t, double beyond,
+                  Problem* problem) {
+  problem->reach.reset();
+  const int M = t.degree;
+  if (!config.exact_visibility || problem->target.rows() > M + 1) return;
+  const Points start = ToPoints(problem->start, M);
+  Box box = BoxOf(ToPoints(problem->target, M), M + 1, 0.0);
+  Extend(start, 4, &box);
+  Eigen::Array3d low[3], high[3];
+  for (int f = 0; f < M - 3; ++f)
+    low[f] = high[f] = (t.fixed.row(f) * start.topRows<4>()).transpose().array();
+  for (size_t n = 0; n < problem->skeletons.size(); ++n) {
+    Eigen::Array3d least = Eigen::Array3d::Constant(HUGE_VAL), most = -least;
+    for (const Eigen::Vector3d& u : problem->skeletons[n]) {
+      least = least.min(u.array());
+      most = most.max(u.array());
+    }
+    for (int f = 0; f < M - 3; ++f) {
+      const double pull = t.pull(f, static_cast<Eigen::Index>(n));
+      low[f] += pull * (pull > 0.0 ? least : most);
+      high[f] += pull * (pull > 0.0 ? most : least);
+    }
+  }
+  for (int f = 0; f < M - 3; ++f) {
+    box.low = box.low.min(low[f] - beyond);
+    box.high = box.high.max(high[f] + beyond);
+  }
+  const double size = std::max(box.low.abs().maxCoeff(), box.high.abs().maxCoeff());
+  if (!(size < 1e6)) return;
+  box.low -= 1e-6 + 1e-9 * size;
+  box.high += 1e-6 + 1e-9 * size;
+  problem->reach = box;
+  problem->near.clear();
+  for (size_t j = 0; j < problem->obstacles.size(); ++j) {
+    const Ellipsoid& e = problem->obstacles[j];
+    if (MayTouch(box, e.center, e.safety, std::max(1.0, config.cost_range)) ||
+        MayTouch(box, e.center, e.sight, 1.0))
+      problem->near.push_back(static_cast<int>(j));
+  }
+}
+
+namespace {
+
+/// weight[n][j][k] = C(j,k) / C(n,k): share of power coefficient k in control point j.
+struct Elevation {
+  double weight[7][7][7];
+  Elevation() : weight() {
+    for (int n = 0; n < 7; ++n)
+      for (int j = 0; j <= n; ++j)
+        for (int k = 0; k <= j; ++k) weight[n][j][k] = math::Binomial(j, k) / math::Binomial(n, k);
+  }
+};
+const Elevation kElevation;
+
+}  // namespace
+
 Points ToPoints(const Curve& power, int degree) {
   Points b = Points::Zero();
-  for (int j = 0; j <= degree; ++j) {
-    double weight = 1.0;  // C(j,k) / C(degree,k)
-    for (int k = 0; k <= j && k < power.rows(); ++k) {
-      b.row(j) += weight * power.row(k);
-      weight *= static_cast<double>(j - k) / (degree - k);
+  const int rows = static_cast<int>(power.rows());
+  for (int a = 0; a < 3; ++a) {
+    const double* c = power.data() + a * power.rows();
+    for (int j = 0; j <= degree; ++j) {
+      const double* weight = kElevation.weight[degree][j];
+      double sum = 0.0;
+      for (int k = 0; k <= j && k < rows; ++k) sum += weight[k] * c[k];
+      b(j, a) = sum;
     }
   }
   return b;

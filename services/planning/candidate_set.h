@@ -8,6 +8,9 @@
 
 namespace chase::planning {
 
+/// Control points of a curve, rows b0..bM; those above its degree are zero.
+using Points = Eigen::Matrix<double, 7, 3>;
+
 /// What depends on horizon, degree and number of steps only. Candidates in Bernstein form over
 /// normalised time: the start fixes b0..b3, and the objective (11) of Jeon 2021 makes the free
 /// points b4.. affine in those and in the skeletons: b_f = sum_i fixed(f,i) b_i + sum_n pull(f,n)
@@ -25,8 +28,38 @@ struct CandidateTables {
   CandidateTables(const PlannerConfig& config, int degree, int steps, double duration);
 };
 
-/// Control points, rows b0..bM, of a curve of lower or equal degree.
-using Points = Eigen::Matrix<double, 7, 3>;
+/// The tables that were asked for last.
+class TableShelf {
+ public:
+  explicit TableShelf(const PlannerConfig& config) : config_(config) {}
+  /// Valid until another seven have been asked for.
+  const CandidateTables& Get(int degree, int steps, double duration);
+
+ private:
+  PlannerConfig config_;
+  std::vector<CandidateTables> tables_;
+  size_t next_ = 0;
+};
+
+/// Of the first n points, grown by `beyond` m.
+Box BoxOf(const Points& points, int n, double beyond);
+
+/// Whether the control points of the curve, of degree 6 at most, lie in the box.
+bool Contains(const Box& box, const Curve& curve);
+
+/// False only when the ellipsoid about the centre's path, grown `by` times, has no point in the
+/// box.
+bool MayTouch(const Box& box, const Curve& center, const Eigen::Matrix3d& R, double by);
+
+/// Sets `reach` to what holds all candidates, the target, and plans whose control points are at
+/// most `beyond` m from a candidate's; and `near` to the obstacles whose bounding boxes come into
+/// it, grown to where they cost anything. The others neither touch the box nor hide anything in it:
+/// it is convex. Does nothing where degrees are above the candidates', nor for the paper's bound on
+/// sight, which may fail for them.
+void LimitToReach(const PlannerConfig& config, const CandidateTables& tables, double beyond,
+                  Problem* problem);
+
+/// Control points of the curve at the given degree.
 Points ToPoints(const Curve& power, int degree);
 Curve ToPower(const Points& points, int degree);
 

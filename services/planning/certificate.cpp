@@ -5,6 +5,7 @@
 
 #include "common/math/bernstein.h"
 #include "common/math/exact.h"
+#include "services/planning/limits.h"
 #include "services/planning/product_weights.h"
 
 namespace chase::planning {
@@ -192,67 +193,6 @@ bool HasNoRoot(const Polynomial& f, double from) {
   return math::Evaluate(f, from) > 0.0 && math::CountRootsSturm(f, from, 1.0) == 0;
 }
 
-// ---- limits ----
-
-/// Sum of weight_i x_i^2 over polynomials x_i of equal degree, plus a constant, in Bernstein form.
-struct SquareSum {
-  Polynomial b;
-  double magnitude;  ///< bounds the sum of the absolute terms
-
-  SquareSum(int degree, double constant)
-      : b(Polynomial::Constant(2 * degree + 1, constant)), magnitude(std::abs(constant)) {}
-  void Add(double weight, const Polynomial& power) {
-    const Polynomial x = math::PowerToBernstein(power);
-    b += weight * math::BernsteinProduct(x, x);
-    const double sum = power.cwiseAbs().sum();
-    magnitude += std::abs(weight) * sum * sum;
-  }
-  bool IsPositive() const {
-    return Decide({b, 128.0 * kRounding * magnitude}) == Positivity::kPositive;
-  }
-};
-
-Polynomial DerivativeOf(const Curve& plan, int axis, int order, double duration) {
-  Polynomial p = plan.col(axis);
-  for (int i = 0; i < order; ++i) p = math::Derivative(p) / duration;
-  return p;
-}
-
-bool KeepsNorm(const Curve& plan, int order, double limit, double duration) {
-  if (plan.rows() <= order) return true;  // of a lower degree: the derivative is zero
-  SquareSum sum(static_cast<int>(plan.rows()) - 1 - order, limit * limit);
-  for (int a = 0; a < 3; ++a) sum.Add(-1.0, DerivativeOf(plan, a, order, duration));
-  return sum.IsPositive();
-}
-
-bool KeepsHeight(const Curve& plan, double z_min, double z_max) {
-  const Polynomial z = plan.col(2);
-  const Polynomial b = math::PowerToBernstein(z);
-  const double error =
-      math::PowerToBernsteinError(z) + 4.0 * kRounding * (std::abs(z_min) + std::abs(z_max));
-  const Polynomial above = b.array() - z_min, below = z_max - b.array();
-  return Both(Decide({above, error}), Decide({below, error})) == Positivity::kPositive;
-}
-
-/// Signs of squared coordinates of target - plan: weights (wx, wy, wz), plus a constant.
-bool KeepsRelative(const Curve& plan, const Curve& target, const Eigen::Vector3d& weights,
-                   double constant) {
-  const Eigen::Index n = std::max(plan.rows(), target.rows());
-  SquareSum sum(static_cast<int>(n) - 1, constant);
-  for (int a = 0; a < 3; ++a) {
-    Polynomial r = Polynomial::Zero(n);
-    r.head(plan.rows()) = plan.col(a);
-    r.head(target.rows()) -= target.col(a);
-    sum.Add(weights[a], r);
-  }
-  return sum.IsPositive();
-}
-
-double SegmentDistance(const Eigen::Vector3d& p, const Eigen::Vector3d& q, const Eigen::Vector3d& c,
-                       const Eigen::Matrix3d& R) {
-  return world::SegmentSquaredDistance(p, q, c, R);
-}
-
 }  // namespace
 
 bool IsSafe(const Curve& plan, const Ellipsoid& e, Arithmetic arithmetic) {
@@ -285,17 +225,6 @@ bool IsInSight(const Curve& plan, const Curve& target, const Ellipsoid& e, doubl
   return IsInSightExact(plan, target, e, from, exact);
 }
 
-bool KeepsLimits(const Curve& plan, const Problem& problem) {
-  const Limits& l = problem.limits;
-  if (l.speed > 0.0 && !KeepsNorm(plan, 1, l.speed, problem.duration)) return false;
-  if (l.acceleration > 0.0 && !KeepsNorm(plan, 2, l.acceleration, problem.duration)) return false;
-  if (l.height && !KeepsHeight(plan, l.z_min, l.z_max)) return false;
-  const double t2 = l.tan_elevation * l.tan_elevation;
-  if (t2 > 0.0 && !KeepsRelative(plan, problem.target, {t2, t2, -1.0}, 0.0)) return false;
-  return !(l.min_distance > 0.0) || KeepsRelative(plan, problem.target, Eigen::Vector3d::Ones(),
-                                                  -l.min_distance * l.min_distance);
-}
-
 bool IsFeasible(const Curve& plan, const Problem& problem, double sight_from, bool exact,
                 Arithmetic arithmetic) {
   if (!plan.allFinite() || !KeepsLimits(plan, problem)) return false;
@@ -316,7 +245,7 @@ std::string SampleFaults(const Curve& plan, const Problem& problem, double sight
       if (tau >= e.safety_from && (p - c).dot(e.safety * (p - c)) < 1.0 - 1e-9)
         return "inside " + where;
       if (tau >= std::max(sight_from, e.sight_from) && e.sight_from < 1.0 && sight_from < 1.0 &&
-          SegmentDistance(p, q, c, e.sight) < 1.0 - 1e-9)
+          world::SegmentSquaredDistance(p, q, c, e.sight) < 1.0 - 1e-9)
         return "sight crosses " + where;
     }
     const Limits& l = problem.limits;

@@ -22,12 +22,8 @@ bool IsSafe(const Curve& plan, const Ellipsoid& e, Arithmetic arithmetic);
 bool IsInSight(const Curve& plan, const Curve& target, const Ellipsoid& e, double from, bool exact,
                Arithmetic arithmetic);
 
-/// Speed, acceleration, height, distance and elevation of the target, each certified as the sign of
-/// a polynomial on [0,1]; what rounding leaves open counts as broken.
-bool KeepsLimits(const Curve& plan, const Problem& problem);
-
-/// All of the above for every obstacle, sight from `sight_from` on (or the obstacle's own, where
-/// later).
+/// Limits, and safety and sight of every obstacle, sight from `sight_from` on (or the obstacle's
+/// own, where later).
 bool IsFeasible(const Curve& plan, const Problem& problem, double sight_from, bool exact,
                 Arithmetic arithmetic);
 

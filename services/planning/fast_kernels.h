@@ -73,15 +73,16 @@ struct ShapeOutput {
 struct Context {
   int degree;  ///< M
   int n_candidates;
-  int stride;       ///< of the rows of x, a multiple of kPad
-  float* x;         ///< [3 (M - 3)][stride]: free control points of all candidates
-  float* j1;        ///< [stride]: weighted J1
-  float* work;      ///< as x, for `check`
-  uint32_t* alive;  ///< [stride / 8], for `check`
-  // J1 = j1_offset + |j1_factor (x - j1_center)|^2 per axis
-  float j1_factor[kMaxFree][kMaxFree];
-  float j1_center[kMaxFree][3];
-  float j1_offset;
+  int stride;  ///< of the rows of work, a multiple of kPad
+  // Candidate i = p choices + s: its free control points are those of prefix p plus those of the
+  // first step's choice s.
+  float* prefix;       ///< [n / choices][kRecord]
+  const float* first;  ///< [3 (M - 3)][row]: free points, row: choices padded
+  int choices, row;
+  uint64_t inverse;  ///< 2^32 / choices, rounded up
+  float* j1;         ///< [stride]: weighted J1
+  float* work;       ///< [3 (M - 3)][stride], for `check`
+  uint32_t* alive;   ///< [stride / 8], for `check`
   // Quadrature: p - q at a node = rel + sum phi_f x_f and its derivative.
   float phi[kQuadratureNodes][kMaxFree], slope[kQuadratureNodes][kMaxFree];
   float rel[kQuadratureNodes][3], rel_rate[kQuadratureNodes][2];
@@ -114,14 +115,57 @@ struct ProofInput {
   double size;  ///< bounds |coordinates| of points and centres, summed over power coefficients
 };
 
+/// What the skeletons of one step, or of several, add to the free control points (3 f + axis), and
+/// from kWhitened on, whitened, to the root of J1.
+constexpr int kWhitened = 12, kRecord = 24;
+
+struct CandidateInput {
+  const double* records;  ///< [step][choice][kRecord]
+  const int* choices;     ///< [steps]
+  int steps;
+  double base[kRecord];         ///< without skeletons
+  const float* first_whitened;  ///< [3 (M - 3)][row], of the first step
+  float j1_offset;              ///< J1 = j1_offset + |whitened|^2
+};
+
+constexpr int kPaddedNodes = 24;  // quadrature nodes; the padding weighs nothing
+constexpr int kNearSize = 6 + 3 * kPaddedNodes;
+
+/// The objective of Problem 2 as a function of the free control points, double precision.
+struct ObjectiveInput {
+  int free;
+  double smooth[kMaxFree][kMaxFree];  ///< weighted J1 = sum x_f smooth x_g + 2 pull x + rest
+  double pull[kMaxFree][3], rest;
+  double phi[kMaxFree][kPaddedNodes], slope[kMaxFree][kPaddedNodes];
+  double at[3][kPaddedNodes];   ///< the plan without its free points, local
+  double rel[3][kPaddedNodes];  ///< the same less the target
+  double rate[2][kPaddedNodes];
+  double weight[kPaddedNodes];  ///< with the duration
+  double weight_obstacle, weight_distance, weight_yaw;
+  double desired_distance, yaw_floor, cost_range;
+  const double* near;  ///< [n_near][kNearSize]: R00 R01 R02 R11 R12 R22, centre at the nodes
+  int n_near;
+};
+
+/// Unweighted parts: J1's weighted value, and the integrals of (l - l_s)^2 below l_s, J3 and J4.
+struct ObjectiveParts {
+  double smooth, near, distance, yaw;
+};
+
+/// Slope and Gauss-Newton curvature (lower triangle) of the weighted sum.
+struct ObjectiveModel {
+  double gradient[3 * kMaxFree];
+  double hessian[3 * kMaxFree][3 * kMaxFree];
+};
+
 /// Verdict on a candidate, or the row (>= 0) whose test single precision left open.
 enum State : int { kClear = -1, kDead = -2 };
 
 struct Table {
   /// Bounds, tables and near nodes of all shapes.
   void (*shape)(const ShapeInput& in, ShapeOutput& out);
-  /// Free points of all candidates: those of a prefix plus those of the first step's choices.
-  void (*generate)(Context& c, const float* prefix, int n_prefix, const float* first, int choices);
+  /// Prefixes, and J1 of all candidates.
+  void (*generate)(Context& c, const CandidateInput& in);
   /// Indices i with low < j1[i] <= high, ascending; `ids` needs room for stride + kPad.
   int (*select)(const Context& c, float low, float high, int* ids);
   /// Adds quadrature nodes [begin, end) of the node order to value[i] of ids[i] and keeps those
@@ -135,12 +179,13 @@ struct Table {
   int (*check)(Context& c, int* ids, int* state, int n);
   /// Tests groups of candidates, group g at prefix g + mid: `ids` gets those with members that may
   /// be feasible. Needs c.slack.
-  int (*check_groups)(Context& c, const float* prefix, const float* mid, int n, int* ids,
-                      int* state);
+  int (*check_groups)(Context& c, const float* mid, int n, int* ids, int* state);
   /// As `check` for up to kBatch candidates, in registers.
   int (*check_batch)(Context& c, int* ids, int* state, int n);
   /// holds[j] = 1 where bounds over the whole horizon prove what shape j asks.
   void (*prove)(const ProofInput& in, uint8_t* holds);
+  ObjectiveParts (*objective)(const ObjectiveInput& in, const double* x);
+  void (*model)(const ObjectiveInput& in, const double* x, ObjectiveModel& out);
   const char* name;
 };
 

@@ -25,19 +25,16 @@ bool FastProblem::Set(const Problem& problem, const PlanProof& proof) {
   n_ = problem.n_candidates();
   free_ = M - 3;
   const int steps = static_cast<int>(problem.skeletons.size());
-  if (tables_.degree != M || tables_.steps != steps || tables_.duration != problem.duration)
-    tables_ = CandidateTables(config_, M, steps, problem.duration);
+  tables_ = &shelf_.Get(M, steps, problem.duration);
   if (!SetCandidates()) return false;
   SetShapes(proof);
   kernels::Context& c = context_;
   c.degree = M;
   c.n_candidates = n_;
   c.stride = Padded(n_) + 4 * kPad;
-  x_.resize(static_cast<size_t>(3 * free_ * c.stride));
   j1_.resize(static_cast<size_t>(c.stride));
-  c.x = x_.data();
   c.j1 = j1_.data();
-  work_.resize(x_.size());
+  work_.resize(static_cast<size_t>(3 * free_ * c.stride));
   alive_.resize(j1_.size() / 8);
   c.work = work_.data();
   c.alive = alive_.data();
@@ -46,7 +43,6 @@ bool FastProblem::Set(const Problem& problem, const PlanProof& proof) {
   c.cost_range = static_cast<float>(config_.cost_range);
   c.exact = config_.exact_visibility ? 1 : 0;
   if (blocked_) return true;
-  SetSmoothness();
   SetNodes();
   Generate();
   return true;
@@ -65,7 +61,7 @@ bool FastProblem::SetCandidates() {
   for (int f = 0; f < free_; ++f)
     for (int a = 0; a < 3; ++a) {
       double sum = 0.0;
-      for (int i = 0; i < 4; ++i) sum += tables_.fixed(f, i) * start_(i, a);
+      for (int i = 0; i < 4; ++i) sum += tables_->fixed(f, i) * start_(i, a);
       base_[3 * f + a] = low_(f, a) = high_(f, a) = sum;
       largest = std::max(largest, std::abs(sum));
     }
@@ -79,7 +75,7 @@ bool FastProblem::SetCandidates() {
     for (const Eigen::Vector3d& u : p.skeletons[n])
       for (int f = 0; f < free_; ++f)
         for (int a = 0; a < 3; ++a) {
-          const double pull = tables_.pull(f, static_cast<int>(n)) * (u[a] - origin_[a]);
+          const double pull = tables_->pull(f, static_cast<int>(n)) * (u[a] - origin_[a]);
           pulls_.push_back(pull);
           low[3 * f + a] = std::min(low[3 * f + a], pull);
           high[3 * f + a] = std::max(high[3 * f + a], pull);
@@ -124,10 +120,10 @@ void FastProblem::SetShapeInput(const PlanProof& proof, kernels::ShapeInput* in)
     in->node_weight[k] = static_cast<float>(weight * GaussNodes().weight[k]);
     for (int a = 0; a < 3; ++a) {
       double mid = 0.0, half = 0.0;
-      for (int i = 0; i < 4; ++i) mid += tables_.phi[k][i] * start_(i, a);
+      for (int i = 0; i < 4; ++i) mid += tables_->phi[k][i] * start_(i, a);
       for (int f = 0; f < free_; ++f) {
-        mid += tables_.phi[k][4 + f] * 0.5 * (low_(f, a) + high_(f, a));
-        half += tables_.phi[k][4 + f] * 0.5 * (high_(f, a) - low_(f, a));
+        mid += tables_->phi[k][4 + f] * 0.5 * (low_(f, a) + high_(f, a));
+        half += tables_->phi[k][4 + f] * 0.5 * (high_(f, a) - low_(f, a));
       }
       in->node_mid[k][a] = static_cast<float>(mid);
       in->node_half[k][a] = static_cast<float>(half + 1e-5);
@@ -211,26 +207,64 @@ void FastProblem::SetOrder(const PlanProof& proof) {
   context_.n_rows = static_cast<int>(order_.size());
 }
 
-// w1 J1 = sum over axes of (x - x*)' H (x - x*) + rest, H = U' U.
-void FastProblem::SetSmoothness() {
-  kernels::Context& c = context_;
+// w1 J1 = sum over axes of (x - x*)' H (x - x*) + rest, H = U' U: `whitened` is U (x - x*).
+void FastProblem::Generate() {
+  const int nx = 3 * free_, first = choices_[0], row = Padded(first);
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 3, 3> H =
-      tables_.smooth.block(4, 4, free_, free_);
+      tables_->smooth.block(4, 4, free_, free_);
   H.diagonal().array() += 1e-12;
   const Eigen::LLT<decltype(H)> llt(H);
   const decltype(H) U = llt.matrixU();
-  double offset = 0.0;
+  const auto whiten = [&](const double* x, double* out) {
+    for (int f = 0; f < free_; ++f)
+      for (int a = 0; a < 3; ++a) {
+        double sum = 0.0;
+        for (int g = f; g < free_; ++g) sum += U(f, g) * x[3 * g + a];
+        out[3 * f + a] = sum;
+      }
+  };
+  kernels::CandidateInput in{};
+  double offset = 0.0, local[9];
   for (int a = 0; a < 3; ++a) {
     const Eigen::Vector4d b = start_.col(a).head<4>();
     const Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 3, 1> h =
-        tables_.smooth.block(4, 0, free_, 4) * b;
+        tables_->smooth.block(4, 0, free_, 4) * b;
     const Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 3, 1> best = -llt.solve(h);
-    offset += b.dot(tables_.smooth.topLeftCorner<4, 4>() * b) + h.dot(best);
-    for (int f = 0; f < free_; ++f) c.j1_center[f][a] = static_cast<float>(best[f]);
+    offset += b.dot(tables_->smooth.topLeftCorner<4, 4>() * b) + h.dot(best);
+    for (int f = 0; f < free_; ++f) local[3 * f + a] = base_[3 * f + a] - best[f];
   }
-  c.j1_offset = static_cast<float>(std::max(0.0, offset));
-  for (int f = 0; f < free_; ++f)
-    for (int g = 0; g < free_; ++g) c.j1_factor[f][g] = static_cast<float>(g >= f ? U(f, g) : 0.0);
+  in.j1_offset = static_cast<float>(std::max(0.0, offset));
+  std::copy(base_, base_ + nx, in.base);
+  whiten(local, in.base + kernels::kWhitened);
+  const size_t n_records = pulls_.size() / static_cast<size_t>(nx);
+  records_.assign(n_records * kernels::kRecord, 0.0);
+  for (size_t r = 0; r < n_records; ++r) {
+    const double* pull = &pulls_[r * static_cast<size_t>(nx)];
+    double* record = &records_[r * kernels::kRecord];
+    std::copy(pull, pull + nx, record);
+    whiten(pull, record + kernels::kWhitened);
+  }
+  first_.assign(static_cast<size_t>(2 * nx * row), 0.0f);
+  float* const whitened = &first_[static_cast<size_t>(nx * row)];
+  for (int s = 0; s < first; ++s)
+    for (int k = 0; k < nx; ++k) {
+      const double* record = &records_[static_cast<size_t>(s) * kernels::kRecord];
+      first_[static_cast<size_t>(k * row + s)] = static_cast<float>(record[k]);
+      whitened[k * row + s] = static_cast<float>(record[kernels::kWhitened + k]);
+    }
+  prefix_.resize(static_cast<size_t>(n_ / first) * kernels::kRecord);
+  in.records = records_.data();
+  in.choices = choices_.data();
+  in.steps = static_cast<int>(choices_.size());
+  in.first_whitened = whitened;
+  kernels::Context& c = context_;
+  c.prefix = prefix_.data();
+  c.first = first_.data();
+  c.choices = first;
+  c.row = row;
+  c.inverse =
+      ((uint64_t{1} << 32) + static_cast<uint64_t>(first) - 1) / static_cast<uint64_t>(first);
+  kernels_.generate(c, in);
 }
 
 void FastProblem::SetNodes() {
@@ -238,17 +272,17 @@ void FastProblem::SetNodes() {
   const double T = problem_->duration;
   for (int k = 0; k < kNodes; ++k) {
     for (int f = 0; f < free_; ++f) {
-      c.phi[k][f] = static_cast<float>(tables_.phi[k][4 + f]);
-      c.slope[k][f] = static_cast<float>(tables_.slope[k][4 + f]);
+      c.phi[k][f] = static_cast<float>(tables_->phi[k][4 + f]);
+      c.slope[k][f] = static_cast<float>(tables_->slope[k][4 + f]);
     }
     for (int a = 0; a < 3; ++a) {
       double p = 0.0, q = 0.0, v = 0.0, w = 0.0;
       for (int i = 0; i <= problem_->degree; ++i) {
-        q += tables_.phi[k][i] * target_(i, a);
-        w += tables_.slope[k][i] * target_(i, a);
+        q += tables_->phi[k][i] * target_(i, a);
+        w += tables_->slope[k][i] * target_(i, a);
         if (i >= 4) continue;
-        p += tables_.phi[k][i] * start_(i, a);
-        v += tables_.slope[k][i] * start_(i, a);
+        p += tables_->phi[k][i] * start_(i, a);
+        v += tables_->slope[k][i] * start_(i, a);
       }
       c.rel[k][a] = static_cast<float>(p - q);
       c.target[k][a] = static_cast<float>(q);
@@ -257,32 +291,6 @@ void FastProblem::SetNodes() {
     c.weight3[k] = static_cast<float>(config_.weight_distance * T * GaussNodes().weight[k]);
     c.weight4[k] = static_cast<float>(config_.weight_yaw * T * GaussNodes().weight[k]);
   }
-}
-
-// Free points of all combinations of the later steps, then the first step's choices on top.
-void FastProblem::Generate() {
-  const int nx = 3 * free_, first = choices_[0], row = Padded(first), n_prefix = n_ / first;
-  prefix_.resize(static_cast<size_t>(n_prefix * nx));
-  for (int i = 0; i < n_prefix; ++i) {
-    double z[9];
-    std::copy(base_, base_ + nx, z);
-    int rest = i;
-    size_t at = static_cast<size_t>(first * nx);
-    for (size_t s = 1; s < choices_.size(); ++s) {
-      const double* pull = &pulls_[at + static_cast<size_t>((rest % choices_[s]) * nx)];
-      for (int k = 0; k < nx; ++k) z[k] += pull[k];
-      rest /= choices_[s];
-      at += static_cast<size_t>(choices_[s] * nx);
-    }
-    for (int k = 0; k < nx; ++k)
-      prefix_[static_cast<size_t>(i * nx + k)] = static_cast<float>(z[k]);
-  }
-  first_.assign(static_cast<size_t>(nx * row), 0.0f);
-  for (int s = 0; s < first; ++s)
-    for (int k = 0; k < nx; ++k)
-      first_[static_cast<size_t>(k * row + s)] =
-          static_cast<float>(pulls_[static_cast<size_t>(s * nx + k)]);
-  kernels_.generate(context_, prefix_.data(), n_prefix, first_.data(), first);
 }
 
 void FastProblem::AliveGroups(std::vector<int>* groups) {
@@ -313,8 +321,8 @@ void FastProblem::AliveGroups(std::vector<int>* groups) {
   groups->resize(static_cast<size_t>(n + kPad));
   states_.resize(static_cast<size_t>(n + kPad));
   context_.slack = slack_.data();
-  groups->resize(static_cast<size_t>(
-      kernels_.check_groups(context_, prefix_.data(), mid, n, groups->data(), states_.data())));
+  groups->resize(
+      static_cast<size_t>(kernels_.check_groups(context_, mid, n, groups->data(), states_.data())));
   context_.slack = nullptr;
   std::sort(groups->begin(), groups->end());
 }
@@ -377,15 +385,15 @@ Cost FastProblem::CostOf(int index) const {
   Cost cost;
   double j1 = 0.0, near = 0.0;
   for (int i = 0; i <= M; ++i) {
-    j1 += tables_.smooth(i, i) * b.row(i).squaredNorm();
-    for (int j = i + 1; j <= M; ++j) j1 += 2.0 * tables_.smooth(i, j) * b.row(i).dot(b.row(j));
+    j1 += tables_->smooth(i, i) * b.row(i).squaredNorm();
+    for (int j = i + 1; j <= M; ++j) j1 += 2.0 * tables_->smooth(i, j) * b.row(i).dot(b.row(j));
   }
   for (int k = 0; k < kNodes; ++k) {
     const double weight = T * GaussNodes().weight[k];
     double d[3] = {}, v[2] = {};
     for (int i = 0; i <= M; ++i) {
-      for (int a = 0; a < 3; ++a) d[a] += tables_.phi[k][i] * r[i][a];
-      for (int a = 0; a < 2; ++a) v[a] += tables_.slope[k][i] * r[i][a];
+      for (int a = 0; a < 3; ++a) d[a] += tables_->phi[k][i] * r[i][a];
+      for (int a = 0; a < 2; ++a) v[a] += tables_->slope[k][i] * r[i][a];
     }
     const double h = d[0] * d[0] + d[1] * d[1];
     const double excess = std::sqrt(h + d[2] * d[2]) - config_.desired_distance;
@@ -396,7 +404,7 @@ Cost FastProblem::CostOf(int index) const {
     if (near_begin_[k] == near_begin_[k + 1]) continue;
     double p[3] = {};
     for (int i = 0; i <= M; ++i)
-      for (int a = 0; a < 3; ++a) p[a] += tables_.phi[k][i] * b(i, a);
+      for (int a = 0; a < 3; ++a) p[a] += tables_->phi[k][i] * b(i, a);
     near += weight * ObstacleCost(k, p);
   }
   const double scale =

@@ -14,7 +14,7 @@ namespace chase::planning {
 class FastProblem {
  public:
   FastProblem(const PlannerConfig& config, const kernels::Table& kernels)
-      : config_(config), kernels_(kernels) {}
+      : config_(config), kernels_(kernels), shelf_(config) {}
 
   /// False where the kernels do not apply: degrees above 6, more than 8 steps, shapes that are not
   /// positive definite, coordinates beyond 10 km. `proof` has been reset to the problem.
@@ -39,7 +39,6 @@ class FastProblem {
   void SetShapes(const PlanProof& proof);
   void SetShapeInput(const PlanProof& proof, kernels::ShapeInput* in);
   void SetOrder(const PlanProof& proof);
-  void SetSmoothness();
   void SetNodes();
   void Generate();
   double ObstacleCost(int node, const double* p) const;
@@ -47,7 +46,8 @@ class FastProblem {
   PlannerConfig config_;
   const kernels::Table& kernels_;
   const Problem* problem_ = nullptr;
-  CandidateTables tables_;
+  TableShelf shelf_;
+  const CandidateTables* tables_ = nullptr;
   kernels::Context context_{};
 
   int n_ = 0, free_ = 0, n_shapes_ = 0;
@@ -68,7 +68,8 @@ class FastProblem {
   int near_begin_[kernels::kQuadratureNodes + 1];
   std::vector<kernels::Shadow> shadows_;
   std::vector<int> order_, states_;
-  std::vector<float> x_, j1_, work_, prefix_, first_;
+  std::vector<double> records_;
+  std::vector<float> j1_, work_, prefix_, first_;
   std::vector<uint32_t> alive_;
 };
 

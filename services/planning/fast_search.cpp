@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "services/planning/fast_problem.h"
+#include "services/planning/limits.h"
 #include "services/planning/reference_search.h"
 
 namespace chase::planning {
@@ -19,24 +20,24 @@ class FastSearch : public Search {
   FastSearch(const PlannerConfig& config, const kernels::Table& table)
       : config_(config),
         kernels_(table),
-        proof_(table),
         fast_(config, table),
         fallback_(MakeReferenceSearch(config, Arithmetic::kCertified)) {}
 
-  Found Best(const Problem& problem, double sight_from) override {
-    proof_.Reset(problem, sight_from, config_.exact_visibility);
-    if (!fast_.Set(problem, proof_)) return fallback_->Best(problem, sight_from);
+  using Search::Best;
+  Found Best(const Problem& problem, double sight_from, double bound, PlanProof* proof) override {
+    proof_ = proof;
+    if (!fast_.Set(problem, *proof)) return fallback_->Best(problem, sight_from, bound, proof);
     problem_ = &problem;
+    bound_ = static_cast<float>(bound);
     Found found;
     found.generated = fast_.n_candidates();
-    checked_ = feasible_ = 0;
     refused_.clear();
     int winner = -1;
     // The winner stands on single-precision tests until it is proven; when that fails, the next
     // best follows.
     while (!fast_.IsBlocked()) {
       winner = Run();
-      if (winner < 0 || proof_.Holds(fast_.PlanOf(winner))) break;
+      if (winner < 0 || proof_->Holds(fast_.PlanOf(winner))) break;
       refused_.push_back(winner);
     }
     found.checked = checked_;
@@ -52,6 +53,7 @@ class FastSearch : public Search {
   using Entry = std::pair<float, int>;  // lower bound or cost, candidate
 
   int Run();
+  bool PruneAll();
   void Weigh(float low, float high);
   void WeighListed(int n);
   void SearchGroups(const float* levels, int n_levels);
@@ -71,13 +73,13 @@ class FastSearch : public Search {
   // The row that is open decides most of them.
   bool IsProven(int id, int row) {
     const Curve plan = fast_.PlanOf(id);
-    return proof_.RowHolds(row, plan) && proof_.Holds(plan);
+    return proof_->RowHolds(row, plan) && proof_->Holds(plan);
   }
   float Limit() const { return best_ * (1.0f + kSlack); }
 
   PlannerConfig config_;
   const kernels::Table& kernels_;
-  PlanProof proof_;
+  PlanProof* proof_ = nullptr;
   FastProblem fast_;
   std::unique_ptr<Search> fallback_;
   const Problem* problem_ = nullptr;
@@ -87,7 +89,7 @@ class FastSearch : public Search {
   std::vector<int> states_;
   std::vector<Entry> heap_, accepted_;
   int checked_ = 0, feasible_ = 0;
-  float best_ = 0.0f;
+  float bound_ = 0.0f, best_ = 0.0f;
   Cost winner_cost_;
 };
 
@@ -96,7 +98,7 @@ class FastSearch : public Search {
 // their costs, so that the certificate is asked for as few as possible.
 void FastSearch::Batch(int* ids, float* lower, int n) {
   for (int i = n; i < kBatch + kPad; ++i) lower[i] = 0.0f;
-  const bool prune = !accepted_.empty();
+  const bool prune = best_ < HUGE_VALF;
   if (prune) kernels_.obstacles(fast_.context(), ids, lower, n);
   int left[kBatch + kPad], states[kBatch];
   float cost[kBatch + kPad];
@@ -228,12 +230,26 @@ int FastSearch::CheapestAccepted() {
   return winner;
 }
 
+// Where a bound is given that few candidates stay below: all of those, and nothing else.
+bool FastSearch::PruneAll() {
+  constexpr size_t kFew = 512;
+  Weigh(-1.0f, Limit());
+  if (heap_.size() > kFew) {
+    heap_.clear();
+    return false;
+  }
+  Drain(1 << 30);
+  return true;
+}
+
 int FastSearch::Run() {
   const kernels::Context& c = fast_.context();
   const int n = fast_.n_candidates();
-  best_ = HUGE_VALF;
+  best_ = bound_;
+  checked_ = feasible_ = 0;
   accepted_.clear();
   heap_.clear();
+  if (bound_ < HUGE_VALF && PruneAll()) return CheapestAccepted();
   // Most promising by J1: a sample of 256 tells the value that about 1 in 32 stays below.
   const int wanted = std::min(n, std::max(64, n / 32)), samples = std::min(256, n);
   float sample[256];
@@ -241,7 +257,7 @@ int FastSearch::Run() {
   const int rank =
       std::min(samples - 1, static_cast<int>(static_cast<int64_t>(samples) * wanted / n));
   std::nth_element(sample, sample + rank, sample + samples);
-  const float cheapest = sample[rank];
+  const float cheapest = std::min(sample[rank], Limit());
   Weigh(-1.0f, cheapest);
   Drain(6);
   if (accepted_.empty()) {

@@ -7,6 +7,7 @@
 #include "services/planning/certificate.h"
 #include "services/planning/cost.h"
 #include "services/planning/field_of_view.h"
+#include "services/planning/limits.h"
 #include "services/planning/refinement.h"
 #include "services/planning/skeletons.h"
 
@@ -33,17 +34,22 @@ PlanRequest OverRestOf(const PlanRequest& request, const world::Trajectory& plan
 class Ladder : public Planner {
  public:
   Ladder(const PlannerConfig& config, std::unique_ptr<Search> search)
-      : config_(config), search_(std::move(search)), refiner_(config) {}
+      : config_(config),
+        search_(std::move(search)),
+        placer_(config),
+        shelf_(config),
+        refiner_(config) {}
 
   PlanResult Plan(const PlanRequest& request) override {
     std::string notes;
-    Problem problem = MakeProblem(config_, request, &notes);
+    problem_ = MakeProblem(config_, request, &notes);
+    used_ = &problem_;
     PlanResult result;
-    if (!TryChase(request, &problem, &notes, &result) && !TryKeep(request, &result) &&
-        !TrySafeOnly(request, &problem, &result))
+    if (!TryChase(request, &notes, &result) && !TryKeep(request, &result) &&
+        !TrySafeOnly(request, &result))
       Brake(request, &result);
     if (!notes.empty()) {
-      if (IsInSightVerdict(result.verdict) && WeakensSight(problem))
+      if (IsInSightVerdict(result.verdict) && WeakensSight(*used_))
         result.verdict = Verdict::kSafeOnly;
       result.reason += (result.reason.empty() ? "" : "; ") + notes;
     }
@@ -83,26 +89,79 @@ class Ladder : public Planner {
     result->reason += "the target leaves the horizontal field of view";
   }
 
-  bool TrySearch(const Problem& problem, double sight_from, PlanResult* result) {
-    Found found = search_->Best(problem, sight_from);
+  /// A certified plan on its way through a rung.
+  struct Choice {
+    Curve plan;
+    Cost cost;
+    int index = -1;  ///< of the candidate; -1: the running plan, or refined
+  };
+
+  // The running plan from now on, as a curve over the problem's duration: its polynomial carried on
+  // where that is longer.
+  std::optional<Curve> Carried(const PlanRequest& request, const Problem& problem) const {
+    if (!config_.refine || !request.running || !request.running_rest.empty()) return std::nullopt;
+    const Curve running = ToCurve(*request.running, request.t0, problem.duration);
+    if (running.rows() > problem.degree + 1) return std::nullopt;
+    Points points = ToPoints(running, problem.degree);
+    points.topRows<4>() = ToPoints(problem.start, problem.degree).topRows<4>();
+    Curve curve = ToPower(points, problem.degree);
+    curve.topRows(4) = problem.start;
+    if (!curve.allFinite() || (problem.reach && !Contains(*problem.reach, curve)))
+      return std::nullopt;
+    return curve;
+  }
+
+  // The plan has been certified; moves it downhill as far as it stays so.
+  void Refine(Choice* choice) {
+    if (!refinable_) return;
+    Choice better = *choice;
+    better.index = -1;
+    if (refiner_.Improve(&better.plan, &better.cost)) *choice = better;
+  }
+
+  // The running plan refined, or as it is; none where it does not hold.
+  std::optional<Choice> Certified(const Problem& problem, const Curve& carried) {
+    Choice choice{carried, {}};
+    if (refiner_.Leap(&choice.plan, &choice.cost)) return choice;
+    choice.plan = carried;
+    if (!proof_.Holds(carried, false) || !KeepsLimits(carried, problem)) return std::nullopt;
+    Choice better = choice;
+    if (refiner_.Creep(&better.plan, &better.cost)) return better;
+    choice.cost = Evaluate(config_, problem, carried);
+    return choice;
+  }
+
+  // The cheapest of the running plan, where it holds, and the candidates, both refined. A candidate
+  // has to be cheaper than that before it is refined itself.
+  bool TrySearch(const Problem& problem, double sight_from, const std::optional<Curve>& carried,
+                 PlanResult* result) {
+    proof_.Reset(problem, sight_from, config_.exact_visibility);
+    refinable_ = config_.refine && refiner_.Reset(problem, sight_from);
+    std::optional<Choice> best;
+    if (carried && refinable_) best = Certified(problem, *carried);
+    const double bound = best ? best->cost.total : HUGE_VAL;
+    const Found found = search_->Best(problem, sight_from, bound, &proof_);
     result->generated += found.generated;
     result->checked += found.checked;
     result->feasible += found.feasible;
-    if (found.index < 0) return false;
-    result->winner = found.index;
-    if (config_.refine && refiner_.Improve(problem, sight_from, &found.plan, &found.cost))
-      result->winner = -1;
-    assert(SampleFaults(found.plan, problem, sight_from, 200).empty());
-    result->cost = found.cost;
-    result->trajectory.coefficients = found.plan;
+    if (found.index >= 0) {
+      Choice choice{found.plan, found.cost, found.index};
+      Refine(&choice);
+      if (!best || choice.cost.total < best->cost.total) best = choice;
+    }
+    if (!best) return false;
+    assert(SampleFaults(best->plan, problem, sight_from, 200).empty());
+    result->winner = best->index;
+    result->cost = best->cost;
+    result->trajectory.coefficients = best->plan;
     return true;
   }
 
   // Over the whole horizon, then over shorter ones: a plan that sees the target for the next
-  // seconds is renewed before it ends, and a shorter polynomial turns more sharply. Wide skeletons
-  // cost most and come last.
-  bool TryChase(const PlanRequest& request, Problem* problem, std::string* notes,
-                PlanResult* result) {
+  // seconds is renewed before it ends, and a shorter polynomial turns more sharply. What the
+  // running plan has left comes before what is shorter than that; wide skeletons cost most and come
+  // last.
+  bool TryChase(const PlanRequest& request, std::string* notes, PlanResult* result) {
     struct Try {
       Layout layout;
       double share;
@@ -110,8 +169,14 @@ class Ladder : public Planner {
     constexpr Try kTries[] = {{Layout::kNormal, 1.0}, {Layout::kNormal, 0.7},
                               {Layout::kNormal, 0.5}, {Layout::kNormal, 0.35},
                               {Layout::kWide, 1.0},   {Layout::kWide, 0.5}};
+    bool carry = true;
     for (const Try& t : kTries) {
-      if (!TryOver(request, t.layout, t.share, problem, notes, result)) continue;
+      const double rest = request.running ? request.running->end() - request.t0 : 0.0;
+      if (carry && t.share < 1.0 && rest > t.share * request.horizon) {
+        carry = false;
+        if (TryCarry(request, std::min(rest, request.horizon), notes, result)) return true;
+      }
+      if (!TryOver(request, t.layout, t.share, notes, result)) continue;
       const bool plain = t.layout == Layout::kNormal && t.share == 1.0;
       result->verdict = plain ? Verdict::kChase : Verdict::kWider;
       if (t.layout == Layout::kWide)
@@ -124,26 +189,61 @@ class Ladder : public Planner {
     return false;
   }
 
-  // On success `problem` and `notes` are those of the horizon that was planned.
-  bool TryOver(const PlanRequest& request, Layout layout, double share, Problem* problem,
-               std::string* notes, PlanResult* result) {
+  // The problem over a shorter horizon, where that is asked for.
+  Problem* Over(const PlanRequest& request, double horizon, std::string* notes) {
+    if (horizon == request.horizon) return &problem_;
     PlanRequest shorter = request;
-    shorter.horizon = share * request.horizon;
-    std::string their_notes = *notes;
-    Problem theirs = *problem;
-    if (share < 1.0) {
-      their_notes.clear();
-      theirs = MakeProblem(config_, shorter, &their_notes);
-    }
-    PlaceSkeletons(config_, layout, &theirs);
-    if (!TrySearch(theirs, 0.0, result)) return false;
+    shorter.horizon = horizon;
+    shorter_ = MakeProblem(config_, shorter, notes);
+    return &shorter_;
+  }
+
+  void Take(const PlanRequest& request, const Problem& problem, PlanResult* result) {
     result->trajectory.start = request.t0;
-    result->trajectory.duration = shorter.horizon;
-    *notes = their_notes;
-    *problem = theirs;
+    result->trajectory.duration = problem.duration;
+    used_ = &problem;
+  }
+
+  bool TryOver(const PlanRequest& request, Layout layout, double share, std::string* notes,
+               PlanResult* result) {
+    std::string their_notes;
+    Problem* problem = Over(request, share * request.horizon, &their_notes);
+    placer_.Place(layout, problem);
+    LimitToReach(
+        config_,
+        shelf_.Get(problem->degree, static_cast<int>(problem->skeletons.size()), problem->duration),
+        Refiner::kReach, problem);
+    const bool carry = layout == Layout::kNormal && share == 1.0;
+    if (!TrySearch(*problem, 0.0, carry ? Carried(request, *problem) : std::nullopt, result))
+      return false;
+    if (problem != &problem_) *notes = their_notes;
+    Take(request, *problem, result);
     return true;
   }
 
+  // The rest of the running plan, with all its margins, refined.
+  bool TryCarry(const PlanRequest& request, double horizon, std::string* notes,
+                PlanResult* result) {
+    std::string their_notes;
+    Problem* problem = Over(request, horizon, &their_notes);
+    problem->reach.reset();
+    const std::optional<Curve> carried = Carried(request, *problem);
+    if (!carried) return false;
+    proof_.Reset(*problem, 0.0, config_.exact_visibility);
+    if (!refiner_.Reset(*problem, 0.0)) return false;
+    const std::optional<Choice> choice = Certified(*problem, *carried);
+    if (!choice) return false;
+    result->verdict = Verdict::kKept;
+    result->reason = "no candidate is feasible over the horizon, the rest of the running plan is";
+    result->winner = -1;
+    result->cost = choice->cost;
+    result->trajectory.coefficients = choice->plan;
+    if (problem != &problem_) *notes = their_notes;
+    Take(request, *problem, result);
+    return true;
+  }
+
+  // The running plan with smaller margins.
   bool TryKeep(const PlanRequest& request, PlanResult* result) {
     if (!request.running || request.running->end() - request.t0 < 0.3 ||
         !IsCertified(request, *request.running))
@@ -158,14 +258,14 @@ class Ladder : public Planner {
   }
 
   // Sight asked from ever later on, then not at all.
-  bool TrySafeOnly(const PlanRequest& request, Problem* problem, PlanResult* result) {
+  bool TrySafeOnly(const PlanRequest& request, PlanResult* result) {
     result->verdict = Verdict::kSafeOnly;
-    problem->limits.tan_elevation = 0.0;
-    PlaceSkeletons(config_, Layout::kCautious, problem);
+    problem_.limits.tan_elevation = 0.0;
+    placer_.Place(Layout::kCautious, &problem_);
+    problem_.reach.reset();
     for (double sight_from : {0.25, 0.5, 0.75, 1.0}) {
-      if (!TrySearch(*problem, sight_from, result)) continue;
-      result->trajectory.start = request.t0;
-      result->trajectory.duration = request.horizon;
+      if (!TrySearch(problem_, sight_from, std::nullopt, result)) continue;
+      Take(request, problem_, result);
       result->reason = sight_from < 1.0 ? "no candidate keeps sight; this one has it from " +
                                               std::to_string(static_cast<int>(100 * sight_from)) +
                                               " % of the horizon on"
@@ -188,8 +288,13 @@ class Ladder : public Planner {
 
   PlannerConfig config_;
   std::unique_ptr<Search> search_;
+  SkeletonPlacer placer_;
+  TableShelf shelf_;
   Refiner refiner_;
   PlanProof proof_;
+  Problem problem_, shorter_;      ///< over the whole horizon, over a part of it
+  const Problem* used_ = nullptr;  ///< of the two, the one whose plan is taken
+  bool refinable_ = false;
 };
 
 Curve BrakeCurve(const world::State& s, double T) {

@@ -28,25 +28,37 @@ bool IsPositiveDefinite(const Eigen::Matrix3d& R) {
 void PlanProof::Reset(const Problem& problem, double sight_from, bool exact) {
   problem_ = &problem;
   exact_sight_ = exact;
+  sight_from_ = sight_from;
   origin_ = problem.target.row(0).transpose();
+  SetRows(!problem.reach);
+}
+
+void PlanProof::AddRows(int obstacle) {
+  const Ellipsoid& e = problem_->obstacles[static_cast<size_t>(obstacle)];
+  const double from = std::max(sight_from_, e.sight_from);
+  const bool sight = from < 1.0;
+  const bool fused = sight && from == e.safety_from && e.safety == e.sight;
+  rows_.push_back({obstacle, true, fused, e.safety_from});
+  if (sight && !fused) rows_.push_back({obstacle, false, true, from});
+  linear_ = linear_ && e.center.rows() <= 2;
+  for (int a = 0; a < 3; ++a)
+    center_size_ = std::max(center_size_, e.center.col(a).cwiseAbs().sum());
+}
+
+void PlanProof::SetRows(bool all) {
+  all_ = all;
   rows_.clear();
-  usable_ = small_ = linear_ = true;
+  usable_ = linear_ = true;
   center_size_ = 0.0;
-  Eigen::Index n = std::max(problem.start.rows(), problem.target.rows());
-  for (size_t j = 0; j < problem.obstacles.size(); ++j) {
-    const Ellipsoid& e = problem.obstacles[j];
-    const int id = static_cast<int>(j);
-    const double from = std::max(sight_from, e.sight_from);
-    const bool sight = from < 1.0;
-    const bool fused = sight && from == e.safety_from && e.safety == e.sight;
-    rows_.push_back({id, true, fused, e.safety_from});
-    if (sight && !fused) rows_.push_back({id, false, true, from});
-    n = std::max(n, e.center.rows());
-    linear_ = linear_ && e.center.rows() <= 2;
-    for (int a = 0; a < 3; ++a)
-      center_size_ = std::max(center_size_, e.center.col(a).cwiseAbs().sum());
+  if (all) {
+    for (int j = 0; j < static_cast<int>(problem_->obstacles.size()); ++j) AddRows(j);
+  } else {
+    for (const int j : problem_->near) AddRows(j);
   }
-  degree_ = std::max(problem.degree, static_cast<int>(n) - 1);
+  Eigen::Index n = std::max<Eigen::Index>(problem_->degree + 1, problem_->target.rows());
+  for (const Row& row : rows_)
+    n = std::max(n, problem_->obstacles[static_cast<size_t>(row.obstacle)].center.rows());
+  degree_ = static_cast<int>(n) - 1;
   small_ = degree_ <= kernels::kMaxDegree;
   degree_ = degree_ <= 5 ? 5 : 6;
   input_.n = Padded(static_cast<int>(rows_.size()));
@@ -64,11 +76,20 @@ void PlanProof::Reset(const Problem& problem, double sight_from, bool exact) {
   input_.sum_R = sums_.data();
   input_.center = centers_.data();
   input_.sight = sight_.data();
-  input_.exact = exact;
+  input_.exact = exact_sight_;
   input_.degree = degree_;
-  if (!small_ || !MakeLocal(problem.target, degree_, &target_)) return;
+  if (!small_ || !MakeLocal(problem_->target, degree_, &target_)) return;
   for (int i = 0; i <= degree_; ++i)
     std::copy(target_.point[i], target_.point[i] + 3, input_.target[i]);
+}
+
+bool PlanProof::IsWithinReach(const Local& plan) const {
+  for (int i = 0; i <= degree_; ++i)
+    for (int a = 0; a < 3; ++a) {
+      const double x = plan.point[i][a] + origin_[a];
+      if (!(x >= problem_->reach->low[a] && x <= problem_->reach->high[a])) return false;
+    }
+  return true;
 }
 
 void PlanProof::PutRow(int column, const Row& row) {
@@ -77,7 +98,10 @@ void PlanProof::PutRow(int column, const Row& row) {
   const double values[6] = {R(0, 0), 0.5 * (R(0, 1) + R(1, 0)), 0.5 * (R(0, 2) + R(2, 0)),
                             R(1, 1), 0.5 * (R(1, 2) + R(2, 1)), R(2, 2)};
   for (int i = 0; i < 6; ++i) shapes_[static_cast<size_t>(i * input_.n + column)] = values[i];
-  sums_[static_cast<size_t>(column)] = R.cwiseAbs().sum();
+  double sum = 0.0;
+  for (int a = 0; a < 3; ++a)
+    for (int b = 0; b < 3; ++b) sum += std::abs(R(a, b));
+  sums_[static_cast<size_t>(column)] = sum;
   sight_[static_cast<size_t>(column)] = row.sight;
   usable_ = usable_ && IsPositiveDefinite(R);
   for (int a = 0; a < 3; ++a) {
@@ -108,7 +132,7 @@ bool PlanProof::TargetIsOutside(int row) const {
   return IsSafe(problem_->target, alone, Arithmetic::kCertified);
 }
 
-bool PlanProof::RowHolds(const Row& row, const Curve& plan, const Local* p) {
+bool PlanProof::RowHolds(const Row& row, const Curve& plan, const Local* p, bool exactly) {
   const Ellipsoid& e = problem_->obstacles[static_cast<size_t>(row.obstacle)];
   Positivity decided = Positivity::kUndecided;
   Local c;
@@ -126,6 +150,7 @@ bool PlanProof::RowHolds(const Row& row, const Curve& plan, const Local* p) {
     decided = row.sight ? forms.DecideSight(exact_sight_, kDepth) : forms.DecideSafe(kDepth);
   }
   if (decided != Positivity::kUndecided) return decided == Positivity::kPositive;
+  if (!exactly) return false;
   ++n_exact_;
   return (!row.safety || IsSafe(plan, e, Arithmetic::kExactSturm)) &&
          (!row.sight ||
@@ -135,15 +160,21 @@ bool PlanProof::RowHolds(const Row& row, const Curve& plan, const Local* p) {
 bool PlanProof::RowHolds(int row, const Curve& plan) {
   Local p{};
   const bool small = small_ && MakeLocal(plan, degree_, &p);
-  return usable_ && RowHolds(rows_[static_cast<size_t>(row)], plan, small ? &p : nullptr);
+  return usable_ && RowHolds(rows_[static_cast<size_t>(row)], plan, small ? &p : nullptr, true);
 }
 
-bool PlanProof::Holds(const Curve& plan) {
-  examined_ = n_exact_ = 0;
-  if (!usable_ || !plan.allFinite()) return false;
-  if (rows_.empty()) return true;
+bool PlanProof::Holds(const Curve& plan, bool exactly) {
+  n_exact_ = 0;
+  if (!plan.allFinite()) return false;
   Local p{};
-  const bool small = small_ && MakeLocal(plan, degree_, &p), bounds = small && linear_;
+  bool small = small_ && MakeLocal(plan, degree_, &p);
+  if (!all_ && !(small && IsWithinReach(p))) {
+    SetRows(true);
+    small = small_ && MakeLocal(plan, degree_, &p);
+  }
+  if (!usable_) return false;
+  if (rows_.empty()) return true;
+  const bool bounds = small && linear_;
   if (bounds) {
     for (int i = 0; i <= degree_; ++i) std::copy(p.point[i], p.point[i] + 3, input_.plan[i]);
     input_.size = std::max(p.size, target_.size) + center_size_ + origin_.cwiseAbs().maxCoeff();
@@ -151,8 +182,7 @@ bool PlanProof::Holds(const Curve& plan) {
   }
   for (size_t j = 0; j < rows_.size(); ++j) {
     if (bounds && cleared_[j]) continue;
-    ++examined_;
-    if (!RowHolds(rows_[j], plan, small ? &p : nullptr)) return false;
+    if (!RowHolds(rows_[j], plan, small ? &p : nullptr, exactly)) return false;
   }
   return true;
 }

@@ -26,10 +26,13 @@ class PlanProof {
   explicit PlanProof(const kernels::Table& kernels = kernels::Kernels()) : kernels_(&kernels) {}
 
   /// Keeps a pointer to `problem`. Sight is asked from tau = `sight_from` on (1: never); `exact` as
-  /// for IsInSight.
+  /// for IsInSight. Where the problem has a reach, there are rows for the obstacles near it only,
+  /// until a plan that leaves it is asked for.
   void Reset(const Problem& problem, double sight_from, bool exact);
 
-  bool Holds(const Curve& plan);
+  /// Without `exactly`, what bounds and subdivision leave open counts as refused: for plans that
+  /// may be dispensed with, because the integers take milliseconds.
+  bool Holds(const Curve& plan, bool exactly = true);
   /// The same for one row only.
   bool RowHolds(int row, const Curve& plan);
   /// Whether the target itself stays outside the row's shape while sight is asked.
@@ -39,11 +42,9 @@ class PlanProof {
   /// [6][padded]: R00 R01 R02 R11 R12 R22 of the rows, the last repeated; one column at least.
   const double* shapes() const { return shapes_.data(); }
   int padded() const { return input_.n; }
-  const Eigen::Vector3d& origin() const { return origin_; }
   /// False where a shape is not finite and positive definite: nothing is proven then.
   bool IsUsable() const { return usable_; }
-  /// Rows of the last Holds that took subdivision, and exact arithmetic.
-  int examined() const { return examined_; }
+  /// Rows of the last Holds that took exact arithmetic.
   int exact() const { return n_exact_; }
 
  private:
@@ -51,15 +52,19 @@ class PlanProof {
     double point[kernels::kMaxDegree + 1][3];
     double size;  ///< largest sum of absolute power coefficients of a coordinate
   };
+  void SetRows(bool all);
+  void AddRows(int obstacle);
+  bool IsWithinReach(const Local& plan) const;
   bool MakeLocal(const Curve& curve, int degree, Local* out) const;
   void PutRow(int column, const Row& row);
   /// `p`: the plan's control points; null where its degree is too high for them.
-  bool RowHolds(const Row& row, const Curve& plan, const Local* p);
+  bool RowHolds(const Row& row, const Curve& plan, const Local* p, bool exactly);
 
   const kernels::Table* kernels_;
   const Problem* problem_ = nullptr;
-  bool exact_sight_ = true, usable_ = false, small_ = false, linear_ = true;
-  int degree_ = 5, examined_ = 0, n_exact_ = 0;
+  bool exact_sight_ = true, usable_ = false, small_ = false, linear_ = true, all_ = true;
+  int degree_ = 5, n_exact_ = 0;
+  double sight_from_ = 0.0;
   Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();
   Local target_{};
   double center_size_ = 0.0;

@@ -29,8 +29,8 @@ std::string PlannerConfig::Problem() const {
     if (!(w >= 0.0)) return Say("a weight", w, "at least 0");
   if (!(cost_max >= cost_min)) return Say("cost_max", cost_max, "at least cost_min");
   if (!(cost_range > 0.0)) return Say("cost_range", cost_range, "above 0");
-  for (double m : {drone_radius, safety_margin, sight_margin, sigmas, max_inflation, max_speed,
-                   max_acceleration, min_distance})
+  for (double m : {drone_radius, safety_margin, sight_margin, refine_room, sigmas, max_inflation,
+                   max_speed, max_acceleration, min_distance})
     if (!(m >= 0.0)) return Say("a margin or limit", m, "at least 0");
   if (!(z_max >= z_min)) return Say("z_max", z_max, "at least z_min");
   if (!(max_elevation_deg >= 0.0 && max_elevation_deg < 90.0))

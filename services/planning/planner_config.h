@@ -16,6 +16,7 @@ struct PlannerConfig {
   double waypoint_weight = 10.0;
   bool adaptive = true;
   bool refine = true;
+  double refine_room = 0.05;
   bool exact_visibility = true;
 
   double weight_smooth = 0.05, weight_obstacle = 1.0, weight_distance = 1.0, weight_yaw = 1.0;
@@ -48,7 +49,8 @@ struct PlannerConfig {
     v("elevation_high_deg", elevation_high_deg, "of the upper skeletons above the target");
     v("waypoint_weight", waypoint_weight, "pull of the skeletons on a candidate [w_p], m^2/s^3");
     v("adaptive", adaptive, "skeleton layout follows clutter and the target's motion");
-    v("refine", refine, "move the winner downhill while it stays certified");
+    v("refine", refine, "move the winner, and the running plan, downhill while certified");
+    v("refine_room", refine_room, "more margin that moved plans keep where there is room, m");
     v("exact_visibility", exact_visibility, "exact sight condition; false: the paper's bound");
     v("weight_smooth", weight_smooth, "[w_1]");
     v("weight_obstacle", weight_obstacle, "[w_2]");

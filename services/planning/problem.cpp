@@ -1,5 +1,6 @@
 #include "services/planning/problem.h"
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
@@ -19,6 +20,15 @@ Eigen::Matrix3d Grown(const Eigen::Matrix3d& R, double margin) {
   return margin > 0.0 ? world::Inflated(R, margin) : R;
 }
 
+// Encloses the ellipsoid and all balls of radius `room` about its points: the inverse of the shape
+// is (1 + s) (R^-1 + room^2 / s) for any s > 0; this s is tight across the axis of upright shapes.
+Eigen::Matrix3d Enlarged(const Eigen::Matrix3d& R, double room) {
+  const double s = room * std::sqrt(0.5 * R.trace());
+  Eigen::Matrix3d inverse = R.inverse();
+  inverse.diagonal().array() += room * room / s;
+  return ((1.0 + s) * inverse).inverse();
+}
+
 double Uncertainty(const PlannerConfig& config, const world::Obstacle& o, double duration) {
   const double half = 0.5 * duration;
   const double sigma = std::sqrt(o.position_variance + o.velocity_variance * half * half);
@@ -27,51 +37,25 @@ double Uncertainty(const PlannerConfig& config, const world::Obstacle& o, double
 
 constexpr int kSamples = 24;
 
-// Control points of a curve at degree 6, where its degree is not higher, and samples.
+// A curve and a box around it, where its degree allows one.
 struct Hull {
-  Points points;
-  bool known = false;
-  Eigen::Vector3d samples[kSamples + 1];
+  const Curve& curve;
+  std::optional<Box> box;
 
-  explicit Hull(const Curve& curve) : known(curve.rows() <= 7) {
-    if (known) points = ToPoints(curve, 6);
-    for (int i = 0; i <= kSamples; ++i)
-      samples[i] = Evaluate(curve, static_cast<double>(i) / kSamples);
+  explicit Hull(const Curve& curve_) : curve(curve_) {
+    if (curve.rows() <= 7) box = BoxOf(ToPoints(curve, 6), 7, 1e-6);
   }
 };
 
-// d(x) >= (m' R x)^2 / (m' R m) for any m (Cauchy-Schwarz): with m the mean of the control points
-// of curve - center, a quick sufficient test that the curve stays out.
+// A quick sufficient test that the curve stays well out.
 bool IsPlainlyOutside(const Hull& curve, const Curve& center, const Eigen::Matrix3d& R) {
-  if (!curve.known || center.rows() > 7) return false;
-  Points x = curve.points;
-  if (center.rows() <= 2) {
-    for (int i = 0; i <= 6; ++i) {
-      x.row(i) -= center.row(0);
-      if (center.rows() == 2) x.row(i) -= (i / 6.0) * center.row(1);
-    }
-  } else {
-    x -= ToPoints(center, 6);
-  }
-  const Eigen::Vector3d mean = x.colwise().mean().transpose();
-  const Eigen::Vector3d Rm = R * mean;
-  double low = HUGE_VAL;
-  for (int i = 0; i <= 6; ++i)
-    low = std::min(low, x(i, 0) * Rm[0] + x(i, 1) * Rm[1] + x(i, 2) * Rm[2]);
-  return low > 0.0 && low * low > kClear * Rm.dot(mean);
+  return curve.box && !MayTouch(*curve.box, center, R, kClear);
 }
 
-bool StaysOutside(const Hull& curve, const Curve& center, const Eigen::Matrix3d& R, double limit) {
+bool StaysOutside(const Curve& curve, const Curve& center, const Eigen::Matrix3d& R, double limit) {
   for (int i = 0; i <= kSamples; ++i) {
-    Eigen::Vector3d x = curve.samples[i];
     const double tau = static_cast<double>(i) / kSamples;
-    if (center.rows() <= 2) {
-      for (int a = 0; a < 3; ++a)
-        x[a] -= center(0, a) + (center.rows() == 2 ? tau * center(1, a) : 0.0);
-    } else {
-      x -= Evaluate(center, tau);
-    }
-    if (SquaredNorm(R, x) <= limit) return false;
+    if (SquaredNorm(R, Evaluate(curve, tau) - Evaluate(center, tau)) <= limit) return false;
   }
   return true;
 }
@@ -104,9 +88,9 @@ void SetSightShape(const PlannerConfig& config, const world::Obstacle& o, double
   for (double share : kShares) {
     e->sight = Grown(o.shape, share * margin);
     if (IsPlainlyOutside(target, e->center, e->sight)) return;
-    if (margin == 0.0 || StaysOutside(target, e->center, e->sight, kClear)) break;
+    if (margin == 0.0 || StaysOutside(target.curve, e->center, e->sight, kClear)) break;
   }
-  if (StaysOutside(target, e->center, e->sight, 1.0)) return;
+  if (StaysOutside(target.curve, e->center, e->sight, 1.0)) return;
   e->sight_from = 1.0;
   Note(notes, "obstacle " + std::to_string(e->id) + " holds the target, its shadow is ignored");
 }
@@ -172,6 +156,33 @@ Problem MakeProblem(const PlannerConfig& config, const PlanRequest& request, std
     SetEllipsoid(config, request, target, o, problem, &problem.obstacles.back(), notes);
   }
   return problem;
+}
+
+Problem WithRoom(const Problem& problem, double room) {
+  Problem roomy;
+  roomy.duration = problem.duration;
+  roomy.degree = problem.degree;
+  roomy.start = problem.start;
+  roomy.target = problem.target;
+  roomy.limits = problem.limits;
+  roomy.reach = problem.reach;
+  const size_t n = problem.reach ? problem.near.size() : problem.obstacles.size();
+  roomy.obstacles.reserve(n);
+  const Hull target(problem.target);
+  for (size_t i = 0; i < n; ++i) {
+    const size_t j = problem.reach ? static_cast<size_t>(problem.near[i]) : i;
+    roomy.near.push_back(static_cast<int>(i));
+    roomy.obstacles.push_back(problem.obstacles[j]);
+    Ellipsoid& e = roomy.obstacles.back();
+    if (!(room > 0.0)) continue;
+    const Eigen::Matrix3d safety = Enlarged(e.safety, room), sight = Enlarged(e.sight, room);
+    const Eigen::Vector3d offset = (problem.start.row(0) - e.center.row(0)).transpose();
+    if (SquaredNorm(safety, offset) > kClear) e.safety = safety;
+    if (IsPlainlyOutside(target, e.center, sight) ||
+        StaysOutside(problem.target, e.center, sight, kClear))
+      e.sight = sight;
+  }
+  return roomy;
 }
 
 Curve ToCurve(const world::Trajectory& trajectory, double start, double duration) {

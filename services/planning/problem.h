@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -10,7 +11,6 @@ namespace chase::planning {
 
 /// Power-basis coefficients of a curve in normalised time tau in [0,1]; row k: tau^k, frame W, m.
 using Curve = Eigen::Matrix<double, Eigen::Dynamic, 3, 0, 16, 3>;
-constexpr int kMaxCurveDegree = 12;
 
 /// An obstacle as the planner sees it: the true ellipsoid grown for the drone's safety and, less,
 /// for the line of sight.
@@ -34,6 +34,11 @@ struct Limits {
   double min_distance = 0.0;   ///< m; 0: none
 };
 
+/// A box, frame W, m.
+struct Box {
+  Eigen::Array3d low, high;
+};
+
 /// Problem 2 of Jeon 2021 in normalised time, ready to be searched.
 struct Problem {
   double duration = 1.0;  ///< T, s
@@ -43,6 +48,10 @@ struct Problem {
   std::vector<Ellipsoid> obstacles;
   Limits limits;
   std::vector<std::vector<Eigen::Vector3d>> skeletons;  ///< [step][choice], frame W, m
+  /// Holds the target and the plans that are considered; none: unlimited.
+  std::optional<Box> reach;
+  /// Indices of the obstacles that can matter within `reach`; meaningless without it.
+  std::vector<int> near;
   int n_candidates() const;
 };
 
@@ -50,6 +59,10 @@ struct Problem {
 /// breaks; `notes` gets one clause for each such relaxation that weakens the certificate. Leaves
 /// the skeletons empty.
 Problem MakeProblem(const PlannerConfig& config, const PlanRequest& request, std::string* notes);
+
+/// The problem with the obstacles near its reach (all, where there is none) only, enlarged by
+/// `room` m to all sides where the start and the target stay outside; without skeletons.
+Problem WithRoom(const Problem& problem, double room);
 
 /// `trajectory` over [start, start + duration] in normalised time.
 Curve ToCurve(const world::Trajectory& trajectory, double start, double duration);

@@ -15,7 +15,9 @@ class ReferenceSearch : public Search {
   ReferenceSearch(const PlannerConfig& config, Arithmetic arithmetic)
       : config_(config), arithmetic_(arithmetic) {}
 
-  Found Best(const Problem& problem, double sight_from) override {
+  using Search::Best;
+  Found Best(const Problem& problem, double sight_from, double /*bound*/,
+             PlanProof* /*proof*/) override {
     const Eigen::MatrixXd K_inverse = InverseKkt(config_, problem);
     Found found;
     found.generated = problem.n_candidates();

@@ -1,205 +1,240 @@
 #include "services/planning/refinement.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
-#include "services/planning/certificate.h"
+#include "services/planning/limits.h"
 
 namespace chase::planning {
 namespace {
 
 constexpr int kSteps = 4;
-constexpr double kReach = 0.5;   // m, that a control point may move in all
 constexpr double kLeast = 2e-4;  // relative gain of a step that is worth another
 constexpr double kDamping = 1e-6;
 
-double SquaredNorm(const Eigen::Matrix3d& R, const Eigen::Vector3d& d) { return d.dot(R * d); }
+bool IsWorthIt(const Cost& before, const Cost& after) {
+  return before.total - after.total >= kLeast * before.total;
+}
 
-}  // namespace
-
-bool Refiner::Set(const Problem& problem, const Curve& plan) {
-  problem_ = &problem;
-  const int M = static_cast<int>(plan.rows()) - 1;
-  if (M < 5 || M > 6 || problem.target.rows() > M + 1) return false;
-  free_ = M - 3;
-  if (tables_.degree != M || tables_.duration != problem.duration)
-    tables_ = CandidateTables(config_, M, 1, problem.duration);
-  origin_ = problem.target.row(0).transpose();
-  Curve local = plan, target = problem.target;
-  local.row(0) -= origin_.transpose();
-  target.row(0).setZero();
-  first_ = ToPoints(local, M);
-  target_ = ToPoints(target, M);
-  SetNear();
+// Solves A x = -g by Cholesky's method, n <= 9, the lower triangle of A given; overwrites A. False
+// where A is not positive definite.
+bool SolveDownhill(int n, double (*A)[9], const double* g, double* x) {
+  double inverse[9];
+  for (int i = 0; i < n; ++i) {
+    for (int j = 0; j <= i; ++j) {
+      double sum = A[i][j];
+      for (int k = 0; k < j; ++k) sum -= A[i][k] * A[j][k];
+      if (j < i) {
+        A[i][j] = sum * inverse[j];
+      } else {
+        if (!(sum > 0.0)) return false;
+        A[i][i] = std::sqrt(sum);
+        inverse[i] = 1.0 / A[i][i];
+      }
+    }
+    double y = -g[i];
+    for (int k = 0; k < i; ++k) y -= A[i][k] * x[k];
+    x[i] = y * inverse[i];
+  }
+  for (int i = n - 1; i >= 0; --i) {
+    for (int k = i + 1; k < n; ++k) x[i] -= A[k][i] * x[k];
+    x[i] *= inverse[i];
+  }
   return true;
 }
 
-void Refiner::SetNear() {
+}  // namespace
+
+bool Refiner::Reset(const Problem& problem, double sight_from) {
+  problem_ = &problem;
+  const int M = problem.degree;
+  if (M < 5 || M > 6 || problem.target.rows() > M + 1) return false;
+  free_ = M - 3;
+  const int steps = std::max(1, static_cast<int>(problem.skeletons.size()));
+  tables_ = &shelf_.Get(M, steps, problem.duration);
+  origin_ = problem.target.row(0).transpose();
+  SetObjective();
+  // The paper's bound on sight may hold for larger shapes only.
+  roomy_ = WithRoom(problem, config_.exact_visibility ? config_.refine_room : 0.0);
+  proof_.Reset(roomy_, sight_from, config_.exact_visibility);
+  return true;
+}
+
+void Refiner::SetObjective() {
+  const int M = tables_->degree;
+  Curve start = problem_->start, target = problem_->target;
+  start.row(0) -= origin_.transpose();
+  target.row(0).setZero();
+  start_ = ToPoints(start, M);
+  const Points their = ToPoints(target, M);
+  kernels::ObjectiveInput& in = input_;
+  in.free = free_;
+  in.rest = 0.0;
+  for (int i = 0; i < 4; ++i)
+    for (int j = 0; j < 4; ++j) in.rest += tables_->smooth(i, j) * start_.row(i).dot(start_.row(j));
+  for (int f = 0; f < free_; ++f) {
+    for (int g = 0; g < free_; ++g) in.smooth[f][g] = tables_->smooth(4 + f, 4 + g);
+    for (int a = 0; a < 3; ++a) {
+      in.pull[f][a] = 0.0;
+      for (int i = 0; i < 4; ++i) in.pull[f][a] += tables_->smooth(4 + f, i) * start_(i, a);
+    }
+  }
+  for (int k = 0; k < kernels::kPaddedNodes; ++k) {
+    const bool real = k < kNodes;
+    in.weight[k] = real ? problem_->duration * GaussNodes().weight[k] : 0.0;
+    for (int f = 0; f < free_; ++f) {
+      in.phi[f][k] = real ? tables_->phi[k][4 + f] : 0.0;
+      in.slope[f][k] = real ? tables_->slope[k][4 + f] : 0.0;
+    }
+    for (int a = 0; a < 3; ++a) {
+      double p = 0.0, q = real ? 0.0 : 1.0, v = 0.0;
+      for (int i = 0; real && i <= M; ++i) {
+        if (i < 4) p += tables_->phi[k][i] * start_(i, a);
+        q += tables_->phi[k][i] * their(i, a);
+        v += tables_->slope[k][i] * ((i < 4 ? start_(i, a) : 0.0) - their(i, a));
+      }
+      in.at[a][k] = p;
+      in.rel[a][k] = p - q;
+      if (a < 2) in.rate[a][k] = v;
+    }
+  }
+  const double scale =
+      (config_.cost_max - config_.cost_min) / (config_.cost_range * config_.cost_range);
+  in.weight_obstacle = config_.weight_obstacle * scale;
+  in.weight_distance = config_.weight_distance;
+  in.weight_yaw = config_.weight_yaw;
+  in.desired_distance = config_.desired_distance;
+  in.yaw_floor = kYawDistanceFloor * kYawDistanceFloor;
+  in.cost_range = config_.cost_range;
+}
+
+// Obstacles that may cost anything to plans within kReach of the given one.
+void Refiner::SetNear(const Points& b) {
   near_.clear();
-  const int n = tables_.degree + 1;
-  Eigen::Vector3d p[kNodes];
-  for (int k = 0; k < kNodes; ++k) {
-    p[k].setZero();
-    for (int i = 0; i < n; ++i) p[k] += tables_.phi[k][i] * first_.row(i).transpose();
-  }
-  for (size_t j = 0; j < problem_->obstacles.size(); ++j) {
-    const Ellipsoid& e = problem_->obstacles[j];
-    const double range = config_.cost_range + kReach * std::sqrt(e.safety.trace());
-    for (int k = 0; k < kNodes; ++k) {
-      const Eigen::Vector3d c = Evaluate(e.center, GaussNodes().tau[k]) - origin_;
-      if (SquaredNorm(e.safety, p[k] - c) >= range * range) continue;
-      near_.push_back({k, static_cast<int>(j), c});
+  input_.n_near = 0;
+  if (config_.weight_obstacle > 0.0) {
+    Points global = b;
+    global.rowwise() += origin_.transpose();
+    const Box box = BoxOf(global, tables_->degree + 1, kReach);
+    const auto add = [&](const Ellipsoid& e) {
+      if (!MayTouch(box, e.center, e.safety, config_.cost_range)) return;
+      const Eigen::Matrix3d& R = e.safety;
+      for (const double r : {R(0, 0), R(0, 1), R(0, 2), R(1, 1), R(1, 2), R(2, 2)})
+        near_.push_back(r);
+      Eigen::Vector3d at[kernels::kPaddedNodes];
+      for (int k = 0; k < kernels::kPaddedNodes; ++k)
+        at[k] = (k == 0 || e.center.rows() > 1
+                     ? Eigen::Vector3d(Evaluate(e.center, GaussNodes().tau[k % kNodes]) - origin_)
+                     : at[0]);
+      for (int a = 0; a < 3; ++a)
+        for (const Eigen::Vector3d& c : at) near_.push_back(c[a]);
+      ++input_.n_near;
+    };
+    if (problem_->reach) {
+      for (const int j : problem_->near) add(problem_->obstacles[static_cast<size_t>(j)]);
+    } else {
+      for (const Ellipsoid& e : problem_->obstacles) add(e);
     }
   }
+  input_.near = near_.data();
 }
 
-Curve Refiner::PlanOf(const Points& b) const {
-  Curve plan = ToPower(b, tables_.degree);
-  plan.topRows(4) = problem_->start;
-  return plan;
-}
-
-Cost Refiner::CostOf(const Points& b) const {
-  const int n = tables_.degree + 1;
-  const double T = problem_->duration;
+Cost Refiner::CostOf(const Free& x) const {
+  const kernels::ObjectiveParts parts = kernels_.objective(input_, x.data());
+  const double scale =
+      (config_.cost_max - config_.cost_min) / (config_.cost_range * config_.cost_range);
   Cost cost;
-  double smooth = 0.0, near = 0.0;
-  for (int i = 0; i < n; ++i)
-    for (int j = 0; j < n; ++j) smooth += tables_.smooth(i, j) * b.row(i).dot(b.row(j));
-  Eigen::Vector3d at[kNodes];
-  for (int k = 0; k < kNodes; ++k) {
-    Eigen::Vector3d p = Eigen::Vector3d::Zero(), q = p, v = p;
-    for (int i = 0; i < n; ++i) {
-      p += tables_.phi[k][i] * b.row(i).transpose();
-      q += tables_.phi[k][i] * target_.row(i).transpose();
-      v += tables_.slope[k][i] * (b.row(i) - target_.row(i)).transpose();
-    }
-    at[k] = p;
-    const Eigen::Vector3d r = p - q;
-    const double weight = T * GaussNodes().weight[k], e = r.norm() - config_.desired_distance;
-    const double h = std::max(r.head<2>().squaredNorm(), kYawDistanceFloor * kYawDistanceFloor);
-    const double rate = (r.x() * v.y() - r.y() * v.x()) / h;
-    cost.j3 += weight * e * e;
-    cost.j4 += weight * rate * rate;
-  }
-  for (const Near& o : near_) {
-    const Eigen::Matrix3d& R = problem_->obstacles[static_cast<size_t>(o.obstacle)].safety;
-    const double l = std::sqrt(SquaredNorm(R, at[o.node] - o.center)) - config_.cost_range;
-    if (l < 0.0) near += T * GaussNodes().weight[o.node] * l * l;
-  }
-  const double range2 = config_.cost_range * config_.cost_range;
-  cost.j1 = config_.weight_smooth > 0.0 ? smooth / config_.weight_smooth : 0.0;
-  cost.j2 = (config_.cost_max - config_.cost_min) / range2 * near +
-            config_.cost_min * T * static_cast<double>(problem_->obstacles.size());
-  cost.total = smooth + config_.weight_obstacle * cost.j2 + config_.weight_distance * cost.j3 +
-               config_.weight_yaw * cost.j4;
+  cost.j1 = config_.weight_smooth > 0.0 ? parts.smooth / config_.weight_smooth : 0.0;
+  cost.j2 = scale * parts.near +
+            config_.cost_min * problem_->duration * static_cast<double>(problem_->obstacles.size());
+  cost.j3 = parts.distance;
+  cost.j4 = parts.yaw;
+  cost.total = parts.smooth + config_.weight_obstacle * cost.j2 +
+               config_.weight_distance * cost.j3 + config_.weight_yaw * cost.j4;
   return cost;
 }
 
-// A term of the position at a node: p = sum of phi_f x_f.
-void Refiner::AddPull(int node, const Eigen::Vector3d& gradient, const Eigen::Matrix3d& hessian,
-                      Vector* g, Matrix* H) const {
+bool Refiner::Direction(const Free& x, Free* step) const {
+  kernels::ObjectiveModel model;
+  kernels_.model(input_, x.data(), model);
+  for (int i = 0; i < 3 * free_; ++i)
+    model.hessian[i][i] += kDamping + 1e-3 * std::abs(model.hessian[i][i]);
+  return SolveDownhill(3 * free_, model.hessian, model.gradient, step->data());
+}
+
+Refiner::Free Refiner::Moved(const Free& x, const Free& step, double share) const {
+  Free moved = x;
   for (int f = 0; f < free_; ++f) {
-    const double a = tables_.phi[node][4 + f];
-    g->segment<3>(3 * f) += a * gradient;
-    for (int e = 0; e <= f; ++e)
-      H->block<3, 3>(3 * f, 3 * e) += a * tables_.phi[node][4 + e] * hessian;
+    const Eigen::Vector3d from = first_.segment<3>(3 * f);
+    const Eigen::Vector3d offset = x.segment<3>(3 * f) + share * step.segment<3>(3 * f) - from;
+    moved.segment<3>(3 * f) = from + offset * std::min(1.0, kReach / std::max(1e-9, offset.norm()));
   }
+  return moved;
 }
 
-// J3 and J4 at a node; second derivatives of the residuals only where they add to the curvature.
-void Refiner::AddNode(int node, const Points& b, Vector* gradient, Matrix* hessian) const {
-  const int n = tables_.degree + 1;
-  Eigen::Vector3d r = Eigen::Vector3d::Zero(), v = r;
-  for (int i = 0; i < n; ++i) {
-    r += tables_.phi[node][i] * (b.row(i) - target_.row(i)).transpose();
-    v += tables_.slope[node][i] * (b.row(i) - target_.row(i)).transpose();
-  }
-  const double weight = 2.0 * problem_->duration * GaussNodes().weight[node];
-  const double distance = std::max(1e-6, r.norm()), e = distance - config_.desired_distance;
-  const Eigen::Vector3d u = r / distance;
-  const double w3 = weight * config_.weight_distance, bend = std::max(0.0, e / distance);
-  const Eigen::Matrix3d along = u * u.transpose();
-  AddPull(node, w3 * e * u, w3 * (along + bend * (Eigen::Matrix3d::Identity() - along)), gradient,
-          hessian);
-  const double floor2 = kYawDistanceFloor * kYawDistanceFloor, h2 = r.head<2>().squaredNorm();
-  const double h = std::max(h2, floor2), y = (r.x() * v.y() - r.y() * v.x()) / h;
-  const double by_h = h2 > floor2 ? -2.0 * y / h : 0.0;
-  const Eigen::Vector3d by_r(v.y() / h + by_h * r.x(), -v.x() / h + by_h * r.y(), 0.0);
-  const Eigen::Vector3d by_v(-r.y() / h, r.x() / h, 0.0);
-  Vector slope(3 * free_);
-  for (int f = 0; f < free_; ++f)
-    slope.segment<3>(3 * f) = tables_.phi[node][4 + f] * by_r + tables_.slope[node][4 + f] * by_v;
-  const double w4 = weight * config_.weight_yaw;
-  *gradient += w4 * y * slope;
-  hessian->triangularView<Eigen::Lower>() += w4 * slope * slope.transpose();
+bool Refiner::IsProven(const Free& x, Curve* plan) {
+  Points b = start_;
+  for (int f = 0; f < free_; ++f) b.row(4 + f) = x.segment<3>(3 * f).transpose();
+  *plan = ToPower(b, tables_->degree);
+  plan->topRows(4) = problem_->start;
+  if (problem_->reach && !Contains(*problem_->reach, *plan)) return false;
+  return KeepsLimits(*plan, *problem_) && proof_.Holds(*plan, false);
 }
 
-void Refiner::Model(const Points& b, Vector* gradient, Matrix* hessian) const {
-  const int n = tables_.degree + 1;
-  gradient->setZero(3 * free_);
-  hessian->setZero(3 * free_, 3 * free_);
-  for (int f = 0; f < free_; ++f) {
-    Eigen::RowVector3d pull = Eigen::RowVector3d::Zero();
-    for (int i = 0; i < n; ++i) pull += 2.0 * tables_.smooth(4 + f, i) * b.row(i);
-    gradient->segment<3>(3 * f) += pull.transpose();
-    for (int e = 0; e <= f; ++e)
-      hessian->block<3, 3>(3 * f, 3 * e).diagonal().array() += 2.0 * tables_.smooth(4 + f, 4 + e);
-  }
-  for (int k = 0; k < kNodes; ++k) AddNode(k, b, gradient, hessian);
-  const double scale = 2.0 * config_.weight_obstacle * (config_.cost_max - config_.cost_min) /
-                       (config_.cost_range * config_.cost_range);
-  for (const Near& o : near_) {
-    Eigen::Vector3d d = -o.center;
-    for (int i = 0; i < n; ++i) d += tables_.phi[o.node][i] * b.row(i).transpose();
-    const Eigen::Vector3d Rd = problem_->obstacles[static_cast<size_t>(o.obstacle)].safety * d;
-    const double s = std::sqrt(std::max(1e-12, d.dot(Rd))), l = s - config_.cost_range;
-    if (l >= 0.0) continue;
-    const double weight = scale * problem_->duration * GaussNodes().weight[o.node];
-    AddPull(o.node, weight * l / s * Rd, weight / (s * s) * Rd * Rd.transpose(), gradient, hessian);
-  }
-}
-
-bool Refiner::Step(const Vector& direction, Points* b, Curve* plan, Cost* cost) {
-  for (const double share : {1.0, 0.5, 0.25, 0.1}) {
-    Points moved = *b;
-    for (int f = 0; f < free_; ++f) {
-      const Eigen::RowVector3d at = b->row(4 + f) + share * direction.segment<3>(3 * f).transpose();
-      const Eigen::RowVector3d offset = at - first_.row(4 + f);
-      moved.row(4 + f) =
-          first_.row(4 + f) + offset * std::min(1.0, kReach / std::max(1e-9, offset.norm()));
-    }
-    const Cost next = CostOf(moved);
-    if (!(next.total < cost->total)) continue;
-    const Curve curve = PlanOf(moved);
-    if (!proof_.Holds(curve) || !KeepsLimits(curve, *problem_)) continue;
-    *b = moved;
-    *plan = curve;
-    *cost = next;
-    return true;
-  }
-  return false;
-}
-
-bool Refiner::Improve(const Problem& problem, double sight_from, Curve* plan, Cost* cost) {
-  if (!Set(problem, *plan)) return false;
-  proof_.Reset(problem, sight_from, config_.exact_visibility);
-  Points b = first_;
+bool Refiner::Descend(bool prove, Free* x, Curve* plan, Cost* cost) {
   bool changed = false;
-  for (int step = 0; step < kSteps; ++step) {
-    Vector gradient;
-    Matrix hessian;
-    Model(b, &gradient, &hessian);
-    hessian.diagonal().array() += kDamping + 1e-3 * hessian.diagonal().array().abs();
-    const Eigen::LLT<Matrix> llt(hessian);
-    if (llt.info() != Eigen::Success) break;
-    const double before = cost->total;
-    if (!Step(-llt.solve(gradient), &b, plan, cost)) break;
-    changed = true;
-    if (before - cost->total < kLeast * before) break;
+  Free step;
+  for (int i = 0; i < kSteps && Direction(*x, &step); ++i) {
+    const Cost before = *cost;
+    for (const double share : {1.0, 0.5, 0.25, 0.1}) {
+      const Free moved = Moved(*x, step, share);
+      const Cost next = CostOf(moved);
+      if (!(next.total < cost->total)) continue;
+      Curve curve;
+      if (prove && !IsProven(moved, &curve)) continue;
+      if (prove) *plan = curve;
+      *x = moved;
+      *cost = next;
+      changed = true;
+      break;
+    }
+    if (!IsWorthIt(before, *cost)) break;
   }
   return changed;
+}
+
+void Refiner::SetPlan(const Curve& plan) {
+  Curve local = plan;
+  local.row(0) -= origin_.transpose();
+  const Points b = ToPoints(local, tables_->degree);
+  first_.setZero();
+  for (int f = 0; f < free_; ++f) first_.segment<3>(3 * f) = b.row(4 + f).transpose();
+  SetNear(b);
+}
+
+bool Refiner::Leap(Curve* plan, Cost* cost) {
+  SetPlan(*plan);
+  const Cost before = CostOf(first_);
+  Free x = first_;
+  Curve moved;
+  Cost found = before;
+  if (!Descend(false, &x, nullptr, &found) || !IsWorthIt(before, found) || !IsProven(x, &moved))
+    return false;
+  *plan = moved;
+  *cost = found;
+  return true;
+}
+
+bool Refiner::Creep(Curve* plan, Cost* cost) {
+  SetPlan(*plan);
+  const Cost before = CostOf(first_);
+  Free x = first_;
+  Curve moved;
+  Cost found = before;
+  if (!Descend(true, &x, &moved, &found) || !IsWorthIt(before, found)) return false;
+  *plan = moved;
+  *cost = found;
+  return true;
 }
 
 }  // namespace chase::planning

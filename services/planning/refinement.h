@@ -8,44 +8,55 @@
 
 namespace chase::planning {
 
-/// Moves the free control points of a feasible plan downhill in the objective of Problem 2: damped
-/// Gauss-Newton steps, each shortened until it lowers the cost and is certified anew. Keeps its
-/// memory from one plan to the next.
+/// Moves the free control points of plans downhill in the objective of Problem 2 by damped
+/// Gauss-Newton steps. Obstacles near the plans are taken somewhat larger than they are
+/// (config.refine_room) where start and target leave that room, so that the result can still be
+/// carried on when the target moves a little otherwise than expected. Keeps its memory from one
+/// plan to the next.
 class Refiner {
  public:
-  explicit Refiner(const PlannerConfig& config) : config_(config) {}
+  explicit Refiner(const PlannerConfig& config) : config_(config), shelf_(config) {}
 
-  /// True when plan and cost changed; the plan is never worse than before and keeps its start.
-  bool Improve(const Problem& problem, double sight_from, Curve* plan, Cost* cost);
+  /// How far a control point may move in all, m.
+  static constexpr double kReach = 0.5;
+
+  /// Keeps a pointer to `problem`. False where its degrees do not fit: nothing can be improved.
+  bool Reset(const Problem& problem, double sight_from);
+
+  /// All steps first, then one proof. True when that holds: the plan has changed, keeps its start,
+  /// is certified against the problem's limits and the enlarged obstacles, and costs less by 0.02 %
+  /// at least; `cost` is its cost. Else both are as before. The plan given need not be feasible.
+  bool Leap(Curve* plan, Cost* cost);
+  /// The same with each step shortened until it is certified: for what Leap could not move.
+  bool Creep(Curve* plan, Cost* cost);
+  bool Improve(Curve* plan, Cost* cost) { return Leap(plan, cost) || Creep(plan, cost); }
 
  private:
-  using Vector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 9, 1>;
-  using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 9, 9>;
+  using Free = Eigen::Matrix<double, 9, 1>;  ///< free control points, 3 f + axis, local
 
-  /// An obstacle near enough at a quadrature node to cost anything there.
-  struct Near {
-    int node, obstacle;
-    Eigen::Vector3d center;  ///< local
-  };
-
-  bool Set(const Problem& problem, const Curve& plan);
-  void SetNear();
-  Cost CostOf(const Points& b) const;
-  void Model(const Points& b, Vector* gradient, Matrix* hessian) const;
-  void AddNode(int node, const Points& b, Vector* gradient, Matrix* hessian) const;
-  void AddPull(int node, const Eigen::Vector3d& gradient, const Eigen::Matrix3d& hessian, Vector* g,
-               Matrix* H) const;
-  bool Step(const Vector& direction, Points* b, Curve* plan, Cost* cost);
-  Curve PlanOf(const Points& b) const;
+  void SetObjective();
+  void SetPlan(const Curve& plan);
+  void SetNear(const Points& b);
+  Cost CostOf(const Free& x) const;
+  /// The Gauss-Newton step, false where there is none.
+  bool Direction(const Free& x, Free* step) const;
+  Free Moved(const Free& x, const Free& step, double share) const;
+  bool IsProven(const Free& x, Curve* plan);
+  bool Descend(bool prove, Free* x, Curve* plan, Cost* cost);
 
   PlannerConfig config_;
-  PlanProof proof_;
-  CandidateTables tables_;
+  TableShelf shelf_;
+  const kernels::Table& kernels_ = kernels::Kernels();
+  const CandidateTables* tables_ = nullptr;
   const Problem* problem_ = nullptr;
+  Problem roomy_;
+  PlanProof proof_;
   int free_ = 2;
   Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();
-  Points first_, target_;  // local control points: of the plan as it came, and of the target
-  std::vector<Near> near_;
+  Points start_;  ///< local control points; of the start rows 0..3
+  Free first_;    ///< of the plan as it came
+  kernels::ObjectiveInput input_{};
+  std::vector<double> near_;
 };
 
 }  // namespace chase::planning

@@ -1,8 +1,10 @@
 #pragma once
 
+#include <limits>
 #include <memory>
 
 #include "services/planning/certificate.h"
+#include "services/planning/plan_proof.h"
 #include "services/planning/problem.h"
 
 namespace chase::planning {
@@ -19,8 +21,18 @@ struct Found {
 class Search {
  public:
   virtual ~Search() = default;
-  /// Sight is asked from tau = `sight_from` on (1: never); a multiple of 1/4.
-  virtual Found Best(const Problem& problem, double sight_from) = 0;
+
+  /// `proof` has been reset to the problem and `sight_from`, the tau from which sight is asked (1:
+  /// never; a multiple of 1/4). Candidates that cost more than `bound` need not be found.
+  virtual Found Best(const Problem& problem, double sight_from, double bound, PlanProof* proof) = 0;
+
+  /// The same with a proof of its own and no bound; `exact` as for IsInSight.
+  Found Best(const Problem& problem, double sight_from, bool exact,
+             const kernels::Table& table = kernels::Kernels()) {
+    PlanProof proof(table);
+    proof.Reset(problem, sight_from, exact);
+    return Best(problem, sight_from, std::numeric_limits<double>::infinity(), &proof);
+  }
 };
 
 }  // namespace chase::planning

@@ -2,27 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 namespace chase::planning {
 namespace {
 
 constexpr int kMaxCandidates = 4096;  // that adaptation may grow to
-
-struct Spread {
-  double radius_near, radius_far;  // m
-  double low, high;                // elevations, rad
-};
-
-struct Direction {
-  double azimuth, elevation;  // rad
-  Eigen::Vector3d unit;
-
-  Direction(double azimuth_, double elevation_)
-      : azimuth(azimuth_),
-        elevation(elevation_),
-        unit(std::cos(azimuth_) * std::cos(elevation_), std::sin(azimuth_) * std::cos(elevation_),
-             std::sin(elevation_)) {}
-};
 
 // Offset of choice i from the present bearing: 0, then pairs to both sides, ever further apart, up
 // to half a turn.
@@ -34,25 +19,58 @@ double AzimuthOffset(int i, int choices) {
   return i % 2 ? offset : -offset;
 }
 
-bool IsFree(const Problem& problem, double tau, const Eigen::Vector3d& q,
-            const Eigen::Vector3d& u) {
-  for (const Ellipsoid& e : problem.obstacles) {
-    const Eigen::Vector3d c = Evaluate(e.center, tau);
-    if ((u - c).dot(e.safety * (u - c)) < 1.05) return false;
-    if (e.sight_from < 1.0 && world::SegmentSquaredDistance(u, q, c, e.sight) < 1.05) return false;
-  }
-  return true;
+// `v` turned about the vertical; turn: cosine and sine.
+Eigen::Vector3d Turned(const Eigen::Vector3d& v, const Eigen::Vector2d& turn) {
+  return {turn.x() * v.x() - turn.y() * v.y(), turn.y() * v.x() + turn.x() * v.y(), v.z()};
 }
 
+Eigen::Vector2d TurnBy(double angle) { return {std::cos(angle), std::sin(angle)}; }
+
+// The obstacles at one time, as far as they are asked to be clear of.
+class Moment {
+ public:
+  Moment(const Problem& problem, double tau, const Eigen::Vector3d& target)
+      : problem_(problem), target_(target) {
+    centers_.reserve(problem.obstacles.size());
+    for (const Ellipsoid& e : problem.obstacles) centers_.push_back(Evaluate(e.center, tau));
+  }
+
+  bool IsFree(const Eigen::Vector3d& u) {
+    // What was in the way last time is likely to be again.
+    if (!centers_.empty() && !IsClearOf(last_, u)) return false;
+    for (size_t j = 0; j < centers_.size(); ++j)
+      if (j != last_ && !IsClearOf(j, u)) {
+        last_ = j;
+        return false;
+      }
+    return true;
+  }
+
+ private:
+  bool IsClearOf(size_t j, const Eigen::Vector3d& u) const {
+    constexpr double kClear = 1.05;
+    const Ellipsoid& e = problem_.obstacles[j];
+    const Eigen::Vector3d d = u - centers_[j];
+    if (d.dot(e.safety * d) < kClear) return false;
+    return e.sight_from >= 1.0 ||
+           world::SegmentSquaredDistance(u, target_, centers_[j], e.sight) >= kClear;
+  }
+
+  const Problem& problem_;
+  const Eigen::Vector3d target_;
+  std::vector<Eigen::Vector3d> centers_;
+  size_t last_ = 0;
+};
+
 // `first`, or the nearest free place around the target q that small changes of it reach.
-Eigen::Vector3d Slid(const Problem& problem, double tau, const Eigen::Vector3d& q,
-                     const Eigen::Vector3d& first, double radius, const Direction& d) {
-  if (IsFree(problem, tau, q, first)) return first;
+Eigen::Vector3d Slid(Moment* moment, const Eigen::Vector3d& q, const Eigen::Vector3d& first,
+                     double radius, const Eigen::Vector3d& direction) {
+  if (moment->IsFree(first)) return first;
   for (double turn : {0.0, 0.15, -0.15, 0.3, -0.3, 0.45, -0.45}) {
-    const Direction turned(d.azimuth + turn, d.elevation);
+    const Eigen::Vector3d turned = Turned(direction, TurnBy(turn));
     for (double r : {1.0, 0.75, 1.3}) {
-      const Eigen::Vector3d u = q + r * radius * turned.unit;
-      if (IsFree(problem, tau, q, u)) return u;
+      const Eigen::Vector3d u = q + r * radius * turned;
+      if (moment->IsFree(u)) return u;
     }
   }
   return first;
@@ -72,11 +90,12 @@ int Clutter(const PlannerConfig& config, const Problem& problem) {
   return n;
 }
 
-double Bearing(const Problem& problem) {
-  const Eigen::Vector3d r = Evaluate(problem.start, 0.0) - Evaluate(problem.target, 0.0);
-  if (r.head<2>().norm() > 1e-3) return std::atan2(r.y(), r.x());
-  const Eigen::Vector3d v = Evaluate(problem.target, 0.0, 1);  // on top of it: get behind it
-  return std::atan2(-v.y(), -v.x());
+// Of the drone from the target, cosine and sine.
+Eigen::Vector2d Bearing(const Problem& problem) {
+  const Eigen::Vector2d r = (problem.start.row(0) - problem.target.row(0)).head<2>().transpose();
+  if (r.norm() > 1e-3) return r.normalized();
+  const Eigen::Vector2d v = Evaluate(problem.target, 0.0, 1).head<2>();  // on top: get behind it
+  return v.norm() > 1e-9 ? Eigen::Vector2d(-v.normalized()) : Eigen::Vector2d(1.0, 0.0);
 }
 
 // Radii at tau are this much larger than wanted: from the present distance to the desired one at a
@@ -108,33 +127,7 @@ void AddNearDrone(Problem* problem) {
   }
 }
 
-void Place(const PlannerConfig& config, int steps, int choices, const Spread& spread, bool slide,
-           Problem* problem) {
-  const double bearing = Bearing(*problem);
-  problem->skeletons.assign(static_cast<size_t>(steps), {});
-  std::vector<Direction> directions;  // [choice][low, high]
-  for (int i = 0; i < choices; ++i)
-    for (double elevation : {spread.low, spread.high})
-      directions.emplace_back(bearing + AzimuthOffset(i, choices), elevation);
-  for (int n = 1; n <= steps; ++n) {
-    const double tau = static_cast<double>(n) / steps;
-    const double scale = slide ? RadiusScale(config, *problem, tau) : 1.0;
-    const Eigen::Vector3d q = Evaluate(problem->target, tau);
-    auto& at = problem->skeletons[static_cast<size_t>(n - 1)];
-    at.reserve(static_cast<size_t>(choices));
-    for (int i = 0; i < choices; ++i) {
-      const double radius = scale * ((i + n) % 2 ? spread.radius_near : spread.radius_far);
-      const Direction& d = directions[static_cast<size_t>(2 * i + ((i / 2 + n) % 2 ? 0 : 1))];
-      const Eigen::Vector3d u = q + radius * d.unit;
-      at.push_back(slide ? Slid(*problem, tau, q, u, radius, d) : u);
-    }
-  }
-  if (!(config.z_max > config.z_min)) return;
-  for (auto& choices_at : problem->skeletons)
-    for (auto& u : choices_at) u.z() = std::clamp(u.z(), config.z_min, config.z_max);
-}
-
-Spread NormalSpread(const PlannerConfig& c) {
+SkeletonPlacer::Spread NormalSpread(const PlannerConfig& c) {
   const double deg = M_PI / 180.0;
   return {(1.0 - c.radius_spread) * c.desired_distance,
           (1.0 + c.radius_spread) * c.desired_distance, c.elevation_low_deg * deg,
@@ -148,30 +141,68 @@ int AffordableChoices(int wanted, int steps) {
 
 }  // namespace
 
-void PlaceRing(const PlannerConfig& config, int steps, int choices, Problem* problem) {
-  Place(config, steps, choices, NormalSpread(config), false, problem);
+const std::vector<Eigen::Vector2d>& SkeletonPlacer::TurnsOf(int choices) {
+  if (turns_.size() <= static_cast<size_t>(choices))
+    turns_.resize(static_cast<size_t>(choices) + 1);
+  auto& turns = turns_[static_cast<size_t>(choices)];
+  for (int i = static_cast<int>(turns.size()); i < choices; ++i)
+    turns.push_back(TurnBy(AzimuthOffset(i, choices)));
+  return turns;
 }
 
-void PlaceSkeletons(const PlannerConfig& config, Layout layout, Problem* problem) {
+void SkeletonPlacer::PlaceAt(int steps, int choices, const Spread& spread, bool slide,
+                             Problem* problem) {
+  const Eigen::Vector2d bearing = Bearing(*problem);
+  const std::vector<Eigen::Vector2d>& turns = TurnsOf(choices);
+  const Eigen::Vector2d low = TurnBy(spread.low), high = TurnBy(spread.high);
+  problem->skeletons.resize(static_cast<size_t>(steps));
+  for (int n = 1; n <= steps; ++n) {
+    const double tau = static_cast<double>(n) / steps;
+    const double scale = slide ? RadiusScale(config_, *problem, tau) : 1.0;
+    const Eigen::Vector3d q = Evaluate(problem->target, tau);
+    std::optional<Moment> moment;
+    if (slide) moment.emplace(*problem, tau, q);
+    auto& at = problem->skeletons[static_cast<size_t>(n - 1)];
+    at.clear();
+    at.reserve(static_cast<size_t>(choices));
+    for (int i = 0; i < choices; ++i) {
+      const double radius = scale * ((i + n) % 2 ? spread.radius_near : spread.radius_far);
+      const Eigen::Vector2d& elevation = (i / 2 + n) % 2 ? low : high;
+      const Eigen::Vector3d level(elevation.x() * bearing.x(), elevation.x() * bearing.y(),
+                                  elevation.y());
+      const Eigen::Vector3d direction = Turned(level, turns[static_cast<size_t>(i)]);
+      const Eigen::Vector3d u = q + radius * direction;
+      at.push_back(slide ? Slid(&*moment, q, u, radius, direction) : u);
+    }
+  }
+  if (!(config_.z_max > config_.z_min)) return;
+  for (auto& choices_at : problem->skeletons)
+    for (auto& u : choices_at) u.z() = std::clamp(u.z(), config_.z_min, config_.z_max);
+}
+
+void SkeletonPlacer::PlaceRing(int steps, int choices, Problem* problem) {
+  PlaceAt(steps, choices, NormalSpread(config_), false, problem);
+}
+
+void SkeletonPlacer::Place(Layout layout, Problem* problem) {
+  Spread spread = NormalSpread(config_);
+  const int few = std::min(config_.steps, 3);
   if (layout == Layout::kWide) {
-    Spread spread = NormalSpread(config);
     spread.radius_near *= 0.7;
     spread.radius_far *= 1.35;
     spread.high *= 1.6;
-    const int steps = std::min(config.steps, 3);
-    Place(config, steps, AffordableChoices(2 * config.skeletons, steps), spread, true, problem);
-    return;
+    PlaceAt(few, AffordableChoices(2 * config_.skeletons, few), spread, true, problem);
+  } else if (layout == Layout::kCautious) {
+    PlaceAt(few, 7, spread, true, problem);
+    AddNearDrone(problem);
+  } else if (!config_.adaptive) {
+    PlaceRing(config_.steps, config_.skeletons, problem);
+  } else {
+    const int extra = std::min(3, Clutter(config_, *problem) / 2);
+    const int choices =
+        std::max(config_.skeletons, AffordableChoices(config_.skeletons + extra, config_.steps));
+    PlaceAt(config_.steps, choices, spread, true, problem);
   }
-  if (layout == Layout::kCautious) {
-    const int steps = std::min(config.steps, 3);
-    Place(config, steps, 7, NormalSpread(config), true, problem);
-    return AddNearDrone(problem);
-  }
-  if (!config.adaptive) return PlaceRing(config, config.steps, config.skeletons, problem);
-  const int extra = std::min(3, Clutter(config, *problem) / 2);
-  const int choices =
-      std::max(config.skeletons, AffordableChoices(config.skeletons + extra, config.steps));
-  Place(config, config.steps, choices, NormalSpread(config), true, problem);
 }
 
 }  // namespace chase::planning

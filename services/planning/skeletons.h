@@ -1,5 +1,8 @@
 #pragma once
 
+#include <Eigen/Core>
+#include <vector>
+
 #include "services/planning/problem.h"
 
 namespace chase::planning {
@@ -13,9 +16,25 @@ enum class Layout { kNormal, kWide, kCautious };
 ///
 /// With config.adaptive a point that an obstacle covers, or from which the target is hidden, slides
 /// to the nearest azimuth and radius that are free, and clutter around the target adds choices.
-void PlaceSkeletons(const PlannerConfig& config, Layout layout, Problem* problem);
+class SkeletonPlacer {
+ public:
+  explicit SkeletonPlacer(const PlannerConfig& config) : config_(config) {}
 
-/// The same points without regard to obstacles, `choices` at each of `steps` times.
-void PlaceRing(const PlannerConfig& config, int steps, int choices, Problem* problem);
+  void Place(Layout layout, Problem* problem);
+  /// The plain ring without regard to obstacles, `choices` at each of `steps` times.
+  void PlaceRing(int steps, int choices, Problem* problem);
+
+  struct Spread {
+    double radius_near, radius_far;  ///< m
+    double low, high;                ///< elevations, rad
+  };
+
+ private:
+  void PlaceAt(int steps, int choices, const Spread& spread, bool slide, Problem* problem);
+  const std::vector<Eigen::Vector2d>& TurnsOf(int choices);
+
+  PlannerConfig config_;
+  std::vector<std::vector<Eigen::Vector2d>> turns_;  ///< [choices]: from the present bearing
+};
 
 }  // namespace chase::planning

@@ -66,11 +66,33 @@ InstanceSpec Spec(int n_obstacles, bool hard) {
   return s;
 }
 
-Found Search1(Search* search, const PlannerConfig& config, const PlanRequest& request) {
-  Problem problem = MakeProblem(config, request, nullptr);
-  PlaceSkeletons(config, Layout::kNormal, &problem);
-  return search->Best(problem, 0.0);
-}
+/// From a request to the best candidate, as the planner goes about it.
+class Searcher {
+ public:
+  Searcher(const PlannerConfig& config, std::unique_ptr<Search> search)
+      : config_(config), search_(std::move(search)), placer_(config), shelf_(config) {}
+  explicit Searcher(const PlannerConfig& config) : Searcher(config, MakeFastSearch(config)) {}
+
+  Found operator()(const PlanRequest& request) {
+    const Problem problem = Pose(request);
+    proof_.Reset(problem, 0.0, config_.exact_visibility);
+    return search_->Best(problem, 0.0, HUGE_VAL, &proof_);
+  }
+  Problem Pose(const PlanRequest& request) {
+    Problem problem = MakeProblem(config_, request, nullptr);
+    placer_.Place(Layout::kNormal, &problem);
+    LimitToReach(config_, shelf_.Get(problem.degree, config_.steps, problem.duration),
+                 Refiner::kReach, &problem);
+    return problem;
+  }
+
+ private:
+  PlannerConfig config_;
+  std::unique_ptr<Search> search_;
+  SkeletonPlacer placer_;
+  TableShelf shelf_;
+  PlanProof proof_;
+};
 
 void Count(benchmark::State& state, const std::vector<double>& us) {
   state.counters["p50_us"] = Quantile(us, 0.5);
@@ -88,9 +110,8 @@ struct Size {
 void Plan(benchmark::State& state, const Size& size) {
   const PlannerConfig config = Config(size.steps, size.skeletons, false);
   const InstanceGenerator generator(config, Spec(size.obstacles, size.hard));
-  const auto fast = MakeFastSearch(config);
-  const auto reference = MakeReferenceSearch(config, Arithmetic::kDoubleSturm),
-             all = MakeReferenceSearch(config, Arithmetic::kCertified);
+  Searcher fast(config), reference(config, MakeReferenceSearch(config, Arithmetic::kDoubleSturm)),
+      all(config, MakeReferenceSearch(config, Arithmetic::kCertified));
   std::vector<double> us, subset, reference_us;
   int same = 0, same_as_double = 0;
   double feasible = 0.0;
@@ -98,17 +119,15 @@ void Plan(benchmark::State& state, const Size& size) {
     for (int i = 0; i < kInstances; ++i) {
       const PlanRequest request = generator.Make(1000u + static_cast<unsigned>(i));
       Found found;
-      us.push_back(
-          MedianMicroseconds(size.repeats, [&] { found = Search1(fast.get(), config, request); }));
+      us.push_back(MedianMicroseconds(size.repeats, [&] { found = fast(request); }));
       if (i < size.compared) {
-        const Found expected = Search1(all.get(), config, request);
+        const Found expected = all(request);
         same += found.index == expected.index;
         feasible += static_cast<double>(expected.feasible) / expected.generated;
       }
       if (i >= size.reference) continue;
       Found expected;
-      reference_us.push_back(
-          MedianMicroseconds(1, [&] { expected = Search1(reference.get(), config, request); }));
+      reference_us.push_back(MedianMicroseconds(1, [&] { expected = reference(request); }));
       subset.push_back(us.back());
       same_as_double += found.index == expected.index;
     }
@@ -128,16 +147,15 @@ void Plan(benchmark::State& state, const Size& size) {
 void ExactVisibility(benchmark::State& state, bool hard) {
   const PlannerConfig bound = Config(3, 12, false), exact = Config(3, 12, true);
   const InstanceGenerator generator(bound, Spec(50, hard));
-  const auto with_bound = MakeFastSearch(bound), with_exact = MakeFastSearch(exact);
+  Searcher with_bound(bound), with_exact(exact);
   std::vector<double> bound_us, us;
   int better = 0, worse = 0;
   for (auto _ : state) {
     for (int i = 0; i < kInstances; ++i) {
       const PlanRequest request = generator.Make(1000u + static_cast<unsigned>(i));
       Found a, b;
-      bound_us.push_back(
-          MedianMicroseconds(5, [&] { a = Search1(with_bound.get(), bound, request); }));
-      us.push_back(MedianMicroseconds(5, [&] { b = Search1(with_exact.get(), exact, request); }));
+      bound_us.push_back(MedianMicroseconds(5, [&] { a = with_bound(request); }));
+      us.push_back(MedianMicroseconds(5, [&] { b = with_exact(request); }));
       const double cost_a = a.index < 0 ? HUGE_VAL : a.cost.total;
       const double cost_b = b.index < 0 ? HUGE_VAL : b.cost.total;
       better += cost_b < cost_a;
@@ -155,6 +173,7 @@ void ExactVisibility(benchmark::State& state, bool hard) {
 void CheckAll(benchmark::State& state) {
   const PlannerConfig config = Config(3, 12, true);
   const InstanceGenerator generator(Config(3, 12, false), Spec(50, false));
+  Searcher searcher(config);
   PlanProof proof;
   FastProblem fast(config, kernels::Kernels());
   std::vector<double> us;
@@ -162,8 +181,7 @@ void CheckAll(benchmark::State& state) {
   for (auto _ : state) {
     for (int i = 0; i < kInstances; ++i) {
       const PlanRequest request = generator.Make(1000u + static_cast<unsigned>(i));
-      Problem problem = MakeProblem(config, request, nullptr);
-      PlaceSkeletons(config, Layout::kNormal, &problem);
+      const Problem problem = searcher.Pose(request);
       proof.Reset(problem, 0.0, true);
       if (!fast.Set(problem, proof) || fast.IsBlocked()) continue;
       const int n = fast.n_candidates();
@@ -185,23 +203,22 @@ void CheckAll(benchmark::State& state) {
 void Refinement(benchmark::State& state) {
   const PlannerConfig config = Config(3, 12, true);
   const InstanceGenerator generator(Config(3, 12, false), Spec(50, false));
-  const auto fast = MakeFastSearch(config);
+  Searcher fast(config);
   Refiner refiner(config);
   std::vector<double> us, gain;
   int worse = 0;
   for (auto _ : state) {
     for (int i = 0; i < kInstances; ++i) {
       const PlanRequest request = generator.Make(1000u + static_cast<unsigned>(i));
-      Problem problem = MakeProblem(config, request, nullptr);
-      PlaceSkeletons(config, Layout::kNormal, &problem);
-      const Found found = fast->Best(problem, 0.0);
+      const Problem problem = fast.Pose(request);
+      const Found found = fast(request);
       if (found.index < 0) continue;
       Curve plan;
       Cost cost;
       us.push_back(MedianMicroseconds(5, [&] {
         plan = found.plan;
         cost = found.cost;
-        refiner.Improve(problem, 0.0, &plan, &cost);
+        if (refiner.Reset(problem, 0.0)) refiner.Improve(&plan, &cost);
       }));
       worse += cost.total > found.cost.total;
       gain.push_back(1.0 - cost.total / found.cost.total);
@@ -215,11 +232,11 @@ void Refinement(benchmark::State& state) {
 double SearchP50(int steps, int skeletons, int n_obstacles) {
   const PlannerConfig config = Config(steps, skeletons, true);
   const InstanceGenerator generator(Config(3, 12, false), Spec(n_obstacles, false));
-  const auto fast = MakeFastSearch(config);
+  Searcher fast(config);
   std::vector<double> us;
   for (unsigned i = 0; i < 100; ++i) {
     const PlanRequest request = generator.Make(3000u + i);
-    us.push_back(MedianMicroseconds(3, [&] { Search1(fast.get(), config, request); }));
+    us.push_back(MedianMicroseconds(3, [&] { fast(request); }));
   }
   return Quantile(us, 0.5);
 }

@@ -95,7 +95,7 @@ class InstanceGenerator {
   using Path = Eigen::Matrix<double, 3, 25>;
   std::vector<Path> SamplePaths(const PlanRequest& request, std::mt19937& g) const {
     Problem problem = MakeProblem(config_, request, nullptr);
-    PlaceRing(config_, config_.steps, config_.skeletons, &problem);
+    SkeletonPlacer(config_).PlaceRing(config_.steps, config_.skeletons, &problem);
     const Eigen::MatrixXd inverse = InverseKkt(config_, problem);
     std::vector<Path> paths;
     for (int i = 0; i < 96; ++i) {

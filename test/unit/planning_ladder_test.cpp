@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "services/planning/certificate.h"
+#include "services/planning/cost.h"
 #include "services/planning/ladder.h"
 #include "services/planning/planner.h"
 #include "services/planning/problem.h"
@@ -119,12 +120,44 @@ TEST(Ladder, KeepsTheRunningPlanWhileItIsCertified) {
   const PlanResult first = MakePlanner("chase", config)->Plan(request);
   ASSERT_EQ(first.verdict, Verdict::kChase);
   config.desired_distance = 40.0;  // its candidates now all break the speed limit
+  config.refine = false;           // nor is the running plan one of them
   request.t0 = 0.2;
   request.start = first.trajectory.At(0.2);
   request.running = first.trajectory;
   const PlanResult kept = MakePlanner("chase", config)->Plan(request);
   EXPECT_EQ(kept.verdict, Verdict::kKept) << kept.reason;
   EXPECT_LT((kept.trajectory.Position(1.5) - first.trajectory.Position(1.5)).norm(), 1e-9);
+}
+
+// A drone on a slalom between pillars, planned anew every 0.3 s: whenever the running plan carried
+// on is feasible, the new plan costs no more.
+TEST(Ladder, NeverCostsMoreThanTheRunningPlanCarriedOn) {
+  const PlannerConfig config = Config();
+  const auto planner = MakePlanner("chase", config);
+  PlanRequest request = Walk();
+  for (int i = 0; i < 6; ++i)
+    request.obstacles.push_back(Pillar(i, -1.0 + 1.6 * i, i % 2 ? 1.1 : -1.1, 0.3));
+  int compared = 0, kept = 0;
+  for (int i = 0; i < 20; ++i) {
+    const PlanResult plan = planner->Plan(request);
+    if (request.running) {
+      const Problem problem = MakeProblem(config, request, nullptr);
+      Curve carried = ToCurve(*request.running, request.t0, request.horizon);
+      carried.topRows(4) = problem.start;
+      if (IsFeasible(carried, problem, 0.0, true, Arithmetic::kCertified)) {
+        ++compared;
+        kept += plan.winner < 0;
+        EXPECT_EQ(plan.verdict, Verdict::kChase) << plan.reason;
+        EXPECT_LE(plan.cost.total, Evaluate(config, problem, carried).total * (1.0 + 1e-9));
+      }
+    }
+    ExpectContinues(plan, request);
+    request.t0 += 0.3;
+    request.start = plan.trajectory.At(request.t0);
+    request.running = plan.trajectory;
+  }
+  EXPECT_GT(compared, 10);
+  EXPECT_GT(kept, 0);
 }
 
 TEST(Ladder, ObstacleOnTheRunningPlanEndsItsCertificate) {

@@ -38,8 +38,9 @@ void ExpectSameWinner(const PlannerConfig& config, const InstanceSpec& spec, Ari
   for (int i = 0; i < n; ++i) {
     const PlanRequest request = generator.Make(seed + static_cast<unsigned>(i));
     Problem problem = MakeProblem(config, request, nullptr);
-    PlaceSkeletons(config, Layout::kNormal, &problem);
-    const Found a = fast->Best(problem, 0.0), b = reference->Best(problem, 0.0);
+    SkeletonPlacer(config).Place(Layout::kNormal, &problem);
+    const Found a = fast->Best(problem, 0.0, config.exact_visibility),
+                b = reference->Best(problem, 0.0, config.exact_visibility);
     ASSERT_EQ(a.index, b.index) << "seed " << seed + static_cast<unsigned>(i) << " cost "
                                 << a.cost.total << " against " << b.cost.total;
     if (a.index < 0) continue;
