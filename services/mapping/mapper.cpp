@@ -62,11 +62,13 @@ void Mapper::Prepare(const Sweep& sweep) {
   returns_.clear();
   near_.clear();
   const double min2 = config_.grid.min_range * config_.grid.min_range;
-  for (const auto& p : sweep.points) {
+  for (size_t i = 0; i < sweep.points.size(); ++i) {
+    const Eigen::Vector3f& p = sweep.points[i];
     if (!p.allFinite()) continue;
     Eigen::Vector3d end = p.cast<double>();
     if ((end - sweep.origin).squaredNorm() < min2) continue;
     Return r;
+    if (i < sweep.ages.size()) r.age = sweep.ages[i];
     r.label = Shorten(sweep.origin, &end) ? Label::kFar : Label::kStatic;
     r.p = end.cast<float>();
     r.key = grid_.ToKey(end);
@@ -96,7 +98,7 @@ void Mapper::TrackMovers(const Eigen::Vector3d& origin, double t) {
   tracker_.Predict(t);
   if (zone_.active()) tracker_.Forget(zone_.center(), zone_.outer());
   auto clusters = detector_.Detect(origin, returns_, &grid_, tracker_.Expected());
-  tracker_.Update(&clusters);
+  tracker_.Update(detector_.panorama(), &clusters);
   for (const auto& cluster : clusters) {
     if (!tracker_.Moves(cluster.track)) continue;
     for (const int i : cluster.members) returns_[static_cast<size_t>(i)].label = Label::kMoving;
@@ -112,9 +114,9 @@ void Mapper::ClearGhosts() {
   }
   for (const auto& track : tracker_.tracks()) {
     if (!track.confirmed) continue;
-    const double radius = track.Radius() + kGhostMargin;
-    const double bottom = track.p.z() - 5.0, top = track.p.z() + 5.0;
-    integrator_.ClearDisc(track.p.head<2>(), radius, bottom, top, kSettledHits, false);
+    const double radius = track.reach + kGhostMargin;
+    const double bottom = track.z - 5.0, top = track.z + 5.0;
+    integrator_.ClearDisc(track.body.p(), radius, bottom, top, kSettledHits, false);
     if (!track.fresh) continue;
     for (const auto& place : track.trail)
       integrator_.ClearDisc(place, radius, bottom, top, kSettledHits, false);
@@ -237,6 +239,7 @@ ObstacleList Mapper::Insert(const Sweep& sweep) {
   const double middle =
       ground_.Height(sweep.origin.x(), sweep.origin.y()) + 0.5 * (c.band_low + c.band_high);
   for (auto& o : tracker_.Obstacles(middle, c.semi_height, 1.02)) {
+    if (PlanDistance(o, sweep.origin) > config_.grid.range) continue;
     ++list.n_moving;
     list.obstacles.push_back(std::move(o));
   }

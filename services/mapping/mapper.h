@@ -9,10 +9,11 @@
 #include "services/mapping/ground.h"
 #include "services/mapping/integration.h"
 #include "services/mapping/mapping_config.h"
-#include "services/mapping/movers.h"
+#include "services/mapping/motion_detector.h"
 #include "services/mapping/occupancy_tree.h"
 #include "services/mapping/sweep.h"
 #include "services/mapping/target_zone.h"
+#include "services/mapping/tracker.h"
 #include "services/mapping/voxel_grid.h"
 
 namespace chase::mapping {

@@ -13,7 +13,7 @@ struct GridConfig {
   int miss = -4;             ///< log-odds that a sweep's ray through the cell adds, tenths
   int limit = 36;            ///< log-odds are kept within +- this, tenths
   int occupied = 12;         ///< a cell becomes occupied at this, and free again at zero or below
-  int ever_free_sweeps = 8;  ///< consecutive free sweeps after which a return means motion
+  int ever_free_sweeps = 5;  ///< consecutive free sweeps after which a return means motion
 
   template <class V>
   void Visit(V& v) {
@@ -76,15 +76,17 @@ struct MoverConfig {
   double cluster_cell = 0.4;      ///< clusters are connected in cells of this edge, m
   double max_size = 6.0;          ///< larger clusters are no movers, m
   double gate = 4.0;              ///< of the innovation, standard deviations
-  double acceleration = 1.5;      ///< process noise, m/s^2
-  double measurement = 0.12;      ///< standard deviation of a cluster's centre, m
+  double acceleration = 0.8;      ///< process noise, m/s^2
+  double measurement = 0.04;      ///< standard deviation of where an end is seen, m
   int confirm_sweeps = 3;         ///< detections before a track may be listed
   double confirm_distance = 0.3;  ///< net travel before a track may be listed, m
   double confirm_speed = 0.4;     ///< speed before a track may be listed, m/s
   double coast_listed = 0.6;      ///< unseen tracks stay listed for this, s
   double coast = 2.0;             ///< unseen tracks keep their id for this, s
+  double coast_hidden = 4.0;      ///< the same while something hides their place, s
   double settle = 2.0;            ///< what does not move for this becomes static, s
   double horizon = 3.0;           ///< length of the centre polynomials, s
+  double sweep_time = 0.1;        ///< that the scanner takes for a turn, s; 0: sees all at once
 
   template <class V>
   void Visit(V& v) {
@@ -93,14 +95,16 @@ struct MoverConfig {
     v("max_size", max_size, "larger clusters are no movers, m");
     v("gate", gate, "of the innovation, standard deviations");
     v("acceleration", acceleration, "process noise, m/s^2");
-    v("measurement", measurement, "standard deviation of a cluster's centre, m");
+    v("measurement", measurement, "standard deviation of where an end is seen, m");
     v("confirm_sweeps", confirm_sweeps, "detections before a track may be listed");
     v("confirm_distance", confirm_distance, "net travel before a track may be listed, m");
     v("confirm_speed", confirm_speed, "speed before a track may be listed, m/s");
     v("coast_listed", coast_listed, "unseen tracks stay listed for this, s");
     v("coast", coast, "unseen tracks keep their id for this, s");
+    v("coast_hidden", coast_hidden, "the same while something hides their place, s");
     v("settle", settle, "what does not move for this becomes static, s");
     v("horizon", horizon, "length of the centre polynomials, s");
+    v("sweep_time", sweep_time, "that the scanner takes for a turn, s; 0: sees all at once");
   }
   std::string Problem() const;
 };

@@ -16,10 +16,11 @@ bool Write(const std::string& file, const std::string& bytes) {
   return out.write(bytes.data(), static_cast<std::streamsize>(bytes.size())).good();
 }
 
-Sweep ToSweep(const scan_registered_t& m, double t) {
-  Sweep sweep{t, bus::ToVector(m.pos), {}};
+Sweep ToSweep(const scan_registered_t& m, double t, double period) {
+  Sweep sweep{t, bus::ToVector(m.pos), {}, {}};
   sweep.points.reserve(m.x.size());
   for (size_t i = 0; i < m.x.size(); ++i) sweep.points.emplace_back(m.x[i], m.y[i], m.z[i]);
+  sweep.ages = FiringAges(sweep.origin, bus::ToQuaternion(m.orientation), sweep.points, period);
   return sweep;
 }
 
@@ -70,7 +71,7 @@ void MappingNode::OnScan(const scan_registered_t& m) {
   last_scan_ = m.utime;
   {
     auto timer = bus_.Time("map");
-    last_list_ = mapper_.Insert(ToSweep(m, t));
+    last_list_ = mapper_.Insert(ToSweep(m, t, config_.movers.sweep_time));
   }
   PublishObstacles(last_list_, m.utime);
   {

@@ -1,7 +1,7 @@
+#include "services/mapping/motion_detector.h"
+
 #include <algorithm>
 #include <cmath>
-
-#include "services/mapping/movers.h"
 
 namespace chase::mapping {
 
@@ -10,6 +10,9 @@ namespace {
 constexpr int kSettledHits = 15;       // sweeps after which an occupied cell is not doubted
 constexpr double kLeastDepth = 0.4;    // of a mover's width over its length
 constexpr double kFewestSeeds = 0.25;  // share of a cluster's returns in ever-free space
+constexpr double kGrazing = -0.35;     // cosine of the view on an end beyond which it is unseen
+constexpr float kTouch = 0.4f;         // m, so near to other returns nothing ends
+constexpr double kRim = 0.5;           // m, so near to the range nothing ends
 
 int64_t Code(int x, int y) {
   return (static_cast<int64_t>(x) << 32) + (static_cast<int64_t>(y) + (1LL << 31));
@@ -60,40 +63,7 @@ std::vector<MotionDetector::Candidate> MotionDetector::Candidates(
   return candidates;
 }
 
-/// The hull of what was seen, and a little beyond on the side that faces away: of a mover seen from
-/// one side only, a thin shell would be tracked as if there were nothing behind.
-bool MotionDetector::Finish(const Eigen::Vector3d& origin, const std::vector<Return>& returns,
-                            Cluster* cluster) const {
-  if (static_cast<int>(cluster->members.size()) < config_.min_points) return false;
-  Points2 points;
-  float low = INFINITY, high = -INFINITY;
-  for (const int i : cluster->members) {
-    const auto& p = returns[static_cast<size_t>(i)].p;
-    points.push_back(p.head<2>().cast<double>());
-    low = std::min(low, p.z());
-    high = std::max(high, p.z());
-  }
-  cluster->hull = ConvexHull(std::move(points));
-  Rectangle box = SmallestRectangle(cluster->hull);
-  const double missing = 2.0 * (kLeastDepth * box.half.x() - box.half.y());
-  if (missing > 0.0) {
-    Eigen::Vector2d away = box.axes.col(1);
-    if (away.dot(box.center - origin.head<2>()) < 0.0) away = -away;
-    for (const double side : {-1.0, 1.0})
-      cluster->hull.push_back(box.center + side * box.half.x() * box.axes.col(0) +
-                              (box.half.y() + missing) * away);
-    cluster->hull = ConvexHull(cluster->hull);
-    box.center += 0.5 * missing * away;
-  }
-  cluster->center << box.center, 0.5 * (low + high);
-  cluster->half_length = box.half.x();
-  return 2.0 * box.half.x() <= config_.max_size;
-}
-
-std::vector<Cluster> MotionDetector::Detect(const Eigen::Vector3d& origin,
-                                            const std::vector<Return>& returns, VoxelGrid* grid,
-                                            const std::vector<Ellipse>& expected) const {
-  const auto candidates = Candidates(returns, grid, expected);
+std::vector<Cluster> MotionDetector::Connected(const std::vector<Candidate>& candidates) const {
   struct Bin {
     int64_t cell;
     size_t first, last;
@@ -132,10 +102,94 @@ std::vector<Cluster> MotionDetector::Detect(const Eigen::Vector3d& origin,
           front.push_back(bin);
         }
     }
-    if (seeds < kFewestSeeds * static_cast<double>(cluster.members.size())) continue;
-    if (Finish(origin, returns, &cluster)) clusters.push_back(std::move(cluster));
+    const auto size = static_cast<int>(cluster.members.size());
+    if (size >= config_.min_points && seeds >= kFewestSeeds * size)
+      clusters.push_back(std::move(cluster));
   }
   return clusters;
+}
+
+/// An end beside which there are returns of something else may belong to more than was found.
+void MotionDetector::Touch(const std::vector<Return>& returns, const std::vector<int>& owner,
+                           int self, const std::array<Eigen::Vector2f, kDirections>& ends,
+                           Cluster* cluster) {
+  Eigen::Array2f low = Eigen::Array2f::Constant(1e9f), high = -low;
+  for (const auto& end : ends) {
+    low = low.min(end.array() - kTouch);
+    high = high.max(end.array() + kTouch);
+  }
+  for (size_t i = 0; i < returns.size(); ++i) {
+    const Return& r = returns[i];
+    if (r.label == Label::kGround || r.label == Label::kFar || owner[i] == self) continue;
+    const Eigen::Vector2f p = r.p.head<2>();
+    if ((p.array() < low).any() || (p.array() > high).any()) continue;
+    for (size_t k = 0; k < ends.size(); ++k)
+      if ((p - ends[k]).squaredNorm() < kTouch * kTouch) cluster->reaches[k].edge = false;
+  }
+}
+
+/// How far the cluster reaches, and where that is its end. On the side that faces away, of a mover
+/// seen from one side only, a thin shell would be tracked as if there were nothing behind: it is
+/// supposed to go on a little.
+bool MotionDetector::Finish(const std::vector<Return>& returns, const std::vector<int>& owner,
+                            int self, Cluster* cluster) const {
+  Points2 points;
+  float low = INFINITY, high = -INFINITY;
+  for (const int i : cluster->members) {
+    const auto& p = returns[static_cast<size_t>(i)].p;
+    points.push_back(p.head<2>().cast<double>());
+    low = std::min(low, p.z());
+    high = std::max(high, p.z());
+  }
+  const Eigen::Vector2d& origin = panorama_.origin();
+  std::array<Eigen::Vector2f, kDirections> ends;
+  for (int k = 0; k < kDirections; ++k) {
+    const Eigen::Vector2d d = Direction(k);
+    size_t best = 0;
+    for (size_t i = 1; i < points.size(); ++i)
+      if (d.dot(points[i]) > d.dot(points[best])) best = i;
+    const Eigen::Vector2d view = origin - points[best];
+    Reach& reach = cluster->reaches[static_cast<size_t>(k)];
+    reach.along = d.dot(points[best]);
+    reach.age = returns[static_cast<size_t>(cluster->members[best])].age;
+    reach.edge = d.dot(view) > kGrazing * view.norm() && view.norm() < range_ - kRim &&
+                 !panorama_.Hides(points[best], self);
+    ends[static_cast<size_t>(k)] = points[best].cast<float>();
+  }
+  Touch(returns, owner, self, ends, cluster);
+  Rectangle box = SmallestRectangle(ConvexHull(std::move(points)));
+  if (2.0 * box.half.x() > config_.max_size) return false;
+  const double missing = 2.0 * (kLeastDepth * box.half.x() - box.half.y());
+  if (missing > 0.0) {
+    Eigen::Vector2d away = box.axes.col(1);
+    if (away.dot(box.center - origin) < 0.0) away = -away;
+    for (int k = 0; k < kDirections; ++k) {
+      Reach& reach = cluster->reaches[static_cast<size_t>(k)];
+      if (reach.edge) continue;
+      for (const double side : {-1.0, 1.0})
+        reach.along = std::max(reach.along,
+                               Direction(k).dot(box.center + side * box.half.x() * box.axes.col(0) +
+                                                (box.half.y() + missing) * away));
+    }
+    box.center += 0.5 * missing * away;
+  }
+  cluster->center << box.center, 0.5 * (low + high);
+  return true;
+}
+
+std::vector<Cluster> MotionDetector::Detect(const Eigen::Vector3d& origin,
+                                            const std::vector<Return>& returns, VoxelGrid* grid,
+                                            const std::vector<Ellipse>& expected) {
+  auto clusters = Connected(Candidates(returns, grid, expected));
+  std::vector<int> owner(returns.size(), -1);
+  for (size_t c = 0; c < clusters.size(); ++c)
+    for (const int i : clusters[c].members) owner[static_cast<size_t>(i)] = static_cast<int>(c);
+  panorama_.Take(origin, returns, owner);
+  std::vector<Cluster> finished;
+  for (size_t c = 0; c < clusters.size(); ++c)
+    if (Finish(returns, owner, static_cast<int>(c), &clusters[c]))
+      finished.push_back(std::move(clusters[c]));
+  return finished;
 }
 
 }  // namespace chase::mapping

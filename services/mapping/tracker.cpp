@@ -1,58 +1,52 @@
+#include "services/mapping/tracker.h"
+
 #include <algorithm>
 #include <cmath>
 
 #include "services/mapping/assignment.h"
-#include "services/mapping/movers.h"
 
 namespace chase::mapping {
 
 namespace {
 
 constexpr double kThinnest = 0.1;       // m, half width of a mover at least
-constexpr double kFirstSpeed = 2.0;     // m/s, standard deviation of an unknown velocity
+constexpr double kFirstSpeed = 2.5;     // m/s, standard deviation of an unknown velocity
+constexpr double kUnseen = 0.5;         // m, standard deviation of an end out of sight
 constexpr double kTentativeGap = 0.25;  // s that an unconfirmed track may go unseen
 constexpr double kTentativeAge = 0.8;   // s after which an unconfirmed track does not count
 constexpr double kRestSpeed = 0.25;     // m/s
-constexpr double kPartShare = 0.9;      // of the known length: seen less, it is half hidden
-constexpr double kPartReach = 1.3;      // factor of the outline within which its part must lie
-constexpr double kPartTime = 2.0;       // s, longest belief in that
-constexpr double kForgetLength = 0.98;  // per sweep
+constexpr double kSure = 3.0;           // standard deviations of a speed that is one
+constexpr double kLeastSpread = 0.12;   // m, of a reach when clusters are assigned
+constexpr double kExpected = 1.1;       // factor of the outline within which returns are expected
+constexpr int kFewestEnds = 3;          // directions with an end in view that tell of a body
+constexpr double kOverlap = 0.8;        // of the gate, the most that overlapping clusters cost
+constexpr double kSameSpeed = 0.5;      // m/s, difference of two tracks of one body
+constexpr double kNear = 1.2;           // factor of the outline within which its parts lie
+constexpr double kAwaited = 0.35;       // s unseen for which its place counts as expected
+constexpr double kLost = 0.3;           // s in full view of its place after which it is not listed
 constexpr size_t kMostTracks = 64;
 
+void Shape(Track* track) {
+  const Points2 corners = track->body.Outline();
+  if (corners.size() < 3) return;
+  track->outline = SmallestEllipse(corners, 0.01, kThinnest);
+  track->reach = 0.0;
+  for (const auto& q : corners) track->reach = std::max(track->reach, q.norm());
+}
+
 }  // namespace
-
-Ellipse Track::Outline() const {
-  if (hull.empty()) return {p.head<2>(), Eigen::Matrix2d::Identity()};
-  Ellipse e = SmallestEllipse(hull, 0.01, kThinnest);
-  double reach = 1.0;
-  e.center.setZero();
-  for (const auto& q : hull) reach = std::max(reach, e.Level(q));
-  return {p.head<2>(), e.shape / reach};
-}
-
-double Track::Radius() const {
-  double radius = 0.0;
-  for (const auto& q : hull) radius = std::max(radius, q.norm());
-  return radius;
-}
 
 void Tracker::Predict(double t) {
   const double dt = std::clamp(t - t_, 0.0, 1.0);
   t_ = t;
-  for (auto& track : tracks_) {
-    track.p += dt * track.v;
-    const double q = config_.acceleration * config_.acceleration;
-    track.pp += 2.0 * dt * track.pv + dt * dt * track.vv + 0.25 * q * std::pow(dt, 4);
-    track.pv += dt * track.vv + 0.5 * q * std::pow(dt, 3);
-    track.vv += q * dt * dt;
-  }
+  for (auto& track : tracks_) track.body.Predict(dt, config_.acceleration);
 }
 
 std::vector<Ellipse> Tracker::Expected() const {
   std::vector<Ellipse> outlines;
   for (const auto& track : tracks_)
-    if (track.confirmed && t_ - track.seen < config_.coast)
-      outlines.push_back(track.Outline().Scaled(1.15));
+    if (track.confirmed && t_ - track.seen < kAwaited)
+      outlines.push_back(track.Outline().Scaled(kExpected));
   return outlines;
 }
 
@@ -60,7 +54,7 @@ std::vector<Ellipse> Tracker::Expected() const {
 void Tracker::Join(std::vector<Cluster>* clusters) const {
   for (const auto& track : tracks_) {
     if (!track.confirmed) continue;
-    const Ellipse outline = track.Outline().Scaled(1.2);
+    const Ellipse outline = track.Outline().Scaled(kNear);
     Cluster* first = nullptr;
     for (auto& cluster : *clusters) {
       if (cluster.members.empty() || outline.Level(cluster.center.head<2>()) > 1.0) continue;
@@ -69,11 +63,9 @@ void Tracker::Join(std::vector<Cluster>* clusters) const {
         continue;
       }
       first->members.insert(first->members.end(), cluster.members.begin(), cluster.members.end());
-      first->hull.insert(first->hull.end(), cluster.hull.begin(), cluster.hull.end());
-      first->hull = ConvexHull(first->hull);
-      const Rectangle box = SmallestRectangle(first->hull);
-      first->center.head<2>() = box.center;
-      first->half_length = box.half.x();
+      for (size_t k = 0; k < kDirections; ++k)
+        if (cluster.reaches[k].along > first->reaches[k].along)
+          first->reaches[k] = cluster.reaches[k];
       cluster.members.clear();
     }
   }
@@ -82,41 +74,40 @@ void Tracker::Join(std::vector<Cluster>* clusters) const {
                   clusters->end());
 }
 
-/// Shorter than it is known to be, and where it is expected: something in front hides the rest, and
-/// its centre says nothing. Not believed for long.
-bool Tracker::HalfHidden(const Cluster& cluster, const Track& track) const {
-  if (!track.confirmed || cluster.half_length > kPartShare * track.half_length) return false;
-  return t_ - track.whole < kPartTime &&
-         track.Outline().Scaled(kPartReach).Level(cluster.center.head<2>()) < 1.0;
+/// Squared distance in standard deviations; infinite for what cannot belong together. What overlaps
+/// may always: its other ends may have come into view.
+double Tracker::Cost(const Track& track, const Cluster& cluster) const {
+  const Eigen::Vector2d c = cluster.center.head<2>();
+  const double far = 2.0 * track.reach + config_.gate * kLeastSpread +
+                     0.1 * config_.gate * std::sqrt(track.body.VelocityVariance());
+  if ((c - track.body.p()).norm() > far) return INFINITY;
+  const double cost = track.body.Distance(cluster.reaches, config_.measurement, kLeastSpread);
+  const double overlap = track.Outline().Level(c);
+  const double most = kOverlap * config_.gate * config_.gate;
+  if (cost < 0.0) return std::min(1.0, overlap) * most;
+  return track.confirmed && overlap < 1.0 ? std::min(cost, most) : cost;
 }
 
 void Tracker::Correct(const Cluster& cluster, Track* track) const {
+  const int ends = track->body.Correct(cluster.reaches, config_.measurement, kUnseen);
+  track->sought = t_;
+  if (ends < kFewestEnds) return Shape(track);  // may be anything that stands there
   track->seen = t_;
   ++track->detections;
-  if (HalfHidden(cluster, *track)) return;
-  track->whole = t_;
-  const double s = track->pp + config_.measurement * config_.measurement;
-  const double kp = track->pp / s, kv = track->pv / s;
-  const Eigen::Vector3d innovation = cluster.center - track->p;
-  track->p += kp * innovation;
-  track->v += kv * innovation;
-  track->vv -= kv * track->pv;
-  track->pv *= 1.0 - kp;
-  track->pp *= 1.0 - kp;
-  track->half_length = std::max(cluster.half_length, kForgetLength * track->half_length);
-  track->hull.clear();
-  for (const auto& q : cluster.hull) track->hull.push_back(q - track->p.head<2>());
+  track->z += 0.3 * (cluster.center.z() - track->z);
+  Shape(track);
 }
 
 void Tracker::Confirm(Track* track) const {
-  track->fresh = false;
-  const double speed = track->v.head<2>().norm();
+  const double speed = track->body.v().norm();
+  const double sigma = std::sqrt(track->body.VelocityVariance());
   if (speed > kRestSpeed) track->moved = t_;
   if (track->confirmed) return;
-  track->trail.push_back(track->p.head<2>());
-  const double travel = (track->p - track->birth).head<2>().norm();
+  track->trail.push_back(track->body.p());
+  const double travel = (track->body.p() - track->birth).norm();
   track->confirmed = track->detections >= config_.confirm_sweeps &&
-                     speed >= config_.confirm_speed && travel >= config_.confirm_distance;
+                     speed >= std::max(config_.confirm_speed, kSure * sigma) &&
+                     travel >= config_.confirm_distance;
   track->fresh = track->confirmed;
 }
 
@@ -125,29 +116,44 @@ void Tracker::Birth(Cluster* cluster) {
   Track track;
   track.id = next_id_;
   next_id_ = next_id_ == INT32_MAX ? 1 << 30 : next_id_ + 1;
-  track.p = track.birth = cluster->center;
-  track.pp = config_.measurement * config_.measurement;
-  track.vv = kFirstSpeed * kFirstSpeed;
-  track.born = track.seen = track.moved = track.whole = t_;
+  track.birth = cluster->center.head<2>();
+  track.body = BodyFilter(track.birth, cluster->reaches, kFirstSpeed, kUnseen);
+  track.z = cluster->center.z();
+  track.born = track.seen = track.sought = track.moved = t_;
   track.detections = 1;
-  track.half_length = cluster->half_length;
-  for (const auto& q : cluster->hull) track.hull.push_back(q - cluster->center.head<2>());
-  track.trail.push_back(track.p.head<2>());
+  track.trail.push_back(track.birth);
+  Shape(&track);
   cluster->track = track.id;
   tracks_.push_back(std::move(track));
 }
 
-void Tracker::Update(std::vector<Cluster>* clusters) {
+/// A stray part of a known mover is no other mover.
+void Tracker::Absorb(Cluster* cluster) {
+  for (auto& track : tracks_)
+    if (track.confirmed && track.Outline().Scaled(kNear).Level(cluster->center.head<2>()) < 1.0)
+      cluster->track = track.id;
+}
+
+/// Tracks without a cluster whose place something hides are still sought.
+void Tracker::Seek(const Panorama& panorama) {
+  for (auto& track : tracks_) {
+    if (track.seen == t_) continue;
+    const Eigen::Vector2d c = track.Outline().center;
+    Eigen::Vector2d across(panorama.origin().y() - c.y(), c.x() - panorama.origin().x());
+    across *= 0.7 * track.reach / std::max(1e-6, across.norm());
+    int hidden = 0;
+    for (const double side : {-1.0, 0.0, 1.0}) hidden += panorama.Hides(c + side * across, -3);
+    if (hidden >= 2) track.sought = t_;
+  }
+}
+
+void Tracker::Update(const Panorama& panorama, std::vector<Cluster>* clusters) {
   Join(clusters);
   Eigen::MatrixXd cost(tracks_.size(), clusters->size());
-  const double gate = config_.gate * config_.gate;
-  for (size_t i = 0; i < tracks_.size(); ++i) {
-    const double s = tracks_[i].pp + config_.measurement * config_.measurement;
+  for (size_t i = 0; i < tracks_.size(); ++i)
     for (size_t j = 0; j < clusters->size(); ++j)
-      cost(static_cast<int>(i), static_cast<int>(j)) =
-          ((*clusters)[j].center - tracks_[i].p).head<2>().squaredNorm() / s;
-  }
-  const auto assigned = Assign(cost, gate);
+      cost(static_cast<int>(i), static_cast<int>(j)) = Cost(tracks_[i], (*clusters)[j]);
+  const auto assigned = Assign(cost, config_.gate * config_.gate);
   for (size_t i = 0; i < tracks_.size(); ++i) {
     Track& track = tracks_[i];
     track.fresh = false;
@@ -157,26 +163,49 @@ void Tracker::Update(std::vector<Cluster>* clusters) {
     Correct(cluster, &track);
     Confirm(&track);
   }
+  Seek(panorama);
+  Unite();
   Bury();
-  for (auto& cluster : *clusters)
+  for (auto& cluster : *clusters) {
+    if (cluster.track < 0) Absorb(&cluster);
     if (cluster.track < 0) Birth(&cluster);
+  }
+}
+
+/// Of two tracks on one body the older one stays.
+void Tracker::Unite() {
+  const auto same = [](const Track& a, const Track& b) {
+    const double sigma = std::sqrt(a.body.VelocityVariance() + b.body.VelocityVariance());
+    return a.confirmed && a.Outline().Level(b.Outline().center) < 1.0 &&
+           (a.body.v() - b.body.v()).norm() < std::max(kSameSpeed, kSure * sigma);
+  };
+  for (size_t i = 0; i < tracks_.size(); ++i)
+    for (size_t j = tracks_.size() - 1; j > i; --j) {
+      if (!same(tracks_[i], tracks_[j]) && !same(tracks_[j], tracks_[i])) continue;
+      if (tracks_[j].seen > tracks_[i].seen) {  // the older id, the better place
+        tracks_[j].id = tracks_[i].id;
+        std::swap(tracks_[i], tracks_[j]);
+      }
+      tracks_.erase(tracks_.begin() + static_cast<long>(j));
+    }
 }
 
 void Tracker::Bury() {
   const auto dead = [this](const Track& track) {
     const double gap = t_ - track.seen;
     if (!track.confirmed) return gap > kTentativeGap;
-    return gap > config_.coast || t_ - track.moved > config_.settle + gap;
+    if (track.outline.SemiAxes().x() > config_.max_size) return true;
+    if (t_ - track.sought > config_.coast || gap > config_.coast_hidden) return true;
+    return t_ - track.moved > config_.settle + gap;
   };
   tracks_.erase(std::remove_if(tracks_.begin(), tracks_.end(), dead), tracks_.end());
 }
 
 void Tracker::Forget(const Eigen::Vector2d& center, double radius) {
-  tracks_.erase(std::remove_if(tracks_.begin(), tracks_.end(),
-                               [&](const Track& track) {
-                                 return (track.p.head<2>() - center).norm() < radius;
-                               }),
-                tracks_.end());
+  tracks_.erase(
+      std::remove_if(tracks_.begin(), tracks_.end(),
+                     [&](const Track& track) { return (track.body.p() - center).norm() < radius; }),
+      tracks_.end());
 }
 
 bool Tracker::Moves(int id) const {
@@ -189,21 +218,22 @@ std::vector<world::Obstacle> Tracker::Obstacles(double middle, double semi_heigh
                                                 double grow) const {
   std::vector<world::Obstacle> obstacles;
   for (const auto& track : tracks_) {
-    if (!track.confirmed || t_ - track.seen > config_.coast_listed) continue;
+    if (!track.confirmed || t_ - track.seen > config_.coast_listed || t_ - track.sought > kLost)
+      continue;
+    const Ellipse outline = track.Outline();
     world::Obstacle o;
     o.id = track.id;
     o.moving = true;
     o.center.start = t_;
     o.center.duration = config_.horizon;
     o.center.coefficients.resize(2, 3);
-    o.center.coefficients.row(0) << track.p.x(), track.p.y(), middle;
-    o.center.coefficients.row(1) << config_.horizon * track.v.x(), config_.horizon * track.v.y(),
-        0.0;
+    o.center.coefficients.row(0) << outline.center.transpose(), middle;
+    o.center.coefficients.row(1) << config_.horizon * track.body.v().transpose(), 0.0;
     o.shape.setZero();
-    o.shape.topLeftCorner<2, 2>() = track.Outline().Scaled(grow).shape;
+    o.shape.topLeftCorner<2, 2>() = outline.Scaled(grow).shape;
     o.shape(2, 2) = 1.0 / (semi_height * semi_height);
-    o.position_variance = track.pp;
-    o.velocity_variance = track.vv;
+    o.position_variance = track.body.CenterVariance();
+    o.velocity_variance = track.body.VelocityVariance();
     obstacles.push_back(o);
   }
   return obstacles;

@@ -19,6 +19,7 @@ struct Arguments {
   std::vector<std::string> only;
   std::string config;
   double length = 1000.0;
+  bool trace = false;
 };
 
 double Now() {  // processor time, ms
@@ -60,6 +61,13 @@ void Print(const std::string& name, const Score& s) {
         "{:.2f} mean {:.2f} m/s max in {} updates, {:.2f} max half hidden in {}; {} ids\n",
         i + 1, m.sights, m.missed, m.worst_delay, m.velocity_sum / std::max(1, m.updates),
         m.worst_velocity, m.updates, m.worst_hidden, m.hidden_updates, m.ids.size());
+    const double n = std::max(1, m.judged);
+    fmt::print(
+        "        squared error over variance: velocity {:.2f}, {:.0f} % beyond 95 %; centre "
+        "{:.2f}, "
+        "{:.0f} %\n",
+        m.velocity_nees / n, 100.0 * m.velocity_beyond / n, m.center_nees / n,
+        100.0 * m.center_beyond / n);
   }
   if (s.mover_points > 0)
     fmt::print("    returns of movers inside an obstacle, from 0.5 s in sight: {:.1f} %\n",
@@ -68,9 +76,9 @@ void Print(const std::string& name, const Score& s) {
 }
 
 void Fly(const std::string& name, const Course& course, const Errors& errors, uint64_t seed,
-         const mapping::MappingConfig& config) {
+         const mapping::MappingConfig& config, bool trace) {
   Stage stage(course, errors, seed);
-  Score score(course, stage);
+  Score score(course, stage, trace);
   mapping::Mapper mapper(config);
   while (const auto shot = stage.Next()) {
     if (shot->target) mapper.ObserveTarget(*shot->target);
@@ -115,19 +123,24 @@ void Run(const Arguments& arguments) {
       const bool gym = scenario == "gym";
       Course course =
           Follow("deploy/scenarios/" + scenario + ".yaml", gym ? 2.5 : 1.4, gym ? 1.2 : 1.8);
-      if (wanted(scenario)) Fly(scenario, course, usual, seed, config);
-      if (wanted(scenario + "-noisy")) Fly(scenario + "-noisy", course, rough, seed, config);
+      if (wanted(scenario)) Fly(scenario, course, usual, seed, config, arguments.trace);
+      if (wanted(scenario + "-noisy"))
+        Fly(scenario + "-noisy", course, rough, seed, config, arguments.trace);
       Course blind = course;
       blind.blind_period = 10.0;
       blind.blind = 1.0;
-      if (wanted(scenario + "-blind")) Fly(scenario + "-blind", blind, usual, seed, config);
+      if (wanted(scenario + "-blind"))
+        Fly(scenario + "-blind", blind, usual, seed, config, arguments.trace);
       course.frozen = true;
       course.duration = 60.0;
-      if (wanted(scenario + "-static")) Fly(scenario + "-static", course, rough, seed, config);
+      if (wanted(scenario + "-static"))
+        Fly(scenario + "-static", course, rough, seed, config, arguments.trace);
     }
     for (const double speed : {1.0, 2.0, 3.0, 4.0})
       if (wanted("crossing"))
-        Fly(fmt::format("crossing-{:.0f}m/s", speed), Crossing(speed), usual, seed, config);
+        Fly(fmt::format("crossing-{:.0f}m/s", speed), Crossing(speed), usual, seed, config,
+            arguments.trace);
+    if (wanted("traffic")) Fly("traffic", Traffic(seed), usual, seed, config, arguments.trace);
   }
   if (wanted("long")) Remember(arguments.length, config);
 }
@@ -141,9 +154,10 @@ int main(int argc, char** argv) {
   app.add_option("--seeds", arguments.count, "flights of each kind");
   app.add_option("--first", arguments.first, "first seed");
   app.add_option("--only", arguments.only,
-                 "kinds: gym, forest (each also -noisy, -blind, -static), crossing, long");
+                 "kinds: gym, forest (each also -noisy, -blind, -static), crossing, traffic, long");
   app.add_option("--config", arguments.config, "file with mapping's config");
   app.add_option("--length", arguments.length, "of the long flight, m");
+  app.add_flag("--trace", arguments.trace, "print every listed mover");
   CLI11_PARSE(app, argc, argv);
   try {
     chase::mapping_stage::Run(arguments);

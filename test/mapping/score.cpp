@@ -1,5 +1,7 @@
 #include "score.h"
 
+#include <fmt/format.h>
+
 #include <cmath>
 
 namespace chase::mapping_stage {
@@ -17,6 +19,7 @@ constexpr double kLow = 0.35, kHigh = 2.9;  // m above the ground: the flight vo
 constexpr double kSightRange = 12.0;        // m
 constexpr double kMatchReach = 0.6;         // m, of a listed mover's centre from the true mover
 constexpr int kSightHits = 8;               // returns in a sweep with which a mover is in sight
+constexpr double kBeyond = 2.996;           // half of the 95 % quantile of chi-squared, 2 axes
 constexpr double kNewSight = 2.0;           // s out of sight after which it comes into sight anew
 constexpr double kWholeShare = 0.8;         // of a mover's usual returns: all of it is in sight
 
@@ -111,17 +114,59 @@ void Score::FollowIds(const Shot& shot, const std::vector<Obstacle>& obstacles) 
   }
 }
 
+void Score::Judge(const Obstacle& o, const world::MoverState& truth, double t, int hits,
+                  MoverScore* score) const {
+  const double error = (o.center.Velocity(t) - truth.velocity).head<2>().norm();
+  const double away = (o.center.Position(t) - truth.solid.center).head<2>().norm();
+  const double velocity_nees = 0.5 * error * error / std::max(1e-6, o.velocity_variance);
+  const double center_nees = 0.5 * away * away / std::max(1e-6, o.position_variance);
+  ++score->judged;
+  score->velocity_nees += velocity_nees;
+  score->center_nees += center_nees;
+  score->velocity_beyond += velocity_nees > kBeyond;
+  score->center_beyond += center_nees > kBeyond;
+  if (hits < kWholeShare * score->most_hits) {
+    score->worst_hidden = std::max(score->worst_hidden, error);
+    ++score->hidden_updates;
+    return;
+  }
+  score->worst_velocity = std::max(score->worst_velocity, error);
+  score->velocity_sum += error;
+  ++score->updates;
+}
+
+void Score::Trace(const Shot& shot, const Obstacle& o, int owner, const std::vector<int>& hits) {
+  const double t = shot.sweep.t;
+  const Vector3d p = o.center.Position(t), v = o.center.Velocity(t);
+  fmt::print("{:7.2f} id {} at {:6.2f} {:6.2f} v {:5.2f} {:5.2f} sigma {:.2f} {:.2f}", t,
+             o.id & 0xffff, p.x(), p.y(), v.x(), v.y(), std::sqrt(o.position_variance),
+             std::sqrt(o.velocity_variance));
+  if (owner >= 0) {
+    const auto k = static_cast<size_t>(owner);
+    const Vector3d dp = p - shot.movers[k].solid.center, dv = v - shot.movers[k].velocity;
+    fmt::print(" mover {} hits {} errors {:5.2f} {:5.2f}, {:5.2f} {:5.2f}", owner + 1, hits[k],
+               dp.x(), dp.y(), dv.x(), dv.y());
+  } else {
+    fmt::print(" FALSE");
+  }
+  fmt::print(" range {:.1f}\n", (p - shot.place).head<2>().norm());
+}
+
 void Score::FollowMovers(const Shot& shot, const std::vector<Obstacle>& obstacles) {
   const double t = shot.sweep.t;
   movers.resize(shot.movers.size());
   std::vector<int> hits(movers.size(), 0);
   for (const auto& hit : shot.hits) {
     if (hit.mover < 0) continue;
-    ++hits[static_cast<size_t>(hit.mover)];
-    const double since = movers[static_cast<size_t>(hit.mover)].in_sight;
-    if (since < 0.0 || t - since < 0.5) continue;
+    const auto k = static_cast<size_t>(hit.mover);
+    ++hits[k];
+    const double since = movers[k].in_sight;
+    if (since < 0.0 || t - since < 0.5 || (hit.point - shot.place).head<2>().norm() > kSightRange ||
+        shot.movers[k].velocity.norm() < 0.1)
+      continue;
     ++mover_points;
-    mover_points_held += Holder(obstacles, hit.point, t) != nullptr;
+    const Vector3d now = hit.point + (t - hit.t) * shot.movers[k].velocity;
+    mover_points_held += Holder(obstacles, now, t) != nullptr;
   }
   // A listed mover stands for the nearest true one within reach, and for nothing otherwise.
   std::vector<int> owner(obstacles.size(), -1);
@@ -136,6 +181,7 @@ void Score::FollowMovers(const Shot& shot, const std::vector<Obstacle>& obstacle
       if (d < best) best = d, owner[i] = static_cast<int>(k);
     }
     wrong |= owner[i] < 0;
+    if (trace_) Trace(shot, obstacles[i], owner[i], hits);
   }
   false_movers += wrong;
   for (size_t k = 0; k < movers.size(); ++k) {
@@ -162,16 +208,7 @@ void Score::FollowMovers(const Shot& shot, const std::vector<Obstacle>& obstacle
         score.worst_delay = std::max(score.worst_delay, t - score.in_sight);
       }
       score.most_hits = std::max(hits[k], static_cast<int>(0.97 * score.most_hits));
-      if (t - score.listed < 1.0) continue;
-      const double error = (o.center.Velocity(t) - truth.velocity).head<2>().norm();
-      if (hits[k] < kWholeShare * score.most_hits) {
-        score.worst_hidden = std::max(score.worst_hidden, error);
-        ++score.hidden_updates;
-        continue;
-      }
-      score.worst_velocity = std::max(score.worst_velocity, error);
-      score.velocity_sum += error;
-      ++score.updates;
+      if (t - score.listed >= 1.0) Judge(o, truth, t, hits[k], &score);
     }
   }
 }
@@ -190,7 +227,12 @@ void Score::LookForGhosts(const Shot& shot, const std::vector<Obstacle>& obstacl
       if (age < 1.0 || age > 6.0 || (p - shot.place).head<2>().norm() > kCoverRadius) continue;
       // A mover's own length is no ghost: its place must be clear by more than that.
       if (!Free(p, shot, shot.movers[k].solid.half_size.head<2>().norm() + 0.4)) continue;
-      ghost |= Holder(obstacles, p, shot.sweep.t) != nullptr;
+      const auto* holder = Holder(obstacles, p, shot.sweep.t);
+      if (holder && trace_ && !ghost)
+        fmt::print("{:7.2f} ghost of mover {} of {:.1f} s before: {} {} at {:.2f} {:.2f}\n",
+                   shot.sweep.t, k + 1, age, holder->moving ? "mover id" : "static id",
+                   holder->id & 0xffff, p.x(), p.y());
+      ghost |= holder != nullptr;
     }
   }
   ghosts += ghost;

@@ -22,13 +22,18 @@ struct MoverScore {
   double worst_hidden = 0.0;                        ///< the same while something hides part of it
   int sights = 0, missed = 0, updates = 0, hidden_updates = 0;
   int most_hits = 0;  ///< returns at the present range when all of it is in sight, decaying
+  /// Squared errors over their published variances, per axis: sums over `judged` updates of the
+  /// velocity and of the centre, and how many were beyond what 95 % of them should stay below.
+  double velocity_nees = 0.0, center_nees = 0.0;
+  int judged = 0, velocity_beyond = 0, center_beyond = 0;
   std::set<int> ids;
 };
 
 /// Figures of a flight, from the published lists and the truth.
 class Score {
  public:
-  Score(const Course& course, const Stage& stage) : course_(course), stage_(stage) {}
+  Score(const Course& course, const Stage& stage, bool trace)
+      : course_(course), stage_(stage), trace_(trace) {}
   void Add(const Shot& shot, const mapping::ObstacleList& list);
   /// Call after the last sweep.
   void Close();
@@ -57,10 +62,15 @@ class Score {
   void CheckVolume(const Shot& shot, const std::vector<world::Obstacle>& obstacles);
   void FollowIds(const Shot& shot, const std::vector<world::Obstacle>& obstacles);
   void FollowMovers(const Shot& shot, const std::vector<world::Obstacle>& obstacles);
+  void Judge(const world::Obstacle& o, const world::MoverState& truth, double t, int hits,
+             MoverScore* score) const;
+  static void Trace(const Shot& shot, const world::Obstacle& o, int owner,
+                    const std::vector<int>& hits);
   void LookForGhosts(const Shot& shot, const std::vector<world::Obstacle>& obstacles);
 
   const Course& course_;
   const Stage& stage_;
+  bool trace_;  ///< prints every listed mover
   std::map<Cell, Seen> seen_;
   std::map<Cell, Eigen::Vector3d> places_;
   std::map<Cell, int> ids_;  ///< of a place on an obstacle: who holds it

@@ -11,6 +11,8 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 
 constexpr double kStep = 0.01;         // s between poses
+constexpr double kSweep = 0.1;         // s
+constexpr double kMoverStep = 5e-4;    // s for which movers stay where they are
 constexpr double kOnSurface = 0.03;    // m, a return this near to a solid hit it
 constexpr double kBin = 3.0;           // m
 constexpr int kBins = 512;             // to a side
@@ -68,16 +70,20 @@ simulator::TimedPose Stage::Pose(double t) const {
   return {t, course_.place(t), q};
 }
 
-void Stage::Classify(const Vector3d& p, double t, std::vector<Hit>* hits) const {
+void Stage::Classify(const Vector3d& p, double t, std::vector<Hit>* hits) {
   Hit hit{p};
+  hit.t = t;
   double best = kOnSurface;
   for (const int i : Near(p.x(), p.y())) {
     const double d = std::abs(world::SignedDistance(solids_[static_cast<size_t>(i)], p));
     if (d < best) best = d, hit.solid = i;
   }
-  const auto movers = actors_.Movers(Actual(t));
-  for (size_t i = 0; i < movers.size(); ++i) {
-    const double d = std::abs(world::SignedDistance(movers[i].solid, p));
+  if (std::abs(t - movers_t_) > kMoverStep) {
+    movers_ = actors_.Movers(Actual(t));
+    movers_t_ = t;
+  }
+  for (size_t i = 0; i < movers_.size(); ++i) {
+    const double d = std::abs(world::SignedDistance(movers_[i].solid, p));
     if (d < best) best = d, hit.solid = -1, hit.mover = static_cast<int>(i);
   }
   if (hit.solid >= 0 || hit.mover >= 0) hits->push_back(hit);
@@ -134,6 +140,8 @@ std::optional<Shot> Stage::Next() {
     shot.sweep.points.push_back((shot.sweep.origin + turn * (seen - end.p)).cast<float>());
     if ((point - end.p).norm() < 20.0) Classify(point, pose.t, &shot.hits);
   }
+  const Eigen::Quaterniond heading(turn * end.q);
+  shot.sweep.ages = mapping::FiringAges(shot.sweep.origin, heading, shot.sweep.points, kSweep);
   Observe(&shot);
   return shot;
 }
@@ -188,6 +196,35 @@ Course Crossing(double speed) {
   s.movers = {first, second};
   course.duration = start + 48.0 / speed + 3.0;
   course.place = [](double t) { return Vector3d(0.3 * std::sin(t), 0.4 * std::cos(0.5 * t), 1.5); };
+  return course;
+}
+
+Course Traffic(uint64_t seed) {
+  constexpr double kFirst = 6.0, kEvery = 4.0, kReach = 22.0;
+  Course course = Follow("deploy/scenarios/forest.yaml", 1.4, 1.8);
+  auto& s = course.scenario;
+  const auto path = world::TargetMotion(s);
+  world::Random random(seed, kStream + 1);
+  s.world.forest.seed = static_cast<int>(100 + seed);
+  s.movers.clear();
+  for (double when = kFirst; when < course.duration - 6.0; when += kEvery) {
+    world::MoverSpec mover;
+    const char* const shapes[] = {"box", "box", "cylinder", "ellipsoid"};
+    mover.shape = shapes[static_cast<int>(random.Uniform(0.0, 4.0)) & 3];
+    const double length = random.Uniform(0.8, 3.5);
+    const bool round = mover.shape == "cylinder";
+    mover.size = {length, round ? length : random.Uniform(0.4, 0.8) * length, 1.7};
+    mover.speed = random.Uniform(1.5, 4.0);
+    // Its way cuts the target's path where the target is 2 to 3 s later.
+    const double ahead = when + random.Uniform(2.0, 3.0), angle = random.Uniform(0.7, 2.4);
+    const Vector2d course_there = path.Position(ahead + 0.1) - path.Position(ahead - 0.1);
+    const double side = random.Uniform() < 0.5 ? -1.0 : 1.0;
+    const Vector2d way = kReach * (Eigen::Rotation2Dd(side * angle) * course_there.normalized());
+    const Vector2d from = path.Position(ahead) - way, to = path.Position(ahead) + way;
+    mover.waypoints = {{from.x(), from.y(), 1.0}, {to.x(), to.y(), 1.0}};
+    mover.start_time = when - kReach / mover.speed;
+    s.movers.push_back(mover);
+  }
   return course;
 }
 

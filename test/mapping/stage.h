@@ -42,6 +42,7 @@ struct Hit {
   Eigen::Vector3d point;  ///< true place, frame W, m
   int solid = -1;         ///< index into the static solids, or -1
   int mover = -1;         ///< index of the mover, or -1
+  double t = 0.0;         ///< s, when it was fired
 };
 
 struct Shot {
@@ -65,7 +66,7 @@ class Stage {
  private:
   simulator::TimedPose Pose(double t) const;
   double Actual(double t) const { return course_.frozen ? 0.0 : t; }
-  void Classify(const Eigen::Vector3d& p, double t, std::vector<Hit>* hits) const;
+  void Classify(const Eigen::Vector3d& p, double t, std::vector<Hit>* hits);
   void Observe(Shot* shot);
 
   Course course_;
@@ -78,12 +79,17 @@ class Stage {
   world::Random random_;
   std::vector<simulator::TimedPose> rail_;  ///< poses so far
   double t_ = 0.0;
+  double movers_t_ = -1.0;  ///< s, when movers_ were there
+  std::vector<world::MoverState> movers_;
 };
 
 /// The drone follows the target's path `delay` s behind it, `height` m above the ground.
 Course Follow(const std::string& scenario, double delay, double height);
 /// Two large movers cross at `speed` in front of the hovering drone, one behind a trunk.
 Course Crossing(double speed);
+/// The forest's flight with trees and movers of its own for every seed: boxes, cylinders and
+/// ellipsoids, 0.8 to 3.5 m long, cut across the target's path at 1.5 to 4 m/s.
+Course Traffic(uint64_t seed);
 /// A straight flight of `length` m at 5 m/s through a forest.
 Course Long(double length);
 

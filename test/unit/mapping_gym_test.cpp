@@ -199,7 +199,7 @@ TEST(MappingFaults, HostileSweepsNeverBreakTheMap) {
   ObstacleList before, after;
   for (int i = 0; i < 10; ++i)
     before = mapper.Insert(testing::Scan(world, {4.0, 4.0, 1.3}, 0.1 * i, {}, &random));
-  Sweep hostile{1.0, {4.0, 4.0, 1.3}, {}};
+  Sweep hostile{1.0, {4.0, 4.0, 1.3}, {}, {}};
   EXPECT_GT(mapper.Insert(hostile).n_static, 0);  // an empty sweep changes nothing
   hostile.points = {{nan, 0, 0},  {0, inf, 0},  {1e30f, 1e30f, 1e30f}, {-3e8f, 0, 0},
                     {4, 4, 1.3f}, {4, 4, 1e9f}, {4, 4, -1e9f}};

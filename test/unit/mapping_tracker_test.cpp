@@ -4,19 +4,20 @@
 #include <map>
 #include <random>
 
-#include "services/mapping/movers.h"
+#include "services/mapping/tracker.h"
 
 namespace chase::mapping {
 namespace {
 
-Cluster BoxCluster(const Eigen::Vector2d& center, double half) {
+/// What is seen of a square, all of whose ends are in view or none.
+Cluster BoxCluster(const Eigen::Vector2d& center, double half, bool ends = true) {
   Cluster cluster;
   cluster.members = {0};
-  for (const double dx : {-half, half})
-    for (const double dy : {-half, half}) cluster.hull.push_back(center + Eigen::Vector2d(dx, dy));
-  cluster.hull = ConvexHull(cluster.hull);
+  for (int k = 0; k < kDirections; ++k) {
+    const Eigen::Vector2d d = Direction(k);
+    cluster.reaches[static_cast<size_t>(k)] = {d.dot(center) + half * d.lpNorm<1>(), 0.0, ends};
+  }
   cluster.center << center, 1.0;
-  cluster.half_length = half;
   return cluster;
 }
 
@@ -38,7 +39,7 @@ TEST(MappingTracker, IdsSurviveACrossing) {
       const Eigen::Vector2d noise(normal(random), normal(random));
       std::vector<Cluster> clusters = {BoxCluster(crossing.Second(t) - noise, 0.4),
                                        BoxCluster(crossing.First(t) + noise, 0.4)};
-      tracker.Update(&clusters);
+      tracker.Update(Panorama(), &clusters);
       ASSERT_EQ(clusters.size(), 2u) << "seed " << seed << " t " << t;
       ++second[clusters[0].track];
       ++first[clusters[1].track];
@@ -57,7 +58,7 @@ TEST(MappingTracker, IdSurvivesAShortOcclusionAndGhostIsNotListed) {
     tracker.Predict(t);
     std::vector<Cluster> clusters;
     if (t < 1.5 || t > 2.5) clusters.push_back(BoxCluster({1.5 * t, 0.0}, 0.5));
-    tracker.Update(&clusters);
+    tracker.Update(Panorama(), &clusters);
     if (t > 0.9 && t < 1.4) id = clusters[0].track;
     if (t > 2.2 && t < 2.4) {
       EXPECT_TRUE(tracker.Obstacles(1.5, 8.0, 1.0).empty());
@@ -75,7 +76,7 @@ TEST(MappingTracker, WhatStandsIsNeverListed) {
   for (double t = 0.0; t < 20.0; t += 0.1) {
     tracker.Predict(t);
     std::vector<Cluster> clusters = {BoxCluster({3.0 + normal(random), normal(random)}, 0.3)};
-    tracker.Update(&clusters);
+    tracker.Update(Panorama(), &clusters);
     EXPECT_TRUE(tracker.Obstacles(1.5, 8.0, 1.0).empty()) << t;
   }
 }
@@ -85,7 +86,7 @@ TEST(MappingTracker, NumberOfTracksIsBounded) {
   std::vector<Cluster> clusters;
   for (int i = 0; i < 500; ++i) clusters.push_back(BoxCluster({10.0 * i, 0.0}, 0.3));
   tracker.Predict(0.0);
-  tracker.Update(&clusters);
+  tracker.Update(Panorama(), &clusters);
   EXPECT_LE(tracker.tracks().size(), 64u);
 }
 

@@ -5,11 +5,11 @@
 #include <filesystem>
 #include <iostream>
 #include <opencv2/imgcodecs.hpp>
-#include <opencv2/imgproc.hpp>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
-#include "services/perception/color_detector.h"
+#include "services/perception/learn.h"
 
 namespace chase::perception {
 namespace {
@@ -42,25 +42,6 @@ bool ForTraining(const Photo& photo) {
          photo.name == "train_20_dist8";
 }
 
-/// The blob, made smaller all around by `inset`, a share of its width.
-cv::Mat Region(const Detection& d, const cv::Size& size, double inset) {
-  cv::Mat region = cv::Mat::zeros(size, CV_8U), distance;
-  d.mask.copyTo(region(d.mask_box));
-  cv::distanceTransform(region, distance, cv::DIST_L2, cv::DIST_MASK_PRECISE);
-  return distance > inset * d.box.width;
-}
-
-double IoU(const cv::Mat& region, const cv::Mat& mask) {
-  const double both = cv::countNonZero((region > 0) & (mask > 0));
-  return both / cv::countNonZero((region > 0) | (mask > 0));
-}
-
-/// The best region's overlap with the mask, 0 where nothing is found.
-double Score(const ColorDetector& detector, const Photo& photo, double inset) {
-  const auto found = detector.Detect(photo.bgr);
-  return found.empty() ? 0.0 : IoU(Region(found.front(), photo.mask.size(), inset), photo.mask);
-}
-
 TEST(PerceptionPhotos, TheConeIsFoundInRealPhotos) {
   const auto photos = LoadPhotos();
   if (photos.empty()) GTEST_SKIP() << "skipped: real recordings not present";
@@ -68,30 +49,20 @@ TEST(PerceptionPhotos, TheConeIsFoundInRealPhotos) {
   for (const auto& p : photos)
     if (ForTraining(p)) images.push_back(p.bgr), masks.push_back(p.mask);
   ASSERT_EQ(images.size(), 3u);
-  DetectorConfig config;
-  config.color.white_balance = false;
-  config.color = LearnColor(images, masks, config.color);
-  config.shape.aspect = 0.48;  // a cone's
-  config.shape.fill = 0.6;
-  ASSERT_EQ(config.Problem(), "");
-  const ColorDetector detector(config, 0.5);
-  // The masks were drawn by hand well inside the cone's outline. How far is learned from the same
-  // three photos, so that the overlap measures what was found and not how the masks were drawn.
-  double inset = 0.0, best = 0.0;
-  for (double share = 0.0; share < 0.2; share += 0.01) {
-    double trained = 0.0;
-    for (const auto& p : photos)
-      if (ForTraining(p)) trained += Score(detector, p, share) / 3.0;
-    if (trained > best) best = trained, inset = share;
-  }
+  // As `chase-perception --learn-colour` does. The masks were drawn by hand well inside the cone's
+  // outline; how far is learned from the same three.
+  const Learned learned = LearnDetector(images, masks, {});
+  ASSERT_EQ(learned.config.Problem(), "");
+  DetectorConfig whole = learned.config;
+  whole.shape.inset = 0.0;
   double sum = 0.0, outline = 0.0;
   int count = 0;
   for (const auto& p : photos) {
     if (ForTraining(p)) continue;
-    const double iou = Score(detector, p, inset);
-    EXPECT_GT(iou, 0.0) << p.name;
-    sum += iou;
-    outline += Score(detector, p, 0.0);
+    const double overlap = Overlap(learned.config, p.bgr, p.mask);
+    EXPECT_GT(overlap, 0.0) << p.name;
+    sum += overlap;
+    outline += Overlap(whole, p.bgr, p.mask);
     ++count;
   }
   EXPECT_EQ(count, 17);
@@ -100,6 +71,38 @@ TEST(PerceptionPhotos, TheConeIsFoundInRealPhotos) {
   RecordProperty("mean_iou_percent", static_cast<int>(100.0 * sum / count));
   RecordProperty("mean_iou_of_outline_percent", static_cast<int>(100.0 * outline / count));
   std::cout << "mean IoU " << sum / count << ", of the whole outline " << outline / count << "\n";
+}
+
+/// An upright orange thing, marked less wide than it is.
+struct Marked {
+  cv::Mat bgr = cv::Mat(240, 320, CV_8UC3, cv::Scalar(120, 125, 130));
+  cv::Mat mask = cv::Mat::zeros(240, 320, CV_8U);
+
+  Marked(int x, int width, int border) {
+    const cv::Rect box(x, 60, width, 2 * width);
+    bgr(box).setTo(cv::Scalar(20, 110, 240));
+    mask(box - cv::Point(-border, -border) - cv::Size(2 * border, 2 * border)).setTo(255);
+  }
+};
+
+TEST(PerceptionLearn, FindsHowFarInsideTheColoursEdgeTheTargetIsMarked) {
+  for (const int border : {0, 4, 8}) {
+    const Marked a(40, 50, border), b(200, 50, border);
+    const Learned learned = LearnDetector({a.bgr}, {a.mask}, {});
+    EXPECT_NEAR(learned.config.shape.inset, border / 50.0, 0.011);
+    EXPECT_GT(learned.overlap, 0.97);
+    EXPECT_GT(Overlap(learned.config, b.bgr, b.mask), 0.97) << border;
+  }
+}
+
+TEST(PerceptionLearn, RefusesWhatDoesNotFitTogether) {
+  const Marked a(40, 50, 0);
+  EXPECT_THROW(LearnDetector({}, {}, {}), std::invalid_argument);
+  EXPECT_THROW(LearnDetector({a.bgr}, {a.mask, a.mask}, {}), std::invalid_argument);
+  EXPECT_THROW(LearnDetector({a.bgr}, {a.bgr}, {}), std::invalid_argument);
+  EXPECT_THROW(LearnDetector({a.bgr}, {a.mask.rowRange(0, 100)}, {}), std::invalid_argument);
+  EXPECT_THROW(LearnDetector({a.bgr}, {cv::Mat::zeros(a.mask.size(), CV_8U)}, {}),
+               std::invalid_argument);
 }
 
 }  // namespace

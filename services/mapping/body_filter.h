@@ -1,0 +1,65 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+
+#include "services/mapping/enclosing.h"
+
+namespace chase::mapping {
+
+/// Directions in plan, evenly spaced from +x counter-clockwise, along which outlines are measured.
+inline constexpr int kDirections = 16;
+Eigen::Vector2d Direction(int k);
+
+/// How far a cluster reaches in one direction: the largest d . x of its returns.
+struct Reach {
+  double along = 0.0;  ///< d . x, frame W, m
+  double age = 0.0;    ///< of that return at the end of the sweep, s
+  bool edge = false;   ///< the body ends there; otherwise it may go on out of sight
+};
+using Reaches = std::array<Reach, kDirections>;
+
+/// A body of unknown convex outline that moves without turning much. Linear Kalman filter of a
+/// point that is fixed to it, of its velocity, and of the outline's support function about that
+/// point (cf. Sun, Li and Lan 2014, extended objects by support functions): a sweep measures d_k .
+/// (p - age v) + h_k where the body's end is in view. What comes into view, or is hidden, on one
+/// side changes the outline there and leaves the motion alone.
+class BodyFilter {
+ public:
+  static constexpr int kStates = 4 + kDirections;
+  using State = Eigen::Matrix<double, kStates, 1>;
+  using Covariance = Eigen::Matrix<double, kStates, kStates>;
+
+  BodyFilter() = default;
+  /// A body at rest, give or take `speed` m/s, about `center`; where no end is in view the outline
+  /// is that of `seen` give or take `unseen` m.
+  BodyFilter(const Eigen::Vector2d& center, const Reaches& seen, double speed, double unseen);
+
+  /// Moves on by dt s; the velocity walks by `acceleration` dt.
+  void Predict(double dt, double acceleration);
+  /// Takes a sweep's reaches; `sigma`: standard deviation of one of them, m; `unseen`: as above.
+  /// Returns in how many directions an end was in view.
+  int Correct(const Reaches& seen, double sigma, double unseen);
+  /// Mean square of the innovations of ends in view, in standard deviations of at least `least` m
+  /// each. Below zero if nothing can be compared.
+  double Distance(const Reaches& seen, double sigma, double least) const;
+
+  Eigen::Vector2d p() const { return x_.head<2>(); }
+  Eigen::Vector2d v() const { return x_.segment<2>(2); }
+  /// Corners of the outline about p, counter-clockwise; empty if the reaches contradict each other.
+  Points2 Outline() const;
+  /// Variance of the outline's centre and of the velocity, mean over the axes, m^2 and m^2/s^2.
+  double CenterVariance() const;
+  double VelocityVariance() const;
+
+ private:
+  using Row = Eigen::Matrix<double, 1, kStates>;
+  static Row Model(int k, double age);
+  void Uncover(const Reaches& seen, double unseen);
+  void Reshape(const Reaches& seen, const std::array<double, kDirections>& innovation);
+
+  State x_ = State::Zero();
+  Covariance P_ = Covariance::Zero();
+};
+
+}  // namespace chase::mapping

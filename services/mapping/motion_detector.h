@@ -1,0 +1,55 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "services/mapping/body_filter.h"
+#include "services/mapping/enclosing.h"
+#include "services/mapping/panorama.h"
+#include "services/mapping/sweep.h"
+
+namespace chase::mapping {
+
+/// Returns that moved together. Frame W.
+struct Cluster {
+  std::vector<int> members;                          ///< indices into the sweep's returns
+  Reaches reaches;                                   ///< of the returns; where hidden, as supposed
+  Eigen::Vector3d center = Eigen::Vector3d::Zero();  ///< of the box around all that, m
+  int track = -1;                                    ///< id of the track that it belongs to
+};
+
+/// Finds returns where space has long been free, and what hangs together with them.
+class MotionDetector {
+ public:
+  MotionDetector(const MoverConfig& movers, const GridConfig& grid)
+      : config_(movers), ever_free_(grid.ever_free_sweeps), range_(grid.range) {}
+
+  /// Looks at returns labelled kStatic, seen from `origin`. `expected`: outlines where movers
+  /// should be now; returns there count as moving unless a settled cell holds them.
+  std::vector<Cluster> Detect(const Eigen::Vector3d& origin, const std::vector<Return>& returns,
+                              VoxelGrid* grid, const std::vector<Ellipse>& expected);
+  /// What hid what in that sweep.
+  const Panorama& panorama() const { return panorama_; }
+
+ private:
+  struct Candidate {
+    int64_t cell;  ///< code of its cluster cell in plan
+    int index;     ///< into the returns
+    bool seed;     ///< lies in ever-free space
+  };
+  std::vector<Candidate> Candidates(const std::vector<Return>& returns, VoxelGrid* grid,
+                                    const std::vector<Ellipse>& expected) const;
+  bool InEverFree(const Key& key, VoxelGrid* grid) const;
+  std::vector<Cluster> Connected(const std::vector<Candidate>& candidates) const;
+  bool Finish(const std::vector<Return>& returns, const std::vector<int>& owner, int self,
+              Cluster* cluster) const;
+  static void Touch(const std::vector<Return>& returns, const std::vector<int>& owner, int self,
+                    const std::array<Eigen::Vector2f, kDirections>& ends, Cluster* cluster);
+
+  MoverConfig config_;
+  int ever_free_;
+  double range_;
+  Panorama panorama_;
+};
+
+}  // namespace chase::mapping

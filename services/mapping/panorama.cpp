@@ -1,0 +1,60 @@
+#include "services/mapping/panorama.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace chase::mapping {
+
+namespace {
+
+constexpr int kNobody = -2;
+constexpr double kInFront = 0.15;  // m, what is nearer by this hides
+constexpr double kBeside = 0.15;   // m, half width of what must be clear for an edge to be one
+constexpr double kStep = 0.012;    // rad, the same at least: some azimuth steps of the scanner
+
+/// Monotone in the angle, 4 to the turn; between one and two thirds of an arc's length.
+double Diamond(double x, double y) {
+  const double s = std::abs(x) + std::abs(y);
+  if (!(s > 0.0)) return 0.0;
+  const double q = y / s;
+  return x < 0.0 ? 2.0 - q : (y < 0.0 ? 4.0 + q : q);
+}
+
+}  // namespace
+
+void Panorama::Take(const Eigen::Vector3d& origin, const std::vector<Return>& returns,
+                    const std::vector<int>& owner) {
+  origin_ = origin.head<2>();
+  bins_.assign(kBins, {INFINITY, INFINITY, kNobody});
+  for (size_t i = 0; i < returns.size(); ++i) {
+    const Return& r = returns[i];
+    if (r.label == Label::kGround || r.label == Label::kFar) continue;
+    const Eigen::Vector2d d = r.p.head<2>().cast<double>() - origin_;
+    const auto range = static_cast<float>(d.norm());
+    Bin& bin = bins_[static_cast<size_t>(0.25 * kBins * Diamond(d.x(), d.y())) % kBins];
+    if (range < bin.first) {
+      if (bin.owner != owner[i]) bin.second = bin.first;
+      bin.first = range;
+      bin.owner = owner[i];
+    } else if (owner[i] != bin.owner && range < bin.second) {
+      bin.second = range;
+    }
+  }
+}
+
+bool Panorama::Hides(const Eigen::Vector2d& p, int owner) const {
+  const Eigen::Vector2d d = p - origin_;
+  const double range = d.norm();
+  if (bins_.empty() || !(range > 0.0)) return false;
+  const int middle = static_cast<int>(0.25 * kBins * Diamond(d.x(), d.y()));
+  const int reach = std::clamp(
+      static_cast<int>(std::ceil(0.25 * kBins * std::max(kStep, kBeside / range))), 1, kBins / 8);
+  for (int b = middle - reach; b <= middle + reach; ++b) {
+    const Bin& bin = bins_[static_cast<size_t>((b + kBins) % kBins)];
+    const float nearest = bin.owner == owner ? bin.second : bin.first;
+    if (nearest < range - kInFront) return true;
+  }
+  return false;
+}
+
+}  // namespace chase::mapping

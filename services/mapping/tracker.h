@@ -1,0 +1,68 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "common/world/obstacle.h"
+#include "services/mapping/body_filter.h"
+#include "services/mapping/motion_detector.h"
+#include "services/mapping/panorama.h"
+
+namespace chase::mapping {
+
+/// A moving object.
+struct Track {
+  int id = 0;
+  BodyFilter body;
+  double z = 0.0;      ///< of the centre, m
+  Ellipse outline;     ///< in plan, about body.p()
+  double reach = 0.0;  ///< of the outline's corners from body.p(), m
+  Eigen::Vector2d birth = Eigen::Vector2d::Zero();
+  double born = 0.0, seen = 0.0, moved = 0.0;  ///< s: first, last detection; last time not at rest
+  double sought = 0.0;  ///< s, last time that it was seen or something hid its place
+  int detections = 0;
+  bool confirmed = false, fresh = false;  ///< fresh: confirmed by the last update
+  std::vector<Eigen::Vector2d> trail;     ///< places until the confirmation
+
+  /// Outline at the present place.
+  Ellipse Outline() const { return {body.p() + outline.center, outline.shape}; }
+};
+
+/// Keeps tracks of clusters: assignment of least cost within a gate, births, deaths.
+class Tracker {
+ public:
+  explicit Tracker(const MoverConfig& config) : config_(config) {}
+
+  /// Moves all tracks to time t [s].
+  void Predict(double t);
+  /// Where confirmed tracks are expected at the time of the last prediction.
+  std::vector<Ellipse> Expected() const;
+  /// Assigns the clusters, which it marks with their track, and may join.
+  void Update(const Panorama& panorama, std::vector<Cluster>* clusters);
+  /// Drops tracks whose centre lies within `radius` of `center` in plan.
+  void Forget(const Eigen::Vector2d& center, double radius);
+
+  /// True while returns of this track are to be kept out of the static map.
+  bool Moves(int id) const;
+  const std::vector<Track>& tracks() const { return tracks_; }
+  /// Confirmed tracks that were seen of late, as upright ellipsoids with a linear centre.
+  std::vector<world::Obstacle> Obstacles(double middle, double semi_height, double grow) const;
+
+ private:
+  void Join(std::vector<Cluster>* clusters) const;
+  double Cost(const Track& track, const Cluster& cluster) const;
+  void Correct(const Cluster& cluster, Track* track) const;
+  void Confirm(Track* track) const;
+  void Absorb(Cluster* cluster);
+  void Birth(Cluster* cluster);
+  void Seek(const Panorama& panorama);
+  void Unite();
+  void Bury();
+
+  MoverConfig config_;
+  std::vector<Track> tracks_;
+  double t_ = 0.0;
+  int next_id_ = 1 << 30;  ///< apart from the ids of static pieces
+};
+
+}  // namespace chase::mapping
