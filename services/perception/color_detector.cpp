@@ -46,6 +46,7 @@ Detection ColorDetector::Describe(const cv::Mat& bgr, const cv::Mat& score,
   d.mask = cv::Mat::zeros(d.mask_box.size(), CV_8U);
   cv::drawContours(d.mask, std::vector<std::vector<cv::Point>>{contour}, 0, 255, cv::FILLED,
                    cv::LINE_8, cv::noArray(), INT_MAX, -d.mask_box.tl());
+  d.inset_px = shape_.inset * d.box.width;
   d.cut = CutSides(d.mask_box, bgr.size());
   Rate(score, &d);
   return d;

@@ -8,8 +8,8 @@ namespace chase::perception {
 namespace {
 
 constexpr double kHidden = 0.02;    // how often a given side is hidden
-constexpr double kRunsOn = 0.01;    // how often a like colour goes on beyond a side,
-constexpr double kRunsOnToo = 0.3;  // and beyond another one then
+constexpr double kRunsOn = 0.04;    // how often a like colour goes on beyond a side,
+constexpr double kRunsOnToo = 0.5;  // and beyond another one then
 
 // What else has the target's colour: so many blobs a frame, anywhere in the image, sides so far
 // apart, as far away as may be.

@@ -58,13 +58,22 @@ bool Perceiver::Vague() const {
   return track_->misses > 0 && HorizontalSigma(*track_) > config_.state.sure_sigma;
 }
 
+/// True for a sighting after which nothing need be asked: all of the target, close to where it was
+/// expected, and nothing else that could be it.
+bool Perceiver::Sure(const Sighting& s) const {
+  if (track_->misses == 0) return true;
+  if (s.contested) return false;
+  const double off = (s.fit.posterior.position() - track_->state.position()).head<2>().norm();
+  return !Vague() || (s.fit.whole && off < config_.state.decoy_radius);
+}
+
 void Perceiver::Follow(View* view) {
   if (!track_) return;
   const auto refuses = [&](const Sighting& s) { return IsRatherDecoy(s, *view); };
   auto taken = view->taken;
-  const auto found = Vague() ? std::nullopt : finder_.Find(*track_, view, refuses);
+  const auto found = finder_.Find(*track_, view, refuses);
   contested_ = found && found->contested && track_->misses > 0;
-  if (!found || contested_) {
+  if (!found || !Sure(*found)) {
     view->taken = taken;
     ++track_->misses;
     return;
@@ -200,7 +209,8 @@ void Perceiver::Remember(const View& view) {
 /// The one that drives is the target, and the one that stands is not.
 void Perceiver::SwapIfTheOtherDrives(const Sighting& s, Decoy* other, double t) {
   const double sigma = std::sqrt(s.fit.posterior.covariance.topLeftCorner<3, 3>().trace());
-  const bool stands = t - stood_since_ > kStoodFor;
+  const bool stands =
+      t - stood_since_ > kStoodFor && (track_->state.position() - stood_).norm() < kStood;
   if (!stands || !other->driven() || sigma > kDrivenSigma) return;
   const Eigen::Vector3d stood = track_->state.position();
   *other = {stood, stood, t, other->hits};

@@ -51,6 +51,7 @@ class Perceiver {
   TargetEstimate Report(double t, const std::optional<View>& view, std::string note) const;
 
   bool Vague() const;
+  bool Sure(const Sighting& s) const;
   bool Ready(const Candidate& candidate, double t) const;
   bool Plausible(const Eigen::Vector3d& p_WT, double t) const;
   bool IsRatherDecoy(const Sighting& s, const View& view) const;

@@ -49,6 +49,7 @@ std::string ShapeConfig::Problem() const {
       .In("aspect_tolerance", aspect_tolerance, 0.01, 10)
       .In("fill", fill, 0.05, 1)
       .In("fill_tolerance", fill_tolerance, 0.01, 10)
+      .In("inset", inset, 0, 0.4)
       .In("min_area_px", min_area_px, 4, 1e6)
       .In("min_score", min_score, 0, 1)
       .In("max_candidates", max_candidates, 1, 100)

@@ -33,6 +33,7 @@ struct ColorConfig {
 struct ShapeConfig {
   double aspect = 0.57, aspect_tolerance = 0.35;
   double fill = 0.93, fill_tolerance = 0.2;
+  double inset = 0.0;
   double min_area_px = 20.0, min_score = 0.0;
   int max_candidates = 16;
 
@@ -42,6 +43,7 @@ struct ShapeConfig {
     v("aspect_tolerance", aspect_tolerance, "one standard deviation of its logarithm");
     v("fill", fill, "share of its box that the blob fills");
     v("fill_tolerance", fill_tolerance, "one standard deviation");
+    v("inset", inset, "the target lies so far inside the colour's outline, share of its width");
     v("min_area_px", min_area_px, "smaller blobs are noise, px^2");
     v("min_score", min_score, "candidates below are not looked at, 0 to 1");
     v("max_candidates", max_candidates, "the best so many are looked at");

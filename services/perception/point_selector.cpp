@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "services/perception/silhouette.h"
+
 namespace chase::perception {
 
 namespace {
@@ -18,14 +20,14 @@ double HalfAngle(const Camera& camera, const cv::Rect2d& box) {
   return 0.5 * std::hypot(box.width, box.height) / camera.rig.focal_px;
 }
 
-bool OnDetection(const Detection& d, const Eigen::Vector2d& px) {
+bool OnDetection(const Detection& d, const cv::Mat& region, const Eigen::Vector2d& px) {
   if (px.x() < d.box.x || px.y() < d.box.y || px.x() > d.box.x + d.box.width ||
       px.y() > d.box.y + d.box.height)
     return false;
-  if (d.mask.empty()) return true;
+  if (region.empty()) return true;
   const int x = static_cast<int>(std::lround(px.x())) - d.mask_box.x;
   const int y = static_cast<int>(std::lround(px.y())) - d.mask_box.y;
-  return x >= 0 && y >= 0 && x < d.mask.cols && y < d.mask.rows && d.mask.at<uint8_t>(y, x) != 0;
+  return x >= 0 && y >= 0 && x < region.cols && y < region.rows && region.at<uint8_t>(y, x) != 0;
 }
 
 Clusters Split(std::vector<TargetPoint> points) {
@@ -77,6 +79,7 @@ Clusters SelectPoints(const Sweep& sweep, const PoseHistory& poses, const Camera
       (camera.rig.R_BL().transpose() * (pose->R_WB.conjugate() * sight)).cast<float>();
   const auto cosine =
       static_cast<float>(std::cos(std::min(1.5, HalfAngle(camera, detection.box) + kCoarseMargin)));
+  const cv::Mat region = Region(detection);
   Placer placer(sweep, poses, camera.rig);
   std::vector<TargetPoint> hits;
   for (size_t i = 0; i < sweep.points.size(); ++i) {
@@ -89,7 +92,7 @@ Clusters SelectPoints(const Sweep& sweep, const PoseHistory& poses, const Camera
     hit.age = t_frame - sweep.t - static_cast<double>(sweep.times[i]);
     const Eigen::Vector3d now = hit.p_W + hit.age * v_WT;
     const auto px = camera.Project(now);
-    if (!px || !OnDetection(detection, *px)) continue;
+    if (!px || !OnDetection(detection, region, *px)) continue;
     hit.range = (now - camera.p_WC).norm();
     hits.push_back(hit);
   }

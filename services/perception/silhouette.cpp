@@ -150,6 +150,15 @@ Silhouette TraceSilhouette(const cv::Mat& bgr, const cv::Mat& mask, const cv::Re
   return out;
 }
 
+cv::Mat Region(const Detection& detection) {
+  if (detection.mask.empty() || detection.inset_px <= 0.0) return detection.mask;
+  cv::Mat framed, distance;  // the frame counts as outside
+  cv::copyMakeBorder(detection.mask, framed, 1, 1, 1, 1, cv::BORDER_CONSTANT, cv::Scalar(0));
+  cv::distanceTransform(framed, distance, cv::DIST_L2, cv::DIST_MASK_PRECISE);
+  const cv::Rect inner(1, 1, detection.mask.cols, detection.mask.rows);
+  return cv::Mat(distance > detection.inset_px)(inner).clone();
+}
+
 cv::Rect2d EdgeBox(const cv::Rect& roi) {
   return {roi.x - 0.5, roi.y - 0.5, static_cast<double>(roi.width),
           static_cast<double>(roi.height)};

@@ -15,6 +15,10 @@ namespace chase::perception {
 Silhouette TraceSilhouette(const cv::Mat& bgr, const cv::Mat& mask, const cv::Rect& roi,
                            const std::array<bool, 4>& cut);
 
+/// The mask of a detection less the border that does not count: 8 bit, 255 on the target, lies
+/// where the mask does.
+cv::Mat Region(const Detection& detection);
+
 /// Edges of a block of pixels where the first pixel's centre is (0, 0).
 cv::Rect2d EdgeBox(const cv::Rect& roi);
 

@@ -1,90 +1,100 @@
-// Recall, precision, position error, honesty and time of perception on synthetic flights. The
-// argument is the number of seeds; counters as in the README of services/perception.
+// Perception against the simulator's truth: scores over whole flights (`flights/WORLD/SEEDS`, as
+// test/perception/README.md says) and the time of a frame (`frames/WORLD`, one flight's frames over
+// and over). Counters as in the README of services/perception. Run in the project's root.
 #include <benchmark/benchmark.h>
 
 #include <algorithm>
-#include <cmath>
+#include <string>
 #include <vector>
 
-#include "perception_world.h"
+#include "score.h"
+#include "stage.h"
 
 namespace {
 
-using chase::perception::TargetState;
-using chase::perception_test::Fly;
-using chase::perception_test::FlyOptions;
-using chase::perception_test::Outcome;
-using chase::perception_test::World;
+using chase::perception::Perceiver;
+using chase::perception_stage::ConfigFor;
+using chase::perception_stage::Fly;
+using chase::perception_stage::Play;
+using chase::perception_stage::Score;
+using chase::perception_stage::Shoot;
+using chase::perception_stage::Stage;
+using chase::perception_stage::StageOptions;
+using chase::perception_stage::Step;
 
-constexpr double kSettle = 0.5;  // s before frames count
-constexpr double kWrong = 0.5;   // m off the target: another thing
-constexpr double k95 = 7.815;    // 95 % of chi square with 3 degrees of freedom
+constexpr uint64_t kFirstSeed = 201;
+constexpr double kReel = 6.0;  // s of the flight whose frames are timed
 
-struct Tally {
-  int visible = 0, recalled = 0, tracked = 0, wrong = 0, inside = 0;
-  double nees = 0.0, squared = 0.0;
-  std::vector<double> errors, ms;
-
-  void Add(const Outcome& o) {
-    ms.push_back(o.milliseconds);
-    const Eigen::Vector3d e = o.estimate.p_WT - o.truth;
-    const bool tracking = o.estimate.state == TargetState::kTracking;
-    const bool detected = tracking && o.estimate.box.width > 0.0;
-    if (o.t > kSettle && o.visible_share >= 0.5 && o.range >= 2.0 && o.range <= 8.0) {
-      ++visible;
-      recalled += detected && e.norm() < kWrong;
-    }
-    if (detected) {
-      ++tracked;
-      wrong += e.norm() > kWrong;
-    }
-    if (!tracking || o.range < 2.0 || o.range > 6.0) return;
-    const double n = e.dot(o.estimate.covariance.ldlt().solve(e));
-    errors.push_back(e.norm());
-    squared += e.squaredNorm();
-    nees += n;
-    inside += n < k95;
-  }
-};
-
-double Quantile(std::vector<double> values, double share) {
-  if (values.empty()) return 0.0;
-  std::sort(values.begin(), values.end());
-  return values[static_cast<size_t>(share * static_cast<double>(values.size() - 1))];
+StageOptions Options(const std::string& world, uint64_t seed) {
+  StageOptions options;
+  options.scenario = "deploy/scenarios/" + world + ".yaml";
+  options.seed = seed;
+  return options;
 }
 
-double Share(double part, double whole) { return whole > 0.0 ? part / whole : 0.0; }
+void Report(const Score& score, benchmark::State* state) {
+  auto& out = state->counters;
+  out["recall"] = score.recall();
+  out["precision"] = score.precision();
+  out["rms_m"] = score.rms();
+  out["p99_m"] = score.p99();
+  out["nees"] = score.nees();
+  out["inside_95"] = score.coverage();
+  out["occlusions"] = score.occlusions();
+  out["occluded_said_max_s"] = score.said_max();
+  out["found_again_p50_s"] = score.found_quantile(0.5);
+  out["found_again_max_s"] = score.found_max();
+  out["wrong_after_occlusion"] = score.wrong_after();
+  out["frame_ms_p50"] = score.ms_p50();
+  out["frame_ms_p99"] = score.ms_p99();
+}
 
-void Run(benchmark::State& state, World (*make)(uint32_t)) {
+void Flights(benchmark::State& state, const std::string& world) {
   for (auto _ : state) {
-    Tally tally;
-    for (uint32_t seed = 1; seed <= static_cast<uint32_t>(state.range(0)); ++seed) {
-      FlyOptions options;
-      options.duration = 10.0;
-      for (const auto& o : Fly(make(seed), {}, options)) tally.Add(o);
+    Score score;
+    for (uint64_t i = 0; i < static_cast<uint64_t>(state.range(0)); ++i) {
+      const Stage stage(Options(world, kFirstSeed + i));
+      score.Add(Fly(stage, ConfigFor(stage.scenario())));
     }
-    const double n = static_cast<double>(tally.errors.size());
-    state.counters["recall"] = Share(tally.recalled, tally.visible);
-    state.counters["precision"] = 1.0 - Share(tally.wrong, tally.tracked);
-    state.counters["rms_m"] = std::sqrt(Share(tally.squared, n));
-    state.counters["p99_m"] = Quantile(tally.errors, 0.99);
-    state.counters["nees"] = Share(tally.nees, n);
-    state.counters["inside_95"] = Share(tally.inside, n);
-    state.counters["frame_ms_p50"] = Quantile(tally.ms, 0.5);
-    state.counters["frame_ms_p99"] = Quantile(tally.ms, 0.99);
+    Report(score, &state);
   }
 }
 
-BENCHMARK_CAPTURE(Run, gym, chase::perception_test::GymWorld)
-    ->Arg(4)
+void Frames(benchmark::State& state, const std::string& world) {
+  StageOptions options = Options(world, kFirstSeed);
+  options.duration = kReel;
+  const Stage stage(options);
+  const auto config = ConfigFor(stage.scenario());
+  std::vector<Step> reel;
+  Shoot(stage, config.rig, [&](Step&& step) { reel.push_back(std::move(step)); });
+  std::vector<double> ms;
+  for (auto _ : state) {
+    Perceiver perceiver(config);
+    for (const Step& step : reel)
+      if (const auto out = Play(step, &perceiver)) ms.push_back(out->milliseconds);
+  }
+  if (ms.empty()) return;
+  std::sort(ms.begin(), ms.end());
+  state.counters["frames"] = static_cast<double>(ms.size());
+  state.counters["frame_ms_p50"] = ms[ms.size() / 2];
+  state.counters["frame_ms_p99"] = ms[ms.size() * 99 / 100];
+  state.SetItemsProcessed(static_cast<int64_t>(ms.size()));
+}
+
+BENCHMARK_CAPTURE(Frames, gym, "gym")->Unit(benchmark::kMillisecond)->Name("frames/gym");
+BENCHMARK_CAPTURE(Frames, forest, "forest")->Unit(benchmark::kMillisecond)->Name("frames/forest");
+BENCHMARK_CAPTURE(Flights, gym, "gym")
+    ->Name("flights/gym")
+    ->Arg(3)
     ->Arg(20)
     ->Iterations(1)
-    ->Unit(benchmark::kMillisecond);
-BENCHMARK_CAPTURE(Run, forest, chase::perception_test::ForestWorld)
-    ->Arg(4)
+    ->Unit(benchmark::kSecond);
+BENCHMARK_CAPTURE(Flights, forest, "forest")
+    ->Name("flights/forest")
+    ->Arg(3)
     ->Arg(20)
     ->Iterations(1)
-    ->Unit(benchmark::kMillisecond);
+    ->Unit(benchmark::kSecond);
 
 }  // namespace
 

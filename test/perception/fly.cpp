@@ -9,6 +9,7 @@ namespace chase::perception_stage {
 namespace {
 
 constexpr double kTick = 0.005;        // s between poses
+constexpr int kFrameEvery = 10;        // ticks
 constexpr double kSweepDelay = 0.005;  // s from a sweep's end to its arrival
 
 }  // namespace
@@ -20,33 +21,51 @@ perception::PerceptionConfig ConfigFor(const world::Scenario& scenario) {
   return config;
 }
 
-std::vector<Outcome> Fly(const Stage& stage, const perception::PerceptionConfig& config) {
-  Show show(stage, config.rig);
-  perception::Perceiver perceiver(config);
-  std::vector<Outcome> outcomes;
+void Shoot(const Stage& stage, const world::Rig& rig, const std::function<void(Step&&)>& take) {
+  Show show(stage, rig);
   std::deque<std::pair<double, perception::Sweep>> pending;  // by the time of arrival
   const int ticks = static_cast<int>(stage.options().duration / kTick);
   for (int k = 1; k <= ticks; ++k) {  // a frame sees the pose of 5 ms ago as the newest
-    const double t = k * kTick;
+    Step step;
+    const double t = step.t = step.truth.t = k * kTick;
     if (auto sweep = show.Advance(t)) pending.emplace_back(t + kSweepDelay, std::move(*sweep));
-    for (; !pending.empty() && t >= pending.front().first - 1e-9; pending.pop_front())
-      perceiver.AddSweep(std::move(pending.front().second));
-    if (k % 10 == 0) {
+    if (!pending.empty() && t >= pending.front().first - 1e-9) {
+      step.arrives = std::move(pending.front().second);
+      pending.pop_front();
+    }
+    if (k % kFrameEvery == 0) {
       const Shot shot = show.Image(t);
       const auto target = show.Target(t);
-      Outcome out;
-      const std::clock_t start = std::clock();  // processor time: others use this machine too
-      out.estimate = perceiver.See({t, shot.bgr, {}});
-      out.milliseconds = 1e3 * static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
-      out.t = t;
-      out.visible_share = shot.visible_share;
-      out.truth = target.center;
-      out.velocity = target.velocity;
-      out.range = (target.center - stage.BodyAt(t).p).norm();
-      outcomes.push_back(out);
+      step.bgr = shot.bgr;
+      step.truth.visible_share = shot.visible_share;
+      step.truth.truth = target.center;
+      step.truth.velocity = target.velocity;
+      step.truth.range = (target.center - stage.BodyAt(t).p).norm();
     }
-    perceiver.AddPose(show.Pose(t));
+    step.pose = show.Pose(t);
+    take(std::move(step));
   }
+}
+
+std::optional<Outcome> Play(const Step& step, perception::Perceiver* perceiver) {
+  std::optional<Outcome> out;
+  if (step.arrives) perceiver->AddSweep(*step.arrives);
+  if (!step.bgr.empty()) {
+    out = step.truth;
+    const std::clock_t start = std::clock();  // processor time: others use this machine too
+    out->estimate = perceiver->See({step.t, step.bgr, {}});
+    out->milliseconds = 1e3 * static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
+  }
+  perceiver->AddPose(step.pose);
+  return out;
+}
+
+std::vector<Outcome> Fly(const Stage& stage, const perception::PerceptionConfig& config) {
+  perception::Perceiver perceiver(config);
+  std::vector<Outcome> outcomes;
+  Shoot(stage, config.rig, [&](Step&& step) {
+    if (const auto out = Play(step, &perceiver)) outcomes.push_back(*out);
+  });
   return outcomes;
 }
 

@@ -2,6 +2,8 @@
 
 #include <Eigen/Geometry>
 #include <cstdint>
+#include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -78,6 +80,21 @@ struct Outcome {
 
 /// The config that a flight of this scenario gives perception.
 perception::PerceptionConfig ConfigFor(const world::Scenario& scenario);
+
+/// What a Perceiver gets in one 5 ms step of a flight, and the truth.
+struct Step {
+  double t = 0.0;                            ///< s
+  std::optional<perception::Sweep> arrives;  ///< before the frame
+  cv::Mat bgr;                               ///< a frame, or empty
+  perception::PoseSample pose;               ///< after the frame
+  Outcome truth;                             ///< of the frame; without estimate
+};
+
+/// Hands the steps of a flight to `take` in the order of time.
+void Shoot(const Stage& stage, const world::Rig& rig, const std::function<void(Step&&)>& take);
+
+/// Shows a step to a Perceiver; the outcome where it holds a frame.
+std::optional<Outcome> Play(const Step& step, perception::Perceiver* perceiver);
 
 /// Flies and shows everything to a Perceiver when it would arrive.
 std::vector<Outcome> Fly(const Stage& stage, const perception::PerceptionConfig& config);

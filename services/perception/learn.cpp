@@ -1,0 +1,95 @@
+#include "services/perception/learn.h"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+#include <stdexcept>
+#include <string>
+
+#include "services/perception/color_detector.h"
+#include "services/perception/color_model.h"
+#include "services/perception/silhouette.h"
+
+namespace chase::perception {
+
+namespace {
+
+constexpr double kMostInset = 0.2, kInsetStep = 0.01;  // shares of the width
+
+void Check(const std::vector<cv::Mat>& images, const std::vector<cv::Mat>& masks) {
+  if (images.empty() || images.size() != masks.size())
+    throw std::invalid_argument("give one mask for each image, and at least one of both");
+  for (size_t i = 0; i < images.size(); ++i) {
+    const std::string pair = "pair " + std::to_string(i + 1);
+    if (images[i].type() != CV_8UC3 || masks[i].type() != CV_8UC1)
+      throw std::invalid_argument(pair + ": needs a colour image and a grey mask, 8 bit");
+    if (images[i].size() != masks[i].size())
+      throw std::invalid_argument(pair + ": image and mask differ in size");
+    if (cv::countNonZero(masks[i]) == 0)
+      throw std::invalid_argument(pair + ": the mask marks nothing");
+  }
+}
+
+double Overlap(const cv::Mat& region, const cv::Rect& at, const cv::Mat& mask) {
+  cv::Mat whole = cv::Mat::zeros(mask.size(), CV_8U);
+  region.copyTo(whole(at));
+  const int both = cv::countNonZero((whole > 0) & (mask > 0));
+  const int either = cv::countNonZero((whole > 0) | (mask > 0));
+  return static_cast<double>(both) / either;
+}
+
+/// Aspect and fill of the blobs that the masks mark, as geometric and plain means.
+void LearnShape(const std::vector<cv::Mat>& images, const std::vector<cv::Mat>& masks,
+                DetectorConfig* config) {
+  const ColorDetector detector(*config, 1.0);
+  double log_aspect = 0.0, fill = 0.0;
+  int n = 0;
+  for (size_t i = 0; i < images.size(); ++i) {
+    const auto found = detector.Detect(images[i]);
+    if (found.empty()) continue;
+    const auto overlap = [&](const Detection& d) { return Overlap(d.mask, d.mask_box, masks[i]); };
+    const auto& marked = *std::max_element(
+        found.begin(), found.end(),
+        [&](const Detection& a, const Detection& b) { return overlap(a) < overlap(b); });
+    log_aspect += std::log(marked.box.width / marked.box.height);
+    fill += cv::countNonZero(marked.mask) / marked.box.area();
+    ++n;
+  }
+  if (n == 0) return;
+  config->shape.aspect = std::exp(log_aspect / n);
+  config->shape.fill = fill / n;
+}
+
+double MeanOverlap(const std::vector<cv::Mat>& images, const std::vector<cv::Mat>& masks,
+                   const DetectorConfig& config) {
+  double sum = 0.0;
+  for (size_t i = 0; i < images.size(); ++i) sum += Overlap(config, images[i], masks[i]);
+  return sum / static_cast<double>(images.size());
+}
+
+}  // namespace
+
+double Overlap(const DetectorConfig& config, const cv::Mat& bgr, const cv::Mat& mask) {
+  const auto found = ColorDetector(config, 1.0).Detect(bgr);
+  if (found.empty()) return 0.0;
+  return Overlap(Region(found.front()), found.front().mask_box, mask);
+}
+
+Learned LearnDetector(const std::vector<cv::Mat>& images, const std::vector<cv::Mat>& masks,
+                      const DetectorConfig& base) {
+  Check(images, masks);
+  DetectorConfig config = base;
+  config.kind = "color";
+  config.color.white_balance = false;  // the pictures' own light is in the colours
+  config.color = LearnColor(images, masks, config.color);
+  LearnShape(images, masks, &config);
+  Learned best;
+  for (int i = 0; i * kInsetStep <= kMostInset; ++i) {
+    config.shape.inset = i * kInsetStep;
+    const double overlap = MeanOverlap(images, masks, config);
+    if (i == 0 || overlap > best.overlap) best = {config, overlap};
+  }
+  return best;
+}
+
+}  // namespace chase::perception

@@ -1,0 +1,70 @@
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <fstream>
+#include <opencv2/imgcodecs.hpp>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "common/config/config.h"
+#include "services/perception/learn.h"
+
+namespace chase::perception {
+
+namespace {
+
+cv::Mat Read(const std::string& file, cv::ImreadModes mode) {
+  cv::Mat image = cv::imread(file, mode);
+  if (image.empty()) throw std::runtime_error(file + ": cannot be read as an image");
+  return image;
+}
+
+void Learn(const std::vector<std::string>& files, const std::string& base, const std::string& out) {
+  if (files.size() % 2 != 0)
+    throw std::invalid_argument("--learn-colour: " + std::to_string(files.size()) +
+                                " files; give pairs of IMAGE MASK");
+  PerceptionConfig config;
+  if (!base.empty()) config::Load(base, &config);
+  std::vector<cv::Mat> images, masks;
+  for (size_t i = 0; i < files.size(); i += 2) {
+    images.push_back(Read(files[i], cv::IMREAD_COLOR));
+    masks.push_back(Read(files[i + 1], cv::IMREAD_GRAYSCALE));
+  }
+  const Learned learned = LearnDetector(images, masks, config.detector);
+  config.detector = learned.config;
+  const std::string problem = config.Problem();
+  if (!problem.empty()) throw std::runtime_error("learned " + problem);
+  if (!(std::ofstream(out) << config::Dump(config)))
+    throw std::runtime_error(out + ": cannot be written; name a file in an existing folder");
+  const auto& color = learned.config.color;
+  std::printf(
+      "%s: hue %.0f to %.0f degrees, saturation from %.2f, value from %.2f, inset %.2f; "
+      "mean overlap with the masks %.3f\n",
+      out.c_str(), color.hue_min_deg, color.hue_max_deg, color.saturation_min, color.value_min,
+      learned.config.shape.inset, learned.overlap);
+}
+
+}  // namespace
+
+int LearnColour(int argc, char** argv) {
+  CLI::App app("Learns the target's colour and shape from marked pictures.", "chase-perception");
+  std::vector<std::string> files;
+  std::string base, out = "perception.yaml";
+  app.add_option("--learn-colour", files, "IMAGE MASK [IMAGE MASK ...]; masks not 0 on the target")
+      ->required();
+  app.add_option("--config", base, "YAML file that all else is taken from");
+  app.add_option("--out", out, "config to write, for --config of the service");
+  try {
+    app.parse(argc, argv);
+    Learn(files, base, out);
+    return 0;
+  } catch (const CLI::ParseError& e) {
+    std::fprintf(stderr, "chase-perception: %s; see --learn-colour IMAGE MASK --out YAML\n",
+                 e.what());
+  } catch (const std::exception& e) {
+    std::fprintf(stderr, "chase-perception: %s\n", e.what());
+  }
+  return 1;
+}
+
+}  // namespace chase::perception
