@@ -81,6 +81,38 @@ TEST(MappingTracker, WhatStandsIsNeverListed) {
   }
 }
 
+/// What lies where a mover was expected, and shows no end, keeps no track alive.
+TEST(MappingTracker, WhatShowsNoEndIsNoSight) {
+  Tracker tracker(MoverConfig{});
+  for (double t = 0.0; t < 6.0; t += 0.1) {
+    tracker.Predict(t);
+    std::vector<Cluster> clusters = {BoxCluster({1.5 * t, 0.0}, 0.5, t < 1.5)};
+    tracker.Update(Panorama(), &clusters);
+    if (t > 1.0 && t < 1.4) {
+      EXPECT_EQ(tracker.Obstacles(1.5, 8.0, 1.0).size(), 1u) << t;
+    }
+    if (t > 2.2) {
+      EXPECT_TRUE(tracker.Obstacles(1.5, 8.0, 1.0).empty()) << t;
+    }
+  }
+}
+
+TEST(MappingTracker, HalvesOfOneMoverAreOneTrack) {
+  Tracker tracker(MoverConfig{});
+  for (double t = 0.0; t < 3.0; t += 0.1) {
+    tracker.Predict(t);
+    std::vector<Cluster> clusters = {BoxCluster({2.0 * t - 0.6, 0.0}, 0.5)};
+    if (t < 1.5)
+      clusters.push_back(BoxCluster({2.0 * t + 0.6, 0.0}, 0.5));
+    else  // the gap closes
+      clusters = {BoxCluster({2.0 * t, 0.0}, 1.1)};
+    tracker.Update(Panorama(), &clusters);
+  }
+  const auto obstacles = tracker.Obstacles(1.5, 8.0, 1.0);
+  ASSERT_EQ(obstacles.size(), 1u);
+  EXPECT_NEAR(obstacles[0].center.Velocity(3.0).x(), 2.0, 0.2);
+}
+
 TEST(MappingTracker, NumberOfTracksIsBounded) {
   Tracker tracker(MoverConfig{});
   std::vector<Cluster> clusters;

@@ -1,0 +1,157 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "services/mapping/body_filter.h"
+#include "services/mapping/panorama.h"
+
+namespace chase::mapping {
+namespace {
+
+constexpr double kSigma = 0.04, kUnseen = 0.5, kStep = 0.1;  // m, m, s
+
+/// Reaches of a rectangle about `c`, all ends in view.
+Reaches Box(const Eigen::Vector2d& c, const Eigen::Vector2d& half) {
+  Reaches reaches;
+  for (int k = 0; k < kDirections; ++k) {
+    const Eigen::Vector2d d = Direction(k);
+    reaches[static_cast<size_t>(k)] = {d.dot(c) + half.dot(d.cwiseAbs()), 0.0, true};
+  }
+  return reaches;
+}
+
+TEST(MappingBody, VelocityIsThatOfTheBodyAndItsVarianceIsHonest) {
+  std::mt19937 random(5);
+  std::normal_distribution<double> normal(0.0, 0.03);
+  const Eigen::Vector2d v(1.7, -2.1);
+  double nees = 0.0;
+  int n = 0;
+  for (int flight = 0; flight < 20; ++flight) {
+    BodyFilter body;
+    for (int i = 0; i < 40; ++i) {
+      Reaches seen = Box(i * kStep * v, {1.5, 0.6});
+      for (auto& reach : seen) reach.along += normal(random);
+      if (i == 0) {
+        body = BodyFilter({0.0, 0.0}, seen, 2.5, kUnseen);
+        continue;
+      }
+      body.Predict(kStep, 0.8);
+      body.Correct(seen, kSigma, kUnseen);
+      if (i < 15) continue;
+      EXPECT_LT((body.v() - v).norm(), 0.3) << flight << " " << i;
+      nees += 0.5 * (body.v() - v).squaredNorm() / body.VelocityVariance();
+      ++n;
+    }
+  }
+  EXPECT_LT(nees / n, 1.0);
+}
+
+/// A body at rest, or under way, of which more and more comes into view.
+TEST(MappingBody, WhatComesIntoViewIsNoMotion) {
+  for (const double speed : {0.0, 2.0}) {
+    BodyFilter body;
+    for (int i = 0; i < 30; ++i) {
+      const double hidden = std::max(0.0, 2.0 - 0.1 * i);  // m of 3 m, at the rear
+      Reaches seen = Box({speed * kStep * i + 0.5 * hidden, 0.0}, {1.5 - 0.5 * hidden, 0.6});
+      for (int k = 0; k < kDirections; ++k)
+        if (Direction(k).x() < -0.01) seen[static_cast<size_t>(k)].edge = hidden <= 0.0;
+      if (i == 0) {
+        body = BodyFilter({0.0, 0.0}, seen, 2.5, kUnseen);
+        continue;
+      }
+      body.Predict(kStep, 0.8);
+      EXPECT_GE(body.Correct(seen, kSigma, kUnseen), 9);
+      if (i > 5) {
+        EXPECT_NEAR(body.v().x(), speed, 0.1) << i;
+      }
+    }
+    const Rectangle box = SmallestRectangle(ConvexHull(body.Outline()));
+    EXPECT_NEAR(box.half.x(), 1.5, 0.15);
+    EXPECT_NEAR(box.half.y(), 0.6, 0.15);
+  }
+}
+
+TEST(MappingBody, AnEndThatJumpsIsAnotherOutline) {
+  BodyFilter body({0.0, 0.0}, Box({0.0, 0.0}, {1.0, 0.5}), 2.5, kUnseen);
+  for (int i = 1; i < 40; ++i) {
+    body.Predict(kStep, 0.8);
+    Reaches seen = Box({0.0, 0.0}, {1.0, 0.5});
+    if (i >= 20) seen[0].along += 0.8;  // something joins in front
+    body.Correct(seen, kSigma, kUnseen);
+    if (i > 5) {
+      EXPECT_LT(body.v().norm(), 0.15) << i;
+    }
+  }
+}
+
+TEST(MappingBody, AgesOfReturnsAreTakenBack) {
+  const Eigen::Vector2d v(4.0, 0.0);
+  BodyFilter body;
+  for (int i = 0; i < 30; ++i) {
+    Reaches seen = Box((i * kStep - 0.05) * v, {1.0, 0.5});
+    for (auto& reach : seen) reach.age = 0.05;
+    if (i == 0) body = BodyFilter({0.0, 0.0}, seen, 2.5, kUnseen);
+    if (i == 0) continue;
+    body.Predict(kStep, 0.8);
+    body.Correct(seen, kSigma, kUnseen);
+  }
+  Eigen::Vector2d center = body.p() + SmallestRectangle(ConvexHull(body.Outline())).center;
+  EXPECT_NEAR(center.x(), 29 * kStep * v.x(), 0.12);
+}
+
+TEST(MappingBody, OutlineOfReachesThatContradictIsEmpty) {
+  Reaches seen = Box({0.0, 0.0}, {1.0, 1.0});
+  seen[0].along = -3.0;
+  EXPECT_TRUE(BodyFilter({0.0, 0.0}, seen, 1.0, kUnseen).Outline().empty());
+}
+
+TEST(MappingPanorama, HidesWhatIsBehindAndNotWhatIsBeside) {
+  std::vector<Return> returns(2);
+  returns[0].p = {4.0f, 0.0f, 1.0f};
+  returns[1].p = {0.0f, 9.0f, 1.0f};
+  Panorama panorama;
+  EXPECT_FALSE(panorama.Hides({8.0, 0.0}, -3));  // before the first sweep
+  panorama.Take({0.0, 0.0, 1.5}, returns, {-1, 2});
+  EXPECT_TRUE(panorama.Hides({8.0, 0.0}, 0));
+  EXPECT_TRUE(panorama.Hides({8.0, 0.1}, 0));
+  EXPECT_FALSE(panorama.Hides({8.0, 1.0}, 0));
+  EXPECT_FALSE(panorama.Hides({3.9, 0.0}, 0));
+  EXPECT_TRUE(panorama.Hides({0.0, 12.0}, 1));
+  EXPECT_FALSE(panorama.Hides({0.0, 12.0}, 2));  // its own returns
+  EXPECT_FALSE(panorama.Hides({0.0, 0.0}, 0));
+}
+
+/// A full turn of either sense from any start, seen from a tilted sensor.
+TEST(MappingSweep, AgesFollowTheTurn) {
+  const Eigen::Vector3d origin(3.0, -2.0, 1.0);
+  for (const double sense : {-1.0, 1.0}) {
+    for (const double yaw : {0.0, 2.0, -3.0}) {
+      const Eigen::Quaterniond R(Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()) *
+                                 Eigen::AngleAxisd(0.1, Eigen::Vector3d::UnitY()));
+      std::vector<Eigen::Vector3f> points;
+      for (int i = 0; i <= 720; ++i) {
+        const double a = 1.0 + sense * i * M_PI / 360.0;
+        const Eigen::Vector3d ray(5.0 * std::cos(a), 5.0 * std::sin(a), i % 16 - 8.0);
+        points.push_back((origin + R * ray).cast<float>());
+      }
+      const auto ages = FiringAges(origin, R, points, 0.1);
+      for (int i = 0; i <= 720; i += 40)
+        EXPECT_NEAR(ages[static_cast<size_t>(i)], 0.1 * (1.0 - i / 720.0), 1e-3) << sense << yaw;
+    }
+  }
+}
+
+TEST(MappingSweep, ReturnsInNoOrderHaveNoAges) {
+  std::mt19937 random(2);
+  std::uniform_real_distribution<float> place(-9.0f, 9.0f);
+  std::vector<Eigen::Vector3f> points;
+  for (int i = 0; i < 500; ++i) points.emplace_back(place(random), place(random), 1.0f);
+  points[7].x() = NAN;
+  for (const float age : FiringAges({0, 0, 0}, Eigen::Quaterniond::Identity(), points, 0.1))
+    EXPECT_EQ(age, 0.0f);
+  EXPECT_TRUE(FiringAges({0, 0, 0}, Eigen::Quaterniond::Identity(), {}, 0.1).empty());
+}
+
+}  // namespace
+}  // namespace chase::mapping
