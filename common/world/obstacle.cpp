@@ -14,15 +14,25 @@ double SegmentSquaredDistance(const Eigen::Vector3d& p, const Eigen::Vector3d& q
   return d.dot(R * d);
 }
 
-Eigen::Matrix3d Inflated(const Eigen::Matrix3d& R, double margin) {
-  if (R(0, 1) == 0.0 && R(0, 2) == 0.0 && R(1, 2) == 0.0) {  // the axes are those of the frame
-    const Eigen::Array3d radius = R.diagonal().array().sqrt().inverse() + margin;
-    return radius.square().inverse().matrix().asDiagonal();
+Inflation::Inflation(const Eigen::Matrix3d& R)
+    : aligned_(R(0, 1) == 0.0 && R(0, 2) == 0.0 && R(1, 2) == 0.0) {
+  if (aligned_) {
+    radius_ = R.diagonal().array().sqrt().inverse();
+    return;
   }
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(R);
-  const Eigen::Array3d radius = eigen.eigenvalues().array().rsqrt() + margin;
-  return eigen.eigenvectors() * radius.square().inverse().matrix().asDiagonal() *
-         eigen.eigenvectors().transpose();
+  axes_ = eigen.eigenvectors();
+  radius_ = eigen.eigenvalues().array().sqrt().inverse();
+}
+
+Eigen::Matrix3d Inflation::By(double margin) const {
+  const Eigen::Vector3d inverse = (radius_ + margin).square().inverse();
+  if (aligned_) return inverse.asDiagonal();
+  return axes_ * inverse.asDiagonal() * axes_.transpose();
+}
+
+Eigen::Matrix3d Inflated(const Eigen::Matrix3d& R, double margin) {
+  return Inflation(R).By(margin);
 }
 
 }  // namespace chase::world

@@ -31,4 +31,16 @@ double SegmentSquaredDistance(const Eigen::Vector3d& p, const Eigen::Vector3d& q
 /// The ellipsoid grown by `margin` m along each principal axis (encloses the Minkowski sum's axes).
 Eigen::Matrix3d Inflated(const Eigen::Matrix3d& R, double margin);
 
+/// The same for many margins: axes and radii are worked out once.
+class Inflation {
+ public:
+  explicit Inflation(const Eigen::Matrix3d& R);
+  Eigen::Matrix3d By(double margin) const;
+
+ private:
+  bool aligned_;  ///< the axes are those of the frame
+  Eigen::Matrix3d axes_;
+  Eigen::Array3d radius_;
+};
+
 }  // namespace chase::world

@@ -50,12 +50,25 @@ CandidateTables::CandidateTables(const PlannerConfig& config, int degree_, int s
   smooth.setZero();
   smooth.topLeftCorner(n, n) = config.weight_smooth * (config.rho_acceleration * acceleration +
                                                        config.rho_jerk * Gram(degree, 3, duration));
+  Eigen::MatrixXd H = smooth.block(4, 4, free, free);
+  H.diagonal().array() += 1e-12;
+  const Eigen::LLT<Eigen::MatrixXd> factor(H);
+  root.setZero();
+  best.setZero();
+  root.topLeftCorner(free, free) = Eigen::MatrixXd(factor.matrixU());
+  best.topRows(free) = -factor.solve(Eigen::MatrixXd(smooth.block(4, 0, free, 4)));
+  rest =
+      smooth.topLeftCorner<4, 4>() + smooth.block(4, 0, free, 4).transpose() * best.topRows(free);
+  std::fill(&phi_of[0][0], &phi_of[0][0] + 7 * kPadded, 0.0);
+  std::fill(&slope_of[0][0], &slope_of[0][0] + 7 * kPadded, 0.0);
   for (int k = 0; k < kNodes; ++k)
     for (int i = 0; i < n; ++i) {
       const double x = GaussNodes().tau[k];
       phi[k][i] = Bernstein(degree, i, x);
       slope[k][i] =
           degree / duration * (Bernstein(degree - 1, i - 1, x) - Bernstein(degree - 1, i, x));
+      phi_of[i][k] = phi[k][i];
+      slope_of[i][k] = slope[k][i];
     }
 }
 
@@ -168,31 +181,42 @@ void LimitToReach(const PlannerConfig& config, const CandidateTables& t, double 
 
 namespace {
 
-/// weight[n][j][k] = C(j,k) / C(n,k): share of power coefficient k in control point j.
+/// value[j][k] = C(j,k) / C(n,k): share of power coefficient k in control point j.
+template <int n>
 struct Elevation {
-  double weight[7][7][7];
-  Elevation() : weight() {
-    for (int n = 0; n < 7; ++n)
-      for (int j = 0; j <= n; ++j)
-        for (int k = 0; k <= j; ++k) weight[n][j][k] = math::Binomial(j, k) / math::Binomial(n, k);
+  double value[n + 1][n + 1];
+  constexpr Elevation() : value() {
+    for (int j = 0; j <= n; ++j) {
+      double weight = 1.0;
+      for (int k = 0; k <= j; ++k) {
+        value[j][k] = weight;
+        if (k < j) weight *= static_cast<double>(j - k) / (n - k);
+      }
+    }
   }
 };
-const Elevation kElevation;
+
+template <int n>
+void Elevate(const Curve& power, Points* out) {
+  constexpr Elevation<n> kShare;
+  for (int a = 0; a < 3; ++a) {
+    double c[n + 1] = {}, b[n + 1] = {};
+    for (Eigen::Index k = 0; k < std::min<Eigen::Index>(n + 1, power.rows()); ++k)
+      c[k] = power(k, a);
+#pragma GCC unroll 7
+    for (int k = 0; k <= n; ++k)
+#pragma GCC unroll 7
+      for (int j = k; j <= n; ++j) b[j] += kShare.value[j][k] * c[k];
+    for (int j = 0; j <= n; ++j) (*out)(j, a) = b[j];
+    for (int j = n + 1; j < 7; ++j) (*out)(j, a) = 0.0;
+  }
+}
 
 }  // namespace
 
 Points ToPoints(const Curve& power, int degree) {
-  Points b = Points::Zero();
-  const int rows = static_cast<int>(power.rows());
-  for (int a = 0; a < 3; ++a) {
-    const double* c = power.data() + a * power.rows();
-    for (int j = 0; j <= degree; ++j) {
-      const double* weight = kElevation.weight[degree][j];
-      double sum = 0.0;
-      for (int k = 0; k <= j && k < rows; ++k) sum += weight[k] * c[k];
-      b(j, a) = sum;
-    }
-  }
+  Points b;
+  degree == 5 ? Elevate<5>(power, &b) : Elevate<6>(power, &b);
   return b;
 }
 

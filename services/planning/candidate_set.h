@@ -21,12 +21,27 @@ struct CandidateTables {
   Eigen::Matrix<double, Eigen::Dynamic, 4, 0, 3, 4> fixed;
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 3, 8> pull;
   Eigen::Matrix<double, 7, 7> smooth;  ///< w1 J1 = sum over axes b' smooth b
-  double phi[kNodes][7];               ///< Bernstein polynomials at the quadrature nodes
-  double slope[kNodes][7];             ///< and their derivatives with respect to t, 1/s
+  /// w1 J1 = |root (x - best b)|^2 + b' rest b over the free points x of an axis, b its first four.
+  Eigen::Matrix3d root;               ///< upper triangular
+  Eigen::Matrix<double, 3, 4> best;   ///< what makes J1 least
+  Eigen::Matrix4d rest;               ///< w1 J1 there = b' rest b
+  double phi[kNodes][7];              ///< Bernstein polynomials at the quadrature nodes
+  double slope[kNodes][7];            ///< and their derivatives with respect to t, 1/s
+  static constexpr int kPadded = 24;  ///< nodes, the rest zero
+  double phi_of[7][kPadded], slope_of[7][kPadded];  ///< the same by polynomial
 
   CandidateTables() = default;
   CandidateTables(const PlannerConfig& config, int degree, int steps, double duration);
 };
+
+/// sum += table' b over the points first..last of one axis: values at all nodes.
+inline void AddAtNodes(const double (*table)[CandidateTables::kPadded], const Points& b, int first,
+                       int last, int axis, double* sum) {
+  for (int i = first; i <= last; ++i) {
+    const double x = b(i, axis);
+    for (int k = 0; k < CandidateTables::kPadded; ++k) sum[k] += table[i][k] * x;
+  }
+}
 
 /// The tables that were asked for last.
 class TableShelf {
@@ -59,7 +74,7 @@ bool MayTouch(const Box& box, const Curve& center, const Eigen::Matrix3d& R, dou
 void LimitToReach(const PlannerConfig& config, const CandidateTables& tables, double beyond,
                   Problem* problem);
 
-/// Control points of the curve at the given degree.
+/// Control points of the curve at degree 5 or 6.
 Points ToPoints(const Curve& power, int degree);
 Curve ToPower(const Points& points, int degree);
 

@@ -117,7 +117,7 @@ struct ProofInput {
 
 /// What the skeletons of one step, or of several, add to the free control points (3 f + axis), and
 /// from kWhitened on, whitened, to the root of J1.
-constexpr int kWhitened = 12, kRecord = 24;
+constexpr int kWhitened = 16, kRecord = 32;
 
 struct CandidateInput {
   const double* records;  ///< [step][choice][kRecord]
@@ -126,6 +126,7 @@ struct CandidateInput {
   double base[kRecord];         ///< without skeletons
   const float* first_whitened;  ///< [3 (M - 3)][row], of the first step
   float j1_offset;              ///< J1 = j1_offset + |whitened|^2
+  double longest2;              ///< prefixes whose |whitened|^2 is above get infinite J1
 };
 
 constexpr int kPaddedNodes = 24;  // quadrature nodes; the padding weighs nothing

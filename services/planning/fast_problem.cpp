@@ -7,6 +7,7 @@
 namespace chase::planning {
 
 using kernels::kPad;
+using kernels::kRecord;
 
 namespace {
 
@@ -14,8 +15,10 @@ int Padded(int n) { return (n + kPad - 1) / kPad * kPad; }
 
 }  // namespace
 
-bool FastProblem::Set(const Problem& problem, const PlanProof& proof) {
+bool FastProblem::Set(const Problem& problem, const PlanProof& proof, float limit) {
   problem_ = &problem;
+  proof_ = &proof;
+  has_obstacles_ = false;
   const int M = problem.degree;
   if (!proof.IsUsable() || problem.target.rows() > M + 1 || problem.skeletons.empty() ||
       problem.skeletons.size() > 8 || problem.n_candidates() < 1)
@@ -27,7 +30,6 @@ bool FastProblem::Set(const Problem& problem, const PlanProof& proof) {
   const int steps = static_cast<int>(problem.skeletons.size());
   tables_ = &shelf_.Get(M, steps, problem.duration);
   if (!SetCandidates()) return false;
-  SetShapes(proof);
   kernels::Context& c = context_;
   c.degree = M;
   c.n_candidates = n_;
@@ -42,10 +44,15 @@ bool FastProblem::Set(const Problem& problem, const PlanProof& proof) {
   c.yaw_floor = static_cast<float>(kYawDistanceFloor * kYawDistanceFloor);
   c.cost_range = static_cast<float>(config_.cost_range);
   c.exact = config_.exact_visibility ? 1 : 0;
-  if (blocked_) return true;
   SetNodes();
-  Generate();
+  Generate(limit);
   return true;
+}
+
+bool FastProblem::SetObstacles() {
+  if (!has_obstacles_) SetShapes(*proof_);
+  has_obstacles_ = true;
+  return !blocked_;
 }
 
 bool FastProblem::SetCandidates() {
@@ -57,40 +64,72 @@ bool FastProblem::SetCandidates() {
   start.row(0) -= origin_.transpose();
   target_ = ToPoints(target, M);
   start_ = ToPoints(start, M);
-  double largest = 0.0;
+  largest_ = 0.0;
   for (int f = 0; f < free_; ++f)
     for (int a = 0; a < 3; ++a) {
       double sum = 0.0;
       for (int i = 0; i < 4; ++i) sum += tables_->fixed(f, i) * start_(i, a);
-      base_[3 * f + a] = low_(f, a) = high_(f, a) = sum;
-      largest = std::max(largest, std::abs(sum));
+      base_[3 * f + a] = sum;
+      largest_ = std::max(largest_, std::abs(sum));
     }
+  SetRecords();
+  reach_ =
+      std::max({start_.topRows(4).cwiseAbs().maxCoeff(), target_.cwiseAbs().maxCoeff(), largest_});
+  return reach_ < 1e4;
+}
+
+// What each skeleton adds to the free points: it pulls all axes alike.
+void FastProblem::SetRecords() {
+  const Problem& p = *problem_;
   choices_.clear();
-  pulls_.clear();
+  size_t n_records = 0;
+  for (const auto& choices : p.skeletons) n_records += choices.size();
+  records_.assign(n_records * kRecord, 0.0);
+  double* record = records_.data();
   for (size_t n = 0; n < p.skeletons.size(); ++n) {
     choices_.push_back(static_cast<int>(p.skeletons[n].size()));
-    double low[9], high[9], top = 0.0;
+    double pull[3] = {}, whitened[3] = {}, strongest = 0.0, farthest = 0.0;
+    for (int f = 0; f < free_; ++f) {
+      pull[f] = tables_->pull(f, static_cast<Eigen::Index>(n));
+      strongest = std::max(strongest, std::abs(pull[f]));
+    }
+    for (int f = 0; f < free_; ++f)
+      for (int g = f; g < free_; ++g) whitened[f] += tables_->root(f, g) * pull[g];
+    for (const Eigen::Vector3d& u : p.skeletons[n]) {
+      const Eigen::Vector3d r = u - origin_;
+      for (int a = 0; a < 3; ++a) {
+        farthest = std::max(farthest, std::abs(r[a]));
+        for (int f = 0; f < free_; ++f) {
+          record[3 * f + a] = pull[f] * r[a];
+          record[kernels::kWhitened + 3 * f + a] = whitened[f] * r[a];
+        }
+      }
+      record += kRecord;
+    }
+    largest_ += strongest * farthest;
+  }
+}
+
+// Ranges of the free points.
+void FastProblem::SetRanges() {
+  const int nx = 3 * free_;
+  std::copy(base_, base_ + nx, low_);
+  std::copy(base_, base_ + nx, high_);
+  const double* record = records_.data();
+  for (const int choices : choices_) {
+    double low[9], high[9];
     std::fill(low, low + 9, HUGE_VAL);
     std::fill(high, high + 9, -HUGE_VAL);
-    for (const Eigen::Vector3d& u : p.skeletons[n])
-      for (int f = 0; f < free_; ++f)
-        for (int a = 0; a < 3; ++a) {
-          const double pull = tables_->pull(f, static_cast<int>(n)) * (u[a] - origin_[a]);
-          pulls_.push_back(pull);
-          low[3 * f + a] = std::min(low[3 * f + a], pull);
-          high[3 * f + a] = std::max(high[3 * f + a], pull);
-          top = std::max(top, std::abs(pull));
-        }
-    largest += top;
-    for (int f = 0; f < free_; ++f)
-      for (int a = 0; a < 3; ++a) {
-        low_(f, a) += low[3 * f + a];
-        high_(f, a) += high[3 * f + a];
+    for (int s = 0; s < choices; ++s, record += kRecord)
+      for (int k = 0; k < nx; ++k) {
+        low[k] = std::min(low[k], record[k]);
+        high[k] = std::max(high[k], record[k]);
       }
+    for (int k = 0; k < nx; ++k) {
+      low_[k] += low[k];
+      high_[k] += high[k];
+    }
   }
-  reach_ =
-      std::max({start_.topRows(4).cwiseAbs().maxCoeff(), target_.cwiseAbs().maxCoeff(), largest});
-  return reach_ < 1e4;
 }
 
 void FastProblem::SetShapeInput(const PlanProof& proof, kernels::ShapeInput* in) {
@@ -107,9 +146,9 @@ void FastProblem::SetShapeInput(const PlanProof& proof, kernels::ShapeInput* in)
     for (int i = 0; i <= M; ++i) in->target[i][a] = static_cast<float>(target_(i, a));
     for (int i = 0; i < 4; ++i) in->fixed[i][a] = static_cast<float>(start_(i, a));
     for (int f = 0; f < free_; ++f) {
-      in->mid[f][a] = static_cast<float>(0.5 * (low_(f, a) + high_(f, a)));
-      in->half[f][a] =
-          static_cast<float>(0.5 * (high_(f, a) - low_(f, a)) * (1 + 1e-6) + 1e-6 * reach_ + 1e-6);
+      in->mid[f][a] = static_cast<float>(0.5 * (low_[3 * f + a] + high_[3 * f + a]));
+      in->half[f][a] = static_cast<float>(0.5 * (high_[3 * f + a] - low_[3 * f + a]) * (1 + 1e-6) +
+                                          1e-6 * reach_ + 1e-6);
     }
   }
   const double weight = config_.weight_obstacle * problem_->duration *
@@ -122,8 +161,8 @@ void FastProblem::SetShapeInput(const PlanProof& proof, kernels::ShapeInput* in)
       double mid = 0.0, half = 0.0;
       for (int i = 0; i < 4; ++i) mid += tables_->phi[k][i] * start_(i, a);
       for (int f = 0; f < free_; ++f) {
-        mid += tables_->phi[k][4 + f] * 0.5 * (low_(f, a) + high_(f, a));
-        half += tables_->phi[k][4 + f] * 0.5 * (high_(f, a) - low_(f, a));
+        mid += tables_->phi[k][4 + f] * 0.5 * (low_[3 * f + a] + high_[3 * f + a]);
+        half += tables_->phi[k][4 + f] * 0.5 * (high_[3 * f + a] - low_[3 * f + a]);
       }
       in->node_mid[k][a] = static_cast<float>(mid);
       in->node_half[k][a] = static_cast<float>(half + 1e-5);
@@ -132,6 +171,7 @@ void FastProblem::SetShapeInput(const PlanProof& proof, kernels::ShapeInput* in)
 }
 
 void FastProblem::SetShapes(const PlanProof& proof) {
+  SetRanges();
   const Problem& p = *problem_;
   const int columns = proof.padded();
   const auto n = static_cast<size_t>(columns);
@@ -207,56 +247,47 @@ void FastProblem::SetOrder(const PlanProof& proof) {
   context_.n_rows = static_cast<int>(order_.size());
 }
 
-// w1 J1 = sum over axes of (x - x*)' H (x - x*) + rest, H = U' U: `whitened` is U (x - x*).
-void FastProblem::Generate() {
+void FastProblem::Generate(float limit) {
   const int nx = 3 * free_, first = choices_[0], row = Padded(first);
-  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 3, 3> H =
-      tables_->smooth.block(4, 4, free_, free_);
-  H.diagonal().array() += 1e-12;
-  const Eigen::LLT<decltype(H)> llt(H);
-  const decltype(H) U = llt.matrixU();
-  const auto whiten = [&](const double* x, double* out) {
-    for (int f = 0; f < free_; ++f)
-      for (int a = 0; a < 3; ++a) {
-        double sum = 0.0;
-        for (int g = f; g < free_; ++g) sum += U(f, g) * x[3 * g + a];
-        out[3 * f + a] = sum;
-      }
-  };
   kernels::CandidateInput in{};
-  double offset = 0.0, local[9];
+  std::copy(base_, base_ + nx, in.base);
+  double offset = 0.0;
   for (int a = 0; a < 3; ++a) {
     const Eigen::Vector4d b = start_.col(a).head<4>();
-    const Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 3, 1> h =
-        tables_->smooth.block(4, 0, free_, 4) * b;
-    const Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 3, 1> best = -llt.solve(h);
-    offset += b.dot(tables_->smooth.topLeftCorner<4, 4>() * b) + h.dot(best);
-    for (int f = 0; f < free_; ++f) local[3 * f + a] = base_[3 * f + a] - best[f];
+    const Eigen::Vector3d best = tables_->best * b;
+    offset += b.dot(tables_->rest * b);
+    for (int f = 0; f < free_; ++f) {
+      double& whitened = in.base[kernels::kWhitened + 3 * f + a];
+      for (int g = f; g < free_; ++g)
+        whitened += tables_->root(f, g) * (base_[3 * g + a] - best[g]);
+    }
   }
   in.j1_offset = static_cast<float>(std::max(0.0, offset));
-  std::copy(base_, base_ + nx, in.base);
-  whiten(local, in.base + kernels::kWhitened);
-  const size_t n_records = pulls_.size() / static_cast<size_t>(nx);
-  records_.assign(n_records * kernels::kRecord, 0.0);
-  for (size_t r = 0; r < n_records; ++r) {
-    const double* pull = &pulls_[r * static_cast<size_t>(nx)];
-    double* record = &records_[r * kernels::kRecord];
-    std::copy(pull, pull + nx, record);
-    whiten(pull, record + kernels::kWhitened);
-  }
   first_.assign(static_cast<size_t>(2 * nx * row), 0.0f);
   float* const whitened = &first_[static_cast<size_t>(nx * row)];
-  for (int s = 0; s < first; ++s)
+  double longest2 = 0.0;
+  for (int s = 0; s < first; ++s) {
+    const double* record = &records_[static_cast<size_t>(s) * kRecord];
+    double length2 = 0.0;
     for (int k = 0; k < nx; ++k) {
-      const double* record = &records_[static_cast<size_t>(s) * kernels::kRecord];
+      const double w = record[kernels::kWhitened + k];
+      length2 += w * w;
       first_[static_cast<size_t>(k * row + s)] = static_cast<float>(record[k]);
-      whitened[k * row + s] = static_cast<float>(record[kernels::kWhitened + k]);
+      whitened[k * row + s] = static_cast<float>(w);
     }
-  prefix_.resize(static_cast<size_t>(n_ / first) * kernels::kRecord);
+    longest2 = std::max(longest2, length2);
+  }
+  prefix_.resize(static_cast<size_t>(n_ / first) * kRecord);
   in.records = records_.data();
   in.choices = choices_.data();
   in.steps = static_cast<int>(choices_.size());
   in.first_whitened = whitened;
+  // A prefix longer than this, whitened, has no candidate below the limit.
+  in.longest2 = HUGE_VAL;
+  if (limit < HUGE_VALF) {
+    const double most = std::sqrt(longest2) + std::sqrt(std::max(0.0, limit - offset));
+    in.longest2 = 1.002 * most * most + 1e-3;
+  }
   kernels::Context& c = context_;
   c.prefix = prefix_.data();
   c.first = first_.data();
@@ -275,21 +306,24 @@ void FastProblem::SetNodes() {
       c.phi[k][f] = static_cast<float>(tables_->phi[k][4 + f]);
       c.slope[k][f] = static_cast<float>(tables_->slope[k][4 + f]);
     }
-    for (int a = 0; a < 3; ++a) {
-      double p = 0.0, q = 0.0, v = 0.0, w = 0.0;
-      for (int i = 0; i <= problem_->degree; ++i) {
-        q += tables_->phi[k][i] * target_(i, a);
-        w += tables_->slope[k][i] * target_(i, a);
-        if (i >= 4) continue;
-        p += tables_->phi[k][i] * start_(i, a);
-        v += tables_->slope[k][i] * start_(i, a);
-      }
-      c.rel[k][a] = static_cast<float>(p - q);
-      c.target[k][a] = static_cast<float>(q);
-      if (a < 2) c.rel_rate[k][a] = static_cast<float>(v - w);
-    }
     c.weight3[k] = static_cast<float>(config_.weight_distance * T * GaussNodes().weight[k]);
     c.weight4[k] = static_cast<float>(config_.weight_yaw * T * GaussNodes().weight[k]);
+  }
+  constexpr int kPadded = CandidateTables::kPadded;
+  const int M = problem_->degree;
+  for (int a = 0; a < 3; ++a) {
+    double p[kPadded] = {}, q[kPadded] = {}, v[kPadded] = {}, w[kPadded] = {};
+    AddAtNodes(tables_->phi_of, start_, 0, 3, a, p);
+    AddAtNodes(tables_->phi_of, target_, 0, M, a, q);
+    if (a < 2) {
+      AddAtNodes(tables_->slope_of, start_, 0, 3, a, v);
+      AddAtNodes(tables_->slope_of, target_, 0, M, a, w);
+    }
+    for (int k = 0; k < kNodes; ++k) {
+      c.rel[k][a] = static_cast<float>(p[k] - q[k]);
+      c.target[k][a] = static_cast<float>(q[k]);
+      if (a < 2) c.rel_rate[k][a] = static_cast<float>(v[k] - w[k]);
+    }
   }
 }
 
@@ -299,8 +333,8 @@ void FastProblem::AliveGroups(std::vector<int>* groups) {
   for (int k = 0; k < nx; ++k) {
     double low = HUGE_VAL, high = -HUGE_VAL;
     for (int s = 0; s < first; ++s) {
-      low = std::min(low, pulls_[static_cast<size_t>(s * nx + k)]);
-      high = std::max(high, pulls_[static_cast<size_t>(s * nx + k)]);
+      low = std::min(low, records_[static_cast<size_t>(s) * kRecord + static_cast<size_t>(k)]);
+      high = std::max(high, records_[static_cast<size_t>(s) * kRecord + static_cast<size_t>(k)]);
     }
     mid[k] = static_cast<float>(0.5 * (low + high));
     half[k] = static_cast<float>(0.5 * (high - low) * (1 + 1e-5) + 1e-6);
@@ -333,10 +367,10 @@ Points FastProblem::PointsOf(int index) const {
   std::copy(base_, base_ + nx, z);
   size_t at = 0;
   for (int choices : choices_) {
-    const double* pull = &pulls_[at + static_cast<size_t>((index % choices) * nx)];
-    for (int k = 0; k < nx; ++k) z[k] += pull[k];
+    const double* record = &records_[(at + static_cast<size_t>(index % choices)) * kRecord];
+    for (int k = 0; k < nx; ++k) z[k] += record[k];
     index /= choices;
-    at += static_cast<size_t>(choices * nx);
+    at += static_cast<size_t>(choices);
   }
   Points b = start_;
   for (int f = 0; f < free_; ++f)

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <vector>
 
 #include "services/planning/candidate_set.h"
@@ -16,14 +17,18 @@ class FastProblem {
   FastProblem(const PlannerConfig& config, const kernels::Table& kernels)
       : config_(config), kernels_(kernels), shelf_(config) {}
 
-  /// False where the kernels do not apply: degrees above 6, more than 8 steps, shapes that are not
-  /// positive definite, coordinates beyond 10 km. `proof` has been reset to the problem.
-  bool Set(const Problem& problem, const PlanProof& proof);
+  /// The candidates and what they cost without J2. False where the kernels do not apply: degrees
+  /// above 6, more than 8 steps, shapes that are not positive definite, coordinates beyond 10 km.
+  /// `proof` has been reset to the problem and is kept.
+  /// Costs J1 above `limit` may be missing (infinite) until SetAllCosts.
+  bool Set(const Problem& problem, const PlanProof& proof, float limit = HUGE_VALF);
+  void SetAllCosts() { Generate(HUGE_VALF); }
+  /// The obstacles, once a problem; before costs of obstacles or feasibility are asked for. False
+  /// when the target is inside a shape while sight is asked: nothing is feasible.
+  bool SetObstacles();
 
   kernels::Context& context() { return context_; }
   int n_candidates() const { return n_; }
-  /// True when the target is inside a shape while sight is asked: nothing is feasible.
-  bool IsBlocked() const { return blocked_; }
 
   /// Candidates that differ in the first step only come in groups, `first_choices` a group, in the
   /// order of their indices: those of groups that may hold feasible ones, ascending.
@@ -40,25 +45,29 @@ class FastProblem {
   void SetShapeInput(const PlanProof& proof, kernels::ShapeInput* in);
   void SetOrder(const PlanProof& proof);
   void SetNodes();
-  void Generate();
+  void SetRecords();
+  void SetRanges();
+  void Generate(float limit);
   double ObstacleCost(int node, const double* p) const;
 
   PlannerConfig config_;
   const kernels::Table& kernels_;
   const Problem* problem_ = nullptr;
+  const PlanProof* proof_ = nullptr;
   TableShelf shelf_;
   const CandidateTables* tables_ = nullptr;
   kernels::Context context_{};
 
   int n_ = 0, free_ = 0, n_shapes_ = 0;
   Eigen::Vector3d origin_;
-  Points start_, target_;                   // local control points; of the start rows 0..3
-  std::vector<double> pulls_;               // [step][choice][3 free]: pull of each skeleton
-  std::vector<int> choices_;                // per step
-  double base_[9];                          // free points without skeletons
-  Eigen::Matrix<double, 3, 3> low_, high_;  // of the free points, rows f
-  double reach_ = 0.0;                      // bounds coordinates and their parts
-  bool blocked_ = false;
+  Points start_, target_;        // local control points; of the start rows 0..3
+  std::vector<double> records_;  // [step][choice][kRecord]: see kernels::CandidateInput
+  std::vector<int> choices_;     // per step
+  double base_[9];               // free points without skeletons
+  double low_[9], high_[9];      // of the free points
+  double largest_ = 0.0;
+  double reach_ = 0.0;  // bounds coordinates and their parts
+  bool blocked_ = false, has_obstacles_ = false;
 
   std::vector<kernels::Row> rows_;
   std::vector<int> obstacle_of_;  // row -> obstacle
@@ -68,7 +77,6 @@ class FastProblem {
   int near_begin_[kernels::kQuadratureNodes + 1];
   std::vector<kernels::Shadow> shadows_;
   std::vector<int> order_, states_;
-  std::vector<double> records_;
   std::vector<float> j1_, work_, prefix_, first_;
   std::vector<uint32_t> alive_;
 };

@@ -26,16 +26,18 @@ class FastSearch : public Search {
   using Search::Best;
   Found Best(const Problem& problem, double sight_from, double bound, PlanProof* proof) override {
     proof_ = proof;
-    if (!fast_.Set(problem, *proof)) return fallback_->Best(problem, sight_from, bound, proof);
+    if (!fast_.Set(problem, *proof, static_cast<float>(1.001 * bound)))
+      return fallback_->Best(problem, sight_from, bound, proof);
     problem_ = &problem;
     bound_ = static_cast<float>(bound);
     Found found;
     found.generated = fast_.n_candidates();
     refused_.clear();
+    checked_ = feasible_ = 0;
     int winner = -1;
     // The winner stands on single-precision tests until it is proven; when that fails, the next
     // best follows.
-    while (!fast_.IsBlocked()) {
+    while (bound_ < HUGE_VALF || fast_.SetObstacles()) {
       winner = Run();
       if (winner < 0 || proof_->Holds(fast_.PlanOf(winner))) break;
       refused_.push_back(winner);
@@ -236,9 +238,10 @@ bool FastSearch::PruneAll() {
   Weigh(-1.0f, Limit());
   if (heap_.size() > kFew) {
     heap_.clear();
+    fast_.SetAllCosts();
     return false;
   }
-  Drain(1 << 30);
+  if (!heap_.empty() && fast_.SetObstacles()) Drain(1 << 30);
   return true;
 }
 
@@ -250,6 +253,7 @@ int FastSearch::Run() {
   accepted_.clear();
   heap_.clear();
   if (bound_ < HUGE_VALF && PruneAll()) return CheapestAccepted();
+  if (!fast_.SetObstacles()) return -1;
   // Most promising by J1: a sample of 256 tells the value that about 1 in 32 stays below.
   const int wanted = std::min(n, std::max(64, n / 32)), samples = std::min(256, n);
   float sample[256];

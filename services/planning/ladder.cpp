@@ -42,7 +42,7 @@ class Ladder : public Planner {
 
   PlanResult Plan(const PlanRequest& request) override {
     std::string notes;
-    problem_ = MakeProblem(config_, request, &notes);
+    MakeProblem(config_, request, &notes, &problem_);
     used_ = &problem_;
     PlanResult result;
     if (!TryChase(request, &notes, &result) && !TryKeep(request, &result) &&
@@ -114,20 +114,18 @@ class Ladder : public Planner {
   // The plan has been certified; moves it downhill as far as it stays so.
   void Refine(Choice* choice) {
     if (!refinable_) return;
+    constexpr int kSteps = 4;
     Choice better = *choice;
     better.index = -1;
-    if (refiner_.Improve(&better.plan, &better.cost)) *choice = better;
+    if (refiner_.Improve(kSteps, &better.plan, &better.cost)) *choice = better;
   }
 
   // The running plan refined, or as it is; none where it does not hold.
   std::optional<Choice> Certified(const Problem& problem, const Curve& carried) {
+    constexpr int kSteps = 2;  // more follow with the next plan
     Choice choice{carried, {}};
-    if (refiner_.Leap(&choice.plan, &choice.cost)) return choice;
-    choice.plan = carried;
+    if (refiner_.Improve(kSteps, &choice.plan, &choice.cost)) return choice;
     if (!proof_.Holds(carried, false) || !KeepsLimits(carried, problem)) return std::nullopt;
-    Choice better = choice;
-    if (refiner_.Creep(&better.plan, &better.cost)) return better;
-    choice.cost = Evaluate(config_, problem, carried);
     return choice;
   }
 
@@ -194,7 +192,7 @@ class Ladder : public Planner {
     if (horizon == request.horizon) return &problem_;
     PlanRequest shorter = request;
     shorter.horizon = horizon;
-    shorter_ = MakeProblem(config_, shorter, notes);
+    MakeProblem(config_, shorter, notes, &shorter_);
     return &shorter_;
   }
 

@@ -16,9 +16,14 @@ constexpr double kLeaveBy = 0.25;  // tau by which a plan has left an obstacle t
 
 double SquaredNorm(const Eigen::Matrix3d& R, const Eigen::Vector3d& x) { return x.dot(R * x); }
 
-Eigen::Matrix3d Grown(const Eigen::Matrix3d& R, double margin) {
-  return margin > 0.0 ? world::Inflated(R, margin) : R;
-}
+// The obstacle's own shape, and grown.
+struct Shape {
+  const Eigen::Matrix3d& R;
+  world::Inflation inflation;
+
+  explicit Shape(const Eigen::Matrix3d& R_) : R(R_), inflation(R_) {}
+  Eigen::Matrix3d Grown(double margin) const { return margin > 0.0 ? inflation.By(margin) : R; }
+};
 
 // Encloses the ellipsoid and all balls of radius `room` about its points: the inverse of the shape
 // is (1 + s) (R^-1 + room^2 / s) for any s > 0; this s is tight across the axis of upright shapes.
@@ -66,13 +71,13 @@ void Note(std::string* notes, const std::string& text) {
   *notes += text;
 }
 
-void SetSafetyShape(const PlannerConfig& config, const world::Obstacle& o, const Problem& problem,
-                    Ellipsoid* e, std::string* notes) {
+void SetSafetyShape(const PlannerConfig& config, const world::Obstacle& o, const Shape& shape,
+                    const Problem& problem, Ellipsoid* e, std::string* notes) {
   const double margin =
       config.drone_radius + config.safety_margin + Uncertainty(config, o, problem.duration);
-  const Eigen::Vector3d offset = Evaluate(problem.start, 0.0) - Evaluate(e->center, 0.0);
+  const Eigen::Vector3d offset = (problem.start.row(0) - e->center.row(0)).transpose();
   for (double share : kShares) {
-    e->safety = Grown(o.shape, share * margin);
+    e->safety = shape.Grown(share * margin);
     if (SquaredNorm(e->safety, offset) > (share > 0.0 ? kClear : 1.0)) {
       if (share < 1.0) Note(notes, "starts within the margin of obstacle " + std::to_string(e->id));
       return;
@@ -82,11 +87,11 @@ void SetSafetyShape(const PlannerConfig& config, const world::Obstacle& o, const
   Note(notes, "starts inside obstacle " + std::to_string(e->id));
 }
 
-void SetSightShape(const PlannerConfig& config, const world::Obstacle& o, double target_growth,
+void SetSightShape(const PlannerConfig& config, const Shape& shape, double target_growth,
                    const Hull& target, Ellipsoid* e, std::string* notes) {
   const double margin = config.sight_margin + target_growth;
   for (double share : kShares) {
-    e->sight = Grown(o.shape, share * margin);
+    e->sight = shape.Grown(share * margin);
     if (IsPlainlyOutside(target, e->center, e->sight)) return;
     if (margin == 0.0 || StaysOutside(target.curve, e->center, e->sight, kClear)) break;
   }
@@ -99,10 +104,12 @@ void SetEllipsoid(const PlannerConfig& config, const PlanRequest& request, const
                   const world::Obstacle& o, const Problem& problem, Ellipsoid* e,
                   std::string* notes) {
   e->id = o.id;
+  e->safety_from = e->sight_from = 0.0;
   e->center = ToCurve(o.center, request.t0, request.horizon);
-  SetSafetyShape(config, o, problem, e, notes);
+  const Shape shape(o.shape);
+  SetSafetyShape(config, o, shape, problem, e, notes);
   const double growth = std::min(config.max_inflation, config.sigmas * request.target_sigma);
-  SetSightShape(config, o, growth, target, e, notes);
+  SetSightShape(config, shape, growth, target, e, notes);
 }
 
 // Limits that the start already breaks give way to just above what it has: the plan may not get
@@ -142,19 +149,25 @@ int Problem::n_candidates() const {
   return n;
 }
 
+void MakeProblem(const PlannerConfig& config, const PlanRequest& request, std::string* notes,
+                 Problem* problem) {
+  problem->duration = request.horizon;
+  problem->degree = config.degree;
+  problem->start = StartCurve(request.start, request.horizon);
+  problem->target = ToCurve(request.target, request.t0, request.horizon);
+  problem->limits = MakeLimits(config, request.start, problem->target.row(0).transpose());
+  problem->skeletons.clear();
+  problem->reach.reset();
+  problem->obstacles.resize(request.obstacles.size());
+  const Hull target(problem->target);
+  for (size_t j = 0; j < request.obstacles.size(); ++j)
+    SetEllipsoid(config, request, target, request.obstacles[j], *problem, &problem->obstacles[j],
+                 notes);
+}
+
 Problem MakeProblem(const PlannerConfig& config, const PlanRequest& request, std::string* notes) {
   Problem problem;
-  problem.duration = request.horizon;
-  problem.degree = config.degree;
-  problem.start = StartCurve(request.start, request.horizon);
-  problem.target = ToCurve(request.target, request.t0, request.horizon);
-  problem.limits = MakeLimits(config, request.start, problem.target.row(0).transpose());
-  problem.obstacles.reserve(request.obstacles.size());
-  const Hull target(problem.target);
-  for (const world::Obstacle& o : request.obstacles) {
-    problem.obstacles.emplace_back();
-    SetEllipsoid(config, request, target, o, problem, &problem.obstacles.back(), notes);
-  }
+  MakeProblem(config, request, notes, &problem);
   return problem;
 }
 
@@ -189,7 +202,7 @@ Curve ToCurve(const world::Trajectory& trajectory, double start, double duration
   Curve c = trajectory.coefficients;
   const double a = (start - trajectory.start) / trajectory.duration;
   const double b = duration / trajectory.duration;
-  if (a == 0.0 && b == 1.0) return c;
+  if (c.rows() == 1 || (a == 0.0 && b == 1.0)) return c;
   c.setZero();
   const Eigen::Index n = c.rows() - 1;
   for (Eigen::Index k = n; k >= 0; --k) {

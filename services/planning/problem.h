@@ -59,6 +59,9 @@ struct Problem {
 /// breaks; `notes` gets one clause for each such relaxation that weakens the certificate. Leaves
 /// the skeletons empty.
 Problem MakeProblem(const PlannerConfig& config, const PlanRequest& request, std::string* notes);
+/// The same in the memory of an earlier problem.
+void MakeProblem(const PlannerConfig& config, const PlanRequest& request, std::string* notes,
+                 Problem* problem);
 
 /// The problem with the obstacles near its reach (all, where there is none) only, enlarged by
 /// `room` m to all sides where the start and the target stay outside; without skeletons.

@@ -8,7 +8,6 @@
 namespace chase::planning {
 namespace {
 
-constexpr int kSteps = 4;
 constexpr double kLeast = 2e-4;  // relative gain of a step that is worth another
 constexpr double kDamping = 1e-6;
 
@@ -79,24 +78,24 @@ void Refiner::SetObjective() {
       for (int i = 0; i < 4; ++i) in.pull[f][a] += tables_->smooth(4 + f, i) * start_(i, a);
     }
   }
-  for (int k = 0; k < kernels::kPaddedNodes; ++k) {
-    const bool real = k < kNodes;
-    in.weight[k] = real ? problem_->duration * GaussNodes().weight[k] : 0.0;
-    for (int f = 0; f < free_; ++f) {
-      in.phi[f][k] = real ? tables_->phi[k][4 + f] : 0.0;
-      in.slope[f][k] = real ? tables_->slope[k][4 + f] : 0.0;
-    }
-    for (int a = 0; a < 3; ++a) {
-      double p = 0.0, q = real ? 0.0 : 1.0, v = 0.0;
-      for (int i = 0; real && i <= M; ++i) {
-        if (i < 4) p += tables_->phi[k][i] * start_(i, a);
-        q += tables_->phi[k][i] * their(i, a);
-        v += tables_->slope[k][i] * ((i < 4 ? start_(i, a) : 0.0) - their(i, a));
-      }
-      in.at[a][k] = p;
-      in.rel[a][k] = p - q;
-      if (a < 2) in.rate[a][k] = v;
-    }
+  for (int k = 0; k < kernels::kPaddedNodes; ++k)
+    in.weight[k] = k < kNodes ? problem_->duration * GaussNodes().weight[k] : 0.0;
+  std::copy(&tables_->phi_of[4][0], tables_->phi_of[4 + free_ - 1] + kernels::kPaddedNodes,
+            &in.phi[0][0]);
+  std::copy(&tables_->slope_of[4][0], tables_->slope_of[4 + free_ - 1] + kernels::kPaddedNodes,
+            &in.slope[0][0]);
+  for (int a = 0; a < 3; ++a) {
+    double target_at[kernels::kPaddedNodes] = {}, target_rate[kernels::kPaddedNodes] = {};
+    std::fill(in.at[a], in.at[a] + kernels::kPaddedNodes, 0.0);
+    AddAtNodes(tables_->phi_of, start_, 0, 3, a, in.at[a]);
+    AddAtNodes(tables_->phi_of, their, 0, M, a, target_at);
+    for (int k = 0; k < kernels::kPaddedNodes; ++k)
+      in.rel[a][k] = k < kNodes ? in.at[a][k] - target_at[k] : 1.0;  // anything but zero
+    if (a == 2) continue;
+    std::fill(in.rate[a], in.rate[a] + kernels::kPaddedNodes, 0.0);
+    AddAtNodes(tables_->slope_of, start_, 0, 3, a, in.rate[a]);
+    AddAtNodes(tables_->slope_of, their, 0, M, a, target_rate);
+    for (int k = 0; k < kernels::kPaddedNodes; ++k) in.rate[a][k] -= target_rate[k];
   }
   const double scale =
       (config_.cost_max - config_.cost_min) / (config_.cost_range * config_.cost_range);
@@ -181,26 +180,20 @@ bool Refiner::IsProven(const Free& x, Curve* plan) {
   return KeepsLimits(*plan, *problem_) && proof_.Holds(*plan, false);
 }
 
-bool Refiner::Descend(bool prove, Free* x, Curve* plan, Cost* cost) {
-  bool changed = false;
+void Refiner::Descend(int steps, Free* x, Cost* cost) const {
   Free step;
-  for (int i = 0; i < kSteps && Direction(*x, &step); ++i) {
+  for (int i = 0; i < steps && Direction(*x, &step); ++i) {
     const Cost before = *cost;
     for (const double share : {1.0, 0.5, 0.25, 0.1}) {
       const Free moved = Moved(*x, step, share);
       const Cost next = CostOf(moved);
       if (!(next.total < cost->total)) continue;
-      Curve curve;
-      if (prove && !IsProven(moved, &curve)) continue;
-      if (prove) *plan = curve;
       *x = moved;
       *cost = next;
-      changed = true;
       break;
     }
     if (!IsWorthIt(before, *cost)) break;
   }
-  return changed;
 }
 
 void Refiner::SetPlan(const Curve& plan) {
@@ -212,29 +205,23 @@ void Refiner::SetPlan(const Curve& plan) {
   SetNear(b);
 }
 
-bool Refiner::Leap(Curve* plan, Cost* cost) {
+bool Refiner::Improve(int steps, Curve* plan, Cost* cost) {
   SetPlan(*plan);
-  const Cost before = CostOf(first_);
+  *cost = CostOf(first_);
   Free x = first_;
-  Curve moved;
-  Cost found = before;
-  if (!Descend(false, &x, nullptr, &found) || !IsWorthIt(before, found) || !IsProven(x, &moved))
-    return false;
-  *plan = moved;
-  *cost = found;
-  return true;
-}
-
-bool Refiner::Creep(Curve* plan, Cost* cost) {
-  SetPlan(*plan);
-  const Cost before = CostOf(first_);
-  Free x = first_;
-  Curve moved;
-  Cost found = before;
-  if (!Descend(true, &x, &moved, &found) || !IsWorthIt(before, found)) return false;
-  *plan = moved;
-  *cost = found;
-  return true;
+  Cost found = *cost;
+  Descend(steps, &x, &found);
+  const Free way = x - first_;
+  for (const double share : {1.0, 0.6, 0.3, 0.1}) {
+    if (share < 1.0) found = CostOf(x = first_ + share * way);
+    Curve moved;
+    if (!IsWorthIt(*cost, found)) return false;
+    if (!IsProven(x, &moved)) continue;
+    *plan = moved;
+    *cost = found;
+    return true;
+  }
+  return false;
 }
 
 }  // namespace chase::planning

@@ -23,13 +23,11 @@ class Refiner {
   /// Keeps a pointer to `problem`. False where its degrees do not fit: nothing can be improved.
   bool Reset(const Problem& problem, double sight_from);
 
-  /// All steps first, then one proof. True when that holds: the plan has changed, keeps its start,
-  /// is certified against the problem's limits and the enlarged obstacles, and costs less by 0.02 %
-  /// at least; `cost` is its cost. Else both are as before. The plan given need not be feasible.
-  bool Leap(Curve* plan, Cost* cost);
-  /// The same with each step shortened until it is certified: for what Leap could not move.
-  bool Creep(Curve* plan, Cost* cost);
-  bool Improve(Curve* plan, Cost* cost) { return Leap(plan, cost) || Creep(plan, cost); }
+  /// Up to `steps` steps, then the proof; where that fails, for ever less of the way. True when the
+  /// plan moved: it keeps its start, is certified against the problem's limits and the enlarged
+  /// obstacles, and costs less by 0.02 % at least. Else it is as before. The plan given need not be
+  /// feasible. `cost` is that of the plan in any case.
+  bool Improve(int steps, Curve* plan, Cost* cost);
 
  private:
   using Free = Eigen::Matrix<double, 9, 1>;  ///< free control points, 3 f + axis, local
@@ -42,7 +40,7 @@ class Refiner {
   bool Direction(const Free& x, Free* step) const;
   Free Moved(const Free& x, const Free& step, double share) const;
   bool IsProven(const Free& x, Curve* plan);
-  bool Descend(bool prove, Free* x, Curve* plan, Cost* cost);
+  void Descend(int steps, Free* x, Cost* cost) const;
 
   PlannerConfig config_;
   TableShelf shelf_;

@@ -183,7 +183,7 @@ void CheckAll(benchmark::State& state) {
       const PlanRequest request = generator.Make(1000u + static_cast<unsigned>(i));
       const Problem problem = searcher.Pose(request);
       proof.Reset(problem, 0.0, true);
-      if (!fast.Set(problem, proof) || fast.IsBlocked()) continue;
+      if (!fast.Set(problem, proof) || !fast.SetObstacles()) continue;
       const int n = fast.n_candidates();
       std::vector<int> ids(static_cast<size_t>(n + kernels::kPad)), states(ids.size());
       us.push_back(MedianMicroseconds(5, [&] {
@@ -218,7 +218,7 @@ void Refinement(benchmark::State& state) {
       us.push_back(MedianMicroseconds(5, [&] {
         plan = found.plan;
         cost = found.cost;
-        if (refiner.Reset(problem, 0.0)) refiner.Improve(&plan, &cost);
+        if (refiner.Reset(problem, 0.0) && !refiner.Improve(4, &plan, &cost)) cost = found.cost;
       }));
       worse += cost.total > found.cost.total;
       gain.push_back(1.0 - cost.total / found.cost.total);

@@ -261,7 +261,7 @@ TEST(WholePlans, AreSoundAndTheBest) {
     Cost cost = fast.cost;
     Refiner refiner(config);
     ASSERT_TRUE(refiner.Reset(problem, 0.0));
-    refiner.Improve(&plan, &cost);
+    refiner.Improve(4, &plan, &cost);
     ASSERT_LE(cost.total, fast.cost.total * (1.0 + 1e-12));
     ASSERT_NEAR(cost.total, Evaluate(config, problem, plan).total, 1e-9 * cost.total);
     ASSERT_EQ(SampleFaults(fast.plan, problem, 0.0, 400), "") << "seed " << seed;

@@ -324,7 +324,9 @@ def draw_motion(number, obstacles, grid, gaps, seed):
         if not route:
             continue
         points, driven = relax(obstacles, resample(route, STEP)[0], wanted)
-        if driven < length or not is_wanted(obstacles, points, wanted):
+        if driven < length or len(points) < length / STEP + 5:
+            continue
+        if not is_wanted(obstacles, points, wanted):
             continue
         if can_be_followed(obstacles, [points[i * 10] for i in range(111)]):
             return points
