@@ -153,7 +153,7 @@ void Integrator::CastRay(const Eigen::Vector3d& origin, const Eigen::Vector3d& e
 }
 
 void Integrator::ClearDisc(const Eigen::Vector2d& center, double radius, double bottom, double top,
-                           int settled, bool also_hit) {
+                           int settled, bool also_hit, const Ellipse* within) {
   const Eigen::Vector3d reach(radius, radius, 0.0);
   const Key low = grid_.ToKey(Eigen::Vector3d(center.x(), center.y(), bottom) - reach);
   const Key high = grid_.ToKey(Eigen::Vector3d(center.x(), center.y(), top) + reach);
@@ -162,7 +162,8 @@ void Integrator::ClearDisc(const Eigen::Vector2d& center, double radius, double 
       VoxelGrid::Column* column = grid_.Find(x, y);
       if (!column || column->occupied == 0) continue;
       const Eigen::Vector2d d = grid_.Center({x, y, 0}).head<2>() - center;
-      if (d.squaredNorm() > radius * radius) continue;
+      if (d.squaredNorm() > radius * radius || (within && within->Level(center + d) > 1.0))
+        continue;
       for (int z = low.z; z <= high.z; ++z) {
         if (!grid_.ContainsLevel(z)) continue;
         Voxel& voxel = column->voxels[VoxelGrid::Level(z)];

@@ -3,6 +3,7 @@
 #include <deque>
 #include <vector>
 
+#include "services/mapping/enclosing.h"
 #include "services/mapping/sweep.h"
 #include "services/mapping/voxel_grid.h"
 
@@ -18,9 +19,9 @@ class Integrator {
 
   /// Empties the cells whose centre lies within `radius` m of `center` in plan and between two
   /// heights; cells hit in more than `settled` sweeps stay, and so do those that the last sweep hit
-  /// unless `also_hit`.
+  /// unless `also_hit`, and those outside `within`, if given.
   void ClearDisc(const Eigen::Vector2d& center, double radius, double bottom, double top,
-                 int settled, bool also_hit);
+                 int settled, bool also_hit, const Ellipse* within = nullptr);
 
   /// Cells whose state changed and that the octree does not know yet, most urgent first.
   std::deque<Key>& changes() { return changes_; }

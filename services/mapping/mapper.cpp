@@ -22,6 +22,11 @@ double PlanDistance(const world::Obstacle& o, const Eigen::Vector3d& p) {
   return level > 1.0 ? d.norm() * (1.0 - 1.0 / level) : 0.0;
 }
 
+/// What lies about as near to a mover as a cell is wide may be its own.
+Ellipse Grown(const Ellipse& outline) {
+  return outline.Scaled(1.0 + kGhostMargin / std::max(0.1, outline.SemiAxes().y()));
+}
+
 }  // namespace
 
 int KeepNearest(const Eigen::Vector3d& origin, int most, std::vector<world::Obstacle>* obstacles) {
@@ -116,10 +121,13 @@ void Mapper::ClearGhosts() {
     if (!track.confirmed) continue;
     const double radius = track.reach + kGhostMargin;
     const double bottom = track.z - 5.0, top = track.z + 5.0;
-    integrator_.ClearDisc(track.body.p(), radius, bottom, top, kSettledHits, false);
+    const auto clear = [&](const Eigen::Vector2d& place) {
+      const Ellipse around = Grown({place + track.outline.center, track.outline.shape});
+      integrator_.ClearDisc(place, radius, bottom, top, kSettledHits, false, &around);
+    };
+    clear(track.body.p());
     if (!track.fresh) continue;
-    for (const auto& place : track.trail)
-      integrator_.ClearDisc(place, radius, bottom, top, kSettledHits, false);
+    for (const auto& place : track.trail) clear(place);
   }
 }
 
