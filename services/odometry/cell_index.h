@@ -22,7 +22,7 @@ class CellIndex {
  public:
   static constexpr int kNone = -1;
 
-  explicit CellIndex(size_t expected = 64) { Resize(expected); }
+  CellIndex() : slots_(64) {}
 
   size_t size() const { return count_; }
 
@@ -37,9 +37,10 @@ class CellIndex {
     return entry.number;
   }
 
-  void Clear(size_t expected = 64) {
+  /// Keeps its size: what was full once will be full again.
+  void Clear() {
     count_ = 0;
-    Resize(expected);
+    slots_.assign(slots_.size(), Entry{});
   }
 
   size_t MemoryBytes() const { return slots_.capacity() * sizeof(Entry); }
@@ -49,12 +50,6 @@ class CellIndex {
     uint64_t key = 0;
     int number = kNone;
   };
-
-  void Resize(size_t expected) {
-    size_t n = 64;
-    while (n < 2 * expected + 2) n *= 2;
-    slots_.assign(n, Entry{});
-  }
 
   void Grow() {
     std::vector<Entry> old(slots_.size() * 2);

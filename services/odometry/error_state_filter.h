@@ -7,17 +7,17 @@
 namespace chase::odometry {
 
 struct FilterConfig {
-  double gyro_noise = 0.0005;           ///< rad/s/sqrt(Hz)
-  double accel_noise = 0.006;           ///< m/s^2/sqrt(Hz)
-  double gyro_bias_walk = 1e-4;         ///< rad/s^2/sqrt(Hz)
-  double accel_bias_walk = 1e-3;        ///< m/s^3/sqrt(Hz)
-  double gravity = 9.81;                ///< m/s^2
-  double accel_bias_sigma = 0.05;       ///< at the start, m/s^2
-  double gyro_bias_sigma = 0.0005;      ///< after an alignment at rest, rad/s
-  double blind_accel = 3.0;             ///< what a body without IMU may do, m/s^2
-  double blind_rate = 1.0;              ///< rad/s
-  double match_position_floor = 0.004;  ///< what a scan match never gets below, m
-  double match_rotation_floor = 0.002;  ///< rad
+  double gyro_noise = 0.0005;            ///< rad/s/sqrt(Hz)
+  double accel_noise = 0.006;            ///< m/s^2/sqrt(Hz)
+  double gyro_bias_walk = 1e-4;          ///< rad/s^2/sqrt(Hz)
+  double accel_bias_walk = 1e-3;         ///< m/s^3/sqrt(Hz)
+  double gravity = 9.81;                 ///< m/s^2
+  double accel_bias_sigma = 0.05;        ///< at the start, m/s^2
+  double gyro_bias_sigma = 0.0005;       ///< after an alignment at rest, rad/s
+  double blind_accel = 3.0;              ///< what a body without IMU may do, m/s^2
+  double blind_rate = 1.0;               ///< rad/s
+  double match_position_floor = 0.0028;  ///< what a scan match never gets below, m
+  double match_rotation_floor = 0.0008;  ///< rad
 
   template <class V>
   void Visit(V& v) {

@@ -14,6 +14,10 @@ constexpr float kPlaneFlatness = 6.0f;  // variance along over variance across
 constexpr float kLineExtent = 0.15f;
 constexpr float kLineStraightness = 9.0f;
 
+// Floors and walls tend to lie at round distances from the origin. On the border of two cells, each
+// would learn the half of the noise that falls into it.
+const Eigen::Vector3f kShift(0.382f, 0.427f, 0.464f);
+
 }  // namespace
 
 SurfaceMap::SurfaceMap(const MapConfig& config, SurfaceKind kind) : config_(config), kind_(kind) {
@@ -21,6 +25,8 @@ SurfaceMap::SurfaceMap(const MapConfig& config, SurfaceKind kind) : config_(conf
   float size = static_cast<float>(config.cell_size);
   for (Level& level : levels_) {
     level.size = size;
+    level.shift = size * kShift;
+    level.cells.reserve(static_cast<size_t>(config.max_cells));
     size *= 2.0f;
   }
 }
@@ -29,7 +35,7 @@ void SurfaceMap::Add(const Eigen::Vector3f& p) {
   for (Level& level : levels_) {
     if (static_cast<int>(level.cells.size()) >= config_.max_cells) continue;
     bool added = false;
-    const int number = level.index.FindOrAdd(CellKey(p, 1.0f / level.size), &added);
+    const int number = level.index.FindOrAdd(level.Key(p), &added);
     if (added) {
       level.cells.emplace_back();
       level.cells.back().origin = p;
@@ -69,7 +75,7 @@ void SurfaceMap::Fit(const Level& level, Cell* cell) const {
 
 const Surface* SurfaceMap::Find(const Eigen::Vector3f& p) const {
   for (const Level& level : levels_) {
-    const int number = level.index.Find(CellKey(p, 1.0f / level.size));
+    const int number = level.index.Find(level.Key(p));
     if (number == CellIndex::kNone) continue;
     const Cell& cell = level.cells[static_cast<size_t>(number)];
     if (cell.valid) return &cell.surface;
@@ -83,20 +89,20 @@ void SurfaceMap::Prune(const Eigen::Vector3f& center) {
       PruneLevel(center, &level);
 }
 
+/// In place: a map that was full once allocates no more.
 void SurfaceMap::PruneLevel(const Eigen::Vector3f& center, Level* level) {
-  std::vector<Cell> kept;
   float range = static_cast<float>(config_.keep_range);
   do {  // a dense world may need a shorter range to make room
-    kept.clear();
-    for (const Cell& cell : level->cells)
-      if ((cell.origin - center).squaredNorm() <= range * range) kept.push_back(cell);
+    const auto far = [&](const Cell& cell) {
+      return (cell.origin - center).squaredNorm() > range * range;
+    };
+    level->cells.erase(std::remove_if(level->cells.begin(), level->cells.end(), far),
+                       level->cells.end());
     range *= 0.8f;
-  } while (10 * kept.size() > 7 * static_cast<size_t>(config_.max_cells));
-  level->cells.swap(kept);
-  level->index.Clear(level->cells.size());
+  } while (10 * level->cells.size() > 7 * static_cast<size_t>(config_.max_cells) && range > 1.0f);
+  level->index.Clear();
   bool added = false;
-  for (const Cell& cell : level->cells)
-    level->index.FindOrAdd(CellKey(cell.origin, 1.0f / level->size), &added);
+  for (const Cell& cell : level->cells) level->index.FindOrAdd(level->Key(cell.origin), &added);
 }
 
 void SurfaceMap::Clear() {

@@ -67,6 +67,9 @@ class SurfaceMap {
   };
   struct Level {
     float size = 1.0f;
+    uint64_t Key(const Eigen::Vector3f& p) const { return CellKey(p + shift, 1.0f / size); }
+
+    Eigen::Vector3f shift = Eigen::Vector3f::Zero();  // of the grid
     CellIndex index;
     std::vector<Cell> cells;
   };

@@ -1,6 +1,7 @@
 #include "test/odometry/trial_flight.h"
 
 #include <fmt/format.h>
+#include <malloc.h>
 #include <unistd.h>
 
 #include <cmath>
@@ -135,6 +136,12 @@ double ResidentMegabytes() {
   return resident * static_cast<double>(sysconf(_SC_PAGESIZE)) * 1e-6;
 }
 
+/// What the program holds of the heap, without what the allocator keeps for later.
+double AllocatedMegabytes() {
+  const struct mallinfo2 info = mallinfo2();
+  return 1e-6 * static_cast<double>(info.uordblks + info.hblkhd);
+}
+
 }  // namespace
 
 void Record(const FlightOptions& options, const std::string& log) {
@@ -164,7 +171,8 @@ void Endure(const FlightOptions& options, double minutes) {
   });
   for (double t = 0.0; t <= 60.0 * minutes; t += 60.0) {
     lockstep.RunUntil(UtimeOf(scenario, t));
-    fmt::print("{:3.0f} min: process {:.1f} MB, map {:.1f} MB\n", t / 60.0, ResidentMegabytes(),
+    fmt::print("{:3.0f} min: process {:.1f} MB, in use {:.1f} MB, map {:.1f} MB\n", t / 60.0,
+               ResidentMegabytes(), AllocatedMegabytes(),
                1e-6 * static_cast<double>(odometry->MapBytes()));
     std::fflush(stdout);
   }
