@@ -33,9 +33,7 @@ bool Visible(const FitInput& input) {
 
 bool Localiser::Agrees(const FitResult& fit, double prior_gate) const {
   if (!fit.ok || fit.prior_distance > prior_gate) return false;
-  const double point_gate = 3.0 * config_.fit.lidar_sigma;
-  if (fit.point_rms > point_gate) return false;
-  return true;
+  return fit.point_rms <= 3.0 * config_.fit.lidar_sigma;
 }
 
 bool Localiser::EdgesAgree(const FitResult& fit, const FitInput& input) const {
