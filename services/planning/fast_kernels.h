@@ -80,6 +80,7 @@ struct Context {
   const float* first;  ///< [3 (M - 3)][row]: free points, row: choices padded
   int choices, row;
   uint64_t inverse;  ///< 2^32 / choices, rounded up
+  const float* x;    ///< [3 (M - 3)][stride]: free points of all, or null until `spread`
   float* j1;         ///< [stride]: weighted J1
   float* work;       ///< [3 (M - 3)][stride], for `check`
   uint32_t* alive;   ///< [stride / 8], for `check`
@@ -167,6 +168,8 @@ struct Table {
   void (*shape)(const ShapeInput& in, ShapeOutput& out);
   /// Prefixes, and J1 of all candidates.
   void (*generate)(Context& c, const CandidateInput& in);
+  /// Free points of all candidates side by side, for those who will need many: fills c.x = x.
+  void (*spread)(Context& c, float* x);
   /// Indices i with low < j1[i] <= high, ascending; `ids` needs room for stride + kPad.
   int (*select)(const Context& c, float low, float high, int* ids);
   /// Adds quadrature nodes [begin, end) of the node order to value[i] of ids[i] and keeps those

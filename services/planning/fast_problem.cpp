@@ -295,7 +295,14 @@ void FastProblem::Generate(float limit) {
   c.row = row;
   c.inverse =
       ((uint64_t{1} << 32) + static_cast<uint64_t>(first) - 1) / static_cast<uint64_t>(first);
+  c.x = nullptr;
   kernels_.generate(c, in);
+}
+
+void FastProblem::Spread() {
+  if (context_.x) return;
+  x_.resize(work_.size());
+  kernels_.spread(context_, x_.data());
 }
 
 void FastProblem::SetNodes() {

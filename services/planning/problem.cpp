@@ -17,12 +17,18 @@ constexpr double kLeaveBy = 0.25;  // tau by which a plan has left an obstacle t
 double SquaredNorm(const Eigen::Matrix3d& R, const Eigen::Vector3d& x) { return x.dot(R * x); }
 
 // The obstacle's own shape, and grown.
-struct Shape {
-  const Eigen::Matrix3d& R;
-  world::Inflation inflation;
+class Shape {
+ public:
+  explicit Shape(const Eigen::Matrix3d& R) : R_(R) {}
+  Eigen::Matrix3d Grown(double margin) {
+    if (!(margin > 0.0)) return R_;
+    if (!inflation_) inflation_.emplace(R_);
+    return inflation_->By(margin);
+  }
 
-  explicit Shape(const Eigen::Matrix3d& R_) : R(R_), inflation(R_) {}
-  Eigen::Matrix3d Grown(double margin) const { return margin > 0.0 ? inflation.By(margin) : R; }
+ private:
+  const Eigen::Matrix3d& R_;
+  std::optional<world::Inflation> inflation_;  // axes are not worked out for nothing
 };
 
 // Encloses the ellipsoid and all balls of radius `room` about its points: the inverse of the shape
@@ -71,13 +77,13 @@ void Note(std::string* notes, const std::string& text) {
   *notes += text;
 }
 
-void SetSafetyShape(const PlannerConfig& config, const world::Obstacle& o, const Shape& shape,
-                    const Problem& problem, Ellipsoid* e, std::string* notes) {
+void SetSafetyShape(const PlannerConfig& config, const world::Obstacle& o, const Problem& problem,
+                    Shape* shape, Ellipsoid* e, std::string* notes) {
   const double margin =
       config.drone_radius + config.safety_margin + Uncertainty(config, o, problem.duration);
   const Eigen::Vector3d offset = (problem.start.row(0) - e->center.row(0)).transpose();
   for (double share : kShares) {
-    e->safety = shape.Grown(share * margin);
+    e->safety = shape->Grown(share * margin);
     if (SquaredNorm(e->safety, offset) > (share > 0.0 ? kClear : 1.0)) {
       if (share < 1.0) Note(notes, "starts within the margin of obstacle " + std::to_string(e->id));
       return;
@@ -87,11 +93,11 @@ void SetSafetyShape(const PlannerConfig& config, const world::Obstacle& o, const
   Note(notes, "starts inside obstacle " + std::to_string(e->id));
 }
 
-void SetSightShape(const PlannerConfig& config, const Shape& shape, double target_growth,
-                   const Hull& target, Ellipsoid* e, std::string* notes) {
+void SetSightShape(const PlannerConfig& config, double target_growth, const Hull& target,
+                   Shape* shape, Ellipsoid* e, std::string* notes) {
   const double margin = config.sight_margin + target_growth;
   for (double share : kShares) {
-    e->sight = shape.Grown(share * margin);
+    e->sight = shape->Grown(share * margin);
     if (IsPlainlyOutside(target, e->center, e->sight)) return;
     if (margin == 0.0 || StaysOutside(target.curve, e->center, e->sight, kClear)) break;
   }
@@ -106,10 +112,10 @@ void SetEllipsoid(const PlannerConfig& config, const PlanRequest& request, const
   e->id = o.id;
   e->safety_from = e->sight_from = 0.0;
   e->center = ToCurve(o.center, request.t0, request.horizon);
-  const Shape shape(o.shape);
-  SetSafetyShape(config, o, shape, problem, e, notes);
+  Shape shape(o.shape);
+  SetSafetyShape(config, o, problem, &shape, e, notes);
   const double growth = std::min(config.max_inflation, config.sigmas * request.target_sigma);
-  SetSightShape(config, shape, growth, target, e, notes);
+  SetSightShape(config, growth, target, &shape, e, notes);
 }
 
 // Limits that the start already breaks give way to just above what it has: the plan may not get
