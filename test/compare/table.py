@@ -10,7 +10,7 @@ import sys
 
 
 def cell(flight):
-    text = f"{flight['acceleration_cost']:.3f}, {flight['plan_cpu_ms']['mean']:.2f}"
+    text = f"{flight['acceleration_cost']:.3f}, {flight['plan_cpu_ms']['mean']:.3f}"
     safe, visible = flight["safe_ratio"], flight["visible_ratio"]
     return text + (f" ({safe:.3f} {visible:.3f})" if min(safe, visible) < 1 else "")
 
