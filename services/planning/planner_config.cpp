@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <cstdio>
+#include <utility>
 
 namespace chase::planning {
 namespace {
@@ -24,14 +25,27 @@ std::string PlannerConfig::Problem() const {
   if (!(radius_spread >= 0.0 && radius_spread < 0.9))
     return Say("radius_spread", radius_spread, "in [0, 0.9)");
   if (!(waypoint_weight > 0.0)) return Say("waypoint_weight", waypoint_weight, "above 0");
-  for (double w : {weight_smooth, weight_obstacle, weight_distance, weight_yaw, rho_acceleration,
-                   rho_jerk, cost_min, cost_max})
-    if (!(w >= 0.0)) return Say("a weight", w, "at least 0");
+  const std::pair<const char*, double> not_negative[] = {{"weight_smooth", weight_smooth},
+                                                         {"weight_obstacle", weight_obstacle},
+                                                         {"weight_distance", weight_distance},
+                                                         {"weight_yaw", weight_yaw},
+                                                         {"rho_acceleration", rho_acceleration},
+                                                         {"rho_jerk", rho_jerk},
+                                                         {"cost_min", cost_min},
+                                                         {"cost_max", cost_max},
+                                                         {"drone_radius", drone_radius},
+                                                         {"safety_margin", safety_margin},
+                                                         {"sight_margin", sight_margin},
+                                                         {"refine_room", refine_room},
+                                                         {"sigmas", sigmas},
+                                                         {"max_inflation", max_inflation},
+                                                         {"max_speed", max_speed},
+                                                         {"max_acceleration", max_acceleration},
+                                                         {"min_distance", min_distance}};
+  for (const auto& [field, value] : not_negative)
+    if (!(value >= 0.0)) return Say(field, value, "at least 0");
   if (!(cost_max >= cost_min)) return Say("cost_max", cost_max, "at least cost_min");
   if (!(cost_range > 0.0)) return Say("cost_range", cost_range, "above 0");
-  for (double m : {drone_radius, safety_margin, sight_margin, refine_room, sigmas, max_inflation,
-                   max_speed, max_acceleration, min_distance})
-    if (!(m >= 0.0)) return Say("a margin or limit", m, "at least 0");
   if (!(z_max >= z_min)) return Say("z_max", z_max, "at least z_min");
   if (!(max_elevation_deg >= 0.0 && max_elevation_deg < 90.0))
     return Say("max_elevation_deg", max_elevation_deg, "in [0, 90)");

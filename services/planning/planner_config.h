@@ -47,7 +47,7 @@ struct PlannerConfig {
     v("radius_spread", radius_spread, "skeleton radii are (1 -+ this) l_des");
     v("elevation_low_deg", elevation_low_deg, "of the lower skeletons above the target");
     v("elevation_high_deg", elevation_high_deg, "of the upper skeletons above the target");
-    v("waypoint_weight", waypoint_weight, "pull of the skeletons on a candidate [w_p], m^2/s^3");
+    v("waypoint_weight", waypoint_weight, "pull of the skeletons on a candidate [w_p], 1/s^3");
     v("adaptive", adaptive, "skeleton layout follows clutter and the target's motion");
     v("refine", refine, "move the winner, and the running plan, downhill while certified");
     v("refine_room", refine_room, "more margin that moved plans keep where there is room, m");
