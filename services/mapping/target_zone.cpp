@@ -11,12 +11,15 @@ constexpr double kSlowDown = 1.0;    // s, time constant with which an unseen ta
 constexpr double kMostSigma = 0.15;  // m, of the estimate that widens the zone
 constexpr double kSpread = 0.15;     // m/s, growth of the zone while unseen
 constexpr double kMostSpread = 0.3;  // m
+constexpr double kArrival = 1.0;     // s, after the first sighting
+constexpr double kHalfSweep = 0.05;  // s; returns were fired up to a sweep before its time
 
 }  // namespace
 
 void TargetZone::Observe(const TargetEstimate& estimate) {
   if (seen_ && estimate.t < last_.t) return;
   if (!estimate.seen && (!seen_ || estimate.t - last_seen_ > config_.hold)) return;
+  if (!seen_) first_seen_ = estimate.t;
   if (estimate.seen) last_seen_ = estimate.t;
   last_ = estimate;
   seen_ = true;
@@ -27,11 +30,13 @@ void TargetZone::MoveTo(double t) {
   active_ = seen_ && age <= config_.hold && age >= -config_.hold;
   if (!active_) return;
   const double lead = age > 0.0 ? kSlowDown * (1.0 - std::exp(-age / kSlowDown)) : age;
-  center_ = last_.mean.head<2>() + lead * last_.velocity.head<2>();
+  center_ = last_.mean.head<2>() + (lead - kHalfSweep) * last_.velocity.head<2>();
+  const double moved = kHalfSweep * last_.velocity.head<2>().norm();
   const double spread = std::clamp(kSpread * (age - 0.2), 0.0, kMostSpread);
   const double sigma = std::min(kMostSigma, last_.sigma);
-  outer_ = last_.radius + config_.margin + 2.0 * sigma + spread;
-  core_ = last_.radius + config_.core;
+  outer_ = last_.radius + config_.margin + 2.0 * sigma + spread + moved;
+  // What settled here before the target was recognised was the target.
+  core_ = t - first_seen_ < kArrival ? outer_ : last_.radius + config_.core + moved;
   top_ = last_.mean.z() + 0.5 * last_.height + config_.margin;
 }
 

@@ -29,7 +29,8 @@ class TargetZone {
 
   bool active() const { return active_; }
   const Eigen::Vector2d& center() const { return center_; }
-  /// Radius within which returns are left out, and the one within which cells are always cleared.
+  /// Radius within which returns are left out, and the one within which cells are always cleared:
+  /// smaller, but for the first second that the target is known.
   double outer() const { return outer_; }
   double core() const { return core_; }
   /// No outline of an obstacle may come nearer than this to the centre.
@@ -44,7 +45,8 @@ class TargetZone {
  private:
   TargetConfig config_;
   TargetEstimate last_;
-  double last_seen_ = 0.0;  ///< s, of the newest estimate that was not a prediction
+  double first_seen_ = 0.0;  ///< s, of the first estimate
+  double last_seen_ = 0.0;   ///< s, of the newest estimate that was not a prediction
   bool seen_ = false, active_ = false;
   Eigen::Vector2d center_ = Eigen::Vector2d::Zero();
   double outer_ = 0.0, core_ = 0.0, top_ = 0.0;
