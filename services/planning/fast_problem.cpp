@@ -8,11 +8,7 @@ namespace chase::planning {
 using kernels::kPad;
 using kernels::kRecord;
 
-namespace {
-
-int Padded(int n) { return (n + kPad - 1) / kPad * kPad; }
-
-}  // namespace
+int FastProblem::Padded(int n) { return (n + kPad - 1) / kPad * kPad; }
 
 bool FastProblem::Set(const Problem& problem, const PlanProof& proof, float limit) {
   problem_ = &problem;

@@ -42,6 +42,8 @@ class FastProblem {
   Cost CostOf(int index) const;
 
  private:
+  /// Up to a multiple of kPad.
+  static int Padded(int n);
   bool SetCandidates();
   void SetShapes(const PlanProof& proof);
   void SetShapeInput(const PlanProof& proof, kernels::ShapeInput* in);

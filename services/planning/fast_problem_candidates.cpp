@@ -7,14 +7,7 @@
 
 namespace chase::planning {
 
-using kernels::kPad;
 using kernels::kRecord;
-
-namespace {
-
-int Padded(int n) { return (n + kPad - 1) / kPad * kPad; }
-
-}  // namespace
 
 bool FastProblem::SetCandidates() {
   const Problem& p = *problem_;
