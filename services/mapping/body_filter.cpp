@@ -12,7 +12,6 @@ namespace {
 constexpr double kEnd = 0.05;         // m, standard deviation of a first reach to an end in view
 constexpr double kReshape = 0.02;     // m/sqrt(s), random walk of the outline
 constexpr double kCommon = 0.015;     // m, error of a sweep's pose, common to all reaches
-constexpr double kHiddenNoise = 0.1;  // m, of what sticks out where no end is in view
 constexpr double kOutlier = 0.12;     // m, a reach this far from what the others say: new outline
 constexpr double kShrink = 0.03;      // share of an end no longer seen that a sweep forgets
 constexpr double kMostTerm = 36.0;    // of a reach in a distance: one alone does not decide
