@@ -3,7 +3,6 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
-#include <set>
 
 namespace chase::mapping {
 
@@ -223,7 +222,8 @@ void Decomposition::SplitWasteful(const std::vector<Cell>& cells, std::map<int, 
 }
 
 /// Neighbouring pieces become one, under the older id, where that wastes nothing. True if some did.
-bool Decomposition::Merge(const std::vector<Cell>& cells, std::map<int, Group>* groups) const {
+bool Decomposition::Merge(const std::vector<Cell>& cells, const std::set<int>& partial,
+                          std::map<int, Group>* groups) const {
   const Neighbours neighbours(cells);
   std::vector<int> piece(cells.size(), 0);
   for (const auto& [id, group] : *groups)
@@ -238,6 +238,7 @@ bool Decomposition::Merge(const std::vector<Cell>& cells, std::map<int, Group>* 
   }
   bool merged = false;
   for (const auto& [a, b] : pairs) {
+    if (partial.count(a) || partial.count(b)) continue;
     const auto first = groups->find(a), second = groups->find(b);
     if (first == groups->end() || second == groups->end()) continue;
     Group both = first->second;
@@ -268,8 +269,8 @@ void Decomposition::Emit(const std::vector<Cell>& cells, int id, const Group& gr
   Emit(cells, id + (kForcedIds << depth), b, keep_out, keep_out_radius, depth + 1, pieces);
 }
 
-std::vector<Piece> Decomposition::Update(std::vector<Cell>* cells, const Eigen::Vector2d* keep_out,
-                                         double keep_out_radius) {
+std::vector<Piece> Decomposition::Update(std::vector<Cell>* cells, const std::set<int>& partial,
+                                         const Eigen::Vector2d* keep_out, double keep_out_radius) {
   std::map<int, Group> groups;
   Group orphans;
   for (size_t i = 0; i < cells->size(); ++i) {
@@ -279,7 +280,7 @@ std::vector<Piece> Decomposition::Update(std::vector<Cell>* cells, const Eigen::
   Adopt(*cells, &groups, &orphans);
   AddNew(*cells, orphans, &groups);
   SplitWasteful(*cells, &groups);
-  for (int round = 0; round < kMergeRounds && Merge(*cells, &groups); ++round) {
+  for (int round = 0; round < kMergeRounds && Merge(*cells, partial, &groups); ++round) {
   }
   std::vector<Piece> pieces;
   dropped_ = 0;

@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <map>
+#include <set>
 #include <vector>
 
 #include "services/mapping/enclosing.h"
@@ -31,10 +32,12 @@ class Decomposition {
  public:
   Decomposition(const StaticConfig& config, double resolution);
 
-  /// Assigns every cell to a piece (Cell::piece) and returns the pieces by id. No outline holds
-  /// `keep_out` (if given) unless a single column does; such pieces are left out and counted.
-  std::vector<Piece> Update(std::vector<Cell>* cells, const Eigen::Vector2d* keep_out,
-                            double keep_out_radius);
+  /// Assigns every cell to a piece (Cell::piece) and returns the pieces by id. `partial`: ids of
+  /// pieces that go on where `cells` end; they merge with no other, since how long they are is not
+  /// seen. No outline holds `keep_out` (if given) unless a single column does; such pieces are left
+  /// out and counted.
+  std::vector<Piece> Update(std::vector<Cell>* cells, const std::set<int>& partial,
+                            const Eigen::Vector2d* keep_out, double keep_out_radius);
   int dropped() const { return dropped_; }
 
   /// The outline of a set of points in plan: a circle where that is round enough, a thin ellipse
@@ -51,7 +54,8 @@ class Decomposition {
   void Adopt(const std::vector<Cell>& cells, std::map<int, Group>* groups, Group* orphans) const;
   void AddNew(const std::vector<Cell>& cells, const Group& orphans, std::map<int, Group>* groups);
   void SplitWasteful(const std::vector<Cell>& cells, std::map<int, Group>* groups);
-  bool Merge(const std::vector<Cell>& cells, std::map<int, Group>* groups) const;
+  bool Merge(const std::vector<Cell>& cells, const std::set<int>& partial,
+             std::map<int, Group>* groups) const;
   void Emit(const std::vector<Cell>& cells, int id, const Group& group,
             const Eigen::Vector2d* keep_out, double keep_out_radius, int depth,
             std::vector<Piece>* pieces);

@@ -163,17 +163,23 @@ bool Mapper::Closed(const VoxelGrid::Column* column, const Eigen::Vector2d& cent
   return true;
 }
 
-std::vector<Cell> Mapper::OccupiedColumns(const Eigen::Vector3d& origin) {
+/// Columns within the list's radius and a margin. `partial`: pieces with columns beyond that too.
+std::vector<Cell> Mapper::OccupiedColumns(const Eigen::Vector3d& origin, std::set<int>* partial) {
   std::vector<Cell> cells;
   const double reach = config_.statics.radius + kWindowMargin;
   const Key middle = grid_.ToKey(origin);
-  const int n = static_cast<int>(std::ceil(reach / grid_.resolution()));
+  const int n =
+      static_cast<int>(std::ceil((reach + config_.statics.max_length) / grid_.resolution()));
   std::array<Eigen::Vector2d, 8> corners;
   Extent extent;
   for (int x = middle.x - n; x <= middle.x + n; ++x) {
     for (int y = middle.y - n; y <= middle.y + n; ++y) {
       VoxelGrid::Column* column = grid_.Find(x, y);
       const Eigen::Vector2d center = grid_.Center({x, y, 0}).head<2>();
+      if ((center - origin.head<2>()).norm() > reach) {
+        if (column && column->piece && column->occupied > 0) partial->insert(column->piece);
+        continue;
+      }
       if (Closed(column, center, origin)) {
         const int piece = column ? column->piece : 0;
         const Eigen::Vector2d half = Eigen::Vector2d::Constant(0.5 * grid_.resolution());
@@ -190,7 +196,6 @@ std::vector<Cell> Mapper::OccupiedColumns(const Eigen::Vector3d& origin) {
         column->piece = 0;
         continue;
       }
-      if ((center - origin.head<2>()).norm() > reach) continue;
       Cell cell{x, y, column->piece, {}, 0.0};
       const int k = PlanCorners(extent, center, grid_.step(), &corners);
       cell.corners.assign(corners.begin(), corners.begin() + k);
@@ -204,10 +209,11 @@ std::vector<Cell> Mapper::OccupiedColumns(const Eigen::Vector3d& origin) {
 
 std::vector<world::Obstacle> Mapper::Statics(const Eigen::Vector3d& origin, double t,
                                              int* dropped) {
-  auto cells = OccupiedColumns(origin);
+  std::set<int> partial;
+  auto cells = OccupiedColumns(origin, &partial);
   const Eigen::Vector2d target = zone_.center();
   const auto pieces =
-      decomposition_.Update(&cells, zone_.active() ? &target : nullptr, zone_.keep_out());
+      decomposition_.Update(&cells, partial, zone_.active() ? &target : nullptr, zone_.keep_out());
   *dropped = decomposition_.dropped();
   for (const auto& cell : cells) grid_.Touch(cell.x, cell.y).piece = cell.piece;
   const StaticConfig& c = config_.statics;

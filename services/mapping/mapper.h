@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -59,7 +60,7 @@ class Mapper {
   void ClearGhosts();
   bool Closed(const VoxelGrid::Column* column, const Eigen::Vector2d& center,
               const Eigen::Vector3d& origin) const;
-  std::vector<Cell> OccupiedColumns(const Eigen::Vector3d& origin);
+  std::vector<Cell> OccupiedColumns(const Eigen::Vector3d& origin, std::set<int>* partial);
   bool ColumnExtent(const VoxelGrid::Column& column, Extent* extent);
   std::vector<world::Obstacle> Statics(const Eigen::Vector3d& origin, double t, int* dropped);
   void SetTree(int most);

@@ -109,6 +109,9 @@ void Score::FollowIds(const Shot& shot, const std::vector<Obstacle>& obstacles) 
       return o.id == it->second && o.SquaredDistance(p, shot.sweep.t) <= 1.0;
     });
     if (same) continue;
+    if (trace_)
+      fmt::print("{:7.2f} id {} -> {} at {:.2f} {:.2f}, solid {}\n", shot.sweep.t, it->second,
+                 any->id, p.x(), p.y(), std::get<0>(key));
     ++id_changes;
     it->second = any->id;
   }

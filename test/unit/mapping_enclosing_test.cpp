@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numeric>
 #include <random>
+#include <set>
 
 #include "services/mapping/assignment.h"
 #include "services/mapping/decomposition.h"
@@ -183,7 +184,7 @@ TEST(MappingDecomposition, EveryColumnIsEnclosedAndIdsStay) {
     for (const double dy : {-0.2, 0.0, 0.2}) centers.emplace_back(4.1 + dx, 3.1 + dy);
   Decomposition decomposition(StaticConfig{}, 0.2);
   auto cells = Columns(centers);
-  const auto first = decomposition.Update(&cells, nullptr, 0.0);
+  const auto first = decomposition.Update(&cells, {}, nullptr, 0.0);
   EXPECT_LE(first.size(), 12u);
   size_t members = 0;
   for (const auto& piece : first) {
@@ -194,9 +195,32 @@ TEST(MappingDecomposition, EveryColumnIsEnclosedAndIdsStay) {
         EXPECT_LE(piece.outline.Level(p), 1.0 + 1e-6);
   }
   EXPECT_EQ(members, cells.size());
-  const auto second = decomposition.Update(&cells, nullptr, 0.0);
+  const auto second = decomposition.Update(&cells, {}, nullptr, 0.0);
   ASSERT_EQ(second.size(), first.size());
   for (size_t i = 0; i < first.size(); ++i) EXPECT_EQ(first[i].id, second[i].id);
+}
+
+TEST(MappingDecomposition, PiecesOfWhichAPartIsGivenMergeWithNoOther) {
+  std::vector<Eigen::Vector2d> centers;
+  for (double s = 0.1; s < 8.0; s += 0.2) centers.emplace_back(s, 0.1);
+  Decomposition decomposition(StaticConfig{}, 0.2);
+  auto wall = Columns(centers);
+  const auto pieces = decomposition.Update(&wall, {}, nullptr, 0.0);
+  ASSERT_GT(pieces.size(), 1u);
+  // What a window shows of two neighbours when its rim crosses both near their common end.
+  std::vector<Cell> seen;
+  std::set<int> ids;
+  for (size_t i = 1; i < wall.size() && ids.empty(); ++i) {
+    if (wall[i].piece == wall[i - 1].piece) continue;
+    seen = {wall[i - 1], wall[i]};
+    ids = {wall[i - 1].piece, wall[i].piece};
+  }
+  ASSERT_EQ(ids.size(), 2u);
+  auto kept = seen;
+  EXPECT_EQ(decomposition.Update(&kept, ids, nullptr, 0.0).size(), 2u);
+  for (size_t i = 0; i < seen.size(); ++i) EXPECT_EQ(kept[i].piece, seen[i].piece);
+  // Known to be all of them, they are one.
+  EXPECT_EQ(decomposition.Update(&seen, {}, nullptr, 0.0).size(), 1u);
 }
 
 TEST(MappingDecomposition, OutlinesKeepOutOfTheTarget) {
@@ -209,7 +233,7 @@ TEST(MappingDecomposition, OutlinesKeepOutOfTheTarget) {
   Decomposition decomposition(StaticConfig{}, 0.2);
   auto cells = Columns(centers);
   const Eigen::Vector2d target(2.1, 2.1);
-  for (const auto& piece : decomposition.Update(&cells, &target, 0.15))
+  for (const auto& piece : decomposition.Update(&cells, {}, &target, 0.15))
     EXPECT_GT(piece.outline.Level(target), 1.0);
 }
 
