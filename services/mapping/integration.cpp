@@ -12,6 +12,8 @@ constexpr double kNearMiss = 0.35;  // cells, a ray this near to a cell's return
 constexpr int kLowShare = 3;        // free cells keep limit / this, so that they can fill again
 constexpr int kSettleSweeps = 20;   // moving returns this long in one cell stand still
 constexpr int kDoubtSweeps = 10;    // hits after which a cell that was long free is no longer
+constexpr double kPassed = 2.0;     // sweeps, how well it is known when a body was somewhere
+constexpr int kPassedHits = 4;      // sweeps that a cell may be hit beyond the body's stay
 constexpr size_t kMostChanges = 400000;
 
 uint8_t Increment(uint8_t n) { return n < 255 ? static_cast<uint8_t>(n + 1) : n; }
@@ -60,7 +62,7 @@ void Integrator::Hit(HitCell* cell) {
     return;
   }
   const bool strong = cell->solid + cell->ground >= 2;
-  voxel.sweep = sweep_;
+  voxel.sweep = voxel.hit_sweep = sweep_;
   voxel.hits = Increment(voxel.hits);
   const bool doubted = voxel.free_sweeps >= config_.ever_free_sweeps && voxel.hits < kDoubtSweeps;
   if (cell->solid == 0 || !doubted) voxel.free_sweeps = 0;
@@ -170,6 +172,39 @@ void Integrator::ClearDisc(const Eigen::Vector2d& center, double radius, double 
         if (voxel.hits > settled || (voxel.sweep == sweep_ && voxel.hits > 0 && !also_hit))
           continue;
         Reset(column, &voxel, {x, y, z});
+      }
+    }
+  }
+}
+
+void Integrator::ClearPassed(const Ellipse& outline, const Eigen::Vector2d& step, double most,
+                             double bottom, double top) {
+  const Eigen::Vector2d end = outline.center - most * step;
+  const double reach = outline.SemiAxes().x();
+  const Eigen::Array2d first = outline.center.array().min(end.array()) - reach;
+  const Eigen::Array2d last = outline.center.array().max(end.array()) + reach;
+  const Key low = grid_.ToKey(Eigen::Vector3d(first.x(), first.y(), bottom));
+  const Key high = grid_.ToKey(Eigen::Vector3d(last.x(), last.y(), top));
+  const double a = step.dot(outline.shape * step);
+  if (!(a > 0.0)) return;
+  for (int x = low.x; x <= high.x; ++x) {
+    for (int y = low.y; y <= high.y; ++y) {
+      VoxelGrid::Column* column = grid_.Find(x, y);
+      if (!column || column->occupied == 0) continue;
+      // The body lay here while d + age step was within its outline.
+      const Eigen::Vector2d d = grid_.Center({x, y, 0}).head<2>() - outline.center;
+      const double b = d.dot(outline.shape * step);
+      const double root = b * b - a * (d.dot(outline.shape * d) - 1.0);
+      if (root <= 0.0 || b > 0.0) continue;
+      const double left = (-b - std::sqrt(root)) / a, came = (-b + std::sqrt(root)) / a;
+      if (left > most) continue;
+      for (int z = low.z; z <= high.z; ++z) {
+        if (!grid_.ContainsLevel(z)) continue;
+        Voxel& voxel = column->voxels[VoxelGrid::Level(z)];
+        const double age = static_cast<double>(sweep_) - static_cast<double>(voxel.hit_sweep);
+        if (voxel.hits > 0 && voxel.hits < came - left + kPassedHits && age >= 1.0 &&
+            age > left - kPassed && age < came + kPassed)
+          Reset(column, &voxel, {x, y, z});
       }
     }
   }

@@ -23,6 +23,12 @@ class Integrator {
   void ClearDisc(const Eigen::Vector2d& center, double radius, double bottom, double top,
                  int settled, bool also_hit, const Ellipse* within = nullptr);
 
+  /// Empties cells that a body filled on its way: those that were last hit while the body, now
+  /// within `outline` and moved by `step` m a sweep, lay over them, at most `most` sweeps ago, and
+  /// that were hit hardly longer than that. Between two heights.
+  void ClearPassed(const Ellipse& outline, const Eigen::Vector2d& step, double most, double bottom,
+                   double top);
+
   /// Cells whose state changed and that the octree does not know yet, most urgent first.
   std::deque<Key>& changes() { return changes_; }
   uint32_t sweep() const { return sweep_; }

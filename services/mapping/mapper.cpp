@@ -10,6 +10,8 @@ namespace {
 
 constexpr int kSettledHits = 15;       // sweeps after which a cell outside the target's core stays
 constexpr double kGhostMargin = 0.2;   // m around a mover within which doubtful cells are cleared
+constexpr double kLookBack = 2.0;      // s after a mover became known that its way is cleared
+constexpr double kPassedTime = 6.0;    // s of its way
 constexpr double kOwnPlace = 0.6;      // m around the drone that are free since it is there
 constexpr int kOwnLevels = 1;          // cells above and below it that count as its height
 constexpr double kWindowMargin = 1.0;  // m beyond the list's radius that the decomposition sees
@@ -111,7 +113,7 @@ void Mapper::TrackMovers(const Eigen::Vector3d& origin, double t) {
 }
 
 /// Empties cells where the target or a mover is, or a mover was before it was known as one.
-void Mapper::ClearGhosts() {
+void Mapper::ClearGhosts(double t) {
   if (zone_.active()) {
     const double bottom = ground_.Height(zone_.center().x(), zone_.center().y());
     integrator_.ClearDisc(zone_.center(), zone_.outer(), bottom, zone_.top(), kSettledHits, false);
@@ -126,8 +128,11 @@ void Mapper::ClearGhosts() {
       integrator_.ClearDisc(place, radius, bottom, top, kSettledHits, false, &around);
     };
     clear(track.body.p());
-    if (!track.fresh) continue;
-    for (const auto& place : track.trail) clear(place);
+    if (track.fresh)
+      for (const auto& place : track.trail) clear(place);
+    if (t - track.known > kLookBack || !(t > t_)) continue;
+    integrator_.ClearPassed(Grown(track.Outline()), (t - t_) * track.body.v(),
+                            kPassedTime / (t - t_), bottom, top);
   }
 }
 
@@ -246,7 +251,8 @@ ObstacleList Mapper::Insert(const Sweep& sweep) {
   MarkTarget();
   TrackMovers(sweep.origin, sweep.t);
   integrator_.Insert(sweep.origin, returns_);
-  ClearGhosts();
+  ClearGhosts(sweep.t);
+  t_ = sweep.t;
   list.obstacles = Statics(sweep.origin, sweep.t, &list.n_dropped);
   list.n_static = static_cast<int>(list.obstacles.size());
   const StaticConfig& c = config_.statics;

@@ -57,7 +57,7 @@ class Mapper {
   bool Shorten(const Eigen::Vector3d& origin, Eigen::Vector3d* end) const;
   void MarkTarget();
   void TrackMovers(const Eigen::Vector3d& origin, double t);
-  void ClearGhosts();
+  void ClearGhosts(double t);
   bool Closed(const VoxelGrid::Column* column, const Eigen::Vector2d& center,
               const Eigen::Vector3d& origin) const;
   std::vector<Cell> OccupiedColumns(const Eigen::Vector3d& origin, std::set<int>* partial);
@@ -78,6 +78,7 @@ class Mapper {
   std::vector<Eigen::Vector3f> near_;
   std::vector<SavedTile> tiles_;
   Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();
+  double t_ = 0.0;  ///< s, of the last sweep
 };
 
 /// Sorts by distance of the outline from `origin` at the obstacles' own start and keeps `most`.

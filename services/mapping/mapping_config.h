@@ -13,7 +13,7 @@ struct GridConfig {
   int miss = -4;             ///< log-odds that a sweep's ray through the cell adds, tenths
   int limit = 36;            ///< log-odds are kept within +- this, tenths
   int occupied = 12;         ///< a cell becomes occupied at this, and free again at zero or below
-  int ever_free_sweeps = 5;  ///< consecutive free sweeps after which a return means motion
+  int ever_free_sweeps = 3;  ///< consecutive free sweeps after which a return means motion
 
   template <class V>
   void Visit(V& v) {
@@ -78,7 +78,7 @@ struct MoverConfig {
   double gate = 4.0;              ///< of the innovation, standard deviations
   double acceleration = 0.8;      ///< process noise, m/s^2
   double measurement = 0.04;      ///< standard deviation of where an end is seen, m
-  int confirm_sweeps = 3;         ///< detections before a track may be listed
+  int confirm_sweeps = 3;         ///< detections in a row before a track may be listed
   double confirm_distance = 0.3;  ///< net travel before a track may be listed, m
   double confirm_speed = 0.4;     ///< speed before a track may be listed, m/s
   double coast_listed = 0.6;      ///< unseen tracks stay listed for this, s
@@ -96,7 +96,7 @@ struct MoverConfig {
     v("gate", gate, "of the innovation, standard deviations");
     v("acceleration", acceleration, "process noise, m/s^2");
     v("measurement", measurement, "standard deviation of where an end is seen, m");
-    v("confirm_sweeps", confirm_sweeps, "detections before a track may be listed");
+    v("confirm_sweeps", confirm_sweeps, "detections in a row before a track may be listed");
     v("confirm_distance", confirm_distance, "net travel before a track may be listed, m");
     v("confirm_speed", confirm_speed, "speed before a track may be listed, m/s");
     v("coast_listed", coast_listed, "unseen tracks stay listed for this, s");

@@ -94,6 +94,7 @@ void Tracker::Correct(const Cluster& cluster, Track* track) const {
   if (ends < kFewestEnds) return Shape(track);  // may be anything that stands there
   track->seen = t_;
   ++track->detections;
+  ++track->row;
   track->z += 0.3 * (cluster.center.z() - track->z);
   Shape(track);
 }
@@ -105,10 +106,11 @@ void Tracker::Confirm(Track* track) const {
   if (track->confirmed) return;
   track->trail.push_back(track->body.p());
   const double travel = (track->body.p() - track->birth).norm();
-  track->confirmed = track->detections >= config_.confirm_sweeps &&
+  track->confirmed = track->row >= config_.confirm_sweeps &&
                      speed >= std::max(config_.confirm_speed, kSure * sigma) &&
                      travel >= config_.confirm_distance;
   track->fresh = track->confirmed;
+  track->known = t_;
 }
 
 void Tracker::Birth(Cluster* cluster) {
@@ -120,7 +122,7 @@ void Tracker::Birth(Cluster* cluster) {
   track.body = BodyFilter(track.birth, cluster->reaches, kFirstSpeed, kUnseen);
   track.z = cluster->center.z();
   track.born = track.seen = track.sought = track.moved = t_;
-  track.detections = 1;
+  track.detections = track.row = 1;
   track.trail.push_back(track.birth);
   Shape(&track);
   cluster->track = track.id;
@@ -134,10 +136,11 @@ void Tracker::Absorb(Cluster* cluster) {
       cluster->track = track.id;
 }
 
-/// Tracks without a cluster whose place something hides are still sought.
+/// Tracks that were not seen; those whose place something hides are still sought.
 void Tracker::Seek(const Panorama& panorama) {
   for (auto& track : tracks_) {
     if (track.seen == t_) continue;
+    track.row = 0;
     const Eigen::Vector2d c = track.Outline().center;
     Eigen::Vector2d across(panorama.origin().y() - c.y(), c.x() - panorama.origin().x());
     across *= 0.7 * track.reach / std::max(1e-6, across.norm());

@@ -19,8 +19,10 @@ struct Track {
   double reach = 0.0;  ///< of the outline's corners from body.p(), m
   Eigen::Vector2d birth = Eigen::Vector2d::Zero();
   double born = 0.0, seen = 0.0, moved = 0.0;  ///< s: first, last detection; last time not at rest
+  double known = 0.0;                          ///< s, when it was confirmed
   double sought = 0.0;  ///< s, last time that it was seen or something hid its place
   int detections = 0;
+  int row = 0;  ///< of them, without a sweep between them in which it was not seen
   bool confirmed = false, fresh = false;  ///< fresh: confirmed by the last update
   std::vector<Eigen::Vector2d> trail;     ///< places until the confirmation
 
