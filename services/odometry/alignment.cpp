@@ -15,6 +15,7 @@ constexpr double kSettledAccel = 0.03;      // m/s^2
 constexpr double kTiltInMotion = 1.5;       // m/s^2, of gravity's horizontal part
 constexpr double kGravityStrength = 1e-3;   // m/s^2, how well |g| is known
 constexpr double kGyroBiasInMotion = 0.05;  // rad/s
+constexpr double kLongestGap = 0.03;        // s between samples over which a motion is followed
 
 void SetBlock(int block, double sigma, ErrorCovariance* P) {
   P->block<3, 3>(block, block) = sigma * sigma * Eigen::Matrix3d::Identity();
@@ -28,6 +29,7 @@ double Spread(const Eigen::Vector3d& squares, const Eigen::Vector3d& mean, doubl
 
 void Alignment::Add(const ImuSample& imu) {
   if (window_.empty()) first_t_ = imu.t;
+  all_.push_back(imu);
   window_.push_back(imu);
   while (window_.size() > kFewestSamples && imu.t - window_[1].t >= config_.duration)
     window_.pop_front();
@@ -112,7 +114,30 @@ NavState Alignment::Result(const FilterConfig& filter, const Eigen::Vector3d& p,
   SetBlock(kV, AtRest() ? 0.01 : 2.0, &state.P);
   SetBlock(kTheta, AtRest() ? 3e-4 : 0.02, &state.P);
   SetBiases(filter, &state);
+  if (AtRest()) Settle(p, yaw, &state);
   return state;
+}
+
+/// A body let down on its legs slides and turns a little before it rests: back from the rest, where
+/// velocity and biases are known, through all samples to the first one, which has the given heading
+/// and position.
+void Alignment::Settle(const Eigen::Vector3d& p, double yaw, NavState* state) const {
+  Eigen::Quaterniond R = state->R_WB;
+  Eigen::Vector3d v = Eigen::Vector3d::Zero(), moved = Eigen::Vector3d::Zero();
+  for (size_t i = all_.size() - 1; i > 0; --i) {
+    const ImuSample &from = all_[i - 1], &to = all_[i];
+    const double dt = to.t - from.t;
+    if (dt > kLongestGap) break;
+    const Eigen::Vector3d w = 0.5 * (from.gyro + to.gyro) - state->gyro_bias;
+    const Eigen::Vector3d force = 0.5 * (from.accel + to.accel) - state->accel_bias;
+    const Eigen::Vector3d a = R * math::ExpSO3(-0.5 * dt * w) * force + state->g;
+    R = (R * math::ExpSO3(-dt * w)).normalized();
+    moved += dt * v - 0.5 * dt * dt * a;
+    v -= dt * a;
+  }
+  const Eigen::Quaterniond turn = math::FromYaw(yaw - math::Yaw(R));
+  state->R_WB = (turn * state->R_WB).normalized();
+  state->p = p + turn * moved;
 }
 
 NavState Alignment::ResultAt(const FilterConfig& filter, const NavState& known) const {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <deque>
+#include <vector>
 
 #include "services/odometry/error_state_filter.h"
 
@@ -38,8 +39,9 @@ class Alignment {
   bool AtRest() const { return AtRest(statistics()); }
   ImuStatistics statistics() const { return Statistics(0, window_.size()); }
 
-  /// State at the last sample: level at heading `yaw` [rad] and position `p` [m, frame M]. In
-  /// motion the gyro's bias is unknown and up is the mean of the felt force.
+  /// State at the last sample, level, of a body that had heading `yaw` [rad] and position `p` [m,
+  /// frame M] at the first one. In motion the gyro's bias is unknown, up is the mean of the felt
+  /// force, and what it moved since the first sample is not known either.
   NavState Result(const FilterConfig& filter, const Eigen::Vector3d& p, double yaw) const;
 
   /// The same for a body whose pose and velocity are known from sweeps: only gravity is found.
@@ -48,12 +50,14 @@ class Alignment {
  private:
   ImuStatistics Statistics(size_t begin, size_t end) const;
   bool AtRest(const ImuStatistics& s) const;
+  void Settle(const Eigen::Vector3d& p, double yaw, NavState* state) const;
   void SetBiases(const FilterConfig& filter, NavState* state) const;
   void CoupleTiltAndBias(const FilterConfig& filter, NavState* state) const;
 
   AlignmentConfig config_;
   double first_t_ = 0.0;
-  std::deque<ImuSample> window_;
+  std::vector<ImuSample> all_;    // since the start
+  std::deque<ImuSample> window_;  // the newest
 };
 
 }  // namespace chase::odometry

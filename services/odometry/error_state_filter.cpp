@@ -29,6 +29,18 @@ void AddDiagonal(int block, double variance, ErrorCovariance* P) {
   for (int i = 0; i < 3; ++i) (*P)(block + i, block + i) += variance;
 }
 
+/// An unknown acceleration of size `a` that changes all the while. A constant one over dt would
+/// make a velocity learnt from exact positions swing from step to step.
+void AddAcceleration(double a, double dt, ErrorCovariance* P) {
+  const double v2 = a * a * dt * dt;
+  for (int i = 0; i < 3; ++i) {
+    (*P)(kP + i, kP + i) += v2 * dt * dt / 3.0;
+    (*P)(kV + i, kV + i) += v2;
+    (*P)(kP + i, kV + i) += 0.5 * v2 * dt;
+    (*P)(kV + i, kP + i) += 0.5 * v2 * dt;
+  }
+}
+
 using JacobianRows = Eigen::Matrix<double, Eigen::Dynamic, kStates>;
 
 void Symmetrise(ErrorCovariance* P) { *P = (0.5 * (*P + P->transpose())).eval(); }
@@ -81,16 +93,13 @@ void PropagateBlind(const FilterConfig& config, double t, NavState* state) {
   ErrorCovariance F = ErrorCovariance::Identity();
   F.block<3, 3>(kP, kV) = dt * Eigen::Matrix3d::Identity();
   state->P = (F * state->P * F.transpose()).eval();
-  const double a2 = config.blind_accel * config.blind_accel;
-  const double dt2 = dt * dt;
-  for (int i = 0; i < 3; ++i) {  // an unknown constant acceleration over dt
-    state->P(kP + i, kP + i) += 0.25 * a2 * dt2 * dt2;
-    state->P(kV + i, kV + i) += a2 * dt2;
-    state->P(kP + i, kV + i) += 0.5 * a2 * dt2 * dt;
-    state->P(kV + i, kP + i) += 0.5 * a2 * dt2 * dt;
-  }
-  AddDiagonal(kTheta, config.blind_rate * config.blind_rate * dt2, &state->P);
+  AddAcceleration(config.blind_accel, dt, &state->P);
+  AddDiagonal(kTheta, config.blind_rate * config.blind_rate * dt * dt, &state->P);
   state->t = t;
+}
+
+void Doubt(const FilterConfig& config, double gap, NavState* state) {
+  AddAcceleration(config.doubt_accel, gap, &state->P);
 }
 
 void Inject(const ErrorVector& dx, NavState* state) {
@@ -108,7 +117,8 @@ UpdateResult Update(const FilterConfig& config, const PoseMeasurement& z, NavSta
   if (k == 0) return {};
   Eigen::Matrix<double, 6, 1> e;
   e << z.X_WB.p - state->p, LogSO3(z.X_WB.R * state->R_WB.conjugate());
-  // The floor stands for the map's own errors, which do not average out over features.
+  // The floor is for what features have in common. Where the map itself is wrong no update can
+  // tell: MapDrift adds that to what is put out.
   const Eigen::MatrixXd reduced = V.transpose() * z.information * V;
   Eigen::Matrix<double, 6, 1> floor;
   floor << Eigen::Vector3d::Constant(config.match_position_floor),

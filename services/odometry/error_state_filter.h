@@ -7,17 +7,18 @@
 namespace chase::odometry {
 
 struct FilterConfig {
-  double gyro_noise = 0.0005;            ///< rad/s/sqrt(Hz)
-  double accel_noise = 0.006;            ///< m/s^2/sqrt(Hz)
+  double gyro_noise = 0.0003;            ///< rad/s/sqrt(Hz)
+  double accel_noise = 0.003;            ///< m/s^2/sqrt(Hz)
   double gyro_bias_walk = 1e-4;          ///< rad/s^2/sqrt(Hz)
   double accel_bias_walk = 1e-3;         ///< m/s^3/sqrt(Hz)
   double gravity = 9.81;                 ///< m/s^2
   double accel_bias_sigma = 0.05;        ///< at the start, m/s^2
   double gyro_bias_sigma = 0.0005;       ///< after an alignment at rest, rad/s
+  double doubt_accel = 0.1;              ///< error of the accelerometer beyond its noise, m/s^2
   double blind_accel = 3.0;              ///< what a body without IMU may do, m/s^2
   double blind_rate = 1.0;               ///< rad/s
-  double match_position_floor = 0.0028;  ///< what a scan match never gets below, m
-  double match_rotation_floor = 0.0008;  ///< rad
+  double match_position_floor = 0.0005;  ///< what a scan match never gets below, m
+  double match_rotation_floor = 0.0001;  ///< rad
 
   template <class V>
   void Visit(V& v) {
@@ -28,6 +29,7 @@ struct FilterConfig {
     v("gravity", gravity, "m/s^2");
     v("accel_bias_sigma", accel_bias_sigma, "at the start, m/s^2");
     v("gyro_bias_sigma", gyro_bias_sigma, "after an alignment at rest, rad/s");
+    v("doubt_accel", doubt_accel, "what the accelerometer may be off while no sweep comes, m/s^2");
     v("blind_accel", blind_accel, "what the body may do while the IMU is silent, m/s^2");
     v("blind_rate", blind_rate, "the same for rotation, rad/s");
     v("match_position_floor", match_position_floor, "no scan match is better than this, m");
@@ -65,6 +67,10 @@ void Propagate(const FilterConfig& config, const ImuSample& imu, NavState* state
 /// Advances to `t` at constant velocity and angular velocity: all one can do while the IMU is
 /// silent.
 void PropagateBlind(const FilterConfig& config, double t, NavState* state);
+
+/// Adds what the model of the inertial unit does not know (shocks, heat, tones) over `gap` s
+/// without a sweep: what is off by a constant is no noise that averages out.
+void Doubt(const FilterConfig& config, double gap, NavState* state);
 
 /// Adds `dx` to the state.
 void Inject(const ErrorVector& dx, NavState* state);

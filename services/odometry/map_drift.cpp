@@ -30,8 +30,8 @@ MapDrift::Covariance MapDrift::Carried(const Place& from, const Eigen::Vector3d&
   F.topRightCorner<3, 1>() = across;
   Covariance P = F * from.covariance * F.transpose();
   const double yaw2 = config_.yaw * config_.yaw * d;
-  P.diagonal().head<3>().array() += config_.position * config_.position * d;
-  P(2, 2) += std::pow(config_.slope * view_, 2) * d;
+  P.diagonal().head<3>().array() +=
+      (std::pow(config_.position, 2) + std::pow(config_.slope * view_, 2)) * d;
   P.topLeftCorner<3, 3>() += yaw2 / 3.0 * across * across.transpose();
   P.topRightCorner<3, 1>() += 0.5 * yaw2 * across;
   P.bottomLeftCorner<1, 3>() += 0.5 * yaw2 * across.transpose();

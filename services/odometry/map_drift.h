@@ -6,11 +6,11 @@
 namespace chase::odometry {
 
 struct DriftConfig {
-  double yaw = 1.0e-4;             ///< rad per root m
-  double position = 0.0005;        ///< m per root m
-  double slope = 1e-4;             ///< rad per root m
-  double first_position = 0.0003;  ///< m
-  double first_yaw = 1e-4;         ///< rad
+  double yaw = 5e-5;               ///< rad per root m
+  double position = 0.0002;        ///< m per root m
+  double slope = 5e-5;             ///< rad per root m
+  double first_position = 0.0007;  ///< m
+  double first_yaw = 1.5e-4;       ///< rad
   double spacing = 3.0;            ///< m
   double sight = 9.0;              ///< m
 
@@ -18,7 +18,7 @@ struct DriftConfig {
   void Visit(V& v) {
     v("yaw", yaw, "error of heading that the map gathers on its way, rad per root m");
     v("position", position, "the same of its place, m per root m");
-    v("slope", slope, "and of its height at the usual distance of what is seen, rad per root m");
+    v("slope", slope, "and per metre of the usual distance of what is seen, rad per root m");
     v("first_position", first_position, "error of the map at the start, m");
     v("first_yaw", first_yaw, "the same of its heading, rad");
     v("spacing", spacing, "of the places that are remembered, m");
@@ -28,10 +28,10 @@ struct DriftConfig {
 
 /// How far the local map may be off where the body is. A match with the map tells where the body is
 /// in it, however often it is repeated; the map itself was placed sweep by sweep, and its heading
-/// and place went astray like a random walk along the way on which it was made. Gravity keeps it
-/// level; its height goes astray by what is seen at a slant, the more the farther that is. Coming
-/// back to a place that was mapped early brings back that place's small error: the shortest chain
-/// of remembered places counts.
+/// and place went astray like a random walk along the way on which it was made, the place the more
+/// the farther away the surfaces are that it is taken from. Gravity keeps it level. Coming back to
+/// a place that was mapped early brings back that place's small error: the shortest chain of
+/// remembered places counts.
 class MapDrift {
  public:
   using Covariance = Eigen::Matrix4d;  ///< of (p, yaw) of the map: m, rad

@@ -12,6 +12,7 @@ namespace {
 constexpr double kKnotStep = 0.005;         // s, of the motion over a sweep
 constexpr double kLongestReplay = 3.0;      // s of inertial samples kept for late sweeps
 constexpr double kWaitForImu = 0.08;        // s that a sweep may be ahead of the IMU
+constexpr double kUsualGap = 0.25;          // s between sweeps that were of use
 constexpr double kLargestInnovation = 1.5;  // m
 
 Pose ExtrinsicsOf(const world::Rig& rig) {
@@ -174,6 +175,8 @@ bool Odometry::Prepare(Pending pending, Prepared* prepared) {
   prepared->track = {base_};
   prepared->predicted = base_;
   imu_.Advance(prepared->end, &prepared->predicted, &prepared->track);
+  const double gap = prepared->end - health_.last_good_sweep();
+  if (gap > kUsualGap) Doubt(config_.filter, gap, &prepared->predicted);
   return true;
 }
 

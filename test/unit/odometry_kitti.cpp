@@ -2,6 +2,7 @@
 
 #include <lzma.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <filesystem>
@@ -28,22 +29,26 @@ std::vector<uint8_t> Unpacked(const std::string& file) {
   return out;
 }
 
-float TimeOf(const Eigen::Vector3f& p, const SweepTiming& timing) {
-  if (timing.no_time) return 0.1f;
-  const double azimuth = std::atan2(p.y(), p.x());
+constexpr double kSweep = 0.1;  // s
+
+float TimeOf(double x, double y, const SweepTiming& timing) {
+  if (timing.no_time) return static_cast<float>(kSweep);
+  const double azimuth = std::atan2(y, x);
   double turned = timing.clockwise ? timing.cut_azimuth - azimuth : azimuth - timing.cut_azimuth;
   turned -= 2.0 * M_PI * std::floor(turned / (2.0 * M_PI));
-  return static_cast<float>(0.1 * turned / (2.0 * M_PI));
+  return static_cast<float>(kSweep * std::min(turned / (2.0 * M_PI), 1.0 - 1e-6));
 }
 
+/// As `chase-log import kitti16` has it: the lowest ring is the first.
 SweepPoint PointAt(const uint8_t* record, const SweepTiming& timing) {
   int16_t xyz[3];
   std::memcpy(xyz, record, sizeof xyz);
   SweepPoint point;
-  point.p = Eigen::Vector3f(xyz[0], xyz[1], xyz[2]) * 0.004f;
-  point.t = TimeOf(point.p, timing);
+  const Eigen::Vector3d p = Eigen::Vector3d(xyz[0], xyz[1], xyz[2]) * 0.004;
+  point.p = p.cast<float>();
+  point.t = TimeOf(p.x(), p.y(), timing);
   point.intensity = record[6];
-  point.ring = record[7];
+  point.ring = static_cast<uint8_t>(15 - std::min<int>(record[7], 15));
   return point;
 }
 
@@ -66,8 +71,10 @@ std::vector<Sweep> LoadKittiSweeps(const SweepTiming& timing) {
     at += 4;
     if (at + 8 * static_cast<size_t>(n) > bytes.size()) return {};
     Sweep sweep;
-    sweep.start = 0.1 * static_cast<double>(sweeps.size());
+    sweep.start = kSweep * static_cast<double>(sweeps.size());
     for (uint32_t i = 0; i < n; ++i, at += 8) sweep.points.push_back(PointAt(&bytes[at], timing));
+    std::stable_sort(sweep.points.begin(), sweep.points.end(),
+                     [](const SweepPoint& a, const SweepPoint& b) { return a.t < b.t; });
     sweeps.push_back(std::move(sweep));
   }
   return sweeps;

@@ -59,6 +59,40 @@ TEST(Alignment, SettlingBodyIsWaitedForAFlyingOneIsNot) {
   }
 }
 
+/// A body that slides and turns while it comes to rest, `t` s after power-on.
+Pose Settling(double t) {
+  const double x = std::min(1.0, t / 0.25), s = x * x * x * (10.0 + x * (-15.0 + 6.0 * x));
+  return {math::FromYaw(0.7 + 0.03 * s) * math::ExpSO3(s * Eigen::Vector3d(0.03, -0.05, 0.0)),
+          Eigen::Vector3d(1.0, 2.0, 0.1) + s * Eigen::Vector3d(0.02, -0.03, -0.005)};
+}
+
+ImuSample SettlingImu(double t, Noise* noise) {
+  constexpr double h = 1e-4;
+  const Pose before = Settling(t - h), now = Settling(t), after = Settling(t + h);
+  const Eigen::Vector3d a = (before.p + after.p - 2.0 * now.p) / (h * h);
+  return {t, now.R.conjugate() * (a + Eigen::Vector3d(0.0, 0.0, 9.81)) + noise->Vector(0.02),
+          math::LogSO3(before.R.conjugate() * after.R) / (2.0 * h) +
+              Eigen::Vector3d(0.004, -0.002, 0.003) + noise->Vector(0.002)};
+}
+
+TEST(Alignment, PlaceAndHeadingAreThoseOfPowerOnAndWhatItMovedSince) {
+  double yaw2 = 0.0;
+  for (unsigned seed = 1; seed <= 10; ++seed) {
+    Alignment alignment(AlignmentConfig{});
+    Noise noise(seed);
+    double t = 0.0;
+    for (; !alignment.Complete(); t += 0.005) alignment.Add(SettlingImu(t, &noise));
+    ASSERT_TRUE(alignment.AtRest()) << seed;
+    const Pose truth = Settling(t);
+    const NavState state = alignment.Result(FilterConfig{}, Settling(0.0).p, 0.7);
+    EXPECT_LT((state.p - truth.p).norm(), 0.004) << seed;
+    const Eigen::Vector3d error = math::LogSO3(state.R_WB * truth.R.conjugate());
+    EXPECT_LT(error.norm(), 1e-3) << seed;
+    yaw2 += 0.1 * error.z() * error.z();
+  }
+  EXPECT_LT(std::sqrt(yaw2), 3e-4);  // as the state's covariance says
+}
+
 TEST(LevelFrame, GravityIsDownAndTheStartStaysWhereItIs) {
   Noise noise(3);
   for (int trial = 0; trial < 50; ++trial) {
