@@ -14,7 +14,8 @@ constexpr double kReshape = 0.02;   // m/sqrt(s), random walk of the outline
 constexpr double kCommon = 0.015;   // m, error of a sweep's pose, common to all reaches
 constexpr double kOutlier = 0.12;   // m, a reach this far from what the others say: new outline
 constexpr double kShrink = 0.03;    // share of an end no longer seen that a sweep forgets
-constexpr double kKnown = 0.15;     // m, standard deviation of an end that was in view
+constexpr double kDoubt = 0.05;     // m, by which a sweep doubts it before
+constexpr double kKnown = 0.15;     // m, standard deviation of an end that is still known
 constexpr double kMostTerm = 36.0;  // of a reach in a distance: one alone does not decide
 constexpr double kSquare = 20.0;    // m, larger than any mover
 
@@ -98,11 +99,13 @@ void BodyFilter::Uncover(const Reaches& seen, double unseen) {
     const Reach& reach = seen[static_cast<size_t>(k)];
     const double beyond = reach.along - Model(k, reach.age).dot(x_);
     if (reach.edge) continue;
-    if (beyond <= 0.0) {  // hidden, or never was: forgotten slowly
-      x_[4 + k] += kShrink * beyond;
+    if (beyond <= 0.0) {  // hidden, or never was: doubted first, then forgotten slowly
+      if (P_(4 + k, 4 + k) < kKnown * kKnown)
+        P_(4 + k, 4 + k) += kDoubt * kDoubt;
+      else
+        x_[4 + k] += kShrink * beyond;
       continue;
     }
-    if (P_(4 + k, 4 + k) < kKnown * kKnown) continue;  // its end has been seen: something else
     x_[4 + k] += beyond;
     P_.row(4 + k).setZero();
     P_.col(4 + k).setZero();

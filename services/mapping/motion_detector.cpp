@@ -52,10 +52,10 @@ std::vector<MotionDetector::Candidate> MotionDetector::Candidates(
     const bool doubted =
         voxel && (voxel->free_sweeps >= ever_free_ || (awaited && voxel->hits < kSettledHits));
     if (voxel && voxel->occupied && !doubted) continue;
-    const bool seed = awaited || InEverFree(r.key, grid);
+    const bool strong = InEverFree(r.key, grid);
     candidates.push_back({Code(static_cast<int>(std::floor(p.x() / config_.cluster_cell)),
                                static_cast<int>(std::floor(p.y() / config_.cluster_cell))),
-                          static_cast<int>(i), seed});
+                          static_cast<int>(i), strong, strong || awaited});
   }
   std::sort(candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) {
     return a.cell != b.cell ? a.cell < b.cell : a.index < b.index;
@@ -67,14 +67,15 @@ std::vector<Cluster> MotionDetector::Connected(const std::vector<Candidate>& can
   struct Bin {
     int64_t cell;
     size_t first, last;
-    int seeds;
+    int strong, seeds;
     bool taken;
   };
   std::vector<Bin> bins;
   for (size_t i = 0; i < candidates.size(); ++i) {
     if (bins.empty() || bins.back().cell != candidates[i].cell)
-      bins.push_back({candidates[i].cell, i, i, 0, false});
+      bins.push_back({candidates[i].cell, i, i, 0, 0, false});
     bins.back().last = i + 1;
+    bins.back().strong += candidates[i].strong;
     bins.back().seeds += candidates[i].seed;
   }
   const auto find = [&](int64_t cell) {
@@ -98,6 +99,8 @@ std::vector<Cluster> MotionDetector::Connected(const std::vector<Candidate>& can
         for (int dy = -1; dy <= 1; ++dy) {
           Bin* bin = find(front[head]->cell + (static_cast<int64_t>(dx) << 32) + dy);
           if (!bin || bin->taken) continue;
+          // What merely lies beside a place where a mover is expected is not its own.
+          if (front[head]->strong == 0 && bin->seeds == 0) continue;
           bin->taken = true;
           front.push_back(bin);
         }

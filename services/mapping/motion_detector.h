@@ -35,7 +35,8 @@ class MotionDetector {
   struct Candidate {
     int64_t cell;  ///< code of its cluster cell in plan
     int index;     ///< into the returns
-    bool seed;     ///< lies in ever-free space
+    bool strong;   ///< lies in ever-free space
+    bool seed;     ///< does, or where a mover is expected
   };
   std::vector<Candidate> Candidates(const std::vector<Return>& returns, VoxelGrid* grid,
                                     const std::vector<Ellipse>& expected) const;
