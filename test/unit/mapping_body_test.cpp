@@ -72,6 +72,33 @@ TEST(MappingBody, WhatComesIntoViewIsNoMotion) {
   }
 }
 
+/// A trunk hides first the front, then the rear of a body that passes behind it.
+TEST(MappingBody, WhatWasHiddenAndIsBackIsNoMotion) {
+  constexpr double kSpeed = 3.0;
+  BodyFilter body;
+  for (int i = 0; i < 50; ++i) {
+    const double x = kSpeed * kStep * i;
+    double front = 1.5, rear = -1.5;
+    if (i >= 20 && i < 26) front = -0.2;
+    if (i >= 26 && i < 32) rear = 0.2;
+    Reaches seen = Box({x + 0.5 * (front + rear), 0.0}, {0.5 * (front - rear), 0.6});
+    for (int k = 0; k < kDirections; ++k) {
+      const double dx = Direction(k).x();
+      if ((dx > 0.01 && front < 1.5) || (dx < -0.01 && rear > -1.5))
+        seen[static_cast<size_t>(k)].edge = false;
+    }
+    if (i == 0) {
+      body = BodyFilter({0.0, 0.0}, seen, 2.5, kUnseen);
+      continue;
+    }
+    body.Predict(kStep, 0.8);
+    body.Correct(seen, kSigma, kUnseen);
+    if (i > 10) {
+      EXPECT_NEAR(body.v().x(), kSpeed, 0.1) << i;
+    }
+  }
+}
+
 TEST(MappingBody, AnEndThatJumpsIsAnotherOutline) {
   BodyFilter body({0.0, 0.0}, Box({0.0, 0.0}, {1.0, 0.5}), 2.5, kUnseen);
   for (int i = 1; i < 40; ++i) {

@@ -61,6 +61,27 @@ TEST(MappingGrid, RayBesideReturnsDoesNotClearThem) {
   EXPECT_TRUE(f.Occupied(surface));
 }
 
+TEST(MappingGrid, OnlyWhatABodyLeftOnItsWayIsCleared) {
+  Fixture f;
+  const auto body = [](int i) { return Eigen::Vector3d(1.1 + 0.3 * i, 2.1, 0.1); };
+  const Eigen::Vector3d stands(2.3, 1.9, 0.1), beside(2.3, 3.3, 0.1), later(1.5, 1.9, 0.1);
+  const int n = 9;
+  for (int i = 0; i <= n; ++i) {
+    std::vector<Eigen::Vector3d> points = {body(i), body(i), stands, stands};
+    if (i == 4) points.insert(points.end(), {beside, beside});  // while the body passes
+    if (i == n - 1) points.insert(points.end(), {later, later});
+    f.Insert(points);
+  }
+  for (int i = 0; i <= n; ++i) EXPECT_TRUE(f.Occupied(body(i))) << i;
+  Ellipse outline{body(n).head<2>(), Eigen::Vector2d(9.0, 9.0).asDiagonal()};
+  f.integrator.ClearPassed(outline, {0.3, 0.0}, 20.0, -1.0, 1.0);
+  for (int i = 0; i < n - 1; ++i) EXPECT_FALSE(f.Occupied(body(i))) << i;
+  EXPECT_TRUE(f.Occupied(body(n)));
+  EXPECT_TRUE(f.Occupied(stands));  // hit for longer than the body can have been there
+  EXPECT_TRUE(f.Occupied(beside));
+  EXPECT_TRUE(f.Occupied(later));  // the body had long left
+}
+
 TEST(MappingGrid, WindowRollsWithoutGhosts) {
   Fixture f;
   const Eigen::Vector3d thing(2.1, 0.1, 0.1);

@@ -81,6 +81,40 @@ TEST(MappingTracker, WhatStandsIsNeverListed) {
   }
 }
 
+/// What is seen now and then only may be anything.
+TEST(MappingTracker, DetectionsWithGapsMakeNoMover) {
+  Tracker tracker(MoverConfig{});
+  for (int i = 0; i < 60; ++i) {
+    tracker.Predict(0.1 * i);
+    std::vector<Cluster> clusters;
+    if (i >= 40 || i % 3 != 2) clusters.push_back(BoxCluster({0.2 * i, 0.0}, 0.5));
+    tracker.Update(Panorama(), &clusters);
+    if (i < 40) {
+      EXPECT_TRUE(tracker.Obstacles(1.5, 8.0, 1.0).empty()) << i;
+    }
+  }
+  EXPECT_EQ(tracker.Obstacles(1.5, 8.0, 1.0).size(), 1u);
+}
+
+TEST(MappingDetector, WhatLiesBesideAnExpectedPlaceDoesNotJoin) {
+  VoxelGrid grid(0.2);
+  grid.MoveTo(Eigen::Vector3d::Zero());
+  std::vector<Return> returns;
+  const auto add = [&](double x) {
+    for (int i = 0; i < 12; ++i) {
+      const Eigen::Vector3d p(x, 0.02 * i, 1.0 + 0.02 * i);
+      returns.push_back({p.cast<float>(), grid.ToKey(p)});
+    }
+  };
+  add(5.3);
+  add(5.65);  // in the next cell of the clusters
+  const Ellipse expected{{5.0, 0.0}, Eigen::Vector2d(4.0, 4.0).asDiagonal()};
+  MotionDetector detector(MoverConfig{}, GridConfig{});
+  const auto clusters = detector.Detect({0.0, 0.0, 1.0}, returns, &grid, {expected});
+  ASSERT_EQ(clusters.size(), 1u);
+  EXPECT_EQ(clusters[0].members.size(), 12u);
+}
+
 /// What lies where a mover was expected, and shows no end, keeps no track alive.
 TEST(MappingTracker, WhatShowsNoEndIsNoSight) {
   Tracker tracker(MoverConfig{});
