@@ -12,9 +12,9 @@ constexpr double kLeastView = 2.0, kMostView = 50.0;  // m
 
 }  // namespace
 
-void MapDrift::Begin(const Covariance& before) {
+void MapDrift::Begin(const Covariance& match) {
   places_.clear();
-  covariance_ = before;
+  covariance_ = config_.first_match * config_.first_match * match;
   covariance_.diagonal().head<3>().array() += config_.first_position * config_.first_position;
   covariance_(3, 3) += config_.first_yaw * config_.first_yaw;
 }

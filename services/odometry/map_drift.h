@@ -7,10 +7,11 @@ namespace chase::odometry {
 
 struct DriftConfig {
   double yaw = 5e-5;               ///< rad per root m
-  double position = 0.0002;        ///< m per root m
-  double slope = 5e-5;             ///< rad per root m
-  double first_position = 0.0007;  ///< m
-  double first_yaw = 1.5e-4;       ///< rad
+  double position = 0.0001;        ///< m per root m
+  double slope = 6e-5;             ///< rad per root m
+  double first_position = 0.0003;  ///< m
+  double first_yaw = 1e-4;         ///< rad
+  double first_match = 0.7;        ///< 1
   double spacing = 3.0;            ///< m
   double sight = 9.0;              ///< m
 
@@ -21,6 +22,7 @@ struct DriftConfig {
     v("slope", slope, "and per metre of the usual distance of what is seen, rad per root m");
     v("first_position", first_position, "error of the map at the start, m");
     v("first_yaw", first_yaw, "the same of its heading, rad");
+    v("first_match", first_match, "and share of the deviation of the first match in both");
     v("spacing", spacing, "of the places that are remembered, m");
     v("sight", sight, "a remembered place this near still holds the body, m");
   }
@@ -42,8 +44,9 @@ class MapDrift {
   /// place if it is new.
   void MoveTo(const Eigen::Vector3d& p_M, double view);
 
-  /// A new map, begun where the body's own place is known as well as `before`.
-  void Begin(const Covariance& before);
+  /// A new map. What it is made of at first lies as well as the first sweeps match each other:
+  /// `match` is the covariance of such a match.
+  void Begin(const Covariance& match);
 
   const Covariance& covariance() const { return covariance_; }
   size_t places() const { return places_.size(); }

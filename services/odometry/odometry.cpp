@@ -142,7 +142,7 @@ SweepResult Odometry::ProcessSweep() {
   }
   RestartMapWhenLost(prepared.end);
   if (applied || planes_.cells() == 0) Learn(prepared, base_.pose());
-  if (applied && result.match.valid) drift_.MoveTo(base_.p, result.match.view);
+  if (applied && !first) FollowDrift(result.match);
   Catchup();
   result.registered = Registered(prepared);
   if (blind) result.pose = Estimate();
@@ -231,6 +231,16 @@ void Odometry::Learn(const Prepared& prepared, const Pose& X_WB) {
     edges_.Add(R * point.p + p);
   planes_.Prune(p);
   edges_.Prune(p);
+}
+
+void Odometry::FollowDrift(const MatchResult& match) {
+  if (drift_.places() == 0 && !match.degenerate()) {
+    const Matrix6d covariance = match.information.inverse();
+    MapDrift::Covariance first = MapDrift::Covariance::Zero();
+    first.diagonal() << covariance.diagonal().head<3>(), covariance(5, 5);
+    if (first.allFinite()) drift_.Begin(first);
+  }
+  drift_.MoveTo(base_.p, match.view);
 }
 
 void Odometry::RestartMapWhenLost(double end) {

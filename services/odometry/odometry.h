@@ -88,6 +88,7 @@ class Odometry {
   void Bend(const Pose& X_WB, Prepared* prepared) const;
   bool Apply(const Prepared& prepared, const MatchResult& match);
   void Learn(const Prepared& prepared, const Pose& X_WB);
+  void FollowDrift(const MatchResult& match);
   void RestartMapWhenLost(double end);
   void Catchup();
   RegisteredSweep Registered(const Prepared& prepared) const;
