@@ -182,6 +182,30 @@ TEST(MapDrift, GrowsWithTheWayAndIsForgottenAtHome) {
   EXPECT_GT(eigen.eigenvalues().minCoeff(), 0.0);
 }
 
+TEST(MapDrift, BeginsAsTheFirstMatchDoes) {
+  MapDrift drift(DriftConfig{});
+  const double before = drift.covariance()(3, 3);
+  MapDrift::Covariance match = MapDrift::Covariance::Identity();
+  match.diagonal() << 4e-6, 1e-6, 1e-6, 9e-8;
+  drift.Begin(match);
+  EXPECT_GT(drift.covariance()(0, 0), drift.covariance()(1, 1));
+  EXPECT_GT(drift.covariance()(3, 3), 2.0 * before);
+  const MapDrift::Covariance first = drift.covariance();
+  drift.MoveTo({1.0, 2.0, 3.0}, 8.0);
+  EXPECT_LT((drift.covariance() - first).norm(), 1e-12);  // where the map begins
+}
+
+/// The farther away the surfaces, the less the same turn of them holds the place.
+TEST(MapDrift, PlaceGoesAstrayWithTheDistanceOfWhatIsSeen) {
+  MapDrift near(DriftConfig{}), far(DriftConfig{});
+  for (int i = 0; i <= 30; ++i) {
+    near.MoveTo({1.0 * i, 0.0, 0.0}, 5.0);
+    far.MoveTo({1.0 * i, 0.0, 0.0}, 20.0);
+  }
+  EXPECT_GT(far.covariance()(0, 0), 4.0 * near.covariance()(0, 0));
+  EXPECT_DOUBLE_EQ(far.covariance()(3, 3), near.covariance()(3, 3));
+}
+
 TEST(MapDrift, RemembersABoundedNumberOfPlaces) {
   MapDrift drift(DriftConfig{});
   for (int i = 0; i < 20000; ++i) drift.MoveTo({1.0 * i, 0.0, 0.0}, 10.0);

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <Eigen/Eigenvalues>
 #include <cmath>
 
 #include "common/math/rotation.h"
@@ -193,6 +194,37 @@ TEST(ErrorStateFilter, UpdateWithoutInformationIsRefused) {
   z.information.setZero();
   EXPECT_FALSE(Update(FilterConfig{}, z, &state).applied);
   EXPECT_TRUE(state.p.allFinite());
+}
+
+/// Without IMU the poses alone give the velocity; exact ones must not make it swing for ever.
+TEST(ErrorStateFilter, VelocityFromExactPosesSettles) {
+  const FilterConfig config;
+  NavState state;
+  state.P.diagonal().segment<3>(kV).setConstant(100.0);
+  PoseMeasurement z{Pose{}, Eigen::Matrix<double, 6, 6>::Identity(),
+                    1e12 * Eigen::Matrix<double, 6, 6>::Identity()};
+  for (int i = 1; i <= 60; ++i) {
+    z.X_WB.p.x() += 0.1 * (i <= 40 ? 1.0 : 2.0);
+    PropagateBlind(config, 0.1 * i, &state);
+    ASSERT_TRUE(Update(config, z, &state).applied) << i;
+    if (i == 40) {
+      EXPECT_NEAR(state.v.x(), 1.0, 1e-3);
+    }
+  }
+  EXPECT_NEAR(state.v.x(), 2.0, 1e-3);
+}
+
+TEST(ErrorStateFilter, DoubtOpensTheCovarianceForAConstantError) {
+  const FilterConfig config;
+  NavState state;
+  state.P.setIdentity();
+  state.P *= 1e-8;
+  constexpr double kGap = 2.0;
+  Doubt(config, kGap, &state);
+  const double e = 0.5 * config.doubt_accel * kGap * kGap;
+  EXPECT_GT(9.0 * state.P(kP, kP), e * e);
+  EXPECT_GT(9.0 * state.P(kV, kV), std::pow(config.doubt_accel * kGap, 2));
+  EXPECT_GT(state.P.selfadjointView<Eigen::Lower>().eigenvalues().minCoeff(), 0.0);
 }
 
 TEST(CorrectionBlend, SpreadsAJumpWithoutLosingIt) {
