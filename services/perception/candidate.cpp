@@ -2,15 +2,17 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <cmath>
 
 namespace chase::perception {
 
 namespace {
 
-constexpr double kMoved = 0.06;      // m,
-constexpr double kMovedPx = 4.0;     // that an edge may seem to move where something hides it, and
-constexpr double kMovedGate = 11.8;  // squared distance, 2 dof, that chance does not reach
-constexpr double kBetter = 0.25;     // share of the first variance from which a start is taken anew
+constexpr double kMoved = 0.04, kMovedPx = 2.5;  // m and px that an edge may seem to move
+constexpr double kMovedUnclear = 0.06, kMovedUnclearPx = 4.0;  // where something may hide it
+constexpr double kMovedGate = 11.8;   // squared distance, 2 dof, that chance does not reach
+constexpr double kKnownSigmas = 2.0;  // from which a way along the line of sight counts
+constexpr double kBetter = 0.25;  // share of the first variance from which a start is taken anew
 
 }  // namespace
 
@@ -20,14 +22,24 @@ void Candidate::Correct(const Sighting& sighting) {
   const auto spread = [](const TargetGaussian& g) {
     return g.covariance.topLeftCorner<2, 2>().trace();
   };
-  if (!Drives() && spread(track.state) < kBetter * spread(first)) first = track.state;
+  if (Drives() || spread(track.state) > kBetter * spread(first)) return;
+  first = track.state;
+  ranged = sighting.n_points > 0;
 }
 
 bool Candidate::Drives() const {
-  const Eigen::Vector2d d = (track.state.position() - first.position()).head<2>();
-  const Eigen::Matrix2d P =
+  Eigen::Vector2d d = (track.state.position() - first.position()).head<2>();
+  Eigen::Matrix2d P =
       track.state.covariance.topLeftCorner<2, 2>() + first.covariance.topLeftCorner<2, 2>();
-  return d.norm() > std::max(kMoved, kMovedPx * px) && d.dot(P.ldlt().solve(d)) > kMovedGate;
+  if (!ranged) P += range_px * range_px.transpose();  // edges err alike from frame to frame
+  if (d.dot(P.ldlt().solve(d)) < kMovedGate) return false;
+  const Eigen::Vector2d n = range_px.normalized();
+  const double along = n.dot(d), sigma = std::sqrt(n.dot(P * n));
+  if (std::abs(along) < kKnownSigmas * sigma) d -= along * n;  // may be no way at all
+  const auto& cut = last.detection.cut;
+  const bool clear = ranged && std::none_of(cut.begin(), cut.end(), [](bool c) { return c; });
+  return d.norm() >
+         (clear ? std::max(kMoved, kMovedPx * px) : std::max(kMovedUnclear, kMovedUnclearPx * px));
 }
 
 }  // namespace chase::perception

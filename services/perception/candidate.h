@@ -11,6 +11,9 @@ struct Candidate {
   double since = 0.0;    ///< when it was first seen, s
   Sighting last;         ///< the last one
   double px = 0.0;       ///< what one pixel spans there, m
+  bool ranged = false;   ///< `first` has its range from LiDAR points, not from the size alone
+  /// Along the line of sight, as far as one pixel less of its height moves it; frame W, m.
+  Eigen::Vector2d range_px = Eigen::Vector2d::UnitX();
 
   /// Takes over a sighting at the track's time.
   void Correct(const Sighting& sighting);

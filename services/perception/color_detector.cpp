@@ -11,7 +11,8 @@ namespace chase::perception {
 namespace {
 
 constexpr double kMaskScore = 127.0;  // half of full score: the blob's pixels
-constexpr double kWellShaped = 0.35;  // score of a blob that is one thing
+constexpr double kOneThing = 0.85;    // score of a blob that is surely not several
+constexpr double kWellShaped = 0.35;  // of a piece of one that may be
 constexpr int kSplitArea = 60;        // px^2 of a blob that may be several
 constexpr size_t kMostPieces = 6;
 
@@ -68,9 +69,10 @@ void ColorDetector::AddPieces(const cv::Mat& bgr, const cv::Mat& score,
                               std::vector<Detection>* found) const {
   std::vector<Detection> pieces;
   for (const auto& whole : *found) {
-    if (whole.score > kWellShaped || cv::countNonZero(whole.mask) < kSplitArea) continue;
+    if (whole.score > kOneThing || cv::countNonZero(whole.mask) < kSplitArea) continue;
     for (auto& piece : SplitColumns(bgr, whole)) {
       Rate(score, &piece);
+      piece.part = whole.score > kWellShaped;
       if (piece.score > kWellShaped) pieces.push_back(std::move(piece));
     }
   }

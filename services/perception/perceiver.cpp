@@ -11,6 +11,7 @@ constexpr double kUnknownVariance = 1e4;  // m^2, while nothing is known
 constexpr double kGateSigmas = 3.0;
 constexpr int kCandidateMisses = 2;  // frames without it that end a candidate
 constexpr size_t kMaxCandidates = 6;
+constexpr double kLeastWidthPx = 6.0;  // what is narrower may be a slit between things
 constexpr int kDecoyHits = 3;  // sightings that what stands beside one that drives counts for
 constexpr double kReachMargin = 0.5;    // m
 constexpr double kReachGate = 11.3;     // squared distance from a hidden target's prediction, 3 dof
@@ -86,7 +87,8 @@ void Perceiver::Follow(View* view) {
 
 void Perceiver::FollowCandidates(View* view) {
   for (auto& c : candidates_) {
-    const auto again = finder_.Find(c.track, view, [](const Sighting&) { return false; });
+    const auto again =
+        finder_.Find(c.track, view, [](const Sighting& s) { return s.detection.part; });
     if (again && again->fit.whole)
       c.Correct(*again);
     else
@@ -102,11 +104,15 @@ void Perceiver::DropMissed() {
       candidates_.end());
 }
 
+/// A piece of something larger is the target only where the target is expected.
+bool Perceiver::MayBeNew(const Detection& d) const {
+  return !d.part && d.score >= config_.state.acquire_score && d.box.width >= kLeastWidthPx;
+}
+
 void Perceiver::AddCandidates(View* view) {
   std::vector<size_t> order;  // near before far, the middle before the border
   for (size_t i = 0; i < view->detections.size(); ++i)
-    if (!view->taken[i] && view->detections[i].score >= config_.state.acquire_score)
-      order.push_back(i);
+    if (!view->taken[i] && MayBeNew(view->detections[i])) order.push_back(i);
   std::stable_sort(order.begin(), order.end(), [&](size_t a, size_t b) {
     return Prominence(view->detections[a], config_.rig) >
            Prominence(view->detections[b], config_.rig);
@@ -116,9 +122,10 @@ void Perceiver::AddCandidates(View* view) {
     const auto found = finder_.Acquire(*view, view->detections[i]);
     if (!found || !Plausible(found->fit.posterior.position(), view->t)) continue;
     const TargetTrack track{found->fit.posterior, found->fit.shape, view->t, view->t, 1, 0};
-    const double range = (track.state.position() - view->camera.p_WC).norm();
-    candidates_.push_back(
-        {track, found->fit.posterior, view->t, *found, range / config_.rig.focal_px});
+    const Eigen::Vector3d sight = track.state.position() - view->camera.p_WC;
+    candidates_.push_back({track, found->fit.posterior, view->t, *found,
+                           sight.norm() / config_.rig.focal_px, found->n_points > 0,
+                           sight.head<2>() / found->detection.box.height});
   }
 }
 
@@ -194,7 +201,7 @@ void Perceiver::Remember(const View& view) {
   const size_t n = view.detections.size();
   for (size_t k = 0; k < n; ++k) {
     const size_t i = (k + turn_) % n;
-    if (view.taken[i] || view.detections[i].score < config_.state.acquire_score) continue;
+    if (view.taken[i] || !MayBeNew(view.detections[i])) continue;
     turn_ = i + 1;
     const auto found = finder_.Acquire(view, view.detections[i]);
     if (!found) return;

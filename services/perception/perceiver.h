@@ -50,6 +50,7 @@ class Perceiver {
   void Judge(double t);
   TargetEstimate Report(double t, const std::optional<View>& view, std::string note) const;
 
+  bool MayBeNew(const Detection& d) const;
   bool Vague() const;
   bool Sure(const Sighting& s) const;
   bool Ready(const Candidate& candidate, double t) const;

@@ -107,8 +107,8 @@ struct DetectorConfig {
 
 /// Standard deviations of what is measured and limits of what is believed.
 struct FitConfig {
-  double edge_sigma_px = 0.5, edge_weight = 2.0;
-  double lidar_sigma = 0.025, lidar_weight = 8.0;
+  double edge_sigma_px = 0.5, edge_weight = 3.0;
+  double lidar_sigma = 0.025, lidar_weight = 16.0;
   double edge_gate_px = 1.5, prior_gate = 30.0, lidar_gate = 0.35;
   bool estimate_shape = false;
   double shape_sigma = 0.03;
@@ -133,7 +133,7 @@ struct FitConfig {
 
 /// Constant velocity with white acceleration, and the honesty of what is published.
 struct MotionConfig {
-  double acceleration_density = 0.5, vertical_density = 0.02;
+  double acceleration_density = 0.012, hidden_density = 0.5, vertical_density = 0.02;
   double initial_speed_sigma = 1.2, initial_vertical_speed_sigma = 0.1;
   double max_speed = 5.0, hidden_time = 3.0, ground_sigma = 0.15;
   double floor_sigma = 0.003, pose_sigma = 0.005, tilt_sigma_deg = 0.35, heading_sigma_deg = 0.12;
@@ -141,6 +141,8 @@ struct MotionConfig {
   template <class V>
   void Visit(V& v) {
     v("acceleration_density", acceleration_density, "of horizontal acceleration, m^2/s^3");
+    v("hidden_density", hidden_density,
+      "the same while it is not seen: a turn lasts, and adds up over seconds, m^2/s^3");
     v("vertical_density", vertical_density, "of vertical acceleration, m^2/s^3");
     v("initial_speed_sigma", initial_speed_sigma, "of a new target, horizontal, m/s");
     v("initial_vertical_speed_sigma", initial_vertical_speed_sigma, "of a new target, m/s");

@@ -13,7 +13,8 @@ constexpr double kSideFrom = 0.25;      // rows used for left and right, share o
 constexpr double kSideTo = 0.85;        // without the caps
 constexpr double kCapHalfWidth = 0.22;  // columns used for top and bottom, around the middle
 constexpr double kMinContrast = 30.0;   // colour difference that allows placing between pixels
-constexpr int kReach = 3;               // pixels looked at on either side of an edge
+constexpr int kLeastDepth = 4;          // pixels across, fewer are not placed between pixels
+constexpr int kCutReach = 3;            // px from a window's border within which it has cut
 constexpr size_t kMostLines = 6;        // that a blob is split along
 constexpr int kLeastPiece = 5;          // px, width of a piece
 constexpr int kBorder = 1;              // px; nearer to the image's border counts as cut
@@ -36,19 +37,18 @@ struct Line {
   }
 };
 
-/// Where the edge lies, px from the first pixel's outer side, positive into the blob: the pixels
-/// around it are mixtures of inside and outside, and their shares add up to the place.
+/// Where the edge lies, px from the first pixel's outer side, positive into the blob: the two
+/// pixels at the edge are mixtures of their neighbours, and their shares add up to the place.
+/// Neighbours further off may be of another shade.
 double EdgeOffset(const Line& line, int depth) {
-  if (depth < 2 * kReach || !line.Has(-kReach - 1)) return 0.0;
-  const Color inside = 0.5 * (line.At(kReach - 1) + line.At(kReach));
-  const Color outside = 0.5 * (line.At(-kReach) + line.At(-kReach - 1));
+  if (depth < kLeastDepth || !line.Has(-2)) return 0.0;
+  const Color inside = line.At(1), outside = line.At(-2);
   const Color span = inside - outside;
   if (span.norm() < kMinContrast) return 0.0;
   double covered = 0.0;
-  for (int i = 1 - kReach; i < kReach - 1; ++i)
+  for (const int i : {-1, 0})
     covered += std::clamp((line.At(i) - outside).dot(span) / span.squaredNorm(), 0.0, 1.0);
-  const double offset = (kReach - 1) - covered;
-  return std::abs(offset) < 1.5 ? offset : 0.0;
+  return 1.0 - covered;
 }
 
 /// First and last set pixel of a row or column, or (-1, -1).
@@ -117,7 +117,7 @@ void LeaveOutCut(const Detection& whole, const cv::Rect& window, Detection* piec
                                         : window.br().y;
     const auto goes_on = [&](const Eigen::Vector2d& px) {
       const int along = static_cast<int>(std::lround(upright ? px.y() : px.x()));
-      return std::abs((upright ? px.x() : px.y()) - beyond) < kReach &&
+      return std::abs((upright ? px.x() : px.y()) - beyond) < kCutReach &&
              (upright ? On(whole, beyond, along) : On(whole, along, beyond));
     };
     const bool some = !samples.empty();
@@ -126,18 +126,26 @@ void LeaveOutCut(const Detection& whole, const cv::Rect& window, Detection* piec
   }
 }
 
-/// Columns at which the blob's upper or lower end jumps: there one thing ends before another.
+/// Columns at which the blob's upper or lower end jumps: there one thing ends before another. Of
+/// those closer together than a piece may be wide, as where a side leans or threads join two
+/// things, the highest.
 std::vector<int> Jumps(const cv::Mat& mask) {
   const int least = std::max(3, mask.rows / 12);
   std::vector<std::pair<int, int>> ends;
   for (int x = 0; x < mask.cols; ++x) ends.push_back(Extent(mask.col(x)));
-  std::vector<int> jumps;
-  for (int x = 1; x < mask.cols; ++x) {
+  std::vector<std::pair<int, int>> jumps;  // column and height
+  for (int x = kLeastPiece; x <= mask.cols - kLeastPiece; ++x) {
     const auto &a = ends[static_cast<size_t>(x - 1)], &b = ends[static_cast<size_t>(x)];
     const int jump = std::max(std::abs(a.first - b.first), std::abs(a.second - b.second));
-    if (jump >= least) jumps.push_back(x);
+    if (jump < least) continue;
+    if (jumps.empty() || x - jumps.back().first >= kLeastPiece)
+      jumps.emplace_back(x, jump);
+    else if (jump > jumps.back().second)
+      jumps.back() = {x, jump};
   }
-  return jumps;
+  std::vector<int> columns;
+  for (const auto& jump : jumps) columns.push_back(jump.first);
+  return columns;
 }
 
 }  // namespace

@@ -13,8 +13,8 @@ void TargetTrack::Predict(double to, const MotionConfig& config) {
   Matrix6d F = Matrix6d::Identity();
   F.topRightCorner<3, 3>() = dt * Eigen::Matrix3d::Identity();
   if (misses > 0) F.bottomRightCorner<3, 3>() *= std::exp(-dt / config.hidden_time);
-  const Eigen::Vector3d q(config.acceleration_density, config.acceleration_density,
-                          config.vertical_density);
+  const double density = misses > 0 ? config.hidden_density : config.acceleration_density;
+  const Eigen::Vector3d q(density, density, config.vertical_density);
   Matrix6d Q = Matrix6d::Zero();
   Q.topLeftCorner<3, 3>() = (q * dt * dt * dt / 3.0).asDiagonal();
   Q.topRightCorner<3, 3>() = (q * dt * dt / 2.0).asDiagonal();
