@@ -11,7 +11,10 @@ namespace {
 
 double Bernstein(int n, int i, double x) {
   if (i < 0 || i > n) return 0.0;
-  return math::Binomial(n, i) * std::pow(x, i) * std::pow(1.0 - x, n - i);
+  double value = math::Binomial(n, i);
+  for (int k = 0; k < i; ++k) value *= x;
+  for (int k = i; k < n; ++k) value *= 1.0 - x;
+  return value;
 }
 
 // Gram matrix of the derivatives of the given order: integral over [0,T] of squares = b' G b.
@@ -70,6 +73,8 @@ CandidateTables::CandidateTables(const PlannerConfig& config, int degree_, int s
       phi_of[i][k] = phi[k][i];
       slope_of[i][k] = slope[k][i];
     }
+  for (int k = 0; k < kPadded; ++k)
+    for (int i = 0; i < 7; ++i) sample_of[i][k] = i < n ? Bernstein(degree, i, SampleAt(k)) : 0.0;
 }
 
 const CandidateTables& TableShelf::Get(int degree, int steps, double duration) {
@@ -94,16 +99,6 @@ void Extend(const Points& points, int n, Box* box) {
   }
 }
 
-// From the box to the nearest place of the centre, per axis; negative where they overlap.
-Eigen::Array3d GapTo(const Box& box, const Curve& center) {
-  Eigen::Array3d low = center.row(0).transpose().array(), high = low;
-  for (Eigen::Index k = 1; k < center.rows(); ++k) {  // tau^k is in [0,1]
-    low += center.row(k).transpose().array().min(0.0);
-    high += center.row(k).transpose().array().max(0.0);
-  }
-  return (low - box.high).max(box.low - high);
-}
-
 }  // namespace
 
 Box BoxOf(const Points& points, int n, double beyond) {
@@ -123,18 +118,15 @@ bool Contains(const Box& box, const Curve& curve) {
   return true;
 }
 
-// Along an axis the ellipsoid reaches the root of an entry of the inverse of R from its centre.
-bool MayTouch(const Box& box, const Curve& center, const Eigen::Matrix3d& R, double by) {
-  const double minor[3] = {R(1, 1) * R(2, 2) - R(1, 2) * R(1, 2),
-                           R(0, 0) * R(2, 2) - R(0, 2) * R(0, 2),
-                           R(0, 0) * R(1, 1) - R(0, 1) * R(0, 1)};
-  const double det = R(0, 0) * minor[0] - R(0, 1) * (R(0, 1) * R(2, 2) - R(1, 2) * R(0, 2)) +
-                     R(0, 2) * (R(0, 1) * R(1, 2) - R(1, 1) * R(0, 2));
-  // An ill-conditioned inverse is not trusted.
-  if (!(det > 1e-9 * R(0, 0) * R(1, 1) * R(2, 2))) return true;
-  const Eigen::Array3d gap = GapTo(box, center);
-  for (int a = 0; a < 3; ++a)
-    if (gap[a] > 0.0 && gap[a] * gap[a] * det > 1.001 * by * by * minor[a]) return false;
+bool MayTouch(const Box& box, const Curve& center, const Eigen::Array3d& half, double by) {
+  for (int a = 0; a < 3; ++a) {
+    double low = center(0, a), high = low;
+    for (Eigen::Index k = 1; k < center.rows(); ++k) {  // tau^k is in [0,1]
+      low += std::min(center(k, a), 0.0);
+      high += std::max(center(k, a), 0.0);
+    }
+    if (std::max(low - box.high[a], box.low[a] - high) > by * half[a]) return false;
+  }
   return true;
 }
 
@@ -173,8 +165,8 @@ void LimitToReach(const PlannerConfig& config, const CandidateTables& t, double 
   problem->near.clear();
   for (size_t j = 0; j < problem->obstacles.size(); ++j) {
     const Ellipsoid& e = problem->obstacles[j];
-    if (MayTouch(box, e.center, e.safety, std::max(1.0, config.cost_range)) ||
-        MayTouch(box, e.center, e.sight, 1.0))
+    if (MayTouch(box, e.center, e.safety_half, std::max(1.0, config.cost_range)) ||
+        MayTouch(box, e.center, e.sight_half, 1.0))
       problem->near.push_back(static_cast<int>(j));
   }
 }

@@ -29,6 +29,8 @@ struct CandidateTables {
   double slope[kNodes][7];            ///< and their derivatives with respect to t, 1/s
   static constexpr int kPadded = 24;  ///< nodes, the rest zero
   double phi_of[7][kPadded], slope_of[7][kPadded];  ///< the same by polynomial
+  double sample_of[7][kPadded];                     ///< and at equally spaced instants
+  static double SampleAt(int k) { return (k + 1.0) / kPadded; }
 
   CandidateTables() = default;
   CandidateTables(const PlannerConfig& config, int degree, int steps, double duration);
@@ -62,9 +64,9 @@ Box BoxOf(const Points& points, int n, double beyond);
 /// Whether the control points of the curve, of degree 6 at most, lie in the box.
 bool Contains(const Box& box, const Curve& curve);
 
-/// False only when the ellipsoid about the centre's path, grown `by` times, has no point in the
-/// box.
-bool MayTouch(const Box& box, const Curve& center, const Eigen::Matrix3d& R, double by);
+/// False only when a box of these half sides about the centre's path, `by` times as large, has no
+/// point in the box.
+bool MayTouch(const Box& box, const Curve& center, const Eigen::Array3d& half, double by);
 
 /// Sets `reach` to what holds all candidates, the target, and plans whose control points are at
 /// most `beyond` m from a candidate's; and `near` to the obstacles whose bounding boxes come into

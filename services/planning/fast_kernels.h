@@ -116,6 +116,17 @@ struct ProofInput {
   double size;  ///< bounds |coordinates| of points and centres, summed over power coefficients
 };
 
+/// One shape, what it is asked, and a plan and a target relative to its centre; double precision.
+struct FormInput {
+  int degree;                                         ///< of plan and target, 5 or 6
+  double x[kMaxDegree + 1][3], y[kMaxDegree + 1][3];  ///< control points of plan and target
+  double X, Y;                                        ///< bound their coordinates
+  double R[3][3];
+  double from;  ///< tau from which it is asked
+  bool sight;   ///< of the line of sight, else of the plan alone
+  bool exact;   ///< exact sight condition, else the paper's bound
+};
+
 /// What the skeletons of one step, or of several, add to the free control points (3 f + axis), and
 /// from kWhitened on, whitened, to the root of J1.
 constexpr int kWhitened = 16, kRecord = 32;
@@ -124,10 +135,14 @@ struct CandidateInput {
   const double* records;  ///< [step][choice][kRecord]
   const int* choices;     ///< [steps]
   int steps;
-  double base[kRecord];         ///< without skeletons
-  const float* first_whitened;  ///< [3 (M - 3)][row], of the first step
-  float j1_offset;              ///< J1 = j1_offset + |whitened|^2
-  double longest2;              ///< prefixes whose |whitened|^2 is above get infinite J1
+  double base[kRecord];               ///< without skeletons
+  const float* first_whitened;        ///< [3 (M - 3)][row], of the first step
+  double first_middle[3 * kMaxFree];  ///< of those
+  const float* second_whitened;       ///< [3 (M - 3)][second_row], of the second step, if any
+  int second_row;
+  float j1_offset;  ///< J1 = j1_offset + |whitened|^2
+  /// Where the prefix' whitened sum and first_middle are longer, squared, J1 may stay infinite.
+  float longest2;
 };
 
 constexpr int kPaddedNodes = 24;  // quadrature nodes; the padding weighs nothing
@@ -147,6 +162,20 @@ struct ObjectiveInput {
   double desired_distance, yaw_floor, cost_range;
   const double* near;  ///< [n_near][kNearSize]: R00 R01 R02 R11 R12 R22, centre at the nodes
   int n_near;
+};
+
+constexpr int kSamples = 24;  // equally spaced instants, the last at tau = 1
+
+/// Where plans pass shapes; local frame, shapes in columns of n.
+struct ClearanceInput {
+  int free;
+  int n, rows;           ///< n: padded
+  const double* R;       ///< [6][n]
+  const double* center;  ///< [2][3][n]: centres are linear in tau
+  const uint8_t* sight;  ///< [n]: the segment to the target counts, else the plan alone
+  double tau[kSamples], phi[kMaxFree][kSamples];
+  double at[3][kSamples];  ///< the plan without its free points
+  double target[3][kSamples];
 };
 
 /// Unweighted parts: J1's weighted value, and the integrals of (l - l_s)^2 below l_s, J3 and J4.
@@ -188,8 +217,12 @@ struct Table {
   int (*check_batch)(Context& c, int* ids, int* state, int n);
   /// holds[j] = 1 where bounds over the whole horizon prove what shape j asks.
   void (*prove)(const ProofInput& in, uint8_t* holds);
+  /// Above 0: what the shape asks holds, proven; below 0: it does not; 0: open at this depth.
+  int (*decide)(const FormInput& in, int depth);
   ObjectiveParts (*objective)(const ObjectiveInput& in, const double* x);
   void (*model)(const ObjectiveInput& in, const double* x, ObjectiveModel& out);
+  /// values[row][kSamples]: squared distance from the row's centre in its own shape; least[row].
+  void (*clearance)(const ClearanceInput& in, const double* x, double* values, double* least);
   const char* name;
 };
 

@@ -10,13 +10,14 @@ using kernels::kRecord;
 
 int FastProblem::Padded(int n) { return (n + kPad - 1) / kPad * kPad; }
 
-bool FastProblem::Set(const Problem& problem, const PlanProof& proof, float limit) {
+bool FastProblem::Set(const Problem& problem, PlanProof* proof, float limit) {
   problem_ = &problem;
-  proof_ = &proof;
-  has_obstacles_ = false;
+  proof_ = proof;
+  beyond_ = false;
+  has_obstacles_ = has_costs_ = false;
   const int M = problem.degree;
-  if (!proof.IsUsable() || problem.target.rows() > M + 1 || problem.skeletons.empty() ||
-      problem.skeletons.size() > 8 || problem.n_candidates() < 1)
+  if (problem.target.rows() > M + 1 || problem.skeletons.empty() || problem.skeletons.size() > 8 ||
+      problem.n_candidates() < 1)
     return false;
   for (const Ellipsoid& e : problem.obstacles)
     if (e.center.rows() > M + 1) return false;
@@ -39,12 +40,15 @@ bool FastProblem::Set(const Problem& problem, const PlanProof& proof, float limi
   c.yaw_floor = static_cast<float>(kYawDistanceFloor * kYawDistanceFloor);
   c.cost_range = static_cast<float>(config_.cost_range);
   c.exact = config_.exact_visibility ? 1 : 0;
-  SetNodes();
   Generate(limit);
   return true;
 }
 
 bool FastProblem::SetObstacles() {
+  if (!proof_->IsUsable()) {
+    beyond_ = true;
+    return false;
+  }
   if (!has_obstacles_) SetShapes(*proof_);
   has_obstacles_ = true;
   return !blocked_;

@@ -18,16 +18,23 @@ class FastProblem {
       : config_(config), kernels_(kernels), shelf_(config) {}
 
   /// The candidates and what they cost without J2. False where the kernels do not apply: degrees
-  /// above 6, more than 8 steps, shapes that are not positive definite, coordinates beyond 10 km.
+  /// above 6, more than 8 steps, coordinates beyond 10 km.
   /// `proof` has been reset to the problem and is kept.
   /// Costs J1 above `limit` may be missing (infinite) until SetAllCosts.
-  bool Set(const Problem& problem, const PlanProof& proof, float limit = HUGE_VALF);
+  bool Set(const Problem& problem, PlanProof* proof, float limit = HUGE_VALF);
   void SetAllCosts() { Generate(HUGE_VALF); }
+  /// What J3 and J4 need, once a problem; before they are asked for.
+  void SetCosts() {
+    if (!has_costs_) SetNodes();
+    has_costs_ = true;
+  }
   /// Makes the points of candidates quicker to get at: worth it before most of them are asked for.
   void Spread();
   /// The obstacles, once a problem; before costs of obstacles or feasibility are asked for. False
-  /// when the target is inside a shape while sight is asked: nothing is feasible.
+  /// when the target is inside a shape while sight is asked: nothing is feasible; or when a shape
+  /// is not positive definite, which is beyond the kernels.
   bool SetObstacles();
+  bool IsBeyondKernels() const { return beyond_; }
 
   kernels::Context& context() { return context_; }
   int n_candidates() const { return n_; }
@@ -52,17 +59,18 @@ class FastProblem {
   void SetRecords();
   void SetRanges();
   void Generate(float limit);
+  void SetColumns(int from, int n, int nx, std::vector<float>* columns) const;
   double ObstacleCost(int node, const double* p) const;
 
   PlannerConfig config_;
   const kernels::Table& kernels_;
   const Problem* problem_ = nullptr;
-  const PlanProof* proof_ = nullptr;
+  PlanProof* proof_ = nullptr;
   TableShelf shelf_;
   const CandidateTables* tables_ = nullptr;
   kernels::Context context_{};
 
-  int n_ = 0, free_ = 0, n_shapes_ = 0;
+  int n_ = 0, free_ = 0, record_free_ = 0, n_shapes_ = 0;
   Eigen::Vector3d origin_;
   Points start_, target_;        // local control points; of the start rows 0..3
   std::vector<double> records_;  // [step][choice][kRecord]: see kernels::CandidateInput
@@ -71,7 +79,7 @@ class FastProblem {
   double low_[9], high_[9];      // of the free points
   double largest_ = 0.0;
   double reach_ = 0.0;  // bounds coordinates and their parts
-  bool blocked_ = false, has_obstacles_ = false;
+  bool blocked_ = false, beyond_ = false, has_obstacles_ = false, has_costs_ = false;
 
   std::vector<kernels::Row> rows_;
   std::vector<int> obstacle_of_;  // row -> obstacle
@@ -81,7 +89,7 @@ class FastProblem {
   int near_begin_[kernels::kQuadratureNodes + 1];
   std::vector<kernels::Shadow> shadows_;
   std::vector<int> order_, states_;
-  std::vector<float> x_, j1_, work_, prefix_, first_;
+  std::vector<float> x_, j1_, work_, prefix_, first_, second_;
   std::vector<uint32_t> alive_;
 };
 

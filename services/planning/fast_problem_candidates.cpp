@@ -38,7 +38,9 @@ void FastProblem::SetRecords() {
   choices_.clear();
   size_t n_records = 0;
   for (const auto& choices : p.skeletons) n_records += choices.size();
-  records_.assign(n_records * kRecord, 0.0);
+  if (records_.size() != n_records * kRecord || record_free_ != free_)
+    records_.assign(n_records * kRecord, 0.0);  // the rest of a record stays zero
+  record_free_ = free_;
   double* record = records_.data();
   for (size_t n = 0; n < p.skeletons.size(); ++n) {
     choices_.push_back(static_cast<int>(p.skeletons[n].size()));
@@ -86,6 +88,20 @@ void FastProblem::SetRanges() {
   }
 }
 
+// Free points and whitened ones of `n` records from `from` on, side by side.
+void FastProblem::SetColumns(int from, int n, int nx, std::vector<float>* columns) const {
+  const int row = Padded(n);
+  columns->assign(static_cast<size_t>(2 * nx * row), 0.0f);
+  for (int s = 0; s < n; ++s) {
+    const double* record = &records_[static_cast<size_t>(from + s) * kRecord];
+    for (int k = 0; k < nx; ++k) {
+      (*columns)[static_cast<size_t>(k * row + s)] = static_cast<float>(record[k]);
+      (*columns)[static_cast<size_t>((nx + k) * row + s)] =
+          static_cast<float>(record[kernels::kWhitened + k]);
+    }
+  }
+}
+
 void FastProblem::Generate(float limit) {
   const int nx = 3 * free_, first = choices_[0], row = Padded(first);
   kernels::CandidateInput in{};
@@ -102,31 +118,38 @@ void FastProblem::Generate(float limit) {
     }
   }
   in.j1_offset = static_cast<float>(std::max(0.0, offset));
-  first_.assign(static_cast<size_t>(2 * nx * row), 0.0f);
-  float* const whitened = &first_[static_cast<size_t>(nx * row)];
-  double longest2 = 0.0;
-  for (int s = 0; s < first; ++s) {
-    const double* record = &records_[static_cast<size_t>(s) * kRecord];
-    double length2 = 0.0;
-    for (int k = 0; k < nx; ++k) {
-      const double w = record[kernels::kWhitened + k];
-      length2 += w * w;
-      first_[static_cast<size_t>(k * row + s)] = static_cast<float>(record[k]);
-      whitened[k * row + s] = static_cast<float>(w);
+  SetColumns(0, first, nx, &first_);
+  in.first_whitened = &first_[static_cast<size_t>(nx * row)];
+  in.longest2 = HUGE_VALF;
+  if (choices_.size() > 1) {
+    SetColumns(first, choices_[1], nx, &second_);
+    in.second_row = Padded(choices_[1]);
+    in.second_whitened = &second_[static_cast<size_t>(nx * in.second_row)];
+  }
+  if (limit < HUGE_VALF) {
+    double farthest2 = 0.0;
+    for (int s = 0; s < first; ++s)
+      for (int k = 0; k < nx; ++k)
+        in.first_middle[k] += records_[static_cast<size_t>(s) * kRecord + kernels::kWhitened +
+                                       static_cast<size_t>(k)] /
+                              first;
+    for (int s = 0; s < first; ++s) {
+      double length2 = 0.0;
+      for (int k = 0; k < nx; ++k) {
+        const double e = records_[static_cast<size_t>(s) * kRecord + kernels::kWhitened +
+                                  static_cast<size_t>(k)] -
+                         in.first_middle[k];
+        length2 += e * e;
+      }
+      farthest2 = std::max(farthest2, length2);
     }
-    longest2 = std::max(longest2, length2);
+    const double most = std::sqrt(farthest2) + std::sqrt(std::max(0.0, limit - offset));
+    in.longest2 = static_cast<float>(1.002 * most * most + 1e-3);
   }
   prefix_.resize(static_cast<size_t>(n_ / first) * kRecord);
   in.records = records_.data();
   in.choices = choices_.data();
   in.steps = static_cast<int>(choices_.size());
-  in.first_whitened = whitened;
-  // A prefix longer than this, whitened, has no candidate below the limit.
-  in.longest2 = HUGE_VAL;
-  if (limit < HUGE_VALF) {
-    const double most = std::sqrt(longest2) + std::sqrt(std::max(0.0, limit - offset));
-    in.longest2 = 1.002 * most * most + 1e-3;
-  }
   kernels::Context& c = context_;
   c.prefix = prefix_.data();
   c.first = first_.data();

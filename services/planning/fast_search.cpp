@@ -26,7 +26,7 @@ class FastSearch : public Search {
   using Search::Best;
   Found Best(const Problem& problem, double sight_from, double bound, PlanProof* proof) override {
     proof_ = proof;
-    if (!fast_.Set(problem, *proof, static_cast<float>(1.001 * bound)))
+    if (!fast_.Set(problem, proof, static_cast<float>(1.001 * bound)))
       return fallback_->Best(problem, sight_from, bound, proof);
     problem_ = &problem;
     bound_ = static_cast<float>(bound);
@@ -42,6 +42,7 @@ class FastSearch : public Search {
       if (winner < 0 || proof_->Holds(fast_.PlanOf(winner))) break;
       refused_.push_back(winner);
     }
+    if (fast_.IsBeyondKernels()) return fallback_->Best(problem, sight_from, bound, proof);
     found.checked = checked_;
     found.feasible = feasible_;
     if (winner < 0) return found;
@@ -144,6 +145,8 @@ void FastSearch::Weigh(float low, float high) {
 }
 
 void FastSearch::WeighListed(int n) {
+  if (n == 0) return;
+  fast_.SetCosts();
   const kernels::Context& c = fast_.context();
   values_.resize(static_cast<size_t>(n + kPad));
   for (int i = 0; i < n; ++i) values_[static_cast<size_t>(i)] = c.j1[ids_[static_cast<size_t>(i)]];

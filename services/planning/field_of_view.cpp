@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "common/math/bernstein.h"
+#include "services/planning/candidate_set.h"
 
 namespace chase::planning {
 namespace {
@@ -59,20 +60,27 @@ bool Keeps(const Piece& piece, const Margins& m, int depth) {
 bool KeepsBearing(const Curve& plan, const Curve& target, const std::vector<double>& yaw,
                   double half_angle) {
   if (yaw.empty() || !plan.allFinite() || !target.allFinite()) return false;
-  Polynomial r[2];
   double length = 0.0, angle = 0.0;
-  for (int a = 0; a < 2; ++a) {
-    r[a] = Polynomial::Zero(std::max(plan.rows(), target.rows()));
-    r[a].head(target.rows()) = target.col(a);
-    r[a].head(plan.rows()) -= plan.col(a);
+  for (int a = 0; a < 2; ++a)
     length += plan.col(a).cwiseAbs().sum() + target.col(a).cwiseAbs().sum();
-  }
   for (const double y : yaw) angle += std::abs(y);
   if (!std::isfinite(angle)) return false;
-  const Polynomial turn =
-      Eigen::Map<const Eigen::VectorXd>(yaw.data(), static_cast<Eigen::Index>(yaw.size()));
-  const Piece whole{math::PowerToBernstein(r[0]), math::PowerToBernstein(r[1]),
-                    math::PowerToBernstein(turn)};
+  // x, y and yaw as the three coordinates of a curve.
+  const Eigen::Index turns = static_cast<Eigen::Index>(yaw.size());
+  const Eigen::Index n = std::max({plan.rows(), target.rows(), turns});
+  Piece whole;
+  if (n > 16) return false;
+  Curve all = Curve::Zero(n, 3);
+  all.topLeftCorner(target.rows(), 2) = target.leftCols<2>();
+  all.topLeftCorner(plan.rows(), 2) -= plan.leftCols<2>();
+  all.col(2).head(turns) = Eigen::Map<const Eigen::VectorXd>(yaw.data(), turns);
+  if (n <= 7) {
+    const Points points = ToPoints(all, 6);
+    whole = {points.col(0), points.col(1), points.col(2)};
+  } else {
+    whole = {math::PowerToBernstein(all.col(0)), math::PowerToBernstein(all.col(1)),
+             math::PowerToBernstein(all.col(2))};
+  }
   return Keeps(whole, {half_angle, kRounding * (1.0 + length), kRounding * (1.0 + angle)}, kDepth);
 }
 

@@ -35,6 +35,7 @@ class Ladder : public Planner {
  public:
   Ladder(const PlannerConfig& config, std::unique_ptr<Search> search)
       : config_(config),
+        tight_(WithSmallerMargins(config)),
         search_(std::move(search)),
         placer_(config),
         shelf_(config),
@@ -114,7 +115,7 @@ class Ladder : public Planner {
   // The plan has been certified; moves it downhill as far as it stays so.
   void Refine(Choice* choice) {
     if (!refinable_) return;
-    constexpr int kSteps = 4;
+    constexpr int kSteps = 2;
     Choice better = *choice;
     better.index = -1;
     if (refiner_.Improve(kSteps, &better.plan, &better.cost)) *choice = better;
@@ -122,11 +123,12 @@ class Ladder : public Planner {
 
   // The running plan refined, or as it is; none where it does not hold.
   std::optional<Choice> Certified(const Problem& problem, const Curve& carried) {
-    constexpr int kSteps = 2;  // more follow with the next plan
+    constexpr int kSteps = 1;  // more follow with the next plan
     Choice choice{carried, {}};
     if (refiner_.Improve(kSteps, &choice.plan, &choice.cost)) return choice;
-    if (!proof_.Holds(carried, false) || !KeepsLimits(carried, problem)) return std::nullopt;
-    return choice;
+    if (proof_.Holds(carried, false) && KeepsLimits(carried, problem)) return choice;
+    if (refiner_.Repair(&choice.plan, &choice.cost)) return choice;
+    return std::nullopt;
   }
 
   // The cheapest of the running plan, where it holds, and the candidates, both refined. A candidate
@@ -163,36 +165,40 @@ class Ladder : public Planner {
     struct Try {
       Layout layout;
       double share;
+      bool tight;
     };
-    constexpr Try kTries[] = {{Layout::kNormal, 1.0}, {Layout::kNormal, 0.7},
-                              {Layout::kNormal, 0.5}, {Layout::kNormal, 0.35},
-                              {Layout::kWide, 1.0},   {Layout::kWide, 0.5}};
+    constexpr Try kTries[] = {{Layout::kNormal, 1.0, false}, {Layout::kNormal, 0.7, false},
+                              {Layout::kNormal, 0.5, false}, {Layout::kNormal, 0.35, false},
+                              {Layout::kWide, 1.0, false},   {Layout::kWide, 0.5, false},
+                              {Layout::kNormal, 1.0, true},  {Layout::kNormal, 0.7, true}};
     bool carry = true;
     for (const Try& t : kTries) {
       const double rest = request.running ? request.running->end() - request.t0 : 0.0;
-      if (carry && t.share < 1.0 && rest > t.share * request.horizon) {
+      if (carry && (t.tight || t.share < 1.0) && rest > t.share * request.horizon) {
         carry = false;
         if (TryCarry(request, std::min(rest, request.horizon), notes, result)) return true;
       }
-      if (!TryOver(request, t.layout, t.share, notes, result)) continue;
-      const bool plain = t.layout == Layout::kNormal && t.share == 1.0;
+      if (!TryOver(request, t.layout, t.share, t.tight, notes, result)) continue;
+      const bool plain = t.layout == Layout::kNormal && t.share == 1.0 && !t.tight;
       result->verdict = plain ? Verdict::kChase : Verdict::kWider;
       if (t.layout == Layout::kWide)
         result->reason = "no candidate of the normal skeletons is feasible";
+      if (t.tight) result->reason = "with half of the margins";
       if (t.share < 1.0)
-        result->reason = "sight over " + std::to_string(static_cast<int>(100.0 * t.share)) +
-                         " % of the horizon only";
+        result->reason += (t.tight ? "; " : "") + std::string("sight over ") +
+                          std::to_string(static_cast<int>(100.0 * t.share)) +
+                          " % of the horizon only";
       return true;
     }
     return false;
   }
 
   // The problem over a shorter horizon, where that is asked for.
-  Problem* Over(const PlanRequest& request, double horizon, std::string* notes) {
-    if (horizon == request.horizon) return &problem_;
+  Problem* Over(const PlanRequest& request, double horizon, bool tight, std::string* notes) {
+    if (horizon == request.horizon && !tight) return &problem_;
     PlanRequest shorter = request;
     shorter.horizon = horizon;
-    MakeProblem(config_, shorter, notes, &shorter_);
+    MakeProblem(tight ? tight_ : config_, shorter, notes, &shorter_);
     return &shorter_;
   }
 
@@ -202,16 +208,16 @@ class Ladder : public Planner {
     used_ = &problem;
   }
 
-  bool TryOver(const PlanRequest& request, Layout layout, double share, std::string* notes,
-               PlanResult* result) {
+  bool TryOver(const PlanRequest& request, Layout layout, double share, bool tight,
+               std::string* notes, PlanResult* result) {
     std::string their_notes;
-    Problem* problem = Over(request, share * request.horizon, &their_notes);
+    Problem* problem = Over(request, share * request.horizon, tight, &their_notes);
     placer_.Place(layout, problem);
     LimitToReach(
         config_,
         shelf_.Get(problem->degree, static_cast<int>(problem->skeletons.size()), problem->duration),
         Refiner::kReach, problem);
-    const bool carry = layout == Layout::kNormal && share == 1.0;
+    const bool carry = layout == Layout::kNormal;
     if (!TrySearch(*problem, 0.0, carry ? Carried(request, *problem) : std::nullopt, result))
       return false;
     if (problem != &problem_) *notes = their_notes;
@@ -223,7 +229,7 @@ class Ladder : public Planner {
   bool TryCarry(const PlanRequest& request, double horizon, std::string* notes,
                 PlanResult* result) {
     std::string their_notes;
-    Problem* problem = Over(request, horizon, &their_notes);
+    Problem* problem = Over(request, horizon, false, &their_notes);
     problem->reach.reset();
     const std::optional<Curve> carried = Carried(request, *problem);
     if (!carried) return false;
@@ -284,7 +290,7 @@ class Ladder : public Planner {
                             Curve(result->trajectory.coefficients));
   }
 
-  PlannerConfig config_;
+  PlannerConfig config_, tight_;  ///< tight_: half of the margins
   std::unique_ptr<Search> search_;
   SkeletonPlacer placer_;
   TableShelf shelf_;

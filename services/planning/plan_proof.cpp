@@ -6,13 +6,11 @@
 
 #include "services/planning/candidate_set.h"
 #include "services/planning/certificate.h"
-#include "services/planning/small_form.h"
 
 namespace chase::planning {
 namespace {
 
 using kernels::kPad;
-using math::Positivity;
 
 constexpr int kDepth = 24;
 
@@ -30,7 +28,7 @@ void PlanProof::Reset(const Problem& problem, double sight_from, bool exact) {
   exact_sight_ = exact;
   sight_from_ = sight_from;
   origin_ = problem.target.row(0).transpose();
-  SetRows(!problem.reach);
+  laid_out_ = false;
 }
 
 void PlanProof::AddRows(int obstacle) {
@@ -47,6 +45,7 @@ void PlanProof::AddRows(int obstacle) {
 
 void PlanProof::SetRows(bool all) {
   all_ = all;
+  laid_out_ = true;
   rows_.clear();
   usable_ = linear_ = true;
   center_size_ = 0.0;
@@ -134,22 +133,27 @@ bool PlanProof::TargetIsOutside(int row) const {
 
 bool PlanProof::RowHolds(const Row& row, const Curve& plan, const Local* p, bool exactly) {
   const Ellipsoid& e = problem_->obstacles[static_cast<size_t>(row.obstacle)];
-  Positivity decided = Positivity::kUndecided;
+  int decided = 0;
   Local c;
   if (p && MakeLocal(e.center, degree_, &c)) {
-    double x[7][3], y[7][3];
+    kernels::FormInput in{};
+    in.degree = degree_;
     for (int i = 0; i <= degree_; ++i)
       for (int a = 0; a < 3; ++a) {
-        x[i][a] = p->point[i][a] - c.point[i][a];
-        y[i][a] = target_.point[i][a] - c.point[i][a];
+        in.x[i][a] = p->point[i][a] - c.point[i][a];
+        in.y[i][a] = target_.point[i][a] - c.point[i][a];
       }
-    const double X = p->size + c.size, Y = target_.size + c.size;
+    in.X = p->size + c.size;
+    in.Y = target_.size + c.size;
     const Eigen::Matrix3d& R = row.safety ? e.safety : e.sight;
-    SmallForms forms(degree_, x, X, y, Y, R);
-    forms.CutFrom(row.from);
-    decided = row.sight ? forms.DecideSight(exact_sight_, kDepth) : forms.DecideSafe(kDepth);
+    for (int a = 0; a < 3; ++a)
+      for (int b = 0; b < 3; ++b) in.R[a][b] = R(a, b);
+    in.from = row.from;
+    in.sight = row.sight;
+    in.exact = exact_sight_;
+    decided = kernels_->decide(in, kDepth);
   }
-  if (decided != Positivity::kUndecided) return decided == Positivity::kPositive;
+  if (decided != 0) return decided > 0;
   if (!exactly) return false;
   ++n_exact_;
   return (!row.safety || IsSafe(plan, e, Arithmetic::kExactSturm)) &&
@@ -158,14 +162,15 @@ bool PlanProof::RowHolds(const Row& row, const Curve& plan, const Local* p, bool
 }
 
 bool PlanProof::RowHolds(int row, const Curve& plan) {
+  if (!IsUsable()) return false;
   Local p{};
   const bool small = small_ && MakeLocal(plan, degree_, &p);
-  return usable_ && RowHolds(rows_[static_cast<size_t>(row)], plan, small ? &p : nullptr, true);
+  return RowHolds(rows_[static_cast<size_t>(row)], plan, small ? &p : nullptr, true);
 }
 
 bool PlanProof::Holds(const Curve& plan, bool exactly) {
   n_exact_ = 0;
-  if (!plan.allFinite()) return false;
+  if (!plan.allFinite() || !IsUsable()) return false;
   Local p{};
   bool small = small_ && MakeLocal(plan, degree_, &p);
   if (!all_ && !(small && IsWithinReach(p))) {

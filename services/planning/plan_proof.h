@@ -38,12 +38,20 @@ class PlanProof {
   /// Whether the target itself stays outside the row's shape while sight is asked.
   bool TargetIsOutside(int row) const;
 
+  /// False where a shape is not finite and positive definite: nothing is proven then. To be called
+  /// before what follows: rows are laid out when they are first needed.
+  bool IsUsable() {
+    if (!laid_out_) SetRows(!problem_->reach);
+    return usable_;
+  }
   const std::vector<Row>& rows() const { return rows_; }
   /// [6][padded]: R00 R01 R02 R11 R12 R22 of the rows, the last repeated; one column at least.
   const double* shapes() const { return shapes_.data(); }
+  /// [2][3][padded]: of their centres, local, the value at tau = 0 and the rate; where IsLinear.
+  const double* centers() const { return centers_.data(); }
+  const uint8_t* asks_sight() const { return sight_.data(); }  ///< [padded]
+  bool IsLinear() const { return linear_; }
   int padded() const { return input_.n; }
-  /// False where a shape is not finite and positive definite: nothing is proven then.
-  bool IsUsable() const { return usable_; }
   /// Rows of the last Holds that took exact arithmetic.
   int exact() const { return n_exact_; }
 
@@ -62,7 +70,8 @@ class PlanProof {
 
   const kernels::Table* kernels_;
   const Problem* problem_ = nullptr;
-  bool exact_sight_ = true, usable_ = false, small_ = false, linear_ = true, all_ = true;
+  bool exact_sight_ = true, usable_ = false, small_ = false, linear_ = true, all_ = true,
+       laid_out_ = false;
   int degree_ = 5, n_exact_ = 0;
   double sight_from_ = 0.0;
   Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();

@@ -17,20 +17,30 @@ namespace {
 
 // Two plans of a walk past a pillar, so that the first that matters finds tables and memory ready.
 void WarmUp(const PlannerConfig& config, Planner* planner) {
-  PlanRequest request;
-  request.start.p = {-config.desired_distance, 0.0, 1.5};
-  request.target.coefficients = Eigen::MatrixXd::Zero(2, 3);
-  request.target.coefficients.row(0) << 0.0, 0.0, 1.0;
-  request.target.coefficients.row(1) << request.horizon, 0.0, 0.0;
-  request.target.duration = request.horizon;
-  world::Obstacle pillar;
-  pillar.center = world::Trajectory::Constant({0.0, 1.5, 1.0}, 0.0, request.horizon);
-  request.obstacles = {pillar};
-  const PlanResult first = planner->Plan(request);
-  request.t0 = 0.2;
-  request.start = first.trajectory.At(request.t0);
-  request.running = first.trajectory;
-  planner->Plan(request);
+  for (const double horizon : {2.5, 5.0}) {
+    PlanRequest request;
+    request.horizon = horizon;
+    request.start.p = {-config.desired_distance, 0.0, 1.5};
+    request.target.duration = horizon;
+    request.target.coefficients = Eigen::MatrixXd::Zero(2, 3);
+    request.target.coefficients.row(1) << horizon, 0.0, 0.0;
+    for (int i = 0; i < 24; ++i) {
+      const double side = i % 2 ? 1.3 : -1.3, along = 0.7 * i - 4.0;
+      world::Obstacle pillar;
+      pillar.id = i;
+      pillar.center = world::Trajectory::Constant({along, side * (1 + i % 3), 1.0}, 0.0, horizon);
+      pillar.shape = Eigen::Vector3d(4.0, 4.0, 0.1).asDiagonal();
+      request.obstacles.push_back(pillar);
+    }
+    for (int i = 0; i < 6; ++i) {
+      request.target.start = request.t0;
+      request.target.coefficients.row(0) << request.t0, 0.2 * (i % 3), 1.0;
+      const PlanResult plan = planner->Plan(request);
+      request.t0 += 0.3;
+      request.start = plan.trajectory.At(request.t0);
+      request.running = plan.trajectory;
+    }
+  }
 }
 
 }  // namespace

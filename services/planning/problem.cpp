@@ -1,8 +1,8 @@
 #include "services/planning/problem.h"
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 #include "services/planning/candidate_set.h"
 
@@ -16,51 +16,57 @@ constexpr double kLeaveBy = 0.25;  // tau by which a plan has left an obstacle t
 
 double SquaredNorm(const Eigen::Matrix3d& R, const Eigen::Vector3d& x) { return x.dot(R * x); }
 
-// The obstacle's own shape, and grown.
-class Shape {
- public:
-  explicit Shape(const Eigen::Matrix3d& R) : R_(R) {}
-  Eigen::Matrix3d Grown(double margin) {
-    if (!(margin > 0.0)) return R_;
-    if (!inflation_) inflation_.emplace(R_);
-    return inflation_->By(margin);
-  }
-
- private:
-  const Eigen::Matrix3d& R_;
-  std::optional<world::Inflation> inflation_;  // axes are not worked out for nothing
-};
-
-// Encloses the ellipsoid and all balls of radius `room` about its points: the inverse of the shape
-// is (1 + s) (R^-1 + room^2 / s) for any s > 0; this s is tight across the axis of upright shapes.
-Eigen::Matrix3d Enlarged(const Eigen::Matrix3d& R, double room) {
-  const double s = room * std::sqrt(0.5 * R.trace());
-  Eigen::Matrix3d inverse = R.inverse();
-  inverse.diagonal().array() += room * room / s;
-  return ((1.0 + s) * inverse).inverse();
-}
-
 double Uncertainty(const PlannerConfig& config, const world::Obstacle& o, double duration) {
   const double half = 0.5 * duration;
   const double sigma = std::sqrt(o.position_variance + o.velocity_variance * half * half);
   return std::min(config.max_inflation, config.sigmas * sigma);
 }
 
+bool IsSameShape(const Eigen::Matrix3d& a, const Eigen::Matrix3d& b) {
+  return std::memcmp(a.data(), b.data(), sizeof(double) * 9) == 0;
+}
+
 constexpr int kSamples = 24;
 
-// A curve and a box around it, where its degree allows one.
+// A curve and boxes around it and its quarters, where its degree allows them.
 struct Hull {
+  static constexpr int kQuarters = 4;
   const Curve& curve;
-  std::optional<Box> box;
+  bool has_boxes;
+  Box whole, quarters[kQuarters];
 
-  explicit Hull(const Curve& curve_) : curve(curve_) {
-    if (curve.rows() <= 7) box = BoxOf(ToPoints(curve, 6), 7, 1e-6);
+  explicit Hull(const Curve& curve_) : curve(curve_), has_boxes(curve.rows() <= 7) {
+    if (!has_boxes) return;
+    Points left = ToPoints(curve, 6);
+    whole = BoxOf(left, 7, 1e-6);
+    Points right = Halve(&left);
+    for (int a = 0; a < 2; ++a) {
+      Points* half = a == 0 ? &left : &right;
+      const Points later = Halve(half);
+      quarters[2 * a] = BoxOf(*half, 7, 1e-6);
+      quarters[2 * a + 1] = BoxOf(later, 7, 1e-6);
+    }
+  }
+
+ private:
+  // Leaves the first half and returns the second.
+  static Points Halve(Points* points) {
+    Points right = *points;
+    for (int k = 1; k < 7; ++k) {
+      for (int i = 0; i + k < 7; ++i) right.row(i) = 0.5 * (right.row(i) + right.row(i + 1));
+      points->row(k) = right.row(0);
+    }
+    return right;
   }
 };
 
 // A quick sufficient test that the curve stays well out.
-bool IsPlainlyOutside(const Hull& curve, const Curve& center, const Eigen::Matrix3d& R) {
-  return curve.box && !MayTouch(*curve.box, center, R, kClear);
+bool IsPlainlyOutside(const Hull& curve, const Curve& center, const Eigen::Array3d& half) {
+  if (!curve.has_boxes) return false;
+  if (!MayTouch(curve.whole, center, half, kClear)) return true;
+  for (const Box& box : curve.quarters)
+    if (MayTouch(box, center, half, kClear)) return false;
+  return true;
 }
 
 bool StaysOutside(const Curve& curve, const Curve& center, const Eigen::Matrix3d& R, double limit) {
@@ -77,13 +83,57 @@ void Note(std::string* notes, const std::string& text) {
   *notes += text;
 }
 
-void SetSafetyShape(const PlannerConfig& config, const world::Obstacle& o, const Problem& problem,
-                    Shape* shape, Ellipsoid* e, std::string* notes) {
-  const double margin =
-      config.drone_radius + config.safety_margin + Uncertainty(config, o, problem.duration);
+// The line of sight at the start and a box around it.
+struct FirstSight {
+  Eigen::Vector3d p, q;
+  Box box;
+
+  explicit FirstSight(const Problem& problem)
+      : p(problem.start.row(0).transpose()), q(problem.target.row(0).transpose()) {
+    box = {p.array().min(q.array()) - 1e-6, p.array().max(q.array()) + 1e-6};
+  }
+  bool IsBeyond(const Curve& center, const Eigen::Matrix3d& R, const Eigen::Array3d& half,
+                double limit) const {
+    const Curve first = center.topRows(1);
+    return !MayTouch(box, first, half, limit) ||
+           world::SegmentSquaredDistance(p, q, center.row(0).transpose(), R) > limit;
+  }
+};
+
+// What the shapes of all obstacles are grown by, m.
+struct Margins {
+  double safety, sight;
+};
+
+// The whole margins; at no cost where the obstacle is what it was.
+void Grow(const world::Obstacle& o, const Margins& margins, Ellipsoid* e) {
+  if (e->grown_by[0] == margins.safety && e->grown_by[1] == margins.sight &&
+      IsSameShape(e->grown_from, o.shape))
+    return;
+  const world::Inflation inflation(o.shape);
+  e->safety = margins.safety > 0.0 ? inflation.By(margins.safety) : o.shape;
+  e->sight = margins.sight > 0.0 ? inflation.By(margins.sight) : o.shape;
+  e->safety_half = HalfSidesOf(e->safety);
+  e->sight_half = HalfSidesOf(e->sight);
+  e->grown_from = o.shape;
+  e->grown_by[0] = margins.safety;
+  e->grown_by[1] = margins.sight;
+}
+
+Eigen::Matrix3d Grown(const world::Obstacle& o, double margin) {
+  return margin > 0.0 ? world::Inflated(o.shape, margin) : o.shape;
+}
+
+// Takes the safety margin back until the start is outside.
+void RelaxSafety(const world::Obstacle& o, double margin, const Problem& problem, Ellipsoid* e,
+                 std::string* notes) {
   const Eigen::Vector3d offset = (problem.start.row(0) - e->center.row(0)).transpose();
   for (double share : kShares) {
-    e->safety = shape->Grown(share * margin);
+    if (share < 1.0) {
+      e->safety = Grown(o, share * margin);
+      e->safety_half = HalfSidesOf(e->safety);
+      e->grown_by[0] = -1.0;
+    }
     if (SquaredNorm(e->safety, offset) > (share > 0.0 ? kClear : 1.0)) {
       if (share < 1.0) Note(notes, "starts within the margin of obstacle " + std::to_string(e->id));
       return;
@@ -93,29 +143,31 @@ void SetSafetyShape(const PlannerConfig& config, const world::Obstacle& o, const
   Note(notes, "starts inside obstacle " + std::to_string(e->id));
 }
 
-void SetSightShape(const PlannerConfig& config, double target_growth, const Hull& target,
-                   Shape* shape, Ellipsoid* e, std::string* notes) {
-  const double margin = config.sight_margin + target_growth;
+// The largest share of the margin that the target keeps out of, and the line of sight at the start
+// too, where it keeps out of any.
+void RelaxSight(const world::Obstacle& o, double margin, const FirstSight& first,
+                const Hull& target, Ellipsoid* e, std::string* notes) {
+  double kept = -1.0;
+  const auto take = [&](double share) {
+    e->sight = Grown(o, share * margin);
+    e->sight_half = HalfSidesOf(e->sight);
+    e->grown_by[1] = -1.0;
+  };
   for (double share : kShares) {
-    e->sight = shape->Grown(share * margin);
-    if (IsPlainlyOutside(target, e->center, e->sight)) return;
-    if (margin == 0.0 || StaysOutside(target.curve, e->center, e->sight, kClear)) break;
+    if (share < 1.0) take(share);
+    const double clear = share > 0.0 ? kClear : 1.0;
+    if (!IsPlainlyOutside(target, e->center, e->sight_half) &&
+        !StaysOutside(target.curve, e->center, e->sight, clear))
+      continue;
+    if (kept < 0.0) kept = share;
+    if (!first.IsBeyond(e->center, e->sight, e->sight_half, clear)) continue;
+    if (share < kept)
+      Note(notes, "sight starts within the margin of obstacle " + std::to_string(e->id));
+    return;
   }
-  if (StaysOutside(target.curve, e->center, e->sight, 1.0)) return;
+  if (kept >= 0.0) return take(kept);
   e->sight_from = 1.0;
   Note(notes, "obstacle " + std::to_string(e->id) + " holds the target, its shadow is ignored");
-}
-
-void SetEllipsoid(const PlannerConfig& config, const PlanRequest& request, const Hull& target,
-                  const world::Obstacle& o, const Problem& problem, Ellipsoid* e,
-                  std::string* notes) {
-  e->id = o.id;
-  e->safety_from = e->sight_from = 0.0;
-  e->center = ToCurve(o.center, request.t0, request.horizon);
-  Shape shape(o.shape);
-  SetSafetyShape(config, o, problem, &shape, e, notes);
-  const double growth = std::min(config.max_inflation, config.sigmas * request.target_sigma);
-  SetSightShape(config, growth, target, &shape, e, notes);
 }
 
 // Limits that the start already breaks give way to just above what it has: the plan may not get
@@ -166,9 +218,25 @@ void MakeProblem(const PlannerConfig& config, const PlanRequest& request, std::s
   problem->reach.reset();
   problem->obstacles.resize(request.obstacles.size());
   const Hull target(problem->target);
-  for (size_t j = 0; j < request.obstacles.size(); ++j)
-    SetEllipsoid(config, request, target, request.obstacles[j], *problem, &problem->obstacles[j],
-                 notes);
+  const FirstSight first(*problem);
+  const Box own{target.whole.low.min(first.box.low), target.whole.high.max(first.box.high)};
+  const double target_growth = std::min(config.max_inflation, config.sigmas * request.target_sigma);
+  for (size_t j = 0; j < request.obstacles.size(); ++j) {
+    const world::Obstacle& o = request.obstacles[j];
+    Ellipsoid* e = &problem->obstacles[j];
+    e->id = o.id;
+    e->safety_from = e->sight_from = 0.0;
+    SetCurve(o.center, request.t0, request.horizon, &e->center);
+    const Margins margins{
+        config.drone_radius + config.safety_margin + Uncertainty(config, o, problem->duration),
+        config.sight_margin + target_growth};
+    Grow(o, margins, e);
+    // Far from start and target no margin has to give way.
+    if (target.has_boxes && !MayTouch(own, e->center, e->safety_half.max(e->sight_half), kClear))
+      continue;
+    RelaxSafety(o, margins.safety, *problem, e, notes);
+    RelaxSight(o, margins.sight, first, target, e, notes);
+  }
 }
 
 Problem MakeProblem(const PlannerConfig& config, const PlanRequest& request, std::string* notes) {
@@ -177,45 +245,62 @@ Problem MakeProblem(const PlannerConfig& config, const PlanRequest& request, std
   return problem;
 }
 
-Problem WithRoom(const Problem& problem, double room) {
-  Problem roomy;
-  roomy.duration = problem.duration;
-  roomy.degree = problem.degree;
-  roomy.start = problem.start;
-  roomy.target = problem.target;
-  roomy.limits = problem.limits;
-  roomy.reach = problem.reach;
+void WithRoom(const Problem& problem, double room, Enlargements* memory, Problem* roomy) {
+  roomy->duration = problem.duration;
+  roomy->degree = problem.degree;
+  roomy->start = problem.start;
+  roomy->target = problem.target;
+  roomy->limits = problem.limits;
+  roomy->reach = problem.reach;
+  roomy->near.clear();
   const size_t n = problem.reach ? problem.near.size() : problem.obstacles.size();
-  roomy.obstacles.reserve(n);
+  roomy->obstacles.resize(n);
   const Hull target(problem.target);
+  const FirstSight first(problem);
   for (size_t i = 0; i < n; ++i) {
     const size_t j = problem.reach ? static_cast<size_t>(problem.near[i]) : i;
-    roomy.near.push_back(static_cast<int>(i));
-    roomy.obstacles.push_back(problem.obstacles[j]);
-    Ellipsoid& e = roomy.obstacles.back();
+    roomy->near.push_back(static_cast<int>(i));
+    Ellipsoid& e = roomy->obstacles[i];
+    e = problem.obstacles[j];
     if (!(room > 0.0)) continue;
-    const Eigen::Matrix3d safety = Enlarged(e.safety, room), sight = Enlarged(e.sight, room);
+    const Enlarged& safety = memory->Of(2 * j, e.safety, room);
     const Eigen::Vector3d offset = (problem.start.row(0) - e.center.row(0)).transpose();
-    if (SquaredNorm(safety, offset) > kClear) e.safety = safety;
-    if (IsPlainlyOutside(target, e.center, sight) ||
-        StaysOutside(problem.target, e.center, sight, kClear))
-      e.sight = sight;
+    if (SquaredNorm(safety.shape, offset) > kClear) {
+      e.safety = safety.shape;
+      e.safety_half = safety.half;
+    }
+    const Enlarged& sight = memory->Of(2 * j + 1, e.sight, room);
+    if (first.IsBeyond(e.center, sight.shape, sight.half, kClear) &&
+        (IsPlainlyOutside(target, e.center, sight.half) ||
+         StaysOutside(problem.target, e.center, sight.shape, kClear))) {
+      e.sight = sight.shape;
+      e.sight_half = sight.half;
+    }
   }
-  return roomy;
 }
 
-Curve ToCurve(const world::Trajectory& trajectory, double start, double duration) {
-  Curve c = trajectory.coefficients;
+void SetCurve(const world::Trajectory& trajectory, double start, double duration, Curve* curve) {
+  if (trajectory.coefficients.rows() == 1 && curve->rows() == 1) {
+    curve->row(0) = trajectory.coefficients.row(0);
+    return;
+  }
   const double a = (start - trajectory.start) / trajectory.duration;
   const double b = duration / trajectory.duration;
-  if (c.rows() == 1 || (a == 0.0 && b == 1.0)) return c;
+  *curve = trajectory.coefficients;
+  if (curve->rows() == 1 || (a == 0.0 && b == 1.0)) return;
+  Curve& c = *curve;
   c.setZero();
   const Eigen::Index n = c.rows() - 1;
   for (Eigen::Index k = n; k >= 0; --k) {
     for (Eigen::Index i = n; i > 0; --i) c.row(i) = a * c.row(i) + b * c.row(i - 1);
     c.row(0) = a * c.row(0) + trajectory.coefficients.row(k);
   }
-  return c;
+}
+
+Curve ToCurve(const world::Trajectory& trajectory, double start, double duration) {
+  Curve curve;
+  SetCurve(trajectory, start, duration, &curve);
+  return curve;
 }
 
 Eigen::Vector3d Evaluate(const Curve& curve, double tau, int order) {

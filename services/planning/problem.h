@@ -1,10 +1,12 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cmath>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "services/planning/enlargement.h"
 #include "services/planning/planner.h"
 
 namespace chase::planning {
@@ -19,6 +21,11 @@ struct Ellipsoid {
   Curve center;
   Eigen::Matrix3d safety;  ///< must not hold the drone's centre
   Eigen::Matrix3d sight;   ///< must not cross the segment from drone to target
+  /// Half the sides of boxes around the two; infinite where nobody has worked them out.
+  Eigen::Array3d safety_half = Eigen::Array3d::Constant(HUGE_VAL), sight_half = safety_half;
+  /// What the two are grown from and by, m; negative where a margin has given way.
+  Eigen::Matrix3d grown_from = Eigen::Matrix3d::Zero();
+  double grown_by[2] = {-1.0, -1.0};
   double safety_from =
       0.0;                  ///< tau from which safety is asked; above 0 only if the start is inside
   double sight_from = 0.0;  ///< tau from which sight is asked; 1: never
@@ -65,10 +72,11 @@ void MakeProblem(const PlannerConfig& config, const PlanRequest& request, std::s
 
 /// The problem with the obstacles near its reach (all, where there is none) only, enlarged by
 /// `room` m to all sides where the start and the target stay outside; without skeletons.
-Problem WithRoom(const Problem& problem, double room);
+void WithRoom(const Problem& problem, double room, Enlargements* memory, Problem* roomy);
 
 /// `trajectory` over [start, start + duration] in normalised time.
 Curve ToCurve(const world::Trajectory& trajectory, double start, double duration);
+void SetCurve(const world::Trajectory& trajectory, double start, double duration, Curve* curve);
 
 /// Value of the curve's derivative of the given order with respect to tau.
 Eigen::Vector3d Evaluate(const Curve& curve, double tau, int order = 0);

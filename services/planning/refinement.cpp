@@ -8,38 +8,12 @@
 namespace chase::planning {
 namespace {
 
-constexpr double kLeast = 2e-4;  // relative gain of a step that is worth another
+constexpr double kLeast = 2e-4;       // relative gain of a step that is worth another
+constexpr double kRepairReach = 2.0;  // m, instead of kReach
 constexpr double kDamping = 1e-6;
 
 bool IsWorthIt(const Cost& before, const Cost& after) {
   return before.total - after.total >= kLeast * before.total;
-}
-
-// Solves A x = -g by Cholesky's method, n <= 9, the lower triangle of A given; overwrites A. False
-// where A is not positive definite.
-bool SolveDownhill(int n, double (*A)[9], const double* g, double* x) {
-  double inverse[9];
-  for (int i = 0; i < n; ++i) {
-    for (int j = 0; j <= i; ++j) {
-      double sum = A[i][j];
-      for (int k = 0; k < j; ++k) sum -= A[i][k] * A[j][k];
-      if (j < i) {
-        A[i][j] = sum * inverse[j];
-      } else {
-        if (!(sum > 0.0)) return false;
-        A[i][i] = std::sqrt(sum);
-        inverse[i] = 1.0 / A[i][i];
-      }
-    }
-    double y = -g[i];
-    for (int k = 0; k < i; ++k) y -= A[i][k] * x[k];
-    x[i] = y * inverse[i];
-  }
-  for (int i = n - 1; i >= 0; --i) {
-    for (int k = i + 1; k < n; ++k) x[i] -= A[k][i] * x[k];
-    x[i] *= inverse[i];
-  }
-  return true;
 }
 
 }  // namespace
@@ -54,7 +28,7 @@ bool Refiner::Reset(const Problem& problem, double sight_from) {
   origin_ = problem.target.row(0).transpose();
   SetObjective();
   // The paper's bound on sight may hold for larger shapes only.
-  roomy_ = WithRoom(problem, config_.exact_visibility ? config_.refine_room : 0.0);
+  WithRoom(problem, config_.exact_visibility ? config_.refine_room : 0.0, &enlargements_, &roomy_);
   proof_.Reset(roomy_, sight_from, config_.exact_visibility);
   return true;
 }
@@ -65,7 +39,8 @@ void Refiner::SetObjective() {
   start.row(0) -= origin_.transpose();
   target.row(0).setZero();
   start_ = ToPoints(start, M);
-  const Points their = ToPoints(target, M);
+  target_ = ToPoints(target, M);
+  cuts_ready_ = false;
   kernels::ObjectiveInput& in = input_;
   in.free = free_;
   in.rest = 0.0;
@@ -88,13 +63,13 @@ void Refiner::SetObjective() {
     double target_at[kernels::kPaddedNodes] = {}, target_rate[kernels::kPaddedNodes] = {};
     std::fill(in.at[a], in.at[a] + kernels::kPaddedNodes, 0.0);
     AddAtNodes(tables_->phi_of, start_, 0, 3, a, in.at[a]);
-    AddAtNodes(tables_->phi_of, their, 0, M, a, target_at);
+    AddAtNodes(tables_->phi_of, target_, 0, M, a, target_at);
     for (int k = 0; k < kernels::kPaddedNodes; ++k)
       in.rel[a][k] = k < kNodes ? in.at[a][k] - target_at[k] : 1.0;  // anything but zero
     if (a == 2) continue;
     std::fill(in.rate[a], in.rate[a] + kernels::kPaddedNodes, 0.0);
     AddAtNodes(tables_->slope_of, start_, 0, 3, a, in.rate[a]);
-    AddAtNodes(tables_->slope_of, their, 0, M, a, target_rate);
+    AddAtNodes(tables_->slope_of, target_, 0, M, a, target_rate);
     for (int k = 0; k < kernels::kPaddedNodes; ++k) in.rate[a][k] -= target_rate[k];
   }
   const double scale =
@@ -114,9 +89,9 @@ void Refiner::SetNear(const Points& b) {
   if (config_.weight_obstacle > 0.0) {
     Points global = b;
     global.rowwise() += origin_.transpose();
-    const Box box = BoxOf(global, tables_->degree + 1, kReach);
+    const Box box = BoxOf(global, tables_->degree + 1, reach_);
     const auto add = [&](const Ellipsoid& e) {
-      if (!MayTouch(box, e.center, e.safety, config_.cost_range)) return;
+      if (!MayTouch(box, e.center, e.safety_half, config_.cost_range)) return;
       const Eigen::Matrix3d& R = e.safety;
       for (const double r : {R(0, 0), R(0, 1), R(0, 2), R(1, 1), R(1, 2), R(2, 2)})
         near_.push_back(r);
@@ -153,12 +128,40 @@ Cost Refiner::CostOf(const Free& x) const {
   return cost;
 }
 
-bool Refiner::Direction(const Free& x, Free* step) const {
-  kernels::ObjectiveModel model;
-  kernels_.model(input_, x.data(), model);
-  for (int i = 0; i < 3 * free_; ++i)
-    model.hessian[i][i] += kDamping + 1e-3 * std::abs(model.hessian[i][i]);
-  return SolveDownhill(3 * free_, model.hessian, model.gradient, step->data());
+bool Refiner::MakeModel(const Free& x, Model* model) const {
+  const int n = 3 * free_;
+  kernels::ObjectiveModel m;
+  kernels_.model(input_, x.data(), m);
+  auto& L = model->L;
+  for (int i = 0; i < n; ++i) {
+    double y = -m.gradient[i];
+    for (int j = 0; j <= i; ++j) {
+      double sum = m.hessian[i][j];
+      if (i == j) sum += kDamping + 1e-3 * std::abs(sum);
+      for (int k = 0; k < j; ++k) sum -= L[i][k] * L[j][k];
+      if (j < i) {
+        L[i][j] = sum * model->inverse[j];
+      } else {
+        if (!(sum > 0.0)) return false;
+        L[i][i] = std::sqrt(sum);
+        model->inverse[i] = 1.0 / L[i][i];
+      }
+    }
+    for (int k = 0; k < i; ++k) y -= L[i][k] * model->y[k];
+    model->y[i] = y * model->inverse[i];
+  }
+  return true;
+}
+
+Refiner::Free Refiner::StepOf(const Model& model) const {
+  const int n = 3 * free_;
+  Free x = Free::Zero();
+  for (int i = n - 1; i >= 0; --i) {
+    x[i] = model.y[i];
+    for (int k = i + 1; k < n; ++k) x[i] -= model.L[k][i] * x[k];
+    x[i] *= model.inverse[i];
+  }
+  return x;
 }
 
 Refiner::Free Refiner::Moved(const Free& x, const Free& step, double share) const {
@@ -166,7 +169,7 @@ Refiner::Free Refiner::Moved(const Free& x, const Free& step, double share) cons
   for (int f = 0; f < free_; ++f) {
     const Eigen::Vector3d from = first_.segment<3>(3 * f);
     const Eigen::Vector3d offset = x.segment<3>(3 * f) + share * step.segment<3>(3 * f) - from;
-    moved.segment<3>(3 * f) = from + offset * std::min(1.0, kReach / std::max(1e-9, offset.norm()));
+    moved.segment<3>(3 * f) = from + offset * std::min(1.0, reach_ / std::max(1e-9, offset.norm()));
   }
   return moved;
 }
@@ -180,9 +183,14 @@ bool Refiner::IsProven(const Free& x, Curve* plan) {
   return KeepsLimits(*plan, *problem_) && proof_.Holds(*plan, false);
 }
 
-void Refiner::Descend(int steps, Free* x, Cost* cost) const {
-  Free step;
-  for (int i = 0; i < steps && Direction(*x, &step); ++i) {
+void Refiner::Descend(int steps, Free* x, Cost* cost) {
+  for (int i = 0; i < steps; ++i) {
+    Model here;
+    Model* model = i == 0 ? &model_ : &here;
+    const bool is_convex = MakeModel(*x, model);
+    if (i == 0) has_model_ = is_convex;
+    if (!is_convex) return;
+    const Free step = StepOf(*model);
     const Cost before = *cost;
     for (const double share : {1.0, 0.5, 0.25, 0.1}) {
       const Free moved = Moved(*x, step, share);
@@ -205,23 +213,63 @@ void Refiner::SetPlan(const Curve& plan) {
   SetNear(b);
 }
 
+bool Refiner::GoAround(const Free& x, double limit, Curve* plan, Cost* cost) {
+  constexpr int kRounds = 3;
+  if (!has_model_ || !proof_.IsUsable() || !proof_.IsLinear()) return false;
+  if (!cuts_ready_) cuts_.Reset(*tables_, proof_, start_, target_);
+  cuts_ready_ = true;
+  cuts_.Clear();
+  Free at = x;
+  for (int round = 0; round < kRounds; ++round) {
+    if (cuts_.Add(at.data(), round == 0 ? first_.data() : at.data()) == 0) return false;
+    Model model = model_;
+    cuts_.Project(model.L, model.inverse, first_.data(), model.y);
+    at = Moved(first_, StepOf(model), 1.0);
+    const Cost there = CostOf(at);
+    if (!(there.total < limit)) return false;
+    Curve moved;
+    if (!IsProven(at, &moved)) continue;
+    *plan = moved;
+    *cost = there;
+    return true;
+  }
+  return false;
+}
+
 bool Refiner::Improve(int steps, Curve* plan, Cost* cost) {
+  reach_ = kReach;
   SetPlan(*plan);
   *cost = CostOf(first_);
   Free x = first_;
   Cost found = *cost;
   Descend(steps, &x, &found);
-  const Free way = x - first_;
-  for (const double share : {1.0, 0.6, 0.3, 0.1}) {
-    if (share < 1.0) found = CostOf(x = first_ + share * way);
-    Curve moved;
-    if (!IsWorthIt(*cost, found)) return false;
-    if (!IsProven(x, &moved)) continue;
+  if (!IsWorthIt(*cost, found)) return false;
+  Curve moved;
+  if (IsProven(x, &moved)) {
     *plan = moved;
     *cost = found;
     return true;
   }
-  return false;
+  if (KeepsLimits(moved, *problem_)) return GoAround(x, (1.0 - kLeast) * cost->total, plan, cost);
+  // Nothing leads around a limit: part of the way may keep it.
+  found = CostOf(x = first_ + 0.4 * (x - first_));
+  if (!IsWorthIt(*cost, found) || !IsProven(x, &moved)) return false;
+  *plan = moved;
+  *cost = found;
+  return true;
+}
+
+bool Refiner::Repair(Curve* plan, Cost* cost) {
+  reach_ = kRepairReach;
+  SetPlan(*plan);
+  has_model_ = MakeModel(first_, &model_);
+  if (!has_model_) return false;
+  const Free x = Moved(first_, StepOf(model_), 1.0);
+  Curve moved;
+  if (!IsProven(x, &moved)) return GoAround(x, HUGE_VAL, plan, cost);
+  *plan = moved;
+  *cost = CostOf(x);
+  return true;
 }
 
 }  // namespace chase::planning

@@ -44,6 +44,10 @@ Level Relative(const world::Trajectory& plan, const world::Trajectory& target) {
   return r;
 }
 
+double ShortestTurn(double angle) {
+  return std::abs(angle) < M_PI ? angle : math::WrapAngle(angle);
+}
+
 // Bearings at equal spacing, limited to what `max_rate` can follow from `start`.
 Samples FollowedBearings(const world::Trajectory& plan, const world::Trajectory& target,
                          const std::optional<YawStart>& start, double max_rate) {
@@ -62,7 +66,7 @@ Samples FollowedBearings(const world::Trajectory& plan, const world::Trajectory&
     if (x * x + y * y > kTooNear * kTooNear) {
       const double bearing = std::atan2(y, x);
       const double reach = i == 0 ? 0.0 : max_rate * step;
-      yaw = known ? yaw + std::clamp(math::WrapAngle(bearing - yaw), -reach, reach) : bearing;
+      yaw = known ? yaw + std::clamp(ShortestTurn(bearing - yaw), -reach, reach) : bearing;
       known = true;
     }
     samples[i] = yaw;

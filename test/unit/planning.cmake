@@ -4,6 +4,9 @@ chase_test(planning_search_test
 chase_test(planning_soundness_test
   LIBS planning_core math_exact
   SOURCES ${CMAKE_CURRENT_LIST_DIR}/planning_soundness_test.cpp)
+chase_test(planning_refinement_test
+  LIBS planning_core math_exact
+  SOURCES ${CMAKE_CURRENT_LIST_DIR}/planning_refinement_test.cpp)
 chase_test(planning_test
   LIBS planning_core math_exact
   SOURCES ${CMAKE_CURRENT_LIST_DIR}/planning_ladder_test.cpp

@@ -1,0 +1,155 @@
+// What leads plans around obstacles, against independent computations.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "common/world/obstacle.h"
+#include "services/planning/certificate.h"
+#include "services/planning/cost.h"
+#include "services/planning/enlargement.h"
+#include "services/planning/fast_kernels.h"
+#include "services/planning/refinement.h"
+#include "test/unit/planning_instances.h"
+
+namespace chase::planning {
+namespace {
+
+double Uniform(std::mt19937_64* g, double low, double high) {
+  return std::uniform_real_distribution<double>(low, high)(*g);
+}
+
+Eigen::Matrix3d RandomShape(std::mt19937_64* g) {
+  Eigen::Vector3d radii;
+  for (int a = 0; a < 3; ++a) radii[a] = Uniform(g, 0.2, 3.0);
+  const Eigen::Quaterniond turn =
+      Eigen::Quaterniond(Uniform(g, -1, 1), Uniform(g, -1, 1), Uniform(g, -1, 1), Uniform(g, -1, 1))
+          .normalized();
+  const Eigen::Matrix3d Q = turn.toRotationMatrix();
+  return Q * radii.array().square().inverse().matrix().asDiagonal() * Q.transpose();
+}
+
+Eigen::Vector3d OnSurface(std::mt19937_64* g, const Eigen::Matrix3d& R) {
+  const Eigen::Vector3d d(Uniform(g, -1, 1), Uniform(g, -1, 1), Uniform(g, -1, 1));
+  return d / std::sqrt(d.dot(R * d));
+}
+
+TEST(Enlargement, HoldsEveryBallAboutTheShapeAndItsBoxHoldsTheShape) {
+  std::mt19937_64 g(3);
+  Enlargements memory;
+  for (int i = 0; i < 200; ++i) {
+    const Eigen::Matrix3d R = RandomShape(&g);
+    const double room = Uniform(&g, 0.01, 0.5);
+    const Enlarged& e = memory.Of(static_cast<size_t>(i % 3), R, room);
+    for (int k = 0; k < 50; ++k) {
+      const Eigen::Vector3d ball =
+          Eigen::Vector3d(Uniform(&g, -1, 1), Uniform(&g, -1, 1), Uniform(&g, -1, 1)).normalized();
+      const Eigen::Vector3d x = OnSurface(&g, R) + room * ball;
+      EXPECT_LE(x.dot(e.shape * x), 1.0 + 1e-9);
+      const Eigen::Vector3d y = OnSurface(&g, e.shape);
+      EXPECT_TRUE((y.array().abs() <= e.half).all());
+    }
+    const Eigen::Array3d half = HalfSidesOf(R);
+    for (int a = 0; a < 3; ++a) EXPECT_NEAR(half[a], std::sqrt(R.inverse()(a, a)), 1e-3 * half[a]);
+  }
+}
+
+TEST(Clearance, KernelsSeeWhatTheSegmentsDistanceSaysAllWithTheSameBits) {
+  std::mt19937_64 g(5);
+  constexpr int n = 16;
+  for (int trial = 0; trial < 50; ++trial) {
+    kernels::ClearanceInput in{};
+    double R[6 * n] = {}, center[6 * n] = {};
+    uint8_t sight[n] = {};
+    Eigen::Matrix3d shapes[n];
+    in.free = 2 + trial % 2;
+    in.n = in.rows = n;
+    in.R = R;
+    in.center = center;
+    in.sight = sight;
+    for (int j = 0; j < n; ++j) {
+      shapes[j] = RandomShape(&g);
+      const int at[6][2] = {{0, 0}, {0, 1}, {0, 2}, {1, 1}, {1, 2}, {2, 2}};
+      for (int i = 0; i < 6; ++i) R[i * n + j] = shapes[j](at[i][0], at[i][1]);
+      for (int i = 0; i < 6; ++i) center[i * n + j] = Uniform(&g, -4, 4);
+      sight[j] = j % 3 != 0;
+    }
+    double x[9];
+    for (double& value : x) value = Uniform(&g, -3, 3);
+    for (int k = 0; k < kernels::kSamples; ++k) {
+      in.tau[k] = (k + 1.0) / kernels::kSamples;
+      for (int f = 0; f < in.free; ++f) in.phi[f][k] = Uniform(&g, 0, 1);
+      for (int a = 0; a < 3; ++a) {
+        in.at[a][k] = Uniform(&g, -3, 3);
+        in.target[a][k] = Uniform(&g, -3, 3);
+      }
+    }
+    double values[n * kernels::kSamples], least[n];
+    kernels::PortableKernels().clearance(in, x, values, least);
+    for (int j = 0; j < n; ++j) {
+      double lowest = HUGE_VAL;
+      for (int k = 0; k < kernels::kSamples; ++k) {
+        Eigen::Vector3d p, q, c;
+        for (int a = 0; a < 3; ++a) {
+          p[a] = in.at[a][k];
+          for (int f = 0; f < in.free; ++f) p[a] += in.phi[f][k] * x[3 * f + a];
+          q[a] = sight[j] ? in.target[a][k] : p[a];
+          c[a] = center[a * n + j] + in.tau[k] * center[(3 + a) * n + j];
+        }
+        const double expected = sight[j] ? world::SegmentSquaredDistance(p, q, c, shapes[j])
+                                         : (p - c).dot(shapes[j] * (p - c));
+        EXPECT_NEAR(values[j * kernels::kSamples + k], expected, 1e-8 * (1.0 + expected));
+        lowest = std::min(lowest, values[j * kernels::kSamples + k]);
+      }
+      EXPECT_EQ(least[j], lowest);
+    }
+    for (const kernels::Table* table : {kernels::Avx2Kernels(), kernels::Avx512Kernels()}) {
+      if (!table) continue;
+      double others[n * kernels::kSamples], their_least[n];
+      table->clearance(in, x, others, their_least);
+      for (int i = 0; i < n * kernels::kSamples; ++i) EXPECT_EQ(others[i], values[i]);
+      for (int j = 0; j < n; ++j) EXPECT_EQ(their_least[j], least[j]);
+    }
+  }
+}
+
+// Improved and repaired plans keep what they promise, by the exhaustive test in exact arithmetic.
+TEST(Refiner, PlansAroundObstaclesAreCertifiedAndKeepTheirStart) {
+  PlannerConfig config;
+  config.degree = 6;
+  config.steps = 3;
+  config.skeletons = 6;
+  config.weight_smooth = 1.0;
+  InstanceSpec spec;
+  spec.n_obstacles = 15;
+  const InstanceGenerator generator(config, spec);
+  Refiner refiner(config);
+  int improved = 0, repaired = 0;
+  for (unsigned seed = 1; seed <= 100; ++seed) {
+    Problem problem = MakeProblem(config, generator.Make(seed), nullptr);
+    SkeletonPlacer(config).PlaceRing(config.steps, config.skeletons, &problem);
+    const Eigen::MatrixXd inverse = InverseKkt(config, problem);
+    const int index = static_cast<int>(seed * 7919u) % problem.n_candidates();
+    const Curve first = ReferenceCandidate(config, problem, inverse, index);
+    if (!refiner.Reset(problem, 0.0)) continue;
+    for (const bool repair : {false, true}) {
+      Curve plan = first;
+      Cost cost;
+      const bool moved = repair ? refiner.Repair(&plan, &cost) : refiner.Improve(2, &plan, &cost);
+      if (!moved) {
+        EXPECT_EQ(plan, first);
+        continue;
+      }
+      ++(repair ? repaired : improved);
+      EXPECT_EQ(Curve(plan.topRows<4>()), problem.start);
+      EXPECT_TRUE(IsFeasible(plan, problem, 0.0, true, Arithmetic::kExactSturm)) << seed;
+      EXPECT_NEAR(cost.total, Evaluate(config, problem, plan).total, 1e-6 * (1.0 + cost.total));
+    }
+  }
+  EXPECT_GT(improved, 20);
+  EXPECT_GT(repaired, 10);
+}
+
+}  // namespace
+}  // namespace chase::planning
