@@ -102,6 +102,7 @@ std::string FitConfig::Problem() const {
 std::string MotionConfig::Problem() const {
   return Check()
       .In("acceleration_density", acceleration_density, 1e-4, 100)
+      .In("hidden_density", hidden_density, 1e-4, 100)
       .In("vertical_density", vertical_density, 1e-5, 100)
       .In("initial_speed_sigma", initial_speed_sigma, 0.01, 20)
       .In("initial_vertical_speed_sigma", initial_vertical_speed_sigma, 0.01, 20)

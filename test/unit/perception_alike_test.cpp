@@ -51,6 +51,27 @@ TEST(PerceptionCandidate, DrivesOnceItsWayIsMoreThanItsErrorsAndItsEdges) {
   EXPECT_FALSE(CandidateAt(p, p + Vector3d(0.0, 0.0, 1.0), 0.01).Drives()) << "up is not away";
 }
 
+TEST(PerceptionCandidate, WhatOnlyTheSizeTellsOfItsRangeIsNoWay) {
+  const Vector3d p(20.0, 0.0, 0.55);  // seven pixels high: one pixel is three metres of range
+  Candidate c = CandidateAt(p, p + Vector3d(-4.0, 0.15, 0.0), 0.03);
+  c.px = 20.0 / 220.0;
+  c.range_px = {3.0, 0.0};
+  EXPECT_FALSE(c.Drives());
+  c.ranged = true;
+  EXPECT_TRUE(c.Drives());
+}
+
+TEST(PerceptionCandidate, HitByTheLidarAndWholeItDrivesSooner) {
+  const Vector3d p(2.0, 0.0, 0.55);
+  Candidate c = CandidateAt(p, p + Vector3d(0.0, 0.05, 0.0), 0.005);
+  c.range_px = {0.05, 0.0};
+  EXPECT_FALSE(c.Drives());
+  c.ranged = true;
+  EXPECT_TRUE(c.Drives());
+  c.last.detection.cut[kLeft] = true;
+  EXPECT_FALSE(c.Drives()) << "what the image's border cuts seems to move with it";
+}
+
 TEST(PerceptionAlike, WhatStandsIsTakenAfterAWhile) {
   FlyOptions options;
   options.duration = 1.5;

@@ -85,6 +85,26 @@ TEST(PerceptionSilhouette, EdgesLieBetweenPixels) {
   }
 }
 
+TEST(PerceptionSilhouette, AnotherShadeBehindTheEdgeDoesNotMoveIt) {
+  cv::Mat image = Grey(10);
+  cv::rectangle(image, {100, 151}, {140, 152}, cv::Scalar::all(35), cv::FILLED);
+  cv::rectangle(image, {100, 80}, {140, 150}, kOrangeBgr, cv::FILLED);
+  const auto found = ColorDetector(DetectorConfig{}, 0.45).Detect(image);
+  ASSERT_EQ(found.size(), 1u);
+  for (const auto& s : found[0].silhouette.samples[kBottom]) EXPECT_NEAR(s.y(), 150.5, 0.05);
+}
+
+TEST(PerceptionColor, TwoThingsJoinedByThreadsAreParted) {
+  cv::Mat image = Grey();  // the lower one before the other, its side leaning
+  for (int y = 86; y < 140; ++y) cv::line(image, {124 + (y - 86) / 18, y}, {155, y}, kOrangeBgr);
+  cv::rectangle(image, {158, 80}, {176, 112}, kOrangeBgr, cv::FILLED);
+  cv::rectangle(image, {155, 87}, {159, 92}, kOrangeBgr, cv::FILLED);
+  const auto found = ColorDetector(DetectorConfig{}, 0.45).Detect(image);
+  EXPECT_TRUE(std::any_of(found.begin(), found.end(), [](const Detection& d) {
+    return std::abs(d.box.x - 157.0) < 3.0 && std::abs(d.box.width - 19.0) < 4.0;
+  }));
+}
+
 TEST(PerceptionSilhouette, SidesAtTheImagesBorderAreCut) {
   cv::Mat image = Grey();
   cv::rectangle(image, {0, 80}, {25, 150}, kOrangeBgr, cv::FILLED);

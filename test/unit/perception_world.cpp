@@ -305,24 +305,4 @@ World GymWorld(uint32_t seed) {
   return w;
 }
 
-World ForestWorld(uint32_t seed) {
-  World w;
-  w.seed = seed;
-  std::mt19937 random(seed * 104729u + 3u);
-  std::uniform_real_distribution<double> u(0.0, 1.0);
-  const double a = 2.0 * M_PI * u(random), b = 2.0 * M_PI * u(random);
-  w.target = [a](double t) { return Vector3d(2.8 * t - 20.0, 2.5 * std::sin(0.45 * t + a), 0.55); };
-  const auto target = w.target;
-  w.body = [a, b, target](double t) {
-    const double d = 5.0 + 1.8 * std::sin(0.4 * t + b);
-    const Vector3d back = target(t - 0.3) - target(t + 0.3);
-    const Vector3d p = target(t) + d * back.normalized() +
-                       Vector3d(0.0, 0.5 * std::sin(0.6 * t), 1.1 + 0.4 * std::sin(0.5 * t + a));
-    return Looking(p, target(t), 0.08 + 0.06 * std::sin(1.1 * t), 0.07 * std::sin(1.3 * t + b));
-  };
-  AddPillars(&w, 40, 14.0, 0.15, 0.35, {0.35, 0.25, 0.16}, 14.0, &random);
-  if (seed % 2) w.light = {1.08, 0.92, 0.72};
-  return w;
-}
-
 }  // namespace chase::perception_test

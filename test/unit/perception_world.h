@@ -98,8 +98,6 @@ std::vector<Outcome> Fly(const World& world, const perception::PerceptionConfig&
 
 /// A hall with pillars, a winding target at up to 1 m/s on its carrier, drone 2 to 4 m away.
 World GymWorld(uint32_t seed);
-/// Trunks, a target at 3 m/s, drone 3 to 8 m away.
-World ForestWorld(uint32_t seed);
 /// The config of tests with a standing target: it is taken without waiting whether it drives.
 perception::PerceptionConfig TakenAtOnce();
 /// Drone hovering at the origin 1.2 m up, target standing `distance` m ahead, nothing else.
