@@ -183,7 +183,7 @@ void CheckAll(benchmark::State& state) {
       const PlanRequest request = generator.Make(1000u + static_cast<unsigned>(i));
       const Problem problem = searcher.Pose(request);
       proof.Reset(problem, 0.0, true);
-      if (!fast.Set(problem, proof) || !fast.SetObstacles()) continue;
+      if (!fast.Set(problem, &proof) || !fast.SetObstacles()) continue;
       const int n = fast.n_candidates();
       std::vector<int> ids(static_cast<size_t>(n + kernels::kPad)), states(ids.size());
       us.push_back(MedianMicroseconds(5, [&] {
