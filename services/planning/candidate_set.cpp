@@ -165,8 +165,8 @@ void LimitToReach(const PlannerConfig& config, const CandidateTables& t, double 
   problem->near.clear();
   for (size_t j = 0; j < problem->obstacles.size(); ++j) {
     const Ellipsoid& e = problem->obstacles[j];
-    if (MayTouch(box, e.center, e.safety_half, std::max(1.0, config.cost_range)) ||
-        MayTouch(box, e.center, e.sight_half, 1.0))
+    if (MayTouch(box, e.center,
+                 (std::max(1.0, config.cost_range) * e.safety_half).max(e.sight_half), 1.0))
       problem->near.push_back(static_cast<int>(j));
   }
 }
@@ -214,11 +214,15 @@ Points ToPoints(const Curve& power, int degree) {
 
 Curve ToPower(const Points& points, int degree) {
   // Forward differences: row k is C(degree,k) times the k-th difference at 0.
-  Points d = points;
   Curve power(degree + 1, 3);
-  for (int k = 0; k <= degree; ++k) {
-    power.row(k) = math::Binomial(degree, k) * d.row(0);
-    for (int i = 0; i < degree - k; ++i) d.row(i) = d.row(i + 1) - d.row(i);
+  for (int a = 0; a < 3; ++a) {
+    double d[7], choose = 1.0;
+    for (int i = 0; i < 7; ++i) d[i] = points(i, a);
+    for (int k = 0; k <= degree; ++k) {
+      power(k, a) = choose * d[0];
+      choose = choose * (degree - k) / (k + 1);
+      for (int i = 0; i < degree - k; ++i) d[i] = d[i + 1] - d[i];
+    }
   }
   return power;
 }

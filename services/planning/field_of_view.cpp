@@ -22,25 +22,29 @@ struct Margins {
   double half_angle, length, angle;
 };
 
-// x cos(direction) and so on: > 0 where (x, y) lies to the left of the direction.
-double Left(double direction, double x, double y) {
-  return std::cos(direction) * y - std::sin(direction) * x;
-}
+struct Direction {
+  double x, y;
+  explicit Direction(double angle) : x(std::cos(angle)), y(std::sin(angle)) {}
+};
+
+// > 0 where (x, y) lies to the left of the direction.
+double Left(const Direction& d, double x, double y) { return d.x * y - d.y * x; }
 
 bool IsBetween(const Piece& piece, const Margins& m) {
   const double from = piece.yaw.maxCoeff() + m.angle - m.half_angle;
   const double to = piece.yaw.minCoeff() - m.angle + m.half_angle;
   if (!(from < to)) return false;
+  const Direction first(from), last(to);
   for (Eigen::Index i = 0; i < piece.x.size(); ++i)
-    if (!(Left(from, piece.x[i], piece.y[i]) > m.length) ||
-        !(Left(to, piece.x[i], piece.y[i]) < -m.length))
+    if (!(Left(first, piece.x[i], piece.y[i]) > m.length) ||
+        !(Left(last, piece.x[i], piece.y[i]) < -m.length))
       return false;
   return true;
 }
 
 bool IsBrokenAt(const Piece& piece, Eigen::Index i, Eigen::Index j, const Margins& m) {
-  return Left(piece.yaw[j] - m.half_angle, piece.x[i], piece.y[i]) < -m.length ||
-         Left(piece.yaw[j] + m.half_angle, piece.x[i], piece.y[i]) > m.length;
+  return Left(Direction(piece.yaw[j] - m.half_angle), piece.x[i], piece.y[i]) < -m.length ||
+         Left(Direction(piece.yaw[j] + m.half_angle), piece.x[i], piece.y[i]) > m.length;
 }
 
 bool Keeps(const Piece& piece, const Margins& m, int depth) {

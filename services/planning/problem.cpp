@@ -52,10 +52,11 @@ struct Hull {
   // Leaves the first half and returns the second.
   static Points Halve(Points* points) {
     Points right = *points;
-    for (int k = 1; k < 7; ++k) {
-      for (int i = 0; i + k < 7; ++i) right.row(i) = 0.5 * (right.row(i) + right.row(i + 1));
-      points->row(k) = right.row(0);
-    }
+    for (int a = 0; a < 3; ++a)
+      for (int k = 1; k < 7; ++k) {
+        for (int i = 0; i + k < 7; ++i) right(i, a) = 0.5 * (right(i, a) + right(i + 1, a));
+        (*points)(k, a) = right(0, a);
+      }
     return right;
   }
 };
