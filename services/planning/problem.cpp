@@ -111,9 +111,12 @@ void Grow(const world::Obstacle& o, const Margins& margins, Ellipsoid* e) {
   if (e->grown_by[0] == margins.safety && e->grown_by[1] == margins.sight &&
       IsSameShape(e->grown_from, o.shape))
     return;
-  const world::Inflation inflation(o.shape);
-  e->safety = margins.safety > 0.0 ? inflation.By(margins.safety) : o.shape;
-  e->sight = margins.sight > 0.0 ? inflation.By(margins.sight) : o.shape;
+  e->safety = e->sight = o.shape;
+  if (margins.safety > 0.0 || margins.sight > 0.0) {
+    const world::Inflation inflation(o.shape);
+    if (margins.safety > 0.0) e->safety = inflation.By(margins.safety);
+    if (margins.sight > 0.0) e->sight = inflation.By(margins.sight);
+  }
   e->safety_half = HalfSidesOf(e->safety);
   e->sight_half = HalfSidesOf(e->sight);
   e->grown_from = o.shape;
