@@ -26,7 +26,9 @@ SurfaceMap::SurfaceMap(const MapConfig& config, SurfaceKind kind) : config_(conf
   for (Level& level : levels_) {
     level.size = size;
     level.shift = size * kShift;
-    level.cells.reserve(static_cast<size_t>(config.max_cells));
+    // All its memory is touched now, so that none has to be found in flight.
+    level.cells.resize(static_cast<size_t>(config.max_cells));
+    level.cells.clear();
     size *= 2.0f;
   }
 }

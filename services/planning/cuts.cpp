@@ -7,9 +7,10 @@ namespace chase::planning {
 namespace {
 
 using kernels::kSamples;
+static_assert(kSamples == CandidateTables::kPadded, "sample_of has a value for every instant");
 
 constexpr double kAsked = 1.03;  // squared distance: a proof has to find room below
-constexpr double kFar = 2.0;     // no parabola between samples reaches down from there
+constexpr double kFar = 2.0;     // thin shapes passed fast are missed: a proof refuses those plans
 constexpr int kSweeps = 24;
 
 // The row's least value and about when: a parabola through the least sample and its neighbours,
@@ -66,7 +67,7 @@ void Cuts::Reset(const CandidateTables& tables, const PlanProof& proof, const Po
 }
 
 Cuts::Sighting Cuts::At(int row, double tau, const double* x) const {
-  const int M = tables_->degree, column = row;
+  const int M = tables_->degree;
   double basis[7] = {};
   for (int i = 0; i <= M; ++i) {
     double b = 1.0;
@@ -75,15 +76,14 @@ Cuts::Sighting Cuts::At(int row, double tau, const double* x) const {
     basis[i] = b;
   }
   double w[3], u[3], R[6];
-  for (int i = 0; i < 6; ++i) R[i] = input_.R[i * input_.n + column];
+  for (int i = 0; i < 6; ++i) R[i] = input_.R[i * input_.n + row];
   for (int a = 0; a < 3; ++a) {
     double p = 0.0, q = 0.0;
     for (int i = 0; i < 4; ++i) p += basis[i] * start_(i, a);
     for (int i = 4; i <= M; ++i) p += basis[i] * x[3 * (i - 4) + a];
     for (int i = 0; i <= M; ++i) q += basis[i] * target_(i, a);
     u[a] = q - p;
-    w[a] =
-        p - input_.center[a * input_.n + column] - tau * input_.center[(3 + a) * input_.n + column];
+    w[a] = p - input_.center[a * input_.n + row] - tau * input_.center[(3 + a) * input_.n + row];
   }
   const auto times = [&](const double* v, double* out) {
     out[0] = R[0] * v[0] + R[1] * v[1] + R[2] * v[2];
@@ -91,7 +91,7 @@ Cuts::Sighting Cuts::At(int row, double tau, const double* x) const {
     out[2] = R[2] * v[0] + R[4] * v[1] + R[5] * v[2];
   };
   double s = 0.0, Rv[3];
-  if (input_.sight[column]) {
+  if (input_.sight[row]) {
     double Ru[3];
     times(u, Ru);
     const double uu = u[0] * Ru[0] + u[1] * Ru[1] + u[2] * Ru[2];

@@ -2,6 +2,7 @@
 
 #include <Eigen/LU>
 #include <cmath>
+#include <cstring>
 
 namespace chase::planning {
 namespace {
@@ -16,6 +17,10 @@ Eigen::Matrix3d Enlarge(const Eigen::Matrix3d& R, double room) {
 }
 
 }  // namespace
+
+bool IsSameShape(const Eigen::Matrix3d& a, const Eigen::Matrix3d& b) {
+  return std::memcmp(a.data(), b.data(), sizeof(double) * 9) == 0;
+}
 
 // Along an axis the ellipsoid reaches the root of an entry of the inverse of R from its centre.
 Eigen::Array3d HalfSidesOf(const Eigen::Matrix3d& R) {
@@ -35,7 +40,7 @@ Eigen::Array3d HalfSidesOf(const Eigen::Matrix3d& R) {
 const Enlarged& Enlargements::Of(size_t slot, const Eigen::Matrix3d& R, double room) {
   if (slot >= entries_.size()) entries_.resize(slot + 1);
   Entry& e = entries_[slot];
-  if (e.by == room && e.from == R) return e.enlarged;
+  if (e.by == room && IsSameShape(e.from, R)) return e.enlarged;
   e.from = R;
   e.by = room;
   e.enlarged.shape = Enlarge(R, room);

@@ -5,8 +5,10 @@
 
 namespace chase::planning {
 
-/// Half the sides of the box around the ellipsoid x' R x = 1, m; infinite where R is
-/// ill-conditioned.
+bool IsSameShape(const Eigen::Matrix3d& a, const Eigen::Matrix3d& b);  ///< bit for bit
+
+/// Half the sides of the box around the ellipsoid x' R x = 1, m, and 0.05 % more, for rounding;
+/// infinite where R is ill-conditioned.
 Eigen::Array3d HalfSidesOf(const Eigen::Matrix3d& R);
 
 /// A shape and half the sides of the box around it.

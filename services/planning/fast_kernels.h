@@ -195,9 +195,11 @@ enum State : int { kClear = -1, kDead = -2 };
 struct Table {
   /// Bounds, tables and near nodes of all shapes.
   void (*shape)(const ShapeInput& in, ShapeOutput& out);
-  /// Prefixes, and J1 of all candidates.
+  /// Prefixes, and J1 of all candidates; where longest2 rules a prefix out, J1 is infinite and the
+  /// prefix unset.
   void (*generate)(Context& c, const CandidateInput& in);
-  /// Free points of all candidates side by side, for those who will need many: fills c.x = x.
+  /// Free points of all candidates side by side, for those who will need many: fills c.x = x. No
+  /// prefix may have been ruled out.
   void (*spread)(Context& c, float* x);
   /// Indices i with low < j1[i] <= high, ascending; `ids` needs room for stride + kPad.
   int (*select)(const Context& c, float low, float high, int* ids);

@@ -28,6 +28,7 @@ class FastProblem {
     if (!has_costs_) SetNodes();
     has_costs_ = true;
   }
+  /// After Set without a limit, or SetAllCosts, only: so is AliveGroups.
   /// Makes the points of candidates quicker to get at: worth it before most of them are asked for.
   void Spread();
   /// The obstacles, once a problem; before costs of obstacles or feasibility are asked for. False

@@ -143,6 +143,7 @@ void FastProblem::Generate(float limit) {
       }
       farthest2 = std::max(farthest2, length2);
     }
+    // By the triangle inequality; the rest is above what single precision rounds.
     const double most = std::sqrt(farthest2) + std::sqrt(std::max(0.0, limit - offset));
     in.longest2 = static_cast<float>(1.002 * most * most + 1e-3);
   }

@@ -62,7 +62,7 @@ class Ladder : public Planner {
   bool IsCertified(const PlanRequest& request, const world::Trajectory& plan) override {
     const PlanRequest rest = OverRestOf(request, plan);
     if (!(rest.horizon > 0.05)) return false;
-    const Problem problem = MakeProblem(WithSmallerMargins(config_), rest, nullptr);
+    const Problem problem = MakeProblem(tight_, rest, nullptr);
     const Curve curve = ToCurve(plan, rest.t0, rest.horizon);
     proof_.Reset(problem, 0.0, config_.exact_visibility);
     return proof_.Holds(curve) && KeepsLimits(curve, problem);
@@ -121,7 +121,7 @@ class Ladder : public Planner {
     if (refiner_.Improve(kSteps, &better.plan, &better.cost)) *choice = better;
   }
 
-  // The running plan refined, or as it is; none where it does not hold.
+  // The running plan refined, or as it is, or led around what is in its way; none where all fail.
   std::optional<Choice> Certified(const Problem& problem, const Curve& carried) {
     constexpr int kSteps = 1;  // more follow with the next plan
     Choice choice{carried, {}};
@@ -131,8 +131,8 @@ class Ladder : public Planner {
     return std::nullopt;
   }
 
-  // The cheapest of the running plan, where it holds, and the candidates, both refined. A candidate
-  // has to be cheaper than that before it is refined itself.
+  // The cheapest of the running plan, where it holds or can be made to, and the candidates, both
+  // refined. A candidate has to be cheaper than that before it is refined itself.
   bool TrySearch(const Problem& problem, double sight_from, const std::optional<Curve>& carried,
                  PlanResult* result) {
     proof_.Reset(problem, sight_from, config_.exact_visibility);
@@ -159,8 +159,8 @@ class Ladder : public Planner {
 
   // Over the whole horizon, then over shorter ones: a plan that sees the target for the next
   // seconds is renewed before it ends, and a shorter polynomial turns more sharply. What the
-  // running plan has left comes before what is shorter than that; wide skeletons cost most and come
-  // last.
+  // running plan has left comes before what is shorter than that; wide skeletons cost most; half of
+  // the margins come last.
   bool TryChase(const PlanRequest& request, std::string* notes, PlanResult* result) {
     struct Try {
       Layout layout;
@@ -174,18 +174,19 @@ class Ladder : public Planner {
     bool carry = true;
     for (const Try& t : kTries) {
       const double rest = request.running ? request.running->end() - request.t0 : 0.0;
-      if (carry && (t.tight || t.share < 1.0) && rest > t.share * request.horizon) {
+      if (carry && t.share < 1.0 && rest > t.share * request.horizon) {
         carry = false;
         if (TryCarry(request, std::min(rest, request.horizon), notes, result)) return true;
       }
       if (!TryOver(request, t.layout, t.share, t.tight, notes, result)) continue;
       const bool plain = t.layout == Layout::kNormal && t.share == 1.0 && !t.tight;
       result->verdict = plain ? Verdict::kChase : Verdict::kWider;
+      result->reason.clear();
       if (t.layout == Layout::kWide)
         result->reason = "no candidate of the normal skeletons is feasible";
       if (t.tight) result->reason = "with half of the margins";
       if (t.share < 1.0)
-        result->reason += (t.tight ? "; " : "") + std::string("sight over ") +
+        result->reason += (result->reason.empty() ? "" : "; ") + std::string("sight over ") +
                           std::to_string(static_cast<int>(100.0 * t.share)) +
                           " % of the horizon only";
       return true;
@@ -225,7 +226,7 @@ class Ladder : public Planner {
     return true;
   }
 
-  // The rest of the running plan, with all its margins, refined.
+  // The rest of the running plan, with all its margins, refined or led around obstacles.
   bool TryCarry(const PlanRequest& request, double horizon, std::string* notes,
                 PlanResult* result) {
     std::string their_notes;
@@ -239,6 +240,8 @@ class Ladder : public Planner {
     if (!choice) return false;
     result->verdict = Verdict::kKept;
     result->reason = "no candidate is feasible over the horizon, the rest of the running plan is";
+    if (!proof_.Holds(*carried, false) || !KeepsLimits(*carried, *problem))
+      result->reason += ", led around what is in its way";
     result->winner = -1;
     result->cost = choice->cost;
     result->trajectory.coefficients = choice->plan;

@@ -25,9 +25,9 @@ class PlanProof {
 
   explicit PlanProof(const kernels::Table& kernels = kernels::Kernels()) : kernels_(&kernels) {}
 
-  /// Keeps a pointer to `problem`. Sight is asked from tau = `sight_from` on (1: never); `exact` as
-  /// for IsInSight. Where the problem has a reach, there are rows for the obstacles near it only,
-  /// until a plan that leaves it is asked for.
+  /// Keeps a pointer to `problem`, which must not change until the next Reset. Sight is asked from
+  /// tau = `sight_from` on (1: never); `exact` as for IsInSight. Where the problem has a reach,
+  /// there are rows for the obstacles near it only, until a plan that leaves it is asked for.
   void Reset(const Problem& problem, double sight_from, bool exact);
 
   /// Without `exactly`, what bounds and subdivision leave open counts as refused: for plans that

@@ -15,7 +15,7 @@ const char* Name(Verdict verdict) {
 
 namespace {
 
-// Two plans of a walk past a pillar, so that the first that matters finds tables and memory ready.
+// A walk between pillars, so that the first plan that matters finds tables and memory ready.
 void WarmUp(const PlannerConfig& config, Planner* planner) {
   for (const double horizon : {2.5, 5.0}) {
     PlanRequest request;

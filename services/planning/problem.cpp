@@ -2,16 +2,16 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 
 #include "services/planning/candidate_set.h"
 
 namespace chase::planning {
 namespace {
 
-// Margins are taken back in these shares until the start, or the target, is outside the shape.
+// Margins are taken back in these shares until the start, the target, or the line of sight at the
+// start is outside the shape.
 constexpr double kShares[] = {1.0, 0.75, 0.5, 0.25, 0.0};
-constexpr double kClear = 1.02;
+constexpr double kClear = 1.02;    // squared distance; as a factor of lengths more than enough
 constexpr double kLeaveBy = 0.25;  // tau by which a plan has left an obstacle that it starts in
 
 double SquaredNorm(const Eigen::Matrix3d& R, const Eigen::Vector3d& x) { return x.dot(R * x); }
@@ -20,10 +20,6 @@ double Uncertainty(const PlannerConfig& config, const world::Obstacle& o, double
   const double half = 0.5 * duration;
   const double sigma = std::sqrt(o.position_variance + o.velocity_variance * half * half);
   return std::min(config.max_inflation, config.sigmas * sigma);
-}
-
-bool IsSameShape(const Eigen::Matrix3d& a, const Eigen::Matrix3d& b) {
-  return std::memcmp(a.data(), b.data(), sizeof(double) * 9) == 0;
 }
 
 constexpr int kSamples = 24;
@@ -36,6 +32,7 @@ struct Hull {
   Box whole, quarters[kQuarters];
 
   explicit Hull(const Curve& curve_) : curve(curve_), has_boxes(curve.rows() <= 7) {
+    whole = {Eigen::Array3d::Constant(-HUGE_VAL), Eigen::Array3d::Constant(HUGE_VAL)};
     if (!has_boxes) return;
     Points left = ToPoints(curve, 6);
     whole = BoxOf(left, 7, 1e-6);
@@ -236,8 +233,7 @@ void MakeProblem(const PlannerConfig& config, const PlanRequest& request, std::s
         config.sight_margin + target_growth};
     Grow(o, margins, e);
     // Far from start and target no margin has to give way.
-    if (target.has_boxes && !MayTouch(own, e->center, e->safety_half.max(e->sight_half), kClear))
-      continue;
+    if (!MayTouch(own, e->center, e->safety_half.max(e->sight_half), kClear)) continue;
     RelaxSafety(o, margins.safety, *problem, e, notes);
     RelaxSight(o, margins.sight, first, target, e, notes);
   }

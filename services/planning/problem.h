@@ -71,7 +71,8 @@ void MakeProblem(const PlannerConfig& config, const PlanRequest& request, std::s
                  Problem* problem);
 
 /// The problem with the obstacles near its reach (all, where there is none) only, enlarged by
-/// `room` m to all sides where the start and the target stay outside; without skeletons.
+/// `room` m to all sides where the start and the target, for sight also the line of sight at the
+/// start, stay outside; without skeletons.
 void WithRoom(const Problem& problem, double room, Enlargements* memory, Problem* roomy);
 
 /// `trajectory` over [start, start + duration] in normalised time.

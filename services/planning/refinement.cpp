@@ -82,7 +82,7 @@ void Refiner::SetObjective() {
   in.cost_range = config_.cost_range;
 }
 
-// Obstacles that may cost anything to plans within kReach of the given one.
+// Obstacles that may cost anything to plans within reach_ of the given one.
 void Refiner::SetNear(const Points& b) {
   near_.clear();
   input_.n_near = 0;

@@ -18,20 +18,20 @@ class Refiner {
  public:
   explicit Refiner(const PlannerConfig& config) : config_(config), shelf_(config) {}
 
-  /// How far a control point may move in all, m.
+  /// How far Improve may move a control point, m; Repair goes further, within the problem's reach.
   static constexpr double kReach = 0.5;
 
   /// Keeps a pointer to `problem`. False where its degrees do not fit: nothing can be improved.
   bool Reset(const Problem& problem, double sight_from);
 
-  /// Up to `steps` steps, then the proof; where that fails, one step around what is in the way.
-  /// True when the plan moved: it keeps its start, is certified against the problem's limits and
-  /// the enlarged obstacles, and costs less by 0.02 % at least. Else it is as before. The plan
-  /// given need not be feasible. `cost` is that of the plan in any case.
+  /// Up to `steps` steps, then the proof; where that fails, around what is in the way, or, for a
+  /// limit, part of the way. True when the plan moved: it keeps its start, is certified against the
+  /// problem's limits and the enlarged obstacles, and costs less by 0.02 % at least. Else it is as
+  /// before. The plan given need not be feasible. `cost` is that of the plan in any case.
   bool Improve(int steps, Curve* plan, Cost* cost);
 
-  /// The nearest in cost that is certified, for a plan that is not; it may cost more. True when
-  /// there is one.
+  /// A certified plan near the model's least, around what is in the way, for a plan that is not
+  /// certified; it may cost more. True when one was found.
   bool Repair(Curve* plan, Cost* cost);
 
  private:

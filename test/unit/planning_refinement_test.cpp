@@ -10,7 +10,9 @@
 #include "services/planning/cost.h"
 #include "services/planning/enlargement.h"
 #include "services/planning/fast_kernels.h"
+#include "services/planning/fast_search.h"
 #include "services/planning/refinement.h"
+#include "services/planning/skeletons.h"
 #include "test/unit/planning_instances.h"
 
 namespace chase::planning {
@@ -149,6 +151,94 @@ TEST(Refiner, PlansAroundObstaclesAreCertifiedAndKeepTheirStart) {
   }
   EXPECT_GT(improved, 20);
   EXPECT_GT(repaired, 10);
+}
+
+// Prefixes that cannot stay below the bound are ruled out together: no candidate below it is lost.
+TEST(Search, ABoundLosesNothingThatIsBelowIt) {
+  int found_some = 0;
+  for (const int steps : {1, 2, 3})
+    for (const int skeletons : {1, 8, 17}) {
+      PlannerConfig config;
+      config.steps = steps;
+      config.skeletons = skeletons;
+      config.adaptive = false;
+      InstanceSpec spec;
+      spec.n_obstacles = 12;
+      const InstanceGenerator generator(config, spec);
+      for (const kernels::Table* table :
+           {&kernels::PortableKernels(), kernels::Avx2Kernels(), kernels::Avx512Kernels()}) {
+        if (!table) continue;
+        const auto search = MakeFastSearch(config, *table);
+        PlanProof proof(*table);
+        for (unsigned seed = 1; seed <= 8; ++seed) {
+          Problem problem = MakeProblem(config, generator.Make(seed), nullptr);
+          SkeletonPlacer(config).Place(Layout::kNormal, &problem);
+          const auto best = [&](double bound) {
+            proof.Reset(problem, 0.0, config.exact_visibility);
+            return search->Best(problem, 0.0, bound, &proof);
+          };
+          const Found free = best(HUGE_VAL);
+          if (free.index < 0) continue;
+          ++found_some;
+          for (const double share : {1.001, 10.0}) {
+            const Found bounded = best(share * free.cost.total);
+            EXPECT_EQ(bounded.index, free.index);
+            EXPECT_EQ(bounded.cost.total, free.cost.total);
+            EXPECT_EQ(bounded.plan, free.plan);
+          }
+          EXPECT_EQ(best(1e-6 * free.cost.total).index, -1);
+        }
+      }
+    }
+  EXPECT_GT(found_some, 100);
+}
+
+PlanRequest WalkPastPillar(double pillar_y) {
+  PlanRequest request;
+  request.start.p = {-2.5, 0.0, 1.5};
+  request.target.duration = request.horizon;
+  request.target.coefficients = Eigen::MatrixXd::Zero(2, 3);
+  request.target.coefficients.row(0) << 0.0, 0.0, 1.0;
+  request.target.coefficients.row(1) << request.horizon, 0.0, 0.0;
+  world::Obstacle pillar;
+  pillar.id = 7;
+  pillar.center = world::Trajectory::Constant({-2.5, pillar_y, 1.0}, 0.0, request.horizon);
+  pillar.shape = Eigen::Vector3d(4.0, 4.0, 0.1).asDiagonal();
+  request.obstacles = {pillar};
+  return request;
+}
+
+// Shapes are kept from plan to plan: margins that gave way must not stay away, nor the other way.
+TEST(Planner, AnswersDoNotDependOnWhatWasAskedBefore) {
+  const PlannerConfig config;
+  const PlanRequest within = WalkPastPillar(0.8), outside = WalkPastPillar(1.5);
+  const PlanResult fresh_within = MakePlanner("chase", config)->Plan(within);
+  const PlanResult fresh_outside = MakePlanner("chase", config)->Plan(outside);
+  EXPECT_NE(fresh_within.reason.find("starts within the margin of obstacle 7"), std::string::npos);
+  EXPECT_EQ(fresh_outside.reason, "");
+  const auto planner = MakePlanner("chase", config);
+  for (int i = 0; i < 2; ++i)
+    for (const bool inside : {true, false, false, true}) {
+      const PlanResult plan = planner->Plan(inside ? within : outside);
+      const PlanResult& expected = inside ? fresh_within : fresh_outside;
+      EXPECT_EQ(plan.trajectory.coefficients, expected.trajectory.coefficients);
+      EXPECT_EQ(plan.reason, expected.reason);
+      EXPECT_EQ(plan.yaw, expected.yaw);
+    }
+}
+
+// The line of sight passes a pillar within its margin when the plan starts: the margin gives way
+// there and is said to, the target stays in sight.
+TEST(Planner, SightThatStartsWithinAMarginIsKept) {
+  PlannerConfig config;
+  config.sight_margin = 0.4;
+  PlanRequest request = WalkPastPillar(0.0);
+  request.obstacles[0].center =
+      world::Trajectory::Constant({-1.2, 0.75, 1.0}, 0.0, request.horizon);
+  const PlanResult plan = MakePlanner("chase", config)->Plan(request);
+  EXPECT_EQ(plan.verdict, Verdict::kChase) << plan.reason;
+  EXPECT_NE(plan.reason.find("sight starts within the margin of obstacle 7"), std::string::npos)
+      << plan.reason;
 }
 
 }  // namespace
