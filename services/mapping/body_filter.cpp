@@ -16,6 +16,8 @@ constexpr double kOutlier = 0.12;   // m, a reach this far from what the others 
 constexpr double kShrink = 0.03;    // share of an end no longer seen that a sweep forgets
 constexpr double kDoubt = 0.05;     // m, by which a sweep doubts it before
 constexpr double kKnown = 0.15;     // m, standard deviation of an end that is still known
+constexpr int kSureSweeps = 4;      // in view, after which an end is one
+constexpr double kStretch = 0.3;    // m, by which the outline may still reach beyond it
 constexpr double kMostTerm = 36.0;  // of a reach in a distance: one alone does not decide
 constexpr double kSquare = 20.0;    // m, larger than any mover
 
@@ -67,8 +69,9 @@ BodyFilter::Row BodyFilter::Model(int k, double age) {
 }
 
 /// Ends that moved otherwise than the rest did, by a robust fit (Geman and McClure), tell of
-/// another outline, not of another motion: their reaches are doubted.
-void BodyFilter::Reshape(const Reaches& seen, const std::array<double, kDirections>& innovation) {
+/// another outline, not of another motion: their reaches are doubted. Returns how many of those
+/// known before did move as the rest.
+int BodyFilter::Reshape(const Reaches& seen, const std::array<double, kDirections>& innovation) {
   Eigen::Vector2d shift = Eigen::Vector2d::Zero();
   for (int round = 0; round < 8; ++round) {
     Eigen::Matrix2d a = 1e-3 * Eigen::Matrix2d::Identity();
@@ -85,20 +88,33 @@ void BodyFilter::Reshape(const Reaches& seen, const std::array<double, kDirectio
     }
     shift = a.inverse() * b;
   }
+  int rigid = 0;
   for (int k = 0; k < kDirections; ++k) {
     const size_t i = static_cast<size_t>(k);
+    if (!seen[i].edge) continue;
     const double rest = innovation[i] - Direction(k).dot(shift);
-    if (seen[i].edge && std::abs(rest) > kOutlier) P_(4 + k, 4 + k) += rest * rest;
+    if (std::abs(rest) > kOutlier)
+      P_(4 + k, 4 + k) += rest * rest;
+    else
+      rigid += P_(4 + k, 4 + k) < kKnown * kKnown;
   }
+  return rigid;
 }
 
 /// Where no end is in view the body reaches at least as far as it was seen. How far is anyone's
-/// guess, and says nothing of the motion.
+/// guess, and says nothing of the motion; hardly beyond an end that was in view often enough,
+/// though: what is seen there is something else that it passes.
 void BodyFilter::Uncover(const Reaches& seen, double unseen) {
   for (int k = 0; k < kDirections; ++k) {
     const Reach& reach = seen[static_cast<size_t>(k)];
-    const double beyond = reach.along - Model(k, reach.age).dot(x_);
-    if (reach.edge) continue;
+    End& end = ends_[static_cast<size_t>(k)];
+    if (reach.edge) {
+      end = {x_[4 + k], end.sweeps + 1};
+      continue;
+    }
+    double beyond = reach.along - Model(k, reach.age).dot(x_);
+    if (end.sweeps >= kSureSweeps)
+      beyond = std::min(beyond, std::max(0.0, end.place + kStretch - x_[4 + k]));
     if (beyond <= 0.0) {  // hidden, or never was: doubted first, then forgotten slowly
       if (P_(4 + k, 4 + k) < kKnown * kKnown)
         P_(4 + k, 4 + k) += kDoubt * kDoubt;
@@ -113,13 +129,13 @@ void BodyFilter::Uncover(const Reaches& seen, double unseen) {
   }
 }
 
-int BodyFilter::Correct(const Reaches& seen, double sigma, double unseen) {
+Sight BodyFilter::Correct(const Reaches& seen, double sigma, double unseen) {
   std::array<double, kDirections> innovation{};
   for (int k = 0; k < kDirections; ++k) {
     const Reach& reach = seen[static_cast<size_t>(k)];
     innovation[static_cast<size_t>(k)] = reach.along - Model(k, reach.age).dot(x_);
   }
-  Reshape(seen, innovation);
+  const int rigid = Reshape(seen, innovation);
   Eigen::Matrix<double, kDirections, kStates> H;
   Eigen::Matrix<double, kDirections, 1> z;
   int n = 0;
@@ -140,7 +156,7 @@ int BodyFilter::Correct(const Reaches& seen, double sigma, double unseen) {
     P_ = (0.5 * (P_ + P_.transpose())).eval();
   }
   Uncover(seen, unseen);
-  return n;
+  return {n, rigid};
 }
 
 double BodyFilter::Distance(const Reaches& seen, double sigma, double least) const {

@@ -19,6 +19,12 @@ struct Reach {
 };
 using Reaches = std::array<Reach, kDirections>;
 
+/// In how many directions a sweep showed where a body ends.
+struct Sight {
+  int ends = 0;
+  int rigid = 0;  ///< of them, those of an end that was known before and moved as the others did
+};
+
 /// A body of unknown convex outline that moves without turning much. Linear Kalman filter of a
 /// point that is fixed to it, of its velocity, and of the outline's support function about that
 /// point (cf. Sun, Li and Lan 2014, extended objects by support functions): a sweep measures d_k .
@@ -38,8 +44,7 @@ class BodyFilter {
   /// Moves on by dt s; the velocity walks by `acceleration` dt.
   void Predict(double dt, double acceleration);
   /// Takes a sweep's reaches; `sigma`: standard deviation of one of them, m; `unseen`: as above.
-  /// Returns in how many directions an end was in view.
-  int Correct(const Reaches& seen, double sigma, double unseen);
+  Sight Correct(const Reaches& seen, double sigma, double unseen);
   /// Mean square of the innovations of ends in view, in standard deviations of at least `least` m
   /// each. Below zero if nothing can be compared.
   double Distance(const Reaches& seen, double sigma, double least) const;
@@ -56,9 +61,16 @@ class BodyFilter {
   using Row = Eigen::Matrix<double, 1, kStates>;
   static Row Model(int k, double age);
   void Uncover(const Reaches& seen, double unseen);
-  void Reshape(const Reaches& seen, const std::array<double, kDirections>& innovation);
+  int Reshape(const Reaches& seen, const std::array<double, kDirections>& innovation);
+
+  /// Where an end was last in view, m from p, and in how many sweeps it was.
+  struct End {
+    double place = 0.0;
+    int sweeps = 0;
+  };
 
   State x_ = State::Zero();
+  std::array<End, kDirections> ends_{};
   Covariance P_ = Covariance::Zero();
 };
 

@@ -19,6 +19,7 @@ constexpr double kSure = 3.0;           // standard deviations of a speed that i
 constexpr double kLeastSpread = 0.12;   // m, of a reach when clusters are assigned
 constexpr double kExpected = 1.1;       // factor of the outline within which returns are expected
 constexpr int kFewestEnds = 3;          // directions with an end in view that tell of a body
+constexpr double kRigid = 0.5;          // share of ends in view that move as those of one body
 constexpr double kOverlap = 0.8;        // of the gate, the most that overlapping clusters cost
 constexpr double kSameSpeed = 0.5;      // m/s, difference of two tracks of one body
 constexpr double kNear = 1.2;           // factor of the outline within which its parts lie
@@ -89,9 +90,10 @@ double Tracker::Cost(const Track& track, const Cluster& cluster) const {
 }
 
 void Tracker::Correct(const Cluster& cluster, Track* track) const {
-  const int ends = track->body.Correct(cluster.reaches, config_.measurement, kUnseen);
+  const Sight sight = track->body.Correct(cluster.reaches, config_.measurement, kUnseen);
   track->sought = t_;
-  if (ends < kFewestEnds) return Shape(track);  // may be anything that stands there
+  if (sight.ends < kFewestEnds) return Shape(track);  // may be anything that stands there
+  track->rigid += 0.5 * (static_cast<double>(sight.rigid) / sight.ends - track->rigid);
   track->seen = t_;
   ++track->detections;
   ++track->row;
@@ -106,7 +108,7 @@ void Tracker::Confirm(Track* track) const {
   if (track->confirmed) return;
   track->trail.push_back(track->body.p());
   const double travel = (track->body.p() - track->birth).norm();
-  track->confirmed = track->row >= config_.confirm_sweeps &&
+  track->confirmed = track->row >= config_.confirm_sweeps && track->rigid >= kRigid &&
                      speed >= std::max(config_.confirm_speed, kSure * sigma) &&
                      travel >= config_.confirm_distance;
   track->fresh = track->confirmed;

@@ -22,7 +22,8 @@ struct Track {
   double known = 0.0;                          ///< s, when it was confirmed
   double sought = 0.0;  ///< s, last time that it was seen or something hid its place
   int detections = 0;
-  int row = 0;  ///< of them, without a sweep between them in which it was not seen
+  int row = 0;         ///< of them, without a sweep between them in which it was not seen
+  double rigid = 0.5;  ///< share of ends in view that moved as those of one body, of late
   bool confirmed = false, fresh = false;  ///< fresh: confirmed by the last update
   std::vector<Eigen::Vector2d> trail;     ///< places until the confirmation
 

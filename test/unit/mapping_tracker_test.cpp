@@ -96,6 +96,23 @@ TEST(MappingTracker, DetectionsWithGapsMakeNoMover) {
   EXPECT_EQ(tracker.Obstacles(1.5, 8.0, 1.0).size(), 1u);
 }
 
+/// Foliage and glass: returns where space seemed free, now from this part, now from that. The
+/// middle moves on, but nothing moves as one body.
+TEST(MappingTracker, PartsThatChangeMakeNoMover) {
+  for (unsigned seed = 0; seed < 20; ++seed) {
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> part(-0.6, 0.6);
+    Tracker tracker(MoverConfig{});
+    for (int i = 0; i < 60; ++i) {
+      tracker.Predict(0.1 * i);
+      std::vector<Cluster> clusters = {BoxCluster({0.1 * i, 0.0}, 0.8)};
+      for (auto& reach : clusters[0].reaches) reach.along += part(random);
+      tracker.Update(Panorama(), &clusters);
+      EXPECT_TRUE(tracker.Obstacles(1.5, 8.0, 1.0).empty()) << "seed " << seed << " sweep " << i;
+    }
+  }
+}
+
 TEST(MappingDetector, WhatLiesBesideAnExpectedPlaceDoesNotJoin) {
   VoxelGrid grid(0.2);
   grid.MoveTo(Eigen::Vector3d::Zero());
