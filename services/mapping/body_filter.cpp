@@ -16,8 +16,8 @@ constexpr double kOutlier = 0.12;   // m, a reach this far from what the others 
 constexpr double kShrink = 0.03;    // share of an end no longer seen that a sweep forgets
 constexpr double kDoubt = 0.05;     // m, by which a sweep doubts it before
 constexpr double kKnown = 0.15;     // m, standard deviation of an end that is still known
-constexpr int kSureSweeps = 4;      // in view, after which an end is one
-constexpr double kStretch = 0.3;    // m, by which the outline may still reach beyond it
+constexpr int kSureSweeps = 6;      // in view, after which an end is one
+constexpr double kStretch = 0.4;    // m, by which the outline may still reach beyond it
 constexpr double kMostTerm = 36.0;  // of a reach in a distance: one alone does not decide
 constexpr double kSquare = 20.0;    // m, larger than any mover
 
