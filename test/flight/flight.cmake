@@ -7,6 +7,11 @@ add_test(NAME flight_lockstep
   COMMAND ${CMAKE_SOURCE_DIR}/test/flight/lockstep.sh ${bin} ${scenario} ${flight})
 set_tests_properties(flight_lockstep PROPERTIES TIMEOUT 300 FIXTURES_SETUP recorded_flight)
 
+# The whole mission among trees; its criteria decide.
+add_test(NAME flight_forest
+  COMMAND ${bin}/chase-flight ${CMAKE_SOURCE_DIR}/deploy/scenarios/forest.yaml --seed 1 --quiet)
+set_tests_properties(flight_forest PROPERTIES TIMEOUT 400)
+
 foreach(row IN ITEMS "odometry:POSE;SCAN_REGISTERED" "mapping:OBSTACLES;MAP" "perception:TARGET"
                      "prediction:PREDICTION" "planning:PLAN" "control:ATTITUDE_SETPOINT"
                      "simulator:TRUTH;IMU;LIDAR_SCAN;CAMERA_IMAGE")
