@@ -26,10 +26,13 @@ class FastSearch : public Search {
   using Search::Best;
   Found Best(const Problem& problem, double sight_from, double bound, PlanProof* proof) override {
     proof_ = proof;
-    if (!fast_.Set(problem, proof, static_cast<float>(1.001 * bound)))
+    // Single precision leaves out what J2 costs all alike.
+    const double alike = config_.weight_obstacle * config_.cost_min * problem.duration *
+                         static_cast<double>(problem.obstacles.size());
+    if (!fast_.Set(problem, proof, static_cast<float>(1.001 * (bound - alike))))
       return fallback_->Best(problem, sight_from, bound, proof);
     problem_ = &problem;
-    bound_ = static_cast<float>(bound);
+    bound_ = static_cast<float>(bound - alike);
     Found found;
     found.generated = fast_.n_candidates();
     refused_.clear();
