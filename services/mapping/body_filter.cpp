@@ -167,8 +167,8 @@ double BodyFilter::Distance(const Reaches& seen, double sigma, double least) con
     const Row row = Model(k, reach.age);
     const double innovation = reach.along - row.dot(x_);
     if (!reach.edge) continue;
-    const double s = row.dot(P_ * row.transpose()) + sigma * sigma;
-    sum += std::min(kMostTerm, innovation * innovation / std::max(s, least * least));
+    const double s = std::max(row.dot(P_ * row.transpose()) + sigma * sigma, least * least);
+    sum += std::min(kMostTerm, innovation * innovation / s) + std::log(s / (least * least));
     ++n;
   }
   return n > 0 ? sum / n : -1.0;

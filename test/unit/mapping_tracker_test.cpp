@@ -96,6 +96,28 @@ TEST(MappingTracker, DetectionsWithGapsMakeNoMover) {
   EXPECT_EQ(tracker.Obstacles(1.5, 8.0, 1.0).size(), 1u);
 }
 
+/// A mover out of sight could be almost anywhere: that makes it no likelier to be what is seen
+/// where another mover is expected.
+TEST(MappingTracker, WhatIsOutOfSightTakesNoPlaceOfWhatIsInSight) {
+  for (unsigned seed = 0; seed < 10; ++seed) {
+    std::mt19937 random(seed);
+    std::normal_distribution<double> normal(0.0, 0.06);
+    Tracker tracker(MoverConfig{});
+    int id = -1;
+    for (double t = 0.0; t < 3.5; t += 0.1) {
+      tracker.Predict(t);
+      const Eigen::Vector2d noise(normal(random), normal(random));
+      std::vector<Cluster> clusters = {BoxCluster(Eigen::Vector2d(2.0 * t, 0.0) + noise, 0.5)};
+      if (t < 1.5) clusters.push_back(BoxCluster({2.0 * t, 5.1 - 1.6 * t}, 0.5));
+      tracker.Update(Panorama(), &clusters);
+      if (t < 1.5)
+        id = clusters[0].track;
+      else
+        EXPECT_EQ(clusters[0].track, id) << "seed " << seed << " t " << t;
+    }
+  }
+}
+
 /// Foliage and glass: returns where space seemed free, now from this part, now from that. The
 /// middle moves on, but nothing moves as one body.
 TEST(MappingTracker, PartsThatChangeMakeNoMover) {
