@@ -31,7 +31,7 @@ struct PlannerConfig {
 
   double max_speed = 4.0;
   double max_acceleration = 6.0;
-  double z_min = 0.4;
+  double z_min = 0.6;
   double z_max = 3.5;
   double max_elevation_deg = 28.0;
   double max_bearing_deg = 38.0;

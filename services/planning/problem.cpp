@@ -171,18 +171,28 @@ void RelaxSight(const world::Obstacle& o, double margin, const FirstSight& first
   Note(notes, "obstacle " + std::to_string(e->id) + " holds the target, its shadow is ignored");
 }
 
+// How far a motion goes on at speed v (<= 0: not at all), slowed down by `brake` after a moment.
+double Overshoot(double v, double a, double brake) {
+  constexpr double kMoment = 0.2;  // s
+  const double then = v + kMoment * std::max(0.0, a);
+  return then > 0.0 ? std::max(0.0, v) * kMoment + then * then / (2.0 * brake) : 0.0;
+}
+
 // Limits that the start already breaks give way to just above what it has: the plan may not get
-// worse than that.
+// worse than that. Heights give way to what the start cannot help only, so that no chain of plans
+// sinks; speed and acceleration a little before, since catching up needs them.
 Limits MakeLimits(const PlannerConfig& c, const world::State& s, const Eigen::Vector3d& target) {
+  constexpr double kRounding = 1e-6;
   Limits limits;
   limits.speed = c.max_speed > 0.0 ? std::max(c.max_speed, 1.1 * s.v.norm() + 0.05) : 0.0;
   limits.acceleration =
       c.max_acceleration > 0.0 ? std::max(c.max_acceleration, 1.2 * s.a.norm() + 0.1) : 0.0;
   limits.height = c.z_max > c.z_min;
-  const double sink = std::max(0.0, -s.v.z()) * 0.5 + 0.1,
-               rise = std::max(0.0, s.v.z()) * 0.5 + 0.1;
-  limits.z_min = std::min(c.z_min, s.p.z() - sink);
-  limits.z_max = std::max(c.z_max, s.p.z() + rise);
+  const double brake = c.max_acceleration > 0.0 ? 0.5 * c.max_acceleration : 2.0;
+  const double sink = Overshoot(-s.v.z(), -s.a.z(), brake),
+               rise = Overshoot(s.v.z(), s.a.z(), brake);
+  limits.z_min = std::min(c.z_min, s.p.z() - sink - kRounding);
+  limits.z_max = std::max(c.z_max, s.p.z() + rise + kRounding);
   const Eigen::Vector3d r = target - s.p;
   const double tangent = std::tan(c.max_elevation_deg * M_PI / 180.0);
   const bool in_field = std::abs(r.z()) < 0.95 * tangent * r.head<2>().norm();

@@ -160,6 +160,45 @@ TEST(Ladder, NeverCostsMoreThanTheRunningPlanCarriedOn) {
   EXPECT_GT(kept, 0);
 }
 
+// A low target that runs ahead draws the drone down, plan after plan, to the least height but not
+// below.
+TEST(Ladder, AChainOfPlansKeepsTheHeight) {
+  PlannerConfig config = Config();
+  config.elevation_low_deg = -4.0;
+  config.elevation_high_deg = 4.0;
+  config.z_min = 0.6;
+  const auto planner = MakePlanner("chase", config);
+  PlanRequest request = Walk();
+  request.start.p.z() = 0.8;
+  double lowest = 1.0;
+  for (int i = 0; i < 60; ++i) {
+    request.target = {request.t0, 2.5, Eigen::MatrixXd::Zero(2, 3)};
+    request.target.coefficients << 1.6 * request.t0, 0.0, 0.3, 4.0, 0.0, 0.0;
+    const PlanResult plan = planner->Plan(request);
+    EXPECT_LT(plan.verdict, Verdict::kSafeOnly) << i << " " << plan.reason;
+    request.t0 += 0.15;
+    request.start = plan.trajectory.At(request.t0);
+    request.running = plan.trajectory;
+    lowest = std::min(lowest, request.start.p.z());
+  }
+  EXPECT_GT(lowest, config.z_min - 0.01);
+  EXPECT_LT(lowest, config.z_min + 0.1);
+}
+
+// Where the start is below the least height, or cannot help sinking there, no plan sinks further.
+TEST(Problem, HeightGivesWayToTheStartOnly) {
+  PlannerConfig config = Config();
+  PlanRequest request = Walk();
+  request.start.p.z() = config.z_min + 0.01;
+  EXPECT_EQ(MakeProblem(config, request, nullptr).limits.z_min, config.z_min);
+  request.start.p.z() = config.z_min - 0.2;
+  EXPECT_NEAR(MakeProblem(config, request, nullptr).limits.z_min, request.start.p.z(), 1e-5);
+  request.start.v.z() = -0.5;
+  EXPECT_LT(MakeProblem(config, request, nullptr).limits.z_min, request.start.p.z() - 0.1);
+  request.start.p.z() = config.z_max + 0.2;
+  EXPECT_NEAR(MakeProblem(config, request, nullptr).limits.z_max, request.start.p.z(), 1e-5);
+}
+
 TEST(Ladder, ObstacleOnTheRunningPlanEndsItsCertificate) {
   const auto planner = MakePlanner("chase", Config());
   PlanRequest request = Walk();
