@@ -10,8 +10,12 @@ namespace {
 
 constexpr double kMoved = 0.04, kMovedPx = 2.5;  // m and px that an edge may seem to move
 constexpr double kMovedUnclear = 0.06, kMovedUnclearPx = 4.0;  // where something may hide it
-constexpr double kMovedGate = 11.8;   // squared distance, 2 dof, that chance does not reach
-constexpr double kKnownSigmas = 2.0;  // from which a way along the line of sight counts
+constexpr double kMovedAcross = 0.03, kMovedAcrossPx = 2.0;    // where all of it is seen sharply
+constexpr double kSharpWidthPx = 12.0;  // from which its place across is known so well
+constexpr double kMovedGate = 11.8;     // squared distance, 2 dof, that chance does not reach
+constexpr double kFast = 0.3;           // m/s that LiDAR points of two sweeps tell from standing,
+constexpr double kFastGate = 30.0;      // and its squared distance from it, 2 dof
+constexpr double kKnownSigmas = 2.0;    // from which a way along the line of sight counts
 constexpr double kBetter = 0.25;  // share of the first variance from which a start is taken anew
 
 }  // namespace
@@ -27,7 +31,17 @@ void Candidate::Correct(const Sighting& sighting) {
   ranged = sighting.n_points > 0;
 }
 
+bool Candidate::Fast() const {
+  if (!ranged || last.n_points == 0) return false;
+  const Eigen::Vector2d v = track.state.velocity().head<2>();
+  return v.norm() > kFast &&
+         v.dot(track.state.covariance.block<2, 2>(3, 3).ldlt().solve(v)) > kFastGate;
+}
+
 bool Candidate::Drives() const {
+  const auto& cut = last.detection.cut;
+  const bool whole = std::none_of(cut.begin(), cut.end(), [](bool c) { return c; });
+  if (whole && Fast()) return true;
   Eigen::Vector2d d = (track.state.position() - first.position()).head<2>();
   Eigen::Matrix2d P =
       track.state.covariance.topLeftCorner<2, 2>() + first.covariance.topLeftCorner<2, 2>();
@@ -35,11 +49,12 @@ bool Candidate::Drives() const {
   if (d.dot(P.ldlt().solve(d)) < kMovedGate) return false;
   const Eigen::Vector2d n = range_px.normalized();
   const double along = n.dot(d), sigma = std::sqrt(n.dot(P * n));
+  if (whole && last.detection.box.width > kSharpWidthPx &&
+      (d - along * n).norm() > std::max(kMovedAcross, kMovedAcrossPx * px))
+    return true;
   if (std::abs(along) < kKnownSigmas * sigma) d -= along * n;  // may be no way at all
-  const auto& cut = last.detection.cut;
-  const bool clear = ranged && std::none_of(cut.begin(), cut.end(), [](bool c) { return c; });
-  return d.norm() >
-         (clear ? std::max(kMoved, kMovedPx * px) : std::max(kMovedUnclear, kMovedUnclearPx * px));
+  return d.norm() > (ranged && whole ? std::max(kMoved, kMovedPx * px)
+                                     : std::max(kMovedUnclear, kMovedUnclearPx * px));
 }
 
 }  // namespace chase::perception

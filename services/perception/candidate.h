@@ -15,11 +15,15 @@ struct Candidate {
   /// Along the line of sight, as far as one pixel less of its height moves it; frame W, m.
   Eigen::Vector2d range_px = Eigen::Vector2d::UnitX();
 
+  bool part = false;  ///< a piece of something larger: it must drive
+
   /// Takes over a sighting at the track's time.
   void Correct(const Sighting& sighting);
 
   /// True when it has surely moved from where it was first seen.
   bool Drives() const;
+  /// True when LiDAR points of several times tell that it moves.
+  bool Fast() const;
 };
 
 }  // namespace chase::perception

@@ -70,7 +70,7 @@ void ColorDetector::AddPieces(const cv::Mat& bgr, const cv::Mat& score,
   std::vector<Detection> pieces;
   for (const auto& whole : *found) {
     if (whole.score > kOneThing || cv::countNonZero(whole.mask) < kSplitArea) continue;
-    for (auto& piece : SplitColumns(bgr, whole)) {
+    for (auto& piece : Split(bgr, whole)) {
       Rate(score, &piece);
       piece.part = whole.score > kWellShaped;
       if (piece.score > kWellShaped) pieces.push_back(std::move(piece));

@@ -254,6 +254,9 @@ class Fit {
       out->edge_px[side] = Median(EdgeResiduals(side, Range()));
       out->used[side] =
           input_.use_side[side] && !input_.detection->silhouette.samples[side].empty();
+      const bool beyond = !out->used[side] && !input_.detection->silhouette.samples[side].empty() &&
+                          out->edge_px[side] > 0.0;
+      out->joined = out->joined || input_.detection->goes_on[side] || beyond;
     }
     out->n_points = static_cast<int>(input_.points.size());
     const auto distances = PointResiduals();

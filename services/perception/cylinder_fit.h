@@ -38,6 +38,8 @@ struct FitInput {
   const Detection* detection = nullptr;
   std::array<bool, 4> use_side = {true, true, true, true};  ///< by Side
   std::vector<TargetPoint> points;
+  bool joined = false;     ///< a like colour went on beyond a side of it in the frame before
+  bool reappears = false;  ///< it was hidden in the frame before, and part of it may still be
 };
 
 struct FitResult {
@@ -47,6 +49,7 @@ struct FitResult {
   std::array<double, 4> edge_px = {};  ///< by Side: median residual, px, positive: seen outside fit
   std::array<bool, 4> used = {};       ///< by Side
   bool whole = true;                   ///< no side that the detection shows is left out
+  bool joined = false;                 ///< a like colour goes on beyond a side
   int n_points = 0;                    ///< LiDAR points in the fit
   double point_rms = 0.0;              ///< distance of the points from the surface, m
   double prior_distance = 0.0;         ///< squared Mahalanobis distance from the prior

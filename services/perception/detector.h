@@ -24,7 +24,9 @@ struct Silhouette {
 struct Detection {
   cv::Rect2d box;                       ///< px, edges between pixels
   double score = 0.0;                   ///< 0 to 1
-  std::array<bool, 4> cut = {};         ///< by Side: the image ends there
+  std::array<bool, 4> cut = {};         ///< by Side: it goes on where the image, or the piece, ends
+  std::array<bool, 4> goes_on = {};     ///< by Side: a like colour does so, all along the side
+  std::array<bool, 4> parted = {};      ///< by Side: likewise, and the blob's outline jumps there
   Silhouette silhouette;                ///< sides that are cut hold no samples
   cv::Rect mask_box;                    ///< where `mask` lies in the image
   cv::Mat mask;                         ///< 8 bit, 255 on the target; may be empty

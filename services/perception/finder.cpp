@@ -11,11 +11,11 @@ namespace chase::perception {
 namespace {
 
 constexpr size_t kMaxSweeps = 4;
-constexpr double kOdds = 0.0;           // logarithm of the odds that a sighting needs,
-constexpr double kOddsAfterMiss = 1.5;  // and where the frame before had none
-constexpr double kSureOdds = 8.0;       // and with which no other is tried
-constexpr double kRival = 6.0;          // less, of something else that makes a sighting contested
-constexpr size_t kMostTried = 4;        // detections a track and frame
+constexpr double kOdds = 0.0;      // logarithm of the odds that a sighting needs,
+constexpr int kStillJoined = 2;    // frames without it after which a like colour may have gone
+constexpr double kSureOdds = 8.0;  // and with which no other is tried
+constexpr double kRival = 6.0;     // less, of something else that makes a sighting contested
+constexpr size_t kMostTried = 4;   // detections a track and frame
 constexpr double kLargest = 1.3, kLargestPx = 4.0;  // of pieces together, times what is expected
 constexpr double kTimeJump = 1.0;                   // s back that count as a new recording
 
@@ -78,9 +78,11 @@ std::optional<Sighting> Finder::Try(const TargetTrack& track, const View& view,
   input.shape = track.shape;
   input.camera = view.camera;
   input.detection = &detection;
+  input.reappears = track.misses > 0;
+  input.joined = track.joined && track.misses <= kStillJoined;
   const auto fit =
       localiser_.Correct(input, Points(view, detection, track.state.velocity(), fresh_sweeps_only));
-  if (!fit || fit->log_odds < (track.misses > 0 ? kOddsAfterMiss : kOdds)) return std::nullopt;
+  if (!fit || fit->log_odds < kOdds) return std::nullopt;
   return Sighting{*fit, detection, fit->n_points};
 }
 

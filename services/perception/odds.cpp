@@ -7,9 +7,10 @@ namespace chase::perception {
 
 namespace {
 
-constexpr double kHidden = 0.02;    // how often a given side is hidden
-constexpr double kRunsOn = 0.04;    // how often a like colour goes on beyond a side,
-constexpr double kRunsOnToo = 0.5;  // and beyond another one then
+constexpr double kHidden = 0.02;      // how often a given side is hidden,
+constexpr double kStillHidden = 0.3;  // and of what comes back from behind something
+constexpr double kRunsOn = 0.04;      // how often a like colour goes on beyond a side,
+constexpr double kRunsOnToo = 0.5;    // and beyond another one then
 
 // What else has the target's colour: so many blobs a frame, anywhere in the image, sides so far
 // apart, as far away as may be.
@@ -22,8 +23,13 @@ double LogSides(const FitResult& fit, const FitInput& input, const FitConfig& co
   const double range = (fit.posterior.position() - input.camera.p_WC).norm();
   const double px = input.camera.rig.focal_px / std::max(0.2, range);
   double sum = 0.0;
-  double runs_on = kRunsOn;
+  double runs_on = input.joined ? kRunsOnToo : kRunsOn;
+  bool still_hidden = input.reappears;
   for (size_t side = 0; side < 4; ++side) {
+    if (input.detection->goes_on[side] && !input.detection->parted[side]) {
+      sum += std::log(runs_on);
+      runs_on = kRunsOnToo;
+    }
     if (input.detection->silhouette.samples[side].empty()) continue;
     const double extent = std::max(
         2.0,
@@ -31,7 +37,9 @@ double LogSides(const FitResult& fit, const FitInput& input, const FitConfig& co
     if (fit.used[side]) {
       sum -= std::log(sigma * std::sqrt(2.0 * M_PI));
     } else if (fit.edge_px[side] < 0.0) {
-      sum += std::log(kHidden / extent);
+      const bool other = fit.used[side ^ 1u];
+      sum += std::log((still_hidden && other ? kStillHidden : kHidden) / extent);
+      still_hidden = still_hidden && !other;
     } else {
       sum += std::log(runs_on / extent);
       runs_on = kRunsOnToo;

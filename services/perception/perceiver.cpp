@@ -17,6 +17,8 @@ constexpr double kReachMargin = 0.5;    // m
 constexpr double kReachGate = 11.3;     // squared distance from a hidden target's prediction, 3 dof
 constexpr double kTimeJump = 1.0;       // s back that count as a new recording
 constexpr int kSureHits = 5;            // corrections after which the track is trusted
+constexpr int kPieceHits = 5;           // sightings of a piece of something larger,
+constexpr double kPieceWay = 0.15;      // and m that it has driven, before it is taken
 constexpr double kDecoySigma = 0.1;     // m, how well its place is known
 constexpr double kDrivenSigma = 0.1;    // m, how well that must be known
 constexpr double kStood = 0.2;          // m, within which a target stands
@@ -88,7 +90,7 @@ void Perceiver::Follow(View* view) {
 void Perceiver::FollowCandidates(View* view) {
   for (auto& c : candidates_) {
     const auto again =
-        finder_.Find(c.track, view, [](const Sighting& s) { return s.detection.part; });
+        finder_.Find(c.track, view, [&](const Sighting& s) { return s.detection.part && !c.part; });
     if (again && again->fit.whole)
       c.Correct(*again);
     else
@@ -104,9 +106,16 @@ void Perceiver::DropMissed() {
       candidates_.end());
 }
 
-/// A piece of something larger is the target only where the target is expected.
 bool Perceiver::MayBeNew(const Detection& d) const {
-  return !d.part && d.score >= config_.state.acquire_score && d.box.width >= kLeastWidthPx;
+  return d.score >= config_.state.acquire_score && d.box.width >= kLeastWidthPx;
+}
+
+/// True when a candidate is followed there.
+bool Perceiver::Followed(const Sighting& s) const {
+  return std::any_of(candidates_.begin(), candidates_.end(), [&](const Candidate& c) {
+    return (c.track.state.position() - s.fit.posterior.position()).norm() <
+           config_.state.decoy_radius;
+  });
 }
 
 void Perceiver::AddCandidates(View* view) {
@@ -121,11 +130,13 @@ void Perceiver::AddCandidates(View* view) {
     if (candidates_.size() >= kMaxCandidates) return;
     const auto found = finder_.Acquire(*view, view->detections[i]);
     if (!found || !Plausible(found->fit.posterior.position(), view->t)) continue;
+    // A piece of something larger is a thing of its own where LiDAR points tell its range.
+    if (found->detection.part && (found->n_points == 0 || Followed(*found))) continue;
     const TargetTrack track{found->fit.posterior, found->fit.shape, view->t, view->t, 1, 0};
     const Eigen::Vector3d sight = track.state.position() - view->camera.p_WC;
     candidates_.push_back({track, found->fit.posterior, view->t, *found,
                            sight.norm() / config_.rig.focal_px, found->n_points > 0,
-                           sight.head<2>() / found->detection.box.height});
+                           sight.head<2>() / found->detection.box.height, found->detection.part});
   }
 }
 
@@ -137,11 +148,16 @@ void Perceiver::Seek(View* view) {
   Promote(*view);
 }
 
-/// What drives is taken at once; what stands only after a while, unless the target stood there. A
+/// What drives is taken at once, a piece of something larger once it has driven further, since what
+/// shows of it may change as well; what stands only after a while, unless the target stood there. A
 /// target that drove when it was last seen must have had the time to stop.
 bool Perceiver::Ready(const Candidate& c, double t) const {
   if (c.track.misses > 0 || c.track.hits < config_.state.confirm_frames) return false;
   if (track_ && !contested_ && !Vague() && t - track_->seen < kTrusted) return false;
+  if (c.part) {
+    const double way = (c.track.state.position() - c.first.position()).head<2>().norm();
+    return c.Drives() && c.track.hits >= kPieceHits && way > kPieceWay;
+  }
   if (c.Drives()) return true;
   const bool stood_here = track_ && last_v_.norm() < kStandingSpeed &&
                           (c.track.state.position() - last_p_).norm() < config_.state.decoy_radius;
@@ -201,7 +217,7 @@ void Perceiver::Remember(const View& view) {
   const size_t n = view.detections.size();
   for (size_t k = 0; k < n; ++k) {
     const size_t i = (k + turn_) % n;
-    if (view.taken[i] || !MayBeNew(view.detections[i])) continue;
+    if (view.taken[i] || view.detections[i].part || !MayBeNew(view.detections[i])) continue;
     turn_ = i + 1;
     const auto found = finder_.Acquire(view, view.detections[i]);
     if (!found) return;

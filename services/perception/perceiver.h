@@ -51,6 +51,7 @@ class Perceiver {
   TargetEstimate Report(double t, const std::optional<View>& view, std::string note) const;
 
   bool MayBeNew(const Detection& d) const;
+  bool Followed(const Sighting& s) const;
   bool Vague() const;
   bool Sure(const Sighting& s) const;
   bool Ready(const Candidate& candidate, double t) const;

@@ -105,6 +105,20 @@ bool On(const Detection& d, int x, int y) {
          d.mask.at<uint8_t>(p) != 0;
 }
 
+/// Side of a box, px.
+int SideOf(const cv::Rect& box, size_t side) {
+  return side == kLeft ? box.x : side == kRight ? box.br().x : side == kTop ? box.y : box.br().y;
+}
+
+/// A side of a piece at which a like colour goes on stays one where it still ends the piece.
+void KeepCut(const Detection& piece, Detection* out) {
+  for (size_t side = 0; side < 4; ++side)
+    if (piece.goes_on[side] && SideOf(piece.mask_box, side) == SideOf(out->mask_box, side)) {
+      out->cut[side] = out->goes_on[side] = true;
+      out->parted[side] = piece.parted[side];
+    }
+}
+
 /// Takes out what the window has cut off: samples beyond which the blob goes on, and sides of which
 /// no sample is left.
 void LeaveOutCut(const Detection& whole, const cv::Rect& window, Detection* piece) {
@@ -122,7 +136,7 @@ void LeaveOutCut(const Detection& whole, const cv::Rect& window, Detection* piec
     };
     const bool some = !samples.empty();
     samples.erase(std::remove_if(samples.begin(), samples.end(), goes_on), samples.end());
-    if (some && samples.empty()) piece->cut[side] = true;
+    if (some && samples.empty()) piece->cut[side] = piece->goes_on[side] = true;
   }
 }
 
@@ -146,6 +160,27 @@ std::vector<int> Jumps(const cv::Mat& mask) {
   std::vector<int> columns;
   for (const auto& jump : jumps) columns.push_back(jump.first);
   return columns;
+}
+
+/// Adds the pieces between any two of the lines across a blob.
+void AddBetween(const cv::Mat& bgr, const Detection& detection, std::vector<int> lines,
+                bool upright, std::vector<Detection>* pieces) {
+  const cv::Rect& box = detection.mask_box;
+  lines.insert(lines.begin(), 0);
+  lines.push_back(upright ? box.width : box.height);
+  const size_t n = lines.size();
+  if (n < 3 || n > kMostLines) return;
+  for (size_t a = 0; a + 1 < n; ++a)
+    for (size_t b = a + 1; b < n; ++b) {
+      const int from = lines[a], size = lines[b] - lines[a];
+      if (b - a == n - 1 || size < kLeastPiece) continue;
+      const cv::Rect window = upright ? cv::Rect(box.x + from, box.y, size, box.height)
+                                      : cv::Rect(box.x, box.y + from, box.width, size);
+      auto piece = CropTo(bgr, detection, window);
+      if (!piece) continue;
+      piece->parted = piece->goes_on;
+      pieces->push_back(std::move(*piece));
+    }
 }
 
 }  // namespace
@@ -193,26 +228,18 @@ std::optional<Detection> CropTo(const cv::Mat& bgr, const Detection& detection,
   out.mask = seen(tight).clone();
   out.box = EdgeBox(out.mask_box);
   out.cut = CutSides(out.mask_box, bgr.size());
+  out.goes_on = out.parted = {};
+  KeepCut(detection, &out);
   out.silhouette = TraceSilhouette(bgr, out.mask, out.mask_box, out.cut);
   LeaveOutCut(detection, window, &out);
   out.silhouette.sigma_px = detection.silhouette.sigma_px;
   return out;
 }
 
-std::vector<Detection> SplitColumns(const cv::Mat& bgr, const Detection& detection) {
-  std::vector<int> lines = {0};
-  for (int x : Jumps(detection.mask)) lines.push_back(x);
-  lines.push_back(detection.mask.cols);
+std::vector<Detection> Split(const cv::Mat& bgr, const Detection& detection) {
   std::vector<Detection> pieces;
-  const size_t n = lines.size();
-  if (n < 3 || n > kMostLines) return pieces;
-  for (size_t a = 0; a + 1 < n; ++a)
-    for (size_t b = a + 1; b < n; ++b) {
-      if (b - a == n - 1 || lines[b] - lines[a] < kLeastPiece) continue;
-      const cv::Rect window(detection.mask_box.x + lines[a], detection.mask_box.y,
-                            lines[b] - lines[a], detection.mask_box.height);
-      if (auto piece = CropTo(bgr, detection, window)) pieces.push_back(std::move(*piece));
-    }
+  AddBetween(bgr, detection, Jumps(detection.mask), true, &pieces);
+  AddBetween(bgr, detection, Jumps(detection.mask.t()), false, &pieces);
   return pieces;
 }
 
@@ -227,6 +254,8 @@ Detection Merge(const cv::Mat& bgr, const std::vector<Detection>& pieces) {
   }
   out.box = EdgeBox(out.mask_box);
   out.cut = CutSides(out.mask_box, bgr.size());
+  out.goes_on = out.parted = {};
+  for (const auto& piece : pieces) KeepCut(piece, &out);
   const double sigma = out.silhouette.sigma_px;
   out.silhouette = TraceSilhouette(bgr, out.mask, out.mask_box, out.cut);
   out.silhouette.sigma_px = sigma;

@@ -30,9 +30,9 @@ std::array<bool, 4> CutSides(const cv::Rect& roi, const cv::Size& image);
 std::optional<Detection> CropTo(const cv::Mat& bgr, const Detection& detection,
                                 const cv::Rect& window);
 
-/// Upright pieces of a blob that several things of one colour make up together, split where its
-/// upper or lower end jumps; none where it does not.
-std::vector<Detection> SplitColumns(const cv::Mat& bgr, const Detection& detection);
+/// Pieces of a blob that several things of one colour make up together, split where an end of its
+/// columns or of its rows jumps; none where none does.
+std::vector<Detection> Split(const cv::Mat& bgr, const Detection& detection);
 
 /// One detection out of several pieces: the union of their masks. All must carry masks.
 Detection Merge(const cv::Mat& bgr, const std::vector<Detection>& pieces);

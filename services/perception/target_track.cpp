@@ -35,6 +35,7 @@ void TargetTrack::Correct(const FitResult& fit) {
   state = fit.posterior;
   shape = fit.shape;
   seen = t;
+  joined = fit.joined;
   misses = 0;
   ++hits;
 }
