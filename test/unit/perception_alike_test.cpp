@@ -72,6 +72,33 @@ TEST(PerceptionCandidate, HitByTheLidarAndWholeItDrivesSooner) {
   EXPECT_FALSE(c.Drives()) << "what the image's border cuts seems to move with it";
 }
 
+TEST(PerceptionCandidate, SeenSharplyItDrivesSoonerAcrossTheLineOfSight) {
+  const Vector3d p(2.0, 0.0, 0.55);
+  Candidate across = CandidateAt(p, p + Vector3d(0.0, 0.04, 0.0), 0.004);
+  across.px = 2.0 / 220.0;
+  EXPECT_FALSE(across.Drives());
+  across.last.detection.box = {100.0, 80.0, 33.0, 55.0};
+  EXPECT_TRUE(across.Drives());
+  across.last.detection.box.width = 8.0;
+  EXPECT_FALSE(across.Drives()) << "a narrow one's edges err by more";
+  Candidate along = CandidateAt(p, p + Vector3d(0.04, 0.0, 0.0), 0.004);
+  along.last.detection.box = {100.0, 80.0, 33.0, 55.0};
+  EXPECT_FALSE(along.Drives());
+}
+
+TEST(PerceptionCandidate, ASpeedByLidarPointsIsAWay) {
+  const Vector3d p(3.0, 0.0, 0.55);
+  Candidate c = CandidateAt(p, p, 0.1);
+  c.track.state.mean[3] = 0.8;
+  c.track.state.covariance.block<2, 2>(3, 3) = 0.01 * Eigen::Matrix2d::Identity();
+  EXPECT_FALSE(c.Drives()) << "edges alone make up speeds along the line of sight";
+  c.ranged = true;
+  c.last.n_points = 20;
+  EXPECT_TRUE(c.Drives());
+  c.track.state.covariance.block<2, 2>(3, 3) = 0.1 * Eigen::Matrix2d::Identity();
+  EXPECT_FALSE(c.Drives()) << "not known well";
+}
+
 TEST(PerceptionAlike, WhatStandsIsTakenAfterAWhile) {
   FlyOptions options;
   options.duration = 1.5;

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -105,6 +106,40 @@ TEST(PerceptionColor, TwoThingsJoinedByThreadsAreParted) {
   }));
 }
 
+TEST(PerceptionColor, WhatShowsAboveTheTargetIsPartedFromIt) {
+  cv::Mat image = Grey();  // a ball behind the upper end of a cylinder
+  cv::circle(image, {166, 116}, 18, kOrangeBgr, cv::FILLED);
+  cv::rectangle(image, {144, 130}, {186, 205}, kOrangeBgr, cv::FILLED);
+  const auto found = ColorDetector(DetectorConfig{}, 0.45).Detect(image);
+  const auto piece = std::find_if(found.begin(), found.end(), [](const Detection& d) {
+    return std::abs(d.box.y - 130.0) < 4.0 && d.box.height > 70.0 && d.box.width > 40.0 &&
+           std::abs(d.box.x - 143.5) < 1.0;
+  });
+  ASSERT_NE(piece, found.end());
+  EXPECT_TRUE(piece->parted[kTop]) << "a like colour goes on there, and the outline jumps";
+  EXPECT_TRUE(piece->cut[kTop] && piece->silhouette.samples[kTop].empty());
+  EXPECT_FALSE(piece->cut[kLeft] || piece->cut[kBottom]);
+}
+
+TEST(PerceptionSilhouette, APartedSideStaysOneInASmallerPiece) {
+  cv::Mat image = Grey();
+  cv::rectangle(image, {100, 60}, {140, 130}, kOrangeBgr, cv::FILLED);
+  const auto whole = ColorDetector(DetectorConfig{}, 0.45).Detect(image).at(0);
+  auto left = CropTo(image, whole, {0, 0, 120, 240});
+  ASSERT_TRUE(left && left->goes_on[kRight]);
+  left->parted[kRight] = true;
+  const auto lower = CropTo(image, *left, {0, 90, 376, 150});
+  ASSERT_TRUE(lower);
+  EXPECT_TRUE(lower->goes_on[kRight] && lower->parted[kRight] && lower->cut[kRight]);
+  EXPECT_TRUE(lower->silhouette.samples[kRight].empty());
+  EXPECT_TRUE(lower->goes_on[kTop]);
+  EXPECT_FALSE(lower->parted[kTop] || lower->goes_on[kLeft] || lower->goes_on[kBottom]);
+  const auto narrower = CropTo(image, *left, {0, 0, 110, 240});
+  ASSERT_TRUE(narrower);
+  EXPECT_TRUE(narrower->goes_on[kRight]);
+  EXPECT_FALSE(narrower->parted[kRight]) << "cut anew, where nothing parts it";
+}
+
 TEST(PerceptionSilhouette, SidesAtTheImagesBorderAreCut) {
   cv::Mat image = Grey();
   cv::rectangle(image, {0, 80}, {25, 150}, kOrangeBgr, cv::FILLED);
@@ -127,6 +162,7 @@ TEST(PerceptionSilhouette, CropAndMergeAreInverse) {
   EXPECT_FALSE(CropTo(image, whole, {200, 0, 50, 240}));
   const auto merged = Merge(image, {*left, *right});
   EXPECT_EQ(merged.mask_box, whole.mask_box);
+  EXPECT_EQ(merged.goes_on, (std::array<bool, 4>{}));
   EXPECT_EQ(cv::countNonZero(merged.mask != whole.mask), 0);
 }
 
