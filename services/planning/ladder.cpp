@@ -337,13 +337,18 @@ std::unique_ptr<Planner> MakeLadder(const PlannerConfig& config, std::unique_ptr
 }
 
 world::Trajectory BrakePlan(const PlannerConfig& config, const PlanRequest& request, bool* safe) {
+  constexpr double kTimes[] = {0.6, 0.8, 1.0, 1.3, 1.7, 2.2, 3.0};
   world::Trajectory best = world::Trajectory::Constant(request.start.p, request.t0, 1.0);
   double best_clearance = -1.0;
-  for (double T : {0.6, 0.8, 1.0, 1.3, 1.7, 2.2, 3.0}) {
+  // Braking may leave the heights as far as the quickest way of it must.
+  const auto heights = ToPoints(BrakeCurve(request.start, kTimes[0]), 5).col(2);
+  for (double T : kTimes) {
     PlanRequest rest = request;
     rest.horizon = T;
     Problem problem = MakeProblem(config, rest, nullptr);
     problem.limits.tan_elevation = problem.limits.min_distance = 0.0;
+    problem.limits.z_min = std::min(problem.limits.z_min, heights.minCoeff() - 1e-6);
+    problem.limits.z_max = std::max(problem.limits.z_max, heights.maxCoeff() + 1e-6);
     const Curve curve = BrakeCurve(request.start, T);
     *safe = curve.allFinite() && IsFeasible(curve, problem, 1.0, false, Arithmetic::kCertified);
     if (*safe) return ToTrajectory(curve, request.t0, T);

@@ -171,7 +171,7 @@ void RelaxSight(const world::Obstacle& o, double margin, const FirstSight& first
   Note(notes, "obstacle " + std::to_string(e->id) + " holds the target, its shadow is ignored");
 }
 
-// How far a motion goes on at speed v (<= 0: not at all), slowed down by `brake` after a moment.
+// How far a motion with speed v and acceleration a goes on that `brake` slows down after a moment.
 double Overshoot(double v, double a, double brake) {
   constexpr double kMoment = 0.2;  // s
   const double then = v + kMoment * std::max(0.0, a);
@@ -182,13 +182,13 @@ double Overshoot(double v, double a, double brake) {
 // worse than that. Heights give way to what the start cannot help only, so that no chain of plans
 // sinks; speed and acceleration a little before, since catching up needs them.
 Limits MakeLimits(const PlannerConfig& c, const world::State& s, const Eigen::Vector3d& target) {
-  constexpr double kRounding = 1e-6;
+  constexpr double kRounding = 1e-6, kBrake = 2.0;  // m; m/s^2 where no limit is set
   Limits limits;
   limits.speed = c.max_speed > 0.0 ? std::max(c.max_speed, 1.1 * s.v.norm() + 0.05) : 0.0;
   limits.acceleration =
       c.max_acceleration > 0.0 ? std::max(c.max_acceleration, 1.2 * s.a.norm() + 0.1) : 0.0;
   limits.height = c.z_max > c.z_min;
-  const double brake = c.max_acceleration > 0.0 ? 0.5 * c.max_acceleration : 2.0;
+  const double brake = c.max_acceleration > 0.0 ? 0.5 * c.max_acceleration : kBrake;
   const double sink = Overshoot(-s.v.z(), -s.a.z(), brake),
                rise = Overshoot(s.v.z(), s.a.z(), brake);
   limits.z_min = std::min(c.z_min, s.p.z() - sink - kRounding);

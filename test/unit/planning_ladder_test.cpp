@@ -199,6 +199,19 @@ TEST(Problem, HeightGivesWayToTheStartOnly) {
   EXPECT_NEAR(MakeProblem(config, request, nullptr).limits.z_max, request.start.p.z(), 1e-5);
 }
 
+TEST(Ladder, BrakingJustAboveTheLeastHeightIsSafeThoughItSinks) {
+  const PlannerConfig config = Config();
+  for (const double speed : {0.0, 0.1, 0.3, 0.8}) {
+    PlanRequest request = Walk();
+    request.start.p.z() = config.z_min + 0.01;
+    request.start.v.z() = -speed;
+    bool safe = false;
+    const world::Trajectory brake = BrakePlan(config, request, &safe);
+    EXPECT_TRUE(safe) << speed;
+    EXPECT_GT(brake.Position(brake.end()).z(), request.start.p.z() - 0.37 * speed - 1e-6);
+  }
+}
+
 TEST(Ladder, ObstacleOnTheRunningPlanEndsItsCertificate) {
   const auto planner = MakePlanner("chase", Config());
   PlanRequest request = Walk();
