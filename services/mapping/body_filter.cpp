@@ -16,7 +16,8 @@ constexpr double kOutlier = 0.12;   // m, a reach this far from what the others 
 constexpr double kShrink = 0.03;    // share of an end no longer seen that a sweep forgets
 constexpr double kDoubt = 0.05;     // m, by which a sweep doubts it before
 constexpr double kKnown = 0.15;     // m, standard deviation of an end that is still known
-constexpr int kSureSweeps = 6;      // in view, after which an end is one
+constexpr int kSure = 12;           // points of an end that is one: two for a sweep in view,
+constexpr int kMostPoints = 60;     // one off for a sweep out of view; at most
 constexpr double kStretch = 0.4;    // m, by which the outline may still reach beyond it
 constexpr double kMostTerm = 36.0;  // of a reach in a distance: one alone does not decide
 constexpr double kSquare = 20.0;    // m, larger than any mover
@@ -109,11 +110,12 @@ void BodyFilter::Uncover(const Reaches& seen, double unseen) {
     const Reach& reach = seen[static_cast<size_t>(k)];
     End& end = ends_[static_cast<size_t>(k)];
     if (reach.edge) {
-      end = {x_[4 + k], end.sweeps + 1};
+      end = {x_[4 + k], std::min(end.points + 2, kMostPoints)};
       continue;
     }
+    end.points = std::max(0, end.points - 1);
     double beyond = reach.along - Model(k, reach.age).dot(x_);
-    if (end.sweeps >= kSureSweeps)
+    if (end.points >= kSure)
       beyond = std::min(beyond, std::max(0.0, end.place + kStretch - x_[4 + k]));
     if (beyond <= 0.0) {  // hidden, or never was: doubted first, then forgotten slowly
       if (P_(4 + k, 4 + k) < kKnown * kKnown)

@@ -45,8 +45,8 @@ class BodyFilter {
   void Predict(double dt, double acceleration);
   /// Takes a sweep's reaches; `sigma`: standard deviation of one of them, m; `unseen`: as above.
   Sight Correct(const Reaches& seen, double sigma, double unseen);
-  /// Mean square of the innovations of ends in view, in standard deviations of at least `least` m
-  /// each. Below zero if nothing can be compared.
+  /// How unlikely ends in view are: mean of innovation^2 / s + log(s / least^2), s: its variance,
+  /// at least `least`^2 m^2. Below zero if nothing can be compared.
   double Distance(const Reaches& seen, double sigma, double least) const;
 
   Eigen::Vector2d p() const { return x_.head<2>(); }
@@ -63,10 +63,10 @@ class BodyFilter {
   void Uncover(const Reaches& seen, double unseen);
   int Reshape(const Reaches& seen, const std::array<double, kDirections>& innovation);
 
-  /// Where an end was last in view, m from p, and in how many sweeps it was.
+  /// Where an end was last in view, m from p, and how sure that is: it grows while the end is seen.
   struct End {
     double place = 0.0;
-    int sweeps = 0;
+    int points = 0;
   };
 
   State x_ = State::Zero();

@@ -72,10 +72,10 @@ struct StaticConfig {
 
 /// Detection and tracking of what moves.
 struct MoverConfig {
-  int min_points = 8;             ///< returns of a cluster
-  double cluster_cell = 0.4;      ///< clusters are connected in cells of this edge, m
-  double max_size = 6.0;          ///< larger clusters are no movers, m
-  double gate = 4.0;              ///< of the innovation, standard deviations
+  int min_points = 8;         ///< returns of a cluster
+  double cluster_cell = 0.4;  ///< clusters are connected in cells of this edge, m
+  double max_size = 6.0;      ///< larger clusters are no movers, m
+  double gate = 4.0;  ///< of the innovation, standard deviations; narrower for uncertain tracks
   double acceleration = 0.8;      ///< process noise, m/s^2
   double measurement = 0.04;      ///< standard deviation of where an end is seen, m
   int confirm_sweeps = 3;         ///< detections in a row before a track may be listed
@@ -93,7 +93,7 @@ struct MoverConfig {
     v("min_points", min_points, "returns of a cluster");
     v("cluster_cell", cluster_cell, "clusters are connected in cells of this edge, m");
     v("max_size", max_size, "larger clusters are no movers, m");
-    v("gate", gate, "of the innovation, standard deviations");
+    v("gate", gate, "of the innovation, standard deviations; narrower for uncertain tracks");
     v("acceleration", acceleration, "process noise, m/s^2");
     v("measurement", measurement, "standard deviation of where an end is seen, m");
     v("confirm_sweeps", confirm_sweeps, "detections in a row before a track may be listed");

@@ -75,8 +75,8 @@ void Tracker::Join(std::vector<Cluster>* clusters) const {
                   clusters->end());
 }
 
-/// Squared distance in standard deviations; infinite for what cannot belong together. What overlaps
-/// may always: its other ends may have come into view.
+/// How unlikely they are to belong together (BodyFilter::Distance); infinite for what cannot. What
+/// overlaps may always: its other ends may have come into view.
 double Tracker::Cost(const Track& track, const Cluster& cluster) const {
   const Eigen::Vector2d c = cluster.center.head<2>();
   const double far = 2.0 * track.reach + config_.gate * kLeastSpread +
@@ -188,6 +188,7 @@ void Tracker::Unite() {
     for (size_t j = tracks_.size() - 1; j > i; --j) {
       if (!same(tracks_[i], tracks_[j]) && !same(tracks_[j], tracks_[i])) continue;
       if (tracks_[j].seen > tracks_[i].seen) {  // the older id, the better place
+        if (tracks_[i].confirmed && !tracks_[j].confirmed) continue;
         tracks_[j].id = tracks_[i].id;
         std::swap(tracks_[i], tracks_[j]);
       }

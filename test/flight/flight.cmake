@@ -1,4 +1,4 @@
-# Closed-loop flights: in lockstep (twice, byte for byte), its replays, and live over UDP.
+# Closed-loop flights: in lockstep (twice, byte for byte), its replays, the forest, live over UDP.
 set(scenario ${CMAKE_SOURCE_DIR}/deploy/scenarios/gym.yaml)
 set(flight ${CMAKE_BINARY_DIR}/test/flight.lcm)
 set(bin ${CMAKE_BINARY_DIR}/bin)

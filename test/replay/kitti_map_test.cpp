@@ -45,6 +45,13 @@ constexpr Parked kParked[] = {{41.3, 13.9, -0.20}, {59.7, 6.4, -0.86},  {64.1, 6
                               {76.1, 4.3, -0.16},  {79.2, 11.6, -0.15}, {81.4, 3.5, -0.17},
                               {85.0, 10.9, -0.13}};
 constexpr double kHalfLength = 2.8, kHalfWidth = 1.2;  // m, of the largest, and a margin
+
+bool IsOn(const Parked& place, double x, double y) {
+  const double dx = x - place.x, dy = y - place.y;
+  const double along = std::cos(place.yaw) * dx + std::sin(place.yaw) * dy;
+  const double across = std::cos(place.yaw) * dy - std::sin(place.yaw) * dx;
+  return std::abs(along) < kHalfLength && std::abs(across) < kHalfWidth;
+}
 constexpr double kWallsFound = 0.95;  // share of solid cells that the map must hold
 
 void Execute(const std::string& command) { ASSERT_EQ(std::system(command.c_str()), 0) << command; }
@@ -130,6 +137,15 @@ bool IsNoMover(const obstacle_t& o, double t, const std::vector<Returns>& sweeps
   return now == 0 || 2 * same > others;
 }
 
+/// Sweeps in which something of the size of a car returns from there.
+long SweepsThatSee(const Parked& place, const std::vector<Returns>& sweeps) {
+  constexpr long kFewest = 10;
+  return std::count_if(sweeps.begin(), sweeps.end(), [&](const Returns& sweep) {
+    return std::count_if(sweep.points.begin(), sweep.points.end(),
+                         [&](const auto& p) { return IsOn(place, p[0], p[1]); }) >= kFewest;
+  });
+}
+
 /// The recording, registered by odometry once for all tests.
 class KittiDrive : public testing::Test {
  protected:
@@ -167,11 +183,8 @@ TEST_F(KittiDrive, VehiclesInTrafficAreFollowedAndWhatStandsIsNot) {
       way.second = std::max(way.second, std::hypot(c[0] - way.first[0], c[1] - way.first[1]));
       ++listed;
       wrong += IsNoMover(o, 1e-6 * static_cast<double>(m.utime), sweeps);
-      parked += std::any_of(std::begin(kParked), std::end(kParked), [&](const Parked& p) {
-        const double dx = c[0] - p.x, dy = c[1] - p.y, cx = std::cos(p.yaw), cy = std::sin(p.yaw);
-        return std::abs(cx * dx + cy * dy) < kHalfLength &&
-               std::abs(cx * dy - cy * dx) < kHalfWidth;
-      });
+      parked += std::any_of(std::begin(kParked), std::end(kParked),
+                            [&](const Parked& place) { return IsOn(place, c[0], c[1]); });
     }
   });
   const auto far = std::count_if(ways.begin(), ways.end(),
@@ -180,6 +193,8 @@ TEST_F(KittiDrive, VehiclesInTrafficAreFollowedAndWhatStandsIsNot) {
              ways.size(), far, kFarWay, listed, wrong, parked);
   EXPECT_GE(far, 2);
   EXPECT_EQ(parked, 0);
+  for (const Parked& place : kParked)
+    EXPECT_GE(SweepsThatSee(place, sweeps), 10) << place.x << " " << place.y;
   EXPECT_LE(wrong, kFewWrong * listed);
 }
 
