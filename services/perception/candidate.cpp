@@ -23,16 +23,18 @@ constexpr double kBetter = 0.25;  // share of the first variance from which a st
 void Candidate::Correct(const Sighting& sighting) {
   track.Correct(sighting.fit);
   last = sighting;
+  part = part && sighting.detection.part;
   const auto spread = [](const TargetGaussian& g) {
     return g.covariance.topLeftCorner<2, 2>().trace();
   };
   if (Drives() || spread(track.state) > kBetter * spread(first)) return;
   first = track.state;
   ranged = sighting.n_points > 0;
+  known = track.t;
 }
 
 bool Candidate::Fast() const {
-  if (!ranged || last.n_points == 0) return false;
+  if (!ranged || last.n_points == 0 || !(track.t > known)) return false;
   const Eigen::Vector2d v = track.state.velocity().head<2>();
   return v.norm() > kFast &&
          v.dot(track.state.covariance.block<2, 2>(3, 3).ldlt().solve(v)) > kFastGate;

@@ -15,7 +15,8 @@ struct Candidate {
   /// Along the line of sight, as far as one pixel less of its height moves it; frame W, m.
   Eigen::Vector2d range_px = Eigen::Vector2d::UnitX();
 
-  bool part = false;  ///< a piece of something larger: it must drive
+  bool part = false;   ///< a piece of something larger, always so far: it must drive
+  double known = 0.0;  ///< time of `first`, s
 
   /// Takes over a sighting at the track's time.
   void Correct(const Sighting& sighting);

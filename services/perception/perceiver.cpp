@@ -42,6 +42,10 @@ bool Perceiver::IsRatherDecoy(const Sighting& s, const View& view) const {
   TargetTrack standing{s.fit.posterior, s.fit.shape, view.t, view.t, 1, 0};
   standing.state.mean << decoy->p_W, Eigen::Vector3d::Zero();
   standing.state.covariance = Matrix6d::Identity() * kDecoySigma * kDecoySigma;
+  if (track_) {  // on the same terms
+    standing.misses = track_->misses;
+    standing.joined = track_->joined;
+  }
   const auto other = finder_.Try(standing, view, s.detection, false);
   return other && other->fit.log_odds > s.fit.log_odds;
 }
@@ -132,11 +136,13 @@ void Perceiver::AddCandidates(View* view) {
     if (!found || !Plausible(found->fit.posterior.position(), view->t)) continue;
     // A piece of something larger is a thing of its own where LiDAR points tell its range.
     if (found->detection.part && (found->n_points == 0 || Followed(*found))) continue;
-    const TargetTrack track{found->fit.posterior, found->fit.shape, view->t, view->t, 1, 0};
+    const TargetTrack track{found->fit.posterior, found->fit.shape, view->t, view->t, 1, 0,
+                            found->fit.joined};
     const Eigen::Vector3d sight = track.state.position() - view->camera.p_WC;
     candidates_.push_back({track, found->fit.posterior, view->t, *found,
                            sight.norm() / config_.rig.focal_px, found->n_points > 0,
-                           sight.head<2>() / found->detection.box.height, found->detection.part});
+                           sight.head<2>() / found->detection.box.height, found->detection.part,
+                           view->t});
   }
 }
 
@@ -176,7 +182,7 @@ void Perceiver::Promote(const View& view) {
   if (!best) return;
   const Candidate chosen = *best;
   for (const auto& c : candidates_)
-    if (&c != best && chosen.Drives() && !c.Drives() &&
+    if (&c != best && chosen.Drives() && !c.Drives() && !c.part &&
         c.track.hits >= config_.state.confirm_frames)
       decoys_.Note(c.track.state.position(), view.t, kDecoyHits);
   Start(chosen.track, chosen.last);
@@ -237,7 +243,7 @@ void Perceiver::SwapIfTheOtherDrives(const Sighting& s, Decoy* other, double t) 
   if (!stands || !other->driven() || sigma > kDrivenSigma) return;
   const Eigen::Vector3d stood = track_->state.position();
   *other = {stood, stood, t, other->hits};
-  Start({s.fit.posterior, s.fit.shape, t, t, 1, 0}, s);
+  Start({s.fit.posterior, s.fit.shape, t, t, 1, 0, s.fit.joined}, s);
 }
 
 void Perceiver::ForgetIfTimeRanBack(double t) {
