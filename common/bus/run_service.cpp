@@ -9,6 +9,7 @@
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
+#include <filesystem>
 
 #include "common/bus/channels.h"
 #include "common/bus/log_bus.h"
@@ -87,7 +88,8 @@ void RunLive(const ServiceSpec& spec, const Flags& flags) {
 void RunReplay(const ServiceSpec& spec, const Flags& flags) {
   if (flags.out.empty())
     throw std::runtime_error("--replay needs --out FILE, where the outputs go");
-  if (flags.out == flags.replay)
+  std::error_code none;  // neither need exist
+  if (std::filesystem::equivalent(flags.out, flags.replay, none))
     throw std::runtime_error("--out " + flags.out + " is the log that is replayed; name another");
   LogBus bus(flags.replay, flags.out);
   const auto node = spec.make_node(bus);

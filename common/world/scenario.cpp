@@ -113,6 +113,16 @@ std::string WorldSpec::Problem() const {
                 FirstOf("trees", trees), Within("forest", forest)});
 }
 
+std::string ServiceOverride::Problem() const {
+  static const std::vector<std::string> known = {"lidar",    "camera",     "odometry",
+                                                 "mapping",  "perception", "prediction",
+                                                 "planning", "control",    "simulator"};
+  std::string all;
+  for (const auto& one : known) all += (all.empty() ? "" : ", ") + one;
+  return Check(std::find(known.begin(), known.end(), name) != known.end(), "name", "'" + name + "'",
+               "one of " + all);
+}
+
 std::string Scenario::Problem() const {
   const bool has_path = target.waypoints.size() >= 2 || !target.path_file.empty();
   return First(
@@ -121,7 +131,8 @@ std::string Scenario::Problem() const {
        Check(has_path, "target.waypoints", std::to_string(target.waypoints.size()) + " points",
              "2 or more, or target.path_file be given"),
        Within("world", world), FirstOf("movers", movers), Within("target", target),
-       Within("chaser", chaser), Within("sensors", sensors), Within("wind", wind)});
+       Within("chaser", chaser), Within("sensors", sensors), Within("wind", wind),
+       FirstOf("services", services)});
 }
 
 Scenario ParseScenario(const std::string& yaml, const std::string& origin) {

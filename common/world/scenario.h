@@ -229,6 +229,7 @@ struct ServiceOverride {
     v("name", name, "service");
     v("config", config, "its overrides as YAML text");
   }
+  std::string Problem() const;
 };
 
 struct Scenario {

@@ -1,5 +1,6 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
+#include <filesystem>
 #include <stdexcept>
 
 #include "logs/src/diff.h"
@@ -18,6 +19,13 @@ struct Arguments {
   bool tum = false, csv = false, mcap = false;
 };
 
+/// What is written is not what is read: nothing is lost by a slip.
+void RefuseSame(const std::string& in, const std::string& out) {
+  std::error_code none;  // neither need exist
+  if (std::filesystem::equivalent(in, out, none))
+    throw std::runtime_error(out + " is the file that is read; name another for the output");
+}
+
 void AddInfo(CLI::App* app, Arguments* a) {
   auto* sub = app->add_subcommand("info", "One line per channel: type, count, rate, bytes, times.");
   sub->add_option("LOG", a->in, "LCM log")->required();
@@ -25,6 +33,7 @@ void AddInfo(CLI::App* app, Arguments* a) {
 }
 
 void RunImport(const Arguments& a) {
+  RefuseSame(a.in, a.out);
   const int sweeps = a.format == "vlp16" ? ImportVlp16(a.in, a.out) : ImportKitti16(a.in, a.out);
   std::printf("%s: %d sweeps\n", a.out.c_str(), sweeps);
 }
@@ -41,6 +50,7 @@ void AddImport(CLI::App* app, Arguments* a) {
 }
 
 void RunExport(const Arguments& a) {
+  RefuseSame(a.in, a.out);
   if (a.tum)
     std::printf("%s: %ld poses\n", a.out.c_str(), ExportTum(a.in, a.out));
   else if (a.mcap)

@@ -154,7 +154,10 @@ int main(int argc, char** argv) {
   app.add_option("--seeds", arguments.count, "flights of each kind");
   app.add_option("--first", arguments.first, "first seed");
   app.add_option("--only", arguments.only,
-                 "kinds: gym, forest (each also -noisy, -blind, -static), crossing, traffic, long");
+                 "kinds: gym, forest (each also -noisy, -blind, -static), crossing, traffic, long")
+      ->check(
+          CLI::IsMember({"gym", "gym-noisy", "gym-blind", "gym-static", "forest", "forest-noisy",
+                         "forest-blind", "forest-static", "crossing", "traffic", "long"}));
   app.add_option("--config", arguments.config, "file with mapping's config");
   app.add_option("--length", arguments.length, "of the long flight, m");
   app.add_flag("--trace", arguments.trace, "print every listed mover");

@@ -100,5 +100,11 @@ int main(int argc, char** argv) {
   app.add_flag("!--no-distractors", a.stage.distractors);
   app.add_flag("!--no-screens", a.stage.screens);
   CLI11_PARSE(app, argc, argv);
-  chase::perception_stage::Run(a);
+  try {
+    chase::perception_stage::Run(a);
+  } catch (const std::exception& e) {
+    fmt::print(stderr, "{}\n", e.what());
+    return 1;
+  }
+  return 0;
 }

@@ -94,6 +94,9 @@ TEST(PerceptionCandidate, ASpeedByLidarPointsIsAWay) {
   EXPECT_FALSE(c.Drives()) << "edges alone make up speeds along the line of sight";
   c.ranged = true;
   c.last.n_points = 20;
+  c.known = c.track.t = 0.05;
+  EXPECT_FALSE(c.Drives()) << "one sweep tells no speed";
+  c.track.t = 0.15;
   EXPECT_TRUE(c.Drives());
   c.track.state.covariance.block<2, 2>(3, 3) = 0.1 * Eigen::Matrix2d::Identity();
   EXPECT_FALSE(c.Drives()) << "not known well";

@@ -57,6 +57,7 @@ TEST(ScenarioFile, BadSpeedIsRefused) {
 TEST(ScenarioFile, EveryPartIsChecked) {
   EXPECT_CONTAINS(Refusal("target: {waypoints: [[0, 0], [1, 0]]}\n"), "name");
   EXPECT_CONTAINS(Refusal("name: x\n"), "target.waypoints");
+  EXPECT_CONTAINS(Refusal(kGood + "services: [{name: planing, config: \"\"}]\n"), "planing");
   EXPECT_CONTAINS(Refusal(kGood + "sensors: {mode: magic}\n"), "'magic'");
   EXPECT_CONTAINS(Refusal(kGood + "world: {cylinders: [{center: [1, 1], radius: 0}]}\n"),
                   "radius is 0");
