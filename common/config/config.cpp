@@ -2,7 +2,22 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 namespace chase::config::detail {
+
+namespace {
+
+/// The entry of a map by its key or of a list by its number; undefined where there is none.
+YAML::Node Child(const YAML::Node& node, const std::string& word) {
+  if (node.IsMap()) return node[word];
+  const bool number =
+      !word.empty() && word.size() < 9 && word.find_first_not_of("0123456789") == std::string::npos;
+  if (node.IsSequence() && number) return node[std::stoul(word)];
+  return YAML::Node(YAML::NodeType::Undefined);
+}
+
+}  // namespace
 
 void Fail(const std::string& origin, const YAML::Node& node, const std::string& what) {
   const int line = node.IsDefined() ? node.Mark().line : -1;
@@ -35,15 +50,29 @@ std::string Quoted(const std::string& text) {
   return quoted + "\"";
 }
 
-void Reader::RefuseUnknownKeys() const {
+YAML::Node NamedBy(const std::string& problem, const YAML::Node& node) {
+  constexpr const char* kSeparators = ".:[] ";
+  const std::size_t end = std::min(problem.find_first_of(kSeparators), problem.size());
+  const YAML::Node child = Child(node, problem.substr(0, end));
+  if (!child.IsDefined()) return node;
+  const std::size_t next = problem.find_first_not_of(kSeparators, end);
+  const bool ends = next == problem.npos || problem[end] == ' ';
+  return ends ? child : NamedBy(problem.substr(next), child);
+}
+
+void Reader::RefuseWrongKeys() const {
+  std::set<std::string> seen;
   for (const auto& entry : node_) {
-    const std::string key = entry.first.as<std::string>();
-    if (known_.count(key)) continue;
-    std::string list;
-    for (const auto& name : known_) list += (list.empty() ? "" : ", ") + name;
-    Fail(origin_, entry.first,
-         fmt::format("unknown key '{}'; known here: {}", path_.empty() ? key : path_ + "." + key,
-                     list));
+    if (!entry.first.IsScalar()) Fail(origin_, entry.first, path_ + ": a key is not a word");
+    const std::string key = entry.first.Scalar();
+    const std::string name = path_.empty() ? key : path_ + "." + key;
+    if (!known_.count(key)) {
+      std::string list;
+      for (const auto& one : known_) list += (list.empty() ? "" : ", ") + one;
+      Fail(origin_, entry.first, fmt::format("unknown key '{}'; known here: {}", name, list));
+    }
+    if (!seen.insert(key).second)
+      Fail(origin_, entry.first, fmt::format("'{}' is given twice; keep one of them", name));
   }
 }
 

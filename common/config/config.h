@@ -38,6 +38,9 @@ struct IsConfig<T, std::void_t<decltype(std::declval<T&>().Visit(std::declval<An
 
 /// "file:line: what" as one exception.
 [[noreturn]] void Fail(const std::string& origin, const YAML::Node& node, const std::string& what);
+/// The node under `node` of the field that a sentence of Problem() begins with, such as
+/// "grid.range is 0", "lidar: rate is 0" or "walls[2]: height is 0", as deep as the file has it.
+YAML::Node NamedBy(const std::string& problem, const YAML::Node& node);
 std::string TypeName(const bool*);
 std::string TypeName(const int*);
 std::string TypeName(const int64_t*);
@@ -51,7 +54,8 @@ void CheckProblem(const std::string& origin, const YAML::Node& node, const std::
                   const C& config) {
   if constexpr (HasProblem<C>::value) {
     const std::string problem = config.Problem();
-    if (!problem.empty()) Fail(origin, node, path.empty() ? problem : path + ": " + problem);
+    if (!problem.empty())
+      Fail(origin, NamedBy(problem, node), path.empty() ? problem : path + ": " + problem);
   }
 }
 
@@ -67,7 +71,7 @@ class Reader {
     if (child.IsDefined()) Read(child, path_.empty() ? name : path_ + "." + name, &field);
   }
 
-  void RefuseUnknownKeys() const;
+  void RefuseWrongKeys() const;
 
   template <class C>
   static void ReadConfig(const std::string& origin, const YAML::Node& node, const std::string& path,
@@ -76,7 +80,7 @@ class Reader {
     if (!node.IsMap()) Fail(origin, node, path + ": expected a map of keys and values");
     Reader reader(origin, node, path);
     config->Visit(reader);
-    reader.RefuseUnknownKeys();
+    reader.RefuseWrongKeys();
     CheckProblem(origin, node, path, *config);
   }
 
@@ -198,8 +202,8 @@ YAML::Node ParseText(const std::string& text, const std::string& origin);
 }  // namespace detail
 
 /// Overrides fields of `config` by the keys of a YAML file. Throws std::runtime_error with one line
-/// "file:line: field: what is wrong" on a missing file, an unknown key, a wrong type or a value
-/// that Problem() refuses; `config` is then in an unspecified state.
+/// "file:line: field: what is wrong" on a missing file, an unknown key, a key given twice, a wrong
+/// type or a value that Problem() refuses; `config` is then in an unspecified state.
 template <class C>
 void Load(const std::string& file, C* config) {
   detail::Reader::ReadConfig(file, detail::ParseFile(file), "", config);

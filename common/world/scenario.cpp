@@ -123,6 +123,20 @@ std::string ServiceOverride::Problem() const {
                "one of " + all);
 }
 
+namespace {
+
+/// A second entry for a service would never be looked at.
+std::string NamedTwice(const std::vector<ServiceOverride>& services) {
+  for (std::size_t i = 1; i < services.size(); ++i)
+    for (std::size_t k = 0; k < i; ++k)
+      if (services[i].name == services[k].name)
+        return "services[" + std::to_string(i) + "].name is '" + services[i].name +
+               "' a second time; put all of its config into one entry";
+  return "";
+}
+
+}  // namespace
+
 std::string Scenario::Problem() const {
   const bool has_path = target.waypoints.size() >= 2 || !target.path_file.empty();
   return First(
@@ -132,7 +146,7 @@ std::string Scenario::Problem() const {
              "2 or more, or target.path_file be given"),
        Within("world", world), FirstOf("movers", movers), Within("target", target),
        Within("chaser", chaser), Within("sensors", sensors), Within("wind", wind),
-       FirstOf("services", services)});
+       FirstOf("services", services), NamedTwice(services)});
 }
 
 Scenario ParseScenario(const std::string& yaml, const std::string& origin) {

@@ -104,10 +104,14 @@ class Item {
 
   void AllowKeys(const std::set<std::string>& allowed) const {
     if (!node_.IsMap()) Fail("is not a map of keys and values");
-    for (const auto& entry : node_)
-      if (const auto key = entry.first.as<std::string>(""); allowed.count(key) == 0)
-        Item(*origin_, entry.first, path_)
-            .Fail("unknown key '" + key + "'; known here: " + List(allowed));
+    std::set<std::string> seen;
+    for (const auto& entry : node_) {
+      const Item key(*origin_, entry.first, path_);
+      const auto name = entry.first.as<std::string>("");
+      if (allowed.count(name) == 0)
+        key.Fail("unknown key '" + name + "'; known here: " + List(allowed));
+      if (!seen.insert(name).second) key.Fail("'" + name + "' is given twice; keep one of them");
+    }
   }
 
   static std::string List(const std::set<std::string>& keys) {

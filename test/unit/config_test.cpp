@@ -91,6 +91,73 @@ TEST(Config, ProblemIsAnError) {
   EXPECT_NE(ErrorOf("speed: -1").find("speed is not above 0"), std::string::npos);
 }
 
+struct Gate {
+  double width = 1.0;
+  template <class V>
+  void Visit(V& v) {
+    v("width", width, "m");
+  }
+  std::string Problem() const { return width > 0.0 ? "" : "width is not above 0 m"; }
+};
+
+struct Course {
+  std::vector<Gate> gates;
+  Gate start;
+  Inner inner;
+  template <class V>
+  void Visit(V& v) {
+    v("gates", gates, "");
+    v("start", start, "");
+    v("inner", inner, "");
+  }
+  std::string Problem() const {
+    if (inner.count < 0) return "inner.count is below 0";
+    return gates.size() < 2 || gates[1].width < 9.0 ? "" : "gates[1]: width is 9 m or more";
+  }
+};
+
+template <class C>
+std::string ErrorOfA(const std::string& yaml) {
+  C config;
+  try {
+    LoadText(yaml, "c.yaml", &config);
+  } catch (const std::runtime_error& e) {
+    return e.what();
+  }
+  return "";
+}
+
+TEST(Config, ProblemNamesTheLineOfTheValue) {
+  EXPECT_EQ(ErrorOf("on: true\ngains: [1]\nspeed: -1\n"), "file.yaml:3: speed is not above 0 m/s");
+  EXPECT_EQ(ErrorOfA<Course>("gates:\n  - width: 1\n  -\n    width: 0\n"),
+            "c.yaml:4: gates[1]: width is not above 0 m");
+  EXPECT_EQ(ErrorOfA<Course>("inner:\n  label: a\n  count: -1\nstart: {width: 2}\n"),
+            "c.yaml:3: inner.count is below 0");
+  EXPECT_EQ(ErrorOfA<Course>("start: {width: 2}\ngates:\n  - width: 1\n  - # two\n    width: 9\n"),
+            "c.yaml:5: gates[1]: width is 9 m or more");
+}
+
+struct Strict : Inner {
+  std::string Problem() const { return "label is short for 3: nothing is right"; }
+};
+
+TEST(Config, ProblemOfAFieldThatIsNotGivenNamesTheMap) {
+  EXPECT_EQ(ErrorOfA<Strict>("\n\ncount: 1\n"), "c.yaml:3: label is short for 3: nothing is right");
+}
+
+TEST(Config, KeyGivenTwiceNamesItsSecondLine) {
+  EXPECT_EQ(ErrorOf("speed: 2.0\non: true\nspeed: 3.0\n"),
+            "file.yaml:3: 'speed' is given twice; keep one of them");
+  EXPECT_EQ(ErrorOf("inner: {count: 1, \"count\": 1}\n"),
+            "file.yaml:1: 'inner.count' is given twice; keep one of them");
+  EXPECT_EQ(ErrorOf("items:\n  - count: 1\n  - label: a\n    count: 2\n    label: b\n"),
+            "file.yaml:5: 'items[1].label' is given twice; keep one of them");
+}
+
+TEST(Config, KeyThatIsNoWordIsRefused) {
+  EXPECT_NE(ErrorOf("? [1, 2]\n: 3\n").find("file.yaml:1"), std::string::npos);
+}
+
 TEST(Config, BrokenYamlNamesTheLine) {
   EXPECT_NE(ErrorOf("speed: [1, 2").find("file.yaml:"), std::string::npos);
 }

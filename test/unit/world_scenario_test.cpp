@@ -49,7 +49,7 @@ TEST(ScenarioFile, UnknownKeyNamesItsLine) {
 TEST(ScenarioFile, BadSpeedIsRefused) {
   const std::string error = Refusal(kGood + "  speed: -1\n");
   EXPECT_CONTAINS(error, "speed is -1");
-  EXPECT_CONTAINS(error, "s.yaml:");
+  EXPECT_CONTAINS(error, "s.yaml:6");
   EXPECT_CONTAINS(Refusal(kGood + "  speed: fast\n"), "s.yaml:6");
   EXPECT_CONTAINS(Refusal(kGood + "  speed: .nan\n"), "speed");
 }
@@ -67,6 +67,15 @@ TEST(ScenarioFile, EveryPartIsChecked) {
   EXPECT_CONTAINS(Refusal(kGood + "duration_s: 0\n"), "duration_s");
   EXPECT_CONTAINS(Refusal(kGood + "wind: {gust_time: 0}\n"), "gust_time");
   EXPECT_CONTAINS(Refusal(kGood + "chaser: {start: [1, 2]}\n"), "3 numbers");
+}
+
+TEST(ScenarioFile, NothingIsGivenTwice) {
+  EXPECT_CONTAINS(Refusal(kGood + "duration_s: 9\nname: other\n"),
+                  "s.yaml:7: 'name' is given twice");
+  const std::string entry = "  - {name: planning, config: \"horizon: 2.5\"}\n";
+  const std::string error = Refusal(kGood + "services:\n" + entry + entry);
+  EXPECT_CONTAINS(error, "s.yaml:8");
+  EXPECT_CONTAINS(error, "'planning' a second time");
 }
 
 TEST(ScenarioFile, MissingFileIsNamed) {
