@@ -21,6 +21,9 @@ class UdpBus : public Bus {
   /// Waits at most `timeout_us` for messages and hands over those that are there.
   void Handle(int64_t timeout_us);
 
+  /// Wall clock at construction plus the steady time since: a step of the wall clock (NTP, a
+  /// suspended machine) neither holds up ticks and signs of life nor makes stamps jump in mid
+  /// flight.
   int64_t Now() const override;
 
  protected:
@@ -30,6 +33,7 @@ class UdpBus : public Bus {
  private:
   lcm::LCM lcm_;
   std::string prefix_;
+  int64_t clock_offset_;             // us from the steady clock to the wall clock
   std::deque<RawHandler> handlers_;  // addresses stay
 };
 

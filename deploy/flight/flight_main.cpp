@@ -11,6 +11,7 @@
 #include "deploy/flight/flight.h"
 #include "deploy/flight/progress.h"
 #include "logs/src/metrics.h"
+#include "logs/src/output.h"
 #include "logs/src/read_flight.h"
 
 namespace chase::flight {
@@ -123,20 +124,33 @@ int Fly(const world::Scenario& scenario, const Arguments& arguments) {
 
 int Run(const Arguments& arguments) {
   const world::Scenario scenario = world::LoadScenario(arguments.options.scenario_file);
-  if (arguments.print_config.empty()) return Fly(scenario, arguments);
+  if (arguments.print_config.empty()) {
+    for (const std::string& file : {arguments.log, arguments.metrics})
+      if (!file.empty()) logs::RequireWritable(file);
+    return Fly(scenario, arguments);
+  }
   fmt::print("{}", DumpService(Configure(scenario, arguments.options), arguments.print_config));
   return 0;
 }
 
+/// Any number compares false with NaN, so that CLI::Range takes it.
+std::string MissionTimeProblem(const std::string& text) {
+  constexpr double kLongest = 86400.0;  // s
+  double t = 0.0;
+  if (CLI::detail::lexical_cast(text, t) && t > 0.0 && t <= kLongest) return "";
+  return fmt::format("{} is no mission time, above 0 and at most {:.0f} s", text, kLongest);
+}
+
 void AddOptions(CLI::App* app, Arguments* a) {
   app->add_option("scenario", a->options.scenario_file, "scenario file")->required();
-  app->add_option("--seed", a->options.seed, "of all noise (default 1)");
+  app->add_option("--seed", a->options.seed, "of all noise (default 1)")
+      ->check(CLI::Range(int64_t{0}, int64_t{2147483647}));
   app->add_option("--sensors", a->options.sensors, "raw or truth (default: the scenario's)")
       ->check(CLI::IsMember({"raw", "truth"}));
   app->add_option("--planner", a->options.planner, "planning algorithm (default: chase)");
   app->add_option("--log", a->log, "record every message into this LCM log");
   app->add_option("--metrics", a->metrics, "write the figures of the flight into this JSON file");
-  app->add_option("--until", a->until, "stop at this mission time, s");
+  app->add_option("--until", a->until, "stop at this mission time, s")->check(MissionTimeProblem);
   app->add_option("--print-config", a->print_config,
                   "print the configuration of this process in this scenario and exit");
   app->add_flag("--quiet", a->quiet, "no progress line");

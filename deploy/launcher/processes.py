@@ -2,15 +2,33 @@
 
 import ctypes
 import os
+import pathlib
 import signal
 import socket
 import subprocess
+import sys
 import time
 
 PR_SET_PDEATHSIG = 1
 READY_LIMIT = 30.0  # s
-WATCHDOG_LIMIT = 10.0  # s without a sign of life
+RETRY_AFTER = 12.0  # s without READY after which a process is started once more
+WATCHDOG_LIMIT = 10.0  # s without a sign of life, once ready
 STOP_LIMIT = 5.0  # s from SIGINT to SIGKILL
+
+
+def threads_state(pid):
+    """What every thread of a process is doing, for a hang that cannot be watched: name, state, where
+    in the kernel it waits, CPU time used."""
+    words = []
+    for task in sorted(pathlib.Path(f"/proc/{pid}/task").glob("*")):
+        try:
+            fields = (task / "stat").read_text().rpartition(")")[2].split()
+            name, where = ((task / file).read_text().strip() for file in ("comm", "wchan"))
+        except (OSError, ProcessLookupError):
+            continue
+        seconds = sum(map(int, fields[11:13])) / os.sysconf("SC_CLK_TCK")
+        words.append(f"{name} {fields[0]} in {where.strip('0') or 'user space'}, {seconds:.2f} s of CPU")
+    return "; ".join(words) or "no thread to be seen"
 
 
 def _die_with_parent():
@@ -23,7 +41,7 @@ class Child:
 
     def __init__(self, name, command, log, env=None, notifies=False, restarts=False, stdout=None):
         self.name, self.log, self.restarts = name, log, restarts
-        self._command, self._stdout = command, stdout
+        self._command, self._stdout, self._retried = command, stdout, False
         self._environment = dict(os.environ, **(env or {}))
         self._environment.pop("NOTIFY_SOCKET", None)
         self._socket = self._notify_socket() if notifies else None
@@ -69,10 +87,19 @@ class Child:
         if code is not None:
             how = f"exit code {code}" if code >= 0 else signal.Signals(-code).name
             return f"{self.name} ended ({how})"
-        self._hear()
-        if self._socket and time.monotonic() - self._last_sign > WATCHDOG_LIMIT:
-            return f"{self.name} has given no sign of life for {WATCHDOG_LIMIT:.0f} s"
+        if self.ready() and self._socket and time.monotonic() - self._last_sign > WATCHDOG_LIMIT:
+            return (f"{self.name} has given no sign of life for {WATCHDOG_LIMIT:.0f} s "
+                    f"({threads_state(self.process.pid)})")
         return ""
+
+    def retry(self, after=RETRY_AFTER):
+        """Starts a process that is not ready `after` seconds from its start once more, and says so."""
+        if self._retried or self.ready() or time.monotonic() - self._last_sign < after:
+            return
+        print(f"warning: {self.name} is not ready after {after:.0f} s "
+              f"({threads_state(self.process.pid)}): started once more", file=sys.stderr, flush=True)
+        self._retried = True
+        self.restart()
 
     def log_tail(self, lines=8):
         with open(self.log, encoding="utf-8", errors="replace") as file:
@@ -102,13 +129,16 @@ def first_problem(children):
 
 
 def wait_ready(children):
-    """True once all are ready; False when one ends or READY_LIMIT passes."""
+    """True once all are ready; False when one ends or READY_LIMIT passes. Nothing flies yet, so that
+    a process which does not come up is tried a second time."""
     deadline = time.monotonic() + READY_LIMIT
     while time.monotonic() < deadline:
         if first_problem(children)[0]:
             return False
         if all(child.ready() for child in children):
             return True
+        for child in children:
+            child.retry()
         time.sleep(0.05)
     return False
 

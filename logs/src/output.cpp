@@ -1,6 +1,7 @@
 #include "logs/src/output.h"
 
 #include <cstdio>
+#include <filesystem>
 #include <fstream>
 #include <stdexcept>
 
@@ -15,6 +16,14 @@ void WriteFile(const std::string& file, const std::string& text) {
   if (out && std::rename(temporary.c_str(), file.c_str()) == 0) return;
   std::remove(temporary.c_str());
   throw std::runtime_error(file + ": could not be completed; is the disk full?");
+}
+
+void RequireWritable(const std::string& file) {
+  const std::string temporary = file + ".tmp";
+  const bool opened = !std::filesystem::is_directory(file) && std::ofstream(temporary).is_open();
+  std::remove(temporary.c_str());
+  if (!opened)
+    throw std::runtime_error(file + ": cannot be written; check the folder and its rights");
 }
 
 OutputLog::~OutputLog() {

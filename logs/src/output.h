@@ -10,6 +10,10 @@ namespace chase::logs {
 /// std::runtime_error with one line.
 void WriteFile(const std::string& file, const std::string& text);
 
+/// Throws what WriteFile would throw, before there is anything to write: for a file that is asked
+/// for at the start and written at the end.
+void RequireWritable(const std::string& file);
+
 /// A log that appears under its name when closed and leaves nothing behind when not.
 class OutputLog {
  public:

@@ -208,6 +208,34 @@ class Processes(unittest.TestCase):
         child._last_sign = time.monotonic() - processes.WATCHDOG_LIMIT - 1
         self.assertIn("no sign of life", child.problem())
 
+    def test_slow_start_is_no_silence(self):
+        child = self.child("import time; time.sleep(60)", notifies=True)
+        child._last_sign = time.monotonic() - processes.WATCHDOG_LIMIT - 1
+        self.assertEqual(child.problem(), "")
+
+    def test_what_does_not_come_up_is_started_once_more(self):
+        hang = 'import os, time; "TRIES" in os.environ or time.sleep(60)'
+        child = self.child(hang + textwrap.dedent(SERVICE.format(behaviour="")), notifies=True)
+        first = child.process.pid
+        child._environment["TRIES"] = "1"
+        words = io.StringIO()
+        with contextlib.redirect_stderr(words):
+            child.retry(after=0.0)
+            self.assertNotEqual(child.process.pid, first)
+            self.assertTrue(processes.wait_ready([child]))
+            second = child.process.pid
+            child.retry(after=0.0)  # ready
+        self.assertEqual(child.process.pid, second)
+        self.assertRegex(words.getvalue(), r"some is not ready.*python.*started once more")
+
+    def test_second_hang_is_left_to_the_limit(self):
+        child = self.child("import time; time.sleep(60)", notifies=True)
+        with contextlib.redirect_stderr(io.StringIO()):
+            child.retry(after=0.0)
+            second = child.process.pid
+            child.retry(after=0.0)
+        self.assertEqual(child.process.pid, second)
+
     def test_signal_is_named(self):
         child = self.child("import os; os.abort()")
         child.process.wait()
