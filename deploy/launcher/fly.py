@@ -5,6 +5,7 @@ import datetime
 import json
 import os
 import pathlib
+import shutil
 import signal
 import subprocess
 import sys
@@ -18,6 +19,8 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 BIN = ROOT / "build" / "bin"
 SILENCE_LIMIT = 30.0  # s of wall time in which the mission's time must move
 TAIL = 1.0  # s recorded after the mission's end
+LOG_RATE = 17e6  # bytes/s of a recording, sweeps and images included
+LARGEST_SEED = 2**31 - 1
 
 
 class FlightError(Exception):
@@ -29,11 +32,17 @@ class Parser(argparse.ArgumentParser):
         raise FlightError(f"{message}; see deploy/fly --help")
 
 
+def seed_number(text):
+    if not (text.isascii() and text.isdigit() and int(text) <= LARGEST_SEED):
+        raise argparse.ArgumentTypeError(f"{text} is no whole number from 0 to {LARGEST_SEED}")
+    return int(text)
+
+
 def parse(arguments):
     parser = Parser(prog="deploy/fly", description=__doc__)
     parser.add_argument("scenario", nargs="?", default="gym",
                         help="name in deploy/scenarios, or a file (default: gym)")
-    parser.add_argument("--seed", type=int, default=1, help="of noise and gusts (default: 1)")
+    parser.add_argument("--seed", type=seed_number, default=1, help="of noise and gusts (default: 1)")
     parser.add_argument("--view", action="store_true", help="look on with lcm-spy (needs a display)")
     return parser.parse_args(arguments)
 
@@ -53,9 +62,45 @@ def flight_processes():
     return [row for row in table["processes"] if row["fly"]]
 
 
-def build():
-    if subprocess.run([ROOT / "deploy" / "build"], check=False).returncode:
+def set_up():
+    if subprocess.run([ROOT / "deploy" / "setup"], check=False).returncode:
+        raise FlightError("the set-up failed; its message above says why")
+
+
+def build(*programs):
+    """These programs, and nothing else that the tree holds."""
+    command = [ROOT / "deploy" / "build", "build", "--", *programs]
+    if subprocess.run(command, check=False).returncode:
         raise FlightError("the build failed; its messages above say why")
+
+
+def ask(program, *arguments):
+    """What a program prints; its one line as an error where it refuses."""
+    answer = subprocess.run([BIN / program, *map(str, arguments)], capture_output=True, text=True,
+                            check=False)
+    if answer.returncode:
+        raise FlightError(answer.stderr.strip() or f"{program} ended ({answer.returncode})")
+    return answer.stdout
+
+
+def build_and_check(scenario):
+    """Builds what flies. The scenario is read as soon as there is a program that can, long before
+    the rest is built. Returns its length [s], take-off included."""
+    set_up()
+    build("chase-scenario")
+    length = json.loads(ask("chase-scenario", scenario))
+    build(*(row["binary"] for row in flight_processes()), "chase-flight", "chase-flight-monitor",
+          "chase-report")
+    ask("chase-flight", scenario, "--print-config", "simulator")  # reads the services' overrides
+    return length["duration_s"] + length["settle_s"]
+
+
+def warn_of_disk(seconds):
+    free, need = shutil.disk_usage(ROOT).free, LOG_RATE * (seconds + TAIL)
+    if free < need:
+        print(f"warning: {free / 1e9:.1f} GB are free in {ROOT}, the recording takes about "
+              f"{need / 1e9:.1f} GB; cure: remove old flights from {ROOT / 'logs'}",
+              file=sys.stderr)
 
 
 def raise_receive_buffers():
@@ -98,12 +143,9 @@ def flight_folder(scenario):
 
 def write_config(folder, scenario, seed, name):
     """The service's YAML for this scenario, as chase-flight would set it in lockstep."""
-    command = [BIN / "chase-flight", scenario, "--seed", str(seed), "--print-config", name]
-    answer = subprocess.run(command, capture_output=True, text=True, check=False)
-    if answer.returncode:
-        raise FlightError(answer.stderr.strip() or f"chase-flight --print-config {name} failed")
     path = folder / f"{name}.yaml"
-    path.write_text(answer.stdout, encoding="utf-8")
+    path.write_text(ask("chase-flight", scenario, "--seed", seed, "--print-config", name),
+                    encoding="utf-8")
     return path
 
 
@@ -207,7 +249,7 @@ def report(folder):
 
 def fly(options):
     scenario = find_scenario(options.scenario)
-    build()
+    warn_of_disk(build_and_check(scenario))
     raise_receive_buffers()
     url = bus.url()
     check_bus(url)

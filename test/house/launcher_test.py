@@ -48,6 +48,7 @@ REPORT = """
     out = pathlib.Path(sys.argv[sys.argv.index("--out") + 1])
     (out / "metrics.json").write_text(json.dumps({metrics}))
 """
+LENGTH = """print('{{"duration_s": {duration}, "settle_s": 1}}')"""
 PASSED = {"safe_ratio": 1.0, "criteria": {"safe_ratio": True, "in_image_ratio": True}}
 FAILED = {"safe_ratio": 0.9, "criteria": {"safe_ratio": False, "in_image_ratio": True}}
 
@@ -71,12 +72,15 @@ class FlightTest(unittest.TestCase):
         self.bin = pathlib.Path(folder.name)
         self.patch(fly, "BIN", self.bin)
         self.patch(fly, "TAIL", 0.1)
-        self.patch(fly, "build", lambda: None)
+        self.built = []
+        self.patch(fly, "set_up", lambda: None)
+        self.patch(fly, "build", lambda *programs: self.built.append(programs))
         self.patch(fly, "flight_folder", lambda scenario: self.make_folder())
         port = free_port()
         self.patch(os, "environ", dict(os.environ, CHASE_LCM_URL=f"udpm://{GROUP}:{port}?ttl=0"))
         for row in fly.flight_processes():
             self.program(row["binary"], SERVICE.format(behaviour=""))
+        self.program("chase-scenario", LENGTH.format(duration=2))
         self.program("chase-flight", "print('{}')")
         self.program("chase-flight-monitor", MONITOR)
         self.program("chase-report", REPORT.format(metrics=PASSED))
@@ -112,6 +116,45 @@ class FlightTest(unittest.TestCase):
         self.assertRegex(out, r"safe_ratio +1 +passed")
         self.assertTrue((self.folder / "flight.lcm").exists())
         self.assertIn("working", (self.folder / "odometry.log").read_text(encoding="utf-8"))
+
+    def test_builds_only_what_flies(self):
+        self.assertEqual(self.fly()[0], 0)
+        first, rest = self.built
+        self.assertEqual(first, ("chase-scenario",))
+        flying = {row["binary"] for row in fly.flight_processes()}
+        others = {"chase-flight", "chase-flight-monitor", "chase-report"}
+        self.assertEqual(set(rest), flying | others)
+
+    def test_scenario_is_read_before_the_build(self):
+        self.program("chase-scenario", "import sys; sys.exit('hall.yaml:3: speed is -1')")
+        code, out, err = self.fly()
+        self.assertEqual((code, out, err), (1, "", "deploy/fly: hall.yaml:3: speed is -1\n"))
+        self.assertEqual(self.built, [("chase-scenario",)])
+        self.assertFalse(hasattr(self, "folder"))
+
+    def test_bad_override_leaves_no_folder(self):
+        self.program("chase-flight", "import sys; sys.exit('planning:1: unknown key')")
+        code, out, err = self.fly()
+        self.assertEqual((code, out, err), (1, "", "deploy/fly: planning:1: unknown key\n"))
+        self.assertFalse(hasattr(self, "folder"))
+
+    def test_disk_that_is_too_small_is_said(self):
+        self.program("chase-scenario", LENGTH.format(duration=1e9))
+        code, _, err = self.fly()
+        self.assertEqual(code, 0)
+        self.assertIn("the recording takes about", err)
+
+    def test_bad_use_is_told_before_anything_is_built(self):
+        for arguments in (["gmy"], ["--seed", "-1"], ["--seed", "1.5"], ["--seed", str(2**31)],
+                          ["--seed", "nan"], ["--no-such"]):
+            with self.subTest(arguments=arguments):
+                self.patch(sys, "argv", ["fly", *arguments])
+                err = io.StringIO()
+                with contextlib.redirect_stderr(err):
+                    self.assertEqual(fly.main(), 1)
+                self.assertEqual(err.getvalue().count("\n"), 1)
+                self.assertIn(arguments[-1], err.getvalue())
+        self.assertEqual(self.built, [])
 
     def test_criterion_that_fails(self):
         self.program("chase-report", REPORT.format(metrics=FAILED))

@@ -1,0 +1,28 @@
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+
+#include "common/world/scenario.h"
+
+/// Checks a scenario file without the services, so that it is the first program that is built.
+int main(int argc, char** argv) {
+  CLI::App app("Checks a scenario file; prints its length as one line of JSON.", "chase-scenario");
+  std::string file;
+  app.add_option("scenario", file, "scenario file")->required();
+  try {
+    app.parse(argc, argv);
+    const chase::world::Scenario scenario = chase::world::LoadScenario(file);
+    chase::world::TargetMotion(scenario);  // reads its path_file
+    fmt::print("{{\"duration_s\": {:.1f}, \"settle_s\": {:.1f}}}\n", scenario.duration_s,
+               scenario.settle_s);
+    return 0;
+  } catch (const CLI::Success& e) {
+    return app.exit(e);
+  } catch (const CLI::ParseError& e) {
+    fmt::print(stderr, "chase-scenario: {}; see chase-scenario --help\n", e.what());
+  } catch (const std::exception& e) {
+    fmt::print(stderr, "chase-scenario: {}\n", e.what());
+  }
+  return 1;
+}
