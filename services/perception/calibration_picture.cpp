@@ -113,6 +113,8 @@ int CheckCalibration(int argc, char** argv) {
     WriteCalibrationPicture(in, out, config, at);
     std::printf("%s\n", out.c_str());
     return 0;
+  } catch (const CLI::Success& e) {  // --help
+    return app.exit(e);
   } catch (const CLI::ParseError& e) {
     std::fprintf(stderr, "chase-perception: %s; see --check-calibration LOG --out PNG\n", e.what());
   } catch (const std::exception& e) {

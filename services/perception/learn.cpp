@@ -1,7 +1,9 @@
 #include "services/perception/learn.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <functional>
 #include <opencv2/imgproc.hpp>
 #include <stdexcept>
 #include <string>
@@ -16,6 +18,16 @@ namespace {
 
 constexpr double kMostInset = 0.2, kInsetStep = 0.01;  // shares of the width
 
+/// A mask has two values, but for a few pixels along the marked outline; a photo has many.
+bool HasTwoValues(const cv::Mat& mask) {
+  constexpr double kLeast = 0.9;  // share of the pixels
+  std::array<int, 256> counts{};
+  for (int row = 0; row < mask.rows; ++row)
+    for (int column = 0; column < mask.cols; ++column) ++counts[mask.at<uchar>(row, column)];
+  std::nth_element(counts.begin(), counts.begin() + 1, counts.end(), std::greater<>());
+  return counts[0] + counts[1] >= kLeast * static_cast<double>(mask.total());
+}
+
 void Check(const std::vector<cv::Mat>& images, const std::vector<cv::Mat>& masks) {
   if (images.empty() || images.size() != masks.size())
     throw std::invalid_argument("give one mask for each image, and at least one of both");
@@ -27,6 +39,9 @@ void Check(const std::vector<cv::Mat>& images, const std::vector<cv::Mat>& masks
       throw std::invalid_argument(pair + ": image and mask differ in size");
     if (cv::countNonZero(masks[i]) == 0)
       throw std::invalid_argument(pair + ": the mask marks nothing");
+    if (cv::countNonZero(masks[i]) == static_cast<int>(masks[i].total()) || !HasTwoValues(masks[i]))
+      throw std::invalid_argument(
+          pair + ": the mask is a picture; a mask is 0 off the target, one value on it");
   }
 }
 

@@ -15,7 +15,7 @@ struct Learned {
 
 /// Colour, shape and how far inside the colour's outline the marked target lies, from pictures
 /// (8 bit BGR) with masks (8 bit, not 0 on the target) of the same sizes. The rest comes from
-/// `base`. Throws std::invalid_argument when sizes differ or a mask is empty.
+/// `base`. Throws std::invalid_argument when sizes differ, a mask is empty or is a picture.
 Learned LearnDetector(const std::vector<cv::Mat>& images, const std::vector<cv::Mat>& masks,
                       const DetectorConfig& base);
 

@@ -58,6 +58,8 @@ int LearnColour(int argc, char** argv) {
     app.parse(argc, argv);
     Learn(files, base, out);
     return 0;
+  } catch (const CLI::Success& e) {  // --help
+    return app.exit(e);
   } catch (const CLI::ParseError& e) {
     std::fprintf(stderr, "chase-perception: %s; see --learn-colour IMAGE MASK --out YAML\n",
                  e.what());

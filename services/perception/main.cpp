@@ -16,5 +16,12 @@ int main(int argc, char** argv) {
   if (asks("--learn-colour")) return chase::perception::LearnColour(argc, argv);
   return chase::bus::RunService<chase::perception::PerceptionNode,
                                 chase::perception::PerceptionConfig>(
-      "perception", "Finds the target: images, sweeps and poses in, its Gaussian out.", argc, argv);
+      "perception",
+      "Finds the target: images, sweeps and poses in, its Gaussian out.\n"
+      "Two commands stand beside the service:\n"
+      "  --learn-colour IMAGE MASK [IMAGE MASK ...] [--config BASE] [--out YAML]\n"
+      "      learns the target's colour and shape from marked pictures\n"
+      "  --check-calibration LOG [--at S] [--config YAML] [--out PNG]\n"
+      "      draws a sweep's points into the frame S seconds after the log's first",
+      argc, argv);
 }

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <iostream>
 #include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -103,6 +104,17 @@ TEST(PerceptionLearn, RefusesWhatDoesNotFitTogether) {
   EXPECT_THROW(LearnDetector({a.bgr}, {a.mask.rowRange(0, 100)}, {}), std::invalid_argument);
   EXPECT_THROW(LearnDetector({a.bgr}, {cv::Mat::zeros(a.mask.size(), CV_8U)}, {}),
                std::invalid_argument);
+  EXPECT_THROW(LearnDetector({a.bgr}, {cv::Mat::ones(a.mask.size(), CV_8U)}, {}),
+               std::invalid_argument);
+  cv::Mat photo(a.mask.size(), CV_8U);
+  for (int row = 0; row < photo.rows; ++row) photo.row(row).setTo(row);
+  EXPECT_THROW(LearnDetector({a.bgr}, {photo}, {}), std::invalid_argument);
+}
+
+TEST(PerceptionLearn, TakesAMaskWithASoftEdge) {
+  Marked a(40, 50, 0);
+  cv::GaussianBlur(a.mask, a.mask, {5, 5}, 1.0);
+  EXPECT_NO_THROW(LearnDetector({a.bgr}, {a.mask}, {}));
 }
 
 }  // namespace
