@@ -137,7 +137,7 @@ void Clearance(const ReportData& d, Script* s, const std::string& file) {
 }
 
 void Pixels(const ReportData& d, Script* s, const std::string& file) {
-  Begin(s, file, d.title + ": the target's centre in the image", 900, 640);
+  Begin(s, file, d.title + ": the target's centre in the image", 900, 570);
   s->Line("$pixels << EOD");
   for (size_t i = 0; i < d.pixel_u.t.size(); ++i)
     s->Line(fmt::format("{:.2f} {:.2f} {:.3f}", d.pixel_u.value[i], d.pixel_v.value[i],
@@ -145,7 +145,7 @@ void Pixels(const ReportData& d, Script* s, const std::string& file) {
   s->Line("EOD");
   s->Line(fmt::format("set xrange [0:{}]; set yrange [{}:0]; set size ratio {}", d.width_px,
                       d.height_px, static_cast<double>(d.height_px) / d.width_px));
-  s->Line("set xlabel 'u [px]'; set ylabel 'v [px]'; set cblabel 'mission time [s]'");
+  s->Line("set xlabel 'u [px]'; set ylabel 'v [px]'; set cblabel 'mission time [s]' offset 1.5");
   s->Line("set palette defined (0 '#440154', 1 '#3b528b', 2 '#21918c', 3 '#5ec962', 4 '#fde725')");
   s->Line("unset key");
   s->Line("plot $pixels using 1:2:3 with linespoints pt 7 ps 0.35 lw 0.6 lc palette");
