@@ -19,7 +19,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 BIN = ROOT / "build" / "bin"
 SILENCE_LIMIT = 30.0  # s of wall time in which the mission's time must move
 TAIL = 1.0  # s recorded after the mission's end
-LOG_RATE = 17e6  # bytes/s of a recording, sweeps and images included
+LOG_RATE = 15e6  # bytes/s of a recording, sweeps and images included
 LARGEST_SEED = 2**31 - 1
 
 
