@@ -295,6 +295,20 @@ TEST(LogExport, McapOfNothingLeavesNoFile) {
   EXPECT_FALSE(fs::exists(out + ".tmp"));
 }
 
+TEST(Output, PlaceIsKnownToBeWritableBeforeThereIsAnythingToWrite) {
+  const std::string file = ::testing::TempDir() + "chase_logs_writable.json";
+  WriteFile(file, "before");
+  RequireWritable(file);
+  EXPECT_EQ(fs::file_size(file), 6u);
+  EXPECT_FALSE(fs::exists(file + ".tmp"));
+  fs::remove(file);
+  RequireWritable(file);
+  EXPECT_FALSE(fs::exists(file));
+  for (const std::string& bad : {std::string("/no/such/folder/m.json"), ::testing::TempDir()})
+    EXPECT_NE(ErrorOf([&] { RequireWritable(bad); }).find("cannot be written"), std::string::npos)
+        << bad;
+}
+
 TEST(LogImport, KittiTimesFollowTheAzimuthAndRingZeroIsLowest) {
   const auto put = [](std::vector<uint8_t>* out, int x, int y, int ring) {
     for (const int v : {x, y, 0})
