@@ -25,14 +25,17 @@ struct Endpoint {
 
 bool Parse(const std::string& url, Endpoint* endpoint) {
   std::smatch match;
-  static const std::regex pattern(R"(udpm://([0-9.]*)(?::(\d+))?(\?.*)?)");
+  static const std::regex pattern(R"(udpm://([0-9.]*)(?::(\d{1,5}))?(\?.*)?)");
   if (!std::regex_match(url, match, pattern)) return false;
+  if (match[2].length() && !match[1].length()) return false;  // LCM takes none or both
   const std::string host = match[1].length() ? match[1].str() : "239.255.76.67";
   const std::string port = match[2].length() ? match[2].str() : "7667";
   endpoint->text = host + ":" + port;
   endpoint->address.sin_family = AF_INET;
-  endpoint->address.sin_port = htons(static_cast<uint16_t>(std::stoi(port)));
-  return inet_pton(AF_INET, host.c_str(), &endpoint->address.sin_addr) == 1;
+  const int number = std::stoi(port);
+  endpoint->address.sin_port = htons(static_cast<uint16_t>(number));
+  return number > 0 && number <= 65535 &&
+         inet_pton(AF_INET, host.c_str(), &endpoint->address.sin_addr) == 1;
 }
 
 class Socket {
@@ -93,6 +96,11 @@ std::string LoopbackProblem(const std::string& url) {
   Endpoint group;
   if (!Parse(url, &group))
     return fmt::format("--lcm-url {}: not of the form udpm://ADDRESS:PORT?ttl=0", url);
+  if (!IN_MULTICAST(ntohl(group.address.sin_addr.s_addr)))
+    return fmt::format(
+        "--lcm-url {}: no multicast address; cure: use one of 224.0.0.0 to 239.255.255.255, such "
+        "as 239.255.76.67",
+        url);
   const Socket receiver, sender;
   if (!Join(receiver.fd(), group)) {
     if (errno == EADDRINUSE)

@@ -1,6 +1,7 @@
 """The LCM URL, and what a multicast socket can tell about the network under it."""
 
 import errno
+import ipaddress
 import os
 import re
 import socket
@@ -17,8 +18,17 @@ def url():
 
 def endpoint(text):
     """(group, port) of a udpm URL, or None where it is something else."""
-    match = re.fullmatch(r"udpm://([0-9.]+):(\d+)(\?.*)?", text)
-    return (match.group(1), int(match.group(2))) if match else None
+    match = re.fullmatch(r"udpm://([0-9.]+):([0-9]{1,5})(\?.*)?", text)
+    if not match or not 0 < int(match.group(2)) <= 65535 or not address(match.group(1)):
+        return None
+    return match.group(1), int(match.group(2))
+
+
+def address(text):
+    try:
+        return ipaddress.IPv4Address(text)
+    except ValueError:
+        return None
 
 
 def stays_on_host(text):
@@ -51,6 +61,9 @@ def route_cure(group):
 
 def loopback_problem(group, port):
     """Sends one LCM message to ourselves; a sentence where it does not come back, else ''."""
+    if not address(group).is_multicast:
+        return (f"{group} is no multicast address; cure: use one of 224.0.0.0 to 239.255.255.255, "
+                "such as 239.255.76.67")
     packet = b"LC02" + struct.pack(">I", 0) + b"LOOPBACK_%d\0" % os.getpid()
     try:
         with listener(group, port) as receiver:

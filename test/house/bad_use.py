@@ -14,7 +14,7 @@ BIN = pathlib.Path(sys.argv[1])
 SERVICES = sys.argv[2:]
 SOURCES = ("lidar", "camera")  # these look for their device before anything else
 TOOLS = [["chase-flight"], ["chase-plan"], ["chase-predict"], ["chase-report"],
-         ["chase-log", "info"], ["chase-compare"]]
+         ["chase-log", "info"], ["chase-compare"], ["chase-scenario"]]
 TOOL_SERVICES = {"lidar", "camera", "odometry", "mapping", "perception", "prediction", "planning",
                  "control", "simulator"}
 LIMIT = 20  # s
@@ -121,6 +121,16 @@ class BadUse(unittest.TestCase):
     def test_bad_url(self):
         self.for_each(self.services(), lambda program: self.assert_refused(
             run(program, "--lcm-url", "udpm://nonsense"), "udpm://nonsense"))
+
+    def test_address_that_is_not_multicast(self):
+        self.for_each(self.services(), lambda program: self.assert_refused(
+            run(program, "--lcm-url", "udpm://10.0.0.1:7667?ttl=0"), "no multicast address",
+            "239.255.76.67"))
+
+    def test_bad_port(self):
+        for place in ("239.255.76.67:0", "239.255.76.67:65536", f"239.255.76.67:{10**20}", ":7667"):
+            self.for_each(self.services(), lambda program: self.assert_refused(
+                run(program, "--lcm-url", f"udpm://{place}"), "ADDRESS:PORT"))
 
     def test_missing_replay(self):
         out = pathlib.Path(self.folder.name) / "out.lcm"

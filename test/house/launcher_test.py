@@ -297,7 +297,14 @@ class Processes(unittest.TestCase):
 class Bus(unittest.TestCase):
     def test_endpoint(self):
         self.assertEqual(bus.endpoint(bus.DEFAULT_URL), (GROUP, 7667))
-        self.assertIsNone(bus.endpoint("file://a.lcm"))
+        for text in ("file://a.lcm", "udpm://239.255.76.67:99999", "udpm://239.255.76.67:0",
+                     "udpm://999.1.1.1:7667", "udpm://239.255.76.67:7667777777777?ttl=0"):
+            self.assertIsNone(bus.endpoint(text), text)
+
+    def test_address_that_is_not_multicast(self):
+        problem = bus.loopback_problem("10.0.0.1", free_port())
+        self.assertIn("no multicast address", problem)
+        self.assertNotIn("ip route", problem)
 
     def test_channel_of(self):
         first = b"LC03" + struct.pack(">IIIHH", 1, 9, 0, 0, 2)
