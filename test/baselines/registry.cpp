@@ -18,6 +18,8 @@ struct Name {
 Name Split(const std::string& name) {
   const size_t colon = name.find(':');
   if (colon == std::string::npos) return {name, ""};
+  if (colon + 1 == name.size())
+    throw std::invalid_argument("planner '" + name + "': after the colon goes a number or 'all'");
   return {name.substr(0, colon), name.substr(colon + 1)};
 }
 

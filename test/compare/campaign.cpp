@@ -8,7 +8,9 @@
 #include <chrono>
 #include <filesystem>
 #include <map>
+#include <memory>
 #include <stdexcept>
+#include <utility>
 
 #include "common/world/scenario.h"
 #include "test/baselines/registry.h"
@@ -39,7 +41,7 @@ std::string Fingerprint(const std::string& scenario) {
 std::string NameOf(const std::string& scenario) { return fs::path(ScenarioFile(scenario)).stem(); }
 
 bool IsDone(const Job& job) {
-  if (!fs::exists(job.file)) return false;
+  if (!fs::is_regular_file(job.file)) return false;
   const auto j = nlohmann::json::parse(ReadText(job.file), nullptr, false);
   return j.is_object() && j.value("fingerprint", "") == Fingerprint(job.scenario);
 }
@@ -69,8 +71,12 @@ class Progress {
                  : "";
     fmt::print(stderr, "\r[{:#<{}}{:.<{}}] {}/{} {:<12} {:<28}", "", filled, "", kWidth - filled,
                done, total_, left, last);
-    if (done == total_) fmt::print(stderr, "\n");
+    if (done == total_) End();
     std::fflush(stderr);
+  }
+
+  void End() {
+    if (!quiet_) fmt::print(stderr, "\n");
   }
 
  private:
@@ -79,7 +85,30 @@ class Progress {
   std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
 };
 
-pid_t Start(const Job& job) {
+/// A file without a name for what a flight's process says on stderr, so that it does not run into
+/// the bar.
+struct Close {
+  void operator()(std::FILE* file) const { std::fclose(file); }
+};
+using Words = std::unique_ptr<std::FILE, Close>;
+
+/// The last line of what was said, without the program's name.
+std::string LastLine(std::FILE* words) {
+  std::rewind(words);
+  std::string text;
+  for (int c = 0; (c = std::fgetc(words)) != EOF;) text += static_cast<char>(c);
+  text.erase(text.find_last_not_of(" \n") + 1);
+  text.erase(0, text.rfind('\n') + 1);
+  const std::string name = "chase-compare: ";
+  return text.rfind(name, 0) == 0 ? text.substr(name.size()) : text;
+}
+
+std::string Ending(int status) {
+  return WIFSIGNALED(status) ? fmt::format("ended by signal {}", WTERMSIG(status))
+                             : fmt::format("exit code {}", WEXITSTATUS(status));
+}
+
+pid_t Start(const Job& job, std::FILE* said) {
   const std::string program = Program();
   std::vector<std::string> words = {program,     "--fly",    job.scenario, "--planners",
                                     job.planner, "--result", job.file};
@@ -89,6 +118,7 @@ pid_t Start(const Job& job) {
   const pid_t child = fork();
   if (child < 0) throw std::runtime_error("a process for the flight cannot be started");
   if (child > 0) return child;
+  dup2(fileno(said), STDERR_FILENO);
   execv(program.c_str(), argv.data());
   _exit(127);
 }
@@ -107,8 +137,12 @@ std::vector<Job> Jobs(const Arguments& arguments) {
   std::vector<Job> jobs;
   std::map<std::string, std::string> files;
   for (const std::string& scenario : scenarios) {
-    if (!fs::exists(ScenarioFile(scenario)))
-      throw std::runtime_error(scenario + ": no such scenario; use S1 to S12 or a scenario file");
+    if (!fs::is_regular_file(ScenarioFile(scenario)))
+      throw std::runtime_error(
+          "no scenario '" + scenario +
+          "'; use S1 to S12 or the path of a scenario file whose obstacles are "
+          "upright ellipsoids");
+    LoadMission(scenario);  // what cannot be flown is said before the first flight
     const std::string name = NameOf(scenario);
     if (const auto [at, fresh] = files.emplace(name, scenario); !fresh)
       throw std::runtime_error(scenario + ": has the same name as " + at->second +
@@ -146,29 +180,44 @@ void Run(const std::vector<Job>& jobs, const Arguments& arguments) {
   std::vector<Job> waiting;
   for (const Job& job : jobs)
     if (!IsDone(job)) waiting.push_back(job);
+  const fs::path folder = fs::path(arguments.out) / "flights";
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (!fs::is_directory(folder) || access(folder.c_str(), W_OK) != 0)
+    throw std::runtime_error("--out " + arguments.out +
+                             ": no folder that can be written to; check the path and its rights");
   size_t done = jobs.size() - waiting.size();
   Progress progress(jobs.size(), arguments.quiet);
   progress.Show("", done);
   std::reverse(waiting.begin(), waiting.end());
-  std::map<pid_t, Job> flying;
+  std::map<pid_t, std::pair<Job, Words>> flying;
   std::string failed;
   while ((!waiting.empty() && failed.empty()) || !flying.empty()) {
     while (!waiting.empty() && failed.empty() && static_cast<int>(flying.size()) < arguments.jobs) {
-      flying[Start(waiting.back())] = waiting.back();
+      Words said(std::tmpfile());
+      if (!said) throw std::runtime_error("no file for a flight's messages; is the disk full?");
+      const pid_t child = Start(waiting.back(), said.get());
+      flying[child] = {waiting.back(), std::move(said)};
       waiting.pop_back();
     }
     int status = 0;
     const pid_t ended = waitpid(-1, &status, 0);
     const auto at = flying.find(ended);
     if (at == flying.end()) continue;
-    const std::string what = NameOf(at->second.scenario) + " " + at->second.planner;
-    if (status != 0 && failed.empty()) failed = what;
+    const auto& [job, said] = at->second;
+    const std::string what = NameOf(job.scenario) + " " + job.planner;
+    if (status != 0 && failed.empty()) {
+      const std::string reason = LastLine(said.get());
+      failed = what + ": " + (reason.empty() ? Ending(status) : reason);
+    }
     flying.erase(at);
-    progress.Show(what, ++done);
+    if (status == 0) ++done;
+    progress.Show(what + (status == 0 ? "" : " FAILED"), done);
   }
-  if (!failed.empty())
-    throw std::runtime_error("the flight " + failed +
-                             " failed, see above; the others are kept, run again to go on");
+  if (!failed.empty()) {
+    progress.End();
+    throw std::runtime_error("the flight " + failed + "; the others are kept, run again to go on");
+  }
 }
 
 }  // namespace chase::compare

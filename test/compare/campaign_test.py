@@ -86,19 +86,44 @@ class Campaign(unittest.TestCase):
         self.assertEqual(answer.returncode, 0, answer.stderr)
         for name in ("comparison.png", "top_view_S3.png"):
             self.assertTrue((self.out / name).read_bytes().startswith(b"\x89PNG"), answer.stderr)
+        self.assertNotIn("arning", answer.stderr)
         if "no pictures" not in answer.stderr:  # without npm's Plotly there is no page
             self.assertIn("Plotly.newPlot", (self.out / "comparison.html").read_text())
 
     def test_bad_use_is_one_line(self):
-        for arguments in (["--scenarios", "S13"], ["--planners", "nobody"], ["--jobs", "0"],
+        for arguments in (["--scenarios", "S13"], ["--scenarios", "deploy/scenarios"],
+                          ["--planners", "penin_style:"], ["--planners", "nobody"], ["--jobs", "0"],
                           ["--planners", "penin_style:21"], ["--no-such"], ["--fly", "S1"],
                           ["--scenarios", "deploy/scenarios/gym.yaml", "--planners", "chase",
                            "--quiet"]):
             with self.subTest(arguments=arguments):
                 answer = compare("--out", self.out, *arguments)
                 self.assertEqual(answer.returncode, 1)
-                self.assertIn("chase-compare: ", answer.stderr)
+                self.assertTrue(answer.stderr.startswith("chase-compare: "), answer.stderr)
+                self.assertEqual(answer.stderr.count("\n"), 1, answer.stderr)
                 self.assertEqual(answer.stdout, "")
+
+    def test_what_cannot_be_flown_is_said_before_the_first_flight(self):
+        answer = compare("--out", self.out, "--scenarios", "S1,deploy/scenarios/gym.yaml",
+                         "--planners", "chase")
+        self.assertEqual(answer.returncode, 1)
+        self.assertIn("upright ellipsoids", answer.stderr)
+        self.assertEqual(list(self.out.iterdir()), [])
+
+    def test_folder_that_cannot_be_is_said_before_the_first_flight(self):
+        answer = compare("--out", "/proc/no/folder", "--scenarios", "S1", "--planners", "chase")
+        self.assertEqual(answer.returncode, 1)
+        self.assertRegex(answer.stderr, "^chase-compare: --out /proc/no/folder: .*\n$")
+
+    def test_failed_flight_is_said_and_not_counted(self):
+        (self.out / "flights/S1_follow_behind.json").mkdir(parents=True)  # cannot be written
+        answer = compare("--out", self.out, "--scenarios", "S1", "--planners", "chase,follow_behind")
+        self.assertEqual(answer.returncode, 1)
+        self.assertIn(" 1/2 ", answer.stderr)
+        self.assertNotIn(" 2/2 ", answer.stderr)
+        self.assertIn("S1 follow_behind FAILED", answer.stderr)
+        self.assertRegex(answer.stderr.splitlines()[-1],
+                         "^chase-compare: the flight S1 follow_behind: .*cannot be written")
 
     def test_generator_makes_the_frozen_files(self):
         subprocess.run([sys.executable, "-B", TWELVE / "generate.py", "--out", self.out, "--only",

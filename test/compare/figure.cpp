@@ -61,6 +61,17 @@ std::string RatioRange(const Flights& flights, const Panel& panel) {
   return fmt::format("set yrange [{}:{}]\n", low - rim, high + rim);
 }
 
+/// Gnuplot's own, which is whole decades; the one around the values where they are all the same.
+std::string LogarithmicRange(const Flights& flights, const Panel& panel) {
+  double low = HUGE_VAL, high = 0.0;
+  for (const Json& f : flights)
+    if (const double value = panel.value(f["metrics"]); value > 0.0)
+      low = std::min(low, value), high = std::max(high, value);
+  if (high > 1.01 * low) return "set yrange [*:*]\n";
+  const double decade = high > 0.0 ? std::floor(std::log10(low)) : 0.0;
+  return fmt::format("set yrange [1e{:.0f}:1e{:.0f}]\n", decade, decade + 1.0);
+}
+
 std::string ScenarioTics(const std::vector<std::string>& scenarios) {
   std::string tics = "set xtics (";
   const size_t every = scenarios.size() / 30 + 1;
@@ -156,7 +167,7 @@ void DrawPanels(const Flights& flights, const std::string& file) {
     for (size_t panel = 0; panel < Panels().size(); ++panel) {
       const Panel& p = Panels()[panel];
       s += "set title " + GnuplotString(p.title) + " offset 0,-0.6\n";
-      s += p.logarithmic ? "set logscale y\nset yrange [*:*]\n"
+      s += p.logarithmic ? "set logscale y\n" + LogarithmicRange(flights, p)
                          : "unset logscale y\n" + RatioRange(flights, p);
       s += panel == 0 ? "set key noenhanced at screen 0.5,0.985 center horizontal samplen 2.5\n"
                       : "unset key\n";
