@@ -20,9 +20,30 @@ def mean_merit(flights):
     return tuple(sum(column) / len(column) for column in columns)
 
 
+def read(arguments, home):
+    """The flights of a flights.json; ends with one line where they are not those of parameter sets."""
+    if len(arguments) != 1:
+        sys.exit("choose_best.py: takes one file; usage: choose_best.py OUT/flights.json")
+    try:
+        flights = json.loads(pathlib.Path(arguments[0]).read_text(encoding="ascii"))
+        for flight in flights:
+            merit(flight), flight["scenario"], flight["parameter_set"] + 0
+        strange = {f["planner"] for f in flights if not (home / f["planner"] / "sets.csv").is_file()}
+    except OSError as error:
+        sys.exit(f"choose_best.py: {arguments[0]}: {error.strerror}")
+    except (ValueError, KeyError, TypeError):
+        sys.exit(f"choose_best.py: {arguments[0]}: is no flights.json of chase-compare with parameter sets; "
+                 "fly them with --planners penin_style:all,naegeli_style:all")
+    if not flights:
+        sys.exit(f"choose_best.py: {arguments[0]}: holds no flights")
+    if strange:
+        sys.exit(f"choose_best.py: {arguments[0]}: no parameter sets are known of {', '.join(sorted(strange))}")
+    return flights
+
+
 def main():
-    flights = json.loads(pathlib.Path(sys.argv[1]).read_text(encoding="ascii"))
     home = pathlib.Path(__file__).resolve().parent
+    flights = read(sys.argv[1:], home)
     for planner in sorted({f["planner"] for f in flights}):
         mine = [f for f in flights if f["planner"] == planner]
         scenarios = list(dict.fromkeys(f["scenario"] for f in mine))

@@ -15,8 +15,25 @@ def cell(flight):
     return text + (f" ({safe:.3f} {visible:.3f})" if min(safe, visible) < 1 else "")
 
 
+def read(arguments):
+    """The flights of a flights.json; ends with one line where it is none."""
+    if len(arguments) != 1:
+        sys.exit("table.py: takes one file; usage: table.py OUT/flights.json")
+    try:
+        flights = json.loads(pathlib.Path(arguments[0]).read_text(encoding="ascii"))
+        for flight in flights:
+            cell(flight), flight["planner"], flight["scenario"], flight["distance_ratio"] + 0.0
+    except OSError as error:
+        sys.exit(f"table.py: {arguments[0]}: {error.strerror}; chase-compare --out OUT makes OUT/flights.json")
+    except (ValueError, KeyError, TypeError):
+        sys.exit(f"table.py: {arguments[0]}: is no flights.json of chase-compare")
+    if not flights:
+        sys.exit(f"table.py: {arguments[0]}: holds no flights")
+    return flights
+
+
 def main():
-    flights = json.loads(pathlib.Path(sys.argv[1]).read_text(encoding="ascii"))
+    flights = read(sys.argv[1:])
     planners = list(dict.fromkeys(f["planner"] for f in flights))
     scenarios = list(dict.fromkeys(f["scenario"] for f in flights))
     at = {(f["scenario"], f["planner"]): f for f in flights}

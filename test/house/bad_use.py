@@ -10,6 +10,7 @@ import sys
 import tempfile
 import unittest
 
+TESTS = pathlib.Path(__file__).resolve().parents[1]
 BIN = pathlib.Path(sys.argv[1])
 SERVICES = sys.argv[2:]
 SOURCES = ("lidar", "camera")  # these look for their device before anything else
@@ -163,6 +164,24 @@ class BadUse(unittest.TestCase):
         if not TOOL_SERVICES <= set(SERVICES):
             self.skipTest("skipped: this build has not all services")
         return TOOLS
+
+    def test_scripts(self):
+        nothing = self.file("[]")
+        for script, *arguments in (
+                ("compare/table.py",), ("compare/table.py", "no/such.json"),
+                ("compare/table.py", "README.md"), ("compare/table.py", nothing),
+                ("baselines/choose_best.py",), ("baselines/choose_best.py", "no/such.json"),
+                ("baselines/choose_best.py", "README.md"), ("baselines/choose_best.py", nothing),
+                ("replay/golden.py",), ("replay/golden.py", "show"), ("replay/golden.py", "check"),
+                ("replay/golden.py", "check", BIN, "no/such.yaml", "nobody"),
+                ("replay/golden.py", "check", "no/bin", "no/such.yaml", "planning"),
+                ("replay/golden.py", "record", BIN, "no/such.yaml", "no/such.lcm", "planning"),
+                ("replay/golden.py", "record", BIN, "no/such.yaml", "README.md", "planning")):
+            with self.subTest(script=script, arguments=arguments):
+                command = [sys.executable, "-B", TESTS / script, *map(str, arguments)]
+                answer = subprocess.run(command, capture_output=True, text=True, timeout=LIMIT,
+                                        check=False)
+                self.assert_refused(answer, script.split("/")[1])
 
     def test_tools_bad_flag(self):
         self.for_each(self.tools(), lambda program: self.assert_refused(

@@ -92,6 +92,9 @@ def record(bin_dir, scenario, flight, *services):
         inputs, _, begin, end, step = SLICES[service]
         events = [(t, c, thin(c, d, step)) for t, c, d in lcmlog.read(flight)
                   if c in inputs and begin <= t * 1e-6 < end]
+        if not events:
+            sys.exit(f"golden.py: {flight}: holds no {', '.join(inputs)} from {begin} to {end} s; "
+                     "fly 30 s or more, with --log")
         with tempfile.TemporaryDirectory() as folder:
             source = f"{folder}/{service}.in.lcm"
             lcmlog.write(source, events)
@@ -105,4 +108,30 @@ def record(bin_dir, scenario, flight, *services):
                 print(f"{service}.{name}.lcm.xz: {len(packed) // 1024} KiB")
 
 
-{"check": check, "record": record}[sys.argv[1]](*sys.argv[2:])
+def refuse(why):
+    sys.exit(f"golden.py: {why}; usage: golden.py check BIN_DIR SCENARIO SERVICE, or "
+             "golden.py record BIN_DIR SCENARIO FLIGHT.lcm [SERVICE...]")
+
+
+def main(arguments):
+    if not arguments or arguments[0] not in ("check", "record"):
+        refuse(f"'{' '.join(arguments[:1])}' is neither check nor record")
+    command, rest = arguments[0], arguments[1:]
+    if len(rest) < 3 or (command == "check" and len(rest) > 3):
+        refuse(f"{command} with {len(rest)} arguments")
+    for service in rest[2:3] if command == "check" else rest[3:]:
+        if service not in SLICES:
+            refuse(f"no service '{service}'; there are {', '.join(SLICES)}")
+    try:
+        (check if command == "check" else record)(*rest)
+    except subprocess.CalledProcessError as error:
+        said = (error.stderr or "").strip()
+        sys.exit(f"golden.py: {pathlib.Path(error.cmd[0]).name} failed: {said or 'see above'}")
+    except OSError as error:
+        sys.exit(f"golden.py: {error.filename}: {error.strerror}")
+    except (ValueError, lzma.LZMAError) as error:
+        sys.exit(f"golden.py: {error}")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

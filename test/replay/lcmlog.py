@@ -8,9 +8,13 @@ def read(path):
     """Yields (utime, channel, data) in file order."""
     with open(path, "rb") as f:
         while header := f.read(28):
-            sync, _, utime, n_channel, n_data = struct.unpack(">IqqII", header)
-            assert sync == SYNC, f"{path}: not an LCM log"
-            yield utime, f.read(n_channel).decode(), f.read(n_data)
+            sync, _, utime, n_channel, n_data = struct.unpack(">IqqII", header.ljust(28))
+            if sync != SYNC:
+                raise ValueError(f"{path}: not an LCM log, or damaged")
+            channel, data = f.read(n_channel), f.read(n_data)
+            if len(data) < n_data:
+                raise ValueError(f"{path}: ends within a message; record it again")
+            yield utime, channel.decode(), data
 
 
 def write(path, events):
