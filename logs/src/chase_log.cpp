@@ -1,4 +1,5 @@
 #include <CLI/CLI.hpp>
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <stdexcept>
@@ -73,6 +74,13 @@ void AddExport(CLI::App* app, Arguments* a) {
   sub->callback([a] { RunExport(*a); });
 }
 
+/// Any number compares false with NaN, so that CLI's own ranges take it.
+std::string ToleranceProblem(const std::string& text) {
+  double value = 0.0;
+  const bool good = CLI::detail::lexical_cast(text, value) && value >= 0.0 && std::isfinite(value);
+  return good ? "" : text + " is no tolerance, 0 or above";
+}
+
 void AddDiff(CLI::App* app, Arguments* a, int* exit_code) {
   auto* sub =
       app->add_subcommand("diff", "Compares two logs field by field; exit 1 if they differ.");
@@ -80,7 +88,7 @@ void AddDiff(CLI::App* app, Arguments* a, int* exit_code) {
   sub->add_option("B", a->other, "LCM log")->required();
   sub->add_option("--tolerance", a->tolerance,
                   "numbers this close are the same: absolute below 1, relative above")
-      ->check(CLI::NonNegativeNumber);
+      ->check(ToleranceProblem);
   sub->add_option("--ignore", a->ignore,
                   "CHANNEL.field left out, shell patterns allowed; CHANNEL alone: all of it");
   sub->callback([a, exit_code] {

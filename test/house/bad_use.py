@@ -165,6 +165,24 @@ class BadUse(unittest.TestCase):
             self.skipTest("skipped: this build has not all services")
         return TOOLS
 
+    def test_tools_numbers_that_are_none(self):
+        self.tools()
+        gym = TESTS.parent / "deploy/scenarios/gym.yaml"
+        for command, values in ((["chase-flight", gym, "--until"], ("nan", -20, 0, "inf", "1s")),
+                                (["chase-flight", gym, "--seed"], ("nan", -1, 1.5, 2**31, 10**20)),
+                                (["chase-compare", "--jobs"], ("nan", 0, 1.5, 10**20)),
+                                (["chase-log", "diff", "a.lcm", "b.lcm", "--tolerance"],
+                                 ("nan", -1, "inf", "x"))):
+            for value in values:
+                with self.subTest(command=command, value=value):
+                    self.assert_refused(run(*command, value), command[-1], value)
+
+    def test_tools_file_that_cannot_be_written(self):
+        self.tools()
+        gym = TESTS.parent / "deploy/scenarios/gym.yaml"
+        for flag in ("--metrics", "--log"):
+            self.assert_refused(run("chase-flight", gym, flag, "/no/such/file"), "/no/such/file")
+
     def test_scripts(self):
         nothing = self.file("[]")
         for script, *arguments in (
