@@ -5,6 +5,7 @@ import datetime
 import json
 import os
 import pathlib
+import re
 import shutil
 import signal
 import subprocess
@@ -52,8 +53,10 @@ def find_scenario(name):
     for path in (scenarios / f"{name}.yaml", pathlib.Path(name)):
         if path.is_file():
             return path.resolve()
+    # Scenes and planners' parameters lie there as well; only scenarios have a name.
     known = sorted(str(path.relative_to(scenarios).with_suffix(""))
-                   for path in scenarios.rglob("*.yaml") if path.parent.name != "scenes")
+                   for path in scenarios.rglob("*.yaml")
+                   if re.search("^name:", path.read_text(encoding="utf-8"), re.MULTILINE))
     raise FlightError(f"no scenario '{name}'; there are: {', '.join(known)}")
 
 

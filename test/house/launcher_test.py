@@ -156,6 +156,13 @@ class FlightTest(unittest.TestCase):
                 self.assertIn(arguments[-1], err.getvalue())
         self.assertEqual(self.built, [])
 
+    def test_known_scenarios_are_named(self):
+        with self.assertRaises(fly.FlightError) as refusal:
+            fly.find_scenario("gmy")
+        names = str(refusal.exception).split("there are: ")[1].split(", ")
+        self.assertEqual(sorted(names), sorted(
+            ["forest", "gym"] + [f"twelve/S{number}" for number in range(1, 13)]))
+
     def test_criterion_that_fails(self):
         self.program("chase-report", REPORT.format(metrics=FAILED))
         code, out, _ = self.fly()
