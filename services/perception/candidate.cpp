@@ -16,21 +16,51 @@ constexpr double kMovedGate = 11.8;     // squared distance, 2 dof, that chance 
 constexpr double kFast = 0.3;           // m/s that LiDAR points of two sweeps tell from standing,
 constexpr double kFastGate = 30.0;      // and its squared distance from it, 2 dof
 constexpr double kKnownSigmas = 2.0;    // from which a way along the line of sight counts
+constexpr double kAstray = 0.1, kAstrayShare = 0.5;  // m and share of its way, off what is told
+constexpr double kSureWay = 0.15;                    // m
 constexpr double kBetter = 0.25;  // share of the first variance from which a start is taken anew
 
 }  // namespace
 
 void Candidate::Correct(const Sighting& sighting) {
+  const bool was_partial = track.partial;
   track.Correct(sighting.fit);
   last = sighting;
-  part = part && sighting.detection.part;
+  part = part && (sighting.detection.part || sighting.detection.AnyCut());
   const auto spread = [](const TargetGaussian& g) {
     return g.covariance.topLeftCorner<2, 2>().trace();
   };
-  if (Drives() || spread(track.state) > kBetter * spread(first)) return;
+  // Before, what hid it may have seemed its edge.
+  const bool comes_out = was_partial && !track.partial && !SurelyDrives();
+  if (!comes_out && (Drives() || spread(track.state) > kBetter * spread(first))) return;
   first = track.state;
   ranged = sighting.n_points > 0;
   known = track.t;
+}
+
+Candidate NewCandidate(const Sighting& sighting, const View& view) {
+  Candidate c;
+  c.track = {sighting.fit.posterior, sighting.fit.shape, view.t, view.t, 1, 0,
+             sighting.fit.joined,    !sighting.fit.whole};
+  c.first = sighting.fit.posterior;
+  c.since = c.known = view.t;
+  c.last = sighting;
+  const Eigen::Vector3d sight = c.track.state.position() - view.camera.p_WC;
+  c.px = sight.norm() / view.camera.rig.focal_px;
+  c.ranged = sighting.n_points > 0;
+  c.range_px = sight.head<2>() / sighting.detection.box.height;
+  c.part = sighting.detection.part;
+  return c;
+}
+
+void ForgetVelocity(const MotionConfig& config, Candidate* candidate) {
+  const double speed = config.initial_speed_sigma, vertical = config.initial_vertical_speed_sigma;
+  auto& state = candidate->track.state;
+  state.mean.tail<3>().setZero();
+  state.covariance.topRightCorner<3, 3>().setZero();
+  state.covariance.bottomLeftCorner<3, 3>().setZero();
+  state.covariance.bottomRightCorner<3, 3>() =
+      Eigen::Vector3d(speed * speed, speed * speed, vertical * vertical).asDiagonal();
 }
 
 bool Candidate::Fast() const {
@@ -40,9 +70,19 @@ bool Candidate::Fast() const {
          v.dot(track.state.covariance.block<2, 2>(3, 3).ldlt().solve(v)) > kFastGate;
 }
 
+bool Candidate::Steady() const {
+  const Eigen::Vector2d way = (track.state.position() - first.position()).head<2>();
+  const Eigen::Vector2d told = (track.t - known) * track.state.velocity().head<2>();
+  return (way - told).norm() < kAstray + kAstrayShare * way.norm();
+}
+
+bool Candidate::SurelyDrives() const {
+  const double way = (track.state.position() - first.position()).head<2>().norm();
+  return Drives() && Steady() && way > kSureWay;
+}
+
 bool Candidate::Drives() const {
-  const auto& cut = last.detection.cut;
-  const bool whole = std::none_of(cut.begin(), cut.end(), [](bool c) { return c; });
+  const bool whole = !last.detection.AnyCut();
   if (whole && Fast()) return true;
   Eigen::Vector2d d = (track.state.position() - first.position()).head<2>();
   Eigen::Matrix2d P =

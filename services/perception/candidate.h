@@ -23,8 +23,19 @@ struct Candidate {
 
   /// True when it has surely moved from where it was first seen.
   bool Drives() const;
+  /// True when it has gone the way that its velocity tells, as a thing does and pieces of one do
+  /// not.
+  bool Steady() const;
+  /// True when it has also gone further than what is seen of a standing thing may seem to.
+  bool SurelyDrives() const;
   /// True when LiDAR points of several times tell that it moves.
   bool Fast() const;
 };
+
+/// Something seen for the first time.
+Candidate NewCandidate(const Sighting& sighting, const View& view);
+
+/// Leaves nothing known of its velocity, as where that was the hidden target's.
+void ForgetVelocity(const MotionConfig& config, Candidate* candidate);
 
 }  // namespace chase::perception

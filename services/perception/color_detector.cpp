@@ -31,9 +31,8 @@ cv::Mat Mask(const cv::Mat& score) {
 }  // namespace
 
 double ColorDetector::ShapeScore(const Detection& d, double area, double hull_area) const {
-  const bool cut = d.cut[kLeft] || d.cut[kRight] || d.cut[kTop] || d.cut[kBottom];
   const double solid = std::min(1.0, area / std::max(hull_area, 1.0));
-  if (cut) return 0.6 * solid;
+  if (d.AnyCut()) return 0.6 * solid;
   const double aspect = d.box.width / d.box.height, fill = area / d.box.area();
   return solid * Bell(std::log(aspect / shape_.aspect), shape_.aspect_tolerance) *
          Bell(std::min(0.0, fill - shape_.fill), shape_.fill_tolerance);

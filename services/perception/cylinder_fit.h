@@ -39,7 +39,7 @@ struct FitInput {
   std::array<bool, 4> use_side = {true, true, true, true};  ///< by Side
   std::vector<TargetPoint> points;
   bool joined = false;     ///< a like colour went on beyond a side of it in the frame before
-  bool reappears = false;  ///< it was hidden in the frame before, and part of it may still be
+  bool reappears = false;  ///< all or part of it was hidden before, and part may still be
 };
 
 struct FitResult {

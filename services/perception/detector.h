@@ -34,6 +34,8 @@ struct Detection {
   bool part = false;                    ///< a piece of a blob that may well be one thing itself
   std::optional<Eigen::Vector3d> p_CT;  ///< centre, frame C, m, if the detector knows it
   Eigen::Matrix3d p_CT_covariance = Eigen::Matrix3d::Identity();  ///< frame C, m^2
+
+  bool AnyCut() const { return cut[kLeft] || cut[kRight] || cut[kTop] || cut[kBottom]; }
 };
 
 /// Finds things in one image that may be the target, best first.

@@ -5,6 +5,7 @@
 
 #include "services/perception/image_check.h"
 #include "services/perception/silhouette.h"
+#include "services/perception/target_points.h"
 
 namespace chase::perception {
 
@@ -16,6 +17,7 @@ constexpr int kStillJoined = 2;    // frames without it after which a like colou
 constexpr double kSureOdds = 8.0;  // and with which no other is tried
 constexpr double kRival = 6.0;     // less, of something else that makes a sighting contested
 constexpr size_t kMostTried = 4;   // detections a track and frame
+constexpr int kKnownHits = 10;     // sightings after which a track's range is trusted
 constexpr double kLargest = 1.3, kLargestPx = 4.0;  // of pieces together, times what is expected
 constexpr double kTimeJump = 1.0;                   // s back that count as a new recording
 
@@ -78,11 +80,18 @@ std::optional<Sighting> Finder::Try(const TargetTrack& track, const View& view,
   input.shape = track.shape;
   input.camera = view.camera;
   input.detection = &detection;
-  input.reappears = track.misses > 0;
+  input.reappears = track.misses > 0 || track.partial;
   input.joined = track.joined && track.misses <= kStillJoined;
   const auto fit =
       localiser_.Correct(input, Points(view, detection, track.state.velocity(), fresh_sweeps_only));
   if (!fit || fit->log_odds < kOdds) return std::nullopt;
+  // What is hardly known has its range from the size alone; a sweep that was used still tells.
+  if (fit->n_points == 0 && fresh_sweeps_only && track.hits < kKnownHits) {
+    FitInput placed = input;
+    placed.prior = fit->posterior;
+    if (SeenThrough(placed, Points(view, detection, track.state.velocity(), false)))
+      return std::nullopt;
+  }
   return Sighting{*fit, detection, fit->n_points};
 }
 

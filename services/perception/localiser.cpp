@@ -20,13 +20,22 @@ constexpr size_t kSurelyHit = 10;        // so often at least
 constexpr int kMostClusters = 2;         // that are tried
 constexpr double kMinVisible = 0.15;     // share of the expected box that a detection must cover
 constexpr double kMaxRangeError = 0.15;  // share of the range; a worse first fix is none
-constexpr double kHiddenPriorShare = 0.6;  // of the prior's gate where sides are left out
+constexpr double kLarger = 1.15, kLargerPx = 3.0;  // times the target's size, and px more
+constexpr double kHiddenPriorShare = 0.6;          // of the prior's gate where sides are left out
 
 bool Visible(const FitInput& input) {
   if (input.detection->p_CT) return true;
   const auto expected = ProjectCylinder(input.camera, input.prior.position(), input.shape.size[0],
                                         input.shape.size[1]);
   return !expected || input.detection->box.area() >= kMinVisible * expected->area();
+}
+
+/// True for a detection that the target cannot fill at this range.
+bool LargerThanTarget(const FitInput& input, double range) {
+  const double px = kLarger * input.camera.rig.focal_px / range;
+  const auto& box = input.detection->box;
+  return box.width > 2.0 * px * input.shape.size[0] + kLargerPx ||
+         box.height > px * input.shape.size[1] + kLargerPx;
 }
 
 }  // namespace
@@ -172,6 +181,24 @@ TargetGaussian Localiser::Guess(const Camera& camera, const Detection& detection
   return g;
 }
 
+/// Half of a target whose range the points tell; what goes on beyond it is a larger thing.
+std::optional<FitResult> Localiser::AcquirePartial(FitInput* input,
+                                                   const Clusters& clusters) const {
+  for (const auto& cluster : clusters) {
+    if (cluster.size() < kSurelyHit) continue;
+    const double range = MedianRange(cluster) + input->shape.size[0];
+    if (LargerThanTarget(*input, range)) continue;
+    input->prior = Guess(input->camera, *input->detection, range, 0.3);
+    input->points = PointsOnTarget(*input, cluster, 2.0 * config_.fit.lidar_gate);
+    if (input->points.size() < kSurelyHit) continue;
+    input->reappears = true;
+    const auto fit = JoinedReading(input);
+    input->reappears = false;
+    if (fit && !fit->joined && !fit->whole && fit->log_odds > 0.0) return fit;
+  }
+  return std::nullopt;
+}
+
 std::optional<FitResult> Localiser::Acquire(const TargetShape& shape, const Camera& camera,
                                             const Detection& detection,
                                             const Clusters& clusters) const {
@@ -197,10 +224,9 @@ std::optional<FitResult> Localiser::Acquire(const TargetShape& shape, const Came
     const auto fit = WholeReading(&input);
     if (good(fit)) return fit;
   }
+  if (const auto partial = AcquirePartial(&input, clusters)) return partial;
   // From the size alone: every side must be seen, since nothing tells what is hidden.
-  const auto& cut = detection.cut;
-  const bool whole = !cut[kLeft] && !cut[kRight] && !cut[kTop] && !cut[kBottom];
-  if (!detection.p_CT && !whole) return std::nullopt;
+  if (!detection.p_CT && detection.AnyCut()) return std::nullopt;
   const double range = detection.p_CT ? detection.p_CT->norm()
                                       : camera.rig.focal_px * 2.0 * shape.size[0] /
                                             std::max(1.0, detection.box.width);

@@ -33,6 +33,7 @@ class Localiser {
   std::optional<FitResult> WholeReading(FitInput* input) const;
   /// All hypotheses that agree with the prediction, weighed and joined into one Gaussian.
   std::optional<FitResult> JoinedReading(FitInput* input) const;
+  std::optional<FitResult> AcquirePartial(FitInput* input, const Clusters& clusters) const;
   static FitResult Joined(const std::vector<Hypothesis>& all);
   void Weigh(const FitInput& input, double log_prior, size_t readings, bool all,
              std::vector<Hypothesis>* out) const;

@@ -15,14 +15,16 @@ constexpr double kLeastWidthPx = 6.0;  // what is narrower may be a slit between
 constexpr int kDecoyHits = 3;  // sightings that what stands beside one that drives counts for
 constexpr double kReachMargin = 0.5;    // m
 constexpr double kReachGate = 11.3;     // squared distance from a hidden target's prediction, 3 dof
+constexpr double kExpectedGate = 4.6;   // likewise of what need not drive, 2 dof
 constexpr double kTimeJump = 1.0;       // s back that count as a new recording
 constexpr int kSureHits = 5;            // corrections after which the track is trusted
-constexpr int kPieceHits = 5;           // sightings of a piece of something larger,
-constexpr double kPieceWay = 0.15;      // and m that it has driven, before it is taken
+constexpr int kProvenHits = 20;         // before, it may have been another thing
+constexpr int kPieceHits = 5;           // sightings of a piece or a half before it is taken
 constexpr double kDecoySigma = 0.1;     // m, how well its place is known
 constexpr double kDrivenSigma = 0.1;    // m, how well that must be known
 constexpr double kStood = 0.2;          // m, within which a target stands
 constexpr double kStoodFor = 0.6;       // s, likewise
+constexpr double kFar = 5.0;            // m, from where fewer pixels tell what stands there
 constexpr double kTrusted = 0.3;        // s that a track not seen is preferred to anything new
 constexpr double kStandingSpeed = 0.2;  // m/s
 
@@ -52,11 +54,11 @@ bool Perceiver::IsRatherDecoy(const Sighting& s, const View& view) const {
 
 bool Perceiver::Plausible(const Eigen::Vector3d& p_WT, double t) const {
   if (decoys_.At(p_WT)) return false;
-  if (!track_) return true;
+  if (!track_ || doubtful_ || track_->hits < kProvenHits) return true;
   const Eigen::Vector3d d = p_WT - track_->state.position();
-  if (std::abs(d.z()) > kGateSigmas * config_.motion.ground_sigma) return false;
   if (state_ != TargetState::kLost)
-    return d.dot(track_->state.covariance.topLeftCorner<3, 3>().ldlt().solve(d)) < kReachGate;
+    return std::abs(d.z()) < kGateSigmas * config_.motion.ground_sigma &&
+           d.dot(track_->state.covariance.topLeftCorner<3, 3>().ldlt().solve(d)) < kReachGate;
   return d.norm() < kReachMargin + config_.motion.max_speed * (t - track_->seen);
 }
 
@@ -70,8 +72,10 @@ bool Perceiver::Vague() const {
 bool Perceiver::Sure(const Sighting& s) const {
   if (track_->misses == 0) return true;
   if (s.contested) return false;
-  const double off = (s.fit.posterior.position() - track_->state.position()).head<2>().norm();
-  return !Vague() || (s.fit.whole && off < config_.state.decoy_radius);
+  const Eigen::Vector2d off = (s.fit.posterior.position() - track_->state.position()).head<2>();
+  if (Vague()) return s.fit.whole && off.norm() < config_.state.decoy_radius;
+  const Eigen::Matrix2d P = track_->state.covariance.topLeftCorner<2, 2>();
+  return off.norm() < config_.state.decoy_radius || off.dot(P.ldlt().solve(off)) < kExpectedGate;
 }
 
 void Perceiver::Follow(View* view) {
@@ -83,19 +87,19 @@ void Perceiver::Follow(View* view) {
   if (!found || !Sure(*found)) {
     view->taken = taken;
     ++track_->misses;
+    unsure_ = found;
     return;
   }
   sighting_ = found;
   track_->Correct(found->fit);
-  finder_.MarkSweepsUsed();
-  candidates_.clear();
+  if (!doubtful_) candidates_.clear();
 }
 
 void Perceiver::FollowCandidates(View* view) {
   for (auto& c : candidates_) {
     const auto again =
         finder_.Find(c.track, view, [&](const Sighting& s) { return s.detection.part && !c.part; });
-    if (again && again->fit.whole)
+    if (again && (again->fit.whole || c.track.partial))
       c.Correct(*again);
     else
       ++c.track.misses;
@@ -122,6 +126,15 @@ bool Perceiver::Followed(const Sighting& s) const {
   });
 }
 
+/// What may be the hidden target, half of it seen, is followed on its own to see whether it drives.
+void Perceiver::AddPartial(const View& view) {
+  if (!unsure_ || unsure_->fit.whole || unsure_->n_points == 0) return;
+  if (Followed(*unsure_) || candidates_.size() >= kMaxCandidates) return;
+  if (!Plausible(unsure_->fit.posterior.position(), view.t)) return;
+  candidates_.push_back(NewCandidate(*unsure_, view));
+  ForgetVelocity(config_.motion, &candidates_.back());
+}
+
 void Perceiver::AddCandidates(View* view) {
   std::vector<size_t> order;  // near before far, the middle before the border
   for (size_t i = 0; i < view->detections.size(); ++i)
@@ -136,21 +149,16 @@ void Perceiver::AddCandidates(View* view) {
     if (!found || !Plausible(found->fit.posterior.position(), view->t)) continue;
     // A piece of something larger is a thing of its own where LiDAR points tell its range.
     if (found->detection.part && (found->n_points == 0 || Followed(*found))) continue;
-    const TargetTrack track{found->fit.posterior, found->fit.shape, view->t, view->t, 1, 0,
-                            found->fit.joined};
-    const Eigen::Vector3d sight = track.state.position() - view->camera.p_WC;
-    candidates_.push_back({track, found->fit.posterior, view->t, *found,
-                           sight.norm() / config_.rig.focal_px, found->n_points > 0,
-                           sight.head<2>() / found->detection.box.height, found->detection.part,
-                           view->t});
+    if (!found->fit.whole && Followed(*found)) continue;
+    candidates_.push_back(NewCandidate(*found, *view));
   }
 }
 
 void Perceiver::Seek(View* view) {
-  if (sighting_) return;
+  if (sighting_ && !doubtful_) return;
   FollowCandidates(view);
+  AddPartial(*view);
   AddCandidates(view);
-  if (!candidates_.empty()) finder_.MarkSweepsUsed();
   Promote(*view);
 }
 
@@ -159,17 +167,18 @@ void Perceiver::Seek(View* view) {
 /// target that drove when it was last seen must have had the time to stop.
 bool Perceiver::Ready(const Candidate& c, double t) const {
   if (c.track.misses > 0 || c.track.hits < config_.state.confirm_frames) return false;
-  if (track_ && !contested_ && !Vague() && t - track_->seen < kTrusted) return false;
-  if (c.part) {
-    const double way = (c.track.state.position() - c.first.position()).head<2>().norm();
-    return c.Drives() && c.track.hits >= kPieceHits && way > kPieceWay;
-  }
+  const bool trusted = !doubtful_ && !contested_ && !Vague();
+  if (track_ && trusted && t - track_->seen < kTrusted) return false;
+  if (c.part || c.track.partial) return c.SurelyDrives() && c.track.hits >= kPieceHits;
   if (c.Drives()) return true;
+  if (sighting_) return false;
   const bool stood_here = track_ && last_v_.norm() < kStandingSpeed &&
                           (c.track.state.position() - last_p_).norm() < config_.state.decoy_radius;
-  const bool may_stand = !track_ || t - track_->seen > config_.motion.hidden_time;
-  const bool near = c.px * config_.rig.focal_px < config_.state.standing_range;
-  return stood_here || (may_stand && near && t - c.since >= config_.state.standing_after);
+  const bool may_stand =
+      !c.last.detection.AnyCut() && (!track_ || t - track_->seen > config_.motion.hidden_time);
+  const double range = c.px * config_.rig.focal_px;
+  const double wait = config_.state.standing_after * std::max(1.0, std::pow(range / kFar, 2));
+  return stood_here || (may_stand && range < config_.state.standing_range && t - c.since >= wait);
 }
 
 void Perceiver::Promote(const View& view) {
@@ -185,12 +194,15 @@ void Perceiver::Promote(const View& view) {
     if (&c != best && chosen.Drives() && !c.Drives() && !c.part &&
         c.track.hits >= config_.state.confirm_frames)
       decoys_.Note(c.track.state.position(), view.t, kDecoyHits);
+  if (sighting_) decoys_.Note(track_->state.position(), view.t, kDecoyHits);
   Start(chosen.track, chosen.last);
+  doubtful_ = !chosen.Drives();
   candidates_.clear();
 }
 
 void Perceiver::Start(const TargetTrack& track, const Sighting& sighting) {
   track_ = track;
+  doubtful_ = false;
   stood_ = track.state.position();
   stood_since_ = track.t;
   sighting_ = sighting;
@@ -211,6 +223,7 @@ void Perceiver::Judge(double t) {
   last_v_ = track_->state.velocity();
   last_p_ = track_->state.position();
   if ((last_p_ - stood_).norm() < kStood) return;
+  doubtful_ = false;
   stood_ = last_p_;
   stood_since_ = t;
 }
@@ -218,7 +231,7 @@ void Perceiver::Judge(double t) {
 /// While the target is surely in view, what else looks just like it is not the target. One of them
 /// a frame is placed.
 void Perceiver::Remember(const View& view) {
-  if (!track_ || track_->seen < view.t || track_->hits < kSureHits) return;
+  if (!track_ || doubtful_ || track_->seen < view.t || track_->hits < kSureHits) return;
   decoys_.Forget(view.t, track_->state.position());
   const size_t n = view.detections.size();
   for (size_t k = 0; k < n; ++k) {
@@ -226,7 +239,7 @@ void Perceiver::Remember(const View& view) {
     if (view.taken[i] || view.detections[i].part || !MayBeNew(view.detections[i])) continue;
     turn_ = i + 1;
     const auto found = finder_.Acquire(view, view.detections[i]);
-    if (!found) return;
+    if (!found || !found->fit.whole) return;
     const Eigen::Vector3d p = found->fit.posterior.position();
     if ((p - track_->state.position()).norm() < config_.state.decoy_radius) return;
     Decoy* decoy = decoys_.Note(p, view.t);
@@ -284,11 +297,13 @@ TargetEstimate Perceiver::See(const Frame& frame) {
   std::string note;
   auto view = finder_.Look(frame, &note);
   sighting_.reset();
+  unsure_.reset();
   if (track_ && state_ != TargetState::kLost) track_->Predict(frame.t, config_.motion);
   for (auto& c : candidates_) c.track.Predict(frame.t, config_.motion);
   if (view) {
     if (state_ != TargetState::kLost) Follow(&*view);
     Seek(&*view);
+    if (sighting_ || !candidates_.empty()) finder_.MarkSweepsUsed();
     Remember(*view);
   } else {
     for (auto& c : candidates_) ++c.track.misses;

@@ -43,6 +43,7 @@ class Perceiver {
   void Follow(View* view);
   void Seek(View* view);
   void FollowCandidates(View* view);
+  void AddPartial(const View& view);
   void AddCandidates(View* view);
   void DropMissed();
   void Promote(const View& view);
@@ -67,6 +68,8 @@ class Perceiver {
   std::optional<TargetTrack> track_;
   std::vector<Candidate> candidates_;
   std::optional<Sighting> sighting_;  ///< of the last frame
+  bool doubtful_ = false;             ///< it stood when it was taken, and has stood since
+  std::optional<Sighting> unsure_;    ///< in the last frame: may be the target, as far as it shows
   bool contested_ = false;            ///< of several things alike in the last frame
   Decoys decoys_;
   size_t turn_ = 0;                                   ///< detection that is looked at next

@@ -17,6 +17,7 @@ constexpr int kLeastDepth = 4;          // pixels across, fewer are not placed b
 constexpr int kCutReach = 3;            // px from a window's border within which it has cut
 constexpr size_t kMostLines = 6;        // that a blob is split along
 constexpr int kLeastPiece = 5;          // px, width of a piece
+constexpr double kSteep = 0.33;         // of a blob's extent that no leaning side jumps at once
 constexpr int kBorder = 1;              // px; nearer to the image's border counts as cut
 
 using Color = Eigen::Vector3d;
@@ -140,43 +141,67 @@ void LeaveOutCut(const Detection& whole, const cv::Rect& window, Detection* piec
   }
 }
 
-/// Columns at which the blob's upper or lower end jumps: there one thing ends before another. Of
-/// those closer together than a piece may be wide, as where a side leans or threads join two
+/// A column at which the blob's upper or lower end jumps: there one thing ends before another.
+struct Jump {
+  int column, height;
+};
+
+/// Of jumps closer together than a piece may be wide, as where a side leans or threads join two
 /// things, the highest.
-std::vector<int> Jumps(const cv::Mat& mask) {
+std::vector<Jump> Jumps(const cv::Mat& mask) {
   const int least = std::max(3, mask.rows / 12);
   std::vector<std::pair<int, int>> ends;
   for (int x = 0; x < mask.cols; ++x) ends.push_back(Extent(mask.col(x)));
-  std::vector<std::pair<int, int>> jumps;  // column and height
+  std::vector<Jump> jumps;
   for (int x = kLeastPiece; x <= mask.cols - kLeastPiece; ++x) {
     const auto &a = ends[static_cast<size_t>(x - 1)], &b = ends[static_cast<size_t>(x)];
-    const int jump = std::max(std::abs(a.first - b.first), std::abs(a.second - b.second));
-    if (jump < least) continue;
-    if (jumps.empty() || x - jumps.back().first >= kLeastPiece)
-      jumps.emplace_back(x, jump);
-    else if (jump > jumps.back().second)
-      jumps.back() = {x, jump};
+    const int height = std::max(std::abs(a.first - b.first), std::abs(a.second - b.second));
+    if (height < least) continue;
+    if (jumps.empty() || x - jumps.back().column >= kLeastPiece)
+      jumps.push_back({x, height});
+    else if (height > jumps.back().height)
+      jumps.back() = {x, height};
   }
-  std::vector<int> columns;
-  for (const auto& jump : jumps) columns.push_back(jump.first);
-  return columns;
+  return jumps;
 }
 
-/// Adds the pieces between any two of the lines across a blob.
-void AddBetween(const cv::Mat& bgr, const Detection& detection, std::vector<int> lines,
+/// The part of a blob inside a window without slivers along it, as the leaning side of what was cut
+/// off leaves them; nothing when none is left.
+std::optional<Detection> CropWithoutSlivers(const cv::Mat& bgr, const Detection& detection,
+                                            const cv::Rect& window, bool upright) {
+  const cv::Rect view = detection.mask_box & window;
+  if (view.empty()) return std::nullopt;
+  const cv::Mat line = cv::Mat::ones(upright ? 1 : kLeastPiece, upright ? kLeastPiece : 1, CV_8U);
+  Detection cleared = detection;
+  cleared.mask = detection.mask.clone();
+  cv::Mat seen = cleared.mask(view - detection.mask_box.tl());
+  cv::Mat framed;  // what lies beyond the window is none of the piece
+  cv::copyMakeBorder(seen, framed, kLeastPiece, kLeastPiece, kLeastPiece, kLeastPiece,
+                     cv::BORDER_CONSTANT | cv::BORDER_ISOLATED, cv::Scalar(0));
+  cv::morphologyEx(framed, framed, cv::MORPH_OPEN, line);
+  framed(cv::Rect(kLeastPiece, kLeastPiece, seen.cols, seen.rows)).copyTo(seen);
+  return CropTo(bgr, cleared, window);
+}
+
+/// Adds the pieces between any two of the lines across a blob. The side of a thing may lean over a
+/// few columns, but jumps as high as `steep` are its end.
+void AddBetween(const cv::Mat& bgr, const Detection& detection, std::vector<Jump> lines,
                 bool upright, std::vector<Detection>* pieces) {
   const cv::Rect& box = detection.mask_box;
-  lines.insert(lines.begin(), 0);
-  lines.push_back(upright ? box.width : box.height);
+  const int steep = static_cast<int>(kSteep * (upright ? box.height : box.width));
+  lines.insert(lines.begin(), {0, steep});
+  lines.push_back({upright ? box.width : box.height, steep});
   const size_t n = lines.size();
   if (n < 3 || n > kMostLines) return;
   for (size_t a = 0; a + 1 < n; ++a)
     for (size_t b = a + 1; b < n; ++b) {
-      const int from = lines[a], size = lines[b] - lines[a];
+      const int from = lines[a].column, size = lines[b].column - from;
       if (b - a == n - 1 || size < kLeastPiece) continue;
       const cv::Rect window = upright ? cv::Rect(box.x + from, box.y, size, box.height)
                                       : cv::Rect(box.x, box.y + from, box.width, size);
-      auto piece = CropTo(bgr, detection, window);
+      auto piece = std::min(lines[a].height, lines[b].height) < steep
+                       ? CropTo(bgr, detection, window)
+                       : CropWithoutSlivers(bgr, detection, window, upright);
       if (!piece) continue;
       piece->parted = piece->goes_on;
       pieces->push_back(std::move(*piece));

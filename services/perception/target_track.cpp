@@ -36,6 +36,7 @@ void TargetTrack::Correct(const FitResult& fit) {
   shape = fit.shape;
   seen = t;
   joined = fit.joined;
+  partial = partial && !fit.whole;
   misses = 0;
   ++hits;
 }

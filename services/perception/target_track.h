@@ -11,7 +11,8 @@ struct TargetTrack {
   double t = 0.0;     ///< s
   double seen = 0.0;  ///< time of the last correction, s
   int hits = 0, misses = 0;
-  bool joined = false;  ///< a like colour went on beyond a side of it when it was last seen
+  bool joined = false;   ///< a like colour went on beyond a side of it when it was last seen
+  bool partial = false;  ///< something hid part of it whenever it was seen
 
   /// Constant velocity with white acceleration up to time `to`; does nothing backwards. While it is
   /// not seen, the velocity fades: it may have stopped or turned behind what hides it.

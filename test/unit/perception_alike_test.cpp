@@ -102,6 +102,46 @@ TEST(PerceptionCandidate, ASpeedByLidarPointsIsAWay) {
   EXPECT_FALSE(c.Drives()) << "not known well";
 }
 
+TEST(PerceptionCandidate, PiecesOfOneThingDoNotGoTheWayThatTheyTell) {
+  const Vector3d p(3.0, 0.0, 0.55);
+  Candidate c = CandidateAt(p, p + Vector3d(0.0, 0.24, 0.0), 0.01);
+  c.track.t = 0.3;
+  c.track.state.mean[4] = 0.8;
+  EXPECT_TRUE(c.Steady());
+  c.track.state.mean[4] = 2.5;
+  EXPECT_FALSE(c.Steady());
+  c.track.state.mean[4] = -0.4;
+  EXPECT_FALSE(c.Steady());
+}
+
+TEST(PerceptionCandidate, APieceStaysOneUntilAllOfItIsSeen) {
+  const Vector3d p(3.0, 0.0, 0.55);
+  Candidate c = CandidateAt(p, p, 0.01);
+  c.part = true;
+  Sighting s;
+  s.fit.posterior = c.track.state;
+  s.detection.cut[kLeft] = true;
+  c.Correct(s);
+  EXPECT_TRUE(c.part) << "the image's border may hide what it belongs to";
+  s.detection.cut[kLeft] = false;
+  c.Correct(s);
+  EXPECT_FALSE(c.part);
+}
+
+TEST(PerceptionCandidate, WhatComesOutFromBehindSomethingMustDriveFromThere) {
+  const Vector3d p(3.0, 0.0, 0.55), q = p + Vector3d(0.0, 0.08, 0.0);
+  Candidate c = CandidateAt(p, p, 0.01);
+  c.track.partial = true;
+  Sighting s;
+  s.fit.posterior = c.track.state;
+  s.fit.posterior.mean.head<3>() = q;
+  s.fit.whole = true;
+  c.Correct(s);
+  EXPECT_FALSE(c.track.partial);
+  EXPECT_FALSE(c.Drives()) << "the edge of what hid it may have gone, not the thing";
+  EXPECT_LT((c.first.position() - q).norm(), 1e-9);
+}
+
 TEST(PerceptionAlike, WhatStandsIsTakenAfterAWhile) {
   FlyOptions options;
   options.duration = 1.5;
@@ -145,6 +185,56 @@ TEST(PerceptionAlike, OfTwoAlikeTheOneThatDrivesIsTheTarget) {
     EXPECT_LT(Error(o), 0.2) << o.t;
   }
   EXPECT_GE(tracked, 5);
+}
+
+/// The target comes from behind a wall when its twin, which stands beside it, has been taken.
+TEST(PerceptionAlike, WhatStoodWhenItWasTakenGivesWayToWhatDrives) {
+  World w = StillWorld(3.5);
+  w.things.push_back({Thing::Kind::kBox, {2.2, -0.8, 1.0}, {0.05, 0.6, 1.0}, {0.5, 0.6, 0.7}});
+  w.things.push_back(Twin(3.2, 0.9));
+  w.target = [](double t) { return Vector3d(3.5, -1.3 + 0.8 * std::max(0.0, t - 1.5), 0.55); };
+  FlyOptions options;
+  options.duration = 3.6;
+  bool twin = false;
+  double back_since = -1.0, found = -1.0;
+  for (const auto& o : Fly(w, {}, options)) {
+    twin = twin || (o.visible_share == 0.0 && Detected(o) && Error(o) > 1.0);
+    if (back_since < 0.0 && o.visible_share >= 0.5) back_since = o.t;
+    if (found < 0.0 && back_since > 0.0 && Detected(o) && Error(o) < 0.2) found = o.t;
+    if (found > 0.0 && o.visible_share >= 0.5) {
+      EXPECT_LT(Error(o), 0.2) << o.t;
+    }
+  }
+  EXPECT_TRUE(twin) << "else this shows nothing";
+  ASSERT_GT(found, 0.0);
+  EXPECT_LE(found, back_since + 0.35);
+}
+
+/// After 2.5 s behind a wall the target comes out so slowly that it is half hidden for long.
+TEST(PerceptionAlike, HalfOfATargetThatDrivesIsEnoughToFindItAgain) {
+  World w = StillWorld(3.0);
+  w.things.push_back({Thing::Kind::kBox, {2.2, 0.0, 1.0}, {0.05, 0.55, 1.0}, {0.5, 0.6, 0.7}});
+  w.target = [](double t) {
+    const double driven = 0.8 * std::min(t, 2.0) + 0.25 * std::max(0.0, t - 2.0);
+    return Vector3d(3.0, -1.3 + driven, 0.55);
+  };
+  FlyOptions options;
+  options.duration = 6.0;
+  double half = -1.0, whole = -1.0, found = -1.0;
+  bool hidden = false;
+  for (const auto& o : Fly(w, {}, options)) {
+    hidden = hidden || o.visible_share == 0.0;
+    if (!hidden) continue;
+    if (half < 0.0 && o.visible_share >= 0.5) half = o.t;
+    if (whole < 0.0 && o.visible_share > 0.98) whole = o.t;
+    if (found < 0.0 && Detected(o)) found = o.t;
+    if (Detected(o)) {
+      EXPECT_LT(Error(o), 0.2) << o.t;
+    }
+  }
+  ASSERT_GT(whole, half + 0.5) << "else this shows nothing";
+  ASSERT_GT(found, 0.0);
+  EXPECT_LE(found, half + 0.4) << "it has driven 0.15 m by then";
 }
 
 /// A wall hides the target, which stops behind it for 3 s and goes on; a twin stands in view.

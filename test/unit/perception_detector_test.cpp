@@ -121,6 +121,21 @@ TEST(PerceptionColor, WhatShowsAboveTheTargetIsPartedFromIt) {
   EXPECT_FALSE(piece->cut[kLeft] || piece->cut[kBottom]);
 }
 
+TEST(PerceptionSilhouette, APieceHasNoSliverOfALeaningThingBesideIt) {
+  cv::Mat bgr(240, 200, CV_8UC3, cv::Scalar(90, 90, 90));
+  const std::vector<cv::Point> pillar = {{20, 30}, {93, 30}, {89, 230}, {20, 230}};
+  cv::fillPoly(bgr, std::vector<std::vector<cv::Point>>{pillar}, cv::Scalar(0, 115, 255));
+  cv::rectangle(bgr, cv::Rect(80, 90, 28, 45), cv::Scalar(0, 115, 255), cv::FILLED);
+  Detection joined;
+  joined.mask_box = {20, 30, 88, 201};
+  cv::inRange(bgr(joined.mask_box), cv::Scalar(0, 115, 255), cv::Scalar(0, 115, 255), joined.mask);
+  bool found = false;
+  for (const auto& piece : Split(bgr, joined))
+    found = found || (piece.mask_box.y == 90 && piece.mask_box.height == 45 &&
+                      piece.mask_box.br().x == 108 && piece.cut[kLeft]);
+  EXPECT_TRUE(found);
+}
+
 TEST(PerceptionSilhouette, APartedSideStaysOneInASmallerPiece) {
   cv::Mat image = Grey();
   cv::rectangle(image, {100, 60}, {140, 130}, kOrangeBgr, cv::FILLED);
