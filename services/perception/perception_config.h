@@ -174,7 +174,8 @@ struct StateConfig {
     v("lost_sigma", lost_sigma, "horizontal standard deviation above which the target is lost, m");
     v("sure_sigma", sure_sigma,
       "horizontal standard deviation of a hidden target above which what is found must drive, m");
-    v("standing_after", standing_after, "what stands is taken for the target after so long, s");
+    v("standing_after", standing_after,
+      "what stands is taken for the target after so long, beyond 5 m later, s");
     v("standing_range", standing_range, "and only nearer than this, m");
     v("decoy_radius", decoy_radius, "look-alikes seen beside the target are refused here, m");
     v("decoy_memory", decoy_memory, "for so long, s");

@@ -123,12 +123,13 @@ TEST(PerceptionColor, WhatShowsAboveTheTargetIsPartedFromIt) {
 
 TEST(PerceptionSilhouette, APieceHasNoSliverOfALeaningThingBesideIt) {
   cv::Mat bgr(240, 200, CV_8UC3, cv::Scalar(90, 90, 90));
-  const std::vector<cv::Point> pillar = {{20, 30}, {93, 30}, {89, 230}, {20, 230}};
-  cv::fillPoly(bgr, std::vector<std::vector<cv::Point>>{pillar}, cv::Scalar(0, 115, 255));
-  cv::rectangle(bgr, cv::Rect(80, 90, 28, 45), cv::Scalar(0, 115, 255), cv::FILLED);
+  const cv::Scalar orange(0, 115, 255);
+  cv::rectangle(bgr, cv::Rect(20, 30, 69, 201), orange, cv::FILLED);
+  cv::rectangle(bgr, cv::Rect(89, 135, 3, 26), orange, cv::FILLED);  // leans out below the target
+  cv::rectangle(bgr, cv::Rect(80, 90, 28, 45), orange, cv::FILLED);
   Detection joined;
   joined.mask_box = {20, 30, 88, 201};
-  cv::inRange(bgr(joined.mask_box), cv::Scalar(0, 115, 255), cv::Scalar(0, 115, 255), joined.mask);
+  cv::inRange(bgr(joined.mask_box), orange, orange, joined.mask);
   bool found = false;
   for (const auto& piece : Split(bgr, joined))
     found = found || (piece.mask_box.y == 90 && piece.mask_box.height == 45 &&
