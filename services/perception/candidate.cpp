@@ -26,7 +26,8 @@ void Candidate::Correct(const Sighting& sighting) {
   const bool was_partial = track.partial;
   track.Correct(sighting.fit);
   last = sighting;
-  part = part && (sighting.detection.part || sighting.detection.AnyCut());
+  const Detection& d = sighting.detection;
+  part = part && (d.part || d.edged || d.AnyCut());
   const auto spread = [](const TargetGaussian& g) {
     return g.covariance.topLeftCorner<2, 2>().trace();
   };
@@ -49,7 +50,7 @@ Candidate NewCandidate(const Sighting& sighting, const View& view) {
   c.px = sight.norm() / view.camera.rig.focal_px;
   c.ranged = sighting.n_points > 0;
   c.range_px = sight.head<2>() / sighting.detection.box.height;
-  c.part = sighting.detection.part;
+  c.part = sighting.detection.part || sighting.detection.edged;
   return c;
 }
 

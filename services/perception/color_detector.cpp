@@ -4,6 +4,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "services/perception/inner_edges.h"
 #include "services/perception/silhouette.h"
 
 namespace chase::perception {
@@ -14,7 +15,7 @@ constexpr double kMaskScore = 127.0;  // half of full score: the blob's pixels
 constexpr double kOneThing = 0.85;    // score of a blob that is surely not several
 constexpr double kWellShaped = 0.35;  // of a piece of one that may be
 constexpr int kSplitArea = 60;        // px^2 of a blob that may be several
-constexpr size_t kMostPieces = 6;
+constexpr size_t kMostPieces = 10;
 
 double Bell(double x, double sigma) { return std::exp(-0.5 * (x / sigma) * (x / sigma)); }
 
@@ -69,7 +70,9 @@ void ColorDetector::AddPieces(const cv::Mat& bgr, const cv::Mat& score,
   std::vector<Detection> pieces;
   for (const auto& whole : *found) {
     if (whole.score > kOneThing || cv::countNonZero(whole.mask) < kSplitArea) continue;
-    for (auto& piece : Split(bgr, whole)) {
+    auto parts = Split(bgr, whole);
+    for (auto& piece : SplitAtEdges(bgr, whole)) parts.push_back(std::move(piece));
+    for (auto& piece : parts) {
       Rate(score, &piece);
       piece.part = whole.score > kWellShaped;
       if (piece.score > kWellShaped) pieces.push_back(std::move(piece));

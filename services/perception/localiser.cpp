@@ -15,6 +15,7 @@ constexpr double kSharpTurn = 0.02;      // how often the target does what the m
 constexpr double kClear = 3.0;           // squared distance from the prediction that needs no other
 constexpr double kNegligible = 7.0;      // logarithm of the odds of a hypothesis that is left out
 constexpr int kSidesOfNew = 3;           // of what nothing is known of yet
+constexpr double kSizedRange = 0.24;     // m, standard deviation of a range from one size alone
 constexpr int kLeastSides = 2;           // that must be seen; one where the lidar hit it
 constexpr size_t kSurelyHit = 10;        // so often at least
 constexpr int kMostClusters = 2;         // that are tried
@@ -199,6 +200,30 @@ std::optional<FitResult> Localiser::AcquirePartial(FitInput* input,
   return std::nullopt;
 }
 
+/// Likewise where three sides are seen and two of them tell the range: what hides the fourth, or
+/// stands right above or below, must not keep it from being followed.
+std::optional<FitResult> Localiser::AcquirePartialBySize(FitInput* input) const {
+  const auto& d = *input->detection;
+  const auto seen = [&](Side side) { return !d.silhouette.samples[side].empty(); };
+  const auto& size = input->shape.size;
+  const double focal = input->camera.rig.focal_px;
+  std::vector<double> ranges;
+  if (seen(kTop) && seen(kBottom)) ranges.push_back(focal * size[1] / d.box.height);
+  if (d.edged && seen(kLeft) && seen(kRight)) ranges.push_back(focal * 2.0 * size[0] / d.box.width);
+  for (const double range : ranges) {
+    input->prior = Guess(input->camera, d, range, kSizedRange);
+    input->points.clear();
+    input->reappears = true;
+    const auto fit = JoinedReading(input);
+    input->reappears = false;
+    if (!fit || fit->whole || fit->log_odds <= 0.0) continue;
+    if (std::count(fit->used.begin(), fit->used.end(), true) < kSidesOfNew) continue;
+    if (fit->joined && !(d.edged && fit->used[kLeft] && fit->used[kRight])) continue;
+    return fit;
+  }
+  return std::nullopt;
+}
+
 std::optional<FitResult> Localiser::Acquire(const TargetShape& shape, const Camera& camera,
                                             const Detection& detection,
                                             const Clusters& clusters) const {
@@ -224,19 +249,28 @@ std::optional<FitResult> Localiser::Acquire(const TargetShape& shape, const Came
     const auto fit = WholeReading(&input);
     if (good(fit)) return fit;
   }
-  if (const auto partial = AcquirePartial(&input, clusters)) return partial;
+  if (const auto hit = AcquirePartial(&input, clusters)) return hit;
+  const auto not_through = [&](const std::optional<FitResult>& fit) {
+    if (!fit) return fit;
+    input.prior = fit->posterior;
+    return SeenThrough(input, clusters) ? std::nullopt : fit;
+  };
   // From the size alone: every side must be seen, since nothing tells what is hidden.
-  if (!detection.p_CT && detection.AnyCut()) return std::nullopt;
+  const auto partial = [&]() -> std::optional<FitResult> {
+    if (detection.p_CT) return std::nullopt;
+    const auto fit = not_through(AcquirePartialBySize(&input));
+    if (fit && HitElsewhere(input, clusters, config_.fit.lidar_gate)) return std::nullopt;
+    return fit;
+  };
+  if (!detection.p_CT && detection.AnyCut()) return partial();
   const double range = detection.p_CT ? detection.p_CT->norm()
                                       : camera.rig.focal_px * 2.0 * shape.size[0] /
                                             std::max(1.0, detection.box.width);
   input.prior = Guess(camera, detection, range, 0.4 * range);
   input.points.clear();
   const auto fit = WholeReading(&input);
-  if (!good(fit)) return std::nullopt;
-  input.prior = fit->posterior;
-  if (SeenThrough(input, clusters)) return std::nullopt;
-  return fit;
+  if (good(fit)) return not_through(fit);
+  return partial();
 }
 
 }  // namespace chase::perception

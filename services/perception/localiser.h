@@ -34,6 +34,7 @@ class Localiser {
   /// All hypotheses that agree with the prediction, weighed and joined into one Gaussian.
   std::optional<FitResult> JoinedReading(FitInput* input) const;
   std::optional<FitResult> AcquirePartial(FitInput* input, const Clusters& clusters) const;
+  std::optional<FitResult> AcquirePartialBySize(FitInput* input) const;
   static FitResult Joined(const std::vector<Hypothesis>& all);
   void Weigh(const FitInput& input, double log_prior, size_t readings, bool all,
              std::vector<Hypothesis>* out) const;

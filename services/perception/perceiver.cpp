@@ -97,9 +97,10 @@ void Perceiver::Follow(View* view) {
 
 void Perceiver::FollowCandidates(View* view) {
   for (auto& c : candidates_) {
-    const auto again =
-        finder_.Find(c.track, view, [&](const Sighting& s) { return s.detection.part && !c.part; });
-    if (again && (again->fit.whole || c.track.partial))
+    const auto again = finder_.Find(c.track, view, [&](const Sighting& s) {
+      return (s.detection.part || s.detection.edged) && !c.part;
+    });
+    if (again && (again->fit.whole || c.track.partial || again->detection.edged))
       c.Correct(*again);
     else
       ++c.track.misses;
@@ -147,8 +148,10 @@ void Perceiver::AddCandidates(View* view) {
     if (candidates_.size() >= kMaxCandidates) return;
     const auto found = finder_.Acquire(*view, view->detections[i]);
     if (!found || !Plausible(found->fit.posterior.position(), view->t)) continue;
-    // A piece of something larger is a thing of its own where LiDAR points tell its range.
-    if (found->detection.part && (found->n_points == 0 || Followed(*found))) continue;
+    // A piece of something larger is a thing of its own where LiDAR points tell its range, or an
+    // edge parts it.
+    const bool ranged = found->n_points > 0 || found->detection.edged;
+    if (found->detection.part && (!ranged || Followed(*found))) continue;
     if (!found->fit.whole && Followed(*found)) continue;
     candidates_.push_back(NewCandidate(*found, *view));
   }
@@ -169,7 +172,8 @@ bool Perceiver::Ready(const Candidate& c, double t) const {
   if (c.track.misses > 0 || c.track.hits < config_.state.confirm_frames) return false;
   const bool trusted = !doubtful_ && !contested_ && !Vague();
   if (track_ && trusted && t - track_->seen < kTrusted) return false;
-  if (c.part || c.track.partial) return c.SurelyDrives() && c.track.hits >= kPieceHits;
+  if (c.part || c.track.partial || c.last.detection.AnyCut())
+    return c.SurelyDrives() && c.track.hits >= kPieceHits;
   if (c.Drives()) return true;
   if (sighting_) return false;
   const bool stood_here = track_ && last_v_.norm() < kStandingSpeed &&

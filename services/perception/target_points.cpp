@@ -10,6 +10,7 @@ namespace {
 constexpr size_t kMinPoints = 3;    // of a cluster that gives a range
 constexpr size_t kMostPoints = 40;  // in a fit
 constexpr int kManyPoints = 5;      // that went through it: the target is not there
+constexpr double kManyHits = 10.0;  // that hit the detection elsewhere: it is something else
 constexpr double kCore = 0.6;       // share of the cylinder that such a ray goes through
 constexpr double kBehind = 0.25;    // m behind the target where such a ray ends at least
 
@@ -58,6 +59,13 @@ bool SeenThrough(const FitInput& input, const Clusters& clusters) {
   for (const auto& cluster : clusters)
     for (const auto& p : cluster) count += SawThrough(p, input);
   return count >= kManyPoints;
+}
+
+bool HitElsewhere(const FitInput& input, const Clusters& clusters, double gate) {
+  if (CountPoints(clusters) < kManyHits) return false;
+  return std::all_of(clusters.begin(), clusters.end(), [&](const auto& cluster) {
+    return PointsOnTarget(input, cluster, gate).empty();
+  });
 }
 
 double CountPoints(const Clusters& clusters) {

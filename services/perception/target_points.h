@@ -21,6 +21,9 @@ std::vector<TargetPoint> PointsOnTarget(const FitInput& input,
 bool SeenThrough(const FitInput& input, const Clusters& clusters);
 
 /// Points in all clusters.
+/// True when many points hit the detection, and none of them the target as predicted.
+bool HitElsewhere(const FitInput& input, const Clusters& clusters, double gate);
+
 double CountPoints(const Clusters& clusters);
 
 /// From the camera [m]; the cluster must hold enough points to give a range.
