@@ -62,7 +62,9 @@ struct FitResult {
 
 /// The most likely position and velocity of an upright cylinder: silhouette, LiDAR points and
 /// prediction weighed together, with the covariance of that estimate. With `points` at times of
-/// their own it is one step of an iterated extended Kalman filter.
-FitResult FitCylinder(const FitInput& input, const FitConfig& config);
+/// their own it is one step of an iterated extended Kalman filter. Starts at `start`, or at the
+/// prediction.
+FitResult FitCylinder(const FitInput& input, const FitConfig& config,
+                      const FitResult* start = nullptr);
 
 }  // namespace chase::perception

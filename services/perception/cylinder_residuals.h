@@ -1,14 +1,15 @@
 #pragma once
 
-#include <ceres/jet.h>
-
 #include <Eigen/Core>
-
-#include "services/perception/cylinder_fit.h"
+#include <algorithm>
+#include <cmath>
 
 namespace chase::perception {
 
-// Residuals over x = (p_WT, v_WT) [m, m/s] and s = (radius, height) [m].
+// Residuals over y = (p_WT, v_WT, radius, height) [m, m/s, m, m], and their derivatives by y where
+// `gradient` is not null.
+
+using Vector8d = Eigen::Matrix<double, 8, 1>;
 
 /// A line of sight in the plan view: it leaves the camera at c_xy towards the unit vector d_xy and
 /// climbs `slope` metres a metre.
@@ -16,6 +17,13 @@ struct PlanRay {
   Eigen::Vector3d c;          ///< p_WC, frame W, m
   Eigen::Vector2d direction;  ///< unit, frame W
   double slope = 0.0;
+
+  double Along(const Vector8d& y) const { return direction.dot(y.head<2>() - c.head<2>()); }
+  /// Positive where the axis stands to the left of the line of sight.
+  double Across(const Vector8d& y) const {
+    return direction.x() * (y[1] - c.y()) - direction.y() * (y[0] - c.x());
+  }
+  Eigen::Vector2d AcrossGradient() const { return {-direction.y(), direction.x()}; }
 };
 
 /// The line of sight touches the side of the cylinder: in the plan view the axis passes it at one
@@ -25,35 +33,38 @@ struct SideResidual {
   double sign;   ///< +1: right edge, -1: left edge
   double scale;  ///< 1/m
 
-  template <class T>
-  bool operator()(const T* x, const T* s, T* residual) const {
-    const T ax = x[0] - ray.c.x(), ay = x[1] - ray.c.y();
-    const T cross = ray.direction.x() * ay - ray.direction.y() * ax;
-    residual[0] = scale * (sign * cross - s[0]);
-    return true;
+  double operator()(const Vector8d& y, Vector8d* gradient) const {
+    if (gradient)
+      *gradient << scale * sign * ray.AcrossGradient(), Eigen::Vector4d::Zero(), -scale, 0.0;
+    return scale * (sign * ray.Across(y) - y[6]);
   }
 };
 
 /// The line of sight touches the rim of the top or bottom. Seen from above, the top's outline is
 /// its far rim and the bottom's its near rim; seen from below the other way round.
 struct CapResidual {
+  static constexpr double kLeastChord = 0.05;  ///< squared, in radii: beside it the rim is steep
+
   PlanRay ray;
   double sign;   ///< +1: top edge, -1: bottom edge
   double scale;  ///< 1/m
 
-  template <class T>
-  bool operator()(const T* x, const T* s, T* residual) const {
-    using std::sqrt;
-    const T ax = x[0] - ray.c.x(), ay = x[1] - ray.c.y();
-    const T along = ray.direction.x() * ax + ray.direction.y() * ay;
-    const T cross = ray.direction.x() * ay - ray.direction.y() * ax;
-    const T rim = x[2] + sign * 0.5 * s[1];
-    const T inside = s[0] * s[0] - cross * cross;
-    const T chord = inside > 0.05 * s[0] * s[0] ? T(sqrt(inside)) : T(sqrt(0.05) * s[0]);
-    const bool above = T(ray.c.z()) > rim;
-    const T reach = above == (sign > 0.0) ? T(along + chord) : T(along - chord);
-    residual[0] = scale * sign * (ray.c.z() + ray.slope * reach - rim);
-    return true;
+  double operator()(const Vector8d& y, Vector8d* gradient) const {
+    const double across = ray.Across(y), radius = y[6];
+    const double rim = y[2] + sign * 0.5 * y[7];
+    const double inside = radius * radius - across * across;
+    const bool crosses = inside > kLeastChord * radius * radius;
+    const double chord = crosses ? std::sqrt(inside) : std::sqrt(kLeastChord) * radius;
+    const double far = (ray.c.z() > rim) == (sign > 0.0) ? 1.0 : -1.0;
+    if (gradient) {
+      const double by_across = crosses ? -across / chord : 0.0;
+      const double by_radius = crosses ? radius / chord : std::sqrt(kLeastChord);
+      const Eigen::Vector2d reach = ray.direction + far * by_across * ray.AcrossGradient();
+      *gradient << ray.slope * reach, -1.0, Eigen::Vector3d::Zero(), ray.slope * far * by_radius,
+          -0.5 * sign;
+      *gradient *= scale * sign;
+    }
+    return scale * sign * (ray.c.z() + ray.slope * (ray.Along(y) + far * chord) - rim);
   }
 };
 
@@ -63,48 +74,21 @@ struct PointResidual {
   double age;    ///< s
   double scale;  ///< 1/m
 
-  template <class T>
-  bool operator()(const T* x, const T* s, T* residual) const {
-    using std::abs;
-    using std::sqrt;
-    const T qx = p_W.x() - (x[0] - age * x[3]), qy = p_W.y() - (x[1] - age * x[4]);
-    const T qz = p_W.z() - (x[2] - age * x[5]);
-    const T side = sqrt(qx * qx + qy * qy + 1e-12) - s[0];
-    const T cap = abs(qz) - 0.5 * s[1];
-    if (side > 0.0 && cap > 0.0)
-      residual[0] = scale * sqrt(side * side + cap * cap);
-    else
-      residual[0] = scale * (side > cap ? side : cap);
-    return true;
-  }
-};
-
-/// A position measured as such.
-struct PositionResidual {
-  Eigen::Vector3d p_W;
-  Eigen::Matrix3d root_information;  ///< L' L is the inverse covariance, 1/m^2
-
-  template <class T>
-  bool operator()(const T* x, T* residual) const {
-    Eigen::Map<const Eigen::Matrix<T, 3, 1>> p(x);
-    Eigen::Map<Eigen::Matrix<T, 3, 1>> r(residual);
-    r = root_information.cast<T>() * (p - p_W.cast<T>());
-    return true;
-  }
-};
-
-/// Deviation from a Gaussian in whitened units.
-template <int N>
-struct PriorResidual {
-  Eigen::Matrix<double, N, 1> mean;
-  Eigen::Matrix<double, N, N> root_information;
-
-  template <class T>
-  bool operator()(const T* x, T* residual) const {
-    Eigen::Map<const Eigen::Matrix<T, N, 1>> value(x);
-    Eigen::Map<Eigen::Matrix<T, N, 1>> r(residual);
-    r = root_information.template cast<T>() * (value - mean.template cast<T>());
-    return true;
+  double operator()(const Vector8d& y, Vector8d* gradient) const {
+    const Eigen::Vector3d q = p_W - (y.head<3>() - age * y.segment<3>(3));
+    const double from_axis = std::sqrt(q.head<2>().squaredNorm() + 1e-12);
+    const double side = from_axis - y[6], cap = std::abs(q.z()) - 0.5 * y[7];
+    const bool corner = side > 0.0 && cap > 0.0;
+    const double distance = corner ? std::sqrt(side * side + cap * cap) : std::max(side, cap);
+    if (gradient) {
+      const double by_side = corner ? side / distance : side > cap ? 1.0 : 0.0;
+      const double by_cap = corner ? cap / distance : side > cap ? 0.0 : 1.0;
+      Eigen::Vector3d by_q;
+      by_q << by_side / from_axis * q.head<2>(), by_cap * (q.z() < 0.0 ? -1.0 : 1.0);
+      *gradient << -by_q, age * by_q, -by_side, -0.5 * by_cap;
+      *gradient *= scale;
+    }
+    return scale * distance;
   }
 };
 

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "services/perception/odds.h"
+#include "services/perception/quick_fit.h"
 #include "services/perception/readings.h"
 #include "services/perception/target_points.h"
 
@@ -63,27 +64,43 @@ bool Localiser::EdgesAgree(const FitResult& fit, const FitInput& input) const {
   return true;
 }
 
+const Localiser::Hypothesis& Localiser::Best(const std::vector<Hypothesis>& all) {
+  return *std::max_element(all.begin(), all.end(), [](const Hypothesis& a, const Hypothesis& b) {
+    return a.log_weight < b.log_weight;
+  });
+}
+
+std::vector<Localiser::Hypothesis> Localiser::Refined(std::vector<Hypothesis> quick) const {
+  std::vector<Hypothesis> all;
+  if (quick.empty()) return all;
+  const double least = Best(quick).log_weight - kNegligible;
+  for (auto& h : quick) {
+    if (h.log_weight < least) continue;
+    const auto fit = Refined(h.input, h.fit);
+    if (!fit) continue;
+    h.fit = *fit;
+    h.log_weight = h.log_prior + LogTarget(h.fit, h.input, config_.fit);
+    all.push_back(std::move(h));
+  }
+  return all;
+}
+
 /// One Gaussian with the mean and covariance of the mixture; all else from the likeliest.
 FitResult Localiser::Joined(const std::vector<Hypothesis>& all) {
-  const auto& best = *std::max_element(
-      all.begin(), all.end(),
-      [](const Hypothesis& a, const Hypothesis& b) { return a.log_weight < b.log_weight; });
+  const Hypothesis& best = Best(all);
+  const auto weight = [&](const Hypothesis& h) { return std::exp(h.log_weight - best.log_weight); };
   FitResult out = best.fit;
   double total = 0.0;
   Vector6d mean = Vector6d::Zero();
   for (const auto& h : all) {
-    const double weight = std::exp(h.log_weight - best.log_weight);
-    if (weight < std::exp(-kNegligible)) continue;
-    total += weight;
-    mean += weight * h.fit.posterior.mean;
+    total += weight(h);
+    mean += weight(h) * h.fit.posterior.mean;
   }
   mean /= total;
   Matrix6d covariance = Matrix6d::Zero();
   for (const auto& h : all) {
-    const double weight = std::exp(h.log_weight - best.log_weight);
-    if (weight < std::exp(-kNegligible)) continue;
     const Vector6d d = h.fit.posterior.mean - mean;
-    covariance += weight / total * (h.fit.posterior.covariance + d * d.transpose());
+    covariance += weight(h) / total * (h.fit.posterior.covariance + d * d.transpose());
   }
   out.posterior.mean = mean;
   out.posterior.covariance = covariance;
@@ -93,8 +110,14 @@ FitResult Localiser::Joined(const std::vector<Hypothesis>& all) {
 
 std::optional<FitResult> Localiser::WholeReading(FitInput* input) const {
   input->use_side = kReadings[0];
-  FitResult fit = FitCylinder(*input, config_.fit);
+  FitResult fit = QuickFit(*input, config_.fit);
   if (!Agrees(fit, config_.fit.prior_gate) || !EdgesAgree(fit, *input)) return std::nullopt;
+  return fit;
+}
+
+std::optional<FitResult> Localiser::Refined(const FitInput& input, const FitResult& quick) const {
+  FitResult fit = FitCylinder(input, config_.fit, &quick);
+  if (!fit.ok) return std::nullopt;
   return fit;
 }
 
@@ -107,19 +130,20 @@ void Localiser::Weigh(const FitInput& given, double log_prior, size_t readings, 
     if (k >= kOneHidden && !out->empty()) return;
     if (!all && !sensible(kReadings[k])) continue;
     input.use_side = kReadings[k];
-    const FitResult fit = FitCylinder(input, config_.fit);
+    const FitResult fit = QuickFit(input, config_.fit);
     const double gate = k == 0 ? prior_gate : kHiddenPriorShare * prior_gate;
     if (Agrees(fit, gate) && EdgesAgree(fit, input))
-      out->push_back({fit, log_prior + LogTarget(fit, input, config_.fit)});
+      out->push_back({input, fit, log_prior, log_prior + LogTarget(fit, input, config_.fit)});
   }
 }
 
 std::optional<FitResult> Localiser::JoinedReading(FitInput* input) const {
   const double log_clutter = LogClutter(*input);
-  auto whole = WholeReading(input);
+  const auto whole = WholeReading(input);
   if (whole && whole->prior_distance < kClear) {
-    whole->log_odds = LogTarget(*whole, *input, config_.fit) - log_clutter;
-    return whole;
+    auto fit = Refined(*input, *whole);
+    if (fit) fit->log_odds = LogTarget(*fit, *input, config_.fit) - log_clutter;
+    return fit;
   }
   std::vector<Hypothesis> all;
   // Where the range is not known, two opposite sides must give it.
@@ -128,6 +152,7 @@ std::optional<FitResult> Localiser::JoinedReading(FitInput* input) const {
   FitInput turned = *input;
   turned.prior = AfterASharpTurn(*input);
   Weigh(turned, std::log(kSharpTurn), kOneHidden, !whole, &all);
+  all = Refined(std::move(all));
   if (all.empty()) return std::nullopt;
   FitResult fit = Joined(all);
   fit.log_odds -= log_clutter;
@@ -247,7 +272,7 @@ std::optional<FitResult> Localiser::Acquire(const TargetShape& shape, const Came
     input.prior = Guess(camera, detection, range, 0.3);
     input.points = PointsOnTarget(input, cluster, 2.0 * config_.fit.lidar_gate);
     const auto fit = WholeReading(&input);
-    if (good(fit)) return fit;
+    if (good(fit)) return Refined(input, *fit);
   }
   if (const auto hit = AcquirePartial(&input, clusters)) return hit;
   const auto not_through = [&](const std::optional<FitResult>& fit) {
@@ -269,8 +294,9 @@ std::optional<FitResult> Localiser::Acquire(const TargetShape& shape, const Came
   input.prior = Guess(camera, detection, range, 0.4 * range);
   input.points.clear();
   const auto fit = WholeReading(&input);
-  if (good(fit)) return not_through(fit);
-  return partial();
+  if (!good(fit)) return partial();
+  const FitInput given = input;
+  return not_through(fit) ? std::optional(Refined(given, *fit)) : std::nullopt;
 }
 
 }  // namespace chase::perception

@@ -25,16 +25,22 @@ class Localiser {
  private:
   /// One way to explain a detection: which sides are seen, whether the target turned sharply.
   struct Hypothesis {
+    FitInput input;
     FitResult fit;
-    double log_weight = 0.0;
+    double log_prior = 0.0, log_weight = 0.0;
   };
 
-  /// The fit to all sides, if it agrees with all of them.
+  /// The quick fit to all sides, if it agrees with all of them.
   std::optional<FitResult> WholeReading(FitInput* input) const;
+  /// The same in full, started there.
+  std::optional<FitResult> Refined(const FitInput& input, const FitResult& quick) const;
+  /// Those that count, in full.
+  std::vector<Hypothesis> Refined(std::vector<Hypothesis> quick) const;
   /// All hypotheses that agree with the prediction, weighed and joined into one Gaussian.
   std::optional<FitResult> JoinedReading(FitInput* input) const;
   std::optional<FitResult> AcquirePartial(FitInput* input, const Clusters& clusters) const;
   std::optional<FitResult> AcquirePartialBySize(FitInput* input) const;
+  static const Hypothesis& Best(const std::vector<Hypothesis>& all);
   static FitResult Joined(const std::vector<Hypothesis>& all);
   void Weigh(const FitInput& input, double log_prior, size_t readings, bool all,
              std::vector<Hypothesis>* out) const;

@@ -1,0 +1,302 @@
+#include "services/perception/cylinder_problem.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+namespace chase::perception {
+
+namespace {
+
+constexpr double kOutlier = 2.0;      // standard deviations where outliers begin
+constexpr double kWorst = 3.0;        // standard deviations that an outlier counts for
+constexpr double kShapeFloor = 1e-6;  // m^2
+constexpr double kNearest = 0.2;      // m, of ranges that scale pixels
+constexpr double kLeastPerPx = 1e-6;
+
+PlanRay ToPlan(const Eigen::Vector3d& p_WC, const Eigen::Vector3d& ray) {
+  const double length = std::max(1e-9, ray.head<2>().norm());
+  return {p_WC, ray.head<2>() / length, ray.z() / length};
+}
+
+bool Upright(size_t side) { return side == kLeft || side == kRight; }
+double Sign(size_t side) { return side == kRight || side == kTop ? 1.0 : -1.0; }
+
+/// What lies between the lines of sight half a pixel to either side: the angle in the plan view
+/// [rad] for the left and right edges, the change of slope for the others.
+double PerPixel(const Camera& camera, const Eigen::Vector3d& ray, bool upright) {
+  const Eigen::Vector3d half = camera.R_WC.col(upright ? 0 : 1) * (0.5 / camera.rig.focal_px);
+  const PlanRay a = ToPlan(camera.p_WC, ray - half), b = ToPlan(camera.p_WC, ray + half);
+  const double span = upright
+                          ? a.direction.x() * b.direction.y() - a.direction.y() * b.direction.x()
+                          : b.slope - a.slope;
+  return std::max(kLeastPerPx, std::abs(span));
+}
+
+/// Of one of `samples` that count for `weight` independent ones together.
+double Share(size_t samples, double weight) {
+  return std::min(1.0, weight / static_cast<double>(samples));
+}
+
+double Median(std::vector<double> values) {
+  if (values.empty()) return 0.0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+/// Half the sum of squares of samples that count for at most `weight` together.
+double BoundedCost(const std::vector<double>& residuals, double sigma, double weight) {
+  if (residuals.empty()) return 0.0;
+  double sum = 0.0;
+  for (double r : residuals) sum += 0.5 * std::min(kWorst * kWorst, r * r / (sigma * sigma));
+  return sum * Share(residuals.size(), weight);
+}
+
+/// Cauchy's loss rho(s) = b^2 log(1 + s / b^2) of samples with the squares s, which count for
+/// `share` each. One logarithm is taken of a product.
+class Cauchy {
+ public:
+  explicit Cauchy(double share) : share_(share) {}
+  /// Adds a sample; slope of its loss.
+  double Weight(double s) {
+    const double u = 1.0 + s / (kOutlier * kOutlier);
+    product_ *= u;
+    if (product_ > kLargest) TakeLogarithm();
+    return share_ / u;
+  }
+  /// Half the sum of the losses.
+  double Cost() {
+    TakeLogarithm();
+    return 0.5 * share_ * kOutlier * kOutlier * log_;
+  }
+
+ private:
+  static constexpr double kLargest = 1e100;
+  void TakeLogarithm() {
+    log_ += std::log(product_);
+    product_ = 1.0;
+  }
+  double share_, product_ = 1.0, log_ = 0.0;
+};
+
+/// Sums up the cost alone.
+struct CostSum {
+  static constexpr bool kDerivatives = false;
+  double cost = 0.0;
+  void Add(double, double, const Vector8d&) {}
+};
+
+/// Sums up cost and normal equations.
+template <int N>
+struct NormalSum : NormalEquations<N> {
+  static constexpr bool kDerivatives = true;
+  void Add(double weight, double residual, const Vector8d& row) {
+    const Eigen::Matrix<double, N, 1> weighed = weight * row.head<N>();
+    this->gradient += residual * weighed;
+    this->information.noalias() += weighed * row.head<N>().transpose();
+  }
+};
+
+}  // namespace
+
+CylinderProblem::CylinderProblem(const FitInput& input, const FitConfig& config)
+    : input_(input), config_(config) {
+  const Eigen::LLT<Matrix6d> llt(input.prior.covariance);
+  if (llt.info() != Eigen::Success) return;
+  root_ = llt.matrixL().solve(Matrix6d::Identity());
+  if (!root_.allFinite()) return;
+  ok_ = true;
+  information_ = root_.transpose() * root_;
+  shape_information_ = input.shape.variance.cwiseMax(kShapeFloor).cwiseInverse();
+  prior_range_ = Range(Start());
+  AddEdges();
+  AddPosition();
+}
+
+Vector8d CylinderProblem::Start() const {
+  Vector8d y;
+  y << input_.prior.mean, input_.shape.size;
+  return y;
+}
+
+double CylinderProblem::Range(const Vector8d& y) const {
+  return std::max(kNearest, (y.head<2>() - input_.camera.p_WC.head<2>()).norm());
+}
+
+void CylinderProblem::AddEdges() {
+  for (size_t side = 0; input_.detection && side < 4; ++side) {
+    const auto& samples = input_.detection->silhouette.samples[side];
+    edges_[side].reserve(samples.size());
+    for (const auto& px : samples) {
+      const Eigen::Vector3d ray = input_.camera.Ray(px.x(), px.y());
+      edges_[side].push_back(
+          {ToPlan(input_.camera.p_WC, ray), 1.0 / PerPixel(input_.camera, ray, Upright(side))});
+    }
+  }
+}
+
+void CylinderProblem::AddPosition() {
+  if (!input_.detection || !input_.detection->p_CT) return;
+  const Eigen::Matrix3d& R = input_.camera.R_WC;
+  const Eigen::LLT<Eigen::Matrix3d> llt(R * input_.detection->p_CT_covariance * R.transpose());
+  if (llt.info() != Eigen::Success) return;
+  position_information_ = llt.solve(Eigen::Matrix3d::Identity());
+  position_ = input_.camera.p_WC + R * *input_.detection->p_CT;
+}
+
+double CylinderProblem::EdgeResidual(size_t side, const Edge& edge, double scale, const Vector8d& y,
+                                     Vector8d* gradient) {
+  if (Upright(side)) return SideResidual{edge.ray, Sign(side), scale * edge.px}(y, gradient);
+  return CapResidual{edge.ray, Sign(side), scale * edge.px}(y, gradient);
+}
+
+template <class Sum>
+void CylinderProblem::EvaluatePrior(const Vector8d& y, Sum* sum) const {
+  const Vector6d d = y.head<6>() - input_.prior.mean;
+  const Vector6d gradient = information_ * d;
+  sum->cost += 0.5 * d.dot(gradient);
+  const Eigen::Vector2d off = y.tail<2>() - input_.shape.size;
+  const Eigen::Vector2d by_shape = shape_information_.cwiseProduct(off);
+  if (config_.estimate_shape) sum->cost += 0.5 * off.dot(by_shape);
+  if constexpr (Sum::kDerivatives) {
+    sum->gradient.template head<6>() += gradient;
+    sum->information.template topLeftCorner<6, 6>() += information_;
+    if (sum->gradient.size() == 6) return;
+    sum->gradient.template tail<2>() += by_shape;
+    sum->information.diagonal().template tail<2>() += shape_information_;
+  }
+}
+
+template <class Sum>
+void CylinderProblem::EvaluateEdges(const Vector8d& y, Sum* sum) const {
+  Vector8d row;
+  for (size_t side = 0; side < 4; ++side) {
+    if (!input_.use_side[side] || edges_[side].empty()) continue;
+    Cauchy loss(Share(edges_[side].size(), config_.edge_weight));
+    const double scale = 1.0 / (input_.detection->silhouette.sigma_px * prior_range_);
+    for (const auto& edge : edges_[side]) {
+      const double r = EdgeResidual(side, edge, scale, y, Sum::kDerivatives ? &row : nullptr);
+      sum->Add(loss.Weight(r * r), r, row);
+    }
+    sum->cost += loss.Cost();
+  }
+}
+
+template <class Sum>
+void CylinderProblem::EvaluatePoints(const Vector8d& y, Sum* sum) const {
+  if (input_.points.empty()) return;
+  Vector8d row;
+  Cauchy loss(Share(input_.points.size(), config_.lidar_weight));
+  const double scale = 1.0 / config_.lidar_sigma;
+  for (const auto& p : input_.points) {
+    const PointResidual residual{p.p_W, p.age, scale};
+    const double r = residual(y, Sum::kDerivatives ? &row : nullptr);
+    sum->Add(loss.Weight(r * r), r, row);
+  }
+  sum->cost += loss.Cost();
+}
+
+template <class Sum>
+void CylinderProblem::EvaluatePosition(const Vector8d& y, Sum* sum) const {
+  if (!position_information_) return;
+  const Eigen::Vector3d off = y.head<3>() - position_;
+  const Eigen::Vector3d gradient = *position_information_ * off;
+  Cauchy loss(1.0);
+  const double weight = loss.Weight(off.dot(gradient));
+  sum->cost += loss.Cost();
+  if constexpr (Sum::kDerivatives) {
+    sum->gradient.template head<3>() += weight * gradient;
+    sum->information.template topLeftCorner<3, 3>() += weight * *position_information_;
+  }
+}
+
+template <class Sum>
+void CylinderProblem::Evaluate(const Vector8d& y, Sum* sum) const {
+  EvaluatePrior(y, sum);
+  EvaluateEdges(y, sum);
+  EvaluatePoints(y, sum);
+  EvaluatePosition(y, sum);
+}
+
+double CylinderProblem::Cost(const Vector8d& y) const {
+  CostSum sum;
+  Evaluate(y, &sum);
+  return sum.cost;
+}
+
+template <int N>
+NormalEquations<N> CylinderProblem::Linearised(const Vector8d& y) const {
+  NormalSum<N> sum;
+  Evaluate(y, &sum);
+  return sum;
+}
+
+template NormalEquations<6> CylinderProblem::Linearised<6>(const Vector8d&) const;
+template NormalEquations<8> CylinderProblem::Linearised<8>(const Vector8d&) const;
+
+/// Residuals of one side in px, without loss or weights.
+std::vector<double> CylinderProblem::EdgeResiduals(size_t side, const Vector8d& y) const {
+  std::vector<double> all;
+  all.reserve(edges_[side].size());
+  for (const auto& edge : edges_[side])
+    all.push_back(EdgeResidual(side, edge, 1.0 / Range(y), y, nullptr));
+  return all;
+}
+
+std::vector<double> CylinderProblem::PointResiduals(const Vector8d& y) const {
+  std::vector<double> all;
+  all.reserve(input_.points.size());
+  for (const auto& p : input_.points) all.push_back(PointResidual{p.p_W, p.age, 1.0}(y, nullptr));
+  return all;
+}
+
+void CylinderProblem::ReadSides(const std::array<std::vector<double>, 4>& edges,
+                                FitResult* out) const {
+  for (size_t side = 0; input_.detection && side < 4; ++side) {
+    const bool seen = !edges[side].empty(), used = input_.use_side[side] && seen;
+    out->edge_px[side] = Median(edges[side]);
+    out->used[side] = used;
+    out->whole = out->whole && (used || !seen);
+    const bool beyond = seen && !used && out->edge_px[side] > 0.0;
+    out->joined = out->joined || input_.detection->goes_on[side] || beyond;
+  }
+}
+
+/// -cost + log sqrt(det posterior / det prior). What single outliers cost is bounded.
+bool CylinderProblem::ReadEvidence(const std::array<std::vector<double>, 4>& edges,
+                                   const std::vector<double>& points, FitResult* out) const {
+  const Eigen::LLT<Matrix6d> posterior(out->posterior.covariance);
+  if (posterior.info() != Eigen::Success) return false;
+  const double log_posterior = posterior.matrixLLT().diagonal().array().log().sum();
+  const double log_prior = -root_.diagonal().array().log().sum();
+  double cost = 0.5 * out->prior_distance;
+  for (size_t side = 0; side < 4; ++side)
+    if (out->used[side])
+      cost += BoundedCost(edges[side], input_.detection->silhouette.sigma_px, config_.edge_weight);
+  cost += BoundedCost(points, config_.lidar_sigma, config_.lidar_weight);
+  out->log_evidence = -cost + log_posterior - log_prior;
+  return std::isfinite(out->log_evidence);
+}
+
+FitResult CylinderProblem::Read(const Vector8d& y, const Matrix8d& covariance, double cost) const {
+  FitResult out;
+  out.posterior.mean = y.head<6>();
+  out.posterior.covariance = covariance.topLeftCorner<6, 6>();
+  out.shape.size = y.tail<2>();
+  out.shape.variance = input_.shape.variance;
+  if (config_.estimate_shape) out.shape.variance = covariance.diagonal().tail<2>();
+  out.cost = cost;
+  out.prior_distance = (root_ * (out.posterior.mean - input_.prior.mean)).squaredNorm();
+  std::array<std::vector<double>, 4> edges;
+  for (size_t side = 0; side < 4; ++side) edges[side] = EdgeResiduals(side, y);
+  ReadSides(edges, &out);
+  const auto points = PointResiduals(y);
+  out.n_points = static_cast<int>(points.size());
+  for (double r : points) out.point_rms += r * r / static_cast<double>(points.size());
+  out.point_rms = std::sqrt(out.point_rms);
+  out.ok = out.posterior.covariance.allFinite() && ReadEvidence(edges, points, &out);
+  return out;
+}
+
+}  // namespace chase::perception
