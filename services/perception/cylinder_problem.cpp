@@ -84,6 +84,7 @@ class Cauchy {
 struct CostSum {
   static constexpr bool kDerivatives = false;
   double cost = 0.0;
+  void AddEdge(double, double, const Vector8d&) {}
   void Add(double, double, const Vector8d&) {}
 };
 
@@ -91,6 +92,13 @@ struct CostSum {
 template <int N>
 struct NormalSum : NormalEquations<N> {
   static constexpr bool kDerivatives = true;
+  /// An edge does not depend on the velocity.
+  void AddEdge(double weight, double residual, const Vector8d& row) {
+    if (N == 8) return Add(weight, residual, row);
+    const Eigen::Vector3d weighed = weight * row.head<3>();
+    this->gradient.template head<3>() += residual * weighed;
+    this->information.template topLeftCorner<3, 3>() += weighed * row.head<3>().transpose();
+  }
   void Add(double weight, double residual, const Vector8d& row) {
     const Eigen::Matrix<double, N, 1> weighed = weight * row.head<N>();
     this->gradient += residual * weighed;
@@ -177,7 +185,7 @@ void CylinderProblem::EvaluateEdges(const Vector8d& y, Sum* sum) const {
     const double scale = 1.0 / (input_.detection->silhouette.sigma_px * prior_range_);
     for (const auto& edge : edges_[side]) {
       const double r = EdgeResidual(side, edge, scale, y, Sum::kDerivatives ? &row : nullptr);
-      sum->Add(loss.Weight(r * r), r, row);
+      sum->AddEdge(loss.Weight(r * r), r, row);
     }
     sum->cost += loss.Cost();
   }

@@ -34,9 +34,9 @@ Finder::Finder(const PerceptionConfig& config)
   shape_.variance = {variance, variance};
 }
 
-void Finder::AddSweep(Sweep sweep) {
-  if (!sweeps_.empty() && sweep.t < sweeps_.back().sweep.t - kTimeJump) sweeps_.clear();
-  sweeps_.push_back({std::move(sweep), false});
+void Finder::AddSweep(const Sweep& sweep) {
+  if (!sweeps_.empty() && sweep.t < sweeps_.back().sweep.t() - kTimeJump) sweeps_.clear();
+  sweeps_.push_back({RangedSweep(sweep), false});
   if (sweeps_.size() > kMaxSweeps) sweeps_.pop_front();
 }
 
@@ -62,8 +62,8 @@ Clusters Finder::Points(const View& view, const Detection& detection, const Eige
                         bool fresh_only) const {
   Clusters all;
   for (auto it = sweeps_.rbegin(); it != sweeps_.rend(); ++it) {
-    if ((fresh_only && it->used) || view.t - it->sweep.t > config_.max_sweep_age) continue;
-    if (it->sweep.t > view.t) continue;
+    if ((fresh_only && it->used) || view.t - it->sweep.t() > config_.max_sweep_age) continue;
+    if (it->sweep.t() > view.t) continue;
     Clusters clusters = SelectPoints(it->sweep, poses_, view.camera, view.t, detection, v_WT);
     for (auto& c : clusters) all.push_back(std::move(c));
     if (!fresh_only) break;  // only the newest

@@ -45,7 +45,7 @@ class Finder {
   explicit Finder(const PerceptionConfig& config);
 
   void AddPose(const PoseSample& pose) { poses_.Add(pose); }
-  void AddSweep(Sweep sweep);
+  void AddSweep(const Sweep& sweep);
   const PoseHistory& poses() const { return poses_; }
 
   /// The frame's detections, or nothing with `note` saying why.
@@ -65,7 +65,7 @@ class Finder {
 
  private:
   struct KeptSweep {
-    Sweep sweep;
+    RangedSweep sweep;
     bool used = false;
   };
 

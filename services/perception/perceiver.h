@@ -34,7 +34,7 @@ class Perceiver {
   explicit Perceiver(const PerceptionConfig& config);
 
   void AddPose(const PoseSample& pose) { finder_.AddPose(pose); }
-  void AddSweep(Sweep sweep) { finder_.AddSweep(std::move(sweep)); }
+  void AddSweep(const Sweep& sweep) { finder_.AddSweep(sweep); }
   TargetEstimate See(const Frame& frame);
 
   const PoseHistory& poses() const { return finder_.poses(); }

@@ -44,21 +44,21 @@ Clusters Split(std::vector<TargetPoint> points) {
 /// Walks through a sweep's points near the detection; the pose is asked for once a millisecond.
 class Placer {
  public:
-  Placer(const Sweep& sweep, const PoseHistory& poses, const world::Rig& rig)
+  Placer(const RangedSweep& sweep, const PoseHistory& poses, const world::Rig& rig)
       : sweep_(sweep), poses_(poses), R_BL_(rig.R_BL()), p_BL_(rig.lidar_position) {}
 
   bool Place(size_t i, TargetPoint* out) {
-    const double t = sweep_.t + static_cast<double>(sweep_.times[i]);
+    const double t = sweep_.t() + static_cast<double>(sweep_.Time(i));
     if (!pose_ || std::abs(t - pose_->t) > 5e-4) pose_ = poses_.At(t, kExtrapolation);
     if (!pose_) return false;
-    const Eigen::Vector3d p_B = p_BL_ + R_BL_ * sweep_.points[i].cast<double>();
+    const Eigen::Vector3d p_B = p_BL_ + R_BL_ * sweep_.Point(i).cast<double>();
     out->p_W = pose_->p_WB + pose_->R_WB * p_B;
     out->p_WL = pose_->p_WB + pose_->R_WB * p_BL_;
     return true;
   }
 
  private:
-  const Sweep& sweep_;
+  const RangedSweep& sweep_;
   const PoseHistory& poses_;
   Eigen::Matrix3d R_BL_;
   Eigen::Vector3d p_BL_;
@@ -67,9 +67,45 @@ class Placer {
 
 }  // namespace
 
-Clusters SelectPoints(const Sweep& sweep, const PoseHistory& poses, const Camera& camera,
+RangedSweep::RangedSweep(const Sweep& sweep) : t_(sweep.t) {
+  const auto n = static_cast<Eigen::Index>(sweep.points.size());
+  // What fills up the last block lies nowhere near anything.
+  for (size_t k = 0; k < 4; ++k)
+    columns_[k].setConstant((n + kBlock - 1) / kBlock * kBlock, k == 3 ? 1e9f : 0.0f);
+  for (size_t i = 0; i < sweep.points.size(); ++i) {
+    const float range = sweep.points[i].norm();
+    if (!(range > static_cast<float>(kMinRange))) continue;
+    if (!(sweep.times[i] >= 0.0f && sweep.times[i] < static_cast<float>(kMaxSweepLength))) continue;
+    const auto at = static_cast<Eigen::Index>(times_.size());
+    for (size_t k = 0; k < 3; ++k) columns_[k][at] = sweep.points[i][static_cast<int>(k)];
+    columns_[3][at] = range;
+    times_.push_back(sweep.times[i]);
+  }
+}
+
+Eigen::Vector3f RangedSweep::Point(size_t i) const {
+  const auto at = static_cast<Eigen::Index>(i);
+  return {columns_[0][at], columns_[1][at], columns_[2][at]};
+}
+
+std::vector<size_t> RangedSweep::Near(const Eigen::Vector3f& sight_L, float cosine) const {
+  std::vector<size_t> near;
+  for (size_t from = 0; from < size(); from += kBlock) {
+    const auto column = [&](size_t k) {
+      return Eigen::Map<const Block>(columns_[k].data() + from);
+    };
+    const Block inside = column(0) * sight_L.x() +
+                         (column(1) * sight_L.y() + column(2) * sight_L.z()) - cosine * column(3);
+    if (inside.maxCoeff() < 0.0f) continue;
+    for (size_t i = 0; i < kBlock && from + i < size(); ++i)
+      if (inside[static_cast<Eigen::Index>(i)] >= 0.0f) near.push_back(from + i);
+  }
+  return near;
+}
+
+Clusters SelectPoints(const RangedSweep& sweep, const PoseHistory& poses, const Camera& camera,
                       double t_frame, const Detection& detection, const Eigen::Vector3d& v_WT) {
-  const auto pose = poses.At(sweep.t + 0.05, 0.06);
+  const auto pose = poses.At(sweep.t() + 0.05, 0.06);
   if (!pose) return {};
   const Eigen::Vector3d sight = camera
                                     .Ray(detection.box.x + 0.5 * detection.box.width,
@@ -82,14 +118,10 @@ Clusters SelectPoints(const Sweep& sweep, const PoseHistory& poses, const Camera
   const cv::Mat region = Region(detection);
   Placer placer(sweep, poses, camera.rig);
   std::vector<TargetPoint> hits;
-  for (size_t i = 0; i < sweep.points.size(); ++i) {
-    const Eigen::Vector3f& p_L = sweep.points[i];
-    const float range = p_L.norm();
-    if (!(range > static_cast<float>(kMinRange)) || p_L.dot(sight_L) < cosine * range) continue;
-    if (!(sweep.times[i] >= 0.0f && sweep.times[i] < static_cast<float>(kMaxSweepLength))) continue;
+  for (const size_t i : sweep.Near(sight_L, cosine)) {
     TargetPoint hit;
     if (!placer.Place(i, &hit)) continue;
-    hit.age = t_frame - sweep.t - static_cast<double>(sweep.times[i]);
+    hit.age = t_frame - sweep.t() - static_cast<double>(sweep.Time(i));
     const Eigen::Vector3d now = hit.p_W + hit.age * v_WT;
     const auto px = camera.Project(now);
     if (!px || !OnDetection(detection, region, *px)) continue;
