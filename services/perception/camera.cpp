@@ -18,7 +18,10 @@ Eigen::Vector3d Camera::Ray(double u, double v) const {
 }
 
 std::optional<Eigen::Vector2d> Camera::Project(const Eigen::Vector3d& p_W) const {
-  const Eigen::Vector3d p_C = R_WC.transpose() * (p_W - p_WC);
+  return Pixel(R_WC.transpose() * (p_W - p_WC));
+}
+
+std::optional<Eigen::Vector2d> Camera::Pixel(const Eigen::Vector3d& p_C) const {
   if (p_C.z() < kNearest) return std::nullopt;
   return rig.Project(p_C);
 }

@@ -19,6 +19,8 @@ struct Camera {
   Eigen::Vector3d Ray(double u, double v) const;
   /// Pixel of p_W [m]; nothing when it lies behind or nearer than 5 cm.
   std::optional<Eigen::Vector2d> Project(const Eigen::Vector3d& p_W) const;
+  /// Likewise of a point in frame C [m].
+  std::optional<Eigen::Vector2d> Pixel(const Eigen::Vector3d& p_C) const;
 };
 
 /// The camera of a body at this pose.

@@ -29,6 +29,21 @@ cv::Mat Mask(const cv::Mat& score) {
   return mask;
 }
 
+/// First and last pixel of each row: they have the hull of all.
+std::vector<cv::Point> RowEnds(const cv::Mat& mask) {
+  std::vector<cv::Point> ends;
+  for (int y = 0; y < mask.rows; ++y) {
+    const uint8_t* row = mask.ptr<uint8_t>(y);
+    int first = 0, last = mask.cols - 1;
+    while (first <= last && row[first] == 0) ++first;
+    if (first > last) continue;
+    while (row[last] == 0) --last;
+    ends.emplace_back(first, y);
+    if (last > first) ends.emplace_back(last, y);
+  }
+  return ends;
+}
+
 }  // namespace
 
 double ColorDetector::ShapeScore(const Detection& d, double area, double hull_area) const {
@@ -54,9 +69,8 @@ Detection ColorDetector::Describe(const cv::Mat& bgr, const cv::Mat& score,
 }
 
 void ColorDetector::Rate(const cv::Mat& score, Detection* d) const {
-  std::vector<cv::Point> points, hull;
-  cv::findNonZero(d->mask, points);
-  cv::convexHull(points, hull);
+  std::vector<cv::Point> hull;
+  cv::convexHull(RowEnds(d->mask), hull);
   const double half_border = 0.5 * static_cast<double>(hull.size());  // hulls run through
   const double area = cv::countNonZero(d->mask);                      // pixel centres
   const double hull_area =

@@ -44,25 +44,38 @@ Clusters Split(std::vector<TargetPoint> points) {
 /// Walks through a sweep's points near the detection; the pose is asked for once a millisecond.
 class Placer {
  public:
-  Placer(const RangedSweep& sweep, const PoseHistory& poses, const world::Rig& rig)
-      : sweep_(sweep), poses_(poses), R_BL_(rig.R_BL()), p_BL_(rig.lidar_position) {}
+  Placer(const RangedSweep& sweep, const PoseHistory& poses, const Camera& camera)
+      : sweep_(sweep), poses_(poses), camera_(camera), R_BL_(camera.rig.R_BL()) {}
 
-  bool Place(size_t i, TargetPoint* out) {
+  /// False when the pose is not known at the time of point i. Must come before all else of i.
+  bool MoveTo(size_t i) {
     const double t = sweep_.t() + static_cast<double>(sweep_.Time(i));
-    if (!pose_ || std::abs(t - pose_->t) > 5e-4) pose_ = poses_.At(t, kExtrapolation);
+    if (pose_ && std::abs(t - pose_->t) <= 5e-4) return true;
+    pose_ = poses_.At(t, kExtrapolation);
     if (!pose_) return false;
-    const Eigen::Vector3d p_B = p_BL_ + R_BL_ * sweep_.Point(i).cast<double>();
-    out->p_W = pose_->p_WB + pose_->R_WB * p_B;
-    out->p_WL = pose_->p_WB + pose_->R_WB * p_BL_;
+    const Eigen::Matrix3d R_CW = camera_.R_WC.transpose(), R_WB = pose_->R_WB.toRotationMatrix();
+    p_WL_ = pose_->p_WB + R_WB * camera_.rig.lidar_position;
+    R_WL_ = R_WB * R_BL_;
+    R_CL_ = R_CW * R_WL_;
+    p_CL_ = R_CW * (p_WL_ - camera_.p_WC);
     return true;
+  }
+  /// Frame C, m.
+  Eigen::Vector3d InCamera(size_t i) const {
+    return p_CL_ + R_CL_ * sweep_.Point(i).cast<double>();
+  }
+  TargetPoint Place(size_t i, double age) const {
+    return {p_WL_ + R_WL_ * sweep_.Point(i).cast<double>(), p_WL_, age, 0.0};
   }
 
  private:
   const RangedSweep& sweep_;
   const PoseHistory& poses_;
+  const Camera& camera_;
   Eigen::Matrix3d R_BL_;
-  Eigen::Vector3d p_BL_;
   std::optional<PoseSample> pose_;
+  Eigen::Matrix3d R_WL_, R_CL_;
+  Eigen::Vector3d p_WL_, p_CL_;
 };
 
 }  // namespace
@@ -116,17 +129,17 @@ Clusters SelectPoints(const RangedSweep& sweep, const PoseHistory& poses, const 
   const auto cosine =
       static_cast<float>(std::cos(std::min(1.5, HalfAngle(camera, detection.box) + kCoarseMargin)));
   const cv::Mat region = Region(detection);
-  Placer placer(sweep, poses, camera.rig);
+  const Eigen::Vector3d v_C = camera.R_WC.transpose() * v_WT;  // of the target, in frame C
+  Placer placer(sweep, poses, camera);
   std::vector<TargetPoint> hits;
   for (const size_t i : sweep.Near(sight_L, cosine)) {
-    TargetPoint hit;
-    if (!placer.Place(i, &hit)) continue;
-    hit.age = t_frame - sweep.t() - static_cast<double>(sweep.Time(i));
-    const Eigen::Vector3d now = hit.p_W + hit.age * v_WT;
-    const auto px = camera.Project(now);
+    if (!placer.MoveTo(i)) continue;
+    const double age = t_frame - sweep.t() - static_cast<double>(sweep.Time(i));
+    const Eigen::Vector3d now_C = placer.InCamera(i) + age * v_C;
+    const auto px = camera.Pixel(now_C);
     if (!px || !OnDetection(detection, region, *px)) continue;
-    hit.range = (now - camera.p_WC).norm();
-    hits.push_back(hit);
+    hits.push_back(placer.Place(i, age));
+    hits.back().range = now_C.norm();
   }
   return Split(std::move(hits));
 }
