@@ -14,6 +14,7 @@ namespace {
 
 constexpr double kSharpTurn = 0.02;      // how often the target does what the motion leaves out
 constexpr double kClear = 3.0;           // squared distance from the prediction that needs no other
+constexpr int kFewRays = 3;              // through it, as the edge of a thing may let pass
 constexpr double kNegligible = 7.0;      // logarithm of the odds of a hypothesis that is left out
 constexpr int kSidesOfNew = 3;           // of what nothing is known of yet
 constexpr double kSizedRange = 0.24;     // m, standard deviation of a range from one size alone
@@ -140,7 +141,9 @@ void Localiser::Weigh(const FitInput& given, double log_prior, size_t readings, 
 std::optional<FitResult> Localiser::JoinedReading(FitInput* input) const {
   const double log_clutter = LogClutter(*input);
   const auto whole = WholeReading(input);
-  if (whole && whole->prior_distance < kClear) {
+  const bool clear = whole && whole->prior_distance < kClear &&
+                     RaysThrough(*input, whole->posterior) < kFewRays;
+  if (clear) {
     auto fit = Refined(*input, *whole);
     if (fit) fit->log_odds = LogTarget(*fit, *input, config_.fit) - log_clutter;
     return fit;
@@ -163,6 +166,7 @@ std::optional<FitResult> Localiser::Correct(const FitInput& predicted,
                                             const Clusters& clusters) const {
   if (!Visible(predicted)) return std::nullopt;
   FitInput input = predicted;
+  input.hits = &clusters;
   const double gate = config_.fit.lidar_gate + 2.0 * RangeSigma(predicted);
   const double all = CountPoints(clusters);
   // What stands before the target may lend the blob's edge a few points, and what stands behind it
@@ -296,7 +300,7 @@ std::optional<FitResult> Localiser::Acquire(const TargetShape& shape, const Came
   const auto fit = WholeReading(&input);
   if (!good(fit)) return partial();
   const FitInput given = input;
-  return not_through(fit) ? std::optional(Refined(given, *fit)) : std::nullopt;
+  return not_through(fit) ? Refined(given, *fit) : std::nullopt;
 }
 
 }  // namespace chase::perception

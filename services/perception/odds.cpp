@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "services/perception/target_points.h"
+
 namespace chase::perception {
 
 namespace {
@@ -16,6 +18,7 @@ constexpr double kRunsOnToo = 0.5;    // and beyond another one then
 // apart, as far away as may be.
 constexpr double kClutter = 0.3, kClutterSidePx = 60.0, kClutterDepth = 10.0;
 constexpr double kUnexplained = 0.5, kMostUnexplained = 6.0;  // for points at other ranges
+constexpr double kThrough = 1.0, kMostThrough = 20.0;  // for rays that went through it
 
 /// Density of the sides as they were seen, hidden ones anywhere inside.
 double LogSides(const FitResult& fit, const FitInput& input, const FitConfig& config) {
@@ -55,6 +58,7 @@ double LogTarget(const FitResult& fit, const FitInput& input, const FitConfig& c
   if (fit.n_points > 0) {
     const double n = std::min(config.lidar_weight, static_cast<double>(fit.n_points));
     sum -= std::log(config.lidar_sigma / std::sqrt(n) * std::sqrt(2.0 * M_PI));
+    sum -= std::min(kMostThrough, kThrough * RaysThrough(input, fit.posterior));
   }
   return sum;
 }

@@ -12,6 +12,7 @@ constexpr size_t kMostPoints = 40;  // in a fit
 constexpr int kManyPoints = 5;      // that went through it: the target is not there
 constexpr double kManyHits = 10.0;  // that hit the detection elsewhere: it is something else
 constexpr double kCore = 0.6;       // share of the cylinder that such a ray goes through
+constexpr double kMostOfIt = 0.8;   // likewise of a target that is placed well
 constexpr double kBehind = 0.25;    // m behind the target where such a ray ends at least
 
 double SurfaceDistance(const TargetPoint& point, const FitInput& input) {
@@ -22,17 +23,19 @@ double SurfaceDistance(const TargetPoint& point, const FitInput& input) {
   return side > 0.0 && cap > 0.0 ? std::hypot(side, cap) : std::max(side, cap);
 }
 
-/// True when the lidar looked well through where the target should be, and hit something behind.
-bool SawThrough(const TargetPoint& point, const FitInput& input) {
-  const Eigen::Vector3d center = input.prior.position() - point.age * input.prior.velocity();
+/// True when the lidar looked through this share of where the target should be, and hit something
+/// behind it.
+bool SawThrough(const TargetPoint& point, const FitInput& input, const TargetGaussian& target,
+                double core, double range_sigma) {
+  const Eigen::Vector3d center = target.position() - point.age * target.velocity();
   const Eigen::Vector3d ray = point.p_W - point.p_WL, to_center = center - point.p_WL;
   const double length = std::max(1e-6, ray.head<2>().norm());
   const double along = ray.head<2>().dot(to_center.head<2>()) / length;
   const double beside = std::abs(ray.x() * to_center.y() - ray.y() * to_center.x()) / length;
   const double above = point.p_WL.z() + along / length * ray.z() - center.z();
-  return beside < kCore * input.shape.size[0] &&
-         std::abs(above) < kCore * 0.5 * input.shape.size[1] &&
-         length > along + input.shape.size[0] + kBehind + 2.0 * RangeSigma(input);
+  return beside < core * input.shape.size[0] &&
+         std::abs(above) < core * 0.5 * input.shape.size[1] &&
+         length > along + input.shape.size[0] + kBehind + 2.0 * range_sigma;
 }
 
 }  // namespace
@@ -57,8 +60,17 @@ std::vector<TargetPoint> PointsOnTarget(const FitInput& input,
 bool SeenThrough(const FitInput& input, const Clusters& clusters) {
   int count = 0;
   for (const auto& cluster : clusters)
-    for (const auto& p : cluster) count += SawThrough(p, input);
+    for (const auto& p : cluster)
+      count += SawThrough(p, input, input.prior, kCore, RangeSigma(input));
   return count >= kManyPoints;
+}
+
+int RaysThrough(const FitInput& input, const TargetGaussian& target) {
+  int count = 0;
+  if (!input.hits) return count;
+  for (const auto& cluster : *input.hits)
+    for (const auto& p : cluster) count += SawThrough(p, input, target, kMostOfIt, 0.0);
+  return count;
 }
 
 bool HitElsewhere(const FitInput& input, const Clusters& clusters, double gate) {

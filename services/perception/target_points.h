@@ -21,6 +21,9 @@ std::vector<TargetPoint> PointsOnTarget(const FitInput& input,
 bool SeenThrough(const FitInput& input, const Clusters& clusters);
 
 /// Points in all clusters.
+/// Rays to the points on the detection that go through a target placed there, and end behind it.
+int RaysThrough(const FitInput& input, const TargetGaussian& target);
+
 /// True when many points hit the detection, and none of them the target as predicted.
 bool HitElsewhere(const FitInput& input, const Clusters& clusters, double gate);
 
