@@ -33,6 +33,16 @@ bool Visible(const FitInput& input) {
   return !expected || input.detection->box.area() >= kMinVisible * expected->area();
 }
 
+/// The sides of a reading that the detection shows.
+Sides Seen(Sides sides, const Detection& d) {
+  for (size_t i = 0; i < sides.size(); ++i) sides[i] = sides[i] && !d.silhouette.samples[i].empty();
+  return sides;
+}
+
+bool GoesOn(const Detection& d) {
+  return std::any_of(d.goes_on.begin(), d.goes_on.end(), [](bool on) { return on; });
+}
+
 /// True for a detection that the target cannot fill at this range.
 bool LargerThanTarget(const FitInput& input, double range) {
   const double px = kLarger * input.camera.rig.focal_px / range;
@@ -127,14 +137,22 @@ void Localiser::Weigh(const FitInput& given, double log_prior, size_t readings, 
   FitInput input = given;
   const double prior_gate = config_.fit.prior_gate;
   const auto sensible = Sensible(input);
+  // Where a like colour goes on, both sides may be another thing's, as the points tell.
+  const bool joined = !input.points.empty() && (input.joined || GoesOn(*input.detection));
+  std::vector<Sides> tried;
+  bool explained = !joined && !out->empty();
   for (size_t k = 0; k < readings; ++k) {
-    if (k >= kOneHidden && !out->empty()) return;
+    if (k >= kOneHidden && explained) return;
     if (!all && !sensible(kReadings[k])) continue;
+    const Sides seen = Seen(kReadings[k], *input.detection);
+    if (std::count(tried.begin(), tried.end(), seen) > 0) continue;
+    tried.push_back(seen);
     input.use_side = kReadings[k];
     const FitResult fit = QuickFit(input, config_.fit);
     const double gate = k == 0 ? prior_gate : kHiddenPriorShare * prior_gate;
-    if (Agrees(fit, gate) && EdgesAgree(fit, input))
-      out->push_back({input, fit, log_prior, log_prior + LogTarget(fit, input, config_.fit)});
+    if (!Agrees(fit, gate) || !EdgesAgree(fit, input)) continue;
+    out->push_back({input, fit, log_prior, log_prior + LogTarget(fit, input, config_.fit)});
+    explained = explained || (!joined && RaysThrough(input, fit.posterior) < kFewRays);
   }
 }
 

@@ -14,6 +14,8 @@ constexpr size_t kMaxCandidates = 6;
 constexpr double kLeastWidthPx = 6.0;  // what is narrower may be a slit between things
 constexpr int kDecoyHits = 3;  // sightings that what stands beside one that drives counts for
 constexpr double kReachMargin = 0.5;    // m
+constexpr double kUsualSpeed = 1.5;     // m/s
+constexpr int kClearPoints = 10;        // LiDAR points on what is surely one thing
 constexpr double kReachGate = 11.3;     // squared distance from a hidden target's prediction, 3 dof
 constexpr double kExpectedGate = 4.6;   // likewise of what need not drive, 2 dof
 constexpr double kTimeJump = 1.0;       // s back that count as a new recording
@@ -30,6 +32,12 @@ constexpr double kStandingSpeed = 0.2;  // m/s
 
 double HorizontalSigma(const TargetTrack& track) {
   return std::sqrt(track.state.covariance.topLeftCorner<2, 2>().diagonal().maxCoeff());
+}
+
+/// True when all of it is seen, on its own, and LiDAR points tell where it is.
+bool Clear(const Sighting& s) {
+  const Detection& d = s.detection;
+  return s.fit.whole && s.n_points >= kClearPoints && !d.part && !d.edged && !d.AnyCut();
 }
 
 }  // namespace
@@ -52,13 +60,19 @@ bool Perceiver::IsRatherDecoy(const Sighting& s, const View& view) const {
   return other && other->fit.log_odds > s.fit.log_odds;
 }
 
-bool Perceiver::Plausible(const Eigen::Vector3d& p_WT, double t) const {
+bool Perceiver::Plausible(const Sighting& s, double t) const {
+  const Eigen::Vector3d p_WT = s.fit.posterior.position();
   if (decoys_.At(p_WT)) return false;
   if (!track_ || doubtful_ || track_->hits < kProvenHits) return true;
   const Eigen::Vector3d d = p_WT - track_->state.position();
-  if (state_ != TargetState::kLost)
-    return std::abs(d.z()) < kGateSigmas * config_.motion.ground_sigma &&
-           d.dot(track_->state.covariance.topLeftCorner<3, 3>().ldlt().solve(d)) < kReachGate;
+  if (state_ != TargetState::kLost) {
+    if (std::abs(d.z()) >= kGateSigmas * config_.motion.ground_sigma) return false;
+    const Eigen::Matrix3d P = track_->state.covariance.topLeftCorner<3, 3>();
+    if (d.dot(P.ldlt().solve(d)) < kReachGate) return true;
+    // The prediction may err by more than it claims, where the fit slipped to what stood behind.
+    const double way = (p_WT - last_p_).norm();
+    return Clear(s) && way < kReachMargin + kUsualSpeed * (t - track_->seen);
+  }
   return d.norm() < kReachMargin + config_.motion.max_speed * (t - track_->seen);
 }
 
@@ -73,7 +87,8 @@ bool Perceiver::Sure(const Sighting& s) const {
   if (track_->misses == 0) return true;
   if (s.contested) return false;
   const Eigen::Vector2d off = (s.fit.posterior.position() - track_->state.position()).head<2>();
-  if (Vague()) return s.fit.whole && off.norm() < config_.state.decoy_radius;
+  const bool piece = s.detection.part || s.detection.edged;
+  if (Vague()) return s.fit.whole && !piece && off.norm() < config_.state.decoy_radius;
   const Eigen::Matrix2d P = track_->state.covariance.topLeftCorner<2, 2>();
   return off.norm() < config_.state.decoy_radius || off.dot(P.ldlt().solve(off)) < kExpectedGate;
 }
@@ -131,7 +146,7 @@ bool Perceiver::Followed(const Sighting& s) const {
 void Perceiver::AddPartial(const View& view) {
   if (!unsure_ || unsure_->fit.whole || unsure_->n_points == 0) return;
   if (Followed(*unsure_) || candidates_.size() >= kMaxCandidates) return;
-  if (!Plausible(unsure_->fit.posterior.position(), view.t)) return;
+  if (!Plausible(*unsure_, view.t)) return;
   candidates_.push_back(NewCandidate(*unsure_, view));
   ForgetVelocity(config_.motion, &candidates_.back());
 }
@@ -144,14 +159,16 @@ void Perceiver::AddCandidates(View* view) {
     return Prominence(view->detections[a], config_.rig) >
            Prominence(view->detections[b], config_.rig);
   });
+  const bool comes_back = track_ && !doubtful_ && track_->hits >= kProvenHits;
   for (const size_t i : order) {
     if (candidates_.size() >= kMaxCandidates) return;
     const auto found = finder_.Acquire(*view, view->detections[i]);
-    if (!found || !Plausible(found->fit.posterior.position(), view->t)) continue;
-    // A piece of something larger is a thing of its own where LiDAR points tell its range, or an
-    // edge parts it.
-    const bool ranged = found->n_points > 0 || found->detection.edged;
-    if (found->detection.part && (!ranged || Followed(*found))) continue;
+    if (!found || !Plausible(*found, view->t)) continue;
+    // Part of something, of which no LiDAR point tells the range, is a thing of its own only where
+    // the target may come back.
+    const bool piece = found->detection.part || found->detection.edged;
+    if ((piece || !found->fit.whole) && found->n_points == 0 && !comes_back) continue;
+    if (piece && ((found->n_points == 0 && !found->detection.edged) || Followed(*found))) continue;
     if (!found->fit.whole && Followed(*found)) continue;
     candidates_.push_back(NewCandidate(*found, *view));
   }

@@ -56,7 +56,7 @@ class Perceiver {
   bool Vague() const;
   bool Sure(const Sighting& s) const;
   bool Ready(const Candidate& candidate, double t) const;
-  bool Plausible(const Eigen::Vector3d& p_WT, double t) const;
+  bool Plausible(const Sighting& s, double t) const;
   bool IsRatherDecoy(const Sighting& s, const View& view) const;
   void SwapIfTheOtherDrives(const Sighting& s, Decoy* other, double t);
   void Start(const TargetTrack& track, const Sighting& sighting);
