@@ -32,7 +32,7 @@ void Candidate::Correct(const Sighting& sighting) {
     return g.covariance.topLeftCorner<2, 2>().trace();
   };
   // Before, what hid it may have seemed its edge.
-  const bool comes_out = was_partial && !track.partial && !SurelyDrives();
+  const bool comes_out = was_partial && !track.partial && !SurelyDrives(kSureWay);
   if (!comes_out && (Drives() || spread(track.state) > kBetter * spread(first))) return;
   first = track.state;
   ranged = sighting.n_points > 0;
@@ -77,9 +77,11 @@ bool Candidate::Steady() const {
   return (way - told).norm() < kAstray + kAstrayShare * way.norm();
 }
 
-bool Candidate::SurelyDrives() const {
-  const double way = (track.state.position() - first.position()).head<2>().norm();
-  return Drives() && Steady() && way > kSureWay;
+bool Candidate::SurelyDrives(double way) const {
+  Eigen::Vector2d d = (track.state.position() - first.position()).head<2>();
+  const Eigen::Vector2d n = range_px.normalized();
+  if (!ranged || last.n_points == 0) d -= n.dot(d) * n;  // what shows of it may grow
+  return Drives() && Steady() && d.norm() > way;
 }
 
 bool Candidate::Drives() const {

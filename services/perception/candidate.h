@@ -26,8 +26,9 @@ struct Candidate {
   /// True when it has gone the way that its velocity tells, as a thing does and pieces of one do
   /// not.
   bool Steady() const;
-  /// True when it has also gone further than what is seen of a standing thing may seem to.
-  bool SurelyDrives() const;
+  /// True when it has also gone this way [m], further than what is seen of a standing thing may
+  /// seem to.
+  bool SurelyDrives(double way) const;
   /// True when LiDAR points of several times tell that it moves.
   bool Fast() const;
 };

@@ -86,7 +86,7 @@ std::optional<Sighting> Finder::Try(const TargetTrack& track, const View& view,
       localiser_.Correct(input, Points(view, detection, track.state.velocity(), fresh_sweeps_only));
   if (!fit || fit->log_odds < kOdds) return std::nullopt;
   // What is hardly known has its range from the size alone; a sweep that was used still tells.
-  if (fit->n_points == 0 && fresh_sweeps_only && track.hits < kKnownHits) {
+  if (fit->n_points == 0 && fresh_sweeps_only && (track.hits < kKnownHits || track.partial)) {
     FitInput placed = input;
     placed.prior = fit->posterior;
     const auto points = [&](const Eigen::Vector3d& v) { return Points(view, detection, v, false); };

@@ -21,7 +21,10 @@ constexpr double kExpectedGate = 4.6;   // likewise of what need not drive, 2 do
 constexpr double kTimeJump = 1.0;       // s back that count as a new recording
 constexpr int kSureHits = 5;            // corrections after which the track is trusted
 constexpr int kProvenHits = 20;         // before, it may have been another thing
-constexpr int kPieceHits = 5;           // sightings of a piece or a half before it is taken
+constexpr int kPieceHits = 5;           // sightings of a piece or a half before it is taken,
+constexpr double kPieceWay = 0.15;      // m that it must have driven,
+constexpr int kNewPieceHits = 10;       // and where no target was ever seen, for there is time
+constexpr double kNewPieceWay = 0.3;    // m, likewise
 constexpr double kDecoySigma = 0.1;     // m, how well its place is known
 constexpr double kDrivenSigma = 0.1;    // m, how well that must be known
 constexpr double kStood = 0.2;          // m, within which a target stands
@@ -32,6 +35,13 @@ constexpr double kStandingSpeed = 0.2;  // m/s
 
 double HorizontalSigma(const TargetTrack& track) {
   return std::sqrt(track.state.covariance.topLeftCorner<2, 2>().diagonal().maxCoeff());
+}
+
+/// True when nothing of it is left out, nor cut off.
+bool AllSeen(const Sighting& s) {
+  const auto& used = s.fit.used;
+  const bool all = std::all_of(used.begin(), used.end(), [](bool side) { return side; });
+  return s.fit.whole && (all || s.detection.p_CT);
 }
 
 /// True when all of it is seen, on its own, and LiDAR points tell where it is.
@@ -87,8 +97,7 @@ bool Perceiver::Sure(const Sighting& s) const {
   if (track_->misses == 0) return true;
   if (s.contested) return false;
   const Eigen::Vector2d off = (s.fit.posterior.position() - track_->state.position()).head<2>();
-  const bool piece = s.detection.part || s.detection.edged;
-  if (Vague()) return s.fit.whole && !piece && off.norm() < config_.state.decoy_radius;
+  if (Vague()) return AllSeen(s) && off.norm() < config_.state.decoy_radius;
   const Eigen::Matrix2d P = track_->state.covariance.topLeftCorner<2, 2>();
   return off.norm() < config_.state.decoy_radius || off.dot(P.ldlt().solve(off)) < kExpectedGate;
 }
@@ -190,7 +199,8 @@ bool Perceiver::Ready(const Candidate& c, double t) const {
   const bool trusted = !doubtful_ && !contested_ && !Vague();
   if (track_ && trusted && t - track_->seen < kTrusted) return false;
   if (c.part || c.track.partial || c.last.detection.AnyCut())
-    return c.SurelyDrives() && c.track.hits >= kPieceHits;
+    return c.SurelyDrives(track_ ? kPieceWay : kNewPieceWay) &&
+           c.track.hits >= (track_ ? kPieceHits : kNewPieceHits);
   if (c.Drives()) return true;
   if (sighting_) return false;
   const bool stood_here = track_ && last_v_.norm() < kStandingSpeed &&
