@@ -23,7 +23,7 @@ constexpr int kSureHits = 5;            // corrections after which the track is 
 constexpr int kProvenHits = 20;         // before, it may have been another thing
 constexpr int kPieceHits = 5;           // sightings of a piece or a half before it is taken,
 constexpr double kPieceWay = 0.15;      // m that it must have driven,
-constexpr int kNewPieceHits = 10;       // and where no target was ever seen, for there is time
+constexpr int kNewPieceHits = 10;       // and where none was ever seen, nor LiDAR tells much
 constexpr double kNewPieceWay = 0.3;    // m, likewise
 constexpr double kDecoySigma = 0.1;     // m, how well its place is known
 constexpr double kDrivenSigma = 0.1;    // m, how well that must be known
@@ -35,6 +35,12 @@ constexpr double kStandingSpeed = 0.2;  // m/s
 
 double HorizontalSigma(const TargetTrack& track) {
   return std::sqrt(track.state.covariance.topLeftCorner<2, 2>().diagonal().maxCoeff());
+}
+
+bool LeavesImage(const Detection& d) {
+  for (size_t side = 0; side < 4; ++side)
+    if (d.cut[side] && !d.goes_on[side]) return true;
+  return false;
 }
 
 /// True when nothing of it is left out, nor cut off.
@@ -198,9 +204,12 @@ bool Perceiver::Ready(const Candidate& c, double t) const {
   if (c.track.misses > 0 || c.track.hits < config_.state.confirm_frames) return false;
   const bool trusted = !doubtful_ && !contested_ && !Vague();
   if (track_ && trusted && t - track_->seen < kTrusted) return false;
-  if (c.part || c.track.partial || c.last.detection.AnyCut())
-    return c.SurelyDrives(track_ ? kPieceWay : kNewPieceWay) &&
-           c.track.hits >= (track_ ? kPieceHits : kNewPieceHits);
+  const bool cut = LeavesImage(c.last.detection);
+  if (c.part || c.track.partial || cut) {
+    const bool hasty = !track_ && (cut || c.last.n_points < kClearPoints);
+    return c.SurelyDrives(hasty ? kNewPieceWay : kPieceWay) &&
+           c.track.hits >= (hasty ? kNewPieceHits : kPieceHits);
+  }
   if (c.Drives()) return true;
   if (sighting_) return false;
   const bool stood_here = track_ && last_v_.norm() < kStandingSpeed &&
