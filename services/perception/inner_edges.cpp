@@ -129,10 +129,11 @@ std::pair<int, int> RowsOf(const cv::Mat& mask, const Edge* left, const Edge* ri
   return {top, bottom};
 }
 
-/// A cap of a piece beyond which the blob goes on, at row `beyond` of its mask.
+/// A cap of a piece in whose middle the blob goes on, at row `beyond` of its mask.
 void CutCap(const Detection& whole, const cv::Rect& tight, int beyond, Side side, Detection* out) {
   if (beyond < 0 || beyond >= whole.mask.rows) return;
-  const cv::Mat row = whole.mask.row(beyond).colRange(tight.x, tight.br().x);
+  const int quarter = tight.width / 4;
+  const cv::Mat row = whole.mask.row(beyond).colRange(tight.x + quarter, tight.br().x - quarter);
   if (cv::countNonZero(row) == 0) return;
   out->silhouette.samples[side].clear();
   out->cut[side] = out->goes_on[side] = true;
