@@ -15,6 +15,7 @@ constexpr double kLeastWidthPx = 6.0;  // what is narrower may be a slit between
 constexpr int kDecoyHits = 3;  // sightings that what stands beside one that drives counts for
 constexpr double kReachMargin = 0.5;    // m
 constexpr double kUsualSpeed = 1.5;     // m/s
+constexpr int kSoonBack = 6;            // frames hidden after which one side at most may be
 constexpr int kClearPoints = 10;        // LiDAR points on what is surely one thing
 constexpr double kReachGate = 11.3;     // squared distance from a hidden target's prediction, 3 dof
 constexpr double kExpectedGate = 4.6;   // likewise of what need not drive, 2 dof
@@ -35,6 +36,14 @@ constexpr double kStandingSpeed = 0.2;  // m/s
 
 double HorizontalSigma(const TargetTrack& track) {
   return std::sqrt(track.state.covariance.topLeftCorner<2, 2>().diagonal().maxCoeff());
+}
+
+/// Sides that the detection shows and the reading does not take for the target's.
+long LeftOut(const Sighting& s) {
+  long count = 0;
+  for (size_t side = 0; side < 4; ++side)
+    count += !s.fit.used[side] && !s.detection.silhouette.samples[side].empty();
+  return count;
 }
 
 bool LeavesImage(const Detection& d) {
@@ -104,6 +113,7 @@ bool Perceiver::Sure(const Sighting& s) const {
   if (s.contested) return false;
   const Eigen::Vector2d off = (s.fit.posterior.position() - track_->state.position()).head<2>();
   if (Vague()) return AllSeen(s) && off.norm() < config_.state.decoy_radius;
+  if (LeftOut(s) > 1 && track_->misses > kSoonBack) return false;
   const Eigen::Matrix2d P = track_->state.covariance.topLeftCorner<2, 2>();
   return off.norm() < config_.state.decoy_radius || off.dot(P.ldlt().solve(off)) < kExpectedGate;
 }
