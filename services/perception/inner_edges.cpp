@@ -13,8 +13,9 @@ namespace {
 constexpr int kLeastStep = 11;         // grey levels across an edge
 constexpr int kSobelGain = 4;          // what a step of one grey level gives
 constexpr int kAside = 3;              // px beside an edge where the shading is smooth
-constexpr int kLeastLength = 10;       // rows of an edge
-constexpr int kGap = 2;                // rows that may be missing of it
+constexpr size_t kLeastLength = 10;    // rows of an edge
+constexpr int kGap = 2;                // rows from one of its peaks to the next at most
+constexpr double kLean = 1.6;          // px, likewise
 constexpr size_t kMostEdges = 4;       // the clearest of a blob
 constexpr double kClearLength = 30.0;  // rows that make an edge no clearer
 constexpr int kLeastPiece = 5;         // px, width of a piece
@@ -54,33 +55,42 @@ cv::Mat Steps(const cv::Mat& bgr, const Detection& d) {
   return out;
 }
 
-/// Peaks of the steps, joined from row to row; the clearest edges, from left to right.
-std::vector<Edge> InnerEdges(const cv::Mat& steps) {
+/// Where a row steps up or down at once, more than the shading of a round side; else nothing.
+std::optional<Eigen::Vector2d> Peak(const cv::Mat& steps, int x, int y) {
+  const auto step = [&](int column) { return std::abs(steps.at<int16_t>(y, column)); };
+  const int at = step(x), before = step(x - 1), after = step(x + 1);
+  if (at < before || at <= after) return std::nullopt;
+  const int slope = std::max(step(x - kAside), step(x + kAside));
+  if (at - slope < kSobelGain * kLeastStep) return std::nullopt;
+  const double curve = before - 2.0 * at + after;
+  return Eigen::Vector2d(x + (curve < 0.0 ? 0.5 * (before - after) / curve : 0.0), y);
+}
+
+/// Peaks joined from row to row.
+std::vector<Edge> Joined(const cv::Mat& steps) {
   std::vector<Edge> edges;
   for (int y = 0; y < steps.rows; ++y)
     for (int x = kAside; x + kAside < steps.cols; ++x) {
-      const auto step = [&](int column) { return std::abs(steps.at<int16_t>(y, column)); };
-      const int at = step(x), before = step(x - 1), after = step(x + 1);
-      if (at < before || at <= after) continue;
-      const int slope = std::max(step(x - kAside), step(x + kAside));  // of a round side
-      if (at - slope < kSobelGain * kLeastStep) continue;
-      const double curve = before - 2.0 * at + after;
-      const Eigen::Vector2d px(x + (curve < 0.0 ? 0.5 * (before - after) / curve : 0.0), y);
+      const auto px = Peak(steps, x, y);
+      if (!px) continue;
       const auto joins = [&](const Edge& e) {
-        return y > e.bottom() && y - e.bottom() <= kGap && std::abs(px.x() - e.px.back().x()) < 1.6;
+        return y > e.bottom() && y - e.bottom() <= kGap &&
+               std::abs(px->x() - e.px.back().x()) < kLean;
       };
-      const auto edge = std::find_if(edges.begin(), edges.end(), joins);
-      if (edge == edges.end()) {
-        edges.push_back({{px}, static_cast<double>(at)});
-      } else {
-        edge->px.push_back(px);
-        edge->steps += at;
-      }
+      auto edge = std::find_if(edges.begin(), edges.end(), joins);
+      if (edge == edges.end()) edge = edges.insert(edges.end(), Edge());
+      edge->px.push_back(*px);
+      edge->steps += std::abs(steps.at<int16_t>(y, x));
     }
-  edges.erase(
-      std::remove_if(edges.begin(), edges.end(),
-                     [](const Edge& e) { return e.px.size() < static_cast<size_t>(kLeastLength); }),
-      edges.end());
+  return edges;
+}
+
+/// The clearest edges, from left to right.
+std::vector<Edge> InnerEdges(const cv::Mat& steps) {
+  auto edges = Joined(steps);
+  edges.erase(std::remove_if(edges.begin(), edges.end(),
+                             [](const Edge& e) { return e.px.size() < kLeastLength; }),
+              edges.end());
   std::stable_sort(edges.begin(), edges.end(),
                    [](const Edge& a, const Edge& b) { return a.Clearness() > b.Clearness(); });
   if (edges.size() > kMostEdges) edges.resize(kMostEdges);
@@ -151,7 +161,8 @@ std::optional<Detection> Between(const cv::Mat& bgr, const Detection& whole, con
     whole.mask(run).copyTo(mask(run));
   }
   const cv::Rect tight = cv::boundingRect(mask);
-  if (tight.width < kLeastPiece || tight.height < kLeastLength) return std::nullopt;
+  if (tight.width < kLeastPiece || tight.height < static_cast<int>(kLeastLength))
+    return std::nullopt;
   Detection piece = whole;
   piece.mask = mask;
   auto out = *CropTo(bgr, piece, whole.mask_box);

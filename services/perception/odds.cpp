@@ -18,7 +18,7 @@ constexpr double kRunsOnToo = 0.5;    // and beyond another one then
 // apart, as far away as may be.
 constexpr double kClutter = 0.3, kClutterSidePx = 60.0, kClutterDepth = 10.0;
 constexpr double kUnexplained = 0.5, kMostUnexplained = 6.0;  // for points at other ranges
-constexpr double kThrough = 1.0, kMostThrough = 20.0;  // for rays that went through it
+constexpr double kThrough = 1.0, kMostThrough = 20.0;         // for rays that went through it
 
 /// Density of the sides as they were seen, hidden ones anywhere inside.
 double LogSides(const FitResult& fit, const FitInput& input, const FitConfig& config) {

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "services/perception/sightings.h"
+
 namespace chase::perception {
 
 namespace {
@@ -16,7 +18,6 @@ constexpr int kDecoyHits = 3;  // sightings that what stands beside one that dri
 constexpr double kReachMargin = 0.5;    // m
 constexpr double kUsualSpeed = 1.5;     // m/s
 constexpr int kSoonBack = 6;            // frames hidden after which one side at most may be
-constexpr int kClearPoints = 10;        // LiDAR points on what is surely one thing
 constexpr double kReachGate = 11.3;     // squared distance from a hidden target's prediction, 3 dof
 constexpr double kExpectedGate = 4.6;   // likewise of what need not drive, 2 dof
 constexpr double kTimeJump = 1.0;       // s back that count as a new recording
@@ -36,33 +37,6 @@ constexpr double kStandingSpeed = 0.2;  // m/s
 
 double HorizontalSigma(const TargetTrack& track) {
   return std::sqrt(track.state.covariance.topLeftCorner<2, 2>().diagonal().maxCoeff());
-}
-
-/// Sides that the detection shows and the reading does not take for the target's.
-long LeftOut(const Sighting& s) {
-  long count = 0;
-  for (size_t side = 0; side < 4; ++side)
-    count += !s.fit.used[side] && !s.detection.silhouette.samples[side].empty();
-  return count;
-}
-
-bool LeavesImage(const Detection& d) {
-  for (size_t side = 0; side < 4; ++side)
-    if (d.cut[side] && !d.goes_on[side]) return true;
-  return false;
-}
-
-/// True when nothing of it is left out, nor cut off.
-bool AllSeen(const Sighting& s) {
-  const auto& used = s.fit.used;
-  const bool all = std::all_of(used.begin(), used.end(), [](bool side) { return side; });
-  return s.fit.whole && (all || s.detection.p_CT);
-}
-
-/// True when all of it is seen, on its own, and LiDAR points tell where it is.
-bool Clear(const Sighting& s) {
-  const Detection& d = s.detection;
-  return s.fit.whole && s.n_points >= kClearPoints && !d.part && !d.edged && !d.AnyCut();
 }
 
 }  // namespace
