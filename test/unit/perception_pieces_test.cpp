@@ -1,0 +1,250 @@
+// Pieces of one blob, and what LiDAR points tell for or against one of them.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+#include <random>
+
+#include "perception_world.h"
+#include "services/perception/candidate.h"
+#include "services/perception/color_detector.h"
+#include "services/perception/inner_edges.h"
+#include "services/perception/localiser.h"
+#include "services/perception/silhouette.h"
+#include "services/perception/target_points.h"
+
+namespace chase::perception {
+namespace {
+
+using Eigen::Vector3d;
+using perception_test::Renderer;
+using perception_test::StillWorld;
+using perception_test::Thing;
+
+const cv::Rect kBig(120, 80, 64, 60), kSmall(140, 92, 20, 36);
+
+/// Orange whose mean of red and green is `grey`.
+cv::Scalar Orange(double grey) { return {0.07 * grey, 0.62 * grey, 1.38 * grey}; }
+
+cv::Mat Scene() { return {240, 376, CV_8UC3, cv::Scalar(120, 120, 120)}; }
+
+/// Adds pixel noise of three levels, and takes all of `blob` for one detection.
+Detection Blob(const cv::Rect& blob, cv::Mat* bgr, uint32_t seed = 7) {
+  std::mt19937 random(seed);
+  std::normal_distribution<double> noise(0.0, 3.0);
+  for (int y = 0; y < bgr->rows; ++y)
+    for (int x = 0; x < bgr->cols; ++x)
+      for (int i = 0; i < 3; ++i) {
+        auto& level = bgr->at<cv::Vec3b>(y, x)[i];
+        level = cv::saturate_cast<uint8_t>(level + noise(random));
+      }
+  Detection d;
+  d.mask_box = blob;
+  d.mask = cv::Mat(blob.size(), CV_8U, cv::Scalar(255));
+  d.box = EdgeBox(blob);
+  d.silhouette = TraceSilhouette(*bgr, d.mask, blob, {});
+  return d;
+}
+
+/// The piece whose left and right side, upper and lower end lie within these px of a rectangle's.
+const Detection* PieceAt(const std::vector<Detection>& pieces, const cv::Rect& rect, double side,
+                         double cap) {
+  const cv::Rect2d box = EdgeBox(rect);
+  const auto it = std::find_if(pieces.begin(), pieces.end(), [&](const Detection& d) {
+    return std::abs(d.box.x - box.x) <= side && std::abs(d.box.br().x - box.br().x) <= side &&
+           std::abs(d.box.y - box.y) <= cap && std::abs(d.box.br().y - box.br().y) <= cap;
+  });
+  return it == pieces.end() ? nullptr : &*it;
+}
+
+TEST(PerceptionInnerEdges, OneThingBeforeAnotherOfItsColourIsAPiece) {
+  for (const double step : {-40.0, -20.0, 20.0})
+    for (uint32_t seed = 1; seed <= 5; ++seed) {
+      cv::Mat bgr = Scene();
+      cv::rectangle(bgr, kBig, Orange(140.0), cv::FILLED);
+      cv::rectangle(bgr, kSmall, Orange(140.0 + step), cv::FILLED);
+      const auto pieces = SplitAtEdges(bgr, Blob(kBig, &bgr, seed));
+      const Detection* piece = PieceAt(pieces, kSmall, 1.0, 3.0);
+      ASSERT_TRUE(piece) << "step " << step << ", seed " << seed;
+      EXPECT_TRUE(piece->edged);
+      for (const auto& [side, u] : {std::pair(kLeft, 139.5), std::pair(kRight, 159.5)}) {
+        EXPECT_GE(piece->silhouette.samples[side].size(), 4u);
+        for (const auto& px : piece->silhouette.samples[side]) EXPECT_NEAR(px.x(), u, 0.6);
+      }
+      EXPECT_TRUE(piece->goes_on[kTop] && piece->goes_on[kBottom]) << "the larger one does";
+      EXPECT_FALSE(piece->cut[kLeft] || piece->cut[kRight]);
+    }
+}
+
+TEST(PerceptionInnerEdges, WhatIsEvenOrRoundIsOnePiece) {
+  cv::Mat even = Scene(), round = Scene();
+  cv::rectangle(even, kBig, Orange(140.0), cv::FILLED);
+  EXPECT_TRUE(SplitAtEdges(even, Blob(kBig, &even)).empty());
+  for (int x = 0; x < kBig.width; ++x) {
+    const double across = 2.0 * (x + 0.5) / kBig.width - 1.0;
+    const double grey = 20.0 + 150.0 * std::cos(std::asin(across));
+    cv::rectangle(round, {kBig.x + x, kBig.y, 1, kBig.height}, Orange(grey), cv::FILLED);
+  }
+  EXPECT_TRUE(SplitAtEdges(round, Blob(kBig, &round)).empty());
+}
+
+TEST(PerceptionInnerEdges, AFaintStepIsNoEdge) {
+  cv::Mat bgr = Scene();
+  cv::rectangle(bgr, kBig, Orange(140.0), cv::FILLED);
+  cv::rectangle(bgr, kSmall, Orange(144.0), cv::FILLED);
+  EXPECT_TRUE(SplitAtEdges(bgr, Blob(kBig, &bgr)).empty());
+}
+
+TEST(PerceptionInnerEdges, AnEdgeThatFadesHalfWayGivesThePieceInFull) {
+  const cv::Rect wide(120, kSmall.y, 64, kSmall.height);
+  const cv::Rect clear(kSmall.x, kSmall.y, kSmall.width, kSmall.height / 2);
+  cv::Mat bgr = Scene();
+  cv::rectangle(bgr, wide, Orange(140.0), cv::FILLED);
+  cv::rectangle(bgr, clear, Orange(110.0), cv::FILLED);
+  const auto pieces = SplitAtEdges(bgr, Blob(wide, &bgr));
+  EXPECT_TRUE(PieceAt(pieces, clear, 1.0, 3.0));
+  EXPECT_TRUE(PieceAt(pieces, kSmall, 1.0, 1.0));
+}
+
+TEST(PerceptionInnerEdges, TheBlobItselfIsLeftAsItIs) {
+  cv::Mat bgr = Scene();
+  cv::rectangle(bgr, kBig, Orange(140.0), cv::FILLED);
+  cv::rectangle(bgr, kSmall, Orange(100.0), cv::FILLED);
+  const Detection blob = Blob(kBig, &bgr);
+  const cv::Mat image = bgr.clone();
+  auto pieces = SplitAtEdges(bgr, blob);
+  ASSERT_FALSE(pieces.empty());
+  for (auto& piece : pieces) piece.mask.setTo(0);  // nor do they share it
+  EXPECT_EQ(cv::countNonZero(blob.mask), kBig.area());
+  EXPECT_EQ(cv::norm(bgr, image, cv::NORM_INF), 0.0);
+}
+
+const Vector3d kTarget(3.0, 0.0, 0.55), kLidar(0.0, 0.0, 1.0);
+
+FitInput Predicted() {
+  FitInput input;
+  input.prior.mean.head<3>() = kTarget;
+  input.prior.covariance *= 1e-4;
+  return input;
+}
+
+TargetPoint PointAt(const Vector3d& p_W, double age = 0.0) {
+  return {p_W, kLidar, age, (p_W - kLidar).norm()};
+}
+
+/// Share of radius and half height off the centre at which the ray passes nearest, step by step:
+/// where it is nearest to the axis, and the least of all places.
+std::pair<double, double> Passes(const TargetPoint& p, const Vector3d& center) {
+  double nearest = 1e9, at_nearest = 0.0, least = 1e9;
+  for (double s = 0.0; s <= 1.0; s += 2e-4) {
+    const Vector3d d = p.p_WL + s * (p.p_W - p.p_WL) - center;
+    const double beside = d.head<2>().norm() / 0.15, above = std::abs(d.z()) / 0.25;
+    if (beside < nearest) nearest = beside, at_nearest = std::max(beside, above);
+    least = std::min(least, std::max(beside, above));
+  }
+  return {at_nearest, least};
+}
+
+TEST(PerceptionRays, OnlyThoseThroughThePlacedCylinderCount) {
+  std::mt19937 random(4);
+  std::uniform_real_distribution<double> u(-1.0, 1.0);
+  FitInput input = Predicted();
+  TargetGaussian placed = input.prior;
+  placed.mean << 3.0, 0.2, 0.55, 0.0, 1.0, 0.0;
+  Clusters hits(2), before(1), on(1);
+  int through = 0, beside = 0;
+  for (int i = 0; i < 600; ++i) {
+    const auto p =
+        PointAt({4.0, 0.2 + 0.5 * u(random), 0.4 + 0.6 * u(random)}, 0.05 + 0.05 * u(random));
+    const auto [at_nearest, least] = Passes(p, placed.position() - p.age * placed.velocity());
+    if (at_nearest >= 0.75 && least <= 1.0) continue;  // its rim
+    (at_nearest < 0.75 ? through : beside) += 1;
+    hits[static_cast<size_t>(i % 2)].push_back(p);
+    before[0].push_back(PointAt(kLidar + 0.6 * (p.p_W - kLidar), p.age));
+    on[0].push_back(PointAt(kLidar + 0.74 * (p.p_W - kLidar), p.age));
+  }
+  ASSERT_GT(through, 30);
+  ASSERT_GT(beside, 200);
+  EXPECT_EQ(RaysThrough(input, placed), 0) << "no points at all";
+  input.hits = &hits;
+  EXPECT_EQ(RaysThrough(input, placed), through);
+  input.hits = &before;
+  EXPECT_EQ(RaysThrough(input, placed), 0) << "they end before it";
+  input.hits = &on;
+  EXPECT_EQ(RaysThrough(input, placed), 0) << "they end on it";
+}
+
+TEST(PerceptionRays, ManyPointsAndNoneOfThemOnTheTargetHitAnotherThing) {
+  const FitInput input = Predicted();
+  std::vector<TargetPoint> behind, on;
+  for (int i = 0; i < 10; ++i) behind.push_back(PointAt({4.0, 0.02 * i, 0.5}));
+  for (int i = 0; i < 3; ++i) on.push_back(PointAt({2.85, 0.0, 0.45 + 0.1 * i}));
+  const std::vector<TargetPoint> seven(behind.begin(), behind.begin() + 7);
+  const std::vector<TargetPoint> two(on.begin(), on.begin() + 2);
+  std::vector<TargetPoint> mixed = on;
+  mixed.insert(mixed.end(), seven.begin(), seven.end());
+  EXPECT_TRUE(HitElsewhere(input, {behind}, 0.1));
+  EXPECT_TRUE(HitElsewhere(input, {two, behind}, 0.1)) << "two give no range";
+  EXPECT_FALSE(HitElsewhere(input, {on, seven}, 0.1));
+  EXPECT_FALSE(HitElsewhere(input, {mixed}, 0.1));
+  behind.pop_back();
+  EXPECT_FALSE(HitElsewhere(input, {behind}, 0.1));
+  EXPECT_FALSE(HitElsewhere(input, {}, 0.1));
+}
+
+/// Something grey hides the left half of the target.
+TEST(PerceptionAcquire, HalfOfATargetIsPlacedByItsHeightUnlessPointsTellAnotherRange) {
+  const Localiser localiser(PerceptionConfig{});
+  const ColorDetector detector(DetectorConfig{}, 0.45);
+  for (const double distance : {3.0, 3.5, 4.0}) {
+    auto world = StillWorld(distance);
+    world.things.push_back(
+        {Thing::Kind::kBox, {2.0, 0.5, 1.0}, {0.05, 0.5, 1.0}, {0.55, 0.6, 0.7}});
+    const auto shot = Renderer(world).Image(0.0);
+    ASSERT_NEAR(shot.visible_share, 0.5, 0.15);
+    const auto found = detector.Detect(shot.bgr);
+    ASSERT_FALSE(found.empty());
+    PoseSample pose;
+    pose.p_WB = world.body(0.0).p;
+    pose.R_WB = world.body(0.0).R;
+    const Camera camera = CameraAt(pose, world.rig);
+    const auto fit = localiser.Acquire({}, camera, found[0], {});
+    ASSERT_TRUE(fit) << distance;
+    EXPECT_FALSE(fit->whole);
+    EXPECT_FALSE(fit->used[kLeft]);
+    EXPECT_LT((fit->posterior.position() - world.target(0.0)).norm(), 0.15) << distance;
+    const Vector3d sight = (fit->posterior.position() - camera.p_WC).normalized();
+    std::vector<TargetPoint> nearer;
+    for (int i = 0; i < 12; ++i)
+      nearer.push_back(
+          {camera.p_WC + 1.5 * sight + Vector3d(0.0, 0.004 * i, 0.0), camera.p_WC, 0.0, 1.5});
+    EXPECT_FALSE(localiser.Acquire({}, camera, found[0], {nearer})) << distance;
+  }
+}
+
+TEST(PerceptionCandidate, WithoutPointsAWayAlongTheLineOfSightIsNotSure) {
+  const auto gone = [](const Vector3d& way) {
+    Candidate c;
+    c.first.mean << kTarget, Vector3d::Zero();
+    c.first.covariance = 1e-4 * Matrix6d::Identity();
+    c.track.state = c.first;
+    c.track.state.mean << kTarget + way, way;
+    c.track.t = 1.0;
+    c.px = 3.0 / 220.0;
+    c.range_px = {0.05, 0.0};
+    return c;
+  };
+  Candidate along = gone({0.4, 0.0, 0.0}), across = gone({0.0, 0.4, 0.0});
+  ASSERT_TRUE(along.Drives() && along.Steady() && across.Drives() && across.Steady());
+  EXPECT_FALSE(along.SurelyDrives(0.15));
+  EXPECT_TRUE(across.SurelyDrives(0.15));
+  EXPECT_FALSE(across.SurelyDrives(0.5));
+  along.ranged = true;
+  EXPECT_FALSE(along.SurelyDrives(0.15)) << "points of the first time alone";
+  along.last.n_points = 20;
+  EXPECT_TRUE(along.SurelyDrives(0.15));
+}
+
+}  // namespace
+}  // namespace chase::perception
