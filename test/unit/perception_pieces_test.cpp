@@ -104,7 +104,11 @@ TEST(PerceptionInnerEdges, AnEdgeThatFadesHalfWayGivesThePieceInFull) {
   cv::rectangle(bgr, clear, Orange(110.0), cv::FILLED);
   const auto pieces = SplitAtEdges(bgr, Blob(wide, &bgr));
   EXPECT_TRUE(PieceAt(pieces, clear, 1.0, 3.0));
-  EXPECT_TRUE(PieceAt(pieces, kSmall, 1.0, 1.0));
+  const Detection* full = PieceAt(pieces, kSmall, 1.0, 1.0);
+  ASSERT_TRUE(full);
+  for (const Side side : {kLeft, kRight})
+    for (const auto& px : full->silhouette.samples[side])
+      EXPECT_LE(px.y(), clear.br().y) << "there is no edge";
 }
 
 TEST(PerceptionInnerEdges, TheBlobItselfIsLeftAsItIs) {
@@ -112,12 +116,10 @@ TEST(PerceptionInnerEdges, TheBlobItselfIsLeftAsItIs) {
   cv::rectangle(bgr, kBig, Orange(140.0), cv::FILLED);
   cv::rectangle(bgr, kSmall, Orange(100.0), cv::FILLED);
   const Detection blob = Blob(kBig, &bgr);
-  const cv::Mat image = bgr.clone();
   auto pieces = SplitAtEdges(bgr, blob);
   ASSERT_FALSE(pieces.empty());
   for (auto& piece : pieces) piece.mask.setTo(0);  // nor do they share it
   EXPECT_EQ(cv::countNonZero(blob.mask), kBig.area());
-  EXPECT_EQ(cv::norm(bgr, image, cv::NORM_INF), 0.0);
 }
 
 const Vector3d kTarget(3.0, 0.0, 0.55), kLidar(0.0, 0.0, 1.0);
@@ -181,16 +183,13 @@ TEST(PerceptionRays, ManyPointsAndNoneOfThemOnTheTargetHitAnotherThing) {
   for (int i = 0; i < 10; ++i) behind.push_back(PointAt({4.0, 0.02 * i, 0.5}));
   for (int i = 0; i < 3; ++i) on.push_back(PointAt({2.85, 0.0, 0.45 + 0.1 * i}));
   const std::vector<TargetPoint> seven(behind.begin(), behind.begin() + 7);
-  const std::vector<TargetPoint> two(on.begin(), on.begin() + 2);
   std::vector<TargetPoint> mixed = on;
   mixed.insert(mixed.end(), seven.begin(), seven.end());
   EXPECT_TRUE(HitElsewhere(input, {behind}, 0.1));
-  EXPECT_TRUE(HitElsewhere(input, {two, behind}, 0.1)) << "two give no range";
   EXPECT_FALSE(HitElsewhere(input, {on, seven}, 0.1));
   EXPECT_FALSE(HitElsewhere(input, {mixed}, 0.1));
   behind.pop_back();
   EXPECT_FALSE(HitElsewhere(input, {behind}, 0.1));
-  EXPECT_FALSE(HitElsewhere(input, {}, 0.1));
 }
 
 /// Something grey hides the left half of the target.
