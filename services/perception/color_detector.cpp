@@ -13,7 +13,6 @@ namespace {
 
 constexpr double kMaskScore = 127.0;  // half of full score: the blob's pixels
 constexpr double kOneThing = 0.85;    // score of a blob that is surely not several
-constexpr double kOfAnyShape = 0.6;   // of what something else ends, if solid
 constexpr double kWellShaped = 0.35;  // of a piece of one that may be
 constexpr int kSplitArea = 60;        // px^2 of a blob that may be several
 constexpr size_t kMostPieces = 10;
@@ -49,12 +48,10 @@ std::vector<cv::Point> RowEnds(const cv::Mat& mask) {
 
 double ColorDetector::ShapeScore(const Detection& d, double area, double hull_area) const {
   const double solid = std::min(1.0, area / std::max(hull_area, 1.0));
-  const double of_any = d.AnyCut() || d.edged ? kOfAnyShape * solid : 0.0;
-  if (d.AnyCut()) return of_any;
+  if (d.AnyCut()) return 0.6 * solid;
   const double aspect = d.box.width / d.box.height, fill = area / d.box.area();
-  const double alike = solid * Bell(std::log(aspect / shape_.aspect), shape_.aspect_tolerance) *
-                       Bell(std::min(0.0, fill - shape_.fill), shape_.fill_tolerance);
-  return std::max(of_any, alike);
+  return solid * Bell(std::log(aspect / shape_.aspect), shape_.aspect_tolerance) *
+         Bell(std::min(0.0, fill - shape_.fill), shape_.fill_tolerance);
 }
 
 Detection ColorDetector::Describe(const cv::Mat& bgr, const cv::Mat& score,
@@ -92,7 +89,8 @@ void ColorDetector::AddPieces(const cv::Mat& bgr, const cv::Mat& score,
     for (auto& piece : parts) {
       Rate(score, &piece);
       piece.part = whole.score > kWellShaped;
-      if (piece.score > kWellShaped) pieces.push_back(std::move(piece));
+      // What another thing ends need not have the target's shape.
+      if (piece.edged || piece.score > kWellShaped) pieces.push_back(std::move(piece));
     }
   }
   std::stable_sort(pieces.begin(), pieces.end(),

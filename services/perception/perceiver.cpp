@@ -130,7 +130,7 @@ void Perceiver::DropMissed() {
 }
 
 bool Perceiver::MayBeNew(const Detection& d) const {
-  return d.score >= config_.state.acquire_score && d.box.width >= kLeastWidthPx;
+  return (d.edged || d.score >= config_.state.acquire_score) && d.box.width >= kLeastWidthPx;
 }
 
 /// True when a candidate is followed there.

@@ -20,13 +20,13 @@ std::vector<TargetPoint> PointsOnTarget(const FitInput& input,
 /// several times: the target is not there.
 bool SeenThrough(const FitInput& input, const Clusters& clusters);
 
-/// Points in all clusters.
 /// Rays to the points on the detection that go through a target placed there, and end behind it.
 int RaysThrough(const FitInput& input, const TargetGaussian& target);
 
 /// True when many points hit the detection, and none of them the target as predicted.
 bool HitElsewhere(const FitInput& input, const Clusters& clusters, double gate);
 
+/// Points in all clusters.
 double CountPoints(const Clusters& clusters);
 
 /// From the camera [m]; the cluster must hold enough points to give a range.
