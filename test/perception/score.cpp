@@ -9,11 +9,10 @@ namespace {
 
 using perception::TargetState;
 
-constexpr double kSettle = 0.5;   // s before frames count
-constexpr double kWrong = 0.5;    // m off the target: another thing
-constexpr double k95 = 7.815;     // 95 % of chi square with 3 degrees of freedom
-constexpr double kHalf = 0.5;     // share of the target that counts as seen
-constexpr double kGlimpse = 0.2;  // s; what hides again before is no return, unless found
+constexpr double kSettle = 0.5;  // s before frames count
+constexpr double kWrong = 0.5;   // m off the target: another thing
+constexpr double k95 = 7.815;    // 95 % of chi square with 3 degrees of freedom
+constexpr double kHalf = 0.5;    // share of the target that counts as seen
 
 double Share(double part, double whole) { return whole > 0.0 ? part / whole : 0.0; }
 
@@ -59,7 +58,7 @@ void Score::AddFrame(const Outcome& o) {
 }
 
 /// Full occlusions of a target that was being followed: until it is said, and from half of the
-/// target being back until it is found; a glimpse too short to be found in time does not count.
+/// target being back until it is found.
 void Score::AddOcclusions(const std::vector<Outcome>& flight) {
   for (size_t i = 1; i < flight.size(); ++i) {
     if (flight[i].visible_share > 0.0 || flight[i - 1].visible_share <= 0.0) continue;
@@ -78,11 +77,8 @@ void Score::AddOcclusions(const std::vector<Outcome>& flight) {
     size_t found = end;
     while (found < flight.size() && !Detected(flight[found])) ++found;
     if (found == flight.size()) --found;
-    wrong_after_ += Error(flight[found]) > kWrong;
-    size_t gone = back;
-    while (gone < flight.size() && flight[gone].visible_share >= kHalf) ++gone;
-    if (found >= gone && flight[gone].t - flight[back].t < kGlimpse) continue;
     found_.push_back(std::max(0.0, flight[found].t - flight[back].t));
+    wrong_after_ += Error(flight[found]) > kWrong;
   }
 }
 
