@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "services/perception/sightings.h"
+
 namespace chase::perception {
 
 namespace {
@@ -13,12 +15,21 @@ constexpr double kMovedUnclear = 0.06, kMovedUnclearPx = 4.0;  // where somethin
 constexpr double kMovedAcross = 0.03, kMovedAcrossPx = 2.0;    // where all of it is seen sharply
 constexpr double kSharpWidthPx = 12.0;  // from which its place across is known so well
 constexpr double kMovedGate = 11.8;     // squared distance, 2 dof, that chance does not reach
+constexpr double kSlow = 0.1;           // m/s, what is slower stands, as far as errors go
 constexpr double kFast = 0.3;           // m/s that LiDAR points of two sweeps tell from standing,
 constexpr double kFastGate = 30.0;      // and its squared distance from it, 2 dof
-constexpr double kKnownSigmas = 2.0;    // from which a way along the line of sight counts
+constexpr int kShownHits = 2;           // sightings before something may hide a side
+constexpr double kFastAge = 0.08;       // s since the last of them, at most
+constexpr double kKnownSigmas = 1.5;    // from which a way along the line of sight counts
 constexpr double kAstray = 0.1, kAstrayShare = 0.5;  // m and share of its way, off what is told
 constexpr double kSureWay = 0.15;                    // m
 constexpr double kBetter = 0.25;  // share of the first variance from which a start is taken anew
+
+void CountSweep(Candidate* c) {
+  if (c->last.n_points == 0) return;
+  ++c->sweeps;
+  c->swept = c->track.t;
+}
 
 }  // namespace
 
@@ -26,6 +37,7 @@ void Candidate::Correct(const Sighting& sighting) {
   const bool was_partial = track.partial;
   track.Correct(sighting.fit);
   last = sighting;
+  CountSweep(this);
   const Detection& d = sighting.detection;
   part = part && (d.part || d.edged || d.AnyCut());
   const auto spread = [](const TargetGaussian& g) {
@@ -51,6 +63,7 @@ Candidate NewCandidate(const Sighting& sighting, const View& view) {
   c.ranged = sighting.n_points > 0;
   c.range_px = sight.head<2>() / sighting.detection.box.height;
   c.part = sighting.detection.part || sighting.detection.edged;
+  CountSweep(&c);
   return c;
 }
 
@@ -64,8 +77,13 @@ void ForgetVelocity(const MotionConfig& config, Candidate* candidate) {
       Eigen::Vector3d(speed * speed, speed * speed, vertical * vertical).asDiagonal();
 }
 
+bool Candidate::HiddenIn(const Sighting& s) const {
+  return ranged && !part && track.hits >= kShownHits && s.n_points >= kClearPoints &&
+         !s.detection.AnyCut() && LeftOut(s) == 1;
+}
+
 bool Candidate::Fast() const {
-  if (!ranged || last.n_points == 0 || !(track.t > known)) return false;
+  if (track.t - swept > kFastAge) return false;
   const Eigen::Vector2d v = track.state.velocity().head<2>();
   return v.norm() > kFast &&
          v.dot(track.state.covariance.block<2, 2>(3, 3).ldlt().solve(v)) > kFastGate;
@@ -85,13 +103,15 @@ bool Candidate::SurelyDrives(double way) const {
 }
 
 bool Candidate::Drives() const {
-  const bool whole = !last.detection.AnyCut();
-  if (whole && Fast()) return true;
+  const bool whole = !last.detection.AnyCut() && (last.fit.whole || track.partial);
+  // Taken from its size, its range may be wrong, and so may be its speed.
+  const bool told = ranged && last.n_points > 0 && track.t > known;
+  if (whole && told && Fast()) return true;
   Eigen::Vector2d d = (track.state.position() - first.position()).head<2>();
   Eigen::Matrix2d P =
       track.state.covariance.topLeftCorner<2, 2>() + first.covariance.topLeftCorner<2, 2>();
   if (!ranged) P += range_px * range_px.transpose();  // edges err alike from frame to frame
-  if (d.dot(P.ldlt().solve(d)) < kMovedGate) return false;
+  if (d.dot(P.ldlt().solve(d)) < kMovedGate || d.norm() < kSlow * (track.t - known)) return false;
   const Eigen::Vector2d n = range_px.normalized();
   const double along = n.dot(d), sigma = std::sqrt(n.dot(P * n));
   if (whole && last.detection.box.width > kSharpWidthPx &&

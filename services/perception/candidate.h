@@ -15,11 +15,17 @@ struct Candidate {
   /// Along the line of sight, as far as one pixel less of its height moves it; frame W, m.
   Eigen::Vector2d range_px = Eigen::Vector2d::UnitX();
 
-  bool part = false;   ///< a piece of something larger, always so far: it must drive
-  double known = 0.0;  ///< time of `first`, s
+  bool part = false;     ///< a piece of something larger, always so far: it must drive
+  double known = 0.0;    ///< time of `first`, s
+  int sweeps = 0;        ///< sightings with LiDAR points
+  double swept = -1e18;  ///< time of the last such one, s
 
   /// Takes over a sighting at the track's time.
   void Correct(const Sighting& sighting);
+
+  /// True when something has come before a side of what was all in view, and LiDAR still tells
+  /// where it is.
+  bool HiddenIn(const Sighting& sighting) const;
 
   /// True when it has surely moved from where it was first seen.
   bool Drives() const;
@@ -29,7 +35,7 @@ struct Candidate {
   /// True when it has also gone this way [m], further than what is seen of a standing thing may
   /// seem to.
   bool SurelyDrives(double way) const;
-  /// True when LiDAR points of several times tell that it moves.
+  /// True when its speed is no chance, with LiDAR points on it just now.
   bool Fast() const;
 };
 

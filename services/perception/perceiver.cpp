@@ -10,87 +10,20 @@ namespace chase::perception {
 namespace {
 
 constexpr double kUnknownVariance = 1e4;  // m^2, while nothing is known
-constexpr double kGateSigmas = 3.0;
-constexpr int kCandidateMisses = 2;  // frames without it that end a candidate
+constexpr int kCandidateMisses = 2;       // frames without it that end a candidate
 constexpr size_t kMaxCandidates = 6;
 constexpr double kLeastWidthPx = 6.0;  // what is narrower may be a slit between things
-constexpr int kDecoyHits = 3;  // sightings that what stands beside one that drives counts for
-constexpr double kReachMargin = 0.5;    // m
-constexpr double kUsualSpeed = 1.5;     // m/s
-constexpr int kSoonBack = 6;            // frames hidden after which one side at most may be
-constexpr double kReachGate = 11.3;     // squared distance from a hidden target's prediction, 3 dof
-constexpr double kExpectedGate = 4.6;   // likewise of what need not drive, 2 dof
-constexpr double kTimeJump = 1.0;       // s back that count as a new recording
-constexpr int kSureHits = 5;            // corrections after which the track is trusted
-constexpr int kProvenHits = 20;         // before, it may have been another thing
-constexpr int kPieceHits = 4;           // sightings of a piece or a half before it is taken,
-constexpr double kPieceWay = 0.15;      // m that it must have driven,
-constexpr int kNewPieceHits = 10;       // and where none was ever seen, nor LiDAR tells much
-constexpr double kNewPieceWay = 0.3;    // m, likewise
-constexpr double kDecoySigma = 0.1;     // m, how well its place is known
-constexpr double kDrivenSigma = 0.1;    // m, how well that must be known
-constexpr double kStood = 0.2;          // m, within which a target stands
-constexpr double kStoodFor = 0.6;       // s, likewise
-constexpr double kFar = 5.0;            // m, from where fewer pixels tell what stands there
-constexpr double kTrusted = 0.3;        // s that a track not seen is preferred to anything new
-constexpr double kStandingSpeed = 0.2;  // m/s
-
-double HorizontalSigma(const TargetTrack& track) {
-  return std::sqrt(track.state.covariance.topLeftCorner<2, 2>().diagonal().maxCoeff());
-}
+constexpr int kDecoyHits = 3;      // sightings that what stands beside one that drives counts for
+constexpr double kTimeJump = 1.0;  // s back that count as a new recording
+constexpr int kSureHits = 5;       // corrections after which the track is trusted
+constexpr double kDrivenSigma = 0.1;  // m, how well that must be known
+constexpr double kStood = 0.2;        // m, within which a target stands
+constexpr double kStoodFor = 0.6;     // s, likewise
 
 }  // namespace
 
 Perceiver::Perceiver(const PerceptionConfig& config)
     : config_(config), finder_(config), decoys_(config.state) {}
-
-/// True when a look-alike known to stand there explains a sighting better than the target does.
-bool Perceiver::IsRatherDecoy(const Sighting& s, const View& view) const {
-  const Decoy* decoy = decoys_.At(s.fit.posterior.position());
-  if (!decoy) return false;
-  TargetTrack standing{s.fit.posterior, s.fit.shape, view.t, view.t, 1, 0};
-  standing.state.mean << decoy->p_W, Eigen::Vector3d::Zero();
-  standing.state.covariance = Matrix6d::Identity() * kDecoySigma * kDecoySigma;
-  if (track_) {  // on the same terms
-    standing.misses = track_->misses;
-    standing.joined = track_->joined;
-  }
-  const auto other = finder_.Try(standing, view, s.detection, false);
-  return other && other->fit.log_odds > s.fit.log_odds;
-}
-
-bool Perceiver::Plausible(const Sighting& s, double t) const {
-  const Eigen::Vector3d p_WT = s.fit.posterior.position();
-  if (decoys_.At(p_WT)) return false;
-  if (!track_ || doubtful_ || track_->hits < kProvenHits) return true;
-  const Eigen::Vector3d d = p_WT - track_->state.position();
-  if (state_ != TargetState::kLost) {
-    if (std::abs(d.z()) >= kGateSigmas * config_.motion.ground_sigma) return false;
-    const Eigen::Matrix3d P = track_->state.covariance.topLeftCorner<3, 3>();
-    if (d.dot(P.ldlt().solve(d)) < kReachGate) return true;
-    // The prediction may err by more than it claims, where the fit slipped to what stood behind.
-    const double way = (p_WT - last_p_).norm();
-    return Clear(s) && way < kReachMargin + kUsualSpeed * (t - track_->seen);
-  }
-  return d.norm() < kReachMargin + config_.motion.max_speed * (t - track_->seen);
-}
-
-/// Hidden for so long that a look-alike may lie where the target may be as well.
-bool Perceiver::Vague() const {
-  return track_->misses > 0 && HorizontalSigma(*track_) > config_.state.sure_sigma;
-}
-
-/// True for a sighting after which nothing need be asked: all of the target, close to where it was
-/// expected, and nothing else that could be it.
-bool Perceiver::Sure(const Sighting& s) const {
-  if (track_->misses == 0) return true;
-  if (s.contested) return false;
-  const Eigen::Vector2d off = (s.fit.posterior.position() - track_->state.position()).head<2>();
-  if (Vague()) return AllSeen(s) && off.norm() < config_.state.decoy_radius;
-  if (LeftOut(s) > 1 && track_->misses > kSoonBack) return false;
-  const Eigen::Matrix2d P = track_->state.covariance.topLeftCorner<2, 2>();
-  return off.norm() < config_.state.decoy_radius || off.dot(P.ldlt().solve(off)) < kExpectedGate;
-}
 
 void Perceiver::Follow(View* view) {
   if (!track_) return;
@@ -114,7 +47,9 @@ void Perceiver::FollowCandidates(View* view) {
     const auto again = finder_.Find(c.track, view, [&](const Sighting& s) {
       return (s.detection.part || s.detection.edged) && !c.part;
     });
-    if (again && (again->fit.whole || c.track.partial || again->detection.edged))
+    const bool partly =
+        c.track.partial || (again && (again->detection.edged || c.HiddenIn(*again)));
+    if (again && (again->fit.whole || partly))
       c.Correct(*again);
     else
       ++c.track.misses;
@@ -158,7 +93,7 @@ void Perceiver::AddCandidates(View* view) {
     return Prominence(view->detections[a], config_.rig) >
            Prominence(view->detections[b], config_.rig);
   });
-  const bool comes_back = track_ && !doubtful_ && track_->hits >= kProvenHits;
+  const bool comes_back = track_ && !doubtful_ && track_->Proven();
   for (const size_t i : order) {
     if (candidates_.size() >= kMaxCandidates) return;
     const auto found = finder_.Acquire(*view, view->detections[i]);
@@ -167,8 +102,8 @@ void Perceiver::AddCandidates(View* view) {
     // the target may come back.
     const bool piece = found->detection.part || found->detection.edged;
     if ((piece || !found->fit.whole) && found->n_points == 0 && !comes_back) continue;
-    if (piece && ((found->n_points == 0 && !found->detection.edged) || Followed(*found))) continue;
-    if (!found->fit.whole && Followed(*found)) continue;
+    if (piece && found->n_points == 0 && !found->detection.edged) continue;
+    if (Followed(*found)) continue;
     candidates_.push_back(NewCandidate(*found, *view));
   }
 }
@@ -179,30 +114,6 @@ void Perceiver::Seek(View* view) {
   AddPartial(*view);
   AddCandidates(view);
   Promote(*view);
-}
-
-/// What drives is taken at once, a piece of something larger once it has driven further, since what
-/// shows of it may change as well; what stands only after a while, unless the target stood there. A
-/// target that drove when it was last seen must have had the time to stop.
-bool Perceiver::Ready(const Candidate& c, double t) const {
-  if (c.track.misses > 0 || c.track.hits < config_.state.confirm_frames) return false;
-  const bool trusted = !doubtful_ && !contested_ && !Vague();
-  if (track_ && trusted && t - track_->seen < kTrusted) return false;
-  const bool cut = LeavesImage(c.last.detection);
-  if (c.part || c.track.partial || cut) {
-    const bool hasty = !track_ && (cut || c.last.n_points < kClearPoints);
-    return c.SurelyDrives(hasty ? kNewPieceWay : kPieceWay) &&
-           c.track.hits >= (hasty ? kNewPieceHits : kPieceHits);
-  }
-  if (c.Drives()) return true;
-  if (sighting_) return false;
-  const bool stood_here = track_ && last_v_.norm() < kStandingSpeed &&
-                          (c.track.state.position() - last_p_).norm() < config_.state.decoy_radius;
-  const bool may_stand =
-      !c.last.detection.AnyCut() && (!track_ || t - track_->seen > config_.motion.hidden_time);
-  const double range = c.px * config_.rig.focal_px;
-  const double wait = config_.state.standing_after * std::max(1.0, std::pow(range / kFar, 2));
-  return stood_here || (may_stand && range < config_.state.standing_range && t - c.since >= wait);
 }
 
 void Perceiver::Promote(const View& view) {
@@ -240,7 +151,7 @@ void Perceiver::Judge(double t) {
     state_ = TargetState::kTracking;
   else if (state_ != TargetState::kLost)
     state_ =
-        unseen > config_.state.lost_after || HorizontalSigma(*track_) > config_.state.lost_sigma
+        unseen > config_.state.lost_after || track_->HorizontalSigma() > config_.state.lost_sigma
             ? TargetState::kLost
             : TargetState::kOccluded;
   if (unseen > 0.0) return;

@@ -56,6 +56,9 @@ class Perceiver {
   bool Vague() const;
   bool Sure(const Sighting& s) const;
   bool Ready(const Candidate& candidate, double t) const;
+  bool PieceIsReady(const Candidate& candidate) const;
+  bool StandsLongEnough(const Candidate& candidate, double t) const;
+  bool SizedBadly(const Candidate& candidate) const;
   bool Plausible(const Sighting& s, double t) const;
   bool IsRatherDecoy(const Sighting& s, const View& view) const;
   void SwapIfTheOtherDrives(const Sighting& s, Decoy* other, double t);

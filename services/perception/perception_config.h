@@ -162,7 +162,7 @@ struct StateConfig {
   double acquire_score = 0.35;
   int confirm_frames = 2;
   double hidden_after = 0.08, lost_after = 5.0, lost_sigma = 3.0;
-  double sure_sigma = 0.6, standing_after = 1.0, standing_range = 10.0;
+  double sure_sigma = 0.6, standing_after = 3.0, standing_range = 10.0;
   double decoy_radius = 0.5, decoy_memory = 60.0;
 
   template <class V>

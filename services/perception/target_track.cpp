@@ -7,6 +7,12 @@
 
 namespace chase::perception {
 
+namespace {
+
+constexpr int kProvenHits = 20;
+
+}  // namespace
+
 void TargetTrack::Predict(double to, const MotionConfig& config) {
   const double dt = to - t;
   if (!(dt > 0.0)) return;
@@ -39,6 +45,12 @@ void TargetTrack::Correct(const FitResult& fit) {
   partial = partial && !fit.whole;
   misses = 0;
   ++hits;
+}
+
+bool TargetTrack::Proven() const { return hits >= kProvenHits; }
+
+double TargetTrack::HorizontalSigma() const {
+  return std::sqrt(state.covariance.topLeftCorner<2, 2>().diagonal().maxCoeff());
 }
 
 Eigen::Matrix3d PublishedCovariance(const TargetTrack& track, const PoseSample& pose,

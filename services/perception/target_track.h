@@ -20,6 +20,11 @@ struct TargetTrack {
 
   /// Takes over a correction at the track's time.
   void Correct(const FitResult& fit);
+
+  /// True when it was seen so often that it is the target and nothing else.
+  bool Proven() const;
+  /// Standard deviation of the position, the greater one of x and y, m.
+  double HorizontalSigma() const;
 };
 
 /// Covariance of the target's position [m^2, frame W] with what the filter cannot know of itself:

@@ -14,6 +14,7 @@ chase_test(perception_pieces_test LIBS perception_world opencv_imgproc
 chase_test(perception_test LIBS perception_world
   SOURCES ${perception_test_dir}/perception_fit_test.cpp
           ${perception_test_dir}/perception_flight_test.cpp
+          ${perception_test_dir}/perception_candidate_test.cpp
           ${perception_test_dir}/perception_alike_test.cpp)
 chase_test(perception_node_test LIBS perception_world perception_node
   SOURCES ${perception_test_dir}/perception_node_test.cpp)

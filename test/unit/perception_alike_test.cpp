@@ -4,12 +4,12 @@
 #include <cmath>
 
 #include "perception_world.h"
-#include "services/perception/candidate.h"
 
 namespace chase::perception {
 namespace {
 
 using Eigen::Vector3d;
+using perception_test::Body;
 using perception_test::Fly;
 using perception_test::FlyOptions;
 using perception_test::kOrange;
@@ -32,120 +32,16 @@ Thing Twin(double x, double y) {
   return {Thing::Kind::kCylinder, {x, y, 0.55}, {0.15, 0.15, 0.25}, kOrange};
 }
 
-Candidate CandidateAt(const Vector3d& first, const Vector3d& now, double sigma) {
-  Candidate c;
-  c.first.mean << first, Vector3d::Zero();
-  c.first.covariance = sigma * sigma * Matrix6d::Identity();
-  c.track.state = c.first;
-  c.track.state.mean.head<3>() = now;
-  c.px = 3.0 / 220.0;
-  return c;
-}
-
-TEST(PerceptionCandidate, DrivesOnceItsWayIsMoreThanItsErrorsAndItsEdges) {
-  const Vector3d p(3.0, 0.0, 0.55);
-  EXPECT_FALSE(CandidateAt(p, p, 0.01).Drives());
-  EXPECT_FALSE(CandidateAt(p, p + Vector3d(0.05, 0.0, 0.0), 0.001).Drives());
-  EXPECT_TRUE(CandidateAt(p, p + Vector3d(0.0, 0.10, 0.0), 0.01).Drives());
-  EXPECT_FALSE(CandidateAt(p, p + Vector3d(0.0, 0.10, 0.0), 0.05).Drives());
-  EXPECT_FALSE(CandidateAt(p, p + Vector3d(0.0, 0.0, 1.0), 0.01).Drives()) << "up is not away";
-}
-
-TEST(PerceptionCandidate, WhatOnlyTheSizeTellsOfItsRangeIsNoWay) {
-  const Vector3d p(20.0, 0.0, 0.55);  // seven pixels high: one pixel is three metres of range
-  Candidate c = CandidateAt(p, p + Vector3d(-4.0, 0.15, 0.0), 0.03);
-  c.px = 20.0 / 220.0;
-  c.range_px = {3.0, 0.0};
-  EXPECT_FALSE(c.Drives());
-  c.ranged = true;
-  EXPECT_TRUE(c.Drives());
-}
-
-TEST(PerceptionCandidate, HitByTheLidarAndWholeItDrivesSooner) {
-  const Vector3d p(2.0, 0.0, 0.55);
-  Candidate c = CandidateAt(p, p + Vector3d(0.0, 0.05, 0.0), 0.005);
-  c.range_px = {0.05, 0.0};
-  EXPECT_FALSE(c.Drives());
-  c.ranged = true;
-  EXPECT_TRUE(c.Drives());
-  c.last.detection.cut[kLeft] = true;
-  EXPECT_FALSE(c.Drives()) << "what the image's border cuts seems to move with it";
-}
-
-TEST(PerceptionCandidate, SeenSharplyItDrivesSoonerAcrossTheLineOfSight) {
-  const Vector3d p(2.0, 0.0, 0.55);
-  Candidate across = CandidateAt(p, p + Vector3d(0.0, 0.04, 0.0), 0.004);
-  across.px = 2.0 / 220.0;
-  EXPECT_FALSE(across.Drives());
-  across.last.detection.box = {100.0, 80.0, 33.0, 55.0};
-  EXPECT_TRUE(across.Drives());
-  across.last.detection.box.width = 8.0;
-  EXPECT_FALSE(across.Drives()) << "a narrow one's edges err by more";
-  Candidate along = CandidateAt(p, p + Vector3d(0.04, 0.0, 0.0), 0.004);
-  along.last.detection.box = {100.0, 80.0, 33.0, 55.0};
-  EXPECT_FALSE(along.Drives());
-}
-
-TEST(PerceptionCandidate, ASpeedByLidarPointsIsAWay) {
-  const Vector3d p(3.0, 0.0, 0.55);
-  Candidate c = CandidateAt(p, p, 0.1);
-  c.track.state.mean[3] = 0.8;
-  c.track.state.covariance.block<2, 2>(3, 3) = 0.01 * Eigen::Matrix2d::Identity();
-  EXPECT_FALSE(c.Drives()) << "edges alone make up speeds along the line of sight";
-  c.ranged = true;
-  c.last.n_points = 20;
-  c.known = c.track.t = 0.05;
-  EXPECT_FALSE(c.Drives()) << "one sweep tells no speed";
-  c.track.t = 0.15;
-  EXPECT_TRUE(c.Drives());
-  c.track.state.covariance.block<2, 2>(3, 3) = 0.1 * Eigen::Matrix2d::Identity();
-  EXPECT_FALSE(c.Drives()) << "not known well";
-}
-
-TEST(PerceptionCandidate, PiecesOfOneThingDoNotGoTheWayThatTheyTell) {
-  const Vector3d p(3.0, 0.0, 0.55);
-  Candidate c = CandidateAt(p, p + Vector3d(0.0, 0.24, 0.0), 0.01);
-  c.track.t = 0.3;
-  c.track.state.mean[4] = 0.8;
-  EXPECT_TRUE(c.Steady());
-  c.track.state.mean[4] = 2.5;
-  EXPECT_FALSE(c.Steady());
-  c.track.state.mean[4] = -0.4;
-  EXPECT_FALSE(c.Steady());
-}
-
-TEST(PerceptionCandidate, APieceStaysOneUntilAllOfItIsSeen) {
-  const Vector3d p(3.0, 0.0, 0.55);
-  Candidate c = CandidateAt(p, p, 0.01);
-  c.part = true;
-  Sighting s;
-  s.fit.posterior = c.track.state;
-  s.detection.cut[kLeft] = true;
-  c.Correct(s);
-  EXPECT_TRUE(c.part) << "the image's border may hide what it belongs to";
-  s.detection.cut[kLeft] = false;
-  c.Correct(s);
-  EXPECT_FALSE(c.part);
-}
-
-TEST(PerceptionCandidate, WhatComesOutFromBehindSomethingMustDriveFromThere) {
-  const Vector3d p(3.0, 0.0, 0.55), q = p + Vector3d(0.0, 0.08, 0.0);
-  Candidate c = CandidateAt(p, p, 0.01);
-  c.track.partial = true;
-  Sighting s;
-  s.fit.posterior = c.track.state;
-  s.fit.posterior.mean.head<3>() = q;
-  s.fit.whole = true;
-  c.Correct(s);
-  EXPECT_FALSE(c.track.partial);
-  EXPECT_FALSE(c.Drives()) << "the edge of what hid it may have gone, not the thing";
-  EXPECT_LT((c.first.position() - q).norm(), 1e-9);
+PerceptionConfig TakenAfterASecond() {
+  PerceptionConfig config;
+  config.state.standing_after = 1.0;
+  return config;
 }
 
 TEST(PerceptionAlike, WhatStandsIsTakenAfterAWhile) {
   FlyOptions options;
   options.duration = 1.5;
-  PerceptionConfig config;
+  const PerceptionConfig config = TakenAfterASecond();
   for (const auto& o : Fly(StillWorld(2.5), config, options)) {
     if (o.t < config.state.standing_after) {
       EXPECT_EQ(o.estimate.state, TargetState::kSearching) << o.t;
@@ -179,7 +75,7 @@ TEST(PerceptionAlike, OfTwoAlikeTheOneThatDrivesIsTheTarget) {
   FlyOptions options;
   options.duration = 2.6;
   int tracked = 0;
-  for (const auto& o : Fly(w, {}, options)) {
+  for (const auto& o : Fly(w, TakenAfterASecond(), options)) {
     if (o.t < 2.3) continue;
     tracked += Detected(o);
     EXPECT_LT(Error(o), 0.2) << o.t;
@@ -197,7 +93,7 @@ TEST(PerceptionAlike, WhatStoodWhenItWasTakenGivesWayToWhatDrives) {
   options.duration = 3.6;
   bool twin = false;
   double back_since = -1.0, found = -1.0;
-  for (const auto& o : Fly(w, {}, options)) {
+  for (const auto& o : Fly(w, TakenAfterASecond(), options)) {
     twin = twin || (o.visible_share == 0.0 && Detected(o) && Error(o) > 1.0);
     if (back_since < 0.0 && o.visible_share >= 0.5) back_since = o.t;
     if (found < 0.0 && back_since > 0.0 && Detected(o) && Error(o) < 0.2) found = o.t;
@@ -268,6 +164,18 @@ TEST(PerceptionAlike, ALongStopBehindAWallIsEndedByTheTargetAndNotByItsTwin) {
   ASSERT_GT(back_since, 0.0);
   ASSERT_GT(found, 0.0);
   EXPECT_LE(found, back_since + 0.3);
+}
+
+/// Half as large as the target, it looks like one twice as far away, which would drive.
+TEST(PerceptionAlike, WhatIsSmallAndStandsDoesNotDriveAsTheDroneDoes) {
+  World w;
+  w.target = [](double) { return Vector3d(-8.0, 0.0, 0.55); };  // behind the drone
+  w.body = [](double t) { return Body{{0.0, 0.9 * t - 0.6, 1.0}}; };
+  w.things.push_back({Thing::Kind::kCylinder, {4.0, 0.0, 0.6}, {0.075, 0.075, 0.125}, kOrange});
+  FlyOptions options;
+  options.duration = 1.4;
+  options.lidar = false;
+  for (const auto& o : Fly(w, {}, options)) EXPECT_NE(o.estimate.state, TargetState::kTracking);
 }
 
 }  // namespace

@@ -1,0 +1,179 @@
+// When something that may be the target has surely driven.
+#include <gtest/gtest.h>
+
+#include "services/perception/candidate.h"
+
+namespace chase::perception {
+namespace {
+
+using Eigen::Vector3d;
+
+Candidate CandidateAt(const Vector3d& first, const Vector3d& now, double sigma) {
+  Candidate c;
+  c.first.mean << first, Vector3d::Zero();
+  c.first.covariance = sigma * sigma * Matrix6d::Identity();
+  c.track.state = c.first;
+  c.track.state.mean.head<3>() = now;
+  c.px = 3.0 / 220.0;
+  return c;
+}
+
+TEST(PerceptionCandidate, DrivesOnceItsWayIsMoreThanItsErrorsAndItsEdges) {
+  const Vector3d p(3.0, 0.0, 0.55);
+  EXPECT_FALSE(CandidateAt(p, p, 0.01).Drives());
+  EXPECT_FALSE(CandidateAt(p, p + Vector3d(0.05, 0.0, 0.0), 0.001).Drives());
+  EXPECT_TRUE(CandidateAt(p, p + Vector3d(0.0, 0.10, 0.0), 0.01).Drives());
+  EXPECT_FALSE(CandidateAt(p, p + Vector3d(0.0, 0.10, 0.0), 0.05).Drives());
+  EXPECT_FALSE(CandidateAt(p, p + Vector3d(0.0, 0.0, 1.0), 0.01).Drives()) << "up is not away";
+}
+
+TEST(PerceptionCandidate, WhatOnlyTheSizeTellsOfItsRangeIsNoWay) {
+  const Vector3d p(20.0, 0.0, 0.55);  // seven pixels high: one pixel is three metres of range
+  Candidate c = CandidateAt(p, p + Vector3d(-4.0, 0.15, 0.0), 0.03);
+  c.px = 20.0 / 220.0;
+  c.range_px = {3.0, 0.0};
+  EXPECT_FALSE(c.Drives());
+  c.ranged = true;
+  EXPECT_TRUE(c.Drives());
+}
+
+TEST(PerceptionCandidate, HitByTheLidarAndWholeItDrivesSooner) {
+  const Vector3d p(2.0, 0.0, 0.55);
+  Candidate c = CandidateAt(p, p + Vector3d(0.0, 0.05, 0.0), 0.005);
+  c.range_px = {0.05, 0.0};
+  EXPECT_FALSE(c.Drives());
+  c.ranged = true;
+  EXPECT_TRUE(c.Drives());
+  c.last.detection.cut[kLeft] = true;
+  EXPECT_FALSE(c.Drives()) << "what the image's border cuts seems to move with it";
+}
+
+TEST(PerceptionCandidate, SeenSharplyItDrivesSoonerAcrossTheLineOfSight) {
+  const Vector3d p(2.0, 0.0, 0.55);
+  Candidate across = CandidateAt(p, p + Vector3d(0.0, 0.04, 0.0), 0.004);
+  across.px = 2.0 / 220.0;
+  EXPECT_FALSE(across.Drives());
+  across.last.detection.box = {100.0, 80.0, 33.0, 55.0};
+  EXPECT_TRUE(across.Drives());
+  across.last.detection.box.width = 8.0;
+  EXPECT_FALSE(across.Drives()) << "a narrow one's edges err by more";
+  Candidate along = CandidateAt(p, p + Vector3d(0.04, 0.0, 0.0), 0.004);
+  along.last.detection.box = {100.0, 80.0, 33.0, 55.0};
+  EXPECT_FALSE(along.Drives());
+}
+
+TEST(PerceptionCandidate, ASpeedByLidarPointsIsAWay) {
+  const Vector3d p(3.0, 0.0, 0.55);
+  Candidate c = CandidateAt(p, p, 0.1);
+  c.track.state.mean[3] = 0.8;
+  c.track.state.covariance.block<2, 2>(3, 3) = 0.01 * Eigen::Matrix2d::Identity();
+  EXPECT_FALSE(c.Drives()) << "edges alone make up speeds along the line of sight";
+  c.ranged = true;
+  c.last.n_points = 20;
+  c.known = c.track.t = c.swept = 0.05;
+  EXPECT_FALSE(c.Drives()) << "one sweep tells no speed";
+  c.track.t = c.swept = 0.15;
+  EXPECT_TRUE(c.Drives());
+  c.track.t = 0.3;
+  EXPECT_FALSE(c.Fast()) << "the points are old";
+  c.track.t = 0.15;
+  c.track.state.covariance.block<2, 2>(3, 3) = 0.1 * Eigen::Matrix2d::Identity();
+  EXPECT_FALSE(c.Drives()) << "not known well";
+}
+
+TEST(PerceptionCandidate, PiecesOfOneThingDoNotGoTheWayThatTheyTell) {
+  const Vector3d p(3.0, 0.0, 0.55);
+  Candidate c = CandidateAt(p, p + Vector3d(0.0, 0.24, 0.0), 0.01);
+  c.track.t = 0.3;
+  c.track.state.mean[4] = 0.8;
+  EXPECT_TRUE(c.Steady());
+  c.track.state.mean[4] = 2.5;
+  EXPECT_FALSE(c.Steady());
+  c.track.state.mean[4] = -0.4;
+  EXPECT_FALSE(c.Steady());
+}
+
+TEST(PerceptionCandidate, APieceStaysOneUntilAllOfItIsSeen) {
+  const Vector3d p(3.0, 0.0, 0.55);
+  Candidate c = CandidateAt(p, p, 0.01);
+  c.part = true;
+  Sighting s;
+  s.fit.posterior = c.track.state;
+  s.detection.cut[kLeft] = true;
+  c.Correct(s);
+  EXPECT_TRUE(c.part) << "the image's border may hide what it belongs to";
+  s.detection.cut[kLeft] = false;
+  c.Correct(s);
+  EXPECT_FALSE(c.part);
+}
+
+TEST(PerceptionCandidate, WhatComesOutFromBehindSomethingMustDriveFromThere) {
+  const Vector3d p(3.0, 0.0, 0.55), q = p + Vector3d(0.0, 0.08, 0.0);
+  Candidate c = CandidateAt(p, p, 0.01);
+  c.track.partial = true;
+  Sighting s;
+  s.fit.posterior = c.track.state;
+  s.fit.posterior.mean.head<3>() = q;
+  s.fit.whole = true;
+  c.Correct(s);
+  EXPECT_FALSE(c.track.partial);
+  EXPECT_FALSE(c.Drives()) << "the edge of what hid it may have gone, not the thing";
+  EXPECT_LT((c.first.position() - q).norm(), 1e-9);
+}
+
+TEST(PerceptionCandidate, ADriftOfSecondsIsNoWay) {
+  const Vector3d p(3.0, 0.0, 0.55);
+  Candidate c = CandidateAt(p, p + Vector3d(0.0, 0.10, 0.0), 0.01);
+  c.track.t = 0.5;
+  EXPECT_TRUE(c.Drives());
+  c.track.t = 2.0;
+  EXPECT_FALSE(c.Drives()) << "0.05 m/s";
+}
+
+TEST(PerceptionCandidate, WhatHidesASideOfItMustNotSeemToMoveIt) {
+  const Vector3d p(2.0, 0.0, 0.55);
+  Candidate c = CandidateAt(p, p + Vector3d(0.0, 0.05, 0.0), 0.005);
+  c.ranged = true;
+  c.last.fit.whole = false;
+  EXPECT_FALSE(c.Drives());
+  c.track.state.mean[1] = 0.08;
+  EXPECT_TRUE(c.Drives());
+}
+
+TEST(PerceptionCandidate, IsFollowedWhereASideIsHiddenAndLidarTellsWhereItIs) {
+  Candidate c = CandidateAt({3.0, 0.0, 0.55}, {3.0, 0.0, 0.55}, 0.01);
+  c.ranged = true;
+  c.track.hits = 2;
+  Sighting hidden;
+  hidden.n_points = 20;
+  hidden.fit.used = {false, true, true, true};
+  for (auto& samples : hidden.detection.silhouette.samples) samples.resize(3);
+  ASSERT_TRUE(c.HiddenIn(hidden));
+  Sighting s = hidden;
+  s.n_points = 5;
+  EXPECT_FALSE(c.HiddenIn(s)) << "the range is a guess";
+  s = hidden;
+  s.fit.used[kTop] = false;
+  EXPECT_FALSE(c.HiddenIn(s)) << "two sides";
+  s = hidden;
+  s.detection.cut[kBottom] = true;
+  EXPECT_FALSE(c.HiddenIn(s)) << "it may belong to what goes on there";
+  c.track.hits = 1;
+  EXPECT_FALSE(c.HiddenIn(hidden)) << "never yet in view for long enough";
+}
+
+TEST(PerceptionCandidate, CountsSightingsWithLidarPoints) {
+  Candidate c = CandidateAt({3.0, 0.0, 0.55}, {3.0, 0.0, 0.55}, 0.01);
+  Sighting s;
+  s.fit.posterior = c.track.state;
+  for (const int points : {0, 12, 0, 9}) {
+    c.track.t += 0.05;
+    s.n_points = points;
+    c.Correct(s);
+  }
+  EXPECT_EQ(c.sweeps, 2);
+  EXPECT_DOUBLE_EQ(c.swept, c.track.t);
+}
+
+}  // namespace
+}  // namespace chase::perception
