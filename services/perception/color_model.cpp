@@ -32,8 +32,10 @@ Hsv ToHsv(double b, double g, double r) {
   return {hue < 0.0 ? 60.0 * hue + 360.0 : 60.0 * hue, span / high, high};
 }
 
-/// How far `hue` lies outside the range, degrees; 0 inside. The range may wrap.
+/// How far `hue` lies outside the range, degrees; 0 inside. The range may wrap, and 0 to 360 is
+/// all.
 double HueOutside(double hue, double low, double high) {
+  if (high - low >= 360.0) return 0.0;
   const double width = std::fmod(high - low + 360.0, 360.0);
   const double after = std::fmod(hue - low + 360.0, 360.0);
   return after <= width ? 0.0 : std::min(after - width, 360.0 - after);
@@ -42,6 +44,16 @@ double HueOutside(double hue, double low, double high) {
 /// 1 at or above the limit, falling to 0 over `softness` below it.
 double Ramp(double x, double limit, double softness) {
   return std::clamp(1.0 + (x - limit) / softness, 0.0, 1.0);
+}
+
+/// Circular mean, degrees, -180 to 180. What is grey has no hue, so each weighs as it is saturated.
+double MeanHue(const std::vector<double>& hue_deg, const std::vector<double>& saturation) {
+  double x = 0.0, y = 0.0;
+  for (size_t i = 0; i < hue_deg.size(); ++i) {
+    x += saturation[i] * std::cos(hue_deg[i] * M_PI / 180.0);
+    y += saturation[i] * std::sin(hue_deg[i] * M_PI / 180.0);
+  }
+  return std::atan2(y, x) * 180.0 / M_PI;
 }
 
 double Percentile(std::vector<double>* values, double share) {
@@ -118,14 +130,16 @@ ColorConfig LearnColor(const std::vector<cv::Mat>& images, const std::vector<cv:
         if (masks[i].at<uint8_t>(y, x) == 0) continue;
         const auto& p = images[i].at<cv::Vec3b>(y, x);
         const Hsv c = ToHsv(p[0] / 255.0, p[1] / 255.0, p[2] / 255.0);
-        hue.push_back(std::fmod(c.hue_deg + 180.0, 360.0));  // red in the middle
+        hue.push_back(c.hue_deg);
         saturation.push_back(c.saturation);
         value.push_back(c.value);
       }
   ColorConfig learned = base;
   if (hue.empty()) return learned;
-  learned.hue_min_deg = std::fmod(Percentile(&hue, 0.03) + 180.0, 360.0);
-  learned.hue_max_deg = std::fmod(Percentile(&hue, 0.97) + 180.0, 360.0);
+  const double middle = MeanHue(hue, saturation);
+  for (double& h : hue) h = std::remainder(h - middle, 360.0);  // the seam lies opposite
+  learned.hue_min_deg = std::fmod(middle + Percentile(&hue, 0.03) + 720.0, 360.0);
+  learned.hue_max_deg = std::fmod(middle + Percentile(&hue, 0.97) + 720.0, 360.0);
   learned.saturation_min = Percentile(&saturation, 0.03);
   learned.value_min = kShade * Percentile(&value, 0.03);
   return learned;

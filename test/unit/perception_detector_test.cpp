@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -44,6 +45,37 @@ TEST(PerceptionColor, RangeOfHueMayWrap) {
   EXPECT_GT(model.Score(0.05, 0.0, 1.0), 0.99);
   EXPECT_GT(model.Score(0.0, 0.05, 1.0), 0.99);
   EXPECT_LT(model.Score(0.05, 0.45, 1.0), 0.01);
+}
+
+TEST(PerceptionColor, AFullCircleLetsEveryHuePass) {
+  ColorConfig config;
+  config.hue_min_deg = 0;
+  config.hue_max_deg = 360;
+  ASSERT_EQ(config.Problem(), "");
+  const ColorModel model(config);
+  EXPECT_GT(model.Score(0.0, 0.0, 1.0), 0.99) << "red";
+  EXPECT_GT(model.Score(0.0, 1.0, 0.5), 0.99) << "green";
+  EXPECT_GT(model.Score(1.0, 1.0, 0.0), 0.99) << "cyan";
+  EXPECT_GT(model.Score(1.0, 0.0, 0.5), 0.99) << "violet";
+}
+
+TEST(PerceptionColor, AnyHueIsLearnedAsANarrowRange) {
+  // From red over yellow, green, cyan, blue and violet, each 20 degrees wide.
+  for (int middle = 0; middle < 360; middle += 15) {
+    cv::Mat hsv(1, 201, CV_32FC3), bgr;
+    for (int i = 0; i <= 200; ++i)
+      hsv.at<cv::Vec3f>(0, i) = {
+          std::fmod(static_cast<float>(middle) + 350.0f + 0.1f * static_cast<float>(i), 360.0f),
+          0.9f, 0.9f};
+    cv::cvtColor(hsv, bgr, cv::COLOR_HSV2BGR);
+    bgr.convertTo(bgr, CV_8U, 255.0);
+    const cv::Mat mask(bgr.size(), CV_8U, cv::Scalar(255));
+    const ColorConfig learned = LearnColor({bgr}, {mask}, {});
+    ASSERT_EQ(learned.Problem(), "");
+    const double width = std::fmod(learned.hue_max_deg - learned.hue_min_deg + 360.0, 360.0);
+    EXPECT_NEAR(width, 0.94 * 20.0, 1.5) << middle;
+    EXPECT_NEAR(std::remainder(learned.hue_min_deg + 0.5 * width - middle, 360.0), 0.0, 1.0);
+  }
 }
 
 TEST(PerceptionColor, GainsUndoWarmLight) {
