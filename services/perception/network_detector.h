@@ -11,13 +11,16 @@ namespace chase::perception {
 /// centre x, centre y, width, height in pixels of the network's input, then one score per class.
 class NetworkDetector : public Detector {
  public:
-  /// Throws std::runtime_error when the file is missing or not a network.
+  /// Throws std::runtime_error when the file is missing or not a network, or when the network does
+  /// not take an image of the configured size or gives another shape, or scores above 1.
   NetworkDetector(const NetworkConfig& config, const world::Rig& rig);
 
-  /// Empty when the network's output has another shape.
+  /// Rows that hold a number that is not finite are left out.
   std::vector<Detection> Detect(const cv::Mat& bgr) const override;
 
  private:
+  cv::Mat Forward(const cv::Mat& bgr) const;
+  bool Usable(const float* row) const;
   Detection Describe(const float* row, const cv::Size& image) const;
 
   NetworkConfig config_;

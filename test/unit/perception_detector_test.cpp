@@ -5,9 +5,13 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <limits>
 #include <opencv2/aruco.hpp>
 #include <opencv2/imgproc.hpp>
+#include <sstream>
+#include <stdexcept>
 #include <string>
+#include <vector>
 
 #include "perception_world.h"
 #include "services/perception/color_detector.h"
@@ -335,8 +339,11 @@ std::string Value(const std::string& name, const std::vector<uint64_t>& dims) {
 
 constexpr int kNetWidth = 47, kNetHeight = 30;
 
+const std::vector<float> kBoxBias = {0.0f, 0.0f, 4.0f, 6.0f, 0.0f};
+
 /// A network of one linear layer: the centre of mass of (red - blue), for blobs of known mass.
-void WriteNetwork(const std::string& file, double mass) {
+void WriteNetwork(const std::string& file, double mass, const std::vector<float>& bias = kBoxBias,
+                  const std::vector<int64_t>& shape = {1, 1, 5}) {
   constexpr size_t kInputs = 3 * kNetWidth * kNetHeight;
   std::vector<float> weights(kInputs * 5, 0.0f);
   for (int channel : {0, 2})
@@ -348,7 +355,6 @@ void WriteNetwork(const std::string& file, double mass) {
         weights[kInputs + in] = static_cast<float>(unit * (y + 0.5));
         weights[4 * kInputs + in] = static_cast<float>(unit);
       }
-  const std::vector<float> bias = {0.0f, 0.0f, 4.0f, 6.0f, 0.0f};
   Proto graph;
   graph.Bytes(1, Operation("Flatten", {"image"}, "flat"));
   graph.Bytes(1, Operation("Gemm", {"flat", "weights", "bias"}, "row", Integer("transB", 1)));
@@ -356,9 +362,9 @@ void WriteNetwork(const std::string& file, double mass) {
   graph.Bytes(2, "tiny");
   graph.Bytes(5, Tensor("weights", {5, kInputs}, 1, weights));
   graph.Bytes(5, Tensor("bias", {5}, 1, bias));
-  graph.Bytes(5, Tensor<int64_t>("shape", {3}, 7, {1, 1, 5}));
+  graph.Bytes(5, Tensor<int64_t>("shape", {shape.size()}, 7, shape));
   graph.Bytes(11, Value("image", {1, 3, kNetHeight, kNetWidth}));
-  graph.Bytes(12, Value("boxes", {1, 1, 5}));
+  graph.Bytes(12, Value("boxes", {shape.begin(), shape.end()}));
   const std::string model = Proto()
                                 .Int(1, 7)
                                 .Bytes(8, Proto().Bytes(1, "").Int(2, 11).text())
@@ -367,14 +373,18 @@ void WriteNetwork(const std::string& file, double mass) {
   std::ofstream(file, std::ios::binary) << model;
 }
 
-TEST(PerceptionNetwork, BoxesComeFromAnOnnxFile) {
-  const std::string file = testing::TempDir() + "perception_tiny.onnx";
-  // Orange (235 - 12) / 255 on 4 x 6 pixels of the network's input, 8 x 8 image pixels each.
-  WriteNetwork(file, 24.0 * (235.0 - 12.0) / 255.0);
+NetworkConfig TinyNetwork() {
   NetworkConfig config;
-  config.file = file;
+  config.file = testing::TempDir() + "perception_tiny.onnx";
   config.input_width_px = kNetWidth;
   config.input_height_px = kNetHeight;
+  return config;
+}
+
+TEST(PerceptionNetwork, BoxesComeFromAnOnnxFile) {
+  const NetworkConfig config = TinyNetwork();
+  // Orange (235 - 12) / 255 on 4 x 6 pixels of the network's input, 8 x 8 image pixels each.
+  WriteNetwork(config.file, 24.0 * (235.0 - 12.0) / 255.0);
   const NetworkDetector detector(config, {});
   for (const cv::Point corner : {cv::Point(80, 64), cv::Point(240, 120)}) {
     cv::Mat image = Grey();
@@ -389,7 +399,58 @@ TEST(PerceptionNetwork, BoxesComeFromAnOnnxFile) {
     EXPECT_EQ(found[0].silhouette.samples[kLeft].size(), 1u);
   }
   EXPECT_TRUE(detector.Detect(Grey()).empty());
-  std::filesystem::remove(file);
+  std::filesystem::remove(config.file);
+}
+
+/// What the constructor says; empty when it takes the network.
+std::string Refusal(const NetworkConfig& config) {
+  try {
+    NetworkDetector detector(config, {});
+    return "";
+  } catch (const std::runtime_error& e) {
+    return e.what();
+  }
+}
+
+TEST(PerceptionNetwork, OneThatDoesNotFitIsRefusedWhenItIsRead) {
+  const NetworkConfig fits = TinyNetwork();
+  const auto expect = [&](const NetworkConfig& config, const std::vector<std::string>& all) {
+    const std::string message = Refusal(config);
+    EXPECT_NE(message.find(config.file), std::string::npos) << message;
+    for (const auto& said : all)
+      EXPECT_NE(message.find(said), std::string::npos) << said << " in: " << message;
+  };
+  WriteNetwork(fits.file, 24.0);
+  EXPECT_EQ(Refusal(fits), "");
+  NetworkConfig config = fits;
+  config.input_width_px = kNetWidth + 1;
+  expect(config, {"48 x 30", "network.input_width_px"});
+  config = fits;
+  config.class_id = 1;
+  expect(config, {"1 x 1 x 5", "network.class_id"});
+  WriteNetwork(fits.file, 24.0, kBoxBias, {1, 5});
+  expect(fits, {"1 x 5", "1 x N x (4 + classes)"});
+  WriteNetwork(fits.file, 24.0, kBoxBias, {1, 5, 1});
+  expect(fits, {"1 x 5 x 1", "1 x N x (4 + classes)"});
+  WriteNetwork(fits.file, 24.0, {20.0f, 15.0f, 4.0f, 6.0f, 30.0f});
+  expect(fits, {"1 x 1 x 5", "a score of 30", "transposed"});
+  std::filesystem::remove(fits.file);
+}
+
+TEST(PerceptionNetwork, RowsThatAreNotFiniteAreLeftOut) {
+  constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+  constexpr float kInf = std::numeric_limits<float>::infinity();
+  const NetworkConfig config = TinyNetwork();
+  for (const float bad : {kNan, kInf, -kInf})
+    for (size_t i = 0; i < 5; ++i) {
+      std::vector<float> bias = {20.0f, 15.0f, 4.0f, 6.0f, 1.0f};
+      WriteNetwork(config.file, 1e9, bias);
+      ASSERT_EQ(NetworkDetector(config, {}).Detect(Grey()).size(), 1u);
+      bias[i] = bad;
+      WriteNetwork(config.file, 1e9, bias);
+      EXPECT_TRUE(NetworkDetector(config, {}).Detect(Grey()).empty()) << bad << " at " << i;
+    }
+  std::filesystem::remove(config.file);
 }
 
 TEST(PerceptionNetwork, MissingAndBrokenFilesAreRefused) {
