@@ -4,6 +4,7 @@
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
 #include <stdexcept>
+#include <string>
 
 #include "services/perception/silhouette.h"
 
@@ -27,6 +28,14 @@ int DictionaryByName(const std::string& name) {
   throw std::runtime_error("marker.dictionary '" + name + "' is unknown; known are" + known);
 }
 
+void CheckId(const MarkerConfig& config, const cv::aruco::Dictionary& dictionary) {
+  const int count = dictionary.bytesList.rows;
+  if (config.id < count) return;
+  throw std::runtime_error("marker.id is " + std::to_string(config.id) + ", must be 0 to " +
+                           std::to_string(count - 1) + " in " + config.dictionary +
+                           ", or -1 for any; set it so, or another marker.dictionary");
+}
+
 /// Covariance along a line of sight n (unit, frame C): `along` [m] on it, `across` [m] beside it.
 Eigen::Matrix3d SightCovariance(const Eigen::Vector3d& n, double along, double across) {
   return across * across * Eigen::Matrix3d::Identity() +
@@ -40,6 +49,7 @@ MarkerDetector::MarkerDetector(const MarkerConfig& config, const world::Rig& rig
       rig_(rig),
       dictionary_(cv::aruco::getPredefinedDictionary(DictionaryByName(config.dictionary))),
       parameters_(cv::aruco::DetectorParameters::create()) {
+  CheckId(config, *dictionary_);
   parameters_->cornerRefinementMethod = cv::aruco::CORNER_REFINE_SUBPIX;
   parameters_->cornerRefinementWinSize = 3;
   parameters_->minMarkerPerimeterRate = 0.04;

@@ -10,7 +10,7 @@ namespace chase::perception {
 /// ArUco and AprilTag markers on the target.
 class MarkerDetector : public Detector {
  public:
-  /// Throws std::runtime_error when the dictionary's name is unknown.
+  /// Throws std::runtime_error when the dictionary's name is unknown or it lacks the id.
   MarkerDetector(const MarkerConfig& config, const world::Rig& rig);
 
   std::vector<Detection> Detect(const cv::Mat& bgr) const override;

@@ -18,6 +18,14 @@ class Check {
     }
     return *this;
   }
+  Check& Finite(const std::string& field, double value) {
+    return That(std::isfinite(value),
+                field + " is " + std::to_string(value) + ", must be a finite number");
+  }
+  Check& Finite(const std::string& field, const Eigen::Vector3d& value) {
+    for (int i = 0; i < 3; ++i) Finite(field + "[" + std::to_string(i) + "]", value[i]);
+    return *this;
+  }
   Check& That(bool holds, const std::string& what) {
     if (problem_.empty() && !holds) problem_ = what;
     return *this;
@@ -126,7 +134,7 @@ std::string StateConfig::Problem() const {
       .In("sure_sigma", sure_sigma, 0.01, 20)
       .In("standing_after", standing_after, 0, 60)
       .In("standing_range", standing_range, 0, 100)
-      .In("decoy_radius", decoy_radius, 0, 10)
+      .In("decoy_radius", decoy_radius, 0.05, 10)
       .In("decoy_memory", decoy_memory, 0, 1e6)
       .Result();
 }
@@ -141,6 +149,12 @@ std::string PerceptionConfig::Problem() const {
       .In("rig.width_px", rig.width_px, 16, 16384)
       .In("rig.height_px", rig.height_px, 16, 16384)
       .In("rig.focal_px", rig.focal_px, 10, 20000)
+      .Finite("rig.center_u_px", rig.center_u_px)
+      .Finite("rig.center_v_px", rig.center_v_px)
+      .Finite("rig.camera_pitch_deg", rig.camera_pitch_deg)
+      .Finite("rig.camera_position", rig.camera_position)
+      .Finite("rig.lidar_position", rig.lidar_position)
+      .Finite("rig.lidar_rpy_deg", rig.lidar_rpy_deg)
       .Result();
 }
 

@@ -17,7 +17,7 @@ struct ColorConfig {
   template <class V>
   void Visit(V& v) {
     v("hue_min_deg", hue_min_deg, "0 red, 30 orange, 60 yellow; may be above hue_max_deg: wraps");
-    v("hue_max_deg", hue_max_deg, "upper end of the hue");
+    v("hue_max_deg", hue_max_deg, "upper end of the hue; 0 to 360 is every hue");
     v("saturation_min", saturation_min, "0 grey to 1 pure");
     v("value_min", value_min, "brightest channel, 0 to 1");
     v("hue_softness_deg", hue_softness_deg, "width over which the score falls outside the range");
@@ -59,8 +59,10 @@ struct MarkerConfig {
 
   template <class V>
   void Visit(V& v) {
-    v("dictionary", dictionary, "OpenCV's name, as DICT_4X4_50 or DICT_APRILTAG_36h11");
-    v("id", id, "the target's marker; -1: any");
+    v("dictionary", dictionary,
+      "DICT_4X4_50, DICT_5X5_50, DICT_6X6_250, DICT_ARUCO_ORIGINAL, DICT_APRILTAG_16h5, "
+      "DICT_APRILTAG_25h9 or DICT_APRILTAG_36h11");
+    v("id", id, "the target's marker, one that the dictionary has; -1: any");
     v("side", side, "edge of the black square, m");
     v("depth", depth, "from the marker along the line of sight to the target's centre, m");
     v("corner_sigma_px", corner_sigma_px, "standard deviation of a corner");
@@ -177,8 +179,10 @@ struct StateConfig {
     v("standing_after", standing_after,
       "what stands is taken for the target after so long, beyond 5 m later, s");
     v("standing_range", standing_range, "and only nearer than this, m");
-    v("decoy_radius", decoy_radius, "look-alikes seen beside the target are refused here, m");
-    v("decoy_memory", decoy_memory, "for so long, s");
+    v("decoy_radius", decoy_radius,
+      "what is seen nearer than this to a look-alike, a candidate, the target in view or where a "
+      "hidden one is expected or stood, is taken for that, m");
+    v("decoy_memory", decoy_memory, "a look-alike not seen again is remembered for so long, s");
   }
   std::string Problem() const;
 };
@@ -201,8 +205,12 @@ struct PerceptionConfig {
     v("fit", fit, "places it in space");
     v("motion", motion, "how it may move, what is sent out");
     v("state", state, "found, hidden, lost");
-    v("max_extrapolation", max_extrapolation, "a pose is carried forward this far, s");
-    v("max_pose_age", max_pose_age, "a frame without a pose this near is not used, s");
+    v("max_extrapolation", max_extrapolation,
+      "the last pose is carried forward, or the first one kept back, this far; a frame beyond is "
+      "not used, s");
+    v("max_pose_age", max_pose_age,
+      "only for what is said of a frame not used for its pose: with one this near 'the pose is too "
+      "old', else 'no pose'; s");
     v("max_sweep_age", max_sweep_age, "older LiDAR points are not used, s");
   }
   std::string Problem() const;

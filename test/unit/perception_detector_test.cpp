@@ -283,6 +283,52 @@ TEST(PerceptionMarker, UnknownDictionaryIsRefusedWithTheKnownOnes) {
   }
 }
 
+TEST(PerceptionMarker, AnIdThatTheDictionaryLacksIsRefused) {
+  MarkerConfig config;
+  for (const int id : {-1, 0, 49}) {
+    config.id = id;
+    EXPECT_NO_THROW(MarkerDetector(config, {})) << id;
+  }
+  config.id = 50;
+  try {
+    MarkerDetector detector(config, {});
+    FAIL();
+  } catch (const std::runtime_error& e) {
+    for (const char* said : {"marker.id is 50", "DICT_4X4_50", "0 to 49", "-1"})
+      EXPECT_NE(std::string(e.what()).find(said), std::string::npos) << e.what();
+  }
+}
+
+struct DocOf {
+  std::string field, doc;
+
+  template <class T>
+  void operator()(const char* name, T&, const char* text) {
+    if (field == name) doc = text;
+  }
+};
+
+TEST(PerceptionMarker, EveryKnownDictionaryIsNamedInTheDoc) {
+  MarkerConfig config;
+  DocOf visitor{"dictionary", ""};
+  config.Visit(visitor);
+  config.dictionary = "DICT_NONE";
+  std::string message;
+  try {
+    MarkerDetector detector(config, {});
+  } catch (const std::runtime_error& e) {
+    message = e.what();
+  }
+  int known = 0;
+  std::istringstream words(message.substr(message.find("known are")));
+  for (std::string word; words >> word;) {
+    if (word.rfind("DICT_", 0) != 0) continue;
+    EXPECT_NE(visitor.doc.find(word), std::string::npos) << word;
+    ++known;
+  }
+  EXPECT_EQ(known, 7);
+}
+
 /// Just enough of the protocol buffers' wire format to write an ONNX file.
 class Proto {
  public:

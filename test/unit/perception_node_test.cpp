@@ -4,10 +4,14 @@
 
 #include <memory>
 #include <opencv2/core.hpp>
+#include <stdexcept>
+#include <string>
+#include <utility>
 
 #include "chase/target_t.hpp"
 #include "common/bus/convert.h"
 #include "common/bus/lockstep.h"
+#include "common/config/config.h"
 #include "perception_world.h"
 
 namespace chase::perception {
@@ -180,6 +184,51 @@ TEST(PerceptionNode, RgbAndBgrAreTheSamePicture) {
   bench.Send(m);
   EXPECT_EQ(bench.out.back().state, +target_t::TRACKING);
   EXPECT_GT(bench.out.back().score, 0.5);
+}
+
+/// What loading `yaml` over the defaults says; empty when it is taken.
+std::string Refusal(const std::string& yaml) {
+  PerceptionConfig config;
+  try {
+    config::LoadText(yaml, "test", &config);
+    return "";
+  } catch (const std::runtime_error& e) {
+    return e.what();
+  }
+}
+
+TEST(PerceptionLimits, ARigThatIsNotFiniteIsRefused) {
+  for (const std::string bad : {".nan", ".inf", "-.inf"}) {
+    for (const std::string field : {"center_u_px", "center_v_px", "camera_pitch_deg", "focal_px"}) {
+      const std::string message = Refusal("rig: {" + field + ": " + bad + "}");
+      EXPECT_NE(message.find("rig." + field + " is "), std::string::npos) << field << message;
+    }
+    for (const std::string field : {"lidar_position", "lidar_rpy_deg", "camera_position"}) {
+      const std::string message = Refusal("rig: {" + field + ": [0, " + bad + ", 0]}");
+      EXPECT_NE(message.find("rig." + field + "[1] is "), std::string::npos) << field << message;
+    }
+  }
+  EXPECT_EQ(Refusal("rig: {center_u_px: 12, lidar_rpy_deg: [180, 0, 90]}"), "");
+}
+
+TEST(PerceptionLimits, LookAlikesTakeUpSomeRoom) {
+  for (const std::string bad : {"0", "0.04", ".nan"})
+    EXPECT_NE(Refusal("state: {decoy_radius: " + bad + "}").find("decoy_radius is "),
+              std::string::npos);
+  EXPECT_EQ(Refusal("state: {decoy_radius: 0.05}"), "");
+}
+
+TEST(PerceptionNode, AFrameNotUsedForItsPoseSaysWhetherOneIsNear) {
+  for (const auto& [t, detail] :
+       {std::pair(0.04, ""), {0.1, "the pose is too old"}, {0.3, "no pose"}}) {
+    Bench bench;
+    bench.SendPose(0.0);
+    bench.Send(bench.Image(t));
+    if (*detail)
+      EXPECT_EQ(bench.Report().detail, detail);
+    else
+      EXPECT_EQ(bench.Report().state, bus::NodeReport::State::kStarting) << "used, none found yet";
+  }
 }
 
 }  // namespace
