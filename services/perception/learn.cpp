@@ -53,26 +53,57 @@ double Overlap(const cv::Mat& region, const cv::Rect& at, const cv::Mat& mask) {
   return static_cast<double>(both) / either;
 }
 
-/// Aspect and fill of the blobs that the masks mark, as geometric and plain means.
-void LearnShape(const std::vector<cv::Mat>& images, const std::vector<cv::Mat>& masks,
-                DetectorConfig* config) {
+/// The blob that overlaps most with the mask; null where none does.
+const Detection* MarkedBlob(const std::vector<Detection>& found, const cv::Mat& mask) {
+  const Detection* marked = nullptr;
+  double most = 0.0;
+  for (const auto& d : found) {
+    const double overlap = Overlap(d.mask, d.mask_box, mask);
+    if (overlap <= most) continue;
+    most = overlap;
+    marked = &d;
+  }
+  return marked;
+}
+
+/// Why a marked blob does not tell the target's shape; empty when it does.
+std::string WhyShapeless(const Detection* marked, const cv::Size& image) {
+  if (!marked) return "no blob of the learned colour lies where the mask marks the target";
+  // A piece's own cuts do not count: where another thing begins, the target ends.
+  const auto cut = CutSides(marked->mask_box, image);
+  return std::count(cut.begin(), cut.end(), true) ? "the image cuts the marked blob" : "";
+}
+
+[[noreturn]] void RefuseAll(const std::vector<std::string>& shapeless) {
+  std::string message = "no picture tells the target's shape: ";
+  for (const auto& pair : shapeless) message += pair + "; ";
+  throw std::invalid_argument(message + "give one with all of the target inside the picture");
+}
+
+/// Aspect and fill of the blobs that the masks mark, as geometric and plain means. Gives the pairs
+/// that do not tell them, and why.
+std::vector<std::string> LearnShape(const std::vector<cv::Mat>& images,
+                                    const std::vector<cv::Mat>& masks, DetectorConfig* config) {
   const ColorDetector detector(*config, 1.0);
+  std::vector<std::string> shapeless;
   double log_aspect = 0.0, fill = 0.0;
   int n = 0;
   for (size_t i = 0; i < images.size(); ++i) {
     const auto found = detector.Detect(images[i]);
-    if (found.empty()) continue;
-    const auto overlap = [&](const Detection& d) { return Overlap(d.mask, d.mask_box, masks[i]); };
-    const auto& marked = *std::max_element(
-        found.begin(), found.end(),
-        [&](const Detection& a, const Detection& b) { return overlap(a) < overlap(b); });
-    log_aspect += std::log(marked.box.width / marked.box.height);
-    fill += cv::countNonZero(marked.mask) / marked.box.area();
+    const Detection* marked = MarkedBlob(found, masks[i]);
+    const std::string why = WhyShapeless(marked, images[i].size());
+    if (!why.empty()) {
+      shapeless.push_back("pair " + std::to_string(i + 1) + ": " + why);
+      continue;
+    }
+    log_aspect += std::log(marked->box.width / marked->box.height);
+    fill += cv::countNonZero(marked->mask) / marked->box.area();
     ++n;
   }
-  if (n == 0) return;
+  if (n == 0) RefuseAll(shapeless);
   config->shape.aspect = std::exp(log_aspect / n);
   config->shape.fill = fill / n;
+  return shapeless;
 }
 
 double MeanOverlap(const std::vector<cv::Mat>& images, const std::vector<cv::Mat>& masks,
@@ -97,12 +128,12 @@ Learned LearnDetector(const std::vector<cv::Mat>& images, const std::vector<cv::
   config.kind = "color";
   config.color.white_balance = false;  // the pictures' own light is in the colours
   config.color = LearnColor(images, masks, config.color);
-  LearnShape(images, masks, &config);
+  const auto shapeless = LearnShape(images, masks, &config);
   Learned best;
   for (int i = 0; i * kInsetStep <= kMostInset; ++i) {
     config.shape.inset = i * kInsetStep;
     const double overlap = MeanOverlap(images, masks, config);
-    if (i == 0 || overlap > best.overlap) best = {config, overlap};
+    if (i == 0 || overlap > best.overlap) best = {config, overlap, shapeless};
   }
   return best;
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <opencv2/core.hpp>
+#include <string>
 #include <vector>
 
 #include "services/perception/perception_config.h"
@@ -10,12 +11,15 @@ namespace chase::perception {
 /// What is learned from, and how well the learned detector marks it.
 struct Learned {
   DetectorConfig config;
-  double overlap = 0.0;  ///< mean of intersection over union with the masks
+  double overlap = 0.0;                ///< mean of intersection over union with the masks
+  std::vector<std::string> shapeless;  ///< pairs that do not tell the shape, and why
 };
 
 /// Colour, shape and how far inside the colour's outline the marked target lies, from pictures
 /// (8 bit BGR) with masks (8 bit, not 0 on the target) of the same sizes. The rest comes from
-/// `base`. Throws std::invalid_argument when sizes differ, a mask is empty or is a picture.
+/// `base`. The shape is that of the blobs that the masks touch and the image does not cut. Throws
+/// std::invalid_argument when sizes differ, a mask is empty or is a picture, or none shows the
+/// shape.
 Learned LearnDetector(const std::vector<cv::Mat>& images, const std::vector<cv::Mat>& masks,
                       const DetectorConfig& base);
 

@@ -19,6 +19,20 @@ cv::Mat Read(const std::string& file, cv::ImreadModes mode) {
   return image;
 }
 
+/// The config as text. Throws when the service would refuse it: each part of it is checked as it is
+/// when it is loaded.
+std::string Checked(const PerceptionConfig& config) {
+  std::string text = config::Dump(config);
+  PerceptionConfig loaded;
+  try {
+    config::LoadText(text, "learned", &loaded);
+  } catch (const std::runtime_error& e) {
+    throw std::runtime_error(std::string(e.what()) +
+                             "; nothing is written, give pictures and masks of the whole target");
+  }
+  return text;
+}
+
 void Learn(const std::vector<std::string>& files, const std::string& base, const std::string& out) {
   if (files.size() % 2 != 0)
     throw std::invalid_argument("--learn-colour: " + std::to_string(files.size()) +
@@ -32,9 +46,8 @@ void Learn(const std::vector<std::string>& files, const std::string& base, const
   }
   const Learned learned = LearnDetector(images, masks, config.detector);
   config.detector = learned.config;
-  const std::string problem = config.Problem();
-  if (!problem.empty()) throw std::runtime_error("learned " + problem);
-  if (!(std::ofstream(out) << config::Dump(config)))
+  const std::string text = Checked(config);
+  if (!(std::ofstream(out) << text))
     throw std::runtime_error(out + ": cannot be written; name a file in an existing folder");
   const auto& color = learned.config.color;
   std::printf(
@@ -42,6 +55,8 @@ void Learn(const std::vector<std::string>& files, const std::string& base, const
       "mean overlap with the masks %.3f\n",
       out.c_str(), color.hue_min_deg, color.hue_max_deg, color.saturation_min, color.value_min,
       learned.config.shape.inset, learned.overlap);
+  for (const auto& pair : learned.shapeless)
+    std::printf("not used for the shape: %s\n", pair.c_str());
 }
 
 }  // namespace

@@ -43,6 +43,14 @@ bool ForTraining(const Photo& photo) {
          photo.name == "train_20_dist8";
 }
 
+/// The first complaint of the config or of those in it.
+std::string ProblemOf(const DetectorConfig& config) {
+  for (const auto& problem : {config.Problem(), config.color.Problem(), config.shape.Problem(),
+                              config.marker.Problem(), config.network.Problem()})
+    if (!problem.empty()) return problem;
+  return "";
+}
+
 TEST(PerceptionPhotos, TheConeIsFoundInRealPhotos) {
   const auto photos = LoadPhotos();
   if (photos.empty()) GTEST_SKIP() << "skipped: real recordings not present";
@@ -53,7 +61,7 @@ TEST(PerceptionPhotos, TheConeIsFoundInRealPhotos) {
   // As `chase-perception --learn-colour` does. The masks were drawn by hand well inside the cone's
   // outline; how far is learned from the same three.
   const Learned learned = LearnDetector(images, masks, {});
-  ASSERT_EQ(learned.config.Problem(), "");
+  ASSERT_EQ(ProblemOf(learned.config), "");
   DetectorConfig whole = learned.config;
   whole.shape.inset = 0.0;
   double sum = 0.0, outline = 0.0;
@@ -93,6 +101,41 @@ TEST(PerceptionLearn, FindsHowFarInsideTheColoursEdgeTheTargetIsMarked) {
     EXPECT_NEAR(learned.config.shape.inset, border / 50.0, 0.011);
     EXPECT_GT(learned.overlap, 0.97);
     EXPECT_GT(Overlap(learned.config, b.bgr, b.mask), 0.97) << border;
+  }
+}
+
+TEST(PerceptionLearn, TheShapeComesFromWholeBlobsThatAreMarked) {
+  const Marked whole(40, 50, 0);
+  Marked cut(40, 50, 0), elsewhere(40, 50, 0);
+  cut.bgr = cut.bgr.colRange(65, 320).clone();  // half of it, twice as slim
+  cut.mask = cut.mask.colRange(65, 320).clone();
+  elsewhere.bgr(cv::Rect(40, 60, 50, 100)).setTo(cv::Scalar(120, 125, 130));
+  elsewhere.bgr(cv::Rect(100, 180, 200, 40)).setTo(cv::Scalar(20, 110, 240));
+  elsewhere.mask = 0;
+  elsewhere.mask(cv::Rect(40, 60, 10, 10)).setTo(255);  // too few pixels to change the colour
+  for (const auto& other : {cut, elsewhere}) {
+    const Learned learned = LearnDetector({whole.bgr, other.bgr}, {whole.mask, other.mask}, {});
+    EXPECT_NEAR(learned.config.shape.aspect, 0.5, 0.01);
+    EXPECT_EQ(ProblemOf(learned.config), "");
+  }
+}
+
+TEST(PerceptionLearn, SaysWhyNoPictureShowsTheShape) {
+  Marked cut(40, 50, 0);
+  cut.bgr = cut.bgr.colRange(65, 320).clone();
+  cut.mask = cut.mask.colRange(65, 320).clone();
+  Marked tiny(40, 50, 0);  // its own blob is noise
+  tiny.bgr(cv::Rect(40, 60, 50, 100)).setTo(cv::Scalar(120, 125, 130));
+  tiny.bgr(cv::Rect(100, 100, 3, 3)).setTo(cv::Scalar(20, 110, 240));
+  tiny.mask = 0;
+  tiny.mask(cv::Rect(100, 100, 3, 3)).setTo(255);
+  try {
+    LearnDetector({cut.bgr, tiny.bgr}, {cut.mask, tiny.mask}, {});
+    FAIL();
+  } catch (const std::invalid_argument& e) {
+    const std::string message = e.what();
+    for (const char* said : {"pair 1: the image cuts", "pair 2: no blob", "give"})
+      EXPECT_NE(message.find(said), std::string::npos) << said << " in: " << message;
   }
 }
 
