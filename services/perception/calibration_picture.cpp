@@ -40,7 +40,8 @@ struct Recording {
   std::optional<Sweep> sweep;
 };
 
-/// Reads until the first frame at or after `at` seconds that poses and a whole sweep surround.
+/// Reads on from the first readable frame at or after `at` seconds until a sweep has been logged
+/// and poses surround the frame.
 Recording ReadAround(const std::string& in, double at) {
   lcm::LogFile log(in, "r");
   if (!log.good()) throw std::runtime_error(in + ": cannot be read; name an LCM log");

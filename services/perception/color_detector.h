@@ -7,7 +7,8 @@
 
 namespace chase::perception {
 
-/// Blobs of the target's colour, ranked by how much they look like an upright cylinder.
+/// Blobs of the target's colour, ranked by how much they look like an upright cylinder, and after
+/// them pieces of those that may be several things, ranked likewise.
 class ColorDetector : public Detector {
  public:
   ColorDetector(const DetectorConfig& config, double edge_sigma_px)
@@ -19,7 +20,8 @@ class ColorDetector : public Detector {
   Detection Describe(const cv::Mat& bgr, const cv::Mat& score,
                      const std::vector<cv::Point>& contour) const;
   void Rate(const cv::Mat& score, Detection* d) const;
-  /// Adds the well shaped pieces of blobs that are badly shaped as a whole.
+  /// Adds the best pieces of large enough blobs that are not surely one thing: those that an edge
+  /// inside the blob ends, whatever their shape, and of the others the well shaped.
   void AddPieces(const cv::Mat& bgr, const cv::Mat& score, std::vector<Detection>* found) const;
   /// 0 to 1 from aspect, fill and straightness; aspect and fill say nothing where the image ends.
   double ShapeScore(const Detection& d, double area, double hull_area) const;

@@ -10,12 +10,17 @@
 
 namespace chase::perception {
 
+// Times of the wire, `utime` and `origin`, are microseconds; t of what is returned is seconds from
+// `origin`, which is any time near the data, the same for all.
+
 /// The frame in a message; what is not an 8 bit image of known format becomes `problem`.
 Frame FromMessage(const camera_image_t& m, int64_t origin);
-/// Points that are not finite are left out.
+/// The sweep in a message, t its start; points that are not finite are left out.
 Sweep FromMessage(const lidar_scan_t& m, int64_t origin);
 PoseSample FromMessage(const pose_t& m, int64_t origin);
+/// False when odometry says that the pose is lost or not there yet.
 bool Usable(const pose_t& m);
+/// The message for an estimate, stamped `utime`, microseconds: its frame's own.
 target_t ToMessage(const TargetEstimate& target, int64_t utime);
 
 }  // namespace chase::perception

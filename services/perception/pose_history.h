@@ -25,8 +25,9 @@ class PoseHistory {
   /// anew.
   void Add(const PoseSample& sample);
 
-  /// Pose at t: between two samples, or carried on from the last by its rates for at most
-  /// `max_extrapolation` s. Nothing when t lies outside.
+  /// Pose at t: between two samples at most 0.15 s apart, or carried by its rates from the last
+  /// sample forward, or from the first one kept back, for at most `max_extrapolation` s. Nothing
+  /// when t lies further outside, or in a longer gap, however near to one of its ends.
   std::optional<PoseSample> At(double t, double max_extrapolation) const;
 
   /// The sample nearest to t if it is at most `max_age` s away.
@@ -38,7 +39,7 @@ class PoseHistory {
   std::deque<PoseSample> samples_;
 };
 
-/// `sample` carried on to time t by its velocity, acceleration and rates.
+/// `sample` carried to time t, later or earlier, by its velocity, acceleration and rates.
 PoseSample Extrapolated(const PoseSample& sample, double t);
 
 }  // namespace chase::perception
