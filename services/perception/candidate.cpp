@@ -23,6 +23,7 @@ constexpr double kFastAge = 0.08;       // s since the last of them, at most
 constexpr double kKnownSigmas = 1.5;    // from which a way along the line of sight counts
 constexpr double kAstray = 0.1, kAstrayShare = 0.5;  // m and share of its way, off what is told
 constexpr double kSureWay = 0.15;                    // m
+constexpr double kAnew = 2.0;     // s that it stood, after which its way is counted anew
 constexpr double kBetter = 0.25;  // share of the first variance from which a start is taken anew
 
 void CountSweep(Candidate* c) {
@@ -45,7 +46,8 @@ void Candidate::Correct(const Sighting& sighting) {
   };
   // Before, what hid it may have seemed its edge.
   const bool comes_out = was_partial && !track.partial && !SurelyDrives(kSureWay);
-  if (!comes_out && (Drives() || spread(track.state) > kBetter * spread(first))) return;
+  const bool stands = !Drives() && track.t - known > kAnew;
+  if (!comes_out && !stands && (Drives() || spread(track.state) > kBetter * spread(first))) return;
   first = track.state;
   ranged = sighting.n_points > 0;
   known = track.t;
@@ -58,9 +60,10 @@ Candidate NewCandidate(const Sighting& sighting, const View& view) {
   c.first = sighting.fit.posterior;
   c.since = c.known = view.t;
   c.last = sighting;
-  const Eigen::Vector3d sight = c.track.state.position() - view.camera.p_WC;
-  c.px = sight.norm() / view.camera.rig.focal_px;
   c.ranged = sighting.n_points > 0;
+  const Eigen::Vector3d sight = c.track.state.position() - view.camera.p_WC;
+  c.range = sight.norm();
+  c.px = c.range / view.camera.rig.focal_px;
   c.range_px = sight.head<2>() / sighting.detection.box.height;
   c.part = sighting.detection.part || sighting.detection.edged;
   CountSweep(&c);
@@ -103,10 +106,11 @@ bool Candidate::SurelyDrives(double way) const {
 }
 
 bool Candidate::Drives() const {
-  const bool whole = !last.detection.AnyCut() && (last.fit.whole || track.partial);
-  // Taken from its size, its range may be wrong, and so may be its speed.
+  // A side that was never seen, and is not now, does not seem to move it.
+  const bool clear = !last.detection.AnyCut() && (last.fit.whole || track.partial);
+  // Taken from its size, its range may be wrong, and so may be its speed; one sweep tells none.
   const bool told = ranged && last.n_points > 0 && track.t > known;
-  if (whole && told && Fast()) return true;
+  if (clear && told && Fast()) return true;
   Eigen::Vector2d d = (track.state.position() - first.position()).head<2>();
   Eigen::Matrix2d P =
       track.state.covariance.topLeftCorner<2, 2>() + first.covariance.topLeftCorner<2, 2>();
@@ -114,11 +118,11 @@ bool Candidate::Drives() const {
   if (d.dot(P.ldlt().solve(d)) < kMovedGate || d.norm() < kSlow * (track.t - known)) return false;
   const Eigen::Vector2d n = range_px.normalized();
   const double along = n.dot(d), sigma = std::sqrt(n.dot(P * n));
-  if (whole && last.detection.box.width > kSharpWidthPx &&
+  if (clear && last.detection.box.width > kSharpWidthPx &&
       (d - along * n).norm() > std::max(kMovedAcross, kMovedAcrossPx * px))
     return true;
   if (std::abs(along) < kKnownSigmas * sigma) d -= along * n;  // may be no way at all
-  return d.norm() > (ranged && whole ? std::max(kMoved, kMovedPx * px)
+  return d.norm() > (ranged && clear ? std::max(kMoved, kMovedPx * px)
                                      : std::max(kMovedUnclear, kMovedUnclearPx * px));
 }
 

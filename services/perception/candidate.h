@@ -10,7 +10,8 @@ struct Candidate {
   TargetGaussian first;  ///< as it was first known well
   double since = 0.0;    ///< when it was first seen, s
   Sighting last;         ///< the last one
-  double px = 0.0;       ///< what one pixel spans there, m
+  double range = 0.0;    ///< from the camera when it was last seen, m
+  double px = 0.0;       ///< what one pixel spanned there at first, m
   bool ranged = false;   ///< `first` has its range from LiDAR points, not from the size alone
   /// Along the line of sight, as far as one pixel less of its height moves it; frame W, m.
   Eigen::Vector2d range_px = Eigen::Vector2d::UnitX();

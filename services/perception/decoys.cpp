@@ -7,14 +7,16 @@ namespace chase::perception {
 namespace {
 
 constexpr int kKnownHits = 3;    // sightings that make a look-alike
-constexpr double kDriven = 0.4;  // m, from where first seen
+constexpr double kDriven = 1.2;  // radii from where first seen
 constexpr size_t kMaxDecoys = 32;
 
 }  // namespace
 
 bool Decoy::known() const { return hits >= kKnownHits; }
 
-bool Decoy::driven() const { return known() && (p_W - start).norm() > kDriven; }
+bool Decoy::Driven(double radius) const {
+  return known() && (p_W - start).norm() > kDriven * radius;
+}
 
 const Decoy* Decoys::At(const Eigen::Vector3d& p_W) const {
   for (const Decoy& d : all_)

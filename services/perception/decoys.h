@@ -14,7 +14,8 @@ struct Decoy {
   int hits;
 
   bool known() const;
-  bool driven() const;  ///< it has moved from where it was first seen
+  /// True when it has moved from where it was first seen; things within `radius` m may be one here.
+  bool Driven(double radius) const;
 };
 
 /// Where look-alikes stand that were seen while the target was in view.

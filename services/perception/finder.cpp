@@ -126,7 +126,7 @@ std::optional<Sighting> Finder::FindWhole(const TargetTrack& track, const View& 
 /// Pieces of one thing, parted by what hides it.
 std::optional<Sighting> Finder::FindPieces(const TargetTrack& track, const View& view,
                                            const std::vector<size_t>& inside,
-                                           const SearchBoxes& boxes) const {
+                                           const Refuses& refuses, const SearchBoxes& boxes) const {
   if (inside.size() < 2 || inside.size() > kMostTried) return std::nullopt;
   std::vector<Detection> pieces;
   for (const size_t i : inside)
@@ -139,7 +139,8 @@ std::optional<Sighting> Finder::FindPieces(const TargetTrack& track, const View&
   if (too_large(merged.box.width, boxes.expected.width) ||
       too_large(merged.box.height, boxes.expected.height))
     return std::nullopt;
-  return Try(track, view, merged, true);
+  const auto s = Try(track, view, merged, true);
+  return s && !refuses(*s) ? s : std::nullopt;
 }
 
 std::optional<Sighting> Finder::Find(const TargetTrack& track, View* view,
@@ -155,7 +156,7 @@ std::optional<Sighting> Finder::Find(const TargetTrack& track, View* view,
   });
   if (inside.size() > kMostTried) inside.resize(kMostTried);
   auto best = FindWhole(track, *view, inside, refuses, *boxes);
-  if (!best) best = FindPieces(track, *view, inside, *boxes);
+  if (!best) best = FindPieces(track, *view, inside, refuses, *boxes);
   if (best)
     for (const size_t i : inside)
       view->taken[i] = view->taken[i] || Overlap(view->detections[i], best->detection);

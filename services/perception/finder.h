@@ -73,7 +73,7 @@ class Finder {
                                     const std::vector<size_t>& inside, const Refuses& refuses,
                                     const SearchBoxes& boxes) const;
   std::optional<Sighting> FindPieces(const TargetTrack& track, const View& view,
-                                     const std::vector<size_t>& inside,
+                                     const std::vector<size_t>& inside, const Refuses& refuses,
                                      const SearchBoxes& boxes) const;
   Clusters Points(const View& view, const Detection& detection, const Eigen::Vector3d& v_WT,
                   bool fresh_only) const;

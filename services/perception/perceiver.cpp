@@ -15,6 +15,7 @@ constexpr size_t kMaxCandidates = 6;
 constexpr double kLeastWidthPx = 6.0;  // what is narrower may be a slit between things
 constexpr int kDecoyHits = 3;      // sightings that what stands beside one that drives counts for
 constexpr double kTimeJump = 1.0;  // s back that count as a new recording
+constexpr double kGap = 0.25;      // s between frames in which a target may do anything
 constexpr int kSureHits = 5;       // corrections after which the track is trusted
 constexpr double kDrivenSigma = 0.1;  // m, how well that must be known
 constexpr double kStood = 0.2;        // m, within which a target stands
@@ -49,10 +50,12 @@ void Perceiver::FollowCandidates(View* view) {
     });
     const bool partly =
         c.track.partial || (again && (again->detection.edged || c.HiddenIn(*again)));
-    if (again && (again->fit.whole || partly))
-      c.Correct(*again);
-    else
+    if (!again || !(again->fit.whole || partly)) {
       ++c.track.misses;
+      continue;
+    }
+    c.Correct(*again);
+    c.range = (c.track.state.position() - view->camera.p_WC).norm();
   }
   DropMissed();
 }
@@ -125,13 +128,14 @@ void Perceiver::Promote(const View& view) {
     if (Ready(c, view.t) && (!best || better(c, *best))) best = &c;
   if (!best) return;
   const Candidate chosen = *best;
+  const bool drives = chosen.Drives() || PieceIsReady(chosen);
   for (const auto& c : candidates_)
-    if (&c != best && chosen.Drives() && !c.Drives() && !c.part &&
+    if (&c != best && drives && !c.Drives() && !c.part &&
         c.track.hits >= config_.state.confirm_frames)
       decoys_.Note(c.track.state.position(), view.t, kDecoyHits);
   if (sighting_) decoys_.Note(track_->state.position(), view.t, kDecoyHits);
   Start(chosen.track, chosen.last);
-  doubtful_ = !chosen.Drives();
+  doubtful_ = !drives;
   candidates_.clear();
 }
 
@@ -188,20 +192,23 @@ void Perceiver::SwapIfTheOtherDrives(const Sighting& s, Decoy* other, double t) 
   const double sigma = std::sqrt(s.fit.posterior.covariance.topLeftCorner<3, 3>().trace());
   const bool stands =
       t - stood_since_ > kStoodFor && (track_->state.position() - stood_).norm() < kStood;
-  if (!stands || !other->driven() || sigma > kDrivenSigma) return;
+  if (!stands || !other->Driven(config_.state.decoy_radius) || sigma > kDrivenSigma) return;
   const Eigen::Vector3d stood = track_->state.position();
   *other = {stood, stood, t, other->hits};
   Start({s.fit.posterior, s.fit.shape, t, t, 1, 0, s.fit.joined}, s);
 }
 
-void Perceiver::ForgetIfTimeRanBack(double t) {
-  if (t < last_t_ - kTimeJump) {
-    track_.reset();
-    candidates_.clear();
-    decoys_.Clear();
-    state_ = TargetState::kSearching;
-  }
+/// True when the frame is newer than the last one, or starts a recording anew.
+bool Perceiver::ForgetIfTimeRanBack(double t) {
+  const bool jumped = t < last_t_ - kTimeJump;
+  if (!jumped && t <= last_t_) return false;
   last_t_ = t;
+  if (!jumped) return true;
+  track_.reset();
+  candidates_.clear();
+  decoys_.Clear();
+  state_ = TargetState::kSearching;
+  return true;
 }
 
 TargetEstimate Perceiver::Report(double t, const std::optional<View>& view,
@@ -228,11 +235,13 @@ TargetEstimate Perceiver::Report(double t, const std::optional<View>& view,
 }
 
 TargetEstimate Perceiver::See(const Frame& frame) {
-  ForgetIfTimeRanBack(frame.t);
-  std::string note;
-  auto view = finder_.Look(frame, &note);
+  const bool newer = ForgetIfTimeRanBack(frame.t);
+  std::string note = "the frame is not newer than the last one";
+  auto view = newer ? finder_.Look(frame, &note) : std::nullopt;
   sighting_.reset();
   unsure_.reset();
+  contested_ = false;
+  if (track_ && frame.t - track_->seen > kGap) track_->misses = std::max(1, track_->misses);
   if (track_ && state_ != TargetState::kLost) track_->Predict(frame.t, config_.motion);
   for (auto& c : candidates_) c.track.Predict(frame.t, config_.motion);
   if (view) {
@@ -240,7 +249,8 @@ TargetEstimate Perceiver::See(const Frame& frame) {
     Seek(&*view);
     if (sighting_ || !candidates_.empty()) finder_.MarkSweepsUsed();
     Remember(*view);
-  } else {
+  } else if (newer) {
+    if (track_) ++track_->misses;
     for (auto& c : candidates_) ++c.track.misses;
     DropMissed();
   }

@@ -63,7 +63,7 @@ class Perceiver {
   bool IsRatherDecoy(const Sighting& s, const View& view) const;
   void SwapIfTheOtherDrives(const Sighting& s, Decoy* other, double t);
   void Start(const TargetTrack& track, const Sighting& sighting);
-  void ForgetIfTimeRanBack(double t);
+  bool ForgetIfTimeRanBack(double t);
 
   PerceptionConfig config_;
   Finder finder_;

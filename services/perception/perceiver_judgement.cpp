@@ -48,21 +48,21 @@ bool Perceiver::Plausible(const Sighting& s, double t) const {
   const Eigen::Vector3d p_WT = s.fit.posterior.position();
   if (decoys_.At(p_WT)) return false;
   if (!track_ || doubtful_ || !track_->Proven()) return true;
-  const Eigen::Vector3d d = p_WT - track_->state.position();
+  const double way = (p_WT - last_p_).norm(), unseen = t - track_->seen;
   if (state_ != TargetState::kLost) {
+    const Eigen::Vector3d d = p_WT - track_->state.position();
     if (std::abs(d.z()) >= kGateSigmas * config_.motion.ground_sigma) return false;
     const Eigen::Matrix3d P = track_->state.covariance.topLeftCorner<3, 3>();
     if (d.dot(P.ldlt().solve(d)) < kReachGate) return true;
     // The prediction may err by more than it claims, where the fit slipped to what stood behind.
-    const double way = (p_WT - last_p_).norm();
-    return Clear(s) && way < kReachMargin + kUsualSpeed * (t - track_->seen);
+    return Clear(s) && way < kReachMargin + kUsualSpeed * unseen;
   }
-  return d.norm() < kReachMargin + config_.motion.max_speed * (t - track_->seen);
+  return way < kReachMargin + config_.motion.max_speed * unseen;
 }
 
 /// Hidden for so long that a look-alike may lie where the target may be as well.
 bool Perceiver::Vague() const {
-  return track_->misses > 0 && track_->HorizontalSigma() > config_.state.sure_sigma;
+  return track_ && track_->misses > 0 && track_->HorizontalSigma() > config_.state.sure_sigma;
 }
 
 /// True for a sighting after which nothing need be asked: all of the target, close to where it was
@@ -99,9 +99,8 @@ bool Perceiver::StandsLongEnough(const Candidate& c, double t) const {
                           (c.track.state.position() - last_p_).norm() < config_.state.decoy_radius;
   const bool may_stand =
       !c.last.detection.AnyCut() && (!track_ || t - track_->seen > config_.motion.hidden_time);
-  const double range = c.px * config_.rig.focal_px;
-  const double wait = config_.state.standing_after * std::max(1.0, std::pow(range / kFar, 2));
-  return stood_here || (may_stand && range < config_.state.standing_range && t - c.since >= wait);
+  const double wait = config_.state.standing_after * std::max(1.0, std::pow(c.range / kFar, 2));
+  return stood_here || (may_stand && c.range < config_.state.standing_range && t - c.since >= wait);
 }
 
 /// What drives is taken at once.

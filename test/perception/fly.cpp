@@ -1,3 +1,4 @@
+#include <cmath>
 #include <ctime>
 #include <deque>
 #include <utility>
@@ -24,7 +25,7 @@ perception::PerceptionConfig ConfigFor(const world::Scenario& scenario) {
 void Shoot(const Stage& stage, const world::Rig& rig, const std::function<void(Step&&)>& take) {
   Show show(stage, rig);
   std::deque<std::pair<double, perception::Sweep>> pending;  // by the time of arrival
-  const int ticks = static_cast<int>(stage.options().duration / kTick);
+  const int ticks = static_cast<int>(std::lround(stage.options().duration / kTick));
   for (int k = 1; k <= ticks; ++k) {  // a frame sees the pose of 5 ms ago as the newest
     Step step;
     const double t = step.t = step.truth.t = k * kTick;

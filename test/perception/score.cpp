@@ -68,7 +68,7 @@ void Score::AddOcclusions(const std::vector<Outcome>& flight) {
     if (!followed || end - i < 4) continue;
     size_t said = i;
     while (said < flight.size() && flight[said].estimate.state == TargetState::kTracking) ++said;
-    if (said < flight.size()) said_.push_back(flight[said].t - flight[i].t);
+    said_.push_back(flight[std::min(said, flight.size() - 1)].t - flight[i].t);
     size_t back = end;
     while (back < flight.size() && flight[back].visible_share < kHalf &&
            flight[back].visible_share > 0.0)
