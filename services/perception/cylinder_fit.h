@@ -56,7 +56,8 @@ struct FitResult {
   double prior_distance = 0.0;         ///< squared Mahalanobis distance from the prior
   double cost = 0.0;                   ///< half the robust sum of squares, prior included
   /// Logarithm of the prediction's density of these measurements, but for what the measurements'
-  /// own densities add: Laplace's approximation around the solution.
+  /// own densities add: Laplace's approximation around the solution. What a position measured by
+  /// the detector costs is left out too, since it may be a stray one: LogTarget() adds it.
   double log_evidence = 0.0;
   double log_odds = 0.0;  ///< of being the target rather than anything else of its colour
 };

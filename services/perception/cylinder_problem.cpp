@@ -271,7 +271,8 @@ void CylinderProblem::ReadSides(const std::array<std::vector<double>, 4>& edges,
   }
 }
 
-/// -cost + log sqrt(det posterior / det prior). What single outliers cost is bounded.
+/// -cost + log sqrt(det posterior / det prior). What single outliers cost is bounded; a measured
+/// position, which may be a stray one, costs nothing here.
 bool CylinderProblem::ReadEvidence(const std::array<std::vector<double>, 4>& edges,
                                    const std::vector<double>& points, FitResult* out) const {
   const Eigen::LLT<Matrix6d> posterior(out->posterior.covariance);

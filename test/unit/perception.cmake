@@ -6,6 +6,7 @@ target_include_directories(perception_world PUBLIC ${perception_test_dir})
 chase_test(perception_image_test
   LIBS perception_world opencv_imgproc opencv_imgcodecs opencv_aruco opencv_dnn
   SOURCES ${perception_test_dir}/perception_detector_test.cpp
+          ${perception_test_dir}/perception_marker_test.cpp
           ${perception_test_dir}/perception_photo_test.cpp)
 chase_test(perception_solver_test LIBS perception_core Ceres::ceres
   SOURCES ${perception_test_dir}/perception_solver_test.cpp)
