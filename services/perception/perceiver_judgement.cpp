@@ -80,7 +80,8 @@ bool Perceiver::Sure(const Sighting& s) const {
 /// True when it is too small for its size to tell the range, and LiDAR never did. A standing thing
 /// of another size would then seem to drive as the drone does.
 bool Perceiver::SizedBadly(const Candidate& c) const {
-  return !track_ && c.sweeps == 0 && c.last.detection.box.width < kSmallPx;
+  const Detection& d = c.last.detection;
+  return !track_ && c.sweeps == 0 && !d.p_CT && d.box.width < kSmallPx;
 }
 
 /// Of a piece of something larger, or what is hidden or cut off in part, once it has driven further

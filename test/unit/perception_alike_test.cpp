@@ -166,15 +166,18 @@ TEST(PerceptionAlike, ALongStopBehindAWallIsEndedByTheTargetAndNotByItsTwin) {
   EXPECT_LE(found, back_since + 0.3);
 }
 
-/// Half as large as the target, it looks like one twice as far away, which would drive.
+/// Half as large as the target, it looks like one twice as far away, which would drive. What drives
+/// and is as large is tracked from the same rails.
 TEST(PerceptionAlike, WhatIsSmallAndStandsDoesNotDriveAsTheDroneDoes) {
   World w;
-  w.target = [](double) { return Vector3d(-8.0, 0.0, 0.55); };  // behind the drone
   w.body = [](double t) { return Body{{0.0, 0.9 * t - 0.6, 1.0}}; };
-  w.things.push_back({Thing::Kind::kCylinder, {4.0, 0.0, 0.6}, {0.075, 0.075, 0.125}, kOrange});
   FlyOptions options;
   options.duration = 1.4;
   options.lidar = false;
+  w.target = [](double t) { return Vector3d(4.0, 0.5 * t, 0.6); };
+  EXPECT_TRUE(Detected(Fly(w, {}, options).back()));
+  w.target = [](double) { return Vector3d(-8.0, 0.0, 0.55); };  // behind the drone
+  w.things.push_back({Thing::Kind::kCylinder, {4.0, 0.0, 0.6}, {0.075, 0.075, 0.125}, kOrange});
   for (const auto& o : Fly(w, {}, options)) EXPECT_NE(o.estimate.state, TargetState::kTracking);
 }
 

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "services/perception/candidate.h"
+#include "services/perception/decoys.h"
 
 namespace chase::perception {
 namespace {
@@ -130,6 +131,19 @@ TEST(PerceptionCandidate, ADriftOfSecondsIsNoWay) {
   EXPECT_FALSE(c.Drives()) << "0.05 m/s";
 }
 
+TEST(PerceptionCandidate, HowLongItStoodBeforeDoesNotCount) {
+  const Vector3d p(3.0, 0.0, 0.55);
+  Candidate c = CandidateAt(p, p, 0.01);
+  Sighting s;
+  s.fit.posterior = c.track.state;
+  for (; c.track.t < 20.0; c.track.t += 0.05) c.Correct(s);
+  ASSERT_FALSE(c.Drives());
+  s.fit.posterior.mean[1] = 0.25;
+  c.track.t += 0.3;
+  c.Correct(s);
+  EXPECT_TRUE(c.Drives());
+}
+
 TEST(PerceptionCandidate, WhatHidesASideOfItMustNotSeemToMoveIt) {
   const Vector3d p(2.0, 0.0, 0.55);
   Candidate c = CandidateAt(p, p + Vector3d(0.0, 0.05, 0.0), 0.005);
@@ -173,6 +187,18 @@ TEST(PerceptionCandidate, CountsSightingsWithLidarPoints) {
   }
   EXPECT_EQ(c.sweeps, 2);
   EXPECT_DOUBLE_EQ(c.swept, c.track.t);
+}
+
+TEST(PerceptionDecoys, TwoThatStandCloseTogetherAreNotOneThatDrives) {
+  const StateConfig config;
+  Decoys decoys(config);
+  const Vector3d a(3.0, 0.0, 0.55), b = a + Vector3d(0.0, 0.9 * config.decoy_radius, 0.0);
+  Decoy* decoy = nullptr;
+  for (int k = 0; k < 10; ++k) decoy = decoys.Note(k % 2 ? b : a, 0.1 * k);
+  ASSERT_TRUE(decoy && decoy->known());
+  EXPECT_FALSE(decoy->Driven(config.decoy_radius));
+  for (int k = 1; k <= 10; ++k) decoy = decoys.Note(b + Vector3d(0.1 * k, 0.0, 0.0), 1.0 + 0.1 * k);
+  EXPECT_TRUE(decoy->Driven(config.decoy_radius));
 }
 
 }  // namespace

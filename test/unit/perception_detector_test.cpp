@@ -499,6 +499,65 @@ TEST(PerceptionNetwork, RowsThatAreNotFiniteAreLeftOut) {
   std::filesystem::remove(config.file);
 }
 
+constexpr double kBoxRange = 2.0;  // m, from where the target of BoxWorld() fills the box below
+constexpr int kBoxWidth = 32, kBoxHeight = 48;
+
+/// A target that crosses on a circle around the camera.
+perception_test::World BoxWorld() {
+  auto world = StillWorld(kBoxRange);
+  const double slope = 0.5 * kBoxWidth / world.rig.focal_px;
+  world.target_radius = kBoxRange * std::sin(std::atan(slope));
+  world.target_height = (kBoxRange - world.target_radius) * kBoxHeight / world.rig.focal_px;
+  world.target = [](double t) {
+    const double angle = 0.1 * t - 0.15;
+    return Eigen::Vector3d(kBoxRange * std::cos(angle), kBoxRange * std::sin(angle), 1.0);
+  };
+  world.body = [](double) { return perception_test::Body{{0.0, 0.0, 1.0}}; };
+  world.rig.camera_position.setZero();
+  world.rig.camera_pitch_deg = 0.0;
+  return world;
+}
+
+/// The target's box on grey.
+void DrawBox(const perception_test::World& world, double t, cv::Mat* bgr) {
+  const Eigen::Vector3d p_BT = world.target(t) - world.body(t).p;
+  const Eigen::Vector2d px = world.rig.Project(world.rig.R_BC().transpose() * p_BT);
+  const auto from = [](double middle, int size) {
+    return static_cast<int>(std::lround(middle - 0.5 * (size - 1)));
+  };
+  *bgr = Grey();
+  cv::rectangle(*bgr, {from(px.x(), kBoxWidth), from(px.y(), kBoxHeight), kBoxWidth, kBoxHeight},
+                kOrangeBgr, cv::FILLED);
+}
+
+TEST(PerceptionNetwork, WhatItsBoxesShowIsTracked) {
+  const std::string file = testing::TempDir() + "perception_tiny_flight.onnx";
+  WriteNetwork(file, 24.0 * (235.0 - 12.0) / 255.0);
+  const auto world = BoxWorld();
+  PerceptionConfig config;
+  config.rig = world.rig;
+  config.target_radius = world.target_radius;
+  config.target_height = world.target_height;
+  config.detector.kind = "network";
+  config.detector.network.file = file;
+  config.detector.network.input_width_px = kNetWidth;
+  config.detector.network.input_height_px = kNetHeight;
+  perception_test::FlyOptions options;
+  options.duration = 3.0;
+  options.spoil_image = [&](double t, cv::Mat* bgr) { DrawBox(world, t, bgr); };
+  for (const bool lidar : {false, true}) {
+    options.lidar = lidar;
+    for (const auto& o : perception_test::Fly(world, config, options)) {
+      if (o.t < 1.0) continue;
+      EXPECT_EQ(o.estimate.state, TargetState::kTracking) << "lidar " << lidar << ", " << o.t;
+      const Eigen::Vector3d error = o.estimate.p_WT - o.truth;
+      EXPECT_LT(error.dot(o.estimate.covariance.ldlt().solve(error)), 16.0)
+          << "lidar " << lidar << ", " << o.t << " s, off by " << error.transpose() << " m";
+    }
+  }
+  std::filesystem::remove(file);
+}
+
 TEST(PerceptionNetwork, MissingAndBrokenFilesAreRefused) {
   NetworkConfig config;
   config.file = testing::TempDir() + "perception_none.onnx";

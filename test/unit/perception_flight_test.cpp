@@ -188,6 +188,44 @@ TEST(PerceptionFaults, SpoiltImagesAreSaid) {
   }
 }
 
+/// Blind for 1.5 s, in which the target stops.
+TEST(PerceptionFaults, ATargetNotSeenForWantOfImagesMayBeAnywhereItCouldGo) {
+  World w = StillWorld(3.0);
+  w.target = [](double t) { return Vector3d(3.0, 0.8 * std::min(t, 0.9), 0.55); };
+  FlyOptions options;
+  options.duration = 2.3;
+  options.spoil_image = [](double t, cv::Mat* m) {
+    if (t > 0.79) m->setTo(cv::Scalar::all(0));
+  };
+  for (const auto& o : Fly(w, {}, options)) {
+    if (o.t < 1.3) continue;
+    const Vector3d e = o.estimate.p_WT - o.truth;
+    EXPECT_LT(e.dot(o.estimate.covariance.ldlt().solve(e)), 16.0) << o.t;
+  }
+}
+
+TEST(PerceptionFaults, AFrameThatIsNotNewerIsSaidAndChangesNothing) {
+  const World w = StillWorld(2.5);
+  perception_test::Renderer renderer(w);
+  Perceiver perceiver(TakenAtOnce());
+  TargetEstimate last;
+  cv::Mat bgr;
+  for (int k = 1; k <= 10; ++k) {
+    perceiver.AddPose(renderer.Pose(0.05 * k));
+    bgr = renderer.Image(0.05 * k).bgr;
+    last = perceiver.See({0.05 * k, bgr, {}});
+  }
+  ASSERT_EQ(last.state, TargetState::kTracking);
+  for (const double t : {0.5, 0.42}) {
+    const auto again = perceiver.See({t, bgr, {}});
+    EXPECT_NE(again.note.find("not newer"), std::string::npos) << again.note;
+    EXPECT_EQ(again.p_WT, last.p_WT);
+    EXPECT_LT((again.covariance - last.covariance).norm(), 1e-4) << "but for another pose";
+  }
+  perceiver.AddPose(renderer.Pose(0.55));
+  EXPECT_EQ(perceiver.See({0.55, renderer.Image(0.55).bgr, {}}).note, "");
+}
+
 TEST(PerceptionFaults, ImagesTornSidewaysDoNotMoveTheTarget) {
   FlyOptions options;
   options.duration = 1.2;
