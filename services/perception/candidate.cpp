@@ -35,7 +35,7 @@ void CountSweep(Candidate* c) {
 }  // namespace
 
 void Candidate::Correct(const Sighting& sighting) {
-  const bool was_partial = track.partial;
+  const bool was_partial = track.partial, was_part = part;
   track.Correct(sighting.fit);
   last = sighting;
   CountSweep(this);
@@ -44,10 +44,12 @@ void Candidate::Correct(const Sighting& sighting) {
   const auto spread = [](const TargetGaussian& g) {
     return g.covariance.topLeftCorner<2, 2>().trace();
   };
-  // Before, what hid it may have seemed its edge.
-  const bool comes_out = was_partial && !track.partial && !SurelyDrives(kSureWay);
+  // Before, what hid it, or what a small one seemed a piece of, may have seemed its edge.
+  const bool out = was_partial && !track.partial && !SurelyDrives(kSureWay);
+  const bool alone = was_part && !part && d.box.width < kSharpWidthPx;
   const bool stands = !Drives() && track.t - known > kAnew;
-  if (!comes_out && !stands && (Drives() || spread(track.state) > kBetter * spread(first))) return;
+  if (!out && !alone && !stands && (Drives() || spread(track.state) > kBetter * spread(first)))
+    return;
   first = track.state;
   ranged = sighting.n_points > 0;
   known = track.t;

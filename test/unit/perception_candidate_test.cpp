@@ -131,6 +131,21 @@ TEST(PerceptionCandidate, ADriftOfSecondsIsNoWay) {
   EXPECT_FALSE(c.Drives()) << "0.05 m/s";
 }
 
+TEST(PerceptionCandidate, ASmallOneThatWasAPieceMustDriveFromWhereItIsAlone) {
+  const Vector3d p(9.0, 0.0, 0.55);
+  for (const double width : {8.0, 30.0}) {
+    Candidate c = CandidateAt(p, p, 0.01);
+    c.part = true;
+    Sighting s;
+    s.fit.posterior = c.track.state;
+    s.fit.posterior.mean[1] = 0.3;
+    s.detection.box = {100.0, 80.0, width, 1.6 * width};
+    c.Correct(s);
+    EXPECT_FALSE(c.part);
+    EXPECT_EQ(c.Drives(), width > 20.0) << width;
+  }
+}
+
 TEST(PerceptionCandidate, HowLongItStoodBeforeDoesNotCount) {
   const Vector3d p(3.0, 0.0, 0.55);
   Candidate c = CandidateAt(p, p, 0.01);
