@@ -15,6 +15,8 @@ constexpr double kReachMargin = 0.5;    // m
 constexpr double kUsualSpeed = 1.5;     // m/s
 constexpr int kSoonBack = 6;            // frames hidden after which one side at most may be
 constexpr double kReachGate = 11.3;     // squared distance from a hidden target's prediction, 3 dof
+constexpr double kWellInside = 2.3;     // likewise of what is alone, where it may be elsewhere,
+constexpr double kFarFromSure = 1.0;    // m, within this standard deviation
 constexpr double kExpectedGate = 4.6;   // likewise of what need not drive, 2 dof
 constexpr int kPieceHits = 4;           // sightings of a piece or a half before it is taken,
 constexpr double kPieceWay = 0.15;      // m that it must have driven,
@@ -71,10 +73,13 @@ bool Perceiver::Sure(const Sighting& s) const {
   if (track_->misses == 0) return true;
   if (s.contested) return false;
   const Eigen::Vector2d off = (s.fit.posterior.position() - track_->state.position()).head<2>();
-  if (Vague()) return AllSeen(s) && off.norm() < config_.state.decoy_radius;
-  if (LeftOut(s) > 1 && track_->misses > kSoonBack) return false;
   const Eigen::Matrix2d P = track_->state.covariance.topLeftCorner<2, 2>();
-  return off.norm() < config_.state.decoy_radius || off.dot(P.ldlt().solve(off)) < kExpectedGate;
+  const double squared = off.dot(P.ldlt().solve(off));
+  const bool near = off.norm() < config_.state.decoy_radius;
+  const bool alone = candidates_.empty() && track_->HorizontalSigma() < kFarFromSure;
+  if (Vague()) return AllSeen(s) && (near || (alone && squared < kWellInside));
+  if (LeftOut(s) > 1 && track_->misses > kSoonBack) return false;
+  return near || squared < kExpectedGate;
 }
 
 /// True when it is too small for its size to tell the range, and LiDAR never did. A standing thing
