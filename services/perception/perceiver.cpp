@@ -236,8 +236,12 @@ TargetEstimate Perceiver::Report(double t, const std::optional<View>& view,
 
 TargetEstimate Perceiver::See(const Frame& frame) {
   const bool newer = ForgetIfTimeRanBack(frame.t);
-  std::string note = "the frame is not newer than the last one";
-  auto view = newer ? finder_.Look(frame, &note) : std::nullopt;
+  std::string note;
+  auto view = finder_.Look(frame, &note);
+  if (view && !newer) {
+    view.reset();
+    note = "the frame is not newer than the last one";
+  }
   sighting_.reset();
   unsure_.reset();
   contested_ = false;
