@@ -7,6 +7,7 @@ chase_test(perception_image_test
   LIBS perception_world opencv_imgproc opencv_imgcodecs opencv_aruco opencv_dnn
   SOURCES ${perception_test_dir}/perception_detector_test.cpp
           ${perception_test_dir}/perception_marker_test.cpp
+          ${perception_test_dir}/perception_network_test.cpp
           ${perception_test_dir}/perception_photo_test.cpp)
 chase_test(perception_solver_test LIBS perception_core Ceres::ceres
   SOURCES ${perception_test_dir}/perception_solver_test.cpp)
