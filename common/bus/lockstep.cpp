@@ -1,9 +1,12 @@
 #include "common/bus/lockstep.h"
 
+#include <algorithm>
 #include <ctime>
+#include <deque>
 #include <stdexcept>
 
 #include "common/bus/channels.h"
+#include "common/bus/live_loop.h"
 
 namespace chase::bus {
 
@@ -43,15 +46,38 @@ class Lockstep::Port : public Bus {
   std::map<std::string, RawHandler> handlers_;
 };
 
-struct Lockstep::Process {
-  Process(Lockstep* lockstep, std::string process_name, int64_t latency)
-      : name(std::move(process_name)), port(lockstep, latency), reporter(name) {}
-  std::string name;
+/// A process from its start to its end.
+struct Lockstep::Life {
+  Life(Lockstep* lockstep, const Process& process);
   Port port;
   StatusReporter reporter;
   std::unique_ptr<Node> node;
+  TickClock ticks;
+  int64_t next_status;
+};
+
+struct Lockstep::Process {
+  std::string name;
+  int64_t latency;
+  MakeNode make;
+  std::unique_ptr<Life> life;       // none: dead
+  int stops = 0;                    // kills and freezes; what was scheduled before one is void
+  bool frozen = false;              // and then:
+  std::deque<Event> inbox;          // what came
+  std::map<std::string, int> room;  // messages that each channel still has place for
   double cpu_s = 0.0;
 
+  void Stop(bool freeze) {
+    ++stops;
+    frozen = freeze;
+    inbox.clear();
+    room.clear();
+  }
+  void Keep(const Event& event) {
+    if (life->port.Handler(event.channel) == nullptr) return;
+    if (room.emplace(event.channel, QueueCapacity(event.channel)).first->second-- > 0)
+      inbox.push_back(event);
+  }
   template <class F>
   void Run(const F& work) {
     const double start = ThreadCpu();
@@ -60,13 +86,68 @@ struct Lockstep::Process {
   }
 };
 
+Lockstep::Life::Life(Lockstep* lockstep, const Process& process)
+    : port(lockstep, process.latency),
+      reporter(process.name),
+      node(process.make(port)),
+      ticks(node->TickPeriod(), lockstep->now_),
+      next_status(lockstep->now_ + kStatusPeriod) {}
+
 void Lockstep::Add(const std::string& name, int64_t latency_us, const MakeNode& make) {
-  auto process = std::make_shared<Process>(this, name, latency_us);
-  process->node = make(process->port);
+  auto process = std::make_shared<Process>();
+  process->name = name;
+  process->latency = latency_us;
+  process->make = make;
+  Begin(process.get());
   processes_.push_back(process);
-  if (process->node->TickPeriod() > 0) ScheduleTick(process.get(), now_);
-  ScheduleStatus(process.get(), now_ + kStatusPeriod);
 }
+
+void Lockstep::Begin(Process* process) {
+  process->life = std::make_unique<Life>(this, *process);
+  if (process->life->node->TickPeriod() > 0) Schedule(process, now_, &Lockstep::Tick);
+  Schedule(process, process->life->next_status, &Lockstep::Status);
+}
+
+void Lockstep::Kill(const std::string& name) {
+  Process& process = Find(name);
+  process.Stop(false);
+  process.life.reset();
+}
+
+void Lockstep::Start(const std::string& name) {
+  Process& process = Find(name);
+  if (!process.life) Begin(&process);
+}
+
+void Lockstep::Freeze(const std::string& name) {
+  Process& process = Find(name);
+  if (process.life && !process.frozen) process.Stop(true);
+}
+
+void Lockstep::Thaw(const std::string& name) {
+  Process& process = Find(name);
+  if (!process.frozen) return;
+  process.frozen = false;
+  CatchUp(&process);
+  const Life& life = *process.life;
+  if (life.node->TickPeriod() > 0) Schedule(&process, life.ticks.next(), &Lockstep::Tick);
+  Schedule(&process, std::max(life.next_status, now_), &Lockstep::Status);
+}
+
+/// What the live loop does when it runs again.
+void Lockstep::CatchUp(Process* process) {
+  const Life& life = *process->life;
+  auto& inbox = process->inbox;
+  while (life.ticks.Due(now_) || !inbox.empty()) {
+    if (life.ticks.Due(now_)) TickOnce(process);
+    for (int i = 0; i < kBurst && !inbox.empty(); ++i) {
+      Handle(process, inbox.front());
+      inbox.pop_front();
+    }
+  }
+}
+
+std::unique_ptr<Bus> Lockstep::Connect() { return std::make_unique<Port>(this, 0); }
 
 void Lockstep::Send(int64_t utime, const std::string& channel, const Bus::Bytes& bytes) {
   events_.push({utime, order_++, channel, std::make_shared<const Bus::Bytes>(bytes), nullptr});
@@ -76,27 +157,43 @@ void Lockstep::Call(int64_t utime, std::function<void()> call) {
   events_.push({utime, order_++, "", nullptr, std::move(call)});
 }
 
-void Lockstep::ScheduleTick(Process* process, int64_t utime) {
-  Call(utime, [this, process, utime] {
-    process->Run([&] { process->node->Tick(utime); });
-    ScheduleTick(process, utime + process->node->TickPeriod());
+void Lockstep::Schedule(Process* process, int64_t utime, void (Lockstep::*work)(Process*)) {
+  Call(utime, [this, process, work, stops = process->stops] {
+    if (stops == process->stops) (this->*work)(process);
   });
 }
 
-void Lockstep::ScheduleStatus(Process* process, int64_t utime) {
-  Call(utime, [this, process, utime] {
-    process->port.Publish(StatusChannel(process->name),
-                          process->reporter.Make(process->port, *process->node, utime, false));
-    ScheduleStatus(process, utime + kStatusPeriod);
-  });
+void Lockstep::TickOnce(Process* process) {
+  Life& life = *process->life;
+  process->Run([&] { life.node->Tick(life.ticks.Take(now_)); });
+}
+
+void Lockstep::Tick(Process* process) {
+  TickOnce(process);
+  Schedule(process, process->life->ticks.next(), &Lockstep::Tick);
+}
+
+void Lockstep::Status(Process* process) {
+  Life& life = *process->life;
+  life.port.Publish(StatusChannel(process->name),
+                    life.reporter.Make(life.port, *life.node, now_, false));
+  life.next_status = now_ + kStatusPeriod;
+  Schedule(process, life.next_status, &Lockstep::Status);
+}
+
+void Lockstep::Handle(Process* process, const Event& event) {
+  if (const auto* handler = process->life->port.Handler(event.channel))
+    process->Run([&] { (*handler)(event.bytes->data(), event.bytes->size()); });
 }
 
 void Lockstep::Deliver(const Event& event) {
   if (event.call) return event.call();
   if (tap_) tap_(event.utime, event.channel, *event.bytes);
   for (const auto& process : processes_)
-    if (const auto* handler = process->port.Handler(event.channel))
-      process->Run([&] { (*handler)(event.bytes->data(), event.bytes->size()); });
+    if (process->frozen)
+      process->Keep(event);
+    else if (process->life)
+      Handle(process.get(), event);
 }
 
 void Lockstep::RunUntil(int64_t utime) {
@@ -111,20 +208,28 @@ void Lockstep::RunUntil(int64_t utime) {
 
 bool Lockstep::Done() const {
   for (const auto& process : processes_)
-    if (process->node->Done()) return true;
+    if (process->life && process->life->node->Done()) return true;
   return false;
 }
 
 std::map<std::string, Lockstep::Usage> Lockstep::Usages() const {
   std::map<std::string, Usage> usages;
-  for (const auto& process : processes_)
-    usages[process->name] = {process->cpu_s, process->port.stages().Summaries()};
+  for (const auto& process : processes_) {
+    usages[process->name].cpu_s = process->cpu_s;
+    if (process->life) usages[process->name].stages = process->life->port.stages().Summaries();
+  }
   return usages;
 }
 
 const Bus& Lockstep::bus(const std::string& name) const {
+  const Process& process = Find(name);
+  if (!process.life) throw std::runtime_error("process " + name + " of this lockstep is dead");
+  return process.life->port;
+}
+
+Lockstep::Process& Lockstep::Find(const std::string& name) const {
   for (const auto& process : processes_)
-    if (process->name == name) return process->port;
+    if (process->name == name) return *process;
   throw std::runtime_error("no process " + name + " in this lockstep");
 }
 

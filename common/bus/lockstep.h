@@ -34,6 +34,24 @@ class Lockstep {
   /// Handles everything up to and including `utime`.
   void RunUntil(int64_t utime);
 
+  /// Calls `call` when logical time is `utime`, microseconds.
+  void At(int64_t utime, std::function<void()> call) { Call(utime, std::move(call)); }
+
+  /// A process dies as by SIGKILL, and comes up as a new one of the same configuration would: fresh
+  /// state, seq from 0. What it sent before still arrives; what arrives while it is dead is lost to
+  /// it. Killing a dead process or starting a live one does nothing.
+  void Kill(const std::string& name);
+  void Start(const std::string& name);
+
+  /// SIGSTOP and SIGCONT: nothing is handled and no tick comes until the thaw, when the messages
+  /// that found room (QueueCapacity) are handled in the order in which they came, and ticks are
+  /// caught up by the rules of the live loop. A stopped or dead process cannot be stopped.
+  void Freeze(const std::string& name);
+  void Thaw(const std::string& name);
+
+  /// A sender beside the processes; what it publishes arrives at once.
+  std::unique_ptr<Bus> Connect();
+
   int64_t now() const { return now_; }
   bool Done() const;
 
@@ -42,11 +60,12 @@ class Lockstep {
     double cpu_s = 0.0;
     std::map<std::string, StageClock::Summary> stages;
   };
-  std::map<std::string, Usage> Usages() const;
+  std::map<std::string, Usage> Usages() const;  // stages: of the newest life
   const Bus& bus(const std::string& name) const;
 
  private:
   class Port;
+  struct Life;
   struct Process;
   struct Event {
     int64_t utime;
@@ -61,8 +80,14 @@ class Lockstep {
 
   void Send(int64_t utime, const std::string& channel, const Bus::Bytes& bytes);
   void Call(int64_t utime, std::function<void()> call);
-  void ScheduleTick(Process* process, int64_t utime);
-  void ScheduleStatus(Process* process, int64_t utime);
+  Process& Find(const std::string& name) const;
+  void Begin(Process* process);
+  void Schedule(Process* process, int64_t utime, void (Lockstep::*work)(Process*));
+  void TickOnce(Process* process);
+  void Tick(Process* process);
+  void Status(Process* process);
+  void Handle(Process* process, const Event& event);
+  void CatchUp(Process* process);
   void Deliver(const Event& event);
 
   int64_t now_;

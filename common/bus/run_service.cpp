@@ -12,6 +12,7 @@
 #include <filesystem>
 
 #include "common/bus/channels.h"
+#include "common/bus/live_loop.h"
 #include "common/bus/log_bus.h"
 #include "common/bus/status.h"
 #include "common/bus/udp_bus.h"
@@ -21,7 +22,6 @@ namespace chase::bus {
 namespace {
 
 constexpr int64_t kStatusPeriod = 1000000;  // us
-constexpr int64_t kMaxLag = 500000;  // us that ticks may fall behind the clock before time slips
 
 volatile std::sig_atomic_t stop_requested = 0;
 
@@ -60,25 +60,18 @@ void RunLive(const ServiceSpec& spec, const Flags& flags) {
   };
   sd_notify(0, "READY=1");
   int64_t now = bus.Now();
-  const int64_t period = node->TickPeriod();
-  int64_t next_tick = now, next_status = now;
-  int64_t slip = 0;  // a node that cannot keep up loses time, never a tick
+  const bool ticked = node->TickPeriod() > 0;
+  TickClock ticks(node->TickPeriod(), now);
+  int64_t next_status = now;
   while (stop_requested == 0 && !node->Done()) {
     now = bus.Now();
-    if (period > 0 && now >= next_tick) {
-      if (now - next_tick > kMaxLag) {
-        slip += now - next_tick;
-        next_tick = now;
-      }
-      node->Tick(next_tick - slip);
-      next_tick += period;
-    }
+    if (ticks.Due(now)) node->Tick(ticks.Take(now));
     if (now >= next_status) {
       report(now);
       sd_notify(0, "WATCHDOG=1");
       next_status = std::max(next_status + kStatusPeriod, now);
     }
-    const int64_t due = period > 0 ? std::min(next_tick, next_status) : next_status;
+    const int64_t due = ticked ? std::min(ticks.next(), next_status) : next_status;
     bus.Handle(due - bus.Now());
   }
   report(bus.Now());

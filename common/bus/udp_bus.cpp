@@ -7,17 +7,12 @@
 #include <chrono>
 #include <stdexcept>
 
-#include "common/bus/channels.h"
+#include "common/bus/live_loop.h"
 #include "common/bus/loopback.h"
 
 namespace chase::bus {
 
 namespace {
-
-// LCM's default of 30 loses IMU samples while a process works; clouds and images are large.
-constexpr int kQueueLight = 400;
-constexpr int kQueueHeavy = 10;
-constexpr int kBurst = 64;  // messages handled before ticks and the clock are looked at again
 
 void Forward(const lcm::ReceiveBuffer* buffer, const std::string&, Bus::RawHandler* handler) {
   (*handler)(static_cast<const uint8_t*>(buffer->data), buffer->data_size);
@@ -64,7 +59,7 @@ int64_t UdpBus::Now() const { return Microseconds<std::chrono::steady_clock>() +
 void UdpBus::SubscribeRaw(const std::string& channel, RawHandler handler) {
   handlers_.push_back(std::move(handler));
   auto* subscription = lcm_.subscribeFunction(prefix_ + channel, &Forward, &handlers_.back());
-  subscription->setQueueCapacity(IsHeavy(channel) ? kQueueHeavy : kQueueLight);
+  subscription->setQueueCapacity(QueueCapacity(channel));
 }
 
 void UdpBus::PublishRaw(const std::string& channel, const Bytes& bytes) {
