@@ -20,6 +20,7 @@ const std::vector<ChannelRow>& ChannelTable() {
       {"ATTITUDE_SETPOINT", "attitude_setpoint_t", "control", false},
       {"TRUTH", "truth_t", "simulator", false},
       {"SCENARIO", "scenario_t", "simulator", false},
+      {"FAULT", "event_t", "simulator, chase-flight", false},
   };
   return table;
 }

@@ -93,6 +93,10 @@ std::string Problem(const camera_image_t& m) {
       .Result();
 }
 
+std::string Problem(const event_t& m) {
+  return Check().Time(m.utime).Code("phase", m.phase, 1).Result();
+}
+
 std::string Problem(const imu_t& m) {
   return Check().Time(m.utime).Number("accel", m.accel).Number("gyro", m.gyro).Result();
 }

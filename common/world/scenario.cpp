@@ -135,6 +135,15 @@ std::string NamedTwice(const std::vector<ServiceOverride>& services) {
   return "";
 }
 
+std::string TooLate(const std::vector<FaultSpec>& faults, double duration_s) {
+  for (std::size_t i = 0; i < faults.size(); ++i) {
+    const std::string problem = Check(faults[i].at < duration_s, "at", Number(faults[i].at),
+                                      "below duration_s, " + Number(duration_s));
+    if (!problem.empty()) return "faults[" + std::to_string(i) + "]: " + problem;
+  }
+  return "";
+}
+
 }  // namespace
 
 std::string Scenario::Problem() const {
@@ -146,7 +155,8 @@ std::string Scenario::Problem() const {
              "2 or more, or target.path_file be given"),
        Within("world", world), FirstOf("movers", movers), Within("target", target),
        Within("chaser", chaser), Within("sensors", sensors), Within("wind", wind),
-       FirstOf("services", services), NamedTwice(services)});
+       FirstOf("faults", faults), TooLate(faults, duration_s), FirstOf("services", services),
+       NamedTwice(services)});
 }
 
 Scenario ParseScenario(const std::string& yaml, const std::string& origin) {

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "common/world/fault.h"
 #include "common/world/path_motion.h"
 #include "common/world/shapes.h"
 
@@ -243,6 +244,7 @@ struct Scenario {
   SensorsSpec sensors;
   WindSpec wind;
   CriteriaSpec criteria;
+  std::vector<FaultSpec> faults;
   std::vector<ServiceOverride> services;
   template <class V>
   void Visit(V& v) {
@@ -258,6 +260,7 @@ struct Scenario {
     v("sensors", sensors, "");
     v("wind", wind, "");
     v("criteria", criteria, "");
+    v("faults", faults, "what goes wrong");
     v("services", services, "");
   }
   /// Names the first field that makes no sense, its value and the limit; empty when all is well.

@@ -3,6 +3,7 @@
 #include "chase/attitude_setpoint_t.hpp"
 #include "chase/camera_image_t.hpp"
 #include "chase/channel_status_t.hpp"
+#include "chase/event_t.hpp"
 #include "chase/imu_t.hpp"
 #include "chase/lidar_scan_t.hpp"
 #include "chase/map_t.hpp"
@@ -92,6 +93,14 @@ void VisitFields(const camera_image_t& m, V& v) {
   v("exposure", m.exposure);
   v("size", m.size);
   v("data", m.data);
+}
+
+template <class V>
+void VisitFields(const event_t& m, V& v) {
+  v("utime", m.utime);
+  v("seq", m.seq);
+  v("name", m.name);
+  v("phase", m.phase);
 }
 
 template <class V>

@@ -47,6 +47,8 @@ std::string SimulatorConfig::Problem() const {
         Named("imu", imu.Problem()), Named("lidar", lidar.Problem()),
         Named("camera", camera.Problem())})
     if (!problem.empty()) return problem;
+  for (const world::FaultSpec& fault : faults)
+    if (fault.at < 0.0) return "faults: " + fault.name + " has no time; give its key at, s";
   return "";
 }
 

@@ -30,6 +30,7 @@ struct SimulatorConfig {
   ImuConfig imu;
   LidarConfig lidar;
   CameraConfig camera;
+  std::vector<world::FaultSpec> faults;
 
   template <class V>
   void Visit(V& v) {
@@ -44,6 +45,7 @@ struct SimulatorConfig {
     v("imu", imu, "");
     v("lidar", lidar, "");
     v("camera", camera, "");
+    v("faults", faults, "of the sensors; each with its time");
   }
   std::string Problem() const;
 };

@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "chase/camera_image_t.hpp"
+#include "chase/event_t.hpp"
 #include "chase/imu_t.hpp"
 #include "chase/lidar_scan_t.hpp"
 #include "chase/scenario_t.hpp"
@@ -34,7 +35,8 @@ SimulatorNode::SimulatorNode(bus::Bus& bus, const SimulatorConfig& config)
       config_(config),
       yaml_(ReadText(config.scenario)),
       scenario_(world::ParseScenario(yaml_, config.scenario)),
-      simulator_(scenario_, config) {
+      simulator_(scenario_, config),
+      faults_(config.faults) {
   const std::string& sensors = config.sensors.empty() ? scenario_.sensors.mode : config.sensors;
   if (sensors == "truth") truth_feed_ = std::make_unique<TruthFeed>(bus, scenario_, config.rig);
   bus_.Subscribe<attitude_setpoint_t>("ATTITUDE_SETPOINT",
@@ -59,8 +61,9 @@ void SimulatorNode::Tick(int64_t utime) {
     const auto timer = bus_.Time("step");
     output = simulator_.Advance(bus::Seconds(utime, *power_on_));
   }
+  PublishFaults(output.truth.mission_time, utime);
   PublishImu(output.imu, utime);
-  if (output.sweep) PublishSweep(*output.sweep);
+  if (output.sweep && !faults_.LidarSilent()) PublishSweep(*output.sweep);
   if (output.image) PublishImage(*output.image, utime);
   if (ticks_ % kTruthTicks == 0) PublishTruth(output.truth, utime);
   if (ticks_ % kScenarioTicks == 0) PublishScenario(utime);
@@ -147,6 +150,16 @@ void SimulatorNode::PublishScenario(int64_t utime) {
   message.name = scenario_.name;
   message.yaml = yaml_;
   bus_.Publish("SCENARIO", message);
+}
+
+void SimulatorNode::PublishFaults(double mission_time, int64_t utime) {
+  for (const SensorFaults::Change& change : faults_.Advance(mission_time)) {
+    event_t message{};
+    message.utime = utime;
+    message.name = change.name;
+    message.phase = change.begins ? event_t::BEGINS : event_t::ENDS;
+    bus_.Publish("FAULT", message);
+  }
 }
 
 }  // namespace chase::simulator

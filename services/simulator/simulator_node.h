@@ -8,13 +8,15 @@
 #include "chase/attitude_setpoint_t.hpp"
 #include "common/bus/bus.h"
 #include "common/bus/node.h"
+#include "services/simulator/sensor_faults.h"
 #include "services/simulator/simulator.h"
 #include "services/simulator/truth_feed.h"
 
 namespace chase::simulator {
 
-/// ATTITUDE_SETPOINT -> simulator -> IMU, LIDAR_SCAN, CAMERA_IMAGE, TRUTH, SCENARIO. The first tick
-/// is power-on. Where the scenario's sensors.mode is "truth", also POSE, TARGET and OBSTACLES.
+/// ATTITUDE_SETPOINT -> simulator -> IMU, LIDAR_SCAN, CAMERA_IMAGE, TRUTH, SCENARIO, FAULT. The
+/// first tick is power-on. Where the scenario's sensors.mode is "truth", also POSE, TARGET and
+/// OBSTACLES.
 class SimulatorNode : public bus::Node {
  public:
   SimulatorNode(bus::Bus& bus, const SimulatorConfig& config);
@@ -30,12 +32,14 @@ class SimulatorNode : public bus::Node {
   void PublishImage(const Image& image, int64_t utime);
   void PublishTruth(const Truth& truth, int64_t utime);
   void PublishScenario(int64_t utime);
+  void PublishFaults(double mission_time, int64_t utime);
 
   bus::Bus& bus_;
   SimulatorConfig config_;
   std::string yaml_;
   world::Scenario scenario_;
   Simulator simulator_;
+  SensorFaults faults_;
   std::unique_ptr<TruthFeed> truth_feed_;
   std::optional<int64_t> power_on_;  // utime of the first tick
   int64_t last_tick_ = 0;

@@ -41,8 +41,9 @@ def check(service):
 def main():
     problems = [p for service in LISTENS for p in check(service)]
     for path in tree.files("services/*.h", "services/*.cpp", "common/*.cpp"):
-        if path.parts[1] != "simulator" and "truth_t" in tree.text(path) and path.parts[1] != "bus":
-            problems.append(f"{path}: knows truth_t: ground truth stays out of the loop")
+        if path.parts[1] != "simulator" and path.parts[1] != "bus":
+            problems += [f"{path}: knows {kind}: it stays out of the loop"
+                         for kind in ("truth_t", "event_t") if kind in tree.text(path)]
     return tree.report(problems)
 
 
