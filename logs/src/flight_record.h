@@ -48,6 +48,12 @@ struct PlanSample {
   world::Trajectory position;  ///< p_WB(t), in mission time
 };
 
+/// A fault that struck.
+struct FaultSample {
+  double t = 0.0;
+  std::string name;
+};
+
 /// Figures of one stage of one process, ms.
 struct StageFigures {
   std::string process, stage;
@@ -70,6 +76,7 @@ struct FlightRecord {
   std::vector<TargetSample> targets;
   std::vector<PredictionSample> predictions;
   std::vector<PlanSample> plans;
+  std::vector<FaultSample> faults;
   std::vector<StageFigures> stages;
   std::vector<PerceivedObstacle> obstacles;
   std::map<std::string, double> cpu_s;     ///< by process

@@ -46,7 +46,7 @@ Figure MeanOverSteps(const std::vector<TruthSample>& truth, F value) {
 
 void AddRatios(const FlightRecord& record, const std::vector<SampleScore>& scores, Metrics* m) {
   const double desired = record.scenario.chaser.desired_distance;
-  m->safe_ratio = Mean(scores, [](const SampleScore& s) { return s.clearance > 0.0 ? 1.0 : 0.0; });
+  m->safe_ratio = Mean(scores, [](const SampleScore& s) { return s.Safe() ? 1.0 : 0.0; });
   m->visible_ratio = Mean(scores, [](const SampleScore& s) { return s.visible ? 1.0 : 0.0; });
   for (const SampleScore& s : scores)
     m->min_clearance_m = std::min(m->min_clearance_m.value_or(s.clearance), s.clearance);
@@ -106,6 +106,23 @@ void AddEstimates(const FlightRecord& record, Metrics* m) {
   m->prediction_error_m = PredictionError(record, 1.0);
 }
 
+void AddFaults(const FlightRecord& record, Metrics* m) {
+  for (const FaultSample& fault : record.faults) {
+    if (m->fault.empty()) m->fault_time_s = fault.t;
+    m->fault += (m->fault.empty() ? "" : "+") + fault.name;
+  }
+}
+
+void AddCollision(const FlightRecord& record, const std::vector<SampleScore>& scores, Metrics* m) {
+  const auto contact =
+      std::find_if(scores.begin(), scores.end(), [](const SampleScore& s) { return !s.Safe(); });
+  if (contact == scores.end()) return;
+  m->collision_s = contact->t;
+  const auto sample = std::find_if(record.truth.begin(), record.truth.end(),
+                                   [&](const TruthSample& s) { return s.t == contact->t; });
+  if (sample != record.truth.end()) m->collided_with = Scorer(record.scenario).Nearest(*sample);
+}
+
 bool AtLeast(const Figure& figure, double limit) { return figure && *figure >= limit; }
 bool AtMost(const Figure& figure, double limit) { return figure && *figure <= limit; }
 
@@ -137,6 +154,8 @@ Metrics Compute(const FlightRecord& record, const std::vector<SampleScore>& scor
   m.flown_s = scores.empty() ? 0.0 : scores.back().t;
   m.cpu_s = record.cpu_s;
   m.real_time_factor = record.real_time_factor;
+  AddFaults(record, &m);
+  AddCollision(record, scores, &m);
   AddRatios(record, scores, &m);
   AddMotion(MissionTruth(record), &m);
   AddPlans(record, &m);

@@ -6,16 +6,9 @@
 #include <vector>
 
 #include "logs/src/flight_record.h"
+#include "logs/src/score.h"
 
 namespace chase::logs {
-
-/// What one truth sample of the mission scores.
-struct SampleScore {
-  double t = 0.0;          ///< mission time, s
-  double distance = 0.0;   ///< |p_WB - p_WT|, m
-  double clearance = 0.0;  ///< from the drone's sphere to the nearest solid, m; negative: touching
-  bool visible = false;    ///< the segment from drone to target's centre touches no obstacle
-};
 
 struct TimeFigures {
   double mean = 0.0, p50 = 0.0, p99 = 0.0, max = 0.0;  ///< ms
@@ -35,14 +28,17 @@ struct Metrics {
   std::map<double, double> prediction_error_by_horizon_m;  ///< horizon in s
   std::map<std::string, double> cpu_s;                     ///< by process
   Figure real_time_factor;
-  double flown_s = 0.0;  ///< of the mission
+  std::string fault;           ///< names of those that struck, joined by +
+  double fault_time_s = -1.0;  ///< mission time of the first; -1: none
+  double flown_s = 0.0;        ///< of the mission
+  double collision_s = -1.0;   ///< mission time of the first contact; -1: none
+  std::string collided_with;   ///< as Scorer::Nearest() names it; empty: nothing
   std::map<std::string, bool> criteria;
 
   bool Passed() const;
 };
 
-/// Scores of every truth sample with 0 <= t <= duration_s. Obstacles are the scenario's own solids;
-/// the ground and the target's body count for clearance, not for sight.
+/// Scores of every truth sample with 0 <= t <= duration_s.
 std::vector<SampleScore> Score(const FlightRecord& record);
 
 Metrics Compute(const FlightRecord& record);

@@ -34,7 +34,11 @@ std::string MetricsJson(const FlightRecord& record, const Metrics& m) {
   j["scenario"] = record.scenario.name;
   j["seed"] = record.seed;
   j["duration_s"] = record.scenario.duration_s;
+  j["fault"] = m.fault;
+  j["fault_time_s"] = m.fault_time_s;
   j["flown_s"] = m.flown_s;
+  j["collision_s"] = m.collision_s;
+  j["collided_with"] = m.collided_with;
   j["passed"] = m.Passed();
   j["safe_ratio"] = Number(m.safe_ratio);
   j["min_clearance_m"] = Number(m.min_clearance_m);

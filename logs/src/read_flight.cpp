@@ -5,6 +5,7 @@
 #include <optional>
 #include <stdexcept>
 
+#include "chase/event_t.hpp"
 #include "chase/obstacles_t.hpp"
 #include "chase/plan_t.hpp"
 #include "chase/pose_t.hpp"
@@ -41,6 +42,7 @@ class Gatherer {
     Take(e, "TARGET", &targets_);
     Take(e, "PREDICTION", &predictions_);
     Take(e, "PLAN", &plans_);
+    Take(e, "FAULT", &faults_);
     TakeLast(e, "SCENARIO", &scenario_);
     TakeLast(e, "OBSTACLES", &obstacles_);
     status_t status;
@@ -55,10 +57,11 @@ class Gatherer {
     FlightRecord record;
     record.scenario = world::ParseScenario(scenario_->yaml, log + ": SCENARIO");
     record.seed = scenario_->seed;
-    origin_ = truth_.front().utime - std::llround(truth_.front().mission_time * 1e6);
+    origin_ = MissionStart(truth_.front());
     AddTruth(&record);
     AddEstimates(&record);
     AddPlans(&record);
+    AddFaults(&record);
     AddStatuses(&record);
     AddObstacles(&record);
     AddRealTimeFactor(&record);
@@ -88,18 +91,7 @@ class Gatherer {
   double Time(int64_t utime) const { return bus::Seconds(utime, origin_); }
 
   void AddTruth(FlightRecord* record) const {
-    for (const truth_t& m : truth_) {
-      TruthSample s;
-      s.t = Time(m.utime);
-      s.p = bus::ToVector(m.pos);
-      s.a = bus::ToVector(m.accel);
-      s.yaw = Yaw(m.orientation);
-      s.target = bus::ToVector(m.target_pos);
-      s.target_px = {m.target_px[0], m.target_px[1]};
-      s.target_in_image = m.target_in_image != 0;
-      s.visible_share = m.visible_share;
-      record->truth.push_back(s);
-    }
+    for (const truth_t& m : truth_) record->truth.push_back(ToSample(m, origin_));
     std::stable_sort(record->truth.begin(), record->truth.end(),
                      [](const TruthSample& a, const TruthSample& b) { return a.t < b.t; });
   }
@@ -119,6 +111,13 @@ class Gatherer {
                                      bus::FromMessage(m.target, origin_)});
     for (const plan_t& m : plans_)
       record->plans.push_back({Time(m.utime), m.verdict, bus::FromMessage(m.position, origin_)});
+  }
+
+  void AddFaults(FlightRecord* record) const {
+    for (const event_t& m : faults_)
+      if (m.phase == event_t::BEGINS) record->faults.push_back({Time(m.utime), m.name});
+    std::stable_sort(record->faults.begin(), record->faults.end(),
+                     [](const FaultSample& a, const FaultSample& b) { return a.t < b.t; });
   }
 
   void AddStatuses(FlightRecord* record) const {
@@ -154,12 +153,30 @@ class Gatherer {
   std::vector<target_t> targets_;
   std::vector<prediction_t> predictions_;
   std::vector<plan_t> plans_;
+  std::vector<event_t> faults_;
   std::optional<scenario_t> scenario_;
   std::optional<obstacles_t> obstacles_;
   std::map<std::string, status_t> statuses_;
 };
 
 }  // namespace
+
+int64_t MissionStart(const truth_t& truth) {
+  return truth.utime - std::llround(truth.mission_time * 1e6);
+}
+
+TruthSample ToSample(const truth_t& m, int64_t start) {
+  TruthSample s;
+  s.t = bus::Seconds(m.utime, start);
+  s.p = bus::ToVector(m.pos);
+  s.a = bus::ToVector(m.accel);
+  s.yaw = Yaw(m.orientation);
+  s.target = bus::ToVector(m.target_pos);
+  s.target_px = {m.target_px[0], m.target_px[1]};
+  s.target_in_image = m.target_in_image != 0;
+  s.visible_share = m.visible_share;
+  return s;
+}
 
 FlightRecord ReadFlight(const std::string& log) {
   LogReader reader(log);

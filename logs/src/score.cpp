@@ -1,3 +1,7 @@
+#include "logs/src/score.h"
+
+#include <fmt/format.h>
+
 #include <algorithm>
 
 #include "logs/src/metrics.h"
@@ -7,13 +11,6 @@ namespace {
 
 using Eigen::Vector3d;
 using world::Solid;
-
-/// A solid with the radius of a sphere that encloses it, so that distant ones cost nothing.
-struct Bounded {
-  Solid solid;
-  double radius;
-  explicit Bounded(const Solid& s) : solid(s), radius(s.half_size.norm()) {}
-};
 
 std::vector<Solid> MoversAt(const world::Scenario& scenario, double t) {
   std::vector<Solid> solids;
@@ -26,59 +23,72 @@ Solid TargetBody(const world::TargetSpec& target, const Vector3d& center) {
           Vector3d(target.radius, target.radius, 0.5 * target.height), 0.0};
 }
 
-double NearestSurface(const std::vector<Bounded>& solids, const Vector3d& p, double nearest) {
-  for (const Bounded& b : solids)
-    if ((p - b.solid.center).norm() - b.radius < nearest)
-      nearest = std::min(nearest, world::SignedDistance(b.solid, p));
-  return nearest;
+std::string Name(const Solid& solid) {
+  const char* kind = solid.kind == Solid::Kind::kBox        ? "box"
+                     : solid.kind == Solid::Kind::kCylinder ? "cylinder"
+                                                            : "ellipsoid";
+  return fmt::format("{} at ({:.1f}, {:.1f})", kind, solid.center.x(), solid.center.y());
 }
-
-double NearestSurface(const std::vector<Solid>& solids, const Vector3d& p, double nearest) {
-  for (const Solid& s : solids) nearest = std::min(nearest, world::SignedDistance(s, p));
-  return nearest;
-}
-
-bool Blocked(const std::vector<Bounded>& solids, const Vector3d& p, const Vector3d& q) {
-  const Vector3d middle = 0.5 * (p + q);
-  const double half = 0.5 * (p - q).norm();
-  return std::any_of(solids.begin(), solids.end(), [&](const Bounded& b) {
-    return (middle - b.solid.center).norm() <= half + b.radius && world::SegmentHits(b.solid, p, q);
-  });
-}
-
-bool Blocked(const std::vector<Solid>& solids, const Vector3d& p, const Vector3d& q) {
-  return std::any_of(solids.begin(), solids.end(),
-                     [&](const Solid& s) { return world::SegmentHits(s, p, q); });
-}
-
-class Scorer {
- public:
-  explicit Scorer(const world::Scenario& scenario) : scenario_(scenario) {
-    for (const Solid& s : world::StaticSolids(scenario)) solids_.emplace_back(s);
-  }
-
-  SampleScore operator()(const TruthSample& s) const {
-    const auto movers = MoversAt(scenario_, s.t);
-    SampleScore score;
-    score.t = s.t;
-    score.distance = (s.p - s.target).norm();
-    score.clearance = Clearance(s, movers);
-    score.visible = !Blocked(solids_, s.p, s.target) && !Blocked(movers, s.p, s.target);
-    return score;
-  }
-
- private:
-  double Clearance(const TruthSample& s, const std::vector<Solid>& movers) const {
-    double d = s.p.z() - world::GroundHeight(scenario_.world.ground, s.p.x(), s.p.y());
-    d = std::min(d, world::SignedDistance(TargetBody(scenario_.target, s.target), s.p));
-    return NearestSurface(solids_, s.p, NearestSurface(movers, s.p, d)) - scenario_.chaser.radius;
-  }
-
-  const world::Scenario& scenario_;
-  std::vector<Bounded> solids_;
-};
 
 }  // namespace
+
+Scorer::Scorer(const world::Scenario& scenario) : scenario_(scenario) {
+  for (const Solid& s : world::StaticSolids(scenario)) solids_.emplace_back(s);
+}
+
+SampleScore Scorer::operator()(const TruthSample& s) const {
+  const auto movers = MoversAt(scenario_, s.t);
+  SampleScore score;
+  score.t = s.t;
+  score.distance = (s.p - s.target).norm();
+  score.clearance = Clearance(s, movers);
+  score.visible = Visible(s, movers);
+  return score;
+}
+
+std::string Scorer::Nearest(const TruthSample& s) const {
+  double nearest = ToGround(s.p);
+  std::string name = "ground";
+  const auto consider = [&](double distance, const std::string& what) {
+    if (distance >= nearest) return;
+    nearest = distance;
+    name = what;
+  };
+  consider(ToTarget(s), "target");
+  const auto movers = MoversAt(scenario_, s.t);
+  for (size_t i = 0; i < movers.size(); ++i)
+    consider(world::SignedDistance(movers[i], s.p), fmt::format("mover {}", i + 1));
+  for (const Bounded& b : solids_) consider(world::SignedDistance(b.solid, s.p), Name(b.solid));
+  return name;
+}
+
+double Scorer::ToGround(const Vector3d& p) const {
+  return p.z() - world::GroundHeight(scenario_.world.ground, p.x(), p.y());
+}
+
+double Scorer::ToTarget(const TruthSample& s) const {
+  return world::SignedDistance(TargetBody(scenario_.target, s.target), s.p);
+}
+
+double Scorer::Clearance(const TruthSample& s, const std::vector<Solid>& movers) const {
+  double nearest = std::min(ToGround(s.p), ToTarget(s));
+  for (const Solid& mover : movers) nearest = std::min(nearest, world::SignedDistance(mover, s.p));
+  for (const Bounded& b : solids_)
+    if ((s.p - b.solid.center).norm() - b.radius < nearest)
+      nearest = std::min(nearest, world::SignedDistance(b.solid, s.p));
+  return nearest - scenario_.chaser.radius;
+}
+
+bool Scorer::Visible(const TruthSample& s, const std::vector<Solid>& movers) const {
+  const Vector3d middle = 0.5 * (s.p + s.target);
+  const double half = 0.5 * (s.p - s.target).norm();
+  const auto hit = [&](const Solid& solid) { return world::SegmentHits(solid, s.p, s.target); };
+  return std::none_of(solids_.begin(), solids_.end(),
+                      [&](const Bounded& b) {
+                        return (middle - b.solid.center).norm() <= half + b.radius && hit(b.solid);
+                      }) &&
+         std::none_of(movers.begin(), movers.end(), hit);
+}
 
 std::vector<SampleScore> Score(const FlightRecord& record) {
   const Scorer score(record.scenario);
