@@ -10,7 +10,11 @@ namespace {
 template <class Node, class Config>
 void Add(bus::Lockstep* lockstep, const std::string& name, const Config& config) {
   lockstep->Add(name, Latencies().at(name),
-                [&](bus::Bus& bus) { return std::make_unique<Node>(bus, config); });
+                [config](bus::Bus& bus) { return std::make_unique<Node>(bus, config); });
+}
+
+int64_t MissionUtime(double settle, double t) {
+  return Flight::kPowerOn + static_cast<int64_t>(std::llround((settle + t) * 1e6));
 }
 
 }  // namespace
@@ -24,7 +28,9 @@ const std::map<std::string, int64_t>& Latencies() {
 }
 
 Flight::Flight(const world::Scenario& scenario, const FlightConfigs& configs)
-    : settle_(scenario.settle_s), lockstep_(kPowerOn) {
+    : settle_(scenario.settle_s),
+      lockstep_(kPowerOn),
+      faults_(configs.faults, MissionUtime(settle_, 0.0), &lockstep_) {
   const std::string& sensors =
       configs.simulator.sensors.empty() ? scenario.sensors.mode : configs.simulator.sensors;
   Add<simulator::SimulatorNode>(&lockstep_, "simulator", configs.simulator);
@@ -38,8 +44,6 @@ Flight::Flight(const world::Scenario& scenario, const FlightConfigs& configs)
   Add<control::ControlNode>(&lockstep_, "control", configs.control);
 }
 
-void Flight::RunUntil(double t) {
-  lockstep_.RunUntil(kPowerOn + static_cast<int64_t>(std::llround((settle_ + t) * 1e6)));
-}
+void Flight::RunUntil(double t) { lockstep_.RunUntil(MissionUtime(settle_, t)); }
 
 }  // namespace chase::flight

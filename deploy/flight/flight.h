@@ -6,6 +6,7 @@
 #include <string>
 
 #include "common/bus/lockstep.h"
+#include "deploy/flight/faults.h"
 #include "deploy/flight/flight_configs.h"
 
 namespace chase::flight {
@@ -30,6 +31,7 @@ class Flight {
  private:
   double settle_;
   bus::Lockstep lockstep_;
+  Faults faults_;
 };
 
 }  // namespace chase::flight

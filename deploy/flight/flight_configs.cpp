@@ -27,6 +27,34 @@ void Derive(const world::Scenario& scenario, FlightConfigs* configs) {
   configs->planning.planner.drone_radius = chaser.radius;
 }
 
+/// The scenario's faults and the command line's, in this order.
+std::vector<world::FaultSpec> AllFaults(world::Scenario scenario, const FlightOptions& options) {
+  for (const std::string& text : options.faults) try {
+      scenario.faults.push_back(world::ParseFault(text));
+      const std::string problem = scenario.Problem();
+      if (!problem.empty()) throw std::runtime_error(problem);
+    } catch (const std::runtime_error& e) {
+      throw std::runtime_error("--fault " + text + ": " + e.what());
+    }
+  return scenario.faults;
+}
+
+/// Each fault with its time and duration; the simulator gets those that are its own.
+void AddFaults(const world::Scenario& scenario, const FlightOptions& options,
+               FlightConfigs* configs) {
+  const bool truth = configs->simulator.sensors == "truth" ||
+                     (configs->simulator.sensors.empty() && scenario.sensors.mode == "truth");
+  int number = 0;
+  for (const world::FaultSpec& fault : AllFaults(scenario, options)) {
+    const world::FaultKind& kind = world::KindOf(fault);
+    if (truth && kind.raw_only)
+      throw std::runtime_error("fault " + fault.name +
+                               " strikes nothing where sensors is truth; fly with --sensors raw");
+    configs->faults.push_back(world::Settled(fault, scenario.duration_s, options.seed, number++));
+    if (kind.process == "simulator") configs->simulator.faults.push_back(configs->faults.back());
+  }
+}
+
 }  // namespace
 
 FlightConfigs Configure(const world::Scenario& scenario, const FlightOptions& options) {
@@ -43,6 +71,7 @@ FlightConfigs Configure(const world::Scenario& scenario, const FlightOptions& op
   Override(scenario, "control", &configs.control);
   if (!options.sensors.empty()) configs.simulator.sensors = options.sensors;
   if (!options.planner.empty()) configs.planning.planner_name = options.planner;
+  AddFaults(scenario, options, &configs);
   return configs;
 }
 

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "common/world/scenario.h"
 #include "services/control/control_node.h"
@@ -18,8 +19,9 @@ namespace chase::flight {
 struct FlightOptions {
   std::string scenario_file;
   int64_t seed = 1;
-  std::string sensors;  ///< raw or truth; empty: as the scenario says
-  std::string planner;  ///< empty: planning's default
+  std::string sensors;              ///< raw or truth; empty: as the scenario says
+  std::string planner;              ///< empty: planning's default
+  std::vector<std::string> faults;  ///< NAME or NAME@SECONDS, besides the scenario's
 };
 
 /// The configuration of every process of one flight.
@@ -31,10 +33,12 @@ struct FlightConfigs {
   prediction::PredictionConfig prediction;
   planning::PlanningConfig planning;
   control::ControlConfig control;
+  std::vector<world::FaultSpec> faults;  ///< each with its time and duration
 };
 
 /// Defaults, then what follows from the scenario (the start, sizes, the desired distance), then the
-/// scenario's own `services` overrides. Throws std::runtime_error, one line, on a bad override.
+/// scenario's own `services` overrides, then the options. Throws std::runtime_error, one line, on a
+/// bad override or a fault that does not fit.
 FlightConfigs Configure(const world::Scenario& scenario, const FlightOptions& options);
 
 /// The configuration of one process as YAML that its --config loads. Throws std::runtime_error on

@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "common/bus/channels.h"
+#include "deploy/flight/collision_watch.h"
 #include "deploy/flight/flight.h"
 #include "deploy/flight/progress.h"
 #include "logs/src/metrics.h"
@@ -21,17 +22,23 @@ struct Arguments {
   FlightOptions options;
   std::string log, metrics, print_config;
   double until = -1.0;
-  bool quiet = false;
+  bool end_on_collision = false, quiet = false;
 };
 
-/// Decodes what the progress line needs out of the stream of messages.
-void Observe(const std::string& channel, const bus::Bus::Bytes& bytes, Progress* progress) {
+constexpr double kStep = 0.1;            // s of the flight at a time
+constexpr double kAfterCollision = 0.2;  // s that are still flown
+
+/// Decodes what the progress line and the end of the flight need out of the stream of messages.
+void Observe(const std::string& channel, const bus::Bus::Bytes& bytes, Progress* progress,
+             CollisionWatch* watch) {
   const int size = static_cast<int>(bytes.size());
   scenario_t scenario;
   truth_t truth;
   if (channel == "SCENARIO" && scenario.decode(bytes.data(), 0, size) > 0)
     progress->SetScenario(scenario);
-  if (channel == "TRUTH" && truth.decode(bytes.data(), 0, size) > 0) progress->Add(truth);
+  if (channel != "TRUTH" || truth.decode(bytes.data(), 0, size) <= 0) return;
+  progress->Add(truth);
+  if (watch != nullptr) watch->Add(truth);
 }
 
 void PrintProgress(const world::Scenario& scenario, const Progress& progress, double t,
@@ -57,10 +64,13 @@ logs::FlightRecord Record(const std::string& log, const bus::Lockstep& lockstep,
   return record;
 }
 
-int PrintCriteria(const logs::Metrics& metrics) {
+int PrintCriteria(const logs::Metrics& metrics, bool part) {
+  if (part) fmt::print("of the part flown, {:.1f} s:\n", metrics.flown_s);
   for (const auto& [name, passed] : metrics.criteria)
     fmt::print("{:<20} {}\n", name, passed ? "passed" : "FAILED");
-  return metrics.Passed() ? 0 : 2;
+  if (metrics.collision_s >= 0.0)
+    fmt::print("collision at {:.2f} s with {}\n", metrics.collision_s, metrics.collided_with);
+  return metrics.Passed() || part ? 0 : 2;  // criteria are for whole missions
 }
 
 /// Without --log a file of light messages is kept only as long as the metrics need it.
@@ -94,32 +104,43 @@ class Recording {
   std::optional<bus::LogWriter> writer_;
 };
 
-int Fly(const world::Scenario& scenario, const Arguments& arguments) {
+/// Flies until the end that was asked for, or shortly after a collision where that ends it; returns
+/// logical over wall time.
+double FlyAll(const world::Scenario& scenario, const Arguments& arguments, const Progress& progress,
+              const CollisionWatch& watch, Flight* flight) {
   using Clock = std::chrono::steady_clock;
+  double end = arguments.until > 0.0 ? arguments.until : scenario.duration_s + 0.1;
+  const auto start = Clock::now();
+  double factor = 0.0;
+  long steps = 0;
+  for (double t = -scenario.settle_s; t < end;) {
+    t = std::min(t + kStep, end);
+    flight->RunUntil(t);
+    if (arguments.end_on_collision && watch.time())
+      end = std::min(end, *watch.time() + kAfterCollision);
+    factor = (t + scenario.settle_s) / std::chrono::duration<double>(Clock::now() - start).count();
+    if (!arguments.quiet && (++steps % 10 == 0 || t >= end))
+      PrintProgress(scenario, progress, t, factor);
+  }
+  if (!arguments.quiet) fmt::print(stderr, "\n");
+  return factor;
+}
+
+int Fly(const world::Scenario& scenario, const Arguments& arguments) {
   Flight flight(scenario, Configure(scenario, arguments.options));
   Recording recording(arguments.log);
   Progress progress;
+  CollisionWatch watch(scenario);
   flight.lockstep().SetTap(
       [&](int64_t utime, const std::string& channel, const bus::Bus::Bytes& bytes) {
         recording.Write(utime, channel, bytes);
-        Observe(channel, bytes, &progress);
+        Observe(channel, bytes, &progress, arguments.end_on_collision ? &watch : nullptr);
       });
-  const double end = arguments.until > 0.0 ? arguments.until : scenario.duration_s + 0.1;
-  const auto start = Clock::now();
-  double factor = 0.0;
-  for (double t = -scenario.settle_s; t < end;) {
-    t = std::min(t + 1.0, end);
-    flight.RunUntil(t);
-    const double wall = std::chrono::duration<double>(Clock::now() - start).count();
-    factor = (t + scenario.settle_s) / wall;
-    if (!arguments.quiet) PrintProgress(scenario, progress, t, factor);
-  }
-  if (!arguments.quiet) fmt::print(stderr, "\n");
+  const double factor = FlyAll(scenario, arguments, progress, watch, &flight);
   const auto record = Record(recording.Close(), flight.lockstep(), factor);
   const logs::Metrics metrics = logs::Compute(record);
   if (!arguments.metrics.empty()) logs::WriteMetricsJson(arguments.metrics, record, metrics);
-  if (arguments.until > 0.0) return 0;  // criteria are for whole missions
-  return PrintCriteria(metrics);
+  return PrintCriteria(metrics, arguments.until > 0.0);
 }
 
 int Run(const Arguments& arguments) {
@@ -150,6 +171,10 @@ void AddOptions(CLI::App* app, Arguments* a) {
   app->add_option("--planner", a->options.planner, "planning algorithm (default: chase)");
   app->add_option("--log", a->log, "record every message into this LCM log");
   app->add_option("--metrics", a->metrics, "write the figures of the flight into this JSON file");
+  app->add_option("--fault", a->options.faults,
+                  "NAME or NAME@SECONDS of mission time, besides the scenario's; repeatable");
+  app->add_flag("--end-on-collision", a->end_on_collision,
+                "end the flight 0.2 s after the first contact");
   app->add_option("--until", a->until, "stop at this mission time, s")->check(MissionTimeProblem);
   app->add_option("--print-config", a->print_config,
                   "print the configuration of this process in this scenario and exit");

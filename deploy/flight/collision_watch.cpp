@@ -1,0 +1,14 @@
+#include "deploy/flight/collision_watch.h"
+
+#include "logs/src/read_flight.h"
+
+namespace chase::flight {
+
+void CollisionWatch::Add(const truth_t& truth) {
+  if (time_) return;
+  if (!start_) start_ = logs::MissionStart(truth);
+  const logs::TruthSample sample = logs::ToSample(truth, *start_);
+  if (record_.InMission(sample.t) && !score_(sample).Safe()) time_ = sample.t;
+}
+
+}  // namespace chase::flight
