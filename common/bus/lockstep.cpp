@@ -64,6 +64,7 @@ struct Lockstep::Process {
   int stops = 0;                    // kills and freezes; what was scheduled before one is void
   bool frozen = false;              // and then:
   std::deque<Event> inbox;          // what came
+  int64_t buffer = 0;               // bytes that still find place in the socket
   std::map<std::string, int> room;  // messages that each channel still has place for
   double cpu_s = 0.0;
 
@@ -71,10 +72,12 @@ struct Lockstep::Process {
     ++stops;
     frozen = freeze;
     inbox.clear();
+    buffer = kReceiveBuffer;
     room.clear();
   }
   void Keep(const Event& event) {
-    if (life->port.Handler(event.channel) == nullptr) return;
+    buffer -= static_cast<int64_t>(event.bytes->size());  // a part of what does not fit fills it
+    if (buffer < 0 || life->port.Handler(event.channel) == nullptr) return;
     if (room.emplace(event.channel, QueueCapacity(event.channel)).first->second-- > 0)
       inbox.push_back(event);
   }

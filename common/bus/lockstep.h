@@ -25,7 +25,8 @@ class Lockstep {
   /// Logical time starts at `start_utime`, microseconds.
   explicit Lockstep(int64_t start_utime) : now_(start_utime) {}
 
-  /// Adds a process whose messages take `latency_us` from the event that it answers.
+  /// Adds a process whose messages take `latency_us` from the event that it answers. `make` is
+  /// called again when it is started anew.
   void Add(const std::string& name, int64_t latency_us, const MakeNode& make);
 
   /// Sees every message when it is delivered, before the processes do.
@@ -44,7 +45,7 @@ class Lockstep {
   void Start(const std::string& name);
 
   /// SIGSTOP and SIGCONT: nothing is handled and no tick comes until the thaw, when the messages
-  /// that found room (QueueCapacity) are handled in the order in which they came, and ticks are
+  /// that found room (live_loop.h) are handled in the order in which they came, and ticks are
   /// caught up by the rules of the live loop. A stopped or dead process cannot be stopped.
   void Freeze(const std::string& name);
   void Thaw(const std::string& name);

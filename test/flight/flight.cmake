@@ -1,4 +1,4 @@
-# Closed-loop flights: in lockstep (twice, byte for byte), its replays, the forest, live over UDP.
+# Closed-loop flights: in lockstep (twice, byte for byte), with faults, its replays, the forest, live over UDP.
 set(scenario ${CMAKE_SOURCE_DIR}/deploy/scenarios/gym.yaml)
 set(flight ${CMAKE_BINARY_DIR}/test/flight.lcm)
 set(bin ${CMAKE_BINARY_DIR}/bin)
@@ -6,6 +6,10 @@ set(bin ${CMAKE_BINARY_DIR}/bin)
 add_test(NAME flight_lockstep
   COMMAND ${CMAKE_SOURCE_DIR}/test/flight/lockstep.sh ${bin} ${scenario} ${flight})
 set_tests_properties(flight_lockstep PROPERTIES TIMEOUT 300 FIXTURES_SETUP recorded_flight)
+
+add_test(NAME flight_faults
+  COMMAND python3 -B ${CMAKE_SOURCE_DIR}/test/flight/faults_test.py ${bin} ${scenario})
+set_tests_properties(flight_faults PROPERTIES TIMEOUT 300)
 
 # The whole mission among trees; its criteria decide.
 add_test(NAME flight_forest

@@ -170,6 +170,8 @@ class BadUse(unittest.TestCase):
         gym = TESTS.parent / "deploy/scenarios/gym.yaml"
         for command, values in ((["chase-flight", gym, "--until"], ("nan", -20, 0, "inf", "1s")),
                                 (["chase-flight", gym, "--seed"], ("nan", -1, 1.5, 2**31, 10**20)),
+                                (["chase-flight", gym, "--fault"],
+                                 ("kill-simulator", "lidar-gap@60", "lidar-gap@-1", "kill-control@")),
                                 (["chase-compare", "--jobs"], ("nan", 0, 1.5, 10**20)),
                                 (["chase-log", "diff", "a.lcm", "b.lcm", "--tolerance"],
                                  ("nan", -1, "inf", "x"))):

@@ -73,6 +73,7 @@ CHASE_SAMPLE(target_t, , m.mean[0] = kNan)
 CHASE_SAMPLE(map_t, m.resolution = 0.1; m.size = 1; m.data = {1}, m.resolution = kNan)
 CHASE_SAMPLE(prediction_t, m.target = GoodPolynomial(), m.target.coefficients[1] = kNan)
 CHASE_SAMPLE(scenario_t, m.yaml = "name: x", m.yaml.clear())
+CHASE_SAMPLE(event_t, m.name = "kill-planning", m.phase = 2)
 CHASE_SAMPLE(status_t, , m.cpu = kNan)
 CHASE_SAMPLE(truth_t, m.orientation[0] = 1.0, m.pos[0] = kNan)
 CHASE_SAMPLE(plan_t, m.position = m.target = GoodPolynomial(); m.n_yaw = 1;
@@ -92,7 +93,7 @@ template <class T>
 class HostileBus : public testing::Test {};
 using Types = testing::Types<imu_t, attitude_setpoint_t, lidar_scan_t, scan_registered_t,
                              camera_image_t, pose_t, target_t, map_t, prediction_t, scenario_t,
-                             status_t, truth_t, plan_t, obstacles_t>;
+                             event_t, status_t, truth_t, plan_t, obstacles_t>;
 TYPED_TEST_SUITE(HostileBus, Types);
 
 /// Every truncation, every single corrupted byte position (among them all lengths set negative or

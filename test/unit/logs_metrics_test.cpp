@@ -63,6 +63,60 @@ TEST(Metrics, ASegmentThroughThePillarIsBlind) {
   EXPECT_EQ(*Compute(Standing({-2, 0, 5.5}, {2, 0, 5.5})).visible_ratio, 1.0);  // over its top
 }
 
+TEST(Metrics, TheFirstContactIsToldWithItsTimeAndPartner) {
+  FlightRecord record = Standing({3, 0, 1.5}, {5.5, 0, 1.5});
+  Metrics m = Compute(record);
+  EXPECT_EQ(m.collision_s, -1.0);
+  EXPECT_EQ(m.collided_with, "");
+  for (TruthSample& s : record.truth)
+    if (s.t > 3.994) s.p.x() = s.t < 7.0 ? 0.5 : 9.0;
+  m = Compute(record);
+  EXPECT_NEAR(m.collision_s, 4.0, 1e-9);
+  EXPECT_EQ(m.collided_with, "cylinder at (0.0, 0.0)");
+  EXPECT_FALSE(m.criteria.at("safe_ratio"));
+  world::MoverSpec mover;
+  mover.waypoints = {{20, 20, 1.5}};
+  record.scenario.movers = {mover, mover};
+  record.scenario.movers[1].waypoints = {{3, 0.5, 1.5}};
+  EXPECT_EQ(Compute(record).collided_with, "mover 2");
+  EXPECT_EQ(Compute(record).collision_s, 0.0);
+  EXPECT_EQ(Compute(Standing({5, 0, 0.2}, {8, 0, 0.5})).collided_with, "ground");
+  EXPECT_EQ(Compute(Standing({5, 0, 1.5}, {5.3, 0, 1.5})).collided_with, "target");
+}
+
+/// The named partner alone leaves the clearance as it is; without it there is more.
+TEST(Metrics, TheNamedPartnerIsTheOneThatTheClearanceIsMeasuredTo) {
+  std::mt19937 random(11);
+  std::uniform_real_distribution<double> xy(-4.0, 4.0), z(0.3, 3.0);
+  for (int trial = 0; trial < 300; ++trial) {
+    FlightRecord record = Standing({xy(random), xy(random), z(random)}, {30, 0, 1.5});
+    record.scenario.world.cylinders.push_back({{2.0, 1.0}, 0.4, 3.0, 0.0});
+    record.scenario.world.boxes.push_back({{-2.0, -1.0, 1.0}, {1.0, 0.5, 2.0}, 30.0});
+    record.scenario.world.ellipsoids.push_back({{1.0, -2.0, 1.0}, {0.5, 0.7, 0.9}, 0.0});
+    const Scorer score(record.scenario);
+    const TruthSample& s = record.truth[100];
+    const std::string name = score.Nearest(s);
+    FlightRecord rest = record;
+    if (name == "cylinder at (0.0, 0.0)")
+      rest.scenario.world.cylinders.erase(rest.scenario.world.cylinders.begin());
+    if (name == "cylinder at (2.0, 1.0)") rest.scenario.world.cylinders.pop_back();
+    if (name == "box at (-2.0, -1.0)") rest.scenario.world.boxes.clear();
+    if (name == "ellipsoid at (1.0, -2.0)") rest.scenario.world.ellipsoids.clear();
+    if (name == "ground") rest.scenario.world.ground.height = -10.0;
+    EXPECT_GT(Scorer(rest.scenario)(s).clearance, score(s).clearance)
+        << "trial " << trial << ": " << name;
+  }
+}
+
+TEST(Metrics, FaultsThatStruckAreNamed) {
+  FlightRecord record = Standing({3, 0, 1.5}, {5.5, 0, 1.5});
+  EXPECT_EQ(Compute(record).fault, "");
+  EXPECT_EQ(Compute(record).fault_time_s, -1.0);
+  record.faults = {{2.5, "lidar-gap"}, {4.0, "kill-planning"}};
+  EXPECT_EQ(Compute(record).fault, "lidar-gap+kill-planning");
+  EXPECT_EQ(Compute(record).fault_time_s, 2.5);
+}
+
 /// Random segments and points against dense sampling of the pillar.
 TEST(Metrics, ScoresAgreeWithDenseSampling) {
   std::mt19937 random(5);
@@ -217,11 +271,30 @@ TEST(Metrics, AnEmptyFlightHasNoFiguresAndFails) {
 TEST(Metrics, JsonHasTheAgreedKeys) {
   const FlightRecord record = Standing({3, 0, 1.5}, {5.5, 0, 1.5});
   const auto json = nlohmann::json::parse(MetricsJson(record, Compute(record)));
-  for (const char* key :
-       {"safe_ratio", "min_clearance_m", "visible_ratio", "in_image_ratio", "distance_ratio",
-        "distance_error", "travel_ratio", "acceleration_cost", "jerk_cost", "yaw_rate_rms",
-        "plan_ms", "predict_ms", "replans", "fallbacks", "odometry_ate_m", "target_rmse_m",
-        "prediction_error_m", "cpu_s", "criteria"})
+  for (const char* key : {"safe_ratio",
+                          "min_clearance_m",
+                          "visible_ratio",
+                          "in_image_ratio",
+                          "distance_ratio",
+                          "distance_error",
+                          "travel_ratio",
+                          "acceleration_cost",
+                          "jerk_cost",
+                          "yaw_rate_rms",
+                          "plan_ms",
+                          "predict_ms",
+                          "replans",
+                          "fallbacks",
+                          "odometry_ate_m",
+                          "target_rmse_m",
+                          "prediction_error_m",
+                          "cpu_s",
+                          "criteria",
+                          "fault",
+                          "fault_time_s",
+                          "flown_s",
+                          "collision_s",
+                          "collided_with"})
     EXPECT_TRUE(json.contains(key)) << key;
 }
 

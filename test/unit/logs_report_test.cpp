@@ -57,6 +57,35 @@ TEST(ReadFlight, FiguresOfASyntheticFlightAreTheOnesItWasMadeWith) {
   EXPECT_EQ(*m.in_image_ratio, 1.0);
 }
 
+TEST(ReadFlight, FaultsAreThoseThatBegan) {
+  const std::string log = Fresh("faults") + "/flight.lcm";
+  OutputLog out(log);
+  scenario_t scenario{};
+  scenario.yaml = kYaml;
+  out.Write(1, "SCENARIO", scenario);
+  truth_t truth{};
+  truth.utime = 2000000;
+  truth.mission_time = -1.0;
+  truth.orientation[0] = 1.0;
+  out.Write(1, "TRUTH", truth);
+  event_t event{};
+  for (const auto& [utime, name] : {std::pair(5000000, "lidar-gap"), {4000000, "kill-control"}}) {
+    event.name = name;
+    event.utime = utime;
+    event.phase = event_t::BEGINS;
+    out.Write(2, "FAULT", event);
+    event.utime += 500000;
+    event.phase = event_t::ENDS;
+    out.Write(3, "FAULT", event);
+  }
+  out.Close();
+  const FlightRecord record = ReadFlight(log);
+  ASSERT_EQ(record.faults.size(), 2u);
+  EXPECT_EQ(record.faults[0].name, "kill-control");
+  EXPECT_EQ(record.faults[0].t, 1.0);
+  EXPECT_EQ(record.faults[1].t, 2.0);
+}
+
 TEST(ReadFlight, LogsWithoutTruthAreRefusedInOneLine) {
   const std::string log = Fresh("none") + "/x.lcm";
   OutputLog out(log);

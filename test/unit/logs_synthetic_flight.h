@@ -5,6 +5,7 @@
 #include <sstream>
 #include <string>
 
+#include "chase/event_t.hpp"
 #include "chase/obstacles_t.hpp"
 #include "chase/plan_t.hpp"
 #include "chase/pose_t.hpp"

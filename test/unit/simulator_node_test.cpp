@@ -8,6 +8,7 @@
 #include <map>
 
 #include "chase/camera_image_t.hpp"
+#include "chase/event_t.hpp"
 #include "chase/imu_t.hpp"
 #include "chase/lidar_scan_t.hpp"
 #include "chase/obstacles_t.hpp"
@@ -106,6 +107,39 @@ TEST(SimulatorNode, AnotherSeedIsAnotherFlight) {
   EXPECT_NE(a.at("IMU"), b.at("IMU"));
   EXPECT_NE(a.at("LIDAR_SCAN"), b.at("LIDAR_SCAN"));
   EXPECT_NE(a.at("CAMERA_IMAGE"), b.at("CAMERA_IMAGE"));
+}
+
+TEST(SimulatorNode, ALidarFaultTakesSweepsAndChangesNothingElse) {
+  SimulatorConfig config = Config();
+  std::ifstream in(config.scenario);
+  std::string text((std::istreambuf_iterator<char>(in)), {});
+  text.replace(text.find("settle_s: 8"), 11, "settle_s: 0");
+  config.scenario = ::testing::TempDir() + "chase_at_once.yaml";
+  std::ofstream(config.scenario) << text;
+  const Record whole = Simulated(config, 2000000);
+  config.faults = {world::Settled({"lidar-gap", 0.5}, 60.0, 1, 0),
+                   world::Settled({"lidar-dead", 1.75}, 60.0, 1, 1)};
+  Record struck = Simulated(config, 2000000);
+  std::vector<int64_t> expected;
+  for (const auto& [utime, bytes] : whole.at("LIDAR_SCAN"))
+    if (utime < kStart + 500000 || (utime >= kStart + 1500000 && utime < kStart + 1750000))
+      expected.push_back(utime);
+  ASSERT_EQ(struck.at("LIDAR_SCAN").size(), expected.size());
+  for (std::size_t i = 0; i < expected.size(); ++i) {
+    EXPECT_EQ(struck.at("LIDAR_SCAN")[i].first, expected[i]);
+    EXPECT_EQ(Message<lidar_scan_t>(struck, "LIDAR_SCAN", i).seq, static_cast<int32_t>(i));
+  }
+  const std::vector<std::pair<int64_t, std::string>> events = {
+      {500000, "lidar-gap"}, {1500000, "lidar-gap"}, {1750000, "lidar-dead"}};
+  ASSERT_EQ(struck.at("FAULT").size(), events.size());
+  for (std::size_t i = 0; i < events.size(); ++i) {
+    const auto event = Message<event_t>(struck, "FAULT", i);
+    EXPECT_EQ(event.utime, kStart + events[i].first);
+    EXPECT_EQ(event.name, events[i].second);
+    EXPECT_EQ(event.phase, i == 1 ? int{event_t::ENDS} : int{event_t::BEGINS});
+  }
+  for (const char* channel : {"IMU", "CAMERA_IMAGE", "TRUTH", "SCENARIO"})
+    EXPECT_EQ(struck.at(channel), whole.at(channel)) << channel;
 }
 
 TEST(SimulatorNode, MissingOrBrokenScenarioIsRefusedAtTheStart) {

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <fstream>
+#include <set>
 
 #include "common/world/random.h"
 #include "common/world/scenario.h"
@@ -67,6 +68,60 @@ TEST(ScenarioFile, EveryPartIsChecked) {
   EXPECT_CONTAINS(Refusal(kGood + "duration_s: 0\n"), "duration_s");
   EXPECT_CONTAINS(Refusal(kGood + "wind: {gust_time: 0}\n"), "gust_time");
   EXPECT_CONTAINS(Refusal(kGood + "chaser: {start: [1, 2]}\n"), "3 numbers");
+}
+
+TEST(ScenarioFile, FaultsAreChecked) {
+  const auto with = [](const std::string& entry) { return kGood + "faults:\n  - " + entry + "\n"; };
+  const Scenario scenario = ParseScenario(with("{name: freeze-control, at: 12, for: 3}"), "s.yaml");
+  ASSERT_EQ(scenario.faults.size(), 1u);
+  EXPECT_EQ(scenario.faults[0].at, 12.0);
+  EXPECT_EQ(scenario.faults[0].duration, 3.0);
+  const std::string error = Refusal(with("{name: kill-planing}"));
+  EXPECT_CONTAINS(error, "s.yaml:7");
+  EXPECT_CONTAINS(error, "name is 'kill-planing'");
+  EXPECT_CONTAINS(error, "kill-planning");
+  EXPECT_CONTAINS(Refusal(with("{name: kill-simulator}")), "'kill-simulator'");
+  EXPECT_CONTAINS(Refusal(with("{name: kill-planning, at: 60}")), "s.yaml:7: faults[0]: at is 60");
+  EXPECT_CONTAINS(Refusal(with("{name: kill-planning, at: .nan}")), "at is .nan");
+  EXPECT_CONTAINS(Refusal(with("{name: kill-planning, for: 0}")), "for is 0");
+  EXPECT_CONTAINS(Refusal(with("{name: kill-planning, for: .inf}")), "for is .inf");
+  EXPECT_CONTAINS(Refusal(with("{name: lidar-dead, for: 3}")), "leave the key out");
+}
+
+TEST(Fault, TextIsNameAndTime) {
+  EXPECT_EQ(ParseFault("lidar-gap").name, "lidar-gap");
+  EXPECT_LT(ParseFault("lidar-gap").at, 0.0);
+  EXPECT_EQ(ParseFault("kill-planning@12.5").at, 12.5);
+  for (const char* text : {"", "kill-", "kill-planning@", "kill-planning@x", "kill-planning@-1",
+                           "kill-planning@1s", "kill-planning@nan", "kill-planning@inf", "@3"})
+    EXPECT_THROW(ParseFault(text), std::runtime_error) << text;
+}
+
+TEST(Fault, EveryKindCanBeSettledAndLoadedAgain) {
+  for (const FaultKind& kind : FaultKinds()) {
+    const FaultSpec settled = Settled({kind.name}, 60.0, 1, 0);
+    EXPECT_EQ(settled.duration, kind.duration);
+    EXPECT_EQ(settled.Problem(), "");
+    EXPECT_EQ(&KindOf(settled), &kind) << "two rows named " << kind.name;
+  }
+}
+
+TEST(Fault, TimesAreDrawnFromTheSeedAndTheNumberAlone) {
+  std::set<double> times;
+  double sum = 0.0;
+  for (int64_t seed = 1; seed <= 500; ++seed)
+    for (int number = 0; number < 2; ++number) {
+      const FaultSpec fault = Settled({"kill-planning"}, 100.0, seed, number);
+      EXPECT_EQ(fault.at, Settled({"lidar-gap"}, 100.0, seed, number).at) << "seed " << seed;
+      EXPECT_GE(fault.at, 20.0);
+      EXPECT_LE(fault.at, 70.0);
+      EXPECT_EQ(ParseFault("kill-planning@" + std::to_string(fault.at)).at, fault.at);
+      times.insert(fault.at);
+      sum += fault.at / 1000.0;
+    }
+  EXPECT_GT(times.size(), 850u) << "of 1000 draws in steps of 0.01 s";
+  EXPECT_NEAR(sum, 45.0, 3.0 * 50.0 / std::sqrt(12.0 * 1000.0));
+  EXPECT_EQ(Settled({"kill-planning", 7.0}, 100.0, 3, 0).at, 7.0);
 }
 
 TEST(ScenarioFile, NothingIsGivenTwice) {

@@ -1,0 +1,116 @@
+"""Flights in lockstep in which something fails: the same bytes every time, the failure where it was asked
+for, and the end at a collision.
+
+faults_test.py BIN_DIR SCENARIO"""
+
+import filecmp
+import json
+import pathlib
+import re
+import struct
+import subprocess
+import sys
+import tempfile
+import unittest
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "replay"))
+import lcmlog
+
+BIN, SCENARIO = pathlib.Path(sys.argv[1]), sys.argv[2]
+START = 9.0  # s of the log at mission time zero: power-on at 1 s, settle_s 8 s
+LIMIT = 200  # s
+
+
+def flight(*arguments, scenario=SCENARIO):
+    command = [BIN / "chase-flight", scenario, "--quiet", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=LIMIT, check=False)
+
+
+def stamps(log, channel):
+    """(mission time of delivery, seq) of every message of a channel."""
+    return [(utime * 1e-6 - START, struct.unpack_from(">i", data, 16)[0])
+            for utime, name, data in lcmlog.read(log) if name == channel]
+
+
+def faults(log):
+    """(name, phase, mission time) of every FAULT."""
+    for utime, name, data in lcmlog.read(log):
+        if name == "FAULT":
+            length = struct.unpack_from(">i", data, 20)[0]
+            text = data[24:24 + length - 1].decode()
+            yield text, data[24 + length], round(utime * 1e-6 - START, 3)
+
+
+class Faults(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = pathlib.Path(folder.name)
+
+    def test_flight_with_faults_repeats_and_shows_them(self):
+        logs = [self.folder / name for name in ("a.lcm", "b.lcm")]
+        metrics = self.folder / "metrics.json"
+        for log in logs:
+            answer = flight("--fault", "kill-planning@1", "--fault", "lidar-gap@0.75", "--until", 3,
+                            "--log", log, "--metrics", metrics)
+            self.assertEqual((answer.returncode, answer.stderr), (0, ""))
+        self.assertTrue(filecmp.cmp(*logs, shallow=False), "two flights, different bytes")
+        self.assertEqual(list(faults(logs[0])),
+                         [("lidar-gap", 1, 0.75), ("kill-planning", 1, 1.0),
+                          ("kill-planning", 0, 1.5), ("lidar-gap", 0, 1.75)])
+        self.check_gap(stamps(logs[0], "LIDAR_SCAN"), 0.75, 1.75, restarts=False)
+        self.check_gap(stamps(logs[0], "PLAN"), 1.0, 1.5, restarts=True)
+        figures = json.loads(metrics.read_text(encoding="utf-8"))
+        self.assertEqual((figures["fault"], figures["fault_time_s"]), ("lidar-gap+kill-planning", 0.75))
+        self.assertIn("of the part flown", answer.stdout)
+
+    def check_gap(self, messages, begin, end, restarts):
+        """Nothing between the times but what was under way; seq goes on, or starts anew after."""
+        before = [seq for t, seq in messages if t < begin + 0.003]
+        after = [seq for t, seq in messages if t >= end]
+        self.assertEqual(len(before) + len(after), len(messages))
+        self.assertGreater(min(len(before), len(after)), 4)
+        first = 0 if restarts else len(before)
+        self.assertEqual(before + after, list(range(len(before))) +
+                         list(range(first, first + len(after))))
+
+    def test_time_is_drawn_from_the_seed(self):
+        def drawn(seed):
+            answer = flight("--fault", "lidar-dead", "--seed", seed, "--print-config", "simulator")
+            return float(re.search(r"lidar-dead.*\n\s+at: ([\d.]+)", answer.stdout).group(1))
+        times = [drawn(seed) for seed in (1, 1, 2, 3)]
+        self.assertEqual(times[0], times[1])
+        self.assertEqual(len(set(times)), 3)
+        self.assertTrue(all(12.0 <= t <= 42.0 for t in times), times)  # of 60 s
+
+    def test_sensor_fault_needs_sensors(self):
+        answer = flight("--fault", "lidar-gap", "--sensors", "truth")
+        self.assertEqual((answer.returncode, answer.stdout), (1, ""))
+        self.assertRegex(answer.stderr, "lidar-gap.*truth.*--sensors raw")
+
+    def test_collision_ends_the_flight(self):
+        """A block comes down the hall and through the hovering drone; planning hangs meanwhile."""
+        text = pathlib.Path(SCENARIO).read_text(encoding="utf-8")
+        scenario = self.folder / "ram.yaml"
+        scenario.write_text(text.replace("settle_s: 8", "settle_s: 4") + """
+faults: [{name: freeze-planning, at: 0, for: 50}]
+movers:
+  - {shape: box, size: [1, 3, 3], waypoints: [[-9, -2.1, 1.5], [20, -2.1, 1.5]], speed: 5}
+""", encoding="utf-8")
+        metrics = self.folder / "metrics.json"
+        answer = flight("--sensors", "truth", "--end-on-collision", "--metrics", metrics,
+                        scenario=scenario)
+        self.assertEqual((answer.returncode, answer.stderr), (2, ""))
+        self.assertRegex(answer.stdout, r"safe_ratio +FAILED")
+        figures = json.loads(metrics.read_text(encoding="utf-8"))
+        self.assertEqual(figures["collided_with"], "mover 1")
+        self.assertEqual(figures["fault"], "freeze-planning")
+        # From -9 m with its half length of 0.5 m to the drone at 1.7 m with its radius of 0.25 m.
+        self.assertAlmostEqual(figures["collision_s"], (1.7 - 0.25 + 9 - 0.5) / 5, delta=0.25)
+        self.assertAlmostEqual(figures["flown_s"], figures["collision_s"] + 0.2, delta=0.011)
+        self.assertLess(figures["safe_ratio"], 1.0)
+        self.assertFalse(figures["criteria"]["safe_ratio"])
+
+
+if __name__ == "__main__":
+    unittest.main(argv=sys.argv[:1])
