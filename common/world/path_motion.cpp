@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/world/speed_profile.h"
+
 namespace chase::world {
 namespace {
 
@@ -14,6 +16,7 @@ constexpr double kStep = 0.02;  // s between the samples of a motion along waypo
 struct Piece {
   Vector2d start, direction;
   double length = 0.0, curvature = 0.0;
+  double rest = -1.0;  // s at its end, negative: none
 
   Vector2d Tangent(double s) const {
     const double c = std::cos(curvature * s), n = std::sin(curvature * s);
@@ -27,10 +30,20 @@ struct Piece {
   }
 };
 
-std::vector<Vector2d> WithoutRepeats(const std::vector<Vector2d>& waypoints) {
-  std::vector<Vector2d> out;
-  for (const auto& p : waypoints)
-    if (out.empty() || (p - out.back()).norm() > 1e-9) out.push_back(p);
+/// A waypoint; the motion rests there for `rest` [s], or goes on when that is negative.
+struct Waypoint {
+  Vector2d p;
+  double rest = -1.0;
+};
+
+std::vector<Waypoint> WithoutRepeats(const std::vector<Vector2d>& waypoints,
+                                     const PathMotion::Stops& stops) {
+  std::vector<Waypoint> out;
+  for (std::size_t i = 0; i < waypoints.size(); ++i) {
+    if (out.empty() || (waypoints[i] - out.back().p).norm() > 1e-9) out.push_back({waypoints[i]});
+    for (const auto& [index, rest] : stops)
+      if (index == static_cast<int>(i)) out.back().rest = std::max(out.back().rest, rest);
+  }
   return out;
 }
 
@@ -38,24 +51,25 @@ double TurnAngle(const Vector2d& a, const Vector2d& b) {
   return std::atan2(a.x() * b.y() - a.y() * b.x(), a.dot(b));
 }
 
-/// Lines joined by arcs of the given radius, smaller where a leg is too short for it.
-std::vector<Piece> Pieces(const std::vector<Vector2d>& waypoints, double radius) {
+/// Lines joined by arcs of the given radius, smaller where a leg is too short for it. Where it
+/// rests it turns on the spot.
+std::vector<Piece> Pieces(const std::vector<Waypoint>& waypoints, double radius) {
   std::vector<Piece> pieces;
-  Vector2d at = waypoints.front();
+  Vector2d at = waypoints.front().p;
   for (std::size_t i = 1; i < waypoints.size(); ++i) {
-    const Vector2d leg = waypoints[i] - waypoints[i - 1], direction = leg.normalized();
+    const Vector2d leg = waypoints[i].p - waypoints[i - 1].p, direction = leg.normalized();
     double trim = 0.0, angle = 0.0;
-    if (i + 1 < waypoints.size()) {
-      const Vector2d next = waypoints[i + 1] - waypoints[i];
+    if (i + 1 < waypoints.size() && waypoints[i].rest < 0.0) {
+      const Vector2d next = waypoints[i + 1].p - waypoints[i].p;
       angle = TurnAngle(leg, next);
       const double shorter = std::min(leg.norm(), next.norm());
       trim = std::min(radius * std::tan(0.5 * std::abs(angle)), 0.5 * shorter);
     }
-    const Vector2d stop = waypoints[i] - trim * direction;
-    pieces.push_back({at, direction, (stop - at).dot(direction), 0.0});
+    const Vector2d stop = waypoints[i].p - trim * direction;
+    pieces.push_back({at, direction, (stop - at).dot(direction), 0.0, waypoints[i].rest});
     if (trim > 1e-9) {
       const double curvature = std::tan(0.5 * std::abs(angle)) / trim * (angle > 0.0 ? 1.0 : -1.0);
-      pieces.push_back({stop, direction, angle / curvature, curvature});
+      pieces.push_back({stop, direction, angle / curvature, curvature, -1.0});
       at = pieces.back().Position(pieces.back().length);
     } else {
       at = stop;
@@ -64,46 +78,55 @@ std::vector<Piece> Pieces(const std::vector<Vector2d>& waypoints, double radius)
   return pieces;
 }
 
-/// Path length and speed at time t of a motion from rest to rest over `length`.
-struct Trapezoid {
-  double length, speed, acceleration;
+/// What the pieces allow, joined where they allow the same.
+std::vector<Stretch> Stretches(const std::vector<Piece>& pieces, const PathLimits& limits) {
+  std::vector<Stretch> stretches;
+  for (const Piece& piece : pieces) {
+    const double bend = std::abs(piece.curvature);
+    const double speed = limits.lateral > 0.0 && bend > 0.0
+                             ? std::min(limits.speed, std::sqrt(limits.lateral / bend))
+                             : limits.speed;
+    const bool goes_on = !stretches.empty() && stretches.back().rest < 0.0;
+    if (goes_on && (piece.length <= 0.0 || stretches.back().speed == speed)) {
+      stretches.back().length += piece.length;
+      stretches.back().rest = piece.rest;
+    } else if (piece.length > 0.0) {
+      stretches.push_back({piece.length, speed, piece.rest});
+    }
+  }
+  return stretches;
+}
 
-  double peak() const { return std::min(speed, std::sqrt(length * acceleration)); }
-  double duration() const { return length / peak() + peak() / acceleration; }
-  double SpeedAt(double t) const {
-    const double ramp = std::min(t, duration() - t) * acceleration;
-    return std::clamp(ramp, 0.0, peak());
-  }
-  double LengthAt(double t) const {
-    const double v = peak(), ramp = v / acceleration, left = duration() - t;
-    if (t <= 0.0) return 0.0;
-    if (left <= 0.0) return length;
-    if (t < ramp) return 0.5 * acceleration * t * t;
-    if (left < ramp) return length - 0.5 * acceleration * left * left;
-    return v * (t - 0.5 * ramp);
-  }
-};
+/// Every kStep, at rests on the way, and at the end.
+std::vector<double> SampleTimes(const SpeedProfile& profile) {
+  std::vector<double> times;
+  const int steps = static_cast<int>(std::ceil(profile.duration() / kStep));
+  for (int i = 0; i <= steps; ++i) times.push_back(std::min(i * kStep, profile.duration()));
+  times.insert(times.end(), profile.rests().begin(), profile.rests().end());
+  std::sort(times.begin(), times.end());
+  const auto repeats = [](double a, double b) { return b - a < 1e-9; };
+  times.erase(std::unique(times.begin(), times.end(), repeats), times.end());
+  return times;
+}
 
 }  // namespace
 
-PathMotion::PathMotion(const std::vector<Vector2d>& waypoints, double speed, double acceleration,
-                       double corner_radius) {
-  const auto points = WithoutRepeats(waypoints);
+PathMotion::PathMotion(const std::vector<Vector2d>& waypoints, const PathLimits& limits,
+                       double corner_radius, const Stops& stops) {
+  const auto points = WithoutRepeats(waypoints, stops);
   if (points.size() < 2) {
     t_ = {0.0};
-    p_ = {points.empty() ? Vector2d::Zero() : points.front()};
+    p_ = {points.empty() ? Vector2d::Zero() : points.front().p};
     v_ = {Vector2d::Zero()};
     return;
   }
   const auto pieces = Pieces(points, corner_radius);
-  double length = 0.0;
-  for (const auto& piece : pieces) length += piece.length;
-  const Trapezoid profile{length, speed, acceleration};
-  const int steps = static_cast<int>(std::ceil(profile.duration() / kStep));
+  const SpeedProfile profile(Stretches(pieces, limits), limits.acceleration,
+                             std::max(0.0, points.front().rest));
   std::size_t k = 0;
   double passed = 0.0;
-  for (int i = 0; i <= steps; ++i) {
-    const double t = std::min(i * kStep, profile.duration()), s = profile.LengthAt(t);
+  for (const double t : SampleTimes(profile)) {
+    const double s = profile.LengthAt(t);
     while (k + 1 < pieces.size() && s > passed + pieces[k].length) passed += pieces[k++].length;
     t_.push_back(t);
     p_.push_back(pieces[k].Position(s - passed));
@@ -145,6 +168,17 @@ Vector2d PathMotion::Velocity(double t) const {
   const double h = t_[i + 1] - t_[i], s = (t - t_[i]) / h;
   return 6.0 * s * (1.0 - s) / h * (p_[i + 1] - p_[i]) + (1.0 - s) * (1.0 - 3.0 * s) * v_[i] +
          s * (3.0 * s - 2.0) * v_[i + 1];
+}
+
+Vector2d PathMotion::Direction(double t) const {
+  if (t_.empty()) return Vector2d::Zero();
+  const auto moves = [this](std::size_t i) { return v_[i].norm() > 1e-9; };
+  const std::size_t now = Segment(std::clamp(t, t_.front(), t_.back()));
+  for (std::size_t i = now + 1; i-- > 0;)
+    if (moves(i)) return v_[i].normalized();
+  for (std::size_t i = now; i < v_.size(); ++i)
+    if (moves(i)) return v_[i].normalized();
+  return Vector2d::Zero();
 }
 
 }  // namespace chase::world

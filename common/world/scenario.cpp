@@ -46,6 +46,11 @@ std::string Within(const std::string& name, const Spec& spec) {
   return problem.empty() ? "" : name + ": " + problem;
 }
 
+bool Grows(const std::vector<double>& times) {
+  const auto falls = [](double a, double b) { return !(b > a); };
+  return std::adjacent_find(times.begin(), times.end(), falls) == times.end();
+}
+
 std::string Folder(const std::string& file) {
   const auto slash = file.rfind('/');
   return slash == std::string::npos ? "" : file.substr(0, slash + 1);
@@ -79,22 +84,41 @@ std::string ForestSpec::Problem() const {
        NotNegative("path_clearance", path_clearance)});
 }
 std::string GroundSpec::Problem() const {
-  return First({NotNegative("roughness", roughness), Positive("wavelength", wavelength)});
+  return First({Check(slope.norm() <= 1.0, "slope", Number(slope.norm()), "1 at most (45 degrees)"),
+                NotNegative("roughness", roughness), Positive("wavelength", wavelength)});
 }
 std::string MoverSpec::Problem() const {
   return First({Check(shape == "box" || shape == "cylinder" || shape == "ellipsoid", "shape",
                       "'" + shape + "'", "box, cylinder or ellipsoid"),
                 Positive("size", size.minCoeff()),
                 Check(!waypoints.empty(), "waypoints", "empty", "one point or more"),
+                Check(times.empty() || times.size() == waypoints.size(), "times",
+                      std::to_string(times.size()) + " numbers", "one for each waypoint, or none"),
+                Check(Grows(times), "times", "out of order", "later from waypoint to waypoint"),
+                Check(times.empty() || !loop, "loop", "true", "false beside times"),
                 NotNegative("speed", speed)});
 }
+std::string StopSpec::Problem() const {
+  return First({Check(waypoint >= 0, "waypoint", std::to_string(waypoint), "0 or more"),
+                NotNegative("duration", duration)});
+}
 std::string TargetSpec::Problem() const {
-  return First({Positive("radius", radius), Positive("height", height),
-                Check(color.minCoeff() >= 0.0 && color.maxCoeff() <= 1.0, "color", "outside 0 to 1",
-                      "within 0 to 1"),
-                NotNegative("carrier_size", carrier_size.minCoeff()), Positive("speed", speed),
-                Positive("acceleration", acceleration),
-                NotNegative("corner_radius", corner_radius)});
+  const int last = static_cast<int>(waypoints.size()) - 1;
+  const bool on_path = std::all_of(stops.begin(), stops.end(),
+                                   [&](const StopSpec& stop) { return stop.waypoint <= last; });
+  return First(
+      {Check(shape == "cylinder" || shape == "box" || shape == "sphere", "shape", "'" + shape + "'",
+             "cylinder, box or sphere"),
+       Check(shape != "sphere" || std::abs(height - 2.0 * radius) < 1e-9, "height", Number(height),
+             "twice the radius of a sphere, " + Number(2.0 * radius)),
+       FirstOf("stops", stops),
+       Check(on_path, "stops", "at a waypoint beyond the last", std::to_string(last) + " at most"),
+       NotNegative("lateral_acceleration", lateral_acceleration), Positive("radius", radius),
+       Positive("height", height),
+       Check(color.minCoeff() >= 0.0 && color.maxCoeff() <= 1.0, "color", "outside 0 to 1",
+             "within 0 to 1"),
+       NotNegative("carrier_size", carrier_size.minCoeff()), Positive("speed", speed),
+       Positive("acceleration", acceleration), NotNegative("corner_radius", corner_radius)});
 }
 std::string ChaserSpec::Problem() const {
   return First({Positive("takeoff_height", takeoff_height),

@@ -99,10 +99,13 @@ struct ForestSpec {
 };
 
 struct GroundSpec {
-  double height = 0.0, roughness = 0.0, wavelength = 8.0;
+  double height = 0.0;
+  Eigen::Vector2d slope = Eigen::Vector2d::Zero();
+  double roughness = 0.0, wavelength = 8.0;
   template <class V>
   void Visit(V& v) {
-    v("height", height, "z, m");
+    v("height", height, "z at the origin, m");
+    v("slope", slope, "rise per metre along x and y");
     v("roughness", roughness, "amplitude of undulation, m");
     v("wavelength", wavelength, "of undulation, m");
   }
@@ -134,6 +137,7 @@ struct MoverSpec {
   std::string shape = "box";  // box, cylinder or ellipsoid
   Eigen::Vector3d size = Eigen::Vector3d::Ones();
   std::vector<Eigen::Vector3d> waypoints;
+  std::vector<double> times;  // mission times at the waypoints instead of speed, or empty, s
   double speed = 1.0, start_time = 0.0;
   bool loop = false;
   template <class V>
@@ -141,6 +145,7 @@ struct MoverSpec {
     v("shape", shape, "box, cylinder or ellipsoid");
     v("size", size, "length width height, m");
     v("waypoints", waypoints, "of the centre, m");
+    v("times", times, "mission time at each waypoint, instead of speed, start_time and loop, s");
     v("speed", speed, "m/s");
     v("start_time", start_time, "mission time at which it starts, s");
     v("loop", loop, "back to the first waypoint");
@@ -148,24 +153,42 @@ struct MoverSpec {
   std::string Problem() const;
 };
 
+/// The target rests on a waypoint and turns there on the spot.
+struct StopSpec {
+  int waypoint = 0;
+  double duration = 0.0;
+  template <class V>
+  void Visit(V& v) {
+    v("waypoint", waypoint, "number of the waypoint, from 0");
+    v("duration", duration, "s; 0: only turns");
+  }
+  std::string Problem() const;
+};
+
 struct TargetSpec {
+  std::string shape = "cylinder";  // cylinder, box or sphere
   double radius = 0.15, height = 0.5, base = 0.3;
   Eigen::Vector3d color = {1.0, 0.45, 0.05};
   Eigen::Vector3d carrier_size = {0.5, 0.4, 0.3};
   std::vector<Eigen::Vector2d> waypoints;
   std::string path_file;  // CSV t,x,y instead of waypoints, relative to the scenario file
-  double speed = 1.0, acceleration = 0.5, corner_radius = 0.8;
+  std::vector<StopSpec> stops;
+  double speed = 1.0, acceleration = 0.5, lateral_acceleration = 0.0, corner_radius = 0.8;
   template <class V>
   void Visit(V& v) {
-    v("radius", radius, "of the upright cylinder, m");
-    v("height", height, "of the cylinder, m");
-    v("base", base, "z of the cylinder's lower end above the ground, m");
+    v("shape", shape, "cylinder (upright), box (square from above) or sphere");
+    v("radius", radius, "of the cylinder or sphere; of the box half an edge, m");
+    v("height", height, "of the cylinder or box; of the sphere twice the radius, m");
+    v("base", base, "z of the lower end above the ground, m");
     v("color", color, "r g b, 0 to 1");
     v("carrier_size", carrier_size, "box that carries it, length width height, m; zeros: none");
     v("waypoints", waypoints, "on the ground, x y, m");
     v("path_file", path_file, "CSV t,x,y instead of waypoints");
+    v("stops", stops, "waypoints where it rests and turns on the spot");
     v("speed", speed, "greatest, m/s");
     v("acceleration", acceleration, "along the path, m/s^2");
+    v("lateral_acceleration", lateral_acceleration,
+      "corners are taken no faster than this allows, m/s^2; 0: at full speed");
     v("corner_radius", corner_radius, "corners are rounded to this, m");
   }
   std::string Problem() const;
@@ -281,6 +304,9 @@ std::vector<Solid> StaticSolids(const Scenario& scenario);
 
 /// Height of the ground at x, y [m].
 double GroundHeight(const GroundSpec& ground, double x, double y);
+
+/// The target's own solid, its carrier left out, about p_WT [m]; `yaw` of the carrier [rad].
+Solid TargetSolid(const TargetSpec& target, const Eigen::Vector3d& center, double yaw);
 
 /// Motion of the target's centre over the ground from mission time 0; reads `path_file` if there is
 /// one.

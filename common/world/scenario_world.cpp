@@ -147,14 +147,53 @@ OnPolygon Along(const std::vector<Vector3d>& corners, double s) {
   return {corners.back(), direction, true};
 }
 
+/// Where a mover is, which way it faces, and how it moves.
+struct OnWay {
+  Vector3d position, direction, velocity;
+};
+
+OnWay AtSpeed(const MoverSpec& mover, double t) {
+  auto corners = mover.waypoints;
+  if (mover.loop && !corners.empty()) corners.push_back(corners.front());
+  const double length = PolygonLength(corners);
+  double s = std::max(0.0, t - mover.start_time) * mover.speed;
+  if (mover.loop && length > 0.0) s = std::fmod(s, length);
+  const OnPolygon on = Along(corners, s);
+  const bool moves = t >= mover.start_time && !on.at_end;
+  return {on.position, on.direction,
+          moves ? Vector3d(mover.speed * on.direction) : Vector3d::Zero()};
+}
+
+/// It faces the way of its last leg that had a length.
+OnWay AtTimes(const MoverSpec& mover, double t) {
+  const auto& p = mover.waypoints;
+  const auto& times = mover.times;
+  const auto after =
+      static_cast<std::size_t>(std::upper_bound(times.begin(), times.end(), t) - times.begin());
+  const std::size_t leg = std::clamp<std::size_t>(after, 1, std::max<std::size_t>(1, p.size() - 1));
+  OnWay on{p.front(), Vector3d::UnitX(), Vector3d::Zero()};
+  for (std::size_t i = std::min(leg, p.size() - 1); i > 0; --i) {
+    if (p[i] == p[i - 1]) continue;
+    on.direction = (p[i] - p[i - 1]).normalized();
+    break;
+  }
+  if (after == 0) return on;
+  on.position = p[after - 1];
+  if (after == p.size()) return on;
+  on.velocity = (p[after] - p[after - 1]) / (times[after] - times[after - 1]);
+  on.position += (t - times[after - 1]) * on.velocity;
+  return on;
+}
+
 }  // namespace
 
 double GroundHeight(const GroundSpec& ground, double x, double y) {
-  if (ground.roughness == 0.0) return ground.height;
+  const double plane = ground.height + ground.slope.dot(Vector2d(x, y));
+  if (ground.roughness == 0.0) return plane;
   const double k = 2.0 * kPi / ground.wavelength;
   const double wave = std::sin(k * x + 0.3) * std::cos(0.8 * k * y) +
                       0.5 * std::sin(1.7 * k * y + 1.1) * std::cos(1.3 * k * x);
-  return ground.height + ground.roughness * wave / 1.5;
+  return plane + ground.roughness * wave / 1.5;
 }
 
 std::vector<Solid> StaticSolids(const Scenario& scenario) {
@@ -175,17 +214,23 @@ std::vector<Solid> StaticSolids(const Scenario& scenario) {
 PathMotion TargetMotion(const Scenario& scenario) {
   const TargetSpec& target = scenario.target;
   if (!target.path_file.empty()) return PathMotion(ReadSamples(target.path_file));
-  return {target.waypoints, target.speed, target.acceleration, target.corner_radius};
+  PathMotion::Stops stops;
+  for (const auto& stop : target.stops) stops.emplace_back(stop.waypoint, stop.duration);
+  return {target.waypoints,
+          {target.speed, target.acceleration, target.lateral_acceleration},
+          target.corner_radius,
+          stops};
+}
+
+Solid TargetSolid(const TargetSpec& target, const Vector3d& center, double yaw) {
+  const Vector3d half(target.radius, target.radius, 0.5 * target.height);
+  if (target.shape == "box") return {Solid::Kind::kBox, center, half, yaw};
+  const bool sphere = target.shape == "sphere";
+  return {sphere ? Solid::Kind::kEllipsoid : Solid::Kind::kCylinder, center, half, 0.0};
 }
 
 MoverState MoverAt(const MoverSpec& mover, double t) {
-  auto corners = mover.waypoints;
-  if (mover.loop && !corners.empty()) corners.push_back(corners.front());
-  const double length = PolygonLength(corners);
-  double s = std::max(0.0, t - mover.start_time) * mover.speed;
-  if (mover.loop && length > 0.0) s = std::fmod(s, length);
-  const OnPolygon on = Along(corners, s);
-  const bool moves = t >= mover.start_time && !on.at_end;
+  const OnWay on = mover.times.empty() ? AtSpeed(mover, t) : AtTimes(mover, t);
   MoverState state;
   state.solid.kind = mover.shape == "box"        ? Solid::Kind::kBox
                      : mover.shape == "cylinder" ? Solid::Kind::kCylinder
@@ -193,7 +238,7 @@ MoverState MoverAt(const MoverSpec& mover, double t) {
   state.solid.center = on.position;
   state.solid.half_size = 0.5 * mover.size;
   state.solid.yaw = std::atan2(on.direction.y(), on.direction.x());
-  state.velocity = moves ? Vector3d(mover.speed * on.direction) : Vector3d::Zero();
+  state.velocity = on.velocity;
   return state;
 }
 

@@ -20,6 +20,7 @@ struct TruthSample {
   Eigen::Vector3d a = Eigen::Vector3d::Zero();       ///< a_WB, m/s^2
   double yaw = 0.0;                                  ///< of the body, rad
   Eigen::Vector3d target = Eigen::Vector3d::Zero();  ///< p_WT
+  double target_yaw = 0.0;                           ///< of its carrier, rad
   Eigen::Vector2d target_px = Eigen::Vector2d::Zero();
   bool target_in_image = false;
   double visible_share = 0.0;  ///< of the target's pixels in the last image

@@ -171,6 +171,7 @@ TruthSample ToSample(const truth_t& m, int64_t start) {
   s.p = bus::ToVector(m.pos);
   s.a = bus::ToVector(m.accel);
   s.yaw = Yaw(m.orientation);
+  s.target_yaw = m.target_yaw;
   s.target = bus::ToVector(m.target_pos);
   s.target_px = {m.target_px[0], m.target_px[1]};
   s.target_in_image = m.target_in_image != 0;

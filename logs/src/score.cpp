@@ -18,11 +18,6 @@ std::vector<Solid> MoversAt(const world::Scenario& scenario, double t) {
   return solids;
 }
 
-Solid TargetBody(const world::TargetSpec& target, const Vector3d& center) {
-  return {Solid::Kind::kCylinder, center,
-          Vector3d(target.radius, target.radius, 0.5 * target.height), 0.0};
-}
-
 std::string Name(const Solid& solid) {
   const char* kind = solid.kind == Solid::Kind::kBox        ? "box"
                      : solid.kind == Solid::Kind::kCylinder ? "cylinder"
@@ -67,7 +62,7 @@ double Scorer::ToGround(const Vector3d& p) const {
 }
 
 double Scorer::ToTarget(const TruthSample& s) const {
-  return world::SignedDistance(TargetBody(scenario_.target, s.target), s.p);
+  return world::SignedDistance(world::TargetSolid(scenario_.target, s.target, s.target_yaw), s.p);
 }
 
 double Scorer::Clearance(const TruthSample& s, const std::vector<Solid>& movers) const {

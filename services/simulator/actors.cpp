@@ -15,11 +15,12 @@ Actors::Actors(const world::Scenario& scenario)
       movers_(scenario.movers),
       path_(world::TargetMotion(scenario)) {}
 
-/// Direction of travel; before the start and after the end, that of the motion next to it.
+/// Direction of travel; at rest, that of the motion next to it.
 double Actors::Heading(double t) const {
   const double moving = std::clamp(t, 0.05, std::max(0.05, path_.Duration() - 0.05));
-  const Vector2d v = path_.Velocity(moving);
-  return v.norm() > 1e-9 ? std::atan2(v.y(), v.x()) : 0.0;
+  Vector2d v = path_.Velocity(moving);
+  if (v.norm() <= 1e-9) v = path_.Direction(moving);
+  return std::atan2(v.y(), v.x());
 }
 
 TargetState Actors::Target(double t) const {
@@ -30,8 +31,7 @@ TargetState Actors::Target(double t) const {
   state.center = {p.x(), p.y(), foot + target_.base + 0.5 * target_.height};
   state.velocity = {v.x(), v.y(), (next - foot) / 1e-3};
   state.yaw = Heading(t);
-  state.cylinder = {Solid::Kind::kCylinder, state.center,
-                    Vector3d(target_.radius, target_.radius, 0.5 * target_.height), 0.0};
+  state.cylinder = world::TargetSolid(target_, state.center, state.yaw);
   state.has_carrier = target_.carrier_size.minCoeff() > 0.0;
   state.carrier = {Solid::Kind::kBox, Vector3d(p.x(), p.y(), foot + 0.5 * target_.carrier_size.z()),
                    0.5 * target_.carrier_size, state.yaw};

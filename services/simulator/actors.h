@@ -7,7 +7,8 @@
 
 namespace chase::simulator {
 
-/// The target at one time: an upright cylinder on its carrier. Frame W.
+/// The target at one time: the solid to chase, by default an upright cylinder, on its carrier.
+/// Frame W.
 struct TargetState {
   Eigen::Vector3d center = Eigen::Vector3d::Zero();  ///< p_WT, m
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();

@@ -1,5 +1,6 @@
 #include "services/simulator/projection.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -11,6 +12,16 @@ constexpr double kPi = 3.14159265358979323846;
 constexpr double kNearest = 0.05;  // m in front of the camera
 constexpr int kRim = 48;           // points on each rim
 
+/// The solid's point towards that of a unit cylinder's rim: a corner of a box, on the cylinder
+/// around an ellipsoid.
+Eigen::Vector3d RimPoint(const world::Solid& solid, Eigen::Vector3d rim) {
+  if (solid.kind != world::Solid::Kind::kBox) return solid.half_size.cwiseProduct(rim);
+  rim.x() = rim.x() >= 0.0 ? 1.0 : -1.0;
+  rim.y() = rim.y() >= 0.0 ? 1.0 : -1.0;
+  const Eigen::AngleAxisd turn(solid.yaw, Eigen::Vector3d::UnitZ());
+  return turn * solid.half_size.cwiseProduct(rim);
+}
+
 }  // namespace
 
 PixelBox ProjectedBox(const world::Rig& rig, const Viewpoint& view, const world::Solid& cylinder) {
@@ -19,8 +30,8 @@ PixelBox ProjectedBox(const world::Rig& rig, const Viewpoint& view, const world:
   int in_front = 0;
   for (int i = 0; i < 2 * kRim; ++i) {
     const double angle = 2.0 * kPi * (i / 2) / kRim, side = i & 1 ? 1.0 : -1.0;
-    const Eigen::Vector3d unit(std::cos(angle), std::sin(angle), side);
-    const Eigen::Vector3d p_W = cylinder.center + cylinder.half_size.cwiseProduct(unit);
+    const Eigen::Vector3d rim(std::cos(angle), std::sin(angle), side);
+    const Eigen::Vector3d p_W = cylinder.center + RimPoint(cylinder, rim);
     const Eigen::Vector3d p_C = view.R_WC.transpose() * (p_W - view.p_WC);
     if (p_C.z() < kNearest) continue;
     ++in_front;

@@ -29,6 +29,13 @@ double ShareWithin(const Vector4d& base, const Vector4d& change, double limit) {
   return share;
 }
 
+/// What motors on a bent curve give of the thrusts asked for [N].
+Vector4d TrueThrusts(const VehicleConfig& config, const Vector4d& asked) {
+  if (config.thrust_curve == 0.0) return asked;
+  const Vector4d share = asked / (config.mass * config.max_thrust / 4.0);
+  return asked.array() * (1.0 - config.thrust_curve + config.thrust_curve * share.array());
+}
+
 Eigen::Quaterniond Turned(const Eigen::Quaterniond& q, const Vector3d& rotation) {
   const double angle = rotation.norm();
   if (angle < 1e-12) return q;
@@ -45,13 +52,15 @@ std::string VehicleConfig::Problem() const {
   if (!(motor_lag >= 0.002)) return "motor_lag is below 0.002 s, two steps of the simulation";
   if (!(max_thrust > kGravity)) return "max_thrust is not above gravity, 9.81 m/s^2";
   if (!(std::abs(thrust_error) < 0.5)) return "thrust_error is not within -0.5 to 0.5";
+  if (!(std::abs(thrust_curve) < 0.5)) return "thrust_curve is not within -0.5 to 0.5";
+  if (!(std::abs(mass_error) < 0.5)) return "mass_error is not within -0.5 to 0.5";
   if (!(drag.minCoeff() >= 0.0)) return "drag is below 0 1/s";
   if (!(leg_height > 0.0 && leg_spread > 0.0)) return "leg_height or leg_spread is not above 0 m";
   return "";
 }
 
 double StandingHeight(const VehicleConfig& config) {
-  return config.leg_height - config.mass * kGravity / (4.0 * kLegStiffness);
+  return config.leg_height - config.TrueMass() * kGravity / (4.0 * kLegStiffness);
 }
 
 Quadrotor::Quadrotor(const VehicleConfig& config, const BodyState& start, Ground ground)
@@ -70,7 +79,7 @@ Vector4d Quadrotor::Mix(const Wrench& wanted) const {
 }
 
 Quadrotor::Load Quadrotor::MotorLoad() const {
-  const Vector4d f = (1.0 + config_.thrust_error) * motors_;
+  const Vector4d f = (1.0 + config_.thrust_error) * TrueThrusts(config_, motors_);
   const double distance = config_.arm / std::sqrt(2.0);
   return {state_.q * Vector3d(0.0, 0.0, f.sum()),
           Vector3d(distance * kLeft.dot(f), -distance * kFront.dot(f),
@@ -101,9 +110,10 @@ void Quadrotor::Step(const Wrench& wanted, const Vector3d& wind, double dt) {
   motors_ += (1.0 - std::exp(-dt / config_.motor_lag)) * (Mix(wanted) - motors_);
   Load load = MotorLoad();
   const Vector3d air_B = state_.q.conjugate() * (state_.v - wind);
-  load.force -= config_.mass * (state_.q * config_.drag.cwiseProduct(air_B));
+  const double mass = config_.TrueMass();
+  load.force -= mass * (state_.q * config_.drag.cwiseProduct(air_B));
   AddLegs(&load);
-  state_.a = load.force / config_.mass - Vector3d(0.0, 0.0, kGravity);
+  state_.a = load.force / mass - Vector3d(0.0, 0.0, kGravity);
   state_.p += dt * state_.v + 0.5 * dt * dt * state_.a;
   state_.v += dt * state_.a;
   const Vector3d spin = state_.w.cross(config_.inertia.cwiseProduct(state_.w));

@@ -17,7 +17,7 @@ struct VehicleConfig {
   double torque_ratio = 0.016;
   double motor_lag = 0.03;
   double max_thrust = 22.0;
-  double thrust_error = -0.02;
+  double thrust_error = -0.02, thrust_curve = 0.0, mass_error = 0.0;
   Eigen::Vector3d drag = {0.25, 0.25, 0.15};
   double leg_height = 0.12;
   double leg_spread = 0.12;
@@ -31,10 +31,14 @@ struct VehicleConfig {
     v("motor_lag", motor_lag, "time constant, s");
     v("max_thrust", max_thrust, "of all motors over mass, m/s^2");
     v("thrust_error", thrust_error, "true over commanded thrust, minus 1");
+    v("thrust_curve", thrust_curve,
+      "a motor asked for the share u of its most gives (1 - this) u + this u^2; 0: linear");
+    v("mass_error", mass_error, "true mass over `mass`, which scales the commands, minus 1");
     v("drag", drag, "linear, over mass, frame B, 1/s");
     v("leg_height", leg_height, "of the body's origin when standing, m");
     v("leg_spread", leg_spread, "feet at +-this in x and y, m");
   }
+  double TrueMass() const { return mass * (1.0 + mass_error); }  ///< kg
   std::string Problem() const;
 };
 

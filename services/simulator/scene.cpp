@@ -19,6 +19,7 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 using world::Solid;
 
+constexpr std::size_t kTargetInstance = 1;
 constexpr int kFine = 48, kCoarse = 20;  // edges around a solid
 constexpr double kMargin = 110.0;        // m of ground beyond what stands on it
 constexpr double kRoughMargin = 40.0;
@@ -95,6 +96,13 @@ void Fill(const RayPacket& rays, RTCRayHit8* out) {
     out->ray.flags[i] = 0;
     out->hit.geomID[i] = out->hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
   }
+}
+
+/// Into the axes of what is turned by an angle with this cosine and sine.
+void TurnBack(const Eigen::Vector2f& turn, float* x, float* y) {
+  const Eigen::Vector2f v(*x, *y);
+  *x = turn.x() * v.x() + turn.y() * v.y();
+  *y = turn.x() * v.y() - turn.y() * v.x();
 }
 
 }  // namespace
@@ -229,11 +237,14 @@ void Scene::TraceTargetAlone(const RayPacket& rays, bool* hits) const {
   alignas(32) RTCRayHit8 work;
   Fill(rays, &work);
   const Eigen::Vector3f center = impl_->target_center.cast<float>();
+  const Eigen::Vector2f turn = impl_->turns[kTargetInstance].cast<float>();
   for (int i = 0; i < 8; ++i) {
     valid[i] = i < rays.count ? -1 : 0;
     work.ray.org_x[i] -= center.x();
     work.ray.org_y[i] -= center.y();
     work.ray.org_z[i] -= center.z();
+    TurnBack(turn, &work.ray.org_x[i], &work.ray.org_y[i]);
+    TurnBack(turn, &work.ray.dir_x[i], &work.ray.dir_y[i]);
   }
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
