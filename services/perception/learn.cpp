@@ -106,19 +106,24 @@ std::vector<std::string> LearnShape(const std::vector<cv::Mat>& images,
   return shapeless;
 }
 
+double Overlap(const ColorDetector& detector, const cv::Mat& bgr, const cv::Mat& mask) {
+  const auto found = detector.Detect(bgr);
+  if (found.empty()) return 0.0;
+  return Overlap(Region(found.front()), found.front().mask_box, mask);
+}
+
 double MeanOverlap(const std::vector<cv::Mat>& images, const std::vector<cv::Mat>& masks,
                    const DetectorConfig& config) {
+  const ColorDetector detector(config, 1.0);
   double sum = 0.0;
-  for (size_t i = 0; i < images.size(); ++i) sum += Overlap(config, images[i], masks[i]);
+  for (size_t i = 0; i < images.size(); ++i) sum += Overlap(detector, images[i], masks[i]);
   return sum / static_cast<double>(images.size());
 }
 
 }  // namespace
 
 double Overlap(const DetectorConfig& config, const cv::Mat& bgr, const cv::Mat& mask) {
-  const auto found = ColorDetector(config, 1.0).Detect(bgr);
-  if (found.empty()) return 0.0;
-  return Overlap(Region(found.front()), found.front().mask_box, mask);
+  return Overlap(ColorDetector(config, 1.0), bgr, mask);
 }
 
 Learned LearnDetector(const std::vector<cv::Mat>& images, const std::vector<cv::Mat>& masks,
