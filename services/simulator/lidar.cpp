@@ -44,6 +44,14 @@ float Reflectivity(Material material) {
   return 0.0f;
 }
 
+/// Cosine between ray i and the normal where it hits.
+float Incidence(const RayPacket& rays, const HitPacket& hits, int i) {
+  const Vector3f normal(hits.nx[i], hits.ny[i], hits.nz[i]);
+  const Vector3f d(rays.dx[i], rays.dy[i], rays.dz[i]);
+  const float length = normal.norm();
+  return length > 0.0f ? std::abs(normal.dot(d)) / length : 0.0f;
+}
+
 }  // namespace
 
 std::string LidarConfig::Problem() const {
@@ -79,50 +87,58 @@ Lidar::Lidar(const LidarConfig& config, const world::Rig& rig, uint64_t seed)
       directions_.push_back(LaserDirection(firing, ring).cast<float>());
 }
 
-double Lidar::FiringTime() const {
-  return static_cast<double>(sweep_index_) / config_.rate + firing_ * kFiringPeriod;
+double Lidar::FiringTime(int firing) const {
+  return static_cast<double>(sweep_index_) / config_.rate + firing * kFiringPeriod;
 }
 
 void Lidar::Advance(const std::vector<TimedPose>& poses, const Scene& scene) {
   if (config_.rate <= 0.0 || poses.size() < 2) return;
   std::size_t i = 0;
-  for (double t = FiringTime(); t < poses.back().t; t = FiringTime()) {
-    while (i + 2 < poses.size() && poses[i + 1].t <= t) ++i;
-    if (firing_ == 0) sweep_.start = t;
-    Fire(Interpolated(poses[i], poses[i + 1], t), scene);
-    if (++firing_ < kFirings) continue;
+  while (FiringTime(firing_) < poses.back().t) {
+    if (firing_ == 0) sweep_.start = FiringTime(0);
+    TimedPose bodies[8];
+    int n = 0;
+    for (; n < std::min(8, kFirings - firing_); ++n) {
+      const double t = FiringTime(firing_ + n);
+      if (!(t < poses.back().t)) break;
+      while (i + 2 < poses.size() && poses[i + 1].t <= t) ++i;
+      bodies[n] = Interpolated(poses[i], poses[i + 1], t);
+    }
+    Fire(bodies, n, scene);
+    if (firing_ < kFirings) continue;
     complete_ = std::exchange(sweep_, Sweep{});
     firing_ = 0;
     ++sweep_index_;
   }
 }
 
-void Lidar::Fire(const TimedPose& body, const Scene& scene) {
-  const Vector3f origin = (body.p + body.q * p_BL_).cast<float>();
-  const Eigen::Matrix3f R_WL = (body.q * q_BL_).toRotationMatrix().cast<float>();
-  const Vector3f* directions = &directions_[static_cast<std::size_t>(firing_ * kRings)];
-  for (int first = 0; first < kRings; first += 8) {
-    RayPacket rays;
-    for (int i = 0; i < 8; ++i) {
-      const Vector3f d = R_WL * directions[first + i];
-      rays.ox[i] = origin.x(), rays.oy[i] = origin.y(), rays.oz[i] = origin.z();
-      rays.dx[i] = d.x(), rays.dy[i] = d.y(), rays.dz[i] = d.z();
-    }
-    HitPacket hits;
-    scene.Trace(rays, &hits);
-    for (int i = 0; i < 8; ++i) {
-      const Vector3f normal(hits.nx[i], hits.ny[i], hits.nz[i]);
-      const Vector3f d(rays.dx[i], rays.dy[i], rays.dz[i]);
-      const float length = normal.norm();
-      const float incidence = length > 0.0f ? std::abs(normal.dot(d)) / length : 0.0f;
-      Record(first + i, hits.distance[i], incidence, hits.material[i]);
+/// Fires n sequences, at most eight. A packet is one ring's rays of all of them: they lie closer
+/// together than the rings of one.
+void Lidar::Fire(const TimedPose* bodies, int n, const Scene& scene) {
+  RayPacket rays[kRings];
+  HitPacket hits[kRings];
+  for (RayPacket& packet : rays) packet.count = n;
+  for (int i = 0; i < n; ++i) {
+    const Vector3f origin = (bodies[i].p + bodies[i].q * p_BL_).cast<float>();
+    const Eigen::Matrix3f R_WL = (bodies[i].q * q_BL_).toRotationMatrix().cast<float>();
+    const Vector3f* directions = &directions_[static_cast<std::size_t>((firing_ + i) * kRings)];
+    for (int ring = 0; ring < kRings; ++ring) {
+      const Vector3f d = R_WL * directions[ring];
+      RayPacket& packet = rays[ring];
+      packet.ox[i] = origin.x(), packet.oy[i] = origin.y(), packet.oz[i] = origin.z();
+      packet.dx[i] = d.x(), packet.dy[i] = d.y(), packet.dz[i] = d.z();
     }
   }
+  for (int ring = 0; ring < kRings; ring += kMostPackets)
+    scene.Trace(&rays[ring], kMostPackets, &hits[ring]);
+  for (int i = 0; i < n; ++i, ++firing_)
+    for (int ring = 0; ring < kRings; ++ring) Record(ring, rays[ring], hits[ring], i);
 }
 
-/// One draw of noise and one of loss for every laser, hit or not, so that what is seen does not
-/// shift the numbers of the lasers after it.
-void Lidar::Record(int ring, float range, float incidence, Material material) {
+/// Of ray i of a ring. One draw of noise and one of loss for every laser, hit or not, so that what
+/// is seen does not shift the numbers of the lasers after it.
+void Lidar::Record(int ring, const RayPacket& rays, const HitPacket& hits, int i) {
+  const float range = hits.distance[i];
   const double noise = config_.noise * random_.Gaussian();
   const bool lost = random_.Uniform() < config_.dropout;
   if (lost || !(range >= config_.min_range && range <= config_.max_range)) return;
@@ -133,7 +149,7 @@ void Lidar::Record(int ring, float range, float incidence, Material material) {
   sweep_.y.push_back(p.y());
   sweep_.z.push_back(p.z());
   sweep_.t.push_back(static_cast<float>(firing_ * kFiringPeriod + LaserDelay(ring)));
-  const float intensity = Reflectivity(material) * (0.3f + 0.7f * incidence);
+  const float intensity = Reflectivity(hits.material[i]) * (0.3f + 0.7f * Incidence(rays, hits, i));
   sweep_.intensity.push_back(static_cast<uint8_t>(std::clamp(intensity, 1.0f, 255.0f)));
   sweep_.ring.push_back(static_cast<uint8_t>(ring));
 }

@@ -72,9 +72,9 @@ class Lidar {
   std::optional<Sweep> Take();
 
  private:
-  double FiringTime() const;
-  void Fire(const TimedPose& body, const Scene& scene);
-  void Record(int ring, float range, float incidence, Material material);
+  double FiringTime(int firing) const;
+  void Fire(const TimedPose* bodies, int n, const Scene& scene);
+  void Record(int ring, const RayPacket& rays, const HitPacket& hits, int i);
 
   LidarConfig config_;
   Eigen::Vector3d p_BL_;

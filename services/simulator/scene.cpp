@@ -24,10 +24,10 @@ constexpr int kFine = 48, kCoarse = 20;  // edges around a solid
 constexpr double kMargin = 110.0;        // m of ground beyond what stands on it
 constexpr double kRoughMargin = 40.0;
 
-/// Numbers of things that move are those of the world's instances; the static world is number 0.
 struct Instance {
   RTCGeometry geometry;
   Material material;
+  float cos_yaw = 1.0f, sin_yaw = 0.0f;
 };
 
 void Attach(RTCDevice device, RTCScene scene, const Mesh& mesh) {
@@ -72,16 +72,16 @@ Rectangle GroundExtent(const world::Scenario& scenario, const std::vector<Solid>
 }
 
 /// Column-major 3x4: turn by the yaw, then to the centre.
-void SetPlace(const Instance& instance, const Solid& solid) {
-  const float c = static_cast<float>(std::cos(solid.yaw));
-  const float s = static_cast<float>(std::sin(solid.yaw));
+void SetPlace(const Solid& solid, Instance* instance) {
+  const float c = instance->cos_yaw = static_cast<float>(std::cos(solid.yaw));
+  const float s = instance->sin_yaw = static_cast<float>(std::sin(solid.yaw));
   const Eigen::Vector3f p = solid.center.cast<float>();
   const float place[12] = {c, s, 0, -s, c, 0, 0, 0, 1, p.x(), p.y(), p.z()};
-  rtcSetGeometryTransform(instance.geometry, 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, place);
-  rtcCommitGeometry(instance.geometry);
+  rtcSetGeometryTransform(instance->geometry, 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, place);
+  rtcCommitGeometry(instance->geometry);
 }
 
-void Fill(const RayPacket& rays, RTCRayHit8* out) {
+void Fill(const RayPacket& rays, int* valid, RTCRayHit8* out) {
   std::memcpy(out->ray.org_x, rays.ox, sizeof rays.ox);
   std::memcpy(out->ray.org_y, rays.oy, sizeof rays.oy);
   std::memcpy(out->ray.org_z, rays.oz, sizeof rays.oz);
@@ -90,7 +90,8 @@ void Fill(const RayPacket& rays, RTCRayHit8* out) {
   std::memcpy(out->ray.dir_z, rays.dz, sizeof rays.dz);
   for (int i = 0; i < 8; ++i) {
     out->ray.tnear[i] = out->ray.time[i] = 0.0f;
-    out->ray.tfar[i] = std::numeric_limits<float>::infinity();
+    valid[i] = i < rays.count ? -1 : 0;
+    out->ray.tfar[i] = valid[i] ? std::numeric_limits<float>::infinity() : -1.0f;
     out->ray.mask[i] = ~0u;
     out->ray.id[i] = static_cast<unsigned>(i);
     out->ray.flags[i] = 0;
@@ -116,22 +117,20 @@ struct Scene::Impl {
   void BuildMoving();
   void AddInstance(RTCScene part, Material material);
   RTCScene MovingPart(const Solid& solid);
-  Material HitMaterial(unsigned instance, unsigned geometry) const;
+  void Read(const RTCRayHit8& work, HitPacket* hits) const;
 
   world::Scenario scenario;
   Actors actors;
   RTCDevice device = nullptr;
-  RTCScene top = nullptr, target = nullptr;
+  RTCScene fixed = nullptr, moving = nullptr, target = nullptr;
   std::vector<RTCScene> parts;
   std::vector<Instance> instances;
   std::vector<Material> static_materials;
-  std::vector<Vector2d> turns;  // cos, sin of each instance's yaw
   Vector3d target_center = Vector3d::Zero();
 };
 
 Scene::Impl::~Impl() {
   for (auto& instance : instances) rtcReleaseGeometry(instance.geometry);
-  if (top) rtcReleaseScene(top);
   for (auto part : parts) rtcReleaseScene(part);
   if (device) rtcReleaseDevice(device);
 }
@@ -140,25 +139,22 @@ void Scene::Impl::AddInstance(RTCScene part, Material material) {
   RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_INSTANCE);
   rtcSetGeometryInstancedScene(geometry, part);
   instances.push_back({geometry, material});
-  turns.emplace_back(1.0, 0.0);
-  SetPlace(instances.back(), Solid{});
-  rtcAttachGeometry(top, geometry);
+  rtcAttachGeometry(moving, geometry);
 }
 
 void Scene::Impl::BuildStatic() {
   const auto solids = world::StaticSolids(scenario);
-  const RTCScene part = NewScene();
+  fixed = NewScene();
   const Rectangle extent = GroundExtent(scenario, solids);
-  Attach(device, part, GroundMesh(scenario.world.ground, extent.min, extent.max));
+  Attach(device, fixed, GroundMesh(scenario.world.ground, extent.min, extent.max));
   static_materials.push_back(Material::kGround);
   for (std::size_t i = 0; i < solids.size(); ++i) {
     const Material material = StaticMaterial(scenario.world, i, solids[i]);
     const bool tree = material == Material::kCrown || material == Material::kTrunk;
-    Attach(device, part, Placed(SolidMesh(solids[i], tree ? kCoarse : kFine), solids[i]));
+    Attach(device, fixed, Placed(SolidMesh(solids[i], tree ? kCoarse : kFine), solids[i]));
     static_materials.push_back(material);
   }
-  rtcCommitScene(part);
-  AddInstance(part, Material::kNothing);
+  rtcCommitScene(fixed);
 }
 
 RTCScene Scene::Impl::MovingPart(const Solid& solid) {
@@ -169,6 +165,9 @@ RTCScene Scene::Impl::MovingPart(const Solid& solid) {
 }
 
 void Scene::Impl::BuildMoving() {
+  moving = NewScene();
+  rtcSetSceneFlags(moving, RTC_SCENE_FLAG_DYNAMIC);
+  rtcSetSceneBuildQuality(moving, RTC_BUILD_QUALITY_LOW);
   const TargetState state = actors.Target(0.0);
   target = MovingPart(state.cylinder);
   AddInstance(target, Material::kTarget);
@@ -177,18 +176,27 @@ void Scene::Impl::BuildMoving() {
     AddInstance(MovingPart(mover.solid), Material::kMover);
 }
 
-Material Scene::Impl::HitMaterial(unsigned instance, unsigned geometry) const {
-  if (geometry == RTC_INVALID_GEOMETRY_ID) return Material::kNothing;
-  return instance == 0 ? static_materials[geometry] : instances[instance].material;
+/// Only a hit on what moves names an instance.
+void Scene::Impl::Read(const RTCRayHit8& work, HitPacket* hits) const {
+  static const Instance kFixed{nullptr, Material::kNothing};
+  for (int i = 0; i < 8; ++i) {
+    const unsigned number = work.hit.instID[0][i], geometry = work.hit.geomID[i];
+    const bool hit = geometry != RTC_INVALID_GEOMETRY_ID;
+    const bool moves = hit && number != RTC_INVALID_GEOMETRY_ID;
+    const Instance& instance = moves ? instances[number] : kFixed;
+    hits->material[i] = moves || !hit ? instance.material : static_materials[geometry];
+    hits->distance[i] = hit ? work.ray.tfar[i] : std::numeric_limits<float>::infinity();
+    const float c = instance.cos_yaw, s = instance.sin_yaw;
+    hits->nx[i] = c * work.hit.Ng_x[i] - s * work.hit.Ng_y[i];
+    hits->ny[i] = s * work.hit.Ng_x[i] + c * work.hit.Ng_y[i];
+    hits->nz[i] = work.hit.Ng_z[i];
+  }
 }
 
 Scene::Scene(const world::Scenario& scenario) : impl_(std::make_unique<Impl>(scenario)) {
   impl_->device = rtcNewDevice("threads=1,isa=avx2");
   if (!impl_->device)
     throw std::runtime_error("simulator: Embree gives no device; a processor with AVX2 is needed");
-  impl_->top = rtcNewScene(impl_->device);
-  rtcSetSceneFlags(impl_->top, RTC_SCENE_FLAG_DYNAMIC);
-  rtcSetSceneBuildQuality(impl_->top, RTC_BUILD_QUALITY_LOW);
   impl_->BuildStatic();
   impl_->BuildMoving();
   MoveTo(0.0);
@@ -202,44 +210,35 @@ void Scene::MoveTo(double t) {
   solids.push_back(target.cylinder);
   if (target.has_carrier) solids.push_back(target.carrier);
   for (const auto& mover : impl_->actors.Movers(t)) solids.push_back(mover.solid);
-  for (std::size_t i = 0; i < solids.size(); ++i) {
-    SetPlace(impl_->instances[i + 1], solids[i]);
-    impl_->turns[i + 1] = {std::cos(solids[i].yaw), std::sin(solids[i].yaw)};
-  }
+  for (std::size_t i = 0; i < solids.size(); ++i) SetPlace(solids[i], &impl_->instances[i]);
   impl_->target_center = target.center;
-  rtcCommitScene(impl_->top);
+  rtcCommitScene(impl_->moving);
 }
 
-void Scene::Trace(const RayPacket& rays, HitPacket* hits) const {
-  alignas(32) int valid[8];
-  for (int i = 0; i < 8; ++i) valid[i] = i < rays.count ? -1 : 0;
-  alignas(32) RTCRayHit8 work;
-  Fill(rays, &work);
+/// What moves is nearly always missed, which the packets find out together; what is fixed they meet
+/// in different places.
+void Scene::Trace(const RayPacket* rays, int n, HitPacket* hits) const {
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
   context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
-  rtcIntersect8(valid, impl_->top, &context, &work);
-  for (int i = 0; i < 8; ++i) {
-    const unsigned instance = work.hit.instID[0][i];
-    hits->material[i] = impl_->HitMaterial(instance, work.hit.geomID[i]);
-    const bool hit = hits->material[i] != Material::kNothing;
-    hits->distance[i] = hit ? work.ray.tfar[i] : std::numeric_limits<float>::infinity();
-    const Vector2d turn = hit ? impl_->turns[instance] : Vector2d(1.0, 0.0);
-    const float c = static_cast<float>(turn.x()), s = static_cast<float>(turn.y());
-    hits->nx[i] = c * work.hit.Ng_x[i] - s * work.hit.Ng_y[i];
-    hits->ny[i] = s * work.hit.Ng_x[i] + c * work.hit.Ng_y[i];
-    hits->nz[i] = work.hit.Ng_z[i];
+  RTCRayHit8 work[kMostPackets];
+  for (int k = 0; k < n; ++k) {
+    alignas(32) int valid[8];
+    Fill(rays[k], valid, &work[k]);
+    rtcIntersect8(valid, impl_->fixed, &context, &work[k]);
   }
+  rtcIntersectNM(impl_->moving, &context, reinterpret_cast<RTCRayHitN*>(work), 8,
+                 static_cast<unsigned>(n), sizeof(RTCRayHit8));
+  for (int k = 0; k < n; ++k) impl_->Read(work[k], &hits[k]);
 }
 
 void Scene::TraceTargetAlone(const RayPacket& rays, bool* hits) const {
   alignas(32) int valid[8];
   alignas(32) RTCRayHit8 work;
-  Fill(rays, &work);
+  Fill(rays, valid, &work);
   const Eigen::Vector3f center = impl_->target_center.cast<float>();
   const Eigen::Vector2f turn = impl_->turns[kTargetInstance].cast<float>();
   for (int i = 0; i < 8; ++i) {
-    valid[i] = i < rays.count ? -1 : 0;
     work.ray.org_x[i] -= center.x();
     work.ray.org_y[i] -= center.y();
     work.ray.org_z[i] -= center.z();

@@ -28,6 +28,9 @@ struct RayPacket {
   int count = 8;
 };
 
+/// As many packets may travel together.
+inline constexpr int kMostPackets = 4;
+
 /// First hits; distances in multiples of the direction's length.
 struct HitPacket {
   alignas(32) float distance[8];          ///< infinity: nothing
@@ -35,8 +38,8 @@ struct HitPacket {
   Material material[8];
 };
 
-/// The world as triangles under Embree: everything static in one structure, and one instance for
-/// each thing that moves.
+/// The world as triangles under Embree: everything static in one structure, and in another an
+/// instance for each thing that moves.
 class Scene {
  public:
   explicit Scene(const world::Scenario& scenario);
@@ -44,7 +47,9 @@ class Scene {
 
   /// Moves the target and the movers to mission time t [s].
   void MoveTo(double t);
-  void Trace(const RayPacket& rays, HitPacket* hits) const;
+  void Trace(const RayPacket& rays, HitPacket* hits) const { Trace(&rays, 1, hits); }
+  /// Traces n packets, at most kMostPackets; neighbours share the way through the structures.
+  void Trace(const RayPacket* rays, int n, HitPacket* hits) const;
   /// True per ray that hits the target's cylinder where nothing else stands in the world.
   void TraceTargetAlone(const RayPacket& rays, bool* hits) const;
 
