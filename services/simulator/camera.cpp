@@ -16,7 +16,8 @@ constexpr double kPi = 3.14159265358979323846;
 constexpr std::size_t kNoiseSamples = 1 << 16;
 
 uint8_t ToByte(float value) {
-  return static_cast<uint8_t>(std::clamp(255.0f * value + 0.5f, 0.0f, 255.0f));
+  return static_cast<uint8_t>(
+      static_cast<int>(std::min(255.0f, std::max(0.0f, 255.0f * value + 0.5f))));
 }
 
 }  // namespace
@@ -40,6 +41,8 @@ Camera::Camera(const CameraConfig& config, const world::Rig& rig, const Vector3d
   for (std::size_t i = 0; i < kNoiseSamples; ++i)
     noise_.push_back(static_cast<int8_t>(
         std::lround(std::clamp(config_.noise * random_.Gaussian(), -127.0, 127.0))));
+  const std::size_t row = static_cast<std::size_t>(3 * rig_.width_px);
+  for (std::size_t i = 0; i < row; ++i) noise_.push_back(noise_[i]);  // a row runs over the end
   phase_ = random_.Uniform(0.0, 2.0 * kPi);
 }
 
@@ -65,26 +68,29 @@ RayPacket Camera::Rays(int row, int column) const {
   return rays;
 }
 
-/// Light that comes back along ray i, before the exposure.
-Vector3f Camera::Color(const RayPacket& rays, const HitPacket& hits, int i) const {
-  const Vector3f d(rays.dx[i], rays.dy[i], rays.dz[i]);
-  if (hits.material[i] == Material::kNothing) return Sky(d.normalized());
-  const Vector3f p = Vector3f(rays.ox[i], rays.oy[i], rays.oz[i]) + hits.distance[i] * d;
-  const Vector3f n = Vector3f(hits.nx[i], hits.ny[i], hits.nz[i]).normalized();
-  return Lambert(n) * Albedo(hits.material[i], p, n, target_color_);
+/// Eight pixels of a row as bytes.
+void Camera::Expose(const RayPacket& rays, const HitPacket& hits, uint8_t* out) {
+  LightPacket light;
+  Shade(rays, hits, target_color_, &light);
+  uint8_t bytes[3][8];
+  const float brightness = brightness_;
+  for (int k = 0; k < 3; ++k)
+    for (int i = 0; i < 8; ++i) bytes[k][i] = ToByte(brightness * light.rgb[k][i]);
+  for (int i = 0; i < rays.count; ++i)
+    for (int k = 0; k < 3; ++k) *out++ = bytes[k][i];
+  visible_px_ += std::count(hits.material, hits.material + rays.count, Material::kTarget);
 }
 
-void Camera::TraceRow(int row, const Scene& scene, Image* image) {
-  uint8_t* out = &image->rgb[static_cast<std::size_t>(3 * row * rig_.width_px)];
-  for (int column = 0; column < rig_.width_px; column += 8) {
-    const RayPacket rays = Rays(row, column);
-    HitPacket hits;
-    scene.Trace(rays, &hits);
-    for (int i = 0; i < rays.count; ++i) {
-      const Vector3f color = brightness_ * Color(rays, hits, i);
-      for (int k = 0; k < 3; ++k) *out++ = ToByte(color[k]);
-      visible_px_ += hits.material[i] == Material::kTarget;
-    }
+/// Eight columns of a few rows.
+void Camera::TraceTile(int row, int column, const Scene& scene, Image* image) {
+  const int rows = std::min(kMostPackets, rig_.height_px - row);
+  RayPacket rays[kMostPackets];
+  HitPacket hits[kMostPackets];
+  for (int k = 0; k < rows; ++k) rays[k] = Rays(row + k, column);
+  scene.Trace(rays, rows, hits);
+  for (int k = 0; k < rows; ++k) {
+    const int pixel = (row + k) * rig_.width_px + column;
+    Expose(rays[k], hits[k], &image->rgb[static_cast<std::size_t>(3 * pixel)]);
   }
 }
 
@@ -99,7 +105,8 @@ Image Camera::Render(const Vector3d& p_WB, const Eigen::Quaterniond& q_WB, doubl
   image.exposure = config_.exposure;
   image.rgb.resize(static_cast<std::size_t>(3 * rig_.width_px * rig_.height_px));
   visible_px_ = 0;
-  for (int row = 0; row < rig_.height_px; ++row) TraceRow(row, scene, &image);
+  for (int row = 0; row < rig_.height_px; row += kMostPackets)
+    for (int column = 0; column < rig_.width_px; column += 8) TraceTile(row, column, scene, &image);
   alone_px_ = CountAlone(scene);
   AddNoise(&image);
   return image;
@@ -129,9 +136,9 @@ void Camera::AddNoise(Image* image) {
   const std::size_t stride = static_cast<std::size_t>(3 * image->width);
   for (int row = 0; row < image->height; ++row) {
     uint8_t* values = &image->rgb[static_cast<std::size_t>(row) * stride];
-    const std::size_t shift = random_.Next() % kNoiseSamples;
+    const int8_t* noise = &noise_[random_.Next() % kNoiseSamples];
     for (std::size_t i = 0; i < stride; ++i) {
-      const int value = values[i] + noise_[(shift + i) % kNoiseSamples];
+      const int value = values[i] + noise[i];
       values[i] = static_cast<uint8_t>(std::clamp(value, 0, 255));
     }
   }

@@ -60,8 +60,8 @@ class Camera {
   TargetView View() const;
 
  private:
-  Eigen::Vector3f Color(const RayPacket& rays, const HitPacket& hits, int i) const;
-  void TraceRow(int row, const Scene& scene, Image* image);
+  void TraceTile(int row, int column, const Scene& scene, Image* image);
+  void Expose(const RayPacket& rays, const HitPacket& hits, uint8_t* out);
   double NextBrightness(double t);
   RayPacket Rays(int row, int column) const;
   long CountAlone(const Scene& scene) const;
@@ -71,7 +71,7 @@ class Camera {
   world::Rig rig_;
   Eigen::Vector3f target_color_;
   world::Random random_;
-  std::vector<int8_t> noise_;  // samples of the noise, drawn from at random places
+  std::vector<int8_t> noise_;  // samples of the noise, a row of them from a random place
   double phase_ = 0.0;
 
   // The last frame.

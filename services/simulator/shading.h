@@ -6,14 +6,16 @@
 
 namespace chase::simulator {
 
-/// Reflectance r g b, 0 to 1, of a surface at p [m, frame W] with unit normal n.
-Eigen::Vector3f Albedo(Material material, const Eigen::Vector3f& p, const Eigen::Vector3f& n,
-                       const Eigen::Vector3f& target_color);
+/// Light along eight rays, red, green and blue; 1: white in full light.
+struct LightPacket {
+  alignas(32) float rgb[3][8];
+};
+
+/// Light that comes back along the rays: procedural textures under Lambert's law, or the sky.
+void Shade(const RayPacket& rays, const HitPacket& hits, const Eigen::Vector3f& target_color,
+           LightPacket* light);
 
 /// Share of light that a surface with unit normal n sends back: ambient and one sun, Lambert's law.
 float Lambert(const Eigen::Vector3f& n);
-
-/// Sky in a unit direction.
-Eigen::Vector3f Sky(const Eigen::Vector3f& direction);
 
 }  // namespace chase::simulator

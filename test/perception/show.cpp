@@ -121,6 +121,8 @@ void Show::PaintOne(const Solid& solid, const Stage::Body& body, simulator::Imag
       const auto rays = Rays(rig_, body, row, column, std::min(8, box.br().x - column));
       simulator::HitPacket hits;
       scene_.Trace(rays, &hits);
+      simulator::LightPacket light;
+      simulator::Shade(rays, hits, kOrange, &light);
       for (int i = 0; i < rays.count; ++i) {
         if (hits.material[i] != simulator::Material::kPillar &&
             hits.material[i] != simulator::Material::kBox &&
@@ -134,7 +136,7 @@ void Show::PaintOne(const Solid& solid, const Stage::Body& body, simulator::Imag
         uint8_t* rgb = &image->rgb[static_cast<size_t>(3 * (row * image->width + column + i))];
         spots.push_back({rgb, lambert});
         seen += rgb[1];
-        expected += 255.0 * lambert * simulator::Albedo(hits.material[i], p, n, kOrange).y();
+        expected += 255.0 * light.rgb[1][i];
       }
     }
   if (spots.empty()) return;
