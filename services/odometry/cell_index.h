@@ -1,19 +1,19 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <cmath>
 #include <cstdint>
 #include <vector>
 
 namespace chase::odometry {
 
-/// The cube of edge 1/inverse_size that holds p, as one number: 21 bits per axis.
-inline uint64_t CellKey(const Eigen::Vector3f& p, float inverse_size) {
+/// The unit cube that holds u, as one number: 21 bits per axis.
+inline uint64_t CellKey(const Eigen::Vector3f& u) {
   const auto cell = [](float x) {
-    return static_cast<uint64_t>(static_cast<int64_t>(std::floor(x)) + (1 << 20)) & 0x1fffffu;
+    const int64_t truncated = static_cast<int64_t>(x);  // rounded down without a call
+    const int64_t floor = truncated - (x < static_cast<float>(truncated) ? 1 : 0);
+    return static_cast<uint64_t>(floor + (1 << 20)) & 0x1fffffu;
   };
-  return cell(p.x() * inverse_size) | cell(p.y() * inverse_size) << 21 |
-         cell(p.z() * inverse_size) << 42;
+  return cell(u.x()) | cell(u.y()) << 21 | cell(u.z()) << 42;
 }
 
 /// Numbers cells 0, 1, 2, ... in the order of their first appearance: an open-addressing hash table

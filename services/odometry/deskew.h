@@ -6,6 +6,27 @@
 
 namespace chase::odometry {
 
+/// A pose in single precision for many points.
+class FloatPose {
+ public:
+  explicit FloatPose(const Pose& X) {
+    columns_.setZero();
+    columns_.topLeftCorner<3, 3>() = X.R.toRotationMatrix().cast<float>();
+    columns_.topRightCorner<3, 1>() = X.p.cast<float>();
+  }
+
+  /// A column is one vector of the processor.
+  Eigen::Vector3f operator*(const Eigen::Vector3f& p) const {
+    const Eigen::Vector4f moved = columns_.col(0) * p.x() +
+                                  (columns_.col(1) * p.y() + columns_.col(2) * p.z()) +
+                                  columns_.col(3);
+    return moved.head<3>();
+  }
+
+ private:
+  Eigen::Matrix4f columns_;
+};
+
 /// The body's motion over a sweep, seen from the body at the sweep's end: poses X_EB(t) at evenly
 /// spaced times, E being the body frame at the end.
 class SweepMotion {
@@ -21,17 +42,12 @@ class SweepMotion {
   Eigen::Vector3f ToEnd(const Eigen::Vector3f& p_B, float t) const;
 
  private:
-  struct Knot {
-    Eigen::Matrix3f R;
-    Eigen::Vector3f p;
-  };
-  std::vector<Knot> knots_;
+  std::vector<FloatPose> knots_;
   float inverse_step_ = 1.0f;
 };
 
-/// The points at `indices` in the body frame at the sweep's end.
-std::vector<FeaturePoint> Deskewed(const std::vector<SweepPoint>& points,
-                                   const std::vector<int>& indices, const Pose& X_BL,
-                                   const SweepMotion& motion);
+/// The points of a sweep in the body frame at its end.
+std::vector<Eigen::Vector3f> Deskewed(const std::vector<SweepPoint>& points, const Pose& X_BL,
+                                      const SweepMotion& motion);
 
 }  // namespace chase::odometry

@@ -30,6 +30,19 @@ double LastTime(const std::vector<SweepPoint>& points) {
   return static_cast<double>(last);
 }
 
+std::vector<Eigen::Vector3f> Picked(const std::vector<Eigen::Vector3f>& points,
+                                    const std::vector<int>& indices) {
+  std::vector<Eigen::Vector3f> out;
+  out.reserve(indices.size());
+  for (int i : indices) out.push_back(points[static_cast<size_t>(i)]);
+  return out;
+}
+
+std::vector<Eigen::Vector3f> Moved(const FloatPose& X, std::vector<Eigen::Vector3f> points) {
+  for (Eigen::Vector3f& p : points) p = X * p;
+  return points;
+}
+
 /// Standard deviation of where points at a usual distance are predicted [m].
 double UncertaintyOf(const NavState& state) {
   constexpr double kUsualRange = 8.0;  // m
@@ -110,13 +123,14 @@ void Odometry::AddSweep(Sweep sweep) {
     ++dropped_sweeps_;
     return;
   }
-  pending_.push_back({std::move(sweep), imu_.newest()});
+  const double end = sweep.start + LastTime(sweep.points);
+  pending_.push_back({std::move(sweep), imu_.newest(), end});
 }
 
 bool Odometry::SweepReady() const {
   if (pending_.empty()) return false;
   if (!fused_ || pending_.size() > 1) return true;
-  const double end = pending_.front().sweep.start + LastTime(pending_.front().sweep.points);
+  const double end = pending_.front().end;
   return imu_.newest() >= end || imu_.newest() < end - kWaitForImu;
 }
 
@@ -175,29 +189,31 @@ bool Odometry::Prepare(Pending pending, Prepared* prepared) {
   prepared->track = {base_};
   prepared->predicted = base_;
   imu_.Advance(prepared->end, &prepared->predicted, &prepared->track);
+  Deskew(prepared);
   const double gap = prepared->end - health_.last_good_sweep();
   if (gap > kUsualGap) Doubt(config_.filter, gap, &prepared->predicted);
   return true;
 }
 
-SweepMotion Odometry::MotionOver(const Prepared& prepared) const {
-  const double length = prepared.end - prepared.sweep.start;
+void Odometry::Deskew(Prepared* prepared) const {
+  const double length = prepared->end - prepared->sweep.start;
   const int steps = std::max(1, static_cast<int>(std::ceil(length / kKnotStep)));
   const double step = std::max(length / steps, 1e-6);
-  return SweepMotion(PosesOver(prepared.track, prepared.sweep.start, step, steps + 1), step);
+  const SweepMotion motion(PosesOver(prepared->track, prepared->sweep.start, step, steps + 1),
+                           step);
+  prepared->at_end = Deskewed(prepared->sweep.points, X_BL_, motion);
 }
 
-Features Odometry::FeaturesIn(const Prepared& prepared, const SweepMotion& motion) const {
-  const auto& points = prepared.sweep.points;
-  return {Deskewed(points, prepared.matched_planes, X_BL_, motion),
-          Deskewed(points, prepared.features.edges, X_BL_, motion)};
+Features Odometry::FeaturesIn(const Prepared& prepared,
+                              const std::vector<Eigen::Vector3f>& points) {
+  return {Picked(points, prepared.matched_planes), Picked(points, prepared.features.edges)};
 }
 
 MatchResult Odometry::Match(Prepared* prepared) {
-  const Features features = FeaturesIn(*prepared, MotionOver(*prepared));
   if (planes_.cells() == 0) return {};
-  MatchResult match = matcher_.Match(features, planes_, edges_, prepared->predicted.pose(),
-                                     UncertaintyOf(prepared->predicted));
+  MatchResult match =
+      matcher_.Match(FeaturesIn(*prepared, prepared->at_end), planes_, edges_,
+                     prepared->predicted.pose(), UncertaintyOf(prepared->predicted));
   if (Blind(prepared->end)) MatchBlind(prepared, &match);
   return match;
 }
@@ -217,20 +233,15 @@ bool Odometry::Apply(const Prepared& prepared, const MatchResult& match) {
 }
 
 void Odometry::Learn(const Prepared& prepared, const Pose& X_WB) {
-  const SweepMotion motion = MotionOver(prepared);
-  const Eigen::Matrix3f R = X_WB.R.toRotationMatrix().cast<float>();
-  const Eigen::Vector3f p = X_WB.p.cast<float>();
   std::vector<int> planes;
   for (size_t i = 0; i < prepared.features.planes.size();
        i += static_cast<size_t>(config_.map_stride))
     planes.push_back(prepared.features.planes[i]);
-  const auto& points = prepared.sweep.points;
-  for (const FeaturePoint& point : Deskewed(points, planes, X_BL_, motion))
-    planes_.Add(R * point.p + p);
-  for (const FeaturePoint& point : Deskewed(points, prepared.features.edges, X_BL_, motion))
-    edges_.Add(R * point.p + p);
-  planes_.Prune(p);
-  edges_.Prune(p);
+  const FloatPose to_world(X_WB);
+  planes_.Add(Moved(to_world, Picked(prepared.at_end, planes)));
+  edges_.Add(Moved(to_world, Picked(prepared.at_end, prepared.features.edges)));
+  planes_.Prune(X_WB.p.cast<float>());
+  edges_.Prune(X_WB.p.cast<float>());
 }
 
 void Odometry::FollowDrift(const MatchResult& match) {
@@ -267,18 +278,19 @@ void Odometry::Catchup() {
 }
 
 RegisteredSweep Odometry::Registered(const Prepared& prepared) const {
+  const Pose X_WB = level_.ToWorld(base_.pose());
   RegisteredSweep out;
   out.t = prepared.end;
-  const Pose X_WB = level_.ToWorld(base_.pose());
   out.X_WL = X_WB * X_BL_;
-  const SweepMotion motion = MotionOver(prepared);
-  const Eigen::Matrix3f R_WB = X_WB.R.toRotationMatrix().cast<float>();
-  const Eigen::Vector3f p_WB = X_WB.p.cast<float>();
-  const Eigen::Matrix3f R_BL = X_BL_.R.toRotationMatrix().cast<float>();
-  const Eigen::Vector3f p_BL = X_BL_.p.cast<float>();
-  out.points = prepared.sweep.points;
-  for (SweepPoint& point : out.points)
-    point.p = R_WB * motion.ToEnd(R_BL * point.p + p_BL, point.t) + p_WB;
+  const FloatPose to_world(X_WB);
+  const size_t n = prepared.at_end.size();
+  out.x.resize(n), out.y.resize(n), out.z.resize(n), out.intensity.resize(n), out.ring.resize(n);
+  for (size_t i = 0; i < n; ++i) {
+    const Eigen::Vector3f p = to_world * prepared.at_end[i];
+    out.x[i] = p.x(), out.y[i] = p.y(), out.z[i] = p.z();
+    out.intensity[i] = prepared.sweep.points[i].intensity;
+    out.ring[i] = prepared.sweep.points[i].ring;
+  }
   return out;
 }
 

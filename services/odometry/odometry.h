@@ -32,7 +32,8 @@ struct RegisteredSweep {
   double t = 0.0;  ///< the sweep's end, s
   Pose X_WL;       ///< at that time
   Health health = Health::kOk;
-  std::vector<SweepPoint> points;  ///< p in frame W
+  std::vector<float> x, y, z;            ///< frame W, m
+  std::vector<uint8_t> intensity, ring;  ///< of the same points
 };
 
 struct SweepResult {
@@ -66,21 +67,23 @@ class Odometry {
   struct Pending {
     Sweep sweep;
     double imu_t;  // of the newest sample when the sweep came
+    double end;    // of the last return, usable or not
   };
   struct Prepared {
     Sweep sweep;
     double end = 0.0;
     FeatureSet features;
     std::vector<int> matched_planes;
-    NavState predicted;           // at the sweep's end
-    std::vector<NavState> track;  // from the last state to the sweep's end; for deskewing
+    NavState predicted;                   // at the sweep's end
+    std::vector<NavState> track;          // from the last state to the sweep's end; for deskewing
+    std::vector<Eigen::Vector3f> at_end;  // the points deskewed by the track: frame B at the end
   };
 
   std::optional<PoseEstimate> Align(const ImuSample& imu);
   void StartBlind(double t);
   bool Prepare(Pending pending, Prepared* prepared);
-  SweepMotion MotionOver(const Prepared& prepared) const;
-  Features FeaturesIn(const Prepared& prepared, const SweepMotion& motion) const;
+  void Deskew(Prepared* prepared) const;
+  static Features FeaturesIn(const Prepared& prepared, const std::vector<Eigen::Vector3f>& points);
   MatchResult Match(Prepared* prepared);
   void MatchBlind(Prepared* prepared, MatchResult* match);
   void Bootstrap(Prepared* prepared, MatchResult* match);

@@ -32,7 +32,7 @@ void Odometry::MatchBlind(Prepared* prepared, MatchResult* match) {
   if (!match->valid) return;
   if (first_) return Bootstrap(prepared, match);
   Bend(match->X_WB, prepared);
-  const Features features = FeaturesIn(*prepared, MotionOver(*prepared));
+  const Features features = FeaturesIn(*prepared, prepared->at_end);
   const MatchResult again = matcher_.Match(features, planes_, edges_, match->X_WB, kUnknown);
   if (again.valid) *match = again;
 }
@@ -48,11 +48,13 @@ void Odometry::Bootstrap(Prepared* prepared, MatchResult* match) {
     const double half = 0.5 * (first_->end - first_->sweep.start);
     const Pose end{initial.R * math::ExpSO3(half * w_B), initial.p + half * v};
     PlaceFirst(end, v, w_B);
-    const MatchResult raw = matcher_.Match(FeaturesIn(*first_, SweepMotion::Still()), planes_,
-                                           edges_, initial, kUnknown);
+    const auto still = Deskewed(first_->sweep.points, X_BL_, SweepMotion::Still());
+    const MatchResult raw =
+        matcher_.Match(FeaturesIn(*first_, still), planes_, edges_, initial, kUnknown);
     if (raw.valid) PlaceFirst(initial * raw.X_WB.Inverse() * end, v, w_B);
     prepared->track.front() = base_;
-    const Features features = FeaturesIn(*prepared, MotionOver(*prepared));
+    Deskew(prepared);
+    const Features features = FeaturesIn(*prepared, prepared->at_end);
     *match = matcher_.Match(features, planes_, edges_, match->X_WB, kUnknown);
   }
   first_.reset();
@@ -65,6 +67,7 @@ void Odometry::PlaceFirst(const Pose& X_WB, const Eigen::Vector3d& v, const Eige
   first_->track = {base_};
   first_->track.front().v = v;
   first_->track.front().w_B = w_B;
+  Deskew(&*first_);
   planes_.Clear();
   edges_.Clear();
   Learn(*first_, X_WB);
@@ -79,6 +82,7 @@ void Odometry::Bend(const Pose& X_WB, Prepared* prepared) const {
   to.p = X_WB.p;
   to.R_WB = X_WB.R;
   prepared->track = {from, to};
+  Deskew(prepared);
 }
 
 }  // namespace chase::odometry

@@ -38,21 +38,15 @@ pose_t ToMessage(const PoseEstimate& estimate, int64_t origin) {
   return m;
 }
 
-scan_registered_t ToMessage(const RegisteredSweep& sweep, int64_t origin) {
+scan_registered_t ToMessage(RegisteredSweep sweep, int64_t origin) {
   scan_registered_t m{};
   m.utime = bus::Utime(sweep.t, origin);
   bus::Set(m.pos, sweep.X_WL.p);
   bus::Set(m.orientation, sweep.X_WL.R);
   m.health = static_cast<int8_t>(sweep.health);
-  m.size = static_cast<int32_t>(sweep.points.size());
-  const size_t n = sweep.points.size();
-  m.x.resize(n), m.y.resize(n), m.z.resize(n), m.intensity.resize(n), m.ring.resize(n);
-  for (size_t i = 0; i < n; ++i) {
-    const SweepPoint& point = sweep.points[i];
-    m.x[i] = point.p.x(), m.y[i] = point.p.y(), m.z[i] = point.p.z();
-    m.intensity[i] = point.intensity;
-    m.ring[i] = point.ring;
-  }
+  m.size = static_cast<int32_t>(sweep.x.size());
+  m.x = std::move(sweep.x), m.y = std::move(sweep.y), m.z = std::move(sweep.z);
+  m.intensity = std::move(sweep.intensity), m.ring = std::move(sweep.ring);
   return m;
 }
 
@@ -93,7 +87,7 @@ void OdometryNode::ProcessSweeps() {
       result = odometry_.ProcessSweep();
     }
     if (result.pose) Publish(*result.pose);
-    if (result.registered) Publish(*result.registered);
+    if (result.registered) Publish(std::move(*result.registered));
   }
 }
 
@@ -102,8 +96,8 @@ void OdometryNode::Publish(const PoseEstimate& estimate) {
   bus_.Publish("POSE", ToMessage(estimate, origin_));
 }
 
-void OdometryNode::Publish(const RegisteredSweep& sweep) {
-  bus_.Publish("SCAN_REGISTERED", ToMessage(sweep, origin_));
+void OdometryNode::Publish(RegisteredSweep sweep) {
+  bus_.Publish("SCAN_REGISTERED", ToMessage(std::move(sweep), origin_));
 }
 
 bus::NodeReport OdometryNode::Report() const {

@@ -23,7 +23,7 @@ class OdometryNode : public bus::Node {
   void ProcessSweeps();
   double SecondsOf(int64_t utime);
   void Publish(const PoseEstimate& estimate);
-  void Publish(const RegisteredSweep& sweep);
+  void Publish(RegisteredSweep sweep);
 
   bus::Bus& bus_;
   Odometry odometry_;

@@ -11,7 +11,7 @@ namespace chase::odometry {
 
 /// Normal equations of one linearisation.
 struct ScanMatcher::System {
-  Matrix6d H = Matrix6d::Zero();
+  Matrix6d H = Matrix6d::Zero();  // only the lower half counts until all is added
   Vector6d b = Vector6d::Zero();
   double weight = 0.0;   // sum of the features' weights
   double squares = 0.0;  // weighted squares of the residuals
@@ -19,12 +19,41 @@ struct ScanMatcher::System {
   int matched = 0, inliers = 0, total = 0;
 
   void Add(double residual, double w, const Vector6d& J, double range2) {
-    H.selfadjointView<Eigen::Lower>().rankUpdate(J, w);
+    for (int i = 0; i < 6; ++i) H.col(i) += w * J[i] * J;
     b -= w * residual * J;
     weight += w;
     squares += w * residual * residual;
     lever2 += w * range2;
   }
+};
+
+/// Features and where each was last looked up: the map does not change during a match, so a feature
+/// that stays within reach of that place keeps its surface.
+class ScanMatcher::Matched {
+ public:
+  Matched(const std::vector<Eigen::Vector3f>& points, const SurfaceMap& map)
+      : points_(points), map_(map), found_(points.size()) {}
+
+  const std::vector<Eigen::Vector3f>& points() const { return points_; }
+
+  const Surface* At(size_t i, const Eigen::Vector3f& p_W) {
+    Found& found = found_[i];
+    if (!((p_W - found.p_W).cwiseAbs().maxCoeff() < found.reach)) {
+      found.p_W = p_W;
+      found.surface = map_.Find(p_W, &found.reach);
+    }
+    return found.surface;
+  }
+
+ private:
+  struct Found {
+    Eigen::Vector3f p_W = Eigen::Vector3f::Zero();
+    float reach = -1.0f;
+    const Surface* surface = nullptr;
+  };
+  const std::vector<Eigen::Vector3f>& points_;
+  const SurfaceMap& map_;
+  std::vector<Found> found_;
 };
 
 double PlaneResidual(const Eigen::Vector3d& p_W, const Eigen::Vector3d& rotated,
@@ -45,32 +74,31 @@ double EdgeResidual(const Eigen::Vector3d& p_W, const Eigen::Vector3d& rotated, 
   return distance;
 }
 
-ScanMatcher::System ScanMatcher::Linearise(const Features& features, const SurfaceMap& planes,
-                                           const SurfaceMap& edges, const Pose& X_WB, double kernel,
-                                           double gate) const {
+ScanMatcher::System ScanMatcher::Linearise(const Pose& X_WB, double kernel, double gate,
+                                           Matched* planes, Matched* edges) const {
   System system;
   const Eigen::Matrix3d R = X_WB.R.toRotationMatrix();
   const double k2 = kernel * kernel;
-  const auto add = [&](const FeaturePoint& point, const SurfaceMap& map, auto&& residual_of,
-                       double weight) {
-    ++system.total;
-    const Eigen::Vector3d rotated = R * point.p.cast<double>();
-    const Eigen::Vector3d p_W = rotated + X_WB.p;
-    const Surface* surface = map.Find(p_W.cast<float>());
-    if (!surface) return;
-    Vector6d J;
-    const double r = residual_of(p_W, rotated, *surface, &J);
-    if (std::abs(r) > gate) return;
-    ++system.matched;
-    if (std::abs(r) < kernel) ++system.inliers;
-    const double robust = k2 / (k2 + r * r);
-    const double noise2 = config_.range_noise * config_.range_noise;
-    const double trust = noise2 / (noise2 + static_cast<double>(surface->variance));
-    system.Add(r, weight * trust * robust * robust, J, rotated.squaredNorm());
+  const double noise2 = config_.range_noise * config_.range_noise;
+  const auto add = [&](Matched* features, auto&& residual_of, double weight) {
+    for (size_t i = 0; i < features->points().size(); ++i) {
+      const Eigen::Vector3d rotated = R * features->points()[i].cast<double>();
+      const Eigen::Vector3d p_W = rotated + X_WB.p;
+      const Surface* surface = features->At(i, p_W.cast<float>());
+      if (!surface) continue;
+      Vector6d J;
+      const double r = residual_of(p_W, rotated, *surface, &J);
+      if (std::abs(r) > gate) continue;
+      ++system.matched;
+      if (std::abs(r) < kernel) ++system.inliers;
+      const double robust = k2 / (k2 + r * r);
+      const double trust = noise2 / (noise2 + static_cast<double>(surface->variance));
+      system.Add(r, weight * trust * robust * robust, J, rotated.squaredNorm());
+    }
+    system.total += static_cast<int>(features->points().size());
   };
-  for (const FeaturePoint& point : features.planes) add(point, planes, PlaneResidual, 1.0);
-  for (const FeaturePoint& point : features.edges)
-    add(point, edges, EdgeResidual, config_.edge_weight);
+  add(planes, PlaneResidual, 1.0);
+  add(edges, EdgeResidual, config_.edge_weight);
   system.H = system.H.selfadjointView<Eigen::Lower>();
   return system;
 }
@@ -99,9 +127,10 @@ MatchResult ScanMatcher::Match(const Features& features, const SurfaceMap& plane
   const double gate =
       std::clamp(config_.least_gate + 3.0 * uncertainty, config_.least_gate, config_.gate);
   double kernel = std::max(config_.kernel, gate);
+  Matched matched_planes(features.planes, planes), matched_edges(features.edges, edges);
   System system;
   for (int i = 0; i < config_.max_iterations; ++i) {
-    system = Linearise(features, planes, edges, result.X_WB, kernel, gate);
+    system = Linearise(result.X_WB, kernel, gate, &matched_planes, &matched_edges);
     result.iterations = i + 1;
     if (system.matched < config_.min_features || system.weight < 1e-6) return result;
     Analyse(system, &result);

@@ -36,7 +36,7 @@ struct MatchConfig {
 };
 
 struct Features {
-  std::vector<FeaturePoint> planes, edges;  ///< frame B at the sweep's end, m
+  std::vector<Eigen::Vector3f> planes, edges;  ///< frame B at the sweep's end, m
 };
 
 struct MatchResult {
@@ -76,8 +76,9 @@ class ScanMatcher {
 
  private:
   struct System;
-  System Linearise(const Features& features, const SurfaceMap& planes, const SurfaceMap& edges,
-                   const Pose& X_WB, double kernel, double gate) const;
+  class Matched;
+  System Linearise(const Pose& X_WB, double kernel, double gate, Matched* planes,
+                   Matched* edges) const;
   void Analyse(const System& system, MatchResult* result) const;
 
   MatchConfig config_;

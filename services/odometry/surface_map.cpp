@@ -2,6 +2,8 @@
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <limits>
+#include <optional>
 
 namespace chase::odometry {
 
@@ -18,6 +20,15 @@ constexpr float kLineStraightness = 9.0f;
 // would learn the half of the noise that falls into it.
 const Eigen::Vector3f kShift(0.382f, 0.427f, 0.464f);
 
+/// How far each of the coordinates u may move without leaving its cell, whatever the rounding of
+/// both places: twice two roundings of half an epsilon each, of numbers up to |u| + 1.
+float Margin(const Eigen::Vector3f& u) {
+  const Eigen::Vector3f inside = u - u.array().floor().matrix();
+  const float rounding =
+      4.0f * std::numeric_limits<float>::epsilon() * (1.0f + u.cwiseAbs().maxCoeff());
+  return std::min(inside.minCoeff(), 1.0f - inside.maxCoeff()) - rounding;
+}
+
 }  // namespace
 
 SurfaceMap::SurfaceMap(const MapConfig& config, SurfaceKind kind) : config_(config), kind_(kind) {
@@ -25,69 +36,100 @@ SurfaceMap::SurfaceMap(const MapConfig& config, SurfaceKind kind) : config_(conf
   float size = static_cast<float>(config.cell_size);
   for (Level& level : levels_) {
     level.size = size;
+    level.inverse_size = 1.0f / size;
     level.shift = size * kShift;
     // All its memory is touched now, so that none has to be found in flight.
-    level.cells.resize(static_cast<size_t>(config.max_cells));
-    level.cells.clear();
+    level.moments.resize(static_cast<size_t>(config.max_cells));
+    level.fitted.resize(static_cast<size_t>(config.max_cells));
+    level.moments.clear();
+    level.fitted.clear();
     size *= 2.0f;
   }
 }
 
-void SurfaceMap::Add(const Eigen::Vector3f& p) {
-  for (Level& level : levels_) {
-    if (static_cast<int>(level.cells.size()) >= config_.max_cells) continue;
-    bool added = false;
-    const int number = level.index.FindOrAdd(level.Key(p), &added);
-    if (added) {
-      level.cells.emplace_back();
-      level.cells.back().origin = p;
-    }
-    Cell& cell = level.cells[static_cast<size_t>(number)];
-    if (cell.n >= config_.max_points) continue;
-    const Eigen::Vector3f d = p - cell.origin;
-    cell.sum += d;
-    cell.outer.noalias() += d * d.transpose();
-    if (++cell.n >= cell.next_fit) Fit(level, &cell);
-  }
+void SurfaceMap::Moments::Add(const Eigen::Vector3f& p) {
+  const Eigen::Vector3f d = p - origin;
+  sum += d;
+  squares += d.cwiseProduct(d);
+  products += Eigen::Vector3f(d.x() * d.y(), d.y() * d.z(), d.z() * d.x());
+  ++n;
 }
 
-void SurfaceMap::Fit(const Level& level, Cell* cell) const {
-  cell->next_fit = cell->n + std::max(1, cell->n / 4);
-  const double n = cell->n;
-  const Eigen::Vector3d mean = cell->sum.cast<double>() / n;
-  const Eigen::Matrix3d covariance = cell->outer.cast<double>() / n - mean * mean.transpose();
+size_t SurfaceMap::Level::CellOf(uint64_t key, const Eigen::Vector3f& p) {
+  bool added = false;
+  const size_t cell = static_cast<size_t>(index.FindOrAdd(key, &added));
+  if (added) {
+    moments.emplace_back().origin = p;
+    fitted.emplace_back();
+  }
+  return cell;
+}
+
+void SurfaceMap::Add(const std::vector<Eigen::Vector3f>& points) {
+  for (Level& level : levels_) AddTo(points, &level);
+}
+
+/// Neighbours along a ring mostly share a cell. A cell that is due for several fits is fitted once,
+/// to the points of the last.
+void SurfaceMap::AddTo(const std::vector<Eigen::Vector3f>& points, Level* level) const {
+  std::vector<std::pair<size_t, Moments>> due;
+  std::optional<uint64_t> last;
+  size_t cell = 0;
+  for (const Eigen::Vector3f& p : points) {
+    if (static_cast<int>(level->moments.size()) >= config_.max_cells) break;
+    const uint64_t key = CellKey(level->Scaled(p));
+    if (key != last) cell = level->CellOf(key, p);
+    last = key;
+    Moments& moments = level->moments[cell];
+    if (moments.n >= config_.max_points) continue;
+    moments.Add(p);
+    if (moments.n < moments.next_fit) continue;
+    moments.next_fit = moments.n + std::max(1, moments.n / 4);
+    due.emplace_back(cell, moments);
+  }
+  for (const auto& [number, moments] : due)
+    if (moments.next_fit == level->moments[number].next_fit)
+      level->fitted[number] = Fit(*level, moments);
+}
+
+SurfaceMap::Fitted SurfaceMap::Fit(const Level& level, const Moments& moments) const {
+  const double n = moments.n;
+  const Eigen::Vector3d mean = moments.sum.cast<double>() / n;
+  const Eigen::Vector3f &s = moments.squares, &p = moments.products;
+  Eigen::Matrix3f outer;
+  outer << s.x(), p.x(), p.z(), p.x(), s.y(), p.y(), p.z(), p.y(), s.z();
+  const Eigen::Matrix3d covariance = outer.cast<double>() / n - mean * mean.transpose();
   Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen;
   eigen.computeDirect(covariance);
   const Eigen::Vector3f lambda = eigen.eigenvalues().cast<float>().cwiseMax(1e-8f);
   const float thickness = static_cast<float>(config_.plane_thickness);
   const float extent = (kind_ == SurfaceKind::kPlane ? kPlaneExtent : kLineExtent) * level.size;
-  cell->surface.center = cell->origin + mean.cast<float>();
-  if (kind_ == SurfaceKind::kPlane) {
-    cell->valid = lambda[0] < thickness * thickness && lambda[1] > extent * extent &&
-                  lambda[1] > kPlaneFlatness * lambda[0];
-    cell->surface.direction = eigen.eigenvectors().col(0).cast<float>();
-    cell->surface.variance = lambda[0];
-  } else {
-    cell->valid = lambda[1] < 2.0f * thickness * thickness && lambda[2] > extent * extent &&
-                  lambda[2] > kLineStraightness * lambda[1];
-    cell->surface.direction = eigen.eigenvectors().col(2).cast<float>();
-    cell->surface.variance = 0.5f * (lambda[0] + lambda[1]);
-  }
+  const Eigen::Vector3f center = moments.origin + mean.cast<float>();
+  if (kind_ == SurfaceKind::kPlane)
+    return {{center, eigen.eigenvectors().col(0).cast<float>(), lambda[0]},
+            lambda[0] < thickness * thickness && lambda[1] > extent * extent &&
+                lambda[1] > kPlaneFlatness * lambda[0]};
+  return {{center, eigen.eigenvectors().col(2).cast<float>(), 0.5f * (lambda[0] + lambda[1])},
+          lambda[1] < 2.0f * thickness * thickness && lambda[2] > extent * extent &&
+              lambda[2] > kLineStraightness * lambda[1]};
 }
 
-const Surface* SurfaceMap::Find(const Eigen::Vector3f& p) const {
+const Surface* SurfaceMap::Find(const Eigen::Vector3f& p, float* reach) const {
+  if (reach) *reach = std::numeric_limits<float>::max();
   for (const Level& level : levels_) {
-    const int number = level.index.Find(level.Key(p));
+    const Eigen::Vector3f u = level.Scaled(p);
+    if (reach) *reach = std::min(*reach, level.size * Margin(u));
+    const int number = level.index.Find(CellKey(u));
     if (number == CellIndex::kNone) continue;
-    const Cell& cell = level.cells[static_cast<size_t>(number)];
-    if (cell.valid) return &cell.surface;
+    const Fitted& fitted = level.fitted[static_cast<size_t>(number)];
+    if (fitted.valid) return &fitted.surface;
   }
   return nullptr;
 }
 
 void SurfaceMap::Prune(const Eigen::Vector3f& center) {
   for (Level& level : levels_)
-    if (10 * level.cells.size() >= 9 * static_cast<size_t>(config_.max_cells))
+    if (10 * level.moments.size() >= 9 * static_cast<size_t>(config_.max_cells))
       PruneLevel(center, &level);
 }
 
@@ -95,35 +137,41 @@ void SurfaceMap::Prune(const Eigen::Vector3f& center) {
 void SurfaceMap::PruneLevel(const Eigen::Vector3f& center, Level* level) {
   float range = static_cast<float>(config_.keep_range);
   do {  // a dense world may need a shorter range to make room
-    const auto far = [&](const Cell& cell) {
-      return (cell.origin - center).squaredNorm() > range * range;
-    };
-    level->cells.erase(std::remove_if(level->cells.begin(), level->cells.end(), far),
-                       level->cells.end());
+    size_t kept = 0;
+    for (size_t i = 0; i < level->moments.size(); ++i) {
+      if ((level->moments[i].origin - center).squaredNorm() > range * range) continue;
+      level->moments[kept] = level->moments[i];
+      level->fitted[kept++] = level->fitted[i];
+    }
+    level->moments.resize(kept);
+    level->fitted.resize(kept);
     range *= 0.8f;
-  } while (10 * level->cells.size() > 7 * static_cast<size_t>(config_.max_cells) && range > 1.0f);
+  } while (10 * level->moments.size() > 7 * static_cast<size_t>(config_.max_cells) && range > 1.0f);
   level->index.Clear();
   bool added = false;
-  for (const Cell& cell : level->cells) level->index.FindOrAdd(level->Key(cell.origin), &added);
+  for (const Moments& cell : level->moments)
+    level->index.FindOrAdd(CellKey(level->Scaled(cell.origin)), &added);
 }
 
 void SurfaceMap::Clear() {
   for (Level& level : levels_) {
-    level.cells.clear();
+    level.moments.clear();
+    level.fitted.clear();
     level.index.Clear();
   }
 }
 
 size_t SurfaceMap::cells() const {
   size_t n = 0;
-  for (const Level& level : levels_) n += level.cells.size();
+  for (const Level& level : levels_) n += level.moments.size();
   return n;
 }
 
 size_t SurfaceMap::MemoryBytes() const {
   size_t bytes = 0;
   for (const Level& level : levels_)
-    bytes += level.index.MemoryBytes() + level.cells.capacity() * sizeof(Cell);
+    bytes += level.index.MemoryBytes() + level.moments.capacity() * sizeof(Moments) +
+             level.fitted.capacity() * sizeof(Fitted);
   return bytes;
 }
 

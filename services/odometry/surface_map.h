@@ -42,11 +42,12 @@ class SurfaceMap {
  public:
   SurfaceMap(const MapConfig& config, SurfaceKind kind);
 
-  /// Learns a point. Frame W, m.
-  void Add(const Eigen::Vector3f& p);
+  /// Learns points in their order. Frame W, m.
+  void Add(const std::vector<Eigen::Vector3f>& points);
 
-  /// The surface at p, or null where the map knows none.
-  const Surface* Find(const Eigen::Vector3f& p) const;
+  /// The surface at p, or null where the map knows none. `reach` [m]: the answer is the same
+  /// wherever no coordinate differs by more; negative where rounding leaves no room.
+  const Surface* Find(const Eigen::Vector3f& p, float* reach = nullptr) const;
 
   /// Forgets far cells of levels that are nearly full.
   void Prune(const Eigen::Vector3f& center);
@@ -56,25 +57,35 @@ class SurfaceMap {
   size_t MemoryBytes() const;
 
  private:
-  struct Cell {
-    Eigen::Vector3f origin = Eigen::Vector3f::Zero();  // sums are relative to it
+  /// The points of one cell. Sums are relative to its first point.
+  struct alignas(64) Moments {
+    void Add(const Eigen::Vector3f& p);
+
+    Eigen::Vector3f origin = Eigen::Vector3f::Zero();
     Eigen::Vector3f sum = Eigen::Vector3f::Zero();
-    Eigen::Matrix3f outer = Eigen::Matrix3f::Zero();
+    Eigen::Vector3f squares = Eigen::Vector3f::Zero();   // xx yy zz
+    Eigen::Vector3f products = Eigen::Vector3f::Zero();  // xy yz zx
     int n = 0;
     int next_fit = 5;  // points at which the surface is fitted again
-    bool valid = false;
+  };
+  struct alignas(32) Fitted {
     Surface surface;
+    bool valid = false;
   };
   struct Level {
-    float size = 1.0f;
-    uint64_t Key(const Eigen::Vector3f& p) const { return CellKey(p + shift, 1.0f / size); }
+    /// A point in units of the cells.
+    Eigen::Vector3f Scaled(const Eigen::Vector3f& p) const { return (p + shift) * inverse_size; }
+    size_t CellOf(uint64_t key, const Eigen::Vector3f& p);
 
+    float size = 1.0f, inverse_size = 1.0f;
     Eigen::Vector3f shift = Eigen::Vector3f::Zero();  // of the grid
     CellIndex index;
-    std::vector<Cell> cells;
+    std::vector<Moments> moments;  // what cells learn from and
+    std::vector<Fitted> fitted;    // what queries read, by the cell's number
   };
 
-  void Fit(const Level& level, Cell* cell) const;
+  void AddTo(const std::vector<Eigen::Vector3f>& points, Level* level) const;
+  Fitted Fit(const Level& level, const Moments& moments) const;
   void PruneLevel(const Eigen::Vector3f& center, Level* level);
 
   MapConfig config_;

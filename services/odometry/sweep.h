@@ -38,10 +38,4 @@ struct Pose {
   Pose Inverse() const { return {R.conjugate(), -(R.conjugate() * p)}; }
 };
 
-/// A point used for matching: frame B at the sweep's end.
-struct FeaturePoint {
-  Eigen::Vector3f p = Eigen::Vector3f::Zero();  ///< m
-  float t = 0.0f;                               ///< after the sweep's start, s
-};
-
 }  // namespace chase::odometry

@@ -36,14 +36,14 @@ class GemanMcClure : public ceres::LossFunction {
 
 }  // namespace
 
-Pose MatchWithCeres(const std::vector<FeaturePoint>& planes, const SurfaceMap& map,
+Pose MatchWithCeres(const std::vector<Eigen::Vector3f>& planes, const SurfaceMap& map,
                     const Pose& start, double kernel) {
   Pose pose = start;
   ceres::Problem problem;
   problem.AddParameterBlock(pose.R.coeffs().data(), 4, new ceres::EigenQuaternionManifold);
   problem.AddParameterBlock(pose.p.data(), 3);
-  for (const FeaturePoint& point : planes) {
-    const Eigen::Vector3d p_B = point.p.cast<double>();
+  for (const Eigen::Vector3f& point : planes) {
+    const Eigen::Vector3d p_B = point.cast<double>();
     const Surface* surface = map.Find((start * p_B).cast<float>());
     if (!surface) continue;
     problem.AddResidualBlock(

@@ -3,7 +3,6 @@
 #include <cmath>
 
 #include "common/math/rotation.h"
-#include "services/odometry/deskew.h"
 #include "services/odometry/features.h"
 #include "services/odometry/scan_matcher.h"
 #include "test/unit/odometry_ceres.h"
@@ -15,8 +14,6 @@ namespace {
 using test::Hall;
 using test::Noise;
 using test::SensorModel;
-
-const Pose kStill{};
 
 /// A map of the hall from a few places, and a sweep from another place.
 struct Room {
@@ -30,8 +27,8 @@ struct Room {
     for (int i = 0; i < 5; ++i) {
       const Pose at{math::FromYaw(0.3 * i), {0.3 * i - 0.6, 0.5 * i, 1.2 + 0.1 * i}};
       const Features seen = FeaturesFrom(hall, at, 1, &noise);
-      for (const auto& point : seen.planes) planes.Add((at * point.p.cast<double>()).cast<float>());
-      for (const auto& point : seen.edges) edges.Add((at * point.p.cast<double>()).cast<float>());
+      for (const auto& point : seen.planes) planes.Add({(at * point.cast<double>()).cast<float>()});
+      for (const auto& point : seen.edges) edges.Add({(at * point.cast<double>()).cast<float>()});
     }
     features = FeaturesFrom(hall, truth, 10, &noise);
   }
@@ -40,10 +37,11 @@ struct Room {
     const Sweep sweep = test::Scan(
         hall, [&](double) { return at; }, 0.0, SensorModel{}, noise);
     const FeatureSet set = ExtractFeatures(FeatureConfig{}, sweep.points);
-    std::vector<int> planes;
-    for (size_t i = 0; i < set.planes.size(); i += stride) planes.push_back(set.planes[i]);
-    return {Deskewed(sweep.points, planes, kStill, SweepMotion::Still()),
-            Deskewed(sweep.points, set.edges, kStill, SweepMotion::Still())};
+    Features features;
+    for (size_t i = 0; i < set.planes.size(); i += stride)
+      features.planes.push_back(sweep.points[static_cast<size_t>(set.planes[i])].p);
+    for (int i : set.edges) features.edges.push_back(sweep.points[static_cast<size_t>(i)].p);
+    return features;
   }
 };
 

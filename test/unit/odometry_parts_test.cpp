@@ -99,9 +99,9 @@ TEST(SurfaceMap, FindsThePlaneThatItsPointsCameFrom) {
   const Eigen::Vector3d normal = Eigen::Vector3d(1.0, 2.0, -0.5).normalized();
   const Eigen::Vector3d u = normal.unitOrthogonal(), v = normal.cross(u);
   for (int i = 0; i < 20000; ++i)
-    map.Add((4.0 * (noise.Uniform() - 0.5) * u + 4.0 * (noise.Uniform() - 0.5) * v +
-             noise.Gauss(0.01) * normal)
-                .cast<float>());
+    map.Add({(4.0 * (noise.Uniform() - 0.5) * u + 4.0 * (noise.Uniform() - 0.5) * v +
+              noise.Gauss(0.01) * normal)
+                 .cast<float>()});
   const Surface* surface = map.Find(Eigen::Vector3f::Zero());
   ASSERT_NE(surface, nullptr);
   EXPECT_GT(std::abs(surface->direction.cast<double>().dot(normal)), 0.99);
@@ -117,7 +117,7 @@ TEST(SurfaceMap, MemoryStaysBoundedOverALongWay) {
   size_t half_way = 0;
   for (int i = 0; i < 400000; ++i) {
     const Eigen::Vector3f at(0.005f * static_cast<float>(i), 0.0f, 0.0f);
-    map.Add(at + noise.Vector(10.0).cast<float>());
+    map.Add({at + noise.Vector(10.0).cast<float>()});
     if (i % 500 == 0) map.Prune(at);
     if (i == 200000) half_way = map.MemoryBytes();
   }
