@@ -26,6 +26,9 @@ class CellIndex {
 
   size_t size() const { return count_; }
 
+  /// Brings near what a query of `key` will read: many queries then wait for memory together.
+  void Prefetch(uint64_t key) const { __builtin_prefetch(&slots_[Home(key)]); }
+
   /// The cell's number, or kNone.
   int Find(uint64_t key) const { return slots_[Slot(key)].number; }
 
@@ -58,9 +61,13 @@ class CellIndex {
       if (entry.number != kNone) slots_[Slot(entry.key)] = entry;
   }
 
+  size_t Home(uint64_t key) const {
+    return static_cast<size_t>((key * 0x9e3779b97f4a7c15ull) >> 20) & (slots_.size() - 1);
+  }
+
   size_t Slot(uint64_t key) const {
     const size_t mask = slots_.size() - 1;
-    size_t slot = static_cast<size_t>((key * 0x9e3779b97f4a7c15ull) >> 20) & mask;
+    size_t slot = Home(key);
     while (slots_[slot].number != kNone && slots_[slot].key != key) slot = (slot + 1) & mask;
     return slot;
   }

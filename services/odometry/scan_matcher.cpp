@@ -27,33 +27,32 @@ struct ScanMatcher::System {
   }
 };
 
-/// Features and where each was last looked up: the map does not change during a match, so a feature
-/// that stays within reach of that place keeps its surface.
+/// Features and the surfaces near them: the map does not change during a match, so a feature that
+/// stays within reach of the place where it was looked up keeps its surface.
 class ScanMatcher::Matched {
  public:
   Matched(const std::vector<Eigen::Vector3f>& points, const SurfaceMap& map)
-      : points_(points), map_(map), found_(points.size()) {}
+      : points_(points), map_(map), queries_(points.size()) {}
 
-  const std::vector<Eigen::Vector3f>& points() const { return points_; }
+  size_t size() const { return points_.size(); }
+  Eigen::Vector3d p_B(size_t i) const { return points_[i].cast<double>(); }
+  const Surface* surface(size_t i) const { return queries_[i].surface; }
 
-  const Surface* At(size_t i, const Eigen::Vector3f& p_W) {
-    Found& found = found_[i];
-    if (!((p_W - found.p_W).cwiseAbs().maxCoeff() < found.reach)) {
-      found.p_W = p_W;
-      found.surface = map_.Find(p_W, &found.reach);
+  void MoveTo(const Eigen::Matrix3d& R_WB, const Eigen::Vector3d& p_WB) {
+    std::vector<Query*> left;
+    for (size_t i = 0; i < size(); ++i) {
+      const Eigen::Vector3f p_W = (R_WB * p_B(i) + p_WB).cast<float>();
+      if ((p_W - queries_[i].p).cwiseAbs().maxCoeff() < queries_[i].reach) continue;
+      queries_[i].p = p_W;
+      left.push_back(&queries_[i]);
     }
-    return found.surface;
+    map_.Find(std::move(left));
   }
 
  private:
-  struct Found {
-    Eigen::Vector3f p_W = Eigen::Vector3f::Zero();
-    float reach = -1.0f;
-    const Surface* surface = nullptr;
-  };
   const std::vector<Eigen::Vector3f>& points_;
   const SurfaceMap& map_;
-  std::vector<Found> found_;
+  std::vector<Query> queries_;
 };
 
 double PlaneResidual(const Eigen::Vector3d& p_W, const Eigen::Vector3d& rotated,
@@ -81,11 +80,13 @@ ScanMatcher::System ScanMatcher::Linearise(const Pose& X_WB, double kernel, doub
   const double k2 = kernel * kernel;
   const double noise2 = config_.range_noise * config_.range_noise;
   const auto add = [&](Matched* features, auto&& residual_of, double weight) {
-    for (size_t i = 0; i < features->points().size(); ++i) {
-      const Eigen::Vector3d rotated = R * features->points()[i].cast<double>();
-      const Eigen::Vector3d p_W = rotated + X_WB.p;
-      const Surface* surface = features->At(i, p_W.cast<float>());
+    features->MoveTo(R, X_WB.p);
+    system.total += static_cast<int>(features->size());
+    for (size_t i = 0; i < features->size(); ++i) {
+      const Surface* surface = features->surface(i);
       if (!surface) continue;
+      const Eigen::Vector3d rotated = R * features->p_B(i);
+      const Eigen::Vector3d p_W = rotated + X_WB.p;
       Vector6d J;
       const double r = residual_of(p_W, rotated, *surface, &J);
       if (std::abs(r) > gate) continue;
@@ -95,7 +96,6 @@ ScanMatcher::System ScanMatcher::Linearise(const Pose& X_WB, double kernel, doub
       const double trust = noise2 / (noise2 + static_cast<double>(surface->variance));
       system.Add(r, weight * trust * robust * robust, J, rotated.squaredNorm());
     }
-    system.total += static_cast<int>(features->points().size());
   };
   add(planes, PlaneResidual, 1.0);
   add(edges, EdgeResidual, config_.edge_weight);

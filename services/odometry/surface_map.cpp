@@ -65,6 +65,13 @@ size_t SurfaceMap::Level::CellOf(uint64_t key, const Eigen::Vector3f& p) {
   return cell;
 }
 
+const Surface* SurfaceMap::Level::At(uint64_t key) const {
+  const int number = index.Find(key);
+  if (number == CellIndex::kNone) return nullptr;
+  const Fitted& cell = fitted[static_cast<size_t>(number)];
+  return cell.valid ? &cell.surface : nullptr;
+}
+
 void SurfaceMap::Add(const std::vector<Eigen::Vector3f>& points) {
   for (Level& level : levels_) AddTo(points, &level);
 }
@@ -72,24 +79,32 @@ void SurfaceMap::Add(const std::vector<Eigen::Vector3f>& points) {
 /// Neighbours along a ring mostly share a cell. A cell that is due for several fits is fitted once,
 /// to the points of the last.
 void SurfaceMap::AddTo(const std::vector<Eigen::Vector3f>& points, Level* level) const {
-  std::vector<std::pair<size_t, Moments>> due;
-  std::optional<uint64_t> last;
-  size_t cell = 0;
+  std::vector<uint64_t> keys;
+  keys.reserve(points.size());
   for (const Eigen::Vector3f& p : points) {
+    keys.push_back(CellKey(level->Scaled(p)));
+    level->index.Prefetch(keys.back());
+  }
+  std::vector<size_t> cells;
+  cells.reserve(points.size());
+  for (size_t i = 0; i < points.size(); ++i) {
     if (static_cast<int>(level->moments.size()) >= config_.max_cells) break;
-    const uint64_t key = CellKey(level->Scaled(p));
-    if (key != last) cell = level->CellOf(key, p);
-    last = key;
-    Moments& moments = level->moments[cell];
+    const bool same = i > 0 && keys[i] == keys[i - 1];
+    cells.push_back(same ? cells.back() : level->CellOf(keys[i], points[i]));
+    __builtin_prefetch(&level->moments[cells.back()]);
+  }
+  std::vector<std::pair<size_t, Moments>> due;
+  for (size_t i = 0; i < cells.size(); ++i) {
+    Moments& moments = level->moments[cells[i]];
     if (moments.n >= config_.max_points) continue;
-    moments.Add(p);
+    moments.Add(points[i]);
     if (moments.n < moments.next_fit) continue;
     moments.next_fit = moments.n + std::max(1, moments.n / 4);
-    due.emplace_back(cell, moments);
+    due.emplace_back(cells[i], moments);
   }
-  for (const auto& [number, moments] : due)
-    if (moments.next_fit == level->moments[number].next_fit)
-      level->fitted[number] = Fit(*level, moments);
+  for (const auto& [cell, moments] : due)
+    if (moments.next_fit == level->moments[cell].next_fit)
+      level->fitted[cell] = Fit(*level, moments);
 }
 
 SurfaceMap::Fitted SurfaceMap::Fit(const Level& level, const Moments& moments) const {
@@ -114,17 +129,31 @@ SurfaceMap::Fitted SurfaceMap::Fit(const Level& level, const Moments& moments) c
               lambda[2] > kLineStraightness * lambda[1]};
 }
 
-const Surface* SurfaceMap::Find(const Eigen::Vector3f& p, float* reach) const {
-  if (reach) *reach = std::numeric_limits<float>::max();
+const Surface* SurfaceMap::Find(const Eigen::Vector3f& p) const {
+  Query query;
+  query.p = p;
+  Find({&query});
+  return query.surface;
+}
+
+void SurfaceMap::Find(std::vector<Query*> queries) const {
+  for (Query* query : queries) query->reach = std::numeric_limits<float>::max();
+  std::vector<uint64_t> keys;
   for (const Level& level : levels_) {
-    const Eigen::Vector3f u = level.Scaled(p);
-    if (reach) *reach = std::min(*reach, level.size * Margin(u));
-    const int number = level.index.Find(CellKey(u));
-    if (number == CellIndex::kNone) continue;
-    const Fitted& fitted = level.fitted[static_cast<size_t>(number)];
-    if (fitted.valid) return &fitted.surface;
+    keys.clear();
+    for (Query* query : queries) {
+      const Eigen::Vector3f u = level.Scaled(query->p);
+      query->reach = std::min(query->reach, level.size * Margin(u));
+      keys.push_back(CellKey(u));
+      level.index.Prefetch(keys.back());
+    }
+    size_t open = 0;
+    for (size_t i = 0; i < queries.size(); ++i) {
+      queries[i]->surface = level.At(keys[i]);
+      if (!queries[i]->surface) queries[open++] = queries[i];
+    }
+    queries.resize(open);
   }
-  return nullptr;
 }
 
 void SurfaceMap::Prune(const Eigen::Vector3f& center) {

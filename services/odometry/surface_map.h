@@ -33,6 +33,15 @@ struct Surface {
   float variance = 0.0f;                                ///< of the points across it, m^2
 };
 
+/// A place in the map and the surface there, null where the map knows none.
+struct Query {
+  Eigen::Vector3f p = Eigen::Vector3f::Zero();  ///< frame W, m
+  /// The answer holds wherever no coordinate differs by more from p [m]; negative before the first
+  /// answer, and where rounding leaves no room.
+  float reach = -1.0f;
+  const Surface* surface = nullptr;
+};
+
 /// What a cell must look like to serve.
 enum class SurfaceKind { kPlane, kLine };
 
@@ -45,9 +54,11 @@ class SurfaceMap {
   /// Learns points in their order. Frame W, m.
   void Add(const std::vector<Eigen::Vector3f>& points);
 
-  /// The surface at p, or null where the map knows none. `reach` [m]: the answer is the same
-  /// wherever no coordinate differs by more; negative where rounding leaves no room.
-  const Surface* Find(const Eigen::Vector3f& p, float* reach = nullptr) const;
+  /// The surface at p, or null where the map knows none.
+  const Surface* Find(const Eigen::Vector3f& p) const;
+
+  /// The same for many places.
+  void Find(std::vector<Query*> queries) const;
 
   /// Forgets far cells of levels that are nearly full.
   void Prune(const Eigen::Vector3f& center);
@@ -76,6 +87,7 @@ class SurfaceMap {
     /// A point in units of the cells.
     Eigen::Vector3f Scaled(const Eigen::Vector3f& p) const { return (p + shift) * inverse_size; }
     size_t CellOf(uint64_t key, const Eigen::Vector3f& p);
+    const Surface* At(uint64_t key) const;
 
     float size = 1.0f, inverse_size = 1.0f;
     Eigen::Vector3f shift = Eigen::Vector3f::Zero();  // of the grid
