@@ -19,7 +19,7 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 using world::Solid;
 
-constexpr std::size_t kTargetInstance = 1;
+constexpr std::size_t kTargetInstance = 0;
 constexpr int kFine = 48, kCoarse = 20;  // edges around a solid
 constexpr double kMargin = 110.0;        // m of ground beyond what stands on it
 constexpr double kRoughMargin = 40.0;
@@ -237,7 +237,8 @@ void Scene::TraceTargetAlone(const RayPacket& rays, bool* hits) const {
   alignas(32) RTCRayHit8 work;
   Fill(rays, valid, &work);
   const Eigen::Vector3f center = impl_->target_center.cast<float>();
-  const Eigen::Vector2f turn = impl_->turns[kTargetInstance].cast<float>();
+  const Instance& target = impl_->instances[kTargetInstance];
+  const Eigen::Vector2f turn(target.cos_yaw, target.sin_yaw);
   for (int i = 0; i < 8; ++i) {
     work.ray.org_x[i] -= center.x();
     work.ray.org_y[i] -= center.y();
