@@ -1,8 +1,9 @@
 #pragma once
 
-#include <cstdint>
 #include <string>
 #include <vector>
+
+#include "deploy/campaign/jobs.h"
 
 namespace chase::compare {
 
@@ -15,8 +16,8 @@ struct Arguments {
   bool pictures = true;
 };
 
-/// One flight of a campaign, one process.
-struct Job {
+/// One flight of a comparison.
+struct Flight {
   std::string scenario;  ///< as given
   std::string planner;   ///< name or name:set
   std::string file;      ///< its result
@@ -24,16 +25,13 @@ struct Job {
 
 /// Every pair of scenario and planner. Throws std::runtime_error or std::invalid_argument with one
 /// line on a name that does not exist.
-std::vector<Job> Jobs(const Arguments& arguments);
+std::vector<Flight> FlightsOf(const Arguments& arguments);
 
-/// The command line of a job, for a shell.
-std::string Command(const Job& job, const Arguments& arguments);
+/// The flights as processes of this very program. A file counts as done when it comes from the
+/// same program and scenario.
+std::vector<campaign::Job> Jobs(const std::vector<Flight>& flights);
 
-/// Flies one job in this process and writes its file.
-void FlyJob(const Job& job);
-
-/// Runs what is not done yet, `jobs` processes at a time, with a progress bar. A file counts as
-/// done when it comes from this very program and scenario. Throws when a flight's process fails.
-void Run(const std::vector<Job>& jobs, const Arguments& arguments);
+/// Flies one flight in this process and writes its file.
+void Fly(const Flight& flight);
 
 }  // namespace chase::compare

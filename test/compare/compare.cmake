@@ -2,7 +2,7 @@ set(compare ${CMAKE_CURRENT_LIST_DIR})
 chase_library(compare ${compare}/mission.cpp ${compare}/rollout.cpp ${compare}/score.cpp
   ${compare}/flight_file.cpp ${compare}/campaign.cpp ${compare}/results.cpp ${compare}/figure.cpp
   ${compare}/page.cpp)
-target_link_libraries(compare PUBLIC scenario planning_core pictures nlohmann_json::nlohmann_json
+target_link_libraries(compare PUBLIC scenario campaign planning_core pictures nlohmann_json::nlohmann_json
   PRIVATE fmt::fmt)
 target_compile_definitions(compare PRIVATE
   CHASE_TWELVE="${CMAKE_SOURCE_DIR}/deploy/scenarios/twelve")

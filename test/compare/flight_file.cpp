@@ -1,12 +1,6 @@
 #include "test/compare/flight_file.h"
 
-#include <unistd.h>
-
 #include <cmath>
-#include <filesystem>
-#include <fstream>
-#include <iterator>
-#include <stdexcept>
 
 namespace chase::compare {
 namespace {
@@ -109,25 +103,6 @@ nlohmann::ordered_json FlightJson(const Mission& mission, const std::string& pla
   j["track"] = Track(rollout);
   j["replans"] = Replans(rollout);
   return j;
-}
-
-void WriteText(const std::string& file, const std::string& text) {
-  const std::string temporary = file + "." + std::to_string(getpid()) + ".tmp";
-  std::ofstream out(temporary, std::ios::binary);
-  out << text;
-  out.close();
-  std::error_code error;
-  if (out) std::filesystem::rename(temporary, file, error);
-  if (!out || error) {
-    std::filesystem::remove(temporary, error);
-    throw std::runtime_error(file + ": cannot be written; check the folder and its rights");
-  }
-}
-
-std::string ReadText(const std::string& file) {
-  std::ifstream in(file, std::ios::binary);
-  if (!in) throw std::runtime_error(file + ": cannot be read; check the path and its rights");
-  return {std::istreambuf_iterator<char>(in), {}};
 }
 
 }  // namespace chase::compare

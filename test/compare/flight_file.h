@@ -12,9 +12,4 @@ namespace chase::compare {
 nlohmann::ordered_json FlightJson(const Mission& mission, const std::string& planner,
                                   const Rollout& rollout, const Score& score);
 
-/// Writes beside and renames, so that a broken run leaves no half file. Throws std::runtime_error
-/// with one line.
-void WriteText(const std::string& file, const std::string& text);
-std::string ReadText(const std::string& file);
-
 }  // namespace chase::compare

@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <stdexcept>
 
+#include "deploy/campaign/process.h"
 #include "test/compare/campaign.h"
 #include "test/compare/results.h"
 
@@ -18,19 +19,25 @@ struct Options {
 };
 
 void Execute(const Options& options) {
-  Arguments campaign = options.campaign;
+  const Arguments& arguments = options.campaign;
   if (!options.fly.empty()) {
-    if (campaign.planners.size() != 1 || options.result.empty())
+    if (arguments.planners.size() != 1 || options.result.empty())
       throw std::runtime_error("--fly takes one planner in --planners and a file in --result");
-    return FlyJob({options.fly, campaign.planners.front(), options.result});
+    return Fly({options.fly, arguments.planners.front(), options.result});
   }
-  const std::vector<Job> jobs = Jobs(campaign);
+  const std::vector<Flight> flights = FlightsOf(arguments);
+  const auto jobs = Jobs(flights);
   if (options.list) {
-    for (const Job& job : jobs) std::printf("%s\n", Command(job, campaign).c_str());
+    for (const auto& job : jobs)
+      std::printf("%s\n", chase::campaign::ShellLine(job.command).c_str());
     return;
   }
-  Run(jobs, campaign);
-  WriteResults(jobs, campaign);
+  chase::campaign::MakeFolder(arguments.out);
+  chase::campaign::RunOptions run;
+  run.jobs = arguments.jobs;
+  run.quiet = arguments.quiet;
+  chase::campaign::Run(jobs, run);
+  WriteResults(flights, arguments);
 }
 
 }  // namespace

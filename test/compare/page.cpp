@@ -1,8 +1,8 @@
 #include <algorithm>
 
+#include "deploy/campaign/text_file.h"
 #include "logs/src/page_template.h"
 #include "test/compare/figure.h"
-#include "test/compare/flight_file.h"
 
 namespace chase::compare {
 namespace {
@@ -66,9 +66,10 @@ void WritePage(const Flights& flights, const std::vector<std::string>& top_views
                      {"rows", Rows(flights)},
                      {"views", TopViews(flights, top_views)}};
   const std::string share = logs::ShareFolder();
-  WriteText(file, logs::FillPage(share + "/comparison.html",
-                                 {{"/*DATA*/null", logs::Embedded(data.dump())},
-                                  {"/*PLOTLY*/", logs::PlotlySource(share + "/plotly.min.js")}}));
+  campaign::WriteText(
+      file, logs::FillPage(share + "/comparison.html",
+                           {{"/*DATA*/null", logs::Embedded(data.dump())},
+                            {"/*PLOTLY*/", logs::PlotlySource(share + "/plotly.min.js")}}));
 }
 
 }  // namespace chase::compare

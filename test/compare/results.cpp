@@ -5,8 +5,8 @@
 #include <filesystem>
 #include <stdexcept>
 
+#include "deploy/campaign/text_file.h"
 #include "test/compare/figure.h"
-#include "test/compare/flight_file.h"
 
 namespace chase::compare {
 namespace {
@@ -86,19 +86,20 @@ void DrawAll(const std::vector<Json>& flights, const std::filesystem::path& fold
 
 }  // namespace
 
-std::vector<nlohmann::ordered_json> ReadFlights(const std::vector<Job>& jobs) {
+std::vector<nlohmann::ordered_json> ReadFlights(const std::vector<Flight>& flown) {
   std::vector<Json> flights;
-  for (const Job& job : jobs) flights.push_back(Json::parse(ReadText(job.file)));
+  for (const Flight& flight : flown)
+    flights.push_back(Json::parse(campaign::ReadText(flight.file)));
   return flights;
 }
 
-void WriteResults(const std::vector<Job>& jobs, const Arguments& arguments) {
+void WriteResults(const std::vector<Flight>& flown, const Arguments& arguments) {
   const std::filesystem::path folder(arguments.out);
-  const std::vector<Json> flights = ReadFlights(jobs);
+  const std::vector<Json> flights = ReadFlights(flown);
   Json list = Json::array();
   for (const Json& flight : flights) list.push_back(flight["metrics"]);
-  WriteText((folder / "flights.json").string(), list.dump(1) + "\n");
-  WriteText((folder / "flights.csv").string(), Csv(flights));
+  campaign::WriteText((folder / "flights.json").string(), list.dump(1) + "\n");
+  campaign::WriteText((folder / "flights.csv").string(), Csv(flights));
   PrintTable(flights);
   if (!arguments.pictures) return;
   try {
