@@ -37,3 +37,11 @@ add_test(NAME flight_live
   COMMAND ${CMAKE_SOURCE_DIR}/test/flight/in_namespace.sh deploy/fly gym --seed 1
   WORKING_DIRECTORY ${CMAKE_SOURCE_DIR})
 set_tests_properties(flight_live PROPERTIES TIMEOUT 300 RUN_SERIAL TRUE)
+
+# Campaigns: their statistics, and the program with stand-ins for the flights.
+chase_test(campaign_statistics_test LIBS statistics
+  SOURCES ${CMAKE_CURRENT_LIST_DIR}/campaign_statistics_test.cpp)
+add_test(NAME flight_campaign
+  COMMAND python3 -B ${CMAKE_SOURCE_DIR}/test/flight/campaign_test.py ${bin}
+  WORKING_DIRECTORY ${CMAKE_SOURCE_DIR})
+set_tests_properties(flight_campaign PROPERTIES TIMEOUT 300)

@@ -1,0 +1,267 @@
+"""chase-campaign as its user meets it: campaign_test.py BIN_DIR. Flights are stand-ins of milliseconds,
+but for one. Python's standard library only."""
+
+import json
+import os
+import pathlib
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+
+BIN = pathlib.Path(sys.argv[1]).resolve()
+HERE = pathlib.Path(__file__).resolve().parent
+ROOT = HERE.parents[1]
+DIFFERS = ("plan_ms", "predict_ms", "cpu_s", "real_time_factor")  # from run to run
+
+
+class Campaign(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = pathlib.Path(folder.name)
+        self.out, self.calls = self.folder / "out", self.folder / "calls"
+        self.programs = self.stand_ins("bin")
+
+    def stand_ins(self, name):
+        folder = self.folder / name
+        folder.mkdir()
+        for program in ("flight", "world"):
+            shutil.copy(HERE / f"stand_in_{program}.py", folder / f"chase-{program}")
+        return folder
+
+    def command(self, *arguments, out=None, programs=None):
+        return [BIN / "chase-campaign", "--programs", programs or self.programs, "--out",
+                out or self.out, *map(str, arguments)]
+
+    def run_it(self, *arguments, sleep=0, **where):
+        return subprocess.run(self.command(*arguments, **where), capture_output=True, text=True,
+                              cwd=self.folder, timeout=120, check=False,
+                              env=self.environment(sleep))
+
+    def environment(self, sleep):
+        return dict(os.environ, STAND_IN_CALLS=str(self.calls), STAND_IN_SLEEP=str(sleep))
+
+    def fly(self, *arguments, code=0, **where):
+        answer = self.run_it(*arguments, **where)
+        self.assertEqual(answer.returncode, code, answer.stderr + answer.stdout)
+        return answer
+
+    def flown(self):
+        """How many flights were flown since the last call."""
+        count = len(self.calls.read_text().splitlines()) if self.calls.exists() else 0
+        self.calls.unlink(missing_ok=True)
+        return count
+
+    def results(self, out=None):
+        """The flights without what differs from run to run, and the table."""
+        flights = json.loads(((out or self.out) / "flights.json").read_text())
+        for flight in flights:
+            for key in DIFFERS:
+                flight.pop(key, None)
+        return flights, ((out or self.out) / "table.md").read_text()
+
+    def test_rows_outcomes_and_lines_that_repeat(self):
+        answer = self.fly("--scenarios", "gym", "--kinds", "hall", "--seeds", "1-4", "--faults",
+                          "none,kill-planning@5")
+        flights, table = self.results()
+        self.assertEqual(len(flights), 16)
+        self.assertEqual(self.flown(), 16)
+        self.assertIn("16/16 12 failed", answer.stderr)
+        self.assertEqual(answer.stdout, table)
+        self.assertEqual([f["outcome"] for f in flights[:4]],
+                         ["collision", "target_lost", "odometry_lost", "passed"])
+        hall = flights[8]
+        self.assertEqual((hall["kind"], hall["scenario"], hall["seed"], hall["fault"]),
+                         ("hall", "hall-1", 1, ""))
+        self.assertNotIn("kind", flights[0])
+        self.assertEqual(flights[4]["fault"], "kill-planning@5")
+        self.assertRegex(table, r"\| gym +\| kill-planning@5 \| 4 +\| 1 \(0\.05 to 0\.70\) \|")
+        self.assertRegex(table, r"\| world:hall +\| +\| 4 ")
+        self.assertRegex(table, r"\| all +\| +\| 16 +\| 4 \(0\.10 to 0\.49\) \|")
+        self.assertIn("- gym, seed 1: collision with cylinder 3 at 12.25 s\n", table)
+        self.assertIn("odometry lost, 3.25 m off; visible_ratio 0.400 too low", table)
+        for flight in (flights[5], hall):
+            line = flight["command"] + " --metrics again.json"
+            subprocess.run(line, shell=True, cwd=self.folder, check=True, timeout=60)
+            again = json.loads((self.folder / "again.json").read_text())
+            for key in ("min_clearance_m", "distance_ratio", "visible_ratio", "flown_s"):
+                self.assertEqual(again[key], flight[key], key)
+        self.assertEqual((self.out / "worlds/hall-1.yaml").read_text(), "# hall 1 60\n")
+        self.assertEqual(list((self.out / "flights").glob("*.work")), [])
+
+    def test_only_what_is_not_done_is_flown(self):
+        scenario = self.folder / "mine.yaml"
+        text = (ROOT / "deploy/scenarios/gym.yaml").read_text()
+        scenario.write_text(text)
+
+        def flown(*arguments, seeds="4-6"):
+            self.fly("--scenarios", scenario, "--seeds", seeds, *arguments)
+            return self.flown()
+        self.assertEqual([flown(), flown()], [3, 0])
+        self.assertEqual(flown(seeds="4-7"), 1)
+        self.assertEqual(flown("--faults", "none,lidar-gap"), 3)
+        self.assertEqual([flown("--duration", 30), flown("--duration", 30)], [3, 0])
+        self.assertEqual([flown("--duration", 30, "--fly-on"), flown()], [3, 3])
+        scenario.write_text(text + "# another text\n")
+        self.assertEqual(flown(), 3)
+        with (self.programs / "chase-flight").open("a") as program:
+            program.write("# another program\n")
+        self.assertEqual(flown(), 3)
+        (self.out / "flights/mine_5.json").write_text("{")
+        self.assertEqual(flown(), 1)
+
+    def test_killed_and_resumed_is_the_same(self):
+        what = ["--kinds", "hall,crowd", "--seeds", "1-6", "--jobs", 2]
+        self.fly(*what, out=self.folder / "whole")
+        self.flown()
+        run = subprocess.Popen(self.command(*what), env=self.environment(0.1), start_new_session=True,
+                               stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        while not self.calls.exists() or len(self.calls.read_text().splitlines()) < 4:
+            time.sleep(0.01)
+        run.send_signal(signal.SIGKILL)
+        run.wait()
+        time.sleep(0.3)  # what was in the air ends with it
+        before = self.flown()
+        self.assertLess(before, 8)
+        self.assertFalse((self.out / "flights.json").exists())
+        self.fly(*what)
+        self.assertLess(self.flown(), 12)
+        self.assertEqual(self.results(), self.results(self.folder / "whole"))
+        self.assertEqual(list((self.out / "flights").glob("*.work")), [])
+
+    def test_list_through_a_shell_is_the_same(self):
+        what = ["--kinds", "hall", "--scenarios", "gym", "--seeds", "1,4,14,19", "--faults",
+                "none,freeze-odometry", "--duration", 30]
+        self.fly(*what, out=self.folder / "direct")
+        lines = self.fly("--list", *what).stdout
+        self.assertEqual(len(lines.splitlines()), 16)
+        self.flown()
+        subprocess.run(["xargs", "-P", "2", "-d", "\n", "-n", "1", "sh", "-c"], input=lines, text=True,
+                       cwd="/", check=True, timeout=60, env=self.environment(0))
+        self.assertEqual(self.flown(), 14)  # two have no world
+        subprocess.run(["sh", "-e"], input=lines, text=True, cwd="/", check=True, timeout=60,
+                       env=self.environment(0))
+        self.fly(*what)
+        self.assertEqual(self.flown(), 0, "what is done is not flown again")
+        self.assertEqual(self.results(), self.results(self.folder / "direct"))
+
+    def test_crashed_and_malformed_flights_are_counted(self):
+        self.fly("--seeds", "4,14-18")
+        flights, table = self.results()
+        why = {f["seed"]: f["why"] for f in flights}
+        self.assertEqual([f["outcome"] for f in flights], ["passed"] + 5 * ["error"])
+        self.assertIn("chase-flight: ended by signal 11", why[14])
+        self.assertIn("no luck today; cure: another seed", why[15])
+        self.assertIn("no JSON", why[16])
+        self.assertIn("malformed metrics.json: no number flown_s", why[17])
+        self.assertIn("wrote no metrics", why[18])
+        self.assertRegex(table, r"\| gym +\| +\| 6 +\| 1 \(0.03 to 0.56\) ")
+        self.assertEqual(table.count("ended by an error"), 5)
+        self.fly("--kinds", "hall", "--seeds", "19")
+        self.assertIn("chase-world: no way through", self.results()[0][0]["why"])
+
+    def test_duration_judges_the_part_that_was_asked_for(self):
+        self.fly("--seeds", "4,1", "--duration", 30)
+        self.assertEqual([f["outcome"] for f in self.results()[0]], ["passed", "collision"])
+        lines = self.calls.read_text().splitlines()
+        self.assertTrue(all("--until 30" in line and "--end-on-collision" in line for line in lines))
+        self.flown()
+        self.fly("--seeds", "4", "--duration", 30, "--fly-on", "--kinds", "yard")
+        self.assertNotIn("--", self.calls.read_text().replace("--seed", "").replace("--quiet", "")
+                         .replace("--metrics", ""))
+        self.assertEqual((self.out / "worlds/yard-4.yaml").read_text(), "# yard 4 30\n")
+
+    def worse(self):
+        """Programs whose flights with an even seed hit something."""
+        programs = self.stand_ins("worse")
+        path = programs / "chase-flight"
+        path.write_text(path.read_text().replace("seed % 10 == 1:", "seed % 2 == 0:"))
+        return programs
+
+    def test_comparison(self):
+        what = ["--kinds", "hall,yard", "--seeds", "20-40", "--quiet"]
+        before, worse = self.folder / "before", self.worse()
+        self.fly(*what, out=before, programs=worse)
+        self.fly(*what, "--compare", before, out=before, programs=worse)
+        answer = self.fly(*what, "--compare", before, "--baseline", self.folder / "slim.json")
+        self.assertIn("Verdict: nothing worse beyond chance; better: ", answer.stdout)
+        for old in (self.out, self.out / "flights.json", self.folder / "slim.json"):
+            again = self.fly(*what, "--compare", old, code=0).stdout
+            self.assertIn("all: 42 pairs, no change\nVerdict: nothing worse beyond chance\n", again)
+            answer = self.fly(*what, "--compare", old, code=3, out=before, programs=worse).stdout
+            self.assertRegex(answer, r"world:hall: 21 pairs\n  passed +1\d of 21 .* -> 8 of 21 ")
+            self.assertRegex(answer, r"all: 42 pairs\n  passed .*: worse, p [0-9.e-]+, beyond chance\n")
+            self.assertIn("hall-24, seed 24: passed -> collision (collision with cylinder 3", answer)
+            self.assertRegex(answer, r"Verdict: WORSE: .*passed of all")
+        other = ["--kinds", "hall,yard", "--seeds", "120-140", "--quiet"]
+        answer = self.fly(*other, "--compare", self.out, code=3, out=self.folder / "other",
+                          programs=worse).stdout
+        self.assertIn("all: 42 flights before, 42 now, no pairs", answer)
+        self.fly("--kinds", "park", "--compare", self.out, out=self.folder / "park")
+
+    def test_flights_from_a_list(self):
+        path = self.folder / "list.csv"
+        path.write_text("# place, seed, fault\n\nworld:forest, 4, kill-mapping  # a comment\nforest,5\n"
+                        "gym,4,none\nworld:forest,4,kill-mapping\n")
+        self.fly("--flights", path)
+        self.assertEqual([(f["scenario"], f.get("kind"), f["seed"], f["fault"])
+                          for f in self.results()[0]],
+                         [("forest-4", "forest", 4, "kill-mapping"), ("forest", None, 5, ""),
+                          ("gym", None, 4, "")])
+        for text, words in (("gym,4\nworld:lake,1\n", ":2: no kind of world 'lake'"),
+                            ("gym\n", ":1: 'gym' is not scenario,seed,fault"),
+                            ("gym,x\n", ":1: .*'x' is no seed"),
+                            ("gym,1,kill-joy\n", ":1: no fault 'kill-joy'"), ("#\n", "no flights")):
+            path.write_text(text)
+            self.assertRegex(self.fly("--flights", path, code=1).stderr, words)
+
+    def test_bad_use_is_one_line(self):
+        twin = self.folder / "gym.yaml"
+        twin.write_text("name: other\ntarget: {waypoints: [[0, 0], [5, 5]]}\n")
+        broken = self.folder / "broken.yaml"
+        broken.write_text("name: broken\nno_such_key: 1\n")
+        for arguments, words in (
+                (["--scenarios", "no-such"], "no scenario 'no-such'"),
+                (["--scenarios", broken], "no_such_key"),
+                (["--scenarios", f"gym,{twin}"], "same name"),
+                (["--kinds", "lake"], "no kind of world 'lake'.*hall, office"),
+                (["--faults", "kill-joy"], "no fault 'kill-joy'.*kill-planning"),
+                (["--faults", "kill-planning@soon"], "'soon' is no mission time"),
+                (["--faults", "kill-planning@nan"], "'nan' is no mission time"),
+                (["--seeds", "5-1"], "'5-1'"), (["--seeds", ""], "seeds ''"),
+                (["--seeds", "1,,2"], "'' is no seed"), (["--seeds", "1-99999999999"], "99999999999"),
+                (["--seeds", "0-2147483647"], "range"), (["--duration", "nan"], "nan"),
+                (["--jobs", "0"], "--jobs"), (["--no-such"], "--no-such"),
+                (["--flights", "no/such.csv"], "no/such.csv"), (["--flights", twin, "--seeds", "1"], "--flights"),
+                (["--compare", "no/such"], "no/such"), (["--compare", twin], "is no list of flights"),
+                (["--fly", "--seeds", "1-2"], "--fly takes one flight")):
+            with self.subTest(arguments=arguments):
+                answer = self.run_it(*arguments)
+                self.assertEqual(answer.returncode, 1, answer.stderr)
+                self.assertEqual(answer.stderr.count("\n"), 1, answer.stderr)
+                self.assertRegex(answer.stderr, "^chase-campaign: ")
+                self.assertRegex(answer.stderr, words)
+                self.assertEqual(answer.stdout, "")
+        self.assertEqual(self.flown(), 0)
+        answer = self.run_it(programs=self.folder)
+        self.assertRegex(answer.stderr, "^chase-campaign: .*/chase-flight: no such program; .*\n$")
+        answer = self.run_it(out="/proc/no/folder")
+        self.assertRegex(answer.stderr.splitlines()[-1], "^chase-campaign: --out /proc/no/folder: ")
+
+    @unittest.skipUnless((BIN / "chase-flight").exists(), "skipped: this build has no chase-flight")
+    def test_real_flight(self):
+        self.fly("--scenarios", "gym", "--duration", 1, "--fly-on", programs=BIN)
+        (flight,), _ = self.results()
+        self.assertEqual(flight["outcome"], "passed", flight["why"])
+        for key in ("safe_ratio", "min_clearance_m", "visible_ratio", "distance_ratio"):
+            self.assertIsInstance(flight[key], float, key)
+        self.assertRegex(flight["command"], r"chase-flight .*gym\.yaml --seed 1 --until 1$")
+
+
+if __name__ == "__main__":
+    unittest.main(argv=sys.argv[:1])
