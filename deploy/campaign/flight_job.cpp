@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <sys/wait.h>
 
+#include <csignal>
 #include <cstdlib>
 #include <filesystem>
 #include <map>
@@ -110,6 +111,8 @@ class Workplace {
 std::string Problem(const Command& command) {
   const Process process(command);
   const int status = Wait(process);
+  if (WIFSIGNALED(status) && (WTERMSIG(status) == SIGTERM || WTERMSIG(status) == SIGINT))
+    throw std::runtime_error("was told to end; nothing is kept of it");  // from outside
   const bool fine = WIFEXITED(status) && (WEXITSTATUS(status) == 0 || WEXITSTATUS(status) == 2);
   if (fine) return "";
   return fs::path(command.front()).filename().string() + ": " + process.Reason(status);

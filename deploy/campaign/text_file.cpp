@@ -19,8 +19,10 @@ void WriteText(const std::string& file, const std::string& text) {
   out << text;
   out.close();
   std::error_code error;
-  if (out) std::filesystem::rename(temporary, file, error);
-  if (!out || error) {
+  // Never over a device such as /dev/null: a rename would replace it.
+  const bool special = std::filesystem::exists(file) && !std::filesystem::is_regular_file(file);
+  if (out && !special) std::filesystem::rename(temporary, file, error);
+  if (!out || special || error) {
     std::filesystem::remove(temporary, error);
     throw std::runtime_error(file + ": cannot be written; check the folder and its rights");
   }

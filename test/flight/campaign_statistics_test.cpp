@@ -143,6 +143,7 @@ TEST(SignFlip, EqualFlightsTellNothing) {
   EXPECT_EQ(SignFlip({}).p, 1.0);
   EXPECT_EQ(SignFlip({0.0, 0.0, 0.0}).p, 1.0);
   EXPECT_EQ(SignFlip({0.0, 0.0, -0.3}).p, 1.0);
+  EXPECT_EQ(SignFlip({0.0, 0.0, -0.3}).least_p, 1.0);
   EXPECT_EQ(SignFlip(std::vector<double>(6, 0.2)).p, 2.0 / 64.0);
 }
 
@@ -213,6 +214,7 @@ TEST(Quantile, IsTheNearestRank) {
   std::iota(values.begin(), values.end(), 1.0);
   std::reverse(values.begin(), values.end());
   EXPECT_EQ(Quantile(values, 0.95), 19.0);
+  EXPECT_EQ(Quantile(values, 0.91), 19.0);
   EXPECT_EQ(Quantile(values, 1.0), 20.0);
   EXPECT_EQ(Quantile({3.0}, 0.95), 3.0);
   EXPECT_FALSE(Quantile({}, 0.95));

@@ -15,7 +15,8 @@ BIN = pathlib.Path(sys.argv[1])
 SERVICES = sys.argv[2:]
 SOURCES = ("lidar", "camera")  # these look for their device before anything else
 TOOLS = [["chase-flight"], ["chase-plan"], ["chase-predict"], ["chase-report"],
-         ["chase-log", "info"], ["chase-compare"], ["chase-scenario"]]
+         ["chase-log", "info"], ["chase-compare"], ["chase-scenario"],
+         ["chase-campaign", "--out", "no/such", "--scenarios"]]
 TOOL_SERVICES = {"lidar", "camera", "odometry", "mapping", "perception", "prediction", "planning",
                  "control", "simulator"}
 LIMIT = 20  # s
@@ -173,6 +174,9 @@ class BadUse(unittest.TestCase):
                                 (["chase-flight", gym, "--fault"],
                                  ("kill-simulator", "lidar-gap@60", "lidar-gap@-1", "kill-control@")),
                                 (["chase-compare", "--jobs"], ("nan", 0, 1.5, 10**20)),
+                                (["chase-campaign", "--out", "no/such", "--jobs"], ("nan", 0, 1.5)),
+                                (["chase-campaign", "--out", "no/such", "--duration"],
+                                 ("nan", -1, 0, "inf")),
                                 (["chase-log", "diff", "a.lcm", "b.lcm", "--tolerance"],
                                  ("nan", -1, "inf", "x"))):
             for value in values:
