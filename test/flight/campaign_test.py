@@ -18,6 +18,19 @@ HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 DIFFERS = ("plan_ms", "predict_ms", "cpu_s", "real_time_factor")  # from run to run
 
+SBATCH = """#!/bin/sh
+set -e
+for word; do
+  case $word in
+    --array=1-*) export SLURM_ARRAY_TASK_COUNT=3 ;;  # fewer tasks than flights
+    --wrap=*) sh -c "${word#--wrap=}" > /dev/null ;;
+    */flight.sbatch) script=$word ;;
+    */flights.txt) for i in 1 2 3; do SLURM_ARRAY_TASK_ID=$i "$script" "$word" > /dev/null; done ;;
+  esac
+done
+echo 7
+"""
+
 
 class Campaign(unittest.TestCase):
     def setUp(self):
@@ -165,6 +178,40 @@ class Campaign(unittest.TestCase):
         self.fly("--kinds", "hall", "--seeds", "19")
         self.assertIn("chase-world: no way through", self.results()[0][0]["why"])
 
+    def test_flight_ended_from_outside_leaves_no_result(self):
+        answer = self.fly("--seeds", "4,24", code=1)
+        self.assertRegex(answer.stderr.splitlines()[-1], "^chase-campaign: the flight gym_24: was told")
+        self.assertEqual([p.name for p in (self.out / "flights").iterdir()], ["gym_4.json"])
+
+    def test_device_is_not_replaced(self):
+        pipe = self.folder / "pipe"
+        os.mkfifo(pipe)
+        self.out.mkdir()
+        (self.out / "table.md").symlink_to(pipe)
+        self.assertIn("table.md: cannot be written", self.fly("--seeds", "4", code=1).stderr)
+        self.assertTrue(pipe.is_fifo())
+        self.assertEqual([p.name for p in self.out.glob("*.tmp")], [])
+
+    def test_sentinels_and_cluster(self):
+        """deploy/slurm/submit with a stand-in for sbatch that flies at once."""
+        lines = self.fly("--list", "--flights", HERE / "sentinels.csv").stdout.splitlines()
+        self.assertEqual(len(set(lines)), 48)
+        sbatch = self.folder / "tools" / "sbatch"
+        sbatch.parent.mkdir()
+        sbatch.write_text(SBATCH)
+        sbatch.chmod(0o755)
+        what = ["--seeds", "1-4", "--faults", "none,lidar-gap"]
+        self.fly(*what, out=self.folder / "direct")
+        environment = self.environment(0)
+        environment.update(PATH=f"{sbatch.parent}:{environment['PATH']}", CHASE_BIN=str(BIN))
+        submit = [ROOT / "deploy/slurm/submit", "chase-campaign", self.out, *what, "--programs",
+                  self.programs]
+        answer = subprocess.run(submit, capture_output=True, text=True, check=False, timeout=60,
+                                cwd=self.folder, env=environment)
+        self.assertEqual(answer.returncode, 0, answer.stderr)
+        self.assertEqual(self.flown(), 16, "each once here and once there")
+        self.assertEqual(self.results(), self.results(self.folder / "direct"))
+
     def test_duration_judges_the_part_that_was_asked_for(self):
         self.fly("--seeds", "4,1", "--duration", 30)
         self.assertEqual([f["outcome"] for f in self.results()[0]], ["passed", "collision"])
@@ -184,7 +231,7 @@ class Campaign(unittest.TestCase):
         return programs
 
     def test_comparison(self):
-        what = ["--kinds", "hall,yard", "--seeds", "20-40", "--quiet"]
+        what = ["--kinds", "hall,yard", "--seeds", "30-50", "--quiet"]
         before, worse = self.folder / "before", self.worse()
         self.fly(*what, out=before, programs=worse)
         self.fly(*what, "--compare", before, out=before, programs=worse)
@@ -196,9 +243,9 @@ class Campaign(unittest.TestCase):
             answer = self.fly(*what, "--compare", old, code=3, out=before, programs=worse).stdout
             self.assertRegex(answer, r"world:hall: 21 pairs\n  passed +1\d of 21 .* -> 8 of 21 ")
             self.assertRegex(answer, r"all: 42 pairs\n  passed .*: worse, p [0-9.e-]+, beyond chance\n")
-            self.assertIn("hall-24, seed 24: passed -> collision (collision with cylinder 3", answer)
+            self.assertIn("hall-34, seed 34: passed -> collision (collision with cylinder 3", answer)
             self.assertRegex(answer, r"Verdict: WORSE: .*passed of all")
-        other = ["--kinds", "hall,yard", "--seeds", "120-140", "--quiet"]
+        other = ["--kinds", "hall,yard", "--seeds", "130-150", "--quiet"]
         answer = self.fly(*other, "--compare", self.out, code=3, out=self.folder / "other",
                           programs=worse).stdout
         self.assertIn("all: 42 flights before, 42 now, no pairs", answer)

@@ -44,4 +44,4 @@ chase_test(campaign_statistics_test LIBS statistics
 add_test(NAME flight_campaign
   COMMAND python3 -B ${CMAKE_SOURCE_DIR}/test/flight/campaign_test.py ${bin}
   WORKING_DIRECTORY ${CMAKE_SOURCE_DIR})
-set_tests_properties(flight_campaign PROPERTIES TIMEOUT 300)
+set_tests_properties(flight_campaign PROPERTIES TIMEOUT 600)

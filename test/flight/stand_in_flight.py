@@ -46,6 +46,8 @@ def main():
     seed, fault = int(option("--seed")), option("--fault", "")
     if seed == 14:
         os.kill(os.getpid(), signal.SIGSEGV)
+    if seed == 24:
+        os.kill(os.getpid(), signal.SIGTERM)
     if seed == 15:
         print("chase-flight: no luck today; cure: another seed", file=sys.stderr)
         sys.exit(1)
