@@ -11,8 +11,8 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "common/world/fault.h"
 #include "common/world/scenario.h"
-#include "deploy/campaign/fault_names.h"
 #include "deploy/campaign/text_file.h"
 
 namespace chase::campaign {
@@ -53,7 +53,11 @@ int64_t Seed(const std::string& text, const std::string& all) {
 
 std::string CheckedFault(const std::string& fault) {
   if (fault.empty() || fault == "none") return "";
-  CheckFault(fault);
+  try {
+    world::ParseFault(fault);
+  } catch (const std::exception& e) {
+    throw std::runtime_error("fault '" + fault + "': " + e.what());
+  }
   return fault;
 }
 
@@ -146,6 +150,12 @@ std::vector<std::string> Expanded(const std::vector<std::string>& given,
       names.push_back(name);
     }
   }
+  return names;
+}
+
+std::vector<std::string> FaultNames() {
+  std::vector<std::string> names;
+  for (const world::FaultKind& kind : world::FaultKinds()) names.push_back(kind.name);
   return names;
 }
 

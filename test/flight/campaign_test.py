@@ -263,7 +263,7 @@ class Campaign(unittest.TestCase):
         for text, words in (("gym,4\nworld:lake,1\n", ":2: no kind of world 'lake'"),
                             ("gym\n", ":1: 'gym' is not scenario,seed,fault"),
                             ("gym,x\n", ":1: .*'x' is no seed"),
-                            ("gym,1,kill-joy\n", ":1: no fault 'kill-joy'"), ("#\n", "no flights")):
+                            ("gym,1,kill-joy\n", ":1: fault 'kill-joy': .*one of .*kill-planning"), ("#\n", "no flights")):
             path.write_text(text)
             self.assertRegex(self.fly("--flights", path, code=1).stderr, words)
 
@@ -277,7 +277,7 @@ class Campaign(unittest.TestCase):
                 (["--scenarios", broken], "no_such_key"),
                 (["--scenarios", f"gym,{twin}"], "same name"),
                 (["--kinds", "lake"], "no kind of world 'lake'.*hall, office"),
-                (["--faults", "kill-joy"], "no fault 'kill-joy'.*kill-planning"),
+                (["--faults", "kill-joy"], "fault 'kill-joy': .*one of .*kill-planning"),
                 (["--faults", "kill-planning@soon"], "'soon' is no mission time"),
                 (["--faults", "kill-planning@nan"], "'nan' is no mission time"),
                 (["--seeds", "5-1"], "'5-1'"), (["--seeds", ""], "seeds ''"),
@@ -299,6 +299,15 @@ class Campaign(unittest.TestCase):
         self.assertRegex(answer.stderr, "^chase-campaign: .*/chase-flight: no such program; .*\n$")
         answer = self.run_it(out="/proc/no/folder")
         self.assertRegex(answer.stderr.splitlines()[-1], "^chase-campaign: --out /proc/no/folder: ")
+
+    @unittest.skipUnless((BIN / "chase-world").exists(), "skipped: this build has no chase-world")
+    def test_kinds_are_those_of_chase_world(self):
+        text = subprocess.run([BIN / "chase-world", "--help"], capture_output=True, text=True,
+                              check=True).stdout
+        kinds = re.findall(r"^  (\w+) ", text.partition("Kinds:\n")[2], re.MULTILINE)
+        lines = self.fly("--list", "--kinds", "all").stdout.splitlines()
+        self.assertEqual([re.search(r"--kinds (\w+)", line)[1] for line in lines],
+                         [kind for kind in kinds if kind != "all"])
 
     @unittest.skipUnless((BIN / "chase-flight").exists(), "skipped: this build has no chase-flight")
     def test_real_flight(self):
