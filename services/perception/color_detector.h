@@ -1,5 +1,6 @@
 #pragma once
 
+#include <utility>
 #include <vector>
 
 #include "services/perception/color_model.h"
@@ -12,7 +13,9 @@ namespace chase::perception {
 class ColorDetector : public Detector {
  public:
   ColorDetector(const DetectorConfig& config, double edge_sigma_px)
-      : shape_(config.shape), color_(config.color), edge_sigma_px_(edge_sigma_px) {}
+      : ColorDetector(config.shape, ColorModel(config.color), edge_sigma_px) {}
+  ColorDetector(const ShapeConfig& shape, ColorModel color, double edge_sigma_px)
+      : shape_(shape), color_(std::move(color)), edge_sigma_px_(edge_sigma_px) {}
 
   std::vector<Detection> Detect(const cv::Mat& bgr) const override;
 

@@ -113,8 +113,7 @@ double Overlap(const ColorDetector& detector, const cv::Mat& bgr, const cv::Mat&
 }
 
 double MeanOverlap(const std::vector<cv::Mat>& images, const std::vector<cv::Mat>& masks,
-                   const DetectorConfig& config) {
-  const ColorDetector detector(config, 1.0);
+                   const ColorDetector& detector) {
   double sum = 0.0;
   for (size_t i = 0; i < images.size(); ++i) sum += Overlap(detector, images[i], masks[i]);
   return sum / static_cast<double>(images.size());
@@ -134,10 +133,11 @@ Learned LearnDetector(const std::vector<cv::Mat>& images, const std::vector<cv::
   config.color.white_balance = false;  // the pictures' own light is in the colours
   config.color = LearnColor(images, masks, config.color);
   const auto shapeless = LearnShape(images, masks, &config);
+  const ColorModel color(config.color);
   Learned best;
   for (int i = 0; i * kInsetStep <= kMostInset; ++i) {
     config.shape.inset = i * kInsetStep;
-    const double overlap = MeanOverlap(images, masks, config);
+    const double overlap = MeanOverlap(images, masks, ColorDetector(config.shape, color, 1.0));
     if (i == 0 || overlap > best.overlap) best = {config, overlap, shapeless};
   }
   return best;
