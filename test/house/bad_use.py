@@ -15,7 +15,7 @@ BIN = pathlib.Path(sys.argv[1])
 SERVICES = sys.argv[2:]
 SOURCES = ("lidar", "camera")  # these look for their device before anything else
 TOOLS = [["chase-flight"], ["chase-plan"], ["chase-predict"], ["chase-report"],
-         ["chase-log", "info"], ["chase-compare"], ["chase-scenario"],
+         ["chase-log", "info"], ["chase-compare"], ["chase-scenario"], ["chase-world"],
          ["chase-campaign", "--out", "no/such", "--scenarios"]]
 TOOL_SERVICES = {"lidar", "camera", "odometry", "mapping", "perception", "prediction", "planning",
                  "control", "simulator"}

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include "common/config/changes.h"
+
 namespace chase::config {
 namespace {
 
@@ -165,6 +167,26 @@ TEST(Config, BrokenYamlNamesTheLine) {
 TEST(Config, MissingFileIsNamed) {
   Outer config;
   EXPECT_THROW(Load("/no/such/file.yaml", &config), std::runtime_error);
+}
+
+TEST(Changes, HoldOnlyWhatDiffersAndLoadBack) {
+  EXPECT_EQ(DumpChanges(Outer{}), "");
+  Outer changed;
+  changed.speed = 0.1 + 0.2;
+  changed.inner.label = "two\nlines: \"quoted\"\n";
+  changed.gains.assign(60, 0.125);
+  changed.items = {Inner{}, Inner{4, std::string(120, 'x')}, Inner{5, "a, [b"}};
+  const std::string text = DumpChanges(changed);
+  EXPECT_EQ(text.find("offset"), text.npos);
+  EXPECT_EQ(text.find("count: 3"), text.npos);
+  Outer loaded;
+  LoadText(text, "changes", &loaded);
+  EXPECT_EQ(Dump(loaded), Dump(changed)) << text;
+  Outer base;
+  base.speed = 7.0;
+  Outer over = base;
+  over.on = false;
+  EXPECT_EQ(DumpChanges(over, base), "on: false\n");
 }
 
 }  // namespace

@@ -175,5 +175,20 @@ TEST(Camera, NoiseHasItsSpreadAndFollowsTheSeed) {
   EXPECT_NEAR(std::sqrt(variance / n), 4.0, 0.2);
 }
 
+/// A box that stands in the open is seen wholly whichever way it is turned.
+TEST(Camera, TargetOfAnyShapeIsSeenWhollyInTheOpen) {
+  for (const char* shape : {"box", "sphere"})
+    for (const double heading : {0.0, 0.4, 0.8}) {
+      world::Scenario world;
+      world.target.shape = shape;
+      world.target.radius = 0.25;
+      world.target.base = 0.5;
+      world.target.carrier_size.setZero();
+      world.target.waypoints = {{3.0, 0.0}, {3.0 + std::cos(heading), std::sin(heading)}};
+      const Shot shot(world, {0.0, 0.0, 1.0}, Yaw(0.0));
+      EXPECT_NEAR(shot.view.visible_share, 1.0, 1e-9) << shape << " " << heading;
+    }
+}
+
 }  // namespace
 }  // namespace chase::simulator

@@ -81,6 +81,23 @@ TEST(Quadrotor, ThrustModelErrorSinksAHover) {
   EXPECT_NEAR(quadrotor.state().a.z(), -0.02 * kGravity, 1e-6);
 }
 
+TEST(Quadrotor, AHeavierBodySinksAndABentCurveGivesLess) {
+  VehicleConfig heavy = Ideal();
+  heavy.mass_error = 0.1;
+  Quadrotor sinking(heavy, At(100.0), Abyss);
+  VehicleConfig bent = Ideal();
+  bent.thrust_curve = 0.2;
+  Quadrotor weak(bent, At(100.0), Abyss), full(bent, At(100.0), Abyss);
+  for (int i = 0; i < 1000; ++i) {
+    sinking.Step({kGravity, kStill}, kStill, kDt);
+    weak.Step({0.5 * bent.max_thrust, kStill}, kStill, kDt);
+    full.Step({bent.max_thrust, kStill}, kStill, kDt);
+  }
+  EXPECT_NEAR(sinking.state().a.z(), kGravity / 1.1 - kGravity, 1e-6);
+  EXPECT_NEAR(weak.state().a.z(), 0.9 * 0.5 * bent.max_thrust - kGravity, 1e-6);
+  EXPECT_NEAR(full.state().a.z(), bent.max_thrust - kGravity, 1e-6);
+}
+
 TEST(Quadrotor, TorqueTurnsAboutItsOwnAxis) {
   const VehicleConfig config = Ideal();
   for (int axis = 0; axis < 3; ++axis) {
@@ -111,6 +128,17 @@ TEST(Quadrotor, StandsStillOnItsLegs) {
   EXPECT_NEAR(quadrotor.state().p.z(), StandingHeight(config), 1e-6);
   EXPECT_LT(quadrotor.state().v.norm() + quadrotor.state().w.norm(), 1e-6);
   EXPECT_LT(quadrotor.state().a.norm(), 1e-4);
+}
+
+TEST(Quadrotor, StandsOnASlope) {
+  const VehicleConfig config = Ideal();
+  const auto slope = [](double x, double) { return 0.2 * x; };
+  Quadrotor quadrotor(config, At(StandingHeight(config) + 0.02), slope);
+  for (int i = 0; i < 4000; ++i) quadrotor.Step({}, kStill, kDt);
+  EXPECT_TRUE(quadrotor.on_ground());
+  EXPECT_LT(quadrotor.state().v.norm(), 0.01);
+  const Vector3d up = quadrotor.state().q * Vector3d::UnitZ();
+  EXPECT_NEAR(std::atan2(-up.x(), up.z()), std::atan(0.2), 0.02);
 }
 
 TEST(Quadrotor, LandsFromAFallAndASlide) {

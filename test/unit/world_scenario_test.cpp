@@ -124,6 +124,17 @@ TEST(Fault, TimesAreDrawnFromTheSeedAndTheNumberAlone) {
   EXPECT_EQ(Settled({"kill-planning", 7.0}, 100.0, 3, 0).at, 7.0);
 }
 
+TEST(ScenarioFile, MotionsThatMakeNoSenseAreRefused) {
+  EXPECT_CONTAINS(Refusal(kGood + "  stops: [{waypoint: 2}]\n"), "stops is at a waypoint beyond");
+  EXPECT_CONTAINS(Refusal(kGood + "  stops: [{waypoint: 1, duration: -1}]\n"), "duration is -1");
+  EXPECT_CONTAINS(Refusal(kGood + "  shape: cone\n"), "'cone'");
+  EXPECT_CONTAINS(Refusal(kGood + "  shape: sphere\n"), "twice the radius");
+  EXPECT_CONTAINS(Refusal(kGood + "world: {ground: {slope: [2, 0]}}\n"), "slope is 2");
+  const std::string mover = "movers: [{waypoints: [[0, 0, 1], [1, 0, 1]], times: ";
+  EXPECT_CONTAINS(Refusal(kGood + mover + "[1]}]\n"), "times is 1 numbers");
+  EXPECT_CONTAINS(Refusal(kGood + mover + "[1, 1]}]\n"), "times is out of order");
+}
+
 TEST(ScenarioFile, NothingIsGivenTwice) {
   EXPECT_CONTAINS(Refusal(kGood + "duration_s: 9\nname: other\n"),
                   "s.yaml:7: 'name' is given twice");
@@ -212,6 +223,29 @@ TEST(Path, CornersAreRoundedToTheRadius) {
   EXPECT_GT(on_arc, 200);
 }
 
+TEST(Path, SlowsDownInCornersAndStops) {
+  Random random(7);
+  for (int n = 0; n < 20; ++n) {
+    SCOPED_TRACE("draw " + std::to_string(n) + " of seed 7");
+    const auto points = RandomWaypoints(&random);
+    const PathLimits limits{random.Uniform(0.5, 3.0), random.Uniform(0.3, 1.5), 1.0};
+    const double rest = random.Uniform(0.0, 3.0);
+    const PathMotion path(points, limits, 0.5, {{0, 1.5}, {4, rest}});
+    EXPECT_EQ(path.Position(1.5), points.front());
+    EXPECT_NE(path.Position(1.7), points.front());
+    EXPECT_GT(path.Direction(0.0).dot((points[1] - points[0]).normalized()), 0.999);
+    double rested = 0.0;
+    for (double t = 0.0; t < path.Duration() - 0.02; t += 0.01) {
+      EXPECT_LE(path.Velocity(t).norm(), 1.02 * limits.speed);
+      const Vector2d a = (path.Velocity(t + 0.02) - path.Velocity(t)) / 0.02;
+      EXPECT_LE(a.norm(), 1.1 * std::hypot(limits.acceleration, limits.lateral) + 0.05) << t;
+      if (path.Velocity(t).norm() < 1e-6 && (path.Position(t) - points[4]).norm() < 1e-6)
+        rested += 0.01;
+    }
+    EXPECT_NEAR(rested, rest, 0.05);
+  }
+}
+
 TEST(Path, OneWaypointStandsStill) {
   const PathMotion path({{1.0, 2.0}}, 1.0, 0.5, 0.8);
   EXPECT_EQ(path.Position(3.0), Vector2d(1.0, 2.0));
@@ -234,6 +268,44 @@ TEST(Mover, WaitsRunsAndStops) {
   EXPECT_NEAR(
       (MoverAt(mover, 1.0 + 1.0 + 0.5 * round).solid.center - Vector3d(2.0, 0.0, 1.0)).norm(), 0.0,
       1e-9);
+}
+
+TEST(Mover, KeepsItsTimes) {
+  MoverSpec mover;
+  mover.waypoints = {{0.0, 0.0, 1.0}, {4.0, 0.0, 1.0}, {4.0, 0.0, 1.0}, {2.0, 0.0, 1.0}};
+  mover.times = {1.0, 3.0, 5.0, 9.0};
+  const auto x = [&](double t) { return MoverAt(mover, t).solid.center.x(); };
+  const auto v = [&](double t) { return MoverAt(mover, t).velocity.x(); };
+  EXPECT_EQ(x(-1.0), 0.0);
+  EXPECT_EQ(v(-1.0), 0.0);
+  EXPECT_NEAR(x(2.0), 2.0, 1e-12);
+  EXPECT_EQ(v(2.0), 2.0);
+  EXPECT_EQ(x(4.0), 4.0);
+  EXPECT_EQ(v(4.0), 0.0);
+  EXPECT_EQ(MoverAt(mover, 4.0).solid.yaw, 0.0);  // faces on
+  EXPECT_NEAR(x(7.0), 3.0, 1e-12);
+  EXPECT_EQ(v(7.0), -0.5);
+  EXPECT_EQ(x(99.0), 2.0);
+  EXPECT_EQ(v(99.0), 0.0);
+}
+
+TEST(Target, IsOfThreeShapes) {
+  TargetSpec target;
+  EXPECT_EQ(TargetSolid(target, Vector3d::Zero(), 0.3).kind, Solid::Kind::kCylinder);
+  target.shape = "box";
+  EXPECT_EQ(TargetSolid(target, Vector3d::Zero(), 0.3).yaw, 0.3);
+  target.shape = "sphere";
+  target.height = 0.3;
+  const Solid ball = TargetSolid(target, Vector3d(1.0, 2.0, 3.0), 0.3);
+  for (const Vector3d& d : {Vector3d(1, 0, 0), Vector3d(0, 0, 1), Vector3d(0.6, 0, 0.8)})
+    EXPECT_NEAR(SignedDistance(ball, Vector3d(1.0, 2.0, 3.0) + 0.15 * d), 0.0, 1e-9);
+}
+
+TEST(Ground, RisesAlongItsSlope) {
+  GroundSpec ground;
+  ground.slope = {0.1, -0.2};
+  EXPECT_NEAR(GroundHeight(ground, 10.0, 5.0), 0.0, 1e-12);
+  EXPECT_NEAR(GroundHeight(ground, 10.0, 0.0), 1.0, 1e-12);
 }
 
 TEST(Ground, StaysWithinItsRoughness) {
