@@ -152,7 +152,9 @@ std::optional<Scenario> Slope(const Options& options, Random* random) {
   const Area area = Centred(56.0, 44.0);
   Scenario scenario;
   const double rise = std::tan(random->Uniform(4.0, 12.0) * kPi / 180.0);
-  scenario.world.ground.slope = Polar(random->Uniform(0.0, 2.0 * kPi), rise);
+  const Vector2d uphill = Polar(random->Uniform(0.0, 2.0 * kPi), rise);
+  // As the file will have it: at 25 m the fourth decimal is a centimetre of height.
+  scenario.world.ground.slope = {RoundTo(uphill.x(), 1e-3), RoundTo(uphill.y(), 1e-3)};
   scenario.world.ground.roughness = random->Uniform(0.0, 0.1);
   const TourPlan plan{4.0, 4.0, random->Uniform(2.8, 4.0), 14};
   if (!SendAround(area, plan, {0.5, 2.5, 0.8, 1.0, 5.0}, options, random, &scenario))
