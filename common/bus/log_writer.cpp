@@ -1,12 +1,11 @@
 #include "common/bus/log_writer.h"
 
-#include <cstdio>
 #include <stdexcept>
 
 namespace chase::bus {
 
 LogWriter::LogWriter(const std::string& file)
-    : file_(file), log_(std::make_unique<lcm::LogFile>(file + ".tmp", "w")) {
+    : file_(file), part_(file), log_(std::make_unique<lcm::LogFile>(part_.name(), "w")) {
   if (!log_->good())
     throw std::runtime_error(file + ": cannot be written; check the folder and its rights");
 }
@@ -24,7 +23,7 @@ void LogWriter::Write(int64_t utime, const std::string& channel,
 
 void LogWriter::Close() {
   log_.reset();
-  if (failed_ || std::rename((file_ + ".tmp").c_str(), file_.c_str()) != 0)
+  if (failed_ || !part_.Complete())
     throw std::runtime_error(file_ + ": could not be completed; is the disk full?");
 }
 

@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "common/bus/part_file.h"
+
 namespace chase::bus {
 
 /// Writes an LCM log beside its final name and renames it when closed, so that a broken run leaves
@@ -20,6 +22,7 @@ class LogWriter {
 
  private:
   std::string file_;
+  PartFile part_;
   std::unique_ptr<lcm::LogFile> log_;
   bool failed_ = false;
 };

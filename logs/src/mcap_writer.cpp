@@ -1,7 +1,6 @@
 #include "logs/src/mcap_writer.h"
 
 #include <algorithm>
-#include <cstdio>
 #include <stdexcept>
 #include <type_traits>
 
@@ -54,14 +53,10 @@ class Content {
 }  // namespace
 
 McapWriter::McapWriter(const std::string& file)
-    : file_(file), out_(file + ".tmp", std::ios::binary) {
+    : file_(file), part_(file), out_(part_.name(), std::ios::binary) {
   if (!out_)
     throw std::runtime_error(file + ": cannot be written; check the folder and its rights");
   Put(kMagic + Content().Text("").Text("chase-log").Record(kHeader));
-}
-
-McapWriter::~McapWriter() {
-  if (!closed_) std::remove((file_ + ".tmp").c_str());
 }
 
 void McapWriter::Put(const std::string& bytes) {
@@ -164,9 +159,8 @@ void McapWriter::Close() {
   Put(SummaryRecords());
   Put(Content().Number(summary).Number(uint64_t{0}).Number(uint32_t{0}).Record(kFooter) + kMagic);
   out_.close();
-  if (!out_ || std::rename((file_ + ".tmp").c_str(), file_.c_str()) != 0)
+  if (!out_ || !part_.Complete())
     throw std::runtime_error(file_ + ": could not be completed; is the disk full?");
-  closed_ = true;
 }
 
 }  // namespace chase::logs

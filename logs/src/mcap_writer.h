@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "common/bus/part_file.h"
+
 namespace chase::logs {
 
 /// Writes an MCAP file (mcap.dev, version 0): uncompressed chunks with message indexes and a
@@ -16,7 +18,6 @@ class McapWriter {
   explicit McapWriter(const std::string& file);
   McapWriter(const McapWriter&) = delete;
   McapWriter& operator=(const McapWriter&) = delete;
-  ~McapWriter();
 
   bool HasChannel(const std::string& topic) const { return channels_.count(topic) > 0; }
   /// `schema` is a JSON schema.
@@ -44,6 +45,7 @@ class McapWriter {
   std::string SummaryRecords() const;
 
   std::string file_;
+  bus::PartFile part_;
   std::ofstream out_;
   uint64_t written_ = 0;
   std::map<std::string, Channel> channels_;
@@ -54,7 +56,6 @@ class McapWriter {
   std::vector<ChunkIndex> chunks_;
   std::map<uint16_t, uint64_t> counts_;
   uint64_t first_ns_ = 0, last_ns_ = 0;
-  bool closed_ = false;
 };
 
 }  // namespace chase::logs

@@ -1,6 +1,5 @@
 #include "logs/src/output.h"
 
-#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <stdexcept>
@@ -8,31 +7,19 @@
 namespace chase::logs {
 
 void WriteFile(const std::string& file, const std::string& text) {
-  const std::string temporary = file + ".tmp";
-  std::ofstream out(temporary, std::ios::binary);
+  bus::PartFile part(file);
+  std::ofstream out(part.name(), std::ios::binary);
   if (!out) throw std::runtime_error(file + ": cannot be written; check the folder and its rights");
   out << text;
   out.close();
-  if (out && std::rename(temporary.c_str(), file.c_str()) == 0) return;
-  std::remove(temporary.c_str());
+  if (out && part.Complete()) return;
   throw std::runtime_error(file + ": could not be completed; is the disk full?");
 }
 
 void RequireWritable(const std::string& file) {
-  const std::string temporary = file + ".tmp";
-  const bool opened = !std::filesystem::is_directory(file) && std::ofstream(temporary).is_open();
-  std::remove(temporary.c_str());
-  if (!opened)
+  const bus::PartFile part(file);
+  if (std::filesystem::is_directory(file) || !std::ofstream(part.name()).is_open())
     throw std::runtime_error(file + ": cannot be written; check the folder and its rights");
-}
-
-OutputLog::~OutputLog() {
-  if (!closed_) std::remove((file_ + ".tmp").c_str());
-}
-
-void OutputLog::Close() {
-  writer_.Close();
-  closed_ = true;
 }
 
 }  // namespace chase::logs

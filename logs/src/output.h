@@ -17,10 +17,7 @@ void RequireWritable(const std::string& file);
 /// A log that appears under its name when closed and leaves nothing behind when not.
 class OutputLog {
  public:
-  explicit OutputLog(const std::string& file) : file_(file), writer_(file) {}
-  OutputLog(const OutputLog&) = delete;
-  OutputLog& operator=(const OutputLog&) = delete;
-  ~OutputLog();
+  explicit OutputLog(const std::string& file) : writer_(file) {}
 
   template <class T>
   void Write(int64_t utime, const std::string& channel, const T& message) {
@@ -28,12 +25,10 @@ class OutputLog {
     message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
     writer_.Write(utime, channel, bytes);
   }
-  void Close();
+  void Close() { writer_.Close(); }
 
  private:
-  std::string file_;
   bus::LogWriter writer_;
-  bool closed_ = false;
 };
 
 }  // namespace chase::logs

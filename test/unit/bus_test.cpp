@@ -1,15 +1,18 @@
 #include "common/bus/bus.h"
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cstdio>
+#include <filesystem>
 #include <fstream>
 #include <iterator>
 
 #include "common/bus/convert.h"
 #include "common/bus/lockstep.h"
 #include "common/bus/log_bus.h"
+#include "common/bus/part_file.h"
 
 namespace chase::bus {
 namespace {
@@ -120,6 +123,34 @@ TEST(LogBus, MissingInputIsAnErrorAndLeavesNoOutput) {
     EXPECT_THROW(bus.Run(&echo), std::runtime_error);
   }
   EXPECT_NE(access(out.c_str(), F_OK), 0);
+}
+
+TEST(PartFile, StandsInForAFileUntilItIsComplete) {
+  const std::string file = TempFile("part");
+  std::remove(file.c_str());
+  {
+    PartFile part(file);
+    std::ofstream(part.name()) << "half";
+  }
+  EXPECT_FALSE(std::filesystem::exists(file));
+  PartFile part(file);
+  std::ofstream(part.name()) << "whole";
+  EXPECT_TRUE(part.Complete());
+  EXPECT_EQ(std::filesystem::file_size(file), 5u);
+  EXPECT_FALSE(std::filesystem::exists(file + ".tmp"));
+}
+
+TEST(PartFile, NeverReplacesADeviceOrAPipe) {
+  const std::string pipe = TempFile("pipe");
+  std::remove(pipe.c_str());
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  {
+    PartFile part(pipe);
+    EXPECT_EQ(part.name(), pipe);
+    EXPECT_TRUE(part.Complete());
+  }
+  EXPECT_TRUE(std::filesystem::is_fifo(pipe));
+  std::remove(pipe.c_str());
 }
 
 TEST(Convert, ObstaclesSurviveTheWire) {
