@@ -76,7 +76,8 @@ struct Lockstep::Process {
     room.clear();
   }
   void Keep(const Event& event) {
-    buffer -= static_cast<int64_t>(event.bytes->size());  // a part of what does not fit fills it
+    // A part of what does not fit fills it.
+    buffer -= static_cast<int64_t>(event.bytes->size()) + kPerMessage;
     if (buffer < 0 || life->port.Handler(event.channel) == nullptr) return;
     if (room.emplace(event.channel, QueueCapacity(event.channel)).first->second-- > 0)
       inbox.push_back(event);

@@ -171,7 +171,7 @@ TEST(LockstepFreeze, HandlesWhatFoundRoomInOrderAtTheThaw) {
   }
 }
 
-TEST(LockstepFreeze, TheSocketHoldsTheOldestTwoMebibytesOfAllThatIsSent) {
+TEST(LockstepFreeze, TheSocketHoldsTheOldestFourMebibytesOfAllThatIsSent) {
   for (uint64_t seed = 1; seed <= 10; ++seed) {
     SCOPED_TRACE(seed);
     world::Random random(seed);
@@ -187,11 +187,11 @@ TEST(LockstepFreeze, TheSocketHoldsTheOldestTwoMebibytesOfAllThatIsSent) {
     int64_t bytes = 0;
     size_t kept = 0, kept_sweeps = 0;
     for (const int64_t t : Arriving(freeze, thaw)) {  // a sample, then perhaps a sweep
-      bytes += imu_t{}.getEncodedSize();
-      kept += bytes <= 2 * 1024 * 1024;
+      bytes += imu_t{}.getEncodedSize() + kPerMessage;
+      kept += bytes <= 4 * 1024 * 1024;
       if ((t - kStart) % (4 * kPeriod) != 0) continue;
-      bytes += Scan(t, points).getEncodedSize();
-      kept_sweeps += bytes <= 2 * 1024 * 1024 && kept_sweeps < 10;
+      bytes += Scan(t, points).getEncodedSize() + kPerMessage;
+      kept_sweeps += bytes <= 4 * 1024 * 1024 && kept_sweeps < 10;
     }
     EXPECT_EQ(story.samples.size(),
               Arriving(0, freeze).size() + kept + Arriving(thaw, 2500137).size());
