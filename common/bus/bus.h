@@ -5,6 +5,7 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "common/bus/stage_clock.h"
@@ -46,7 +47,7 @@ class Bus {
     message.seq = next_seq_[channel]++;
     Bytes bytes(static_cast<size_t>(message.getEncodedSize()));
     message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
-    PublishRaw(channel, bytes);
+    PublishRaw(channel, std::move(bytes));
   }
 
   /// Time of the event being handled, microseconds: logical where the backend is, else the wall's.
@@ -64,7 +65,7 @@ class Bus {
 
  protected:
   virtual void SubscribeRaw(const std::string& channel, RawHandler handler) = 0;
-  virtual void PublishRaw(const std::string& channel, const Bytes& bytes) = 0;
+  virtual void PublishRaw(const std::string& channel, Bytes bytes) = 0;
 
  private:
   template <class T>

@@ -4,6 +4,7 @@
 #include <ctime>
 #include <deque>
 #include <stdexcept>
+#include <utility>
 
 #include "common/bus/channels.h"
 #include "common/bus/live_loop.h"
@@ -36,8 +37,8 @@ class Lockstep::Port : public Bus {
   void SubscribeRaw(const std::string& channel, RawHandler handler) override {
     handlers_[channel] = std::move(handler);
   }
-  void PublishRaw(const std::string& channel, const Bytes& bytes) override {
-    lockstep_->Send(lockstep_->now_ + latency_, channel, bytes);
+  void PublishRaw(const std::string& channel, Bytes bytes) override {
+    lockstep_->Send(lockstep_->now_ + latency_, channel, std::move(bytes));
   }
 
  private:
@@ -153,8 +154,9 @@ void Lockstep::CatchUp(Process* process) {
 
 std::unique_ptr<Bus> Lockstep::Connect() { return std::make_unique<Port>(this, 0); }
 
-void Lockstep::Send(int64_t utime, const std::string& channel, const Bus::Bytes& bytes) {
-  events_.push({utime, order_++, channel, std::make_shared<const Bus::Bytes>(bytes), nullptr});
+void Lockstep::Send(int64_t utime, const std::string& channel, Bus::Bytes bytes) {
+  events_.push(
+      {utime, order_++, channel, std::make_shared<const Bus::Bytes>(std::move(bytes)), nullptr});
 }
 
 void Lockstep::Call(int64_t utime, std::function<void()> call) {

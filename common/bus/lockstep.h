@@ -79,7 +79,7 @@ class Lockstep {
     }
   };
 
-  void Send(int64_t utime, const std::string& channel, const Bus::Bytes& bytes);
+  void Send(int64_t utime, const std::string& channel, Bus::Bytes bytes);
   void Call(int64_t utime, std::function<void()> call);
   Process& Find(const std::string& name) const;
   void Begin(Process* process);

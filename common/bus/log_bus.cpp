@@ -10,7 +10,7 @@ void LogBus::SubscribeRaw(const std::string& channel, RawHandler handler) {
   handlers_[channel] = std::move(handler);
 }
 
-void LogBus::PublishRaw(const std::string& channel, const Bytes& bytes) {
+void LogBus::PublishRaw(const std::string& channel, Bytes bytes) {
   out_.Write(now_, channel, bytes);
 }
 

@@ -25,7 +25,7 @@ class LogBus : public Bus {
 
  protected:
   void SubscribeRaw(const std::string& channel, RawHandler handler) override;
-  void PublishRaw(const std::string& channel, const Bytes& bytes) override;
+  void PublishRaw(const std::string& channel, Bytes bytes) override;
 
  private:
   std::string in_;

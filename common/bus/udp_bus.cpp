@@ -62,7 +62,7 @@ void UdpBus::SubscribeRaw(const std::string& channel, RawHandler handler) {
   subscription->setQueueCapacity(QueueCapacity(channel));
 }
 
-void UdpBus::PublishRaw(const std::string& channel, const Bytes& bytes) {
+void UdpBus::PublishRaw(const std::string& channel, Bytes bytes) {
   if (lcm_.publish(prefix_ + channel, bytes.data(), static_cast<unsigned>(bytes.size())) != 0)
     ReportError(fmt::format("{}: could not be sent ({} bytes)", channel, bytes.size()));
 }

@@ -28,7 +28,7 @@ class UdpBus : public Bus {
 
  protected:
   void SubscribeRaw(const std::string& channel, RawHandler handler) override;
-  void PublishRaw(const std::string& channel, const Bytes& bytes) override;
+  void PublishRaw(const std::string& channel, Bytes bytes) override;
 
  private:
   lcm::LCM lcm_;

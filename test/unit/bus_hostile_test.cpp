@@ -16,7 +16,7 @@ class WireBus : public Bus {
 
  protected:
   void SubscribeRaw(const std::string&, RawHandler handler) override { handler_ = handler; }
-  void PublishRaw(const std::string&, const Bytes&) override {}
+  void PublishRaw(const std::string&, Bytes) override {}
 
  private:
   RawHandler handler_;

@@ -25,7 +25,7 @@ class MemoryBus : public bus::Bus {
   void SubscribeRaw(const std::string& channel, RawHandler handler) override {
     handlers_[channel] = std::move(handler);
   }
-  void PublishRaw(const std::string& channel, const Bytes& bytes) override {
+  void PublishRaw(const std::string& channel, Bytes bytes) override {
     ASSERT_EQ(channel, "PREDICTION");
     prediction_t message;
     ASSERT_GT(message.decode(bytes.data(), 0, static_cast<int>(bytes.size())), 0);
