@@ -112,23 +112,25 @@ void Lidar::Advance(const std::vector<TimedPose>& poses, const Scene& scene) {
   }
 }
 
+/// Makes the i-th sequence from here the i-th ray of every ring's packet.
+void Lidar::Aim(const TimedPose& body, int i, RayPacket* rays) const {
+  const Vector3f origin = (body.p + body.q * p_BL_).cast<float>();
+  const Eigen::Matrix3f R_WL = (body.q * q_BL_).toRotationMatrix().cast<float>();
+  const Vector3f* directions = &directions_[static_cast<std::size_t>((firing_ + i) * kRings)];
+  for (int ring = 0; ring < kRings; ++ring) {
+    const Vector3f d = R_WL * directions[ring];
+    rays[ring].ox[i] = origin.x(), rays[ring].oy[i] = origin.y(), rays[ring].oz[i] = origin.z();
+    rays[ring].dx[i] = d.x(), rays[ring].dy[i] = d.y(), rays[ring].dz[i] = d.z();
+  }
+}
+
 /// Fires n sequences, at most eight. A packet is one ring's rays of all of them: they lie closer
 /// together than the rings of one.
 void Lidar::Fire(const TimedPose* bodies, int n, const Scene& scene) {
   RayPacket rays[kRings];
   HitPacket hits[kRings];
   for (RayPacket& packet : rays) packet.count = n;
-  for (int i = 0; i < n; ++i) {
-    const Vector3f origin = (bodies[i].p + bodies[i].q * p_BL_).cast<float>();
-    const Eigen::Matrix3f R_WL = (bodies[i].q * q_BL_).toRotationMatrix().cast<float>();
-    const Vector3f* directions = &directions_[static_cast<std::size_t>((firing_ + i) * kRings)];
-    for (int ring = 0; ring < kRings; ++ring) {
-      const Vector3f d = R_WL * directions[ring];
-      RayPacket& packet = rays[ring];
-      packet.ox[i] = origin.x(), packet.oy[i] = origin.y(), packet.oz[i] = origin.z();
-      packet.dx[i] = d.x(), packet.dy[i] = d.y(), packet.dz[i] = d.z();
-    }
-  }
+  for (int i = 0; i < n; ++i) Aim(bodies[i], i, rays);
   for (int ring = 0; ring < kRings; ring += kMostPackets)
     scene.Trace(&rays[ring], kMostPackets, &hits[ring]);
   for (int i = 0; i < n; ++i, ++firing_)

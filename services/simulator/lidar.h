@@ -73,6 +73,7 @@ class Lidar {
 
  private:
   double FiringTime(int firing) const;
+  void Aim(const TimedPose& body, int i, RayPacket* rays) const;
   void Fire(const TimedPose* bodies, int n, const Scene& scene);
   void Record(int ring, const RayPacket& rays, const HitPacket& hits, int i);
 

@@ -5,6 +5,7 @@
 #include <fstream>
 #include <sstream>
 #include <stdexcept>
+#include <utility>
 
 #include "chase/camera_image_t.hpp"
 #include "chase/event_t.hpp"
@@ -63,8 +64,8 @@ void SimulatorNode::Tick(int64_t utime) {
   }
   PublishFaults(output.truth.mission_time, utime);
   PublishImu(output.imu, utime);
-  if (output.sweep && !faults_.LidarSilent()) PublishSweep(*output.sweep);
-  if (output.image) PublishImage(*output.image, utime);
+  if (output.sweep && !faults_.LidarSilent()) PublishSweep(std::move(*output.sweep));
+  if (output.image) PublishImage(std::move(*output.image), utime);
   if (ticks_ % kTruthTicks == 0) PublishTruth(output.truth, utime);
   if (ticks_ % kScenarioTicks == 0) PublishScenario(utime);
   if (truth_feed_) truth_feed_->Publish(output.truth, utime, ticks_);
@@ -90,20 +91,20 @@ void SimulatorNode::PublishImu(const ImuSample& sample, int64_t utime) {
   bus_.Publish("IMU", message);
 }
 
-void SimulatorNode::PublishSweep(const Sweep& sweep) {
+void SimulatorNode::PublishSweep(Sweep sweep) {
   lidar_scan_t message{};
   message.utime = bus::Utime(sweep.start, *power_on_);
   message.size = static_cast<int32_t>(sweep.x.size());
-  message.x = sweep.x;
-  message.y = sweep.y;
-  message.z = sweep.z;
-  message.t = sweep.t;
-  message.intensity = sweep.intensity;
-  message.ring = sweep.ring;
-  bus_.Publish("LIDAR_SCAN", message);
+  message.x = std::move(sweep.x);
+  message.y = std::move(sweep.y);
+  message.z = std::move(sweep.z);
+  message.t = std::move(sweep.t);
+  message.intensity = std::move(sweep.intensity);
+  message.ring = std::move(sweep.ring);
+  bus_.Publish("LIDAR_SCAN", std::move(message));
 }
 
-void SimulatorNode::PublishImage(const Image& image, int64_t utime) {
+void SimulatorNode::PublishImage(Image image, int64_t utime) {
   camera_image_t message{};
   message.utime = utime;
   message.width = image.width;
@@ -112,8 +113,8 @@ void SimulatorNode::PublishImage(const Image& image, int64_t utime) {
   message.pixelformat = camera_image_t::PIXEL_FORMAT_RGB;
   message.exposure = image.exposure;
   message.size = static_cast<int32_t>(image.rgb.size());
-  message.data = image.rgb;
-  bus_.Publish("CAMERA_IMAGE", message);
+  message.data = std::move(image.rgb);
+  bus_.Publish("CAMERA_IMAGE", std::move(message));
 }
 
 void SimulatorNode::PublishTruth(const Truth& truth, int64_t utime) {

@@ -28,8 +28,8 @@ class SimulatorNode : public bus::Node {
  private:
   void OnSetpoint(const attitude_setpoint_t& message);
   void PublishImu(const ImuSample& sample, int64_t utime);
-  void PublishSweep(const Sweep& sweep);
-  void PublishImage(const Image& image, int64_t utime);
+  void PublishSweep(Sweep sweep);
+  void PublishImage(Image image, int64_t utime);
   void PublishTruth(const Truth& truth, int64_t utime);
   void PublishScenario(int64_t utime);
   void PublishFaults(double mission_time, int64_t utime);
