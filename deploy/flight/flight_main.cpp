@@ -1,4 +1,5 @@
 #include <fmt/format.h>
+#include <malloc.h>
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
@@ -28,16 +29,18 @@ struct Arguments {
 constexpr double kStep = 0.1;            // s of the flight at a time
 constexpr double kAfterCollision = 0.2;  // s that are still flown
 
-/// Decodes what the progress line and the end of the flight need out of the stream of messages.
+/// Decodes what the progress line and the end of the flight, where they are asked for, need out of
+/// the stream of messages.
 void Observe(const std::string& channel, const bus::Bus::Bytes& bytes, Progress* progress,
              CollisionWatch* watch) {
   const int size = static_cast<int>(bytes.size());
   scenario_t scenario;
   truth_t truth;
-  if (channel == "SCENARIO" && scenario.decode(bytes.data(), 0, size) > 0)
+  if (progress != nullptr && channel == "SCENARIO" && scenario.decode(bytes.data(), 0, size) > 0)
     progress->SetScenario(scenario);
+  if (progress == nullptr && watch == nullptr) return;
   if (channel != "TRUTH" || truth.decode(bytes.data(), 0, size) <= 0) return;
-  progress->Add(truth);
+  if (progress != nullptr) progress->Add(truth);
   if (watch != nullptr) watch->Add(truth);
 }
 
@@ -134,7 +137,8 @@ int Fly(const world::Scenario& scenario, const Arguments& arguments) {
   flight.lockstep().SetTap(
       [&](int64_t utime, const std::string& channel, const bus::Bus::Bytes& bytes) {
         recording.Write(utime, channel, bytes);
-        Observe(channel, bytes, &progress, arguments.end_on_collision ? &watch : nullptr);
+        Observe(channel, bytes, arguments.quiet ? nullptr : &progress,
+                arguments.end_on_collision ? &watch : nullptr);
       });
   const double factor = FlyAll(scenario, arguments, progress, watch, &flight);
   const auto record = Record(recording.Close(), flight.lockstep(), factor);
@@ -187,6 +191,9 @@ void AddOptions(CLI::App* app, Arguments* a) {
 /// Flies a scenario with all nodes in lockstep. Exit codes: 0 flown and the criteria hold, 1 bad
 /// use, 2 flown and a criterion failed.
 int main(int argc, char** argv) {
+  // Sweeps and images come and go by the megabyte: the kernel need not take back and clear them.
+  mallopt(M_MMAP_THRESHOLD, 32 << 20);
+  mallopt(M_TRIM_THRESHOLD, 256 << 20);
   CLI::App app("Flies a scenario with every node in one thread and in logical time.",
                "chase-flight");
   chase::flight::Arguments arguments;
