@@ -87,58 +87,43 @@ Lidar::Lidar(const LidarConfig& config, const world::Rig& rig, uint64_t seed)
       directions_.push_back(LaserDirection(firing, ring).cast<float>());
 }
 
-double Lidar::FiringTime(int firing) const {
-  return static_cast<double>(sweep_index_) / config_.rate + firing * kFiringPeriod;
+double Lidar::FiringTime() const {
+  return static_cast<double>(sweep_index_) / config_.rate + firing_ * kFiringPeriod;
 }
 
 void Lidar::Advance(const std::vector<TimedPose>& poses, const Scene& scene) {
   if (config_.rate <= 0.0 || poses.size() < 2) return;
   std::size_t i = 0;
-  while (FiringTime(firing_) < poses.back().t) {
-    if (firing_ == 0) sweep_.start = FiringTime(0);
-    TimedPose bodies[8];
-    int n = 0;
-    for (; n < std::min(8, kFirings - firing_); ++n) {
-      const double t = FiringTime(firing_ + n);
-      if (!(t < poses.back().t)) break;
-      while (i + 2 < poses.size() && poses[i + 1].t <= t) ++i;
-      bodies[n] = Interpolated(poses[i], poses[i + 1], t);
-    }
-    Fire(bodies, n, scene);
-    if (firing_ < kFirings) continue;
+  for (double t = FiringTime(); t < poses.back().t; t = FiringTime()) {
+    while (i + 2 < poses.size() && poses[i + 1].t <= t) ++i;
+    if (firing_ == 0) sweep_.start = t;
+    Fire(Interpolated(poses[i], poses[i + 1], t), scene);
+    if (++firing_ < kFirings) continue;
     complete_ = std::exchange(sweep_, Sweep{});
     firing_ = 0;
     ++sweep_index_;
   }
 }
 
-/// Makes the i-th sequence from here the i-th ray of every ring's packet.
-void Lidar::Aim(const TimedPose& body, int i, RayPacket* rays) const {
+void Lidar::Fire(const TimedPose& body, const Scene& scene) {
   const Vector3f origin = (body.p + body.q * p_BL_).cast<float>();
   const Eigen::Matrix3f R_WL = (body.q * q_BL_).toRotationMatrix().cast<float>();
-  const Vector3f* directions = &directions_[static_cast<std::size_t>((firing_ + i) * kRings)];
+  const Vector3f* directions = &directions_[static_cast<std::size_t>(firing_ * kRings)];
+  RayPacket rays[kRings / 8];
+  HitPacket hits[kRings / 8];
   for (int ring = 0; ring < kRings; ++ring) {
     const Vector3f d = R_WL * directions[ring];
-    rays[ring].ox[i] = origin.x(), rays[ring].oy[i] = origin.y(), rays[ring].oz[i] = origin.z();
-    rays[ring].dx[i] = d.x(), rays[ring].dy[i] = d.y(), rays[ring].dz[i] = d.z();
+    RayPacket& packet = rays[ring / 8];
+    const int i = ring % 8;
+    packet.ox[i] = origin.x(), packet.oy[i] = origin.y(), packet.oz[i] = origin.z();
+    packet.dx[i] = d.x(), packet.dy[i] = d.y(), packet.dz[i] = d.z();
   }
+  scene.Trace(rays, kRings / 8, hits);
+  for (int ring = 0; ring < kRings; ++ring) Record(ring, rays[ring / 8], hits[ring / 8], ring % 8);
 }
 
-/// Fires n sequences, at most eight. A packet is one ring's rays of all of them: they lie closer
-/// together than the rings of one.
-void Lidar::Fire(const TimedPose* bodies, int n, const Scene& scene) {
-  RayPacket rays[kRings];
-  HitPacket hits[kRings];
-  for (RayPacket& packet : rays) packet.count = n;
-  for (int i = 0; i < n; ++i) Aim(bodies[i], i, rays);
-  for (int ring = 0; ring < kRings; ring += kMostPackets)
-    scene.Trace(&rays[ring], kMostPackets, &hits[ring]);
-  for (int i = 0; i < n; ++i, ++firing_)
-    for (int ring = 0; ring < kRings; ++ring) Record(ring, rays[ring], hits[ring], i);
-}
-
-/// Of ray i of a ring. One draw of noise and one of loss for every laser, hit or not, so that what
-/// is seen does not shift the numbers of the lasers after it.
+/// Of ray i of the packet. One draw of noise and one of loss for every laser, hit or not, so that
+/// what is seen does not shift the numbers of the lasers after it.
 void Lidar::Record(int ring, const RayPacket& rays, const HitPacket& hits, int i) {
   const float range = hits.distance[i];
   const double noise = config_.noise * random_.Gaussian();

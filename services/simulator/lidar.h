@@ -72,9 +72,8 @@ class Lidar {
   std::optional<Sweep> Take();
 
  private:
-  double FiringTime(int firing) const;
-  void Aim(const TimedPose& body, int i, RayPacket* rays) const;
-  void Fire(const TimedPose* bodies, int n, const Scene& scene);
+  double FiringTime() const;
+  void Fire(const TimedPose& body, const Scene& scene);
   void Record(int ring, const RayPacket& rays, const HitPacket& hits, int i);
 
   LidarConfig config_;
