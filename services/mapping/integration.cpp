@@ -10,6 +10,7 @@ namespace {
 constexpr double kNoise = 0.08;     // m, an interval's difference that may be noise
 constexpr double kNearMiss = 0.35;  // cells, a ray this near to a cell's returns contradicts them
 constexpr int kLowShare = 3;        // free cells keep limit / this, so that they can fill again
+constexpr int kNewlyFree = 2;       // free sweeps after which the octree is told
 constexpr int kSettleSweeps = 20;   // moving returns this long in one cell stand still
 constexpr int kDoubtSweeps = 10;    // hits after which a cell that was long free is no longer
 constexpr double kPassed = 2.0;     // sweeps, how well it is known when a body was somewhere
@@ -22,6 +23,7 @@ uint8_t Increment(uint8_t n) { return n < 255 ? static_cast<uint8_t>(n + 1) : n;
 
 void Integrator::Insert(const Eigen::Vector3d& origin, const std::vector<Return>& returns) {
   ++sweep_;
+  done_ = grid_.settled_free();
   Gather(returns);
   for (auto& cell : cells_) Hit(&cell);
   for (const auto& cell : cells_)
@@ -54,15 +56,18 @@ void Integrator::Gather(const std::vector<Return>& returns) {
 
 void Integrator::Hit(HitCell* cell) {
   Voxel& voxel = *cell->voxel;
+  if (cell->solid + cell->ground + cell->moving == 0) return;
+  const size_t index = VoxelGrid::Index(cell->key.x, cell->key.y);
+  done_[index] |= VoxelGrid::Bit(cell->key.z);
+  grid_.settled_free()[index] &= ~VoxelGrid::Bit(cell->key.z);
+  voxel.sweep = sweep_;
   if (cell->solid + cell->ground == 0) {
-    if (cell->moving == 0) return;
-    voxel.sweep = sweep_;
     voxel.moving_hits = Increment(voxel.moving_hits);
     if (voxel.moving_hits >= kSettleSweeps) voxel.free_sweeps = 0;
     return;
   }
   const bool strong = cell->solid + cell->ground >= 2;
-  voxel.sweep = voxel.hit_sweep = sweep_;
+  voxel.hit_sweep = sweep_;
   voxel.hits = Increment(voxel.hits);
   const bool doubted = voxel.free_sweeps >= config_.ever_free_sweeps && voxel.hits < kDoubtSweeps;
   if (cell->solid == 0 || !doubted) voxel.free_sweeps = 0;
@@ -110,16 +115,23 @@ bool Integrator::PassesReturns(const Voxel& voxel, const Key& key) const {
   return squared < std::pow(kNearMiss * grid_.resolution(), 2);
 }
 
-void Integrator::Miss(const Key& key, VoxelGrid::Column* column, Voxel* voxel) {
-  if (!voxel->extent.empty() && !PassesReturns(*voxel, key)) return;
-  voxel->sweep = sweep_;
-  voxel->moving_hits = 0;
-  voxel->log_odds =
-      static_cast<int8_t>(std::max(-config_.limit / kLowShare, voxel->log_odds + config_.miss));
-  if (voxel->log_odds > 0) return;
-  if (voxel->hits > 0) Reset(column, voxel, key);
-  voxel->free_sweeps = Increment(voxel->free_sweeps);
-  if (voxel->free_sweeps == 2) Queue(voxel, key);
+void Integrator::Miss(const Key& key) {
+  VoxelGrid::Column& column = grid_.Touch(key.x, key.y);
+  Voxel& voxel = column.voxels[VoxelGrid::Level(key.z)];
+  if (!voxel.extent.empty() && !PassesReturns(voxel, key)) return;
+  const size_t index = VoxelGrid::Index(key.x, key.y);
+  done_[index] |= VoxelGrid::Bit(key.z);
+  voxel.sweep = sweep_;
+  voxel.moving_hits = 0;
+  const int least = -config_.limit / kLowShare;
+  voxel.log_odds = static_cast<int8_t>(std::max(least, voxel.log_odds + config_.miss));
+  if (voxel.log_odds > 0) return;
+  if (voxel.hits > 0) Reset(&column, &voxel, key);
+  voxel.free_sweeps = Increment(voxel.free_sweeps);
+  if (voxel.free_sweeps == kNewlyFree) Queue(&voxel, key);
+  if (voxel.log_odds == least &&
+      voxel.free_sweeps >= std::max(kNewlyFree, config_.ever_free_sweeps))
+    grid_.settled_free()[index] |= VoxelGrid::Bit(key.z);
 }
 
 /// Walks the cells between two points of the window (Amanatides and Woo 1987), the last one
@@ -131,27 +143,33 @@ void Integrator::CastRay(const Eigen::Vector3d& origin, const Eigen::Vector3d& e
   if (!(length > 1e-6)) return;
   ray_origin_ = origin;
   ray_direction_ = d / length;
-  const Key start = grid_.ToKey(origin);
-  int cell[3] = {start.x, start.y, start.z};
-  const int goal[3] = {last.x, last.y, last.z};
-  int step[3];
-  double next[3], delta[3];  // in shares of the ray's length
-  for (int i = 0; i < 3; ++i) {
-    step[i] = d[i] > 0.0 ? 1 : -1;
-    const double border = grid_.resolution() * (cell[i] + (d[i] > 0.0 ? 1 : 0));
-    next[i] = std::abs(d[i]) > 1e-12 ? (border - origin[i]) / d[i] : INFINITY;
-    delta[i] = std::abs(d[i]) > 1e-12 ? grid_.resolution() / std::abs(d[i]) : INFINITY;
+  Key cell = grid_.ToKey(origin);
+  const Eigen::Array3i step = (d.array() > 0.0).select(Eigen::Array3i::Ones(), -1);
+  const Eigen::Array3d border =
+      grid_.resolution() * (Eigen::Array3i(cell.x, cell.y, cell.z) + step.max(0)).cast<double>();
+  const auto moves = d.array().abs() > 1e-12;
+  // In shares of the ray's length.
+  Eigen::Array3d next = moves.select((border - origin.array()) / d.array(), INFINITY);
+  const Eigen::Array3d delta = moves.select(grid_.resolution() / d.array().abs(), INFINITY);
+  crossed_.clear();
+  int steps = std::abs(last.x - cell.x) + std::abs(last.y - cell.y) + std::abs(last.z - cell.z);
+  for (; steps != 0 || !(cell == last); --steps) {
+    if (!(done_[VoxelGrid::Index(cell.x, cell.y)] & VoxelGrid::Bit(cell.z)))
+      crossed_.push_back(cell);
+    const bool along_x = next.x() < next.y();
+    const double nearest = along_x ? next.x() : next.y();
+    if (std::min(nearest, next.z()) > 1.0) break;  // rounding let the ray slip past the last cell
+    if (nearest < next.z()) {  // no branches between x and y: they could not be predicted
+      cell.x += along_x ? step.x() : 0;
+      cell.y += along_x ? 0 : step.y();
+      next.x() += along_x ? delta.x() : 0.0;
+      next.y() += along_x ? 0.0 : delta.y();
+    } else {
+      cell.z += step.z();
+      next.z() += delta.z();
+    }
   }
-  VoxelGrid::Column* column = &grid_.Touch(cell[0], cell[1]);
-  while (cell[0] != goal[0] || cell[1] != goal[1] || cell[2] != goal[2]) {
-    Voxel& voxel = column->voxels[VoxelGrid::Level(cell[2])];
-    if (voxel.sweep != sweep_) Miss({cell[0], cell[1], cell[2]}, column, &voxel);
-    const int i = next[0] < next[1] ? (next[0] < next[2] ? 0 : 2) : (next[1] < next[2] ? 1 : 2);
-    if (next[i] > 1.0) return;  // rounding let the ray slip past the last cell
-    cell[i] += step[i];
-    next[i] += delta[i];
-    if (i != 2) column = &grid_.Touch(cell[0], cell[1]);
-  }
+  for (const Key& key : crossed_) Miss(key);
 }
 
 void Integrator::ClearDisc(const Eigen::Vector2d& center, double radius, double bottom, double top,

@@ -45,7 +45,7 @@ class Integrator {
   void Gather(const std::vector<Return>& returns);
   void Hit(HitCell* cell);
   void CastRay(const Eigen::Vector3d& origin, const Eigen::Vector3d& end, const Key& last);
-  void Miss(const Key& key, VoxelGrid::Column* column, Voxel* voxel);
+  void Miss(const Key& key);
   bool PassesReturns(const Voxel& voxel, const Key& key) const;
   void Reset(VoxelGrid::Column* column, Voxel* voxel, const Key& key);
   void SetOccupied(VoxelGrid::Column* column, Voxel* voxel, const Key& key);
@@ -55,6 +55,8 @@ class Integrator {
   VoxelGrid& grid_;
   uint32_t sweep_ = 0;
   std::vector<HitCell> cells_;
+  std::vector<uint32_t> done_;  ///< cells in which a ray changes nothing more this sweep
+  std::vector<Key> crossed_;    ///< the others that a ray crosses
   std::deque<Key> changes_;
   Eigen::Vector3d ray_origin_, ray_direction_;
 };

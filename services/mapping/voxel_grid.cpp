@@ -35,7 +35,8 @@ Extent Extent::Nothing() {
 VoxelGrid::VoxelGrid(double resolution)
     : resolution_(resolution),
       step_(0.75 * resolution / 127.0),
-      columns_(static_cast<size_t>(kSide) * kSide) {}
+      columns_(static_cast<size_t>(kSide) * kSide),
+      settled_free_(columns_.size()) {}
 
 Key VoxelGrid::ToKey(const Eigen::Vector3d& p) const {
   const Eigen::Vector3d c = (p / resolution_).array().floor().max(-1e9).min(1e9);
@@ -48,11 +49,18 @@ Eigen::Vector3d VoxelGrid::Center(const Key& k) const {
 
 void VoxelGrid::MoveTo(const Eigen::Vector3d& p) {
   const Key k = ToKey(p);
+  const int x0 = x0_, y0 = y0_;
   x0_ = k.x - kSide / 2;
   y0_ = k.y - kSide / 2;
   const int middle = z0_ + kLevels / 2;
-  if (!placed_ || std::abs(k.z - middle) > kHysteresis) z0_ = k.z - kLevels / 2;
+  const bool level = placed_ && std::abs(k.z - middle) <= kHysteresis;
+  if (!level) z0_ = k.z - kLevels / 2;
   placed_ = true;
+  if (level && x0 == x0_ && y0 == y0_) return;
+  for (int x = x0_; x < x0_ + kSide; ++x)
+    for (int y = y0_; y < y0_ + kSide; ++y)
+      if (!level || x < x0 || x >= x0 + kSide || y < y0 || y >= y0 + kSide)
+        settled_free_[Index(x, y)] = 0;
 }
 
 VoxelGrid::Column* VoxelGrid::Find(int x, int y) {

@@ -76,21 +76,30 @@ class VoxelGrid {
   /// The column of (x, y), or null where nothing was seen.
   Column* Find(int x, int y);
   static size_t Level(int z) { return static_cast<size_t>(z & (kLevels - 1)); }
+  static uint32_t Bit(int z) { return uint32_t{1} << Level(z); }
+  static size_t Index(int x, int y) {
+    return static_cast<size_t>((x & (kSide - 1)) * kSide + (y & (kSide - 1)));
+  }
   /// The voxel, or null where nothing was seen.
   Voxel* At(const Key& k);
 
-  size_t Bytes() const { return columns_.size() * sizeof(Column); }
+  /// A bit per level of each column in the window (Index, Bit): cells that another free sweep would
+  /// leave as they are. Small, so that rays need not look at the cells themselves.
+  std::vector<uint32_t>& settled_free() { return settled_free_; }
+
+  size_t Bytes() const {
+    return columns_.size() * (sizeof(Column) + sizeof(settled_free_.front()));
+  }
 
  private:
-  Column& Slot(int x, int y) {
-    return columns_[static_cast<size_t>((x & (kSide - 1)) * kSide + (y & (kSide - 1)))];
-  }
+  Column& Slot(int x, int y) { return columns_[Index(x, y)]; }
   void Renew(Column* column, int x, int y) const;
 
   double resolution_, step_;
   int x0_ = 0, y0_ = 0, z0_ = 0;
   bool placed_ = false;
   std::vector<Column> columns_;
+  std::vector<uint32_t> settled_free_;
 };
 
 /// Interval of a point set within one cell; metres about the cell's centre.
