@@ -32,7 +32,7 @@ struct Voxel {
   bool occupied = false;
   bool queued = false;                ///< waits for being written to the octree
   Extent extent = Extent::Nothing();  ///< of its returns above the ground
-  uint32_t sweep = 0;                 ///< last sweep that touched it
+  uint32_t sweep = 0;                 ///< last sweep that hit it, or freed it while not settled
   uint32_t hit_sweep = 0;             ///< last sweep that hit it
   int32_t slot = 0;                   ///< index into that sweep's hit cells
 };
