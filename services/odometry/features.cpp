@@ -15,9 +15,9 @@ constexpr double kBetweenBeams = 0.0035;  // rad along a ring, about
 constexpr double kBetweenRings = 0.035;   // rad, of a sensor of 16 rings
 
 bool Usable(const FeatureConfig& config, const SweepPoint& point) {
-  if (!point.p.allFinite() || !(point.t >= 0.0f && point.t <= kLongestSweep)) return false;
-  const double r2 = point.p.cast<double>().squaredNorm();
-  return r2 >= config.min_range * config.min_range && r2 <= config.max_range * config.max_range &&
+  const double r2 = point.p.cast<double>().squaredNorm();  // finite where the point is
+  return std::isfinite(r2) && r2 >= config.min_range * config.min_range &&
+         r2 <= config.max_range * config.max_range && point.t >= 0.0f && point.t <= kLongestSweep &&
          point.ring < kRings;
 }
 
@@ -42,10 +42,12 @@ class Ring {
        const std::vector<int>& order)
       : config_(config), n_(static_cast<int>(order.size())) {
     p_.reserve(order.size());
+    range_.reserve(order.size());
     sum_.reserve(order.size() + 1);
     sum_.push_back(Eigen::Vector3d::Zero());
     for (int i : order) {
       p_.push_back(points[static_cast<size_t>(i)].p);
+      range_.push_back(p_.back().norm());
       sum_.push_back(sum_.back() + p_.back().cast<double>());
     }
     jumps_.assign(order.size() + 1, 0);
@@ -57,7 +59,7 @@ class Ring {
 
   /// Half length of the window round point i, in points.
   int HalfWindow(int i) const {
-    const float step = std::max(1e-4f, p_[At(i)].norm() * spacing_);
+    const float step = std::max(1e-4f, Range(i) * spacing_);
     return std::clamp(static_cast<int>(static_cast<float>(config_.window) / step), 2, 12);
   }
 
@@ -75,13 +77,13 @@ class Ring {
     return (d - along * (along.dot(d) / length2)).norm();
   }
 
-  float Range(int i) const { return p_[At(i)].norm(); }
+  float Range(int i) const { return range_[At(i)]; }
 
  private:
   static size_t At(int i) { return static_cast<size_t>(i); }
   /// True when the surface breaks between points i-1 and i, or is seen at too flat an angle.
   bool Jump(int i) const {
-    const float r = std::min(p_[At(i)].norm(), p_[At(i - 1)].norm());
+    const float r = std::min(Range(i), Range(i - 1));
     return (p_[At(i)] - p_[At(i - 1)]).squaredNorm() > std::pow(0.08f + 0.035f * r, 2.0f);
   }
 
@@ -89,6 +91,7 @@ class Ring {
   int n_;
   float spacing_ = 0.0f;  // rad
   std::vector<Eigen::Vector3f> p_;
+  std::vector<float> range_;
   std::vector<Eigen::Vector3d> sum_;
   std::vector<int> jumps_;  // number of jumps up to a point
 };

@@ -55,24 +55,6 @@ class ScanMatcher::Matched {
   std::vector<Query> queries_;
 };
 
-double PlaneResidual(const Eigen::Vector3d& p_W, const Eigen::Vector3d& rotated,
-                     const Surface& plane, Vector6d* jacobian) {
-  const Eigen::Vector3d n = plane.direction.cast<double>();
-  *jacobian << n, rotated.cross(n);
-  return n.dot(p_W - plane.center.cast<double>());
-}
-
-double EdgeResidual(const Eigen::Vector3d& p_W, const Eigen::Vector3d& rotated, const Surface& line,
-                    Vector6d* jacobian) {
-  const Eigen::Vector3d u = line.direction.cast<double>();
-  const Eigen::Vector3d d = p_W - line.center.cast<double>();
-  const Eigen::Vector3d across = d - u * u.dot(d);
-  const double distance = across.norm();
-  const Eigen::Vector3d n = distance > 1e-9 ? across / distance : u.unitOrthogonal();
-  *jacobian << n, rotated.cross(n);
-  return distance;
-}
-
 ScanMatcher::System ScanMatcher::Linearise(const Pose& X_WB, double kernel, double gate,
                                            Matched* planes, Matched* edges) const {
   System system;
@@ -97,8 +79,10 @@ ScanMatcher::System ScanMatcher::Linearise(const Pose& X_WB, double kernel, doub
       system.Add(r, weight * trust * robust * robust, J, rotated.squaredNorm());
     }
   };
-  add(planes, PlaneResidual, 1.0);
-  add(edges, EdgeResidual, config_.edge_weight);
+  add(
+      planes, [](const auto&... of) { return PlaneResidual(of...); }, 1.0);
+  add(
+      edges, [](const auto&... of) { return EdgeResidual(of...); }, config_.edge_weight);
   system.H = system.H.selfadjointView<Eigen::Lower>();
   return system;
 }

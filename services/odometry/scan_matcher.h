@@ -58,10 +58,23 @@ struct MatchResult {
 
 /// Residual of a feature against a surface and its derivative with respect to (p, rotation error in
 /// W) where R_WB <- Exp(d_theta) R_WB. `rotated` is R_WB p_B.
-double PlaneResidual(const Eigen::Vector3d& p_W, const Eigen::Vector3d& rotated,
-                     const Surface& plane, Vector6d* jacobian);
-double EdgeResidual(const Eigen::Vector3d& p_W, const Eigen::Vector3d& rotated, const Surface& line,
-                    Vector6d* jacobian);
+inline double PlaneResidual(const Eigen::Vector3d& p_W, const Eigen::Vector3d& rotated,
+                            const Surface& plane, Vector6d* jacobian) {
+  const Eigen::Vector3d n = plane.direction.cast<double>();
+  *jacobian << n, rotated.cross(n);
+  return n.dot(p_W - plane.center.cast<double>());
+}
+
+inline double EdgeResidual(const Eigen::Vector3d& p_W, const Eigen::Vector3d& rotated,
+                           const Surface& line, Vector6d* jacobian) {
+  const Eigen::Vector3d u = line.direction.cast<double>();
+  const Eigen::Vector3d d = p_W - line.center.cast<double>();
+  const Eigen::Vector3d across = d - u * u.dot(d);
+  const double distance = across.norm();
+  const Eigen::Vector3d n = distance > 1e-9 ? across / distance : u.unitOrthogonal();
+  *jacobian << n, rotated.cross(n);
+  return distance;
+}
 
 /// Sweep against map: Gauss-Newton on the manifold over point-to-plane and point-to-line distances
 /// with a Geman-McClure kernel that narrows. Zhang & Singh 2014 (LOAM), eqs. (2) to (4); directions

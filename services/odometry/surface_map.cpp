@@ -47,14 +47,6 @@ SurfaceMap::SurfaceMap(const MapConfig& config, SurfaceKind kind) : config_(conf
   }
 }
 
-void SurfaceMap::Moments::Add(const Eigen::Vector3f& p) {
-  const Eigen::Vector3f d = p - origin;
-  sum += d;
-  squares += d.cwiseProduct(d);
-  products += Eigen::Vector3f(d.x() * d.y(), d.y() * d.z(), d.z() * d.x());
-  ++n;
-}
-
 size_t SurfaceMap::Level::CellOf(uint64_t key, const Eigen::Vector3f& p) {
   bool added = false;
   const size_t cell = static_cast<size_t>(index.FindOrAdd(key, &added));

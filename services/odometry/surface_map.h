@@ -70,7 +70,13 @@ class SurfaceMap {
  private:
   /// The points of one cell. Sums are relative to its first point.
   struct alignas(64) Moments {
-    void Add(const Eigen::Vector3f& p);
+    void Add(const Eigen::Vector3f& p) {
+      const Eigen::Vector3f d = p - origin;
+      sum += d;
+      squares += d.cwiseProduct(d);
+      products += Eigen::Vector3f(d.x() * d.y(), d.y() * d.z(), d.z() * d.x());
+      ++n;
+    }
 
     Eigen::Vector3f origin = Eigen::Vector3f::Zero();
     Eigen::Vector3f sum = Eigen::Vector3f::Zero();

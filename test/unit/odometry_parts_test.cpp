@@ -46,7 +46,8 @@ TEST(Deskew, SweepTakenInMotionMatchesSweepTakenAtRestAtItsEnd) {
   const Pose end = X_WL(0.1);
   for (size_t i = 0; i < sweep.points.size(); i += 37) {
     const SweepPoint& point = sweep.points[i];
-    const Eigen::Vector3d p_W = end * motion.ToEnd(point.p, point.t).cast<double>();
+    const Eigen::Vector4f p_L(point.p.x(), point.p.y(), point.p.z(), 0.0f);
+    const Eigen::Vector3d p_W = end * motion.ToEnd(p_L, point.t).head<3>().cast<double>();
     const Eigen::Vector3d truth = X_WL(point.t) * point.p.cast<double>();
     EXPECT_LT((p_W - truth).norm(), 1.5e-3) << "point " << i;
     // Every return lies on a wall again.
@@ -57,7 +58,7 @@ TEST(Deskew, SweepTakenInMotionMatchesSweepTakenAtRestAtItsEnd) {
 }
 
 TEST(Deskew, StillBodyChangesNothing) {
-  const Eigen::Vector3f p(1.0f, 2.0f, 3.0f);
+  const Eigen::Vector4f p(1.0f, 2.0f, 3.0f, 0.0f);
   EXPECT_TRUE(SweepMotion::Still().ToEnd(p, 0.07f).isApprox(p));
 }
 
@@ -107,6 +108,34 @@ TEST(SurfaceMap, FindsThePlaneThatItsPointsCameFrom) {
   EXPECT_GT(std::abs(surface->direction.cast<double>().dot(normal)), 0.99);
   EXPECT_LT(std::abs(surface->center.cast<double>().dot(normal)), 0.01);
   EXPECT_EQ(map.Find(Eigen::Vector3f(50.0f, 0.0f, 0.0f)), nullptr);
+}
+
+/// What a match relies on that does not look a feature up again.
+TEST(SurfaceMap, AnswerHoldsWithinItsReach) {
+  constexpr int kSeed = 5, kPlaces = 2000;
+  Noise noise(kSeed);
+  SurfaceMap map(MapConfig{}, SurfaceKind::kPlane);
+  std::vector<Eigen::Vector3f> points;
+  for (int i = 0; i < 20000; ++i)
+    points.push_back(
+        (noise.Vector(3.0).cwiseProduct(Eigen::Vector3d(1.0, 1.0, 0.01))).cast<float>());
+  map.Add(points);
+  std::vector<Query> places(kPlaces);
+  std::vector<Query*> all;
+  for (Query& place : places) place.p = noise.Vector(3.0).cast<float>(), all.push_back(&place);
+  map.Find(all);
+  int far = 0;
+  for (const Query& place : places) {
+    EXPECT_EQ(map.Find(place.p), place.surface) << "seed " << kSeed;
+    far += place.reach > 0.01f ? 1 : 0;
+    for (int corner = 0; corner < 8; ++corner) {
+      const Eigen::Vector3f to(corner & 1 ? 1.0f : -1.0f, corner & 2 ? 1.0f : -1.0f,
+                               corner & 4 ? 1.0f : -1.0f);
+      const Eigen::Vector3f p = place.p + 0.99999f * place.reach * to;
+      EXPECT_EQ(map.Find(p), place.surface) << "seed " << kSeed;
+    }
+  }
+  EXPECT_GT(far, kPlaces / 2);
 }
 
 TEST(SurfaceMap, MemoryStaysBoundedOverALongWay) {
