@@ -7,6 +7,7 @@
 #include "common/math/exact.h"
 #include "services/planning/limits.h"
 #include "services/planning/product_weights.h"
+#include "services/planning/sturm_check.h"
 
 namespace chase::planning {
 namespace {
@@ -172,32 +173,11 @@ bool IsInSightExact(const Curve& plan, const Curve& target, const Ellipsoid& e, 
   return math::IsPositiveExact(P) && math::IsPositiveExact(Q) && math::IsPositiveExact(S);
 }
 
-// ---- Sturm in double, power basis, as the paper writes it ----
-
-Polynomial PowerForm(const Curve& x, const Eigen::Matrix3d& R, const Curve& y, const Curve& c) {
-  const Eigen::Index n = std::max({x.rows(), y.rows(), c.rows()});
-  Curve a = Curve::Zero(n, 3), b = Curve::Zero(n, 3);
-  a.topRows(x.rows()) = x;
-  b.topRows(y.rows()) = y;
-  a.topRows(c.rows()) -= c;
-  b.topRows(c.rows()) -= c;
-  const Curve Ra = a * R;
-  Polynomial f = Polynomial::Zero(2 * n - 1);
-  for (Eigen::Index i = 0; i < n; ++i)
-    for (Eigen::Index j = 0; j < n; ++j) f[i + j] += Ra.row(i).dot(b.row(j));
-  f[0] -= 1.0;
-  return f;
-}
-
-bool HasNoRoot(const Polynomial& f, double from) {
-  return math::Evaluate(f, from) > 0.0 && math::CountRootsSturm(f, from, 1.0) == 0;
-}
-
 }  // namespace
 
 bool IsSafe(const Curve& plan, const Ellipsoid& e, Arithmetic arithmetic) {
   if (arithmetic == Arithmetic::kDoubleSturm)
-    return HasNoRoot(PowerForm(plan, e.safety, plan, e.center), e.safety_from);
+    return SturmCheck(plan, e, 1.0, plan.rows()).IsSafe(plan);
   if (arithmetic == Arithmetic::kExactSturm) return IsSafeExact(plan, e);
   const int n = static_cast<int>(std::max(plan.rows(), e.center.rows())) - 1;
   const Relative x = MakeRelative(plan, e.center, n);
@@ -211,9 +191,7 @@ bool IsInSight(const Curve& plan, const Curve& target, const Ellipsoid& e, doubl
   from = std::max(from, e.sight_from);
   if (from >= 1.0) return true;
   if (arithmetic == Arithmetic::kDoubleSturm)
-    return HasNoRoot(PowerForm(plan, e.sight, plan, e.center), from) &&
-           HasNoRoot(PowerForm(plan, e.sight, target, e.center), from) &&
-           HasNoRoot(PowerForm(target, e.sight, target, e.center), from);
+    return SturmCheck(target, e, from, plan.rows()).IsInSight(plan);
   if (arithmetic == Arithmetic::kExactSturm) return IsInSightExact(plan, target, e, from, exact);
   const int n = static_cast<int>(std::max({plan.rows(), target.rows(), e.center.rows()})) - 1;
   const Relative x = MakeRelative(plan, e.center, n), y = MakeRelative(target, e.center, n);

@@ -1,17 +1,24 @@
 #pragma once
 
-#include <Eigen/Core>
+#include <memory>
+#include <vector>
 
 #include "services/planning/search.h"
 
 namespace chase::planning {
 
-/// K^-1 of Jeon 2021, section IV-B, with the objective (11) in normalised time.
-Eigen::MatrixXd InverseKkt(const PlannerConfig& config, const Problem& problem);
+/// Candidates of Jeon 2021, section IV-B, from the KKT system with the objective (11) in normalised
+/// time. The solution is affine in the skeletons: every candidate is the start's part and one term
+/// per step.
+class KktCandidates {
+ public:
+  KktCandidates(const PlannerConfig& config, const Problem& problem);
+  Curve operator()(int index) const;
 
-/// Candidate `index` from the KKT system.
-Curve ReferenceCandidate(const PlannerConfig& config, const Problem& problem,
-                         const Eigen::MatrixXd& inverse_kkt, int index);
+ private:
+  Curve base_;
+  std::vector<std::vector<Curve>> terms_;  ///< [step][choice]
+};
 
 /// Jeon 2021, sections IV and V, in the plainest code: power basis of normalised time, the KKT
 /// system, every candidate checked and the feasible ones weighed.

@@ -49,8 +49,18 @@ std::unique_ptr<planning::Planner> MakeReference(const Setup& setup) {
   return planning::MakePlanner("reference-double", config);
 }
 
+/// Ours on the candidates of the paper: 12 skeletons at each of 3 steps, 1,728 quintics.
+std::unique_ptr<planning::Planner> MakeChasePaper(const Setup& setup) {
+  planning::PlannerConfig config = setup.config;
+  config.degree = 5;
+  config.steps = 3;
+  config.skeletons = 12;
+  return planning::MakePlanner("chase", config);
+}
+
 const Registration kChase(
     "chase", [](const Setup& s) { return planning::MakePlanner("chase", s.config); }, true);
+const Registration kChasePaper("chase_paper", MakeChasePaper);
 const Registration kReference("reference", MakeReference, true);
 
 }  // namespace

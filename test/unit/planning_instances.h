@@ -96,11 +96,11 @@ class InstanceGenerator {
   std::vector<Path> SamplePaths(const PlanRequest& request, std::mt19937& g) const {
     Problem problem = MakeProblem(config_, request, nullptr);
     SkeletonPlacer(config_).PlaceRing(config_.steps, config_.skeletons, &problem);
-    const Eigen::MatrixXd inverse = InverseKkt(config_, problem);
+    const KktCandidates candidates(config_, problem);
     std::vector<Path> paths;
     for (int i = 0; i < 96; ++i) {
       const int index = static_cast<int>(g() % static_cast<unsigned>(problem.n_candidates()));
-      const Curve candidate = ReferenceCandidate(config_, problem, inverse, index);
+      const Curve candidate = candidates(index);
       paths.emplace_back();
       for (int k = 0; k <= 24; ++k) paths.back().col(k) = Evaluate(candidate, k / 24.0);
     }

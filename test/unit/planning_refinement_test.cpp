@@ -131,9 +131,8 @@ TEST(Refiner, PlansAroundObstaclesAreCertifiedAndKeepTheirStart) {
   for (unsigned seed = 1; seed <= 100; ++seed) {
     Problem problem = MakeProblem(config, generator.Make(seed), nullptr);
     SkeletonPlacer(config).PlaceRing(config.steps, config.skeletons, &problem);
-    const Eigen::MatrixXd inverse = InverseKkt(config, problem);
     const int index = static_cast<int>(seed * 7919u) % problem.n_candidates();
-    const Curve first = ReferenceCandidate(config, problem, inverse, index);
+    const Curve first = KktCandidates(config, problem)(index);
     if (!refiner.Reset(problem, 0.0)) continue;
     for (const bool repair : {false, true}) {
       Curve plan = first;
