@@ -3,7 +3,8 @@
 // is timed by the processor time of this process, median of `repeats` runs. Counters:
 //   p50_us p99_us max_us   over the instances
 //   ratio                  p50 of the double-Sturm reference over p50 of ours, both on the first
-//                          `reference_instances` instances
+//                          `reference_instances` instances; the reference tests the paper's sight
+//                          condition, also where ours tests the exact one
 //   same_winner            share of the first `compared` instances with the winner of testing every
 //                          candidate with the certificate
 //   same_as_double         share of the reference's instances with its winner
@@ -21,12 +22,13 @@
 #include "services/planning/reference_search.h"
 #include "services/planning/refinement.h"
 #include "services/planning/skeletons.h"
+#include "test/bench/literal_planner.h"
 #include "test/unit/planning_instances.h"
 
 namespace chase::planning {
 namespace {
 
-constexpr int kInstances = 500;
+constexpr int kInstances = 500, kReferenceInstances = 60;
 
 double CpuMicroseconds() {
   timespec t{};
@@ -101,6 +103,13 @@ void Count(benchmark::State& state, const std::vector<double>& us) {
   state.counters["instances"] = static_cast<double>(us.size());
 }
 
+void CountReference(benchmark::State& state, const std::vector<double>& reference_us,
+                    const std::vector<double>& us) {
+  state.counters["ratio"] = Quantile(reference_us, 0.5) / Quantile(us, 0.5);
+  state.counters["reference_p50_us"] = Quantile(reference_us, 0.5);
+  state.counters["reference_instances"] = static_cast<double>(us.size());
+}
+
 struct Size {
   int steps, skeletons, obstacles;
   bool hard;
@@ -133,9 +142,7 @@ void Plan(benchmark::State& state, const Size& size) {
     }
   }
   Count(state, us);
-  state.counters["ratio"] = Quantile(reference_us, 0.5) / Quantile(subset, 0.5);
-  state.counters["reference_p50_us"] = Quantile(reference_us, 0.5);
-  state.counters["reference_instances"] = size.reference;
+  CountReference(state, reference_us, subset);
   state.counters["same_winner"] = static_cast<double>(same) / size.compared;
   state.counters["same_as_double"] = static_cast<double>(same_as_double) / size.reference;
   state.counters["compared"] = size.compared;
@@ -143,12 +150,40 @@ void Plan(benchmark::State& state, const Size& size) {
   state.counters["repeats"] = size.repeats;
 }
 
+/// Is the reference as fast as plain code that shares nothing with it? By turns on one problem.
+void Literal(benchmark::State& state) {
+  const PlannerConfig config = Config(3, 12, false);
+  const InstanceGenerator generator(config, Spec(50, false));
+  Searcher poser(config);
+  const auto reference = MakeReferenceSearch(config, Arithmetic::kDoubleSturm);
+  std::vector<double> us, literal_us;
+  int same = 0, same_feasible = 0;
+  for (auto _ : state) {
+    for (int i = 0; i < kReferenceInstances; ++i) {
+      const Problem problem = poser.Pose(generator.Make(1000u + static_cast<unsigned>(i)));
+      Found found;
+      LiteralPlan literal;
+      us.push_back(MedianMicroseconds(1, [&] { found = reference->Best(problem, 0.0, false); }));
+      literal_us.push_back(
+          MedianMicroseconds(1, [&] { literal = PlanLiterally(config, problem); }));
+      same += found.index == literal.index;
+      same_feasible += found.feasible == literal.feasible;
+    }
+  }
+  Count(state, us);
+  state.counters["literal_p50_us"] = Quantile(literal_us, 0.5);
+  state.counters["over_literal"] = Quantile(us, 0.5) / Quantile(literal_us, 0.5);
+  state.counters["same_winner"] = same / static_cast<double>(kReferenceInstances);
+  state.counters["same_feasible"] = same_feasible / static_cast<double>(kReferenceInstances);
+}
+
 /// Exact visibility against the paper's bound on the same instances.
 void ExactVisibility(benchmark::State& state, bool hard) {
   const PlannerConfig bound = Config(3, 12, false), exact = Config(3, 12, true);
   const InstanceGenerator generator(bound, Spec(50, hard));
-  Searcher with_bound(bound), with_exact(exact);
-  std::vector<double> bound_us, us;
+  Searcher with_bound(bound), with_exact(exact),
+      reference(bound, MakeReferenceSearch(bound, Arithmetic::kDoubleSturm));
+  std::vector<double> bound_us, us, subset, reference_us;
   int better = 0, worse = 0;
   for (auto _ : state) {
     for (int i = 0; i < kInstances; ++i) {
@@ -160,9 +195,13 @@ void ExactVisibility(benchmark::State& state, bool hard) {
       const double cost_b = b.index < 0 ? HUGE_VAL : b.cost.total;
       better += cost_b < cost_a;
       worse += cost_b > cost_a;
+      if (i >= kReferenceInstances) continue;
+      subset.push_back(us.back());
+      reference_us.push_back(MedianMicroseconds(1, [&] { reference(request); }));
     }
   }
   Count(state, us);
+  CountReference(state, reference_us, subset);
   state.counters["time_ratio"] = Quantile(us, 0.5) / Quantile(bound_us, 0.5);
   state.counters["better_share"] = static_cast<double>(better) / kInstances;
   state.counters["worse"] = worse;
@@ -274,13 +313,16 @@ void Register() {
   const auto row = [](const char* name, auto&& f) {
     benchmark::RegisterBenchmark(name, f)->Iterations(1)->Unit(benchmark::kMillisecond);
   };
-  row("plan/1728x50", [](benchmark::State& s) { Plan(s, {3, 12, 50, false, 60, kInstances, 5}); });
+  row("exact_visibility/1728x50", [](benchmark::State& s) { ExactVisibility(s, false); });
+  row("plan/1728x50", [](benchmark::State& s) {
+    Plan(s, {3, 12, 50, false, kReferenceInstances, kInstances, 5});
+  });
   row("plan/20736x50", [](benchmark::State& s) { Plan(s, {4, 12, 50, false, 6, 50, 3}); });
   row("plan/hard/1728x50", [](benchmark::State& s) {
-    Plan(s, {3, 12, 50, true, 60, kInstances, 5});
+    Plan(s, {3, 12, 50, true, kReferenceInstances, kInstances, 5});
   });
-  row("exact_visibility/1728x50", [](benchmark::State& s) { ExactVisibility(s, false); });
   row("exact_visibility/hard/1728x50", [](benchmark::State& s) { ExactVisibility(s, true); });
+  row("literal/1728x50", Literal);
   row("check_all/1728x50", CheckAll);
   row("refinement/1728x50", Refinement);
   row("growth", Growth);
