@@ -2,6 +2,7 @@
 
 #include "services/planning/fast_search.h"
 #include "services/planning/reference_search.h"
+#include "services/planning/sturm_check.h"
 #include "test/unit/planning_instances.h"
 
 namespace chase::planning {
@@ -66,6 +67,34 @@ TEST(FastSearch, FindsTheCertifiedWinnerWithExactVisibility) {
   ExpectSameWinner(Literal(5, 3, 8, true), Spec(5.0, 20, false), Arithmetic::kCertified, 500, 15);
   ExpectSameWinner(Literal(5, 3, 6, true), Spec(5.0, 50, true), Arithmetic::kCertified, 600, 15);
   ExpectSameWinner(Literal(6, 3, 5, true), Spec(5.0, 50, true), Arithmetic::kCertified, 700, 15);
+}
+
+// Shapes for safety and sight that differ (margins) and that do not, sight from the start, from
+// later and never.
+TEST(SturmCheck, AgreesWithTheCertificate) {
+  for (const bool margins : {false, true}) {
+    PlannerConfig config = Literal(6, 2, 5, false);
+    if (margins) config.drone_radius = 0.1, config.sight_margin = 0.5;
+    for (unsigned seed = 800; seed < 806; ++seed) {
+      Problem problem =
+          MakeProblem(config, InstanceGenerator(config, Spec(5.0, 20, true)).Make(seed), nullptr);
+      SkeletonPlacer(config).Place(Layout::kNormal, &problem);
+      const KktCandidates candidates(config, problem);
+      for (const double from : {0.0, 0.5, 1.0})
+        for (const Ellipsoid& e : problem.obstacles) {
+          const SturmCheck check(problem.target, e, from, problem.degree + 1);
+          for (int i = 0; i < problem.n_candidates(); ++i) {
+            const Curve plan = candidates(i);
+            const bool safe = IsSafe(plan, e, Arithmetic::kCertified),
+                       seen =
+                           IsInSight(plan, problem.target, e, from, false, Arithmetic::kCertified);
+            ASSERT_EQ(check.IsSafe(plan), safe) << "seed " << seed << " obstacle " << e.id;
+            ASSERT_EQ(check.IsInSight(plan), seen) << "seed " << seed << " obstacle " << e.id;
+            ASSERT_EQ(check.IsClear(plan), safe && seen) << "seed " << seed << " obstacle " << e.id;
+          }
+        }
+    }
+  }
 }
 
 }  // namespace
