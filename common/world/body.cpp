@@ -1,0 +1,69 @@
+#include "common/world/body.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace chase::world {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+double Support(const Body& body, const Vector3d& n) {
+  switch (body.kind) {
+    case Body::Kind::kEllipsoid:
+      return std::sqrt(n.dot(body.shape * n));
+    case Body::Kind::kBox:
+      return (body.shape.transpose() * n).cwiseAbs().dot(body.half);
+    case Body::Kind::kCylinder:
+      return body.half.x() * n.head<2>().norm() + body.half.z() * std::abs(n.z());
+  }
+  return HUGE_VAL;
+}
+
+Vector3d SupportPoint(const Body& body, const Vector3d& n) {
+  switch (body.kind) {
+    case Body::Kind::kEllipsoid: {
+      const Vector3d Qn = body.shape * n;
+      const double squared = n.dot(Qn);
+      return squared > 0.0 ? Vector3d(Qn / std::sqrt(squared)) : Vector3d::Zero();
+    }
+    case Body::Kind::kBox: {
+      Vector3d x = body.half;
+      for (int a = 0; a < 3; ++a)
+        if (body.shape.col(a).dot(n) < 0.0) x[a] = -x[a];
+      return body.shape * x;
+    }
+    case Body::Kind::kCylinder: {
+      const double across = n.head<2>().norm();
+      Vector3d x(0.0, 0.0, std::copysign(body.half.z(), n.z()));
+      if (across > 0.0) x.head<2>() = body.half.x() / across * n.head<2>();
+      return x;
+    }
+  }
+  return Vector3d::Zero();
+}
+
+double Deviation(const Body& body, const Vector3d& n, double tau) {
+  double variance = 0.0;
+  for (int k = 2; k >= 0; --k) variance = variance * tau + n.dot(body.covariance[k] * n);
+  return std::sqrt(std::max(0.0, variance));
+}
+
+// The area of the projection goes with det((1 + s) Q + (1 + 1/s) r^2 I) of the horizontal block.
+// Its derivative vanishes where 2 D s^3 + r^2 T s^2 - r^2 T s - 2 r^4 = 0, T the trace and D the
+// determinant of the block: one change of sign, one positive root, and Newton's method comes down
+// to it from any s above, where the cubic is positive and convex.
+Matrix3d EnclosingEllipsoid(const Matrix3d& Q, double r) {
+  const double T = Q(0, 0) + Q(1, 1), D = Q(0, 0) * Q(1, 1) - Q(0, 1) * Q(1, 0), rr = r * r;
+  double s = 1.0 + 2.0 * rr / T;  // the cubic is positive here
+  for (int i = 0; i < 60; ++i) {
+    const double f = ((2.0 * D * s + rr * T) * s - rr * T) * s - 2.0 * rr * rr;
+    const double slope = (6.0 * D * s + 2.0 * rr * T) * s - rr * T;
+    const double next = s - f / slope;
+    if (!(next < s) || !(next > 0.0)) break;
+    s = next;
+  }
+  return (1.0 + s) * Q + (1.0 + 1.0 / s) * rr * Matrix3d::Identity();
+}
+
+}  // namespace chase::world

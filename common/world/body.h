@@ -1,0 +1,50 @@
+#pragma once
+
+#include <Eigen/Core>
+
+#include "common/math/polynomial.h"
+
+namespace chase::world {
+
+/// Power-basis coefficients of a curve in normalised time tau in [0,1]; row k: tau^k, frame W, m.
+using Curve = Eigen::Matrix<double, Eigen::Dynamic, 3, 0, 16, 3>;
+
+/// A convex solid that moves without turning, and the uncertainty of where it is. What is to be
+/// avoided at tau is the Minkowski sum of the solid and the ellipsoid of `sigmas` standard
+/// deviations; what else is to be kept off (the drone's radius, tubes, growth) is a ball's radius.
+struct Body {
+  enum class Kind { kEllipsoid, kBox, kCylinder };  // cylinder: upright
+  Kind kind = Kind::kEllipsoid;
+  Curve center = Curve::Zero(1, 3);
+  /// Ellipsoid: Q, m^2, of { x : x' Q^-1 x <= 1 }. Box: columns are its axes. Frame W. The entries
+  /// as they are define the solid.
+  Eigen::Matrix3d shape = Eigen::Matrix3d::Identity();
+  /// Box: half edges along its axes; cylinder: radius, radius, half height; m.
+  Eigen::Vector3d half = Eigen::Vector3d::Ones();
+  double sigmas = 0.0;
+  /// Of the position: coefficients of 1, tau, tau^2, m^2; their sum is positive semidefinite on
+  /// [0,1].
+  Eigen::Matrix3d covariance[3] = {Eigen::Matrix3d::Zero(), Eigen::Matrix3d::Zero(),
+                                   Eigen::Matrix3d::Zero()};
+};
+
+/// A ball about a moving point: the drone with its tube, or the target's end of a line of sight.
+struct Ball {
+  Curve center;             ///< frame W, m
+  math::Polynomial radius;  ///< power basis in tau, m, >= 0 on [0,1]
+};
+
+/// max of n' x over the solid about the origin, without its uncertainty, m.
+double Support(const Body& body, const Eigen::Vector3d& n);
+/// A point of the solid about the origin where that is reached; n is not zero.
+Eigen::Vector3d SupportPoint(const Body& body, const Eigen::Vector3d& n);
+
+/// Standard deviation of the body's position along n at tau, times |n|, m.
+double Deviation(const Body& body, const Eigen::Vector3d& n, double tau);
+
+/// (1 + s) Q + (1 + 1/s) r^2 I encloses { x' Q^-1 x <= 1 } and all balls of radius r > 0 about its
+/// points, for any s > 0; this s gives its horizontal projection the least area. Kurzhanski and
+/// Valyi 1997, "Ellipsoidal Calculus".
+Eigen::Matrix3d EnclosingEllipsoid(const Eigen::Matrix3d& Q, double r);
+
+}  // namespace chase::world

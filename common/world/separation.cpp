@@ -1,0 +1,187 @@
+#include "common/world/separation.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/math/bernstein.h"
+#include "common/math/simplex.h"
+
+namespace chase::world {
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr int kDepth = 14;
+constexpr int kIterations = 60;
+constexpr double kSlack = 1e-9;  // m; more than all rounding for coordinates below 10 km
+
+/// Bernstein coefficients over an interval, one a column: centre of the drone's ball from the
+/// body's, its radius, the same of the target's, covariance of the body.
+using Controls = Eigen::Matrix<double, 17, Eigen::Dynamic, 0, 17, 16>;
+
+void PutBernstein(const math::Polynomial& power, int row, Controls* controls) {
+  math::Polynomial padded = math::Polynomial::Zero(controls->cols());
+  padded.head(power.size()) = power;
+  controls->row(row) = math::PowerToBernstein(padded).transpose();
+}
+
+void PutBall(const Ball& ball, const Curve& center, int row, Controls* controls) {
+  for (int a = 0; a < 3; ++a) {
+    math::Polynomial offset = math::Polynomial::Zero(controls->cols());
+    offset.head(ball.center.rows()) = ball.center.col(a);
+    offset.head(center.rows()) -= center.col(a);
+    PutBernstein(offset, row + a, controls);
+  }
+  PutBernstein(ball.radius, row + 3, controls);
+}
+
+/// Cuts at t: returns the part before and leaves the part after in `rest`.
+Controls CutOff(double t, Controls* rest) {
+  Controls part = *rest;
+  const Eigen::Index n = part.cols() - 1;
+  for (Eigen::Index k = 1; k <= n; ++k) {
+    for (Eigen::Index i = 0; i <= n - k; ++i)
+      rest->col(i) = (1.0 - t) * rest->col(i) + t * rest->col(i + 1);
+    part.col(k) = rest->col(0);
+  }
+  return part;
+}
+
+/// One attempt to separate a body from two balls.
+class Prover {
+ public:
+  Prover(const Ball& drone, const Ball* target, const Body& body)
+      : drone_(drone), target_(target), body_(body) {}
+
+  SeparationResult Prove(double from, double to);
+
+ private:
+  enum class Answer { kPlane, kOverlap, kOpen };
+
+  int Columns() const;
+  Controls MakeControls(int columns) const;
+  Vector3d Lowest(const Controls& c, double radius, const Vector3d& n) const;
+  double LeastRadius(const Controls& c) const;
+  Answer FindPlane(const Controls& c, double tolerance, Separation* s) const;
+  bool Descend(const Controls& c, Separation s, int depth);
+  bool Stop(Kept kept, double tau);
+
+  const Ball& drone_;
+  const Ball* target_;
+  const Body& body_;
+  SeparationResult result_;
+};
+
+int Prover::Columns() const {
+  Eigen::Index n = std::max({drone_.center.rows(), drone_.radius.size(), body_.center.rows(),
+                             Eigen::Index{body_.sigmas > 0.0 ? 3 : 1}});
+  if (target_) n = std::max({n, target_->center.rows(), target_->radius.size()});
+  return static_cast<int>(n);
+}
+
+Controls Prover::MakeControls(int columns) const {
+  Controls c = Controls::Zero(17, columns);
+  PutBall(drone_, body_.center, 0, &c);
+  if (target_) PutBall(*target_, body_.center, 4, &c);
+  if (body_.sigmas == 0.0) return c;
+  for (int i = 0; i < 9; ++i) {
+    math::Polynomial entry(3);
+    for (int k = 0; k < 3; ++k) entry[k] = body_.covariance[k](i);
+    PutBernstein(entry, 8 + i, &c);
+  }
+  return c;
+}
+
+double Prover::LeastRadius(const Controls& c) const {
+  const double drone = c.row(3).minCoeff();
+  return std::max(0.0, target_ ? std::min(drone, c.row(7).minCoeff()) : drone);
+}
+
+/// The point z of the set { balls of their radius less `radius` - body } with the least n' z.
+Vector3d Prover::Lowest(const Controls& c, double radius, const Vector3d& n) const {
+  double least = HUGE_VAL;
+  Vector3d z = Vector3d::Zero();
+  for (Eigen::Index i = 0; i < c.cols(); ++i) {
+    Vector3d spread = Vector3d::Zero();
+    if (body_.sigmas > 0.0) {
+      const Eigen::Map<const Eigen::Matrix3d> S(&c(8, i));
+      const Vector3d Sn = S * n;
+      const double variance = n.dot(Sn);
+      if (variance > 0.0) spread = body_.sigmas / std::sqrt(variance) * Sn;
+    }
+    for (int row = 0; row <= (target_ ? 4 : 0); row += 4) {
+      const double more = std::max(0.0, c(row + 3, i) - radius);
+      const Vector3d point = c.block<3, 1>(row, i) - more * n - spread;
+      const double value = n.dot(point);
+      if (value >= least) continue;
+      least = value;
+      z = point;
+    }
+  }
+  return z - SupportPoint(body_, n);
+}
+
+/// Gilbert, Johnson and Keerthi's algorithm from the direction s->normal. kPlane: n' z >= radius
+/// for all of the set; kOverlap: the set has a point that is nearer to the origin than the radius
+/// and `tolerance`.
+Prover::Answer Prover::FindPlane(const Controls& c, double tolerance, Separation* s) const {
+  const double radius = LeastRadius(c);
+  math::Simplex simplex;
+  for (int i = 0; i < kIterations; ++i) {
+    const Vector3d z = Lowest(c, radius, s->normal);
+    if (!z.allFinite()) return Answer::kOpen;
+    if (s->normal.dot(z) >= radius + kSlack) return Answer::kPlane;
+    if (!simplex.Add(z)) return Answer::kOpen;
+    const double distance = simplex.nearest().norm();
+    if (distance <= std::max(kSlack, radius + tolerance)) return Answer::kOverlap;
+    s->normal = simplex.nearest() / distance;
+  }
+  return Answer::kOpen;
+}
+
+bool Prover::Stop(Kept kept, double tau) {
+  result_.kept = kept;
+  result_.tau = tau;
+  result_.certificate.clear();
+  return false;
+}
+
+/// `s`: the interval, and the normal to start from.
+bool Prover::Descend(const Controls& c, Separation s, int depth) {
+  if (FindPlane(c, kSlack, &s) == Answer::kPlane && ProvenRoom(s, drone_, target_, body_) >= 0.0) {
+    result_.certificate.push_back(s);
+    return true;
+  }
+  const double middle = 0.5 * (s.from + s.to);
+  Controls right = c, point(17, 1);
+  const Controls left = CutOff(0.5, &right);
+  point.col(0) = right.col(0);
+  Separation now{middle, middle, s.normal};
+  if (FindPlane(point, -kSlack, &now) == Answer::kOverlap) return Stop(Kept::kTouches, middle);
+  if (depth == 0) return Stop(Kept::kUndecided, middle);
+  return Descend(left, {s.from, middle, now.normal}, depth - 1) &&
+         Descend(right, {middle, s.to, now.normal}, depth - 1);
+}
+
+SeparationResult Prover::Prove(double from, double to) {
+  const int columns = Columns();
+  if (columns > 16 || !(from >= 0.0 && from < to && to <= 1.0)) return result_;
+  Controls c = MakeControls(columns);
+  if (!c.allFinite()) return result_;
+  if (to < 1.0) c = CutOff(to, &c);
+  if (from > 0.0) CutOff(from / to, &c);
+  const Vector3d start = c.topRows<3>().rowwise().mean();
+  const double distance = start.norm();
+  Separation s{from, to, distance > 0.0 ? Vector3d(start / distance) : Vector3d::UnitX()};
+  if (Descend(c, s, kDepth)) result_.kept = Kept::kOff;
+  return result_;
+}
+
+}  // namespace
+
+SeparationResult Separate(const Ball& drone, const Ball* target, const Body& body, double from,
+                          double to) {
+  return Prover(drone, target, body).Prove(from, to);
+}
+
+}  // namespace chase::world

@@ -1,0 +1,93 @@
+#include <gtest/gtest.h>
+
+#include <Eigen/Eigenvalues>
+#include <array>
+#include <vector>
+
+#include "common/world/obstacle.h"
+#include "common/world/separation.h"
+#include "test/unit/separation_model.h"
+
+namespace chase::world {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+using Certificate = std::vector<Separation>;
+
+SeparationResult Prove(const SeparationPair& pair) {
+  return Separate(pair.drone, pair.second(), pair.body);
+}
+bool Holds(const Certificate& c, const SeparationPair& pair) {
+  return IsCertificate(c, 0.0, 1.0, pair.drone, pair.second(), pair.body);
+}
+bool HoldsExactly(const Certificate& c, const SeparationPair& pair) {
+  return IsCertificateExact(c, 0.0, 1.0, pair.drone, pair.second(), pair.body);
+}
+
+// ---- the prover, against distances by nearest points ----
+
+struct Tally {
+  int pairs = 0, kept = 0, touching = 0, undecided = 0, intervals = 0, most = 0;
+  int false_kept = 0, false_touching = 0, missed = 0;
+  std::array<int, 3> kept_of_kind = {0, 0, 0};
+};
+
+/// Grows the balls of a pair until the gap is at most 2 cm, above or below zero.
+double Tighten(Random* random, double gap, SeparationPair* pair) {
+  const double wanted = random->Uniform(-0.02, 0.02);
+  if (gap <= wanted) return gap;
+  pair->drone.radius[0] += gap - wanted;
+  pair->target.radius[0] += gap - wanted;
+  return wanted;
+}
+
+Tally ProveRandomPairs(uint64_t seed, int n) {
+  Tally t;
+  for (int i = 0; i < n; ++i) {
+    Random random(seed, static_cast<uint64_t>(i));
+    SeparationPair pair = RandomPair(&random);
+    double gap = LeastGap(pair);
+    if (i % 3 == 0) gap = Tighten(&random, gap, &pair);
+    const SeparationResult result = Prove(pair);
+    const bool kept = result.kept == Kept::kOff, touches = result.kept == Kept::kTouches;
+    const int intervals = static_cast<int>(result.certificate.size());
+    ++t.pairs;
+    t.kept += kept;
+    t.touching += touches;
+    t.undecided += !kept && !touches;
+    t.intervals += intervals;
+    t.most = std::max(t.most, intervals);
+    t.kept_of_kind[static_cast<size_t>(pair.body.kind)] += kept;
+    t.false_kept += kept && gap < -1e-7;
+    t.false_touching += touches && GapAt(pair, result.tau) > 1e-7;
+    t.missed += !kept && gap > 0.005;
+    if ((kept && gap < -1e-7) || (!kept && gap > 0.005))
+      ADD_FAILURE() << "seed " << seed << " pair " << i << " gap " << gap << " kept " << kept;
+  }
+  return t;
+}
+
+void Expect(const Tally& t) {
+  EXPECT_EQ(t.false_kept, 0);
+  EXPECT_EQ(t.false_touching, 0);
+  EXPECT_EQ(t.missed, 0);
+  EXPECT_LE(t.intervals, 3.5 * t.kept);
+  for (int kept : t.kept_of_kind) EXPECT_GT(kept, t.pairs / 20);
+  EXPECT_GT(t.touching, t.pairs / 5);
+  std::printf(
+      "%d pairs: %d kept off (%d ellipsoids, %d boxes, %d cylinders), %d touching, %d "
+      "undecided; %.2f intervals a proof, %d at most\n",
+      t.pairs, t.kept, t.kept_of_kind[0], t.kept_of_kind[1], t.kept_of_kind[2], t.touching,
+      t.undecided, static_cast<double>(t.intervals) / t.kept, t.most);
+}
+
+TEST(Separation, KeepsOffWhatStaysClearAndNothingThatComesCloser) {
+  Expect(ProveRandomPairs(1, 3000));
+}
+
+/// --gtest_also_run_disabled_tests --gtest_filter=*HundredThousand*: about ten minutes.
+TEST(Separation, DISABLED_HundredThousandPairs) { Expect(ProveRandomPairs(2, 100000)); }
+
+}  // namespace
+}  // namespace chase::world
