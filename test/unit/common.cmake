@@ -5,4 +5,5 @@ chase_test(common_math_test
 chase_test(world_separation_test
   LIBS separation world
   SOURCES ${CMAKE_CURRENT_LIST_DIR}/world_separation_test.cpp
+          ${CMAKE_CURRENT_LIST_DIR}/world_separation_check_test.cpp
           ${CMAKE_CURRENT_LIST_DIR}/separation_model.cpp)

@@ -1,29 +1,13 @@
 #include <gtest/gtest.h>
 
-#include <Eigen/Eigenvalues>
 #include <array>
-#include <vector>
+#include <cstdio>
 
-#include "common/world/obstacle.h"
 #include "common/world/separation.h"
 #include "test/unit/separation_model.h"
 
 namespace chase::world {
 namespace {
-
-using Eigen::Matrix3d;
-using Eigen::Vector3d;
-using Certificate = std::vector<Separation>;
-
-SeparationResult Prove(const SeparationPair& pair) {
-  return Separate(pair.drone, pair.second(), pair.body);
-}
-bool Holds(const Certificate& c, const SeparationPair& pair) {
-  return IsCertificate(c, 0.0, 1.0, pair.drone, pair.second(), pair.body);
-}
-bool HoldsExactly(const Certificate& c, const SeparationPair& pair) {
-  return IsCertificateExact(c, 0.0, 1.0, pair.drone, pair.second(), pair.body);
-}
 
 // ---- the prover, against distances by nearest points ----
 
@@ -49,7 +33,7 @@ Tally ProveRandomPairs(uint64_t seed, int n) {
     SeparationPair pair = RandomPair(&random);
     double gap = LeastGap(pair);
     if (i % 3 == 0) gap = Tighten(&random, gap, &pair);
-    const SeparationResult result = Prove(pair);
+    const SeparationResult result = Separate(pair.drone, pair.second(), pair.body);
     const bool kept = result.kept == Kept::kOff, touches = result.kept == Kept::kTouches;
     const int intervals = static_cast<int>(result.certificate.size());
     ++t.pairs;

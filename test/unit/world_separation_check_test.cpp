@@ -1,0 +1,371 @@
+#include <gtest/gtest.h>
+
+#include <Eigen/Eigenvalues>
+#include <functional>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "common/world/obstacle.h"
+#include "common/world/separation.h"
+#include "test/unit/separation_pairs.h"
+
+namespace chase::world {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+using Certificate = std::vector<Separation>;
+
+bool Holds(const Certificate& c, const SeparationPair& pair) {
+  return IsCertificate(c, 0.0, 1.0, pair.drone, pair.second(), pair.body);
+}
+bool HoldsExactly(const Certificate& c, const SeparationPair& pair) {
+  return IsCertificateExact(c, 0.0, 1.0, pair.drone, pair.second(), pair.body);
+}
+
+struct Proven {
+  SeparationPair pair;
+  Certificate certificate;
+};
+
+/// Random pairs that are kept off.
+Proven RandomProven(Random* random) {
+  for (;;) {
+    const SeparationPair pair = RandomPair(random);
+    const SeparationResult result = Separate(pair.drone, pair.second(), pair.body);
+    if (result.kept == Kept::kOff) return {pair, result.certificate};
+  }
+}
+
+// ---- a second formulation: corners, axes and samples in time ----
+
+Vector3d At(const Curve& curve, double tau) {
+  Vector3d x = Vector3d::Zero();
+  for (Eigen::Index k = curve.rows(); k-- > 0;) x = x * tau + curve.row(k).transpose();
+  return x;
+}
+
+double RootOfForm(const Matrix3d& Q, const Vector3d& n) {
+  const Eigen::SelfAdjointEigenSolver<Matrix3d> eigen(Q);
+  const Vector3d axes = eigen.eigenvalues().cwiseMax(0.0).cwiseSqrt();
+  return axes.cwiseProduct(eigen.eigenvectors().transpose() * n).norm();
+}
+
+double FurthestAlong(const Body& body, const Vector3d& n) {
+  if (body.kind == Body::Kind::kEllipsoid) return RootOfForm(body.shape, n);
+  double most = -HUGE_VAL;
+  for (int corner = 0; corner < 8; ++corner) {
+    Vector3d x = body.half;
+    for (int a = 0; a < 3; ++a)
+      if (corner >> a & 1) x[a] = -x[a];
+    if (body.kind == Body::Kind::kCylinder) {
+      const double angle = std::atan2(n.y(), n.x());
+      x.head<2>() = body.half.x() * Eigen::Vector2d(std::cos(angle), std::sin(angle));
+    }
+    most = std::max(most, n.dot(body.kind == Body::Kind::kBox ? Vector3d(body.shape * x) : x));
+  }
+  return most;
+}
+
+double RoomAt(const SeparationPair& pair, const Separation& s, double tau) {
+  const Vector3d& n = s.normal;
+  const Body& b = pair.body;
+  const Matrix3d S = b.covariance[0] + tau * b.covariance[1] + tau * tau * b.covariance[2];
+  const double taken = FurthestAlong(b, n) + b.sigmas * RootOfForm(S, n);
+  const auto room = [&](const Ball& ball) {
+    return n.dot(At(ball.center, tau) - At(b.center, tau)) - taken -
+           n.norm() * math::Evaluate(ball.radius, tau);
+  };
+  return (pair.sight ? std::min(room(pair.drone), room(pair.target)) : room(pair.drone)) / n.norm();
+}
+
+double LeastRoom(const SeparationPair& pair, const Separation& s) {
+  double least = HUGE_VAL;
+  for (int i = 0; i <= 200; ++i)
+    least = std::min(least, RoomAt(pair, s, s.from + (s.to - s.from) * i / 200.0));
+  return least;
+}
+
+TEST(SeparationCheck, ProvenRoomIsBelowTheSampledOneAndNearIt) {
+  double worst = 0.0;
+  for (uint64_t seed = 0; seed < 500; ++seed) {
+    Random random(seed, 11);
+    const Proven proven = RandomProven(&random);
+    for (const Separation& s : proven.certificate) {
+      const double room = ProvenRoom(s, proven.pair.drone, proven.pair.second(), proven.pair.body);
+      const double sampled = LeastRoom(proven.pair, s);
+      ASSERT_GE(room, 0.0) << seed;
+      ASSERT_LE(room, sampled + 1e-9) << seed;
+      worst = std::max(worst, RoomAt(proven.pair, {s.from, s.from, s.normal}, s.from) - room);
+    }
+  }
+  EXPECT_LT(worst, 20.0);  // m: the room at an instant, not just anything
+}
+
+TEST(SeparationCheck, TrueCertificatesPassInBothArithmetics) {
+  for (uint64_t seed = 0; seed < 1000; ++seed) {
+    Random random(seed, 12);
+    const Proven proven = RandomProven(&random);
+    ASSERT_TRUE(Holds(proven.certificate, proven.pair)) << seed;
+    if (seed % 4 == 0) {
+      ASSERT_TRUE(HoldsExactly(proven.certificate, proven.pair)) << seed;
+    }
+  }
+}
+
+// ---- tampering ----
+
+Separation& PickOne(Random* random, Certificate* c) { return (*c)[random->Next() % c->size()]; }
+
+/// Bends the normal ever further until it no longer separates.
+void BendNormal(Random* random, Proven* p) {
+  Separation& s = PickOne(random, &p->certificate);
+  const Vector3d axis = RandomVector(random, 1.0, 1.0, 1.0).normalized();
+  const Vector3d n = s.normal;
+  for (double angle = random->Uniform(0.0, 0.3); angle < M_PI; angle += 0.05) {
+    s.normal = Eigen::AngleAxisd(angle, axis) * n;
+    if (LeastRoom(p->pair, s) < -1e-6) return;
+  }
+}
+
+/// One plane for what took several.
+void WidenInterval(Random* random, Proven* p) {
+  for (int i = 0; i < 20 && p->certificate.size() < 2; ++i) *p = RandomProven(random);
+  Separation s = PickOne(random, &p->certificate);
+  s.from = 0.0;
+  s.to = 1.0;
+  p->certificate = {s};
+}
+
+void GrowBody(Random* random, Proven* p) {
+  const Separation s = PickOne(random, &p->certificate);
+  Body& body = p->pair.body;
+  for (int i = 0; i < 60 && LeastRoom(p->pair, s) >= -1e-6; ++i) {
+    body.half *= 1.1;
+    if (body.kind == Body::Kind::kEllipsoid) body.shape *= 1.21;
+  }
+}
+
+/// Just too far towards the drone.
+void MoveBody(Random* random, Proven* p) {
+  const Separation s = PickOne(random, &p->certificate);
+  const double room = LeastRoom(p->pair, s);
+  p->pair.body.center.row(0) += (room + 1e-6) * s.normal.normalized().transpose();
+}
+
+void GrowUncertainty(Random* random, Proven* p) {
+  const Separation s = PickOne(random, &p->certificate);
+  const double room = std::max(0.0, LeastRoom(p->pair, s));
+  p->pair.drone.radius.conservativeResize(3);
+  p->pair.drone.radius[2] = 0.0;
+  p->pair.drone.radius[0] += room + 1e-6;
+  p->pair.target.radius[0] += room + 1e-6;
+}
+
+/// Leaves a gap in time: a piece is missing, or an end is off by one unit in the last place.
+void BreakCover(Random* random, Proven* p) {
+  const size_t i = random->Next() % p->certificate.size();
+  Separation& s = p->certificate[i];
+  switch (random->Next() % 3) {
+    case 0:
+      p->certificate.erase(p->certificate.begin() + static_cast<std::ptrdiff_t>(i));
+      return;
+    case 1:
+      s.to = std::nextafter(s.to, 0.0);
+      return;
+    default:
+      s.from = std::nextafter(s.from, 1.0);
+  }
+}
+
+bool IsBroken(const Proven& p) {
+  double end = 0.0;
+  for (const Separation& s : p.certificate) {
+    if (s.from > end || LeastRoom(p.pair, s) < -1e-9) return true;
+    end = s.to;
+  }
+  return end < 1.0;
+}
+
+TEST(SeparationCheck, TamperedCertificatesAreRefused) {
+  struct Way {
+    std::string name;
+    std::function<void(Random*, Proven*)> tamper;
+  };
+  const std::vector<Way> ways = {
+      {"normal bent", BendNormal},       {"interval widened", WidenInterval},
+      {"body grown", GrowBody},          {"body moved", MoveBody},
+      {"radius grown", GrowUncertainty}, {"gap in time", BreakCover}};
+  std::vector<int> count(ways.size(), 0);
+  int total = 0;
+  for (uint64_t seed = 0; total < 10000; ++seed) {
+    Random random(seed, 13);
+    const Proven proven = RandomProven(&random);
+    for (size_t w = 0; w < ways.size(); ++w) {
+      Proven tampered = proven;
+      ways[w].tamper(&random, &tampered);
+      if (!IsBroken(tampered)) continue;
+      ++count[w];
+      ++total;
+      ASSERT_FALSE(Holds(tampered.certificate, tampered.pair)) << ways[w].name << " " << seed;
+      if (seed % 16 == 0) {
+        ASSERT_FALSE(HoldsExactly(tampered.certificate, tampered.pair))
+            << ways[w].name << " " << seed;
+      }
+    }
+  }
+  for (size_t w = 0; w < ways.size(); ++w) EXPECT_GT(count[w], 200) << ways[w].name;
+}
+
+/// The body moved along the normal until the room is zero up to rounding: whatever floating point
+/// accepts the integers accept.
+TEST(SeparationCheck, AcceptsNothingThatExactArithmeticRefuses) {
+  int accepted = 0, refused = 0, differ = 0;
+  for (uint64_t seed = 0; seed < 400; ++seed) {
+    Random random(seed, 14);
+    Proven p = RandomProven(&random);
+    const Separation s = PickOne(&random, &p.certificate);
+    for (int i = 0; i < 3; ++i) {
+      const double room = ProvenRoom(s, p.pair.drone, p.pair.second(), p.pair.body);
+      p.pair.body.center.row(0) +=
+          (room + random.Uniform(-1.0, 1.0) * 1e-12) * s.normal.transpose();
+    }
+    const bool fast = ProvenRoom(s, p.pair.drone, p.pair.second(), p.pair.body) >= 0.0;
+    const bool exact =
+        IsCertificateExact({s}, s.from, s.to, p.pair.drone, p.pair.second(), p.pair.body);
+    ASSERT_TRUE(!fast || exact) << seed;
+    (fast ? accepted : refused) += 1;
+    differ += fast != exact;
+  }
+  EXPECT_GT(accepted, 20);
+  EXPECT_GT(refused, 20);
+  EXPECT_GT(differ, 0) << "the margin of rounding was not tried";
+}
+
+// ---- input that is none ----
+
+Proven StandingWall() {
+  Proven p;
+  p.pair.drone.center = Vector3d(0.0, 0.0, 1.0).transpose();
+  p.pair.drone.radius = math::Polynomial::Constant(1, 0.4);
+  p.pair.body.kind = Body::Kind::kBox;
+  p.pair.body.half = {1.25, 0.05, 1.0};
+  p.pair.body.center = Vector3d(0.0, 1.0, 1.0).transpose();
+  p.certificate = {{0.0, 1.0, -Vector3d::UnitY()}};
+  return p;
+}
+
+TEST(SeparationCheck, RoomOfAStandingWallIsItsDistance) {
+  const Proven p = StandingWall();
+  EXPECT_NEAR(ProvenRoom(p.certificate[0], p.pair.drone, nullptr, p.pair.body), 0.55, 1e-12);
+}
+
+TEST(SeparationCheck, WhatIsNoInputProvesNothing) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const std::vector<std::function<void(Proven*)>> ways = {
+      [](Proven* p) { p->certificate.clear(); },
+      [](Proven* p) { p->certificate[0].normal.setZero(); },
+      [](Proven* p) { p->certificate[0].normal *= 3.0; },
+      [](Proven* p) { p->certificate[0].from = -0.1; },
+      [](Proven* p) { p->certificate[0].to = 1.1; },
+      [=](Proven* p) { p->certificate[0].to = nan; },
+      [=](Proven* p) { p->certificate[0].normal.x() = nan; },
+      [=](Proven* p) { p->pair.drone.center(0, 1) = nan; },
+      [=](Proven* p) { p->pair.drone.center(0, 1) = -HUGE_VAL; },
+      [=](Proven* p) { p->pair.drone.radius[0] = nan; },
+      [=](Proven* p) { p->pair.body.center(0, 0) = nan; },
+      [=](Proven* p) { p->pair.body.shape(0, 1) = nan; },
+      [](Proven* p) { p->pair.body.half.x() = -1.0; },
+      [=](Proven* p) { p->pair.body.sigmas = nan; },
+      [](Proven* p) { p->pair.drone.radius = math::Polynomial::Zero(17); },
+  };
+  for (size_t w = 0; w < ways.size(); ++w) {
+    Proven p = StandingWall();
+    ASSERT_TRUE(Holds(p.certificate, p.pair) && HoldsExactly(p.certificate, p.pair));
+    ways[w](&p);
+    EXPECT_FALSE(Holds(p.certificate, p.pair)) << w;
+    if (w + 1 < ways.size()) {
+      EXPECT_FALSE(HoldsExactly(p.certificate, p.pair)) << w;
+    }
+    const SeparationResult result = Separate(p.pair.drone, nullptr, p.pair.body);
+    EXPECT_TRUE(result.kept == Kept::kOff ? Holds(result.certificate, p.pair) : true) << w;
+  }
+}
+
+// ---- growing the axes is no enclosure ----
+
+/// How far the ball of radius r about the ellipsoid x' R x <= 1 sticks out of the ellipsoid of
+/// inverse shape `outer` in the worst of many directions, m.
+double StickingOut(const Matrix3d& Q, double r, const Matrix3d& outer, Random* random) {
+  double most = -HUGE_VAL;
+  for (int i = 0; i < 2000; ++i) {
+    Vector3d n;
+    for (int a = 0; a < 3; ++a) n[a] = random->Gaussian();
+    n.normalize();
+    if (i % 2 == 0) n = Vector3d(n.x(), n.y(), 0.0).normalized();
+    most = std::max(most, std::sqrt(n.dot(Q * n)) + r - std::sqrt(n.dot(outer * n)));
+  }
+  return most;
+}
+
+TEST(EnclosingEllipsoid, GrownAxesDoNotHoldAWallAndABall) {
+  Random random(1);
+  for (double width : {0.01, 0.05, 0.1}) {
+    const Matrix3d Q = Vector3d(1.25, width, 1.0).cwiseAbs2().asDiagonal();
+    const Matrix3d grown = Inflated(Q.inverse(), 0.4).inverse();
+    const double short_by = StickingOut(Q, 0.4, grown, &random);
+    EXPECT_GT(short_by, 0.104) << width;
+    EXPECT_LT(short_by, 0.146) << width;
+  }
+}
+
+/// A place that the grown ellipsoid calls free and where the drone's ball cuts into the wall.
+TEST(EnclosingEllipsoid, APlaceOutsideTheGrownAxesCanTouch) {
+  Proven p = StandingWall();
+  p.pair.body.kind = Body::Kind::kEllipsoid;
+  p.pair.body.shape = Vector3d(1.25, 0.01, 1.0).cwiseAbs2().asDiagonal();
+  p.pair.drone.center.row(0) = p.pair.body.center.row(0) + Vector3d(1.15, 0.30, 0.0).transpose();
+  const Vector3d offset = (p.pair.drone.center.row(0) - p.pair.body.center.row(0)).transpose();
+  const Matrix3d grown = Inflated(p.pair.body.shape.inverse(), 0.4);
+  EXPECT_GT(offset.dot(grown * offset), 1.0);
+  const SeparationResult result = Separate(p.pair.drone, nullptr, p.pair.body);
+  EXPECT_EQ(result.kept, Kept::kTouches);
+}
+
+TEST(EnclosingEllipsoid, HoldsTheBallAboutEveryPoint) {
+  for (uint64_t seed = 0; seed < 300; ++seed) {
+    Random random(seed, 15);
+    const Matrix3d R = RandomRotation(&random, seed % 2 == 0);
+    const Vector3d half = RandomHalfSizes(&random);
+    const Matrix3d Q = R * half.cwiseAbs2().asDiagonal() * R.transpose();
+    const double r = random.Uniform(0.01, 1.0);
+    const Matrix3d outer = EnclosingEllipsoid(Q, r), inverse = outer.inverse();
+    EXPECT_LT(StickingOut(Q, r, outer, &random), 1e-9) << seed;
+    for (int i = 0; i < 200; ++i) {
+      Vector3d u, v;
+      for (int a = 0; a < 3; ++a) u[a] = random.Gaussian(), v[a] = random.Gaussian();
+      const Vector3d x = R * half.cwiseProduct(u.normalized()) + r * v.normalized();
+      ASSERT_LT(x.dot(inverse * x), 1.0 + 1e-9) << seed;
+    }
+  }
+}
+
+TEST(EnclosingEllipsoid, HasTheLeastHorizontalProjection) {
+  for (uint64_t seed = 0; seed < 300; ++seed) {
+    Random random(seed, 16);
+    const Vector3d half = RandomHalfSizes(&random);
+    const Matrix3d R = RandomRotation(&random, true);
+    const Matrix3d Q = R * half.cwiseAbs2().asDiagonal() * R.transpose();
+    const double r = random.Uniform(0.01, 1.0);
+    const auto area = [&](const Matrix3d& M) { return M.topLeftCorner<2, 2>().determinant(); };
+    const double best = area(EnclosingEllipsoid(Q, r));
+    for (double s = 1e-3; s < 1e4; s *= 1.02) {
+      const Matrix3d other = (1.0 + s) * Q + (1.0 + 1.0 / s) * r * r * Matrix3d::Identity();
+      ASSERT_LE(best, area(other) * (1.0 + 1e-9)) << seed << " s " << s;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace chase::world
