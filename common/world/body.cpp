@@ -1,12 +1,42 @@
 #include "common/world/body.h"
 
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace chase::world {
 
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
+
+namespace {
+
+// With E = R Q - I and Q symmetric, R^(1/2) Q R^(1/2) - I has the eigenvalues of E. So Q is at
+// least (1 - |E|) times the inverse of R.
+Matrix3d InverseAbove(const Matrix3d& R) {
+  const Eigen::LLT<Matrix3d> factors(R);
+  const Matrix3d inverse = R.inverse(), Q = 0.5 * (inverse + inverse.transpose());
+  const double rounding = 32.0 * 0x1p-53 * R.norm() * Q.norm();
+  const double error = (R * Q - Matrix3d::Identity()).norm() + rounding;
+  const bool usable = R == R.transpose() && factors.info() == Eigen::Success && error < 0.1;
+  return usable ? Matrix3d((1.0 + 2.0 * error) * Q)
+                : Matrix3d::Constant(std::numeric_limits<double>::quiet_NaN());
+}
+
+}  // namespace
+
+Body MakeBody(const Obstacle& obstacle, double start, double duration, double sigmas) {
+  Body body;
+  body.center = obstacle.center.Reparametrised(start, duration).coefficients;
+  body.shape = InverseAbove(obstacle.shape);
+  if (obstacle.position_variance == 0.0 && obstacle.velocity_variance == 0.0) return body;
+  body.sigmas = sigmas;
+  body.covariance[0].diagonal().setConstant(obstacle.position_variance);
+  body.covariance[2].diagonal().setConstant(obstacle.velocity_variance * duration * duration);
+  return body;
+}
 
 double Support(const Body& body, const Vector3d& n) {
   switch (body.kind) {

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 
 #include "common/math/polynomial.h"
+#include "common/world/obstacle.h"
 
 namespace chase::world {
 
@@ -30,9 +31,14 @@ struct Body {
 
 /// A ball about a moving point: the drone with its tube, or the target's end of a line of sight.
 struct Ball {
-  Curve center;             ///< frame W, m
-  math::Polynomial radius;  ///< power basis in tau, m, >= 0 on [0,1]
+  Curve center = Curve::Zero(1, 3);  ///< frame W, m
+  math::Polynomial radius;           ///< power basis in tau, m, >= 0 on [0,1]
 };
+
+/// The obstacle over [start, start + duration], its ellipsoid no smaller than the one that R
+/// describes, however the inverse of R is rounded; its variances grow as those of a body at unknown
+/// constant velocity. NaN where R is not positive definite or its inverse is no inverse.
+Body MakeBody(const Obstacle& obstacle, double start, double duration, double sigmas);
 
 /// max of n' x over the solid about the origin, without its uncertainty, m.
 double Support(const Body& body, const Eigen::Vector3d& n);

@@ -92,13 +92,19 @@ bool IsNotNegative(const ExactPolynomial& p, const Separation& s) {
   return true;
 }
 
-bool IsFinite(const Ball& ball) { return ball.center.allFinite() && ball.radius.allFinite(); }
+/// Of numbers whose squares and products stay finite in floating point.
+template <class Matrix>
+bool IsModerate(const Matrix& m) {
+  return m.allFinite() && (m.size() == 0 || m.cwiseAbs().maxCoeff() < 1e100);
+}
 
-bool IsFinite(const Body& body) {
-  bool finite = body.center.allFinite() && body.shape.allFinite() && body.half.allFinite() &&
-                body.half.minCoeff() >= 0.0 && body.sigmas >= 0.0 && std::isfinite(body.sigmas);
-  for (const Eigen::Matrix3d& S : body.covariance) finite = finite && S.allFinite();
-  return finite;
+bool IsUsable(const Ball& ball) { return IsModerate(ball.center) && IsModerate(ball.radius); }
+
+bool IsUsable(const Body& body) {
+  bool usable = IsModerate(body.center) && IsModerate(body.shape) && IsModerate(body.half) &&
+                body.half.minCoeff() >= 0.0 && body.sigmas >= 0.0 && body.sigmas < 1e100;
+  for (const Eigen::Matrix3d& S : body.covariance) usable = usable && IsModerate(S);
+  return usable;
 }
 
 bool IsKeptOff(const Separation& s, const Ball& ball, const Body& body,
@@ -114,8 +120,8 @@ bool IsKeptOff(const Separation& s, const Ball& ball, const Body& body,
 
 bool IsCertificateExact(const std::vector<Separation>& certificate, double from, double to,
                         const Ball& drone, const Ball* target, const Body& body) {
-  if (!IsWellFormed(certificate, from, to) || !IsFinite(drone) || !IsFinite(body)) return false;
-  if (target && !IsFinite(*target)) return false;
+  if (!IsWellFormed(certificate, from, to) || !IsUsable(drone) || !IsUsable(body)) return false;
+  if (target && !IsUsable(*target)) return false;
   for (const Separation& s : certificate) {
     const ExactPolynomial taken = SupportAbove(body, s.normal) + UncertaintyAbove(s, body);
     if (!IsKeptOff(s, drone, body, taken)) return false;

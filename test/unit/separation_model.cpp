@@ -85,20 +85,31 @@ class Model {
   double Distance(const Vector3d& x) const {
     if (body_.sigmas == 0.0) return (x - Nearest(x)).norm();
     if (round_) return (x - Nearest(x)).norm() - radius_;
-    // Minimises |x - u - v|, u in the solid, v in the ellipsoid of uncertainty, in turns.
-    Vector3d u = Nearest(x), v = Vector3d::Zero();
-    double last = HUGE_VAL;
-    for (int i = 0; i < 2000; ++i) {
-      v = spread_.Nearest(x - u);
-      u = Nearest(x - v);
-      const double distance = (x - u - v).norm();
-      if (distance < 1e-12 || last - distance < 1e-12) return distance;
-      last = distance;
-    }
-    return last;
+    return DistanceFromSum(x);
   }
 
  private:
+  /// Minimises |x - u - v|, u in the solid, v in the ellipsoid of uncertainty: accelerated
+  /// projected gradients with restarts (O'Donoghue and Candes 2015).
+  double DistanceFromSum(const Vector3d& x) const {
+    const auto step = [&](const Vector3d& v) { return spread_.Nearest(x - Nearest(x - v)); };
+    Vector3d v = step(Vector3d::Zero()), y = v;
+    double momentum = 1.0;
+    for (int i = 0; i < 5000; ++i) {
+      Vector3d next = step(y);
+      if ((y - next).dot(next - v) > 0.0) {
+        momentum = 1.0;
+        next = step(v);
+      }
+      const double more = 0.5 * (1.0 + std::sqrt(1.0 + 4.0 * momentum * momentum));
+      y = next + (momentum - 1.0) / more * (next - v);
+      momentum = more;
+      const bool settled = (next - v).norm() < 1e-13;
+      v = next;
+      if (settled || (x - v - Nearest(x - v)).norm() < 1e-11) break;
+    }
+    return (x - v - Nearest(x - v)).norm();
+  }
   Vector3d Nearest(const Vector3d& x) const {
     return body_.kind == Body::Kind::kEllipsoid ? solid_.Nearest(x) : NearestPoint(body_, x);
   }

@@ -29,12 +29,14 @@ struct Proven {
   Certificate certificate;
 };
 
-/// Random pairs that are kept off.
+/// Random pairs that are kept off; the normals get other lengths, which mean the same.
 Proven RandomProven(Random* random) {
   for (;;) {
     const SeparationPair pair = RandomPair(random);
-    const SeparationResult result = Separate(pair.drone, pair.second(), pair.body);
-    if (result.kept == Kept::kOff) return {pair, result.certificate};
+    SeparationResult result = Separate(pair.drone, pair.second(), pair.body);
+    if (result.kept != Kept::kOff) continue;
+    for (Separation& s : result.certificate) s.normal *= random->Uniform(0.75, 1.4);
+    return {pair, result.certificate};
   }
 }
 
@@ -218,29 +220,79 @@ TEST(SeparationCheck, TamperedCertificatesAreRefused) {
   for (size_t w = 0; w < ways.size(); ++w) EXPECT_GT(count[w], 200) << ways[w].name;
 }
 
-/// The body moved along the normal until the room is zero up to rounding: whatever floating point
-/// accepts the integers accept.
+/// The body moved along the normal until the last place that floating point accepts: the integers
+/// accept it, too, and go on for no more than the bound on rounding.
 TEST(SeparationCheck, AcceptsNothingThatExactArithmeticRefuses) {
-  int accepted = 0, refused = 0, differ = 0;
+  int further = 0;
   for (uint64_t seed = 0; seed < 400; ++seed) {
     Random random(seed, 14);
     Proven p = RandomProven(&random);
     const Separation s = PickOne(&random, &p.certificate);
-    for (int i = 0; i < 3; ++i) {
-      const double room = ProvenRoom(s, p.pair.drone, p.pair.second(), p.pair.body);
-      p.pair.body.center.row(0) +=
-          (room + random.Uniform(-1.0, 1.0) * 1e-12) * s.normal.transpose();
+    const Curve center = p.pair.body.center;
+    const auto move = [&](double by) {
+      p.pair.body.center.row(0) = center.row(0) + by * s.normal.normalized().transpose();
+    };
+    const auto exact = [&] {
+      return IsCertificateExact({s}, s.from, s.to, p.pair.drone, p.pair.second(), p.pair.body);
+    };
+    double low = 0.0, high = 100.0;
+    for (int i = 0; i < 60; ++i) {
+      const double by = 0.5 * (low + high);
+      move(by);
+      const bool holds = ProvenRoom(s, p.pair.drone, p.pair.second(), p.pair.body) >= 0.0;
+      (holds ? low : high) = by;
     }
-    const bool fast = ProvenRoom(s, p.pair.drone, p.pair.second(), p.pair.body) >= 0.0;
-    const bool exact =
-        IsCertificateExact({s}, s.from, s.to, p.pair.drone, p.pair.second(), p.pair.body);
-    ASSERT_TRUE(!fast || exact) << seed;
-    (fast ? accepted : refused) += 1;
-    differ += fast != exact;
+    move(low);
+    ASSERT_TRUE(exact()) << seed;
+    move(high);
+    further += exact();
+    move(high + 1e-10);
+    ASSERT_FALSE(exact()) << seed;
   }
-  EXPECT_GT(accepted, 20);
-  EXPECT_GT(refused, 20);
-  EXPECT_GT(differ, 0) << "the margin of rounding was not tried";
+  EXPECT_GT(further, 300) << "the bound on rounding was not tried";
+}
+
+// ---- obstacles of the planner ----
+
+/// Points of { x' R x <= 1 }, written with a Cholesky factor, stay within the body.
+TEST(MakeBody, IsNoSmallerThanTheObstacle) {
+  for (uint64_t seed = 0; seed < 500; ++seed) {
+    Random random(seed, 17);
+    const Matrix3d axes = RandomRotation(&random, seed % 2 == 0);
+    const Vector3d half = RandomHalfSizes(&random);
+    Obstacle o;
+    o.shape = axes * half.cwiseAbs2().cwiseInverse().asDiagonal() * axes.transpose();
+    o.shape = (0.5 * (o.shape + o.shape.transpose())).eval();
+    o.position_variance = 0.01;
+    o.velocity_variance = 0.04;
+    const Body body = MakeBody(o, 1.0, 2.5, 2.0);
+    using Long = Eigen::Matrix<long double, 3, 3>;
+    const Long L = o.shape.cast<long double>().llt().matrixL();
+    for (int i = 0; i < 50; ++i) {
+      const Vector3d n = RandomVector(&random, 1.0, 1.0, 1.0).normalized();
+      const auto y = L.triangularView<Eigen::Lower>().solve(n.cast<long double>()).eval();
+      const auto Qn = (body.shape.cast<long double>() * n.cast<long double>()).eval();
+      const long double of_body = n.cast<long double>().dot(Qn);
+      ASSERT_GE(of_body, y.squaredNorm()) << seed;
+      ASSERT_LE(of_body, y.squaredNorm() * (1.0L + 1e-9L)) << seed;
+    }
+    const Vector3d n = Vector3d::UnitX();
+    EXPECT_NEAR(Deviation(body, n, 0.4), std::sqrt(0.01 + 0.04), 1e-12);
+  }
+}
+
+TEST(MakeBody, WhatIsNoEllipsoidIsNeverKeptOff) {
+  const Matrix3d shapes[] = {Matrix3d::Zero(), -Matrix3d::Identity(), Matrix3d::Ones(),
+                             Vector3d(1.0, 1.0, -1.0).asDiagonal(),
+                             Vector3d(1e12, 1.0, 1e-12).asDiagonal()};
+  for (const Matrix3d& R : shapes) {
+    Obstacle o;
+    o.shape = R;
+    Ball drone;
+    drone.center << 100.0, 0.0, 0.0;
+    const SeparationResult result = Separate(drone, nullptr, MakeBody(o, 0.0, 1.0, 1.0));
+    EXPECT_NE(result.kept, Kept::kOff) << R;
+  }
 }
 
 // ---- input that is none ----
