@@ -13,14 +13,15 @@ using Eigen::Vector3d;
 
 namespace {
 
-// With E = R Q - I and Q symmetric, R^(1/2) Q R^(1/2) - I has the eigenvalues of E. So Q is at
+// With E = R Q - I, Q and R symmetric, R^(1/2) Q R^(1/2) - I has the eigenvalues of E. So Q is at
 // least (1 - |E|) times the inverse of R.
-Matrix3d InverseAbove(const Matrix3d& R) {
+Matrix3d InverseAbove(const Matrix3d& given) {
+  const Matrix3d R = 0.5 * (given + given.transpose());
   const Eigen::LLT<Matrix3d> factors(R);
   const Matrix3d inverse = R.inverse(), Q = 0.5 * (inverse + inverse.transpose());
   const double rounding = 32.0 * 0x1p-53 * R.norm() * Q.norm();
   const double error = (R * Q - Matrix3d::Identity()).norm() + rounding;
-  const bool usable = R == R.transpose() && factors.info() == Eigen::Success && error < 0.1;
+  const bool usable = factors.info() == Eigen::Success && error < 0.1;
   return usable ? Matrix3d((1.0 + 2.0 * error) * Q)
                 : Matrix3d::Constant(std::numeric_limits<double>::quiet_NaN());
 }
@@ -36,18 +37,6 @@ Body MakeBody(const Obstacle& obstacle, double start, double duration, double si
   body.covariance[0].diagonal().setConstant(obstacle.position_variance);
   body.covariance[2].diagonal().setConstant(obstacle.velocity_variance * duration * duration);
   return body;
-}
-
-double Support(const Body& body, const Vector3d& n) {
-  switch (body.kind) {
-    case Body::Kind::kEllipsoid:
-      return std::sqrt(n.dot(body.shape * n));
-    case Body::Kind::kBox:
-      return (body.shape.transpose() * n).cwiseAbs().dot(body.half);
-    case Body::Kind::kCylinder:
-      return body.half.x() * n.head<2>().norm() + body.half.z() * std::abs(n.z());
-  }
-  return HUGE_VAL;
 }
 
 Vector3d SupportPoint(const Body& body, const Vector3d& n) {

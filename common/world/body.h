@@ -40,9 +40,8 @@ struct Ball {
 /// constant velocity. NaN where R is not positive definite or its inverse is no inverse.
 Body MakeBody(const Obstacle& obstacle, double start, double duration, double sigmas);
 
-/// max of n' x over the solid about the origin, without its uncertainty, m.
-double Support(const Body& body, const Eigen::Vector3d& n);
-/// A point of the solid about the origin where that is reached; n is not zero.
+/// A point of the solid about the origin, without its uncertainty, where n' x is greatest; n is not
+/// zero.
 Eigen::Vector3d SupportPoint(const Body& body, const Eigen::Vector3d& n);
 
 /// Standard deviation of the body's position along n at tau, times |n|, m.

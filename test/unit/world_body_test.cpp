@@ -1,0 +1,156 @@
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+
+#include "common/world/separation.h"
+#include "test/unit/separation_pairs.h"
+
+namespace chase::world {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+// ---- obstacles of the planner ----
+
+/// Points of { x' R x <= 1 }, written with a Cholesky factor, stay within the body.
+TEST(MakeBody, IsNoSmallerThanTheObstacle) {
+  for (uint64_t seed = 0; seed < 500; ++seed) {
+    Random random(seed, 17);
+    const Matrix3d axes = RandomRotation(&random, seed % 2 == 0);
+    const Vector3d half = RandomHalfSizes(&random);
+    Obstacle o;
+    o.shape = axes * half.cwiseAbs2().cwiseInverse().asDiagonal() * axes.transpose();
+    o.shape = (0.5 * (o.shape + o.shape.transpose())).eval();
+    o.position_variance = 0.01;
+    o.velocity_variance = 0.04;
+    const Body body = MakeBody(o, 1.0, 2.5, 2.0);
+    using Long = Eigen::Matrix<long double, 3, 3>;
+    const Long L = o.shape.cast<long double>().llt().matrixL();
+    for (int i = 0; i < 50; ++i) {
+      const Vector3d n = RandomVector(&random, 1.0, 1.0, 1.0).normalized();
+      const auto y = L.triangularView<Eigen::Lower>().solve(n.cast<long double>()).eval();
+      const auto Qn = (body.shape.cast<long double>() * n.cast<long double>()).eval();
+      const long double of_body = n.cast<long double>().dot(Qn);
+      ASSERT_GE(of_body, y.squaredNorm()) << seed;
+      ASSERT_LE(of_body, y.squaredNorm() * (1.0L + 1e-9L)) << seed;
+    }
+    const Vector3d n = Vector3d::UnitX();
+    EXPECT_NEAR(Deviation(body, n, 0.4), std::sqrt(0.01 + 0.04), 1e-12);
+  }
+}
+
+TEST(MakeBody, WhatIsNoEllipsoidIsNeverKeptOff) {
+  const Matrix3d shapes[] = {Matrix3d::Zero(), -Matrix3d::Identity(), Matrix3d::Ones(),
+                             Vector3d(1.0, 1.0, -1.0).asDiagonal(),
+                             Vector3d(1e12, 1.0, 1e-12).asDiagonal()};
+  for (const Matrix3d& R : shapes) {
+    Obstacle o;
+    o.shape = R;
+    Ball drone;
+    drone.center << 100.0, 0.0, 0.0;
+    const SeparationResult result = Separate(drone, nullptr, MakeBody(o, 0.0, 1.0, 1.0));
+    EXPECT_NE(result.kept, Kept::kOff) << R;
+  }
+}
+
+// ---- growing the axes is no enclosure ----
+
+/// How far the ball of radius r about the ellipsoid x' R x <= 1 sticks out of the ellipsoid of
+/// inverse shape `outer` in the worst of many directions, m.
+double StickingOut(const Matrix3d& Q, double r, const Matrix3d& outer, Random* random) {
+  double most = -HUGE_VAL;
+  for (int i = 0; i < 2000; ++i) {
+    Vector3d n;
+    for (int a = 0; a < 3; ++a) n[a] = random->Gaussian();
+    n.normalize();
+    if (i % 2 == 0) n = Vector3d(n.x(), n.y(), 0.0).normalized();
+    most = std::max(most, std::sqrt(n.dot(Q * n)) + r - std::sqrt(n.dot(outer * n)));
+  }
+  return most;
+}
+
+/// A piece of wall 2.5 m long, its half width given.
+Body Wall(double width) {
+  Body wall;
+  wall.shape = Vector3d(1.25, width, 1.0).cwiseAbs2().asDiagonal();
+  return wall;
+}
+
+TEST(EnclosingEllipsoid, GrownAxesDoNotHoldAWallAndABall) {
+  Random random(1);
+  for (double width : {0.01, 0.05, 0.1}) {
+    const Matrix3d Q = Wall(width).shape;
+    const Matrix3d grown = Inflated(Q.inverse(), 0.4).inverse();
+    const double short_by = StickingOut(Q, 0.4, grown, &random);
+    EXPECT_GT(short_by, 0.104) << width;
+    EXPECT_LT(short_by, 0.146) << width;
+  }
+}
+
+/// By Minkowski's inequality: a plan that enters an ellipsoid of grown axes touches for certain.
+TEST(EnclosingEllipsoid, GrownAxesLieWithinTheSum) {
+  for (uint64_t seed = 0; seed < 300; ++seed) {
+    Random random(seed, 18);
+    const Matrix3d R = RandomRotation(&random, seed % 2 == 0);
+    const Vector3d half = RandomHalfSizes(&random);
+    const Matrix3d Q = R * half.cwiseAbs2().asDiagonal() * R.transpose();
+    const Matrix3d inverse = R * half.cwiseAbs2().cwiseInverse().asDiagonal() * R.transpose();
+    const double r = random.Uniform(0.01, 1.0);
+    const Matrix3d grown = Inflated(inverse, r).inverse();
+    for (int i = 0; i < 200; ++i) {
+      const Vector3d n = RandomVector(&random, 1.0, 1.0, 1.0).normalized();
+      ASSERT_LE(std::sqrt(n.dot(grown * n)), std::sqrt(n.dot(Q * n)) + r + 1e-9) << seed;
+    }
+  }
+}
+
+/// A place that the grown ellipsoid calls free and where the drone's ball cuts into the wall.
+TEST(EnclosingEllipsoid, APlaceOutsideTheGrownAxesCanTouch) {
+  const Vector3d offset(1.15, 0.30, 0.0);
+  const Body wall = Wall(0.01);
+  const Matrix3d grown = Inflated(wall.shape.inverse(), 0.4);
+  EXPECT_GT(offset.dot(grown * offset), 1.0);
+  const Ball drone{Curve(offset.transpose()), math::Polynomial::Constant(1, 0.4)};
+  EXPECT_EQ(Separate(drone, nullptr, wall).kept, Kept::kTouches);
+  const Matrix3d enclosing = EnclosingEllipsoid(wall.shape, 0.4).inverse();
+  EXPECT_LT(offset.dot(enclosing * offset), 1.0);
+}
+
+TEST(EnclosingEllipsoid, HoldsTheBallAboutEveryPoint) {
+  for (uint64_t seed = 0; seed < 300; ++seed) {
+    Random random(seed, 15);
+    const Matrix3d R = RandomRotation(&random, seed % 2 == 0);
+    const Vector3d half = RandomHalfSizes(&random);
+    const Matrix3d Q = R * half.cwiseAbs2().asDiagonal() * R.transpose();
+    const double r = random.Uniform(0.01, 1.0);
+    const Matrix3d outer = EnclosingEllipsoid(Q, r), inverse = outer.inverse();
+    EXPECT_LT(StickingOut(Q, r, outer, &random), 1e-9) << seed;
+    for (int i = 0; i < 200; ++i) {
+      Vector3d u, v;
+      for (int a = 0; a < 3; ++a) u[a] = random.Gaussian(), v[a] = random.Gaussian();
+      const Vector3d x = R * half.cwiseProduct(u.normalized()) + r * v.normalized();
+      ASSERT_LT(x.dot(inverse * x), 1.0 + 1e-9) << seed;
+    }
+  }
+}
+
+TEST(EnclosingEllipsoid, HasTheLeastHorizontalProjection) {
+  for (uint64_t seed = 0; seed < 300; ++seed) {
+    Random random(seed, 16);
+    const Vector3d half = RandomHalfSizes(&random);
+    const Matrix3d R = RandomRotation(&random, true);
+    const Matrix3d Q = R * half.cwiseAbs2().asDiagonal() * R.transpose();
+    const double r = random.Uniform(0.01, 1.0);
+    const auto area = [&](const Matrix3d& M) { return M.topLeftCorner<2, 2>().determinant(); };
+    const double best = area(EnclosingEllipsoid(Q, r));
+    for (double s = 1e-3; s < 1e4; s *= 1.02) {
+      const Matrix3d other = (1.0 + s) * Q + (1.0 + 1.0 / s) * r * r * Matrix3d::Identity();
+      ASSERT_LE(best, area(other) * (1.0 + 1e-9)) << seed << " s " << s;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace chase::world
