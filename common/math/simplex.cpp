@@ -63,8 +63,8 @@ bool Simplex::Reduce() {
     for (int i = 0; i < size_; ++i) weights_[i] += step * (wanted[i] - weights_[i]);
     if (first < 0) return true;
     --size_;
-    std::copy(points_ + first + 1, points_ + size_ + 1, points_ + first);
-    std::copy(weights_ + first + 1, weights_ + size_ + 1, weights_ + first);
+    std::copy(points_.data() + first + 1, points_.data() + size_ + 1, points_.data() + first);
+    std::copy(weights_.data() + first + 1, weights_.data() + size_ + 1, weights_.data() + first);
   }
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 
 namespace chase::math {
 
@@ -24,8 +25,8 @@ class Simplex {
   bool Reduce();
 
   int size_ = 0;
-  Eigen::Vector3d points_[4];
-  double weights_[4] = {0.0, 0.0, 0.0, 0.0};
+  std::array<Eigen::Vector3d, 4> points_;
+  std::array<double, 4> weights_ = {0.0, 0.0, 0.0, 0.0};
   Eigen::Vector3d nearest_ = Eigen::Vector3d::Zero();
 };
 
