@@ -215,8 +215,7 @@ void Scene::MoveTo(double t) {
   rtcCommitScene(impl_->moving);
 }
 
-/// What moves is nearly always missed, which the packets find out together; what is fixed they meet
-/// in different places.
+/// Packet by packet, as streams settle ties on the triangles' edges in another order.
 void Scene::Trace(const RayPacket* rays, int n, HitPacket* hits) const {
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
@@ -226,9 +225,8 @@ void Scene::Trace(const RayPacket* rays, int n, HitPacket* hits) const {
     alignas(32) int valid[8];
     Fill(rays[k], valid, &work[k]);
     rtcIntersect8(valid, impl_->fixed, &context, &work[k]);
+    rtcIntersect8(valid, impl_->moving, &context, &work[k]);
   }
-  rtcIntersectNM(impl_->moving, &context, reinterpret_cast<RTCRayHitN*>(work), 8,
-                 static_cast<unsigned>(n), sizeof(RTCRayHit8));
   for (int k = 0; k < n; ++k) impl_->Read(work[k], &hits[k]);
 }
 

@@ -48,7 +48,7 @@ class Scene {
   /// Moves the target and the movers to mission time t [s].
   void MoveTo(double t);
   void Trace(const RayPacket& rays, HitPacket* hits) const { Trace(&rays, 1, hits); }
-  /// Traces n packets, at most kMostPackets; neighbours share the way through the structures.
+  /// Traces n packets, at most kMostPackets.
   void Trace(const RayPacket* rays, int n, HitPacket* hits) const;
   /// True per ray that hits the target's cylinder where nothing else stands in the world.
   void TraceTargetAlone(const RayPacket& rays, bool* hits) const;
