@@ -234,7 +234,8 @@ Course Long(double length) {
   Course course;
   course.name = "long";
   auto& s = course.scenario;
-  s.world.ground = {0.0, 0.12, 10.0};
+  s.world.ground.roughness = 0.12;
+  s.world.ground.wavelength = 10.0;
   s.target.waypoints = {{-40.0, -100.0}, {-40.0, -99.0}};
   world::Random random(4, kStream);
   std::vector<Vector2d> trees;
