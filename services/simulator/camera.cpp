@@ -15,11 +15,6 @@ using Eigen::Vector3f;
 constexpr double kPi = 3.14159265358979323846;
 constexpr std::size_t kNoiseSamples = 1 << 16;
 
-uint8_t ToByte(float value) {
-  return static_cast<uint8_t>(
-      static_cast<int>(std::min(255.0f, std::max(0.0f, 255.0f * value + 0.5f))));
-}
-
 }  // namespace
 
 std::string CameraConfig::Problem() const {
@@ -44,6 +39,8 @@ Camera::Camera(const CameraConfig& config, const world::Rig& rig, const Vector3d
   const std::size_t row = static_cast<std::size_t>(3 * rig_.width_px);
   for (std::size_t i = 0; i < row; ++i) noise_.push_back(noise_[i]);  // a row runs over the end
   phase_ = random_.Uniform(0.0, 2.0 * kPi);
+  for (int column = 0; column < rig_.width_px + 8; ++column)
+    u_.push_back(static_cast<float>((column - rig_.center_u_px) / rig_.focal_px));
 }
 
 /// A slow wave and 1 % from frame to frame, as of an automatic exposure.
@@ -59,7 +56,7 @@ RayPacket Camera::Rays(int row, int column) const {
   const Vector3f right = view_.R_WC.col(0).cast<float>(), origin = view_.p_WC.cast<float>();
   rays.count = std::min(8, rig_.width_px - column);
   for (int i = 0; i < 8; ++i) {
-    const float u = static_cast<float>((column + i - rig_.center_u_px) / rig_.focal_px);
+    const float u = u_[static_cast<std::size_t>(column + i)];
     rays.ox[i] = origin.x(), rays.oy[i] = origin.y(), rays.oz[i] = origin.z();
     rays.dx[i] = edge.x() + u * right.x();
     rays.dy[i] = edge.y() + u * right.y();
@@ -68,17 +65,12 @@ RayPacket Camera::Rays(int row, int column) const {
   return rays;
 }
 
-/// Eight pixels of a row as bytes.
-void Camera::Expose(const RayPacket& rays, const HitPacket& hits, uint8_t* out) {
-  LightPacket light;
-  Shade(rays, hits, target_color_, &light);
-  uint8_t bytes[3][8];
-  const float brightness = brightness_;
-  for (int k = 0; k < 3; ++k)
-    for (int i = 0; i < 8; ++i) bytes[k][i] = ToByte(brightness * light.rgb[k][i]);
-  for (int i = 0; i < rays.count; ++i)
-    for (int k = 0; k < 3; ++k) *out++ = bytes[k][i];
-  visible_px_ += std::count(hits.material, hits.material + rays.count, Material::kTarget);
+/// True where rays of a tile may meet something that moves.
+bool Camera::MoversIn(int row, int column) const {
+  return std::any_of(movers_.begin(), movers_.end(), [&](const PixelBox& box) {
+    return box.left <= column + 7 && box.right >= column && box.top <= row + kMostPackets - 1 &&
+           box.bottom >= row;
+  });
 }
 
 /// Eight columns of a few rows.
@@ -86,11 +78,19 @@ void Camera::TraceTile(int row, int column, const Scene& scene, Image* image) {
   const int rows = std::min(kMostPackets, rig_.height_px - row);
   RayPacket rays[kMostPackets];
   HitPacket hits[kMostPackets];
-  for (int k = 0; k < rows; ++k) rays[k] = Rays(row + k, column);
+  const bool movers = MoversIn(row, column);
+  for (int k = 0; k < rows; ++k) {
+    rays[k] = Rays(row + k, column);
+    rays[k].movers = movers;
+  }
   scene.Trace(rays, rows, hits);
   for (int k = 0; k < rows; ++k) {
     const int pixel = (row + k) * rig_.width_px + column;
-    Expose(rays[k], hits[k], &image->rgb[static_cast<std::size_t>(3 * pixel)]);
+    LightPacket light;
+    Shade(rays[k], hits[k], target_color_.data(), &light);
+    Expose(light, brightness_, rays[k].count, &image->rgb[static_cast<std::size_t>(3 * pixel)]);
+    visible_px_ +=
+        std::count(hits[k].material, hits[k].material + rays[k].count, Material::kTarget);
   }
 }
 
@@ -105,6 +105,11 @@ Image Camera::Render(const Vector3d& p_WB, const Eigen::Quaterniond& q_WB, doubl
   image.exposure = config_.exposure;
   image.rgb.resize(static_cast<std::size_t>(3 * rig_.width_px * rig_.height_px));
   visible_px_ = 0;
+  movers_.clear();
+  for (const auto& solid : scene.MovingSolids()) {
+    const PixelBox box = Surrounding(rig_, view_, solid);
+    if (!box.empty()) movers_.push_back(box);
+  }
   for (int row = 0; row < rig_.height_px; row += kMostPackets)
     for (int column = 0; column < rig_.width_px; column += 8) TraceTile(row, column, scene, &image);
   alone_px_ = CountAlone(scene);

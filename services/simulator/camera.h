@@ -61,9 +61,9 @@ class Camera {
 
  private:
   void TraceTile(int row, int column, const Scene& scene, Image* image);
-  void Expose(const RayPacket& rays, const HitPacket& hits, uint8_t* out);
   double NextBrightness(double t);
   RayPacket Rays(int row, int column) const;
+  bool MoversIn(int row, int column) const;
   long CountAlone(const Scene& scene) const;
   void AddNoise(Image* image);
 
@@ -72,11 +72,13 @@ class Camera {
   Eigen::Vector3f target_color_;
   world::Random random_;
   std::vector<int8_t> noise_;  // samples of the noise, a row of them from a random place
+  std::vector<float> u_;       // of the columns, in focal lengths, and of some beyond
   double phase_ = 0.0;
 
   // The last frame.
   Viewpoint view_;
   world::Solid target_;
+  std::vector<PixelBox> movers_;  // around all that moves
   float brightness_ = 1.0f;
   long alone_px_ = 0, visible_px_ = 0;
 };

@@ -117,7 +117,7 @@ struct Scene::Impl {
   void BuildMoving();
   void AddInstance(RTCScene part, Material material);
   RTCScene MovingPart(const Solid& solid);
-  void Read(const RTCRayHit8& work, HitPacket* hits) const;
+  void Read(const RTCRayHit8& work, bool movers, HitPacket* hits) const;
 
   world::Scenario scenario;
   Actors actors;
@@ -125,7 +125,9 @@ struct Scene::Impl {
   RTCScene fixed = nullptr, moving = nullptr, target = nullptr;
   std::vector<RTCScene> parts;
   std::vector<Instance> instances;
-  std::vector<Material> static_materials;
+  std::vector<Solid> moving_solids;
+  // By number of the geometry plus one, as the invalid number plus one is zero.
+  std::vector<Material> static_materials = {Material::kNothing};
   Vector3d target_center = Vector3d::Zero();
 };
 
@@ -176,20 +178,21 @@ void Scene::Impl::BuildMoving() {
     AddInstance(MovingPart(mover.solid), Material::kMover);
 }
 
-/// Only a hit on what moves names an instance.
-void Scene::Impl::Read(const RTCRayHit8& work, HitPacket* hits) const {
-  static const Instance kFixed{nullptr, Material::kNothing};
+/// Only a hit on what moves names an instance; its normal is in the instance's axes.
+void Scene::Impl::Read(const RTCRayHit8& work, bool movers, HitPacket* hits) const {
+  for (int i = 0; i < 8; ++i) hits->material[i] = static_materials[work.hit.geomID[i] + 1u];
   for (int i = 0; i < 8; ++i) {
-    const unsigned number = work.hit.instID[0][i], geometry = work.hit.geomID[i];
-    const bool hit = geometry != RTC_INVALID_GEOMETRY_ID;
-    const bool moves = hit && number != RTC_INVALID_GEOMETRY_ID;
-    const Instance& instance = moves ? instances[number] : kFixed;
-    hits->material[i] = moves || !hit ? instance.material : static_materials[geometry];
+    const bool hit = work.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID;
     hits->distance[i] = hit ? work.ray.tfar[i] : std::numeric_limits<float>::infinity();
+    hits->nx[i] = work.hit.Ng_x[i], hits->ny[i] = work.hit.Ng_y[i], hits->nz[i] = work.hit.Ng_z[i];
+  }
+  for (int i = 0; movers && i < 8; ++i) {
+    if (work.hit.instID[0][i] == RTC_INVALID_GEOMETRY_ID) continue;
+    const Instance& instance = instances[work.hit.instID[0][i]];
     const float c = instance.cos_yaw, s = instance.sin_yaw;
+    hits->material[i] = instance.material;
     hits->nx[i] = c * work.hit.Ng_x[i] - s * work.hit.Ng_y[i];
     hits->ny[i] = s * work.hit.Ng_x[i] + c * work.hit.Ng_y[i];
-    hits->nz[i] = work.hit.Ng_z[i];
   }
 }
 
@@ -205,7 +208,8 @@ Scene::Scene(const world::Scenario& scenario) : impl_(std::make_unique<Impl>(sce
 Scene::~Scene() = default;
 
 void Scene::MoveTo(double t) {
-  std::vector<Solid> solids;
+  std::vector<Solid>& solids = impl_->moving_solids;
+  solids.clear();
   const TargetState target = impl_->actors.Target(t);
   solids.push_back(target.cylinder);
   if (target.has_carrier) solids.push_back(target.carrier);
@@ -214,6 +218,8 @@ void Scene::MoveTo(double t) {
   impl_->target_center = target.center;
   rtcCommitScene(impl_->moving);
 }
+
+const std::vector<Solid>& Scene::MovingSolids() const { return impl_->moving_solids; }
 
 /// Packet by packet, as streams settle ties on the triangles' edges in another order.
 void Scene::Trace(const RayPacket* rays, int n, HitPacket* hits) const {
@@ -225,9 +231,9 @@ void Scene::Trace(const RayPacket* rays, int n, HitPacket* hits) const {
     alignas(32) int valid[8];
     Fill(rays[k], valid, &work[k]);
     rtcIntersect8(valid, impl_->fixed, &context, &work[k]);
-    rtcIntersect8(valid, impl_->moving, &context, &work[k]);
+    if (rays[k].movers) rtcIntersect8(valid, impl_->moving, &context, &work[k]);
   }
-  for (int k = 0; k < n; ++k) impl_->Read(work[k], &hits[k]);
+  for (int k = 0; k < n; ++k) impl_->Read(work[k], rays[k].movers, &hits[k]);
 }
 
 void Scene::TraceTargetAlone(const RayPacket& rays, bool* hits) const {

@@ -2,41 +2,12 @@
 
 #include <Eigen/Core>
 #include <memory>
+#include <vector>
 
 #include "services/simulator/actors.h"
+#include "services/simulator/packets.h"
 
 namespace chase::simulator {
-
-enum class Material : int {
-  kNothing,
-  kGround,
-  kWall,
-  kBox,
-  kPillar,
-  kEllipsoid,
-  kTrunk,
-  kCrown,
-  kMover,
-  kCarrier,
-  kTarget
-};
-
-/// Eight rays in frame W; a ray beyond `count` is not traced.
-struct RayPacket {
-  alignas(32) float ox[8], oy[8], oz[8];  ///< origins, m
-  alignas(32) float dx[8], dy[8], dz[8];  ///< directions, any length
-  int count = 8;
-};
-
-/// As many packets may travel together.
-inline constexpr int kMostPackets = 4;
-
-/// First hits; distances in multiples of the direction's length.
-struct HitPacket {
-  alignas(32) float distance[8];          ///< infinity: nothing
-  alignas(32) float nx[8], ny[8], nz[8];  ///< normal, frame W, not normalised
-  Material material[8];
-};
 
 /// The world as triangles under Embree: everything static in one structure, and in another an
 /// instance for each thing that moves.
@@ -47,6 +18,8 @@ class Scene {
 
   /// Moves the target and the movers to mission time t [s].
   void MoveTo(double t);
+  /// All that moves, where it stands now.
+  const std::vector<world::Solid>& MovingSolids() const;
   void Trace(const RayPacket& rays, HitPacket* hits) const { Trace(&rays, 1, hits); }
   /// Traces n packets, at most kMostPackets.
   void Trace(const RayPacket* rays, int n, HitPacket* hits) const;

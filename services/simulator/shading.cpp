@@ -1,123 +1,124 @@
+// Compiled for AVX2 on x86, which Embree asks for too (see CMakeLists.txt and Scene). Plain C++ and
+// arrays only: anything inline from a header would be compiled for this instruction set and could
+// be picked by the linker for everyone.
 #include "services/simulator/shading.h"
 
-#include <algorithm>
-#include <cmath>
-#include <cstdint>
-#include <limits>
+#include <float.h>
+#include <string.h>
+
+#ifdef __AVX2__
+#include <immintrin.h>
+#endif
 
 namespace chase::simulator {
 namespace {
 
-using Eigen::Vector3f;
+// Eight rays side by side; each lane rounds as a scalar would, whatever the processor.
+typedef float V __attribute__((vector_size(32)));
+typedef int32_t VI __attribute__((vector_size(32)));
+typedef uint32_t VU __attribute__((vector_size(32)));
 
-const Vector3f kSun = Vector3f(0.35f, 0.25f, 0.90f).normalized();
-constexpr float kFarthest = std::numeric_limits<float>::max();
+// (0.35, 0.25, 0.90), normalised.
+constexpr float kSun[3] = {0.350878298f, 0.250627369f, 0.902258456f};
 constexpr float kAmbient = 0.45f, kDirect = 0.60f;
 
-// Loops over eight rays below are plain, so that the compiler turns them into vector instructions.
 // Sums of three are a + (b + c).
 
-/// Floor, without the library call that floor() is on plain x86-64.
-int Cell(float x) {
-  const int i = static_cast<int>(x);
-  return i - (static_cast<float>(i) > x ? 1 : 0);
+V Load(const float* p) {
+  V v;
+  memcpy(&v, p, sizeof v);
+  return v;
+}
+
+V All(float x) { return V{x, x, x, x, x, x, x, x}; }
+V Max(V a, V b) { return a < b ? b : a; }
+V Min(V a, V b) { return b < a ? b : a; }
+V Abs(V a) { return a < 0.0f ? -a : a; }
+
+V Sqrt(V a) {
+#ifdef __AVX2__
+  return (V)_mm256_sqrt_ps((__m256)a);
+#else
+  for (int i = 0; i < 8; ++i) a[i] = __builtin_sqrtf(a[i]);
+  return a;
+#endif
+}
+
+/// Floor.
+VI Cell(V x) {
+  const VI i = __builtin_convertvector(x, VI);
+  return i + (__builtin_convertvector(i, V) > x);  // true is -1
 }
 
 /// A number in [0, 1) that looks random, one for each cell.
-float Hash(int x, int y, int z) {
-  uint32_t h = static_cast<uint32_t>(x) * 0x8DA6B343u ^ static_cast<uint32_t>(y) * 0xD8163841u ^
-               static_cast<uint32_t>(z) * 0xCB1AB31Fu;
+V Hash(VI x, VI y, VI z) {
+  VU h = (VU)x * 0x8DA6B343u ^ (VU)y * 0xD8163841u ^ (VU)z * 0xCB1AB31Fu;
   h = (h ^ (h >> 15)) * 0x2C1B3C6Du;
   h = (h ^ (h >> 12)) * 0x297A2D39u;
-  return static_cast<float>((h ^ (h >> 15)) >> 8) * 0x1p-24f;
+  return __builtin_convertvector((VI)((h ^ (h >> 15)) >> 8), V) * 0x1p-24f;
 }
 
-float Cells(float x, float y, float z, int salt) {
-  return Hash(Cell(x), Cell(y), Cell(z) + salt) - 0.5f;
-}
-
-float Lit(float nx, float ny, float nz, const Vector3f& sun) {
-  return kAmbient + kDirect * std::max(0.0f, nx * sun.x() + (ny * sun.y() + nz * sun.z()));
-}
-
-/// Where the rays hit, m, the unit normals there, and Lambert's share of light. Frame W.
+/// Where the rays hit, m, and the unit normals there. Frame W.
 struct Surface {
-  alignas(32) float x[8], y[8], z[8], nx[8], ny[8], nz[8], lit[8];
+  V x, y, z, nx, ny, nz;
 };
 
 Surface SurfaceOf(const RayPacket& rays, const HitPacket& hits) {
-  Surface s;
-  for (int i = 0; i < 8; ++i) {
-    const float reach = hits.distance[i];
-    const float distance = reach <= kFarthest ? reach : 0.0f;
-    s.x[i] = rays.ox[i] + distance * rays.dx[i];
-    s.y[i] = rays.oy[i] + distance * rays.dy[i];
-    s.z[i] = rays.oz[i] + distance * rays.dz[i];
-  }
-  for (int i = 0; i < 8; ++i) {
-    const float x = hits.nx[i], y = hits.ny[i], z = hits.nz[i];
-    const float squared = x * x + (y * y + z * z);
-    const float length = squared > 0.0f ? std::sqrt(squared) : 1.0f;
-    s.nx[i] = x / length, s.ny[i] = y / length, s.nz[i] = z / length;
-  }
-  const Vector3f sun = kSun;
-  for (int i = 0; i < 8; ++i) s.lit[i] = Lit(s.nx[i], s.ny[i], s.nz[i], sun);
-  return s;
+  const V reach = Load(hits.distance), distance = reach <= FLT_MAX ? reach : All(0.0f);
+  const V x = Load(hits.nx), y = Load(hits.ny), z = Load(hits.nz);
+  const V squared = x * x + (y * y + z * z);
+  const V length = squared > 0.0f ? Sqrt(squared) : All(1.0f);
+  return {Load(rays.ox) + distance * Load(rays.dx),
+          Load(rays.oy) + distance * Load(rays.dy),
+          Load(rays.oz) + distance * Load(rays.dz),
+          x / length,
+          y / length,
+          z / length};
+}
+
+/// Lambert's share of light.
+V Lit(V nx, V ny, V nz) {
+  return kAmbient + kDirect * Max(All(0.0f), nx * kSun[0] + (ny * kSun[1] + nz * kSun[2]));
+}
+
+V Cells(const Surface& s, float density, int salt) {
+  return Hash(Cell(density * s.x), Cell(density * s.y), Cell(density * s.z) + salt) - 0.5f;
 }
 
 /// Grey values at eight points, and the tint that makes a colour of grey.
 struct Paint {
-  alignas(32) float grey[8];
-  Vector3f tint = Vector3f::Ones();
+  V grey;
+  float tint[3];
 };
-
-Paint Plain(float grey, const Vector3f& tint) {
-  Paint paint;
-  std::fill(paint.grey, paint.grey + 8, grey);
-  paint.tint = tint;
-  return paint;
-}
 
 /// Patches of two sizes, so many a metre.
 Paint Patches(const Surface& s, float grey, float contrast, float coarse, float fine, float red,
               float blue) {
-  Paint paint;
-  for (int i = 0; i < 8; ++i)
-    paint.grey[i] =
-        grey + contrast * (1.2f * Cells(coarse * s.x[i], coarse * s.y[i], coarse * s.z[i], 0) +
-                           0.8f * Cells(fine * s.x[i], fine * s.y[i], fine * s.z[i], 7));
-  paint.tint = {red, 1.0f, blue};
-  return paint;
+  return {grey + contrast * (1.2f * Cells(s, coarse, 0) + 0.8f * Cells(s, fine, 7)),
+          {red, 1.0f, blue}};
 }
 
 /// Courses of blocks on an upright surface.
 Paint Blocks(const Surface& s, float grey, float contrast, float red, float blue) {
-  Paint paint;
-  for (int i = 0; i < 8; ++i) {
-    const float along = std::abs(s.nx[i]) > std::abs(s.ny[i]) ? s.y[i] : s.x[i];
-    const int course = Cell(4.0f * s.z[i]);
-    const float shift = course & 1 ? 0.25f : 0.0f;
-    paint.grey[i] = grey + contrast * (Hash(Cell(2.0f * (along + shift)), course, 3) - 0.5f);
-  }
-  paint.tint = {red, 1.0f, blue};
-  return paint;
+  const V along = Abs(s.nx) > Abs(s.ny) ? s.y : s.x;
+  const VI course = Cell(4.0f * s.z);
+  const V shift = (course & 1) != 0 ? All(0.25f) : All(0.0f);
+  return {grey + contrast * (Hash(Cell(2.0f * (along + shift)), course, VI{} + 3) - 0.5f),
+          {red, 1.0f, blue}};
 }
 
 /// Half a metre light, half a metre dark.
 Paint Stripes(const Surface& s, float grey, float contrast, float red, float blue) {
-  Paint paint;
-  for (int i = 0; i < 8; ++i)
-    paint.grey[i] = grey + contrast * (Cell(2.0f * s.z[i]) & 1 ? 1.0f : -1.0f);
-  paint.tint = {red, 1.0f, blue};
-  return paint;
+  const V sign = (Cell(2.0f * s.z) & 1) != 0 ? All(1.0f) : All(-1.0f);
+  return {grey + contrast * sign, {red, 1.0f, blue}};
 }
 
 Surface Flattened(Surface s) {
-  std::fill(s.z, s.z + 8, 0.0f);
+  s.z = All(0.0f);
   return s;
 }
 
-Paint PaintOf(Material material, const Surface& s, const Vector3f& target_color) {
+Paint PaintOf(Material material, const Surface& s, const float target_color[3]) {
   switch (material) {
     case Material::kNothing:
       break;
@@ -138,44 +139,62 @@ Paint PaintOf(Material material, const Surface& s, const Vector3f& target_color)
     case Material::kMover:
       return Patches(s, 0.40f, 0.06f, 2.0f, 5.0f, 0.55f, 1.60f);
     case Material::kCarrier:
-      return Plain(0.12f, Vector3f::Ones());
+      return {All(0.12f), {1.0f, 1.0f, 1.0f}};
     case Material::kTarget:
-      return Plain(1.0f, target_color);
+      return {All(1.0f), {target_color[0], target_color[1], target_color[2]}};
   }
-  return Plain(0.0f, Vector3f::Zero());
+  return Paint{};
+}
+
+/// The set of materials that are there, a bit each.
+void PaintAll(const Surface& s, VI material, int there, const float target_color[3], V* light) {
+  const V lit = Lit(s.nx, s.ny, s.nz);
+  for (; there != 0; there &= there - 1) {
+    const int m = __builtin_ctz(static_cast<unsigned>(there));
+    const Paint paint = PaintOf(static_cast<Material>(m), s, target_color);
+    for (int k = 0; k < 3; ++k)
+      light[k] = material == m ? lit * (paint.grey * paint.tint[k]) : light[k];
+  }
 }
 
 /// Lighter towards the horizon.
-void Sky(const RayPacket& rays, LightPacket* light) {
+void Sky(const RayPacket& rays, V* light) {
   constexpr float kHorizon[3] = {0.80f, 0.86f, 0.92f}, kFall[3] = {0.45f, 0.30f, 0.05f};
-  for (int i = 0; i < 8; ++i) {
-    const float x = rays.dx[i], y = rays.dy[i], z = rays.dz[i];
-    const float up = std::clamp(z / std::sqrt(x * x + (y * y + z * z)), 0.0f, 1.0f);
-    for (int k = 0; k < 3; ++k) light->rgb[k][i] = kHorizon[k] - up * kFall[k];
-  }
+  const V x = Load(rays.dx), y = Load(rays.dy), z = Load(rays.dz);
+  const V up = Min(Max(z / Sqrt(x * x + (y * y + z * z)), All(0.0f)), All(1.0f));
+  for (int k = 0; k < 3; ++k) light[k] = kHorizon[k] - up * kFall[k];
 }
 
 }  // namespace
 
-float Lambert(const Vector3f& n) { return Lit(n.x(), n.y(), n.z(), kSun); }
+float Lambert(float x, float y, float z) { return Lit(All(x), All(y), All(z))[0]; }
 
 /// Paints all eight points with each material that is there, and keeps its own.
-void Shade(const RayPacket& rays, const HitPacket& hits, const Vector3f& target_color,
+void Shade(const RayPacket& rays, const HitPacket& hits, const float target_color[3],
            LightPacket* light) {
-  uint32_t there = 0;
-  for (const Material material : hits.material) there |= 1u << static_cast<int>(material);
-  if (there & 1u) Sky(rays, light);
-  if (there == 1u) return;
-  const Surface s = SurfaceOf(rays, hits);
-  for (int m = 1; there >> m != 0; ++m) {
-    if (!(there >> m & 1u)) continue;
-    const Paint paint = PaintOf(static_cast<Material>(m), s, target_color);
-    for (int k = 0; k < 3; ++k)
-      for (int i = 0; i < 8; ++i) {
-        const float own = s.lit[i] * (paint.grey[i] * paint.tint[k]), other = light->rgb[k][i];
-        light->rgb[k][i] = static_cast<int>(hits.material[i]) == m ? own : other;
-      }
+  VI material;
+  memcpy(&material, hits.material, sizeof material);
+  const VI bits = (VI{} + 1) << material;
+  int there = 0;
+  for (int i = 0; i < 8; ++i) there |= bits[i];
+  V sum[3] = {};
+  if (there & 1) Sky(rays, sum);
+  if (there > 1) PaintAll(SurfaceOf(rays, hits), material, there & ~1, target_color, sum);
+  memcpy(light->rgb, sum, sizeof sum);
+}
+
+void Expose(const LightPacket& light, float brightness, int count, uint8_t* out) {
+  VI value[3];
+  for (int k = 0; k < 3; ++k) {
+    const V scaled = 255.0f * (brightness * Load(light.rgb[k])) + 0.5f;
+    value[k] = __builtin_convertvector(Min(All(255.0f), Max(All(0.0f), scaled)), VI);
   }
+  const VI pixel = value[0] | value[1] << 8 | value[2] << 16;
+  int pixels[8];
+  memcpy(pixels, &pixel, sizeof pixels);
+  // Least byte first; the next pixel takes the place of the fourth byte.
+  for (int i = 0; i + 1 < count; ++i) memcpy(out + 3 * i, &pixels[i], 4);
+  memcpy(out + 3 * (count - 1), &pixels[count - 1], 3);
 }
 
 }  // namespace chase::simulator

@@ -1,8 +1,8 @@
 #pragma once
 
-#include <Eigen/Core>
+#include <stdint.h>
 
-#include "services/simulator/scene.h"
+#include "services/simulator/packets.h"
 
 namespace chase::simulator {
 
@@ -12,10 +12,14 @@ struct LightPacket {
 };
 
 /// Light that comes back along the rays: procedural textures under Lambert's law, or the sky.
-void Shade(const RayPacket& rays, const HitPacket& hits, const Eigen::Vector3f& target_color,
+void Shade(const RayPacket& rays, const HitPacket& hits, const float target_color[3],
            LightPacket* light);
 
-/// Share of light that a surface with unit normal n sends back: ambient and one sun, Lambert's law.
-float Lambert(const Eigen::Vector3f& n);
+/// The first `count` pixels as bytes, 3 a pixel; the light times the brightness, cut to 0 to 1.
+void Expose(const LightPacket& light, float brightness, int count, uint8_t* out);
+
+/// Share of light that a surface with unit normal x y z sends back: ambient and one sun, Lambert's
+/// law.
+float Lambert(float x, float y, float z);
 
 }  // namespace chase::simulator

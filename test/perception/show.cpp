@@ -122,7 +122,7 @@ void Show::PaintOne(const Solid& solid, const Stage::Body& body, simulator::Imag
       simulator::HitPacket hits;
       scene_.Trace(rays, &hits);
       simulator::LightPacket light;
-      simulator::Shade(rays, hits, kOrange, &light);
+      simulator::Shade(rays, hits, kOrange.data(), &light);
       for (int i = 0; i < rays.count; ++i) {
         if (hits.material[i] != simulator::Material::kPillar &&
             hits.material[i] != simulator::Material::kBox &&
@@ -132,7 +132,7 @@ void Show::PaintOne(const Solid& solid, const Stage::Body& body, simulator::Imag
                            hits.distance[i] * Vector3f(rays.dx[i], rays.dy[i], rays.dz[i]);
         if (world::SignedDistance(solid, p.cast<double>()) > 0.02) continue;
         const Vector3f n = Vector3f(hits.nx[i], hits.ny[i], hits.nz[i]).normalized();
-        const float lambert = simulator::Lambert(n);
+        const float lambert = simulator::Lambert(n.x(), n.y(), n.z());
         uint8_t* rgb = &image->rgb[static_cast<size_t>(3 * (row * image->width + column + i))];
         spots.push_back({rgb, lambert});
         seen += rgb[1];

@@ -1,7 +1,9 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
+#include "common/world/random.h"
 #include "common/world/scenario.h"
 #include "services/simulator/camera.h"
 #include "services/simulator/projection.h"
@@ -153,6 +155,58 @@ TEST(Camera, BoxOfTheTargetEnclosesItsPixelsTightly) {
   EXPECT_NEAR(box.right, right, 1.0);
   EXPECT_NEAR(box.top, top, 1.0);
   EXPECT_NEAR(box.bottom, bottom, 1.0);
+}
+
+/// Eight rays through neighbours in a row of the image.
+RayPacket Packet(const world::Rig& rig, const Viewpoint& view, int u, int v) {
+  RayPacket rays;
+  for (int i = 0; i < 8; ++i) {
+    const Eigen::Vector3f p = view.p_WC.cast<float>();
+    const Eigen::Vector3f d = (view.R_WC * Vector3d((u + i - rig.center_u_px) / rig.focal_px,
+                                                    (v - rig.center_v_px) / rig.focal_px, 1.0))
+                                  .cast<float>();
+    rays.ox[i] = p.x(), rays.oy[i] = p.y(), rays.oz[i] = p.z();
+    rays.dx[i] = d.x(), rays.dy[i] = d.y(), rays.dz[i] = d.z();
+  }
+  return rays;
+}
+
+TEST(Camera, WhatMovesIsSeenWithinItsRectangleOnly) {
+  const auto world = world::ParseScenario(
+      "name: test\ntarget: {waypoints: [[4, 0], [5, 0]], carrier_size: [0.8, 0.6, 0.4]}\n"
+      "movers:\n  - {shape: box, size: [2, 1, 1.5], waypoints: [[2, 3, 1], [6, 5, 2]], speed: 1}\n"
+      "  - {shape: ellipsoid, size: [1, 2, 1.5], waypoints: [[5, -3, 1], [1, -4, 1]], speed: 1}\n",
+      "test");
+  Scene scene(world);
+  const world::Rig rig;
+  world::Random random(17);
+  int seen = 0, spared = 0;
+  for (int shot = 0; shot < 200; ++shot) {
+    scene.MoveTo(random.Uniform(0.0, 4.0));
+    const auto& solids = scene.MovingSolids();
+    Viewpoint view;
+    view.p_WC = solids[static_cast<std::size_t>(shot) % solids.size()].center;
+    for (int i = 0; i < 3; ++i) view.p_WC[i] += random.Uniform(-2.5, 2.5);
+    const Vector3d axis(random.Gaussian(), random.Gaussian(), random.Gaussian());
+    view.R_WC = Eigen::AngleAxisd(random.Uniform(-3.1, 3.1), axis.normalized()).matrix();
+    for (int ray = 0; ray < 300; ++ray) {
+      const int u = static_cast<int>(random.Next() % 368),
+                v = static_cast<int>(random.Next() % 240);
+      HitPacket hits;
+      scene.Trace(Packet(rig, view, u, v), &hits);
+      for (int i = 0; i < 8; ++i) {
+        const bool within = std::any_of(solids.begin(), solids.end(), [&](const auto& solid) {
+          const PixelBox box = Surrounding(rig, view, solid);
+          return box.left <= u + i && u + i <= box.right && box.top <= v && v <= box.bottom;
+        });
+        const bool mover = hits.material[i] >= Material::kMover;
+        EXPECT_TRUE(within || !mover) << "seed 17, shot " << shot << ", " << u + i << " " << v;
+        seen += mover, spared += !within;
+      }
+    }
+  }
+  EXPECT_GT(seen, 1000);
+  EXPECT_GT(spared, 1000);
 }
 
 TEST(Camera, NoiseHasItsSpreadAndFollowsTheSeed) {
