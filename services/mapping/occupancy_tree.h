@@ -10,10 +10,6 @@
 
 #include "services/mapping/voxel_grid.h"
 
-namespace octomap {
-class OcTree;
-}
-
 namespace chase::mapping {
 
 /// A tile that left the octree, as OctoMap's binary stream.
@@ -22,14 +18,24 @@ struct SavedTile {
   std::string bytes;
 };
 
-/// The long memory: an OctoMap octree that takes over the grid's cells when their state changes,
-/// and forgets tiles far from the drone.
+/// The eight octants of a cube: two bits each, as in OctoMap's "bt" stream.
+struct Octants {
+  enum State : unsigned { kUnknown, kFree, kOccupied, kParted };
+  State Get(unsigned i) const { return static_cast<State>(states >> 2 * i & 3u); }
+  /// Frees what lay below if the octant is not parted.
+  void Put(unsigned i, State state);
+
+  uint16_t states = 0;
+  std::unique_ptr<Octants[]> parts;  ///< octants of the parted ones; null if none is
+};
+
+/// The long memory: an octree as OctoMap's, pruned at each change, that takes over the grid's cells
+/// when their state changes, and forgets tiles far from the drone.
 class OccupancyTree {
  public:
   static constexpr int kTileCells = 128;
 
-  explicit OccupancyTree(double resolution);
-  ~OccupancyTree();
+  explicit OccupancyTree(double resolution) : resolution_(resolution) {}
 
   /// Sets the state of a cell.
   void Set(const Key& key, bool occupied);
@@ -38,18 +44,15 @@ class OccupancyTree {
   void Forget(const Eigen::Vector3d& p, double radius, std::vector<SavedTile>* saved);
 
   /// Octree in OctoMap's "bt" format with its header. Counts occupied leaf cells.
-  std::string Write(int* occupied);
+  std::string Write(int* occupied) const;
   /// The cell's state: -1 unknown, 0 free, 1 occupied.
   int State(const Eigen::Vector3d& p) const;
   size_t Bytes() const;
 
  private:
-  using Tile = std::tuple<int, int, int>;
-  std::string Serialise(const Tile& tile) const;
-  void Drop(const Tile& tile);
-
-  std::unique_ptr<octomap::OcTree> tree_;
-  std::set<Tile> tiles_;
+  double resolution_;
+  Octants root_;
+  std::set<std::tuple<int, int, int>> tiles_;
 };
 
 }  // namespace chase::mapping

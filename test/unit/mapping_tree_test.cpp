@@ -56,6 +56,20 @@ TEST(MappingTree, FarTilesLeaveAndMemoryIsBounded) {
   EXPECT_TRUE(tile.isNodeOccupied(tile.search(0.1, 0.1, 0.1)));
 }
 
+TEST(MappingTree, SavedTileHasItsPrunedCells) {
+  OccupancyTree tree(0.2);
+  for (int i = 0; i < 8; ++i) tree.Set({2 + i % 2, 2 + i / 2 % 2, 2 + i / 4}, true);
+  std::vector<SavedTile> saved;
+  tree.Forget({1e4, 0.0, 0.0}, 40.0, &saved);
+  ASSERT_EQ(saved.size(), 1u);
+  octomap::OcTree tile(0.1);
+  std::istringstream stream(saved.front().bytes);
+  ASSERT_TRUE(tile.readBinary(stream));
+  for (int i = 0; i < 8; ++i)
+    EXPECT_NE(tile.search(0.5 + 0.2 * (i % 2), 0.5 + 0.2 * (i / 2 % 2), 0.5 + 0.2 * (i / 4)),
+              nullptr);
+}
+
 TEST(MappingTree, EmptiesCompletely) {
   OccupancyTree tree(0.2);
   tree.Set({5, 5, 5}, true);
@@ -63,6 +77,7 @@ TEST(MappingTree, EmptiesCompletely) {
   int occupied = -1;
   tree.Write(&occupied);
   EXPECT_EQ(occupied, 0);
+  EXPECT_EQ(tree.Bytes(), 0u);
   tree.Set({5, 5, 5}, true);
   tree.Write(&occupied);
   EXPECT_EQ(occupied, 1);
