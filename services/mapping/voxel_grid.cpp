@@ -25,18 +25,14 @@ double FollowEnd(double old_end, double seen_end, double noise_steps) {
 
 }  // namespace
 
-Extent Extent::Nothing() {
-  Extent e;
-  e.low.fill(1);
-  e.high.fill(-1);
-  return e;
-}
-
 VoxelGrid::VoxelGrid(double resolution)
     : resolution_(resolution),
       step_(0.75 * resolution / 127.0),
       columns_(static_cast<size_t>(kSide) * kSide),
-      settled_free_(columns_.size()) {}
+      voxels_(columns_.size() * kLevels),
+      settled_free_(columns_.size()) {
+  for (size_t i = 0; i < columns_.size(); ++i) columns_[i].voxels = &voxels_[i * kLevels];
+}
 
 Key VoxelGrid::ToKey(const Eigen::Vector3d& p) const {
   const Eigen::Vector3d c = (p / resolution_).array().floor().max(-1e9).min(1e9);
@@ -63,14 +59,6 @@ void VoxelGrid::MoveTo(const Eigen::Vector3d& p) {
         settled_free_[Index(x, y)] = 0;
 }
 
-VoxelGrid::Column* VoxelGrid::Find(int x, int y) {
-  if (!ContainsColumn(x, y)) return nullptr;
-  Column& column = Slot(x, y);
-  if (column.x != x || column.y != y) return nullptr;
-  if (column.z0 != z0_) Renew(&column, x, y);
-  return &column;
-}
-
 Voxel* VoxelGrid::At(const Key& k) {
   if (!ContainsLevel(k.z)) return nullptr;
   Column* column = Find(k.x, k.y);
@@ -80,7 +68,8 @@ Voxel* VoxelGrid::At(const Key& k) {
 void VoxelGrid::Renew(Column* column, int x, int y) const {
   const bool same_place = column->x == x && column->y == y;
   if (!same_place) {
-    *column = Column();
+    column->piece = 0;
+    std::fill_n(column->voxels, kLevels, Voxel());
   } else {  // the window moved up or down: keep the levels that both have
     for (int z = z0_; z < z0_ + kLevels; ++z)
       if (z < column->z0 || z >= column->z0 + kLevels) column->voxels[Level(z)] = Voxel();
@@ -88,9 +77,10 @@ void VoxelGrid::Renew(Column* column, int x, int y) const {
   column->x = x;
   column->y = y;
   column->z0 = z0_;
-  column->occupied = static_cast<int>(
-      std::count_if(column->voxels.begin(), column->voxels.end(),
-                    [](const Voxel& v) { return v.occupied && !v.extent.empty(); }));
+  column->occupied =
+      static_cast<int>(std::count_if(column->voxels, column->voxels + kLevels, [](const Voxel& v) {
+        return v.occupied && !v.extent.empty();
+      }));
 }
 
 ExtentMeter::ExtentMeter() {

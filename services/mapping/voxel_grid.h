@@ -21,7 +21,7 @@ struct Extent {
   static constexpr int kAxes = 5;
   std::array<int8_t, kAxes> low{}, high{};  ///< in steps of VoxelGrid::step()
   bool empty() const { return low[0] > high[0]; }
-  static Extent Nothing();
+  static constexpr Extent Nothing() { return {{1, 1, 1, 1, 1}, {-1, -1, -1, -1, -1}}; }
 };
 
 struct Voxel {
@@ -47,10 +47,11 @@ class VoxelGrid {
     int x = INT32_MIN, y = INT32_MIN, z0 = 0;  ///< the cells that it stands for
     int piece = 0;                             ///< of the static decomposition; 0: none
     int occupied = 0;                          ///< cells that are occupied with an extent
-    std::array<Voxel, kLevels> voxels;
+    Voxel* voxels = nullptr;                   ///< kLevels; apart, so that columns stay in cache
   };
 
   explicit VoxelGrid(double resolution);
+  VoxelGrid(const VoxelGrid&) = delete;
 
   double resolution() const { return resolution_; }
   /// Length of one step of an Extent, m.
@@ -74,7 +75,13 @@ class VoxelGrid {
     return column;
   }
   /// The column of (x, y), or null where nothing was seen.
-  Column* Find(int x, int y);
+  Column* Find(int x, int y) {
+    if (!ContainsColumn(x, y)) return nullptr;
+    Column& column = Slot(x, y);
+    if (column.x != x || column.y != y) return nullptr;
+    if (column.z0 != z0_) Renew(&column, x, y);
+    return &column;
+  }
   static size_t Level(int z) { return static_cast<size_t>(z & (kLevels - 1)); }
   static uint32_t Bit(int z) { return uint32_t{1} << Level(z); }
   static size_t Index(int x, int y) {
@@ -88,7 +95,7 @@ class VoxelGrid {
   std::vector<uint32_t>& settled_free() { return settled_free_; }
 
   size_t Bytes() const {
-    return columns_.size() * (sizeof(Column) + sizeof(settled_free_.front()));
+    return columns_.size() * (sizeof(Column) + kLevels * sizeof(Voxel) + sizeof(uint32_t));
   }
 
  private:
@@ -99,6 +106,7 @@ class VoxelGrid {
   int x0_ = 0, y0_ = 0, z0_ = 0;
   bool placed_ = false;
   std::vector<Column> columns_;
+  std::vector<Voxel> voxels_;
   std::vector<uint32_t> settled_free_;
 };
 

@@ -97,10 +97,8 @@ TEST(MappingGym, EveryOccupiedCellIsEnclosed) {
           for (int y = 0; y < 40; ++y) {
             const auto* column = grid.Find(x, y);
             if (!column) continue;
-            for (const Voxel& voxel : column->voxels) {
-              const size_t level = static_cast<size_t>(&voxel - column->voxels.data());
-              int z = grid.z0();
-              while (VoxelGrid::Level(z) != level) ++z;
+            for (int z = grid.z0(); z < grid.z0() + VoxelGrid::kLevels; ++z) {
+              const Voxel& voxel = column->voxels[VoxelGrid::Level(z)];
               const Eigen::Vector3d center = grid.Center({x, y, z});
               // The band's lower end follows the ground's estimate: 0.3 m above it, at most 0.25 m
               // high.
