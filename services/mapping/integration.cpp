@@ -15,6 +15,7 @@ constexpr int kSettleSweeps = 20;   // moving returns this long in one cell stan
 constexpr int kDoubtSweeps = 10;    // hits after which a cell that was long free is no longer
 constexpr double kPassed = 2.0;     // sweeps, how well it is known when a body was somewhere
 constexpr int kPassedHits = 4;      // sweeps that a cell may be hit beyond the body's stay
+constexpr size_t kAhead = 8;        // returns whose cells are fetched from memory meanwhile
 constexpr size_t kMostChanges = 400000;
 
 uint8_t Increment(uint8_t n) { return n < 255 ? static_cast<uint8_t>(n + 1) : n; }
@@ -32,7 +33,9 @@ void Integrator::Insert(const Eigen::Vector3d& origin, const std::vector<Return>
 
 void Integrator::Gather(const std::vector<Return>& returns) {
   cells_.clear();
-  for (const auto& r : returns) {
+  for (size_t i = 0; i < returns.size(); ++i) {
+    const Return& r = returns[i];
+    grid_.Prefetch(returns[std::min(i + kAhead, returns.size() - 1)].key);
     auto& column = grid_.Touch(r.key.x, r.key.y);
     Voxel& voxel = column.voxels[VoxelGrid::Level(r.key.z)];
     const size_t slot = static_cast<size_t>(voxel.slot);
@@ -154,8 +157,10 @@ void Integrator::CastRay(const Eigen::Vector3d& origin, const Eigen::Vector3d& e
   crossed_.clear();
   int steps = std::abs(last.x - cell.x) + std::abs(last.y - cell.y) + std::abs(last.z - cell.z);
   for (; steps != 0 || !(cell == last); --steps) {
-    if (!(done_[VoxelGrid::Index(cell.x, cell.y)] & VoxelGrid::Bit(cell.z)))
+    if (!(done_[VoxelGrid::Index(cell.x, cell.y)] & VoxelGrid::Bit(cell.z))) {
       crossed_.push_back(cell);
+      grid_.Prefetch(cell);
+    }
     const bool along_x = next.x() < next.y();
     const double nearest = along_x ? next.x() : next.y();
     if (std::min(nearest, next.z()) > 1.0) break;  // rounding let the ray slip past the last cell

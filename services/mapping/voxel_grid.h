@@ -87,6 +87,11 @@ class VoxelGrid {
   static size_t Index(int x, int y) {
     return static_cast<size_t>((x & (kSide - 1)) * kSide + (y & (kSide - 1)));
   }
+  /// Fetches the memory of a cell that is needed soon; it need not be in the window.
+  void Prefetch(const Key& k) const {
+    __builtin_prefetch(&columns_[Index(k.x, k.y)]);
+    __builtin_prefetch(&voxels_[Index(k.x, k.y) * kLevels + Level(k.z)]);
+  }
   /// The voxel, or null where nothing was seen.
   Voxel* At(const Key& k);
 
