@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "services/mapping/voxel_grid.h"
+
 namespace chase::mapping {
 
 namespace {
@@ -19,7 +21,7 @@ constexpr size_t kFewest = 20;    // returns without which there is no start
 GroundModel::GroundModel(const GroundConfig& config)
     : config_(config), tiles_(static_cast<size_t>(kSide) * kSide) {}
 
-int GroundModel::TileOf(double x) { return static_cast<int>(std::floor(std::clamp(x, -1e8, 1e8))); }
+int GroundModel::TileOf(double x) { return Floor(std::clamp(x, -1e8, 1e8)); }
 
 GroundModel::Tile& GroundModel::At(int x, int y) {
   Tile& tile = tiles_[static_cast<size_t>((x & (kSide - 1)) * kSide + (y & (kSide - 1)))];

@@ -53,9 +53,9 @@ std::vector<MotionDetector::Candidate> MotionDetector::Candidates(
         voxel && (voxel->free_sweeps >= ever_free_ || (awaited && voxel->hits < kSettledHits));
     if (voxel && voxel->occupied && !doubted) continue;
     const bool strong = InEverFree(r.key, grid);
-    candidates.push_back({Code(static_cast<int>(std::floor(p.x() / config_.cluster_cell)),
-                               static_cast<int>(std::floor(p.y() / config_.cluster_cell))),
-                          static_cast<int>(i), strong, strong || awaited});
+    candidates.push_back(
+        {Code(Floor(p.x() / config_.cluster_cell), Floor(p.y() / config_.cluster_cell)),
+         static_cast<int>(i), strong, strong || awaited});
   }
   std::sort(candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) {
     return a.cell != b.cell ? a.cell < b.cell : a.index < b.index;

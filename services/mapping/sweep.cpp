@@ -25,7 +25,8 @@ std::vector<float> FiringAges(const Eigen::Vector3d& origin, const Eigen::Quater
     if (ray.allFinite() && ray.head<2>().squaredNorm() > 0.0f) {
       const double azimuth = std::atan2(ray.y(), ray.x());
       if (known++ > 0) {
-        const double step = std::remainder(azimuth - last, 2.0 * M_PI);
+        double step = azimuth - last;
+        if (std::abs(step) > M_PI) step -= std::copysign(2.0 * M_PI, step);
         jumps += std::abs(step) > kStep;
         sum += step;
       }

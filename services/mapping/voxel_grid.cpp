@@ -34,15 +34,6 @@ VoxelGrid::VoxelGrid(double resolution)
   for (size_t i = 0; i < columns_.size(); ++i) columns_[i].voxels = &voxels_[i * kLevels];
 }
 
-Key VoxelGrid::ToKey(const Eigen::Vector3d& p) const {
-  const Eigen::Vector3d c = (p / resolution_).array().floor().max(-1e9).min(1e9);
-  return {static_cast<int>(c.x()), static_cast<int>(c.y()), static_cast<int>(c.z())};
-}
-
-Eigen::Vector3d VoxelGrid::Center(const Key& k) const {
-  return resolution_ * Eigen::Vector3d(k.x + 0.5, k.y + 0.5, k.z + 0.5);
-}
-
 void VoxelGrid::MoveTo(const Eigen::Vector3d& p) {
   const Key k = ToKey(p);
   const int x0 = x0_, y0 = y0_;

@@ -15,6 +15,12 @@ struct Key {
   bool operator==(const Key& o) const { return x == o.x && y == o.y && z == o.z; }
 };
 
+/// floor(x), without a call of the library; |x| < 2^31.
+inline int Floor(double x) {
+  const int i = static_cast<int>(x);
+  return i - (x < i);
+}
+
 /// Where in a cell its returns lie: intervals along x, y, (x+y)/sqrt2, (x-y)/sqrt2 and z about the
 /// cell's centre. An octagon in plan that hugs round and slanted surfaces where a cell does not.
 struct Extent {
@@ -56,8 +62,13 @@ class VoxelGrid {
   double resolution() const { return resolution_; }
   /// Length of one step of an Extent, m.
   double step() const { return step_; }
-  Key ToKey(const Eigen::Vector3d& p) const;
-  Eigen::Vector3d Center(const Key& k) const;
+  Key ToKey(const Eigen::Vector3d& p) const {
+    const Eigen::Array3d c = (p.array() / resolution_).max(-1e9).min(1e9);
+    return {Floor(c.x()), Floor(c.y()), Floor(c.z())};
+  }
+  Eigen::Vector3d Center(const Key& k) const {
+    return resolution_ * Eigen::Vector3d(k.x + 0.5, k.y + 0.5, k.z + 0.5);
+  }
 
   /// Centres the window on p. Forgets what falls out.
   void MoveTo(const Eigen::Vector3d& p);
