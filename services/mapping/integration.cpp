@@ -15,7 +15,6 @@ constexpr int kSettleSweeps = 20;   // moving returns this long in one cell stan
 constexpr int kDoubtSweeps = 10;    // hits after which a cell that was long free is no longer
 constexpr double kPassed = 2.0;     // sweeps, how well it is known when a body was somewhere
 constexpr int kPassedHits = 4;      // sweeps that a cell may be hit beyond the body's stay
-constexpr size_t kAhead = 8;        // returns whose cells are fetched from memory meanwhile
 constexpr size_t kMostChanges = 400000;
 
 uint8_t Increment(uint8_t n) { return n < 255 ? static_cast<uint8_t>(n + 1) : n; }
@@ -35,7 +34,7 @@ void Integrator::Gather(const std::vector<Return>& returns) {
   cells_.clear();
   for (size_t i = 0; i < returns.size(); ++i) {
     const Return& r = returns[i];
-    grid_.Prefetch(returns[std::min(i + kAhead, returns.size() - 1)].key);
+    grid_.Prefetch(returns[std::min(i + VoxelGrid::kAhead, returns.size() - 1)].key);
     auto& column = grid_.Touch(r.key.x, r.key.y);
     Voxel& voxel = column.voxels[VoxelGrid::Level(r.key.z)];
     const size_t slot = static_cast<size_t>(voxel.slot);

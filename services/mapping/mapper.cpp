@@ -8,7 +8,6 @@ namespace chase::mapping {
 
 namespace {
 
-constexpr size_t kAhead = 8;           // cells that are fetched from memory meanwhile
 constexpr int kSettledHits = 15;       // sweeps after which a cell outside the target's core stays
 constexpr double kGhostMargin = 0.2;   // m around a mover within which doubtful cells are cleared
 constexpr double kLookBack = 2.0;      // s after a mover became known that its way is cleared
@@ -271,7 +270,7 @@ ObstacleList Mapper::Insert(const Sweep& sweep) {
 void Mapper::SetTree(int most) {
   auto& changes = integrator_.changes();
   for (int i = 0; i < most && !changes.empty(); ++i) {
-    grid_.Prefetch(changes[std::min(kAhead, changes.size() - 1)]);
+    grid_.Prefetch(changes[std::min(VoxelGrid::kAhead, changes.size() - 1)]);
     const Key key = changes.front();
     changes.pop_front();
     Voxel* voxel = grid_.At(key);

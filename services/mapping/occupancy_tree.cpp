@@ -51,30 +51,15 @@ struct Stream {
 void Append(const Octants& node, int level, const Key* within, Stream* out) {
   unsigned states = node.states;
   if (within && level >= kTileLevels) states &= kBits << 2 * Octant(*within, level);
+  ++out->nodes;
   out->bytes.push_back(static_cast<char>(states & 0xff));
   out->bytes.push_back(static_cast<char>(states >> 8));
   for (unsigned i = 0; states != 0; ++i, states >>= 2) {
     const unsigned state = states & kBits;
-    out->nodes += state != Octants::kUnknown;
+    out->nodes += state == Octants::kFree || state == Octants::kOccupied;
     if (state == Octants::kOccupied) out->occupied += 1 << 3 * level;
     if (state == Octants::kParted) Append(node.parts[i], level - 1, within, out);
   }
-}
-
-/// The stream with OctoMap's header.
-std::string ToBytes(const Octants& root, double resolution, const Key* within, int* occupied) {
-  Stream stream;
-  if (root.states != 0) {
-    stream.nodes = 1;
-    Append(root, kTop, within, &stream);
-  }
-  std::ostringstream out;
-  out << "# Octomap OcTree binary file\n# (feel free to add / change comments, but leave the first "
-         "line as it is!)\n#\nid OcTree\nsize "
-      << stream.nodes << "\nres " << resolution << "\ndata\n"
-      << stream.bytes;
-  *occupied = stream.occupied;
-  return out.str();
 }
 
 size_t BytesBelow(const Octants& node) {
@@ -110,14 +95,22 @@ void OccupancyTree::Forget(const Eigen::Vector3d& p, double radius, std::vector<
     }
     const Key first{x * kTileCells, y * kTileCells, z * kTileCells};
     int occupied = 0;
-    if (saved) saved->push_back({x, y, z, ToBytes(root_, resolution_, &first, &occupied)});
+    if (saved) saved->push_back({x, y, z, Write(&occupied, &first)});
     SetCube(first, kTop, kTileLevels, Octants::kUnknown, &root_);
     it = tiles_.erase(it);
   }
 }
 
-std::string OccupancyTree::Write(int* occupied) const {
-  return ToBytes(root_, resolution_, nullptr, occupied);
+std::string OccupancyTree::Write(int* occupied, const Key* within) const {
+  Stream stream;
+  if (root_.states != 0) Append(root_, kTop, within, &stream);
+  *occupied = stream.occupied;
+  std::ostringstream out;
+  out << "# Octomap OcTree binary file\n# (feel free to add / change comments, but leave the first "
+         "line as it is!)\n#\nid OcTree\nsize "
+      << stream.nodes << "\nres " << resolution_ << "\ndata\n"
+      << stream.bytes;
+  return out.str();
 }
 
 int OccupancyTree::State(const Eigen::Vector3d& p) const {

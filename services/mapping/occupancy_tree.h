@@ -43,8 +43,9 @@ class OccupancyTree {
   /// if that is given.
   void Forget(const Eigen::Vector3d& p, double radius, std::vector<SavedTile>* saved);
 
-  /// Octree in OctoMap's "bt" format with its header. Counts occupied leaf cells.
-  std::string Write(int* occupied) const;
+  /// Octree in OctoMap's "bt" format with its header; if `within` is given, of the tile that holds
+  /// this cell only. Counts occupied cells.
+  std::string Write(int* occupied, const Key* within = nullptr) const;
   /// The cell's state: -1 unknown, 0 free, 1 occupied.
   int State(const Eigen::Vector3d& p) const;
   size_t Bytes() const;

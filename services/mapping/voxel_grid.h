@@ -48,6 +48,8 @@ struct Voxel {
 class VoxelGrid {
  public:
   static constexpr int kSide = 256, kLevels = 32;
+  /// Cells ahead to Prefetch: one takes 10 to 20 ns, memory answers after about 100.
+  static constexpr size_t kAhead = 8;
 
   struct Column {
     int x = INT32_MIN, y = INT32_MIN, z0 = 0;  ///< the cells that it stands for

@@ -32,6 +32,15 @@ struct Fixture {
   }
 };
 
+TEST(MappingGrid, FloorIsThatOfTheLibrary) {
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> value(-1e9, 1e9), small(-3.0, 3.0);
+  for (int i = 0; i < 10000; ++i)
+    for (const double x : {value(random), small(random), std::round(small(random))})
+      for (const double y : {x, std::nextafter(x, -1e10), std::nextafter(x, 1e10)})
+        ASSERT_EQ(Floor(y), static_cast<int>(std::floor(y))) << y;
+}
+
 TEST(MappingGrid, HitsOccupyAndRaysFreeEveryCellBetween) {
   Fixture f;
   const Eigen::Vector3d wall(4.1, 1.3, 0.7), origin(0.05, 0.05, 0.05);

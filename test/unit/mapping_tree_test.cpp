@@ -35,6 +35,25 @@ TEST(MappingTree, BytesAreReadByOctomap) {
   }
 }
 
+TEST(MappingTree, WritesWhatOctomapWrites) {
+  OccupancyTree tree(0.2);
+  octomap::OcTree reference(0.2);
+  std::mt19937 random(2);
+  std::uniform_int_distribution<int> cell(-4, 3);
+  for (int i = 0; i < 20000; ++i) {  // few cells, so that octants are pruned and parted again
+    const Key key{cell(random), cell(random), cell(random)};
+    const bool occupied = random() % 64 == 0;
+    tree.Set(key, occupied);
+    reference.setNodeValue(0.2 * (key.x + 0.5), 0.2 * (key.y + 0.5), 0.2 * (key.z + 0.5),
+                           occupied ? 2.0f : -1.0f);
+    if (i % 500 != 0) continue;
+    std::ostringstream out;
+    ASSERT_TRUE(reference.writeBinaryConst(out));
+    int n = 0;
+    ASSERT_TRUE(tree.Write(&n) == out.str()) << i;
+  }
+}
+
 TEST(MappingTree, FarTilesLeaveAndMemoryIsBounded) {
   OccupancyTree tree(0.2);
   std::vector<SavedTile> saved;
