@@ -23,7 +23,7 @@ Faults::Faults(const std::vector<world::FaultSpec>& faults, int64_t mission_star
   }
 }
 
-void Faults::Plan(const world::FaultSpec& fault, Strike begin, Strike end) {
+void Faults::Plan(const world::FaultSpec& fault, const Strike& begin, const Strike& end) {
   const auto at = [&](double t) { return mission_start_ + std::llround(t * 1e6); };
   lockstep_->At(at(fault.at), [this, fault, begin] {
     Announce(fault, event_t::BEGINS);

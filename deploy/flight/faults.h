@@ -21,7 +21,7 @@ class Faults {
 
  private:
   using Strike = std::function<void()>;
-  void Plan(const world::FaultSpec& fault, Strike begin, Strike end);
+  void Plan(const world::FaultSpec& fault, const Strike& begin, const Strike& end);
   void Announce(const world::FaultSpec& fault, int8_t phase);
 
   int64_t mission_start_;

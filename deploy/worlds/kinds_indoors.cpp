@@ -22,7 +22,8 @@ class Floor {
 
   int count() const { return columns_ * rows_; }
   Vector2d Center(int i) const {
-    return {(i % columns_ + 0.5) * room_.x(), (i / columns_ + 0.5) * room_.y()};
+    const int row = i / columns_;
+    return {(i % columns_ + 0.5) * room_.x(), (row + 0.5) * room_.y()};
   }
   Area All() const { return {{0.0, 0.0}, {columns_ * room_.x(), rows_ * room_.y()}}; }
 
@@ -204,7 +205,7 @@ std::optional<Scenario> Corridor(const Options& options, Random* random) {
     return std::nullopt;
   const KeptFree free(scenario, 0.7);
   for (std::size_t i = 1; i < line.size(); ++i) {  // cupboards and pillars along the walls
-    const Vector2d a = line[i - 1], b = line[i];
+    const Vector2d &a = line[i - 1], &b = line[i];
     const Vector2d d = (b - a).normalized(), across(half * d.y(), half * d.x());
     const Area leg{a.cwiseMin(b) - across, a.cwiseMax(b) + across};
     Placer placer(leg, free, random);

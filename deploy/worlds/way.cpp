@@ -38,7 +38,7 @@ std::vector<Vector2d> Tour(const std::vector<Vector2d>& nodes, double length, do
       nodes[static_cast<std::size_t>(Whole(random, 0, static_cast<int>(nodes.size()) - 1))]};
   double driven = 0.0;
   for (int tries = 0; driven < length && tries < 10000; ++tries) {
-    const Vector2d next =
+    const Vector2d& next =
         nodes[static_cast<std::size_t>(Whole(random, 0, static_cast<int>(nodes.size()) - 1))];
     const double leg = (next - way.back()).norm();
     if (leg < leg_min || (leg > 3.0 * leg_min && !Chance(random, 0.02))) continue;
