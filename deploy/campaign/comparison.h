@@ -15,10 +15,11 @@ struct Comparison {
   bool worse = false;  ///< something is worse beyond chance: p < 0.05 after Holm
 };
 
-/// What got better and worse from `before` to `now`, row by row and pooled. Where both hold the
-/// same (place, seed, fault) the pairs are compared: the exact McNemar test for passing and
-/// colliding, the sign-flip test and a t interval of the differences for the figures. Else
-/// Fisher's exact test, and Welch's test and interval. One family of tests for Holm's adjustment.
+/// What got better and worse from `before` to `now`, row by row and, of two rows or more, pooled
+/// over those that both hold. Where both hold the same (place, seed, fault) the pairs are compared:
+/// the exact McNemar test for passing and colliding, the sign-flip test and a t interval of the
+/// differences for the figures. Else Fisher's exact test, and Welch's test and interval. One family
+/// of tests for Holm's adjustment.
 Comparison Compare(const std::vector<nlohmann::ordered_json>& before,
                    const std::vector<nlohmann::ordered_json>& now);
 

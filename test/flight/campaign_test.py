@@ -249,6 +249,11 @@ class Campaign(unittest.TestCase):
         answer = self.fly(*other, "--compare", self.out, code=3, out=self.folder / "other",
                           programs=worse).stdout
         self.assertIn("all: 42 flights before, 42 now, no pairs", answer)
+        mixed = self.fly("--kinds", "hall,park", "--seeds", "230-250", "--quiet", "--compare", self.out,
+                         out=self.folder / "mixed").stdout
+        self.assertIn("world:hall: 21 flights before, 21 now, no pairs", mixed)
+        self.assertIn("world:park: not flown before\n", mixed)
+        self.assertNotIn("\nall: ", mixed.partition("Against")[2], "halls are not compared with parks")
         self.fly("--kinds", "park", "--compare", self.out, out=self.folder / "park")
 
     def test_flights_from_a_list(self):
