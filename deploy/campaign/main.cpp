@@ -3,8 +3,9 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
-#include <cmath>
+#include <algorithm>
 #include <filesystem>
+#include <map>
 #include <thread>
 
 #include "deploy/campaign/comparison.h"
