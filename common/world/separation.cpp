@@ -166,6 +166,7 @@ bool Prover::Descend(const Controls& c, Separation s, int depth) {
 SeparationResult Prover::Prove(double from, double to) {
   const int columns = Columns();
   if (columns > 16 || !(from >= 0.0 && from < to && to <= 1.0)) return result_;
+  if (!(body_.sigmas >= 0.0)) return result_;
   Controls c = MakeControls(columns);
   if (!c.allFinite()) return result_;
   if (to < 1.0) c = CutOff(to, &c);

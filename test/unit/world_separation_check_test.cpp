@@ -155,7 +155,7 @@ void MoveBody(Random* random, Proven* p) {
   p->pair.body.center.row(0) += (room + 1e-6) * s.normal.normalized().transpose();
 }
 
-void GrowUncertainty(Random* random, Proven* p) {
+void GrowRadius(Random* random, Proven* p) {
   const Separation s = PickOne(random, &p->certificate);
   const double room = std::max(0.0, LeastRoom(p->pair, s));
   p->pair.drone.radius.conservativeResize(3);
@@ -194,10 +194,9 @@ TEST(SeparationCheck, TamperedCertificatesAreRefused) {
     std::string name;
     std::function<void(Random*, Proven*)> tamper;
   };
-  const std::vector<Way> ways = {
-      {"normal bent", BendNormal},       {"interval widened", WidenInterval},
-      {"body grown", GrowBody},          {"body moved", MoveBody},
-      {"radius grown", GrowUncertainty}, {"gap in time", BreakCover}};
+  const std::vector<Way> ways = {{"normal bent", BendNormal},  {"interval widened", WidenInterval},
+                                 {"body grown", GrowBody},     {"body moved", MoveBody},
+                                 {"radius grown", GrowRadius}, {"gap in time", BreakCover}};
   std::vector<int> count(ways.size(), 0);
   int total = 0;
   for (uint64_t seed = 0; total < 10000; ++seed) {
@@ -286,6 +285,7 @@ TEST(SeparationCheck, WhatIsNoInputProvesNothing) {
       [=](Proven* p) { p->pair.body.shape(0, 1) = nan; },
       [](Proven* p) { p->pair.body.half.x() = -1.0; },
       [=](Proven* p) { p->pair.body.sigmas = nan; },
+      [](Proven* p) { p->pair.body.sigmas = -1.0; },
       [](Proven* p) { p->pair.drone.radius = math::Polynomial::Zero(17); },
   };
   for (size_t w = 0; w < ways.size(); ++w) {
