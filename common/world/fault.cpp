@@ -67,7 +67,7 @@ std::string FaultSpec::Problem() const {
     return "at is " + config::detail::FormatNumber(at) +
            "; it must be a mission time in s, or negative to be drawn from the seed";
   const bool endless = std::isinf(kind->duration);
-  if (endless && duration >= 0.0 && duration != kind->duration)
+  if (endless && !(duration < 0.0) && duration != kind->duration)
     return "for is " + config::detail::FormatNumber(duration) + "; " + name +
            " lasts to the end of the flight: leave the key out";
   if (!endless && (duration == 0.0 || !std::isfinite(duration)))

@@ -6,7 +6,7 @@
 
 namespace chase::world {
 
-/// One thing that goes wrong in a flight: an entry of a scenario's `faults`.
+/// A failure during a flight: an entry of a scenario's `faults`.
 struct FaultSpec {
   std::string name;
   double at = -1.0;
@@ -34,7 +34,7 @@ struct FaultKind {
   bool raw_only;        ///< strikes what a flight on true sensors does not have
 };
 
-/// Every fault. DESIGN.md lists the names.
+/// Every fault. deploy/scenarios/README.md lists the names.
 const std::vector<FaultKind>& FaultKinds();
 
 /// The row of a name that Problem() accepts.

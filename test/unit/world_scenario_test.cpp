@@ -86,6 +86,7 @@ TEST(ScenarioFile, FaultsAreChecked) {
   EXPECT_CONTAINS(Refusal(with("{name: kill-planning, for: 0}")), "for is 0");
   EXPECT_CONTAINS(Refusal(with("{name: kill-planning, for: .inf}")), "for is .inf");
   EXPECT_CONTAINS(Refusal(with("{name: lidar-dead, for: 3}")), "leave the key out");
+  EXPECT_CONTAINS(Refusal(with("{name: lidar-dead, for: .nan}")), "for is .nan");
 }
 
 TEST(Fault, TextIsNameAndTime) {
