@@ -171,7 +171,7 @@ Vector2d PathMotion::Velocity(double t) const {
 }
 
 Vector2d PathMotion::Direction(double t) const {
-  if (t_.empty()) return Vector2d::Zero();
+  if (t_.size() < 2) return Vector2d::Zero();
   const auto moves = [this](std::size_t i) { return v_[i].norm() > 1e-9; };
   const std::size_t now = Segment(std::clamp(t, t_.front(), t_.back()));
   for (std::size_t i = now + 1; i-- > 0;)

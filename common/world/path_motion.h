@@ -37,7 +37,7 @@ class PathMotion {
   double Duration() const { return t_.empty() ? 0.0 : t_.back(); }
 
  private:
-  /// Index of the sample before t; t within [front, back].
+  /// Index of the sample before t; t within [front, back] of two samples or more.
   std::size_t Segment(double t) const;
 
   std::vector<double> t_;
