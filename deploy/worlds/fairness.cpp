@@ -136,9 +136,10 @@ std::string StandProblem(const Look& look) {
 
 std::string Unfairness(const world::Scenario& scenario, const world::Rig& rig,
                        const Options& options) {
-  const Look look{scenario};
   std::string problem = scenario.Problem();
-  if (problem.empty()) problem = WayProblem(look);
+  if (!problem.empty()) return problem;
+  const Look look{scenario};
+  problem = WayProblem(look);
   if (problem.empty()) problem = StartProblem(look, rig, options.hidden_start);
   for (const auto& mover : scenario.movers)
     if (problem.empty()) problem = MoverProblem(look, mover);

@@ -10,7 +10,7 @@ using world::Solid;
 
 namespace {
 
-constexpr int kAttempts = 40;         // for one thing
+constexpr int kAttempts = 40;         // for one solid
 constexpr double kStartClear = 0.9;   // m around the chaser's start
 constexpr double kSightClear = 0.45;  // m beside the first line of sight
 constexpr double kWallThickness = 0.2;

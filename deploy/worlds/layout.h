@@ -29,7 +29,7 @@ class KeptFree {
   /// `clearance`: free distance in plan to the target's way, m.
   KeptFree(const world::Scenario& scenario, double clearance);
 
-  /// A random place as far from the target's way as a thing of this radius must be, or up to 1 m
+  /// A random place as far from the target's way as a solid of this radius must be, or up to 1 m
   /// farther.
   Eigen::Vector2d Beside(double radius, Random* random) const;
   /// True when the solid leaves all places free; its height does not matter.
@@ -44,7 +44,7 @@ class KeptFree {
   std::size_t on_way_ = 0;
 };
 
-/// Random places of things that leave `free` free and keep a gap to each other; half of them stand
+/// Random places of solids that leave `free` free and keep a gap to each other; half of them stand
 /// beside the target's way, where they matter.
 class Placer {
  public:
