@@ -12,8 +12,9 @@ struct LiteralPlan {
 
 /// Jeon 2021, sections IV and V, as one would write them for a table of run times: time in seconds,
 /// power basis, plain arrays, one KKT system for all candidates, one Sturm chain each for d_p and
-/// d_s of every candidate and obstacle until one fails, costs of the feasible. Shares nothing with
-/// the services' reference but the problem and the quadrature's nodes; it keeps that one honest.
+/// d_s of every candidate and obstacle until one fails, costs of the feasible. Shares with the
+/// services' reference the problem, the quadrature's nodes and c(l) of eq. (3); it keeps that one
+/// honest.
 /// Candidates and target of degree 6 at most, obstacles at constant velocity, one shape for safety
 /// and sight, no limits.
 LiteralPlan PlanLiterally(const PlannerConfig& config, const Problem& problem);
