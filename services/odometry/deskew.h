@@ -40,8 +40,7 @@ class SweepMotion {
   static SweepMotion Still();
 
   /// A point measured in the body frame at time t [s after the sweep's start], seen from E; its
-  /// fourth number is 0. Between
-  /// two poses the point moves on the chord.
+  /// fourth number is 0. Between two poses the point moves on the chord.
   Eigen::Vector4f ToEnd(const Eigen::Vector4f& p_B, float t) const {
     const float s = std::max(0.0f, t * inverse_step_);
     const int i = std::min(static_cast<int>(s), last_);
