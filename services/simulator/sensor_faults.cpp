@@ -7,7 +7,7 @@ namespace chase::simulator {
 SensorFaults::SensorFaults(const std::vector<world::FaultSpec>& faults) {
   for (const world::FaultSpec& fault : faults)
     if (const world::FaultKind& kind = world::KindOf(fault); kind.process == "simulator")
-      entries_.push_back({fault, kind.effect});
+      entries_.push_back({world::Settled(fault, 0.0, 0, 0), kind.effect});
 }
 
 std::vector<SensorFaults::Change> SensorFaults::Advance(double t) {

@@ -15,7 +15,8 @@ class SensorFaults {
     bool begins;
   };
 
-  /// Each fault has its time and duration; those that strike no sensor are left out.
+  /// Each fault has its time; a negative duration is its kind's. Those that strike no sensor are
+  /// left out.
   explicit SensorFaults(const std::vector<world::FaultSpec>& faults);
 
   /// What begins or ends at `t` or since the last call; times must not fall.

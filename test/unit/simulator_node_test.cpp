@@ -109,6 +109,15 @@ TEST(SimulatorNode, AnotherSeedIsAnotherFlight) {
   EXPECT_NE(a.at("CAMERA_IMAGE"), b.at("CAMERA_IMAGE"));
 }
 
+TEST(SensorFaults, WithoutALengthAFaultLastsAsLongAsItsKind) {
+  const std::vector<world::FaultSpec> gap = {{"lidar-gap", 0.5}};
+  SensorFaults faults(gap);
+  EXPECT_EQ(faults.Advance(0.6).size(), 1u);
+  EXPECT_TRUE(faults.LidarSilent());
+  EXPECT_EQ(faults.Advance(1.6).size(), 1u);
+  EXPECT_FALSE(faults.LidarSilent());
+}
+
 TEST(SimulatorNode, ALidarFaultTakesSweepsAndChangesNothingElse) {
   SimulatorConfig config = Config();
   std::ifstream in(config.scenario);
