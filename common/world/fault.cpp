@@ -13,8 +13,7 @@ namespace {
 
 using Effect = FaultKind::Effect;
 
-// A restarted process is there again after its start-up; measured from 0.01 s (control) to 0.47 s
-// (perception, which reads its network).
+// A restarted process is there again after its start-up; measured from 0.01 to 0.44 s.
 constexpr double kRestart = 0.5;
 constexpr double kFreeze = 2.0;
 constexpr double kLidarGap = 1.0;

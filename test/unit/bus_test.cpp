@@ -133,6 +133,7 @@ TEST(PartFile, StandsInForAFileUntilItIsComplete) {
     std::ofstream(part.name()) << "half";
   }
   EXPECT_FALSE(std::filesystem::exists(file));
+  EXPECT_FALSE(std::filesystem::exists(file + ".tmp"));
   PartFile part(file);
   std::ofstream(part.name()) << "whole";
   EXPECT_TRUE(part.Complete());
