@@ -1,7 +1,6 @@
 #include "common/math/simplex.h"
 
 #include <Eigen/Geometry>
-#include <algorithm>
 #include <cmath>
 
 namespace chase::math {
@@ -15,10 +14,10 @@ constexpr double kFlat = 1e-12;
 }  // namespace
 
 bool Simplex::AffineWeights(double* w) const {
-  const Vector3d& o = points_[0];
+  const Vector3d o = points_.col(0);
   w[0] = 1.0;
   if (size_ == 1) return true;
-  const Vector3d a = points_[1] - o;
+  const Vector3d a = points_.col(1) - o;
   if (size_ == 2) {
     const double aa = a.squaredNorm();
     if (!(aa > 0.0)) return false;
@@ -26,7 +25,7 @@ bool Simplex::AffineWeights(double* w) const {
     w[0] -= w[1];
     return true;
   }
-  const Vector3d b = points_[2] - o, ab = a.cross(b);
+  const Vector3d b = points_.col(2) - o, ab = a.cross(b);
   if (size_ == 3) {
     const double area = ab.squaredNorm();
     if (!(area > kFlat * kFlat * a.squaredNorm() * b.squaredNorm())) return false;
@@ -35,7 +34,7 @@ bool Simplex::AffineWeights(double* w) const {
     w[0] -= w[1] + w[2];
     return true;
   }
-  const Vector3d c = points_[3] - o;
+  const Vector3d c = points_.col(3) - o;
   const double volume = ab.dot(c);
   if (!(std::abs(volume) > kFlat * a.norm() * b.norm() * c.norm())) return false;
   w[1] = -o.dot(b.cross(c)) / volume;
@@ -63,20 +62,22 @@ bool Simplex::Reduce() {
     for (int i = 0; i < size_; ++i) weights_[i] += step * (wanted[i] - weights_[i]);
     if (first < 0) return true;
     --size_;
-    std::copy(points_.data() + first + 1, points_.data() + size_ + 1, points_.data() + first);
-    std::copy(weights_.data() + first + 1, weights_.data() + size_ + 1, weights_.data() + first);
+    for (int i = first; i < size_; ++i) {
+      points_.col(i) = points_.col(i + 1);
+      weights_[i] = weights_[i + 1];
+    }
   }
 }
 
 bool Simplex::Add(const Vector3d& point) {
   if (size_ == 4) return false;  // the origin is inside
   const Simplex before = *this;
-  points_[size_] = point;
+  points_.col(size_) = point;
   weights_[size_] = size_ == 0 ? 1.0 : 0.0;
   ++size_;
   const bool reduced = Reduce();
   Vector3d nearest = Vector3d::Zero();
-  for (int i = 0; i < size_; ++i) nearest += weights_[i] * points_[i];
+  for (int i = 0; i < size_; ++i) nearest += weights_[i] * points_.col(i);
   const bool nearer = before.size_ == 0 || nearest.squaredNorm() < nearest_.squaredNorm();
   if (!reduced || !nearer) {
     *this = before;

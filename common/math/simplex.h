@@ -1,7 +1,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <array>
 
 namespace chase::math {
 
@@ -25,8 +24,8 @@ class Simplex {
   bool Reduce();
 
   int size_ = 0;
-  std::array<Eigen::Vector3d, 4> points_;
-  std::array<double, 4> weights_ = {0.0, 0.0, 0.0, 0.0};
+  Eigen::Matrix<double, 3, 4> points_;
+  Eigen::Vector4d weights_ = Eigen::Vector4d::Zero();
   Eigen::Vector3d nearest_ = Eigen::Vector3d::Zero();
 };
 
