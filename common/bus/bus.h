@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "chase/input_t.hpp"
 #include "common/bus/stage_clock.h"
 #include "common/bus/validation.h"
 
@@ -17,12 +18,20 @@ namespace chase::bus {
 struct ChannelCounters {
   int64_t received = 0;
   int64_t dropped = 0;
+  int64_t foreign = 0;
   int64_t malformed = 0;
   int32_t last_seq = -1;
 };
 
+/// Who a process is on the bus.
+struct Identity {
+  std::string process, vehicle;
+  int64_t start = 0;  ///< when it started, microseconds
+};
+
 /// Typed publish and subscribe; the backends carry bytes. A subscription hands over good messages
-/// only: what does not decode, or breaks `Problem(message)`, is counted and left out.
+/// only: what does not decode, breaks `Problem(message)` or comes from another vehicle, or from a
+/// process that has no business on the channel, is counted and left out.
 class Bus {
  public:
   using Bytes = std::vector<uint8_t>;
@@ -41,10 +50,16 @@ class Bus {
     });
   }
 
-  /// Numbers `message` (field seq) and sends it. The caller sets utime.
+  /// Numbers `message` (field seq), says who sends it and what had been heard by then, and sends
+  /// it. The caller sets utime.
   template <class T>
   void Publish(const std::string& channel, T message) {
     message.seq = next_seq_[channel]++;
+    message.sender = identity_.process;
+    message.vehicle = identity_.vehicle;
+    message.sender_start = identity_.start;
+    message.inputs = Inputs();
+    message.n_inputs = static_cast<int32_t>(message.inputs.size());
     Bytes bytes(static_cast<size_t>(message.getEncodedSize()));
     message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
     PublishRaw(channel, std::move(bytes));
@@ -58,6 +73,10 @@ class Bus {
 
   /// Remembers the newest error for the status message.
   void ReportError(const std::string& what) { last_error_ = what; }
+
+  /// Before anything is sent. A process without a name hears everybody.
+  void SetIdentity(Identity identity) { identity_ = std::move(identity); }
+  const Identity& identity() const { return identity_; }
 
   const std::map<std::string, ChannelCounters>& counters() const { return counters_; }
   const StageClock& stages() const { return stages_; }
@@ -80,13 +99,22 @@ class Bus {
     } catch (const std::exception& e) {  // generated decoders throw on negative lengths
       problem = std::string("does not decode: ") + e.what();
     }
+    if (problem.empty() && IsForeign(channel, message->sender, message->vehicle)) {
+      ++counters->foreign;
+      ReportError(channel + ": from " + message->sender + " of vehicle '" + message->vehicle + "'");
+      return false;
+    }
     return Count(channel, problem, problem.empty() ? message->seq : 0, counters);
   }
 
   bool Count(const std::string& channel, const std::string& problem, int32_t seq,
              ChannelCounters* counters);
+  bool IsForeign(const std::string& channel, const std::string& sender,
+                 const std::string& vehicle) const;
+  std::vector<input_t> Inputs() const;
   void Guarded(const std::string& channel, const std::function<void()>& handler);
 
+  Identity identity_;
   std::map<std::string, ChannelCounters> counters_;
   std::map<std::string, int32_t> next_seq_;
   StageClock stages_;

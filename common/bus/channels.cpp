@@ -16,13 +16,20 @@ const std::vector<ChannelRow>& ChannelTable() {
       {"MAP", "map_t", "mapping", true},
       {"TARGET", "target_t", "perception", false},
       {"PREDICTION", "prediction_t", "prediction", false},
-      {"PLAN", "plan_t", "planning", false},
-      {"ATTITUDE_SETPOINT", "attitude_setpoint_t", "control", false},
+      {"PLAN", "plan_t", "planning", false, true},
+      {"ATTITUDE_SETPOINT", "attitude_setpoint_t", "control", false, true},
+      {"TRACKING", "tracking_t", "control", false},
       {"TRUTH", "truth_t", "simulator", false},
       {"SCENARIO", "scenario_t", "simulator", false},
       {"FAULT", "event_t", "simulator, chase-flight", false},
   };
   return table;
+}
+
+bool MaySend(const std::string& channel, const std::string& sender) {
+  for (const auto& row : ChannelTable())
+    if (row.commands && row.channel == channel) return row.sender == sender;
+  return true;
 }
 
 bool IsHeavy(const std::string& channel) {

@@ -1,5 +1,6 @@
 #include "common/bus/convert.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace chase::bus {
@@ -31,10 +32,13 @@ world::Obstacle FromMessage(const obstacle_t& m, int64_t origin) {
   o.id = m.id;
   o.moving = m.kind == obstacle_t::MOVING;
   o.center = FromMessage(m.center, origin);
-  o.shape << m.shape[0], m.shape[1], m.shape[2], m.shape[1], m.shape[3], m.shape[4], m.shape[2],
-      m.shape[4], m.shape[5];
-  o.position_variance = m.position_variance;
-  o.velocity_variance = m.velocity_variance;
+  o.shape = ToSymmetric(m.shape);
+  o.solid = static_cast<world::Obstacle::Solid>(m.solid);
+  o.half = ToVector(m.half);
+  if (m.solid != obstacle_t::ELLIPSOID) o.axes = ToQuaternion(m.orientation).normalized();
+  o.position_covariance = ToSymmetric(m.position_covariance);
+  o.velocity_covariance = ToSymmetric(m.velocity_covariance);
+  o.existence = m.existence;
   return o;
 }
 
@@ -43,11 +47,13 @@ obstacle_t ToMessage(const world::Obstacle& o, int64_t origin) {
   m.id = o.id;
   m.kind = o.moving ? obstacle_t::MOVING : obstacle_t::STATIC;
   m.center = ToMessage(o.center, origin);
-  const Eigen::Matrix3d& R = o.shape;
-  const double shape[6] = {R(0, 0), R(0, 1), R(0, 2), R(1, 1), R(1, 2), R(2, 2)};
-  for (int i = 0; i < 6; ++i) m.shape[i] = shape[i];
-  m.position_variance = o.position_variance;
-  m.velocity_variance = o.velocity_variance;
+  Set(m.shape, o.shape);
+  m.solid = static_cast<int8_t>(o.solid);
+  Set(m.half, o.half);
+  Set(m.orientation, o.axes);
+  Set(m.position_covariance, o.position_covariance);
+  Set(m.velocity_covariance, o.velocity_covariance);
+  m.existence = o.existence;
   return m;
 }
 
@@ -60,6 +66,17 @@ void Set(double (&out)[4], const Eigen::Quaterniond& q) {
   out[1] = q.x();
   out[2] = q.y();
   out[3] = q.z();
+}
+
+Eigen::Matrix3d ToSymmetric(const double (&m)[6]) {
+  Eigen::Matrix3d symmetric;
+  symmetric << m[0], m[1], m[2], m[1], m[3], m[4], m[2], m[4], m[5];
+  return symmetric;
+}
+
+void Set(double (&out)[6], const Eigen::Matrix3d& m) {
+  const double entries[6] = {m(0, 0), m(0, 1), m(0, 2), m(1, 1), m(1, 2), m(2, 2)};
+  std::copy(entries, entries + 6, out);
 }
 
 Eigen::Matrix3d ToMatrix(const double (&m)[9]) {

@@ -28,6 +28,9 @@ inline Eigen::Vector3d ToVector(const double (&v)[3]) { return {v[0], v[1], v[2]
 inline Eigen::Quaterniond ToQuaternion(const double (&q)[4]) { return {q[0], q[1], q[2], q[3]}; }
 void Set(double (&out)[3], const Eigen::Vector3d& v);
 void Set(double (&out)[4], const Eigen::Quaterniond& q);
+/// xx xy xz yy yz zz.
+Eigen::Matrix3d ToSymmetric(const double (&m)[6]);
+void Set(double (&out)[6], const Eigen::Matrix3d& m);
 /// Row-major 3x3.
 Eigen::Matrix3d ToMatrix(const double (&m)[9]);
 void Set(double (&out)[9], const Eigen::Matrix3d& m);

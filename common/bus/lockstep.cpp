@@ -26,7 +26,10 @@ double ThreadCpu() {
 /// One process's view of the lockstep.
 class Lockstep::Port : public Bus {
  public:
-  Port(Lockstep* lockstep, int64_t latency) : lockstep_(lockstep), latency_(latency) {}
+  Port(Lockstep* lockstep, const std::string& process, int64_t latency)
+      : lockstep_(lockstep), latency_(latency) {
+    SetIdentity({process, "", lockstep->now_});
+  }
   int64_t Now() const override { return lockstep_->now_; }
   const RawHandler* Handler(const std::string& channel) const {
     const auto it = handlers_.find(channel);
@@ -92,7 +95,7 @@ struct Lockstep::Process {
 };
 
 Lockstep::Life::Life(Lockstep* lockstep, const Process& process)
-    : port(lockstep, process.latency),
+    : port(lockstep, process.name, process.latency),
       reporter(process.name),
       node(process.make(port)),
       ticks(node->TickPeriod(), lockstep->now_),
@@ -152,7 +155,7 @@ void Lockstep::CatchUp(Process* process) {
   }
 }
 
-std::unique_ptr<Bus> Lockstep::Connect() { return std::make_unique<Port>(this, 0); }
+std::unique_ptr<Bus> Lockstep::Connect() { return std::make_unique<Port>(this, "", 0); }
 
 void Lockstep::Send(int64_t utime, const std::string& channel, Bus::Bytes bytes) {
   events_.push(

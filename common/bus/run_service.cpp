@@ -43,7 +43,8 @@ void AddFlags(CLI::App* app, Flags* flags) {
   app->add_flag("--dump-config", flags->dump_config, "print the complete configuration and exit");
   app->add_option("--lcm-url", flags->url,
                   "LCM provider (default: $LCM_DEFAULT_URL, else built in)");
-  app->add_option("--channel-prefix", flags->prefix, "put in front of every channel's name");
+  app->add_option("--channel-prefix", flags->prefix,
+                  "the vehicle: in front of every channel's name");
   app->add_option("--replay", flags->replay, "drive the service by this LCM log, in logical time");
   app->add_option("--out", flags->out, "LCM log that --replay writes");
   app->set_version_flag("--version", Version());
@@ -52,6 +53,7 @@ void AddFlags(CLI::App* app, Flags* flags) {
 /// Live processing until a signal comes or the node is done.
 void RunLive(const ServiceSpec& spec, const Flags& flags) {
   UdpBus bus(flags.url, flags.prefix);
+  bus.SetIdentity({spec.name, flags.prefix, bus.Now()});
   const auto node = spec.make_node(bus);
   StatusReporter reporter(spec.name);
   const std::string channel = StatusChannel(spec.name);

@@ -66,6 +66,7 @@ status_t StatusReporter::Make(const Bus& bus, const Node& node, int64_t utime, b
     channel.channel = name;
     channel.received = c.received;
     channel.dropped = c.dropped;
+    channel.foreign = c.foreign;
     channel.malformed = c.malformed;
     int64_t& last = last_received_[name];
     channel.rate_hz = elapsed > 0.0 ? static_cast<double>(c.received - last) / elapsed : 0.0;

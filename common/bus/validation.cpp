@@ -49,6 +49,21 @@ class Check {
          "has a number of coefficients that is not 3 to 48 in steps of 3");
     return Number(field, p.coefficients);
   }
+  Check& Probability(const char* field, double value) {
+    return That(value >= 0.0 && value <= 1.0, field, "is not a probability");
+  }
+  Check& Stop(const polynomial_t& p) {
+    return p.n_coefficients == 0 ? *this : Polynomial("stop", p);
+  }
+  Check& Proofs(const char* field, const std::vector<proof_t>& proofs) {
+    for (const proof_t& p : proofs) {
+      Code(field, p.of, 1).Number(field, p.from).Number(field, p.radius);
+      Number(field, p.target_radius);
+      for (const separation_t& s : p.separations)
+        Number(field, s.from).Number(field, s.to).Number(field, s.normal);
+    }
+    return *this;
+  }
   Check& Code(const char* field, int value, int last) {
     return That(value >= 0 && value <= last, field, "is not one of the constants");
   }
@@ -81,6 +96,7 @@ std::string Problem(const attitude_setpoint_t& m) {
       .Number("body_rate", m.body_rate)
       .Number("thrust", m.thrust)
       .That(m.thrust >= 0.0, "thrust", "is negative")
+      .Code("motors", m.motors, 1)
       .Result();
 }
 
@@ -119,8 +135,13 @@ std::string Problem(const obstacles_t& m) {
   for (const auto& o : m.obstacles) {
     check.Polynomial("center", o.center).Number("shape", o.shape).Code("kind", o.kind, 1);
     check.That(Positive(o.shape), "shape", "is not positive definite");
-    check.Number("position_variance", o.position_variance)
-        .Number("velocity_variance", o.velocity_variance);
+    check.Code("solid", o.solid, 2).Number("half", o.half);
+    if (o.solid != obstacle_t::ELLIPSOID)
+      check.That(o.half[0] > 0.0 && o.half[1] > 0.0 && o.half[2] > 0.0, "half", "is not positive")
+          .Quaternion(o.orientation);
+    check.Number("position_covariance", o.position_covariance)
+        .Number("velocity_covariance", o.velocity_covariance)
+        .Probability("existence", o.existence);
   }
   return check.Result();
 }
@@ -128,11 +149,17 @@ std::string Problem(const obstacles_t& m) {
 std::string Problem(const plan_t& m) {
   return Check()
       .Time(m.utime)
-      .Code("verdict", m.verdict, 5)
+      .Code("verdict", m.verdict, 6)
       .Polynomial("position", m.position)
       .That(m.n_yaw >= 1 && m.n_yaw <= 16, "n_yaw", "is not 1 to 16")
       .Number("yaw", m.yaw)
       .Polynomial("target", m.target)
+      .Number("hard_radius", m.hard_radius)
+      .Number("sigmas", m.sigmas)
+      .Number("certified_clearance", m.certified_clearance)
+      .Proofs("proofs", m.proofs)
+      .Stop(m.stop)
+      .Proofs("stop_proofs", m.stop_proofs)
       .Result();
 }
 
@@ -147,6 +174,7 @@ std::string Problem(const pose_t& m) {
       .Number("gyro_bias", m.gyro_bias)
       .Number("accel_bias", m.accel_bias)
       .Number("covariance", m.covariance)
+      .Number("local_covariance", m.local_covariance)
       .Code("health", m.health, 3)
       .Result();
 }
@@ -160,6 +188,7 @@ std::string Problem(const prediction_t& m) {
       .Number("velocity_covariance", m.velocity_covariance)
       .Number("radius", m.radius)
       .Number("height", m.height)
+      .Probability("existence", m.existence)
       .Result();
 }
 
@@ -193,10 +222,21 @@ std::string Problem(const target_t& m) {
       .Number("mean", m.mean)
       .Number("covariance", m.covariance)
       .Number("velocity", m.velocity)
+      .Number("velocity_covariance", m.velocity_covariance)
+      .Probability("existence", m.existence)
       .Number("radius", m.radius)
       .Number("height", m.height)
       .Number("box_px", m.box_px)
       .Number("score", m.score)
+      .Result();
+}
+
+std::string Problem(const tracking_t& m) {
+  return Check()
+      .Time(m.utime)
+      .Code("following", m.following, 4)
+      .Number("error", m.error)
+      .Number("bound", m.bound)
       .Result();
 }
 

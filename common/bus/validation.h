@@ -16,6 +16,7 @@
 #include "chase/scenario_t.hpp"
 #include "chase/status_t.hpp"
 #include "chase/target_t.hpp"
+#include "chase/tracking_t.hpp"
 #include "chase/truth_t.hpp"
 
 namespace chase::bus {
@@ -36,6 +37,7 @@ std::string Problem(const scan_registered_t& m);
 std::string Problem(const scenario_t& m);
 std::string Problem(const status_t& m);
 std::string Problem(const target_t& m);
+std::string Problem(const tracking_t& m);
 std::string Problem(const truth_t& m);
 
 }  // namespace chase::bus

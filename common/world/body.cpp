@@ -31,11 +31,20 @@ Matrix3d InverseAbove(const Matrix3d& given) {
 Body MakeBody(const Obstacle& obstacle, double start, double duration, double sigmas) {
   Body body;
   body.center = obstacle.center.Reparametrised(start, duration).coefficients;
-  body.shape = InverseAbove(obstacle.shape);
-  if (obstacle.position_variance == 0.0 && obstacle.velocity_variance == 0.0) return body;
+  body.kind = obstacle.solid;
+  body.half = obstacle.half;
+  if (body.kind == Body::Kind::kEllipsoid)
+    body.shape = InverseAbove(obstacle.shape);
+  else
+    body.shape = obstacle.axes.toRotationMatrix();
+  if (obstacle.position_covariance.isZero(0.0) && obstacle.velocity_covariance.isZero(0.0))
+    return body;
+  // The age at tau is since + duration tau.
+  const double since = start - obstacle.center.start;
   body.sigmas = sigmas;
-  body.covariance[0].diagonal().setConstant(obstacle.position_variance);
-  body.covariance[2].diagonal().setConstant(obstacle.velocity_variance * duration * duration);
+  body.covariance[0] = obstacle.position_covariance + since * since * obstacle.velocity_covariance;
+  body.covariance[1] = 2.0 * since * duration * obstacle.velocity_covariance;
+  body.covariance[2] = duration * duration * obstacle.velocity_covariance;
   return body;
 }
 

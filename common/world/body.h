@@ -14,7 +14,7 @@ using Curve = Eigen::Matrix<double, Eigen::Dynamic, 3, 0, 16, 3>;
 /// avoided at tau is the Minkowski sum of the solid and the ellipsoid of `sigmas` standard
 /// deviations; what else is to be kept off (the drone's radius, tubes, growth) is a ball's radius.
 struct Body {
-  enum class Kind { kEllipsoid, kBox, kCylinder };  // cylinder: upright
+  using Kind = Obstacle::Solid;
   Kind kind = Kind::kEllipsoid;
   Curve center = Curve::Zero(1, 3);
   /// Ellipsoid: Q, m^2, of { x : x' Q^-1 x <= 1 }. Box: columns are its axes. Frame W. The entries
@@ -36,8 +36,9 @@ struct Ball {
 };
 
 /// The obstacle over [start, start + duration], its ellipsoid no smaller than the one that R
-/// describes, however the inverse of R is rounded; its variances grow as those of a body at unknown
-/// constant velocity. NaN where R is not positive definite or its inverse is no inverse.
+/// describes, however the inverse of R is rounded; its covariance grows as that of a body at
+/// unknown constant velocity since center.start. NaN where R is not positive definite or its
+/// inverse is no inverse.
 Body MakeBody(const Obstacle& obstacle, double start, double duration, double sigmas);
 
 /// A point of the solid about the origin, without its uncertainty, where n' x is greatest; n is not

@@ -1,20 +1,27 @@
 #pragma once
 
-#include <Eigen/Core>
+#include <Eigen/Geometry>
 
 #include "common/world/trajectory.h"
 
 namespace chase::world {
 
-/// The ellipsoid { x : (x - c(t))' R (x - c(t)) <= 1 } of constant shape R. Jeon 2021, section
-/// II-B.
+/// A solid of constant shape about c(t); where nothing else is said the ellipsoid
+/// { x : (x - c(t))' R (x - c(t)) <= 1 } of Jeon 2021, section II-B.
 struct Obstacle {
   int id = 0;
   bool moving = false;
   Trajectory center;                                    ///< c(t), frame W, m
   Eigen::Matrix3d shape = Eigen::Matrix3d::Identity();  ///< R, frame W, 1/m^2, positive definite
-  double position_variance = 0.0;                       ///< isotropic, m^2
-  double velocity_variance = 0.0;                       ///< isotropic, m^2/s^2
+  enum class Solid { kEllipsoid, kBox, kCylinder };     ///< cylinder: upright
+  Solid solid = Solid::kEllipsoid;                      ///< others: the ellipsoid lies inside
+  /// Box: half edges; cylinder: radius, radius, half height; m.
+  Eigen::Vector3d half = Eigen::Vector3d::Zero();
+  Eigen::Quaterniond axes = Eigen::Quaterniond::Identity();  ///< of a box, frame W
+  /// Of the centre at center.start, m^2, and of its velocity, m^2/s^2; frame W.
+  Eigen::Matrix3d position_covariance = Eigen::Matrix3d::Zero();
+  Eigen::Matrix3d velocity_covariance = Eigen::Matrix3d::Zero();
+  double existence = 1.0;  ///< probability that it is there
 
   /// ||x - c(t)||_R^2; below 1 inside.
   double SquaredDistance(const Eigen::Vector3d& x, double t) const {

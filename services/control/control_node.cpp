@@ -54,6 +54,7 @@ void ControlNode::Send(int64_t utime, const Setpoint& setpoint) {
   bus::Set(m.orientation, setpoint.R_WB);
   bus::Set(m.body_rate, setpoint.w_WB_B);
   m.thrust = setpoint.thrust;
+  m.motors = attitude_setpoint_t::MOTORS_ON;
   bus_.Publish("ATTITUDE_SETPOINT", m);
 }
 

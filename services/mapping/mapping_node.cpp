@@ -27,7 +27,7 @@ Sweep ToSweep(const scan_registered_t& m, double t, double period) {
 }  // namespace
 
 MappingNode::MappingNode(bus::Bus& bus, const MappingConfig& config)
-    : bus_(bus), config_(config), mapper_(config) {
+    : bus_(bus), config_(config), mapper_(std::make_unique<Mapper>(config)) {
   if (!config_.save_map.empty() && !std::ofstream(config_.save_map, std::ios::app))
     throw std::runtime_error("save_map: " + config_.save_map +
                              " cannot be written; check the folder and its rights");
@@ -39,8 +39,8 @@ MappingNode::MappingNode(bus::Bus& bus, const MappingConfig& config)
 MappingNode::~MappingNode() {
   if (config_.save_map.empty() || !last_scan_) return;
   int occupied = 0;
-  mapper_.CompleteTree();
-  Write(config_.save_map, mapper_.WriteTree(&occupied));
+  mapper_->CompleteTree();
+  Write(config_.save_map, mapper_->WriteTree(&occupied));
 }
 
 double MappingNode::Seconds(int64_t utime) {
@@ -50,6 +50,7 @@ double MappingNode::Seconds(int64_t utime) {
 
 void MappingNode::OnTarget(const target_t& m) {
   if (m.state != target_t::TRACKING && m.state != target_t::OCCLUDED) return;
+  if (!epoch_.Is(m.epoch)) return;
   TargetEstimate estimate;
   estimate.t = Seconds(m.utime);
   estimate.mean = bus::ToVector(m.mean);
@@ -58,7 +59,7 @@ void MappingNode::OnTarget(const target_t& m) {
   estimate.radius = std::max(0.0, m.radius);
   estimate.height = std::max(0.0, m.height);
   estimate.seen = m.state == target_t::TRACKING;
-  mapper_.ObserveTarget(estimate);
+  mapper_->ObserveTarget(estimate);
 }
 
 void MappingNode::OnScan(const scan_registered_t& m) {
@@ -68,15 +69,19 @@ void MappingNode::OnScan(const scan_registered_t& m) {
     ++refused_;
     return;
   }
+  if (epoch_.Change(m.epoch)) {
+    mapper_ = std::make_unique<Mapper>(config_);
+    last_map_.reset();
+  }
   last_scan_ = m.utime;
   {
     auto timer = bus_.Time("map");
-    last_list_ = mapper_.Insert(ToSweep(m, t, config_.movers.sweep_time));
+    last_list_ = mapper_->Insert(ToSweep(m, t, config_.movers.sweep_time));
   }
   PublishObstacles(last_list_, m.utime);
   {
     auto timer = bus_.Time("tree");
-    mapper_.UpdateTree();
+    mapper_->UpdateTree();
   }
   const auto period = static_cast<int64_t>(config_.map_period * 1e6);
   if (!last_map_ || m.utime - *last_map_ >= period) PublishMap(m.utime);
@@ -86,6 +91,7 @@ void MappingNode::OnScan(const scan_registered_t& m) {
 void MappingNode::PublishObstacles(const ObstacleList& list, int64_t utime) {
   obstacles_t out{};
   out.utime = utime;
+  out.epoch = epoch_.value();
   out.n_cut = list.n_cut;
   for (const auto& obstacle : list.obstacles)
     out.obstacles.push_back(bus::ToMessage(obstacle, *origin_));
@@ -98,16 +104,17 @@ void MappingNode::PublishMap(int64_t utime) {
   last_map_ = utime;
   map_t out{};
   out.utime = utime;
+  out.epoch = epoch_.value();
   out.resolution = config_.grid.resolution;
   out.format = "bt";
-  const std::string bytes = mapper_.WriteTree(&out.n_occupied);
+  const std::string bytes = mapper_->WriteTree(&out.n_occupied);
   out.size = static_cast<int32_t>(bytes.size());
   out.data.assign(bytes.begin(), bytes.end());
   bus_.Publish("MAP", out);
 }
 
 void MappingNode::SaveTiles() {
-  for (const auto& tile : mapper_.TakeTiles()) {
+  for (const auto& tile : mapper_->TakeTiles()) {
     if (config_.save_map.empty()) continue;
     std::ostringstream name;
     name << config_.save_map << ".tile_" << tile.x << "_" << tile.y << "_" << tile.z << ".bt";
@@ -121,7 +128,7 @@ bus::NodeReport MappingNode::Report() const {
   if (lost_) report.state = bus::NodeReport::State::kDegraded;
   std::ostringstream detail;
   detail << last_list_.n_static << " static, " << last_list_.n_moving << " moving, "
-         << last_list_.n_cut << " cut, " << mapper_.Bytes() / (1 << 20) << " MiB, " << refused_
+         << last_list_.n_cut << " cut, " << mapper_->Bytes() / (1 << 20) << " MiB, " << refused_
          << " sweeps refused";
   report.detail = detail.str();
   return report;

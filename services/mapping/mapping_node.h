@@ -1,10 +1,12 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 
 #include "common/bus/bus.h"
+#include "common/bus/epoch.h"
 #include "common/bus/node.h"
 #include "services/mapping/mapper.h"
 
@@ -30,7 +32,8 @@ class MappingNode : public bus::Node {
 
   bus::Bus& bus_;
   MappingConfig config_;
-  Mapper mapper_;
+  std::unique_ptr<Mapper> mapper_;
+  bus::Epoch epoch_;
   std::optional<int64_t> origin_, last_scan_, last_map_;  ///< utime
   int refused_ = 0;    ///< sweeps that odometry calls unusable, or that come from the past
   bool lost_ = false;  ///< the last sweep was unusable

@@ -238,8 +238,8 @@ std::vector<world::Obstacle> Tracker::Obstacles(double middle, double semi_heigh
     o.shape.setZero();
     o.shape.topLeftCorner<2, 2>() = outline.Scaled(grow).shape;
     o.shape(2, 2) = 1.0 / (semi_height * semi_height);
-    o.position_variance = track.body.CenterVariance();
-    o.velocity_variance = track.body.VelocityVariance();
+    o.position_covariance = track.body.CenterVariance() * Eigen::Matrix3d::Identity();
+    o.velocity_covariance = track.body.VelocityVariance() * Eigen::Matrix3d::Identity();
     obstacles.push_back(o);
   }
   return obstacles;

@@ -32,6 +32,7 @@ pose_t ToMessage(const PoseEstimate& estimate, int64_t origin) {
   // A lost filter's covariance grows without bound; the bus refuses numbers from 1e7 on.
   Eigen::Map<Eigen::Matrix<double, 9, 9, Eigen::RowMajor>>(m.covariance) =
       estimate.covariance.cwiseMax(-kMostVariance).cwiseMin(kMostVariance);
+  std::copy(m.covariance, m.covariance + 81, m.local_covariance);
   m.health = static_cast<int8_t>(estimate.health.health);
   m.correcting = estimate.correcting ? 1 : 0;
   m.reason = estimate.health.reason;

@@ -116,6 +116,8 @@ target_t ToMessage(const TargetEstimate& target, int64_t utime) {
   std::copy(box, box + 4, m.box_px);
   m.score = target.score;
   m.n_points = target.n_points;
+  m.existence = m.state == target_t::TRACKING || m.state == target_t::OCCLUDED ? 1.0 : 0.0;
+  m.reason = target.note;
   return m;
 }
 

@@ -9,7 +9,7 @@
 namespace chase::perception {
 
 PerceptionNode::PerceptionNode(bus::Bus& bus, const PerceptionConfig& config)
-    : bus_(bus), perceiver_(config) {
+    : bus_(bus), config_(config), perceiver_(std::make_unique<Perceiver>(config)) {
   cv::setNumThreads(1);  // the same sums in the same order, and no threads beside the flight's
   bus_.Subscribe<camera_image_t>("CAMERA_IMAGE", [this](const camera_image_t& m) { OnImage(m); });
   bus_.Subscribe<lidar_scan_t>("LIDAR_SCAN", [this](const lidar_scan_t& m) { OnScan(m); });
@@ -17,24 +17,28 @@ PerceptionNode::PerceptionNode(bus::Bus& bus, const PerceptionConfig& config)
 }
 
 void PerceptionNode::OnPose(const pose_t& message) {
-  if (Usable(message)) perceiver_.AddPose(FromMessage(message, Origin(message.utime)));
+  if (!Usable(message)) return;
+  if (epoch_.Change(message.epoch)) perceiver_ = std::make_unique<Perceiver>(config_);
+  perceiver_->AddPose(FromMessage(message, Origin(message.utime)));
 }
 
 void PerceptionNode::OnScan(const lidar_scan_t& message) {
-  perceiver_.AddSweep(FromMessage(message, Origin(message.utime)));
+  perceiver_->AddSweep(FromMessage(message, Origin(message.utime)));
 }
 
 void PerceptionNode::OnImage(const camera_image_t& message) {
   {
     auto timer = bus_.Time("perceive");
-    last_ = perceiver_.See(FromMessage(message, Origin(message.utime)));
+    last_ = perceiver_->See(FromMessage(message, Origin(message.utime)));
   }
   if (!last_->note.empty()) bus_.ReportError("frame not used: " + last_->note);
   Send(message.utime, *last_);
 }
 
 void PerceptionNode::Send(int64_t utime, const TargetEstimate& target) {
-  bus_.Publish("TARGET", ToMessage(target, utime));
+  target_t m = ToMessage(target, utime);
+  m.epoch = epoch_.value();
+  bus_.Publish("TARGET", m);
 }
 
 int64_t PerceptionNode::Origin(int64_t utime) {

@@ -1,12 +1,14 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 
 #include "chase/camera_image_t.hpp"
 #include "chase/lidar_scan_t.hpp"
 #include "chase/pose_t.hpp"
 #include "common/bus/bus.h"
+#include "common/bus/epoch.h"
 #include "common/bus/node.h"
 #include "services/perception/perceiver.h"
 
@@ -27,7 +29,9 @@ class PerceptionNode : public bus::Node {
   int64_t Origin(int64_t utime);
 
   bus::Bus& bus_;
-  Perceiver perceiver_;
+  PerceptionConfig config_;
+  std::unique_ptr<Perceiver> perceiver_;
+  bus::Epoch epoch_;
   std::optional<TargetEstimate> last_;
   std::optional<int64_t> origin_;  ///< utime that the core's seconds count from
 };

@@ -55,6 +55,12 @@ void Pilot::SetObstacles(double /*t*/, std::vector<world::Obstacle> obstacles) {
   obstacles_changed_ = true;
 }
 
+void Pilot::ChangeFrame() {
+  forecast_.reset();
+  obstacles_.clear();
+  has_running_ = false;
+}
+
 bool Pilot::HasTarget(double t) const {
   return forecast_ && forecast_->has_target && t - forecast_->t < config_.stale_prediction;
 }
@@ -88,7 +94,8 @@ Pilot::Start Pilot::StartAt(double t, double t0, const BodyEstimate& body) const
   const world::Trajectory& plan = running_.trajectory;
   const double now = std::clamp(t, plan.start, plan.end());
   if (!has_running_ || (plan.Position(now) - body.p).norm() > config_.reset_threshold)
-    return {{body.p, has_running_ ? body.v : Eigen::Vector3d::Zero()}, {body.yaw, 0.0}};
+    return {{body.p, has_running_ || airborne_ ? body.v : Eigen::Vector3d::Zero()},
+            {body.yaw, 0.0}};
   const double tau = std::clamp((t0 - plan.start) / plan.duration, 0.0, 1.0);
   Start start{plan.At(plan.start + tau * plan.duration), YawAt(running_.yaw, tau, plan.duration),
               true};

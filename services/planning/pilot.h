@@ -35,6 +35,9 @@ class Pilot {
   void SetForecast(const Forecast& forecast);
   void SetObstacles(double t, std::vector<world::Obstacle> obstacles);
 
+  /// Forgets all that was said in the frame W that was: forecast, obstacles, the running plan.
+  void ChangeFrame();
+
   /// A new plan if one is due at time t [s]; it starts `latency` later.
   std::optional<PlanResult> Update(double t, const BodyEstimate& body);
 

@@ -58,6 +58,7 @@ PlanningNode::PlanningNode(bus::Bus& bus, const PlanningConfig& config)
 }
 
 void PlanningNode::OnPrediction(const prediction_t& message) {
+  if (!epoch_.Is(message.epoch)) return;
   const int64_t origin = Origin(message.utime);
   Forecast forecast;
   forecast.t = bus::Seconds(message.utime, origin);
@@ -73,6 +74,7 @@ void PlanningNode::OnPrediction(const prediction_t& message) {
 }
 
 void PlanningNode::OnObstacles(const obstacles_t& message) {
+  if (!epoch_.Is(message.epoch)) return;
   const int64_t origin = Origin(message.utime);
   std::vector<world::Obstacle> obstacles;
   for (const obstacle_t& o : message.obstacles)
@@ -83,6 +85,10 @@ void PlanningNode::OnObstacles(const obstacles_t& message) {
 
 void PlanningNode::OnPose(const pose_t& message) {
   if (message.health != pose_t::HEALTH_OK && message.health != pose_t::HEALTH_DEGRADED) return;
+  if (epoch_.Change(message.epoch)) {
+    pilot_.ChangeFrame();
+    target_ = {};
+  }
   const double t = bus::Seconds(message.utime, Origin(message.utime));
   std::optional<PlanResult> plan;
   {
@@ -95,6 +101,7 @@ void PlanningNode::OnPose(const pose_t& message) {
 
 void PlanningNode::Send(const PlanResult& plan) {
   plan_t m = ToMessage(plan, *origin_);
+  m.epoch = epoch_.value();
   m.n_obstacles = pilot_.n_obstacles();
   m.target = target_.n_coefficients > 0
                  ? target_

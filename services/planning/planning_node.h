@@ -8,6 +8,7 @@
 #include "chase/pose_t.hpp"
 #include "chase/prediction_t.hpp"
 #include "common/bus/bus.h"
+#include "common/bus/epoch.h"
 #include "common/bus/node.h"
 #include "services/planning/pilot.h"
 
@@ -28,10 +29,11 @@ class PlanningNode : public bus::Node {
 
   bus::Bus& bus_;
   Pilot pilot_;
+  bus::Epoch epoch_;
   std::optional<int64_t> origin_;  // utime that the core's seconds count from
   polynomial_t target_{};          // as predicted; no coefficients: none yet
   int64_t n_plans_ = 0;
-  int64_t n_verdicts_[6] = {};
+  int64_t n_verdicts_[7] = {};
 };
 
 }  // namespace chase::planning

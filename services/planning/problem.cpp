@@ -18,7 +18,8 @@ double SquaredNorm(const Eigen::Matrix3d& R, const Eigen::Vector3d& x) { return 
 
 double Uncertainty(const PlannerConfig& config, const world::Obstacle& o, double duration) {
   const double half = 0.5 * duration;
-  const double sigma = std::sqrt(o.position_variance + o.velocity_variance * half * half);
+  const double sigma = std::sqrt(o.position_covariance.diagonal().maxCoeff() +
+                                 o.velocity_covariance.diagonal().maxCoeff() * half * half);
   return std::min(config.max_inflation, config.sigmas * sigma);
 }
 

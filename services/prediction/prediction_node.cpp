@@ -48,6 +48,7 @@ PredictionNode::PredictionNode(bus::Bus& bus, const PredictionConfig& config)
 }
 
 void PredictionNode::OnObstacles(const obstacles_t& message) {
+  if (!epoch_.Is(message.epoch)) return;
   obstacles_time_ = Time(message.utime);
   obstacles_.clear();
   for (const obstacle_t& o : message.obstacles) obstacles_.push_back(bus::FromMessage(o, *origin_));
@@ -55,6 +56,11 @@ void PredictionNode::OnObstacles(const obstacles_t& message) {
 
 void PredictionNode::OnTarget(const target_t& message) {
   const double now = Time(message.utime);
+  if (epoch_.Change(message.epoch)) {
+    window_.Clear();
+    obstacles_.clear();
+    trigger_.Lost();
+  }
   const bool seen = message.state == target_t::TRACKING;
   if (!seen && message.state != target_t::OCCLUDED) {
     window_.Clear();
@@ -113,6 +119,7 @@ void PredictionNode::Send(const target_t& target, const PredictResult& result, i
                          : std::nullopt;
   prediction_t m{};
   m.utime = target.utime;
+  m.epoch = epoch_.value();
   m.verdict = WireVerdict(result.verdict);
   m.reason = result.reason;
   m.target = bus::ToMessage(result.trajectory, *origin_);
@@ -125,6 +132,7 @@ void PredictionNode::Send(const target_t& target, const PredictResult& result, i
   m.candidates = result.candidates;
   m.checked = static_cast<int32_t>(std::min<int64_t>(result.checked, INT32_MAX));
   m.trigger = trigger;
+  m.existence = target.existence;
   bus_.Publish("PREDICTION", m);
 }
 

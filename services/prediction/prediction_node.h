@@ -9,6 +9,7 @@
 #include "chase/prediction_t.hpp"
 #include "chase/target_t.hpp"
 #include "common/bus/bus.h"
+#include "common/bus/epoch.h"
 #include "common/bus/node.h"
 #include "services/prediction/observation_window.h"
 #include "services/prediction/predictor.h"
@@ -58,6 +59,7 @@ class PredictionNode : public bus::Node {
   Predictor predictor_;
   ObservationWindow window_;
   ReplanTrigger trigger_;
+  bus::Epoch epoch_;
   std::vector<world::Obstacle> obstacles_;
   double obstacles_time_ = 0.0;             // s since origin
   std::optional<int64_t> origin_;           // utime that the core's seconds count from

@@ -34,7 +34,8 @@ world::Obstacle ToObstacle(const world::MoverState& mover, int id) {
   Eigen::Matrix<double, Eigen::Dynamic, 3> rows(2, 3);
   rows << mover.solid.center.transpose(), kForecast * mover.velocity.transpose();
   obstacle.center.coefficients.swap(rows);
-  obstacle.position_variance = obstacle.velocity_variance = kVariance;
+  obstacle.position_covariance = obstacle.velocity_covariance =
+      kVariance * Eigen::Matrix3d::Identity();
   return obstacle;
 }
 
@@ -85,6 +86,7 @@ void TruthFeed::PublishPose(const Truth& truth, int64_t utime) {
 void TruthFeed::PublishTarget(const Truth& truth, int64_t utime) {
   const TargetState& target = truth.target;
   target_t message{};
+  message.existence = 1.0;
   message.utime = utime;
   message.state = target_t::TRACKING;
   bus::Set(message.mean, target.center);

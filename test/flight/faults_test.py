@@ -36,9 +36,10 @@ def faults(log):
     """(name, phase, mission time) of every FAULT."""
     for utime, name, data in lcmlog.read(log):
         if name == "FAULT":
-            length = struct.unpack_from(">i", data, 20)[0]
-            text = data[24:24 + length - 1].decode()
-            yield text, data[24 + length], round(utime * 1e-6 - START, 3)
+            at = lcmlog.after_head(data)
+            length = struct.unpack_from(">i", data, at)[0]
+            text = data[at + 4:at + 3 + length].decode()
+            yield text, data[at + 4 + length], round(utime * 1e-6 - START, 3)
 
 
 class Faults(unittest.TestCase):

@@ -25,11 +25,10 @@ LISTENS = {
     "control": ["PLAN", "POSE"],
     "simulator": ["ATTITUDE_SETPOINT"],
 }
-# Where the first double of a message stands behind the fingerprint, utime and seq.
-FIRST_DOUBLE = {"IMU": 20, "POSE": 20, "TARGET": 21, "ATTITUDE_SETPOINT": 20,
-                "SCAN_REGISTERED": 20}
+# Where the first double of a message stands behind what all begin with.
+FIRST_DOUBLE = {"IMU": 0, "POSE": 4, "TARGET": 5, "ATTITUDE_SETPOINT": 0, "SCAN_REGISTERED": 4}
 # Where an array's length stands.
-LENGTH = {"LIDAR_SCAN": 20, "OBSTACLES": 20, "SCAN_REGISTERED": 77, "CAMERA_IMAGE": 44}
+LENGTH = {"LIDAR_SCAN": 0, "OBSTACLES": 4, "SCAN_REGISTERED": 61, "CAMERA_IMAGE": 32}
 
 
 class Bus:
@@ -74,7 +73,7 @@ class Bus:
 
 
 def parse_status(data):
-    at = 20
+    at = lcmlog.after_head(data)
 
     def take(form):
         nonlocal at
@@ -92,7 +91,7 @@ def parse_status(data):
     text(), take("b"), text(), text(), text(), take("d"), take("d"), take("d")
     channels = {}
     for _ in range(take("i")):
-        name, received, _, malformed, _ = text(), take("q"), take("q"), take("q"), take("d")
+        name, received, _, _, malformed, _ = text(), *(take("q") for _ in range(4)), take("d")
         channels[name] = (received, malformed)
     return channels
 
@@ -104,10 +103,10 @@ def attacks(channel, good):
         yield good[:n]
     yield bytes([good[0] ^ 0x55]) + good[1:]
     if channel in FIRST_DOUBLE:
-        at = FIRST_DOUBLE[channel]
+        at = lcmlog.after_head(good) + FIRST_DOUBLE[channel]
         yield good[:at] + NAN + good[at + 8:]
     if channel in LENGTH:
-        at = LENGTH[channel]
+        at = lcmlog.after_head(good) + LENGTH[channel]
         for length in (b"\xff\xff\xff\xff", b"\x80\x00\x00\x00", b"\x7f\xff\xff\xff"):
             yield good[:at] + length + good[at + 4:]
 

@@ -121,8 +121,8 @@ void Score::Judge(const Obstacle& o, const world::MoverState& truth, double t, i
                   MoverScore* score) const {
   const double error = (o.center.Velocity(t) - truth.velocity).head<2>().norm();
   const double away = (o.center.Position(t) - truth.solid.center).head<2>().norm();
-  const double velocity_nees = 0.5 * error * error / std::max(1e-6, o.velocity_variance);
-  const double center_nees = 0.5 * away * away / std::max(1e-6, o.position_variance);
+  const double velocity_nees = 0.5 * error * error / std::max(1e-6, o.velocity_covariance(0, 0));
+  const double center_nees = 0.5 * away * away / std::max(1e-6, o.position_covariance(0, 0));
   ++score->judged;
   score->velocity_nees += velocity_nees;
   score->center_nees += center_nees;
@@ -142,8 +142,8 @@ void Score::Trace(const Shot& shot, const Obstacle& o, int owner, const std::vec
   const double t = shot.sweep.t;
   const Vector3d p = o.center.Position(t), v = o.center.Velocity(t);
   fmt::print("{:7.2f} id {} at {:6.2f} {:6.2f} v {:5.2f} {:5.2f} sigma {:.2f} {:.2f}", t,
-             o.id & 0xffff, p.x(), p.y(), v.x(), v.y(), std::sqrt(o.position_variance),
-             std::sqrt(o.velocity_variance));
+             o.id & 0xffff, p.x(), p.y(), v.x(), v.y(), std::sqrt(o.position_covariance(0, 0)),
+             std::sqrt(o.velocity_covariance(0, 0)));
   if (owner >= 0) {
     const auto k = static_cast<size_t>(owner);
     const Vector3d dp = p - shot.movers[k].solid.center, dv = v - shot.movers[k].velocity;

@@ -31,15 +31,16 @@ SLICES = {
     "control": (["PLAN", "POSE"], ["ATTITUDE_SETPOINT"], 20.0, 22.0, 1),
     "simulator": (["ATTITUDE_SETPOINT"], ["TRUTH", "IMU"], 1.0, 5.0, 1),
 }
-# Where a cloud's size stands, and how many float and byte arrays follow.
-CLOUDS = {"LIDAR_SCAN": (20, 4, 2), "SCAN_REGISTERED": (77, 3, 2)}
+# Bytes between a cloud's head and its size, and how many float and byte arrays follow.
+CLOUDS = {"LIDAR_SCAN": (0, 4, 2), "SCAN_REGISTERED": (61, 3, 2)}
 
 
 def thin(channel, data, step):
     """Keeps every step-th group of 16 points, which is a column of a sweep."""
     if channel not in CLOUDS or step == 1:
         return data
-    at, n_float, n_byte = CLOUDS[channel]
+    offset, n_float, n_byte = CLOUDS[channel]
+    at = lcmlog.after_head(data) + offset
     size, = struct.unpack_from(">i", data, at)
     keep = [i for i in range(size) if i // 16 % step == 0]
     out, pos = data[:at] + struct.pack(">i", len(keep)), at + 4

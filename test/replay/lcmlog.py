@@ -22,3 +22,15 @@ def write(path, events):
         for number, (utime, channel, data) in enumerate(events):
             name = channel.encode()
             f.write(struct.pack(">IqqII", SYNC, number, utime, len(name), len(data)) + name + data)
+
+
+def after_head(data):
+    """Where the fields go on that every message begins with: stamp, number, sender, vehicle, start, inputs."""
+    def skip_string(at):
+        return at + 4 + struct.unpack_from(">i", data, at)[0]
+    at = skip_string(skip_string(20)) + 8
+    inputs, = struct.unpack_from(">i", data, at)
+    at += 4
+    for _ in range(inputs):
+        at = skip_string(at) + 4
+    return at

@@ -48,7 +48,7 @@ TEST(MappingMover, IsFoundTrackedAndForgotten) {
         ids.insert(o.id);
         if (found < 0.0) found = t;
         EXPECT_EQ(o.center.degree(), 1);
-        EXPECT_GT(o.velocity_variance, 0.0);
+        EXPECT_GT(o.velocity_covariance(0, 0), 0.0);
         if (t < found + 1.0 || t > end) continue;
         const double error = (o.center.Velocity(t).head<2>() - Eigen::Vector2d(0, speed)).norm();
         const bool hidden = std::abs(scene.Place(t).y()) < 4.2;  // by the trunk in front, in part

@@ -23,8 +23,9 @@ TEST(MakeBody, IsNoSmallerThanTheObstacle) {
     Obstacle o;
     o.shape = axes * half.cwiseAbs2().cwiseInverse().asDiagonal() * axes.transpose();
     o.shape = (0.5 * (o.shape + o.shape.transpose())).eval();
-    o.position_variance = 0.01;
-    o.velocity_variance = 0.04;
+    o.center.start = 0.4;
+    o.position_covariance = 0.01 * Matrix3d::Identity();
+    o.velocity_covariance = 0.04 * Matrix3d::Identity();
     const Body body = MakeBody(o, 1.0, 2.5, 2.0);
     using Long = Eigen::Matrix<long double, 3, 3>;
     const Long L = o.shape.cast<long double>().llt().matrixL();
@@ -37,7 +38,7 @@ TEST(MakeBody, IsNoSmallerThanTheObstacle) {
       ASSERT_LE(of_body, y.squaredNorm() * (1.0L + 1e-9L)) << seed;
     }
     const Vector3d n = Vector3d::UnitX();
-    EXPECT_NEAR(Deviation(body, n, 0.4), std::sqrt(0.01 + 0.04), 1e-12);
+    EXPECT_NEAR(Deviation(body, n, 0.4), std::sqrt(0.01 + 0.04 * 1.6 * 1.6), 1e-12);
   }
 }
 
