@@ -8,6 +8,7 @@
 #include "logs/src/export.h"
 #include "logs/src/import.h"
 #include "logs/src/info.h"
+#include "logs/src/migrate.h"
 
 namespace {
 
@@ -22,9 +23,10 @@ struct Arguments {
 
 /// What is written is not what is read: nothing is lost by a slip.
 void RefuseSame(const std::string& in, const std::string& out) {
-  std::error_code none;  // neither need exist
-  if (std::filesystem::equivalent(in, out, none))
-    throw std::runtime_error(out + " is the file that is read; name another for the output");
+  std::error_code none;                                   // neither need exist
+  for (const std::string& written : {out, out + ".tmp"})  // bus::PartFile's name meanwhile
+    if (std::filesystem::equivalent(in, written, none))
+      throw std::runtime_error(written + " is the file that is read; name another for the output");
 }
 
 void AddInfo(CLI::App* app, Arguments* a) {
@@ -74,6 +76,19 @@ void AddExport(CLI::App* app, Arguments* a) {
   sub->callback([a] { RunExport(*a); });
 }
 
+void RunMigrate(const Arguments& a) {
+  RefuseSame(a.in, a.out);
+  std::fputs(Format(MigrateLog(a.in, a.out)).c_str(), stdout);
+}
+
+void AddMigrate(CLI::App* app, Arguments* a) {
+  auto* sub = app->add_subcommand(
+      "migrate", "Brings a log that an older version recorded to today's messages.");
+  sub->add_option("OLD", a->in, "LCM log")->required();
+  sub->add_option("NEW", a->out, "LCM log to write")->required();
+  sub->callback([a] { RunMigrate(*a); });
+}
+
 /// Any number compares false with NaN, so that CLI's own ranges take it.
 std::string ToleranceProblem(const std::string& text) {
   double value = 0.0;
@@ -101,7 +116,7 @@ void AddDiff(CLI::App* app, Arguments* a, int* exit_code) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app{"Shows, imports, exports and compares LCM logs."};
+  CLI::App app{"Shows, imports, exports, compares and migrates LCM logs."};
   app.name("chase-log");
   app.set_version_flag("--version", CHASE_VERSION);
   app.require_subcommand(1);
@@ -111,6 +126,7 @@ int main(int argc, char** argv) {
   AddImport(&app, &arguments);
   AddExport(&app, &arguments);
   AddDiff(&app, &arguments, &exit_code);
+  AddMigrate(&app, &arguments);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {

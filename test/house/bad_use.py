@@ -189,6 +189,14 @@ class BadUse(unittest.TestCase):
         for flag in ("--metrics", "--log"):
             self.assert_refused(run("chase-flight", gym, flag, "/no/such/file"), "/no/such/file")
 
+    def test_tools_output_that_is_the_input(self):
+        self.tools()
+        log = self.file("").with_name("flight.lcm.tmp")  # what flight.lcm is while being written
+        log.write_bytes(bytes.fromhex("eda1da01"))
+        for out in (log, log.with_suffix("")):
+            self.assert_refused(run("chase-log", "migrate", log, out), log, "name another")
+        self.assertEqual(log.read_bytes(), bytes.fromhex("eda1da01"))
+
     def test_scripts(self):
         nothing = self.file("[]")
         for script, *arguments in (

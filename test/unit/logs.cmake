@@ -7,3 +7,19 @@ chase_test(logs_metrics_test
 chase_test(logs_report_test
   LIBS report
   SOURCES ${CMAKE_CURRENT_LIST_DIR}/logs_report_test.cpp)
+
+# Every message's name and the fingerprint that lcm-gen gave it.
+get_directory_property(types DIRECTORY ${CMAKE_SOURCE_DIR}/lcmtypes DEFINITION types)
+set(includes "")
+set(fingerprints "")
+foreach(type IN LISTS types)
+  string(APPEND includes "#include \"chase/${type}_t.hpp\"\n")
+  string(APPEND fingerprints "{\"${type}_t\", chase::${type}_t::getHash()},\n")
+endforeach()
+file(CONFIGURE OUTPUT migrate_test/all_types.h CONTENT "${includes}")
+file(CONFIGURE OUTPUT migrate_test/fingerprints.inc CONTENT "${fingerprints}")
+chase_test(logs_migrate_test
+  LIBS log_tools
+  SOURCES ${CMAKE_CURRENT_LIST_DIR}/logs_migrate_test.cpp
+          ${CMAKE_CURRENT_LIST_DIR}/logs_migrate_rules_test.cpp)
+target_include_directories(logs_migrate_test PRIVATE ${CMAKE_CURRENT_BINARY_DIR}/migrate_test)
