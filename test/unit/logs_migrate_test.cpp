@@ -252,6 +252,28 @@ TEST(Migrate, RefusesEveryPrefixAndAByteTooMany) {
   }
 }
 
+TEST(Migrate, RefusesLengthsThatCannotBe) {
+  const char* was = "struct in_t { byte b; } struct a_t { int32_t n; in_t in[n]; string s; }";
+  const char* now =
+      "struct in_t { byte b; } struct a_t { int32_t n; in_t in[n]; byte x[n]; string s; }";
+  const Schema old(was);
+  const auto fate_of = [&](int64_t n, const std::string& string) {
+    Record record = Zero(old, *old.Find("a_t"));
+    record.Set("n", {static_cast<double>(n)});
+    record.values.at("s").bytes = string;
+    Bytes bytes = Wire(old, "a_t", record);
+    return Migrator(now, {was}).Migrate("A", &bytes);
+  };
+  const std::string ok = BigEndian(2, 4) + "a" + '\0';
+  EXPECT_EQ(fate_of(0, ok), Fate::kMigrated);
+  EXPECT_EQ(fate_of(-1, ok), Fate::kMalformed);
+  EXPECT_EQ(fate_of(INT32_MIN, ok), Fate::kMalformed);
+  EXPECT_EQ(fate_of(INT32_MAX, ok), Fate::kMalformed);
+  EXPECT_EQ(fate_of(0, BigEndian(0, 4)), Fate::kMalformed);
+  EXPECT_EQ(fate_of(0, BigEndian(0xFFFFFFFF, 4)), Fate::kMalformed);
+  EXPECT_EQ(fate_of(0, BigEndian(2, 4) + "ab"), Fate::kMalformed);  // no zero at the end
+}
+
 TEST(Migrate, WhateverBytesComeTheResultIsWhole) {
   const Schema old(kOld), today(kNew);
   const Migrator migrator(kNew, {kOld});
