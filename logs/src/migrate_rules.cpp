@@ -47,21 +47,13 @@ void PredictionExistence(const Source& source, Value* value) {
   value->SetNumbers({source.old.Number("verdict") == 2.0 ? 0.0 : 1.0});  // NO_TARGET
 }
 
-/// Standstill where the plan ends.
-void Stop(const Source& source, Value* value) {
-  const Value* position = source.old.Find("position");
-  if (!position || position->records.size() != 1 || value->records.size() != 1) return;
-  const Record& from = position->records[0];
-  Record& stop = value->records[0];
-  std::vector<double> end(3, 0.0);  // at tau = 1: the sum of the rows
-  if (const Value* coefficients = from.Find("coefficients")) {
-    const std::vector<double> rows = coefficients->Numbers();
-    for (size_t i = 0; i < rows.size(); ++i) end[i % 3] += rows[i];
-  }
-  stop.Set("utime", {from.Number("utime")});
-  stop.Set("duration", {1.0});
-  stop.Set("coefficients", end);
+/// The map around knows no more of it than the world does.
+void LocalCovariance(const Source& source, Value* value) {
+  if (const Value* covariance = source.old.Find("covariance"))
+    value->SetNumbers(covariance->Numbers());
 }
+
+void NotCertified(const Source&, Value* value) { value->SetNumbers({-1.0}); }
 
 }  // namespace
 
@@ -70,10 +62,12 @@ Rule RuleFor(const std::string& type, const std::string& member) {
       {"obstacle_t.position_covariance", PositionCovariance},
       {"obstacle_t.velocity_covariance", VelocityCovariance},
       {"obstacle_t.orientation", NoRotation},
+      {"obstacle_t.existence", One},
       {"target_t.existence", TargetExistence},
       {"prediction_t.existence", PredictionExistence},
       {"attitude_setpoint_t.motors", One},
-      {"plan_t.stop", Stop},
+      {"plan_t.certified_clearance", NotCertified},
+      {"pose_t.local_covariance", LocalCovariance},
   };
   if (member == "sender") return Sender;  // of every message
   const auto it = rules.find(type + "." + member);

@@ -15,22 +15,25 @@ using Doubles = std::vector<double>;
 
 /// What the first version's messages became next, as far as there are rules.
 constexpr char kNext[] = R"(
-  struct input_t { string channel; int64_t utime; }
+  struct input_t { string channel; int32_t seq; }
   struct polynomial_t {
     int64_t utime; double duration; int32_t n_coefficients; double coefficients[n_coefficients]; }
-  struct imu_t { int64_t utime; int32_t seq; string sender; int64_t sender_start; string vehicle;
+  struct imu_t { int64_t utime; int32_t seq; string sender; string vehicle; int64_t sender_start;
     int32_t n_inputs; input_t inputs[n_inputs]; double accel[3]; double gyro[3]; }
   struct status_t { int64_t utime; int32_t seq; string sender; string name; }
-  struct obstacle_t { int32_t id; int8_t shape_kind; polynomial_t center; double shape[6];
-    double half[3]; double orientation[4];
-    double position_covariance[6]; double velocity_covariance[6]; }
+  struct obstacle_t { int32_t id; polynomial_t center; double shape[6]; int8_t solid;
+    double half[3]; double orientation[4]; double position_covariance[6];
+    double velocity_covariance[6]; double existence; }
   struct obstacles_t { int64_t utime; int32_t seq; string sender;
     int32_t n_obstacles; obstacle_t obstacles[n_obstacles]; }
   struct target_t { int64_t utime; int8_t state; double existence; }
   struct prediction_t { int64_t utime; int8_t verdict; double existence;
     double velocity_covariance[9]; }
   struct attitude_setpoint_t { int64_t utime; double orientation[4]; int8_t motors; }
-  struct plan_t { int64_t utime; polynomial_t position; polynomial_t stop; })";
+  struct pose_t { int64_t utime; double covariance[81]; double local_covariance[81]; }
+  struct proof_t { double from; }
+  struct plan_t { int64_t utime; polynomial_t position; double certified_clearance;
+    int32_t n_proofs; proof_t proofs[n_proofs]; polynomial_t stop; })";
 
 const std::string& First() {
   static const std::string text = LcmHistory().at(0);
@@ -97,9 +100,10 @@ TEST(MigrateRules, AnObstaclesVariancesBecomeCovariances) {
   EXPECT_EQ(now.Number("id"), 12.0);
   EXPECT_EQ(Numbers(now, "position_covariance"), Doubles({0.25, 0, 0, 0.25, 0, 0.25}));
   EXPECT_EQ(Numbers(now, "velocity_covariance"), Doubles({4, 0, 0, 4, 0, 4}));
-  EXPECT_EQ(Numbers(now, "shape_kind"), Doubles({0}));
+  EXPECT_EQ(Numbers(now, "solid"), Doubles({0}));
   EXPECT_EQ(Numbers(now, "half"), Doubles({0, 0, 0}));
   EXPECT_EQ(Numbers(now, "orientation"), Doubles({1, 0, 0, 0}));
+  EXPECT_EQ(now.Number("existence"), 1.0);
 }
 
 TEST(MigrateRules, WhatWasSeenOrForecastExists) {
@@ -128,19 +132,26 @@ TEST(MigrateRules, TheMotorsWereOnAndTheAttitudeStays) {
   EXPECT_EQ(Numbers(out, "orientation"), Doubles({0.6, 0.8, 0.0, 0.0}));
 }
 
-TEST(MigrateRules, APlanStopsWhereItEnds) {
+TEST(MigrateRules, APlanIsNotCertifiedAndHasNoStop) {
   Record plan = Blank("plan_t");
   Record& position = plan.values.at("position").records.at(0);
   position.Set("utime", {1234567890123456.0});
-  position.Set("duration", {2.0});
-  position.Set("coefficients", {1, 2, 3, 10, 20, 30, 100, 200, 300});
+  position.Set("coefficients", {1, 2, 3, 10, 20, 30});
   const Record out = Migrated("PLAN", "plan_t", plan);
-  const Record& stop = out.Find("stop")->records.at(0);
-  EXPECT_EQ(stop.Find("utime")->Integer(), 1234567890123456);
-  EXPECT_EQ(stop.Number("duration"), 1.0);
-  EXPECT_EQ(stop.Number("n_coefficients"), 3.0);
-  EXPECT_EQ(Numbers(stop, "coefficients"), Doubles({111, 222, 333}));
-  EXPECT_EQ(Numbers(out.Find("position")->records.at(0), "coefficients").size(), 9U);
+  EXPECT_LT(out.Number("certified_clearance"), 0.0);
+  EXPECT_EQ(out.Find("stop")->records.at(0).Number("n_coefficients"), 0.0);
+  EXPECT_TRUE(out.Find("proofs")->records.empty());
+  const Record& now = out.Find("position")->records.at(0);
+  EXPECT_EQ(now.Find("utime")->Integer(), 1234567890123456);
+  EXPECT_EQ(Numbers(now, "coefficients"), Doubles({1, 2, 3, 10, 20, 30}));
+}
+
+TEST(MigrateRules, APosesLocalCovarianceIsTheWhole) {
+  Record pose = Blank("pose_t");
+  Doubles covariance(81);
+  for (size_t i = 0; i < covariance.size(); ++i) covariance[i] = 0.1 * static_cast<double>(i);
+  pose.Set("covariance", covariance);
+  EXPECT_EQ(Numbers(Migrated("POSE", "pose_t", pose), "local_covariance"), covariance);
 }
 
 /// The first version's channels, each with a message of zeros.
