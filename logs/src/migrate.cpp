@@ -66,7 +66,6 @@ Migrator::Migrator(const std::string& today, const std::vector<std::string>& his
 
 Fate Migrator::Migrate(const std::string& channel, std::vector<uint8_t>* message) const {
   if (message->size() < kFingerprintBytes) return Fate::kMalformed;
-  const std::string bytes(message->begin(), message->end());
   uint64_t fingerprint = 0;
   for (size_t i = 0; i < kFingerprintBytes; ++i) fingerprint = fingerprint << 8 | (*message)[i];
   const auto known = known_.find(static_cast<int64_t>(fingerprint));
@@ -75,7 +74,8 @@ Fate Migrator::Migrate(const std::string& channel, std::vector<uint8_t>* message
   if (schema == &today_) return Fate::kKept;
   try {
     const Struct& to = *today_.Find(from->name);
-    const Record old = Decode(*schema, *from, bytes.substr(kFingerprintBytes));
+    const std::string body(message->begin() + kFingerprintBytes, message->end());
+    const Record old = Decode(*schema, *from, body);
     const std::string out =
         BigEndian(static_cast<uint64_t>(today_.Fingerprint(to)), kFingerprintBytes) +
         Encode(today_, to, Convert(channel, to, old));
