@@ -71,6 +71,27 @@ Vector3d SupportPoint(const Body& body, const Vector3d& n) {
   return Vector3d::Zero();
 }
 
+Vector3d Outwards(const Body& body, const Vector3d& offset) {
+  Vector3d n = offset;
+  if (body.kind == Body::Kind::kEllipsoid) {
+    n = body.shape.ldlt().solve(offset);
+  } else {
+    // The face that is the nearest of all, by what it is exceeded by.
+    const bool box = body.kind == Body::Kind::kBox;
+    const Vector3d x = box ? Vector3d(body.shape.transpose() * offset) : offset;
+    const double across = box ? std::abs(x.x()) : x.head<2>().norm();
+    const double beyond[3] = {across - body.half.x(),
+                              box ? std::abs(x.y()) - body.half.y() : -HUGE_VAL,
+                              std::abs(x.z()) - body.half.z()};
+    const auto a = std::max_element(beyond, beyond + 3) - beyond;
+    n = std::copysign(1.0, x[a]) * Vector3d::Unit(a);
+    if (!box && a == 0) n << x.head<2>(), 0.0;
+    if (box) n = body.shape * n;
+  }
+  const double length = n.norm();
+  return length > 0.0 && std::isfinite(length) ? Vector3d(n / length) : Vector3d::UnitZ();
+}
+
 double Deviation(const Body& body, const Vector3d& n, double tau) {
   double variance = 0.0;
   for (int k = 2; k >= 0; --k) variance = variance * tau + n.dot(body.covariance[k] * n);

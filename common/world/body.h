@@ -45,6 +45,10 @@ Body MakeBody(const Obstacle& obstacle, double start, double duration, double si
 /// zero.
 Eigen::Vector3d SupportPoint(const Body& body, const Eigen::Vector3d& n);
 
+/// Unit normal of the body's surface where a point at `offset` from its centre, inside or out, is
+/// to leave it: of the level set of the solid that the point lies on.
+Eigen::Vector3d Outwards(const Body& body, const Eigen::Vector3d& offset);
+
 /// Standard deviation of the body's position along n at tau, times |n|, m.
 double Deviation(const Body& body, const Eigen::Vector3d& n, double tau);
 

@@ -7,6 +7,7 @@
 #include "common/math/exact.h"
 #include "services/planning/limits.h"
 #include "services/planning/product_weights.h"
+#include "services/planning/separations.h"
 #include "services/planning/sturm_check.h"
 
 namespace chase::planning {
@@ -210,7 +211,7 @@ bool IsFeasible(const Curve& plan, const Problem& problem, double sight_from, bo
     if (!IsSafe(plan, e, arithmetic) ||
         !IsInSight(plan, problem.target, e, sight_from, exact, arithmetic))
       return false;
-  return true;
+  return StaysOff(plan, problem, sight_from);
 }
 
 std::string SampleFaults(const Curve& plan, const Problem& problem, double sight_from, int n) {

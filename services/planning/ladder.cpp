@@ -9,7 +9,9 @@
 #include "services/planning/field_of_view.h"
 #include "services/planning/limits.h"
 #include "services/planning/refinement.h"
+#include "services/planning/separations.h"
 #include "services/planning/skeletons.h"
+#include "services/planning/stopping.h"
 
 namespace chase::planning {
 namespace {
@@ -45,13 +47,17 @@ class Ladder : public Planner {
     std::string notes;
     MakeProblem(config_, request, &notes, &problem_);
     used_ = &problem_;
+    sight_from_ = 0.0;
     PlanResult result;
-    if (!TryChase(request, &notes, &result) && !TryKeep(request, &result) &&
-        !TrySafeOnly(request, &result))
-      Brake(request, &result);
+    const auto finish = [&] { return Certify(request, &result); };
+    if (!(TryChase(request, &notes, &result) && finish()) &&
+        !(TryKeep(request, &result) && finish()) && !(TrySafeOnly(request, &result) && finish()))
+      Rest(request, &result);
     if (!notes.empty()) {
       if (IsInSightVerdict(result.verdict) && WeakensSight(*used_))
         result.verdict = Verdict::kSafeOnly;
+      if (result.verdict != Verdict::kBrake && StartsInside(*used_))
+        result.verdict = Verdict::kEscape;
       result.reason += (result.reason.empty() ? "" : "; ") + notes;
     }
     result.yaw = FitYaw(result.trajectory, request.target, request.yaw, config_.max_yaw_rate);
@@ -71,6 +77,27 @@ class Ladder : public Planner {
  private:
   static bool IsInSightVerdict(Verdict v) {
     return v == Verdict::kChase || v == Verdict::kWider || v == Verdict::kKept;
+  }
+  // The proofs of a plan for whoever flies it, and its way out; false where it has none.
+  bool Certify(const PlanRequest& request, PlanResult* result) const {
+    const auto& obstacles = used_->obstacles;
+    const bool asked = used_->target_body || std::any_of(obstacles.begin(), obstacles.end(),
+                                                         [](const auto& e) { return e.solid; });
+    if (!asked && !obstacles.empty()) return true;
+    auto proofs = ProveOff(Curve(result->trajectory.coefficients), *used_, sight_from_);
+    if (!proofs) return false;
+    auto stop = WayOut(config_, request, result->trajectory);
+    if (!stop) return false;
+    SetProofs(config_, std::move(*proofs), result);
+    result->stop = std::move(stop->trajectory);
+    result->stop_proofs = std::move(stop->proofs);
+    return true;
+  }
+
+  static bool StartsInside(const Problem& problem) {
+    const auto inside = [](const Ellipsoid& e) { return e.safety_from > 0.0; };
+    return (problem.target_body && inside(*problem.target_body)) ||
+           std::any_of(problem.obstacles.begin(), problem.obstacles.end(), inside);
   }
   static bool WeakensSight(const Problem& problem) {
     return std::any_of(problem.obstacles.begin(), problem.obstacles.end(), [](const Ellipsoid& e) {
@@ -197,9 +224,9 @@ class Ladder : public Planner {
   // The problem over a shorter horizon, where that is asked for.
   Problem* Over(const PlanRequest& request, double horizon, bool tight, std::string* notes) {
     if (horizon == request.horizon && !tight) return &problem_;
-    PlanRequest shorter = request;
-    shorter.horizon = horizon;
-    MakeProblem(tight ? tight_ : config_, shorter, notes, &shorter_);
+    part_ = request;
+    part_.horizon = horizon;
+    MakeProblem(tight ? tight_ : config_, part_, notes, &shorter_);
     return &shorter_;
   }
 
@@ -255,12 +282,15 @@ class Ladder : public Planner {
     if (!request.running || request.running->end() - request.t0 < 0.3 ||
         !IsCertified(request, *request.running))
       return false;
-    const PlanRequest rest = OverRestOf(request, *request.running);
-    const Curve curve = ToCurve(*request.running, rest.t0, rest.horizon);
+    part_ = OverRestOf(request, *request.running);
+    const Curve curve = ToCurve(*request.running, part_.t0, part_.horizon);
     result->verdict = Verdict::kKept;
     result->reason = "no candidate is feasible, the running plan still is";
-    result->trajectory = ToTrajectory(curve, rest.t0, rest.horizon);
-    result->cost = Evaluate(config_, MakeProblem(config_, rest, nullptr), curve);
+    result->trajectory = ToTrajectory(curve, part_.t0, part_.horizon);
+    result->cost = Evaluate(config_, MakeProblem(config_, part_, nullptr), curve);
+    MakeProblem(tight_, part_, nullptr, &shorter_);
+    used_ = &shorter_;
+    sight_from_ = 0.0;
     return true;
   }
 
@@ -268,11 +298,13 @@ class Ladder : public Planner {
   bool TrySafeOnly(const PlanRequest& request, PlanResult* result) {
     result->verdict = Verdict::kSafeOnly;
     problem_.limits.tan_elevation = 0.0;
+    if (problem_.target_body) problem_.limits.min_distance = 0.0;
     placer_.Place(Layout::kCautious, &problem_);
     problem_.reach.reset();
     for (double sight_from : {0.25, 0.5, 0.75, 1.0}) {
       if (!TrySearch(problem_, sight_from, std::nullopt, result)) continue;
       Take(request, problem_, result);
+      sight_from_ = sight_from;
       result->reason = sight_from < 1.0 ? "no candidate keeps sight; this one has it from " +
                                               std::to_string(static_cast<int>(100 * sight_from)) +
                                               " % of the horizon on"
@@ -282,14 +314,17 @@ class Ladder : public Planner {
     return false;
   }
 
-  void Brake(const PlanRequest& request, PlanResult* result) {
-    bool safe = false;
-    result->verdict = Verdict::kBrake;
-    result->trajectory = BrakePlan(config_, request, &safe);
-    result->reason = safe ? "no candidate is safe" : "no candidate is safe, nor is braking";
-    PlanRequest rest = request;
-    rest.horizon = result->trajectory.duration;
-    result->cost = Evaluate(config_, MakeProblem(config_, rest, nullptr),
+  void Rest(const PlanRequest& request, PlanResult* result) {
+    PlanResult rest = RestPlan(config_, request);
+    rest.reason = "no candidate is safe" + (rest.reason.empty() ? "" : ", " + rest.reason);
+    rest.generated = result->generated;
+    rest.checked = result->checked;
+    rest.feasible = result->feasible;
+    *result = std::move(rest);
+    used_ = &problem_;
+    part_ = request;
+    part_.horizon = result->trajectory.duration;
+    result->cost = Evaluate(config_, MakeProblem(config_, part_, nullptr),
                             Curve(result->trajectory.coefficients));
   }
 
@@ -300,64 +335,16 @@ class Ladder : public Planner {
   Refiner refiner_;
   PlanProof proof_;
   Problem problem_, shorter_;      ///< over the whole horizon, over a part of it
+  PlanRequest part_;               ///< what shorter_ was made from
   const Problem* used_ = nullptr;  ///< of the two, the one whose plan is taken
+  double sight_from_ = 0.0;        ///< of that plan
   bool refinable_ = false;
 };
-
-Curve BrakeCurve(const world::State& s, double T) {
-  const Eigen::Vector3d b0 = s.p, b1 = b0 + T / 5.0 * s.v;
-  const Eigen::Vector3d b2 = 2.0 * b1 - b0 + T * T / 20.0 * s.a;
-  const Eigen::Vector3d b3 = 3.0 * b2 - 3.0 * b1 + b0 + T * T * T / 60.0 * s.j;
-  const Eigen::Vector3d b[6] = {b0, b1, b2, b3, b3, b3};
-  Curve c = Curve::Zero(6, 3);
-  for (int k = 0; k <= 5; ++k)
-    for (int i = 0; i <= k; ++i) {
-      double weight = (k - i) % 2 ? -1.0 : 1.0;
-      for (int m = 0; m < k; ++m) weight *= (5.0 - m) / (m + 1.0);
-      for (int m = 0; m < i; ++m) weight *= (k - m) / (m + 1.0);
-      c.row(k) += weight * b[i].transpose();
-    }
-  return c;
-}
-
-double Clearance(const Curve& plan, const Problem& problem) {
-  double low = HUGE_VAL;
-  for (int i = 1; i <= 30; ++i)
-    for (const Ellipsoid& e : problem.obstacles) {
-      const Eigen::Vector3d d = Evaluate(plan, i / 30.0) - Evaluate(e.center, i / 30.0);
-      low = std::min(low, d.dot(e.safety * d));
-    }
-  return low;
-}
 
 }  // namespace
 
 std::unique_ptr<Planner> MakeLadder(const PlannerConfig& config, std::unique_ptr<Search> search) {
   return std::make_unique<Ladder>(config, std::move(search));
-}
-
-world::Trajectory BrakePlan(const PlannerConfig& config, const PlanRequest& request, bool* safe) {
-  constexpr double kTimes[] = {0.6, 0.8, 1.0, 1.3, 1.7, 2.2, 3.0};
-  world::Trajectory best = world::Trajectory::Constant(request.start.p, request.t0, 1.0);
-  double best_clearance = -1.0;
-  // Braking may leave the heights as far as the quickest way of it must.
-  const auto heights = ToPoints(BrakeCurve(request.start, kTimes[0]), 5).col(2);
-  for (double T : kTimes) {
-    PlanRequest rest = request;
-    rest.horizon = T;
-    Problem problem = MakeProblem(config, rest, nullptr);
-    problem.limits.tan_elevation = problem.limits.min_distance = 0.0;
-    problem.limits.z_min = std::min(problem.limits.z_min, heights.minCoeff() - 1e-6);
-    problem.limits.z_max = std::max(problem.limits.z_max, heights.maxCoeff() + 1e-6);
-    const Curve curve = BrakeCurve(request.start, T);
-    *safe = curve.allFinite() && IsFeasible(curve, problem, 1.0, false, Arithmetic::kCertified);
-    if (*safe) return ToTrajectory(curve, request.t0, T);
-    const double clearance = Clearance(curve, problem);
-    if (clearance <= best_clearance) continue;
-    best_clearance = clearance;
-    best = ToTrajectory(curve, request.t0, T);
-  }
-  return best;
 }
 
 }  // namespace chase::planning

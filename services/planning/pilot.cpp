@@ -4,7 +4,8 @@
 #include <cmath>
 
 #include "common/math/rotation.h"
-#include "services/planning/ladder.h"
+#include "common/world/ages.h"
+#include "services/planning/stopping.h"
 
 namespace chase::planning {
 namespace {
@@ -35,6 +36,21 @@ PlanResult Waiting(const std::string& reason, const world::Trajectory& trajector
   return result;
 }
 
+// The target's upright cylinder where it is forecast to be.
+std::optional<world::Obstacle> TargetBody(const Forecast& f) {
+  if (!(f.radius > 0.0 && f.height > 0.0)) return std::nullopt;
+  world::Obstacle body;
+  body.id = kTargetId;
+  body.moving = true;
+  body.center = f.target;
+  body.solid = world::Obstacle::Solid::kCylinder;
+  body.half = {f.radius, f.radius, 0.5 * f.height};
+  body.shape = body.half.cwiseAbs2().cwiseInverse().asDiagonal();
+  body.position_covariance.diagonal().setConstant(f.sigma * f.sigma);
+  body.velocity_covariance.diagonal().setConstant(f.speed_sigma * f.speed_sigma);
+  return body;
+}
+
 bool IsFinite(const PlanResult& plan) {
   if (!plan.trajectory.coefficients.allFinite()) return false;
   return std::all_of(plan.yaw.begin(), plan.yaw.end(), [](double y) { return std::isfinite(y); });
@@ -50,7 +66,8 @@ void Pilot::SetForecast(const Forecast& forecast) {
   news_ = true;
 }
 
-void Pilot::SetObstacles(double /*t*/, std::vector<world::Obstacle> obstacles) {
+void Pilot::SetObstacles(double t, std::vector<world::Obstacle> obstacles) {
+  obstacles_time_ = t;
   obstacles_ = std::move(obstacles);
   obstacles_changed_ = true;
 }
@@ -59,6 +76,10 @@ void Pilot::ChangeFrame() {
   forecast_.reset();
   obstacles_.clear();
   has_running_ = false;
+}
+
+bool Pilot::SeesObstacles(double t) const {
+  return t - obstacles_time_ <= world::kMostAge.obstacles;
 }
 
 bool Pilot::HasTarget(double t) const {
@@ -79,8 +100,9 @@ std::optional<PlanResult> Pilot::Update(double t, const BodyEstimate& body) {
     news_ = news_ || !planner_->IsCertified(Request(t0, start), running_.trajectory);
   }
   if (!IsDue(t)) return std::nullopt;
-  PlanResult plan = airborne_ && HasTarget(t) ? Chase(t0, start) : Wait(t0, start, body);
-  if (!IsFinite(plan)) plan = Hover(t0, {{body.p}, {body.yaw, 0.0}});
+  PlanResult plan =
+      airborne_ && HasTarget(t) && SeesObstacles(t) ? Chase(t0, start) : Wait(t0, start, body);
+  if (!IsFinite(plan)) plan = Rest(t0, {{body.p}, {body.yaw, 0.0}});
   running_ = plan;
   has_running_ = true;
   last_planned_ = t;
@@ -117,6 +139,8 @@ PlanRequest Pilot::Request(double t0, const Start& start) const {
   if (!forecast_ || !forecast_->has_target) return request;
   request.target = forecast_->target;
   request.target_sigma = forecast_->sigma;
+  request.target_speed_sigma = forecast_->speed_sigma;
+  request.target_body = TargetBody(*forecast_);
   request.horizon = std::clamp(forecast_->target.end() - t0, kShortestHorizon, config_.horizon);
   if (start.on_plan) request.running = running_.trajectory;  // off it, it is no way out
   return request;
@@ -142,6 +166,7 @@ PlanResult Pilot::Wait(double t0, const Start& start, const BodyEstimate& body) 
     return same;
   }
   airborne_ = true;
+  if (!SeesObstacles(t0 - config_.latency)) return Rest(t0, start);
   if (HasTarget(t0 - config_.latency)) return Chase(t0, start);
   return had_target_ ? BrakeAndLook(t0, start) : Hover(t0, start);
 }
@@ -152,25 +177,31 @@ PlanResult Pilot::Climb(double t0, const Start& start) const {
                  {start.yaw.yaw});
 }
 
+// Braking while it moves; else where it is, for as long as that can be certified.
+PlanResult Pilot::Rest(double t0, const Start& start) const {
+  PlanResult plan = RestPlan(config_.planner, Request(t0, start));
+  plan.yaw = {start.yaw.yaw};
+  if (plan.reason.empty() && IsAtRest(start.state)) plan.verdict = Verdict::kWait;
+  if (SeesObstacles(t0 - config_.latency)) return plan;
+  plan.proofs.clear();  // of a world that nobody has seen for a while
+  plan.certified_clearance = -1.0;
+  plan.reason = "obstacles are not heard of" + (plan.reason.empty() ? "" : "; " + plan.reason);
+  return plan;
+}
+
 PlanResult Pilot::Hover(double t0, const Start& start) const {
-  return Waiting("nothing to chase yet",
-                 world::Trajectory::Constant(start.state.p, t0, kHoverDuration), {start.yaw.yaw});
+  PlanResult plan = Rest(t0, start);
+  if (plan.verdict == Verdict::kWait) plan.reason = "nothing to chase yet";
+  return plan;
 }
 
 PlanResult Pilot::BrakeAndLook(double t0, const Start& start) const {
-  const YawStart turning{start.yaw.yaw, search_turn_ * config_.search_yaw_rate};
-  if (IsAtRest(start.state))
-    return Waiting("target lost, looking around",
-                   world::Trajectory::Constant(start.state.p, t0, kHoverDuration),
-                   TurningYaw(turning, kHoverDuration));
-  PlanRequest request = Request(t0, start);
-  bool safe = false;
-  PlanResult result;
-  result.verdict = Verdict::kBrake;
-  result.trajectory = BrakePlan(config_.planner, request, &safe);
-  result.reason = safe ? "target lost" : "target lost, braking is not certified safe";
-  result.yaw = TurningYaw(turning, result.trajectory.duration);
-  return result;
+  PlanResult plan = Rest(t0, start);
+  plan.yaw =
+      TurningYaw({start.yaw.yaw, search_turn_ * config_.search_yaw_rate}, plan.trajectory.duration);
+  plan.reason = (plan.verdict == Verdict::kWait ? "target lost, looking around" : "target lost") +
+                (plan.reason.empty() ? "" : ", " + plan.reason);
+  return plan;
 }
 
 }  // namespace chase::planning

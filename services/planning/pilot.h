@@ -13,10 +13,12 @@ namespace chase::planning {
 
 /// The newest forecast of the target. Times in seconds from the pilot's origin.
 struct Forecast {
-  double t = 0.0;            ///< made for this instant, s
-  bool has_target = false;   ///< false: nothing to chase
-  world::Trajectory target;  ///< p_WT(t)
-  double sigma = 0.0;        ///< largest standard deviation of the position at t, m
+  double t = 0.0;                     ///< made for this instant, s
+  bool has_target = false;            ///< false: nothing to chase
+  world::Trajectory target;           ///< p_WT(t)
+  double sigma = 0.0;                 ///< largest standard deviation of the position at t, m
+  double speed_sigma = 0.0;           ///< and of the velocity, m/s
+  double radius = 0.0, height = 0.0;  ///< of the target's upright cylinder, m; 0: not known
 };
 
 /// The body as estimated, frame W.
@@ -34,6 +36,8 @@ class Pilot {
 
   void SetForecast(const Forecast& forecast);
   void SetObstacles(double t, std::vector<world::Obstacle> obstacles);
+  /// Control says that it flies: a planner that has just been started must not take off again.
+  void SetAirborne() { airborne_ = airborne_ || !has_running_; }
 
   /// Forgets all that was said in the frame W that was: forecast, obstacles, the running plan.
   void ChangeFrame();
@@ -60,12 +64,15 @@ class Pilot {
   PlanResult Wait(double t0, const Start& start, const BodyEstimate& body);
   PlanResult Climb(double t0, const Start& start) const;
   PlanResult Hover(double t0, const Start& start) const;
+  PlanResult Rest(double t0, const Start& start) const;
+  bool SeesObstacles(double t) const;
   PlanResult BrakeAndLook(double t0, const Start& start) const;
 
   PlanningConfig config_;
   std::unique_ptr<Planner> planner_;
   std::optional<Forecast> forecast_;
   std::vector<world::Obstacle> obstacles_;
+  double obstacles_time_ = -1e9;  ///< s
   PlanResult running_;
   bool has_running_ = false;
   double last_planned_ = -1e9;

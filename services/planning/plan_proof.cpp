@@ -6,6 +6,7 @@
 
 #include "services/planning/candidate_set.h"
 #include "services/planning/certificate.h"
+#include "services/planning/separations.h"
 
 namespace chase::planning {
 namespace {
@@ -178,8 +179,7 @@ bool PlanProof::Holds(const Curve& plan, bool exactly) {
     small = small_ && MakeLocal(plan, degree_, &p);
   }
   if (!usable_) return false;
-  if (rows_.empty()) return true;
-  const bool bounds = small && linear_;
+  const bool bounds = small && linear_ && !rows_.empty();
   if (bounds) {
     for (int i = 0; i <= degree_; ++i) std::copy(p.point[i], p.point[i] + 3, input_.plan[i]);
     input_.size = std::max(p.size, target_.size) + center_size_ + origin_.cwiseAbs().maxCoeff();
@@ -189,7 +189,7 @@ bool PlanProof::Holds(const Curve& plan, bool exactly) {
     if (bounds && cleared_[j]) continue;
     if (!RowHolds(rows_[j], plan, small ? &p : nullptr, exactly)) return false;
   }
-  return true;
+  return StaysOff(plan, *problem_, sight_from_);
 }
 
 }  // namespace chase::planning

@@ -9,7 +9,8 @@
 namespace chase::planning {
 
 const char* Name(Verdict verdict) {
-  constexpr const char* kNames[] = {"CHASE", "WIDER", "KEPT", "SAFE_ONLY", "BRAKE", "WAIT"};
+  constexpr const char* kNames[] = {"CHASE", "WIDER", "KEPT",  "SAFE_ONLY",
+                                    "BRAKE", "WAIT",  "ESCAPE"};
   return kNames[static_cast<int>(verdict)];
 }
 

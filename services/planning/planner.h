@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "common/world/obstacle.h"
+#include "common/world/separation_check.h"
 #include "common/world/state.h"
 #include "common/world/trajectory.h"
 #include "services/planning/planner_config.h"
@@ -15,18 +16,43 @@
 namespace chase::planning {
 
 /// Rung of the ladder that the plan stands on; the numbers of plan_t.
-enum class Verdict { kChase = 0, kWider = 1, kKept = 2, kSafeOnly = 3, kBrake = 4, kWait = 5 };
+enum class Verdict {
+  kChase = 0,
+  kWider = 1,
+  kKept = 2,
+  kSafeOnly = 3,
+  kBrake = 4,
+  kWait = 5,
+  kEscape = 6,
+};
 const char* Name(Verdict verdict);
+
+/// Proof that the drone's ball, or the hull of it and the target's, stays off one obstacle over
+/// [from, 1] of a plan: off the Minkowski sum of the solid, its uncertainty as it grows, and the
+/// balls.
+struct Proof {
+  int obstacle = 0;  ///< its id; kTargetId: the target's body
+  bool of_sight = false;
+  double from = 0.0;                                           ///< tau
+  double radius = 0.0;                                         ///< of the ball about the drone, m
+  math::Polynomial target_radius = math::Polynomial::Zero(2);  ///< sight: about the target, m
+  std::vector<world::Separation> separations;
+  double room = 0.0;  ///< least that it proves beyond the radius, m
+};
+inline constexpr int kTargetId = -1;
 
 /// One chasing problem (Jeon 2021, Problem 2). Frame W; times in seconds from a common origin.
 struct PlanRequest {
-  double t0 = 0.0;                              ///< start of the horizon, s
-  double horizon = 2.5;                         ///< T, s
-  world::State start;                           ///< at t0
-  std::optional<YawStart> yaw;                  ///< at t0; none: towards the target
-  world::Trajectory target;                     ///< p_WT(t)
-  double target_sigma = 0.0;                    ///< largest standard deviation of p_WT, m
-  std::vector<world::Obstacle> obstacles;       ///< at their true size
+  double t0 = 0.0;                             ///< start of the horizon, s
+  double horizon = 2.5;                        ///< T, s
+  world::State start;                          ///< at t0
+  std::optional<YawStart> yaw;                 ///< at t0; none: towards the target
+  world::Trajectory target;                    ///< p_WT(t)
+  double target_sigma = 0.0;                   ///< largest standard deviation of p_WT at t0, m
+  double target_speed_sigma = 0.0;             ///< and of its velocity, m/s
+  std::vector<world::Obstacle> obstacles;      ///< at their true size
+  std::optional<world::Obstacle> target_body;  ///< what the drone must not touch of the target
+  bool asks_sight = true;
   std::optional<world::Trajectory> running;     ///< the plan being flown, if any
   std::vector<world::Trajectory> running_rest;  ///< its further pieces, in order, if it has any
 };
@@ -49,6 +75,13 @@ struct PlanResult {
   std::vector<world::Trajectory> rest;
   std::vector<double> yaw;  ///< power basis in tau, unwrapped, rad
   bool in_field = false;    ///< certified: the bearing stays within max_bearing_deg of the yaw
+  /// That the trajectory keeps off all obstacles; none where it is not certified, or where they
+  /// stand for ellipsoids without margins, for which the search's own certificate is exact.
+  std::vector<Proof> proofs;
+  double certified_clearance = -1.0;  ///< least that they leave to the drone's sphere, m; below 0:
+                                      ///< not certified
+  std::optional<world::Trajectory> stop;  ///< from the trajectory to rest, certified by
+  std::vector<Proof> stop_proofs;
   Cost cost;
   int generated = 0;  ///< candidates in the set
   int checked = 0;    ///< candidates tested for feasibility

@@ -34,11 +34,11 @@ std::string PlannerConfig::Problem() const {
                                                          {"cost_min", cost_min},
                                                          {"cost_max", cost_max},
                                                          {"drone_radius", drone_radius},
+                                                         {"tracking_tube", tracking_tube},
                                                          {"safety_margin", safety_margin},
                                                          {"sight_margin", sight_margin},
                                                          {"refine_room", refine_room},
                                                          {"sigmas", sigmas},
-                                                         {"max_inflation", max_inflation},
                                                          {"max_speed", max_speed},
                                                          {"max_acceleration", max_acceleration},
                                                          {"min_distance", min_distance}};
@@ -58,7 +58,7 @@ std::string PlannerConfig::Problem() const {
 PlannerConfig PlannerConfig::Literal() {
   PlannerConfig c;
   c.adaptive = c.refine = false;
-  c.drone_radius = c.safety_margin = c.sight_margin = c.sigmas = c.max_inflation = 0.0;
+  c.drone_radius = c.tracking_tube = c.safety_margin = c.sight_margin = c.sigmas = 0.0;
   c.max_speed = c.max_acceleration = c.max_elevation_deg = c.max_bearing_deg = 0.0;
   c.min_distance = 0.0;
   c.z_min = c.z_max = 0.0;

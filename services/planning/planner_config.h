@@ -24,10 +24,10 @@ struct PlannerConfig {
   double cost_min = 0.01, cost_max = 1.0, cost_range = 2.0;
 
   double drone_radius = 0.25;
-  double safety_margin = 0.15;
+  double tracking_tube = 0.12;
+  double safety_margin = 0.03;
   double sight_margin = 0.1;
-  double sigmas = 1.0;
-  double max_inflation = 0.3;
+  double sigmas = 2.0;
 
   double max_speed = 4.0;
   double max_acceleration = 6.0;
@@ -62,10 +62,10 @@ struct PlannerConfig {
     v("cost_max", cost_max, "obstacle cost at its centre [c_max]");
     v("cost_range", cost_range, "where it ends, in obstacle radii [l_s]");
     v("drone_radius", drone_radius, "of the drone's sphere, m");
-    v("safety_margin", safety_margin, "kept between that sphere and obstacles, m");
+    v("tracking_tube", tracking_tube, "the body stays this near to the plan, m");
+    v("safety_margin", safety_margin, "kept beyond sphere and tube where the start allows it, m");
     v("sight_margin", sight_margin, "kept between the line of sight and obstacles, m");
     v("sigmas", sigmas, "uncertain obstacles and targets are widened by this many deviations");
-    v("max_inflation", max_inflation, "greatest such widening, m");
     v("max_speed", max_speed, "m/s; 0: no limit");
     v("max_acceleration", max_acceleration, "m/s^2; 0: no limit");
     v("z_min", z_min, "lowest height of a plan, m; z_min = z_max: no limits");
@@ -76,6 +76,8 @@ struct PlannerConfig {
     v("min_distance", min_distance, "from the drone to the target's centre, m; 0: no limit");
     v("max_yaw_rate", max_yaw_rate, "of the plan's yaw, rad/s");
   }
+  /// Of what has to stay clear in any case: sphere and tube, m.
+  double hard_radius() const { return drone_radius + tracking_tube; }
   std::string Problem() const;
 
   /// Problem 2 as the paper states it: no inflation, no limits, fixed layout, no refinement.

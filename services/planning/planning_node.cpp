@@ -32,6 +32,26 @@ polynomial_t At(const Eigen::Vector3d& p, int64_t utime, double duration) {
   return m;
 }
 
+std::vector<proof_t> ToMessage(const std::vector<Proof>& proofs) {
+  std::vector<proof_t> out;
+  for (const Proof& proof : proofs) {
+    proof_t m{};
+    m.obstacle = proof.obstacle;
+    m.of = proof.of_sight ? proof_t::SIGHT : proof_t::SAFETY;
+    m.from = proof.from;
+    m.radius = proof.radius;
+    for (int k = 0; k < 2; ++k) m.target_radius[k] = proof.target_radius[k];
+    for (const world::Separation& s : proof.separations) {
+      separation_t plane{s.from, s.to, {}};
+      bus::Set(plane.normal, s.normal);
+      m.separations.push_back(plane);
+    }
+    m.n_separations = static_cast<int32_t>(m.separations.size());
+    out.push_back(m);
+  }
+  return out;
+}
+
 plan_t ToMessage(const PlanResult& plan, int64_t origin) {
   plan_t m{};
   m.utime = bus::Utime(plan.trajectory.start, origin);
@@ -45,15 +65,24 @@ plan_t ToMessage(const PlanResult& plan, int64_t origin) {
   m.generated = plan.generated;
   m.checked = plan.checked;
   m.feasible = plan.feasible;
+  m.certified_clearance = plan.certified_clearance;
+  m.proofs = ToMessage(plan.proofs);
+  m.n_proofs = static_cast<int32_t>(m.proofs.size());
+  if (plan.stop) m.stop = bus::ToMessage(*plan.stop, origin);
+  m.stop_proofs = ToMessage(plan.stop_proofs);
+  m.n_stop_proofs = static_cast<int32_t>(m.stop_proofs.size());
   return m;
 }
 
 }  // namespace
 
 PlanningNode::PlanningNode(bus::Bus& bus, const PlanningConfig& config)
-    : bus_(bus), pilot_(config) {
+    : bus_(bus), config_(config), pilot_(config) {
   bus_.Subscribe<prediction_t>("PREDICTION", [this](const prediction_t& m) { OnPrediction(m); });
   bus_.Subscribe<obstacles_t>("OBSTACLES", [this](const obstacles_t& m) { OnObstacles(m); });
+  bus_.Subscribe<tracking_t>("TRACKING", [this](const tracking_t& m) {
+    if (m.following != tracking_t::NONE) pilot_.SetAirborne();
+  });
   bus_.Subscribe<pose_t>("POSE", [this](const pose_t& m) { OnPose(m); });
 }
 
@@ -68,6 +97,9 @@ void PlanningNode::OnPrediction(const prediction_t& message) {
   if (forecast.has_target) {
     forecast.target = bus::FromMessage(message.target, origin);
     forecast.sigma = LargestSigma(bus::ToMatrix(message.covariance));
+    forecast.speed_sigma = LargestSigma(bus::ToMatrix(message.velocity_covariance));
+    forecast.radius = message.radius;
+    forecast.height = message.height;
     target_ = message.target;
   }
   pilot_.SetForecast(forecast);
@@ -102,6 +134,8 @@ void PlanningNode::OnPose(const pose_t& message) {
 void PlanningNode::Send(const PlanResult& plan) {
   plan_t m = ToMessage(plan, *origin_);
   m.epoch = epoch_.value();
+  m.hard_radius = config_.planner.hard_radius();
+  m.sigmas = config_.planner.sigmas;
   m.n_obstacles = pilot_.n_obstacles();
   m.target = target_.n_coefficients > 0
                  ? target_

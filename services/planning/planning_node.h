@@ -7,6 +7,7 @@
 #include "chase/plan_t.hpp"
 #include "chase/pose_t.hpp"
 #include "chase/prediction_t.hpp"
+#include "chase/tracking_t.hpp"
 #include "common/bus/bus.h"
 #include "common/bus/epoch.h"
 #include "common/bus/node.h"
@@ -28,6 +29,7 @@ class PlanningNode : public bus::Node {
   int64_t Origin(int64_t utime);
 
   bus::Bus& bus_;
+  PlanningConfig config_;
   Pilot pilot_;
   bus::Epoch epoch_;
   std::optional<int64_t> origin_;  // utime that the core's seconds count from

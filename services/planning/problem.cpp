@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "services/planning/candidate_set.h"
+#include "services/planning/separations.h"
 
 namespace chase::planning {
 namespace {
@@ -16,11 +17,13 @@ constexpr double kLeaveBy = 0.25;  // tau by which a plan has left an obstacle t
 
 double SquaredNorm(const Eigen::Matrix3d& R, const Eigen::Vector3d& x) { return x.dot(R * x); }
 
-double Uncertainty(const PlannerConfig& config, const world::Obstacle& o, double duration) {
-  const double half = 0.5 * duration;
-  const double sigma = std::sqrt(o.position_covariance.diagonal().maxCoeff() +
-                                 o.velocity_covariance.diagonal().maxCoeff() * half * half);
-  return std::min(config.max_inflation, config.sigmas * sigma);
+// Deviations of the obstacle's position along the worst axis, times sigmas, at tau.
+double Uncertainty(const world::Obstacle& o, const Problem& problem, double tau) {
+  if (o.position_covariance.isZero(0.0) && o.velocity_covariance.isZero(0.0)) return 0.0;
+  const double age = problem.t0 + tau * problem.duration - o.center.start;
+  const Eigen::Vector3d variance =
+      o.position_covariance.diagonal() + age * age * o.velocity_covariance.diagonal();
+  return problem.sigmas * std::sqrt(std::max(0.0, variance.maxCoeff()));
 }
 
 constexpr int kSamples = 24;
@@ -99,47 +102,90 @@ struct FirstSight {
   }
 };
 
-// What the shapes of all obstacles are grown by, m.
-struct Margins {
+// What the ellipsoids are grown by, m.
+struct Growth {
   double safety, sight;
 };
 
-// The whole margins; at no cost where the obstacle is what it was.
-void Grow(const world::Obstacle& o, const Margins& margins, Ellipsoid* e) {
-  if (e->grown_by[0] == margins.safety && e->grown_by[1] == margins.sight &&
+// Boxes around the Minkowski sums: half the sides of the solid's, and what it is grown by at most.
+void SetBoxes(const world::Obstacle& o, const Growth& most, Ellipsoid* e) {
+  Eigen::Array3d half = HalfSidesOf(o.shape);
+  if (o.solid == world::Obstacle::Solid::kBox)
+    half = (o.axes.toRotationMatrix().cwiseAbs() * o.half).array();
+  else if (o.solid == world::Obstacle::Solid::kCylinder)
+    half = o.half.array();
+  e->safety_half = half + most.safety;
+  e->sight_half = half + most.sight;
+}
+
+// At no cost where the obstacle is what it was.
+void Grow(const world::Obstacle& o, const Growth& growth, Ellipsoid* e) {
+  if (e->grown_by[0] == growth.safety && e->grown_by[1] == growth.sight &&
       IsSameShape(e->grown_from, o.shape))
     return;
   e->safety = e->sight = o.shape;
-  if (margins.safety > 0.0 || margins.sight > 0.0) {
+  if (growth.safety > 0.0 || growth.sight > 0.0) {
     const world::Inflation inflation(o.shape);
-    if (margins.safety > 0.0) e->safety = inflation.By(margins.safety);
-    if (margins.sight > 0.0) e->sight = inflation.By(margins.sight);
+    if (growth.safety > 0.0) e->safety = inflation.By(growth.safety);
+    if (growth.sight > 0.0) e->sight = inflation.By(growth.sight);
   }
-  e->safety_half = HalfSidesOf(e->safety);
-  e->sight_half = HalfSidesOf(e->sight);
   e->grown_from = o.shape;
-  e->grown_by[0] = margins.safety;
-  e->grown_by[1] = margins.sight;
+  e->grown_by[0] = growth.safety;
+  e->grown_by[1] = growth.sight;
 }
 
 Eigen::Matrix3d Grown(const world::Obstacle& o, double margin) {
   return margin > 0.0 ? world::Inflated(o.shape, margin) : o.shape;
 }
 
-// Takes the safety margin back until the start is outside.
-void RelaxSafety(const world::Obstacle& o, double margin, const Problem& problem, Ellipsoid* e,
-                 std::string* notes) {
-  const Eigen::Vector3d offset = (problem.start.row(0) - e->center.row(0)).transpose();
+// Margins that give way at the start: whether what stands at tau = 0 is off the obstacle.
+class Start {
+ public:
+  explicit Start(const Problem& problem) : problem_(problem) {
+    start_.center = problem.start.topRows(1);
+    seen_.center = problem.target.topRows(1);
+  }
+  bool IsSafe(const Ellipsoid& e, double radius) {
+    if (!e.solid) {
+      const Eigen::Vector3d offset = (problem_.start.row(0) - e.center.row(0)).transpose();
+      return SquaredNorm(e.safety, offset) > 1.0;
+    }
+    start_.radius = math::Polynomial::Constant(1, radius);
+    return IsOff(e, nullptr);
+  }
+  bool IsInSight(const Ellipsoid& e, double share) {
+    start_.radius = math::Polynomial::Constant(1, share * problem_.sight_radius);
+    seen_.radius = TargetBall(problem_, share).radius.head(1);
+    return IsOff(e, &seen_);
+  }
+
+ private:
+  // Off by a little more than nothing, so that a plan can be, too.
+  bool IsOff(const Ellipsoid& e, const world::Ball* target) {
+    world::Body body = BodyOf(e, problem_);
+    body.center = body.center.topRows(1).eval();
+    body.covariance[1].setZero();
+    body.covariance[2].setZero();
+    start_.radius[0] += kRounding;
+    return world::Separate(start_, target, body).kept == world::Kept::kOff;
+  }
+  static constexpr double kRounding = 1e-4;  // m
+  const Problem& problem_;
+  world::Ball start_, seen_;
+};
+
+// Takes the margin, never the hard radius, back until the start is outside.
+void RelaxSafety(const world::Obstacle& o, double hard, double margin, double uncertainty,
+                 Start* start, Ellipsoid* e, std::string* notes) {
   for (double share : kShares) {
+    e->safety_radius = hard + share * margin;
     if (share < 1.0) {
-      e->safety = Grown(o, share * margin);
-      e->safety_half = HalfSidesOf(e->safety);
+      e->safety = Grown(o, e->safety_radius + uncertainty);
       e->grown_by[0] = -1.0;
     }
-    if (SquaredNorm(e->safety, offset) > (share > 0.0 ? kClear : 1.0)) {
-      if (share < 1.0) Note(notes, "starts within the margin of obstacle " + std::to_string(e->id));
-      return;
-    }
+    if (!start->IsSafe(*e, e->safety_radius)) continue;
+    if (share < 1.0) Note(notes, "starts within the margin of obstacle " + std::to_string(e->id));
+    return;
   }
   e->safety_from = kLeaveBy;
   Note(notes, "starts inside obstacle " + std::to_string(e->id));
@@ -147,22 +193,32 @@ void RelaxSafety(const world::Obstacle& o, double margin, const Problem& problem
 
 // The largest share of the margin that the target keeps out of, and the line of sight at the start
 // too, where it keeps out of any.
-void RelaxSight(const world::Obstacle& o, double margin, const FirstSight& first,
-                const Hull& target, Ellipsoid* e, std::string* notes) {
+void RelaxSight(const world::Obstacle& o, const Growth& growth, const FirstSight& first,
+                const Hull& target, const Problem& problem, Start* start, Ellipsoid* e,
+                std::string* notes) {
+  const auto target_is_off = [&](double share) {
+    if (IsPlainlyOutside(target, e->center, e->sight_half)) return true;
+    if (!e->solid)
+      return StaysOutside(target.curve, e->center, e->sight, share > 0.0 ? kClear : 1.0);
+    return world::Separate(TargetBall(problem, share), nullptr, BodyOf(*e, problem)).kept ==
+           world::Kept::kOff;
+  };
+  const auto begins_in_sight = [&](double share) {
+    if (!first.IsBeyond(e->center, e->sight, e->sight_half, share > 0.0 ? kClear : 1.0))
+      return false;
+    return !e->solid || start->IsInSight(*e, share);
+  };
   double kept = -1.0;
   const auto take = [&](double share) {
-    e->sight = Grown(o, share * margin);
-    e->sight_half = HalfSidesOf(e->sight);
+    e->sight_share = share;
+    e->sight = Grown(o, share * growth.sight);
     e->grown_by[1] = -1.0;
   };
   for (double share : kShares) {
     if (share < 1.0) take(share);
-    const double clear = share > 0.0 ? kClear : 1.0;
-    if (!IsPlainlyOutside(target, e->center, e->sight_half) &&
-        !StaysOutside(target.curve, e->center, e->sight, clear))
-      continue;
+    if (!target_is_off(share)) continue;
     if (kept < 0.0) kept = share;
-    if (!first.IsBeyond(e->center, e->sight, e->sight_half, clear)) continue;
+    if (!begins_in_sight(share)) continue;
     if (share < kept)
       Note(notes, "sight starts within the margin of obstacle " + std::to_string(e->id));
     return;
@@ -179,15 +235,16 @@ double Overshoot(double v, double a, double brake) {
   return then > 0.0 ? std::max(0.0, v) * kMoment + then * then / (2.0 * brake) : 0.0;
 }
 
-// Limits that the start already breaks give way to just above what it has: the plan may not get
-// worse than that. Heights give way to what the start cannot help only, so that no chain of plans
-// sinks; speed and acceleration a little before, since catching up needs them.
+// Limits that the start already breaks give way to what it has: no chain of plans gets worse.
+// Heights give way to what the start cannot help only, so that none sinks.
 Limits MakeLimits(const PlannerConfig& c, const world::State& s, const Eigen::Vector3d& target) {
   constexpr double kRounding = 1e-6, kBrake = 2.0;  // m; m/s^2 where no limit is set
+  const auto at_least = [](double limit, double now) {
+    return limit > 0.0 ? std::max(limit, (1.0 + kRounding) * now + kRounding) : 0.0;
+  };
   Limits limits;
-  limits.speed = c.max_speed > 0.0 ? std::max(c.max_speed, 1.1 * s.v.norm() + 0.05) : 0.0;
-  limits.acceleration =
-      c.max_acceleration > 0.0 ? std::max(c.max_acceleration, 1.2 * s.a.norm() + 0.1) : 0.0;
+  limits.speed = at_least(c.max_speed, s.v.norm());
+  limits.acceleration = at_least(c.max_acceleration, s.a.norm());
   limits.height = c.z_max > c.z_min;
   const double brake = c.max_acceleration > 0.0 ? 0.5 * c.max_acceleration : kBrake;
   const double sink = Overshoot(-s.v.z(), -s.a.z(), brake),
@@ -211,6 +268,35 @@ Curve StartCurve(const world::State& s, double T) {
   return c;
 }
 
+// The target's own body, to which no margin is kept.
+void SetTargetBody(const world::Obstacle& o, double hard, Start* start, Problem* problem,
+                   std::string* notes) {
+  Ellipsoid e;
+  e.id = kTargetId;
+  e.solid = &o;
+  e.center = ToCurve(o.center, problem->t0, problem->duration);
+  e.grown_from = o.shape;
+  e.sight_from = 1.0;
+  e.safety_radius = hard;
+  const double most = std::max(Uncertainty(o, *problem, 0.0), Uncertainty(o, *problem, 1.0));
+  SetBoxes(o, {hard + most, 0.0}, &e);
+  if (!start->IsSafe(e, hard)) {
+    e.safety_from = kLeaveBy;
+    Note(notes, "starts at the target");
+  }
+  problem->target_body = e;
+}
+
+// A chord over the deviation, which is convex in tau.
+math::Polynomial TargetGrowth(const PlannerConfig& config, const PlanRequest& request) {
+  const double now = config.sigmas * request.target_sigma;
+  const double then = config.sigmas * std::hypot(request.target_sigma,
+                                                 request.target_speed_sigma * request.horizon);
+  math::Polynomial growth(2);
+  growth << now, then - now;
+  return growth;
+}
+
 }  // namespace
 
 int Problem::n_candidates() const {
@@ -221,6 +307,7 @@ int Problem::n_candidates() const {
 
 void MakeProblem(const PlannerConfig& config, const PlanRequest& request, std::string* notes,
                  Problem* problem) {
+  problem->t0 = request.t0;
   problem->duration = request.horizon;
   problem->degree = config.degree;
   problem->start = StartCurve(request.start, request.horizon);
@@ -229,25 +316,42 @@ void MakeProblem(const PlannerConfig& config, const PlanRequest& request, std::s
   problem->skeletons.clear();
   problem->reach.reset();
   problem->obstacles.resize(request.obstacles.size());
+  problem->sigmas = config.sigmas;
+  problem->sight_radius = config.sight_margin;
+  problem->target_growth = TargetGrowth(config, request);
+  const double sight = config.sight_margin + 0.5 * problem->target_growth.sum();
+  const double hard = config.hard_radius(), margin = config.safety_margin;
   const Hull target(problem->target);
   const FirstSight first(*problem);
+  Start start(*problem);
   const Box own{target.whole.low.min(first.box.low), target.whole.high.max(first.box.high)};
-  const double target_growth = std::min(config.max_inflation, config.sigmas * request.target_sigma);
   for (size_t j = 0; j < request.obstacles.size(); ++j) {
     const world::Obstacle& o = request.obstacles[j];
     Ellipsoid* e = &problem->obstacles[j];
     e->id = o.id;
-    e->safety_from = e->sight_from = 0.0;
+    e->safety_from = 0.0;
+    e->sight_from = request.asks_sight ? 0.0 : 1.0;
+    e->sight_share = 1.0;
+    e->safety_radius = hard + margin;
     SetCurve(o.center, request.t0, request.horizon, &e->center);
-    const Margins margins{
-        config.drone_radius + config.safety_margin + Uncertainty(config, o, problem->duration),
-        config.sight_margin + target_growth};
-    Grow(o, margins, e);
+    const double then = Uncertainty(o, *problem, 1.0), now = Uncertainty(o, *problem, 0.0);
+    const Growth growth{hard + margin + 0.5 * (now + then), sight + 0.5 * (now + then)};
+    Grow(o, growth, e);
+    const double most = std::max(now, then);
+    const Growth widest{hard + margin + most,
+                        config.sight_margin + problem->target_growth.sum() + most};
+    SetBoxes(o, widest, e);
+    const bool as_it_is = o.solid == world::Obstacle::Solid::kEllipsoid && !(widest.safety > 0.0) &&
+                          !(widest.sight > 0.0);
+    e->solid = as_it_is ? nullptr : &o;
     // Far from start and target no margin has to give way.
     if (!MayTouch(own, e->center, e->safety_half.max(e->sight_half), kClear)) continue;
-    RelaxSafety(o, margins.safety, *problem, e, notes);
-    RelaxSight(o, margins.sight, first, target, e, notes);
+    RelaxSafety(o, hard, margin, now, &start, e, notes);
+    if (!request.asks_sight) continue;
+    RelaxSight(o, growth, first, target, *problem, &start, e, notes);
   }
+  problem->target_body.reset();
+  if (request.target_body) SetTargetBody(*request.target_body, hard, &start, problem, notes);
 }
 
 Problem MakeProblem(const PlannerConfig& config, const PlanRequest& request, std::string* notes) {
@@ -257,7 +361,12 @@ Problem MakeProblem(const PlannerConfig& config, const PlanRequest& request, std
 }
 
 void WithRoom(const Problem& problem, double room, Enlargements* memory, Problem* roomy) {
+  roomy->t0 = problem.t0;
   roomy->duration = problem.duration;
+  roomy->sigmas = problem.sigmas;
+  roomy->sight_radius = problem.sight_radius;
+  roomy->target_growth = problem.target_growth;
+  roomy->target_body = problem.target_body;
   roomy->degree = problem.degree;
   roomy->start = problem.start;
   roomy->target = problem.target;
@@ -278,14 +387,14 @@ void WithRoom(const Problem& problem, double room, Enlargements* memory, Problem
     const Eigen::Vector3d offset = (problem.start.row(0) - e.center.row(0)).transpose();
     if (SquaredNorm(safety.shape, offset) > kClear) {
       e.safety = safety.shape;
-      e.safety_half = safety.half;
+      e.safety_half = e.safety_half.max(safety.half);
     }
     const Enlarged& sight = memory->Of(2 * j + 1, e.sight, room);
     if (first.IsBeyond(e.center, sight.shape, sight.half, kClear) &&
         (IsPlainlyOutside(target, e.center, sight.half) ||
          StaysOutside(problem.target, e.center, sight.shape, kClear))) {
       e.sight = sight.shape;
-      e.sight_half = sight.half;
+      e.sight_half = e.sight_half.max(sight.half);
     }
   }
 }

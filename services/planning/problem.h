@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "common/math/polynomial.h"
 #include "services/planning/enlargement.h"
 #include "services/planning/planner.h"
 
@@ -26,9 +27,15 @@ struct Ellipsoid {
   /// What the two are grown from and by, m; negative where a margin has given way.
   Eigen::Matrix3d grown_from = Eigen::Matrix3d::Zero();
   double grown_by[2] = {-1.0, -1.0};
-  double safety_from =
-      0.0;                  ///< tau from which safety is asked; above 0 only if the start is inside
+  /// tau from which safety is asked; above 0 only if the start is inside
+  double safety_from = 0.0;
   double sight_from = 0.0;  ///< tau from which sight is asked; 1: never
+  /// What the ellipsoids stand for, in the request; null: for themselves. Then they only sort out
+  /// candidates, and the proof is about the solid's Minkowski sums.
+  const world::Obstacle* solid = nullptr;
+  double safety_radius = 0.0;  ///< of the ball about the drone, m: hard radius and what is left of
+                               ///< the margin
+  double sight_share = 1.0;    ///< of the sight's margin and of the target's uncertainty
 };
 
 /// Limits of the plan; infinity (or nothing) where there is none.
@@ -48,11 +55,17 @@ struct Box {
 
 /// Problem 2 of Jeon 2021 in normalised time, ready to be searched.
 struct Problem {
+  double t0 = 0.0;        ///< of tau = 0, s
   double duration = 1.0;  ///< T, s
   int degree = 5;         ///< of the candidates
   Curve start;            ///< first four power coefficients of every candidate
   Curve target;
   std::vector<Ellipsoid> obstacles;
+  std::optional<Ellipsoid> target_body;  ///< to be kept off, like the obstacles; hides nothing
+  double sigmas = 0.0;                   ///< that covariances are taken by
+  double sight_radius = 0.0;             ///< margin of the line of sight, m
+  /// `sigmas` deviations of the target's position, from above: power coefficients in tau, m.
+  math::Polynomial target_growth = math::Polynomial::Zero(2);
   Limits limits;
   std::vector<std::vector<Eigen::Vector3d>> skeletons;  ///< [step][choice], frame W, m
   /// Holds the target and the plans that are considered; none: unlimited.
@@ -62,9 +75,9 @@ struct Problem {
   int n_candidates() const;
 };
 
-/// Puts the request into normalised time, grows the obstacles and relaxes what the start already
-/// breaks; `notes` gets one clause for each such relaxation that weakens the certificate. Leaves
-/// the skeletons empty.
+/// Keeps pointers into the request. Puts it into normalised time, grows the obstacles and relaxes
+/// what the start already breaks; `notes` gets one clause for each such relaxation that weakens the
+/// certificate. Leaves the skeletons empty.
 Problem MakeProblem(const PlannerConfig& config, const PlanRequest& request, std::string* notes);
 /// The same in the memory of an earlier problem.
 void MakeProblem(const PlannerConfig& config, const PlanRequest& request, std::string* notes,

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "services/planning/ladder.h"
+#include "services/planning/stopping.h"
 
 namespace chase::baselines {
 namespace {
@@ -111,8 +111,7 @@ planning::PlanResult KeepOrBrake(const planning::PlannerConfig& config,
     result.reason = why + "; flies on" + (fault.empty() ? "" : " although it " + fault);
     return result;
   }
-  bool safe = false;
-  result.trajectory = planning::BrakePlan(config, request, &safe);
+  result = planning::RestPlan(config, request);
   result.verdict = planning::Verdict::kBrake;
   result.reason = why + "; brakes";
   return result;

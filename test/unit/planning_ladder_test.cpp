@@ -4,9 +4,9 @@
 
 #include "services/planning/certificate.h"
 #include "services/planning/cost.h"
-#include "services/planning/ladder.h"
 #include "services/planning/planner.h"
 #include "services/planning/problem.h"
+#include "services/planning/stopping.h"
 
 namespace chase::planning {
 namespace {
@@ -205,9 +205,9 @@ TEST(Ladder, BrakingJustAboveTheLeastHeightIsSafeThoughItSinks) {
     PlanRequest request = Walk();
     request.start.p.z() = config.z_min + 0.01;
     request.start.v.z() = -speed;
-    bool safe = false;
-    const world::Trajectory brake = BrakePlan(config, request, &safe);
-    EXPECT_TRUE(safe) << speed;
+    const std::optional<Stop> stop = Brake(config, request);
+    ASSERT_TRUE(stop) << speed;
+    const world::Trajectory& brake = stop->trajectory;
     EXPECT_GT(brake.Position(brake.end()).z(), request.start.p.z() - 0.37 * speed - 1e-6);
   }
 }

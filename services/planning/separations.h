@@ -1,0 +1,28 @@
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "common/world/separation.h"
+#include "services/planning/problem.h"
+
+namespace chase::planning {
+
+/// Does the plan stay off the obstacles, and its line of sight from `sight_from` on? Obstacles that
+/// stand for no solid are not asked about; where the problem has a reach that holds the plan, nor
+/// are those that are not near.
+bool StaysOff(const Curve& plan, const Problem& problem, double sight_from);
+
+/// The proofs of that for all obstacles; nothing where it does not.
+std::optional<std::vector<Proof>> ProveOff(const Curve& plan, const Problem& problem,
+                                           double sight_from);
+
+/// The obstacle over the problem's time.
+world::Body BodyOf(const Ellipsoid& e, const Problem& problem);
+
+/// The drone's ball, and the target's end of the line of sight with its uncertainty; `share` of the
+/// latter.
+world::Ball DroneBall(const Curve& plan, double radius);
+world::Ball TargetBall(const Problem& problem, double share);
+
+}  // namespace chase::planning

@@ -1,0 +1,217 @@
+#include "services/planning/stopping.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "services/planning/candidate_set.h"
+#include "services/planning/limits.h"
+#include "services/planning/separations.h"
+
+namespace chase::planning {
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr double kTimes[] = {0.6, 0.8, 1.0, 1.3, 1.7, 2.2, 3.0};  // s, of a braking
+constexpr double kInTime = 0.05;  // s: contacts are sampled this often
+
+/// Ways to rest ask for safety alone.
+PlanRequest WithoutSight(const PlanRequest& request, const world::State& start, double t0) {
+  PlanRequest rest = request;
+  rest.t0 = t0;
+  rest.start = start;
+  rest.asks_sight = false;
+  rest.running.reset();
+  return rest;
+}
+
+/// Coefficients in Bernstein form of degree n that continue position, velocity, acceleration and
+/// jerk of s over T; the rest are zero.
+Points Continued(const world::State& s, double T, int n) {
+  Points b = Points::Zero();
+  const Vector3d d[4] = {s.p, T * s.v, T * T * s.a, T * T * T * s.j};
+  const double falling[4] = {1.0, 1.0 * n, n * (n - 1.0), n * (n - 1.0) * (n - 2.0)};
+  // Differences of order k at the start are d_k / falling_k.
+  Vector3d difference[4];
+  for (int k = 0; k < 4; ++k) difference[k] = d[k] / falling[k];
+  for (int i = 0; i < 4; ++i) {
+    Vector3d sum = Vector3d::Zero();
+    double binomial = 1.0;
+    for (int k = 0; k <= i; ++k) {
+      sum += binomial * difference[k];
+      binomial *= (i - k) / (k + 1.0);
+    }
+    b.row(i) = sum.transpose();
+  }
+  return b;
+}
+
+Curve BrakeCurve(const world::State& s, double T) {
+  Points b = Continued(s, T, 5);
+  b.row(4) = b.row(5) = b.row(3);
+  return ToPower(b, 5);
+}
+
+/// To rest at `end`.
+Curve CurveTo(const world::State& s, double T, const Vector3d& end) {
+  Points b = Continued(s, T, 6);
+  for (int i = 4; i <= 6; ++i) b.row(i) = end.transpose();
+  return ToPower(b, 6);
+}
+
+/// One state to come to rest from.
+class Resting {
+ public:
+  Resting(const PlannerConfig& config, const PlanRequest& request)
+      : config_(config), request_(request), heights_(BrakeCurve(request.start, kTimes[0])) {}
+
+  /// A certified way over T, if the curve is one.
+  std::optional<Stop> Certified(const Curve& curve, double T) {
+    SetProblem(T);
+    if (!curve.allFinite() || !KeepsLimits(curve, problem_) || !StaysOff(curve, problem_, 1.0))
+      return std::nullopt;
+    auto proofs = ProveOff(curve, problem_, 1.0);
+    if (!proofs) return std::nullopt;
+    return Stop{{request_.t0, T, curve}, std::move(*proofs), true};
+  }
+
+  /// Time of the first sampled contact, s, infinite where there is none, and the least clearance.
+  std::pair<double, double> Harm(const Curve& curve, double T) {
+    SetProblem(T);
+    double contact = HUGE_VAL, least = HUGE_VAL;
+    const int n = static_cast<int>(std::ceil(T / kInTime));
+    for (int i = 1; i <= n; ++i) {
+      const double tau = static_cast<double>(i) / n;
+      const Vector3d p = planning::Evaluate(curve, tau);
+      for (const Ellipsoid& e : problem_.obstacles) least = std::min(least, Off(e, p, tau));
+      if (problem_.target_body) least = std::min(least, Off(*problem_.target_body, p, tau));
+      if (least < config_.drone_radius && contact == HUGE_VAL) contact = tau * T;
+    }
+    return {contact, least};
+  }
+
+ private:
+  // Along the line to the centre; roughly, and only for comparison.
+  static double Off(const Ellipsoid& e, const Vector3d& p, double tau) {
+    const Vector3d d = p - planning::Evaluate(e.center, tau);
+    const double scale = std::sqrt(d.dot(e.grown_from * d));
+    return scale > 0.0 ? d.norm() * (1.0 - 1.0 / scale) : -HUGE_VAL;
+  }
+
+  void SetProblem(double T) {
+    if (problem_.duration == T && has_problem_) return;
+    has_problem_ = true;
+    request_.horizon = T;
+    MakeProblem(config_, request_, nullptr, &problem_);
+    Limits& l = problem_.limits;
+    l.tan_elevation = l.min_distance = 0.0;
+    // Braking may leave the heights as far as the quickest way of it must.
+    const auto heights = ToPoints(heights_, 5).col(2).head<6>();
+    l.z_min = std::min(l.z_min, heights.minCoeff() - 1e-6);
+    l.z_max = std::max(l.z_max, heights.maxCoeff() + 1e-6);
+  }
+
+  const PlannerConfig& config_;
+  PlanRequest request_;
+  Curve heights_;
+  Problem problem_;
+  bool has_problem_ = false;
+};
+
+/// Displacements of the place of rest by distance: none, then rings of directions, level, up and
+/// down.
+std::vector<Vector3d> Displacements() {
+  constexpr int kAround = 12;
+  std::vector<Vector3d> all;
+  for (const double r : {0.4, 0.8, 1.4, 2.2})
+    for (const double rise : {0.0, 0.5, -0.5})
+      for (int i = 0; i < kAround; ++i) {
+        const double angle = 2.0 * M_PI * i / kAround;
+        all.emplace_back(r * std::cos(angle), r * std::sin(angle), rise * r);
+      }
+  for (const double rise : {0.5, -0.5, 1.0, -1.0}) all.emplace_back(0.0, 0.0, rise);
+  std::stable_sort(all.begin(), all.end(), [](const Vector3d& a, const Vector3d& b) {
+    return a.squaredNorm() < b.squaredNorm();
+  });
+  return all;
+}
+
+}  // namespace
+
+std::optional<Stop> Brake(const PlannerConfig& config, const PlanRequest& request) {
+  Resting resting(config, WithoutSight(request, request.start, request.t0));
+  for (const double T : kTimes)
+    if (auto stop = resting.Certified(BrakeCurve(request.start, T), T)) return stop;
+  return std::nullopt;
+}
+
+Stop Evade(const PlannerConfig& config, const PlanRequest& request) {
+  static const std::vector<Vector3d> displacements = Displacements();
+  constexpr double kOver[] = {1.0, 1.6};
+  const PlanRequest rest = WithoutSight(request, request.start, request.t0);
+  Resting resting[] = {{config, rest}, {config, rest}};
+  Stop best;
+  std::pair<double, double> least{-HUGE_VAL, -HUGE_VAL};
+  const auto weigh = [&](Resting* way, const Curve& curve, double T) {
+    const std::pair<double, double> harm = way->Harm(curve, T);
+    if (!curve.allFinite() || harm <= least) return;
+    least = harm;
+    best.trajectory = {request.t0, T, curve};
+  };
+  for (const double T : {kTimes[0], kTimes[2], kTimes[4]}) {
+    Resting braking(config, rest);
+    weigh(&braking, BrakeCurve(request.start, T), T);
+  }
+  for (const Vector3d& d : displacements)
+    for (int i = 0; i < 2; ++i) {
+      const double T = kOver[i];
+      const Vector3d end = ToPoints(BrakeCurve(request.start, T), 5).row(5).transpose() + d;
+      const Curve curve = CurveTo(request.start, T, end);
+      if (auto stop = resting[i].Certified(curve, T)) return *stop;
+      weigh(&resting[i], curve, T);
+    }
+  if (best.trajectory.coefficients.rows() == 0)
+    best.trajectory = world::Trajectory::Constant(request.start.p, request.t0, 1.0);
+  return best;
+}
+
+void SetProofs(const PlannerConfig& config, std::vector<Proof> proofs, PlanResult* result) {
+  constexpr double kFarOff = 100.0;  // m: no obstacle at all
+  double least = kFarOff;
+  for (const Proof& p : proofs)
+    if (!p.of_sight) least = std::min(least, p.from > 0.0 ? 0.0 : p.radius + p.room);
+  result->certified_clearance = std::max(0.0, least - config.hard_radius());
+  result->proofs = std::move(proofs);
+}
+
+PlanResult RestPlan(const PlannerConfig& config, const PlanRequest& request) {
+  PlanResult result;
+  std::optional<Stop> stop = Brake(config, request);
+  result.verdict = Verdict::kBrake;
+  if (!stop) {
+    stop = Evade(config, request);
+    if (stop->certified) result.verdict = Verdict::kEscape;
+    result.reason = stop->certified ? "nor is braking" : "nor is braking, nor any way aside";
+  }
+  result.trajectory = std::move(stop->trajectory);
+  if (stop->certified) SetProofs(config, std::move(stop->proofs), &result);
+  return result;
+}
+
+std::optional<Stop> WayOut(const PlannerConfig& config, const PlanRequest& request,
+                           const world::Trajectory& plan) {
+  constexpr double kOverdue = 0.4;  // s: several periods of planning
+  PlannerConfig hard = config;
+  hard.safety_margin = 0.0;
+  for (const double after : {kOverdue, 0.2, 0.7, 1.1, HUGE_VAL}) {
+    const double t = std::min(plan.start + after, plan.end());
+    PlanRequest rest = request;
+    rest.t0 = t;
+    rest.start = plan.At(t);
+    if (auto stop = Brake(hard, rest)) return stop;
+    if (t == plan.end()) break;
+  }
+  return std::nullopt;
+}
+
+}  // namespace chase::planning

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "services/planning/planner.h"
+
+namespace chase::planning {
+
+/// A way to rest, and how well it is known to be clear.
+struct Stop {
+  world::Trajectory trajectory;
+  std::vector<Proof> proofs;
+  bool certified = false;
+};
+
+/// Comes to rest: b3 = b4 = b5 in Bernstein form, which continues position, velocity, acceleration
+/// and jerk and ends with none. Of several durations the shortest that is certified clear of
+/// obstacles and of the target's body within the limits. Sight is not asked for.
+std::optional<Stop> Brake(const PlannerConfig& config, const PlanRequest& request);
+
+/// Out of the way: comes to rest near where braking would, of all places tried the nearest that can
+/// be certified, also up and down. Where none can: the one whose first contact is the latest, then
+/// the one that stays farthest off; not certified.
+Stop Evade(const PlannerConfig& config, const PlanRequest& request);
+
+/// Brake, or else Evade, as a plan; the reason says what it is not.
+PlanResult RestPlan(const PlannerConfig& config, const PlanRequest& request);
+
+/// What the proofs leave to the drone's sphere goes with them.
+void SetProofs(const PlannerConfig& config, std::vector<Proof> proofs, PlanResult* result);
+
+/// Where `plan` can be left for a certified rest: as soon as a new plan is overdue, else sooner or
+/// later. Braking keeps the hard radius and gives up the margin. After FASTER, Tordesillas et al.
+/// 2019: a plan is flown only with such a way out.
+std::optional<Stop> WayOut(const PlannerConfig& config, const PlanRequest& request,
+                           const world::Trajectory& plan);
+
+}  // namespace chase::planning
