@@ -81,8 +81,9 @@ class Ladder : public Planner {
   // The proofs of a plan for whoever flies it, and its way out; false where it has none.
   bool Certify(const PlanRequest& request, PlanResult* result) const {
     const auto& obstacles = used_->obstacles;
-    const bool asked = used_->target_body || std::any_of(obstacles.begin(), obstacles.end(),
-                                                         [](const auto& e) { return e.solid; });
+    const bool asked =
+        used_->target_body || std::any_of(obstacles.begin(), obstacles.end(),
+                                          [](const auto& e) { return e.body.has_value(); });
     if (!asked && !obstacles.empty()) return true;
     auto proofs = ProveOff(Curve(result->trajectory.coefficients), *used_, sight_from_);
     if (!proofs) return false;

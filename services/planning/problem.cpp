@@ -146,7 +146,7 @@ class Start {
     seen_.center = problem.target.topRows(1);
   }
   bool IsSafe(const Ellipsoid& e, double radius) {
-    if (!e.solid) {
+    if (!e.body) {
       const Eigen::Vector3d offset = (problem_.start.row(0) - e.center.row(0)).transpose();
       return SquaredNorm(e.safety, offset) > 1.0;
     }
@@ -162,7 +162,7 @@ class Start {
  private:
   // Off by a little more than nothing, so that a plan can be, too.
   bool IsOff(const Ellipsoid& e, const world::Ball* target) {
-    world::Body body = BodyOf(e, problem_);
+    world::Body body = *e.body;
     body.center = body.center.topRows(1).eval();
     body.covariance[1].setZero();
     body.covariance[2].setZero();
@@ -198,15 +198,14 @@ void RelaxSight(const world::Obstacle& o, const Growth& growth, const FirstSight
                 std::string* notes) {
   const auto target_is_off = [&](double share) {
     if (IsPlainlyOutside(target, e->center, e->sight_half)) return true;
-    if (!e->solid)
+    if (!e->body)
       return StaysOutside(target.curve, e->center, e->sight, share > 0.0 ? kClear : 1.0);
-    return world::Separate(TargetBall(problem, share), nullptr, BodyOf(*e, problem)).kept ==
-           world::Kept::kOff;
+    return world::Separate(TargetBall(problem, share), nullptr, *e->body).kept == world::Kept::kOff;
   };
   const auto begins_in_sight = [&](double share) {
     if (!first.IsBeyond(e->center, e->sight, e->sight_half, share > 0.0 ? kClear : 1.0))
       return false;
-    return !e->solid || start->IsInSight(*e, share);
+    return !e->body || start->IsInSight(*e, share);
   };
   double kept = -1.0;
   const auto take = [&](double share) {
@@ -221,9 +220,15 @@ void RelaxSight(const world::Obstacle& o, const Growth& growth, const FirstSight
     if (!begins_in_sight(share)) continue;
     if (share < kept)
       Note(notes, "sight starts within the margin of obstacle " + std::to_string(e->id));
+    else if (share < 1.0)
+      Note(notes, "the target passes within the sight margin of obstacle " + std::to_string(e->id));
     return;
   }
-  if (kept >= 0.0) return take(kept);
+  if (kept >= 0.0) {
+    if (kept < 1.0)
+      Note(notes, "the target passes within the sight margin of obstacle " + std::to_string(e->id));
+    return take(kept);
+  }
   e->sight_from = 1.0;
   Note(notes, "obstacle " + std::to_string(e->id) + " holds the target, its shadow is ignored");
 }
@@ -273,7 +278,7 @@ void SetTargetBody(const world::Obstacle& o, double hard, Start* start, Problem*
                    std::string* notes) {
   Ellipsoid e;
   e.id = kTargetId;
-  e.solid = &o;
+  e.body = BodyOf(o, *problem);
   e.center = ToCurve(o.center, problem->t0, problem->duration);
   e.grown_from = o.shape;
   e.sight_from = 1.0;
@@ -343,7 +348,8 @@ void MakeProblem(const PlannerConfig& config, const PlanRequest& request, std::s
     SetBoxes(o, widest, e);
     const bool as_it_is = o.solid == world::Obstacle::Solid::kEllipsoid && !(widest.safety > 0.0) &&
                           !(widest.sight > 0.0);
-    e->solid = as_it_is ? nullptr : &o;
+    e->body.reset();
+    if (!as_it_is) e->body = BodyOf(o, *problem);
     // Far from start and target no margin has to give way.
     if (!MayTouch(own, e->center, e->safety_half.max(e->sight_half), kClear)) continue;
     RelaxSafety(o, hard, margin, now, &start, e, notes);

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "common/math/polynomial.h"
+#include "common/world/body.h"
 #include "services/planning/enlargement.h"
 #include "services/planning/planner.h"
 
@@ -30,9 +31,9 @@ struct Ellipsoid {
   /// tau from which safety is asked; above 0 only if the start is inside
   double safety_from = 0.0;
   double sight_from = 0.0;  ///< tau from which sight is asked; 1: never
-  /// What the ellipsoids stand for, in the request; null: for themselves. Then they only sort out
-  /// candidates, and the proof is about the solid's Minkowski sums.
-  const world::Obstacle* solid = nullptr;
+  /// What the ellipsoids stand for; nothing: for themselves. Else they only sort out candidates,
+  /// and the proof is about the body's Minkowski sums.
+  std::optional<world::Body> body;
   double safety_radius = 0.0;  ///< of the ball about the drone, m: hard radius and what is left of
                                ///< the margin
   double sight_share = 1.0;    ///< of the sight's margin and of the target's uncertainty
@@ -75,7 +76,7 @@ struct Problem {
   int n_candidates() const;
 };
 
-/// Keeps pointers into the request. Puts it into normalised time, grows the obstacles and relaxes
+/// Puts the request into normalised time, grows the obstacles and relaxes
 /// what the start already breaks; `notes` gets one clause for each such relaxation that weakens the
 /// certificate. Leaves the skeletons empty.
 Problem MakeProblem(const PlannerConfig& config, const PlanRequest& request, std::string* notes);

@@ -19,9 +19,9 @@ Box Union(const Box& a, const Box& b) { return {a.low.min(b.low), a.high.max(b.h
 
 // A plan that starts within an obstacle's hard shape has to leave it: along the way out at its
 // start the distance never shrinks.
-bool Leaves(const Curve& plan, const Ellipsoid& e, const Problem& problem) {
+bool Leaves(const Curve& plan, const Ellipsoid& e) {
   const Eigen::Vector3d offset = (plan.row(0) - e.center.row(0)).transpose();
-  const Eigen::Vector3d out = world::Outwards(BodyOf(e, problem), offset);
+  const Eigen::Vector3d out = world::Outwards(*e.body, offset);
   const Eigen::Index n = std::max(plan.rows(), e.center.rows());
   math::Polynomial along = math::Polynomial::Zero(n);
   along.head(plan.rows()) = plan * out;
@@ -41,10 +41,9 @@ class Prover {
   // any.
   bool IsOff(const Ellipsoid& e, std::vector<Proof>* proofs) const {
     const bool sight = std::max(sight_from_, e.sight_from) < 1.0;
-    if (e.safety_from > 0.0 && !Leaves(plan_, e, problem_)) return false;
-    const world::Body body = BodyOf(e, problem_);
-    return Prove(e, body, false, e.safety_from, proofs) &&
-           (!sight || Prove(e, body, true, std::max(sight_from_, e.sight_from), proofs));
+    if (e.safety_from > 0.0 && !Leaves(plan_, e)) return false;
+    return Prove(e, *e.body, false, e.safety_from, proofs) &&
+           (!sight || Prove(e, *e.body, true, std::max(sight_from_, e.sight_from), proofs));
   }
 
  private:
@@ -74,8 +73,8 @@ class Prover {
 
 }  // namespace
 
-world::Body BodyOf(const Ellipsoid& e, const Problem& problem) {
-  return world::MakeBody(*e.solid, problem.t0, problem.duration, problem.sigmas);
+world::Body BodyOf(const world::Obstacle& obstacle, const Problem& problem) {
+  return world::MakeBody(obstacle, problem.t0, problem.duration, problem.sigmas);
 }
 
 world::Ball DroneBall(const Curve& plan, double radius) {
@@ -92,7 +91,7 @@ bool StaysOff(const Curve& plan, const Problem& problem, double sight_from) {
   const Prover prover(plan, problem, sight_from);
   const std::optional<Box> box = BoxAround(plan), seen = BoxAround(problem.target);
   const auto is_off = [&](const Ellipsoid& e) {
-    if (!e.solid) return true;
+    if (!e.body) return true;
     const bool far = box && seen &&
                      !MayTouch(Union(*box, *seen), e.center, e.safety_half.max(e.sight_half), 1.0);
     return far || prover.IsOff(e, nullptr);
@@ -109,7 +108,7 @@ std::optional<std::vector<Proof>> ProveOff(const Curve& plan, const Problem& pro
   const Prover prover(plan, problem, sight_from);
   std::vector<Proof> proofs;
   for (const Ellipsoid& e : problem.obstacles)
-    if (e.solid && !prover.IsOff(e, &proofs)) return std::nullopt;
+    if (e.body && !prover.IsOff(e, &proofs)) return std::nullopt;
   if (problem.target_body && !prover.IsOff(*problem.target_body, &proofs)) return std::nullopt;
   return proofs;
 }

@@ -18,7 +18,7 @@ std::optional<std::vector<Proof>> ProveOff(const Curve& plan, const Problem& pro
                                            double sight_from);
 
 /// The obstacle over the problem's time.
-world::Body BodyOf(const Ellipsoid& e, const Problem& problem);
+world::Body BodyOf(const world::Obstacle& obstacle, const Problem& problem);
 
 /// The drone's ball, and the target's end of the line of sight with its uncertainty; `share` of the
 /// latter.

@@ -75,10 +75,29 @@ TEST(Ladder, SameRequestSameBits) {
 
 TEST(Ladder, StartInsideTheMarginStillPlans) {
   PlanRequest request = Walk();
-  request.obstacles = {Pillar(1, -2.5, 0.55, 0.3)};  // 0.25 m from the drone's centre
+  const double off = Config().hard_radius() + 0.5 * Config().safety_margin;
+  request.obstacles = {Pillar(1, -2.5, 0.3 + off, 0.3)};
   const PlanResult plan = MakePlanner("chase", Config())->Plan(request);
   EXPECT_EQ(plan.verdict, Verdict::kChase) << plan.reason;
   EXPECT_NE(plan.reason.find("margin of obstacle 1"), std::string::npos) << plan.reason;
+}
+
+TEST(Ladder, StartInsideTheHardRadiusIsAnEscapeThatOnlyMovesAway) {
+  PlanRequest request = Walk();
+  request.obstacles = {Pillar(1, -2.5, 0.55, 0.3)};  // 0.25 m from the drone's centre
+  const PlanResult plan = MakePlanner("chase", Config())->Plan(request);
+  EXPECT_EQ(plan.verdict, Verdict::kEscape) << plan.reason;
+  EXPECT_NE(plan.reason.find("inside obstacle 1"), std::string::npos) << plan.reason;
+  double before = 0.55;
+  for (double t = 0.02; t <= plan.trajectory.duration; t += 0.02) {
+    const double away =
+        (plan.trajectory.Position(t) - request.obstacles[0].center.Position(t)).head<2>().norm();
+    if (t < 0.25 * plan.trajectory.duration)
+      EXPECT_GE(away, before - 1e-9) << t;
+    else
+      EXPECT_GE(away, 0.3 + Config().hard_radius() - 1e-9) << t;
+    before = away;
+  }
 }
 
 TEST(Ladder, TargetAlreadyHiddenGivesASafePlanThatRegainsSight) {

@@ -32,6 +32,11 @@ class Company : public bus::Node {
   int64_t TickPeriod() const override { return kPeriod; }
   void Tick(int64_t utime) override {
     if (utime >= from_ && utime < until_ && (utime - from_) % 200000 == 0) Forecast(utime);
+    if ((utime - kStart) % 100000 == 0) {
+      obstacles_t none{};
+      none.utime = utime;
+      bus_.Publish("OBSTACLES", none);
+    }
     pose_t pose{};
     pose.utime = utime;
     pose.orientation[0] = 1.0;

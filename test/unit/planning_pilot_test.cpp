@@ -25,6 +25,7 @@ class Flight {
 
   void Run(double seconds, bool with_target) {
     for (const double end = t + seconds; t < end; t += kPeriod) {
+      if (std::fmod(t, 0.1) < kPeriod) pilot.SetObstacles(t, {});
       if (with_target && std::fmod(t, 0.3) < kPeriod) pilot.SetForecast(Walking(t));
       if (const auto plan = pilot.Update(t, Body())) {
         plans.push_back(*plan);

@@ -210,7 +210,7 @@ PlanRequest WalkPastPillar(double pillar_y) {
 // Shapes are kept from plan to plan: margins that gave way must not stay away, nor the other way.
 TEST(Planner, AnswersDoNotDependOnWhatWasAskedBefore) {
   const PlannerConfig config;
-  const PlanRequest within = WalkPastPillar(0.8), outside = WalkPastPillar(1.5);
+  const PlanRequest within = WalkPastPillar(0.885), outside = WalkPastPillar(1.5);
   const PlanResult fresh_within = MakePlanner("chase", config)->Plan(within);
   const PlanResult fresh_outside = MakePlanner("chase", config)->Plan(outside);
   EXPECT_NE(fresh_within.reason.find("starts within the margin of obstacle 7"), std::string::npos);

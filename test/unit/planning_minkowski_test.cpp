@@ -1,0 +1,178 @@
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <map>
+
+#include "services/planning/planner.h"
+#include "services/planning/problem.h"
+#include "test/unit/planning_instances.h"
+#include "test/unit/separation_model.h"
+
+// Whole plans, with margins, tube and uncertainty, against distances by nearest points: what a plan
+// claims has to hold in the Minkowski sum itself.
+
+namespace chase::planning {
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+using world::Random;
+
+constexpr int kInstants = 50;
+constexpr double kTolerance = 1e-6;  // m
+
+/// Walls, pillars, lumps; every other one moves with an uncertainty that grows.
+world::Obstacle RandomObstacle(Random* random, const PlanRequest& request, int id) {
+  world::Obstacle o;
+  o.id = id;
+  o.moving = random->Uniform() < 0.4;
+  o.solid = static_cast<world::Obstacle::Solid>(random->Next() % 3);
+  o.half = world::RandomHalfSizes(random);
+  if (o.solid == world::Obstacle::Solid::kCylinder) o.half.y() = o.half.x();
+  o.axes = Eigen::Quaterniond(world::RandomRotation(random, random->Uniform() < 0.7));
+  const Matrix3d R = o.axes.toRotationMatrix();
+  const bool turned = o.solid != world::Obstacle::Solid::kCylinder;
+  o.shape = o.half.cwiseAbs2().cwiseInverse().asDiagonal();
+  if (turned) o.shape = (R * o.shape * R.transpose()).eval();
+  o.shape = (0.5 * (o.shape + o.shape.transpose())).eval();
+  const Vector3d middle = request.target.Position(random->Uniform(0.0, request.horizon));
+  o.center.start = request.t0 - random->Uniform(0.0, 0.2);
+  o.center.duration = request.horizon;
+  o.center.coefficients = Eigen::MatrixXd::Zero(o.moving ? 2 : 1, 3);
+  o.center.coefficients.row(0) = (middle + world::RandomVector(random, 4.0, 4.0, 0.5)).transpose();
+  if (!o.moving) return o;
+  o.center.coefficients.row(1) =
+      request.horizon * world::RandomVector(random, 0.8, 0.8, 0.1).transpose();
+  for (Matrix3d* S : {&o.position_covariance, &o.velocity_covariance}) {
+    const Matrix3d axes = world::RandomRotation(random, true);
+    const Vector3d deviation(random->Uniform(0.01, 0.1), random->Uniform(0.01, 0.1), 0.02);
+    *S = axes * deviation.cwiseAbs2().asDiagonal() * axes.transpose();
+    *S = (0.5 * (*S + S->transpose())).eval();
+  }
+  return o;
+}
+
+PlanRequest RandomRequest(const PlannerConfig& config, unsigned seed) {
+  InstanceSpec spec;
+  spec.horizon = 2.5;
+  spec.n_obstacles = 0;
+  PlanRequest request = InstanceGenerator(config, spec).Make(seed);
+  Random random(seed, 77);
+  request.target_sigma = random.Uniform(0.0, 0.05);
+  request.target_speed_sigma = random.Uniform(0.0, 0.1);
+  const int n = 2 + static_cast<int>(random.Next() % 9);
+  for (int i = 0; i < n; ++i) request.obstacles.push_back(RandomObstacle(&random, request, i));
+  return request;
+}
+
+/// The obstacle over [start, start + duration], written anew.
+world::Body Truth(const world::Obstacle& o, double start, double duration, double sigmas) {
+  world::Body body;
+  body.kind = o.solid;
+  body.half = o.half;
+  body.shape = o.solid == world::Obstacle::Solid::kBox ? o.axes.toRotationMatrix()
+                                                       : Matrix3d(o.shape.inverse());
+  const Vector3d v = o.center.Velocity(start);
+  body.center = Curve::Zero(2, 3);
+  body.center.row(0) = o.center.Position(start).transpose();
+  body.center.row(1) = duration * v.transpose();
+  const double age = start - o.center.start;
+  body.sigmas = o.moving ? sigmas : 0.0;
+  body.covariance[0] = o.position_covariance + age * age * o.velocity_covariance;
+  body.covariance[1] = 2.0 * age * duration * o.velocity_covariance;
+  body.covariance[2] = duration * duration * o.velocity_covariance;
+  return body;
+}
+
+/// Least gap over [from, 1] of the ball about `way`, or of its hull with one about the target.
+double LeastGap(const world::Trajectory& way, double radius, double from, const world::Ball* target,
+                const world::Obstacle& o, double sigmas) {
+  world::SeparationPair pair;
+  pair.drone = {way.coefficients, math::Polynomial::Constant(1, radius)};
+  pair.sight = target != nullptr;
+  pair.target = target ? *target : pair.drone;
+  pair.body = Truth(o, way.start, way.duration, sigmas);
+  double least = HUGE_VAL;
+  for (int i = 0; i <= kInstants; ++i) {
+    const double tau = from + (1.0 - from) * i / kInstants;
+    least = std::min(least, world::GapAt(pair, tau));
+  }
+  return least;
+}
+
+/// What a plan that is called certified promises, one sentence per broken promise.
+std::vector<std::string> BrokenPromises(const PlannerConfig& c, const PlanRequest& request,
+                                        const PlanResult& plan) {
+  std::vector<std::string> broken;
+  std::map<int, int> safety;
+  const auto check = [&](const char* what, double gap, int id) {
+    if (gap < -kTolerance) broken.push_back(std::string(what) + std::to_string(id));
+  };
+  for (const Proof& p : plan.proofs) {
+    const world::Obstacle& o = request.obstacles[static_cast<size_t>(p.obstacle)];
+    const world::Trajectory seen =
+        request.target.Reparametrised(plan.trajectory.start, plan.trajectory.duration);
+    const world::Ball target{seen.coefficients, p.target_radius};
+    safety[p.obstacle] += !p.of_sight;
+    check(p.of_sight ? "sight of " : "safety from ",
+          LeastGap(plan.trajectory, p.radius, p.from, p.of_sight ? &target : nullptr, o, c.sigmas),
+          p.obstacle);
+    if (!p.of_sight && p.radius < c.hard_radius()) broken.push_back("less than the hard radius");
+    if (p.from > 0.0 && plan.verdict != Verdict::kEscape && !p.of_sight)
+      broken.push_back("late, and no escape");
+    // The target's own uncertainty, from the request.
+    if (p.of_sight && plan.reason.empty())
+      for (const double tau : {0.0, 0.5, 1.0}) {
+        const double t = tau * plan.trajectory.duration;
+        const double sigma = std::hypot(request.target_sigma, request.target_speed_sigma * t);
+        check("uncertainty in sight of ",
+              math::Evaluate(p.target_radius, tau) - c.sight_margin - c.sigmas * sigma, p.obstacle);
+      }
+  }
+  if (safety.size() != request.obstacles.size()) broken.push_back("an obstacle without a proof");
+  if (plan.verdict == Verdict::kChase && plan.reason.empty()) {
+    size_t sights = 0;
+    for (const Proof& p : plan.proofs) sights += p.of_sight && p.from == 0.0;
+    if (sights != request.obstacles.size()) broken.push_back("sight without a proof");
+  }
+  if (plan.stop)
+    for (const Proof& p : plan.stop_proofs) {
+      const world::Obstacle& o = request.obstacles[static_cast<size_t>(p.obstacle)];
+      check("stop from ", LeastGap(*plan.stop, c.hard_radius(), p.from, nullptr, o, c.sigmas),
+            o.id);
+      if (p.from > 0.0 && plan.verdict != Verdict::kEscape)
+        broken.push_back("late stop, no escape");
+    }
+  else if (plan.verdict != Verdict::kBrake &&
+           plan.trajectory.Velocity(plan.trajectory.end()).norm() > 1e-6)
+    broken.push_back("no stop");
+  return broken;
+}
+
+TEST(Minkowski, CertifiedPlansKeepOffWhatTheySayTheyDo) {
+  const char* count = std::getenv("CHASE_PLANS");
+  const unsigned n = count ? static_cast<unsigned>(std::atoi(count)) : 200;
+  const PlannerConfig config;
+  const auto planner = MakePlanner("chase", config);
+  int certified = 0, in_sight = 0, false_accepts = 0;
+  std::map<Verdict, int> verdicts;
+  for (unsigned seed = 1; seed <= n; ++seed) {
+    const PlanRequest request = RandomRequest(config, seed);
+    const PlanResult plan = planner->Plan(request);
+    ++verdicts[plan.verdict];
+    if (plan.certified_clearance < 0.0) continue;
+    ++certified;
+    in_sight += plan.verdict == Verdict::kChase;
+    const std::vector<std::string> broken = BrokenPromises(config, request, plan);
+    false_accepts += !broken.empty();
+    for (const std::string& what : broken)
+      ADD_FAILURE() << "seed " << seed << " " << Name(plan.verdict) << ": " << what;
+  }
+  for (const auto& [verdict, k] : verdicts) std::printf("%s %d\n", Name(verdict), k);
+  std::printf("%u plans, %d certified, %d false\n", n, certified, false_accepts);
+  EXPECT_GT(certified, static_cast<int>(n) / 2);
+  EXPECT_GT(in_sight, static_cast<int>(n) / 10);
+}
+
+}  // namespace
+}  // namespace chase::planning
