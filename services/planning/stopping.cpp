@@ -76,14 +76,19 @@ class Resting {
   }
 
   /// Time of the first sampled contact, s, infinite where there is none, and the least clearance.
+  /// The least height counts as an obstacle's surface.
   std::pair<double, double> Harm(const Curve& curve, double T) {
     SetProblem(T);
     double contact = HUGE_VAL, least = HUGE_VAL;
+    const Limits& l = problem_.limits;
     const int n = static_cast<int>(std::ceil(T / kInTime));
     for (int i = 1; i <= n; ++i) {
       const double tau = static_cast<double>(i) / n;
       const Vector3d p = planning::Evaluate(curve, tau);
       for (const Ellipsoid& e : problem_.obstacles) least = std::min(least, Off(e, p, tau));
+      if (l.height)
+        least = std::min({least, config_.drone_radius + p.z() - l.z_min,
+                          config_.drone_radius + l.z_max - p.z()});
       if (problem_.target_body) least = std::min(least, Off(*problem_.target_body, p, tau));
       if (least < config_.drone_radius && contact == HUGE_VAL) contact = tau * T;
     }
@@ -193,6 +198,9 @@ PlanResult RestPlan(const PlannerConfig& config, const PlanRequest& request) {
     if (stop->certified) result.verdict = Verdict::kEscape;
     result.reason = stop->certified ? "nor is braking" : "nor is braking, nor any way aside";
   }
+  const auto late = [](const Proof& p) { return p.from > 0.0; };
+  if (std::any_of(stop->proofs.begin(), stop->proofs.end(), late))
+    result.verdict = Verdict::kEscape;
   result.trajectory = std::move(stop->trajectory);
   if (stop->certified) SetProofs(config, std::move(stop->proofs), &result);
   return result;
