@@ -45,8 +45,11 @@ struct PredictionSample {
 
 struct PlanSample {
   double t = 0.0;
-  int verdict = 0;             ///< plan_t's constants
-  world::Trajectory position;  ///< p_WB(t), in mission time
+  int verdict = 0;                        ///< plan_t's constants
+  world::Trajectory position;             ///< p_WB(t), in mission time
+  std::optional<world::Trajectory> stop;  ///< its way to rest, in mission time
+  double certified_clearance = -1.0;      ///< m; negative: not certified
+  double hard_radius = 0.0;               ///< m
 };
 
 /// A fault that struck.

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "logs/src/estimate_errors.h"
+#include "logs/src/flown_plans.h"
 
 namespace chase::logs {
 namespace {
@@ -159,6 +160,7 @@ Metrics Compute(const FlightRecord& record, const std::vector<SampleScore>& scor
   AddRatios(record, scores, &m);
   AddMotion(MissionTruth(record), &m);
   AddPlans(record, &m);
+  AddCertificates(record, scores, &m);
   AddEstimates(record, &m);
   AddCriteria(record.scenario, &m);
   return m;

@@ -26,7 +26,9 @@ struct Metrics {
   long replans = 0, fallbacks = 0;
   Figure odometry_ate_m, odometry_ate_aligned_m, target_rmse_m, prediction_error_m;
   std::map<double, double> prediction_error_by_horizon_m;  ///< horizon in s
-  std::map<std::string, double> cpu_s;                     ///< by process
+  Figure certified_clearance_m, certificate_kept_ratio, tube_exceeded_ratio, tracking_error_p99_m;
+  std::map<int, double> verdict_s;      ///< time under each of plan_t's verdicts
+  std::map<std::string, double> cpu_s;  ///< by process
   Figure real_time_factor;
   std::string fault;           ///< names of those that struck, joined by +
   double fault_time_s = -1.0;  ///< mission time of the first; -1: none

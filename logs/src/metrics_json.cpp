@@ -27,6 +27,17 @@ Json ByHorizon(const std::map<double, double>& errors) {
   return out;
 }
 
+Json Verdicts(const std::map<int, double>& seconds) {
+  constexpr const char* kNames[] = {"chase", "wider", "kept",  "safe_only",
+                                    "brake", "wait",  "escape"};
+  Json out = Json::object();
+  for (int v = 0; v < 7; ++v) {
+    const auto found = seconds.find(v);
+    out[kNames[v]] = found == seconds.end() ? 0.0 : found->second;
+  }
+  return out;
+}
+
 }  // namespace
 
 std::string MetricsJson(const FlightRecord& record, const Metrics& m) {
@@ -54,6 +65,11 @@ std::string MetricsJson(const FlightRecord& record, const Metrics& m) {
   j["predict_ms"] = Times(m.predict_ms);
   j["replans"] = m.replans;
   j["fallbacks"] = m.fallbacks;
+  j["certified_clearance_m"] = Number(m.certified_clearance_m);
+  j["certificate_kept_ratio"] = Number(m.certificate_kept_ratio);
+  j["tube_exceeded_ratio"] = Number(m.tube_exceeded_ratio);
+  j["tracking_error_p99_m"] = Number(m.tracking_error_p99_m);
+  j["verdict_s"] = Verdicts(m.verdict_s);
   j["odometry_ate_m"] = Number(m.odometry_ate_m);
   j["odometry_ate_aligned_m"] = Number(m.odometry_ate_aligned_m);
   j["target_rmse_m"] = Number(m.target_rmse_m);

@@ -109,8 +109,13 @@ class Gatherer {
     for (const prediction_t& m : predictions_)
       record->predictions.push_back({Time(m.utime), m.verdict != prediction_t::NO_TARGET,
                                      bus::FromMessage(m.target, origin_)});
-    for (const plan_t& m : plans_)
-      record->plans.push_back({Time(m.utime), m.verdict, bus::FromMessage(m.position, origin_)});
+    for (const plan_t& m : plans_) {
+      PlanSample plan{
+          Time(m.utime),         m.verdict,    bus::FromMessage(m.position, origin_), {},
+          m.certified_clearance, m.hard_radius};
+      if (m.stop.n_coefficients > 0) plan.stop = bus::FromMessage(m.stop, origin_);
+      record->plans.push_back(std::move(plan));
+    }
   }
 
   void AddFaults(FlightRecord* record) const {

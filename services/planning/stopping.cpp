@@ -181,8 +181,9 @@ Stop Evade(const PlannerConfig& config, const PlanRequest& request) {
 }
 
 void SetProofs(const PlannerConfig& config, std::vector<Proof> proofs, PlanResult* result) {
-  constexpr double kFarOff = 100.0;  // m: no obstacle at all
-  double least = kFarOff;
+  // The ground lies no higher than where the flight began.
+  const Curve plan = result->trajectory.coefficients;
+  double least = ToPoints(plan, 6).col(2).minCoeff();
   for (const Proof& p : proofs)
     if (!p.of_sight) least = std::min(least, p.from > 0.0 ? 0.0 : p.radius + p.room);
   result->certified_clearance = std::max(0.0, least - config.hard_radius());

@@ -27,7 +27,8 @@ Stop Evade(const PlannerConfig& config, const PlanRequest& request);
 /// Brake, or else Evade, as a plan; the reason says what it is not.
 PlanResult RestPlan(const PlannerConfig& config, const PlanRequest& request);
 
-/// What the proofs leave to the drone's sphere goes with them.
+/// What the proofs, and the plan's height over z = 0, leave to the drone's sphere goes with them;
+/// after the trajectory.
 void SetProofs(const PlannerConfig& config, std::vector<Proof> proofs, PlanResult* result);
 
 /// Where `plan` can be left for a certified rest: as soon as a new plan is overdue, else sooner or

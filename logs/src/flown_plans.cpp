@@ -1,0 +1,67 @@
+#include "logs/src/flown_plans.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace chase::logs {
+namespace {
+
+/// Walks along with time through the plans as they take over.
+class Flown {
+ public:
+  explicit Flown(const FlightRecord& record) : plans_(record.plans) {}
+
+  /// The newest plan that has begun by t; times must not go back.
+  const PlanSample* At(double t) {
+    while (next_ < plans_.size() && plans_[next_].t <= t) ++next_;
+    return next_ > 0 ? &plans_[next_ - 1] : nullptr;
+  }
+
+ private:
+  const std::vector<PlanSample>& plans_;
+  size_t next_ = 0;
+};
+
+/// Where the plan wants the body at t: on its stop once that has begun.
+Eigen::Vector3d Wanted(const PlanSample& plan, double t) {
+  const bool stops = plan.stop && t > plan.stop->start;
+  const world::Trajectory& way = stops ? *plan.stop : plan.position;
+  return way.Position(std::min(t, way.end()));
+}
+
+}  // namespace
+
+void AddCertificates(const FlightRecord& record, const std::vector<SampleScore>& scores,
+                     Metrics* m) {
+  Flown flown(record), followed(record);
+  long kept = 0;
+  for (size_t i = 0; i < scores.size(); ++i) {
+    const PlanSample* plan = flown.At(scores[i].t);
+    if (!plan) continue;
+    const double step = i + 1 < scores.size() ? scores[i + 1].t - scores[i].t : 0.0;
+    m->verdict_s[plan->verdict] += step;
+    if (plan->certified_clearance < 0.0) continue;
+    m->certified_clearance_m = std::min(
+        m->certified_clearance_m.value_or(plan->certified_clearance), plan->certified_clearance);
+    kept += scores[i].clearance >= plan->certified_clearance;
+  }
+  if (!scores.empty())
+    m->certificate_kept_ratio = static_cast<double>(kept) / static_cast<double>(scores.size());
+  std::vector<double> errors;
+  long exceeded = 0;
+  for (const PoseSample& pose : record.poses) {
+    if (!record.InMission(pose.t)) continue;
+    const PlanSample* plan = followed.At(pose.t);
+    if (!plan) continue;
+    errors.push_back((pose.p - Wanted(*plan, pose.t)).norm());
+    exceeded += errors.back() > plan->hard_radius - record.scenario.chaser.radius;
+  }
+  if (errors.empty()) return;
+  m->tube_exceeded_ratio = static_cast<double>(exceeded) / static_cast<double>(errors.size());
+  const auto p99 =
+      errors.begin() + static_cast<long>(0.99 * static_cast<double>(errors.size() - 1));
+  std::nth_element(errors.begin(), p99, errors.end());
+  m->tracking_error_p99_m = *p99;
+}
+
+}  // namespace chase::logs
