@@ -14,7 +14,7 @@ struct Obstacle {
   Trajectory center;                                    ///< c(t), frame W, m
   Eigen::Matrix3d shape = Eigen::Matrix3d::Identity();  ///< R, frame W, 1/m^2, positive definite
   enum class Solid { kEllipsoid, kBox, kCylinder };     ///< cylinder: upright
-  Solid solid = Solid::kEllipsoid;                      ///< others: the ellipsoid lies inside
+  Solid solid = Solid::kEllipsoid;                      ///< others: the ellipsoid is about it
   /// Box: half edges; cylinder: radius, radius, half height; m.
   Eigen::Vector3d half = Eigen::Vector3d::Zero();
   Eigen::Quaterniond axes = Eigen::Quaterniond::Identity();  ///< of a box, frame W

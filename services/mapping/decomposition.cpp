@@ -254,7 +254,15 @@ bool Decomposition::Merge(const std::vector<Cell>& cells, const std::set<int>& p
 void Decomposition::Emit(const std::vector<Cell>& cells, int id, const Group& group,
                          const Eigen::Vector2d* keep_out, double keep_out_radius, int depth,
                          std::vector<Piece>* pieces) {
-  Piece piece{id, group, Outline(Hull(cells, group))};
+  const Points2 hull = Hull(cells, group);
+  Piece piece{id, group, Outline(hull), SmallestRectangle(hull)};
+  Rectangle& box = piece.rectangle;
+  box.center = piece.outline.center;
+  box.half.setConstant(kThinnest);
+  for (const Eigen::Vector2d& p : hull) {
+    box.half = box.half.cwiseMax((box.axes.transpose() * (p - box.center)).cwiseAbs());
+    piece.radius = std::max(piece.radius, (p - box.center).norm());
+  }
   if (!keep_out || Grown(piece.outline, keep_out_radius).Level(*keep_out) > 1.0) {
     pieces->push_back(std::move(piece));
     return;

@@ -23,6 +23,8 @@ struct Piece {
   int id = 0;
   std::vector<int> cells;  ///< indices into the cells of the last update
   Ellipse outline;         ///< in plan, frame W, m
+  Rectangle rectangle;     ///< about the outline's centre, holds the same cells
+  double radius = 0.0;     ///< of a circle about it that does, m
 };
 
 /// Keeps a partition of occupied columns into pieces from sweep to sweep, so that ids are stable:

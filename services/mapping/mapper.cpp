@@ -29,6 +29,20 @@ Ellipse Grown(const Ellipse& outline) {
   return outline.Scaled(1.0 + kGhostMargin / std::max(0.1, outline.SemiAxes().y()));
 }
 
+/// A column that is tighter than the ellipsoid: a cylinder or a box, whichever has the smaller
+/// section.
+void SetSolid(const Piece& piece, double semi_height, world::Obstacle* o) {
+  const Rectangle& r = piece.rectangle;
+  if (M_PI * piece.radius * piece.radius < r.Area()) {
+    o->solid = world::Obstacle::Solid::kCylinder;
+    o->half = {piece.radius, piece.radius, semi_height};
+    return;
+  }
+  o->solid = world::Obstacle::Solid::kBox;
+  o->half << r.half, semi_height;
+  o->axes = Eigen::AngleAxisd(std::atan2(r.axes(1, 0), r.axes(0, 0)), Eigen::Vector3d::UnitZ());
+}
+
 }  // namespace
 
 int KeepNearest(const Eigen::Vector3d& origin, int most, std::vector<world::Obstacle>* obstacles) {
@@ -236,6 +250,7 @@ std::vector<world::Obstacle> Mapper::Statics(const Eigen::Vector3d& origin, doub
     o.shape.setZero();
     o.shape.topLeftCorner<2, 2>() = piece.outline.Scaled(grow).shape;
     o.shape(2, 2) = 1.0 / (c.semi_height * c.semi_height);
+    SetSolid(piece, c.semi_height, &o);
     if (PlanDistance(o, origin) <= c.radius && o.shape.allFinite()) obstacles.push_back(o);
   }
   return obstacles;

@@ -222,6 +222,7 @@ bool Tracker::Moves(int id) const {
 
 std::vector<world::Obstacle> Tracker::Obstacles(double middle, double semi_height,
                                                 double grow) const {
+  const Eigen::Matrix3d level = Eigen::Vector3d(1.0, 1.0, 0.0).asDiagonal();
   std::vector<world::Obstacle> obstacles;
   for (const auto& track : tracks_) {
     if (!track.confirmed || t_ - track.seen > config_.coast_listed || t_ - track.sought > kLost)
@@ -238,8 +239,8 @@ std::vector<world::Obstacle> Tracker::Obstacles(double middle, double semi_heigh
     o.shape.setZero();
     o.shape.topLeftCorner<2, 2>() = outline.Scaled(grow).shape;
     o.shape(2, 2) = 1.0 / (semi_height * semi_height);
-    o.position_covariance = track.body.CenterVariance() * Eigen::Matrix3d::Identity();
-    o.velocity_covariance = track.body.VelocityVariance() * Eigen::Matrix3d::Identity();
+    o.position_covariance = track.body.CenterVariance() * level;
+    o.velocity_covariance = track.body.VelocityVariance() * level;
     obstacles.push_back(o);
   }
   return obstacles;

@@ -30,6 +30,7 @@ void PlanProof::Reset(const Problem& problem, double sight_from, bool exact) {
   sight_from_ = sight_from;
   origin_ = problem.target.row(0).transpose();
   laid_out_ = false;
+  first_ = -1;
 }
 
 void PlanProof::AddRows(int obstacle) {
@@ -189,7 +190,7 @@ bool PlanProof::Holds(const Curve& plan, bool exactly) {
     if (bounds && cleared_[j]) continue;
     if (!RowHolds(rows_[j], plan, small ? &p : nullptr, exactly)) return false;
   }
-  return StaysOff(plan, *problem_, sight_from_);
+  return StaysOff(plan, *problem_, sight_from_, &first_);
 }
 
 }  // namespace chase::planning

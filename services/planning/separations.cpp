@@ -87,7 +87,7 @@ world::Ball TargetBall(const Problem& problem, double share) {
   return {problem.target, radius};
 }
 
-bool StaysOff(const Curve& plan, const Problem& problem, double sight_from) {
+bool StaysOff(const Curve& plan, const Problem& problem, double sight_from, int* first) {
   const Prover prover(plan, problem, sight_from);
   const std::optional<Box> box = BoxAround(plan), seen = BoxAround(problem.target);
   const auto is_off = [&](const Ellipsoid& e) {
@@ -96,11 +96,19 @@ bool StaysOff(const Curve& plan, const Problem& problem, double sight_from) {
                      !MayTouch(Union(*box, *seen), e.center, e.safety_half.max(e.sight_half), 1.0);
     return far || prover.IsOff(e, nullptr);
   };
+  const int n = static_cast<int>(problem.obstacles.size());
+  const auto is_off_at = [&](int j) {
+    const bool off = is_off(problem.obstacles[static_cast<size_t>(j)]);
+    if (!off && first) *first = j;
+    return off;
+  };
+  if (first && *first >= 0 && *first < n && !is_off_at(*first)) return false;
   if (problem.target_body && !is_off(*problem.target_body)) return false;
   if (problem.reach && Contains(*problem.reach, plan))
-    return std::all_of(problem.near.begin(), problem.near.end(),
-                       [&](int j) { return is_off(problem.obstacles[static_cast<size_t>(j)]); });
-  return std::all_of(problem.obstacles.begin(), problem.obstacles.end(), is_off);
+    return std::all_of(problem.near.begin(), problem.near.end(), is_off_at);
+  for (int j = 0; j < n; ++j)
+    if (!is_off_at(j)) return false;
+  return true;
 }
 
 std::optional<std::vector<Proof>> ProveOff(const Curve& plan, const Problem& problem,

@@ -11,7 +11,9 @@ namespace chase::planning {
 /// Does the plan stay off the obstacles, and its line of sight from `sight_from` on? Obstacles that
 /// stand for no solid are not asked about; where the problem has a reach that holds the plan, nor
 /// are those that are not near.
-bool StaysOff(const Curve& plan, const Problem& problem, double sight_from);
+/// `first`, if given: index of the obstacle to be asked first, and then of the one that is not kept
+/// off, because one plan after the other tends to fail at the same.
+bool StaysOff(const Curve& plan, const Problem& problem, double sight_from, int* first = nullptr);
 
 /// The proofs of that for all obstacles; nothing where it does not.
 std::optional<std::vector<Proof>> ProveOff(const Curve& plan, const Problem& problem,
