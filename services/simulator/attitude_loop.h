@@ -13,6 +13,7 @@ struct AttitudeSetpoint {
   Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity();  ///< desired R_WB
   Eigen::Vector3d body_rate = Eigen::Vector3d::Zero();  ///< feed-forward, in the desired B, rad/s
   double thrust = 0.0;                                  ///< collective over mass, m/s^2
+  bool motors = true;                                   ///< false: they stand still
 };
 
 /// Gains of the inner loop, after PX4's defaults for a small quadrotor.

@@ -90,7 +90,7 @@ AttitudeSetpoint Simulator::ActiveSetpoint() const {
 
 void Simulator::StepPhysics() {
   wind_.Step(kStep);
-  const bool resting = quadrotor_.on_ground() && !SetpointFresh();
+  const bool resting = SetpointFresh() ? !setpoint_.motors : quadrotor_.on_ground();
   const Wrench wrench =
       attitude_loop_.Step(ActiveSetpoint(), quadrotor_.state(), quadrotor_.on_ground(), kStep);
   quadrotor_.Step(resting ? Wrench{} : wrench, wind_.velocity(), kStep);

@@ -50,6 +50,7 @@ void SimulatorNode::OnSetpoint(const attitude_setpoint_t& message) {
   setpoint.orientation = bus::ToQuaternion(message.orientation);
   setpoint.body_rate = bus::ToVector(message.body_rate);
   setpoint.thrust = std::max(0.0, message.thrust);
+  setpoint.motors = message.motors != attitude_setpoint_t::MOTORS_OFF;
   const int64_t utime = std::min(message.utime, last_tick_);  // none counts as from the future
   simulator_.SetSetpoint(setpoint, bus::Seconds(utime, *power_on_));
 }

@@ -44,6 +44,7 @@ class Pilot : public bus::Node {
     bus::Set(out.orientation, setpoint.R_WB);
     bus::Set(out.body_rate, setpoint.w_WB_B);
     out.thrust = setpoint.thrust;
+    out.motors = attitude_setpoint_t::MOTORS_ON;
     bus_.Publish("ATTITUDE_SETPOINT", out);
   }
 

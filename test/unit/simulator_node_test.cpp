@@ -7,6 +7,7 @@
 #include <iterator>
 #include <map>
 
+#include "chase/attitude_setpoint_t.hpp"
 #include "chase/camera_image_t.hpp"
 #include "chase/event_t.hpp"
 #include "chase/imu_t.hpp"
@@ -149,6 +150,46 @@ TEST(SimulatorNode, ALidarFaultTakesSweepsAndChangesNothingElse) {
   }
   for (const char* channel : {"IMU", "CAMERA_IMAGE", "TRUTH", "SCENARIO"})
     EXPECT_EQ(struck.at(channel), whole.at(channel)) << channel;
+}
+
+/// Height after a second of asking for one and a half times the weight.
+double HeightAfterLift(int8_t motors) {
+  class Lifter : public bus::Node {
+   public:
+    Lifter(bus::Bus& bus, int8_t motors) : bus_(bus), motors_(motors) {}
+    int64_t TickPeriod() const override { return 5000; }
+    void Tick(int64_t utime) override {
+      attitude_setpoint_t m{};
+      m.utime = utime;
+      m.orientation[0] = 1.0;
+      m.thrust = 15.0;
+      m.motors = motors_;
+      bus_.Publish("ATTITUDE_SETPOINT", m);
+    }
+
+   private:
+    bus::Bus& bus_;
+    int8_t motors_;
+  };
+  bus::Lockstep lockstep(kStart);
+  double height = 0.0;
+  lockstep.SetTap([&](int64_t, const std::string& channel, const bus::Bus::Bytes& bytes) {
+    truth_t truth;
+    if (channel != "TRUTH") return;
+    truth.decode(bytes.data(), 0, static_cast<int>(bytes.size()));
+    height = truth.pos[2];
+  });
+  lockstep.Add("simulator", 0,
+               [](bus::Bus& bus) { return std::make_unique<SimulatorNode>(bus, Config()); });
+  lockstep.Add("control", 1000,
+               [&](bus::Bus& bus) { return std::make_unique<Lifter>(bus, motors); });
+  lockstep.RunUntil(kStart + 1000000);
+  return height;
+}
+
+TEST(SimulatorNode, MotorsThatAreOffGiveNoThrust) {
+  EXPECT_GT(HeightAfterLift(attitude_setpoint_t::MOTORS_ON), 1.0);
+  EXPECT_LT(HeightAfterLift(attitude_setpoint_t::MOTORS_OFF), 0.2);
 }
 
 TEST(SimulatorNode, MissingOrBrokenScenarioIsRefusedAtTheStart) {
