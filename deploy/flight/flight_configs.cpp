@@ -25,6 +25,7 @@ void Derive(const world::Scenario& scenario, FlightConfigs* configs) {
   configs->planning.takeoff_height = chaser.takeoff_height;
   configs->planning.planner.desired_distance = chaser.desired_distance;
   configs->planning.planner.drone_radius = chaser.radius;
+  configs->control.drone_radius = chaser.radius;
 }
 
 /// The scenario's faults and the command line's, in this order.

@@ -30,7 +30,11 @@ std::string ControlConfig::Problem() const {
                                {"max_body_rate", max_body_rate, 0.0, 20.0},
                                {"max_yaw_error", max_yaw_error, 0.05, 3.0},
                                {"lead", lead, 0.0, 0.3},
-                               {"slow_down", slow_down, 0.0, 5.0},
+                               {"drone_radius", drone_radius, 0.01, 5.0},
+                               {"tracking_tube", tracking_tube, 0.0, 5.0},
+                               {"sigmas", sigmas, 0.0, 10.0},
+                               {"reset_distance", reset_distance, 0.1, 10.0},
+                               {"land_speed", land_speed, 0.1, 2.0},
                                {"lost_descent", lost_descent, 0.0, 2.0}};
   for (int i = 0; i < 3; ++i) {
     bounds.push_back({"position_gain", position_gain[i], 0.1, 50.0});

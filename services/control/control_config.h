@@ -14,13 +14,17 @@ struct ControlConfig {
   double catch_up_speed = 2.0;                      ///< m/s
   Eigen::Vector3d drag = {0.25, 0.25, 0.15};        ///< 1/s
   double tilt_limit_deg = 35.0;
-  double min_thrust = 2.0;     ///< m/s^2
-  double max_thrust = 18.0;    ///< m/s^2
-  double max_body_rate = 4.0;  ///< rad/s
-  double max_yaw_error = 0.8;  ///< rad
-  double lead = 0.02;          ///< s
-  double slow_down = 0.6;      ///< s
-  double lost_descent = 0.15;  ///< m/s^2
+  double min_thrust = 2.0;      ///< m/s^2
+  double max_thrust = 18.0;     ///< m/s^2
+  double max_body_rate = 4.0;   ///< rad/s
+  double max_yaw_error = 0.8;   ///< rad
+  double lead = 0.02;           ///< s
+  double drone_radius = 0.25;   ///< m
+  double tracking_tube = 0.12;  ///< m
+  double sigmas = 2.0;
+  double reset_distance = 0.9;  ///< m
+  double land_speed = 0.5;      ///< m/s
+  double lost_descent = 0.15;   ///< m/s^2
 
   template <class V>
   void Visit(V& v) {
@@ -36,10 +40,17 @@ struct ControlConfig {
     v("max_body_rate", max_body_rate, "bound of the feed-forward on each axis, rad/s");
     v("max_yaw_error", max_yaw_error, "largest step of yaw asked for at once, rad");
     v("lead", lead, "the plan's acceleration and yaw are taken this much ahead: attitude lag, s");
-    v("slow_down", slow_down, "last part of a plan, flown ever slower unless a new one comes, s");
-    v("lost_descent", lost_descent, "thrust short of hovering while the pose is lost, m/s^2");
+    v("drone_radius", drone_radius, "of the sphere that plans have to keep clear, m");
+    v("tracking_tube", tracking_tube, "about it: the body stays this near to the plan, m");
+    v("sigmas", sigmas, "plans have to take the obstacles' covariances by so many deviations");
+    v("reset_distance", reset_distance,
+      "a new plan starts this near to the reference or to the body, m");
+    v("land_speed", land_speed, "of sinking by the inertial velocity once the pose is lost, m/s");
+    v("lost_descent", lost_descent, "thrust short of hovering where there is no velocity, m/s^2");
   }
 
+  /// The least that a proof has to keep clear, m.
+  double hard_radius() const { return drone_radius + tracking_tube; }
   std::string Problem() const;
 };
 

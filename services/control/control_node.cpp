@@ -2,50 +2,144 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+
 #include "chase/attitude_setpoint_t.hpp"
+#include "chase/tracking_t.hpp"
 #include "common/bus/convert.h"
 
 namespace chase::control {
 
 namespace {
 
-Plan FromMessage(const plan_t& m, int64_t origin) {
-  Plan plan;
-  plan.position = bus::FromMessage(m.position, origin);
-  plan.yaw = Eigen::Map<const Eigen::VectorXd>(m.yaw.data(), m.n_yaw);
-  return plan;
+constexpr size_t kLists = 8;                 // 0.4 s at 20 Hz: plans name none older than 0.3 s
+constexpr int64_t kTrackingPeriod = 50'000;  // us
+
+std::vector<Proof> FromMessage(const std::vector<proof_t>& messages) {
+  std::vector<Proof> proofs(messages.size());
+  for (size_t i = 0; i < messages.size(); ++i) {
+    const proof_t& m = messages[i];
+    Proof& proof = proofs[i];
+    proof.obstacle = m.obstacle;
+    proof.of_sight = m.of == proof_t::SIGHT;
+    proof.from = m.from;
+    proof.radius = m.radius;
+    proof.target_radius = Eigen::Vector2d(m.target_radius[0], m.target_radius[1]);
+    for (const separation_t& s : m.separations)
+      proof.separations.push_back({s.from, s.to, bus::ToVector(s.normal)});
+  }
+  return proofs;
+}
+
+Claim ClaimOf(const plan_t& m, int64_t origin) {
+  Claim claim;
+  claim.position = bus::FromMessage(m.position, origin);
+  claim.target = bus::FromMessage(m.target, origin);
+  if (m.stop.n_coefficients > 0) claim.stop = bus::FromMessage(m.stop, origin);
+  claim.proofs = FromMessage(m.proofs);
+  claim.stop_proofs = FromMessage(m.stop_proofs);
+  claim.hard_radius = m.hard_radius;
+  claim.sigmas = m.sigmas;
+  claim.certified = m.certified_clearance >= 0.0;
+  claim.last_resort = m.verdict == plan_t::BRAKE || m.verdict == plan_t::WAIT;
+  claim.starts_inside = claim.last_resort || m.verdict == plan_t::ESCAPE;
+  return claim;
 }
 
 Estimate FromMessage(const pose_t& m) {
-  return {bus::ToVector(m.pos), bus::ToVector(m.vel), bus::ToQuaternion(m.orientation)};
+  return {bus::ToVector(m.pos), bus::ToVector(m.vel), bus::ToQuaternion(m.orientation),
+          bus::ToVector(m.accel)};
 }
 
-Health HealthOf(const pose_t& m) {
-  if (m.health == pose_t::HEALTH_OK || m.health == pose_t::HEALTH_DEGRADED) return Health::kUsable;
-  return m.health == pose_t::HEALTH_STARTING ? Health::kStarting : Health::kLost;
+double LargestSigma(const Eigen::Matrix3d& covariance) {
+  return std::sqrt(
+      std::max(0.0, covariance.selfadjointView<Eigen::Lower>().eigenvalues().maxCoeff()));
+}
+
+// A pose is good for plans while the body is within the tube about them, and a velocity for braking
+// while its error is less than the speed of landing, both by as many deviations as obstacles are
+// taken by.
+Health HealthOf(const pose_t& m, const ControlConfig& config) {
+  const Eigen::Map<const Eigen::Matrix<double, 9, 9, Eigen::RowMajor>> P(m.local_covariance);
+  const bool knows_velocity =
+      config.sigmas * LargestSigma(P.block<3, 3>(3, 3)) <= config.land_speed;
+  if (m.health == pose_t::HEALTH_STARTING || !knows_velocity) return Health::kStarting;
+  const bool knows_place =
+      config.sigmas * LargestSigma(P.block<3, 3>(0, 0)) <= config.tracking_tube;
+  return m.health == pose_t::HEALTH_LOST || !knows_place ? Health::kLost : Health::kUsable;
 }
 
 }  // namespace
 
 ControlNode::ControlNode(bus::Bus& bus, const ControlConfig& config)
-    : bus_(bus), controller_(config) {
+    : bus_(bus), config_(config), controller_(config) {
   bus_.Subscribe<plan_t>("PLAN", [this](const plan_t& m) { OnPlan(m); });
+  bus_.Subscribe<obstacles_t>("OBSTACLES", [this](const obstacles_t& m) { OnObstacles(m); });
   bus_.Subscribe<pose_t>("POSE", [this](const pose_t& m) { OnPose(m); });
 }
 
+void ControlNode::OnObstacles(const obstacles_t& message) {
+  if (!epoch_.Is(message.epoch)) return;
+  const int64_t origin = Origin(message.utime);
+  std::vector<world::Obstacle> list;
+  for (const obstacle_t& o : message.obstacles) list.push_back(bus::FromMessage(o, origin));
+  if (lists_.size() == kLists) lists_.pop_front();
+  lists_.emplace_back(message.seq, std::move(list));
+}
+
+// The list that the plan was made for; null where it was never heard.
+const std::vector<world::Obstacle>* ControlNode::ListOf(const plan_t& message) const {
+  for (const input_t& input : message.inputs) {
+    if (input.channel != "OBSTACLES") continue;
+    for (auto list = lists_.rbegin(); list != lists_.rend(); ++list)
+      if (list->first == input.seq) return &list->second;
+  }
+  return nullptr;
+}
+
+std::string ControlNode::Refusal(const plan_t& message) {
+  const Claim claim = ClaimOf(message, Origin(message.utime));
+  const std::vector<world::Obstacle>* list = ListOf(message);
+  if (claim.certified && !list) return "the obstacles that it was made for were not heard";
+  const auto timer = bus_.Time("check");
+  static const std::vector<world::Obstacle> none;
+  std::string bad = Refute(claim, {config_.hard_radius(), config_.sigmas}, list ? *list : none);
+  if (!bad.empty()) return bad;
+  Plan plan;
+  plan.position = claim.position;
+  plan.yaw = Eigen::Map<const Eigen::VectorXd>(message.yaw.data(), message.n_yaw);
+  plan.stop = claim.stop;
+  plan.seq = message.seq;
+  return controller_.AddPlan(plan);
+}
+
 void ControlNode::OnPlan(const plan_t& message) {
-  if (!controller_.AddPlan(FromMessage(message, Origin(message.utime))))
-    bus_.ReportError("PLAN left out: it starts before the one being flown, or is empty");
+  if (!epoch_.Is(message.epoch)) return;
+  ++n_plans_;
+  const std::string bad = Refusal(message);
+  if (bad.empty()) return;
+  ++n_refused_;
+  bus_.ReportError(fmt::format("PLAN {} left out: {}", message.seq, bad));
 }
 
 void ControlNode::OnPose(const pose_t& message) {
+  if (epoch_.Change(message.epoch)) {
+    controller_.ForgetPlans();
+    lists_.clear();
+  }
   const double t = bus::Seconds(message.utime, Origin(message.utime));
+  const Health health = HealthOf(message, config_);
+  pose_reason_ = health == Health::kUsable ? ""
+                 : message.reason.empty()  ? "uncertain"
+                                           : message.reason;
   std::optional<Setpoint> setpoint;
   {
     auto timer = bus_.Time("control");
-    setpoint = controller_.Update(t, FromMessage(message), HealthOf(message));
+    setpoint = controller_.Update(t, FromMessage(message), health);
   }
   if (setpoint) Send(message.utime, *setpoint);
+  if (std::abs(message.utime - last_tracking_) >= kTrackingPeriod) SendTracking(message.utime);
 }
 
 void ControlNode::Send(int64_t utime, const Setpoint& setpoint) {
@@ -54,8 +148,38 @@ void ControlNode::Send(int64_t utime, const Setpoint& setpoint) {
   bus::Set(m.orientation, setpoint.R_WB);
   bus::Set(m.body_rate, setpoint.w_WB_B);
   m.thrust = setpoint.thrust;
-  m.motors = attitude_setpoint_t::MOTORS_ON;
+  m.motors = setpoint.motors ? attitude_setpoint_t::MOTORS_ON : attitude_setpoint_t::MOTORS_OFF;
   bus_.Publish("ATTITUDE_SETPOINT", m);
+}
+
+void ControlNode::SendTracking(int64_t utime) {
+  last_tracking_ = utime;
+  tracking_t m{};
+  m.utime = utime;
+  m.epoch = epoch_.value();
+  m.following = static_cast<int8_t>(controller_.following());
+  m.plan_seq = controller_.plan_seq();
+  bus::Set(m.error, controller_.error());
+  m.bound = controller_.error_bound();
+  m.reason = Reason();
+  bus_.Publish("TRACKING", m);
+}
+
+std::string ControlNode::Reason() const {
+  switch (controller_.following()) {
+    case Following::kNone:
+      return "waiting for a plan and a pose";
+    case Following::kPlan:
+      return "";
+    case Following::kStop:
+      return fmt::format("no new plan since {:.1f} s: on the last one's stop",
+                         controller_.overdue());
+    case Following::kBrake:
+      return pose_reason_.empty() ? "no plan: braking" : "pose lost, braking: " + pose_reason_;
+    case Following::kLand:
+      return controller_.is_down() ? "landed: motors off" : "pose lost, landing: " + pose_reason_;
+  }
+  return "";
 }
 
 int64_t ControlNode::Origin(int64_t utime) {
@@ -65,17 +189,19 @@ int64_t ControlNode::Origin(int64_t utime) {
 
 bus::NodeReport ControlNode::Report() const {
   using State = bus::NodeReport::State;
-  switch (controller_.mode()) {
-    case Mode::kIdle:
-      return {State::kStarting, "waiting for a plan and a pose"};
-    case Mode::kTracking:
-      return {State::kOk, fmt::format("tracking, {:.2f} m off", controller_.position_error())};
-    case Mode::kHolding:
-      return {State::kDegraded,
-              fmt::format("no new plan since {:.1f} s: holding the last one's end",
-                          controller_.overdue())};
-    case Mode::kLevel:
-      return {State::kFailed, "pose lost: level, sinking slowly"};
+  const std::string plans = fmt::format("; {} plans, {} refused", n_plans_, n_refused_);
+  switch (controller_.following()) {
+    case Following::kNone:
+      return {State::kStarting, Reason() + plans};
+    case Following::kPlan:
+      return {State::kOk, fmt::format("tracking, {:.2f} m off, below {:.2f} m of late",
+                                      controller_.error().norm(), controller_.error_bound()) +
+                              plans};
+    case Following::kStop:
+      return {State::kDegraded, Reason() + plans};
+    case Following::kBrake:
+    case Following::kLand:
+      return {State::kFailed, Reason() + plans};
   }
   return {};
 }

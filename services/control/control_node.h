@@ -1,17 +1,24 @@
 #pragma once
 
 #include <cstdint>
+#include <deque>
 #include <optional>
+#include <string>
+#include <utility>
+#include <vector>
 
+#include "chase/obstacles_t.hpp"
 #include "chase/plan_t.hpp"
 #include "chase/pose_t.hpp"
 #include "common/bus/bus.h"
+#include "common/bus/epoch.h"
 #include "common/bus/node.h"
 #include "services/control/controller.h"
+#include "services/control/plan_check.h"
 
 namespace chase::control {
 
-/// PLAN and POSE in, ATTITUDE_SETPOINT out; every POSE triggers.
+/// PLAN, OBSTACLES and POSE in, ATTITUDE_SETPOINT and TRACKING out; every POSE triggers.
 class ControlNode : public bus::Node {
  public:
   ControlNode(bus::Bus& bus, const ControlConfig& config);
@@ -19,13 +26,24 @@ class ControlNode : public bus::Node {
 
  private:
   void OnPlan(const plan_t& message);
+  void OnObstacles(const obstacles_t& message);
   void OnPose(const pose_t& message);
+  std::string Refusal(const plan_t& message);
+  const std::vector<world::Obstacle>* ListOf(const plan_t& message) const;
   void Send(int64_t utime, const Setpoint& setpoint);
+  void SendTracking(int64_t utime);
+  std::string Reason() const;
   int64_t Origin(int64_t utime);
 
   bus::Bus& bus_;
+  ControlConfig config_;
   Controller controller_;
+  bus::Epoch epoch_;
+  std::deque<std::pair<int32_t, std::vector<world::Obstacle>>> lists_;  // by seq, newest last
   std::optional<int64_t> origin_;  // utime that the core's seconds count from
+  int64_t last_tracking_ = 0;
+  std::string pose_reason_;  // why the pose is not usable
+  int64_t n_plans_ = 0, n_refused_ = 0;
 };
 
 }  // namespace chase::control

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "common/math/rotation.h"
+#include "common/world/ages.h"
 
 namespace chase::control {
 
@@ -12,8 +13,8 @@ namespace {
 constexpr double kJumpBack = 1.0;  // s; less is jitter between publishers
 
 bool Usable(const Estimate& e) {
-  return e.p_WB.allFinite() && e.v_WB.allFinite() && e.R_WB.coeffs().allFinite() &&
-         std::abs(e.R_WB.norm() - 1.0) < 1e-2;
+  return e.p_WB.allFinite() && e.v_WB.allFinite() && e.a_WB.allFinite() &&
+         e.R_WB.coeffs().allFinite() && std::abs(e.R_WB.norm() - 1.0) < 1e-2;
 }
 
 bool Finite(const Reference& r) {
@@ -28,33 +29,82 @@ bool Finite(const Setpoint& s) {
 
 }  // namespace
 
+std::string Controller::AddPlan(const Plan& plan) {
+  if (flying_ && !IsNear(plan)) return "it starts where neither the reference nor the body is";
+  return plans_.Add(plan) ? "" : "it starts before the one being flown, or is empty";
+}
+
+// The reference may be far from the body, which follows it; a new plan does not add to that.
+bool Controller::IsNear(const Plan& plan) const {
+  const double start = plan.position.start;
+  const Eigen::Vector3d p = plan.position.Position(start);
+  const std::optional<Reference> reference = plans_.At(start);
+  if (reference && (reference->state.p - p).norm() <= config_.reset_distance) return true;
+  const double ahead = std::clamp(start - last_t_.value_or(start), 0.0, 0.2);
+  return (last_estimate_.p_WB + ahead * last_estimate_.v_WB - p).norm() <= config_.reset_distance;
+}
+
 std::optional<Setpoint> Controller::Update(double t, const Estimate& estimate, Health health) {
   RestartIfTimeJumpedBack(t);
   const double dt = StepTo(t);
   plans_.Advance(t);
-  position_error_ = 0.0;
-  if (health != Health::kUsable || !Usable(estimate)) return Level();
-
+  error_.setZero();
+  if (landing_.is_down()) health = Health::kLost;  // motors that are off stay off
+  const bool finite = Usable(estimate);
+  if (health != Health::kUsable || !finite)
+    return WithoutPose(t, estimate, finite ? health : Health::kStarting, dt);
+  last_usable_ = t;
+  last_estimate_ = estimate;
   last_yaw_ = math::Yaw(estimate.R_WB);
+  return Follow(t, estimate, dt);
+}
+
+std::optional<Setpoint> Controller::Follow(double t, const Estimate& estimate, double dt) {
   const std::optional<Reference> now = plans_.At(t);
   const std::optional<Reference> ahead = plans_.At(t + config_.lead);
-  if (!now || !ahead) {
-    mode_ = Mode::kIdle;
-    return std::nullopt;
+  if (!now || !ahead || !Finite(*now) || !Finite(*ahead)) return Brake(estimate);
+  const Eigen::Vector3d error = now->state.p - estimate.p_WB;
+  // A body that drifted far while it was lost waits for a plan that starts where it is.
+  if (lost_ && error.norm() > config_.reset_distance) {
+    plans_.Clear();
+    return Brake(estimate);
   }
-  if (!Finite(*now) || !Finite(*ahead)) return Level();  // a plan of finite numbers may overflow
   const Setpoint setpoint = law_.Track(estimate, *now, *ahead, flying_ ? dt : 0.0);
-  if (!Finite(setpoint)) return Level();
+  if (!Finite(setpoint)) return Brake(estimate);
   flying_ = true;
-  mode_ = overdue() > config_.slow_down ? Mode::kHolding : Mode::kTracking;
-  position_error_ = (now->state.p - estimate.p_WB).norm();
+  lost_ = false;
+  const Plan& plan = *plans_.FlownAt(t);
+  overdue_ = t - StopsAt(plan);
+  plan_seq_ = plan.seq;
+  following_ = overdue_ > 0.0 ? Following::kStop : Following::kPlan;
+  error_ = error;
+  bound_.Add(t, error.norm());
   return setpoint;
 }
 
-std::optional<Setpoint> Controller::Level() {
+std::optional<Setpoint> Controller::Brake(const Estimate& estimate) {
   if (!flying_) return std::nullopt;
-  mode_ = Mode::kLevel;
-  return law_.LevelDescent(last_yaw_);
+  following_ = Following::kBrake;
+  const Setpoint setpoint = law_.Brake(estimate, last_yaw_);
+  return Finite(setpoint) ? setpoint : law_.Level(last_yaw_, -config_.lost_descent);
+}
+
+std::optional<Setpoint> Controller::WithoutPose(double t, const Estimate& estimate, Health health,
+                                                double dt) {
+  if (!flying_) return std::nullopt;
+  lost_ = true;
+  const bool inertial = health == Health::kLost;
+  if (inertial && !is_down() && t - last_usable_ <= world::kMostAge.velocity) {
+    landing_ = Landing(config_);
+    return Brake(estimate);
+  }
+  following_ = Following::kLand;
+  const double lift = inertial ? landing_.Lift(estimate, dt) : -config_.lost_descent;
+  Setpoint setpoint = law_.Level(last_yaw_, lift);
+  if (!is_down()) return setpoint;
+  setpoint.motors = false;
+  setpoint.thrust = 0.0;
+  return setpoint;
 }
 
 void Controller::RestartIfTimeJumpedBack(double t) {

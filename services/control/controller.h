@@ -1,57 +1,82 @@
 #pragma once
 
 #include <optional>
+#include <string>
 
 #include "services/control/control_config.h"
+#include "services/control/error_bound.h"
+#include "services/control/landing.h"
 #include "services/control/plan_follower.h"
 #include "services/control/tracking_law.h"
 
 namespace chase::control {
 
 /// How far the estimate can be trusted.
-enum class Health { kUsable, kLost, kStarting };
-
-/// What the last update did.
-enum class Mode {
-  kIdle,      ///< nothing to fly yet: no setpoint
-  kTracking,  ///< on a plan
-  kHolding,   ///< at rest on the end of a plan that no newer one followed
-  kLevel,     ///< pose lost: level, sinking slowly
+enum class Health {
+  kUsable,
+  kLost,      ///< position no more, velocity for a while
+  kStarting,  ///< nothing of it
 };
 
-/// Plans and pose in, setpoint out. Never anything that is not finite.
+/// What is followed; the numbers of tracking_t.
+enum class Following {
+  kNone,  ///< nothing to fly yet: no setpoint
+  kPlan,
+  kStop,   ///< no newer plan in time: the plan's stop, or its end
+  kBrake,  ///< against the velocity: no plan, or no position
+  kLand,   ///< no velocity either: down
+};
+
+/// Plans and pose in, setpoint out. Never anything that is not finite. Plans are to have passed
+/// `Refute`.
 class Controller {
  public:
   explicit Controller(const ControlConfig& config)
-      : config_(config), plans_(config.slow_down), law_(config) {}
+      : config_(config), law_(config), landing_(config) {}
 
-  /// False when the plan is late or unusable.
-  bool AddPlan(const Plan& plan) { return plans_.Add(plan); }
+  /// Nothing, or why the plan is left out: it is late or unusable, or starts where neither the
+  /// reference nor the body is by then.
+  std::string AddPlan(const Plan& plan);
 
-  /// Setpoint for time t [s] of the estimate, nothing while there is nothing to fly. An estimate
-  /// that is not usable or not finite gives a level attitude once flying. Time that jumps back
-  /// starts the controller anew.
+  /// Frame W has changed: all plans are void.
+  void ForgetPlans() { plans_.Clear(); }
+
+  /// Setpoint for time t [s] of the estimate, nothing while there is nothing to fly. Once flying:
+  /// no plan, brake; no usable pose, brake for as long as its velocity is good (kMostAge.velocity),
+  /// then land; where the estimate is not finite or starting, sink level. Motors that have been
+  /// stopped on the ground stay so. Time that jumps back starts the controller anew.
   std::optional<Setpoint> Update(double t, const Estimate& estimate, Health health);
 
-  Mode mode() const { return mode_; }
-  /// Distance of the last estimate from the reference, m; 0 unless tracking or holding.
-  double position_error() const { return position_error_; }
-  /// Seconds since the end of the newest plan; negative before it.
-  double overdue() const { return plans_.Overdue(last_t_.value_or(0.0)); }
+  Following following() const { return following_; }
+  bool is_down() const { return landing_.is_down(); }
+  /// Reference minus estimate, m; 0 unless there is a reference that is followed.
+  const Eigen::Vector3d& error() const { return error_; }
+  double error_bound() const { return bound_.value(); }  ///< of its length, m
+  int32_t plan_seq() const { return plan_seq_; }         ///< of the plan followed last; -1: none
+  double overdue() const { return overdue_; }            ///< since the stop began, s
 
  private:
-  std::optional<Setpoint> Level();
+  std::optional<Setpoint> Follow(double t, const Estimate& estimate, double dt);
+  std::optional<Setpoint> Brake(const Estimate& estimate);
+  std::optional<Setpoint> WithoutPose(double t, const Estimate& estimate, Health health, double dt);
   void RestartIfTimeJumpedBack(double t);
   double StepTo(double t);
+  bool IsNear(const Plan& plan) const;
 
   ControlConfig config_;
   PlanFollower plans_;
   TrackingLaw law_;
+  Landing landing_;
+  ErrorBound bound_;
   std::optional<double> last_t_;
-  bool flying_ = false;
-  Mode mode_ = Mode::kIdle;
+  Estimate last_estimate_;
+  double last_usable_ = 0.0;  // s
+  bool flying_ = false, lost_ = false;
+  Following following_ = Following::kNone;
   double last_yaw_ = 0.0;  // rad
-  double position_error_ = 0.0;
+  Eigen::Vector3d error_ = Eigen::Vector3d::Zero();
+  int32_t plan_seq_ = -1;
+  double overdue_ = 0.0;  // s
 };
 
 }  // namespace chase::control

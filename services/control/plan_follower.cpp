@@ -8,36 +8,6 @@ namespace chase::control {
 namespace {
 
 constexpr std::size_t kMostWaiting = 16;
-constexpr double kRestingSpeed = 0.02;         // m/s
-constexpr double kRestingAcceleration = 0.05;  // m/s^2
-
-/// Place s on a plan's own time axis and its derivatives with respect to t.
-struct Pace {
-  double s, ds, dds, ddds;
-};
-
-// Over u = (t - from) / 2d in [0,1]: s = from + d (2u - 2u^3 + u^4). It leaves at rate 1 and comes
-// to rest after 2d, having covered d, with the rate and its derivative continuous.
-Pace Slowed(double t, double from, double d) {
-  const double u = (t - from) / (2.0 * d);
-  if (u >= 1.0) return {from + d, 0.0, 0.0, 0.0};
-  return {from + d * (2.0 * u - 2.0 * u * u * u + u * u * u * u),
-          1.0 - 3.0 * u * u + 2.0 * u * u * u, 3.0 * (u * u - u) / d,
-          1.5 * (2.0 * u - 1.0) / (d * d)};
-}
-
-bool EndsAtRest(const world::Trajectory& position) {
-  return position.Velocity(position.end()).norm() < kRestingSpeed &&
-         position.Acceleration(position.end()).norm() < kRestingAcceleration;
-}
-
-Pace PaceAt(const world::Trajectory& position, double t, double slow_down) {
-  if (t <= position.start) return {position.start, 1.0, 0.0, 0.0};
-  const double d = EndsAtRest(position) ? 0.0 : std::min(slow_down, position.duration);
-  if (t < position.end() - d) return {t, 1.0, 0.0, 0.0};
-  if (d <= 0.0) return {position.end(), 0.0, 0.0, 0.0};
-  return Slowed(t, position.end() - d, d);
-}
 
 double YawDerivative(const Plan& plan, int order, double t) {
   const double tau = (t - plan.position.start) / plan.position.duration;
@@ -47,26 +17,50 @@ double YawDerivative(const Plan& plan, int order, double t) {
   return order == 0 ? sum : sum / plan.position.duration;
 }
 
+/// Where t lies on the trajectory; at rest at its end.
+world::State OnWay(const world::Trajectory& way, double t) {
+  if (t < way.end()) return way.At(std::max(t, way.start));
+  world::State rest;
+  rest.p = way.Position(way.end());
+  return rest;
+}
+
+/// The yaw's rate falls to zero evenly over the stop.
+void StopYaw(const Plan& plan, double t, Reference* r) {
+  const world::Trajectory& stop = *plan.stop;
+  const double rate = YawDerivative(plan, 1, stop.start);
+  const double s = std::min((t - stop.start) / stop.duration, 1.0);
+  r->yaw = YawDerivative(plan, 0, stop.start) + rate * stop.duration * (s - 0.5 * s * s);
+  r->yaw_rate = rate * (1.0 - s);
+}
+
+bool IsFinite(const world::Trajectory& x) {
+  return x.coefficients.allFinite() && std::isfinite(x.start) && std::isfinite(x.duration) &&
+         x.duration > 0.0;
+}
+
 }  // namespace
 
-Reference Sample(const Plan& plan, double t, double slow_down) {
-  const Pace pace = PaceAt(plan.position, t, slow_down);
-  const world::State on_path = plan.position.At(pace.s);
+Reference Sample(const Plan& plan, double t) {
   Reference r;
-  r.state.p = on_path.p;
-  r.state.v = on_path.v * pace.ds;
-  r.state.a = on_path.a * pace.ds * pace.ds + on_path.v * pace.dds;
-  r.state.j = on_path.j * pace.ds * pace.ds * pace.ds + 3.0 * on_path.a * pace.ds * pace.dds +
-              on_path.v * pace.ddds;
-  r.yaw = YawDerivative(plan, 0, pace.s);
-  r.yaw_rate = YawDerivative(plan, 1, pace.s) * pace.ds;
+  if (plan.stop && t >= plan.stop->start) {
+    r.state = OnWay(*plan.stop, t);
+    StopYaw(plan, t, &r);
+    return r;
+  }
+  const world::Trajectory& way = plan.position;
+  r.state = OnWay(way, t);
+  r.yaw = YawDerivative(plan, 0, std::clamp(t, way.start, way.end()));
+  r.yaw_rate = t < way.end() ? YawDerivative(plan, 1, std::max(t, way.start)) : 0.0;
   return r;
 }
 
+double StopsAt(const Plan& plan) { return plan.stop ? plan.stop->start : plan.position.end(); }
+
 bool PlanFollower::Add(const Plan& plan) {
-  const auto& p = plan.position;
-  if (!p.coefficients.allFinite() || !plan.yaw.allFinite() || plan.yaw.size() == 0) return false;
-  if (!std::isfinite(p.start) || !std::isfinite(p.duration) || p.duration <= 0.0) return false;
+  const world::Trajectory& p = plan.position;
+  if (!IsFinite(p) || !plan.yaw.allFinite() || plan.yaw.size() == 0) return false;
+  if (plan.stop && !IsFinite(*plan.stop)) return false;
   if (running_ && p.start < running_->position.start) return false;
   const auto later = std::find_if(waiting_.begin(), waiting_.end(), [&](const Plan& other) {
     return other.position.start >= p.start;
@@ -77,12 +71,17 @@ bool PlanFollower::Add(const Plan& plan) {
   return true;
 }
 
-std::optional<Reference> PlanFollower::At(double t) const {
+const Plan* PlanFollower::FlownAt(double t) const {
   const Plan* plan = running_ ? &*running_ : nullptr;
   for (const Plan& next : waiting_)
     if (next.position.start <= t) plan = &next;
+  return plan;
+}
+
+std::optional<Reference> PlanFollower::At(double t) const {
+  const Plan* plan = FlownAt(t);
   if (!plan) return std::nullopt;
-  return Sample(*plan, t, slow_down_);
+  return Sample(*plan, t);
 }
 
 void PlanFollower::Advance(double t) {
@@ -90,11 +89,6 @@ void PlanFollower::Advance(double t) {
     running_ = std::move(waiting_.front());
     waiting_.erase(waiting_.begin());
   }
-}
-
-double PlanFollower::Overdue(double t) const {
-  if (!waiting_.empty()) return t - waiting_.back().position.end();
-  return running_ ? t - running_->position.end() : 0.0;
 }
 
 }  // namespace chase::control

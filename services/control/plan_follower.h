@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstdint>
 #include <optional>
 #include <vector>
 
@@ -9,20 +10,20 @@
 
 namespace chase::control {
 
-/// A plan as control needs it: position and yaw over the same interval.
+/// A plan as control needs it: position and yaw over the same interval, and the way to rest that is
+/// flown when no newer plan takes over. Without one it ends at rest (`Refute` sees to that).
 struct Plan {
   world::Trajectory position;                      ///< p_WB(t)
   Eigen::VectorXd yaw = Eigen::VectorXd::Zero(1);  ///< power basis in normalised time, rad
+  std::optional<world::Trajectory> stop;           ///< leaves `position` at its start
+  int32_t seq = 0;                                 ///< of the message
 };
 
 /// Turns a stream of plans into one reference. A plan takes over at its own start; until then the
-/// one before it is flown. Near its end a plan is flown ever slower, so that the body comes to rest
-/// on the path, at the plan's end: nothing is extrapolated.
+/// one before it is flown. From the start of its stop on the stop is flown, in the stop's own time,
+/// while the yaw comes to rest with it; then the end is held. Nothing is extrapolated.
 class PlanFollower {
  public:
-  /// `slow_down` is the length of the last part of a plan over which it is slowed to rest, s.
-  explicit PlanFollower(double slow_down) : slow_down_(slow_down) {}
-
   /// Takes a plan. It replaces those waiting that start no earlier; one that starts before the plan
   /// being flown is late and left out. Plans that are not finite or have no length are refused.
   bool Add(const Plan& plan);
@@ -33,16 +34,20 @@ class PlanFollower {
   /// Forgets the plans that time t has left behind.
   void Advance(double t);
 
-  /// Seconds that t lies after the end of the last plan known; negative before it.
-  double Overdue(double t) const;
+  void Clear() { *this = {}; }
+
+  /// The plan that is flown at t; null before the first one starts.
+  const Plan* FlownAt(double t) const;
 
  private:
-  double slow_down_;
   std::optional<Plan> running_;
   std::vector<Plan> waiting_;  // by start
 };
 
-/// Reference of one plan at time t, slowed to rest over its last `slow_down` seconds.
-Reference Sample(const Plan& plan, double t, double slow_down);
+/// Reference of one plan at time t.
+Reference Sample(const Plan& plan, double t);
+
+/// When the plan is left for its stop, or ends at rest without one, s.
+double StopsAt(const Plan& plan);
 
 }  // namespace chase::control

@@ -67,17 +67,29 @@ Setpoint TrackingLaw::Track(const Estimate& estimate, const Reference& now, cons
       std::clamp(math::WrapAngle(ahead.yaw - yaw), -config_.max_yaw_error, config_.max_yaw_error);
   Setpoint result = AttitudeFor(thrust, thrust_rate, yaw + turn, ahead.yaw_rate);
   result.w_WB_B = Clamped(result.w_WB_B, config_.max_body_rate);
-  // Lee 2010, eq. (15): only the part along the body's present z axis acts as wanted.
-  result.thrust = std::clamp(thrust.dot(estimate.R_WB * Vector3d::UnitZ()), config_.min_thrust,
-                             config_.max_thrust);
+  result.thrust = AlongBody(thrust, estimate);
   return result;
 }
 
-Setpoint TrackingLaw::LevelDescent(double yaw) const {
-  const double thrust = kGravity + trim_ - config_.lost_descent;
-  Setpoint result = AttitudeFor(Vector3d::UnitZ(), Vector3d::Zero(), yaw, 0.0);
-  result.thrust = std::clamp(thrust, config_.min_thrust, config_.max_thrust);
+Setpoint TrackingLaw::Brake(const Estimate& estimate, double yaw) const {
+  const Vector3d wanted =
+      (kGravity + trim_) * Vector3d::UnitZ() - config_.velocity_gain.cwiseProduct(estimate.v_WB);
+  const Vector3d thrust = LimitThrust(wanted, config_);
+  Setpoint result = AttitudeFor(thrust, Vector3d::Zero(), yaw, 0.0);
+  result.thrust = AlongBody(thrust, estimate);
   return result;
+}
+
+Setpoint TrackingLaw::Level(double yaw, double lift) const {
+  Setpoint result = AttitudeFor(Vector3d::UnitZ(), Vector3d::Zero(), yaw, 0.0);
+  result.thrust = std::clamp(kGravity + trim_ + lift, config_.min_thrust, config_.max_thrust);
+  return result;
+}
+
+// Lee 2010, eq. (15): only the part along the body's present z axis acts as wanted.
+double TrackingLaw::AlongBody(const Vector3d& thrust, const Estimate& estimate) const {
+  return std::clamp(thrust.dot(estimate.R_WB * Vector3d::UnitZ()), config_.min_thrust,
+                    config_.max_thrust);
 }
 
 // The velocity error includes the speed that closes the position error, so that the sum is Lee's

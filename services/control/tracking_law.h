@@ -19,6 +19,7 @@ struct Estimate {
   Eigen::Vector3d p_WB = Eigen::Vector3d::Zero();  ///< m
   Eigen::Vector3d v_WB = Eigen::Vector3d::Zero();  ///< m/s
   Eigen::Quaterniond R_WB = Eigen::Quaterniond::Identity();
+  Eigen::Vector3d a_WB = Eigen::Vector3d::Zero();  ///< without gravity, m/s^2
 };
 
 /// What the attitude loop is asked for.
@@ -26,6 +27,7 @@ struct Setpoint {
   Eigen::Quaterniond R_WB = Eigen::Quaterniond::Identity();
   Eigen::Vector3d w_WB_B = Eigen::Vector3d::Zero();  ///< feed-forward, rad/s
   double thrust = 9.81;                              ///< collective over mass, m/s^2
+  bool motors = true;                                ///< false: off
 };
 
 constexpr double kGravity = 9.81;     ///< m/s^2
@@ -52,10 +54,14 @@ class TrackingLaw {
   /// and yaw fed forward. `dt` is the time since the last call, s: 0 leaves the integral alone.
   Setpoint Track(const Estimate& estimate, const Reference& now, const Reference& ahead, double dt);
 
-  /// Level attitude at the given yaw with a thrust a little short of hovering: gravity plus what
-  /// the integral asked for on average of late, within kLargestTrim. A pose that is about to be
-  /// lost winds the integral up.
-  Setpoint LevelDescent(double yaw) const;
+  /// Against the velocity, to rest, within the limits: needs no position. Hover thrust, see
+  /// Level(), holds the height.
+  Setpoint Brake(const Estimate& estimate, double yaw) const;
+
+  /// Level attitude at the given yaw, thrust `lift` (m/s^2) beyond that of hovering: gravity plus
+  /// what the integral asked for on average of late, within kLargestTrim. A pose that is about to
+  /// be lost winds the integral up.
+  Setpoint Level(double yaw, double lift) const;
 
   /// Acceleration that the integral asks for, m/s^2.
   const Eigen::Vector3d& integral() const { return integral_; }
@@ -63,6 +69,7 @@ class TrackingLaw {
  private:
   Eigen::Vector3d Feedback(const Estimate& estimate, const world::State& reference) const;
   void Integrate(const Eigen::Vector3d& position_error, double dt);
+  double AlongBody(const Eigen::Vector3d& thrust, const Estimate& estimate) const;
 
   ControlConfig config_;
   Eigen::Vector3d integral_ = Eigen::Vector3d::Zero();

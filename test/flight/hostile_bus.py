@@ -22,7 +22,7 @@ LISTENS = {
     "perception": ["CAMERA_IMAGE", "LIDAR_SCAN", "POSE"],
     "prediction": ["TARGET", "OBSTACLES"],
     "planning": ["PREDICTION", "OBSTACLES", "POSE"],
-    "control": ["PLAN", "POSE"],
+    "control": ["PLAN", "OBSTACLES", "POSE"],
     "simulator": ["ATTITUDE_SETPOINT"],
 }
 # Where the first double of a message stands behind what all begin with.

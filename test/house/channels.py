@@ -13,7 +13,7 @@ LISTENS = {
     "perception": {"CAMERA_IMAGE", "LIDAR_SCAN", "POSE"},
     "prediction": {"TARGET", "OBSTACLES"},
     "planning": {"PREDICTION", "OBSTACLES", "POSE"},
-    "control": {"PLAN", "POSE"},
+    "control": {"PLAN", "OBSTACLES", "POSE"},
     "simulator": {"ATTITUDE_SETPOINT"},
 }
 SUBSCRIBE = re.compile(r'Subscribe<[\w:]+>\(\s*(?:/\*.*?\*/\s*)?([^,]+),')

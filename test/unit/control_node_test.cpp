@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "chase/attitude_setpoint_t.hpp"
+#include "chase/tracking_t.hpp"
 #include "common/bus/convert.h"
 #include "common/bus/lockstep.h"
 
@@ -20,11 +21,13 @@ class Silent : public bus::Node {};
 /// The node on an in-memory bus, with a hand on both ends.
 class Bench {
  public:
-  Bench() {
-    lockstep_.Add("test", 0, [this](bus::Bus& bus) {
+  explicit Bench(bool hears_obstacles = true) {
+    lockstep_.Add("planning", 0, [this, hears_obstacles](bus::Bus& bus) {
       bus_ = &bus;
       bus.Subscribe<attitude_setpoint_t>(
           "ATTITUDE_SETPOINT", [this](const attitude_setpoint_t& m) { out.push_back(m); });
+      bus.Subscribe<tracking_t>("TRACKING", [this](const tracking_t& m) { tracking.push_back(m); });
+      if (hears_obstacles) bus.Subscribe<obstacles_t>("OBSTACLES", [](const obstacles_t&) {});
       return std::make_unique<Silent>();
     });
     lockstep_.Add("control", 0, [this](bus::Bus& bus) {
@@ -34,28 +37,74 @@ class Bench {
     });
   }
 
-  void SendPlan(int64_t utime, const Eigen::Vector3d& p, double duration = 2.0) {
+  /// A hover that nobody has certified: the last resort.
+  static plan_t Hover(int64_t utime, const Eigen::Vector3d& p, double duration = 2.0) {
     plan_t m{};
     m.utime = utime;
+    m.verdict = plan_t::WAIT;
+    m.certified_clearance = -1.0;
     m.position = bus::ToMessage(
         world::Trajectory::Constant(p, bus::Seconds(utime, kStart), duration), kStart);
     m.target = m.position;
     m.n_yaw = 1;
     m.yaw = {0.0};
-    bus_->Publish("PLAN", m);
+    return m;
+  }
+  void SendPlan(int64_t utime, const Eigen::Vector3d& p, double duration = 2.0) {
+    Send(Hover(utime, p, duration));
+  }
+  void Send(const plan_t& plan) { bus_->Publish("PLAN", plan); }
+
+  /// A hover that is certified off the wall that SendWall lists.
+  static plan_t Certified(int64_t utime, const Eigen::Vector3d& p) {
+    plan_t m = Hover(utime, p);
+    m.verdict = plan_t::CHASE;
+    m.certified_clearance = 0.1;
+    m.hard_radius = ControlConfig{}.hard_radius();
+    m.sigmas = ControlConfig{}.sigmas;
+    m.n_proofs = 1;
+    m.proofs.resize(1);
+    m.proofs[0].obstacle = 7;
+    m.proofs[0].radius = m.hard_radius;
+    m.proofs[0].n_separations = 1;
+    m.proofs[0].separations = {{0.0, 1.0, {-1.0, 0.0, 0.0}}};
+    return m;
   }
 
-  void SendPose(int64_t utime, int8_t health = pose_t::HEALTH_OK) {
+  /// A wall 2 m ahead.
+  void SendWall(int64_t utime, int32_t epoch = 0) {
+    obstacles_t m{};
+    m.utime = utime;
+    m.epoch = epoch;
+    m.n_obstacles = 1;
+    world::Obstacle wall;
+    wall.id = 7;
+    wall.solid = world::Obstacle::Solid::kBox;
+    wall.half = {0.1, 5.0, 5.0};
+    wall.shape = (3.0 * wall.half.cwiseAbs2()).cwiseInverse().asDiagonal();
+    wall.center = world::Trajectory::Constant({2, 0, 0}, bus::Seconds(utime, kStart), 1.0);
+    m.obstacles = {bus::ToMessage(wall, kStart)};
+    bus_->Publish("OBSTACLES", m);
+  }
+
+  void SendPose(int64_t utime, int8_t health = pose_t::HEALTH_OK, int32_t epoch = 0,
+                double sigma = 0.0, double speed_sigma = 0.0) {
     pose_t m{};
     m.utime = utime;
+    m.epoch = epoch;
     m.orientation[0] = 1.0;
     m.health = health;
+    for (int i = 0; i < 3; ++i) {
+      m.local_covariance[10 * i] = sigma * sigma;
+      m.local_covariance[10 * (i + 3)] = speed_sigma * speed_sigma;
+    }
     bus_->Publish("POSE", m);
     lockstep_.RunUntil(utime);
   }
 
   const ControlNode& node() const { return *node_; }
   std::vector<attitude_setpoint_t> out;
+  std::vector<tracking_t> tracking;
 
  private:
   bus::Lockstep lockstep_{kStart};
@@ -88,7 +137,7 @@ TEST(ControlNode, TurnsToANewPlanAtItsUtime) {
   Bench bench;
   bench.SendPlan(kStart, {0, 0, 0});
   bench.SendPose(kStart);
-  bench.SendPlan(kStart + 100'000, {1, 0, 0});
+  bench.SendPlan(kStart + 100'000, {0.8, 0, 0});
   bench.SendPose(kStart + 99'000);
   EXPECT_NEAR(bench.out.back().orientation[2], 0.0, 1e-9);
   bench.SendPose(kStart + 100'000);
@@ -104,16 +153,103 @@ TEST(ControlNode, HoldsAndComplainsWhenThePlanIsStale) {
   EXPECT_EQ(bench.node().Report().state, bus::NodeReport::State::kDegraded);
 }
 
-TEST(ControlNode, IsLevelWhilePoseIsLost) {
+TEST(ControlNode, BrakesWhilePoseIsLost) {
   Bench bench;
   bench.SendPlan(kStart, {5, 0, 0});
   bench.SendPose(kStart);
   bench.SendPose(kStart + 5000, pose_t::HEALTH_LOST);
   EXPECT_NEAR(bench.out.back().orientation[0], 1.0, 1e-9);
-  EXPECT_LT(bench.out.back().thrust, 9.81);
+  EXPECT_NEAR(bench.out.back().thrust, 9.81, 1e-6);
   EXPECT_EQ(bench.node().Report().state, bus::NodeReport::State::kFailed);
-  bench.SendPose(kStart + 10'000, pose_t::HEALTH_DEGRADED);
-  EXPECT_GT(bench.out.back().orientation[2], 0.05);
+}
+
+TEST(ControlNode, GoesByTheUncertaintyNotByTheHealthAlone) {
+  const ControlConfig config;
+  const double place = config.tracking_tube / config.sigmas;
+  const double speed = config.land_speed / config.sigmas;
+  const auto following = [](double sigma, double speed_sigma) {
+    Bench bench;
+    bench.SendPlan(kStart, {0, 0, 0});
+    bench.SendPose(kStart);
+    for (int i = 1; i < 12; ++i)
+      bench.SendPose(kStart + 5000 * i, pose_t::HEALTH_DEGRADED, 0, sigma, speed_sigma);
+    return bench.tracking.back().following;
+  };
+  EXPECT_EQ(following(0.99 * place, 0.99 * speed), +tracking_t::PLAN);
+  EXPECT_EQ(following(1.01 * place, 0.99 * speed), +tracking_t::BRAKE);
+  EXPECT_EQ(following(0.5 * place, 1.01 * speed), +tracking_t::LAND);
+}
+
+TEST(ControlNode, FliesWhatIsCertifiedAgainstTheListThatItHeard) {
+  Bench bench;
+  bench.SendWall(kStart);
+  bench.SendPose(kStart);
+  bench.Send(Bench::Certified(kStart + 5000, {0, 0, 0}));
+  bench.SendPose(kStart + 5000);
+  EXPECT_EQ(bench.out.size(), 1U);
+  EXPECT_NE(bench.node().Report().detail.find("1 plans, 0 refused"), std::string::npos)
+      << bench.node().Report().detail;
+}
+
+TEST(ControlNode, RefusesWhatIsNotCertified) {
+  const auto answers = [](auto change, bool names_list = true, bool heard = true) {
+    Bench bench(names_list);
+    if (heard) bench.SendWall(kStart);
+    bench.SendPose(kStart);
+    plan_t plan = Bench::Certified(kStart + 5000, {0, 0, 0});
+    change(&plan);
+    bench.Send(plan);
+    bench.SendPose(kStart + 5000);
+    EXPECT_EQ(bench.out.empty(),
+              bench.node().Report().detail.find("1 plans, 1 refused") != std::string::npos);
+    return bench.out.size();
+  };
+  EXPECT_EQ(answers([](plan_t*) {}), 1U);
+  EXPECT_EQ(answers([](plan_t*) {}, false), 0U);  // names no list
+  EXPECT_EQ(answers([](plan_t*) {}, true, false), 0U);
+  EXPECT_EQ(answers([](plan_t* m) { m->certified_clearance = -1.0; }), 0U);
+  EXPECT_EQ(answers([](plan_t* m) { m->proofs[0].obstacle = 8; }), 0U);
+  EXPECT_EQ(answers([](plan_t* m) { m->proofs[0].separations[0].normal[0] = 1.0; }), 0U);
+  EXPECT_EQ(answers([](plan_t* m) { m->hard_radius = m->proofs[0].radius = 0.1; }), 0U);
+  EXPECT_EQ(answers([](plan_t* m) { m->position.coefficients[0] = 1.7; }), 0U);
+}
+
+TEST(ControlNode, AnotherFrameVoidsPlansAndLists) {
+  Bench bench;
+  bench.SendWall(kStart);
+  bench.SendPose(kStart);
+  bench.Send(Bench::Certified(kStart, {0, 0, 0}));
+  bench.SendPose(kStart + 5000);
+  EXPECT_EQ(bench.node().Report().state, bus::NodeReport::State::kOk);
+  bench.SendPose(kStart + 10'000, pose_t::HEALTH_OK, 1);
+  EXPECT_NE(bench.node().Report().detail.find("no plan: braking"), std::string::npos);
+  bench.Send(Bench::Certified(kStart + 10'000, {0, 0, 0}));  // in the frame that was
+  bench.SendWall(kStart + 10'000, 0);
+  bench.SendPose(kStart + 15'000, pose_t::HEALTH_OK, 1);
+  EXPECT_NE(bench.node().Report().detail.find("no plan: braking"), std::string::npos);
+  plan_t plan = Bench::Certified(kStart + 15'000, {0, 0, 0});
+  plan.epoch = 1;
+  bench.SendWall(kStart + 15'000, 1);
+  bench.SendPose(kStart + 20'000, pose_t::HEALTH_OK, 1);
+  bench.Send(plan);
+  bench.SendPose(kStart + 25'000, pose_t::HEALTH_OK, 1);
+  EXPECT_EQ(bench.node().Report().state, bus::NodeReport::State::kOk)
+      << bench.node().Report().detail;
+}
+
+TEST(ControlNode, SaysTwentyTimesASecondHowWellItFollows) {
+  Bench bench;
+  bench.SendPose(kStart);
+  ASSERT_EQ(bench.tracking.size(), 1U);
+  EXPECT_EQ(bench.tracking[0].following, +tracking_t::NONE);
+  bench.SendPlan(kStart + 5000, {0.1, 0, 0}, 1.0);
+  for (int i = 1; i <= 400; ++i) bench.SendPose(kStart + 5000 * i);
+  EXPECT_EQ(bench.tracking.size(), 41U);
+  EXPECT_EQ(bench.tracking[5].following, +tracking_t::PLAN);
+  EXPECT_NEAR(bench.tracking[5].error[0], 0.1, 1e-9);
+  EXPECT_GE(bench.tracking[5].bound, 0.1);
+  EXPECT_EQ(bench.tracking.back().following, +tracking_t::STOP);
+  EXPECT_NE(bench.tracking.back().reason, "");
 }
 
 }  // namespace

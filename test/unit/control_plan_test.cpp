@@ -23,17 +23,17 @@ Plan Moving(double start, double duration, double x0, double speed) {
 }
 
 TEST(PlanFollower, HasNothingBeforeTheFirstPlanStarts) {
-  PlanFollower follower(0.6);
+  PlanFollower follower;
   EXPECT_FALSE(follower.At(0.0));
   follower.Add(Moving(1.0, 2.0, 0.0, 1.0));
   EXPECT_FALSE(follower.At(0.99));
   EXPECT_TRUE(follower.At(1.0));
 }
 
-TEST(PlanFollower, GivesPlanAsItIsBeforeItsLastPart) {
+TEST(PlanFollower, GivesPlanAsItIs) {
   const Plan plan = Moving(1.0, 2.0, 0.0, 1.0);
-  for (double t = 1.0; t < 2.39; t += 0.1) {
-    const Reference r = Sample(plan, t, 0.6);
+  for (double t = 1.0; t < 2.99; t += 0.1) {
+    const Reference r = Sample(plan, t);
     EXPECT_EQ(r.state.p, plan.position.Position(t));
     EXPECT_EQ(r.state.j, plan.position.Derivative(3, t));
     EXPECT_NEAR(r.yaw, 0.3 + 0.5 * (t - 1.0), 1e-12);
@@ -42,7 +42,7 @@ TEST(PlanFollower, GivesPlanAsItIsBeforeItsLastPart) {
 }
 
 TEST(PlanFollower, SwitchesAtTheNewPlansStart) {
-  PlanFollower follower(0.6);
+  PlanFollower follower;
   follower.Add(Moving(0.0, 2.0, 0.0, 1.0));
   follower.Advance(0.5);
   EXPECT_TRUE(follower.Add(Moving(1.0, 2.0, 100.0, 1.0)));
@@ -54,7 +54,7 @@ TEST(PlanFollower, SwitchesAtTheNewPlansStart) {
 
 TEST(PlanFollower, ReferenceIsContinuousOverConsistentPlans) {
   const Plan whole = Moving(0.0, 4.0, 0.0, 2.0);
-  PlanFollower follower(0.6);
+  PlanFollower follower;
   follower.Add(whole);
   for (int i = 0; i < 300; ++i) {
     const double t = 0.01 * i;
@@ -73,7 +73,7 @@ TEST(PlanFollower, ReferenceIsContinuousOverConsistentPlans) {
 }
 
 TEST(PlanFollower, NewPlanReplacesThoseWaitingThatStartNoEarlier) {
-  PlanFollower follower(0.6);
+  PlanFollower follower;
   follower.Add(Moving(0.0, 9.0, 0.0, 1.0));
   follower.Advance(0.0);
   follower.Add(Moving(2.0, 9.0, 200.0, 1.0));
@@ -82,7 +82,7 @@ TEST(PlanFollower, NewPlanReplacesThoseWaitingThatStartNoEarlier) {
 }
 
 TEST(PlanFollower, RefusesLateAndUnusablePlans) {
-  PlanFollower follower(0.6);
+  PlanFollower follower;
   follower.Add(Moving(1.0, 2.0, 0.0, 1.0));
   follower.Advance(1.0);
   EXPECT_FALSE(follower.Add(Moving(0.9, 2.0, 0.0, 1.0)));
@@ -96,57 +96,87 @@ TEST(PlanFollower, RefusesLateAndUnusablePlans) {
 }
 
 TEST(PlanFollower, KeepsFewWaitingPlans) {
-  PlanFollower follower(0.6);
+  PlanFollower follower;
   for (int i = 0; i < 100000; ++i) follower.Add(Moving(i, 2.0, 0.0, 1.0));
   follower.Advance(5.0);
   EXPECT_TRUE(follower.At(5.0));
 }
 
-TEST(PlanFollower, StopsOnThePathAtItsEnd) {
-  const Plan plan = Moving(0.0, 2.0, 0.0, 3.0);
-  const Vector3d end = plan.position.Position(2.0);
-  for (const double t : {2.6, 3.0, 1000.0}) {
-    const Reference r = Sample(plan, t, 0.6);
-    EXPECT_LT((r.state.p - end).norm(), 1e-12) << t;
-    EXPECT_EQ(r.state.v.norm() + r.state.a.norm() + r.state.j.norm() + r.yaw_rate, 0.0) << t;
+/// The plan with a way to rest that leaves it at `at`: position and velocity go on, b3 = b4 = b5.
+Plan WithStop(Plan plan, double at, double duration) {
+  const world::State s = plan.position.At(at);
+  Eigen::Matrix<double, 6, 3> b;  // in Bernstein form
+  b.row(0) = s.p.transpose();
+  b.row(1) = b.row(0) + 0.2 * duration * s.v.transpose();
+  b.row(2) = 2.0 * b.row(1) - b.row(0) + 0.05 * duration * duration * s.a.transpose();
+  b.row(3) = 3.0 * b.row(2) - 3.0 * b.row(1) + b.row(0) +
+             duration * duration * duration / 60.0 * s.j.transpose();
+  b.row(4) = b.row(5) = b.row(3);
+  const double choose[6][6] = {{1},          {1, 1},          {1, 2, 1},
+                               {1, 3, 3, 1}, {1, 4, 6, 4, 1}, {1, 5, 10, 10, 5, 1}};
+  plan.stop = {at, duration, Eigen::MatrixXd::Zero(6, 3)};
+  for (int k = 0; k < 6; ++k)
+    for (int i = 0; i <= k; ++i)
+      plan.stop->coefficients.row(k) +=
+          ((k - i) % 2 ? -1.0 : 1.0) * choose[5][k] * choose[k][i] * b.row(i);
+  return plan;
+}
+
+TEST(PlanFollower, FliesTheStopInItsOwnTimeAndHoldsItsEnd) {
+  const Plan plan = WithStop(Moving(0.0, 2.0, 0.0, 3.0), 0.4, 1.0);
+  EXPECT_EQ(Sample(plan, 0.39).state.p, plan.position.Position(0.39));
+  for (double t = 0.4; t < 1.399; t += 0.05) {
+    EXPECT_EQ(Sample(plan, t).state.p, plan.stop->Position(t)) << t;
+    EXPECT_EQ(Sample(plan, t).state.a, plan.stop->Acceleration(t)) << t;
   }
-  for (double t = 1.4; t < 2.7; t += 0.01) {  // never off the path, never beyond its end
-    const Vector3d p = Sample(plan, t, 0.6).state.p;
-    const double s = p.x() / 3.0;
-    EXPECT_LE(s, 2.0 + 1e-12);
-    EXPECT_LT((p - plan.position.Position(s)).norm(), 1e-9);
+  for (const double t : {1.41, 2.0, 1000.0}) {
+    const Reference r = Sample(plan, t);
+    EXPECT_LT((r.state.p - plan.stop->Position(1.4)).norm(), 1e-12) << t;
+    EXPECT_LT(r.state.v.norm() + r.state.a.norm() + r.state.j.norm() + r.yaw_rate, 1e-12) << t;
   }
 }
 
-TEST(PlanFollower, SlowingDownIsSmoothAndItsDerivativesMatch) {
-  const Plan plan = Moving(0.0, 2.0, 0.0, 3.0);
+TEST(PlanFollower, ReferenceIsSmoothWhereThePlanIsLeft) {
+  const Plan plan = WithStop(Moving(0.0, 2.0, 0.0, 3.0), 0.4, 1.0);
   const double h = 1e-5;
-  for (double t = 1.3037; t < 2.8; t += 0.0501) {
-    const auto at = [&](double u) { return Sample(plan, u, 0.6); };
+  for (double t = 0.3037; t < 1.6; t += 0.0101) {
+    const auto at = [&](double u) { return Sample(plan, u); };
     const Vector3d v = (at(t + h).state.p - at(t - h).state.p) / (2 * h);
     const Vector3d a = (at(t + h).state.v - at(t - h).state.v) / (2 * h);
-    const Vector3d j = (at(t + h).state.a - at(t - h).state.a) / (2 * h);
-    EXPECT_LT((at(t).state.v - v).norm(), 1e-6) << t;
-    EXPECT_LT((at(t).state.a - a).norm(), 1e-6) << t;
-    EXPECT_LT((at(t).state.j - j).norm(), 1e-5) << t;
-    EXPECT_NEAR(at(t).yaw_rate, (at(t + h).yaw - at(t - h).yaw) / (2 * h), 1e-6) << t;
+    EXPECT_LT((at(t).state.v - v).norm(), 1e-5) << t;
+    EXPECT_LT((at(t).state.a - a).norm(), 1e-3) << t;
+    EXPECT_NEAR(at(t).yaw_rate, (at(t + h).yaw - at(t - h).yaw) / (2 * h), 1e-5) << t;
+    EXPECT_LT((at(t + h).state.a - at(t - h).state.a).norm(), 0.01) << t;
   }
 }
 
-TEST(PlanFollower, PlanEndingAtRestIsFlownAsItIs) {
+TEST(PlanFollower, ANewPlanEndsTheStop) {
+  PlanFollower follower;
+  follower.Add(WithStop(Moving(0.0, 2.0, 0.0, 3.0), 0.4, 1.0));
+  follower.Advance(0.9);
+  follower.Add(Moving(1.0, 2.0, 5.0, 0.0));
+  EXPECT_LT(follower.At(0.999)->state.p.x(), 4.0);
+  EXPECT_NEAR(follower.At(1.0)->state.p.x(), 5.0, 1e-9);
+}
+
+TEST(PlanFollower, HoldsTheEndOfAPlanThatEndsAtRest) {
   Plan plan = Moving(0.0, 2.0, 0.0, 0.0);
   plan.position.coefficients.setZero();
   plan.position.coefficients.col(0) = Eigen::Vector4d(0, 3, -3, 1);  // 1 - (1 - tau)^3
-  EXPECT_EQ(Sample(plan, 1.9, 0.6).state.p, plan.position.Position(1.9));
-  EXPECT_EQ(Sample(plan, 2.5, 0.6).state.p, plan.position.Position(2.0));
+  EXPECT_EQ(Sample(plan, 1.9).state.p, plan.position.Position(1.9));
+  EXPECT_EQ(Sample(plan, 2.5).state.p, plan.position.Position(2.0));
+  EXPECT_EQ(Sample(plan, 2.5).state.v, Vector3d::Zero());
+  EXPECT_EQ(Sample(plan, 2.5).yaw_rate, 0.0);
 }
 
-TEST(PlanFollower, TellsHowLongAgoTheLastPlanEnded) {
-  PlanFollower follower(0.6);
-  follower.Add(Moving(0.0, 2.0, 0.0, 1.0));
-  follower.Advance(0.0);
-  EXPECT_NEAR(follower.Overdue(0.5), -1.5, 1e-12);
-  EXPECT_NEAR(follower.Overdue(2.5), 0.5, 1e-12);
+TEST(PlanFollower, RefusesAStopThatIsNone) {
+  PlanFollower follower;
+  Plan plan = WithStop(Moving(0.0, 2.0, 0.0, 3.0), 0.4, 1.0);
+  plan.stop->duration = 0.0;
+  EXPECT_FALSE(follower.Add(plan));
+  plan = WithStop(Moving(0.0, 2.0, 0.0, 3.0), 0.4, 1.0);
+  plan.stop->coefficients(2, 1) = std::numeric_limits<double>::infinity();
+  EXPECT_FALSE(follower.Add(plan));
 }
 
 }  // namespace

@@ -34,7 +34,7 @@ Plan CirclePlan(double start, double duration = 1.2) {
 }
 
 Plan PointPlan(const Vector3d& p, double start = 0.0) {
-  return {world::Trajectory::Constant(p, start, 1.0), Eigen::VectorXd::Zero(1)};
+  return {world::Trajectory::Constant(p, start, 1.0), Eigen::VectorXd::Zero(1), {}};
 }
 
 Body OnCircle() {
@@ -176,58 +176,10 @@ TEST(Controller, IsIdleWithoutPlan) {
   Controller controller(ControlConfig{});
   EXPECT_FALSE(controller.Update(0.0, {}, Health::kUsable));
   EXPECT_FALSE(controller.Update(0.1, {}, Health::kLost));
-  EXPECT_EQ(controller.mode(), Mode::kIdle);
+  EXPECT_EQ(controller.following(), Following::kNone);
   controller.AddPlan(PointPlan({0, 0, 1}, 0.5));
   EXPECT_FALSE(controller.Update(0.2, {}, Health::kUsable));
   EXPECT_TRUE(controller.Update(0.5, {}, Health::kUsable));
-}
-
-TEST(Controller, IsLevelAndSinksWhenPoseIsLost) {
-  const ControlConfig config;
-  Controller controller(config);
-  controller.AddPlan(PointPlan({1, 0, 0}));
-  Estimate estimate;
-  estimate.R_WB = math::FromYaw(0.7) * Quaterniond(Eigen::AngleAxisd(0.3, Vector3d::UnitX()));
-  controller.Update(0.0, estimate, Health::kUsable);
-  for (const Health health : {Health::kLost, Health::kStarting}) {
-    const auto s = controller.Update(0.005, estimate, health);
-    ASSERT_TRUE(s);
-    EXPECT_NEAR((s->R_WB * Vector3d::UnitZ()).z(), 1.0, 1e-12);
-    EXPECT_NEAR(math::Yaw(s->R_WB), math::Yaw(estimate.R_WB), 1e-9);
-    EXPECT_NEAR(s->thrust, 9.81 - config.lost_descent, 1e-9);
-    EXPECT_EQ(controller.mode(), Mode::kLevel);
-  }
-}
-
-TEST(Controller, SinksNoFasterThanDragAllows) {
-  Body body;
-  body.p = {0, 0, 10};
-  Controller controller(ControlConfig{});
-  controller.AddPlan(PointPlan({0, 0, 10}));
-  for (int i = 0; i < 1000; ++i)
-    body.Step(
-        *controller.Update(i * kStep, body.Measured(), i < 200 ? Health::kUsable : Health::kLost));
-  EXPECT_LT(body.v.z(), -0.1);
-  EXPECT_GT(body.v.z(), -0.7);
-}
-
-TEST(Controller, PoseGoingWrongBeforeItIsLostMakesItSinkAllTheSame) {
-  Controller controller(ControlConfig{});
-  controller.AddPlan(PointPlan({0, 0, 1}));
-  Estimate sinking;  // says 1 m too low, for as long as it takes to wind the integral up
-  for (int i = 0; i < 4000; ++i) controller.Update(i * kStep, sinking, Health::kUsable);
-  EXPECT_LT(controller.Update(20.0, sinking, Health::kLost)->thrust, 9.81 + kLargestTrim);
-}
-
-TEST(Controller, LevelDescentKnowsTheTrueHoverThrust) {
-  Body body;
-  body.mass_factor = 1.03;
-  Controller controller(ControlConfig{});
-  controller.AddPlan(PointPlan({0, 0, 0}));
-  for (int i = 0; i < 5000; ++i)
-    body.Step(*controller.Update(i * kStep, body.Measured(), Health::kUsable));
-  const auto s = controller.Update(25.0, body.Measured(), Health::kLost);
-  EXPECT_NEAR(s->thrust / body.mass_factor, 9.81 - ControlConfig{}.lost_descent, 0.05);
 }
 
 TEST(Controller, NeverSendsNaN) {
@@ -255,16 +207,15 @@ TEST(Controller, NeverSendsNaNForOverflowingPlan) {
   controller.AddPlan(plan);
   controller.Update(0.0, {}, Health::kUsable);
   plan.position.start = 0.001;
-  plan.position.coefficients *= 1e300;
-  plan.position.duration = 1e-300;
+  plan.position.coefficients.bottomRows(11).setConstant(1.7e308);
   controller.AddPlan(plan);
   const auto s = controller.Update(0.005, {}, Health::kUsable);
   ASSERT_TRUE(s);
   EXPECT_TRUE(s->R_WB.coeffs().allFinite() && s->w_WB_B.allFinite() && std::isfinite(s->thrust));
-  EXPECT_EQ(controller.mode(), Mode::kLevel);
+  EXPECT_EQ(controller.following(), Following::kBrake);
   controller.AddPlan(PointPlan({0, 0, 0}, 0.008));  // and a good plan mends it
   EXPECT_NEAR(controller.Update(0.010, {}, Health::kUsable)->thrust, 9.81, 0.5);
-  EXPECT_EQ(controller.mode(), Mode::kTracking);
+  EXPECT_EQ(controller.following(), Following::kPlan);
 }
 
 TEST(Controller, StartsAnewWhenTimeJumpsBack) {
@@ -272,7 +223,7 @@ TEST(Controller, StartsAnewWhenTimeJumpsBack) {
   controller.AddPlan(PointPlan({0, 0, 1}, 100.0));
   ASSERT_TRUE(controller.Update(100.0, {}, Health::kUsable));
   EXPECT_FALSE(controller.Update(3.0, {}, Health::kUsable));
-  EXPECT_TRUE(controller.AddPlan(PointPlan({0, 0, 1}, 3.0)));
+  EXPECT_EQ(controller.AddPlan(PointPlan({0, 0, 1}, 3.0)), "");
   EXPECT_TRUE(controller.Update(3.005, {}, Health::kUsable));
 }
 

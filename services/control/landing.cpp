@@ -1,0 +1,36 @@
+#include "services/control/landing.h"
+
+#include <algorithm>
+
+namespace chase::control {
+
+namespace {
+
+// In the air what thrust and weight leave unexplained is the error of the hover thrust (0.4 m/s^2
+// at most, kLargestTrim) and drag (0.15 1/s of 0.5 m/s, and of a gust of 3 m/s upwards): together
+// below 1. On the ground the loop takes `land_speed` times its gain off the thrust, which is 2.
+constexpr double kSupport = 1.0;       // m/s^2
+constexpr double kSmoothing = 0.1;     // s: motors lag 0.05 s, and an accelerometer is noisy
+constexpr double kSupportFor = 0.5;    // s: longer than a bump or a bounce
+constexpr double kLeastLift = -3.0;    // m/s^2: leaves 70 % of the weight to steer with
+constexpr double kMostLift = 1.0;      // m/s^2: a velocity that is wrong is not climbed after
+constexpr double kIntegralGain = 2.0;  // 1/s^2: takes 2 s at a gain of 4 1/s
+constexpr double kMostIntegral = 1.0;  // m/s^2
+
+}  // namespace
+
+double Landing::Lift(const Estimate& estimate, double dt) {
+  Feel(estimate.a_WB.z() - lift_, dt);
+  const double error = -speed_ - estimate.v_WB.z();
+  integral_ = std::clamp(integral_ + kIntegralGain * error * dt, -kMostIntegral, kMostIntegral);
+  lift_ = std::clamp(gain_ * error + integral_, kLeastLift, kMostLift);
+  return lift_;
+}
+
+void Landing::Feel(double support, double dt) {
+  support_ += std::min(1.0, dt / kSmoothing) * (support - support_);
+  supported_ = support_ > kSupport ? supported_ + dt : 0.0;
+  is_down_ = is_down_ || supported_ > kSupportFor;
+}
+
+}  // namespace chase::control

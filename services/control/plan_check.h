@@ -1,0 +1,55 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/math/polynomial.h"
+#include "common/world/obstacle.h"
+#include "common/world/separation_check.h"
+#include "common/world/trajectory.h"
+
+namespace chase::control {
+
+/// That a ball about the drone, or the hull of it and one about the target, stays off an obstacle
+/// for tau in [from, 1].
+struct Proof {
+  int obstacle = 0;  ///< its id; kTargetBody: not one of the list
+  bool of_sight = false;
+  double from = 0.0;                                           ///< tau
+  double radius = 0.0;                                         ///< about the drone, m
+  math::Polynomial target_radius = math::Polynomial::Zero(2);  ///< about the target, m
+  std::vector<world::Separation> separations;
+};
+inline constexpr int kTargetBody = -1;  ///< proofs about the target's own body: nobody lists it
+
+/// What a plan says of itself. Frame W; times in seconds from a common origin.
+struct Claim {
+  world::Trajectory position, target;     ///< p_WB(t), p_WT(t)
+  std::optional<world::Trajectory> stop;  ///< leaves `position` at its start and comes to rest
+  std::vector<Proof> proofs, stop_proofs;
+  double hard_radius = 0.0;  ///< of sphere and tracking tube, m
+  double sigmas = 0.0;       ///< that covariances are taken by
+  bool certified = false;    ///< a clearance is claimed
+  bool last_resort = false;  ///< BRAKE or WAIT: flown without a certificate if there is none
+  bool starts_inside =
+      false;  ///< ESCAPE, or a last resort: it may start in an obstacle and leave it
+};
+
+/// The least that a proof has to be about.
+struct LeastClaim {
+  double hard_radius = 0.0;  ///< m
+  double sigmas = 0.0;
+};
+
+/// Nothing where the plan may be flown among the obstacles; else why not. A certified plan has for
+/// each of them a proof of safety that holds, and so has its stop; proofs of sight that are there
+/// hold too. A plan that is not certified is a last resort. Each plan ends at rest or has a stop
+/// that does.
+std::string Refute(const Claim& claim, const LeastClaim& least,
+                   const std::vector<world::Obstacle>& obstacles);
+
+/// Is the velocity at its end, and the acceleration, as good as none?
+bool EndsAtRest(const world::Trajectory& position);
+
+}  // namespace chase::control

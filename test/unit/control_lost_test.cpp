@@ -1,0 +1,233 @@
+// What is flown without a plan, without a position, and without a velocity.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "common/math/rotation.h"
+#include "common/world/ages.h"
+#include "services/control/controller.h"
+#include "test/unit/control_body.h"
+
+namespace chase::control {
+namespace {
+
+using Eigen::Quaterniond;
+using Eigen::Vector3d;
+using test::Body;
+
+constexpr double kStep = 0.005;  // s
+
+Plan PointPlan(const Vector3d& p, double start = 0.0) {
+  return {world::Trajectory::Constant(p, start, 1.0), Eigen::VectorXd::Zero(1), {}};
+}
+
+/// Along x at `speed`, for 5 s.
+Plan LinePlan(const Vector3d& p, double speed, double start = 0.0) {
+  Plan plan = PointPlan(p, start);
+  plan.position.duration = 5.0;
+  plan.position.coefficients.conservativeResize(2, 3);
+  plan.position.coefficients.row(1) = Eigen::RowVector3d(5.0 * speed, 0.0, 0.0);
+  return plan;
+}
+
+/// A body over the ground at z = 0, and what inertial sensors make of it: position lost, velocity
+/// off by a bias that grows with `drift` m/s^2.
+class Flight {
+ public:
+  explicit Flight(const Vector3d& p, const ControlConfig& config = {}) : controller(config) {
+    body.p = p;
+  }
+
+  /// Flies on until `until`, s.
+  void Fly(double until, Health health) {
+    for (; t < until - 1e-9; t += kStep) {
+      const Vector3d v = body.v;
+      Estimate estimate = body.Measured();
+      estimate.a_WB = a_;
+      if (health != Health::kUsable) {
+        estimate.p_WB += Vector3d(30, 0, -50);
+        estimate.v_WB += (lost_for_ += kStep) * drift;
+        estimate.a_WB += drift;
+      }
+      setpoint = *controller.Update(t, estimate, health);
+      if (!setpoint.motors && off_at < 0.0) off_at = t;
+      body.Step(setpoint);
+      if (body.p.z() < 0.0) {
+        if (down_at < 0.0) down_at = t, impact = -v.z();
+        body.p.z() = 0.0, body.v.setZero();
+      }
+      a_ = (body.v - v) / kStep;
+      fastest = std::max(fastest, body.v.norm());
+    }
+  }
+
+  Controller controller;
+  Body body;
+  Vector3d drift = Vector3d::Zero();
+  Setpoint setpoint;
+  double t = 0.0, down_at = -1.0, off_at = -1.0, impact = 0.0, fastest = 0.0;
+
+ private:
+  Vector3d a_ = Vector3d::Zero();
+  double lost_for_ = 0.0;
+};
+
+TEST(LostPose, BrakesOnTheInertialVelocityAndHoldsTheHeight) {
+  Flight flight({0, 0, 2});
+  flight.body.v = {3, 0, 0};
+  flight.controller.AddPlan(LinePlan({0, 0, 2}, 3.0));
+  flight.Fly(2.0, Health::kUsable);
+  const Vector3d from = flight.body.p;
+  flight.Fly(3.9, Health::kLost);
+  EXPECT_EQ(flight.controller.following(), Following::kBrake);
+  const Vector3d way = flight.body.p - from;
+  std::printf("braking from 3 m/s: %.2f m of way, %.2f m of height\n", way.head<2>().norm(),
+              way.z());
+  EXPECT_LT(flight.body.v.norm(), 0.1);
+  EXPECT_LT(way.head<2>().norm(), 1.5);  // 8 m when it only sank
+  EXPECT_LT(std::abs(way.z()), 0.15);
+}
+
+TEST(LostPose, LandsOnceTheVelocityIsTooOldAndStopsTheMotorsOnTheGround) {
+  for (const double mass : {0.96, 1.0, 1.04})
+    for (const double drift : {-0.03, 0.0, 0.03}) {
+      Flight flight({0, 0, 2});
+      flight.body.mass_factor = mass;
+      flight.drift = {0.02, 0.02, drift};
+      flight.controller.AddPlan(PointPlan({0, 0, 2}));
+      flight.Fly(20.0, Health::kUsable);  // the trim is learnt
+      flight.Fly(20.0 + world::kMostAge.velocity - 0.1, Health::kLost);
+      EXPECT_EQ(flight.controller.following(), Following::kBrake);
+      flight.Fly(35.0, Health::kLost);
+      EXPECT_EQ(flight.controller.following(), Following::kLand);
+      ASSERT_GT(flight.down_at, 0.0) << "mass " << mass << " drift " << drift;
+      EXPECT_LT(flight.impact, 0.8) << "mass " << mass << " drift " << drift;
+      EXPECT_GT(flight.off_at, flight.down_at) << "mass " << mass << " drift " << drift;
+      EXPECT_LT(flight.off_at, flight.down_at + 1.0) << "mass " << mass << " drift " << drift;
+      EXPECT_TRUE(flight.controller.is_down());
+      EXPECT_EQ(flight.setpoint.thrust, 0.0);
+    }
+}
+
+TEST(LostPose, MotorsRunAsLongAsItIsInTheAir) {
+  for (const double gust : {-3.0, 3.0})
+    for (const double mass : {0.96, 1.04}) {
+      Flight flight({0, 0, 40});
+      flight.body.mass_factor = mass;
+      flight.controller.AddPlan(PointPlan({0, 0, 40}));
+      flight.Fly(20.0, Health::kUsable);
+      for (double until = 20.5; until < 60.0; until += 0.5) {
+        flight.body.wind.z() = static_cast<int>(until) % 4 < 2 ? gust : 0.0;
+        flight.Fly(until, Health::kLost);
+      }
+      EXPECT_LT(flight.off_at, 0.0) << "gust " << gust << " mass " << mass;
+      EXPECT_LT(flight.body.p.z(), 30.0);
+    }
+}
+
+TEST(LostPose, MotorsThatAreOffStayOff) {
+  Flight flight({0, 0, 1});
+  flight.controller.AddPlan(PointPlan({0, 0, 1}));
+  flight.Fly(1.0, Health::kUsable);
+  flight.Fly(12.0, Health::kLost);
+  ASSERT_TRUE(flight.controller.is_down());
+  flight.controller.AddPlan(PointPlan({0, 0, 1}, 12.0));
+  flight.Fly(13.0, Health::kUsable);
+  EXPECT_FALSE(flight.setpoint.motors);
+}
+
+TEST(LostPose, GoesBackToThePlanThatIsNear) {
+  Flight flight({0, 0, 2});
+  flight.controller.AddPlan(PointPlan({0, 0, 2}));
+  flight.Fly(1.0, Health::kUsable);
+  flight.Fly(2.0, Health::kLost);
+  flight.Fly(2.1, Health::kUsable);
+  EXPECT_NE(flight.controller.following(), Following::kBrake);
+}
+
+TEST(LostPose, WaitsForANewPlanWhereItHasDrifted) {
+  Flight flight({0, 0, 2});
+  flight.controller.AddPlan(PointPlan({0, 0, 2}));
+  flight.Fly(1.0, Health::kUsable);
+  flight.Fly(2.0, Health::kLost);
+  flight.body.p += Vector3d(2, 0, 0);
+  flight.Fly(2.5, Health::kUsable);
+  EXPECT_EQ(flight.controller.following(), Following::kBrake);
+  EXPECT_LT(flight.body.v.norm(), 0.2);  // no way back that nobody has certified
+  EXPECT_EQ(flight.controller.AddPlan(PointPlan(flight.body.p, 2.5)), "");
+  flight.Fly(2.6, Health::kUsable);
+  EXPECT_EQ(flight.controller.following(), Following::kPlan);
+}
+
+TEST(LostPose, BrakesWhenTheFrameHasChanged) {
+  Flight flight({0, 0, 2});
+  flight.body.v = {2, 0, 0};
+  flight.controller.AddPlan(LinePlan({0, 0, 2}, 2.0));
+  flight.Fly(1.0, Health::kUsable);
+  flight.controller.ForgetPlans();
+  flight.Fly(3.0, Health::kUsable);
+  EXPECT_EQ(flight.controller.following(), Following::kBrake);
+  EXPECT_LT(flight.body.v.norm(), 0.1);
+}
+
+TEST(LostPose, WithoutAVelocityItIsLevelAndSinks) {
+  const ControlConfig config;
+  Controller controller(config);
+  controller.AddPlan(PointPlan({1, 0, 0}));
+  Estimate estimate;
+  estimate.R_WB = math::FromYaw(0.7) * Quaterniond(Eigen::AngleAxisd(0.3, Vector3d::UnitX()));
+  controller.Update(0.0, estimate, Health::kUsable);
+  const auto s = controller.Update(0.005, estimate, Health::kStarting);
+  ASSERT_TRUE(s);
+  EXPECT_NEAR((s->R_WB * Vector3d::UnitZ()).z(), 1.0, 1e-12);
+  EXPECT_NEAR(math::Yaw(s->R_WB), math::Yaw(estimate.R_WB), 1e-9);
+  EXPECT_NEAR(s->thrust, 9.81 - config.lost_descent, 1e-9);
+  EXPECT_EQ(controller.following(), Following::kLand);
+  for (int i = 2; i < 4000; ++i)  // standing still, or a sensor that says so: no reason to stop
+    EXPECT_TRUE(controller.Update(i * kStep, estimate, Health::kStarting)->motors);
+}
+
+TEST(LostPose, SinksNoFasterThanDragAllows) {
+  Flight flight({0, 0, 10});
+  flight.controller.AddPlan(PointPlan({0, 0, 10}));
+  flight.Fly(1.0, Health::kUsable);
+  flight.Fly(5.0, Health::kStarting);
+  EXPECT_LT(flight.body.v.z(), -0.1);
+  EXPECT_GT(flight.body.v.z(), -0.7);
+}
+
+TEST(LostPose, APoseThatGoesWrongBeforeItIsLostMakesItSinkAllTheSame) {
+  Controller controller(ControlConfig{});
+  controller.AddPlan(PointPlan({0, 0, 1}));
+  Estimate sinking;  // says 1 m too low, for as long as it takes to wind the integral up
+  for (int i = 0; i < 4000; ++i) controller.Update(i * kStep, sinking, Health::kUsable);
+  EXPECT_LT(controller.Update(20.0, sinking, Health::kStarting)->thrust, 9.81 + kLargestTrim);
+}
+
+TEST(LostPose, KnowsTheTrueHoverThrust) {
+  Flight flight({0, 0, 0});
+  flight.body.mass_factor = 1.03;
+  flight.body.p.z() = 1.0;
+  flight.controller.AddPlan(PointPlan({0, 0, 1}));
+  flight.Fly(25.0, Health::kUsable);
+  flight.Fly(25.004, Health::kStarting);
+  EXPECT_NEAR(flight.setpoint.thrust / 1.03, 9.81 - ControlConfig{}.lost_descent, 0.05);
+}
+
+TEST(NewPlans, MoveTheReferenceNoFurtherThanAResetUnlessToTheBody) {
+  const ControlConfig config;
+  Flight flight({0, 0, 2});
+  flight.controller.AddPlan(PointPlan({0, 0, 2}));
+  flight.Fly(1.0, Health::kUsable);
+  const double reset = config.reset_distance;
+  EXPECT_EQ(flight.controller.AddPlan(PointPlan({0.99 * reset, 0, 2}, 1.1)), "");
+  EXPECT_NE(flight.controller.AddPlan(PointPlan({2.1 * reset, 0, 2}, 1.2)), "");
+  EXPECT_NE(flight.controller.AddPlan(PointPlan({0, 0, 2 - 2.1 * reset}, 1.2)), "");
+  flight.body.p.x() += 3.0;  // off the plan: a reset starts at the body
+  flight.Fly(1.005, Health::kUsable);
+  EXPECT_EQ(flight.controller.AddPlan(PointPlan({3, 0, 2}, 1.2)), "");
+}
+
+}  // namespace
+}  // namespace chase::control

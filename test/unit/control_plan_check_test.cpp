@@ -1,0 +1,329 @@
+// The check of a plan's proofs: plans of the planner's own pass, forged ones do not. What makes a
+// plan a forgery is judged by dense sampling, which shares nothing with the check.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <functional>
+#include <map>
+
+#include "services/control/plan_check.h"
+#include "test/unit/control_claims.h"
+
+namespace chase::control {
+namespace {
+
+using Eigen::Vector3d;
+using test::Case;
+using test::Random;
+using test::Uniform;
+
+std::string Verdict(const Case& c) { return Refute(c.claim, c.least, c.obstacles); }
+
+/// Is some plane of the proof no plane between the obstacle and the balls?
+bool IsBroken(const Proof& proof, const Claim& claim, const world::Trajectory& way,
+              const world::Obstacle& o) {
+  const world::Body body = world::MakeBody(o, way.start, way.duration, claim.sigmas);
+  for (const world::Separation& s : proof.separations)
+    for (int i = 0; i <= 40; ++i) {
+      const double tau = s.from + (s.to - s.from) * i / 40.0, t = way.start + tau * way.duration;
+      const Vector3d n = s.normal.normalized();
+      const double support =
+          n.dot(world::SupportPoint(body, n)) + claim.sigmas * world::Deviation(body, n, tau);
+      const auto off = [&](const Vector3d& p, double radius) {
+        return n.dot(p - o.center.Position(t)) - support - radius;
+      };
+      if (off(way.Position(t), proof.radius) < -1e-6) return true;
+      if (proof.of_sight &&
+          off(claim.target.Position(t), math::Evaluate(proof.target_radius, tau)) < -1e-6)
+        return true;
+    }
+  return false;
+}
+
+const world::Obstacle* Find(const Case& c, int id) {
+  for (const world::Obstacle& o : c.obstacles)
+    if (o.id == id) return &o;
+  return nullptr;
+}
+
+bool IsBroken(const Case& c, const std::vector<Proof>& proofs, const world::Trajectory& way) {
+  for (const Proof& proof : proofs)
+    if (const world::Obstacle* o = Find(c, proof.obstacle))
+      if (IsBroken(proof, c.claim, way, *o)) return true;
+  return false;
+}
+
+/// By sampling alone.
+bool IsBroken(const Case& c) {
+  return IsBroken(c, c.claim.proofs, c.claim.position) ||
+         IsBroken(c, c.claim.stop_proofs, *c.claim.stop);
+}
+
+/// Any proof about a listed obstacle, of the plan or of its stop.
+Proof& AnyProof(Case* c, Random& g) {
+  for (;;) {
+    auto& proofs = g() % 2 ? c->claim.proofs : c->claim.stop_proofs;
+    Proof& proof = proofs[g() % proofs.size()];
+    if (proof.obstacle != kTargetBody) return proof;
+  }
+}
+
+world::Separation& AnyPlane(Case* c, Random& g) {
+  auto& planes = AnyProof(c, g).separations;
+  return planes[g() % planes.size()];
+}
+
+Vector3d Somewhere(Random& g) {
+  const double x = Uniform(g, -1, 1), y = Uniform(g, -1, 1), z = Uniform(g, -1, 1);
+  return Vector3d(x, y, z).normalized();
+}
+
+/// Certified plans with a stop.
+const std::vector<Case>& Cases() {
+  static const std::vector<Case> cases = [] {
+    std::vector<Case> some;
+    for (unsigned seed = 1; seed <= 40; ++seed)
+      if (Case c = test::MakeCase(seed); c.claim.certified && c.claim.stop) some.push_back(c);
+    return some;
+  }();
+  return cases;
+}
+
+/// Changes the case; false where the change need not be a forgery.
+using Forgery = std::function<bool(Case*, Random&)>;
+
+bool TurnNormal(Case* c, Random& g) {
+  world::Separation& plane = AnyPlane(c, g);
+  const Eigen::AngleAxisd turn(Uniform(g, 0.02, M_PI), Somewhere(g));
+  plane.normal = turn * plane.normal;
+  return IsBroken(*c);
+}
+
+bool ShortenInterval(Case* c, Random& g) {
+  world::Separation& plane = AnyPlane(c, g);
+  const double cut = Uniform(g, 1e-6, 0.5) * (plane.to - plane.from);
+  if (g() % 2)
+    plane.to -= cut;
+  else
+    plane.from += cut;
+  return true;  // a gap
+}
+
+bool EnlargeRadius(Case* c, Random& g) {
+  AnyProof(c, g).radius += Uniform(g, 0.01, 2.0);
+  return IsBroken(*c);
+}
+
+bool ShrinkRadius(Case* c, Random& g) {
+  Proof& proof = AnyProof(c, g);
+  proof.radius = c->claim.hard_radius - Uniform(g, 1e-9, 0.3);
+  return !proof.of_sight;
+}
+
+bool ShrinkHardRadius(Case* c, Random& g) {
+  c->claim.hard_radius -= Uniform(g, 1e-9, 0.3);
+  return true;
+}
+
+bool LowerSigmas(Case* c, Random& g) {
+  c->claim.sigmas -= Uniform(g, 1e-9, 2.0);
+  return true;
+}
+
+bool DropProof(Case* c, Random& g) {
+  auto& proofs = g() % 2 ? c->claim.proofs : c->claim.stop_proofs;
+  const size_t i = g() % proofs.size();
+  const bool needed = !proofs[i].of_sight && proofs[i].obstacle != kTargetBody;
+  proofs.erase(proofs.begin() + static_cast<long>(i));
+  return needed;
+}
+
+bool ShuffleAndTurn(Case* c, Random& g) {
+  if (!TurnNormal(c, g)) return false;
+  std::shuffle(c->claim.proofs.begin(), c->claim.proofs.end(), g);
+  std::shuffle(c->claim.stop_proofs.begin(), c->claim.stop_proofs.end(), g);
+  return true;
+}
+
+bool DropPlanes(Case* c, Random& g) {
+  AnyProof(c, g).separations.clear();
+  return true;
+}
+
+bool MoveObstacle(Case* c, Random& g) {
+  world::Obstacle& o = c->obstacles[g() % c->obstacles.size()];
+  o.center.coefficients.row(0) += Uniform(g, 0.01, 3.0) * Somewhere(g).transpose();
+  return IsBroken(*c);
+}
+
+bool GrowObstacle(Case* c, Random& g) {
+  c->obstacles[g() % c->obstacles.size()].shape *= Uniform(g, 0.05, 0.95);
+  return IsBroken(*c);
+}
+
+bool AddObstacle(Case* c, Random& g) {
+  world::Obstacle o = c->obstacles[g() % c->obstacles.size()];
+  o.id = 1000;
+  c->obstacles.insert(c->obstacles.begin() + static_cast<long>(g() % c->obstacles.size()), o);
+  return true;
+}
+
+bool ExchangeProofs(Case* c, Random& g) {
+  Proof &a = AnyProof(c, g), &b = AnyProof(c, g);
+  if (a.of_sight != b.of_sight) return false;
+  std::swap(a.separations, b.separations);
+  return IsBroken(*c);
+}
+
+bool MovePlan(Case* c, Random& g) {
+  const int k =
+      static_cast<int>(g() % static_cast<unsigned>(c->claim.position.coefficients.rows()));
+  c->claim.position.coefficients.row(k) += Uniform(g, 0.01, 3.0) * Somewhere(g).transpose();
+  return IsBroken(*c, c->claim.proofs, c->claim.position);
+}
+
+bool MoveStop(Case* c, Random& g) {
+  c->claim.stop->coefficients.row(0) += Uniform(g, 0.001, 1.0) * Somewhere(g).transpose();
+  return true;  // it does not begin on the plan
+}
+
+bool ExchangeStop(Case* c, Random& g) {
+  const Case& other = Cases()[g() % Cases().size()];
+  if (other.seed == c->seed) return false;
+  c->claim.stop = other.claim.stop;
+  c->claim.stop_proofs = other.claim.stop_proofs;
+  return true;
+}
+
+bool SpeedStopUp(Case* c, Random& g) {
+  c->claim.stop->coefficients.row(1) *= Uniform(g, 1.1, 2.0);
+  return c->claim.stop->Velocity(c->claim.stop->start).norm() > 0.1;
+}
+
+bool SpeakLater(Case* c, Random& g) {
+  Proof& proof = AnyProof(c, g);
+  if (proof.of_sight) return false;
+  proof.from = Uniform(g, 1e-6, 1.0);
+  while (proof.separations.size() > 1 && proof.separations.front().to <= proof.from)
+    proof.separations.erase(proof.separations.begin());
+  proof.separations.front().from = proof.from;
+  return true;
+}
+
+bool TakeCertificateBack(Case* c, Random& /*g*/) {
+  c->claim.certified = false;
+  return true;
+}
+
+const std::map<std::string, Forgery>& Forgeries() {
+  static const std::map<std::string, Forgery> all = {
+      {"normal turned, another order", ShuffleAndTurn},
+      {"normal turned", TurnNormal},
+      {"interval shortened", ShortenInterval},
+      {"radius enlarged", EnlargeRadius},
+      {"radius shrunk", ShrinkRadius},
+      {"hard radius shrunk", ShrinkHardRadius},
+      {"sigmas lowered", LowerSigmas},
+      {"proof missing", DropProof},
+      {"planes missing", DropPlanes},
+      {"obstacle moved", MoveObstacle},
+      {"obstacle grown", GrowObstacle},
+      {"obstacle added", AddObstacle},
+      {"proofs exchanged", ExchangeProofs},
+      {"plan moved", MovePlan},
+      {"stop moved", MoveStop},
+      {"stop exchanged", ExchangeStop},
+      {"stop too fast", SpeedStopUp},
+      {"proof from later on", SpeakLater},
+      {"not certified", TakeCertificateBack}};
+  return all;
+}
+
+TEST(PlanCheck, TakesThePlannersOwnPlans) {
+  int n = 0, sight = 0;
+  for (unsigned seed = 1; seed <= 40; ++seed) {
+    const Case c = test::MakeCase(seed);
+    if (!c.claim.certified) continue;
+    EXPECT_EQ(Verdict(c), "") << "seed " << seed;
+    EXPECT_FALSE(c.claim.stop && IsBroken(c)) << "seed " << seed;
+    for (const Proof& proof : c.claim.proofs) sight += proof.of_sight;
+    ++n;
+  }
+  EXPECT_GE(n, 20);
+  EXPECT_GE(sight, 100);
+}
+
+TEST(PlanCheck, RefusesTenThousandForgeries) {
+  ASSERT_FALSE(Cases().empty());
+  const int each = 10000 / static_cast<int>(Forgeries().size()) + 1;
+  int taken = 0, made = 0;
+  for (const auto& [name, forge] : Forgeries()) {
+    Random g(7);
+    int n = 0;
+    for (int i = 0; n < each && i < 100 * each; ++i) {
+      Case c = Cases()[g() % Cases().size()];
+      if (!forge(&c, g)) continue;
+      ++n;
+      if (!Verdict(c).empty()) continue;
+      ++taken;
+      ADD_FAILURE() << name << ", try " << i << ", seed of the plan " << c.seed;
+    }
+    EXPECT_EQ(n, each) << name;
+    made += n;
+  }
+  std::printf("%d forgeries of %zu kinds, %d taken\n", made, Forgeries().size(), taken);
+  EXPECT_GE(made, 10000);
+}
+
+TEST(PlanCheck, NamesObstacleAndWhatIsMissing) {
+  Case c = test::MakeCase(1);
+  c.claim.proofs.clear();
+  EXPECT_EQ(Verdict(c),
+            "obstacle " + std::to_string(c.obstacles[0].id) + " has no proof of safety");
+  c = test::MakeCase(1);
+  c.claim.stop_proofs.clear();
+  EXPECT_EQ(Verdict(c).find("stop: obstacle"), 0U) << Verdict(c);
+}
+
+TEST(PlanCheck, LastResortsNeedNoCertificateButComeToRest) {
+  Claim claim;
+  claim.position = world::Trajectory::Constant({1, 2, 3}, 0.0, 1.0);
+  claim.target = claim.position;
+  EXPECT_EQ(Refute(claim, {0.3, 2.0}, {}), "it is not certified");
+  claim.last_resort = true;
+  EXPECT_EQ(Refute(claim, {0.3, 2.0}, {}), "");
+  claim.position.coefficients = Eigen::MatrixXd::Ones(2, 3);
+  EXPECT_EQ(Refute(claim, {0.3, 2.0}, {}), "it neither stops nor ends at rest");
+}
+
+TEST(PlanCheck, OnlyAnEscapeMayStartInside) {
+  Random g(3);
+  Case c = test::MakeCase(1);
+  for (Proof& proof : c.claim.proofs)
+    if (!proof.of_sight && proof.obstacle == c.obstacles[0].id) {
+      proof.from = 0.2;
+      auto& planes = proof.separations;
+      while (planes.front().to <= 0.2) planes.erase(planes.begin());
+      planes.front().from = 0.2;
+    }
+  EXPECT_EQ(Verdict(c),
+            "obstacle " + std::to_string(c.obstacles[0].id) + " is kept off only later");
+  c.claim.starts_inside = true;
+  EXPECT_EQ(Verdict(c), "");
+}
+
+TEST(PlanCheck, RefusesWhatIsNoCurve) {
+  Case c = test::MakeCase(1);
+  c.claim.position.coefficients = Eigen::MatrixXd::Zero(17, 3);
+  EXPECT_EQ(Verdict(c), "it is no curve");
+  c = test::MakeCase(1);
+  c.obstacles[0].center.coefficients = Eigen::MatrixXd::Zero(17, 3);
+  EXPECT_NE(Verdict(c), "");
+  c = test::MakeCase(1);
+  c.claim.position.coefficients(1, 1) = std::nan("");
+  EXPECT_NE(Verdict(c), "");
+}
+
+}  // namespace
+}  // namespace chase::control
