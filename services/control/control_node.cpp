@@ -8,13 +8,13 @@
 #include "chase/attitude_setpoint_t.hpp"
 #include "chase/tracking_t.hpp"
 #include "common/bus/convert.h"
+#include "common/world/ages.h"
 
 namespace chase::control {
 
 namespace {
 
-constexpr size_t kLists = 8;                 // 0.4 s at 20 Hz: plans name none older than 0.3 s
-constexpr int64_t kTrackingPeriod = 50'000;  // us
+constexpr size_t kLists = 8;  // 0.4 s at 20 Hz: plans name none older than 0.3 s
 
 std::vector<Proof> FromMessage(const std::vector<proof_t>& messages) {
   std::vector<Proof> proofs(messages.size());
@@ -124,6 +124,7 @@ void ControlNode::OnPlan(const plan_t& message) {
 }
 
 void ControlNode::OnPose(const pose_t& message) {
+  ticks_without_pose_ = 0;
   if (epoch_.Change(message.epoch)) {
     controller_.ForgetPlans();
     lists_.clear();
@@ -139,7 +140,19 @@ void ControlNode::OnPose(const pose_t& message) {
     setpoint = controller_.Update(t, FromMessage(message), health);
   }
   if (setpoint) Send(message.utime, *setpoint);
-  if (std::abs(message.utime - last_tracking_) >= kTrackingPeriod) SendTracking(message.utime);
+  if (std::abs(message.utime - last_tracking_) >= kTick) SendTracking(message.utime);
+}
+
+// Without poses: level, until the autopilot's own limit on silence may act. Ticks are counted
+// rather than stamps compared: whoever sets the clock does not make the pose old.
+void ControlNode::Tick(int64_t utime) {
+  const double silence = bus::Seconds(ticks_without_pose_++ * kTick, 0);
+  if (silence <= world::kMostAge.pose || silence > world::kMostAge.velocity) return;
+  const std::optional<Setpoint> setpoint = controller_.Blind();
+  if (!setpoint) return;
+  pose_reason_ = "no pose is heard";
+  Send(utime, *setpoint);
+  SendTracking(utime);
 }
 
 void ControlNode::Send(int64_t utime, const Setpoint& setpoint) {

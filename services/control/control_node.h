@@ -18,13 +18,17 @@
 
 namespace chase::control {
 
-/// PLAN, OBSTACLES and POSE in, ATTITUDE_SETPOINT and TRACKING out; every POSE triggers.
+/// PLAN, OBSTACLES and POSE in, ATTITUDE_SETPOINT and TRACKING out; every POSE triggers. Ticks
+/// only notice that there are none.
 class ControlNode : public bus::Node {
  public:
   ControlNode(bus::Bus& bus, const ControlConfig& config);
+  int64_t TickPeriod() const override { return kTick; }
+  void Tick(int64_t utime) override;
   bus::NodeReport Report() const override;
 
  private:
+  static constexpr int64_t kTick = 50'000;  // us
   void OnPlan(const plan_t& message);
   void OnObstacles(const obstacles_t& message);
   void OnPose(const pose_t& message);
@@ -42,6 +46,7 @@ class ControlNode : public bus::Node {
   std::deque<std::pair<int32_t, std::vector<world::Obstacle>>> lists_;  // by seq, newest last
   std::optional<int64_t> origin_;  // utime that the core's seconds count from
   int64_t last_tracking_ = 0;
+  int ticks_without_pose_ = 0;
   std::string pose_reason_;  // why the pose is not usable
   int64_t n_plans_ = 0, n_refused_ = 0;
 };

@@ -107,6 +107,11 @@ std::optional<Setpoint> Controller::WithoutPose(double t, const Estimate& estima
   return setpoint;
 }
 
+std::optional<Setpoint> Controller::Blind() {
+  if (!flying_) return std::nullopt;
+  return WithoutPose(last_t_.value_or(0.0), {}, Health::kStarting, 0.0);
+}
+
 void Controller::RestartIfTimeJumpedBack(double t) {
   if (last_t_ && t < *last_t_ - kJumpBack) *this = Controller(config_);
 }

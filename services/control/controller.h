@@ -47,6 +47,9 @@ class Controller {
   /// stopped on the ground stay so. Time that jumps back starts the controller anew.
   std::optional<Setpoint> Update(double t, const Estimate& estimate, Health health);
 
+  /// Setpoint while no pose comes at all: level, sinking; nothing while there is nothing to fly.
+  std::optional<Setpoint> Blind();
+
   Following following() const { return following_; }
   bool is_down() const { return landing_.is_down(); }
   /// Reference minus estimate, m; 0 unless there is a reference that is followed.

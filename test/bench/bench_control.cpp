@@ -32,3 +32,5 @@ BENCHMARK(CheckPlan)->Unit(benchmark::kMicrosecond);
 
 }  // namespace
 }  // namespace chase::control
+
+BENCHMARK_MAIN();

@@ -102,6 +102,8 @@ class Bench {
     lockstep_.RunUntil(utime);
   }
 
+  void RunUntil(int64_t utime) { lockstep_.RunUntil(utime); }
+
   const ControlNode& node() const { return *node_; }
   std::vector<attitude_setpoint_t> out;
   std::vector<tracking_t> tracking;
@@ -147,8 +149,7 @@ TEST(ControlNode, TurnsToANewPlanAtItsUtime) {
 TEST(ControlNode, HoldsAndComplainsWhenThePlanIsStale) {
   Bench bench;
   bench.SendPlan(kStart, {0, 0, 0}, 1.0);
-  bench.SendPose(kStart);
-  bench.SendPose(kStart + 5'000'000);
+  for (int i = 0; i <= 100; ++i) bench.SendPose(kStart + 50'000 * i);
   EXPECT_NEAR(bench.out.back().thrust, 9.81, 1e-6);
   EXPECT_EQ(bench.node().Report().state, bus::NodeReport::State::kDegraded);
 }
@@ -235,6 +236,28 @@ TEST(ControlNode, AnotherFrameVoidsPlansAndLists) {
   bench.SendPose(kStart + 25'000, pose_t::HEALTH_OK, 1);
   EXPECT_EQ(bench.node().Report().state, bus::NodeReport::State::kOk)
       << bench.node().Report().detail;
+}
+
+TEST(ControlNode, LevelsWhenNoPoseComesAndLeavesTheRestToTheAutopilot) {
+  Bench bench;
+  bench.RunUntil(kStart + 1'000'000);
+  EXPECT_TRUE(bench.out.empty());
+  bench.SendPlan(kStart + 1'000'000, {5, 0, 0});
+  bench.SendPose(kStart + 1'000'000);
+  bench.SendPose(kStart + 1'005'000);
+  ASSERT_EQ(bench.out.size(), 2U);
+  EXPECT_LT(bench.out.back().orientation[0], 0.999);
+  bench.RunUntil(kStart + 1'099'000);
+  EXPECT_EQ(bench.out.size(), 2U);
+  bench.RunUntil(kStart + 1'200'000);
+  ASSERT_GT(bench.out.size(), 2U);
+  EXPECT_NEAR(bench.out.back().orientation[0], 1.0, 1e-9);
+  EXPECT_EQ(bench.tracking.back().following, +tracking_t::LAND);
+  bench.RunUntil(kStart + 4'000'000);
+  const size_t n = bench.out.size();
+  EXPECT_NEAR(static_cast<double>(n), 40.0, 4.0);
+  bench.RunUntil(kStart + 5'000'000);
+  EXPECT_EQ(bench.out.size(), n);
 }
 
 TEST(ControlNode, SaysTwentyTimesASecondHowWellItFollows) {

@@ -1,7 +1,9 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
+#include <vector>
 
 #include "common/math/rotation.h"
 #include "services/control/controller.h"
@@ -106,6 +108,31 @@ TEST(ControlLoop, FliesCircleInWindWithWrongMass) {
   Report("wind 3 m/s, mass +5 %, 20 ms:", e);
   EXPECT_LT(e.rms, 0.06);
   EXPECT_LT(e.peak, 0.12);
+}
+
+TEST(ControlLoop, ErrorBoundHoldsForTheHalfSecondToCome) {
+  for (const double wind : {0.0, 3.0}) {
+    Body body = OnCircle();
+    body.wind = {wind, 0.0, 0.0};
+    body.mass_factor = 1.02;
+    body.latency_ms = 20;
+    Controller controller(ControlConfig{});
+    std::vector<double> errors, bounds;
+    for (int i = 0; i * kStep < 60.0; ++i) {
+      const double t = i * kStep;
+      if (i % 8 == 0) controller.AddPlan(CirclePlan(t));
+      body.wind.x() = wind * (1.0 + 0.5 * std::sin(2.0 * t));
+      body.Step(*controller.Update(t, body.Measured(), Health::kUsable));
+      errors.push_back(controller.error().norm());
+      bounds.push_back(controller.error_bound());
+    }
+    int held = 0, n = 0;
+    for (size_t i = 400; i + 100 < errors.size(); ++i, ++n)
+      held += *std::max_element(&errors[i], &errors[i] + 100) <= bounds[i];
+    std::printf("bound holds for %.2f %% of %d half seconds, wind %.0f m/s\n", 100.0 * held / n, n,
+                wind);
+    EXPECT_GT(held, 0.99 * n) << wind;
+  }
 }
 
 TEST(ControlLoop, IntegralTakesOutMassErrorAtHover) {
