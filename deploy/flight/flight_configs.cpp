@@ -69,6 +69,8 @@ FlightConfigs Configure(const world::Scenario& scenario, const FlightOptions& op
   Override(scenario, "perception", &configs.perception);
   Override(scenario, "prediction", &configs.prediction);
   Override(scenario, "planning", &configs.planning);
+  configs.control.tracking_tube = configs.planning.planner.tracking_tube;
+  configs.control.sigmas = configs.planning.planner.sigmas;
   Override(scenario, "control", &configs.control);
   if (!options.sensors.empty()) configs.simulator.sensors = options.sensors;
   if (!options.planner.empty()) configs.planning.planner_name = options.planner;

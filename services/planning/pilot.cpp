@@ -12,6 +12,8 @@ namespace {
 
 constexpr double kHoverDuration = 2.0;  // s
 constexpr double kShortestHorizon = 1.0;
+// s: control says 20 times a second whether it flies; nobody climbs before that was heard.
+constexpr double kHearControl = 0.3;
 
 // Rest to rest from a to b, minimum jerk.
 world::Trajectory RestToRest(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double start,
@@ -95,11 +97,13 @@ bool Pilot::IsDue(double t) const {
 std::optional<PlanResult> Pilot::Update(double t, const BodyEstimate& body) {
   const double t0 = t + config_.latency;
   const Start start = StartAt(t, t0, body);
+  if (!first_update_) first_update_ = t;
   if (obstacles_changed_ && has_running_ && HasTarget(t)) {
     obstacles_changed_ = false;
     news_ = news_ || !planner_->IsCertified(Request(t0, start), running_.trajectory);
   }
-  if (!IsDue(t)) return std::nullopt;
+  if (!IsDue(t) || (!heard_control_ && !has_running_ && t < *first_update_ + kHearControl))
+    return std::nullopt;
   PlanResult plan =
       airborne_ && HasTarget(t) && SeesObstacles(t) ? Chase(t0, start) : Wait(t0, start, body);
   if (!IsFinite(plan)) plan = Rest(t0, {{body.p}, {body.yaw, 0.0}});

@@ -37,7 +37,10 @@ class Pilot {
   void SetForecast(const Forecast& forecast);
   void SetObstacles(double t, std::vector<world::Obstacle> obstacles);
   /// Control says that it flies: a planner that has just been started must not take off again.
-  void SetAirborne() { airborne_ = airborne_ || !has_running_; }
+  void SetFlying(bool flying) {
+    heard_control_ = true;
+    airborne_ = airborne_ || (flying && !has_running_);
+  }
 
   /// Forgets all that was said in the frame W that was: forecast, obstacles, the running plan.
   void ChangeFrame();
@@ -79,6 +82,8 @@ class Pilot {
   bool news_ = false;
   bool obstacles_changed_ = false;
   bool airborne_ = false;
+  bool heard_control_ = false;
+  std::optional<double> first_update_;  ///< s
   bool had_target_ = false;
   double climb_end_ = 0.0;
   double search_turn_ = 1.0;

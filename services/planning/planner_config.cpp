@@ -57,7 +57,7 @@ std::string PlannerConfig::Problem() const {
 
 PlannerConfig PlannerConfig::Literal() {
   PlannerConfig c;
-  c.adaptive = c.refine = false;
+  c.adaptive = c.refine = c.minkowski_sums = false;
   c.drone_radius = c.tracking_tube = c.safety_margin = c.sight_margin = c.sigmas = 0.0;
   c.max_speed = c.max_acceleration = c.max_elevation_deg = c.max_bearing_deg = 0.0;
   c.min_distance = 0.0;

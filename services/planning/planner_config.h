@@ -18,6 +18,7 @@ struct PlannerConfig {
   bool refine = true;
   double refine_room = 0.05;
   bool exact_visibility = true;
+  bool minkowski_sums = true;
 
   double weight_smooth = 0.05, weight_obstacle = 1.0, weight_distance = 1.0, weight_yaw = 1.0;
   double rho_acceleration = 1.0, rho_jerk = 0.1;
@@ -52,6 +53,8 @@ struct PlannerConfig {
     v("refine", refine, "move the winner, and the running plan, downhill while certified");
     v("refine_room", refine_room, "more margin that moved plans keep where there is room, m");
     v("exact_visibility", exact_visibility, "exact sight condition; false: the paper's bound");
+    v("minkowski_sums", minkowski_sums,
+      "proofs are about solids; false: about ellipsoids grown along their axes, to compare");
     v("weight_smooth", weight_smooth, "[w_1]");
     v("weight_obstacle", weight_obstacle, "[w_2]");
     v("weight_distance", weight_distance, "[w_3]");

@@ -81,7 +81,7 @@ PlanningNode::PlanningNode(bus::Bus& bus, const PlanningConfig& config)
   bus_.Subscribe<prediction_t>("PREDICTION", [this](const prediction_t& m) { OnPrediction(m); });
   bus_.Subscribe<obstacles_t>("OBSTACLES", [this](const obstacles_t& m) { OnObstacles(m); });
   bus_.Subscribe<tracking_t>("TRACKING", [this](const tracking_t& m) {
-    if (m.following != tracking_t::NONE) pilot_.SetAirborne();
+    pilot_.SetFlying(m.following != tracking_t::NONE);
   });
   bus_.Subscribe<pose_t>("POSE", [this](const pose_t& m) { OnPose(m); });
 }

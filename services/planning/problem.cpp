@@ -346,10 +346,8 @@ void MakeProblem(const PlannerConfig& config, const PlanRequest& request, std::s
     const Growth widest{hard + margin + most,
                         config.sight_margin + problem->target_growth.sum() + most};
     SetBoxes(o, widest, e);
-    const bool as_it_is = o.solid == world::Obstacle::Solid::kEllipsoid && !(widest.safety > 0.0) &&
-                          !(widest.sight > 0.0);
     e->body.reset();
-    if (!as_it_is) e->body = BodyOf(o, *problem);
+    if (config.minkowski_sums) e->body = BodyOf(o, *problem);
     // Far from start and target no margin has to give way.
     if (!MayTouch(own, e->center, e->safety_half.max(e->sight_half), kClear)) continue;
     RelaxSafety(o, hard, margin, now, &start, e, notes);

@@ -38,6 +38,7 @@ int SeedOf(const std::string& name) {
 planning::PlanningConfig Planning(const world::Scenario& scenario, const std::string& file) {
   planning::PlanningConfig config;
   config.planner.desired_distance = scenario.chaser.desired_distance;
+  config.planner.minkowski_sums = false;  // the comparison's ellipsoids are the obstacles
   config.planner.drone_radius = scenario.chaser.radius;
   config::LoadText(world::ServiceConfig(scenario, "planning"), file + ", services: planning",
                    &config);

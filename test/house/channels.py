@@ -12,7 +12,7 @@ LISTENS = {
     "mapping": {"SCAN_REGISTERED", "TARGET"},
     "perception": {"CAMERA_IMAGE", "LIDAR_SCAN", "POSE"},
     "prediction": {"TARGET", "OBSTACLES"},
-    "planning": {"PREDICTION", "OBSTACLES", "POSE"},
+    "planning": {"PREDICTION", "OBSTACLES", "POSE", "TRACKING"},
     "control": {"PLAN", "OBSTACLES", "POSE"},
     "simulator": {"ATTITUDE_SETPOINT"},
 }

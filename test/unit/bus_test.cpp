@@ -67,7 +67,7 @@ TEST(Lockstep, DeliversAfterEachProcessLatency) {
     source = node.get();
     return node;
   });
-  lockstep.Add("echo", 3000, [](Bus& bus) { return std::make_unique<Echo>(bus); });
+  lockstep.Add("control", 3000, [](Bus& bus) { return std::make_unique<Echo>(bus); });
   lockstep.RunUntil(1000000 + 100000);
   ASSERT_EQ(source->delays.size(), 20u);  // the answer to the last tick is under way
   for (const int64_t delay : source->delays) EXPECT_EQ(delay, 3000);
@@ -80,7 +80,7 @@ std::string RecordLockstep(const std::string& file) {
     log.Write(utime, channel, bytes);
   });
   lockstep.Add("source", 0, [](Bus& bus) { return std::make_unique<Source>(bus); });
-  lockstep.Add("echo", 2000, [](Bus& bus) { return std::make_unique<Echo>(bus); });
+  lockstep.Add("control", 2000, [](Bus& bus) { return std::make_unique<Echo>(bus); });
   lockstep.RunUntil(3500000);
   log.Close();
   return Bytes(file);

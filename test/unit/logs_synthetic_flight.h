@@ -77,7 +77,7 @@ class SyntheticLog {
   }
 
   void WriteScenario(const std::string& yaml) {
-    scenario_t m;
+    scenario_t m{};
     m.seq = 0;
     m.seed = 7;
     m.start_utime = origin_;
@@ -128,7 +128,7 @@ class SyntheticLog {
   }
 
   static polynomial_t Line(int64_t utime, const V& from, const V& to, double duration) {
-    polynomial_t m;
+    polynomial_t m{};
     m.utime = utime;
     m.duration = duration;
     m.n_coefficients = 6;

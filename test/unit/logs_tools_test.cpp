@@ -138,13 +138,19 @@ std::vector<std::string> Declared(const std::string& lcm) {
 
 TEST(FieldTables, ListEveryFieldOfEveryTypeInWireOrder) {
   const std::string tables = ReadText("logs/src/field_tables.h");
+  const size_t begin = tables.find("{\n", tables.find("void VisitHead(")) + 2;
+  const std::string head = tables.substr(begin, tables.find("}", begin) - begin);
+  EXPECT_NE(head.find("n_inputs"), std::string::npos);
   int types = 0;
   for (const auto& entry : fs::directory_iterator("lcmtypes")) {
     if (entry.path().extension() != ".lcm") continue;
     std::string expected =
         "void VisitFields(const " + entry.path().stem().string() + "& m, V& v) {\n";
+    std::string fields;
     for (const std::string& name : Declared(ReadText(entry.path().string())))
-      expected += "  v(\"" + name + "\", m." + name + ");\n";
+      fields += "  v(\"" + name + "\", m." + name + ");\n";
+    if (fields.rfind(head, 0) == 0) fields = "  VisitHead(m, v);\n" + fields.substr(head.size());
+    expected += fields;
     EXPECT_NE(tables.find(expected + "}"), std::string::npos) << entry.path();
     ++types;
   }
