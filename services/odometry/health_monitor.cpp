@@ -54,8 +54,10 @@ void HealthMonitor::OnSweep(double end, int returns, double imu_t, bool imu_sile
 void HealthMonitor::OnMatch(double end, const MatchResult& match, bool applied) {
   match_problem_.clear();
   if (applied) last_good_ = end;
-  if (!match.valid)
-    match_problem_ = Text("sweep does not fit the map: %.0f %% inliers", 100.0 * match.inliers);
+  if (match.misfit)
+    match_problem_ = Text("sweep contradicts the map: %.0f %% fit", 100.0 * match.fit);
+  else if (!match.valid)
+    match_problem_ = "sweep shows nothing that is mapped";
   else if (!applied)
     match_problem_ = "scan match refused by the filter";
   else if (match.degenerate())

@@ -144,6 +144,7 @@ SweepResult Odometry::ProcessSweep() {
   result.match = Match(&prepared);
   const bool first = planes_.cells() == 0;
   const bool applied = first || Apply(prepared, result.match);
+  result.applied = applied;
   if (first || !applied) base_ = prepared.predicted;
   if (first) result.match.valid = applied;
   health_.OnMatch(prepared.end, result.match, applied);
@@ -155,7 +156,7 @@ SweepResult Odometry::ProcessSweep() {
     edges_.Clear();
   }
   RestartMapWhenLost(prepared.end);
-  if (applied || planes_.cells() == 0) Learn(prepared, base_.pose());
+  if (applied || planes_.cells() == 0 || Extends(result.match)) Learn(prepared, base_.pose());
   if (applied && !first) FollowDrift(result.match);
   Catchup();
   result.registered = Registered(prepared);
@@ -232,6 +233,12 @@ bool Odometry::Apply(const Prepared& prepared, const MatchResult& match) {
   return true;
 }
 
+/// A sweep over ground that the map does not know extends it while inertia still tells the pose
+/// within a cell.
+bool Odometry::Extends(const MatchResult& match) const {
+  return !match.valid && !match.misfit && UncertaintyOf(base_) < config_.map.cell_size;
+}
+
 void Odometry::Learn(const Prepared& prepared, const Pose& X_WB) {
   std::vector<int> planes;
   for (size_t i = 0; i < prepared.features.planes.size();
@@ -258,6 +265,7 @@ void Odometry::RestartMapWhenLost(double end) {
   const double patience =
       3.0 * (fused_ ? config_.health.lost_after : config_.health.lost_after_blind);
   if (end - health_.last_good_sweep() < patience) return;
+  ++epoch_;
   planes_.Clear();
   edges_.Clear();
 }
@@ -311,6 +319,7 @@ PoseEstimate Odometry::Estimate() const {
   const double sigma = std::sqrt(std::max(0.0, live_.P.topLeftCorner<3, 3>().trace()));
   out.health = health_.At(live_.t, fused_, sigma);
   out.correcting = blend_.correcting();
+  out.epoch = epoch_;
   return out;
 }
 

@@ -25,6 +25,7 @@ struct PoseEstimate {
   Eigen::Matrix<double, 9, 9> covariance = Eigen::Matrix<double, 9, 9>::Zero();  ///< p, v, theta
   HealthReport health;
   bool correcting = false;
+  int epoch = 0;  ///< changes whenever the map begins anew: W is another frame from then on
 };
 
 /// A sweep deskewed to its end.
@@ -40,6 +41,7 @@ struct SweepResult {
   std::optional<PoseEstimate> pose;  ///< only where no IMU carries the pose
   std::optional<RegisteredSweep> registered;
   MatchResult match;
+  bool applied = false;  ///< the match corrected the state
 };
 
 /// LiDAR odometry fused with an IMU. The filter's state at the end of the last good sweep is kept;
@@ -90,6 +92,7 @@ class Odometry {
   void PlaceFirst(const Pose& X_WB, const Eigen::Vector3d& v, const Eigen::Vector3d& w_B);
   void Bend(const Pose& X_WB, Prepared* prepared) const;
   bool Apply(const Prepared& prepared, const MatchResult& match);
+  bool Extends(const MatchResult& match) const;
   void Learn(const Prepared& prepared, const Pose& X_WB);
   void FollowDrift(const MatchResult& match);
   void RestartMapWhenLost(double end);
@@ -119,6 +122,7 @@ class Odometry {
   std::deque<Pending> pending_;
   std::optional<Prepared> first_;  // of a start without IMU, until the velocity is known
   Thinning thinning_;
+  int epoch_ = 0;
   int64_t dropped_sweeps_ = 0, dropped_samples_ = 0;
 };
 

@@ -32,6 +32,7 @@ std::string OdometryConfig::Problem() const {
                     {"match.gate", match.gate},
                     {"match.kernel", match.kernel},
                     {"match.range_noise", match.range_noise},
+                    {"match.min_support", match.min_support},
                     {"filter.gyro_noise", filter.gyro_noise},
                     {"filter.accel_noise", filter.accel_noise},
                     {"filter.gravity", filter.gravity},
@@ -56,8 +57,6 @@ std::string OdometryConfig::Problem() const {
   if (map.max_cells < 1000) return OutOfRange("map.max_cells", map.max_cells, "at least 1000");
   if (match.max_iterations < 1)
     return OutOfRange("match.max_iterations", match.max_iterations, "at least 1");
-  if (match.min_features < 6)
-    return OutOfRange("match.min_features", match.min_features, "at least 6");
   return "";
 }
 

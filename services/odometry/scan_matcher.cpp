@@ -4,6 +4,7 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "common/math/rotation.h"
 
@@ -56,11 +57,13 @@ class ScanMatcher::Matched {
 };
 
 ScanMatcher::System ScanMatcher::Linearise(const Pose& X_WB, double kernel, double gate,
-                                           Matched* planes, Matched* edges) const {
+                                           Matched* planes, Matched* edges,
+                                           std::vector<Row>* rows) const {
   System system;
   const Eigen::Matrix3d R = X_WB.R.toRotationMatrix();
   const double k2 = kernel * kernel;
   const double noise2 = config_.range_noise * config_.range_noise;
+  rows->clear();
   const auto add = [&](Matched* features, auto&& residual_of, double weight) {
     features->MoveTo(R, X_WB.p);
     system.total += static_cast<int>(features->size());
@@ -76,7 +79,9 @@ ScanMatcher::System ScanMatcher::Linearise(const Pose& X_WB, double kernel, doub
       if (std::abs(r) < kernel) ++system.inliers;
       const double robust = k2 / (k2 + r * r);
       const double trust = noise2 / (noise2 + static_cast<double>(surface->variance));
-      system.Add(r, weight * trust * robust * robust, J, rotated.squaredNorm());
+      const double w = weight * trust * robust * robust;
+      system.Add(r, w, J, rotated.squaredNorm());
+      rows->push_back({J.cast<float>(), static_cast<float>(w)});
     }
   };
   add(
@@ -87,20 +92,43 @@ ScanMatcher::System ScanMatcher::Linearise(const Pose& X_WB, double kernel, doub
   return system;
 }
 
-void ScanMatcher::Analyse(const System& system, MatchResult* result) const {
-  // Rotations are scaled by the features' mean distance, so that all six directions compare.
-  const double lever = std::sqrt(std::max(system.lever2 / system.weight, 1e-6));
-  result->view = lever;
-  Vector6d scale;
-  scale << 1.0, 1.0, 1.0, 1.0 / lever, 1.0 / lever, 1.0 / lever;
-  const Matrix6d normalised = scale.asDiagonal() * system.H * scale.asDiagonal() / system.weight;
-  const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(normalised);
-  result->strength = eigen.eigenvalues();
-  result->weakest = eigen.eigenvectors().col(0);
-  int first = 0;
-  while (first < 6 && result->strength[first] < config_.min_information) ++first;
-  result->known = (scale.asDiagonal() * eigen.eigenvectors()).rightCols(6 - first);
-  for (int i = 0; i < result->known.cols(); ++i) result->known.col(i).normalize();
+void ScanMatcher::Analyse(const System& system, const std::vector<Row>& rows,
+                          MatchResult* result) const {
+  result->view = std::sqrt(std::max(system.lever2 / system.weight, 1e-6));
+  result->known.resize(6, 0);
+  double least = std::numeric_limits<double>::max();
+  for (const int block : {0, 3}) {
+    const double scale = block == 0 ? 1.0 : result->view;
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(system.H.block<3, 3>(block, block));
+    for (int i = 0; i < 3; ++i) {
+      Vector6d direction = Vector6d::Zero();
+      direction.segment<3>(block) = eigen.eigenvectors().col(i) / scale;
+      const double squares = eigen.eigenvalues()[i] / (scale * scale);
+      const double support = Support(rows, direction, squares, system.weight);
+      direction *= scale;
+      if (support < least) least = support, result->weakest = direction;
+      if (support < config_.min_support) continue;
+      result->known.conservativeResize(6, result->known.cols() + 1);
+      result->known.rightCols<1>() = direction;
+    }
+  }
+}
+
+/// Features that hold a direction, each counted by how squarely it does. A surface that is nearly
+/// parallel to the direction seems to hold it, but only by the noise of its normal. `squares`: what
+/// all rows of weight `weight` give along it; where that is plenty, a lower bound will do.
+double ScanMatcher::Support(const std::vector<Row>& rows, const Vector6d& direction, double squares,
+                            double weight) const {
+  const double least = std::cos(config_.slant * M_PI / 180.0);
+  const double bound = squares - least * least * weight;
+  if (bound > config_.min_support) return bound;
+  const Eigen::Matrix<float, 6, 1> d = direction.cast<float>();
+  double support = 0.0;
+  for (const Row& row : rows) {
+    const double along = static_cast<double>(std::abs(d.dot(row.J)));
+    if (along > least) support += static_cast<double>(row.weight) * std::min(1.0, along);
+  }
+  return support;
 }
 
 MatchResult ScanMatcher::Match(const Features& features, const SurfaceMap& planes,
@@ -113,11 +141,13 @@ MatchResult ScanMatcher::Match(const Features& features, const SurfaceMap& plane
   double kernel = std::max(config_.kernel, gate);
   Matched matched_planes(features.planes, planes), matched_edges(features.edges, edges);
   System system;
+  std::vector<Row> rows;
+  rows.reserve(features.planes.size() + features.edges.size());
   for (int i = 0; i < config_.max_iterations; ++i) {
-    system = Linearise(result.X_WB, kernel, gate, &matched_planes, &matched_edges);
+    system = Linearise(result.X_WB, kernel, gate, &matched_planes, &matched_edges, &rows);
     result.iterations = i + 1;
-    if (system.matched < config_.min_features || system.weight < 1e-6) return result;
-    Analyse(system, &result);
+    if (system.weight < 1e-6) return result;
+    Analyse(system, rows, &result);
     // The step within the span of the known directions.
     const auto& V = result.known;
     if (V.cols() == 0) return result;
@@ -132,10 +162,12 @@ MatchResult ScanMatcher::Match(const Features& features, const SurfaceMap& plane
     kernel = std::max(config_.kernel, 0.5 * kernel);
   }
   result.rms = std::sqrt(system.squares / system.weight);
-  result.inliers = static_cast<double>(system.inliers) / std::max(system.total, 1);
+  result.fit = static_cast<double>(system.inliers) / std::max(system.matched, 1);
+  result.unmapped = 1.0 - static_cast<double>(system.matched) / std::max(system.total, 1);
   const double sigma2 = std::max(system.squares / system.weight, std::pow(config_.range_noise, 2));
   result.information = system.H / sigma2;
-  result.valid = result.inliers >= config_.min_inliers;
+  result.misfit = result.fit < config_.min_fit;
+  result.valid = !result.misfit;
   return result;
 }
 

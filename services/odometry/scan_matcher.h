@@ -12,14 +12,14 @@ using Vector6d = Eigen::Matrix<double, 6, 1>;
 
 struct MatchConfig {
   int max_iterations = 8;
-  double gate = 0.6;               ///< features farther from their surface are left out, m
-  double least_gate = 0.15;        ///< the same where the prediction is certain, m
-  double kernel = 0.07;            ///< scale of the robust kernel at the end, m
-  double range_noise = 0.02;       ///< standard deviation of a residual, m
-  double min_information = 0.004;  ///< least share of the features that must hold each direction
-  int min_features = 80;
-  double min_inliers = 0.3;  ///< least share of features that find a surface within the kernel
-  double edge_weight = 1.0;  ///< of an edge feature against a plane feature
+  double gate = 0.6;          ///< features farther from their surface are left out, m
+  double least_gate = 0.15;   ///< the same where the prediction is certain, m
+  double kernel = 0.07;       ///< scale of the robust kernel at the end, m
+  double range_noise = 0.02;  ///< standard deviation of a residual, m
+  double slant = 80.0;        ///< deg
+  double min_support = 25.0;  ///< features
+  double min_fit = 0.65;      ///< 1
+  double edge_weight = 1.0;   ///< of an edge feature against a plane feature
 
   template <class V>
   void Visit(V& v) {
@@ -28,9 +28,9 @@ struct MatchConfig {
     v("least_gate", least_gate, "the same where the prediction is certain, m");
     v("kernel", kernel, "scale of the robust kernel at the end, m");
     v("range_noise", range_noise, "smallest standard deviation of a residual, m");
-    v("min_information", min_information, "share of the features that must hold each direction");
-    v("min_features", min_features, "a sweep with fewer matched features says nothing");
-    v("min_inliers", min_inliers, "least share of features within the kernel of their surface");
+    v("slant", slant, "a surface turned farther from a direction says nothing of it, deg");
+    v("min_support", min_support, "features, at least, that must hold a direction");
+    v("min_fit", min_fit, "least share of the matched features within the kernel");
     v("edge_weight", edge_weight, "of an edge feature against a plane feature");
   }
 };
@@ -42,16 +42,19 @@ struct Features {
 struct MatchResult {
   bool valid = false;
   Pose X_WB;
-  /// Columns span the directions of (p, rotation error in W) that the sweep determines; the others
-  /// keep the prediction's value in X_WB.
+  /// Orthonormal columns span the directions of (p, rotation error in W) that the sweep determines,
+  /// each of a translation or of a rotation; the others keep the prediction's value in X_WB.
   Eigen::Matrix<double, 6, Eigen::Dynamic> known = Eigen::MatrixXd::Zero(6, 0);
   Matrix6d information = Matrix6d::Zero();  ///< inverse covariance of (p, rotation error in W)
-  Vector6d strength = Vector6d::Zero();     ///< share of the features that hold each eigenvector
-  Vector6d weakest = Vector6d::Zero();      ///< eigenvector of the least strength
-  double inliers = 0.0;                     ///< share of the features
+  Vector6d weakest = Vector6d::Zero();      ///< direction of the least support
+  double fit = 1.0;                         ///< share of the matched features within the kernel
+  double unmapped = 1.0;                    ///< share of the features where the map knows nothing
   double view = 0.0;                        ///< the features' usual distance, m
   double rms = 0.0;                         ///< of the inliers' residuals, m
   int iterations = 0;
+
+  /// The sweep contradicts the map. One that finds no map where it looks is not valid either.
+  bool misfit = false;
 
   bool degenerate() const { return valid && known.cols() < 6; }
 };
@@ -77,8 +80,9 @@ inline double EdgeResidual(const Eigen::Vector3d& p_W, const Eigen::Vector3d& ro
 }
 
 /// Sweep against map: Gauss-Newton on the manifold over point-to-plane and point-to-line distances
-/// with a Geman-McClure kernel that narrows. Zhang & Singh 2014 (LOAM), eqs. (2) to (4); directions
-/// without information are left at the prediction as in Zhang, Kaess & Singh 2016.
+/// with a Geman-McClure kernel that narrows. Zhang & Singh 2014 (LOAM), eqs. (2) to (4). Directions
+/// are told known from unknown by what supports each, translation and rotation apart, after Tuna et
+/// al. 2023 (X-ICP), section IV; the unknown ones are left at the prediction.
 class ScanMatcher {
  public:
   explicit ScanMatcher(const MatchConfig& config) : config_(config) {}
@@ -88,11 +92,17 @@ class ScanMatcher {
                     const Pose& predicted, double uncertainty) const;
 
  private:
+  struct Row {  // of the linearised problem
+    Eigen::Matrix<float, 6, 1> J;
+    float weight;
+  };
   struct System;
   class Matched;
-  System Linearise(const Pose& X_WB, double kernel, double gate, Matched* planes,
-                   Matched* edges) const;
-  void Analyse(const System& system, MatchResult* result) const;
+  System Linearise(const Pose& X_WB, double kernel, double gate, Matched* planes, Matched* edges,
+                   std::vector<Row>* rows) const;
+  void Analyse(const System& system, const std::vector<Row>& rows, MatchResult* result) const;
+  double Support(const std::vector<Row>& rows, const Vector6d& direction, double squares,
+                 double weight) const;
 
   MatchConfig config_;
 };

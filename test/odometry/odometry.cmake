@@ -11,3 +11,8 @@ chase_program(odometry_trial ${CMAKE_CURRENT_LIST_DIR}/trial_main.cpp
 target_link_libraries(odometry_trial PRIVATE simulator_node odometry_node control_node log_tools
   scenario CLI11::CLI11 fmt::fmt)
 set_target_properties(odometry_trial PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/test)
+
+# Odometry and simulator in one process, without a bus.
+chase_test(odometry_live_test LIBS simulator_core control_core odometry_core scenario fmt::fmt TIMEOUT 200
+  SOURCES ${CMAKE_SOURCE_DIR}/test/unit/odometry_live_test.cpp ${CMAKE_CURRENT_LIST_DIR}/live_trial.cpp
+    ${CMAKE_CURRENT_LIST_DIR}/courses.cpp)

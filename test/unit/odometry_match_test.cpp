@@ -118,6 +118,49 @@ TEST(ScanMatcher, CorridorLeavesItsAxisToThePrediction) {
   EXPECT_NEAR(match.X_WB.p.y(), start.p.y(), 0.05);
 }
 
+/// What the map does not know yet says nothing against a match with what it knows.
+TEST(ScanMatcher, UnmappedFeaturesDoNotSpeakAgainstAMatch) {
+  Room room(Hall{});
+  const size_t mapped = room.features.planes.size();
+  Noise noise(4);
+  for (size_t i = 0; i < 9 * mapped; ++i) {
+    const Eigen::Vector3d p_W(100.0 + 20.0 * noise.Uniform(), 20.0 * noise.Uniform(), 1.0);
+    room.features.planes.push_back((room.truth.Inverse() * p_W).cast<float>());
+  }
+  const Pose start = Disturbed(room.truth, &noise, 0.03, 0.005);
+  const MatchResult match =
+      ScanMatcher(MatchConfig{}).Match(room.features, room.planes, room.edges, start, 0.1);
+  ASSERT_TRUE(match.valid);
+  EXPECT_NEAR(match.unmapped, 0.9, 0.03);
+  EXPECT_GT(match.fit, 0.9);
+  EXPECT_LT((match.X_WB.p - room.truth.p).norm(), 0.02);
+}
+
+/// Features scattered about the surfaces contradict the map, however many find one.
+TEST(ScanMatcher, ScatteredFeaturesAreAMisfit) {
+  Room room(Hall{});
+  Noise noise(5);
+  for (auto& p : room.features.planes) p += noise.Vector(0.5).cast<float>();
+  const MatchResult match =
+      ScanMatcher(MatchConfig{}).Match(room.features, room.planes, room.edges, room.truth, 0.3);
+  EXPECT_FALSE(match.valid);
+  EXPECT_TRUE(match.misfit);
+}
+
+/// A few slanting returns on walls do not hold the axis, noise of their normals or not.
+TEST(ScanMatcher, KnownDirectionsAreOrthonormalAndOfOneKind) {
+  Hall corridor;
+  corridor.ends_open = true;
+  const Room room(corridor);
+  const MatchResult match =
+      ScanMatcher(MatchConfig{}).Match(room.features, room.planes, room.edges, room.truth, 0.1);
+  ASSERT_TRUE(match.valid);
+  ASSERT_EQ(match.known.cols(), 5);
+  EXPECT_LT((match.known.transpose() * match.known - Eigen::MatrixXd::Identity(5, 5)).norm(), 1e-9);
+  for (int i = 0; i < 5; ++i)
+    EXPECT_LT(match.known.col(i).head<3>().norm() * match.known.col(i).tail<3>().norm(), 1e-12);
+}
+
 TEST(ScanMatcher, NoFeaturesIsNoMatch) {
   const Room room(Hall{});
   const MatchResult match =

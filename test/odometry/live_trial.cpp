@@ -1,0 +1,196 @@
+#include "test/odometry/live_trial.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+
+#include "common/world/random.h"
+#include "services/odometry/odometry.h"
+#include "services/simulator/simulator.h"
+#include "test/odometry/courses.h"
+
+namespace chase::odometry::trial {
+
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr double kTick = 0.005;          // s
+constexpr double kStanding = 0.12;       // m, of the body on its legs
+constexpr double kUsableVelocity = 0.2;  // m/s
+
+struct Pair {
+  double t;
+  Vector3d error, sigma, estimate, truth;
+  double velocity_error;
+};
+
+Sweep FromSimulator(const simulator::Sweep& from) {
+  Sweep sweep;
+  sweep.start = from.start;
+  sweep.points.resize(from.x.size());
+  for (size_t i = 0; i < from.x.size(); ++i)
+    sweep.points[i] = {
+        {from.x[i], from.y[i], from.z[i]}, from.t[i], from.intensity[i], from.ring[i]};
+  return sweep;
+}
+
+/// Simulator, pilot and odometry, stepped together.
+class Live {
+ public:
+  Live(const world::Scenario& scenario, const LiveOptions& options)
+      : options_(options),
+        settle_(scenario.settle_s),
+        course_(options.course, scenario),
+        law_(control::ControlConfig{}),
+        simulator_(scenario, Sensors(options)),
+        odometry_(Start(scenario)) {}
+
+  LiveFigures Run() {
+    for (int i = 0; i * kTick <= options_.duration; ++i) Step(i * kTick);
+    Judge();
+    return figures_;
+  }
+
+ private:
+  static simulator::SimulatorConfig Sensors(const LiveOptions& options) {
+    simulator::SimulatorConfig config;
+    config.seed = options.seed;
+    config.camera.rate = 0.0;
+    return config;
+  }
+
+  static OdometryConfig Start(const world::Scenario& scenario) {
+    OdometryConfig config;
+    config.initial_position = scenario.chaser.start;
+    config.initial_yaw_deg = scenario.chaser.yaw_deg;
+    return config;
+  }
+
+  void Step(double t) {
+    simulator::Output out = simulator_.Advance(t);
+    Steer(t, out.truth);
+    if (options_.imu) See(odometry_.AddImu({t, out.imu.accel, out.imu.gyro}), out.truth);
+    if (out.sweep && !Out(out.sweep->start)) odometry_.AddSweep(FromSimulator(*out.sweep));
+    while (odometry_.SweepReady()) {
+      const SweepResult result = odometry_.ProcessSweep();
+      if (!result.registered) continue;
+      if (figures_.sweeps++ > 0 && !result.applied) ++figures_.refused;
+      See(result.pose, out.truth);
+    }
+  }
+
+  bool Out(double t) const { return t >= options_.lidar_out_from && t < options_.lidar_out_to; }
+
+  void Steer(double t, const simulator::Truth& truth) {
+    const double mission = truth.mission_time;
+    if (!course_.Flies() || mission < Course::kTakeoff || t >= options_.land_at) return;
+    const control::Estimate body{truth.body.p, truth.body.v, truth.body.q};
+    const control::Setpoint setpoint = law_.Track(
+        body, course_.At(mission), course_.At(mission + 0.02), mission > -5.0 ? 0.01 : 0.0);
+    simulator_.SetSetpoint({setpoint.R_WB, setpoint.w_WB_B, setpoint.thrust}, t);
+  }
+
+  void See(const std::optional<PoseEstimate>& pose, const simulator::Truth& truth) {
+    if (!pose || pose->health.health == Health::kStarting) return;
+    figures_.epochs = pose->epoch;
+    if (pose->t < options_.judge_from) return;
+    pairs_.push_back({pose->t, pose->X_WB.p - truth.body.p,
+                      pose->covariance.diagonal().head<3>().cwiseSqrt(), pose->X_WB.p, truth.body.p,
+                      (pose->v - truth.body.v).norm()});
+  }
+
+  void Judge() {
+    if (pairs_.empty()) return;
+    const double n = static_cast<double>(pairs_.size());
+    Eigen::Matrix3Xd a(3, pairs_.size()), b(3, pairs_.size());
+    Vector3d squares = Vector3d::Zero();
+    for (size_t i = 0; i < pairs_.size(); ++i) {
+      const Pair& pair = pairs_[i];
+      a.col(static_cast<long>(i)) = pair.estimate;
+      b.col(static_cast<long>(i)) = pair.truth;
+      squares += pair.error.cwiseAbs2();
+      figures_.worst = std::max(figures_.worst, pair.error.norm());
+      figures_.moved = std::max(figures_.moved, (pair.error - pairs_[0].error).norm());
+      for (int k = 0; k < 3; ++k)
+        figures_.covered[k] += std::abs(pair.error[k]) <= 3.0 * pair.sigma[k] ? 1.0 / n : 0.0;
+      if (figures_.velocity_back < 0.0 && pair.t >= options_.lidar_out_to &&
+          pair.velocity_error < kUsableVelocity)
+        figures_.velocity_back = pair.t - options_.lidar_out_to;
+    }
+    const Eigen::Isometry3d fit(Eigen::umeyama(a, b, false));
+    figures_.aligned = std::sqrt(((fit * a) - b).squaredNorm() / n);
+    figures_.ate = std::sqrt(squares.sum() / n);
+    figures_.end = pairs_.back().error.norm();
+    for (int k = 0; k < 3; ++k) figures_.caution[k] = MedianSigma(k) / std::sqrt(squares[k] / n);
+  }
+
+  double MedianSigma(int axis) const {
+    std::vector<double> sigma;
+    for (const Pair& pair : pairs_) sigma.push_back(pair.sigma[axis]);
+    std::nth_element(sigma.begin(), sigma.begin() + static_cast<long>(sigma.size() / 2),
+                     sigma.end());
+    return sigma[sigma.size() / 2];
+  }
+
+  LiveOptions options_;
+  double settle_;
+  Course course_;
+  control::TrackingLaw law_;
+  simulator::Simulator simulator_;
+  Odometry odometry_;
+  std::vector<Pair> pairs_;
+  LiveFigures figures_;
+};
+
+}  // namespace
+
+LiveFigures FlyLive(const world::Scenario& scenario, const LiveOptions& options) {
+  return Live(scenario, options).Run();
+}
+
+world::Scenario Meadow(int trees, double roughness, uint64_t seed) {
+  world::Random random(seed, 77);
+  world::Scenario scenario;
+  scenario.name = fmt::format("meadow-{}", seed);
+  scenario.world.ground.roughness = roughness;
+  scenario.world.ground.wavelength = random.Uniform(6.0, 12.0);
+  scenario.target.waypoints = {{-8.0, -6.0}, {8.0, -6.0}, {8.0, 6.0}, {-8.0, 6.0}};
+  scenario.target.speed = random.Uniform(1.0, 3.0);
+  scenario.target.corner_radius = 3.0;
+  scenario.world.forest.count = trees;
+  scenario.world.forest.min = {-28.0, -22.0};
+  scenario.world.forest.max = {28.0, 22.0};
+  scenario.world.forest.gap = 1.5;
+  scenario.world.forest.seed = static_cast<int>(seed);
+  scenario.chaser.start = {-11.0, -6.0, 0.0};
+  scenario.chaser.start.z() = world::GroundHeight(scenario.world.ground, -11.0, -6.0) + kStanding;
+  scenario.wind = {{random.Uniform(-1.5, 1.5), random.Uniform(-1.5, 1.5), 0.0}, 0.5, 2.0};
+  return scenario;
+}
+
+world::Scenario BareStreet() {
+  world::Scenario scenario;
+  scenario.name = "bare street";
+  for (const double y : {-6.1, 6.1})
+    scenario.world.walls.push_back({{-150.0, y}, {150.0, y}, 6.0, 0.2});
+  scenario.target.waypoints = {{-30.0, 0.0}, {30.0, 0.0}};
+  scenario.target.speed = 1.5;
+  scenario.target.corner_radius = 3.0;
+  scenario.chaser.start = {-33.0, 0.0, kStanding};
+  return scenario;
+}
+
+std::string Text(const LiveFigures& f) {
+  return fmt::format(
+      "\"sweeps\":{},\"refused\":{},\"lost\":{},\"epochs\":{},\"ate\":{:.4f},\"aligned\":{:.4f},"
+      "\"worst\":{:.3f},\"end\":{:.3f},\"moved\":{:.4f},\"velocity_back\":{:.3f},"
+      "\"covered\":[{:.3f},{:.3f},{:.3f}],\"caution\":[{:.2f},{:.2f},{:.2f}]",
+      f.sweeps, f.refused, f.lost, f.epochs, f.ate, f.aligned, f.worst, f.end, f.moved,
+      f.velocity_back, f.covered[0], f.covered[1], f.covered[2], f.caution[0], f.caution[1],
+      f.caution[2]);
+}
+
+}  // namespace chase::odometry::trial

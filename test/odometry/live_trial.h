@@ -1,0 +1,51 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "common/world/scenario.h"
+#include "services/odometry/odometry_config.h"
+
+namespace chase::odometry::trial {
+
+/// What is flown, and what goes wrong on the way. Times count from power-on [s].
+struct LiveOptions {
+  std::string course = "follow";  ///< see courses.h
+  int64_t seed = 1;
+  double duration = 20.0;
+  bool imu = true;
+  double lidar_out_from = 1e9, lidar_out_to = 1e9;  ///< no sweep begins in this time
+  double land_at = 1e9;                             ///< the pilot falls silent: it sinks and stands
+  double judge_from = 0.0;
+};
+
+/// How POSE did against the truth, at every estimate after the start.
+struct LiveFigures {
+  int sweeps = 0;        ///< after the first
+  int refused = 0;       ///< of these
+  int lost = 0;          ///< estimates that said so
+  int epochs = 0;        ///< restarts of the map
+  double ate = 0.0;      ///< RMS of the position error in W, m
+  double aligned = 0.0;  ///< the same after the best fit, m
+  double worst = 0.0;    ///< m
+  double end = 0.0;      ///< error at the end, m
+  double moved = 0.0;    ///< how far the error went astray from `judge_from` on, m
+  double velocity_back =
+      -1.0;  ///< after the LiDAR's return, until the velocity is within 0.2 m/s, s
+  double covered[3] = {0, 0, 0};  ///< share of estimates within three standard deviations, by axis
+  double caution[3] = {0, 0, 0};  ///< median standard deviation over RMS error, by axis
+};
+
+/// Flies a world with simulator and odometry in one process; a pilot who knows the truth flies.
+LiveFigures FlyLive(const world::Scenario& scenario, const LiveOptions& options);
+
+/// A meadow with `trees` trees on ground of the given roughness [m], laid out by `seed`.
+world::Scenario Meadow(int trees, double roughness, uint64_t seed);
+
+/// Two bare walls 12 m apart on even ground: nothing tells where along them one is.
+world::Scenario BareStreet();
+
+std::string Text(const LiveFigures& figures);
+
+}  // namespace chase::odometry::trial
