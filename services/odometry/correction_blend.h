@@ -35,6 +35,10 @@ class CorrectionBlend {
 
   Pose Applied(const Pose& X_WB) const;
   Eigen::Vector3d AppliedVelocity(const Eigen::Vector3d& v_WB) const { return v_WB + dv_; }
+  /// What is put out lies off the estimate by this on purpose: (p, v, rotation).
+  Eigen::Matrix<double, 9, 1> rest() const {
+    return (Eigen::Matrix<double, 9, 1>() << dp_, dv_, dtheta_).finished();
+  }
   bool correcting() const { return dp_.norm() > config_.flag_position; }
 
  private:

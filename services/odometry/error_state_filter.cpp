@@ -1,6 +1,8 @@
 #include "services/odometry/error_state_filter.h"
 
 #include <Eigen/Cholesky>
+#include <cmath>
+#include <limits>
 
 #include "common/math/rotation.h"
 
@@ -45,21 +47,40 @@ using JacobianRows = Eigen::Matrix<double, Eigen::Dynamic, kStates>;
 
 void Symmetrise(ErrorCovariance* P) { *P = (0.5 * (*P + P->transpose())).eval(); }
 
-/// Kalman update in Joseph's form; refused where the innovation's covariance is singular.
+/// Kalman update in Joseph's form; refused where the innovation's covariance is singular or the
+/// normalised innovation squared per direction exceeds `largest_nis`.
 UpdateResult Correct(const JacobianRows& H, const Eigen::VectorXd& innovation,
-                     const Eigen::MatrixXd& noise, NavState* state) {
+                     const Eigen::MatrixXd& noise, double usual_nis, double largest_nis,
+                     NavState* state) {
   const Eigen::MatrixXd S = H * state->P * H.transpose() + noise;
   const Eigen::LDLT<Eigen::MatrixXd> solver(S);
   if (solver.info() != Eigen::Success || !(solver.vectorD().minCoeff() > 0.0)) return {};
+  const double k = static_cast<double>(innovation.size());
+  const double nis = innovation.dot(solver.solve(innovation)) / k;
+  if (!(nis <= largest_nis)) return {false, nis};
   const Eigen::MatrixXd K = solver.solve(H * state->P).transpose();
   const ErrorVector dx = K * innovation;
   if (!dx.allFinite()) return {};
   Inject(dx, state);
   const ErrorCovariance I_KH = ErrorCovariance::Identity() - K * H;
   state->P = (I_KH * state->P * I_KH.transpose() + K * noise * K.transpose()).eval();
+  if (nis > usual_nis)
+    state->P.topLeftCorner<9, 9>() +=
+        (1.0 - usual_nis / nis) * dx.head<9>() * dx.head<9>().transpose();
   Symmetrise(&state->P);
-  const double k = static_cast<double>(innovation.size());
-  return {true, innovation.dot(solver.solve(innovation)) / k};
+  return {true, nis};
+}
+
+/// What the unknown directions U, left at the prediction, do to the known ones V of a match: an
+/// error e there moves these by -(V' H V)^-1 V' H U e.
+Eigen::MatrixXd FromUnknown(const PoseMeasurement& z, const Eigen::LDLT<Eigen::MatrixXd>& known,
+                            const NavState& state) {
+  Eigen::Matrix<double, 6, 6> P, unknown = Eigen::Matrix<double, 6, 6>::Identity();
+  P << state.P.block<3, 3>(kP, kP), state.P.block<3, 3>(kP, kTheta),
+      state.P.block<3, 3>(kTheta, kP), state.P.block<3, 3>(kTheta, kTheta);
+  unknown -= z.known * z.known.transpose();
+  const Eigen::MatrixXd moves = known.solve(z.known.transpose() * z.information * unknown);
+  return moves * P * moves.transpose();
 }
 
 }  // namespace
@@ -102,6 +123,19 @@ void Doubt(const FilterConfig& config, double gap, NavState* state) {
   AddAcceleration(config.doubt_accel, gap, &state->P);
 }
 
+void DoubtAcceleration(const FilterConfig& config, const Eigen::Matrix3d& unheld, NavState* state) {
+  if (unheld.trace() < 0.5) return;
+  const Eigen::Matrix3d R = state->R_WB.toRotationMatrix();
+  Eigen::Matrix<double, 3, kStates> J = Eigen::Matrix<double, 3, kStates>::Zero();  // of a
+  J.block<3, 3>(0, kTheta) = -Hat(state->a - state->g);
+  J.block<3, 3>(0, kAccelBias) = -R;
+  J.block<3, 3>(0, kGravity).setIdentity();
+  const double known2 = (unheld * J * state->P * J.transpose() * unheld).trace() / unheld.trace();
+  const double lacking2 = std::pow(config.map_tilt * config.gravity, 2) - known2;
+  if (lacking2 > 0.0)
+    state->P.block<3, 3>(kAccelBias, kAccelBias) += lacking2 * R.transpose() * unheld * R;
+}
+
 void Inject(const ErrorVector& dx, NavState* state) {
   state->p += dx.segment<3>(kP);
   state->v += dx.segment<3>(kV);
@@ -127,12 +161,13 @@ UpdateResult Update(const FilterConfig& config, const PoseMeasurement& z, NavSta
   if (information.info() != Eigen::Success || !(information.vectorD().minCoeff() > 0.0)) return {};
   const Eigen::MatrixXd onto = (V.transpose() * V).ldlt().solve(V.transpose());  // V onto = proj.
   const Eigen::MatrixXd noise = information.solve(Eigen::MatrixXd::Identity(k, k)) +
-                                onto * floor.cwiseAbs2().asDiagonal() * onto.transpose();
+                                onto * floor.cwiseAbs2().asDiagonal() * onto.transpose() +
+                                FromUnknown(z, information, *state);
   JacobianRows H(k, kStates);
   H.setZero();
   H.middleCols<3>(kP) = onto.leftCols<3>();
   H.middleCols<3>(kTheta) = onto.rightCols<3>();
-  return Correct(H, onto * e, noise, state);
+  return Correct(H, onto * e, noise, config.usual_nis, config.largest_nis, state);
 }
 
 void HoldStill(const Eigen::Vector3d& gyro, NavState* state) {
@@ -143,7 +178,8 @@ void HoldStill(const Eigen::Vector3d& gyro, NavState* state) {
   Eigen::VectorXd innovation(6), sigma(6);
   innovation << -state->v, gyro - state->gyro_bias;
   sigma << Eigen::Vector3d::Constant(kSpeed), Eigen::Vector3d::Constant(kTurn);
-  Correct(H, innovation, sigma.cwiseAbs2().asDiagonal(), state);
+  constexpr double kAny = std::numeric_limits<double>::infinity();
+  Correct(H, innovation, sigma.cwiseAbs2().asDiagonal(), kAny, kAny, state);
 }
 
 }  // namespace chase::odometry

@@ -15,8 +15,11 @@ struct FilterConfig {
   double accel_bias_sigma = 0.05;        ///< at the start, m/s^2
   double gyro_bias_sigma = 0.0005;       ///< after an alignment at rest, rad/s
   double doubt_accel = 0.1;              ///< error of the accelerometer beyond its noise, m/s^2
+  double map_tilt = 1e-3;                ///< rad
   double blind_accel = 3.0;              ///< what a body without IMU may do, m/s^2
   double blind_rate = 1.0;               ///< rad/s
+  double usual_nis = 4.0;                ///< per direction
+  double largest_nis = 100.0;            ///< per direction
   double match_position_floor = 0.0005;  ///< what a scan match never gets below, m
   double match_rotation_floor = 0.0001;  ///< rad
 
@@ -30,8 +33,12 @@ struct FilterConfig {
     v("accel_bias_sigma", accel_bias_sigma, "at the start, m/s^2");
     v("gyro_bias_sigma", gyro_bias_sigma, "after an alignment at rest, rad/s");
     v("doubt_accel", doubt_accel, "what the accelerometer may be off while no sweep comes, m/s^2");
+    v("map_tilt", map_tilt,
+      "how well a map is level; gravity pulls along it where nothing holds, rad");
     v("blind_accel", blind_accel, "what the body may do while the IMU is silent, m/s^2");
     v("blind_rate", blind_rate, "the same for rotation, rad/s");
+    v("usual_nis", usual_nis, "normalised innovation squared per direction that needs no doubt");
+    v("largest_nis", largest_nis, "and above which a match is refused");
     v("match_position_floor", match_position_floor, "no scan match is better than this, m");
     v("match_rotation_floor", match_rotation_floor, "no scan match is better than this, rad");
   }
@@ -72,11 +79,16 @@ void PropagateBlind(const FilterConfig& config, double t, NavState* state);
 /// without a sweep: what is off by a constant is no noise that averages out.
 void Doubt(const FilterConfig& config, double gap, NavState* state);
 
+/// Attitude is taken from the map, whose own tilt turns gravity into an acceleration that never
+/// averages out. Where a sweep holds the place this is seen; along the directions that `unheld`
+/// projects on, acceleration is never known any better.
+void DoubtAcceleration(const FilterConfig& config, const Eigen::Matrix3d& unheld, NavState* state);
+
 /// Adds `dx` to the state.
 void Inject(const ErrorVector& dx, NavState* state);
 
-/// A pose as measured, of which only the directions `known` (columns: p, rotation error in W)
-/// count.
+/// A pose as measured, of which only the directions `known` (orthonormal columns: p, rotation error
+/// in W) count; along the others it was kept at the prediction.
 struct PoseMeasurement {
   Pose X_WB;
   Eigen::Matrix<double, 6, Eigen::Dynamic> known;
@@ -91,7 +103,9 @@ struct UpdateResult {
   double nis = 0.0;  ///< normalised innovation squared per known direction
 };
 
-/// Kalman update; leaves the state as it is where the numbers do not allow one.
+/// Kalman update; leaves the state as it is where the numbers do not allow one or the innovation is
+/// too large to be of noise. One that is larger than the covariances explain makes these larger: by
+/// as much of the correction as they do not explain.
 UpdateResult Update(const FilterConfig& config, const PoseMeasurement& z, NavState* state);
 
 }  // namespace chase::odometry

@@ -9,6 +9,7 @@ namespace chase::odometry {
 namespace {
 
 constexpr double kSettlingAfterMovingStart = 2.0;  // s
+constexpr double kNisShare = 0.6;                  // of a sweep in the running mean
 constexpr double kImuGapRemembered = 0.2;          // s
 
 std::string Text(const char* format, double value) {
@@ -54,10 +55,13 @@ void HealthMonitor::OnSweep(double end, int returns, double imu_t, bool imu_sile
 void HealthMonitor::OnMatch(double end, const MatchResult& match, bool applied) {
   match_problem_.clear();
   if (applied) last_good_ = end;
+  if (applied) nis_ += kNisShare * (match.nis - nis_);
   if (match.misfit)
     match_problem_ = Text("sweep contradicts the map: %.0f %% fit", 100.0 * match.fit);
   else if (!match.valid)
     match_problem_ = "sweep shows nothing that is mapped";
+  else if (nis_ > config_.usual_nis)
+    match_problem_ = Text("corrections are %.0f times what the covariance explains", nis_);
   else if (!applied)
     match_problem_ = "scan match refused by the filter";
   else if (match.degenerate())
@@ -77,11 +81,8 @@ HealthReport HealthMonitor::Degradation(double t) const {
   return {Health::kOk, ""};
 }
 
-HealthReport HealthMonitor::At(double t, bool has_imu, double position_sigma) const {
+HealthReport HealthMonitor::At(double t, double position_sigma) const {
   if (!started_) return {Health::kStarting, "aligning"};
-  const double patience = has_imu ? config_.lost_after : config_.lost_after_blind;
-  if (t - last_good_ > patience)
-    return {Health::kLost, Text("no usable sweep for %.1f s", t - last_good_)};
   if (position_sigma > config_.lost_sigma)
     return {Health::kLost, Text("position uncertain by %.2f m", position_sigma)};
   return Degradation(t);

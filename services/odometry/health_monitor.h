@@ -7,22 +7,20 @@
 namespace chase::odometry {
 
 struct HealthConfig {
-  double degraded_after = 0.19;   ///< since the last good sweep, s
-  double lost_after = 2.0;        ///< s, with an IMU
-  double lost_after_blind = 0.5;  ///< s, without
-  double imu_gap = 0.05;          ///< s
-  double late_sweep = 0.045;      ///< a sweep that ends this long away from the newest sample, s
-  double lost_sigma = 0.5;        ///< standard deviation of the position, m
-  double dropped_share = 0.2;     ///< of the usual number of returns
+  double degraded_after = 0.19;  ///< since the last good sweep, s
+  double imu_gap = 0.05;         ///< s
+  double late_sweep = 0.045;     ///< a sweep that ends this long away from the newest sample, s
+  double lost_sigma = 0.5;       ///< standard deviation of the position, m
+  double usual_nis = 4.0;        ///< running mean, per direction
+  double dropped_share = 0.2;    ///< of the usual number of returns
 
   template <class V>
   void Visit(V& v) {
     v("degraded_after", degraded_after, "since the last good sweep, s");
-    v("lost_after", lost_after, "the same for lost, with an IMU, s");
-    v("lost_after_blind", lost_after_blind, "the same for lost, without an IMU, s");
     v("imu_gap", imu_gap, "longest silence of the IMU, s");
     v("late_sweep", late_sweep, "a sweep's end may lie this far from the newest IMU sample, s");
     v("lost_sigma", lost_sigma, "standard deviation of the position, m");
+    v("usual_nis", usual_nis, "running mean of normalised innovations squared, per direction");
     v("dropped_share", dropped_share, "of the usual number of returns");
   }
 };
@@ -46,8 +44,8 @@ class HealthMonitor {
   void OnSweep(double end, int returns, double imu_t, bool imu_silent);
   void OnMatch(double end, const MatchResult& match, bool applied);
 
-  HealthReport At(double t, bool has_imu, double position_sigma) const;
-  double last_good_sweep() const { return last_good_; }
+  /// `position_sigma`: of the place in the local map, m.
+  HealthReport At(double t, double position_sigma) const;
   bool started() const { return started_; }
 
  private:
@@ -59,6 +57,7 @@ class HealthMonitor {
   double start_t_ = 0.0;
   double last_good_ = 0.0;
   double usual_returns_ = 0.0;
+  double nis_ = 0.0;  // running mean
   double imu_gap_until_ = -1e18;
   std::string sweep_problem_;  // of the newest sweep
   std::string match_problem_;

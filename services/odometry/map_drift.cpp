@@ -14,9 +14,20 @@ constexpr double kLeastView = 2.0, kMostView = 50.0;  // m
 
 void MapDrift::Begin(const Covariance& match) {
   places_.clear();
-  covariance_ = config_.first_match * config_.first_match * match;
+  covariance_ = inherited_ + config_.first_match * config_.first_match * match;
   covariance_.diagonal().head<3>().array() += config_.first_position * config_.first_position;
   covariance_(3, 3) += config_.first_yaw * config_.first_yaw;
+}
+
+void MapDrift::Restart(const Covariance& inherited) {
+  inherited_ = inherited;
+  Begin(Covariance::Zero());
+}
+
+void MapDrift::GoAstray(const Covariance& added) {
+  inherited_ += added;
+  covariance_ += added;
+  for (Place& place : places_) place.covariance += added;
 }
 
 /// Error of the map at `to` if it was made from `from` straight on: the heading's error turns the

@@ -48,6 +48,12 @@ class MapDrift {
   /// `match` is the covariance of such a match.
   void Begin(const Covariance& match);
 
+  /// A new map that lies as far astray as `inherited` says, whatever its first match will be.
+  void Restart(const Covariance& inherited);
+
+  /// The map goes on from a body that was `added` off: so is all of it, as far as one can tell.
+  void GoAstray(const Covariance& added);
+
   const Covariance& covariance() const { return covariance_; }
   size_t places() const { return places_.size(); }
 
@@ -61,6 +67,7 @@ class MapDrift {
 
   DriftConfig config_;
   double view_ = 8.0;  // m
+  Covariance inherited_ = Covariance::Zero();
   Covariance covariance_;
   std::vector<Place> places_;
 };

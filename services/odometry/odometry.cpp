@@ -9,11 +9,13 @@ namespace chase::odometry {
 
 namespace {
 
-constexpr double kKnotStep = 0.005;         // s, of the motion over a sweep
-constexpr double kLongestReplay = 3.0;      // s of inertial samples kept for late sweeps
-constexpr double kWaitForImu = 0.08;        // s that a sweep may be ahead of the IMU
-constexpr double kUsualGap = 0.25;          // s between sweeps that were of use
-constexpr double kLargestInnovation = 1.5;  // m
+constexpr double kKnotStep = 0.005;     // s, of the motion over a sweep
+constexpr double kLongestReplay = 3.0;  // s of inertial samples kept for late sweeps
+constexpr double kWaitForImu = 0.08;    // s that a sweep may be ahead of the IMU
+constexpr double kUsualGap = 0.25;      // s between sweeps that were of use
+constexpr double kHoldLag = 0.15;       // s for which a sweep may still come while it stands
+constexpr double kLeastTurn = 1e-2;     // of known directions that is one found
+constexpr double kAtTheOrigin = 1e-4;   // m, rad: a body in a map that begins there
 
 Pose ExtrinsicsOf(const world::Rig& rig) {
   return {Eigen::Quaterniond(rig.R_BL()), rig.lidar_position};
@@ -51,6 +53,20 @@ double UncertaintyOf(const NavState& state) {
   return std::sqrt(std::max(0.0, p2 + kUsualRange * kUsualRange * theta2));
 }
 
+Matrix6d PosePart(const NavState& state) {
+  Matrix6d P;
+  P << state.P.block<3, 3>(kP, kP), state.P.block<3, 3>(kP, kTheta),
+      state.P.block<3, 3>(kTheta, kP), state.P.block<3, 3>(kTheta, kTheta);
+  return P;
+}
+
+/// Error of a body in (p, yaw).
+MapDrift::Covariance PlaceCovariance(const Matrix6d& P) {
+  MapDrift::Covariance out;
+  out << P.topLeftCorner<3, 3>(), P.topRightCorner<3, 1>(), P.bottomLeftCorner<1, 3>(), P(5, 5);
+  return out;
+}
+
 }  // namespace
 
 Odometry::Odometry(const OdometryConfig& config)
@@ -75,10 +91,11 @@ std::optional<PoseEstimate> Odometry::AddImu(const ImuSample& imu) {
   imu_.Add(imu);
   if (!fused_) return Align(imu);
   health_.OnImu(imu.t, previous);
-  standing_.Add(imu);
+  standing_.Add(imu, live_);
   const double dt = imu.t - live_.t;
   imu_.Advance(imu.t, &live_);
   blend_.Decay(dt);
+  HoldBetweenSweeps(imu.t);
   if (imu.t - base_.t > kLongestReplay) {
     imu_.Advance(imu.t - 0.5 * kLongestReplay, &base_);
     imu_.DropBefore(base_.t);
@@ -95,7 +112,7 @@ std::optional<PoseEstimate> Odometry::Align(const ImuSample& imu) {
     base_ = started_ ? alignment_.ResultAt(config_.filter, base_)
                      : alignment_.Result(config_.filter, config_.initial_position,
                                          config_.initial_yaw_deg * M_PI / 180.0);
-    if (!started_) health_.OnStarted(alignment_.AtRest(), imu.t);
+    if (!started_) health_.OnStarted(alignment_.AtRest(), held_ = imu.t);
     if (!started_ && !alignment_.AtRest()) sweeps_to_anchor_ = 2;
     if (!started_ && alignment_.AtRest()) {
       const ImuStatistics rest = alignment_.statistics();
@@ -142,11 +159,18 @@ SweepResult Odometry::ProcessSweep() {
   if (!Prepare(std::move(pending), &prepared)) return result;
   const bool blind = Blind(prepared.end);
   result.match = Match(&prepared);
-  const bool first = planes_.cells() == 0;
-  const bool applied = first || Apply(prepared, result.match);
+  bool first = planes_.cells() == 0;
+  if (first) result.match.valid = true;
+  const bool applied = first || Apply(prepared, &result.match);
+  if (!applied) base_ = prepared.inertial;
+  if (!applied && UncertaintyOf(prepared.predicted) > config_.match.gate) {
+    base_ = prepared.predicted;
+    RestartMap();
+    first = true;
+  }
+  if (first) base_ = prepared.predicted;
   result.applied = applied;
-  if (first || !applied) base_ = prepared.predicted;
-  if (first) result.match.valid = applied;
+  if (applied) held_ = prepared.end;
   health_.OnMatch(prepared.end, result.match, applied);
   if (blind && applied && !first)
     base_.w_B = math::LogSO3(prepared.track.front().R_WB.conjugate() * base_.R_WB) /
@@ -155,8 +179,9 @@ SweepResult Odometry::ProcessSweep() {
     planes_.Clear();
     edges_.Clear();
   }
-  RestartMapWhenLost(prepared.end);
-  if (applied || planes_.cells() == 0 || Extends(result.match)) Learn(prepared, base_.pose());
+  const bool extends = !first && Extends(result.match);
+  if (extends) unknown_.setIdentity();
+  if (applied || planes_.cells() == 0 || extends) Learn(prepared, base_.pose());
   if (applied && !first) FollowDrift(result.match);
   Catchup();
   result.registered = Registered(prepared);
@@ -190,9 +215,9 @@ bool Odometry::Prepare(Pending pending, Prepared* prepared) {
   prepared->track = {base_};
   prepared->predicted = base_;
   imu_.Advance(prepared->end, &prepared->predicted, &prepared->track);
+  prepared->inertial = prepared->predicted;
+  prepared->predicted = Doubted(prepared->predicted);
   Deskew(prepared);
-  const double gap = prepared->end - health_.last_good_sweep();
-  if (gap > kUsualGap) Doubt(config_.filter, gap, &prepared->predicted);
   return true;
 }
 
@@ -214,23 +239,35 @@ MatchResult Odometry::Match(Prepared* prepared) {
   if (planes_.cells() == 0) return {};
   MatchResult match =
       matcher_.Match(FeaturesIn(*prepared, prepared->at_end), planes_, edges_,
-                     prepared->predicted.pose(), UncertaintyOf(prepared->predicted));
+                     prepared->predicted.pose(), UncertaintyOf(prepared->predicted), unknown_);
   if (Blind(prepared->end)) MatchBlind(prepared, &match);
   return match;
 }
 
-bool Odometry::Apply(const Prepared& prepared, const MatchResult& match) {
-  if (!match.valid) return false;
+bool Odometry::Apply(const Prepared& prepared, MatchResult* match) {
+  if (!match->valid) return false;
   NavState state = prepared.predicted;
-  standing_.See(match.X_WB.p);
+  standing_.See(match->X_WB.p);
   if (standing_.holds()) HoldStill(standing_.gyro(), &state);
-  const double allowed = kLargestInnovation + 3.0 * std::sqrt(state.P.block<3, 3>(kP, kP).trace());
-  if ((match.X_WB.p - state.p).norm() > allowed) return false;
   const UpdateResult update =
-      Update(config_.filter, {match.X_WB, match.known, match.information}, &state);
+      Update(config_.filter, {match->X_WB, match->known, match->information}, &state);
+  match->nis = update.nis;
+  match->misfit = update.nis > config_.filter.largest_nis;
   if (!update.applied) return false;
+  CarryUnknown(*match, prepared.predicted);
+  DoubtAcceleration(config_.filter, unknown_.topLeftCorner<3, 3>(), &state);
   base_ = state;
   return true;
+}
+
+/// What was seen while a direction was unknown has been mapped as far off along it as the body was.
+/// Once that is matched, the body is known in the map, the map no better than before.
+void Odometry::CarryUnknown(const MatchResult& match, const NavState& prior) {
+  const Matrix6d known = match.known * match.known.transpose();
+  const Matrix6d found = known * unknown_;
+  unknown_ = Matrix6d::Identity() - known;
+  if (found.squaredNorm() < kLeastTurn) return;
+  drift_.GoAstray(PlaceCovariance(found * PosePart(prior) * found.transpose()));
 }
 
 /// A sweep over ground that the map does not know extends it while inertia still tells the pose
@@ -261,13 +298,36 @@ void Odometry::FollowDrift(const MatchResult& match) {
   drift_.MoveTo(base_.p, match.view);
 }
 
-void Odometry::RestartMapWhenLost(double end) {
-  const double patience =
-      3.0 * (fused_ ? config_.health.lost_after : config_.health.lost_after_blind);
-  if (end - health_.last_good_sweep() < patience) return;
-  ++epoch_;
+/// The map is of no use to a body that may be farther off than a match reaches. A new one begins at
+/// the pose as it is believed; what that may be off is from now on the error of the map.
+void Odometry::RestartMap() {
+  drift_.Restart(drift_.covariance() + PlaceCovariance(PosePart(base_)));
+  for (const int row : {kP + 0, kP + 1, kP + 2, kTheta + 2}) {
+    base_.P.row(row).setZero();
+    base_.P.col(row).setZero();
+    base_.P(row, row) = kAtTheOrigin * kAtTheOrigin;
+  }
   planes_.Clear();
   edges_.Clear();
+  unknown_.setZero();
+  held_ = base_.t;
+  ++epoch_;
+}
+
+/// While no sweep comes, a body that stands is held by that alone.
+void Odometry::HoldBetweenSweeps(double t) {
+  if (!standing_.holds() || t - base_.t < 2.0 * kHoldLag) return;
+  imu_.Advance(t - kHoldLag, &base_);
+  HoldStill(standing_.gyro(), &base_);
+  held_ = base_.t;
+  Catchup();
+}
+
+/// What inertia may be off by more than its noise, since the state was last held.
+NavState Odometry::Doubted(NavState state) const {
+  const double gap = state.t - held_;
+  if (gap > kUsualGap) Doubt(config_.filter, gap, &state);
+  return state;
 }
 
 /// Brings the newest state up from the last sweep; what is put out moves there smoothly.
@@ -311,13 +371,16 @@ PoseEstimate Odometry::Estimate() const {
   out.a = level_.R_WM() * live_.a;
   out.gyro_bias = live_.gyro_bias;
   out.accel_bias = live_.accel_bias;
-  out.covariance = level_.CovarianceInWorld(live_);
+  const NavState doubted = Doubted(live_);
+  out.covariance = level_.CovarianceInWorld(doubted);
+  out.covariance += blend_.rest() * blend_.rest().transpose();
+  out.local_covariance = doubted.P.topLeftCorner<9, 9>();
   out.covariance.topLeftCorner<3, 3>() += drift_.covariance().topLeftCorner<3, 3>();
   out.covariance.block<3, 1>(0, 8) += drift_.covariance().topRightCorner<3, 1>();
   out.covariance.block<1, 3>(8, 0) += drift_.covariance().bottomLeftCorner<1, 3>();
   out.covariance(8, 8) += drift_.covariance()(3, 3);
-  const double sigma = std::sqrt(std::max(0.0, live_.P.topLeftCorner<3, 3>().trace()));
-  out.health = health_.At(live_.t, fused_, sigma);
+  const double sigma = std::sqrt(std::max(0.0, doubted.P.topLeftCorner<3, 3>().trace()));
+  out.health = health_.At(live_.t, sigma);
   out.correcting = blend_.correcting();
   out.epoch = epoch_;
   return out;

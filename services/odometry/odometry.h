@@ -23,6 +23,8 @@ struct PoseEstimate {
   Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero();   ///< frame B, rad/s
   Eigen::Vector3d accel_bias = Eigen::Vector3d::Zero();  ///< frame B, m/s^2
   Eigen::Matrix<double, 9, 9> covariance = Eigen::Matrix<double, 9, 9>::Zero();  ///< p, v, theta
+  /// The same against what the map holds, for what is kept in it: without the map's own error.
+  Eigen::Matrix<double, 9, 9> local_covariance = Eigen::Matrix<double, 9, 9>::Zero();
   HealthReport health;
   bool correcting = false;
   int epoch = 0;  ///< changes whenever the map begins anew: W is another frame from then on
@@ -76,7 +78,8 @@ class Odometry {
     double end = 0.0;
     FeatureSet features;
     std::vector<int> matched_planes;
-    NavState predicted;                   // at the sweep's end
+    NavState inertial;                    // at the sweep's end
+    NavState predicted;                   // the same with what inertia may be off
     std::vector<NavState> track;          // from the last state to the sweep's end; for deskewing
     std::vector<Eigen::Vector3f> at_end;  // the points deskewed by the track: frame B at the end
   };
@@ -91,11 +94,14 @@ class Odometry {
   void Bootstrap(Prepared* prepared, MatchResult* match);
   void PlaceFirst(const Pose& X_WB, const Eigen::Vector3d& v, const Eigen::Vector3d& w_B);
   void Bend(const Pose& X_WB, Prepared* prepared) const;
-  bool Apply(const Prepared& prepared, const MatchResult& match);
+  bool Apply(const Prepared& prepared, MatchResult* match);
   bool Extends(const MatchResult& match) const;
   void Learn(const Prepared& prepared, const Pose& X_WB);
   void FollowDrift(const MatchResult& match);
-  void RestartMapWhenLost(double end);
+  void RestartMap();
+  void CarryUnknown(const MatchResult& match, const NavState& prior);
+  void HoldBetweenSweeps(double t);
+  NavState Doubted(NavState state) const;
   void Catchup();
   RegisteredSweep Registered(const Prepared& prepared) const;
   PoseEstimate Estimate() const;
@@ -123,6 +129,8 @@ class Odometry {
   std::optional<Prepared> first_;  // of a start without IMU, until the velocity is known
   Thinning thinning_;
   int epoch_ = 0;
+  Matrix6d unknown_ = Matrix6d::Zero();  // projector on what the last sweep left to inertia
+  double held_ = 0.0;                    // last time that a sweep or standing held the state, s
   int64_t dropped_sweeps_ = 0, dropped_samples_ = 0;
 };
 

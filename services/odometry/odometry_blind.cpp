@@ -24,7 +24,7 @@ void Odometry::StartBlind(double t) {
   base_.P.diagonal().segment<3>(kTheta).setConstant(1e-6);
   live_ = base_;
   started_ = true;
-  health_.OnStarted(true, t);
+  health_.OnStarted(true, held_ = t);
 }
 
 /// Without IMU the motion over the sweep is what the match makes of it: deskew and match again.
@@ -33,7 +33,8 @@ void Odometry::MatchBlind(Prepared* prepared, MatchResult* match) {
   if (first_) return Bootstrap(prepared, match);
   Bend(match->X_WB, prepared);
   const Features features = FeaturesIn(*prepared, prepared->at_end);
-  const MatchResult again = matcher_.Match(features, planes_, edges_, match->X_WB, kUnknown);
+  const MatchResult again =
+      matcher_.Match(features, planes_, edges_, match->X_WB, kUnknown, unknown_);
   if (again.valid) *match = again;
 }
 

@@ -42,7 +42,7 @@ std::string OdometryConfig::Problem() const {
                     {"blend.position_rate", blend.position_rate},
                     {"blend.rotation_rate", blend.rotation_rate},
                     {"health.degraded_after", health.degraded_after},
-                    {"health.lost_after", health.lost_after}};
+                    {"health.lost_sigma", health.lost_sigma}};
   for (const auto& field : above_zero)
     if (const std::string problem = positive(field.name, field.value); !problem.empty())
       return problem;

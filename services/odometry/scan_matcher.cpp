@@ -93,25 +93,42 @@ ScanMatcher::System ScanMatcher::Linearise(const Pose& X_WB, double kernel, doub
 }
 
 void ScanMatcher::Analyse(const System& system, const std::vector<Row>& rows,
-                          MatchResult* result) const {
+                          const Matrix6d& unknown_before, MatchResult* result) const {
   result->view = std::sqrt(std::max(system.lever2 / system.weight, 1e-6));
   result->known.resize(6, 0);
   double least = std::numeric_limits<double>::max();
   for (const int block : {0, 3}) {
     const double scale = block == 0 ? 1.0 : result->view;
     const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(system.H.block<3, 3>(block, block));
+    Eigen::Matrix3d directions = eigen.eigenvectors();
+    int unknown = 0;  // those of least support come first
     for (int i = 0; i < 3; ++i) {
       Vector6d direction = Vector6d::Zero();
-      direction.segment<3>(block) = eigen.eigenvectors().col(i) / scale;
+      direction.segment<3>(block) = directions.col(i) / scale;
       const double squares = eigen.eigenvalues()[i] / (scale * scale);
       const double support = Support(rows, direction, squares, system.weight);
-      direction *= scale;
-      if (support < least) least = support, result->weakest = direction;
-      if (support < config_.min_support) continue;
+      if (support < least) least = support, result->weakest = direction * scale;
+      if (support < config_.min_support) directions.col(i).swap(directions.col(unknown++));
+    }
+    KeepUnknown(unknown_before.block<3, 3>(block, block), unknown, &directions);
+    for (int i = unknown; i < 3; ++i) {
       result->known.conservativeResize(6, result->known.cols() + 1);
-      result->known.rightCols<1>() = direction;
+      result->known.rightCols<1>().setZero();
+      result->known.rightCols<1>().segment<3>(block) = directions.col(i);
     }
   }
+}
+
+/// Noise turns the unknown directions from sweep to sweep, and each turn would seem to tell a
+/// little of them: those that are nearly the ones before stay these. The first `unknown` of
+/// `directions` are unknown; `before` is the projector on those before.
+void ScanMatcher::KeepUnknown(const Eigen::Matrix3d& before, int unknown,
+                              Eigen::Matrix3d* directions) const {
+  if (unknown == 0 || unknown == 3 || std::lround(before.trace()) != unknown) return;
+  const Eigen::MatrixXd now = directions->leftCols(unknown);
+  if ((now - before * now).norm() > std::cos(config_.slant * M_PI / 180.0)) return;
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(-before);
+  *directions = eigen.eigenvectors();
 }
 
 /// Features that hold a direction, each counted by how squarely it does. A surface that is nearly
@@ -132,8 +149,8 @@ double ScanMatcher::Support(const std::vector<Row>& rows, const Vector6d& direct
 }
 
 MatchResult ScanMatcher::Match(const Features& features, const SurfaceMap& planes,
-                               const SurfaceMap& edges, const Pose& predicted,
-                               double uncertainty) const {
+                               const SurfaceMap& edges, const Pose& predicted, double uncertainty,
+                               const Matrix6d& unknown_before) const {
   MatchResult result;
   result.X_WB = predicted;
   const double gate =
@@ -147,7 +164,7 @@ MatchResult ScanMatcher::Match(const Features& features, const SurfaceMap& plane
     system = Linearise(result.X_WB, kernel, gate, &matched_planes, &matched_edges, &rows);
     result.iterations = i + 1;
     if (system.weight < 1e-6) return result;
-    Analyse(system, rows, &result);
+    Analyse(system, rows, unknown_before, &result);
     // The step within the span of the known directions.
     const auto& V = result.known;
     if (V.cols() == 0) return result;

@@ -17,7 +17,7 @@ struct MatchConfig {
   double kernel = 0.07;       ///< scale of the robust kernel at the end, m
   double range_noise = 0.02;  ///< standard deviation of a residual, m
   double slant = 80.0;        ///< deg
-  double min_support = 25.0;  ///< features
+  double min_support = 10.0;  ///< features
   double min_fit = 0.65;      ///< 1
   double edge_weight = 1.0;   ///< of an edge feature against a plane feature
 
@@ -49,6 +49,7 @@ struct MatchResult {
   Vector6d weakest = Vector6d::Zero();      ///< direction of the least support
   double fit = 1.0;                         ///< share of the matched features within the kernel
   double unmapped = 1.0;                    ///< share of the features where the map knows nothing
+  double nis = 0.0;                         ///< per direction, once a filter saw it
   double view = 0.0;                        ///< the features' usual distance, m
   double rms = 0.0;                         ///< of the inliers' residuals, m
   int iterations = 0;
@@ -88,8 +89,10 @@ class ScanMatcher {
   explicit ScanMatcher(const MatchConfig& config) : config_(config) {}
 
   /// `uncertainty`: standard deviation of the features' predicted places, m; narrows the gate.
+  /// `unknown_before`: projector on the directions that the sweep before did not determine.
   MatchResult Match(const Features& features, const SurfaceMap& planes, const SurfaceMap& edges,
-                    const Pose& predicted, double uncertainty) const;
+                    const Pose& predicted, double uncertainty,
+                    const Matrix6d& unknown_before = Matrix6d::Zero()) const;
 
  private:
   struct Row {  // of the linearised problem
@@ -100,7 +103,9 @@ class ScanMatcher {
   class Matched;
   System Linearise(const Pose& X_WB, double kernel, double gate, Matched* planes, Matched* edges,
                    std::vector<Row>* rows) const;
-  void Analyse(const System& system, const std::vector<Row>& rows, MatchResult* result) const;
+  void Analyse(const System& system, const std::vector<Row>& rows, const Matrix6d& unknown_before,
+               MatchResult* result) const;
+  void KeepUnknown(const Eigen::Matrix3d& before, int unknown, Eigen::Matrix3d* directions) const;
   double Support(const std::vector<Row>& rows, const Vector6d& direction, double squares,
                  double weight) const;
 

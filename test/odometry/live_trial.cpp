@@ -72,6 +72,7 @@ class Live {
   void Step(double t) {
     simulator::Output out = simulator_.Advance(t);
     Steer(t, out.truth);
+    if (Out(t)) out.imu.accel.x() += options_.accel_fault;
     if (options_.imu) See(odometry_.AddImu({t, out.imu.accel, out.imu.gyro}), out.truth);
     if (out.sweep && !Out(out.sweep->start)) odometry_.AddSweep(FromSimulator(*out.sweep));
     while (odometry_.SweepReady()) {
@@ -95,6 +96,7 @@ class Live {
 
   void See(const std::optional<PoseEstimate>& pose, const simulator::Truth& truth) {
     if (!pose || pose->health.health == Health::kStarting) return;
+    figures_.lost += pose->health.health == Health::kLost ? 1 : 0;
     figures_.epochs = pose->epoch;
     if (pose->t < options_.judge_from) return;
     pairs_.push_back({pose->t, pose->X_WB.p - truth.body.p,
@@ -104,6 +106,7 @@ class Live {
 
   void Judge() {
     if (pairs_.empty()) return;
+    if (!options_.imu) CountFromTheFirstSecond();
     const double n = static_cast<double>(pairs_.size());
     Eigen::Matrix3Xd a(3, pairs_.size()), b(3, pairs_.size());
     Vector3d squares = Vector3d::Zero();
@@ -124,7 +127,16 @@ class Live {
     figures_.aligned = std::sqrt(((fit * a) - b).squaredNorm() / n);
     figures_.ate = std::sqrt(squares.sum() / n);
     figures_.end = pairs_.back().error.norm();
-    for (int k = 0; k < 3; ++k) figures_.caution[k] = MedianSigma(k) / std::sqrt(squares[k] / n);
+    for (int k = 0; k < 3; ++k) figures_.sigma[k] = MedianSigma(k);
+    for (int k = 0; k < 3; ++k) figures_.rms[k] = std::sqrt(squares[k] / n);
+  }
+
+  void CountFromTheFirstSecond() {
+    Vector3d mean = Vector3d::Zero();
+    double n = 0.0;
+    for (const Pair& pair : pairs_)
+      if (pair.t < pairs_[0].t + 1.0) mean += pair.error, n += 1.0;
+    for (Pair& pair : pairs_) pair.error -= mean / n;
   }
 
   double MedianSigma(int axis) const {
@@ -171,11 +183,13 @@ world::Scenario Meadow(int trees, double roughness, uint64_t seed) {
   return scenario;
 }
 
-world::Scenario BareStreet() {
+world::Scenario BareStreet(bool posts) {
   world::Scenario scenario;
   scenario.name = "bare street";
   for (const double y : {-6.1, 6.1})
     scenario.world.walls.push_back({{-150.0, y}, {150.0, y}, 6.0, 0.2});
+  for (int i = 0; posts && i < 8; ++i)
+    scenario.world.cylinders.push_back({{-2.0 + 3.0 * i, i % 2 ? 4.0 : -4.0}, 0.5, 4.0, 0.0});
   scenario.target.waypoints = {{-30.0, 0.0}, {30.0, 0.0}};
   scenario.target.speed = 1.5;
   scenario.target.corner_radius = 3.0;
@@ -187,10 +201,12 @@ std::string Text(const LiveFigures& f) {
   return fmt::format(
       "\"sweeps\":{},\"refused\":{},\"lost\":{},\"epochs\":{},\"ate\":{:.4f},\"aligned\":{:.4f},"
       "\"worst\":{:.3f},\"end\":{:.3f},\"moved\":{:.4f},\"velocity_back\":{:.3f},"
-      "\"covered\":[{:.3f},{:.3f},{:.3f}],\"caution\":[{:.2f},{:.2f},{:.2f}]",
+      "\"covered\":[{:.3f},{:.3f},{:.3f}],\"sigma_mm\":[{:.1f},{:.1f},{:.1f}],\"rms_mm\":[{:.1f},{:"
+      ".1f},"
+      "{:.1f}]",
       f.sweeps, f.refused, f.lost, f.epochs, f.ate, f.aligned, f.worst, f.end, f.moved,
-      f.velocity_back, f.covered[0], f.covered[1], f.covered[2], f.caution[0], f.caution[1],
-      f.caution[2]);
+      f.velocity_back, f.covered[0], f.covered[1], f.covered[2], 1e3 * f.sigma[0], 1e3 * f.sigma[1],
+      1e3 * f.sigma[2], 1e3 * f.rms[0], 1e3 * f.rms[1], 1e3 * f.rms[2]);
 }
 
 }  // namespace chase::odometry::trial

@@ -16,11 +16,13 @@ struct LiveOptions {
   double duration = 20.0;
   bool imu = true;
   double lidar_out_from = 1e9, lidar_out_to = 1e9;  ///< no sweep begins in this time
+  double accel_fault = 0.0;                         ///< of the IMU along x meanwhile, m/s^2
   double land_at = 1e9;                             ///< the pilot falls silent: it sinks and stands
   double judge_from = 0.0;
 };
 
-/// How POSE did against the truth, at every estimate after the start.
+/// How POSE did against the truth, at every estimate after the start. Without IMU W is the frame in
+/// which the first sweep fits: errors count from the mean of the first second that is judged.
 struct LiveFigures {
   int sweeps = 0;        ///< after the first
   int refused = 0;       ///< of these
@@ -34,7 +36,8 @@ struct LiveFigures {
   double velocity_back =
       -1.0;  ///< after the LiDAR's return, until the velocity is within 0.2 m/s, s
   double covered[3] = {0, 0, 0};  ///< share of estimates within three standard deviations, by axis
-  double caution[3] = {0, 0, 0};  ///< median standard deviation over RMS error, by axis
+  double sigma[3] = {0, 0, 0};    ///< median standard deviation, by axis, m
+  double rms[3] = {0, 0, 0};      ///< of the error, by axis, m
 };
 
 /// Flies a world with simulator and odometry in one process; a pilot who knows the truth flies.
@@ -43,8 +46,9 @@ LiveFigures FlyLive(const world::Scenario& scenario, const LiveOptions& options)
 /// A meadow with `trees` trees on ground of the given roughness [m], laid out by `seed`.
 world::Scenario Meadow(int trees, double roughness, uint64_t seed);
 
-/// Two bare walls 12 m apart on even ground: nothing tells where along them one is.
-world::Scenario BareStreet();
+/// Two bare walls 12 m apart on even ground: nothing tells where along them one is, but for a few
+/// posts half-way on if there are any.
+world::Scenario BareStreet(bool posts);
 
 std::string Text(const LiveFigures& figures);
 

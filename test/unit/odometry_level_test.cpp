@@ -156,13 +156,43 @@ TEST(Standing, EndsWithTheFirstMotionAndOnlyThen) {
   mean.accel.z() = 9.81;
   standing.Begin(mean, 0.02, 0.002, Eigen::Vector3d::Zero());
   double t = 0.0;
-  for (; t < 30.0; t += 0.005) standing.Add(AtRest(t, Eigen::Vector3d::Zero(), &noise));
+  for (; t < 30.0; t += 0.005) standing.Add(AtRest(t, Eigen::Vector3d::Zero(), &noise), {});
   EXPECT_TRUE(standing.holds());
   const double lift = t;
-  for (; t < lift + 0.25; t += 0.005) standing.Add(AtRest(t, {0.0, 0.0, 0.9 * (t - lift)}, &noise));
+  for (; t < lift + 0.25; t += 0.005)
+    standing.Add(AtRest(t, {0.0, 0.0, 0.9 * (t - lift)}, &noise), {});
   EXPECT_FALSE(standing.holds());
   standing.Begin(mean, 0.02, 0.002, Eigen::Vector3d::Zero());
   standing.See({0.0, 0.3, 0.0});  // carried without being felt
+  EXPECT_FALSE(standing.holds());
+}
+
+TEST(Standing, BeginsAgainAfterLandingAndNotInAHover) {
+  Noise noise(6);
+  Standing standing;
+  double t = 0.0;
+  const auto feel = [&](double until, double sway) {  // sway: of the felt force, m/s^2
+    for (; t < until; t += 0.005)
+      standing.Add(AtRest(t, {sway * std::sin(3.0 * t), 0.0, 0.0}, &noise), {});
+  };
+  feel(10.0, 0.1);
+  EXPECT_FALSE(standing.holds());
+  feel(12.5, 0.0);
+  EXPECT_TRUE(standing.holds());
+  feel(30.0, 0.0);
+  EXPECT_TRUE(standing.holds());
+  feel(32.0, 0.1);
+  EXPECT_FALSE(standing.holds());
+}
+
+/// What the estimate knows to move does not stand, however evenly.
+TEST(Standing, SteadyMotionIsNoRest) {
+  Noise noise(7);
+  Standing standing;
+  NavState state;
+  state.v.x() = 0.5;
+  for (double t = 0.0; t < 5.0; t += 0.005)
+    standing.Add(AtRest(t, Eigen::Vector3d::Zero(), &noise), state);
   EXPECT_FALSE(standing.holds());
 }
 
@@ -193,6 +223,18 @@ TEST(MapDrift, BeginsAsTheFirstMatchDoes) {
   const MapDrift::Covariance first = drift.covariance();
   drift.MoveTo({1.0, 2.0, 3.0}, 8.0);
   EXPECT_LT((drift.covariance() - first).norm(), 1e-12);  // where the map begins
+}
+
+TEST(MapDrift, ARestartForgetsNothing) {
+  MapDrift drift(DriftConfig{});
+  const MapDrift::Covariance astray = 0.04 * MapDrift::Covariance::Identity();
+  drift.Restart(astray);
+  EXPECT_GE(drift.covariance()(0, 0), astray(0, 0));
+  drift.Begin(1e-6 * MapDrift::Covariance::Identity());
+  drift.MoveTo({0.0, 0.0, 0.0}, 8.0);
+  drift.MoveTo({10.0, 0.0, 0.0}, 8.0);
+  EXPECT_GE(drift.covariance()(0, 0), astray(0, 0));
+  EXPECT_GT(drift.covariance()(1, 1), astray(1, 1) + 90.0 * astray(3, 3));  // its heading
 }
 
 /// The farther away the surfaces, the less the same turn of them holds the place.
@@ -239,6 +281,27 @@ TEST(Consistency, ErrorsAreAsLargeAsTheCovarianceSays) {
   EXPECT_LT(position / n, 5.37);
   EXPECT_GT(yaw / n, 0.216);
   EXPECT_LT(yaw / n, 2.52);
+}
+
+/// Sweeps that contradict the map cost as much certainty as sweeps that do not come, and no more.
+TEST(LostRecovery, RefusedSweepsAreAsGoodAsNone) {
+  double sigma[2] = {0.0, 0.0};
+  for (const int garbled : {0, 1}) {
+    Course course;
+    course.duration = 6.5;
+    course.sensors.azimuths = 900;
+    Noise noise(8);
+    course.on_sweep = [&](Sweep* s) {
+      if (s->start < 5.0) return true;
+      for (auto& point : s->points) point.p += noise.Vector(0.5).cast<float>();
+      return garbled == 1;
+    };
+    const CourseResult result = test::Fly(course, test::ConfigFor(course.flight));
+    sigma[garbled] = std::sqrt(result.visits.back().estimate.covariance(0, 0));
+    EXPECT_EQ(result.visits.back().estimate.epoch, 0);
+  }
+  EXPECT_GT(sigma[0], 0.05);
+  EXPECT_NEAR(sigma[1], sigma[0], 0.1 * sigma[0]);
 }
 
 /// After the loss of all sweeps the estimate is wrong by decimetres; it comes back without a jump

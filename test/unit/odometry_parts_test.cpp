@@ -216,6 +216,67 @@ TEST(ErrorStateFilter, UpdateLeavesUnknownDirectionsAlone) {
   EXPECT_LT(state.P(0, 0), 0.001);
 }
 
+/// Where no sweep holds the place, a map that is not quite level turns into a velocity, for ever.
+TEST(ErrorStateFilter, UnheldAccelerationIsNeverKnownBetterThanTheMapIsLevel) {
+  FilterConfig config;
+  config.gyro_noise = config.accel_noise = config.gyro_bias_walk = config.accel_bias_walk = 0.0;
+  NavState state;
+  state.P = 1e-12 * ErrorCovariance::Identity();
+  const Eigen::Matrix3d along_x = Eigen::Vector3d::UnitX() * Eigen::RowVector3d::UnitX();
+  for (int i = 1; i <= 2000; ++i) {
+    Propagate(config, {0.005 * i, {0.0, 0.0, 9.81}, Eigen::Vector3d::Zero()}, &state);
+    if (i % 20 == 0) DoubtAcceleration(config, along_x, &state);
+  }
+  const double expected = 0.5 * config.map_tilt * config.gravity * 100.0;  // after ten seconds
+  EXPECT_GT(std::sqrt(state.P(kP, kP)), 0.9 * expected);
+  EXPECT_LT(std::sqrt(state.P(kP, kP)), 1.1 * expected);
+  EXPECT_LT(std::sqrt(state.P(kP + 1, kP + 1)), 0.01 * expected);
+}
+
+/// An error along an unknown direction moves what is known as far as the match couples them.
+TEST(ErrorStateFilter, UnknownDirectionsBlurTheKnownOnesTheyAreCoupledTo) {
+  NavState state;
+  state.P = 1e-6 * ErrorCovariance::Identity();
+  state.P(kP + 1, kP + 1) = 1.0;  // m^2, along y
+  PoseMeasurement z{Pose{}, Eigen::MatrixXd::Zero(6, 5),
+                    1e6 * Eigen::Matrix<double, 6, 6>::Identity()};
+  for (int i = 0; i < 5; ++i) z.known(i < 1 ? 0 : i + 1, i) = 1.0;  // all but y
+  NavState coupled = state;
+  ASSERT_TRUE(Update(FilterConfig{}, z, &state).applied);
+  z.information(0, 1) = z.information(1, 0) = 0.05e6;
+  ASSERT_TRUE(Update(FilterConfig{}, z, &coupled).applied);
+  EXPECT_LT(std::sqrt(state.P(0, 0)), 8.2e-4);
+  EXPECT_GT(std::sqrt(coupled.P(0, 0)), 9.5e-4);  // 0.05 m of blur tell nothing of x
+}
+
+/// A pose known to 1 cm and one measured to 1 mm that lies `off` from it [m].
+struct Innovation {
+  NavState state;
+  PoseMeasurement z{Pose{}, Eigen::Matrix<double, 6, 6>::Identity(),
+                    1e6 * Eigen::Matrix<double, 6, 6>::Identity()};
+  explicit Innovation(double off) {
+    state.P = 1e-4 * ErrorCovariance::Identity();
+    z.X_WB.p.x() = off;
+  }
+};
+
+TEST(ErrorStateFilter, CorrectionsBeyondTheCovarianceMakeItLarger) {
+  Innovation usual(0.02), large(0.15);
+  ASSERT_TRUE(Update(FilterConfig{}, usual.z, &usual.state).applied);
+  ASSERT_TRUE(Update(FilterConfig{}, large.z, &large.state).applied);
+  EXPECT_LT(std::sqrt(usual.state.P(0, 0)), 0.002);
+  EXPECT_GT(3.0 * std::sqrt(large.state.P(0, 0)), 0.15);
+  EXPECT_LT(std::sqrt(large.state.P(1, 1)), 0.002);  // nothing was corrected there
+}
+
+TEST(ErrorStateFilter, ImpossibleInnovationIsRefused) {
+  Innovation innovation(0.5);
+  const UpdateResult result = Update(FilterConfig{}, innovation.z, &innovation.state);
+  EXPECT_FALSE(result.applied);
+  EXPECT_GT(result.nis, FilterConfig{}.largest_nis);
+  EXPECT_EQ(innovation.state.p, Eigen::Vector3d::Zero());
+}
+
 TEST(ErrorStateFilter, UpdateWithoutInformationIsRefused) {
   NavState state;
   PoseMeasurement z;
