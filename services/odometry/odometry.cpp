@@ -128,7 +128,7 @@ std::optional<PoseEstimate> Odometry::Align(const ImuSample& imu) {
     return Estimate();
   }
   if (was_started) return std::nullopt;
-  live_.t = imu.t;
+  live_.t = held_ = imu.t;
   live_.p = config_.initial_position;
   live_.R_WB = math::FromYaw(config_.initial_yaw_deg * M_PI / 180.0);
   return Estimate();
