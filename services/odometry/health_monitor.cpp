@@ -10,6 +10,7 @@ namespace {
 
 constexpr double kSettlingAfterMovingStart = 2.0;  // s
 constexpr double kNisShare = 0.6;                  // of a sweep in the running mean
+constexpr int kMatchesToBegin = 3;                 // before them nothing can be lost
 constexpr double kImuGapRemembered = 0.2;          // s
 
 std::string Text(const char* format, double value) {
@@ -55,6 +56,7 @@ void HealthMonitor::OnSweep(double end, int returns, double imu_t, bool imu_sile
 void HealthMonitor::OnMatch(double end, const MatchResult& match, bool applied) {
   match_problem_.clear();
   if (applied) last_good_ = end;
+  matches_ += applied ? 1 : 0;
   if (applied) nis_ += kNisShare * (match.nis - nis_);
   if (match.misfit)
     match_problem_ = Text("sweep contradicts the map: %.0f %% fit", 100.0 * match.fit);
@@ -83,7 +85,7 @@ HealthReport HealthMonitor::Degradation(double t) const {
 
 HealthReport HealthMonitor::At(double t, double position_sigma) const {
   if (!started_) return {Health::kStarting, "aligning"};
-  if (position_sigma > config_.lost_sigma)
+  if (position_sigma > config_.lost_sigma && matches_ >= kMatchesToBegin)
     return {Health::kLost, Text("position uncertain by %.2f m", position_sigma)};
   return Degradation(t);
 }

@@ -58,6 +58,7 @@ class HealthMonitor {
   double last_good_ = 0.0;
   double usual_returns_ = 0.0;
   double nis_ = 0.0;  // running mean
+  int matches_ = 0;   // that were applied, the first sweep among them
   double imu_gap_until_ = -1e18;
   std::string sweep_problem_;  // of the newest sweep
   std::string match_problem_;
