@@ -349,6 +349,7 @@ RegisteredSweep Odometry::Registered(const Prepared& prepared) const {
   const Pose X_WB = level_.ToWorld(base_.pose());
   RegisteredSweep out;
   out.t = prepared.end;
+  out.epoch = epoch_;
   out.X_WL = X_WB * X_BL_;
   const FloatPose to_world(X_WB);
   const size_t n = prepared.at_end.size();

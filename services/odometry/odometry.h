@@ -35,6 +35,7 @@ struct RegisteredSweep {
   double t = 0.0;  ///< the sweep's end, s
   Pose X_WL;       ///< at that time
   Health health = Health::kOk;
+  int epoch = 0;                         ///< of the frame W
   std::vector<float> x, y, z;            ///< frame W, m
   std::vector<uint8_t> intensity, ring;  ///< of the same points
 };

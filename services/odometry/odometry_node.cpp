@@ -19,6 +19,10 @@ Sweep FromMessage(const lidar_scan_t& m, double start) {
 
 constexpr double kMostVariance = 1e6;  // m^2, m^2/s^2, rad^2
 
+// Another life of the process works in another frame: the number begins with when it began, tenths
+// of a second.
+int32_t FirstEpoch(int64_t start) { return static_cast<int32_t>(start / 100000 % 1000000) * 1000; }
+
 pose_t ToMessage(const PoseEstimate& estimate, int64_t origin) {
   pose_t m{};
   m.utime = bus::Utime(estimate.t, origin);
@@ -30,9 +34,11 @@ pose_t ToMessage(const PoseEstimate& estimate, int64_t origin) {
   bus::Set(m.gyro_bias, estimate.gyro_bias);
   bus::Set(m.accel_bias, estimate.accel_bias);
   // A lost filter's covariance grows without bound; the bus refuses numbers from 1e7 on.
-  Eigen::Map<Eigen::Matrix<double, 9, 9, Eigen::RowMajor>>(m.covariance) =
-      estimate.covariance.cwiseMax(-kMostVariance).cwiseMin(kMostVariance);
-  std::copy(m.covariance, m.covariance + 81, m.local_covariance);
+  using Wire = Eigen::Map<Eigen::Matrix<double, 9, 9, Eigen::RowMajor>>;
+  Wire(m.covariance) = estimate.covariance.cwiseMax(-kMostVariance).cwiseMin(kMostVariance);
+  Wire(m.local_covariance) =
+      estimate.local_covariance.cwiseMax(-kMostVariance).cwiseMin(kMostVariance);
+  m.epoch = estimate.epoch;
   m.health = static_cast<int8_t>(estimate.health.health);
   m.correcting = estimate.correcting ? 1 : 0;
   m.reason = estimate.health.reason;
@@ -44,6 +50,7 @@ scan_registered_t ToMessage(RegisteredSweep sweep, int64_t origin) {
   m.utime = bus::Utime(sweep.t, origin);
   bus::Set(m.pos, sweep.X_WL.p);
   bus::Set(m.orientation, sweep.X_WL.R);
+  m.epoch = sweep.epoch;
   m.health = static_cast<int8_t>(sweep.health);
   m.size = static_cast<int32_t>(sweep.x.size());
   m.x = std::move(sweep.x), m.y = std::move(sweep.y), m.z = std::move(sweep.z);
@@ -94,11 +101,15 @@ void OdometryNode::ProcessSweeps() {
 
 void OdometryNode::Publish(const PoseEstimate& estimate) {
   health_ = estimate.health;
-  bus_.Publish("POSE", ToMessage(estimate, origin_));
+  pose_t m = ToMessage(estimate, origin_);
+  m.epoch += FirstEpoch(bus_.identity().start);
+  bus_.Publish("POSE", m);
 }
 
 void OdometryNode::Publish(RegisteredSweep sweep) {
-  bus_.Publish("SCAN_REGISTERED", ToMessage(std::move(sweep), origin_));
+  scan_registered_t m = ToMessage(std::move(sweep), origin_);
+  m.epoch += FirstEpoch(bus_.identity().start);
+  bus_.Publish("SCAN_REGISTERED", m);
 }
 
 bus::NodeReport OdometryNode::Report() const {
