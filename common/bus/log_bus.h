@@ -10,6 +10,10 @@
 
 namespace chase::bus {
 
+/// Who `process` was when the log was recorded, read off the first message that it sent; where the
+/// log holds none: of no vehicle, started at 0.
+Identity IdentityIn(const std::string& log, const std::string& process);
+
 /// Replays a log file to one node in file order; what the node sends goes to another log file with
 /// the stamp of the event that it answers.
 class LogBus : public Bus {

@@ -87,6 +87,7 @@ void RunReplay(const ServiceSpec& spec, const Flags& flags) {
   if (std::filesystem::equivalent(flags.out, flags.replay, none))
     throw std::runtime_error("--out " + flags.out + " is the log that is replayed; name another");
   LogBus bus(flags.replay, flags.out);
+  bus.SetIdentity(IdentityIn(flags.replay, spec.name));
   const auto node = spec.make_node(bus);
   bus.Run(node.get());
 }

@@ -27,7 +27,7 @@ SLICES = {
     "mapping": (["SCAN_REGISTERED", "TARGET"], ["OBSTACLES"], 20.0, 21.6, 6),
     "perception": (["CAMERA_IMAGE", "LIDAR_SCAN", "POSE"], ["TARGET"], 20.0, 20.35, 4),
     "prediction": (["TARGET", "OBSTACLES"], ["PREDICTION"], 20.0, 25.0, 1),
-    "planning": (["PREDICTION", "OBSTACLES", "POSE"], ["PLAN"], 20.0, 23.0, 1),
+    "planning": (["PREDICTION", "OBSTACLES", "POSE", "TRACKING"], ["PLAN"], 20.0, 23.0, 1),
     "control": (["PLAN", "OBSTACLES", "POSE"], ["ATTITUDE_SETPOINT"], 20.0, 22.0, 1),
     "simulator": (["ATTITUDE_SETPOINT"], ["TRUTH", "IMU"], 1.0, 5.0, 1),
 }
