@@ -8,7 +8,7 @@ include(CMakePackageConfigHelpers)
 
 set_target_properties(planning_core PROPERTIES EXPORT_NAME planning)
 set_target_properties(prediction_core PROPERTIES EXPORT_NAME prediction)
-install(TARGETS chase_options math math_exact world separation scene planning_core prediction_core
+install(TARGETS chase_options math math_exact world separation plan_check scene planning_core prediction_core
   EXPORT chase COMPONENT development ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR}/chase)
 
 foreach(folder IN ITEMS common/math common/world services/planning services/prediction)

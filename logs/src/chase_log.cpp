@@ -9,6 +9,7 @@
 #include "logs/src/import.h"
 #include "logs/src/info.h"
 #include "logs/src/migrate.h"
+#include "logs/src/verify.h"
 
 namespace {
 
@@ -113,16 +114,32 @@ void AddDiff(CLI::App* app, Arguments* a, int* exit_code) {
   });
 }
 
+void AddVerify(CLI::App* app, Arguments* a, int* exit_code) {
+  auto* sub = app->add_subcommand(
+      "verify",
+      "Checks the proofs of every plan in exact arithmetic; exit 1 if one does not hold.");
+  sub->add_option("FLIGHT", a->in, "LCM log, or the folder of a flight")->required();
+  sub->callback([a, exit_code] {
+    namespace fs = std::filesystem;
+    const std::string log =
+        fs::is_directory(a->in) ? (fs::path(a->in) / "flight.lcm").string() : a->in;
+    const Verification verification = Verify(log);
+    std::fputs(Format(verification).c_str(), stdout);
+    *exit_code = verification.Holds() ? 0 : 1;
+  });
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app{"Shows, imports, exports, compares and migrates LCM logs."};
+  CLI::App app{"Shows, imports, exports, compares, migrates and verifies LCM logs."};
   app.name("chase-log");
   app.set_version_flag("--version", CHASE_VERSION);
   app.require_subcommand(1);
   Arguments arguments;
   int exit_code = 0;
   AddInfo(&app, &arguments);
+  AddVerify(&app, &arguments, &exit_code);
   AddImport(&app, &arguments);
   AddExport(&app, &arguments);
   AddDiff(&app, &arguments, &exit_code);

@@ -8,6 +8,7 @@
 #include "chase/attitude_setpoint_t.hpp"
 #include "chase/tracking_t.hpp"
 #include "common/bus/convert.h"
+#include "common/bus/plan_message.h"
 #include "common/world/ages.h"
 
 namespace chase::control {
@@ -15,37 +16,6 @@ namespace chase::control {
 namespace {
 
 constexpr size_t kLists = 8;  // 0.4 s at 20 Hz: plans name none older than 0.3 s
-
-std::vector<Proof> FromMessage(const std::vector<proof_t>& messages) {
-  std::vector<Proof> proofs(messages.size());
-  for (size_t i = 0; i < messages.size(); ++i) {
-    const proof_t& m = messages[i];
-    Proof& proof = proofs[i];
-    proof.obstacle = m.obstacle;
-    proof.of_sight = m.of == proof_t::SIGHT;
-    proof.from = m.from;
-    proof.radius = m.radius;
-    proof.target_radius = Eigen::Vector2d(m.target_radius[0], m.target_radius[1]);
-    for (const separation_t& s : m.separations)
-      proof.separations.push_back({s.from, s.to, bus::ToVector(s.normal)});
-  }
-  return proofs;
-}
-
-Claim ClaimOf(const plan_t& m, int64_t origin) {
-  Claim claim;
-  claim.position = bus::FromMessage(m.position, origin);
-  claim.target = bus::FromMessage(m.target, origin);
-  if (m.stop.n_coefficients > 0) claim.stop = bus::FromMessage(m.stop, origin);
-  claim.proofs = FromMessage(m.proofs);
-  claim.stop_proofs = FromMessage(m.stop_proofs);
-  claim.hard_radius = m.hard_radius;
-  claim.sigmas = m.sigmas;
-  claim.certified = m.certified_clearance >= 0.0;
-  claim.last_resort = m.verdict == plan_t::BRAKE || m.verdict == plan_t::WAIT;
-  claim.starts_inside = claim.last_resort || m.verdict == plan_t::ESCAPE;
-  return claim;
-}
 
 Estimate FromMessage(const pose_t& m) {
   return {bus::ToVector(m.pos), bus::ToVector(m.vel), bus::ToQuaternion(m.orientation),
@@ -90,21 +60,20 @@ void ControlNode::OnObstacles(const obstacles_t& message) {
 
 // The list that the plan was made for; null where it was never heard.
 const std::vector<world::Obstacle>* ControlNode::ListOf(const plan_t& message) const {
-  for (const input_t& input : message.inputs) {
-    if (input.channel != "OBSTACLES") continue;
-    for (auto list = lists_.rbegin(); list != lists_.rend(); ++list)
-      if (list->first == input.seq) return &list->second;
-  }
+  const int32_t seq = bus::ObstaclesOf(message);
+  for (auto list = lists_.rbegin(); list != lists_.rend(); ++list)
+    if (list->first == seq) return &list->second;
   return nullptr;
 }
 
 std::string ControlNode::Refusal(const plan_t& message) {
-  const Claim claim = ClaimOf(message, Origin(message.utime));
+  const world::Claim claim = bus::ClaimOf(message, Origin(message.utime));
   const std::vector<world::Obstacle>* list = ListOf(message);
   if (claim.certified && !list) return "the obstacles that it was made for were not heard";
   const auto timer = bus_.Time("check");
   static const std::vector<world::Obstacle> none;
-  std::string bad = Refute(claim, {config_.hard_radius(), config_.sigmas}, list ? *list : none);
+  std::string bad =
+      world::Refute(claim, {config_.hard_radius(), config_.sigmas}, list ? *list : none);
   if (!bad.empty()) return bad;
   Plan plan;
   plan.position = claim.position;

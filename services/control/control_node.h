@@ -13,8 +13,8 @@
 #include "common/bus/bus.h"
 #include "common/bus/epoch.h"
 #include "common/bus/node.h"
+#include "common/world/plan_check.h"
 #include "services/control/controller.h"
-#include "services/control/plan_check.h"
 
 namespace chase::control {
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "common/world/obstacle.h"
-#include "common/world/separation_check.h"
+#include "common/world/plan_check.h"
 #include "common/world/state.h"
 #include "common/world/trajectory.h"
 #include "services/planning/planner_config.h"
@@ -27,19 +27,8 @@ enum class Verdict {
 };
 const char* Name(Verdict verdict);
 
-/// Proof that the drone's ball, or the hull of it and the target's, stays off one obstacle over
-/// [from, 1] of a plan: off the Minkowski sum of the solid, its uncertainty as it grows, and the
-/// balls.
-struct Proof {
-  int obstacle = 0;  ///< its id; kTargetId: the target's body
-  bool of_sight = false;
-  double from = 0.0;                                           ///< tau
-  double radius = 0.0;                                         ///< of the ball about the drone, m
-  math::Polynomial target_radius = math::Polynomial::Zero(2);  ///< sight: about the target, m
-  std::vector<world::Separation> separations;
-  double room = 0.0;  ///< least that it proves beyond the radius, m
-};
-inline constexpr int kTargetId = -1;
+using world::Proof;
+inline constexpr int kTargetId = world::kTargetBody;
 
 /// One chasing problem (Jeon 2021, Problem 2). Frame W; times in seconds from a common origin.
 struct PlanRequest {

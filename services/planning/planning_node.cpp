@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "common/bus/convert.h"
+#include "common/bus/plan_message.h"
 #include "common/math/rotation.h"
 
 namespace chase::planning {
@@ -32,26 +33,6 @@ polynomial_t At(const Eigen::Vector3d& p, int64_t utime, double duration) {
   return m;
 }
 
-std::vector<proof_t> ToMessage(const std::vector<Proof>& proofs) {
-  std::vector<proof_t> out;
-  for (const Proof& proof : proofs) {
-    proof_t m{};
-    m.obstacle = proof.obstacle;
-    m.of = proof.of_sight ? proof_t::SIGHT : proof_t::SAFETY;
-    m.from = proof.from;
-    m.radius = proof.radius;
-    for (int k = 0; k < 2; ++k) m.target_radius[k] = proof.target_radius[k];
-    for (const world::Separation& s : proof.separations) {
-      separation_t plane{s.from, s.to, {}};
-      bus::Set(plane.normal, s.normal);
-      m.separations.push_back(plane);
-    }
-    m.n_separations = static_cast<int32_t>(m.separations.size());
-    out.push_back(m);
-  }
-  return out;
-}
-
 plan_t ToMessage(const PlanResult& plan, int64_t origin) {
   plan_t m{};
   m.utime = bus::Utime(plan.trajectory.start, origin);
@@ -66,10 +47,10 @@ plan_t ToMessage(const PlanResult& plan, int64_t origin) {
   m.checked = plan.checked;
   m.feasible = plan.feasible;
   m.certified_clearance = plan.certified_clearance;
-  m.proofs = ToMessage(plan.proofs);
+  m.proofs = bus::ToMessage(plan.proofs);
   m.n_proofs = static_cast<int32_t>(m.proofs.size());
   if (plan.stop) m.stop = bus::ToMessage(*plan.stop, origin);
-  m.stop_proofs = ToMessage(plan.stop_proofs);
+  m.stop_proofs = bus::ToMessage(plan.stop_proofs);
   m.n_stop_proofs = static_cast<int32_t>(m.stop_proofs.size());
   return m;
 }

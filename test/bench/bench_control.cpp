@@ -17,13 +17,13 @@ test::Case FirstCertified() {
 void CheckPlan(benchmark::State& state) {
   const test::Case c = FirstCertified();
   for (auto _ : state) {
-    std::string bad = Refute(c.claim, c.least, c.obstacles);
+    std::string bad = world::Refute(c.claim, c.least, c.obstacles);
     if (!bad.empty()) state.SkipWithError(bad.c_str());
     benchmark::DoNotOptimize(bad);
   }
   size_t planes = 0;
   for (const auto* proofs : {&c.claim.proofs, &c.claim.stop_proofs})
-    for (const Proof& proof : *proofs) planes += proof.separations.size();
+    for (const world::Proof& proof : *proofs) planes += proof.separations.size();
   state.counters["proofs"] =
       static_cast<double>(c.claim.proofs.size() + c.claim.stop_proofs.size());
   state.counters["planes"] = static_cast<double>(planes);

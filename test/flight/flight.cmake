@@ -7,6 +7,10 @@ add_test(NAME flight_lockstep
   COMMAND ${CMAKE_SOURCE_DIR}/test/flight/lockstep.sh ${bin} ${scenario} ${flight})
 set_tests_properties(flight_lockstep PROPERTIES TIMEOUT 300 FIXTURES_SETUP recorded_flight)
 
+add_test(NAME flight_verify
+  COMMAND python3 -B ${CMAKE_SOURCE_DIR}/test/flight/verify_test.py ${bin} ${flight})
+set_tests_properties(flight_verify PROPERTIES TIMEOUT 120 FIXTURES_REQUIRED recorded_flight)
+
 add_test(NAME flight_faults
   COMMAND python3 -B ${CMAKE_SOURCE_DIR}/test/flight/faults_test.py ${bin} ${scenario})
 set_tests_properties(flight_faults PROPERTIES TIMEOUT 300)

@@ -3,7 +3,7 @@
 #include <random>
 #include <vector>
 
-#include "services/control/plan_check.h"
+#include "common/world/plan_check.h"
 #include "test/unit/planning_instances.h"
 
 namespace chase::control::test {
@@ -17,17 +17,10 @@ inline double Uniform(Random& g, double low, double high) {
 /// A plan of the planner's, the obstacles that it was made for, and what control asks of it.
 struct Case {
   unsigned seed = 0;
-  Claim claim;
+  world::Claim claim;
   std::vector<world::Obstacle> obstacles;
-  LeastClaim least;
+  world::LeastClaim least;
 };
-
-inline std::vector<Proof> ProofsOf(const std::vector<planning::Proof>& theirs) {
-  std::vector<Proof> ours;
-  for (const planning::Proof& p : theirs)
-    ours.push_back({p.obstacle, p.of_sight, p.from, p.radius, p.target_radius, p.separations});
-  return ours;
-}
 
 /// Half of the obstacles are uncertain, a third are boxes, a third upright cylinders.
 inline Case MakeCase(unsigned seed, int n_obstacles = 12) {
@@ -53,12 +46,12 @@ inline Case MakeCase(unsigned seed, int n_obstacles = 12) {
   }
   const planning::PlanResult plan = planning::MakePlanner("chase", config)->Plan(request);
   c.obstacles = request.obstacles;
-  c.least = {config.hard_radius(), config.sigmas};
+  c.least = {config.hard_radius(), config.sigmas, false};
   c.claim.position = plan.trajectory;
   c.claim.target = request.target;
   c.claim.stop = plan.stop;
-  c.claim.proofs = ProofsOf(plan.proofs);
-  c.claim.stop_proofs = ProofsOf(plan.stop_proofs);
+  c.claim.proofs = plan.proofs;
+  c.claim.stop_proofs = plan.stop_proofs;
   c.claim.hard_radius = config.hard_radius();
   c.claim.sigmas = config.sigmas;
   c.claim.certified = plan.certified_clearance >= 0.0;

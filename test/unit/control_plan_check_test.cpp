@@ -7,7 +7,7 @@
 #include <functional>
 #include <map>
 
-#include "services/control/plan_check.h"
+#include "common/world/plan_check.h"
 #include "test/unit/control_claims.h"
 
 namespace chase::control {
@@ -17,6 +17,10 @@ using Eigen::Vector3d;
 using test::Case;
 using test::Random;
 using test::Uniform;
+using world::Claim;
+using world::kTargetBody;
+using world::Proof;
+using world::Refute;
 
 std::string Verdict(const Case& c) { return Refute(c.claim, c.least, c.obstacles); }
 

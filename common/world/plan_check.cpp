@@ -1,17 +1,12 @@
-#include "services/control/plan_check.h"
+#include "common/world/plan_check.h"
 
 #include <algorithm>
 
-namespace chase::control {
+namespace chase::world {
 
 namespace {
 
-using world::Ball;
-using world::Body;
-using world::Obstacle;
-using world::Trajectory;
-
-constexpr Eigen::Index kMostRows = 16;  // of a world::Curve
+constexpr Eigen::Index kMostRows = 16;  // of a Curve
 // Stamps are whole microseconds, in which a body at 10 m/s and 10 m/s^2 moves by 1e-5 of each unit.
 constexpr double kJoin = 1e-4;                 // m, m/s
 constexpr double kLeaveBy = 0.25;              // tau by which planning leaves what the start is in
@@ -25,8 +20,13 @@ bool IsCurve(const Trajectory& x) {
 /// Proofs of one trajectory.
 class Examiner {
  public:
-  Examiner(const Claim& claim, const Trajectory& of, const std::vector<Obstacle>& obstacles)
-      : claim_(claim), of_(of), obstacles_(obstacles), is_safe_(obstacles.size(), 0) {
+  Examiner(const Claim& claim, const LeastClaim& least, const Trajectory& of,
+           const std::vector<Obstacle>& obstacles)
+      : claim_(claim),
+        of_(of),
+        obstacles_(obstacles),
+        is_certificate_(least.exact ? IsCertificateExact : IsCertificate),
+        is_safe_(obstacles.size(), 0) {
     drone_.center = of.coefficients;
     target_.center = claim.target.Reparametrised(of.start, of.duration).coefficients;
   }
@@ -63,11 +63,11 @@ class Examiner {
       return "is kept off a smaller sphere";
     const Obstacle& obstacle = obstacles_[at_];
     if (!IsCurve(obstacle.center)) return "moves in no way that can be checked";
-    if (!body_) body_.emplace(world::MakeBody(obstacle, of_.start, of_.duration, claim_.sigmas));
+    if (!body_) body_.emplace(MakeBody(obstacle, of_.start, of_.duration, claim_.sigmas));
     drone_.radius = math::Polynomial::Constant(1, proof.radius);
     if (proof.of_sight) target_.radius = proof.target_radius;
-    const bool holds = world::IsCertificate(proof.separations, proof.from, 1.0, drone_,
-                                            proof.of_sight ? &target_ : nullptr, *body_);
+    const bool holds = is_certificate_(proof.separations, proof.from, 1.0, drone_,
+                                       proof.of_sight ? &target_ : nullptr, *body_);
     if (holds) return "";
     return proof.of_sight ? "has a proof of sight that does not hold"
                           : "has a proof of safety that does not hold";
@@ -76,6 +76,7 @@ class Examiner {
   const Claim& claim_;
   const Trajectory& of_;
   const std::vector<Obstacle>& obstacles_;
+  decltype(&IsCertificate) is_certificate_;
   std::vector<char> is_safe_;
   Ball drone_, target_;
   std::optional<Body> body_;  // that of obstacles_[at_]
@@ -102,7 +103,7 @@ bool EndsAtRest(const Trajectory& position) {
 }
 
 std::string Refute(const Claim& claim, const LeastClaim& least,
-                   const std::vector<world::Obstacle>& obstacles) {
+                   const std::vector<Obstacle>& obstacles) {
   if (!IsCurve(claim.position) || !IsCurve(claim.target)) return "it is no curve";
   if (!claim.certified && !claim.last_resort) return "it is not certified";
   if (!claim.stop && !EndsAtRest(claim.position)) return "it neither stops nor ends at rest";
@@ -111,10 +112,10 @@ std::string Refute(const Claim& claim, const LeastClaim& least,
   if (!claim.certified) return "";
   if (!(claim.hard_radius >= least.hard_radius)) return "its sphere is too small";
   if (!(claim.sigmas >= least.sigmas)) return "it takes obstacles for more certain than they are";
-  std::string bad = Examiner(claim, claim.position, obstacles).Complaint(claim.proofs);
+  std::string bad = Examiner(claim, least, claim.position, obstacles).Complaint(claim.proofs);
   if (!bad.empty() || !claim.stop) return bad;
-  bad = Examiner(claim, *claim.stop, obstacles).Complaint(claim.stop_proofs);
+  bad = Examiner(claim, least, *claim.stop, obstacles).Complaint(claim.stop_proofs);
   return bad.empty() ? "" : "stop: " + bad;
 }
 
-}  // namespace chase::control
+}  // namespace chase::world

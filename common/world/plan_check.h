@@ -9,7 +9,7 @@
 #include "common/world/separation_check.h"
 #include "common/world/trajectory.h"
 
-namespace chase::control {
+namespace chase::world {
 
 /// That a ball about the drone, or the hull of it and one about the target, stays off an obstacle
 /// for tau in [from, 1].
@@ -19,14 +19,15 @@ struct Proof {
   double from = 0.0;                                           ///< tau
   double radius = 0.0;                                         ///< about the drone, m
   math::Polynomial target_radius = math::Polynomial::Zero(2);  ///< about the target, m
-  std::vector<world::Separation> separations;
+  std::vector<Separation> separations;
+  double room = 0.0;  ///< least that it proves beyond the radius, m; known to its maker only
 };
 inline constexpr int kTargetBody = -1;  ///< proofs about the target's own body: nobody lists it
 
 /// What a plan says of itself. Frame W; times in seconds from a common origin.
 struct Claim {
-  world::Trajectory position, target;     ///< p_WB(t), p_WT(t)
-  std::optional<world::Trajectory> stop;  ///< leaves `position` at its start and comes to rest
+  Trajectory position, target;     ///< p_WB(t), p_WT(t)
+  std::optional<Trajectory> stop;  ///< leaves `position` at its start and comes to rest
   std::vector<Proof> proofs, stop_proofs;
   double hard_radius = 0.0;  ///< of sphere and tracking tube, m
   double sigmas = 0.0;       ///< that covariances are taken by
@@ -36,10 +37,11 @@ struct Claim {
       false;  ///< ESCAPE, or a last resort: it may start in an obstacle and leave it
 };
 
-/// The least that a proof has to be about.
+/// The least that a proof has to be about, and how it is checked.
 struct LeastClaim {
   double hard_radius = 0.0;  ///< m
   double sigmas = 0.0;
+  bool exact = false;  ///< in exact arithmetic, milliseconds a proof; else with bounds on rounding
 };
 
 /// Nothing where the plan may be flown among the obstacles; else why not. A certified plan has for
@@ -47,9 +49,9 @@ struct LeastClaim {
 /// hold too. A plan that is not certified is a last resort. Each plan ends at rest or has a stop
 /// that does.
 std::string Refute(const Claim& claim, const LeastClaim& least,
-                   const std::vector<world::Obstacle>& obstacles);
+                   const std::vector<Obstacle>& obstacles);
 
 /// Is the velocity at its end, and the acceleration, as good as none?
-bool EndsAtRest(const world::Trajectory& position);
+bool EndsAtRest(const Trajectory& position);
 
-}  // namespace chase::control
+}  // namespace chase::world

@@ -1,0 +1,25 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace chase::logs {
+
+/// What an exact check of every plan of a log says.
+struct Verification {
+  long plans = 0, certified = 0, proven = 0;  ///< proven: of the certified ones
+  long unheard = 0;                           ///< certified, their OBSTACLES are not in the log
+  long proofs = 0;
+  double hard_radius = 0.0, sigmas = 0.0;  ///< least of the certified plans, m and 1
+  std::vector<std::string> refuted;        ///< a line per plan that does not hold
+
+  bool Holds() const { return refuted.empty() && unheard == 0; }
+};
+
+/// Checks the proofs of every plan against the obstacles that it was made from, in exact
+/// arithmetic. Throws std::runtime_error where the file is no log or holds no PLAN.
+Verification Verify(const std::string& file);
+
+std::string Format(const Verification& verification);
+
+}  // namespace chase::logs
