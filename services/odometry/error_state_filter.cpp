@@ -48,25 +48,26 @@ using JacobianRows = Eigen::Matrix<double, Eigen::Dynamic, kStates>;
 void Symmetrise(ErrorCovariance* P) { *P = (0.5 * (*P + P->transpose())).eval(); }
 
 /// Kalman update in Joseph's form; refused where the innovation's covariance is singular or the
-/// normalised innovation squared per direction exceeds `largest_nis`.
+/// normalised innovation squared per direction exceeds `largest_nis`. Above `usual_nis` the noise
+/// is taken larger by as much: inertia tells a tenth of a second better than a match that is at
+/// odds with it, and doubt in the state instead would hand it over to such matches.
 UpdateResult Correct(const JacobianRows& H, const Eigen::VectorXd& innovation,
-                     const Eigen::MatrixXd& noise, double usual_nis, double largest_nis,
-                     NavState* state) {
-  const Eigen::MatrixXd S = H * state->P * H.transpose() + noise;
-  const Eigen::LDLT<Eigen::MatrixXd> solver(S);
+                     Eigen::MatrixXd noise, double usual_nis, double largest_nis, NavState* state) {
+  Eigen::LDLT<Eigen::MatrixXd> solver(H * state->P * H.transpose() + noise);
   if (solver.info() != Eigen::Success || !(solver.vectorD().minCoeff() > 0.0)) return {};
   const double k = static_cast<double>(innovation.size());
   const double nis = innovation.dot(solver.solve(innovation)) / k;
   if (!(nis <= largest_nis)) return {false, nis};
+  if (nis > usual_nis) {
+    noise *= nis / usual_nis;
+    solver.compute(H * state->P * H.transpose() + noise);
+  }
   const Eigen::MatrixXd K = solver.solve(H * state->P).transpose();
   const ErrorVector dx = K * innovation;
   if (!dx.allFinite()) return {};
   Inject(dx, state);
   const ErrorCovariance I_KH = ErrorCovariance::Identity() - K * H;
   state->P = (I_KH * state->P * I_KH.transpose() + K * noise * K.transpose()).eval();
-  if (nis > usual_nis)
-    state->P.topLeftCorner<9, 9>() +=
-        (1.0 - usual_nis / nis) * dx.head<9>() * dx.head<9>().transpose();
   Symmetrise(&state->P);
   return {true, nis};
 }
