@@ -166,8 +166,8 @@ TEST(ControlNode, BrakesWhilePoseIsLost) {
 
 TEST(ControlNode, GoesByTheUncertaintyNotByTheHealthAlone) {
   const ControlConfig config;
-  const double place = config.tracking_tube / config.sigmas;
-  const double speed = config.land_speed / config.sigmas;
+  const double astray = config.tracking_tube / config.sigmas / 0.4;  // m/s until a stop begins
+  const double landing = config.land_speed / config.sigmas;
   const auto following = [](double sigma, double speed_sigma) {
     Bench bench;
     bench.SendPlan(kStart, {0, 0, 0});
@@ -176,9 +176,10 @@ TEST(ControlNode, GoesByTheUncertaintyNotByTheHealthAlone) {
       bench.SendPose(kStart + 5000 * i, pose_t::HEALTH_DEGRADED, 0, sigma, speed_sigma);
     return bench.tracking.back().following;
   };
-  EXPECT_EQ(following(0.99 * place, 0.99 * speed), +tracking_t::PLAN);
-  EXPECT_EQ(following(1.01 * place, 0.99 * speed), +tracking_t::BRAKE);
-  EXPECT_EQ(following(0.5 * place, 1.01 * speed), +tracking_t::LAND);
+  // Where the body is in the world matters to no plan.
+  EXPECT_EQ(following(1.0, 0.99 * std::min(astray, landing)), +tracking_t::PLAN);
+  EXPECT_EQ(following(0.0, 0.5 * (astray + landing)), +tracking_t::BRAKE);
+  EXPECT_EQ(following(0.0, 1.01 * landing), +tracking_t::LAND);
 }
 
 TEST(ControlNode, FliesWhatIsCertifiedAgainstTheListThatItHeard) {

@@ -260,13 +260,14 @@ struct Innovation {
   }
 };
 
-TEST(ErrorStateFilter, CorrectionsBeyondTheCovarianceMakeItLarger) {
-  Innovation usual(0.02), large(0.15);
+TEST(ErrorStateFilter, AMatchAtOddsWithThePredictionCountsForLess) {
+  Innovation usual(0.02), large(0.2);
   ASSERT_TRUE(Update(FilterConfig{}, usual.z, &usual.state).applied);
   ASSERT_TRUE(Update(FilterConfig{}, large.z, &large.state).applied);
   EXPECT_LT(std::sqrt(usual.state.P(0, 0)), 0.002);
-  EXPECT_GT(3.0 * std::sqrt(large.state.P(0, 0)), 0.15);
-  EXPECT_LT(std::sqrt(large.state.P(1, 1)), 0.002);  // nothing was corrected there
+  EXPECT_GT(usual.state.p.x(), 0.95 * 0.02);
+  EXPECT_LT(large.state.p.x(), 0.97 * 0.2);
+  EXPECT_GT(large.state.P(0, 0), 2.0 * usual.state.P(0, 0));
 }
 
 TEST(ErrorStateFilter, ImpossibleInnovationIsRefused) {
