@@ -83,10 +83,13 @@ HealthReport HealthMonitor::Degradation(double t) const {
   return {Health::kOk, ""};
 }
 
-HealthReport HealthMonitor::At(double t, double position_sigma) const {
+HealthReport HealthMonitor::At(double t, double position_sigma, double velocity_sigma) const {
   if (!started_) return {Health::kStarting, "aligning"};
-  if (position_sigma > config_.lost_sigma && matches_ >= kMatchesToBegin)
+  const bool blind = t - last_good_ > config_.degraded_after;
+  if (blind && position_sigma > config_.lost_sigma && matches_ >= kMatchesToBegin)
     return {Health::kLost, Text("position uncertain by %.2f m", position_sigma)};
+  if (velocity_sigma > config_.lost_speed && matches_ >= kMatchesToBegin)
+    return {Health::kLost, Text("velocity uncertain by %.2f m/s", velocity_sigma)};
   return Degradation(t);
 }
 

@@ -10,7 +10,8 @@ struct HealthConfig {
   double degraded_after = 0.19;  ///< since the last good sweep, s
   double imu_gap = 0.05;         ///< s
   double late_sweep = 0.045;     ///< a sweep that ends this long away from the newest sample, s
-  double lost_sigma = 0.5;       ///< standard deviation of the position, m
+  double lost_sigma = 0.5;       ///< standard deviation of the position without sweeps, m
+  double lost_speed = 0.25;      ///< standard deviation of the velocity, m/s
   double usual_nis = 4.0;        ///< running mean, per direction
   double dropped_share = 0.2;    ///< of the usual number of returns
 
@@ -19,7 +20,8 @@ struct HealthConfig {
     v("degraded_after", degraded_after, "since the last good sweep, s");
     v("imu_gap", imu_gap, "longest silence of the IMU, s");
     v("late_sweep", late_sweep, "a sweep's end may lie this far from the newest IMU sample, s");
-    v("lost_sigma", lost_sigma, "standard deviation of the position, m");
+    v("lost_sigma", lost_sigma, "standard deviation of the position while no sweep helps, m");
+    v("lost_speed", lost_speed, "standard deviation of the velocity, m/s");
     v("usual_nis", usual_nis, "running mean of normalised innovations squared, per direction");
     v("dropped_share", dropped_share, "of the usual number of returns");
   }
@@ -44,8 +46,10 @@ class HealthMonitor {
   void OnSweep(double end, int returns, double imu_t, bool imu_silent);
   void OnMatch(double end, const MatchResult& match, bool applied);
 
-  /// `position_sigma`: of the place in the local map, m.
-  HealthReport At(double t, double position_sigma) const;
+  /// `position_sigma`: of the place in the local map, m; `velocity_sigma`: m/s. Where sweeps hold
+  /// the body but along a direction that nothing fixes, its place along it matters to nobody who
+  /// flies by what he sees: the velocity does.
+  HealthReport At(double t, double position_sigma, double velocity_sigma) const;
   bool started() const { return started_; }
 
  private:

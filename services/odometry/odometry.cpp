@@ -381,7 +381,8 @@ PoseEstimate Odometry::Estimate() const {
   out.covariance.block<1, 3>(8, 0) += drift_.covariance().bottomLeftCorner<1, 3>();
   out.covariance(8, 8) += drift_.covariance()(3, 3);
   const double sigma = std::sqrt(std::max(0.0, doubted.P.topLeftCorner<3, 3>().trace()));
-  out.health = health_.At(live_.t, sigma);
+  const double speed_sigma = std::sqrt(std::max(0.0, doubted.P.block<3, 3>(3, 3).trace()));
+  out.health = health_.At(live_.t, sigma, speed_sigma);
   out.correcting = blend_.correcting();
   out.epoch = epoch_;
   return out;
