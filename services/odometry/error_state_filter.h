@@ -18,7 +18,7 @@ struct FilterConfig {
   double map_tilt = 1e-3;                ///< rad
   double blind_accel = 3.0;              ///< what a body without IMU may do, m/s^2
   double blind_rate = 1.0;               ///< rad/s
-  double usual_nis = 9.0;                ///< per direction: three deviations
+  double usual_nis = 6.0;                ///< per direction
   double largest_nis = 100.0;            ///< per direction
   double match_position_floor = 0.0005;  ///< what a scan match never gets below, m
   double match_rotation_floor = 0.0001;  ///< rad

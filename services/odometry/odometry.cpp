@@ -382,7 +382,8 @@ PoseEstimate Odometry::Estimate() const {
   out.covariance(8, 8) += drift_.covariance()(3, 3);
   const double sigma = std::sqrt(std::max(0.0, doubted.P.topLeftCorner<3, 3>().trace()));
   const double speed_sigma = std::sqrt(std::max(0.0, doubted.P.block<3, 3>(3, 3).trace()));
-  out.health = health_.At(live_.t, sigma, speed_sigma);
+  // Without an inertial unit the velocity is what the last sweeps showed, and doubted accordingly.
+  out.health = health_.At(live_.t, sigma, Blind(live_.t) ? 0.0 : speed_sigma);
   out.correcting = blend_.correcting();
   out.epoch = epoch_;
   return out;
