@@ -111,9 +111,11 @@ class Resting {
     Limits& l = problem_.limits;
     l.tan_elevation = l.min_distance = 0.0;
     // Braking may leave the heights as far as the quickest way of it must.
-    const auto heights = ToPoints(heights_, 5).col(2).head<6>();
-    l.z_min = std::min(l.z_min, heights.minCoeff() - 1e-6);
-    l.z_max = std::max(l.z_max, heights.maxCoeff() + 1e-6);
+    const Points points = ToPoints(heights_, 5);
+    for (int i = 0; i <= 5; ++i) {
+      l.z_min = std::min(l.z_min, points(i, 2) - 1e-6);
+      l.z_max = std::max(l.z_max, points(i, 2) + 1e-6);
+    }
   }
 
   const PlannerConfig& config_;

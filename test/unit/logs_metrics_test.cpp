@@ -226,7 +226,7 @@ TEST(Metrics, PlansAndStagesAreCounted) {
   FlightRecord record = Standing({3, 0, 1.5}, {5.5, 0, 1.5});
   const std::vector<std::pair<double, int>> plans = {{-0.5, 5}, {0.0, 0}, {1.0, 1},
                                                      {2.0, 2},  {3.0, 3}, {4.0, 4}};
-  for (const auto& [t, verdict] : plans) record.plans.push_back({t, verdict, {}});
+  for (const auto& [t, verdict] : plans) record.plans.push_back({t, verdict, {}, {}});
   record.stages.push_back({"planning", "plan", 10, 1.0, 2.0, 3.0, 4.0});
   const Metrics m = Compute(record);
   EXPECT_EQ(m.replans, 5);
