@@ -161,6 +161,7 @@ perception::PerceptionConfig LearnTarget(const world::Scenario& world, const Out
   perception::PerceptionConfig config;
   config.detector = LearnDetector(images, masks, config.detector).config;
   config.rig = outfit.calibrated;
+  config.target_shape = world.target.shape == "sphere" ? "sphere" : "cylinder";
   config.target_radius = world.target.radius;
   config.target_height = world.target.height;
   if (world.target.shape == "box") config.target_radius *= 4.0 / kPi;  // mean half width seen
@@ -172,6 +173,7 @@ void WriteServices(const Outfit& outfit, const perception::PerceptionConfig& lea
   odometry::OdometryConfig odometry;
   odometry.rig = outfit.calibrated;
   perception::PerceptionConfig derived;  // from the scenario itself
+  derived.target_shape = learned.target_shape;
   derived.target_radius = scenario->target.radius;
   derived.target_height = scenario->target.height;
   planning::PlanningConfig planning;

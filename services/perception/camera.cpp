@@ -31,15 +31,26 @@ Camera CameraAt(const PoseSample& pose, const world::Rig& rig) {
   return {rig, R_WB * rig.R_BC(), pose.p_WB + R_WB * rig.camera_position};
 }
 
-std::optional<cv::Rect2d> ProjectCylinder(const Camera& camera, const Eigen::Vector3d& p_WT,
-                                          double radius, double height) {
+std::optional<cv::Rect2d> ProjectTarget(const Camera& camera, const Eigen::Vector3d& p_WT,
+                                        const TargetShape& shape) {
+  const double radius = shape.size[0];
+  Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();
+  double around = radius, above = 0.5 * shape.size[1], beyond = 0.0;
+  if (shape.sphere) {  // seen is the circle along which lines of sight touch it
+    const Eigen::Vector3d sight = p_WT - camera.p_WC;
+    const double range = sight.norm();
+    if (range <= radius) return std::nullopt;
+    axes = Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), sight).toRotationMatrix();
+    beyond = -radius * radius / range;
+    around = radius * std::sqrt(1.0 - radius * radius / (range * range));
+    above = 0.0;
+  }
   Eigen::Vector2d low(1e9, 1e9), high(-1e9, -1e9);
   for (int i = 0; i < 2 * kRimPoints; ++i) {
-    const int around = i / 2;
-    const double angle = 2.0 * M_PI * around / kRimPoints;
-    const Eigen::Vector3d rim(radius * std::cos(angle), radius * std::sin(angle),
-                              (i % 2 ? 0.5 : -0.5) * height);
-    const auto px = camera.Project(p_WT + rim);
+    const double angle = 2.0 * M_PI * (i / 2) / kRimPoints;
+    const Eigen::Vector3d rim(around * std::cos(angle), around * std::sin(angle),
+                              beyond + (i % 2 ? above : -above));
+    const auto px = camera.Project(p_WT + axes * rim);
     if (!px) return std::nullopt;
     low = low.cwiseMin(*px);
     high = high.cwiseMax(*px);

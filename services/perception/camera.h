@@ -26,9 +26,16 @@ struct Camera {
 /// The camera of a body at this pose.
 Camera CameraAt(const PoseSample& pose, const world::Rig& rig);
 
-/// Box [px] around an upright cylinder centred at p_WT, from its two rims; nothing when any part
-/// lies behind the camera.
-std::optional<cv::Rect2d> ProjectCylinder(const Camera& camera, const Eigen::Vector3d& p_WT,
-                                          double radius, double height);
+/// Radius and height of the upright cylinder, or of the sphere, and how well they are known.
+struct TargetShape {
+  bool sphere = false;
+  Eigen::Vector2d size = {0.15, 0.5};                  ///< radius, height, m
+  Eigen::Vector2d variance = Eigen::Vector2d::Zero();  ///< m^2
+};
+
+/// Box [px] around a target centred at p_WT, from a cylinder's two rims or from the rim of the
+/// sphere that is seen; nothing when any part lies behind the camera.
+std::optional<cv::Rect2d> ProjectTarget(const Camera& camera, const Eigen::Vector3d& p_WT,
+                                        const TargetShape& shape);
 
 }  // namespace chase::perception

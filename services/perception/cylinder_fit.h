@@ -24,12 +24,6 @@ struct TargetGaussian {
   Eigen::Vector3d velocity() const { return mean.tail<3>(); }
 };
 
-/// Radius and height of the upright cylinder and how well they are known.
-struct TargetShape {
-  Eigen::Vector2d size = {0.15, 0.5};                  ///< radius, height, m
-  Eigen::Vector2d variance = Eigen::Vector2d::Zero();  ///< m^2
-};
-
 /// All that is known for one frame. The time of the frame is that of `prior`.
 struct FitInput {
   TargetGaussian prior;
@@ -62,7 +56,7 @@ struct FitResult {
   double log_odds = 0.0;  ///< of being the target rather than anything else of its colour
 };
 
-/// The most likely position and velocity of an upright cylinder: silhouette, LiDAR points and
+/// The most likely position and velocity of the target: silhouette, LiDAR points and
 /// prediction weighed together, with the covariance of that estimate. With `points` at times of
 /// their own it is one step of an iterated extended Kalman filter. Starts at `start`, or at the
 /// prediction.

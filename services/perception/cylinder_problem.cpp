@@ -154,9 +154,17 @@ void CylinderProblem::AddPosition() {
 }
 
 double CylinderProblem::EdgeResidual(size_t side, const Edge& edge, double scale, const Vector8d& y,
-                                     Vector8d* gradient) {
+                                     Vector8d* gradient) const {
+  if (input_.shape.sphere)
+    return TangentResidual{edge.ray, Upright(side), Sign(side), scale * edge.px}(y, gradient);
   if (Upright(side)) return SideResidual{edge.ray, Sign(side), scale * edge.px}(y, gradient);
   return CapResidual{edge.ray, Sign(side), scale * edge.px}(y, gradient);
+}
+
+double CylinderProblem::SurfaceDistance(const TargetPoint& point, double scale, const Vector8d& y,
+                                        Vector8d* gradient) const {
+  if (input_.shape.sphere) return SpherePointResidual{point.p_W, point.age, scale}(y, gradient);
+  return PointResidual{point.p_W, point.age, scale}(y, gradient);
 }
 
 template <class Sum>
@@ -198,8 +206,7 @@ void CylinderProblem::EvaluatePoints(const Vector8d& y, Sum* sum) const {
   Cauchy loss(Share(input_.points.size(), config_.lidar_weight));
   const double scale = 1.0 / config_.lidar_sigma;
   for (const auto& p : input_.points) {
-    const PointResidual residual{p.p_W, p.age, scale};
-    const double r = residual(y, Sum::kDerivatives ? &row : nullptr);
+    const double r = SurfaceDistance(p, scale, y, Sum::kDerivatives ? &row : nullptr);
     sum->Add(loss.Weight(r * r), r, row);
   }
   sum->cost += loss.Cost();
@@ -255,7 +262,7 @@ std::vector<double> CylinderProblem::EdgeResiduals(size_t side, const Vector8d& 
 std::vector<double> CylinderProblem::PointResiduals(const Vector8d& y) const {
   std::vector<double> all;
   all.reserve(input_.points.size());
-  for (const auto& p : input_.points) all.push_back(PointResidual{p.p_W, p.age, 1.0}(y, nullptr));
+  for (const auto& p : input_.points) all.push_back(SurfaceDistance(p, 1.0, y, nullptr));
   return all;
 }
 
@@ -292,8 +299,8 @@ FitResult CylinderProblem::Read(const Vector8d& y, const Matrix8d& covariance, d
   FitResult out;
   out.posterior.mean = y.head<6>();
   out.posterior.covariance = covariance.topLeftCorner<6, 6>();
+  out.shape = input_.shape;
   out.shape.size = y.tail<2>();
-  out.shape.variance = input_.shape.variance;
   if (config_.estimate_shape) out.shape.variance = covariance.diagonal().tail<2>();
   out.cost = cost;
   out.prior_distance = (root_ * (out.posterior.mean - input_.prior.mean)).squaredNorm();

@@ -55,8 +55,10 @@ class CylinderProblem {
   void AddEdges();
   void AddPosition();
   double Range(const Vector8d& y) const;
-  static double EdgeResidual(size_t side, const Edge& edge, double scale, const Vector8d& y,
-                             Vector8d* gradient);
+  double EdgeResidual(size_t side, const Edge& edge, double scale, const Vector8d& y,
+                      Vector8d* gradient) const;
+  double SurfaceDistance(const TargetPoint& point, double scale, const Vector8d& y,
+                         Vector8d* gradient) const;
   template <class Sum>
   void Evaluate(const Vector8d& y, Sum* sum) const;
   template <class Sum>

@@ -68,6 +68,42 @@ struct CapResidual {
   }
 };
 
+/// The line of sight touches a sphere: its centre passes it at one radius, on the inner side of the
+/// edge.
+struct TangentResidual {
+  PlanRay ray;
+  bool upright;  ///< a left or right edge
+  double sign;   ///< +1: right or top edge, -1: left or bottom edge
+  double scale;  ///< 1/m
+
+  double operator()(const Vector8d& y, Vector8d* gradient) const {
+    const Eigen::Vector3d sight =
+        Eigen::Vector3d(ray.direction.x(), ray.direction.y(), ray.slope).normalized();
+    const Eigen::Vector3d to_center = y.head<3>() - ray.c;
+    const Eigen::Vector3d off = to_center - to_center.dot(sight) * sight;
+    const double side = upright ? ray.Across(y) : ray.c.z() + ray.slope * ray.Along(y) - y[2];
+    const double inner = sign * side < 0.0 ? -1.0 : 1.0;
+    const double distance = std::sqrt(off.squaredNorm() + 1e-12);
+    if (gradient) *gradient << scale * inner / distance * off, Eigen::Vector3d::Zero(), -scale, 0.0;
+    return scale * (inner * distance - y[6]);
+  }
+};
+
+/// Distance of a LiDAR point from the surface of a sphere where it was at the point's time.
+struct SpherePointResidual {
+  Eigen::Vector3d p_W;
+  double age;    ///< s
+  double scale;  ///< 1/m
+
+  double operator()(const Vector8d& y, Vector8d* gradient) const {
+    const Eigen::Vector3d q = p_W - (y.head<3>() - age * y.segment<3>(3));
+    const double distance = std::sqrt(q.squaredNorm() + 1e-12);
+    if (gradient) *gradient << -q / distance, age * q / distance, -1.0, 0.0;
+    if (gradient) *gradient *= scale;
+    return scale * (distance - y[6]);
+  }
+};
+
 /// Distance of a LiDAR point from the surface of the cylinder where it stood at the point's time.
 struct PointResidual {
   Eigen::Vector3d p_W;

@@ -30,6 +30,7 @@ Finder::Finder(const PerceptionConfig& config)
       detector_(MakeDetector(config.detector, config.fit.edge_sigma_px, config.rig)),
       localiser_(config) {
   const double variance = config.fit.shape_sigma * config.fit.shape_sigma;
+  shape_.sphere = config.target_shape == "sphere";
   shape_.size = {config.target_radius, config.target_height};
   shape_.variance = {variance, variance};
 }

@@ -23,8 +23,7 @@ constexpr double kHiddenPriorShare = 0.6;  // of the prior's gate where sides ar
 
 bool Visible(const FitInput& input) {
   if (input.detection->p_CT) return true;
-  const auto expected = ProjectCylinder(input.camera, input.prior.position(), input.shape.size[0],
-                                        input.shape.size[1]);
+  const auto expected = ProjectTarget(input.camera, input.prior.position(), input.shape);
   return !expected || input.detection->box.area() >= kMinVisible * expected->area();
 }
 

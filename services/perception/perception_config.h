@@ -189,6 +189,7 @@ struct StateConfig {
 
 struct PerceptionConfig {
   world::Rig rig;
+  std::string target_shape = "cylinder";
   double target_radius = 0.15, target_height = 0.5;
   DetectorConfig detector;
   FitConfig fit;
@@ -199,8 +200,9 @@ struct PerceptionConfig {
   template <class V>
   void Visit(V& v) {
     v("rig", rig, "calibration: where the sensors sit, the pinhole camera");
-    v("target_radius", target_radius, "of the target's upright cylinder, m");
-    v("target_height", target_height, "of the cylinder, m");
+    v("target_shape", target_shape, "cylinder (upright) or sphere");
+    v("target_radius", target_radius, "of the target, m");
+    v("target_height", target_height, "of the target, m");
     v("detector", detector, "finds the target in the image");
     v("fit", fit, "places it in space");
     v("motion", motion, "how it may move, what is sent out");

@@ -30,8 +30,7 @@ TargetGaussian AfterASharpTurn(const FitInput& input) {
 }
 
 std::function<bool(const Sides&)> Sensible(const FitInput& input) {
-  const auto expected = ProjectCylinder(input.camera, input.prior.position(), input.shape.size[0],
-                                        input.shape.size[1]);
+  const auto expected = ProjectTarget(input.camera, input.prior.position(), input.shape);
   const double range = (input.prior.position() - input.camera.p_WC).norm();
   if (!expected || RangeSigma(input) > kKnownShare * range)
     return [](const Sides&) { return true; };

@@ -22,8 +22,7 @@ cv::Rect2d Grown(const cv::Rect2d& box, double dx, double dy) {
 }  // namespace
 
 std::optional<SearchBoxes> WhereToLook(const TargetTrack& track, const Camera& camera) {
-  const auto box =
-      ProjectCylinder(camera, track.state.position(), track.shape.size[0], track.shape.size[1]);
+  const auto box = ProjectTarget(camera, track.state.position(), track.shape);
   if (!box) return std::nullopt;
   const double range = (track.state.position() - camera.p_WC).norm();
   const double sigma =

@@ -18,6 +18,7 @@ constexpr double kBehind = 0.25;    // m behind the target where such a ray ends
 double SurfaceDistance(const TargetPoint& point, const FitInput& input) {
   const Eigen::Vector3d q =
       point.p_W - (input.prior.position() - point.age * input.prior.velocity());
+  if (input.shape.sphere) return q.norm() - input.shape.size[0];
   const double side = q.head<2>().norm() - input.shape.size[0];
   const double cap = std::abs(q.z()) - 0.5 * input.shape.size[1];
   return side > 0.0 && cap > 0.0 ? std::hypot(side, cap) : std::max(side, cap);

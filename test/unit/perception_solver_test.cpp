@@ -49,7 +49,7 @@ class Scene {
 
  private:
   void Outline(const Vector3d& target) {
-    outline.box = *ProjectCylinder(input.camera, target, 0.15, 0.5);
+    outline.box = *ProjectTarget(input.camera, target, {});
     const auto& b = outline.box;
     for (int i = 0; i < 8; ++i) {
       const double along = 0.3 + 0.05 * i, off = 0.4 * Uniform() + (i == 3 ? 6.0 : 0.0);
@@ -101,6 +101,55 @@ TEST(PerceptionSolver, GradientsOfTheResidualsAreTheirDifferences) {
     ExpectGradient(CapResidual{ray, sign, 7.0}, y);
     const Vector3d off(0.3 * scene.Uniform(), 0.3 * scene.Uniform(), 0.4 * scene.Uniform());
     ExpectGradient(PointResidual{y.head<3>() + off, 0.2 * scene.Uniform(), 40.0}, y);
+    ExpectGradient(TangentResidual{ray, i % 4 < 2, sign, 7.0}, y);
+    ExpectGradient(SpherePointResidual{y.head<3>() + off, 0.2 * scene.Uniform(), 40.0}, y);
+  }
+}
+
+// Where lines of sight touch a sphere: the edge of what is hit in a dense image of it.
+TEST(PerceptionSolver, ASphereIsPlacedByItsOutline) {
+  constexpr double kRadius = 0.2;
+  for (unsigned seed = 1; seed <= 50; ++seed) {
+    Scene scene(seed);
+    const Vector3d center = scene.input.prior.position();
+    scene.input.shape = {true, {kRadius, 2.0 * kRadius}, Eigen::Vector2d::Zero()};
+    scene.input.points.clear();
+    const Camera& camera = scene.input.camera;
+    const auto hits = [&](double u, double v) {
+      const Vector3d ray = camera.Ray(u, v).normalized(), to = center - camera.p_WC;
+      return (to - to.dot(ray) * ray).norm() < kRadius;
+    };
+    const auto edge = [&](double u, double v, double du, double dv) {
+      double in = 0.0, out = 200.0;
+      for (int i = 0; i < 60; ++i)
+        (hits(u + 0.5 * (in + out) * du, v + 0.5 * (in + out) * dv) ? in : out) = 0.5 * (in + out);
+      return Eigen::Vector2d(u + in * du, v + in * dv);
+    };
+    const Eigen::Vector2d middle = *camera.Project(center);
+    const auto box = *ProjectTarget(camera, center, scene.input.shape);
+    scene.outline.box = box;
+    for (auto& samples : scene.outline.silhouette.samples) samples.clear();
+    for (int i = -3; i <= 3; ++i) {
+      const double v = middle.y() + 0.08 * i * box.height, u = middle.x() + 0.08 * i * box.width;
+      auto& samples = scene.outline.silhouette.samples;
+      samples[kLeft].push_back(edge(middle.x(), v, -1, 0));
+      samples[kRight].push_back(edge(middle.x(), v, 1, 0));
+      samples[kTop].push_back(edge(u, middle.y(), 0, -1));
+      samples[kBottom].push_back(edge(u, middle.y(), 0, 1));
+      for (const size_t side : {kLeft, kRight, kTop, kBottom}) {
+        const auto& px = samples[side].back();
+        const double slack = 0.02 * box.width;  // its rim is a polygon of 16 sides
+        EXPECT_GT(px.x(), box.x - slack);
+        EXPECT_LT(px.x(), box.x + box.width + slack);
+        EXPECT_GT(px.y(), box.y - slack);
+        EXPECT_LT(px.y(), box.y + box.height + slack);
+      }
+    }
+    scene.input.prior.mean.head<3>() += Vector3d(0.2, 0.1, -0.1);
+    scene.input.prior.covariance = 10.0 * Matrix6d::Identity();
+    EXPECT_LT((FitCylinder(scene.input, {}).posterior.position() - center).norm(), 2e-3);
+    scene.input.shape.sphere = false;
+    EXPECT_GT((FitCylinder(scene.input, {}).posterior.position() - center).norm(), 0.1);
   }
 }
 
