@@ -31,6 +31,7 @@ world::Obstacle FromMessage(const obstacle_t& m, int64_t origin) {
   world::Obstacle o;
   o.id = m.id;
   o.moving = m.kind == obstacle_t::MOVING;
+  o.ground = m.kind == obstacle_t::GROUND;
   o.center = FromMessage(m.center, origin);
   o.shape = ToSymmetric(m.shape);
   o.solid = static_cast<world::Obstacle::Solid>(m.solid);
@@ -45,7 +46,7 @@ world::Obstacle FromMessage(const obstacle_t& m, int64_t origin) {
 obstacle_t ToMessage(const world::Obstacle& o, int64_t origin) {
   obstacle_t m{};
   m.id = o.id;
-  m.kind = o.moving ? obstacle_t::MOVING : obstacle_t::STATIC;
+  m.kind = o.moving ? obstacle_t::MOVING : o.ground ? obstacle_t::GROUND : obstacle_t::STATIC;
   m.center = ToMessage(o.center, origin);
   Set(m.shape, o.shape);
   m.solid = static_cast<int8_t>(o.solid);

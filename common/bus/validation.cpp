@@ -133,7 +133,7 @@ std::string Problem(const obstacles_t& m) {
   Check check;
   check.Time(m.utime);
   for (const auto& o : m.obstacles) {
-    check.Polynomial("center", o.center).Number("shape", o.shape).Code("kind", o.kind, 1);
+    check.Polynomial("center", o.center).Number("shape", o.shape).Code("kind", o.kind, 2);
     check.That(Positive(o.shape), "shape", "is not positive definite");
     check.Code("solid", o.solid, 2).Number("half", o.half);
     if (o.solid != obstacle_t::ELLIPSOID)

@@ -11,7 +11,8 @@ namespace chase::world {
 struct Obstacle {
   int id = 0;
   bool moving = false;
-  Trajectory center;                                    ///< c(t), frame W, m
+  bool ground = false;  ///< what the target stands on: hides nothing
+  Trajectory center;    ///< c(t), frame W, m
   Eigen::Matrix3d shape = Eigen::Matrix3d::Identity();  ///< R, frame W, 1/m^2, positive definite
   enum class Solid { kEllipsoid, kBox, kCylinder };     ///< cylinder: upright
   Solid solid = Solid::kEllipsoid;                      ///< others: the ellipsoid is about it

@@ -179,18 +179,7 @@ void WriteServices(const Outfit& outfit, const perception::PerceptionConfig& lea
   planning::PlanningConfig planning;
   prediction::PredictionConfig prediction;
   if (scenario->world.forest.count > 200) planning.planner.skeletons = 8;
-  if (!scenario->world.ground.slope.isZero()) {  // heights count from the ground along the way
-    const auto path = world::TargetMotion(*scenario);
-    double least = 1e9, most = -1e9;
-    for (double t = 0.0; t < path.Duration(); t += 0.5) {
-      const Eigen::Vector2d p = path.Position(t);
-      least = std::min(least, world::GroundHeight(scenario->world.ground, p.x(), p.y()));
-      most = std::max(most, world::GroundHeight(scenario->world.ground, p.x(), p.y()));
-    }
-    planning.planner.z_min = RoundTo(least + planning.planner.z_min, 0.1);
-    planning.planner.z_max = RoundTo(most + planning.planner.z_max, 0.1);
-    prediction.predictor.planar = false;
-  }
+  if (!scenario->world.ground.slope.isZero()) prediction.predictor.planar = false;
   scenario->services.clear();
   const auto add = [&](const std::string& name, const std::string& text) {
     if (!text.empty()) scenario->services.push_back({name, text});

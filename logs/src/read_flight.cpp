@@ -137,6 +137,7 @@ class Gatherer {
   void AddObstacles(FlightRecord* record) const {
     if (!obstacles_) return;
     for (const obstacle_t& m : obstacles_->obstacles) {
+      if (m.kind == obstacle_t::GROUND) continue;
       const world::Obstacle o = bus::FromMessage(m, origin_);
       record->obstacles.push_back({o.center.Position(Time(obstacles_->utime)), o.shape, o.moving});
     }

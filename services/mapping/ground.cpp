@@ -33,6 +33,12 @@ GroundModel::Tile& GroundModel::At(int x, int y) {
   return tile;
 }
 
+std::optional<double> GroundModel::Known(int x, int y) const {
+  const Tile& tile = tiles_[static_cast<size_t>((x & (kSide - 1)) * kSide + (y & (kSide - 1)))];
+  if (tile.x != x || tile.y != y || !tile.known) return std::nullopt;
+  return tile.z;
+}
+
 double GroundModel::Estimate(int x, int y) {
   Tile& tile = At(x, y);
   if (tile.cached == sweep_) return tile.estimate;

@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "services/mapping/mapping_config.h"
@@ -18,6 +19,8 @@ class GroundModel {
   void Update(const std::vector<Eigen::Vector3f>& points, const Eigen::Vector3d& origin);
   /// z of the ground at (x, y), m.
   double Height(double x, double y) { return Estimate(TileOf(x), TileOf(y)); }
+  /// z of the tile over [x, x + 1) x [y, y + 1), m, where it was seen.
+  std::optional<double> Known(int x, int y) const;
   bool IsGround(const Eigen::Vector3f& p) { return p.z() < Height(p.x(), p.y()) + config_.margin; }
   double mean() const { return mean_; }
 

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <utility>
 
+#include "services/mapping/ground_slabs.h"
+
 namespace chase::mapping {
 
 namespace {
@@ -269,8 +271,11 @@ ObstacleList Mapper::Insert(const Sweep& sweep) {
   ClearGhosts(sweep.t);
   t_ = sweep.t;
   list.obstacles = Statics(sweep.origin, sweep.t, &list.n_dropped);
-  list.n_static = static_cast<int>(list.obstacles.size());
   const StaticConfig& c = config_.statics;
+  for (auto& slab :
+       GroundSlabs(ground_, sweep.origin, c.radius, c.band_low, sweep.t, config_.movers.horizon))
+    list.obstacles.push_back(std::move(slab));
+  list.n_static = static_cast<int>(list.obstacles.size());
   const double middle =
       ground_.Height(sweep.origin.x(), sweep.origin.y()) + 0.5 * (c.band_low + c.band_high);
   for (auto& o : tracker_.Obstacles(middle, c.semi_height, 1.02)) {

@@ -46,7 +46,7 @@ struct GroundConfig {
 struct StaticConfig {
   double radius = 9.0;          ///< obstacles within this of the drone are listed, m
   double band_low = 0.3;        ///< flight volume above the ground, m
-  double band_high = 3.0;       ///< the same, upper end, m
+  double band_high = 3.9;       ///< the same, upper end: planner.z_max and its hard radius, m
   double closed = 0.0;          ///< unseen columns within this count as solid, m; 0: none
   double semi_height = 8.0;     ///< vertical semi-axis of the ellipsoids, m
   double max_length = 2.5;      ///< longest piece of a wall, m

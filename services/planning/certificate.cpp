@@ -233,7 +233,8 @@ std::string SampleFaults(const Curve& plan, const Problem& problem, double sight
     const double acceleration =
         Evaluate(plan, tau, 2).norm() / (problem.duration * problem.duration);
     if (l.acceleration > 0.0 && acceleration > l.acceleration * (1 + 1e-9)) return "too steep";
-    if (l.height && (p.z() < l.z_min - 1e-9 || p.z() > l.z_max + 1e-9)) return "height";
+    const double z = l.ground.Above(p);
+    if (l.height && (z < l.z_min - 1e-9 || z > l.z_max + 1e-9)) return "height";
     if (l.min_distance > 0.0 && (p - q).norm() < l.min_distance - 1e-9) return "too near";
     if (l.tan_elevation > 0.0 &&
         std::abs(p.z() - q.z()) > l.tan_elevation * (p - q).head<2>().norm() + 1e-9)

@@ -89,7 +89,7 @@ class Ladder : public Planner {
     if (!proofs) return false;
     auto stop = WayOut(config_, request, result->trajectory);
     if (!stop) return false;
-    SetProofs(config_, std::move(*proofs), result);
+    SetProofs(config_, request, std::move(*proofs), result);
     result->stop = std::move(stop->trajectory);
     result->stop_proofs = std::move(stop->proofs);
     return true;
@@ -102,7 +102,7 @@ class Ladder : public Planner {
   }
   static bool WeakensSight(const Problem& problem) {
     return std::any_of(problem.obstacles.begin(), problem.obstacles.end(), [](const Ellipsoid& e) {
-      return e.sight_from > 0.0 || e.safety_from > 0.0;
+      return (e.sight_from > 0.0 && !e.ground) || e.safety_from > 0.0;
     });
   }
 

@@ -71,16 +71,16 @@ Answer KeepsNorm(const Net& net, int order, double limit, double duration) {
   return ends2 > std::pow(most + net.error, 2) ? Answer::kBroken : Answer::kOpen;
 }
 
-Answer KeepsHeight(const Net& net, double z_min, double z_max) {
-  double low = net.b[0][2], high = low;
-  for (int i = 1; i <= kDegree; ++i) {
-    low = std::min(low, net.b[i][2]);
-    high = std::max(high, net.b[i][2]);
-  }
-  if (low - net.error > z_min && high + net.error < z_max) return Answer::kKept;
-  const double ends[2] = {net.b[0][2], net.b[kDegree][2]};
-  for (const double z : ends)
-    if (z < z_min - net.error || z > z_max + net.error) return Answer::kBroken;
+Answer KeepsHeight(const Net& net, const Limits& l) {
+  const Ground& g = l.ground;
+  double z[kDegree + 1];
+  for (int i = 0; i <= kDegree; ++i) z[i] = g.Above({net.b[i][0], net.b[i][1], net.b[i][2]});
+  const auto [low, high] = std::minmax_element(z, z + kDegree + 1);
+  const double error =
+      net.error * (1.0 + std::abs(g.slope_x) + std::abs(g.slope_y)) + kSlack * std::abs(g.z0);
+  if (*low - error > l.z_min && *high + error < l.z_max) return Answer::kKept;
+  for (const double end : {z[0], z[kDegree]})
+    if (end < l.z_min - error || end > l.z_max + error) return Answer::kBroken;
   return Answer::kOpen;
 }
 
@@ -140,12 +140,17 @@ bool KeepsNorm(const Curve& plan, int order, double limit, double duration) {
   return sum.IsPositive();
 }
 
-bool KeepsHeight(const Curve& plan, double z_min, double z_max) {
-  const Polynomial z = plan.col(2);
+bool KeepsHeight(const Curve& plan, const Limits& l) {
+  const Ground& g = l.ground;
+  Polynomial z = plan.col(2) - g.slope_x * plan.col(0) - g.slope_y * plan.col(1);
+  z[0] -= g.z0;
+  const double terms = plan.cwiseAbs().colwise().sum().dot(
+      Eigen::RowVector3d(std::abs(g.slope_x), std::abs(g.slope_y), 1.0));
   const Polynomial b = math::PowerToBernstein(z);
   const double error =
-      math::PowerToBernsteinError(z) + 4.0 * kRounding * (std::abs(z_min) + std::abs(z_max));
-  const Polynomial above = b.array() - z_min, below = z_max - b.array();
+      math::PowerToBernsteinError(z) +
+      4.0 * kRounding * (terms + std::abs(g.z0) + std::abs(l.z_min) + std::abs(l.z_max));
+  const Polynomial above = b.array() - l.z_min, below = l.z_max - b.array();
   return IsPositive(above, error) && IsPositive(below, error);
 }
 
@@ -169,9 +174,9 @@ bool KeepsNorm(const Net* net, const Curve& plan, int order, double limit, doubl
          (answer == Answer::kOpen && KeepsNorm(plan, order, limit, duration));
 }
 
-bool KeepsHeight(const Net* net, const Curve& plan, double z_min, double z_max) {
-  const Answer answer = net ? KeepsHeight(*net, z_min, z_max) : Answer::kOpen;
-  return answer == Answer::kKept || (answer == Answer::kOpen && KeepsHeight(plan, z_min, z_max));
+bool KeepsHeight(const Net* net, const Curve& plan, const Limits& l) {
+  const Answer answer = net ? KeepsHeight(*net, l) : Answer::kOpen;
+  return answer == Answer::kKept || (answer == Answer::kOpen && KeepsHeight(plan, l));
 }
 
 }  // namespace
@@ -183,7 +188,7 @@ bool KeepsLimits(const Curve& plan, const Problem& problem) {
   Net net{};
   if (small) net = MakeNet(plan);
   const Net* quick = small ? &net : nullptr;
-  if (l.height && !KeepsHeight(quick, plan, l.z_min, l.z_max)) return false;
+  if (l.height && !KeepsHeight(quick, plan, l)) return false;
   if (l.speed > 0.0 && !KeepsNorm(quick, plan, 1, l.speed, problem.duration)) return false;
   if (l.acceleration > 0.0 && !KeepsNorm(quick, plan, 2, l.acceleration, problem.duration))
     return false;

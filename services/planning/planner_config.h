@@ -71,8 +71,8 @@ struct PlannerConfig {
     v("sigmas", sigmas, "uncertain obstacles and targets are widened by this many deviations");
     v("max_speed", max_speed, "m/s; 0: no limit");
     v("max_acceleration", max_acceleration, "m/s^2; 0: no limit");
-    v("z_min", z_min, "lowest height of a plan, m; z_min = z_max: no limits");
-    v("z_max", z_max, "greatest height of a plan, m");
+    v("z_min", z_min, "lowest height of a plan above the ground, m; z_min = z_max: no limits");
+    v("z_max", z_max, "greatest height of a plan above the ground, m");
     v("max_elevation_deg", max_elevation_deg, "of the target out of the level; 0: no limit");
     v("max_bearing_deg", max_bearing_deg,
       "of the target off the yaw, said when broken; 0: no limit");

@@ -1,5 +1,6 @@
 #include "services/planning/problem.h"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
@@ -13,6 +14,7 @@ namespace {
 // start is outside the shape.
 constexpr double kShares[] = {1.0, 0.75, 0.5, 0.25, 0.0};
 constexpr double kClear = 1.02;    // squared distance; as a factor of lengths more than enough
+constexpr double kPoint = 1e6;     // 1/m^2, of a shape that sorts out nothing
 constexpr double kLeaveBy = 0.25;  // tau by which a plan has left an obstacle that it starts in
 
 double SquaredNorm(const Eigen::Matrix3d& R, const Eigen::Vector3d& x) { return x.dot(R * x); }
@@ -179,7 +181,7 @@ void RelaxSafety(const world::Obstacle& o, double hard, double margin, double un
                  Start* start, Ellipsoid* e, std::string* notes) {
   for (double share : kShares) {
     e->safety_radius = hard + share * margin;
-    if (share < 1.0) {
+    if (share < 1.0 && !o.ground) {
       e->safety = Grown(o, e->safety_radius + uncertainty);
       e->grown_by[0] = -1.0;
     }
@@ -242,8 +244,10 @@ double Overshoot(double v, double a, double brake) {
 
 // Limits that the start already breaks give way to what it has: no chain of plans gets worse.
 // Heights give way to what the start cannot help only, so that none sinks.
-Limits MakeLimits(const PlannerConfig& c, const world::State& s, const Eigen::Vector3d& target) {
+Limits MakeLimits(const PlannerConfig& c, const world::State& s, const Eigen::Vector3d& target,
+                  const Ground& ground) {
   constexpr double kRounding = 1e-6, kBrake = 2.0;  // m; m/s^2 where no limit is set
+  constexpr double kOverhead = 10.0;  // tangent from which there is no side to be on
   const auto at_least = [](double limit, double now) {
     return limit > 0.0 ? std::max(limit, (1.0 + kRounding) * now + kRounding) : 0.0;
   };
@@ -252,14 +256,14 @@ Limits MakeLimits(const PlannerConfig& c, const world::State& s, const Eigen::Ve
   limits.acceleration = at_least(c.max_acceleration, s.a.norm());
   limits.height = c.z_max > c.z_min;
   const double brake = c.max_acceleration > 0.0 ? 0.5 * c.max_acceleration : kBrake;
-  const double sink = Overshoot(-s.v.z(), -s.a.z(), brake),
-               rise = Overshoot(s.v.z(), s.a.z(), brake);
-  limits.z_min = std::min(c.z_min, s.p.z() - sink - kRounding);
-  limits.z_max = std::max(c.z_max, s.p.z() + rise + kRounding);
+  const double v = ground.Rise(s.v), a = ground.Rise(s.a), z = ground.Above(s.p);
+  limits.ground = ground;
+  limits.z_min = std::min(c.z_min, z - Overshoot(-v, -a, brake) - kRounding);
+  limits.z_max = std::max(c.z_max, z + Overshoot(v, a, brake) + kRounding);
   const Eigen::Vector3d r = target - s.p;
   const double tangent = std::tan(c.max_elevation_deg * M_PI / 180.0);
-  const bool in_field = std::abs(r.z()) < 0.95 * tangent * r.head<2>().norm();
-  limits.tan_elevation = in_field ? tangent : 0.0;
+  const double now = std::abs(r.z()) / std::max(r.head<2>().norm(), 1e-3);
+  limits.tan_elevation = now < kOverhead ? at_least(tangent, now) : 0.0;
   limits.min_distance = std::min(c.min_distance, 0.9 * r.norm());
   return limits;
 }
@@ -304,6 +308,27 @@ math::Polynomial TargetGrowth(const PlannerConfig& config, const PlanRequest& re
 
 }  // namespace
 
+Ground GroundOf(const std::vector<world::Obstacle>& obstacles) {
+  Eigen::Matrix3d A = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d b = Eigen::Vector3d::Zero();
+  for (const world::Obstacle& o : obstacles) {
+    if (!o.ground) continue;
+    const double area = o.half.x() * o.half.y();
+    const Eigen::Vector3d center = o.center.Position(o.center.start);
+    for (const double x : {-1.0, 1.0})
+      for (const double y : {-1.0, 1.0}) {
+        const Eigen::Vector3d p =
+            center + o.axes * Eigen::Vector3d(x * o.half.x(), y * o.half.y(), 0.0);
+        const Eigen::Vector3d row(p.x(), p.y(), 1.0);
+        A += area * row * row.transpose();
+        b += area * p.z() * row;
+      }
+  }
+  if (A.isZero(0.0)) return {};
+  const Eigen::Vector3d plane = A.ldlt().solve(b);
+  return {plane.x(), plane.y(), plane.z()};
+}
+
 int Problem::n_candidates() const {
   int n = 1;
   for (const auto& choices : skeletons) n *= static_cast<int>(choices.size());
@@ -317,7 +342,8 @@ void MakeProblem(const PlannerConfig& config, const PlanRequest& request, std::s
   problem->degree = config.degree;
   problem->start = StartCurve(request.start, request.horizon);
   problem->target = ToCurve(request.target, request.t0, request.horizon);
-  problem->limits = MakeLimits(config, request.start, problem->target.row(0).transpose());
+  problem->limits = MakeLimits(config, request.start, problem->target.row(0).transpose(),
+                               GroundOf(request.obstacles));
   problem->skeletons.clear();
   problem->reach.reset();
   problem->obstacles.resize(request.obstacles.size());
@@ -335,13 +361,19 @@ void MakeProblem(const PlannerConfig& config, const PlanRequest& request, std::s
     Ellipsoid* e = &problem->obstacles[j];
     e->id = o.id;
     e->safety_from = 0.0;
-    e->sight_from = request.asks_sight ? 0.0 : 1.0;
+    const bool asks_sight = request.asks_sight && !o.ground;
+    e->ground = o.ground;
+    e->sight_from = asks_sight ? 0.0 : 1.0;
     e->sight_share = 1.0;
     e->safety_radius = hard + margin;
     SetCurve(o.center, request.t0, request.horizon, &e->center);
     const double then = Uncertainty(o, *problem, 1.0), now = Uncertainty(o, *problem, 0.0);
     const Growth growth{hard + margin + 0.5 * (now + then), sight + 0.5 * (now + then)};
     Grow(o, growth, e);
+    if (o.ground) {  // heights sort out candidates; no ellipsoid fits a slab
+      e->safety = e->sight = kPoint * Eigen::Matrix3d::Identity();
+      e->grown_by[0] = -1.0;
+    }
     const double most = std::max(now, then);
     const Growth widest{hard + margin + most,
                         config.sight_margin + problem->target_growth.sum() + most};
@@ -351,7 +383,7 @@ void MakeProblem(const PlannerConfig& config, const PlanRequest& request, std::s
     // Far from start and target no margin has to give way.
     if (!MayTouch(own, e->center, e->safety_half.max(e->sight_half), kClear)) continue;
     RelaxSafety(o, hard, margin, now, &start, e, notes);
-    if (!request.asks_sight) continue;
+    if (!asks_sight) continue;
     RelaxSight(o, growth, first, target, *problem, &start, e, notes);
   }
   problem->target_body.reset();

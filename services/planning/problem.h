@@ -31,6 +31,7 @@ struct Ellipsoid {
   /// tau from which safety is asked; above 0 only if the start is inside
   double safety_from = 0.0;
   double sight_from = 0.0;  ///< tau from which sight is asked; 1: never
+  bool ground = false;      ///< what the target stands on: hides nothing
   /// What the ellipsoids stand for; nothing: for themselves. Else they only sort out candidates,
   /// and the proof is about the body's Minkowski sums.
   std::optional<world::Body> body;
@@ -39,12 +40,22 @@ struct Ellipsoid {
   double sight_share = 1.0;    ///< of the sight's margin and of the target's uncertainty
 };
 
+/// The ground about the start, as a plane.
+struct Ground {
+  double slope_x = 0.0, slope_y = 0.0, z0 = 0.0;  ///< z = slope_x x + slope_y y + z0, frame W, m
+
+  double Above(const Eigen::Vector3d& p) const { return Rise(p) - z0; }
+  /// Of a displacement, over that of the ground.
+  double Rise(const Eigen::Vector3d& d) const { return d.z() - slope_x * d.x() - slope_y * d.y(); }
+};
+
 /// Limits of the plan; infinity (or nothing) where there is none.
 struct Limits {
-  double speed = 0.0;         ///< m/s; 0: none
-  double acceleration = 0.0;  ///< m/s^2; 0: none
-  bool height = false;        ///< whether z_min and z_max apply
-  double z_min = 0.0, z_max = 0.0;
+  double speed = 0.0;               ///< m/s; 0: none
+  double acceleration = 0.0;        ///< m/s^2; 0: none
+  bool height = false;              ///< whether z_min and z_max apply
+  double z_min = 0.0, z_max = 0.0;  ///< above the ground, m
+  Ground ground;
   double tan_elevation = 0.0;  ///< of the target seen from the drone; 0: none
   double min_distance = 0.0;   ///< m; 0: none
 };
@@ -75,6 +86,10 @@ struct Problem {
   std::vector<int> near;
   int n_candidates() const;
 };
+
+/// Least squares over the corners of what is listed of the ground, by area; level at z = 0 where
+/// nothing is.
+Ground GroundOf(const std::vector<world::Obstacle>& obstacles);
 
 /// Puts the request into normalised time, grows the obstacles and relaxes
 /// what the start already breaks; `notes` gets one clause for each such relaxation that weakens the

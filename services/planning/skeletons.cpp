@@ -177,7 +177,10 @@ void SkeletonPlacer::PlaceAt(int steps, int choices, const Spread& spread, bool 
   }
   if (!(config_.z_max > config_.z_min)) return;
   for (auto& choices_at : problem->skeletons)
-    for (auto& u : choices_at) u.z() = std::clamp(u.z(), config_.z_min, config_.z_max);
+    for (auto& u : choices_at) {
+      const double z = problem->limits.ground.Above(u);
+      u.z() += std::clamp(z, config_.z_min, config_.z_max) - z;
+    }
 }
 
 void SkeletonPlacer::PlaceRing(int steps, int choices, Problem* problem) {

@@ -75,6 +75,11 @@ class Resting {
     return Stop{{request_.t0, T, curve}, std::move(*proofs), true};
   }
 
+  bool IsWithinLimits(const Curve& curve, double T) {
+    SetProblem(T);
+    return KeepsLimits(curve, problem_);
+  }
+
   /// Time of the first sampled contact, s, infinite where there is none, and the least clearance.
   /// The least height counts as an obstacle's surface.
   std::pair<double, double> Harm(const Curve& curve, double T) {
@@ -87,8 +92,8 @@ class Resting {
       const Vector3d p = planning::Evaluate(curve, tau);
       for (const Ellipsoid& e : problem_.obstacles) least = std::min(least, Off(e, p, tau));
       if (l.height)
-        least = std::min({least, config_.drone_radius + p.z() - l.z_min,
-                          config_.drone_radius + l.z_max - p.z()});
+        least = std::min({least, config_.drone_radius + l.ground.Above(p) - l.z_min,
+                          config_.drone_radius + l.z_max - l.ground.Above(p)});
       if (problem_.target_body) least = std::min(least, Off(*problem_.target_body, p, tau));
       if (least < config_.drone_radius && contact == HUGE_VAL) contact = tau * T;
     }
@@ -113,8 +118,9 @@ class Resting {
     // Braking may leave the heights as far as the quickest way of it must.
     const Points points = ToPoints(heights_, 5);
     for (int i = 0; i <= 5; ++i) {
-      l.z_min = std::min(l.z_min, points(i, 2) - 1e-6);
-      l.z_max = std::max(l.z_max, points(i, 2) + 1e-6);
+      const double z = l.ground.Above(points.row(i).transpose());
+      l.z_min = std::min(l.z_min, z - 1e-6);
+      l.z_max = std::max(l.z_max, z + 1e-6);
     }
   }
 
@@ -160,8 +166,9 @@ Stop Evade(const PlannerConfig& config, const PlanRequest& request) {
   Stop best;
   std::pair<double, double> least{-HUGE_VAL, -HUGE_VAL};
   const auto weigh = [&](Resting* way, const Curve& curve, double T) {
+    if (!curve.allFinite()) return;
     const std::pair<double, double> harm = way->Harm(curve, T);
-    if (!curve.allFinite() || harm <= least) return;
+    if (harm <= least) return;
     least = harm;
     best.trajectory = {request.t0, T, curve};
   };
@@ -174,6 +181,7 @@ Stop Evade(const PlannerConfig& config, const PlanRequest& request) {
       const double T = kOver[i];
       const Vector3d end = ToPoints(BrakeCurve(request.start, T), 5).row(5).transpose() + d;
       const Curve curve = CurveTo(request.start, T, end);
+      if (!curve.allFinite() || !resting[i].IsWithinLimits(curve, T)) continue;
       if (auto stop = resting[i].Certified(curve, T)) return *stop;
       weigh(&resting[i], curve, T);
     }
@@ -182,10 +190,12 @@ Stop Evade(const PlannerConfig& config, const PlanRequest& request) {
   return best;
 }
 
-void SetProofs(const PlannerConfig& config, std::vector<Proof> proofs, PlanResult* result) {
-  // The ground lies no higher than where the flight began.
-  const Curve plan = result->trajectory.coefficients;
-  double least = ToPoints(plan, 6).col(2).minCoeff();
+void SetProofs(const PlannerConfig& config, const PlanRequest& request, std::vector<Proof> proofs,
+               PlanResult* result) {
+  const Ground ground = GroundOf(request.obstacles);
+  const Points points = ToPoints(Curve(result->trajectory.coefficients), 6);
+  double least = HUGE_VAL;
+  for (int i = 0; i <= 6; ++i) least = std::min(least, ground.Above(points.row(i).transpose()));
   for (const Proof& p : proofs)
     if (!p.of_sight) least = std::min(least, p.from > 0.0 ? 0.0 : p.radius + p.room);
   result->certified_clearance = std::max(0.0, least - config.hard_radius());
@@ -205,13 +215,12 @@ PlanResult RestPlan(const PlannerConfig& config, const PlanRequest& request) {
   if (std::any_of(stop->proofs.begin(), stop->proofs.end(), late))
     result.verdict = Verdict::kEscape;
   result.trajectory = std::move(stop->trajectory);
-  if (stop->certified) SetProofs(config, std::move(stop->proofs), &result);
+  if (stop->certified) SetProofs(config, request, std::move(stop->proofs), &result);
   return result;
 }
 
 std::optional<Stop> WayOut(const PlannerConfig& config, const PlanRequest& request,
                            const world::Trajectory& plan) {
-  constexpr double kOverdue = 0.4;  // s: several periods of planning
   PlannerConfig hard = config;
   hard.safety_margin = 0.0;
   for (const double after : {kOverdue, 0.2, 0.7, 1.1, HUGE_VAL}) {

@@ -24,12 +24,16 @@ std::optional<Stop> Brake(const PlannerConfig& config, const PlanRequest& reques
 /// the one that stays farthest off; not certified.
 Stop Evade(const PlannerConfig& config, const PlanRequest& request);
 
+/// When the certified stop of a plan begins, s after its start: several periods of planning.
+inline constexpr double kOverdue = 0.4;
+
 /// Brake, or else Evade, as a plan; the reason says what it is not.
 PlanResult RestPlan(const PlannerConfig& config, const PlanRequest& request);
 
-/// What the proofs, and the plan's height over z = 0, leave to the drone's sphere goes with them;
+/// What the proofs, and the height above the ground, leave to the drone's sphere goes with them;
 /// after the trajectory.
-void SetProofs(const PlannerConfig& config, std::vector<Proof> proofs, PlanResult* result);
+void SetProofs(const PlannerConfig& config, const PlanRequest& request, std::vector<Proof> proofs,
+               PlanResult* result);
 
 /// Where `plan` can be left for a certified rest: as soon as a new plan is overdue, else sooner or
 /// later. Braking keeps the hard radius and gives up the margin. After FASTER, Tordesillas et al.

@@ -106,7 +106,7 @@ PredictRequest PredictionNode::MakeRequest(const target_t& message) const {
   request.target_radius = message.radius;
   const bool fresh = request.now - obstacles_time_ <= config_.max_obstacle_age;
   for (const world::Obstacle& o : obstacles_)
-    if (fresh || !o.moving) request.obstacles.push_back(o);
+    if (!o.ground && (fresh || !o.moving)) request.obstacles.push_back(o);
   return request;
 }
 

@@ -1,0 +1,223 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "services/planning/limits.h"
+#include "services/planning/pilot.h"
+#include "services/planning/problem.h"
+#include "services/planning/stopping.h"
+
+namespace chase::planning {
+namespace {
+
+using Eigen::Vector3d;
+
+world::Obstacle Slab(const Vector3d& center, const Eigen::Vector2d& slope) {
+  world::Obstacle o;
+  o.id = 1;
+  o.ground = true;
+  o.center = world::Trajectory::Constant(center, 0.0, 3.0);
+  o.solid = world::Obstacle::Solid::kBox;
+  o.half = {12.0, 12.0, 0.3};
+  o.axes =
+      Eigen::Quaterniond::FromTwoVectors(Vector3d::UnitZ(), Vector3d(-slope.x(), -slope.y(), 1.0));
+  const Eigen::Matrix3d R = o.axes.toRotationMatrix();
+  o.shape = R * (3.0 * o.half.cwiseAbs2()).cwiseInverse().asDiagonal() * R.transpose();
+  return o;
+}
+
+/// A target that drives uphill along x, the drone 3 m behind it at the same height above ground.
+PlanRequest Uphill(double slope) {
+  PlanRequest r;
+  r.horizon = 2.5;
+  r.start.p = {-3.0, 0.0, 1.2 - 3.0 * slope};
+  r.start.v = {1.5, 0.0, 1.5 * slope};
+  r.target = {0.0, 2.5, Eigen::MatrixXd::Zero(2, 3)};
+  r.target.coefficients << 0.0, 0.0, 0.5, 3.75, 0.0, 3.75 * slope;
+  r.obstacles = {Slab({0.0, 0.0, 0.0}, {slope, 0.0})};
+  return r;
+}
+
+TEST(Ground, PlansKeepTheirHeightAboveItUphillAndDownhill) {
+  const PlannerConfig config;
+  const auto planner = MakePlanner("chase", config);
+  for (const double slope : {-0.25, -0.1, 0.1, 0.25}) {
+    PlanRequest request = Uphill(slope);
+    for (int i = 0; i < 20; ++i) {
+      request.target.start = request.t0;
+      request.target.coefficients.row(0) =
+          Vector3d(1.5 * request.t0, 0.0, 0.5 + 1.5 * slope * request.t0).transpose();
+      const PlanResult plan = planner->Plan(request);
+      EXPECT_EQ(plan.verdict, Verdict::kChase) << slope << " " << i << " " << plan.reason;
+      for (double t = request.t0; t <= plan.trajectory.end(); t += 0.05) {
+        const Vector3d p = plan.trajectory.Position(t);
+        const double above = p.z() - slope * p.x();
+        EXPECT_GT(above, config.z_min - 1e-6) << slope << " " << i;
+        EXPECT_LT(above, config.z_max + 1e-6) << slope << " " << i;
+      }
+      request.t0 += 0.2;
+      request.start = plan.trajectory.At(request.t0);
+      request.running = plan.trajectory;
+      request.obstacles[0].center.start = request.t0;
+    }
+  }
+}
+
+TEST(Ground, LimitsOfHeightAreThoseOfSamples) {
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> within(-1.0, 1.0);
+  int kept = 0, broken = 0;
+  for (int i = 0; i < 20000; ++i) {
+    Problem problem;
+    Limits& l = problem.limits;
+    l.height = true;
+    l.z_min = 0.6;
+    l.z_max = 3.5;
+    l.ground = {0.4 * within(random), 0.4 * within(random), 5.0 * within(random)};
+    Curve plan(6, 3);
+    for (double& x : plan.reshaped()) x = 2.0 * within(random);
+    plan(0, 2) += l.ground.z0 + 2.0;
+    problem.target = Curve::Zero(2, 3);
+    double low = HUGE_VAL, high = -HUGE_VAL;
+    for (int k = 0; k <= 400; ++k) {
+      const Vector3d p = Evaluate(plan, k / 400.0);
+      const double z = p.z() - l.ground.slope_x * p.x() - l.ground.slope_y * p.y() - l.ground.z0;
+      low = std::min(low, z);
+      high = std::max(high, z);
+    }
+    const bool keeps = KeepsLimits(plan, problem);
+    if (low < l.z_min || high > l.z_max) EXPECT_FALSE(keeps) << i;
+    if (low > l.z_min + 1e-3 && high < l.z_max - 1e-3) EXPECT_TRUE(keeps) << i;
+    kept += keeps;
+    broken += !keeps;
+  }
+  EXPECT_GT(kept, 1000);
+  EXPECT_GT(broken, 1000);
+}
+
+// A step in the ground that the plane through it does not show is kept off like an obstacle.
+TEST(Ground, WhatRisesAboveItsPlaneIsKeptOff) {
+  const auto planner = MakePlanner("chase", PlannerConfig());
+  PlanRequest request = Uphill(0.0);
+  request.start.p.z() = 0.9;
+  request.obstacles.push_back(Slab({1.5, 0.0, 0.5}, {0.0, 0.0}));
+  request.obstacles.back().id = 2;
+  request.obstacles.back().half.head<2>().setConstant(1.0);
+  const PlanResult plan = planner->Plan(request);
+  ASSERT_GE(plan.certified_clearance, 0.0) << plan.reason;
+  const double hard = PlannerConfig().hard_radius();
+  for (double t = 0.0; t <= plan.trajectory.end(); t += 0.02) {
+    const Vector3d d = plan.trajectory.Position(t) - Vector3d(1.5, 0.0, 0.5);
+    EXPECT_GE((d.cwiseAbs() - Vector3d(1.0, 1.0, 0.3)).cwiseMax(0.0).norm(), hard - 1e-6) << t;
+  }
+}
+
+TEST(Ground, ItHidesNothing) {
+  PlanRequest request = Uphill(0.0);
+  request.target.coefficients(0, 2) = request.target.coefficients(1, 2) = 0.0;
+  request.target.coefficients(0, 2) = 0.25;  // within the slab
+  const PlanResult plan = MakePlanner("chase", PlannerConfig())->Plan(request);
+  EXPECT_EQ(plan.verdict, Verdict::kChase) << plan.reason;
+}
+
+// Steeper than the camera sees, plans get no steeper.
+TEST(Elevation, AStartBeyondItOnlyComesBack) {
+  PlannerConfig config;
+  config.min_distance = 0.3;
+  const auto planner = MakePlanner("chase", config);
+  PlanRequest request;
+  request.horizon = 2.5;
+  request.start.p = {-1.2, 0.0, 1.7};
+  request.target = world::Trajectory::Constant({0.0, 0.0, 0.7}, 0.0, 2.5);
+  double steepest = 1.0 / 1.2;
+  for (int i = 0; i < 10; ++i) {
+    const PlanResult plan = planner->Plan(request);
+    ASSERT_LT(plan.verdict, Verdict::kSafeOnly) << plan.reason;
+    for (double t = request.t0; t <= plan.trajectory.end(); t += 0.05) {
+      const Vector3d d = plan.trajectory.Position(t) - Vector3d(0.0, 0.0, 0.7);
+      EXPECT_LT(std::abs(d.z()) / d.head<2>().norm(), std::max(steepest, 0.54) + 1e-4);
+    }
+    request.t0 += 0.3;
+    request.start = plan.trajectory.At(request.t0);
+    request.running = plan.trajectory;
+    request.target.start = request.t0;
+    const Vector3d d = request.start.p - Vector3d(0.0, 0.0, 0.7);
+    steepest = std::abs(d.z()) / d.head<2>().norm();
+  }
+  EXPECT_LT(steepest, std::tan(config.max_elevation_deg * M_PI / 180.0));
+}
+
+// Among movers that leave no way, the way of least harm is no faster than the limits.
+TEST(Rest, TheLeastHarmNeverSpeedsUp) {
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> within(-1.0, 1.0);
+  const PlannerConfig config;
+  int uncertified = 0;
+  for (int i = 0; i < 40; ++i) {
+    PlanRequest request;
+    request.start.p = {0.0, 0.0, 1.5};
+    request.start.v = {2.0 * within(random), 2.0 * within(random), 0.0};
+    request.target = world::Trajectory::Constant({5.0, 0.0, 0.7}, 0.0, 2.5);
+    for (int k = 0; k < 8; ++k) {
+      world::Obstacle o;
+      o.id = k + 1;
+      o.moving = true;
+      const double angle = 0.25 * M_PI * k;
+      const Vector3d at(1.1 * std::cos(angle), 1.1 * std::sin(angle), 1.5);
+      o.center = {0.0, 3.0, Eigen::MatrixXd::Zero(2, 3)};
+      o.center.coefficients.row(0) = at.transpose();
+      o.center.coefficients.row(1) = -1.5 * at.transpose();
+      o.shape = Vector3d(11.0, 11.0, 0.02).asDiagonal();
+      o.velocity_covariance.diagonal().setConstant(0.1);
+      request.obstacles.push_back(o);
+    }
+    const PlanResult plan = RestPlan(config, request);
+    uncertified += plan.certified_clearance < 0.0;
+    for (double t = 0.0; t <= plan.trajectory.end(); t += 0.05)
+      EXPECT_LE(plan.trajectory.Velocity(t).norm(),
+                std::max(config.max_speed, request.start.v.norm()) + 1e-3);
+  }
+  EXPECT_GT(uncertified, 10);
+}
+
+// Two metres a second sideways past a wall, in a frame that drifts towards it.
+TEST(Pilot, AFrameThatDriftsKeepsOffWhatStands) {
+  PlanningConfig config;
+  config.takeoff_time = 0.1;
+  const auto nearest = [&](double sigma) {
+    Pilot pilot(config);
+    pilot.SetFlying(true);
+    world::Obstacle wall = Slab({0.0, 2.0, 1.5}, {0.0, 0.0});
+    wall.ground = false;
+    wall.half = {5.0, 0.1, 3.0};
+    wall.axes.setIdentity();
+    wall.shape = (3.0 * wall.half.cwiseAbs2()).cwiseInverse().asDiagonal();
+    pilot.SetObstacles(0.0, {wall});
+    Forecast forecast;
+    forecast.has_target = true;
+    forecast.target = world::Trajectory::Constant({2.5, 1.5, 0.7}, 0.0, 2.5);
+    pilot.SetForecast(forecast);
+    BodyEstimate body{{0.0, 0.6, 1.2}, Vector3d::Zero(), 0.0};
+    body.velocity_covariance.diagonal().setConstant(sigma * sigma);
+    for (double t = 0.0; t < 1.0; t += 0.05)
+      if (const auto plan = pilot.Update(t, body)) {
+        double least = HUGE_VAL;
+        for (double s = 0.0; s <= 1.0; s += 0.05)
+          least = std::min(
+              least,
+              1.9 -
+                  plan->trajectory.Position(plan->trajectory.start + s * plan->trajectory.duration)
+                      .y() -
+                  2.0 * std::max(0.0, std::sqrt(std::max(0.0, sigma * sigma - 0.0225))) * s *
+                      plan->trajectory.duration);
+        return least;
+      }
+    return -HUGE_VAL;
+  };
+  for (const double sigma : {0.0, 0.05, 0.2, 0.3})
+    EXPECT_GE(nearest(sigma), config.planner.hard_radius() - 1e-6) << sigma;
+}
+
+}  // namespace
+}  // namespace chase::planning
