@@ -27,17 +27,13 @@ double LargestSigma(const Eigen::Matrix3d& covariance) {
       std::max(0.0, covariance.selfadjointView<Eigen::Lower>().eigenvalues().maxCoeff()));
 }
 
-// A pose is good for plans while the body goes astray from the map around by no more than the tube
-// until a stop would begin, and a velocity for braking while its error is less than the speed of
-// landing, both by as many deviations as obstacles are taken by. Where in the world all that is
-// does not matter for either.
+// A pose that odometry stands for is good for plans: planning allows for a frame that drifts. A
+// velocity is good for braking while it errs by less than the speed of landing.
 Health HealthOf(const pose_t& m, const ControlConfig& config) {
-  constexpr double kUntilStop = 0.4;  // s
   const Eigen::Map<const Eigen::Matrix<double, 9, 9, Eigen::RowMajor>> P(m.local_covariance);
-  const double speed = config.sigmas * LargestSigma(P.block<3, 3>(3, 3));
+  const double speed = LargestSigma(P.block<3, 3>(3, 3));
   if (m.health == pose_t::HEALTH_STARTING || speed > config.land_speed) return Health::kStarting;
-  const bool usable = m.health != pose_t::HEALTH_LOST && speed * kUntilStop <= config.tracking_tube;
-  return usable ? Health::kUsable : Health::kLost;
+  return m.health == pose_t::HEALTH_LOST ? Health::kLost : Health::kUsable;
 }
 
 }  // namespace

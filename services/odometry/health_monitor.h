@@ -11,7 +11,7 @@ struct HealthConfig {
   double imu_gap = 0.05;         ///< s
   double late_sweep = 0.045;     ///< a sweep that ends this long away from the newest sample, s
   double lost_sigma = 0.5;       ///< standard deviation of the position without sweeps, m
-  double lost_speed = 0.25;      ///< standard deviation of the velocity, m/s
+  double lost_speed = 0.5;       ///< standard deviation of the velocity, m/s
   double usual_nis = 4.0;        ///< running mean, per direction
   double dropped_share = 0.2;    ///< of the usual number of returns
 

@@ -1,5 +1,6 @@
 #include "services/planning/pilot.h"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
@@ -14,6 +15,9 @@ constexpr double kHoverDuration = 2.0;  // s
 constexpr double kShortestHorizon = 1.0;
 // s: control says 20 times a second whether it flies; nobody climbs before that was heard.
 constexpr double kHearControl = 0.3;
+// A lost target is taken to go on for so long in all, s, and looked for from so near, in desired
+// distances: beyond it a turn on the spot sees less than a way there.
+constexpr double kGoesOn = 4.0, kArrived = 1.5;
 
 // Rest to rest from a to b, minimum jerk.
 world::Trajectory RestToRest(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double start,
@@ -53,6 +57,15 @@ std::optional<world::Obstacle> TargetBody(const Forecast& f) {
   return body;
 }
 
+// What stands seems to move when the frame drifts. The tube holds what adds up until a stop begins.
+Eigen::Matrix3d BeyondTube(const Eigen::Matrix3d& covariance, const PlannerConfig& c) {
+  if (!covariance.allFinite() || !(c.sigmas > 0.0)) return Eigen::Matrix3d::Zero();
+  const double held = c.tracking_tube / (c.sigmas * kOverdue);
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(covariance);
+  const Eigen::Vector3d rest = (eigen.eigenvalues().array() - held * held).max(0.0);
+  return eigen.eigenvectors() * rest.asDiagonal() * eigen.eigenvectors().transpose();
+}
+
 bool IsFinite(const PlanResult& plan) {
   if (!plan.trajectory.coefficients.allFinite()) return false;
   return std::all_of(plan.yaw.begin(), plan.yaw.end(), [](double y) { return std::isfinite(y); });
@@ -76,6 +89,7 @@ void Pilot::SetObstacles(double t, std::vector<world::Obstacle> obstacles) {
 
 void Pilot::ChangeFrame() {
   forecast_.reset();
+  had_target_ = false;
   obstacles_.clear();
   has_running_ = false;
 }
@@ -95,6 +109,7 @@ bool Pilot::IsDue(double t) const {
 }
 
 std::optional<PlanResult> Pilot::Update(double t, const BodyEstimate& body) {
+  drift_ = BeyondTube(body.velocity_covariance, config_.planner);
   const double t0 = t + config_.latency;
   const Start start = StartAt(t, t0, body);
   if (!first_update_) first_update_ = t;
@@ -138,6 +153,9 @@ PlanRequest Pilot::Request(double t0, const Start& start) const {
   request.start = start.state;
   request.yaw = start.yaw;
   request.obstacles = obstacles_;
+  // What moves is measured, as the target is, in the frame that drifts.
+  for (world::Obstacle& o : request.obstacles)
+    if (!o.moving) o.velocity_covariance += drift_;
   request.horizon = config_.horizon;
   request.target = world::Trajectory::Constant(start.state.p, t0, config_.horizon);
   if (!forecast_ || !forecast_->has_target) return request;
@@ -152,6 +170,7 @@ PlanRequest Pilot::Request(double t0, const Start& start) const {
 
 PlanResult Pilot::Chase(double t0, const Start& start) {
   had_target_ = true;
+  last_seen_ = forecast_->target;
   const PlanResult plan = planner_->Plan(Request(t0, start));
   if (plan.yaw.size() > 1) {
     const double turned = EvaluateYaw(plan.yaw, 1.0) - plan.yaw[0];
@@ -172,13 +191,37 @@ PlanResult Pilot::Wait(double t0, const Start& start, const BodyEstimate& body) 
   airborne_ = true;
   if (!SeesObstacles(t0 - config_.latency)) return Rest(t0, start);
   if (HasTarget(t0 - config_.latency)) return Chase(t0, start);
-  return had_target_ ? BrakeAndLook(t0, start) : Hover(t0, start);
+  return had_target_ ? Search(t0, start) : Hover(t0, start);
 }
 
 PlanResult Pilot::Climb(double t0, const Start& start) const {
   const Eigen::Vector3d top = start.state.p + config_.takeoff_height * Eigen::Vector3d::UnitZ();
   return Waiting("climbing", RestToRest(start.state.p, top, t0, config_.takeoff_time),
                  {start.yaw.yaw});
+}
+
+// To where the target would be had it gone on, ever slower, in sight of that place; there around.
+PlanResult Pilot::Search(double t0, const Start& start) {
+  const double end = last_seen_.end();
+  const double on = kGoesOn * (1.0 - std::exp(-std::max(0.0, t0 - end) / kGoesOn));
+  Eigen::Vector3d velocity = last_seen_.Velocity(end);
+  velocity.z() = 0.0;
+  const Eigen::Vector3d place = last_seen_.Position(end) + on * velocity;
+  const double distance = (place - start.state.p).norm();
+  if (distance > kArrived * config_.planner.desired_distance) {
+    PlanRequest request = Request(t0, start);
+    request.target = world::Trajectory::Constant(place, t0, request.horizon);
+    request.target_body.reset();
+    if (start.on_plan) request.running = running_.trajectory;
+    PlanResult plan = planner_->Plan(request);
+    if (plan.verdict < Verdict::kBrake) {
+      plan.verdict = Verdict::kSafeOnly;
+      plan.reason =
+          "target lost, to where it may be" + (plan.reason.empty() ? "" : "; " + plan.reason);
+      return plan;
+    }
+  }
+  return BrakeAndLook(t0, start);
 }
 
 // Braking while it moves; else where it is, for as long as that can be certified.

@@ -26,6 +26,8 @@ struct BodyEstimate {
   Eigen::Vector3d p = Eigen::Vector3d::Zero();  ///< p_WB, m
   Eigen::Vector3d v = Eigen::Vector3d::Zero();  ///< v_WB, m/s
   double yaw = 0.0;                             ///< rad
+  /// Of v against the map around, m^2/s^2.
+  Eigen::Matrix3d velocity_covariance = Eigen::Matrix3d::Zero();
 };
 
 /// Decides when to plan, from which state, and what to fly when there is nothing to chase: climb,
@@ -69,12 +71,15 @@ class Pilot {
   PlanResult Hover(double t0, const Start& start) const;
   PlanResult Rest(double t0, const Start& start) const;
   bool SeesObstacles(double t) const;
+  PlanResult Search(double t0, const Start& start);
   PlanResult BrakeAndLook(double t0, const Start& start) const;
 
   PlanningConfig config_;
   std::unique_ptr<Planner> planner_;
   std::optional<Forecast> forecast_;
   std::vector<world::Obstacle> obstacles_;
+  Eigen::Matrix3d drift_ =
+      Eigen::Matrix3d::Zero();    ///< covariance of the frame's velocity, m^2/s^2
   double obstacles_time_ = -1e9;  ///< s
   PlanResult running_;
   bool has_running_ = false;
@@ -85,6 +90,7 @@ class Pilot {
   bool heard_control_ = false;
   std::optional<double> first_update_;  ///< s
   bool had_target_ = false;
+  world::Trajectory last_seen_;  ///< forecast of the target that was chased last
   double climb_end_ = 0.0;
   double search_turn_ = 1.0;
 };

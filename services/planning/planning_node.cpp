@@ -21,7 +21,9 @@ double LargestSigma(const Eigen::Matrix3d& covariance) {
 }
 
 BodyEstimate FromMessage(const pose_t& m) {
-  return {bus::ToVector(m.pos), bus::ToVector(m.vel), math::Yaw(bus::ToQuaternion(m.orientation))};
+  const Eigen::Map<const Eigen::Matrix<double, 9, 9, Eigen::RowMajor>> P(m.local_covariance);
+  return {bus::ToVector(m.pos), bus::ToVector(m.vel), math::Yaw(bus::ToQuaternion(m.orientation)),
+          P.block<3, 3>(3, 3)};
 }
 
 polynomial_t At(const Eigen::Vector3d& p, int64_t utime, double duration) {
