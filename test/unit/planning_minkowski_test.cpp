@@ -120,6 +120,13 @@ std::vector<std::string> BrokenPromises(const PlannerConfig& c, const PlanReques
     if (!p.of_sight && p.radius < c.hard_radius()) broken.push_back("less than the hard radius");
     if (p.from > 0.0 && plan.verdict != Verdict::kEscape && !p.of_sight)
       broken.push_back("late, and no escape");
+    if (!p.of_sight && p.from == 0.0)
+      check("clearance from ",
+            LeastGap(plan.trajectory, c.hard_radius() + plan.certified_clearance, 0.0, nullptr, o,
+                     c.sigmas),
+            p.obstacle);
+    if (!p.of_sight && plan.reason.empty() && p.radius < c.hard_radius() + c.safety_margin - 1e-12)
+      broken.push_back("less than the margin, unsaid");
     // The target's own uncertainty, from the request.
     if (p.of_sight && plan.reason.empty())
       for (const double tau : {0.0, 0.5, 1.0}) {
@@ -135,6 +142,8 @@ std::vector<std::string> BrokenPromises(const PlannerConfig& c, const PlanReques
     for (const Proof& p : plan.proofs) sights += p.of_sight && p.from == 0.0;
     if (sights != request.obstacles.size()) broken.push_back("sight without a proof");
   }
+  if (plan.verdict == Verdict::kChase && plan.trajectory.duration < request.horizon)
+    broken.push_back("a chase over a part of the horizon");
   if (plan.stop)
     for (const Proof& p : plan.stop_proofs) {
       const world::Obstacle& o = request.obstacles[static_cast<size_t>(p.obstacle)];
