@@ -77,6 +77,7 @@ void Pilot::SetObstacles(double t, std::vector<world::Obstacle> obstacles) {
 void Pilot::ChangeFrame() {
   forecast_.reset();
   obstacles_.clear();
+  obstacles_time_ = -1e9;
   has_running_ = false;
 }
 

@@ -172,6 +172,7 @@ TEST(Pilot, NothingOfAnotherFrameIsPlannedWith) {
   ASSERT_TRUE(plan) << "the running plan is void";
   EXPECT_GE(plan->verdict, Verdict::kBrake) << "there is no target in this frame yet";
   EXPECT_LT((plan->trajectory.Position(plan->trajectory.start) - body.p).norm(), 1e-9);
+  EXPECT_LT(plan->certified_clearance, 0.0) << "no obstacles were listed in this frame yet";
 }
 
 TEST(Pilot, NoPlanReachesBeyondTheForecast) {
@@ -205,7 +206,7 @@ TEST(Pilot, TheForecastsUncertaintyAndBodyReachThePlan) {
   pillar.center = world::Trajectory::Constant({flight.t + 2.5, 4.0, 1.0}, flight.t, 1.0);
   flight.pilot.SetObstacles(flight.t, {pillar});
   Forecast forecast = Walking(flight.t);
-  forecast.target.coefficients << 2.5, 0.0, 0.85, -1.5, 0.0, 0.0;
+  forecast.target.coefficients << 2.5, 0.0, 0.85, -2.5, 0.0, 0.0;
   forecast.sigma = 0.1;
   forecast.speed_sigma = 0.05;
   forecast.radius = 0.3;
