@@ -4,7 +4,9 @@
 #include <cmath>
 
 #include "common/math/rotation.h"
+#include "services/planning/ladder.h"
 #include "services/planning/planner.h"
+#include "services/planning/search.h"
 #include "services/planning/stopping.h"
 
 // What SAFETY.md promises of a single plan, judged by sampled distances.
@@ -24,7 +26,7 @@ world::Obstacle Cylinder(int id, const Vector3d& p, const Vector3d& v, double ra
   o.center.coefficients << p.transpose(), v.transpose();
   o.solid = world::Obstacle::Solid::kCylinder;
   o.half = {radius, radius, half_height};
-  o.shape = (2.0 * o.half.cwiseAbs2()).cwiseInverse().asDiagonal();
+  o.shape = o.half.cwiseAbs2().cwiseInverse().asDiagonal();
   return o;
 }
 
@@ -100,11 +102,67 @@ TEST(Evasion, WhereNothingCanBeCertifiedTheContactComesAsLateAsCanBe) {
     EXPECT_EQ(plan.verdict, Verdict::kBrake) << plan.reason;
     EXPECT_LT(plan.certified_clearance, 0.0);
     EXPECT_TRUE(plan.proofs.empty());
+    EXPECT_LT((plan.trajectory.Position(0.0) - request.start.p).norm(), 1e-9);
     const world::Trajectory stays =
         world::Trajectory::Constant(request.start.p, 0.0, plan.trajectory.duration);
     EXPECT_GT(FirstContact(request.obstacles[0], plan.trajectory, config.drone_radius),
               FirstContact(request.obstacles[0], stays, config.drone_radius))
         << speed;
+  }
+}
+
+TEST(Evasion, AStartThatIsNotFiniteStaysWhereItIs) {
+  PlanRequest request = Hover();
+  request.t0 = 3.0;
+  request.start.v.x() = std::nan("");
+  const PlanResult plan = RestPlan(PlannerConfig(), request);
+  EXPECT_LT(plan.certified_clearance, 0.0);
+  EXPECT_EQ(plan.trajectory.start, request.t0);
+  EXPECT_EQ(plan.trajectory.Position(plan.trajectory.end()), request.start.p);
+}
+
+// From within the hard radius: a plan that is certified only ever moves out, and is out when
+// control wants it to be; where it cannot help moving in it is not certified.
+TEST(Escape, OnlyMovesOutAndIsOutInTime) {
+  const PlannerConfig config;
+  const auto planner = MakePlanner("chase", config);
+  int out = 0;
+  for (const double gap : {0.2, 0.33, 0.365})
+    for (const double inwards : {-0.8, -0.4, 0.0, 0.02, 0.1}) {
+      PlanRequest request = Hover();
+      request.start.v = {0.0, inwards, 0.0};
+      const Vector3d at = request.start.p + Vector3d(0.0, gap + 0.3, 0.0);
+      request.obstacles = {Cylinder(1, at, Vector3d::Zero(), 0.3, 3.0)};
+      const PlanResult plan = planner->Plan(request);
+      if (plan.certified_clearance < 0.0) {
+        EXPECT_EQ(plan.verdict, Verdict::kBrake) << gap << " " << inwards;
+        continue;
+      }
+      EXPECT_LE(inwards, 0.0) << gap;
+      EXPECT_EQ(plan.verdict, Verdict::kEscape) << plan.reason;
+      EXPECT_EQ(plan.certified_clearance, 0.0);
+      EXPECT_NEAR(LeastDistance(request.obstacles[0], plan.trajectory), gap, 1e-6);
+      for (const Proof& p : plan.proofs) EXPECT_LE(p.from, 0.25);
+      ++out;
+    }
+  EXPECT_GE(out, 5);
+}
+
+TEST(Margins, GiveWayToTheHardRadiusAndNoFurther) {
+  const PlannerConfig config;
+  const auto planner = MakePlanner("chase", config);
+  for (const double share : {0.1, 0.4, 0.6, 0.9}) {
+    PlanRequest request = Hover();
+    request.start.v = {0.6, 0.0, 0.0};
+    const double off = config.hard_radius() + share * config.safety_margin;
+    const Vector3d at = request.start.p + Vector3d(0.0, off + 0.3, 0.0);
+    request.obstacles = {Cylinder(1, at, Vector3d::Zero(), 0.3, 3.0)};
+    const PlanResult plan = planner->Plan(request);
+    EXPECT_LE(plan.verdict, Verdict::kKept) << plan.reason;
+    EXPECT_NE(plan.reason.find("margin of obstacle 1"), std::string::npos) << plan.reason;
+    for (const Proof& p : plan.proofs)
+      EXPECT_TRUE(p.of_sight || (p.from == 0.0 && p.radius >= config.hard_radius())) << share;
+    EXPECT_GE(LeastDistance(request.obstacles[0], plan.trajectory), config.hard_radius() - 1e-6);
   }
 }
 
@@ -147,6 +205,37 @@ TEST(CertifiedPlan, IsLeftForAStopBeforeAPlannerThatFellSilentIsMissed) {
   const double t = plan.stop->start;
   EXPECT_LT((plan.stop->Position(t) - plan.trajectory.Position(t)).norm(), 1e-6);
   EXPECT_LT((plan.stop->Velocity(t) - plan.trajectory.Velocity(t)).norm(), 1e-6);
+}
+
+/// Calls a plan feasible that goes straight on.
+class Liar : public Search {
+ public:
+  Found Best(const Problem& problem, double, double, PlanProof*) override {
+    Found found;
+    found.index = 0;
+    found.plan = problem.start;
+    return found;
+  }
+};
+
+// The search may be wrong: its plan is proved before it is called certified.
+TEST(CertifiedPlan, DoesNotTakeTheSearchAtItsWord) {
+#ifndef NDEBUG
+  GTEST_SKIP() << "an assertion of the ladder's own says so first";
+#endif
+  PlannerConfig config;
+  config.refine = false;
+  PlanRequest request = Hover();
+  request.start.v = {0.8, 0.0, 0.0};
+  const auto plan_at = [&](double across) {
+    request.obstacles = {Cylinder(1, {-1.2, across, 1.0}, {0.0, 0.0, 0.0}, 0.2, 2.0)};
+    return MakeLadder(config, std::make_unique<Liar>())->Plan(request);
+  };
+  EXPECT_EQ(plan_at(3.0).verdict, Verdict::kChase);
+  const PlanResult plan = plan_at(0.0);
+  EXPECT_GE(plan.verdict, Verdict::kBrake) << plan.reason;
+  EXPECT_GE(plan.certified_clearance, 0.0);
+  EXPECT_GE(LeastDistance(request.obstacles[0], plan.trajectory), config.hard_radius() - 1e-6);
 }
 
 TEST(CertifiedPlan, KeepsSphereAndTubeOff) {
