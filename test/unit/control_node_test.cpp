@@ -244,6 +244,7 @@ TEST(ControlNode, AnotherFrameVoidsPlansAndLists) {
   bench.SendPose(kStart + 10'000, pose_t::HEALTH_OK, 1);
   EXPECT_NE(bench.node().Report().detail.find("no plan: braking"), std::string::npos);
   bench.Send(Bench::Certified(kStart + 10'000, {0, 0, 0}));  // in the frame that was
+  bench.SendPlan(kStart + 10'000, {0, 0, 0});
   bench.SendWall(kStart + 10'000, 0);
   bench.SendPose(kStart + 15'000, pose_t::HEALTH_OK, 1);
   EXPECT_NE(bench.node().Report().detail.find("no plan: braking"), std::string::npos);

@@ -205,6 +205,23 @@ bool SpeedStopUp(Case* c, Random& g) {
   return c->claim.stop->Velocity(c->claim.stop->start).norm() > 0.1;
 }
 
+/// It begins where the plan is then and comes to rest, but not as fast as the plan is.
+bool KinkStop(Case* c, Random& g) {
+  const Vector3d speed = Uniform(g, 0.01, 0.1) * Somewhere(g);
+  const double powers[] = {1.0, -3.0, 3.0, -1.0};  // tau (1 - tau)^3
+  for (int k = 0; k < 4; ++k)
+    c->claim.stop->coefficients.row(k + 1) += powers[k] * speed.transpose();
+  return true;
+}
+
+/// It leaves the plan as it should and moves at its end.
+bool NeverRest(Case* c, Random& g) {
+  const Vector3d speed = Uniform(g, 0.1, 0.3) * Somewhere(g);
+  c->claim.stop->coefficients.row(4) += speed.transpose();
+  c->claim.stop->coefficients.row(3) -= speed.transpose();
+  return true;
+}
+
 bool SpeakLater(Case* c, Random& g) {
   Proof& proof = AnyProof(c, g);
   if (proof.of_sight) return false;
@@ -239,6 +256,8 @@ const std::map<std::string, Forgery>& Forgeries() {
       {"stop moved", MoveStop},
       {"stop exchanged", ExchangeStop},
       {"stop too fast", SpeedStopUp},
+      {"stop with a kink", KinkStop},
+      {"stop without rest", NeverRest},
       {"proof from later on", SpeakLater},
       {"not certified", TakeCertificateBack}};
   return all;
