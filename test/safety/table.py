@@ -48,7 +48,7 @@ class Line:
 def blocks(path):
     """The blocks of a file as dictionaries; lines that begin with # are comments."""
     text = "\n".join(x for x in path.read_text(encoding="utf-8").splitlines() if x[:1] != "#")
-    for block in re.split(r"\n\s*\n", text.strip()):
+    for block in filter(None, re.split(r"\n\s*\n", text.strip())):
         pairs = (line.partition(":") for line in block.splitlines())
         yield {key.strip(): value.strip() for key, _, value in pairs}
 

@@ -25,10 +25,11 @@ constexpr int64_t kNever = kStart + 1000000000;  // us
 
 /// What else happens in a flight.
 struct Events {
-  double height = 0.1;           // where the body is before there is a plan, m
-  int64_t flying_from = kNever;  // control says from then on that it flies, us
-  int64_t frame_at = kNever;     // the frame of odometry changes, us
-  int64_t others_at = kNever;    // forecasts and obstacles speak of the new one, us
+  double height = 0.1;            // where the body is before there is a plan, m
+  int64_t flying_from = kNever;   // control says from then on that it flies, us
+  int64_t frame_at = kNever;      // the frame of odometry changes, us
+  int64_t obstacles_at = kNever;  // obstacles speak of the new one, us
+  int64_t forecasts_at = kNever;  // forecasts do, us
 };
 
 /// Plays the drone and the target: hovers where the newest plan wants it, forecasts a straight
@@ -45,7 +46,7 @@ class Company : public bus::Node {
     if ((utime - kStart) % 100000 == 0) {
       obstacles_t none{};
       none.utime = utime;
-      none.epoch = utime >= events_.others_at;
+      none.epoch = utime >= events_.obstacles_at;
       bus_.Publish("OBSTACLES", none);
     }
     if (utime >= events_.flying_from && (utime - kStart) % 50000 == 0) {
@@ -76,7 +77,7 @@ class Company : public bus::Node {
   void Forecast(int64_t utime) {
     prediction_t m{};
     m.utime = utime;
-    m.epoch = utime >= events_.others_at;
+    m.epoch = utime >= events_.forecasts_at;
     const double t = bus::Seconds(utime, from_);
     m.target = Line(utime, {2.5 + 0.8 * t, 0.0, 0.6}, {0.8, 0.0, 0.0});
     for (const int i : {0, 4, 8}) m.covariance[i] = m.velocity_covariance[i] = 1e-4;
@@ -161,27 +162,38 @@ TEST(PlanningNode, APlannerStartedInFlightDoesNotClimb) {
   }
 }
 
-TEST(PlanningNode, AnotherFrameVoidsForecastAndObstacles) {
+struct Chases {
+  int before = 0, between = 0, after = 0;
+};
+
+/// Chases of a target in a flight whose frame changes after 8 s; what is heard is of the new one
+/// from the given times on.
+Chases ChasesInAnotherFrame(int64_t obstacles_at, int64_t forecasts_at) {
   Events events;
   events.frame_at = kStart + 8000000;
-  events.others_at = kStart + 10000000;
-  const auto plans = Fly(kStart + 5000000, kStart + 12000000, kStart + 12000000, events);
-  int before = 0, after = 0;
-  for (const plan_t& plan : plans) {
-    const bool chases = plan.verdict <= plan_t::SAFE_ONLY;
-    if (plan.utime < events.frame_at) {
-      before += chases;
-    } else if (plan.epoch == 1 && plan.utime < events.others_at) {
-      EXPECT_FALSE(chases) << "after the target of another frame: " << plan.reason;
-      const bool silent = plan.utime > events.frame_at + 500000;
-      EXPECT_FALSE(silent && plan.certified_clearance >= 0.0) << "of another frame's obstacles";
-    } else {
-      after += chases;
-    }
+  events.obstacles_at = obstacles_at;
+  events.forecasts_at = forecasts_at;
+  const int64_t all_at = std::max(obstacles_at, forecasts_at);
+  Chases chases;
+  for (const plan_t& plan : Fly(kStart + 5000000, kStart + 12000000, kStart + 12000000, events)) {
+    const bool is_old = plan.epoch == 0, is_between = !is_old && plan.utime < all_at;
+    int& n = is_old ? chases.before : is_between ? chases.between : chases.after;
+    n += plan.verdict <= plan_t::SAFE_ONLY;
+    EXPECT_FALSE(is_between && plan.utime < obstacles_at && plan.certified_clearance >= 0.0)
+        << "among the obstacles of another frame";
   }
-  EXPECT_GT(before, 10);
-  EXPECT_GT(after, 3);
-  EXPECT_EQ(plans.back().epoch, 1);
+  return chases;
+}
+
+TEST(PlanningNode, AnotherFrameVoidsForecastAndObstacles) {
+  const int64_t change = kStart + 8000000, later = kStart + 10000000;
+  for (const bool forecasts_last : {true, false}) {
+    const Chases chases =
+        forecasts_last ? ChasesInAnotherFrame(change, later) : ChasesInAnotherFrame(later, change);
+    EXPECT_GT(chases.before, 10);
+    EXPECT_EQ(chases.between, 0) << (forecasts_last ? "forecasts" : "obstacles");
+    EXPECT_GT(chases.after, 3);
+  }
 }
 
 }  // namespace
