@@ -1,4 +1,4 @@
-"""Random small changes of sources, put to the tests that lines.txt names."""
+"""Random small changes of sources, put to the unit tests of planning and control."""
 
 import math
 import random
@@ -7,11 +7,11 @@ import re
 import table
 import workshop
 
-# Sources, and the tests that lines.txt names for them, quick ones first.
+# Sources, and the tests of planning and control that are quick, the quickest first.
 PLANNING = tuple(f"services/planning/{name}.cpp" for name in
                  ("ladder", "pilot", "limits", "problem", "separations", "stopping"))
 PLANNING_TESTS = ("planning_test", "planning_node_test", "planning_minkowski_test",
-                  "control_plan_check_test")
+                  "control_plan_check_test", "planning_refinement_test", "planning_search_test")
 CONTROL = ("services/control/plan_follower.cpp", "common/world/plan_check.cpp")
 CONTROL_TESTS = ("control_test", "control_node_test", "control_plan_check_test")
 Z = 1.959964  # of 95 %

@@ -320,6 +320,20 @@ TEST(PlanCheck, LastResortsNeedNoCertificateButComeToRest) {
   EXPECT_EQ(Refute(claim, {0.3, 2.0}, {}), "it neither stops nor ends at rest");
 }
 
+TEST(PlanCheck, RestIsLessThanTwoCentimetresASecond) {
+  const auto ends_at_rest = [](double speed, double acceleration) {
+    world::Trajectory way{0.0, 2.0, Eigen::MatrixXd::Zero(3, 3)};
+    way.coefficients(2, 1) = 0.5 * 4.0 * acceleration;
+    way.coefficients(1, 1) = 2.0 * (speed - 2.0 * acceleration);  // the speed at the end
+    return world::EndsAtRest(way);
+  };
+  EXPECT_TRUE(ends_at_rest(0.0, 0.0));
+  EXPECT_TRUE(ends_at_rest(0.015, 0.0));
+  EXPECT_TRUE(ends_at_rest(0.0, 0.04));
+  EXPECT_FALSE(ends_at_rest(0.025, 0.0));
+  EXPECT_FALSE(ends_at_rest(0.0, -0.06));
+}
+
 TEST(PlanCheck, OnlyAnEscapeMayStartInside) {
   Random g(3);
   Case c = test::MakeCase(1);

@@ -144,6 +144,8 @@ std::vector<std::string> BrokenPromises(const PlannerConfig& c, const PlanReques
   }
   if (plan.verdict == Verdict::kChase && plan.trajectory.duration < request.horizon)
     broken.push_back("a chase over a part of the horizon");
+  if (plan.verdict <= Verdict::kSafeOnly && plan.trajectory.duration > request.horizon + 1e-9)
+    broken.push_back("beyond the horizon");
   if (plan.stop)
     for (const Proof& p : plan.stop_proofs) {
       const world::Obstacle& o = request.obstacles[static_cast<size_t>(p.obstacle)];

@@ -150,6 +150,28 @@ TEST(Pilot, WithoutObstaclesItBrakesAndCertifiesNothing) {
   EXPECT_LT(flight.Body().v.norm(), 0.05);
 }
 
+TEST(Pilot, AnObstacleOnTheRunningPlanIsAnsweredAtOnce) {
+  const PlanningConfig config;
+  for (const bool in_the_way : {true, false}) {
+    Flight flight{config};
+    flight.Run(4.0, false);
+    flight.Run(4.0, true);
+    ASSERT_EQ(flight.plans.back().verdict, Verdict::kChase);
+    while (flight.plans.back().trajectory.start > flight.t) flight.Run(kPeriod, false);
+    flight.Run(config.min_period, false);
+    const world::Trajectory& plan = flight.pilot.running().trajectory;
+    world::Obstacle pillar;
+    pillar.solid = world::Obstacle::Solid::kCylinder;
+    pillar.half = {0.2, 0.2, 3.0};
+    pillar.shape = pillar.half.cwiseAbs2().cwiseInverse().asDiagonal();
+    const Eigen::Vector3d aside(0.0, in_the_way ? 0.0 : 5.0, 0.0);
+    pillar.center = world::Trajectory::Constant(plan.Position(plan.end()) + aside, flight.t, 1.0);
+    flight.pilot.SetObstacles(flight.t, {pillar});
+    const auto answer = flight.pilot.Update(flight.t, flight.Body());
+    EXPECT_EQ(answer.has_value(), in_the_way);
+  }
+}
+
 // A climb ends where nobody looks on its way up, too.
 TEST(Pilot, WithoutObstaclesItDoesNotChaseAfterTheClimbEither) {
   Flight flight{PlanningConfig()};
