@@ -183,7 +183,7 @@ def report(tried, killed, survivors, known, seed):
     for mutant in survivors:
         why = known.get((mutant.file, mutant.line(mutant.text), mutant.line(mutant.changed)))
         open_ones += why is None
-        print(f"{mutant}\n  {'equivalent: ' + why if why else 'SURVIVED'}")
+        print(f"{mutant}\n  {'needs no test: ' + why if why else 'SURVIVED'}")
     low, high = wilson(killed, tried)
     print(f"seed {seed}: {killed} of {tried} random changes killed "
           f"({100 * killed / tried:.0f} %, 95 % Wilson {100 * low:.0f} to {100 * high:.0f} %); "
