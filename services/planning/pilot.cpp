@@ -91,6 +91,7 @@ void Pilot::ChangeFrame() {
   forecast_.reset();
   had_target_ = false;
   obstacles_.clear();
+  obstacles_time_ = -1e9;
   has_running_ = false;
 }
 

@@ -185,7 +185,7 @@ Stop Evade(const PlannerConfig& config, const PlanRequest& request) {
       if (auto stop = resting[i].Certified(curve, T)) return *stop;
       weigh(&resting[i], curve, T);
     }
-  if (best.trajectory.coefficients.rows() == 0)
+  if (least.first < 0.0)  // none is finite
     best.trajectory = world::Trajectory::Constant(request.start.p, request.t0, 1.0);
   return best;
 }

@@ -158,6 +158,34 @@ TEST(Bus, GapsInSeqAreCountedAsDrops) {
   EXPECT_EQ(bus.counters().at("IMU").received, 6);
 }
 
+template <class T>
+bool IsObeyed(const std::string& channel, const std::string& sender, const std::string& vehicle) {
+  WireBus bus;
+  bus.SetIdentity({"simulator", "falcon", 0});
+  int handled = 0;
+  bus.Subscribe<T>(channel, [&](const T&) { ++handled; });
+  T message = Sample<T>::Good();
+  message.sender = sender;
+  message.vehicle = vehicle;
+  bus.Deliver(Encode(message));
+  EXPECT_EQ(bus.counters().at(channel).foreign, 1 - handled);
+  return handled == 1;
+}
+
+TEST(Bus, CommandsOfStrangersAndOtherVehiclesAreLeftOut) {
+  EXPECT_TRUE(IsObeyed<plan_t>("PLAN", "planning", "falcon"));
+  EXPECT_TRUE(IsObeyed<attitude_setpoint_t>("ATTITUDE_SETPOINT", "control", "falcon"));
+  for (const char* stranger : {"", "control2", "planning2", "simulator"}) {
+    EXPECT_FALSE(IsObeyed<plan_t>("PLAN", stranger, "falcon")) << stranger;
+    EXPECT_FALSE(IsObeyed<attitude_setpoint_t>("ATTITUDE_SETPOINT", stranger, "falcon"));
+  }
+  EXPECT_FALSE(IsObeyed<plan_t>("PLAN", "control", "falcon"));
+  EXPECT_FALSE(IsObeyed<plan_t>("PLAN", "planning", "eagle"));
+  EXPECT_FALSE(IsObeyed<attitude_setpoint_t>("ATTITUDE_SETPOINT", "control", ""));
+  EXPECT_TRUE(IsObeyed<imu_t>("IMU", "stand-in", "falcon"));
+  EXPECT_FALSE(IsObeyed<imu_t>("IMU", "fcu", "eagle"));
+}
+
 TEST(Bus, AHandlerThatThrowsIsReportedAndContained) {
   WireBus bus;
   bus.Subscribe<imu_t>("IMU", [](const imu_t&) { throw std::runtime_error("inner"); });

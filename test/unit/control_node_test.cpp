@@ -214,6 +214,24 @@ TEST(ControlNode, RefusesWhatIsNotCertified) {
   EXPECT_EQ(answers([](plan_t* m) { m->proofs[0].separations[0].normal[0] = 1.0; }), 0U);
   EXPECT_EQ(answers([](plan_t* m) { m->hard_radius = m->proofs[0].radius = 0.1; }), 0U);
   EXPECT_EQ(answers([](plan_t* m) { m->position.coefficients[0] = 1.7; }), 0U);
+  const ControlConfig config;
+  const double most = config.drone_radius + 0.9 * config.tracking_tube;  // short of the tube
+  EXPECT_EQ(answers([&](plan_t* m) { m->hard_radius = m->proofs[0].radius = most; }), 0U);
+}
+
+TEST(ControlNode, RefusesAPlanForObstaclesOfLongAgo) {
+  const auto flies = [](int newer) {
+    Bench bench;
+    bench.SendWall(kStart);
+    bench.SendPose(kStart);
+    for (int i = 0; i < newer; ++i) bench.SendWall(kStart + 1000);
+    bench.Send(Bench::Certified(kStart + 5000, {0, 0, 0}));  // it has heard the first list only
+    bench.SendPose(kStart + 5000);
+    return bench.out.size() == 1U;
+  };
+  EXPECT_TRUE(flies(0));
+  EXPECT_TRUE(flies(7));
+  EXPECT_FALSE(flies(8));
 }
 
 TEST(ControlNode, AnotherFrameVoidsPlansAndLists) {
@@ -226,6 +244,7 @@ TEST(ControlNode, AnotherFrameVoidsPlansAndLists) {
   bench.SendPose(kStart + 10'000, pose_t::HEALTH_OK, 1);
   EXPECT_NE(bench.node().Report().detail.find("no plan: braking"), std::string::npos);
   bench.Send(Bench::Certified(kStart + 10'000, {0, 0, 0}));  // in the frame that was
+  bench.SendPlan(kStart + 10'000, {0, 0, 0});
   bench.SendWall(kStart + 10'000, 0);
   bench.SendPose(kStart + 15'000, pose_t::HEALTH_OK, 1);
   EXPECT_NE(bench.node().Report().detail.find("no plan: braking"), std::string::npos);

@@ -205,6 +205,23 @@ bool SpeedStopUp(Case* c, Random& g) {
   return c->claim.stop->Velocity(c->claim.stop->start).norm() > 0.1;
 }
 
+/// It begins where the plan is then and comes to rest, but not as fast as the plan is.
+bool KinkStop(Case* c, Random& g) {
+  const Vector3d speed = Uniform(g, 0.01, 0.1) * Somewhere(g);
+  const double powers[] = {1.0, -3.0, 3.0, -1.0};  // tau (1 - tau)^3
+  for (int k = 0; k < 4; ++k)
+    c->claim.stop->coefficients.row(k + 1) += powers[k] * speed.transpose();
+  return true;
+}
+
+/// It leaves the plan as it should and moves at its end.
+bool NeverRest(Case* c, Random& g) {
+  const Vector3d speed = Uniform(g, 0.1, 0.3) * Somewhere(g);
+  c->claim.stop->coefficients.row(4) += speed.transpose();
+  c->claim.stop->coefficients.row(3) -= speed.transpose();
+  return true;
+}
+
 bool SpeakLater(Case* c, Random& g) {
   Proof& proof = AnyProof(c, g);
   if (proof.of_sight) return false;
@@ -239,6 +256,8 @@ const std::map<std::string, Forgery>& Forgeries() {
       {"stop moved", MoveStop},
       {"stop exchanged", ExchangeStop},
       {"stop too fast", SpeedStopUp},
+      {"stop with a kink", KinkStop},
+      {"stop without rest", NeverRest},
       {"proof from later on", SpeakLater},
       {"not certified", TakeCertificateBack}};
   return all;
@@ -299,6 +318,20 @@ TEST(PlanCheck, LastResortsNeedNoCertificateButComeToRest) {
   EXPECT_EQ(Refute(claim, {0.3, 2.0}, {}), "");
   claim.position.coefficients = Eigen::MatrixXd::Ones(2, 3);
   EXPECT_EQ(Refute(claim, {0.3, 2.0}, {}), "it neither stops nor ends at rest");
+}
+
+TEST(PlanCheck, RestIsLessThanTwoCentimetresASecond) {
+  const auto ends_at_rest = [](double speed, double acceleration) {
+    world::Trajectory way{0.0, 2.0, Eigen::MatrixXd::Zero(3, 3)};
+    way.coefficients(2, 1) = 0.5 * 4.0 * acceleration;
+    way.coefficients(1, 1) = 2.0 * (speed - 2.0 * acceleration);  // the speed at the end
+    return world::EndsAtRest(way);
+  };
+  EXPECT_TRUE(ends_at_rest(0.0, 0.0));
+  EXPECT_TRUE(ends_at_rest(0.015, 0.0));
+  EXPECT_TRUE(ends_at_rest(0.0, 0.04));
+  EXPECT_FALSE(ends_at_rest(0.025, 0.0));
+  EXPECT_FALSE(ends_at_rest(0.0, -0.06));
 }
 
 TEST(PlanCheck, OnlyAnEscapeMayStartInside) {

@@ -18,7 +18,7 @@ Plan Moving(double start, double duration, double x0, double speed) {
   plan.position.coefficients(1, 0) = speed * duration;
   plan.position.coefficients(2, 1) = 0.5 * duration * duration;
   plan.position.coefficients(3, 2) = 0.1 * duration * duration * duration;
-  plan.yaw = Eigen::Vector2d(0.3, 0.5 * duration);
+  plan.yaw = Vector3d(0.3, 0.5 * duration, 0.2 * duration * duration);
   return plan;
 }
 
@@ -36,8 +36,8 @@ TEST(PlanFollower, GivesPlanAsItIs) {
     const Reference r = Sample(plan, t);
     EXPECT_EQ(r.state.p, plan.position.Position(t));
     EXPECT_EQ(r.state.j, plan.position.Derivative(3, t));
-    EXPECT_NEAR(r.yaw, 0.3 + 0.5 * (t - 1.0), 1e-12);
-    EXPECT_NEAR(r.yaw_rate, 0.5, 1e-12);
+    EXPECT_NEAR(r.yaw, 0.3 + 0.5 * (t - 1.0) + 0.2 * (t - 1.0) * (t - 1.0), 1e-12);
+    EXPECT_NEAR(r.yaw_rate, 0.5 + 0.4 * (t - 1.0), 1e-12);
   }
 }
 
@@ -62,13 +62,14 @@ TEST(PlanFollower, ReferenceIsContinuousOverConsistentPlans) {
     if (i % 4 == 0) {  // the same motion, over a later interval
       Plan next;
       next.position = whole.position.Reparametrised(t + 0.03, 2.5);
-      next.yaw = Eigen::Vector2d(0.3 + 0.5 * (t + 0.03), 0.5 * 2.5);
+      const double s = t + 0.03;
+      next.yaw = Vector3d(0.3 + 0.5 * s + 0.2 * s * s, 2.5 * (0.5 + 0.4 * s), 0.2 * 2.5 * 2.5);
       follower.Add(next);
     }
     const auto r = follower.At(t);
     EXPECT_LT((r->state.p - whole.position.Position(t)).norm(), 1e-9) << t;
     EXPECT_LT((r->state.a - whole.position.Acceleration(t)).norm(), 1e-9) << t;
-    EXPECT_NEAR(r->yaw, 0.3 + 0.5 * t, 1e-9) << t;
+    EXPECT_NEAR(r->yaw, 0.3 + 0.5 * t + 0.2 * t * t, 1e-9) << t;
   }
 }
 

@@ -228,6 +228,9 @@ TEST(Ladder, BrakingJustAboveTheLeastHeightIsSafeThoughItSinks) {
     ASSERT_TRUE(stop) << speed;
     const world::Trajectory& brake = stop->trajectory;
     EXPECT_GT(brake.Position(brake.end()).z(), request.start.p.z() - 0.37 * speed - 1e-6);
+    request.start.p.z() = config.z_max - 0.01;
+    request.start.v.z() = speed;
+    EXPECT_TRUE(Brake(config, request)) << speed << " upwards";
   }
 }
 

@@ -120,6 +120,13 @@ std::vector<std::string> BrokenPromises(const PlannerConfig& c, const PlanReques
     if (!p.of_sight && p.radius < c.hard_radius()) broken.push_back("less than the hard radius");
     if (p.from > 0.0 && plan.verdict != Verdict::kEscape && !p.of_sight)
       broken.push_back("late, and no escape");
+    if (!p.of_sight && p.from == 0.0)
+      check("clearance from ",
+            LeastGap(plan.trajectory, c.hard_radius() + plan.certified_clearance, 0.0, nullptr, o,
+                     c.sigmas),
+            p.obstacle);
+    if (!p.of_sight && plan.reason.empty() && p.radius < c.hard_radius() + c.safety_margin - 1e-12)
+      broken.push_back("less than the margin, unsaid");
     // The target's own uncertainty, from the request.
     if (p.of_sight && plan.reason.empty())
       for (const double tau : {0.0, 0.5, 1.0}) {
@@ -135,6 +142,10 @@ std::vector<std::string> BrokenPromises(const PlannerConfig& c, const PlanReques
     for (const Proof& p : plan.proofs) sights += p.of_sight && p.from == 0.0;
     if (sights != request.obstacles.size()) broken.push_back("sight without a proof");
   }
+  if (plan.verdict == Verdict::kChase && plan.trajectory.duration < request.horizon)
+    broken.push_back("a chase over a part of the horizon");
+  if (plan.verdict <= Verdict::kSafeOnly && plan.trajectory.duration > request.horizon + 1e-9)
+    broken.push_back("beyond the horizon");
   if (plan.stop)
     for (const Proof& p : plan.stop_proofs) {
       const world::Obstacle& o = request.obstacles[static_cast<size_t>(p.obstacle)];
@@ -172,6 +183,98 @@ TEST(Minkowski, CertifiedPlansKeepOffWhatTheySayTheyDo) {
   std::printf("%u plans, %d certified, %d false\n", n, certified, false_accepts);
   EXPECT_GT(certified, static_cast<int>(n) / 2);
   EXPECT_GT(in_sight, static_cast<int>(n) / 10);
+}
+
+/// Gap of the way's ball, or of its hull with the target's, at tau.
+double Gap(const world::Ball& drone, const world::Ball* target, const world::Body& body,
+           double tau) {
+  world::SeparationPair pair;
+  pair.drone = drone;
+  pair.sight = target != nullptr;
+  pair.target = target ? *target : drone;
+  pair.body = body;
+  return world::GapAt(pair, tau);
+}
+
+/// Half the extent of body and uncertainty along an axis.
+double Extent(const world::Body& body, int axis, double tau) {
+  const Vector3d n = Vector3d::Unit(axis);
+  return n.dot(world::SupportPoint(body, n)) + body.sigmas * world::Deviation(body, n, tau);
+}
+
+/// Boxes that sort out obstacles hold what the proofs are about, and little more.
+void ExpectBoxes(const PlannerConfig& c, const Problem& problem, const Ellipsoid& e,
+                 const world::Body& body) {
+  const double most = std::sqrt(std::max(
+      body.covariance[0].diagonal().maxCoeff(),
+      (body.covariance[0] + body.covariance[1] + body.covariance[2]).diagonal().maxCoeff()));
+  for (int a = 0; a < 3; ++a) {
+    const double solid = Vector3d::Unit(a).dot(world::SupportPoint(body, Vector3d::Unit(a)));
+    for (const double tau : {0.0, 0.3, 0.7, 1.0}) {
+      const double seen = math::Evaluate(problem.target_growth, tau);
+      EXPECT_GE(e.safety_half[a] + 1e-9, Extent(body, a, tau) + c.hard_radius() + c.safety_margin);
+      EXPECT_GE(e.sight_half[a] + 1e-9, Extent(body, a, tau) + c.sight_margin + seen);
+    }
+    const double reach = 1.001 * solid + body.sigmas * most + 1e-6;
+    EXPECT_LE(e.safety_half[a], reach + c.hard_radius() + c.safety_margin);
+    EXPECT_LE(e.sight_half[a], reach + c.sight_margin + problem.target_growth.sum());
+  }
+}
+
+/// Margins give way as far as they must, and the hard radius where the start is within it only.
+void ExpectRelaxed(const PlannerConfig& c, const Problem& problem, const Ellipsoid& e,
+                   const world::Body& body) {
+  constexpr double kNear = 2e-4;     // m: what is off has to be so by a little
+  constexpr double kBetween = 0.02;  // m: nearer between the samples
+  const auto at_start = [&](double radius) {
+    return Gap({problem.start, math::Polynomial::Constant(1, radius)}, nullptr, body, 0.0);
+  };
+  const auto target = [&](double share) {
+    math::Polynomial radius = share * problem.target_growth;
+    radius[0] += share * c.sight_margin;
+    return world::Ball{problem.target, radius};
+  };
+  const auto least_of_target = [&](double share) {
+    double least = HUGE_VAL;
+    for (int i = 0; i <= kInstants; ++i)
+      least = std::min(least, Gap(target(share), nullptr, body, 1.0 * i / kInstants));
+    return least;
+  };
+  const auto then = [](bool given, bool follows) { return !given || follows; };
+  const double most = c.hard_radius() + c.safety_margin;
+  const bool inside = e.safety_from > 0.0, hidden = e.sight_from > 0.0;
+  EXPECT_TRUE(then(at_start(c.hard_radius()) < -kTolerance, inside));
+  EXPECT_TRUE(then(at_start(c.hard_radius()) > kNear, !inside));
+  EXPECT_TRUE(then(inside, e.safety_radius == c.hard_radius()));
+  EXPECT_TRUE(then(!inside, at_start(e.safety_radius) >= -kTolerance));
+  EXPECT_TRUE(then(at_start(most) > kNear, e.safety_radius == most));
+  EXPECT_TRUE(then(!hidden, least_of_target(e.sight_share) >= -kTolerance));
+  EXPECT_TRUE(then(hidden, least_of_target(0.0) <= kBetween));
+}
+
+TEST(Minkowski, ProblemsAskForWhatTheBodiesAre) {
+  const PlannerConfig c;
+  int inside = 0, within = 0, holds_target = 0;
+  for (unsigned seed = 1; seed <= 300; ++seed) {
+    PlanRequest request = RandomRequest(c, seed);
+    // Forecasts may be of degree 8, which has no control points of degree 6.
+    const Eigen::MatrixXd target = request.target.coefficients;
+    request.target.coefficients = Eigen::MatrixXd::Zero(seed % 20 == 0 ? 9 : target.rows(), 3);
+    request.target.coefficients.topRows(target.rows()) = target;
+    const Problem problem = MakeProblem(c, request, nullptr);
+    for (size_t i = 0; i < problem.obstacles.size(); ++i) {
+      const Ellipsoid& e = problem.obstacles[i];
+      const world::Body body = Truth(request.obstacles[i], request.t0, request.horizon, c.sigmas);
+      ExpectBoxes(c, problem, e, body);
+      ExpectRelaxed(c, problem, e, body);
+      inside += e.safety_from > 0.0;
+      within += e.safety_from == 0.0 && e.safety_radius < c.hard_radius() + c.safety_margin;
+      holds_target += e.sight_from > 0.0;
+    }
+  }
+  std::printf("%d hold the start, %d its margin, %d the target\n", inside, within, holds_target);
+  EXPECT_GT(inside, 10);
+  EXPECT_GT(holds_target, 10);
 }
 
 }  // namespace

@@ -21,12 +21,23 @@ polynomial_t Line(int64_t utime, const Eigen::Vector3d& from, const Eigen::Vecto
   return m;
 }
 
+constexpr int64_t kNever = kStart + 1000000000;  // us
+
+/// What else happens in a flight.
+struct Events {
+  double height = 0.1;            // where the body is before there is a plan, m
+  int64_t flying_from = kNever;   // control says from then on that it flies, us
+  int64_t frame_at = kNever;      // the frame of odometry changes, us
+  int64_t obstacles_at = kNever;  // obstacles speak of the new one, us
+  int64_t forecasts_at = kNever;  // forecasts do, us
+};
+
 /// Plays the drone and the target: hovers where the newest plan wants it, forecasts a straight
 /// walk.
 class Company : public bus::Node {
  public:
-  Company(bus::Bus& bus, int64_t forecast_from, int64_t forecast_until)
-      : bus_(bus), from_(forecast_from), until_(forecast_until) {
+  Company(bus::Bus& bus, int64_t forecast_from, int64_t forecast_until, const Events& events)
+      : bus_(bus), from_(forecast_from), until_(forecast_until), events_(events) {
     bus.Subscribe<plan_t>("PLAN", [this](const plan_t& m) { plans.push_back(m); });
   }
   int64_t TickPeriod() const override { return kPeriod; }
@@ -35,10 +46,18 @@ class Company : public bus::Node {
     if ((utime - kStart) % 100000 == 0) {
       obstacles_t none{};
       none.utime = utime;
+      none.epoch = utime >= events_.obstacles_at;
       bus_.Publish("OBSTACLES", none);
+    }
+    if (utime >= events_.flying_from && (utime - kStart) % 50000 == 0) {
+      tracking_t tracking{};
+      tracking.utime = utime;
+      tracking.following = tracking_t::PLAN;
+      bus_.Publish("TRACKING", tracking);
     }
     pose_t pose{};
     pose.utime = utime;
+    pose.epoch = utime >= events_.frame_at;
     pose.orientation[0] = 1.0;
     bus::Set(pose.pos, Position(utime));
     bus_.Publish("POSE", pose);
@@ -47,7 +66,7 @@ class Company : public bus::Node {
 
  private:
   Eigen::Vector3d Position(int64_t utime) const {
-    Eigen::Vector3d p(0.0, 0.0, 0.1);
+    Eigen::Vector3d p(0.0, 0.0, events_.height);
     for (const plan_t& plan : plans) {
       if (plan.utime > utime) continue;
       const auto x = bus::FromMessage(plan.position, kStart);
@@ -58,6 +77,7 @@ class Company : public bus::Node {
   void Forecast(int64_t utime) {
     prediction_t m{};
     m.utime = utime;
+    m.epoch = utime >= events_.forecasts_at;
     const double t = bus::Seconds(utime, from_);
     m.target = Line(utime, {2.5 + 0.8 * t, 0.0, 0.6}, {0.8, 0.0, 0.0});
     for (const int i : {0, 4, 8}) m.covariance[i] = m.velocity_covariance[i] = 1e-4;
@@ -66,13 +86,15 @@ class Company : public bus::Node {
 
   bus::Bus& bus_;
   int64_t from_, until_;
+  Events events_;
 };
 
-std::vector<plan_t> Fly(int64_t forecast_from, int64_t forecast_until, int64_t end) {
+std::vector<plan_t> Fly(int64_t forecast_from, int64_t forecast_until, int64_t end,
+                        const Events& events = {}) {
   bus::Lockstep lockstep(kStart);
   Company* company = nullptr;
   lockstep.Add("company", 0, [&](bus::Bus& bus) {
-    auto node = std::make_unique<Company>(bus, forecast_from, forecast_until);
+    auto node = std::make_unique<Company>(bus, forecast_from, forecast_until, events);
     company = node.get();
     return node;
   });
@@ -126,6 +148,52 @@ TEST(PlanningNode, StopsAndLooksAroundWhenTheForecastsStop) {
 TEST(PlanningNode, TheSameMessagesGiveTheSameBytes) {
   EXPECT_EQ(Bytes(Fly(kStart + 5000000, kStart + 7000000, kStart + 8000000)),
             Bytes(Fly(kStart + 5000000, kStart + 7000000, kStart + 8000000)));
+}
+
+TEST(PlanningNode, APlannerStartedInFlightDoesNotClimb) {
+  Events events;
+  events.height = 1.5;
+  events.flying_from = kStart + 100000;  // heard a little after the first poses
+  const auto plans = Fly(kNever, kNever, kStart + 5000000, events);
+  ASSERT_FALSE(plans.empty());
+  for (const plan_t& plan : plans) {
+    const auto way = bus::FromMessage(plan.position, kStart);
+    EXPECT_NEAR(way.Position(way.end()).z(), events.height, 0.01) << plan.reason;
+  }
+}
+
+struct Chases {
+  int before = 0, between = 0, after = 0;
+};
+
+/// Chases of a target in a flight whose frame changes after 8 s; what is heard is of the new one
+/// from the given times on.
+Chases ChasesInAnotherFrame(int64_t obstacles_at, int64_t forecasts_at) {
+  Events events;
+  events.frame_at = kStart + 8000000;
+  events.obstacles_at = obstacles_at;
+  events.forecasts_at = forecasts_at;
+  const int64_t all_at = std::max(obstacles_at, forecasts_at);
+  Chases chases;
+  for (const plan_t& plan : Fly(kStart + 5000000, kStart + 12000000, kStart + 12000000, events)) {
+    const bool is_old = plan.epoch == 0, is_between = !is_old && plan.utime < all_at;
+    int& n = is_old ? chases.before : is_between ? chases.between : chases.after;
+    n += plan.verdict <= plan_t::SAFE_ONLY;
+    EXPECT_FALSE(is_between && plan.utime < obstacles_at && plan.certified_clearance >= 0.0)
+        << "among the obstacles of another frame";
+  }
+  return chases;
+}
+
+TEST(PlanningNode, AnotherFrameVoidsForecastAndObstacles) {
+  const int64_t change = kStart + 8000000, later = kStart + 10000000;
+  for (const bool forecasts_last : {true, false}) {
+    const Chases chases =
+        forecasts_last ? ChasesInAnotherFrame(change, later) : ChasesInAnotherFrame(later, change);
+    EXPECT_GT(chases.before, 10);
+    EXPECT_EQ(chases.between, 0) << (forecasts_last ? "forecasts" : "obstacles");
+    EXPECT_GT(chases.after, 3);
+  }
 }
 
 }  // namespace

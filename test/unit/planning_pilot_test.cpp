@@ -25,7 +25,7 @@ class Flight {
 
   void Run(double seconds, bool with_target) {
     for (const double end = t + seconds; t < end; t += kPeriod) {
-      if (std::fmod(t, 0.1) < kPeriod) pilot.SetObstacles(t, {});
+      if (hears && std::fmod(t, 0.1) < kPeriod) pilot.SetObstacles(t, {});
       if (with_target && std::fmod(t, 0.3) < kPeriod) pilot.SetForecast(Walking(t));
       if (const auto plan = pilot.Update(t, Body())) {
         plans.push_back(*plan);
@@ -45,6 +45,7 @@ class Flight {
 
   Pilot pilot;
   double t = 0.0;
+  bool hears = true;  // of obstacles
   double largest_step = 0.0, largest_kink = 0.0;
   std::vector<PlanResult> plans;
   std::optional<PlanResult> flown, waiting;
@@ -127,6 +128,136 @@ TEST(Pilot, ARestartedChaseBeginsAtTheEstimatesVelocityWithoutAcceleration) {
   EXPECT_LT((start.p - pushed.p).norm(), 1e-6);
   EXPECT_LT((start.v - pushed.v).norm(), 1e-6);
   EXPECT_LT(start.a.norm(), 1e-6);
+}
+
+TEST(Pilot, WithoutObstaclesItBrakesAndCertifiesNothing) {
+  Flight flight{PlanningConfig()};
+  flight.Run(4.0, false);
+  flight.Run(4.0, true);
+  ASSERT_EQ(flight.plans.back().verdict, Verdict::kChase);
+  flight.hears = false;
+  flight.Run(0.35, true);
+  const size_t before = flight.plans.size();
+  flight.Run(4.0, true);
+  ASSERT_GT(flight.plans.size(), before + 10);
+  for (size_t i = before; i < flight.plans.size(); ++i) {
+    const PlanResult& plan = flight.plans[i];
+    EXPECT_TRUE(plan.verdict == Verdict::kBrake || plan.verdict == Verdict::kWait);
+    EXPECT_LT(plan.certified_clearance, 0.0);
+    EXPECT_TRUE(plan.proofs.empty());
+    EXPECT_NE(plan.reason.find("not heard"), std::string::npos) << plan.reason;
+  }
+  EXPECT_LT(flight.Body().v.norm(), 0.05);
+}
+
+TEST(Pilot, AnObstacleOnTheRunningPlanIsAnsweredAtOnce) {
+  const PlanningConfig config;
+  for (const bool in_the_way : {true, false}) {
+    Flight flight{config};
+    flight.Run(4.0, false);
+    flight.Run(4.0, true);
+    ASSERT_EQ(flight.plans.back().verdict, Verdict::kChase);
+    while (flight.plans.back().trajectory.start > flight.t) flight.Run(kPeriod, false);
+    flight.Run(config.min_period, false);
+    const world::Trajectory& plan = flight.pilot.running().trajectory;
+    world::Obstacle pillar;
+    pillar.solid = world::Obstacle::Solid::kCylinder;
+    pillar.half = {0.2, 0.2, 3.0};
+    pillar.shape = pillar.half.cwiseAbs2().cwiseInverse().asDiagonal();
+    const Eigen::Vector3d aside(0.0, in_the_way ? 0.0 : 5.0, 0.0);
+    pillar.center = world::Trajectory::Constant(plan.Position(plan.end()) + aside, flight.t, 1.0);
+    flight.pilot.SetObstacles(flight.t, {pillar});
+    const auto answer = flight.pilot.Update(flight.t, flight.Body());
+    EXPECT_EQ(answer.has_value(), in_the_way);
+  }
+}
+
+// A climb ends where nobody looks on its way up, too.
+TEST(Pilot, WithoutObstaclesItDoesNotChaseAfterTheClimbEither) {
+  Flight flight{PlanningConfig()};
+  flight.hears = false;
+  flight.Run(6.0, true);
+  for (const PlanResult& plan : flight.plans) EXPECT_EQ(plan.verdict, Verdict::kWait);
+  EXPECT_LT(flight.plans.back().certified_clearance, 0.0);
+}
+
+TEST(Pilot, NothingOfAnotherFrameIsPlannedWith) {
+  Flight flight{PlanningConfig()};
+  flight.Run(4.0, false);
+  flight.Run(4.0, true);
+  ASSERT_EQ(flight.plans.back().verdict, Verdict::kChase);
+  flight.pilot.SetObstacles(flight.t, {world::Obstacle()});
+  flight.pilot.ChangeFrame();
+  EXPECT_EQ(flight.pilot.n_obstacles(), 0);
+  const BodyEstimate body{flight.Body().p + Eigen::Vector3d(0.3, 0.3, 0.0), flight.Body().v, 0.0};
+  const auto plan = flight.pilot.Update(flight.t, body);
+  ASSERT_TRUE(plan) << "the running plan is void";
+  EXPECT_GE(plan->verdict, Verdict::kBrake) << "there is no target in this frame yet";
+  EXPECT_LT((plan->trajectory.Position(plan->trajectory.start) - body.p).norm(), 1e-9);
+  EXPECT_LT(plan->certified_clearance, 0.0) << "no obstacles were listed in this frame yet";
+}
+
+TEST(Pilot, NoPlanReachesBeyondTheForecast) {
+  Flight flight{PlanningConfig()};
+  flight.Run(4.0, false);
+  for (const double seconds : {1.2, 1.6, 2.1}) {
+    Forecast forecast = Walking(flight.t);
+    forecast.target.coefficients.row(1) *= seconds / forecast.target.duration;
+    forecast.target.duration = seconds;
+    flight.pilot.SetForecast(forecast);
+    const size_t before = flight.plans.size();
+    flight.Run(0.1, false);
+    ASSERT_GT(flight.plans.size(), before);
+    EXPECT_LE(flight.plans[before].verdict, Verdict::kKept) << flight.plans[before].reason;
+    EXPECT_LE(flight.plans[before].trajectory.end(), forecast.target.end() + 1e-9);
+  }
+}
+
+// As far as the forecast is uncertain, plans keep off its body and sight allows for it.
+TEST(Pilot, TheForecastsUncertaintyAndBodyReachThePlan) {
+  PlanningConfig config;
+  config.planner.min_distance = 0.0;
+  config.planner.desired_distance = 0.5;
+  Flight flight{config};
+  flight.Run(4.0, false);
+  world::Obstacle pillar;
+  pillar.id = 4;
+  pillar.solid = world::Obstacle::Solid::kCylinder;
+  pillar.half = {0.2, 0.2, 3.0};
+  pillar.shape = (2.0 * pillar.half.cwiseAbs2()).cwiseInverse().asDiagonal();
+  pillar.center = world::Trajectory::Constant({flight.t + 2.5, 4.0, 1.0}, flight.t, 1.0);
+  flight.pilot.SetObstacles(flight.t, {pillar});
+  Forecast forecast = Walking(flight.t);
+  forecast.target.coefficients << 2.5, 0.0, 0.85, -2.5, 0.0, 0.0;
+  forecast.sigma = 0.1;
+  forecast.speed_sigma = 0.05;
+  forecast.radius = 0.3;
+  forecast.height = 1.7;
+  flight.pilot.SetForecast(forecast);
+  const auto plan = flight.pilot.Update(flight.t, flight.Body());
+  ASSERT_TRUE(plan);
+  ASSERT_GE(plan->certified_clearance, 0.0) << plan->reason;
+  const PlannerConfig& c = config.planner;
+  for (double t = plan->trajectory.start; t <= plan->trajectory.end(); t += 0.02) {
+    const double since = t - forecast.t;
+    const double deviations = c.sigmas * std::hypot(forecast.sigma, since * forecast.speed_sigma);
+    const Eigen::Vector3d d = plan->trajectory.Position(t) - forecast.target.Position(t);
+    const double off = std::hypot(std::max(0.0, d.head<2>().norm() - forecast.radius),
+                                  std::max(0.0, std::abs(d.z()) - 0.5 * forecast.height));
+    EXPECT_GE(off, c.hard_radius() + deviations - 1e-3) << since;
+  }
+  int sights = 0;
+  for (const Proof& p : plan->proofs) {
+    if (!p.of_sight) continue;
+    ++sights;
+    EXPECT_GE(p.target_radius[0], c.sight_margin + c.sigmas * forecast.sigma - 1e-9);
+    EXPECT_GE(p.target_radius.sum(),
+              c.sight_margin +
+                  c.sigmas *
+                      std::hypot(forecast.sigma, plan->trajectory.duration * forecast.speed_sigma) -
+                  1e-9);
+  }
+  EXPECT_EQ(sights, 1);
 }
 
 TEST(PlanningConfig, DefaultsAreFineAndBadValuesAreNamed) {

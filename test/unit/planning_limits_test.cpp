@@ -1,0 +1,159 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+#include "services/planning/limits.h"
+#include "services/planning/planner_config.h"
+
+// Limits are certified for all of a plan: against dense sampling, both ways.
+
+namespace chase::planning {
+namespace {
+
+using Eigen::Vector3d;
+using Random = std::mt19937;
+
+constexpr int kPlans = 3000;
+constexpr int kInstants = 400;
+
+double Uniform(Random& g, double low, double high) {
+  return std::uniform_real_distribution<double>(low, high)(g);
+}
+
+Curve RandomCurve(Random& g, int rows, const Vector3d& from, double spread) {
+  Curve c(rows, 3);
+  for (int k = 0; k < rows; ++k)
+    for (int a = 0; a < 3; ++a) c(k, a) = Uniform(g, -spread, spread);
+  c.row(0) = from.transpose();
+  return c;
+}
+
+/// A plan of a degree that has control points, or of a higher one, and a target.
+Problem RandomProblem(Random& g, Curve* plan) {
+  Problem problem;
+  problem.duration = Uniform(g, 0.5, 3.0);
+  const int rows = g() % 4 ? 3 + static_cast<int>(g() % 5) : 9;
+  const Vector3d from(Uniform(g, -30, 30), Uniform(g, -30, 30), Uniform(g, 0.5, 3));
+  *plan = RandomCurve(g, rows, from, Uniform(g, 0.1, 2.0));
+  const Vector3d away(Uniform(g, -3, 3), Uniform(g, -3, 3), Uniform(g, -1, 1));
+  problem.target = RandomCurve(g, 1 + static_cast<int>(g() % 6), from + away, 0.5);
+  return problem;
+}
+
+struct Extremes {
+  double speed = 0.0, acceleration = 0.0, low = HUGE_VAL, high = -HUGE_VAL, near = HUGE_VAL,
+         slope = 0.0;  // the last: tangent of the elevation
+};
+
+Extremes Sampled(const Curve& plan, const Problem& problem) {
+  Extremes e;
+  const double T = problem.duration;
+  for (int i = 0; i <= kInstants; ++i) {
+    const double tau = static_cast<double>(i) / kInstants;
+    const Vector3d p = Evaluate(plan, tau), r = Evaluate(problem.target, tau) - p;
+    e.speed = std::max(e.speed, Evaluate(plan, tau, 1).norm() / T);
+    e.acceleration = std::max(e.acceleration, Evaluate(plan, tau, 2).norm() / (T * T));
+    e.low = std::min(e.low, p.z());
+    e.high = std::max(e.high, p.z());
+    e.near = std::min(e.near, r.norm());
+    e.slope = std::max(e.slope, std::abs(r.z()) / r.head<2>().norm());
+  }
+  return e;
+}
+
+/// `room`: by how much less than the limit the sampled value is, as a share; one limit of six.
+double SetLimit(Random& g, const Extremes& e, Limits* limits) {
+  const double room = Uniform(g, -0.2, 0.2), by = 1.0 / (1.0 - room);
+  switch (g() % 6) {
+    case 0:
+      limits->speed = by * e.speed;
+      break;
+    case 1:
+      limits->acceleration = by * e.acceleration;
+      break;
+    case 2:
+      limits->min_distance = e.near / by;
+      break;
+    case 3:
+      limits->tan_elevation = by * e.slope;
+      break;
+    case 4:
+      limits->height = true;
+      limits->z_min = e.low - room;
+      limits->z_max = e.high + 1.0;
+      break;
+    default:
+      limits->height = true;
+      limits->z_min = e.low - 1.0;
+      limits->z_max = e.high + room;
+  }
+  return room;
+}
+
+TEST(Limits, HoldWhereSamplesSaySoAndNowhereElse) {
+  Random g(11);
+  int kept = 0, broken = 0;
+  for (int i = 0; i < kPlans; ++i) {
+    Curve plan;
+    Problem problem = RandomProblem(g, &plan);
+    const Extremes e = Sampled(plan, problem);
+    const double room = SetLimit(g, e, &problem.limits);
+    if (e.slope > 50.0 || e.near < 0.1) continue;
+    const bool keeps = KeepsLimits(plan, problem);
+    EXPECT_FALSE(keeps && room < 0.0) << i;
+    EXPECT_FALSE(!keeps && room > 0.02) << i;
+    ++(room < 0.0 ? broken : kept);
+  }
+  EXPECT_GT(kept, kPlans / 4);
+  EXPECT_GT(broken, kPlans / 4);
+}
+
+TEST(Limits, NoneIsAskedThatIsNotSet) {
+  Random g(12);
+  for (int i = 0; i < 100; ++i) {
+    Curve plan;
+    const Problem problem = RandomProblem(g, &plan);
+    EXPECT_TRUE(KeepsLimits(plan, problem)) << i;
+  }
+}
+
+PlanRequest At(const world::State& start) {
+  PlanRequest request;
+  request.start = start;
+  request.target = world::Trajectory::Constant({5.0, 0.0, 1.0}, 0.0, 2.5);
+  return request;
+}
+
+// From any start: what is in force is the file's limit, or what the start has already, no more.
+TEST(Limits, GiveWayToTheStartOnly) {
+  const PlannerConfig c;
+  Random g(13);
+  for (int i = 0; i < 1000; ++i) {
+    world::State s;
+    for (Vector3d* x : {&s.p, &s.v, &s.a})
+      *x = {Uniform(g, -4, 4), Uniform(g, -4, 4), Uniform(g, -4, 4)};
+    const Limits l = MakeProblem(c, At(s), nullptr).limits;
+    const double v = s.v.norm(), a = s.a.norm();
+    EXPECT_GE(l.speed, std::max(c.max_speed, v));
+    EXPECT_LE(l.speed, std::max(c.max_speed, v + 1e-5 * (1.0 + v)));
+    EXPECT_GE(l.acceleration, std::max(c.max_acceleration, a));
+    EXPECT_LE(l.acceleration, std::max(c.max_acceleration, a + 1e-5 * (1.0 + a)));
+    // Braking at half of the acceleration after 0.2 s.
+    const auto reach = [&](double speed, double more) {
+      const double then = speed + 0.2 * std::max(0.0, more);
+      return then > 0.0 ? 0.2 * std::max(0.0, speed) + then * then / c.max_acceleration : 0.0;
+    };
+    EXPECT_NEAR(l.z_min, std::min(c.z_min, s.p.z() - reach(-s.v.z(), -s.a.z())), 1e-5);
+    EXPECT_NEAR(l.z_max, std::max(c.z_max, s.p.z() + reach(s.v.z(), s.a.z())), 1e-5);
+    const Vector3d r = Vector3d(5.0, 0.0, 1.0) - s.p;
+    EXPECT_NEAR(l.min_distance, std::min(c.min_distance, 0.9 * r.norm()), 1e-9);
+    const double tangent = std::tan(c.max_elevation_deg * M_PI / 180.0);
+    const bool in_field = std::abs(r.z()) < 0.95 * tangent * r.head<2>().norm();
+    EXPECT_NEAR(l.tan_elevation, in_field ? tangent : 0.0, 1e-9);
+  }
+}
+
+}  // namespace
+}  // namespace chase::planning

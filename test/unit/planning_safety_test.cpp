@@ -1,0 +1,293 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/math/rotation.h"
+#include "services/planning/ladder.h"
+#include "services/planning/planner.h"
+#include "services/planning/search.h"
+#include "services/planning/stopping.h"
+
+// What SAFETY.md promises of a single plan, judged by sampled distances.
+
+namespace chase::planning {
+namespace {
+
+using Eigen::Vector3d;
+
+/// An upright cylinder that moves at v.
+world::Obstacle Cylinder(int id, const Vector3d& p, const Vector3d& v, double radius,
+                         double half_height) {
+  world::Obstacle o;
+  o.id = id;
+  o.moving = true;
+  o.center = {0.0, 1.0, Eigen::MatrixXd::Zero(2, 3)};
+  o.center.coefficients << p.transpose(), v.transpose();
+  o.solid = world::Obstacle::Solid::kCylinder;
+  o.half = {radius, radius, half_height};
+  o.shape = o.half.cwiseAbs2().cwiseInverse().asDiagonal();
+  return o;
+}
+
+/// A wall across x that moves along it.
+world::Obstacle Wall(int id, double x, double speed) {
+  world::Obstacle o = Cylinder(id, {x, 0.0, 1.0}, {speed, 0.0, 0.0}, 1.0, 1.0);
+  o.solid = world::Obstacle::Solid::kBox;
+  o.half = {0.1, 20.0, 20.0};
+  o.shape = (3.0 * o.half.cwiseAbs2()).cwiseInverse().asDiagonal();
+  return o;
+}
+
+/// From the cylinder's or the box's surface, negative inside.
+double Distance(const world::Obstacle& o, const Vector3d& p, double t) {
+  const Vector3d d = p - o.center.Position(t);
+  const bool box = o.solid == world::Obstacle::Solid::kBox;
+  const Vector3d beyond =
+      box ? Vector3d(d.cwiseAbs() - o.half)
+          : Vector3d(d.head<2>().norm() - o.half.x(), std::abs(d.z()) - o.half.z(), -HUGE_VAL);
+  return beyond.cwiseMax(0.0).norm() + std::min(0.0, beyond.maxCoeff());
+}
+
+double LeastDistance(const world::Obstacle& o, const world::Trajectory& way) {
+  double least = HUGE_VAL;
+  for (int i = 0; i <= 200; ++i) {
+    const double t = way.start + way.duration * i / 200.0;
+    least = std::min(least, Distance(o, way.Position(t), t));
+  }
+  return least;
+}
+
+/// When the way first comes nearer than `radius`, s; infinite where it never does.
+double FirstContact(const world::Obstacle& o, const world::Trajectory& way, double radius) {
+  for (double t = way.start; t <= way.end(); t += 0.005)
+    if (Distance(o, way.Position(t), t) < radius) return t;
+  return HUGE_VAL;
+}
+
+/// A drone that hovers 2.5 m behind a target that walks away from it.
+PlanRequest Hover() {
+  PlanRequest r;
+  r.horizon = 2.5;
+  r.start.p = {-2.5, 0.0, 1.4};
+  r.target = {0.0, 2.5, Eigen::MatrixXd::Zero(2, 3)};
+  r.target.coefficients << 0.0, 0.0, 0.8, 1.5, 0.0, 0.0;
+  return r;
+}
+
+TEST(Evasion, WhatCannotBeBrakedForIsEvadedAndCertified) {
+  const PlannerConfig config;
+  int aside = 0;
+  for (const double angle : {0.0, 1.0, 2.5, 4.0}) {
+    const Vector3d along(std::cos(angle), std::sin(angle), 0.0);
+    PlanRequest request = Hover();
+    request.obstacles = {Cylinder(1, request.start.p - 1.3 * along, 1.2 * along, 0.3, 3.0)};
+    ASSERT_FALSE(Brake(config, request)) << "it would do to stay";
+    const PlanResult plan = RestPlan(config, request);
+    EXPECT_EQ(plan.verdict, Verdict::kEscape) << plan.reason;
+    EXPECT_GE(plan.certified_clearance, 0.0);
+    EXPECT_GE(LeastDistance(request.obstacles[0], plan.trajectory), config.hard_radius() - 1e-6);
+    EXPECT_LT(plan.trajectory.Velocity(plan.trajectory.end()).norm(), 1e-6);
+    aside += plan.reason == "nor is braking";
+  }
+  EXPECT_EQ(aside, 4);
+}
+
+TEST(Evasion, WhereNothingCanBeCertifiedTheContactComesAsLateAsCanBe) {
+  const PlannerConfig config;
+  for (const double speed : {2.0, 4.0, -3.0}) {
+    PlanRequest request = Hover();
+    request.obstacles = {Wall(1, request.start.p.x() - 0.35 * speed, speed)};
+    const PlanResult plan = RestPlan(config, request);
+    EXPECT_EQ(plan.verdict, Verdict::kBrake) << plan.reason;
+    EXPECT_LT(plan.certified_clearance, 0.0);
+    EXPECT_TRUE(plan.proofs.empty());
+    EXPECT_LT((plan.trajectory.Position(0.0) - request.start.p).norm(), 1e-9);
+    const world::Trajectory stays =
+        world::Trajectory::Constant(request.start.p, 0.0, plan.trajectory.duration);
+    EXPECT_GT(FirstContact(request.obstacles[0], plan.trajectory, config.drone_radius),
+              FirstContact(request.obstacles[0], stays, config.drone_radius))
+        << speed;
+  }
+}
+
+TEST(Evasion, AStartThatIsNotFiniteStaysWhereItIs) {
+  PlanRequest request = Hover();
+  request.t0 = 3.0;
+  request.start.v.x() = std::nan("");
+  const PlanResult plan = RestPlan(PlannerConfig(), request);
+  EXPECT_LT(plan.certified_clearance, 0.0);
+  EXPECT_EQ(plan.trajectory.start, request.t0);
+  EXPECT_EQ(plan.trajectory.Position(plan.trajectory.end()), request.start.p);
+}
+
+// From within the hard radius: a plan that is certified only ever moves out, and is out when
+// control wants it to be; where it cannot help moving in it is not certified.
+TEST(Escape, OnlyMovesOutAndIsOutInTime) {
+  const PlannerConfig config;
+  const auto planner = MakePlanner("chase", config);
+  int out = 0;
+  for (const double gap : {0.2, 0.33, 0.365})
+    for (const double inwards : {-0.8, -0.4, 0.0, 0.02, 0.1})
+      for (const double drift : {0.0, 0.3, -0.3}) {  // of both
+        PlanRequest request = Hover();
+        request.start.v = {0.0, inwards + drift, 0.0};
+        const Vector3d at = request.start.p + Vector3d(0.0, gap + 0.3, 0.0);
+        request.obstacles = {Cylinder(1, at, {0.0, drift, 0.0}, 0.3, 3.0)};
+        const PlanResult plan = planner->Plan(request);
+        if (plan.certified_clearance < 0.0) {
+          EXPECT_EQ(plan.verdict, Verdict::kBrake) << gap << " " << inwards;
+          continue;
+        }
+        EXPECT_LE(inwards, 0.0) << gap << " " << drift;
+        EXPECT_EQ(plan.verdict, Verdict::kEscape) << plan.reason;
+        EXPECT_EQ(plan.certified_clearance, 0.0);
+        EXPECT_NEAR(LeastDistance(request.obstacles[0], plan.trajectory), gap, 1e-6);
+        for (const Proof& p : plan.proofs) EXPECT_LE(p.from, 0.25);
+        ++out;
+      }
+  EXPECT_GE(out, 15);
+}
+
+TEST(Margins, GiveWayToTheHardRadiusAndNoFurther) {
+  const PlannerConfig config;
+  const auto planner = MakePlanner("chase", config);
+  for (const double share : {0.1, 0.4, 0.6, 0.9}) {
+    PlanRequest request = Hover();
+    request.start.v = {0.6, 0.0, 0.0};
+    const double off = config.hard_radius() + share * config.safety_margin;
+    const Vector3d at = request.start.p + Vector3d(0.0, off + 0.3, 0.0);
+    request.obstacles = {Cylinder(1, at, Vector3d::Zero(), 0.3, 3.0)};
+    const PlanResult plan = planner->Plan(request);
+    EXPECT_LE(plan.verdict, Verdict::kKept) << plan.reason;
+    EXPECT_NE(plan.reason.find("margin of obstacle 1"), std::string::npos) << plan.reason;
+    for (const Proof& p : plan.proofs)
+      EXPECT_TRUE(p.of_sight || (p.from == 0.0 && p.radius >= config.hard_radius())) << share;
+    EXPECT_GE(LeastDistance(request.obstacles[0], plan.trajectory), config.hard_radius() - 1e-6);
+  }
+}
+
+// Nothing but its body keeps the drone off the target: no least distance, and a wish to be in it.
+TEST(TargetBody, IsKeptOffByPlansThatItDrivesAt) {
+  PlannerConfig config;
+  config.min_distance = 0.0;
+  config.desired_distance = 0.5;
+  const auto planner = MakePlanner("chase", config);
+  int in_sight = 0;
+  for (const double speed : {0.0, 0.5, 1.0, 1.5})
+    for (const double across : {0.0, 0.2}) {
+      PlanRequest request = Hover();
+      request.target.coefficients << 0.0, across, 0.85, -2.5 * speed, 0.0, 0.0;
+      const Vector3d v(-speed, 0.0, 0.0);
+      request.target_body = Cylinder(kTargetId, {0.0, across, 0.85}, v, 0.3, 0.85);
+      const PlanResult plan = planner->Plan(request);
+      in_sight += plan.verdict <= Verdict::kKept;
+      EXPECT_GE(plan.certified_clearance, 0.0) << speed << " " << plan.reason;
+      EXPECT_GE(LeastDistance(*request.target_body, plan.trajectory), config.hard_radius() - 1e-6);
+      EXPECT_EQ(std::count_if(plan.proofs.begin(), plan.proofs.end(),
+                              [](const Proof& p) { return p.obstacle == kTargetId; }),
+                1);
+      ASSERT_TRUE(plan.stop || plan.verdict >= Verdict::kBrake);
+      const world::Trajectory& rest = plan.stop ? *plan.stop : plan.trajectory;
+      EXPECT_GE(LeastDistance(*request.target_body, rest), config.hard_radius() - 1e-6);
+    }
+  EXPECT_GE(in_sight, 4);
+}
+
+TEST(CertifiedPlan, IsLeftForAStopBeforeAPlannerThatFellSilentIsMissed) {
+  const auto planner = MakePlanner("chase", PlannerConfig());
+  PlanRequest request = Hover();
+  request.obstacles = {Cylinder(1, {0.0, 3.0, 1.0}, {0.0, 0.0, 0.0}, 0.3, 2.0)};
+  const PlanResult plan = planner->Plan(request);
+  ASSERT_TRUE(plan.stop) << plan.reason;
+  EXPECT_LE(plan.stop->start, request.t0 + 0.4 + 1e-9);
+  EXPECT_TRUE(world::EndsAtRest(*plan.stop));
+  EXPECT_FALSE(plan.stop_proofs.empty());
+  const double t = plan.stop->start;
+  EXPECT_LT((plan.stop->Position(t) - plan.trajectory.Position(t)).norm(), 1e-6);
+  EXPECT_LT((plan.stop->Velocity(t) - plan.trajectory.Velocity(t)).norm(), 1e-6);
+}
+
+/// Calls a plan feasible that goes straight on.
+class Liar : public Search {
+ public:
+  Found Best(const Problem& problem, double, double, PlanProof*) override {
+    Found found;
+    found.index = 0;
+    found.plan = problem.start;
+    return found;
+  }
+};
+
+// The search may be wrong: its plan is proved before it is called certified.
+TEST(CertifiedPlan, DoesNotTakeTheSearchAtItsWord) {
+#ifndef NDEBUG
+  GTEST_SKIP() << "an assertion of the ladder's own says so first";
+#endif
+  PlannerConfig config;
+  config.refine = false;
+  PlanRequest request = Hover();
+  request.start.v = {0.8, 0.0, 0.0};
+  const auto plan_at = [&](double across) {
+    request.obstacles = {Cylinder(1, {-1.2, across, 1.0}, {0.0, 0.0, 0.0}, 0.2, 2.0)};
+    return MakeLadder(config, std::make_unique<Liar>())->Plan(request);
+  };
+  EXPECT_EQ(plan_at(3.0).verdict, Verdict::kChase);
+  const PlanResult plan = plan_at(0.0);
+  EXPECT_GE(plan.verdict, Verdict::kBrake) << plan.reason;
+  EXPECT_GE(plan.certified_clearance, 0.0);
+  EXPECT_GE(LeastDistance(request.obstacles[0], plan.trajectory), config.hard_radius() - 1e-6);
+}
+
+TEST(CertifiedPlan, KeepsSphereAndTubeOff) {
+  PlannerConfig config;
+  config.tracking_tube = 0.3;
+  PlanRequest request = Hover();
+  request.obstacles = {Cylinder(1, {-1.0, 0.9, 1.0}, {0.0, 0.0, 0.0}, 0.1, 2.0)};
+  const PlanResult plan = MakePlanner("chase", config)->Plan(request);
+  ASSERT_GE(plan.certified_clearance, 0.0) << plan.reason;
+  EXPECT_GE(LeastDistance(request.obstacles[0], plan.trajectory), 0.25 + 0.3 - 1e-6);
+  for (const Proof& p : plan.proofs) EXPECT_TRUE(p.of_sight || p.radius >= 0.25 + 0.3);
+}
+
+// The ground is an obstacle that nobody lists.
+TEST(CertifiedPlan, ClaimsNoMoreThanItsHeightOverTheGround) {
+  const PlannerConfig config;
+  PlanRequest request = Hover();
+  request.start.p.z() = 0.7;
+  const PlanResult plan = MakePlanner("chase", config)->Plan(request);
+  double least = HUGE_VAL;
+  for (int i = 0; i <= 100; ++i)
+    least = std::min(least, plan.trajectory.Position(plan.trajectory.duration * i / 100.0).z());
+  EXPECT_GE(plan.certified_clearance, 0.0);
+  EXPECT_LE(plan.certified_clearance, std::max(0.0, least - config.hard_radius()) + 1e-9);
+}
+
+TEST(CertifiedPlan, SaysWhenTheTargetLeavesTheFieldOfView) {
+  PlannerConfig config;
+  config.max_yaw_rate = 0.4;
+  const auto planner = MakePlanner("chase", config);
+  int left = 0, kept = 0;
+  for (const double off : {0.0, 0.3, 0.9, 1.5, -1.5, 3.0}) {
+    PlanRequest request = Hover();
+    request.yaw = YawStart{off, 0.0};
+    const PlanResult plan = planner->Plan(request);
+    double worst = 0.0;
+    for (int i = 0; i <= 100; ++i) {
+      const double tau = i / 100.0, t = tau * plan.trajectory.duration;
+      const Vector3d r = request.target.Position(t) - plan.trajectory.Position(t);
+      const double yaw = EvaluateYaw(plan.yaw, tau);
+      worst = std::max(worst, std::abs(math::WrapAngle(std::atan2(r.y(), r.x()) - yaw)));
+    }
+    const bool leaves = worst > config.max_bearing_deg * M_PI / 180.0;
+    EXPECT_FALSE(leaves && plan.in_field) << off;
+    EXPECT_EQ(plan.in_field, plan.reason.find("field of view") == std::string::npos) << off;
+    left += leaves;
+    kept += plan.in_field;
+  }
+  EXPECT_GE(left, 2);
+  EXPECT_GE(kept, 1);
+}
+
+}  // namespace
+}  // namespace chase::planning
