@@ -272,9 +272,6 @@ ObstacleList Mapper::Insert(const Sweep& sweep) {
   t_ = sweep.t;
   list.obstacles = Statics(sweep.origin, sweep.t, &list.n_dropped);
   const StaticConfig& c = config_.statics;
-  for (auto& slab :
-       GroundSlabs(ground_, sweep.origin, c.radius, c.band_low, sweep.t, config_.movers.horizon))
-    list.obstacles.push_back(std::move(slab));
   list.n_static = static_cast<int>(list.obstacles.size());
   const double middle =
       ground_.Height(sweep.origin.x(), sweep.origin.y()) + 0.5 * (c.band_low + c.band_high);
@@ -284,6 +281,9 @@ ObstacleList Mapper::Insert(const Sweep& sweep) {
     list.obstacles.push_back(std::move(o));
   }
   list.n_cut = KeepNearest(sweep.origin, config_.max_obstacles, &list.obstacles);
+  for (auto& slab :
+       GroundSlabs(ground_, sweep.origin, c.radius, c.band_low, sweep.t, config_.movers.horizon))
+    list.obstacles.push_back(std::move(slab));
   return list;
 }
 

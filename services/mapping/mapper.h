@@ -21,7 +21,7 @@ namespace chase::mapping {
 
 /// What the planner should know after a sweep.
 struct ObstacleList {
-  std::vector<world::Obstacle> obstacles;  ///< nearest to the drone first; frame W
+  std::vector<world::Obstacle> obstacles;  ///< nearest to the drone first, then the ground; frame W
   int n_cut = 0;                           ///< left out because the list is bounded
   int n_static = 0, n_moving = 0;          ///< listed and cut
   int n_dropped = 0;                       ///< single columns left out because the target is there

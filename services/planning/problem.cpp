@@ -247,7 +247,7 @@ double Overshoot(double v, double a, double brake) {
 Limits MakeLimits(const PlannerConfig& c, const world::State& s, const Eigen::Vector3d& target,
                   const Ground& ground) {
   constexpr double kRounding = 1e-6, kBrake = 2.0;  // m; m/s^2 where no limit is set
-  constexpr double kOverhead = 10.0;  // tangent from which there is no side to be on
+  constexpr double kOverhead = 10.0;                // tangent from which there is no side to be on
   const auto at_least = [](double limit, double now) {
     return limit > 0.0 ? std::max(limit, (1.0 + kRounding) * now + kRounding) : 0.0;
   };

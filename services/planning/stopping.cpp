@@ -75,9 +75,13 @@ class Resting {
     return Stop{{request_.t0, T, curve}, std::move(*proofs), true};
   }
 
-  bool IsWithinLimits(const Curve& curve, double T) {
+  bool KeepsSpeed(const Curve& curve, double T) {
     SetProblem(T);
-    return KeepsLimits(curve, problem_);
+    Problem speed;
+    speed.duration = T;
+    speed.limits.speed = problem_.limits.speed;
+    speed.target = problem_.target;
+    return curve.allFinite() && KeepsLimits(curve, speed);
   }
 
   /// Time of the first sampled contact, s, infinite where there is none, and the least clearance.
@@ -181,9 +185,8 @@ Stop Evade(const PlannerConfig& config, const PlanRequest& request) {
       const double T = kOver[i];
       const Vector3d end = ToPoints(BrakeCurve(request.start, T), 5).row(5).transpose() + d;
       const Curve curve = CurveTo(request.start, T, end);
-      if (!curve.allFinite() || !resting[i].IsWithinLimits(curve, T)) continue;
       if (auto stop = resting[i].Certified(curve, T)) return *stop;
-      weigh(&resting[i], curve, T);
+      if (resting[i].KeepsSpeed(curve, T)) weigh(&resting[i], curve, T);
     }
   if (least.first < 0.0)  // none is finite
     best.trajectory = world::Trajectory::Constant(request.start.p, request.t0, 1.0);

@@ -25,7 +25,7 @@ constexpr double kWholeShare = 0.8;         // of a mover's usual returns: all o
 
 const Obstacle* Holder(const std::vector<Obstacle>& obstacles, const Vector3d& p, double t) {
   for (const auto& o : obstacles)
-    if (o.SquaredDistance(p, t) <= 1.0) return &o;
+    if (!o.ground && o.SquaredDistance(p, t) <= 1.0) return &o;
   return nullptr;
 }
 

@@ -137,7 +137,10 @@ TEST(MappingGym, ListIsNearestFirstAndSaysWhatItCut) {
   ObstacleList list;
   for (int i = 0; i < 5; ++i)
     list = bounded.Insert(testing::Scan(world, {4.0, 4.0, 1.3}, 0.1 * i, {}, &random));
-  ASSERT_EQ(list.obstacles.size(), 5u);
+  const auto is_ground = [](const world::Obstacle& o) { return o.ground; };
+  ASSERT_GE(list.obstacles.size(), 5u);
+  EXPECT_TRUE(std::none_of(list.obstacles.begin(), list.obstacles.begin() + 5, is_ground));
+  EXPECT_TRUE(std::all_of(list.obstacles.begin() + 5, list.obstacles.end(), is_ground));
   EXPECT_GT(list.n_cut, 0);
   EXPECT_EQ(list.n_cut + 5, list.n_static);
   // The pillar at (4, 5.8) is 1.5 m away, that at (6, 3.4) 1.8 m, that at (2.5, 2) 2.2 m.

@@ -67,7 +67,7 @@ double SectionRadius(const world::Obstacle& obstacle, double z) {
 const world::Obstacle* Holding(const std::vector<world::Obstacle>& obstacles,
                                const Eigen::Vector3d& p, double t) {
   for (const auto& o : obstacles)
-    if (o.SquaredDistance(p, t) <= 1.0) return &o;
+    if (!o.ground && o.SquaredDistance(p, t) <= 1.0) return &o;
   return nullptr;
 }
 

@@ -49,7 +49,7 @@ TEST(Ground, PlansKeepTheirHeightAboveItUphillAndDownhill) {
       request.target.coefficients.row(0) =
           Vector3d(1.5 * request.t0, 0.0, 0.5 + 1.5 * slope * request.t0).transpose();
       const PlanResult plan = planner->Plan(request);
-      EXPECT_EQ(plan.verdict, Verdict::kChase) << slope << " " << i << " " << plan.reason;
+      EXPECT_LT(plan.verdict, Verdict::kSafeOnly) << slope << " " << i << " " << plan.reason;
       for (double t = request.t0; t <= plan.trajectory.end(); t += 0.05) {
         const Vector3d p = plan.trajectory.Position(t);
         const double above = p.z() - slope * p.x();
@@ -87,8 +87,12 @@ TEST(Ground, LimitsOfHeightAreThoseOfSamples) {
       high = std::max(high, z);
     }
     const bool keeps = KeepsLimits(plan, problem);
-    if (low < l.z_min || high > l.z_max) EXPECT_FALSE(keeps) << i;
-    if (low > l.z_min + 1e-3 && high < l.z_max - 1e-3) EXPECT_TRUE(keeps) << i;
+    if (low < l.z_min || high > l.z_max) {
+      EXPECT_FALSE(keeps) << i;
+    }
+    if (low > l.z_min + 1e-3 && high < l.z_max - 1e-3) {
+      EXPECT_TRUE(keeps) << i;
+    }
     kept += keeps;
     broken += !keeps;
   }

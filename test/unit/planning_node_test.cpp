@@ -137,7 +137,7 @@ TEST(PlanningNode, ChasesAForecastWithoutJumpsFromPlanToPlan) {
 }
 
 TEST(PlanningNode, StopsAndLooksAroundWhenTheForecastsStop) {
-  const auto plans = Fly(kStart + 5000000, kStart + 7000000, kStart + 12000000);
+  const auto plans = Fly(kStart + 5000000, kStart + 7000000, kStart + 30000000);
   ASSERT_FALSE(plans.empty());
   EXPECT_TRUE(plans.back().verdict == +plan_t::BRAKE || plans.back().verdict == +plan_t::WAIT);
   EXPECT_FALSE(plans.back().reason.empty());

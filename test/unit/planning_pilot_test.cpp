@@ -82,7 +82,18 @@ TEST(Pilot, ChasesFollowsAndHoversWhenTheTargetIsLost) {
   const Eigen::Vector3d r = Walking(flight.t).target.Position(flight.t) - flight.Body().p;
   EXPECT_GT(r.norm(), 1.5);
   EXPECT_LT(r.norm(), 3.6);
-  flight.Run(8.0, false);
+  flight.Run(4.0, false);
+  const double before = flight.Body().p.x();
+  bool looked = false;
+  for (const PlanResult& plan : flight.plans) {
+    if (plan.reason.find("target lost, to where it may be") != 0) continue;
+    looked = true;
+    EXPECT_EQ(plan.verdict, Verdict::kSafeOnly);
+    EXPECT_GE(plan.certified_clearance, 0.0);
+  }
+  EXPECT_TRUE(looked);
+  flight.Run(20.0, false);
+  EXPECT_GT(flight.Body().p.x(), before + 1.0) << "after it";
   EXPECT_EQ(flight.plans.back().verdict, Verdict::kWait);
   EXPECT_NE(flight.plans.back().reason.find("looking around"), std::string::npos);
   EXPECT_LT(flight.Body().v.norm(), 0.05);
