@@ -165,21 +165,19 @@ TEST(ControlNode, BrakesWhilePoseIsLost) {
 }
 
 TEST(ControlNode, GoesByTheUncertaintyNotByTheHealthAlone) {
-  const ControlConfig config;
-  const double astray = config.tracking_tube / config.sigmas / 0.4;  // m/s until a stop begins
-  const double landing = config.land_speed / config.sigmas;
-  const auto following = [](double sigma, double speed_sigma) {
+  const double landing = ControlConfig().land_speed;
+  const auto following = [](double sigma, double speed_sigma, int8_t health) {
     Bench bench;
     bench.SendPlan(kStart, {0, 0, 0});
     bench.SendPose(kStart);
-    for (int i = 1; i < 12; ++i)
-      bench.SendPose(kStart + 5000 * i, pose_t::HEALTH_DEGRADED, 0, sigma, speed_sigma);
+    for (int i = 1; i < 12; ++i) bench.SendPose(kStart + 5000 * i, health, 0, sigma, speed_sigma);
     return bench.tracking.back().following;
   };
-  // Where the body is in the world matters to no plan.
-  EXPECT_EQ(following(1.0, 0.99 * std::min(astray, landing)), +tracking_t::PLAN);
-  EXPECT_EQ(following(0.0, 0.5 * (astray + landing)), +tracking_t::BRAKE);
-  EXPECT_EQ(following(0.0, 1.01 * landing), +tracking_t::LAND);
+  // Where the body is in the world matters to no plan, and plans allow for a frame that drifts.
+  EXPECT_EQ(following(1.0, 0.99 * landing, pose_t::HEALTH_DEGRADED), +tracking_t::PLAN);
+  EXPECT_EQ(following(0.0, 0.5 * landing, pose_t::HEALTH_LOST), +tracking_t::BRAKE);
+  EXPECT_EQ(following(0.0, 1.01 * landing, pose_t::HEALTH_DEGRADED), +tracking_t::LAND);
+  EXPECT_EQ(following(0.0, 1.01 * landing, pose_t::HEALTH_LOST), +tracking_t::LAND);
 }
 
 TEST(ControlNode, FliesWhatIsCertifiedAgainstTheListThatItHeard) {

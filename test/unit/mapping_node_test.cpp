@@ -83,12 +83,16 @@ TEST(MappingNodeTest, EverySweepIsAnsweredAndTheMapOnceASecond) {
   ASSERT_EQ(bench.maps.size(), 3u);
   EXPECT_EQ(bench.lists[4].utime, kStart + 500'000);
   EXPECT_EQ(bench.lists[4].n_obstacles, static_cast<int32_t>(bench.lists[4].obstacles.size()));
-  EXPECT_GT(bench.lists[4].n_obstacles, 10);
+  int statics = 0, ground = 0;
   for (const auto& o : bench.lists[4].obstacles) {
-    EXPECT_EQ(o.kind, +obstacle_t::STATIC);
+    statics += o.kind == obstacle_t::STATIC;
+    ground += o.kind == obstacle_t::GROUND;
     EXPECT_EQ(o.center.n_coefficients, 3);
     EXPECT_EQ(o.center.utime, bench.lists[4].utime);
   }
+  EXPECT_GT(statics, 10);
+  EXPECT_GT(ground, 0);
+  EXPECT_EQ(statics + ground, bench.lists[4].n_obstacles);
   EXPECT_EQ(bench.maps[1].format, "bt");
   EXPECT_GT(bench.maps[1].n_occupied, 500);
   const std::string head(bench.maps[1].data.begin(), bench.maps[1].data.begin() + 22);
