@@ -22,7 +22,7 @@ constexpr double kMatch = 0.5;       // m, and two deviations, from a walker to 
 constexpr double kBar = 0.3;         // m/s, m and s: velocity error, extent, reversal
 constexpr double kGap = 0.2;         // s
 constexpr double kSweep = 0.1;       // s
-constexpr double kBeside = 1.0;      // m from the target's centre to the walker's
+constexpr double kBeside = 2.0;      // m from the target's centre to the walker's
 constexpr double kBlindRange = 0.5;  // m, of the sensor
 constexpr double kChange = 0.4;      // m/s, of a velocity that counts as a change of it
 constexpr double kChi2 = 5.99;       // 95 % quantile of chi-squared with two axes
@@ -201,8 +201,9 @@ void WalkerJudge::Follow(const Shot& shot, size_t k, int hits, const Obstacle* o
   }
   const double aside = (p - shot.true_target.center.head<2>()).norm();
   if (trace_ && judged) {
-    fmt::print("{:7.2f} walker {} {} at {:.2f} {:.2f} range {:.1f} hits {} beside {:.1f}", t, k + 1,
-               o ? "listed" : "MISSED", p.x(), p.y(), range, hits, aside);
+    fmt::print(
+        "{:7.2f} walker {} {} at {:.2f} {:.2f} range {:.1f} hits {} beside {:.1f} speed {:.2f}", t,
+        k + 1, o ? "listed" : "MISSED", p.x(), p.y(), range, hits, aside, truth.velocity.norm());
     if (o) {
       const Eigen::Vector3d dp = o->center.Position(t) - truth.solid.center,
                             v = o->center.Velocity(t);
@@ -219,7 +220,7 @@ void WalkerJudge::Follow(const Shot& shot, size_t k, int hits, const Obstacle* o
   const bool blind = range < kBlindRange + truth.solid.half_size.x() + 0.1;
   Step(t, usable && !in_view && blind, o != nullptr, w.was_listed, kBar, &w.blind);
   Step(t, usable && !in_view && !blind, o != nullptr, w.was_listed, kBar, &w.hidden);
-  Step(t, usable && aside < kBeside, o != nullptr, w.was_listed, 0.0, &w.beside);
+  Step(t, usable && aside < kBeside, o != nullptr, w.was_listed, 0.05, &w.beside);
   Close(&w.blind, "blind", kForgotten, &figures.blind);
   Close(&w.hidden, "hidden", kForgotten, &figures.hidden);
   Close(&w.beside, "beside", INFINITY, &figures.beside);

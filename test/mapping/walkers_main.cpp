@@ -61,7 +61,7 @@ void Print(const std::string& name, const WalkerFigures& f) {
   Print("reversal: error <= 0.3 m/s within 0.3 s", f.reversed);
   Print("reversal: nearer to the new velocity within 0.3 s", f.halved);
   Print("other change: error <= 0.3 m/s within 0.3 s", f.stopped);
-  Print("beside the target (1 m): no gap above 0.2 s", f.beside);
+  Print("beside the target (2 m): no gap above 0.2 s", f.beside);
   Print("out of view for less than 2 s: no gap above 0.2 s", f.hidden);
   Print("in the blind range for less than 2 s: no gap above 0.2 s", f.blind);
   Print("velocity within its published 95 %", f.velocity_honest);
