@@ -11,7 +11,7 @@ namespace {
 
 constexpr double kEnd = 0.05;       // m, standard deviation of a first reach to an end in view
 constexpr double kReshape = 0.02;   // m/sqrt(s), random walk of the outline
-constexpr double kCommon = 0.015;   // m, error of a sweep's pose, common to all reaches
+constexpr double kCommon = 0.02;    // m, error of a sweep's pose, common to all reaches
 constexpr double kOutlier = 0.12;   // m, a reach this far from what the others say: new outline
 constexpr double kShrink = 0.03;    // share of an end no longer seen that a sweep forgets
 constexpr double kDoubt = 0.05;     // m, by which a sweep doubts it before
@@ -47,11 +47,24 @@ BodyFilter::BodyFilter(const Eigen::Vector2d& center, const Reaches& seen, doubl
   }
 }
 
-void BodyFilter::Predict(double dt, double acceleration) {
+double Footprint::Excess(const Eigen::Vector2d& q, double age) const {
+  const Eigen::Vector2d d = q - p + age * v;
+  if (d.squaredNorm() > radius * radius) return INFINITY;
+  double most = -INFINITY;
+  for (int k = 0; k < kDirections; ++k) {
+    const auto i = static_cast<size_t>(k);
+    most = std::max(most, (Direction(k).dot(d) - reach[i]) / sigma[i]);
+  }
+  return most;
+}
+
+/// A change that was not confirmed by a sweep is one that may have been: same mean, its variance.
+void BodyFilter::Predict(double dt, const MotionNoise& noise) {
+  P_ += change_ * (Changed() - P_);
   x_.head<2>() += dt * x_.segment<2>(2);
   P_.topRows<2>() += dt * P_.middleRows<2>(2);
   P_.leftCols<2>() += dt * P_.middleCols<2>(2);
-  const double q = acceleration * acceleration;
+  const double q = noise.acceleration * noise.acceleration;
   for (int i = 0; i < 2; ++i) {
     P_(i, i) += 0.25 * q * std::pow(dt, 4);
     P_(i, i + 2) += 0.5 * q * std::pow(dt, 3);
@@ -59,6 +72,39 @@ void BodyFilter::Predict(double dt, double acceleration) {
     P_(i + 2, i + 2) += q * dt * dt;
   }
   P_.diagonal().tail<kDirections>().array() += kReshape * kReshape * dt;
+  change_ = 1.0 - std::exp(-noise.change_rate * dt);
+  change_speed_ = noise.change_speed;
+  change_time_ = dt;
+}
+
+/// The covariance if the velocity changed at some time of the last step, any as likely: of the
+/// place by the mean square of the time since then.
+BodyFilter::Covariance BodyFilter::Changed() const {
+  Covariance P = P_;
+  const double q = change_speed_ * change_speed_, t = change_time_;
+  for (int i = 0; i < 2; ++i) {
+    P(i, i) += q * t * t / 3.0;
+    P(i, i + 2) += q * t / 2.0;
+    P(i + 2, i) += q * t / 2.0;
+    P(i + 2, i + 2) += q;
+  }
+  return P;
+}
+
+Footprint BodyFilter::Expected(double sigma, double most) const {
+  Footprint f;
+  f.p = p();
+  f.v = v();
+  const Covariance P = Changed();
+  for (int k = 0; k < kDirections; ++k) {
+    const auto i = static_cast<size_t>(k);
+    const Row row = Model(k, 0.0);
+    f.reach[i] = x_[4 + k];
+    f.sigma[i] = std::min(most, std::sqrt(row.dot(P * row.transpose()) + sigma * sigma));
+    f.radius = std::max(f.radius, std::abs(f.reach[i]) + 4.0 * f.sigma[i]);
+  }
+  f.radius *= 1.1;  // corners between two directions
+  return f;
 }
 
 BodyFilter::Row BodyFilter::Model(int k, double age) {
@@ -131,6 +177,20 @@ void BodyFilter::Uncover(const Reaches& seen, double unseen) {
   }
 }
 
+/// Kalman update; returns the log likelihood of the innovations z but for a constant.
+double BodyFilter::Update(const Eigen::MatrixXd& model, const Eigen::VectorXd& z, double sigma,
+                          State* x, Covariance* P) const {
+  Eigen::MatrixXd S = model * *P * model.transpose();
+  S += kCommon * kCommon * model.leftCols<2>() * model.leftCols<2>().transpose();
+  S.diagonal().array() += sigma * sigma;
+  const Eigen::LLT<Eigen::MatrixXd> factors(S);
+  const Eigen::MatrixXd gain = factors.solve(model * *P).transpose();
+  *x += gain * z;
+  *P -= gain * S * gain.transpose();
+  const Eigen::MatrixXd L = factors.matrixL();
+  return -0.5 * z.dot(factors.solve(z)) - L.diagonal().array().log().sum();
+}
+
 Sight BodyFilter::Correct(const Reaches& seen, double sigma, double unseen) {
   std::array<double, kDirections> innovation{};
   for (int k = 0; k < kDirections; ++k) {
@@ -148,15 +208,19 @@ Sight BodyFilter::Correct(const Reaches& seen, double sigma, double unseen) {
     z[n++] = innovation[i];
   }
   if (n > 0) {
-    const auto model = H.topRows(n);
-    Eigen::MatrixXd S = model * P_ * model.transpose();
-    S += kCommon * kCommon * model.leftCols<2>() * model.leftCols<2>().transpose();
-    S.diagonal().array() += sigma * sigma;
-    const Eigen::MatrixXd gain = S.llt().solve(model * P_).transpose();
-    x_ += gain * z.head(n);
-    P_ -= gain * S * gain.transpose();
+    const Eigen::MatrixXd model = H.topRows(n);
+    State changed = x_;
+    Covariance P_changed = Changed();
+    const double on = Update(model, z.head(n), sigma, &x_, &P_);
+    const double off = Update(model, z.head(n), sigma, &changed, &P_changed);
+    const double odds = change_ / (1.0 - change_) * std::exp(std::clamp(off - on, -60.0, 60.0));
+    const double w = odds / (1.0 + odds);
+    const State apart = changed - x_;
+    x_ += w * apart;
+    P_ += w * (P_changed - P_) + w * (1.0 - w) * apart * apart.transpose();
     P_ = (0.5 * (P_ + P_.transpose())).eval();
   }
+  change_ = 0.0;
   Uncover(seen, unseen);
   return {n, rigid};
 }
@@ -206,6 +270,8 @@ double BodyFilter::CenterVariance() const {
   return 0.5 * sum;
 }
 
-double BodyFilter::VelocityVariance() const { return 0.5 * (P_(2, 2) + P_(3, 3)); }
+double BodyFilter::VelocityVariance() const {
+  return 0.5 * (P_(2, 2) + P_(3, 3)) + change_ * change_speed_ * change_speed_;
+}
 
 }  // namespace chase::mapping

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "services/mapping/forecast.h"
 #include "services/mapping/ground_slabs.h"
 
 namespace chase::mapping {
@@ -105,22 +106,25 @@ void Mapper::Prepare(const Sweep& sweep) {
     if (r.label == Label::kStatic && ground_.IsGround(r.p)) r.label = Label::kGround;
 }
 
-/// Returns near the target are its own, unless a settled cell outside its core explains them.
-void Mapper::MarkTarget() {
+/// Returns near the target are its own, unless a settled cell outside its core explains them, or a
+/// mover does better: the zone reaches as many deviations from the target as a mover's gate.
+void Mapper::MarkTarget(const std::vector<Footprint>& movers) {
   if (!zone_.active()) return;
+  const double sigma = (zone_.outer() - zone_.keep_out()) / config_.movers.gate;
+  double excess = 0.0;
   for (auto& r : returns_) {
     if (r.label != Label::kStatic || !zone_.Holds(r.p)) continue;
     const Voxel* voxel = grid_.At(r.key);
     const bool settled = voxel && voxel->occupied && voxel->hits > kSettledHits;
     const double distance = (r.p.head<2>().cast<double>() - zone_.center()).norm();
-    if (!settled || distance < zone_.core()) r.label = Label::kTarget;
+    if (settled && distance >= zone_.core()) continue;
+    if (NearestBody(movers, r, (distance - zone_.keep_out()) / sigma, &excess) < 0)
+      r.label = Label::kTarget;
   }
 }
 
-void Mapper::TrackMovers(const Eigen::Vector3d& origin, double t) {
-  tracker_.Predict(t);
-  if (zone_.active()) tracker_.Forget(zone_.center(), zone_.outer());
-  auto clusters = detector_.Detect(origin, returns_, &grid_, tracker_.Expected());
+void Mapper::TrackMovers(const Eigen::Vector3d& origin, const std::vector<Footprint>& expected) {
+  auto clusters = detector_.Detect(origin, returns_, &grid_, expected);
   tracker_.Update(detector_.panorama(), &clusters);
   for (const auto& cluster : clusters) {
     if (!tracker_.Moves(cluster.track)) continue;
@@ -136,7 +140,7 @@ void Mapper::ClearGhosts(double t) {
     integrator_.ClearDisc(zone_.center(), zone_.core(), bottom, zone_.top(), 255, true);
   }
   for (const auto& track : tracker_.tracks()) {
-    if (!track.confirmed) continue;
+    if (!track.confirmed || !tracker_.Moves(track.id)) continue;
     const double radius = track.reach + kGhostMargin;
     const double bottom = track.z - 5.0, top = track.z + 5.0;
     const auto clear = [&](const Eigen::Vector2d& place) {
@@ -258,6 +262,21 @@ std::vector<world::Obstacle> Mapper::Statics(const Eigen::Vector3d& origin, doub
   return obstacles;
 }
 
+/// Nothing walks through what stands: a mover's forecast ends where its front meets it.
+void Mapper::StopAtWalls(world::Obstacle* mover) {
+  const Eigen::Vector2d p = mover->center.coefficients.row(0).head<2>();
+  const Eigen::Vector2d way = mover->center.coefficients.row(1).head<2>();
+  const double length = way.norm();
+  if (!(length > 0.0)) return;
+  const Eigen::Vector2d d = way / length;
+  const Eigen::Matrix2d outline = mover->shape.topLeftCorner<2, 2>().inverse();
+  const double front = std::sqrt(d.dot(outline * d));
+  const double ground = ground_.Height(p.x(), p.y());
+  StopAfter(FreeWay(p + front * d, d, length, ground + config_.statics.band_low,
+                    ground + config_.statics.band_high, &grid_),
+            mover);
+}
+
 ObstacleList Mapper::Insert(const Sweep& sweep) {
   ObstacleList list;
   if (!(sweep.origin.cwiseAbs().maxCoeff() < kMostCoordinate)) return list;
@@ -265,8 +284,11 @@ ObstacleList Mapper::Insert(const Sweep& sweep) {
   grid_.MoveTo(sweep.origin);
   zone_.MoveTo(sweep.t);
   Prepare(sweep);
-  MarkTarget();
-  TrackMovers(sweep.origin, sweep.t);
+  tracker_.Predict(sweep.t);
+  if (zone_.active()) tracker_.Forget(zone_.center(), zone_.keep_out(), zone_.outer());
+  const auto expected = tracker_.Expected();
+  MarkTarget(expected);
+  TrackMovers(sweep.origin, expected);
   integrator_.Insert(sweep.origin, returns_);
   ClearGhosts(sweep.t);
   t_ = sweep.t;
@@ -278,6 +300,7 @@ ObstacleList Mapper::Insert(const Sweep& sweep) {
   for (auto& o : tracker_.Obstacles(middle, c.semi_height, 1.02)) {
     if (PlanDistance(o, sweep.origin) > config_.grid.range) continue;
     ++list.n_moving;
+    StopAtWalls(&o);
     list.obstacles.push_back(std::move(o));
   }
   list.n_cut = KeepNearest(sweep.origin, config_.max_obstacles, &list.obstacles);

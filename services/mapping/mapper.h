@@ -55,14 +55,15 @@ class Mapper {
  private:
   void Prepare(const Sweep& sweep);
   bool Shorten(const Eigen::Vector3d& origin, Eigen::Vector3d* end) const;
-  void MarkTarget();
-  void TrackMovers(const Eigen::Vector3d& origin, double t);
+  void MarkTarget(const std::vector<Footprint>& movers);
+  void TrackMovers(const Eigen::Vector3d& origin, const std::vector<Footprint>& expected);
   void ClearGhosts(double t);
   bool Closed(const VoxelGrid::Column* column, const Eigen::Vector2d& center,
               const Eigen::Vector3d& origin) const;
   std::vector<Cell> OccupiedColumns(const Eigen::Vector3d& origin, std::set<int>* partial);
   bool ColumnExtent(const VoxelGrid::Column& column, Extent* extent);
   std::vector<world::Obstacle> Statics(const Eigen::Vector3d& origin, double t, int* dropped);
+  void StopAtWalls(world::Obstacle* mover);
   void SetTree(int most);
 
   MappingConfig config_;

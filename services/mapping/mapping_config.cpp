@@ -69,10 +69,10 @@ std::string MoverConfig::Problem() const {
                 Within("confirm_sweeps", confirm_sweeps, 1, 100),
                 Within("confirm_distance", confirm_distance, 0.0, 10.0),
                 Within("confirm_speed", confirm_speed, 0.0, 10.0),
-                Within("coast_listed", coast_listed, 0.0, 10.0), Within("coast", coast, 0.0, 10.0),
-                Within("coast_hidden", coast_hidden, coast, 20.0),
-                Within("sweep_time", sweep_time, 0.0, 1.0), Within("settle", settle, 0.1, 60.0),
-                Within("horizon", horizon, 0.1, 60.0)});
+                Within("change_rate", change_rate, 0.0, 10.0),
+                Within("change_speed", change_speed, 0.0, 10.0),
+                Within("lifetime", lifetime, 0.1, 60.0), Within("sweep_time", sweep_time, 0.0, 1.0),
+                Within("settle", settle, 0.1, 60.0), Within("horizon", horizon, 0.1, 60.0)});
 }
 
 std::string TargetConfig::Problem() const {

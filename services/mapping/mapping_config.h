@@ -72,18 +72,18 @@ struct StaticConfig {
 
 /// Detection and tracking of what moves.
 struct MoverConfig {
-  int min_points = 8;         ///< returns of a cluster
-  double cluster_cell = 0.4;  ///< clusters are connected in cells of this edge, m
-  double max_size = 6.0;      ///< larger clusters are no movers, m
+  int min_points = 8;          ///< returns of a cluster
+  double cluster_cell = 0.25;  ///< clusters are connected in cells of this edge, m
+  double max_size = 6.0;       ///< larger clusters are no movers, m
   double gate = 4.0;  ///< of the innovation, standard deviations; narrower for uncertain tracks
-  double acceleration = 0.8;      ///< process noise, m/s^2
+  double acceleration = 0.4;      ///< process noise, m/s^2
+  double change_rate = 0.2;       ///< sudden changes of velocity, 1/s
+  double change_speed = 1.0;      ///< standard deviation of such a change, per axis, m/s
   double measurement = 0.04;      ///< standard deviation of where an end is seen, m
-  int confirm_sweeps = 3;         ///< detections in a row before a track may be listed
+  int confirm_sweeps = 4;         ///< detections in a row before a track may be listed
   double confirm_distance = 0.3;  ///< net travel before a track may be listed, m
-  double confirm_speed = 0.4;     ///< speed before a track may be listed, m/s
-  double coast_listed = 0.6;      ///< unseen tracks stay listed for this, s
-  double coast = 2.0;             ///< unseen tracks keep their id for this, s
-  double coast_hidden = 4.0;      ///< the same while something hides their place, s
+  double confirm_speed = 0.3;     ///< speed before a track may be listed, m/s
+  double lifetime = 4.0;          ///< mean time that what is out of sight still counts, s
   double settle = 2.0;            ///< what does not move for this becomes static, s
   double horizon = 3.0;           ///< length of the centre polynomials, s
   double sweep_time = 0.1;        ///< that the scanner takes for a turn, s; 0: sees all at once
@@ -95,13 +95,13 @@ struct MoverConfig {
     v("max_size", max_size, "larger clusters are no movers, m");
     v("gate", gate, "of the innovation, standard deviations; narrower for uncertain tracks");
     v("acceleration", acceleration, "process noise, m/s^2");
+    v("change_rate", change_rate, "sudden changes of velocity, 1/s");
+    v("change_speed", change_speed, "standard deviation of such a change, per axis, m/s");
     v("measurement", measurement, "standard deviation of where an end is seen, m");
     v("confirm_sweeps", confirm_sweeps, "detections in a row before a track may be listed");
     v("confirm_distance", confirm_distance, "net travel before a track may be listed, m");
     v("confirm_speed", confirm_speed, "speed before a track may be listed, m/s");
-    v("coast_listed", coast_listed, "unseen tracks stay listed for this, s");
-    v("coast", coast, "unseen tracks keep their id for this, s");
-    v("coast_hidden", coast_hidden, "the same while something hides their place, s");
+    v("lifetime", lifetime, "mean time that what is out of sight still counts, s");
     v("settle", settle, "what does not move for this becomes static, s");
     v("horizon", horizon, "length of the centre polynomials, s");
     v("sweep_time", sweep_time, "that the scanner takes for a turn, s; 0: sees all at once");

@@ -18,12 +18,27 @@ int64_t Code(int x, int y) {
   return (static_cast<int64_t>(x) << 32) + (static_cast<int64_t>(y) + (1LL << 31));
 }
 
-bool Inside(const std::vector<Ellipse>& outlines, const Eigen::Vector2d& p) {
-  return std::any_of(outlines.begin(), outlines.end(),
-                     [&](const Ellipse& e) { return e.Level(p) <= 1.0; });
+/// A column of the sorted list, or one next to it.
+bool Beside(const std::vector<int64_t>& columns, const Key& key) {
+  for (int dx = -1; dx <= 1; ++dx) {
+    const auto it = std::lower_bound(columns.begin(), columns.end(), Code(key.x + dx, key.y - 1));
+    if (it != columns.end() && *it <= Code(key.x + dx, key.y + 1)) return true;
+  }
+  return false;
 }
 
 }  // namespace
+
+int NearestBody(const std::vector<Footprint>& bodies, const Return& r, double gate,
+                double* excess) {
+  int best = -1;
+  *excess = gate;
+  for (size_t i = 0; i < bodies.size(); ++i) {
+    const double e = bodies[i].Excess(r.p.head<2>().cast<double>(), r.age);
+    if (e < *excess) *excess = e, best = static_cast<int>(i);
+  }
+  return best;
+}
 
 /// Long free, and so are the cells around: noise of a surface nearby never looks like motion.
 bool MotionDetector::InEverFree(const Key& key, VoxelGrid* grid) const {
@@ -39,44 +54,58 @@ bool MotionDetector::InEverFree(const Key& key, VoxelGrid* grid) const {
   return true;
 }
 
+/// Feet that touch cells of the ground belong to what stands in free space above them.
 std::vector<MotionDetector::Candidate> MotionDetector::Candidates(
     const std::vector<Return>& returns, VoxelGrid* grid,
-    const std::vector<Ellipse>& expected) const {
+    const std::vector<Footprint>& expected) const {
   std::vector<Candidate> candidates;
+  std::vector<int> doubtful;     // in occupied cells that are not settled
+  std::vector<int64_t> columns;  // with a return in ever-free space
+  const auto add = [&](int i, bool strong, int body) {
+    const Eigen::Vector3f& p = returns[static_cast<size_t>(i)].p;
+    const double cell = config_.cluster_cell;
+    candidates.push_back({Code(Floor(p.x() / cell), Floor(p.y() / cell)), i, strong, body});
+  };
+  double excess = 0.0;
   for (size_t i = 0; i < returns.size(); ++i) {
     const Return& r = returns[i];
     if (r.label != Label::kStatic) continue;
     const Voxel* voxel = grid->At(r.key);
-    const Eigen::Vector2d p = r.p.head<2>().cast<double>();
-    const bool awaited = !expected.empty() && Inside(expected, p);
-    const bool doubted =
-        voxel && (voxel->free_sweeps >= ever_free_ || (awaited && voxel->hits < kSettledHits));
-    if (voxel && voxel->occupied && !doubted) continue;
+    const int body = NearestBody(expected, r, config_.gate, &excess);
+    const bool settled = voxel && voxel->hits >= kSettledHits;
+    if (voxel && voxel->occupied && voxel->free_sweeps < ever_free_ && (settled || body < 0)) {
+      if (!settled) doubtful.push_back(static_cast<int>(i));
+      continue;
+    }
     const bool strong = InEverFree(r.key, grid);
-    candidates.push_back(
-        {Code(Floor(p.x() / config_.cluster_cell), Floor(p.y() / config_.cluster_cell)),
-         static_cast<int>(i), strong, strong || awaited});
+    add(static_cast<int>(i), strong, body);
+    if (strong) columns.push_back(Code(r.key.x, r.key.y));
   }
+  std::sort(columns.begin(), columns.end());
+  for (const int i : doubtful)
+    if (Beside(columns, returns[static_cast<size_t>(i)].key)) add(i, false, -1);
   std::sort(candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) {
     return a.cell != b.cell ? a.cell < b.cell : a.index < b.index;
   });
   return candidates;
 }
 
-std::vector<Cluster> MotionDetector::Connected(const std::vector<Candidate>& candidates) const {
+/// The connected parts of what is `body`'s, or of what no expected mover explains (-1). Of an
+/// expected one half of the returns do that a new one takes.
+std::vector<Cluster> MotionDetector::Connected(const std::vector<Candidate>& candidates,
+                                               int body) const {
   struct Bin {
     int64_t cell;
-    size_t first, last;
-    int strong, seeds;
+    std::vector<int> members;
+    int strong;
     bool taken;
   };
   std::vector<Bin> bins;
-  for (size_t i = 0; i < candidates.size(); ++i) {
-    if (bins.empty() || bins.back().cell != candidates[i].cell)
-      bins.push_back({candidates[i].cell, i, i, 0, 0, false});
-    bins.back().last = i + 1;
-    bins.back().strong += candidates[i].strong;
-    bins.back().seeds += candidates[i].seed;
+  for (const auto& c : candidates) {
+    if (c.body != body) continue;
+    if (bins.empty() || bins.back().cell != c.cell) bins.push_back({c.cell, {}, 0, false});
+    bins.back().members.push_back(c.index);
+    bins.back().strong += c.strong || body >= 0;
   }
   const auto find = [&](int64_t cell) {
     const auto it = std::lower_bound(bins.begin(), bins.end(), cell,
@@ -85,31 +114,66 @@ std::vector<Cluster> MotionDetector::Connected(const std::vector<Candidate>& can
   };
   std::vector<Cluster> clusters;
   for (auto& start : bins) {
-    if (start.taken || start.seeds == 0) continue;
+    if (start.taken || start.strong == 0) continue;
     start.taken = true;
     std::vector<Bin*> front{&start};
     Cluster cluster;
-    int seeds = 0;
+    int strong = 0;
     for (size_t head = 0; head < front.size(); ++head) {
-      seeds += front[head]->seeds;
-      for (size_t i = front[head]->first; i < front[head]->last; ++i)
-        cluster.members.push_back(candidates[i].index);
-      if (front[head]->seeds == 0) continue;  // the rim grows no further
+      const Bin& at = *front[head];
+      strong += at.strong;
+      cluster.members.insert(cluster.members.end(), at.members.begin(), at.members.end());
+      if (at.strong == 0) continue;  // the rim grows no further
       for (int dx = -1; dx <= 1; ++dx)
         for (int dy = -1; dy <= 1; ++dy) {
-          Bin* bin = find(front[head]->cell + (static_cast<int64_t>(dx) << 32) + dy);
+          Bin* bin = find(at.cell + (static_cast<int64_t>(dx) << 32) + dy);
           if (!bin || bin->taken) continue;
-          // What merely lies beside a place where a mover is expected is not its own.
-          if (front[head]->strong == 0 && bin->seeds == 0) continue;
           bin->taken = true;
           front.push_back(bin);
         }
     }
     const auto size = static_cast<int>(cluster.members.size());
-    if (size >= config_.min_points && seeds >= kFewestSeeds * size)
+    if ((body >= 0 ? 2 : 1) * size >= config_.min_points && strong >= kFewestSeeds * size)
       clusters.push_back(std::move(cluster));
   }
   return clusters;
+}
+
+std::vector<int> MotionDetector::Look(const Eigen::Vector3d& origin,
+                                      const std::vector<Return>& returns,
+                                      const std::vector<Cluster>& clusters) {
+  std::vector<int> owner(returns.size(), -1);
+  for (size_t c = 0; c < clusters.size(); ++c)
+    for (const int i : clusters[c].members) owner[static_cast<size_t>(i)] = static_cast<int>(c);
+  panorama_.Take(origin, returns, owner);
+  return owner;
+}
+
+/// Parts of one expected mover belong together where something hides what is between them;
+/// otherwise the largest is it, and the others are by themselves. True if any were joined.
+bool MotionDetector::Join(const std::vector<Return>& returns,
+                          std::vector<Cluster>* clusters) const {
+  const auto middle = [&](const Cluster& cluster) {
+    Eigen::Vector2f sum = Eigen::Vector2f::Zero();
+    for (const int i : cluster.members) sum += returns[static_cast<size_t>(i)].p.head<2>();
+    return Eigen::Vector2d((sum / static_cast<float>(cluster.members.size())).cast<double>());
+  };
+  bool joined = false;
+  for (size_t i = 0; i < clusters->size(); ++i)
+    for (size_t j = 0; j < clusters->size(); ++j) {
+      Cluster &whole = (*clusters)[i], &part = (*clusters)[j];
+      if (i == j || whole.track < 0 || whole.track != part.track) continue;
+      if (whole.members.size() < part.members.size()) continue;
+      part.track = -1;
+      const Eigen::Vector2d between = 0.5 * (middle(whole) + middle(part));
+      if (!panorama_.Hides(between, static_cast<int>(i)) ||
+          !panorama_.Hides(between, static_cast<int>(j)))
+        continue;
+      whole.members.insert(whole.members.end(), part.members.begin(), part.members.end());
+      part.members.clear();
+      joined = true;
+    }
+  return joined;
 }
 
 /// An end beside which there are returns of something else may belong to more than was found.
@@ -182,15 +246,19 @@ bool MotionDetector::Finish(const std::vector<Return>& returns, const std::vecto
 
 std::vector<Cluster> MotionDetector::Detect(const Eigen::Vector3d& origin,
                                             const std::vector<Return>& returns, VoxelGrid* grid,
-                                            const std::vector<Ellipse>& expected) {
-  auto clusters = Connected(Candidates(returns, grid, expected));
-  std::vector<int> owner(returns.size(), -1);
-  for (size_t c = 0; c < clusters.size(); ++c)
-    for (const int i : clusters[c].members) owner[static_cast<size_t>(i)] = static_cast<int>(c);
-  panorama_.Take(origin, returns, owner);
+                                            const std::vector<Footprint>& expected) {
+  const auto candidates = Candidates(returns, grid, expected);
+  std::vector<Cluster> clusters;
+  for (int body = -1; body < static_cast<int>(expected.size()); ++body)
+    for (auto& cluster : Connected(candidates, body)) {
+      if (body >= 0) cluster.track = expected[static_cast<size_t>(body)].track;
+      clusters.push_back(std::move(cluster));
+    }
+  auto owner = Look(origin, returns, clusters);
+  if (Join(returns, &clusters)) owner = Look(origin, returns, clusters);
   std::vector<Cluster> finished;
   for (size_t c = 0; c < clusters.size(); ++c)
-    if (Finish(returns, owner, static_cast<int>(c), &clusters[c]))
+    if (!clusters[c].members.empty() && Finish(returns, owner, static_cast<int>(c), &clusters[c]))
       finished.push_back(std::move(clusters[c]));
   return finished;
 }

@@ -18,16 +18,21 @@ struct Cluster {
   int track = -1;                                    ///< id of the track that it belongs to
 };
 
+/// Index of the body whose outline a return exceeds least, by at most `gate` deviations, or -1;
+/// `excess`: by how many.
+int NearestBody(const std::vector<Footprint>& bodies, const Return& r, double gate, double* excess);
+
 /// Finds returns where space has long been free, and what hangs together with them.
 class MotionDetector {
  public:
   MotionDetector(const MoverConfig& movers, const GridConfig& grid)
       : config_(movers), ever_free_(grid.ever_free_sweeps), range_(grid.range) {}
 
-  /// Looks at returns labelled kStatic, seen from `origin`. `expected`: outlines where movers
-  /// should be now; returns there count as moving unless a settled cell holds them.
+  /// Looks at returns labelled kStatic, seen from `origin`. `expected`: where movers should be now;
+  /// returns there count as moving unless a settled cell holds them, and are divided among these
+  /// movers by likelihood. The others are clusters by their connection.
   std::vector<Cluster> Detect(const Eigen::Vector3d& origin, const std::vector<Return>& returns,
-                              VoxelGrid* grid, const std::vector<Ellipse>& expected);
+                              VoxelGrid* grid, const std::vector<Footprint>& expected);
   /// What hid what in that sweep.
   const Panorama& panorama() const { return panorama_; }
 
@@ -36,12 +41,15 @@ class MotionDetector {
     int64_t cell;  ///< code of its cluster cell in plan
     int index;     ///< into the returns
     bool strong;   ///< lies in ever-free space
-    bool seed;     ///< does, or where a mover is expected
+    int body;      ///< index of the expected mover whose it is, or -1
   };
   std::vector<Candidate> Candidates(const std::vector<Return>& returns, VoxelGrid* grid,
-                                    const std::vector<Ellipse>& expected) const;
+                                    const std::vector<Footprint>& expected) const;
   bool InEverFree(const Key& key, VoxelGrid* grid) const;
-  std::vector<Cluster> Connected(const std::vector<Candidate>& candidates) const;
+  std::vector<Cluster> Connected(const std::vector<Candidate>& candidates, int body) const;
+  std::vector<int> Look(const Eigen::Vector3d& origin, const std::vector<Return>& returns,
+                        const std::vector<Cluster>& clusters);
+  bool Join(const std::vector<Return>& returns, std::vector<Cluster>* clusters) const;
   bool Finish(const std::vector<Return>& returns, const std::vector<int>& owner, int self,
               Cluster* cluster) const;
   static void Touch(const std::vector<Return>& returns, const std::vector<int>& owner, int self,

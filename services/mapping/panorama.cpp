@@ -25,13 +25,14 @@ double Diamond(double x, double y) {
 void Panorama::Take(const Eigen::Vector3d& origin, const std::vector<Return>& returns,
                     const std::vector<int>& owner) {
   origin_ = origin.head<2>();
-  bins_.assign(kBins, {INFINITY, INFINITY, kNobody});
+  bins_.assign(kBins, {INFINITY, INFINITY, 0.0f, kNobody});
   for (size_t i = 0; i < returns.size(); ++i) {
     const Return& r = returns[i];
-    if (r.label == Label::kGround || r.label == Label::kFar) continue;
     const Eigen::Vector2d d = r.p.head<2>().cast<double>() - origin_;
     const auto range = static_cast<float>(d.norm());
     Bin& bin = bins_[static_cast<size_t>(0.25 * kBins * Diamond(d.x(), d.y())) % kBins];
+    bin.farthest = std::max(bin.farthest, range);
+    if (r.label == Label::kGround || r.label == Label::kFar) continue;
     if (range < bin.first) {
       if (bin.owner != owner[i]) bin.second = bin.first;
       bin.first = range;
@@ -42,19 +43,33 @@ void Panorama::Take(const Eigen::Vector3d& origin, const std::vector<Return>& re
   }
 }
 
+template <class Check>
+bool Panorama::Any(const Eigen::Vector2d& d, Check check) const {
+  const int middle = static_cast<int>(0.25 * kBins * Diamond(d.x(), d.y()));
+  const int reach =
+      std::clamp(static_cast<int>(std::ceil(0.25 * kBins * std::max(kStep, kBeside / d.norm()))), 1,
+                 kBins / 8);
+  for (int b = middle - reach; b <= middle + reach; ++b)
+    if (check(bins_[static_cast<size_t>((b + kBins) % kBins)])) return true;
+  return false;
+}
+
 bool Panorama::Hides(const Eigen::Vector2d& p, int owner) const {
   const Eigen::Vector2d d = p - origin_;
   const double range = d.norm();
   if (bins_.empty() || !(range > 0.0)) return false;
-  const int middle = static_cast<int>(0.25 * kBins * Diamond(d.x(), d.y()));
-  const int reach = std::clamp(
-      static_cast<int>(std::ceil(0.25 * kBins * std::max(kStep, kBeside / range))), 1, kBins / 8);
-  for (int b = middle - reach; b <= middle + reach; ++b) {
-    const Bin& bin = bins_[static_cast<size_t>((b + kBins) % kBins)];
-    const float nearest = bin.owner == owner ? bin.second : bin.first;
-    if (nearest < range - kInFront) return true;
-  }
-  return false;
+  return Any(d, [&](const Bin& bin) {
+    return (bin.owner == owner ? bin.second : bin.first) < range - kInFront;
+  });
+}
+
+bool Panorama::Sees(const Eigen::Vector2d& p) const {
+  const Eigen::Vector2d d = p - origin_;
+  const double range = d.norm();
+  if (bins_.empty()) return true;
+  if (!(range > 0.0)) return false;
+  return !Any(d, [&](const Bin& bin) { return bin.first < range - kInFront; }) &&
+         Any(d, [&](const Bin& bin) { return bin.farthest > range; });
 }
 
 }  // namespace chase::mapping

@@ -16,14 +16,22 @@ class Panorama {
             const std::vector<int>& owner);
   /// True where something that is not `owner`'s stands in front of p, or beside the ray to it.
   bool Hides(const Eigen::Vector2d& p, int owner) const;
+  /// True where rays went through p, or passed beside it: what is there would have been seen.
+  /// Before the first sweep everywhere.
+  bool Sees(const Eigen::Vector2d& p) const;
   const Eigen::Vector2d& origin() const { return origin_; }
 
  private:
   static constexpr int kBins = 1024;
   struct Bin {
     float first, second;  ///< m, of the nearest return and of the nearest of another owner
+    float farthest;       ///< m, of all returns, the ground's and those out of range too
     int owner;            ///< of the first
   };
+  /// Whether `check` holds for a bin in the direction d or so near to it that it matters.
+  template <class Check>
+  bool Any(const Eigen::Vector2d& d, Check check) const;
+
   Eigen::Vector2d origin_ = Eigen::Vector2d::Zero();
   std::vector<Bin> bins_;
 };

@@ -3,28 +3,31 @@
 #include <algorithm>
 #include <cmath>
 
-#include "services/mapping/assignment.h"
+#include "common/track/association.h"
 
 namespace chase::mapping {
 
 namespace {
 
-constexpr double kThinnest = 0.1;       // m, half width of a mover at least
-constexpr double kFirstSpeed = 2.5;     // m/s, standard deviation of an unknown velocity
-constexpr double kUnseen = 0.5;         // m, standard deviation of an end out of sight
-constexpr double kTentativeGap = 0.25;  // s that an unconfirmed track may go unseen
-constexpr double kTentativeAge = 0.8;   // s after which an unconfirmed track does not count
-constexpr double kRestSpeed = 0.25;     // m/s
-constexpr double kSure = 3.0;           // standard deviations of a speed that is one
-constexpr double kLeastSpread = 0.12;   // m, of a reach when clusters are assigned
-constexpr double kExpected = 1.1;       // factor of the outline within which returns are expected
-constexpr int kFewestEnds = 3;          // directions with an end in view that tell of a body
-constexpr double kRigid = 0.5;          // share of ends in view that move as those of one body
-constexpr double kOverlap = 0.8;        // of the gate, the most that overlapping clusters cost
-constexpr double kSameSpeed = 0.5;      // m/s, difference of two tracks of one body
-constexpr double kNear = 1.2;           // factor of the outline within which its parts lie
-constexpr double kAwaited = 0.35;       // s unseen for which its place counts as expected
-constexpr double kLost = 0.3;           // s in full view of its place after which it is not listed
+constexpr double kThinnest = 0.1;    // m, half width of a mover at least
+constexpr double kFirstSpeed = 2.5;  // m/s, standard deviation of an unknown velocity
+constexpr double kUnseen = 0.5;      // m, standard deviation of an end out of sight
+constexpr double kReach = 0.125;     // m, the same where returns are divided: four are in the gate
+constexpr double kTentativeAge = 0.8;  // s after which an unconfirmed track does not count
+constexpr double kRestSpeed = 0.25;    // m/s
+constexpr double kSure = 2.5;          // standard deviations of a speed that is one
+constexpr double kLeastSpread = 0.12;  // m, of a reach when clusters are assigned
+constexpr int kFewestEnds = 3;         // directions with an end in view that tell of a body
+constexpr double kRigid = 0.5;         // share of ends in view that move as those of one body
+constexpr double kSameSpeed = 0.5;     // m/s, difference of two tracks of one body
+constexpr double kDetected = 0.9;      // probability of a detection of what is in full view
+constexpr double kClutter = 0.005;  // 1/m^2 new clusters a sweep: five in the 18 m around the drone
+constexpr double kOwn = 20.0;       // likelihood ratio of what lies within a track's outline
+constexpr double kVague = 0.2;      // of returns there that show too few ends of a body
+constexpr double kBorn = 0.5;       // existence of a new track
+constexpr double kListed = 0.5;     // from which a track is listed
+constexpr double kDead = 0.25;      // below which a track ends
+constexpr double kLeast = 0.2;      // probability of an assignment
 constexpr size_t kMostTracks = 64;
 
 void Shape(Track* track) {
@@ -40,58 +43,54 @@ void Shape(Track* track) {
 void Tracker::Predict(double t) {
   const double dt = std::clamp(t - t_, 0.0, 1.0);
   t_ = t;
-  for (auto& track : tracks_) track.body.Predict(dt, config_.acceleration);
-}
-
-std::vector<Ellipse> Tracker::Expected() const {
-  std::vector<Ellipse> outlines;
-  for (const auto& track : tracks_)
-    if (track.confirmed && t_ - track.seen < kAwaited)
-      outlines.push_back(track.Outline().Scaled(kExpected));
-  return outlines;
-}
-
-/// Parts of one mover that something in front of it separates belong together.
-void Tracker::Join(std::vector<Cluster>* clusters) const {
-  for (const auto& track : tracks_) {
-    if (!track.confirmed) continue;
-    const Ellipse outline = track.Outline().Scaled(kNear);
-    Cluster* first = nullptr;
-    for (auto& cluster : *clusters) {
-      if (cluster.members.empty() || outline.Level(cluster.center.head<2>()) > 1.0) continue;
-      if (!first) {
-        first = &cluster;
-        continue;
-      }
-      first->members.insert(first->members.end(), cluster.members.begin(), cluster.members.end());
-      for (size_t k = 0; k < kDirections; ++k)
-        if (cluster.reaches[k].along > first->reaches[k].along)
-          first->reaches[k] = cluster.reaches[k];
-      cluster.members.clear();
-    }
+  for (auto& track : tracks_) {
+    track.body.Predict(dt, {config_.acceleration, config_.change_rate, config_.change_speed});
+    track.existence = track::Survival(track.existence, dt, config_.lifetime);
   }
-  clusters->erase(std::remove_if(clusters->begin(), clusters->end(),
-                                 [](const Cluster& c) { return c.members.empty(); }),
-                  clusters->end());
 }
 
-/// How unlikely they are to belong together (BodyFilter::Distance); infinite for what cannot. What
-/// overlaps may always: its other ends may have come into view.
-double Tracker::Cost(const Track& track, const Cluster& cluster) const {
+std::vector<Footprint> Tracker::Expected() const {
+  std::vector<Footprint> bodies;
+  for (const auto& track : tracks_) {
+    if (!track.confirmed || Rests(track)) continue;
+    Footprint body = track.body.Expected(config_.measurement, kReach);
+    if (*std::min_element(body.sigma.begin(), body.sigma.end()) >= kReach) continue;
+    body.track = track.id;
+    bodies.push_back(body);
+  }
+  return bodies;
+}
+
+/// How much likelier the cluster is if it is this track's. The ends in view tell of the two
+/// coordinates of a place (BodyFilter::Distance, twice the mean over the ends). What overlaps may
+/// always be the track's: its other ends may have come into view.
+double Tracker::Ratio(const Track& track, const Cluster& cluster) const {
   const Eigen::Vector2d c = cluster.center.head<2>();
   const double far = 2.0 * track.reach + config_.gate * kLeastSpread +
                      0.1 * config_.gate * std::sqrt(track.body.VelocityVariance());
-  if ((c - track.body.p()).norm() > far) return INFINITY;
+  const bool own = cluster.track == track.id;
+  if (!own && (c - track.body.p()).norm() > far) return 0.0;
+  const double inside = track.confirmed && track.Outline().Level(c) < 1.0 ? kOwn : 0.0;
   const double cost = track.body.Distance(cluster.reaches, config_.measurement, kLeastSpread);
-  const double overlap = track.Outline().Level(c);
-  const double most = kOverlap * config_.gate * config_.gate;
-  if (cost < 0.0) return std::min(1.0, overlap) * most;
-  return track.confirmed && overlap < 1.0 ? std::min(cost, most) : cost;
+  if (cost < 0.0) return own || inside > 0.0 ? kVague : 0.0;
+  const double density = std::exp(-cost) / (2.0 * M_PI * kLeastSpread * kLeastSpread);
+  const double ratio = cost < config_.gate * config_.gate ? density / kClutter : 0.0;
+  return std::max(ratio, own ? kOwn : inside);
+}
+
+/// Probability of a detection, from what is in view of the place and its likely width.
+double Tracker::Detection(const Track& track, const Panorama& panorama) const {
+  const Eigen::Vector2d c = track.Outline().center;
+  Eigen::Vector2d across(panorama.origin().y() - c.y(), c.x() - panorama.origin().x());
+  across *= std::max(0.7 * track.reach, std::sqrt(track.body.CenterVariance())) /
+            std::max(1e-6, across.norm());
+  double seen = 0.0;
+  for (const double side : {-1.0, 0.0, 1.0}) seen += panorama.Sees(c + side * across) / 3.0;
+  return kDetected * seen * seen;
 }
 
 void Tracker::Correct(const Cluster& cluster, Track* track) const {
   const Sight sight = track->body.Correct(cluster.reaches, config_.measurement, kUnseen);
-  track->sought = t_;
   if (sight.ends < kFewestEnds) return Shape(track);  // may be anything that stands there
   track->rigid += 0.5 * (static_cast<double>(sight.rigid) / sight.ends - track->rigid);
   track->seen = t_;
@@ -123,7 +122,8 @@ void Tracker::Birth(Cluster* cluster) {
   track.birth = cluster->center.head<2>();
   track.body = BodyFilter(track.birth, cluster->reaches, kFirstSpeed, kUnseen);
   track.z = cluster->center.z();
-  track.born = track.seen = track.sought = track.moved = t_;
+  track.born = track.seen = track.moved = t_;
+  track.existence = kBorn;
   track.detections = track.row = 1;
   track.trail.push_back(track.birth);
   Shape(&track);
@@ -131,50 +131,36 @@ void Tracker::Birth(Cluster* cluster) {
   tracks_.push_back(std::move(track));
 }
 
-/// A stray part of a known mover is no other mover.
-void Tracker::Absorb(Cluster* cluster) {
-  for (auto& track : tracks_)
-    if (track.confirmed && track.Outline().Scaled(kNear).Level(cluster->center.head<2>()) < 1.0)
-      cluster->track = track.id;
-}
-
-/// Tracks that were not seen; those whose place something hides are still sought.
-void Tracker::Seek(const Panorama& panorama) {
-  for (auto& track : tracks_) {
-    if (track.seen == t_) continue;
-    track.row = 0;
-    const Eigen::Vector2d c = track.Outline().center;
-    Eigen::Vector2d across(panorama.origin().y() - c.y(), c.x() - panorama.origin().x());
-    across *= 0.7 * track.reach / std::max(1e-6, across.norm());
-    int hidden = 0;
-    for (const double side : {-1.0, 0.0, 1.0}) hidden += panorama.Hides(c + side * across, -3);
-    if (hidden >= 2) track.sought = t_;
-  }
-}
-
 void Tracker::Update(const Panorama& panorama, std::vector<Cluster>* clusters) {
-  Join(clusters);
-  Eigen::MatrixXd cost(tracks_.size(), clusters->size());
-  for (size_t i = 0; i < tracks_.size(); ++i)
-    for (size_t j = 0; j < clusters->size(); ++j)
-      cost(static_cast<int>(i), static_cast<int>(j)) = Cost(tracks_[i], (*clusters)[j]);
-  const auto assigned = Assign(cost, config_.gate * config_.gate);
+  std::vector<track::Prior> priors;
+  Eigen::MatrixXd ratio(tracks_.size(), clusters->size());
+  for (size_t i = 0; i < tracks_.size(); ++i) {
+    priors.push_back({tracks_[i].existence, Detection(tracks_[i], panorama)});
+    for (size_t j = 0; j < clusters->size(); ++j) {
+      auto& entry = ratio(static_cast<int>(i), static_cast<int>(j));
+      entry = Ratio(tracks_[i], (*clusters)[j]);
+      // What was seen could be seen, whatever else hides the place.
+      if (entry > 1.0) priors.back().detection = kDetected;
+    }
+  }
+  const auto association = track::Associate(priors, ratio);
+  const auto assigned = track::Assign(association, kLeast);
   for (size_t i = 0; i < tracks_.size(); ++i) {
     Track& track = tracks_[i];
+    track.existence = association.existence[static_cast<int>(i)];
     track.fresh = false;
-    if (assigned[i] < 0) continue;
-    Cluster& cluster = (*clusters)[static_cast<size_t>(assigned[i])];
-    cluster.track = track.id;
-    Correct(cluster, &track);
-    Confirm(&track);
+    if (assigned[i] >= 0) {
+      Cluster& cluster = (*clusters)[static_cast<size_t>(assigned[i])];
+      cluster.track = track.id;
+      Correct(cluster, &track);
+      Confirm(&track);
+    }
+    if (track.seen != t_) track.row = 0;
   }
-  Seek(panorama);
   Unite();
   Bury();
-  for (auto& cluster : *clusters) {
-    if (cluster.track < 0) Absorb(&cluster);
+  for (auto& cluster : *clusters)
     if (cluster.track < 0) Birth(&cluster);
-  }
 }
 
 /// Of two tracks on one body the older one stays.
@@ -198,25 +184,22 @@ void Tracker::Unite() {
 
 void Tracker::Bury() {
   const auto dead = [this](const Track& track) {
-    const double gap = t_ - track.seen;
-    if (!track.confirmed) return gap > kTentativeGap;
-    if (track.outline.SemiAxes().x() > config_.max_size) return true;
-    if (t_ - track.sought > config_.coast || gap > config_.coast_hidden) return true;
-    return t_ - track.moved > config_.settle + gap;
+    return track.existence < kDead ||
+           (track.confirmed && track.outline.SemiAxes().x() > config_.max_size);
   };
   tracks_.erase(std::remove_if(tracks_.begin(), tracks_.end(), dead), tracks_.end());
 }
 
-void Tracker::Forget(const Eigen::Vector2d& center, double radius) {
-  tracks_.erase(
-      std::remove_if(tracks_.begin(), tracks_.end(),
-                     [&](const Track& track) { return (track.body.p() - center).norm() < radius; }),
-      tracks_.end());
+void Tracker::Forget(const Eigen::Vector2d& center, double radius, double around) {
+  const auto within = [&](const Track& track) {
+    return (track.body.p() - center).norm() < (track.confirmed ? radius : around);
+  };
+  tracks_.erase(std::remove_if(tracks_.begin(), tracks_.end(), within), tracks_.end());
 }
 
 bool Tracker::Moves(int id) const {
   for (const auto& track : tracks_)
-    if (track.id == id) return track.confirmed || t_ - track.born < kTentativeAge;
+    if (track.id == id) return track.confirmed ? !Rests(track) : t_ - track.born < kTentativeAge;
   return false;
 }
 
@@ -225,12 +208,12 @@ std::vector<world::Obstacle> Tracker::Obstacles(double middle, double semi_heigh
   const Eigen::Matrix3d level = Eigen::Vector3d(1.0, 1.0, 0.0).asDiagonal();
   std::vector<world::Obstacle> obstacles;
   for (const auto& track : tracks_) {
-    if (!track.confirmed || t_ - track.seen > config_.coast_listed || t_ - track.sought > kLost)
-      continue;
+    if (!track.confirmed || track.existence < kListed) continue;
     const Ellipse outline = track.Outline();
     world::Obstacle o;
     o.id = track.id;
     o.moving = true;
+    o.existence = track.existence;
     o.center.start = t_;
     o.center.duration = config_.horizon;
     o.center.coefficients.resize(2, 3);

@@ -20,7 +20,7 @@ struct Track {
   Eigen::Vector2d birth = Eigen::Vector2d::Zero();
   double born = 0.0, seen = 0.0, moved = 0.0;  ///< s: first, last detection; last time not at rest
   double known = 0.0;                          ///< s, when it was confirmed
-  double sought = 0.0;  ///< s, last time that it was seen or something hid its place
+  double existence = 0.5;                      ///< probability
   int detections = 0;
   int row = 0;         ///< of them, without a sweep between them in which it was not seen
   double rigid = 0.5;  ///< share of ends in view that moved as those of one body, of late
@@ -31,34 +31,36 @@ struct Track {
   Ellipse Outline() const { return {body.p() + outline.center, outline.shape}; }
 };
 
-/// Keeps tracks of clusters: assignment of least cost within a gate, births, deaths.
+/// Keeps tracks of clusters: joint probabilistic association, existence, births, deaths.
 class Tracker {
  public:
   explicit Tracker(const MoverConfig& config) : config_(config) {}
 
   /// Moves all tracks to time t [s].
   void Predict(double t);
-  /// Where confirmed tracks are expected at the time of the last prediction.
-  std::vector<Ellipse> Expected() const;
-  /// Assigns the clusters, which it marks with their track, and may join.
+  /// Where returns of confirmed tracks whose place is known are expected, at the time of the last
+  /// prediction.
+  std::vector<Footprint> Expected() const;
+  /// Assigns the clusters, which it marks with their track.
   void Update(const Panorama& panorama, std::vector<Cluster>* clusters);
-  /// Drops tracks whose centre lies within `radius` of `center` in plan.
-  void Forget(const Eigen::Vector2d& center, double radius);
+  /// Drops tracks whose centre lies within `radius` of `center` in plan, and those not yet
+  /// confirmed within `around`.
+  void Forget(const Eigen::Vector2d& center, double radius, double around);
 
   /// True while returns of this track are to be kept out of the static map.
   bool Moves(int id) const;
   const std::vector<Track>& tracks() const { return tracks_; }
-  /// Confirmed tracks that were seen of late, as upright ellipsoids with a linear centre.
+  /// Confirmed tracks that are more likely there than not, as upright ellipsoids with a linear
+  /// centre.
   std::vector<world::Obstacle> Obstacles(double middle, double semi_height, double grow) const;
 
  private:
-  void Join(std::vector<Cluster>* clusters) const;
-  double Cost(const Track& track, const Cluster& cluster) const;
+  bool Rests(const Track& track) const { return t_ - track.moved > config_.settle; }
+  double Ratio(const Track& track, const Cluster& cluster) const;
+  double Detection(const Track& track, const Panorama& panorama) const;
   void Correct(const Cluster& cluster, Track* track) const;
   void Confirm(Track* track) const;
-  void Absorb(Cluster* cluster);
   void Birth(Cluster* cluster);
-  void Seek(const Panorama& panorama);
   void Unite();
   void Bury();
 

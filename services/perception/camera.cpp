@@ -47,7 +47,8 @@ std::optional<cv::Rect2d> ProjectTarget(const Camera& camera, const Eigen::Vecto
   }
   Eigen::Vector2d low(1e9, 1e9), high(-1e9, -1e9);
   for (int i = 0; i < 2 * kRimPoints; ++i) {
-    const double angle = 2.0 * M_PI * (i / 2) / kRimPoints;
+    const int step = i / 2;
+    const double angle = 2.0 * M_PI * step / kRimPoints;
     const Eigen::Vector3d rim(around * std::cos(angle), around * std::sin(angle),
                               beyond + (i % 2 ? above : -above));
     const auto px = camera.Project(p_WT + axes * rim);

@@ -85,7 +85,7 @@ class Resting {
   }
 
   /// Time of the first sampled contact, s, infinite where there is none, and the least clearance.
-  /// The least height counts as an obstacle's surface.
+  /// The ground and the greatest height count as an obstacle's surface.
   std::pair<double, double> Harm(const Curve& curve, double T) {
     SetProblem(T);
     double contact = HUGE_VAL, least = HUGE_VAL;
@@ -96,8 +96,8 @@ class Resting {
       const Vector3d p = planning::Evaluate(curve, tau);
       for (const Ellipsoid& e : problem_.obstacles) least = std::min(least, Off(e, p, tau));
       if (l.height)
-        least = std::min({least, config_.drone_radius + l.ground.Above(p) - l.z_min,
-                          config_.drone_radius + l.z_max - l.ground.Above(p)});
+        least = std::min(
+            {least, l.ground.Above(p), config_.drone_radius + l.z_max - l.ground.Above(p)});
       if (problem_.target_body) least = std::min(least, Off(*problem_.target_body, p, tau));
       if (least < config_.drone_radius && contact == HUGE_VAL) contact = tau * T;
     }

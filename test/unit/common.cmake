@@ -3,6 +3,8 @@ chase_test(common_math_test
   SOURCES ${CMAKE_CURRENT_LIST_DIR}/common_math_polynomial_test.cpp
           ${CMAKE_CURRENT_LIST_DIR}/common_math_rotation_test.cpp
           ${CMAKE_CURRENT_LIST_DIR}/common_math_simplex_test.cpp)
+chase_test(common_track_test LIBS track
+  SOURCES ${CMAKE_CURRENT_LIST_DIR}/common_track_test.cpp)
 chase_test(world_separation_test
   LIBS separation world
   SOURCES ${CMAKE_CURRENT_LIST_DIR}/world_separation_test.cpp

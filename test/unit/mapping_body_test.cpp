@@ -36,7 +36,7 @@ TEST(MappingBody, VelocityIsThatOfTheBodyAndItsVarianceIsHonest) {
         body = BodyFilter({0.0, 0.0}, seen, 2.5, kUnseen);
         continue;
       }
-      body.Predict(kStep, 0.8);
+      body.Predict(kStep, {});
       body.Correct(seen, kSigma, kUnseen);
       if (i < 15) continue;
       EXPECT_LT((body.v() - v).norm(), 0.3) << flight << " " << i;
@@ -45,6 +45,36 @@ TEST(MappingBody, VelocityIsThatOfTheBodyAndItsVarianceIsHonest) {
     }
   }
   EXPECT_LT(nees / n, 1.0);
+}
+
+/// A walker that turns back is believed within three sweeps, and mostly followed to 0.3 m/s, and
+/// the variance says so until then.
+TEST(MappingBody, AReversalIsFollowedAndItsVarianceIsHonest) {
+  std::mt19937 random(7);
+  std::normal_distribution<double> normal(0.0, 0.02);
+  const MotionNoise motion{0.4, 0.2, 1.0};
+  int followed = 0;
+  for (int flight = 0; flight < 20; ++flight) {
+    const double v = 0.6 + 0.04 * flight, changed = 2.0 + 0.005 * flight;  // m/s, s
+    BodyFilter body;
+    for (int i = 0; i < 24; ++i) {
+      const double t = i * kStep, x = v * (t - 2.0 * std::max(0.0, t - changed));
+      Reaches seen = Box({x, 0.0}, {0.25, 0.25});
+      for (auto& reach : seen) reach.along += normal(random);
+      if (i == 0) body = BodyFilter({0.0, 0.0}, seen, 2.5, kUnseen);
+      if (i == 0) continue;
+      body.Predict(kStep, motion);
+      body.Correct(seen, kSigma, kUnseen);
+      if (i == 20) {
+        EXPECT_NEAR(body.v().x(), v, 0.3);
+      }
+    }
+    const double error = std::abs(body.v().x() + v);
+    followed += error < 0.3;
+    EXPECT_LT(error, v) << flight;  // nearer to the new velocity than to the old one
+    EXPECT_LT(error, 3.0 * std::sqrt(body.VelocityVariance())) << flight;
+  }
+  EXPECT_GE(followed, 12);
 }
 
 /// A body at rest, or under way, of which more and more comes into view.
@@ -60,7 +90,7 @@ TEST(MappingBody, WhatComesIntoViewIsNoMotion) {
         body = BodyFilter({0.0, 0.0}, seen, 2.5, kUnseen);
         continue;
       }
-      body.Predict(kStep, 0.8);
+      body.Predict(kStep, {});
       EXPECT_GE(body.Correct(seen, kSigma, kUnseen).ends, 9);
       if (i > 5) {
         EXPECT_NEAR(body.v().x(), speed, 0.1) << i;
@@ -91,7 +121,7 @@ TEST(MappingBody, WhatWasHiddenAndIsBackIsNoMotion) {
       body = BodyFilter({0.0, 0.0}, seen, 2.5, kUnseen);
       continue;
     }
-    body.Predict(kStep, 0.8);
+    body.Predict(kStep, {});
     body.Correct(seen, kSigma, kUnseen);
     if (i > 10) {
       EXPECT_NEAR(body.v().x(), kSpeed, 0.1) << i;
@@ -102,7 +132,7 @@ TEST(MappingBody, WhatWasHiddenAndIsBackIsNoMotion) {
 TEST(MappingBody, AnEndThatJumpsIsAnotherOutline) {
   BodyFilter body({0.0, 0.0}, Box({0.0, 0.0}, {1.0, 0.5}), 2.5, kUnseen);
   for (int i = 1; i < 40; ++i) {
-    body.Predict(kStep, 0.8);
+    body.Predict(kStep, {});
     Reaches seen = Box({0.0, 0.0}, {1.0, 0.5});
     if (i >= 20) seen[0].along += 0.8;  // something joins in front
     body.Correct(seen, kSigma, kUnseen);
@@ -128,7 +158,7 @@ TEST(MappingBody, OutlineHardlyGrowsBeyondAnEndThatWasInView) {
         body = BodyFilter({0.0, 0.0}, seen, 2.5, kUnseen);
         continue;
       }
-      body.Predict(kStep, 0.8);
+      body.Predict(kStep, {});
       body.Correct(seen, kSigma, kUnseen);
       if (i > 5) {
         EXPECT_NEAR(body.v().x(), 1.5, 0.1) << i;
@@ -146,13 +176,13 @@ TEST(MappingBody, OutlineHardlyGrowsBeyondAnEndThatWasInView) {
 TEST(MappingBody, OnlyEndsThatMoveTogetherAreRigid) {
   const Eigen::Vector2d half(0.8, 0.5);
   BodyFilter body({0.0, 0.0}, Box({0.0, 0.0}, half), 2.5, kUnseen);
-  body.Predict(kStep, 0.8);
+  body.Predict(kStep, {});
   EXPECT_EQ(body.Correct(Box({0.2, 0.0}, half), kSigma, kUnseen).rigid, kDirections);
 
   std::mt19937 random(3);
   std::uniform_real_distribution<double> anywhere(-1.5, 1.5);
   for (int i = 0; i < 20; ++i) {
-    body.Predict(kStep, 0.8);
+    body.Predict(kStep, {});
     Reaches seen = Box({0.2 * i, 0.0}, half);
     for (auto& reach : seen) reach.along += anywhere(random);
     const Sight sight = body.Correct(seen, kSigma, kUnseen);
@@ -171,7 +201,7 @@ TEST(MappingBody, AgesOfReturnsAreTakenBack) {
     for (auto& reach : seen) reach.age = 0.05;
     if (i == 0) body = BodyFilter({0.0, 0.0}, seen, 2.5, kUnseen);
     if (i == 0) continue;
-    body.Predict(kStep, 0.8);
+    body.Predict(kStep, {});
     body.Correct(seen, kSigma, kUnseen);
   }
   Eigen::Vector2d center = body.p() + SmallestRectangle(ConvexHull(body.Outline())).center;

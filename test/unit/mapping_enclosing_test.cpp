@@ -8,7 +8,6 @@
 #include <random>
 #include <set>
 
-#include "services/mapping/assignment.h"
 #include "services/mapping/decomposition.h"
 #include "services/mapping/enclosing.h"
 
@@ -129,37 +128,6 @@ TEST(MappingEnclosing, RectangleAndItsEllipseHoldThePoints) {
       EXPECT_LE(e.Level(p), 1.0 + 1e-9);
     }
   }
-}
-
-TEST(MappingAssignment, AgreesWithEveryPermutation) {
-  std::mt19937 random(2);
-  std::uniform_real_distribution<double> uniform(0.0, 10.0);
-  for (int round = 0; round < 40; ++round) {
-    const int n = 5;
-    Eigen::MatrixXd cost(n, n);
-    for (int i = 0; i < n * n; ++i) cost(i / n, i % n) = uniform(random);
-    const double unassigned = 4.0;
-    const auto assigned = Assign(cost, unassigned);
-    const auto price = [&](int i, int j) { return std::min(cost(i, j), unassigned); };
-    double total = 0.0;
-    for (int i = 0; i < n; ++i)
-      total += assigned[static_cast<size_t>(i)] < 0 ? unassigned
-                                                    : cost(i, assigned[static_cast<size_t>(i)]);
-    std::vector<int> order(n);
-    std::iota(order.begin(), order.end(), 0);
-    double best = INFINITY;
-    do {
-      double sum = 0.0;
-      for (int i = 0; i < n; ++i) sum += price(i, order[static_cast<size_t>(i)]);
-      best = std::min(best, sum);
-    } while (std::next_permutation(order.begin(), order.end()));
-    EXPECT_NEAR(total, best, 1e-9) << "round " << round;
-  }
-}
-
-TEST(MappingAssignment, EmptySidesAreFine) {
-  EXPECT_TRUE(Assign(Eigen::MatrixXd(0, 3), 1.0).empty());
-  EXPECT_EQ(Assign(Eigen::MatrixXd(2, 0), 1.0), (std::vector<int>{-1, -1}));
 }
 
 std::vector<Cell> Columns(const std::vector<Eigen::Vector2d>& centers) {

@@ -6,6 +6,7 @@
 
 #include "mapping_metrics.h"
 #include "mapping_world.h"
+#include "services/mapping/forecast.h"
 #include "services/mapping/mapper.h"
 
 namespace chase::mapping {
@@ -69,6 +70,52 @@ TEST(MappingMover, IsFoundTrackedAndForgotten) {
     EXPECT_LT(worst, 0.3) << speed;
     EXPECT_LT(worst_hidden, 0.9) << speed;
   }
+}
+
+TEST(MappingForecast, StopsWhereItsWayEndsAndKeepsItsVelocityUntilThen) {
+  world::Obstacle mover;
+  mover.center.start = 5.0;
+  mover.center.duration = 3.0;
+  mover.center.coefficients.resize(2, 3);
+  mover.center.coefficients << 1.0, 2.0, 1.5, 2.4, -1.8, 0.0;  // 1 m/s
+  const world::Obstacle free = mover;
+  StopAfter(3.0, &mover);
+  EXPECT_EQ(mover.center.coefficients, free.center.coefficients);
+  for (const double way : {0.0, 0.3, 1.0, 2.5}) {
+    mover = free;
+    StopAfter(way, &mover);
+    double last = 0.0;
+    for (double t = 5.0; t < 8.0; t += 0.05) {
+      const double gone = (mover.center.Position(t) - free.center.Position(5.0)).norm();
+      EXPECT_LE(gone, std::min(way, t - 5.0) + 1e-9) << way;
+      EXPECT_GE(gone, last - 1e-9) << way;
+      last = gone;
+    }
+    EXPECT_NEAR((mover.center.Position(8.0) - free.center.Position(5.0)).norm(), way, 1e-9);
+    if (way >= 0.75) {
+      EXPECT_NEAR((mover.center.Velocity(5.0) - free.center.Velocity(5.0)).norm(), 0.0, 1e-9);
+    }
+  }
+}
+
+/// A mover on its way to a wall that has long been there is not forecast to go through it.
+TEST(MappingMover, ForecastEndsAtAWall) {
+  std::mt19937 random(3);
+  Mapper mapper(MappingConfig{});
+  int judged = 0;
+  for (double t = 0.0; t < 5.0; t += 0.1) {
+    testing::World world;
+    world.boxes = {{{8.0, 0.0, 2.0}, {0.1, 6.0, 2.0}}, {{-9.0, 0.0, 2.0}, {0.1, 6.0, 2.0}}};
+    if (t > 2.5) world.boxes.push_back({{2.5 + 1.2 * (t - 2.5), 2.0, 0.9}, {0.25, 0.25, 0.9}});
+    const auto list = mapper.Insert(testing::Scan(world, {0, 0, 1.2}, t, {0.02, 0.01}, &random));
+    for (const auto& o : list.obstacles) {
+      if (!o.moving || t < 4.0) continue;
+      ++judged;
+      EXPECT_LT(o.center.Position(t + 3.0).x(), 8.0);
+      EXPECT_GT(o.center.Position(t + 3.0).x(), 6.8);
+    }
+  }
+  EXPECT_GE(judged, 8);
 }
 
 TEST(MappingMover, WhatStopsBecomesStatic) {

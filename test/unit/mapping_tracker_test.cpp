@@ -51,20 +51,48 @@ TEST(MappingTracker, IdsSurviveACrossing) {
   }
 }
 
-TEST(MappingTracker, IdSurvivesAShortOcclusionAndGhostIsNotListed) {
-  Tracker tracker(MoverConfig{});
-  int id = -1;
-  for (double t = 0.0; t < 4.0; t += 0.1) {
-    tracker.Predict(t);
-    std::vector<Cluster> clusters;
-    if (t < 1.5 || t > 2.5) clusters.push_back(BoxCluster({1.5 * t, 0.0}, 0.5));
-    tracker.Update(Panorama(), &clusters);
-    if (t > 0.9 && t < 1.4) id = clusters[0].track;
-    if (t > 2.2 && t < 2.4) {
-      EXPECT_TRUE(tracker.Obstacles(1.5, 8.0, 1.0).empty());
-    }
-    if (t > 2.6) {
-      EXPECT_EQ(clusters[0].track, id);
+/// A wall at 2 m, seen from (0, -4), on both sides of a gap at `gap`, and what lies beyond the gap.
+Panorama Seen(double gap) {
+  std::vector<Return> returns;
+  for (double angle = -1.2; angle < 1.2; angle += 0.002) {
+    const bool open = std::abs(std::tan(angle) * 2.0 - gap) < 0.3;
+    const double range = open ? 12.0 : 2.0 / std::cos(angle);
+    Return r;
+    r.p =
+        Eigen::Vector3d(range * std::sin(angle), range * std::cos(angle) - 4.0, 1.0).cast<float>();
+    returns.push_back(r);
+  }
+  Panorama panorama;
+  panorama.Take({0.0, -4.0, 1.0}, returns, std::vector<int>(returns.size(), -1));
+  return panorama;
+}
+
+/// What something hides is not missed: it stays listed, ever less certain where; what is nowhere to
+/// be seen although its place is in view is not.
+TEST(MappingTracker, OnlyWhatIsHiddenStaysListed) {
+  for (const bool hidden : {true, false}) {
+    Tracker tracker(MoverConfig{});
+    int id = -1;
+    double sigma = 0.0;
+    for (double t = 0.0; t < 4.0; t += 0.1) {
+      tracker.Predict(t);
+      std::vector<Cluster> clusters;
+      if (t < 1.5 || t > 2.8) clusters.push_back(BoxCluster({1.5 * t - 4.0, 0.0}, 0.5));
+      const bool away = t > 1.5 && t < 2.8;
+      tracker.Update(away && hidden ? Seen(50.0) : Panorama(), &clusters);
+      const auto obstacles = tracker.Obstacles(1.5, 8.0, 1.0);
+      if (t > 0.9 && t < 1.4) id = clusters[0].track;
+      if (t > 1.85 && t < 2.75) {
+        ASSERT_EQ(obstacles.size(), hidden ? 1u : 0u) << t;
+        if (!hidden) continue;
+        EXPECT_EQ(obstacles[0].id, id);
+        EXPECT_LT(obstacles[0].existence, 1.0);
+        EXPECT_GT(obstacles[0].position_covariance(0, 0), sigma);
+        sigma = obstacles[0].position_covariance(0, 0);
+      }
+      if (t > 2.9 && hidden) {
+        EXPECT_EQ(clusters[0].track, id) << t;
+      }
     }
   }
 }
@@ -135,6 +163,44 @@ TEST(MappingTracker, PartsThatChangeMakeNoMover) {
   }
 }
 
+/// Two walkers so near to each other that their returns are connected.
+TEST(MappingDetector, ConnectedReturnsAreDividedBetweenTheExpectedBodies) {
+  VoxelGrid grid(0.2);
+  grid.MoveTo(Eigen::Vector3d::Zero());
+  std::vector<Return> returns;
+  std::vector<Footprint> expected(2);
+  for (int body = 0; body < 2; ++body) {
+    const Eigen::Vector2d c(5.0, 0.55 * body);
+    auto& f = expected[static_cast<size_t>(body)];
+    f.track = 7 + body;
+    f.p = c;
+    f.reach.fill(0.25);
+    f.sigma.fill(0.08);
+    f.radius = 0.7;
+    for (int i = 0; i < 40; ++i) {
+      const double a = M_PI * (0.5 + i / 40.0);
+      const Eigen::Vector3d p(c.x() + 0.25 * std::cos(a), c.y() + 0.25 * std::sin(a), 1.0);
+      returns.push_back({p.cast<float>(), grid.ToKey(p)});
+    }
+  }
+  MotionDetector detector(MoverConfig{}, GridConfig{});
+  auto clusters = detector.Detect({0.0, 0.0, 1.0}, returns, &grid, expected);
+  ASSERT_EQ(clusters.size(), 2u);
+  for (const auto& cluster : clusters) {
+    EXPECT_EQ(cluster.members.size(), 40u);
+    for (const int i : cluster.members) EXPECT_EQ(cluster.track, 7 + i / 40);
+  }
+  // One body of that size that was seen as both before is two: nothing hides what is between them.
+  for (auto& r : returns)
+    if (r.p.y() > 0.3f) r.p.y() += 0.5f;
+  expected.resize(1);
+  expected[0].p.y() = 0.5;
+  expected[0].reach.fill(1.0);
+  expected[0].radius = 2.0;
+  clusters = detector.Detect({0.0, 0.0, 1.0}, returns, &grid, expected);
+  EXPECT_EQ(clusters.size(), 2u);
+}
+
 TEST(MappingDetector, WhatLiesBesideAnExpectedPlaceDoesNotJoin) {
   VoxelGrid grid(0.2);
   grid.MoveTo(Eigen::Vector3d::Zero());
@@ -147,7 +213,11 @@ TEST(MappingDetector, WhatLiesBesideAnExpectedPlaceDoesNotJoin) {
   };
   add(5.3);
   add(5.65);  // in the next cell of the clusters
-  const Ellipse expected{{5.0, 0.0}, Eigen::Vector2d(4.0, 4.0).asDiagonal()};
+  Footprint expected;
+  expected.p = {5.0, 0.0};
+  expected.reach.fill(0.5);
+  expected.sigma.fill(0.01);
+  expected.radius = 1.0;
   MotionDetector detector(MoverConfig{}, GridConfig{});
   const auto clusters = detector.Detect({0.0, 0.0, 1.0}, returns, &grid, {expected});
   ASSERT_EQ(clusters.size(), 1u);
