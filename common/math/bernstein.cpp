@@ -24,13 +24,33 @@ Positivity DecideAtDepth(const Polynomial& b, double error, double step, int dep
   return second == Positivity::kPositive ? first : second;
 }
 
+/// Worked out once, for the degrees that polynomials may have.
+class ShareTable {
+ public:
+  ShareTable() {
+    for (int n = 0; n < kSize; ++n)
+      for (int j = 0; j <= n; ++j)
+        for (int k = 0; k <= j; ++k) shares_[n][j][k] = Binomial(j, k) / Binomial(n, k);
+  }
+  double operator()(int n, int j, int k) const { return shares_[n][j][k]; }
+
+ private:
+  static constexpr int kSize = Polynomial::MaxRowsAtCompileTime;
+  double shares_[kSize][kSize][kSize] = {};
+};
+
 }  // namespace
+
+double BernsteinShare(int n, int j, int k) {
+  static const ShareTable shares;
+  return shares(n, j, k);
+}
 
 Polynomial PowerToBernstein(const Polynomial& power) {
   const int n = Degree(power);
   Polynomial b = Polynomial::Zero(n + 1);
   for (int j = 0; j <= n; ++j)
-    for (int k = 0; k <= j; ++k) b[j] += Binomial(j, k) / Binomial(n, k) * power[k];
+    for (int k = 0; k <= j; ++k) b[j] += BernsteinShare(n, j, k) * power[k];
   return b;
 }
 

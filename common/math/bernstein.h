@@ -4,6 +4,10 @@
 
 namespace chase::math {
 
+/// Binomial(j, k) / Binomial(n, k) for k <= j <= n: what coefficient k of a power of degree n
+/// counts for in Bernstein coefficient j.
+double BernsteinShare(int n, int j, int k);
+
 /// Coefficients over [0,1] in the Bernstein basis of degree size() - 1. They bound the polynomial
 /// from both sides (convex hull) and the first and last are its values at 0 and 1.
 Polynomial PowerToBernstein(const Polynomial& power);

@@ -19,20 +19,19 @@ constexpr double kSlack = 1e-9;  // m; more than all rounding for coordinates be
 /// body's, its radius, the same of the target's, covariance of the body.
 using Controls = Eigen::Matrix<double, 17, Eigen::Dynamic, 0, 17, 16>;
 
-void PutBernstein(const math::Polynomial& power, int row, Controls* controls) {
-  math::Polynomial padded = math::Polynomial::Zero(controls->cols());
-  padded.head(power.size()) = power;
-  controls->row(row) = math::PowerToBernstein(padded).transpose();
+/// Into columns of power coefficients.
+void PutBall(const Ball& ball, const Curve& center, int row, Controls* power) {
+  power->block(row, 0, 3, ball.center.rows()) = ball.center.transpose();
+  power->block(row, 0, 3, center.rows()) -= center.transpose();
+  power->row(row + 3).head(ball.radius.size()) = ball.radius.transpose();
 }
 
-void PutBall(const Ball& ball, const Curve& center, int row, Controls* controls) {
-  for (int a = 0; a < 3; ++a) {
-    math::Polynomial offset = math::Polynomial::Zero(controls->cols());
-    offset.head(ball.center.rows()) = ball.center.col(a);
-    offset.head(center.rows()) -= center.col(a);
-    PutBernstein(offset, row + a, controls);
-  }
-  PutBernstein(ball.radius, row + 3, controls);
+Controls ToBernstein(const Controls& power) {
+  const int n = static_cast<int>(power.cols()) - 1;
+  Controls c = Controls::Zero(17, n + 1);
+  for (int j = 0; j <= n; ++j)
+    for (int k = 0; k <= j; ++k) c.col(j) += math::BernsteinShare(n, j, k) * power.col(k);
+  return c;
 }
 
 /// Cuts at t: returns the part before and leaves the part after in `rest`.
@@ -80,16 +79,14 @@ int Prover::Columns() const {
 }
 
 Controls Prover::MakeControls(int columns) const {
-  Controls c = Controls::Zero(17, columns);
-  PutBall(drone_, body_.center, 0, &c);
-  if (target_) PutBall(*target_, body_.center, 4, &c);
-  if (body_.sigmas == 0.0) return c;
-  for (int i = 0; i < 9; ++i) {
-    math::Polynomial entry(3);
-    for (int k = 0; k < 3; ++k) entry[k] = body_.covariance[k](i);
-    PutBernstein(entry, 8 + i, &c);
-  }
-  return c;
+  Controls power = Controls::Zero(17, columns);
+  PutBall(drone_, body_.center, 0, &power);
+  if (target_) PutBall(*target_, body_.center, 4, &power);
+  if (body_.sigmas != 0.0)
+    for (int k = 0; k < 3; ++k)
+      power.col(k).tail<9>() =
+          Eigen::Map<const Eigen::Matrix<double, 9, 1>>(body_.covariance[k].data());
+  return ToBernstein(power);
 }
 
 double Prover::LeastRadius(const Controls& c) const {
