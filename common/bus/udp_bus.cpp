@@ -4,9 +4,9 @@
 #include <poll.h>
 
 #include <algorithm>
-#include <chrono>
 #include <stdexcept>
 
+#include "common/bus/host_clock.h"
 #include "common/bus/live_loop.h"
 #include "common/bus/loopback.h"
 
@@ -16,12 +16,6 @@ namespace {
 
 void Forward(const lcm::ReceiveBuffer* buffer, const std::string&, Bus::RawHandler* handler) {
   (*handler)(static_cast<const uint8_t*>(buffer->data), buffer->data_size);
-}
-
-template <class Clock>
-int64_t Microseconds() {
-  using std::chrono::microseconds;
-  return std::chrono::duration_cast<microseconds>(Clock::now().time_since_epoch()).count();
 }
 
 /// Checked before LCM opens its sockets: LCM itself would wait ten seconds and then abort.
@@ -34,10 +28,7 @@ const std::string& Checked(const std::string& url) {
 }  // namespace
 
 UdpBus::UdpBus(const std::string& url, const std::string& prefix)
-    : lcm_(Checked(url)),
-      prefix_(prefix),
-      clock_offset_(Microseconds<std::chrono::system_clock>() -
-                    Microseconds<std::chrono::steady_clock>()) {
+    : lcm_(Checked(url)), prefix_(prefix), clock_offset_(HostClockOffset()) {
   if (!lcm_.good())
     throw std::runtime_error(fmt::format(
         "{}: LCM cannot open it; check the address and port, or run deploy/doctor", url));
@@ -54,7 +45,7 @@ void UdpBus::Handle(int64_t timeout_us) {
   }
 }
 
-int64_t UdpBus::Now() const { return Microseconds<std::chrono::steady_clock>() + clock_offset_; }
+int64_t UdpBus::Now() const { return SteadyMicroseconds() + clock_offset_; }
 
 void UdpBus::SubscribeRaw(const std::string& channel, RawHandler handler) {
   handlers_.push_back(std::move(handler));

@@ -21,9 +21,9 @@ class UdpBus : public Bus {
   /// Waits at most `timeout_us` for messages and hands over those that are there.
   void Handle(int64_t timeout_us);
 
-  /// Wall clock at construction plus the steady time since: a step of the wall clock (NTP, a
-  /// suspended machine) neither holds up ticks and signs of life nor makes stamps jump in mid
-  /// flight.
+  /// The host's clock: the wall clock as it was when the host's first process started, plus the
+  /// steady time since. A step of the wall clock (NTP) neither holds up ticks and signs of life nor
+  /// makes stamps jump in mid flight, and a process that starts again goes by the same clock.
   int64_t Now() const override;
 
  protected:

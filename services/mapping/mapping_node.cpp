@@ -37,7 +37,7 @@ MappingNode::MappingNode(bus::Bus& bus, const MappingConfig& config)
 }
 
 MappingNode::~MappingNode() {
-  if (config_.save_map.empty() || !last_scan_) return;
+  if (config_.save_map.empty() || !has_scan_) return;
   int occupied = 0;
   mapper_->CompleteTree();
   Write(config_.save_map, mapper_->WriteTree(&occupied));
@@ -65,15 +65,19 @@ void MappingNode::OnTarget(const target_t& m) {
 void MappingNode::OnScan(const scan_registered_t& m) {
   const double t = Seconds(m.utime);
   lost_ = m.health == pose_t::HEALTH_LOST || m.health == pose_t::HEALTH_STARTING;
-  if (lost_ || (last_scan_ && m.utime <= *last_scan_)) {
+  const bool in_this_frame = epoch_.Is(m.epoch);
+  if (!in_this_frame) order_ = {};
+  const auto order = order_.Take(m.utime);
+  if (lost_ || order == bus::StampOrder::Verdict::kLate) {
     ++refused_;
     return;
   }
-  if (epoch_.Change(m.epoch)) {
+  epoch_.Change(m.epoch);
+  if (!in_this_frame || order == bus::StampOrder::Verdict::kSetBack) {
     mapper_ = std::make_unique<Mapper>(config_);
     last_map_.reset();
   }
-  last_scan_ = m.utime;
+  has_scan_ = true;
   {
     auto timer = bus_.Time("map");
     last_list_ = mapper_->Insert(ToSweep(m, t, config_.movers.sweep_time));
@@ -124,7 +128,7 @@ void MappingNode::SaveTiles() {
 
 bus::NodeReport MappingNode::Report() const {
   bus::NodeReport report;
-  if (!last_scan_) report.state = bus::NodeReport::State::kStarting;
+  if (!has_scan_) report.state = bus::NodeReport::State::kStarting;
   if (lost_) report.state = bus::NodeReport::State::kDegraded;
   std::ostringstream detail;
   detail << last_list_.n_static << " static, " << last_list_.n_moving << " moving, "

@@ -8,6 +8,7 @@
 #include "common/bus/bus.h"
 #include "common/bus/epoch.h"
 #include "common/bus/node.h"
+#include "common/bus/stamp_order.h"
 #include "services/mapping/mapper.h"
 
 namespace chase::mapping {
@@ -34,7 +35,9 @@ class MappingNode : public bus::Node {
   MappingConfig config_;
   std::unique_ptr<Mapper> mapper_;
   bus::Epoch epoch_;
-  std::optional<int64_t> origin_, last_scan_, last_map_;  ///< utime
+  bus::StampOrder order_;
+  bool has_scan_ = false;
+  std::optional<int64_t> origin_, last_map_;  ///< utime
   int refused_ = 0;    ///< sweeps that odometry calls unusable, or that come from the past
   bool lost_ = false;  ///< the last sweep was unusable
   ObstacleList last_list_;

@@ -18,6 +18,7 @@ Sweep FromMessage(const lidar_scan_t& m, double start) {
 }
 
 constexpr double kMostVariance = 1e6;  // m^2, m^2/s^2, rad^2
+constexpr int kUnderWay = 2;           // sweeps between the sensor and this node
 
 // Another life of the process works in another frame: the number begins with when it began, tenths
 // of a second.
@@ -61,7 +62,11 @@ scan_registered_t ToMessage(RegisteredSweep sweep, int64_t origin) {
 }  // namespace
 
 OdometryNode::OdometryNode(bus::Bus& bus, const OdometryConfig& config)
-    : bus_(bus), odometry_(config) {
+    : bus_(bus),
+      config_(config),
+      odometry_(config),
+      first_epoch_(FirstEpoch(bus.identity().start)),
+      epoch_(first_epoch_) {
   bus_.Subscribe<imu_t>("IMU", [this](const imu_t& m) { OnImu(m); });
   bus_.Subscribe<lidar_scan_t>("LIDAR_SCAN", [this](const lidar_scan_t& m) { OnScan(m); });
 }
@@ -72,27 +77,47 @@ double OdometryNode::SecondsOf(int64_t utime) {
   return bus::Seconds(utime, origin_);
 }
 
+void OdometryNode::BeginAnew() {
+  first_epoch_ = epoch_ + 1;
+  has_origin_ = false;
+  odometry_.emplace(config_);
+}
+
 void OdometryNode::OnImu(const imu_t& m) {
+  if (imu_order_.Take(m.utime) == bus::StampOrder::Verdict::kSetBack) {
+    BeginAnew();
+    scan_order_ = {};
+    old_sweeps_ = kUnderWay;
+  }
   std::optional<PoseEstimate> pose;
   {
     const auto timer = bus_.Time("imu");
-    pose = odometry_.AddImu({SecondsOf(m.utime), bus::ToVector(m.accel), bus::ToVector(m.gyro)});
+    pose = odometry_->AddImu({SecondsOf(m.utime), bus::ToVector(m.accel), bus::ToVector(m.gyro)});
   }
   if (pose) Publish(*pose);
   ProcessSweeps();
 }
 
 void OdometryNode::OnScan(const lidar_scan_t& m) {
-  odometry_.AddSweep(FromMessage(m, SecondsOf(m.utime)));
+  if (old_sweeps_ > 0 && m.utime > imu_order_.newest() + bus::StampOrder::kLatest) {
+    --old_sweeps_;
+    return;
+  }
+  old_sweeps_ = 0;
+  if (scan_order_.Take(m.utime) == bus::StampOrder::Verdict::kSetBack) {
+    BeginAnew();
+    imu_order_ = {};
+  }
+  odometry_->AddSweep(FromMessage(m, SecondsOf(m.utime)));
   ProcessSweeps();
 }
 
 void OdometryNode::ProcessSweeps() {
-  while (odometry_.SweepReady()) {
+  while (odometry_->SweepReady()) {
     SweepResult result;
     {
       const auto timer = bus_.Time("sweep");
-      result = odometry_.ProcessSweep();
+      result = odometry_->ProcessSweep();
     }
     if (result.pose) Publish(*result.pose);
     if (result.registered) Publish(std::move(*result.registered));
@@ -102,13 +127,15 @@ void OdometryNode::ProcessSweeps() {
 void OdometryNode::Publish(const PoseEstimate& estimate) {
   health_ = estimate.health;
   pose_t m = ToMessage(estimate, origin_);
-  m.epoch += FirstEpoch(bus_.identity().start);
+  m.epoch += first_epoch_;
+  epoch_ = m.epoch;
   bus_.Publish("POSE", m);
 }
 
 void OdometryNode::Publish(RegisteredSweep sweep) {
   scan_registered_t m = ToMessage(std::move(sweep), origin_);
-  m.epoch += FirstEpoch(bus_.identity().start);
+  m.epoch += first_epoch_;
+  epoch_ = m.epoch;
   bus_.Publish("SCAN_REGISTERED", m);
 }
 

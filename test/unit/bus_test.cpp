@@ -10,9 +10,11 @@
 #include <iterator>
 
 #include "common/bus/convert.h"
+#include "common/bus/host_clock.h"
 #include "common/bus/lockstep.h"
 #include "common/bus/log_bus.h"
 #include "common/bus/part_file.h"
+#include "common/bus/stamp_order.h"
 
 namespace chase::bus {
 namespace {
@@ -169,6 +171,32 @@ TEST(Convert, ObstaclesSurviveTheWire) {
   EXPECT_EQ(back.center.coefficients, o.center.coefficients);
   EXPECT_DOUBLE_EQ(back.center.start, 12.5);
   EXPECT_TRUE(back.moving);
+}
+
+TEST(StampOrder, TellsLateFromSetBack) {
+  using Verdict = StampOrder::Verdict;
+  StampOrder order;
+  constexpr int64_t kSecond = 1'000'000;
+  EXPECT_EQ(order.Take(10 * kSecond), Verdict::kNewer);
+  EXPECT_EQ(order.Take(10 * kSecond), Verdict::kLate) << "twice the same";
+  EXPECT_EQ(order.Take(8 * kSecond), Verdict::kLate) << "one stray message";
+  EXPECT_EQ(order.Take(11 * kSecond), Verdict::kNewer);
+  EXPECT_EQ(order.Take(11 * kSecond - 200'000), Verdict::kLate);
+  EXPECT_EQ(order.Take(11 * kSecond - 100'000), Verdict::kLate) << "two that come out of order";
+  EXPECT_EQ(order.Take(3 * kSecond), Verdict::kLate);
+  EXPECT_EQ(order.Take(4 * kSecond), Verdict::kSetBack);
+  EXPECT_EQ(order.Take(5 * kSecond), Verdict::kNewer);
+}
+
+TEST(HostClock, IsTheSameForWhoeverAsksLater) {
+  const std::string file = testing::TempDir() + "/host_clock";
+  std::remove(file.c_str());
+  const int64_t first = HostClockOffset(file);
+  std::ofstream(file) << first - 7;  // as a process from before the wall clock was set
+  EXPECT_EQ(HostClockOffset(file), first - 7);
+  std::ofstream(file) << "torn";
+  EXPECT_NEAR(static_cast<double>(HostClockOffset(file) - first), 0.0, 1e6);
+  EXPECT_NEAR(static_cast<double>(HostClockOffset("/no/such/place") - first), 0.0, 1e6);
 }
 
 }  // namespace

@@ -119,6 +119,14 @@ TEST(MappingNodeTest, SweepsFromThePastAreRefused) {
   EXPECT_EQ(bench.lists.size(), 1u);
 }
 
+TEST(MappingNodeTest, AClockThatIsSetBackCostsOneSweep) {
+  Bench bench;
+  for (int i = 0; i < 5; ++i) bench.Send(bench.Scan(kStart + 100'000 * i));
+  for (int i = 0; i < 5; ++i) bench.Send(bench.Scan(kStart - 5'000'000 + 100'000 * i));
+  ASSERT_EQ(bench.lists.size(), 9u);
+  EXPECT_EQ(bench.lists[5].utime, kStart - 4'900'000);
+}
+
 TEST(MappingNodeTest, HostileCloudsAreSurvived) {
   Bench bench;
   const float nan = std::nanf(""), inf = INFINITY;

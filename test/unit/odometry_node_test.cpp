@@ -39,7 +39,7 @@ class Bench {
     m.utime = utime;
     bus::Set(m.accel, Eigen::Vector3d(0.0, 0.0, 9.81));
     bus_->Publish("IMU", m);
-    lockstep_.RunUntil(utime);
+    lockstep_.RunUntil(std::max(utime, lockstep_.now()));
   }
 
   void SendScan(int64_t utime, int64_t now) {
@@ -54,7 +54,7 @@ class Bench {
       m.intensity.push_back(point.intensity), m.ring.push_back(point.ring);
     }
     bus_->Publish("LIDAR_SCAN", m);
-    lockstep_.RunUntil(now);
+    lockstep_.RunUntil(std::max(now, lockstep_.now()));
   }
 
   std::vector<pose_t> poses;
@@ -92,6 +92,38 @@ TEST(OdometryNode, WithoutImuOnePosePerScan) {
   for (int i = 0; i < 5; ++i) bench.SendScan(kStart + 100000 * i, kStart + 100000 * (i + 1));
   EXPECT_EQ(bench.poses.size(), 5u);
   EXPECT_EQ(bench.sweeps.size(), 5u);
+}
+
+/// Standing for 1.5 s, sweeps handed over when they end; one more of the clock before `first`.
+void Stand(int64_t first, bool late_sweep, Bench* bench) {
+  for (int i = 0; i <= 300; ++i) {
+    const int64_t now = first + 5000 * i;
+    bench->SendImu(now);
+    if (late_sweep && i == 10) bench->SendScan(kStart + 1'450'000, now);
+    if (i > 20 && i % 20 == 0) bench->SendScan(now - 100000, now);
+  }
+}
+
+TEST(OdometryNode, BeginsAnewWithTheSecondSampleOfAClockThatIsSetBack) {
+  Bench bench;
+  Stand(kStart, false, &bench);
+  const size_t before = bench.poses.size();
+  const int32_t epoch = bench.poses.back().epoch;
+  const int64_t back = kStart - 60'000'000;
+  Stand(back, true, &bench);
+  ASSERT_EQ(bench.poses.size(), before + 300);
+  EXPECT_EQ(bench.poses[before].utime, back + 5000);
+  EXPECT_NE(bench.poses[before].epoch, epoch);
+  EXPECT_EQ(bench.poses.back().health, int{pose_t::HEALTH_OK}) << bench.poses.back().reason;
+  EXPECT_EQ(bench.poses.back().epoch, bench.poses[before].epoch);
+}
+
+TEST(OdometryNode, BeginsAnewWithoutImuAsWell) {
+  Bench bench;
+  for (int i = 0; i < 5; ++i) bench.SendScan(kStart + 100000 * i, kStart + 100000 * (i + 1));
+  for (int i = 0; i < 5; ++i) bench.SendScan(kStart - 9'000'000 + 100000 * i, kStart);
+  ASSERT_EQ(bench.poses.size(), 9u);
+  EXPECT_NE(bench.poses.back().epoch, bench.poses.front().epoch);
 }
 
 }  // namespace
