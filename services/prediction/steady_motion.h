@@ -14,6 +14,9 @@ struct MotionConfig {
   double turn_sigma = 0.35;
   double straight_share = 0.6;
   double turn_memory = 1.5;
+  double slowing_share = 0.15;
+  double gaining_share = 0.1;
+  double gain_memory = 0.5;
   double change_cost = 1.6;
   double sigma_floor = 0.02;
 
@@ -25,6 +28,9 @@ struct MotionConfig {
       "standard deviation of the turn rate of a target that turns, rad/s");
     v("straight_share", straight_share, "how likely a target goes straight, above 0 and below 1");
     v("turn_memory", turn_memory, "a turn fades with this time constant, s");
+    v("slowing_share", slowing_share, "how likely a target is slowing down, above 0 to 0.45");
+    v("gaining_share", gaining_share, "how likely it is speeding up, above 0 to 0.45");
+    v("gain_memory", gain_memory, "speeding up fades with this time constant, s");
     v("change_cost", change_cost,
       "negative log likelihood of an observation from before the motion changed");
     v("sigma_floor", sigma_floor, "least standard deviation of a merged observation, m");

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "deploy/worlds/worlds.h"
 #include "test/bench/prediction_courses.h"
 
 namespace chase::prediction {
@@ -46,6 +47,15 @@ std::vector<Course> Drives() {
   return {DriveCourse(0), DriveCourse(1), DriveCourse(2), DriveCourse(3), DriveCourse(4)};
 }
 
+// The targets of random worlds of every kind.
+std::vector<Course> Worlds(uint64_t first, uint64_t last) {
+  std::vector<Course> courses;
+  for (const auto& kind : worlds::Kinds())
+    for (uint64_t seed = first; seed <= last; ++seed)
+      courses.push_back(WorldCourse(kind.name, seed));
+  return courses;
+}
+
 #define ACCURACY(name, ...)                                                          \
   BENCHMARK_CAPTURE(Accuracy, name, [] { return std::vector<Course>(__VA_ARGS__); }) \
       ->Iterations(1)                                                                \
@@ -57,6 +67,8 @@ ACCURACY(gym, {GymCourse()});
 ACCURACY(corridor, {CorridorCourse()});
 ACCURACY(S1_to_S6_tuned_on, Twelve(1, 6));
 ACCURACY(S7_to_S12, Twelve(7, 12));
+ACCURACY(worlds_1_to_4, Worlds(1, 4));
+ACCURACY(worlds_1001_to_1004_chosen_on, Worlds(1001, 1004));
 
 }  // namespace
 }  // namespace chase::prediction

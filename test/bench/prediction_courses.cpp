@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "common/world/scenario.h"
+#include "deploy/worlds/worlds.h"
 #include "test/unit/prediction_instances.h"
 
 namespace chase::prediction {
@@ -120,6 +121,11 @@ Course CorridorCourse() {
     }
   }
   return course;
+}
+
+Course WorldCourse(const std::string& kind, uint64_t seed) {
+  const world::Scenario scenario = worlds::MakeWorld(kind, seed, {});
+  return {kind, Sampled(world::TargetMotion(scenario)), {}, scenario.target.radius};
 }
 
 Course StraightCourse() {

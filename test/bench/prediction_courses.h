@@ -23,6 +23,8 @@ Course GymCourse();
 Course TwelveCourse(int number);
 /// Along a corridor 2.4 m wide whose walls force turns of 90 degrees every 4 to 7 m.
 Course CorridorCourse();
+/// The target of a random world, nothing around.
+Course WorldCourse(const std::string& kind, uint64_t seed);
 /// Straight on at 1 m/s, nothing around.
 Course StraightCourse();
 /// Straights and curves, two of three of them 90 degrees at 0.8 m, with stops; nothing around.
