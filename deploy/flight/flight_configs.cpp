@@ -1,5 +1,7 @@
 #include "deploy/flight/flight_configs.h"
 
+#include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <stdexcept>
 
@@ -27,6 +29,15 @@ void Derive(const world::Scenario& scenario, FlightConfigs* configs) {
   configs->planning.planner.desired_distance = chaser.desired_distance;
   configs->planning.planner.drone_radius = chaser.radius;
   configs->control.drone_radius = chaser.radius;
+}
+
+/// The image's edges less a margin: what calibration, drag and control tilt the body by.
+void DeriveView(const world::Rig& rig, planning::PlannerConfig* planner) {
+  constexpr double kMargin = 3.0, deg = 180.0 / M_PI;
+  const auto angle = [&](double px) { return std::atan(px / rig.focal_px) * deg - kMargin; };
+  planner->view_down_deg = angle(rig.height_px - 1 - rig.center_v_px) + rig.camera_pitch_deg;
+  planner->view_up_deg = angle(rig.center_v_px) - rig.camera_pitch_deg;
+  planner->max_bearing_deg = angle(std::min(rig.center_u_px, rig.width_px - 1 - rig.center_u_px));
 }
 
 /// The scenario's faults and the command line's, in this order.
@@ -69,6 +80,7 @@ FlightConfigs Configure(const world::Scenario& scenario, const FlightOptions& op
   Override(scenario, "mapping", &configs.mapping);
   Override(scenario, "perception", &configs.perception);
   Override(scenario, "prediction", &configs.prediction);
+  DeriveView(configs.perception.rig, &configs.planning.planner);
   Override(scenario, "planning", &configs.planning);
   configs.control.tracking_tube = configs.planning.planner.tracking_tube;
   configs.control.sigmas = configs.planning.planner.sigmas;

@@ -5,6 +5,7 @@
 
 #include "common/math/bernstein.h"
 #include "common/math/exact.h"
+#include "services/planning/field_of_view.h"
 #include "services/planning/limits.h"
 #include "services/planning/product_weights.h"
 #include "services/planning/separations.h"
@@ -239,6 +240,11 @@ std::string SampleFaults(const Curve& plan, const Problem& problem, double sight
     if (l.tan_elevation > 0.0 &&
         std::abs(p.z() - q.z()) > l.tan_elevation * (p - q).head<2>().norm() + 1e-9)
       return "elevation";
+    if (l.view && tau >= l.view_from) {
+      const double T2 = problem.duration * problem.duration;
+      const double below = SeenAt(q - p, Evaluate(plan, tau, 2) / T2, nullptr).x();
+      if (!(below < l.view->down + 1e-9) || !(below > -l.view->up - 1e-9)) return "image";
+    }
   }
   return "";
 }

@@ -59,9 +59,10 @@ Cost Weigh(const PlannerConfig& config, double T, const Curve& plan, const Targe
     const Eigen::Vector3d r = target(k, 0) - p;
     const Eigen::Vector3d rate = (target(k, 1) - Evaluate(plan, tau, 1)) / T;
     const double excess = r.norm() - config.desired_distance;
+    const double rise = config.desired_height() + r.z();
     const double h = std::max(r.head<2>().squaredNorm(), kYawDistanceFloor * kYawDistanceFloor);
     const double yaw_rate = (r.x() * rate.y() - r.y() * rate.x()) / h;
-    cost.j3 += weight * excess * excess;
+    cost.j3 += weight * (excess * excess + config.rho_height * rise * rise);
     cost.j4 += weight * yaw_rate * yaw_rate;
   }
   cost.total = config.weight_smooth * cost.j1 + config.weight_obstacle * cost.j2 +

@@ -89,7 +89,7 @@ struct Context {
   float rel[kQuadratureNodes][3], rel_rate[kQuadratureNodes][2];
   float target[kQuadratureNodes][3];
   float weight3[kQuadratureNodes], weight4[kQuadratureNodes];
-  float desired_distance, yaw_floor;
+  float desired_distance, desired_height, rho_height, yaw_floor;
   float cost_range;
   const NearNode* near;
   const int* near_begin;  ///< [kQuadratureNodes + 1]
@@ -159,7 +159,7 @@ struct ObjectiveInput {
   double rate[2][kPaddedNodes];
   double weight[kPaddedNodes];  ///< with the duration
   double weight_obstacle, weight_distance, weight_yaw;
-  double desired_distance, yaw_floor, cost_range;
+  double desired_distance, desired_height, rho_height, yaw_floor, cost_range;
   const double* near;  ///< [n_near][kNearSize]: R00 R01 R02 R11 R12 R22, centre at the nodes
   int n_near;
 };

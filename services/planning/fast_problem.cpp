@@ -37,6 +37,8 @@ bool FastProblem::Set(const Problem& problem, PlanProof* proof, float limit) {
   c.work = work_.data();
   c.alive = alive_.data();
   c.desired_distance = static_cast<float>(config_.desired_distance);
+  c.desired_height = static_cast<float>(config_.desired_height());
+  c.rho_height = static_cast<float>(config_.rho_height);
   c.yaw_floor = static_cast<float>(kYawDistanceFloor * kYawDistanceFloor);
   c.cost_range = static_cast<float>(config_.cost_range);
   c.exact = config_.exact_visibility ? 1 : 0;

@@ -269,7 +269,8 @@ Cost FastProblem::CostOf(int index) const {
     const double excess = std::sqrt(h + d[2] * d[2]) - config_.desired_distance;
     const double rate =
         (d[0] * v[1] - d[1] * v[0]) / std::max(h, kYawDistanceFloor * kYawDistanceFloor);
-    cost.j3 += weight * excess * excess;
+    const double rise = config_.desired_height() + d[2];
+    cost.j3 += weight * (excess * excess + config_.rho_height * rise * rise);
     cost.j4 += weight * rate * rate;
     if (near_begin_[k] == near_begin_[k + 1]) continue;
     double p[3] = {};

@@ -4,88 +4,219 @@
 #include <cmath>
 
 #include "common/math/bernstein.h"
-#include "services/planning/candidate_set.h"
 
 namespace chase::planning {
 namespace {
 
-using math::Polynomial;
+constexpr double kGravity = 9.80665;  // m/s^2
+constexpr double kSlack = 1e-9;       // of all rounding, relative
+constexpr int kMost = 12;             // coefficients of a curve
+constexpr int kDepth = 7;             // halvings
 
-constexpr int kDepth = 12;
-constexpr double kRounding = 1e-12;  // of all steps, relative to the sums of coefficients
+struct Range {
+  double low, high;
+};
+Range operator+(Range a, Range b) { return {a.low + b.low, a.high + b.high}; }
+Range operator-(Range a, Range b) { return {a.low - b.high, a.high - b.low}; }
+Range operator*(double s, Range a) {
+  return s < 0.0 ? Range{s * a.high, s * a.low} : Range{s * a.low, s * a.high};
+}
+Range operator*(Range a, Range b) {
+  const double p[] = {a.low * b.low, a.low * b.high, a.high * b.low, a.high * b.high};
+  return {std::min({p[0], p[1], p[2], p[3]}), std::max({p[0], p[1], p[2], p[3]})};
+}
+Range Squared(Range a) {
+  const double l = a.low * a.low, h = a.high * a.high;
+  return {a.low <= 0.0 && a.high >= 0.0 ? 0.0 : std::min(l, h), std::max(l, h)};
+}
+Range Root(Range a) { return {std::sqrt(std::max(0.0, a.low)), std::sqrt(a.high)}; }
 
+/// Bernstein coefficients.
+struct Coefficients {
+  int n = 1;
+  double c[kMost] = {};
+
+  Range range() const {
+    const auto [low, high] = std::minmax_element(c, c + n);
+    return {*low, *high};
+  }
+  Coefficients End(bool last) const { return {1, {c[last ? n - 1 : 0]}}; }
+};
+
+void Split(const Coefficients& whole, double at, Coefficients* left, Coefficients* right) {
+  left->n = right->n = whole.n;
+  std::copy(whole.c, whole.c + whole.n, right->c);
+  left->c[0] = right->c[0];
+  for (int k = 1; k < whole.n; ++k) {
+    for (int i = 0; i + k < whole.n; ++i)
+      right->c[i] = (1.0 - at) * right->c[i] + at * right->c[i + 1];
+    left->c[k] = right->c[0];
+  }
+}
+
+/// Of a plan: target - plan, acceleration plus gravity, and the yaw where there is one.
 struct Piece {
-  Polynomial x, y, yaw;  // target - plan and yaw in Bernstein form
+  Coefficients r[3], f[3], yaw;
+  bool has_yaw = false;
+
+  Piece End(bool last) const {
+    Piece end;
+    for (int a = 0; a < 3; ++a) end.r[a] = r[a].End(last), end.f[a] = f[a].End(last);
+    end.yaw = yaw.End(last);
+    end.has_yaw = has_yaw;
+    return end;
+  }
 };
 
-struct Margins {
-  double half_angle, length, angle;
+void Split(const Piece& whole, double at, Piece* left, Piece* right) {
+  for (int a = 0; a < 3; ++a) {
+    Split(whole.r[a], at, &left->r[a], &right->r[a]);
+    Split(whole.f[a], at, &left->f[a], &right->f[a]);
+  }
+  Split(whole.yaw, at, &left->yaw, &right->yaw);
+  left->has_yaw = right->has_yaw = whole.has_yaw;
+}
+
+/// Directions within `half` (below pi/2) of the middle one.
+struct Fan {
+  double cosine, sine, half;
+
+  /// Level coordinates along and across the middle direction.
+  void Turn(const Coefficients* xy, Coefficients* along, Coefficients* across) const {
+    along->n = across->n = xy[0].n;
+    for (int i = 0; i < xy[0].n; ++i) {
+      along->c[i] = cosine * xy[0].c[i] + sine * xy[1].c[i];
+      across->c[i] = cosine * xy[1].c[i] - sine * xy[0].c[i];
+    }
+  }
 };
 
-struct Direction {
-  double x, y;
-  explicit Direction(double angle) : x(std::cos(angle)), y(std::sin(angle)) {}
+std::optional<Fan> HeadingOf(const Piece& piece) {
+  if (piece.has_yaw) {
+    const Range yaw = piece.yaw.range();
+    const double middle = 0.5 * (yaw.low + yaw.high), half = 0.5 * (yaw.high - yaw.low);
+    if (!(half < 1.5)) return std::nullopt;
+    return Fan{std::cos(middle), std::sin(middle), half};
+  }
+  Fan fan{0.0, 0.0, 0.0};
+  for (int i = 0; i < piece.r[0].n; ++i) fan.cosine += piece.r[0].c[i], fan.sine += piece.r[1].c[i];
+  const double length = std::hypot(fan.cosine, fan.sine);
+  if (!(length > 0.0)) return std::nullopt;
+  fan.cosine /= length, fan.sine /= length;
+  Coefficients along, across;
+  fan.Turn(piece.r, &along, &across);
+  for (int i = 0; i < along.n; ++i) {
+    if (!(along.c[i] > 0.0)) return std::nullopt;
+    fan.half = std::max(fan.half, std::atan2(std::abs(across.c[i]), along.c[i]));
+  }
+  return fan;
+}
+
+/// The target in the body's frame, forward, left and down, each times the same positive number.
+struct Seen {
+  Range forward, left, down;
 };
 
-// > 0 where (x, y) lies to the left of the direction.
-double Left(const Direction& d, double x, double y) { return d.x * y - d.y * x; }
+std::optional<Seen> SeenFrom(const Piece& piece) {
+  const auto heading = HeadingOf(piece);
+  if (!heading) return std::nullopt;
+  const Range cosine{std::cos(heading->half), 1.0};
+  const Range sine{-std::sin(heading->half), std::sin(heading->half)};
+  const auto turned = [&](const Coefficients* xy, Range* x, Range* y) {
+    Coefficients along, across;
+    heading->Turn(xy, &along, &across);
+    const Range a = along.range(), b = across.range();
+    *x = cosine * a + sine * b;
+    *y = cosine * b - sine * a;
+  };
+  Range x{}, y{}, ax{}, ay{};
+  turned(piece.r, &x, &y);
+  turned(piece.f, &ax, &ay);
+  if (!piece.has_yaw) {
+    x = {std::max(x.low, 0.0), x.high};
+    y = {0.0, 0.0};
+  }
+  const Range z = piece.r[2].range(), up = piece.f[2].range();
+  if (!(up.low > 0.0)) return std::nullopt;
+  const Range lateral2 = Squared(up) + Squared(ay), lateral = Root(lateral2);
+  const Range thrust = Root(lateral2 + Squared(ax));
+  return Seen{x * lateral2 - y * ax * ay - z * up * ax, (y * up - z * ay) * thrust,
+              -1.0 * ((x * ax + y * ay + z * up) * lateral)};
+}
 
-bool IsBetween(const Piece& piece, const Margins& m) {
-  const double from = piece.yaw.maxCoeff() + m.angle - m.half_angle;
-  const double to = piece.yaw.minCoeff() - m.angle + m.half_angle;
-  if (!(from < to)) return false;
-  const Direction first(from), last(to);
-  for (Eigen::Index i = 0; i < piece.x.size(); ++i)
-    if (!(Left(first, piece.x[i], piece.y[i]) > m.length) ||
-        !(Left(last, piece.x[i], piece.y[i]) < -m.length))
-      return false;
+bool IsInside(const Piece& piece, const View& view) {
+  const auto seen = SeenFrom(piece);
+  if (!seen) return false;
+  const Range forward = seen->forward, down = seen->down;
+  const double slack = kSlack * (std::abs(forward.high) + std::abs(down.low) + std::abs(down.high) +
+                                 std::abs(seen->left.high));
+  if ((down - view.down * forward).high > -slack) return false;
+  if ((down + view.up * forward).low < slack) return false;
+  if (!piece.has_yaw) return true;
+  const double pitch = 0.5 * (std::atan(view.down) - std::atan(view.up));
+  const Range side = view.side * (std::cos(pitch) * forward + std::sin(pitch) * down);
+  return (seen->left - side).high < -slack && (seen->left + side).low > slack;
+}
+
+bool Keeps(const Piece& piece, const View& view, int depth) {
+  if (!IsInside(piece.End(false), view) || !IsInside(piece.End(true), view)) return false;
+  if (IsInside(piece, view)) return true;
+  if (depth == 0) return false;
+  Piece left, right;
+  Split(piece, 0.5, &left, &right);
+  return Keeps(left, view, depth - 1) && Keeps(right, view, depth - 1);
+}
+
+bool Set(const math::Polynomial& power, Coefficients* out) {
+  if (power.size() > kMost || !power.allFinite()) return false;
+  const math::Polynomial b = math::PowerToBernstein(power);
+  out->n = static_cast<int>(b.size());
+  std::copy(b.data(), b.data() + b.size(), out->c);
   return true;
 }
 
-bool IsBrokenAt(const Piece& piece, Eigen::Index i, Eigen::Index j, const Margins& m) {
-  return Left(Direction(piece.yaw[j] - m.half_angle), piece.x[i], piece.y[i]) < -m.length ||
-         Left(Direction(piece.yaw[j] + m.half_angle), piece.x[i], piece.y[i]) > m.length;
-}
-
-bool Keeps(const Piece& piece, const Margins& m, int depth) {
-  if (IsBetween(piece, m)) return true;
-  if (depth == 0 || IsBrokenAt(piece, 0, 0, m) ||
-      IsBrokenAt(piece, piece.x.size() - 1, piece.yaw.size() - 1, m))
-    return false;
-  Piece left, right;
-  math::SplitBernstein(piece.x, 0.5, &left.x, &right.x);
-  math::SplitBernstein(piece.y, 0.5, &left.y, &right.y);
-  math::SplitBernstein(piece.yaw, 0.5, &left.yaw, &right.yaw);
-  return Keeps(left, m, depth - 1) && Keeps(right, m, depth - 1);
+bool Set(const Curve& plan, const Curve& target, double duration, const std::vector<double>* yaw,
+         Piece* piece) {
+  const Eigen::Index n = std::max(plan.rows(), target.rows());
+  for (int a = 0; a < 3; ++a) {
+    math::Polynomial r = math::Polynomial::Zero(n);
+    r.head(target.rows()) = target.col(a);
+    r.head(plan.rows()) -= plan.col(a);
+    math::Polynomial f = math::Derivative(math::Derivative(plan.col(a))) / (duration * duration);
+    if (a == 2) f[0] += kGravity;
+    if (!Set(r, &piece->r[a]) || !Set(f, &piece->f[a])) return false;
+  }
+  piece->has_yaw = yaw != nullptr;
+  return !yaw || (!yaw->empty() && Set(Eigen::Map<const Eigen::VectorXd>(
+                                           yaw->data(), static_cast<Eigen::Index>(yaw->size())),
+                                       &piece->yaw));
 }
 
 }  // namespace
 
-bool KeepsBearing(const Curve& plan, const Curve& target, const std::vector<double>& yaw,
-                  double half_angle) {
-  if (yaw.empty() || !plan.allFinite() || !target.allFinite()) return false;
-  double length = 0.0, angle = 0.0;
-  for (int a = 0; a < 2; ++a)
-    length += plan.col(a).cwiseAbs().sum() + target.col(a).cwiseAbs().sum();
-  for (const double y : yaw) angle += std::abs(y);
-  if (!std::isfinite(angle)) return false;
-  // x, y and yaw as the three coordinates of a curve.
-  const Eigen::Index turns = static_cast<Eigen::Index>(yaw.size());
-  const Eigen::Index n = std::max({plan.rows(), target.rows(), turns});
+bool KeepsView(const Curve& plan, const Curve& target, double duration,
+               const std::vector<double>* yaw, const View& view, double from) {
   Piece whole;
-  if (n > 16) return false;
-  Curve all = Curve::Zero(n, 3);
-  all.topLeftCorner(target.rows(), 2) = target.leftCols<2>();
-  all.topLeftCorner(plan.rows(), 2) -= plan.leftCols<2>();
-  all.col(2).head(turns) = Eigen::Map<const Eigen::VectorXd>(yaw.data(), turns);
-  if (n <= 7) {
-    const Points points = ToPoints(all, 6);
-    whole = {points.col(0), points.col(1), points.col(2)};
-  } else {
-    whole = {math::PowerToBernstein(all.col(0)), math::PowerToBernstein(all.col(1)),
-             math::PowerToBernstein(all.col(2))};
+  if (!Set(plan, target, duration, yaw, &whole)) return false;
+  if (from >= 1.0) return true;
+  if (from > 0.0) {
+    Piece before, after;
+    Split(whole, from, &before, &after);
+    whole = after;
   }
-  return Keeps(whole, {half_angle, kRounding * (1.0 + length), kRounding * (1.0 + angle)}, kDepth);
+  return Keeps(whole, view, kDepth);
+}
+
+Eigen::Vector2d SeenAt(const Eigen::Vector3d& to_target, const Eigen::Vector3d& acceleration,
+                       const double* yaw) {
+  Piece piece;
+  for (int a = 0; a < 3; ++a) piece.r[a].c[0] = to_target[a], piece.f[a].c[0] = acceleration[a];
+  piece.f[2].c[0] += kGravity;
+  if (yaw) piece.yaw.c[0] = *yaw;
+  piece.has_yaw = yaw != nullptr;
+  const auto seen = SeenFrom(piece);
+  if (!seen || !(seen->forward.low > 0.0)) return Eigen::Vector2d::Constant(HUGE_VAL);
+  return {seen->down.low / seen->forward.low, seen->left.low / seen->forward.low};
 }
 
 }  // namespace chase::planning

@@ -6,12 +6,18 @@
 
 namespace chase::planning {
 
-/// Does the bearing of the target from the plan stay within `half_angle` (rad, below pi/2) of the
-/// yaw over all of [0,1]? Certified by subdivision: on a piece where the yaw lies in [a, b], the
-/// control points of target - plan must lie between the directions b - half_angle and
-/// a + half_angle; rounding is covered by a margin, and what stays open counts as no. `yaw`: power
-/// basis in tau, rad.
-bool KeepsBearing(const Curve& plan, const Curve& target, const std::vector<double>& yaw,
-                  double half_angle);
+/// Does the target's centre stay within the image over [from,1]? The body's z axis lies along the
+/// plan's acceleration plus gravity (Mellinger & Kumar 2011), its x axis in the plane of that and
+/// the heading: `yaw` (power basis in tau, rad) or, where that is null, towards the target; then
+/// the sides of the image are not asked about. Certified by interval arithmetic and subdivision;
+/// what stays open counts as no. Drag and the lever arm of the camera are left to the view's
+/// margin.
+bool KeepsView(const Curve& plan, const Curve& target, double duration,
+               const std::vector<double>* yaw, const View& view, double from = 0.0);
+
+/// Where the target's centre appears, as tangents in the body's frame: below its level, and to the
+/// left; (inf, inf) behind the camera. For one instant; heading as above.
+Eigen::Vector2d SeenAt(const Eigen::Vector3d& to_target, const Eigen::Vector3d& acceleration,
+                       const double* yaw);
 
 }  // namespace chase::planning

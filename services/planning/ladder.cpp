@@ -106,16 +106,18 @@ class Ladder : public Planner {
     });
   }
 
-  // Position decides safety and sight; the yaw may still have to catch up with the target.
+  // The search takes the yaw for pointing at the target, and a start as it is; the yaw that is
+  // flown may still have to catch up.
   void SetField(const PlanRequest& request, PlanResult* result) const {
     const world::Trajectory& plan = result->trajectory;
-    result->in_field =
-        config_.max_bearing_deg <= 0.0 ||
-        KeepsBearing(Curve(plan.coefficients), ToCurve(request.target, plan.start, plan.duration),
-                     result->yaw, config_.max_bearing_deg * M_PI / 180.0);
+    const std::optional<View> view = config_.view();
+    result->in_field = !view || KeepsView(Curve(plan.coefficients),
+                                          ToCurve(request.target, plan.start, plan.duration),
+                                          plan.duration, &result->yaw, *view);
     if (result->in_field || !IsInSightVerdict(result->verdict)) return;
+    result->verdict = Verdict::kSafeOnly;
     result->reason += (result->reason.empty() ? "" : "; ");
-    result->reason += "the target leaves the horizontal field of view";
+    result->reason += "the target leaves the field of view";
   }
 
   /// A certified plan on its way through a rung.
@@ -302,7 +304,14 @@ class Ladder : public Planner {
     if (problem_.target_body) problem_.limits.min_distance = 0.0;
     placer_.Place(Layout::kCautious, &problem_);
     problem_.reach.reset();
-    for (double sight_from : {0.25, 0.5, 0.75, 1.0}) {
+    struct Try {
+      double sight_from;
+      bool view;
+    };
+    for (const auto& [sight_from, view] : {Try{0.25, true}, Try{0.5, true}, Try{0.25, false},
+                                           Try{0.5, false}, Try{0.75, false}, Try{1.0, false}}) {
+      problem_.limits.view = view ? config_.view() : std::nullopt;
+      problem_.limits.view_from = sight_from;
       if (!TrySearch(problem_, sight_from, std::nullopt, result)) continue;
       Take(request, problem_, result);
       sight_from_ = sight_from;

@@ -5,6 +5,7 @@
 
 #include "common/math/bernstein.h"
 #include "services/planning/candidate_set.h"
+#include "services/planning/field_of_view.h"
 
 namespace chase::planning {
 namespace {
@@ -191,6 +192,8 @@ bool KeepsLimits(const Curve& plan, const Problem& problem) {
   if (l.height && !KeepsHeight(quick, plan, l)) return false;
   if (l.speed > 0.0 && !KeepsNorm(quick, plan, 1, l.speed, problem.duration)) return false;
   if (l.acceleration > 0.0 && !KeepsNorm(quick, plan, 2, l.acceleration, problem.duration))
+    return false;
+  if (l.view && !KeepsView(plan, target, problem.duration, nullptr, *l.view, l.view_from))
     return false;
   if (!(l.tan_elevation > 0.0) && !(l.min_distance > 0.0)) return true;
   if (small) {

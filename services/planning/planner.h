@@ -63,7 +63,7 @@ struct PlanResult {
   /// such as splines, need them.
   std::vector<world::Trajectory> rest;
   std::vector<double> yaw;  ///< power basis in tau, unwrapped, rad
-  bool in_field = false;    ///< certified: the bearing stays within max_bearing_deg of the yaw
+  bool in_field = false;    ///< certified: the target stays in the image
   /// That the trajectory keeps off all obstacles; none where it is not certified, or where they
   /// stand for ellipsoids without margins, for which the search's own certificate is exact.
   std::vector<Proof> proofs;

@@ -31,6 +31,7 @@ std::string PlannerConfig::Problem() const {
                                                          {"weight_yaw", weight_yaw},
                                                          {"rho_acceleration", rho_acceleration},
                                                          {"rho_jerk", rho_jerk},
+                                                         {"rho_height", rho_height},
                                                          {"cost_min", cost_min},
                                                          {"cost_max", cost_max},
                                                          {"drone_radius", drone_radius},
@@ -51,16 +52,32 @@ std::string PlannerConfig::Problem() const {
     return Say("max_elevation_deg", max_elevation_deg, "in [0, 90)");
   if (!(max_bearing_deg >= 0.0 && max_bearing_deg < 90.0))
     return Say("max_bearing_deg", max_bearing_deg, "in [0, 90)");
+  if (!(view_down_deg >= 0.0 && view_down_deg < 90.0))
+    return Say("view_down_deg", view_down_deg, "in [0, 90)");
+  if (!(view_up_deg > -view_down_deg && view_up_deg < 90.0) && view_down_deg > 0.0)
+    return Say("view_up_deg", view_up_deg, "above -view_down_deg, below 90");
   if (!(max_yaw_rate > 0.0)) return Say("max_yaw_rate", max_yaw_rate, "above 0");
   return "";
+}
+
+double PlannerConfig::desired_height() const {
+  const double mean = 0.5 * (elevation_low_deg + elevation_high_deg);
+  return desired_distance * std::sin(mean * M_PI / 180.0);
+}
+
+std::optional<View> PlannerConfig::view() const {
+  if (view_down_deg <= 0.0) return std::nullopt;
+  constexpr double deg = M_PI / 180.0;
+  return View{std::tan(view_down_deg * deg), std::tan(view_up_deg * deg),
+              std::tan(max_bearing_deg * deg)};
 }
 
 PlannerConfig PlannerConfig::Literal() {
   PlannerConfig c;
   c.adaptive = c.refine = c.minkowski_sums = false;
   c.drone_radius = c.tracking_tube = c.safety_margin = c.sight_margin = c.sigmas = 0.0;
-  c.max_speed = c.max_acceleration = c.max_elevation_deg = c.max_bearing_deg = 0.0;
-  c.min_distance = 0.0;
+  c.max_speed = c.max_acceleration = c.max_elevation_deg = c.view_down_deg = 0.0;
+  c.min_distance = c.rho_height = 0.0;
   c.z_min = c.z_max = 0.0;
   return c;
 }

@@ -1,12 +1,19 @@
 #pragma once
 
+#include <optional>
 #include <string>
 
 namespace chase::planning {
 
+/// Edges of the image as tangents in the body's frame: below and above its level, and to either
+/// side of the optical axis.
+struct View {
+  double down = 0.0, up = 0.0, side = 0.0;
+};
+
 /// Parameters of the planner. Symbols of Jeon 2021 in brackets.
 struct PlannerConfig {
-  int degree = 5;
+  int degree = 6;
   int steps = 4;
   int skeletons = 6;
   double desired_distance = 2.5;
@@ -21,7 +28,7 @@ struct PlannerConfig {
   bool minkowski_sums = true;
 
   double weight_smooth = 0.05, weight_obstacle = 1.0, weight_distance = 1.0, weight_yaw = 1.0;
-  double rho_acceleration = 1.0, rho_jerk = 0.1;
+  double rho_acceleration = 1.0, rho_jerk = 0.1, rho_height = 1.0;
   double cost_min = 0.01, cost_max = 1.0, cost_range = 2.0;
 
   double drone_radius = 0.25;
@@ -35,6 +42,8 @@ struct PlannerConfig {
   double z_min = 0.6;
   double z_max = 3.5;
   double max_elevation_deg = 28.0;
+  double view_down_deg = 37.5;
+  double view_up_deg = 13.5;
   double max_bearing_deg = 38.0;
   double min_distance = 0.8;
   double max_yaw_rate = 2.5;
@@ -61,6 +70,9 @@ struct PlannerConfig {
     v("weight_yaw", weight_yaw, "[w_4]");
     v("rho_acceleration", rho_acceleration, "of squared acceleration in J1 [rho_2]");
     v("rho_jerk", rho_jerk, "of squared jerk in J1 [rho_3]");
+    v("rho_height", rho_height,
+      "of the squared departure in J3 from the skeletons' mean height above the target; "
+      "0: the paper's");
     v("cost_min", cost_min, "obstacle cost far away [c_min]");
     v("cost_max", cost_max, "obstacle cost at its centre [c_max]");
     v("cost_range", cost_range, "where it ends, in obstacle radii [l_s]");
@@ -74,13 +86,20 @@ struct PlannerConfig {
     v("z_min", z_min, "lowest height of a plan above the ground, m; z_min = z_max: no limits");
     v("z_max", z_max, "greatest height of a plan above the ground, m");
     v("max_elevation_deg", max_elevation_deg, "of the target out of the level; 0: no limit");
-    v("max_bearing_deg", max_bearing_deg,
-      "of the target off the yaw, said when broken; 0: no limit");
+    v("view_down_deg", view_down_deg,
+      "the image's lower edge below the body's level, less what tilt and calibration may be off; "
+      "0: the image is not asked about");
+    v("view_up_deg", view_up_deg, "its upper edge above the body's level, the same way");
+    v("max_bearing_deg", max_bearing_deg, "its sides off the optical axis, the same way");
     v("min_distance", min_distance, "from the drone to the target's centre, m; 0: no limit");
     v("max_yaw_rate", max_yaw_rate, "of the plan's yaw, rad/s");
   }
   /// Of what has to stay clear in any case: sphere and tube, m.
   double hard_radius() const { return drone_radius + tracking_tube; }
+  /// Above the target, m: at the skeletons' mean elevation.
+  double desired_height() const;
+  /// The image's edges; none where it is not asked about.
+  std::optional<View> view() const;
   std::string Problem() const;
 
   /// Problem 2 as the paper states it: no inflation, no limits, fixed layout, no refinement.

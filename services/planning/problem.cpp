@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "services/planning/candidate_set.h"
+#include "services/planning/field_of_view.h"
 #include "services/planning/separations.h"
 
 namespace chase::planning {
@@ -13,9 +14,10 @@ namespace {
 // Margins are taken back in these shares until the start, the target, or the line of sight at the
 // start is outside the shape.
 constexpr double kShares[] = {1.0, 0.75, 0.5, 0.25, 0.0};
-constexpr double kClear = 1.02;    // squared distance; as a factor of lengths more than enough
-constexpr double kPoint = 1e6;     // 1/m^2, of a shape that sorts out nothing
-constexpr double kLeaveBy = 0.25;  // tau by which a plan has left an obstacle that it starts in
+constexpr double kClear = 1.02;       // squared distance; as a factor of lengths more than enough
+constexpr double kPoint = 1e6;        // 1/m^2, of a shape that sorts out nothing
+constexpr double kLeaveBy = 0.25;     // tau by which a plan has left an obstacle that it starts in
+constexpr double kBackInView = 0.25;  // tau by which a plan sees a target that it starts without
 
 double SquaredNorm(const Eigen::Matrix3d& R, const Eigen::Vector3d& x) { return x.dot(R * x); }
 
@@ -265,6 +267,10 @@ Limits MakeLimits(const PlannerConfig& c, const world::State& s, const Eigen::Ve
   const double now = std::abs(r.z()) / std::max(r.head<2>().norm(), 1e-3);
   limits.tan_elevation = now < kOverhead ? at_least(tangent, now) : 0.0;
   limits.min_distance = std::min(c.min_distance, 0.9 * r.norm());
+  limits.view = c.view();
+  const double below = SeenAt(r, s.a, nullptr).x();
+  const bool seen = limits.view && below < limits.view->down && below > -limits.view->up;
+  limits.view_from = seen ? 0.0 : kBackInView;
   return limits;
 }
 

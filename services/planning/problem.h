@@ -58,6 +58,8 @@ struct Limits {
   Ground ground;
   double tan_elevation = 0.0;  ///< of the target seen from the drone; 0: none
   double min_distance = 0.0;   ///< m; 0: none
+  std::optional<View> view;    ///< that the target stays in, from above and below
+  double view_from = 0.0;      ///< from this tau on
 };
 
 /// A box, frame W, m.

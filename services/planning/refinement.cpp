@@ -78,6 +78,8 @@ void Refiner::SetObjective() {
   in.weight_distance = config_.weight_distance;
   in.weight_yaw = config_.weight_yaw;
   in.desired_distance = config_.desired_distance;
+  in.desired_height = config_.desired_height();
+  in.rho_height = config_.rho_height;
   in.yaw_floor = kYawDistanceFloor * kYawDistanceFloor;
   in.cost_range = config_.cost_range;
 }

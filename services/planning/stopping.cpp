@@ -119,6 +119,7 @@ class Resting {
     MakeProblem(config_, request_, nullptr, &problem_);
     Limits& l = problem_.limits;
     l.tan_elevation = l.min_distance = 0.0;
+    l.view.reset();
     // Braking may leave the heights as far as the quickest way of it must.
     const Points points = ToPoints(heights_, 5);
     for (int i = 0; i <= 5; ++i) {

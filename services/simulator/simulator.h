@@ -76,6 +76,9 @@ class Simulator {
   /// The flight controller's newest setpoint, received at t [s].
   void SetSetpoint(const AttitudeSetpoint& setpoint, double t);
 
+  /// R_WB as the autopilot takes it to be.
+  const Eigen::Quaterniond& attitude() const { return quadrotor_.state().q; }
+
   /// Advances to t [s] at 1 kHz, and measures there. Times must grow; the first is 0.
   Output Advance(double t);
 

@@ -14,6 +14,7 @@
 #include "chase/scenario_t.hpp"
 #include "chase/truth_t.hpp"
 #include "common/bus/convert.h"
+#include "common/math/rotation.h"
 
 namespace chase::simulator {
 namespace {
@@ -42,12 +43,21 @@ SimulatorNode::SimulatorNode(bus::Bus& bus, const SimulatorConfig& config)
   if (sensors == "truth") truth_feed_ = std::make_unique<TruthFeed>(bus, scenario_, config.rig);
   bus_.Subscribe<attitude_setpoint_t>("ATTITUDE_SETPOINT",
                                       [this](const auto& message) { OnSetpoint(message); });
+  if (!truth_feed_) bus_.Subscribe<pose_t>("POSE", [this](const auto& m) { OnPose(m); });
+}
+
+void SimulatorNode::OnPose(const pose_t& message) {
+  if (epoch_.Change(message.epoch)) changes_frame_ = true;
+  if (!changes_frame_ || message.health == pose_t::HEALTH_STARTING) return;
+  changes_frame_ = false;
+  frame_yaw_ = math::WrapAngle(math::Yaw(simulator_.attitude()) -
+                               math::Yaw(bus::ToQuaternion(message.orientation)));
 }
 
 void SimulatorNode::OnSetpoint(const attitude_setpoint_t& message) {
   if (!power_on_) return;
   AttitudeSetpoint setpoint;
-  setpoint.orientation = bus::ToQuaternion(message.orientation);
+  setpoint.orientation = math::FromYaw(frame_yaw_) * bus::ToQuaternion(message.orientation);
   setpoint.body_rate = bus::ToVector(message.body_rate);
   setpoint.thrust = std::max(0.0, message.thrust);
   setpoint.motors = message.motors != attitude_setpoint_t::MOTORS_OFF;

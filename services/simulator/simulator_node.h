@@ -6,7 +6,9 @@
 #include <string>
 
 #include "chase/attitude_setpoint_t.hpp"
+#include "chase/pose_t.hpp"
 #include "common/bus/bus.h"
+#include "common/bus/epoch.h"
 #include "common/bus/node.h"
 #include "services/simulator/sensor_faults.h"
 #include "services/simulator/simulator.h"
@@ -16,7 +18,9 @@ namespace chase::simulator {
 
 /// ATTITUDE_SETPOINT -> simulator -> IMU, LIDAR_SCAN, CAMERA_IMAGE, TRUTH, SCENARIO, FAULT. The
 /// first tick is power-on. Where the scenario's sensors.mode is "truth", also POSE, TARGET and
-/// OBSTACLES.
+/// OBSTACLES. Else POSE
+/// is heard for its frame: like PX4 with its reset counter, the autopilot takes over the yaw of a
+/// frame that odometry begins anew.
 class SimulatorNode : public bus::Node {
  public:
   SimulatorNode(bus::Bus& bus, const SimulatorConfig& config);
@@ -27,6 +31,7 @@ class SimulatorNode : public bus::Node {
 
  private:
   void OnSetpoint(const attitude_setpoint_t& message);
+  void OnPose(const pose_t& message);
   void PublishImu(const ImuSample& sample, int64_t utime);
   void PublishSweep(Sweep sweep);
   void PublishImage(Image image, int64_t utime);
@@ -41,6 +46,9 @@ class SimulatorNode : public bus::Node {
   Simulator simulator_;
   SensorFaults faults_;
   std::unique_ptr<TruthFeed> truth_feed_;
+  bus::Epoch epoch_;
+  bool changes_frame_ = false;       // its first usable pose is awaited
+  double frame_yaw_ = 0.0;           // of odometry's frame W in the simulator's, rad
   std::optional<int64_t> power_on_;  // utime of the first tick
   int64_t last_tick_ = 0;
   int64_t ticks_ = 0;

@@ -282,6 +282,7 @@ TEST(CertifiedPlan, SaysWhenTheTargetLeavesTheFieldOfView) {
     const bool leaves = worst > config.max_bearing_deg * M_PI / 180.0;
     EXPECT_FALSE(leaves && plan.in_field) << off;
     EXPECT_EQ(plan.in_field, plan.reason.find("field of view") == std::string::npos) << off;
+    EXPECT_TRUE(plan.in_field || plan.verdict >= Verdict::kSafeOnly) << off;
     left += leaves;
     kept += plan.in_field;
   }

@@ -179,32 +179,6 @@ TEST(PlanProof, NothingHoldsForShapesThatAreNone) {
   }
 }
 
-TEST(FieldOfView, CertifiesOnlyWhatSamplingConfirms) {
-  Random g(5);
-  int kept = 0, left_alone = 0;
-  for (int i = 0; i < 3000; ++i) {
-    const Curve plan = RandomCurve(g, 5, 1.0);
-    Curve target = RandomCurve(g, 3, 1.0);
-    target(0, 0) += 6.0;
-    const std::vector<double> yaw = {Uniform(g, -0.3, 0.3), Uniform(g, -0.3, 0.3),
-                                     Uniform(g, -0.3, 0.3)};
-    const double half = Uniform(g, 0.3, 1.2);
-    double worst = 0.0;
-    for (int k = 0; k <= 500; ++k) {
-      const double tau = k / 500.0;
-      const Eigen::Vector3d r = Evaluate(target, tau) - Evaluate(plan, tau);
-      worst = std::max(worst, std::abs(std::remainder(
-                                  std::atan2(r.y(), r.x()) - EvaluateYaw(yaw, tau), 2 * M_PI)));
-    }
-    const bool keeps = KeepsBearing(plan, target, yaw, half);
-    ASSERT_FALSE(keeps && worst > half) << i;
-    kept += keeps;
-    left_alone += !keeps && worst < 0.999 * half;
-  }
-  EXPECT_GT(kept, 500);
-  EXPECT_LT(left_alone, 5) << "certificate far too cautious";
-}
-
 PlannerConfig Literal(int degree, int steps, int skeletons, bool exact) {
   PlannerConfig c = PlannerConfig::Literal();
   c.degree = degree;
