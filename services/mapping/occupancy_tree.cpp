@@ -118,10 +118,9 @@ int OccupancyTree::State(const Eigen::Vector3d& p) const {
 }
 
 size_t OccupancyTree::Bytes() const {
-  std::vector<NumberedTile> tiles;
-  for (const auto& [key, tile] : tiles_) tiles.push_back(Numbered(key, tile));
-  const NodeWriter nodes = Nodes(std::move(tiles));
-  return 16 * (nodes.children() + 1) + 64 * (nodes.bytes().size() / 2);
+  size_t sum = 0;
+  for (const auto& [key, tile] : tiles_) sum += sizeof(key) + tile.Bytes();
+  return sum;
 }
 
 }  // namespace chase::mapping
