@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <utility>
 #include <vector>
 
 #include "services/odometry/cell_index.h"
@@ -102,13 +103,21 @@ class SurfaceMap {
     std::vector<Fitted> fitted;    // what queries read, by the cell's number
   };
 
-  void AddTo(const std::vector<Eigen::Vector3f>& points, Level* level) const;
+  /// What AddTo works with, kept so that sweeps need no new memory.
+  struct Scratch {
+    std::vector<uint64_t> keys;                   // of the points' cells
+    std::vector<size_t> cells;                    // their numbers
+    std::vector<std::pair<size_t, Moments>> due;  // cells to be fitted and to what
+  };
+
+  void AddTo(const std::vector<Eigen::Vector3f>& points, Level* level);
   Fitted Fit(const Level& level, const Moments& moments) const;
   void PruneLevel(const Eigen::Vector3f& center, Level* level);
 
   MapConfig config_;
   SurfaceKind kind_;
   std::vector<Level> levels_;
+  Scratch scratch_;
 };
 
 }  // namespace chase::odometry
