@@ -4,6 +4,7 @@
 #include <utility>
 #include <vector>
 
+#include "common/memory/huge_page_allocator.h"
 #include "services/odometry/cell_index.h"
 
 namespace chase::odometry {
@@ -99,8 +100,10 @@ class SurfaceMap {
     float size = 1.0f, inverse_size = 1.0f;
     Eigen::Vector3f shift = Eigen::Vector3f::Zero();  // of the grid
     CellIndex index;
-    std::vector<Moments> moments;  // what cells learn from and
-    std::vector<Fitted> fitted;    // what queries read, by the cell's number
+    template <class T>
+    using Array = std::vector<T, memory::HugePageAllocator<T>>;
+    Array<Moments> moments;  // what cells learn from and
+    Array<Fitted> fitted;    // what queries read, by the cell's number
   };
 
   /// What AddTo works with, kept so that sweeps need no new memory.
