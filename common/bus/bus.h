@@ -43,8 +43,10 @@ class Bus {
   template <class T>
   void Subscribe(const std::string& channel, std::function<void(const T&)> handler) {
     auto& counters = counters_[channel];
-    SubscribeRaw(channel, [this, channel, &counters, handler](const uint8_t* data, size_t size) {
-      T message;
+    // Every message is decoded into the same place: sweeps and images need no new memory.
+    SubscribeRaw(channel, [this, channel, &counters, handler, kept = std::make_shared<T>()](
+                              const uint8_t* data, size_t size) {
+      T& message = *kept;
       if (!Decode(channel, data, size, &message, &counters)) return;
       Guarded(channel, [&] { handler(message); });
     });

@@ -71,10 +71,13 @@ Mapper::Mapper(const MappingConfig& config)
 
 /// Shortens a ray to the range and to the window's levels; true if it had to.
 bool Mapper::Shorten(const Eigen::Vector3d& origin, Eigen::Vector3d* end) const {
+  constexpr double kSurelyShorter = 1.0 - 1e-12;  // for most, neither root nor division is needed
   const Eigen::Vector3d d = *end - origin;
-  double share = std::min(1.0, config_.grid.range / d.norm());
   const double low = grid_.resolution() * (grid_.z0() + 0.5);
   const double high = grid_.resolution() * (grid_.z0() + VoxelGrid::kLevels - 0.5);
+  const double z = origin.z() + d.z(), range = config_.grid.range;
+  if (d.squaredNorm() < kSurelyShorter * range * range && z >= low && z <= high) return false;
+  double share = std::min(1.0, range / d.norm());
   if (origin.z() + share * d.z() > high) share = (high - origin.z()) / d.z();
   if (origin.z() + share * d.z() < low) share = (low - origin.z()) / d.z();
   if (share >= 1.0) return false;

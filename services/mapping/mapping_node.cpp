@@ -4,6 +4,7 @@
 #include <fstream>
 #include <sstream>
 #include <stdexcept>
+#include <utility>
 
 #include "common/bus/convert.h"
 
@@ -100,7 +101,7 @@ void MappingNode::PublishObstacles(const ObstacleList& list, int64_t utime) {
   for (const auto& obstacle : list.obstacles)
     out.obstacles.push_back(bus::ToMessage(obstacle, *origin_));
   out.n_obstacles = static_cast<int32_t>(out.obstacles.size());
-  bus_.Publish("OBSTACLES", out);
+  bus_.Publish("OBSTACLES", std::move(out));
 }
 
 void MappingNode::PublishMap(int64_t utime) {
@@ -114,7 +115,7 @@ void MappingNode::PublishMap(int64_t utime) {
   const std::string bytes = mapper_->WriteTree(&out.n_occupied);
   out.size = static_cast<int32_t>(bytes.size());
   out.data.assign(bytes.begin(), bytes.end());
-  bus_.Publish("MAP", out);
+  bus_.Publish("MAP", std::move(out));
 }
 
 void MappingNode::SaveTiles() {

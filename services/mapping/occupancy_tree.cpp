@@ -1,161 +1,126 @@
 #include "services/mapping/occupancy_tree.h"
 
-#include <octomap/octomap.h>
-
+#include <algorithm>
 #include <sstream>
 
 namespace chase::mapping {
 
 namespace {
 
-constexpr int kMiddle = 32768;     // OctoMap's key of the cell that starts at zero
-constexpr int kTileLevels = 7;     // 2^7 cells
-constexpr float kOccupied = 2.0f;  // log-odds written
-constexpr float kFree = -1.0f;
+constexpr int kMiddle = 32768;   // OctoMap's key of the cell that starts at zero
+constexpr int kTreeLevels = 16;  // OctoMap's
+constexpr int kUpper = kTreeLevels - OctreeTile::kLevels;  // levels above the tiles
 
-octomap::OcTreeKey TreeKey(const Key& key) {
-  const auto unsign = [](int k) { return static_cast<octomap::key_type>(k + kMiddle); };
-  return {unsign(key.x), unsign(key.y), unsign(key.z)};
-}
+struct NumberedTile {
+  uint32_t morton;
+  const OctreeTile* tile;
+};
+using TileRange = std::pair<const NumberedTile*, const NumberedTile*>;
 
 bool InTree(const Key& key) {
   const auto in = [](int k) { return k >= -kMiddle && k < kMiddle; };
   return in(key.x) && in(key.y) && in(key.z);
 }
 
-/// Gives all children below a node the same value and removes them. OctoMap frees a node's list of
-/// children only by pruning.
-void Collapse(octomap::OcTree* tree, octomap::OcTreeNode* node) {
-  if (!tree->nodeHasChildren(node)) return;
-  for (unsigned i = 0; i < 8; ++i) {
-    if (!tree->nodeChildExists(node, i)) tree->createNodeChild(node, i);
-    octomap::OcTreeNode* child = tree->getNodeChild(node, i);
-    Collapse(tree, child);
-    child->setLogOdds(0.0f);
+std::tuple<int, int, int> TileOf(const Key& key) {
+  constexpr int kLevels = OctreeTile::kLevels;
+  return {key.x >> kLevels, key.y >> kLevels, key.z >> kLevels};
+}
+
+/// The cell's place in its tile.
+unsigned Within(int k) { return static_cast<unsigned>(k) & (OccupancyTree::kTileCells - 1u); }
+
+NumberedTile Numbered(const std::tuple<int, int, int>& key, const OctreeTile& tile) {
+  const auto [x, y, z] = key;
+  uint32_t morton = 0;
+  for (int i = 0; i < kUpper; ++i) {
+    int axis = 0;
+    for (const int k : {x, y, z})
+      morton |= (static_cast<uint32_t>(k + (kMiddle >> OctreeTile::kLevels)) >> i & 1u)
+                << (3 * i + axis++);
   }
-  tree->pruneNode(node);
+  return {morton, &tile};
 }
 
-/// Removes the node of `key` at `depth` from below `node`, which lies at depth `level`. True if
-/// `node` is then empty itself. (OctoMap's own deleteNode keeps lists of children alive.)
-bool Remove(octomap::OcTree* tree, octomap::OcTreeNode* node, const octomap::OcTreeKey& key,
-            unsigned depth, unsigned level) {
-  if (level == depth) {
-    Collapse(tree, node);
-    return true;
-  }
-  const unsigned i =
-      octomap::computeChildIdx(key, static_cast<int>(tree->getTreeDepth() - 1 - level));
-  if (!tree->nodeHasChildren(node) || !tree->nodeChildExists(node, i)) return false;
-  if (!Remove(tree, tree->getNodeChild(node, i), key, depth, level + 1)) return false;
-  tree->deleteNodeChild(node, i);
-  if (tree->nodeHasChildren(node)) return false;
-  tree->createNodeChild(node, 0);
-  Collapse(tree, node);
-  return true;
+/// The node of 8^level tiles that holds those of the range, which is in Morton order.
+NodeState Write(TileRange tiles, int level, NodeWriter* writer) {
+  if (tiles.first == tiles.second) return NodeState::kUnknown;
+  if (level == 0) return tiles.first->tile->Write(writer);
+  const NumberedTile* next = tiles.first;
+  return writer->Inner([&](unsigned i) {
+    const NumberedTile* first = next;
+    while (next != tiles.second && (next->morton >> 3 * (level - 1) & 7u) == i) ++next;
+    return Write({first, next}, level - 1, writer);
+  });
 }
 
-/// Makes what lies below a node of `part` what lies below a node of `tree`.
-void Copy(const octomap::OcTree& tree, const octomap::OcTreeNode* from, octomap::OcTree* part,
-          octomap::OcTreeNode* to) {
-  if (!tree.nodeHasChildren(from)) {
-    Collapse(part, to);
-    to->setLogOdds(from->getLogOdds());
-    return;
-  }
-  for (unsigned i = 0; i < 8; ++i)
-    if (tree.nodeChildExists(from, i))
-      Copy(tree, tree.getNodeChild(from, i), part,
-           part->nodeHasChildren(to) && part->nodeChildExists(to, i)
-               ? part->getNodeChild(to, i)
-               : part->createNodeChild(to, i));
+/// All nodes of the octree that holds these tiles and nothing else.
+NodeWriter Nodes(std::vector<NumberedTile> tiles) {
+  std::sort(tiles.begin(), tiles.end(),
+            [](const NumberedTile& a, const NumberedTile& b) { return a.morton < b.morton; });
+  NodeWriter writer;
+  Write({tiles.data(), tiles.data() + tiles.size()}, kUpper, &writer);
+  return writer;
 }
 
-/// Cells of the occupied leaves below a node whose own edge is 2^level cells.
-int CountOccupied(const octomap::OcTree& tree, const octomap::OcTreeNode* node, unsigned level) {
-  if (!tree.nodeHasChildren(node)) return tree.isNodeOccupied(node) ? 1 << 3 * level : 0;
-  int sum = 0;
-  for (unsigned i = 0; i < 8; ++i)
-    if (tree.nodeChildExists(node, i))
-      sum += CountOccupied(tree, tree.getNodeChild(node, i), level - 1);
-  return sum;
-}
-
-/// OctoMap's "bt" stream. Its own writer does the same but prints to the console.
-std::string ToBytes(const octomap::OcTree& tree) {
-  std::ostringstream out;
-  out << "# Octomap OcTree binary file\n# (feel free to add / change comments, but leave the first "
-         "line as it is!)\n#\nid "
-      << tree.getTreeType() << "\nsize " << tree.size() << "\nres " << tree.getResolution()
-      << "\ndata\n";
-  tree.writeBinaryData(out);
-  return out.str();
+/// OctoMap's "bt" stream with its header.
+std::string ToBytes(const NodeWriter& nodes, double resolution) {
+  std::ostringstream head;
+  head
+      << "# Octomap OcTree binary file\n# (feel free to add / change comments, but leave the first "
+         "line as it is!)\n#\nid OcTree\nsize "
+      << nodes.children() + (nodes.bytes().empty() ? 0 : 1) << "\nres " << resolution << "\ndata\n";
+  return head.str() + nodes.bytes();
 }
 
 }  // namespace
 
-OccupancyTree::OccupancyTree(double resolution)
-    : tree_(std::make_unique<octomap::OcTree>(resolution)) {}
-
-OccupancyTree::~OccupancyTree() = default;
-
 void OccupancyTree::Set(const Key& key, bool occupied) {
   if (!InTree(key)) return;
-  tree_->setNodeValue(TreeKey(key), occupied ? kOccupied : kFree);
-  tiles_.insert({key.x >> kTileLevels, key.y >> kTileLevels, key.z >> kTileLevels});
+  const TileKey tile = TileOf(key);
+  if (last_.second == nullptr || last_.first != tile) last_ = {tile, &tiles_[tile]};
+  last_.second->Set(Within(key.x), Within(key.y), Within(key.z), occupied);
 }
 
 void OccupancyTree::Forget(const Eigen::Vector3d& p, double radius, std::vector<SavedTile>* saved) {
-  const double edge = kTileCells * tree_->getResolution();
+  const double edge = kTileCells * resolution_;
   for (auto it = tiles_.begin(); it != tiles_.end();) {
-    const auto [x, y, z] = *it;
+    const auto [x, y, z] = it->first;
     const Eigen::Vector2d center(edge * (x + 0.5), edge * (y + 0.5));
     if ((center - p.head<2>()).norm() <= radius + 0.5 * edge) {
       ++it;
       continue;
     }
-    if (saved) saved->push_back({x, y, z, Serialise(*it)});
-    Drop(*it);
+    if (saved)
+      saved->push_back({x, y, z, ToBytes(Nodes({Numbered(it->first, it->second)}), resolution_)});
+    last_.second = nullptr;
     it = tiles_.erase(it);
   }
 }
 
-std::string OccupancyTree::Serialise(const Tile& tile) const {
-  const auto [x, y, z] = tile;
-  octomap::OcTree part(tree_->getResolution());
-  const auto corner = [](int t, int cell) {
-    return static_cast<octomap::key_type>(t * kTileCells + cell + kMiddle);
-  };
-  const octomap::OcTreeKey low(corner(x, 0), corner(y, 0), corner(z, 0));
-  const int last = kTileCells - 1;
-  const octomap::OcTreeKey high(corner(x, last), corner(y, last), corner(z, last));
-  const auto leaf = tree_->begin_leafs_bbx(low, high);
-  if (leaf == tree_->end_leafs_bbx()) return ToBytes(part);
-  const unsigned depth = part.getTreeDepth() - kTileLevels;
-  const octomap::OcTreeKey key = leaf.getDepth() < depth ? low : leaf.getKey();
-  part.setNodeValue(key, leaf->getLogOdds());  // makes the way down to the tile
-  Copy(*tree_, tree_->search(key, depth), &part, part.search(key, depth));
-  return ToBytes(part);
-}
-
-void OccupancyTree::Drop(const Tile& tile) {
-  const auto [x, y, z] = tile;
-  const octomap::OcTreeKey key = TreeKey({x * kTileCells, y * kTileCells, z * kTileCells});
-  const unsigned depth = tree_->getTreeDepth() - kTileLevels;
-  if (tree_->getRoot() && Remove(tree_.get(), tree_->getRoot(), key, depth, 0)) tree_->clear();
-}
-
-std::string OccupancyTree::Write(int* occupied) {
-  const octomap::OcTreeNode* root = tree_->getRoot();
-  *occupied = root ? CountOccupied(*tree_, root, tree_->getTreeDepth()) : 0;
-  return ToBytes(*tree_);
+std::string OccupancyTree::Write(int* occupied) const {
+  std::vector<NumberedTile> tiles;
+  *occupied = 0;
+  for (const auto& [key, tile] : tiles_) {
+    tiles.push_back(Numbered(key, tile));
+    *occupied += tile.occupied();
+  }
+  return ToBytes(Nodes(std::move(tiles)), resolution_);
 }
 
 int OccupancyTree::State(const Eigen::Vector3d& p) const {
-  const octomap::OcTreeNode* node = tree_->search(p.x(), p.y(), p.z());
-  return node ? (tree_->isNodeOccupied(node) ? 1 : 0) : -1;
+  const Eigen::Array3d cell = (p.array() / resolution_).floor().max(-1e9).min(1e9);
+  const Key key{static_cast<int>(cell.x()), static_cast<int>(cell.y()), static_cast<int>(cell.z())};
+  const auto tile = tiles_.find(TileOf(key));
+  if (tile == tiles_.end()) return -1;
+  const auto state = tile->second.State(Within(key.x), Within(key.y), Within(key.z));
+  return state == NodeState::kUnknown ? -1 : state == NodeState::kOccupied ? 1 : 0;
 }
 
-size_t OccupancyTree::Bytes() const { return tree_->memoryUsage(); }
+size_t OccupancyTree::Bytes() const {
+  size_t sum = 0;
+  for (const auto& [key, tile] : tiles_) sum += sizeof(key) + tile.Bytes();
+  return sum;
+}
 
 }  // namespace chase::mapping

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "common/memory/huge_page_allocator.h"
 #include "services/mapping/mapping_config.h"
 
 namespace chase::mapping {
@@ -123,8 +124,10 @@ class VoxelGrid {
   double resolution_, step_;
   int x0_ = 0, y0_ = 0, z0_ = 0;
   bool placed_ = false;
-  std::vector<Column> columns_;
-  std::vector<Voxel> voxels_;
+  template <class T>
+  using Array = std::vector<T, memory::HugePageAllocator<T>>;
+  Array<Column> columns_;
+  Array<Voxel> voxels_;
   std::vector<uint32_t> settled_free_;
 };
 

@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "common/memory/huge_page_allocator.h"
+
 namespace chase::odometry {
 
 /// The unit cube that holds u, as one number: 21 bits per axis.
@@ -53,9 +55,10 @@ class CellIndex {
     uint64_t key = 0;
     int number = kNone;
   };
+  using Slots = std::vector<Entry, memory::HugePageAllocator<Entry>>;
 
   void Grow() {
-    std::vector<Entry> old(slots_.size() * 2);
+    Slots old(slots_.size() * 2);
     old.swap(slots_);
     for (const Entry& entry : old)
       if (entry.number != kNone) slots_[Slot(entry.key)] = entry;
@@ -72,7 +75,7 @@ class CellIndex {
     return slot;
   }
 
-  std::vector<Entry> slots_;
+  Slots slots_;
   size_t count_ = 0;
 };
 

@@ -1,5 +1,7 @@
 #include "services/odometry/odometry_node.h"
 
+#include <utility>
+
 #include "chase/pose_t.hpp"
 #include "chase/scan_registered_t.hpp"
 #include "common/bus/convert.h"
@@ -136,7 +138,7 @@ void OdometryNode::Publish(RegisteredSweep sweep) {
   scan_registered_t m = ToMessage(std::move(sweep), origin_);
   m.epoch += first_epoch_;
   epoch_ = m.epoch;
-  bus_.Publish("SCAN_REGISTERED", m);
+  bus_.Publish("SCAN_REGISTERED", std::move(m));
 }
 
 bus::NodeReport OdometryNode::Report() const {

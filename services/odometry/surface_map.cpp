@@ -70,22 +70,19 @@ void SurfaceMap::Add(const std::vector<Eigen::Vector3f>& points) {
 
 /// Neighbours along a ring mostly share a cell. A cell that is due for several fits is fitted once,
 /// to the points of the last.
-void SurfaceMap::AddTo(const std::vector<Eigen::Vector3f>& points, Level* level) const {
-  std::vector<uint64_t> keys;
-  keys.reserve(points.size());
+void SurfaceMap::AddTo(const std::vector<Eigen::Vector3f>& points, Level* level) {
+  auto& [keys, cells, due] = scratch_;
+  keys.clear(), cells.clear(), due.clear();
   for (const Eigen::Vector3f& p : points) {
     keys.push_back(CellKey(level->Scaled(p)));
     level->index.Prefetch(keys.back());
   }
-  std::vector<size_t> cells;
-  cells.reserve(points.size());
   for (size_t i = 0; i < points.size(); ++i) {
     if (static_cast<int>(level->moments.size()) >= config_.max_cells) break;
     const bool same = i > 0 && keys[i] == keys[i - 1];
     cells.push_back(same ? cells.back() : level->CellOf(keys[i], points[i]));
     __builtin_prefetch(&level->moments[cells.back()]);
   }
-  std::vector<std::pair<size_t, Moments>> due;
   for (size_t i = 0; i < cells.size(); ++i) {
     Moments& moments = level->moments[cells[i]];
     if (moments.n >= config_.max_points) continue;

@@ -1,8 +1,10 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <utility>
 #include <vector>
 
+#include "common/memory/huge_page_allocator.h"
 #include "services/odometry/cell_index.h"
 
 namespace chase::odometry {
@@ -98,17 +100,27 @@ class SurfaceMap {
     float size = 1.0f, inverse_size = 1.0f;
     Eigen::Vector3f shift = Eigen::Vector3f::Zero();  // of the grid
     CellIndex index;
-    std::vector<Moments> moments;  // what cells learn from and
-    std::vector<Fitted> fitted;    // what queries read, by the cell's number
+    template <class T>
+    using Array = std::vector<T, memory::HugePageAllocator<T>>;
+    Array<Moments> moments;  // what cells learn from and
+    Array<Fitted> fitted;    // what queries read, by the cell's number
   };
 
-  void AddTo(const std::vector<Eigen::Vector3f>& points, Level* level) const;
+  /// What AddTo works with, kept so that sweeps need no new memory.
+  struct Scratch {
+    std::vector<uint64_t> keys;                   // of the points' cells
+    std::vector<size_t> cells;                    // their numbers
+    std::vector<std::pair<size_t, Moments>> due;  // cells to be fitted and to what
+  };
+
+  void AddTo(const std::vector<Eigen::Vector3f>& points, Level* level);
   Fitted Fit(const Level& level, const Moments& moments) const;
   void PruneLevel(const Eigen::Vector3f& center, Level* level);
 
   MapConfig config_;
   SurfaceKind kind_;
   std::vector<Level> levels_;
+  Scratch scratch_;
 };
 
 }  // namespace chase::odometry

@@ -54,6 +54,55 @@ TEST(MappingTree, WritesWhatOctomapWrites) {
   }
 }
 
+/// Boxes of one state across the borders of bricks, tiles and the middle of the tree: nodes of all
+/// levels up to that of a tile are pruned and parted again.
+TEST(MappingTree, WritesBoxesAsOctomapDoes) {
+  OccupancyTree tree(0.2);
+  octomap::OcTree reference(0.2);
+  std::mt19937 random(3);
+  for (const int edge : {2, 4, 8, 16, 128, 9, 33, 5, 64, 1, 17, 8}) {
+    const int shift = edge == 128 ? 0 : static_cast<int>(random() % 100);
+    const bool occupied = random() % 3 == 0;
+    for (int i = 0; i < edge * edge * edge; ++i) {
+      const Key key{shift - edge + i % edge, i / edge % edge - shift, i / edge / edge - edge / 2};
+      tree.Set(key, occupied);
+      reference.setNodeValue(octomap::OcTreeKey(static_cast<octomap::key_type>(key.x + 32768),
+                                                static_cast<octomap::key_type>(key.y + 32768),
+                                                static_cast<octomap::key_type>(key.z + 32768)),
+                             occupied ? 2.0f : -1.0f);
+    }
+    std::ostringstream out;
+    ASSERT_TRUE(reference.writeBinaryConst(out));
+    int n = 0, expected = 0;
+    ASSERT_TRUE(tree.Write(&n) == out.str()) << edge;
+    for (auto it = reference.begin_leafs(), end = reference.end_leafs(); it != end; ++it)
+      if (reference.isNodeOccupied(*it)) expected += 1 << 3 * (16 - it.getDepth());
+    ASSERT_EQ(n, expected) << edge;
+  }
+}
+
+TEST(MappingTree, SavedTileIsWhatOctomapWritesOfIt) {
+  OccupancyTree tree(0.2);
+  octomap::OcTree reference(0.2);
+  std::mt19937 random(4);
+  for (int i = 0; i < 4000; ++i) {
+    const auto cell = [&] { return static_cast<int>(random() % 16); };
+    const Key key{-20 + cell(), 140 + cell(), cell()};  // tile (-1, 1, 0)
+    const bool occupied = random() % 8 == 0;
+    tree.Set(key, occupied);
+    tree.Set({key.x + 1000, key.y, key.z}, true);
+    reference.setNodeValue(0.2 * (key.x + 0.5), 0.2 * (key.y + 0.5), 0.2 * (key.z + 0.5),
+                           occupied ? 2.0f : -1.0f);
+  }
+  std::vector<SavedTile> saved;
+  tree.Forget({200.0, 30.0, 0.0}, 40.0, &saved);
+  ASSERT_EQ(saved.size(), 1u);
+  EXPECT_EQ(std::make_tuple(saved[0].x, saved[0].y, saved[0].z), std::make_tuple(-1, 1, 0));
+  std::ostringstream out;
+  ASSERT_TRUE(reference.writeBinaryConst(out));
+  EXPECT_TRUE(saved[0].bytes == out.str());
+}
+
 TEST(MappingTree, FarTilesLeaveAndMemoryIsBounded) {
   OccupancyTree tree(0.2);
   std::vector<SavedTile> saved;
