@@ -1,0 +1,16 @@
+chase_test(fcu_framing_test LIBS fcu_core world
+  SOURCES ${CMAKE_CURRENT_LIST_DIR}/fcu_framing_test.cpp ${CMAKE_CURRENT_LIST_DIR}/fcu_signing_test.cpp)
+
+# Byte for byte against node-mavlink, both ways. On demand more: node fcu_exchange.mjs PROGRAM 100000
+chase_program(fcu_exchange ${CMAKE_CURRENT_LIST_DIR}/fcu_exchange.cpp)
+target_link_libraries(fcu_exchange PRIVATE fcu_core world)
+set_target_properties(fcu_exchange PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/test)
+add_test(NAME fcu_exchange
+  COMMAND ${NODE} ${CMAKE_CURRENT_LIST_DIR}/fcu_exchange.mjs $<TARGET_FILE:fcu_exchange> 4000)
+set_tests_properties(fcu_exchange PROPERTIES TIMEOUT 120)
+
+# Random and mutated bytes; for longer: build-asan/test/fcu_fuzz 60.
+chase_program(fcu_fuzz ${CMAKE_CURRENT_LIST_DIR}/fcu_fuzz.cpp)
+target_link_libraries(fcu_fuzz PRIVATE fcu_core world)
+set_target_properties(fcu_fuzz PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/test)
+add_test(NAME fcu_fuzz COMMAND fcu_fuzz 2)
