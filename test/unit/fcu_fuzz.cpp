@@ -1,9 +1,11 @@
-// Random and mutated bytes into the codec: fcu_fuzz SECONDS [SEED]. For the sanitizers to judge.
+// Random and mutated bytes into the codec and the bridge: fcu_fuzz SECONDS [SEED]. For the
+// sanitizers to judge.
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
 
 #include "fcu_random.h"
+#include "services/fcu/bridge.h"
 
 namespace {
 
@@ -72,6 +74,8 @@ int main(int argc, char** argv) {
   Signing ours(Key{}, 1), theirs(Key{}, 2);
   FrameReader plain, sealed(&ours);
   FrameWriter writer(1, 1), signer(1, 1, &theirs);
+  Bridge bridge{FcuConfig{}};
+  int64_t now = kUtime;
   Sum sum;
   int64_t bytes_read = 0;
   const auto take = [&](const Frame& frame) {
@@ -91,6 +95,12 @@ int main(int argc, char** argv) {
       sealed.Add(kUtime, bytes.data() + at, piece, take);
       at += piece;
     }
+    now += static_cast<int64_t>(random.Next() % 20'000);
+    bridge.Receive(now, now, bytes.data(), bytes.size(), random.Next() % 2 == 0);
+    bridge.Tick(now);
+    bridge.TakeOutgoing();
+    bridge.TakeImu();
+    sum.total += static_cast<double>(bridge.Words().size());
     bytes_read += static_cast<int64_t>(bytes.size());
     if (random.Next() % 3 == 0) plain.Reset();
   }
