@@ -24,7 +24,7 @@ struct Link {
 // 100 us/s of drift is twice what two crystals do.
 TEST(FcuClockSync, ErrsByLittleWithDriftAndQueues) {
   for (double mean : {50.0, 500.0, 3000.0}) {
-    Link link{world::Random(1), mean, mean};
+    Link link{world::Random{1}, mean, mean};
     ClockSync sync;
     double worst = 0;
     for (int64_t t = 0; t < 60'000'000; t += 100'000) {
