@@ -15,6 +15,7 @@ find_package(benchmark REQUIRED)
 pkg_check_modules(LCM REQUIRED IMPORTED_TARGET lcm)
 pkg_check_modules(SYSTEMD REQUIRED IMPORTED_TARGET libsystemd)
 pkg_check_modules(LZMA REQUIRED IMPORTED_TARGET liblzma)
+pkg_check_modules(CRYPTO REQUIRED IMPORTED_TARGET libcrypto)
 
 # PCL's own package file asks for MPI and VTK; its libraries need neither where we use them.
 pkg_check_modules(PCL REQUIRED IMPORTED_TARGET pcl_common pcl_kdtree pcl_search pcl_filters)

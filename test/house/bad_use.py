@@ -13,7 +13,7 @@ import unittest
 TESTS = pathlib.Path(__file__).resolve().parents[1]
 BIN = pathlib.Path(sys.argv[1])
 SERVICES = sys.argv[2:]
-SOURCES = ("lidar", "camera")  # these look for their device before anything else
+SOURCES = ("lidar", "camera", "fcu")  # these look for their device before anything else
 TOOLS = [["chase-flight"], ["chase-plan"], ["chase-predict"], ["chase-report"],
          ["chase-log", "info"], ["chase-compare"], ["chase-scenario"], ["chase-world"],
          ["chase-campaign", "--out", "no/such", "--scenarios"]]

@@ -14,6 +14,7 @@ LISTENS = {
     "prediction": {"TARGET", "OBSTACLES"},
     "planning": {"PREDICTION", "OBSTACLES", "POSE", "TRACKING"},
     "control": {"PLAN", "OBSTACLES", "POSE"},
+    "fcu": {"ATTITUDE_SETPOINT", "POSE"},
     "simulator": {"ATTITUDE_SETPOINT"},
 }
 SUBSCRIBE = re.compile(r'Subscribe<[\w:]+>\(\s*(?:/\*.*?\*/\s*)?([^,]+),')

@@ -21,7 +21,7 @@ class Setup(unittest.TestCase):
         for tool in ("env", "bash", "dirname", "sed", "sort", "comm", "cmp", "cp", "mkdir", "echo"):
             (self.bin / tool).symlink_to(shutil.which(tool))
         self.program("id", "echo 0")
-        self.program("npm", f'echo "npm $*" >> {self.home}/calls; mkdir -p logs/node_modules')
+        self.program("npm", f'echo "npm $*" >> {self.home}/calls; mkdir -p $3/node_modules')
         self.program("apt-get", f'echo "apt-get $*" >> {self.home}/calls')
         self.installed("all")
 
@@ -79,12 +79,16 @@ class Setup(unittest.TestCase):
         self.assertIn("check the network", answer.stderr)
 
     def test_node_modules_once_per_lock_file(self):
-        logs = self.home / "logs"
-        logs.mkdir()
-        for text, expected in (("{}", 1), ("{}", 1), ("{1}", 2)):
-            (logs / "package-lock.json").write_text(text, encoding="utf-8")
-            self.assertEqual(self.setup_script().returncode, 0)
-            self.assertEqual(len(self.calls()), expected)
+        for folder in ("logs", "services/fcu"):
+            with self.subTest(folder=folder):
+                path = self.home / folder
+                path.mkdir(parents=True)
+                before = len(self.calls())
+                for text, expected in (("{}", 1), ("{}", 1), ("{1}", 2)):
+                    (path / "package-lock.json").write_text(text, encoding="utf-8")
+                    self.assertEqual(self.setup_script().returncode, 0)
+                    self.assertEqual(len(self.calls()) - before, expected)
+                self.assertIn(f"npm ci --prefix {folder} ", self.calls()[-1])
 
     def test_unknown_argument(self):
         self.assertEqual(self.setup_script("--what").returncode, 1)

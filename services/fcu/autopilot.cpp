@@ -1,0 +1,118 @@
+#include "services/fcu/autopilot.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "services/fcu/frames.h"
+
+namespace chase::fcu {
+namespace {
+
+constexpr uint8_t kComponent = 1;  // MAV_COMP_ID_AUTOPILOT1
+
+template <class E>
+bool Has(uint8_t bits, E flag) {
+  return (bits & static_cast<uint32_t>(flag)) != 0;
+}
+
+}  // namespace
+
+bool Autopilot::Take(const Frame& frame, int64_t utime) {
+  if (frame.component != kComponent) return false;
+  if (frame.id == mav::Heartbeat::kId && !TakeHeartbeat(frame, utime)) return false;
+  if (!known() || frame.system != system_) return false;
+  TakeState(frame, utime);
+  return true;
+}
+
+bool Autopilot::TakeHeartbeat(const Frame& frame, int64_t utime) {
+  const auto m = *As<mav::Heartbeat>(frame);
+  if (system_ != 0 && frame.system != system_) return false;
+  if (m.autopilot != static_cast<uint8_t>(mav::MavAutopilot::PX4)) {
+    stranger_ = fmt::format("system {} is no PX4 (MAV_AUTOPILOT {})", frame.system, m.autopilot);
+    return false;
+  }
+  system_ = frame.system;
+  heartbeat_ = m;
+  heartbeat_utime_ = utime;
+  return true;
+}
+
+void Autopilot::TakeState(const Frame& frame, int64_t utime) {
+  if (const auto m = As<mav::AttitudeQuaternion>(frame)) {
+    const Eigen::Quaterniond q(m->q1, m->q2, m->q3, m->q4);
+    if (std::abs(q.norm() - 1.0) < 0.01) attitude_ = Attitude{utime, SwapFrames(q)};
+  } else if (const auto p = As<mav::LocalPositionNed>(frame)) {
+    const Eigen::Vector3d position(p->x, p->y, p->z);
+    if (position.allFinite()) position_ = SwapWorld(position);
+  } else if (const auto e = As<mav::ExtendedSysState>(frame)) {
+    landed_ = e->landed_state;
+  } else if (const auto s = As<mav::SysStatus>(frame)) {
+    if (s->battery_remaining >= 0) battery_percent_ = s->battery_remaining;
+    if (s->voltage_battery != UINT16_MAX) volts_ = 1e-3 * s->voltage_battery;
+  } else if (const auto b = As<mav::BatteryStatus>(frame)) {
+    if (b->id == 0 && b->battery_remaining >= 0) battery_percent_ = b->battery_remaining;
+  } else if (const auto r = As<mav::RcChannels>(frame)) {
+    channels_ = r->chancount;
+  } else if (const auto t = As<mav::Statustext>(frame)) {
+    const auto whole = texts_.Add(utime, *t);
+    if (!whole || whole->severity > static_cast<uint8_t>(mav::MavSeverity::WARNING)) return;
+    warning_ = *whole;
+    warning_utime_ = utime;
+  }
+}
+
+double Autopilot::silence(int64_t utime) const {
+  return 1e-6 * static_cast<double>(utime - heartbeat_utime_);
+}
+
+bool Autopilot::armed() const { return Has(heartbeat_.base_mode, mav::MavModeFlag::SAFETY_ARMED); }
+
+bool Autopilot::failsafe() const {
+  switch (static_cast<mav::MavState>(heartbeat_.system_status)) {
+    case mav::MavState::CRITICAL:
+    case mav::MavState::EMERGENCY:
+    case mav::MavState::FLIGHT_TERMINATION:
+      return true;
+    default:
+      return false;
+  }
+}
+
+bool Autopilot::on_ground() const {
+  return landed_ == static_cast<uint8_t>(mav::MavLandedState::ON_GROUND);
+}
+
+std::string Autopilot::Unfit() const {
+  switch (static_cast<mav::MavState>(heartbeat_.system_status)) {
+    case mav::MavState::CALIBRATING:
+      return "the autopilot calibrates";
+    case mav::MavState::POWEROFF:
+      return "the autopilot shuts down";
+    case mav::MavState::FLIGHT_TERMINATION:
+      return "the autopilot has ended the flight";
+    case mav::MavState::BOOT:
+    case mav::MavState::UNINIT:
+      return "the autopilot starts";
+    default:
+      return "";
+  }
+}
+
+std::string Autopilot::Warning(int64_t utime, double seconds) const {
+  const bool recent = 1e-6 * static_cast<double>(utime - warning_utime_) <= seconds;
+  return warning_utime_ != 0 && recent ? warning_.text : "";
+}
+
+std::string Autopilot::Words() const {
+  static const char* const landed[] = {"unknown", "on ground", "in air", "taking off", "landing"};
+  std::string words = fmt::format("mode {}, {}, {}", mode().name(), armed() ? "armed" : "disarmed",
+                                  landed_ < std::size(landed) ? landed[landed_] : "unknown");
+  if (battery_percent_) words += fmt::format(", battery {} %", *battery_percent_);
+  if (volts_) words += fmt::format(" {:.1f} V", *volts_);
+  if (channels_) words += *channels_ > 0 ? ", receiver heard" : ", no receiver";
+  return words;
+}
+
+}  // namespace chase::fcu

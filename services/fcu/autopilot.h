@@ -1,0 +1,68 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "services/fcu/command.h"
+#include "services/fcu/framing.h"
+#include "services/fcu/status_text.h"
+
+namespace chase::fcu {
+
+/// What the autopilot has said of itself. Times: arrival, microseconds of the host's clock.
+class Autopilot {
+ public:
+  /// `system`: whom to listen to; 0: the first PX4 whose heartbeat comes.
+  explicit Autopilot(int system) : system_(static_cast<uint8_t>(system)) {}
+
+  /// Takes a frame; false where it is not the autopilot's.
+  bool Take(const Frame& frame, int64_t utime);
+
+  bool known() const { return heartbeat_utime_ != 0; }
+  uint8_t system() const { return system_; }
+  /// Seconds since the last heartbeat.
+  double silence(int64_t utime) const;
+  bool armed() const;
+  /// CRITICAL, EMERGENCY or FLIGHT_TERMINATION.
+  bool failsafe() const;
+  Mode mode() const { return Mode::Of(heartbeat_.custom_mode); }
+  bool on_ground() const;
+  /// Why it cannot fly now by its own state (starting, calibrating ...); empty: it can.
+  std::string Unfit() const;
+  /// What else speaks on the link in an autopilot's place; empty: nobody.
+  const std::string& stranger() const { return stranger_; }
+
+  struct Attitude {
+    int64_t utime;
+    Eigen::Quaterniond R_WB;
+  };
+  const std::optional<Attitude>& attitude() const { return attitude_; }
+  /// p_WB by its own estimate, m.
+  const std::optional<Eigen::Vector3d>& position() const { return position_; }
+
+  /// The last text of severity warning or worse that is no older than `seconds`.
+  std::string Warning(int64_t utime, double seconds) const;
+  /// Battery, landed state, receiver in a few words.
+  std::string Words() const;
+
+ private:
+  bool TakeHeartbeat(const Frame& frame, int64_t utime);
+  void TakeState(const Frame& frame, int64_t utime);
+
+  uint8_t system_;
+  mav::Heartbeat heartbeat_;
+  int64_t heartbeat_utime_ = 0;
+  uint8_t landed_ = 0;
+  std::optional<Attitude> attitude_;
+  std::optional<Eigen::Vector3d> position_;
+  std::optional<int> battery_percent_, channels_;
+  std::optional<double> volts_;
+  StatusTexts texts_;
+  StatusText warning_;
+  int64_t warning_utime_ = 0;
+  std::string stranger_;
+};
+
+}  // namespace chase::fcu

@@ -1,0 +1,234 @@
+#include "services/fcu/bridge.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "common/world/ages.h"
+
+namespace chase::fcu {
+namespace {
+
+constexpr int64_t kHeartbeatPeriod = 1'000'000;  // us
+constexpr int64_t kTimesyncPeriod = 100'000;     // us: PX4's own rate
+constexpr std::size_t kTimeRequests = 20;        // on their way: 2 s
+constexpr double kAttitudeAge = 0.5;             // s; it comes at 50 Hz
+constexpr double kWarningAge = 10.0;             // s in which a text explains a refusal
+
+int64_t Period(double rate) { return static_cast<int64_t>(std::llround(1e6 / rate)); }
+
+double Seconds(int64_t from, int64_t to) { return 1e-6 * static_cast<double>(to - from); }
+
+/// Is something due that comes each `period`? Late calls lose time, never catch up.
+bool Due(int64_t now, int64_t period, int64_t* next) {
+  if (now < *next) return false;
+  *next = std::max(*next + period, now - period + 1);
+  return true;
+}
+
+}  // namespace
+
+Bridge::Bridge(const FcuConfig& config, const std::optional<Key>& key)
+    : config_(config),
+      signing_(key ? std::make_unique<Signing>(*key, static_cast<uint8_t>(config.signing_link))
+                   : nullptr),
+      reader_(signing_.get()),
+      writer_(static_cast<uint8_t>(config.system), static_cast<uint8_t>(config.component),
+              signing_.get()),
+      autopilot_(config.autopilot_system),
+      rates_(config.imu_rate),
+      handshake_(config.engages(), config.give_up_after) {
+  if (config.system == 0) writer_.SetSystem(1);  // until the autopilot's is known
+}
+
+void Bridge::Receive(int64_t arrival, int64_t now, const uint8_t* data, std::size_t size,
+                     bool whole) {
+  reader_.Add(now, data, size, [&](const Frame& frame) { OnFrame(frame, {arrival, now}); });
+  if (whole) reader_.Reset();
+}
+
+void Bridge::OnFrame(const Frame& frame, const Heard& when) {
+  if (!autopilot_.Take(frame, when.now)) return;
+  if (config_.system == 0) writer_.SetSystem(autopilot_.system());
+  rates_.OnMessage(frame.id);
+  if (const auto m = As<mav::Timesync>(frame)) OnTimesync(*m, when);
+  if (const auto m = As<mav::CommandAck>(frame)) {
+    const bool to_others = (m->target_system != 0 && m->target_system != writer_.system()) ||
+                           (m->target_component != 0 && m->target_component != writer_.component());
+    if (to_others) return;
+    if (m->command == static_cast<uint16_t>(mav::MavCmd::SET_MESSAGE_INTERVAL))
+      rates_.OnAnswer(m->result);
+    else
+      handshake_.OnAck(m->command, m->result, when.now);
+  }
+  if (const auto sample = imu_.Take(frame, clock_, when.now)) samples_.push_back(*sample);
+}
+
+/// A request is answered with the middle of its stay here, so that the asker's halved round trip
+/// meets the time that we say.
+void Bridge::OnTimesync(const mav::Timesync& m, const Heard& when) {
+  if (m.tc1 == 0) {
+    mav::Timesync answer;
+    answer.tc1 = 1000 * (when.arrival + (when.now - when.arrival) / 2);
+    answer.ts1 = m.ts1;
+    return Send(when.now, answer);
+  }
+  const auto request = std::find(time_requests_.begin(), time_requests_.end(), m.ts1);
+  if (request == time_requests_.end()) return;  // another's
+  time_requests_.erase(request);
+  clock_.Add(m.ts1 / 1000, m.tc1 / 1000, when.arrival);
+}
+
+void Bridge::AskTime(int64_t now) {
+  mav::Timesync request;
+  request.ts1 = 1000 * now;
+  time_requests_.push_back(request.ts1);
+  if (time_requests_.size() > kTimeRequests) time_requests_.pop_front();
+  Send(now, request);
+}
+
+void Bridge::OnPose(const Pose& pose, int64_t now) {
+  if (pose_ && pose.epoch != pose_->epoch) {
+    ++resets_;
+  } else if (pose_ && pose.utime <= pose_->utime) {
+    return;  // a repetition
+  }
+  pose_ = pose;
+  pose_arrival_ = now;
+  if (!pose.usable || !heard_ || PoseAge(now) > world::kMostAge.pose) return;
+  if (!Due(pose.utime, Period(config_.odometry_rate), &next_odometry_)) return;
+  Send(now, ExternalVision(pose, resets_));
+  ++odometry_sent_;
+}
+
+void Bridge::OnSetpoint(const Setpoint& setpoint, int64_t utime, int64_t now) {
+  // A publisher that begins anew may have an older clock.
+  const bool repeated = utime == setpoint_utime_ ||
+                        (utime < setpoint_utime_ && Seconds(setpoint_arrival_, now) < 1.0);
+  if (setpoint_ && repeated) return;
+  setpoint_ = setpoint;
+  setpoint_utime_ = utime;
+  setpoint_arrival_ = now;
+}
+
+bool Bridge::IsFresh(int64_t now) const {
+  return setpoint_ && Seconds(setpoint_arrival_, now) <= config_.setpoint_age;
+}
+
+double Bridge::PoseAge(int64_t now) const {
+  return Seconds(std::min(pose_arrival_, pose_->utime), now);
+}
+
+std::string Bridge::PoseProblem(int64_t now) const {
+  if (!pose_) return "no POSE yet";
+  if (!pose_->usable) return "POSE is not usable";
+  const double age = PoseAge(now);
+  return age > world::kMostAge.pose ? fmt::format("POSE is {:.2f} s old", age) : "";
+}
+
+std::string Bridge::AttitudeProblem(int64_t now) const {
+  const auto& attitude = autopilot_.attitude();
+  if (!attitude || Seconds(attitude->utime, now) > kAttitudeAge)
+    return "the autopilot does not tell its attitude";
+  const double degrees = attitude->R_WB.angularDistance(pose_->R_WB) * 180.0 / M_PI;
+  if (degrees <= config_.attitude_gate_deg) return "";
+  return fmt::format(
+      "the autopilot's attitude is {:.0f} degrees off POSE: EKF2_EV_CTRL has to "
+      "take the yaw",
+      degrees);
+}
+
+std::string Bridge::Missing(int64_t now) const {
+  if (std::string unfit = autopilot_.Unfit(); !unfit.empty()) return unfit;
+  if (!clock_.synced()) return "the autopilot's clock is not known yet";
+  if (std::string problem = PoseProblem(now); !problem.empty()) return problem;
+  return AttitudeProblem(now);
+}
+
+Facts Bridge::Gather(int64_t now) const {
+  Facts f;
+  f.utime = now;
+  f.heard = heard_;
+  f.armed = autopilot_.armed();
+  f.failsafe = autopilot_.failsafe();
+  f.mode = autopilot_.mode();
+  f.on_ground = autopilot_.on_ground();
+  f.wish = IsFresh(now) && setpoint_->motors;
+  f.motors_off = IsFresh(now) && !setpoint_->motors;
+  f.blind = !pose_ || PoseAge(now) > world::kMostAge.velocity;
+  f.missing = missing_;
+  f.said = autopilot_.Warning(now, kWarningAge);
+  return f;
+}
+
+void Bridge::Tick(int64_t now) {
+  const bool was_heard = heard_;
+  heard_ = autopilot_.known() && autopilot_.silence(now) <= config_.autopilot_silence;
+  if ((heard_ && !was_heard) || clock_.restarts() != restarts_) rates_.Restart();
+  restarts_ = clock_.restarts();
+  missing_ = heard_ ? Missing(now) : "no PX4 is heard";
+  handshake_.Update(Gather(now));
+  if (Due(now, kHeartbeatPeriod, &next_heartbeat_)) SendHeartbeat(now);
+  if (!autopilot_.known()) return;
+  if (Due(now, kTimesyncPeriod, &next_timesync_)) AskTime(now);
+  if (handshake_.streams() && IsFresh(now) && setpoint_->motors &&
+      Due(now, Period(config_.setpoint_rate), &next_setpoint_))
+    SendSetpoint(now);
+  SendCommands(now);
+}
+
+void Bridge::SendHeartbeat(int64_t now) {
+  mav::Heartbeat m;
+  m.type = static_cast<uint8_t>(mav::MavType::ONBOARD_CONTROLLER);
+  m.autopilot = static_cast<uint8_t>(mav::MavAutopilot::INVALID);
+  m.system_status = static_cast<uint8_t>(mav::MavState::ACTIVE);
+  m.mavlink_version = 3;
+  Send(now, m);
+}
+
+void Bridge::SendSetpoint(int64_t now) {
+  mav::SetAttitudeTarget m = AttitudeTarget(*setpoint_, pose_->R_WB, config_);
+  m.time_boot_ms = static_cast<uint32_t>(now / 1000);
+  m.target_system = autopilot_.system();
+  m.target_component = static_cast<uint8_t>(mav::MavComponent::AUTOPILOT1);
+  Send(now, m);
+  ++setpoints_sent_;
+}
+
+void Bridge::SendCommands(int64_t now) {
+  if (const auto command = handshake_.NextCommand(now)) Send(now, *command);
+  if (!heard_) return;
+  if (const auto request = rates_.Tick(now)) Send(now, *request);
+}
+
+void Bridge::Send(int64_t now, mav::CommandLong command) {
+  command.target_system = autopilot_.system();
+  command.target_component = static_cast<uint8_t>(mav::MavComponent::AUTOPILOT1);
+  outgoing_.push_back(writer_.Write(now, command));
+}
+
+std::vector<Bridge::Bytes> Bridge::TakeOutgoing() { return std::exchange(outgoing_, {}); }
+
+std::vector<ImuSample> Bridge::TakeImu() { return std::exchange(samples_, {}); }
+
+std::string Bridge::Words() const {
+  std::string words =
+      fmt::format("{}: {}", Handshake::Name(handshake_.state()), handshake_.reason());
+  if (!heard_) return words;
+  if (handshake_.state() == Handshake::State::kStandby)
+    words += missing_.empty() ? "; waits for setpoints" : "; waits: " + missing_;
+  words += "; " + autopilot_.Words();
+  words += fmt::format("; clock +-{:.2f} ms, round trip {:.1f} ms", 1e3 * clock_.jitter(),
+                       1e3 * clock_.round_trip());
+  words += fmt::format("; {} {:.0f} Hz", imu_.source(), rates_.rate(mav::HighresImu::kId));
+  words += fmt::format("; {} setpoints, {} odometry sent, {} frames lost", setpoints_sent_,
+                       odometry_sent_, reader_.counters().lost);
+  if (autopilot_.position() && pose_)
+    words += fmt::format("; its position is {:.2f} m off POSE",
+                         (*autopilot_.position() - pose_->p_WB).norm());
+  return words;
+}
+
+}  // namespace chase::fcu

@@ -1,0 +1,101 @@
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "services/fcu/autopilot.h"
+#include "services/fcu/clock_sync.h"
+#include "services/fcu/conversions.h"
+#include "services/fcu/fcu_config.h"
+#include "services/fcu/handshake.h"
+#include "services/fcu/imu_stream.h"
+#include "services/fcu/stream_rates.h"
+
+namespace chase::fcu {
+
+/// Between our messages and an autopilot's bytes. Knows no clock and no socket: bytes, messages and
+/// times go in (microseconds of the host's clock, never back), bytes and samples come out.
+class Bridge {
+ public:
+  using Bytes = std::vector<uint8_t>;
+
+  explicit Bridge(const FcuConfig& config, const std::optional<Key>& key = std::nullopt);
+
+  /// Bytes that arrived at `arrival` and are looked at `now`. `whole`: a datagram, in which no
+  /// frame is left unfinished.
+  void Receive(int64_t arrival, int64_t now, const uint8_t* data, std::size_t size, bool whole);
+  void OnPose(const Pose& pose, int64_t now);
+  /// `utime`: the message's own stamp. One that does not rise is a repetition and left out.
+  void OnSetpoint(const Setpoint& setpoint, int64_t utime, int64_t now);
+  /// Whatever is due; to be called at twice the rate of setpoints or faster.
+  void Tick(int64_t now);
+
+  std::vector<Bytes> TakeOutgoing();
+  std::vector<ImuSample> TakeImu();
+
+  const Handshake& handshake() const { return handshake_; }
+  const Autopilot& autopilot() const { return autopilot_; }
+  const ClockSync& clock() const { return clock_; }
+  const FrameReader& reader() const { return reader_; }
+  const ImuStream& imu() const { return imu_; }
+  const StreamRates& rates() const { return rates_; }
+  /// Is a PX4 heard now?
+  bool heard() const { return heard_; }
+  /// What a flight waits for; empty: nothing.
+  const std::string& missing() const { return missing_; }
+  /// All of it on one line.
+  std::string Words() const;
+
+ private:
+  struct Heard {
+    int64_t arrival, now;
+  };
+  void OnFrame(const Frame& frame, const Heard& when);
+  void OnTimesync(const mav::Timesync& m, const Heard& when);
+  void AskTime(int64_t now);
+  void SendSetpoint(int64_t now);
+  void SendCommands(int64_t now);
+  void SendHeartbeat(int64_t now);
+  Facts Gather(int64_t now) const;
+  std::string Missing(int64_t now) const;
+  std::string PoseProblem(int64_t now) const;
+  std::string AttitudeProblem(int64_t now) const;
+  double PoseAge(int64_t now) const;
+  bool IsFresh(int64_t now) const;
+
+  template <class M>
+  void Send(int64_t now, const M& message) {
+    outgoing_.push_back(writer_.Write(now, message));
+  }
+  void Send(int64_t now, mav::CommandLong command);
+
+  FcuConfig config_;
+  std::unique_ptr<Signing> signing_;
+  FrameReader reader_;
+  FrameWriter writer_;
+  Autopilot autopilot_;
+  ClockSync clock_;
+  ImuStream imu_;
+  StreamRates rates_;
+  Handshake handshake_;
+
+  std::optional<Pose> pose_;
+  int64_t pose_arrival_ = 0, next_odometry_ = 0;
+  uint8_t resets_ = 0;
+  std::optional<Setpoint> setpoint_;
+  int64_t setpoint_arrival_ = 0, setpoint_utime_ = 0, next_setpoint_ = 0;
+  int64_t next_heartbeat_ = 0, next_timesync_ = 0;
+  std::deque<int64_t> time_requests_;  // sent, ns
+  bool heard_ = false;
+  int restarts_ = 0;
+  std::string missing_ = "no PX4 is heard";
+  int64_t setpoints_sent_ = 0, odometry_sent_ = 0;
+  std::vector<Bytes> outgoing_;
+  std::vector<ImuSample> samples_;
+};
+
+}  // namespace chase::fcu

@@ -1,0 +1,112 @@
+#include "services/fcu/command.h"
+
+#include <fmt/format.h>
+
+#include <iterator>
+
+namespace chase::fcu {
+namespace {
+
+constexpr int64_t kUnanswered = 500'000;  // us until it is sent again
+constexpr int64_t kTryAgain = 2'000'000;  // us after "not now", and after an effect that stays out
+constexpr float kCustomModeEnabled = 1.0f;  // MAV_MODE_FLAG
+
+uint16_t Number(Ask ask) {
+  return static_cast<uint16_t>(ask == Ask::kArm || ask == Ask::kDisarm
+                                   ? mav::MavCmd::COMPONENT_ARM_DISARM
+                                   : mav::MavCmd::DO_SET_MODE);
+}
+
+mav::CommandLong Message(Ask ask) {
+  mav::CommandLong m;
+  m.command = Number(ask);
+  if (ask == Ask::kArm) m.param1 = 1.0f;
+  if (ask == Ask::kOffboard || ask == Ask::kLand) {
+    const Mode mode = ask == Ask::kOffboard ? kOffboardMode : kLandMode;
+    m.param1 = kCustomModeEnabled;
+    m.param2 = mode.main;
+    m.param3 = mode.sub;
+  }
+  return m;
+}
+
+}  // namespace
+
+std::string Mode::name() const {
+  static const char* const mains[] = {"no mode",   "MANUAL", "ALTCTL",     "POSCTL",
+                                      "AUTO",      "ACRO",   "OFFBOARD",   "STABILIZED",
+                                      "RATTITUDE", "SIMPLE", "TERMINATION"};
+  static const char* const autos[] = {"",    "READY", "TAKEOFF", "LOITER", "MISSION",
+                                      "RTL", "LAND",  "RTGS",    "FOLLOW", "PRECLAND"};
+  const std::string word = main < std::size(mains) ? mains[main] : fmt::format("mode {}", main);
+  if (main != 4 || sub == 0) return word;
+  return word + "." + (sub < std::size(autos) ? autos[sub] : std::to_string(sub));
+}
+
+std::string Words(Ask ask) {
+  switch (ask) {
+    case Ask::kOffboard:
+      return "OFFBOARD";
+    case Ask::kArm:
+      return "arming";
+    case Ask::kLand:
+      return "landing";
+    case Ask::kDisarm:
+      return "disarming";
+    case Ask::kNothing:
+      break;
+  }
+  return "nothing";
+}
+
+std::string Words(mav::MavResult result) {
+  using R = mav::MavResult;
+  switch (result) {
+    case R::ACCEPTED:
+      return "accepted";
+    case R::TEMPORARILY_REJECTED:
+      return "not now";
+    case R::DENIED:
+      return "denied";
+    case R::UNSUPPORTED:
+      return "unsupported";
+    case R::FAILED:
+      return "failed";
+    case R::IN_PROGRESS:
+      return "in progress";
+    case R::CANCELLED:
+      return "cancelled";
+    default:
+      return fmt::format("result {}", static_cast<int>(result));
+  }
+}
+
+void Command::Begin(Ask ask, int64_t utime) {
+  ask_ = ask;
+  answer_ = Answer::kWaiting;
+  words_.clear();
+  next_ = utime;
+  sent_ = 0;
+}
+
+void Command::OnAck(uint16_t command, uint8_t result, int64_t utime) {
+  if (ask_ == Ask::kNothing || sent_ == 0 || command != Number(ask_)) return;
+  const auto r = static_cast<mav::MavResult>(result);
+  words_ = Words(r);
+  next_ = utime + kTryAgain;
+  if (r == mav::MavResult::ACCEPTED) answer_ = Answer::kAccepted;
+  // "Not now" is PX4's answer to a check that fails; that may pass a moment later.
+  else if (r != mav::MavResult::IN_PROGRESS && r != mav::MavResult::TEMPORARILY_REJECTED)
+    answer_ = Answer::kRefused;
+}
+
+std::optional<mav::CommandLong> Command::Tick(int64_t utime) {
+  if (ask_ == Ask::kNothing || answer_ == Answer::kRefused || utime < next_) return std::nullopt;
+  mav::CommandLong m = Message(ask_);
+  m.confirmation = sent_;
+  if (sent_ < 255) ++sent_;
+  next_ = utime + kUnanswered;
+  return m;
+}
+
+}  // namespace chase::fcu

@@ -1,0 +1,174 @@
+#include "services/fcu/handshake.h"
+
+#include <fmt/format.h>
+
+namespace chase::fcu {
+namespace {
+
+using State = Handshake::State;
+
+// PX4 wants more than 2 Hz for a second before OFFBOARD (docs.px4.io, Offboard Mode).
+constexpr double kStreamBefore = 1.2;  // s
+constexpr double kSilent = 0.5;        // s without a setpoint in flight; PX4's COM_OF_LOSS_T is 1.0
+constexpr double kWithdrawn = 2.0;     // s without a setpoint: the next one is another flight's
+constexpr double kLateArming = 10.0;   // s after asking in which arming is still our doing
+
+}  // namespace
+
+/// The rows of a state are tried in order; the first whose condition holds is taken.
+struct HandshakeTable {
+  struct Row {
+    State from;
+    bool (*when)(const Handshake&);
+    State to;
+    const char* why;
+  };
+
+  using H = const Handshake&;
+  static bool Heard(H h) { return h.facts_.heard; }
+  static bool Silent(H h) { return !h.facts_.heard; }
+  static bool InOffboard(H h) { return h.facts_.mode == kOffboardMode; }
+  static bool Flies(H h) { return h.facts_.armed && InOffboard(h); }
+  static bool Ready(H h) { return h.facts_.wish && h.facts_.missing.empty(); }
+  static bool NotReady(H h) { return !Ready(h); }
+  static bool TakenOver(H h) { return Flies(h) && Ready(h); }
+  /// Only who lets the pilot engage streams while somebody else flies.
+  static bool Others(H h) { return h.facts_.armed && !InOffboard(h) && h.engages_; }
+  static bool Begins(H h) { return Ready(h) && !(h.facts_.armed && h.engages_); }
+  static bool Streamed(H h) { return h.engages_ && h.InState() >= kStreamBefore; }
+  static bool Refused(H h) { return h.command_.answer() == Command::Answer::kRefused; }
+  static bool GivesUp(H h) { return h.InState() >= h.give_up_after_; }
+  static bool LeftOffboard(H h) { return !InOffboard(h); }
+  static bool Disarmed(H h) { return !h.facts_.armed; }
+  static bool DisarmedOnGround(H h) { return Disarmed(h) && h.facts_.on_ground; }
+  static bool Failsafe(H h) { return LeftOffboard(h) && h.facts_.failsafe; }
+  /// An arming of ours that came through when it was no longer wanted.
+  static bool ArmedLate(H h) {
+    return h.facts_.armed && h.facts_.on_ground && h.AskedToArm() && !h.facts_.failsafe;
+  }
+  static bool Down(H h) { return h.facts_.motors_off && h.facts_.on_ground; }
+  static bool OffInTheAir(H h) { return h.facts_.motors_off && !h.facts_.on_ground; }
+  static bool Blind(H h) { return h.facts_.blind; }
+  static bool Ceased(H h) { return h.WithoutWish() >= kSilent; }
+  static bool OnGround(H h) { return h.facts_.on_ground; }
+  static bool PilotLands(H h) {
+    return h.landing_heard_ && !(h.facts_.mode == kLandMode) && !InOffboard(h) &&
+           !h.facts_.failsafe;
+  }
+  static bool Released(H h) { return h.Withdrawn() && !h.facts_.armed; }
+  static bool GivenBack(H h) { return !h.engages_ && !h.facts_.failsafe; }
+
+  static const Row kRows[];
+};
+
+const HandshakeTable::Row HandshakeTable::kRows[] = {
+    {State::kNoAutopilot, Heard, State::kStandby, "a PX4 is heard"},
+
+    {State::kStandby, Silent, State::kNoAutopilot, "the autopilot's heartbeat has ceased"},
+    {State::kStandby, TakenOver, State::kFlying, "armed and in OFFBOARD already"},
+    {State::kStandby, ArmedLate, State::kDisarming, "armed after we had given up"},
+    {State::kStandby, Others, State::kPilot, "somebody else flies"},
+    {State::kStandby, Begins, State::kStreaming, "setpoints come"},
+
+    {State::kStreaming, Silent, State::kNoAutopilot, "the autopilot's heartbeat has ceased"},
+    {State::kStreaming, NotReady, State::kStandby, "not ready any more"},
+    {State::kStreaming, Flies, State::kFlying, "armed and in OFFBOARD already"},
+    {State::kStreaming, Others, State::kPilot, "somebody else has armed"},
+    {State::kStreaming, Streamed, State::kOffboard, "setpoints have gone out for long enough"},
+
+    {State::kOffboard, Silent, State::kNoAutopilot, "the autopilot's heartbeat has ceased"},
+    {State::kOffboard, NotReady, State::kStandby, "not ready any more"},
+    {State::kOffboard, Flies, State::kFlying, "armed and in OFFBOARD"},
+    {State::kOffboard, Others, State::kPilot, "somebody else has armed"},
+    {State::kOffboard, InOffboard, State::kArming, "in OFFBOARD"},
+    {State::kOffboard, Refused, State::kRefused, "OFFBOARD was refused"},
+    {State::kOffboard, GivesUp, State::kRefused, "OFFBOARD did not come"},
+
+    {State::kArming, Silent, State::kNoAutopilot, "the autopilot's heartbeat has ceased"},
+    {State::kArming, Flies, State::kFlying, "armed and in OFFBOARD"},
+    {State::kArming, LeftOffboard, State::kPilot, "the mode was changed while we were arming"},
+    {State::kArming, NotReady, State::kStandby, "not ready any more"},
+    {State::kArming, Refused, State::kRefused, "arming was refused"},
+    {State::kArming, GivesUp, State::kRefused, "arming did not come"},
+
+    {State::kFlying, DisarmedOnGround, State::kDone, "the autopilot has disarmed on the ground"},
+    {State::kFlying, Disarmed, State::kFailsafe, "the autopilot has disarmed or begun anew"},
+    {State::kFlying, Failsafe, State::kFailsafe, "a failsafe of the autopilot"},
+    {State::kFlying, LeftOffboard, State::kPilot, "the mode was changed: the pilot has it"},
+    {State::kFlying, Down, State::kDisarming, "on the ground, motors no longer wanted"},
+    {State::kFlying, OffInTheAir, State::kLanding, "motors no longer wanted, the autopilot lands"},
+    {State::kFlying, Blind, State::kLanding, "no estimate of the pose: the autopilot lands"},
+    {State::kFlying, Ceased, State::kLanding, "setpoints have ceased: the autopilot lands"},
+
+    {State::kLanding, Disarmed, State::kDone, "landed and disarmed"},
+    {State::kLanding, PilotLands, State::kPilot, "the mode was changed: the pilot has it"},
+    {State::kLanding, OnGround, State::kDisarming, "landed"},
+
+    {State::kDisarming, Disarmed, State::kDone, "landed and disarmed"},
+    {State::kDisarming, GivesUp, State::kRefused, "disarming did not come"},
+
+    {State::kDone, Released, State::kStandby, "ready for another flight"},
+    {State::kPilot, GivenBack, State::kStandby, "the pilot may give it back"},
+    {State::kPilot, Released, State::kStandby, "ready for another flight"},
+    {State::kFailsafe, Released, State::kStandby, "ready for another flight"},
+    {State::kRefused, ArmedLate, State::kDisarming, "armed after we had given up"},
+    {State::kRefused, Released, State::kStandby, "ready for another flight"},
+};
+
+bool Handshake::Withdrawn() const { return WithoutWish() >= kWithdrawn; }
+
+bool Handshake::AskedToArm() const {
+  return asked_to_arm_ != 0 &&
+         1e-6 * static_cast<double>(facts_.utime - asked_to_arm_) < kLateArming;
+}
+
+bool Handshake::streams() const {
+  return state_ == State::kStreaming || state_ == State::kOffboard || state_ == State::kArming ||
+         state_ == State::kFlying;
+}
+
+void Handshake::Update(const Facts& facts) {
+  facts_ = facts;
+  if (facts.wish) wished_ = facts.utime;
+  if (state_ == State::kArming) asked_to_arm_ = facts.utime;
+  if (state_ == State::kLanding && facts.mode == kLandMode) landing_heard_ = true;
+  // Landing and disarming have no alternative: what is refused is asked for again.
+  if ((state_ == State::kLanding || state_ == State::kDisarming) &&
+      command_.answer() == Command::Answer::kRefused)
+    command_.Begin(command_.ask(), facts.utime + 1'000'000);
+  for (const HandshakeTable::Row& row : HandshakeTable::kRows)
+    if (row.from == state_ && row.when(*this)) return Enter(row.to, row.why);
+}
+
+void Handshake::Enter(State state, const std::string& why) {
+  reason_ = why;
+  if (state == State::kRefused && !command_.words().empty())
+    reason_ += fmt::format(" ({})", command_.words());
+  if ((state == State::kRefused || state == State::kFailsafe) && !facts_.said.empty())
+    reason_ += fmt::format(": {}", facts_.said);
+  if (state == State::kFlying || state == State::kDone) asked_to_arm_ = 0;
+  landing_heard_ = false;
+  state_ = state;
+  since_ = facts_.utime;
+  switch (state) {
+    case State::kOffboard:
+      return command_.Begin(Ask::kOffboard, facts_.utime);
+    case State::kArming:
+      return command_.Begin(Ask::kArm, facts_.utime);
+    case State::kLanding:
+      return command_.Begin(Ask::kLand, facts_.utime);
+    case State::kDisarming:
+      return command_.Begin(Ask::kDisarm, facts_.utime);
+    default:
+      return command_.Drop();
+  }
+}
+
+std::string Handshake::Name(State state) {
+  static const char* const names[] = {"no autopilot", "standby", "streaming", "asking for OFFBOARD",
+                                      "arming",       "flying",  "landing",   "disarming",
+                                      "done",         "pilot",   "failsafe",  "refused"};
+  return names[static_cast<std::size_t>(state)];
+}
+
+}  // namespace chase::fcu

@@ -1,0 +1,84 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "services/fcu/command.h"
+
+namespace chase::fcu {
+
+/// What the hand-shake goes by, now.
+struct Facts {
+  int64_t utime = 0;
+  bool heard = false;  ///< heartbeats of the autopilot come
+  bool armed = false;
+  bool failsafe = false;  ///< the autopilot's state is CRITICAL or worse
+  Mode mode;
+  bool on_ground = false;   ///< as the autopilot says
+  bool wish = false;        ///< a fresh setpoint wants the motors on
+  bool motors_off = false;  ///< a fresh setpoint wants them off
+  bool blind = false;       ///< the estimate is older than a flight may go on with
+  std::string missing;      ///< what a flight must not begin without; empty: nothing
+  std::string said;         ///< the autopilot's last warning
+};
+
+/// From the first setpoint to the last: stream, OFFBOARD, arm, fly, land, disarm. The autopilot's
+/// own word decides what has happened; answers to commands only say why it has not. The table of
+/// states is in handshake.cpp.
+class Handshake {
+ public:
+  enum class State {
+    kNoAutopilot,
+    kStandby,    ///< waits for setpoints and for what is missing
+    kStreaming,  ///< setpoints go out; the autopilot wants a second of them before the switch
+    kOffboard,   ///< asks for OFFBOARD
+    kArming,
+    kFlying,
+    kLanding,  ///< asks for AUTO.LAND
+    kDisarming,
+    kDone,  ///< these three and kRefused last until the setpoints have ceased and it is disarmed
+    kPilot,
+    kFailsafe,
+    kRefused,
+  };
+
+  /// `engages`: it switches and arms itself; otherwise the pilot does.
+  Handshake(bool engages, double give_up_after)
+      : engages_(engages), give_up_after_(give_up_after) {}
+
+  void Update(const Facts& facts);
+  void OnAck(uint16_t command, uint8_t result, int64_t utime) {
+    command_.OnAck(command, result, utime);
+  }
+  /// The command to send now, without its target.
+  std::optional<mav::CommandLong> NextCommand(int64_t utime) { return command_.Tick(utime); }
+
+  State state() const { return state_; }
+  /// May setpoints be sent?
+  bool streams() const;
+  /// Why the state is what it is.
+  const std::string& reason() const { return reason_; }
+  static std::string Name(State state);
+
+ private:
+  friend struct HandshakeTable;
+
+  double InState() const { return 1e-6 * static_cast<double>(facts_.utime - since_); }
+  double WithoutWish() const { return 1e-6 * static_cast<double>(facts_.utime - wished_); }
+  bool Withdrawn() const;
+  bool AskedToArm() const;
+  void Enter(State state, const std::string& why);
+
+  bool engages_;
+  double give_up_after_;
+  State state_ = State::kNoAutopilot;
+  std::string reason_ = "no heartbeat of a PX4 yet";
+  Facts facts_;
+  Command command_;
+  int64_t since_ = 0;           // in this state
+  int64_t wished_ = 0;          // when a setpoint last wanted the motors
+  int64_t asked_to_arm_ = 0;    // when; 0: not yet
+  bool landing_heard_ = false;  // the autopilot has been in AUTO.LAND since we asked
+};
+
+}  // namespace chase::fcu

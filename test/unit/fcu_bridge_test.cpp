@@ -1,0 +1,356 @@
+#include <gtest/gtest.h>
+
+#include "fcu_flight.h"
+#include "services/fcu/bridge.h"
+
+namespace chase::fcu::testing {
+namespace {
+
+using State = Handshake::State;
+
+TEST(FcuBridge, TakesOffHoversLandsAndDisarms) {
+  Flight flight;
+  ASSERT_TRUE(flight.RunUntil(State::kFlying, 12.0)) << flight.bridge.Words();
+  flight.Run(10.0);
+  EXPECT_NEAR(flight.px4.p_WB().z(), 1.5, 0.1);
+  EXPECT_NE(flight.bridge.Words().find("armed, in air"), std::string::npos)
+      << flight.bridge.Words();
+  flight.height = -1.0;  // onto the ground and pushed down
+  flight.Run(8.0, [&] { return flight.px4.p_WB().z() <= 0.0; });
+  flight.Run(0.5);
+  flight.motors = false;
+  ASSERT_TRUE(flight.RunUntil(State::kDone, 8.0)) << flight.bridge.Words();
+  EXPECT_FALSE(flight.px4.armed());
+  const std::vector<std::string> expected = {"no autopilot",        "standby", "streaming",
+                                             "asking for OFFBOARD", "arming",  "flying",
+                                             "disarming",           "done"};
+  auto states = flight.states;
+  // The clock is not known at first: it may wait in standby; the landing may be the autopilot's.
+  states.erase(std::remove(states.begin(), states.end(), "landing"), states.end());
+  EXPECT_EQ(states, expected);
+  EXPECT_EQ(flight.px4.seen().times_armed, 1);
+}
+
+TEST(FcuBridge, SendsItsStreamsAtTheirRates) {
+  Flight flight;
+  ASSERT_TRUE(flight.RunUntil(State::kFlying, 12.0));
+  const auto before = flight.px4.seen();
+  flight.Run(10.0);
+  const auto& after = flight.px4.seen();
+  EXPECT_NEAR(after.setpoints - before.setpoints, 1000, 10);
+  EXPECT_NEAR(after.odometry - before.odometry, 400, 8);
+  EXPECT_NEAR(after.heartbeats - before.heartbeats, 10, 1);
+  EXPECT_EQ(after.setpoint->type_mask, 3);
+  EXPECT_NEAR(after.rates.at(mav::HighresImu::kId), 200.0, 1.0);
+  EXPECT_EQ(flight.bridge.rates().missing(), "");
+}
+
+TEST(FcuBridge, ClocksMeetOnBothSides) {
+  Flight flight;
+  flight.setpoints = false;
+  flight.Run(20.0);
+  const auto& clock = flight.bridge.clock();
+  ASSERT_TRUE(clock.synced());
+  const int64_t host = flight.now();
+  EXPECT_NEAR(static_cast<double>(*clock.HostTime(flight.px4.Clock(host)) - host), 0.0, 1500.0);
+  const auto& errors = flight.px4.seen().clock_errors;
+  ASSERT_GT(errors.size(), 100u);
+  double mean = 0;
+  for (double e : errors) mean += e / static_cast<double>(errors.size());
+  EXPECT_NEAR(mean, 0.0, 1.5e-3) << "ticks of 2.5 ms are the stand-in's own resolution";
+}
+
+TEST(FcuBridge, ImuIsAt200HzOnTheHostsClock) {
+  Flight flight;
+  flight.setpoints = false;
+  flight.Run(8.0);
+  const std::size_t begin = flight.imu.size();
+  const int64_t from = flight.now();
+  flight.Run(5.0);
+  EXPECT_NEAR(static_cast<double>(flight.imu.size() - begin), 1000.0, 10.0);
+  EXPECT_NEAR(static_cast<double>(flight.imu[begin].utime - from), 0.0, 10'000.0);
+  for (std::size_t i = begin; i < flight.imu.size(); ++i) {
+    EXPECT_GT(flight.imu[i].utime, flight.imu[i - 1].utime);
+    EXPECT_NEAR(flight.imu[i].accel.z(), 9.81, 1e-3);
+  }
+  EXPECT_STREQ(flight.bridge.imu().source(), "HIGHRES_IMU");
+}
+
+TEST(FcuBridge, NeverSendsAStaleSetpoint) {
+  Flight flight;
+  ASSERT_TRUE(flight.RunUntil(State::kFlying, 12.0));
+  flight.Run(5.0);
+  flight.setpoints = false;
+  flight.Run(0.12);
+  const int sent = flight.px4.seen().setpoints;
+  flight.Run(1.0);
+  EXPECT_EQ(flight.px4.seen().setpoints, sent);
+  EXPECT_EQ(flight.bridge.handshake().state(), State::kLanding) << flight.bridge.Words();
+  EXPECT_FALSE(flight.px4.failsafe()) << "we asked before the autopilot had to";
+  EXPECT_TRUE(flight.px4.mode() == kLandMode);
+  EXPECT_TRUE(flight.RunUntil(State::kDone, 20.0));
+}
+
+TEST(FcuBridge, ARepeatedSetpointIsNoFreshOne) {
+  Flight flight;
+  ASSERT_TRUE(flight.RunUntil(State::kFlying, 12.0));
+  flight.Run(3.0);
+  flight.setpoints = false;
+  Setpoint setpoint;
+  setpoint.motors = true;
+  setpoint.thrust = 9.81;
+  const int64_t stuck = flight.now();
+  for (int i = 0; i < 400; ++i) {
+    flight.bridge.OnSetpoint(setpoint, stuck, flight.now());
+    flight.Run(0.0025);
+  }
+  EXPECT_EQ(flight.bridge.handshake().state(), State::kLanding);
+}
+
+TEST(FcuBridge, LandsWhenThePoseHasBeenSilentForTooLong) {
+  Flight flight;
+  ASSERT_TRUE(flight.RunUntil(State::kFlying, 12.0));
+  flight.Run(5.0);
+  flight.poses = false;
+  flight.Run(0.3);
+  const int odometry = flight.px4.seen().odometry;
+  flight.Run(1.5);
+  EXPECT_EQ(flight.bridge.handshake().state(), State::kFlying) << "control has its two seconds";
+  flight.Run(0.5);
+  EXPECT_EQ(flight.bridge.handshake().state(), State::kLanding);
+  EXPECT_EQ(flight.px4.seen().odometry, odometry);
+}
+
+TEST(FcuBridge, BeginsNothingWithoutAPose) {
+  Flight flight;
+  flight.poses = false;
+  flight.Run(10.0);
+  EXPECT_EQ(flight.bridge.handshake().state(), State::kStandby);
+  EXPECT_EQ(flight.bridge.missing(), "no POSE yet");
+  EXPECT_EQ(flight.px4.seen().setpoints, 0);
+  EXPECT_EQ(flight.px4.seen().offboard_commands, 0);
+}
+
+TEST(FcuBridge, BeginsNothingWhenTheAttitudesDiffer) {
+  Flight flight;
+  flight.poses = false;
+  for (int i = 0; i < 4000; ++i) {
+    Pose pose;
+    pose.utime = flight.now();
+    pose.R_WB = math::FromYaw(0.5);
+    pose.usable = true;
+    flight.bridge.OnPose(pose, flight.now());
+    flight.Run(0.0025);
+  }
+  EXPECT_NE(flight.bridge.missing().find("29 degrees off"), std::string::npos)
+      << flight.bridge.missing();
+  EXPECT_EQ(flight.px4.seen().times_armed, 0);
+}
+
+TEST(FcuBridge, ThePilotTakesItAtOnceAndForGood) {
+  Flight flight;
+  ASSERT_TRUE(flight.RunUntil(State::kFlying, 12.0));
+  flight.Run(5.0);
+  flight.px4.PilotMode({3, 0});
+  flight.Run(1.1);  // the next heartbeat
+  EXPECT_EQ(flight.bridge.handshake().state(), State::kPilot);
+  const auto before = flight.px4.seen();
+  flight.Run(20.0);
+  EXPECT_EQ(flight.px4.seen().setpoints, before.setpoints);
+  EXPECT_EQ(flight.px4.seen().offboard_commands, before.offboard_commands);
+  EXPECT_EQ(flight.bridge.handshake().state(), State::kPilot) << "setpoints still come";
+  flight.setpoints = false;
+  flight.Run(5.0);
+  EXPECT_EQ(flight.bridge.handshake().state(), State::kPilot) << "still armed";
+  flight.px4.PilotArms(false);
+  EXPECT_TRUE(flight.RunUntil(State::kStandby, 5.0));
+  flight.px4.PilotMode({3, 0});
+  flight.setpoints = true;
+  EXPECT_TRUE(flight.RunUntil(State::kFlying, 12.0)) << "another flight";
+}
+
+TEST(FcuBridge, AFailsafeIsLatchedThoughTheStreamCouldComeBack) {
+  StandInOptions options;
+  options.com_of_loss_t = 0.3;  // shorter than our own patience
+  Flight flight(options);
+  ASSERT_TRUE(flight.RunUntil(State::kFlying, 12.0));
+  flight.Run(5.0);
+  flight.setpoints = false;
+  flight.Run(0.45);
+  ASSERT_TRUE(flight.px4.failsafe());
+  flight.Run(0.04);
+  flight.setpoints = true;
+  flight.Run(1.5);
+  // Either a heartbeat told us and it is latched, or the stream was back before.
+  const State state = flight.bridge.handshake().state();
+  EXPECT_TRUE(state == State::kFailsafe || state == State::kFlying) << flight.bridge.Words();
+  EXPECT_EQ(flight.px4.mode() == kOffboardMode, state == State::kFlying);
+}
+
+TEST(FcuBridge, LinkLossEndsInALatchedFailsafe) {
+  Flight flight;
+  ASSERT_TRUE(flight.RunUntil(State::kFlying, 12.0));
+  flight.Run(5.0);
+  flight.link = false;
+  flight.Run(3.0);
+  EXPECT_TRUE(flight.px4.failsafe());
+  // Back, but only their words: ours would bring OFFBOARD back by itself.
+  flight.link = true;
+  flight.setpoints = false;
+  flight.Run(1.2);
+  flight.setpoints = true;
+  const int sent = flight.px4.seen().setpoints;
+  flight.Run(10.0);
+  EXPECT_EQ(flight.px4.seen().setpoints, sent);
+  EXPECT_FALSE(flight.px4.mode() == kOffboardMode) << flight.bridge.Words();
+}
+
+TEST(FcuBridge, RefusalsAreSaidInWordsAndGivenUp) {
+  StandInOptions refuses;
+  refuses.refuses_offboard = true;
+  Flight a(refuses);
+  ASSERT_TRUE(a.RunUntil(State::kRefused, 12.0));
+  EXPECT_NE(a.bridge.Words().find("OFFBOARD was refused (denied)"), std::string::npos)
+      << a.bridge.Words();
+  const int sent = a.px4.seen().setpoints;
+  a.Run(5.0);
+  EXPECT_EQ(a.px4.seen().setpoints, sent) << "given up: no stream any more";
+  EXPECT_EQ(a.px4.seen().offboard_commands, 1);
+
+  StandInOptions preflight;
+  preflight.preflight = "Preflight Fail: ekf2 missing data and a sentence of more than fifty bytes";
+  FcuConfig config;
+  config.give_up_after = 8.0;
+  Flight b(preflight, config);
+  ASSERT_TRUE(b.RunUntil(State::kRefused, 25.0)) << b.bridge.Words();
+  EXPECT_NE(
+      b.bridge.Words().find("arming did not come (not now): Arming denied: " + preflight.preflight),
+      std::string::npos)
+      << b.bridge.Words();
+  b.px4.options().preflight.clear();
+  b.Run(5.0);
+  EXPECT_EQ(b.bridge.handshake().state(), State::kRefused) << "until the setpoints have ceased";
+  b.setpoints = false;
+  b.Run(3.0);
+  b.setpoints = true;
+  EXPECT_TRUE(b.RunUntil(State::kFlying, 12.0)) << b.bridge.Words();
+}
+
+TEST(FcuBridge, ACheckThatPassesLaterIsWaitedFor) {
+  StandInOptions options;
+  options.preflight = "heading estimate not stable";
+  Flight flight(options);
+  ASSERT_TRUE(flight.RunUntil(State::kArming, 12.0));
+  flight.Run(10.0);
+  flight.px4.options().preflight.clear();
+  EXPECT_TRUE(flight.RunUntil(State::kFlying, 5.0)) << flight.bridge.Words();
+}
+
+TEST(FcuBridge, ThePilotMayBeTheOneWhoEngages) {
+  FcuConfig config;
+  config.engage = "pilot";
+  Flight flight({}, config);
+  ASSERT_TRUE(flight.RunUntil(State::kStreaming, 12.0));
+  flight.Run(10.0);
+  EXPECT_EQ(flight.bridge.handshake().state(), State::kStreaming);
+  EXPECT_EQ(flight.px4.seen().offboard_commands, 0);
+  flight.px4.PilotMode(kOffboardMode);
+  flight.px4.PilotArms(true);
+  ASSERT_TRUE(flight.RunUntil(State::kFlying, 3.0));
+  flight.px4.PilotMode({3, 0});
+  ASSERT_TRUE(flight.RunUntil(State::kStreaming, 3.0)) << "he may give it back";
+  flight.px4.PilotMode(kOffboardMode);
+  EXPECT_TRUE(flight.RunUntil(State::kFlying, 3.0));
+}
+
+TEST(FcuBridge, APilotInTheAirIsNotInterfered) {
+  Flight flight;
+  flight.px4.PilotArms(true);
+  flight.Run(15.0);
+  EXPECT_EQ(flight.px4.seen().setpoints, 0);
+  EXPECT_EQ(flight.px4.seen().offboard_commands, 0);
+}
+
+TEST(FcuBridge, GoesOnWhereItBeganAnewInMidFlight) {
+  Flight flight;
+  ASSERT_TRUE(flight.RunUntil(State::kFlying, 12.0));
+  flight.Run(5.0);
+  StandInOptions options;
+  flight.bridge = Bridge(FcuConfig{});
+  flight.Run(2.5);
+  // The clock takes half a second and the heartbeat one: longer than COM_OF_LOSS_T may bear, so
+  // either is right, but never a second arming.
+  EXPECT_EQ(flight.px4.seen().times_armed, 1);
+  flight.Run(30.0);
+  EXPECT_EQ(flight.px4.seen().times_armed, 1);
+}
+
+TEST(FcuBridge, AnAutopilotThatBeginsAnewIsAskedForItsStreamsAgain) {
+  Flight flight;
+  flight.setpoints = false;
+  flight.Run(10.0);
+  flight.px4.Reboot(flight.now());
+  flight.Run(10.0);
+  EXPECT_EQ(flight.bridge.clock().restarts(), 1);
+  EXPECT_EQ(flight.bridge.rates().missing(), "");
+  flight.setpoints = true;
+  EXPECT_TRUE(flight.RunUntil(State::kFlying, 12.0));
+  flight.Run(3.0);
+  flight.px4.Reboot(flight.now());
+  flight.Run(2.0);
+  // Whichever it says first: that it is disarmed, or that it stands on the ground.
+  EXPECT_TRUE(flight.bridge.handshake().state() == State::kFailsafe ||
+              flight.bridge.handshake().state() == State::kDone)
+      << flight.bridge.Words();
+  flight.Run(10.0);
+  EXPECT_EQ(flight.px4.seen().times_armed, 1) << "not armed again by itself";
+}
+
+TEST(FcuBridge, AnotherMakesAutopilotIsLeftAlone) {
+  StandInOptions options;
+  options.autopilot = 3;
+  Flight flight(options);
+  flight.Run(10.0);
+  EXPECT_EQ(flight.bridge.handshake().state(), State::kNoAutopilot);
+  EXPECT_EQ(flight.px4.seen().commands, 0);
+  EXPECT_NE(flight.bridge.autopilot().stranger(), "");
+}
+
+TEST(FcuBridge, ResetsAreCountedPerEpoch) {
+  Flight flight;
+  flight.setpoints = false;
+  flight.poses = false;
+  flight.Run(3.0);
+  Pose pose;
+  pose.usable = true;
+  uint8_t expected = 0;
+  for (const int32_t epoch : {5, 5, 261, 261, -3, 5}) {
+    static int32_t last = 5;
+    if (epoch != last) ++expected;
+    last = epoch;
+    pose.epoch = epoch;
+    pose.utime = flight.now();
+    flight.bridge.OnPose(pose, flight.now());
+    flight.Run(0.03);
+    EXPECT_EQ(flight.px4.seen().vision->reset_counter, expected);
+  }
+}
+
+// Whatever is lost on the way: it flies, and it ends.
+TEST(FcuBridge, FliesAndEndsOnALossyLink) {
+  for (uint64_t seed = 1; seed <= 20; ++seed) {
+    StandInOptions options;
+    options.lost_acks = 0.5;
+    Flight flight(options, {}, seed);
+    flight.loss = 0.2;
+    ASSERT_TRUE(flight.RunUntil(State::kFlying, 30.0)) << seed << flight.bridge.Words();
+    flight.Run(5.0);
+    EXPECT_EQ(flight.bridge.handshake().state(), State::kFlying) << seed << flight.bridge.Words();
+    flight.setpoints = false;
+    ASSERT_TRUE(flight.RunUntil(State::kDone, 40.0)) << seed << flight.bridge.Words();
+    EXPECT_FALSE(flight.px4.armed());
+  }
+}
+
+}  // namespace
+}  // namespace chase::fcu::testing

@@ -1,0 +1,103 @@
+#pragma once
+
+#include <algorithm>
+#include <deque>
+#include <functional>
+#include <string>
+#include <utility>
+
+#include "../fcu/stand_in.h"
+#include "common/math/rotation.h"
+#include "services/fcu/bridge.h"
+
+namespace chase::fcu::testing {
+
+inline constexpr int64_t kFlightStart = 1'700'000'000'000'000;
+
+/// The bridge and the stand-in on a link with a delay, in logical time; POSE is the truth, and
+/// setpoints come from a hand-written controller: climb to `height`, or nothing.
+class Flight {
+ public:
+  explicit Flight(const StandInOptions& options = {}, FcuConfig config = {}, uint64_t seed = 1)
+      : bridge(config), px4(options, kFlightStart, seed), random_(seed) {}
+
+  Bridge bridge;
+  StandIn px4;
+  bool setpoints = true, motors = true, poses = true, link = true;
+  double height = 1.5;
+  double loss = 0.0;  ///< probability that a datagram is lost, each way
+  std::vector<ImuSample> imu;
+  std::vector<double> imu_errors;  ///< s: stamp against when it was measured
+  std::vector<std::string> states;
+
+  void Run(
+      double seconds, const std::function<bool()>& until = [] { return false; }) {
+    const int64_t end = now_ + static_cast<int64_t>(1e6 * seconds);
+    while (now_ < end && !until()) Step();
+  }
+  bool RunUntil(Handshake::State state, double seconds) {
+    Run(seconds, [&] { return bridge.handshake().state() == state; });
+    return bridge.handshake().state() == state;
+  }
+  int64_t now() const { return now_; }
+
+ private:
+  struct Datagram {
+    int64_t arrival;
+    std::vector<uint8_t> bytes;
+  };
+
+  void Step() {
+    now_ += 2'500;
+    px4.Tick(now_);
+    Carry(px4.TakeOutgoing(), &to_us_);
+    for (; !to_us_.empty() && to_us_.front().arrival <= now_; to_us_.pop_front())
+      bridge.Receive(to_us_.front().arrival, now_, to_us_.front().bytes.data(),
+                     to_us_.front().bytes.size(), true);
+    if (now_ % 5'000 == 0) Feed();
+    bridge.Tick(now_);
+    Carry(bridge.TakeOutgoing(), &to_px4_);
+    for (; !to_px4_.empty() && to_px4_.front().arrival <= now_; to_px4_.pop_front())
+      px4.Receive(to_px4_.front().arrival, to_px4_.front().bytes);
+    for (const ImuSample& sample : bridge.TakeImu()) imu.push_back(sample);
+    const std::string name = Handshake::Name(bridge.handshake().state());
+    if (states.empty() || states.back() != name) states.push_back(name);
+  }
+
+  void Carry(std::vector<std::vector<uint8_t>> from, std::deque<Datagram>* to) {
+    for (auto& bytes : from) {
+      if (!link || random_.Uniform() < loss) continue;
+      const int64_t queue = static_cast<int64_t>(400.0 * random_.Uniform());
+      const int64_t arrival = std::max(now_ + 300 + queue, to->empty() ? 0 : to->back().arrival);
+      to->push_back({arrival, std::move(bytes)});
+    }
+  }
+
+  void Feed() {
+    if (poses) {
+      Pose pose;
+      pose.utime = now_;
+      pose.p_WB = px4.p_WB();
+      pose.v_WB = px4.v_WB();
+      pose.R_WB = px4.R_WB();
+      pose.covariance = Matrix9d::Identity() * 1e-4;
+      pose.usable = true;
+      bridge.OnPose(pose, now_);
+    }
+    if (!setpoints) return;
+    Setpoint setpoint;
+    const Eigen::Vector3d goal(0, 0, height);
+    const Eigen::Vector3d a = 2.0 * (goal - px4.p_WB()) - 2.5 * px4.v_WB();
+    const Eigen::Vector3d force = a.cwiseMax(-3.0).cwiseMin(3.0) + Eigen::Vector3d(0, 0, 9.81);
+    setpoint.R_WB = math::FromZAxisAndYaw(force, 0.0);
+    setpoint.thrust = force.norm();
+    setpoint.motors = motors;
+    bridge.OnSetpoint(setpoint, now_, now_);
+  }
+
+  world::Random random_;
+  int64_t now_ = kFlightStart;
+  std::deque<Datagram> to_us_, to_px4_;
+};
+
+}  // namespace chase::fcu::testing

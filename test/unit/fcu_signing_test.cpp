@@ -1,0 +1,92 @@
+#include <gtest/gtest.h>
+
+#include "common/world/random.h"
+#include "services/fcu/framing.h"
+#include "services/fcu/signing.h"
+
+namespace chase::fcu {
+namespace {
+
+constexpr int64_t kUtime = 1'800'000'000'000'000;
+constexpr int64_t kSecond = 1'000'000;
+
+using Bytes = std::vector<uint8_t>;
+
+Key KeyOf(uint8_t first) {
+  Key key{};
+  key[0] = first;
+  return key;
+}
+
+struct Receiver {
+  explicit Receiver(const Key& key = KeyOf(1)) : signing(key, 0), reader(&signing) {}
+  bool Hears(const Bytes& bytes, int64_t utime = kUtime) {
+    bool heard = false;
+    reader.Add(utime, bytes.data(), bytes.size(), [&](const Frame&) { heard = true; });
+    return heard;
+  }
+  Signing signing;
+  FrameReader reader;
+};
+
+struct Sender {
+  explicit Sender(uint8_t link = 1, const Key& key = KeyOf(1))
+      : signing(key, link), writer(1, 1, &signing) {}
+  Bytes Send(int64_t utime = kUtime) { return writer.Write(utime, mav::Timesync{1, 2, 0, 0}); }
+  Signing signing;
+  FrameWriter writer;
+};
+
+TEST(FcuSigning, GenuineFramesAreHeardOnceEach) {
+  Sender sender;
+  Receiver receiver;
+  for (int i = 0; i < 600; ++i) {
+    const Bytes frame = sender.Send(kUtime + i);  // many within one tick of 10 us
+    EXPECT_TRUE(receiver.Hears(frame));
+    EXPECT_FALSE(receiver.Hears(frame)) << "replayed";
+  }
+  EXPECT_EQ(receiver.reader.counters().refused, 600);
+}
+
+TEST(FcuSigning, ForgedAndUnsignedFramesAreRefused) {
+  world::Random random(3);
+  Sender sender, stranger(1, KeyOf(2));
+  Receiver receiver;
+  EXPECT_FALSE(receiver.Hears(stranger.Send()));
+  FrameWriter plain(1, 1);
+  EXPECT_FALSE(receiver.Hears(plain.Write(kUtime, mav::Timesync{})));
+  for (int i = 0; i < 500; ++i) {
+    Bytes frame = sender.Send();
+    frame[frame.size() - 1 - random.Next() % kSignatureBytes] ^=
+        static_cast<uint8_t>(1 + random.Next() % 255);
+    EXPECT_FALSE(receiver.Hears(frame));
+    receiver.reader.Reset();
+  }
+  EXPECT_TRUE(receiver.Hears(sender.Send()));
+}
+
+TEST(FcuSigning, AnOldRecordingIsRefusedOnANewLink) {
+  Receiver receiver;
+  EXPECT_FALSE(receiver.Hears(Sender(5).Send(kUtime - 61 * kSecond)));
+  EXPECT_TRUE(receiver.Hears(Sender(5).Send(kUtime - 59 * kSecond)));
+  EXPECT_TRUE(receiver.Hears(Sender(6).Send(kUtime + 3600 * kSecond))) << "their clock leads";
+  EXPECT_FALSE(receiver.Hears(Sender(7).Send(kUtime))) << "ours has followed it";
+}
+
+TEST(FcuSigning, OurOwnClockMayBeSetBack) {
+  Sender sender;
+  Receiver receiver;
+  EXPECT_TRUE(receiver.Hears(sender.Send(kUtime)));
+  EXPECT_TRUE(receiver.Hears(sender.Send(kUtime - 3600 * kSecond)));
+}
+
+TEST(FcuSigning, LinksAreCountedApart) {
+  Sender a(1), b(2);
+  Receiver receiver;
+  const Bytes early = a.Send(kUtime);
+  EXPECT_TRUE(receiver.Hears(b.Send(kUtime + kSecond)));
+  EXPECT_TRUE(receiver.Hears(early));
+}
+
+}  // namespace
+}  // namespace chase::fcu
