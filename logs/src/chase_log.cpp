@@ -56,9 +56,10 @@ void AddImport(CLI::App* app, Arguments* a) {
 void RunExport(const Arguments& a) {
   RefuseSame(a.in, a.out);
   if (a.tum)
-    std::printf("%s: %ld poses\n", a.out.c_str(), ExportTum(a.in, a.out));
+    std::printf("%s: %ld poses\n", a.out.c_str(),
+                ExportTum(a.in, a.out, a.channel.empty() ? "POSE" : a.channel));
   else if (a.mcap)
-    std::printf("%s: %ld messages\n", a.out.c_str(), ExportMcap(a.in, a.out));
+    std::printf("%s: %ld messages\n", a.out.c_str(), ExportMcap(a.in, a.out, a.channel));
   else
     std::printf("%s: %d files\n", a.out.c_str(), ExportCsv(a.in, a.out, a.channel));
 }
@@ -66,12 +67,14 @@ void RunExport(const Arguments& a) {
 void AddExport(CLI::App* app, Arguments* a) {
   auto* sub = app->add_subcommand("export", "Writes a log in a format that others read.");
   auto* format = sub->add_option_group("format");
-  format->add_flag("--tum", a->tum, "trajectory of POSE: t x y z qx qy qz qw");
+  format->add_flag("--tum", a->tum,
+                   "trajectory t x y z qx qy qz qw of POSE, or --channel TRUTH or TARGET");
   format->add_flag("--csv", a->csv, "OUT is a folder: one file per channel");
   format->add_flag("--mcap", a->mcap,
                    "JSON messages for Foxglove; clouds and images in its schemas");
   format->require_option(1);
-  sub->add_option("--channel", a->channel, "--csv: this channel only, clouds and images included");
+  sub->add_option("--channel", a->channel,
+                  "this channel only; --csv leaves out clouds and images unless they are named");
   sub->add_option("LOG", a->in, "LCM log")->required();
   sub->add_option("OUT", a->out, "file or folder to write")->required();
   sub->callback([a] { RunExport(*a); });
@@ -152,7 +155,7 @@ int main(int argc, char** argv) {
     return 1;
   } catch (const std::exception& e) {
     std::fprintf(stderr, "chase-log: %s\n", e.what());
-    return 1;
+    return dynamic_cast<const BadOption*>(&e) != nullptr ? 2 : 1;
   }
   return exit_code;
 }

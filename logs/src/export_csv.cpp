@@ -86,11 +86,19 @@ class Table {
 
 }  // namespace
 
+void RefuseEmpty(const std::string& log, const std::string& channel) {
+  if (channel.empty())
+    throw std::runtime_error(log + ": holds no message of ours; see chase-log info");
+  throw BadOption("--channel " + channel + ": " + log +
+                  " holds no message of ours on it; chase-log info lists its channels");
+}
+
 int ExportCsv(const std::string& log, const std::string& out, const std::string& channel) {
   LogReader reader(log);
   std::map<std::string, Table> tables;
   for (Event e; reader.Next(&e);)
     if (channel.empty() ? !bus::IsHeavy(e.channel) : e.channel == channel) tables[e.channel].Add(e);
+  if (tables.empty()) RefuseEmpty(log, channel);
   std::filesystem::create_directories(out);
   int files = 0;
   for (const auto& [name, table] : tables) {
@@ -98,9 +106,7 @@ int ExportCsv(const std::string& log, const std::string& out, const std::string&
     WriteFile((std::filesystem::path(out) / (name + ".csv")).string(), table.Text());
     ++files;
   }
-  if (files == 0)
-    throw std::runtime_error(log + ": holds no message of ours" +
-                             (channel.empty() ? "" : " on " + channel) + "; see chase-log info");
+  if (files == 0) RefuseEmpty(log, channel);
   return files;
 }
 

@@ -7,11 +7,12 @@
 
 namespace chase::logs {
 
-long ExportMcap(const std::string& log, const std::string& out) {
+long ExportMcap(const std::string& log, const std::string& out, const std::string& channel) {
   LogReader reader(log);
   McapWriter writer(out);
   long count = 0;
   for (Event e; reader.Next(&e);) {
+    if (!channel.empty() && e.channel != channel) continue;
     const auto message = ToViewer(e.bytes);
     if (!message) continue;
     if (!writer.HasChannel(e.channel)) {
@@ -24,7 +25,7 @@ long ExportMcap(const std::string& log, const std::string& out) {
     writer.Write(e.channel, e.utime, message->json.dump());
     ++count;
   }
-  if (count == 0) throw std::runtime_error(log + ": holds no message of ours; see chase-log info");
+  if (count == 0) RefuseEmpty(log, channel);
   writer.Close();
   return count;
 }

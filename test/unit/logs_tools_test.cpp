@@ -243,7 +243,7 @@ TEST(LogExport, TumHasOneLinePerPose) {
   EXPECT_EQ(ReadText(out),
             "1.500000 1.000000 -2.000000 0.000000 0.000000000 0.000000000 0.800000000 "
             "0.600000000\n");
-  EXPECT_NE(ErrorOf([] { ExportTum(WriteLog("n.lcm"), Temp("n.tum")); }).find("no POSE"),
+  EXPECT_NE(ErrorOf([] { ExportTum(WriteLog("n.lcm"), Temp("n.tum")); }).find("no usable POSE"),
             std::string::npos);
 }
 
