@@ -71,6 +71,7 @@ int PrintCriteria(const logs::Metrics& metrics, bool part) {
   if (part) fmt::print("of the part flown, {:.1f} s:\n", metrics.flown_s);
   for (const auto& [name, passed] : metrics.criteria)
     if (!part || name != "complete") fmt::print("{:<20} {}\n", name, passed ? "passed" : "FAILED");
+  for (const std::string& loss : metrics.losses) fmt::print("{}\n", loss);
   if (metrics.collision_s >= 0.0)
     fmt::print("collision at {:.2f} s with {}\n", metrics.collision_s, metrics.collided_with);
   return metrics.Passed() || part ? 0 : 2;  // criteria are for whole missions

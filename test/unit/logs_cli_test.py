@@ -2,6 +2,7 @@
 
 logs_cli_test.py BIN_DIR"""
 
+import json
 import pathlib
 import subprocess
 import sys
@@ -70,6 +71,70 @@ class LogTools(unittest.TestCase):
                 answer = run("chase-log", "export", *arguments, self.log, out)
                 self.assert_refused(answer, 2, *words)
                 self.assertFalse(out.exists())
+
+    def without(self, name, lost):
+        """A log that lacks the messages of which lost(channel, k) is true for the channel's k-th."""
+        counts, kept = {}, []
+        for event in self.events:
+            k = counts[event[1]] = counts.get(event[1], -1) + 1
+            if not lost(event[1], k):
+                kept.append(event)
+        lcmlog.write(self.folder / name, kept)
+        return self.folder / name
+
+    def test_lost_messages_are_counted(self):
+        whole = self.good("info", self.log)
+        self.assertNotIn("are missing", whole)
+        self.assertIn("gym, seed 1", whole)
+        self.assertIn("versions", whole)
+        log = self.without("lost.lcm", lambda channel, k: channel == "IMU" and 100 <= k < 150 or
+                           channel == "TRUTH" and k < 30)
+        text = self.good("info", log)
+        self.assertIn(f"IMU: 50 of {self.count('IMU')} messages of simulator are missing", text)
+        self.assertIn(f"TRUTH: 30 of {self.count('TRUTH')} messages of simulator are missing", text)
+        imu = next(line for line in text.splitlines() if line.startswith("IMU")).split()
+        self.assertEqual(imu[-2:], ["50", "0.255"])  # 51 periods of 5 ms
+
+    def test_what_others_heard_and_the_log_lacks_is_said(self):
+        log = self.without("no_imu.lcm", lambda channel, k: channel in ("IMU", "POSE"))
+        text = self.good("info", log)
+        for channel in ("IMU", "POSE"):
+            self.assertIn(f"{channel}: others heard", text)
+
+    def test_cut_and_damaged_logs_are_read_as_far_as_they_go(self):
+        data = self.log.read_bytes()
+        cut = self.folder / "cut.lcm"
+        cut.write_bytes(data[:-100])
+        self.assertIn("cut off", self.good("info", cut))
+        sync = lcmlog.SYNC.to_bytes(4, "big")
+        at = data.index(sync + (1000).to_bytes(8, "big"))  # the 1000th event
+        for name, wrong in (("sync", b"\0" * 4), ("length", data[at:at + 24] + b"\x7f\xff\0\0")):
+            damaged = self.folder / f"{name}.lcm"
+            damaged.write_bytes(data[:at] + wrong + data[at + len(wrong):])
+            text = self.good("info", damaged)
+            self.assertIn("damaged", text)
+            count = sum(int(line.split()[2]) for line in text.splitlines() if " Hz " in line)
+            self.assertEqual(count, len(self.events) - 1, name)
+
+    def test_packets_of_the_bus_stay_out(self):
+        log = self.folder / "loopback.lcm"
+        lcmlog.write(log, [(self.events[0][0], "LOOPBACK_4711", b""), *self.events])
+        self.assertNotIn("LOOPBACK", self.good("info", log))
+
+    def test_reports_say_what_is_missing(self):
+        out = self.folder / "report"
+        log = self.without("report.lcm", lambda channel, k: channel in ("IMU", "POSE") and k % 3)
+        log.write_bytes(log.read_bytes()[:-50])
+        answer = run("chase-report", log, "--out", out)
+        self.assertEqual(answer.returncode, 2, answer.stderr)
+        self.assertIn("cut off", answer.stderr)
+        self.assertIn("IMU: ", answer.stdout)
+        metrics = json.loads((out / "metrics.json").read_text())
+        self.assertFalse(metrics["passed"])
+        self.assertFalse(metrics["criteria"]["recorded"])
+        self.assertGreater(metrics["lost_messages"]["IMU"], 0.6 * self.count("IMU"))
+        self.assertEqual(metrics["lost_messages"]["TRUTH"], 0)
+        self.assertIn("are missing", (out / "report.html").read_text())
 
 
 if __name__ == "__main__":

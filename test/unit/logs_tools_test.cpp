@@ -5,7 +5,9 @@
 #include <fstream>
 #include <functional>
 #include <map>
+#include <random>
 #include <regex>
+#include <set>
 #include <sstream>
 
 #include "chase/imu_t.hpp"
@@ -165,7 +167,8 @@ TEST(LogInfo, CountsAndTypesEveryChannel) {
   EXPECT_EQ(info.channels[0].count, 20);
   EXPECT_NEAR(info.channels[0].RateHz(), 200.0, 1e-9);
   EXPECT_EQ(info.channels[1].count, 4);
-  EXPECT_EQ(info.unread_bytes, 0);
+  EXPECT_TRUE(info.Whole());
+  EXPECT_EQ(info.channels[0].missing, 0);
 }
 
 TEST(LogInfo, ALogCutOffAnywhereIsReadAsFarAsItGoes) {
@@ -175,8 +178,28 @@ TEST(LogInfo, ALogCutOffAnywhereIsReadAsFarAsItGoes) {
     long count = 0;
     for (const auto& c : info.channels) count += c.count;
     EXPECT_LT(count, 24);
-    EXPECT_GE(info.unread_bytes, 0);
   }
+}
+
+TEST(SeqCount, CountsWhatNeverCameInAnyOrder) {
+  std::mt19937 random(7);
+  for (int round = 0; round < 200; ++round) {
+    std::vector<int32_t> numbers(1 + random() % 60);
+    for (int32_t& n : numbers) n = static_cast<int32_t>(random() % 80);
+    SeqCount count;
+    for (const int32_t n : numbers) count.Add(n);
+    const std::set<int32_t> different(numbers.begin(), numbers.end());
+    const auto span = *different.rbegin() - *different.begin() + 1;
+    EXPECT_EQ(count.missing(), span - static_cast<int64_t>(different.size())) << "round " << round;
+    EXPECT_EQ(count.first(), *different.begin());
+    EXPECT_EQ(count.last(), *different.rbegin());
+  }
+}
+
+TEST(SeqCount, TakesTheWholeRangeOfNumbers) {
+  SeqCount count;
+  for (const int32_t n : {INT32_MAX, INT32_MIN, 0}) count.Add(n);
+  EXPECT_EQ(count.missing(), (int64_t{1} << 32) - 3);
 }
 
 TEST(LogInfo, WhatIsNoLogIsRefusedInOneLine) {
