@@ -4,6 +4,7 @@ logs_cli_test.py BIN_DIR"""
 
 import json
 import pathlib
+import re
 import subprocess
 import sys
 import tempfile
@@ -115,6 +116,27 @@ class LogTools(unittest.TestCase):
             self.assertIn("damaged", text)
             count = sum(int(line.split()[2]) for line in text.splitlines() if " Hz " in line)
             self.assertEqual(count, len(self.events) - 1, name)
+
+    def test_diff_tells_lost_from_different(self):
+        lost = self.without("diff.lcm", lambda channel, k: channel == "IMU" and k == 10)
+        answer = run("chase-log", "diff", self.log, lost)
+        self.assertEqual(answer.returncode, 1, answer.stderr)
+        n = self.count("IMU")
+        self.assertEqual(answer.stdout, f"IMU: {n} messages against {n - 1}; 1 of A are not in B\n")
+        none = self.without("none.lcm", lambda channel, k: channel == "IMU")
+        self.assertEqual(run("chase-log", "diff", self.log, none).stdout,
+                         f"IMU: {n} messages against 0; {n} of A are not in B\n")
+
+    def test_diff_of_a_replay_pairs_by_time(self):
+        half = self.folder / "half.lcm"
+        lcmlog.write(half, [e for e in self.events if e[0] >= 5_000_000])
+        again = self.folder / "again.lcm"
+        self.assertEqual(run("chase-planning", "--replay", half, "--out", again).returncode, 0)
+        lines = run("chase-log", "diff", half, again).stdout.splitlines()
+        plan = next(line for line in lines if line.startswith("PLAN: "))
+        ours = sum(channel == "PLAN" for _, channel, _ in lcmlog.read(again))
+        unpaired = re.search(r"(\d+) of B are not in A", plan)
+        self.assertLess(int(unpaired.group(1)) if unpaired else 0, ours / 2, plan)
 
     def test_packets_of_the_bus_stay_out(self):
         log = self.folder / "loopback.lcm"
