@@ -7,8 +7,9 @@
 
 namespace chase::logs {
 
-long ExportMcap(const std::string& log, const std::string& out, const std::string& channel) {
-  LogReader reader(log);
+long ExportMcap(const std::string& log, const std::string& out, const std::string& channel,
+                const Watch& watch) {
+  LogReader reader(log, watch);
   McapWriter writer(out);
   long count = 0;
   for (Event e; reader.Next(&e);) {

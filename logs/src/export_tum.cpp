@@ -47,9 +47,10 @@ Liner LinerOf(const std::string& channel) {
 
 }  // namespace
 
-long ExportTum(const std::string& log, const std::string& out, const std::string& channel) {
+long ExportTum(const std::string& log, const std::string& out, const std::string& channel,
+               const Watch& watch) {
   const Liner line_of = LinerOf(channel);
-  LogReader reader(log);
+  LogReader reader(log, watch);
   std::string text;
   long count = 0;
   for (Event e; reader.Next(&e);) {

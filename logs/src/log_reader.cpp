@@ -33,7 +33,7 @@ struct LogReader::Header {
   int64_t utime = 0, channel_bytes = 0, data_bytes = 0, size = 0;
 };
 
-LogReader::LogReader(const std::string& file) : file_(file) {
+LogReader::LogReader(const std::string& file, Watch watch) : file_(file), watch_(std::move(watch)) {
   if (!std::filesystem::is_regular_file(file))
     throw std::runtime_error(file + ": no such file; check the path");
   const int fd = open(file.c_str(), O_RDONLY | O_CLOEXEC);
@@ -92,6 +92,12 @@ void LogReader::StepOver(int64_t to) {
 }
 
 bool LogReader::Next(Event* event) {
+  const bool found = Find(event);
+  if (watch_) watch_(*this);
+  return found;
+}
+
+bool LogReader::Find(Event* event) {
   while (at_ < size_) {
     const Header h = HeaderAt(at_);
     if (h.size == 0) {

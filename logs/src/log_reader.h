@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -18,12 +19,16 @@ struct Damage {
   bool at_end = false;  ///< the log was cut off while being written
 };
 
+class LogReader;
+/// Hears of every event that was read and of the end: for progress and for what was damaged.
+using Watch = std::function<void(const LogReader&)>;
+
 /// Reads an LCM log from its beginning, in file order. Goes on behind what is damaged; leaves out
 /// the bus's own packets (bus::IsLoopback).
 class LogReader {
  public:
   /// Throws std::runtime_error with one line when the file is missing or no LCM log.
-  explicit LogReader(const std::string& file);
+  explicit LogReader(const std::string& file, Watch watch = {});
   ~LogReader();
   LogReader(const LogReader&) = delete;
   LogReader& operator=(const LogReader&) = delete;
@@ -37,15 +42,18 @@ class LogReader {
   int64_t size() const { return size_; }
   /// Where the next event is looked for, bytes from the beginning.
   int64_t position() const { return at_; }
+  bool AtEnd() const { return at_ >= size_; }
 
  private:
   struct Header;
+  bool Find(Event* event);
   Header HeaderAt(int64_t at) const;
   bool BeginsAt(int64_t at) const;
   int64_t FindEvent(int64_t from, int64_t to) const;
   void StepOver(int64_t to);
 
   std::string file_;
+  Watch watch_;
   const uint8_t* data_ = nullptr;
   int64_t size_ = 0, at_ = 0;
   std::vector<Damage> damage_;

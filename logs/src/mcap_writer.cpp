@@ -52,15 +52,12 @@ class Content {
 
 }  // namespace
 
-McapWriter::McapWriter(const std::string& file)
-    : file_(file), part_(file), out_(part_.name(), std::ios::binary) {
-  if (!out_)
-    throw std::runtime_error(file + ": cannot be written; check the folder and its rights");
+McapWriter::McapWriter(const std::string& file) : out_(file) {
   Put(kMagic + Content().Text("").Text("chase-log").Record(kHeader));
 }
 
 void McapWriter::Put(const std::string& bytes) {
-  out_ << bytes;
+  out_.Write(bytes);
   written_ += bytes.size();
 }
 
@@ -158,9 +155,7 @@ void McapWriter::Close() {
   const uint64_t summary = written_;
   Put(SummaryRecords());
   Put(Content().Number(summary).Number(uint64_t{0}).Number(uint32_t{0}).Record(kFooter) + kMagic);
-  out_.close();
-  if (!out_ || !part_.Complete())
-    throw std::runtime_error(file_ + ": could not be completed; is the disk full?");
+  out_.Close();
 }
 
 }  // namespace chase::logs

@@ -1,12 +1,11 @@
 #pragma once
 
 #include <cstdint>
-#include <fstream>
 #include <map>
 #include <string>
 #include <vector>
 
-#include "common/bus/part_file.h"
+#include "logs/src/output.h"
 
 namespace chase::logs {
 
@@ -44,9 +43,7 @@ class McapWriter {
   std::string Statistics() const;
   std::string SummaryRecords() const;
 
-  std::string file_;
-  bus::PartFile part_;
-  std::ofstream out_;
+  OutputFile out_;
   uint64_t written_ = 0;
   std::map<std::string, Channel> channels_;
   std::string definitions_;  // schema and channel records, repeated in the summary

@@ -2,6 +2,7 @@
 
 logs_cli_test.py BIN_DIR"""
 
+import csv
 import json
 import pathlib
 import re
@@ -17,6 +18,7 @@ import lcmlog  # noqa: E402
 
 BIN = pathlib.Path(sys.argv[1]).resolve()
 LIMIT = 60  # s
+HEAVY = ("LIDAR_SCAN", "CAMERA_IMAGE", "SCAN_REGISTERED", "MAP")
 
 
 def run(program, *arguments):
@@ -34,7 +36,18 @@ class LogTools(unittest.TestCase):
         answer = run("chase-flight", ROOT / "deploy/scenarios/gym.yaml", "--until", "1", "--quiet",
                      "--log", cls.log)
         assert answer.returncode == 0, answer.stderr
-        cls.events = list(lcmlog.read(cls.log))
+        cls.events = cls.thinned(lcmlog.read(cls.log))
+        lcmlog.write(cls.log, cls.events)
+
+    @staticmethod
+    def thinned(events):
+        """Few of the clouds and images, so that the tests are quick."""
+        counts, kept = {}, []
+        for event in events:
+            counts[event[1]] = counts.get(event[1], 0) + 1
+            if event[1] not in HEAVY or counts[event[1]] <= 5:
+                kept.append(event)
+        return kept
 
     def good(self, *arguments):
         answer = run("chase-log", *arguments)
@@ -157,6 +170,81 @@ class LogTools(unittest.TestCase):
         self.assertGreater(metrics["lost_messages"]["IMU"], 0.6 * self.count("IMU"))
         self.assertEqual(metrics["lost_messages"]["TRUTH"], 0)
         self.assertIn("are missing", (out / "report.html").read_text())
+
+    def counts(self, log):
+        found = {}
+        for _, channel, _ in lcmlog.read(log):
+            found[channel] = found.get(channel, 0) + 1
+        return found
+
+    def test_cut_copies_a_stretch_of_time(self):
+        out = self.folder / "stretch.lcm"
+        self.good("cut", self.log, out, "--from", "2", "--to", "3.5")
+        first = self.events[0][0]
+        self.assertEqual(list(lcmlog.read(out)),
+                         [e for e in self.events if 2_000_000 <= e[0] - first < 3_500_000])
+
+    def test_filter_copies_channels(self):
+        out = self.folder / "some.lcm"
+        self.good("filter", self.log, out, "--keep", "P*,IMU", "--drop", "*_STATUS")
+        self.assertEqual(set(self.counts(out)), {"POSE", "PLAN", "PREDICTION", "IMU"})
+        self.assertEqual(self.counts(out)["IMU"], self.count("IMU"))
+
+    def test_merge_puts_together_what_was_parted(self):
+        parts = self.folder / "imu.lcm", self.folder / "rest.lcm"
+        self.good("filter", self.log, parts[0], "--keep", "IMU,POSE")
+        self.good("filter", self.log, parts[1], "--drop", "IMU")
+        out = self.folder / "merged.lcm"
+        self.assertIn(f"{self.count('POSE')} messages were in several logs",
+                      self.good("merge", *parts, out))
+        self.assertEqual(run("chase-log", "diff", self.log, out).stdout, "no difference\n")
+
+    def test_repair_keeps_all_that_can_be_read(self):
+        at = next(k for k, e in enumerate(self.events) if e[1] == "POSE" and k > 500)
+        utime, channel, data = self.events[at]
+        events = list(self.events)
+        events[at] = utime, channel, data[:100]
+        damaged, out = self.folder / "damaged.lcm", self.folder / "repaired.lcm"
+        lcmlog.write(damaged, events)
+        raw = damaged.read_bytes()
+        middle = raw.index(lcmlog.SYNC.to_bytes(4, "big"), len(raw) // 2)
+        damaged.write_bytes(raw[:middle] + b"xxxx" + raw[middle + 4:-10])
+        answer = run("chase-log", "repair", damaged, out)
+        self.assertEqual(answer.returncode, 0, answer.stderr)
+        self.assertIn("POSE: 1 messages do not decode", answer.stdout)
+        self.assertIn("damaged", answer.stderr)
+        self.assertIn("cut off", answer.stderr)
+        self.assertEqual(sum(self.counts(out).values()), len(self.events) - 3)
+        self.assertNotIn("damaged", self.good("info", out))
+
+    def test_selections_of_nothing_are_refused(self):
+        out = self.folder / "nothing.lcm"
+        for words, arguments in ((("--from",), ("cut",)), (("--keep",), ("filter",)),
+                                 (("--from 5", "later"), ("cut", "--from", "5", "--to", "5")),
+                                 (("lasts", "--from"), ("cut", "--from", "1000")),
+                                 (("NO_SUCH", "info"), ("filter", "--keep", "NO_SUCH")),
+                                 (("--long", "--csv"), ("export", "--tum", "--long"))):
+            with self.subTest(arguments=arguments):
+                answer = run("chase-log", *arguments, self.log, out)
+                self.assert_refused(answer, 2, *words)
+                self.assertFalse(out.exists())
+
+    def test_long_csv_has_a_row_for_every_element(self):
+        out = self.folder / "csv"
+        self.good("export", "--csv", "--long", "--channel", "OBSTACLES", self.log, out)
+        lines = (out / "OBSTACLES.csv").read_text().splitlines()
+        self.assertEqual(lines[0], "event_utime,seq,field,index,value")
+        rows = list(csv.DictReader(lines))
+        ids = [row for row in rows if row["field"] == "obstacles.id"]
+        counts = [float(row["value"]) for row in rows if row["field"] == "n_obstacles"]
+        self.assertEqual(len(counts), self.count("OBSTACLES"))
+        self.assertEqual(len(ids), sum(counts))
+        self.assertEqual(int(ids[-1]["index"]), counts[-1] - 1)
+
+    def test_every_command_has_help(self):
+        for command in ("info", "import", "export", "diff", "cut", "filter", "merge", "repair",
+                        "migrate", "verify"):
+            self.assertIn("Usage:", self.good(command, "--help"))
 
 
 if __name__ == "__main__":
