@@ -26,7 +26,7 @@ struct Arguments {
   std::vector<std::string> ignore, files;
   Selection selection;
   double tolerance = 0.0;
-  bool tum = false, csv = false, mcap = false, long_form = false;
+  bool tum = false, csv = false, mcap = false, long_form = false, jpeg = false;
 };
 
 /// Says on stderr how far the work is, where that is a terminal, and in the end what of the log
@@ -97,12 +97,15 @@ void RunExport(const Arguments& a) {
   if (a.long_form && !a.csv)
     throw BadOption(std::string("--long: does nothing with ") + (a.tum ? "--tum" : "--mcap") +
                     "; leave it out, or export --csv");
+  if (a.jpeg && !a.mcap)
+    throw BadOption(std::string("--jpeg: does nothing with ") + (a.tum ? "--tum" : "--csv") +
+                    "; leave it out, or export --mcap");
   if (a.tum)
     std::printf("%s: %ld poses\n", a.out.c_str(),
                 ExportTum(a.in, a.out, a.channel.empty() ? "POSE" : a.channel, Progress()));
   else if (a.mcap)
     std::printf("%s: %ld messages\n", a.out.c_str(),
-                ExportMcap(a.in, a.out, a.channel, Progress()));
+                ExportMcap(a.in, a.out, a.channel, a.jpeg, Progress()));
   else
     std::printf("%s: %d files\n", a.out.c_str(),
                 ExportCsv(a.in, a.out, a.channel, a.long_form, Progress()));
@@ -115,8 +118,9 @@ void AddExport(CLI::App* app, Arguments* a) {
                    "trajectory t x y z qx qy qz qw of POSE, or --channel TRUTH or TARGET");
   format->add_flag("--csv", a->csv, "OUT is a folder: one file per channel");
   format->add_flag("--mcap", a->mcap,
-                   "JSON messages for Foxglove; clouds and images in its schemas");
+                   "protobuf for Foxglove: all fields, and its own schemas where they fit");
   format->require_option(1);
+  sub->add_flag("--jpeg", a->jpeg, "--mcap: images as JPEG, with loss, at a tenth of the size");
   sub->add_flag("--long", a->long_form,
                 "--csv: a row for every element: event_utime, seq, field, index, value");
   sub->add_option("--channel", a->channel,

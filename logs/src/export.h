@@ -30,9 +30,9 @@ long ExportTum(const std::string& log, const std::string& out, const std::string
 int ExportCsv(const std::string& log, const std::string& out, const std::string& channel,
               bool long_form = false, const Watch& watch = {});
 
-/// Every message (or those of `channel`) as JSON in an MCAP file for Foxglove and the like; clouds
-/// and images in Foxglove's own schemas. Returns the number of messages.
+/// Every message (or those of `channel`) as protobuf in an MCAP file for Foxglove and the like
+/// (foxglove.h), with `jpeg` the images compressed with loss. Returns the number of messages.
 long ExportMcap(const std::string& log, const std::string& out, const std::string& channel = "",
-                const Watch& watch = {});
+                bool jpeg = false, const Watch& watch = {});
 
 }  // namespace chase::logs

@@ -241,6 +241,39 @@ class LogTools(unittest.TestCase):
         self.assertEqual(len(ids), sum(counts))
         self.assertEqual(int(ids[-1]["index"]), counts[-1] - 1)
 
+    def mcap(self, *options):
+        out = self.folder / "flight.mcap"
+        self.good("export", "--mcap", *options, self.log, out)
+        modules = ROOT / "logs/node_modules"
+        if not (modules / "@mcap/core").is_dir():
+            self.skipTest("skipped: npm ci --prefix logs brings the readers")
+        answer = subprocess.run(["node", ROOT / "test/unit/mcap_check.cjs", modules, out],
+                                capture_output=True, text=True, timeout=LIMIT, check=False)
+        self.assertEqual(answer.returncode, 0, answer.stderr)
+        return json.loads(answer.stdout)
+
+    def test_mcap_is_read_by_the_loader_of_foxglove(self):
+        topics = self.mcap()
+        counts = self.counts(self.log)
+        for channel, count in counts.items():
+            self.assertEqual(topics[channel]["count"], count, channel)
+        for topic, schema in (("LIDAR_SCAN", "PointCloud"), ("CAMERA_IMAGE", "RawImage"),
+                              ("CAMERA_IMAGE/calibration", "CameraCalibration"),
+                              ("POSE/pose", "PoseInFrame"), ("/tf", "FrameTransforms"),
+                              ("OBSTACLES/scene", "SceneUpdate"), ("PLAN/scene", "SceneUpdate"),
+                              ("TARGET/scene", "SceneUpdate"), ("PLANNING_STATUS/log", "Log")):
+            self.assertEqual(topics[topic]["schema"], f"foxglove.{schema}")
+        pose = topics["POSE"]["first"]
+        self.assertEqual((pose["seq"], len(pose["covariance"])), (0, 81))
+        image = topics["CAMERA_IMAGE"]["first"]
+        self.assertEqual((image["width"], image["data"]), (376, 376 * 240 * 3))
+
+    def test_mcap_of_one_channel_with_jpeg(self):
+        topics = self.mcap("--channel", "CAMERA_IMAGE", "--jpeg")
+        self.assertEqual(set(topics), {"CAMERA_IMAGE", "CAMERA_IMAGE/calibration"})
+        self.assertEqual(topics["CAMERA_IMAGE"]["schema"], "foxglove.CompressedImage")
+        self.assertLess(topics["CAMERA_IMAGE"]["first"]["data"], 376 * 240 / 2)
+
     def test_every_command_has_help(self):
         for command in ("info", "import", "export", "diff", "cut", "filter", "merge", "repair",
                         "migrate", "verify"):
