@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "common/bus/channels.h"
+#include "common/config/version.h"
 #include "deploy/flight/collision_watch.h"
 #include "deploy/flight/flight.h"
 #include "deploy/flight/progress.h"
@@ -197,6 +198,7 @@ int main(int argc, char** argv) {
   mallopt(M_TRIM_THRESHOLD, 256 << 20);
   CLI::App app("Flies a scenario with every node in one thread and in logical time.",
                "chase-flight");
+  chase::config::AddVersion(&app);
   chase::flight::Arguments arguments;
   chase::flight::AddOptions(&app, &arguments);
   try {

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <stdexcept>
 
+#include "common/config/version.h"
 #include "logs/src/copy.h"
 #include "logs/src/diff.h"
 #include "logs/src/export.h"
@@ -246,7 +247,7 @@ int main(int argc, char** argv) {
   CLI::App app{
       "Shows, imports, exports, compares, cuts, merges, repairs, migrates and verifies LCM logs."};
   app.name("chase-log");
-  app.set_version_flag("--version", CHASE_VERSION);
+  chase::config::AddVersion(&app);
   app.require_subcommand(1);
   Arguments arguments;
   int exit_code = 0;

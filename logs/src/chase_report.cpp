@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <stdexcept>
 
+#include "common/config/version.h"
 #include "logs/src/page_template.h"
 #include "logs/src/read_flight.h"
 #include "logs/src/report_page.h"
@@ -59,7 +60,7 @@ int Report(const std::string& log, const std::string& out) {
 int main(int argc, char** argv) {
   CLI::App app{"Metrics, plots and one HTML page from a flight log."};
   app.name("chase-report");
-  app.set_version_flag("--version", CHASE_VERSION);
+  chase::config::AddVersion(&app);
   std::string log, out;
   app.add_option("LOG", log, "LCM log of a simulated flight")->required();
   app.add_option("--out", out, "folder for metrics.json, report.html and PNGs; default: the log's");

@@ -17,7 +17,7 @@ sys.dont_write_bytecode = True
 import lcmlog  # noqa: E402
 
 BIN = pathlib.Path(sys.argv[1]).resolve()
-LIMIT = 60  # s
+LIMIT = 240  # s: a loaded machine is slow to write
 HEAVY = ("LIDAR_SCAN", "CAMERA_IMAGE", "SCAN_REGISTERED", "MAP")
 
 
