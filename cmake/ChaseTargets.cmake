@@ -27,7 +27,7 @@ endfunction()
 # chase_program(NAME sources...): an executable in build/bin with our options.
 function(chase_program name)
   add_executable(${name} ${ARGN})
-  target_link_libraries(${name} PRIVATE chase_options)
+  target_link_libraries(${name} PRIVATE chase_options version)
 endfunction()
 
 # chase_test(NAME LIBS... SOURCES... [TIMEOUT s]): a GoogleTest program registered with CTest.

@@ -3,50 +3,15 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "common/bus/message_head.h"
+
 namespace chase::bus {
-
-namespace {
-
-/// What every message begins with (lcmtypes/README.md), read without knowing its type.
-class Head {
- public:
-  Head(const void* data, int size)
-      : at_(static_cast<const uint8_t*>(data)), end_(at_ + std::max(0, size)) {}
-
-  bool Read(Identity* sender) {
-    at_ += std::min<ptrdiff_t>(kBeforeSender, end_ - at_);
-    return Text(&sender->process) && Text(&sender->vehicle) && Integer(8, &sender->start);
-  }
-
- private:
-  static constexpr ptrdiff_t kBeforeSender = 8 + 8 + 4;  // fingerprint, utime, seq
-
-  bool Integer(int bytes, int64_t* value) {
-    if (end_ - at_ < bytes) return false;
-    uint64_t bits = 0;
-    for (int i = 0; i < bytes; ++i) bits = bits << 8 | *at_++;
-    *value = static_cast<int64_t>(bits);
-    return true;
-  }
-  bool Text(std::string* text) {
-    int64_t length = 0;  // with the zero at its end
-    if (!Integer(4, &length) || length < 1 || length > end_ - at_) return false;
-    text->assign(at_, at_ + length - 1);
-    at_ += length;
-    return true;
-  }
-
-  const uint8_t* at_;
-  const uint8_t* end_;
-};
-
-}  // namespace
 
 Identity IdentityIn(const std::string& log, const std::string& process) {
   lcm::LogFile file(log, "r");
   while (const lcm::LogEvent* event = file.good() ? file.readNextEvent() : nullptr) {
-    Identity sender;
-    if (Head(event->data, event->datalen).Read(&sender) && sender.process == process) return sender;
+    const auto head = HeadOf(event->data, static_cast<size_t>(std::max(0, event->datalen)));
+    if (head && head->sender == process) return {head->sender, head->vehicle, head->sender_start};
   }
   return {process, "", 0};
 }

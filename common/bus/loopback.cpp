@@ -15,6 +15,7 @@ namespace chase::bus {
 
 namespace {
 
+constexpr const char* kPrefix = "LOOPBACK_";
 constexpr int kAttempts = 10;
 constexpr int kWaitMs = 150;
 
@@ -54,7 +55,7 @@ class Socket {
 
 /// LCM's short message: magic, sequence number, channel, then the payload.
 std::vector<uint8_t> Packet() {
-  const std::string channel = fmt::format("LOOPBACK_{}", getpid());
+  const std::string channel = kPrefix + std::to_string(getpid());
   std::vector<uint8_t> packet = {'L', 'C', '0', '2', 0, 0, 0, 0};
   packet.insert(packet.end(), channel.begin(), channel.end());
   packet.push_back(0);
@@ -90,6 +91,10 @@ std::string RouteProblem(const Endpoint& group) {
 }
 
 }  // namespace
+
+bool IsLoopback(const std::string& channel) {
+  return channel.rfind(kPrefix, 0) == 0 || channel == "LCM_SELF_TEST";
+}
 
 std::string LoopbackProblem(const std::string& url) {
   if (url.rfind("udpm://", 0) != 0) return "";

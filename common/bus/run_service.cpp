@@ -16,6 +16,7 @@
 #include "common/bus/log_bus.h"
 #include "common/bus/status.h"
 #include "common/bus/udp_bus.h"
+#include "common/config/version.h"
 
 namespace chase::bus {
 
@@ -47,7 +48,7 @@ void AddFlags(CLI::App* app, Flags* flags) {
                   "the vehicle: in front of every channel's name");
   app->add_option("--replay", flags->replay, "drive the service by this LCM log, in logical time");
   app->add_option("--out", flags->out, "LCM log that --replay writes");
-  app->set_version_flag("--version", Version());
+  config::AddVersion(app);
 }
 
 /// Live processing until a signal comes or the node is done.

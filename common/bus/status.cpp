@@ -2,6 +2,8 @@
 
 #include <sys/resource.h>
 
+#include "common/config/version.h"
+
 namespace chase::bus {
 
 namespace {
@@ -47,8 +49,6 @@ int8_t StateCode(NodeReport::State state) {
 
 }  // namespace
 
-std::string Version() { return CHASE_VERSION; }
-
 status_t StatusReporter::Make(const Bus& bus, const Node& node, int64_t utime, bool measured) {
   if (start_ < 0) start_ = utime;
   const NodeReport report = node.Report();
@@ -58,7 +58,7 @@ status_t StatusReporter::Make(const Bus& bus, const Node& node, int64_t utime, b
   status.state = StateCode(report.state);
   status.detail = report.detail;
   status.last_error = bus.last_error();
-  status.version = Version();
+  status.version = config::Version();
   status.uptime = static_cast<double>(utime - start_) * 1e-6;
   const double elapsed = last_ < 0 ? 0.0 : static_cast<double>(utime - last_) * 1e-6;
   for (const auto& [name, c] : bus.counters()) {

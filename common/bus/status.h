@@ -9,9 +9,6 @@
 
 namespace chase::bus {
 
-/// The version that --version prints and status messages carry.
-std::string Version();
-
 /// Builds the status messages of one process.
 class StatusReporter {
  public:

@@ -8,6 +8,7 @@
 #include <map>
 #include <thread>
 
+#include "common/config/version.h"
 #include "deploy/campaign/comparison.h"
 #include "deploy/campaign/flight_job.h"
 #include "deploy/campaign/flight_list.h"
@@ -140,6 +141,7 @@ void AddOptions(CLI::App* app, Options* o) {
 /// Exit codes: 0 flown, whatever became of the flights; 1 bad use; 3 with --compare: worse.
 int main(int argc, char** argv) {
   CLI::App app("Flies many flights in lockstep and judges them together.", "chase-campaign");
+  chase::config::AddVersion(&app);
   chase::campaign::Options options;
   chase::campaign::AddOptions(&app, &options);
   try {

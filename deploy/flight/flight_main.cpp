@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "common/bus/channels.h"
+#include "common/config/version.h"
 #include "deploy/flight/collision_watch.h"
 #include "deploy/flight/flight.h"
 #include "deploy/flight/progress.h"
@@ -71,6 +72,7 @@ int PrintCriteria(const logs::Metrics& metrics, bool part) {
   if (part) fmt::print("of the part flown, {:.1f} s:\n", metrics.flown_s);
   for (const auto& [name, passed] : metrics.criteria)
     if (!part || name != "complete") fmt::print("{:<20} {}\n", name, passed ? "passed" : "FAILED");
+  for (const std::string& loss : metrics.losses) fmt::print("{}\n", loss);
   if (metrics.collision_s >= 0.0)
     fmt::print("collision at {:.2f} s with {}\n", metrics.collision_s, metrics.collided_with);
   return metrics.Passed() || part ? 0 : 2;  // criteria are for whole missions
@@ -196,6 +198,7 @@ int main(int argc, char** argv) {
   mallopt(M_TRIM_THRESHOLD, 256 << 20);
   CLI::App app("Flies a scenario with every node in one thread and in logical time.",
                "chase-flight");
+  chase::config::AddVersion(&app);
   chase::flight::Arguments arguments;
   chase::flight::AddOptions(&app, &arguments);
   try {

@@ -6,6 +6,7 @@
 #include <cstdlib>
 
 #include "common/bus/udp_bus.h"
+#include "common/config/version.h"
 #include "deploy/flight/progress.h"
 
 namespace {
@@ -49,6 +50,7 @@ int Watch(const std::string& url, const std::string& prefix) {
 /// Prints one JSON line a second about the flight on the bus and ends with the mission.
 int main(int argc, char** argv) {
   CLI::App app("Prints one JSON line a second about the flight on the bus; exits 0 at its end.");
+  chase::config::AddVersion(&app);
   const char* env = std::getenv("LCM_DEFAULT_URL");
   std::string url = env != nullptr ? env : chase::bus::kDefaultUrl, prefix;
   app.add_option("--lcm-url", url, "LCM provider (default: $LCM_DEFAULT_URL, else built in)");

@@ -3,11 +3,13 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 
+#include "common/config/version.h"
 #include "common/world/scenario.h"
 
 /// Checks a scenario file without the services, so that it is the first program that is built.
 int main(int argc, char** argv) {
   CLI::App app("Checks a scenario file; prints its length as one line of JSON.", "chase-scenario");
+  chase::config::AddVersion(&app);
   std::string file;
   app.add_option("scenario", file, "scenario file")->required();
   try {

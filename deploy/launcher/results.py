@@ -9,7 +9,8 @@ def passed(metrics):
 
 
 def table(metrics):
-    """One line per criterion: its name, its figure where the metrics hold one, and the verdict."""
+    """One line per criterion: its name, its figure where the metrics hold one, and the verdict; then
+    what the log lost."""
     lines = [f"{'criterion':<28} {'figure':>10}  verdict"]
     for name, holds in metrics.get("criteria", {}).items():
         value = metrics.get(name)
@@ -17,7 +18,7 @@ def table(metrics):
         lines.append(f"{name:<28} {figure:>10}  {'passed' if holds else 'FAILED'}")
     if len(lines) == 1:
         lines.append("the scenario names no criteria")
-    return "\n".join(lines)
+    return "\n".join(lines + metrics.get("losses", []))
 
 
 def load(path):

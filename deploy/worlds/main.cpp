@@ -5,6 +5,7 @@
 #include <fstream>
 #include <stdexcept>
 
+#include "common/config/version.h"
 #include "deploy/worlds/picture.h"
 #include "deploy/worlds/worlds.h"
 
@@ -68,6 +69,7 @@ void AddOptions(CLI::App* app, Arguments* a) {
 /// Writes a random world as a scenario file. Exit codes: 0 written, 1 bad use.
 int main(int argc, char** argv) {
   CLI::App app("Writes a random world as a scenario file.", "chase-world");
+  chase::config::AddVersion(&app);
   chase::worlds::Arguments arguments;
   chase::worlds::AddOptions(&app, &arguments);
   try {

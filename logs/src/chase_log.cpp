@@ -1,9 +1,14 @@
+#include <unistd.h>
+
 #include <CLI/CLI.hpp>
+#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <stdexcept>
 
+#include "common/config/version.h"
+#include "logs/src/copy.h"
 #include "logs/src/diff.h"
 #include "logs/src/export.h"
 #include "logs/src/import.h"
@@ -15,12 +20,47 @@ namespace {
 
 using namespace chase::logs;
 
+constexpr std::chrono::milliseconds kProgressPeriod(200);
+
 struct Arguments {
   std::string in, out, other, format, channel;
-  std::vector<std::string> ignore;
+  std::vector<std::string> ignore, files;
+  Selection selection;
   double tolerance = 0.0;
-  bool tum = false, csv = false, mcap = false;
+  bool tum = false, csv = false, mcap = false, long_form = false, jpeg = false;
 };
+
+/// Says on stderr how far the work is, where that is a terminal, and in the end what of the log
+/// could not be read.
+Watch Progress() {
+  using Clock = std::chrono::steady_clock;
+  return [next = Clock::now() + kProgressPeriod](const LogReader& log) mutable {
+    const bool terminal = isatty(STDERR_FILENO) != 0;
+    if (terminal && Clock::now() >= next) {
+      next = Clock::now() + kProgressPeriod;
+      std::fprintf(stderr, "\r%s: %3.0f %%", log.file().c_str(),
+                   100.0 * static_cast<double>(log.position()) / static_cast<double>(log.size()));
+    }
+    if (!log.AtEnd()) return;
+    if (terminal) std::fputs("\r\033[K", stderr);
+    for (const Damage& d : log.damage())
+      std::fprintf(stderr, "%s: %s\n", log.file().c_str(), Format(d).c_str());
+  };
+}
+
+/// Any number compares false with NaN, so that CLI's own ranges take it.
+bool IsNumber(const std::string& text) {
+  double value = 0.0;
+  return CLI::detail::lexical_cast(text, value) && value >= 0.0 && std::isfinite(value);
+}
+
+std::string ToleranceProblem(const std::string& text) {
+  return IsNumber(text) ? "" : text + " is no tolerance, 0 or above";
+}
+
+std::string TimeProblem(const std::string& text) {
+  return IsNumber(text) ? "" : text + " is no time in s, 0 or above";
+}
 
 /// What is written is not what is read: nothing is lost by a slip.
 void RefuseSame(const std::string& in, const std::string& out) {
@@ -55,26 +95,103 @@ void AddImport(CLI::App* app, Arguments* a) {
 
 void RunExport(const Arguments& a) {
   RefuseSame(a.in, a.out);
+  if (a.long_form && !a.csv)
+    throw BadOption(std::string("--long: does nothing with ") + (a.tum ? "--tum" : "--mcap") +
+                    "; leave it out, or export --csv");
+  if (a.jpeg && !a.mcap)
+    throw BadOption(std::string("--jpeg: does nothing with ") + (a.tum ? "--tum" : "--csv") +
+                    "; leave it out, or export --mcap");
   if (a.tum)
-    std::printf("%s: %ld poses\n", a.out.c_str(), ExportTum(a.in, a.out));
+    std::printf("%s: %ld poses\n", a.out.c_str(),
+                ExportTum(a.in, a.out, a.channel.empty() ? "POSE" : a.channel, Progress()));
   else if (a.mcap)
-    std::printf("%s: %ld messages\n", a.out.c_str(), ExportMcap(a.in, a.out));
+    std::printf("%s: %ld messages\n", a.out.c_str(),
+                ExportMcap(a.in, a.out, a.channel, a.jpeg, Progress()));
   else
-    std::printf("%s: %d files\n", a.out.c_str(), ExportCsv(a.in, a.out, a.channel));
+    std::printf("%s: %d files\n", a.out.c_str(),
+                ExportCsv(a.in, a.out, a.channel, a.long_form, Progress()));
 }
 
 void AddExport(CLI::App* app, Arguments* a) {
   auto* sub = app->add_subcommand("export", "Writes a log in a format that others read.");
   auto* format = sub->add_option_group("format");
-  format->add_flag("--tum", a->tum, "trajectory of POSE: t x y z qx qy qz qw");
+  format->add_flag("--tum", a->tum,
+                   "trajectory t x y z qx qy qz qw of POSE, or --channel TRUTH or TARGET");
   format->add_flag("--csv", a->csv, "OUT is a folder: one file per channel");
   format->add_flag("--mcap", a->mcap,
-                   "JSON messages for Foxglove; clouds and images in its schemas");
+                   "protobuf for Foxglove: all fields, and its own schemas where they fit");
   format->require_option(1);
-  sub->add_option("--channel", a->channel, "--csv: this channel only, clouds and images included");
+  sub->add_flag("--jpeg", a->jpeg, "--mcap: images as JPEG, with loss, at a tenth of the size");
+  sub->add_flag("--long", a->long_form,
+                "--csv: a row for every element: event_utime, seq, field, index, value");
+  sub->add_option("--channel", a->channel,
+                  "this channel only; --csv leaves out clouds and images unless they are named");
   sub->add_option("LOG", a->in, "LCM log")->required();
   sub->add_option("OUT", a->out, "file or folder to write")->required();
   sub->callback([a] { RunExport(*a); });
+}
+
+void Say(const Arguments& a, const Copied& copied) {
+  std::printf("%s: %s", a.out.c_str(), Format(copied).c_str());
+}
+
+void RunCopy(const Arguments& a, const char* cure) {
+  const Selection none, &s = a.selection;
+  if (s.from == none.from && s.to == none.to && s.keep.empty() && s.drop.empty())
+    throw BadOption(std::string("nothing is selected, this would copy the log; give ") + cure);
+  if (s.to <= s.from)
+    throw BadOption("--to " + std::to_string(s.to) + ": is not after --from " +
+                    std::to_string(s.from) + "; give a later time");
+  RefuseSame(a.in, a.out);
+  Say(a, CopySelected(a.in, a.out, s, Progress()));
+}
+
+CLI::App* AddInOut(CLI::App* app, Arguments* a, const char* name, const char* description) {
+  auto* sub = app->add_subcommand(name, description);
+  sub->add_option("LOG", a->in, "LCM log")->required();
+  sub->add_option("OUT", a->out, "LCM log to write")->required();
+  return sub;
+}
+
+void AddCut(CLI::App* app, Arguments* a) {
+  auto* sub = AddInOut(app, a, "cut", "Copies a stretch of time of a log.");
+  sub->add_option("--from", a->selection.from, "s after the log's first event (default: 0)")
+      ->check(TimeProblem);
+  sub->add_option("--to", a->selection.to, "s after the log's first event (default: its end)")
+      ->check(TimeProblem);
+  sub->callback([a] { RunCopy(*a, "--from or --to"); });
+}
+
+void AddFilter(CLI::App* app, Arguments* a) {
+  auto* sub = AddInOut(app, a, "filter", "Copies some channels of a log.");
+  sub->add_option("--keep", a->selection.keep, "channels, shell patterns allowed (default: all)")
+      ->delimiter(',');
+  sub->add_option("--drop", a->selection.drop, "channels to leave out, shell patterns allowed")
+      ->delimiter(',');
+  sub->callback([a] { RunCopy(*a, "--keep or --drop"); });
+}
+
+void AddRepair(CLI::App* app, Arguments* a) {
+  auto* sub = AddInOut(app, a, "repair",
+                       "Copies all that can be read of a damaged log and says what was dropped.");
+  sub->callback([a] {
+    RefuseSame(a->in, a->out);
+    Say(*a, Repair(a->in, a->out, Progress()));
+  });
+}
+
+void AddMerge(CLI::App* app, Arguments* a) {
+  auto* sub = app->add_subcommand(
+      "merge", "Joins logs in the order of their stamps; what several hold is written once.");
+  sub->add_option("FILES", a->files, "LOG LOG... OUT: two logs or more, and the one to write")
+      ->required()
+      ->expected(3, 1000);
+  sub->callback([a] {
+    a->out = a->files.back();
+    a->files.pop_back();
+    for (const std::string& in : a->files) RefuseSame(in, a->out);
+    Say(*a, Merge(a->files, a->out, Progress()));
+  });
 }
 
 void RunMigrate(const Arguments& a) {
@@ -88,13 +205,6 @@ void AddMigrate(CLI::App* app, Arguments* a) {
   sub->add_option("OLD", a->in, "LCM log")->required();
   sub->add_option("NEW", a->out, "LCM log to write")->required();
   sub->callback([a] { RunMigrate(*a); });
-}
-
-/// Any number compares false with NaN, so that CLI's own ranges take it.
-std::string ToleranceProblem(const std::string& text) {
-  double value = 0.0;
-  const bool good = CLI::detail::lexical_cast(text, value) && value >= 0.0 && std::isfinite(value);
-  return good ? "" : text + " is no tolerance, 0 or above";
 }
 
 void AddDiff(CLI::App* app, Arguments* a, int* exit_code) {
@@ -131,10 +241,13 @@ void AddVerify(CLI::App* app, Arguments* a, int* exit_code) {
 
 }  // namespace
 
+/// Exit codes: 0 done; 1 bad use or a file that cannot be read or written, diff and verify: they
+/// differ, one does not hold; 2 an option that would do nothing.
 int main(int argc, char** argv) {
-  CLI::App app{"Shows, imports, exports, compares, migrates and verifies LCM logs."};
+  CLI::App app{
+      "Shows, imports, exports, compares, cuts, merges, repairs, migrates and verifies LCM logs."};
   app.name("chase-log");
-  app.set_version_flag("--version", CHASE_VERSION);
+  chase::config::AddVersion(&app);
   app.require_subcommand(1);
   Arguments arguments;
   int exit_code = 0;
@@ -143,6 +256,10 @@ int main(int argc, char** argv) {
   AddImport(&app, &arguments);
   AddExport(&app, &arguments);
   AddDiff(&app, &arguments, &exit_code);
+  AddCut(&app, &arguments);
+  AddFilter(&app, &arguments);
+  AddMerge(&app, &arguments);
+  AddRepair(&app, &arguments);
   AddMigrate(&app, &arguments);
   try {
     app.parse(argc, argv);
@@ -152,7 +269,7 @@ int main(int argc, char** argv) {
     return 1;
   } catch (const std::exception& e) {
     std::fprintf(stderr, "chase-log: %s\n", e.what());
-    return 1;
+    return dynamic_cast<const BadOption*>(&e) != nullptr ? 2 : 1;
   }
   return exit_code;
 }

@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <stdexcept>
 
+#include "common/config/version.h"
 #include "logs/src/page_template.h"
 #include "logs/src/read_flight.h"
 #include "logs/src/report_page.h"
@@ -25,10 +26,15 @@ fs::path OutputFolder(const std::string& log, const std::string& out) {
 void PrintSummary(const Metrics& m, const fs::path& folder) {
   for (const auto& [name, passed] : m.criteria)
     std::printf("%-20s %s\n", name.c_str(), passed ? "passed" : "FAILED");
+  for (const std::string& loss : m.losses) std::printf("%s\n", loss.c_str());
   std::printf("%s\n", (folder / "report.html").c_str());
 }
 
-void Report(const std::string& log, const std::string& out) {
+/// The flight's end is in the log: that of its mission, or the collision that it was ended by.
+bool HoldsTheEnd(const Metrics& m) { return m.criteria.at("complete") || m.collision_s >= 0.0; }
+
+/// Returns the exit code.
+int Report(const std::string& log, const std::string& out) {
   const FlightRecord record = ReadFlight(log);
   const auto scores = Score(record);
   const Metrics metrics = Compute(record, scores);
@@ -39,27 +45,33 @@ void Report(const std::string& log, const std::string& out) {
   WritePage((folder / "report.html").string(), ShareFolder() + "/report.html",
             ShareFolder() + "/plotly.min.js", data, MetricsJson(record, metrics));
   PrintSummary(metrics, folder);
+  if (metrics.log_whole && HoldsTheEnd(metrics)) return 0;
+  std::fprintf(stderr,
+               "chase-report: %s: the log %s at %.1f s of %.1f s; the figures are of that part\n",
+               log.c_str(), metrics.log_whole ? "ends" : "is cut off or damaged and ends",
+               metrics.flown_s, record.scenario.duration_s);
+  return 2;
 }
 
 }  // namespace
 
+/// Exit codes: 0 reported, whatever became of the flight; 1 bad use; 2 reported as far as the log
+/// goes, which does not hold the whole flight.
 int main(int argc, char** argv) {
   CLI::App app{"Metrics, plots and one HTML page from a flight log."};
   app.name("chase-report");
-  app.set_version_flag("--version", CHASE_VERSION);
+  chase::config::AddVersion(&app);
   std::string log, out;
   app.add_option("LOG", log, "LCM log of a simulated flight")->required();
   app.add_option("--out", out, "folder for metrics.json, report.html and PNGs; default: the log's");
   try {
     app.parse(argc, argv);
-    Report(log, out);
+    return Report(log, out);
   } catch (const CLI::ParseError& e) {
     if (e.get_exit_code() == 0) return app.exit(e);
     std::fprintf(stderr, "chase-report: %s; see chase-report --help\n", e.what());
-    return 1;
   } catch (const std::exception& e) {
     std::fprintf(stderr, "chase-report: %s\n", e.what());
-    return 1;
   }
-  return 0;
+  return 1;
 }

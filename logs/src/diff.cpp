@@ -4,11 +4,14 @@
 #include <fnmatch.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <deque>
+#include <iterator>
 #include <optional>
+#include <set>
+#include <tuple>
 
-#include "logs/src/info.h"
+#include "common/bus/message_head.h"
 #include "logs/src/log_reader.h"
 #include "logs/src/message_fields.h"
 
@@ -54,25 +57,91 @@ std::optional<Change> Compare(const Field& a, const Field& b, double tolerance) 
   return change;
 }
 
-using CountMap = std::map<std::string, long>;
+/// What tells a message from the others of its channel: sender and `seq`, or `utime` (the order and
+/// the log's stamp where it has neither); then how many alike came before it.
+using Key = std::tuple<std::string, int64_t, long>;
+enum Rule { kBySeq, kByUtime, kRules };
+using Keys = std::array<Key, kRules>;
+
+/// Names the messages of one channel in the order of the log.
+class Namer {
+ public:
+  Keys Next(const Event& e) {
+    const auto head =
+        TypeOf(e.bytes).empty() ? std::nullopt : bus::HeadOf(e.bytes.data(), e.bytes.size());
+    Keys keys = {Key{"", order_++, 0}, Key{"", e.utime, 0}};
+    if (head) {
+      auto& starts = starts_[head->sender];
+      const size_t start = starts.emplace(head->sender_start, starts.size()).first->second;
+      keys[kBySeq] = {fmt::format("{}#{}", head->sender, start), head->seq, 0};
+      keys[kByUtime] = {"", head->utime, 0};
+    }
+    for (size_t rule = 0; rule < kRules; ++rule)
+      std::get<2>(keys[rule]) = alike_[rule][keys[rule]]++;
+    return keys;
+  }
+
+ private:
+  int64_t order_ = 0;
+  std::map<std::string, std::map<int64_t, size_t>> starts_;  // of each sender, as they come
+  std::array<std::map<Key, long>, kRules> alike_;
+};
+
+/// The names of a log's messages under every rule, by channel.
+using Names = std::map<std::string, std::array<std::set<Key>, kRules>>;
+
+Names NamesIn(const std::string& file) {
+  LogReader log(file);
+  Names names;
+  std::map<std::string, Namer> namers;
+  for (Event e; log.Next(&e);) {
+    const Keys keys = namers[e.channel].Next(e);
+    for (size_t rule = 0; rule < kRules; ++rule) names[e.channel][rule].insert(keys[rule]);
+  }
+  return names;
+}
+
+std::set<Key> Common(const std::set<Key>& a, const std::set<Key>& b) {
+  std::set<Key> common;
+  std::set_intersection(a.begin(), a.end(), b.begin(), b.end(),
+                        std::inserter(common, common.end()));
+  return common;
+}
+
+/// How the messages of one channel find their partners: by the rule that pairs most.
+struct Pairing {
+  Rule rule = kBySeq;
+  std::set<Key> pairs;
+  long count_a = 0, count_b = 0;
+};
+
+std::map<std::string, Pairing> Pair(Names a, Names b) {
+  std::map<std::string, Pairing> pairings;
+  for (const auto& names : {a, b})
+    for (const auto& [channel, keys] : names) pairings[channel];
+  for (auto& [channel, p] : pairings) {
+    p.count_a = static_cast<long>(a[channel][kBySeq].size());
+    p.count_b = static_cast<long>(b[channel][kBySeq].size());
+    p.pairs = Common(a[channel][kBySeq], b[channel][kBySeq]);
+    std::set<Key> by_utime = Common(a[channel][kByUtime], b[channel][kByUtime]);
+    if (by_utime.size() <= p.pairs.size()) continue;
+    p.rule = kByUtime;
+    p.pairs = std::move(by_utime);
+  }
+  return pairings;
+}
 
 class Comparison {
  public:
-  Comparison(std::vector<std::string> ignore, double tolerance, CountMap a, CountMap b)
-      : ignore_(std::move(ignore)),
-        tolerance_(tolerance),
-        counts_a_(std::move(a)),
-        counts_b_(std::move(b)) {
-    CountMap all = counts_a_;
-    all.insert(counts_b_.begin(), counts_b_.end());
-    for (const auto& [channel, count] : all) {
-      common_[channel] = std::min(counts_a_[channel], counts_b_[channel]);
-      if (counts_a_[channel] != counts_b_[channel] && !Ignored(channel, "count")) result_[channel];
+  Comparison(std::vector<std::string> ignore, double tolerance,
+             const std::map<std::string, Pairing>& pairings)
+      : ignore_(std::move(ignore)), tolerance_(tolerance), pairings_(pairings) {
+    for (const auto& [channel, p] : pairings) {
+      const auto pairs = static_cast<long>(p.pairs.size());
+      const bool lost = p.count_a > pairs || p.count_b > pairs;
+      if (lost && !Ignored(channel, "count")) result_[channel];
     }
   }
-
-  /// Messages of each channel that have a partner.
-  const CountMap& common() const { return common_; }
 
   void AddPair(const Event& a, const Event& b) {
     index_ = compared_[a.channel]++;
@@ -85,8 +154,12 @@ class Comparison {
 
   std::map<std::string, ChannelDifference> Take() {
     for (auto& [channel, d] : result_) {
-      d.count_a = counts_a_[channel];
-      d.count_b = counts_b_[channel];
+      const Pairing& p = pairings_.at(channel);
+      const auto pairs = static_cast<long>(p.pairs.size());
+      d.count_a = p.count_a;
+      d.count_b = p.count_b;
+      d.only_a = p.count_a - pairs;
+      d.only_b = p.count_b - pairs;
     }
     return std::move(result_);
   }
@@ -128,41 +201,38 @@ class Comparison {
 
   std::vector<std::string> ignore_;
   double tolerance_;
-  CountMap counts_a_, counts_b_, common_, compared_;
+  const std::map<std::string, Pairing>& pairings_;
+  std::map<std::string, long> compared_;
   std::map<std::string, ChannelDifference> result_;
   std::string channel_;
   long index_ = 0;
 };
 
-/// One of the two logs: how many messages of each channel it has given, and those that wait for
-/// their partner in the other.
+/// One of the two logs, and its messages that wait for their partners in the other.
 struct Side {
   explicit Side(const std::string& file) : log(file) {}
   LogReader log;
   bool more = true;
-  CountMap given;
-  std::map<std::string, std::deque<Event>> waiting;
+  std::map<std::string, Namer> namers;
+  std::map<std::string, std::map<Key, Event>> waiting;
 };
 
-CountMap Counts(const std::string& file) {
-  CountMap counts;
-  for (const ChannelInfo& c : Describe(file).channels) counts[c.channel] = c.count;
-  return counts;
-}
-
 /// Takes the next event of `own`; returns its partner if that has come already.
-std::optional<std::pair<Event, Event>> Step(const CountMap& common, Side* own, Side* other) {
+std::optional<std::pair<Event, Event>> Step(const std::map<std::string, Pairing>& pairings,
+                                            Side* own, Side* other) {
   Event e;
   if (!own->more || !(own->more = own->log.Next(&e))) return std::nullopt;
-  const auto limit = common.find(e.channel);
-  if (limit == common.end() || own->given[e.channel]++ >= limit->second) return std::nullopt;
+  const Pairing& pairing = pairings.at(e.channel);
+  const Key key = own->namers[e.channel].Next(e)[pairing.rule];
+  if (pairing.pairs.count(key) == 0) return std::nullopt;
   auto& partners = other->waiting[e.channel];
-  if (partners.empty()) {
-    own->waiting[e.channel].push_back(std::move(e));
+  const auto partner = partners.find(key);
+  if (partner == partners.end()) {
+    own->waiting[e.channel].emplace(key, std::move(e));
     return std::nullopt;
   }
-  std::pair<Event, Event> pair(std::move(e), std::move(partners.front()));
-  partners.pop_front();
+  std::pair<Event, Event> pair(std::move(e), std::move(partner->second));
+  partners.erase(partner);
   return pair;
 }
 
@@ -171,13 +241,13 @@ std::optional<std::pair<Event, Event>> Step(const CountMap& common, Side* own, S
 std::map<std::string, ChannelDifference> Diff(const std::string& a, const std::string& b,
                                               const std::vector<std::string>& ignore,
                                               double tolerance) {
-  const auto counts_a = Counts(a), counts_b = Counts(b);
-  Comparison comparison(ignore, tolerance, counts_a, counts_b);
+  const auto pairings = Pair(NamesIn(a), NamesIn(b));
+  Comparison comparison(ignore, tolerance, pairings);
   Side side_a(a), side_b(b);
   while (side_a.more || side_b.more) {
-    if (const auto pair = Step(comparison.common(), &side_a, &side_b))
+    if (const auto pair = Step(pairings, &side_a, &side_b))
       comparison.AddPair(pair->first, pair->second);
-    if (const auto pair = Step(comparison.common(), &side_b, &side_a))
+    if (const auto pair = Step(pairings, &side_b, &side_a))
       comparison.AddPair(pair->second, pair->first);
   }
   return comparison.Take();
@@ -186,10 +256,13 @@ std::map<std::string, ChannelDifference> Diff(const std::string& a, const std::s
 std::string Format(const std::map<std::string, ChannelDifference>& differences) {
   std::string text;
   for (const auto& [channel, d] : differences) {
-    text += fmt::format("{}: {} messages against {}\n", channel, d.count_a, d.count_b);
+    text += fmt::format("{}: {} messages against {}", channel, d.count_a, d.count_b);
+    if (d.only_a > 0) text += fmt::format("; {} of A are not in B", d.only_a);
+    if (d.only_b > 0) text += fmt::format("; {} of B are not in A", d.only_b);
+    text += "\n";
     for (const auto& [path, f] : d.fields)
-      text += fmt::format("  {}: {} messages differ, by up to {:.6g}; first in message {}: {}\n",
-                          path, f.messages, f.greatest, f.first, f.first_values);
+      text += fmt::format("  {}: {} messages differ, by up to {:.6g}; first in pair {}: {}\n", path,
+                          f.messages, f.greatest, f.first, f.first_values);
   }
   return text;
 }

@@ -1,20 +1,38 @@
 #pragma once
 
+#include <stdexcept>
 #include <string>
+
+#include "logs/src/log_reader.h"
 
 namespace chase::logs {
 
-/// POSE as a trajectory `t x y z qx qy qz qw` (s, m), one line per message. Returns their number.
-/// Throws std::runtime_error with one line when there is none.
-long ExportTum(const std::string& log, const std::string& out);
+/// An option that would do nothing; says in one line which, with what value, and the cure.
+struct BadOption : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+/// What to throw when a log holds nothing to export: BadOption when `channel` names what is not
+/// there.
+[[noreturn]] void RefuseEmpty(const std::string& log, const std::string& channel);
+
+/// A channel's trajectory `t x y z qx qy qz qw` (s, m, frame W), one line per message: the estimate
+/// (POSE), the true body (TRUTH), or the target as perceived (TARGET, where its mean is usable; no
+/// rotation). Returns the number of lines. Throws BadOption for other channels,
+/// std::runtime_error with one line when there is no such message.
+long ExportTum(const std::string& log, const std::string& out, const std::string& channel = "POSE",
+               const Watch& watch = {});
 
 /// One CSV file `<channel>.csv` per channel in the folder `out`. A list becomes one cell of values
 /// separated by spaces. Heavy channels (clouds, images, maps) are written only when `channel` names
-/// them; with `channel` nothing else is written. Returns the number of files.
-int ExportCsv(const std::string& log, const std::string& out, const std::string& channel);
+/// them; with `channel` nothing else is written. In long form every element has a row of its own:
+/// event_utime, seq, field, index, value. Returns the number of files.
+int ExportCsv(const std::string& log, const std::string& out, const std::string& channel,
+              bool long_form = false, const Watch& watch = {});
 
-/// Every message as JSON in an MCAP file for Foxglove and the like; clouds and images in Foxglove's
-/// own schemas. Returns the number of messages.
-long ExportMcap(const std::string& log, const std::string& out);
+/// Every message (or those of `channel`) as protobuf in an MCAP file for Foxglove and the like
+/// (foxglove.h), with `jpeg` the images compressed with loss. Returns the number of messages.
+long ExportMcap(const std::string& log, const std::string& out, const std::string& channel = "",
+                bool jpeg = false, const Watch& watch = {});
 
 }  // namespace chase::logs

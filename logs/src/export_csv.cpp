@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <iterator>
 #include <map>
@@ -44,9 +45,9 @@ std::string Cells(const Field& f) {
 }
 
 /// Lists of structs that are empty have no fields at all; the row still has to line up.
-std::string Row(const Event& event, const std::vector<Field>& fields,
+std::string Row(int64_t utime, const std::vector<Field>& fields,
                 const std::vector<std::string>& paths) {
-  std::string line = std::to_string(event.utime);
+  std::string line = std::to_string(utime);
   size_t next = 0;
   for (const std::string& path : paths) {
     line += ",";
@@ -55,53 +56,77 @@ std::string Row(const Event& event, const std::vector<Field>& fields,
   return line + "\n";
 }
 
+std::string LongRows(int64_t utime, const std::vector<Field>& fields) {
+  std::string rows;
+  const auto seq =
+      std::find_if(fields.begin(), fields.end(), [](const Field& f) { return f.path == "seq"; });
+  const std::string begin =
+      fmt::format("{},{},", utime, seq == fields.end() ? 0.0 : seq->numbers[0]);
+  for (const Field& f : fields)
+    for (size_t i = 0; i < std::max(f.numbers.size(), f.texts.size()); ++i)
+      fmt::format_to(std::back_inserter(rows), "{}{},{},{}\n", begin, f.path, i,
+                     f.texts.empty() ? fmt::format("{}", f.numbers[i]) : Quoted(f.texts[i]));
+  return rows;
+}
+
+/// One file. The wide form waits for the end: the message with the most fields names the columns.
 class Table {
  public:
-  void Add(const Event& event) {
-    const auto fields = FieldsOf(event.bytes);
-    if (!fields) return;
-    rows_.push_back({event.utime, *fields});
+  Table(const std::string& file, bool long_form) : out_(file), long_form_(long_form) {
+    if (long_form) out_.Write("event_utime,seq,field,index,value\n");
   }
-  bool empty() const { return rows_.empty(); }
-
-  std::string Text() const {
-    const auto widest = Widest();
-    std::vector<std::string> paths;
-    for (const Field& f : widest) paths.push_back(f.path);
-    std::string text = Header(widest);
-    for (const auto& [utime, fields] : rows_) text += Row({utime, {}, {}}, fields, paths);
-    return text;
+  void Add(int64_t utime, const std::vector<Field>& fields) {
+    if (long_form_)
+      out_.Write(LongRows(utime, fields));
+    else
+      rows_.push_back({utime, fields});
+  }
+  void Close() {
+    if (!long_form_) WriteWide();
+    out_.Close();
   }
 
  private:
-  /// The row with the most fields names the columns.
-  std::vector<Field> Widest() const {
-    size_t best = 0;
-    for (size_t i = 0; i < rows_.size(); ++i)
-      if (rows_[i].second.size() > rows_[best].second.size()) best = i;
-    return rows_[best].second;
+  void WriteWide() {
+    const auto& widest =
+        std::max_element(rows_.begin(), rows_.end(), [](const auto& a, const auto& b) {
+          return a.second.size() < b.second.size();
+        })->second;
+    std::vector<std::string> paths;
+    for (const Field& f : widest) paths.push_back(f.path);
+    out_.Write(Header(widest));
+    for (const auto& [utime, fields] : rows_) out_.Write(Row(utime, fields, paths));
   }
+
+  OutputFile out_;
+  bool long_form_;
   std::vector<std::pair<int64_t, std::vector<Field>>> rows_;
 };
 
 }  // namespace
 
-int ExportCsv(const std::string& log, const std::string& out, const std::string& channel) {
-  LogReader reader(log);
+void RefuseEmpty(const std::string& log, const std::string& channel) {
+  if (channel.empty())
+    throw std::runtime_error(log + ": holds no message of ours; see chase-log info");
+  throw BadOption("--channel " + channel + ": " + log +
+                  " holds no message of ours on it; chase-log info lists its channels");
+}
+
+int ExportCsv(const std::string& log, const std::string& out, const std::string& channel,
+              bool long_form, const Watch& watch) {
+  LogReader reader(log, watch);
   std::map<std::string, Table> tables;
-  for (Event e; reader.Next(&e);)
-    if (channel.empty() ? !bus::IsHeavy(e.channel) : e.channel == channel) tables[e.channel].Add(e);
-  std::filesystem::create_directories(out);
-  int files = 0;
-  for (const auto& [name, table] : tables) {
-    if (table.empty()) continue;
-    WriteFile((std::filesystem::path(out) / (name + ".csv")).string(), table.Text());
-    ++files;
+  for (Event e; reader.Next(&e);) {
+    if (channel.empty() ? bus::IsHeavy(e.channel) : e.channel != channel) continue;
+    const auto fields = FieldsOf(e.bytes);
+    if (!fields) continue;
+    std::filesystem::create_directories(out);
+    const std::string file = (std::filesystem::path(out) / (e.channel + ".csv")).string();
+    tables.try_emplace(e.channel, file, long_form).first->second.Add(e.utime, *fields);
   }
-  if (files == 0)
-    throw std::runtime_error(log + ": holds no message of ours" +
-                             (channel.empty() ? "" : " on " + channel) + "; see chase-log info");
-  return files;
+  if (tables.empty()) RefuseEmpty(log, channel);
+  for (auto& [name, table] : tables) table.Close();
+  return static_cast<int>(tables.size());
 }
 
 }  // namespace chase::logs

@@ -1,30 +1,26 @@
-#include <stdexcept>
-
 #include "logs/src/export.h"
+#include "logs/src/foxglove.h"
 #include "logs/src/log_reader.h"
 #include "logs/src/mcap_writer.h"
-#include "logs/src/message_json.h"
 
 namespace chase::logs {
 
-long ExportMcap(const std::string& log, const std::string& out) {
-  LogReader reader(log);
+long ExportMcap(const std::string& log, const std::string& out, const std::string& channel,
+                bool jpeg, const Watch& watch) {
+  LogReader reader(log, watch);
   McapWriter writer(out);
   long count = 0;
   for (Event e; reader.Next(&e);) {
-    const auto message = ToViewer(e.bytes);
-    if (!message) continue;
-    if (!writer.HasChannel(e.channel)) {
-      nlohmann::ordered_json schema = SchemaOf(message->json);
-      schema["title"] = message->schema;
-      if (message->schema.rfind("foxglove.", 0) == 0)
-        schema["properties"]["data"]["contentEncoding"] = "base64";
-      writer.AddChannel(e.channel, message->schema, schema.dump());
+    if (!channel.empty() && e.channel != channel) continue;
+    const auto messages = ToViewer(e, {jpeg});
+    for (const ViewerMessage& m : messages) {
+      if (!writer.HasChannel(m.topic))
+        writer.AddChannel(m.topic, m.schema, DescriptorsOf(m.schema));
+      writer.Write(m.topic, e.utime, m.bytes);
     }
-    writer.Write(e.channel, e.utime, message->json.dump());
-    ++count;
+    count += !messages.empty();
   }
-  if (count == 0) throw std::runtime_error(log + ": holds no message of ours; see chase-log info");
+  if (count == 0) RefuseEmpty(log, channel);
   writer.Close();
   return count;
 }

@@ -1,31 +1,67 @@
 #include <fmt/format.h>
 
 #include <iterator>
-#include <stdexcept>
+#include <optional>
 
 #include "chase/pose_t.hpp"
+#include "chase/target_t.hpp"
+#include "chase/truth_t.hpp"
 #include "logs/src/export.h"
 #include "logs/src/log_reader.h"
 #include "logs/src/message_types.h"
 #include "logs/src/output.h"
 
 namespace chase::logs {
+namespace {
 
-long ExportTum(const std::string& log, const std::string& out) {
-  LogReader reader(log);
+constexpr double kNoRotation[4] = {1.0, 0.0, 0.0, 0.0};
+
+/// `q` as w x y z; TUM has x y z w.
+std::string Line(int64_t utime, const double* p, const double* q) {
+  return fmt::format("{:.6f} {:.6f} {:.6f} {:.6f} {:.9f} {:.9f} {:.9f} {:.9f}\n",
+                     static_cast<double>(utime) * 1e-6, p[0], p[1], p[2], q[1], q[2], q[3], q[0]);
+}
+
+std::string LineOf(const pose_t& m) { return Line(m.utime, m.pos, m.orientation); }
+std::string LineOf(const truth_t& m) { return Line(m.utime, m.pos, m.orientation); }
+std::string LineOf(const target_t& m) {
+  const bool usable = m.state == target_t::TRACKING || m.state == target_t::OCCLUDED;
+  return usable ? Line(m.utime, m.mean, kNoRotation) : "";
+}
+
+template <class T>
+std::string LineOf(const Bytes& bytes) {
+  T message;
+  return DecodeBytes(bytes, &message) ? LineOf(message) : "";
+}
+
+using Liner = std::string (*)(const Bytes&);
+
+Liner LinerOf(const std::string& channel) {
+  if (channel == "POSE") return LineOf<pose_t>;
+  if (channel == "TRUTH") return LineOf<truth_t>;
+  if (channel == "TARGET") return LineOf<target_t>;
+  throw BadOption("--channel " + channel +
+                  ": is no trajectory for --tum; name POSE (the default), TRUTH or TARGET");
+}
+
+}  // namespace
+
+long ExportTum(const std::string& log, const std::string& out, const std::string& channel,
+               const Watch& watch) {
+  const Liner line_of = LinerOf(channel);
+  LogReader reader(log, watch);
   std::string text;
   long count = 0;
-  pose_t pose;
   for (Event e; reader.Next(&e);) {
-    if (e.channel != "POSE" || !DecodeBytes(e.bytes, &pose)) continue;
-    const double *p = pose.pos, *q = pose.orientation;
-    fmt::format_to(
-        std::back_inserter(text), "{:.6f} {:.6f} {:.6f} {:.6f} {:.9f} {:.9f} {:.9f} {:.9f}\n",
-        static_cast<double>(pose.utime) * 1e-6, p[0], p[1], p[2], q[1], q[2], q[3], q[0]);
-    ++count;
+    if (e.channel != channel) continue;
+    const std::string line = line_of(e.bytes);
+    text += line;
+    count += !line.empty();
   }
   if (count == 0)
-    throw std::runtime_error(log + ": holds no POSE; export a log that chase-odometry wrote");
+    throw std::runtime_error(log + ": holds no usable " + channel +
+                             "; export a log of a flight, see chase-log info");
   WriteFile(out, text);
   return count;
 }

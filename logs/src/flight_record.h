@@ -9,6 +9,7 @@
 
 #include "common/world/scenario.h"
 #include "common/world/trajectory.h"
+#include "logs/src/info.h"
 
 /// A flight as metrics need it: plain structs, frame W, m and s; `t` is mission time, negative
 /// before the target starts to move.
@@ -83,6 +84,7 @@ struct FlightRecord {
   std::vector<FaultSample> faults;
   std::vector<StageFigures> stages;
   std::vector<PerceivedObstacle> obstacles;
+  LogInfo log;                             ///< what it was read from, and what is missing there
   std::map<std::string, double> cpu_s;     ///< by process
   std::optional<double> real_time_factor;  ///< logical over wall time
 

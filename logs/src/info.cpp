@@ -1,51 +1,204 @@
 #include "logs/src/info.h"
 
+#include <fmt/chrono.h>
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <map>
 
-#include "logs/src/log_reader.h"
+#include "chase/scenario_t.hpp"
+#include "chase/status_t.hpp"
+#include "common/bus/channels.h"
+#include "common/bus/message_head.h"
 #include "logs/src/message_fields.h"
+#include "logs/src/message_types.h"
 
 namespace chase::logs {
+namespace {
+
+constexpr double kTolerableShare = 0.01;              // of messages: see LogInfo::Recorded
+constexpr int64_t kYear2000 = 946684800LL * 1000000;  // us; before it: logical time
+
+double Seconds(int64_t utime) { return static_cast<double>(utime) * 1e-6; }
+
+/// What may be left out of a recording.
+bool HeavyUnderAnyPrefix(const std::string& channel) {
+  const auto& table = bus::ChannelTable();
+  return std::any_of(table.begin(), table.end(), [&](const bus::ChannelRow& row) {
+    const size_t n = row.channel.size();
+    return row.heavy && channel.size() >= n &&
+           channel.compare(channel.size() - n, n, row.channel) == 0;
+  });
+}
+
+std::string Line(const ChannelInfo& c) {
+  return fmt::format("{:<20} {:<20} {:>8} {:>8.2f} Hz {:>12} {:>18.6f} {:>18.6f} {:>8} {:>9.3f}\n",
+                     c.channel, c.type.empty() ? "-" : c.type, c.count, c.RateHz(), c.bytes,
+                     Seconds(c.first_utime), Seconds(c.last_utime),
+                     c.senders.empty() ? "-" : std::to_string(c.missing), Seconds(c.longest_gap));
+}
+
+std::string Recorded(int64_t first, int64_t last) {
+  const std::string length = fmt::format("{:.1f} s", Seconds(last - first));
+  if (first < kYear2000) return length + " of logical time (flown in lockstep, or imported)";
+  return fmt::format("{:%Y-%m-%d %H:%M:%S} UTC, {}", fmt::gmtime(first / 1000000), length);
+}
+
+/// Processes of the same version in one place.
+std::string Versions(const std::map<std::string, std::string>& versions) {
+  std::map<std::string, std::string> processes;
+  for (const auto& [process, version] : versions)
+    processes[version] += (processes[version].empty() ? "" : ", ") + process;
+  std::string text;
+  for (const auto& [version, names] : processes)
+    text += fmt::format("{}{} ({})", text.empty() ? "" : "; ", version, names);
+  return text;
+}
+
+std::string Head(const LogInfo& info) {
+  int64_t first = INT64_MAX, last = 0;
+  for (const ChannelInfo& c : info.channels) {
+    if (c.count == 0) continue;
+    first = std::min(first, c.first_utime);
+    last = std::max(last, c.last_utime);
+  }
+  std::string text = fmt::format("log        {}, {} bytes\n", info.file, info.bytes);
+  if (first <= last) text += "recorded   " + Recorded(first, last) + "\n";
+  if (!info.scenario.empty()) text += "scenario   " + info.scenario + "\n";
+  if (!info.versions.empty()) text += "versions   " + Versions(info.versions) + "\n";
+  return text + "host, configuration  not in a log; a flight's folder has each process's .yaml\n\n";
+}
+
+}  // namespace
 
 double ChannelInfo::RateHz() const {
-  const double span = static_cast<double>(last_utime - first_utime) * 1e-6;
+  const double span = Seconds(last_utime - first_utime);
   return span > 0.0 ? static_cast<double>(count - 1) / span : 0.0;
+}
+
+double ChannelInfo::MissingShare() const {
+  return missing > 0 ? static_cast<double>(missing) / static_cast<double>(missing + count) : 0.0;
+}
+
+bool LogInfo::Recorded() const {
+  return Whole() && std::all_of(channels.begin(), channels.end(), [](const ChannelInfo& c) {
+           return c.MissingShare() <= kTolerableShare || HeavyUnderAnyPrefix(c.channel);
+         });
+}
+
+std::vector<std::string> LogInfo::Losses() const {
+  std::vector<std::string> lines;
+  for (const ChannelInfo& c : channels) {
+    if (c.missing > 0 && c.count == 0)
+      lines.push_back(
+          fmt::format("{}: others heard {} messages, the log holds none", c.channel, c.missing));
+    for (const SenderInfo& s : c.senders)
+      if (s.missing > 0)
+        lines.push_back(fmt::format(
+            "{}: {} of {} messages of {} are missing ({:.1f} %)", c.channel, s.missing,
+            s.missing + s.count, s.name,
+            100.0 * static_cast<double>(s.missing) / static_cast<double>(s.missing + s.count)));
+  }
+  for (const Damage& d : damage) lines.push_back(Format(d));
+  return lines;
+}
+
+void LogSurvey::Add(const Event& e) {
+  Channel& channel = channels_[e.channel];
+  ChannelInfo& c = channel.info;
+  if (c.count++ == 0) {
+    c.channel = e.channel;
+    c.type = TypeOf(e.bytes);
+    c.first_utime = c.last_utime = channel.previous = e.utime;
+  }
+  first_utime_ = std::min(first_utime_, e.utime);
+  c.bytes += static_cast<int64_t>(e.bytes.size());
+  c.first_utime = std::min(c.first_utime, e.utime);  // live logs may step back by a millisecond
+  c.last_utime = std::max(c.last_utime, e.utime);
+  c.longest_gap = std::max(c.longest_gap, e.utime - channel.previous);
+  channel.previous = e.utime;
+  if (c.type.empty()) return;
+  AddHead(e, &channel);
+  AddContent(e, c.type);
+}
+
+void LogSurvey::AddHead(const Event& e, Channel* channel) {
+  const auto head = bus::HeadOf(e.bytes.data(), e.bytes.size());
+  if (!head) return;
+  auto& [count, seqs] = channel->senders[{head->sender, head->vehicle, head->sender_start}];
+  ++count;
+  seqs.Add(head->seq);
+  for (const auto& [name, seq] : head->inputs) {
+    auto& heard = heard_.try_emplace(head->vehicle + name, Heard{seq, seq}).first->second;
+    heard = {std::min(heard.first, seq), std::max(heard.last, seq)};
+  }
+}
+
+void LogSurvey::AddContent(const Event& e, const std::string& type) {
+  status_t status;
+  scenario_t scenario;
+  if (type == "status_t" && DecodeBytes(e.bytes, &status))
+    info_.versions[status.name] = status.version;
+  if (type == "scenario_t" && info_.scenario.empty() && DecodeBytes(e.bytes, &scenario))
+    info_.scenario = fmt::format("{}, seed {}", scenario.name, scenario.seed);
+}
+
+/// A process that started while the log was written counts from 0 (Bus::Publish).
+void LogSurvey::Settle(Channel* channel) const {
+  for (const auto& [key, value] : channel->senders) {
+    const auto& [name, vehicle, start] = key;
+    const auto& [count, seqs] = value;
+    const int64_t before = start >= first_utime_ ? std::max(0, seqs.first()) : 0;
+    const std::string shown = name.empty() ? "an unnamed sender" : name;
+    channel->info.senders.push_back({shown, count, seqs.missing() + before});
+    channel->info.missing += channel->info.senders.back().missing;
+  }
+}
+
+void LogSurvey::AddUnrecorded(LogInfo* info) const {
+  for (const auto& [name, heard] : heard_) {
+    if (channels_.count(name) > 0 || HeavyUnderAnyPrefix(name)) continue;
+    ChannelInfo c;
+    c.channel = name;
+    c.missing = int64_t{heard.last} - heard.first + 1;
+    info->channels.push_back(std::move(c));
+  }
+}
+
+LogInfo LogSurvey::Take(const LogReader& log) {
+  for (auto& [name, channel] : channels_) {
+    Settle(&channel);
+    info_.channels.push_back(std::move(channel.info));
+  }
+  AddUnrecorded(&info_);
+  std::sort(info_.channels.begin(), info_.channels.end(),
+            [](const ChannelInfo& a, const ChannelInfo& b) { return a.channel < b.channel; });
+  info_.file = log.file();
+  info_.bytes = log.size();
+  info_.damage = log.damage();
+  return std::move(info_);
 }
 
 LogInfo Describe(const std::string& file) {
   LogReader log(file);
-  std::map<std::string, ChannelInfo> channels;
-  for (Event e; log.Next(&e);) {
-    ChannelInfo& c = channels[e.channel];
-    if (c.count++ == 0) {
-      c.channel = e.channel;
-      c.type = TypeOf(e.bytes);
-      c.first_utime = c.last_utime = e.utime;
-    }
-    c.bytes += static_cast<int64_t>(e.bytes.size());
-    c.first_utime = std::min(c.first_utime, e.utime);  // live logs may step back by a millisecond
-    c.last_utime = std::max(c.last_utime, e.utime);
-  }
-  LogInfo info;
-  for (auto& [name, channel] : channels) info.channels.push_back(std::move(channel));
-  info.unread_bytes = log.unread_bytes();
-  return info;
+  LogSurvey survey;
+  for (Event e; log.Next(&e);) survey.Add(e);
+  return survey.Take(log);
+}
+
+std::string Format(const Damage& d) {
+  if (d.at_end)
+    return fmt::format("the last {} bytes are no whole event: the log was cut off", d.bytes);
+  return fmt::format("{} bytes at {} are no whole event: the log is damaged", d.bytes, d.at);
 }
 
 std::string Format(const LogInfo& info) {
-  std::string text = fmt::format("{:<20} {:<20} {:>8} {:>11} {:>12} {:>18} {:>18}\n", "channel",
-                                 "type", "count", "rate", "bytes", "first [s]", "last [s]");
+  std::string text =
+      Head(info) + fmt::format("{:<20} {:<20} {:>8} {:>11} {:>12} {:>18} {:>18} {:>8} {:>9}\n",
+                               "channel", "type", "count", "rate", "bytes", "first [s]", "last [s]",
+                               "missing", "gap [s]");
   for (const ChannelInfo& c : info.channels)
-    text += fmt::format("{:<20} {:<20} {:>8} {:>8.2f} Hz {:>12} {:>18.6f} {:>18.6f}\n", c.channel,
-                        c.type.empty() ? "-" : c.type, c.count, c.RateHz(), c.bytes,
-                        static_cast<double>(c.first_utime) * 1e-6,
-                        static_cast<double>(c.last_utime) * 1e-6);
-  if (info.unread_bytes > 0)
-    text += fmt::format("the last {} bytes are no whole event: the log was cut off\n",
-                        info.unread_bytes);
+    if (c.count > 0) text += Line(c);
+  for (const std::string& line : info.Losses()) text += line + "\n";
   return text;
 }
 

@@ -1,8 +1,7 @@
 #pragma once
 
 #include <cstdint>
-#include <lcm/lcm-cpp.hpp>
-#include <memory>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -14,23 +13,50 @@ struct Event {
   std::vector<uint8_t> bytes;
 };
 
-/// Reads an LCM log from its beginning, in file order.
+/// A stretch of a log that holds no whole event.
+struct Damage {
+  int64_t at = 0, bytes = 0;
+  bool at_end = false;  ///< the log was cut off while being written
+};
+
+class LogReader;
+/// Hears of every event that was read and of the end: for progress and for what was damaged.
+using Watch = std::function<void(const LogReader&)>;
+
+/// Reads an LCM log from its beginning, in file order. Goes on behind what is damaged; leaves out
+/// the bus's own packets (bus::IsLoopback).
 class LogReader {
  public:
   /// Throws std::runtime_error with one line when the file is missing or no LCM log.
-  explicit LogReader(const std::string& file);
+  explicit LogReader(const std::string& file, Watch watch = {});
+  ~LogReader();
+  LogReader(const LogReader&) = delete;
+  LogReader& operator=(const LogReader&) = delete;
 
   /// The next event; false at the end of the log.
   bool Next(Event* event);
 
-  /// After the end: bytes that belong to no whole event (a log cut off while being written).
-  int64_t unread_bytes() const { return size_ - read_; }
+  /// What was stepped over so far, in file order.
+  const std::vector<Damage>& damage() const { return damage_; }
   const std::string& file() const { return file_; }
+  int64_t size() const { return size_; }
+  /// Where the next event is looked for, bytes from the beginning.
+  int64_t position() const { return at_; }
+  bool AtEnd() const { return at_ >= size_; }
 
  private:
+  struct Header;
+  bool Find(Event* event);
+  Header HeaderAt(int64_t at) const;
+  bool BeginsAt(int64_t at) const;
+  int64_t FindEvent(int64_t from, int64_t to) const;
+  void StepOver(int64_t to);
+
   std::string file_;
-  std::unique_ptr<lcm::LogFile> log_;
-  int64_t size_ = 0, read_ = 0;
+  Watch watch_;
+  const uint8_t* data_ = nullptr;
+  int64_t size_ = 0, at_ = 0;
+  std::vector<Damage> damage_;
 };
 
 }  // namespace chase::logs

@@ -1,17 +1,16 @@
 #pragma once
 
 #include <cstdint>
-#include <fstream>
 #include <map>
 #include <string>
 #include <vector>
 
-#include "common/bus/part_file.h"
+#include "logs/src/output.h"
 
 namespace chase::logs {
 
-/// Writes an MCAP file (mcap.dev, version 0): uncompressed chunks with message indexes and a
-/// summary, messages as JSON. The file appears under its name when closed and not before.
+/// Writes an MCAP file (mcap.dev, version 0): chunks compressed by zstd, with message indexes and
+/// a summary, messages as protobuf. The file appears under its name when closed and not before.
 class McapWriter {
  public:
   /// Throws std::runtime_error with one line when the file cannot be written.
@@ -20,11 +19,11 @@ class McapWriter {
   McapWriter& operator=(const McapWriter&) = delete;
 
   bool HasChannel(const std::string& topic) const { return channels_.count(topic) > 0; }
-  /// `schema` is a JSON schema.
+  /// `schema` is a FileDescriptorSet.
   void AddChannel(const std::string& topic, const std::string& schema_name,
                   const std::string& schema);
   /// `topic` must have been added; `utime` in microseconds.
-  void Write(const std::string& topic, int64_t utime, const std::string& json);
+  void Write(const std::string& topic, int64_t utime, const std::string& message);
   void Close();
 
  private:
@@ -33,7 +32,7 @@ class McapWriter {
     uint32_t sequence = 0;
   };
   struct ChunkIndex {
-    uint64_t first_ns, last_ns, offset, length, size;
+    uint64_t first_ns, last_ns, offset, length, size, packed_size;
     std::map<uint16_t, uint64_t> index_offsets;
     uint64_t index_length;
   };
@@ -44,9 +43,7 @@ class McapWriter {
   std::string Statistics() const;
   std::string SummaryRecords() const;
 
-  std::string file_;
-  bus::PartFile part_;
-  std::ofstream out_;
+  OutputFile out_;
   uint64_t written_ = 0;
   std::map<std::string, Channel> channels_;
   std::string definitions_;  // schema and channel records, repeated in the summary

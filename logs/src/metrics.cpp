@@ -127,8 +127,19 @@ void AddCollision(const FlightRecord& record, const std::vector<SampleScore>& sc
 bool AtLeast(const Figure& figure, double limit) { return figure && *figure >= limit; }
 bool AtMost(const Figure& figure, double limit) { return figure && *figure <= limit; }
 
-void AddCriteria(const world::Scenario& scenario, Metrics* m) {
+void AddLosses(const LogInfo& log, Metrics* m) {
+  for (const ChannelInfo& c : log.channels) {
+    m->lost_messages[c.channel] = c.missing;
+    m->longest_gap_s[c.channel] = 1e-6 * static_cast<double>(c.longest_gap);
+  }
+  m->losses = log.Losses();
+  m->log_whole = log.Whole();
+}
+
+void AddCriteria(const FlightRecord& record, Metrics* m) {
+  const world::Scenario& scenario = record.scenario;
   const world::CriteriaSpec& c = scenario.criteria;
+  m->criteria["recorded"] = record.log.Recorded();
   m->criteria["complete"] = m->flown_s >= scenario.duration_s - kEndTolerance;
   if (c.safe_ratio >= 0.0) m->criteria["safe_ratio"] = AtLeast(m->safe_ratio, c.safe_ratio);
   if (c.visible_ratio >= 0.0)
@@ -162,7 +173,8 @@ Metrics Compute(const FlightRecord& record, const std::vector<SampleScore>& scor
   AddPlans(record, &m);
   AddCertificates(record, scores, &m);
   AddEstimates(record, &m);
-  AddCriteria(record.scenario, &m);
+  AddLosses(record.log, &m);
+  AddCriteria(record, &m);
   return m;
 }
 

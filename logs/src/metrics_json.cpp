@@ -77,6 +77,10 @@ std::string MetricsJson(const FlightRecord& record, const Metrics& m) {
   j["prediction_error_by_horizon_m"] = ByHorizon(m.prediction_error_by_horizon_m);
   j["cpu_s"] = Json(m.cpu_s);
   j["real_time_factor"] = Number(m.real_time_factor);
+  j["lost_messages"] = Json(m.lost_messages);
+  j["longest_gap_s"] = Json(m.longest_gap_s);
+  j["losses"] = Json(m.losses);
+  j["log_whole"] = m.log_whole;
   j["criteria"] = Json(m.criteria);
   return j.dump(2) + "\n";
 }

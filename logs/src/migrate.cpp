@@ -7,6 +7,7 @@
 
 #include "common/bus/log_writer.h"
 #include "lcmtypes/lcm_texts.h"
+#include "logs/src/info.h"
 #include "logs/src/log_reader.h"
 #include "logs/src/migrate_rules.h"
 
@@ -123,7 +124,7 @@ Migration MigrateLog(const std::string& in, const std::string& out) {
     if (fate != Fate::kMalformed) writer.Write(e.utime, e.channel, e.bytes);
   }
   writer.Close();
-  migration.unread_bytes = log.unread_bytes();
+  migration.damage = log.damage();
   return migration;
 }
 
@@ -140,9 +141,7 @@ std::string Format(const Migration& migration) {
       parts += fmt::format("{}{} {}", parts.empty() ? "" : "; ", count, words.at(fate));
     text += fmt::format("{:<20} {}\n", channel, parts);
   }
-  if (migration.unread_bytes > 0)
-    text += fmt::format("the last {} bytes are no whole event: the log was cut off\n",
-                        migration.unread_bytes);
+  for (const Damage& d : migration.damage) text += Format(d) + "\n";
   return text;
 }
 

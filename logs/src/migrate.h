@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "logs/src/log_reader.h"
 #include "logs/src/record.h"
 #include "logs/src/schema.h"
 
@@ -41,7 +42,7 @@ class Migrator {
 
 struct Migration {
   std::map<std::string, std::map<Fate, long>> channels;  ///< messages of each
-  int64_t unread_bytes = 0;                              ///< of a log that was cut off
+  std::vector<Damage> damage;                            ///< what could not be read
 };
 
 /// Writes the log `in` anew as `out` with today's messages. Stamps, channels and the order stay;

@@ -6,14 +6,22 @@
 
 namespace chase::logs {
 
+OutputFile::OutputFile(const std::string& file)
+    : file_(file), part_(file), out_(part_.name(), std::ios::binary) {
+  if (!out_)
+    throw std::runtime_error(file + ": cannot be written; check the folder and its rights");
+}
+
+void OutputFile::Close() {
+  out_.close();
+  if (!out_ || !part_.Complete())
+    throw std::runtime_error(file_ + ": could not be completed; is the disk full?");
+}
+
 void WriteFile(const std::string& file, const std::string& text) {
-  bus::PartFile part(file);
-  std::ofstream out(part.name(), std::ios::binary);
-  if (!out) throw std::runtime_error(file + ": cannot be written; check the folder and its rights");
-  out << text;
-  out.close();
-  if (out && part.Complete()) return;
-  throw std::runtime_error(file + ": could not be completed; is the disk full?");
+  OutputFile out(file);
+  out.Write(text);
+  out.Close();
 }
 
 void RequireWritable(const std::string& file) {

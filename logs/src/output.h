@@ -1,10 +1,25 @@
 #pragma once
 
+#include <fstream>
 #include <string>
 
 #include "common/bus/log_writer.h"
 
 namespace chase::logs {
+
+/// A file that is written beside its name and appears under it when closed. Throws
+/// std::runtime_error with one line.
+class OutputFile {
+ public:
+  explicit OutputFile(const std::string& file);
+  void Write(const std::string& text) { out_ << text; }
+  void Close();
+
+ private:
+  std::string file_;
+  bus::PartFile part_;
+  std::ofstream out_;
+};
 
 /// Writes `text` beside `file` and renames it, so that nobody ever sees half a file. Throws
 /// std::runtime_error with one line.

@@ -188,8 +188,14 @@ TruthSample ToSample(const truth_t& m, int64_t start) {
 FlightRecord ReadFlight(const std::string& log) {
   LogReader reader(log);
   Gatherer gatherer;
-  for (Event e; reader.Next(&e);) gatherer.Add(e);
-  return gatherer.Record(log);
+  LogSurvey survey;
+  for (Event e; reader.Next(&e);) {
+    gatherer.Add(e);
+    survey.Add(e);
+  }
+  FlightRecord record = gatherer.Record(log);
+  record.log = survey.Take(reader);
+  return record;
 }
 
 }  // namespace chase::logs

@@ -109,6 +109,14 @@ int64_t Value::Integer() const {
   return Signed(FromBigEndian(bytes, 0, size), size);
 }
 
+std::vector<int64_t> Value::Integers() const {
+  std::vector<int64_t> numbers;
+  const int size = PrimitiveSize(member->type);
+  for (size_t at = 0; size > 0 && at < bytes.size(); at += static_cast<size_t>(size))
+    numbers.push_back(Signed(FromBigEndian(bytes, at, size), size));
+  return numbers;
+}
+
 std::vector<double> Value::Numbers() const {
   std::vector<double> numbers;
   const int size = PrimitiveSize(member->type);

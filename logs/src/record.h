@@ -23,6 +23,8 @@ struct Value {
   bool Varies() const;
   /// Of an integer member; its first element.
   int64_t Integer() const;
+  /// Of integer members and bytes: all elements.
+  std::vector<int64_t> Integers() const;
   /// All numbers; integers up to 2^53 are exact. Empty for strings and structs.
   std::vector<double> Numbers() const;
   /// Leaves alone strings, structs and an array of another fixed size.

@@ -12,6 +12,7 @@
 
 #include "common/bus/validation.h"
 #include "common/config/config.h"
+#include "common/config/version.h"
 #include "services/perception/camera.h"
 #include "services/perception/messages.h"
 
@@ -102,6 +103,7 @@ void WriteCalibrationPicture(const std::string& in, const std::string& out,
 
 int CheckCalibration(int argc, char** argv) {
   CLI::App app("Projects LiDAR points into a frame of a log.", "chase-perception");
+  chase::config::AddVersion(&app);
   std::string in, out = "calibration.png", config;
   double at = 1.0;
   app.add_option("--check-calibration", in, "LCM log with CAMERA_IMAGE, LIDAR_SCAN and POSE")

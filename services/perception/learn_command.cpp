@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "common/config/config.h"
+#include "common/config/version.h"
 #include "services/perception/learn.h"
 
 namespace chase::perception {
@@ -63,6 +64,7 @@ void Learn(const std::vector<std::string>& files, const std::string& base, const
 
 int LearnColour(int argc, char** argv) {
   CLI::App app("Learns the target's colour and shape from marked pictures.", "chase-perception");
+  chase::config::AddVersion(&app);
   std::vector<std::string> files;
   std::string base, out = "perception.yaml";
   app.add_option("--learn-colour", files, "IMAGE MASK [IMAGE MASK ...]; masks not 0 on the target")

@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "common/config/config.h"
+#include "common/config/version.h"
 #include "common/world/scene.h"
 #include "services/planning/planner.h"
 
@@ -78,6 +79,7 @@ ordered_json Answer(const std::string& file, const std::string& planner_name) {
 
 int main(int argc, char** argv) {
   CLI::App app("Plans one chase: a scene file in, JSON out.", "chase-plan");
+  chase::config::AddVersion(&app);
   std::string file;
   std::string planner = "chase";
   app.add_option("SCENE", file, "scene file, see deploy/scenarios/scenes/README.md")->required();

@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "common/config/config.h"
+#include "common/config/version.h"
 #include "common/world/scene.h"
 #include "services/prediction/predictor.h"
 
@@ -94,6 +95,7 @@ ordered_json Answer(const std::string& file) {
 
 int main(int argc, char** argv) {
   CLI::App app("Predicts the target once: a scene file in, JSON out.", "chase-predict");
+  chase::config::AddVersion(&app);
   std::string file;
   app.add_option("SCENE", file, "scene file, see deploy/scenarios/scenes/README.md")->required();
   try {

@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <stdexcept>
 
+#include "common/config/version.h"
 #include "deploy/campaign/process.h"
 #include "test/compare/campaign.h"
 #include "test/compare/results.h"
@@ -45,6 +46,7 @@ void Execute(const Options& options) {
 int main(int argc, char** argv) {
   CLI::App app("Flies planners through scenarios and sets their figures side by side.",
                "chase-compare");
+  chase::config::AddVersion(&app);
   Options o;
   app.add_option("--planners", o.campaign.planners,
                  "names, such as chase,penin_style; name:7 is parameter set 7, name:all every one "

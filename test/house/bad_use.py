@@ -86,6 +86,22 @@ class BadUse(unittest.TestCase):
                 self.assertTrue(answer.stdout.strip(), flag)
         self.for_each(self.services(), check)
 
+    def test_every_program_names_its_commit(self):
+        def check(program):
+            answer = run(program, "--version")
+            self.assertEqual((answer.returncode, answer.stderr), (0, ""))
+            self.assertRegex(answer.stdout, r"^\d+\.\d+\.\d+ \(commit [0-9a-z-]+\)\n$")
+        self.for_each(sorted(path.name for path in BIN.glob("chase-*")), check)
+
+    def test_scripts_have_help(self):
+        for script in ("build", "doctor", "fly", "setup", "slurm/submit", "spy"):
+            for flag in ("-h", "--help"):
+                with self.subTest(script=script, flag=flag):
+                    answer = subprocess.run([TESTS.parent / "deploy" / script, flag], check=False,
+                                            capture_output=True, text=True, timeout=LIMIT)
+                    self.assertEqual((answer.returncode, answer.stderr), (0, ""))
+                    self.assertGreater(len(answer.stdout), 40)
+
     def test_dumped_config_loads_again(self):
         def check(program):
             dump = run(program, "--dump-config").stdout

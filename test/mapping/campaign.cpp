@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "common/config/config.h"
+#include "common/config/version.h"
 #include "score.h"
 
 namespace chase::mapping_stage {
@@ -151,6 +152,7 @@ void Run(const Arguments& arguments) {
 int main(int argc, char** argv) {
   chase::mapping_stage::Arguments arguments;
   CLI::App app("Mapping against the truth in the simulator's worlds; run from the project's top.");
+  chase::config::AddVersion(&app);
   app.add_option("--seeds", arguments.count, "flights of each kind");
   app.add_option("--first", arguments.first, "first seed");
   app.add_option("--only", arguments.only,

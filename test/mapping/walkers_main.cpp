@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "common/config/config.h"
+#include "common/config/version.h"
 #include "deploy/campaign/statistics.h"
 #include "deploy/worlds/worlds.h"
 #include "walkers.h"
@@ -114,6 +115,7 @@ void Run(const Arguments& arguments) {
 int main(int argc, char** argv) {
   chase::mapping_stage::Arguments arguments;
   CLI::App app("Mapping's movers against the truth in random worlds with people.");
+  chase::config::AddVersion(&app);
   app.add_option("--kinds", arguments.kinds, "kinds of chase-world (default crowd and mixed)");
   app.add_option("--first", arguments.first, "first seed");
   app.add_option("--seeds", arguments.count, "worlds of each kind");

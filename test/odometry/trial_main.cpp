@@ -3,6 +3,7 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 
+#include "common/config/version.h"
 #include "test/odometry/judge.h"
 #include "test/odometry/trial_flight.h"
 
@@ -26,6 +27,7 @@ void AddFlightOptions(CLI::App* app, Arguments* a) {
 int Run(int argc, char** argv) {
   CLI::App app("Flights of the simulated sensors for odometry, and their figures.",
                "odometry_trial");
+  chase::config::AddVersion(&app);
   app.require_subcommand(1);
   Arguments a;
   CLI::App* record = app.add_subcommand("record", "fly a course, keep what the sensors say");

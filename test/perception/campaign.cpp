@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "common/config/config.h"
+#include "common/config/version.h"
 #include "score.h"
 #include "show.h"
 
@@ -88,6 +89,7 @@ void Run(const Arguments& a) {
 int main(int argc, char** argv) {
   chase::perception_stage::Arguments a;
   CLI::App app("Flies perception through the simulator's worlds and scores it.");
+  chase::config::AddVersion(&app);
   app.add_option("scenarios", a.scenarios, "names in deploy/scenarios");
   app.add_option("--first", a.first, "first seed");
   app.add_option("--count", a.count, "seeds");

@@ -23,3 +23,11 @@ chase_test(logs_migrate_test
   SOURCES ${CMAKE_CURRENT_LIST_DIR}/logs_migrate_test.cpp
           ${CMAKE_CURRENT_LIST_DIR}/logs_migrate_rules_test.cpp)
 target_include_directories(logs_migrate_test PRIVATE ${CMAKE_CURRENT_BINARY_DIR}/migrate_test)
+
+# The tools as a user calls them, where there is a program that flies.
+if(TARGET chase-flight)
+  find_package(Python3 REQUIRED COMPONENTS Interpreter)
+  add_test(NAME logs_cli
+    COMMAND ${Python3_EXECUTABLE} -B ${CMAKE_CURRENT_LIST_DIR}/logs_cli_test.py ${CMAKE_BINARY_DIR}/bin)
+  set_tests_properties(logs_cli PROPERTIES TIMEOUT 300)
+endif()

@@ -241,13 +241,31 @@ TEST(Metrics, CriteriaFollowTheScenario) {
   record.real_time_factor = 0.99;
   Metrics m = Compute(record);
   EXPECT_TRUE(m.Passed());
-  EXPECT_EQ(m.criteria.size(), 6u);
+  EXPECT_EQ(m.criteria.size(), 7u);
   record.real_time_factor = 0.9;
   EXPECT_FALSE(Compute(record).criteria.at("real_time_factor"));
   record.scenario.criteria.real_time_factor = -1.0;
   EXPECT_TRUE(Compute(record).Passed());
   record.scenario.criteria.distance_ratio_max = 0.9;
   EXPECT_FALSE(Compute(record).criteria.at("distance_ratio_max"));
+}
+
+TEST(Metrics, AFlightWhoseLogLostAHundredthFails) {
+  FlightRecord record = Standing({3, 0, 1.5}, {5.5, 0, 1.5});
+  ChannelInfo imu;
+  imu.channel = "IMU";
+  imu.count = 990;
+  imu.missing = 10;
+  record.log.channels = {imu};
+  EXPECT_TRUE(Compute(record).Passed());
+  EXPECT_EQ(Compute(record).lost_messages.at("IMU"), 10);
+  record.log.channels[0].missing = 11;
+  EXPECT_FALSE(Compute(record).criteria.at("recorded"));
+  record.log.channels[0].channel = "CAMERA_IMAGE";  // may be left out of a recording
+  EXPECT_TRUE(Compute(record).Passed());
+  record.log.damage = {{1000, 10, true}};
+  EXPECT_FALSE(Compute(record).Passed());
+  EXPECT_EQ(Compute(record).losses.size(), 1u);
 }
 
 TEST(Metrics, AFlightThatStopsEarlyFails) {

@@ -1,0 +1,284 @@
+"""chase-log and chase-report as a user calls them, on the log of a short flight.
+
+logs_cli_test.py BIN_DIR"""
+
+import csv
+import json
+import pathlib
+import re
+import subprocess
+import sys
+import tempfile
+import unittest
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "test/replay"))
+sys.dont_write_bytecode = True
+import lcmlog  # noqa: E402
+
+BIN = pathlib.Path(sys.argv[1]).resolve()
+LIMIT = 240  # s: a loaded machine is slow to write
+HEAVY = ("LIDAR_SCAN", "CAMERA_IMAGE", "SCAN_REGISTERED", "MAP")
+
+
+def run(program, *arguments):
+    return subprocess.run([BIN / program, *map(str, arguments)], capture_output=True, text=True,
+                          timeout=LIMIT, check=False)
+
+
+class LogTools(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.temporary = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(cls.temporary.cleanup)
+        cls.folder = pathlib.Path(cls.temporary.name)
+        cls.log = cls.folder / "flight.lcm"
+        answer = run("chase-flight", ROOT / "deploy/scenarios/gym.yaml", "--until", "1", "--quiet",
+                     "--log", cls.log)
+        assert answer.returncode == 0, answer.stderr
+        cls.events = cls.thinned(lcmlog.read(cls.log))
+        lcmlog.write(cls.log, cls.events)
+
+    @staticmethod
+    def thinned(events):
+        """Few of the clouds and images, so that the tests are quick."""
+        counts, kept = {}, []
+        for event in events:
+            counts[event[1]] = counts.get(event[1], 0) + 1
+            if event[1] not in HEAVY or counts[event[1]] <= 5:
+                kept.append(event)
+        return kept
+
+    def good(self, *arguments):
+        answer = run("chase-log", *arguments)
+        self.assertEqual(answer.returncode, 0, answer.stderr)
+        return answer.stdout
+
+    def assert_refused(self, answer, code, *words):
+        self.assertEqual(answer.returncode, code, answer.stderr)
+        self.assertEqual(answer.stderr.count("\n"), 1, f"not one line: {answer.stderr!r}")
+        for word in words:
+            self.assertIn(str(word), answer.stderr)
+
+    def count(self, channel):
+        return sum(name == channel for _, name, _ in self.events)
+
+    def test_tum_holds_the_channel_that_is_named(self):
+        texts = {}
+        for channel in ("POSE", "TRUTH", "TARGET"):
+            out = self.folder / f"{channel}.tum"
+            self.good("export", "--tum", "--channel", channel, self.log, out)
+            texts[channel] = out.read_text()
+            self.assertLessEqual(len(texts[channel].splitlines()), self.count(channel))
+        self.assertEqual(len(set(texts.values())), 3, "two channels give one trajectory")
+        self.assertEqual(len(texts["TRUTH"].splitlines()), self.count("TRUTH"))
+        self.good("export", "--tum", self.log, self.folder / "default.tum")
+        self.assertEqual((self.folder / "default.tum").read_text(), texts["POSE"])
+
+    def test_options_without_effect_are_refused(self):
+        out = self.folder / "refused"
+        for words, arguments in (
+                (("--channel", "IMU", "POSE"), ("--tum", "--channel", "IMU")),
+                (("--channel", "NO_SUCH", "info"), ("--csv", "--channel", "NO_SUCH")),
+                (("--channel", "NO_SUCH", "info"), ("--mcap", "--channel", "NO_SUCH"))):
+            with self.subTest(arguments=arguments):
+                answer = run("chase-log", "export", *arguments, self.log, out)
+                self.assert_refused(answer, 2, *words)
+                self.assertFalse(out.exists())
+
+    def without(self, name, lost):
+        """A log that lacks the messages of which lost(channel, k) is true for the channel's k-th."""
+        counts, kept = {}, []
+        for event in self.events:
+            k = counts[event[1]] = counts.get(event[1], -1) + 1
+            if not lost(event[1], k):
+                kept.append(event)
+        lcmlog.write(self.folder / name, kept)
+        return self.folder / name
+
+    def test_lost_messages_are_counted(self):
+        whole = self.good("info", self.log)
+        self.assertNotIn("are missing", whole)
+        self.assertIn("gym, seed 1", whole)
+        self.assertIn("versions", whole)
+        log = self.without("lost.lcm", lambda channel, k: channel == "IMU" and 100 <= k < 150 or
+                           channel == "TRUTH" and k < 30)
+        text = self.good("info", log)
+        self.assertIn(f"IMU: 50 of {self.count('IMU')} messages of simulator are missing", text)
+        self.assertIn(f"TRUTH: 30 of {self.count('TRUTH')} messages of simulator are missing", text)
+        imu = next(line for line in text.splitlines() if line.startswith("IMU")).split()
+        self.assertEqual(imu[-2:], ["50", "0.255"])  # 51 periods of 5 ms
+
+    def test_what_others_heard_and_the_log_lacks_is_said(self):
+        log = self.without("no_imu.lcm", lambda channel, k: channel in ("IMU", "POSE"))
+        text = self.good("info", log)
+        for channel in ("IMU", "POSE"):
+            self.assertIn(f"{channel}: others heard", text)
+
+    def test_cut_and_damaged_logs_are_read_as_far_as_they_go(self):
+        data = self.log.read_bytes()
+        cut = self.folder / "cut.lcm"
+        cut.write_bytes(data[:-100])
+        self.assertIn("cut off", self.good("info", cut))
+        sync = lcmlog.SYNC.to_bytes(4, "big")
+        at = data.index(sync + (1000).to_bytes(8, "big"))  # the 1000th event
+        for name, wrong in (("sync", b"\0" * 4), ("length", data[at:at + 24] + b"\x7f\xff\0\0")):
+            damaged = self.folder / f"{name}.lcm"
+            damaged.write_bytes(data[:at] + wrong + data[at + len(wrong):])
+            text = self.good("info", damaged)
+            self.assertIn("damaged", text)
+            count = sum(int(line.split()[2]) for line in text.splitlines() if " Hz " in line)
+            self.assertEqual(count, len(self.events) - 1, name)
+
+    def test_diff_tells_lost_from_different(self):
+        lost = self.without("diff.lcm", lambda channel, k: channel == "IMU" and k == 10)
+        answer = run("chase-log", "diff", self.log, lost)
+        self.assertEqual(answer.returncode, 1, answer.stderr)
+        n = self.count("IMU")
+        self.assertEqual(answer.stdout, f"IMU: {n} messages against {n - 1}; 1 of A are not in B\n")
+        none = self.without("none.lcm", lambda channel, k: channel == "IMU")
+        self.assertEqual(run("chase-log", "diff", self.log, none).stdout,
+                         f"IMU: {n} messages against 0; {n} of A are not in B\n")
+
+    def test_diff_of_a_replay_pairs_by_time(self):
+        half = self.folder / "half.lcm"
+        lcmlog.write(half, [e for e in self.events if e[0] >= 5_000_000])
+        again = self.folder / "again.lcm"
+        self.assertEqual(run("chase-planning", "--replay", half, "--out", again).returncode, 0)
+        lines = run("chase-log", "diff", half, again).stdout.splitlines()
+        plan = next(line for line in lines if line.startswith("PLAN: "))
+        ours = sum(channel == "PLAN" for _, channel, _ in lcmlog.read(again))
+        unpaired = re.search(r"(\d+) of B are not in A", plan)
+        self.assertLess(int(unpaired.group(1)) if unpaired else 0, ours / 2, plan)
+
+    def test_packets_of_the_bus_stay_out(self):
+        log = self.folder / "loopback.lcm"
+        lcmlog.write(log, [(self.events[0][0], "LOOPBACK_4711", b""), *self.events])
+        self.assertNotIn("LOOPBACK", self.good("info", log))
+
+    def test_reports_say_what_is_missing(self):
+        out = self.folder / "report"
+        log = self.without("report.lcm", lambda channel, k: channel in ("IMU", "POSE") and k % 3)
+        log.write_bytes(log.read_bytes()[:-50])
+        answer = run("chase-report", log, "--out", out)
+        self.assertEqual(answer.returncode, 2, answer.stderr)
+        self.assertIn("cut off", answer.stderr)
+        self.assertIn("IMU: ", answer.stdout)
+        metrics = json.loads((out / "metrics.json").read_text())
+        self.assertFalse(metrics["passed"])
+        self.assertFalse(metrics["criteria"]["recorded"])
+        self.assertGreater(metrics["lost_messages"]["IMU"], 0.6 * self.count("IMU"))
+        self.assertEqual(metrics["lost_messages"]["TRUTH"], 0)
+        self.assertIn("are missing", (out / "report.html").read_text())
+
+    def counts(self, log):
+        found = {}
+        for _, channel, _ in lcmlog.read(log):
+            found[channel] = found.get(channel, 0) + 1
+        return found
+
+    def test_cut_copies_a_stretch_of_time(self):
+        out = self.folder / "stretch.lcm"
+        self.good("cut", self.log, out, "--from", "2", "--to", "3.5")
+        first = self.events[0][0]
+        self.assertEqual(list(lcmlog.read(out)),
+                         [e for e in self.events if 2_000_000 <= e[0] - first < 3_500_000])
+
+    def test_filter_copies_channels(self):
+        out = self.folder / "some.lcm"
+        self.good("filter", self.log, out, "--keep", "P*,IMU", "--drop", "*_STATUS")
+        self.assertEqual(set(self.counts(out)), {"POSE", "PLAN", "PREDICTION", "IMU"})
+        self.assertEqual(self.counts(out)["IMU"], self.count("IMU"))
+
+    def test_merge_puts_together_what_was_parted(self):
+        parts = self.folder / "imu.lcm", self.folder / "rest.lcm"
+        self.good("filter", self.log, parts[0], "--keep", "IMU,POSE")
+        self.good("filter", self.log, parts[1], "--drop", "IMU")
+        out = self.folder / "merged.lcm"
+        self.assertIn(f"{self.count('POSE')} messages were in several logs",
+                      self.good("merge", *parts, out))
+        self.assertEqual(run("chase-log", "diff", self.log, out).stdout, "no difference\n")
+
+    def test_repair_keeps_all_that_can_be_read(self):
+        at = next(k for k, e in enumerate(self.events) if e[1] == "POSE" and k > 500)
+        utime, channel, data = self.events[at]
+        events = list(self.events)
+        events[at] = utime, channel, data[:100]
+        damaged, out = self.folder / "damaged.lcm", self.folder / "repaired.lcm"
+        lcmlog.write(damaged, events)
+        raw = damaged.read_bytes()
+        middle = raw.index(lcmlog.SYNC.to_bytes(4, "big"), len(raw) // 2)
+        damaged.write_bytes(raw[:middle] + b"xxxx" + raw[middle + 4:-10])
+        answer = run("chase-log", "repair", damaged, out)
+        self.assertEqual(answer.returncode, 0, answer.stderr)
+        self.assertIn("POSE: 1 messages do not decode", answer.stdout)
+        self.assertIn("damaged", answer.stderr)
+        self.assertIn("cut off", answer.stderr)
+        self.assertEqual(sum(self.counts(out).values()), len(self.events) - 3)
+        self.assertNotIn("damaged", self.good("info", out))
+
+    def test_selections_of_nothing_are_refused(self):
+        out = self.folder / "nothing.lcm"
+        for words, arguments in ((("--from",), ("cut",)), (("--keep",), ("filter",)),
+                                 (("--from 5", "later"), ("cut", "--from", "5", "--to", "5")),
+                                 (("lasts", "--from"), ("cut", "--from", "1000")),
+                                 (("NO_SUCH", "info"), ("filter", "--keep", "NO_SUCH")),
+                                 (("--long", "--csv"), ("export", "--tum", "--long"))):
+            with self.subTest(arguments=arguments):
+                answer = run("chase-log", *arguments, self.log, out)
+                self.assert_refused(answer, 2, *words)
+                self.assertFalse(out.exists())
+
+    def test_long_csv_has_a_row_for_every_element(self):
+        out = self.folder / "csv"
+        self.good("export", "--csv", "--long", "--channel", "OBSTACLES", self.log, out)
+        lines = (out / "OBSTACLES.csv").read_text().splitlines()
+        self.assertEqual(lines[0], "event_utime,seq,field,index,value")
+        rows = list(csv.DictReader(lines))
+        ids = [row for row in rows if row["field"] == "obstacles.id"]
+        counts = [float(row["value"]) for row in rows if row["field"] == "n_obstacles"]
+        self.assertEqual(len(counts), self.count("OBSTACLES"))
+        self.assertEqual(len(ids), sum(counts))
+        self.assertEqual(int(ids[-1]["index"]), counts[-1] - 1)
+
+    def mcap(self, *options):
+        out = self.folder / "flight.mcap"
+        self.good("export", "--mcap", *options, self.log, out)
+        modules = ROOT / "logs/node_modules"
+        if not (modules / "@mcap/core").is_dir():
+            self.skipTest("skipped: npm ci --prefix logs brings the readers")
+        answer = subprocess.run(["node", ROOT / "test/unit/mcap_check.cjs", modules, out],
+                                capture_output=True, text=True, timeout=LIMIT, check=False)
+        self.assertEqual(answer.returncode, 0, answer.stderr)
+        return json.loads(answer.stdout)
+
+    def test_mcap_is_read_by_the_loader_of_foxglove(self):
+        topics = self.mcap()
+        counts = self.counts(self.log)
+        for channel, count in counts.items():
+            self.assertEqual(topics[channel]["count"], count, channel)
+        for topic, schema in (("LIDAR_SCAN", "PointCloud"), ("CAMERA_IMAGE", "RawImage"),
+                              ("CAMERA_IMAGE/calibration", "CameraCalibration"),
+                              ("POSE/pose", "PoseInFrame"), ("/tf", "FrameTransforms"),
+                              ("OBSTACLES/scene", "SceneUpdate"), ("PLAN/scene", "SceneUpdate"),
+                              ("TARGET/scene", "SceneUpdate"), ("PLANNING_STATUS/log", "Log")):
+            self.assertEqual(topics[topic]["schema"], f"foxglove.{schema}")
+        pose = topics["POSE"]["first"]
+        self.assertEqual((pose["seq"], len(pose["covariance"])), (0, 81))
+        image = topics["CAMERA_IMAGE"]["first"]
+        self.assertEqual((image["width"], image["data"]), (376, 376 * 240 * 3))
+
+    def test_mcap_of_one_channel_with_jpeg(self):
+        topics = self.mcap("--channel", "CAMERA_IMAGE", "--jpeg")
+        self.assertEqual(set(topics), {"CAMERA_IMAGE", "CAMERA_IMAGE/calibration"})
+        self.assertEqual(topics["CAMERA_IMAGE"]["schema"], "foxglove.CompressedImage")
+        self.assertLess(topics["CAMERA_IMAGE"]["first"]["data"], 376 * 240 / 2)
+
+    def test_every_command_has_help(self):
+        for command in ("info", "import", "export", "diff", "cut", "filter", "merge", "repair",
+                        "migrate", "verify"):
+            self.assertIn("Usage:", self.good(command, "--help"))
+
+
+if __name__ == "__main__":
+    unittest.main(argv=sys.argv[:1])
