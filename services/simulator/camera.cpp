@@ -65,11 +65,10 @@ RayPacket Camera::Rays(int row, int column) const {
   return rays;
 }
 
-/// True where rays of a tile may meet something that moves.
+/// True where a packet's rays may meet something that moves.
 bool Camera::MoversIn(int row, int column) const {
   return std::any_of(movers_.begin(), movers_.end(), [&](const PixelBox& box) {
-    return box.left <= column + 7 && box.right >= column && box.top <= row + kMostPackets - 1 &&
-           box.bottom >= row;
+    return box.left <= column + 7 && box.right >= column && box.top <= row && box.bottom >= row;
   });
 }
 
@@ -78,10 +77,9 @@ void Camera::TraceTile(int row, int column, const Scene& scene, Image* image) {
   const int rows = std::min(kMostPackets, rig_.height_px - row);
   RayPacket rays[kMostPackets];
   HitPacket hits[kMostPackets];
-  const bool movers = MoversIn(row, column);
   for (int k = 0; k < rows; ++k) {
     rays[k] = Rays(row + k, column);
-    rays[k].movers = movers;
+    rays[k].movers = MoversIn(row + k, column);
   }
   scene.Trace(rays, rows, hits);
   for (int k = 0; k < rows; ++k) {

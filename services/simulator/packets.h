@@ -25,7 +25,7 @@ struct RayPacket {
 };
 
 /// As many packets may travel together.
-inline constexpr int kMostPackets = 4;
+inline constexpr int kMostPackets = 16;
 
 /// First hits; distances in multiples of the direction's length.
 struct HitPacket {

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "services/simulator/facet_tables.h"
 #include "services/simulator/mesh.h"
 
 namespace chase::simulator {
@@ -81,7 +82,8 @@ void SetPlace(const Solid& solid, Instance* instance) {
   rtcCommitGeometry(instance->geometry);
 }
 
-void Fill(const RayPacket& rays, int* valid, RTCRayHit8* out) {
+/// Rays up to where they are known to end.
+void Fill(const RayPacket& rays, const float* reach, int* valid, RTCRayHit8* out) {
   std::memcpy(out->ray.org_x, rays.ox, sizeof rays.ox);
   std::memcpy(out->ray.org_y, rays.oy, sizeof rays.oy);
   std::memcpy(out->ray.org_z, rays.oz, sizeof rays.oz);
@@ -91,7 +93,7 @@ void Fill(const RayPacket& rays, int* valid, RTCRayHit8* out) {
   for (int i = 0; i < 8; ++i) {
     out->ray.tnear[i] = out->ray.time[i] = 0.0f;
     valid[i] = i < rays.count ? -1 : 0;
-    out->ray.tfar[i] = valid[i] ? std::numeric_limits<float>::infinity() : -1.0f;
+    out->ray.tfar[i] = valid[i] ? reach[i] : -1.0f;
     out->ray.mask[i] = ~0u;
     out->ray.id[i] = static_cast<unsigned>(i);
     out->ray.flags[i] = 0;
@@ -117,11 +119,13 @@ struct Scene::Impl {
   void BuildMoving();
   void AddInstance(RTCScene part, Material material);
   RTCScene MovingPart(const Solid& solid);
-  void Read(const RTCRayHit8& work, bool movers, HitPacket* hits) const;
+  void TraceFixed(const RayPacket& rays, HitPacket* hits) const;
+  void TraceMoving(const RayPacket& rays, HitPacket* hits) const;
 
   world::Scenario scenario;
   Actors actors;
   RTCDevice device = nullptr;
+  FacetTables facets;
   RTCScene fixed = nullptr, moving = nullptr, target = nullptr;
   std::vector<RTCScene> parts;
   std::vector<Instance> instances;
@@ -148,14 +152,20 @@ void Scene::Impl::BuildStatic() {
   const auto solids = world::StaticSolids(scenario);
   fixed = NewScene();
   const Rectangle extent = GroundExtent(scenario, solids);
-  Attach(device, fixed, GroundMesh(scenario.world.ground, extent.min, extent.max));
+  const Mesh ground = GroundMesh(scenario.world.ground, extent.min, extent.max);
+  Attach(device, fixed, ground);
+  facets.SetGround(scenario.world.ground, ground);
   static_materials.push_back(Material::kGround);
   for (std::size_t i = 0; i < solids.size(); ++i) {
     const Material material = StaticMaterial(scenario.world, i, solids[i]);
     const bool tree = material == Material::kCrown || material == Material::kTrunk;
-    Attach(device, fixed, Placed(SolidMesh(solids[i], tree ? kCoarse : kFine), solids[i]));
+    const int segments = tree ? kCoarse : kFine;
+    const Mesh mesh = Placed(SolidMesh(solids[i], segments), solids[i]);
+    Attach(device, fixed, mesh);
+    facets.Add(solids[i], mesh, segments, material);
     static_materials.push_back(material);
   }
+  facets.Finish();
   rtcCommitScene(fixed);
 }
 
@@ -178,21 +188,45 @@ void Scene::Impl::BuildMoving() {
     AddInstance(MovingPart(mover.solid), Material::kMover);
 }
 
-/// Only a hit on what moves names an instance; its normal is in the instance's axes.
-void Scene::Impl::Read(const RTCRayHit8& work, bool movers, HitPacket* hits) const {
-  for (int i = 0; i < 8; ++i) hits->material[i] = static_materials[work.hit.geomID[i] + 1u];
+/// What stands still, under Embree. The whole packet, as a ray that grazes an edge can get another
+/// hit in other company.
+void Scene::Impl::TraceFixed(const RayPacket& rays, HitPacket* hits) const {
+  constexpr float kEver = std::numeric_limits<float>::infinity();
+  const float reach[8] = {kEver, kEver, kEver, kEver, kEver, kEver, kEver, kEver};
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+  alignas(32) int valid[8];
+  alignas(32) RTCRayHit8 work;
+  Fill(rays, reach, valid, &work);
+  rtcIntersect8(valid, fixed, &context, &work);
   for (int i = 0; i < 8; ++i) {
+    if (!valid[i]) continue;
     const bool hit = work.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID;
-    hits->distance[i] = hit ? work.ray.tfar[i] : std::numeric_limits<float>::infinity();
+    hits->material[i] = static_materials[work.hit.geomID[i] + 1u];
+    hits->distance[i] = hit ? work.ray.tfar[i] : kEver;
     hits->nx[i] = work.hit.Ng_x[i], hits->ny[i] = work.hit.Ng_y[i], hits->nz[i] = work.hit.Ng_z[i];
   }
-  for (int i = 0; movers && i < 8; ++i) {
-    if (work.hit.instID[0][i] == RTC_INVALID_GEOMETRY_ID) continue;
+}
+
+/// What moves, in front of the hits already found. Its normals are in the instance's axes.
+void Scene::Impl::TraceMoving(const RayPacket& rays, HitPacket* hits) const {
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+  alignas(32) int valid[8];
+  alignas(32) RTCRayHit8 work;
+  Fill(rays, hits->distance, valid, &work);
+  rtcIntersect8(valid, moving, &context, &work);
+  for (int i = 0; i < 8; ++i) {
+    if (!valid[i] || work.hit.instID[0][i] == RTC_INVALID_GEOMETRY_ID) continue;
     const Instance& instance = instances[work.hit.instID[0][i]];
     const float c = instance.cos_yaw, s = instance.sin_yaw;
     hits->material[i] = instance.material;
+    hits->distance[i] = work.ray.tfar[i];
     hits->nx[i] = c * work.hit.Ng_x[i] - s * work.hit.Ng_y[i];
     hits->ny[i] = s * work.hit.Ng_x[i] + c * work.hit.Ng_y[i];
+    hits->nz[i] = work.hit.Ng_z[i];
   }
 }
 
@@ -221,25 +255,23 @@ void Scene::MoveTo(double t) {
 
 const std::vector<Solid>& Scene::MovingSolids() const { return impl_->moving_solids; }
 
-/// Packet by packet, as streams settle ties on the triangles' edges in another order.
+/// By the solids' own shapes; Embree settles what is unsure, packet by packet, as its streams
+/// settle ties on the triangles' edges in another order.
 void Scene::Trace(const RayPacket* rays, int n, HitPacket* hits) const {
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
-  context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
-  RTCRayHit8 work[kMostPackets];
+  unsigned unsure[kMostPackets];
+  TraceFacets(impl_->facets.world(), rays, n, hits, unsure);
   for (int k = 0; k < n; ++k) {
-    alignas(32) int valid[8];
-    Fill(rays[k], valid, &work[k]);
-    rtcIntersect8(valid, impl_->fixed, &context, &work[k]);
-    if (rays[k].movers) rtcIntersect8(valid, impl_->moving, &context, &work[k]);
+    if (unsure[k] != 0) impl_->TraceFixed(rays[k], &hits[k]);
+    if (rays[k].movers) impl_->TraceMoving(rays[k], &hits[k]);
   }
-  for (int k = 0; k < n; ++k) impl_->Read(work[k], rays[k].movers, &hits[k]);
 }
 
 void Scene::TraceTargetAlone(const RayPacket& rays, bool* hits) const {
   alignas(32) int valid[8];
   alignas(32) RTCRayHit8 work;
-  Fill(rays, valid, &work);
+  constexpr float kEver = std::numeric_limits<float>::infinity();
+  const float reach[8] = {kEver, kEver, kEver, kEver, kEver, kEver, kEver, kEver};
+  Fill(rays, reach, valid, &work);
   const Eigen::Vector3f center = impl_->target_center.cast<float>();
   const Instance& target = impl_->instances[kTargetInstance];
   const Eigen::Vector2f turn(target.cos_yaw, target.sin_yaw);

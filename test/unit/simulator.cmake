@@ -6,6 +6,8 @@ chase_test(simulator_test LIBS simulator_core
           ${CMAKE_CURRENT_LIST_DIR}/simulator_lidar_test.cpp
           ${CMAKE_CURRENT_LIST_DIR}/simulator_camera_test.cpp
           ${CMAKE_CURRENT_LIST_DIR}/simulator_loop_test.cpp)
+chase_test(simulator_facets_test LIBS simulator_core embree
+  SOURCES ${CMAKE_CURRENT_LIST_DIR}/simulator_facets_test.cpp)
 chase_test(simulator_node_test LIBS simulator_node
   SOURCES ${CMAKE_CURRENT_LIST_DIR}/simulator_node_test.cpp)
 

@@ -1,0 +1,59 @@
+#pragma once
+
+#include "services/simulator/packets.h"
+
+namespace chase::simulator {
+
+/// A vertex in frame W, m.
+struct alignas(16) FacetVertex {
+  float p[4];  ///< x y z, and nothing
+};
+
+/// A solid of the world and where its vertices are.
+struct FacetSolid {
+  enum class Kind : int { kBox, kCylinder, kEllipsoid };
+  Kind kind = Kind::kBox;
+  Material material = Material::kNothing;
+  int first = 0;           ///< of its vertices, in the order of SolidMesh()
+  int around = 0;          ///< edges around
+  int rows = 0;            ///< of quads from the lower to the upper pole or rim
+  float center[3] = {};    ///< frame W, m
+  float per_half[3] = {};  ///< 1 / half size, 1/m
+  float cos_yaw = 1.0f, sin_yaw = 0.0f;
+};
+
+/// Eight boxes along the axes of frame W around solids or around further nodes, m.
+struct BoundsNode {
+  alignas(32) float center[3][8] = {}, half[3][8] = {};
+  int child[8] = {};  ///< a node, or ~solid
+  int count = 0;
+};
+
+/// The ground's grid of vertices; each cell's quad is cut from its first to its last corner.
+struct GroundGrid {
+  int columns = 0, rows = 0;   ///< of cells
+  const float* x = nullptr;    ///< of the columns' vertices, m
+  const float* y = nullptr;    ///< of the rows' vertices, m
+  const float* z = nullptr;    ///< row by row, m
+  const float* top = nullptr;  ///< of each cell's corners above the mean plane, m
+  float cells_per_m[2] = {};
+  float plane[3] = {};   ///< the mean plane's height: plane[0] + plane[1] x + plane[2] y
+  float highest = 0.0f;  ///< above the mean plane, m
+};
+
+/// All that stands still; its arrays belong to whoever made it.
+struct FacetWorld {
+  const FacetVertex* vertices = nullptr;
+  const FacetSolid* solids = nullptr;
+  const BoundsNode* nodes = nullptr;  ///< the first is the root; none: no solids
+  int node_count = 0;
+  GroundGrid ground;
+};
+
+/// First hits of n packets, at most kMostPackets, with the bits that Embree 3 gives for the same
+/// triangles on AVX2. A ray's bit in unsure[packet] says that its hit is not settled: it passes too
+/// near an edge or an outline, starts inside a solid, or the processor has no AVX2.
+void TraceFacets(const FacetWorld& world, const RayPacket* rays, int n, HitPacket* hits,
+                 unsigned* unsure);
+
+}  // namespace chase::simulator
