@@ -14,6 +14,8 @@ using Eigen::Vector3f;
 
 constexpr double kPi = 3.14159265358979323846;
 constexpr double kResolution = 0.002;  // m, of a range
+constexpr int kTogether = 8;           // sequences traced at once
+static_assert(kRings <= kMostPackets && kRings % 8 == 0);
 
 /// Reflectivity at normal incidence, 0 to 255.
 float Reflectivity(Material material) {
@@ -87,56 +89,71 @@ Lidar::Lidar(const LidarConfig& config, const world::Rig& rig, uint64_t seed)
       directions_.push_back(LaserDirection(firing, ring).cast<float>());
 }
 
-double Lidar::FiringTime() const {
-  return static_cast<double>(sweep_index_) / config_.rate + firing_ * kFiringPeriod;
+double Lidar::FiringTime(int firing) const {
+  return static_cast<double>(sweep_index_) / config_.rate + firing * kFiringPeriod;
 }
 
 void Lidar::Advance(const std::vector<TimedPose>& poses, const Scene& scene) {
   if (config_.rate <= 0.0 || poses.size() < 2) return;
-  std::size_t i = 0;
-  for (double t = FiringTime(); t < poses.back().t; t = FiringTime()) {
-    while (i + 2 < poses.size() && poses[i + 1].t <= t) ++i;
-    if (firing_ == 0) sweep_.start = t;
-    Fire(Interpolated(poses[i], poses[i + 1], t), scene);
-    if (++firing_ < kFirings) continue;
+  while (FiringTime(firing_) < poses.back().t) {
+    if (firing_ == 0) sweep_.start = FiringTime(0);
+    firing_ += FireNext(poses, scene);
+    if (firing_ < kFirings) continue;
     complete_ = std::exchange(sweep_, Sweep{});
     firing_ = 0;
     ++sweep_index_;
   }
 }
 
-void Lidar::Fire(const TimedPose& body, const Scene& scene) {
-  const Vector3f origin = (body.p + body.q * p_BL_).cast<float>();
-  const Eigen::Matrix3f R_WL = (body.q * q_BL_).toRotationMatrix().cast<float>();
-  const Vector3f* directions = &directions_[static_cast<std::size_t>(firing_ * kRings)];
-  RayPacket rays[kRings / 8];
-  HitPacket hits[kRings / 8];
-  for (int ring = 0; ring < kRings; ++ring) {
-    const Vector3f d = R_WL * directions[ring];
-    RayPacket& packet = rays[ring / 8];
-    const int i = ring % 8;
-    packet.ox[i] = origin.x(), packet.oy[i] = origin.y(), packet.oz[i] = origin.z();
-    packet.dx[i] = d.x(), packet.dy[i] = d.y(), packet.dz[i] = d.z();
+/// Up to eight sequences that are due, traced together: a packet for each ring, as a ring's rays
+/// from firing to firing stay close.
+int Lidar::FireNext(const std::vector<TimedPose>& poses, const Scene& scene) {
+  RayPacket rays[kRings] = {};
+  HitPacket hits[kRings];
+  int count = 0;
+  std::size_t i = 0;
+  for (; count < kTogether && firing_ + count < kFirings; ++count) {
+    const double t = FiringTime(firing_ + count);
+    if (t >= poses.back().t) break;
+    while (i + 2 < poses.size() && poses[i + 1].t <= t) ++i;
+    Aim(Interpolated(poses[i], poses[i + 1], t), count, rays);
   }
-  scene.Trace(rays, kRings / 8, hits);
-  for (int ring = 0; ring < kRings; ++ring) Record(ring, rays[ring / 8], hits[ring / 8], ring % 8);
+  for (RayPacket& packet : rays) packet.count = count;
+  scene.TraceAcross(rays, kRings, hits);
+  for (int lane = 0; lane < count; ++lane)
+    for (int ring = 0; ring < kRings; ++ring)
+      Record(firing_ + lane, ring, rays[ring], hits[ring], lane);
+  return count;
 }
 
-/// Of ray i of the packet. One draw of noise and one of loss for every laser, hit or not, so that
+void Lidar::Aim(const TimedPose& body, int lane, RayPacket* rays) const {
+  const Vector3f origin = (body.p + body.q * p_BL_).cast<float>();
+  const Eigen::Matrix3f R_WL = (body.q * q_BL_).toRotationMatrix().cast<float>();
+  const Vector3f* directions = &directions_[static_cast<std::size_t>((firing_ + lane) * kRings)];
+  for (int ring = 0; ring < kRings; ++ring) {
+    const Vector3f d = R_WL * directions[ring];
+    RayPacket& packet = rays[ring];
+    packet.ox[lane] = origin.x(), packet.oy[lane] = origin.y(), packet.oz[lane] = origin.z();
+    packet.dx[lane] = d.x(), packet.dy[lane] = d.y(), packet.dz[lane] = d.z();
+  }
+}
+
+/// Of a ray of the packet. One draw of noise and one of loss for every laser, hit or not, so that
 /// what is seen does not shift the numbers of the lasers after it.
-void Lidar::Record(int ring, const RayPacket& rays, const HitPacket& hits, int i) {
-  const float range = hits.distance[i];
+void Lidar::Record(int firing, int ring, const RayPacket& rays, const HitPacket& hits, int lane) {
+  const float range = hits.distance[lane];
   const double noise = config_.noise * random_.Gaussian();
   const bool lost = random_.Uniform() < config_.dropout;
   if (lost || !(range >= config_.min_range && range <= config_.max_range)) return;
   const double measured = kResolution * std::round((range + noise) / kResolution);
   const Vector3f p =
-      static_cast<float>(measured) * directions_[static_cast<std::size_t>(firing_ * kRings + ring)];
+      static_cast<float>(measured) * directions_[static_cast<std::size_t>(firing * kRings + ring)];
   sweep_.x.push_back(p.x());
   sweep_.y.push_back(p.y());
   sweep_.z.push_back(p.z());
-  sweep_.t.push_back(static_cast<float>(firing_ * kFiringPeriod + LaserDelay(ring)));
-  const float intensity = Reflectivity(hits.material[i]) * (0.3f + 0.7f * Incidence(rays, hits, i));
+  sweep_.t.push_back(static_cast<float>(firing * kFiringPeriod + LaserDelay(ring)));
+  const float intensity =
+      Reflectivity(hits.material[lane]) * (0.3f + 0.7f * Incidence(rays, hits, lane));
   sweep_.intensity.push_back(static_cast<uint8_t>(std::clamp(intensity, 1.0f, 255.0f)));
   sweep_.ring.push_back(static_cast<uint8_t>(ring));
 }

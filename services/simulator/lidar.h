@@ -72,9 +72,10 @@ class Lidar {
   std::optional<Sweep> Take();
 
  private:
-  double FiringTime() const;
-  void Fire(const TimedPose& body, const Scene& scene);
-  void Record(int ring, const RayPacket& rays, const HitPacket& hits, int i);
+  double FiringTime(int firing) const;
+  int FireNext(const std::vector<TimedPose>& poses, const Scene& scene);
+  void Aim(const TimedPose& body, int lane, RayPacket* rays) const;
+  void Record(int firing, int ring, const RayPacket& rays, const HitPacket& hits, int lane);
 
   LidarConfig config_;
   Eigen::Vector3d p_BL_;
