@@ -15,7 +15,7 @@ using Eigen::Vector3f;
 constexpr double kPi = 3.14159265358979323846;
 constexpr double kResolution = 0.002;  // m, of a range
 constexpr int kTogether = 8;           // sequences traced at once
-static_assert(kRings <= kMostPackets);
+static_assert(kRings <= kMostPackets && kRings % 8 == 0);
 
 /// Reflectivity at normal incidence, 0 to 255.
 float Reflectivity(Material material) {
@@ -119,7 +119,7 @@ int Lidar::FireNext(const std::vector<TimedPose>& poses, const Scene& scene) {
     Aim(Interpolated(poses[i], poses[i + 1], t), count, rays);
   }
   for (RayPacket& packet : rays) packet.count = count;
-  scene.Trace(rays, kRings, hits);
+  scene.TraceAcross(rays, kRings, hits);
   for (int lane = 0; lane < count; ++lane)
     for (int ring = 0; ring < kRings; ++ring)
       Record(firing_ + lane, ring, rays[ring], hits[ring], lane);

@@ -101,6 +101,16 @@ void Fill(const RayPacket& rays, const float* reach, int* valid, RTCRayHit8* out
   }
 }
 
+void CopyRay(const RayPacket& from, int i, RayPacket* to, int k) {
+  to->ox[k] = from.ox[i], to->oy[k] = from.oy[i], to->oz[k] = from.oz[i];
+  to->dx[k] = from.dx[i], to->dy[k] = from.dy[i], to->dz[k] = from.dz[i];
+}
+
+void CopyHit(const HitPacket& from, int i, HitPacket* to, int k) {
+  to->distance[k] = from.distance[i], to->material[k] = from.material[i];
+  to->nx[k] = from.nx[i], to->ny[k] = from.ny[i], to->nz[k] = from.nz[i];
+}
+
 /// Into the axes of what is turned by an angle with this cosine and sine.
 void TurnBack(const Eigen::Vector2f& turn, float* x, float* y) {
   const Eigen::Vector2f v(*x, *y);
@@ -121,6 +131,7 @@ struct Scene::Impl {
   RTCScene MovingPart(const Solid& solid);
   void TraceFixed(const RayPacket& rays, HitPacket* hits) const;
   void TraceMoving(const RayPacket& rays, HitPacket* hits) const;
+  void Settle(const RayPacket& rays, bool unsure, HitPacket* hits) const;
 
   world::Scenario scenario;
   Actors actors;
@@ -230,6 +241,11 @@ void Scene::Impl::TraceMoving(const RayPacket& rays, HitPacket* hits) const {
   }
 }
 
+void Scene::Impl::Settle(const RayPacket& rays, bool unsure, HitPacket* hits) const {
+  if (unsure) TraceFixed(rays, hits);
+  if (rays.movers) TraceMoving(rays, hits);
+}
+
 Scene::Scene(const world::Scenario& scenario) : impl_(std::make_unique<Impl>(scenario)) {
   impl_->device = rtcNewDevice("threads=1,isa=avx2");
   if (!impl_->device)
@@ -260,10 +276,25 @@ const std::vector<Solid>& Scene::MovingSolids() const { return impl_->moving_sol
 void Scene::Trace(const RayPacket* rays, int n, HitPacket* hits) const {
   unsigned unsure[kMostPackets];
   TraceFacets(impl_->facets.world(), rays, n, hits, unsure);
-  for (int k = 0; k < n; ++k) {
-    if (unsure[k] != 0) impl_->TraceFixed(rays[k], &hits[k]);
-    if (rays[k].movers) impl_->TraceMoving(rays[k], &hits[k]);
-  }
+  for (int k = 0; k < n; ++k) impl_->Settle(rays[k], unsure[k] != 0, &hits[k]);
+}
+
+void Scene::TraceAcross(const RayPacket* rays, int n, HitPacket* hits) const {
+  unsigned unsure[kMostPackets];
+  TraceFacets(impl_->facets.world(), rays, n, hits, unsure);
+  for (int lane = 0; lane < rays[0].count; ++lane)
+    for (int first = 0; first < n; first += 8) {
+      RayPacket across;
+      HitPacket found;
+      bool open = false;
+      for (int i = 0; i < 8; ++i) {
+        CopyRay(rays[first + i], lane, &across, i);
+        CopyHit(hits[first + i], lane, &found, i);
+        open = open || (unsure[first + i] >> lane & 1u) != 0;
+      }
+      impl_->Settle(across, open, &found);
+      for (int i = 0; i < 8; ++i) CopyHit(found, i, &hits[first + i], lane);
+    }
 }
 
 void Scene::TraceTargetAlone(const RayPacket& rays, bool* hits) const {
