@@ -121,7 +121,7 @@ void AddExport(CLI::App* app, Arguments* a) {
   format->add_flag("--mcap", a->mcap,
                    "protobuf for Foxglove: all fields, and its own schemas where they fit");
   format->require_option(1);
-  sub->add_flag("--jpeg", a->jpeg, "--mcap: images as JPEG, with loss, at a tenth of the size");
+  sub->add_flag("--jpeg", a->jpeg, "--mcap: images as JPEG, with loss, at a twentieth of the size");
   sub->add_flag("--long", a->long_form,
                 "--csv: a row for every element: event_utime, seq, field, index, value");
   sub->add_option("--channel", a->channel,

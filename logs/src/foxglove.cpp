@@ -3,12 +3,11 @@
 #include <Eigen/Eigenvalues>
 #include <cmath>
 #include <cstring>
-#include <opencv2/imgcodecs.hpp>
-#include <opencv2/imgproc.hpp>
 
 #include "common/bus/convert.h"
 #include "common/world/rig.h"
 #include "lcmtypes/lcm_texts.h"
+#include "logs/src/jpeg.h"
 #include "logs/src/message_types.h"
 #include "logs/src/protobuf.h"
 
@@ -19,7 +18,6 @@ using Eigen::Quaterniond;
 using Eigen::Vector3d;
 using Messages = std::vector<ViewerMessage>;
 
-constexpr int kJpegQuality = 90;  // differences stay below the camera's own noise
 constexpr int kCurvePoints = 25;  // 0.1 s of a horizon of 2.5 s
 constexpr float kPointGrid =
     8192.0f;                         // per m: a twentieth of the VLP-16's 2 mm; noise does not pack
@@ -94,28 +92,8 @@ std::string RawImage(const camera_image_t& m) {
       .bytes();
 }
 
-/// Empty when the message does not hold the pixels that it says.
-std::string Jpeg(const camera_image_t& m) {
-  const bool grey = m.pixelformat == camera_image_t::PIXEL_FORMAT_GRAY;
-  const int64_t row = int64_t{m.width} * (grey ? 1 : 3);
-  if (m.width <= 0 || m.height <= 0 || m.row_stride < row ||
-      int64_t{m.row_stride} * m.height > static_cast<int64_t>(m.data.size()))
-    return "";
-  cv::Mat image(m.height, m.width, grey ? CV_8UC1 : CV_8UC3, const_cast<uint8_t*>(m.data.data()),
-                static_cast<size_t>(m.row_stride));
-  if (m.pixelformat == camera_image_t::PIXEL_FORMAT_RGB) {
-    cv::Mat turned;
-    cv::cvtColor(image, turned, cv::COLOR_RGB2BGR);
-    image = turned;
-  }
-  std::vector<uint8_t> jpeg;
-  cv::imencode(".jpg", image, jpeg, {cv::IMWRITE_JPEG_QUALITY, kJpegQuality});
-  return Proto()
-      .Put(1, Stamp(m.utime))
-      .Bytes(2, std::string(jpeg.begin(), jpeg.end()))
-      .Bytes(3, "jpeg")
-      .Bytes(4, "camera")
-      .bytes();
+std::string CompressedImage(const camera_image_t& m, const std::string& jpeg) {
+  return Proto().Put(1, Stamp(m.utime)).Bytes(2, jpeg).Bytes(3, "jpeg").Bytes(4, "camera").bytes();
 }
 
 Proto& Doubles(int field, const std::vector<double>& values, Proto* out) {
@@ -298,7 +276,7 @@ void Add(const camera_image_t& m, const Event& e, const ViewerOptions& options, 
   if (!options.jpeg)
     out->push_back({e.channel, "foxglove.RawImage", RawImage(m)});
   else if (!jpeg.empty())
-    out->push_back({e.channel, "foxglove.CompressedImage", jpeg});
+    out->push_back({e.channel, "foxglove.CompressedImage", CompressedImage(m, jpeg)});
   out->push_back({e.channel + "/calibration", "foxglove.CameraCalibration", Calibration(m.utime)});
 }
 

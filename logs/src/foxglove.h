@@ -19,7 +19,7 @@ struct ViewerMessage {
 };
 
 struct ViewerOptions {
-  bool jpeg = false;  ///< images lossy, at a tenth of the size
+  bool jpeg = false;  ///< images lossy, at a twentieth of the size
 };
 
 /// What a viewer shows of a message. Clouds and images become Foxglove's own; every other message

@@ -88,9 +88,8 @@ int main(int argc, char** argv) {
     app.parse(argc, argv);
     std::printf("%s\n", Answer(file, planner).dump(2).c_str());
     return 0;
-  } catch (const CLI::CallForHelp&) {
-    std::printf("%s", app.help().c_str());
-    return 0;
+  } catch (const CLI::Success& e) {  // --help, --version
+    return app.exit(e);
   } catch (const std::exception& e) {
     std::fprintf(stderr, "chase-plan: %s\n", e.what());
     return 1;

@@ -26,8 +26,10 @@ async function main() {
   for await (const message of reader.readMessages()) {
     const type = types.get(message.channelId);
     const entry = found[reader.channelsById.get(message.channelId).topic];
-    const value = type.toObject(type.decode(message.data), {longs: Number, bytes: (b) => b.length});
-    if (entry.count++ === 0) entry.first = value;
+    const value = type.toObject(type.decode(message.data), {longs: Number});
+    if (entry.count++ > 0) continue;
+    if (value.data instanceof Uint8Array) value.data = value.data.length;
+    entry.first = value;
   }
   console.log(JSON.stringify(found));
   await handle.close();
