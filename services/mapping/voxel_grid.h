@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "common/memory/huge_page_allocator.h"
+#include "common/math/huge_page_allocator.h"
 #include "services/mapping/mapping_config.h"
 
 namespace chase::mapping {
@@ -125,7 +125,7 @@ class VoxelGrid {
   int x0_ = 0, y0_ = 0, z0_ = 0;
   bool placed_ = false;
   template <class T>
-  using Array = std::vector<T, memory::HugePageAllocator<T>>;
+  using Array = std::vector<T, math::HugePageAllocator<T>>;
   Array<Column> columns_;
   Array<Voxel> voxels_;
   std::vector<uint32_t> settled_free_;

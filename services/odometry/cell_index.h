@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "common/memory/huge_page_allocator.h"
+#include "common/math/huge_page_allocator.h"
 
 namespace chase::odometry {
 
@@ -55,7 +55,7 @@ class CellIndex {
     uint64_t key = 0;
     int number = kNone;
   };
-  using Slots = std::vector<Entry, memory::HugePageAllocator<Entry>>;
+  using Slots = std::vector<Entry, math::HugePageAllocator<Entry>>;
 
   void Grow() {
     Slots old(slots_.size() * 2);

@@ -4,7 +4,7 @@
 #include <utility>
 #include <vector>
 
-#include "common/memory/huge_page_allocator.h"
+#include "common/math/huge_page_allocator.h"
 #include "services/odometry/cell_index.h"
 
 namespace chase::odometry {
@@ -101,7 +101,7 @@ class SurfaceMap {
     Eigen::Vector3f shift = Eigen::Vector3f::Zero();  // of the grid
     CellIndex index;
     template <class T>
-    using Array = std::vector<T, memory::HugePageAllocator<T>>;
+    using Array = std::vector<T, math::HugePageAllocator<T>>;
     Array<Moments> moments;  // what cells learn from and
     Array<Fitted> fitted;    // what queries read, by the cell's number
   };

@@ -14,8 +14,8 @@ struct MotionConfig {
   double turn_sigma = 0.35;
   double straight_share = 0.6;
   double turn_memory = 1.5;
-  double slowing_share = 0.15;
-  double gaining_share = 0.1;
+  double slowing_share = 0.035;
+  double gaining_share = 0.02;
   double gain_memory = 0.5;
   double change_cost = 1.6;
   double sigma_floor = 0.02;

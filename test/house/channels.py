@@ -15,7 +15,7 @@ LISTENS = {
     "planning": {"PREDICTION", "OBSTACLES", "POSE", "TRACKING"},
     "control": {"PLAN", "OBSTACLES", "POSE"},
     "fcu": {"ATTITUDE_SETPOINT", "POSE"},
-    "simulator": {"ATTITUDE_SETPOINT"},
+    "simulator": {"ATTITUDE_SETPOINT", "POSE"},  # in place of fcu
 }
 SUBSCRIBE = re.compile(r'Subscribe<[\w:]+>\(\s*(?:/\*.*?\*/\s*)?([^,]+),')
 

@@ -7,7 +7,7 @@
 #include <cstdlib>
 #include <new>
 
-namespace chase::memory {
+namespace chase::math {
 
 /// For arrays that are read all over: those of a megabyte or more come on huge pages where the
 /// system grants them (madvise(2)), so that the processor finds their addresses at once.
@@ -36,4 +36,4 @@ struct HugePageAllocator {
   bool operator!=(const HugePageAllocator& /*other*/) const { return false; }
 };
 
-}  // namespace chase::memory
+}  // namespace chase::math
