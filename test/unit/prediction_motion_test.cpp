@@ -1,6 +1,7 @@
 // The steady motion against the motions that it is made for.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "services/prediction/steady_motion.h"
@@ -51,6 +52,20 @@ TEST(SteadyMotion, KeepsTurningWithATargetThatTurns) {
     const auto circle = [rate](double t) { return OnCircle(t, rate, 1.0); };
     const double straight = (circle(2.5) - Eigen::Vector3d(2.5, 0, 0.5)).norm();
     EXPECT_LT((Forecast(Seen(circle), 2.5, config) - circle(2.5)).norm(), 0.15 * straight) << rate;
+  }
+}
+
+TEST(SteadyMotion, ComesToRestWithATargetThatSlowsDown) {
+  MotionConfig deaf;
+  deaf.slowing_share = deaf.gaining_share = 1e-6;
+  for (const double rest : {0.5, 1.0, 2.0}) {  // s until it stands; it slows down since 1 s
+    const auto braking = [rest](double t) {
+      const double T = rest + 1.0, s = std::clamp(t + 1.0, 0.0, T), v0 = T;  // at 1 m/s^2
+      return Eigen::Vector3d(v0 * (t < -1.0 ? t + 1.0 : s) - 0.5 * s * s, 0.0, 0.5);
+    };
+    const auto seen = Seen(braking);
+    const double error = (Forecast(seen, 1.0) - braking(1.0)).norm();
+    EXPECT_LT(error, 0.5 * (Forecast(seen, 1.0, deaf) - braking(1.0)).norm()) << rest;
   }
 }
 
