@@ -9,6 +9,7 @@
 #include "chase/status_t.hpp"
 #include "common/bus/channels.h"
 #include "common/bus/message_head.h"
+#include "logs/src/log_survey.h"
 #include "logs/src/message_fields.h"
 #include "logs/src/message_types.h"
 

@@ -3,13 +3,15 @@
 #include <cstdint>
 #include <map>
 #include <string>
-#include <tuple>
 #include <vector>
 
-#include "logs/src/log_reader.h"
-#include "logs/src/seq_count.h"
-
 namespace chase::logs {
+
+/// A stretch of a log that holds no whole event.
+struct Damage {
+  int64_t at = 0, bytes = 0;
+  bool at_end = false;  ///< the log was cut off while being written
+};
 
 /// The messages of one process on a channel, from its start to its end.
 struct SenderInfo {
@@ -25,8 +27,7 @@ struct ChannelInfo {
   int64_t first_utime = 0, last_utime = 0;  ///< of the events, microseconds
   int64_t longest_gap = 0;                  ///< from event to event, microseconds
   std::vector<SenderInfo> senders;
-  /// 0 on a channel that others heard but that the log does not hold.
-  int64_t missing = 0;
+  int64_t missing = 0;  ///< by `seq`; where count is 0: what others heard of the channel
 
   /// Messages a second between the first and the last; 0 for a single one.
   double RateHz() const;
@@ -47,33 +48,6 @@ struct LogInfo {
   bool Recorded() const;
   /// A line for everything that is not there.
   std::vector<std::string> Losses() const;
-};
-
-/// Gathers what a log is made of, event by event.
-class LogSurvey {
- public:
-  void Add(const Event& event);
-  /// `log` has been read to its end.
-  LogInfo Take(const LogReader& log);
-
- private:
-  struct Channel {
-    ChannelInfo info;
-    int64_t previous = 0;
-    std::map<std::tuple<std::string, std::string, int64_t>, std::pair<long, SeqCount>> senders;
-  };
-  struct Heard {
-    int32_t first, last;
-  };
-  void AddHead(const Event& event, Channel* channel);
-  void AddContent(const Event& event, const std::string& type);
-  void Settle(Channel* channel) const;
-  void AddUnrecorded(LogInfo* info) const;
-
-  int64_t first_utime_ = INT64_MAX;
-  std::map<std::string, Channel> channels_;
-  std::map<std::string, Heard> heard_;  ///< lowest and highest `seq` that others heard
-  LogInfo info_;
 };
 
 LogInfo Describe(const std::string& file);

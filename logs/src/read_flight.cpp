@@ -17,6 +17,7 @@
 #include "common/bus/convert.h"
 #include "common/bus/validation.h"
 #include "logs/src/log_reader.h"
+#include "logs/src/log_survey.h"
 #include "logs/src/message_types.h"
 
 namespace chase::logs {

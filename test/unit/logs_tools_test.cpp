@@ -20,6 +20,7 @@
 #include "logs/src/log_reader.h"
 #include "logs/src/message_fields.h"
 #include "logs/src/output.h"
+#include "logs/src/seq_count.h"
 
 namespace chase::logs {
 namespace {
@@ -141,7 +142,7 @@ std::vector<std::string> Declared(const std::string& lcm) {
 TEST(FieldTables, ListEveryFieldOfEveryTypeInWireOrder) {
   const std::string tables = ReadText("logs/src/field_tables.h");
   const size_t begin = tables.find("{\n", tables.find("void VisitHead(")) + 2;
-  const std::string head = tables.substr(begin, tables.find("}", begin) - begin);
+  const std::string head = tables.substr(begin, tables.find('}', begin) - begin);
   EXPECT_NE(head.find("n_inputs"), std::string::npos);
   int types = 0;
   for (const auto& entry : fs::directory_iterator("lcmtypes")) {

@@ -1,0 +1,42 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <tuple>
+#include <utility>
+
+#include "logs/src/info.h"
+#include "logs/src/log_reader.h"
+#include "logs/src/seq_count.h"
+
+namespace chase::logs {
+
+/// Gathers what a log is made of, event by event.
+class LogSurvey {
+ public:
+  void Add(const Event& event);
+  /// `log` has been read to its end.
+  LogInfo Take(const LogReader& log);
+
+ private:
+  struct Channel {
+    ChannelInfo info;
+    int64_t previous = 0;
+    std::map<std::tuple<std::string, std::string, int64_t>, std::pair<long, SeqCount>> senders;
+  };
+  struct Heard {
+    int32_t first, last;
+  };
+  void AddHead(const Event& event, Channel* channel);
+  void AddContent(const Event& event, const std::string& type);
+  void Settle(Channel* channel) const;
+  void AddUnrecorded(LogInfo* info) const;
+
+  int64_t first_utime_ = INT64_MAX;
+  std::map<std::string, Channel> channels_;
+  std::map<std::string, Heard> heard_;  ///< lowest and highest `seq` that others heard
+  LogInfo info_;
+};
+
+}  // namespace chase::logs
