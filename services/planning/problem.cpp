@@ -157,6 +157,7 @@ class Start {
     start_.radius = math::Polynomial::Constant(1, radius);
     return IsOff(e, nullptr);
   }
+  const Curve& curve() const { return problem_.start; }
   bool IsInSight(const Ellipsoid& e, double share) {
     start_.radius = math::Polynomial::Constant(1, share * problem_.sight_radius);
     seen_.radius = TargetBall(problem_, share).radius.head(1);
@@ -178,6 +179,20 @@ class Start {
   world::Ball start_, seen_;
 };
 
+// The ellipsoid only sorts candidates out before the proof looks at the solid. Where it holds a
+// start that is off the solid, none would be left: there it is smaller, or sorts out nothing.
+void ClearStart(const world::Obstacle& o, double growth, const Curve& start, Ellipsoid* e) {
+  const Eigen::Vector3d offset = (start.row(0) - e->center.row(0)).transpose();
+  for (const double share : {1.0, 0.5, 0.0}) {
+    if (share < 1.0) {
+      e->safety = Grown(o, share * growth);
+      e->grown_by[0] = -1.0;
+    }
+    if (SquaredNorm(e->safety, offset) > kClear) return;
+  }
+  e->safety = kPoint * Eigen::Matrix3d::Identity();
+}
+
 // Takes the margin, never the hard radius, back until the start is outside.
 void RelaxSafety(const world::Obstacle& o, double hard, double margin, double uncertainty,
                  Start* start, Ellipsoid* e, std::string* notes) {
@@ -189,6 +204,7 @@ void RelaxSafety(const world::Obstacle& o, double hard, double margin, double un
     }
     if (!start->IsSafe(*e, e->safety_radius)) continue;
     if (share < 1.0) Note(notes, "starts within the margin of obstacle " + std::to_string(e->id));
+    if (e->body && !o.ground) ClearStart(o, e->safety_radius + uncertainty, start->curve(), e);
     return;
   }
   e->safety_from = kLeaveBy;
@@ -386,6 +402,7 @@ void MakeProblem(const PlannerConfig& config, const PlanRequest& request, std::s
     SetBoxes(o, widest, e);
     e->body.reset();
     if (config.minkowski_sums) e->body = BodyOf(o, *problem);
+    if (e->body && !o.ground) ClearStart(o, hard + margin + 0.5 * (now + then), problem->start, e);
     // Far from start and target no margin has to give way.
     if (!MayTouch(own, e->center, e->safety_half.max(e->sight_half), kClear)) continue;
     RelaxSafety(o, hard, margin, now, &start, e, notes);

@@ -133,6 +133,25 @@ TEST(Ladder, NothingFeasibleBrakesToRest) {
   EXPECT_LT(end.v.norm() + end.a.norm(), 1e-9);
 }
 
+// The ellipsoid about a thin wall holds places that are off the wall itself.
+TEST(Ladder, StartOffAWallButWithinItsEllipsoidStillChases) {
+  const PlannerConfig config;
+  PlanRequest request = Walk();
+  request.start.v.setZero();
+  request.target.coefficients.row(1).setZero();
+  world::Obstacle wall;
+  wall.id = 3;
+  wall.solid = world::Obstacle::Solid::kBox;
+  wall.half = {1.5, 0.1, 1.5};
+  wall.shape = (3.0 * wall.half.array().square()).inverse().matrix().asDiagonal();
+  const double off = config.hard_radius() + config.safety_margin + 0.02;
+  wall.center = world::Trajectory::Constant({-2.5, wall.half.y() + off, 1.4}, 0.0, 2.5);
+  request.obstacles = {wall};
+  const PlanResult plan = MakePlanner("chase", config)->Plan(request);
+  EXPECT_EQ(plan.verdict, Verdict::kChase) << plan.reason;
+  EXPECT_GE(plan.certified_clearance, 0.0);
+}
+
 TEST(Ladder, KeepsTheRunningPlanWhileItIsCertified) {
   PlannerConfig config = Config();
   PlanRequest request = Walk();
