@@ -74,6 +74,7 @@ std::optional<View> PlannerConfig::view() const {
 
 PlannerConfig PlannerConfig::Literal() {
   PlannerConfig c;
+  c.degree = 5;
   c.adaptive = c.refine = c.minkowski_sums = false;
   c.drone_radius = c.tracking_tube = c.safety_margin = c.sight_margin = c.sigmas = 0.0;
   c.max_speed = c.max_acceleration = c.max_elevation_deg = c.view_down_deg = 0.0;
