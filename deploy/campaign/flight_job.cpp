@@ -170,10 +170,12 @@ std::vector<Job> Jobs(const std::vector<Flight>& flights, const Setup& setup) {
 void Fly(const Flight& flight, const Job& job, const Setup& setup) {
   MakeFolder(setup.out);
   if (IsDone(job)) return;
-  const Workplace work(job.file + ".work");
-  setenv("TMPDIR", fs::absolute(work.File("")).c_str(), 1);
   Json result = {{"fingerprint", job.fingerprint}};
-  result.update(Flown(flight, setup, work));
+  {  // the folder is gone before the result says that the flight is done
+    const Workplace work(job.file + ".work");
+    setenv("TMPDIR", fs::absolute(work.File("")).c_str(), 1);
+    result.update(Flown(flight, setup, work));
+  }
   WriteText(job.file, result.dump() + "\n");
 }
 
