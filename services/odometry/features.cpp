@@ -3,16 +3,22 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
+#include <utility>
 
 namespace chase::odometry {
 
 namespace {
 
 constexpr int kRings = 128;
-constexpr int kSectors = 6;
 constexpr float kLongestSweep = 0.2f;     // s
 constexpr double kBetweenBeams = 0.0035;  // rad along a ring, about
-constexpr double kBetweenRings = 0.035;   // rad, of a sensor of 16 rings
+constexpr int kLeastReturns = 4;          // of a post
+constexpr float kGap = 0.018f;  // rad without a return: more than single ones that were lost
+constexpr float kFlat = 0.9f;   // cosine of the flattest incidence of a wall whose end is used
+constexpr float kLongestStep = 0.15f;    // m
+constexpr float kStep = 0.3f;            // m in range, from a post to what is behind it
+constexpr double kBetweenRings = 0.035;  // rad, of a sensor of 16 rings
 
 bool Usable(const FeatureConfig& config, const SweepPoint& point) {
   const double r2 = point.p.cast<double>().squaredNorm();  // finite where the point is
@@ -79,12 +85,57 @@ class Ring {
 
   float Range(int i) const { return range_[At(i)]; }
 
- private:
-  static size_t At(int i) { return static_cast<size_t>(i); }
   /// True when the surface breaks between points i-1 and i, or is seen at too flat an angle.
   bool Jump(int i) const {
     const float r = std::min(Range(i), Range(i - 1));
     return (p_[At(i)] - p_[At(i - 1)]).squaredNorm() > std::pow(0.08f + 0.035f * r, 2.0f);
+  }
+
+  /// The post whose returns are `first` to `last`; none where an outline is hidden by what stands
+  /// before it, or where they are not those of something slim and round.
+  std::optional<Post> PostOf(int first, int last) const {
+    if (!StandsOut(first, first - 1) || !StandsOut(last, last + 1)) return std::nullopt;
+    const int middle = (first + last) / 2, third = (last - first) / 3;
+    const float step = static_cast<float>(kBetweenBeams) * Range(middle);
+    const float width = (p_[At(last)] - p_[At(first)]).norm() + step;
+    if (width > static_cast<float>(config_.post_width)) return std::nullopt;
+    float front = 0.0f;
+    for (int i = first + third; i <= last - third; ++i) front += Range(i);
+    front /= static_cast<float>(last - first + 1 - 2 * third);
+    for (int i : {first, last})
+      if (std::abs(Range(i) - front) > 0.5f * width + kStep) return std::nullopt;
+    const Eigen::Vector3f toward = p_[At(first)].normalized() + p_[At(last)].normalized();
+    return Post{middle, toward.normalized() * (front + 0.5f * width) - p_[At(middle)]};
+  }
+
+  /// The end of a wall: where a run of `length` returns, straight over two windows, ends at `last`
+  /// with `next` beyond it, about half a step behind its last return.
+  std::optional<Post> EndOf(int last, int next, int length) const {
+    const float beam = static_cast<float>(kBetweenBeams) * Range(last);
+    const int k = 2 + static_cast<int>(2.0f * static_cast<float>(config_.window) / beam);
+    const int inward = last < next ? -k : k;
+    if (length <= 2 * k || !StandsOut(last, next)) return std::nullopt;
+    const Eigen::Vector3f along = p_[At(last)] - p_[At(last + 2 * inward)];
+    const Eigen::Vector3f unit = along.normalized();
+    const Eigen::Vector3f bend = unit.cross(p_[At(last)] - p_[At(last + inward)]);
+    const Eigen::Vector3f step = along / static_cast<float>(2 * k);
+    if (bend.norm() > Limit(last) || step.norm() > kLongestStep ||
+        std::abs(unit.dot(p_[At(last)].normalized())) > kFlat)
+      return std::nullopt;
+    return Post{last, 0.5f * step};
+  }
+
+  float Limit(int i) const {
+    return static_cast<float>(config_.plane_deviation + config_.plane_deviation_ratio * Range(i));
+  }
+
+ private:
+  static size_t At(int i) { return static_cast<size_t>(i); }
+
+  /// True when nothing, or something farther, comes next to point i.
+  bool StandsOut(int i, int next) const {
+    const float turn = p_[At(i)].cross(p_[At(next)]).norm() / (Range(i) * Range(next));
+    return turn > kGap || Range(next) > Range(i) + kStep;
   }
 
   const FeatureConfig& config_;
@@ -96,37 +147,29 @@ class Ring {
   std::vector<int> jumps_;  // number of jumps up to a point
 };
 
-/// Appends the sharpest points of a sector, no two of them within five points of each other.
-void AppendEdges(const FeatureConfig& config, const std::vector<float>& bend,
-                 const std::vector<int>& order, int begin, int end, std::vector<int>* edges) {
-  std::vector<int> candidates;
-  for (int i = begin; i < end; ++i)
-    if (bend[static_cast<size_t>(i)] > config.edge_deviation) candidates.push_back(i);
-  std::stable_sort(candidates.begin(), candidates.end(), [&](int a, int b) {
-    return bend[static_cast<size_t>(a)] > bend[static_cast<size_t>(b)];
-  });
-  std::vector<int> chosen;
-  for (int i : candidates) {
-    if (static_cast<int>(chosen.size()) >= config.edges_per_sector) break;
-    const bool near = std::any_of(chosen.begin(), chosen.end(),
-                                  [i](int other) { return std::abs(i - other) <= 5; });
-    if (!near) chosen.push_back(i);
-  }
-  for (int i : chosen) edges->push_back(order[static_cast<size_t>(i)]);
-}
-
+/// Posts are runs of returns without a jump. The axis of a round one lies half its width behind its
+/// front.
 void AppendRing(const FeatureConfig& config, const std::vector<SweepPoint>& points,
                 const std::vector<int>& order, FeatureSet* features) {
   const Ring ring(config, points, order);
-  std::vector<float> bend(order.size(), -1.0f);
+  int first = 0;
   for (int i = 0; i < ring.size(); ++i) {
-    const float b = bend[static_cast<size_t>(i)] = ring.Bend(i);
-    const double limit = config.plane_deviation + config.plane_deviation_ratio * ring.Range(i);
-    if (b >= 0.0f && b < limit) features->planes.push_back(order[static_cast<size_t>(i)]);
+    const float bend = ring.Bend(i);
+    if (bend >= 0.0f && bend < ring.Limit(i))
+      features->planes.push_back(order[static_cast<size_t>(i)]);
+    if (i == 0 || !ring.Jump(i)) continue;
+    const int begin = std::exchange(first, i);
+    if (begin == 0 || i - begin < kLeastReturns) continue;
+    const auto add = [&](std::optional<Post> post) {
+      if (!post) return false;
+      post->point = order[static_cast<size_t>(post->point)];
+      features->posts.push_back(*post);
+      return true;
+    };
+    if (add(ring.PostOf(begin, i - 1))) continue;
+    add(ring.EndOf(begin, begin - 1, i - begin));
+    add(ring.EndOf(i - 1, i, i - begin));
   }
-  for (int s = 0; s < kSectors; ++s)
-    AppendEdges(config, bend, order, ring.size() * s / kSectors, ring.size() * (s + 1) / kSectors,
-                &features->edges);
 }
 
 }  // namespace

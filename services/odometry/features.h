@@ -12,8 +12,7 @@ struct FeatureConfig {
   double window = 0.16;                  ///< half length of the neighbourhood along a ring, m
   double plane_deviation = 0.04;         ///< largest bend of a plane feature, m
   double plane_deviation_ratio = 0.003;  ///< added per metre of range
-  double edge_deviation = 0.08;          ///< smallest bend of an edge feature, m
-  int edges_per_sector = 4;              ///< a ring has six sectors
+  double post_width = 1.0;               ///< of the widest post, m
 
   template <class V>
   void Visit(V& v) {
@@ -22,24 +21,29 @@ struct FeatureConfig {
     v("window", window, "half length of the neighbourhood along a ring, m");
     v("plane_deviation", plane_deviation, "largest bend of a plane feature, m");
     v("plane_deviation_ratio", plane_deviation_ratio, "added to it per metre of range");
-    v("edge_deviation", edge_deviation, "smallest bend of an edge feature, m");
-    v("edges_per_sector", edges_per_sector, "most edge features in a sixth of a ring");
+    v("post_width", post_width, "of the widest post, m");
   }
 };
 
-/// Indices into a sweep's points.
+/// Where a ring crosses something upright that stands before what is behind it: the axis of a trunk
+/// or a lamp post, the end of a wall.
+struct Post {
+  int point = 0;                                      ///< of the sweep, on it
+  Eigen::Vector3f to_axis = Eigen::Vector3f::Zero();  ///< from that point, frame L, m
+};
+
 struct FeatureSet {
-  std::vector<int> planes;
-  std::vector<int> edges;
+  std::vector<int> planes;  ///< indices into a sweep's points
+  std::vector<Post> posts;
 };
 
 /// Removes what no one can use: not finite, too near, too far, a time outside [0, 0.2] s.
 void RemoveUnusable(const FeatureConfig& config, std::vector<SweepPoint>* points);
 
-/// Edge and plane features by the curvature along each ring, after Zhang & Singh 2014 (LOAM), eq.
-/// (1). The bend is measured perpendicular to the ring, in metres, over a window of fixed length,
-/// so that the thresholds hold indoors and outdoors. Jumps in range give no feature: they move with
-/// the view.
+/// Plane features by the curvature along each ring, after Zhang & Singh 2014 (LOAM), eq. (1): the
+/// bend is measured perpendicular to the ring, in metres, over a window of fixed length, so that
+/// the thresholds hold indoors and outdoors. Outlines move with the view and give no feature, but
+/// for a post: the axis between its two outlines stays.
 FeatureSet ExtractFeatures(const FeatureConfig& config, const std::vector<SweepPoint>& points);
 
 /// Takes features so that each stands for about the same area of what the sensor sees. The choice

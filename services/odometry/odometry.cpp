@@ -74,7 +74,7 @@ Odometry::Odometry(const OdometryConfig& config)
       X_BL_(ExtrinsicsOf(config.rig)),
       matcher_(config.match),
       planes_(config.map, SurfaceKind::kPlane),
-      edges_(config.map, SurfaceKind::kLine),
+      posts_(config.map, SurfaceKind::kLine),
       imu_(config.filter, config.health.imu_gap),
       alignment_(config.alignment),
       level_(config.initial_position),
@@ -177,7 +177,7 @@ SweepResult Odometry::ProcessSweep() {
                 std::max(1e-3, prepared.end - prepared.track.front().t);
   if (sweeps_to_anchor_ > 0 && applied && !first && --sweeps_to_anchor_ == 0) {
     planes_.Clear();
-    edges_.Clear();
+    posts_.Clear();
   }
   const bool extends = !first && Extends(result.match);
   if (extends) unknown_.setIdentity();
@@ -230,15 +230,24 @@ void Odometry::Deskew(Prepared* prepared) const {
   prepared->at_end = Deskewed(prepared->sweep.points, X_BL_, motion);
 }
 
+std::vector<Eigen::Vector3f> Odometry::Axes(const Prepared& prepared,
+                                            const std::vector<Eigen::Vector3f>& points) const {
+  const Eigen::Matrix3f R_BL = X_BL_.R.toRotationMatrix().cast<float>();
+  std::vector<Eigen::Vector3f> out;
+  for (const Post& post : prepared.features.posts)
+    out.push_back(points[static_cast<size_t>(post.point)] + R_BL * post.to_axis);
+  return out;
+}
+
 Features Odometry::FeaturesIn(const Prepared& prepared,
-                              const std::vector<Eigen::Vector3f>& points) {
-  return {Picked(points, prepared.matched_planes), Picked(points, prepared.features.edges)};
+                              const std::vector<Eigen::Vector3f>& points) const {
+  return {Picked(points, prepared.matched_planes), Axes(prepared, points)};
 }
 
 MatchResult Odometry::Match(Prepared* prepared) {
   if (planes_.cells() == 0) return {};
   MatchResult match =
-      matcher_.Match(FeaturesIn(*prepared, prepared->at_end), planes_, edges_,
+      matcher_.Match(FeaturesIn(*prepared, prepared->at_end), planes_, posts_,
                      prepared->predicted.pose(), UncertaintyOf(prepared->predicted), unknown_);
   if (Blind(prepared->end)) MatchBlind(prepared, &match);
   return match;
@@ -283,9 +292,9 @@ void Odometry::Learn(const Prepared& prepared, const Pose& X_WB) {
     planes.push_back(prepared.features.planes[i]);
   const FloatPose to_world(X_WB);
   planes_.Add(Moved(to_world, Picked(prepared.at_end, planes)));
-  edges_.Add(Moved(to_world, Picked(prepared.at_end, prepared.features.edges)));
+  posts_.Add(Moved(to_world, Axes(prepared, prepared.at_end)));
   planes_.Prune(X_WB.p.cast<float>());
-  edges_.Prune(X_WB.p.cast<float>());
+  posts_.Prune(X_WB.p.cast<float>());
 }
 
 void Odometry::FollowDrift(const MatchResult& match) {
@@ -308,7 +317,7 @@ void Odometry::RestartMap() {
     base_.P(row, row) = kAtTheOrigin * kAtTheOrigin;
   }
   planes_.Clear();
-  edges_.Clear();
+  posts_.Clear();
   unknown_.setZero();
   held_ = base_.t;
   ++epoch_;

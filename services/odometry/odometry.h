@@ -65,8 +65,8 @@ class Odometry {
 
   int64_t dropped_sweeps() const { return dropped_sweeps_; }
   int64_t dropped_samples() const { return dropped_samples_; }
-  size_t MapBytes() const { return planes_.MemoryBytes() + edges_.MemoryBytes(); }
-  size_t map_cells() const { return planes_.cells() + edges_.cells(); }
+  size_t MapBytes() const { return planes_.MemoryBytes() + posts_.MemoryBytes(); }
+  size_t map_cells() const { return planes_.cells() + posts_.cells(); }
 
  private:
   struct Pending {
@@ -89,7 +89,9 @@ class Odometry {
   void StartBlind(double t);
   bool Prepare(Pending pending, Prepared* prepared);
   void Deskew(Prepared* prepared) const;
-  static Features FeaturesIn(const Prepared& prepared, const std::vector<Eigen::Vector3f>& points);
+  Features FeaturesIn(const Prepared& prepared, const std::vector<Eigen::Vector3f>& points) const;
+  std::vector<Eigen::Vector3f> Axes(const Prepared& prepared,
+                                    const std::vector<Eigen::Vector3f>& points) const;
   MatchResult Match(Prepared* prepared);
   void MatchBlind(Prepared* prepared, MatchResult* match);
   void Bootstrap(Prepared* prepared, MatchResult* match);
@@ -111,7 +113,7 @@ class Odometry {
   OdometryConfig config_;
   Pose X_BL_;
   ScanMatcher matcher_;
-  SurfaceMap planes_, edges_;
+  SurfaceMap planes_, posts_;
   ImuBuffer imu_;
   Alignment alignment_;
   Standing standing_;

@@ -34,7 +34,7 @@ void Odometry::MatchBlind(Prepared* prepared, MatchResult* match) {
   Bend(match->X_WB, prepared);
   const Features features = FeaturesIn(*prepared, prepared->at_end);
   const MatchResult again =
-      matcher_.Match(features, planes_, edges_, match->X_WB, kUnknown, unknown_);
+      matcher_.Match(features, planes_, posts_, match->X_WB, kUnknown, unknown_);
   if (again.valid) *match = again;
 }
 
@@ -51,12 +51,12 @@ void Odometry::Bootstrap(Prepared* prepared, MatchResult* match) {
     PlaceFirst(end, v, w_B);
     const auto still = Deskewed(first_->sweep.points, X_BL_, SweepMotion::Still());
     const MatchResult raw =
-        matcher_.Match(FeaturesIn(*first_, still), planes_, edges_, initial, kUnknown);
+        matcher_.Match(FeaturesIn(*first_, still), planes_, posts_, initial, kUnknown);
     if (raw.valid) PlaceFirst(initial * raw.X_WB.Inverse() * end, v, w_B);
     prepared->track.front() = base_;
     Deskew(prepared);
     const Features features = FeaturesIn(*prepared, prepared->at_end);
-    *match = matcher_.Match(features, planes_, edges_, match->X_WB, kUnknown);
+    *match = matcher_.Match(features, planes_, posts_, match->X_WB, kUnknown);
   }
   first_.reset();
 }
@@ -70,7 +70,7 @@ void Odometry::PlaceFirst(const Pose& X_WB, const Eigen::Vector3d& v, const Eige
   first_->track.front().w_B = w_B;
   Deskew(&*first_);
   planes_.Clear();
-  edges_.Clear();
+  posts_.Clear();
   Learn(*first_, X_WB);
 }
 

@@ -36,7 +36,7 @@ struct OdometryConfig {
     v("match_points", match_points, "plane features matched per sweep, about");
     v("map_stride", map_stride, "every how many-th plane feature the map learns");
     v("alignment", alignment, "start-up at rest");
-    v("features", features, "edge and plane features");
+    v("features", features, "plane features and posts");
     v("map", map, "local map");
     v("drift", drift, "how far the local map goes astray");
     v("match", match, "scan to map");

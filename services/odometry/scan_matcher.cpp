@@ -10,6 +10,13 @@
 
 namespace chase::odometry {
 
+namespace {
+
+// A few rings on a post hold a direction squarely; that many planes may do so by their noise alone.
+constexpr double kPostSupport = 4.0;
+
+}  // namespace
+
 /// Normal equations of one linearisation.
 struct ScanMatcher::System {
   Matrix6d H = Matrix6d::Zero();  // only the lower half counts until all is added
@@ -57,14 +64,14 @@ class ScanMatcher::Matched {
 };
 
 ScanMatcher::System ScanMatcher::Linearise(const Pose& X_WB, double kernel, double gate,
-                                           Matched* planes, Matched* edges,
+                                           Matched* planes, Matched* posts,
                                            std::vector<Row>* rows) const {
   System system;
   const Eigen::Matrix3d R = X_WB.R.toRotationMatrix();
   const double k2 = kernel * kernel;
   const double noise2 = config_.range_noise * config_.range_noise;
   rows->clear();
-  const auto add = [&](Matched* features, auto&& residual_of, double weight) {
+  const auto add = [&](Matched* features, auto&& residual_of, double support) {
     features->MoveTo(R, X_WB.p);
     system.total += static_cast<int>(features->size());
     for (size_t i = 0; i < features->size(); ++i) {
@@ -79,15 +86,15 @@ ScanMatcher::System ScanMatcher::Linearise(const Pose& X_WB, double kernel, doub
       if (std::abs(r) < kernel) ++system.inliers;
       const double robust = k2 / (k2 + r * r);
       const double trust = noise2 / (noise2 + static_cast<double>(surface->variance));
-      const double w = weight * trust * robust * robust;
+      const double w = trust * robust * robust;
       system.Add(r, w, J, rotated.squaredNorm());
-      rows->push_back({J.cast<float>(), static_cast<float>(w)});
+      rows->push_back({J.cast<float>(), static_cast<float>(support * w)});
     }
   };
   add(
       planes, [](const auto&... of) { return PlaneResidual(of...); }, 1.0);
   add(
-      edges, [](const auto&... of) { return EdgeResidual(of...); }, config_.edge_weight);
+      posts, [](const auto&... of) { return PostResidual(of...); }, kPostSupport);
   system.H = system.H.selfadjointView<Eigen::Lower>();
   return system;
 }
@@ -149,19 +156,19 @@ double ScanMatcher::Support(const std::vector<Row>& rows, const Vector6d& direct
 }
 
 MatchResult ScanMatcher::Match(const Features& features, const SurfaceMap& planes,
-                               const SurfaceMap& edges, const Pose& predicted, double uncertainty,
+                               const SurfaceMap& posts, const Pose& predicted, double uncertainty,
                                const Matrix6d& unknown_before) const {
   MatchResult result;
   result.X_WB = predicted;
   const double gate =
       std::clamp(config_.least_gate + 3.0 * uncertainty, config_.least_gate, config_.gate);
   double kernel = std::max(config_.kernel, gate);
-  Matched matched_planes(features.planes, planes), matched_edges(features.edges, edges);
+  Matched matched_planes(features.planes, planes), matched_posts(features.posts, posts);
   System system;
   std::vector<Row> rows;
-  rows.reserve(features.planes.size() + features.edges.size());
+  rows.reserve(features.planes.size() + features.posts.size());
   for (int i = 0; i < config_.max_iterations; ++i) {
-    system = Linearise(result.X_WB, kernel, gate, &matched_planes, &matched_edges, &rows);
+    system = Linearise(result.X_WB, kernel, gate, &matched_planes, &matched_posts, &rows);
     result.iterations = i + 1;
     if (system.weight < 1e-6) return result;
     Analyse(system, rows, unknown_before, &result);

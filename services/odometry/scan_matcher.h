@@ -19,7 +19,6 @@ struct MatchConfig {
   double slant = 80.0;        ///< deg
   double min_support = 10.0;  ///< features
   double min_fit = 0.65;      ///< 1
-  double edge_weight = 1.0;   ///< of an edge feature against a plane feature
 
   template <class V>
   void Visit(V& v) {
@@ -31,12 +30,11 @@ struct MatchConfig {
     v("slant", slant, "a surface turned farther from a direction says nothing of it, deg");
     v("min_support", min_support, "features, at least, that must hold a direction");
     v("min_fit", min_fit, "least share of the matched features within the kernel");
-    v("edge_weight", edge_weight, "of an edge feature against a plane feature");
   }
 };
 
 struct Features {
-  std::vector<Eigen::Vector3f> planes, edges;  ///< frame B at the sweep's end, m
+  std::vector<Eigen::Vector3f> planes, posts;  ///< frame B at the sweep's end, m
 };
 
 struct MatchResult {
@@ -69,7 +67,7 @@ inline double PlaneResidual(const Eigen::Vector3d& p_W, const Eigen::Vector3d& r
   return n.dot(p_W - plane.center.cast<double>());
 }
 
-inline double EdgeResidual(const Eigen::Vector3d& p_W, const Eigen::Vector3d& rotated,
+inline double PostResidual(const Eigen::Vector3d& p_W, const Eigen::Vector3d& rotated,
                            const Surface& line, Vector6d* jacobian) {
   const Eigen::Vector3d u = line.direction.cast<double>();
   const Eigen::Vector3d d = p_W - line.center.cast<double>();
@@ -90,18 +88,18 @@ class ScanMatcher {
 
   /// `uncertainty`: standard deviation of the features' predicted places, m; narrows the gate.
   /// `unknown_before`: projector on the directions that the sweep before did not determine.
-  MatchResult Match(const Features& features, const SurfaceMap& planes, const SurfaceMap& edges,
+  MatchResult Match(const Features& features, const SurfaceMap& planes, const SurfaceMap& posts,
                     const Pose& predicted, double uncertainty,
                     const Matrix6d& unknown_before = Matrix6d::Zero()) const;
 
  private:
   struct Row {  // of the linearised problem
     Eigen::Matrix<float, 6, 1> J;
-    float weight;
+    float weight;  // as a support of the directions that it holds
   };
   struct System;
   class Matched;
-  System Linearise(const Pose& X_WB, double kernel, double gate, Matched* planes, Matched* edges,
+  System Linearise(const Pose& X_WB, double kernel, double gate, Matched* planes, Matched* posts,
                    std::vector<Row>* rows) const;
   void Analyse(const System& system, const std::vector<Row>& rows, const Matrix6d& unknown_before,
                MatchResult* result) const;

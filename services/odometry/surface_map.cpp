@@ -11,7 +11,7 @@ namespace {
 
 // A plane must be seen in two directions: the smaller extent is at least this share of the cell and
 // well above its thickness. A line is the reverse.
-constexpr float kPlaneExtent = 0.10f;
+constexpr float kPlaneExtent = 0.20f;
 constexpr float kPlaneFlatness = 6.0f;  // variance along over variance across
 constexpr float kLineExtent = 0.15f;
 constexpr float kLineStraightness = 9.0f;

@@ -12,7 +12,7 @@ namespace chase::odometry {
 struct MapConfig {
   double cell_size = 0.3;    ///< of the finest level, m
   int levels = 4;            ///< each twice as coarse
-  int max_points = 80;       ///< a cell stops learning there, so that the map stays put
+  int max_points = 160;      ///< a cell stops learning there, so that the map stays put
   int max_cells = 60000;     ///< per level
   double keep_range = 60.0;  ///< cells farther from the drone are forgotten when the map is full, m
   double plane_thickness = 0.06;  ///< largest standard deviation across a plane, m

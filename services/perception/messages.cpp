@@ -89,7 +89,7 @@ bool Usable(const pose_t& m) {
 
 PoseSample FromMessage(const pose_t& m, int64_t origin) {
   using Covariance = Eigen::Matrix<double, 9, 9, Eigen::RowMajor>;
-  const Eigen::Map<const Covariance> C(m.covariance);
+  const Eigen::Map<const Covariance> C(m.local_covariance);
   PoseSample pose;
   pose.t = bus::Seconds(m.utime, origin);
   pose.p_WB = bus::ToVector(m.pos);

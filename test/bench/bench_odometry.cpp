@@ -111,7 +111,7 @@ BENCHMARK_CAPTURE(Course, rest, test::Flight::AtRest(), 60.0)
 
 /// A map and a sweep of the hall for the solvers.
 struct Problem {
-  SurfaceMap planes{MapConfig{}, SurfaceKind::kPlane}, edges{MapConfig{}, SurfaceKind::kLine};
+  SurfaceMap planes{MapConfig{}, SurfaceKind::kPlane}, posts{MapConfig{}, SurfaceKind::kLine};
   Features features;
   Pose start{math::FromYaw(0.01), {0.03, -0.03, 1.02}};
 
@@ -134,7 +134,7 @@ void GaussNewton(benchmark::State& state) {
   const ScanMatcher matcher(MatchConfig{});
   for (auto _ : state)
     benchmark::DoNotOptimize(
-        matcher.Match(problem.features, problem.planes, problem.edges, problem.start, 0.1));
+        matcher.Match(problem.features, problem.planes, problem.posts, problem.start, 0.1));
 }
 BENCHMARK(GaussNewton)->Name("solver/gauss_newton")->Unit(benchmark::kMillisecond);
 

@@ -18,7 +18,7 @@ using test::SensorModel;
 /// A map of the hall from a few places, and a sweep from another place.
 struct Room {
   SurfaceMap planes{MapConfig{}, SurfaceKind::kPlane};
-  SurfaceMap edges{MapConfig{}, SurfaceKind::kLine};
+  SurfaceMap posts{MapConfig{}, SurfaceKind::kLine};
   Features features;
   Pose truth{math::ExpSO3({0.05, -0.04, 0.6}), {0.4, 1.0, 1.4}};
 
@@ -28,7 +28,7 @@ struct Room {
       const Pose at{math::FromYaw(0.3 * i), {0.3 * i - 0.6, 0.5 * i, 1.2 + 0.1 * i}};
       const Features seen = FeaturesFrom(hall, at, 1, &noise);
       for (const auto& point : seen.planes) planes.Add({(at * point.cast<double>()).cast<float>()});
-      for (const auto& point : seen.edges) edges.Add({(at * point.cast<double>()).cast<float>()});
+      for (const auto& point : seen.posts) posts.Add({(at * point.cast<double>()).cast<float>()});
     }
     features = FeaturesFrom(hall, truth, 10, &noise);
   }
@@ -40,7 +40,8 @@ struct Room {
     Features features;
     for (size_t i = 0; i < set.planes.size(); i += stride)
       features.planes.push_back(sweep.points[static_cast<size_t>(set.planes[i])].p);
-    for (int i : set.edges) features.edges.push_back(sweep.points[static_cast<size_t>(i)].p);
+    for (const Post& post : set.posts)
+      features.posts.push_back(sweep.points[static_cast<size_t>(post.point)].p + post.to_axis);
     return features;
   }
 };
@@ -58,7 +59,7 @@ TEST(ScanMatcher, JacobiansAgreeWithFiniteDifferences) {
     surface.direction = noise.Vector(1.0).normalized().cast<float>();
     const Pose X{math::ExpSO3(noise.Vector(1.0)), noise.Vector(2.0)};
     const Eigen::Vector3d p_B = noise.Vector(4.0);
-    for (auto* residual : {&PlaneResidual, &EdgeResidual}) {
+    for (auto* residual : {&PlaneResidual, &PostResidual}) {
       Vector6d J, unused;
       const double r = (*residual)(X * p_B, X.R * p_B, surface, &J);
       for (int i = 0; i < 6; ++i) {
@@ -79,7 +80,7 @@ TEST(ScanMatcher, FindsThePoseFromDisturbedStarts) {
   Noise noise(3);
   for (int trial = 0; trial < 10; ++trial) {
     const Pose start = Disturbed(room.truth, &noise, 0.08, 0.02);
-    const MatchResult match = matcher.Match(room.features, room.planes, room.edges, start, 0.3);
+    const MatchResult match = matcher.Match(room.features, room.planes, room.posts, start, 0.3);
     ASSERT_TRUE(match.valid) << "trial " << trial;
     EXPECT_FALSE(match.degenerate());
     EXPECT_LT((match.X_WB.p - room.truth.p).norm(), 0.02) << "trial " << trial;
@@ -93,8 +94,8 @@ TEST(ScanMatcher, AgreesWithCeres) {
   config.max_iterations = 30;
   const ScanMatcher matcher(config);
   Features planes_only{room.features.planes, {}};
-  const SurfaceMap no_edges(MapConfig{}, SurfaceKind::kLine);
-  const MatchResult ours = matcher.Match(planes_only, room.planes, no_edges, room.truth, 0.3);
+  const SurfaceMap no_posts(MapConfig{}, SurfaceKind::kLine);
+  const MatchResult ours = matcher.Match(planes_only, room.planes, no_posts, room.truth, 0.3);
   ASSERT_TRUE(ours.valid);
   const Pose reference =
       test::MatchWithCeres(planes_only.planes, room.planes, ours.X_WB, config.kernel);
@@ -110,7 +111,7 @@ TEST(ScanMatcher, CorridorLeavesItsAxisToThePrediction) {
   const ScanMatcher matcher(MatchConfig{});
   Pose start = room.truth;
   start.p += Eigen::Vector3d(0.05, 0.20, -0.03);
-  const MatchResult match = matcher.Match(room.features, room.planes, room.edges, start, 0.3);
+  const MatchResult match = matcher.Match(room.features, room.planes, room.posts, start, 0.3);
   ASSERT_TRUE(match.valid);
   EXPECT_TRUE(match.degenerate());
   EXPECT_GT(std::abs(match.weakest[1]), 0.9);
@@ -129,7 +130,7 @@ TEST(ScanMatcher, UnmappedFeaturesDoNotSpeakAgainstAMatch) {
   }
   const Pose start = Disturbed(room.truth, &noise, 0.03, 0.005);
   const MatchResult match =
-      ScanMatcher(MatchConfig{}).Match(room.features, room.planes, room.edges, start, 0.1);
+      ScanMatcher(MatchConfig{}).Match(room.features, room.planes, room.posts, start, 0.1);
   ASSERT_TRUE(match.valid);
   EXPECT_NEAR(match.unmapped, 0.9, 0.03);
   EXPECT_GT(match.fit, 0.9);
@@ -142,7 +143,7 @@ TEST(ScanMatcher, ScatteredFeaturesAreAMisfit) {
   Noise noise(5);
   for (auto& p : room.features.planes) p += noise.Vector(0.5).cast<float>();
   const MatchResult match =
-      ScanMatcher(MatchConfig{}).Match(room.features, room.planes, room.edges, room.truth, 0.3);
+      ScanMatcher(MatchConfig{}).Match(room.features, room.planes, room.posts, room.truth, 0.3);
   EXPECT_FALSE(match.valid);
   EXPECT_TRUE(match.misfit);
 }
@@ -153,7 +154,7 @@ TEST(ScanMatcher, KnownDirectionsAreOrthonormalAndOfOneKind) {
   corridor.ends_open = true;
   const Room room(corridor);
   const MatchResult match =
-      ScanMatcher(MatchConfig{}).Match(room.features, room.planes, room.edges, room.truth, 0.1);
+      ScanMatcher(MatchConfig{}).Match(room.features, room.planes, room.posts, room.truth, 0.1);
   ASSERT_TRUE(match.valid);
   ASSERT_EQ(match.known.cols(), 5);
   EXPECT_LT((match.known.transpose() * match.known - Eigen::MatrixXd::Identity(5, 5)).norm(), 1e-9);
@@ -164,7 +165,7 @@ TEST(ScanMatcher, KnownDirectionsAreOrthonormalAndOfOneKind) {
 TEST(ScanMatcher, NoFeaturesIsNoMatch) {
   const Room room(Hall{});
   const MatchResult match =
-      ScanMatcher(MatchConfig{}).Match({}, room.planes, room.edges, room.truth, 0.1);
+      ScanMatcher(MatchConfig{}).Match({}, room.planes, room.posts, room.truth, 0.1);
   EXPECT_FALSE(match.valid);
   EXPECT_TRUE(match.X_WB.p.allFinite());
 }
@@ -174,7 +175,7 @@ TEST(ScanMatcher, AnotherPlaceIsNoMatch) {
   Pose elsewhere = room.truth;
   elsewhere.p += Eigen::Vector3d(60.0, 0.0, 0.0);
   EXPECT_FALSE(ScanMatcher(MatchConfig{})
-                   .Match(room.features, room.planes, room.edges, elsewhere, 0.1)
+                   .Match(room.features, room.planes, room.posts, elsewhere, 0.1)
                    .valid);
 }
 

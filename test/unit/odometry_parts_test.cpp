@@ -62,24 +62,87 @@ TEST(Deskew, StillBodyChangesNothing) {
   EXPECT_TRUE(SweepMotion::Still().ToEnd(p, 0.07f).isApprox(p));
 }
 
-TEST(FeaturesOfARoom, WallsGivePlanesAndCornersGiveEdges) {
+TEST(FeaturesOfARoom, WallsGivePlanesAndPillarsGiveTheirAxes) {
+  Hall hall;
+  Noise noise(2);
+  std::vector<int> seen(hall.pillars.size(), 0);
+  for (const double y : {-5.0, -2.0, 0.5, 4.0}) {
+    const auto X_WL = [y](double) { return Pose{math::FromYaw(y), {0.5, y, 1.5}}; };
+    const Sweep sweep = test::Scan(hall, X_WL, 0.0, SensorModel{}, &noise);
+    const FeatureSet features = ExtractFeatures(FeatureConfig{}, sweep.points);
+    EXPECT_GT(features.planes.size(), sweep.points.size() / 2);
+    for (const Post& post : features.posts) {
+      const Eigen::Vector3f p_L = sweep.points[static_cast<size_t>(post.point)].p + post.to_axis;
+      const Eigen::Vector2d axis = (X_WL(0) * p_L.cast<double>()).head<2>();
+      std::vector<double> off;
+      for (const auto& pillar : hall.pillars) off.push_back((axis - pillar.center).norm());
+      const auto nearest = std::min_element(off.begin(), off.end());
+      EXPECT_LT(*nearest, 0.06) << "at " << axis.transpose();
+      ++seen[static_cast<size_t>(nearest - off.begin())];
+    }
+  }
+  for (size_t i = 0; i < seen.size(); ++i) EXPECT_GE(seen[i], 16) << "pillar " << i;
+}
+
+TEST(FeaturesOfARoom, BareWallsGiveNoPost) {
   Hall hall;
   hall.pillars.clear();
   Noise noise(2);
   const auto X_WL = [](double) { return Pose{Eigen::Quaterniond::Identity(), {0.5, 0.5, 1.5}}; };
   const Sweep sweep = test::Scan(hall, X_WL, 0.0, SensorModel{}, &noise);
-  const FeatureSet features = ExtractFeatures(FeatureConfig{}, sweep.points);
-  EXPECT_GT(features.planes.size(), sweep.points.size() / 2);
-  ASSERT_GT(features.edges.size(), 10u);
-  int at_corner = 0;
-  for (int i : features.edges) {
-    const Eigen::Vector3d p_W = sweep.points[static_cast<size_t>(i)].p.cast<double>() + X_WL(0).p;
-    const Eigen::Vector3d gap = (p_W - hall.min).cwiseAbs().cwiseMin((p_W - hall.max).cwiseAbs());
-    int near = 0;
-    for (int axis = 0; axis < 3; ++axis) near += gap[axis] < 0.25 ? 1 : 0;
-    at_corner += near >= 2 ? 1 : 0;
+  EXPECT_TRUE(ExtractFeatures(FeatureConfig{}, sweep.points).posts.empty());
+}
+
+/// A sweep of 16 rings from the origin, which begins at a far wall in its back; `range` [m] of a
+/// horizontal direction ahead, 0 where nothing is.
+template <class Range>
+Sweep SweepOf(const Range& range, Noise* noise) {
+  Sweep sweep;
+  for (int azimuth = 0; azimuth < 1800; ++azimuth)
+    for (int ring = 0; ring < 16; ++ring) {
+      const double turn = azimuth * M_PI / 900.0 - M_PI_2,
+                   rise = (2.0 * ring - 15.0) * M_PI / 180.0;
+      const Eigen::Vector3d way(std::cos(turn), std::sin(turn), std::tan(rise));
+      const double r = way.y() < -0.2 ? -12.0 / way.y() : range(Eigen::Vector2d(way.head<2>()));
+      if (r <= 0.0) continue;
+      SweepPoint point;
+      point.p = (way * (r + 0.02 * noise->Vector(1.0).x())).cast<float>();
+      point.t = static_cast<float>(azimuth) * 0.1f / 1800.0f;
+      point.ring = static_cast<uint8_t>(ring);
+      sweep.points.push_back(point);
+    }
+  return sweep;
+}
+
+TEST(FeaturesOfARoom, WallsGiveTheirEnds) {
+  Noise noise(4);
+  const auto wall = [](const Eigen::Vector2d& way) {
+    const double r = 5.0 / way.y();
+    return r > 0.0 && std::abs(r * way.x() - 1.0) < 5.0 ? r : 0.0;
+  };
+  const Sweep sweep = SweepOf(wall, &noise);
+  int left = 0, right = 0;
+  for (const Post& post : ExtractFeatures(FeatureConfig{}, sweep.points).posts) {
+    const Eigen::Vector3f p = sweep.points[static_cast<size_t>(post.point)].p + post.to_axis;
+    if (p.y() < 0.0f) continue;
+    EXPECT_NEAR(p.y(), 5.0, 0.15);
+    EXPECT_NEAR(p.x(), p.x() < 0.0f ? -4.0 : 6.0, 0.1);
+    ++(p.x() < 0.0f ? left : right);
   }
-  EXPECT_GT(at_corner, 0.9 * static_cast<double>(features.edges.size()));
+  EXPECT_GE(left, 12);
+  EXPECT_GE(right, 12);
+}
+
+/// Outlines of what is round and wide move with the view.
+TEST(FeaturesOfARoom, AWideTankGivesNothing) {
+  Noise noise(5);
+  const auto tank = [](const Eigen::Vector2d& way) {
+    const double along = 6.0 * way.y(), across = 6.0 * way.x();
+    return along > 0.0 && std::abs(across) < 1.2 ? along - std::sqrt(1.44 - across * across) : 0.0;
+  };
+  const Sweep sweep = SweepOf(tank, &noise);
+  for (const Post& post : ExtractFeatures(FeatureConfig{}, sweep.points).posts)
+    EXPECT_LT(sweep.points[static_cast<size_t>(post.point)].p.y(), 0.0f);
 }
 
 TEST(FeaturesOfARoom, UnusablePointsAreRemoved) {
