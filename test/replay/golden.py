@@ -3,7 +3,9 @@
 made.
 
 Usage: golden.py check BIN_DIR SCENARIO SERVICE
-       golden.py record BIN_DIR SCENARIO FLIGHT.lcm [SERVICE...]   (prints what changed)
+       golden.py record BIN_DIR SCENARIO frozen|FLIGHT.lcm [SERVICE...]   (prints what changed)
+
+`frozen` keeps the input and records the output alone.
 
 Inputs are slices of a flight of chase-flight with sweeps thinned to some columns of a sweep, so that the
 files stay small. The configuration is today's for the scenario: a new default shows up as a difference.
@@ -91,19 +93,24 @@ def record(bin_dir, scenario, flight, *services):
     GOLDEN.mkdir(exist_ok=True)
     for service in services or SLICES:
         inputs, _, begin, end, step = SLICES[service]
-        events = [(t, c, thin(c, d, step)) for t, c, d in lcmlog.read(flight)
-                  if c in inputs and begin <= t * 1e-6 < end]
-        if not events:
-            sys.exit(f"golden.py: {flight}: holds no {', '.join(inputs)} from {begin} to {end} s; "
-                     "fly 30 s or more, with --log")
         with tempfile.TemporaryDirectory() as folder:
             source = f"{folder}/{service}.in.lcm"
-            lcmlog.write(source, events)
+            if flight == "frozen":
+                unpack(f"{service}.in.lcm", folder)
+            else:
+                events = [(t, c, thin(c, d, step)) for t, c, d in lcmlog.read(flight)
+                          if c in inputs and begin <= t * 1e-6 < end]
+                if not events:
+                    sys.exit(f"golden.py: {flight}: holds no {', '.join(inputs)} from {begin} to {end} s; "
+                             "fly 30 s or more, with --log")
+                lcmlog.write(source, events)
             lcmlog.write(f"{folder}/new.lcm", run_service(bin_dir, scenario, service, source, folder))
             if (GOLDEN / f"{service}.out.lcm.xz").exists():
                 print(difference(bin_dir, unpack(f"{service}.out.lcm", folder),
                                  f"{folder}/new.lcm").stdout)
             for name, path in (("in", source), ("out", f"{folder}/new.lcm")):
+                if flight == "frozen" and name == "in":
+                    continue
                 packed = lzma.compress(pathlib.Path(path).read_bytes(), preset=9)
                 (GOLDEN / f"{service}.{name}.lcm.xz").write_bytes(packed)
                 print(f"{service}.{name}.lcm.xz: {len(packed) // 1024} KiB")
@@ -111,7 +118,7 @@ def record(bin_dir, scenario, flight, *services):
 
 def refuse(why):
     sys.exit(f"golden.py: {why}; usage: golden.py check BIN_DIR SCENARIO SERVICE, or "
-             "golden.py record BIN_DIR SCENARIO FLIGHT.lcm [SERVICE...]")
+             "golden.py record BIN_DIR SCENARIO frozen|FLIGHT.lcm [SERVICE...]")
 
 
 def main(arguments):
