@@ -42,7 +42,7 @@ def check(service):
 def main():
     problems = [p for service in LISTENS for p in check(service)]
     for path in tree.files("services/*.h", "services/*.cpp", "common/*.cpp"):
-        if path.parts[1] != "simulator" and path.parts[1] != "bus":
+        if path.parts[1] not in ("simulator", "bus", "logs"):  # logs: what any message looks like
             problems += [f"{path}: knows {kind}: it stays out of the loop"
                          for kind in ("truth_t", "event_t") if kind in tree.text(path)]
     return tree.report(problems)

@@ -5,9 +5,13 @@
 #include <string>
 #include <vector>
 
-#include "logs/src/info.h"
-
 namespace chase::logs {
+
+/// A stretch of a log that holds no whole event.
+struct Damage {
+  int64_t at = 0, bytes = 0;
+  bool at_end = false;  ///< the log was cut off while being written
+};
 
 struct Event {
   int64_t utime = 0;  ///< when it was logged, microseconds

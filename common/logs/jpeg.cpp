@@ -1,4 +1,4 @@
-#include "logs/src/jpeg.h"
+#include "common/logs/jpeg.h"
 
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
