@@ -43,6 +43,8 @@ class LogReader {
   /// Where the next event is looked for, bytes from the beginning.
   int64_t position() const { return at_; }
   bool AtEnd() const { return at_ >= size_; }
+  /// Reads on from there, a position that an earlier event began at.
+  void Seek(int64_t position) { at_ = position; }
 
  private:
   struct Header;
