@@ -1,5 +1,6 @@
 #include "services/viewer/play.h"
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
@@ -16,7 +17,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr auto kStep = std::chrono::milliseconds(20);
-constexpr int kStepsPerTick = 5;
+constexpr auto kTick = std::chrono::milliseconds(100);
 
 class Playback {
  public:
@@ -73,11 +74,13 @@ void PlayLog(const std::string& file, const ViewerConfig& config,
   Playback playback(file, config);
   std::printf("http://localhost:%d plays %s\n", playback.port(), file.c_str());
   std::fflush(stdout);
-  auto last = Clock::now();
-  for (long step = 0; !stop(); ++step) {
+  auto last = Clock::now(), tick = last;
+  while (!stop()) {
     std::this_thread::sleep_until(last + kStep);
     const auto now = Clock::now();
-    playback.Step(std::chrono::duration<double>(now - last).count(), step % kStepsPerTick == 0);
+    const bool due = now >= tick;
+    playback.Step(std::chrono::duration<double>(now - last).count(), due);
+    if (due) tick = std::max(tick + kTick, now);
     last = now;
   }
 }

@@ -6,6 +6,7 @@
 #include <boost/beast/websocket.hpp>
 #include <chrono>
 #include <optional>
+#include <utility>
 
 namespace chase::viewer {
 namespace {
@@ -71,7 +72,7 @@ class WebSocket : public Client, public std::enable_shared_from_this<WebSocket> 
     if (foxglove_) PushText(kAdvertisement, advertisement);
   }
   void OfferMessage(uint32_t channel, int64_t utime, const std::string& payload) override {
-    if (!foxglove_) return;
+    if (!foxglove_ || choked_) return;
     for (const auto& [subscription, id] : foxglove_->channels())
       if (id == channel)
         Push({static_cast<int>(channel),
@@ -82,7 +83,7 @@ class WebSocket : public Client, public std::enable_shared_from_this<WebSocket> 
     return (part == Part::kCloud && wants_cloud_) || (part == Part::kImage && wants_image_);
   }
   void MarkSubscribed(std::array<bool, Server::kMostChannels>* channels) const override {
-    if (!foxglove_) return;
+    if (!foxglove_ || choked_) return;
     for (const auto& [subscription, id] : foxglove_->channels())
       if (id < channels->size()) (*channels)[id] = true;
   }
@@ -145,6 +146,13 @@ class WebSocket : public Client, public std::enable_shared_from_this<WebSocket> 
   void Push(Frame frame) {
     outbox_.Push(std::move(frame));
     Flush();
+    Choke();
+  }
+  /// A client that does not keep up is sent nothing more until it has: nothing is converted for it.
+  void Choke() {
+    const size_t most = kFoxgloveLimits.waiting;
+    const bool choked = foxglove_ && outbox_.waiting() > (choked_ ? most / 8 : most / 2);
+    if (std::exchange(choked_, choked) != choked) hub_.Recount();
   }
   void Flush() {
     if (writing_) return;
@@ -156,6 +164,7 @@ class WebSocket : public Client, public std::enable_shared_from_this<WebSocket> 
                         [self = shared_from_this()](Error error, size_t) {
                           self->writing_.reset();
                           if (!error) self->Flush();
+                          if (self->choked_) self->Choke();
                         });
   }
 
@@ -166,7 +175,7 @@ class WebSocket : public Client, public std::enable_shared_from_this<WebSocket> 
   Outbox outbox_;
   std::shared_ptr<const std::string> writing_;
   std::optional<FoxgloveClient> foxglove_;  ///< none: a page
-  bool wants_cloud_ = false, wants_image_ = false;
+  bool wants_cloud_ = false, wants_image_ = false, choked_ = false;
 };
 
 class Http : public std::enable_shared_from_this<Http> {

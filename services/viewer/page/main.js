@@ -24,6 +24,7 @@ function span() {
 function showPills({drone, target, plan, following}) {
   const verdict = plan?.verdict;
   pill(page.verdict, plan ? `${VERDICTS[verdict] ?? '?'}${plan.reason ? ': ' + plan.reason : ''}` : 'no plan', '');
+  page.verdict.title = page.verdict.textContent;
   page.verdict.style.background = VERDICT_COLORS[verdict] ?? '';
   page.verdict.style.color = plan ? '#0c1116' : '';
   pill(page.targetstate, target ? `target ${TARGET_STATES[target.state]}` : 'no target', target?.state === 1 ? 'good' : 'warn');
@@ -108,4 +109,5 @@ page.legend.replaceChildren(...VERDICTS.map((name, i) => {
   entry.append(box, name);
   return entry;
 }));
+page.safety.onsubmit = (event) => event.preventDefault();
 window.addEventListener('resize', drawLines);

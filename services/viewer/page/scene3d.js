@@ -8,6 +8,7 @@ const TRAIL = 20;        // s
 const MOST_POINTS = 20000;
 const KINDS = ['#8d97a5', '#d9534f', '#6b5f4a'];  // static, moving, ground
 const SIGMAS = 3;        // of the target's ellipsoid; it is small beside the target
+const LARGE = 1.5;       // m: half an edge from which on a box would hide what is behind it
 
 const line = (color, opacity = 1) => {
   const made = new THREE.Line(new THREE.BufferGeometry(),
@@ -21,6 +22,22 @@ const place = (object, p) => {
   object.visible = !!p && p.every((v) => v !== null);
   if (object.visible) object.position.set(p[0], p[1], p[2]);
   return object.visible;
+};
+// Lines are one pixel wide in WebGL: what counts is drawn as a tube.
+const tube = (color, radius, opacity) => {
+  const made = new THREE.Mesh(new THREE.BufferGeometry(),
+    new THREE.MeshBasicMaterial({color, transparent: opacity < 1, opacity}));
+  made.frustumCulled = false;
+  made.radius = radius;
+  return made;
+};
+const setTube = (object, points) => {
+  object.visible = !!points && points.length >= 6 && points.every((v) => v !== null);
+  if (!object.visible) return;
+  const path = [];
+  for (let i = 0; i < points.length; i += 3) path.push(new THREE.Vector3(points[i], points[i + 1], points[i + 2]));
+  object.geometry.dispose();
+  object.geometry = new THREE.TubeGeometry(new THREE.CatmullRomCurve3(path), path.length, object.radius, 5);
 };
 const setLine = (object, points) => {
   object.visible = !!points && points.length >= 6 && points.every((v) => v !== null);
@@ -49,12 +66,12 @@ export class Scene3D {
   constructor(canvas) {
     THREE.Object3D.DEFAULT_UP.set(0, 0, 1);
     this.canvas = canvas;
-    this.renderer = new THREE.WebGLRenderer({canvas, antialias: window.devicePixelRatio < 1.5, powerPreference: 'low-power'});
+    this.renderer = new THREE.WebGLRenderer({canvas, antialias: false, powerPreference: 'low-power'});
     this.scene = new THREE.Scene();
     this.scene.background = new THREE.Color('#12161c');
     this.camera = new THREE.PerspectiveCamera(50, 1, 0.1, 500);
     this.camera.up.set(0, 0, 1);
-    this.camera.position.set(-5, -4, 5);
+    this.camera.position.set(-4, -3.5, 5);
     this.controls = new OrbitControls(this.camera, canvas);
     this.controls.maxPolarAngle = 0.49 * Math.PI;
     this.controls.addEventListener('change', () => { this.dirty = true; });
@@ -81,10 +98,9 @@ export class Scene3D {
       new THREE.MeshBasicMaterial({color: '#ffd24d', wireframe: true, transparent: true, opacity: 0.5}));
     this.trail = line('#4c9be8', 0.6);
     this.targetTrail = line('#e8702a', 0.5);
-    this.plan = line('#ffffff');
-    this.stop = new THREE.Line(new THREE.BufferGeometry(), new THREE.LineDashedMaterial({color: '#ffffff', dashSize: 0.12, gapSize: 0.08}));
-    this.stop.frustumCulled = false;
-    this.forecast = line('#ffd24d');
+    this.plan = tube('#ffffff', 0.035, 1);
+    this.stop = tube('#ffffff', 0.06, 0.35);
+    this.forecast = tube('#ffd24d', 0.025, 1);
     this.fan = new THREE.Mesh(new THREE.BufferGeometry(),
       new THREE.MeshBasicMaterial({color: '#ffd24d', transparent: true, opacity: 0.22, side: THREE.DoubleSide, depthWrite: false}));
     this.fan.frustumCulled = false;
@@ -102,7 +118,11 @@ export class Scene3D {
     this.solids = [new THREE.SphereGeometry(1, 16, 10), new THREE.BoxGeometry(2, 2, 2),
       new THREE.CylinderGeometry(1, 1, 2, 20).rotateX(Math.PI / 2)];
     this.materials = KINDS.map((color, kind) => new THREE.MeshLambertMaterial(
-      {color, transparent: true, opacity: kind === 2 ? 0.25 : 0.6, depthWrite: kind !== 2}));
+      {color, transparent: kind === 2, opacity: kind === 2 ? 0.25 : 1, depthWrite: kind !== 2}));
+    this.edges = new THREE.EdgesGeometry(this.solids[1]);
+    this.edgeMaterial = new THREE.LineBasicMaterial({color: '#6d7886'});
+    this.wallMaterial = new THREE.MeshBasicMaterial(
+      {color: '#8d97a5', transparent: true, opacity: 0.08, side: THREE.BackSide, depthWrite: false});
   }
 
   clear() {
@@ -124,10 +144,9 @@ export class Scene3D {
     this.covariance.visible = this.target.visible;
     const color = VERDICT_COLORS[plan?.verdict] ?? '#ffffff';
     for (const part of [this.plan, this.stop]) part.material.color.set(color);
-    setLine(this.plan, plan?.path);
-    setLine(this.stop, plan?.stop);
-    if (this.stop.visible) this.stop.computeLineDistances();
-    setLine(this.forecast, forecast?.path);
+    setTube(this.plan, plan?.path);
+    setTube(this.stop, plan?.stop);
+    setTube(this.forecast, forecast?.path);
     this.setFan(forecast);
     setLine(this.sight, this.drone.visible && this.target.visible ? [...drone.p, ...target.p] : null);
     if (this.drone.visible) this.keepInView();
@@ -169,7 +188,10 @@ export class Scene3D {
   setObstacles(rows) {
     this.obstacles.clear();
     for (const row of rows) {
-      const mesh = new THREE.Mesh(this.solids[row.solid] ?? this.solids[0], this.materials[row.kind] ?? this.materials[0]);
+      const wall = row.kind === 0 && row.solid === 1 && Math.max(...row.half) > LARGE;
+      const mesh = new THREE.Mesh(this.solids[row.solid] ?? this.solids[0],
+        wall ? this.wallMaterial : this.materials[row.kind] ?? this.materials[0]);
+      if (wall) mesh.add(new THREE.LineSegments(this.edges, this.edgeMaterial));
       if (!place(mesh, row.p) || row.half.some((v) => v === null)) continue;
       turn(mesh, row.q);
       mesh.scale.set(...row.half.map((v) => Math.max(v, 0.005)));
