@@ -65,7 +65,7 @@ void ViewerNode::SubscribeScene() {
   bus_.Subscribe<prediction_t>("PREDICTION", [this](const prediction_t& m) {
     Time(m.utime);
     scene_.forecast.reset();
-    if (m.target.n_coefficients > 0) scene_.forecast = FromMessage(m, origin_);
+    if (m.verdict != prediction_t::NO_TARGET) scene_.forecast = FromMessage(m, origin_);
     foxglove_.Offer("PREDICTION", m);
   });
   bus_.Subscribe<obstacles_t>("OBSTACLES", [this](const obstacles_t& m) {

@@ -1,6 +1,10 @@
 chase_test(viewer_core_test
   LIBS viewer_core nlohmann_json::nlohmann_json
   SOURCES ${CMAKE_CURRENT_LIST_DIR}/viewer_core_test.cpp)
+chase_test(viewer_node_test
+  LIBS viewer_node
+  SOURCES ${CMAKE_CURRENT_LIST_DIR}/viewer_node_test.cpp)
+add_dependencies(viewer_node_test viewer_page)
 
 # The program with a short log: Foxglove's published client, hostile ones, the page in Chromium.
 foreach(name IN ITEMS foxglove hostile page)
