@@ -22,14 +22,14 @@ Drone FromMessage(const pose_t& m) {
   d.p_WB = bus::ToVector(m.pos);
   d.v_WB = bus::ToVector(m.vel);
   d.R_WB = bus::ToQuaternion(m.orientation);
-  d.health = m.health;
+  d.health = Code(m.health);
   d.reason = m.reason;
   return d;
 }
 
 Target FromMessage(const target_t& m) {
   Target t;
-  t.state = m.state;
+  t.state = Code(m.state);
   t.p_WT = bus::ToVector(m.mean);
   t.v_WT = bus::ToVector(m.velocity);
   t.covariance = RowMajor(m.covariance);
@@ -43,7 +43,7 @@ Target FromMessage(const target_t& m) {
 
 Plan FromMessage(const plan_t& m, int64_t origin) {
   Plan p;
-  p.verdict = m.verdict;
+  p.verdict = Code(m.verdict);
   p.reason = m.reason;
   p.path = bus::FromMessage(m.position, origin);
   if (m.stop.n_coefficients > 0) p.stop = bus::FromMessage(m.stop, origin);
@@ -52,7 +52,7 @@ Plan FromMessage(const plan_t& m, int64_t origin) {
 }
 
 Forecast FromMessage(const prediction_t& m, int64_t origin) {
-  return {m.verdict, bus::FromMessage(m.target, origin), RowMajor(m.covariance),
+  return {Code(m.verdict), bus::FromMessage(m.target, origin), RowMajor(m.covariance),
           RowMajor(m.velocity_covariance)};
 }
 
@@ -67,7 +67,7 @@ ProcessHealth FromMessage(const status_t& m, const status_t* before) {
   p.name = m.name;
   p.detail = m.detail;
   p.last_error = m.last_error;
-  p.state = m.state;
+  p.state = Code(m.state);
   p.rss_mb = m.rss_mb;
   const double passed = before ? bus::Seconds(m.utime, before->utime) : 0.0;
   p.cpu_percent = passed > 0.0 ? 100.0 * (m.cpu - before->cpu) / passed : -1.0;

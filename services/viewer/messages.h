@@ -14,6 +14,9 @@
 /// Messages as the core wants them. `origin`: utime of the core's time zero.
 namespace chase::viewer {
 
+/// One of a message's constants; none of them is negative.
+inline int Code(int8_t constant) { return static_cast<unsigned char>(constant); }
+
 Drone FromMessage(const pose_t& m);
 Target FromMessage(const target_t& m);
 Plan FromMessage(const plan_t& m, int64_t origin);

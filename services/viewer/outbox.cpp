@@ -23,7 +23,7 @@ void Outbox::Push(Frame frame) {
   }
 }
 
-void Outbox::Drop(std::deque<Frame>::const_iterator frame) {
+void Outbox::Drop(const std::deque<Frame>::const_iterator& frame) {
   waiting_ -= frame->bytes->size();
   frames_.erase(frame);
   ++dropped_;

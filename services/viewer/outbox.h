@@ -37,7 +37,7 @@ class Outbox {
   int64_t dropped() const { return dropped_; }
 
  private:
-  void Drop(std::deque<Frame>::const_iterator frame);
+  void Drop(const std::deque<Frame>::const_iterator& frame);
 
   OutboxLimits limits_;
   std::deque<Frame> frames_;      // in the order of their first arrival

@@ -75,7 +75,7 @@ void ViewerNode::SubscribeScene() {
     foxglove_.Offer("OBSTACLES", m);
   });
   bus_.Subscribe<tracking_t>("TRACKING", [this](const tracking_t& m) {
-    scene_.following = m.following;
+    scene_.following = Code(m.following);
     foxglove_.Offer("TRACKING", m);
   });
   bus_.Subscribe<scan_registered_t>("SCAN_REGISTERED",
