@@ -19,6 +19,7 @@ page.on('pageerror', (error) => problems.push(error.stack));
 page.on('requestfailed', (request) => problems.push(`failed: ${request.url()}`));
 page.on('request', (request) => { if (!/^(ws|http):\/\/127\.0\.0\.1|^blob:|^data:/.test(request.url())) problems.push(`asks the internet: ${request.url()}`); });
 await page.goto(viewer.url);
+await page.waitForFunction('window.chase');
 
 const look = () => page.evaluate(() => {
   const {scene, model, counts} = window.chase;
@@ -56,6 +57,12 @@ assert.notDeepStrictEqual(after.plan, before.plan, 'the plan stands still');
 assert.notStrictEqual(after.image, before.image, 'the image stands still');
 assert.ok(after.obstacles > 0 && after.health >= 5 && after.verdict.length > 0);
 const fps = (after.frames - before.frames) / (Date.now() - since) * 1000;
+
+// A process's row stays where it is while its figures change.
+await page.click('#health details summary');
+const health = after.counts.health;
+await until('two more statuses', async () => (await look()).counts.health >= health + 2);
+assert.ok(await page.evaluate(() => document.querySelector('#health details').open));
 
 // A seek shows the state at that time: the drone stands where the history says.
 await toggle();

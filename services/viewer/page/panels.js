@@ -27,29 +27,37 @@ export async function drawImage(canvas, text, {about, jpeg}) {
     : `target ${TARGET_STATES[about.state] ?? '?'}, probability ${format(about.existence, 2, '')}`;
 }
 
+// A row per process. Rows stay while their texts change, so that a click meets what it was aimed at.
 export function showHealth(box, rows) {
-  const open = new Set([...box.querySelectorAll('details[open]')].map((d) => d.dataset.name));
-  box.replaceChildren(...rows.map((row) => {
-    const details = element('details'), summary = element('summary'), dot = element('span', '', 'dot');
-    details.dataset.name = row.name;
-    details.open = open.has(row.name);
-    const stale = row.age > STALE;
-    dot.style.background = stale ? '#d9534f' : STATE_COLORS[row.state] ?? '#7d8896';
-    const sum = (k) => row.channels.reduce((n, c) => n + c[k], 0);
-    const lost = sum(2), malformed = sum(3);
-    summary.append(dot, element('b', row.name),
-      element('span', stale ? `silent ${row.age.toFixed(0)} s` : row.cpu === null || row.cpu < 0 ? '' : `${row.cpu.toFixed(0)} %`),
-      element('span', lost + malformed > 0 ? `${lost} lost ${malformed} bad` : ''));
-    const table = element('table');
-    for (const [channel, rate, dropped, bad, foreign] of row.channels) {
-      const line = element('tr');
-      line.append(element('td', channel), element('td', format(rate, 1, 'Hz')), element('td', `${dropped} lost`),
-        element('td', `${bad} malformed`), element('td', `${foreign} foreign`));
-      table.append(line);
-    }
-    details.append(summary, element('p', `${row.detail}${row.error ? ` · last error: ${row.error}` : ''} · ${format(row.rss, 0, 'MiB')}`), table);
-    return details;
+  const known = new Map([...box.querySelectorAll('details')].map((d) => [d.dataset.name, d]));
+  const shown = rows.map((row) => updateProcess(known.get(row.name) ?? makeProcess(row.name), row));
+  if (shown.length !== box.childNodes.length || shown.some((d, i) => d !== box.childNodes[i])) box.replaceChildren(...shown);
+}
+
+function makeProcess(name) {
+  const details = element('details'), summary = element('summary');
+  details.dataset.name = name;
+  summary.append(element('span', '', 'dot'), element('b', name), element('span'), element('span'));
+  details.append(summary, element('p'), element('table'));
+  return details;
+}
+
+function updateProcess(details, row) {
+  const [summary, text, table] = details.children, [dot, , share, losses] = summary.children;
+  const stale = row.age > STALE;
+  dot.style.background = stale ? '#d9534f' : STATE_COLORS[row.state] ?? '#7d8896';
+  share.textContent = stale ? `silent ${row.age.toFixed(0)} s` : row.cpu === null || row.cpu < 0 ? '' : `${row.cpu.toFixed(0)} %`;
+  const sum = (k) => row.channels.reduce((n, c) => n + c[k], 0);
+  const lost = sum(2), malformed = sum(3);
+  losses.textContent = lost + malformed > 0 ? `${lost} lost ${malformed} malformed` : '';
+  text.textContent = `${row.detail}${row.error ? ` · last error: ${row.error}` : ''} · ${format(row.rss, 0, 'MiB')}`;
+  table.replaceChildren(...row.channels.map(([channel, rate, dropped, bad, foreign]) => {
+    const line = element('tr');
+    line.append(element('td', channel), element('td', format(rate, 1, 'Hz')), element('td', `${dropped} lost`),
+      element('td', `${bad} malformed`), element('td', `${foreign} foreign`));
+    return line;
   }));
+  return details;
 }
 
 // Buttons work only while armed, and only with the token of the viewer's configuration. What takes the

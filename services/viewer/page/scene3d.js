@@ -95,7 +95,7 @@ export class Scene3D {
     const orange = new THREE.MeshLambertMaterial({color: '#e8702a'});
     this.target = new THREE.Mesh(new THREE.CylinderGeometry(1, 1, 1, 24).rotateX(Math.PI / 2), orange);
     this.covariance = new THREE.Mesh(new THREE.SphereGeometry(1, 20, 12),
-      new THREE.MeshBasicMaterial({color: '#ffd24d', wireframe: true, transparent: true, opacity: 0.5}));
+      new THREE.MeshBasicMaterial({color: '#ffd24d', wireframe: true, transparent: true, opacity: 0.5, depthTest: false}));
     this.trail = line('#4c9be8', 0.6);
     this.targetTrail = line('#e8702a', 0.5);
     this.plan = tube('#ffffff', 0.035, 1);
