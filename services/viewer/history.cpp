@@ -3,9 +3,13 @@
 #include <limits>
 
 namespace chase::viewer {
+namespace {
+
+constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+
+}  // namespace
 
 Sample SampleOf(const Scene& scene, double t) {
-  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
   Sample s;
   s.t = t;
   s.p_WB = s.p_WT = Eigen::Vector3d::Constant(kNone);
@@ -36,6 +40,10 @@ void History::Add(const Sample& sample) {
   std::deque<Sample> half;
   for (size_t i = 0; i < samples_.size(); i += 2) half.push_back(samples_[i]);
   samples_ = std::move(half);
+}
+
+void History::ForgetPositions() {
+  for (Sample& s : samples_) s.p_WB = s.p_WT = Eigen::Vector3d::Constant(kNone);
 }
 
 }  // namespace chase::viewer

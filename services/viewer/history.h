@@ -25,6 +25,8 @@ class History {
 
   explicit History(double length) : length_(length) {}
   void Add(const Sample& sample);
+  /// After a change of the frame W: no position stays.
+  void ForgetPositions();
   const std::deque<Sample>& samples() const { return samples_; }
 
  private:

@@ -47,12 +47,7 @@ ViewerNode::ViewerNode(bus::Bus& bus, const ViewerConfig& config, const std::str
 }
 
 void ViewerNode::SubscribeScene() {
-  bus_.Subscribe<pose_t>("POSE", [this](const pose_t& m) {
-    Time(newest_ = m.utime);
-    scene_.drone = FromMessage(m);
-    pose_heard_ = bus_.Now();
-    foxglove_.Offer("POSE", m);
-  });
+  bus_.Subscribe<pose_t>("POSE", [this](const pose_t& m) { OnPose(m); });
   bus_.Subscribe<target_t>("TARGET", [this](const target_t& m) {
     scene_.target = FromMessage(m);
     foxglove_.Offer("TARGET", m);
@@ -130,6 +125,18 @@ bool ViewerNode::Due(Part part, int64_t utime, double rate_hz) {
   return true;
 }
 
+void ViewerNode::OnPose(const pose_t& m) {
+  Time(newest_ = m.utime);
+  if (m.epoch != epoch_ && epoch_ >= 0) {  // what was drawn in the old frame W is nowhere now
+    history_.ForgetPositions();
+    Forget();
+  }
+  epoch_ = m.epoch;
+  scene_.drone = FromMessage(m);
+  pose_heard_ = bus_.Now();
+  foxglove_.Offer("POSE", m);
+}
+
 void ViewerNode::OnScan(const scan_registered_t& m) {
   foxglove_.Offer("SCAN_REGISTERED", m);
   if (!Due(Part::kCloud, m.utime, config_.cloud_rate_hz)) return;
@@ -171,6 +178,7 @@ void ViewerNode::Forget() {
   statuses_.clear();
   health_.clear();
   sent_.clear();
+  epoch_ = -1;
   ++generation_;
 }
 

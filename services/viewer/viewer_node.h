@@ -44,6 +44,7 @@ class ViewerNode : public bus::Node {
   void SubscribeScene();
   void SubscribeStatuses();
   void SubscribeOthers();
+  void OnPose(const pose_t& m);
   void OnScan(const scan_registered_t& m);
   void OnImage(const camera_image_t& m);
   void OnStatus(const status_t& m);
@@ -69,7 +70,8 @@ class ViewerNode : public bus::Node {
   int64_t start_ = -1;      // of the first tick
   int64_t pose_heard_ = 0;  // when, by the bus's clock
   std::map<std::string, int64_t> status_heard_;
-  int generation_ = 0;
+  int generation_ = 0;  // of what a page has drawn and must clear
+  int epoch_ = -1;      // of the frame W
   Scene scene_;
   std::vector<world::Obstacle> obstacles_;
   bool obstacles_sent_ = true;

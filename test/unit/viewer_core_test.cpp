@@ -183,6 +183,11 @@ TEST(ViewerHistory, IsBounded) {
   EXPECT_LE(whole.samples().size(), History::kMost);
   EXPECT_EQ(whole.samples().front().t, 0.0);
   EXPECT_NEAR(whole.samples().back().t, 1999.9, 1e-9);
+  Scene flying = FullScene(1.0);
+  whole.Add(SampleOf(flying, 2001.0));
+  whole.ForgetPositions();
+  EXPECT_TRUE(std::isnan(whole.samples().back().p_WB.x()));
+  EXPECT_GT(whole.samples().back().speed, 0.0);
   seconds.Add(SampleOf(Scene(), 0.0));  // another flight
   EXPECT_EQ(seconds.samples().size(), 1U);
 }

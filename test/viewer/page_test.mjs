@@ -94,6 +94,16 @@ const later = await look();
 assert.deepStrictEqual([later.counts.cloud, later.counts.image], [off.counts.cloud, off.counts.image]);
 assert.ok(later.counts.state > off.counts.state);
 
+// A mover has an arrow for its velocity; what is null is not drawn.
+const drawn = await page.evaluate(() => {
+  const {scene} = window.chase, solid = {id: 1, kind: 1, solid: 0, half: [1, 1, 1], q: [1, 0, 0, 0]};
+  scene.setObstacles([{...solid, p: [0, 0, 1], v: [1, 0, 0]}, {...solid, p: [null, 0, 1], v: [1, 0, 0]},
+    {...solid, p: [0, 0, 1], half: [null, 1, 1]}, {...solid, p: [0, 0, 1], v: [null, 0, 0], q: [null, 0, 0, 0]}]);
+  scene.setState({generation: 0, row: [], drone: {p: [null, 0, 0], q: [1, 0, 0, 0]}, plan: {verdict: 9, path: [null, 1, 2, 3, 4, 5]}});
+  return {obstacles: scene.obstacles.children.length, drone: scene.drone.visible, plan: scene.plan.visible};
+});
+assert.deepStrictEqual(drawn, {obstacles: 3, drone: false, plan: false});
+
 // Commands stay off without a token, and a phone needs no scrolling sideways.
 assert.ok(await page.isDisabled('#arm'));
 assert.ok(await page.isDisabled('#buttons button'));

@@ -2,7 +2,7 @@ import {Link} from './link.js';
 import {Scene3D} from './scene3d.js';
 import {drawTimeline, drawStrips, timeAt} from './strips.js';
 import {drawImage, showHealth, makeCommands, allowCommands} from './panels.js';
-import {T, VERDICTS, VERDICT_COLORS, TARGET_STATES, HEALTHS, FOLLOWING, format} from './names.js';
+import {T, DRONE, VERDICTS, VERDICT_COLORS, TARGET_STATES, HEALTHS, FOLLOWING, format} from './names.js';
 
 const WINDOW = 60;   // s of a live flight that the strips show
 const STALE = 0.5;   // s without a pose
@@ -60,7 +60,10 @@ const handlers = {
   },
   state(message) {
     window.chase.counts.state++;
-    if (message.generation !== model.generation) scene.clear();
+    if (message.generation !== model.generation) {  // a seek, or another frame W
+      scene.clear();
+      if (!message.play) for (const row of model.rows) row.fill(null, DRONE);
+    }
     model.generation = message.generation;
     model.play = message.play ?? null;
     model.state = message;
