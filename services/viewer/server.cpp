@@ -60,6 +60,7 @@ void Listen(Server::Hub& hub) {
     hub.acceptor.set_option(net::socket_base::reuse_address(true));
     hub.acceptor.bind(endpoint);
     hub.acceptor.listen();
+    hub.port = hub.acceptor.local_endpoint().port();
   } catch (const boost::system::system_error& error) {
     throw std::runtime_error(c.address + ":" + std::to_string(c.port) +
                              ": cannot be listened on (" + error.code().message() +
@@ -120,7 +121,7 @@ Server::~Server() {
   hub_->thread.join();
 }
 
-int Server::port() const { return hub_->acceptor.local_endpoint().port(); }
+int Server::port() const { return hub_->port; }
 
 void Server::Send(Part part, std::string bytes, bool binary) {
   Post(*hub_, [hub = hub_.get(), part, frame = FrameOf(part, std::move(bytes), binary)] {

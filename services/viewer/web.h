@@ -46,6 +46,7 @@ struct Server::Hub {
   std::set<Client*> clients;
   std::map<Part, Frame> retained;
   std::vector<FoxgloveChannel> channels;
+  int port = 0;         ///< that is listened on
   std::string session;  ///< tells Foxglove one start of the server from the next
 
   std::mutex inbox_mutex;
