@@ -223,6 +223,11 @@ TEST_F(ViewerPlayer, SeeksToTheStateAtThatTime) {
     EXPECT_EQ(scans_, 1);
     EXPECT_EQ(player.Now(), t);
   }
+  for (int i = 0; i <= 50; ++i) {  // at an event's own time it counts
+    poses_.clear();
+    player.Seek(kSecond + i * kSecond / 10);
+    EXPECT_EQ(poses_, std::vector<double>{static_cast<double>(i)});
+  }
   poses_.clear();
   player.Seek(0);
   EXPECT_TRUE(poses_.empty());

@@ -96,7 +96,7 @@ for (const socket of deaf) socket.terminate();
 // Commands: a wrong token, none, an unknown command; and the right one, which nothing takes yet.
 const replies = [];
 good.socket.on('message', (data, binary) => { if (!binary && String(data).includes('"reply"')) replies.push(JSON.parse(data).refusal); });
-for (const request of [{command: 'land', token: 'wrong'}, {command: 'land'}, {command: 'land', token: ''},
+for (const request of [{command: 'land', token: TOKEN.replace('right', 'wrong')}, {command: 'land'}, {command: 'land', token: ''},
   {command: 'explode', token: TOKEN}, {command: 'land', token: TOKEN}]) {
   const heard = replies.length;
   good.ask(request);
