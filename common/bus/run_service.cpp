@@ -101,6 +101,7 @@ int Run(const ServiceSpec& spec, const Flags& flags) {
   }
   std::signal(SIGINT, RequestStop);
   std::signal(SIGTERM, RequestStop);
+  if (spec.run && spec.run()) return 0;
   if (!flags.replay.empty())
     RunReplay(spec, flags);
   else
@@ -110,11 +111,14 @@ int Run(const ServiceSpec& spec, const Flags& flags) {
 
 }  // namespace
 
+bool StopRequested() { return stop_requested != 0; }
+
 int RunService(const ServiceSpec& spec, int argc, char** argv) {
   const std::string program = "chase-" + spec.name;
   CLI::App app(spec.description, program);
   Flags flags;
   AddFlags(&app, &flags);
+  if (spec.add_flags) spec.add_flags(app);
   try {
     app.parse(argc, argv);
     return Run(spec, flags);

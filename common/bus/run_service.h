@@ -8,6 +8,10 @@
 #include "common/bus/node.h"
 #include "common/config/config.h"
 
+namespace CLI {
+class App;
+}
+
 namespace chase::bus {
 
 /// The part of a service that differs from process to process.
@@ -17,7 +21,14 @@ struct ServiceSpec {
   std::function<std::string()> dump_config;
   std::function<void(const std::string& file)> load_config;  ///< throws std::runtime_error
   std::function<std::unique_ptr<Node>(Bus&)> make_node;
+  std::function<void(CLI::App&)> add_flags;  ///< its own ones; may be empty
+  /// Runs in the process's own manner, until StopRequested(), and returns true; false, or empty: it
+  /// runs live or replays.
+  std::function<bool()> run;
 };
+
+/// Has SIGINT or SIGTERM come?
+bool StopRequested();
 
 /// Flags, config, signals, 1 Hz status, watchdog, replay and exit codes of a process. Exit codes: 0
 /// ended as asked, 1 bad use (one line on stderr says what, where and how to mend it).

@@ -92,6 +92,19 @@ def packets(sock, deadline):
             return
 
 
+def free_port(ports):
+    """The first of these TCP ports that nobody listens on, else 0: any."""
+    for port in ports:
+        with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as sock:
+            sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            try:
+                sock.bind(("", port))
+                return port
+            except OSError:
+                pass
+    return 0
+
+
 def channel_of(packet):
     """Channel of an LCM packet; of a fragment after the first and of anything else ''."""
     if packet[:4] == b"LC02":

@@ -22,6 +22,7 @@ SILENCE_LIMIT = 30.0  # s of wall time in which the mission's time must move
 TAIL = 1.0  # s recorded after the mission's end
 LOG_RATE = 15e6  # bytes/s of a recording, sweeps and images included
 LARGEST_SEED = 2**31 - 1
+VIEW_PORTS = range(8080, 8100)  # of --view: the first that nobody listens on
 
 
 class FlightError(Exception):
@@ -44,7 +45,7 @@ def parse(arguments):
     parser.add_argument("scenario", nargs="?", default="gym",
                         help="name in deploy/scenarios, or a file (default: gym)")
     parser.add_argument("--seed", type=seed_number, default=1, help="of noise and gusts (default: 1)")
-    parser.add_argument("--view", action="store_true", help="look on with lcm-spy (needs a display)")
+    parser.add_argument("--view", action="store_true", help="look on in a browser, at http://localhost:8080")
     return parser.parse_args(arguments)
 
 
@@ -86,14 +87,14 @@ def ask(program, *arguments):
     return answer.stdout
 
 
-def build_and_check(scenario):
+def build_and_check(scenario, view=False):
     """Builds what flies. The scenario is read as soon as there is a program that can, long before
     the rest is built. Returns its length [s], take-off included."""
     set_up()
     build("chase-scenario")
     length = json.loads(ask("chase-scenario", scenario))
     build(*(row["binary"] for row in flight_processes()), "chase-flight", "chase-flight-monitor",
-          "chase-report")
+          "chase-report", *(["chase-viewer"] if view else []))
     ask("chase-flight", scenario, "--print-config", "simulator")  # reads the services' overrides
     return length["duration_s"] + length["settle_s"]
 
@@ -159,7 +160,7 @@ class Flight:
         self.folder = flight_folder(scenario)
         self.scenario, self.seed = scenario, seed
         self.env = {"LCM_DEFAULT_URL": url}
-        self.services, self.logger, self.monitor, self.spy = [], None, None, None
+        self.services, self.logger, self.monitor, self.viewer = [], None, None, None
 
     def child(self, name, command, **options):
         return processes.Child(name, command, self.folder / f"{name}.log", self.env, **options)
@@ -172,7 +173,7 @@ class Flight:
         self.monitor = self.child("monitor", [BIN / "chase-flight-monitor"], stdout=subprocess.PIPE)
         os.set_blocking(self.monitor.process.stdout.fileno(), False)
         if view:
-            self.spy = self.child("spy", [ROOT / "deploy" / "spy"])
+            self.start_viewer()
         # The simulator comes last: its clock starts when everybody listens.
         for row in sorted(rows, key=lambda r: r["name"] == "simulator"):
             if row["name"] == "simulator":
@@ -182,6 +183,12 @@ class Flight:
             self.services.append(self.child(row["name"], command, notifies=True,
                                             restarts=row["restart"] == "always"))
         self.wait_ready()
+
+    def start_viewer(self):
+        """An onlooker: whatever becomes of it, the flight goes on."""
+        port = bus.free_port(VIEW_PORTS)
+        self.viewer = self.child("viewer", ["nice", "-n", "10", BIN / "chase-viewer", "--port", str(port)])
+        print(f"look on at http://localhost:{port}", flush=True)
 
     def wait_ready(self):
         if not processes.wait_ready(self.services):
@@ -220,7 +227,7 @@ class Flight:
 
     def stop(self):
         """Services first, the logger last, so that the log holds their last words."""
-        extras = [c for c in (self.monitor, self.spy) if c]
+        extras = [c for c in (self.monitor, self.viewer) if c]
         processes.stop(self.services + extras)
         if self.logger:
             processes.stop([self.logger])
@@ -252,7 +259,7 @@ def report(folder):
 
 def fly(options):
     scenario = find_scenario(options.scenario)
-    warn_of_disk(build_and_check(scenario))
+    warn_of_disk(build_and_check(scenario, options.view))
     raise_receive_buffers()
     url = bus.url()
     check_bus(url)

@@ -10,9 +10,9 @@
 
 #include "common/bus/log_writer.h"
 #include "common/bus/message_head.h"
+#include "common/logs/message_types.h"
 #include "logs/src/export.h"
 #include "logs/src/message_fields.h"
-#include "logs/src/message_types.h"
 
 namespace chase::logs {
 namespace {

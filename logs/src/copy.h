@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "logs/src/log_reader.h"
+#include "common/logs/log_reader.h"
 
 namespace chase::logs {
 

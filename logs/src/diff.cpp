@@ -12,7 +12,7 @@
 #include <tuple>
 
 #include "common/bus/message_head.h"
-#include "logs/src/log_reader.h"
+#include "common/logs/log_reader.h"
 #include "logs/src/message_fields.h"
 
 namespace chase::logs {

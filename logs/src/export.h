@@ -3,7 +3,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "logs/src/log_reader.h"
+#include "common/logs/log_reader.h"
 
 namespace chase::logs {
 

@@ -7,8 +7,8 @@
 #include <stdexcept>
 
 #include "common/bus/channels.h"
+#include "common/logs/log_reader.h"
 #include "logs/src/export.h"
-#include "logs/src/log_reader.h"
 #include "logs/src/message_fields.h"
 #include "logs/src/output.h"
 

@@ -1,6 +1,6 @@
+#include "common/logs/foxglove.h"
+#include "common/logs/log_reader.h"
 #include "logs/src/export.h"
-#include "logs/src/foxglove.h"
-#include "logs/src/log_reader.h"
 #include "logs/src/mcap_writer.h"
 
 namespace chase::logs {

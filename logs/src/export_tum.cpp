@@ -6,9 +6,9 @@
 #include "chase/pose_t.hpp"
 #include "chase/target_t.hpp"
 #include "chase/truth_t.hpp"
+#include "common/logs/log_reader.h"
+#include "common/logs/message_types.h"
 #include "logs/src/export.h"
-#include "logs/src/log_reader.h"
-#include "logs/src/message_types.h"
 #include "logs/src/output.h"
 
 namespace chase::logs {

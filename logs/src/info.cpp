@@ -9,9 +9,9 @@
 #include "chase/status_t.hpp"
 #include "common/bus/channels.h"
 #include "common/bus/message_head.h"
+#include "common/logs/message_types.h"
 #include "logs/src/log_survey.h"
 #include "logs/src/message_fields.h"
-#include "logs/src/message_types.h"
 
 namespace chase::logs {
 namespace {

@@ -5,13 +5,9 @@
 #include <string>
 #include <vector>
 
-namespace chase::logs {
+#include "common/logs/log_reader.h"
 
-/// A stretch of a log that holds no whole event.
-struct Damage {
-  int64_t at = 0, bytes = 0;
-  bool at_end = false;  ///< the log was cut off while being written
-};
+namespace chase::logs {
 
 /// The messages of one process on a channel, from its start to its end.
 struct SenderInfo {

@@ -6,8 +6,8 @@
 #include <tuple>
 #include <utility>
 
+#include "common/logs/log_reader.h"
 #include "logs/src/info.h"
-#include "logs/src/log_reader.h"
 #include "logs/src/seq_count.h"
 
 namespace chase::logs {

@@ -3,7 +3,7 @@
 #include <map>
 #include <type_traits>
 
-#include "logs/src/message_types.h"
+#include "common/logs/message_types.h"
 
 namespace chase::logs {
 namespace {

@@ -6,9 +6,9 @@
 #include <set>
 
 #include "common/bus/log_writer.h"
+#include "common/logs/log_reader.h"
 #include "lcmtypes/lcm_texts.h"
 #include "logs/src/info.h"
-#include "logs/src/log_reader.h"
 #include "logs/src/migrate_rules.h"
 
 namespace chase::logs {

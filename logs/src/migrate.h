@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "logs/src/log_reader.h"
-#include "logs/src/record.h"
-#include "logs/src/schema.h"
+#include "common/logs/log_reader.h"
+#include "common/logs/record.h"
+#include "common/logs/schema.h"
 
 namespace chase::logs {
 

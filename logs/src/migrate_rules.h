@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "logs/src/record.h"
+#include "common/logs/record.h"
 
 namespace chase::logs {
 

@@ -16,9 +16,9 @@
 #include "chase/truth_t.hpp"
 #include "common/bus/convert.h"
 #include "common/bus/validation.h"
-#include "logs/src/log_reader.h"
+#include "common/logs/log_reader.h"
+#include "common/logs/message_types.h"
 #include "logs/src/log_survey.h"
-#include "logs/src/message_types.h"
 
 namespace chase::logs {
 namespace {

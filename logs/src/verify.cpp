@@ -8,8 +8,8 @@
 
 #include "common/bus/convert.h"
 #include "common/bus/plan_message.h"
-#include "logs/src/log_reader.h"
-#include "logs/src/message_types.h"
+#include "common/logs/log_reader.h"
+#include "common/logs/message_types.h"
 
 namespace chase::logs {
 namespace {

@@ -15,8 +15,10 @@ ALLOWED = {
     "common/world": ("common/math", "common/config"),  # config: scenario files
     "common/config": (),
     "common/bus": ("common/config", "common/math", "common/world", "chase"),
+    "common/logs": ("common/bus", "common/world", "lcmtypes", "chase"),
 }
 SERVICE = ("common/math", "common/world", "common/track", "common/config", "common/bus", "chase")
+VIEWER = SERVICE + ("common/logs",)  # the only service that knows messages of any type
 CORE_ALLOWED = ("common/math", "common/world", "common/track")
 # A core has no clock, file, log, randomness or thread of its own.
 CORE_FORBIDDEN = {"chrono", "ctime", "thread", "mutex", "future", "atomic", "fstream", "iostream",
@@ -38,6 +40,8 @@ def house_includes(path):
 def allowed_from(home):
     if home in ALLOWED:
         return ALLOWED[home]
+    if home == "services/viewer":
+        return VIEWER
     return SERVICE if home.startswith("services/") else None  # None: tools and tests
 
 

@@ -5,6 +5,7 @@ import io
 import json
 import os
 import pathlib
+import re
 import signal
 import socket
 import struct
@@ -99,11 +100,11 @@ class FlightTest(unittest.TestCase):
         path.write_text(f"#!{sys.executable}\n" + textwrap.dedent(source), encoding="utf-8")
         path.chmod(0o755)
 
-    def fly(self):
+    def fly(self, *options):
         """Exit code, and what deploy/fly printed on both streams."""
         scenario = self.bin / "hall.yaml"
         scenario.write_text("{}", encoding="utf-8")
-        self.patch(sys, "argv", ["fly", str(scenario)])
+        self.patch(sys, "argv", ["fly", str(scenario), *options])
         out, err = io.StringIO(), io.StringIO()
         with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
             code = fly.main()
@@ -124,6 +125,21 @@ class FlightTest(unittest.TestCase):
         flying = {row["binary"] for row in fly.flight_processes()}
         others = {"chase-flight", "chase-flight-monitor", "chase-report"}
         self.assertEqual(set(rest), flying | others)
+
+    def test_view_starts_an_onlooker(self):
+        self.program("chase-viewer", "import sys; print(*sys.argv[1:], flush=True)")
+        code, out, err = self.fly("--view")
+        self.assertEqual((code, err), (0, ""))  # that it ends at once is no concern of the flight
+        self.assertIn("chase-viewer", self.built[-1])
+        port = re.search(r"look on at http://localhost:(\d+)", out).group(1)
+        self.assertEqual((self.folder / "viewer.log").read_text(encoding="utf-8"), f"--port {port}\n")
+
+    def test_view_takes_a_free_port(self):
+        with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as sock:
+            sock.bind(("", 0))
+            sock.listen()
+            taken = sock.getsockname()[1]
+            self.assertEqual(bus.free_port([taken]), 0)
 
     def test_scenario_is_read_before_the_build(self):
         self.program("chase-scenario", "import sys; sys.exit('hall.yaml:3: speed is -1')")

@@ -15,9 +15,9 @@
 #include "chase/pose_t.hpp"
 #include "chase/truth_t.hpp"
 #include "common/bus/convert.h"
+#include "common/logs/log_reader.h"
+#include "common/logs/message_types.h"
 #include "common/math/rotation.h"
-#include "logs/src/log_reader.h"
-#include "logs/src/message_types.h"
 
 namespace chase::odometry::trial {
 

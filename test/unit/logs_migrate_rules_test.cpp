@@ -3,8 +3,8 @@
 #include <filesystem>
 
 #include "common/bus/log_writer.h"
+#include "common/logs/log_reader.h"
 #include "lcmtypes/lcm_texts.h"
-#include "logs/src/log_reader.h"
 #include "logs/src/message_fields.h"
 #include "logs/src/migrate.h"
 

@@ -13,11 +13,11 @@
 #include "chase/imu_t.hpp"
 #include "chase/obstacles_t.hpp"
 #include "chase/pose_t.hpp"
+#include "common/logs/log_reader.h"
 #include "logs/src/diff.h"
 #include "logs/src/export.h"
 #include "logs/src/import.h"
 #include "logs/src/info.h"
-#include "logs/src/log_reader.h"
 #include "logs/src/message_fields.h"
 #include "logs/src/output.h"
 #include "logs/src/seq_count.h"
@@ -140,7 +140,7 @@ std::vector<std::string> Declared(const std::string& lcm) {
 }
 
 TEST(FieldTables, ListEveryFieldOfEveryTypeInWireOrder) {
-  const std::string tables = ReadText("logs/src/field_tables.h");
+  const std::string tables = ReadText("common/logs/field_tables.h");
   const size_t begin = tables.find("{\n", tables.find("void VisitHead(")) + 2;
   const std::string head = tables.substr(begin, tables.find('}', begin) - begin);
   EXPECT_NE(head.find("n_inputs"), std::string::npos);

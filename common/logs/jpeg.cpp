@@ -1,17 +1,12 @@
-#include "logs/src/jpeg.h"
+#include "common/logs/jpeg.h"
 
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
 namespace chase::logs {
-namespace {
 
-constexpr int kQuality = 90;  // of 100: at a twentieth of the raw size; no sweep
-
-}  // namespace
-
-std::string Jpeg(const camera_image_t& m) {
+std::string Jpeg(const camera_image_t& m, int quality) {
   const bool grey = m.pixelformat == camera_image_t::PIXEL_FORMAT_GRAY;
   const int64_t row = int64_t{m.width} * (grey ? 1 : 3);
   if (m.width <= 0 || m.height <= 0 || m.row_stride < row ||
@@ -25,7 +20,7 @@ std::string Jpeg(const camera_image_t& m) {
     image = turned;
   }
   std::vector<uint8_t> jpeg;
-  cv::imencode(".jpg", image, jpeg, {cv::IMWRITE_JPEG_QUALITY, kQuality});
+  cv::imencode(".jpg", image, jpeg, {cv::IMWRITE_JPEG_QUALITY, quality});
   return {jpeg.begin(), jpeg.end()};
 }
 

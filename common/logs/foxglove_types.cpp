@@ -1,4 +1,4 @@
-#include "logs/src/foxglove.h"
+#include "common/logs/foxglove.h"
 
 namespace chase::logs {
 namespace {

@@ -1,4 +1,4 @@
-#include "logs/src/record.h"
+#include "common/logs/record.h"
 
 #include <cmath>
 #include <cstring>

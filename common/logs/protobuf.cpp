@@ -1,4 +1,4 @@
-#include "logs/src/protobuf.h"
+#include "common/logs/protobuf.h"
 
 #include <algorithm>
 #include <cstring>

@@ -1,4 +1,4 @@
-#include "logs/src/log_reader.h"
+#include "common/logs/log_reader.h"
 
 #include <fcntl.h>
 #include <sys/mman.h>

@@ -3,8 +3,8 @@
 #include <string>
 #include <vector>
 
-#include "logs/src/log_reader.h"
-#include "logs/src/schema.h"
+#include "common/logs/log_reader.h"
+#include "common/logs/schema.h"
 
 namespace chase::logs {
 

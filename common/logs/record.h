@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "logs/src/schema.h"
+#include "common/logs/schema.h"
 
 namespace chase::logs {
 

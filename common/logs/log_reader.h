@@ -5,9 +5,13 @@
 #include <string>
 #include <vector>
 
-#include "logs/src/info.h"
-
 namespace chase::logs {
+
+/// A stretch of a log that holds no whole event.
+struct Damage {
+  int64_t at = 0, bytes = 0;
+  bool at_end = false;  ///< the log was cut off while being written
+};
 
 struct Event {
   int64_t utime = 0;  ///< when it was logged, microseconds
@@ -39,6 +43,8 @@ class LogReader {
   /// Where the next event is looked for, bytes from the beginning.
   int64_t position() const { return at_; }
   bool AtEnd() const { return at_ >= size_; }
+  /// Reads on from there, a position that an earlier event began at.
+  void Seek(int64_t position) { at_ = position; }
 
  private:
   struct Header;

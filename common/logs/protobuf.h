@@ -3,8 +3,8 @@
 #include <cstdint>
 #include <string>
 
-#include "logs/src/record.h"
-#include "logs/src/schema.h"
+#include "common/logs/record.h"
+#include "common/logs/schema.h"
 
 namespace chase::logs {
 

@@ -1,4 +1,4 @@
-#include "logs/src/schema.h"
+#include "common/logs/schema.h"
 
 #include <algorithm>
 #include <cctype>

@@ -5,7 +5,7 @@
 #include <tuple>
 #include <vector>
 
-#include "logs/src/field_tables.h"
+#include "common/logs/field_tables.h"
 
 namespace chase::logs {
 

@@ -1,15 +1,15 @@
-#include "logs/src/foxglove.h"
+#include "common/logs/foxglove.h"
 
 #include <Eigen/Eigenvalues>
 #include <cmath>
 #include <cstring>
 
 #include "common/bus/convert.h"
+#include "common/logs/jpeg.h"
+#include "common/logs/message_types.h"
+#include "common/logs/protobuf.h"
 #include "common/world/rig.h"
 #include "lcmtypes/lcm_texts.h"
-#include "logs/src/jpeg.h"
-#include "logs/src/message_types.h"
-#include "logs/src/protobuf.h"
 
 namespace chase::logs {
 namespace {

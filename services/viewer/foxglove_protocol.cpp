@@ -1,0 +1,113 @@
+#include "services/viewer/foxglove_protocol.h"
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+namespace chase::viewer {
+namespace {
+
+using nlohmann::json;
+
+constexpr char kDigits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+
+std::string Text(const json& j) { return j.dump(-1, ' ', false, json::error_handler_t::replace); }
+
+template <class T>
+void LittleEndian(T value, std::string* out) {
+  for (size_t i = 0; i < sizeof(T); ++i) out->push_back(static_cast<char>(value >> (8 * i) & 0xff));
+}
+
+std::string Warning(const std::string& what) {
+  return Text({{"op", "status"}, {"level", 1}, {"message", what}});
+}
+
+const json& Member(const json& object, const char* name) {
+  static const json none;
+  const auto it = object.find(name);
+  return it == object.end() ? none : *it;
+}
+
+std::optional<uint32_t> Id(const json& value) {
+  if (!value.is_number_unsigned() || value.get<uint64_t>() > UINT32_MAX) return std::nullopt;
+  return value.get<uint32_t>();
+}
+
+std::string ParameterValues(const json& request, const Parameters& parameters) {
+  const json& names = Member(request, "parameterNames");
+  json values = json::array();
+  for (const auto& [name, value] : parameters)
+    if (!names.is_array() || names.empty() ||
+        std::find(names.begin(), names.end(), name) != names.end())
+      values.push_back({{"name", name}, {"value", value}});
+  json answer = {{"op", "parameterValues"}, {"parameters", values}};
+  if (Member(request, "id").is_string()) answer["id"] = request["id"];
+  return Text(answer);
+}
+
+}  // namespace
+
+std::string Base64(const std::string& bytes) {
+  std::string out;
+  for (size_t i = 0; i < bytes.size(); i += 3) {
+    uint32_t bits = 0;
+    for (size_t k = 0; k < 3; ++k)
+      bits = bits << 8 | (i + k < bytes.size() ? static_cast<uint8_t>(bytes[i + k]) : 0U);
+    for (size_t k = 0; k < 4; ++k)
+      out.push_back(i + k > bytes.size() ? '=' : kDigits[bits >> (18 - 6 * k) & 63]);
+  }
+  return out;
+}
+
+std::string ServerInfoText(const std::string& name, const std::string& session) {
+  return Text({{"op", "serverInfo"},
+               {"name", name},
+               {"capabilities", {"parameters"}},
+               {"supportedEncodings", json::array()},
+               {"metadata", json::object()},
+               {"sessionId", session}});
+}
+
+std::string AdvertiseText(const std::vector<FoxgloveChannel>& channels) {
+  json rows = json::array();
+  for (const FoxgloveChannel& c : channels)
+    rows.push_back({{"id", c.id},
+                    {"topic", c.topic},
+                    {"encoding", "protobuf"},
+                    {"schemaName", c.schema_name},
+                    {"schema", Base64(c.descriptors)},
+                    {"schemaEncoding", "protobuf"}});
+  return Text({{"op", "advertise"}, {"channels", rows}});
+}
+
+std::string MessageData(uint32_t subscription, int64_t utime, const std::string& payload) {
+  std::string out(1, '\1');
+  LittleEndian(subscription, &out);
+  LittleEndian(static_cast<uint64_t>(utime) * 1000U, &out);
+  return out + payload;
+}
+
+std::string FoxgloveClient::Hear(const std::string& text) {
+  const json request = json::parse(text, nullptr, false);
+  if (!request.is_object() || !Member(request, "op").is_string()) return Warning("not understood");
+  const auto op = request["op"].get<std::string>();
+  if (op == "subscribe") {
+    for (const json& s : Member(request, "subscriptions")) {
+      const auto id = s.is_object() ? Id(Member(s, "id")) : std::nullopt;
+      const auto channel = s.is_object() ? Id(Member(s, "channelId")) : std::nullopt;
+      if (!id || !channel) return Warning("a subscription needs id and channelId");
+      if (channels_.size() >= kMostSubscriptions) return Warning("too many subscriptions");
+      channels_[*id] = *channel;
+    }
+    return "";
+  }
+  if (op == "unsubscribe") {
+    for (const json& id : Member(request, "subscriptionIds"))
+      if (const auto subscription = Id(id)) channels_.erase(*subscription);
+    return "";
+  }
+  if (op == "getParameters") return ParameterValues(request, *parameters_);
+  if (op == "subscribeParameterUpdates" || op == "unsubscribeParameterUpdates") return "";
+  return Warning(op + ": this server only shows");
+}
+
+}  // namespace chase::viewer

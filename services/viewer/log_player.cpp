@@ -1,0 +1,77 @@
+#include "services/viewer/log_player.h"
+
+#include <algorithm>
+#include <stdexcept>
+
+#include "common/bus/channels.h"
+
+namespace chase::viewer {
+
+LogPlayer::LogPlayer(const std::string& file) : reader_(file) {
+  std::map<std::string, size_t> numbers;
+  int64_t utime = 0;
+  for (int64_t position = reader_.position(); reader_.Next(&event_);
+       position = reader_.position()) {
+    const auto [number, is_new] = numbers.emplace(event_.channel, channels_.size());
+    if (is_new) channels_.push_back(event_.channel);
+    utime = index_.empty() ? event_.utime : std::max(utime, event_.utime);
+    index_.push_back({utime, position, number->second});
+  }
+  if (index_.empty()) throw std::runtime_error(file + ": holds no event; is it an LCM log?");
+  handlers_.resize(channels_.size());
+  for (const std::string& channel : channels_) heavy_.push_back(bus::IsHeavy(channel));
+  now_ = begin();
+}
+
+void LogPlayer::SubscribeRaw(const std::string& channel, RawHandler handler) {
+  for (size_t i = 0; i < channels_.size(); ++i)
+    if (channels_[i] == channel) handlers_[i] = handler;
+}
+
+void LogPlayer::HandOver(const Entry& entry) {
+  if (!handlers_[entry.channel]) return;
+  now_ = entry.utime;
+  reader_.Seek(entry.position);
+  if (reader_.Next(&event_)) handlers_[entry.channel](event_.bytes.data(), event_.bytes.size());
+}
+
+size_t LogPlayer::After(int64_t utime) const {
+  const auto after = std::upper_bound(index_.begin(), index_.end(), utime,
+                                      [](int64_t t, const Entry& e) { return t < e.utime; });
+  return static_cast<size_t>(after - index_.begin());
+}
+
+std::vector<size_t> LogPlayer::LastOfEach(size_t from, size_t to) const {
+  std::vector<size_t> last(channels_.size(), SIZE_MAX);
+  for (size_t i = from; i < to; ++i) last[index_[i].channel] = i;
+  return last;
+}
+
+void LogPlayer::Survey(int64_t period, const std::function<void(int64_t utime)>& every) {
+  int64_t next = begin() + period;
+  for (const Entry& entry : index_) {
+    for (; next <= entry.utime; next += period) every(next);
+    if (!heavy_[entry.channel]) HandOver(entry);
+  }
+}
+
+void LogPlayer::Seek(int64_t utime) {
+  next_ = After(utime);
+  std::vector<size_t> last = LastOfEach(0, next_);
+  std::sort(last.begin(), last.end());
+  for (const size_t i : last)
+    if (i != SIZE_MAX) HandOver(index_[i]);
+  now_ = utime;
+}
+
+void LogPlayer::PlayTo(int64_t utime) {
+  const size_t to = std::max(After(utime), next_);
+  const std::vector<size_t> last = LastOfEach(next_, to);
+  for (; next_ < to; ++next_) {
+    const Entry& entry = index_[next_];
+    if (!heavy_[entry.channel] || last[entry.channel] == next_) HandOver(entry);
+  }
+  now_ = utime;
+}
+
+}  // namespace chase::viewer

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "common/bus/bus.h"
+#include "common/logs/log_reader.h"
+
+namespace chase::viewer {
+
+/// A bus that hands over what a flight log holds, from any moment on. What is published is lost.
+class LogPlayer : public bus::Bus {
+ public:
+  /// Reads the whole log once to know where its events are. Throws std::runtime_error with one
+  /// line.
+  explicit LogPlayer(const std::string& file);
+
+  int64_t begin() const { return index_.front().utime; }  ///< microseconds, by the log's stamps
+  int64_t end() const { return index_.back().utime; }
+  int64_t Now() const override { return now_; }
+
+  /// Hands over all light messages and calls `every` at multiples of `period` microseconds.
+  void Survey(int64_t period, const std::function<void(int64_t utime)>& every);
+  /// Hands over, of each channel, the last message up to `utime`, in file order.
+  void Seek(int64_t utime);
+  /// Hands over what follows up to `utime`; of each heavy channel only the last.
+  void PlayTo(int64_t utime);
+
+ protected:
+  void SubscribeRaw(const std::string& channel, RawHandler handler) override;
+  void PublishRaw(const std::string&, Bytes) override {}
+
+ private:
+  struct Entry {
+    int64_t utime, position;  // utime never goes back: a stamp that does counts as the one before
+    size_t channel;
+  };
+  void HandOver(const Entry& entry);
+  /// Per channel the last of the entries [from, to); SIZE_MAX: none.
+  std::vector<size_t> LastOfEach(size_t from, size_t to) const;
+  size_t After(int64_t utime) const;
+
+  logs::LogReader reader_;
+  logs::Event event_;
+  std::vector<std::string> channels_;
+  std::vector<RawHandler> handlers_;  // by channel; empty: nobody listens
+  std::vector<bool> heavy_;
+  std::vector<Entry> index_;
+  size_t next_ = 0;
+  int64_t now_ = 0;
+};
+
+}  // namespace chase::viewer

@@ -1,0 +1,32 @@
+#include <CLI/CLI.hpp>
+
+#include "common/bus/run_service.h"
+#include "services/viewer/play.h"
+#include "services/viewer/viewer_node.h"
+
+int main(int argc, char** argv) {
+  using chase::viewer::ViewerConfig;
+  ViewerConfig config;
+  int port = -1;  // of the flag
+  std::string log;
+
+  chase::bus::ServiceSpec spec;
+  spec.name = "viewer";
+  spec.description = "Shows a flight, live or from a log, on a web page and to Foxglove.";
+  spec.add_flags = [&](CLI::App& app) {
+    app.add_option("--port", port, "of the page (default: the configuration's, 8080)")
+        ->check(CLI::Range(0, 65535));
+    app.add_option("--play", log, "LCM log to play instead of looking at the bus");
+  };
+  spec.dump_config = [&] { return chase::config::Dump(config); };
+  spec.load_config = [&](const std::string& file) { chase::config::Load(file, &config); };
+  spec.run = [&] {
+    if (port >= 0) config.port = port;
+    if (!log.empty()) chase::viewer::PlayLog(log, config, chase::bus::StopRequested);
+    return !log.empty();
+  };
+  spec.make_node = [&](chase::bus::Bus& bus) {
+    return std::make_unique<chase::viewer::ViewerNode>(bus, config);
+  };
+  return chase::bus::RunService(spec, argc, argv);
+}

@@ -1,0 +1,88 @@
+#include "services/viewer/messages.h"
+
+#include <algorithm>
+
+#include "common/bus/convert.h"
+
+namespace chase::viewer {
+namespace {
+
+Eigen::Matrix3d RowMajor(const double (&m)[9]) { return bus::ToMatrix(m); }
+
+const stage_status_t* StageOf(const status_t& m, const std::string& name) {
+  const auto it = std::find_if(m.stages.begin(), m.stages.end(),
+                               [&](const stage_status_t& s) { return s.name == name; });
+  return it == m.stages.end() ? nullptr : &*it;
+}
+
+}  // namespace
+
+Drone FromMessage(const pose_t& m) {
+  Drone d;
+  d.p_WB = bus::ToVector(m.pos);
+  d.v_WB = bus::ToVector(m.vel);
+  d.R_WB = bus::ToQuaternion(m.orientation);
+  d.health = Code(m.health);
+  d.reason = m.reason;
+  return d;
+}
+
+Target FromMessage(const target_t& m) {
+  Target t;
+  t.state = Code(m.state);
+  t.p_WT = bus::ToVector(m.mean);
+  t.v_WT = bus::ToVector(m.velocity);
+  t.covariance = RowMajor(m.covariance);
+  t.radius = m.radius;
+  t.height = m.height;
+  t.box_px = Eigen::Vector4d(m.box_px);
+  t.existence = m.existence;
+  t.reason = m.reason;
+  return t;
+}
+
+Plan FromMessage(const plan_t& m, int64_t origin) {
+  Plan p;
+  p.verdict = Code(m.verdict);
+  p.reason = m.reason;
+  p.path = bus::FromMessage(m.position, origin);
+  if (m.stop.n_coefficients > 0) p.stop = bus::FromMessage(m.stop, origin);
+  p.clearance = m.certified_clearance;
+  return p;
+}
+
+Forecast FromMessage(const prediction_t& m, int64_t origin) {
+  return {Code(m.verdict), bus::FromMessage(m.target, origin), RowMajor(m.covariance),
+          RowMajor(m.velocity_covariance)};
+}
+
+std::vector<world::Obstacle> FromMessage(const obstacles_t& m, int64_t origin) {
+  std::vector<world::Obstacle> out;
+  for (const obstacle_t& o : m.obstacles) out.push_back(bus::FromMessage(o, origin));
+  return out;
+}
+
+ProcessHealth FromMessage(const status_t& m, const status_t* before) {
+  ProcessHealth p;
+  p.name = m.name;
+  p.detail = m.detail;
+  p.last_error = m.last_error;
+  p.state = Code(m.state);
+  p.rss_mb = m.rss_mb;
+  const double passed = before ? bus::Seconds(m.utime, before->utime) : 0.0;
+  p.cpu_percent = passed > 0.0 ? 100.0 * (m.cpu - before->cpu) / passed : -1.0;
+  for (const channel_status_t& c : m.channels)
+    p.channels.push_back({c.channel, c.rate_hz, c.dropped, c.malformed, c.foreign});
+  return p;
+}
+
+double MeanStageMs(const status_t& m, const status_t& before, const std::string& stage) {
+  const stage_status_t* now = StageOf(m, stage);
+  const stage_status_t* then = StageOf(before, stage);
+  if (!now || !then || now->count <= then->count) return -1.0;
+  const double sum = now->mean_ms * static_cast<double>(now->count) -
+                     then->mean_ms * static_cast<double>(then->count);
+  return std::max(sum, 0.0) / static_cast<double>(now->count - then->count);
+}
+
+}  // namespace chase::viewer

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <vector>
+
+#include "chase/obstacles_t.hpp"
+#include "chase/plan_t.hpp"
+#include "chase/pose_t.hpp"
+#include "chase/prediction_t.hpp"
+#include "chase/status_t.hpp"
+#include "chase/target_t.hpp"
+#include "services/viewer/page_text.h"
+#include "services/viewer/scene.h"
+
+/// Messages as the core wants them. `origin`: utime of the core's time zero.
+namespace chase::viewer {
+
+/// One of a message's constants; none of them is negative.
+inline int Code(int8_t constant) { return static_cast<unsigned char>(constant); }
+
+Drone FromMessage(const pose_t& m);
+Target FromMessage(const target_t& m);
+Plan FromMessage(const plan_t& m, int64_t origin);
+Forecast FromMessage(const prediction_t& m, int64_t origin);
+std::vector<world::Obstacle> FromMessage(const obstacles_t& m, int64_t origin);
+
+/// `before`: the process's last status, for its share of a core; nullptr: none.
+ProcessHealth FromMessage(const status_t& m, const status_t* before);
+
+/// Mean time [ms] of what a stage did between two statuses; negative: nothing, or not known.
+double MeanStageMs(const status_t& m, const status_t& before, const std::string& stage);
+
+}  // namespace chase::viewer

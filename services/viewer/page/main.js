@@ -1,0 +1,116 @@
+import {Link} from './link.js';
+import {Scene3D} from './scene3d.js';
+import {drawTimeline, drawStrips, timeAt} from './strips.js';
+import {drawImage, showHealth, makeCommands, allowCommands} from './panels.js';
+import {T, DRONE, VERDICTS, VERDICT_COLORS, TARGET_STATES, HEALTHS, FOLLOWING, format} from './names.js';
+
+const WINDOW = 60;   // s of a live flight that the strips show
+const STALE = 0.5;   // s without a pose
+const page = Object.fromEntries([...document.querySelectorAll('[id]')].map((e) => [e.id, e]));
+const scene = new Scene3D(page.scene);
+const now = () => model.play ? model.play.t : model.rows.at(-1)?.[T] ?? 0;
+const model = {rows: [], generation: -1, play: null, duration: 0, seeking: false};
+// What a test looks at.
+window.chase = {model, scene, counts: {state: 0, cloud: 0, image: 0, health: 0, obstacles: 0}};
+
+const pill = (element, text, kind) => { element.textContent = text; element.className = `pill ${kind}`; };
+
+function span() {
+  if (model.play) return [0, model.duration];
+  const to = Math.max(now(), WINDOW);
+  return [to - WINDOW, to];
+}
+
+function showPills({drone, target, plan, following}) {
+  const verdict = plan?.verdict;
+  pill(page.verdict, plan ? `${VERDICTS[verdict] ?? '?'}${plan.reason ? ': ' + plan.reason : ''}` : 'no plan', '');
+  page.verdict.title = page.verdict.textContent;
+  page.verdict.style.background = VERDICT_COLORS[verdict] ?? '';
+  page.verdict.style.color = plan ? '#0c1116' : '';
+  pill(page.targetstate, target ? `target ${TARGET_STATES[target.state]}` : 'no target', target?.state === 1 ? 'good' : 'warn');
+  const stale = drone && drone.age > STALE;
+  pill(page.pose, !drone ? 'no pose' : stale ? `pose ${drone.age.toFixed(1)} s old` : HEALTHS[drone.health],
+    !drone || stale || drone.health === 2 ? 'bad' : drone.health === 0 ? 'good' : 'warn');
+  page.scene.style.opacity = stale ? 0.5 : 1;
+  page.figures.textContent = drone
+    ? `height ${format(drone.p[2], 2, 'm')}\nfollows ${FOLLOWING[following] ?? '–'}` : '';
+}
+
+function showPlayer(play) {
+  page.player.hidden = false;
+  page.playbutton.textContent = play.playing ? '\u2759\u2759' : '\u25b6';
+  page.scrubber.max = play.duration;
+  if (!model.seeking) page.scrubber.value = play.t;
+  if (document.activeElement !== page.speed) page.speed.value = String(play.speed);
+}
+
+function drawLines() {
+  const [from, to] = span();
+  drawTimeline(page.timeline, model.rows, from, to, now());
+  drawStrips(page.strips, model.rows, from, to, now());
+}
+
+const handlers = {
+  link(up) { pill(page.link, up ? 'linked' : 'no link', up ? 'good' : 'bad'); },
+  hello(message) {
+    page.source.textContent = message.source || 'live';
+    model.rows = message.rows;
+    model.duration = message.duration;
+    allowCommands(page, message.commands);
+  },
+  state(message) {
+    window.chase.counts.state++;
+    if (message.generation !== model.generation) {  // a seek, or another frame W
+      scene.clear();
+      if (!message.play) for (const row of model.rows) row.fill(null, DRONE);
+    }
+    model.generation = message.generation;
+    model.play = message.play ?? null;
+    model.state = message;
+    if (!model.play) {
+      if (message.row[T] < model.rows.at(-1)?.[T]) model.rows = [];
+      model.rows.push(message.row);
+      while (model.rows[0][T] < message.row[T] - WINDOW) model.rows.shift();
+    } else {
+      showPlayer(model.play);
+    }
+    scene.setState(message);
+    scene.setTrail(model.rows, now());
+    showPills(message);
+    page.clock.textContent = `${now().toFixed(1)} s${model.play ? ` / ${model.duration.toFixed(1)} s` : ''}`;
+    drawLines();
+  },
+  obstacles(message) { window.chase.counts.obstacles++; scene.setObstacles(message.rows); },
+  health(message) {
+    window.chase.counts.health++;
+    showHealth(page.health, message.rows);
+    page.self.textContent = `viewer: ${message.self}; ${(link.bytes / 1000).toFixed(0)} kB/s`;
+    link.bytes = 0;
+  },
+  reply(message) { page.reply.textContent = `${message.command}: ${message.refusal || 'taken'}`; },
+  cloud(cloud) { window.chase.counts.cloud++; scene.addSweep(cloud.points); },
+  image(image) { window.chase.counts.image++; drawImage(page.image, page.imagetext, image).catch(() => {}); },
+};
+const link = new Link(handlers);
+
+const want = () => link.want(['cloud', 'image'].filter((part) => page[`want${part}`].checked));
+page.wantcloud.onchange = page.wantimage.onchange = () => { want(); if (!page.wantcloud.checked) scene.clear(); };
+page.follow.onchange = () => { scene.follow = page.follow.checked; };
+page.showground.onchange = () => { scene.showGround = page.showground.checked; };
+
+page.playbutton.onclick = () => link.ask({play: !model.play?.playing});
+page.speed.onchange = () => { link.ask({speed: Number(page.speed.value)}); page.speed.blur(); };
+page.scrubber.oninput = () => { model.seeking = true; link.ask({seek: Number(page.scrubber.value)}); };
+page.scrubber.onchange = () => { model.seeking = false; };
+for (const canvas of [page.timeline, page.strips])
+  canvas.onclick = (event) => { if (model.play) link.ask({seek: timeAt(canvas, event, ...span())}); };
+
+makeCommands(page, (request) => link.ask(request));
+page.legend.replaceChildren(...VERDICTS.map((name, i) => {
+  const entry = document.createElement('span'), box = document.createElement('i');
+  box.style.background = VERDICT_COLORS[i];
+  entry.append(box, name);
+  return entry;
+}));
+page.safety.onsubmit = (event) => event.preventDefault();
+window.addEventListener('resize', drawLines);

@@ -1,0 +1,16 @@
+// What the messages' constants mean, and the colours that stand for them.
+export const VERDICTS = ['chase', 'wider', 'kept', 'safe only', 'brake', 'wait', 'escape'];
+export const VERDICT_COLORS = ['#3fa66b', '#6fbf73', '#4c9be8', '#d9a33a', '#d9534f', '#7d8896', '#b455c9'];
+export const TARGET_STATES = ['searching', 'tracking', 'occluded', 'lost'];
+export const TARGET_COLORS = ['#7d8896', '#3fa66b', '#d9a33a', '#d9534f'];
+export const HEALTHS = ['pose ok', 'pose degraded', 'pose lost', 'pose starting'];
+export const HEALTH_COLORS = ['#3fa66b', '#d9a33a', '#d9534f', '#7d8896'];
+export const FOLLOWING = ['no plan', 'plan', 'stop', 'brake', 'land'];
+export const STATE_COLORS = ['#7d8896', '#3fa66b', '#d9a33a', '#d9534f'];  // of a process: starting ok degraded failed
+export const COMMANDS = ['takeoff', 'chase', 'hold', 'search', 'return', 'land', 'stop'];
+
+// Columns of a row of samples (services/viewer/page_text.cpp, RowOf).
+export const T = 0, DISTANCE = 1, CLEARANCE = 2, SPEED = 3, PLAN_MS = 4, VERDICT = 5, TARGET_STATE = 6, HEALTH = 7,
+  DRONE = 8, TARGET = 11;
+
+export const format = (value, digits, unit) => value === null || value === undefined ? `– ${unit}` : `${value.toFixed(digits)} ${unit}`;

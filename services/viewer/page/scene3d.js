@@ -1,0 +1,261 @@
+// The 3D scene. World: x east, y north, z up, metres.
+import * as THREE from './three.module.min.js';
+import {OrbitControls} from './OrbitControls.js';
+import {VERDICT_COLORS, T, DRONE, TARGET} from './names.js';
+
+const SWEEPS = 6;        // of the last seconds that stay on the screen
+const TRAIL = 20;        // s
+const MOST_POINTS = 20000;
+const KINDS = ['#8d97a5', '#d9534f', '#6b5f4a'];  // static, moving, ground
+const SIGMAS = 3;        // of the target's ellipsoid; it is small beside the target
+const LARGE = 1.5;       // m: half an edge from which on a box would hide what is behind it
+
+const line = (color, opacity = 1) => {
+  const made = new THREE.Line(new THREE.BufferGeometry(),
+    new THREE.LineBasicMaterial({color, transparent: opacity < 1, opacity}));
+  made.frustumCulled = false;
+  return made;
+};
+// The wire's quaternions are w x y z.
+const turn = (object, q) => { if (q && q.every((v) => v !== null)) object.quaternion.set(q[1], q[2], q[3], q[0]); };
+const place = (object, p) => {
+  object.visible = !!p && p.every((v) => v !== null);
+  if (object.visible) object.position.set(p[0], p[1], p[2]);
+  return object.visible;
+};
+// Lines are one pixel wide in WebGL: what counts is drawn as a tube.
+const tube = (color, radius, opacity) => {
+  const made = new THREE.Mesh(new THREE.BufferGeometry(),
+    new THREE.MeshBasicMaterial({color, transparent: opacity < 1, opacity}));
+  made.frustumCulled = false;
+  made.radius = radius;
+  return made;
+};
+const setTube = (object, points) => {
+  object.visible = !!points && points.length >= 6 && points.every((v) => v !== null);
+  if (!object.visible) return;
+  const path = [];
+  for (let i = 0; i < points.length; i += 3) path.push(new THREE.Vector3(points[i], points[i + 1], points[i + 2]));
+  object.geometry.dispose();
+  object.geometry = new THREE.TubeGeometry(new THREE.CatmullRomCurve3(path), path.length, object.radius, 5);
+};
+const setLine = (object, points) => {
+  object.visible = !!points && points.length >= 6 && points.every((v) => v !== null);
+  if (!object.visible) return;
+  object.geometry.setAttribute('position', new THREE.BufferAttribute(new Float32Array(points), 3));
+};
+
+function makeDrone() {
+  const group = new THREE.Group();
+  const body = new THREE.MeshLambertMaterial({color: '#dfe5ec'}), rotor = new THREE.MeshLambertMaterial({color: '#4c9be8'});
+  group.add(new THREE.Mesh(new THREE.BoxGeometry(0.22, 0.12, 0.08), body));
+  for (const [x, y] of [[1, 1], [1, -1], [-1, 1], [-1, -1]]) {
+    const disc = new THREE.Mesh(new THREE.CylinderGeometry(0.11, 0.11, 0.02, 16), rotor);
+    disc.rotation.x = Math.PI / 2;
+    disc.position.set(0.16 * x, 0.16 * y, 0.04);
+    group.add(disc);
+  }
+  const nose = new THREE.Mesh(new THREE.ConeGeometry(0.05, 0.16, 12), new THREE.MeshLambertMaterial({color: '#e8702a'}));
+  nose.rotation.z = -Math.PI / 2;
+  nose.position.x = 0.18;
+  group.add(nose);
+  return group;
+}
+
+export class Scene3D {
+  constructor(canvas) {
+    THREE.Object3D.DEFAULT_UP.set(0, 0, 1);
+    this.canvas = canvas;
+    this.renderer = new THREE.WebGLRenderer({canvas, antialias: false, powerPreference: 'low-power'});
+    this.scene = new THREE.Scene();
+    this.scene.background = new THREE.Color('#12161c');
+    this.camera = new THREE.PerspectiveCamera(50, 1, 0.1, 500);
+    this.camera.up.set(0, 0, 1);
+    this.camera.position.set(-4, -3.5, 5);
+    this.controls = new OrbitControls(this.camera, canvas);
+    this.controls.maxPolarAngle = 0.49 * Math.PI;
+    this.controls.addEventListener('change', () => { this.dirty = true; });
+    this.scene.add(new THREE.HemisphereLight('#ffffff', '#404850', 2.2));
+    const sun = new THREE.DirectionalLight('#ffffff', 1.2);
+    sun.position.set(5, -8, 12);
+    this.scene.add(sun);
+    this.addThings();
+    this.follow = true;
+    this.at = new THREE.Vector3();
+    this.dirty = true;
+    this.frames = 0;
+    const draw = () => { this.draw(); requestAnimationFrame(draw); };
+    requestAnimationFrame(draw);
+  }
+
+  addThings() {
+    const grid = new THREE.GridHelper(200, 100, '#2c3542', '#222a34');
+    grid.rotation.x = Math.PI / 2;
+    this.drone = makeDrone();
+    const orange = new THREE.MeshLambertMaterial({color: '#e8702a'});
+    this.target = new THREE.Mesh(new THREE.CylinderGeometry(1, 1, 1, 24).rotateX(Math.PI / 2), orange);
+    this.covariance = new THREE.Mesh(new THREE.SphereGeometry(1, 20, 12),
+      new THREE.MeshBasicMaterial({color: '#ffd24d', wireframe: true, transparent: true, opacity: 0.5, depthTest: false}));
+    this.trail = line('#4c9be8', 0.6);
+    this.targetTrail = line('#e8702a', 0.5);
+    this.plan = tube('#ffffff', 0.035, 1);
+    this.stop = tube('#ffffff', 0.06, 0.35);
+    this.forecast = tube('#ffd24d', 0.025, 1);
+    this.fan = new THREE.Mesh(new THREE.BufferGeometry(),
+      new THREE.MeshBasicMaterial({color: '#ffd24d', transparent: true, opacity: 0.22, side: THREE.DoubleSide, depthWrite: false}));
+    this.fan.frustumCulled = false;
+    this.sight = line('#93a0b0', 0.35);
+    this.obstacles = new THREE.Group();
+    this.cloud = new THREE.Points(new THREE.BufferGeometry(), new THREE.PointsMaterial({size: 2, sizeAttenuation: false, vertexColors: true}));
+    this.cloud.geometry.setAttribute('position', new THREE.BufferAttribute(new Float32Array(3 * MOST_POINTS), 3));
+    this.cloud.geometry.setAttribute('color', new THREE.BufferAttribute(new Float32Array(3 * MOST_POINTS), 3));
+    this.cloud.geometry.setDrawRange(0, 0);
+    this.cloud.frustumCulled = false;
+    this.sweeps = [];
+    this.scene.add(grid, this.drone, this.target, this.covariance, this.trail, this.targetTrail, this.plan, this.stop,
+      this.forecast, this.fan, this.sight, this.obstacles, this.cloud);
+    for (const thing of [this.drone, this.target, this.covariance]) thing.visible = false;
+    this.solids = [new THREE.SphereGeometry(1, 16, 10), new THREE.BoxGeometry(2, 2, 2),
+      new THREE.CylinderGeometry(1, 1, 2, 20).rotateX(Math.PI / 2)];
+    this.materials = KINDS.map((color, kind) => new THREE.MeshLambertMaterial(
+      {color, transparent: kind === 2, opacity: kind === 2 ? 0.25 : 1, depthWrite: kind !== 2}));
+    this.edges = new THREE.EdgesGeometry(this.solids[1]);
+    this.edgeMaterial = new THREE.LineBasicMaterial({color: '#6d7886'});
+    this.wallMaterial = new THREE.MeshBasicMaterial(
+      {color: '#8d97a5', transparent: true, opacity: 0.08, side: THREE.BackSide, depthWrite: false});
+  }
+
+  clear() {
+    this.sweeps = [];
+    this.cloud.geometry.setDrawRange(0, 0);
+    this.obstacles.clear();
+    this.dirty = true;
+  }
+
+  setState(state) {
+    const {drone, target, plan, forecast} = state;
+    if (place(this.drone, drone?.p)) turn(this.drone, drone.q);
+    if (place(this.target, target?.p)) {
+      this.target.scale.set(target.radius, target.radius, target.height);
+      this.covariance.position.copy(this.target.position);
+      this.covariance.scale.set(...target.axes.map((v) => Math.max(SIGMAS * (v ?? 0), 0.005)));
+      turn(this.covariance, target.q);
+    }
+    this.covariance.visible = this.target.visible;
+    const color = VERDICT_COLORS[plan?.verdict] ?? '#ffffff';
+    for (const part of [this.plan, this.stop]) part.material.color.set(color);
+    setTube(this.plan, plan?.path);
+    setTube(this.stop, plan?.stop);
+    setTube(this.forecast, forecast?.path);
+    this.setFan(forecast);
+    setLine(this.sight, this.drone.visible && this.target.visible ? [...drone.p, ...target.p] : null);
+    if (this.drone.visible) this.keepInView();
+    this.dirty = true;
+  }
+
+  // A band of two standard deviations to both sides of the forecast.
+  setFan(forecast) {
+    this.fan.visible = this.forecast.visible && forecast.spread.every((v) => v !== null);
+    if (!this.fan.visible) return;
+    const path = forecast.path, count = path.length / 3, sides = [], faces = [];
+    for (let i = 0; i < count; ++i) {
+      const a = 3 * Math.max(i - 1, 0), b = 3 * Math.min(i + 1, count - 1);
+      let dx = path[b] - path[a], dy = path[b + 1] - path[a + 1];
+      const length = Math.hypot(dx, dy) || 1;
+      const along = i / (count - 1) * (forecast.spread.length - 1), k = Math.min(Math.floor(along), forecast.spread.length - 2);
+      const sigma = forecast.spread[k] + (along - k) * (forecast.spread[k + 1] - forecast.spread[k]);
+      dx *= 2 * sigma / length; dy *= 2 * sigma / length;
+      const [x, y, z] = path.slice(3 * i, 3 * i + 3);
+      sides.push(x - dy, y + dx, z, x + dy, y - dx, z);
+      if (i > 0) faces.push(2 * i - 2, 2 * i - 1, 2 * i, 2 * i - 1, 2 * i + 1, 2 * i);
+    }
+    this.fan.geometry.setAttribute('position', new THREE.BufferAttribute(new Float32Array(sides), 3));
+    this.fan.geometry.setIndex(faces);
+  }
+
+  setTrail(rows, now) {
+    for (const [part, column] of [[this.trail, DRONE], [this.targetTrail, TARGET]]) {
+      const points = [];
+      for (const row of rows) {
+        if (row[T] < now - TRAIL || row[T] > now || row[column] === null) continue;
+        points.push(row[column], row[column + 1], row[column + 2]);
+      }
+      setLine(part, points);
+    }
+    this.dirty = true;
+  }
+
+  setObstacles(rows) {
+    this.obstacles.clear();
+    for (const row of rows) {
+      const wall = row.kind === 0 && row.solid === 1 && Math.max(...row.half) > LARGE;
+      const mesh = new THREE.Mesh(this.solids[row.solid] ?? this.solids[0],
+        wall ? this.wallMaterial : this.materials[row.kind] ?? this.materials[0]);
+      if (wall) mesh.add(new THREE.LineSegments(this.edges, this.edgeMaterial));
+      if (!place(mesh, row.p) || row.half.some((v) => v === null)) continue;
+      turn(mesh, row.q);
+      mesh.scale.set(...row.half.map((v) => Math.max(v, 0.005)));
+      if (row.kind === 2) mesh.visible = !!this.showGround;
+      this.obstacles.add(mesh);
+      if (row.v && row.v.every((v) => v !== null)) this.addArrow(row);
+    }
+    this.dirty = true;
+  }
+
+  addArrow(row) {
+    const v = new THREE.Vector3(...row.v), speed = v.length();
+    if (speed < 0.05) return;
+    this.obstacles.add(new THREE.ArrowHelper(v.normalize(), new THREE.Vector3(...row.p), Math.min(speed, 5), '#ff8a80', 0.25, 0.15));
+  }
+
+  // The newest sweep is bright, the ones before fade; colour: height above the lowest.
+  addSweep(points) {
+    this.sweeps.unshift(points);
+    this.sweeps.length = Math.min(this.sweeps.length, SWEEPS);
+    const {position, color} = this.cloud.geometry.attributes;
+    let n = 0;
+    this.sweeps.forEach((sweep, age) => {
+      const bright = 1 - 0.7 * age / SWEEPS;
+      for (let i = 0; i + 2 < sweep.length && n < MOST_POINTS; i += 3, ++n) {
+        position.setXYZ(n, sweep[i], sweep[i + 1], sweep[i + 2]);
+        const h = Math.min(Math.max(sweep[i + 2] / 3, 0), 1);
+        color.setXYZ(n, bright * (0.25 + 0.5 * h), bright * (0.55 + 0.25 * h), bright * (0.75 - 0.35 * h));
+      }
+    });
+    position.needsUpdate = color.needsUpdate = true;
+    this.cloud.geometry.setDrawRange(0, n);
+    this.points = n;
+    this.dirty = true;
+  }
+
+  // Moves camera and centre along with the drone.
+  keepInView() {
+    if (!this.follow) return;
+    const goal = this.target.visible ? this.drone.position.clone().lerp(this.target.position, 0.5) : this.drone.position;
+    const step = goal.clone().sub(this.controls.target);
+    if (step.length() < 30 && this.placed) step.multiplyScalar(0.3);
+    this.placed = true;
+    this.controls.target.add(step);
+    this.camera.position.add(step);
+  }
+
+  resize() {
+    const {clientWidth: width, clientHeight: height} = this.canvas;
+    if (width === this.width && height === this.height) return;
+    [this.width, this.height] = [width, height];
+    this.renderer.setPixelRatio(Math.min(window.devicePixelRatio, 2));
+    this.renderer.setSize(width, height, false);
+    this.camera.aspect = width / Math.max(height, 1);
+    this.camera.updateProjectionMatrix();
+    this.dirty = true;
+  }
+
+  draw() {
+    this.frames++;
+    this.resize();
+    if (!this.dirty) return;
+    this.dirty = false;
+    this.controls.update();
+    this.renderer.render(this.scene, this.camera);
+  }
+}

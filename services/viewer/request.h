@@ -1,0 +1,29 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace chase::viewer {
+
+/// What a page asks for. Several may stand in one message.
+struct Request {
+  int64_t acknowledged = 0;                       ///< frames taken since the last request
+  std::optional<std::vector<std::string>> wants;  ///< heavy parts: "cloud", "image"
+  std::optional<bool> play;
+  std::optional<double> speed, seek;  ///< seek: s from the log's beginning
+  std::string command, token;         ///< command: empty where there is none
+};
+
+/// Nothing when the text is no request: other JSON, none at all, or values of other types.
+std::optional<Request> ParseRequest(const std::string& text);
+
+/// takeoff, chase, hold, search, return, land, stop.
+bool IsCommand(const std::string& name);
+
+/// Empty when a command with this token may be passed on, else why not. The comparison takes as
+/// long for every token of the same length.
+std::string RefusalOf(const Request& request, const std::string& token);
+
+}  // namespace chase::viewer

@@ -1,0 +1,81 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/world/obstacle.h"
+#include "common/world/trajectory.h"
+
+/// What the page draws. Times are seconds from one origin, everything else is in frame W, SI.
+namespace chase::viewer {
+
+struct Drone {
+  Eigen::Vector3d p_WB = Eigen::Vector3d::Zero(), v_WB = Eigen::Vector3d::Zero();
+  Eigen::Quaterniond R_WB = Eigen::Quaterniond::Identity();
+  int health = 0;      ///< pose_t's constants
+  std::string reason;  ///< why it is not OK
+  double age = 0.0;    ///< since it was heard, s
+};
+
+struct Target {
+  int state = 0;  ///< target_t's constants
+  Eigen::Vector3d p_WT = Eigen::Vector3d::Zero(), v_WT = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< of p_WT, m^2
+  double radius = 0.0, height = 0.0;                     ///< of its upright cylinder, m
+  Eigen::Vector4d box_px = Eigen::Vector4d::Zero();      ///< centre u v, width, height
+  double existence = 0.0;                                ///< probability, 0 to 1
+  std::string reason;
+
+  /// Are mean and covariance usable?
+  bool Known() const { return state == 1 || state == 2; }
+};
+
+struct Plan {
+  int verdict = 0;  ///< plan_t's constants
+  std::string reason;
+  world::Trajectory path;
+  std::optional<world::Trajectory> stop;  ///< certified, leaves `path` at its start
+  double clearance = -1.0;                ///< certified, m; negative: not certified
+};
+
+struct Forecast {
+  int verdict = 0;  ///< prediction_t's constants
+  world::Trajectory path;
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();           ///< at its start, m^2
+  Eigen::Matrix3d velocity_covariance = Eigen::Matrix3d::Zero();  ///< m^2/s^2
+};
+
+/// The newest of everything.
+struct Scene {
+  std::optional<Drone> drone;
+  std::optional<Target> target;
+  std::optional<Plan> plan;
+  std::optional<Forecast> forecast;
+  int following = -1;     ///< tracking_t's constants; -1: not heard
+  double plan_ms = -1.0;  ///< mean time per plan of the last second; negative: not known
+  std::string scenario;   ///< its name; empty: none
+};
+
+/// Semi-axes and orientation of the ellipsoid { x : x' S^-1 x <= 1 }, S symmetric; zeros where S is
+/// not finite, and along axes in which it is not positive.
+struct Axes {
+  Eigen::Vector3d half = Eigen::Vector3d::Zero();
+  Eigen::Quaterniond R = Eigen::Quaterniond::Identity();
+};
+Axes AxesOf(const Eigen::Matrix3d& S);
+
+/// The solid that is drawn for an obstacle: `half` are half edges, (radius, radius, half height) or
+/// semi-axes.
+struct Solid {
+  Eigen::Vector3d center, velocity, half;
+  Eigen::Quaterniond R;
+};
+Solid SolidOf(const world::Obstacle& obstacle, double t);
+
+/// Standard deviation [m] of the forecast `dt` seconds from its start, the largest over directions,
+/// for a velocity that errs as it does at the start: sqrt(eig(P + V dt^2)).
+double SpreadAt(const Forecast& forecast, double dt);
+
+}  // namespace chase::viewer

@@ -1,0 +1,65 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "services/viewer/assets.h"
+#include "services/viewer/foxglove_protocol.h"
+#include "services/viewer/request.h"
+
+namespace chase::viewer {
+
+struct ServerConfig {
+  std::string address = "127.0.0.1";
+  int port = 0;           ///< 0: any free one
+  int max_clients = 64;   ///< connections at a time; more are closed at once
+  Parameters parameters;  ///< that Foxglove may read
+};
+
+/// What a page is told; only the newest of each waits for a slow one.
+enum class Part { kHello, kState, kObstacles, kHealth, kReply, kCloud, kImage };
+
+/// HTTP and WebSocket server with a thread of its own: the page's files, the page's data at /ws,
+/// and Foxglove's protocol for clients that ask for it. Its functions may be called from another
+/// thread and do not wait for any client.
+class Server {
+ public:
+  /// Throws std::runtime_error, one line with the cure, when the address cannot be listened on.
+  Server(const ServerConfig& config, Assets assets);
+  ~Server();
+  Server(const Server&) = delete;
+  Server& operator=(const Server&) = delete;
+
+  int port() const;
+
+  /// To all pages. Hello, obstacles and health go to those that come later as well.
+  void Send(Part part, std::string bytes, bool binary = false);
+  /// Only to those that come later.
+  void Retain(Part part, std::string bytes);
+  int pages() const;
+  /// Does any page want this heavy part?
+  bool Wanted(Part part) const;
+  /// What pages asked for since the last call; of more than 64 the first.
+  std::vector<Request> TakeRequests();
+
+  /// A channel for Foxglove; ids count from 1 and stay below kMostChannels.
+  static constexpr uint32_t kMostChannels = 256;
+  void Advertise(const FoxgloveChannel& channel);
+  bool Subscribed(uint32_t channel) const;
+  void SendMessage(uint32_t channel, int64_t utime, std::string payload);
+
+  struct Counters {
+    int64_t accepted = 0, refused = 0, malformed = 0, dropped = 0;
+    int connected = 0;
+  };
+  Counters counters() const;
+
+  struct Hub;  ///< web.h
+
+ private:
+  std::unique_ptr<Hub> hub_;
+};
+
+}  // namespace chase::viewer

@@ -1,0 +1,92 @@
+// Foxglove's published client subscribes to every channel; every schema must resolve and every message decode.
+import assert from 'node:assert';
+import {load, pageClient, play, sleep, until} from './viewer.mjs';
+
+const {FoxgloveClient} = load('@foxglove/ws-protocol');
+const {WebSocket} = load('ws');
+const protobuf = load('protobufjs');
+const descriptor = load('protobufjs/ext/descriptor');
+
+const EXPECTED = {
+  'POSE': 'chase.pose_t', 'POSE/pose': 'foxglove.PoseInFrame', '/tf': 'foxglove.FrameTransforms',
+  'OBSTACLES/scene': 'foxglove.SceneUpdate', 'TARGET/scene': 'foxglove.SceneUpdate', 'PLAN/scene': 'foxglove.SceneUpdate',
+  'PREDICTION/scene': 'foxglove.SceneUpdate', 'LIDAR_SCAN': 'foxglove.PointCloud', 'SCAN_REGISTERED': 'foxglove.PointCloud',
+  'CAMERA_IMAGE': 'foxglove.CompressedImage', 'CAMERA_IMAGE/calibration': 'foxglove.CameraCalibration',
+  'PLANNING_STATUS/log': 'foxglove.Log', 'PLAN': 'chase.plan_t', 'SCENARIO': 'chase.scenario_t',
+};
+
+async function connect(port, protocols) {
+  const socket = new WebSocket(`ws://127.0.0.1:${port}/`, protocols);
+  const client = new FoxgloveClient({ws: socket});
+  const seen = {socket, client, channels: new Map(), types: new Map(), counts: new Map(), first: new Map(), errors: [], statuses: []};
+  client.on('error', (error) => seen.errors.push(error));
+  client.on('status', (status) => seen.statuses.push(status));
+  client.on('serverInfo', (info) => { seen.info = info; });
+  client.on('parameterValues', (values) => { seen.parameters = values; });
+  const bySubscription = new Map();
+  client.on('advertise', (channels) => {
+    for (const channel of channels) {
+      const root = protobuf.Root.fromDescriptor(descriptor.FileDescriptorSet.decode(Buffer.from(channel.schema, 'base64')));
+      root.resolveAll();
+      assert.strictEqual(channel.encoding, 'protobuf');
+      assert.strictEqual(channel.schemaEncoding, 'protobuf');
+      seen.channels.set(channel.topic, channel);
+      seen.types.set(channel.topic, root.lookupType(channel.schemaName));
+      bySubscription.set(client.subscribe(channel.id), channel.topic);
+    }
+  });
+  client.on('message', ({subscriptionId, timestamp, data}) => {
+    const topic = bySubscription.get(subscriptionId), type = seen.types.get(topic);
+    const message = type.decode(new Uint8Array(data.buffer, data.byteOffset, data.byteLength));
+    assert.strictEqual(type.verify(message), null, topic);
+    assert.ok(timestamp > 0n, topic);
+    seen.counts.set(topic, (seen.counts.get(topic) ?? 0) + 1);
+    seen.first.set(topic, seen.first.get(topic) ?? type.toObject(message));
+  });
+  await until(`serverInfo (${protocols})`, () => seen.info);
+  return seen;
+}
+
+const viewer = await play();
+const page = await pageClient(viewer.port);
+page.ask({speed: 5});
+const seen = await connect(viewer.port, [FoxgloveClient.SUPPORTED_SUBPROTOCOL]);
+assert.deepStrictEqual(seen.info.capabilities, ['parameters']);
+await until('a message on every channel', () => {
+  if (page.newest.state?.play && !page.newest.state.play.playing) page.ask({play: true});
+  return seen.channels.size >= Object.keys(EXPECTED).length &&
+    Object.keys(EXPECTED).every((topic) => seen.channels.has(topic)) &&
+    [...seen.channels.keys()].every((topic) => seen.counts.has(topic));
+}, 60000).catch((error) => {
+  throw new Error(`${error.message}; missing: ${[...new Set([...Object.keys(EXPECTED), ...seen.channels.keys()])].filter((t) => !seen.counts.has(t))}`);
+});
+for (const [topic, schema] of Object.entries(EXPECTED)) assert.strictEqual(seen.channels.get(topic).schemaName, schema, topic);
+assert.deepStrictEqual(seen.errors, []);
+
+const cloud = seen.first.get('SCAN_REGISTERED');
+assert.strictEqual(cloud.data.length % cloud.point_stride, 0);
+assert.ok(cloud.data.length > 1000 * cloud.point_stride);
+assert.strictEqual(Buffer.from(seen.first.get('CAMERA_IMAGE').data).readUInt16BE(0), 0xffd8);
+assert.deepStrictEqual(seen.first.get('/tf').transforms.map((t) => t.child_frame_id), ['body', 'lidar', 'camera']);
+
+seen.client.getParameters([], 'all');
+await until('parameters', () => seen.parameters);
+assert.ok(seen.parameters.parameters.some((p) => p.name === 'version'));
+seen.client.setParameters([{name: 'version', value: 'x'}]);
+await until('a refusal', () => seen.statuses.length > 0);
+assert.ok(!seen.channels.has('TRUTH'));
+
+// The newer name of the protocol, and several clients at once.
+const other = await connect(viewer.port, ['foxglove.sdk.v1']);
+assert.strictEqual(other.socket.protocol, 'foxglove.sdk.v1');
+await until('messages for the second', () => {
+  if (!page.newest.state.play.playing) page.ask({play: true});
+  return other.counts.has('POSE') && other.counts.has('CAMERA_IMAGE');
+});
+seen.client.close();
+other.client.close();
+await sleep(100);
+await viewer.stop();
+const total = [...seen.counts.values()].reduce((a, b) => a + b, 0);
+console.log(`${seen.channels.size} channels, ${total} messages decoded by their schemas`);
+process.exit(0);

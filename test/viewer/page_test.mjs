@@ -1,0 +1,117 @@
+// The page in headless Chromium while a log is played: drone, sweep, plan and image are there and change.
+import assert from 'node:assert';
+import fs from 'node:fs';
+import {load, play, sleep, until} from './viewer.mjs';
+
+const {chromium} = load('playwright-core');
+const CHROMIUM = '/usr/bin/chromium';
+if (!fs.existsSync(CHROMIUM)) {
+  console.log(`skipped: no ${CHROMIUM}; cure: deploy/setup`);
+  process.exit(77);
+}
+
+const viewer = await play();
+const browser = await chromium.launch({executablePath: CHROMIUM,
+  args: ['--no-sandbox', '--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader']});
+const page = await browser.newPage({viewport: {width: 1280, height: 720}});
+const problems = [];
+page.on('pageerror', (error) => problems.push(error.stack));
+page.on('requestfailed', (request) => problems.push(`failed: ${request.url()}`));
+page.on('request', (request) => { if (!/^(ws|http):\/\/127\.0\.0\.1|^blob:|^data:/.test(request.url())) problems.push(`asks the internet: ${request.url()}`); });
+await page.goto(viewer.url);
+await page.waitForFunction('window.chase');
+
+const look = () => page.evaluate(() => {
+  const {scene, model, counts} = window.chase;
+  const image = document.getElementById('image');
+  const pixels = image.getContext('2d').getImageData(0, 0, image.width, image.height).data;
+  let hash = 0;
+  for (let i = 0; i < pixels.length; i += 16) hash = (hash * 31 + pixels[i]) | 0;
+  const plan = scene.plan.geometry.attributes.position;
+  return {drone: scene.drone.visible && scene.drone.position.toArray(), points: scene.points ?? 0,
+    plan: scene.plan.visible && Array.from(plan.array.slice(0, 9)), image: hash, counts: {...counts}, frames: scene.frames,
+    t: model.play?.t, rows: model.rows.length, obstacles: scene.obstacles.children.length,
+    verdict: document.getElementById('verdict').textContent, health: document.querySelectorAll('#health details').length};
+});
+const seek = async (t) => {
+  await page.evaluate((to) => {
+    const scrubber = document.getElementById('scrubber');
+    scrubber.value = to;
+    scrubber.dispatchEvent(new Event('input'));
+    scrubber.dispatchEvent(new Event('change'));
+  }, t);
+  await until(`the state at ${t} s`, async () => { const s = await look(); return s.t >= t - 0.1 && s.t < t + 3; });
+};
+const toggle = () => page.click('#playbutton');
+const paused = async () => !(await page.evaluate(() => window.chase.model.play.playing));
+
+await until('the scene', async () => { const s = await look(); return s.drone && s.points > 100 && s.plan && s.counts.image > 1; }, 20000);
+const before = await look(), since = Date.now();
+let after = before;
+await until('twenty states, two images and a sweep', async () => {
+  after = await look();
+  return ['state', 'image', 'cloud'].every((part, i) => after.counts[part] - before.counts[part] >= [20, 2, 1][i]);
+});
+assert.notDeepStrictEqual(after.drone, before.drone, 'the drone stands still');
+assert.notDeepStrictEqual(after.plan, before.plan, 'the plan stands still');
+assert.notStrictEqual(after.image, before.image, 'the image stands still');
+assert.ok(after.obstacles > 0 && after.health >= 5 && after.verdict.length > 0);
+const fps = (after.frames - before.frames) / (Date.now() - since) * 1000;
+
+// A process's row stays where it is while its figures change.
+await page.click('#health details summary');
+const health = after.counts.health;
+await until('two more statuses', async () => (await look()).counts.health >= health + 2);
+assert.ok(await page.evaluate(() => document.querySelector('#health details').open));
+
+// A seek shows the state at that time: the drone stands where the history says.
+await toggle();
+await until('a pause', paused);
+const duration = await page.evaluate(() => window.chase.model.duration);
+for (const share of [0.9, 0.3, 0.7]) {
+  await seek(share * duration);
+  const error = await page.evaluate(() => {
+    const {model, scene} = window.chase;
+    const row = model.rows.findLast((r) => r[0] <= model.play.t + 0.051);
+    return Math.hypot(...[0, 1, 2].map((k) => row[8 + k] - scene.drone.position.getComponent(k)));
+  });
+  assert.ok(error < 0.3, `the drone is ${error} m from where it was at ${share} of the log`);
+}
+await page.selectOption('#speed', '10');
+await seek(0);
+await toggle();
+await until('ten times as fast to the end', async () => (await look()).t >= duration - 0.01, 1000 * (duration / 10 + 10));
+
+// Heavy parts come on demand only.
+await page.uncheck('#wantcloud');
+await page.uncheck('#wantimage');
+await page.selectOption('#speed', '1');
+await toggle();
+await sleep(300);
+const off = await look();
+await sleep(1200);
+const later = await look();
+assert.deepStrictEqual([later.counts.cloud, later.counts.image], [off.counts.cloud, off.counts.image]);
+assert.ok(later.counts.state > off.counts.state);
+
+// A mover has an arrow for its velocity; what is null is not drawn.
+const drawn = await page.evaluate(() => {
+  const {scene} = window.chase, solid = {id: 1, kind: 1, solid: 0, half: [1, 1, 1], q: [1, 0, 0, 0]};
+  scene.setObstacles([{...solid, p: [0, 0, 1], v: [1, 0, 0]}, {...solid, p: [null, 0, 1], v: [1, 0, 0]},
+    {...solid, p: [0, 0, 1], half: [null, 1, 1]}, {...solid, p: [0, 0, 1], v: [null, 0, 0], q: [null, 0, 0, 0]}]);
+  scene.setState({generation: 0, row: [], drone: {p: [null, 0, 0], q: [1, 0, 0, 0]}, plan: {verdict: 9, path: [null, 1, 2, 3, 4, 5]}});
+  return {obstacles: scene.obstacles.children.length, drone: scene.drone.visible, plan: scene.plan.visible};
+});
+assert.deepStrictEqual(drawn, {obstacles: 3, drone: false, plan: false});
+
+// Commands stay off without a token, and a phone needs no scrolling sideways.
+assert.ok(await page.isDisabled('#arm'));
+assert.ok(await page.isDisabled('#buttons button'));
+await page.setViewportSize({width: 390, height: 844});
+await sleep(300);
+assert.ok(await page.evaluate(() => document.documentElement.scrollWidth) <= 390, 'wider than a phone');
+assert.deepStrictEqual(problems, []);
+await browser.close();
+await viewer.stop();
+console.log(`page in order; ${fps.toFixed(0)} frames a second at 1280 x 720 in software`);
+process.exit(0);
