@@ -15,9 +15,15 @@ constexpr double kHoverDuration = 2.0;  // s
 constexpr double kShortestHorizon = 1.0;
 // s: control says 20 times a second whether it flies; nobody climbs before that was heard.
 constexpr double kHearControl = 0.3;
-// A lost target is taken to go on for so long in all, s, and looked for from so near, in desired
-// distances: beyond it a turn on the spot sees less than a way there.
-constexpr double kGoesOn = 4.0, kArrived = 1.5;
+// A lost target is looked for from here while that share of where it may be is in sight from here;
+// else a place is gone to, for so long, s.
+constexpr double kEnoughInSight = 0.5, kKeepsPlace = 1.0;
+// Gone to while looking that way: a place so far from the gaze, rad, and from here, desired
+// distances.
+constexpr double kAhead = 0.5, kArrived = 1.5;
+constexpr double kLeg = 2.5;      // desired distances: the planner is led to nothing farther off
+constexpr double kGoes = 0.5;     // m: a plan without sight of the place is worth that at least
+constexpr double kSettles = 0.3;  // s: a turn ends so
 
 // Rest to rest from a to b, minimum jerk.
 world::Trajectory RestToRest(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double start,
@@ -90,6 +96,7 @@ void Pilot::SetObstacles(double t, std::vector<world::Obstacle> obstacles) {
 void Pilot::ChangeFrame() {
   forecast_.reset();
   had_target_ = false;
+  whereabouts_.Clear();
   obstacles_.clear();
   obstacles_time_ = -1e9;
   has_running_ = false;
@@ -172,12 +179,9 @@ PlanRequest Pilot::Request(double t0, const Start& start) const {
 PlanResult Pilot::Chase(double t0, const Start& start) {
   had_target_ = true;
   last_seen_ = forecast_->target;
-  const PlanResult plan = planner_->Plan(Request(t0, start));
-  if (plan.yaw.size() > 1) {
-    const double turned = EvaluateYaw(plan.yaw, 1.0) - plan.yaw[0];
-    if (std::abs(turned) > 0.05) search_turn_ = turned > 0.0 ? 1.0 : -1.0;
-  }
-  return plan;
+  fastest_ = std::max(fastest_, last_seen_.Velocity(last_seen_.start).norm());
+  whereabouts_.Clear();
+  return planner_->Plan(Request(t0, start));
 }
 
 PlanResult Pilot::Wait(double t0, const Start& start, const BodyEstimate& body) {
@@ -192,7 +196,7 @@ PlanResult Pilot::Wait(double t0, const Start& start, const BodyEstimate& body) 
   airborne_ = true;
   if (!SeesObstacles(t0 - config_.latency)) return Rest(t0, start);
   if (HasTarget(t0 - config_.latency)) return Chase(t0, start);
-  return had_target_ ? Search(t0, start) : Hover(t0, start);
+  return had_target_ ? Search(t0, start, body) : Hover(t0, start);
 }
 
 PlanResult Pilot::Climb(double t0, const Start& start) const {
@@ -201,28 +205,41 @@ PlanResult Pilot::Climb(double t0, const Start& start) const {
                  {start.yaw.yaw});
 }
 
-// To where the target would be had it gone on, ever slower, in sight of that place; there around.
-PlanResult Pilot::Search(double t0, const Start& start) {
-  const double end = last_seen_.end();
-  const double on = kGoesOn * (1.0 - std::exp(-std::max(0.0, t0 - end) / kGoesOn));
-  Eigen::Vector3d velocity = last_seen_.Velocity(end);
-  velocity.z() = 0.0;
-  const Eigen::Vector3d place = last_seen_.Position(end) + on * velocity;
-  const double distance = (place - start.state.p).norm();
-  if (distance > kArrived * config_.planner.desired_distance) {
-    PlanRequest request = Request(t0, start);
-    request.target = world::Trajectory::Constant(place, t0, request.horizon);
-    request.target_body.reset();
-    if (start.on_plan) request.running = running_.trajectory;
-    PlanResult plan = planner_->Plan(request);
-    if (plan.verdict < Verdict::kBrake) {
-      plan.verdict = Verdict::kSafeOnly;
-      plan.reason =
-          "target lost, to where it may be" + (plan.reason.empty() ? "" : "; " + plan.reason);
-      return plan;
-    }
+// From here as long as enough of where it may be is in sight from here, unless what is worth
+// looking at is far ahead; else from where most is.
+PlanResult Pilot::Search(double t0, const Start& start, const BodyEstimate& body) {
+  const View view = config_.planner.view().value_or(View{});
+  if (!whereabouts_.begun()) {
+    const double known = last_seen_.start;
+    whereabouts_.Begin(known, last_seen_.Position(known), last_seen_.Velocity(known), fastest_);
+    place_chosen_ = -1e9;
   }
-  return BrakeAndLook(t0, start);
+  whereabouts_.Advance(t0 - config_.latency, obstacles_, body.p, body.yaw, view);
+  const auto gaze = whereabouts_.BestGaze(start.yaw.yaw, config_.search_yaw_rate, view);
+  if (t0 - place_chosen_ > kKeepsPlace) {
+    place_ = whereabouts_.Likeliest(0.5 * config_.planner.desired_distance);
+    place_chosen_ = t0;
+  }
+  const Eigen::Vector2d way = (place_ - start.state.p).head<2>();
+  const double off = std::remainder(std::atan2(way.y(), way.x()) - gaze.yaw, 2.0 * M_PI);
+  const bool ahead =
+      std::abs(off) < kAhead && way.norm() > kArrived * config_.planner.desired_distance;
+  if (gaze.share > kEnoughInSight && !ahead) return BrakeAndLook(t0, start, gaze.yaw);
+  PlanRequest request = Request(t0, start);
+  const double near = std::min(1.0, kLeg * config_.planner.desired_distance / way.norm());
+  request.target = world::Trajectory::Constant(
+      {start.state.p.x() + near * way.x(), start.state.p.y() + near * way.y(), place_.z()}, t0,
+      request.horizon);
+  request.target_body.reset();
+  if (start.on_plan) request.running = running_.trajectory;
+  PlanResult plan = planner_->Plan(request);
+  const bool shows = plan.verdict < Verdict::kSafeOnly;
+  const bool goes =
+      (plan.trajectory.Position(plan.trajectory.end()) - start.state.p).norm() > kGoes;
+  if (plan.verdict >= Verdict::kBrake || !(shows || goes)) return BrakeAndLook(t0, start, gaze.yaw);
+  plan.verdict = Verdict::kSafeOnly;
+  plan.reason = "target lost, to where it may be" + (plan.reason.empty() ? "" : "; " + plan.reason);
+  return plan;
 }
 
 // Braking while it moves; else where it is, for as long as that can be certified.
@@ -243,10 +260,12 @@ PlanResult Pilot::Hover(double t0, const Start& start) const {
   return plan;
 }
 
-PlanResult Pilot::BrakeAndLook(double t0, const Start& start) const {
+PlanResult Pilot::BrakeAndLook(double t0, const Start& start, double yaw) const {
   PlanResult plan = Rest(t0, start);
-  plan.yaw =
-      TurningYaw({start.yaw.yaw, search_turn_ * config_.search_yaw_rate}, plan.trajectory.duration);
+  const double turn = std::remainder(yaw - start.yaw.yaw, 2.0 * M_PI);
+  const double rate =
+      std::clamp(turn / kSettles, -config_.search_yaw_rate, config_.search_yaw_rate);
+  plan.yaw = TurningYaw({start.yaw.yaw, rate}, plan.trajectory.duration);
   plan.reason = (plan.verdict == Verdict::kWait ? "target lost, looking around" : "target lost") +
                 (plan.reason.empty() ? "" : ", " + plan.reason);
   return plan;

@@ -8,6 +8,7 @@
 
 #include "services/planning/planner.h"
 #include "services/planning/planning_config.h"
+#include "services/planning/whereabouts.h"
 
 namespace chase::planning {
 
@@ -71,8 +72,8 @@ class Pilot {
   PlanResult Hover(double t0, const Start& start) const;
   PlanResult Rest(double t0, const Start& start) const;
   bool SeesObstacles(double t) const;
-  PlanResult Search(double t0, const Start& start);
-  PlanResult BrakeAndLook(double t0, const Start& start) const;
+  PlanResult Search(double t0, const Start& start, const BodyEstimate& body);
+  PlanResult BrakeAndLook(double t0, const Start& start, double yaw) const;
 
   PlanningConfig config_;
   std::unique_ptr<Planner> planner_;
@@ -92,7 +93,10 @@ class Pilot {
   bool had_target_ = false;
   world::Trajectory last_seen_;  ///< forecast of the target that was chased last
   double climb_end_ = 0.0;
-  double search_turn_ = 1.0;
+  Whereabouts whereabouts_;                          ///< of a target that is lost
+  Eigen::Vector3d place_ = Eigen::Vector3d::Zero();  ///< from which it is looked for, m
+  double fastest_ = 0.0;                             ///< that the target was seen to move, m/s
+  double place_chosen_ = -1e9;                       ///< s
 };
 
 }  // namespace chase::planning

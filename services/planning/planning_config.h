@@ -17,7 +17,7 @@ struct PlanningConfig {
   double stale_prediction = 1.4;
   double takeoff_height = 1.2;
   double takeoff_time = 3.0;
-  double search_yaw_rate = 0.6;
+  double search_yaw_rate = 1.0;
   PlannerConfig planner;
 
   template <class V>
