@@ -14,6 +14,10 @@ LISTENS = {
     "prediction": {"TARGET", "OBSTACLES"},
     "planning": {"PREDICTION", "OBSTACLES", "POSE", "TRACKING"},
     "control": {"PLAN", "OBSTACLES", "POSE"},
+    "mission": {"COMMAND", "POSE", "OBSTACLES", "TARGET", "PLAN", "TRACKING", "ATTITUDE_SETPOINT",
+                "LIDAR_STATUS", "CAMERA_STATUS", "ODOMETRY_STATUS", "MAPPING_STATUS",
+                "PERCEPTION_STATUS", "PREDICTION_STATUS", "PLANNING_STATUS", "CONTROL_STATUS",
+                "FCU_STATUS", "SIMULATOR_STATUS"},
     "fcu": {"ATTITUDE_SETPOINT", "POSE"},
     "simulator": {"ATTITUDE_SETPOINT", "POSE"},  # in place of fcu
 }
