@@ -37,6 +37,12 @@ add_test(NAME hostile_bus
   WORKING_DIRECTORY ${CMAKE_SOURCE_DIR})
 set_tests_properties(hostile_bus PROPERTIES TIMEOUT 200 FIXTURES_REQUIRED recorded_flight)
 
+add_test(NAME flight_command
+  COMMAND ${CMAKE_SOURCE_DIR}/test/flight/in_namespace.sh
+          python3 -B ${CMAKE_SOURCE_DIR}/test/flight/command_test.py ${bin}
+  WORKING_DIRECTORY ${CMAKE_SOURCE_DIR})
+set_tests_properties(flight_command PROPERTIES TIMEOUT 60)
+
 add_test(NAME flight_live
   COMMAND ${CMAKE_SOURCE_DIR}/test/flight/in_namespace.sh deploy/fly gym --seed 1
   WORKING_DIRECTORY ${CMAKE_SOURCE_DIR})
