@@ -13,7 +13,7 @@ LISTENS = {
     "perception": {"CAMERA_IMAGE", "LIDAR_SCAN", "POSE"},
     "prediction": {"TARGET", "OBSTACLES"},
     "planning": {"PREDICTION", "OBSTACLES", "POSE", "TRACKING"},
-    "control": {"PLAN", "OBSTACLES", "POSE"},
+    "control": {"PLAN", "OBSTACLES", "POSE", "FLIGHT_STATE"},
     "mission": {"COMMAND", "POSE", "OBSTACLES", "TARGET", "PLAN", "TRACKING", "ATTITUDE_SETPOINT",
                 "LIDAR_STATUS", "CAMERA_STATUS", "ODOMETRY_STATUS", "MAPPING_STATUS",
                 "PERCEPTION_STATUS", "PREDICTION_STATUS", "PLANNING_STATUS", "CONTROL_STATUS",
