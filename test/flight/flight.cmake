@@ -20,6 +20,11 @@ add_test(NAME flight_forest
   COMMAND ${bin}/chase-flight ${CMAKE_SOURCE_DIR}/deploy/scenarios/forest.yaml --seed 1 --quiet)
 set_tests_properties(flight_forest PROPERTIES TIMEOUT 400)
 
+# From take-off to the motors' end on command; its criteria decide.
+add_test(NAME flight_mission
+  COMMAND ${bin}/chase-flight ${CMAKE_SOURCE_DIR}/deploy/scenarios/mission.yaml --seed 1 --quiet)
+set_tests_properties(flight_mission PROPERTIES TIMEOUT 300)
+
 foreach(row IN ITEMS "odometry:POSE;SCAN_REGISTERED" "mapping:OBSTACLES;MAP" "perception:TARGET"
                      "prediction:PREDICTION" "planning:PLAN" "control:ATTITUDE_SETPOINT"
                      "simulator:TRUTH;IMU;LIDAR_SCAN;CAMERA_IMAGE")
