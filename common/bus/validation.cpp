@@ -109,8 +109,41 @@ std::string Problem(const camera_image_t& m) {
       .Result();
 }
 
+std::string Problem(const command_ack_t& m) {
+  return Check()
+      .Time(m.utime)
+      .Code("kind", m.kind, command_t::STOP)
+      .Code("verdict", m.verdict, command_ack_t::REFUSED)
+      .Result();
+}
+
+std::string Problem(const command_t& m) {
+  return Check()
+      .Time(m.utime)
+      .Code("kind", m.kind, command_t::STOP)
+      .Number("arguments", m.arguments)
+      .Result();
+}
+
 std::string Problem(const event_t& m) {
   return Check().Time(m.utime).Code("phase", m.phase, 1).Result();
+}
+
+std::string Problem(const flight_state_t& m) {
+  return Check()
+      .Time(m.utime)
+      .Code("state", m.state, flight_state_t::EMERGENCY)
+      .Code("has_home", m.has_home, 1)
+      .Number("home", m.home)
+      .Result();
+}
+
+std::string Problem(const health_t& m) {
+  Check check;
+  check.Time(m.utime);
+  for (const process_health_t& p : m.processes)
+    check.Code("state", p.state, status_t::FAILED).Number("age", p.age);
+  return check.Result();
 }
 
 std::string Problem(const imu_t& m) {

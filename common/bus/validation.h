@@ -4,7 +4,11 @@
 
 #include "chase/attitude_setpoint_t.hpp"
 #include "chase/camera_image_t.hpp"
+#include "chase/command_ack_t.hpp"
+#include "chase/command_t.hpp"
 #include "chase/event_t.hpp"
+#include "chase/flight_state_t.hpp"
+#include "chase/health_t.hpp"
 #include "chase/imu_t.hpp"
 #include "chase/lidar_scan_t.hpp"
 #include "chase/map_t.hpp"
@@ -25,7 +29,11 @@ namespace chase::bus {
 /// empty string. Clouds may hold single points that are not finite; nodes leave those out.
 std::string Problem(const attitude_setpoint_t& m);
 std::string Problem(const camera_image_t& m);
+std::string Problem(const command_ack_t& m);
+std::string Problem(const command_t& m);
 std::string Problem(const event_t& m);
+std::string Problem(const flight_state_t& m);
+std::string Problem(const health_t& m);
 std::string Problem(const imu_t& m);
 std::string Problem(const lidar_scan_t& m);
 std::string Problem(const map_t& m);

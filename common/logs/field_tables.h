@@ -3,7 +3,11 @@
 #include "chase/attitude_setpoint_t.hpp"
 #include "chase/camera_image_t.hpp"
 #include "chase/channel_status_t.hpp"
+#include "chase/command_ack_t.hpp"
+#include "chase/command_t.hpp"
 #include "chase/event_t.hpp"
+#include "chase/flight_state_t.hpp"
+#include "chase/health_t.hpp"
 #include "chase/imu_t.hpp"
 #include "chase/input_t.hpp"
 #include "chase/lidar_scan_t.hpp"
@@ -15,6 +19,7 @@
 #include "chase/polynomial_t.hpp"
 #include "chase/pose_t.hpp"
 #include "chase/prediction_t.hpp"
+#include "chase/process_health_t.hpp"
 #include "chase/proof_t.hpp"
 #include "chase/scan_registered_t.hpp"
 #include "chase/scenario_t.hpp"
@@ -285,6 +290,54 @@ void VisitFields(const tracking_t& m, V& v) {
   v("error", m.error);
   v("bound", m.bound);
   v("reason", m.reason);
+}
+
+template <class V>
+void VisitFields(const command_t& m, V& v) {
+  VisitHead(m, v);
+  v("id", m.id);
+  v("kind", m.kind);
+  v("n_arguments", m.n_arguments);
+  v("arguments", m.arguments);
+}
+
+template <class V>
+void VisitFields(const command_ack_t& m, V& v) {
+  VisitHead(m, v);
+  v("command_sender", m.command_sender);
+  v("command_start", m.command_start);
+  v("id", m.id);
+  v("kind", m.kind);
+  v("verdict", m.verdict);
+  v("reason", m.reason);
+}
+
+template <class V>
+void VisitFields(const flight_state_t& m, V& v) {
+  VisitHead(m, v);
+  v("epoch", m.epoch);
+  v("state", m.state);
+  v("reason", m.reason);
+  v("since", m.since);
+  v("has_home", m.has_home);
+  v("home", m.home);
+  v("n_missing", m.n_missing);
+  v("missing", m.missing);
+}
+
+template <class V>
+void VisitFields(const process_health_t& m, V& v) {
+  v("name", m.name);
+  v("state", m.state);
+  v("age", m.age);
+  v("restarts", m.restarts);
+}
+
+template <class V>
+void VisitFields(const health_t& m, V& v) {
+  VisitHead(m, v);
+  v("n_processes", m.n_processes);
+  v("processes", m.processes);
 }
 
 template <class V>

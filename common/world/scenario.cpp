@@ -137,10 +137,19 @@ std::string WorldSpec::Problem() const {
                 FirstOf("trees", trees), Within("forest", forest)});
 }
 
+std::string CommandSpec::Problem() const {
+  static const std::vector<std::string> known = {"takeoff", "chase", "hold", "search",
+                                                 "return",  "land",  "stop"};
+  std::string all;
+  for (const auto& one : known) all += (all.empty() ? "" : ", ") + one;
+  return Check(std::find(known.begin(), known.end(), command) != known.end(), "command",
+               "'" + command + "'", "one of " + all);
+}
+
 std::string ServiceOverride::Problem() const {
-  static const std::vector<std::string> known = {"lidar",    "camera",     "odometry",
-                                                 "mapping",  "perception", "prediction",
-                                                 "planning", "control",    "simulator"};
+  static const std::vector<std::string> known = {"lidar",      "camera",     "odometry", "mapping",
+                                                 "perception", "prediction", "planning", "control",
+                                                 "mission",    "simulator"};
   std::string all;
   for (const auto& one : known) all += (all.empty() ? "" : ", ") + one;
   return Check(std::find(known.begin(), known.end(), name) != known.end(), "name", "'" + name + "'",
@@ -168,6 +177,20 @@ std::string TooLate(const std::vector<FaultSpec>& faults, double duration_s) {
   return "";
 }
 
+/// A command that never comes, or one that comes before the one above it.
+std::string OutOfTime(const Scenario& s) {
+  double before = -s.settle_s;
+  for (std::size_t i = 0; i < s.commands.size(); ++i) {
+    const double at = s.commands[i].at_s;
+    const std::string problem =
+        Check(at >= before && at < s.duration_s, "at_s", Number(at),
+              "from " + Number(before) + " to below duration_s, " + Number(s.duration_s));
+    if (!problem.empty()) return "commands[" + std::to_string(i) + "]: " + problem;
+    before = at;
+  }
+  return "";
+}
+
 }  // namespace
 
 std::string Scenario::Problem() const {
@@ -179,8 +202,8 @@ std::string Scenario::Problem() const {
              "2 or more, or target.path_file be given"),
        Within("world", world), FirstOf("movers", movers), Within("target", target),
        Within("chaser", chaser), Within("sensors", sensors), Within("wind", wind),
-       FirstOf("faults", faults), TooLate(faults, duration_s), FirstOf("services", services),
-       NamedTwice(services)});
+       FirstOf("faults", faults), TooLate(faults, duration_s), FirstOf("commands", commands),
+       OutOfTime(*this), FirstOf("services", services), NamedTwice(services)});
 }
 
 Scenario ParseScenario(const std::string& yaml, const std::string& origin) {

@@ -234,6 +234,8 @@ struct WindSpec {
 struct CriteriaSpec {
   double safe_ratio = 1.0, visible_ratio = 0.95, in_image_ratio = 0.9;
   double distance_ratio_max = -1.0, real_time_factor = -1.0;
+  std::vector<std::string> flight_states;
+  double touchdown_speed = -1.0, motors_off = -1.0;
   template <class V>
   void Visit(V& v) {
     v("safe_ratio", safe_ratio, "at least");
@@ -241,7 +243,22 @@ struct CriteriaSpec {
     v("in_image_ratio", in_image_ratio, "at least");
     v("distance_ratio_max", distance_ratio_max, "at most");
     v("real_time_factor", real_time_factor, "at least; live flights only");
+    v("flight_states", flight_states, "that the flight is in, in this order, others between them");
+    v("touchdown_speed", touchdown_speed, "at most, m/s");
+    v("motors_off", motors_off, "after touchdown, at most, s");
   }
+};
+
+/// What an operator commands during the flight: an entry of a scenario's `commands`.
+struct CommandSpec {
+  std::string command;
+  double at_s = 0.0;
+  template <class V>
+  void Visit(V& v) {
+    v("command", command, "takeoff, chase, hold, search, return, land or stop");
+    v("at_s", at_s, "mission time, s; negative: before the target moves");
+  }
+  std::string Problem() const;
 };
 
 /// One override of a service's config: `services: [{name: planning, config: "horizon: 2.5"}]`.
@@ -268,6 +285,7 @@ struct Scenario {
   WindSpec wind;
   CriteriaSpec criteria;
   std::vector<FaultSpec> faults;
+  std::vector<CommandSpec> commands;
   std::vector<ServiceOverride> services;
   template <class V>
   void Visit(V& v) {
@@ -284,6 +302,7 @@ struct Scenario {
     v("wind", wind, "");
     v("criteria", criteria, "");
     v("faults", faults, "what goes wrong");
+    v("commands", commands, "of an operator; none: it takes off and chases by itself");
     v("services", services, "");
   }
   /// Names the first field that makes no sense, its value and the limit; empty when all is well.

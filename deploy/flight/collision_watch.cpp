@@ -7,8 +7,11 @@ namespace chase::flight {
 void CollisionWatch::Add(const truth_t& truth) {
   if (time_) return;
   if (!start_) start_ = logs::MissionStart(truth);
-  const logs::TruthSample sample = logs::ToSample(truth, *start_);
+  logs::TruthSample sample = logs::ToSample(truth, *start_);
+  sample.may_stand = may_stand_;
   if (record_.InMission(sample.t) && !score_(sample).Safe()) time_ = sample.t;
 }
+
+void CollisionWatch::Add(const flight_state_t& state) { may_stand_ = logs::MayStand(state.state); }
 
 }  // namespace chase::flight

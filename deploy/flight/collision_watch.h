@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <optional>
 
+#include "chase/flight_state_t.hpp"
 #include "chase/truth_t.hpp"
 #include "logs/src/flight_record.h"
 #include "logs/src/score.h"
@@ -17,6 +18,7 @@ class CollisionWatch {
   }
 
   void Add(const truth_t& truth);
+  void Add(const flight_state_t& state);
 
   /// Mission time of the first contact, s.
   std::optional<double> time() const { return time_; }
@@ -25,6 +27,7 @@ class CollisionWatch {
   logs::Scorer score_;
   logs::FlightRecord record_;     // of the scenario alone; says when the mission lasts
   std::optional<int64_t> start_;  // mission time zero, microseconds
+  bool may_stand_ = false;
   std::optional<double> time_;
 };
 

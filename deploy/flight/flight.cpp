@@ -3,6 +3,8 @@
 #include <cmath>
 #include <memory>
 
+#include "deploy/flight/operator.h"
+
 namespace chase::flight {
 
 namespace {
@@ -22,7 +24,7 @@ int64_t MissionUtime(double settle, double t) {
 const std::map<std::string, int64_t>& Latencies() {
   static const std::map<std::string, int64_t> latencies = {
       {"simulator", 0},     {"odometry", 2000}, {"mapping", 20000}, {"perception", 8000},
-      {"prediction", 2000}, {"planning", 2000}, {"control", 500},
+      {"prediction", 2000}, {"planning", 2000}, {"control", 500},   {"mission", 1000},
   };
   return latencies;
 }
@@ -42,6 +44,11 @@ Flight::Flight(const world::Scenario& scenario, const FlightConfigs& configs)
   Add<prediction::PredictionNode>(&lockstep_, "prediction", configs.prediction);
   Add<planning::PlanningNode>(&lockstep_, "planning", configs.planning);
   Add<control::ControlNode>(&lockstep_, "control", configs.control);
+  if (scenario.commands.empty()) return;  // takes off and chases by itself, without a mission
+  Add<mission::MissionNode>(&lockstep_, "mission", configs.mission);
+  lockstep_.Add("command", 0, [commands = scenario.commands, this](bus::Bus& bus) {
+    return std::make_unique<Operator>(bus, commands, MissionUtime(settle_, 0.0));
+  });
 }
 
 void Flight::RunUntil(double t) { lockstep_.RunUntil(MissionUtime(settle_, t)); }

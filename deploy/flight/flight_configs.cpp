@@ -29,6 +29,9 @@ void Derive(const world::Scenario& scenario, FlightConfigs* configs) {
   configs->planning.planner.desired_distance = chaser.desired_distance;
   configs->planning.planner.drone_radius = chaser.radius;
   configs->control.drone_radius = chaser.radius;
+  if (!scenario.commands.empty()) return;
+  configs->mission.autostart = true;
+  configs->mission.give_up = 0.0;
 }
 
 /// The image's edges less a margin: what calibration, drag and control tilt the body by.
@@ -85,6 +88,7 @@ FlightConfigs Configure(const world::Scenario& scenario, const FlightOptions& op
   configs.control.tracking_tube = configs.planning.planner.tracking_tube;
   configs.control.sigmas = configs.planning.planner.sigmas;
   Override(scenario, "control", &configs.control);
+  Override(scenario, "mission", &configs.mission);
   if (!options.sensors.empty()) configs.simulator.sensors = options.sensors;
   if (!options.planner.empty()) configs.planning.planner_name = options.planner;
   AddFaults(scenario, options, &configs);
@@ -99,9 +103,10 @@ std::string DumpService(const FlightConfigs& configs, const std::string& service
   if (service == "prediction") return config::Dump(configs.prediction);
   if (service == "planning") return config::Dump(configs.planning);
   if (service == "control") return config::Dump(configs.control);
+  if (service == "mission") return config::Dump(configs.mission);
   throw std::runtime_error("--print-config " + service +
                            ": no such process in a flight; use simulator, odometry, mapping, "
-                           "perception, prediction, planning or control");
+                           "perception, prediction, planning, control or mission");
 }
 
 }  // namespace chase::flight

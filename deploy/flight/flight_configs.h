@@ -7,6 +7,7 @@
 #include "common/world/scenario.h"
 #include "services/control/control_node.h"
 #include "services/mapping/mapping_node.h"
+#include "services/mission/mission_node.h"
 #include "services/odometry/odometry_node.h"
 #include "services/perception/perception_node.h"
 #include "services/planning/planning_node.h"
@@ -33,6 +34,7 @@ struct FlightConfigs {
   prediction::PredictionConfig prediction;
   planning::PlanningConfig planning;
   control::ControlConfig control;
+  mission::MissionConfig mission;
   std::vector<world::FaultSpec> faults;  ///< each with its time and duration
 };
 

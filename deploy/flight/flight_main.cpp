@@ -37,6 +37,9 @@ void Observe(const std::string& channel, const bus::Bus::Bytes& bytes, Progress*
   const int size = static_cast<int>(bytes.size());
   scenario_t scenario;
   truth_t truth;
+  flight_state_t state;
+  if (watch != nullptr && channel == "FLIGHT_STATE" && state.decode(bytes.data(), 0, size) > 0)
+    watch->Add(state);
   if (progress != nullptr && channel == "SCENARIO" && scenario.decode(bytes.data(), 0, size) > 0)
     progress->SetScenario(scenario);
   if (progress == nullptr && watch == nullptr) return;

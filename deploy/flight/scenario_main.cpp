@@ -8,7 +8,8 @@
 
 /// Checks a scenario file without the services, so that it is the first program that is built.
 int main(int argc, char** argv) {
-  CLI::App app("Checks a scenario file; prints its length as one line of JSON.", "chase-scenario");
+  CLI::App app("Checks a scenario file; prints its length and commands as one line of JSON.",
+               "chase-scenario");
   chase::config::AddVersion(&app);
   std::string file;
   app.add_option("scenario", file, "scenario file")->required();
@@ -16,8 +17,12 @@ int main(int argc, char** argv) {
     app.parse(argc, argv);
     const chase::world::Scenario scenario = chase::world::LoadScenario(file);
     chase::world::TargetMotion(scenario);  // reads its path_file
-    fmt::print("{{\"duration_s\": {:.1f}, \"settle_s\": {:.1f}}}\n", scenario.duration_s,
-               scenario.settle_s);
+    std::string commands;
+    for (const chase::world::CommandSpec& c : scenario.commands)
+      commands += fmt::format("{}{{\"command\": \"{}\", \"at_s\": {}}}",
+                              commands.empty() ? "" : ", ", c.command, c.at_s);
+    fmt::print("{{\"duration_s\": {:.1f}, \"settle_s\": {:.1f}, \"commands\": [{}]}}\n",
+               scenario.duration_s, scenario.settle_s, commands);
     return 0;
   } catch (const CLI::Success& e) {
     return app.exit(e);

@@ -89,14 +89,14 @@ def ask(program, *arguments):
 
 def build_and_check(scenario, view=False):
     """Builds what flies. The scenario is read as soon as there is a program that can, long before
-    the rest is built. Returns its length [s], take-off included."""
+    the rest is built. Returns its length [s], take-off included, and its operator's commands."""
     set_up()
     build("chase-scenario")
-    length = json.loads(ask("chase-scenario", scenario))
+    told = json.loads(ask("chase-scenario", scenario))
     build(*(row["binary"] for row in flight_processes()), "chase-flight", "chase-flight-monitor",
-          "chase-report", *(["chase-viewer"] if view else []))
+          "chase-report", "chase-command", *(["chase-viewer"] if view else []))
     ask("chase-flight", scenario, "--print-config", "simulator")  # reads the services' overrides
-    return length["duration_s"] + length["settle_s"]
+    return told["duration_s"] + told["settle_s"], told.get("commands", [])
 
 
 def warn_of_disk(seconds):
@@ -156,11 +156,12 @@ def write_config(folder, scenario, seed, name):
 class Flight:
     """The processes of one flight and the folder that they leave."""
 
-    def __init__(self, scenario, seed, url):
+    def __init__(self, scenario, seed, url, commands=()):
         self.folder = flight_folder(scenario)
         self.scenario, self.seed = scenario, seed
         self.env = {"LCM_DEFAULT_URL": url}
         self.services, self.logger, self.monitor, self.viewer = [], None, None, None
+        self.commands, self.given = list(commands), []
 
     def child(self, name, command, **options):
         return processes.Child(name, command, self.folder / f"{name}.log", self.env, **options)
@@ -206,6 +207,13 @@ class Flight:
         elif child:
             raise FlightError(f"{sentence}; the end of {child.log}:\n{child.log_tail()}")
 
+    def command(self, mission_time):
+        """Gives the operator's commands that are due."""
+        while self.commands and self.commands[0]["at_s"] <= mission_time:
+            name = self.commands.pop(0)["command"]
+            self.given.append(self.child(f"command-{len(self.given) + 1}-{name}",
+                                         [BIN / "chase-command", name]))
+
     def watch(self):
         """Shows progress until the mission's end."""
         last_time, moved = None, time.monotonic()
@@ -214,6 +222,7 @@ class Flight:
             if line:
                 progress = json.loads(line)
                 show(progress)
+                self.command(progress["mission_time"])
                 if progress["done"]:
                     return
                 if progress["mission_time"] != last_time:
@@ -227,7 +236,7 @@ class Flight:
 
     def stop(self):
         """Services first, the logger last, so that the log holds their last words."""
-        extras = [c for c in (self.monitor, self.viewer) if c]
+        extras = [c for c in (self.monitor, self.viewer, *self.given) if c]
         processes.stop(self.services + extras)
         if self.logger:
             processes.stop([self.logger])
@@ -259,11 +268,12 @@ def report(folder):
 
 def fly(options):
     scenario = find_scenario(options.scenario)
-    warn_of_disk(build_and_check(scenario, options.view))
+    seconds, commands = build_and_check(scenario, options.view)
+    warn_of_disk(seconds)
     raise_receive_buffers()
     url = bus.url()
     check_bus(url)
-    flight = Flight(scenario, options.seed, url)
+    flight = Flight(scenario, options.seed, url, commands)
     print(f"flying {scenario.stem}, seed {options.seed}, into {flight.folder}", flush=True)
     try:
         flight.start(options.view)

@@ -25,6 +25,15 @@ struct TruthSample {
   Eigen::Vector2d target_px = Eigen::Vector2d::Zero();
   bool target_in_image = false;
   double visible_share = 0.0;  ///< of the target's pixels in the last image
+  /// The flight's state has it on the ground, or on the way from or to it: touching that is no
+  /// harm.
+  bool may_stand = false;
+};
+
+/// The flight's state from then on.
+struct StateSample {
+  double t = 0.0;
+  int state = 0;  ///< flight_state_t's constants
 };
 
 struct PoseSample {
@@ -82,6 +91,7 @@ struct FlightRecord {
   std::vector<PredictionSample> predictions;
   std::vector<PlanSample> plans;
   std::vector<FaultSample> faults;
+  std::vector<StateSample> states;  ///< one for every change; none: no mission process was there
   std::vector<StageFigures> stages;
   std::vector<PerceivedObstacle> obstacles;
   LogInfo log;                             ///< what it was read from, and what is missing there

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "logs/src/landing_figures.h"
+
 namespace chase::logs {
 namespace {
 
@@ -34,8 +36,10 @@ Eigen::Vector3d Wanted(const PlanSample& plan, double t) {
 void AddCertificates(const FlightRecord& record, const std::vector<SampleScore>& scores,
                      Metrics* m) {
   Flown flown(record), followed(record);
-  long kept = 0;
+  long kept = 0, asked = 0;
   for (size_t i = 0; i < scores.size(); ++i) {
+    if (ComesDown(record, scores[i].t)) continue;
+    ++asked;
     const PlanSample* plan = flown.At(scores[i].t);
     if (!plan) continue;
     const double step = i + 1 < scores.size() ? scores[i + 1].t - scores[i].t : 0.0;
@@ -45,12 +49,11 @@ void AddCertificates(const FlightRecord& record, const std::vector<SampleScore>&
         m->certified_clearance_m.value_or(plan->certified_clearance), plan->certified_clearance);
     kept += scores[i].clearance >= plan->certified_clearance;
   }
-  if (!scores.empty())
-    m->certificate_kept_ratio = static_cast<double>(kept) / static_cast<double>(scores.size());
+  if (asked > 0) m->certificate_kept_ratio = static_cast<double>(kept) / static_cast<double>(asked);
   std::vector<double> errors;
   long exceeded = 0;
   for (const PoseSample& pose : record.poses) {
-    if (!record.InMission(pose.t)) continue;
+    if (!record.InMission(pose.t) || ComesDown(record, pose.t)) continue;
     const PlanSample* plan = followed.At(pose.t);
     if (!plan) continue;
     errors.push_back((pose.p - Wanted(*plan, pose.t)).norm());

@@ -6,6 +6,7 @@
 
 #include "logs/src/estimate_errors.h"
 #include "logs/src/flown_plans.h"
+#include "logs/src/landing_figures.h"
 
 namespace chase::logs {
 namespace {
@@ -150,6 +151,11 @@ void AddCriteria(const FlightRecord& record, Metrics* m) {
     m->criteria["distance_ratio_max"] = AtMost(m->distance_ratio, c.distance_ratio_max);
   if (c.real_time_factor >= 0.0 && m->real_time_factor)
     m->criteria["real_time_factor"] = AtLeast(m->real_time_factor, c.real_time_factor);
+  if (!c.flight_states.empty())
+    m->criteria["flight_states"] = InOrder(c.flight_states, m->flight_states);
+  if (c.touchdown_speed >= 0.0)
+    m->criteria["touchdown_speed"] = AtMost(m->touchdown_speed_mps, c.touchdown_speed);
+  if (c.motors_off >= 0.0) m->criteria["motors_off"] = AtMost(m->motors_off_s, c.motors_off);
 }
 
 }  // namespace
@@ -174,6 +180,7 @@ Metrics Compute(const FlightRecord& record, const std::vector<SampleScore>& scor
   AddCertificates(record, scores, &m);
   AddEstimates(record, &m);
   AddLosses(record.log, &m);
+  AddLanding(record, &m);
   AddCriteria(record, &m);
   return m;
 }

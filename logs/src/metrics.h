@@ -14,6 +14,12 @@ struct TimeFigures {
   double mean = 0.0, p50 = 0.0, p99 = 0.0, max = 0.0;  ///< ms
 };
 
+/// A state that the flight was in.
+struct StateFigures {
+  std::string name;   ///< of flight_state_t's constant
+  double at_s = 0.0;  ///< mission time of its beginning
+};
+
 /// Figures of a flight; empty where the log holds nothing to compute them from. Definitions: see
 /// logs/README.md.
 struct Metrics {
@@ -39,6 +45,9 @@ struct Metrics {
   std::map<std::string, double> longest_gap_s;   ///< by channel, between the log's events
   std::vector<std::string> losses;               ///< a line for each, for people
   bool log_whole = true;                         ///< neither cut off nor damaged
+  std::vector<StateFigures> flight_states;       ///< in their order; none without a mission process
+  Figure touchdown_speed_mps;                    ///< of the landing that ended the flight
+  Figure motors_off_s;                           ///< after touchdown
   std::map<std::string, bool> criteria;
 
   bool Passed() const;

@@ -81,6 +81,12 @@ std::string MetricsJson(const FlightRecord& record, const Metrics& m) {
   j["longest_gap_s"] = Json(m.longest_gap_s);
   j["losses"] = Json(m.losses);
   j["log_whole"] = m.log_whole;
+  if (!m.flight_states.empty()) {
+    for (const StateFigures& s : m.flight_states)
+      j["flight_states"].push_back({{"state", s.name}, {"at_s", s.at_s}});
+    j["touchdown_speed_mps"] = Number(m.touchdown_speed_mps);
+    j["motors_off_s"] = Number(m.motors_off_s);
+  }
   j["criteria"] = Json(m.criteria);
   return j.dump(2) + "\n";
 }

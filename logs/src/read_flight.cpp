@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "chase/event_t.hpp"
+#include "chase/flight_state_t.hpp"
 #include "chase/obstacles_t.hpp"
 #include "chase/plan_t.hpp"
 #include "chase/pose_t.hpp"
@@ -44,6 +45,7 @@ class Gatherer {
     Take(e, "PREDICTION", &predictions_);
     Take(e, "PLAN", &plans_);
     Take(e, "FAULT", &faults_);
+    Take(e, "FLIGHT_STATE", &states_);
     TakeLast(e, "SCENARIO", &scenario_);
     TakeLast(e, "OBSTACLES", &obstacles_);
     status_t status;
@@ -60,6 +62,7 @@ class Gatherer {
     record.seed = scenario_->seed;
     origin_ = MissionStart(truth_.front());
     AddTruth(&record);
+    AddStates(&record);
     AddEstimates(&record);
     AddPlans(&record);
     AddFaults(&record);
@@ -95,6 +98,17 @@ class Gatherer {
     for (const truth_t& m : truth_) record->truth.push_back(ToSample(m, origin_));
     std::stable_sort(record->truth.begin(), record->truth.end(),
                      [](const TruthSample& a, const TruthSample& b) { return a.t < b.t; });
+  }
+
+  void AddStates(FlightRecord* record) const {
+    for (const flight_state_t& m : states_)
+      if (record->states.empty() || record->states.back().state != m.state)
+        record->states.push_back({Time(m.utime), m.state});
+    size_t next = 0;
+    for (TruthSample& s : record->truth) {
+      while (next < record->states.size() && record->states[next].t <= s.t) ++next;
+      s.may_stand = next > 0 && MayStand(record->states[next - 1].state);
+    }
   }
 
   void AddEstimates(FlightRecord* record) const {
@@ -161,6 +175,7 @@ class Gatherer {
   std::vector<prediction_t> predictions_;
   std::vector<plan_t> plans_;
   std::vector<event_t> faults_;
+  std::vector<flight_state_t> states_;
   std::optional<scenario_t> scenario_;
   std::optional<obstacles_t> obstacles_;
   std::map<std::string, status_t> statuses_;
@@ -170,6 +185,12 @@ class Gatherer {
 
 int64_t MissionStart(const truth_t& truth) {
   return truth.utime - std::llround(truth.mission_time * 1e6);
+}
+
+bool MayStand(int state) {
+  return state == flight_state_t::IDLE || state == flight_state_t::READY ||
+         state == flight_state_t::TAKEOFF || state == flight_state_t::LAND ||
+         state == flight_state_t::DONE;
 }
 
 TruthSample ToSample(const truth_t& m, int64_t start) {

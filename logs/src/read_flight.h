@@ -12,6 +12,9 @@ int64_t MissionStart(const truth_t& truth);
 /// The sample of a message; `start` is mission time zero, microseconds.
 TruthSample ToSample(const truth_t& message, int64_t start);
 
+/// Is a touch of the ground to be expected in a state of flight_state_t?
+bool MayStand(int state);
+
 /// Reads what metrics need from a flight log; a channel prefix is left out of account. Throws
 /// std::runtime_error with one line when the file is no log or holds no SCENARIO or TRUTH.
 FlightRecord ReadFlight(const std::string& log);

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <limits>
 
 #include "logs/src/metrics.h"
 
@@ -42,7 +43,7 @@ SampleScore Scorer::operator()(const TruthSample& s) const {
 }
 
 std::string Scorer::Nearest(const TruthSample& s) const {
-  double nearest = ToGround(s.p);
+  double nearest = ToGround(s);
   std::string name = "ground";
   const auto consider = [&](double distance, const std::string& what) {
     if (distance >= nearest) return;
@@ -57,7 +58,9 @@ std::string Scorer::Nearest(const TruthSample& s) const {
   return name;
 }
 
-double Scorer::ToGround(const Vector3d& p) const {
+double Scorer::ToGround(const TruthSample& s) const {
+  const Vector3d& p = s.p;
+  if (s.may_stand) return std::numeric_limits<double>::infinity();
   return p.z() - world::GroundHeight(scenario_.world.ground, p.x(), p.y());
 }
 
@@ -66,7 +69,7 @@ double Scorer::ToTarget(const TruthSample& s) const {
 }
 
 double Scorer::Clearance(const TruthSample& s, const std::vector<Solid>& movers) const {
-  double nearest = std::min(ToGround(s.p), ToTarget(s));
+  double nearest = std::min(ToGround(s), ToTarget(s));
   for (const Solid& mover : movers) nearest = std::min(nearest, world::SignedDistance(mover, s.p));
   for (const Bounded& b : solids_)
     if ((s.p - b.solid.center).norm() - b.radius < nearest)

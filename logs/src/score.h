@@ -18,8 +18,8 @@ struct SampleScore {
   bool Safe() const { return clearance > 0.0; }
 };
 
-/// Scores samples against the scenario's own solids; the ground and the target's body count for
-/// clearance, not for sight.
+/// Scores samples against the scenario's own solids; the ground (except where the flight may stand)
+/// and the target's body count for clearance, not for sight.
 class Scorer {
  public:
   explicit Scorer(const world::Scenario& scenario);
@@ -38,7 +38,7 @@ class Scorer {
     double radius;
   };
 
-  double ToGround(const Eigen::Vector3d& p) const;
+  double ToGround(const TruthSample& sample) const;
   double ToTarget(const TruthSample& sample) const;
   double Clearance(const TruthSample& sample, const std::vector<world::Solid>& movers) const;
   bool Visible(const TruthSample& sample, const std::vector<world::Solid>& movers) const;

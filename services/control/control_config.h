@@ -24,6 +24,7 @@ struct ControlConfig {
   double sigmas = 2.0;
   double reset_distance = 0.9;  ///< m
   double land_speed = 0.5;      ///< m/s
+  double descent_speed = 0.4;   ///< m/s
   double lost_descent = 0.15;   ///< m/s^2
 
   template <class V>
@@ -46,6 +47,8 @@ struct ControlConfig {
     v("reset_distance", reset_distance,
       "a new plan starts this near to the reference or to the body, m");
     v("land_speed", land_speed, "of sinking by the inertial velocity once the pose is lost, m/s");
+    v("descent_speed", descent_speed,
+      "of a landing that was asked for, m/s; its loop goes a tenth beyond");
     v("lost_descent", lost_descent, "thrust short of hovering where there is no velocity, m/s^2");
   }
 

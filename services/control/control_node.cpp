@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "chase/attitude_setpoint_t.hpp"
+#include "chase/flight_state_t.hpp"
 #include "chase/tracking_t.hpp"
 #include "common/bus/convert.h"
 #include "common/bus/plan_message.h"
@@ -42,6 +43,9 @@ ControlNode::ControlNode(bus::Bus& bus, const ControlConfig& config)
     : bus_(bus), config_(config), controller_(config) {
   bus_.Subscribe<plan_t>("PLAN", [this](const plan_t& m) { OnPlan(m); });
   bus_.Subscribe<obstacles_t>("OBSTACLES", [this](const obstacles_t& m) { OnObstacles(m); });
+  bus_.Subscribe<flight_state_t>("FLIGHT_STATE", [this](const flight_state_t& m) {
+    controller_.SetLanding(m.state == flight_state_t::LAND);
+  });
   bus_.Subscribe<pose_t>("POSE", [this](const pose_t& m) { OnPose(m); });
 }
 
@@ -155,7 +159,8 @@ std::string ControlNode::Reason() const {
     case Following::kBrake:
       return pose_reason_.empty() ? "no plan: braking" : "pose lost, braking: " + pose_reason_;
     case Following::kLand:
-      return controller_.is_down() ? "landed: motors off" : "pose lost, landing: " + pose_reason_;
+      if (controller_.is_down()) return "landed: motors off";
+      return pose_reason_.empty() ? "landing" : "pose lost, landing: " + pose_reason_;
   }
   return "";
 }
@@ -179,7 +184,9 @@ bus::NodeReport ControlNode::Report() const {
       return {State::kDegraded, Reason() + plans};
     case Following::kBrake:
     case Following::kLand:
-      return {State::kFailed, Reason() + plans};
+      return {pose_reason_.empty() && controller_.following() == Following::kLand ? State::kOk
+                                                                                  : State::kFailed,
+              Reason() + plans};
   }
   return {};
 }

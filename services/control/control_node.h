@@ -18,8 +18,8 @@
 
 namespace chase::control {
 
-/// PLAN, OBSTACLES and POSE in, ATTITUDE_SETPOINT and TRACKING out; every POSE triggers. Ticks
-/// only notice that there are none.
+/// PLAN, OBSTACLES, FLIGHT_STATE and POSE in, ATTITUDE_SETPOINT and TRACKING out; every POSE
+/// triggers. Ticks only notice that there are none.
 class ControlNode : public bus::Node {
  public:
   ControlNode(bus::Bus& bus, const ControlConfig& config);

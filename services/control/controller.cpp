@@ -11,6 +11,7 @@ namespace chase::control {
 namespace {
 
 constexpr double kJumpBack = 1.0;  // s; less is jitter between publishers
+constexpr double kAtRest = 0.3;    // m/s: gusts about a wind of 3 m/s stir a hovering body by less
 
 bool Usable(const Estimate& e) {
   return e.p_WB.allFinite() && e.v_WB.allFinite() && e.a_WB.allFinite() &&
@@ -59,7 +60,16 @@ std::optional<Setpoint> Controller::Update(double t, const Estimate& estimate, H
   return Follow(t, estimate, dt);
 }
 
+void Controller::SetLanding(bool wanted) {
+  if (lands_ && !wanted && !is_down()) {
+    spot_.reset();
+    landing_ = Landing(config_, config_.land_speed);
+  }
+  lands_ = wanted;
+}
+
 std::optional<Setpoint> Controller::Follow(double t, const Estimate& estimate, double dt) {
+  if (const std::optional<Setpoint> setpoint = Descend(estimate, dt)) return setpoint;
   const std::optional<Reference> now = plans_.At(t);
   const std::optional<Reference> ahead = plans_.At(t + config_.lead);
   if (!now || !ahead || !Finite(*now) || !Finite(*ahead)) return Brake(estimate);
@@ -82,6 +92,24 @@ std::optional<Setpoint> Controller::Follow(double t, const Estimate& estimate, d
   return setpoint;
 }
 
+// Held above the spot by the position, down by the vertical velocity alone.
+std::optional<Setpoint> Controller::Descend(const Estimate& estimate, double dt) {
+  if (!flying_ || !lands_ || (!spot_ && estimate.v_WB.norm() > kAtRest)) return std::nullopt;
+  if (!spot_) {
+    spot_ = estimate.p_WB;
+    landing_ = Landing(config_, config_.descent_speed);
+    yaw_on_spot_ = last_yaw_;
+  }
+  Reference down;
+  down.state.p = {spot_->x(), spot_->y(), estimate.p_WB.z()};
+  down.state.v.z() = estimate.v_WB.z();
+  down.state.a.z() = landing_.Lift(estimate, dt);
+  down.yaw = yaw_on_spot_;
+  following_ = Following::kLand;
+  const Setpoint setpoint = law_.Track(estimate, down, down, dt);
+  return Finite(setpoint) ? setpoint : law_.Level(last_yaw_, -config_.lost_descent);
+}
+
 std::optional<Setpoint> Controller::Brake(const Estimate& estimate) {
   if (!flying_) return std::nullopt;
   following_ = Following::kBrake;
@@ -94,8 +122,8 @@ std::optional<Setpoint> Controller::WithoutPose(double t, const Estimate& estima
   if (!flying_) return std::nullopt;
   lost_ = true;
   const bool inertial = health == Health::kLost;
-  if (inertial && !is_down() && t - last_usable_ <= world::kMostAge.velocity) {
-    landing_ = Landing(config_);
+  if (inertial && !spot_ && !is_down() && t - last_usable_ <= world::kMostAge.velocity) {
+    landing_ = Landing(config_, config_.land_speed);
     return Brake(estimate);
   }
   following_ = Following::kLand;

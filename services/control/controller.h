@@ -24,7 +24,7 @@ enum class Following {
   kPlan,
   kStop,   ///< no newer plan in time: the plan's stop, or its end
   kBrake,  ///< against the velocity: no plan, or no position
-  kLand,   ///< no velocity either: down
+  kLand,   ///< down: no velocity either, or asked for
 };
 
 /// Plans and pose in, setpoint out. Never anything that is not finite. Plans are to have passed
@@ -32,14 +32,20 @@ enum class Following {
 class Controller {
  public:
   explicit Controller(const ControlConfig& config)
-      : config_(config), law_(config), landing_(config) {}
+      : config_(config), law_(config), landing_(config, config.land_speed) {}
 
   /// Nothing, or why the plan is left out: it is late or unusable, or starts where neither the
   /// reference nor the body is by then.
   std::string AddPlan(const Plan& plan);
 
   /// Frame W has changed: all plans are void.
-  void ForgetPlans() { plans_.Clear(); }
+  void ForgetPlans() {
+    plans_.Clear();
+    spot_.reset();
+  }
+
+  /// A landing on the spot is asked for, or no more: it begins once the body is at rest.
+  void SetLanding(bool wanted);
 
   /// Setpoint for time t [s] of the estimate, nothing while there is nothing to fly. Once flying:
   /// no plan, brake; no usable pose, brake for as long as its velocity is good (kMostAge.velocity),
@@ -61,6 +67,7 @@ class Controller {
  private:
   std::optional<Setpoint> Follow(double t, const Estimate& estimate, double dt);
   std::optional<Setpoint> Brake(const Estimate& estimate);
+  std::optional<Setpoint> Descend(const Estimate& estimate, double dt);
   std::optional<Setpoint> WithoutPose(double t, const Estimate& estimate, Health health, double dt);
   void RestartIfTimeJumpedBack(double t);
   double StepTo(double t);
@@ -75,8 +82,10 @@ class Controller {
   Estimate last_estimate_;
   double last_usable_ = 0.0;  // s
   bool flying_ = false, lost_ = false;
+  bool lands_ = false;                   // a landing is asked for
+  std::optional<Eigen::Vector3d> spot_;  // above which it comes down, frame W, m
   Following following_ = Following::kNone;
-  double last_yaw_ = 0.0;  // rad
+  double last_yaw_ = 0.0, yaw_on_spot_ = 0.0;  // rad
   Eigen::Vector3d error_ = Eigen::Vector3d::Zero();
   int32_t plan_seq_ = -1;
   double overdue_ = 0.0;  // s

@@ -5,14 +5,15 @@
 
 namespace chase::control {
 
-/// Down to the ground by the vertical velocity of the inertial sensors, level, without a position.
+/// Down to the ground by the vertical velocity, which needs no position.
 /// The ground is what bears a part of the weight for a while: in the air the vertical acceleration
 /// is what thrust and weight make of it. After PX4's land detector (little thrust and no vertical
 /// motion for a time).
 class Landing {
  public:
-  explicit Landing(const ControlConfig& config)
-      : gain_(config.velocity_gain.z()), speed_(config.land_speed) {}
+  /// Sinks at `speed`, m/s.
+  Landing(const ControlConfig& config, double speed)
+      : gain_(config.velocity_gain.z()), speed_(speed) {}
 
   /// Thrust beyond that of hovering, m/s^2, after `dt` s with the last one.
   double Lift(const Estimate& estimate, double dt);

@@ -11,7 +11,6 @@
 namespace chase::planning {
 namespace {
 
-constexpr double kHoverDuration = 2.0;  // s
 constexpr double kShortestHorizon = 1.0;
 // s: control says 20 times a second whether it flies; nobody climbs before that was heard.
 constexpr double kHearControl = 0.3;
@@ -100,6 +99,18 @@ void Pilot::ChangeFrame() {
   obstacles_.clear();
   obstacles_time_ = -1e9;
   has_running_ = false;
+  home_.reset();
+  trail_.Clear();
+  way_back_.Reset();
+}
+
+void Pilot::SetTask(Task task, const std::optional<Eigen::Vector3d>& home) {
+  if (task_ != task) {
+    way_back_.Reset();
+    news_ = true;  // to be obeyed at once
+  }
+  task_ = task;
+  home_ = home;
 }
 
 bool Pilot::SeesObstacles(double t) const {
@@ -116,6 +127,14 @@ bool Pilot::IsDue(double t) const {
   return news_ && age >= config_.min_period - 1e-6;
 }
 
+// Nobody climbs before control has been heard; under a mission nobody who is not told to.
+bool Pilot::MayPlan(double t) const {
+  if (task_ == Task::kDone) return false;
+  if (has_running_) return true;
+  if (!task_) return heard_control_ || t >= *first_update_ + kHearControl;
+  return airborne_ || (heard_control_ && (task_ == Task::kTakeoff || task_ == Task::kChase));
+}
+
 std::optional<PlanResult> Pilot::Update(double t, const BodyEstimate& body) {
   drift_ = BeyondTube(body.velocity_covariance, config_.planner);
   const double t0 = t + config_.latency;
@@ -125,10 +144,11 @@ std::optional<PlanResult> Pilot::Update(double t, const BodyEstimate& body) {
     obstacles_changed_ = false;
     news_ = news_ || !planner_->IsCertified(Request(t0, start), running_.trajectory);
   }
-  if (!IsDue(t) || (!heard_control_ && !has_running_ && t < *first_update_ + kHearControl))
-    return std::nullopt;
-  PlanResult plan =
-      airborne_ && HasTarget(t) && SeesObstacles(t) ? Chase(t0, start) : Wait(t0, start, body);
+  if (task_ && airborne_) trail_.Add(body.p);
+  if (!IsDue(t) || !MayPlan(t)) return std::nullopt;
+  PlanResult plan = !Chases()                                       ? Obey(t0, start, body)
+                    : airborne_ && HasTarget(t) && SeesObstacles(t) ? Chase(t0, start)
+                                                                    : Wait(t0, start, body);
   if (!IsFinite(plan)) plan = Rest(t0, {{body.p}, {body.yaw, 0.0}});
   running_ = plan;
   has_running_ = true;
@@ -194,9 +214,38 @@ PlanResult Pilot::Wait(double t0, const Start& start, const BodyEstimate& body) 
     return same;
   }
   airborne_ = true;
+  if (task_ == Task::kTakeoff) return Hold(t0, start, "climbed");
   if (!SeesObstacles(t0 - config_.latency)) return Rest(t0, start);
   if (HasTarget(t0 - config_.latency)) return Chase(t0, start);
   return had_target_ ? Search(t0, start, body) : Hover(t0, start);
+}
+
+PlanResult Pilot::Obey(double t0, const Start& start, const BodyEstimate& body) {
+  if (task_ == Task::kTakeoff) return Wait(t0, start, body);
+  airborne_ = true;  // a climb ends here
+  return task_ == Task::kReturn ? Return(t0, start) : Hold(t0, start, "holding");
+}
+
+PlanResult Pilot::Hold(double t0, const Start& start, const std::string& reason) {
+  PlanResult plan = Rest(t0, start);
+  plan.reason = reason + (plan.reason.empty() ? "" : ", " + plan.reason);
+  return plan;
+}
+
+PlanResult Pilot::Return(double t0, const Start& start) {
+  if (!home_) return Hold(t0, start, "the take-off place is not known");
+  const Eigen::Vector3d above = *home_ + config_.takeoff_height * Eigen::Vector3d::UnitZ();
+  const PlanRequest request = Request(t0, start);
+  std::optional<Stop> leg = way_back_.Leg(config_.planner, request, trail_, above,
+                                          start.on_plan ? &running_.trajectory : nullptr);
+  if (!leg || !SeesObstacles(t0 - config_.latency)) return Hold(t0, start, "no way back");
+  PlanResult plan;
+  plan.verdict = Verdict::kSafeOnly;
+  plan.reason = "returning";
+  plan.trajectory = std::move(leg->trajectory);
+  plan.yaw = {start.yaw.yaw};
+  SetProofs(config_.planner, request, std::move(leg->proofs), &plan);
+  return plan;
 }
 
 PlanResult Pilot::Climb(double t0, const Start& start) const {

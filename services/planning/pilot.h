@@ -8,6 +8,7 @@
 
 #include "services/planning/planner.h"
 #include "services/planning/planning_config.h"
+#include "services/planning/way_back.h"
 #include "services/planning/whereabouts.h"
 
 namespace chase::planning {
@@ -31,6 +32,16 @@ struct BodyEstimate {
   Eigen::Matrix3d velocity_covariance = Eigen::Matrix3d::Zero();
 };
 
+/// What a mission process wants.
+enum class Task {
+  kGround,   ///< nothing is flown; in the air: as kHold
+  kTakeoff,  ///< climb, then hover
+  kChase,    ///< the target, or look for it
+  kHold,     ///< brake and hover
+  kReturn,   ///< to above the take-off place
+  kDone,     ///< nothing is flown any more
+};
+
 /// Decides when to plan, from which state, and what to fly when there is nothing to chase: climb,
 /// hover, brake, look around. Keeps the plan being flown.
 class Pilot {
@@ -44,6 +55,10 @@ class Pilot {
     heard_control_ = true;
     airborne_ = airborne_ || (flying && !has_running_);
   }
+
+  /// Until the first one it climbs and chases by itself. `home` is p_WB where it took off, frame W,
+  /// m; nothing: not known.
+  void SetTask(Task task, const std::optional<Eigen::Vector3d>& home);
 
   /// Forgets all that was said in the frame W that was: forecast, obstacles, the running plan.
   void ChangeFrame();
@@ -63,6 +78,8 @@ class Pilot {
   };
 
   bool IsDue(double t) const;
+  bool MayPlan(double t) const;
+  bool Chases() const { return !task_ || *task_ == Task::kChase; }
   bool HasTarget(double t) const;
   Start StartAt(double t, double t0, const BodyEstimate& body) const;
   PlanRequest Request(double t0, const Start& start) const;
@@ -71,6 +88,9 @@ class Pilot {
   PlanResult Climb(double t0, const Start& start) const;
   PlanResult Hover(double t0, const Start& start) const;
   PlanResult Rest(double t0, const Start& start) const;
+  PlanResult Obey(double t0, const Start& start, const BodyEstimate& body);
+  PlanResult Hold(double t0, const Start& start, const std::string& reason);
+  PlanResult Return(double t0, const Start& start);
   bool SeesObstacles(double t) const;
   PlanResult Search(double t0, const Start& start, const BodyEstimate& body);
   PlanResult BrakeAndLook(double t0, const Start& start, double yaw) const;
@@ -93,6 +113,10 @@ class Pilot {
   bool had_target_ = false;
   world::Trajectory last_seen_;  ///< forecast of the target that was chased last
   double climb_end_ = 0.0;
+  std::optional<Task> task_;
+  std::optional<Eigen::Vector3d> home_;  // m
+  Trail trail_;
+  WayBack way_back_;
   Whereabouts whereabouts_;                          ///< of a target that is lost
   Eigen::Vector3d place_ = Eigen::Vector3d::Zero();  ///< from which it is looked for, m
   double fastest_ = 0.0;                             ///< that the target was seen to move, m/s

@@ -8,6 +8,7 @@
 #include "common/bus/convert.h"
 #include "common/bus/plan_message.h"
 #include "common/math/rotation.h"
+#include "common/world/ages.h"
 
 namespace chase::planning {
 namespace {
@@ -24,6 +25,25 @@ BodyEstimate FromMessage(const pose_t& m) {
   const Eigen::Map<const Eigen::Matrix<double, 9, 9, Eigen::RowMajor>> P(m.local_covariance);
   return {bus::ToVector(m.pos), bus::ToVector(m.vel), math::Yaw(bus::ToQuaternion(m.orientation)),
           P.block<3, 3>(3, 3)};
+}
+
+Task TaskOf(int8_t state) {
+  switch (state) {
+    case flight_state_t::IDLE:
+    case flight_state_t::READY:
+      return Task::kGround;
+    case flight_state_t::TAKEOFF:
+      return Task::kTakeoff;
+    case flight_state_t::CHASE:
+    case flight_state_t::SEARCH:
+      return Task::kChase;
+    case flight_state_t::RETURN:
+      return Task::kReturn;
+    case flight_state_t::DONE:
+      return Task::kDone;
+    default:  // control does the rest of landing, with a pose or without
+      return Task::kHold;
+  }
 }
 
 polynomial_t At(const Eigen::Vector3d& p, int64_t utime, double duration) {
@@ -66,6 +86,7 @@ PlanningNode::PlanningNode(bus::Bus& bus, const PlanningConfig& config)
   bus_.Subscribe<tracking_t>("TRACKING", [this](const tracking_t& m) {
     pilot_.SetFlying(m.following != tracking_t::NONE);
   });
+  bus_.Subscribe<flight_state_t>("FLIGHT_STATE", [this](const flight_state_t& m) { OnState(m); });
   bus_.Subscribe<pose_t>("POSE", [this](const pose_t& m) { OnPose(m); });
 }
 
@@ -98,12 +119,28 @@ void PlanningNode::OnObstacles(const obstacles_t& message) {
   pilot_.SetObstacles(bus::Seconds(message.utime, origin), std::move(obstacles));
 }
 
+void PlanningNode::OnState(const flight_state_t& message) {
+  state_utime_ = message.utime;
+  task_ = TaskOf(message.state);
+  const bool knows_home = message.has_home != 0 && epoch_.Is(message.epoch);
+  pilot_.SetTask(task_, knows_home ? std::optional(bus::ToVector(message.home)) : std::nullopt);
+}
+
+// Whoever leads the flight has fallen silent: what moves the vehicle about ends.
+void PlanningNode::CheckMission(int64_t utime) {
+  const bool moves = task_ == Task::kChase || task_ == Task::kReturn;
+  if (state_utime_ == 0 || !moves) return;
+  if (bus::Seconds(utime, state_utime_) > world::kMostAge.flight_state)
+    pilot_.SetTask(Task::kHold, std::nullopt);
+}
+
 void PlanningNode::OnPose(const pose_t& message) {
   if (message.health != pose_t::HEALTH_OK && message.health != pose_t::HEALTH_DEGRADED) return;
   if (epoch_.Change(message.epoch)) {
     pilot_.ChangeFrame();
     target_ = {};
   }
+  CheckMission(message.utime);
   const double t = bus::Seconds(message.utime, Origin(message.utime));
   std::optional<PlanResult> plan;
   {

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <optional>
 
+#include "chase/flight_state_t.hpp"
 #include "chase/obstacles_t.hpp"
 #include "chase/plan_t.hpp"
 #include "chase/pose_t.hpp"
@@ -15,7 +16,7 @@
 
 namespace chase::planning {
 
-/// PREDICTION, OBSTACLES and POSE in, PLAN out; POSE is the clock.
+/// PREDICTION, OBSTACLES, FLIGHT_STATE and POSE in, PLAN out; POSE is the clock.
 class PlanningNode : public bus::Node {
  public:
   PlanningNode(bus::Bus& bus, const PlanningConfig& config);
@@ -24,7 +25,9 @@ class PlanningNode : public bus::Node {
  private:
   void OnPrediction(const prediction_t& message);
   void OnObstacles(const obstacles_t& message);
+  void OnState(const flight_state_t& message);
   void OnPose(const pose_t& message);
+  void CheckMission(int64_t utime);
   void Send(const PlanResult& plan);
   int64_t Origin(int64_t utime);
 
@@ -33,6 +36,8 @@ class PlanningNode : public bus::Node {
   Pilot pilot_;
   bus::Epoch epoch_;
   std::optional<int64_t> origin_;  // utime that the core's seconds count from
+  int64_t state_utime_ = 0;        // of the newest FLIGHT_STATE; 0: none
+  Task task_ = Task::kGround;      // that it asked for
   polynomial_t target_{};          // as predicted; no coefficients: none yet
   int64_t n_plans_ = 0;
   int64_t n_verdicts_[7] = {};

@@ -163,6 +163,29 @@ std::optional<Stop> Brake(const PlannerConfig& config, const PlanRequest& reques
   return std::nullopt;
 }
 
+std::optional<Stop> GoTo(const PlannerConfig& config, const PlanRequest& request,
+                         const Vector3d& end) {
+  // Rest to rest the speed peaks at 2.2 times the mean, which stays below 4 m/s of max_speed, and
+  // the acceleration of the shortest way at 5 m/s^2.
+  constexpr double kPace = 1.0, kLeast = 1.5;  // m/s, s
+  const double quickest = std::max(kLeast, (end - request.start.p).norm() / kPace);
+  Resting resting(config, WithoutSight(request, request.start, request.t0));
+  for (const double slower : {1.0, 1.5, 2.2}) {
+    const double T = slower * quickest;
+    if (auto stop = resting.Certified(CurveTo(request.start, T, end), T)) return stop;
+  }
+  return std::nullopt;
+}
+
+std::optional<Stop> GoOn(const PlannerConfig& config, const PlanRequest& request,
+                         const world::Trajectory& way) {
+  constexpr double kLeast = 0.1;  // s
+  const double T = way.end() - request.t0;
+  if (T < kLeast || request.t0 < way.start) return std::nullopt;
+  Resting resting(config, WithoutSight(request, request.start, request.t0));
+  return resting.Certified(ToCurve(way, request.t0, T), T);
+}
+
 Stop Evade(const PlannerConfig& config, const PlanRequest& request) {
   static const std::vector<Vector3d> displacements = Displacements();
   constexpr double kOver[] = {1.0, 1.6};

@@ -19,6 +19,14 @@ struct Stop {
 /// obstacles and of the target's body within the limits. Sight is not asked for.
 std::optional<Stop> Brake(const PlannerConfig& config, const PlanRequest& request);
 
+/// Comes to rest at `end`, certified as Brake() is; the quickest of three ways at a leisurely pace.
+std::optional<Stop> GoTo(const PlannerConfig& config, const PlanRequest& request,
+                         const Eigen::Vector3d& end);
+
+/// The rest of a way to rest from the request's start on, where it is still certified.
+std::optional<Stop> GoOn(const PlannerConfig& config, const PlanRequest& request,
+                         const world::Trajectory& way);
+
 /// Out of the way: comes to rest near where braking would, of all places tried the nearest that can
 /// be certified, also up and down. Where none can: the one whose first contact is the latest, then
 /// the one that stays farthest off; not certified.

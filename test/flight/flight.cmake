@@ -20,6 +20,11 @@ add_test(NAME flight_forest
   COMMAND ${bin}/chase-flight ${CMAKE_SOURCE_DIR}/deploy/scenarios/forest.yaml --seed 1 --quiet)
 set_tests_properties(flight_forest PROPERTIES TIMEOUT 400)
 
+# From take-off to the motors' end on command; its criteria decide.
+add_test(NAME flight_mission
+  COMMAND ${bin}/chase-flight ${CMAKE_SOURCE_DIR}/deploy/scenarios/mission.yaml --seed 1 --quiet)
+set_tests_properties(flight_mission PROPERTIES TIMEOUT 300)
+
 foreach(row IN ITEMS "odometry:POSE;SCAN_REGISTERED" "mapping:OBSTACLES;MAP" "perception:TARGET"
                      "prediction:PREDICTION" "planning:PLAN" "control:ATTITUDE_SETPOINT"
                      "simulator:TRUTH;IMU;LIDAR_SCAN;CAMERA_IMAGE")
@@ -36,6 +41,12 @@ add_test(NAME hostile_bus
           python3 ${CMAKE_SOURCE_DIR}/test/flight/hostile_bus.py ${bin} ${flight}
   WORKING_DIRECTORY ${CMAKE_SOURCE_DIR})
 set_tests_properties(hostile_bus PROPERTIES TIMEOUT 200 FIXTURES_REQUIRED recorded_flight)
+
+add_test(NAME flight_command
+  COMMAND ${CMAKE_SOURCE_DIR}/test/flight/in_namespace.sh
+          python3 -B ${CMAKE_SOURCE_DIR}/test/flight/command_test.py ${bin}
+  WORKING_DIRECTORY ${CMAKE_SOURCE_DIR})
+set_tests_properties(flight_command PROPERTIES TIMEOUT 60)
 
 add_test(NAME flight_live
   COMMAND ${CMAKE_SOURCE_DIR}/test/flight/in_namespace.sh deploy/fly gym --seed 1

@@ -18,7 +18,7 @@ TOOLS = [["chase-flight"], ["chase-plan"], ["chase-predict"], ["chase-report"],
          ["chase-log", "info"], ["chase-compare"], ["chase-scenario"], ["chase-world"],
          ["chase-campaign", "--out", "no/such", "--scenarios"]]
 TOOL_SERVICES = {"lidar", "camera", "odometry", "mapping", "perception", "prediction", "planning",
-                 "control", "simulator"}
+                 "control", "mission", "simulator"}
 LIMIT = 20  # s
 
 

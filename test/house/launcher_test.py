@@ -123,7 +123,7 @@ class FlightTest(unittest.TestCase):
         first, rest = self.built
         self.assertEqual(first, ("chase-scenario",))
         flying = {row["binary"] for row in fly.flight_processes()}
-        others = {"chase-flight", "chase-flight-monitor", "chase-report"}
+        others = {"chase-flight", "chase-flight-monitor", "chase-report", "chase-command"}
         self.assertEqual(set(rest), flying | others)
 
     def test_view_starts_an_onlooker(self):
@@ -177,7 +177,7 @@ class FlightTest(unittest.TestCase):
             fly.find_scenario("gmy")
         names = str(refusal.exception).split("there are: ")[1].split(", ")
         self.assertEqual(sorted(names), sorted(
-            ["forest", "gym"] + [f"twelve/S{number}" for number in range(1, 13)]))
+            ["forest", "gym", "mission"] + [f"twelve/S{number}" for number in range(1, 13)]))
 
     def test_criterion_that_fails(self):
         self.program("chase-report", REPORT.format(metrics=FAILED))

@@ -73,6 +73,10 @@ CHASE_SAMPLE(target_t, , m.mean[0] = kNan)
 CHASE_SAMPLE(map_t, m.resolution = 0.1; m.size = 1; m.data = {1}, m.resolution = kNan)
 CHASE_SAMPLE(prediction_t, m.target = GoodPolynomial(), m.target.coefficients[1] = kNan)
 CHASE_SAMPLE(scenario_t, m.yaml = "name: x", m.yaml.clear())
+CHASE_SAMPLE(command_t, m.n_arguments = 1; m.arguments = {1.0}, m.arguments[0] = kNan)
+CHASE_SAMPLE(command_ack_t, m.reason = "not ready", m.verdict = 2)
+CHASE_SAMPLE(flight_state_t, m.n_missing = 1; m.missing = {"POSE"}, m.home[2] = kNan)
+CHASE_SAMPLE(health_t, m.n_processes = 1; m.processes.resize(1), m.processes[0].age = kNan)
 CHASE_SAMPLE(event_t, m.name = "kill-planning", m.phase = 2)
 CHASE_SAMPLE(status_t, , m.cpu = kNan)
 CHASE_SAMPLE(truth_t, m.orientation[0] = 1.0, m.pos[0] = kNan)
@@ -91,9 +95,10 @@ CHASE_SAMPLE(obstacles_t, m.n_obstacles = 1;
 
 template <class T>
 class HostileBus : public testing::Test {};
-using Types = testing::Types<imu_t, attitude_setpoint_t, lidar_scan_t, scan_registered_t,
-                             camera_image_t, pose_t, target_t, map_t, prediction_t, scenario_t,
-                             event_t, status_t, truth_t, plan_t, obstacles_t>;
+using Types =
+    testing::Types<imu_t, attitude_setpoint_t, lidar_scan_t, scan_registered_t, camera_image_t,
+                   pose_t, target_t, map_t, prediction_t, scenario_t, command_t, command_ack_t,
+                   flight_state_t, health_t, event_t, status_t, truth_t, plan_t, obstacles_t>;
 TYPED_TEST_SUITE(HostileBus, Types);
 
 /// Every truncation, every single corrupted byte position (among them all lengths set negative or
@@ -179,6 +184,11 @@ TEST(Bus, CommandsOfStrangersAndOtherVehiclesAreLeftOut) {
     EXPECT_FALSE(IsObeyed<plan_t>("PLAN", stranger, "falcon")) << stranger;
     EXPECT_FALSE(IsObeyed<attitude_setpoint_t>("ATTITUDE_SETPOINT", stranger, "falcon"));
   }
+  EXPECT_TRUE(IsObeyed<command_t>("COMMAND", "command", "falcon"));
+  EXPECT_FALSE(IsObeyed<command_t>("COMMAND", "command", "eagle"));
+  EXPECT_FALSE(IsObeyed<command_t>("COMMAND", "planning", "falcon"));
+  EXPECT_TRUE(IsObeyed<flight_state_t>("FLIGHT_STATE", "mission", "falcon"));
+  EXPECT_FALSE(IsObeyed<flight_state_t>("FLIGHT_STATE", "planning", "falcon"));
   EXPECT_FALSE(IsObeyed<plan_t>("PLAN", "control", "falcon"));
   EXPECT_FALSE(IsObeyed<plan_t>("PLAN", "planning", "eagle"));
   EXPECT_FALSE(IsObeyed<attitude_setpoint_t>("ATTITUDE_SETPOINT", "control", ""));

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "chase/attitude_setpoint_t.hpp"
+#include "chase/flight_state_t.hpp"
 #include "chase/tracking_t.hpp"
 #include "common/bus/convert.h"
 #include "common/bus/lockstep.h"
@@ -103,6 +104,13 @@ class Bench {
   }
 
   void RunUntil(int64_t utime) { lockstep_.RunUntil(utime); }
+  void SendState(int8_t state, const std::string& sender = "mission") {
+    if (!mission_) mission_ = lockstep_.Connect();
+    mission_->SetIdentity({sender, "", 0});
+    flight_state_t m{};
+    m.state = state;
+    mission_->Publish("FLIGHT_STATE", m);
+  }
 
   const ControlNode& node() const { return *node_; }
   std::vector<attitude_setpoint_t> out;
@@ -112,7 +120,25 @@ class Bench {
   bus::Lockstep lockstep_{kStart};
   bus::Bus* bus_ = nullptr;
   ControlNode* node_ = nullptr;
+  std::unique_ptr<bus::Bus> mission_;
 };
+
+TEST(ControlNode, LandsWhenTheMissionSaysSoAndNobodyElse) {
+  Bench bench;
+  int64_t t = kStart;
+  const auto following_after = [&](int8_t state, const std::string& sender) {
+    bench.SendPlan(t, {0, 0, 0});
+    bench.SendState(state, sender);
+    for (int i = 0; i < 20; ++i) bench.SendPose(t += 5000);
+    return int{bench.tracking.back().following};
+  };
+  EXPECT_EQ(following_after(flight_state_t::HOLD, "mission"), int{tracking_t::PLAN});
+  EXPECT_EQ(following_after(flight_state_t::LAND, "planning"), int{tracking_t::PLAN});
+  EXPECT_EQ(following_after(flight_state_t::LAND, "mission"), int{tracking_t::LAND});
+  EXPECT_EQ(bench.tracking.back().reason, "landing");
+  EXPECT_EQ(bench.node().Report().state, bus::NodeReport::State::kOk);
+  EXPECT_EQ(following_after(flight_state_t::HOLD, "mission"), int{tracking_t::PLAN});
+}
 
 TEST(ControlNode, AnswersEveryPoseWithItsOwnStamp) {
   Bench bench;

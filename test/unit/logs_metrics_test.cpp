@@ -56,6 +56,48 @@ TEST(Metrics, GroundAndTargetCountForClearanceButNotForSight) {
   EXPECT_EQ(*close.visible_ratio, 1.0);
 }
 
+/// Comes down from 1.5 m at 0.4 m/s from t = 2 s on, DONE 0.5 s after it stands.
+FlightRecord Landing(double speed) {
+  FlightRecord record = Standing({5, 0, 1.5}, {8, 0, 0.5});
+  const double down = 2.0 + 1.38 / speed;
+  record.states = {{-1.0, 3}, {1.5, 7}, {down + 0.5, 8}};
+  for (TruthSample& s : record.truth) {
+    s.p.z() = std::clamp(1.5 - speed * (s.t - 2.0), 0.12, 1.5);
+    s.may_stand = s.t >= 1.5;
+  }
+  PlanSample hover;
+  hover.certified_clearance = 1.0;
+  hover.hard_radius = 0.37;
+  hover.position = world::Trajectory::Constant({5, 0, 1.5}, -1.0, 2.0);
+  record.plans = {hover};
+  record.poses = {{1.0, {5, 0, 1.5}}, {6.0, {5, 0, 0.12}}};
+  record.scenario.criteria.flight_states = {"CHASE", "LAND", "DONE"};
+  record.scenario.criteria.touchdown_speed = 0.5;
+  record.scenario.criteria.motors_off = 1.0;
+  return record;
+}
+
+TEST(Metrics, ALandingIsJudgedByItsSpeedAndTheGroundIsNoHarm) {
+  for (const double speed : {0.4, 0.6}) {
+    const Metrics m = Compute(Landing(speed));
+    EXPECT_EQ(*m.safe_ratio, 1.0);
+    EXPECT_EQ(*m.certificate_kept_ratio, 1.0) << "nobody flies the plan any more";
+    EXPECT_EQ(*m.tube_exceeded_ratio, 0.0);
+    ASSERT_TRUE(m.touchdown_speed_mps.has_value());
+    EXPECT_NEAR(*m.touchdown_speed_mps, speed, 0.02);
+    EXPECT_NEAR(*m.motors_off_s, 0.5, 0.07);
+    EXPECT_EQ(m.criteria.at("touchdown_speed"), speed < 0.5);
+    EXPECT_TRUE(m.criteria.at("motors_off"));
+    EXPECT_TRUE(m.criteria.at("flight_states"));
+    EXPECT_EQ(m.flight_states.size(), 3u);
+  }
+  FlightRecord other = Landing(0.4);
+  other.scenario.criteria.flight_states = {"LAND", "CHASE"};
+  EXPECT_FALSE(Compute(other).criteria.at("flight_states")) << "not in that order";
+  other.states.pop_back();
+  EXPECT_FALSE(Compute(other).criteria.at("touchdown_speed")) << "it never was down";
+}
+
 TEST(Metrics, ASegmentThroughThePillarIsBlind) {
   EXPECT_EQ(*Compute(Standing({-2, 0, 1.5}, {2, 0, 1.5})).visible_ratio, 0.0);
   EXPECT_EQ(*Compute(Standing({-2, 0.29, 1.5}, {2, 0.29, 1.5})).visible_ratio, 1.0);
@@ -237,7 +279,7 @@ TEST(Metrics, PlansAndStagesAreCounted) {
 
 TEST(Metrics, CriteriaFollowTheScenario) {
   FlightRecord record = Standing({3, 0, 1.5}, {5.5, 0, 1.5});
-  record.scenario.criteria = {1.0, 0.95, 0.9, 1.2, 0.95};
+  record.scenario.criteria = {1.0, 0.95, 0.9, 1.2, 0.95, {}, -1.0, -1.0};
   record.real_time_factor = 0.99;
   Metrics m = Compute(record);
   EXPECT_TRUE(m.Passed());

@@ -89,6 +89,24 @@ TEST(ScenarioFile, FaultsAreChecked) {
   EXPECT_CONTAINS(Refusal(with("{name: lidar-dead, for: .nan}")), "for is .nan");
 }
 
+TEST(ScenarioFile, CommandsAreChecked) {
+  const std::string head = "name: x\ntarget: {waypoints: [[0, 0], [1, 0]]}\nduration_s: 20\n";
+  const auto problem = [&](const std::string& commands) -> std::string {
+    try {
+      ParseScenario(head + "commands: " + commands + "\n", "x.yaml");
+    } catch (const std::runtime_error& e) {
+      return e.what();
+    }
+    return "";
+  };
+  EXPECT_EQ(problem("[{command: takeoff, at_s: -5}, {command: land, at_s: 3}]"), "");
+  EXPECT_NE(problem("[{command: fly, at_s: 0}]").find("command is 'fly'"), std::string::npos);
+  EXPECT_NE(problem("[{command: land, at_s: 20}]").find("at_s is 20"), std::string::npos);
+  EXPECT_NE(problem("[{command: land, at_s: -9}]").find("at_s is -9"), std::string::npos);
+  EXPECT_NE(problem("[{command: hold, at_s: 5}, {command: land, at_s: 4}]").find("commands[1]"),
+            std::string::npos);
+}
+
 TEST(Fault, TextIsNameAndTime) {
   EXPECT_EQ(ParseFault("lidar-gap").name, "lidar-gap");
   EXPECT_LT(ParseFault("lidar-gap").at, 0.0);

@@ -1,0 +1,149 @@
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+#include <cstdlib>
+#include <string>
+#include <vector>
+
+#include "chase/command_ack_t.hpp"
+#include "chase/command_t.hpp"
+#include "chase/flight_state_t.hpp"
+#include "common/bus/convert.h"
+#include "common/bus/udp_bus.h"
+#include "common/config/version.h"
+#include "services/mission/command_client.h"
+
+namespace chase::mission {
+namespace {
+
+constexpr int64_t kWait = 20'000;  // us at a time for messages
+enum Exit { kAccepted = 0, kBadUse = 1, kRefused = 2, kNoAnswer = 3, kNotReached = 4 };
+
+struct Arguments {
+  std::string command, vehicle, url;
+  bool wait = false;
+  double timeout = 120.0;
+};
+
+/// The command on its way: sends, hears answers, follows the flight's state.
+class Session {
+ public:
+  Session(bus::UdpBus* bus, Event command)
+      : bus_(*bus), start_(bus->identity().start), client_(command, 0.0) {
+    message_.utime = message_.id = start_;
+    message_.kind = static_cast<int8_t>(command);
+    bus_.Subscribe<command_ack_t>("COMMAND_ACK", [this](const command_ack_t& m) {
+      if (m.command_sender == bus_.identity().process && m.command_start == start_ &&
+          m.id == message_.id)
+        client_.OnAnswer(m.verdict == command_ack_t::ACCEPTED, m.reason);
+    });
+    bus_.Subscribe<flight_state_t>("FLIGHT_STATE", [this](const flight_state_t& m) {
+      state_ = std::string(Name(static_cast<State>(m.state))) + ": " + m.reason;
+      if (client_.answered())
+        progress_ = ProgressOf(client_.command(), static_cast<State>(m.state));
+    });
+  }
+
+  void Turn() {
+    if (client_.Due(elapsed())) bus_.Publish("COMMAND", message_);
+    bus_.Handle(kWait);
+  }
+
+  double elapsed() const { return bus::Seconds(bus_.Now(), start_); }
+  const CommandClient& client() const { return client_; }
+  Progress progress() const { return progress_; }
+  const std::string& state() const { return state_; }
+
+ private:
+  bus::UdpBus& bus_;
+  int64_t start_;
+  CommandClient client_;
+  command_t message_{};
+  Progress progress_ = Progress::kUnderWay;
+  std::string state_;
+};
+
+int Fail(int code, const std::string& what) {
+  fmt::print(stderr, "chase-command: {}\n", what);
+  return code;
+}
+
+int AwaitAnswer(const Arguments& a, Session* session) {
+  const CommandClient& client = session->client();
+  while (!client.answered() && !client.GaveUp(session->elapsed())) session->Turn();
+  if (!client.answered())
+    return Fail(kNoAnswer,
+                fmt::format("{}: no answer{}; does chase-mission run{}?", a.command,
+                            session->state().empty() ? "" : ", though FLIGHT_STATE is heard",
+                            a.vehicle.empty() ? "" : " on vehicle '" + a.vehicle + "'"));
+  if (!client.accepted()) return Fail(kRefused, "refused: " + client.reason());
+  fmt::print("{}\n", client.reason());
+  std::fflush(stdout);
+  return kAccepted;
+}
+
+int AwaitEnd(const Arguments& a, Session* session) {
+  while (session->progress() == Progress::kUnderWay && session->elapsed() < a.timeout)
+    session->Turn();
+  if (session->progress() == Progress::kUnderWay)
+    return Fail(kNotReached, fmt::format("{}: not there after {} s, {}", a.command, a.timeout,
+                                         session->state()));
+  if (session->progress() == Progress::kMissed)
+    return Fail(kNotReached, fmt::format("{}: it came otherwise, {}", a.command, session->state()));
+  fmt::print("{}\n", session->state());
+  return kAccepted;
+}
+
+int Run(const Arguments& a) {
+  bus::UdpBus bus(a.url, a.vehicle);
+  bus.SetIdentity({"command", a.vehicle, bus.Now()});
+  Session session(&bus, *CommandNamed(a.command));
+  const int code = AwaitAnswer(a, &session);
+  return code == kAccepted && a.wait ? AwaitEnd(a, &session) : code;
+}
+
+/// Any number compares false with NaN, so that CLI::Range takes it.
+std::string TimeoutProblem(const std::string& text) {
+  double t = 0.0;
+  if (CLI::detail::lexical_cast(text, t) && t > 0.0 && t <= 86400.0) return "";
+  return text + " is no time, above 0 and at most 86400 s";
+}
+
+void AddOptions(CLI::App* app, Arguments* a) {
+  const char* env = std::getenv("LCM_DEFAULT_URL");
+  a->url = env != nullptr && *env != '\0' ? env : bus::kDefaultUrl;
+  app->add_option("command", a->command, "takeoff, chase, hold, search, return, land or stop")
+      ->required()
+      ->check(CLI::IsMember({"takeoff", "chase", "hold", "search", "return", "land", "stop"}));
+  app->add_option("--vehicle", a->vehicle, "channel prefix of the vehicle that is meant");
+  app->add_flag("--wait", a->wait,
+                "until the flight is there: in the air, chasing, holding, landed");
+  app->add_option("--timeout", a->timeout, "of --wait, s (default 120)")->check(TimeoutProblem);
+  app->add_option("--lcm-url", a->url, "LCM provider (default: $LCM_DEFAULT_URL, else built in)");
+  app->footer(
+      "Exit codes: 0 accepted (with --wait: and reached), 1 bad use, 2 refused, 3 no answer "
+      "within 5 s, 4 not reached.");
+}
+
+}  // namespace
+}  // namespace chase::mission
+
+/// Gives the vehicle one command, again and again until it is answered; it takes effect once.
+int main(int argc, char** argv) {
+  CLI::App app("Gives the vehicle a command.", "chase-command");
+  chase::config::AddVersion(&app);
+  chase::mission::Arguments arguments;
+  chase::mission::AddOptions(&app, &arguments);
+  try {
+    app.parse(argc, argv);
+    return chase::mission::Run(arguments);
+  } catch (const CLI::Success& e) {
+    return app.exit(e);
+  } catch (const CLI::ParseError& e) {
+    fmt::print(stderr, "chase-command: {}; see chase-command --help\n", e.what());
+  } catch (const std::exception& e) {
+    fmt::print(stderr, "chase-command: {}\n", e.what());
+  }
+  return 1;
+}

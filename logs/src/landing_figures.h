@@ -1,0 +1,17 @@
+#pragma once
+
+#include "logs/src/metrics.h"
+
+namespace chase::logs {
+
+/// The states of the flight and, where the last is DONE, how it came down: touchdown is when the
+/// body is as low as it stands in the end, give or take 2 cm of springy legs.
+void AddLanding(const FlightRecord& record, Metrics* metrics);
+
+/// Does the body come down at t, or stand there again: beside the plan, which hovers?
+bool ComesDown(const FlightRecord& record, double t);
+
+/// Were these states there in this order, whatever was between them?
+bool InOrder(const std::vector<std::string>& wanted, const std::vector<StateFigures>& states);
+
+}  // namespace chase::logs

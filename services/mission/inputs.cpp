@@ -1,0 +1,67 @@
+#include "services/mission/inputs.h"
+
+#include <algorithm>
+#include <cstdio>
+#include <utility>
+
+#include "common/world/ages.h"
+
+namespace chase::mission {
+
+namespace {
+
+std::string Age(double age) {
+  char text[32];
+  std::snprintf(text, sizeof text, " is %.1f s old", age);
+  return text;
+}
+
+/// Why an input of that time is not there; empty: it is.
+std::string Absence(const std::string& name, const std::optional<double>& heard, double most,
+                    double t) {
+  if (!heard) return name + " is not heard";
+  return t - *heard > most ? name + Age(t - *heard) : "";
+}
+
+std::string ProcessProblem(const std::string& name, const Inputs& inputs, double t) {
+  const auto found = inputs.processes.find(name);
+  const bool heard = found != inputs.processes.end();
+  const std::optional<double> when = heard ? std::optional(found->second.t) : std::nullopt;
+  std::string problem = Absence(name, when, world::kMostAge.status, t);
+  if (problem.empty() && found->second.failed) problem = name + " has failed";
+  return problem;
+}
+
+}  // namespace
+
+void Inputs::Heard(const std::string& process, ProcessReport report) {
+  const auto [at, fresh] = processes.emplace(process, report);
+  if (fresh) return;
+  report.restarts = at->second.restarts + (at->second.start != report.start ? 1 : 0);
+  at->second = report;
+}
+
+std::vector<std::string> Missing(const MissionConfig& config, const Inputs& inputs, double t) {
+  std::vector<std::string> missing;
+  const auto note = [&missing](std::string what) {
+    if (!what.empty()) missing.push_back(std::move(what));
+  };
+  const std::optional<PoseReport>& pose = inputs.pose;
+  const std::optional<double> pose_time = pose ? std::optional(pose->t) : std::nullopt;
+  note(Absence("POSE", pose_time, world::kMostAge.pose, t));
+  if (pose && !pose->healthy)
+    note("odometry is not healthy" + (pose->reason.empty() ? "" : ": " + pose->reason));
+  note(Absence("OBSTACLES", inputs.obstacles, world::kMostAge.obstacles, t));
+  note(Absence("TARGET", inputs.target, world::kMostAge.target, t));
+  for (const std::string& name : config.needs) note(ProcessProblem(name, inputs, t));
+  for (const auto& [name, report] : inputs.processes)
+    if (std::find(config.needs.begin(), config.needs.end(), name) == config.needs.end())
+      note(ProcessProblem(name, inputs, t));
+  return missing;
+}
+
+bool SeesTarget(const Inputs& inputs, double t) {
+  return inputs.target && inputs.target_tracked && t - *inputs.target <= world::kMostAge.target;
+}
+
+}  // namespace chase::mission

@@ -1,0 +1,54 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "services/mission/mission_config.h"
+
+namespace chase::mission {
+
+/// What odometry says. Frame W.
+struct PoseReport {
+  double t = 0.0;                                                            ///< s
+  Eigen::Vector3d p = Eigen::Vector3d::Zero(), v = Eigen::Vector3d::Zero();  ///< m, m/s
+  int32_t epoch = 0;                                                         ///< of the frame W
+  bool usable = false;                                                       ///< to fly by
+  bool healthy = false;                                                      ///< to take off by
+  std::string reason;  ///< why it is not healthy
+};
+
+/// What a process says of itself.
+struct ProcessReport {
+  double t = 0.0;    ///< s
+  int8_t state = 0;  ///< one of status_t's constants
+  bool failed = false;
+  int64_t start = 0;  ///< when it started; another number is another process
+  int restarts = 0;
+};
+
+/// The newest of everything that the flight depends on. Times in seconds of one clock.
+struct Inputs {
+  std::optional<PoseReport> pose;
+  std::optional<double> obstacles;  ///< when they were valid, s
+  std::optional<double> target;
+  bool target_tracked = false;
+  double plan_heard = -1e9;                            ///< s
+  Eigen::Vector3d plan_end = Eigen::Vector3d::Zero();  ///< where the newest plan ends, frame W
+  bool flying = false, landing = false;                ///< as control says
+  bool motors_off = false;                             ///< control has stopped them
+  std::map<std::string, ProcessReport> processes;      ///< by name
+
+  void Heard(const std::string& process, ProcessReport report);
+};
+
+/// What stands against taking off at time `t` [s], a phrase each; empty: nothing.
+std::vector<std::string> Missing(const MissionConfig& config, const Inputs& inputs, double t);
+
+/// Is the target tracked, by news that are fresh?
+bool SeesTarget(const Inputs& inputs, double t);
+
+}  // namespace chase::mission

@@ -1,0 +1,123 @@
+#include "services/mission/mission.h"
+
+#include <algorithm>
+
+#include "common/world/ages.h"
+
+namespace chase::mission {
+
+Answer Mission::Obey(double t, const Command& command) {
+  window_.Forget(t);
+  if (const Answer* before = window_.Find(command)) return *before;
+  return Judge(t, command);
+}
+
+// What is refused here is not remembered: it is refused again, or has had no effect.
+Answer Mission::Judge(double t, const Command& command) {
+  const auto refuse = [&](const char* reason) { return Answer{command, false, reason}; };
+  const double age = t - command.t;
+  if (command.t < start_) return refuse("it was given before the mission process started");
+  if (age > world::kMostAge.command) return refuse("it is old: given more than 10 s ago");
+  if (age < -world::kMostAge.command)
+    return refuse("it is given in the future: compare the clocks");
+  if (window_.IsFull()) return refuse("too many commands came of late");
+  return window_.Add(Try(t, command));
+}
+
+Answer Mission::Try(double t, const Command& command) {
+  Answer answer{command, false, Refused(command.kind)};
+  if (!answer.reason.empty()) return answer;
+  Step(t, command.kind);
+  if (state_ == State::kReturn && !KnowsHome()) Step(t, Event::kHomeLost);
+  leads_itself_ = false;
+  answer.accepted = true;
+  answer.reason = std::string(Name(state_)) + ": " + reason_;
+  return answer;
+}
+
+std::string Mission::Refused(Event command) const {
+  if (Find(state_, command) != nullptr) return "";
+  std::string reason = std::string(Name(command)) + " in " + Name(state_) + ": " + Refusal(state_);
+  const char* separator = ": ";
+  if (state_ != State::kIdle) return reason;
+  for (const std::string& what : missing_) {
+    reason += separator + what;
+    separator = ", ";
+  }
+  return reason;
+}
+
+bool Mission::Step(double t, Event event, const std::string& detail) {
+  const Transition* row = Find(state_, event);
+  if (row == nullptr) return false;
+  if (row->to != state_) since_ = t;
+  state_ = row->to;
+  reason_ = row->reason + (detail.empty() ? "" : ": " + detail);
+  if (event == Event::kTakeoff && inputs_.pose) home_ = Home{inputs_.pose->p, inputs_.pose->epoch};
+  return true;
+}
+
+void Mission::Update(double t) {
+  if (!began_) {
+    began_ = true;
+    since_ = last_usable_ = t;
+  }
+  if (inputs_.pose && inputs_.pose->usable) last_usable_ = std::max(last_usable_, inputs_.pose->t);
+  missing_ = Missing(config_, inputs_, t);
+  for (const Event event : Observed(t)) {
+    Step(t, event, event == Event::kMissing ? missing_.front() : "");
+  }
+  if (leads_itself_) LeadItself(t);
+}
+
+// In the order in which they count; each moves the state that the one before has led to.
+std::vector<Event> Mission::Observed(double t) const {
+  std::vector<Event> events;
+  const auto add = [&events](bool holds, Event event) {
+    if (holds) events.push_back(event);
+  };
+  add(inputs_.motors_off, Event::kMotorsOff);
+  add(inputs_.landing, Event::kLanding);
+  add(inputs_.flying, Event::kFlying);
+  events.push_back(PoseIsLost(t) ? Event::kPoseLost : Event::kPoseBack);
+  events.push_back(missing_.empty() ? Event::kComplete : Event::kMissing);
+  events.push_back(SeesTarget(inputs_, t) ? Event::kSeen : Event::kLost);
+  add(state_ == State::kTakeoff && IsUp(), Event::kUp);
+  add(state_ == State::kSearch && config_.give_up > 0.0 && t - since_ > config_.give_up,
+      Event::kGaveUp);
+  add(!KnowsHome(), Event::kHomeLost);
+  add(IsHome(), Event::kHome);
+  return events;
+}
+
+// By then control comes down by itself.
+bool Mission::PoseIsLost(double t) const { return t - last_usable_ > world::kMostAge.velocity; }
+
+// At rest at the end of a plan that was made since.
+bool Mission::IsUp() const {
+  constexpr double kAtEnd = 0.1;  // m: several times what control is off while it climbs
+  const std::optional<PoseReport>& pose = inputs_.pose;
+  return pose && inputs_.plan_heard > since_ && (pose->p - inputs_.plan_end).norm() < kAtEnd &&
+         pose->v.norm() < config_.rest_speed;
+}
+
+bool Mission::KnowsHome() const {
+  return home_ && inputs_.pose && home_->epoch == inputs_.pose->epoch;
+}
+
+bool Mission::IsHome() const {
+  if (!KnowsHome()) return false;
+  const PoseReport& pose = *inputs_.pose;
+  return (pose.p - home_->p).head<2>().norm() < config_.home_radius &&
+         pose.v.norm() < config_.rest_speed;
+}
+
+// As an operator would who wants to see a chase.
+void Mission::LeadItself(double t) {
+  if (state_ == State::kReady)
+    Step(t, Event::kTakeoff, "autostart");
+  else if (state_ == State::kTakeoff || state_ == State::kHold)
+    Step(t, Event::kChase, "autostart");
+}
+
+}  // namespace chase::mission

@@ -1,0 +1,72 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "services/mission/command_window.h"
+#include "services/mission/inputs.h"
+#include "services/mission/mission_config.h"
+#include "services/mission/states.h"
+
+namespace chase::mission {
+
+/// The place that RETURN goes back to.
+struct Home {
+  Eigen::Vector3d p = Eigen::Vector3d::Zero();  ///< p_WB where it took off, frame W, m
+  int32_t epoch = 0;                            ///< of that frame W
+};
+
+/// Leads a flight from switch-on to landing: commands and what is observed in, a state out.
+class Mission {
+ public:
+  /// Commands from before `start` [s] are refused: whoever led the flight then has had them.
+  Mission(const MissionConfig& config, double start)
+      : config_(config), start_(start), leads_itself_(config.autostart) {}
+
+  /// Written to as messages come.
+  Inputs& inputs() { return inputs_; }
+
+  /// Obeys or refuses a command that came at time `t` [s]. The same command again gets the same
+  /// answer and changes nothing.
+  Answer Obey(double t, const Command& command);
+
+  /// Moves on by what is observed at time `t` [s], which never goes back.
+  void Update(double t);
+
+  State state() const { return state_; }
+  const std::string& reason() const { return reason_; }
+  double since() const { return since_; }  ///< when the state began, s
+  const std::optional<Home>& home() const { return home_; }
+  const std::vector<std::string>& missing() const { return missing_; }
+  const Inputs& inputs() const { return inputs_; }
+
+ private:
+  bool Step(double t, Event event, const std::string& detail = "");
+  Answer Judge(double t, const Command& command);
+  Answer Try(double t, const Command& command);
+  std::string Refused(Event command) const;
+  std::vector<Event> Observed(double t) const;
+  bool PoseIsLost(double t) const;
+  bool IsUp() const;
+  bool IsHome() const;
+  bool KnowsHome() const;
+  void LeadItself(double t);
+
+  MissionConfig config_;
+  double start_;
+  bool leads_itself_;  // nobody has commanded anything yet
+  Inputs inputs_;
+  CommandWindow window_;
+  State state_ = State::kIdle;
+  std::string reason_ = "switched on";
+  double since_ = 0.0;
+  bool began_ = false;
+  double last_usable_ = -1e9;  // pose, s
+  std::optional<Home> home_;
+  std::vector<std::string> missing_;
+};
+
+}  // namespace chase::mission

@@ -1,0 +1,18 @@
+#include "services/mission/mission_config.h"
+
+#include <sstream>
+
+namespace chase::mission {
+
+std::string MissionConfig::Problem() const {
+  std::ostringstream text;
+  if (!(give_up >= 0.0 && give_up <= 3600.0))
+    text << "give_up is " << give_up << ", must be from 0 to 3600 s";
+  else if (!(home_radius >= 0.05 && home_radius <= 5.0))
+    text << "home_radius is " << home_radius << ", must be from 0.05 to 5 m";
+  else if (!(rest_speed >= 0.02 && rest_speed <= 1.0))
+    text << "rest_speed is " << rest_speed << ", must be from 0.02 to 1 m/s";
+  return text.str();
+}
+
+}  // namespace chase::mission

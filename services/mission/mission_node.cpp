@@ -1,0 +1,151 @@
+#include "services/mission/mission_node.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "chase/command_ack_t.hpp"
+#include "chase/flight_state_t.hpp"
+#include "chase/health_t.hpp"
+#include "common/bus/convert.h"
+
+namespace chase::mission {
+
+namespace {
+
+constexpr int64_t kHealthTicks = 10;  // 1 Hz, as the statuses that it sums up
+
+}  // namespace
+
+MissionNode::MissionNode(bus::Bus& bus, const MissionConfig& config)
+    : bus_(bus), config_(config), origin_(bus.identity().start), mission_(config, 0.0) {
+  bus_.Subscribe<command_t>("COMMAND", [this](const command_t& m) { OnCommand(m); });
+  bus_.Subscribe<pose_t>("POSE", [this](const pose_t& m) { OnPose(m); });
+  bus_.Subscribe<obstacles_t>("OBSTACLES", [this](const obstacles_t& m) {
+    mission_.inputs().obstacles = Seconds(m.utime);
+  });
+  bus_.Subscribe<target_t>("TARGET", [this](const target_t& m) {
+    mission_.inputs().target = Seconds(m.utime);
+    mission_.inputs().target_tracked =
+        m.state == target_t::TRACKING || m.state == target_t::OCCLUDED;
+  });
+  bus_.Subscribe<plan_t>("PLAN", [this](const plan_t& m) { OnPlan(m); });
+  bus_.Subscribe<tracking_t>("TRACKING", [this](const tracking_t& m) { OnTracking(m); });
+  bus_.Subscribe<attitude_setpoint_t>("ATTITUDE_SETPOINT", [this](const attitude_setpoint_t& m) {
+    mission_.inputs().motors_off = m.motors == attitude_setpoint_t::MOTORS_OFF;
+  });
+  SubscribeStatuses();
+}
+
+void MissionNode::SubscribeStatuses() {
+  const auto heard = [this](const status_t& m) { OnStatus(m); };
+  bus_.Subscribe<status_t>("LIDAR_STATUS", heard);
+  bus_.Subscribe<status_t>("CAMERA_STATUS", heard);
+  bus_.Subscribe<status_t>("ODOMETRY_STATUS", heard);
+  bus_.Subscribe<status_t>("MAPPING_STATUS", heard);
+  bus_.Subscribe<status_t>("PERCEPTION_STATUS", heard);
+  bus_.Subscribe<status_t>("PREDICTION_STATUS", heard);
+  bus_.Subscribe<status_t>("PLANNING_STATUS", heard);
+  bus_.Subscribe<status_t>("CONTROL_STATUS", heard);
+  bus_.Subscribe<status_t>("FCU_STATUS", heard);
+  bus_.Subscribe<status_t>("SIMULATOR_STATUS", heard);
+}
+
+void MissionNode::OnCommand(const command_t& message) {
+  const Command command{message.sender, message.sender_start, message.id, Seconds(message.utime),
+                        static_cast<Event>(message.kind)};
+  const Answer answer = mission_.Obey(Now(), command);
+  command_ack_t m{};
+  m.utime = bus_.Now();
+  m.command_sender = command.sender;
+  m.command_start = command.sender_start;
+  m.id = command.id;
+  m.kind = message.kind;
+  m.verdict = answer.accepted ? command_ack_t::ACCEPTED : command_ack_t::REFUSED;
+  m.reason = answer.reason;
+  bus_.Publish("COMMAND_ACK", m);
+  if (answer.accepted) SendState();
+}
+
+void MissionNode::OnPose(const pose_t& message) {
+  PoseReport pose;
+  pose.t = Seconds(message.utime);
+  pose.p = bus::ToVector(message.pos);
+  pose.v = bus::ToVector(message.vel);
+  pose.epoch = message.epoch;
+  pose.healthy = message.health == pose_t::HEALTH_OK;
+  pose.usable = pose.healthy || message.health == pose_t::HEALTH_DEGRADED;
+  pose.reason = message.reason;
+  mission_.inputs().pose = std::move(pose);
+}
+
+void MissionNode::OnPlan(const plan_t& message) {
+  Inputs& inputs = mission_.inputs();
+  inputs.plan_heard = Now();
+  const world::Trajectory plan = bus::FromMessage(message.position, origin_);
+  inputs.plan_end = plan.Position(plan.end());
+}
+
+void MissionNode::OnTracking(const tracking_t& message) {
+  mission_.inputs().flying = message.following != tracking_t::NONE;
+  mission_.inputs().landing = message.following == tracking_t::LAND;
+}
+
+void MissionNode::OnStatus(const status_t& message) {
+  ProcessReport report;
+  report.t = Seconds(message.utime);
+  report.state = message.state;
+  report.failed = message.state == status_t::FAILED;
+  report.start = message.sender_start;
+  mission_.inputs().Heard(message.name, report);
+}
+
+void MissionNode::Tick(int64_t /*utime*/) {
+  mission_.Update(Now());
+  SendState();
+  if (ticks_++ % kHealthTicks == 0) SendHealth();
+}
+
+void MissionNode::SendState() {
+  flight_state_t m{};
+  m.utime = bus_.Now();
+  m.epoch = mission_.home() ? mission_.home()->epoch : 0;
+  m.state = static_cast<int8_t>(mission_.state());
+  m.reason = mission_.reason();
+  m.since = bus::Utime(mission_.since(), origin_);
+  m.has_home = mission_.home() ? 1 : 0;
+  if (mission_.home()) bus::Set(m.home, mission_.home()->p);
+  m.missing = mission_.missing();
+  m.n_missing = static_cast<int32_t>(m.missing.size());
+  bus_.Publish("FLIGHT_STATE", m);
+}
+
+void MissionNode::SendHealth() {
+  health_t m{};
+  m.utime = bus_.Now();
+  for (const auto& [name, report] : mission_.inputs().processes) {
+    process_health_t& process = m.processes.emplace_back();
+    process.name = name;
+    process.state = report.state;
+    process.age = std::max(0.0, Now() - report.t);
+    process.restarts = report.restarts;
+  }
+  m.n_processes = static_cast<int32_t>(m.processes.size());
+  bus_.Publish("HEALTH", m);
+}
+
+double MissionNode::Now() const { return Seconds(bus_.Now()); }
+
+double MissionNode::Seconds(int64_t utime) const { return bus::Seconds(utime, origin_); }
+
+bus::NodeReport MissionNode::Report() const {
+  using Health = bus::NodeReport::State;
+  const State state = mission_.state();
+  const bool waits = state == State::kIdle || state == State::kReady;
+  return {state == State::kEmergency ? Health::kFailed
+          : waits                    ? Health::kStarting
+                                     : Health::kOk,
+          fmt::format("{}: {}", Name(state), mission_.reason())};
+}
+
+}  // namespace chase::mission

@@ -1,0 +1,171 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <random>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include "services/mission/command_client.h"
+#include "test/unit/mission_bench.h"
+
+namespace chase::mission {
+namespace {
+
+TEST(Commands, OfAnotherTimeAreRefused) {
+  Bench bench({}, 9.0);
+  bench.Fly();
+  const auto given = [&](double t, int64_t id) {
+    return bench.mission.Obey(bench.t, {"command", 1, id, t, Event::kChase});
+  };
+  EXPECT_FALSE(given(8.9, 100).accepted) << "before the process started";
+  EXPECT_FALSE(given(bench.t + 11.0, 102).accepted) << "from the future";
+  bench.Run(20.0);
+  EXPECT_FALSE(given(bench.t - 11.0, 101).accepted) << "old";
+  EXPECT_EQ(bench.mission.state(), State::kHold);
+  EXPECT_TRUE(given(bench.t - 1.0, 103).accepted);
+}
+
+TEST(Commands, AreToldApartBySenderStartAndId) {
+  Bench bench;
+  bench.Fly();
+  const auto obey = [&](const char* sender, int64_t start, int64_t id, Event kind) {
+    return bench.mission.Obey(bench.t, {sender, start, id, bench.t, kind}).accepted;
+  };
+  EXPECT_TRUE(obey("command", 1, 500, Event::kChase));
+  for (const auto& [sender, start, id] :
+       {std::tuple("command", 2, 500), std::tuple("viewer", 1, 500),
+        std::tuple("command", 1, 501)}) {
+    EXPECT_TRUE(obey(sender, start, id, Event::kHold));
+    EXPECT_EQ(bench.mission.state(), State::kHold);
+    EXPECT_TRUE(obey("command", 1, 500, Event::kChase)) << "answered as before";
+    EXPECT_EQ(bench.mission.state(), State::kHold) << "and not obeyed again";
+    EXPECT_TRUE(obey(sender, start, id + 1000, Event::kChase));
+  }
+}
+
+TEST(Commands, ARefusedOneStaysRefused) {
+  Bench bench;
+  bench.hears_target = false;
+  bench.Run(1.0);
+  const Answer first = bench.Command(Event::kTakeoff, 7);
+  EXPECT_FALSE(first.accepted);
+  bench.hears_target = true;
+  bench.Run(0.5);
+  ASSERT_EQ(bench.mission.state(), State::kReady);
+  const Answer again = bench.mission.Obey(bench.t, first.command);
+  EXPECT_FALSE(again.accepted);
+  EXPECT_EQ(again.reason, first.reason);
+  EXPECT_EQ(bench.mission.state(), State::kReady);
+  EXPECT_TRUE(bench.Command(Event::kTakeoff).accepted);
+}
+
+TEST(Commands, MoreThanCanBeRememberedAreRefusedAndNoneIsObeyedTwice) {
+  Bench bench;
+  bench.Fly();
+  std::vector<Command> obeyed;
+  int refused = 0;
+  for (int64_t id = 1000; id < 1400; ++id) {
+    const Answer answer = bench.Command(id % 2 == 0 ? Event::kChase : Event::kHold, id);
+    if (answer.accepted) obeyed.push_back(answer.command);
+    refused += !answer.accepted;
+  }
+  EXPECT_GT(refused, 100);
+  const State state = bench.mission.state();
+  for (const Command& command : obeyed) {
+    bench.mission.Obey(bench.t, command);
+    ASSERT_EQ(bench.mission.state(), state) << command.id;
+  }
+  bench.Run(15.0);
+  EXPECT_TRUE(bench.Command(Event::kHold, 2000).accepted) << "after a while there is room";
+}
+
+/// What is under way on a bus that loses, doubles and delays.
+template <class T>
+class BadLine {
+ public:
+  explicit BadLine(std::mt19937* random) : random_(random) {}
+  void Send(double t, const T& message) {
+    std::uniform_real_distribution<double> u(0.0, 1.0);
+    const int copies = u(*random_) < 0.2 ? 0 : u(*random_) < 0.2 ? 2 : 1;
+    for (int i = 0; i < copies; ++i) in_flight_.push_back({t + 0.6 * u(*random_), message});
+  }
+  std::vector<T> Arrived(double t) {
+    const auto late = std::stable_partition(in_flight_.begin(), in_flight_.end(),
+                                            [t](const auto& m) { return m.first > t; });
+    std::vector<T> out;
+    for (auto m = late; m != in_flight_.end(); ++m) out.push_back(m->second);
+    in_flight_.erase(late, in_flight_.end());
+    return out;
+  }
+
+ private:
+  std::mt19937* random_;
+  std::vector<std::pair<double, T>> in_flight_;
+};
+
+// 20 % are lost and 20 % come twice, on the way there and back; late copies of earlier commands
+// keep coming while the next ones are given.
+TEST(Commands, TakeEffectOnceOnABadLine) {
+  for (unsigned seed = 1; seed <= 20; ++seed) {
+    std::mt19937 random(seed);
+    Bench bench;
+    bench.Fly();
+    BadLine<Command> there(&random);
+    BadLine<Answer> back(&random);
+    int given = 0, changes = 0;
+    State before = bench.mission.state();
+    for (int64_t id = 1; id <= 100; ++id) {
+      const Event kind = id % 2 == 1 ? Event::kChase : Event::kHold;
+      const Command command{"command", 5, 10'000 + id, bench.t, kind};
+      CommandClient client(kind, bench.t);
+      while (!client.answered()) {
+        ASSERT_FALSE(client.GaveUp(bench.t)) << "seed " << seed << ", command " << id;
+        if (client.Due(bench.t)) there.Send(bench.t, command);
+        bench.Run(kTick);
+        for (const Command& c : there.Arrived(bench.t)) {
+          back.Send(bench.t, bench.mission.Obey(bench.t, c));
+          changes += bench.mission.state() != before;
+          before = bench.mission.state();
+        }
+        for (const Answer& a : back.Arrived(bench.t))
+          if (a.command.Key() == command.Key()) client.OnAnswer(a.accepted, a.reason);
+      }
+      ASSERT_TRUE(client.accepted()) << client.reason();
+      ++given;
+      ASSERT_EQ(changes, given) << "seed " << seed << ": each once, none again";
+      ASSERT_EQ(before, kind == Event::kChase ? State::kChase : State::kHold);
+    }
+  }
+}
+
+TEST(CommandClient, RepeatsUntilAnsweredAndGivesUp) {
+  CommandClient client(Event::kHold, 1.0);
+  EXPECT_TRUE(client.Due(1.0));
+  EXPECT_FALSE(client.Due(1.05));
+  EXPECT_TRUE(client.Due(1.11));
+  EXPECT_FALSE(client.GaveUp(5.9));
+  EXPECT_TRUE(client.GaveUp(6.1));
+  client.OnAnswer(true, "HOLD");
+  client.OnAnswer(false, "late");
+  EXPECT_TRUE(client.accepted());
+  EXPECT_FALSE(client.Due(7.0));
+  EXPECT_FALSE(client.GaveUp(9.0));
+}
+
+TEST(CommandClient, KnowsWhenTheFlightIsThere) {
+  EXPECT_EQ(ProgressOf(Event::kTakeoff, State::kTakeoff), Progress::kUnderWay);
+  EXPECT_EQ(ProgressOf(Event::kTakeoff, State::kHold), Progress::kReached);
+  EXPECT_EQ(ProgressOf(Event::kReturn, State::kLand), Progress::kUnderWay);
+  EXPECT_EQ(ProgressOf(Event::kReturn, State::kDone), Progress::kReached);
+  EXPECT_EQ(ProgressOf(Event::kReturn, State::kHold), Progress::kMissed);
+  EXPECT_EQ(ProgressOf(Event::kChase, State::kSearch), Progress::kUnderWay);
+  EXPECT_EQ(ProgressOf(Event::kChase, State::kEmergency), Progress::kMissed);
+  EXPECT_EQ(ProgressOf(Event::kStop, State::kHold), Progress::kReached);
+  for (int i = 0; i <= static_cast<int>(Event::kStop); ++i)
+    EXPECT_EQ(CommandNamed(Name(static_cast<Event>(i))), static_cast<Event>(i));
+  EXPECT_FALSE(CommandNamed("fly").has_value());
+}
+
+}  // namespace
+}  // namespace chase::mission

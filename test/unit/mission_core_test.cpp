@@ -1,0 +1,184 @@
+#include <gtest/gtest.h>
+
+#include "test/unit/mission_bench.h"
+
+namespace chase::mission {
+namespace {
+
+TEST(Mission, IsReadyOnlyWhenNothingIsMissing) {
+  Bench bench;
+  bench.Run(0.2);
+  EXPECT_EQ(bench.mission.state(), State::kReady);
+  struct Case {
+    const char* what;
+    void (*spoil)(Bench*);
+    double after;  // s
+  };
+  const Case cases[] = {
+      {"POSE is", [](Bench* b) { b->hears_pose = false; }, 0.2},
+      {"odometry is not healthy: few points",
+       [](Bench* b) {
+         b->pose.healthy = false;
+         b->pose.reason = "few points";
+       },
+       0.1},
+      {"OBSTACLES is", [](Bench* b) { b->hears_obstacles = false; }, 0.4},
+      {"TARGET is", [](Bench* b) { b->hears_target = false; }, 0.6},
+      {"planning is", [](Bench* b) { b->failed.erase("planning"); }, 2.6},
+      {"control has failed", [](Bench* b) { b->failed["control"] = true; }, 0.1},
+      {"mapping has failed", [](Bench* b) { b->failed["mapping"] = true; }, 0.1},
+  };
+  for (const Case& c : cases) {
+    Bench one;
+    one.Run(0.5);
+    ASSERT_EQ(one.mission.state(), State::kReady) << c.what;
+    c.spoil(&one);
+    one.Run(c.after + 0.1);
+    EXPECT_EQ(one.mission.state(), State::kIdle) << c.what;
+    ASSERT_EQ(one.mission.missing().size(), 1u) << c.what;
+    EXPECT_EQ(one.mission.missing()[0].rfind(c.what, 0), 0u) << one.mission.missing()[0];
+    const Answer answer = one.Command(Event::kTakeoff);
+    EXPECT_FALSE(answer.accepted);
+    EXPECT_NE(answer.reason.find(c.what), std::string::npos) << answer.reason;
+  }
+  Bench deaf;
+  deaf.hears_pose = deaf.hears_obstacles = deaf.hears_target = false;
+  deaf.failed.clear();
+  deaf.Run(0.2);
+  EXPECT_EQ(deaf.mission.missing().size(), 6u);
+}
+
+TEST(Mission, FliesFromTakeOffToLanding) {
+  Bench bench;
+  bench.Run(0.2);
+  EXPECT_TRUE(bench.Command(Event::kTakeoff).accepted);
+  EXPECT_EQ(bench.mission.state(), State::kTakeoff);
+  bench.mission.inputs().plan_heard = bench.t + 0.05;
+  bench.mission.inputs().plan_end = {0.0, 0.0, 1.0};
+  bench.Run(1.0);
+  EXPECT_EQ(bench.mission.state(), State::kTakeoff);
+  bench.pose.p.z() = 0.95;
+  bench.Run(0.2);
+  EXPECT_EQ(bench.mission.state(), State::kHold);
+  EXPECT_TRUE(bench.Command(Event::kChase).accepted);
+  bench.Run(0.2);
+  EXPECT_EQ(bench.mission.state(), State::kChase);
+  bench.tracked = false;
+  bench.Run(0.2);
+  EXPECT_EQ(bench.mission.state(), State::kSearch);
+  bench.tracked = true;
+  bench.Run(0.2);
+  EXPECT_EQ(bench.mission.state(), State::kChase);
+  bench.pose.p = {4.0, 0.0, 1.2};
+  bench.Run(0.2);
+  EXPECT_TRUE(bench.Command(Event::kReturn).accepted);
+  bench.Run(0.2);
+  EXPECT_EQ(bench.mission.state(), State::kReturn);
+  bench.pose.p = {0.1, -0.1, 1.2};
+  bench.pose.v = {0.5, 0.0, 0.0};
+  bench.Run(0.2);
+  EXPECT_EQ(bench.mission.state(), State::kReturn) << "still moving";
+  bench.pose.v.setZero();
+  bench.Run(0.2);
+  EXPECT_EQ(bench.mission.state(), State::kLand);
+  bench.mission.inputs().motors_off = true;
+  bench.Run(0.1);
+  EXPECT_EQ(bench.mission.state(), State::kDone);
+  EXPECT_FALSE(bench.Command(Event::kTakeoff).accepted);
+}
+
+TEST(Mission, AChangeOfFrameTurnsReturnIntoLand) {
+  Bench bench;
+  bench.Fly({3.0, 0.0, 1.0});
+  bench.Command(Event::kReturn);
+  bench.Run(0.2);
+  ASSERT_EQ(bench.mission.state(), State::kReturn);
+  ++bench.pose.epoch;
+  bench.Run(0.1);
+  EXPECT_EQ(bench.mission.state(), State::kLand);
+}
+
+TEST(Mission, ReturnInAnotherFrameIsALandingAtOnce) {
+  Bench bench;
+  bench.Fly({3.0, 0.0, 1.0});
+  ++bench.pose.epoch;
+  bench.Run(0.1);
+  ASSERT_EQ(bench.mission.state(), State::kHold);
+  const Answer answer = bench.Command(Event::kReturn);
+  EXPECT_TRUE(answer.accepted);
+  EXPECT_NE(answer.reason.find("not known"), std::string::npos) << answer.reason;
+  EXPECT_EQ(bench.mission.state(), State::kLand);
+}
+
+TEST(Mission, WithoutAPoseItIsAnEmergencyUntilThereIsOne) {
+  Bench bench;
+  bench.Fly();
+  bench.pose.usable = bench.pose.healthy = false;
+  bench.Run(1.8);
+  EXPECT_EQ(bench.mission.state(), State::kHold) << "control brakes and waits as long";
+  bench.Run(0.4);
+  EXPECT_EQ(bench.mission.state(), State::kEmergency);
+  EXPECT_FALSE(bench.Command(Event::kChase).accepted);
+  bench.pose.usable = true;
+  bench.Run(0.1);
+  EXPECT_EQ(bench.mission.state(), State::kHold);
+  bench.hears_pose = false;
+  bench.Run(2.2);
+  EXPECT_EQ(bench.mission.state(), State::kEmergency);
+  bench.mission.inputs().motors_off = true;
+  bench.Run(0.1);
+  EXPECT_EQ(bench.mission.state(), State::kDone);
+}
+
+TEST(Mission, StartedInFlightItHoldsAndDoesNotGoOnWithALanding) {
+  Bench flying;
+  flying.mission.inputs().flying = true;
+  flying.Run(0.1);
+  EXPECT_EQ(flying.mission.state(), State::kHold);
+  EXPECT_FALSE(flying.mission.home().has_value());
+  EXPECT_EQ((flying.Command(Event::kReturn), flying.mission.state()), State::kLand);
+
+  Bench landing;
+  landing.mission.inputs().flying = landing.mission.inputs().landing = true;
+  landing.Run(0.1);
+  EXPECT_EQ(landing.mission.state(), State::kLand) << "a landing goes on";
+
+  Bench down;
+  down.mission.inputs().motors_off = down.mission.inputs().flying = true;
+  down.Run(0.1);
+  EXPECT_EQ(down.mission.state(), State::kDone);
+}
+
+TEST(Mission, GivesUpTheSearchInTime) {
+  MissionConfig config;
+  config.give_up = 5.0;
+  Bench bench(config);
+  bench.Fly();
+  bench.tracked = false;
+  bench.pose.p.x() = 3.0;
+  bench.Command(Event::kSearch);
+  bench.Run(4.8);
+  EXPECT_EQ(bench.mission.state(), State::kSearch);
+  bench.Run(0.4);
+  EXPECT_EQ(bench.mission.state(), State::kReturn);
+}
+
+TEST(Mission, AutostartFliesByItselfUntilTheFirstCommand) {
+  MissionConfig config;
+  config.autostart = true;
+  Bench bench(config);
+  bench.Run(0.5);
+  EXPECT_EQ(bench.mission.state(), State::kChase);
+  bench.pose.usable = bench.pose.healthy = false;
+  bench.Run(2.5);
+  ASSERT_EQ(bench.mission.state(), State::kEmergency);
+  bench.pose.usable = bench.pose.healthy = true;
+  bench.Run(0.3);
+  EXPECT_EQ(bench.mission.state(), State::kChase) << "it goes on";
+  EXPECT_TRUE(bench.Command(Event::kStop).accepted);
+  bench.Run(5.0);
+  EXPECT_EQ(bench.mission.state(), State::kHold) << "the operator leads now";
+}
+
+}  // namespace
+}  // namespace chase::mission

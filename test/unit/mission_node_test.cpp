@@ -1,0 +1,148 @@
+#include "services/mission/mission_node.h"
+
+#include <gtest/gtest.h>
+
+#include <memory>
+#include <vector>
+
+#include "chase/command_ack_t.hpp"
+#include "chase/flight_state_t.hpp"
+#include "chase/health_t.hpp"
+#include "common/bus/convert.h"
+#include "common/bus/lockstep.h"
+
+namespace chase::mission {
+namespace {
+
+constexpr int64_t kStart = 1'700'000'000'000'000;  // microseconds
+
+/// Stands in for a process: its status comes once a second by itself.
+class Silent : public bus::Node {};
+
+/// The node on an in-memory bus among stand-ins.
+class Bench {
+ public:
+  Bench() {
+    for (const char* name : {"prediction", "planning", "control"})
+      lockstep_.Add(name, 0, [](bus::Bus&) { return std::make_unique<Silent>(); });
+    lockstep_.Add("mission", 0, [](bus::Bus& bus) {
+      return std::make_unique<MissionNode>(bus, MissionConfig{});
+    });
+    lockstep_.Add("listener", 0, [this](bus::Bus& bus) {
+      bus.Subscribe<flight_state_t>("FLIGHT_STATE", [this](const auto& m) { states.push_back(m); });
+      bus.Subscribe<command_ack_t>("COMMAND_ACK", [this](const auto& m) { acks.push_back(m); });
+      bus.Subscribe<health_t>("HEALTH", [this](const auto& m) { healths.push_back(m); });
+      return std::make_unique<Silent>();
+    });
+    sensors_ = lockstep_.Connect();
+    operator_ = lockstep_.Connect();
+    operator_->SetIdentity({"command", "", kStart});
+  }
+
+  void Run(double seconds) {
+    for (const int64_t end = lockstep_.now() + std::llround(seconds * 1e6);
+         lockstep_.now() < end;) {
+      const int64_t t = lockstep_.now() + 20'000;
+      pose_t pose{};
+      pose.utime = t;
+      pose.orientation[0] = 1.0;
+      sensors_->Publish("POSE", pose);
+      obstacles_t obstacles{};
+      obstacles.utime = t;
+      sensors_->Publish("OBSTACLES", obstacles);
+      target_t target{};
+      target.utime = t;
+      target.state = target_t::TRACKING;
+      sensors_->Publish("TARGET", target);
+      lockstep_.RunUntil(t);
+    }
+  }
+
+  void Command(int8_t kind, int64_t id, const std::string& vehicle = "") {
+    command_t m{};
+    m.utime = lockstep_.now();
+    m.id = id;
+    m.kind = kind;
+    operator_->SetIdentity({"command", vehicle, kStart});
+    operator_->Publish("COMMAND", m);
+    Run(0.02);
+  }
+
+  bus::Lockstep lockstep_{kStart};
+  std::vector<flight_state_t> states;
+  std::vector<command_ack_t> acks;
+  std::vector<health_t> healths;
+
+ private:
+  std::unique_ptr<bus::Bus> sensors_, operator_;
+};
+
+TEST(MissionNode, SaysTenTimesASecondWhereTheFlightIsAndWhatIsMissing) {
+  Bench bench;
+  bench.Run(0.5);
+  ASSERT_GE(bench.states.size(), 5u);
+  EXPECT_EQ(bench.states.front().state, +flight_state_t::IDLE);
+  EXPECT_EQ(bench.states.back().missing,
+            (std::vector<std::string>{"prediction is not heard", "planning is not heard",
+                                      "control is not heard"}));
+  bench.Run(1.5);
+  EXPECT_EQ(bench.states.back().state, +flight_state_t::READY);
+  EXPECT_NEAR(static_cast<double>(bench.states.size()), 20.0, 1.0);
+  EXPECT_GT(bench.states.back().since, kStart + 1'000'000);
+  EXPECT_EQ(bench.states.back().n_missing, 0);
+}
+
+TEST(MissionNode, AnswersACommandAndSaysTheNewStateAtOnce) {
+  Bench bench;
+  bench.Run(2.0);
+  const size_t before = bench.states.size();
+  bench.Command(command_t::CHASE, 1);
+  ASSERT_EQ(bench.acks.size(), 1u);
+  EXPECT_EQ(bench.acks[0].verdict, +command_ack_t::REFUSED);
+  EXPECT_NE(bench.acks[0].reason.find("take off first"), std::string::npos);
+  bench.Command(command_t::TAKEOFF, 2);
+  bench.Command(command_t::TAKEOFF, 2);
+  ASSERT_EQ(bench.acks.size(), 3u);
+  EXPECT_EQ(bench.acks[1].verdict, +command_ack_t::ACCEPTED);
+  EXPECT_EQ(bench.acks[1].command_sender, "command");
+  EXPECT_EQ(bench.acks[1].command_start, kStart);
+  EXPECT_EQ(bench.acks[1].id, 2);
+  EXPECT_EQ(bench.acks[2].verdict, +command_ack_t::ACCEPTED) << "the same answer again";
+  EXPECT_GT(bench.states.size(), before);
+  EXPECT_EQ(bench.states.back().state, +flight_state_t::TAKEOFF);
+  EXPECT_EQ(bench.states.back().has_home, 1);
+}
+
+TEST(MissionNode, CommandsToOtherVehiclesAreNotItsOwn) {
+  Bench bench;
+  bench.Run(2.0);
+  bench.Command(command_t::TAKEOFF, 1, "eagle");
+  EXPECT_TRUE(bench.acks.empty());
+  EXPECT_EQ(bench.states.back().state, +flight_state_t::READY);
+  EXPECT_EQ(bench.lockstep_.bus("mission").counters().at("COMMAND").foreign, 1);
+}
+
+TEST(MissionNode, HealthCountsTheLivesOfEveryProcess) {
+  Bench bench;
+  bench.Run(3.0);
+  const auto find = [&](const std::string& name) {
+    for (const process_health_t& p : bench.healths.back().processes)
+      if (p.name == name) return p;
+    return process_health_t{};
+  };
+  EXPECT_EQ(bench.healths.back().n_processes, 3);
+  EXPECT_EQ(find("planning").restarts, 0);
+  EXPECT_LE(find("planning").age, 1.1);
+  bench.lockstep_.Kill("planning");
+  bench.Run(3.0);
+  EXPECT_GT(find("planning").age, 2.0);
+  EXPECT_EQ(bench.states.back().state, +flight_state_t::IDLE);
+  EXPECT_EQ(bench.states.back().missing.at(0).rfind("planning is", 0), 0u);
+  bench.lockstep_.Start("planning");
+  bench.Run(3.0);
+  EXPECT_EQ(find("planning").restarts, 1);
+  EXPECT_EQ(bench.states.back().state, +flight_state_t::READY);
+}
+
+}  // namespace
+}  // namespace chase::mission
