@@ -33,7 +33,8 @@ struct Arguments {
   unsigned draws = 50;
   std::vector<int> widths_px = {600, 1200, 300};  ///< that the photos are scaled to
   double field_of_view_deg = 65.0;                ///< of the photos' height
-  double seconds = 8.0;                           ///< that the service is shown a photo
+  double dark = 0.0;     ///< brightness of one more training photo; 0: none
+  double seconds = 8.0;  ///< that the service is shown a photo
   bool each = false;
 };
 
@@ -67,16 +68,35 @@ std::vector<bool> Draw(size_t photos, size_t train, unsigned seed) {
   return chosen;
 }
 
+/// As a camera sees it with so much less light: darker, with the same noise of its own.
+cv::Mat Darkened(const cv::Mat& bgr, double brightness) {
+  constexpr double kNoise = 3.0;  // grey levels, as the simulator's camera
+  cv::RNG random(1);
+  cv::Mat out, noise(bgr.size(), CV_16SC3);
+  random.fill(noise, cv::RNG::NORMAL, 0.0, kNoise);
+  bgr.convertTo(out, CV_16SC3, brightness);
+  cv::add(out, noise, out);
+  out.convertTo(out, CV_8UC3);
+  return out;
+}
+
+/// With `dark` above 0 the first photo is given once more, darkened to that share.
 Learned Learn(const std::vector<Photo>& photos, const std::vector<bool>& chosen,
-              const DetectorConfig& base) {
+              const DetectorConfig& base, double dark = 0.0) {
   std::vector<cv::Mat> images, masks;
   for (size_t i = 0; i < photos.size(); ++i)
     if (chosen[i]) images.push_back(photos[i].bgr), masks.push_back(photos[i].mask);
+  if (dark > 0.0) images.push_back(Darkened(images[0], dark)), masks.push_back(masks[0]);
   return LearnDetector(images, masks, base);
+}
+
+double Mean(const std::vector<double>& values) {
+  return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
 }
 
 void RunDraws(const Arguments& a, const std::vector<Photo>& photos, const DetectorConfig& base) {
   std::vector<double> means;
+  std::vector<std::vector<double>> by_photo(photos.size());
   size_t missed = 0, shown = 0;
   for (unsigned seed = 1; seed <= a.draws; ++seed) {
     const auto chosen = Draw(photos.size(), a.train, seed);
@@ -85,11 +105,12 @@ void RunDraws(const Arguments& a, const std::vector<Photo>& photos, const Detect
     double sum = 0.0;
     std::string refused;
     try {
-      const Learned learned = Learn(photos, chosen, base);
+      const Learned learned = Learn(photos, chosen, base, a.dark);
       for (size_t i = 0; i < photos.size(); ++i) {
         if (chosen[i]) continue;
         const double overlap = Overlap(learned.config, photos[i].bgr, photos[i].mask);
         sum += overlap;
+        by_photo[i].push_back(overlap);
         missed += overlap <= 0.0;
         ++shown;
       }
@@ -101,8 +122,13 @@ void RunDraws(const Arguments& a, const std::vector<Photo>& photos, const Detect
       fmt::print("draw {:3d}: mean IoU {:.3f},{}{}\n", seed, means.back(), names, refused);
   }
   if (means.empty()) return;
+  for (size_t i = 0; a.each && i < photos.size(); ++i)
+    if (!by_photo[i].empty())
+      fmt::print("{:<16} shown {:3d} times: mean IoU {:.3f}, missed {}\n", photos[i].name,
+                 by_photo[i].size(), Mean(by_photo[i]),
+                 std::count(by_photo[i].begin(), by_photo[i].end(), 0.0));
   const double n = static_cast<double>(means.size());
-  const double mean = std::accumulate(means.begin(), means.end(), 0.0) / n;
+  const double mean = Mean(means);
   double squares = 0.0;
   for (const double m : means) squares += (m - mean) * (m - mean);
   fmt::print(
@@ -238,6 +264,8 @@ int main(int argc, char** argv) {
   app.add_option("--config", a.base, "overrides of perception's config");
   app.add_option("--train", a.train, "photos that are learned from")->check(CLI::PositiveNumber);
   app.add_option("--draws", a.draws, "choices of them, seeds from 1");
+  app.add_option("--dark", a.dark, "learn from one of them once more, darkened to this share")
+      ->check(CLI::Range(0.0, 1.0));
   app.add_option("--widths", a.widths_px, "that the service is shown the photos at, px");
   app.add_option("--fov", a.field_of_view_deg, "of the photos' height, degrees")
       ->check(CLI::Range(5.0, 160.0));
