@@ -26,7 +26,7 @@ void LogBus::PublishRaw(const std::string& channel, Bytes bytes) {
   out_.Write(now_, channel, bytes);
 }
 
-void LogBus::Run(Node* node) {
+void LogBus::Run(Node* node, const std::function<void(int64_t)>& after) {
   lcm::LogFile log(in_, "r");
   if (!log.good()) throw std::runtime_error(in_ + ": cannot be read; --replay needs an LCM log");
   const int64_t period = node->TickPeriod();
@@ -42,6 +42,7 @@ void LogBus::Run(Node* node) {
     if (handler != handlers_.end())
       handler->second(static_cast<const uint8_t*>(event->data),
                       static_cast<size_t>(event->datalen));
+    if (after) after(now_);
   }
   if (events_ == 0) throw std::runtime_error(in_ + ": holds no event; is it an LCM log?");
   out_.Close();

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <map>
 #include <memory>
 #include <string>
@@ -21,8 +22,9 @@ class LogBus : public Bus {
   /// Throws std::runtime_error when a file cannot be opened.
   LogBus(const std::string& in, const std::string& out);
 
-  /// Drives `node` through the whole log; ticks it at multiples of its period in between.
-  void Run(Node* node);
+  /// Drives `node` through the whole log; ticks it at multiples of its period in between. After
+  /// each event `after` is called with its time, microseconds, where given.
+  void Run(Node* node, const std::function<void(int64_t utime)>& after = nullptr);
 
   int64_t Now() const override { return now_; }
   int64_t events() const { return events_; }

@@ -90,7 +90,13 @@ void RunReplay(const ServiceSpec& spec, const Flags& flags) {
   LogBus bus(flags.replay, flags.out);
   bus.SetIdentity(IdentityIn(flags.replay, spec.name));
   const auto node = spec.make_node(bus);
-  bus.Run(node.get());
+  StatusReporter reporter(spec.name);
+  int64_t next_status = -1;
+  bus.Run(node.get(), [&](int64_t now) {
+    if (now < next_status) return;
+    bus.Publish(StatusChannel(spec.name), reporter.Make(bus, *node, now, false));
+    next_status = now + kStatusPeriod;
+  });
 }
 
 int Run(const ServiceSpec& spec, const Flags& flags) {

@@ -51,7 +51,7 @@ double ColorDetector::ShapeScore(const Detection& d, double area, double hull_ar
   if (d.AnyCut()) return 0.6 * solid;
   const double aspect = d.box.width / d.box.height, fill = area / d.box.area();
   return solid * Bell(std::log(aspect / shape_.aspect), shape_.aspect_tolerance) *
-         Bell(std::min(0.0, fill - shape_.fill), shape_.fill_tolerance);
+         Bell(fill - shape_.fill, shape_.fill_tolerance);
 }
 
 Detection ColorDetector::Describe(const cv::Mat& bgr, const cv::Mat& score,

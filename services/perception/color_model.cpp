@@ -12,25 +12,7 @@ constexpr int kBits = 6, kLevels = 1 << kBits;
 // Pixels below tell the light's tint: earth, bark and concrete under a warm lamp reach 0.5.
 constexpr double kGreySaturation = 0.6;
 constexpr int kGreyMinimum = 200;  // sampled pixels needed for that
-constexpr double kShade = 0.5;     // brightness in shade, share of the darkest one learned
 constexpr int kGreyStep = 4;       // every so many rows and columns are sampled
-
-struct Hsv {
-  double hue_deg, saturation, value;
-};
-
-Hsv ToHsv(double b, double g, double r) {
-  const double high = std::max({b, g, r}), low = std::min({b, g, r}), span = high - low;
-  if (span <= 0.0) return {0.0, 0.0, high};
-  double hue = 0.0;
-  if (high == r)
-    hue = (g - b) / span;
-  else if (high == g)
-    hue = 2.0 + (b - r) / span;
-  else
-    hue = 4.0 + (r - g) / span;
-  return {hue < 0.0 ? 60.0 * hue + 360.0 : 60.0 * hue, span / high, high};
-}
 
 /// How far `hue` lies outside the range, degrees; 0 inside. The range may wrap, and 0 to 360 is
 /// all.
@@ -46,23 +28,27 @@ double Ramp(double x, double limit, double softness) {
   return std::clamp(1.0 + (x - limit) / softness, 0.0, 1.0);
 }
 
-/// Circular mean, degrees, -180 to 180. What is grey has no hue, so each weighs as it is saturated.
-double MeanHue(const std::vector<double>& hue_deg, const std::vector<double>& saturation) {
-  double x = 0.0, y = 0.0;
-  for (size_t i = 0; i < hue_deg.size(); ++i) {
-    x += saturation[i] * std::cos(hue_deg[i] * M_PI / 180.0);
-    y += saturation[i] * std::sin(hue_deg[i] * M_PI / 180.0);
-  }
-  return std::atan2(y, x) * 180.0 / M_PI;
-}
-
-double Percentile(std::vector<double>* values, double share) {
-  const auto k = static_cast<std::ptrdiff_t>(share * static_cast<double>(values->size() - 1));
-  std::nth_element(values->begin(), values->begin() + k, values->end());
-  return (*values)[static_cast<size_t>(k)];
-}
-
 }  // namespace
+
+Hsv ToHsv(double b, double g, double r) {
+  const double high = std::max({b, g, r}), low = std::min({b, g, r}), span = high - low;
+  if (span <= 0.0) return {0.0, 0.0, high};
+  double hue = 0.0;
+  if (high == r)
+    hue = (g - b) / span;
+  else if (high == g)
+    hue = 2.0 + (b - r) / span;
+  else
+    hue = 4.0 + (r - g) / span;
+  return {hue < 0.0 ? 60.0 * hue + 360.0 : 60.0 * hue, span / high, high};
+}
+
+double Score(const ColorConfig& config, const Hsv& c) {
+  const double outside = HueOutside(c.hue_deg, config.hue_min_deg, config.hue_max_deg);
+  return std::max(0.0, 1.0 - outside / config.hue_softness_deg) *
+         Ramp(c.saturation, config.saturation_min, config.softness) *
+         Ramp(c.value, config.value_min, config.softness);
+}
 
 ColorModel::ColorModel(const ColorConfig& config) : config_(config) {
   table_.resize(static_cast<size_t>(kLevels) * kLevels * kLevels);
@@ -76,11 +62,7 @@ ColorModel::ColorModel(const ColorConfig& config) : config_(config) {
 }
 
 double ColorModel::Score(double blue, double green, double red) const {
-  const Hsv c = ToHsv(blue, green, red);
-  const double outside = HueOutside(c.hue_deg, config_.hue_min_deg, config_.hue_max_deg);
-  return std::max(0.0, 1.0 - outside / config_.hue_softness_deg) *
-         Ramp(c.saturation, config_.saturation_min, config_.softness) *
-         Ramp(c.value, config_.value_min, config_.softness);
+  return chase::perception::Score(config_, ToHsv(blue, green, red));
 }
 
 Eigen::Vector3d ColorModel::Gains(const cv::Mat& bgr) const {
@@ -119,30 +101,6 @@ cv::Mat ColorModel::Score(const cv::Mat& bgr) const {
       out[x] = table_[index[0][in[0]] | index[1][in[1]] | index[2][in[2]]];
   }
   return score;
-}
-
-ColorConfig LearnColor(const std::vector<cv::Mat>& images, const std::vector<cv::Mat>& masks,
-                       const ColorConfig& base) {
-  std::vector<double> hue, saturation, value;
-  for (size_t i = 0; i < images.size(); ++i)
-    for (int y = 0; y < images[i].rows; ++y)
-      for (int x = 0; x < images[i].cols; ++x) {
-        if (masks[i].at<uint8_t>(y, x) == 0) continue;
-        const auto& p = images[i].at<cv::Vec3b>(y, x);
-        const Hsv c = ToHsv(p[0] / 255.0, p[1] / 255.0, p[2] / 255.0);
-        hue.push_back(c.hue_deg);
-        saturation.push_back(c.saturation);
-        value.push_back(c.value);
-      }
-  ColorConfig learned = base;
-  if (hue.empty()) return learned;
-  const double middle = MeanHue(hue, saturation);
-  for (double& h : hue) h = std::remainder(h - middle, 360.0);  // the seam lies opposite
-  learned.hue_min_deg = std::fmod(middle + Percentile(&hue, 0.03) + 720.0, 360.0);
-  learned.hue_max_deg = std::fmod(middle + Percentile(&hue, 0.97) + 720.0, 360.0);
-  learned.saturation_min = Percentile(&saturation, 0.03);
-  learned.value_min = kShade * Percentile(&value, 0.03);
-  return learned;
 }
 
 }  // namespace chase::perception

@@ -9,6 +9,16 @@
 
 namespace chase::perception {
 
+struct Hsv {
+  double hue_deg, saturation, value;  ///< 0 to 360, 0 to 1, 0 to 1
+};
+
+/// Of a colour with channels 0 to 1; grey has hue 0.
+Hsv ToHsv(double blue, double green, double red);
+
+/// How much a colour looks like the target's, 0 to 1.
+double Score(const ColorConfig& config, const Hsv& color);
+
 /// How much each pixel looks like the target's colour.
 class ColorModel {
  public:
@@ -28,10 +38,5 @@ class ColorModel {
   ColorConfig config_;
   std::vector<uint8_t> table_;  ///< by 6 bits a channel
 };
-
-/// The range of hue, saturation and value that holds the masked pixels of some pictures.
-/// `images` 8 bit BGR, `masks` 8 bit of the same sizes; the rest comes from `base`.
-ColorConfig LearnColor(const std::vector<cv::Mat>& images, const std::vector<cv::Mat>& masks,
-                       const ColorConfig& base);
 
 }  // namespace chase::perception

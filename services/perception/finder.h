@@ -60,6 +60,7 @@ class Finder {
                               const Detection& detection, bool fresh_sweeps_only) const;
   /// One detection as a target of which nothing is known.
   std::optional<Sighting> Acquire(const View& view, const Detection& detection) const;
+  bool HasSweeps() const { return !sweeps_.empty(); }
   /// Sweeps count once.
   void MarkSweepsUsed();
 

@@ -10,6 +10,7 @@
 
 #include "services/perception/color_detector.h"
 #include "services/perception/color_model.h"
+#include "services/perception/learn_color.h"
 #include "services/perception/silhouette.h"
 
 namespace chase::perception {
@@ -53,14 +54,15 @@ double Overlap(const cv::Mat& region, const cv::Rect& at, const cv::Mat& mask) {
   return static_cast<double>(both) / either;
 }
 
-/// The blob that overlaps most with the mask; null where none does.
+/// The blob that covers most of the mask; null where none does. Pieces of a blob come after it and
+/// cover less: masks are drawn inside the outline, which pieces suit better than the whole.
 const Detection* MarkedBlob(const std::vector<Detection>& found, const cv::Mat& mask) {
   const Detection* marked = nullptr;
-  double most = 0.0;
+  int most = 0;
   for (const auto& d : found) {
-    const double overlap = Overlap(d.mask, d.mask_box, mask);
-    if (overlap <= most) continue;
-    most = overlap;
+    const int covered = cv::countNonZero(d.mask & mask(d.mask_box));
+    if (covered <= most) continue;
+    most = covered;
     marked = &d;
   }
   return marked;
@@ -80,14 +82,19 @@ std::string WhyShapeless(const Detection* marked, const cv::Size& image) {
   throw std::invalid_argument(message + "give one with all of the target inside the picture");
 }
 
-/// Aspect and fill of the blobs that the masks mark, as geometric and plain means. Gives the pairs
+double Median(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  return 0.5 * (values[(values.size() - 1) / 2] + values[values.size() / 2]);
+}
+
+/// Aspect and fill of the blobs that the masks mark, as medians: a blob may hold more than the
+/// target. Gives the pairs
 /// that do not tell them, and why.
 std::vector<std::string> LearnShape(const std::vector<cv::Mat>& images,
                                     const std::vector<cv::Mat>& masks, DetectorConfig* config) {
   const ColorDetector detector(*config, 1.0);
   std::vector<std::string> shapeless;
-  double log_aspect = 0.0, fill = 0.0;
-  int n = 0;
+  std::vector<double> aspects, fills;
   for (size_t i = 0; i < images.size(); ++i) {
     const auto found = detector.Detect(images[i]);
     const Detection* marked = MarkedBlob(found, masks[i]);
@@ -96,20 +103,30 @@ std::vector<std::string> LearnShape(const std::vector<cv::Mat>& images,
       shapeless.push_back("pair " + std::to_string(i + 1) + ": " + why);
       continue;
     }
-    log_aspect += std::log(marked->box.width / marked->box.height);
-    fill += cv::countNonZero(marked->mask) / marked->box.area();
-    ++n;
+    aspects.push_back(marked->box.width / marked->box.height);
+    fills.push_back(cv::countNonZero(marked->mask) / marked->box.area());
   }
-  if (n == 0) RefuseAll(shapeless);
-  config->shape.aspect = std::exp(log_aspect / n);
-  config->shape.fill = fill / n;
+  if (aspects.empty()) RefuseAll(shapeless);
+  config->shape.aspect = Median(aspects);
+  config->shape.fill = Median(fills);
   return shapeless;
+}
+
+/// The best whole, or a piece that scores more, is not cut anywhere and is no piece of a good
+/// whole.
+const Detection* MostLikely(const std::vector<Detection>& found) {
+  const Detection* best = nullptr;
+  for (const auto& d : found) {
+    const bool candidate = !best || (!d.part && !d.edged && !d.AnyCut());
+    if (candidate && (!best || d.score > best->score)) best = &d;
+  }
+  return best;
 }
 
 double Overlap(const ColorDetector& detector, const cv::Mat& bgr, const cv::Mat& mask) {
   const auto found = detector.Detect(bgr);
-  if (found.empty()) return 0.0;
-  return Overlap(Region(found.front()), found.front().mask_box, mask);
+  const Detection* best = MostLikely(found);
+  return best ? Overlap(Region(*best), best->mask_box, mask) : 0.0;
 }
 
 double MeanOverlap(const std::vector<cv::Mat>& images, const std::vector<cv::Mat>& masks,
@@ -125,20 +142,27 @@ double Overlap(const DetectorConfig& config, const cv::Mat& bgr, const cv::Mat& 
   return Overlap(ColorDetector(config, 1.0), bgr, mask);
 }
 
-Learned LearnDetector(const std::vector<cv::Mat>& images, const std::vector<cv::Mat>& masks,
+Learned LearnDetector(const std::vector<cv::Mat>& images, const std::vector<cv::Mat>& given,
                       const DetectorConfig& base) {
-  Check(images, masks);
+  Check(images, given);
+  std::vector<cv::Mat> masks;  // of soft edges the inner half
+  for (const auto& mask : given) {
+    double most = 0.0;
+    cv::minMaxLoc(mask, nullptr, &most);
+    masks.push_back(mask > 0.5 * most);
+  }
   DetectorConfig config = base;
   config.kind = "color";
   config.color.white_balance = false;  // the pictures' own light is in the colours
-  config.color = LearnColor(images, masks, config.color);
+  const LearnedColor color_of = LearnColor(images, masks, config.color);
+  config.color = color_of.config;
   const auto shapeless = LearnShape(images, masks, &config);
   const ColorModel color(config.color);
   Learned best;
   for (int i = 0; i * kInsetStep <= kMostInset; ++i) {
     config.shape.inset = i * kInsetStep;
     const double overlap = MeanOverlap(images, masks, ColorDetector(config.shape, color, 1.0));
-    if (i == 0 || overlap > best.overlap) best = {config, overlap, shapeless};
+    if (i == 0 || overlap > best.overlap) best = {config, overlap, shapeless, color_of};
   }
   return best;
 }

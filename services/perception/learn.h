@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "services/perception/perception_config.h"
+#include "services/perception/learn_color.h"
 
 namespace chase::perception {
 
@@ -13,6 +13,7 @@ struct Learned {
   DetectorConfig config;
   double overlap = 0.0;                ///< mean of intersection over union with the masks
   std::vector<std::string> shapeless;  ///< pairs that do not tell the shape, and why
+  LearnedColor color;                  ///< how well it separates, and which pictures it is from
 };
 
 /// Colour, shape and how far inside the colour's outline the marked target lies, from pictures

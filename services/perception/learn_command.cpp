@@ -1,7 +1,9 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <fstream>
+#include <iomanip>
 #include <opencv2/imgcodecs.hpp>
+#include <sstream>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -34,6 +36,26 @@ std::string Checked(const PerceptionConfig& config) {
   return text;
 }
 
+/// How well the learned colours separate target and background, as comments of the YAML file.
+std::string Quality(const std::vector<std::string>& files, const Learned& learned) {
+  std::ostringstream out;
+  out << std::fixed << std::setprecision(3)
+      << "# Shares of pixels within the learned colours: of the target, of the background near it, "
+         "of all of it.\n# The picture's separation: 1 where they part it wholly.\n";
+  const auto& pictures = learned.color.pictures;
+  for (size_t i = 0; i < pictures.size(); ++i) {
+    const auto& p = pictures[i];
+    out << "# " << files[2 * i] << ": target " << p.target << ", near " << p.near << ", all "
+        << p.far << ", separation " << p.index
+        << (p.used ? "" : "; left out of the colours: with it they separate worse") << "\n";
+  }
+  if (learned.color.widest >= 0)
+    out << "# Widest: without " << files[2 * static_cast<size_t>(learned.color.widest)]
+        << " the hue would be narrower by " << learned.color.narrower_deg << " degrees.\n";
+  out << "# Mean overlap with the masks: " << learned.overlap << "\n";
+  return out.str();
+}
+
 void Learn(const std::vector<std::string>& files, const std::string& base, const std::string& out) {
   if (files.size() % 2 != 0)
     throw std::invalid_argument("--learn-colour: " + std::to_string(files.size()) +
@@ -47,7 +69,7 @@ void Learn(const std::vector<std::string>& files, const std::string& base, const
   }
   const Learned learned = LearnDetector(images, masks, config.detector);
   config.detector = learned.config;
-  const std::string text = Checked(config);
+  const std::string text = Quality(files, learned) + Checked(config);
   if (!(std::ofstream(out) << text))
     throw std::runtime_error(out + ": cannot be written; name a file in an existing folder");
   const auto& color = learned.config.color;
@@ -56,6 +78,7 @@ void Learn(const std::vector<std::string>& files, const std::string& base, const
       "mean overlap with the masks %.3f\n",
       out.c_str(), color.hue_min_deg, color.hue_max_deg, color.saturation_min, color.value_min,
       learned.config.shape.inset, learned.overlap);
+  std::fputs(Quality(files, learned).c_str(), stdout);
   for (const auto& pair : learned.shapeless)
     std::printf("not used for the shape: %s\n", pair.c_str());
 }

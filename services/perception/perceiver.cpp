@@ -71,6 +71,16 @@ bool Perceiver::MayBeNew(const Detection& d) const {
   return (d.edged || d.score >= config_.state.acquire_score) && d.box.width >= kLeastWidthPx;
 }
 
+/// Counts why nothing was made of a detection.
+void Perceiver::CountRefused(const Detection& d) {
+  Refusal why = finder_.HasSweeps() ? Refusal::kContradicted : Refusal::kNoRange;
+  if (d.box.width < kLeastWidthPx)
+    why = Refusal::kTooSmall;
+  else if (!d.edged && d.score < config_.state.acquire_score)
+    why = Refusal::kWrongShape;
+  ++refused_[static_cast<size_t>(why)];
+}
+
 /// True when a candidate is followed there.
 bool Perceiver::Followed(const Sighting& s) const {
   return std::any_of(candidates_.begin(), candidates_.end(), [&](const Candidate& c) {
@@ -90,8 +100,13 @@ void Perceiver::AddPartial(const View& view) {
 
 void Perceiver::AddCandidates(View* view) {
   std::vector<size_t> order;  // near before far, the middle before the border
-  for (size_t i = 0; i < view->detections.size(); ++i)
-    if (!view->taken[i] && MayBeNew(view->detections[i])) order.push_back(i);
+  for (size_t i = 0; i < view->detections.size(); ++i) {
+    if (view->taken[i]) continue;
+    if (MayBeNew(view->detections[i]))
+      order.push_back(i);
+    else
+      CountRefused(view->detections[i]);
+  }
   std::stable_sort(order.begin(), order.end(), [&](size_t a, size_t b) {
     return Prominence(view->detections[a], config_.rig) >
            Prominence(view->detections[b], config_.rig);
@@ -100,6 +115,7 @@ void Perceiver::AddCandidates(View* view) {
   for (const size_t i : order) {
     if (candidates_.size() >= kMaxCandidates) return;
     const auto found = finder_.Acquire(*view, view->detections[i]);
+    if (!found) CountRefused(view->detections[i]);
     if (!found || !Plausible(*found, view->t)) continue;
     // Part of something, of which no LiDAR point tells the range, is a thing of its own only where
     // the target may come back.
@@ -219,6 +235,7 @@ TargetEstimate Perceiver::Report(double t, const std::optional<View>& view,
   out.size =
       track_ ? track_->shape.size : Eigen::Vector2d(config_.target_radius, config_.target_height);
   out.note = std::move(note);
+  out.refused = refused_;
   if (sighting_) {
     out.box = sighting_->detection.box;
     out.score = sighting_->detection.score;
@@ -245,6 +262,7 @@ TargetEstimate Perceiver::See(const Frame& frame) {
   sighting_.reset();
   unsure_.reset();
   contested_ = false;
+  refused_ = {};
   if (track_ && frame.t - track_->seen > kGap) track_->misses = std::max(1, track_->misses);
   if (track_ && state_ != TargetState::kLost) track_->Predict(frame.t, config_.motion);
   for (auto& c : candidates_) c.track.Predict(frame.t, config_.motion);

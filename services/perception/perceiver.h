@@ -1,5 +1,7 @@
 #pragma once
 
+#include <array>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -11,6 +13,12 @@
 namespace chase::perception {
 
 enum class TargetState { kSearching, kTracking, kOccluded, kLost };
+
+/// Why a detection was not taken for a new target, worst first.
+enum class Refusal { kTooSmall, kWrongShape, kNoRange, kContradicted };
+inline constexpr size_t kRefusals = 4;
+/// Detections by Refusal.
+using Refused = std::array<int64_t, kRefusals>;
 
 /// The target at a frame's time as a Gaussian of its centre.
 struct TargetEstimate {
@@ -24,6 +32,7 @@ struct TargetEstimate {
   double score = 0.0;                                        ///< of the detection, 0 to 1
   int n_points = 0;                                          ///< LiDAR points used
   std::string note;                                          ///< what was missing; else empty
+  Refused refused = {};  ///< detections of this frame that no track was started from
 };
 
 /// Finds the target, follows it and says how sure it is. Feed it poses and sweeps as they come and
@@ -52,6 +61,7 @@ class Perceiver {
   TargetEstimate Report(double t, const std::optional<View>& view, std::string note) const;
 
   bool MayBeNew(const Detection& d) const;
+  void CountRefused(const Detection& d);
   bool Followed(const Sighting& s) const;
   bool Vague() const;
   bool Sure(const Sighting& s) const;
@@ -75,6 +85,7 @@ class Perceiver {
   std::optional<Sighting> unsure_;    ///< in the last frame: may be the target, as far as it shows
   bool contested_ = false;            ///< of several things alike in the last frame
   Decoys decoys_;
+  Refused refused_ = {};                              ///< in this frame
   size_t turn_ = 0;                                   ///< detection that is looked at next
   Eigen::Vector3d stood_ = Eigen::Vector3d::Zero();   ///< where the target stood or was, frame W, m
   double stood_since_ = 0.0;                          ///< s

@@ -2,7 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <array>
 #include <opencv2/core.hpp>
+#include <string>
 
 #include "services/perception/messages.h"
 
@@ -31,6 +33,8 @@ void PerceptionNode::OnImage(const camera_image_t& message) {
     auto timer = bus_.Time("perceive");
     last_ = perceiver_->See(FromMessage(message, Origin(message.utime)));
   }
+  for (size_t i = 0; i < kRefusals; ++i) refused_[i] += last_->refused[i];
+  unused_frames_ += !last_->note.empty();
   if (!last_->note.empty()) bus_.ReportError("frame not used: " + last_->note);
   Send(message.utime, *last_);
 }
@@ -46,13 +50,29 @@ int64_t PerceptionNode::Origin(int64_t utime) {
   return *origin_;
 }
 
+/// Why nothing was acquired, with counts since the start; empty when nothing was refused.
+std::string PerceptionNode::Reasons() const {
+  static constexpr std::array<const char*, kRefusals> kWhy = {
+      "too small", "of another aspect, fill or colour", "no LiDAR, and the size tells no range",
+      "outline, size and LiDAR contradict each other"};
+  std::string text;
+  for (size_t i = 0; i < kRefusals; ++i)
+    if (refused_[i] > 0)
+      text += fmt::format("{}{}: {}", text.empty() ? "" : "; ", kWhy[i], refused_[i]);
+  if (unused_frames_ > 0)
+    text += fmt::format("{}frames not used: {}", text.empty() ? "" : "; ", unused_frames_);
+  return text;
+}
+
 bus::NodeReport PerceptionNode::Report() const {
   using State = bus::NodeReport::State;
   if (!last_) return {State::kStarting, "waiting for an image"};
   if (!last_->note.empty()) return {State::kDegraded, last_->note};
   switch (last_->state) {
     case TargetState::kSearching:
-      return {State::kStarting, "searching the target"};
+      return {State::kStarting, Reasons().empty()
+                                    ? "searching the target, no detection"
+                                    : "searching the target; not acquired: " + Reasons()};
     case TargetState::kTracking:
       return {State::kOk, fmt::format("tracking, {} LiDAR points", last_->n_points)};
     case TargetState::kOccluded:

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <string>
 
 #include "chase/camera_image_t.hpp"
 #include "chase/lidar_scan_t.hpp"
@@ -32,6 +33,10 @@ class PerceptionNode : public bus::Node {
   PerceptionConfig config_;
   std::unique_ptr<Perceiver> perceiver_;
   bus::Epoch epoch_;
+  std::string Reasons() const;
+
+  Refused refused_ = {};       ///< since the start
+  int64_t unused_frames_ = 0;  ///< likewise
   std::optional<TargetEstimate> last_;
   std::optional<int64_t> origin_;  ///< utime that the core's seconds count from
 };

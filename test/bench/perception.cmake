@@ -11,3 +11,6 @@ if(TARGET simulator_core)
   target_link_libraries(perception_campaign PRIVATE perception_stage config opencv_imgcodecs
     CLI11::CLI11 fmt::fmt)
 endif()
+chase_program(perception_photos ${CMAKE_SOURCE_DIR}/test/perception/photos.cpp)
+target_link_libraries(perception_photos PRIVATE perception_core config opencv_imgcodecs
+  opencv_imgproc CLI11::CLI11 fmt::fmt)

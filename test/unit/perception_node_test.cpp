@@ -109,6 +109,25 @@ class Bench {
   PerceptionNode* node_ = nullptr;
 };
 
+/// What is refused in one picture of an orange block this wide and high, px, without LiDAR.
+Refused RefusedOf(int width, int height) {
+  const PerceptionConfig config;
+  Perceiver perceiver(config);
+  for (int i = 0; i <= 20; ++i) {
+    PoseSample pose;
+    pose.t = 0.005 * i;
+    perceiver.AddPose(pose);
+  }
+  cv::Mat bgr(config.rig.height_px, config.rig.width_px, CV_8UC3, cv::Scalar(120, 120, 120));
+  bgr(cv::Rect(150, 80, width, height)).setTo(cv::Scalar(12, 105, 235));
+  return perceiver.See({0.1, bgr, {}}).refused;
+}
+
+TEST(PerceptionReasons, SayWhyNothingIsAcquired) {
+  EXPECT_EQ(RefusedOf(5, 9), (Refused{1, 0, 0, 0}));
+  EXPECT_EQ(RefusedOf(120, 20), (Refused{0, 1, 0, 0}));
+}
+
 TEST(PerceptionNode, AnswersEveryImageForItsOwnTime) {
   Bench bench;
   for (int k = 0; k < 6; ++k) bench.Tenth(k);

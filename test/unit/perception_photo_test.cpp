@@ -104,6 +104,53 @@ TEST(PerceptionLearn, FindsHowFarInsideTheColoursEdgeTheTargetIsMarked) {
   }
 }
 
+/// The same scene with grey noise and with so much of its light.
+cv::Mat Noisy(const Marked& from, double brightness, uint64_t seed) {
+  cv::Mat out, noise(from.bgr.size(), CV_16SC3);
+  cv::RNG(seed).fill(noise, cv::RNG::NORMAL, 0.0, 4.0);
+  from.bgr.convertTo(out, CV_16SC3, brightness);
+  cv::add(out, noise, out);
+  out.convertTo(out, CV_8UC3);
+  return out;
+}
+
+TEST(PerceptionLearn, APictureInTheDarkDoesNotWidenTheColours) {
+  Marked a(40, 50, 0), b(200, 50, 0), c(120, 40, 0);
+  for (Marked* m : {&a, &b, &c}) {  // red, brown and yellow things lie about
+    m->bgr(cv::Rect(0, 0, 320, 20)).setTo(cv::Scalar(20, 20, 160));
+    m->bgr(cv::Rect(0, 20, 320, 20)).setTo(cv::Scalar(25, 50, 80));
+    m->bgr(cv::Rect(0, 180, 320, 40)).setTo(cv::Scalar(30, 190, 210));
+  }
+  for (uint64_t seed = 1; seed <= 5; ++seed) {
+    SCOPED_TRACE(seed);
+    const std::vector<cv::Mat> lit = {Noisy(a, 1.0, seed), Noisy(b, 0.9, seed + 10)};
+    const Learned without = LearnDetector(lit, {a.mask, b.mask}, {});
+    const Learned with =
+        LearnDetector({lit[0], lit[1], Noisy(c, 0.05, seed + 20)}, {a.mask, b.mask, c.mask}, {});
+    EXPECT_FALSE(with.color.pictures[2].used);
+    EXPECT_TRUE(with.color.pictures[0].used && with.color.pictures[1].used);
+    EXPECT_DOUBLE_EQ(with.config.color.hue_min_deg, without.config.color.hue_min_deg);
+    EXPECT_DOUBLE_EQ(with.config.color.hue_max_deg, without.config.color.hue_max_deg);
+    EXPECT_DOUBLE_EQ(with.config.color.saturation_min, without.config.color.saturation_min);
+    EXPECT_DOUBLE_EQ(with.config.color.value_min, without.config.color.value_min);
+  }
+}
+
+TEST(PerceptionLearn, SaysHowWellItSeparatesAndWhichPictureWidens) {
+  const Marked a(40, 50, 0);
+  Marked redder(200, 50, 0);
+  redder.bgr(cv::Rect(200, 60, 50, 100)).setTo(cv::Scalar(20, 70, 240));
+  const Learned learned =
+      LearnDetector({a.bgr, a.bgr, redder.bgr}, {a.mask, a.mask, redder.mask}, {});
+  for (const auto& p : learned.color.pictures) {
+    EXPECT_TRUE(p.used);
+    EXPECT_GT(p.target, 0.99);
+    EXPECT_LT(p.far, 0.01);
+  }
+  EXPECT_EQ(learned.color.widest, 2);
+  EXPECT_GT(learned.color.narrower_deg, 5.0);
+}
+
 TEST(PerceptionLearn, TheShapeComesFromWholeBlobsThatAreMarked) {
   const Marked whole(40, 50, 0);
   Marked cut(40, 50, 0), elsewhere(40, 50, 0);
