@@ -25,7 +25,7 @@ namespace {
 constexpr char kRecording[] = "../shared/data/kitti/raw_2011_09_26_drive_0005_16ring.bin.xz";
 constexpr double kReach = 15.0;   // returns from nearer than this count, m
 constexpr double kWindow = 30.0;  // ... that end up within this of the last pose, m
-// The scanner, 1.7 m above the road, is at z = 0: this leaves out the road.
+// The scanner is 1.7 m above the road, which falls by half a metre on the way: this leaves it out.
 constexpr double kLow = -1.2;
 constexpr size_t kSweeps = 32;  // what returns in so many sweeps is a wall, a trunk, a parked car
 
@@ -108,7 +108,7 @@ std::vector<Returns> AboveTheRoad(const std::string& registered) {
   ForEach<scan_registered_t>(registered, "SCAN_REGISTERED", [&](const scan_registered_t& m) {
     sweeps.push_back({1e-6 * static_cast<double>(m.utime), {}});
     for (size_t i = 0; i < m.x.size(); ++i)
-      if (m.z[i] > kLow) sweeps.back().points.push_back({m.x[i], m.y[i]});
+      if (m.z[i] > m.pos[2] + kLow) sweeps.back().points.push_back({m.x[i], m.y[i]});
   });
   return sweeps;
 }
