@@ -258,20 +258,20 @@ void AddDrawn(const event_t& m, const std::string& channel, Messages* out) {
 }
 
 template <class T>
-void Add(const T& m, const Event& e, const ViewerOptions&, Messages* out) {
+void Add(const T& m, const LogEvent& e, const ViewerOptions&, Messages* out) {
   const Struct& type = *OurTypes().Find(T::getTypeName());
   const std::string body(e.bytes.begin() + 8, e.bytes.end());  // behind the fingerprint
   out->push_back({e.channel, std::string("chase.") + T::getTypeName(),
                   ToProto(OurTypes(), type, Decode(OurTypes(), type, body)).bytes()});
   AddDrawn(m, e.channel, out);
 }
-void Add(const lidar_scan_t& m, const Event& e, const ViewerOptions&, Messages* out) {
+void Add(const lidar_scan_t& m, const LogEvent& e, const ViewerOptions&, Messages* out) {
   out->push_back({e.channel, "foxglove.PointCloud", CloudBytes(m, "lidar")});
 }
-void Add(const scan_registered_t& m, const Event& e, const ViewerOptions&, Messages* out) {
+void Add(const scan_registered_t& m, const LogEvent& e, const ViewerOptions&, Messages* out) {
   out->push_back({e.channel, "foxglove.PointCloud", CloudBytes(m, "world")});
 }
-void Add(const camera_image_t& m, const Event& e, const ViewerOptions& options, Messages* out) {
+void Add(const camera_image_t& m, const LogEvent& e, const ViewerOptions& options, Messages* out) {
   const std::string jpeg = options.jpeg ? Jpeg(m) : "";
   if (!options.jpeg)
     out->push_back({e.channel, "foxglove.RawImage", RawImage(m)});
@@ -282,7 +282,7 @@ void Add(const camera_image_t& m, const Event& e, const ViewerOptions& options, 
 
 }  // namespace
 
-std::vector<ViewerMessage> ToViewer(const Event& event, const ViewerOptions& options) {
+std::vector<ViewerMessage> ToViewer(const LogEvent& event, const ViewerOptions& options) {
   Messages out;
   WithMessage(event.bytes, [&](const auto& m) { Add(m, event, options, &out); });
   return out;

@@ -25,7 +25,7 @@ struct ViewerOptions {
 /// What a viewer shows of a message. Clouds and images become Foxglove's own; every other message
 /// keeps its fields, and beside it, on topics CHANNEL/pose, CHANNEL/scene, /tf and so on, there is
 /// what Foxglove draws. Nothing when the type is not ours or the bytes do not decode.
-std::vector<ViewerMessage> ToViewer(const Event& event, const ViewerOptions& options);
+std::vector<ViewerMessage> ToViewer(const LogEvent& event, const ViewerOptions& options);
 
 /// What describes a message of that name, as a FileDescriptorSet.
 std::string DescriptorsOf(const std::string& schema);

@@ -91,13 +91,13 @@ void LogReader::StepOver(int64_t to) {
   at_ = to;
 }
 
-bool LogReader::Next(Event* event) {
+bool LogReader::Next(LogEvent* event) {
   const bool found = Find(event);
   if (watch_) watch_(*this);
   return found;
 }
 
-bool LogReader::Find(Event* event) {
+bool LogReader::Find(LogEvent* event) {
   while (at_ < size_) {
     const Header h = HeaderAt(at_);
     if (h.size == 0) {

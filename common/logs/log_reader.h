@@ -13,7 +13,7 @@ struct Damage {
   bool at_end = false;  ///< the log was cut off while being written
 };
 
-struct Event {
+struct LogEvent {
   int64_t utime = 0;  ///< when it was logged, microseconds
   std::string channel;
   std::vector<uint8_t> bytes;
@@ -34,7 +34,7 @@ class LogReader {
   LogReader& operator=(const LogReader&) = delete;
 
   /// The next event; false at the end of the log.
-  bool Next(Event* event);
+  bool Next(LogEvent* event);
 
   /// What was stepped over so far, in file order.
   const std::vector<Damage>& damage() const { return damage_; }
@@ -48,7 +48,7 @@ class LogReader {
 
  private:
   struct Header;
-  bool Find(Event* event);
+  bool Find(LogEvent* event);
   Header HeaderAt(int64_t at) const;
   bool BeginsAt(int64_t at) const;
   int64_t FindEvent(int64_t from, int64_t to) const;

@@ -47,7 +47,7 @@ struct Source {
   Source(const std::string& file, const Watch& watch) : log(file, watch) { Step(); }
   void Step() { more = log.Next(&next); }
   LogReader log;
-  Event next;
+  LogEvent next;
   bool more = false;
 };
 
@@ -56,7 +56,7 @@ using Name = std::tuple<std::string, std::string, std::string, int64_t, int32_t>
 /// Knows which log a message was first seen in.
 class Repeats {
  public:
-  bool Has(const Event& e, size_t log) {
+  bool Has(const LogEvent& e, size_t log) {
     if (TypeOf(e.bytes).empty()) return false;
     const auto head = bus::HeadOf(e.bytes.data(), e.bytes.size());
     if (!head) return false;
@@ -77,7 +77,7 @@ Copied CopySelected(const std::string& in, const std::string& out, const Selecti
   Copied copied;
   std::set<std::string> channels;
   int64_t first = 0, last = 0;
-  for (Event e; log.Next(&e);) {
+  for (LogEvent e; log.Next(&e);) {
     if (copied.read++ == 0) first = last = e.utime;
     last = std::max(last, e.utime);
     channels.insert(e.channel);
@@ -103,7 +103,7 @@ Copied Repair(const std::string& in, const std::string& out, const Watch& watch)
   LogReader log(in, watch);
   bus::LogWriter writer(out);
   Copied copied;
-  for (Event e; log.Next(&e); ++copied.read) {
+  for (LogEvent e; log.Next(&e); ++copied.read) {
     if (IsMalformed(e.bytes)) {
       ++copied.malformed[e.channel];
       continue;

@@ -66,7 +66,7 @@ using Keys = std::array<Key, kRules>;
 /// Names the messages of one channel in the order of the log.
 class Namer {
  public:
-  Keys Next(const Event& e) {
+  Keys Next(const LogEvent& e) {
     const auto head =
         TypeOf(e.bytes).empty() ? std::nullopt : bus::HeadOf(e.bytes.data(), e.bytes.size());
     Keys keys = {Key{"", order_++, 0}, Key{"", e.utime, 0}};
@@ -94,7 +94,7 @@ Names NamesIn(const std::string& file) {
   LogReader log(file);
   Names names;
   std::map<std::string, Namer> namers;
-  for (Event e; log.Next(&e);) {
+  for (LogEvent e; log.Next(&e);) {
     const Keys keys = namers[e.channel].Next(e);
     for (size_t rule = 0; rule < kRules; ++rule) names[e.channel][rule].insert(keys[rule]);
   }
@@ -143,7 +143,7 @@ class Comparison {
     }
   }
 
-  void AddPair(const Event& a, const Event& b) {
+  void AddPair(const LogEvent& a, const LogEvent& b) {
     index_ = compared_[a.channel]++;
     channel_ = a.channel;
     if (a.utime != b.utime)
@@ -214,13 +214,13 @@ struct Side {
   LogReader log;
   bool more = true;
   std::map<std::string, Namer> namers;
-  std::map<std::string, std::map<Key, Event>> waiting;
+  std::map<std::string, std::map<Key, LogEvent>> waiting;
 };
 
 /// Takes the next event of `own`; returns its partner if that has come already.
-std::optional<std::pair<Event, Event>> Step(const std::map<std::string, Pairing>& pairings,
-                                            Side* own, Side* other) {
-  Event e;
+std::optional<std::pair<LogEvent, LogEvent>> Step(const std::map<std::string, Pairing>& pairings,
+                                                  Side* own, Side* other) {
+  LogEvent e;
   if (!own->more || !(own->more = own->log.Next(&e))) return std::nullopt;
   const Pairing& pairing = pairings.at(e.channel);
   const Key key = own->namers[e.channel].Next(e)[pairing.rule];
@@ -231,7 +231,7 @@ std::optional<std::pair<Event, Event>> Step(const std::map<std::string, Pairing>
     own->waiting[e.channel].emplace(key, std::move(e));
     return std::nullopt;
   }
-  std::pair<Event, Event> pair(std::move(e), std::move(partner->second));
+  std::pair<LogEvent, LogEvent> pair(std::move(e), std::move(partner->second));
   partners.erase(partner);
   return pair;
 }

@@ -116,7 +116,7 @@ int ExportCsv(const std::string& log, const std::string& out, const std::string&
               bool long_form, const Watch& watch) {
   LogReader reader(log, watch);
   std::map<std::string, Table> tables;
-  for (Event e; reader.Next(&e);) {
+  for (LogEvent e; reader.Next(&e);) {
     if (channel.empty() ? bus::IsHeavy(e.channel) : e.channel != channel) continue;
     const auto fields = FieldsOf(e.bytes);
     if (!fields) continue;

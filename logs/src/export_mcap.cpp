@@ -10,7 +10,7 @@ long ExportMcap(const std::string& log, const std::string& out, const std::strin
   LogReader reader(log, watch);
   McapWriter writer(out);
   long count = 0;
-  for (Event e; reader.Next(&e);) {
+  for (LogEvent e; reader.Next(&e);) {
     if (!channel.empty() && e.channel != channel) continue;
     const auto messages = ToViewer(e, {jpeg});
     for (const ViewerMessage& m : messages) {

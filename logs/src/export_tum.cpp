@@ -53,7 +53,7 @@ long ExportTum(const std::string& log, const std::string& out, const std::string
   LogReader reader(log, watch);
   std::string text;
   long count = 0;
-  for (Event e; reader.Next(&e);) {
+  for (LogEvent e; reader.Next(&e);) {
     if (e.channel != channel) continue;
     const std::string line = line_of(e.bytes);
     text += line;

@@ -103,7 +103,7 @@ std::vector<std::string> LogInfo::Losses() const {
   return lines;
 }
 
-void LogSurvey::Add(const Event& e) {
+void LogSurvey::Add(const LogEvent& e) {
   Channel& channel = channels_[e.channel];
   ChannelInfo& c = channel.info;
   if (c.count++ == 0) {
@@ -122,7 +122,7 @@ void LogSurvey::Add(const Event& e) {
   AddContent(e, c.type);
 }
 
-void LogSurvey::AddHead(const Event& e, Channel* channel) {
+void LogSurvey::AddHead(const LogEvent& e, Channel* channel) {
   const auto head = bus::HeadOf(e.bytes.data(), e.bytes.size());
   if (!head) return;
   auto& [count, seqs] = channel->senders[{head->sender, head->vehicle, head->sender_start}];
@@ -134,7 +134,7 @@ void LogSurvey::AddHead(const Event& e, Channel* channel) {
   }
 }
 
-void LogSurvey::AddContent(const Event& e, const std::string& type) {
+void LogSurvey::AddContent(const LogEvent& e, const std::string& type) {
   status_t status;
   scenario_t scenario;
   if (type == "status_t" && DecodeBytes(e.bytes, &status))
@@ -182,7 +182,7 @@ LogInfo LogSurvey::Take(const LogReader& log) {
 LogInfo Describe(const std::string& file) {
   LogReader log(file);
   LogSurvey survey;
-  for (Event e; log.Next(&e);) survey.Add(e);
+  for (LogEvent e; log.Next(&e);) survey.Add(e);
   return survey.Take(log);
 }
 

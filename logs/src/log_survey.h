@@ -15,7 +15,7 @@ namespace chase::logs {
 /// Gathers what a log is made of, event by event.
 class LogSurvey {
  public:
-  void Add(const Event& event);
+  void Add(const LogEvent& event);
   /// `log` has been read to its end.
   LogInfo Take(const LogReader& log);
 
@@ -28,8 +28,8 @@ class LogSurvey {
   struct Heard {
     int32_t first, last;
   };
-  void AddHead(const Event& event, Channel* channel);
-  void AddContent(const Event& event, const std::string& type);
+  void AddHead(const LogEvent& event, Channel* channel);
+  void AddContent(const LogEvent& event, const std::string& type);
   void Settle(Channel* channel) const;
   void AddUnrecorded(LogInfo* info) const;
 

@@ -118,7 +118,7 @@ Migration MigrateLog(const std::string& in, const std::string& out) {
   LogReader log(in);
   bus::LogWriter writer(out);
   Migration migration;
-  for (Event e; log.Next(&e);) {
+  for (LogEvent e; log.Next(&e);) {
     const Fate fate = migrator.Migrate(e.channel, &e.bytes);
     ++migration.channels[e.channel][fate];
     if (fate != Fate::kMalformed) writer.Write(e.utime, e.channel, e.bytes);

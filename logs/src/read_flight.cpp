@@ -35,7 +35,7 @@ double Yaw(const double (&q)[4]) {
 /// Gathers messages as they are; times are settled at the end, when the mission's start is known.
 class Gatherer {
  public:
-  void Add(const Event& e) {
+  void Add(const LogEvent& e) {
     if (Take(e, "TRUTH", &truth_)) {
       if (!first_event_) first_event_ = e.utime;
       last_event_ = e.utime;
@@ -75,19 +75,19 @@ class Gatherer {
  private:
   /// A vehicle's prefix may stand before the channel's name.
   template <class T>
-  static bool Good(const Event& e, const std::string& name, T* message) {
+  static bool Good(const LogEvent& e, const std::string& name, T* message) {
     return EndsWith(e.channel, name) && DecodeBytes(e.bytes, message) &&
            bus::Problem(*message).empty();
   }
   template <class T>
-  static bool Take(const Event& e, const std::string& name, std::vector<T>* messages) {
+  static bool Take(const LogEvent& e, const std::string& name, std::vector<T>* messages) {
     T message;
     if (!Good(e, name, &message)) return false;
     messages->push_back(std::move(message));
     return true;
   }
   template <class T>
-  static void TakeLast(const Event& e, const std::string& name, std::optional<T>* message) {
+  static void TakeLast(const LogEvent& e, const std::string& name, std::optional<T>* message) {
     T fresh;
     if (Good(e, name, &fresh)) *message = std::move(fresh);
   }
@@ -211,7 +211,7 @@ FlightRecord ReadFlight(const std::string& log) {
   LogReader reader(log);
   Gatherer gatherer;
   LogSurvey survey;
-  for (Event e; reader.Next(&e);) {
+  for (LogEvent e; reader.Next(&e);) {
     gatherer.Add(e);
     survey.Add(e);
   }

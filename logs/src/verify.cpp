@@ -62,7 +62,7 @@ class Verifier {
 Verification Verify(const std::string& file) {
   LogReader log(file);
   Verifier verifier;
-  Event event;
+  LogEvent event;
   plan_t plan;
   obstacles_t obstacles;
   while (log.Next(&event)) {

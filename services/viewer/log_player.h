@@ -44,7 +44,7 @@ class LogPlayer : public bus::Bus {
   size_t After(int64_t utime) const;
 
   logs::LogReader reader_;
-  logs::Event event_;
+  logs::LogEvent event_;
   std::vector<std::string> channels_;
   std::vector<RawHandler> handlers_;  // by channel; empty: nobody listens
   std::vector<bool> heavy_;

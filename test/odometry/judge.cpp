@@ -47,7 +47,7 @@ std::vector<T> Messages(const std::string& log, const std::string& channel) {
   logs::LogReader reader(log);
   std::vector<T> out;
   T message;
-  for (logs::Event e; reader.Next(&e);)
+  for (logs::LogEvent e; reader.Next(&e);)
     if (e.channel == channel && logs::DecodeBytes(e.bytes, &message)) out.push_back(message);
   if (out.empty()) throw std::runtime_error(log + ": holds no " + channel);
   return out;

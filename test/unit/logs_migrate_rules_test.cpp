@@ -187,7 +187,7 @@ TEST(MigrateLog, TheFirstVersionsMessagesAreReadToday) {
   const Migration migration = MigrateLog(in, out);
   LogReader log(out);
   utime = 1000;
-  Event e;
+  LogEvent e;
   for (const auto& [channel, type] : kChannels) {
     ASSERT_TRUE(log.Next(&e));
     EXPECT_EQ(e.channel, channel);
