@@ -286,6 +286,10 @@ PlanResult Pilot::Search(double t0, const Start& start, const BodyEstimate& body
   const bool goes =
       (plan.trajectory.Position(plan.trajectory.end()) - start.state.p).norm() > kGoes;
   if (plan.verdict >= Verdict::kBrake || !(shows || goes)) return BrakeAndLook(t0, start, gaze.yaw);
+  // What it proves of sight is of that place, which whoever checks it takes for the target's.
+  plan.proofs.erase(std::remove_if(plan.proofs.begin(), plan.proofs.end(),
+                                   [](const Proof& proof) { return proof.of_sight; }),
+                    plan.proofs.end());
   plan.verdict = Verdict::kSafeOnly;
   plan.reason = "target lost, to where it may be" + (plan.reason.empty() ? "" : "; " + plan.reason);
   return plan;

@@ -25,7 +25,7 @@ class Flight {
 
   void Run(double seconds, bool with_target) {
     for (const double end = t + seconds; t < end; t += kPeriod) {
-      if (hears && std::fmod(t, 0.1) < kPeriod) pilot.SetObstacles(t, {});
+      if (hears && std::fmod(t, 0.1) < kPeriod) pilot.SetObstacles(t, obstacles);
       if (with_target && std::fmod(t, 0.3) < kPeriod) pilot.SetForecast(Walking(t));
       if (const auto plan = pilot.Update(t, Body())) {
         plans.push_back(*plan);
@@ -47,6 +47,7 @@ class Flight {
   Pilot pilot;
   double t = 0.0;
   bool hears = true;  // of obstacles
+  std::vector<world::Obstacle> obstacles;
   double largest_step = 0.0, largest_kink = 0.0;
   std::vector<PlanResult> plans;
   std::optional<PlanResult> flown, waiting;
@@ -77,6 +78,11 @@ TEST(Pilot, ClimbsAndHoversWithoutATarget) {
 
 TEST(Pilot, ChasesFollowsAndHoversWhenTheTargetIsLost) {
   Flight flight{PlanningConfig()};
+  world::Obstacle pillar;
+  pillar.id = 7;
+  pillar.center = world::Trajectory::Constant({14.0, 3.0, 1.5}, 0.0, 100.0);
+  pillar.shape = Eigen::Vector3d(0.3, 0.3, 2.0).cwiseAbs2().cwiseInverse().asDiagonal();
+  flight.obstacles = {pillar};
   flight.Run(4.0, false);
   flight.Run(8.0, true);
   EXPECT_EQ(flight.plans.back().verdict, Verdict::kChase) << flight.plans.back().reason;
@@ -102,6 +108,8 @@ TEST(Pilot, ChasesFollowsAndHoversWhenTheTargetIsLost) {
     went = true;
     EXPECT_EQ(plan.verdict, Verdict::kSafeOnly);
     EXPECT_GE(plan.certified_clearance, 0.0);
+    for (const Proof& proof : plan.proofs)
+      EXPECT_FALSE(proof.of_sight) << "of a place, which control would take for the target's";
   }
   EXPECT_TRUE(went) << "to where the target may have gone";
   EXPECT_LT(flight.largest_kink, 1e-6) << "plans continue where the one before is left";
