@@ -157,7 +157,7 @@ void Lockstep::CatchUp(Process* process) {
 
 void Lockstep::SetLoss(double share, uint64_t seed) {
   loss_ = share;
-  loss_draws_ = world::Random(seed);
+  loss_draws_ = world::Random{seed};
 }
 
 std::unique_ptr<Bus> Lockstep::Connect() { return std::make_unique<Port>(this, "", 0); }
