@@ -155,9 +155,15 @@ void Lockstep::CatchUp(Process* process) {
   }
 }
 
+void Lockstep::SetLoss(double share, uint64_t seed) {
+  loss_ = share;
+  loss_draws_ = world::Random{seed};
+}
+
 std::unique_ptr<Bus> Lockstep::Connect() { return std::make_unique<Port>(this, "", 0); }
 
 void Lockstep::Send(int64_t utime, const std::string& channel, Bus::Bytes bytes) {
+  if (const auto delay = delays_.find(channel); delay != delays_.end()) utime += delay->second;
   events_.push(
       {utime, order_++, channel, std::make_shared<const Bus::Bytes>(std::move(bytes)), nullptr});
 }
@@ -199,7 +205,9 @@ void Lockstep::Deliver(const Event& event) {
   if (event.call) return event.call();
   if (tap_) tap_(event.utime, event.channel, *event.bytes);
   for (const auto& process : processes_)
-    if (process->frozen)
+    if (loss_ > 0.0 && loss_draws_.Uniform() < loss_)
+      continue;
+    else if (process->frozen)
       process->Keep(event);
     else if (process->life)
       Handle(process.get(), event);

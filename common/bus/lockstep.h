@@ -6,12 +6,14 @@
 #include <memory>
 #include <queue>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "common/bus/bus.h"
 #include "common/bus/log_writer.h"
 #include "common/bus/node.h"
 #include "common/bus/status.h"
+#include "common/world/random.h"
 
 namespace chase::bus {
 
@@ -49,6 +51,19 @@ class Lockstep {
   /// caught up by the rules of the live loop. A stopped or dead process cannot be stopped.
   void Freeze(const std::string& name);
   void Thaw(const std::string& name);
+
+  /// What is sent on the channel from now on arrives this much later, microseconds. Nothing holds
+  /// what comes after back: when the delay ends, messages overtake.
+  void SetDelay(const std::string& channel, int64_t us) { delays_[channel] = us; }
+
+  /// Each process misses this share of what is sent, each message by a draw of its own from the
+  /// seed. The tap sees all of it.
+  void SetLoss(double share, uint64_t seed);
+
+  /// Sends bytes as they are, which need be no message.
+  void Inject(const std::string& channel, Bus::Bytes bytes) {
+    Send(now_, channel, std::move(bytes));
+  }
 
   /// A sender beside the processes; what it publishes arrives at once.
   std::unique_ptr<Bus> Connect();
@@ -96,6 +111,9 @@ class Lockstep {
   std::vector<std::shared_ptr<Process>> processes_;  // shared with the scheduled calls
   std::priority_queue<Event, std::vector<Event>, std::greater<>> events_;
   Tap tap_;
+  std::map<std::string, int64_t> delays_;  // us
+  double loss_ = 0.0;
+  world::Random loss_draws_{0};
 };
 
 }  // namespace chase::bus

@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <stdexcept>
+#include <utility>
 
 #include "common/config/config.h"
 #include "common/world/random.h"
@@ -12,25 +14,66 @@ namespace chase::world {
 namespace {
 
 using Effect = FaultKind::Effect;
+using Needs = FaultKind::Needs;
 
 // A restarted process is there again after its start-up; measured from 0.01 to 0.44 s.
 constexpr double kRestart = 0.5;
 constexpr double kFreeze = 2.0;
 constexpr double kLidarGap = 1.0;
+// An automatic exposure has settled after a second; two stops are the step from shade into the sun.
+constexpr double kExposureTime = 1.0, kTwoStops = 4.0;
+constexpr double kSensorTime = 2.0;  // of a sensor's error that passes, as long as a freeze
+constexpr double kBusTime = 10.0;    // a hundred sweeps
+constexpr double kDecoyTime = 10.0;  // long against the target's tracks, which live for seconds
 constexpr double kForGood = std::numeric_limits<double>::infinity();
 constexpr uint64_t kStream = 0xFA017;  // of the draws, apart from all noise
 
 std::vector<FaultKind> MakeKinds() {
   std::vector<FaultKind> kinds;
-  for (const char* process :
-       {"odometry", "mapping", "perception", "prediction", "planning", "control"}) {
-    const std::string name = process;
-    const bool raw_only = name == "odometry" || name == "mapping" || name == "perception";
-    kinds.push_back({"kill-" + name, Effect::kKill, name, kRestart, raw_only});
-    kinds.push_back({"freeze-" + name, Effect::kFreeze, name, kFreeze, raw_only});
+  const std::pair<std::string, Needs> processes[] = {
+      {"odometry", Needs::kSensors},   {"mapping", Needs::kSensors},
+      {"perception", Needs::kSensors}, {"prediction", Needs::kNothing},
+      {"planning", Needs::kNothing},   {"control", Needs::kNothing},
+      {"mission", Needs::kMission}};
+  for (const auto& [process, needs] : processes) {
+    kinds.push_back({"kill-" + process, Effect::kKill, process, kRestart, needs});
+    kinds.push_back({"freeze-" + process, Effect::kFreeze, process, kFreeze, needs});
   }
-  kinds.push_back({"lidar-gap", Effect::kSilenceLidar, "simulator", kLidarGap, true});
-  kinds.push_back({"lidar-dead", Effect::kSilenceLidar, "simulator", kForGood, true});
+  const std::pair<std::string, Needs> channels[] = {{"LIDAR_SCAN", Needs::kSensors},
+                                                    {"CAMERA_IMAGE", Needs::kSensors},
+                                                    {"IMU", Needs::kSensors},
+                                                    {"POSE", Needs::kNothing},
+                                                    {"SCAN_REGISTERED", Needs::kSensors},
+                                                    {"OBSTACLES", Needs::kNothing},
+                                                    {"MAP", Needs::kSensors},
+                                                    {"TARGET", Needs::kNothing},
+                                                    {"PREDICTION", Needs::kNothing},
+                                                    {"PLAN", Needs::kNothing},
+                                                    {"ATTITUDE_SETPOINT", Needs::kNothing},
+                                                    {"FLIGHT_STATE", Needs::kMission}};
+  for (const auto& [channel, needs] : channels)
+    kinds.push_back({"delay-" + channel, Effect::kDelay, channel, kFreeze, needs, 0.3});
+  const std::string s = "simulator";
+  const FaultKind others[] = {
+      {"lidar-gap", Effect::kSilenceLidar, s, kLidarGap, Needs::kSensors},
+      {"lidar-dead", Effect::kSilenceLidar, s, kForGood, Needs::kSensors},
+      {"camera-blackout", Effect::kBlackout, s, kSensorTime, Needs::kSensors},
+      {"camera-blur", Effect::kBlur, s, kSensorTime, Needs::kSensors, 1.0 / 16.0},
+      {"exposure-jump", Effect::kExposure, s, kExposureTime, Needs::kSensors, kTwoStops},
+      {"imu-spikes", Effect::kImuSpikes, s, kSensorTime, Needs::kSensors, 0.02},
+      {"imu-bias", Effect::kImuBias, s, kForGood, Needs::kSensors, 5.0},
+      {"loss-5", Effect::kLoss, "", kBusTime, Needs::kNothing, 0.05},
+      {"loss-20", Effect::kLoss, "", kBusTime, Needs::kNothing, 0.20},
+      {"clock-forward", Effect::kLidarClock, s, kSensorTime, Needs::kSensors, 1.0},
+      {"clock-back", Effect::kLidarClock, s, kSensorTime, Needs::kSensors, -1.0},
+      {"gust", Effect::kGust, s, kSensorTime, Needs::kNothing, 8.0},
+      {"motor-80", Effect::kMotor, s, kForGood, Needs::kNothing, 0.8},
+      {"hidden-4s", Effect::kHide, s, 4.0, Needs::kSensors},
+      {"hidden-for-good", Effect::kHide, s, kForGood, Needs::kSensors},
+      {"decoy", Effect::kDecoy, s, kDecoyTime, Needs::kSensors, 2.0},
+      {"flood", Effect::kFlood, "", kSensorTime, Needs::kNothing, 1000.0},
+      {"disk-full", Effect::kDiskFull, "recorder", kForGood, Needs::kRecorder}};
+  kinds.insert(kinds.end(), std::begin(others), std::end(others));
   return kinds;
 }
 
@@ -51,6 +94,17 @@ std::string KnownNames() {
 const std::vector<FaultKind>& FaultKinds() {
   static const std::vector<FaultKind> kinds = MakeKinds();
   return kinds;
+}
+
+std::string Misfit(const FaultKind& kind, bool sensors, bool mission) {
+  if (kind.needs == Needs::kSensors && !sensors)
+    return "strikes nothing where sensors is truth; fly with --sensors raw";
+  if (kind.needs == Needs::kMission && !mission)
+    return "strikes nothing without a mission process; give the scenario commands";
+  if (kind.needs == Needs::kRecorder)
+    return "strikes chase-recorder, which a flight in lockstep does not have; fly live with a full "
+           "disk under the log's folder";
+  return "";
 }
 
 const FaultKind& KindOf(const FaultSpec& fault) {

@@ -26,13 +26,34 @@ struct FaultKind {
     kKill,          ///< of a process: it dies at once and a new one comes up
     kFreeze,        ///< of a process: it neither handles nor sends anything
     kSilenceLidar,  ///< of the simulator: no sweeps
+    kBlackout,      ///< of the simulator: black frames
+    kBlur,        ///< of the simulator: `amount` is the blur's length, shares of the image's width
+    kExposure,    ///< of the simulator: `amount` times the light, cut at white
+    kImuSpikes,   ///< of the simulator: `amount` is the share of samples
+    kImuBias,     ///< of the simulator: `amount` standard deviations of the bias at power-on
+    kLidarClock,  ///< of the simulator: `amount` is the step of the sweeps' stamps, s
+    kGust,        ///< of the simulator: `amount` is added to the wind, m/s
+    kMotor,       ///< of the simulator: `amount` is the share of thrust that one motor gives
+    kHide,        ///< of the simulator: the target and its carrier are not there
+    kDecoy,       ///< of the simulator: a second target, `amount` seconds ahead on its path
+    kDelay,       ///< of a channel: `amount` is what its messages are late, s
+    kLoss,        ///< of the bus: `amount` is the share of messages lost, at each receiver
+    kFlood,       ///< of the bus: `amount` malformed messages a second on every channel
+    kDiskFull,    ///< of the recorder
   };
+  /// What a flight must have for the fault to strike anything.
+  enum class Needs { kNothing, kSensors, kMission, kRecorder };
   std::string name;
   Effect effect;
-  std::string process;  ///< that it strikes
-  double duration;      ///< s; infinite: to the end of the flight, whatever the scenario says
-  bool raw_only;        ///< strikes what a flight on true sensors does not have
+  std::string victim;  ///< the process or the channel that it strikes
+  double duration;     ///< s; infinite: to the end of the flight, whatever the scenario says
+  Needs needs;
+  double amount = 0.0;  ///< as the effect says
 };
+
+/// Why the fault cannot strike a flight in lockstep, with the cure; empty: it can. `sensors`: the
+/// simulator's are used, not the truth; `mission`: a mission process flies.
+std::string Misfit(const FaultKind& kind, bool sensors, bool mission);
 
 /// Every fault. deploy/scenarios/README.md lists the names.
 const std::vector<FaultKind>& FaultKinds();

@@ -153,9 +153,17 @@ std::vector<std::string> Expanded(const std::vector<std::string>& given,
   return names;
 }
 
-std::vector<std::string> FaultNames() {
+/// Those that can strike a flight of the place.
+std::vector<std::string> FaultNames(const std::string& place) {
+  bool sensors = true, mission = false;  // of a random world
+  if (place.rfind(kWorld, 0) != 0) {
+    const world::Scenario scenario = world::LoadScenario(ScenarioFile(place));
+    sensors = scenario.sensors.mode != "truth";
+    mission = !scenario.commands.empty();
+  }
   std::vector<std::string> names;
-  for (const world::FaultKind& kind : world::FaultKinds()) names.push_back(kind.name);
+  for (const world::FaultKind& kind : world::FaultKinds())
+    if (world::Misfit(kind, sensors, mission).empty()) names.push_back(kind.name);
   return names;
 }
 
@@ -193,13 +201,14 @@ std::vector<Flight> Flights(const Request& request) {
   std::vector<std::string> places = request.scenarios;
   for (const std::string& kind : Expanded(request.kinds, Kinds())) places.push_back(kWorld + kind);
   if (places.empty()) places.emplace_back("gym");
-  std::vector<std::string> faults = Expanded(request.faults, FaultNames());
-  if (faults.empty()) faults.emplace_back("none");
   const std::vector<int64_t> seeds = Seeds(request.seeds);
   List list;
-  for (const std::string& place : places)
+  for (const std::string& place : places) {
+    std::vector<std::string> faults = Expanded(request.faults, FaultNames(place));
+    if (faults.empty()) faults.emplace_back("none");
     for (const std::string& fault : faults)
       for (const int64_t seed : seeds) list.Add(place, seed, fault);
+  }
   return list.flights;
 }
 

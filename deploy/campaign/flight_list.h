@@ -24,7 +24,7 @@ struct Flight {
 struct Request {
   std::vector<std::string> scenarios;  ///< names, files, or world:KIND
   std::vector<std::string> kinds;      ///< of random worlds; `all`: every one
-  std::vector<std::string> faults;     ///< `none`, `all` or fault names; empty: none
+  std::vector<std::string> faults;     ///< `none`, `all` that can strike, or names; empty: none
   std::string seeds = "1";             ///< such as 1-20 or 1,5,9
   std::string flights_file;            ///< instead of all others
 };

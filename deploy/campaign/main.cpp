@@ -112,8 +112,9 @@ void AddOptions(CLI::App* app, Options* o) {
                                     "gym, unless there are kinds)");
   auto* kinds = app->add_option("--kinds", o->request.kinds,
                                 "random worlds of these kinds, one per seed; all: every kind");
-  auto* faults = app->add_option("--faults", o->request.faults,
-                                 "NAME or NAME@SECONDS; all: every one; none: no fault (default)");
+  auto* faults = app->add_option(
+      "--faults", o->request.faults,
+      "NAME or NAME@SECONDS; all: every one that can strike; none: no fault (default)");
   for (auto* option : {scenarios, kinds, faults}) option->delimiter(',');
   auto* seeds = app->add_option("--seeds", o->request.seeds, "such as 1-20 or 1,5,9 (default 1)");
   app->add_option("--flights", o->request.flights_file,

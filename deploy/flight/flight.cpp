@@ -32,7 +32,7 @@ const std::map<std::string, int64_t>& Latencies() {
 Flight::Flight(const world::Scenario& scenario, const FlightConfigs& configs)
     : settle_(scenario.settle_s),
       lockstep_(kPowerOn),
-      faults_(configs.faults, MissionUtime(settle_, 0.0), &lockstep_) {
+      faults_(configs.faults, MissionUtime(settle_, 0.0), configs.simulator.seed, &lockstep_) {
   const std::string& sensors =
       configs.simulator.sensors.empty() ? scenario.sensors.mode : configs.simulator.sensors;
   Add<simulator::SimulatorNode>(&lockstep_, "simulator", configs.simulator);

@@ -63,11 +63,10 @@ void AddFaults(const world::Scenario& scenario, const FlightOptions& options,
   int number = 0;
   for (const world::FaultSpec& fault : AllFaults(scenario, options)) {
     const world::FaultKind& kind = world::KindOf(fault);
-    if (truth && kind.raw_only)
-      throw std::runtime_error("fault " + fault.name +
-                               " strikes nothing where sensors is truth; fly with --sensors raw");
+    const std::string misfit = world::Misfit(kind, !truth, !scenario.commands.empty());
+    if (!misfit.empty()) throw std::runtime_error("fault " + fault.name + " " + misfit);
     configs->faults.push_back(world::Settled(fault, scenario.duration_s, options.seed, number++));
-    if (kind.process == "simulator") configs->simulator.faults.push_back(configs->faults.back());
+    if (kind.victim == "simulator") configs->simulator.faults.push_back(configs->faults.back());
   }
 }
 

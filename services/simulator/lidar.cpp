@@ -41,6 +41,7 @@ float Reflectivity(Material material) {
     case Material::kCarrier:
       return 20.0f;
     case Material::kTarget:
+    case Material::kDecoy:
       return 180.0f;
   }
   return 0.0f;

@@ -13,7 +13,8 @@ enum class Material : int {
   kCrown,
   kMover,
   kCarrier,
-  kTarget
+  kTarget,
+  kDecoy
 };
 
 /// Eight rays in frame W; a ray beyond `count` is not traced.

@@ -66,6 +66,9 @@ class Quadrotor {
   /// Advances by dt [s] under the wrench wanted and the wind [m/s, frame W].
   void Step(const Wrench& wanted, const Eigen::Vector3d& wind, double dt);
 
+  /// Shares of the thrusts that the motors give from now on.
+  void SetMotorShares(const Eigen::Vector4d& shares) { motor_shares_ = shares; }
+
   const BodyState& state() const { return state_; }
   /// True while a foot touches the ground.
   bool on_ground() const { return on_ground_; }
@@ -84,6 +87,7 @@ class Quadrotor {
   BodyState state_;
   Ground ground_;
   Eigen::Vector4d motors_ = Eigen::Vector4d::Zero();
+  Eigen::Vector4d motor_shares_ = Eigen::Vector4d::Ones();
   bool on_ground_ = false;
 };
 

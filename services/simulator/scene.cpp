@@ -24,6 +24,7 @@ constexpr std::size_t kTargetInstance = 0;
 constexpr int kFine = 48, kCoarse = 20;  // edges around a solid
 constexpr double kMargin = 110.0;        // m of ground beyond what stands on it
 constexpr double kRoughMargin = 40.0;
+constexpr double kAway = 1000.0;  // m below: out of range and under the ground
 
 struct Instance {
   RTCGeometry geometry;
@@ -121,7 +122,7 @@ void TurnBack(const Eigen::Vector2f& turn, float* x, float* y) {
 }  // namespace
 
 struct Scene::Impl {
-  explicit Impl(const world::Scenario& s) : scenario(s), actors(s) {}
+  Impl(const world::Scenario& s, double lead) : scenario(s), actors(s), decoy_lead(lead) {}
   ~Impl();
 
   RTCScene NewScene() { return parts.emplace_back(rtcNewScene(device)); }
@@ -135,6 +136,8 @@ struct Scene::Impl {
 
   world::Scenario scenario;
   Actors actors;
+  double decoy_lead;
+  bool shows_target = true, shows_decoy = false;
   RTCDevice device = nullptr;
   FacetTables facets;
   RTCScene fixed = nullptr, moving = nullptr, target = nullptr;
@@ -197,6 +200,7 @@ void Scene::Impl::BuildMoving() {
   if (state.has_carrier) AddInstance(MovingPart(state.carrier), Material::kCarrier);
   for (const auto& mover : actors.Movers(0.0))
     AddInstance(MovingPart(mover.solid), Material::kMover);
+  if (decoy_lead > 0.0) AddInstance(target, Material::kDecoy);
 }
 
 /// What stands still, under Embree. The whole packet, as a ray that grazes an edge can get another
@@ -246,7 +250,8 @@ void Scene::Impl::Settle(const RayPacket& rays, bool unsure, HitPacket* hits) co
   if (rays.movers) TraceMoving(rays, hits);
 }
 
-Scene::Scene(const world::Scenario& scenario) : impl_(std::make_unique<Impl>(scenario)) {
+Scene::Scene(const world::Scenario& scenario, double decoy_lead)
+    : impl_(std::make_unique<Impl>(scenario, decoy_lead)) {
   impl_->device = rtcNewDevice("threads=1,isa=avx2");
   if (!impl_->device)
     throw std::runtime_error("simulator: Embree gives no device; a processor with AVX2 is needed");
@@ -257,13 +262,24 @@ Scene::Scene(const world::Scenario& scenario) : impl_(std::make_unique<Impl>(sce
 
 Scene::~Scene() = default;
 
+void Scene::Show(bool target, bool decoy) {
+  impl_->shows_target = target;
+  impl_->shows_decoy = decoy;
+}
+
 void Scene::MoveTo(double t) {
   std::vector<Solid>& solids = impl_->moving_solids;
   solids.clear();
   const TargetState target = impl_->actors.Target(t);
   solids.push_back(target.cylinder);
   if (target.has_carrier) solids.push_back(target.carrier);
+  if (!impl_->shows_target)
+    for (Solid& solid : solids) solid.center.z() -= kAway;
   for (const auto& mover : impl_->actors.Movers(t)) solids.push_back(mover.solid);
+  if (impl_->decoy_lead > 0.0) {
+    solids.push_back(impl_->actors.Target(t + impl_->decoy_lead).cylinder);
+    if (!impl_->shows_decoy) solids.back().center.z() -= kAway;
+  }
   for (std::size_t i = 0; i < solids.size(); ++i) SetPlace(solids[i], &impl_->instances[i]);
   impl_->target_center = target.center;
   rtcCommitScene(impl_->moving);

@@ -13,11 +13,15 @@ namespace chase::simulator {
 /// instance for each thing that moves.
 class Scene {
  public:
-  explicit Scene(const world::Scenario& scenario);
+  /// `decoy_lead`: how far a decoy is ahead of the target on its path, s; 0: there is none.
+  explicit Scene(const world::Scenario& scenario, double decoy_lead = 0.0);
   ~Scene();
 
   /// Moves the target and the movers to mission time t [s].
   void MoveTo(double t);
+  /// From the next MoveTo() on: are the target and its carrier there, is the decoy? At first only
+  /// the target is.
+  void Show(bool target, bool decoy);
   /// All that moves, where it stands now.
   const std::vector<world::Solid>& MovingSolids() const;
   void Trace(const RayPacket& rays, HitPacket* hits) const { Trace(&rays, 1, hits); }

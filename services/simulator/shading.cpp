@@ -141,6 +141,7 @@ Paint PaintOf(Material material, const Surface& s, const float target_color[3]) 
     case Material::kCarrier:
       return {All(0.12f), {1.0f, 1.0f, 1.0f}};
     case Material::kTarget:
+    case Material::kDecoy:
       return {All(1.0f), {target_color[0], target_color[1], target_color[2]}};
   }
   return Paint{};

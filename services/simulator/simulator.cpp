@@ -29,6 +29,15 @@ Eigen::Quaterniond Level(const Eigen::Quaterniond& q) {
       Eigen::AngleAxisd(std::atan2(forward.y(), forward.x()), Vector3d::UnitZ()));
 }
 
+/// s on the target's path; 0: no decoy in this flight.
+double DecoyLead(const std::vector<world::FaultSpec>& faults) {
+  for (const world::FaultSpec& fault : faults)
+    if (const world::FaultKind& kind = world::KindOf(fault);
+        kind.effect == world::FaultKind::Effect::kDecoy)
+      return kind.amount;
+  return 0.0;
+}
+
 std::string Named(const std::string& name, const std::string& problem) {
   return problem.empty() ? "" : name + ": " + problem;
 }
@@ -56,7 +65,7 @@ Simulator::Simulator(const world::Scenario& scenario, const SimulatorConfig& con
     : scenario_(scenario),
       config_(config),
       actors_(scenario),
-      scene_(scenario),
+      scene_(scenario, DecoyLead(config.faults)),
       quadrotor_(config.vehicle, StartState(scenario, config.vehicle),
                  [ground = scenario.world.ground](double x, double y) {
                    return world::GroundHeight(ground, x, y);
@@ -67,6 +76,12 @@ Simulator::Simulator(const world::Scenario& scenario, const SimulatorConfig& con
       lidar_(config.lidar, config.rig, static_cast<uint64_t>(config.seed)),
       camera_(config.camera, config.rig, scenario.target.color,
               static_cast<uint64_t>(config.seed)) {}
+
+void Simulator::Disturb(const Disturbance& disturbance) {
+  gust_ = disturbance.gust;
+  quadrotor_.SetMotorShares(disturbance.motors);
+  scene_.Show(!disturbance.target_hidden, disturbance.decoy);
+}
 
 void Simulator::SetSetpoint(const AttitudeSetpoint& setpoint, double t) {
   if (!(setpoint.orientation.norm() > 0.1)) return;
@@ -93,7 +108,7 @@ void Simulator::StepPhysics() {
   const bool resting = SetpointFresh() ? !setpoint_.motors : quadrotor_.on_ground();
   const Wrench wrench =
       attitude_loop_.Step(ActiveSetpoint(), quadrotor_.state(), quadrotor_.on_ground(), kStep);
-  quadrotor_.Step(resting ? Wrench{} : wrench, wind_.velocity(), kStep);
+  quadrotor_.Step(resting ? Wrench{} : wrench, wind_.velocity() + gust_, kStep);
   ++steps_;
 }
 

@@ -14,6 +14,7 @@
 #include "services/simulator/lidar.h"
 #include "services/simulator/quadrotor.h"
 #include "services/simulator/scene.h"
+#include "services/simulator/sensor_faults.h"
 #include "services/simulator/wind.h"
 
 namespace chase::simulator {
@@ -76,6 +77,9 @@ class Simulator {
   /// The flight controller's newest setpoint, received at t [s].
   void SetSetpoint(const AttitudeSetpoint& setpoint, double t);
 
+  /// From the next step on.
+  void Disturb(const Disturbance& disturbance);
+
   /// R_WB as the autopilot takes it to be.
   const Eigen::Quaterniond& attitude() const { return quadrotor_.state().q; }
 
@@ -106,6 +110,7 @@ class Simulator {
   long frames_ = 0;  // of the camera
   double last_measurement_ = 0.0;
   AttitudeSetpoint setpoint_;
+  Eigen::Vector3d gust_ = Eigen::Vector3d::Zero();  // of a fault, m/s
   double setpoint_time_ = -1e9;
 };
 

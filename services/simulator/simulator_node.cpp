@@ -38,7 +38,7 @@ SimulatorNode::SimulatorNode(bus::Bus& bus, const SimulatorConfig& config)
       yaml_(ReadText(config.scenario)),
       scenario_(world::ParseScenario(yaml_, config.scenario)),
       simulator_(scenario_, config),
-      faults_(config.faults) {
+      faults_(config.faults, config.seed) {
   const std::string& sensors = config.sensors.empty() ? scenario_.sensors.mode : config.sensors;
   if (sensors == "truth") truth_feed_ = std::make_unique<TruthFeed>(bus, scenario_, config.rig);
   bus_.Subscribe<attitude_setpoint_t>("ATTITUDE_SETPOINT",
@@ -68,15 +68,19 @@ void SimulatorNode::OnSetpoint(const attitude_setpoint_t& message) {
 void SimulatorNode::Tick(int64_t utime) {
   if (!power_on_) power_on_ = utime;
   last_tick_ = utime;
+  AdvanceFaults(utime);
   Output output;
   {
     const auto timer = bus_.Time("step");
     output = simulator_.Advance(bus::Seconds(utime, *power_on_));
   }
-  PublishFaults(output.truth.mission_time, utime);
+  faults_.Strike(config_.imu, &output.imu);
   PublishImu(output.imu, utime);
   if (output.sweep && !faults_.LidarSilent()) PublishSweep(std::move(*output.sweep));
-  if (output.image) PublishImage(std::move(*output.image), utime);
+  if (output.image) {
+    faults_.Strike(&*output.image);
+    PublishImage(std::move(*output.image), utime);
+  }
   if (ticks_ % kTruthTicks == 0) PublishTruth(output.truth, utime);
   if (ticks_ % kScenarioTicks == 0) PublishScenario(utime);
   if (truth_feed_) truth_feed_->Publish(output.truth, utime, ticks_);
@@ -104,7 +108,7 @@ void SimulatorNode::PublishImu(const ImuSample& sample, int64_t utime) {
 
 void SimulatorNode::PublishSweep(Sweep sweep) {
   lidar_scan_t message{};
-  message.utime = bus::Utime(sweep.start, *power_on_);
+  message.utime = bus::Utime(sweep.start + faults_.LidarClock(), *power_on_);
   message.size = static_cast<int32_t>(sweep.x.size());
   message.x = std::move(sweep.x);
   message.y = std::move(sweep.y);
@@ -164,13 +168,15 @@ void SimulatorNode::PublishScenario(int64_t utime) {
   bus_.Publish("SCENARIO", message);
 }
 
-void SimulatorNode::PublishFaults(double mission_time, int64_t utime) {
+void SimulatorNode::AdvanceFaults(int64_t utime) {
+  const double mission_time = bus::Seconds(utime, *power_on_) - scenario_.settle_s;
   for (const SensorFaults::Change& change : faults_.Advance(mission_time)) {
     event_t message{};
     message.utime = utime;
     message.name = change.name;
     message.phase = change.begins ? event_t::BEGINS : event_t::ENDS;
     bus_.Publish("FAULT", message);
+    simulator_.Disturb(faults_.Disturbed());
   }
 }
 

@@ -37,7 +37,7 @@ class SimulatorNode : public bus::Node {
   void PublishImage(Image image, int64_t utime);
   void PublishTruth(const Truth& truth, int64_t utime);
   void PublishScenario(int64_t utime);
-  void PublishFaults(double mission_time, int64_t utime);
+  void AdvanceFaults(int64_t utime);
 
   bus::Bus& bus_;
   SimulatorConfig config_;

@@ -10,5 +10,6 @@ inline constexpr uint64_t kWindStream = 1;
 inline constexpr uint64_t kImuStream = 2;
 inline constexpr uint64_t kLidarStream = 3;
 inline constexpr uint64_t kCameraStream = 4;
+inline constexpr uint64_t kFaultStream = 5;
 
 }  // namespace chase::simulator

@@ -29,13 +29,18 @@ def flight(*arguments, scenario=SCENARIO):
 def stamps(log, channel):
     """(mission time of delivery, seq) of every message of a channel."""
     return [(utime * 1e-6 - START, struct.unpack_from(">i", data, 16)[0])
-            for utime, name, data in lcmlog.read(log) if name == channel]
+            for utime, name, data in lcmlog.read(log) if name == channel and whole(data)]
+
+
+def whole(data):
+    """Is it a message? What floods the bus is random bytes, and so would its stamp be."""
+    return len(data) >= 20 and 0 < struct.unpack_from(">q", data, 8)[0] < 10**12
 
 
 def faults(log):
     """(name, phase, mission time) of every FAULT."""
     for utime, name, data in lcmlog.read(log):
-        if name == "FAULT":
+        if name == "FAULT" and whole(data):
             at = lcmlog.after_head(data)
             length = struct.unpack_from(">i", data, at)[0]
             text = data[at + 4:at + 3 + length].decode()
@@ -65,6 +70,19 @@ class Faults(unittest.TestCase):
         self.assertEqual((figures["fault"], figures["fault_time_s"]), ("lidar-gap+kill-planning", 0.75))
         self.assertIn("of the part flown", answer.stdout)
 
+    def test_faults_of_the_bus_repeat_and_show(self):
+        logs = [self.folder / name for name in ("a.lcm", "b.lcm")]
+        for log in logs:
+            answer = flight("--fault", "delay-POSE@0.5", "--fault", "loss-20@1", "--fault", "flood@1.5",
+                            "--until", 3, "--log", log)
+            self.assertEqual((answer.returncode, answer.stderr), (0, ""))
+        self.assertTrue(filecmp.cmp(*logs, shallow=False), "two flights, different bytes")
+        self.assertEqual(list(faults(logs[0])),
+                         [("delay-POSE", 1, 0.5), ("loss-20", 1, 1.0), ("flood", 1, 1.5),
+                          ("delay-POSE", 0, 2.5)])
+        poses = [t for t, _ in stamps(logs[0], "POSE") if 0.5 < t < 1.5]
+        self.assertGreater(min(t for t in poses if t > 0.51), 0.8)
+
     def check_gap(self, messages, begin, end, restarts):
         """Nothing between the times but what was under way; seq goes on, or starts anew after."""
         before = [seq for t, seq in messages if t < begin + 0.003]
@@ -88,6 +106,14 @@ class Faults(unittest.TestCase):
         answer = flight("--fault", "lidar-gap", "--sensors", "truth")
         self.assertEqual((answer.returncode, answer.stdout), (1, ""))
         self.assertRegex(answer.stderr, "lidar-gap.*truth.*--sensors raw")
+
+    def test_fault_that_strikes_nothing_is_refused(self):
+        for fault, cure in (("disk-full", "fly live"), ("kill-mission", "commands"),
+                            ("disk-ful", "flood, disk-full")):
+            answer = flight("--fault", fault)
+            self.assertEqual((answer.returncode, answer.stdout), (1, ""))
+            self.assertEqual(answer.stderr.count("\n"), 1)
+            self.assertRegex(answer.stderr, f"{fault}.*{cure}")
 
     def test_collision_ends_the_flight(self):
         """A block comes down the hall and through the hovering drone; planning hangs meanwhile."""

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <functional>
 
 #include "common/bus/live_loop.h"
@@ -256,6 +257,44 @@ TEST(LockstepFaults, AnyOrderOfStrikesIsSurvivedAndRepeats) {
     EXPECT_GE(firsts, 1);
     EXPECT_TRUE(story == Lived(5000137, strikes));
   }
+}
+
+TEST(LockstepDelay, StrikesOneChannelForItsTime) {
+  const Story story = Lived(3000137, [](Lockstep* lockstep) {
+    lockstep->At(1500137, [=] { lockstep->SetDelay("IMU", 300000); });
+    lockstep->At(2000137, [=] { lockstep->SetDelay("IMU", 0); });
+  });
+  EXPECT_EQ(story.samples.size(), Arriving(0, 3000137).size()) << "late, not lost";
+  EXPECT_EQ(story.sweeps, Arriving(0, 3000137, 4));
+  for (size_t i = 0; i < story.samples.size(); ++i) {
+    const bool late = story.samples[i] > 1500137 && story.samples[i] < 2000137;
+    EXPECT_EQ(story.handled_at[i] - story.samples[i], kUnderWay + (late ? 300000 : 0));
+  }
+}
+
+TEST(LockstepLoss, TakesItsShareOfHeavyAndLightAlikeAndRepeats) {
+  const auto plan = [](Lockstep* lockstep) {
+    lockstep->At(2000137, [=] { lockstep->SetLoss(0.2, 7); });
+    lockstep->At(42000137, [=] { lockstep->SetLoss(0.0, 0); });
+  };
+  const Story story = Lived(43000137, plan);
+  const auto lost = [](const std::vector<int64_t>& heard, int64_t step) {
+    return static_cast<double>(Arriving(0, 43000137, step).size() - heard.size()) /
+           static_cast<double>(40000000 / kPeriod / step);
+  };
+  EXPECT_NEAR(lost(story.samples, 1), 0.2, 3.0 * 0.4 / std::sqrt(8000.0));
+  EXPECT_NEAR(lost(story.sweeps, 4), 0.2, 3.0 * 0.4 / std::sqrt(2000.0));
+  EXPECT_EQ(story.samples.front(), kStart);
+  EXPECT_EQ(story.samples.back(), Arriving(0, 43000137).back());
+  EXPECT_TRUE(story == Lived(43000137, plan));
+}
+
+TEST(LockstepInject, BytesThatAreNoMessageAreCountedAndChangeNothing) {
+  const auto flooded = [](Lockstep* lockstep) {
+    for (int64_t t = kStart + 137; t < 2000137; t += 1000)
+      lockstep->At(t, [=] { lockstep->Inject("IMU", Bus::Bytes(static_cast<size_t>(t % 99), 3)); });
+  };
+  EXPECT_TRUE(Lived(3000137, flooded) == Lived(3000137, [](Lockstep*) {}));
 }
 
 TEST(LockstepFaults, AnUnknownProcessIsNamed) {

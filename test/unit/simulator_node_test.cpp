@@ -6,6 +6,7 @@
 #include <fstream>
 #include <iterator>
 #include <map>
+#include <numeric>
 
 #include "chase/attitude_setpoint_t.hpp"
 #include "chase/camera_image_t.hpp"
@@ -44,6 +45,18 @@ Record Simulated(const SimulatorConfig& config, int64_t duration_us) {
 SimulatorConfig Config(const std::string& scenario = "gym") {
   SimulatorConfig config;
   config.scenario = std::string(CHASE_SOURCE_DIR) + "/deploy/scenarios/" + scenario + ".yaml";
+  return config;
+}
+
+/// The gym with mission time zero at power-on, and a fault at half a second if it has a name.
+SimulatorConfig AtOnce(const std::string& fault = "") {
+  SimulatorConfig config = Config();
+  std::ifstream in(config.scenario);
+  std::string text((std::istreambuf_iterator<char>(in)), {});
+  text.replace(text.find("settle_s: 8"), 11, "settle_s: 0");
+  config.scenario = ::testing::TempDir() + "chase_at_once.yaml";
+  std::ofstream(config.scenario) << text;
+  if (!fault.empty()) config.faults = {world::Settled({fault, 0.5}, 60.0, 1, 0)};
   return config;
 }
 
@@ -120,12 +133,7 @@ TEST(SensorFaults, WithoutALengthAFaultLastsAsLongAsItsKind) {
 }
 
 TEST(SimulatorNode, ALidarFaultTakesSweepsAndChangesNothingElse) {
-  SimulatorConfig config = Config();
-  std::ifstream in(config.scenario);
-  std::string text((std::istreambuf_iterator<char>(in)), {});
-  text.replace(text.find("settle_s: 8"), 11, "settle_s: 0");
-  config.scenario = ::testing::TempDir() + "chase_at_once.yaml";
-  std::ofstream(config.scenario) << text;
+  SimulatorConfig config = AtOnce();
   const Record whole = Simulated(config, 2000000);
   config.faults = {world::Settled({"lidar-gap", 0.5}, 60.0, 1, 0),
                    world::Settled({"lidar-dead", 1.75}, 60.0, 1, 1)};
@@ -152,8 +160,102 @@ TEST(SimulatorNode, ALidarFaultTakesSweepsAndChangesNothingElse) {
     EXPECT_EQ(struck.at(channel), whole.at(channel)) << channel;
 }
 
-/// Height after a second of asking for one and a half times the weight.
-double HeightAfterLift(int8_t motors) {
+/// The first frame, sweep or sample sent from half a second on, without and with the fault. What
+/// was sent before must be the same.
+template <class T>
+std::pair<T, T> Struck(const std::string& fault, const std::string& channel) {
+  const Record whole = Simulated(AtOnce(), 1000000), struck = Simulated(AtOnce(fault), 1000000);
+  EXPECT_EQ(struck.at("FAULT").size(), 1u);
+  std::size_t i = 0;
+  for (; whole.at(channel)[i].first < kStart + 500000; ++i)
+    EXPECT_EQ(whole.at(channel)[i], struck.at(channel)[i]);
+  return {Message<T>(whole, channel, i), Message<T>(struck, channel, i)};
+}
+
+TEST(SimulatorNode, ABlackoutIsBlack) {
+  const auto [before, after] = Struck<camera_image_t>("camera-blackout", "CAMERA_IMAGE");
+  EXPECT_EQ(after.data, std::vector<uint8_t>(before.data.size(), 0));
+}
+
+TEST(SimulatorNode, AnExposureJumpIsTwoStopsBrighter) {
+  const auto [before, after] = Struck<camera_image_t>("exposure-jump", "CAMERA_IMAGE");
+  for (std::size_t i = 0; i < before.data.size(); ++i)
+    ASSERT_EQ(int{after.data[i]}, std::min(255, 4 * before.data[i])) << "byte " << i;
+}
+
+TEST(SimulatorNode, BlurTakesTheContrastAlongTheRowsAndKeepsTheLight) {
+  const auto [before, after] = Struck<camera_image_t>("camera-blur", "CAMERA_IMAGE");
+  const auto change = [](const camera_image_t& image) {
+    double sum = 0.0;
+    for (std::size_t i = 3; i < image.data.size(); ++i)
+      sum += std::abs(int{image.data[i]} - int{image.data[i - 3]});
+    return sum;
+  };
+  EXPECT_LT(change(after), 0.4 * change(before));
+  const auto light = [](const camera_image_t& image) {
+    return std::accumulate(image.data.begin(), image.data.end(), 0.0) / image.size;
+  };
+  EXPECT_NEAR(light(after), light(before), 3.0);
+}
+
+TEST(SimulatorNode, AnImuBiasIsAStep) {
+  const auto [before, after] = Struck<imu_t>("imu-bias", "IMU");
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_NEAR(after.accel[i] - before.accel[i], 0.25, 1e-12);
+    EXPECT_NEAR(after.gyro[i] - before.gyro[i], 0.015, 1e-12);
+  }
+}
+
+TEST(SimulatorNode, ImuSpikesAreRareAndOfFullScale) {
+  const Record whole = Simulated(AtOnce(), 2500000);
+  const Record struck = Simulated(AtOnce("imu-spikes"), 2500000);
+  int spikes = 0;
+  for (std::size_t i = 0; i < whole.at("IMU").size(); ++i) {
+    if (whole.at("IMU")[i] == struck.at("IMU")[i]) continue;
+    ++spikes;
+    EXPECT_NEAR(bus::ToVector(Message<imu_t>(struck, "IMU", i).accel).cwiseAbs().maxCoeff(), 157.0,
+                0.1);
+  }
+  EXPECT_NEAR(spikes, 8, 7) << "2 % of 400";
+  EXPECT_EQ(struck, Simulated(AtOnce("imu-spikes"), 2500000));
+}
+
+TEST(SimulatorNode, TheLidarsClockStepsByASecond) {
+  const auto [ahead, forward] = Struck<lidar_scan_t>("clock-forward", "LIDAR_SCAN");
+  EXPECT_EQ(forward.utime - ahead.utime, 1000000);
+  const auto [behind, back] = Struck<lidar_scan_t>("clock-back", "LIDAR_SCAN");
+  EXPECT_EQ(back.utime - behind.utime, -1000000);
+}
+
+/// Pixels of the target's colour, which nothing else in the gym has.
+int Orange(const camera_image_t& image) {
+  int count = 0;
+  for (std::size_t i = 0; i + 2 < image.data.size(); i += 3)
+    count += image.data[i] > 2 * image.data[i + 2] + 60;
+  return count;
+}
+
+TEST(SimulatorNode, AHiddenTargetIsNotInTheFrameNorInTheTruthsView) {
+  const auto [before, after] = Struck<camera_image_t>("hidden-4s", "CAMERA_IMAGE");
+  EXPECT_GT(Orange(before), 20);
+  EXPECT_EQ(Orange(after), 0);
+  EXPECT_EQ(
+      Message<truth_t>(Simulated(AtOnce("hidden-for-good"), 1000000), "TRUTH", 90).visible_share,
+      0.0);
+}
+
+TEST(SimulatorNode, ADecoyHasTheTargetsColourAndLeavesTheTruthAlone) {
+  const Record whole = Simulated(AtOnce(), 1000000), decoy = Simulated(AtOnce("decoy"), 1000000);
+  EXPECT_EQ(decoy.at("TRUTH"), whole.at("TRUTH"));
+  SimulatorConfig config = AtOnce("decoy");  // stands behind the target, seen from the start
+  config.faults.push_back(world::Settled({"hidden-4s", 0.5}, 60.0, 1, 1));
+  const Record alone = Simulated(config, 1000000);
+  EXPECT_GT(Orange(Message<camera_image_t>(alone, "CAMERA_IMAGE", 15)), 20);
+  EXPECT_EQ(Message<truth_t>(alone, "TRUTH", 90).visible_share, 0.0);
+}
+
+/// The truth after a second of asking for one and a half times the weight.
+truth_t AfterLift(int8_t motors, const SimulatorConfig& config) {
   class Lifter : public bus::Node {
    public:
     Lifter(bus::Bus& bus, int8_t motors) : bus_(bus), motors_(motors) {}
@@ -172,24 +274,35 @@ double HeightAfterLift(int8_t motors) {
     int8_t motors_;
   };
   bus::Lockstep lockstep(kStart);
-  double height = 0.0;
+  truth_t last{};
   lockstep.SetTap([&](int64_t, const std::string& channel, const bus::Bus::Bytes& bytes) {
     truth_t truth;
     if (channel != "TRUTH") return;
     truth.decode(bytes.data(), 0, static_cast<int>(bytes.size()));
-    height = truth.pos[2];
+    last = truth;
   });
   lockstep.Add("simulator", 0,
-               [](bus::Bus& bus) { return std::make_unique<SimulatorNode>(bus, Config()); });
+               [&](bus::Bus& bus) { return std::make_unique<SimulatorNode>(bus, config); });
   lockstep.Add("control", 1000,
                [&](bus::Bus& bus) { return std::make_unique<Lifter>(bus, motors); });
   lockstep.RunUntil(kStart + 1000000);
-  return height;
+  return last;
 }
 
 TEST(SimulatorNode, MotorsThatAreOffGiveNoThrust) {
-  EXPECT_GT(HeightAfterLift(attitude_setpoint_t::MOTORS_ON), 1.0);
-  EXPECT_LT(HeightAfterLift(attitude_setpoint_t::MOTORS_OFF), 0.2);
+  EXPECT_GT(AfterLift(attitude_setpoint_t::MOTORS_ON, Config()).pos[2], 1.0);
+  EXPECT_LT(AfterLift(attitude_setpoint_t::MOTORS_OFF, Config()).pos[2], 0.2);
+}
+
+TEST(SimulatorNode, AGustPushesAndAWeakMotorCostsHeight) {
+  const auto lifted = [](const std::string& fault) {
+    return AfterLift(attitude_setpoint_t::MOTORS_ON, AtOnce(fault));
+  };
+  const truth_t whole = lifted(""), gust = lifted("gust"), motor = lifted("motor-80");
+  // Drag of 0.25 1/s against 8 m/s of wind for half a second.
+  EXPECT_NEAR(std::hypot(gust.vel[0] - whole.vel[0], gust.vel[1] - whole.vel[1]), 0.94, 0.15);
+  // A twentieth of the thrust of 15 m/s^2, for half a second.
+  EXPECT_NEAR(whole.pos[2] - motor.pos[2], 0.09, 0.04);
 }
 
 TEST(SimulatorNode, MissingOrBrokenScenarioIsRefusedAtTheStart) {

@@ -125,6 +125,28 @@ TEST(Fault, EveryKindCanBeSettledAndLoadedAgain) {
   }
 }
 
+TEST(Fault, EveryPromisedNameIsThere) {
+  for (const char* name :
+       {"kill-mission", "freeze-mission", "lidar-gap",  "lidar-dead",      "camera-blackout",
+        "camera-blur",  "exposure-jump",  "imu-spikes", "imu-bias",        "delay-LIDAR_SCAN",
+        "delay-PLAN",   "loss-5",         "loss-20",    "clock-forward",   "clock-back",
+        "gust",         "motor-80",       "hidden-4s",  "hidden-for-good", "decoy",
+        "flood",        "disk-full"})
+    EXPECT_EQ(ParseFault(name).name, name);
+}
+
+TEST(Fault, WhatStrikesNothingSaysWhyAndTheCure) {
+  const auto misfit = [](const char* name, bool sensors, bool mission) {
+    return Misfit(KindOf({name}), sensors, mission);
+  };
+  EXPECT_CONTAINS(misfit("decoy", false, true), "--sensors raw");
+  EXPECT_EQ(misfit("decoy", true, false), "");
+  EXPECT_CONTAINS(misfit("kill-mission", true, false), "commands");
+  EXPECT_EQ(misfit("kill-mission", false, true), "");
+  EXPECT_EQ(misfit("gust", false, false), "");
+  EXPECT_CONTAINS(misfit("disk-full", true, true), "fly live");
+}
+
 TEST(Fault, TimesAreDrawnFromTheSeedAndTheNumberAlone) {
   std::set<double> times;
   double sum = 0.0;
