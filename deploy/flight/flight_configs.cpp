@@ -22,7 +22,7 @@ void Derive(const world::Scenario& scenario, FlightConfigs* configs) {
   const world::ChaserSpec& chaser = scenario.chaser;
   configs->odometry.initial_position = chaser.start;
   configs->odometry.initial_yaw_deg = chaser.yaw_deg;
-  configs->perception.target_shape = scenario.target.shape == "sphere" ? "sphere" : "cylinder";
+  configs->perception.target_shape = scenario.target.shape;
   configs->perception.target_radius = scenario.target.radius;
   configs->perception.target_height = scenario.target.height;
   configs->planning.takeoff_height = chaser.takeoff_height;

@@ -161,10 +161,9 @@ perception::PerceptionConfig LearnTarget(const world::Scenario& world, const Out
   perception::PerceptionConfig config;
   config.detector = LearnDetector(images, masks, config.detector).config;
   config.rig = outfit.calibrated;
-  config.target_shape = world.target.shape == "sphere" ? "sphere" : "cylinder";
+  config.target_shape = world.target.shape;
   config.target_radius = world.target.radius;
   config.target_height = world.target.height;
-  if (world.target.shape == "box") config.target_radius *= 4.0 / kPi;  // mean half width seen
   return Rounded(config, 4);
 }
 

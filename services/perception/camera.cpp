@@ -36,7 +36,7 @@ std::optional<cv::Rect2d> ProjectTarget(const Camera& camera, const Eigen::Vecto
   const double radius = shape.size[0];
   Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();
   double around = radius, above = 0.5 * shape.size[1], beyond = 0.0;
-  if (shape.sphere) {  // seen is the circle along which lines of sight touch it
+  if (shape.sphere()) {  // seen is the circle along which lines of sight touch it
     const Eigen::Vector3d sight = p_WT - camera.p_WC;
     const double range = sight.norm();
     if (range <= radius) return std::nullopt;
@@ -45,11 +45,14 @@ std::optional<cv::Rect2d> ProjectTarget(const Camera& camera, const Eigen::Vecto
     around = radius * std::sqrt(1.0 - radius * radius / (range * range));
     above = 0.0;
   }
+  const Eigen::Matrix2d turn = Eigen::Rotation2Dd(shape.yaw).toRotationMatrix();
   Eigen::Vector2d low(1e9, 1e9), high(-1e9, -1e9);
   for (int i = 0; i < 2 * kRimPoints; ++i) {
     const int step = i / 2;
     const double angle = 2.0 * M_PI * step / kRimPoints;
-    const Eigen::Vector3d rim(around * std::cos(angle), around * std::sin(angle),
+    Eigen::Vector2d place(std::cos(angle), std::sin(angle));
+    if (shape.box()) place = turn * (place / place.lpNorm<Eigen::Infinity>());
+    const Eigen::Vector3d rim(around * place.x(), around * place.y(),
                               beyond + (i % 2 ? above : -above));
     const auto px = camera.Project(p_WT + axes * rim);
     if (!px) return std::nullopt;

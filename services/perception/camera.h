@@ -26,15 +26,27 @@ struct Camera {
 /// The camera of a body at this pose.
 Camera CameraAt(const PoseSample& pose, const world::Rig& rig);
 
-/// Radius and height of the upright cylinder, or of the sphere, and how well they are known.
+/// The target's solid, and how well it is known. A box stands upright on a square.
 struct TargetShape {
-  bool sphere = false;
-  Eigen::Vector2d size = {0.15, 0.5};                  ///< radius, height, m
+  enum class Kind { kCylinder, kSphere, kBox };
+  /// Of a heading of which nothing is known: uniform over the quarter turn after which a box looks
+  /// the same, rad^2.
+  static constexpr double kAnyYaw = M_PI * M_PI / 48.0;
+
+  Kind kind = Kind::kCylinder;
+  Eigen::Vector2d size = {0.15, 0.5};                  ///< half the width (the radius), height, m
   Eigen::Vector2d variance = Eigen::Vector2d::Zero();  ///< m^2
+  double yaw = 0.0, yaw_variance = kAnyYaw;            ///< of a box, rad
+
+  bool sphere() const { return kind == Kind::kSphere; }
+  bool box() const { return kind == Kind::kBox; }
+  /// Half of what is seen of the width, over all headings [m]: on average and at most.
+  double MeanHalfWidth() const { return (box() ? 4.0 / M_PI : 1.0) * size[0]; }
+  double MostHalfWidth() const { return (box() ? M_SQRT2 : 1.0) * size[0]; }
 };
 
-/// Box [px] around a target centred at p_WT, from a cylinder's two rims or from the rim of the
-/// sphere that is seen; nothing when any part lies behind the camera.
+/// Box [px] around a target centred at p_WT, from the two rims of a cylinder or box or from the rim
+/// of the sphere that is seen; nothing when any part lies behind the camera.
 std::optional<cv::Rect2d> ProjectTarget(const Camera& camera, const Eigen::Vector3d& p_WT,
                                         const TargetShape& shape);
 

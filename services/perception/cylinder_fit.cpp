@@ -43,7 +43,7 @@ ceres::Solver::Options SolverOptions(const FitConfig& config) {
 
 /// Of y at the solution, with the losses' weights held.
 template <int N>
-bool ReadCovariance(double* y, ceres::Problem* problem, Matrix8d* out) {
+bool ReadCovariance(double* y, ceres::Problem* problem, Matrix9d* out) {
   ceres::Covariance::Options options;
   options.algorithm_type = ceres::DENSE_SVD;
   options.num_threads = 1;
@@ -57,12 +57,12 @@ bool ReadCovariance(double* y, ceres::Problem* problem, Matrix8d* out) {
 }
 
 template <int N>
-FitResult Solve(const CylinderProblem& fit, const FitConfig& config, Vector8d y) {
+FitResult Solve(const CylinderProblem& fit, const FitConfig& config, Vector9d y) {
   ceres::Problem problem;
   problem.AddResidualBlock(new Cost<N>(fit), nullptr, y.data());
   ceres::Solver::Summary summary;
   ceres::Solve(SolverOptions(config), &problem, &summary);
-  Matrix8d covariance = Matrix8d::Zero();
+  Matrix9d covariance = Matrix9d::Zero();
   if (!summary.IsSolutionUsable() || !y.allFinite() ||
       !ReadCovariance<N>(y.data(), &problem, &covariance))
     return {};
@@ -74,9 +74,10 @@ FitResult Solve(const CylinderProblem& fit, const FitConfig& config, Vector8d y)
 FitResult FitCylinder(const FitInput& input, const FitConfig& config, const FitResult* start) {
   const CylinderProblem fit(input, config);
   if (!fit.ok()) return {};
-  Vector8d y = fit.Start();
-  if (start) y << start->posterior.mean, start->shape.size;
-  return config.estimate_shape ? Solve<8>(fit, config, y) : Solve<6>(fit, config, y);
+  Vector9d y = fit.Start();
+  if (start) y << start->posterior.mean, start->shape.yaw, start->shape.size;
+  if (fit.unknowns() == 9) return Solve<9>(fit, config, y);
+  return fit.unknowns() == 7 ? Solve<7>(fit, config, y) : Solve<6>(fit, config, y);
 }
 
 }  // namespace chase::perception

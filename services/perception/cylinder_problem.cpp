@@ -11,6 +11,7 @@ namespace {
 constexpr double kOutlier = 2.0;      // standard deviations where outliers begin
 constexpr double kWorst = 3.0;        // standard deviations that an outlier counts for
 constexpr double kShapeFloor = 1e-6;  // m^2
+constexpr double kYawFloor = 1e-6;    // rad^2
 constexpr double kNearest = 0.2;      // m, of ranges that scale pixels
 constexpr double kLeastPerPx = 1e-6;
 
@@ -84,22 +85,23 @@ class Cauchy {
 struct CostSum {
   static constexpr bool kDerivatives = false;
   double cost = 0.0;
-  void AddEdge(double, double, const Vector8d&) {}
-  void Add(double, double, const Vector8d&) {}
+  void AddEdge(double, double, const Vector9d&) {}
+  void Add(double, double, const Vector9d&) {}
 };
 
 /// Sums up cost and normal equations.
 template <int N>
 struct NormalSum : NormalEquations<N> {
   static constexpr bool kDerivatives = true;
-  /// An edge does not depend on the velocity.
-  void AddEdge(double weight, double residual, const Vector8d& row) {
-    if (N == 8) return Add(weight, residual, row);
+  static constexpr int kUnknowns = N;
+  /// An edge does not depend on the velocity, nor a round one on the heading.
+  void AddEdge(double weight, double residual, const Vector9d& row) {
+    if (N > 6) return Add(weight, residual, row);
     const Eigen::Vector3d weighed = weight * row.head<3>();
     this->gradient.template head<3>() += residual * weighed;
     this->information.template topLeftCorner<3, 3>() += weighed * row.head<3>().transpose();
   }
-  void Add(double weight, double residual, const Vector8d& row) {
+  void Add(double weight, double residual, const Vector9d& row) {
     const Eigen::Matrix<double, N, 1> weighed = weight * row.head<N>();
     this->gradient += residual * weighed;
     this->information.noalias() += weighed * row.head<N>().transpose();
@@ -116,19 +118,20 @@ CylinderProblem::CylinderProblem(const FitInput& input, const FitConfig& config)
   if (!root_.allFinite()) return;
   ok_ = true;
   information_ = root_.transpose() * root_;
-  shape_information_ = input.shape.variance.cwiseMax(kShapeFloor).cwiseInverse();
+  shape_information_ << 1.0 / std::max(kYawFloor, input.shape.yaw_variance),
+      input.shape.variance.cwiseMax(kShapeFloor).cwiseInverse();
   prior_range_ = Range(Start());
   AddEdges();
   AddPosition();
 }
 
-Vector8d CylinderProblem::Start() const {
-  Vector8d y;
-  y << input_.prior.mean, input_.shape.size;
+Vector9d CylinderProblem::Start() const {
+  Vector9d y;
+  y << input_.prior.mean, input_.shape.yaw, input_.shape.size;
   return y;
 }
 
-double CylinderProblem::Range(const Vector8d& y) const {
+double CylinderProblem::Range(const Vector9d& y) const {
   return std::max(kNearest, (y.head<2>() - input_.camera.p_WC.head<2>()).norm());
 }
 
@@ -153,40 +156,45 @@ void CylinderProblem::AddPosition() {
   position_ = input_.camera.p_WC + R * *input_.detection->p_CT;
 }
 
-double CylinderProblem::EdgeResidual(size_t side, const Edge& edge, double scale, const Vector8d& y,
-                                     Vector8d* gradient) const {
-  if (input_.shape.sphere)
+double CylinderProblem::EdgeResidual(size_t side, const Edge& edge, double scale, const Vector9d& y,
+                                     Vector9d* gradient) const {
+  if (input_.shape.sphere())
     return TangentResidual{edge.ray, Upright(side), Sign(side), scale * edge.px}(y, gradient);
-  if (Upright(side)) return SideResidual{edge.ray, Sign(side), scale * edge.px}(y, gradient);
-  return CapResidual{edge.ray, Sign(side), scale * edge.px}(y, gradient);
+  const bool square = input_.shape.box();
+  if (Upright(side))
+    return SideResidual{edge.ray, square, Sign(side), scale * edge.px}(y, gradient);
+  return CapResidual{edge.ray, square, Sign(side), scale * edge.px}(y, gradient);
 }
 
-double CylinderProblem::SurfaceDistance(const TargetPoint& point, double scale, const Vector8d& y,
-                                        Vector8d* gradient) const {
-  if (input_.shape.sphere) return SpherePointResidual{point.p_W, point.age, scale}(y, gradient);
-  return PointResidual{point.p_W, point.age, scale}(y, gradient);
+double CylinderProblem::SurfaceDistance(const TargetPoint& point, double scale, const Vector9d& y,
+                                        Vector9d* gradient) const {
+  if (input_.shape.sphere()) return SpherePointResidual{point.p_W, point.age, scale}(y, gradient);
+  return PointResidual{point.p_W, input_.shape.box(), point.age, scale}(y, gradient);
 }
 
 template <class Sum>
-void CylinderProblem::EvaluatePrior(const Vector8d& y, Sum* sum) const {
+void CylinderProblem::EvaluatePrior(const Vector9d& y, Sum* sum) const {
   const Vector6d d = y.head<6>() - input_.prior.mean;
   const Vector6d gradient = information_ * d;
   sum->cost += 0.5 * d.dot(gradient);
-  const Eigen::Vector2d off = y.tail<2>() - input_.shape.size;
-  const Eigen::Vector2d by_shape = shape_information_.cwiseProduct(off);
-  if (config_.estimate_shape) sum->cost += 0.5 * off.dot(by_shape);
+  const Eigen::Vector3d off = y.tail<3>() - Start().tail<3>();
+  const Eigen::Vector3d by_shape = shape_information_.cwiseProduct(off);
+  if (config_.estimate_shape)
+    sum->cost += 0.5 * off.dot(by_shape);
+  else
+    sum->cost += 0.5 * off[0] * by_shape[0];
   if constexpr (Sum::kDerivatives) {
     sum->gradient.template head<6>() += gradient;
     sum->information.template topLeftCorner<6, 6>() += information_;
-    if (sum->gradient.size() == 6) return;
-    sum->gradient.template tail<2>() += by_shape;
-    sum->information.diagonal().template tail<2>() += shape_information_;
+    constexpr int kMore = Sum::kUnknowns - 6;
+    sum->gradient.template tail<kMore>() += by_shape.head<kMore>();
+    sum->information.diagonal().template tail<kMore>() += shape_information_.head<kMore>();
   }
 }
 
 template <class Sum>
-void CylinderProblem::EvaluateEdges(const Vector8d& y, Sum* sum) const {
-  Vector8d row;
+void CylinderProblem::EvaluateEdges(const Vector9d& y, Sum* sum) const {
+  Vector9d row;
   for (size_t side = 0; side < 4; ++side) {
     if (!input_.use_side[side] || edges_[side].empty()) continue;
     Cauchy loss(Share(edges_[side].size(), config_.edge_weight));
@@ -200,9 +208,9 @@ void CylinderProblem::EvaluateEdges(const Vector8d& y, Sum* sum) const {
 }
 
 template <class Sum>
-void CylinderProblem::EvaluatePoints(const Vector8d& y, Sum* sum) const {
+void CylinderProblem::EvaluatePoints(const Vector9d& y, Sum* sum) const {
   if (input_.points.empty()) return;
-  Vector8d row;
+  Vector9d row;
   Cauchy loss(Share(input_.points.size(), config_.lidar_weight));
   const double scale = 1.0 / config_.lidar_sigma;
   for (const auto& p : input_.points) {
@@ -213,7 +221,7 @@ void CylinderProblem::EvaluatePoints(const Vector8d& y, Sum* sum) const {
 }
 
 template <class Sum>
-void CylinderProblem::EvaluatePosition(const Vector8d& y, Sum* sum) const {
+void CylinderProblem::EvaluatePosition(const Vector9d& y, Sum* sum) const {
   if (!position_information_) return;
   const Eigen::Vector3d off = y.head<3>() - position_;
   const Eigen::Vector3d gradient = *position_information_ * off;
@@ -227,31 +235,32 @@ void CylinderProblem::EvaluatePosition(const Vector8d& y, Sum* sum) const {
 }
 
 template <class Sum>
-void CylinderProblem::Evaluate(const Vector8d& y, Sum* sum) const {
+void CylinderProblem::Evaluate(const Vector9d& y, Sum* sum) const {
   EvaluatePrior(y, sum);
   EvaluateEdges(y, sum);
   EvaluatePoints(y, sum);
   EvaluatePosition(y, sum);
 }
 
-double CylinderProblem::Cost(const Vector8d& y) const {
+double CylinderProblem::Cost(const Vector9d& y) const {
   CostSum sum;
   Evaluate(y, &sum);
   return sum.cost;
 }
 
 template <int N>
-NormalEquations<N> CylinderProblem::Linearised(const Vector8d& y) const {
+NormalEquations<N> CylinderProblem::Linearised(const Vector9d& y) const {
   NormalSum<N> sum;
   Evaluate(y, &sum);
   return sum;
 }
 
-template NormalEquations<6> CylinderProblem::Linearised<6>(const Vector8d&) const;
-template NormalEquations<8> CylinderProblem::Linearised<8>(const Vector8d&) const;
+template NormalEquations<6> CylinderProblem::Linearised<6>(const Vector9d&) const;
+template NormalEquations<7> CylinderProblem::Linearised<7>(const Vector9d&) const;
+template NormalEquations<9> CylinderProblem::Linearised<9>(const Vector9d&) const;
 
 /// Residuals of one side in px, without loss or weights.
-std::vector<double> CylinderProblem::EdgeResiduals(size_t side, const Vector8d& y) const {
+std::vector<double> CylinderProblem::EdgeResiduals(size_t side, const Vector9d& y) const {
   std::vector<double> all;
   all.reserve(edges_[side].size());
   for (const auto& edge : edges_[side])
@@ -259,7 +268,7 @@ std::vector<double> CylinderProblem::EdgeResiduals(size_t side, const Vector8d& 
   return all;
 }
 
-std::vector<double> CylinderProblem::PointResiduals(const Vector8d& y) const {
+std::vector<double> CylinderProblem::PointResiduals(const Vector9d& y) const {
   std::vector<double> all;
   all.reserve(input_.points.size());
   for (const auto& p : input_.points) all.push_back(SurfaceDistance(p, 1.0, y, nullptr));
@@ -285,7 +294,9 @@ bool CylinderProblem::ReadEvidence(const std::array<std::vector<double>, 4>& edg
   const Eigen::LLT<Matrix6d> posterior(out->posterior.covariance);
   if (posterior.info() != Eigen::Success) return false;
   const double log_posterior = posterior.matrixLLT().diagonal().array().log().sum();
-  const double log_prior = -root_.diagonal().array().log().sum();
+  double log_prior = -root_.diagonal().array().log().sum();
+  if (input_.shape.box())  // the heading counts by itself
+    log_prior -= 0.5 * std::log(shape_information_[0] * out->shape.yaw_variance);
   double cost = 0.5 * out->prior_distance;
   for (size_t side = 0; side < 4; ++side)
     if (out->used[side])
@@ -295,7 +306,7 @@ bool CylinderProblem::ReadEvidence(const std::array<std::vector<double>, 4>& edg
   return std::isfinite(out->log_evidence);
 }
 
-FitResult CylinderProblem::Read(const Vector8d& y, const Matrix8d& covariance, double cost) const {
+FitResult CylinderProblem::Read(const Vector9d& y, const Matrix9d& covariance, double cost) const {
   FitResult out;
   out.posterior.mean = y.head<6>();
   out.posterior.covariance = covariance.topLeftCorner<6, 6>();
@@ -304,6 +315,12 @@ FitResult CylinderProblem::Read(const Vector8d& y, const Matrix8d& covariance, d
   if (config_.estimate_shape) out.shape.variance = covariance.diagonal().tail<2>();
   out.cost = cost;
   out.prior_distance = (root_ * (out.posterior.mean - input_.prior.mean)).squaredNorm();
+  if (input_.shape.box()) {
+    out.shape.yaw = y[kYawAt];
+    out.shape.yaw_variance = covariance(kYawAt, kYawAt);
+    const double turn = y[kYawAt] - input_.shape.yaw;
+    out.prior_distance += shape_information_[0] * turn * turn;
+  }
   std::array<std::vector<double>, 4> edges;
   for (size_t side = 0; side < 4; ++side) edges[side] = EdgeResiduals(side, y);
   ReadSides(edges, &out);

@@ -10,7 +10,7 @@
 
 namespace chase::perception {
 
-using Matrix8d = Eigen::Matrix<double, 8, 8>;
+using Matrix9d = Eigen::Matrix<double, 9, 9>;
 
 /// Gauss and Newton's equations around one y: information * step = -gradient. N: unknowns.
 template <int N>
@@ -21,8 +21,8 @@ struct NormalEquations {
   Eigen::Matrix<double, N, N> information = Eigen::Matrix<double, N, N>::Zero();
 };
 
-/// The least squares problem of one FitInput over y = (p_WT, v_WT, radius, height), of which the
-/// first `unknowns()` are sought: prediction, edges, points, and a position where one is measured.
+/// The least squares problem of one FitInput over y (cylinder_residuals.h), of which the first
+/// `unknowns()` are sought: prediction, edges, points, and a position where one is measured.
 /// Single samples have Cauchy's loss, the prediction has none. Whichever solver is asked, it is
 /// asked this.
 class CylinderProblem {
@@ -31,18 +31,18 @@ class CylinderProblem {
   CylinderProblem(const FitInput& input, const FitConfig& config);
 
   bool ok() const { return ok_; }  ///< the prediction's covariance has a root
-  int unknowns() const { return config_.estimate_shape ? 8 : 6; }
+  int unknowns() const { return config_.estimate_shape ? 9 : input_.shape.box() ? 7 : 6; }
   /// Where nothing was measured: the prediction, the size as it is known.
-  Vector8d Start() const;
+  Vector9d Start() const;
 
   /// Half the robust sum of squares.
-  double Cost(const Vector8d& y) const;
+  double Cost(const Vector9d& y) const;
   /// N: unknowns().
   template <int N>
-  NormalEquations<N> Linearised(const Vector8d& y) const;
+  NormalEquations<N> Linearised(const Vector9d& y) const;
 
-  /// What a solution means. `covariance` of y; where only the first six are sought their block.
-  FitResult Read(const Vector8d& y, const Matrix8d& covariance, double cost) const;
+  /// What a solution means. `covariance` of y; where only some are sought their block.
+  FitResult Read(const Vector9d& y, const Matrix9d& covariance, double cost) const;
 
  private:
   /// One sample of an edge and the pixels that go to one unit there: of the plan angle [rad] for
@@ -54,23 +54,23 @@ class CylinderProblem {
 
   void AddEdges();
   void AddPosition();
-  double Range(const Vector8d& y) const;
-  double EdgeResidual(size_t side, const Edge& edge, double scale, const Vector8d& y,
-                      Vector8d* gradient) const;
-  double SurfaceDistance(const TargetPoint& point, double scale, const Vector8d& y,
-                         Vector8d* gradient) const;
+  double Range(const Vector9d& y) const;
+  double EdgeResidual(size_t side, const Edge& edge, double scale, const Vector9d& y,
+                      Vector9d* gradient) const;
+  double SurfaceDistance(const TargetPoint& point, double scale, const Vector9d& y,
+                         Vector9d* gradient) const;
   template <class Sum>
-  void Evaluate(const Vector8d& y, Sum* sum) const;
+  void Evaluate(const Vector9d& y, Sum* sum) const;
   template <class Sum>
-  void EvaluatePrior(const Vector8d& y, Sum* sum) const;
+  void EvaluatePrior(const Vector9d& y, Sum* sum) const;
   template <class Sum>
-  void EvaluateEdges(const Vector8d& y, Sum* sum) const;
+  void EvaluateEdges(const Vector9d& y, Sum* sum) const;
   template <class Sum>
-  void EvaluatePoints(const Vector8d& y, Sum* sum) const;
+  void EvaluatePoints(const Vector9d& y, Sum* sum) const;
   template <class Sum>
-  void EvaluatePosition(const Vector8d& y, Sum* sum) const;
-  std::vector<double> EdgeResiduals(size_t side, const Vector8d& y) const;
-  std::vector<double> PointResiduals(const Vector8d& y) const;
+  void EvaluatePosition(const Vector9d& y, Sum* sum) const;
+  std::vector<double> EdgeResiduals(size_t side, const Vector9d& y) const;
+  std::vector<double> PointResiduals(const Vector9d& y) const;
   void ReadSides(const std::array<std::vector<double>, 4>& edges, FitResult* out) const;
   bool ReadEvidence(const std::array<std::vector<double>, 4>& edges,
                     const std::vector<double>& points, FitResult* out) const;
@@ -81,10 +81,10 @@ class CylinderProblem {
   double prior_range_ = 1.0;                 // m, from the camera in the plan view
   Matrix6d root_ = Matrix6d::Zero();         // of the prediction's information
   Matrix6d information_ = Matrix6d::Zero();  // of the prediction
-  Eigen::Vector2d shape_information_ = Eigen::Vector2d::Zero();
-  std::array<std::vector<Edge>, 4> edges_;               // by Side, those left out too
-  std::optional<Eigen::Matrix3d> position_information_;  // of the measured position
-  Eigen::Vector3d position_ = Eigen::Vector3d::Zero();   // measured, frame W, m
+  Eigen::Vector3d shape_information_ = Eigen::Vector3d::Zero();  // of yaw, half width, height
+  std::array<std::vector<Edge>, 4> edges_;                       // by Side, those left out too
+  std::optional<Eigen::Matrix3d> position_information_;          // of the measured position
+  Eigen::Vector3d position_ = Eigen::Vector3d::Zero();           // measured, frame W, m
 };
 
 }  // namespace chase::perception

@@ -30,7 +30,9 @@ Finder::Finder(const PerceptionConfig& config)
       detector_(MakeDetector(config.detector, config.fit.edge_sigma_px, config.rig)),
       localiser_(config) {
   const double variance = config.fit.shape_sigma * config.fit.shape_sigma;
-  shape_.sphere = config.target_shape == "sphere";
+  shape_.kind = config.target_shape == "sphere" ? TargetShape::Kind::kSphere
+                : config.target_shape == "box"  ? TargetShape::Kind::kBox
+                                                : TargetShape::Kind::kCylinder;
   shape_.size = {config.target_radius, config.target_height};
   shape_.variance = {variance, variance};
 }

@@ -156,9 +156,7 @@ std::optional<FitResult> Localiser::JoinedReading(FitInput* input) const {
   // Where the range is not known, two opposite sides must give it.
   const bool known = RangeIsKnown(*input);
   Weigh(*input, std::log(1.0 - kSharpTurn), known ? kReadings.size() : kOneHidden, !whole, &all);
-  FitInput turned = *input;
-  turned.prior = AfterASharpTurn(*input);
-  Weigh(turned, std::log(kSharpTurn), kOneHidden, !whole, &all);
+  Weigh(AfterASharpTurn(*input), std::log(kSharpTurn), kOneHidden, !whole, &all);
   all = Refined(std::move(all));
   if (all.empty()) return std::nullopt;
   FitResult fit = Joined(all);

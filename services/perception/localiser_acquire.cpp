@@ -18,7 +18,7 @@ constexpr double kLarger = 1.15, kLargerPx = 3.0;  // times the target's size, a
 bool LargerThanTarget(const FitInput& input, double range) {
   const double px = kLarger * input.camera.rig.focal_px / range;
   const auto& box = input.detection->box;
-  return box.width > 2.0 * px * input.shape.size[0] + kLargerPx ||
+  return box.width > 2.0 * px * input.shape.MostHalfWidth() + kLargerPx ||
          box.height > px * input.shape.size[1] + kLargerPx;
 }
 
@@ -69,7 +69,8 @@ std::optional<FitResult> Localiser::AcquirePartialBySize(FitInput* input) const 
   const double focal = input->camera.rig.focal_px;
   std::vector<double> ranges;
   if (seen(kTop) && seen(kBottom)) ranges.push_back(focal * size[1] / d.box.height);
-  if (d.edged && seen(kLeft) && seen(kRight)) ranges.push_back(focal * 2.0 * size[0] / d.box.width);
+  if (d.edged && seen(kLeft) && seen(kRight))
+    ranges.push_back(focal * 2.0 * input->shape.MeanHalfWidth() / d.box.width);
   for (const double range : ranges) {
     input->prior = Guess(input->camera, d, range, kSizedRange);
     input->points.clear();
@@ -124,7 +125,7 @@ std::optional<FitResult> Localiser::Acquire(const TargetShape& shape, const Came
   };
   if (!detection.p_CT && detection.AnyCut()) return partial();
   const double range = detection.p_CT ? detection.p_CT->norm()
-                                      : camera.rig.focal_px * 2.0 * shape.size[0] /
+                                      : camera.rig.focal_px * 2.0 * shape.MeanHalfWidth() /
                                             std::max(1.0, detection.box.width);
   input.prior = Guess(camera, detection, range, 0.4 * range);
   input.points.clear();

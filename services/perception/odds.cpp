@@ -37,9 +37,9 @@ double LogSides(const FitResult& fit, const FitInput& input, const FitConfig& co
       runs_on = kRunsOnToo;
     }
     if (input.detection->silhouette.samples[side].empty()) continue;
-    const double extent = std::max(
-        2.0,
-        px * (side == kLeft || side == kRight ? 2.0 * input.shape.size[0] : input.shape.size[1]));
+    const double extent =
+        std::max(2.0, px * (side == kLeft || side == kRight ? 2.0 * input.shape.MeanHalfWidth()
+                                                            : input.shape.size[1]));
     if (fit.used[side]) {
       sum -= std::log(sigma * std::sqrt(2.0 * M_PI));
     } else if (fit.edge_px[side] < 0.0) {

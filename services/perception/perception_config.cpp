@@ -141,8 +141,8 @@ std::string StateConfig::Problem() const {
 
 std::string PerceptionConfig::Problem() const {
   return Check()
-      .That(target_shape == "cylinder" || target_shape == "sphere",
-            "target_shape is '" + target_shape + "', must be cylinder or sphere")
+      .That(target_shape == "cylinder" || target_shape == "box" || target_shape == "sphere",
+            "target_shape is '" + target_shape + "', must be cylinder, box or sphere")
       .In("target_radius", target_radius, 0.01, 5)
       .In("target_height", target_height, 0.02, 10)
       .In("max_extrapolation", max_extrapolation, 0, 0.5)

@@ -200,8 +200,8 @@ struct PerceptionConfig {
   template <class V>
   void Visit(V& v) {
     v("rig", rig, "calibration: where the sensors sit, the pinhole camera");
-    v("target_shape", target_shape, "cylinder (upright) or sphere");
-    v("target_radius", target_radius, "of the target, m");
+    v("target_shape", target_shape, "cylinder (upright), box (upright, its base square) or sphere");
+    v("target_radius", target_radius, "of the target; half the width of a box, m");
     v("target_height", target_height, "of the target, m");
     v("detector", detector, "finds the target in the image");
     v("fit", fit, "places it in space");

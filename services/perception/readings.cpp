@@ -19,14 +19,15 @@ bool RangeIsKnown(const FitInput& input) {
   return !input.points.empty() || RangeSigma(input) < kKnownRange;
 }
 
-TargetGaussian AfterASharpTurn(const FitInput& input) {
+FitInput AfterASharpTurn(const FitInput& input) {
   Eigen::Vector2d sight = (input.prior.position() - input.camera.p_WC).head<2>().normalized();
   Eigen::Matrix2d across = Eigen::Matrix2d::Identity();
   if (input.points.empty()) across -= sight * sight.transpose();
-  TargetGaussian g = input.prior;
-  g.covariance.topLeftCorner<2, 2>() += kTurnShift * kTurnShift * across;
-  g.covariance.block<2, 2>(3, 3) += kTurnSpeed * kTurnSpeed * across;
-  return g;
+  FitInput turned = input;
+  turned.prior.covariance.topLeftCorner<2, 2>() += kTurnShift * kTurnShift * across;
+  turned.prior.covariance.block<2, 2>(3, 3) += kTurnSpeed * kTurnSpeed * across;
+  turned.shape.yaw_variance = TargetShape::kAnyYaw;
+  return turned;
 }
 
 std::function<bool(const Sides&)> Sensible(const FitInput& input) {

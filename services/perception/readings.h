@@ -35,9 +35,9 @@ bool RangeIsKnown(const FitInput& input);
 /// expected. All may hold while the range is not known.
 std::function<bool(const Sides&)> Sensible(const FitInput& input);
 
-/// The same prediction of a target that has just braked, turned or been pushed; across the line of
-/// sight only unless points tell the range, since the apparent size alone would take every pixel
-/// that is hidden for a leap.
-TargetGaussian AfterASharpTurn(const FitInput& input);
+/// The same with the prediction of a target that has just braked, turned or been pushed; across the
+/// line of sight only unless points tell the range, since the apparent size alone would take every
+/// pixel that is hidden for a leap.
+FitInput AfterASharpTurn(const FitInput& input);
 
 }  // namespace chase::perception

@@ -22,8 +22,8 @@ struct ReducedProblem {
 
   const CylinderProblem& problem;
 
-  Vector8d All(const double* y) const {
-    Vector8d all = problem.Start();
+  Vector9d All(const double* y) const {
+    Vector9d all = problem.Start();
     all.head<N>() = Eigen::Map<const Eigen::Matrix<double, N, 1>>(y);
     return all;
   }

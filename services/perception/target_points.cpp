@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "services/perception/cylinder_residuals.h"
+
 namespace chase::perception {
 
 namespace {
@@ -16,12 +18,10 @@ constexpr double kMostOfIt = 0.8;   // likewise of a target that is placed well
 constexpr double kBehind = 0.25;    // m behind the target where such a ray ends at least
 
 double SurfaceDistance(const TargetPoint& point, const FitInput& input) {
-  const Eigen::Vector3d q =
-      point.p_W - (input.prior.position() - point.age * input.prior.velocity());
-  if (input.shape.sphere) return q.norm() - input.shape.size[0];
-  const double side = q.head<2>().norm() - input.shape.size[0];
-  const double cap = std::abs(q.z()) - 0.5 * input.shape.size[1];
-  return side > 0.0 && cap > 0.0 ? std::hypot(side, cap) : std::max(side, cap);
+  Vector9d y;
+  y << input.prior.mean, input.shape.yaw, input.shape.size;
+  if (input.shape.sphere()) return SpherePointResidual{point.p_W, point.age, 1.0}(y, nullptr);
+  return PointResidual{point.p_W, input.shape.box(), point.age, 1.0}(y, nullptr);
 }
 
 /// True when the lidar looked through this share of where the target should be, and hit something
@@ -36,7 +36,7 @@ bool SawThrough(const TargetPoint& point, const FitInput& input, const TargetGau
   const double above = point.p_WL.z() + along / length * ray.z() - center.z();
   return beside < core * input.shape.size[0] &&
          std::abs(above) < core * 0.5 * input.shape.size[1] &&
-         length > along + input.shape.size[0] + kBehind + 2.0 * range_sigma;
+         length > along + input.shape.MostHalfWidth() + kBehind + 2.0 * range_sigma;
 }
 
 }  // namespace

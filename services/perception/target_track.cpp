@@ -10,6 +10,7 @@ namespace chase::perception {
 namespace {
 
 constexpr int kProvenHits = 20;
+constexpr double kTurnDensity = 0.2;  // rad^2/s: 2 rad/s, as into a corner, for 0.05 s
 
 }  // namespace
 
@@ -29,6 +30,7 @@ void TargetTrack::Predict(double to, const MotionConfig& config) {
   if (misses > 0) state.mean[5] = 0.0;  // slopes end, and what was measured of one may be noise
   state.mean = F * state.mean;
   state.covariance = F * state.covariance * F.transpose() + Q;
+  shape.yaw_variance = std::min(TargetShape::kAnyYaw, shape.yaw_variance + kTurnDensity * dt);
   t = to;
   const double most = config.ground_sigma * config.ground_sigma;  // it stays on the ground
   if (misses == 0 || state.covariance(2, 2) < most) return;

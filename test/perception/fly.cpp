@@ -17,7 +17,7 @@ constexpr double kSweepDelay = 0.005;  // s from a sweep's end to its arrival
 
 perception::PerceptionConfig ConfigFor(const world::Scenario& scenario) {
   perception::PerceptionConfig config;
-  config.target_shape = scenario.target.shape == "sphere" ? "sphere" : "cylinder";
+  config.target_shape = scenario.target.shape;
   config.target_radius = scenario.target.radius;
   config.target_height = scenario.target.height;
   return config;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <memory>
 #include <random>
 
@@ -37,10 +38,10 @@ class Scene {
   }
 
   double Uniform() { return std::uniform_real_distribution<double>(-1.0, 1.0)(random_); }
-  Vector8d Near() {
-    Vector8d y;
-    y << input.prior.mean, input.shape.size;
-    for (int i = 0; i < 8; ++i) y[i] += (i < 6 ? 0.1 : 0.02) * Uniform();
+  Vector9d Near() {
+    Vector9d y;
+    y << input.prior.mean, input.shape.yaw, input.shape.size;
+    for (int i = 0; i < 9; ++i) y[i] += (i < 7 ? 0.1 : 0.02) * Uniform();
     return y;
   }
 
@@ -70,20 +71,20 @@ class Scene {
 };
 
 template <class Function>
-Vector8d Differences(const Function& f, const Vector8d& y) {
-  Vector8d out;
-  for (int i = 0; i < 8; ++i) {
-    const Vector8d step = kStep * Vector8d::Unit(i);
+Vector9d Differences(const Function& f, const Vector9d& y) {
+  Vector9d out;
+  for (int i = 0; i < 9; ++i) {
+    const Vector9d step = kStep * Vector9d::Unit(i);
     out[i] = (f(y + step) - f(y - step)) / (2.0 * kStep);
   }
   return out;
 }
 
 template <class Residual>
-void ExpectGradient(const Residual& residual, const Vector8d& y) {
-  Vector8d gradient;
+void ExpectGradient(const Residual& residual, const Vector9d& y) {
+  Vector9d gradient;
   EXPECT_EQ(residual(y, &gradient), residual(y, nullptr));
-  const auto f = [&](const Vector8d& at) { return residual(at, nullptr); };
+  const auto f = [&](const Vector9d& at) { return residual(at, nullptr); };
   EXPECT_LT((gradient - Differences(f, y)).norm(), 1e-5 * (1.0 + gradient.norm()))
       << gradient.transpose() << "\n"
       << Differences(f, y).transpose();
@@ -92,65 +93,134 @@ void ExpectGradient(const Residual& residual, const Vector8d& y) {
 TEST(PerceptionSolver, GradientsOfTheResidualsAreTheirDifferences) {
   Scene scene(1);
   for (int i = 0; i < 2000; ++i) {
-    const Vector8d y = scene.Near();
+    const Vector9d y = scene.Near();
     const double angle = 0.1 * scene.Uniform(), sign = i % 2 ? 1.0 : -1.0;
     const PlanRay ray{{0.0, 0.0, y[2] + scene.Uniform()},
                       {std::cos(angle), std::sin(angle)},
                       0.5 * scene.Uniform()};
-    ExpectGradient(SideResidual{ray, sign, 7.0}, y);
-    ExpectGradient(CapResidual{ray, sign, 7.0}, y);
     const Vector3d off(0.3 * scene.Uniform(), 0.3 * scene.Uniform(), 0.4 * scene.Uniform());
-    ExpectGradient(PointResidual{y.head<3>() + off, 0.2 * scene.Uniform(), 40.0}, y);
+    for (const bool square : {false, true}) {
+      Vector9d turned = y;
+      turned[kYawAt] = 3.0 * scene.Uniform();
+      ExpectGradient(SideResidual{ray, square, sign, 7.0}, turned);
+      ExpectGradient(CapResidual{ray, square, sign, 7.0}, turned);
+      ExpectGradient(PointResidual{y.head<3>() + off, square, 0.2 * scene.Uniform(), 40.0}, turned);
+    }
     ExpectGradient(TangentResidual{ray, i % 4 < 2, sign, 7.0}, y);
     ExpectGradient(SpherePointResidual{y.head<3>() + off, 0.2 * scene.Uniform(), 40.0}, y);
   }
 }
 
-// Where lines of sight touch a sphere: the edge of what is hit in a dense image of it.
+using Hits = std::function<bool(const Vector3d& ray)>;
+
+/// The outline of what lines of sight from the camera hit, as in a dense image; within the target's
+/// expected box.
+void OutlineOf(const Hits& hits, const Vector3d& center, Scene* scene) {
+  const Camera& camera = scene->input.camera;
+  const auto edge = [&](double u, double v, double du, double dv) {
+    double in = 0.0, out = 200.0;
+    for (int i = 0; i < 60; ++i) {
+      const double at = 0.5 * (in + out);
+      (hits(camera.Ray(u + at * du, v + at * dv)) ? in : out) = at;
+    }
+    return Eigen::Vector2d(u + in * du, v + in * dv);
+  };
+  const Eigen::Vector2d middle = *camera.Project(center);
+  const auto box = *ProjectTarget(camera, center, scene->input.shape);
+  scene->outline.box = box;
+  for (auto& samples : scene->outline.silhouette.samples) samples.clear();
+  for (int i = -3; i <= 3; ++i) {
+    const double v = middle.y() + 0.08 * i * box.height, u = middle.x() + 0.08 * i * box.width;
+    auto& samples = scene->outline.silhouette.samples;
+    samples[kLeft].push_back(edge(middle.x(), v, -1, 0));
+    samples[kRight].push_back(edge(middle.x(), v, 1, 0));
+    samples[kTop].push_back(edge(u, middle.y(), 0, -1));
+    samples[kBottom].push_back(edge(u, middle.y(), 0, 1));
+    for (const size_t side : {kLeft, kRight, kTop, kBottom}) {
+      const auto& px = samples[side].back();
+      const double slack = 0.02 * box.width;  // its rim is a polygon of 16 sides
+      EXPECT_GT(px.x(), box.x - slack);
+      EXPECT_LT(px.x(), box.x + box.width + slack);
+      EXPECT_GT(px.y(), box.y - slack);
+      EXPECT_LT(px.y(), box.y + box.height + slack);
+    }
+  }
+}
+
 TEST(PerceptionSolver, ASphereIsPlacedByItsOutline) {
   constexpr double kRadius = 0.2;
   for (unsigned seed = 1; seed <= 50; ++seed) {
     Scene scene(seed);
     const Vector3d center = scene.input.prior.position();
-    scene.input.shape = {true, {kRadius, 2.0 * kRadius}, Eigen::Vector2d::Zero()};
+    scene.input.shape = {TargetShape::Kind::kSphere, {kRadius, 2.0 * kRadius}};
     scene.input.points.clear();
-    const Camera& camera = scene.input.camera;
-    const auto hits = [&](double u, double v) {
-      const Vector3d ray = camera.Ray(u, v).normalized(), to = center - camera.p_WC;
-      return (to - to.dot(ray) * ray).norm() < kRadius;
-    };
-    const auto edge = [&](double u, double v, double du, double dv) {
-      double in = 0.0, out = 200.0;
-      for (int i = 0; i < 60; ++i)
-        (hits(u + 0.5 * (in + out) * du, v + 0.5 * (in + out) * dv) ? in : out) = 0.5 * (in + out);
-      return Eigen::Vector2d(u + in * du, v + in * dv);
-    };
-    const Eigen::Vector2d middle = *camera.Project(center);
-    const auto box = *ProjectTarget(camera, center, scene.input.shape);
-    scene.outline.box = box;
-    for (auto& samples : scene.outline.silhouette.samples) samples.clear();
-    for (int i = -3; i <= 3; ++i) {
-      const double v = middle.y() + 0.08 * i * box.height, u = middle.x() + 0.08 * i * box.width;
-      auto& samples = scene.outline.silhouette.samples;
-      samples[kLeft].push_back(edge(middle.x(), v, -1, 0));
-      samples[kRight].push_back(edge(middle.x(), v, 1, 0));
-      samples[kTop].push_back(edge(u, middle.y(), 0, -1));
-      samples[kBottom].push_back(edge(u, middle.y(), 0, 1));
-      for (const size_t side : {kLeft, kRight, kTop, kBottom}) {
-        const auto& px = samples[side].back();
-        const double slack = 0.02 * box.width;  // its rim is a polygon of 16 sides
-        EXPECT_GT(px.x(), box.x - slack);
-        EXPECT_LT(px.x(), box.x + box.width + slack);
-        EXPECT_GT(px.y(), box.y - slack);
-        EXPECT_LT(px.y(), box.y + box.height + slack);
-      }
-    }
+    const Vector3d to = center - scene.input.camera.p_WC;
+    OutlineOf(
+        [&](const Vector3d& sight) {
+          const Vector3d ray = sight.normalized();
+          return (to - to.dot(ray) * ray).norm() < kRadius;
+        },
+        center, &scene);
     scene.input.prior.mean.head<3>() += Vector3d(0.2, 0.1, -0.1);
     scene.input.prior.covariance = 10.0 * Matrix6d::Identity();
     EXPECT_LT((FitCylinder(scene.input, {}).posterior.position() - center).norm(), 2e-3);
-    scene.input.shape.sphere = false;
+    scene.input.shape.kind = TargetShape::Kind::kCylinder;
     EXPECT_GT((FitCylinder(scene.input, {}).posterior.position() - center).norm(), 0.1);
   }
+}
+
+/// An upright box on a square, turned.
+struct TurnedBox {
+  Vector3d center, half;
+  double yaw;
+
+  Vector3d Turned(const Vector3d& v) const {
+    return Eigen::AngleAxisd(-yaw, Vector3d::UnitZ()) * v;
+  }
+  /// Distance along the ray from p to it, in rays; negative where it misses.
+  double Hit(const Vector3d& p, const Vector3d& ray) const {
+    const Vector3d from = Turned(p - center), d = Turned(ray);
+    const Eigen::Array3d a = (-half - from).cwiseQuotient(d), b = (half - from).cwiseQuotient(d);
+    const double in = a.min(b).maxCoeff(), out = a.max(b).minCoeff();
+    return in < out ? in : -1.0;
+  }
+};
+
+// Whichever way it is turned, of which nothing is known: by its outline and what LiDAR hits of it.
+TEST(PerceptionSolver, ABoxIsPlacedHoweverItIsTurned) {
+  constexpr double kHalf = 0.2, kTall = 0.6;
+  double worst = 0.0, worst_round = 0.0;
+  for (unsigned seed = 1; seed <= 100; ++seed) {
+    Scene scene(seed);
+    const TurnedBox box{
+        scene.input.prior.position(), {kHalf, kHalf, 0.5 * kTall}, M_PI * scene.Uniform()};
+    const Vector3d p_WC = scene.input.camera.p_WC;
+    scene.input.shape = {TargetShape::Kind::kBox, {kHalf, kTall}};
+    scene.input.shape.yaw = box.yaw;  // for the expected box alone
+    OutlineOf([&](const Vector3d& ray) { return box.Hit(p_WC, ray) > 0.0; }, box.center, &scene);
+    scene.input.shape.yaw = M_PI * scene.Uniform();
+    scene.input.points.clear();
+    for (int i = -40; i <= 40; ++i)
+      for (const double up : {-0.1, 0.1}) {
+        const Vector3d aim = box.center + Vector3d(0.0, 0.01 * i, up) - p_WC;
+        const double t = box.Hit(p_WC, aim);
+        const Vector3d p = p_WC + t * aim;
+        if (t > 0.0) scene.input.points.push_back({p, p_WC, 0.0, (p - p_WC).norm()});
+      }
+    scene.input.prior.mean.head<3>() += Vector3d(0.1, 0.1, -0.1);
+    scene.input.prior.covariance = 10.0 * Matrix6d::Identity();
+    const auto fit = QuickFit(scene.input, {});
+    ASSERT_TRUE(fit.ok) << "seed " << seed;
+    worst = std::max(worst, (fit.posterior.position() - box.center).norm());
+    const double turn = fit.shape.yaw - box.yaw;
+    EXPECT_LT(std::abs(std::remainder(turn, 0.5 * M_PI)), 0.02) << "seed " << seed;
+    scene.input.shape.kind = TargetShape::Kind::kCylinder;
+    scene.input.shape.size[0] = scene.input.shape.MeanHalfWidth() * 4.0 / M_PI;
+    const Vector3d round = QuickFit(scene.input, {}).posterior.position() - box.center;
+    worst_round = std::max(worst_round, round.head<2>().norm());
+  }
+  EXPECT_LT(worst, 0.01);
+  EXPECT_GT(worst_round, 0.04);
 }
 
 TEST(PerceptionSolver, GradientOfTheProblemIsItsDifference) {
@@ -162,12 +232,13 @@ TEST(PerceptionSolver, GradientOfTheProblemIsItsDifference) {
       scene.outline.p_CT = Vector3d(0.1, 0.2, 3.0 + scene.Uniform());
       scene.outline.p_CT_covariance = 0.01 * Eigen::Matrix3d::Identity();
     }
+    if (seed % 3 == 0) scene.input.shape.kind = TargetShape::Kind::kBox;
     const CylinderProblem problem(scene.input, config);
     ASSERT_TRUE(problem.ok());
-    const Vector8d y = scene.Near();
-    const auto normal = problem.Linearised<8>(y);
+    const Vector9d y = scene.Near();
+    const auto normal = problem.Linearised<9>(y);
     EXPECT_NEAR(normal.cost, problem.Cost(y), 1e-9 * normal.cost) << "seed " << seed;
-    const Vector8d d = Differences([&](const Vector8d& at) { return problem.Cost(at); }, y);
+    const Vector9d d = Differences([&](const Vector9d& at) { return problem.Cost(at); }, y);
     EXPECT_LT((normal.gradient - d).norm(), 1e-5 * (1.0 + d.norm())) << "seed " << seed;
     const auto six = problem.Linearised<6>(y);
     EXPECT_LT((six.gradient - normal.gradient.head<6>()).norm(), 1e-9 * (1.0 + d.norm()));
@@ -180,7 +251,7 @@ template <class Residual>
 struct OverY {
   Residual residual;
   bool operator()(const double* y, double* r) const {
-    *r = residual(Eigen::Map<const Vector8d>(y), nullptr);
+    *r = residual(Eigen::Map<const Vector9d>(y), nullptr);
     return true;
   }
 };
@@ -189,13 +260,13 @@ struct OverY {
 class Reference {
  public:
   Reference(const Scene& scene, const FitConfig& config) : input_(scene.input), config_(config) {
-    y << input_.prior.mean, input_.shape.size;
+    y << input_.prior.mean, input_.shape.yaw, input_.shape.size;
     AddPrior();
     for (size_t side = 0; side < 4; ++side)
       for (const auto& px : scene.outline.silhouette.samples[side]) AddEdge(side, px);
     for (const auto& p : input_.points)
-      Add(PointResidual{p.p_W, p.age, 1.0 / config.lidar_sigma}, config.lidar_weight,
-          input_.points.size());
+      Add(PointResidual{p.p_W, input_.shape.box(), p.age, 1.0 / config.lidar_sigma},
+          config.lidar_weight, input_.points.size());
     ceres::Solver::Options options;
     options.linear_solver_type = ceres::DENSE_QR;
     options.max_num_iterations = 200;
@@ -204,34 +275,35 @@ class Reference {
     ceres::Solve(options, &problem_, &summary_);
   }
   double cost() const { return summary_.final_cost; }
-  Matrix8d Covariance() {
+  Matrix9d Covariance() {
     ceres::Covariance::Options options;
     options.algorithm_type = ceres::DENSE_SVD;
     ceres::Covariance covariance(options);
     const std::vector<const double*> blocks = {y.data()};
-    Matrix8d C = Matrix8d::Zero();
+    Matrix9d C = Matrix9d::Zero();
     if (covariance.Compute(blocks, &problem_))
       covariance.GetCovarianceBlock(y.data(), y.data(), C.data());
     return C;
   }
-  Vector8d y;
+  Vector9d y;
 
  private:
   struct Prior {
-    Vector8d mean;
-    Matrix8d root;
+    Vector9d mean;
+    Matrix9d root;
     bool operator()(const double* y, double* r) const {
-      Eigen::Map<Vector8d>{r} = root * (Eigen::Map<const Vector8d>(y) - mean);
+      Eigen::Map<Vector9d>{r} = root * (Eigen::Map<const Vector9d>(y) - mean);
       return true;
     }
   };
   void AddPrior() {
-    Matrix8d covariance = Matrix8d::Zero();
+    Matrix9d covariance = Matrix9d::Zero();
     covariance.topLeftCorner<6, 6>() = input_.prior.covariance;
+    covariance(kYawAt, kYawAt) = input_.shape.yaw_variance;
     covariance.diagonal().tail<2>() = input_.shape.variance;
-    const Matrix8d root = Eigen::LLT<Matrix8d>(covariance).matrixL().solve(Matrix8d::Identity());
+    const Matrix9d root = Eigen::LLT<Matrix9d>(covariance).matrixL().solve(Matrix9d::Identity());
     problem_.AddResidualBlock(
-        new ceres::NumericDiffCostFunction<Prior, ceres::CENTRAL, 8, 8>(new Prior{y, root}),
+        new ceres::NumericDiffCostFunction<Prior, ceres::CENTRAL, 9, 9>(new Prior{y, root}),
         nullptr, y.data());
   }
   template <class Residual>
@@ -239,7 +311,7 @@ class Reference {
     using Function = OverY<Residual>;
     const double share = std::min(1.0, weight / static_cast<double>(samples));
     problem_.AddResidualBlock(
-        new ceres::NumericDiffCostFunction<Function, ceres::CENTRAL, 1, 8>(new Function{residual}),
+        new ceres::NumericDiffCostFunction<Function, ceres::CENTRAL, 1, 9>(new Function{residual}),
         new ceres::ScaledLoss(new ceres::CauchyLoss(2.0), share, ceres::TAKE_OWNERSHIP), y.data());
   }
   PlanRay Ray(const Eigen::Vector2d& px) const {
@@ -250,16 +322,17 @@ class Reference {
   void AddEdge(size_t side, const Eigen::Vector2d& px) {
     const double range = (input_.prior.position() - input_.camera.p_WC).head<2>().norm();
     const double scale = 1.0 / (input_.detection->silhouette.sigma_px * range);
-    const bool upright = side == kLeft || side == kRight;
+    const bool upright = side == kLeft || side == kRight, square = input_.shape.box();
     const Eigen::Vector2d half = upright ? Eigen::Vector2d(0.5, 0) : Eigen::Vector2d(0, 0.5);
     const PlanRay a = Ray(px - half), b = Ray(px + half);
     const double sign = side == kRight || side == kTop ? 1.0 : -1.0;
     const double turn =
         std::asin(a.direction.x() * b.direction.y() - a.direction.y() * b.direction.x());
     if (upright)
-      Add(SideResidual{Ray(px), sign, scale / std::abs(turn)}, config_.edge_weight, 8);
+      Add(SideResidual{Ray(px), square, sign, scale / std::abs(turn)}, config_.edge_weight, 8);
     else
-      Add(CapResidual{Ray(px), sign, scale / std::abs(b.slope - a.slope)}, config_.edge_weight, 8);
+      Add(CapResidual{Ray(px), square, sign, scale / std::abs(b.slope - a.slope)},
+          config_.edge_weight, 8);
   }
 
   const FitInput& input_;
@@ -270,14 +343,14 @@ class Reference {
 
 void ExpectSame(const FitResult& fit, Reference* reference) {
   ASSERT_TRUE(fit.ok);
-  const Matrix8d C = reference->Covariance();
-  Vector8d off = -reference->y;
+  const Matrix9d C = reference->Covariance();
+  Vector9d off = -reference->y;
   off.head<6>() += fit.posterior.mean;
   off.tail<2>() += fit.shape.size;
   EXPECT_NEAR(fit.cost, reference->cost(), 1e-4 * reference->cost());
   EXPECT_LT(std::sqrt(off.dot(C.ldlt().solve(off))), 0.05) << "standard deviations";
   EXPECT_LT((fit.posterior.covariance - C.topLeftCorner<6, 6>()).norm(), 0.01 * C.norm());
-  EXPECT_NEAR(fit.shape.variance[1], C(7, 7), 0.01 * C(7, 7));
+  EXPECT_NEAR(fit.shape.variance[1], C(kHeightAt, kHeightAt), 0.01 * C(kHeightAt, kHeightAt));
 }
 
 TEST(PerceptionSolver, BothSolversFindWhatCeresFindsBlockByBlock) {
