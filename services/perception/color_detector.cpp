@@ -117,7 +117,7 @@ std::vector<Detection> ColorDetector::Detect(const cv::Mat& bgr) const {
     found.resize(static_cast<size_t>(shape_.max_candidates));
   for (auto& d : found) {
     d.silhouette = TraceSilhouette(bgr, d.mask, d.mask_box, d.cut);
-    d.silhouette.sigma_px = edge_sigma_px_;
+    d.silhouette.sigma_px = std::hypot(edge_sigma_px_, shape_.outline_sigma * d.box.width);
   }
   AddPieces(bgr, score, &found);
   return found;

@@ -17,6 +17,7 @@ namespace chase::perception {
 
 namespace {
 
+constexpr double kPixel = 0.5;                         // standard deviation of an edge, px
 constexpr double kMostInset = 0.2, kInsetStep = 0.01;  // shares of the width
 
 /// A mask has two values, but for a few pixels along the marked outline; a photo has many.
@@ -87,14 +88,30 @@ double Median(std::vector<double> values) {
   return 0.5 * (values[(values.size() - 1) / 2] + values[values.size() / 2]);
 }
 
-/// Aspect and fill of the blobs that the masks mark, as medians: a blob may hold more than the
-/// target. Gives the pairs
-/// that do not tell them, and why.
+/// How far the sides of a blob depart from those of an upright box or cylinder, or of a sphere,
+/// whichever is nearer: root of the mean square, share of its width, less what pixels make of it.
+double Departure(const Detection& d) {
+  const double middle = d.box.x + 0.5 * d.box.width, half = 0.5 * d.box.width;
+  const double level = d.box.y + 0.5 * d.box.height;
+  double straight = 0.0, round = 0.0, n = 0.0;
+  for (const Side side : {kLeft, kRight})
+    for (const auto& px : d.silhouette.samples[side]) {
+      const double reach = std::abs(px.x() - middle), up = 2.0 * (px.y() - level) / d.box.height;
+      straight += std::pow(reach - half, 2);
+      round += std::pow(reach - half * std::sqrt(std::max(0.0, 1.0 - up * up)), 2);
+      ++n;
+    }
+  const double square = std::min(straight, round) / std::max(1.0, n) - kPixel * kPixel;
+  return std::sqrt(std::max(0.0, square)) / d.box.width;
+}
+
+/// Aspect, fill and departure of the blobs that the masks mark, as medians: a blob may hold more
+/// than the target. Gives the pairs that do not tell them, and why.
 std::vector<std::string> LearnShape(const std::vector<cv::Mat>& images,
                                     const std::vector<cv::Mat>& masks, DetectorConfig* config) {
   const ColorDetector detector(*config, 1.0);
   std::vector<std::string> shapeless;
-  std::vector<double> aspects, fills;
+  std::vector<double> aspects, fills, departures;
   for (size_t i = 0; i < images.size(); ++i) {
     const auto found = detector.Detect(images[i]);
     const Detection* marked = MarkedBlob(found, masks[i]);
@@ -105,10 +122,12 @@ std::vector<std::string> LearnShape(const std::vector<cv::Mat>& images,
     }
     aspects.push_back(marked->box.width / marked->box.height);
     fills.push_back(cv::countNonZero(marked->mask) / marked->box.area());
+    departures.push_back(Departure(*marked));
   }
   if (aspects.empty()) RefuseAll(shapeless);
   config->shape.aspect = Median(aspects);
   config->shape.fill = Median(fills);
+  config->shape.outline_sigma = Median(departures);
   return shapeless;
 }
 

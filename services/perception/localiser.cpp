@@ -54,7 +54,7 @@ bool Localiser::EdgesAgree(const FitResult& fit, const FitInput& input) const {
     if (fit.used[side] && std::abs(fit.edge_px[side]) > gate) return false;
     const bool left_out =
         !input.use_side[side] && !input.detection->silhouette.samples[side].empty();
-    if (left_out && std::abs(fit.edge_px[side]) < kHiddenBy) return false;
+    if (left_out && std::abs(fit.edge_px[side]) < HiddenBy(input)) return false;
     // Where the range is not known, what goes on beyond a side is a larger thing.
     if (left_out && fit.edge_px[side] > 0.0 && !RangeIsKnown(input)) return false;
   }
@@ -164,6 +164,17 @@ std::optional<FitResult> Localiser::JoinedReading(FitInput* input) const {
   return fit;
 }
 
+std::optional<FitResult> Localiser::DisplacedReading(
+    const FitInput& input, const std::vector<TargetPoint>& cluster) const {
+  auto moved = AtRangeOf(cluster, input);
+  if (!moved) return std::nullopt;
+  moved->points = PointsOnTarget(*moved, cluster, config_.fit.lidar_gate);
+  if (moved->points.size() < kSurelyHit) return std::nullopt;
+  auto fit = JoinedReading(&*moved);
+  if (fit) fit->log_odds += std::log(kSharpTurn);
+  return fit;
+}
+
 std::optional<FitResult> Localiser::Correct(const FitInput& predicted,
                                             const Clusters& clusters) const {
   if (!Visible(predicted)) return std::nullopt;
@@ -178,9 +189,12 @@ std::optional<FitResult> Localiser::Correct(const FitInput& predicted,
   int tried = 0;
   for (const auto& cluster : clusters) {
     input.points = PointsOnTarget(predicted, cluster, gate);
-    if (input.points.empty()) continue;
-    if (++tried > kMostClusters) break;
-    auto fit = JoinedReading(&input);
+    std::optional<FitResult> fit;
+    if (!input.points.empty()) {
+      if (++tried > kMostClusters) break;
+      fit = JoinedReading(&input);
+    }
+    if (!fit || fit->log_odds < 0.0) fit = DisplacedReading(input, cluster);
     if (!fit) continue;
     const double score = fit->log_odds - LogUnexplained(all - static_cast<double>(cluster.size()));
     if (best && score <= best_score) continue;

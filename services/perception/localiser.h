@@ -38,6 +38,9 @@ class Localiser {
   std::vector<Hypothesis> Refined(std::vector<Hypothesis> quick) const;
   /// All hypotheses that agree with the prediction, weighed and joined into one Gaussian.
   std::optional<FitResult> JoinedReading(FitInput* input) const;
+  /// Where the prediction erred along the line of sight, as the points of a cluster tell.
+  std::optional<FitResult> DisplacedReading(const FitInput& input,
+                                            const std::vector<TargetPoint>& cluster) const;
   std::optional<FitResult> AcquirePartial(FitInput* input, const Clusters& clusters) const;
   std::optional<FitResult> AcquirePartialBySize(FitInput* input) const;
   static const Hypothesis& Best(const std::vector<Hypothesis>& all);

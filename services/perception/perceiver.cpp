@@ -247,7 +247,8 @@ TargetEstimate Perceiver::Report(double t, const std::optional<View>& view,
   out.v_WT = track_->state.velocity();
   if (state_ == TargetState::kLost) return out;
   const auto pose = view ? view->pose : finder_.poses().Nearest(t, 1e9).value_or(PoseSample{});
-  out.covariance = PublishedCovariance(*track_, pose, config_.motion);
+  out.covariance =
+      PublishedCovariance(*track_, pose, config_.detector.shape.outline_sigma, config_.motion);
   return out;
 }
 

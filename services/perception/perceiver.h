@@ -17,6 +17,9 @@ enum class TargetState { kSearching, kTracking, kOccluded, kLost };
 /// Why a detection was not taken for a new target, worst first.
 enum class Refusal { kTooSmall, kWrongShape, kNoRange, kContradicted };
 inline constexpr size_t kRefusals = 4;
+inline constexpr std::array<const char*, kRefusals> kWhyRefused = {
+    "too small", "of another aspect, fill or colour", "no LiDAR, and the size tells no range",
+    "outline, size and LiDAR contradict each other"};
 /// Detections by Refusal.
 using Refused = std::array<int64_t, kRefusals>;
 

@@ -58,6 +58,7 @@ std::string ShapeConfig::Problem() const {
       .In("fill", fill, 0.05, 1)
       .In("fill_tolerance", fill_tolerance, 0.01, 10)
       .In("inset", inset, 0, 0.4)
+      .In("outline_sigma", outline_sigma, 0, 0.5)
       .In("min_area_px", min_area_px, 4, 1e6)
       .In("min_score", min_score, 0, 1)
       .In("max_candidates", max_candidates, 1, 100)

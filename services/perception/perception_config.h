@@ -33,7 +33,7 @@ struct ColorConfig {
 struct ShapeConfig {
   double aspect = 0.57, aspect_tolerance = 0.35;
   double fill = 0.93, fill_tolerance = 0.2;
-  double inset = 0.0;
+  double inset = 0.0, outline_sigma = 0.0;
   double min_area_px = 20.0, min_score = 0.0;
   int max_candidates = 16;
 
@@ -44,6 +44,9 @@ struct ShapeConfig {
     v("fill", fill, "share of its box that the blob fills");
     v("fill_tolerance", fill_tolerance, "one standard deviation");
     v("inset", inset, "the target lies so far inside the colour's outline, share of its width");
+    v("outline_sigma", outline_sigma,
+      "its sides depart so far from the model's, as a cone's from a cylinder's, in every frame "
+      "alike: one standard deviation, share of its width");
     v("min_area_px", min_area_px, "smaller blobs are noise, px^2");
     v("min_score", min_score, "candidates below are not looked at, 0 to 1");
     v("max_candidates", max_candidates, "the best so many are looked at");
@@ -135,7 +138,7 @@ struct FitConfig {
 
 /// Constant velocity with white acceleration, and the honesty of what is published.
 struct MotionConfig {
-  double acceleration_density = 0.012, hidden_density = 0.5, vertical_density = 0.02;
+  double acceleration_density = 0.12, hidden_density = 0.5, vertical_density = 0.02;
   double initial_speed_sigma = 1.2, initial_vertical_speed_sigma = 0.1;
   double max_speed = 5.0, hidden_time = 3.0, ground_sigma = 0.15;
   double floor_sigma = 0.003, pose_sigma = 0.005, tilt_sigma_deg = 0.35, heading_sigma_deg = 0.12;

@@ -52,13 +52,10 @@ int64_t PerceptionNode::Origin(int64_t utime) {
 
 /// Why nothing was acquired, with counts since the start; empty when nothing was refused.
 std::string PerceptionNode::Reasons() const {
-  static constexpr std::array<const char*, kRefusals> kWhy = {
-      "too small", "of another aspect, fill or colour", "no LiDAR, and the size tells no range",
-      "outline, size and LiDAR contradict each other"};
   std::string text;
   for (size_t i = 0; i < kRefusals; ++i)
     if (refused_[i] > 0)
-      text += fmt::format("{}{}: {}", text.empty() ? "" : "; ", kWhy[i], refused_[i]);
+      text += fmt::format("{}{}: {}", text.empty() ? "" : "; ", kWhyRefused[i], refused_[i]);
   if (unused_frames_ > 0)
     text += fmt::format("{}frames not used: {}", text.empty() ? "" : "; ", unused_frames_);
   return text;

@@ -2,6 +2,8 @@
 
 #include <array>
 #include <functional>
+#include <optional>
+#include <vector>
 
 #include "services/perception/cylinder_fit.h"
 
@@ -26,7 +28,8 @@ inline constexpr std::array<Sides, 12> kReadings = {{{true, true, true, true},
                                                      {false, false, false, true}}};
 inline constexpr size_t kOneHidden = 5;  ///< of them, with at most one side left out
 
-inline constexpr double kHiddenBy = 1.0;  ///< px that a side left out lies off the outline at least
+/// px that a side left out lies off the outline at least.
+double HiddenBy(const FitInput& input);
 
 /// True when the prediction or the LiDAR tells how far away it is.
 bool RangeIsKnown(const FitInput& input);
@@ -39,5 +42,10 @@ std::function<bool(const Sides&)> Sensible(const FitInput& input);
 /// line of sight only unless points tell the range, since the apparent size alone would take every
 /// pixel that is hidden for a leap.
 FitInput AfterASharpTurn(const FitInput& input);
+
+/// The same with a prediction that erred along the line of sight and in its heading, as of a box
+/// that turned while its width alone told its range: at the range of these points. Nothing where
+/// the detection is too wide or too narrow for the target there.
+std::optional<FitInput> AtRangeOf(const std::vector<TargetPoint>& cluster, const FitInput& input);
 
 }  // namespace chase::perception

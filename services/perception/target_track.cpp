@@ -10,7 +10,8 @@ namespace chase::perception {
 namespace {
 
 constexpr int kProvenHits = 20;
-constexpr double kTurnDensity = 0.2;  // rad^2/s: 2 rad/s, as into a corner, for 0.05 s
+constexpr double kRangedFor = 0.5;    // s, some sweeps
+constexpr double kTurnDensity = 1.0;  // rad^2/s: a corner taken at 1 rad/s lasts about a second
 
 }  // namespace
 
@@ -43,6 +44,7 @@ void TargetTrack::Correct(const FitResult& fit) {
   state = fit.posterior;
   shape = fit.shape;
   seen = t;
+  if (fit.n_points > 0) ranged = t;
   joined = fit.joined;
   partial = partial && !fit.whole;
   misses = 0;
@@ -56,7 +58,7 @@ double TargetTrack::HorizontalSigma() const {
 }
 
 Eigen::Matrix3d PublishedCovariance(const TargetTrack& track, const PoseSample& pose,
-                                    const MotionConfig& config) {
+                                    double outline_sigma, const MotionConfig& config) {
   const double tilt = config.tilt_sigma_deg * M_PI / 180.0;
   const double heading = config.heading_sigma_deg * M_PI / 180.0;
   Eigen::Matrix<double, 6, 6> C = pose.covariance;
@@ -69,8 +71,11 @@ Eigen::Matrix3d PublishedCovariance(const TargetTrack& track, const PoseSample& 
   Eigen::Matrix<double, 3, 6> J;
   J << Eigen::Matrix3d::Identity(), -math::Hat(track.state.position() - pose.p_WB);
   const double floor = config.floor_sigma * config.floor_sigma;
+  // What is not shaped as the model seems nearer or farther, alike in every frame without points.
+  const double share = track.t - track.ranged > kRangedFor ? outline_sigma : 0.0;
+  const Eigen::Vector3d off = share * (track.state.position() - pose.p_WB);
   const Eigen::Matrix3d P = track.state.covariance.topLeftCorner<3, 3>() + J * C * J.transpose() +
-                            floor * Eigen::Matrix3d::Identity();
+                            off * off.transpose() + floor * Eigen::Matrix3d::Identity();
   return math::MadePositiveDefinite(P, floor);
 }
 

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <limits>
+
 #include "services/perception/cylinder_fit.h"
 
 namespace chase::perception {
@@ -13,6 +15,7 @@ struct TargetTrack {
   int hits = 0, misses = 0;
   bool joined = false;   ///< a like colour went on beyond a side of it when it was last seen
   bool partial = false;  ///< something hid part of it whenever it was seen
+  double ranged = -std::numeric_limits<double>::infinity();  ///< when LiDAR last hit it, s
 
   /// Constant velocity with white acceleration up to time `to`; does nothing backwards. While it is
   /// not seen, the velocity fades: it may have stopped or turned behind what hides it.
@@ -28,8 +31,9 @@ struct TargetTrack {
 };
 
 /// Covariance of the target's position [m^2, frame W] with what the filter cannot know of itself:
-/// the drone's pose, which shifts all measurements alike, and a floor.
+/// the drone's pose, which shifts all measurements alike, the outline's departure from the model
+/// (ShapeConfig), which scales the range, and a floor.
 Eigen::Matrix3d PublishedCovariance(const TargetTrack& track, const PoseSample& pose,
-                                    const MotionConfig& config);
+                                    double outline_sigma, const MotionConfig& config);
 
 }  // namespace chase::perception

@@ -208,6 +208,8 @@ void RunService(const Arguments& a, const std::vector<Photo>& photos, Perception
                    on ? RangeSigma(e) : 0.0, e.box.width, e.box.height, e.note);
       if (!on) {
         ++reasons[e.note];
+        for (size_t k = 0; k < e.refused.size(); ++k)
+          if (e.refused[k] > 0) ++reasons[kWhyRefused[k]];
         continue;
       }
       ++tracked;

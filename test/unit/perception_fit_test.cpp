@@ -300,7 +300,7 @@ TEST(PerceptionTrack, PoseErrorReachesTheTargetThroughTheLeverArm) {
   pose.covariance(5, 5) = 0.01;  // heading, rad^2
   MotionConfig config;
   config.pose_sigma = config.tilt_sigma_deg = config.heading_sigma_deg = 0.0;
-  const auto P = PublishedCovariance(track, pose, config);
+  const auto P = PublishedCovariance(track, pose, 0.0, config);
   EXPECT_NEAR(P(1, 1), 16.0 * 0.01, 1e-3);
   EXPECT_LT(P(0, 0), 1e-3);
 }

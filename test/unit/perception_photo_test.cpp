@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <iostream>
 #include <opencv2/imgcodecs.hpp>
@@ -11,6 +12,7 @@
 #include <vector>
 
 #include "services/perception/learn.h"
+#include "services/perception/perceiver.h"
 
 namespace chase::perception {
 namespace {
@@ -199,6 +201,62 @@ TEST(PerceptionLearn, RefusesWhatDoesNotFitTogether) {
   cv::Mat photo(a.mask.size(), CV_8U);
   for (int row = 0; row < photo.rows; ++row) photo.row(row).setTo(row);
   EXPECT_THROW(LearnDetector({a.bgr}, {photo}, {}), std::invalid_argument);
+}
+
+/// The same thing cut to another outline.
+Marked Shaped(const std::vector<cv::Point>& outline) {
+  Marked shaped(40, 50, 0);
+  const cv::Scalar ground(120, 125, 130);
+  cv::Mat mask = cv::Mat::zeros(shaped.mask.size(), CV_8U);
+  cv::fillPoly(mask, std::vector<std::vector<cv::Point>>{outline}, 255);
+  shaped.bgr.setTo(ground);
+  shaped.bgr.setTo(cv::Scalar(20, 110, 240), mask);
+  shaped.mask = mask;
+  return shaped;
+}
+
+Marked Cone() { return Shaped({{135, 70}, {145, 70}, {165, 170}, {115, 170}}); }
+
+TEST(PerceptionLearn, TellsHowFarTheOutlineIsFromTheModels) {
+  const auto departure = [](const Marked& m) {
+    return LearnDetector({m.bgr}, {m.mask}, {}).config.shape.outline_sigma;
+  };
+  EXPECT_LT(departure(Marked(40, 50, 0)), 0.01);
+  std::vector<cv::Point> round;
+  cv::ellipse2Poly({140, 120}, {40, 40}, 0, 0, 360, 3, round);
+  EXPECT_LT(departure(Shaped(round)), 0.02);
+  EXPECT_GT(departure(Cone()), 0.1);
+}
+
+// Its sides lean by pixels in a large image; its height tells the range all the same.
+TEST(PerceptionLearn, AConeIsTrackedAtARangeWithinItsSigma) {
+  const Marked cone = Cone();
+  PerceptionConfig config;
+  config.detector = LearnDetector({cone.bgr}, {cone.mask}, {}).config;
+  config.rig.width_px = cone.bgr.cols, config.rig.height_px = cone.bgr.rows;
+  config.rig.center_u_px = 159.5;
+  config.rig.camera_pitch_deg = 0.0;
+  config.target_height = 1.0;
+  config.target_radius = 0.25;
+  const double range = config.rig.focal_px * config.target_height / 100.0;
+  const auto watch = [&] {
+    Perceiver perceiver(config);
+    TargetEstimate seen;
+    for (int k = 0; k < 1000 && seen.state != TargetState::kTracking; ++k) {
+      PoseSample pose;
+      pose.t = 0.005 * k;
+      perceiver.AddPose(pose);
+      if (k % 10 == 0) seen = perceiver.See({pose.t, cone.bgr, {}});
+    }
+    return seen;
+  };
+  const TargetEstimate seen = watch();
+  ASSERT_EQ(seen.state, TargetState::kTracking);
+  const double sigma = std::sqrt(seen.covariance(0, 0));
+  EXPECT_LT(std::abs(seen.p_WT.x() - range), 3.0 * sigma);
+  EXPECT_LT(sigma, 0.25 * range);
+  config.detector.shape.outline_sigma = 0.0;
+  EXPECT_NE(watch().state, TargetState::kTracking);
 }
 
 TEST(PerceptionLearn, TakesAMaskWithASoftEdge) {
