@@ -17,7 +17,7 @@ namespace chase::perception {
 
 namespace {
 
-constexpr double kPixel = 0.5;                         // standard deviation of an edge, px
+constexpr double kPixel = 1.0;  // px, of a side behind the outermost of its samples
 constexpr double kMostInset = 0.2, kInsetStep = 0.01;  // shares of the width
 
 /// A mask has two values, but for a few pixels along the marked outline; a photo has many.
