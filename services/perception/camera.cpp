@@ -31,6 +31,16 @@ Camera CameraAt(const PoseSample& pose, const world::Rig& rig) {
   return {rig, R_WB * rig.R_BC(), pose.p_WB + R_WB * rig.camera_position};
 }
 
+TargetShape ShapeOf(const PerceptionConfig& config) {
+  TargetShape shape;
+  shape.kind = config.target_shape == "sphere" ? TargetShape::Kind::kSphere
+               : config.target_shape == "box"  ? TargetShape::Kind::kBox
+                                               : TargetShape::Kind::kCylinder;
+  shape.size = {config.target_radius, config.target_height};
+  shape.variance.setConstant(config.fit.shape_sigma * config.fit.shape_sigma);
+  return shape;
+}
+
 std::optional<cv::Rect2d> ProjectTarget(const Camera& camera, const Eigen::Vector3d& p_WT,
                                         const TargetShape& shape) {
   const double radius = shape.size[0];

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "common/world/rig.h"
+#include "services/perception/perception_config.h"
 #include "services/perception/pose_history.h"
 
 namespace chase::perception {
@@ -44,6 +45,9 @@ struct TargetShape {
   double MeanHalfWidth() const { return (box() ? 4.0 / M_PI : 1.0) * size[0]; }
   double MostHalfWidth() const { return (box() ? M_SQRT2 : 1.0) * size[0]; }
 };
+
+/// The target as the config describes it.
+TargetShape ShapeOf(const PerceptionConfig& config);
 
 /// Box [px] around a target centred at p_WT, from the two rims of a cylinder or box or from the rim
 /// of the sphere that is seen; nothing when any part lies behind the camera.

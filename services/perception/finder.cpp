@@ -28,14 +28,8 @@ bool Overlap(const Detection& a, const Detection& b) { return (a.box & b.box).ar
 Finder::Finder(const PerceptionConfig& config)
     : config_(config),
       detector_(MakeDetector(config.detector, config.fit.edge_sigma_px, config.rig)),
-      localiser_(config) {
-  const double variance = config.fit.shape_sigma * config.fit.shape_sigma;
-  shape_.kind = config.target_shape == "sphere" ? TargetShape::Kind::kSphere
-                : config.target_shape == "box"  ? TargetShape::Kind::kBox
-                                                : TargetShape::Kind::kCylinder;
-  shape_.size = {config.target_radius, config.target_height};
-  shape_.variance = {variance, variance};
-}
+      localiser_(config),
+      shape_(ShapeOf(config)) {}
 
 void Finder::AddSweep(const Sweep& sweep) {
   if (!sweeps_.empty() && sweep.t < sweeps_.back().sweep.t() - kTimeJump) sweeps_.clear();

@@ -11,6 +11,7 @@
 #include "services/perception/color_detector.h"
 #include "services/perception/color_model.h"
 #include "services/perception/learn_color.h"
+#include "services/perception/picture.h"
 #include "services/perception/silhouette.h"
 
 namespace chase::perception {
@@ -45,14 +46,6 @@ void Check(const std::vector<cv::Mat>& images, const std::vector<cv::Mat>& masks
       throw std::invalid_argument(
           pair + ": the mask is a picture; a mask is 0 off the target, one value on it");
   }
-}
-
-double Overlap(const cv::Mat& region, const cv::Rect& at, const cv::Mat& mask) {
-  cv::Mat whole = cv::Mat::zeros(mask.size(), CV_8U);
-  region.copyTo(whole(at));
-  const int both = cv::countNonZero((whole > 0) & (mask > 0));
-  const int either = cv::countNonZero((whole > 0) | (mask > 0));
-  return static_cast<double>(both) / either;
 }
 
 /// The blob that covers most of the mask; null where none does. Pieces of a blob come after it and
@@ -131,21 +124,10 @@ std::vector<std::string> LearnShape(const std::vector<cv::Mat>& images,
   return shapeless;
 }
 
-/// The best whole, or a piece that scores more, is not cut anywhere and is no piece of a good
-/// whole.
-const Detection* MostLikely(const std::vector<Detection>& found) {
-  const Detection* best = nullptr;
-  for (const auto& d : found) {
-    const bool candidate = !best || (!d.part && !d.edged && !d.AnyCut());
-    if (candidate && (!best || d.score > best->score)) best = &d;
-  }
-  return best;
-}
-
 double Overlap(const ColorDetector& detector, const cv::Mat& bgr, const cv::Mat& mask) {
   const auto found = detector.Detect(bgr);
   const Detection* best = MostLikely(found);
-  return best ? Overlap(Region(*best), best->mask_box, mask) : 0.0;
+  return best ? Overlap(*best, mask) : 0.0;
 }
 
 double MeanOverlap(const std::vector<cv::Mat>& images, const std::vector<cv::Mat>& masks,
