@@ -18,7 +18,7 @@ struct MotionConfig {
   double gaining_share = 0.02;
   double gain_memory = 0.5;
   double change_cost = 1.6;
-  double sigma_floor = 0.02;
+  double sigma_floor = 0.005;
 
   template <class V>
   void Visit(V& v) {
