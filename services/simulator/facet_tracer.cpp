@@ -12,8 +12,11 @@ namespace {
 
 constexpr float kEdge = 2e-4f;  // share of a facet at its edges where a hit is not settled
 constexpr float kPi = 3.14159265f;
-constexpr int kRounds = 4;      // of the search for the facet
-constexpr int kRowPackets = 4;  // of a tile, with one list of solids
+constexpr int kRounds = 4;              // of the search for the facet
+constexpr int kPassRound = 1;           // after which most that are left pass the facets by
+constexpr float kOutline = 1e-4f;       // half sizes beside the outline where a hit is not settled
+constexpr float kUnitRounding = 1e-6f;  // of coordinates in half sizes
+constexpr int kRowPackets = 4;          // of a tile, with one list of solids
 
 /// atan(y / x) over the whole turn, to 1e-5. Abramowitz and Stegun 1964, 4.4.49.
 V Angle(V y, V x) {
@@ -199,11 +202,39 @@ Choice Choose(const FacetSolid& solid, const Lanes& unit, V size, const V3& p, V
   return EllipsoidChoice(solid, p);
 }
 
+/// Cosine of an angle to the nearest of the steps of a turn that is cut into so many.
+V NearestCosine(V angle, float steps) {
+  const V turn = angle * (0.5f * steps / kPi), off = turn - Floor(turn + 0.5f);
+  const V s = off * off * (4.0f * kPi * kPi / (steps * steps));
+  return 1.0f - s * (0.5f - s * (1.0f / 24));
+}
+
+/// Rays that pass between the facets and the smooth body around them: beyond the plane that touches
+/// the facets' farthest vertex towards where the ray is nearest to the axis or the centre.
+VI Passes(const FacetSolid& solid, const Lanes& unit) {
+  const V3 &o = unit.o, &d = unit.d;
+  const V margin = kOutline + kUnitRounding * (Abs(o.x) + Abs(o.y) + Abs(o.z));
+  const float around = static_cast<float>(solid.around);
+  if (solid.kind == FacetSolid::Kind::kBox) return AllInt(0);
+  if (solid.kind == FacetSolid::Kind::kCylinder) {
+    const V moment = Fms(o.x, d.y, o.y * d.x), side = Sign(moment);
+    const V reach = NearestCosine(Angle(Xor(-d.x, side), Xor(d.y, side)), around) + margin;
+    return moment * moment > reach * reach * (d.x * d.x + d.y * d.y);
+  }
+  const V3 q = Along(o, -Dot(o, d) / (Dot(d, d) + 1e-20f), d);
+  const V across = Sqrt(q.x * q.x + q.y * q.y) * NearestCosine(Angle(q.y, q.x), around);
+  // Rows of vertices are half a turn apart from pole to pole, and a quarter below the equator.
+  const float rows = 2.0f * static_cast<float>(solid.rows);
+  const V reach =
+      Sqrt(across * across + q.z * q.z) * NearestCosine(Angle(q.z, across) + 0.5f * kPi, rows);
+  return Dot(q, q) > reach + margin;
+}
+
 /// The facet through which each ray enters a convex solid: guessed on a smooth body around it, and
 /// from then on where the ray meets the plane of the last guess.
 void CrossSolid(const FacetWorld& world, const FacetSolid& solid, VI active, Lanes* ray) {
   const Lanes unit = UnitRays(solid, *ray);
-  const V size = 1.001f + 1e-6f * (Abs(unit.o.x) + Abs(unit.o.y) + Abs(unit.o.z));
+  const V size = 1.001f + kUnitRounding * (Abs(unit.o.x) + Abs(unit.o.y) + Abs(unit.o.z));
   Span span = {};
   VI cap = AllInt(0), todo = active & Within(solid, unit, size, &span, &cap);
   if (Bits(todo) == 0) return;
@@ -222,9 +253,10 @@ void CrossSolid(const FacetWorld& world, const FacetSolid& solid, VI active, Lan
       v[k] = Vertices(world.vertices + solid.first, Pick(todo, corners.v[k], AllInt(0)));
     const Triangle triangle = TriangleOf(v[0], v[1], v[2]);
     const Crossing x = Cross(*ray, triangle);
-    const VI found = todo & x.Inside(kEdge) & (x.den < 0.0f);
+    const VI found = todo & x.Inside(kEdge * x.volume) & (x.den < 0.0f);
     Keep(x, triangle.n, found, AllInt(static_cast<int>(solid.material)), ray);
     todo &= ~found;
+    if (i == kPassRound && Bits(todo) != 0) todo &= ~Passes(solid, unit);
     p = Along(unit.o, x.depth / x.volume, unit.d);
   }
   ray->unsure |= todo;
@@ -238,15 +270,14 @@ Lanes LanesOf(const RayPacket& rays) {
   return ray;
 }
 
-/// One packet, whose solids are in the row.
-unsigned TracePacket(const FacetWorld& world, const RayPacket& rays, const Row& row, float longest,
+unsigned TracePacket(const FacetWorld& world, const RayPacket& rays, const NearSolids& near,
                      HitPacket* hits) {
   Lanes ray = LanesOf(rays);
   const VI used = kLane < rays.count;
-  for (int i = 0; i < row.count; ++i) {
-    const VI open = used & ~ray.unsure & (ray.t * longest >= row.distance[i]);
+  for (int i = 0; i < near.count; ++i) {
+    const VI open = used & ~ray.unsure & (ray.t >= near.first[i].least);
     if (Bits(open) == 0) break;
-    CrossSolid(world, world.solids[row.solid[i]], open, &ray);
+    CrossSolid(world, world.solids[near.first[i].solid], open, &ray);
   }
   CrossGround(world.ground, used & ~ray.unsure, &ray);
   memcpy(hits->distance, &ray.t, sizeof ray.t);
@@ -270,8 +301,21 @@ void TraceFacets(const FacetWorld& world, const RayPacket* rays, int n, HitPacke
     Sort(near, fan, &row);
     for (int k = first; k < end; ++k)
       unsure[k] = near.full ? (1u << rays[k].count) - 1u
-                            : TracePacket(world, rays[k], row, fan.longest, &hits[k]);
+                            : TracePacket(world, rays[k], {row.solids, row.count}, &hits[k]);
   }
+}
+
+void TraceNear(const FacetWorld& world, const NearSolids& near, const RayPacket* rays, int n,
+               HitPacket* hits, unsigned* unsure) {
+  for (int k = 0; k < n; ++k) unsure[k] = TracePacket(world, rays[k], near, &hits[k]);
+}
+
+bool MayMeet(const BoundsNode* boxes, int n_nodes, const RayPacket* rays, int n) {
+  const Fan fan = FanOf(rays, n);
+  V gap;
+  for (int i = 0; i < n_nodes; ++i)
+    if (Meets(boxes[i], fan, &gap) != 0) return true;
+  return false;
 }
 
 }  // namespace chase::simulator
@@ -283,6 +327,13 @@ namespace chase::simulator {
 void TraceFacets(const FacetWorld&, const RayPacket* rays, int n, HitPacket*, unsigned* unsure) {
   for (int k = 0; k < n; ++k) unsure[k] = (1u << rays[k].count) - 1u;
 }
+
+void TraceNear(const FacetWorld& world, const NearSolids&, const RayPacket* rays, int n,
+               HitPacket* hits, unsigned* unsure) {
+  TraceFacets(world, rays, n, hits, unsure);
+}
+
+bool MayMeet(const BoundsNode*, int, const RayPacket*, int) { return true; }
 
 }  // namespace chase::simulator
 
