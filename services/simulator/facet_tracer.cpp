@@ -12,11 +12,10 @@ namespace {
 
 constexpr float kEdge = 2e-4f;  // share of a facet at its edges where a hit is not settled
 constexpr float kPi = 3.14159265f;
-constexpr int kRounds = 4;              // of the search for the facet
-constexpr int kPassRound = 1;           // after which most that are left pass the facets by
-constexpr float kOutline = 1e-4f;       // half sizes beside the outline where a hit is not settled
-constexpr float kUnitRounding = 1e-6f;  // of coordinates in half sizes
-constexpr int kRowPackets = 4;          // of a tile, with one list of solids
+constexpr int kRounds = 4;               // of the search for the facet
+constexpr float kUnitRounding = 1e-6f;   // of coordinates in half sizes
+constexpr float kPlaneRounding = 1e-6f;  // sixteen roundings of a product
+constexpr int kRowPackets = 4;           // of a tile, with one list of solids
 
 /// atan(y / x) over the whole turn, to 1e-5. Abramowitz and Stegun 1964, 4.4.49.
 V Angle(V y, V x) {
@@ -202,33 +201,21 @@ Choice Choose(const FacetSolid& solid, const Lanes& unit, V size, const V3& p, V
   return EllipsoidChoice(solid, p);
 }
 
-/// Cosine of an angle to the nearest of the steps of a turn that is cut into so many.
-V NearestCosine(V angle, float steps) {
-  const V turn = angle * (0.5f * steps / kPi), off = turn - Floor(turn + 0.5f);
-  const V s = off * off * (4.0f * kPi * kPi / (steps * steps));
-  return 1.0f - s * (0.5f - s * (1.0f / 24));
-}
+/// Where the rays are behind the planes of the facets tried so far (Cyrus and Beck 1978): a ray
+/// that leaves by one before it enters by another passes the solid by, between the facets and the
+/// smooth body around them. Both ends count by what rounding may make of them.
+struct Clip {
+  V enter = All(-INFINITY), leave = All(INFINITY);
 
-/// Rays that pass between the facets and the smooth body around them: beyond the plane that touches
-/// the facets' farthest vertex towards where the ray is nearest to the axis or the centre.
-VI Passes(const FacetSolid& solid, const Lanes& unit) {
-  const V3 &o = unit.o, &d = unit.d;
-  const V margin = kOutline + kUnitRounding * (Abs(o.x) + Abs(o.y) + Abs(o.z));
-  const float around = static_cast<float>(solid.around);
-  if (solid.kind == FacetSolid::Kind::kBox) return AllInt(0);
-  if (solid.kind == FacetSolid::Kind::kCylinder) {
-    const V moment = Fms(o.x, d.y, o.y * d.x), side = Sign(moment);
-    const V reach = NearestCosine(Angle(Xor(-d.x, side), Xor(d.y, side)), around) + margin;
-    return moment * moment > reach * reach * (d.x * d.x + d.y * d.y);
+  VI Missed(const Lanes& ray, const Triangle& triangle, const Crossing& x, V t) {
+    const V edges = Sum(triangle.e1) * Sum(triangle.e2), way = Sum(triangle.v0 - ray.o);
+    const V slack = kPlaneRounding * edges * way / x.volume;
+    enter = Pick(x.den < 0.0f, Max(enter, t - slack), enter);
+    leave = Pick(x.den > 0.0f, Min(leave, t + slack), leave);
+    return enter > leave;
   }
-  const V3 q = Along(o, -Dot(o, d) / (Dot(d, d) + 1e-20f), d);
-  const V across = Sqrt(q.x * q.x + q.y * q.y) * NearestCosine(Angle(q.y, q.x), around);
-  // Rows of vertices are half a turn apart from pole to pole, and a quarter below the equator.
-  const float rows = 2.0f * static_cast<float>(solid.rows);
-  const V reach =
-      Sqrt(across * across + q.z * q.z) * NearestCosine(Angle(q.z, across) + 0.5f * kPi, rows);
-  return Dot(q, q) > reach + margin;
-}
+  static V Sum(const V3& a) { return Abs(a.x) + Abs(a.y) + Abs(a.z); }
+};
 
 /// The facet through which each ray enters a convex solid: guessed on a smooth body around it, and
 /// from then on where the ray meets the plane of the last guess.
@@ -241,6 +228,7 @@ void CrossSolid(const FacetWorld& world, const FacetSolid& solid, VI active, Lan
   todo &= (span.leave >= 0.0f) & (span.enter <= ray->t);
   ray->unsure |= todo & (span.enter <= 0.0f);
   todo &= ~ray->unsure;
+  Clip clip;
   VI last = AllInt(-1), half = last;
   V3 p = Along(unit.o, span.enter, unit.d);
   for (int i = 0; i < kRounds && Bits(todo) != 0; ++i) {
@@ -255,9 +243,9 @@ void CrossSolid(const FacetWorld& world, const FacetSolid& solid, VI active, Lan
     const Crossing x = Cross(*ray, triangle);
     const VI found = todo & x.Inside(kEdge * x.volume) & (x.den < 0.0f);
     Keep(x, triangle.n, found, AllInt(static_cast<int>(solid.material)), ray);
-    todo &= ~found;
-    if (i == kPassRound && Bits(todo) != 0) todo &= ~Passes(solid, unit);
-    p = Along(unit.o, x.depth / x.volume, unit.d);
+    const V t = x.depth / x.volume;
+    todo &= ~(found | clip.Missed(*ray, triangle, x, t));
+    p = Along(unit.o, t, unit.d);
   }
   ray->unsure |= todo;
 }
