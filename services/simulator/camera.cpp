@@ -104,8 +104,8 @@ Image Camera::Render(const Vector3d& p_WB, const Eigen::Quaterniond& q_WB, doubl
   visible_px_ = 0;
   movers_.clear();
   for (const auto& solid : scene.MovingSolids()) {
-    const PixelBox box = Surrounding(rig_, view_, solid);
-    if (!box.empty()) movers_.push_back(box);
+    const Outline outline = OutlineOf(rig_, view_, solid);
+    if (!outline.box.empty()) movers_.push_back(outline.box);
   }
   bins_.Project(rig_, view_, scene.StandingSolids());
   for (int row = 0; row < rig_.height_px; row += TileBins::kRows)
