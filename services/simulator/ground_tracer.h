@@ -43,7 +43,8 @@ inline void CrossCell(const GroundGrid& ground, VI ix, VI iy, float most, VI* la
 
 /// From cell to cell of the grid (Amanatides and Woo 1987), from where the ray comes below the
 /// highest of the ground.
-inline void CrossGround(const GroundGrid& ground, VI todo, Lanes* ray) {
+__attribute__((always_inline)) inline void CrossGround(const GroundGrid& ground, VI todo,
+                                                       Lanes* ray) {
   if (ground.columns == 1 && ground.rows == 1)
     return CrossCell(ground, AllInt(0), AllInt(0), kPlainEdge, &todo, ray);
   const float* plane = ground.plane;

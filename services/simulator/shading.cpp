@@ -197,8 +197,8 @@ void Expose(const LightPacket& light, float brightness, int count, uint8_t* out)
   memcpy(halves, &pixels, sizeof halves);
   uint8_t bytes[32];
   for (int i = 0; i < 2; ++i) {
-    const Bytes packed =
-        __builtin_shuffle(halves[i], Bytes{0, 1, 2, 4, 5, 6, 8, 9, 10, 12, 13, 14, 15, 15, 15, 15});
+    const Bytes packed = __builtin_shufflevector(halves[i], halves[i], 0, 1, 2, 4, 5, 6, 8, 9, 10,
+                                                 12, 13, 14, 15, 15, 15, 15);
     memcpy(bytes + 12 * i, &packed, sizeof packed);
   }
   if (count == 8)
