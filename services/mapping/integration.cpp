@@ -23,11 +23,11 @@ uint8_t Increment(uint8_t n) { return n < 255 ? static_cast<uint8_t>(n + 1) : n;
 
 void Integrator::Insert(const Eigen::Vector3d& origin, const std::vector<Return>& returns) {
   ++sweep_;
-  done_ = grid_.settled_free();
+  grid_.SettledFree(&done_);
   Gather(returns);
   for (auto& cell : cells_) Hit(&cell);
-  for (const auto& cell : cells_)
-    CastRay(origin, (cell.sum / static_cast<float>(cell.count)).cast<double>(), cell.key);
+  for (size_t first = 0; first < cells_.size(); first += kRaysAtOnce)
+    CastRays(origin, first, std::min(cells_.size() - first, size_t{kRaysAtOnce}));
 }
 
 void Integrator::Gather(const std::vector<Return>& returns) {
@@ -60,7 +60,7 @@ void Integrator::Hit(HitCell* cell) {
   Voxel& voxel = *cell->voxel;
   if (cell->solid + cell->ground + cell->moving == 0) return;
   const size_t index = VoxelGrid::Index(cell->key.x, cell->key.y);
-  done_[index] |= VoxelGrid::Bit(cell->key.z);
+  done_.Add(grid_.Number(cell->key));
   grid_.settled_free()[index] &= ~VoxelGrid::Bit(cell->key.z);
   voxel.sweep = sweep_;
   if (cell->solid + cell->ground == 0) {
@@ -122,7 +122,7 @@ void Integrator::Miss(const Key& key) {
   Voxel& voxel = column.voxels[VoxelGrid::Level(key.z)];
   if (!voxel.extent.empty() && !PassesReturns(voxel, key)) return;
   const size_t index = VoxelGrid::Index(key.x, key.y);
-  done_[index] |= VoxelGrid::Bit(key.z);
+  done_.Add(grid_.Number(key));
   voxel.sweep = sweep_;
   voxel.moving_hits = 0;
   const int least = -config_.limit / kLowShare;
@@ -136,44 +136,25 @@ void Integrator::Miss(const Key& key) {
     grid_.settled_free()[index] |= VoxelGrid::Bit(key.z);
 }
 
-/// Walks the cells between two points of the window (Amanatides and Woo 1987), the last one
-/// excluded. What lies between is in the window too.
-void Integrator::CastRay(const Eigen::Vector3d& origin, const Eigen::Vector3d& end,
-                         const Key& last) {
-  const Eigen::Vector3d d = end - origin;
-  const double length = d.norm();
-  if (!(length > 1e-6)) return;
-  ray_origin_ = origin;
-  ray_direction_ = d / length;
-  Key cell = grid_.ToKey(origin);
-  const Eigen::Array3i step = (d.array() > 0.0).select(Eigen::Array3i::Ones(), -1);
-  const Eigen::Array3d border =
-      grid_.resolution() * (Eigen::Array3i(cell.x, cell.y, cell.z) + step.max(0)).cast<double>();
-  const auto moves = d.array().abs() > 1e-12;
-  // In shares of the ray's length.
-  Eigen::Array3d next = moves.select((border - origin.array()) / d.array(), INFINITY);
-  const Eigen::Array3d delta = moves.select(grid_.resolution() / d.array().abs(), INFINITY);
-  crossed_.clear();
-  int steps = std::abs(last.x - cell.x) + std::abs(last.y - cell.y) + std::abs(last.z - cell.z);
-  for (; steps != 0 || !(cell == last); --steps) {
-    if (!(done_[VoxelGrid::Index(cell.x, cell.y)] & VoxelGrid::Bit(cell.z))) {
-      crossed_.push_back(cell);
-      grid_.Prefetch(cell);
-    }
-    const bool along_x = next.x() < next.y();
-    const double nearest = along_x ? next.x() : next.y();
-    if (std::min(nearest, next.z()) > 1.0) break;  // rounding let the ray slip past the last cell
-    if (nearest < next.z()) {  // no branches between x and y: they could not be predicted
-      cell.x += along_x ? step.x() : 0;
-      cell.y += along_x ? 0 : step.y();
-      next.x() += along_x ? delta.x() : 0.0;
-      next.y() += along_x ? 0.0 : delta.y();
-    } else {
-      cell.z += step.z();
-      next.z() += delta.z();
-    }
+/// From the origin to where the returns of some hit cells are. What lies between is in the window
+/// too. All of them are walked first; so a ray looks once more for cells that one before it has
+/// done.
+void Integrator::CastRays(const Eigen::Vector3d& origin, size_t first, size_t n) {
+  RayEnd ends[kRaysAtOnce];
+  for (size_t i = 0; i < n; ++i) {
+    const HitCell& cell = cells_[first + i];
+    ends[i] = {(cell.sum / static_cast<float>(cell.count)).cast<double>(), cell.key};
   }
-  for (const Key& key : crossed_) Miss(key);
+  WalkRays(grid_, origin, ends, static_cast<int>(n), done_, crossed_);
+  for (size_t i = 0; i < n; ++i)
+    for (int k = 0; k < crossed_[i].count; ++k) grid_.Prefetch(grid_.KeyOf(crossed_[i].cells[k]));
+  ray_origin_ = origin;
+  for (size_t i = 0; i < n; ++i) {
+    const Eigen::Vector3d d = ends[i].p - origin;
+    ray_direction_ = d / d.norm();
+    for (int k = 0; k < crossed_[i].count; ++k)
+      if (const int cell = crossed_[i].cells[k]; !done_.Has(cell)) Miss(grid_.KeyOf(cell));
+  }
 }
 
 void Integrator::ClearDisc(const Eigen::Vector2d& center, double radius, double bottom, double top,

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "services/mapping/enclosing.h"
+#include "services/mapping/ray_walk.h"
 #include "services/mapping/sweep.h"
 #include "services/mapping/voxel_grid.h"
 
@@ -44,7 +45,7 @@ class Integrator {
   };
   void Gather(const std::vector<Return>& returns);
   void Hit(HitCell* cell);
-  void CastRay(const Eigen::Vector3d& origin, const Eigen::Vector3d& end, const Key& last);
+  void CastRays(const Eigen::Vector3d& origin, size_t first, size_t n);
   void Miss(const Key& key);
   bool PassesReturns(const Voxel& voxel, const Key& key) const;
   void Reset(VoxelGrid::Column* column, Voxel* voxel, const Key& key);
@@ -55,8 +56,8 @@ class Integrator {
   VoxelGrid& grid_;
   uint32_t sweep_ = 0;
   std::vector<HitCell> cells_;
-  std::vector<uint32_t> done_;  ///< cells in which a ray changes nothing more this sweep
-  std::vector<Key> crossed_;    ///< the others that a ray crosses
+  CellSet done_;                       ///< cells in which a ray changes nothing more this sweep
+  CrossedCells crossed_[kRaysAtOnce];  ///< the others that each ray crosses
   std::deque<Key> changes_;
   Eigen::Vector3d ray_origin_, ray_direction_;
 };

@@ -50,6 +50,19 @@ void VoxelGrid::MoveTo(const Eigen::Vector3d& p) {
         settled_free_[Index(x, y)] = 0;
 }
 
+/// The window begins anywhere in the ring of columns, and in that of a column's levels.
+void VoxelGrid::SettledFree(CellSet* cells) const {
+  static_assert(kLevels == 32);
+  auto& columns = cells->columns();
+  columns.resize(settled_free_.size());
+  const size_t low = Level(z0_);
+  for (int x = 0; x < kSide; ++x)
+    for (int y = 0; y < kSide; ++y) {
+      const uint32_t bits = settled_free_[Index(x0_ + x, y0_ + y)];
+      columns[static_cast<size_t>(x * kSide + y)] = bits >> low | bits << (-low & (kLevels - 1));
+    }
+}
+
 Voxel* VoxelGrid::At(const Key& k) {
   if (!ContainsLevel(k.z)) return nullptr;
   Column* column = Find(k.x, k.y);

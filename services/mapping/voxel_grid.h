@@ -44,6 +44,20 @@ struct Voxel {
   int32_t slot = 0;                   ///< index into that sweep's hit cells
 };
 
+/// Cells of the window by number: the levels of a column lie together, then columns along y.
+class CellSet {
+ public:
+  bool Has(int cell) const { return columns_[Column(cell)] >> Level(cell) & 1u; }
+  void Add(int cell) { columns_[Column(cell)] |= 1u << Level(cell); }
+  std::vector<uint32_t>& columns() { return columns_; }
+
+ private:
+  static size_t Column(int cell) { return static_cast<uint32_t>(cell) / 32u; }
+  static uint32_t Level(int cell) { return static_cast<uint32_t>(cell) % 32u; }
+
+  std::vector<uint32_t> columns_;
+};
+
 /// Rolling window of cells around the drone, kSide x kSide columns of kLevels cells. A column is
 /// reset when it is first touched after the window moved onto it, so that moving costs nothing.
 class VoxelGrid {
@@ -101,6 +115,14 @@ class VoxelGrid {
   static size_t Index(int x, int y) {
     return static_cast<size_t>((x & (kSide - 1)) * kSide + (y & (kSide - 1)));
   }
+  /// Number of a cell of the window, by its place in it.
+  int Number(const Key& k) const {
+    return ((k.x - x0_) * kSide + (k.y - y0_)) * kLevels + (k.z - z0_);
+  }
+  Key KeyOf(int number) const {
+    const int column = number / kLevels;
+    return {x0_ + column / kSide, y0_ + column % kSide, z0_ + number % kLevels};
+  }
   /// Fetches the memory of a cell that is needed soon; it need not be in the window.
   void Prefetch(const Key& k) const {
     __builtin_prefetch(&columns_[Index(k.x, k.y)]);
@@ -112,6 +134,8 @@ class VoxelGrid {
   /// A bit per level of each column in the window (Index, Bit): cells that another free sweep would
   /// leave as they are. Small, so that rays need not look at the cells themselves.
   std::vector<uint32_t>& settled_free() { return settled_free_; }
+  /// The same by number.
+  void SettledFree(CellSet* cells) const;
 
   size_t Bytes() const {
     return columns_.size() * (sizeof(Column) + kLevels * sizeof(Voxel) + sizeof(uint32_t));

@@ -72,16 +72,15 @@ bool Camera::MoversIn(int row, int column) const {
   });
 }
 
-/// Eight columns of a few rows.
 void Camera::TraceTile(int row, int column, const Scene& scene, Image* image) {
-  const int rows = std::min(kMostPackets, rig_.height_px - row);
-  RayPacket rays[kMostPackets];
-  HitPacket hits[kMostPackets];
+  const int rows = std::min(TileBins::kRows, rig_.height_px - row);
+  RayPacket rays[TileBins::kRows];
+  HitPacket hits[TileBins::kRows];
   for (int k = 0; k < rows; ++k) {
     rays[k] = Rays(row + k, column);
     rays[k].movers = MoversIn(row + k, column);
   }
-  scene.Trace(rays, rows, hits);
+  scene.Trace(bins_.At(row, column), rays, rows, hits);
   for (int k = 0; k < rows; ++k) {
     const int pixel = (row + k) * rig_.width_px + column;
     LightPacket light;
@@ -105,11 +104,13 @@ Image Camera::Render(const Vector3d& p_WB, const Eigen::Quaterniond& q_WB, doubl
   visible_px_ = 0;
   movers_.clear();
   for (const auto& solid : scene.MovingSolids()) {
-    const PixelBox box = Surrounding(rig_, view_, solid);
-    if (!box.empty()) movers_.push_back(box);
+    const Outline outline = OutlineOf(rig_, view_, solid);
+    if (!outline.box.empty()) movers_.push_back(outline.box);
   }
-  for (int row = 0; row < rig_.height_px; row += kMostPackets)
-    for (int column = 0; column < rig_.width_px; column += 8) TraceTile(row, column, scene, &image);
+  bins_.Project(rig_, view_, scene.StandingSolids());
+  for (int row = 0; row < rig_.height_px; row += TileBins::kRows)
+    for (int column = 0; column < rig_.width_px; column += TileBins::kColumns)
+      TraceTile(row, column, scene, &image);
   alone_px_ = CountAlone(scene);
   AddNoise(&image);
   return image;

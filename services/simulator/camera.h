@@ -10,6 +10,7 @@
 #include "common/world/rig.h"
 #include "services/simulator/projection.h"
 #include "services/simulator/scene.h"
+#include "services/simulator/tile_bins.h"
 
 namespace chase::simulator {
 
@@ -78,6 +79,7 @@ class Camera {
   // The last frame.
   Viewpoint view_;
   world::Solid target_;
+  TileBins bins_;                 // what stands
   std::vector<PixelBox> movers_;  // around all that moves
   float brightness_ = 1.0f;
   long alone_px_ = 0, visible_px_ = 0;

@@ -12,11 +12,15 @@ namespace {
 
 constexpr float kEdge = 2e-4f;  // share of a facet at its edges where a hit is not settled
 constexpr float kPi = 3.14159265f;
-constexpr int kRounds = 4;      // of the search for the facet
-constexpr int kRowPackets = 4;  // of a tile, with one list of solids
+constexpr int kRounds = 4;               // of the search for the facet
+constexpr float kUnitRounding = 1e-6f;   // of coordinates in half sizes
+constexpr float kPlaneRounding = 1e-6f;  // sixteen roundings of a product
+constexpr int kRowPackets = 4;           // of a tile, with one list of solids
+
+#define CHASE_INLINE __attribute__((always_inline)) inline
 
 /// atan(y / x) over the whole turn, to 1e-5. Abramowitz and Stegun 1964, 4.4.49.
-V Angle(V y, V x) {
+CHASE_INLINE V Angle(V y, V x) {
   const V ax = Abs(x), ay = Abs(y);
   const V a = Min(ax, ay) / Max(Max(ax, ay), All(1e-30f)), s = a * a;
   const float k[] = {0.0208351f, -0.0851330f, 0.1801410f, -0.3302995f, 0.9998660f};
@@ -29,7 +33,7 @@ V Angle(V y, V x) {
 }
 
 /// The rays in the solid's own axes, its half sizes one.
-Lanes UnitRays(const FacetSolid& solid, const Lanes& ray) {
+CHASE_INLINE Lanes UnitRays(const FacetSolid& solid, const Lanes& ray) {
   const float c = solid.cos_yaw, s = solid.sin_yaw, *per = solid.per_half;
   const V3 o = {ray.o.x - solid.center[0], ray.o.y - solid.center[1], ray.o.z - solid.center[2]};
   Lanes unit = {};
@@ -46,7 +50,7 @@ struct Span {
 
 Span Both(const Span& a, const Span& b) { return {Max(a.enter, b.enter), Min(a.leave, b.leave)}; }
 
-Span Slab(V o, V d, V half) {
+CHASE_INLINE Span Slab(V o, V d, V half) {
   const V rate = 1.0f / Pick(Abs(d) > 1e-12f, d, All(1e-12f));
   const V a = (-half - o) * rate, b = (half - o) * rate;
   return {Min(a, b), Max(a, b)};
@@ -54,12 +58,12 @@ Span Slab(V o, V d, V half) {
 
 /// Rays that miss the ball of a radius around the origin. By the cross product, as the discriminant
 /// cancels far away.
-VI Misses(const V3& o, const V3& d, V radius) {
+CHASE_INLINE VI Misses(const V3& o, const V3& d, V radius) {
   const V3 moment = Cross(o, d);
   return Dot(moment, moment) > radius * radius * Dot(d, d);
 }
 
-Span Ball(const V3& o, const V3& d, V radius) {
+CHASE_INLINE Span Ball(const V3& o, const V3& d, V radius) {
   const V squared = Dot(d, d) + 1e-20f, closest = -Dot(o, d) / squared;
   const V3 q = Along(o, closest, d);
   const V chord = Sqrt(Max(radius * radius - Dot(q, q), All(0.0f)) / squared);
@@ -77,7 +81,7 @@ struct Corners {
 };
 
 /// Column of the edge around the axis, and where between its ends.
-void Column(const FacetSolid& solid, const V3& p, VI* column, V* share) {
+CHASE_INLINE void Column(const FacetSolid& solid, const V3& p, VI* column, V* share) {
   const float n = static_cast<float>(solid.around);
   V turn = Angle(p.y, p.x) * (0.5f / kPi);
   turn = n * (turn - Floor(turn));
@@ -85,7 +89,7 @@ void Column(const FacetSolid& solid, const V3& p, VI* column, V* share) {
   *column = Whole(whole), *share = turn - whole;
 }
 
-Choice BoxChoice(const Lanes& unit, V margin) {
+CHASE_INLINE Choice BoxChoice(const Lanes& unit, V margin) {
   const V x = Slab(unit.o.x, unit.d.x, margin).enter, y = Slab(unit.o.y, unit.d.y, margin).enter,
           z = Slab(unit.o.z, unit.d.z, margin).enter;
   const VI on_z = (z >= x) & (z >= y), on_y = (y >= x) & ~on_z;
@@ -95,7 +99,7 @@ Choice BoxChoice(const Lanes& unit, V margin) {
 }
 
 /// The quads of the side, and after them the caps: below and above.
-Choice CylinderChoice(const FacetSolid& solid, const V3& p, VI cap) {
+CHASE_INLINE Choice CylinderChoice(const FacetSolid& solid, const V3& p, VI cap) {
   VI column;
   V share;
   Column(solid, p, &column, &share);
@@ -104,7 +108,7 @@ Choice CylinderChoice(const FacetSolid& solid, const V3& p, VI cap) {
 }
 
 /// By the point's direction from the centre, along which the quads' edges are straight.
-Choice EllipsoidChoice(const FacetSolid& solid, const V3& p) {
+CHASE_INLINE Choice EllipsoidChoice(const FacetSolid& solid, const V3& p) {
   VI column;
   V share;
   Column(solid, p, &column, &share);
@@ -121,7 +125,7 @@ Choice EllipsoidChoice(const FacetSolid& solid, const V3& p) {
 }
 
 /// As SolidMesh() lists them.
-Corners BoxCorners(const Choice& choice) {
+CHASE_INLINE Corners BoxCorners(const Choice& choice) {
   alignas(32) static const int kCorners[3][16] = {{0, 0, 4, 4, 0, 0, 2, 2, 0, 0, 1, 1},
                                                   {2, 3, 5, 7, 1, 5, 6, 7, 4, 6, 3, 7},
                                                   {3, 1, 7, 6, 5, 4, 7, 3, 6, 2, 7, 5}};
@@ -133,14 +137,14 @@ Corners BoxCorners(const Choice& choice) {
 }
 
 /// Quads between two rows of vertices.
-Corners QuadCorners(const FacetSolid& solid, const Choice& choice, VI row) {
+CHASE_INLINE Corners QuadCorners(const FacetSolid& solid, const Choice& choice, VI row) {
   const int n = solid.around;
   const VI a = choice.quad, column = a - row * n;
   const VI b = Pick(column == n - 1, a - column, a + 1), upper = choice.half != 0;
   return {{a, Pick(upper, b + n, b), Pick(upper, a + n, b + n)}};
 }
 
-Corners CylinderCorners(const FacetSolid& solid, const Choice& choice) {
+CHASE_INLINE Corners CylinderCorners(const FacetSolid& solid, const Choice& choice) {
   const int n = solid.around;
   const VI cap = choice.quad >= n, top = choice.half != 0;
   const VI i = Pick(cap, choice.quad - n, choice.quad), next = Pick(i == n - 1, AllInt(0), i + 1);
@@ -149,7 +153,7 @@ Corners CylinderCorners(const FacetSolid& solid, const Choice& choice) {
            Pick(cap, Pick(top, n + next, i), side.v[2])}};
 }
 
-Corners CornersOf(const FacetSolid& solid, const Choice& choice) {
+CHASE_INLINE Corners CornersOf(const FacetSolid& solid, const Choice& choice) {
   if (solid.kind == FacetSolid::Kind::kBox) return BoxCorners(choice);
   if (solid.kind == FacetSolid::Kind::kCylinder) return CylinderCorners(solid, choice);
   const V row = Floor((Real(choice.quad) + 0.5f) / static_cast<float>(solid.around));
@@ -157,7 +161,7 @@ Corners CornersOf(const FacetSolid& solid, const Choice& choice) {
 }
 
 /// A vertex for each lane.
-V3 Vertices(const FacetVertex* base, VI index) {
+CHASE_INLINE V3 Vertices(const FacetVertex* base, VI index) {
   int at[8];
   memcpy(at, &index, sizeof at);
   __m256 row[4];
@@ -171,7 +175,7 @@ V3 Vertices(const FacetVertex* base, VI index) {
 
 /// Where the rays may be within the solid: a span of a body slightly larger, and, of a cylinder,
 /// the lanes that enter it by a cap.
-VI Within(const FacetSolid& solid, const Lanes& unit, V size, Span* span, VI* cap) {
+CHASE_INLINE VI Within(const FacetSolid& solid, const Lanes& unit, V size, Span* span, VI* cap) {
   const V3 &o = unit.o, &d = unit.d;
   if (solid.kind == FacetSolid::Kind::kEllipsoid) {
     const VI misses = Misses(o, d, size);
@@ -193,23 +197,42 @@ VI Within(const FacetSolid& solid, const Lanes& unit, V size, Span* span, VI* ca
   return meets & (span->enter <= span->leave);
 }
 
-Choice Choose(const FacetSolid& solid, const Lanes& unit, V size, const V3& p, VI cap) {
+CHASE_INLINE Choice Choose(const FacetSolid& solid, const Lanes& unit, V size, const V3& p,
+                           VI cap) {
   if (solid.kind == FacetSolid::Kind::kBox) return BoxChoice(unit, size);
   if (solid.kind == FacetSolid::Kind::kCylinder) return CylinderChoice(solid, p, cap);
   return EllipsoidChoice(solid, p);
 }
 
+/// Where the rays are behind the planes of the facets tried so far (Cyrus and Beck 1978): a ray
+/// that leaves by one before it enters by another passes the solid by, between the facets and the
+/// smooth body around them. Both ends count by what rounding may make of them.
+struct Clip {
+  V enter = All(-INFINITY), leave = All(INFINITY);
+
+  VI Missed(const Lanes& ray, const Triangle& triangle, const Crossing& x, V t) {
+    const V edges = Sum(triangle.e1) * Sum(triangle.e2), way = Sum(triangle.v0 - ray.o);
+    const V slack = kPlaneRounding * edges * way / x.volume;
+    enter = Pick(x.den < 0.0f, Max(enter, t - slack), enter);
+    leave = Pick(x.den > 0.0f, Min(leave, t + slack), leave);
+    return enter > leave;
+  }
+  static V Sum(const V3& a) { return Abs(a.x) + Abs(a.y) + Abs(a.z); }
+};
+
 /// The facet through which each ray enters a convex solid: guessed on a smooth body around it, and
 /// from then on where the ray meets the plane of the last guess.
-void CrossSolid(const FacetWorld& world, const FacetSolid& solid, VI active, Lanes* ray) {
+CHASE_INLINE void CrossSolid(const FacetWorld& world, const FacetSolid& solid, VI active,
+                             Lanes* ray) {
   const Lanes unit = UnitRays(solid, *ray);
-  const V size = 1.001f + 1e-6f * (Abs(unit.o.x) + Abs(unit.o.y) + Abs(unit.o.z));
+  const V size = 1.001f + kUnitRounding * (Abs(unit.o.x) + Abs(unit.o.y) + Abs(unit.o.z));
   Span span = {};
   VI cap = AllInt(0), todo = active & Within(solid, unit, size, &span, &cap);
   if (Bits(todo) == 0) return;
   todo &= (span.leave >= 0.0f) & (span.enter <= ray->t);
   ray->unsure |= todo & (span.enter <= 0.0f);
   todo &= ~ray->unsure;
+  Clip clip;
   VI last = AllInt(-1), half = last;
   V3 p = Along(unit.o, span.enter, unit.d);
   for (int i = 0; i < kRounds && Bits(todo) != 0; ++i) {
@@ -222,15 +245,16 @@ void CrossSolid(const FacetWorld& world, const FacetSolid& solid, VI active, Lan
       v[k] = Vertices(world.vertices + solid.first, Pick(todo, corners.v[k], AllInt(0)));
     const Triangle triangle = TriangleOf(v[0], v[1], v[2]);
     const Crossing x = Cross(*ray, triangle);
-    const VI found = todo & x.Inside(kEdge) & (x.den < 0.0f);
+    const VI found = todo & x.Inside(kEdge * x.volume) & (x.den < 0.0f);
     Keep(x, triangle.n, found, AllInt(static_cast<int>(solid.material)), ray);
-    todo &= ~found;
-    p = Along(unit.o, x.depth / x.volume, unit.d);
+    const V t = x.depth / x.volume;
+    todo &= ~(found | clip.Missed(*ray, triangle, x, t));
+    p = Along(unit.o, t, unit.d);
   }
   ray->unsure |= todo;
 }
 
-Lanes LanesOf(const RayPacket& rays) {
+CHASE_INLINE Lanes LanesOf(const RayPacket& rays) {
   Lanes ray = {};
   ray.o = {Load(rays.ox), Load(rays.oy), Load(rays.oz)};
   ray.d = {Load(rays.dx), Load(rays.dy), Load(rays.dz)};
@@ -238,15 +262,14 @@ Lanes LanesOf(const RayPacket& rays) {
   return ray;
 }
 
-/// One packet, whose solids are in the row.
-unsigned TracePacket(const FacetWorld& world, const RayPacket& rays, const Row& row, float longest,
-                     HitPacket* hits) {
+CHASE_INLINE unsigned TraceBody(const FacetWorld& world, const RayPacket& rays,
+                                const NearSolids& near, HitPacket* hits) {
   Lanes ray = LanesOf(rays);
   const VI used = kLane < rays.count;
-  for (int i = 0; i < row.count; ++i) {
-    const VI open = used & ~ray.unsure & (ray.t * longest >= row.distance[i]);
+  for (int i = 0; i < near.count; ++i) {
+    const VI open = used & ~ray.unsure & (ray.t >= near.first[i].least);
     if (Bits(open) == 0) break;
-    CrossSolid(world, world.solids[row.solid[i]], open, &ray);
+    CrossSolid(world, world.solids[near.first[i].solid], open, &ray);
   }
   CrossGround(world.ground, used & ~ray.unsure, &ray);
   memcpy(hits->distance, &ray.t, sizeof ray.t);
@@ -256,6 +279,20 @@ unsigned TracePacket(const FacetWorld& world, const RayPacket& rays, const Row& 
   memcpy(hits->material, &ray.material, sizeof ray.material);
   return Bits(ray.unsure & used);
 }
+
+// One body, compiled for AVX2 and for the masks and the 32 registers of AVX-512: the same
+// operations, lane by lane. The processor decides at run time.
+unsigned TraceAvx2(const FacetWorld& world, const RayPacket& rays, const NearSolids& near,
+                   HitPacket* hits) {
+  return TraceBody(world, rays, near, hits);
+}
+__attribute__((target("avx512f,avx512vl,avx512dq,avx512bw"))) unsigned TraceAvx512(
+    const FacetWorld& world, const RayPacket& rays, const NearSolids& near, HitPacket* hits) {
+  return TraceBody(world, rays, near, hits);
+}
+const bool kHasAvx512 = __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512dq") &&
+                        __builtin_cpu_supports("avx512bw");
+const auto TracePacket = kHasAvx512 ? TraceAvx512 : TraceAvx2;
 
 }  // namespace
 
@@ -270,8 +307,21 @@ void TraceFacets(const FacetWorld& world, const RayPacket* rays, int n, HitPacke
     Sort(near, fan, &row);
     for (int k = first; k < end; ++k)
       unsure[k] = near.full ? (1u << rays[k].count) - 1u
-                            : TracePacket(world, rays[k], row, fan.longest, &hits[k]);
+                            : TracePacket(world, rays[k], {row.solids, row.count}, &hits[k]);
   }
+}
+
+void TraceNear(const FacetWorld& world, const NearSolids& near, const RayPacket* rays, int n,
+               HitPacket* hits, unsigned* unsure) {
+  for (int k = 0; k < n; ++k) unsure[k] = TracePacket(world, rays[k], near, &hits[k]);
+}
+
+bool MayMeet(const BoundsNode* boxes, int n_nodes, const RayPacket* rays, int n) {
+  const Fan fan = FanOf(rays, n);
+  V gap;
+  for (int i = 0; i < n_nodes; ++i)
+    if (Meets(boxes[i], fan, &gap) != 0) return true;
+  return false;
 }
 
 }  // namespace chase::simulator
@@ -283,6 +333,13 @@ namespace chase::simulator {
 void TraceFacets(const FacetWorld&, const RayPacket* rays, int n, HitPacket*, unsigned* unsure) {
   for (int k = 0; k < n; ++k) unsure[k] = (1u << rays[k].count) - 1u;
 }
+
+void TraceNear(const FacetWorld& world, const NearSolids&, const RayPacket* rays, int n,
+               HitPacket* hits, unsigned* unsure) {
+  TraceFacets(world, rays, n, hits, unsure);
+}
+
+bool MayMeet(const BoundsNode*, int, const RayPacket*, int) { return true; }
 
 }  // namespace chase::simulator
 

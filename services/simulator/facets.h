@@ -50,10 +50,29 @@ struct FacetWorld {
   GroundGrid ground;
 };
 
+/// A solid that rays may meet, and how far away it is at least, in multiples of their length.
+struct NearSolid {
+  int solid;
+  float least;
+};
+
+/// Solids that rays may meet, the nearest first.
+struct NearSolids {
+  const NearSolid* first = nullptr;
+  int count = 0;
+};
+
 /// First hits of n packets, at most kMostPackets, with the bits that Embree 3 gives for the same
 /// triangles on AVX2. A ray's bit in unsure[packet] says that its hit is not settled: it passes too
 /// near an edge or an outline, starts inside a solid, or the processor has no AVX2.
 void TraceFacets(const FacetWorld& world, const RayPacket* rays, int n, HitPacket* hits,
                  unsigned* unsure);
+
+/// The same where it is known which solids the rays may meet.
+void TraceNear(const FacetWorld& world, const NearSolids& near, const RayPacket* rays, int n,
+               HitPacket* hits, unsigned* unsure);
+
+/// False if none of the rays meets any of the boxes.
+bool MayMeet(const BoundsNode* boxes, int n_nodes, const RayPacket* rays, int n);
 
 }  // namespace chase::simulator

@@ -134,16 +134,15 @@ inline void Collect(const FacetWorld& world, const Fan& fan, Near* near) {
   }
 }
 
-/// Solids in the order of their distance, m.
+/// Solids in the order of their distance.
 struct Row {
-  int solid[kMostNear], count = 0;
-  float distance[kMostNear];
+  NearSolid solids[kMostNear];
+  int count = 0;
 
-  void Add(int s, float d) {
+  void Add(int solid, float least) {
     int i = count++;
-    for (; i > 0 && distance[i - 1] > d; --i)
-      distance[i] = distance[i - 1], solid[i] = solid[i - 1];
-    distance[i] = d, solid[i] = s;
+    for (; i > 0 && solids[i - 1].least > least; --i) solids[i] = solids[i - 1];
+    solids[i] = {solid, least};
   }
 };
 
@@ -157,7 +156,7 @@ inline void Sort(const Near& near, const Fan& fan, Row* row) {
     memcpy(distance, &gap, sizeof distance);
     for (; meets != 0; meets &= meets - 1) {
       const int i = __builtin_ctz(meets);
-      row->Add(~node.child[i], distance[i]);
+      row->Add(~node.child[i], distance[i] / fan.longest);
     }
   }
 }

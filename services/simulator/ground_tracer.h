@@ -6,21 +6,33 @@
 namespace chase::simulator {
 namespace {
 
-constexpr int kMostCells = 256;      // on a ray's way
-constexpr float kCellEdge = 1e-3f;   // share of a triangle at its edges where a hit is not settled
+constexpr int kMostCells = 256;  // on a ray's way
+// Share of a triangle at its edges where a hit is not settled, at most and at least.
+constexpr float kCellEdge = 1e-3f, kLeastEdge = 1e-4f;
 constexpr float kPlainEdge = 1e-5f;  // the same where the ground is two triangles
+constexpr float kRounding = 5e-7f;   // eight roundings of a product, of single precision
 constexpr float kAboveTop = 1e-3f;   // m, more than the rounding of a height
 
-inline void CrossCell(const GroundGrid& ground, VI ix, VI iy, float edge, VI* lanes, Lanes* ray) {
+/// How near to a triangle's edges a hit is not settled, in the unit of the crossing's volume: what
+/// rounding may make of the way to the triangle times its edge, and a little more.
+inline V CellEdge(const GroundGrid& ground, const Crossing& x, float most, V way) {
+  const float rounding = kRounding / ground.cells_per_m[0];
+  return Min(most * x.volume, kLeastEdge * x.volume + rounding * way);
+}
+
+inline void CrossCell(const GroundGrid& ground, VI ix, VI iy, float most, VI* lanes, Lanes* ray) {
   const VI below = iy * (ground.columns + 1) + ix, above = below + (ground.columns + 1);
   const V x0 = Gather(ground.x, ix), x1 = Gather(ground.x + 1, ix);
   const V y0 = Gather(ground.y, iy), y1 = Gather(ground.y + 1, iy);
   const V3 a = {x0, y0, Gather(ground.z, below)}, b = {x1, y0, Gather(ground.z + 1, below)};
   const V3 d = {x0, y1, Gather(ground.z, above)}, e = {x1, y1, Gather(ground.z + 1, above)};
   const Triangle halves[2] = {TriangleOf(a, b, e), TriangleOf(a, e, d)};
+  const V3 c = a - ray->o;
+  const V way = Abs(c.x) + Abs(c.y) + Abs(c.z);
   VI settled = AllInt(0);
   for (const Triangle& triangle : halves) {
     const Crossing x = Cross(*ray, triangle);
+    const V edge = CellEdge(ground, x, most, way);
     const VI found = *lanes & x.Inside(edge);
     ray->unsure |= *lanes & x.Inside(-edge) & ~found;
     Keep(x, triangle.n, found, AllInt(static_cast<int>(Material::kGround)), ray);
@@ -31,7 +43,8 @@ inline void CrossCell(const GroundGrid& ground, VI ix, VI iy, float edge, VI* la
 
 /// From cell to cell of the grid (Amanatides and Woo 1987), from where the ray comes below the
 /// highest of the ground.
-inline void CrossGround(const GroundGrid& ground, VI todo, Lanes* ray) {
+__attribute__((always_inline)) inline void CrossGround(const GroundGrid& ground, VI todo,
+                                                       Lanes* ray) {
   if (ground.columns == 1 && ground.rows == 1)
     return CrossCell(ground, AllInt(0), AllInt(0), kPlainEdge, &todo, ray);
   const float* plane = ground.plane;

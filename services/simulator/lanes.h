@@ -79,11 +79,8 @@ inline Triangle TriangleOf(const V3& v0, const V3& v1, const V3& v2) {
 struct Crossing {
   V u, v, w, depth, volume, den;
 
-  /// Inside the triangle by a share of its size, or, where it is below zero, not outside by more.
-  VI Inside(float margin) const {
-    const V edge = margin * volume;
-    return (Min(Min(u, v), w) > edge);
-  }
+  /// Inside the triangle by a volume, or, where it is below zero, not outside by more.
+  VI Inside(V edge) const { return Min(Min(u, v), w) > edge; }
 };
 
 inline Crossing Cross(const Lanes& ray, const Triangle& triangle) {

@@ -27,4 +27,13 @@ PixelBox ProjectedBox(const world::Rig& rig, const Viewpoint& view, const world:
 /// is behind the camera, and without end when it reaches there.
 PixelBox Surrounding(const world::Rig& rig, const Viewpoint& view, const world::Solid& solid);
 
+/// What a solid and a millimetre around it take of the image.
+struct Outline {
+  PixelBox box;        ///< not cut to the image; empty when it is behind the camera
+  double depth = 0.0;  ///< of its nearest point along the optical axis, 0 at least, m
+};
+
+/// Close around the solid, also where a part of it is behind the camera.
+Outline OutlineOf(const world::Rig& rig, const Viewpoint& view, const world::Solid& solid);
+
 }  // namespace chase::simulator

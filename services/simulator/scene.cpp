@@ -24,6 +24,7 @@ constexpr std::size_t kTargetInstance = 0;
 constexpr int kFine = 48, kCoarse = 20;  // edges around a solid
 constexpr double kMargin = 110.0;        // m of ground beyond what stands on it
 constexpr double kRoughMargin = 40.0;
+constexpr float kAround = 1e-3f;  // m around what moves
 constexpr double kAway = 1000.0;  // m below: out of range and under the ground
 
 struct Instance {
@@ -81,6 +82,24 @@ void SetPlace(const Solid& solid, Instance* instance) {
   const float place[12] = {c, s, 0, -s, c, 0, 0, 0, 1, p.x(), p.y(), p.z()};
   rtcSetGeometryTransform(instance->geometry, 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, place);
   rtcCommitGeometry(instance->geometry);
+}
+
+/// Boxes around solids, by eights.
+std::vector<BoundsNode> BoxesAround(const std::vector<Solid>& solids) {
+  std::vector<BoundsNode> nodes((solids.size() + 7) / 8);
+  for (std::size_t i = 0; i < solids.size(); ++i) {
+    const Solid& solid = solids[i];
+    const double c = std::abs(std::cos(solid.yaw)), s = std::abs(std::sin(solid.yaw));
+    const Vector3d& h = solid.half_size;
+    const Vector3d half(c * h.x() + s * h.y(), s * h.x() + c * h.y(), h.z());
+    BoundsNode& node = nodes[i / 8];
+    const int slot = node.count++;
+    for (int k = 0; k < 3; ++k) {
+      node.center[k][slot] = static_cast<float>(solid.center[k]);
+      node.half[k][slot] = static_cast<float>(half[k]) + kAround;
+    }
+  }
+  return nodes;
 }
 
 /// Rays up to where they are known to end.
@@ -143,7 +162,8 @@ struct Scene::Impl {
   RTCScene fixed = nullptr, moving = nullptr, target = nullptr;
   std::vector<RTCScene> parts;
   std::vector<Instance> instances;
-  std::vector<Solid> moving_solids;
+  std::vector<Solid> standing_solids, moving_solids;
+  std::vector<BoundsNode> moving_boxes;
   // By number of the geometry plus one, as the invalid number plus one is zero.
   std::vector<Material> static_materials = {Material::kNothing};
   Vector3d target_center = Vector3d::Zero();
@@ -163,7 +183,8 @@ void Scene::Impl::AddInstance(RTCScene part, Material material) {
 }
 
 void Scene::Impl::BuildStatic() {
-  const auto solids = world::StaticSolids(scenario);
+  standing_solids = world::StaticSolids(scenario);
+  const auto& solids = standing_solids;
   fixed = NewScene();
   const Rectangle extent = GroundExtent(scenario, solids);
   const Mesh ground = GroundMesh(scenario.world.ground, extent.min, extent.max);
@@ -282,10 +303,12 @@ void Scene::MoveTo(double t) {
   }
   for (std::size_t i = 0; i < solids.size(); ++i) SetPlace(solids[i], &impl_->instances[i]);
   impl_->target_center = target.center;
+  impl_->moving_boxes = BoxesAround(solids);
   rtcCommitScene(impl_->moving);
 }
 
 const std::vector<Solid>& Scene::MovingSolids() const { return impl_->moving_solids; }
+const std::vector<Solid>& Scene::StandingSolids() const { return impl_->standing_solids; }
 
 /// By the solids' own shapes; Embree settles what is unsure, packet by packet, as its streams
 /// settle ties on the triangles' edges in another order.
@@ -295,18 +318,28 @@ void Scene::Trace(const RayPacket* rays, int n, HitPacket* hits) const {
   for (int k = 0; k < n; ++k) impl_->Settle(rays[k], unsure[k] != 0, &hits[k]);
 }
 
+void Scene::Trace(const NearSolids& near, const RayPacket* rays, int n, HitPacket* hits) const {
+  unsigned unsure[kMostPackets];
+  TraceNear(impl_->facets.world(), near, rays, n, hits, unsure);
+  for (int k = 0; k < n; ++k) impl_->Settle(rays[k], unsure[k] != 0, &hits[k]);
+}
+
 void Scene::TraceAcross(const RayPacket* rays, int n, HitPacket* hits) const {
   unsigned unsure[kMostPackets];
   TraceFacets(impl_->facets.world(), rays, n, hits, unsure);
+  const auto& boxes = impl_->moving_boxes;
+  const bool movers = MayMeet(boxes.data(), static_cast<int>(boxes.size()), rays, n);
   for (int lane = 0; lane < rays[0].count; ++lane)
     for (int first = 0; first < n; first += 8) {
+      bool open = false;
+      for (int i = 0; i < 8; ++i) open = open || (unsure[first + i] >> lane & 1u) != 0;
+      if (!open && !movers) continue;
       RayPacket across;
       HitPacket found;
-      bool open = false;
+      across.movers = movers;
       for (int i = 0; i < 8; ++i) {
         CopyRay(rays[first + i], lane, &across, i);
         CopyHit(hits[first + i], lane, &found, i);
-        open = open || (unsure[first + i] >> lane & 1u) != 0;
       }
       impl_->Settle(across, open, &found);
       for (int i = 0; i < 8; ++i) CopyHit(found, i, &hits[first + i], lane);

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "services/simulator/actors.h"
+#include "services/simulator/facets.h"
 #include "services/simulator/packets.h"
 
 namespace chase::simulator {
@@ -24,9 +25,13 @@ class Scene {
   void Show(bool target, bool decoy);
   /// All that moves, where it stands now.
   const std::vector<world::Solid>& MovingSolids() const;
+  /// All that stands but the ground.
+  const std::vector<world::Solid>& StandingSolids() const;
   void Trace(const RayPacket& rays, HitPacket* hits) const { Trace(&rays, 1, hits); }
   /// Traces n packets, at most kMostPackets.
   void Trace(const RayPacket* rays, int n, HitPacket* hits) const;
+  /// The same where it is known which of StandingSolids() the rays may meet.
+  void Trace(const NearSolids& near, const RayPacket* rays, int n, HitPacket* hits) const;
   /// The same, n a multiple of eight; what Embree settles travels in packets across the tile, of a
   /// lane of eight packets each.
   void TraceAcross(const RayPacket* rays, int n, HitPacket* hits) const;

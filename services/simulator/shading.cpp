@@ -184,18 +184,27 @@ void Shade(const RayPacket& rays, const HitPacket& hits, const float target_colo
   memcpy(light->rgb, sum, sizeof sum);
 }
 
+/// The fourth byte of each pixel is left out.
 void Expose(const LightPacket& light, float brightness, int count, uint8_t* out) {
+  typedef uint8_t Bytes __attribute__((vector_size(16)));
   VI value[3];
   for (int k = 0; k < 3; ++k) {
     const V scaled = 255.0f * (brightness * Load(light.rgb[k])) + 0.5f;
     value[k] = __builtin_convertvector(Min(All(255.0f), Max(All(0.0f), scaled)), VI);
   }
-  const VI pixel = value[0] | value[1] << 8 | value[2] << 16;
-  int pixels[8];
-  memcpy(pixels, &pixel, sizeof pixels);
-  // Least byte first; the next pixel takes the place of the fourth byte.
-  for (int i = 0; i + 1 < count; ++i) memcpy(out + 3 * i, &pixels[i], 4);
-  memcpy(out + 3 * (count - 1), &pixels[count - 1], 3);
+  const VI pixels = value[0] | value[1] << 8 | value[2] << 16;  // least byte first
+  Bytes halves[2];
+  memcpy(halves, &pixels, sizeof halves);
+  uint8_t bytes[32];
+  for (int i = 0; i < 2; ++i) {
+    const Bytes packed = __builtin_shufflevector(halves[i], halves[i], 0, 1, 2, 4, 5, 6, 8, 9, 10,
+                                                 12, 13, 14, 15, 15, 15, 15);
+    memcpy(bytes + 12 * i, &packed, sizeof packed);
+  }
+  if (count == 8)
+    memcpy(out, bytes, 24);
+  else
+    memcpy(out, bytes, static_cast<size_t>(3 * count));
 }
 
 }  // namespace chase::simulator

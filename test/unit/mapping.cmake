@@ -3,6 +3,7 @@ chase_test(mapping_test LIBS mapping_core octomap octomath SOURCES
   ${CMAKE_CURRENT_LIST_DIR}/mapping_metrics.cpp
   ${CMAKE_CURRENT_LIST_DIR}/mapping_enclosing_test.cpp
   ${CMAKE_CURRENT_LIST_DIR}/mapping_grid_test.cpp
+  ${CMAKE_CURRENT_LIST_DIR}/mapping_ray_walk_test.cpp
   ${CMAKE_CURRENT_LIST_DIR}/mapping_ground_test.cpp
   ${CMAKE_CURRENT_LIST_DIR}/mapping_body_test.cpp
   ${CMAKE_CURRENT_LIST_DIR}/mapping_tracker_test.cpp

@@ -5,6 +5,7 @@ chase_test(simulator_test LIBS simulator_core
   SOURCES ${CMAKE_CURRENT_LIST_DIR}/simulator_vehicle_test.cpp
           ${CMAKE_CURRENT_LIST_DIR}/simulator_lidar_test.cpp
           ${CMAKE_CURRENT_LIST_DIR}/simulator_camera_test.cpp
+          ${CMAKE_CURRENT_LIST_DIR}/simulator_tile_bins_test.cpp
           ${CMAKE_CURRENT_LIST_DIR}/simulator_loop_test.cpp)
 chase_test(simulator_facets_test LIBS simulator_core embree
   SOURCES ${CMAKE_CURRENT_LIST_DIR}/simulator_facets_test.cpp)
