@@ -1,9 +1,12 @@
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <stdexcept>
 
 #include "common/config/version.h"
+#include "logs/src/compare.h"
+#include "logs/src/output.h"
 #include "logs/src/page_template.h"
 #include "logs/src/read_flight.h"
 #include "logs/src/report_page.h"
@@ -13,6 +16,8 @@ namespace {
 
 namespace fs = std::filesystem;
 using namespace chase::logs;
+
+constexpr double kTolerance = 0.01;  // share of a figure: less is not worth a flag
 
 fs::path OutputFolder(const std::string& log, const std::string& out) {
   fs::path folder = out.empty() ? fs::path(log).parent_path() : fs::path(out);
@@ -33,6 +38,16 @@ void PrintSummary(const Metrics& m, const fs::path& folder) {
 /// The flight's end is in the log: that of its mission, or the collision that it was ended by.
 bool HoldsTheEnd(const Metrics& m) { return m.criteria.at("complete") || m.collision_s >= 0.0; }
 
+/// Says where the log ends before the flight does; returns the exit code.
+int Judge(const std::string& log, const FlightRecord& record, const Metrics& metrics) {
+  if (metrics.log_whole && HoldsTheEnd(metrics)) return 0;
+  std::fprintf(stderr,
+               "chase-report: %s: the log %s at %.1f s of %.1f s; the figures are of that part\n",
+               log.c_str(), metrics.log_whole ? "ends" : "is cut off or damaged and ends",
+               metrics.flown_s, record.scenario.duration_s);
+  return 2;
+}
+
 /// Returns the exit code.
 int Report(const std::string& log, const std::string& out) {
   const FlightRecord record = ReadFlight(log);
@@ -45,12 +60,24 @@ int Report(const std::string& log, const std::string& out) {
   WritePage((folder / "report.html").string(), ShareFolder() + "/report.html",
             ShareFolder() + "/plotly.min.js", data, MetricsJson(record, metrics));
   PrintSummary(metrics, folder);
-  if (metrics.log_whole && HoldsTheEnd(metrics)) return 0;
-  std::fprintf(stderr,
-               "chase-report: %s: the log %s at %.1f s of %.1f s; the figures are of that part\n",
-               log.c_str(), metrics.log_whole ? "ends" : "is cut off or damaged and ends",
-               metrics.flown_s, record.scenario.duration_s);
-  return 2;
+  return Judge(log, record, metrics);
+}
+
+/// The metrics of two flights side by side; with `out` as comparison.txt there too.
+int Compare(const std::string& a, const std::string& b, const std::string& out) {
+  std::string json[2];
+  int code = 0;
+  for (int i = 0; i < 2; ++i) {
+    const std::string& log = i == 0 ? a : b;
+    const FlightRecord record = ReadFlight(log);
+    const Metrics metrics = Compute(record, Score(record));
+    json[i] = MetricsJson(record, metrics);
+    code = std::max(code, Judge(log, record, metrics));
+  }
+  const std::string table = Format(CompareMetrics(json[0], json[1], kTolerance));
+  std::printf("A: %s\nB: %s\n%s", a.c_str(), b.c_str(), table.c_str());
+  if (!out.empty()) WriteFile((OutputFolder(b, out) / "comparison.txt").string(), table);
+  return code;
 }
 
 }  // namespace
@@ -61,12 +88,16 @@ int main(int argc, char** argv) {
   CLI::App app{"Metrics, plots and one HTML page from a flight log."};
   app.name("chase-report");
   chase::config::AddVersion(&app);
-  std::string log, out;
+  std::string log, other, out;
   app.add_option("LOG", log, "LCM log of a simulated flight")->required();
-  app.add_option("--out", out, "folder for metrics.json, report.html and PNGs; default: the log's");
+  app.add_option("LOG2", other,
+                 "a second one: the two are compared, and what got worse is flagged");
+  app.add_option("--out", out,
+                 "folder for metrics.json, report.html and PNGs; default: the log's; of two "
+                 "logs: for comparison.txt");
   try {
     app.parse(argc, argv);
-    return Report(log, out);
+    return other.empty() ? Report(log, out) : Compare(log, other, out);
   } catch (const CLI::ParseError& e) {
     if (e.get_exit_code() == 0) return app.exit(e);
     std::fprintf(stderr, "chase-report: %s; see chase-report --help\n", e.what());

@@ -171,6 +171,25 @@ class LogTools(unittest.TestCase):
         self.assertEqual(metrics["lost_messages"]["TRUTH"], 0)
         self.assertIn("are missing", (out / "report.html").read_text())
 
+    def test_two_flights_are_compared(self):
+        out = self.folder / "compared"
+        same = run("chase-report", self.log, self.log, "--out", out)
+        self.assertEqual(same.returncode, 2, "both end after a second of a minute")
+        self.assertIn("B is worse in nothing", same.stdout)
+        self.assertIn("safe_ratio", (out / "comparison.txt").read_text())
+        blind = self.without("blind.lcm", lambda channel, k: channel == "POSE")
+        worse = run("chase-report", self.log, blind).stdout
+        self.assertRegex(worse, r"odometry_ate_m +[\d.]+ +not known  WORSE")
+        better = run("chase-report", blind, self.log).stdout
+        self.assertRegex(better, r"odometry_ate_m +not known +[\d.]+\n")
+
+    def test_report_has_a_time_line_and_what_was_certified(self):
+        out = self.folder / "lines"
+        run("chase-report", self.log, "--out", out)
+        page = (out / "report.html").read_text()
+        self.assertRegex(page, r'"lane":"verdict","label":"\w+"')
+        self.assertRegex(page, r'"certified":\{"t":\[')
+
     def counts(self, log):
         found = {}
         for _, channel, _ in lcmlog.read(log):
