@@ -11,6 +11,7 @@
 #include "logs/src/read_flight.h"
 #include "logs/src/report_page.h"
 #include "logs/src/report_plots.h"
+#include "logs/src/vehicle_report.h"
 
 namespace {
 
@@ -45,6 +46,26 @@ int Judge(const std::string& log, const FlightRecord& record, const Metrics& met
                "chase-report: %s: the log %s at %.1f s of %.1f s; the figures are of that part\n",
                log.c_str(), metrics.log_whole ? "ends" : "is cut off or damaged and ends",
                metrics.flown_s, record.scenario.duration_s);
+  return 2;
+}
+
+/// Of a log that holds no truth; returns the exit code.
+int ReportOfVehicle(const std::string& log, const std::string& out) {
+  const VehicleReport report = ReportVehicle(log);
+  const fs::path folder = OutputFolder(log, out);
+  const std::string metrics = report.metrics.dump(2) + "\n";
+  WriteFile((folder / "metrics.json").string(), metrics);
+  WriteFile((folder / "report.html").string(),
+            FillPage(ShareFolder() + "/vehicle_report.html",
+                     {{"/*DATA*/null", Embedded(report.series.dump())},
+                      {"/*METRICS*/null", Embedded(metrics)},
+                      {"/*PLOTLY*/", PlotlySource(ShareFolder() + "/plotly.min.js")}}));
+  std::printf("%s holds no TRUTH: reported is what the vehicle said of itself\n%s\n", log.c_str(),
+              (folder / "report.html").c_str());
+  if (report.whole) return 0;
+  std::fprintf(stderr,
+               "chase-report: %s: the log is cut off or damaged; the figures are of its rest\n",
+               log.c_str());
   return 2;
 }
 
@@ -89,7 +110,7 @@ int main(int argc, char** argv) {
   app.name("chase-report");
   chase::config::AddVersion(&app);
   std::string log, other, out;
-  app.add_option("LOG", log, "LCM log of a simulated flight")->required();
+  app.add_option("LOG", log, "LCM log of a flight")->required();
   app.add_option("LOG2", other,
                  "a second one: the two are compared, and what got worse is flagged");
   app.add_option("--out", out,
@@ -97,7 +118,8 @@ int main(int argc, char** argv) {
                  "logs: for comparison.txt");
   try {
     app.parse(argc, argv);
-    return other.empty() ? Report(log, out) : Compare(log, other, out);
+    if (!other.empty()) return Compare(log, other, out);
+    return HoldsTruth(log) ? Report(log, out) : ReportOfVehicle(log, out);
   } catch (const CLI::ParseError& e) {
     if (e.get_exit_code() == 0) return app.exit(e);
     std::fprintf(stderr, "chase-report: %s; see chase-report --help\n", e.what());
