@@ -16,6 +16,7 @@
 #include "chase/truth_t.hpp"
 #include "common/bus/battery.h"
 #include "common/bus/convert.h"
+#include "common/config/version.h"
 #include "common/math/rotation.h"
 
 namespace chase::simulator {
@@ -180,6 +181,7 @@ void SimulatorNode::PublishAutopilot(int64_t utime) {
   message.name = "fcu";
   message.state = status_t::OK;
   message.detail = "simulated, " + bus::BatteryWords(simulator_.charge());
+  message.version = config::Version();
   bus_.Publish("FCU_STATUS", message);
 }
 

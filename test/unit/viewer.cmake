@@ -3,7 +3,7 @@ chase_test(viewer_core_test
   SOURCES ${CMAKE_CURRENT_LIST_DIR}/viewer_core_test.cpp)
 chase_test(viewer_node_test
   LIBS viewer_node
-  SOURCES ${CMAKE_CURRENT_LIST_DIR}/viewer_node_test.cpp)
+  SOURCES ${CMAKE_CURRENT_LIST_DIR}/viewer_node_test.cpp ${CMAKE_CURRENT_LIST_DIR}/viewer_commander_test.cpp)
 add_dependencies(viewer_node_test viewer_page)
 
 add_test(NAME viewer_commands
