@@ -19,7 +19,7 @@ const std::vector<ChannelRow>& ChannelTable() {
       {"PLAN", "plan_t", "planning", false, true},
       {"ATTITUDE_SETPOINT", "attitude_setpoint_t", "control", false, true},
       {"TRACKING", "tracking_t", "control", false},
-      {"COMMAND", "command_t", "command", false, true},
+      {"COMMAND", "command_t", "command, viewer", false, true},
       {"COMMAND_ACK", "command_ack_t", "mission", false},
       {"FLIGHT_STATE", "flight_state_t", "mission", false, true},
       {"HEALTH", "health_t", "mission", false},
@@ -30,9 +30,18 @@ const std::vector<ChannelRow>& ChannelTable() {
   return table;
 }
 
+namespace {
+
+/// Is `name` one of a list with commas?
+bool IsAmong(const std::string& list, const std::string& name) {
+  return (", " + list + ",").find(", " + name + ",") != std::string::npos;
+}
+
+}  // namespace
+
 bool MaySend(const std::string& channel, const std::string& sender) {
   for (const auto& row : ChannelTable())
-    if (row.commands && row.channel == channel) return row.sender == sender;
+    if (row.commands && row.channel == channel) return IsAmong(row.sender, sender);
   return true;
 }
 

@@ -15,7 +15,7 @@ struct ChannelRow {
 /// Every channel but the <NAME>_STATUS ones (status_t).
 const std::vector<ChannelRow>& ChannelTable();
 /// May a process of this name be obeyed on the channel? What moves the vehicle comes from the
-/// process of the table only; anybody may stand in for the others.
+/// processes of the table only; anybody may stand in for the others.
 bool MaySend(const std::string& channel, const std::string& sender);
 bool IsHeavy(const std::string& channel);
 /// "planning" -> "PLANNING_STATUS".

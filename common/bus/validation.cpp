@@ -4,6 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "common/world/commands.h"
+
 namespace chase::bus {
 
 namespace {
@@ -112,7 +114,7 @@ std::string Problem(const camera_image_t& m) {
 std::string Problem(const command_ack_t& m) {
   return Check()
       .Time(m.utime)
-      .Code("kind", m.kind, command_t::STOP)
+      .Code("kind", m.kind, world::kKillCommand)
       .Code("verdict", m.verdict, command_ack_t::REFUSED)
       .Result();
 }
@@ -120,7 +122,7 @@ std::string Problem(const command_ack_t& m) {
 std::string Problem(const command_t& m) {
   return Check()
       .Time(m.utime)
-      .Code("kind", m.kind, command_t::STOP)
+      .Code("kind", m.kind, world::kKillCommand)
       .Number("arguments", m.arguments)
       .Result();
 }

@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "common/config/config.h"
+#include "common/world/commands.h"
 
 namespace chase::world {
 namespace {
@@ -138,12 +139,9 @@ std::string WorldSpec::Problem() const {
 }
 
 std::string CommandSpec::Problem() const {
-  static const std::vector<std::string> known = {"takeoff", "chase", "hold", "search",
-                                                 "return",  "land",  "stop"};
   std::string all;
-  for (const auto& one : known) all += (all.empty() ? "" : ", ") + one;
-  return Check(std::find(known.begin(), known.end(), command) != known.end(), "command",
-               "'" + command + "'", "one of " + all);
+  for (const char* one : kCommandNames) all += (all.empty() ? "" : ", ") + std::string(one);
+  return Check(CommandNamed(command).has_value(), "command", "'" + command + "'", "one of " + all);
 }
 
 std::string ServiceOverride::Problem() const {

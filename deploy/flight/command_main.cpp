@@ -6,13 +6,12 @@
 #include <string>
 #include <vector>
 
-#include "chase/command_ack_t.hpp"
-#include "chase/command_t.hpp"
 #include "chase/flight_state_t.hpp"
+#include "common/bus/command_call.h"
 #include "common/bus/convert.h"
 #include "common/bus/udp_bus.h"
 #include "common/config/version.h"
-#include "services/mission/command_client.h"
+#include "services/mission/progress.h"
 
 namespace chase::mission {
 namespace {
@@ -22,44 +21,37 @@ enum Exit { kAccepted = 0, kBadUse = 1, kRefused = 2, kNoAnswer = 3, kNotReached
 
 struct Arguments {
   std::string command, vehicle, url;
-  bool wait = false;
+  bool wait = false, force = false;
   double timeout = 120.0;
 };
 
-/// The command on its way: sends, hears answers, follows the flight's state.
+/// The command on its way, and the flight's state meanwhile.
 class Session {
  public:
-  Session(bus::UdpBus* bus, Event command)
-      : bus_(*bus), start_(bus->identity().start), client_(command, 0.0) {
-    message_.utime = message_.id = start_;
-    message_.kind = static_cast<int8_t>(command);
-    bus_.Subscribe<command_ack_t>("COMMAND_ACK", [this](const command_ack_t& m) {
-      if (m.command_sender == bus_.identity().process && m.command_start == start_ &&
-          m.id == message_.id)
-        client_.OnAnswer(m.verdict == command_ack_t::ACCEPTED, m.reason);
-    });
+  Session(bus::UdpBus* bus, int kind, bool force)
+      : bus_(*bus), start_(bus->Now()), call_(*bus, kind, bus->identity().start, force) {
+    bus_.Subscribe<command_ack_t>("COMMAND_ACK", [this](const command_ack_t& m) { call_.Hear(m); });
     bus_.Subscribe<flight_state_t>("FLIGHT_STATE", [this](const flight_state_t& m) {
       state_ = std::string(Name(static_cast<State>(m.state))) + ": " + m.reason;
-      if (client_.answered())
-        progress_ = ProgressOf(client_.command(), static_cast<State>(m.state));
+      if (call_.answered())
+        progress_ = ProgressOf(static_cast<Event>(call_.kind()), static_cast<State>(m.state));
     });
   }
 
   void Turn() {
-    if (client_.Due(elapsed())) bus_.Publish("COMMAND", message_);
+    call_.Turn();
     bus_.Handle(kWait);
   }
 
   double elapsed() const { return bus::Seconds(bus_.Now(), start_); }
-  const CommandClient& client() const { return client_; }
+  const bus::CommandCall& call() const { return call_; }
   Progress progress() const { return progress_; }
   const std::string& state() const { return state_; }
 
  private:
   bus::UdpBus& bus_;
   int64_t start_;
-  CommandClient client_;
-  command_t message_{};
+  bus::CommandCall call_;
   Progress progress_ = Progress::kUnderWay;
   std::string state_;
 };
@@ -70,15 +62,15 @@ int Fail(int code, const std::string& what) {
 }
 
 int AwaitAnswer(const Arguments& a, Session* session) {
-  const CommandClient& client = session->client();
-  while (!client.answered() && !client.GaveUp(session->elapsed())) session->Turn();
-  if (!client.answered())
+  const bus::CommandCall& call = session->call();
+  while (!call.answered() && !call.GaveUp()) session->Turn();
+  if (!call.answered())
     return Fail(kNoAnswer,
                 fmt::format("{}: no answer{}; does chase-mission run{}?", a.command,
                             session->state().empty() ? "" : ", though FLIGHT_STATE is heard",
                             a.vehicle.empty() ? "" : " on vehicle '" + a.vehicle + "'"));
-  if (!client.accepted()) return Fail(kRefused, "refused: " + client.reason());
-  fmt::print("{}\n", client.reason());
+  if (!call.accepted()) return Fail(kRefused, "refused: " + call.reason());
+  fmt::print("{}\n", call.reason());
   std::fflush(stdout);
   return kAccepted;
 }
@@ -96,9 +88,11 @@ int AwaitEnd(const Arguments& a, Session* session) {
 }
 
 int Run(const Arguments& a) {
+  if (a.force && a.command != "kill")
+    return Fail(kBadUse, "--force belongs to kill; see chase-command --help");
   bus::UdpBus bus(a.url, a.vehicle);
   bus.SetIdentity({"command", a.vehicle, bus.Now()});
-  Session session(&bus, *CommandNamed(a.command));
+  Session session(&bus, *world::CommandNamed(a.command), a.force);
   const int code = AwaitAnswer(a, &session);
   return code == kAccepted && a.wait ? AwaitEnd(a, &session) : code;
 }
@@ -113,12 +107,14 @@ std::string TimeoutProblem(const std::string& text) {
 void AddOptions(CLI::App* app, Arguments* a) {
   const char* env = std::getenv("LCM_DEFAULT_URL");
   a->url = env != nullptr && *env != '\0' ? env : bus::kDefaultUrl;
-  app->add_option("command", a->command, "takeoff, chase, hold, search, return, land or stop")
+  app->add_option("command", a->command, "takeoff, chase, hold, search, return, land, stop or kill")
       ->required()
-      ->check(CLI::IsMember({"takeoff", "chase", "hold", "search", "return", "land", "stop"}));
+      ->check(CLI::IsMember(
+          std::vector<std::string>(world::kCommandNames.begin(), world::kCommandNames.end())));
   app->add_option("--vehicle", a->vehicle, "channel prefix of the vehicle that is meant");
   app->add_flag("--wait", a->wait,
                 "until the flight is there: in the air, chasing, holding, landed");
+  app->add_flag("--force", a->force, "of kill, which cuts the motors wherever it is, and it falls");
   app->add_option("--timeout", a->timeout, "of --wait, s (default 120)")->check(TimeoutProblem);
   app->add_option("--lcm-url", a->url, "LCM provider (default: $LCM_DEFAULT_URL, else built in)");
   app->footer(

@@ -29,6 +29,8 @@ void Derive(const world::Scenario& scenario, FlightConfigs* configs) {
   configs->planning.planner.desired_distance = chaser.desired_distance;
   configs->planning.planner.drone_radius = chaser.radius;
   configs->control.drone_radius = chaser.radius;
+  configs->mission.climb_height = chaser.takeoff_height + chaser.radius;
+  configs->mission.body_radius = chaser.radius;
   if (!scenario.commands.empty()) return;
   configs->mission.autostart = true;
   configs->mission.give_up = 0.0;

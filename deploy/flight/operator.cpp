@@ -1,6 +1,5 @@
 #include "deploy/flight/operator.h"
 
-#include "chase/command_t.hpp"
 #include "common/bus/convert.h"
 
 namespace chase::flight {
@@ -8,37 +7,23 @@ namespace chase::flight {
 Operator::Operator(bus::Bus& bus, const std::vector<world::CommandSpec>& commands,
                    int64_t mission_start)
     : bus_(bus), commands_(commands), mission_start_(mission_start) {
-  bus_.Subscribe<command_ack_t>("COMMAND_ACK", [this](const command_ack_t& m) { OnAnswer(m); });
+  bus_.Subscribe<command_ack_t>("COMMAND_ACK", [this](const command_ack_t& m) {
+    if (call_) call_->Hear(m);
+  });
 }
 
 void Operator::Tick(int64_t utime) {
   if (static_cast<size_t>(id_) >= commands_.size()) return;
   const world::CommandSpec& next = commands_[static_cast<size_t>(id_)];
-  const double t = bus::Seconds(utime, mission_start_);
-  if (!client_ && t >= next.at_s) {
-    client_.emplace(*mission::CommandNamed(next.command), t);
-    given_ = utime;
-  }
-  if (!client_) return;
-  if (client_->Due(t)) {
-    command_t m{};
-    m.utime = given_;
-    m.id = id_;
-    m.kind = static_cast<int8_t>(client_->command());
-    bus_.Publish("COMMAND", m);
-  } else if (client_->answered() || client_->GaveUp(t)) {
-    if (!client_->accepted())
-      bus_.ReportError(next.command +
-                       (client_->answered() ? ": " + client_->reason() : ": no answer"));
-    client_.reset();
-    ++id_;
-  }
-}
-
-void Operator::OnAnswer(const command_ack_t& message) {
-  if (client_ && message.command_sender == bus_.identity().process &&
-      message.command_start == bus_.identity().start && message.id == id_)
-    client_->OnAnswer(message.verdict == command_ack_t::ACCEPTED, message.reason);
+  if (!call_ && bus::Seconds(utime, mission_start_) >= next.at_s)
+    call_.emplace(bus_, *world::CommandNamed(next.command), id_, next.command == "kill");
+  if (!call_) return;
+  call_->Turn();
+  if (!call_->answered() && !call_->GaveUp()) return;
+  if (!call_->accepted())
+    bus_.ReportError(next.command + (call_->answered() ? ": " + call_->reason() : ": no answer"));
+  call_.reset();
+  ++id_;
 }
 
 }  // namespace chase::flight

@@ -4,11 +4,10 @@
 #include <optional>
 #include <vector>
 
-#include "chase/command_ack_t.hpp"
 #include "common/bus/bus.h"
+#include "common/bus/command_call.h"
 #include "common/bus/node.h"
 #include "common/world/scenario.h"
-#include "services/mission/command_client.h"
 
 namespace chase::flight {
 
@@ -22,14 +21,11 @@ class Operator : public bus::Node {
   void Tick(int64_t utime) override;
 
  private:
-  void OnAnswer(const command_ack_t& message);
-
   bus::Bus& bus_;
   std::vector<world::CommandSpec> commands_;
   int64_t mission_start_;
-  int64_t id_ = 0;     // of the command that is being given; those before it are over
-  int64_t given_ = 0;  // when, us
-  std::optional<mission::CommandClient> client_;
+  int64_t id_ = 0;  // of the command that is being given; those before it are over
+  std::optional<bus::CommandCall> call_;
 };
 
 }  // namespace chase::flight

@@ -8,22 +8,6 @@
 namespace chase::logs {
 namespace {
 
-/// Walks along with time through the plans as they take over.
-class Flown {
- public:
-  explicit Flown(const FlightRecord& record) : plans_(record.plans) {}
-
-  /// The newest plan that has begun by t; times must not go back.
-  const PlanSample* At(double t) {
-    while (next_ < plans_.size() && plans_[next_].t <= t) ++next_;
-    return next_ > 0 ? &plans_[next_ - 1] : nullptr;
-  }
-
- private:
-  const std::vector<PlanSample>& plans_;
-  size_t next_ = 0;
-};
-
 /// Where the plan wants the body at t: on its stop once that has begun.
 Eigen::Vector3d Wanted(const PlanSample& plan, double t) {
   const bool stops = plan.stop && t > plan.stop->start;
@@ -33,9 +17,15 @@ Eigen::Vector3d Wanted(const PlanSample& plan, double t) {
 
 }  // namespace
 
+const char* VerdictName(int verdict) {
+  constexpr const char* kNames[] = {"chase", "wider", "kept",  "safe_only",
+                                    "brake", "wait",  "escape"};
+  return kNames[verdict];
+}
+
 void AddCertificates(const FlightRecord& record, const std::vector<SampleScore>& scores,
                      Metrics* m) {
-  Flown flown(record), followed(record);
+  FlownPlans flown(record), followed(record);
   long kept = 0, asked = 0;
   for (size_t i = 0; i < scores.size(); ++i) {
     if (ComesDown(record, scores[i].t)) continue;

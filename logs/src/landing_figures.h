@@ -4,6 +4,9 @@
 
 namespace chase::logs {
 
+/// Of one of flight_state_t's constants.
+std::string StateName(int state);
+
 /// The states of the flight and, where the last is DONE, how it came down: touchdown is when the
 /// body is as low as it stands in the end, give or take 2 cm of springy legs.
 void AddLanding(const FlightRecord& record, Metrics* metrics);

@@ -1,6 +1,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "logs/src/flown_plans.h"
 #include "logs/src/metrics.h"
 #include "logs/src/output.h"
 
@@ -28,12 +29,10 @@ Json ByHorizon(const std::map<double, double>& errors) {
 }
 
 Json Verdicts(const std::map<int, double>& seconds) {
-  constexpr const char* kNames[] = {"chase", "wider", "kept",  "safe_only",
-                                    "brake", "wait",  "escape"};
   Json out = Json::object();
   for (int v = 0; v < 7; ++v) {
     const auto found = seconds.find(v);
-    out[kNames[v]] = found == seconds.end() ? 0.0 : found->second;
+    out[VerdictName(v)] = found == seconds.end() ? 0.0 : found->second;
   }
   return out;
 }

@@ -4,6 +4,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "logs/src/flown_plans.h"
+#include "logs/src/landing_figures.h"
+
 namespace chase::logs {
 namespace {
 
@@ -119,6 +122,40 @@ void AddSeries(const FlightRecord& record, const std::vector<SampleScore>& score
   }
 }
 
+void AddCertified(const FlightRecord& record, const std::vector<SampleScore>& scores,
+                  ReportData* data) {
+  Thinner score(kSeriesStep);
+  FlownPlans flown(record);
+  for (const SampleScore& s : scores) {
+    const PlanSample* plan = flown.At(s.t);
+    const bool certifies = plan && plan->certified_clearance >= 0.0 && !ComesDown(record, s.t);
+    if (certifies && score.Pass(s.t)) Add(s.t, plan->certified_clearance, &data->certified);
+  }
+}
+
+/// Goes on with the lane's last span where the label is the same.
+void AddSpan(const std::string& lane, const std::string& label, double t,
+             std::vector<ReportData::Span>* spans) {
+  const bool goes_on = !spans->empty() && spans->back().lane == lane;
+  if (goes_on) spans->back().to = t;
+  if (!goes_on || spans->back().label != label) spans->push_back({lane, label, t, t});
+}
+
+void AddTimeLine(const FlightRecord& record, ReportData* data) {
+  std::vector<ReportData::Span>* spans = &data->spans;
+  const double end = record.truth.empty() ? 0.0 : record.truth.back().t;
+  const auto finish = [&] {
+    if (!spans->empty()) spans->back().to = std::max(spans->back().to, end);
+  };
+  for (const StateSample& s : record.states) AddSpan("flight", StateName(s.state), s.t, spans);
+  finish();
+  for (const PlanSample& s : record.plans) AddSpan("verdict", VerdictName(s.verdict), s.t, spans);
+  if (!record.plans.empty()) finish();
+  for (const TargetSample& s : record.targets)
+    AddSpan("target", s.tracking ? "tracked" : "not tracked", s.t, spans);
+  for (const FaultSample& s : record.faults) spans->push_back({"fault", s.name, s.t, s.t});
+}
+
 void AddCosts(const FlightRecord& record, ReportData* data) {
   data->stages = record.stages;
   std::stable_sort(data->stages.begin(), data->stages.end(),
@@ -162,6 +199,8 @@ ReportData PrepareReport(const FlightRecord& record, const std::vector<SampleSco
   AddWorld(record, &data);
   AddPaths(record, &data);
   AddSeries(record, scores, &data);
+  AddCertified(record, scores, &data);
+  AddTimeLine(record, &data);
   AddCosts(record, &data);
   return data;
 }
@@ -182,6 +221,10 @@ nlohmann::ordered_json ToJson(const ReportData& d) {
   j["plans"] = Points(d.plans, false);
   j["distance"] = ToJson(d.distance);
   j["clearance"] = ToJson(d.clearance);
+  j["certified"] = ToJson(d.certified);
+  j["spans"] = nlohmann::ordered_json::array();
+  for (const ReportData::Span& s : d.spans)
+    j["spans"].push_back({{"lane", s.lane}, {"label", s.label}, {"from", s.from}, {"to", s.to}});
   j["visible"] = ToJson(d.visible);
   j["visible_share"] = ToJson(d.visible_share);
   j["pixel_u"] = ToJson(d.pixel_u);

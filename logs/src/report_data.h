@@ -19,6 +19,12 @@ struct ReportData {
     std::vector<double> t, value;
   };
 
+  /// A stretch of time in one lane of the time line; a mark where it has no length.
+  struct Span {
+    std::string lane, label;
+    double from, to;  ///< s
+  };
+
   std::string title;
   double desired_distance = 0.0;  ///< m
   int width_px = 376, height_px = 240;
@@ -26,6 +32,8 @@ struct ReportData {
   Outline chaser, target, estimated;        ///< paths, open
   std::vector<Outline> predictions, plans;  ///< fans, open
   Series distance, clearance, visible, visible_share;
+  Series certified;                   ///< clearance that the plan flown then certified, m
+  std::vector<Span> spans;            ///< flight states, verdicts, target, faults
   Series pixel_u, pixel_v;            ///< of frames with the target in the image
   std::vector<StageFigures> stages;   ///< slowest first
   std::vector<NamedValue> cpu_share;  ///< processor time over flight time, per cent

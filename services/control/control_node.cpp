@@ -45,6 +45,7 @@ ControlNode::ControlNode(bus::Bus& bus, const ControlConfig& config)
   bus_.Subscribe<obstacles_t>("OBSTACLES", [this](const obstacles_t& m) { OnObstacles(m); });
   bus_.Subscribe<flight_state_t>("FLIGHT_STATE", [this](const flight_state_t& m) {
     controller_.SetLanding(m.state == flight_state_t::LAND);
+    if (m.state == flight_state_t::DONE) controller_.Cut();
   });
   bus_.Subscribe<pose_t>("POSE", [this](const pose_t& m) { OnPose(m); });
 }
@@ -160,6 +161,7 @@ std::string ControlNode::Reason() const {
       return pose_reason_.empty() ? "no plan: braking" : "pose lost, braking: " + pose_reason_;
     case Following::kLand:
       if (controller_.is_down()) return "landed: motors off";
+      if (controller_.is_cut()) return "the flight is over: motors off";
       return pose_reason_.empty() ? "landing" : "pose lost, landing: " + pose_reason_;
   }
   return "";

@@ -50,6 +50,7 @@ std::optional<Setpoint> Controller::Update(double t, const Estimate& estimate, H
   const double dt = StepTo(t);
   plans_.Advance(t);
   error_.setZero();
+  if (cut_) return Off();
   if (landing_.is_down()) health = Health::kLost;  // motors that are off stay off
   const bool finite = Usable(estimate);
   if (health != Health::kUsable || !finite)
@@ -117,6 +118,15 @@ std::optional<Setpoint> Controller::Brake(const Estimate& estimate) {
   return Finite(setpoint) ? setpoint : law_.Level(last_yaw_, -config_.lost_descent);
 }
 
+std::optional<Setpoint> Controller::Off() {
+  if (!flying_) return std::nullopt;
+  following_ = Following::kLand;
+  Setpoint setpoint = law_.Level(last_yaw_, 0.0);
+  setpoint.motors = false;
+  setpoint.thrust = 0.0;
+  return setpoint;
+}
+
 std::optional<Setpoint> Controller::WithoutPose(double t, const Estimate& estimate, Health health,
                                                 double dt) {
   if (!flying_) return std::nullopt;
@@ -128,15 +138,12 @@ std::optional<Setpoint> Controller::WithoutPose(double t, const Estimate& estima
   }
   following_ = Following::kLand;
   const double lift = inertial ? landing_.Lift(estimate, dt) : -config_.lost_descent;
-  Setpoint setpoint = law_.Level(last_yaw_, lift);
-  if (!is_down()) return setpoint;
-  setpoint.motors = false;
-  setpoint.thrust = 0.0;
-  return setpoint;
+  return is_down() ? Off() : law_.Level(last_yaw_, lift);
 }
 
 std::optional<Setpoint> Controller::Blind() {
   if (!flying_) return std::nullopt;
+  if (cut_) return Off();
   return WithoutPose(last_t_.value_or(0.0), {}, Health::kStarting, 0.0);
 }
 

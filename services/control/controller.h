@@ -47,6 +47,9 @@ class Controller {
   /// A landing on the spot is asked for, or no more: it begins once the body is at rest.
   void SetLanding(bool wanted);
 
+  /// Motors off for good, at once, wherever it is: the flight is over, or somebody has ended it.
+  void Cut() { cut_ = true; }
+
   /// Setpoint for time t [s] of the estimate, nothing while there is nothing to fly. Once flying:
   /// no plan, brake; no usable pose, brake for as long as its velocity is good (kMostAge.velocity),
   /// then land; where the estimate is not finite or starting, sink level. Motors that have been
@@ -58,6 +61,7 @@ class Controller {
 
   Following following() const { return following_; }
   bool is_down() const { return landing_.is_down(); }
+  bool is_cut() const { return cut_; }
   /// Reference minus estimate, m; 0 unless there is a reference that is followed.
   const Eigen::Vector3d& error() const { return error_; }
   double error_bound() const { return bound_.value(); }  ///< of its length, m
@@ -68,6 +72,7 @@ class Controller {
   std::optional<Setpoint> Follow(double t, const Estimate& estimate, double dt);
   std::optional<Setpoint> Brake(const Estimate& estimate);
   std::optional<Setpoint> Descend(const Estimate& estimate, double dt);
+  std::optional<Setpoint> Off();
   std::optional<Setpoint> WithoutPose(double t, const Estimate& estimate, Health health, double dt);
   void RestartIfTimeJumpedBack(double t);
   double StepTo(double t);
@@ -82,7 +87,8 @@ class Controller {
   Estimate last_estimate_;
   double last_usable_ = 0.0;  // s
   bool flying_ = false, lost_ = false;
-  bool lands_ = false;                   // a landing is asked for
+  bool lands_ = false;  // a landing is asked for
+  bool cut_ = false;
   std::optional<Eigen::Vector3d> spot_;  // above which it comes down, frame W, m
   Following following_ = Following::kNone;
   double last_yaw_ = 0.0, yaw_on_spot_ = 0.0;  // rad

@@ -55,11 +55,16 @@ Setpoint AttitudeFor(const Vector3d& thrust, const Vector3d& thrust_rate, double
 
 Setpoint TrackingLaw::Track(const Estimate& estimate, const Reference& now, const Reference& ahead,
                             double dt) {
+  const Vector3d before = integral_;
   Integrate(now.state.p - estimate.p_WB, dt);
   const Vector3d feed_forward =
       ahead.state.a + config_.drag.cwiseProduct(now.state.v) + kGravity * Vector3d::UnitZ();
   const Vector3d wanted = feed_forward + Feedback(estimate, now.state) + integral_;
   const Vector3d thrust = LimitThrust(wanted, config_);
+  // Anti-windup: what the limits cut off is not asked for more of (conditional integration).
+  const Vector3d cut = wanted - thrust;
+  for (int i = 0; i < 3; ++i)
+    if (cut[i] * (integral_[i] - before[i]) > 0.0) integral_[i] = before[i];
   const Vector3d thrust_rate = ahead.state.j + config_.drag.cwiseProduct(ahead.state.a);
 
   const double yaw = math::Yaw(estimate.R_WB);

@@ -17,6 +17,7 @@ struct Command {
   int64_t id = 0;            ///< among the commands of that process
   double t = 0.0;            ///< when it was given, s
   Event kind = Event::kStop;
+  bool force = false;  ///< says that it is meant
 
   auto Key() const { return std::tie(sender, sender_start, id); }
 };

@@ -16,6 +16,12 @@ std::string Age(double age) {
   return text;
 }
 
+std::string Percent(double share) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.0f %%", 100.0 * share);
+  return text;
+}
+
 /// Why an input of that time is not there; empty: it is.
 std::string Absence(const std::string& name, const std::optional<double>& heard, double most,
                     double t) {
@@ -53,6 +59,9 @@ std::vector<std::string> Missing(const MissionConfig& config, const Inputs& inpu
     note("odometry is not healthy" + (pose->reason.empty() ? "" : ": " + pose->reason));
   note(Absence("OBSTACLES", inputs.obstacles, world::kMostAge.obstacles, t));
   note(Absence("TARGET", inputs.target, world::kMostAge.target, t));
+  if (inputs.blocked) note("the way up is not free: something is above the take-off place");
+  if (inputs.battery && *inputs.battery <= config.battery_low)
+    note("the battery is low: " + Percent(*inputs.battery));
   for (const std::string& name : config.needs) note(ProcessProblem(name, inputs, t));
   for (const auto& [name, report] : inputs.processes)
     if (std::find(config.needs.begin(), config.needs.end(), name) == config.needs.end())

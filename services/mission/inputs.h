@@ -40,7 +40,11 @@ struct Inputs {
   Eigen::Vector3d plan_end = Eigen::Vector3d::Zero();  ///< where the newest plan ends, frame W
   bool flying = false, landing = false;                ///< as control says
   bool motors_off = false;                             ///< control has stopped them
-  std::map<std::string, ProcessReport> processes;      ///< by name
+  /// Places on the newest plan up to its stop and on to rest: where it flies if nothing more comes.
+  std::vector<Eigen::Vector3d> way;                ///< frame W
+  bool blocked = false;                            ///< something reaches into the climb's column
+  std::optional<double> battery;                   ///< share of its charge; nothing: nobody says
+  std::map<std::string, ProcessReport> processes;  ///< by name
 
   void Heard(const std::string& process, ProcessReport report);
 };

@@ -26,6 +26,8 @@ Answer Mission::Judge(double t, const Command& command) {
 
 Answer Mission::Try(double t, const Command& command) {
   Answer answer{command, false, Refused(command.kind)};
+  if (answer.reason.empty() && command.kind == Event::kKill && !command.force)
+    answer.reason = "kill cuts the motors wherever it is, and it falls: say so with --force";
   if (!answer.reason.empty()) return answer;
   Step(t, command.kind);
   if (state_ == State::kReturn && !KnowsHome()) Step(t, Event::kHomeLost);
@@ -36,7 +38,7 @@ Answer Mission::Try(double t, const Command& command) {
 }
 
 std::string Mission::Refused(Event command) const {
-  if (Find(state_, command) != nullptr) return "";
+  if (const Transition* row = Find(state_, command)) return Overridden(row->to);
   std::string reason = std::string(Name(command)) + " in " + Name(state_) + ": " + Refusal(state_);
   const char* separator = ": ";
   if (state_ != State::kIdle) return reason;
@@ -45,6 +47,14 @@ std::string Mission::Refused(Event command) const {
     separator = ", ";
   }
   return reason;
+}
+
+/// Why the safety envelope would not leave it in that state; empty: it would.
+std::string Mission::Overridden(State to) const {
+  if (to == State::kDone || to == State::kLand) return "";
+  if (IsCritical()) return "the battery is critical: it only lands";
+  if (to == State::kReturn) return "";
+  return IsLow() ? "the battery is low: it returns or lands" : "";
 }
 
 bool Mission::Step(double t, Event event, const std::string& detail) {
@@ -65,7 +75,8 @@ void Mission::Update(double t) {
   if (inputs_.pose && inputs_.pose->usable) last_usable_ = std::max(last_usable_, inputs_.pose->t);
   missing_ = Missing(config_, inputs_, t);
   for (const Event event : Observed(t)) {
-    Step(t, event, event == Event::kMissing ? missing_.front() : "");
+    const bool stepped = Step(t, event, Detail(event));
+    if (stepped && event == Event::kLeaving) leads_itself_ = false;  // it would lead out again
   }
   if (leads_itself_) LeadItself(t);
 }
@@ -85,9 +96,41 @@ std::vector<Event> Mission::Observed(double t) const {
   add(state_ == State::kTakeoff && IsUp(), Event::kUp);
   add(state_ == State::kSearch && config_.give_up > 0.0 && t - since_ > config_.give_up,
       Event::kGaveUp);
+  add(!Leaving().empty(), Event::kLeaving);
+  add(!Outside().empty(), Event::kOutside);
+  add(IsLow(), Event::kBatteryLow);
+  add(IsCritical(), Event::kBatteryCritical);
   add(!KnowsHome(), Event::kHomeLost);
   add(IsHome(), Event::kHome);
   return events;
+}
+
+std::string Mission::Detail(Event event) const {
+  if (event == Event::kMissing) return missing_.front();
+  if (event == Event::kLeaving) return Leaving();
+  return event == Event::kOutside ? Outside() : "";
+}
+
+bool Mission::IsLow() const {
+  return inputs_.battery && config_.battery_low > 0.0 && *inputs_.battery <= config_.battery_low;
+}
+
+bool Mission::IsCritical() const {
+  return inputs_.battery && config_.battery_critical > 0.0 &&
+         *inputs_.battery <= config_.battery_critical;
+}
+
+// The fence counts from the take-off place: where that is not known any more nothing leads about.
+std::string Mission::Leaving() const {
+  if (!config_.geofence.Exists()) return "";
+  if (!KnowsHome()) return "the take-off place is not known";
+  for (const Eigen::Vector3d& p : inputs_.way)
+    if (std::string breach = config_.geofence.Breach(p - home_->p); !breach.empty()) return breach;
+  return "";
+}
+
+std::string Mission::Outside() const {
+  return KnowsHome() ? config_.geofence.Breach(inputs_.pose->p - home_->p) : "";
 }
 
 // By then control comes down by itself.

@@ -53,6 +53,12 @@ class Mission {
   bool IsUp() const;
   bool IsHome() const;
   bool KnowsHome() const;
+  std::string Overridden(State to) const;
+  bool IsLow() const;
+  bool IsCritical() const;
+  std::string Leaving() const;
+  std::string Outside() const;
+  std::string Detail(Event event) const;
   void LeadItself(double t);
 
   MissionConfig config_;

@@ -7,13 +7,22 @@
 #include "chase/command_ack_t.hpp"
 #include "chase/flight_state_t.hpp"
 #include "chase/health_t.hpp"
+#include "common/bus/battery.h"
 #include "common/bus/convert.h"
+#include "services/mission/climb_column.h"
 
 namespace chase::mission {
 
 namespace {
 
 constexpr int64_t kHealthTicks = 10;  // 1 Hz, as the statuses that it sums up
+constexpr int kPlaces = 20;           // on a plan: 0.1 s apart
+
+void Sample(const world::Trajectory& path, double from, double to,
+            std::vector<Eigen::Vector3d>* places) {
+  for (int i = 0; i <= kPlaces; ++i)
+    places->push_back(path.Position(from + (to - from) * i / kPlaces));
+}
 
 }  // namespace
 
@@ -21,9 +30,7 @@ MissionNode::MissionNode(bus::Bus& bus, const MissionConfig& config)
     : bus_(bus), config_(config), origin_(bus.identity().start), mission_(config, 0.0) {
   bus_.Subscribe<command_t>("COMMAND", [this](const command_t& m) { OnCommand(m); });
   bus_.Subscribe<pose_t>("POSE", [this](const pose_t& m) { OnPose(m); });
-  bus_.Subscribe<obstacles_t>("OBSTACLES", [this](const obstacles_t& m) {
-    mission_.inputs().obstacles = Seconds(m.utime);
-  });
+  bus_.Subscribe<obstacles_t>("OBSTACLES", [this](const obstacles_t& m) { OnObstacles(m); });
   bus_.Subscribe<target_t>("TARGET", [this](const target_t& m) {
     mission_.inputs().target = Seconds(m.utime);
     mission_.inputs().target_tracked =
@@ -52,8 +59,12 @@ void MissionNode::SubscribeStatuses() {
 }
 
 void MissionNode::OnCommand(const command_t& message) {
-  const Command command{message.sender, message.sender_start, message.id, Seconds(message.utime),
-                        static_cast<Event>(message.kind)};
+  const Command command{message.sender,
+                        message.sender_start,
+                        message.id,
+                        Seconds(message.utime),
+                        static_cast<Event>(message.kind),
+                        message.n_arguments == 1 && message.arguments[0] == 1.0};
   const Answer answer = mission_.Obey(Now(), command);
   command_ack_t m{};
   m.utime = bus_.Now();
@@ -79,11 +90,30 @@ void MissionNode::OnPose(const pose_t& message) {
   mission_.inputs().pose = std::move(pose);
 }
 
+// In the air nobody asks for the column.
+void MissionNode::OnObstacles(const obstacles_t& message) {
+  Inputs& inputs = mission_.inputs();
+  inputs.obstacles = Seconds(message.utime);
+  if (IsAirborne(mission_.state()) || !inputs.pose || inputs.pose->epoch != message.epoch) return;
+  std::vector<world::Obstacle> obstacles;
+  for (const obstacle_t& o : message.obstacles) obstacles.push_back(bus::FromMessage(o, origin_));
+  inputs.blocked = IsBlocked(obstacles, inputs.pose->p, config_.body_radius, config_.climb_height);
+}
+
 void MissionNode::OnPlan(const plan_t& message) {
   Inputs& inputs = mission_.inputs();
   inputs.plan_heard = Now();
   const world::Trajectory plan = bus::FromMessage(message.position, origin_);
   inputs.plan_end = plan.Position(plan.end());
+  if (!config_.geofence.Exists()) return;
+  inputs.way.clear();
+  double leaves = plan.end();
+  if (message.stop.n_coefficients > 0) {
+    const world::Trajectory stop = bus::FromMessage(message.stop, origin_);
+    leaves = stop.start;
+    Sample(stop, stop.start, stop.end(), &inputs.way);
+  }
+  Sample(plan, plan.start, leaves, &inputs.way);
 }
 
 void MissionNode::OnTracking(const tracking_t& message) {
@@ -98,6 +128,8 @@ void MissionNode::OnStatus(const status_t& message) {
   report.failed = message.state == status_t::FAILED;
   report.start = message.sender_start;
   mission_.inputs().Heard(message.name, report);
+  if (const std::optional<double> battery = bus::BatteryIn(message))
+    mission_.inputs().battery = battery;
 }
 
 void MissionNode::Tick(int64_t /*utime*/) {

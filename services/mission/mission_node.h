@@ -31,6 +31,7 @@ class MissionNode : public bus::Node {
   void SubscribeStatuses();
   void OnCommand(const command_t& message);
   void OnPose(const pose_t& message);
+  void OnObstacles(const obstacles_t& message);
   void OnPlan(const plan_t& message);
   void OnTracking(const tracking_t& message);
   void OnStatus(const status_t& message);

@@ -1,5 +1,7 @@
 #include "services/mission/states.h"
 
+#include "common/world/commands.h"
+
 namespace chase::mission {
 
 // clang-format off
@@ -78,6 +80,33 @@ const std::vector<Transition>& Transitions() {
       {S::kReturn,    E::kMotorsOff, S::kDone, "motors are off"},
       {S::kLand,      E::kMotorsOff, S::kDone, "landed: motors are off"},
       {S::kEmergency, E::kMotorsOff, S::kDone, "landed: motors are off"},
+
+      // The safety envelope.
+      {S::kTakeoff,    E::kLeaving, S::kHold, "the way leads out of the geofence: holding inside"},
+      {S::kChase,      E::kLeaving, S::kHold, "the way leads out of the geofence: holding inside"},
+      {S::kSearch,     E::kLeaving, S::kHold, "the way leads out of the geofence: holding inside"},
+      {S::kTakeoff,    E::kOutside, S::kReturn, "geofence breached: returning"},
+      {S::kChase,      E::kOutside, S::kReturn, "geofence breached: returning"},
+      {S::kSearch,     E::kOutside, S::kReturn, "geofence breached: returning"},
+      {S::kHold,       E::kOutside, S::kReturn, "geofence breached: returning"},
+      {S::kTakeoff,    E::kBatteryLow, S::kReturn, "battery low"},
+      {S::kChase,      E::kBatteryLow, S::kReturn, "battery low"},
+      {S::kSearch,     E::kBatteryLow, S::kReturn, "battery low"},
+      {S::kHold,       E::kBatteryLow, S::kReturn, "battery low"},
+      {S::kTakeoff,    E::kBatteryCritical, S::kLand, "battery critical: landing here"},
+      {S::kChase,      E::kBatteryCritical, S::kLand, "battery critical: landing here"},
+      {S::kSearch,     E::kBatteryCritical, S::kLand, "battery critical: landing here"},
+      {S::kHold,       E::kBatteryCritical, S::kLand, "battery critical: landing here"},
+      {S::kReturn,     E::kBatteryCritical, S::kLand, "battery critical: landing here"},
+      {S::kIdle,       E::kKill, S::kDone, "killed: motors cut by command"},
+      {S::kReady,      E::kKill, S::kDone, "killed: motors cut by command"},
+      {S::kTakeoff,    E::kKill, S::kDone, "killed: motors cut by command"},
+      {S::kChase,      E::kKill, S::kDone, "killed: motors cut by command"},
+      {S::kHold,       E::kKill, S::kDone, "killed: motors cut by command"},
+      {S::kSearch,     E::kKill, S::kDone, "killed: motors cut by command"},
+      {S::kReturn,     E::kKill, S::kDone, "killed: motors cut by command"},
+      {S::kLand,       E::kKill, S::kDone, "killed: motors cut by command"},
+      {S::kEmergency,  E::kKill, S::kDone, "killed: motors cut by command"},
   };
   return table;
 }
@@ -99,11 +128,7 @@ const char* Name(State state) {
   return kNames[static_cast<int>(state)];
 }
 
-const char* Name(Event command) {
-  static constexpr const char* kNames[] = {"takeoff", "chase", "hold", "search",
-                                           "return",  "land",  "stop"};
-  return kNames[static_cast<int>(command)];
-}
+const char* Name(Event command) { return world::kCommandNames[static_cast<size_t>(command)]; }
 
 const char* Refusal(State state) {
   switch (state) {

@@ -20,7 +20,7 @@ enum class State {
 };
 inline constexpr int kStates = 10;
 
-/// What moves the flight on. The first seven are commands, with the numbers of command_t.
+/// What moves the flight on. The first eight are commands, with the numbers of command_t.
 enum class Event {
   kTakeoff,
   kChase,
@@ -29,6 +29,7 @@ enum class Event {
   kReturn,
   kLand,
   kStop,
+  kKill,
   kComplete,  ///< nothing is missing
   kMissing,   ///< something is
   kFlying,    ///< control flies already
@@ -42,8 +43,12 @@ enum class Event {
   kPoseLost,  ///< for so long that control comes down by itself
   kPoseBack,
   kMotorsOff,
+  kLeaving,          ///< what is planned leads out of the geofence
+  kOutside,          ///< the body is outside
+  kBatteryLow,       ///< time to return
+  kBatteryCritical,  ///< time to land
 };
-inline constexpr int kEvents = 20;
+inline constexpr int kEvents = 25;
 
 struct Transition {
   State from;

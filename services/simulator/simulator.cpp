@@ -52,9 +52,9 @@ std::string SimulatorConfig::Problem() const {
   if (rig.width_px < 8 || rig.height_px < 8) return "rig: the image is below 8 x 8 px";
   if (!(rig.focal_px > 0.0)) return "rig: focal_px is not above 0";
   for (const auto& problem :
-       {Named("vehicle", vehicle.Problem()), Named("attitude_loop", attitude_loop.Problem()),
-        Named("imu", imu.Problem()), Named("lidar", lidar.Problem()),
-        Named("camera", camera.Problem())})
+       {Named("vehicle", vehicle.Problem()), Named("battery", battery.Problem()),
+        Named("attitude_loop", attitude_loop.Problem()), Named("imu", imu.Problem()),
+        Named("lidar", lidar.Problem()), Named("camera", camera.Problem())})
     if (!problem.empty()) return problem;
   for (const world::FaultSpec& fault : faults)
     if (fault.at < 0.0) return "faults: " + fault.name + " has no time; give its key at, s";
@@ -70,6 +70,7 @@ Simulator::Simulator(const world::Scenario& scenario, const SimulatorConfig& con
                  [ground = scenario.world.ground](double x, double y) {
                    return world::GroundHeight(ground, x, y);
                  }),
+      battery_(config.battery),
       attitude_loop_(config.attitude_loop, config.vehicle.inertia),
       wind_(scenario.wind, static_cast<uint64_t>(config.seed)),
       imu_(config.imu, static_cast<uint64_t>(config.seed)),
@@ -109,6 +110,7 @@ void Simulator::StepPhysics() {
   const Wrench wrench =
       attitude_loop_.Step(ActiveSetpoint(), quadrotor_.state(), quadrotor_.on_ground(), kStep);
   quadrotor_.Step(resting ? Wrench{} : wrench, wind_.velocity() + gust_, kStep);
+  battery_.Draw(quadrotor_.motor_thrusts().sum() / (config_.vehicle.TrueMass() * kGravity), kStep);
   ++steps_;
 }
 

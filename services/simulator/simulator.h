@@ -9,6 +9,7 @@
 #include "common/world/scenario.h"
 #include "services/simulator/actors.h"
 #include "services/simulator/attitude_loop.h"
+#include "services/simulator/battery.h"
 #include "services/simulator/camera.h"
 #include "services/simulator/imu.h"
 #include "services/simulator/lidar.h"
@@ -27,6 +28,7 @@ struct SimulatorConfig {
   double descent_speed = 0.5;
   world::Rig rig;
   VehicleConfig vehicle;
+  BatteryConfig battery;
   AttitudeLoopConfig attitude_loop;
   ImuConfig imu;
   LidarConfig lidar;
@@ -42,6 +44,7 @@ struct SimulatorConfig {
     v("descent_speed", descent_speed, "of that descent, m/s");
     v("rig", rig, "where the sensors sit");
     v("vehicle", vehicle, "");
+    v("battery", battery, "");
     v("attitude_loop", attitude_loop, "");
     v("imu", imu, "");
     v("lidar", lidar, "");
@@ -80,6 +83,8 @@ class Simulator {
   /// From the next step on.
   void Disturb(const Disturbance& disturbance);
 
+  double charge() const { return battery_.charge(); }  ///< of the battery, 0 to 1
+
   /// R_WB as the autopilot takes it to be.
   const Eigen::Quaterniond& attitude() const { return quadrotor_.state().q; }
 
@@ -101,6 +106,7 @@ class Simulator {
   Actors actors_;
   Scene scene_;
   Quadrotor quadrotor_;
+  Battery battery_;
   AttitudeLoop attitude_loop_;
   Wind wind_;
   Imu imu_;

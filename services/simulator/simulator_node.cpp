@@ -12,15 +12,18 @@
 #include "chase/imu_t.hpp"
 #include "chase/lidar_scan_t.hpp"
 #include "chase/scenario_t.hpp"
+#include "chase/status_t.hpp"
 #include "chase/truth_t.hpp"
+#include "common/bus/battery.h"
 #include "common/bus/convert.h"
+#include "common/config/version.h"
 #include "common/math/rotation.h"
 
 namespace chase::simulator {
 namespace {
 
 constexpr int64_t kTruthTicks = 2;       // 100 Hz
-constexpr int64_t kScenarioTicks = 200;  // 1 Hz
+constexpr int64_t kScenarioTicks = 200;  // 1 Hz; FCU_STATUS as well
 
 std::string ReadText(const std::string& file) {
   std::ifstream in(file);
@@ -82,7 +85,10 @@ void SimulatorNode::Tick(int64_t utime) {
     PublishImage(std::move(*output.image), utime);
   }
   if (ticks_ % kTruthTicks == 0) PublishTruth(output.truth, utime);
-  if (ticks_ % kScenarioTicks == 0) PublishScenario(utime);
+  if (ticks_ % kScenarioTicks == 0) {
+    PublishScenario(utime);
+    PublishAutopilot(utime);
+  }
   if (truth_feed_) truth_feed_->Publish(output.truth, utime, ticks_);
   ++ticks_;
 }
@@ -166,6 +172,17 @@ void SimulatorNode::PublishScenario(int64_t utime) {
   message.name = scenario_.name;
   message.yaml = yaml_;
   bus_.Publish("SCENARIO", message);
+}
+
+// What the bridge to an autopilot would say of it.
+void SimulatorNode::PublishAutopilot(int64_t utime) {
+  status_t message{};
+  message.utime = utime;
+  message.name = "fcu";
+  message.state = status_t::OK;
+  message.detail = "simulated, " + bus::BatteryWords(simulator_.charge());
+  message.version = config::Version();
+  bus_.Publish("FCU_STATUS", message);
 }
 
 void SimulatorNode::AdvanceFaults(int64_t utime) {

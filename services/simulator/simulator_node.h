@@ -16,11 +16,10 @@
 
 namespace chase::simulator {
 
-/// ATTITUDE_SETPOINT -> simulator -> IMU, LIDAR_SCAN, CAMERA_IMAGE, TRUTH, SCENARIO, FAULT. The
-/// first tick is power-on. Where the scenario's sensors.mode is "truth", also POSE, TARGET and
-/// OBSTACLES. Else POSE
-/// is heard for its frame: like PX4 with its reset counter, the autopilot takes over the yaw of a
-/// frame that odometry begins anew.
+/// ATTITUDE_SETPOINT -> simulator -> IMU, LIDAR_SCAN, CAMERA_IMAGE, TRUTH, SCENARIO, FAULT,
+/// FCU_STATUS. The first tick is power-on. Where the scenario's sensors.mode is "truth", also POSE,
+/// TARGET and OBSTACLES. Else POSE is heard for its frame: like PX4 with its reset counter, the
+/// autopilot takes over the yaw of a frame that odometry begins anew.
 class SimulatorNode : public bus::Node {
  public:
   SimulatorNode(bus::Bus& bus, const SimulatorConfig& config);
@@ -37,6 +36,7 @@ class SimulatorNode : public bus::Node {
   void PublishImage(Image image, int64_t utime);
   void PublishTruth(const Truth& truth, int64_t utime);
   void PublishScenario(int64_t utime);
+  void PublishAutopilot(int64_t utime);
   void AdvanceFaults(int64_t utime);
 
   bus::Bus& bus_;

@@ -2,6 +2,8 @@
 
 #include <limits>
 
+#include "common/world/ages.h"
+
 namespace chase::viewer {
 namespace {
 
@@ -28,6 +30,8 @@ Sample SampleOf(const Scene& scene, double t) {
     s.verdict = scene.plan->verdict;
     if (scene.plan->clearance >= 0.0) s.clearance = scene.plan->clearance;
   }
+  if (scene.flight && scene.flight->age <= world::kMostAge.flight_state)
+    s.flight = scene.flight->state;
   if (scene.plan_ms >= 0.0) s.plan_ms = scene.plan_ms;
   return s;
 }

@@ -2,13 +2,14 @@
 
 #include "common/bus/run_service.h"
 #include "services/viewer/play.h"
+#include "services/viewer/token_file.h"
 #include "services/viewer/viewer_node.h"
 
 int main(int argc, char** argv) {
   using chase::viewer::ViewerConfig;
   ViewerConfig config;
   int port = -1;  // of the flag
-  std::string log;
+  std::string log, token_file;
 
   chase::bus::ServiceSpec spec;
   spec.name = "viewer";
@@ -17,11 +18,14 @@ int main(int argc, char** argv) {
     app.add_option("--port", port, "of the page (default: the configuration's, 8080)")
         ->check(CLI::Range(0, 65535));
     app.add_option("--play", log, "LCM log to play instead of looking at the bus");
+    app.add_option("--token-file", token_file,
+                   "its first line is what commands must carry (default: no commands are taken)");
   };
   spec.dump_config = [&] { return chase::config::Dump(config); };
   spec.load_config = [&](const std::string& file) { chase::config::Load(file, &config); };
   spec.run = [&] {
     if (port >= 0) config.port = port;
+    if (!token_file.empty()) config.token = chase::viewer::TokenIn(token_file);
     if (!log.empty()) chase::viewer::PlayLog(log, config, chase::bus::StopRequested);
     return !log.empty();
   };

@@ -56,6 +56,10 @@ Forecast FromMessage(const prediction_t& m, int64_t origin) {
           RowMajor(m.velocity_covariance)};
 }
 
+Flight FromMessage(const flight_state_t& m, int64_t origin) {
+  return {Code(m.state), m.reason, bus::Seconds(m.since, origin), m.missing, 0.0};
+}
+
 std::vector<world::Obstacle> FromMessage(const obstacles_t& m, int64_t origin) {
   std::vector<world::Obstacle> out;
   for (const obstacle_t& o : m.obstacles) out.push_back(bus::FromMessage(o, origin));
@@ -74,6 +78,24 @@ ProcessHealth FromMessage(const status_t& m, const status_t* before) {
   for (const channel_status_t& c : m.channels)
     p.channels.push_back({c.channel, c.rate_hz, c.dropped, c.malformed, c.foreign});
   return p;
+}
+
+std::vector<ProcessHealth> Joined(const std::map<std::string, ProcessHealth>& heard,
+                                  const health_t& mission, int64_t now) {
+  std::map<std::string, ProcessHealth> all = heard;
+  for (const process_health_t& p : mission.processes) {
+    const auto [row, only_there] = all.try_emplace(p.name);
+    row->second.restarts = p.restarts;
+    if (!only_there) continue;
+    row->second.name = p.name;
+    row->second.state = Code(p.state);
+    row->second.age = p.age + bus::Seconds(now, mission.utime);
+    row->second.cpu_percent = -1.0;
+    row->second.detail = "heard by the mission process only";
+  }
+  std::vector<ProcessHealth> rows;
+  for (const auto& [name, row] : all) rows.push_back(row);
+  return rows;
 }
 
 double MeanStageMs(const status_t& m, const status_t& before, const std::string& stage) {

@@ -1,7 +1,11 @@
 #pragma once
 
+#include <map>
+#include <string>
 #include <vector>
 
+#include "chase/flight_state_t.hpp"
+#include "chase/health_t.hpp"
 #include "chase/obstacles_t.hpp"
 #include "chase/plan_t.hpp"
 #include "chase/pose_t.hpp"
@@ -21,10 +25,16 @@ Drone FromMessage(const pose_t& m);
 Target FromMessage(const target_t& m);
 Plan FromMessage(const plan_t& m, int64_t origin);
 Forecast FromMessage(const prediction_t& m, int64_t origin);
+Flight FromMessage(const flight_state_t& m, int64_t origin);
 std::vector<world::Obstacle> FromMessage(const obstacles_t& m, int64_t origin);
 
 /// `before`: the process's last status, for its share of a core; nullptr: none.
 ProcessHealth FromMessage(const status_t& m, const status_t* before);
+
+/// A row for each process: what it says of itself, and what the mission process has heard of it at
+/// `now` [us]; of one that only the latter has heard, that.
+std::vector<ProcessHealth> Joined(const std::map<std::string, ProcessHealth>& heard,
+                                  const health_t& mission, int64_t now);
 
 /// Mean time [ms] of what a stage did between two statuses; negative: nothing, or not known.
 double MeanStageMs(const status_t& m, const status_t& before, const std::string& stage);

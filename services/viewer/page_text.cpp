@@ -80,11 +80,20 @@ json ForecastOf(const Forecast& f) {
   return {{"verdict", f.verdict}, {"path", Path(f.path, kFanPoints * 4)}, {"spread", spread}};
 }
 
+json FlightOf(const Flight& f) {
+  return {{"state", f.state},
+          {"reason", f.reason},
+          {"since", Number(f.since)},
+          {"age", Number(f.age)},
+          {"missing", f.missing}};
+}
+
 json RowOf(const Sample& s) {
   json row = {Number(s.t),       Number(s.distance), Number(s.clearance), Number(s.speed),
               Number(s.plan_ms), s.verdict,          s.target_state,      s.health};
   for (const Eigen::Vector3d* p : {&s.p_WB, &s.p_WT})
     for (const double v : {p->x(), p->y(), p->z()}) row.push_back(Number(v));
+  row.push_back(s.flight);
   return row;
 }
 
@@ -114,6 +123,7 @@ std::string StateText(const Scene& scene, double t, int generation,
   if (scene.target) out["target"] = TargetOf(*scene.target);
   if (scene.plan) out["plan"] = PlanOf(*scene.plan);
   if (scene.forecast) out["forecast"] = ForecastOf(*scene.forecast);
+  if (scene.flight) out["flight"] = FlightOf(*scene.flight);
   if (play) out["play"] = PlayOf(*play);
   return Text(out);
 }
@@ -148,6 +158,7 @@ std::string HealthText(const std::vector<ProcessHealth>& processes, const std::s
                     {"age", Number(p.age)},
                     {"cpu", Number(p.cpu_percent)},
                     {"rss", Number(p.rss_mb)},
+                    {"restarts", p.restarts},
                     {"channels", channels}});
   }
   return Text({{"type", "health"}, {"rows", rows}, {"self", self}});
@@ -164,8 +175,9 @@ std::string HelloText(const std::string& source, double duration, bool commands,
                {"rows", rows}});
 }
 
-std::string ReplyText(const std::string& command, const std::string& refusal) {
-  return Text({{"type", "reply"}, {"command", command}, {"refusal", refusal}});
+std::string ReplyText(const std::string& command, const std::string& refusal,
+                      const std::string& words) {
+  return Text({{"type", "reply"}, {"command", command}, {"refusal", refusal}, {"words", words}});
 }
 
 std::string EncodeImage(double t, int width, int height, const std::optional<Target>& target,

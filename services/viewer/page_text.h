@@ -25,7 +25,7 @@ std::string StateText(const Scene& scene, double t, int generation,
 /// "obstacles" at t.
 std::string ObstaclesText(const std::vector<world::Obstacle>& obstacles, double t);
 
-/// One process as its status message tells.
+/// One process as its status message tells, and HEALTH.
 struct ChannelHealth {
   std::string channel;
   double rate_hz = 0.0;
@@ -37,6 +37,7 @@ struct ProcessHealth {
   double age = 0.0;          ///< since the status was heard, s
   double cpu_percent = 0.0;  ///< of one core since the status before; negative: not known
   double rss_mb = 0.0;
+  int restarts = -1;  ///< as the mission process counts; negative: not known
   std::vector<ChannelHealth> channels;
 };
 /// "health"; `self` is the viewer's own sentence.
@@ -46,8 +47,10 @@ std::string HealthText(const std::vector<ProcessHealth>& processes, const std::s
 std::string HelloText(const std::string& source, double duration, bool commands,
                       const History& history);
 
-/// "reply" to a command.
-std::string ReplyText(const std::string& command, const std::string& refusal);
+/// "reply" to a command. `refusal`: why it is refused; empty where the vehicle has taken it.
+/// `words`: what it does then.
+std::string ReplyText(const std::string& command, const std::string& refusal,
+                      const std::string& words);
 
 /// Byte 2, three zeros, uint32 length of a JSON text {t, width, height, box, state}, that text and
 /// the JPEG.

@@ -1,15 +1,15 @@
 #include "services/viewer/request.h"
 
 #include <algorithm>
-#include <array>
 #include <nlohmann/json.hpp>
+
+#include "common/world/commands.h"
 
 namespace chase::viewer {
 namespace {
 
 using nlohmann::json;
 
-constexpr std::array kCommands = {"takeoff", "chase", "hold", "search", "return", "land", "stop"};
 constexpr int64_t kMostAcknowledged = 1000000;
 
 /// False when the value is there and is not what it should be.
@@ -69,14 +69,12 @@ std::optional<Request> ParseRequest(const std::string& text) {
   return request;
 }
 
-bool IsCommand(const std::string& name) {
-  return std::find(kCommands.begin(), kCommands.end(), name) != kCommands.end();
-}
-
 std::string RefusalOf(const Request& request, const std::string& token) {
   if (token.empty()) return "commands are off: the configuration has no token";
   if (!Same(request.token, token)) return "wrong token";
-  if (!IsCommand(request.command)) return "no such command";
+  if (!world::CommandNamed(request.command)) return "no such command";
+  if (world::CommandNamed(request.command) == world::kKillCommand)
+    return "not from a page: chase-command kill --force";
   return "";
 }
 

@@ -19,11 +19,8 @@ struct Request {
 /// Nothing when the text is no request: other JSON, none at all, or values of other types.
 std::optional<Request> ParseRequest(const std::string& text);
 
-/// takeoff, chase, hold, search, return, land, stop.
-bool IsCommand(const std::string& name);
-
-/// Empty when a command with this token may be passed on, else why not. The comparison takes as
-/// long for every token of the same length.
+/// Empty when a command, other than kill, with this token may be passed on, else why not. The
+/// comparison takes as long for every token of the same length.
 std::string RefusalOf(const Request& request, const std::string& token);
 
 }  // namespace chase::viewer

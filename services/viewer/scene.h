@@ -47,12 +47,22 @@ struct Forecast {
   Eigen::Matrix3d velocity_covariance = Eigen::Matrix3d::Zero();  ///< m^2/s^2
 };
 
+/// Where the flight is, as the mission process says.
+struct Flight {
+  int state = 0;                     ///< flight_state_t's constants
+  std::string reason;                ///< what led to it
+  double since = 0.0;                ///< when it began, s
+  std::vector<std::string> missing;  ///< what READY waits for
+  double age = 0.0;                  ///< since it was heard, s
+};
+
 /// The newest of everything.
 struct Scene {
   std::optional<Drone> drone;
   std::optional<Target> target;
   std::optional<Plan> plan;
   std::optional<Forecast> forecast;
+  std::optional<Flight> flight;
   int following = -1;     ///< tracking_t's constants; -1: not heard
   double plan_ms = -1.0;  ///< mean time per plan of the last second; negative: not known
   std::string scenario;   ///< its name; empty: none

@@ -21,7 +21,8 @@ struct ViewerConfig {
   void Visit(V& v) {
     v("address", address, "that the server listens on; 127.0.0.1: this host only");
     v("port", port, "of page and Foxglove endpoint; 0: any free one");
-    v("token", token, "that commands must carry; empty: none are taken");
+    v("token", token,
+      "that commands must carry; empty: none are taken; rather in a file: --token-file");
     v("max_clients", max_clients, "connections at a time; more are closed at once");
     v("cloud_points", cloud_points, "of a sweep on the page");
     v("cloud_rate_hz", cloud_rate_hz, "sweeps a second on the page");

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "chase/attitude_setpoint_t.hpp"
+#include "chase/command_t.hpp"
 #include "chase/imu_t.hpp"
 #include "chase/lidar_scan_t.hpp"
 #include "chase/map_t.hpp"
@@ -40,8 +41,11 @@ ViewerNode::ViewerNode(bus::Bus& bus, const ViewerConfig& config, const std::str
       source_(source),
       server_(ServerConfigOf(config, source), LoadAssets(AssetFolder())),
       foxglove_(server_),
+      commander_(bus, config.token, source.empty(),
+                 [this](const auto&... answer) { Answer(answer...); }),
       history_(source.empty() ? config.trail : kWholeLog) {
   SubscribeScene();
+  SubscribeMission();
   SubscribeStatuses();
   SubscribeOthers();
 }
@@ -78,6 +82,19 @@ void ViewerNode::SubscribeScene() {
   bus_.Subscribe<camera_image_t>("CAMERA_IMAGE", [this](const camera_image_t& m) { OnImage(m); });
 }
 
+void ViewerNode::SubscribeMission() {
+  bus_.Subscribe<flight_state_t>("FLIGHT_STATE",
+                                 [this](const flight_state_t& m) { OnFlightState(m); });
+  bus_.Subscribe<command_ack_t>("COMMAND_ACK", [this](const command_ack_t& m) {
+    commander_.Hear(m);
+    foxglove_.Offer("COMMAND_ACK", m);
+  });
+  bus_.Subscribe<health_t>("HEALTH", [this](const health_t& m) {
+    mission_health_ = m;
+    foxglove_.Offer("HEALTH", m);
+  });
+}
+
 void ViewerNode::SubscribeStatuses() {
   const auto hear = [this](const status_t& m) { OnStatus(m); };
   bus_.Subscribe<status_t>("LIDAR_STATUS", hear);
@@ -88,6 +105,7 @@ void ViewerNode::SubscribeStatuses() {
   bus_.Subscribe<status_t>("PREDICTION_STATUS", hear);
   bus_.Subscribe<status_t>("PLANNING_STATUS", hear);
   bus_.Subscribe<status_t>("CONTROL_STATUS", hear);
+  bus_.Subscribe<status_t>("MISSION_STATUS", hear);
   bus_.Subscribe<status_t>("FCU_STATUS", hear);
   bus_.Subscribe<status_t>("SIMULATOR_STATUS", hear);
 }
@@ -101,6 +119,8 @@ void ViewerNode::SubscribeOthers() {
   bus_.Subscribe<attitude_setpoint_t>("ATTITUDE_SETPOINT", [this](const attitude_setpoint_t& m) {
     foxglove_.Offer("ATTITUDE_SETPOINT", m);
   });
+  bus_.Subscribe<command_t>("COMMAND",
+                            [this](const command_t& m) { foxglove_.Offer("COMMAND", m); });
   bus_.Subscribe<scenario_t>("SCENARIO",
                              [this](const scenario_t& m) { foxglove_.Offer("SCENARIO", m); });
 }
@@ -135,6 +155,13 @@ void ViewerNode::OnPose(const pose_t& m) {
   scene_.drone = FromMessage(m);
   pose_heard_ = bus_.Now();
   foxglove_.Offer("POSE", m);
+}
+
+void ViewerNode::OnFlightState(const flight_state_t& m) {
+  Time(m.utime);
+  scene_.flight = FromMessage(m, start_ < 0 ? origin_ : start_);
+  flight_heard_ = bus_.Now();
+  foxglove_.Offer("FLIGHT_STATE", m);
 }
 
 void ViewerNode::OnScan(const scan_registered_t& m) {
@@ -177,6 +204,7 @@ void ViewerNode::Forget() {
   obstacles_sent_ = false;
   statuses_.clear();
   health_.clear();
+  mission_health_.reset();
   sent_.clear();
   epoch_ = -1;
   ++generation_;
@@ -188,30 +216,28 @@ void ViewerNode::SendHello() {
 }
 
 void ViewerNode::SendHealth() {
-  std::vector<ProcessHealth> rows;
-  for (const auto& [name, health] : health_) {
-    rows.push_back(health);
-    rows.back().age = bus::Seconds(bus_.Now(), status_heard_[name]);
-  }
+  const int64_t now = bus_.Now();
+  for (auto& [name, health] : health_) health.age = bus::Seconds(now, status_heard_[name]);
+  const std::vector<ProcessHealth> rows =
+      mission_health_ ? Joined(health_, *mission_health_, now) : Joined(health_, {}, now);
   const Server::Counters c = server_.counters();
   server_.Send(Part::kHealth, HealthText(rows, std::to_string(c.connected) + " connected, " +
                                                    std::to_string(c.refused) + " refused, " +
                                                    std::to_string(c.dropped) + " frames dropped"));
 }
 
-/// Here a command will be handed on; until then every one is refused, and says why.
-void ViewerNode::Answer(const Request& request) {
-  std::string refusal = RefusalOf(request, config_.token);
-  if (refusal.empty()) refusal = "nothing on this vehicle takes commands yet";
-  ++commands_refused_;
-  server_.Send(Part::kReply, ReplyText(request.command, refusal));
+void ViewerNode::Answer(const std::string& command, const std::string& refusal,
+                        const std::string& words) {
+  server_.Send(Part::kReply, ReplyText(command, refusal, words));
 }
 
 void ViewerNode::Tick(int64_t utime) {
   for (const Request& request : server_.TakeRequests()) {
-    if (!request.command.empty()) Answer(request);
+    if (!request.command.empty()) commander_.Take(request);
     if (on_play_) on_play_(request);
   }
+  commander_.Turn();
+  if (scene_.flight) scene_.flight->age = bus::Seconds(bus_.Now(), flight_heard_);
   if (!play_) Remember(utime);
   const bool second = ticks_++ % kTicksPerSecond == 0;
   if (!play_ && second) SendHello();
@@ -228,11 +254,11 @@ void ViewerNode::Tick(int64_t utime) {
 
 bus::NodeReport ViewerNode::Report() const {
   const Server::Counters c = server_.counters();
-  return {bus::NodeReport::State::kOk, "port " + std::to_string(server_.port()) + ", " +
-                                           std::to_string(c.connected) + " connected, " +
-                                           std::to_string(c.refused) + " refused, " +
-                                           std::to_string(c.malformed) + " malformed, " +
-                                           std::to_string(commands_refused_) + " commands refused"};
+  return {bus::NodeReport::State::kOk,
+          "port " + std::to_string(server_.port()) + ", " + std::to_string(c.connected) +
+              " connected, " + std::to_string(c.refused) + " refused, " +
+              std::to_string(c.malformed) + " malformed, " + std::to_string(commander_.taken()) +
+              " commands taken, " + std::to_string(commander_.refused()) + " refused"};
 }
 
 }  // namespace chase::viewer

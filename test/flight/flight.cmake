@@ -25,6 +25,12 @@ add_test(NAME flight_mission
   COMMAND ${bin}/chase-flight ${CMAKE_SOURCE_DIR}/deploy/scenarios/mission.yaml --seed 1 --quiet)
 set_tests_properties(flight_mission PROPERTIES TIMEOUT 300)
 
+# Battery, geofence, kill, a blocked way up: each ends a mission with its reason.
+add_test(NAME flight_envelope
+  COMMAND python3 -B ${CMAKE_SOURCE_DIR}/test/flight/envelope_test.py ${bin}
+          ${CMAKE_SOURCE_DIR}/deploy/scenarios/mission.yaml)
+set_tests_properties(flight_envelope PROPERTIES TIMEOUT 300)
+
 foreach(row IN ITEMS "odometry:POSE;SCAN_REGISTERED" "mapping:OBSTACLES;MAP" "perception:TARGET"
                      "prediction:PREDICTION" "planning:PLAN" "control:ATTITUDE_SETPOINT"
                      "simulator:TRUTH;IMU;LIDAR_SCAN;CAMERA_IMAGE")

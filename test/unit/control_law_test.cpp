@@ -86,6 +86,33 @@ TEST(TrackingLaw, IntegralIsLimited) {
   EXPECT_DOUBLE_EQ(law.integral().y(), -config.integral_limit);
 }
 
+// Whatever is cut off by the limits, the integral does not grow into it, and asked the other way it
+// comes back at once.
+TEST(TrackingLaw, AntiWindupUnderEveryLimit) {
+  ControlConfig config;
+  config.tilt_limit_deg = 10.0;
+  config.max_thrust = 12.0;
+  config.catch_up_speed = 20.0;  // no error is far
+  for (const Eigen::Vector3d& way : {Eigen::Vector3d(1, 0, 0), Eigen::Vector3d(0, -1, 0),
+                                     Eigen::Vector3d(0, 0, 1), Eigen::Vector3d(0, 0, -1)}) {
+    TrackingLaw law(config);
+    Reference reference;
+    reference.state.p = 2.0 * way;
+    for (int i = 0; i < 400; ++i) {
+      const Setpoint setpoint = law.Track({}, reference, reference, 0.005);
+      EXPECT_LE(setpoint.thrust, config.max_thrust + 1e-9);
+      EXPECT_GE(setpoint.thrust, config.min_thrust - 1e-9);
+      EXPECT_LE(setpoint.w_WB_B.cwiseAbs().maxCoeff(), config.max_body_rate + 1e-9);
+      const double tilt = (setpoint.R_WB * Eigen::Vector3d::UnitZ()).z();
+      EXPECT_GE(tilt, std::cos(config.tilt_limit_deg * M_PI / 180.0) - 1e-9);
+    }
+    EXPECT_EQ(law.integral().dot(way), 0.0) << way.transpose();
+    reference.state.p = -0.05 * way;  // within the limits
+    law.Track({}, reference, reference, 0.005);
+    EXPECT_LT(law.integral().dot(way), 0.0) << way.transpose();
+  }
+}
+
 TEST(TrackingLaw, IntegralIgnoresGapsAndFarStarts) {
   TrackingLaw law({});
   Reference r;

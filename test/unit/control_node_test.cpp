@@ -140,6 +140,27 @@ TEST(ControlNode, LandsWhenTheMissionSaysSoAndNobodyElse) {
   EXPECT_EQ(following_after(flight_state_t::HOLD, "mission"), int{tracking_t::PLAN});
 }
 
+TEST(ControlNode, CutsTheMotorsInTheAirWhenTheFlightIsOverAndForGood) {
+  Bench bench;
+  int64_t t = kStart;
+  bench.SendPlan(t, {0, 0, 0});
+  for (int i = 0; i < 20; ++i) bench.SendPose(t += 5000);
+  ASSERT_EQ(int{bench.out.back().motors}, int{attitude_setpoint_t::MOTORS_ON});
+  bench.SendState(flight_state_t::DONE, "planning");
+  bench.SendPose(t += 5000);
+  EXPECT_EQ(int{bench.out.back().motors}, int{attitude_setpoint_t::MOTORS_ON})
+      << "not its business";
+  bench.SendState(flight_state_t::DONE);
+  bench.SendPose(t += 5000);
+  EXPECT_EQ(int{bench.out.back().motors}, int{attitude_setpoint_t::MOTORS_OFF});
+  EXPECT_EQ(bench.out.back().thrust, 0.0);
+  bench.SendState(flight_state_t::CHASE);
+  bench.SendPlan(t, {0, 0, 0});
+  for (int i = 0; i < 20; ++i) bench.SendPose(t += 5000);
+  EXPECT_EQ(int{bench.out.back().motors}, int{attitude_setpoint_t::MOTORS_OFF});
+  EXPECT_EQ(bench.tracking.back().reason, "the flight is over: motors off");
+}
+
 TEST(ControlNode, AnswersEveryPoseWithItsOwnStamp) {
   Bench bench;
   bench.SendPlan(kStart, {0, 0, 0});

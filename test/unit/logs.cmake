@@ -29,5 +29,7 @@ if(TARGET chase-flight)
   find_package(Python3 REQUIRED COMPONENTS Interpreter)
   add_test(NAME logs_cli
     COMMAND ${Python3_EXECUTABLE} -B ${CMAKE_CURRENT_LIST_DIR}/logs_cli_test.py ${CMAKE_BINARY_DIR}/bin)
-  set_tests_properties(logs_cli PROPERTIES TIMEOUT 300)
+  add_test(NAME logs_python
+    COMMAND ${Python3_EXECUTABLE} -B ${CMAKE_CURRENT_LIST_DIR}/logs_python_test.py ${CMAKE_BINARY_DIR}/bin)
+  set_tests_properties(logs_cli logs_python PROPERTIES TIMEOUT 300)
 endif()

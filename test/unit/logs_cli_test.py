@@ -171,6 +171,42 @@ class LogTools(unittest.TestCase):
         self.assertEqual(metrics["lost_messages"]["TRUTH"], 0)
         self.assertIn("are missing", (out / "report.html").read_text())
 
+    def test_two_flights_are_compared(self):
+        out = self.folder / "compared"
+        same = run("chase-report", self.log, self.log, "--out", out)
+        self.assertEqual(same.returncode, 2, "both end after a second of a minute")
+        self.assertIn("B is worse in nothing", same.stdout)
+        self.assertIn("safe_ratio", (out / "comparison.txt").read_text())
+        blind = self.without("blind.lcm", lambda channel, k: channel == "POSE")
+        worse = run("chase-report", self.log, blind).stdout
+        self.assertRegex(worse, r"odometry_ate_m +[\d.]+ +not known  WORSE")
+        better = run("chase-report", blind, self.log).stdout
+        self.assertRegex(better, r"odometry_ate_m +not known +[\d.]+\n")
+
+    def test_report_has_a_time_line_and_what_was_certified(self):
+        out = self.folder / "lines"
+        run("chase-report", self.log, "--out", out)
+        page = (out / "report.html").read_text()
+        self.assertRegex(page, r'"lane":"verdict","label":"\w+"')
+        self.assertRegex(page, r'"certified":\{"t":\[')
+
+    def test_a_log_without_truth_is_reported_by_what_the_vehicle_said(self):
+        out = self.folder / "vehicle"
+        log = self.without("vehicle.lcm", lambda channel, k: channel in ("TRUTH", "SCENARIO"))
+        answer = run("chase-report", log, "--out", out)
+        self.assertEqual(answer.returncode, 0, answer.stderr)
+        self.assertIn("no TRUTH", answer.stdout)
+        metrics = json.loads((out / "metrics.json").read_text())
+        self.assertEqual(metrics["replans"], self.count("PLAN"))
+        self.assertAlmostEqual(sum(metrics["pose_health_s"].values()), metrics["flown_s"], delta=1.0)
+        self.assertGreater(metrics["latency_ms"]["TARGET"]["p50"], 0.0)
+        self.assertIn("certified_clearance_m", metrics)
+        self.assertIn('"lane":"pose"', (out / "report.html").read_text())
+        log.write_bytes(log.read_bytes()[:-50])
+        self.assert_refused(run("chase-report", log, "--out", out), 2, "cut off")
+        bare = self.without("bare.lcm", lambda channel, k: channel != "IMU")
+        self.assert_refused(run("chase-report", bare, "--out", out), 1, "no flight to report")
+
     def counts(self, log):
         found = {}
         for _, channel, _ in lcmlog.read(log):

@@ -6,7 +6,8 @@
 #include <utility>
 #include <vector>
 
-#include "services/mission/command_client.h"
+#include "common/world/commands.h"
+#include "services/mission/progress.h"
 #include "test/unit/mission_bench.h"
 
 namespace chase::mission {
@@ -118,7 +119,7 @@ TEST(Commands, TakeEffectOnceOnABadLine) {
     for (int64_t id = 1; id <= 100; ++id) {
       const Event kind = id % 2 == 1 ? Event::kChase : Event::kHold;
       const Command command{"command", 5, 10'000 + id, bench.t, kind};
-      CommandClient client(kind, bench.t);
+      world::CommandClient client(static_cast<int>(kind), bench.t);
       while (!client.answered()) {
         ASSERT_FALSE(client.GaveUp(bench.t)) << "seed " << seed << ", command " << id;
         if (client.Due(bench.t)) there.Send(bench.t, command);
@@ -139,8 +140,30 @@ TEST(Commands, TakeEffectOnceOnABadLine) {
   }
 }
 
+TEST(Commands, KillNeedsForceInEveryState) {
+  for (const bool flies : {false, true}) {
+    Bench bench;
+    bench.Run(0.5);
+    if (flies) bench.Fly();
+    const State before = bench.mission.state();
+    const auto kill = [&](bool force, int64_t id) {
+      return bench.mission.Obey(bench.t, {"command", 1, id, bench.t, Event::kKill, force});
+    };
+    const Answer refused = kill(false, 900);
+    EXPECT_FALSE(refused.accepted);
+    EXPECT_NE(refused.reason.find("--force"), std::string::npos);
+    EXPECT_EQ(bench.mission.state(), before);
+    // A command that is meant to be something else cannot be forced into a kill.
+    EXPECT_FALSE(kill(true, 900).accepted) << "the same command again";
+    EXPECT_TRUE(kill(true, 901).accepted);
+    EXPECT_EQ(bench.mission.state(), State::kDone);
+    EXPECT_EQ(bench.mission.reason(), "killed: motors cut by command");
+    EXPECT_FALSE(kill(true, 902).accepted) << "they are off";
+  }
+}
+
 TEST(CommandClient, RepeatsUntilAnsweredAndGivesUp) {
-  CommandClient client(Event::kHold, 1.0);
+  world::CommandClient client(2, 1.0);
   EXPECT_TRUE(client.Due(1.0));
   EXPECT_FALSE(client.Due(1.05));
   EXPECT_TRUE(client.Due(1.11));
@@ -162,9 +185,9 @@ TEST(CommandClient, KnowsWhenTheFlightIsThere) {
   EXPECT_EQ(ProgressOf(Event::kChase, State::kSearch), Progress::kUnderWay);
   EXPECT_EQ(ProgressOf(Event::kChase, State::kEmergency), Progress::kMissed);
   EXPECT_EQ(ProgressOf(Event::kStop, State::kHold), Progress::kReached);
-  for (int i = 0; i <= static_cast<int>(Event::kStop); ++i)
-    EXPECT_EQ(CommandNamed(Name(static_cast<Event>(i))), static_cast<Event>(i));
-  EXPECT_FALSE(CommandNamed("fly").has_value());
+  for (int i = 0; i <= static_cast<int>(Event::kKill); ++i)
+    EXPECT_EQ(world::CommandNamed(Name(static_cast<Event>(i))), i);
+  EXPECT_FALSE(world::CommandNamed("fly").has_value());
 }
 
 }  // namespace

@@ -11,7 +11,7 @@
 namespace chase::mission {
 namespace {
 
-bool IsCommand(Event e) { return e <= Event::kStop; }
+bool IsCommand(Event e) { return e <= Event::kKill; }
 
 /// The flight in rules rather than rows: what is known of the vehicle, and what it is to do.
 class Model {
@@ -32,6 +32,11 @@ class Model {
 
  private:
   bool Obey(Event e) {
+    if (e == Event::kKill) {
+      const bool was_off = off_;
+      off_ = true;
+      return !was_off;
+    }
     if (off_ || (aloft_ && blind_)) return false;
     if (!aloft_) {
       if (e != Event::kTakeoff || !complete_) return false;
@@ -81,6 +86,12 @@ class Model {
     if (now == std::pair(State::kSearch, Event::kGaveUp)) task_ = State::kReturn;
     if (now == std::pair(State::kReturn, Event::kHome)) task_ = State::kLand;
     if (now == std::pair(State::kReturn, Event::kHomeLost)) task_ = State::kLand;
+    const bool leads =
+        task_ == State::kTakeoff || task_ == State::kChase || task_ == State::kSearch;
+    const bool stays_up = leads || task_ == State::kHold;
+    if (e == Event::kLeaving && leads) task_ = State::kHold;
+    if ((e == Event::kOutside || e == Event::kBatteryLow) && stays_up) task_ = State::kReturn;
+    if (e == Event::kBatteryCritical) task_ = State::kLand;
   }
 
   bool off_ = false, aloft_ = false, complete_ = false, blind_ = false;
@@ -89,14 +100,14 @@ class Model {
 
 TEST(States, TheTableWalksAsTheRulesDo) {
   std::set<std::pair<State, Event>> visited;
-  for (unsigned seed = 1; seed <= 2000; ++seed) {
+  for (unsigned seed = 1; seed <= 4000; ++seed) {
     std::mt19937 random(seed);
     State state = State::kIdle;
     Model model;
-    for (int i = 0; i < 60; ++i) {
+    for (int i = 0; i < 80; ++i) {
       const auto event = static_cast<Event>(random() % kEvents);
       // Motors that are off end the walk: later steps see more of the table.
-      if (event == Event::kMotorsOff && i < 40) continue;
+      if ((event == Event::kMotorsOff || event == Event::kKill) && i < 10) continue;
       visited.emplace(state, event);
       const Transition* row = Find(state, event);
       const bool obeyed = model.Take(event);

@@ -3,8 +3,14 @@ chase_test(viewer_core_test
   SOURCES ${CMAKE_CURRENT_LIST_DIR}/viewer_core_test.cpp)
 chase_test(viewer_node_test
   LIBS viewer_node
-  SOURCES ${CMAKE_CURRENT_LIST_DIR}/viewer_node_test.cpp)
+  SOURCES ${CMAKE_CURRENT_LIST_DIR}/viewer_node_test.cpp ${CMAKE_CURRENT_LIST_DIR}/viewer_commander_test.cpp)
 add_dependencies(viewer_node_test viewer_page)
+
+add_test(NAME viewer_commands
+  COMMAND ${CMAKE_SOURCE_DIR}/test/flight/in_namespace.sh
+          ${NODE} ${CMAKE_SOURCE_DIR}/test/viewer/commands_test.mjs ${CMAKE_BINARY_DIR}/bin none
+          ${CMAKE_SOURCE_DIR}/services/viewer/node_modules)
+set_tests_properties(viewer_commands PROPERTIES TIMEOUT 120)
 
 # The program with a short log: Foxglove's published client, hostile ones, a slow link, Chromium.
 foreach(name IN ITEMS foxglove hostile link page)

@@ -135,6 +135,19 @@ TEST(ViewerText, WhatIsNotFiniteIsNull) {
   EXPECT_TRUE(state["plan"]["path"][0].is_null());
 }
 
+TEST(ViewerText, WhereTheFlightIs) {
+  Scene scene;
+  scene.flight = Flight{4, "hold commanded", 2.0, {"POSE is not heard"}, 0.1};
+  json state = json::parse(StateText(scene, 5.0, 0, {}));
+  EXPECT_EQ(state["flight"]["state"], 4);
+  EXPECT_EQ(state["flight"]["reason"], "hold commanded");
+  EXPECT_EQ(state["flight"]["missing"][0], "POSE is not heard");
+  EXPECT_EQ(state["row"][14], 4);
+  scene.flight->age = 2.1;  // nobody says so any more
+  state = json::parse(StateText(scene, 5.0, 0, {}));
+  EXPECT_EQ(state["row"][14], -1);
+}
+
 TEST(ViewerText, NothingHeardYet) {
   const json state = json::parse(StateText(Scene(), 0.0, 7, {}));
   EXPECT_EQ(state["generation"], 7);

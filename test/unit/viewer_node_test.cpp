@@ -13,43 +13,12 @@
 #include "common/bus/convert.h"
 #include "common/bus/log_writer.h"
 #include "services/viewer/log_player.h"
+#include "test/unit/viewer_memory_bus.h"
 
 namespace chase::viewer {
 namespace {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-constexpr int64_t kSecond = 1000000;
-
-template <class T>
-std::vector<uint8_t> BytesOf(const T& m) {
-  std::vector<uint8_t> bytes(static_cast<size_t>(m.getEncodedSize()));
-  m.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
-  return bytes;
-}
-
-/// Hands over bytes at once.
-class MemoryBus : public bus::Bus {
- public:
-  void Deliver(const std::string& channel, const std::vector<uint8_t>& bytes) {
-    const auto it = handlers_.find(channel);
-    if (it != handlers_.end()) it->second(bytes.data(), bytes.size());
-  }
-  template <class T>
-  void Deliver(const std::string& channel, const T& m) {
-    Deliver(channel, BytesOf(m));
-  }
-  int64_t Now() const override { return now; }
-  int64_t now = 100 * kSecond;
-
- protected:
-  void SubscribeRaw(const std::string& channel, RawHandler handler) override {
-    handlers_[channel] = std::move(handler);
-  }
-  void PublishRaw(const std::string&, Bytes) override {}
-
- private:
-  std::map<std::string, RawHandler> handlers_;
-};
 
 pose_t PoseAt(int64_t utime, double x) {
   pose_t m{};
@@ -172,6 +141,23 @@ TEST(ViewerNode, ShareOfACoreAndPlanTime) {
   EXPECT_NEAR(MeanStageMs(b, a, "plan"), 5.0, 1e-12);  // (30 x 4 - 10 x 2) / 20
   EXPECT_LT(MeanStageMs(a, a, "plan"), 0.0);
   EXPECT_LT(MeanStageMs(b, a, "other"), 0.0);
+}
+
+TEST(ViewerNode, ProcessesThatOnlyTheMissionHears) {
+  ProcessHealth own;
+  own.name = "planning";
+  own.rss_mb = 12.0;
+  health_t m{};
+  m.utime = 5 * kSecond;
+  m.processes = {{"lidar", status_t::FAILED, 3.0, 0}, {"planning", status_t::OK, 0.5, 2}};
+  const auto rows = Joined({{"planning", own}}, m, 6 * kSecond);
+  ASSERT_EQ(rows.size(), 2U);
+  EXPECT_EQ(rows[0].name, "lidar");
+  EXPECT_EQ(rows[0].state, +status_t::FAILED);
+  EXPECT_NEAR(rows[0].age, 4.0, 1e-12);
+  EXPECT_EQ(rows[1].restarts, 2);
+  EXPECT_EQ(rows[1].rss_mb, 12.0);
+  EXPECT_EQ(Joined({{"planning", own}}, {}, 0)[0].restarts, -1);
 }
 
 class ViewerPlayer : public ::testing::Test {

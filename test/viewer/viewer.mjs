@@ -37,6 +37,28 @@ export async function play(config = '') {
   return {url: `http://127.0.0.1:${port}/`, port, process: child, stop};
 }
 
+// Starts chase-mission with nothing to fly and a viewer that takes commands with the token; resolves like play.
+export async function live(token) {
+  const folder = fs.mkdtempSync(path.join(os.tmpdir(), 'viewer-'));
+  const file = path.join(folder, 'token');
+  fs.writeFileSync(file, `${token}\n`);
+  const port = 18080;  // of a network namespace of its own
+  const start = (name, ...words) => spawn(path.join(bin, `chase-${name}`), words, {stdio: ['ignore', 'ignore', 'inherit']});
+  const children = [start('mission'), start('viewer', '--port', String(port), '--token-file', file)];
+  process.on('exit', () => children.forEach((child) => child.kill('SIGKILL')));
+  const url = `http://127.0.0.1:${port}/`;
+  await until('the viewer is up', () => fetch(url).then((answer) => answer.ok, () => false));
+  const stop = async () => {
+    for (const child of children) {
+      const ended = new Promise((done) => child.on('exit', done));
+      child.kill('SIGINT');
+      if (await ended !== 0) throw new Error(`${child.spawnfile} ended badly`);
+    }
+    fs.rmSync(folder, {recursive: true});
+  };
+  return {url, port, process: children[1], stop};
+}
+
 // A page without a browser: acknowledges, keeps the newest of every type.
 export async function pageClient(port) {
   const {WebSocket} = load('ws');

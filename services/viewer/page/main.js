@@ -2,16 +2,18 @@ import {Link} from './link.js';
 import {Scene3D} from './scene3d.js';
 import {drawTimeline, drawStrips, timeAt} from './strips.js';
 import {drawImage, showHealth, makeCommands, allowCommands} from './panels.js';
-import {T, DRONE, VERDICTS, VERDICT_COLORS, TARGET_STATES, HEALTHS, FOLLOWING, format} from './names.js';
+import {T, DRONE, VERDICTS, VERDICT_COLORS, TARGET_STATES, HEALTHS, FOLLOWING, FLIGHT_STATES,
+  FLIGHT_COLORS, format} from './names.js';
 
 const WINDOW = 60;   // s of a live flight that the strips show
 const STALE = 0.5;   // s without a pose
+const SILENT = 2;    // s without a flight state (common/world/ages.h)
 const page = Object.fromEntries([...document.querySelectorAll('[id]')].map((e) => [e.id, e]));
 const scene = new Scene3D(page.scene);
 const now = () => model.play ? model.play.t : model.rows.at(-1)?.[T] ?? 0;
 const model = {rows: [], generation: -1, play: null, duration: 0, seeking: false};
 // What a test looks at.
-window.chase = {model, scene, counts: {state: 0, cloud: 0, image: 0, health: 0, obstacles: 0}};
+window.chase = {model, scene, counts: {state: 0, cloud: 0, image: 0, health: 0, obstacles: 0, reply: 0}};
 
 const pill = (element, text, kind) => { element.textContent = text; element.className = `pill ${kind}`; };
 
@@ -21,7 +23,20 @@ function span() {
   return [to - WINDOW, to];
 }
 
-function showPills({drone, target, plan, following}) {
+// Where the flight is, why, and what it still waits for.
+function showFlight(flight) {
+  const silent = flight?.age > SILENT, on_ground = flight?.state === 0;
+  const missing = on_ground && flight.missing.length ? `: ${flight.missing.join(', ')}` : '';
+  const text = !flight ? '' : silent ? `flight state ${flight.age.toFixed(0)} s old`
+    : `${FLIGHT_STATES[flight.state] ?? '?'}: ${flight.reason}${missing}`;
+  pill(page.flight, text, silent ? 'bad' : '');
+  page.flight.title = text;
+  page.flight.style.background = silent ? '' : FLIGHT_COLORS[flight?.state] ?? '';
+  page.flight.style.color = flight && !silent ? '#0c1116' : '';
+}
+
+function showPills({drone, target, plan, following, flight}) {
+  showFlight(flight);
   const verdict = plan?.verdict;
   pill(page.verdict, plan ? `${VERDICTS[verdict] ?? '?'}${plan.reason ? ': ' + plan.reason : ''}` : 'no plan', '');
   page.verdict.title = page.verdict.textContent;
@@ -87,7 +102,11 @@ const handlers = {
     page.self.textContent = `viewer: ${message.self}; ${(link.bytes / 1000).toFixed(0)} kB/s`;
     link.bytes = 0;
   },
-  reply(message) { page.reply.textContent = `${message.command}: ${message.refusal || 'taken'}`; },
+  reply(message) {
+    window.chase.counts.reply++;
+    page.reply.textContent = `${message.command}: ${message.refusal ? `refused: ${message.refusal}` : `taken: ${message.words}`}`;
+    page.reply.className = message.refusal ? 'refused' : 'taken';
+  },
   cloud(cloud) { window.chase.counts.cloud++; scene.addSweep(cloud.points); },
   image(image) { window.chase.counts.image++; drawImage(page.image, page.imagetext, image).catch(() => {}); },
 };

@@ -9,8 +9,11 @@ export const FOLLOWING = ['no plan', 'plan', 'stop', 'brake', 'land'];
 export const STATE_COLORS = ['#7d8896', '#3fa66b', '#d9a33a', '#d9534f'];  // of a process: starting ok degraded failed
 export const COMMANDS = ['takeoff', 'chase', 'hold', 'search', 'return', 'land', 'stop'];
 
+export const FLIGHT_STATES = ['IDLE', 'READY', 'TAKEOFF', 'CHASE', 'HOLD', 'SEARCH', 'RETURN', 'LAND', 'DONE', 'EMERGENCY'];
+export const FLIGHT_COLORS = ['#7d8896', '#a9c7b4', '#6fbf73', '#3fa66b', '#4c9be8', '#d9a33a', '#b455c9', '#8a6fd1', '#5b6675', '#d9534f'];
+
 // Columns of a row of samples (services/viewer/page_text.cpp, RowOf).
 export const T = 0, DISTANCE = 1, CLEARANCE = 2, SPEED = 3, PLAN_MS = 4, VERDICT = 5, TARGET_STATE = 6, HEALTH = 7,
-  DRONE = 8, TARGET = 11;
+  DRONE = 8, TARGET = 11, FLIGHT = 14;
 
 export const format = (value, digits, unit) => value === null || value === undefined ? `– ${unit}` : `${value.toFixed(digits)} ${unit}`;

@@ -49,7 +49,8 @@ function updateProcess(details, row) {
   share.textContent = stale ? `silent ${row.age.toFixed(0)} s` : row.cpu === null || row.cpu < 0 ? '' : `${row.cpu.toFixed(0)} %`;
   const sum = (k) => row.channels.reduce((n, c) => n + c[k], 0);
   const lost = sum(2), malformed = sum(3);
-  losses.textContent = lost + malformed > 0 ? `${lost} lost ${malformed} malformed` : '';
+  losses.textContent = [row.restarts > 0 ? `${row.restarts} restarts` : '', lost + malformed > 0 ? `${lost} lost ${malformed} malformed` : '']
+    .filter((text) => text).join(', ');
   text.textContent = `${row.detail}${row.error ? ` · last error: ${row.error}` : ''} · ${format(row.rss, 0, 'MiB')}`;
   table.replaceChildren(...row.channels.map(([channel, rate, dropped, bad, foreign]) => {
     const line = element('tr');
@@ -60,13 +61,17 @@ function updateProcess(details, row) {
   return details;
 }
 
-// Buttons work only while armed, and only with the token of the viewer's configuration. What takes the
-// commands on the vehicle answers through "reply".
+// Buttons work only while armed, and only with the token that the viewer was started with. The vehicle's
+// answer comes through "reply".
 export function makeCommands(page, ask) {
   const buttons = COMMANDS.map((name) => {
     const button = element('button', name);
     button.disabled = true;
-    button.onclick = () => ask({command: name, token: page.token.value});
+    button.onclick = () => {
+      page.reply.textContent = `${name}: sent`;
+      page.reply.className = '';
+      ask({command: name, token: page.token.value});
+    };
     return button;
   });
   page.buttons.replaceChildren(...buttons);
@@ -76,5 +81,5 @@ export function makeCommands(page, ask) {
 
 export function allowCommands(page, allowed) {
   page.arm.disabled = page.token.disabled = !allowed;
-  if (!allowed) page.reply.textContent = 'off: the viewer was started without a token';
+  if (!allowed) page.reply.textContent = 'off: the viewer was started without --token-file';
 }

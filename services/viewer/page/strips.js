@@ -1,11 +1,10 @@
 // Time line and strips: plain 2D canvases over the rows of samples.
-import {T, DISTANCE, CLEARANCE, SPEED, PLAN_MS, VERDICT, TARGET_STATE, HEALTH, VERDICT_COLORS, TARGET_COLORS,
-  HEALTH_COLORS, format} from './names.js';
+import {T, DISTANCE, CLEARANCE, SPEED, PLAN_MS, VERDICT, TARGET_STATE, HEALTH, FLIGHT, VERDICT_COLORS, TARGET_COLORS,
+  HEALTH_COLORS, FLIGHT_COLORS, format} from './names.js';
 
 const STRIPS = [['distance', DISTANCE, 'm', 2, '#4c9be8'], ['certified clearance', CLEARANCE, 'm', 2, '#3fa66b'],
   ['speed', SPEED, 'm/s', 2, '#d9a33a'], ['plan time', PLAN_MS, 'ms', 2, '#b455c9']];
-// A lane whose column is null waits for messages of its own: flight states.
-const LANES = [['flight', null, []], ['verdict', VERDICT, VERDICT_COLORS], ['target', TARGET_STATE, TARGET_COLORS],
+const LANES = [['flight', FLIGHT, FLIGHT_COLORS], ['verdict', VERDICT, VERDICT_COLORS], ['target', TARGET_STATE, TARGET_COLORS],
   ['pose', HEALTH, HEALTH_COLORS]];
 const LEFT = 60, DIM = '#93a0b0';
 
@@ -38,7 +37,6 @@ export function drawTimeline(canvas, rows, from, to, now) {
     context.fillText(name, 8, top + step / 2 - 1);
     context.fillStyle = '#232b36';
     context.fillRect(LEFT, top, width - LEFT - 8, step - 4);
-    if (column === null) return;
     for (let i = 0, j; i < rows.length; i = j) {  // runs of the same code
       for (j = i + 1; j < rows.length && rows[j][column] === rows[i][column]; ++j);
       const color = colors[rows[i][column]];

@@ -1,12 +1,6 @@
-#include "services/mission/command_client.h"
+#include "services/mission/progress.h"
 
 namespace chase::mission {
-
-std::optional<Event> CommandNamed(const std::string& name) {
-  for (int i = 0; i <= static_cast<int>(Event::kStop); ++i)
-    if (name == Name(static_cast<Event>(i))) return static_cast<Event>(i);
-  return std::nullopt;
-}
 
 Progress ProgressOf(Event command, State state) {
   const auto is = [state](State s) { return state == s; };
@@ -26,6 +20,7 @@ Progress ProgressOf(Event command, State state) {
       return reached_by(chases, false);
     case Event::kReturn:
     case Event::kLand:
+    case Event::kKill:
       return reached_by(is(State::kDone), is(State::kReturn) || is(State::kLand));
     default:
       return reached_by(is(State::kHold), false);

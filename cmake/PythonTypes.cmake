@@ -1,0 +1,16 @@
+# lcm-gen's Python classes of TYPES in the folder TO. A field that Python has a word of its own for
+# (proof_t's `from`) gets an underscore: the generated module would not load.
+file(REMOVE_RECURSE ${TO}/chase)
+execute_process(COMMAND ${LCM_GEN} --python --ppath ${TO} ${TYPES} RESULT_VARIABLE failed)
+if(failed)
+  message(FATAL_ERROR "lcm-gen --python: ${failed}")
+endif()
+file(GLOB modules ${TO}/chase/*_t.py)
+foreach(module IN LISTS modules)
+  file(READ ${module} text)
+  string(REPLACE "self.from" "self.from_" fixed "${text}")
+  string(REPLACE "\"from\"" "\"from_\"" fixed "${fixed}")
+  if(NOT fixed STREQUAL text)
+    file(WRITE ${module} "${fixed}")
+  endif()
+endforeach()

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <cstdint>
+
+#include "chase/command_ack_t.hpp"
+#include "common/bus/bus.h"
+#include "common/world/commands.h"
+
+namespace chase::bus {
+
+/// A command on its way over the bus: COMMAND until a COMMAND_ACK names it.
+class CommandCall {
+ public:
+  /// Given now. `kind`: one of command_t's constants; `id`: no other command of this process has
+  /// it; `force`: of kill, which is refused without.
+  CommandCall(Bus& bus, int kind, int64_t id, bool force = false)
+      : bus_(&bus), given_(bus.Now()), id_(id), force_(force), client_(kind, 0.0) {}
+
+  /// Sends it when that is due: to be called ten times a second or more.
+  void Turn();
+  /// Of all acknowledgements; what answers another command is left alone.
+  void Hear(const command_ack_t& ack);
+
+  bool answered() const { return client_.answered(); }
+  bool GaveUp() const { return client_.GaveUp(Elapsed()); }
+  bool accepted() const { return client_.accepted(); }
+  const std::string& reason() const { return client_.reason(); }
+  int kind() const { return client_.command(); }
+
+ private:
+  double Elapsed() const;
+
+  Bus* bus_;
+  int64_t given_, id_;  // given: us
+  bool force_;
+  world::CommandClient client_;
+};
+
+}  // namespace chase::bus

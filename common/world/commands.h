@@ -1,0 +1,56 @@
+#pragma once
+
+#include <array>
+#include <optional>
+#include <string>
+
+namespace chase::world {
+
+/// What an operator may want of the vehicle, by command_t's constants.
+inline constexpr std::array<const char*, 8> kCommandNames = {"takeoff", "chase", "hold", "search",
+                                                             "return",  "land",  "stop", "kill"};
+inline constexpr int kKillCommand = 7;  ///< cuts the motors in the air; needs to be forced
+
+/// The constant of a name such as "takeoff"; nothing where there is none.
+inline std::optional<int> CommandNamed(const std::string& name) {
+  for (size_t i = 0; i < kCommandNames.size(); ++i)
+    if (name == kCommandNames[i]) return static_cast<int>(i);
+  return std::nullopt;
+}
+
+/// One command from giving it to its answer: sent again until it is answered.
+class CommandClient {
+ public:
+  /// Given at time `t` [s].
+  CommandClient(int command, double t) : command_(command), start_(t), next_(t) {}
+
+  /// True when it is to be sent now.
+  bool Due(double t) {
+    if (answered_ || t < next_) return false;
+    next_ = t + kPeriod;
+    return true;
+  }
+  void OnAnswer(bool accepted, const std::string& reason) {
+    if (answered_) return;
+    answered_ = true;
+    accepted_ = accepted;
+    reason_ = reason;
+  }
+  /// Nobody has answered for so long that nobody will.
+  bool GaveUp(double t) const { return !answered_ && t - start_ > kPatience; }
+
+  int command() const { return command_; }  ///< one of command_t's constants
+  bool answered() const { return answered_; }
+  bool accepted() const { return accepted_; }
+  const std::string& reason() const { return reason_; }
+
+ private:
+  static constexpr double kPeriod = 0.1;    // s
+  static constexpr double kPatience = 5.0;  // s: half of kMostAge.command
+  int command_;
+  double start_, next_;
+  bool answered_ = false, accepted_ = false;
+  std::string reason_;
+};
+
+}  // namespace chase::world

@@ -1,0 +1,23 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace chase::logs {
+
+/// One figure of two flights. Empty texts: not known.
+struct ComparedFigure {
+  std::string key, a, b;  ///< key of metrics.json, parts joined by a point
+  bool worse = false;     ///< of b
+};
+
+/// The figures of two flights' metrics.json that have a better side, and the criteria. A figure is
+/// worse where it has moved to its worse side by more than `tolerance` of the larger of the two; a
+/// criterion where it held and does not any more.
+std::vector<ComparedFigure> CompareMetrics(const std::string& a, const std::string& b,
+                                           double tolerance);
+
+/// A table, WORSE beside what is.
+std::string Format(const std::vector<ComparedFigure>& figures);
+
+}  // namespace chase::logs

@@ -1,0 +1,50 @@
+#include "services/viewer/commander.h"
+
+#include <utility>
+
+#include "common/world/commands.h"
+
+namespace chase::viewer {
+
+Commander::Commander(bus::Bus& bus, std::string token, bool live, Reply reply)
+    : bus_(bus), token_(std::move(token)), live_(live), reply_(std::move(reply)) {}
+
+void Commander::Hear(const command_ack_t& ack) {
+  for (Given& given : given_) given.call.Hear(ack);
+}
+
+std::string Commander::RefusalHere(const Request& request) const {
+  std::string refusal = RefusalOf(request, token_);
+  if (refusal.empty() && !live_) refusal = "a log is played: nobody flies";
+  if (refusal.empty() && given_.size() >= kMost) refusal = "too many commands are not answered yet";
+  return refusal;
+}
+
+void Commander::Take(const Request& request) {
+  const std::string refusal = RefusalHere(request);
+  if (!refusal.empty()) return Settle(request.command, refusal, "");
+  given_.push_back(
+      {request.command, bus::CommandCall(bus_, *world::CommandNamed(request.command), next_id_++)});
+}
+
+void Commander::Turn() {
+  std::deque<Given> open;
+  for (Given& given : std::exchange(given_, {})) {
+    given.call.Turn();
+    if (given.call.answered())
+      Settle(given.command, given.call.accepted() ? "" : given.call.reason(), given.call.reason());
+    else if (given.call.GaveUp())
+      Settle(given.command, "no answer; does chase-mission run?", "");
+    else
+      open.push_back(std::move(given));
+  }
+  given_ = std::move(open);
+}
+
+void Commander::Settle(const std::string& command, const std::string& refusal,
+                       const std::string& words) {
+  ++(refusal.empty() ? taken_ : refused_);
+  reply_(command, refusal, words);
+}
+
+}  // namespace chase::viewer

@@ -1,0 +1,47 @@
+#pragma once
+
+#include <deque>
+#include <functional>
+#include <string>
+
+#include "common/bus/command_call.h"
+#include "services/viewer/request.h"
+
+namespace chase::viewer {
+
+/// Gives the vehicle what pages command with the right token, each command until it is answered.
+class Commander {
+ public:
+  /// `reply(command, refusal, words)` is called once for each command; refusal: empty where the
+  /// vehicle has taken it. `token`: empty: all are refused. `live`: false: all are refused.
+  using Reply =
+      std::function<void(const std::string&, const std::string&, const std::string& words)>;
+  Commander(bus::Bus& bus, std::string token, bool live, Reply reply);
+
+  void Take(const Request& request);
+  /// Of all acknowledgements.
+  void Hear(const command_ack_t& ack);
+  /// Sends what is due and answers what is over: ten times a second.
+  void Turn();
+
+  int64_t taken() const { return taken_; }      ///< by the vehicle
+  int64_t refused() const { return refused_; }  ///< by the vehicle or here
+
+ private:
+  struct Given {
+    std::string command;
+    bus::CommandCall call;
+  };
+  static constexpr size_t kMost = 8;  // under way: a finger is no faster than their answers
+  std::string RefusalHere(const Request& request) const;
+  void Settle(const std::string& command, const std::string& refusal, const std::string& words);
+
+  bus::Bus& bus_;
+  std::string token_;
+  bool live_;
+  Reply reply_;
+  std::deque<Given> given_;
+  int64_t next_id_ = 1, taken_ = 0, refused_ = 0;
+};
+
+}  // namespace chase::viewer

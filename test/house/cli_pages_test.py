@@ -1,0 +1,67 @@
+#!/usr/bin/env python3
+"""Completions and man pages name every option of every program, and bash and man can read them.
+
+cli_pages_test.py BIN_DIR"""
+
+import pathlib
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import unittest
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+BIN = pathlib.Path(sys.argv[1]).resolve()
+
+
+def run(*command, **more):
+    return subprocess.run(list(map(str, command)), capture_output=True, text=True, check=False, **more)
+
+
+class Pages(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.temporary = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(cls.temporary.cleanup)
+        cls.out = pathlib.Path(cls.temporary.name)
+        answer = run(sys.executable, "-B", ROOT / "deploy/cli_pages.py", BIN, cls.out)
+        assert answer.returncode == 0, answer.stderr
+        cls.programs = sorted(path.name for path in BIN.glob("chase-*"))
+
+    def completion(self, program):
+        return self.out / "share/bash-completion/completions" / program
+
+    def complete(self, *words):
+        """What is offered for the last word."""
+        script = f"source {self.completion(words[0])}; COMP_WORDS=({' '.join(words[:-1])} '{words[-1]}'); " \
+                 f"COMP_CWORD={len(words) - 1}; _{words[0].replace('-', '_')}; echo ${{COMPREPLY[@]}}"
+        return run("bash", "-c", script).stdout.split()
+
+    def test_every_option_is_there(self):
+        self.assertGreater(len(self.programs), 5)
+        for program in self.programs:
+            options = set(re.findall(r"^\s+(?:-\w,)?(--[\w-]+)", run(BIN / program, "--help").stdout.split("Usage:")[1], re.M))
+            self.assertIn("--version", options, program)
+            page = (self.out / f"share/man/man1/{program}.1").read_text(encoding="utf-8").replace("\\-", "-")
+            for option in options:
+                self.assertIn(option, self.complete(program, "--"), program)
+                self.assertIn(option, page, program)
+
+    def test_bash_and_man_read_them(self):
+        for program in self.programs:
+            self.assertEqual(run("bash", "-n", self.completion(program)).stderr, "", program)
+            if shutil.which("man"):
+                answer = run("man", "--warnings", "-l", self.out / f"share/man/man1/{program}.1",
+                             env={"MANWIDTH": "80", "LC_ALL": "C.UTF-8", "PATH": "/usr/bin:/bin"})
+                self.assertEqual((answer.returncode, answer.stderr), (0, ""), program)
+
+    def test_choices_and_subcommands(self):
+        self.assertEqual(self.complete("chase-log", "ex"), ["export"])
+        self.assertIn("--tum", self.complete("chase-log", "export", "--"))
+        self.assertIn("takeoff", self.complete("chase-command", "ta"))
+        self.assertEqual(self.complete("chase-flight", "--sensors", "tr"), ["truth"])
+
+
+if __name__ == "__main__":
+    unittest.main(argv=sys.argv[:1] + sys.argv[2:])

@@ -1,0 +1,80 @@
+#!/usr/bin/env python3
+"""The Python reader against chase-log, damaged logs, and every example of its page.
+
+logs_python_test.py BIN_DIR"""
+
+import csv
+import os
+import pathlib
+import re
+import subprocess
+import sys
+import tempfile
+import unittest
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+BIN = pathlib.Path(sys.argv[1]).resolve()
+MODULES = BIN.parent / "share/chase/python"
+sys.dont_write_bytecode = True
+sys.path.insert(0, str(MODULES))
+import chase_log  # noqa: E402
+
+EXAMPLE = re.compile(r"^```python\n(.*?)^```", re.MULTILINE | re.DOTALL)
+
+
+class Python(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.temporary = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(cls.temporary.cleanup)
+        cls.folder = pathlib.Path(cls.temporary.name)
+        cls.log = cls.folder / "flight.lcm"
+        subprocess.run([BIN / "chase-flight", ROOT / "deploy/scenarios/gym.yaml", "--until", "1", "--quiet",
+                        "--sensors", "truth", "--log", cls.log], check=True, capture_output=True)
+
+    def test_agrees_with_the_csv_of_chase_log(self):
+        subprocess.run([BIN / "chase-log", "export", "--csv", self.log, self.folder / "csv"], check=True,
+                       capture_output=True)
+        for channel in ("POSE", "TRUTH", "ATTITUDE_SETPOINT", "PLAN", "TARGET"):
+            with (self.folder / f"csv/{channel}.csv").open(encoding="utf-8") as file:
+                rows = list(csv.DictReader(file))
+            ours = chase_log.table(self.log, channel)
+            self.assertEqual(len(ours), len(rows), channel)
+            self.assertGreater(len(ours), 5, channel)
+            for row, mine in zip(rows, ours):
+                self.assertEqual(int(row["utime"]), mine["utime"])
+                self.assertEqual(int(row["seq"]), mine["seq"])
+
+    def test_every_message_is_decoded(self):
+        unknown = {e.channel for e in chase_log.read(self.log) if isinstance(e.message, bytes)}
+        self.assertEqual(unknown, set())
+
+    def test_damage_costs_what_is_damaged(self):
+        data = self.log.read_bytes()
+        whole = sum(1 for _ in chase_log.read(self.log))
+        damaged = self.folder / "damaged.lcm"
+        middle = len(data) // 2
+        for bad, least in ((data[:-3], whole - 1), (data[:middle] + bytes(100) + data[middle + 100:], whole - 3),
+                           (data[:middle] + data[middle + 1000:], whole - 40), (b"", 0), (b"no log at all" * 9, 0)):
+            damaged.write_bytes(bad)
+            self.assertGreaterEqual(sum(1 for _ in chase_log.read(damaged)), least)
+
+    def test_the_examples_of_the_page_run(self):
+        examples = EXAMPLE.findall((ROOT / "logs/python/README.md").read_text(encoding="utf-8"))
+        self.assertEqual(len(examples), 4)
+        for number, text in enumerate(examples):
+            with self.subTest(number=number):
+                text = text.replace("build/bin", str(BIN)).replace("deploy/", f"{ROOT}/deploy/")
+                file = self.folder / f"example{number}.py"
+                file.write_text(text, encoding="utf-8")
+                answer = subprocess.run([sys.executable, "-B", file, self.log], cwd=self.folder, check=False,
+                                        capture_output=True, text=True,
+                                        env={**os.environ, "PYTHONPATH": str(MODULES)})
+                if "No module named 'pandas'" in answer.stderr:
+                    continue  # it is said to need it
+                self.assertEqual(answer.returncode, 0, answer.stderr)
+        self.assertGreater((self.folder / "path.png").stat().st_size, 1000)
+
+
+if __name__ == "__main__":
+    unittest.main(argv=sys.argv[:1] + sys.argv[2:])
