@@ -128,25 +128,6 @@ PixelBox ProjectedBox(const world::Rig& rig, const Viewpoint& view, const world:
           std::min(box.right, image.right), std::min(box.bottom, image.bottom)};
 }
 
-/// Around the corners of the box around it, and a pixel more for the rounding of single precision.
-PixelBox Surrounding(const world::Rig& rig, const Viewpoint& view, const world::Solid& solid) {
-  const double far = std::numeric_limits<double>::infinity();
-  const Eigen::AngleAxisd turn(solid.yaw, Eigen::Vector3d::UnitZ());
-  PixelBox box{far, far, -far, -far};
-  double nearest = far, farthest = -far;
-  for (int i = 0; i < 8; ++i) {
-    const Eigen::Vector3d sign(i & 1 ? 1.0 : -1.0, i & 2 ? 1.0 : -1.0, i & 4 ? 1.0 : -1.0);
-    const Eigen::Vector3d p_W = solid.center + turn * solid.half_size.cwiseProduct(sign);
-    const Eigen::Vector3d p_C = view.R_WC.transpose() * (p_W - view.p_WC);
-    nearest = std::min(nearest, p_C.z()), farthest = std::max(farthest, p_C.z());
-    const Eigen::Vector2d px = rig.Project(p_C);
-    box = {std::min(box.left, px.x() - 1.0), std::min(box.top, px.y() - 1.0),
-           std::max(box.right, px.x() + 1.0), std::max(box.bottom, px.y() + 1.0)};
-  }
-  if (farthest < -kNearest) return {};
-  return nearest < kNearest ? PixelBox{-far, -far, far, far} : box;
-}
-
 /// What is not in front by kFront is out of the image unless the camera is near: all that the image
 /// shows of the space before kFront is within some multiples of that.
 Outline OutlineOf(const world::Rig& rig, const Viewpoint& view, const world::Solid& solid) {

@@ -23,10 +23,6 @@ struct PixelBox {
 /// is in the image, and the whole image when it reaches behind the camera.
 PixelBox ProjectedBox(const world::Rig& rig, const Viewpoint& view, const world::Solid& cylinder);
 
-/// A rectangle that holds all of a solid's projection, not cut to the image; empty when the solid
-/// is behind the camera, and without end when it reaches there.
-PixelBox Surrounding(const world::Rig& rig, const Viewpoint& view, const world::Solid& solid);
-
 /// What a solid and a millimetre around it take of the image.
 struct Outline {
   PixelBox box;        ///< not cut to the image; empty when it is behind the camera

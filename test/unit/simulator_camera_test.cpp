@@ -196,7 +196,7 @@ TEST(Camera, WhatMovesIsSeenWithinItsRectangleOnly) {
       scene.Trace(Packet(rig, view, u, v), &hits);
       for (int i = 0; i < 8; ++i) {
         const bool within = std::any_of(solids.begin(), solids.end(), [&](const auto& solid) {
-          const PixelBox box = Surrounding(rig, view, solid);
+          const PixelBox box = OutlineOf(rig, view, solid).box;
           return box.left <= u + i && u + i <= box.right && box.top <= v && v <= box.bottom;
         });
         const bool mover = hits.material[i] >= Material::kMover;
