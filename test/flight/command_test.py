@@ -33,12 +33,16 @@ class Command(unittest.TestCase):
                              "POSE is not heard", "planning is not heard")
             self.assert_said(command("chase", "--vehicle", "falcon_", "--wait"), 2, "chase in IDLE")
             self.assert_said(command("stop", "--vehicle", "eagle_"), 3, "no answer", "eagle_")
+            self.assert_said(command("kill", "--vehicle", "falcon_"), 2, "--force", "it falls")
+            killed = command("kill", "--force", "--vehicle", "falcon_")
+            self.assertEqual((killed.returncode, killed.stdout), (0, "DONE: killed: motors cut by command\n"))
+            self.assert_said(command("takeoff", "--vehicle", "falcon_"), 2, "motors are off")
         finally:
             mission.terminate()
             mission.wait(timeout=10)
 
     def test_bad_use(self):
-        for words in ((), ("fly",), ("stop", "now"), ("stop", "--timeout", "nan"),
+        for words in ((), ("fly",), ("stop", "now"), ("land", "--force"), ("stop", "--timeout", "nan"),
                       ("stop", "--timeout", "0"), ("stop", "--lcm-url", "udpm://nonsense")):
             self.assert_said(command(*words), 1, "chase-command: ")
 
