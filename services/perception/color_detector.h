@@ -8,7 +8,7 @@
 
 namespace chase::perception {
 
-/// Blobs of the target's colour, ranked by how much they look like an upright cylinder, and after
+/// Blobs of the target's colour, ranked by their shape, and after
 /// them pieces of those that may be several things, ranked likewise.
 class ColorDetector : public Detector {
  public:

@@ -113,7 +113,7 @@ std::optional<FitResult> Localiser::WholeReading(FitInput* input) const {
 }
 
 std::optional<FitResult> Localiser::Refined(const FitInput& input, const FitResult& quick) const {
-  FitResult fit = FitCylinder(input, config_.fit, &quick);
+  FitResult fit = FitTarget(input, config_.fit, &quick);
   if (!fit.ok) return std::nullopt;
   return fit;
 }

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "services/perception/cylinder_residuals.h"
+#include "services/perception/fit_residuals.h"
 
 namespace chase::perception {
 
@@ -13,7 +13,7 @@ constexpr size_t kMinPoints = 3;    // of a cluster that gives a range
 constexpr size_t kMostPoints = 40;  // in a fit
 constexpr int kManyPoints = 5;      // that went through it: the target is not there
 constexpr double kManyHits = 10.0;  // that hit the detection elsewhere: it is something else
-constexpr double kCore = 0.6;       // share of the cylinder that such a ray goes through
+constexpr double kCore = 0.6;       // share of the target that such a ray goes through
 constexpr double kMostOfIt = 0.8;   // likewise of a target that is placed well
 constexpr double kBehind = 0.25;    // m behind the target where such a ray ends at least
 

@@ -2,11 +2,11 @@
 
 #include <vector>
 
-#include "services/perception/cylinder_fit.h"
+#include "services/perception/target_fit.h"
 
 namespace chase::perception {
 
-// LiDAR points against a predicted cylinder.
+// LiDAR points against a predicted target.
 
 /// Standard deviation of the prediction along the line of sight [m].
 double RangeSigma(const FitInput& input);

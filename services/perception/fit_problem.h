@@ -5,8 +5,8 @@
 #include <optional>
 #include <vector>
 
-#include "services/perception/cylinder_fit.h"
-#include "services/perception/cylinder_residuals.h"
+#include "services/perception/fit_residuals.h"
+#include "services/perception/target_fit.h"
 
 namespace chase::perception {
 
@@ -21,14 +21,14 @@ struct NormalEquations {
   Eigen::Matrix<double, N, N> information = Eigen::Matrix<double, N, N>::Zero();
 };
 
-/// The least squares problem of one FitInput over y (cylinder_residuals.h), of which the first
+/// The least squares problem of one FitInput over y (fit_residuals.h), of which the first
 /// `unknowns()` are sought: prediction, edges, points, and a position where one is measured.
 /// Single samples have Cauchy's loss, the prediction has none. Whichever solver is asked, it is
 /// asked this.
-class CylinderProblem {
+class FitProblem {
  public:
   /// `input` must outlive it.
-  CylinderProblem(const FitInput& input, const FitConfig& config);
+  FitProblem(const FitInput& input, const FitConfig& config);
 
   bool ok() const { return ok_; }  ///< the prediction's covariance has a root
   int unknowns() const { return config_.estimate_shape ? 9 : input_.shape.box() ? 7 : 6; }

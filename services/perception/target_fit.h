@@ -60,7 +60,7 @@ struct FitResult {
 /// prediction weighed together, with the covariance of that estimate. With `points` at times of
 /// their own it is one step of an iterated extended Kalman filter. Starts at `start`, or at the
 /// prediction.
-FitResult FitCylinder(const FitInput& input, const FitConfig& config,
-                      const FitResult* start = nullptr);
+FitResult FitTarget(const FitInput& input, const FitConfig& config,
+                    const FitResult* start = nullptr);
 
 }  // namespace chase::perception
