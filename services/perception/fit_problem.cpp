@@ -110,6 +110,18 @@ struct NormalSum : NormalEquations<N> {
 
 }  // namespace
 
+Vector9d Unknowns(const TargetGaussian& target, const TargetShape& shape) {
+  Vector9d y;
+  y << target.mean, shape.yaw, shape.size;
+  return y;
+}
+
+double SurfaceDistance(const TargetShape& shape, const TargetPoint& point, double scale,
+                       const Vector9d& y, Vector9d* gradient) {
+  if (shape.sphere()) return SpherePointResidual{point.p_W, point.age, scale}(y, gradient);
+  return PointResidual{point.p_W, shape.box(), point.age, scale}(y, gradient);
+}
+
 FitProblem::FitProblem(const FitInput& input, const FitConfig& config)
     : input_(input), config_(config) {
   const Eigen::LLT<Matrix6d> llt(input.prior.covariance);
@@ -123,12 +135,6 @@ FitProblem::FitProblem(const FitInput& input, const FitConfig& config)
   prior_range_ = Range(Start());
   AddEdges();
   AddPosition();
-}
-
-Vector9d FitProblem::Start() const {
-  Vector9d y;
-  y << input_.prior.mean, input_.shape.yaw, input_.shape.size;
-  return y;
 }
 
 double FitProblem::Range(const Vector9d& y) const {
@@ -166,12 +172,6 @@ double FitProblem::EdgeResidual(size_t side, const Edge& edge, double scale, con
   return CapResidual{edge.ray, square, Sign(side), scale * edge.px}(y, gradient);
 }
 
-double FitProblem::SurfaceDistance(const TargetPoint& point, double scale, const Vector9d& y,
-                                   Vector9d* gradient) const {
-  if (input_.shape.sphere()) return SpherePointResidual{point.p_W, point.age, scale}(y, gradient);
-  return PointResidual{point.p_W, input_.shape.box(), point.age, scale}(y, gradient);
-}
-
 template <class Sum>
 void FitProblem::EvaluatePrior(const Vector9d& y, Sum* sum) const {
   const Vector6d d = y.head<6>() - input_.prior.mean;
@@ -179,10 +179,7 @@ void FitProblem::EvaluatePrior(const Vector9d& y, Sum* sum) const {
   sum->cost += 0.5 * d.dot(gradient);
   const Eigen::Vector3d off = y.tail<3>() - Start().tail<3>();
   const Eigen::Vector3d by_shape = shape_information_.cwiseProduct(off);
-  if (config_.estimate_shape)
-    sum->cost += 0.5 * off.dot(by_shape);
-  else
-    sum->cost += 0.5 * off[0] * by_shape[0];
+  sum->cost += 0.5 * off.dot(by_shape);  // what is not sought stays where it starts
   if constexpr (Sum::kDerivatives) {
     sum->gradient.template head<6>() += gradient;
     sum->information.template topLeftCorner<6, 6>() += information_;
@@ -214,7 +211,7 @@ void FitProblem::EvaluatePoints(const Vector9d& y, Sum* sum) const {
   Cauchy loss(Share(input_.points.size(), config_.lidar_weight));
   const double scale = 1.0 / config_.lidar_sigma;
   for (const auto& p : input_.points) {
-    const double r = SurfaceDistance(p, scale, y, Sum::kDerivatives ? &row : nullptr);
+    const double r = SurfaceDistance(input_.shape, p, scale, y, Sum::kDerivatives ? &row : nullptr);
     sum->Add(loss.Weight(r * r), r, row);
   }
   sum->cost += loss.Cost();
@@ -271,7 +268,8 @@ std::vector<double> FitProblem::EdgeResiduals(size_t side, const Vector9d& y) co
 std::vector<double> FitProblem::PointResiduals(const Vector9d& y) const {
   std::vector<double> all;
   all.reserve(input_.points.size());
-  for (const auto& p : input_.points) all.push_back(SurfaceDistance(p, 1.0, y, nullptr));
+  for (const auto& p : input_.points)
+    all.push_back(SurfaceDistance(input_.shape, p, 1.0, y, nullptr));
   return all;
 }
 

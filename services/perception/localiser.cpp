@@ -180,7 +180,7 @@ std::optional<FitResult> Localiser::Correct(const FitInput& predicted,
   if (!Visible(predicted)) return std::nullopt;
   FitInput input = predicted;
   input.hits = &clusters;
-  const double gate = config_.fit.lidar_gate + 2.0 * RangeSigma(predicted);
+  const double gate = config_.fit.lidar_gate + 2.0 * RangeSigma(predicted.prior, predicted.camera);
   const double all = CountPoints(clusters);
   // What stands before the target may lend the blob's edge a few points, and what stands behind it
   // too: the fit that explains most of them is taken.

@@ -74,8 +74,7 @@ FitResult Solve(const FitProblem& fit, const FitConfig& config, Vector9d y) {
 FitResult FitTarget(const FitInput& input, const FitConfig& config, const FitResult* start) {
   const FitProblem fit(input, config);
   if (!fit.ok()) return {};
-  Vector9d y = fit.Start();
-  if (start) y << start->posterior.mean, start->shape.yaw, start->shape.size;
+  const Vector9d y = start ? Unknowns(start->posterior, start->shape) : fit.Start();
   if (fit.unknowns() == 9) return Solve<9>(fit, config, y);
   return fit.unknowns() == 7 ? Solve<7>(fit, config, y) : Solve<6>(fit, config, y);
 }
