@@ -30,8 +30,8 @@ Camera CameraAt(const PoseSample& pose, const world::Rig& rig);
 /// The target's solid, and how well it is known. A box stands upright on a square.
 struct TargetShape {
   enum class Kind { kCylinder, kSphere, kBox };
-  /// Of a heading of which nothing is known: uniform over the quarter turn after which a box looks
-  /// the same, rad^2.
+  /// Variance of an unknown heading: uniform over the quarter turn after which a box looks the
+  /// same, rad^2.
   static constexpr double kAnyYaw = M_PI * M_PI / 48.0;
 
   Kind kind = Kind::kCylinder;

@@ -8,8 +8,8 @@
 
 namespace chase::perception {
 
-/// Blobs of the target's colour, ranked by how much they look like an upright cylinder, and after
-/// them pieces of those that may be several things, ranked likewise.
+/// Blobs of the target's colour, ranked by their shape, and after them pieces of those that
+/// may be several things, ranked likewise.
 class ColorDetector : public Detector {
  public:
   ColorDetector(const DetectorConfig& config, double edge_sigma_px)

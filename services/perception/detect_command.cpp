@@ -37,6 +37,7 @@ struct Arguments {
 /// One picture, or one frame of a video.
 struct Picture {
   std::string name;  ///< of the file, with the frame's number behind a #
+  std::string stem;  ///< of its mask: the file's stem, with the frame's number behind a -
   cv::Mat bgr;
 };
 
@@ -51,43 +52,44 @@ bool IsPicture(const fs::path& file) {
 
 bool IsMask(const fs::path& file) {
   const std::string stem = file.stem().string(), tail = "_mask";
-  return stem.size() > tail.size() &&
-         stem.compare(stem.size() - tail.size(), tail.size(), tail) == 0;
+  return stem.size() > tail.size() && stem.rfind(tail) == stem.size() - tail.size();
 }
 
-/// Pictures of a folder by name, without NAME_mask.png.
-std::vector<std::string> PicturesIn(const std::string& folder) {
+/// The file, or the pictures of a folder by name, without NAME_mask.png.
+std::vector<std::string> FilesOf(const std::string& input) {
+  if (!fs::exists(input)) throw std::runtime_error(input + ": no such file or folder");
+  if (!fs::is_directory(input)) return {input};
   std::vector<std::string> files;
-  for (const auto& entry : fs::directory_iterator(folder))
+  for (const auto& entry : fs::directory_iterator(input))
     if (IsPicture(entry.path()) && !IsMask(entry.path())) files.push_back(entry.path().string());
-  if (files.empty()) throw std::runtime_error(folder + ": holds no picture");
+  if (files.empty()) throw std::runtime_error(input + ": holds no picture");
   std::sort(files.begin(), files.end());
   return files;
 }
 
-void ForEachPicture(const std::string& input, const std::function<void(const Picture&)>& show) {
-  if (!fs::exists(input)) throw std::runtime_error(input + ": no such file or folder");
-  if (fs::is_directory(input)) {
-    for (const auto& file : PicturesIn(input)) ForEachPicture(file, show);
-    return;
+void ForEachPicture(const std::string& file, const std::function<void(const Picture&)>& show) {
+  const std::string stem = fs::path(file).stem().string();
+  if (IsPicture(file)) {
+    const cv::Mat bgr = cv::imread(file, cv::IMREAD_COLOR);
+    if (bgr.empty()) throw std::runtime_error(file + ": cannot be read as a picture");
+    return show({file, stem, bgr});
   }
-  if (IsPicture(input)) {
-    const cv::Mat bgr = cv::imread(input, cv::IMREAD_COLOR);
-    if (bgr.empty()) throw std::runtime_error(input + ": cannot be read as a picture");
-    return show({input, bgr});
-  }
-  cv::VideoCapture video(input);
+  cv::VideoCapture video(file);
   cv::Mat bgr;
   int frame = 0;
-  while (video.isOpened() && video.read(bgr)) show({fmt::format("{}#{}", input, frame++), bgr});
-  if (frame == 0) throw std::runtime_error(input + ": neither a picture nor a video");
+  for (; video.isOpened() && video.read(bgr); ++frame)
+    show({fmt::format("{}#{}", file, frame), fmt::format("{}-{}", stem, frame), bgr});
+  if (frame == 0) throw std::runtime_error(file + ": neither a picture nor a video");
 }
 
-/// NAME_mask.png, or any picture NAME, in the folder of masks.
+/// NAME_mask.png or NAME.png in the folder of masks, but never the picture itself.
 cv::Mat MaskFor(const Picture& picture, const std::string& folder) {
-  const std::string stem = fs::path(picture.name).stem().string();
+  const std::string& stem = picture.stem;
   for (const auto& name : {stem + "_mask.png", stem + ".png"}) {
-    const cv::Mat mask = cv::imread((fs::path(folder) / name).string(), cv::IMREAD_GRAYSCALE);
+    const fs::path file = fs::path(folder) / name;
+    std::error_code missing;
+    if (fs::equivalent(file, picture.name, missing)) continue;
+    const cv::Mat mask = cv::imread(file.string(), cv::IMREAD_GRAYSCALE);
     if (mask.empty()) continue;
     if (mask.size() == picture.bgr.size()) return mask;
     throw std::runtime_error(fmt::format("{}: the mask is {}x{}, the picture {}x{}", name,
@@ -162,7 +164,18 @@ void WriteAnnotated(const Picture& picture, const std::optional<PictureTarget>& 
   if (!cv::imwrite(file, drawn)) throw std::runtime_error(file + ": cannot be written");
 }
 
-/// Files that could not be read.
+void PrintFigures(const Evaluation& e) {
+  fmt::print("precision {:.3f} ({} of {}), recall {:.3f} ({} of {}), mean IoU {:.3f}\n",
+             e.precision(), e.found, e.claimed, e.recall(), e.found, e.with_target,
+             e.mean_overlap());
+}
+
+json ToJson(const Evaluation& e) {
+  return {{"with_target", e.with_target}, {"claimed", e.claimed}, {"found", e.found},
+          {"precision", e.precision()},   {"recall", e.recall()}, {"mean_iou", e.mean_overlap()}};
+}
+
+/// How many files could not be used, after a line on stderr for each.
 int Run(const Arguments& a) {
   PerceptionConfig config;
   if (!a.config.empty()) config::Load(a.config, &config);
@@ -170,32 +183,33 @@ int Run(const Arguments& a) {
   json pictures = json::array();
   Evaluation evaluation;
   int failed = 0;
-  for (const auto& input : a.inputs) try {
-      ForEachPicture(input, [&](const Picture& picture) {
-        const auto target = detector.Find(picture.bgr);
-        if (!a.masks.empty()) evaluation.Add(target, MaskFor(picture, a.masks));
-        if (!a.out.empty()) WriteAnnotated(picture, target, a.out);
-        if (a.json)
-          pictures.push_back(ToJson(picture, target));
-        else
-          fmt::print("{}: {}\n", picture.name, ToText(target));
-      });
+  const auto attempt = [&failed](const std::function<void()>& what) {
+    try {
+      what();
     } catch (const std::exception& e) {
       fmt::print(stderr, "chase-detect: {}\n", e.what());
       ++failed;
     }
-  const Evaluation& e = evaluation;
+  };
+  const auto show = [&](const Picture& picture) {
+    const auto target = detector.Find(picture.bgr);
+    if (!a.masks.empty()) evaluation.Add(target, MaskFor(picture, a.masks));
+    if (!a.out.empty()) WriteAnnotated(picture, target, a.out);
+    if (a.json)
+      pictures.push_back(ToJson(picture, target));
+    else
+      fmt::print("{}: {}\n", picture.name, ToText(target));
+  };
+  for (const auto& input : a.inputs)
+    attempt([&] {
+      for (const auto& file : FilesOf(input)) attempt([&] { ForEachPicture(file, show); });
+    });
   json result{{"pictures", pictures}};
-  if (!a.masks.empty())
-    result["evaluation"] = {
-        {"with_target", e.with_target}, {"claimed", e.claimed}, {"found", e.found},
-        {"precision", e.precision()},   {"recall", e.recall()}, {"mean_iou", e.mean_overlap()}};
+  if (!a.masks.empty()) result["evaluation"] = ToJson(evaluation);
   if (a.json)
     fmt::print("{}\n", result.dump(2));
   else if (!a.masks.empty())
-    fmt::print("precision {:.3f} ({} of {}), recall {:.3f} ({} of {}), mean IoU {:.3f}\n",
-               e.precision(), e.found, e.claimed, e.recall(), e.found, e.with_target,
-               e.mean_overlap());
+    PrintFigures(evaluation);
   return failed;
 }
 
@@ -215,8 +229,8 @@ int Detect(int argc, char** argv) {
   app.add_option("--out", a.out, "folder for one annotated PNG a picture");
   app.add_option(
       "--evaluate", a.masks,
-      "folder of masks NAME_mask.png or NAME.png, not 0 on the target: prints precision, "
-      "recall and mean IoU; found is what overlaps by half");
+      "folder of masks NAME_mask.png or NAME.png (of a video's frames NAME-0_mask.png and so on), "
+      "not 0 on the target: prints precision, recall and mean IoU; found is what overlaps by half");
   try {
     app.parse(argc, argv);
     return Run(a) > 0 ? 1 : 0;

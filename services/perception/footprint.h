@@ -9,7 +9,7 @@ namespace chase::perception {
 /// A length in the plan view and its derivatives by what it depends on.
 struct PlanLength {
   double value;
-  double by_place = 0.0;  ///< by the offset that was asked for
+  double by_place = 0.0;  ///< by how far the line passes the centre
   double by_yaw = 0.0, by_half = 0.0;
 };
 
@@ -23,7 +23,7 @@ class Footprint {
         cos_(square ? std::cos(yaw) : 1.0),
         sin_(square ? std::sin(yaw) : 0.0) {}
 
-  /// How far it reaches along the unit vector n.
+  /// Its support function: how far it reaches along the unit vector n [m].
   PlanLength Reach(const Eigen::Vector2d& n) const {
     if (!square_) return {half_, 0.0, 0.0, 1.0};
     const Eigen::Vector2d m = Turned(n), side = Signs(m);
@@ -32,8 +32,8 @@ class Footprint {
   }
 
   /// Where a line along the unit vector d leaves it (far: +1) or enters it (-1), along d from the
-  /// foot of the centre, which stands `across` to the left of the line. Beside it the rim is steep:
-  /// as where it is just crossed.
+  /// foot of the centre, which stands `across` to the left of the line. A line that passes beside
+  /// it, or nearly, counts as the outermost that still crosses it well.
   PlanLength Chord(const Eigen::Vector2d& d, double across, double far) const {
     const PlanLength reach = Reach({-d.y(), d.x()});
     const double most = std::copysign(kMostAcross, across);
@@ -47,7 +47,7 @@ class Footprint {
     return end;
   }
 
-  /// Distance of q from it, negative inside; `by_q` the derivative.
+  /// Signed distance of q from it [m], negative inside; `by_q` the derivative.
   PlanLength Distance(const Eigen::Vector2d& q, Eigen::Vector2d* by_q) const {
     if (!square_) {
       const double from_axis = std::sqrt(q.squaredNorm() + 1e-12);
@@ -67,7 +67,8 @@ class Footprint {
   }
 
  private:
-  static constexpr double kMostAcross = 0.975;  ///< of the reach to either side: beyond it is steep
+  static constexpr double kMostAcross = 0.975;  ///< of the reach: beyond it the rim is steep
+  static constexpr double kParallel = 1e-9;     ///< cosine to a face that the line never meets
 
   /// In the square's own axes; turning on by da changes it by da * (y, -x).
   Eigen::Vector2d Turned(const Eigen::Vector2d& v) const {
@@ -97,8 +98,6 @@ class Footprint {
     }
     return best;
   }
-
-  static constexpr double kParallel = 1e-9;
 
   bool square_;
   double half_, cos_, sin_;

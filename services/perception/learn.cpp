@@ -10,7 +10,6 @@
 
 #include "services/perception/color_detector.h"
 #include "services/perception/color_model.h"
-#include "services/perception/learn_color.h"
 #include "services/perception/picture.h"
 #include "services/perception/silhouette.h"
 

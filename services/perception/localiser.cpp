@@ -113,7 +113,7 @@ std::optional<FitResult> Localiser::WholeReading(FitInput* input) const {
 }
 
 std::optional<FitResult> Localiser::Refined(const FitInput& input, const FitResult& quick) const {
-  FitResult fit = FitCylinder(input, config_.fit, &quick);
+  FitResult fit = FitTarget(input, config_.fit, &quick);
   if (!fit.ok) return std::nullopt;
   return fit;
 }
@@ -180,7 +180,7 @@ std::optional<FitResult> Localiser::Correct(const FitInput& predicted,
   if (!Visible(predicted)) return std::nullopt;
   FitInput input = predicted;
   input.hits = &clusters;
-  const double gate = config_.fit.lidar_gate + 2.0 * RangeSigma(predicted);
+  const double gate = config_.fit.lidar_gate + 2.0 * RangeSigma(predicted.prior, predicted.camera);
   const double all = CountPoints(clusters);
   // What stands before the target may lend the blob's edge a few points, and what stands behind it
   // too: the fit that explains most of them is taken.

@@ -3,7 +3,7 @@
 #include <optional>
 #include <vector>
 
-#include "services/perception/cylinder_fit.h"
+#include "services/perception/target_fit.h"
 
 namespace chase::perception {
 

@@ -92,11 +92,8 @@ std::optional<FitResult> Localiser::Acquire(const TargetShape& shape, const Came
     if (!fit) return false;
     if (!detection.p_CT && std::count(fit->used.begin(), fit->used.end(), true) < kSidesOfNew)
       return false;
-    const Eigen::Vector3d sight = fit->posterior.position() - camera.p_WC;
-    const double range = sight.norm();
-    const Eigen::Vector3d n = sight / range;
-    const double sigma = std::sqrt(n.dot(fit->posterior.covariance.topLeftCorner<3, 3>() * n));
-    return sigma < kMaxRangeError * range;
+    const double range = (fit->posterior.position() - camera.p_WC).norm();
+    return RangeSigma(fit->posterior, camera) < kMaxRangeError * range;
   };
   FitInput input;
   input.shape = shape;

@@ -4,6 +4,7 @@
 
 #include "services/perception/localiser.h"
 #include "services/perception/silhouette.h"
+#include "services/perception/target_points.h"
 
 namespace chase::perception {
 
@@ -62,11 +63,9 @@ std::optional<PictureTarget> PictureDetector::Find(const cv::Mat& bgr) const {
   const Camera camera = CameraAt({}, *rig);
   const auto fit = Localiser(config_).Acquire(ShapeOf(config_), camera, *best, {});
   if (!fit) return target;
-  const Eigen::Vector3d sight = fit->posterior.position() - camera.p_WC, n = sight.normalized();
-  target.range = sight.norm();
-  target.range_sigma =
-      std::hypot(std::sqrt(n.dot(fit->posterior.covariance.topLeftCorner<3, 3>() * n)),
-                 config_.detector.shape.outline_sigma * sight.norm());
+  target.range = (fit->posterior.position() - camera.p_WC).norm();
+  target.range_sigma = std::hypot(RangeSigma(fit->posterior, camera),
+                                  config_.detector.shape.outline_sigma * *target.range);
   return target;
 }
 

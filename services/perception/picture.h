@@ -22,8 +22,8 @@ double Overlap(const Detection& detection, const cv::Mat& mask);
 /// What one picture shows of the target.
 struct PictureTarget {
   Detection detection;
-  std::optional<double> range,
-      range_sigma;  ///< from the camera, m; nothing where the size tells none
+  /// From the camera, and its standard deviation [m]; nothing where the size tells none.
+  std::optional<double> range, range_sigma;
 };
 
 /// Finds the target in pictures (8 bit BGR) of the config's camera, or of it at another resolution.

@@ -15,7 +15,7 @@ constexpr double kTolerance = 1e-5;       // of the cost
 constexpr double kVagueYaw = M_PI / 8.0;  // rad, standard deviation: half of what one start covers
 
 template <int N>
-FitResult Solve(const CylinderProblem& problem, const FitConfig& config, double turn = 0.0) {
+FitResult Solve(const FitProblem& problem, const FitConfig& config, double turn = 0.0) {
   using Vector = Eigen::Matrix<double, N, 1>;
   ceres::TinySolver<ReducedProblem<N>> solver;
   solver.options.max_num_iterations = config.max_iterations + 1;  // it counts the start
@@ -35,7 +35,7 @@ FitResult Solve(const CylinderProblem& problem, const FitConfig& config, double 
 
 /// Of a heading hardly known every eighth of a turn is tried: a face seen at one angle may look
 /// like one at another.
-FitResult SolveBox(const CylinderProblem& problem, const FitConfig& config, double yaw_variance) {
+FitResult SolveBox(const FitProblem& problem, const FitConfig& config, double yaw_variance) {
   FitResult best = Solve<7>(problem, config);
   if (yaw_variance < kVagueYaw * kVagueYaw) return best;
   for (const double turn : {-M_PI / 8.0, M_PI / 8.0, M_PI / 4.0}) {
@@ -48,7 +48,7 @@ FitResult SolveBox(const CylinderProblem& problem, const FitConfig& config, doub
 }  // namespace
 
 FitResult QuickFit(const FitInput& input, const FitConfig& config) {
-  const CylinderProblem problem(input, config);
+  const FitProblem problem(input, config);
   if (!problem.ok()) return {};
   if (problem.unknowns() == 9) return Solve<9>(problem, config);
   return problem.unknowns() == 7 ? SolveBox(problem, config, input.shape.yaw_variance)

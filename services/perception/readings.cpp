@@ -23,7 +23,7 @@ double HiddenBy(const FitInput& input) {
 }
 
 bool RangeIsKnown(const FitInput& input) {
-  return !input.points.empty() || RangeSigma(input) < kKnownRange;
+  return !input.points.empty() || RangeSigma(input.prior, input.camera) < kKnownRange;
 }
 
 FitInput AfterASharpTurn(const FitInput& input) {
@@ -58,9 +58,8 @@ std::optional<FitInput> AtRangeOf(const std::vector<TargetPoint>& cluster, const
 std::function<bool(const Sides&)> Sensible(const FitInput& input) {
   const auto expected = ProjectTarget(input.camera, input.prior.position(), input.shape);
   const double range = (input.prior.position() - input.camera.p_WC).norm();
-  if (!expected || RangeSigma(input) > kKnownShare * range)
-    return [](const Sides&) { return true; };
-  const double share = RangeSigma(input) / range;
+  const double share = RangeSigma(input.prior, input.camera) / range;
+  if (!expected || share > kKnownShare) return [](const Sides&) { return true; };
   const auto fits = [share, by = HiddenBy(input)](double seen, double wanted) {
     return std::abs(seen - wanted) < by + 3.0 * share * wanted;
   };

@@ -5,7 +5,7 @@
 #include <optional>
 #include <vector>
 
-#include "services/perception/cylinder_fit.h"
+#include "services/perception/target_fit.h"
 
 namespace chase::perception {
 
@@ -28,7 +28,7 @@ inline constexpr std::array<Sides, 12> kReadings = {{{true, true, true, true},
                                                      {false, false, false, true}}};
 inline constexpr size_t kOneHidden = 5;  ///< of them, with at most one side left out
 
-/// px that a side left out lies off the outline at least.
+/// Least distance of a hidden side from the fitted outline, px.
 double HiddenBy(const FitInput& input);
 
 /// True when the prediction or the LiDAR tells how far away it is.
@@ -43,9 +43,9 @@ std::function<bool(const Sides&)> Sensible(const FitInput& input);
 /// pixel that is hidden for a leap.
 FitInput AfterASharpTurn(const FitInput& input);
 
-/// The same with a prediction that erred along the line of sight and in its heading, as of a box
-/// that turned while its width alone told its range: at the range of these points. Nothing where
-/// the detection is too wide or too narrow for the target there.
+/// The same with the prediction moved along the line of sight to the range of these points, its
+/// heading unknown: a box may turn while its width alone tells its range. Nothing where the
+/// detection is too wide or too narrow for the target there.
 std::optional<FitInput> AtRangeOf(const std::vector<TargetPoint>& cluster, const FitInput& input);
 
 }  // namespace chase::perception

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "services/perception/cylinder_problem.h"
+#include "services/perception/fit_problem.h"
 
 namespace chase::perception {
 
@@ -20,7 +20,7 @@ struct ReducedProblem {
   using Residuals = Eigen::Matrix<double, N + 1, 1>;
   using Jacobian = Eigen::Matrix<double, N + 1, N>;
 
-  const CylinderProblem& problem;
+  const FitProblem& problem;
 
   Vector9d All(const double* y) const {
     Vector9d all = problem.Start();

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "services/perception/cylinder_residuals.h"
+#include "services/perception/fit_problem.h"
 
 namespace chase::perception {
 
@@ -13,16 +13,9 @@ constexpr size_t kMinPoints = 3;    // of a cluster that gives a range
 constexpr size_t kMostPoints = 40;  // in a fit
 constexpr int kManyPoints = 5;      // that went through it: the target is not there
 constexpr double kManyHits = 10.0;  // that hit the detection elsewhere: it is something else
-constexpr double kCore = 0.6;       // share of the cylinder that such a ray goes through
+constexpr double kCore = 0.6;       // share of the target that such a ray goes through
 constexpr double kMostOfIt = 0.8;   // likewise of a target that is placed well
 constexpr double kBehind = 0.25;    // m behind the target where such a ray ends at least
-
-double SurfaceDistance(const TargetPoint& point, const FitInput& input) {
-  Vector9d y;
-  y << input.prior.mean, input.shape.yaw, input.shape.size;
-  if (input.shape.sphere()) return SpherePointResidual{point.p_W, point.age, 1.0}(y, nullptr);
-  return PointResidual{point.p_W, input.shape.box(), point.age, 1.0}(y, nullptr);
-}
 
 /// True when the lidar looked through this share of where the target should be, and hit something
 /// behind it.
@@ -41,16 +34,17 @@ bool SawThrough(const TargetPoint& point, const FitInput& input, const TargetGau
 
 }  // namespace
 
-double RangeSigma(const FitInput& input) {
-  const Eigen::Vector3d sight = (input.prior.position() - input.camera.p_WC).normalized();
-  return std::sqrt(sight.dot(input.prior.covariance.topLeftCorner<3, 3>() * sight));
+double RangeSigma(const TargetGaussian& target, const Camera& camera) {
+  const Eigen::Vector3d sight = (target.position() - camera.p_WC).normalized();
+  return std::sqrt(sight.dot(target.covariance.topLeftCorner<3, 3>() * sight));
 }
 
 std::vector<TargetPoint> PointsOnTarget(const FitInput& input,
                                         const std::vector<TargetPoint>& cluster, double gate) {
+  const Vector9d y = Unknowns(input.prior, input.shape);
   std::vector<TargetPoint> kept;
   for (const auto& p : cluster)
-    if (std::abs(SurfaceDistance(p, input)) < gate) kept.push_back(p);
+    if (std::abs(SurfaceDistance(input.shape, p, 1.0, y, nullptr)) < gate) kept.push_back(p);
   if (!GivesRange(kept)) return {};
   const size_t step = 1 + kept.size() / kMostPoints;  // more would not tell more
   std::vector<TargetPoint> some;
@@ -62,7 +56,7 @@ bool SeenThrough(const FitInput& input, const Clusters& clusters) {
   int count = 0;
   for (const auto& cluster : clusters)
     for (const auto& p : cluster)
-      count += SawThrough(p, input, input.prior, kCore, RangeSigma(input));
+      count += SawThrough(p, input, input.prior, kCore, RangeSigma(input.prior, input.camera));
   return count >= kManyPoints;
 }
 

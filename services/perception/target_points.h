@@ -2,14 +2,14 @@
 
 #include <vector>
 
-#include "services/perception/cylinder_fit.h"
+#include "services/perception/target_fit.h"
 
 namespace chase::perception {
 
-// LiDAR points against a predicted cylinder.
+// LiDAR points against a predicted target.
 
-/// Standard deviation of the prediction along the line of sight [m].
-double RangeSigma(const FitInput& input);
+/// Standard deviation of the target's position along the line of sight [m].
+double RangeSigma(const TargetGaussian& target, const Camera& camera);
 
 /// The points of a cluster that lie within `gate` m of the predicted surface, thinned; none when
 /// they are too few to give a range.

@@ -1,5 +1,6 @@
 #include "services/perception/target_track.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "common/math/gaussian.h"

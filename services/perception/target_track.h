@@ -2,7 +2,7 @@
 
 #include <limits>
 
-#include "services/perception/cylinder_fit.h"
+#include "services/perception/target_fit.h"
 
 namespace chase::perception {
 

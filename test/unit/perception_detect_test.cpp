@@ -138,6 +138,11 @@ TEST_F(DetectCommand, ReadsTheFramesOfAVideo) {
   EXPECT_EQ(result["pictures"][2]["file"], file + "#2");
   EXPECT_EQ(result["pictures"][0]["detections"].size(), 1u);
   EXPECT_EQ(result["pictures"][1]["detections"].size(), 0u);
+  for (int i = 0; i < 3; ++i)
+    cv::imwrite(File("c-" + std::to_string(i) + "_mask.png"), MaskOf(i == 1 ? cv::Rect() : kPlace));
+  const Ran ran = Command({file, "--json", "--evaluate", folder_.string()});
+  ASSERT_EQ(ran.code, 0) << ran.err;
+  EXPECT_EQ(json::parse(ran.out)["evaluation"]["found"], 2);
 }
 
 TEST_F(DetectCommand, GoesOnAfterWhatItCannotReadAndSaysWhy) {
@@ -150,6 +155,22 @@ TEST_F(DetectCommand, GoesOnAfterWhatItCannotReadAndSaysWhy) {
   EXPECT_EQ(Command({}).code, 1);
   EXPECT_EQ(Command({"--help"}).code, 0);
   EXPECT_EQ(Command({File("a.png"), "--config", File("text.txt")}).code, 1);
+}
+
+TEST_F(DetectCommand, OneBadFileOfAFolderDoesNotHideTheOthers) {
+  std::ofstream(File("0.png")) << "no picture";
+  const Ran ran = Command({folder_.string()});
+  EXPECT_EQ(ran.code, 1);
+  EXPECT_NE(ran.err.find("0.png: cannot be read"), std::string::npos) << ran.err;
+  for (const char* said : {"a.png: score", "b.png: none"})
+    EXPECT_NE(ran.out.find(said), std::string::npos) << ran.out;
+}
+
+TEST_F(DetectCommand, APictureIsNotItsOwnMask) {
+  fs::remove(File("b_mask.png"));
+  const Ran ran = Command({folder_.string(), "--evaluate", folder_.string()});
+  EXPECT_EQ(ran.code, 1);
+  EXPECT_NE(ran.err.find("b.png: neither b_mask.png nor b.png"), std::string::npos) << ran.err;
 }
 
 }  // namespace

@@ -102,7 +102,7 @@ TEST(PerceptionFit, OutlineAloneGivesThePositionFromDisturbedStarts) {
     auto input = InputFor(pose, guess, 2.0);
     const auto outline = DenseOutline(input.camera, target);
     input.detection = &outline;
-    const auto fit = FitCylinder(input, {});
+    const auto fit = FitTarget(input, {});
     ASSERT_TRUE(fit.ok);
     EXPECT_LT((fit.posterior.position() - target).norm(), 0.03)
         << "trial " << trial << ": " << (fit.posterior.position() - target).transpose();
@@ -117,9 +117,9 @@ TEST(PerceptionFit, PointsSharpenTheRange) {
   auto input = InputFor(pose, target + Vector3d(0.4, 0.1, -0.1), 2.0);
   const auto outline = DenseOutline(input.camera, target);
   input.detection = &outline;
-  const auto without = FitCylinder(input, {});
+  const auto without = FitTarget(input, {});
   input.points = SidePoints(target, {0, 0, 1.4}, 0.02, &random);
-  const auto with = FitCylinder(input, {});
+  const auto with = FitTarget(input, {});
   ASSERT_TRUE(without.ok && with.ok);
   EXPECT_LT(with.posterior.covariance(0, 0), 0.2 * without.posterior.covariance(0, 0));
   EXPECT_LT((with.posterior.position() - target).norm(), 0.03);
@@ -133,14 +133,14 @@ TEST(PerceptionFit, OldPointsAreCarriedOnByTheVelocity) {
   input.prior.covariance.diagonal().tail<3>().setConstant(1e-4);
   input.points = SidePoints(target - 0.15 * velocity, {0, 0, 1.4}, 0.005, &random);
   for (auto& p : input.points) p.age = 0.15;
-  const auto fit = FitCylinder(input, {});
+  const auto fit = FitTarget(input, {});
   ASSERT_TRUE(fit.ok);
   EXPECT_LT((fit.posterior.position() - target).norm(), 0.02);
 }
 
 TEST(PerceptionFit, FitWithoutMeasurementsIsThePrior) {
   const auto input = InputFor(BodyAt({0, 0, 1.2}, 0, 0, 0), {3, 0, 0.5}, 0.3);
-  const auto fit = FitCylinder(input, {});
+  const auto fit = FitTarget(input, {});
   ASSERT_TRUE(fit.ok);
   EXPECT_LT((fit.posterior.mean - input.prior.mean).norm(), 1e-9);
   EXPECT_LT((fit.posterior.covariance - input.prior.covariance).norm(), 1e-6);
@@ -149,9 +149,9 @@ TEST(PerceptionFit, FitWithoutMeasurementsIsThePrior) {
 TEST(PerceptionFit, SingularPriorIsRefused) {
   auto input = InputFor(BodyAt({0, 0, 1.2}, 0, 0, 0), {3, 0, 0.5}, 0.3);
   input.prior.covariance.setZero();
-  EXPECT_FALSE(FitCylinder(input, {}).ok);
+  EXPECT_FALSE(FitTarget(input, {}).ok);
   input.prior.covariance.setConstant(std::nan(""));
-  EXPECT_FALSE(FitCylinder(input, {}).ok);
+  EXPECT_FALSE(FitTarget(input, {}).ok);
 }
 
 TEST(PerceptionFit, RadiusAndHeightCanBeEstimated) {
@@ -165,7 +165,7 @@ TEST(PerceptionFit, RadiusAndHeightCanBeEstimated) {
   FitConfig config;
   config.estimate_shape = true;
   config.shape_sigma = 0.05;
-  const auto fit = FitCylinder(input, config);
+  const auto fit = FitTarget(input, config);
   ASSERT_TRUE(fit.ok);
   EXPECT_NEAR(fit.shape.size[0], kRadius, 0.01);
   EXPECT_NEAR(fit.shape.size[1], kHeight, 0.03);

@@ -148,7 +148,7 @@ std::pair<double, double> Passes(const TargetPoint& p, const Vector3d& center) {
   return {at_nearest, least};
 }
 
-TEST(PerceptionRays, OnlyThoseThroughThePlacedCylinderCount) {
+TEST(PerceptionRays, OnlyThoseThroughThePlacedTargetCount) {
   std::mt19937 random(4);
   std::uniform_real_distribution<double> u(-1.0, 1.0);
   FitInput input = Predicted();

@@ -7,7 +7,7 @@
 #include <memory>
 #include <random>
 
-#include "services/perception/cylinder_problem.h"
+#include "services/perception/fit_problem.h"
 #include "services/perception/quick_fit.h"
 
 namespace chase::perception {
@@ -163,9 +163,9 @@ TEST(PerceptionSolver, ASphereIsPlacedByItsOutline) {
         center, &scene);
     scene.input.prior.mean.head<3>() += Vector3d(0.2, 0.1, -0.1);
     scene.input.prior.covariance = 10.0 * Matrix6d::Identity();
-    EXPECT_LT((FitCylinder(scene.input, {}).posterior.position() - center).norm(), 2e-3);
+    EXPECT_LT((FitTarget(scene.input, {}).posterior.position() - center).norm(), 2e-3);
     scene.input.shape.kind = TargetShape::Kind::kCylinder;
-    EXPECT_GT((FitCylinder(scene.input, {}).posterior.position() - center).norm(), 0.1);
+    EXPECT_GT((FitTarget(scene.input, {}).posterior.position() - center).norm(), 0.1);
   }
 }
 
@@ -233,7 +233,7 @@ TEST(PerceptionSolver, GradientOfTheProblemIsItsDifference) {
       scene.outline.p_CT_covariance = 0.01 * Eigen::Matrix3d::Identity();
     }
     if (seed % 3 == 0) scene.input.shape.kind = TargetShape::Kind::kBox;
-    const CylinderProblem problem(scene.input, config);
+    const FitProblem problem(scene.input, config);
     ASSERT_TRUE(problem.ok());
     const Vector9d y = scene.Near();
     const auto normal = problem.Linearised<9>(y);
@@ -363,8 +363,8 @@ TEST(PerceptionSolver, BothSolversFindWhatCeresFindsBlockByBlock) {
     SCOPED_TRACE(testing::Message() << "seed " << seed);
     const auto quick = QuickFit(scene.input, config);
     ExpectSame(quick, &reference);
-    ExpectSame(FitCylinder(scene.input, config), &reference);
-    ExpectSame(FitCylinder(scene.input, config, &quick), &reference);
+    ExpectSame(FitTarget(scene.input, config), &reference);
+    ExpectSame(FitTarget(scene.input, config, &quick), &reference);
   }
 }
 
@@ -376,7 +376,7 @@ TEST(PerceptionSolver, RefiningWhatHasConvergedChangesHardlyAnything) {
   for (unsigned seed = 1; seed <= 200; ++seed) {
     const Scene scene(seed);
     const auto quick = QuickFit(scene.input, config);
-    const auto full = FitCylinder(scene.input, config, &quick);
+    const auto full = FitTarget(scene.input, config, &quick);
     ASSERT_TRUE(quick.ok && full.ok) << "seed " << seed;
     EXPECT_LE(full.cost, quick.cost * (1.0 + 1e-9)) << "seed " << seed;
     const Matrix6d off = quick.posterior.covariance - full.posterior.covariance;

@@ -56,11 +56,10 @@ struct FitResult {
   double log_odds = 0.0;  ///< of being the target rather than anything else of its colour
 };
 
-/// The most likely position and velocity of the target: silhouette, LiDAR points and
-/// prediction weighed together, with the covariance of that estimate. With `points` at times of
-/// their own it is one step of an iterated extended Kalman filter. Starts at `start`, or at the
-/// prediction.
-FitResult FitCylinder(const FitInput& input, const FitConfig& config,
-                      const FitResult* start = nullptr);
+/// The most likely position and velocity of the target (of a box its heading, too) from silhouette,
+/// LiDAR points, each at its own time, and prediction, with the covariance: one step of an iterated
+/// extended Kalman filter. Starts at `start`, or at the prediction.
+FitResult FitTarget(const FitInput& input, const FitConfig& config,
+                    const FitResult* start = nullptr);
 
 }  // namespace chase::perception

@@ -5,8 +5,8 @@
 #include <optional>
 #include <vector>
 
-#include "services/perception/cylinder_fit.h"
-#include "services/perception/cylinder_residuals.h"
+#include "services/perception/fit_residuals.h"
+#include "services/perception/target_fit.h"
 
 namespace chase::perception {
 
@@ -21,19 +21,27 @@ struct NormalEquations {
   Eigen::Matrix<double, N, N> information = Eigen::Matrix<double, N, N>::Zero();
 };
 
-/// The least squares problem of one FitInput over y (cylinder_residuals.h), of which the first
+/// The y of a target (fit_residuals.h).
+Vector9d Unknowns(const TargetGaussian& target, const TargetShape& shape);
+
+/// Signed distance of a point [m, times `scale`] from the surface of the target y of this kind
+/// where it was at the point's time.
+double SurfaceDistance(const TargetShape& shape, const TargetPoint& point, double scale,
+                       const Vector9d& y, Vector9d* gradient);
+
+/// The least squares problem of one FitInput over y (fit_residuals.h), of which the first
 /// `unknowns()` are sought: prediction, edges, points, and a position where one is measured.
 /// Single samples have Cauchy's loss, the prediction has none. Whichever solver is asked, it is
 /// asked this.
-class CylinderProblem {
+class FitProblem {
  public:
   /// `input` must outlive it.
-  CylinderProblem(const FitInput& input, const FitConfig& config);
+  FitProblem(const FitInput& input, const FitConfig& config);
 
   bool ok() const { return ok_; }  ///< the prediction's covariance has a root
   int unknowns() const { return config_.estimate_shape ? 9 : input_.shape.box() ? 7 : 6; }
   /// Where nothing was measured: the prediction, the size as it is known.
-  Vector9d Start() const;
+  Vector9d Start() const { return Unknowns(input_.prior, input_.shape); }
 
   /// Half the robust sum of squares.
   double Cost(const Vector9d& y) const;
@@ -57,8 +65,6 @@ class CylinderProblem {
   double Range(const Vector9d& y) const;
   double EdgeResidual(size_t side, const Edge& edge, double scale, const Vector9d& y,
                       Vector9d* gradient) const;
-  double SurfaceDistance(const TargetPoint& point, double scale, const Vector9d& y,
-                         Vector9d* gradient) const;
   template <class Sum>
   void Evaluate(const Vector9d& y, Sum* sum) const;
   template <class Sum>

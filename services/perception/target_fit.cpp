@@ -1,4 +1,4 @@
-#include "services/perception/cylinder_fit.h"
+#include "services/perception/target_fit.h"
 
 #include <ceres/ceres.h>
 
@@ -14,7 +14,7 @@ namespace {
 template <int N>
 class Cost : public ceres::SizedCostFunction<N + 1, N> {
  public:
-  explicit Cost(const CylinderProblem& problem) : reduced_{problem} {}
+  explicit Cost(const FitProblem& problem) : reduced_{problem} {}
   bool Evaluate(double const* const* y, double* residuals, double** jacobians) const override {
     using Jacobian = typename ReducedProblem<N>::Jacobian;
     if (!jacobians || !jacobians[0]) return reduced_(y[0], residuals, nullptr);
@@ -57,7 +57,7 @@ bool ReadCovariance(double* y, ceres::Problem* problem, Matrix9d* out) {
 }
 
 template <int N>
-FitResult Solve(const CylinderProblem& fit, const FitConfig& config, Vector9d y) {
+FitResult Solve(const FitProblem& fit, const FitConfig& config, Vector9d y) {
   ceres::Problem problem;
   problem.AddResidualBlock(new Cost<N>(fit), nullptr, y.data());
   ceres::Solver::Summary summary;
@@ -71,11 +71,10 @@ FitResult Solve(const CylinderProblem& fit, const FitConfig& config, Vector9d y)
 
 }  // namespace
 
-FitResult FitCylinder(const FitInput& input, const FitConfig& config, const FitResult* start) {
-  const CylinderProblem fit(input, config);
+FitResult FitTarget(const FitInput& input, const FitConfig& config, const FitResult* start) {
+  const FitProblem fit(input, config);
   if (!fit.ok()) return {};
-  Vector9d y = fit.Start();
-  if (start) y << start->posterior.mean, start->shape.yaw, start->shape.size;
+  const Vector9d y = start ? Unknowns(start->posterior, start->shape) : fit.Start();
   if (fit.unknowns() == 9) return Solve<9>(fit, config, y);
   return fit.unknowns() == 7 ? Solve<7>(fit, config, y) : Solve<6>(fit, config, y);
 }

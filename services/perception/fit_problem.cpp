@@ -1,4 +1,4 @@
-#include "services/perception/cylinder_problem.h"
+#include "services/perception/fit_problem.h"
 
 #include <Eigen/Cholesky>
 #include <algorithm>
@@ -110,7 +110,19 @@ struct NormalSum : NormalEquations<N> {
 
 }  // namespace
 
-CylinderProblem::CylinderProblem(const FitInput& input, const FitConfig& config)
+Vector9d Unknowns(const TargetGaussian& target, const TargetShape& shape) {
+  Vector9d y;
+  y << target.mean, shape.yaw, shape.size;
+  return y;
+}
+
+double SurfaceDistance(const TargetShape& shape, const TargetPoint& point, double scale,
+                       const Vector9d& y, Vector9d* gradient) {
+  if (shape.sphere()) return SpherePointResidual{point.p_W, point.age, scale}(y, gradient);
+  return PointResidual{point.p_W, shape.box(), point.age, scale}(y, gradient);
+}
+
+FitProblem::FitProblem(const FitInput& input, const FitConfig& config)
     : input_(input), config_(config) {
   const Eigen::LLT<Matrix6d> llt(input.prior.covariance);
   if (llt.info() != Eigen::Success) return;
@@ -125,17 +137,11 @@ CylinderProblem::CylinderProblem(const FitInput& input, const FitConfig& config)
   AddPosition();
 }
 
-Vector9d CylinderProblem::Start() const {
-  Vector9d y;
-  y << input_.prior.mean, input_.shape.yaw, input_.shape.size;
-  return y;
-}
-
-double CylinderProblem::Range(const Vector9d& y) const {
+double FitProblem::Range(const Vector9d& y) const {
   return std::max(kNearest, (y.head<2>() - input_.camera.p_WC.head<2>()).norm());
 }
 
-void CylinderProblem::AddEdges() {
+void FitProblem::AddEdges() {
   for (size_t side = 0; input_.detection && side < 4; ++side) {
     const auto& samples = input_.detection->silhouette.samples[side];
     edges_[side].reserve(samples.size());
@@ -147,7 +153,7 @@ void CylinderProblem::AddEdges() {
   }
 }
 
-void CylinderProblem::AddPosition() {
+void FitProblem::AddPosition() {
   if (!input_.detection || !input_.detection->p_CT) return;
   const Eigen::Matrix3d& R = input_.camera.R_WC;
   const Eigen::LLT<Eigen::Matrix3d> llt(R * input_.detection->p_CT_covariance * R.transpose());
@@ -156,8 +162,8 @@ void CylinderProblem::AddPosition() {
   position_ = input_.camera.p_WC + R * *input_.detection->p_CT;
 }
 
-double CylinderProblem::EdgeResidual(size_t side, const Edge& edge, double scale, const Vector9d& y,
-                                     Vector9d* gradient) const {
+double FitProblem::EdgeResidual(size_t side, const Edge& edge, double scale, const Vector9d& y,
+                                Vector9d* gradient) const {
   if (input_.shape.sphere())
     return TangentResidual{edge.ray, Upright(side), Sign(side), scale * edge.px}(y, gradient);
   const bool square = input_.shape.box();
@@ -166,23 +172,14 @@ double CylinderProblem::EdgeResidual(size_t side, const Edge& edge, double scale
   return CapResidual{edge.ray, square, Sign(side), scale * edge.px}(y, gradient);
 }
 
-double CylinderProblem::SurfaceDistance(const TargetPoint& point, double scale, const Vector9d& y,
-                                        Vector9d* gradient) const {
-  if (input_.shape.sphere()) return SpherePointResidual{point.p_W, point.age, scale}(y, gradient);
-  return PointResidual{point.p_W, input_.shape.box(), point.age, scale}(y, gradient);
-}
-
 template <class Sum>
-void CylinderProblem::EvaluatePrior(const Vector9d& y, Sum* sum) const {
+void FitProblem::EvaluatePrior(const Vector9d& y, Sum* sum) const {
   const Vector6d d = y.head<6>() - input_.prior.mean;
   const Vector6d gradient = information_ * d;
   sum->cost += 0.5 * d.dot(gradient);
   const Eigen::Vector3d off = y.tail<3>() - Start().tail<3>();
   const Eigen::Vector3d by_shape = shape_information_.cwiseProduct(off);
-  if (config_.estimate_shape)
-    sum->cost += 0.5 * off.dot(by_shape);
-  else
-    sum->cost += 0.5 * off[0] * by_shape[0];
+  sum->cost += 0.5 * off.dot(by_shape);  // what is not sought stays where it starts
   if constexpr (Sum::kDerivatives) {
     sum->gradient.template head<6>() += gradient;
     sum->information.template topLeftCorner<6, 6>() += information_;
@@ -193,7 +190,7 @@ void CylinderProblem::EvaluatePrior(const Vector9d& y, Sum* sum) const {
 }
 
 template <class Sum>
-void CylinderProblem::EvaluateEdges(const Vector9d& y, Sum* sum) const {
+void FitProblem::EvaluateEdges(const Vector9d& y, Sum* sum) const {
   Vector9d row;
   for (size_t side = 0; side < 4; ++side) {
     if (!input_.use_side[side] || edges_[side].empty()) continue;
@@ -208,20 +205,20 @@ void CylinderProblem::EvaluateEdges(const Vector9d& y, Sum* sum) const {
 }
 
 template <class Sum>
-void CylinderProblem::EvaluatePoints(const Vector9d& y, Sum* sum) const {
+void FitProblem::EvaluatePoints(const Vector9d& y, Sum* sum) const {
   if (input_.points.empty()) return;
   Vector9d row;
   Cauchy loss(Share(input_.points.size(), config_.lidar_weight));
   const double scale = 1.0 / config_.lidar_sigma;
   for (const auto& p : input_.points) {
-    const double r = SurfaceDistance(p, scale, y, Sum::kDerivatives ? &row : nullptr);
+    const double r = SurfaceDistance(input_.shape, p, scale, y, Sum::kDerivatives ? &row : nullptr);
     sum->Add(loss.Weight(r * r), r, row);
   }
   sum->cost += loss.Cost();
 }
 
 template <class Sum>
-void CylinderProblem::EvaluatePosition(const Vector9d& y, Sum* sum) const {
+void FitProblem::EvaluatePosition(const Vector9d& y, Sum* sum) const {
   if (!position_information_) return;
   const Eigen::Vector3d off = y.head<3>() - position_;
   const Eigen::Vector3d gradient = *position_information_ * off;
@@ -235,32 +232,32 @@ void CylinderProblem::EvaluatePosition(const Vector9d& y, Sum* sum) const {
 }
 
 template <class Sum>
-void CylinderProblem::Evaluate(const Vector9d& y, Sum* sum) const {
+void FitProblem::Evaluate(const Vector9d& y, Sum* sum) const {
   EvaluatePrior(y, sum);
   EvaluateEdges(y, sum);
   EvaluatePoints(y, sum);
   EvaluatePosition(y, sum);
 }
 
-double CylinderProblem::Cost(const Vector9d& y) const {
+double FitProblem::Cost(const Vector9d& y) const {
   CostSum sum;
   Evaluate(y, &sum);
   return sum.cost;
 }
 
 template <int N>
-NormalEquations<N> CylinderProblem::Linearised(const Vector9d& y) const {
+NormalEquations<N> FitProblem::Linearised(const Vector9d& y) const {
   NormalSum<N> sum;
   Evaluate(y, &sum);
   return sum;
 }
 
-template NormalEquations<6> CylinderProblem::Linearised<6>(const Vector9d&) const;
-template NormalEquations<7> CylinderProblem::Linearised<7>(const Vector9d&) const;
-template NormalEquations<9> CylinderProblem::Linearised<9>(const Vector9d&) const;
+template NormalEquations<6> FitProblem::Linearised<6>(const Vector9d&) const;
+template NormalEquations<7> FitProblem::Linearised<7>(const Vector9d&) const;
+template NormalEquations<9> FitProblem::Linearised<9>(const Vector9d&) const;
 
 /// Residuals of one side in px, without loss or weights.
-std::vector<double> CylinderProblem::EdgeResiduals(size_t side, const Vector9d& y) const {
+std::vector<double> FitProblem::EdgeResiduals(size_t side, const Vector9d& y) const {
   std::vector<double> all;
   all.reserve(edges_[side].size());
   for (const auto& edge : edges_[side])
@@ -268,15 +265,15 @@ std::vector<double> CylinderProblem::EdgeResiduals(size_t side, const Vector9d& 
   return all;
 }
 
-std::vector<double> CylinderProblem::PointResiduals(const Vector9d& y) const {
+std::vector<double> FitProblem::PointResiduals(const Vector9d& y) const {
   std::vector<double> all;
   all.reserve(input_.points.size());
-  for (const auto& p : input_.points) all.push_back(SurfaceDistance(p, 1.0, y, nullptr));
+  for (const auto& p : input_.points)
+    all.push_back(SurfaceDistance(input_.shape, p, 1.0, y, nullptr));
   return all;
 }
 
-void CylinderProblem::ReadSides(const std::array<std::vector<double>, 4>& edges,
-                                FitResult* out) const {
+void FitProblem::ReadSides(const std::array<std::vector<double>, 4>& edges, FitResult* out) const {
   for (size_t side = 0; input_.detection && side < 4; ++side) {
     const bool seen = !edges[side].empty(), used = input_.use_side[side] && seen;
     out->edge_px[side] = Median(edges[side]);
@@ -289,8 +286,8 @@ void CylinderProblem::ReadSides(const std::array<std::vector<double>, 4>& edges,
 
 /// -cost + log sqrt(det posterior / det prior). What single outliers cost is bounded; a measured
 /// position, which may be a stray one, costs nothing here.
-bool CylinderProblem::ReadEvidence(const std::array<std::vector<double>, 4>& edges,
-                                   const std::vector<double>& points, FitResult* out) const {
+bool FitProblem::ReadEvidence(const std::array<std::vector<double>, 4>& edges,
+                              const std::vector<double>& points, FitResult* out) const {
   const Eigen::LLT<Matrix6d> posterior(out->posterior.covariance);
   if (posterior.info() != Eigen::Success) return false;
   const double log_posterior = posterior.matrixLLT().diagonal().array().log().sum();
@@ -306,7 +303,7 @@ bool CylinderProblem::ReadEvidence(const std::array<std::vector<double>, 4>& edg
   return std::isfinite(out->log_evidence);
 }
 
-FitResult CylinderProblem::Read(const Vector9d& y, const Matrix9d& covariance, double cost) const {
+FitResult FitProblem::Read(const Vector9d& y, const Matrix9d& covariance, double cost) const {
   FitResult out;
   out.posterior.mean = y.head<6>();
   out.posterior.covariance = covariance.topLeftCorner<6, 6>();
