@@ -9,7 +9,7 @@ import re
 import subprocess
 import sys
 
-OPTION = re.compile(r"^\s+(-[-\w]*(?:,-[-\w]*)*)( \S.*?)?(?:\s{2,}(\S.*))?$")
+OPTION = re.compile(r"^\s+(-[-\w]*(?:,-[-\w]*)*)(?:\{\w+\})?( \S.*?)?(?:\s{2,}(\S.*))?$")
 ENTRY = re.compile(r"^\s{2,4}(\S+)(?: (\S.*?))?(?:\s{2,}(\S.*))?$")
 CHOICES = re.compile(r"\{([^}]*)\}")
 EMPTY = {"options": [], "positionals": [], "subcommands": []}

@@ -50,7 +50,7 @@ if (fs.existsSync(CHROMIUM)) {
     args: ['--no-sandbox', '--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader']});
   const page = await browser.newPage({viewport: {width: 1280, height: 720}});
   await page.goto(viewer.url);
-  await page.waitForFunction('window.chase?.model.state?.flight');
+  await page.waitForFunction(() => window.chase?.model.state?.flight);
   assert.match(await page.textContent('#flight'), /^IDLE: .*POSE is not heard/);
   const button = '#buttons button:nth-child(6)';
   assert.strictEqual(await page.textContent(button), 'land');
@@ -59,7 +59,7 @@ if (fs.existsSync(CHROMIUM)) {
   assert.ok(await page.isDisabled(button), 'not armed');
   await page.check('#arm');
   await page.click(button);
-  await page.waitForFunction('document.getElementById("reply").className');
+  await page.waitForFunction(() => document.getElementById('reply').className);
   assert.match(await page.textContent('#reply'), /^land: refused: land in IDLE/);
   await page.uncheck('#arm');
   assert.ok(await page.isDisabled(button));

@@ -19,7 +19,7 @@ page.on('pageerror', (error) => problems.push(error.stack));
 page.on('requestfailed', (request) => problems.push(`failed: ${request.url()}`));
 page.on('request', (request) => { if (!/^(ws|http):\/\/127\.0\.0\.1|^blob:|^data:/.test(request.url())) problems.push(`asks the internet: ${request.url()}`); });
 await page.goto(viewer.url);
-await page.waitForFunction('window.chase');
+await page.waitForFunction(() => window.chase);
 
 const look = () => page.evaluate(() => {
   const {scene, model, counts} = window.chase;
