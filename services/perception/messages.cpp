@@ -108,6 +108,7 @@ target_t ToMessage(const TargetEstimate& target, int64_t utime) {
   m.state = Code(target.state);
   bus::Set(m.mean, target.p_WT);
   bus::Set(m.covariance, target.covariance);
+  bus::Set(m.velocity_covariance, target.velocity_covariance);
   bus::Set(m.velocity, target.v_WT);
   m.radius = target.size[0];
   m.height = target.size[1];

@@ -241,11 +241,12 @@ TargetEstimate Perceiver::Report(double t, const std::optional<View>& view,
     out.score = sighting_->detection.score;
     out.n_points = sighting_->n_points;
   }
-  out.covariance = kUnknownVariance * Eigen::Matrix3d::Identity();
+  out.covariance = out.velocity_covariance = kUnknownVariance * Eigen::Matrix3d::Identity();
   if (!track_) return out;
   out.p_WT = track_->state.position();
   out.v_WT = track_->state.velocity();
   if (state_ == TargetState::kLost) return out;
+  out.velocity_covariance = track_->state.covariance.bottomRightCorner<3, 3>();
   const auto pose = view ? view->pose : finder_.poses().Nearest(t, 1e9).value_or(PoseSample{});
   out.covariance =
       PublishedCovariance(*track_, pose, config_.detector.shape.outline_sigma, config_.motion);

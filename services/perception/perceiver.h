@@ -27,14 +27,15 @@ using Refused = std::array<int64_t, kRefusals>;
 struct TargetEstimate {
   double t = 0.0;  ///< s
   TargetState state = TargetState::kSearching;
-  Eigen::Vector3d p_WT = Eigen::Vector3d::Zero();            ///< frame W, m
-  Eigen::Vector3d v_WT = Eigen::Vector3d::Zero();            ///< frame W, m/s
-  Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity();  ///< of p_WT, m^2
-  Eigen::Vector2d size = Eigen::Vector2d::Zero();            ///< radius, height, m
-  cv::Rect2d box;                                            ///< px; empty: not seen
-  double score = 0.0;                                        ///< of the detection, 0 to 1
-  int n_points = 0;                                          ///< LiDAR points used
-  std::string note;                                          ///< what was missing; else empty
+  Eigen::Vector3d p_WT = Eigen::Vector3d::Zero();                     ///< frame W, m
+  Eigen::Vector3d v_WT = Eigen::Vector3d::Zero();                     ///< frame W, m/s
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity();           ///< of p_WT, m^2
+  Eigen::Matrix3d velocity_covariance = Eigen::Matrix3d::Identity();  ///< of v_WT, m^2/s^2
+  Eigen::Vector2d size = Eigen::Vector2d::Zero();                     ///< radius, height, m
+  cv::Rect2d box;                                                     ///< px; empty: not seen
+  double score = 0.0;                                                 ///< of the detection, 0 to 1
+  int n_points = 0;                                                   ///< LiDAR points used
+  std::string note;      ///< what was missing; else empty
   Refused refused = {};  ///< detections of this frame that no track was started from
 };
 

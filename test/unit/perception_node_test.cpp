@@ -140,6 +140,10 @@ TEST(PerceptionNode, AnswersEveryImageForItsOwnTime) {
   EXPECT_NEAR(last.mean[0], kDistance, 0.05);
   EXPECT_NEAR(last.mean[1], 0.0, 0.03);
   EXPECT_NEAR(last.mean[2], 0.55, 0.03);
+  for (const int i : {0, 4, 8}) {
+    EXPECT_GT(last.velocity_covariance[i], 1e-4);
+    EXPECT_LT(last.velocity_covariance[i], 1.0);
+  }
   EXPECT_EQ(last.radius, 0.15);
   EXPECT_EQ(last.height, 0.5);
   EXPECT_NEAR(last.box_px[2], 0.3 * 220.0 / kDistance, 3.0);
