@@ -9,8 +9,8 @@ namespace chase::odometry {
 /// Tells a step of the inertial unit's biases from a match that is off: both make an innovation
 /// which the filter does not explain. A rival filter that begins before the first such innovation
 /// with its biases open is compared with it, sweep by sweep, until the ratio of their likelihoods
-/// speaks for one of them: Wald 1945, "Sequential tests of statistical hypotheses"; for filters,
-/// Willsky & Jones 1976, "A generalized likelihood ratio approach".
+/// speaks: Page 1954, "Continuous inspection schemes"; for filters, Willsky & Jones 1976, "A
+/// generalized likelihood ratio approach".
 class BiasWatch {
  public:
   explicit BiasWatch(const FilterConfig& config) : config_(config) {}
@@ -20,8 +20,7 @@ class BiasWatch {
   /// have stepped.
   std::optional<NavState> Judge(const ImuBuffer& imu, const NavState& before, double t,
                                 const PoseMeasurement& z, const UpdateResult& kept);
-  /// So far the steps are the better explanation: the filter's pose may be off.
-  bool doubts() const { return rival_ && evidence_ > 0.0; }
+  bool undecided() const { return rival_.has_value(); }
   void Forget() { rival_.reset(); }
 
  private:

@@ -145,13 +145,13 @@ void DoubtAcceleration(const FilterConfig& config, const Eigen::Matrix3d& unheld
     state->P.block<3, 3>(kAccelBias, kAccelBias) += lacking2 * R.transpose() * unheld * R;
 }
 
-void OpenBiases(const FilterConfig& config, double accel_s, double gyro_s, NavState* state) {
+void OpenBiases(const FilterConfig& config, double before, NavState* state) {
   const Eigen::Matrix3d R = state->R_WB.toRotationMatrix();
   Eigen::Matrix<double, kStates, 6> G = Eigen::Matrix<double, kStates, 6>::Zero();
-  G.block<3, 3>(kP, 0) = -0.5 * accel_s * accel_s * R;
-  G.block<3, 3>(kV, 0) = -accel_s * R;
+  G.block<3, 3>(kP, 0) = -0.5 * before * before * R;
+  G.block<3, 3>(kV, 0) = -before * R;
   G.block<3, 3>(kAccelBias, 0).setIdentity();
-  G.block<3, 3>(kTheta, 3) = -gyro_s * R;
+  G.block<3, 3>(kTheta, 3) = -before * R;
   G.block<3, 3>(kGyroBias, 3).setIdentity();
   Eigen::Matrix<double, 6, 1> step;
   step << Eigen::Vector3d::Constant(config.accel_bias_step),

@@ -90,9 +90,9 @@ void Doubt(const FilterConfig& config, double gap, NavState* state);
 /// projects on, acceleration is never known any better.
 void DoubtAcceleration(const FilterConfig& config, const Eigen::Matrix3d& unheld, NavState* state);
 
-/// The accelerometer's bias may have stepped up to `accel_s` seconds ago, the gyroscope's `gyro_s`:
-/// what that did to the pose and velocity since is as open as they are.
-void OpenBiases(const FilterConfig& config, double accel_s, double gyro_s, NavState* state);
+/// The biases may have stepped up to `before` s ago: what that did to the pose and velocity since
+/// is as open as they are.
+void OpenBiases(const FilterConfig& config, double before, NavState* state);
 
 /// Adds `dx` to the state.
 void Inject(const ErrorVector& dx, NavState* state);

@@ -163,7 +163,7 @@ SweepResult Odometry::ProcessSweep() {
   }
   const bool extends = !first && Extends(result.match);
   if (extends) unknown_.setIdentity();
-  if ((applied && !biases_.doubts()) || planes_.cells() == 0 || extends)
+  if ((applied && !biases_.undecided()) || planes_.cells() == 0 || extends)
     Learn(prepared, base_.pose());
   if (applied && !first) FollowDrift(result.match);
   Catchup();

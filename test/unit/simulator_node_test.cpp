@@ -89,7 +89,7 @@ TEST(SimulatorNode, PublishesEveryChannelAtItsRate) {
   EXPECT_EQ(record.at("CAMERA_IMAGE").size(), 41u);
   EXPECT_EQ(record.at("LIDAR_SCAN").size(), 20u);
   EXPECT_EQ(record.at("SCENARIO").size(), 3u);
-  EXPECT_EQ(record.at("FCU_STATUS").size(), 2u);
+  EXPECT_EQ(record.at("FCU_STATUS").size(), 3u);
   EXPECT_EQ(record.size(), 6u);  // nothing of the truth feed
   for (std::size_t i = 0; i < 20; ++i) {
     const auto scan = Message<lidar_scan_t>(record, "LIDAR_SCAN", i);
