@@ -13,7 +13,6 @@ constexpr size_t kFewestSamples = 20;
 constexpr double kSettledGyro = 0.002;      // rad/s
 constexpr double kSettledAccel = 0.03;      // m/s^2
 constexpr double kTiltInMotion = 1.5;       // m/s^2, of gravity's horizontal part
-constexpr double kTiltAtRest = 0.5;         // m/s^2, where sweeps give the pose
 constexpr double kGravityStrength = 1e-3;   // m/s^2, how well |g| is known
 constexpr double kGyroBiasInMotion = 0.05;  // rad/s
 constexpr double kLongestGap = 0.03;        // s between samples over which a motion is followed
@@ -36,9 +35,8 @@ void Alignment::Add(const ImuSample& imu) {
     window_.pop_front();
 }
 
-bool Alignment::Complete(bool moves) const {
+bool Alignment::Complete() const {
   if (window_.size() < kFewestSamples) return false;
-  if (moves) return true;
   const double t = window_.back().t;
   if (t - window_.front().t < config_.duration) return false;
   if (t - first_t_ >= config_.patience) return true;
@@ -70,9 +68,9 @@ bool Alignment::AtRest(const ImuStatistics& s) const {
          s.accel_spread < config_.still_accel;
 }
 
-void Alignment::SetBiases(const FilterConfig& filter, bool at_rest, NavState* state) const {
+void Alignment::SetBiases(const FilterConfig& filter, NavState* state) const {
   SetBlock(kAccelBias, filter.accel_bias_sigma, &state->P);
-  if (at_rest) {
+  if (AtRest()) {
     SetBlock(kGyroBias, filter.gyro_bias_sigma, &state->P);
     state->gyro_bias = statistics().mean.gyro;
     return CoupleTiltAndBias(filter, state);
@@ -115,7 +113,7 @@ NavState Alignment::Result(const FilterConfig& filter, const Eigen::Vector3d& p,
   SetBlock(kP, 1e-3, &state.P);
   SetBlock(kV, AtRest() ? 0.01 : 2.0, &state.P);
   SetBlock(kTheta, AtRest() ? 3e-4 : 0.02, &state.P);
-  SetBiases(filter, AtRest(), &state);
+  SetBiases(filter, &state);
   if (AtRest()) Settle(p, yaw, &state);
   return state;
 }
@@ -142,12 +140,12 @@ void Alignment::Settle(const Eigen::Vector3d& p, double yaw, NavState* state) co
   state->p = p + turn * moved;
 }
 
-NavState Alignment::ResultAt(const FilterConfig& filter, const NavState& known, bool moves) const {
+NavState Alignment::ResultAt(const FilterConfig& filter, const NavState& known) const {
   NavState state = known;
   const Eigen::Vector3d up = known.R_WB * statistics().mean.accel;
   state.g = -filter.gravity * up.normalized();
-  SetBiases(filter, AtRest() && !moves, &state);
-  SetBlock(kGravity, moves ? kTiltInMotion : kTiltAtRest, &state.P);
+  SetBiases(filter, &state);
+  SetBlock(kGravity, 0.5, &state.P);
   state.P.block<3, 3>(kGravity, kAccelBias).setZero();
   state.P.block<3, 3>(kAccelBias, kGravity).setZero();
   return state;

@@ -35,8 +35,7 @@ class Alignment {
   explicit Alignment(const AlignmentConfig& config) : config_(config) {}
 
   void Add(const ImuSample& imu);
-  /// `moves`: sweeps have shown that the body does not rest.
-  bool Complete(bool moves = false) const;
+  bool Complete() const;
   bool AtRest() const { return AtRest(statistics()); }
   ImuStatistics statistics() const { return Statistics(0, window_.size()); }
 
@@ -46,13 +45,13 @@ class Alignment {
   NavState Result(const FilterConfig& filter, const Eigen::Vector3d& p, double yaw) const;
 
   /// The same for a body whose pose and velocity are known from sweeps: only gravity is found.
-  NavState ResultAt(const FilterConfig& filter, const NavState& known, bool moves) const;
+  NavState ResultAt(const FilterConfig& filter, const NavState& known) const;
 
  private:
   ImuStatistics Statistics(size_t begin, size_t end) const;
   bool AtRest(const ImuStatistics& s) const;
   void Settle(const Eigen::Vector3d& p, double yaw, NavState* state) const;
-  void SetBiases(const FilterConfig& filter, bool at_rest, NavState* state) const;
+  void SetBiases(const FilterConfig& filter, NavState* state) const;
   void CoupleTiltAndBias(const FilterConfig& filter, NavState* state) const;
 
   AlignmentConfig config_;

@@ -21,6 +21,11 @@ Pose ExtrinsicsOf(const world::Rig& rig) {
   return {Eigen::Quaterniond(rig.R_BL()), rig.lidar_position};
 }
 
+bool Plausible(const ImuSample& imu) {
+  return imu.accel.allFinite() && imu.gyro.allFinite() && imu.accel.norm() < 400.0 &&
+         imu.gyro.norm() < 100.0;
+}
+
 double LastTime(const std::vector<SweepPoint>& points) {
   float last = 0.0f;
   for (const SweepPoint& point : points) last = std::max(last, point.t);
@@ -71,58 +76,71 @@ Odometry::Odometry(const OdometryConfig& config)
       planes_(config.map, SurfaceKind::kPlane),
       posts_(config.map, SurfaceKind::kLine),
       imu_(config.filter, config.health.imu_gap),
-      spikes_(config.spikes),
       alignment_(config.alignment),
       level_(config.initial_position),
       drift_(config.drift),
       blend_(config.blend),
-      biases_(config.filter),
       health_(config.health) {}
 
 std::optional<PoseEstimate> Odometry::AddImu(const ImuSample& imu) {
-  if (!imu.accel.allFinite() || !imu.gyro.allFinite() || imu.t <= heard_) {
+  if (!Plausible(imu) || imu.t <= imu_.newest()) {
     ++dropped_samples_;
     return std::nullopt;
   }
-  heard_ = imu.t;
-  for (const ImuSample& sample : spikes_.Take(imu)) Take(sample);
-  if (fused_) {
-    const double dt = imu.t - live_.t;
-    imu_.Advance(imu.t, &live_);
-    blend_.Decay(dt);
-    HoldBetweenSweeps(imu.t);
-    if (imu.t - base_.t > kLongestReplay) {
-      imu_.Advance(imu.t - 0.5 * kLongestReplay, &base_);
-      imu_.DropBefore(base_.t);
+  const double previous = imu_.newest();
+  imu_.Add(imu);
+  if (!fused_) return Align(imu);
+  health_.OnImu(imu.t, previous);
+  standing_.Add(imu, live_);
+  const double dt = imu.t - live_.t;
+  imu_.Advance(imu.t, &live_);
+  blend_.Decay(dt);
+  HoldBetweenSweeps(imu.t);
+  if (imu.t - base_.t > kLongestReplay) {
+    imu_.Advance(imu.t - 0.5 * kLongestReplay, &base_);
+    imu_.DropBefore(base_.t);
+  }
+  return Estimate();
+}
+
+std::optional<PoseEstimate> Odometry::Align(const ImuSample& imu) {
+  aligning_ = true;
+  alignment_.Add(imu);
+  const bool was_started = started_;
+  if (alignment_.Complete()) {
+    if (started_) PropagateBlind(config_.filter, imu.t, &base_);
+    base_ = started_ ? alignment_.ResultAt(config_.filter, base_)
+                     : alignment_.Result(config_.filter, config_.initial_position,
+                                         config_.initial_yaw_deg * M_PI / 180.0);
+    if (!started_) health_.OnStarted(alignment_.AtRest(), held_ = imu.t);
+    if (!started_ && !alignment_.AtRest()) sweeps_to_anchor_ = 2;
+    if (!started_ && alignment_.AtRest()) {
+      const ImuStatistics rest = alignment_.statistics();
+      standing_.Begin(rest.mean, rest.accel_spread, rest.gyro_spread, base_.p);
     }
+    const bool was_blind = started_;
+    const Pose shown = level_.ToWorld(base_.pose());
+    live_ = base_;
+    level_.SetGravity(base_.g);
+    if (was_blind) blend_.Absorb(shown, base_.v, level_.ToWorld(base_.pose()), base_.v);
+    fused_ = started_ = true;
+    imu_.DropBefore(base_.t);
     return Estimate();
   }
-  if (started_) return std::nullopt;
+  if (was_started) return std::nullopt;
   live_.t = held_ = imu.t;
   live_.p = config_.initial_position;
   live_.R_WB = math::FromYaw(config_.initial_yaw_deg * M_PI / 180.0);
   return Estimate();
 }
 
-void Odometry::Take(const ImuSample& imu) {
-  const double previous = imu_.newest();
-  imu_.Add(imu);
-  if (!fused_) return Align(imu);
-  health_.OnImu(imu.t, previous);
-  standing_.Add(imu, live_);
-}
-
 void Odometry::AddSweep(Sweep sweep) {
-  if (!std::isfinite(sweep.start)) {
+  const bool wait_for_alignment = aligning_ && !started_;
+  if (wait_for_alignment || !std::isfinite(sweep.start)) {
     ++dropped_sweeps_;
     return;
   }
-  double end = sweep.start + LastTime(sweep.points);
-  if (!imu_.empty()) {
-    const double correction = clock_.Correction(end, imu_.newest());
-    sweep.start += correction, end += correction;
-  }
-  if (aligning_ && !started_) return Scout(std::move(sweep));
+  const double end = sweep.start + LastTime(sweep.points);
   pending_.push_back({std::move(sweep), imu_.newest(), end});
 }
 
@@ -163,8 +181,7 @@ SweepResult Odometry::ProcessSweep() {
   }
   const bool extends = !first && Extends(result.match);
   if (extends) unknown_.setIdentity();
-  if ((applied && !biases_.undecided()) || planes_.cells() == 0 || extends)
-    Learn(prepared, base_.pose());
+  if (applied || planes_.cells() == 0 || extends) Learn(prepared, base_.pose());
   if (applied && !first) FollowDrift(result.match);
   Catchup();
   result.registered = Registered(prepared);
@@ -183,7 +200,6 @@ bool Odometry::Prepare(Pending pending, Prepared* prepared) {
   if (!started_) return false;
   const bool silent = fused_ && imu_.newest() < prepared->end - kWaitForImu;
   health_.OnSweep(prepared->end, returns, fused_ ? pending.imu_t : prepared->end, silent);
-  if (clock_.stepped()) health_.OnClock();
   if (returns == 0) {
     health_.OnMatch(prepared->end, MatchResult{}, false);
     return false;
@@ -238,21 +254,12 @@ MatchResult Odometry::Match(Prepared* prepared) {
 }
 
 bool Odometry::Apply(const Prepared& prepared, MatchResult* match) {
-  if (!match->valid) {
-    biases_.Forget();
-    return false;
-  }
+  if (!match->valid) return false;
   NavState state = prepared.predicted;
   standing_.See(match->X_WB.p);
   if (standing_.holds()) HoldStill(standing_.gyro(), &state);
-  const PoseMeasurement z{match->X_WB, match->known, match->information};
-  UpdateResult update = Update(config_.filter, z, &state);
-  if (!Blind(prepared.end)) {
-    if (const auto stepped = biases_.Judge(imu_, prepared.track.front(), prepared.end, z, update)) {
-      state = *stepped;
-      update = {true, 0.0, 0.0};
-    }
-  }
+  const UpdateResult update =
+      Update(config_.filter, {match->X_WB, match->known, match->information}, &state);
   match->nis = update.nis;
   match->misfit = update.nis > config_.filter.largest_nis;
   if (!update.applied) return false;

@@ -1,19 +1,15 @@
 #pragma once
 
 #include <deque>
-#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "services/odometry/bias_watch.h"
 #include "services/odometry/deskew.h"
 #include "services/odometry/imu_buffer.h"
 #include "services/odometry/level_frame.h"
 #include "services/odometry/odometry_config.h"
-#include "services/odometry/spike_filter.h"
 #include "services/odometry/standing.h"
-#include "services/odometry/sweep_clock.h"
 
 namespace chase::odometry {
 
@@ -89,12 +85,7 @@ class Odometry {
     std::vector<Eigen::Vector3f> at_end;  // the points deskewed by the track: frame B at the end
   };
 
-  void Take(const ImuSample& imu);
-  void Align(const ImuSample& imu);
-  void Scout(Sweep sweep);
-  double Shift() const;
-  bool Coasts() const;
-  void TakeOver();
+  std::optional<PoseEstimate> Align(const ImuSample& imu);
   void StartBlind(double t);
   bool Prepare(Pending pending, Prepared* prepared);
   void Deskew(Prepared* prepared) const;
@@ -124,20 +115,16 @@ class Odometry {
   ScanMatcher matcher_;
   SurfaceMap planes_, posts_;
   ImuBuffer imu_;
-  SpikeFilter spikes_;
-  SweepClock clock_;
   Alignment alignment_;
   Standing standing_;
   LevelFrame level_;
   MapDrift drift_;
   CorrectionBlend blend_;
-  BiasWatch biases_;
   HealthMonitor health_;
 
   bool fused_ = false;    // the IMU carries the state
   bool started_ = false;  // there is a state at all
   bool aligning_ = false;
-  std::unique_ptr<Odometry> scout_;  // while aligning: of the sweeps alone
   int sweeps_to_anchor_ = 0;  // after a start in motion the map begins again this many sweeps later
   NavState base_;             // at the end of the last sweep
   NavState live_;             // at the newest sample
@@ -147,7 +134,6 @@ class Odometry {
   int epoch_ = 0;
   Matrix6d unknown_ = Matrix6d::Zero();  // projector on what the last sweep left to inertia
   double held_ = 0.0;                    // last time that a sweep or standing held the state, s
-  double heard_ = -1e18;                 // of the newest inertial sample, used or not, s
   int64_t dropped_sweeps_ = 0, dropped_samples_ = 0;
 };
 
