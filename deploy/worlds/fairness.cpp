@@ -21,6 +21,8 @@ constexpr double kDroneRoom = 0.58;    // m: radius 0.25 and 0.3, and what lies 
 constexpr double kImageMargin = 25.0;  // px
 constexpr double kStep = 0.05;         // s
 constexpr double kStands = 0.95;       // share of the time in which the chaser has a place to be
+constexpr double kBolt = 1.5;      // m/s from one instant to the next: more than a walker's step
+constexpr double kBoltRoom = 4.0;  // m: 4 m/s for the second that it takes to see it and give way
 
 /// Everything about one world that the checks look at.
 struct Look {
@@ -90,13 +92,19 @@ std::string StartProblem(const Look& look, const world::Rig& rig, bool hidden) {
 
 std::string MoverProblem(const Look& look, const world::MoverSpec& mover) {
   const double reach = TargetReach(look.scenario.target) + kWalkerToTarget;
+  const double chase = look.scenario.chaser.desired_distance + kBoltRoom;
+  double speed = world::MoverAt(mover, 0.0).velocity.norm();
   for (double t = 0.0; t <= look.scenario.duration_s; t += kStep) {
-    const Solid body = world::MoverAt(mover, t).solid;
-    const auto away = [&](const Vector3d& p) {
+    const auto [body, velocity] = world::MoverAt(mover, t);
+    const bool bolts = velocity.norm() > speed + kBolt;
+    speed = velocity.norm();
+    const auto away = [&body = body](const Vector3d& p) {
       return SignedDistance(body, {p.x(), p.y(), body.center.z()});
     };
     if (away(look.Target(t)) < reach) return fmt::format("a mover meets the target at {:.1f} s", t);
     if (t < 3.0 && away(look.Hover()) < 1.2) return "a mover comes to the hovering drone";
+    if (bolts && away(look.Target(t)) < chase)
+      return fmt::format("a mover sets off beside the chase at {:.1f} s", t);
     const double size = body.half_size.head<2>().norm();
     const bool round = body.kind == Solid::Kind::kCylinder;
     const Vector3d low = body.center - Vector3d(0.0, 0.0, 0.8 * body.half_size.z());

@@ -171,15 +171,19 @@ void ExpectFairStart(const World& world, bool hidden) {
 
 void ExpectFairMovers(const World& world, const std::string& kind) {
   const bool people = kind == "crowd" || kind == "mixed";
+  const double bolt_room = world.scenario.chaser.desired_distance + 3.7;  // m to the target
   for (const auto& mover : world.scenario.movers)
     for (double t = -world.scenario.settle_s; t < world.scenario.duration_s; t += 0.07) {
       const auto state = world::MoverAt(mover, t);
+      const double faster = state.velocity.norm() - world::MoverAt(mover, t - 0.07).velocity.norm();
+      const bool bolts = t > 0.0 && faster > 1.6;
       const auto points = GridIn(state.solid);
       ASSERT_TRUE(world.AllFree(points, 5.0)) << "mover in something at " << t << " s";
       const Vector2d target = world.path.Position(t), hover = world.Hover().head<2>();
       for (const Vector3d& p : points) {
         ASSERT_GE((p.head<2>() - target).norm(), world.Reach() + kWalker) << t;
         ASSERT_TRUE(t >= 3.0 || (p.head<2>() - hover).norm() >= 1.0) << "at the hover, " << t;
+        ASSERT_TRUE(!bolts || (p.head<2>() - target).norm() >= bolt_room) << "bolts, " << t;
       }
       if (!people) continue;
       ASSERT_LE(state.velocity.head<2>().norm(), 1.45);
