@@ -15,6 +15,7 @@ namespace {
 constexpr double kTail = 0.03;       // share of the pixels beyond either limit: marking errors
 constexpr double kOtherLight = 3.0;  // degrees, what the hue shifts by in light not yet seen: sweep
 constexpr double kShade = 0.5;       // brightness in shade, share of the darkest one learned
+constexpr double kGlare = 0.8;       // saturation in glare, share of the palest one learned: sweep
 constexpr double kAccepted = 0.5;    // score of a pixel that the detector takes
 constexpr double kBorder = 0.35;     // of the mask's lesser extent: masks are drawn inside outlines
 constexpr double kWorthIt = 0.5;     // of a picture's index, gained by leaving one out: sweep
@@ -109,7 +110,7 @@ Range RangeOf(const std::vector<Samples>& all, const std::vector<bool>& used,
   config.hue_min_deg = std::fmod(middle + low + 720.0, 360.0);
   config.hue_max_deg = std::fmod(middle + high + 720.0, 360.0);
   if (high - low >= 360.0) config.hue_min_deg = 0.0, config.hue_max_deg = 360.0;
-  config.saturation_min = Percentile(saturation, kTail);
+  config.saturation_min = kGlare * Percentile(saturation, kTail);
   config.value_min = kShade * Percentile(value, kTail);
   return {config, high - low};
 }
