@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <deque>
 #include <optional>
 #include <string>
@@ -62,6 +63,13 @@ class Odometry {
   void AddSweep(Sweep sweep);
   bool SweepReady() const;
   SweepResult ProcessSweep();
+
+  /// True where neither samples nor sweeps have told for so long before t [s] how the body goes on
+  /// that its attitude and place are anybody's guess: to be begun anew.
+  bool Outdated(double t) const {
+    constexpr double kLongest = 0.3;  // s: at 1 rad/s and 4 m/s^2, 17 degrees and 0.2 m
+    return fused_ && t - std::max(imu_.newest(), held_) > kLongest;
+  }
 
   int64_t dropped_sweeps() const { return dropped_sweeps_; }
   int64_t dropped_samples() const { return dropped_samples_; }

@@ -91,6 +91,7 @@ void OdometryNode::OnImu(const imu_t& m) {
     scan_order_ = {};
     old_sweeps_ = kUnderWay;
   }
+  if (odometry_->Outdated(SecondsOf(m.utime))) BeginAnew();
   std::optional<PoseEstimate> pose;
   {
     const auto timer = bus_.Time("imu");
@@ -110,6 +111,7 @@ void OdometryNode::OnScan(const lidar_scan_t& m) {
     BeginAnew();
     imu_order_ = {};
   }
+  if (odometry_->Outdated(SecondsOf(m.utime))) BeginAnew();
   odometry_->AddSweep(FromMessage(m, SecondsOf(m.utime)));
   ProcessSweeps();
 }

@@ -12,7 +12,8 @@
 namespace chase::odometry {
 
 /// IMU and LIDAR_SCAN in; POSE at every IMU sample (without IMU: at every sweep) and
-/// SCAN_REGISTERED out. Begins anew, in another frame, where a sensor's clock was set back.
+/// SCAN_REGISTERED out. Begins anew, in another frame, where a sensor's clock was set back
+/// or nothing came for so long that the state is outdated.
 class OdometryNode : public bus::Node {
  public:
   OdometryNode(bus::Bus& bus, const OdometryConfig& config);

@@ -118,6 +118,31 @@ TEST(OdometryNode, BeginsAnewWithTheSecondSampleOfAClockThatIsSetBack) {
   EXPECT_EQ(bench.poses.back().epoch, bench.poses[before].epoch);
 }
 
+TEST(OdometryNode, BeginsAnewAfterASilenceOfAllSensorsWhicheverSpeaksFirst) {
+  for (const bool sweep_first : {false, true}) {
+    Bench bench;
+    Stand(kStart, false, &bench);
+    const size_t before = bench.poses.size();
+    const int32_t epoch = bench.poses.back().epoch;
+    const int64_t after = kStart + 3'500'000;
+    if (sweep_first) bench.SendScan(after - 100000, after - 1);
+    Stand(after, false, &bench);
+    ASSERT_GT(bench.poses.size(), before + 200);
+    EXPECT_NE(bench.poses.back().epoch, epoch) << sweep_first;
+    EXPECT_EQ(bench.poses.back().health, int{pose_t::HEALTH_OK}) << bench.poses.back().reason;
+  }
+}
+
+TEST(OdometryNode, GoesOnThroughASilenceOfTheImuAlone) {
+  Bench bench;
+  Stand(kStart, false, &bench);
+  const int32_t epoch = bench.poses.back().epoch;
+  const int64_t silent = kStart + 1'500'000;
+  for (int i = 1; i <= 10; ++i) bench.SendScan(silent + 100000 * (i - 1), silent + 100000 * i);
+  Stand(silent + 1'000'000, false, &bench);
+  EXPECT_EQ(bench.poses.back().epoch, epoch);
+}
+
 TEST(OdometryNode, BeginsAnewWithoutImuAsWell) {
   Bench bench;
   for (int i = 0; i < 5; ++i) bench.SendScan(kStart + 100000 * i, kStart + 100000 * (i + 1));
