@@ -10,12 +10,14 @@
 #include "chase/tracking_t.hpp"
 #include "common/bus/convert.h"
 #include "common/bus/plan_message.h"
+#include "common/math/rotation.h"
 #include "common/world/ages.h"
 
 namespace chase::control {
 
 namespace {
 
+constexpr int kBurst = 2;     // ticks over which queued poses may come
 constexpr size_t kLists = 8;  // 0.4 s at 20 Hz: plans name none older than 0.3 s
 
 Estimate FromMessage(const pose_t& m) {
@@ -94,12 +96,18 @@ void ControlNode::OnPlan(const plan_t& message) {
 }
 
 void ControlNode::OnPose(const pose_t& message) {
-  ticks_without_pose_ = 0;
+  const double t = bus::Seconds(message.utime, Origin(message.utime));
+  late_ = reckoned_ && t < *reckoned_ - world::kMostAge.pose && ticks_late_ < kBurst;
+  if (late_) return;
+  reckoned_.reset();
+  pose_t_ = t;
+  ticks_without_pose_ = ticks_late_ = 0;
   if (epoch_.Change(message.epoch)) {
     controller_.ForgetPlans();
     lists_.clear();
   }
-  const double t = bus::Seconds(message.utime, Origin(message.utime));
+  if (message.health != pose_t::HEALTH_STARTING && flown_.Change(message.epoch))
+    controller_.TurnFrame(math::Yaw(bus::ToQuaternion(message.orientation)));
   const Health health = HealthOf(message, config_);
   pose_reason_ = health == Health::kUsable ? ""
                  : message.reason.empty()  ? "uncertain"
@@ -113,13 +121,17 @@ void ControlNode::OnPose(const pose_t& message) {
   if (std::abs(message.utime - last_tracking_) >= kTick) SendTracking(message.utime);
 }
 
-// Without poses: level, until the autopilot's own limit on silence may act. Ticks are counted
-// rather than stamps compared: whoever sets the clock does not make the pose old.
+// Without poses: by dead reckoning, until the autopilot's own limit on silence may act. Ticks are
+// counted rather than stamps compared: whoever sets the clock does not make the pose old. Poses
+// from before the time that has been reckoned to were queued while their sender hung and come in a
+// burst; those that are late for longer have to do.
 void ControlNode::Tick(int64_t utime) {
+  if (late_) ++ticks_late_;
   const double silence = bus::Seconds(ticks_without_pose_++ * kTick, 0);
   if (silence <= world::kMostAge.pose || silence > world::kMostAge.velocity) return;
-  const std::optional<Setpoint> setpoint = controller_.Blind();
+  const std::optional<Setpoint> setpoint = controller_.Blind(silence);
   if (!setpoint) return;
+  reckoned_ = pose_t_ + silence;
   pose_reason_ = "no pose is heard";
   Send(utime, *setpoint);
   SendTracking(utime);

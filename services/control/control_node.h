@@ -43,11 +43,15 @@ class ControlNode : public bus::Node {
   ControlConfig config_;
   Controller controller_;
   bus::Epoch epoch_;
+  bus::Epoch flown_;  // of the last pose that was aligned: the attitude loop goes by it
   std::deque<std::pair<int32_t, std::vector<world::Obstacle>>> lists_;  // by seq, newest last
   std::optional<int64_t> origin_;  // utime that the core's seconds count from
   int64_t last_tracking_ = 0;
-  int ticks_without_pose_ = 0;
-  std::string pose_reason_;  // why the pose is not usable
+  int ticks_without_pose_ = 0, ticks_late_ = 0;
+  double pose_t_ = 0.0;             // of the last pose, s
+  std::optional<double> reckoned_;  // time that was reckoned to without poses, s
+  bool late_ = false;               // a pose from before that has come
+  std::string pose_reason_;         // why the pose is not usable
   int64_t n_plans_ = 0, n_refused_ = 0;
 };
 

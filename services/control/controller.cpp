@@ -51,12 +51,24 @@ std::optional<Setpoint> Controller::Update(double t, const Estimate& estimate, H
   plans_.Advance(t);
   error_.setZero();
   if (cut_) return Off();
+  return Sent(Answer(t, estimate, health, dt));
+}
+
+// What is sent is what the body does until it is told otherwise.
+std::optional<Setpoint> Controller::Sent(std::optional<Setpoint> setpoint) {
+  if (setpoint) reckoning_.Ask(*setpoint, law_.thrust_gain(), law_.trim());
+  return setpoint;
+}
+
+std::optional<Setpoint> Controller::Answer(double t, const Estimate& estimate, Health health,
+                                           double dt) {
   if (landing_.is_down()) health = Health::kLost;  // motors that are off stay off
   const bool finite = Usable(estimate);
   if (health != Health::kUsable || !finite)
     return WithoutPose(t, estimate, finite ? health : Health::kStarting, dt);
   last_usable_ = t;
   last_estimate_ = estimate;
+  reckoning_.Begin(t, estimate);
   last_yaw_ = math::Yaw(estimate.R_WB);
   return Follow(t, estimate, dt);
 }
@@ -132,19 +144,28 @@ std::optional<Setpoint> Controller::WithoutPose(double t, const Estimate& estima
   if (!flying_) return std::nullopt;
   lost_ = true;
   const bool inertial = health == Health::kLost;
-  if (inertial && !spot_ && !is_down() && t - last_usable_ <= world::kMostAge.velocity) {
+  if (!spot_ && !is_down() && t - last_usable_ <= world::kMostAge.velocity) {
     landing_ = Landing(config_, config_.land_speed);
-    return Brake(estimate);
+    if (inertial) reckoning_.Begin(t, estimate);
+    return Brake(reckoning_.At(t));
   }
   following_ = Following::kLand;
   const double lift = inertial ? landing_.Lift(estimate, dt) : -config_.lost_descent;
   return is_down() ? Off() : law_.Level(last_yaw_, lift);
 }
 
-std::optional<Setpoint> Controller::Blind() {
+std::optional<Setpoint> Controller::Blind(double silence) {
   if (!flying_) return std::nullopt;
   if (cut_) return Off();
-  return WithoutPose(last_t_.value_or(0.0), {}, Health::kStarting, 0.0);
+  return Sent(WithoutPose(last_t_.value_or(0.0) + silence, {}, Health::kStarting, 0.0));
+}
+
+void Controller::TurnFrame(double yaw) {
+  if (!std::isfinite(yaw)) return;
+  const double turn = yaw - reckoning_.yaw();
+  reckoning_.Turn(turn);
+  law_.Turn(turn);
+  last_yaw_ = yaw;
 }
 
 void Controller::RestartIfTimeJumpedBack(double t) {

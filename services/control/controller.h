@@ -4,6 +4,7 @@
 #include <string>
 
 #include "services/control/control_config.h"
+#include "services/control/dead_reckoning.h"
 #include "services/control/error_bound.h"
 #include "services/control/landing.h"
 #include "services/control/plan_follower.h"
@@ -32,7 +33,7 @@ enum class Following {
 class Controller {
  public:
   explicit Controller(const ControlConfig& config)
-      : config_(config), law_(config), landing_(config, config.land_speed) {}
+      : config_(config), law_(config), landing_(config, config.land_speed), reckoning_(config) {}
 
   /// Nothing, or why the plan is left out: it is late or unusable, or starts where neither the
   /// reference nor the body is by then.
@@ -44,6 +45,10 @@ class Controller {
     spot_.reset();
   }
 
+  /// The attitude loop goes by the new frame from now on, in which the body's heading is `yaw`,
+  /// rad.
+  void TurnFrame(double yaw);
+
   /// A landing on the spot is asked for, or no more: it begins once the body is at rest.
   void SetLanding(bool wanted);
 
@@ -51,13 +56,14 @@ class Controller {
   void Cut() { cut_ = true; }
 
   /// Setpoint for time t [s] of the estimate, nothing while there is nothing to fly. Once flying:
-  /// no plan, brake; no usable pose, brake for as long as its velocity is good (kMostAge.velocity),
-  /// then land; where the estimate is not finite or starting, sink level. Motors that have been
-  /// stopped on the ground stay so. Time that jumps back starts the controller anew.
+  /// no plan, brake; no usable pose, brake for as long as a velocity is good (kMostAge.velocity),
+  /// by dead reckoning where the estimate is not finite or starting; then land. Motors that have
+  /// been stopped on the ground stay so. Time that jumps back starts the controller anew.
   std::optional<Setpoint> Update(double t, const Estimate& estimate, Health health);
 
-  /// Setpoint while no pose comes at all: level, sinking; nothing while there is nothing to fly.
-  std::optional<Setpoint> Blind();
+  /// Setpoint `silence` s after the last pose while none comes: by dead reckoning, as above;
+  /// nothing while there is nothing to fly.
+  std::optional<Setpoint> Blind(double silence);
 
   Following following() const { return following_; }
   bool is_down() const { return landing_.is_down(); }
@@ -73,6 +79,8 @@ class Controller {
   std::optional<Setpoint> Brake(const Estimate& estimate);
   std::optional<Setpoint> Descend(const Estimate& estimate, double dt);
   std::optional<Setpoint> Off();
+  std::optional<Setpoint> Answer(double t, const Estimate& estimate, Health health, double dt);
+  std::optional<Setpoint> Sent(std::optional<Setpoint> setpoint);
   std::optional<Setpoint> WithoutPose(double t, const Estimate& estimate, Health health, double dt);
   void RestartIfTimeJumpedBack(double t);
   double StepTo(double t);
@@ -82,6 +90,7 @@ class Controller {
   PlanFollower plans_;
   TrackingLaw law_;
   Landing landing_;
+  DeadReckoning reckoning_;
   ErrorBound bound_;
   std::optional<double> last_t_;
   Estimate last_estimate_;

@@ -6,9 +6,10 @@ namespace chase::control {
 
 namespace {
 
-// In the air what thrust and weight leave unexplained is the error of the hover thrust (0.4 m/s^2
-// at most, kLargestTrim) and drag (0.15 1/s of 0.5 m/s, and of a gust of 3 m/s upwards): together
-// below 1. On the ground the loop takes `land_speed` times its gain off the thrust, which is 2.
+// In the air what thrust and weight leave unexplained is the error of the thrust's gain (0.4 m/s^2,
+// 4 % of it, when the battery sags under the motors) and drag (0.15 1/s of 0.5 m/s, and of a gust
+// of 3 m/s upwards): together below 1. On the ground the loop takes `land_speed` times its gain off
+// the thrust, which is 2.
 constexpr double kSupport = 1.0;       // m/s^2
 constexpr double kSmoothing = 0.1;     // s: motors lag 0.05 s, and an accelerometer is noisy
 constexpr double kSupportFor = 0.5;    // s: longer than a bump or a bounce

@@ -12,6 +12,9 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr double kTrimTime = 5.0;      // s that the trim averages over
+constexpr double kMostWind = 1.0;      // m/s^2: 4 m/s, drag 0.25 1/s
+constexpr double kAirborne = 0.3;      // m/s: no body stands at that
+constexpr double kLiftOff = 3.0;       // s of following plans: by then it hovers
 constexpr double kLongestStep = 0.05;  // s; a gap in the estimates must not wind the integral up
 
 Vector3d Shortened(const Vector3d& v, double limit) {
@@ -55,6 +58,7 @@ Setpoint AttitudeFor(const Vector3d& thrust, const Vector3d& thrust_rate, double
 
 Setpoint TrackingLaw::Track(const Estimate& estimate, const Reference& now, const Reference& ahead,
                             double dt) {
+  Weigh(estimate, dt);
   const Vector3d before = integral_;
   Integrate(now.state.p - estimate.p_WB, dt);
   const Vector3d feed_forward =
@@ -72,13 +76,13 @@ Setpoint TrackingLaw::Track(const Estimate& estimate, const Reference& now, cons
       std::clamp(math::WrapAngle(ahead.yaw - yaw), -config_.max_yaw_error, config_.max_yaw_error);
   Setpoint result = AttitudeFor(thrust, thrust_rate, yaw + turn, ahead.yaw_rate);
   result.w_WB_B = Clamped(result.w_WB_B, config_.max_body_rate);
-  result.thrust = AlongBody(thrust, estimate);
+  result.thrust = asked_ = AlongBody(thrust, estimate);
   return result;
 }
 
 Setpoint TrackingLaw::Brake(const Estimate& estimate, double yaw) const {
   const Vector3d wanted =
-      (kGravity + trim_) * Vector3d::UnitZ() - config_.velocity_gain.cwiseProduct(estimate.v_WB);
+      kGravity * Vector3d::UnitZ() + trim_ - config_.velocity_gain.cwiseProduct(estimate.v_WB);
   const Vector3d thrust = LimitThrust(wanted, config_);
   Setpoint result = AttitudeFor(thrust, Vector3d::Zero(), yaw, 0.0);
   result.thrust = AlongBody(thrust, estimate);
@@ -87,14 +91,22 @@ Setpoint TrackingLaw::Brake(const Estimate& estimate, double yaw) const {
 
 Setpoint TrackingLaw::Level(double yaw, double lift) const {
   Setpoint result = AttitudeFor(Vector3d::UnitZ(), Vector3d::Zero(), yaw, 0.0);
-  result.thrust = std::clamp(kGravity + trim_ + lift, config_.min_thrust, config_.max_thrust);
+  result.thrust = Asked(kGravity + lift);
   return result;
+}
+
+void TrackingLaw::Turn(double yaw) {
+  integral_ = math::FromYaw(yaw) * integral_;
+  trim_ = math::FromYaw(yaw) * trim_;
+}
+
+double TrackingLaw::Asked(double thrust) const {
+  return std::clamp(thrust / thrust_gain(), config_.min_thrust, config_.max_thrust);
 }
 
 // Lee 2010, eq. (15): only the part along the body's present z axis acts as wanted.
 double TrackingLaw::AlongBody(const Vector3d& thrust, const Estimate& estimate) const {
-  return std::clamp(thrust.dot(estimate.R_WB * Vector3d::UnitZ()), config_.min_thrust,
-                    config_.max_thrust);
+  return Asked(thrust.dot(estimate.R_WB * Vector3d::UnitZ()));
 }
 
 // The velocity error includes the speed that closes the position error, so that the sum is Lee's
@@ -108,6 +120,19 @@ Vector3d TrackingLaw::Feedback(const Estimate& estimate, const world::State& ref
   return config_.velocity_gain.cwiseProduct(velocity_error);
 }
 
+// What the gain learns the integral need not ask for any more: what is asked for does not jump.
+void TrackingLaw::Weigh(const Estimate& estimate, double dt) {
+  const double before = thrust_gain();
+  followed_ += dt;
+  airborne_ = airborne_ || estimate.v_WB.norm() > kAirborne || followed_ > kLiftOff;
+  if (!airborne_) return;
+  const Vector3d force =
+      estimate.a_WB + kGravity * Vector3d::UnitZ() + config_.drag.cwiseProduct(estimate.v_WB);
+  gain_.Add(asked_, force.dot(estimate.R_WB * Vector3d::UnitZ()), std::min(dt, kLongestStep));
+  const double bears = (kGravity + integral_.z()) * thrust_gain() / before - kGravity;
+  integral_.z() = std::clamp(bears, -config_.integral_limit, config_.integral_limit);
+}
+
 // A large error is a manoeuvre, not a bias: it is left to the feedback.
 void TrackingLaw::Integrate(const Vector3d& position_error, double dt) {
   const double step = std::clamp(dt, 0.0, kLongestStep);
@@ -118,7 +143,8 @@ void TrackingLaw::Integrate(const Vector3d& position_error, double dt) {
     integral_[i] = std::clamp(integral_[i] + config_.integral_gain[i] * position_error[i] * step,
                               -config_.integral_limit, config_.integral_limit);
   }
-  trim_ += step / kTrimTime * (std::clamp(integral_.z(), -kLargestTrim, kLargestTrim) - trim_);
+  const Vector3d horizontal(integral_.x(), integral_.y(), 0.0);
+  trim_ += step / kTrimTime * (Shortened(horizontal, kMostWind) - trim_);
 }
 
 }  // namespace chase::control

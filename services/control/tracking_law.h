@@ -4,6 +4,7 @@
 
 #include "common/world/state.h"
 #include "services/control/control_config.h"
+#include "services/control/thrust_gain.h"
 
 namespace chase::control {
 
@@ -30,8 +31,7 @@ struct Setpoint {
   bool motors = true;                                ///< false: off
 };
 
-constexpr double kGravity = 9.81;     ///< m/s^2
-constexpr double kLargestTrim = 0.4;  ///< m/s^2; 4 % of weight or thrust
+constexpr double kGravity = 9.81;  ///< m/s^2
 
 /// Specific thrust (acceleration without gravity, m/s^2, frame W) cut to what may be asked for: the
 /// vertical part first, within [min_thrust, max_thrust], then the horizontal part within the tilt
@@ -45,7 +45,8 @@ Eigen::Vector3d LimitThrust(const Eigen::Vector3d& thrust, const ControlConfig& 
 Setpoint AttitudeFor(const Eigen::Vector3d& thrust, const Eigen::Vector3d& thrust_rate, double yaw,
                      double yaw_rate);
 
-/// Lee's position loop, with an integral, feed-forward of drag and limits.
+/// Lee's position loop, with an integral, feed-forward of drag and limits. Thrusts are asked for by
+/// what the motors have been seen to give.
 class TrackingLaw {
  public:
   explicit TrackingLaw(const ControlConfig& config) : config_(config) {}
@@ -54,14 +55,20 @@ class TrackingLaw {
   /// and yaw fed forward. `dt` is the time since the last call, s: 0 leaves the integral alone.
   Setpoint Track(const Estimate& estimate, const Reference& now, const Reference& ahead, double dt);
 
-  /// Against the velocity, to rest, within the limits: needs no position. Hover thrust, see
-  /// Level(), holds the height.
+  /// Against the velocity and the wind, to rest, within the limits: needs no position.
   Setpoint Brake(const Estimate& estimate, double yaw) const;
 
-  /// Level attitude at the given yaw, thrust `lift` (m/s^2) beyond that of hovering: gravity plus
-  /// what the integral asked for on average of late, within kLargestTrim. A pose that is about to
-  /// be lost winds the integral up.
+  /// Level attitude at the given yaw, thrust `lift` (m/s^2) beyond that of hovering.
   Setpoint Level(double yaw, double lift) const;
+
+  /// Frame W has turned by `yaw`, rad.
+  void Turn(double yaw);
+
+  /// Thrust over mass that the motors give for what they are asked, shares of it.
+  double thrust_gain() const { return airborne_ ? gain_.value() : 1.0; }
+
+  /// What the integral has asked for on average, horizontally, against a wind, m/s^2.
+  const Eigen::Vector3d& trim() const { return trim_; }
 
   /// Acceleration that the integral asks for, m/s^2.
   const Eigen::Vector3d& integral() const { return integral_; }
@@ -69,11 +76,17 @@ class TrackingLaw {
  private:
   Eigen::Vector3d Feedback(const Estimate& estimate, const world::State& reference) const;
   void Integrate(const Eigen::Vector3d& position_error, double dt);
+  void Weigh(const Estimate& estimate, double dt);
+  double Asked(double thrust) const;
   double AlongBody(const Eigen::Vector3d& thrust, const Estimate& estimate) const;
 
   ControlConfig config_;
   Eigen::Vector3d integral_ = Eigen::Vector3d::Zero();
-  double trim_ = 0.0;  // vertical integral, averaged, m/s^2
+  Eigen::Vector3d trim_ = Eigen::Vector3d::Zero();
+  ThrustGain gain_;
+  double asked_ = kGravity;  // last, m/s^2
+  double followed_ = 0.0;    // plans, for this long, s
+  bool airborne_ = false;    // on the ground it is not the motors alone that bear the weight
 };
 
 }  // namespace chase::control

@@ -25,8 +25,9 @@ struct Body {
   Eigen::Quaterniond q = Eigen::Quaterniond::Identity();
   Eigen::Vector3d w = Eigen::Vector3d::Zero();
   double thrust = 9.81;
+  Eigen::Vector3d a = Eigen::Vector3d::Zero();
 
-  Estimate Measured() const { return {p, v, q}; }
+  Estimate Measured() const { return {p, v, q, a}; }
 
   /// Moves on by 5 ms with the setpoint sent now.
   void Step(const Setpoint& setpoint) {
@@ -46,8 +47,8 @@ struct Body {
         (2.0 * attitude_gain * error.vec() + s.w_WB_B).cwiseMax(-4.0).cwiseMin(4.0);
     w += dt / rate_time_constant * (wanted - w);
     thrust += dt / thrust_time_constant * (s.thrust - thrust);
-    const Eigen::Vector3d a = q * Eigen::Vector3d(0, 0, thrust / mass_factor) - drag * (v - wind) -
-                              Eigen::Vector3d(0, 0, 9.81);
+    a = q * Eigen::Vector3d(0, 0, thrust / mass_factor) - drag * (v - wind) -
+        Eigen::Vector3d(0, 0, 9.81);
     p += dt * v + 0.5 * dt * dt * a;
     v += dt * a;
     const double angle = w.norm() * dt;

@@ -171,21 +171,70 @@ TEST(LostPose, BrakesWhenTheFrameHasChanged) {
   EXPECT_LT(flight.body.v.norm(), 0.1);
 }
 
-TEST(LostPose, WithoutAVelocityItIsLevelAndSinks) {
+TEST(LostPose, WithoutAVelocityItHoldsTheHeightForAWhileAndThenSinks) {
   const ControlConfig config;
   Controller controller(config);
-  controller.AddPlan(PointPlan({1, 0, 0}));
+  controller.AddPlan(PointPlan({0, 0, 0}));
   Estimate estimate;
-  estimate.R_WB = math::FromYaw(0.7) * Quaterniond(Eigen::AngleAxisd(0.3, Vector3d::UnitX()));
+  estimate.R_WB = math::FromYaw(0.7);
   controller.Update(0.0, estimate, Health::kUsable);
   const auto s = controller.Update(0.005, estimate, Health::kStarting);
   ASSERT_TRUE(s);
   EXPECT_NEAR((s->R_WB * Vector3d::UnitZ()).z(), 1.0, 1e-12);
   EXPECT_NEAR(math::Yaw(s->R_WB), math::Yaw(estimate.R_WB), 1e-9);
-  EXPECT_NEAR(s->thrust, 9.81 - config.lost_descent, 1e-9);
-  EXPECT_EQ(controller.following(), Following::kLand);
-  for (int i = 2; i < 4000; ++i)  // standing still, or a sensor that says so: no reason to stop
-    EXPECT_TRUE(controller.Update(i * kStep, estimate, Health::kStarting)->motors);
+  EXPECT_NEAR(s->thrust, 9.81, 1e-9);
+  EXPECT_EQ(controller.following(), Following::kBrake);
+  const double until = world::kMostAge.velocity;
+  EXPECT_NEAR(controller.Update(until - kStep, estimate, Health::kStarting)->thrust, 9.81, 1e-9);
+  for (int i = 1; i < 4000; ++i) {  // standing still, or a sensor that says so: no reason to stop
+    const auto sinking = controller.Update(until + i * kStep, estimate, Health::kStarting);
+    EXPECT_TRUE(sinking->motors);
+    EXPECT_NEAR(sinking->thrust, 9.81 - config.lost_descent, 1e-9);
+    EXPECT_EQ(controller.following(), Following::kLand);
+  }
+}
+
+/// Flies at 2 m/s until t = 2 s; from then on no pose comes for `silent` s, then poses that are
+/// starting, in a frame that is turned by `turn` rad once they are aligned, for 1 s.
+Vector3d WayWithoutPose(double silent, double turn, double wind, Body* body) {
+  Flight flight({0, 0, 2});
+  flight.body.v = {2, 0, 0};
+  flight.body.wind = {0, wind, 0};
+  flight.controller.AddPlan(LinePlan({0, 0, 2}, 2.0));
+  flight.Fly(2.0, Health::kUsable);
+  const Vector3d from = flight.body.p;
+  Setpoint setpoint = flight.setpoint;
+  for (int i = 1; i <= std::lround(silent / kStep); ++i) {
+    if (i >= 30 && i % 10 == 0) setpoint = *flight.controller.Blind(i * kStep);
+    flight.body.Step(setpoint);
+  }
+  flight.controller.ForgetPlans();
+  const Quaterniond frame = math::FromYaw(turn);
+  for (int i = 0; i < 200; ++i) {
+    Estimate estimate = flight.body.Measured();
+    estimate.R_WB = frame * estimate.R_WB;
+    if (i == 100) flight.controller.TurnFrame(math::Yaw(estimate.R_WB));
+    setpoint = *flight.controller.Update(2.0 + silent + i * kStep, estimate, Health::kStarting);
+    if (i >= 100) setpoint.R_WB = frame.conjugate() * setpoint.R_WB;
+    flight.body.Step(setpoint);
+  }
+  *body = flight.body;
+  return flight.body.p - from;
+}
+
+TEST(LostPose, BrakesByDeadReckoningWhileNoVelocityIsKnown) {
+  for (const double silent : {0.3, 0.5, 2.0})
+    for (const double turn : {0.0, -2.0, 3.0})
+      for (const double wind : {0.0, 1.5}) {
+        Body body;
+        const Vector3d way = WayWithoutPose(silent, turn, wind, &body);
+        EXPECT_LT(way.head<2>().norm(), 1.3 + 0.2 * wind * silent * silent)
+            << silent << " " << turn << " " << wind;  // 2.6 to 5 m when it only levelled
+        EXPECT_LT(std::abs(body.v.x()), 0.2);
+        EXPECT_LT(body.v.head<2>().norm(), 0.2 + 0.25 * wind * (silent + 1.0));
+        EXPECT_GT(way.z(), -0.9);
+        EXPECT_LT(way.z(), 0.1);
+      }
 }
 
 TEST(LostPose, SinksNoFasterThanDragAllows) {
@@ -201,8 +250,11 @@ TEST(LostPose, APoseThatGoesWrongBeforeItIsLostMakesItSinkAllTheSame) {
   Controller controller(ControlConfig{});
   controller.AddPlan(PointPlan({0, 0, 1}));
   Estimate sinking;  // says 1 m too low, for as long as it takes to wind the integral up
-  for (int i = 0; i < 4000; ++i) controller.Update(i * kStep, sinking, Health::kUsable);
-  EXPECT_LT(controller.Update(20.0, sinking, Health::kStarting)->thrust, 9.81 + kLargestTrim);
+  for (int i = 0; i < 4000; ++i) {
+    const auto setpoint = controller.Update(i * kStep, sinking, Health::kUsable);
+    sinking.a_WB.z() = setpoint->thrust - 9.81;  // as the accelerometer feels it
+  }
+  EXPECT_LT(controller.Update(23.0, sinking, Health::kStarting)->thrust, 9.81);
 }
 
 TEST(LostPose, KnowsTheTrueHoverThrust) {
@@ -212,7 +264,7 @@ TEST(LostPose, KnowsTheTrueHoverThrust) {
   flight.controller.AddPlan(PointPlan({0, 0, 1}));
   flight.Fly(25.0, Health::kUsable);
   flight.Fly(25.004, Health::kStarting);
-  EXPECT_NEAR(flight.setpoint.thrust / 1.03, 9.81 - ControlConfig{}.lost_descent, 0.05);
+  EXPECT_NEAR(flight.setpoint.thrust / 1.03, 9.81, 0.05);
 }
 
 TEST(NewPlans, MoveTheReferenceNoFurtherThanAResetUnlessToTheBody) {

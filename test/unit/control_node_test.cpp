@@ -213,18 +213,25 @@ TEST(ControlNode, BrakesWhilePoseIsLost) {
 
 TEST(ControlNode, GoesByTheUncertaintyNotByTheHealthAlone) {
   const double landing = ControlConfig().land_speed;
-  const auto following = [](double sigma, double speed_sigma, int8_t health) {
+  const auto after = [](double seconds, double sigma, double speed_sigma, int8_t health) {
     Bench bench;
     bench.SendPlan(kStart, {0, 0, 0});
     bench.SendPose(kStart);
-    for (int i = 1; i < 12; ++i) bench.SendPose(kStart + 5000 * i, health, 0, sigma, speed_sigma);
-    return bench.tracking.back().following;
+    for (int i = 1; i < 12 + std::lround(seconds / 0.005); ++i)
+      bench.SendPose(kStart + 5000 * i, health, 0, sigma, speed_sigma);
+    return std::pair(bench.tracking.back().following, bench.out.back().thrust);
   };
   // Where the body is in the world matters to no plan, and plans allow for a frame that drifts.
-  EXPECT_EQ(following(1.0, 0.99 * landing, pose_t::HEALTH_DEGRADED), +tracking_t::PLAN);
-  EXPECT_EQ(following(0.0, 0.5 * landing, pose_t::HEALTH_LOST), +tracking_t::BRAKE);
-  EXPECT_EQ(following(0.0, 1.01 * landing, pose_t::HEALTH_DEGRADED), +tracking_t::LAND);
-  EXPECT_EQ(following(0.0, 1.01 * landing, pose_t::HEALTH_LOST), +tracking_t::LAND);
+  EXPECT_EQ(after(0.0, 1.0, 0.99 * landing, pose_t::HEALTH_DEGRADED).first, +tracking_t::PLAN);
+  EXPECT_EQ(after(0.0, 0.0, 0.5 * landing, pose_t::HEALTH_LOST).first, +tracking_t::BRAKE);
+  EXPECT_EQ(after(0.0, 0.0, 1.01 * landing, pose_t::HEALTH_DEGRADED).first, +tracking_t::BRAKE);
+  const double blind = 9.81 - ControlConfig().lost_descent;  // goes by no vertical velocity
+  for (const auto health : {pose_t::HEALTH_DEGRADED, pose_t::HEALTH_LOST}) {
+    const auto [following, thrust] = after(2.1, 0.0, 1.01 * landing, health);
+    EXPECT_EQ(following, +tracking_t::LAND);
+    EXPECT_NEAR(thrust, blind, 1e-6);
+  }
+  EXPECT_LT(after(2.1, 0.0, 0.5 * landing, pose_t::HEALTH_LOST).second, blind - 1.0);
 }
 
 TEST(ControlNode, FliesWhatIsCertifiedAgainstTheListThatItHeard) {
@@ -303,7 +310,7 @@ TEST(ControlNode, AnotherFrameVoidsPlansAndLists) {
       << bench.node().Report().detail;
 }
 
-TEST(ControlNode, LevelsWhenNoPoseComesAndLeavesTheRestToTheAutopilot) {
+TEST(ControlNode, BrakesWhenNoPoseComesAndLeavesTheRestToTheAutopilot) {
   Bench bench;
   bench.RunUntil(kStart + 1'000'000);
   EXPECT_TRUE(bench.out.empty());
@@ -312,17 +319,43 @@ TEST(ControlNode, LevelsWhenNoPoseComesAndLeavesTheRestToTheAutopilot) {
   bench.SendPose(kStart + 1'005'000);
   ASSERT_EQ(bench.out.size(), 2U);
   EXPECT_LT(bench.out.back().orientation[0], 0.999);
+  const double forward = bench.out.back().orientation[2];
   bench.RunUntil(kStart + 1'099'000);
   EXPECT_EQ(bench.out.size(), 2U);
   bench.RunUntil(kStart + 1'200'000);
   ASSERT_GT(bench.out.size(), 2U);
-  EXPECT_NEAR(bench.out.back().orientation[0], 1.0, 1e-9);
-  EXPECT_EQ(bench.tracking.back().following, +tracking_t::LAND);
+  EXPECT_LT(bench.out.back().orientation[2] * forward, 0.0);  // against what it has asked for
+  EXPECT_EQ(bench.tracking.back().following, +tracking_t::BRAKE);
   bench.RunUntil(kStart + 4'000'000);
+  EXPECT_NEAR(bench.out.back().orientation[0], 1.0, 1e-3);
   const size_t n = bench.out.size();
   EXPECT_NEAR(static_cast<double>(n), 40.0, 4.0);
   bench.RunUntil(kStart + 5'000'000);
   EXPECT_EQ(bench.out.size(), n);
+}
+
+TEST(ControlNode, DoesNotGoBackToPosesThatWereQueuedWhileTheirSenderHung) {
+  Bench bench;
+  bench.SendPlan(kStart, {5, 0, 0});
+  bench.SendPose(kStart);
+  bench.RunUntil(kStart + 1'000'000);
+  const size_t n = bench.out.size();
+  for (int i = 1; i <= 50; ++i) bench.SendPose(kStart + 5000 * i);
+  bench.RunUntil(kStart + 1'001'000);
+  EXPECT_EQ(bench.out.size(), n);
+  bench.SendPose(kStart + 1'005'000);
+  EXPECT_EQ(bench.out.size(), n + 1);
+}
+
+TEST(ControlNode, GoesByPosesThatAreAlwaysLateForWantOfOthers) {
+  Bench bench;
+  bench.SendPlan(kStart, {0, 0, 0});
+  bench.SendPose(kStart);
+  for (int i = 0; i < 100; ++i) {
+    bench.RunUntil(kStart + 300'000 + 5000 * i);
+    bench.SendPose(kStart + 5000 * i);
+  }
+  EXPECT_EQ(bench.tracking.back().following, +tracking_t::PLAN);
 }
 
 TEST(ControlNode, SaysTwentyTimesASecondHowWellItFollows) {

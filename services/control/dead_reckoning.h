@@ -1,0 +1,35 @@
+#pragma once
+
+#include "common/math/rotation.h"
+#include "services/control/tracking_law.h"
+
+namespace chase::control {
+
+/// How the body goes on after the last pose that was good, by what has been asked of it since: the
+/// attitude loop needs no pose. Good for the second or two that braking takes: a gust of 1 m/s that
+/// it does not know is 0.25 m/s^2.
+class DeadReckoning {
+ public:
+  explicit DeadReckoning(const ControlConfig& config) : drag_(config.drag) {}
+
+  void Begin(double t, const Estimate& estimate) { t_ = t, estimate_ = estimate; }
+  /// From here on the body does as `asked`, its motors give `gain` times that thrust, and a wind
+  /// takes `trim`, m/s^2, to stand against.
+  void Ask(const Setpoint& asked, double gain, const Eigen::Vector3d& trim) {
+    asked_ = asked, thrust_ = gain * asked.thrust, trim_ = trim;
+  }
+  /// Velocity and attitude at time t, s.
+  const Estimate& At(double t);
+  double yaw() const { return math::Yaw(estimate_.R_WB); }
+  /// Frame W has turned by `yaw`, rad.
+  void Turn(double yaw);
+
+ private:
+  Eigen::Vector3d drag_;  // 1/s
+  double t_ = 0.0, thrust_ = kGravity;
+  Eigen::Vector3d trim_ = Eigen::Vector3d::Zero();
+  Setpoint asked_;
+  Estimate estimate_;
+};
+
+}  // namespace chase::control
