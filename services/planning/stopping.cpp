@@ -14,6 +14,7 @@ using Eigen::Vector3d;
 
 constexpr double kTimes[] = {0.6, 0.8, 1.0, 1.3, 1.7, 2.2, 3.0};  // s, of a braking
 constexpr double kInTime = 0.05;  // s: contacts are sampled this often
+constexpr double kAlike = 0.01;   // m of clearance that make no difference
 
 /// Ways to rest ask for safety alone.
 PlanRequest WithoutSight(const PlanRequest& request, const world::State& start, double t0) {
@@ -85,26 +86,53 @@ class Resting {
   }
 
   /// Time of the first sampled contact, s, infinite where there is none, and the least clearance.
-  /// The ground and the greatest height count as an obstacle's surface.
+  /// The ground and the greatest height count as an obstacle's surface. What stands and holds the
+  /// start is not as the map says: the body is there and has touched nothing. As far in as the
+  /// quickest braking goes is no contact with it, and to flee it is no gain.
   std::pair<double, double> Harm(const Curve& curve, double T) {
+    const auto [within, gain] = Within();
     SetProblem(T);
-    double contact = HUGE_VAL, least = HUGE_VAL;
-    const Limits& l = problem_.limits;
+    double contact = HUGE_VAL, least = gain;
     const int n = static_cast<int>(std::ceil(T / kInTime));
     for (int i = 1; i <= n; ++i) {
       const double tau = static_cast<double>(i) / n;
-      const Vector3d p = planning::Evaluate(curve, tau);
-      for (const Ellipsoid& e : problem_.obstacles) least = std::min(least, Off(e, p, tau));
-      if (l.height)
-        least = std::min(
-            {least, l.ground.Above(p), config_.drone_radius + l.z_max - l.ground.Above(p)});
-      if (problem_.target_body) least = std::min(least, Off(*problem_.target_body, p, tau));
-      if (least < config_.drone_radius && contact == HUGE_VAL) contact = tau * T;
+      const auto [standing, moving] = Clearances(curve, tau);
+      least = std::min({least, standing, moving});
+      if ((standing < within || moving < config_.drone_radius) && contact == HUGE_VAL)
+        contact = tau * T;
     }
     return {contact, least};
   }
 
  private:
+  /// Of what stands and of what moves.
+  std::pair<double, double> Clearances(const Curve& curve, double tau) const {
+    const Vector3d p = planning::Evaluate(curve, tau);
+    const Limits& l = problem_.limits;
+    double standing = HUGE_VAL, moving = HUGE_VAL;
+    for (const Ellipsoid& e : problem_.obstacles) {
+      double& least = e.center.bottomRows(e.center.rows() - 1).isZero() ? standing : moving;
+      least = std::min(least, Off(e, p, tau));
+    }
+    if (problem_.target_body) moving = std::min(moving, Off(*problem_.target_body, p, tau));
+    if (!l.height) return {standing, moving};
+    const double above = l.ground.Above(p);
+    return {std::min({standing, above, config_.drone_radius + l.z_max - above}), moving};
+  }
+
+  /// Clearance of what stands below which it is a contact, and the most of it that counts.
+  std::pair<double, double> Within() {
+    if (within_) return *within_;
+    SetProblem(kTimes[0]);
+    within_ = {config_.drone_radius, HUGE_VAL};
+    if (Clearances(heights_, 0.0).first >= config_.drone_radius) return *within_;
+    double least = HUGE_VAL;
+    for (double tau = 0.0; tau <= 1.0; tau += kInTime)
+      least = std::min(least, Clearances(heights_, tau).first);
+    within_ = {least - kAlike, least - kAlike};
+    return *within_;
+  }
+
   // Along the line to the centre; roughly, and only for comparison.
   static double Off(const Ellipsoid& e, const Vector3d& p, double tau) {
     const Vector3d d = p - planning::Evaluate(e.center, tau);
@@ -134,6 +162,7 @@ class Resting {
   Curve heights_;
   Problem problem_;
   bool has_problem_ = false;
+  std::optional<std::pair<double, double>> within_;
 };
 
 /// Displacements of the place of rest by distance: none, then rings of directions, level, up and

@@ -111,6 +111,20 @@ TEST(Evasion, WhereNothingCanBeCertifiedTheContactComesAsLateAsCanBe) {
   }
 }
 
+// Where the drone is nothing stands; what the map has there it need not flee from.
+TEST(Evasion, InsideOfWhatStandsItOnlyBrakes) {
+  for (const double speed : {0.0, 1.0}) {
+    PlanRequest request = Hover();
+    request.start.v.x() = speed;
+    request.obstacles = {
+        Cylinder(1, request.start.p + Vector3d(1.0, 0.5, 0.0), Vector3d::Zero(), 6.0, 3.0)};
+    const PlanResult plan = RestPlan(PlannerConfig(), request);
+    EXPECT_EQ(plan.verdict, Verdict::kBrake) << plan.reason;
+    for (double t = 0.0; t < plan.trajectory.duration; t += 0.05)
+      EXPECT_LE(plan.trajectory.Velocity(t).norm(), speed + 1e-9) << t;
+  }
+}
+
 TEST(Evasion, AStartThatIsNotFiniteStaysWhereItIs) {
   PlanRequest request = Hover();
   request.t0 = 3.0;
