@@ -261,11 +261,16 @@ double Overshoot(double v, double a, double brake) {
 }
 
 // Limits that the start already breaks give way to what it has: no chain of plans gets worse.
-// Heights give way to what the start cannot help only, so that none sinks.
+// Heights give way to what the start cannot help only, so that none sinks. What is below the drone
+// its LiDAR sees on the way there only: it comes down along that slope, or slowly, until it is
+// level with people.
 Limits MakeLimits(const PlannerConfig& c, const world::State& s, const Eigen::Vector3d& target,
-                  const Ground& ground) {
+                  const Ground& ground, double horizon) {
   constexpr double kRounding = 1e-6, kBrake = 2.0;  // m; m/s^2 where no limit is set
   constexpr double kOverhead = 10.0;                // tangent from which there is no side to be on
+  constexpr double kUnseenDrop = 0.15;              // m: replanned, half a metre a second
+  constexpr double kSightSlope = 0.2;               // 15 degrees, less a tilt of 4
+  constexpr double kPerson = 1.7;                   // m high
   const auto at_least = [](double limit, double now) {
     return limit > 0.0 ? std::max(limit, (1.0 + kRounding) * now + kRounding) : 0.0;
   };
@@ -276,7 +281,9 @@ Limits MakeLimits(const PlannerConfig& c, const world::State& s, const Eigen::Ve
   const double brake = c.max_acceleration > 0.0 ? 0.5 * c.max_acceleration : kBrake;
   const double v = ground.Rise(s.v), a = ground.Rise(s.a), z = ground.Above(s.p);
   limits.ground = ground;
-  limits.z_min = std::min(c.z_min, z - Overshoot(-v, -a, brake) - kRounding);
+  const double seen_to = z - kUnseenDrop - kSightSlope * s.v.head<2>().norm() * horizon;
+  const double lowest = seen_to > kPerson ? std::max(c.z_min, seen_to) : c.z_min;
+  limits.z_min = std::min(lowest, z - Overshoot(-v, -a, brake) - kRounding);
   limits.z_max = std::max(c.z_max, z + Overshoot(v, a, brake) + kRounding);
   const Eigen::Vector3d r = target - s.p;
   const double tangent = std::tan(c.max_elevation_deg * M_PI / 180.0);
@@ -365,7 +372,7 @@ void MakeProblem(const PlannerConfig& config, const PlanRequest& request, std::s
   problem->start = StartCurve(request.start, request.horizon);
   problem->target = ToCurve(request.target, request.t0, request.horizon);
   problem->limits = MakeLimits(config, request.start, problem->target.row(0).transpose(),
-                               GroundOf(request.obstacles));
+                               GroundOf(request.obstacles), request.horizon);
   problem->skeletons.clear();
   problem->reach.reset();
   problem->obstacles.resize(request.obstacles.size());

@@ -176,10 +176,11 @@ void SkeletonPlacer::PlaceAt(int steps, int choices, const Spread& spread, bool 
     }
   }
   if (!(config_.z_max > config_.z_min)) return;
+  const double lowest = std::clamp(problem->limits.z_min, config_.z_min, config_.z_max);
   for (auto& choices_at : problem->skeletons)
     for (auto& u : choices_at) {
       const double z = problem->limits.ground.Above(u);
-      u.z() += std::clamp(z, config_.z_min, config_.z_max) - z;
+      u.z() += std::clamp(z, lowest, config_.z_max) - z;
     }
 }
 
