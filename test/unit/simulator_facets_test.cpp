@@ -146,7 +146,7 @@ world::GroundSpec Rough() {
 
 #ifdef __x86_64__
 constexpr bool kTraces = true;
-constexpr double kSettled = 0.998;  // what is left is at edges and outlines
+constexpr double kSettled = 0.9994;  // what is left is at edges and outlines
 #else
 constexpr bool kTraces = false;
 constexpr double kSettled = 0.0;
