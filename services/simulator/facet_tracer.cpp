@@ -269,6 +269,14 @@ CHASE_INLINE Lanes LanesOf(const RayPacket& rays) {
   return ray;
 }
 
+CHASE_INLINE void Store(const Lanes& ray, HitPacket* hits) {
+  memcpy(hits->distance, &ray.t, sizeof ray.t);
+  memcpy(hits->nx, &ray.n.x, sizeof ray.n.x);
+  memcpy(hits->ny, &ray.n.y, sizeof ray.n.y);
+  memcpy(hits->nz, &ray.n.z, sizeof ray.n.z);
+  memcpy(hits->material, &ray.material, sizeof ray.material);
+}
+
 CHASE_INLINE unsigned TraceBody(const FacetWorld& world, const RayPacket& rays,
                                 const NearSolids& near, HitPacket* hits) {
   Lanes ray = LanesOf(rays);
@@ -278,13 +286,33 @@ CHASE_INLINE unsigned TraceBody(const FacetWorld& world, const RayPacket& rays,
     if (Bits(open) == 0) break;
     CrossSolid(world, world.solids[near.first[i].solid], open, &ray);
   }
-  CrossGround(world.ground, used & ~ray.unsure, &ray);
-  memcpy(hits->distance, &ray.t, sizeof ray.t);
-  memcpy(hits->nx, &ray.n.x, sizeof ray.n.x);
-  memcpy(hits->ny, &ray.n.y, sizeof ray.n.y);
-  memcpy(hits->nz, &ray.n.z, sizeof ray.n.z);
-  memcpy(hits->material, &ray.material, sizeof ray.material);
+  if (world.ground.columns > 0) CrossGround(world.ground, used & ~ray.unsure, &ray);
+  Store(ray, hits);
   return Bits(ray.unsure & used);
+}
+
+/// As Embree 3 turns rays into the axes of an instance: the inverse of the turn by its determinant.
+CHASE_INLINE Lanes RaysInAxes(const FacetPlace& place, const Lanes& ray) {
+  const float det = place.cos_yaw * place.cos_yaw + place.sin_yaw * place.sin_yaw;
+  const float c = place.cos_yaw / det, s = place.sin_yaw / det, *p = place.p;
+  const V x = All(-(c * p[0] + s * p[1])), y = All(-(c * p[1] - s * p[0]));
+  Lanes turned = ray;
+  turned.o = {Fma(ray.o.x, All(c), Fma(ray.o.y, All(s), x)),
+              Fma(ray.o.x, All(-s), Fma(ray.o.y, All(c), y)), ray.o.z - p[2]};
+  turned.d = {Fma(ray.d.x, All(c), ray.d.y * s), Fma(ray.d.x, All(-s), ray.d.y * c), ray.d.z};
+  return turned;
+}
+
+CHASE_INLINE void CrossMoving(const FacetWorld& shapes, int i, const FacetPlace& place, VI active,
+                              Lanes* ray) {
+  const Lanes before = *ray;
+  *ray = RaysInAxes(place, before);
+  CrossSolid(shapes, shapes.solids[i], active, ray);
+  const float c = place.cos_yaw, s = place.sin_yaw;
+  const VI hit = ray->t < before.t;
+  const V x = c * ray->n.x - s * ray->n.y, y = s * ray->n.x + c * ray->n.y;
+  ray->n.x = Pick(hit, x, before.n.x), ray->n.y = Pick(hit, y, before.n.y);
+  ray->o = before.o, ray->d = before.d;
 }
 
 // One body, compiled for AVX2 and for the masks and the 32 registers of AVX-512: the same
@@ -323,6 +351,19 @@ void TraceNear(const FacetWorld& world, const NearSolids& near, const RayPacket*
   for (int k = 0; k < n; ++k) unsure[k] = TracePacket(world, rays[k], near, &hits[k]);
 }
 
+bool TraceMoving(const FacetWorld& shapes, const FacetPlace* places, int n, const RayPacket& rays,
+                 HitPacket* hits) {
+  Lanes ray = LanesOf(rays);
+  ray.t = Load(hits->distance);
+  ray.n = {Load(hits->nx), Load(hits->ny), Load(hits->nz)};
+  memcpy(&ray.material, hits->material, sizeof ray.material);
+  const VI used = kLane < rays.count;
+  for (int i = 0; i < n; ++i) CrossMoving(shapes, i, places[i], used & ~ray.unsure, &ray);
+  if (Bits(ray.unsure & used) != 0) return false;
+  Store(ray, hits);
+  return true;
+}
+
 bool MayMeet(const BoundsNode* boxes, int n_nodes, const RayPacket* rays, int n) {
   const Fan fan = FanOf(rays, n);
   V gap;
@@ -344,6 +385,10 @@ void TraceFacets(const FacetWorld&, const RayPacket* rays, int n, HitPacket*, un
 void TraceNear(const FacetWorld& world, const NearSolids&, const RayPacket* rays, int n,
                HitPacket* hits, unsigned* unsure) {
   TraceFacets(world, rays, n, hits, unsure);
+}
+
+bool TraceMoving(const FacetWorld&, const FacetPlace*, int, const RayPacket&, HitPacket*) {
+  return false;
 }
 
 bool MayMeet(const BoundsNode*, int, const RayPacket*, int) { return true; }
