@@ -86,8 +86,9 @@ void Camera::TraceTile(int row, int column, const Scene& scene, Image* image) {
     LightPacket light;
     Shade(rays[k], hits[k], target_color_.data(), &light);
     Expose(light, brightness_, rays[k].count, &image->rgb[static_cast<std::size_t>(3 * pixel)]);
-    visible_px_ +=
-        std::count(hits[k].material, hits[k].material + rays[k].count, Material::kTarget);
+    if (rays[k].movers)
+      visible_px_ +=
+          std::count(hits[k].material, hits[k].material + rays[k].count, Material::kTarget);
   }
 }
 

@@ -10,7 +10,7 @@
 namespace chase::simulator {
 namespace {
 
-constexpr float kEdge = 2e-4f;  // share of a facet at its edges where a hit is not settled
+constexpr float kFacetEdge = 2e-4f;  // as kCellEdge
 constexpr float kPi = 3.14159265f;
 constexpr int kRounds = 4;               // of the search for the facet
 constexpr float kUnitRounding = 1e-6f;   // of coordinates in half sizes
@@ -89,13 +89,15 @@ CHASE_INLINE void Column(const FacetSolid& solid, const V3& p, VI* column, V* sh
   *column = Whole(whole), *share = turn - whole;
 }
 
-CHASE_INLINE Choice BoxChoice(const Lanes& unit, V margin) {
-  const V x = Slab(unit.o.x, unit.d.x, margin).enter, y = Slab(unit.o.y, unit.d.y, margin).enter,
-          z = Slab(unit.o.z, unit.d.z, margin).enter;
+/// The face that the point is beyond, or nearest to.
+CHASE_INLINE Choice BoxChoice(const V3& p) {
+  const V x = Abs(p.x), y = Abs(p.y), z = Abs(p.z);
   const VI on_z = (z >= x) & (z >= y), on_y = (y >= x) & ~on_z;
-  const V d = Pick(on_z, unit.d.z, Pick(on_y, unit.d.y, unit.d.x));
+  const auto of = [&](V if_z, V if_y, V if_x) { return Pick(on_z, if_z, Pick(on_y, if_y, if_x)); };
+  const VI positive = of(p.z, p.y, p.x) > 0.0f;
+  const V a = of(p.x, p.z, p.y), b = of(p.y, p.x, p.z);
   const VI face = Pick(on_z, AllInt(0), Pick(on_y, AllInt(2), AllInt(4)));
-  return {face - (d < 0.0f), AllInt(0)};
+  return {face - positive, Pick(positive, a <= b, b <= a) & 1};
 }
 
 /// The quads of the side, and after them the caps: below and above.
@@ -174,7 +176,7 @@ CHASE_INLINE V3 Vertices(const FacetVertex* base, VI index) {
 }
 
 /// Where the rays may be within the solid: a span of a body slightly larger, and, of a cylinder,
-/// the lanes that enter it by a cap.
+/// the lanes that seem to enter it by a cap.
 CHASE_INLINE VI Within(const FacetSolid& solid, const Lanes& unit, V size, Span* span, VI* cap) {
   const V3 &o = unit.o, &d = unit.d;
   if (solid.kind == FacetSolid::Kind::kEllipsoid) {
@@ -197,9 +199,8 @@ CHASE_INLINE VI Within(const FacetSolid& solid, const Lanes& unit, V size, Span*
   return meets & (span->enter <= span->leave);
 }
 
-CHASE_INLINE Choice Choose(const FacetSolid& solid, const Lanes& unit, V size, const V3& p,
-                           VI cap) {
-  if (solid.kind == FacetSolid::Kind::kBox) return BoxChoice(unit, size);
+CHASE_INLINE Choice Choose(const FacetSolid& solid, const V3& p, VI cap) {
+  if (solid.kind == FacetSolid::Kind::kBox) return BoxChoice(p);
   if (solid.kind == FacetSolid::Kind::kCylinder) return CylinderChoice(solid, p, cap);
   return EllipsoidChoice(solid, p);
 }
@@ -210,18 +211,22 @@ CHASE_INLINE Choice Choose(const FacetSolid& solid, const Lanes& unit, V size, c
 struct Clip {
   V enter = All(-INFINITY), leave = All(INFINITY);
 
-  VI Missed(const Lanes& ray, const Triangle& triangle, const Crossing& x, V t) {
-    const V edges = Sum(triangle.e1) * Sum(triangle.e2), way = Sum(triangle.v0 - ray.o);
-    const V slack = kPlaneRounding * edges * way / x.volume;
+  VI Missed(const Triangle& triangle, const Crossing& x, V t, V way) {
+    const V slack = kPlaneRounding * Products(triangle.e1, triangle.e2) * way / x.volume;
     enter = Pick(x.den < 0.0f, Max(enter, t - slack), enter);
     leave = Pick(x.den > 0.0f, Min(leave, t + slack), leave);
     return enter > leave;
   }
-  static V Sum(const V3& a) { return Abs(a.x) + Abs(a.y) + Abs(a.z); }
+  /// Of all that the cross product is the sum of.
+  static V Products(const V3& a, const V3& b) {
+    return Abs(a.x) * (Abs(b.y) + Abs(b.z)) + Abs(a.y) * (Abs(b.z) + Abs(b.x)) +
+           Abs(a.z) * (Abs(b.x) + Abs(b.y));
+  }
 };
 
 /// The facet through which each ray enters a convex solid: guessed on a smooth body around it, and
-/// from then on where the ray meets the plane of the last guess.
+/// from then on where the ray meets the plane of the last guess. A cylinder's cap is tried in vain
+/// once; the next guess is then the side.
 CHASE_INLINE void CrossSolid(const FacetWorld& world, const FacetSolid& solid, VI active,
                              Lanes* ray) {
   const Lanes unit = UnitRays(solid, *ray);
@@ -236,7 +241,7 @@ CHASE_INLINE void CrossSolid(const FacetWorld& world, const FacetSolid& solid, V
   VI last = AllInt(-1), half = last;
   V3 p = Along(unit.o, span.enter, unit.d);
   for (int i = 0; i < kRounds && Bits(todo) != 0; ++i) {
-    Choice choice = Choose(solid, unit, size, p, cap);
+    Choice choice = Choose(solid, p, cap);
     choice.half = Pick(choice.quad == last, half ^ 1, choice.half);
     last = choice.quad, half = choice.half;
     const Corners corners = CornersOf(solid, choice);
@@ -245,11 +250,13 @@ CHASE_INLINE void CrossSolid(const FacetWorld& world, const FacetSolid& solid, V
       v[k] = Vertices(world.vertices + solid.first, Pick(todo, corners.v[k], AllInt(0)));
     const Triangle triangle = TriangleOf(v[0], v[1], v[2]);
     const Crossing x = Cross(*ray, triangle);
-    const VI found = todo & x.Inside(kEdge * x.volume) & (x.den < 0.0f);
+    const V edges = Sum(triangle.e1) + Sum(triangle.e2), way = Sum(triangle.v0 - ray->o);
+    const VI found = todo & x.Inside(EdgeMargin(x, kFacetEdge, edges * way)) & (x.den < 0.0f);
     Keep(x, triangle.n, found, AllInt(static_cast<int>(solid.material)), ray);
     const V t = x.depth / x.volume;
-    todo &= ~(found | clip.Missed(*ray, triangle, x, t));
+    todo &= ~(found | clip.Missed(triangle, x, t, way));
     p = Along(unit.o, t, unit.d);
+    cap = (Abs(p.z) > 1.0f) & ~cap;
   }
   ray->unsure |= todo;
 }
@@ -262,6 +269,14 @@ CHASE_INLINE Lanes LanesOf(const RayPacket& rays) {
   return ray;
 }
 
+CHASE_INLINE void Store(const Lanes& ray, HitPacket* hits) {
+  memcpy(hits->distance, &ray.t, sizeof ray.t);
+  memcpy(hits->nx, &ray.n.x, sizeof ray.n.x);
+  memcpy(hits->ny, &ray.n.y, sizeof ray.n.y);
+  memcpy(hits->nz, &ray.n.z, sizeof ray.n.z);
+  memcpy(hits->material, &ray.material, sizeof ray.material);
+}
+
 CHASE_INLINE unsigned TraceBody(const FacetWorld& world, const RayPacket& rays,
                                 const NearSolids& near, HitPacket* hits) {
   Lanes ray = LanesOf(rays);
@@ -271,13 +286,33 @@ CHASE_INLINE unsigned TraceBody(const FacetWorld& world, const RayPacket& rays,
     if (Bits(open) == 0) break;
     CrossSolid(world, world.solids[near.first[i].solid], open, &ray);
   }
-  CrossGround(world.ground, used & ~ray.unsure, &ray);
-  memcpy(hits->distance, &ray.t, sizeof ray.t);
-  memcpy(hits->nx, &ray.n.x, sizeof ray.n.x);
-  memcpy(hits->ny, &ray.n.y, sizeof ray.n.y);
-  memcpy(hits->nz, &ray.n.z, sizeof ray.n.z);
-  memcpy(hits->material, &ray.material, sizeof ray.material);
+  if (world.ground.columns > 0) CrossGround(world.ground, used & ~ray.unsure, &ray);
+  Store(ray, hits);
   return Bits(ray.unsure & used);
+}
+
+/// As Embree 3 turns rays into the axes of an instance: the inverse of the turn by its determinant.
+CHASE_INLINE Lanes RaysInAxes(const FacetPlace& place, const Lanes& ray) {
+  const float det = place.cos_yaw * place.cos_yaw + place.sin_yaw * place.sin_yaw;
+  const float c = place.cos_yaw / det, s = place.sin_yaw / det, *p = place.p;
+  const V x = All(-(c * p[0] + s * p[1])), y = All(-(c * p[1] - s * p[0]));
+  Lanes turned = ray;
+  turned.o = {Fma(ray.o.x, All(c), Fma(ray.o.y, All(s), x)),
+              Fma(ray.o.x, All(-s), Fma(ray.o.y, All(c), y)), ray.o.z - p[2]};
+  turned.d = {Fma(ray.d.x, All(c), ray.d.y * s), Fma(ray.d.x, All(-s), ray.d.y * c), ray.d.z};
+  return turned;
+}
+
+CHASE_INLINE void CrossMoving(const FacetWorld& shapes, int i, const FacetPlace& place, VI active,
+                              Lanes* ray) {
+  const Lanes before = *ray;
+  *ray = RaysInAxes(place, before);
+  CrossSolid(shapes, shapes.solids[i], active, ray);
+  const float c = place.cos_yaw, s = place.sin_yaw;
+  const VI hit = ray->t < before.t;
+  const V x = c * ray->n.x - s * ray->n.y, y = s * ray->n.x + c * ray->n.y;
+  ray->n.x = Pick(hit, x, before.n.x), ray->n.y = Pick(hit, y, before.n.y);
+  ray->o = before.o, ray->d = before.d;
 }
 
 // One body, compiled for AVX2 and for the masks and the 32 registers of AVX-512: the same
@@ -316,6 +351,19 @@ void TraceNear(const FacetWorld& world, const NearSolids& near, const RayPacket*
   for (int k = 0; k < n; ++k) unsure[k] = TracePacket(world, rays[k], near, &hits[k]);
 }
 
+bool TraceMoving(const FacetWorld& shapes, const FacetPlace* places, int n, const RayPacket& rays,
+                 HitPacket* hits) {
+  Lanes ray = LanesOf(rays);
+  ray.t = Load(hits->distance);
+  ray.n = {Load(hits->nx), Load(hits->ny), Load(hits->nz)};
+  memcpy(&ray.material, hits->material, sizeof ray.material);
+  const VI used = kLane < rays.count;
+  for (int i = 0; i < n; ++i) CrossMoving(shapes, i, places[i], used & ~ray.unsure, &ray);
+  if (Bits(ray.unsure & used) != 0) return false;
+  Store(ray, hits);
+  return true;
+}
+
 bool MayMeet(const BoundsNode* boxes, int n_nodes, const RayPacket* rays, int n) {
   const Fan fan = FanOf(rays, n);
   V gap;
@@ -337,6 +385,10 @@ void TraceFacets(const FacetWorld&, const RayPacket* rays, int n, HitPacket*, un
 void TraceNear(const FacetWorld& world, const NearSolids&, const RayPacket* rays, int n,
                HitPacket* hits, unsigned* unsure) {
   TraceFacets(world, rays, n, hits, unsure);
+}
+
+bool TraceMoving(const FacetWorld&, const FacetPlace*, int, const RayPacket&, HitPacket*) {
+  return false;
 }
 
 bool MayMeet(const BoundsNode*, int, const RayPacket*, int) { return true; }

@@ -47,7 +47,7 @@ struct FacetWorld {
   const FacetSolid* solids = nullptr;
   const BoundsNode* nodes = nullptr;  ///< the first is the root; none: no solids
   int node_count = 0;
-  GroundGrid ground;
+  GroundGrid ground;  ///< no cells: there is none
 };
 
 /// A solid that rays may meet, and how far away it is at least, in multiples of their length.
@@ -71,6 +71,18 @@ void TraceFacets(const FacetWorld& world, const RayPacket* rays, int n, HitPacke
 /// The same where it is known which solids the rays may meet.
 void TraceNear(const FacetWorld& world, const NearSolids& near, const RayPacket* rays, int n,
                HitPacket* hits, unsigned* unsure);
+
+/// Where a solid that moves is: its axes are turned by a yaw around z.
+struct FacetPlace {
+  float cos_yaw = 1.0f, sin_yaw = 0.0f;
+  float p[3] = {};  ///< frame W, m
+};
+
+/// Hits on n solids that move, the first of `shapes`, each in its own axes, in front of the hits
+/// already found; with the bits of Embree's instances, normals turned into frame W. False, with
+/// nothing changed, where a ray is not settled.
+bool TraceMoving(const FacetWorld& shapes, const FacetPlace* places, int n, const RayPacket& rays,
+                 HitPacket* hits);
 
 /// False if none of the rays meets any of the boxes.
 bool MayMeet(const BoundsNode* boxes, int n_nodes, const RayPacket* rays, int n);

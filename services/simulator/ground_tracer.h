@@ -6,33 +6,22 @@
 namespace chase::simulator {
 namespace {
 
-constexpr int kMostCells = 256;  // on a ray's way
-// Share of a triangle at its edges where a hit is not settled, at most and at least.
-constexpr float kCellEdge = 1e-3f, kLeastEdge = 1e-4f;
-constexpr float kPlainEdge = 1e-5f;  // the same where the ground is two triangles
-constexpr float kRounding = 5e-7f;   // eight roundings of a product, of single precision
-constexpr float kAboveTop = 1e-3f;   // m, more than the rounding of a height
+constexpr int kMostCells = 256;     // on a ray's way
+constexpr float kCellEdge = 1e-3f;  // share of a triangle at its edges that is not settled, at most
+constexpr float kAboveTop = 1e-3f;  // m, more than the rounding of a height
 
-/// How near to a triangle's edges a hit is not settled, in the unit of the crossing's volume: what
-/// rounding may make of the way to the triangle times its edge, and a little more.
-inline V CellEdge(const GroundGrid& ground, const Crossing& x, float most, V way) {
-  const float rounding = kRounding / ground.cells_per_m[0];
-  return Min(most * x.volume, kLeastEdge * x.volume + rounding * way);
-}
-
-inline void CrossCell(const GroundGrid& ground, VI ix, VI iy, float most, VI* lanes, Lanes* ray) {
+inline void CrossCell(const GroundGrid& ground, VI ix, VI iy, VI* lanes, Lanes* ray) {
   const VI below = iy * (ground.columns + 1) + ix, above = below + (ground.columns + 1);
   const V x0 = Gather(ground.x, ix), x1 = Gather(ground.x + 1, ix);
   const V y0 = Gather(ground.y, iy), y1 = Gather(ground.y + 1, iy);
   const V3 a = {x0, y0, Gather(ground.z, below)}, b = {x1, y0, Gather(ground.z + 1, below)};
   const V3 d = {x0, y1, Gather(ground.z, above)}, e = {x1, y1, Gather(ground.z + 1, above)};
   const Triangle halves[2] = {TriangleOf(a, b, e), TriangleOf(a, e, d)};
-  const V3 c = a - ray->o;
-  const V way = Abs(c.x) + Abs(c.y) + Abs(c.z);
+  const V way = Sum(a - ray->o) / ground.cells_per_m[0];
   VI settled = AllInt(0);
   for (const Triangle& triangle : halves) {
     const Crossing x = Cross(*ray, triangle);
-    const V edge = CellEdge(ground, x, most, way);
+    const V edge = EdgeMargin(x, kCellEdge, way);
     const VI found = *lanes & x.Inside(edge);
     ray->unsure |= *lanes & x.Inside(-edge) & ~found;
     Keep(x, triangle.n, found, AllInt(static_cast<int>(Material::kGround)), ray);
@@ -46,7 +35,7 @@ inline void CrossCell(const GroundGrid& ground, VI ix, VI iy, float most, VI* la
 __attribute__((always_inline)) inline void CrossGround(const GroundGrid& ground, VI todo,
                                                        Lanes* ray) {
   if (ground.columns == 1 && ground.rows == 1)
-    return CrossCell(ground, AllInt(0), AllInt(0), kPlainEdge, &todo, ray);
+    return CrossCell(ground, AllInt(0), AllInt(0), &todo, ray);
   const float* plane = ground.plane;
   const V height = ray->o.z - (plane[0] + plane[1] * ray->o.x + plane[2] * ray->o.y);
   const V climb = ray->d.z - (plane[1] * ray->d.x + plane[2] * ray->d.y);
@@ -76,7 +65,7 @@ __attribute__((always_inline)) inline void CrossGround(const GroundGrid& ground,
     VI meets = todo & (lowest <= Gather(ground.top, iy * ground.columns + ix));
     if (Bits(meets) != 0) {
       const VI tried = meets;
-      CrossCell(ground, ix, iy, kCellEdge, &meets, ray);
+      CrossCell(ground, ix, iy, &meets, ray);
       todo &= ~(tried & ~meets);
     }
     const VI along_x = tx <= ty;

@@ -11,6 +11,9 @@
 namespace chase::simulator {
 namespace {
 
+constexpr float kLeastEdge = 1e-6f;  // share of a triangle at its edges, more than it rounds
+constexpr float kRounding = 5e-7f;   // eight roundings of a product, of single precision
+
 typedef float V __attribute__((vector_size(32)));
 typedef int32_t VI __attribute__((vector_size(32)));
 
@@ -94,6 +97,14 @@ inline Crossing Cross(const Lanes& ray, const Triangle& triangle) {
   x.w = x.volume - x.u - x.v;
   x.depth = Xor(Dot(triangle.n, c), sign);
   return x;
+}
+
+inline V Sum(const V3& a) { return Abs(a.x) + Abs(a.y) + Abs(a.z); }
+
+/// How near to a triangle's edges a hit is not settled, in the unit of the crossing's volume: what
+/// rounding may make of the way to the triangle times its edges, and a little more.
+inline V EdgeMargin(const Crossing& x, float most, V edges_by_way) {
+  return Min(most * x.volume, kLeastEdge * x.volume + kRounding * edges_by_way);
 }
 
 /// Keeps the crossing in the lanes where it is the nearest in front. Of two at the same distance

@@ -47,6 +47,14 @@ float Reflectivity(Material material) {
   return 0.0f;
 }
 
+Sweep NewSweep(double start) {
+  Sweep sweep;
+  sweep.start = start;
+  for (auto* values : {&sweep.x, &sweep.y, &sweep.z, &sweep.t}) values->reserve(kFirings * kRings);
+  for (auto* values : {&sweep.intensity, &sweep.ring}) values->reserve(kFirings * kRings);
+  return sweep;
+}
+
 /// Cosine between ray i and the normal where it hits.
 float Incidence(const RayPacket& rays, const HitPacket& hits, int i) {
   const Vector3f normal(hits.nx[i], hits.ny[i], hits.nz[i]);
@@ -97,10 +105,10 @@ double Lidar::FiringTime(int firing) const {
 void Lidar::Advance(const std::vector<TimedPose>& poses, const Scene& scene) {
   if (config_.rate <= 0.0 || poses.size() < 2) return;
   while (FiringTime(firing_) < poses.back().t) {
-    if (firing_ == 0) sweep_.start = FiringTime(0);
+    if (firing_ == 0) sweep_ = NewSweep(FiringTime(0));
     firing_ += FireNext(poses, scene);
     if (firing_ < kFirings) continue;
-    complete_ = std::exchange(sweep_, Sweep{});
+    complete_ = std::move(sweep_);
     firing_ = 0;
     ++sweep_index_;
   }

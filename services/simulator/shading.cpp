@@ -195,16 +195,13 @@ void Expose(const LightPacket& light, float brightness, int count, uint8_t* out)
   const VI pixels = value[0] | value[1] << 8 | value[2] << 16;  // least byte first
   Bytes halves[2];
   memcpy(halves, &pixels, sizeof halves);
-  uint8_t bytes[32];
-  for (int i = 0; i < 2; ++i) {
-    const Bytes packed = __builtin_shufflevector(halves[i], halves[i], 0, 1, 2, 4, 5, 6, 8, 9, 10,
-                                                 12, 13, 14, 15, 15, 15, 15);
-    memcpy(bytes + 12 * i, &packed, sizeof packed);
-  }
-  if (count == 8)
-    memcpy(out, bytes, 24);
-  else
-    memcpy(out, bytes, static_cast<size_t>(3 * count));
+  for (Bytes& half : halves)
+    half =
+        __builtin_shufflevector(half, half, 0, 1, 2, 4, 5, 6, 8, 9, 10, 12, 13, 14, 15, 15, 15, 15);
+  uint8_t bytes[24], *to = count == 8 ? out : bytes;
+  memcpy(to, &halves[0], 16);
+  memcpy(to + 12, &halves[1], 12);
+  if (to == bytes) memcpy(out, bytes, static_cast<size_t>(3 * count));
 }
 
 }  // namespace chase::simulator

@@ -23,6 +23,32 @@ Span PixelsWithin(double from, double to, int size) {
           static_cast<int>(std::floor(std::clamp(to, -1.0, size - 1.0)))};
 }
 
+/// The planes through the camera and the image's edges, or a pixel beyond.
+class Frustum {
+ public:
+  Frustum(const world::Rig& rig, const Viewpoint& view) : p_WC_(view.p_WC) {
+    const double right = (rig.width_px - rig.center_u_px) / rig.focal_px;
+    const double below = (rig.height_px - rig.center_v_px) / rig.focal_px;
+    const double left = (rig.center_u_px + 1.0) / rig.focal_px;
+    const double above = (rig.center_v_px + 1.0) / rig.focal_px;
+    outwards_.col(0) = view.R_WC * Eigen::Vector3d(1.0, 0.0, -right).normalized();
+    outwards_.col(1) = view.R_WC * Eigen::Vector3d(-1.0, 0.0, -left).normalized();
+    outwards_.col(2) = view.R_WC * Eigen::Vector3d(0.0, 1.0, -below).normalized();
+    outwards_.col(3) = view.R_WC * Eigen::Vector3d(0.0, -1.0, -above).normalized();
+  }
+
+  /// The ball around the solid is beyond one of the planes.
+  bool Misses(const Solid& solid) const {
+    const double out = (outwards_.transpose() * (solid.center - p_WC_)).maxCoeff();
+    return out > 0.0 && out * out > kSwell * kSwell * solid.half_size.squaredNorm();
+  }
+
+ private:
+  static constexpr double kSwell = 1.001;  // beyond what is rounded
+  Eigen::Vector3d p_WC_;
+  Eigen::Matrix<double, 3, 4> outwards_;
+};
+
 }  // namespace
 
 void TileBins::Project(const world::Rig& rig, const Viewpoint& view,
@@ -30,7 +56,9 @@ void TileBins::Project(const world::Rig& rig, const Viewpoint& view,
   columns_ = (rig.width_px + kColumns - 1) / kColumns;
   rows_ = (rig.height_px + kRows - 1) / kRows;
   ranges_.clear();
+  const Frustum frustum(rig, view);
   for (std::size_t i = 0; i < solids.size(); ++i) {
+    if (frustum.Misses(solids[i])) continue;
     const Outline outline = OutlineOf(rig, view, solids[i]);
     const Span u = PixelsWithin(outline.box.left, outline.box.right, rig.width_px);
     const Span v = PixelsWithin(outline.box.top, outline.box.bottom, rig.height_px);
