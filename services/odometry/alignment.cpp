@@ -14,11 +14,30 @@ constexpr double kSettledGyro = 0.002;      // rad/s
 constexpr double kSettledAccel = 0.03;      // m/s^2
 constexpr double kTiltInMotion = 1.5;       // m/s^2, of gravity's horizontal part
 constexpr double kGravityStrength = 1e-3;   // m/s^2, how well |g| is known
+constexpr double kSpeedInMotion = 2.0;      // m/s
 constexpr double kGyroBiasInMotion = 0.05;  // rad/s
+constexpr double kKnownPlace = 1e-3;        // m
+constexpr double kKnownTheta = 3e-4;        // rad
+constexpr double kSpeedAtRest = 0.01;       // m/s
 constexpr double kLongestGap = 0.03;        // s between samples over which a motion is followed
 
 void SetBlock(int block, double sigma, ErrorCovariance* P) {
   P->block<3, 3>(block, block) = sigma * sigma * Eigen::Matrix3d::Identity();
+}
+
+/// Gravity may lie anywhere near where the mean force says; its strength is known.
+void OpenInMotion(ErrorCovariance* P) {
+  SetBlock(kGyroBias, kGyroBiasInMotion, P);
+  SetBlock(kGravity, kTiltInMotion, P);
+  (*P)(kGravity + 2, kGravity + 2) = kGravityStrength * kGravityStrength;
+}
+
+/// Attitude of heading `yaw` in which the specific force `f` points up.
+Eigen::Quaterniond Upright(const Eigen::Vector3d& f, double yaw) {
+  const double roll = std::atan2(f.y(), f.z());
+  const double pitch = std::atan2(-f.x(), std::hypot(f.y(), f.z()));
+  return math::FromYaw(yaw) * Eigen::AngleAxisd(pitch, Eigen::Vector3d::UnitY()) *
+         Eigen::AngleAxisd(roll, Eigen::Vector3d::UnitX());
 }
 
 double Spread(const Eigen::Vector3d& squares, const Eigen::Vector3d& mean, double n) {
@@ -29,6 +48,7 @@ double Spread(const Eigen::Vector3d& squares, const Eigen::Vector3d& mean, doubl
 
 void Alignment::Add(const ImuSample& imu) {
   if (window_.empty()) first_t_ = imu.t;
+  if (!all_.empty() && imu.t - all_.back().t > kLongestGap) all_.clear();
   all_.push_back(imu);
   window_.push_back(imu);
   while (window_.size() > kFewestSamples && imu.t - window_[1].t >= config_.duration)
@@ -75,9 +95,7 @@ void Alignment::SetBiases(const FilterConfig& filter, NavState* state) const {
     state->gyro_bias = statistics().mean.gyro;
     return CoupleTiltAndBias(filter, state);
   }
-  SetBlock(kGyroBias, kGyroBiasInMotion, &state->P);
-  SetBlock(kGravity, kTiltInMotion, &state->P);
-  state->P(kGravity + 2, kGravity + 2) = kGravityStrength * kGravityStrength;
+  OpenInMotion(&state->P);
 }
 
 /// At rest only f = b - R^T g is known, and |g|. Along gravity that gives the bias; across it, an
@@ -102,42 +120,66 @@ void Alignment::CoupleTiltAndBias(const FilterConfig& filter, NavState* state) c
 NavState Alignment::Result(const FilterConfig& filter, const Eigen::Vector3d& p, double yaw) const {
   NavState state;
   const ImuStatistics s = statistics();
-  const Eigen::Vector3d f = s.mean.accel;
-  const double roll = std::atan2(f.y(), f.z());
-  const double pitch = std::atan2(-f.x(), std::hypot(f.y(), f.z()));
   state.t = s.mean.t;
-  state.p = p;
-  state.R_WB = math::FromYaw(yaw) * Eigen::AngleAxisd(pitch, Eigen::Vector3d::UnitY()) *
-               Eigen::AngleAxisd(roll, Eigen::Vector3d::UnitX());
+  state.R_WB = Upright(s.mean.accel, yaw);
   state.g = {0.0, 0.0, -filter.gravity};
-  SetBlock(kP, 1e-3, &state.P);
-  SetBlock(kV, AtRest() ? 0.01 : 2.0, &state.P);
-  SetBlock(kTheta, AtRest() ? 3e-4 : 0.02, &state.P);
+  SetBlock(kP, kKnownPlace, &state.P);
+  SetBlock(kV, kSpeedAtRest, &state.P);
+  SetBlock(kTheta, kKnownTheta, &state.P);
   SetBiases(filter, &state);
-  if (AtRest()) Settle(p, yaw, &state);
+  // A body let down on its legs slides and turns a little before it rests.
+  const NavState first = AtFirst(filter, state);
+  const Eigen::Quaterniond turn = math::FromYaw(yaw - math::Yaw(first.R_WB));
+  state.R_WB = (turn * state.R_WB).normalized();
+  state.p = p + turn * (state.p - first.p);
   return state;
 }
 
-/// A body let down on its legs slides and turns a little before it rests: back from the rest, where
-/// velocity and biases are known, through all samples to the first one, which has the given heading
-/// and position.
-void Alignment::Settle(const Eigen::Vector3d& p, double yaw, NavState* state) const {
-  Eigen::Quaterniond R = state->R_WB;
-  Eigen::Vector3d v = Eigen::Vector3d::Zero(), moved = Eigen::Vector3d::Zero();
+NavState Alignment::InMotion(const FilterConfig& filter, const Eigen::Vector3d& p,
+                             double yaw) const {
+  Eigen::Quaterniond R =
+      Eigen::Quaterniond::Identity();  // from a sample's frame to the first one's
+  Eigen::Vector3d force = all_.front().accel;
+  for (size_t i = 1; i < all_.size(); ++i) {
+    const double dt = all_[i].t - all_[i - 1].t;
+    R = (R * math::ExpSO3(0.5 * dt * (all_[i - 1].gyro + all_[i].gyro))).normalized();
+    force += R * all_[i].accel;
+  }
+  NavState state;
+  state.t = all_.front().t;
+  state.R_WB = Upright(force, yaw);
+  return Opened(filter, p, yaw, state);
+}
+
+NavState Alignment::InMotion(const FilterConfig& filter, const Eigen::Vector3d& p, double yaw,
+                             const NavState& first) const {
+  return Opened(filter, p, yaw, first);
+}
+
+/// The same state with the given place, upright, and all but the place open.
+NavState Alignment::Opened(const FilterConfig& filter, const Eigen::Vector3d& p, double yaw,
+                           NavState state) const {
+  const auto upright = Eigen::Quaterniond::FromTwoVectors(state.g, -Eigen::Vector3d::UnitZ());
+  const Eigen::Quaterniond turn = math::FromYaw(yaw - math::Yaw(upright * state.R_WB)) * upright;
+  state.R_WB = (turn * state.R_WB).normalized();
+  state.v = turn * state.v;
+  state.p = p;
+  state.g = {0.0, 0.0, -filter.gravity};
+  state.P.setZero();
+  SetBlock(kP, kKnownPlace, &state.P);
+  SetBlock(kV, kSpeedInMotion, &state.P);
+  SetBlock(kTheta, kKnownTheta, &state.P);
+  SetBlock(kAccelBias, filter.accel_bias_sigma, &state.P);
+  OpenInMotion(&state.P);
+  return state;
+}
+
+NavState Alignment::AtFirst(const FilterConfig& filter, NavState state) const {
   for (size_t i = all_.size() - 1; i > 0; --i) {
     const ImuSample &from = all_[i - 1], &to = all_[i];
-    const double dt = to.t - from.t;
-    if (dt > kLongestGap) break;
-    const Eigen::Vector3d w = 0.5 * (from.gyro + to.gyro) - state->gyro_bias;
-    const Eigen::Vector3d force = 0.5 * (from.accel + to.accel) - state->accel_bias;
-    const Eigen::Vector3d a = R * math::ExpSO3(-0.5 * dt * w) * force + state->g;
-    R = (R * math::ExpSO3(-dt * w)).normalized();
-    moved += dt * v - 0.5 * dt * dt * a;
-    v -= dt * a;
+    Propagate(filter, {from.t, 0.5 * (from.accel + to.accel), 0.5 * (from.gyro + to.gyro)}, &state);
   }
-  const Eigen::Quaterniond turn = math::FromYaw(yaw - math::Yaw(R));
-  state->R_WB = (turn * state->R_WB).normalized();
-  state->p = p + turn * moved;
+  return state;
 }
 
 NavState Alignment::ResultAt(const FilterConfig& filter, const NavState& known) const {

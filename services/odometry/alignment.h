@@ -39,24 +39,37 @@ class Alignment {
   bool AtRest() const { return AtRest(statistics()); }
   ImuStatistics statistics() const { return Statistics(0, window_.size()); }
 
-  /// State at the last sample, level, of a body that had heading `yaw` [rad] and position `p` [m,
-  /// frame M] at the first one. In motion the gyro's bias is unknown, up is the mean of the felt
-  /// force, and what it moved since the first sample is not known either.
+  /// State at the last sample, level, of a body at rest that had heading `yaw` [rad] and position
+  /// `p` [m, frame M] at the first one.
   NavState Result(const FilterConfig& filter, const Eigen::Vector3d& p, double yaw) const;
 
-  /// The same for a body whose pose and velocity are known from sweeps: only gravity is found.
+  /// State at the first sample of a body in motion, which had that heading and position then. Up is
+  /// the mean of the felt force; velocity, biases and gravity's direction are open.
+  NavState InMotion(const FilterConfig& filter, const Eigen::Vector3d& p, double yaw) const;
+  /// The same, as open, about what `first` says of that sample.
+  NavState InMotion(const FilterConfig& filter, const Eigen::Vector3d& p, double yaw,
+                    const NavState& first) const;
+
+  /// `last`, a state at the last sample, taken back to the first one.
+  NavState AtFirst(const FilterConfig& filter, NavState last) const;
+  const std::vector<ImuSample>& samples() const { return all_; }
+  /// Since when the samples count as of a body at rest [s].
+  double window_start() const { return window_.front().t; }
+
+  /// State of a body whose pose and velocity are known from sweeps: only gravity is found.
   NavState ResultAt(const FilterConfig& filter, const NavState& known) const;
 
  private:
   ImuStatistics Statistics(size_t begin, size_t end) const;
   bool AtRest(const ImuStatistics& s) const;
-  void Settle(const Eigen::Vector3d& p, double yaw, NavState* state) const;
+  NavState Opened(const FilterConfig& filter, const Eigen::Vector3d& p, double yaw,
+                  NavState state) const;
   void SetBiases(const FilterConfig& filter, NavState* state) const;
   void CoupleTiltAndBias(const FilterConfig& filter, NavState* state) const;
 
   AlignmentConfig config_;
   double first_t_ = 0.0;
-  std::vector<ImuSample> all_;    // since the start
+  std::vector<ImuSample> all_;    // since the start, or the last gap
   std::deque<ImuSample> window_;  // the newest
 };
 

@@ -87,23 +87,34 @@ Eigen::MatrixXd FromUnknown(const PoseMeasurement& z, const Eigen::LDLT<Eigen::M
 }  // namespace
 
 void Propagate(const FilterConfig& config, const ImuSample& imu, NavState* state) {
-  const double dt = imu.t - state->t;
-  if (!(dt > 0.0)) return;
+  const double dt = imu.t - state->t, length = std::abs(dt);
+  if (!(length > 0.0)) return;
   const Eigen::Vector3d w = imu.gyro - state->gyro_bias;
   const Eigen::Quaterniond middle = state->R_WB * ExpSO3(0.5 * dt * w);
   const Eigen::Vector3d force_W = middle * (imu.accel - state->accel_bias);
   const Eigen::Vector3d a = force_W + state->g;
   PropagateCovariance(middle.toRotationMatrix(), force_W, dt, &state->P);
-  AddDiagonal(kV, config.accel_noise * config.accel_noise * dt, &state->P);
-  AddDiagonal(kTheta, config.gyro_noise * config.gyro_noise * dt, &state->P);
-  AddDiagonal(kGyroBias, config.gyro_bias_walk * config.gyro_bias_walk * dt, &state->P);
-  AddDiagonal(kAccelBias, config.accel_bias_walk * config.accel_bias_walk * dt, &state->P);
+  AddDiagonal(kV, config.accel_noise * config.accel_noise * length, &state->P);
+  AddDiagonal(kTheta, config.gyro_noise * config.gyro_noise * length, &state->P);
+  AddDiagonal(kGyroBias, config.gyro_bias_walk * config.gyro_bias_walk * length, &state->P);
+  AddDiagonal(kAccelBias, config.accel_bias_walk * config.accel_bias_walk * length, &state->P);
   state->p += dt * state->v + 0.5 * dt * dt * a;
   state->v += dt * a;
   state->R_WB = (state->R_WB * ExpSO3(dt * w)).normalized();
   state->w_B = w;
   state->a = a;
   state->t = imu.t;
+}
+
+void AddUnsampled(const FilterConfig& config, const ImuSample& from, const ImuSample& to, double dt,
+                  NavState* state) {
+  const auto variance = [&](const Eigen::Vector3d& change, double noise) {
+    const double unexplained = change.squaredNorm() / 3.0 - 2.0 * noise * noise / dt;
+    return dt * dt / 12.0 * std::max(0.0, unexplained);
+  };
+  if (!(dt > 0.0)) return;
+  AddDiagonal(kV, variance(to.accel - from.accel, config.accel_noise), &state->P);
+  AddDiagonal(kTheta, variance(to.gyro - from.gyro, config.gyro_noise), &state->P);
 }
 
 void PropagateBlind(const FilterConfig& config, double t, NavState* state) {

@@ -69,7 +69,15 @@ struct NavState {
 
 /// Advances to `imu.t` under constant specific force and angular velocity. Solà 2017, "Quaternion
 /// kinematics for the error-state Kalman filter", section 5, with the rotation error on the left.
+/// A sample before the state's time takes it back there.
 void Propagate(const FilterConfig& config, const ImuSample& imu, NavState* state);
+
+/// What may have passed between two samples `dt` s apart: a change from one to the other that noise
+/// does not explain may have come at any time between, so their mean times dt has the variance
+/// (change dt)^2 / 12 (uniform distribution). Legs that hit the ground shock faster than one
+/// samples.
+void AddUnsampled(const FilterConfig& config, const ImuSample& from, const ImuSample& to, double dt,
+                  NavState* state);
 
 /// Advances to `t` at constant velocity and angular velocity: all one can do while the IMU is
 /// silent.

@@ -35,7 +35,9 @@ bool ImuBuffer::Covered(double from, double to) const {
 void ImuBuffer::Step(double t, NavState* state) const {
   if (!Covered(state->t, t)) return PropagateBlind(filter_, t, state);
   const ImuSample a = At(state->t), b = At(t);
+  const double dt = t - state->t;
   Propagate(filter_, {t, 0.5 * (a.accel + b.accel), 0.5 * (a.gyro + b.gyro)}, state);
+  AddUnsampled(filter_, a, b, dt, state);
 }
 
 void ImuBuffer::Advance(double t, NavState* state, std::vector<NavState>* track) const {

@@ -16,6 +16,7 @@ constexpr double kUsualGap = 0.25;      // s between sweeps that were of use
 constexpr double kHoldLag = 0.15;       // s for which a sweep may still come while it stands
 constexpr double kLeastTurn = 1e-2;     // of known directions that is one found
 constexpr double kAtTheOrigin = 1e-4;   // m, rad: a body in a map that begins there
+constexpr size_t kMostKept = 32;        // sweeps that wait for the alignment
 
 Pose ExtrinsicsOf(const world::Rig& rig) {
   return {Eigen::Quaterniond(rig.R_BL()), rig.lidar_position};
@@ -103,49 +104,21 @@ std::optional<PoseEstimate> Odometry::AddImu(const ImuSample& imu) {
   return Estimate();
 }
 
-std::optional<PoseEstimate> Odometry::Align(const ImuSample& imu) {
-  aligning_ = true;
-  alignment_.Add(imu);
-  const bool was_started = started_;
-  if (alignment_.Complete()) {
-    if (started_) PropagateBlind(config_.filter, imu.t, &base_);
-    base_ = started_ ? alignment_.ResultAt(config_.filter, base_)
-                     : alignment_.Result(config_.filter, config_.initial_position,
-                                         config_.initial_yaw_deg * M_PI / 180.0);
-    if (!started_) health_.OnStarted(alignment_.AtRest(), held_ = imu.t);
-    if (!started_ && !alignment_.AtRest()) sweeps_to_anchor_ = 2;
-    if (!started_ && alignment_.AtRest()) {
-      const ImuStatistics rest = alignment_.statistics();
-      standing_.Begin(rest.mean, rest.accel_spread, rest.gyro_spread, base_.p);
-    }
-    const bool was_blind = started_;
-    const Pose shown = level_.ToWorld(base_.pose());
-    live_ = base_;
-    level_.SetGravity(base_.g);
-    if (was_blind) blend_.Absorb(shown, base_.v, level_.ToWorld(base_.pose()), base_.v);
-    fused_ = started_ = true;
-    imu_.DropBefore(base_.t);
-    return Estimate();
-  }
-  if (was_started) return std::nullopt;
-  live_.t = held_ = imu.t;
-  live_.p = config_.initial_position;
-  live_.R_WB = math::FromYaw(config_.initial_yaw_deg * M_PI / 180.0);
-  return Estimate();
-}
-
 void Odometry::AddSweep(Sweep sweep) {
-  const bool wait_for_alignment = aligning_ && !started_;
-  if (wait_for_alignment || !std::isfinite(sweep.start)) {
+  if (!std::isfinite(sweep.start)) {
     ++dropped_sweeps_;
     return;
+  }
+  if (Aligns() && pending_.size() >= kMostKept) {
+    pending_.pop_front();
+    ++dropped_sweeps_;
   }
   const double end = sweep.start + LastTime(sweep.points);
   pending_.push_back({std::move(sweep), imu_.newest(), end});
 }
 
 bool Odometry::SweepReady() const {
-  if (pending_.empty()) return false;
+  if (pending_.empty() || Aligns()) return false;
   if (!fused_ || pending_.size() > 1) return true;
   const double end = pending_.front().end;
   return imu_.newest() >= end || imu_.newest() < end - kWaitForImu;
@@ -163,7 +136,7 @@ SweepResult Odometry::ProcessSweep() {
   if (first) result.match.valid = true;
   const bool applied = first || Apply(prepared, &result.match);
   if (!applied) base_ = prepared.inertial;
-  if (!applied && UncertaintyOf(prepared.predicted) > config_.match.gate) {
+  if ((first || !applied) && UncertaintyOf(prepared.predicted) > config_.match.gate) {
     base_ = prepared.predicted;
     RestartMap();
     first = true;
@@ -175,10 +148,6 @@ SweepResult Odometry::ProcessSweep() {
   if (blind && applied && !first)
     base_.w_B = math::LogSO3(prepared.track.front().R_WB.conjugate() * base_.R_WB) /
                 std::max(1e-3, prepared.end - prepared.track.front().t);
-  if (sweeps_to_anchor_ > 0 && applied && !first && --sweeps_to_anchor_ == 0) {
-    planes_.Clear();
-    posts_.Clear();
-  }
   const bool extends = !first && Extends(result.match);
   if (extends) unknown_.setIdentity();
   if (applied || planes_.cells() == 0 || extends) Learn(prepared, base_.pose());
@@ -208,10 +177,7 @@ bool Odometry::Prepare(Pending pending, Prepared* prepared) {
     ++dropped_sweeps_;
     return false;
   }
-  prepared->sweep = std::move(sweep);
-  prepared->features = ExtractFeatures(config_.features, prepared->sweep.points);
-  prepared->matched_planes =
-      thinning_.Evenly(prepared->sweep.points, prepared->features.planes, config_.match_points);
+  Extract(std::move(sweep), prepared);
   prepared->track = {base_};
   prepared->predicted = base_;
   imu_.Advance(prepared->end, &prepared->predicted, &prepared->track);
@@ -219,6 +185,13 @@ bool Odometry::Prepare(Pending pending, Prepared* prepared) {
   prepared->predicted = Doubted(prepared->predicted);
   Deskew(prepared);
   return true;
+}
+
+void Odometry::Extract(Sweep sweep, Prepared* prepared) {
+  prepared->sweep = std::move(sweep);
+  prepared->features = ExtractFeatures(config_.features, prepared->sweep.points);
+  prepared->matched_planes =
+      thinning_.Evenly(prepared->sweep.points, prepared->features.planes, config_.match_points);
 }
 
 void Odometry::Deskew(Prepared* prepared) const {
@@ -310,17 +283,31 @@ void Odometry::FollowDrift(const MatchResult& match) {
 /// The map is of no use to a body that may be farther off than a match reaches. A new one begins at
 /// the pose as it is believed; what that may be off is from now on the error of the map.
 void Odometry::RestartMap() {
-  drift_.Restart(drift_.covariance() + PlaceCovariance(PosePart(base_)));
-  for (const int row : {kP + 0, kP + 1, kP + 2, kTheta + 2}) {
-    base_.P.row(row).setZero();
-    base_.P.col(row).setZero();
-    base_.P(row, row) = kAtTheOrigin * kAtTheOrigin;
-  }
+  PlaceMap(base_);
+  BeginMapHere();
+  held_ = base_.t;
+  ++epoch_;
+}
+
+/// The map lies as far astray as `state` may be off, besides what it was.
+void Odometry::PlaceMap(const NavState& state) {
+  drift_.Restart(drift_.covariance() + PlaceCovariance(PosePart(state)));
+}
+
+void Odometry::BeginMapHere() {
+  PutAtOrigin(&base_);
   planes_.Clear();
   posts_.Clear();
   unknown_.setZero();
-  held_ = base_.t;
-  ++epoch_;
+}
+
+/// In a map that begins at the body it is by definition where it is believed to be.
+void Odometry::PutAtOrigin(NavState* state) {
+  for (const int row : {kP + 0, kP + 1, kP + 2, kTheta + 2}) {
+    state->P.row(row).setZero();
+    state->P.col(row).setZero();
+    state->P(row, row) = kAtTheOrigin * kAtTheOrigin;
+  }
 }
 
 /// While no sweep comes, a body that stands is held by that alone.

@@ -94,8 +94,17 @@ class Odometry {
   };
 
   std::optional<PoseEstimate> Align(const ImuSample& imu);
+  void Join(double t);
+  void StartAtRest(double t);
+  void StartInMotion(double t);
+  bool SweepsShowMotion();
+  void Follow(Pending pending, NavState placed);
+  void Begin(double t);
+  bool Aligns() const { return aligning_ && !started_; }
+  double InitialYaw() const { return config_.initial_yaw_deg * M_PI / 180.0; }
   void StartBlind(double t);
   bool Prepare(Pending pending, Prepared* prepared);
+  void Extract(Sweep sweep, Prepared* prepared);
   void Deskew(Prepared* prepared) const;
   Features FeaturesIn(const Prepared& prepared, const std::vector<Eigen::Vector3f>& points) const;
   std::vector<Eigen::Vector3f> Axes(const Prepared& prepared,
@@ -110,6 +119,9 @@ class Odometry {
   void Learn(const Prepared& prepared, const Pose& X_WB);
   void FollowDrift(const MatchResult& match);
   void RestartMap();
+  void PlaceMap(const NavState& state);
+  void BeginMapHere();
+  static void PutAtOrigin(NavState* state);
   void CarryUnknown(const MatchResult& match, const NavState& prior);
   void HoldBetweenSweeps(double t);
   NavState Doubted(NavState state) const;
@@ -133,9 +145,8 @@ class Odometry {
   bool fused_ = false;    // the IMU carries the state
   bool started_ = false;  // there is a state at all
   bool aligning_ = false;
-  int sweeps_to_anchor_ = 0;  // after a start in motion the map begins again this many sweeps later
-  NavState base_;             // at the end of the last sweep
-  NavState live_;             // at the newest sample
+  NavState base_;  // at the end of the last sweep
+  NavState live_;  // at the newest sample
   std::deque<Pending> pending_;
   std::optional<Prepared> first_;  // of a start without IMU, until the velocity is known
   Thinning thinning_;

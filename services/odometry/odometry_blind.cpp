@@ -17,7 +17,7 @@ constexpr double kUnknown = 1e3;  // m, an uncertainty that leaves the gate wide
 void Odometry::StartBlind(double t) {
   base_.t = t;
   base_.p = config_.initial_position;
-  base_.R_WB = math::FromYaw(config_.initial_yaw_deg * M_PI / 180.0);
+  base_.R_WB = math::FromYaw(InitialYaw());
   base_.P.setZero();
   base_.P.diagonal().segment<3>(kP).setConstant(1e-6);
   base_.P.diagonal().segment<3>(kV).setConstant(100.0);

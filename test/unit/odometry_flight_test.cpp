@@ -64,6 +64,19 @@ TEST(OdometryFlight, StandingStillDoesNotDrift) {
   EXPECT_LT(FlyDefault(course).WorstPosition(), 0.005);
 }
 
+/// To the inertial unit a body that slides evenly is one at rest; the sweeps tell.
+TEST(OdometryFlight, OneThatSlidesWhileItAlignsIsNotTakenForOneAtRest) {
+  for (const double speed : {0.1, 0.6, 1.5}) {
+    Course course = ShortCourse();
+    course.duration = 3.0;
+    course.flight.start = {-2.0, 2.0, 0.2};
+    course.flight.slide = speed * Eigen::Vector3d(0.8, -0.6, 0.0);
+    const CourseResult result = FlyDefault(course);
+    EXPECT_LT(result.WorstPosition(1.0), 0.06) << speed;
+    EXPECT_LT(result.VelocityRms(1.0), 0.1) << speed;
+  }
+}
+
 TEST(OdometryFlight, SweepsAloneSuffice) {
   Course course;
   course.duration = 10.0;

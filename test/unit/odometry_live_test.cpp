@@ -73,6 +73,29 @@ TEST(OdometryLive, StartsAnywhere) {
   }
 }
 
+/// On ground this steep a leg of the level body is in the ground at power-on: it is thrown off and
+/// coasts while the alignment runs.
+TEST(OdometryLive, StartsOnGroundThatThrowsItOff) {
+  std::vector<LiveFigures> flights;
+  for (int seed = 1; seed <= Layouts(2); ++seed) {
+    world::Random random(static_cast<uint64_t>(seed), 6);
+    const double way = random.Uniform(-M_PI, M_PI);
+    world::Scenario scenario = trial::Meadow(60, 0.05, static_cast<uint64_t>(seed));
+    scenario.world.ground.slope = 0.21 * Eigen::Vector2d(std::cos(way), std::sin(way));
+    Eigen::Vector3d& start = scenario.chaser.start;
+    start.z() += scenario.world.ground.slope.dot(start.head<2>());
+    LiveOptions options;
+    options.seed = seed;
+    options.duration = 8.0;
+    options.judge_from = 1.0;
+    flights.push_back(Shown(fmt::format("steep, seed {}", seed), FlyLive(scenario, options)));
+    EXPECT_LT(flights.back().worst, 0.1) << seed;
+    EXPECT_LT(flights.back().end, 0.05) << seed;
+    EXPECT_EQ(flights.back().lost, 0) << seed;
+  }
+  ExpectHonest(flights, 0.95, 6.0);
+}
+
 TEST(OdometryLive, BareStreetIsSaidToHoldNothingAlongIt) {
   std::vector<LiveFigures> flights;
   for (int seed = 1; seed <= Layouts(3); ++seed)

@@ -30,6 +30,46 @@ SensorModel Noiseless() {
   return model;
 }
 
+TEST(Filter, GoesBackTheWayItCame) {
+  Noise noise(12);
+  for (int trial = 0; trial < 20; ++trial) {
+    NavState start;
+    start.v = noise.Vector(2.0);
+    start.R_WB = math::ExpSO3(noise.Vector(0.5));
+    NavState state = start;
+    const Eigen::Vector3d accel = noise.Vector(3.0), gyro = noise.Vector(1.0);
+    for (int i = 1; i <= 100; ++i) Propagate(FilterConfig{}, {0.005 * i, accel, gyro}, &state);
+    for (int i = 99; i >= 0; --i) Propagate(FilterConfig{}, {0.005 * i, accel, gyro}, &state);
+    EXPECT_LT((state.p - start.p).norm(), 1e-9);
+    EXPECT_LT((state.v - start.v).norm(), 1e-9);
+    EXPECT_LT(math::LogSO3(state.R_WB * start.R_WB.conjugate()).norm(), 1e-9);
+    EXPECT_GT(state.P(kV, kV), 0.0);
+  }
+}
+
+/// A force or rate that changes at once, some time between two samples, against what their mean
+/// makes of it.
+TEST(Filter, WhatPassesBetweenSamplesIsDoubted) {
+  constexpr double dt = 0.005;
+  Noise noise(13);
+  const ImuSample from{0.0, Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero()};
+  const ImuSample to{dt, noise.Vector(30.0), noise.Vector(3.0)};
+  NavState state;
+  AddUnsampled(FilterConfig{}, from, to, dt, &state);
+  double v2 = 0.0, theta2 = 0.0;
+  constexpr int n = 10000;
+  for (int i = 0; i < n; ++i) {
+    const double after = (i + 0.5) / n - 0.5;  // share of dt beyond the middle
+    v2 += std::pow(after * dt, 2) * to.accel.squaredNorm() / n;
+    theta2 += std::pow(after * dt, 2) * to.gyro.squaredNorm() / n;
+  }
+  EXPECT_NEAR((state.P.block<3, 3>(kV, kV).trace()) / v2, 1.0, 0.02);
+  EXPECT_NEAR((state.P.block<3, 3>(kTheta, kTheta).trace()) / theta2, 1.0, 0.02);
+  NavState quiet;
+  AddUnsampled(FilterConfig{}, from, {dt, {0.02, 0.01, 0.0}, {0.002, 0.0, 0.001}}, dt, &quiet);
+  EXPECT_EQ(quiet.P.norm(), 0.0);  // that is noise
+}
+
 TEST(Deskew, SweepTakenInMotionMatchesSweepTakenAtRestAtItsEnd) {
   Hall hall;
   hall.pillars.clear();

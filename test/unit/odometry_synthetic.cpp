@@ -50,7 +50,7 @@ double Hall::Cast(const Eigen::Vector3d& from, const Eigen::Vector3d& direction)
 Pose Flight::X_WB(double t) const {
   const double s = std::max(0.0, t - rest);
   const double blend = SmoothStep(s / kRamp);
-  Eigen::Vector3d p = start;
+  Eigen::Vector3d p = start + t * slide;
   for (int i = 0; i < 3; ++i) p[i] += blend * amplitude[i] * std::sin(rate[i] * s);
   p.z() += climb * blend;
   const double yaw = blend * yaw_amplitude * std::sin(yaw_rate * s);

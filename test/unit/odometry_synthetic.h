@@ -47,6 +47,7 @@ struct Flight {
   double climb = 1.0;                           ///< height gained at the start of motion, m
   double yaw_amplitude = 1.2, yaw_rate = 0.25;  ///< rad, rad/s
   double tilt_amplitude = 0.08, tilt_rate = 2.0;
+  Eigen::Vector3d slide = Eigen::Vector3d::Zero();  ///< from power-on, besides, m/s
 
   Pose X_WB(double t) const;
   Eigen::Vector3d Velocity(double t) const;
