@@ -8,10 +8,10 @@ void CollisionWatch::Add(const truth_t& truth) {
   if (time_) return;
   if (!start_) start_ = logs::MissionStart(truth);
   logs::TruthSample sample = logs::ToSample(truth, *start_);
-  sample.may_stand = may_stand_;
+  sample.may_stand = logs::MayStand(state_, sample.speed);
   if (record_.InMission(sample.t) && !score_(sample).Safe()) time_ = sample.t;
 }
 
-void CollisionWatch::Add(const flight_state_t& state) { may_stand_ = logs::MayStand(state.state); }
+void CollisionWatch::Add(const flight_state_t& state) { state_ = state.state; }
 
 }  // namespace chase::flight

@@ -27,7 +27,7 @@ class CollisionWatch {
   logs::Scorer score_;
   logs::FlightRecord record_;     // of the scenario alone; says when the mission lasts
   std::optional<int64_t> start_;  // mission time zero, microseconds
-  bool may_stand_ = false;
+  int state_ = -1;  // of flight_state_t, once it is heard
   std::optional<double> time_;
 };
 

@@ -19,14 +19,15 @@ struct TruthSample {
   double t = 0.0;
   Eigen::Vector3d p = Eigen::Vector3d::Zero();       ///< p_WB
   Eigen::Vector3d a = Eigen::Vector3d::Zero();       ///< a_WB, m/s^2
+  double speed = 0.0;                                ///< |v_WB|, m/s
   double yaw = 0.0;                                  ///< of the body, rad
   Eigen::Vector3d target = Eigen::Vector3d::Zero();  ///< p_WT
   double target_yaw = 0.0;                           ///< of its carrier, rad
   Eigen::Vector2d target_px = Eigen::Vector2d::Zero();
   bool target_in_image = false;
   double visible_share = 0.0;  ///< of the target's pixels in the last image
-  /// The flight's state has it on the ground, or on the way from or to it: touching that is no
-  /// harm.
+  /// The flight's state has it on the ground, or on the way from or to it, in an emergency slowly:
+  /// touching that is no harm.
   bool may_stand = false;
 };
 

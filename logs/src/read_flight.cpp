@@ -107,7 +107,7 @@ class Gatherer {
     size_t next = 0;
     for (TruthSample& s : record->truth) {
       while (next < record->states.size() && record->states[next].t <= s.t) ++next;
-      s.may_stand = next > 0 && MayStand(record->states[next - 1].state);
+      s.may_stand = next > 0 && MayStand(record->states[next - 1].state, s.speed);
     }
   }
 
@@ -187,7 +187,9 @@ int64_t MissionStart(const truth_t& truth) {
   return truth.utime - std::llround(truth.mission_time * 1e6);
 }
 
-bool MayStand(int state) {
+bool MayStand(int state, double speed) {
+  constexpr double kTouchdown = 0.75;  // m/s: as fast as control sinks without a velocity
+  if (state == flight_state_t::EMERGENCY) return speed <= kTouchdown;
   return state == flight_state_t::IDLE || state == flight_state_t::READY ||
          state == flight_state_t::TAKEOFF || state == flight_state_t::LAND ||
          state == flight_state_t::DONE;
@@ -198,6 +200,7 @@ TruthSample ToSample(const truth_t& m, int64_t start) {
   s.t = bus::Seconds(m.utime, start);
   s.p = bus::ToVector(m.pos);
   s.a = bus::ToVector(m.accel);
+  s.speed = bus::ToVector(m.vel).norm();
   s.yaw = Yaw(m.orientation);
   s.target_yaw = m.target_yaw;
   s.target = bus::ToVector(m.target_pos);

@@ -4,8 +4,10 @@
 #include <nlohmann/json.hpp>
 #include <random>
 
+#include "chase/flight_state_t.hpp"
 #include "logs/src/estimate_errors.h"
 #include "logs/src/metrics.h"
+#include "logs/src/read_flight.h"
 
 namespace chase::logs {
 namespace {
@@ -96,6 +98,13 @@ TEST(Metrics, ALandingIsJudgedByItsSpeedAndTheGroundIsNoHarm) {
   EXPECT_FALSE(Compute(other).criteria.at("flight_states")) << "not in that order";
   other.states.pop_back();
   EXPECT_FALSE(Compute(other).criteria.at("touchdown_speed")) << "it never was down";
+}
+
+TEST(Metrics, ATouchOfTheGroundIsALandingByTheFlightsState) {
+  EXPECT_TRUE(MayStand(flight_state_t::LAND, 3.0));
+  EXPECT_TRUE(MayStand(flight_state_t::EMERGENCY, 0.7)) << "as control sinks without a velocity";
+  EXPECT_FALSE(MayStand(flight_state_t::EMERGENCY, 0.8));
+  EXPECT_FALSE(MayStand(flight_state_t::CHASE, 0.1));
 }
 
 TEST(Metrics, ASegmentThroughThePillarIsBlind) {
