@@ -44,6 +44,8 @@ class HealthMonitor {
   /// A sweep that ended at `end` with `returns` usable points while the newest IMU sample was of
   /// `imu_t` (the same as `end` where there is no IMU).
   void OnSweep(double end, int returns, double imu_t, bool imu_silent);
+  /// The sweep's stamps were off and have been put right.
+  void OnClock() { sweep_problem_ = "the LiDAR's clock is not the IMU's"; }
   void OnMatch(double end, const MatchResult& match, bool applied);
 
   /// `position_sigma`: of the place in the local map, m; `velocity_sigma`: m/s. Where sweeps hold

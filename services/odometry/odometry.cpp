@@ -22,11 +22,6 @@ Pose ExtrinsicsOf(const world::Rig& rig) {
   return {Eigen::Quaterniond(rig.R_BL()), rig.lidar_position};
 }
 
-bool Plausible(const ImuSample& imu) {
-  return imu.accel.allFinite() && imu.gyro.allFinite() && imu.accel.norm() < 400.0 &&
-         imu.gyro.norm() < 100.0;
-}
-
 double LastTime(const std::vector<SweepPoint>& points) {
   float last = 0.0f;
   for (const SweepPoint& point : points) last = std::max(last, point.t);
@@ -77,22 +72,22 @@ Odometry::Odometry(const OdometryConfig& config)
       planes_(config.map, SurfaceKind::kPlane),
       posts_(config.map, SurfaceKind::kLine),
       imu_(config.filter, config.health.imu_gap),
+      spikes_(config.spikes),
       alignment_(config.alignment),
       level_(config.initial_position),
       drift_(config.drift),
       blend_(config.blend),
+      biases_(config.filter),
       health_(config.health) {}
 
 std::optional<PoseEstimate> Odometry::AddImu(const ImuSample& imu) {
-  if (!Plausible(imu) || imu.t <= imu_.newest()) {
+  if (!imu.accel.allFinite() || !imu.gyro.allFinite() || imu.t <= heard_) {
     ++dropped_samples_;
     return std::nullopt;
   }
-  const double previous = imu_.newest();
-  imu_.Add(imu);
-  if (!fused_) return Align(imu);
-  health_.OnImu(imu.t, previous);
-  standing_.Add(imu, live_);
+  heard_ = imu.t;
+  for (const ImuSample& sample : spikes_.Take(imu)) Take(sample);
+  if (!fused_) return started_ ? std::nullopt : std::optional(AtPowerOn(imu.t));
   const double dt = imu.t - live_.t;
   imu_.Advance(imu.t, &live_);
   blend_.Decay(dt);
@@ -104,6 +99,14 @@ std::optional<PoseEstimate> Odometry::AddImu(const ImuSample& imu) {
   return Estimate();
 }
 
+void Odometry::Take(const ImuSample& imu) {
+  const double previous = imu_.newest();
+  imu_.Add(imu);
+  if (!fused_) return Align(imu);
+  health_.OnImu(imu.t, previous);
+  standing_.Add(imu, live_);
+}
+
 void Odometry::AddSweep(Sweep sweep) {
   if (!std::isfinite(sweep.start)) {
     ++dropped_sweeps_;
@@ -113,7 +116,11 @@ void Odometry::AddSweep(Sweep sweep) {
     pending_.pop_front();
     ++dropped_sweeps_;
   }
-  const double end = sweep.start + LastTime(sweep.points);
+  double end = sweep.start + LastTime(sweep.points);
+  if (!imu_.empty()) {
+    const double correction = clock_.Correction(end, imu_.newest());
+    sweep.start += correction, end += correction;
+  }
   pending_.push_back({std::move(sweep), imu_.newest(), end});
 }
 
@@ -150,7 +157,8 @@ SweepResult Odometry::ProcessSweep() {
                 std::max(1e-3, prepared.end - prepared.track.front().t);
   const bool extends = !first && Extends(result.match);
   if (extends) unknown_.setIdentity();
-  if (applied || planes_.cells() == 0 || extends) Learn(prepared, base_.pose());
+  if ((applied && !biases_.undecided()) || planes_.cells() == 0 || extends)
+    Learn(prepared, base_.pose());
   if (applied && !first) FollowDrift(result.match);
   Catchup();
   result.registered = Registered(prepared);
@@ -169,6 +177,7 @@ bool Odometry::Prepare(Pending pending, Prepared* prepared) {
   if (!started_) return false;
   const bool silent = fused_ && imu_.newest() < prepared->end - kWaitForImu;
   health_.OnSweep(prepared->end, returns, fused_ ? pending.imu_t : prepared->end, silent);
+  if (clock_.stepped()) health_.OnClock();
   if (returns == 0) {
     health_.OnMatch(prepared->end, MatchResult{}, false);
     return false;
@@ -227,12 +236,21 @@ MatchResult Odometry::Match(Prepared* prepared) {
 }
 
 bool Odometry::Apply(const Prepared& prepared, MatchResult* match) {
-  if (!match->valid) return false;
+  if (!match->valid) {
+    biases_.Forget();
+    return false;
+  }
   NavState state = prepared.predicted;
   standing_.See(match->X_WB.p);
   if (standing_.holds()) HoldStill(standing_.gyro(), &state);
-  const UpdateResult update =
-      Update(config_.filter, {match->X_WB, match->known, match->information}, &state);
+  const PoseMeasurement z{match->X_WB, match->known, match->information};
+  UpdateResult update = Update(config_.filter, z, &state);
+  if (health_.started() && !Blind(prepared.end)) {
+    if (const auto stepped = biases_.Judge(imu_, prepared.track.front(), prepared.end, z, update)) {
+      state = *stepped;
+      update = {true, 0.0, 0.0};
+    }
+  }
   match->nis = update.nis;
   match->misfit = update.nis > config_.filter.largest_nis;
   if (!update.applied) return false;
@@ -339,50 +357,6 @@ void Odometry::Catchup() {
   const Eigen::Vector3d shown_v = level_.R_WM() * before.v;
   level_.SetGravity(live_.g);
   blend_.Absorb(shown, shown_v, level_.ToWorld(live_.pose()), level_.R_WM() * live_.v);
-}
-
-RegisteredSweep Odometry::Registered(const Prepared& prepared) const {
-  const Pose X_WB = level_.ToWorld(base_.pose());
-  RegisteredSweep out;
-  out.t = prepared.end;
-  out.epoch = epoch_;
-  out.X_WL = X_WB * X_BL_;
-  const FloatPose to_world(X_WB);
-  const size_t n = prepared.at_end.size();
-  out.x.resize(n), out.y.resize(n), out.z.resize(n), out.intensity.resize(n), out.ring.resize(n);
-  for (size_t i = 0; i < n; ++i) {
-    const Eigen::Vector3f p = to_world * prepared.at_end[i];
-    out.x[i] = p.x(), out.y[i] = p.y(), out.z[i] = p.z();
-    out.intensity[i] = prepared.sweep.points[i].intensity;
-    out.ring[i] = prepared.sweep.points[i].ring;
-  }
-  return out;
-}
-
-PoseEstimate Odometry::Estimate() const {
-  PoseEstimate out;
-  out.t = live_.t;
-  out.X_WB = blend_.Applied(level_.ToWorld(live_.pose()));
-  out.v = blend_.AppliedVelocity(level_.R_WM() * live_.v);
-  out.w_B = live_.w_B;
-  out.a = level_.R_WM() * live_.a;
-  out.gyro_bias = live_.gyro_bias;
-  out.accel_bias = live_.accel_bias;
-  const NavState doubted = Doubted(live_);
-  out.covariance = level_.CovarianceInWorld(doubted);
-  out.covariance += blend_.rest() * blend_.rest().transpose();
-  out.local_covariance = doubted.P.topLeftCorner<9, 9>();
-  out.covariance.topLeftCorner<3, 3>() += drift_.covariance().topLeftCorner<3, 3>();
-  out.covariance.block<3, 1>(0, 8) += drift_.covariance().topRightCorner<3, 1>();
-  out.covariance.block<1, 3>(8, 0) += drift_.covariance().bottomLeftCorner<1, 3>();
-  out.covariance(8, 8) += drift_.covariance()(3, 3);
-  const double sigma = std::sqrt(std::max(0.0, doubted.P.topLeftCorner<3, 3>().trace()));
-  const double speed_sigma = std::sqrt(std::max(0.0, doubted.P.block<3, 3>(3, 3).trace()));
-  // Without an inertial unit the velocity is what the last sweeps showed, and doubted accordingly.
-  out.health = health_.At(live_.t, sigma, Blind(live_.t) ? 0.0 : speed_sigma);
-  out.correcting = blend_.correcting();
-  out.epoch = epoch_;
-  return out;
 }
 
 }  // namespace chase::odometry

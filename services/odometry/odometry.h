@@ -6,11 +6,14 @@
 #include <string>
 #include <vector>
 
+#include "services/odometry/bias_watch.h"
 #include "services/odometry/deskew.h"
 #include "services/odometry/imu_buffer.h"
 #include "services/odometry/level_frame.h"
 #include "services/odometry/odometry_config.h"
+#include "services/odometry/spike_filter.h"
 #include "services/odometry/standing.h"
+#include "services/odometry/sweep_clock.h"
 
 namespace chase::odometry {
 
@@ -93,7 +96,9 @@ class Odometry {
     std::vector<Eigen::Vector3f> at_end;  // the points deskewed by the track: frame B at the end
   };
 
-  std::optional<PoseEstimate> Align(const ImuSample& imu);
+  void Take(const ImuSample& imu);
+  void Align(const ImuSample& imu);
+  PoseEstimate AtPowerOn(double t);
   void Join(double t);
   void StartAtRest(double t);
   void StartInMotion(double t);
@@ -135,11 +140,14 @@ class Odometry {
   ScanMatcher matcher_;
   SurfaceMap planes_, posts_;
   ImuBuffer imu_;
+  SpikeFilter spikes_;
+  SweepClock clock_;
   Alignment alignment_;
   Standing standing_;
   LevelFrame level_;
   MapDrift drift_;
   CorrectionBlend blend_;
+  BiasWatch biases_;
   HealthMonitor health_;
 
   bool fused_ = false;    // the IMU carries the state
@@ -153,6 +161,7 @@ class Odometry {
   int epoch_ = 0;
   Matrix6d unknown_ = Matrix6d::Zero();  // projector on what the last sweep left to inertia
   double held_ = 0.0;                    // last time that a sweep or standing held the state, s
+  double heard_ = -1e18;                 // of the newest inertial sample, used or not, s
   int64_t dropped_sweeps_ = 0, dropped_samples_ = 0;
 };
 

@@ -9,6 +9,7 @@
 #include "services/odometry/health_monitor.h"
 #include "services/odometry/map_drift.h"
 #include "services/odometry/scan_matcher.h"
+#include "services/odometry/spike_filter.h"
 #include "services/odometry/surface_map.h"
 
 namespace chase::odometry {
@@ -19,6 +20,7 @@ struct OdometryConfig {
   double initial_yaw_deg = 0.0;                                ///< heading at power-on
   int match_points = 3000;  ///< plane features matched per sweep, about
   int map_stride = 2;       ///< every how many-th plane feature the map learns
+  SpikeConfig spikes;
   AlignmentConfig alignment;
   FeatureConfig features;
   MapConfig map;
@@ -35,6 +37,7 @@ struct OdometryConfig {
     v("initial_yaw_deg", initial_yaw_deg, "heading at power-on");
     v("match_points", match_points, "plane features matched per sweep, about");
     v("map_stride", map_stride, "every how many-th plane feature the map learns");
+    v("spikes", spikes, "inertial samples that are left out");
     v("alignment", alignment, "start-up at rest");
     v("features", features, "plane features and posts");
     v("map", map, "local map");

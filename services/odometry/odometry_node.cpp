@@ -20,7 +20,6 @@ Sweep FromMessage(const lidar_scan_t& m, double start) {
 }
 
 constexpr double kMostVariance = 1e6;  // m^2, m^2/s^2, rad^2
-constexpr int kUnderWay = 2;           // sweeps between the sensor and this node
 
 // Another life of the process works in another frame: the number begins with when it began, tenths
 // of a second.
@@ -89,7 +88,6 @@ void OdometryNode::OnImu(const imu_t& m) {
   if (imu_order_.Take(m.utime) == bus::StampOrder::Verdict::kSetBack) {
     BeginAnew();
     scan_order_ = {};
-    old_sweeps_ = kUnderWay;
   }
   if (odometry_->Outdated(SecondsOf(m.utime))) BeginAnew();
   std::optional<PoseEstimate> pose;
@@ -102,16 +100,13 @@ void OdometryNode::OnImu(const imu_t& m) {
 }
 
 void OdometryNode::OnScan(const lidar_scan_t& m) {
-  if (old_sweeps_ > 0 && m.utime > imu_order_.newest() + bus::StampOrder::kLatest) {
-    --old_sweeps_;
-    return;
-  }
-  old_sweeps_ = 0;
-  if (scan_order_.Take(m.utime) == bus::StampOrder::Verdict::kSetBack) {
+  const bool silent = imu_order_.newest() == imu_at_sweep_;  // since the last sweep
+  if (scan_order_.Take(m.utime) == bus::StampOrder::Verdict::kSetBack && silent) {
     BeginAnew();
     imu_order_ = {};
   }
   if (odometry_->Outdated(SecondsOf(m.utime))) BeginAnew();
+  imu_at_sweep_ = imu_order_.newest();
   odometry_->AddSweep(FromMessage(m, SecondsOf(m.utime)));
   ProcessSweeps();
 }

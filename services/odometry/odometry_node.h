@@ -12,8 +12,9 @@
 namespace chase::odometry {
 
 /// IMU and LIDAR_SCAN in; POSE at every IMU sample (without IMU: at every sweep) and
-/// SCAN_REGISTERED out. Begins anew, in another frame, where a sensor's clock was set back
-/// or nothing came for so long that the state is outdated.
+/// SCAN_REGISTERED out. Begins anew, in another frame, where the IMU's clock was set back, or the
+/// LiDAR's while there is no IMU to tell the time, and where nothing came for so long that the state
+/// is outdated.
 class OdometryNode : public bus::Node {
  public:
   OdometryNode(bus::Bus& bus, const OdometryConfig& config);
@@ -34,7 +35,7 @@ class OdometryNode : public bus::Node {
   OdometryConfig config_;
   std::optional<Odometry> odometry_;
   bus::StampOrder imu_order_, scan_order_;
-  int old_sweeps_ = 0;  // that may still come by the clock before it was set back
+  int64_t imu_at_sweep_ = bus::StampOrder().newest();  // the IMU's when the last sweep came
   bool has_origin_ = false;
   int64_t origin_ = 0;           // utime of t = 0
   int32_t first_epoch_, epoch_;  // of the odometry since the clock was last set back; the newest

@@ -16,20 +16,20 @@ constexpr double kMovesAtRest = 0.02;
 
 }  // namespace
 
-std::optional<PoseEstimate> Odometry::Align(const ImuSample& imu) {
+void Odometry::Align(const ImuSample& imu) {
   aligning_ = true;
   alignment_.Add(imu);
-  if (alignment_.Complete()) {
-    if (started_)
-      Join(imu.t);
-    else if (alignment_.AtRest() && !SweepsShowMotion())
-      StartAtRest(imu.t);
-    else
-      StartInMotion(imu.t);
-    return Estimate();
-  }
-  if (started_) return std::nullopt;
-  live_.t = held_ = imu.t;
+  if (!alignment_.Complete()) return;
+  if (started_)
+    Join(imu.t);
+  else if (alignment_.AtRest() && !SweepsShowMotion())
+    StartAtRest(imu.t);
+  else
+    StartInMotion(imu.t);
+}
+
+PoseEstimate Odometry::AtPowerOn(double t) {
+  live_.t = held_ = t;
   live_.p = config_.initial_position;
   live_.R_WB = math::FromYaw(InitialYaw());
   return Estimate();

@@ -74,7 +74,9 @@ class Live {
     simulator::Output out = simulator_.Advance(t);
     Steer(t, out.truth);
     if (Out(t)) out.imu.accel.x() += options_.accel_fault;
+    Strike(t, &out.imu);
     if (options_.imu) See(odometry_.AddImu({t, out.imu.accel, out.imu.gyro}), out.truth);
+    if (out.sweep && Within(options_.clock_from, t)) out.sweep->start += options_.clock_step;
     if (out.sweep && !Out(out.sweep->start)) odometry_.AddSweep(FromSimulator(*out.sweep));
     while (odometry_.SweepReady()) {
       const SweepResult result = odometry_.ProcessSweep();
@@ -83,6 +85,23 @@ class Live {
       See(result.pose, out.truth);
     }
   }
+
+  void Strike(double t, simulator::ImuSample* imu) {
+    if (t >= options_.bias_from) imu->accel += options_.accel_step, imu->gyro += options_.gyro_step;
+    if (!Within(options_.spikes_from, t)) return;
+    if (burst_ == 0 && random_.Uniform() < options_.spikes_share) {
+      burst_ = 1 + static_cast<int>(random_.Next() % static_cast<uint64_t>(options_.spike_length));
+      const double sign = random_.Next() & 1 ? 1.0 : -1.0;
+      spike_ = sign * options_.spike_size * Vector3d::Unit(static_cast<int>(random_.Next() % 3));
+    }
+    if (burst_ == 0) return;
+    --burst_;
+    for (int k = 0; k < 3; ++k)
+      if (spike_[k] != 0.0)
+        imu->accel[k] = 16.0 * 9.81 * spike_[k], imu->gyro[k] = 2000.0 * M_PI / 180.0 * spike_[k];
+  }
+
+  static bool Within(double from, double t) { return t >= from && t < from + 2.0; }
 
   bool Out(double t) const { return t >= options_.lidar_out_from && t < options_.lidar_out_to; }
 
@@ -100,6 +119,7 @@ class Live {
     figures_.lost += pose->health.health == Health::kLost ? 1 : 0;
     figures_.epochs = pose->epoch;
     if (pose->t < options_.judge_from) return;
+    figures_.degraded += pose->health.health != Health::kOk ? 1 : 0;
     pairs_.push_back({pose->t, pose->X_WB.p - truth.body.p,
                       pose->covariance.diagonal().head<3>().cwiseSqrt(), pose->X_WB.p, truth.body.p,
                       (pose->v - truth.body.v).norm()});
@@ -154,6 +174,9 @@ class Live {
   control::TrackingLaw law_;
   simulator::Simulator simulator_;
   Odometry odometry_;
+  world::Random random_{3};
+  int burst_ = 0;  // samples that a spike still lasts
+  Vector3d spike_ = Vector3d::Zero();
   std::vector<Pair> pairs_;
   LiveFigures figures_;
 };
@@ -200,12 +223,13 @@ world::Scenario BareStreet(bool posts) {
 
 std::string Text(const LiveFigures& f) {
   return fmt::format(
-      "\"sweeps\":{},\"refused\":{},\"lost\":{},\"epochs\":{},\"ate\":{:.4f},\"aligned\":{:.4f},"
+      "\"sweeps\":{},\"refused\":{},\"lost\":{},\"degraded\":{},\"epochs\":{},\"ate\":{:.4f},"
+      "\"aligned\":{:.4f},"
       "\"worst\":{:.3f},\"end\":{:.3f},\"moved\":{:.4f},\"velocity_back\":{:.3f},"
       "\"covered\":[{:.3f},{:.3f},{:.3f}],\"sigma_mm\":[{:.1f},{:.1f},{:.1f}],\"rms_mm\":[{:.1f},{:"
       ".1f},"
       "{:.1f}]",
-      f.sweeps, f.refused, f.lost, f.epochs, f.ate, f.aligned, f.worst, f.end, f.moved,
+      f.sweeps, f.refused, f.lost, f.degraded, f.epochs, f.ate, f.aligned, f.worst, f.end, f.moved,
       f.velocity_back, f.covered[0], f.covered[1], f.covered[2], 1e3 * f.sigma[0], 1e3 * f.sigma[1],
       1e3 * f.sigma[2], 1e3 * f.rms[0], 1e3 * f.rms[1], 1e3 * f.rms[2]);
 }

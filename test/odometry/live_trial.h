@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -17,7 +18,16 @@ struct LiveOptions {
   bool imu = true;
   double lidar_out_from = 1e9, lidar_out_to = 1e9;  ///< no sweep begins in this time
   double accel_fault = 0.0;                         ///< of the IMU along x meanwhile, m/s^2
-  double land_at = 1e9;                             ///< the pilot falls silent: it sinks and stands
+  /// From then on this is added to what the IMU shows, m/s^2 and rad/s, frame B.
+  double bias_from = 1e9;
+  Eigen::Vector3d accel_step = Eigen::Vector3d::Zero(), gyro_step = Eigen::Vector3d::Zero();
+  /// For two seconds this share of bursts of one to `spike_length` samples reads `spike_size` times
+  /// full scale (16 g, 2000 deg/s) on an axis.
+  double spikes_from = 1e9, spikes_share = 0.02, spike_size = 1.0;
+  int spike_length = 1;
+  /// For two seconds the LiDAR's stamps are off by `clock_step` s.
+  double clock_from = 1e9, clock_step = 0.0;
+  double land_at = 1e9;  ///< the pilot falls silent: it sinks and stands
   double judge_from = 0.0;
 };
 
@@ -27,6 +37,7 @@ struct LiveFigures {
   int sweeps = 0;        ///< after the first
   int refused = 0;       ///< of these
   int lost = 0;          ///< estimates that said so
+  int degraded = 0;      ///< the same, from `judge_from` on
   int epochs = 0;        ///< restarts of the map
   double ate = 0.0;      ///< RMS of the position error in W, m
   double aligned = 0.0;  ///< the same after the best fit, m

@@ -16,3 +16,6 @@ set_target_properties(odometry_trial PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE
 chase_test(odometry_live_test LIBS simulator_core control_core odometry_core scenario fmt::fmt TIMEOUT 200
   SOURCES ${CMAKE_SOURCE_DIR}/test/unit/odometry_live_test.cpp ${CMAKE_CURRENT_LIST_DIR}/live_trial.cpp
     ${CMAKE_CURRENT_LIST_DIR}/courses.cpp)
+chase_test(odometry_imu_fault_test LIBS simulator_core control_core odometry_core scenario fmt::fmt TIMEOUT 200
+  SOURCES ${CMAKE_SOURCE_DIR}/test/unit/odometry_imu_fault_test.cpp ${CMAKE_CURRENT_LIST_DIR}/live_trial.cpp
+    ${CMAKE_CURRENT_LIST_DIR}/courses.cpp)

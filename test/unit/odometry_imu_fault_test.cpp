@@ -1,0 +1,112 @@
+// Sensors that go wrong in flight: biases that step, readings that jump, stamps that step.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <vector>
+
+#include "common/world/random.h"
+#include "test/odometry/live_trial.h"
+
+namespace chase::odometry {
+namespace {
+
+using trial::FlyLive;
+using trial::LiveFigures;
+using trial::LiveOptions;
+
+int Layouts(int usual) {
+  const char* text = std::getenv("CHASE_ODOMETRY_LAYOUTS");
+  return text ? std::atoi(text) : usual;
+}
+
+LiveFigures Flown(const std::string& what, uint64_t seed, const LiveOptions& options) {
+  world::Random random(seed, 9);
+  const int trees = static_cast<int>(random.Uniform(30.0, 200.0));
+  const LiveFigures figures =
+      FlyLive(trial::Meadow(trees, random.Uniform(0.0, 0.2), seed), options);
+  if (std::getenv("CHASE_ODOMETRY_LAYOUTS"))
+    fmt::print("{{\"what\":\"{}\",\"seed\":{},{}}}\n", what, seed, trial::Text(figures));
+  return figures;
+}
+
+LiveOptions From(int seed) {
+  LiveOptions options;
+  options.seed = seed;
+  options.duration = 16.0;
+  options.judge_from = 10.0;
+  return options;
+}
+
+void ExpectGood(const LiveFigures& figures, const std::string& what) {
+  EXPECT_LT(figures.worst, 0.1) << what;
+  EXPECT_EQ(figures.lost, 0) << what;
+  EXPECT_EQ(figures.epochs, 0) << what;
+}
+
+/// Over all flights the error lies within three standard deviations, on each axis.
+void ExpectHonest(const std::vector<LiveFigures>& flights) {
+  for (int axis = 0; axis < 3; ++axis) {
+    double covered = 0.0;
+    for (const LiveFigures& f : flights)
+      covered += f.covered[axis] / static_cast<double>(flights.size());
+    EXPECT_GE(covered, 0.95) << axis;
+  }
+}
+
+/// Within what data sheets of small units give for heat and shock: 0.05 to 0.5 m/s^2, 0.005 to
+/// 0.03 rad/s, in any direction.
+TEST(OdometryImuFault, StepsOfTheBiasAreFound) {
+  std::vector<LiveFigures> flights;
+  for (int seed = 1; seed <= Layouts(6); ++seed) {
+    world::Random random(static_cast<uint64_t>(seed), 11);
+    const auto vector = [&](double least, double most) {
+      const Eigen::Vector3d way(random.Uniform(-1.0, 1.0), random.Uniform(-1.0, 1.0),
+                                random.Uniform(-1.0, 1.0));
+      return Eigen::Vector3d(random.Uniform(least, most) * way.normalized());
+    };
+    LiveOptions options = From(seed);
+    options.bias_from = random.Uniform(10.0, 10.1);
+    options.accel_step = vector(0.05, 0.5);
+    options.gyro_step = vector(0.005, 0.03);
+    const std::string what = fmt::format("step of {:.2f} m/s^2, {:.3f} rad/s, seed {} ",
+                                         options.accel_step.norm(), options.gyro_step.norm(), seed);
+    const LiveFigures figures = Flown(what, static_cast<uint64_t>(seed), options);
+    ExpectGood(figures, what);
+    EXPECT_LT(figures.degraded, 2 * 200) << what;
+    EXPECT_LT(figures.end, 0.06) << what;
+    flights.push_back(figures);
+  }
+  ExpectHonest(flights);
+}
+
+TEST(OdometryImuFault, SpikesAreLeftOut) {
+  for (int seed = 1; seed <= Layouts(2); ++seed)
+    for (const double size : {0.3, 1.0})
+      for (const int length : {1, 6}) {
+        if (size < 1.0 && length > 1) continue;  // several that agree are a motion
+        LiveOptions options = From(seed);
+        options.spikes_from = 10.5;
+        options.spike_size = size;
+        options.spike_length = length;
+        const std::string what = fmt::format("spikes {} x {} ", size, length);
+        ExpectGood(Flown(what, static_cast<uint64_t>(seed), options), what);
+      }
+}
+
+TEST(OdometryImuFault, StampsOfTheLidarThatStepCostNoSweep) {
+  for (int seed = 1; seed <= Layouts(1); ++seed)
+    for (const double step : {-60.0, -1.0, 1.0, 60.0}) {
+      LiveOptions options = From(seed);
+      options.clock_from = 10.5;
+      options.clock_step = step;
+      const std::string what = fmt::format("stamps off by {} s ", step);
+      const LiveFigures figures = Flown(what, static_cast<uint64_t>(seed), options);
+      ExpectGood(figures, what);
+      EXPECT_LE(figures.refused, 0) << what;
+      EXPECT_GE(figures.sweeps, 150) << what;
+    }
+}
+
+}  // namespace
+}  // namespace chase::odometry
