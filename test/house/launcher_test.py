@@ -177,7 +177,8 @@ class FlightTest(unittest.TestCase):
             fly.find_scenario("gmy")
         names = str(refusal.exception).split("there are: ")[1].split(", ")
         self.assertEqual(sorted(names), sorted(
-            ["forest", "gym", "mission"] + [f"twelve/S{number}" for number in range(1, 13)]))
+            ["corridor", "crossing", "forest", "gym", "long", "mission", "night"]
+            + [f"twelve/S{number}" for number in range(1, 13)]))
 
     def test_criterion_that_fails(self):
         self.program("chase-report", REPORT.format(metrics=FAILED))
