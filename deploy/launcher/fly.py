@@ -62,8 +62,11 @@ def find_scenario(name):
 
 
 def flight_processes():
-    table = json.loads((ROOT / "deploy" / "processes.json").read_text(encoding="utf-8"))
-    return [row for row in table["processes"] if row["fly"]]
+    table = ROOT / "deploy" / "processes.json"
+    try:
+        return [row for row in processes.read_table(table.read_bytes(), table.name) if row["fly"]]
+    except processes.TableError as error:
+        raise FlightError(str(error)) from error
 
 
 def set_up():
