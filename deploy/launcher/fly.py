@@ -20,6 +20,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 BIN = ROOT / "build" / "bin"
 SILENCE_LIMIT = 30.0  # s of wall time in which the mission's time must move
 TAIL = 1.0  # s recorded after the mission's end
+KEEP_FREE = 200  # MB of disk below which sweeps and images are no longer recorded
 LOG_RATE = 15e6  # bytes/s of a recording, sweeps and images included
 LARGEST_SEED = 2**31 - 1
 VIEW_PORTS = range(8080, 8100)  # of --view: the first that nobody listens on
@@ -97,7 +98,7 @@ def build_and_check(scenario, view=False):
     build("chase-scenario")
     told = json.loads(ask("chase-scenario", scenario))
     build(*(row["binary"] for row in flight_processes()), "chase-flight", "chase-flight-monitor",
-          "chase-report", "chase-command", *(["chase-viewer"] if view else []))
+          "chase-recorder", "chase-report", "chase-command", *(["chase-viewer"] if view else []))
     ask("chase-flight", scenario, "--print-config", "simulator")  # reads the services' overrides
     return told["duration_s"] + told["settle_s"], told.get("commands", [])
 
@@ -173,7 +174,11 @@ class Flight:
         rows = flight_processes()
         configs = {row["name"]: write_config(self.folder, self.scenario, self.seed, row["name"])
                    for row in rows}
-        self.logger = self.child("logger", ["lcm-logger", "-q", self.folder / "flight.lcm"])
+        # All that is said, in one log: reports and replays read it.
+        self.logger = self.child("recorder", [
+            BIN / "chase-recorder", "--folder", self.folder, "--name", "flight", "--heavy-minutes", "-1",
+            "--rotate-mb", "0", "--rotate-minutes", "0", "--keep-free", str(KEEP_FREE)],
+            notifies=True)
         self.monitor = self.child("monitor", [BIN / "chase-flight-monitor"], stdout=subprocess.PIPE)
         os.set_blocking(self.monitor.process.stdout.fileno(), False)
         if view:
@@ -195,9 +200,9 @@ class Flight:
         print(f"look on at http://localhost:{port}", flush=True)
 
     def wait_ready(self):
-        if not processes.wait_ready(self.services):
+        if not processes.wait_ready([self.logger, *self.services]):
             self.complain(mend=False)
-            late = ", ".join(c.name for c in self.services if not c.ready())
+            late = ", ".join(c.name for c in [self.logger, *self.services] if not c.ready())
             raise FlightError(f"not ready after {processes.READY_LIMIT:.0f} s: {late}; "
                               f"their logs are in {self.folder}")
 

@@ -37,12 +37,14 @@ SERVICE = """
     while True:
         time.sleep(0.1)
 """
+RECORD = """open(os.path.join(sys.argv[sys.argv.index("--folder") + 1], "flight.lcm"), "w").close()"""
 MONITOR = """
-    import json, time
+    import json, signal, time
     for i in range(3):
         time.sleep(0.2)
         print(json.dumps(dict(mission_time=i, duration=2, distance=2.5, visible=1.0, rtf=1.0,
                               done=i == 2)), flush=True)
+    signal.pause()  # however long the others take to come up
 """
 REPORT = """
     import json, pathlib, sys
@@ -84,6 +86,7 @@ class FlightTest(unittest.TestCase):
         self.program("chase-scenario", LENGTH.format(duration=2))
         self.program("chase-flight", "print('{}')")
         self.program("chase-flight-monitor", MONITOR)
+        self.program("chase-recorder", SERVICE.format(behaviour=RECORD))
         self.program("chase-report", REPORT.format(metrics=PASSED))
 
     def patch(self, place, name, value):
@@ -123,7 +126,7 @@ class FlightTest(unittest.TestCase):
         first, rest = self.built
         self.assertEqual(first, ("chase-scenario",))
         flying = {row["binary"] for row in fly.flight_processes()}
-        others = {"chase-flight", "chase-flight-monitor", "chase-report", "chase-command"}
+        others = {"chase-flight", "chase-flight-monitor", "chase-recorder", "chase-report", "chase-command"}
         self.assertEqual(set(rest), flying | others)
 
     def test_view_starts_an_onlooker(self):
