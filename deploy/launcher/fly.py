@@ -15,6 +15,7 @@ import time
 import bus
 import processes
 import results
+import version
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 BIN = ROOT / "build" / "bin"
@@ -46,6 +47,7 @@ def parse(arguments):
     parser.add_argument("scenario", nargs="?", default="gym",
                         help="name in deploy/scenarios, or a file (default: gym)")
     parser.add_argument("--seed", type=seed_number, default=1, help="of noise and gusts (default: 1)")
+    parser.add_argument("--version", action="version", version=version.text())
     parser.add_argument("--view", action="store_true", help="look on in a browser, at http://localhost:8080")
     return parser.parse_args(arguments)
 

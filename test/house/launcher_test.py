@@ -66,6 +66,15 @@ def lcm_packet(channel):
     return b"LC02" + struct.pack(">I", 7) + channel.encode() + b"\0payload"
 
 
+class VersionTest(unittest.TestCase):
+    def test_launchers_say_it_like_the_programs(self):
+        for command in ("fly", "doctor", "spy"):
+            answer = subprocess.run([ROOT / "deploy" / command, "--version"], capture_output=True, text=True,
+                                    check=False)
+            self.assertEqual((answer.returncode, answer.stderr), (0, ""), command)
+            self.assertRegex(answer.stdout, r"^\d+\.\d+\.\d+ \(commit (unknown|[0-9a-f]{10}(-dirty)?)\)\n$")
+
+
 class FlightTest(unittest.TestCase):
     """deploy/fly's own steps after the build, with programs that only pretend."""
 
