@@ -1,8 +1,11 @@
 #include "common/bus/bus.h"
 
+#include <algorithm>
 #include <exception>
+#include <stdexcept>
 
 #include "common/bus/channels.h"
+#include "common/bus/message_head.h"
 
 namespace chase::bus {
 
@@ -18,6 +21,27 @@ bool Bus::Count(const std::string& channel, const std::string& problem, int32_t 
     counters->dropped += seq - counters->last_seq - 1;
   counters->last_seq = seq;  // a lower number is a restarted sender
   return true;
+}
+
+void Bus::SubscribeEvery(const EveryHandler& /*handler*/) {
+  throw std::runtime_error("this bus does not hand over every channel; use the live one");
+}
+
+void Bus::CountAny(const std::string& channel, const uint8_t* data, size_t size) {
+  constexpr size_t kMostChannels = 200;  // names of strangers are not remembered without end
+  if (counters_.size() >= kMostChannels && counters_.count(channel) == 0) return;
+  ChannelCounters& counters = counters_[channel];
+  const auto head = HeadOf(data, size);
+  if (!head) {
+    ++counters.malformed;
+    return;
+  }
+  ++counters.received;
+  counters.last_seq = head->seq;
+  const auto [last, fresh] =
+      last_seq_.try_emplace({channel, head->sender, head->sender_start}, head->seq);
+  if (!fresh && head->seq > last->second) counters.dropped += int64_t{head->seq} - last->second - 1;
+  last->second = std::max(last->second, head->seq);
 }
 
 bool Bus::IsForeign(const std::string& channel, const std::string& sender,

@@ -5,6 +5,7 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -52,6 +53,14 @@ class Bus {
     });
   }
 
+  /// What hears everything: the channel's name as on the wire, when the message came (microseconds,
+  /// the bus's clock), its bytes.
+  using EveryHandler = std::function<void(const std::string& channel, int64_t utime,
+                                          const uint8_t* data, size_t size)>;
+  /// Hands over every message of every channel of the vehicle as it came, decoded or not, beside
+  /// other subscriptions; for a recorder. Gaps in each sender's `seq` are counted as drops.
+  virtual void SubscribeEvery(const EveryHandler& handler);
+
   /// Numbers `message` (field seq), says who sends it and what had been heard by then, and sends
   /// it. The caller sets utime.
   template <class T>
@@ -87,6 +96,9 @@ class Bus {
  protected:
   virtual void SubscribeRaw(const std::string& channel, RawHandler handler) = 0;
   virtual void PublishRaw(const std::string& channel, Bytes bytes) = 0;
+  /// Counts a message of any type by its head.
+  void CountAny(const std::string& channel, const uint8_t* data, size_t size);
+  void Guarded(const std::string& channel, const std::function<void()>& handler);
 
  private:
   template <class T>
@@ -114,11 +126,11 @@ class Bus {
   bool IsForeign(const std::string& channel, const std::string& sender,
                  const std::string& vehicle) const;
   std::vector<input_t> Inputs() const;
-  void Guarded(const std::string& channel, const std::function<void()>& handler);
 
   Identity identity_;
   std::map<std::string, ChannelCounters> counters_;
   std::map<std::string, int32_t> next_seq_;
+  std::map<std::tuple<std::string, std::string, int64_t>, int32_t> last_seq_;  // of each sender
   StageClock stages_;
   std::string last_error_;
 };

@@ -12,7 +12,8 @@ int64_t Utime(double seconds, int64_t origin) {
 world::Trajectory FromMessage(const polynomial_t& m, int64_t origin) {
   world::Trajectory trajectory{Seconds(m.utime, origin), m.duration,
                                Eigen::MatrixXd::Zero(m.n_coefficients / 3, 3)};
-  for (int i = 0; i < m.n_coefficients; ++i)
+  // Whole rows: tools also read messages that no node would take.
+  for (int i = 0; i < m.n_coefficients / 3 * 3; ++i)
     trajectory.coefficients(i / 3, i % 3) = m.coefficients[static_cast<std::size_t>(i)];
   return trajectory;
 }

@@ -14,7 +14,9 @@ namespace chase::bus {
 /// Seconds from `origin` to `utime`. Cores count from an origin near the data, so that double
 /// precision is no concern.
 inline double Seconds(int64_t utime, int64_t origin) {
-  return static_cast<double>(utime - origin) * 1e-6;
+  int64_t us = 0;
+  if (__builtin_sub_overflow(utime, origin, &us)) us = utime < origin ? INT64_MIN : INT64_MAX;
+  return static_cast<double>(us) * 1e-6;
 }
 int64_t Utime(double seconds, int64_t origin);
 

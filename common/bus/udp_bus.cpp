@@ -2,10 +2,12 @@
 
 #include <fmt/format.h>
 #include <poll.h>
+#include <time.h>
 
 #include <algorithm>
 #include <stdexcept>
 
+#include "common/bus/channels.h"
 #include "common/bus/host_clock.h"
 #include "common/bus/live_loop.h"
 #include "common/bus/loopback.h"
@@ -13,6 +15,10 @@
 namespace chase::bus {
 
 namespace {
+
+constexpr int kEveryLight =
+    10000;  // messages that wait for a recorder: 5 s of a flight's 2000 a second
+constexpr int64_t kLongestWait = 10'000'000;  // us; beyond it the wall clock was set
 
 void Forward(const lcm::ReceiveBuffer* buffer, const std::string&, Bus::RawHandler* handler) {
   (*handler)(static_cast<const uint8_t*>(buffer->data), buffer->data_size);
@@ -51,6 +57,31 @@ void UdpBus::SubscribeRaw(const std::string& channel, RawHandler handler) {
   handlers_.push_back(std::move(handler));
   auto* subscription = lcm_.subscribeFunction(prefix_ + channel, &Forward, &handlers_.back());
   subscription->setQueueCapacity(QueueCapacity(channel));
+}
+
+void UdpBus::SubscribeEvery(const EveryHandler& handler) {
+  every_ = handler;
+  std::string heavy;  // LCM's patterns are Perl's
+  for (const auto& row : ChannelTable())
+    if (row.heavy) heavy += (heavy.empty() ? "" : "|") + row.channel;
+  const std::string ours = "\\Q" + prefix_ + "\\E";
+  lcm_.subscribeFunction(ours + ".*(" + heavy + ")", &ForwardEvery, this)
+      ->setQueueCapacity(4 * QueueCapacity("LIDAR_SCAN"));
+  lcm_.subscribeFunction(ours + "(?!.*(" + heavy + ")$).*", &ForwardEvery, this)
+      ->setQueueCapacity(kEveryLight);
+}
+
+void UdpBus::ForwardEvery(const lcm::ReceiveBuffer* buffer, const std::string& channel,
+                          UdpBus* bus) {
+  if (IsLoopback(channel)) return;
+  timespec wall{};
+  clock_gettime(CLOCK_REALTIME, &wall);  // of which LCM's stamp of the arrival is
+  const int64_t now = int64_t{wall.tv_sec} * 1000000 + wall.tv_nsec / 1000;
+  const int64_t waited = std::clamp<int64_t>(now - buffer->recv_utime, 0, kLongestWait);
+  const auto* data = static_cast<const uint8_t*>(buffer->data);
+  bus->CountAny(channel.substr(bus->prefix_.size()), data, buffer->data_size);
+  bus->Guarded(channel,
+               [&] { bus->every_(channel, bus->Now() - waited, data, buffer->data_size); });
 }
 
 void UdpBus::PublishRaw(const std::string& channel, Bytes bytes) {

@@ -26,15 +26,21 @@ class UdpBus : public Bus {
   /// makes stamps jump in mid flight, and a process that starts again goes by the same clock.
   int64_t Now() const override;
 
+  void SubscribeEvery(const EveryHandler& handler) override;
+
  protected:
   void SubscribeRaw(const std::string& channel, RawHandler handler) override;
   void PublishRaw(const std::string& channel, Bytes bytes) override;
 
  private:
+  static void ForwardEvery(const lcm::ReceiveBuffer* buffer, const std::string& channel,
+                           UdpBus* bus);
+
   lcm::LCM lcm_;
   std::string prefix_;
   int64_t clock_offset_;             // us from the steady clock to the wall clock
   std::deque<RawHandler> handlers_;  // addresses stay
+  EveryHandler every_;
 };
 
 }  // namespace chase::bus

@@ -16,8 +16,9 @@ namespace chase::logs {
 namespace {
 
 constexpr uint8_t kSync[4] = {0xED, 0xA1, 0xDA, 0x01};
-constexpr int64_t kHeaderBytes = 28;     // sync word, number, stamp, two lengths
-constexpr int64_t kLongestChannel = 63;  // LCM_MAX_CHANNEL_NAME_LENGTH
+constexpr int64_t kHeaderBytes = 28;           // sync word, number, stamp, two lengths
+constexpr int64_t kLongestChannel = 63;        // LCM_MAX_CHANNEL_NAME_LENGTH
+constexpr int64_t kLatest = int64_t{1} << 61;  // us, 73,000 years: any two stamps can be subtracted
 
 template <class T>
 T BigEndianAt(const uint8_t* from) {
@@ -28,7 +29,8 @@ T BigEndianAt(const uint8_t* from) {
 
 }  // namespace
 
-/// What stands before an event's channel and data; `size` 0: there is no event of possible lengths.
+/// What stands before an event's channel and data; `size` 0: there is no event of possible lengths
+/// and a possible stamp.
 struct LogReader::Header {
   int64_t utime = 0, channel_bytes = 0, data_bytes = 0, size = 0;
 };
@@ -67,6 +69,7 @@ LogReader::Header LogReader::HeaderAt(int64_t at) const {
   const int64_t end = at + kHeaderBytes + h.channel_bytes + h.data_bytes;
   if (h.channel_bytes < 1 || h.channel_bytes > kLongestChannel || h.data_bytes < 0 || end > size_)
     return h;
+  if (h.utime < -kLatest || h.utime > kLatest) return h;
   const uint8_t* name = data_ + at + kHeaderBytes;
   if (std::all_of(name, name + h.channel_bytes, [](uint8_t c) { return std::isgraph(c) != 0; }))
     h.size = end - at;

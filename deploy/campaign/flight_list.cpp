@@ -14,6 +14,7 @@
 #include "common/world/fault.h"
 #include "common/world/scenario.h"
 #include "deploy/campaign/text_file.h"
+#include "deploy/flight/scenario_file.h"
 
 namespace chase::campaign {
 namespace {
@@ -61,20 +62,11 @@ std::string CheckedFault(const std::string& fault) {
   return fault;
 }
 
-std::string ScenarioFile(const std::string& scenario) {
-  const fs::path folder = CHASE_SCENARIOS;
-  for (const fs::path& file : {fs::path(scenario), folder / (scenario + ".yaml"),
-                               folder / "twelve" / (scenario + ".yaml")})
-    if (fs::is_regular_file(file)) return fs::absolute(file).lexically_normal();
-  throw std::runtime_error("no scenario '" + scenario +
-                           "'; use a name from deploy/scenarios, a file, or world:KIND");
-}
-
 /// A random world or a scenario by the text that names it, without seed and fault.
 Flight PlaceOf(const std::string& text) {
   Flight flight;
   if (text.rfind(kWorld, 0) != 0) {
-    flight.file = ScenarioFile(text);
+    flight.file = flight::ScenarioFile(text);
     flight.scenario = fs::path(flight.file).stem();
     world::LoadScenario(flight.file);  // what cannot be flown is said before the first flight
     return flight;
@@ -157,7 +149,7 @@ std::vector<std::string> Expanded(const std::vector<std::string>& given,
 std::vector<std::string> FaultNames(const std::string& place) {
   bool sensors = true, mission = false;  // of a random world
   if (place.rfind(kWorld, 0) != 0) {
-    const world::Scenario scenario = world::LoadScenario(ScenarioFile(place));
+    const world::Scenario scenario = world::LoadScenario(flight::ScenarioFile(place));
     sensors = scenario.sensors.mode != "truth";
     mission = !scenario.commands.empty();
   }

@@ -13,6 +13,7 @@
 #include "deploy/flight/collision_watch.h"
 #include "deploy/flight/flight.h"
 #include "deploy/flight/progress.h"
+#include "deploy/flight/scenario_file.h"
 #include "logs/src/metrics.h"
 #include "logs/src/output.h"
 #include "logs/src/read_flight.h"
@@ -172,7 +173,8 @@ std::string MissionTimeProblem(const std::string& text) {
 }
 
 void AddOptions(CLI::App* app, Arguments* a) {
-  app->add_option("scenario", a->options.scenario_file, "scenario file")->required();
+  app->add_option("scenario", a->options.scenario_file, "name in deploy/scenarios, or a file")
+      ->required();
   app->add_option("--seed", a->options.seed, "of all noise (default 1)")
       ->check(CLI::Range(int64_t{0}, int64_t{2147483647}));
   app->add_option("--sensors", a->options.sensors, "raw or truth (default: the scenario's)")
@@ -206,6 +208,8 @@ int main(int argc, char** argv) {
   chase::flight::AddOptions(&app, &arguments);
   try {
     app.parse(argc, argv);
+    auto& scenario = arguments.options.scenario_file;
+    scenario = chase::flight::ScenarioFile(scenario);
     return chase::flight::Run(arguments);
   } catch (const CLI::Success& e) {
     return app.exit(e);

@@ -5,6 +5,7 @@
 
 #include "common/config/version.h"
 #include "common/world/scenario.h"
+#include "deploy/flight/scenario_file.h"
 
 /// Checks a scenario file without the services, so that it is the first program that is built.
 int main(int argc, char** argv) {
@@ -12,10 +13,11 @@ int main(int argc, char** argv) {
                "chase-scenario");
   chase::config::AddVersion(&app);
   std::string file;
-  app.add_option("scenario", file, "scenario file")->required();
+  app.add_option("scenario", file, "name in deploy/scenarios, or a file")->required();
   try {
     app.parse(argc, argv);
-    const chase::world::Scenario scenario = chase::world::LoadScenario(file);
+    const chase::world::Scenario scenario =
+        chase::world::LoadScenario(chase::flight::ScenarioFile(file));
     chase::world::TargetMotion(scenario);  // reads its path_file
     std::string commands;
     for (const chase::world::CommandSpec& c : scenario.commands)

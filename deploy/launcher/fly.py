@@ -15,11 +15,13 @@ import time
 import bus
 import processes
 import results
+import version
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 BIN = ROOT / "build" / "bin"
 SILENCE_LIMIT = 30.0  # s of wall time in which the mission's time must move
 TAIL = 1.0  # s recorded after the mission's end
+KEEP_FREE = 200  # MB of disk below which sweeps and images are no longer recorded
 LOG_RATE = 15e6  # bytes/s of a recording, sweeps and images included
 LARGEST_SEED = 2**31 - 1
 VIEW_PORTS = range(8080, 8100)  # of --view: the first that nobody listens on
@@ -45,6 +47,7 @@ def parse(arguments):
     parser.add_argument("scenario", nargs="?", default="gym",
                         help="name in deploy/scenarios, or a file (default: gym)")
     parser.add_argument("--seed", type=seed_number, default=1, help="of noise and gusts (default: 1)")
+    parser.add_argument("--version", action="version", version=version.text())
     parser.add_argument("--view", action="store_true", help="look on in a browser, at http://localhost:8080")
     return parser.parse_args(arguments)
 
@@ -62,8 +65,11 @@ def find_scenario(name):
 
 
 def flight_processes():
-    table = json.loads((ROOT / "deploy" / "processes.json").read_text(encoding="utf-8"))
-    return [row for row in table["processes"] if row["fly"]]
+    table = ROOT / "deploy" / "processes.json"
+    try:
+        return [row for row in processes.read_table(table.read_bytes(), table.name) if row["fly"]]
+    except processes.TableError as error:
+        raise FlightError(str(error)) from error
 
 
 def set_up():
@@ -94,7 +100,7 @@ def build_and_check(scenario, view=False):
     build("chase-scenario")
     told = json.loads(ask("chase-scenario", scenario))
     build(*(row["binary"] for row in flight_processes()), "chase-flight", "chase-flight-monitor",
-          "chase-report", "chase-command", *(["chase-viewer"] if view else []))
+          "chase-recorder", "chase-report", "chase-command", *(["chase-viewer"] if view else []))
     ask("chase-flight", scenario, "--print-config", "simulator")  # reads the services' overrides
     return told["duration_s"] + told["settle_s"], told.get("commands", [])
 
@@ -170,7 +176,11 @@ class Flight:
         rows = flight_processes()
         configs = {row["name"]: write_config(self.folder, self.scenario, self.seed, row["name"])
                    for row in rows}
-        self.logger = self.child("logger", ["lcm-logger", "-q", self.folder / "flight.lcm"])
+        # All that is said, in one log: reports and replays read it.
+        self.logger = self.child("recorder", [
+            BIN / "chase-recorder", "--folder", self.folder, "--name", "flight", "--heavy-minutes", "-1",
+            "--rotate-mb", "0", "--rotate-minutes", "0", "--keep-free", str(KEEP_FREE)],
+            notifies=True)
         self.monitor = self.child("monitor", [BIN / "chase-flight-monitor"], stdout=subprocess.PIPE)
         os.set_blocking(self.monitor.process.stdout.fileno(), False)
         if view:
@@ -192,9 +202,9 @@ class Flight:
         print(f"look on at http://localhost:{port}", flush=True)
 
     def wait_ready(self):
-        if not processes.wait_ready(self.services):
+        if not processes.wait_ready([self.logger, *self.services]):
             self.complain(mend=False)
-            late = ", ".join(c.name for c in self.services if not c.ready())
+            late = ", ".join(c.name for c in [self.logger, *self.services] if not c.ready())
             raise FlightError(f"not ready after {processes.READY_LIMIT:.0f} s: {late}; "
                               f"their logs are in {self.folder}")
 

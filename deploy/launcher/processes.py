@@ -1,8 +1,10 @@
 """Child processes: started in their own session, watched, stopped in order."""
 
 import ctypes
+import json
 import os
 import pathlib
+import re
 import signal
 import socket
 import subprocess
@@ -14,6 +16,47 @@ READY_LIMIT = 30.0  # s
 RETRY_AFTER = 12.0  # s without READY after which a process is started once more
 WATCHDOG_LIMIT = 10.0  # s without a sign of life, once ready
 STOP_LIMIT = 5.0  # s from SIGINT to SIGKILL
+
+
+# Of a row of the process table (deploy/processes.json).
+FIELDS = {"name": str, "binary": str, "heavy": bool, "fly": bool, "restart": str, "nice": int}
+RESTARTS = ("always", "never")
+
+
+class TableError(Exception):
+    """One line: which table, what is wrong."""
+
+
+def read_table(data, origin):
+    """The rows of a process table, given as bytes."""
+    try:
+        rows = json.loads(data)["processes"]
+    except (ValueError, RecursionError, TypeError, KeyError) as error:
+        raise TableError(f"{origin}: no map of JSON with a list of processes ({type(error).__name__})") from error
+    if not isinstance(rows, list) or not rows:
+        raise TableError(f"{origin}: processes is no list of rows")
+    for number, row in enumerate(rows):
+        if problem := _row_problem(row):
+            raise TableError(f"{origin}: processes[{number}]: {problem}")
+    names = [row["name"] for row in rows]
+    if twice := [name for name in names if names.count(name) > 1]:
+        raise TableError(f"{origin}: {twice[0]!r} is there twice")
+    return rows
+
+
+def _row_problem(row):
+    if not isinstance(row, dict) or set(row) != set(FIELDS):
+        return f"has to have {', '.join(FIELDS)} and nothing else"
+    for field, kind in FIELDS.items():
+        if type(row[field]) is not kind:
+            return f"{field} is no {kind.__name__}"
+    if not re.fullmatch(r"[a-z][a-z0-9_]*", row["name"]):
+        return f"name is {row['name'][:40]!r}; it is a word in small letters"
+    if not re.fullmatch(r"chase-[a-z0-9-]+", row["binary"]):
+        return f"binary is {row['binary'][:40]!r}; it begins with chase-"
+    if row["restart"] not in RESTARTS:
+        return f"restart is {row['restart'][:40]!r}; it is one of {', '.join(RESTARTS)}"
+    return "" if -20 <= row["nice"] <= 19 else "nice is outside -20 to 19"
 
 
 def threads_state(pid):

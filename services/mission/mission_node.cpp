@@ -56,6 +56,7 @@ void MissionNode::SubscribeStatuses() {
   bus_.Subscribe<status_t>("CONTROL_STATUS", heard);
   bus_.Subscribe<status_t>("FCU_STATUS", heard);
   bus_.Subscribe<status_t>("SIMULATOR_STATUS", heard);
+  bus_.Subscribe<status_t>("RECORDER_STATUS", heard);
 }
 
 void MissionNode::OnCommand(const command_t& message) {

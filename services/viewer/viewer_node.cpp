@@ -108,6 +108,7 @@ void ViewerNode::SubscribeStatuses() {
   bus_.Subscribe<status_t>("MISSION_STATUS", hear);
   bus_.Subscribe<status_t>("FCU_STATUS", hear);
   bus_.Subscribe<status_t>("SIMULATOR_STATUS", hear);
+  bus_.Subscribe<status_t>("RECORDER_STATUS", hear);
 }
 
 /// What only Foxglove shows.

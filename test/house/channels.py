@@ -17,14 +17,14 @@ LISTENS = {
     "mission": {"COMMAND", "POSE", "OBSTACLES", "TARGET", "PLAN", "TRACKING", "ATTITUDE_SETPOINT",
                 "LIDAR_STATUS", "CAMERA_STATUS", "ODOMETRY_STATUS", "MAPPING_STATUS",
                 "PERCEPTION_STATUS", "PREDICTION_STATUS", "PLANNING_STATUS", "CONTROL_STATUS",
-                "FCU_STATUS", "SIMULATOR_STATUS"},
+                "FCU_STATUS", "SIMULATOR_STATUS", "RECORDER_STATUS"},
     "fcu": {"ATTITUDE_SETPOINT", "POSE"},
     # Ground truth is not for it either: the page shows what the vehicle knows.
     "viewer": {"LIDAR_SCAN", "CAMERA_IMAGE", "IMU", "POSE", "SCAN_REGISTERED", "OBSTACLES", "MAP",
                "TARGET", "PREDICTION", "PLAN", "ATTITUDE_SETPOINT", "TRACKING", "SCENARIO",
                "FLIGHT_STATE", "HEALTH", "COMMAND", "COMMAND_ACK", "MISSION_STATUS", "LIDAR_STATUS", "CAMERA_STATUS", "ODOMETRY_STATUS", "MAPPING_STATUS",
                "PERCEPTION_STATUS", "PREDICTION_STATUS", "PLANNING_STATUS", "CONTROL_STATUS",
-               "FCU_STATUS", "SIMULATOR_STATUS"},
+               "FCU_STATUS", "SIMULATOR_STATUS", "RECORDER_STATUS"},
     "simulator": {"ATTITUDE_SETPOINT", "POSE"},  # in place of fcu
 }
 SUBSCRIBE = re.compile(r'Subscribe<[\w:]+>\(\s*(?:/\*.*?\*/\s*)?([^,]+),')

@@ -37,12 +37,14 @@ SERVICE = """
     while True:
         time.sleep(0.1)
 """
+RECORD = """open(os.path.join(sys.argv[sys.argv.index("--folder") + 1], "flight.lcm"), "w").close()"""
 MONITOR = """
-    import json, time
+    import json, signal, time
     for i in range(3):
         time.sleep(0.2)
         print(json.dumps(dict(mission_time=i, duration=2, distance=2.5, visible=1.0, rtf=1.0,
                               done=i == 2)), flush=True)
+    signal.pause()  # however long the others take to come up
 """
 REPORT = """
     import json, pathlib, sys
@@ -62,6 +64,15 @@ def free_port():
 
 def lcm_packet(channel):
     return b"LC02" + struct.pack(">I", 7) + channel.encode() + b"\0payload"
+
+
+class VersionTest(unittest.TestCase):
+    def test_launchers_say_it_like_the_programs(self):
+        for command in ("fly", "doctor", "spy"):
+            answer = subprocess.run([ROOT / "deploy" / command, "--version"], capture_output=True, text=True,
+                                    check=False)
+            self.assertEqual((answer.returncode, answer.stderr), (0, ""), command)
+            self.assertRegex(answer.stdout, r"^\d+\.\d+\.\d+ \(commit (unknown|[0-9a-f]{10}(-dirty)?)\)\n$")
 
 
 class FlightTest(unittest.TestCase):
@@ -84,6 +95,7 @@ class FlightTest(unittest.TestCase):
         self.program("chase-scenario", LENGTH.format(duration=2))
         self.program("chase-flight", "print('{}')")
         self.program("chase-flight-monitor", MONITOR)
+        self.program("chase-recorder", SERVICE.format(behaviour=RECORD))
         self.program("chase-report", REPORT.format(metrics=PASSED))
 
     def patch(self, place, name, value):
@@ -123,7 +135,7 @@ class FlightTest(unittest.TestCase):
         first, rest = self.built
         self.assertEqual(first, ("chase-scenario",))
         flying = {row["binary"] for row in fly.flight_processes()}
-        others = {"chase-flight", "chase-flight-monitor", "chase-report", "chase-command"}
+        others = {"chase-flight", "chase-flight-monitor", "chase-recorder", "chase-report", "chase-command"}
         self.assertEqual(set(rest), flying | others)
 
     def test_view_starts_an_onlooker(self):
@@ -177,7 +189,8 @@ class FlightTest(unittest.TestCase):
             fly.find_scenario("gmy")
         names = str(refusal.exception).split("there are: ")[1].split(", ")
         self.assertEqual(sorted(names), sorted(
-            ["forest", "gym", "mission"] + [f"twelve/S{number}" for number in range(1, 13)]))
+            ["corridor", "crossing", "forest", "gym", "long", "mission", "night"]
+            + [f"twelve/S{number}" for number in range(1, 13)]))
 
     def test_criterion_that_fails(self):
         self.program("chase-report", REPORT.format(metrics=FAILED))

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -149,6 +150,32 @@ TEST(HostileBus, AHugeLengthIsRefusedBeforeItIsAllocated) {
   lidar_scan_t message;
   EXPECT_LT(message.decode(bytes.data(), 0, static_cast<int>(bytes.size())), 0);
   EXPECT_TRUE(message.x.empty());
+}
+
+TEST(HostileBus, ATextThatDoesNotEndAtItsOnlyZeroIsRefused) {
+  event_t good{};
+  good.name = "kill";
+  const Bus::Bytes bytes = Encode(good);
+  const auto text = std::search(bytes.begin(), bytes.end(), good.name.begin(), good.name.end());
+  ASSERT_NE(text, bytes.end());
+  event_t message;
+  for (const auto& [at, byte] :
+       {std::pair<int, uint8_t>{2, 0}, {4, '!'}}) {  // within it, or no zero at all
+    Bus::Bytes spoiled = bytes;
+    spoiled[static_cast<size_t>(text - bytes.begin() + at)] = byte;
+    EXPECT_LT(message.decode(spoiled.data(), 0, static_cast<int>(spoiled.size())), 0) << at;
+  }
+}
+
+TEST(HostileBus, ATextOfTheLeastLengthIsRefused) {
+  Bus::Bytes bytes = Encode(event_t{});
+  bytes[8 + 8 + 4] = 0x80;  // of the sender's name
+  event_t message;
+  for (const auto last :
+       {uint8_t{0}, uint8_t{1}}) {  // -2^31, from which nothing can be taken, and one more
+    bytes[8 + 8 + 4 + 3] = last;
+    EXPECT_LT(message.decode(bytes.data(), 0, static_cast<int>(bytes.size())), 0);
+  }
 }
 
 TEST(Bus, GapsInSeqAreCountedAsDrops) {

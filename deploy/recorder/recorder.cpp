@@ -1,0 +1,160 @@
+#include "deploy/recorder/recorder.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <stdexcept>
+
+namespace chase::recorder {
+namespace {
+
+constexpr double kMega = 1e6, kMinute = 60e6;  // bytes; us
+constexpr int64_t kRetry = 1'000'000;          // us between two tries on a disk that refuses
+constexpr double kPieces = 5.0;                // logs that the heavy minutes are made of
+constexpr double kEnough = 1.2;                // of keep_free_mb, before heavy ones are taken again
+
+}  // namespace
+
+Recorder::Recorder(const RecorderConfig& config, const std::string& name, int64_t utime)
+    : config_(config) {
+  light_.name = config.folder + "/" + name;
+  heavy_.name = light_.name + "-heavy";
+  if (!Open(utime, &light_))
+    throw std::runtime_error(light_.name +
+                             ".lcm: cannot be written; check the folder, its rights "
+                             "and the disk");
+}
+
+Recorder::~Recorder() {
+  Retire(&heavy_);
+  Retire(&light_);
+}
+
+/// NAME.lcm, then NAME-001.lcm and so on; a log that is there already is left alone.
+bool Recorder::Open(int64_t utime, Series* series) {
+  std::string name;
+  do {
+    name = series->count == 0 ? series->name + ".lcm"
+                              : fmt::format("{}-{:03}.lcm", series->name, series->count);
+    ++series->count;
+  } while (std::filesystem::exists(name) && std::filesystem::file_size(name) > 0);
+  try {
+    series->file = std::make_unique<EventFile>(name);
+  } catch (const std::runtime_error&) {
+    --series->count;
+    return false;
+  }
+  series->since = utime;
+  return true;
+}
+
+bool Recorder::IsFull(int64_t utime, const Series& series, double minutes) const {
+  const double mb = static_cast<double>(series.file->bytes()) / kMega;
+  return (config_.rotate_mb > 0.0 && mb >= config_.rotate_mb) ||
+         (minutes > 0.0 && static_cast<double>(utime - series.since) >= minutes * kMinute);
+}
+
+/// Ends the log of a series; an empty one is no log.
+void Recorder::Retire(Series* series) {
+  if (!series->file) return;
+  series->file->Flush();
+  unrecorded_ += series->file->lost();
+  const Old old{series->file->name(), series->file->bytes(), series->last_utime};
+  series->file.reset();
+  if (old.bytes == 0) {
+    std::filesystem::remove(old.name);
+    --series->count;
+  } else if (series == &heavy_) {
+    old_heavy_.push_back(old);
+  } else {
+    light_bytes_ += old.bytes;
+  }
+}
+
+bool Recorder::Put(int64_t utime, const std::string& channel, const uint8_t* data, size_t size,
+                   Series* series) {
+  const double minutes =
+      series == &heavy_ ? config_.heavy_minutes / kPieces : config_.rotate_minutes;
+  if (series->file && IsFull(utime, *series, minutes)) Retire(series);
+  if (!series->file && !Open(utime, series)) return false;
+  series->last_utime = utime;
+  return series->file->Write(utime, channel, data, size);
+}
+
+void Recorder::Add(int64_t utime, const std::string& channel, bool heavy, const uint8_t* data,
+                   size_t size) {
+  const bool apart = heavy && config_.heavy_minutes >= 0.0;
+  if (apart && config_.heavy_minutes == 0.0) return;
+  room_ -= static_cast<int64_t>(size);  // until the next tick looks
+  if (heavy && !heavy_given_up_) MindTheDisk();
+  if ((heavy && heavy_given_up_) || (refused_ && utime < next_try_)) {
+    ++unrecorded_;
+    return;
+  }
+  Series* series = apart ? &heavy_ : &light_;
+  if (Put(utime, channel, data, size, series)) return;
+  unrecorded_ += series->file ? 0 : 1;  // a file counts its own
+  Refused(utime, series);
+}
+
+/// The disk refuses: its log ends, the oldest sweeps and images make room for it, and it is tried
+/// anew in another log.
+void Recorder::Refused(int64_t utime, Series* series) {
+  Retire(series);
+  heavy_given_up_ = true;
+  const bool room = DropOldestHeavy() > 0;
+  if (series == &heavy_) return;
+  refused_ = true;
+  next_try_ = room ? utime : utime + kRetry;
+}
+
+int64_t Recorder::heavy_bytes() const {
+  int64_t bytes = heavy_.file ? heavy_.file->bytes() : 0;
+  for (const Old& old : old_heavy_) bytes += old.bytes;
+  return bytes;
+}
+
+/// Bytes that became free; 0: there are no heavy logs any more.
+int64_t Recorder::DropOldestHeavy() {
+  if (old_heavy_.empty()) Retire(&heavy_);
+  if (old_heavy_.empty()) return 0;
+  const Old old = old_heavy_.front();
+  old_heavy_.pop_front();
+  std::error_code ignored;
+  std::filesystem::remove(old.name, ignored);
+  return old.bytes;
+}
+
+void Recorder::DropOldHeavy(int64_t utime) {
+  const auto age = static_cast<int64_t>(config_.heavy_minutes * kMinute);
+  while (!old_heavy_.empty() && utime - old_heavy_.front().last_utime > age) DropOldestHeavy();
+}
+
+void Recorder::MindTheDisk() {
+  const double keep = config_.keep_free_mb * kMega;
+  while (static_cast<double>(room_) < keep && !old_heavy_.empty()) room_ += DropOldestHeavy();
+  if (static_cast<double>(room_) < keep)
+    heavy_given_up_ = true;
+  else if (static_cast<double>(room_) >= kEnough * keep && !refused_)
+    heavy_given_up_ = false;
+}
+
+void Recorder::FlushAll(int64_t utime) {
+  if (heavy_.file && !heavy_.file->Flush()) Refused(utime, &heavy_);
+  if (!light_.file) return;
+  const bool any = light_.file->bytes() > 0;
+  if (!light_.file->Flush())
+    Refused(utime, &light_);
+  else if (any)
+    refused_ = false;
+}
+
+void Recorder::Tick(int64_t utime, int64_t free_bytes) {
+  FlushAll(utime);
+  DropOldHeavy(utime);
+  room_ = free_bytes;
+  MindTheDisk();
+}
+
+}  // namespace chase::recorder
