@@ -86,6 +86,7 @@ std::optional<PoseEstimate> Odometry::AddImu(const ImuSample& imu) {
     return std::nullopt;
   }
   heard_ = imu.t;
+  sweeps_since_ = 0;
   for (const ImuSample& sample : spikes_.Take(imu)) Take(sample);
   if (!fused_) return started_ ? std::nullopt : std::optional(AtPowerOn(imu.t));
   const double dt = imu.t - live_.t;
@@ -116,6 +117,7 @@ void Odometry::AddSweep(Sweep sweep) {
     pending_.pop_front();
     ++dropped_sweeps_;
   }
+  ++sweeps_since_;
   double end = sweep.start + LastTime(sweep.points);
   if (!imu_.empty()) {
     const double correction = clock_.Correction(end, imu_.newest());

@@ -67,11 +67,12 @@ class Odometry {
   bool SweepReady() const;
   SweepResult ProcessSweep();
 
-  /// True where neither samples nor sweeps have told for so long before t [s] how the body goes on
-  /// that its attitude and place are anybody's guess: to be begun anew.
+  /// True where neither samples nor sweeps have told until a sample of time t [s] how the body goes
+  /// on, for so long that its attitude and place are anybody's guess: to be begun anew.
   bool Outdated(double t) const {
-    constexpr double kLongest = 0.3;  // s: at 1 rad/s and 4 m/s^2, 17 degrees and 0.2 m
-    return fused_ && t - std::max(imu_.newest(), held_) > kLongest;
+    constexpr double kLongest = 0.3, kRare = 0.2;  // s; at 1 rad/s and 4 m/s^2 17 degrees, 0.2 m
+    const double silence = t - heard_;
+    return fused_ && silence > kLongest && sweeps_since_ < silence / kRare;
   }
 
   int64_t dropped_sweeps() const { return dropped_sweeps_; }
@@ -161,6 +162,7 @@ class Odometry {
   int epoch_ = 0;
   Matrix6d unknown_ = Matrix6d::Zero();  // projector on what the last sweep left to inertia
   double held_ = 0.0;                    // last time that a sweep or standing held the state, s
+  int sweeps_since_ = 0;                 // the newest inertial sample
   double heard_ = -1e18;                 // of the newest inertial sample, used or not, s
   int64_t dropped_sweeps_ = 0, dropped_samples_ = 0;
 };

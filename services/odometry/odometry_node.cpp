@@ -105,7 +105,6 @@ void OdometryNode::OnScan(const lidar_scan_t& m) {
     BeginAnew();
     imu_order_ = {};
   }
-  if (odometry_->Outdated(SecondsOf(m.utime))) BeginAnew();
   imu_at_sweep_ = imu_order_.newest();
   odometry_->AddSweep(FromMessage(m, SecondsOf(m.utime)));
   ProcessSweeps();
