@@ -20,15 +20,15 @@ class Random {
 
   /// Standard normal, by Box and Muller.
   double Gaussian() {
-    if (has_spare_) {
-      has_spare_ = false;
-      return spare_;
-    }
-    const double r = std::sqrt(-2.0 * std::log(1.0 - Uniform()));
-    const double angle = 6.283185307179586 * Uniform();
-    spare_ = r * std::sin(angle);
-    has_spare_ = true;
-    return r * std::cos(angle);
+    if (!BeginPair()) return known_ ? spare_ : Radius() * std::sin(Angle());
+    spare_ = Radius() * std::sin(Angle());
+    known_ = true;
+    return Radius() * std::cos(Angle());
+  }
+
+  /// What follows is as if one had been drawn, at a fraction of its price.
+  void SkipGaussian() {
+    if (BeginPair()) known_ = false;
   }
 
  private:
@@ -38,9 +38,20 @@ class Random {
     return z ^ (z >> 31);
   }
 
+  /// False where one of a pair is left, which goes.
+  bool BeginPair() {
+    has_spare_ = !has_spare_;
+    if (!has_spare_) return false;
+    u_ = Uniform();
+    w_ = Uniform();
+    return true;
+  }
+  double Radius() const { return std::sqrt(-2.0 * std::log(1.0 - u_)); }
+  double Angle() const { return 6.283185307179586 * w_; }
+
   uint64_t state_;
-  double spare_ = 0.0;
-  bool has_spare_ = false;
+  double u_ = 0.0, w_ = 0.0, spare_ = 0.0;
+  bool has_spare_ = false, known_ = false;
 };
 
 }  // namespace chase::world

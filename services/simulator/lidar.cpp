@@ -151,9 +151,13 @@ void Lidar::Aim(const TimedPose& body, int lane, RayPacket* rays) const {
 /// what is seen does not shift the numbers of the lasers after it.
 void Lidar::Record(int firing, int ring, const RayPacket& rays, const HitPacket& hits, int lane) {
   const float range = hits.distance[lane];
-  const double noise = config_.noise * random_.Gaussian();
-  const bool lost = random_.Uniform() < config_.dropout;
-  if (lost || !(range >= config_.min_range && range <= config_.max_range)) return;
+  const bool hit = range >= config_.min_range && range <= config_.max_range;
+  double noise = 0.0;
+  if (hit)
+    noise = config_.noise * random_.Gaussian();
+  else
+    random_.SkipGaussian();
+  if (random_.Uniform() < config_.dropout || !hit) return;
   const double measured = kResolution * std::round((range + noise) / kResolution);
   const Vector3f p =
       static_cast<float>(measured) * directions_[static_cast<std::size_t>(firing * kRings + ring)];

@@ -55,6 +55,21 @@ Motion Standing(const Vector3d& p, const Quaterniond& q = Quaterniond::Identity(
 
 Vector3d Point(const Sweep& sweep, std::size_t i) { return {sweep.x[i], sweep.y[i], sweep.z[i]}; }
 
+TEST(Random, SkippedDrawsShiftNothing) {
+  for (unsigned pattern = 0; pattern < 256; ++pattern) {
+    Random all(7), some(7);
+    for (unsigned i = 0; i < 8; ++i) {
+      const double drawn = all.Gaussian();
+      if ((pattern >> i & 1) != 0) {
+        some.SkipGaussian();
+      } else {
+        EXPECT_EQ(some.Gaussian(), drawn) << pattern << " " << i;
+      }
+      EXPECT_EQ(some.Uniform(), all.Uniform());
+    }
+  }
+}
+
 TEST(Lidar, FiresOnceAPeriodClockwiseFromTheBack) {
   EXPECT_NEAR(
       (LaserDirection(0, 7) - Vector3d(-std::cos(kPi / 180), 0, -std::sin(kPi / 180))).norm(), 0.0,
