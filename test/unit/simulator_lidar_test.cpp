@@ -3,6 +3,7 @@
 #include <cmath>
 #include <functional>
 
+#include "common/world/random.h"
 #include "common/world/scenario.h"
 #include "services/simulator/lidar.h"
 
@@ -57,7 +58,7 @@ Vector3d Point(const Sweep& sweep, std::size_t i) { return {sweep.x[i], sweep.y[
 
 TEST(Random, SkippedDrawsShiftNothing) {
   for (unsigned pattern = 0; pattern < 256; ++pattern) {
-    Random all(7), some(7);
+    world::Random all(7), some(7);
     for (unsigned i = 0; i < 8; ++i) {
       const double drawn = all.Gaussian();
       if ((pattern >> i & 1) != 0) {
