@@ -44,6 +44,9 @@ void Observe(const std::string& channel, const bus::Bus::Bytes& bytes, Progress*
   flight_state_t state;
   if (watch != nullptr && channel == "FLIGHT_STATE" && state.decode(bytes.data(), 0, size) > 0)
     watch->Add(state);
+  tracking_t tracking;
+  if (watch != nullptr && channel == "TRACKING" && tracking.decode(bytes.data(), 0, size) > 0)
+    watch->Add(tracking);
   if (progress != nullptr && channel == "SCENARIO" && scenario.decode(bytes.data(), 0, size) > 0)
     progress->SetScenario(scenario);
   if (progress == nullptr && watch == nullptr) return;

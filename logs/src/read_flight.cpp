@@ -14,6 +14,7 @@
 #include "chase/scenario_t.hpp"
 #include "chase/status_t.hpp"
 #include "chase/target_t.hpp"
+#include "chase/tracking_t.hpp"
 #include "chase/truth_t.hpp"
 #include "common/bus/convert.h"
 #include "common/bus/validation.h"
@@ -46,6 +47,7 @@ class Gatherer {
     Take(e, "PLAN", &plans_);
     Take(e, "FAULT", &faults_);
     Take(e, "FLIGHT_STATE", &states_);
+    Take(e, "TRACKING", &tracking_);
     TakeLast(e, "SCENARIO", &scenario_);
     TakeLast(e, "OBSTACLES", &obstacles_);
     status_t status;
@@ -104,10 +106,12 @@ class Gatherer {
     for (const flight_state_t& m : states_)
       if (record->states.empty() || record->states.back().state != m.state)
         record->states.push_back({Time(m.utime), m.state});
-    size_t next = 0;
+    size_t state = 0, tracking = 0;
     for (TruthSample& s : record->truth) {
-      while (next < record->states.size() && record->states[next].t <= s.t) ++next;
-      s.may_stand = next > 0 && MayStand(record->states[next - 1].state, s.speed);
+      while (state < record->states.size() && record->states[state].t <= s.t) ++state;
+      while (tracking < tracking_.size() && Time(tracking_[tracking].utime) <= s.t) ++tracking;
+      const bool descends = tracking > 0 && tracking_[tracking - 1].following == tracking_t::LAND;
+      s.may_stand = MayStand(state > 0 ? record->states[state - 1].state : -1, descends, s.speed);
     }
   }
 
@@ -176,6 +180,7 @@ class Gatherer {
   std::vector<plan_t> plans_;
   std::vector<event_t> faults_;
   std::vector<flight_state_t> states_;
+  std::vector<tracking_t> tracking_;
   std::optional<scenario_t> scenario_;
   std::optional<obstacles_t> obstacles_;
   std::map<std::string, status_t> statuses_;
@@ -187,9 +192,9 @@ int64_t MissionStart(const truth_t& truth) {
   return truth.utime - std::llround(truth.mission_time * 1e6);
 }
 
-bool MayStand(int state, double speed) {
+bool MayStand(int state, bool descends, double speed) {
   constexpr double kTouchdown = 0.75;  // m/s: as fast as control sinks without a velocity
-  if (state == flight_state_t::EMERGENCY) return speed <= kTouchdown;
+  if (descends && speed <= kTouchdown) return true;
   return state == flight_state_t::IDLE || state == flight_state_t::READY ||
          state == flight_state_t::TAKEOFF || state == flight_state_t::LAND ||
          state == flight_state_t::DONE;

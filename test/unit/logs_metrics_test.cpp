@@ -101,10 +101,11 @@ TEST(Metrics, ALandingIsJudgedByItsSpeedAndTheGroundIsNoHarm) {
 }
 
 TEST(Metrics, ATouchOfTheGroundIsALandingByTheFlightsState) {
-  EXPECT_TRUE(MayStand(flight_state_t::LAND, 3.0));
-  EXPECT_TRUE(MayStand(flight_state_t::EMERGENCY, 0.7)) << "as control sinks without a velocity";
-  EXPECT_FALSE(MayStand(flight_state_t::EMERGENCY, 0.8));
-  EXPECT_FALSE(MayStand(flight_state_t::CHASE, 0.1));
+  EXPECT_TRUE(MayStand(flight_state_t::LAND, false, 3.0));
+  EXPECT_TRUE(MayStand(flight_state_t::EMERGENCY, true, 0.7)) << "sinks without a velocity";
+  EXPECT_TRUE(MayStand(-1, true, 0.7)) << "no mission leads it";
+  EXPECT_FALSE(MayStand(-1, true, 0.8));
+  EXPECT_FALSE(MayStand(flight_state_t::CHASE, false, 0.1));
 }
 
 TEST(Metrics, ASegmentThroughThePillarIsBlind) {
