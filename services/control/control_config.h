@@ -25,7 +25,7 @@ struct ControlConfig {
   double reset_distance = 0.9;  ///< m
   double land_speed = 0.5;      ///< m/s
   double descent_speed = 0.4;   ///< m/s
-  double lost_descent = 0.15;   ///< m/s^2
+  double lost_descent = 0.1;    ///< m/s^2
 
   template <class V>
   void Visit(V& v) {
