@@ -47,13 +47,6 @@ using JacobianRows = Eigen::Matrix<double, Eigen::Dynamic, kStates>;
 
 void Symmetrise(ErrorCovariance* P) { *P = (0.5 * (*P + P->transpose())).eval(); }
 
-/// Of an innovation after Student's distribution, whose tails hold the matches that are off. `D`:
-/// of the factorised covariance of k innovations with this normalised square per direction.
-double LogLikelihood(const Eigen::VectorXd& D, double k, double nis) {
-  constexpr double kDegrees = 4.0;  // as usual for robust estimates: Lange et al. 1989
-  return -0.5 * D.array().log().sum() - 0.5 * (kDegrees + k) * std::log1p(k * nis / kDegrees);
-}
-
 /// Kalman update in Joseph's form; refused where the innovation's covariance is singular or the
 /// normalised innovation squared per direction exceeds `largest_nis`. Above `usual_nis` the noise
 /// is taken larger by as much: inertia tells a tenth of a second better than a match that is at
@@ -64,8 +57,7 @@ UpdateResult Correct(const JacobianRows& H, const Eigen::VectorXd& innovation,
   if (solver.info() != Eigen::Success || !(solver.vectorD().minCoeff() > 0.0)) return {};
   const double k = static_cast<double>(innovation.size());
   const double nis = innovation.dot(solver.solve(innovation)) / k;
-  const double likelihood = LogLikelihood(solver.vectorD(), k, nis);
-  if (!(nis <= largest_nis)) return {false, nis, likelihood};
+  if (!(nis <= largest_nis)) return {false, nis};
   if (nis > usual_nis) {
     noise *= nis / usual_nis;
     solver.compute(H * state->P * H.transpose() + noise);
@@ -77,7 +69,7 @@ UpdateResult Correct(const JacobianRows& H, const Eigen::VectorXd& innovation,
   const ErrorCovariance I_KH = ErrorCovariance::Identity() - K * H;
   state->P = (I_KH * state->P * I_KH.transpose() + K * noise * K.transpose()).eval();
   Symmetrise(&state->P);
-  return {true, nis, likelihood};
+  return {true, nis};
 }
 
 /// What the unknown directions U, left at the prediction, do to the known ones V of a match: an
@@ -154,20 +146,6 @@ void DoubtAcceleration(const FilterConfig& config, const Eigen::Matrix3d& unheld
   const double lacking2 = std::pow(config.map_tilt * config.gravity, 2) - known2;
   if (lacking2 > 0.0)
     state->P.block<3, 3>(kAccelBias, kAccelBias) += lacking2 * R.transpose() * unheld * R;
-}
-
-void OpenBiases(const FilterConfig& config, double before, NavState* state) {
-  const Eigen::Matrix3d R = state->R_WB.toRotationMatrix();
-  Eigen::Matrix<double, kStates, 6> G = Eigen::Matrix<double, kStates, 6>::Zero();
-  G.block<3, 3>(kP, 0) = -0.5 * before * before * R;
-  G.block<3, 3>(kV, 0) = -before * R;
-  G.block<3, 3>(kAccelBias, 0).setIdentity();
-  G.block<3, 3>(kTheta, 3) = -before * R;
-  G.block<3, 3>(kGyroBias, 3).setIdentity();
-  Eigen::Matrix<double, 6, 1> step;
-  step << Eigen::Vector3d::Constant(config.accel_bias_step),
-      Eigen::Vector3d::Constant(config.gyro_bias_step);
-  state->P += G * step.cwiseAbs2().asDiagonal() * G.transpose();
 }
 
 void Inject(const ErrorVector& dx, NavState* state) {

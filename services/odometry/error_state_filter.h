@@ -20,9 +20,6 @@ struct FilterConfig {
   double blind_rate = 1.0;               ///< rad/s
   double usual_nis = 6.0;                ///< per direction
   double largest_nis = 100.0;            ///< per direction
-  double accel_bias_step = 0.25;         ///< m/s^2
-  double gyro_bias_step = 0.02;          ///< rad/s
-  double step_evidence = 12.0;           ///< logarithm of a likelihood ratio
   double match_position_floor = 0.0005;  ///< what a scan match never gets below, m
   double match_rotation_floor = 0.0001;  ///< rad
 
@@ -42,9 +39,6 @@ struct FilterConfig {
     v("blind_rate", blind_rate, "the same for rotation, rad/s");
     v("usual_nis", usual_nis, "normalised innovation squared per direction that needs no doubt");
     v("largest_nis", largest_nis, "and above which a match is refused");
-    v("accel_bias_step", accel_bias_step, "of the accelerometer's bias when it steps, m/s^2");
-    v("gyro_bias_step", gyro_bias_step, "the same of the gyroscope, rad/s");
-    v("step_evidence", step_evidence, "logarithm of the likelihood ratio that tells such a step");
     v("match_position_floor", match_position_floor, "no scan match is better than this, m");
     v("match_rotation_floor", match_rotation_floor, "no scan match is better than this, rad");
   }
@@ -98,10 +92,6 @@ void Doubt(const FilterConfig& config, double gap, NavState* state);
 /// projects on, acceleration is never known any better.
 void DoubtAcceleration(const FilterConfig& config, const Eigen::Matrix3d& unheld, NavState* state);
 
-/// The biases may have stepped up to `before` s ago: what that did to the pose and velocity since
-/// is as open as they are.
-void OpenBiases(const FilterConfig& config, double before, NavState* state);
-
 /// Adds `dx` to the state.
 void Inject(const ErrorVector& dx, NavState* state);
 
@@ -118,8 +108,7 @@ void HoldStill(const Eigen::Vector3d& gyro, NavState* state);
 
 struct UpdateResult {
   bool applied = false;
-  double nis = 0.0;             ///< normalised innovation squared per known direction
-  double log_likelihood = 0.0;  ///< of the innovation, up to a constant
+  double nis = 0.0;  ///< normalised innovation squared per known direction
 };
 
 /// Kalman update; leaves the state as it is where the numbers do not allow one or the innovation is

@@ -52,7 +52,6 @@ class HealthMonitor {
   /// the body but along a direction that nothing fixes, its place along it matters to nobody who
   /// flies by what he sees: the velocity does.
   HealthReport At(double t, double position_sigma, double velocity_sigma) const;
-  bool started() const { return started_; }
 
  private:
   HealthReport Degradation(double t) const;

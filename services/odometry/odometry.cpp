@@ -77,7 +77,6 @@ Odometry::Odometry(const OdometryConfig& config)
       level_(config.initial_position),
       drift_(config.drift),
       blend_(config.blend),
-      biases_(config.filter),
       health_(config.health) {}
 
 std::optional<PoseEstimate> Odometry::AddImu(const ImuSample& imu) {
@@ -159,7 +158,7 @@ SweepResult Odometry::ProcessSweep() {
                 std::max(1e-3, prepared.end - prepared.track.front().t);
   const bool extends = !first && Extends(result.match);
   if (extends) unknown_.setIdentity();
-  if ((applied && !biases_.undecided()) || planes_.cells() == 0 || extends)
+  if (applied || planes_.cells() == 0 || extends)
     Learn(prepared, base_.pose());
   if (applied && !first) FollowDrift(result.match);
   Catchup();
@@ -238,21 +237,12 @@ MatchResult Odometry::Match(Prepared* prepared) {
 }
 
 bool Odometry::Apply(const Prepared& prepared, MatchResult* match) {
-  if (!match->valid) {
-    biases_.Forget();
-    return false;
-  }
+  if (!match->valid) return false;
   NavState state = prepared.predicted;
   standing_.See(match->X_WB.p);
   if (standing_.holds()) HoldStill(standing_.gyro(), &state);
-  const PoseMeasurement z{match->X_WB, match->known, match->information};
-  UpdateResult update = Update(config_.filter, z, &state);
-  if (health_.started() && !Blind(prepared.end)) {
-    if (const auto stepped = biases_.Judge(imu_, prepared.track.front(), prepared.end, z, update)) {
-      state = *stepped;
-      update = {true, 0.0, 0.0};
-    }
-  }
+  const UpdateResult update =
+      Update(config_.filter, {match->X_WB, match->known, match->information}, &state);
   match->nis = update.nis;
   match->misfit = update.nis > config_.filter.largest_nis;
   if (!update.applied) return false;

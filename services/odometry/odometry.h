@@ -6,7 +6,6 @@
 #include <string>
 #include <vector>
 
-#include "services/odometry/bias_watch.h"
 #include "services/odometry/deskew.h"
 #include "services/odometry/imu_buffer.h"
 #include "services/odometry/level_frame.h"
@@ -148,7 +147,6 @@ class Odometry {
   LevelFrame level_;
   MapDrift drift_;
   CorrectionBlend blend_;
-  BiasWatch biases_;
   HealthMonitor health_;
 
   bool fused_ = false;    // the IMU carries the state

@@ -87,7 +87,6 @@ class Live {
   }
 
   void Strike(double t, simulator::ImuSample* imu) {
-    if (t >= options_.bias_from) imu->accel += options_.accel_step, imu->gyro += options_.gyro_step;
     if (!Within(options_.spikes_from, t)) return;
     if (burst_ == 0 && random_.Uniform() < options_.spikes_share) {
       burst_ = 1 + static_cast<int>(random_.Next() % static_cast<uint64_t>(options_.spike_length));

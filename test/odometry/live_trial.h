@@ -18,9 +18,6 @@ struct LiveOptions {
   bool imu = true;
   double lidar_out_from = 1e9, lidar_out_to = 1e9;  ///< no sweep begins in this time
   double accel_fault = 0.0;                         ///< of the IMU along x meanwhile, m/s^2
-  /// From then on this is added to what the IMU shows, m/s^2 and rad/s, frame B.
-  double bias_from = 1e9;
-  Eigen::Vector3d accel_step = Eigen::Vector3d::Zero(), gyro_step = Eigen::Vector3d::Zero();
   /// For two seconds this share of bursts of one to `spike_length` samples reads `spike_size` times
   /// full scale (16 g, 2000 deg/s) on an axis.
   double spikes_from = 1e9, spikes_share = 0.02, spike_size = 1.0;
