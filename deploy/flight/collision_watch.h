@@ -29,7 +29,7 @@ class CollisionWatch {
   logs::Scorer score_;
   logs::FlightRecord record_;     // of the scenario alone; says when the mission lasts
   std::optional<int64_t> start_;  // mission time zero, microseconds
-  int state_ = -1;                // of flight_state_t, once it is heard
+  int8_t state_ = -1;             // of flight_state_t, once it is heard
   bool descends_ = false;         // control does, by itself
   std::optional<double> time_;
 };

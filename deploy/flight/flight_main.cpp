@@ -205,11 +205,11 @@ void KeepMemory() {
   mallopt(M_MMAP_THRESHOLD, 32 << 20);
   mallopt(M_TRIM_THRESHOLD, 512 << 20);
   mallopt(M_TOP_PAD, 256 << 20);  // a flight's heap, most of the time
-  void* grown = std::malloc(kPage);
-  const auto begin = (reinterpret_cast<uintptr_t>(grown) + kPage - 1) / kPage * kPage;
-  const auto end = reinterpret_cast<uintptr_t>(sbrk(0));
+  auto* grown = static_cast<char*>(std::malloc(kPage));
+  char* begin = grown + (kPage - reinterpret_cast<uintptr_t>(grown) % kPage) % kPage;
+  auto* end = static_cast<char*>(sbrk(0));
+  if (begin < end) madvise(begin, static_cast<size_t>(end - begin), MADV_HUGEPAGE);
   std::free(grown);
-  if (begin < end) madvise(reinterpret_cast<void*>(begin), end - begin, MADV_HUGEPAGE);
 }
 
 }  // namespace
