@@ -158,8 +158,7 @@ SweepResult Odometry::ProcessSweep() {
                 std::max(1e-3, prepared.end - prepared.track.front().t);
   const bool extends = !first && Extends(result.match);
   if (extends) unknown_.setIdentity();
-  if (applied || planes_.cells() == 0 || extends)
-    Learn(prepared, base_.pose());
+  if (applied || planes_.cells() == 0 || extends) Learn(prepared, base_.pose());
   if (applied && !first) FollowDrift(result.match);
   Catchup();
   result.registered = Registered(prepared);
