@@ -13,8 +13,8 @@ namespace chase::odometry {
 
 /// IMU and LIDAR_SCAN in; POSE at every IMU sample (without IMU: at every sweep) and
 /// SCAN_REGISTERED out. Begins anew, in another frame, where the IMU's clock was set back, or the
-/// LiDAR's while there is no IMU to tell the time, and where nothing came for so long that the state
-/// is outdated.
+/// LiDAR's while there is no IMU to tell the time, and where nothing came for so long that the
+/// state is outdated.
 class OdometryNode : public bus::Node {
  public:
   OdometryNode(bus::Bus& bus, const OdometryConfig& config);
