@@ -54,6 +54,9 @@ struct ControlConfig {
 
   /// The least that a proof has to keep clear, m.
   double hard_radius() const { return drone_radius + tracking_tube; }
+  /// The largest deviation of a velocity that is better than none, m/s: thrust that is known to
+  /// `lost_descent` leaves a sinking body, whose drag alone brakes it, that uncertain.
+  double UsableVelocitySigma() const { return lost_descent / drag.z(); }
   std::string Problem() const;
 };
 

@@ -20,23 +20,23 @@ namespace {
 constexpr int kBurst = 2;     // ticks over which queued poses may come
 constexpr size_t kLists = 8;  // 0.4 s at 20 Hz: plans name none older than 0.3 s
 
-Estimate FromMessage(const pose_t& m) {
-  return {bus::ToVector(m.pos), bus::ToVector(m.vel), bus::ToQuaternion(m.orientation),
-          bus::ToVector(m.accel)};
-}
-
 double LargestSigma(const Eigen::Matrix3d& covariance) {
   return std::sqrt(
       std::max(0.0, covariance.selfadjointView<Eigen::Lower>().eigenvalues().maxCoeff()));
 }
 
-// A pose that odometry stands for is good for plans: planning allows for a frame that drifts. A
-// velocity is good for braking while it errs by less than the speed of landing.
-Health HealthOf(const pose_t& m, const ControlConfig& config) {
+Estimate FromMessage(const pose_t& m) {
   const Eigen::Map<const Eigen::Matrix<double, 9, 9, Eigen::RowMajor>> P(m.local_covariance);
-  const double speed = LargestSigma(P.block<3, 3>(3, 3));
-  if (m.health == pose_t::HEALTH_STARTING || speed > config.land_speed) return Health::kStarting;
-  return m.health == pose_t::HEALTH_LOST ? Health::kLost : Health::kUsable;
+  return {bus::ToVector(m.pos), bus::ToVector(m.vel), bus::ToQuaternion(m.orientation),
+          bus::ToVector(m.accel), LargestSigma(P.block<3, 3>(3, 3))};
+}
+
+// A pose that odometry stands for is good for plans while its velocity is: planning allows for a
+// frame that drifts.
+Health HealthOf(const pose_t& m, double velocity_sigma, const ControlConfig& config) {
+  if (m.health == pose_t::HEALTH_STARTING) return Health::kStarting;
+  const bool lost = m.health == pose_t::HEALTH_LOST || velocity_sigma > config.land_speed;
+  return lost ? Health::kLost : Health::kUsable;
 }
 
 }  // namespace
@@ -108,14 +108,15 @@ void ControlNode::OnPose(const pose_t& message) {
   }
   if (message.health != pose_t::HEALTH_STARTING && flown_.Change(message.epoch))
     controller_.TurnFrame(math::Yaw(bus::ToQuaternion(message.orientation)));
-  const Health health = HealthOf(message, config_);
+  const Estimate estimate = FromMessage(message);
+  const Health health = HealthOf(message, estimate.velocity_sigma, config_);
   pose_reason_ = health == Health::kUsable ? ""
                  : message.reason.empty()  ? "uncertain"
                                            : message.reason;
   std::optional<Setpoint> setpoint;
   {
     auto timer = bus_.Time("control");
-    setpoint = controller_.Update(t, FromMessage(message), health);
+    setpoint = controller_.Update(t, estimate, health);
   }
   if (setpoint) Send(message.utime, *setpoint);
   if (std::abs(message.utime - last_tracking_) >= kTick) SendTracking(message.utime);

@@ -12,6 +12,7 @@ namespace {
 
 constexpr double kJumpBack = 1.0;  // s; less is jitter between publishers
 constexpr double kAtRest = 0.3;    // m/s: gusts about a wind of 3 m/s stir a hovering body by less
+constexpr double kMeasured = 0.1;  // m/s: sweeps leave 0.03, a second without them adds 0.1
 
 bool Usable(const Estimate& e) {
   return e.p_WB.allFinite() && e.v_WB.allFinite() && e.a_WB.allFinite() &&
@@ -66,7 +67,7 @@ std::optional<Setpoint> Controller::Answer(double t, const Estimate& estimate, H
   const bool finite = Usable(estimate);
   if (health != Health::kUsable || !finite)
     return WithoutPose(t, estimate, finite ? health : Health::kStarting, dt);
-  last_usable_ = t;
+  if (estimate.velocity_sigma <= kMeasured) last_measured_ = t;
   last_estimate_ = estimate;
   reckoning_.Begin(t, estimate);
   last_yaw_ = math::Yaw(estimate.R_WB);
@@ -143,15 +144,19 @@ std::optional<Setpoint> Controller::WithoutPose(double t, const Estimate& estima
                                                 double dt) {
   if (!flying_) return std::nullopt;
   lost_ = true;
-  const bool inertial = health == Health::kLost;
-  if (!spot_ && !is_down() && t - last_usable_ <= world::kMostAge.velocity) {
+  const bool known = health == Health::kLost;
+  const bool inertial = known && estimate.velocity_sigma <= config_.UsableVelocitySigma();
+  if (!spot_ && !is_down() && t - last_measured_ <= world::kMostAge.velocity) {
     landing_ = Landing(config_, config_.land_speed);
     if (inertial) reckoning_.Begin(t, estimate);
     return Brake(reckoning_.At(t));
   }
   following_ = Following::kLand;
-  const double lift = inertial ? landing_.Lift(estimate, dt) : -config_.lost_descent;
-  return is_down() ? Off() : law_.Level(last_yaw_, lift);
+  const double lift = known ? landing_.Lift(estimate, dt) : -config_.lost_descent;
+  if (is_down()) return Off();
+  if (!inertial) return law_.Level(last_yaw_, lift);
+  const Setpoint setpoint = law_.Sink(estimate, last_yaw_, lift);
+  return Finite(setpoint) ? setpoint : law_.Level(last_yaw_, -config_.lost_descent);
 }
 
 std::optional<Setpoint> Controller::Blind(double silence) {

@@ -94,7 +94,7 @@ class Controller {
   ErrorBound bound_;
   std::optional<double> last_t_;
   Estimate last_estimate_;
-  double last_usable_ = 0.0;  // s
+  double last_measured_ = 0.0;  // s
   bool flying_ = false, lost_ = false;
   bool lands_ = false;  // a landing is asked for
   bool cut_ = false;

@@ -22,10 +22,15 @@ constexpr double kMostIntegral = 1.0;  // m/s^2
 
 double Landing::Lift(const Estimate& estimate, double dt) {
   Feel(estimate.a_WB.z() - lift_, dt);
+  return lift_ = LiftFor(estimate, dt);
+}
+
+double Landing::LiftFor(const Estimate& estimate, double dt) {
+  const double doubt = estimate.velocity_sigma / usable_sigma_;
+  if (doubt > 1.0) return std::max(kLeastLift, blind_lift_ * doubt * doubt);
   const double error = -speed_ - estimate.v_WB.z();
   integral_ = std::clamp(integral_ + kIntegralGain * error * dt, -kMostIntegral, kMostIntegral);
-  lift_ = std::clamp(gain_ * error + integral_, kLeastLift, kMostLift);
-  return lift_;
+  return std::clamp(gain_ * error + integral_, kLeastLift, kMostLift);
 }
 
 void Landing::Feel(double support, double dt) {

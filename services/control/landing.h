@@ -13,9 +13,13 @@ class Landing {
  public:
   /// Sinks at `speed`, m/s.
   Landing(const ControlConfig& config, double speed)
-      : gain_(config.velocity_gain.z()), speed_(speed) {}
+      : gain_(config.velocity_gain.z()),
+        speed_(speed),
+        blind_lift_(-config.lost_descent),
+        usable_sigma_(config.UsableVelocitySigma()) {}
 
-  /// Thrust beyond that of hovering, m/s^2, after `dt` s with the last one.
+  /// Thrust beyond that of hovering, m/s^2, after `dt` s with the last one. A velocity that is not
+  /// usable is left alone: ever less thrust, so that the ground is felt at last.
   double Lift(const Estimate& estimate, double dt);
 
   /// True once the ground has been felt for long enough; stays true.
@@ -23,8 +27,9 @@ class Landing {
 
  private:
   void Feel(double support, double dt);
+  double LiftFor(const Estimate& estimate, double dt);
 
-  double gain_, speed_;
+  double gain_, speed_, blind_lift_, usable_sigma_;
   double lift_ = 0.0, integral_ = 0.0;  // m/s^2
   double support_ = 0.0;                // felt of late, over mass, m/s^2
   double supported_ = 0.0;              // for this long, s

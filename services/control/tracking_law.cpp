@@ -81,8 +81,12 @@ Setpoint TrackingLaw::Track(const Estimate& estimate, const Reference& now, cons
 }
 
 Setpoint TrackingLaw::Brake(const Estimate& estimate, double yaw) const {
-  const Vector3d wanted =
-      kGravity * Vector3d::UnitZ() + trim_ - config_.velocity_gain.cwiseProduct(estimate.v_WB);
+  return Sink(estimate, yaw, trim_.z() - config_.velocity_gain.z() * estimate.v_WB.z());
+}
+
+Setpoint TrackingLaw::Sink(const Estimate& estimate, double yaw, double lift) const {
+  Vector3d wanted = trim_ - config_.velocity_gain.cwiseProduct(estimate.v_WB);
+  wanted.z() = kGravity + lift;
   const Vector3d thrust = LimitThrust(wanted, config_);
   Setpoint result = AttitudeFor(thrust, Vector3d::Zero(), yaw, 0.0);
   result.thrust = AlongBody(thrust, estimate);

@@ -21,6 +21,7 @@ struct Estimate {
   Eigen::Vector3d v_WB = Eigen::Vector3d::Zero();  ///< m/s
   Eigen::Quaterniond R_WB = Eigen::Quaterniond::Identity();
   Eigen::Vector3d a_WB = Eigen::Vector3d::Zero();  ///< without gravity, m/s^2
+  double velocity_sigma = 0.0;                     ///< along the axis where it is largest, m/s
 };
 
 /// What the attitude loop is asked for.
@@ -58,7 +59,10 @@ class TrackingLaw {
   /// Against the velocity and the wind, to rest, within the limits: needs no position.
   Setpoint Brake(const Estimate& estimate, double yaw) const;
 
-  /// Level attitude at the given yaw, thrust `lift` (m/s^2) beyond that of hovering.
+  /// The same across, and thrust `lift` (m/s^2) beyond that of hovering.
+  Setpoint Sink(const Estimate& estimate, double yaw, double lift) const;
+
+  /// Level attitude at the given yaw, thrust `lift` beyond that of hovering.
   Setpoint Level(double yaw, double lift) const;
 
   /// Frame W has turned by `yaw`, rad.

@@ -72,7 +72,8 @@ class Quadrotor {
   const BodyState& state() const { return state_; }
   /// True while a foot touches the ground.
   bool on_ground() const { return on_ground_; }
-  const Eigen::Vector4d& motor_thrusts() const { return motors_; }  ///< N
+  const Eigen::Vector4d& motor_thrusts() const { return motors_; }  ///< as asked for, N
+  double thrust() const { return MotorLoad().force.norm(); }        ///< that they give together, N
 
  private:
   struct Load {

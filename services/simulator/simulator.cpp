@@ -10,6 +10,7 @@ using Eigen::Vector3d;
 
 constexpr double kStep = 1e-3;        // s
 constexpr double kDescentGain = 2.0;  // 1/s
+constexpr double kHoverMemory = 2.0;  // s, of the autopilot's hover thrust
 constexpr double kPi = 3.14159265358979323846;
 
 /// Standing on its legs where the scenario puts it, or in the air if that is higher.
@@ -92,6 +93,14 @@ void Simulator::SetSetpoint(const AttitudeSetpoint& setpoint, double t) {
 
 bool Simulator::SetpointFresh() const { return now() - setpoint_time_ <= config_.setpoint_timeout; }
 
+/// What hovering takes, learned by thrust asked for over acceleration felt, as PX4's hover thrust
+/// estimator does: motors and mass are not what an autopilot was told either.
+void Simulator::LearnHoverThrust() {
+  const double felt = quadrotor_.thrust() / config_.vehicle.TrueMass();
+  if (!SetpointFresh() || !setpoint_.motors || quadrotor_.on_ground() || felt < kGravity / 2) return;
+  hover_thrust_ += kStep / kHoverMemory * (setpoint_.thrust / felt * kGravity - hover_thrust_);
+}
+
 /// The setpoint while it is fresh; without one, level descent in the air and rest on the ground.
 AttitudeSetpoint Simulator::ActiveSetpoint() const {
   if (SetpointFresh()) return setpoint_;
@@ -100,7 +109,7 @@ AttitudeSetpoint Simulator::ActiveSetpoint() const {
   descent.orientation = Level(body.q);
   if (quadrotor_.on_ground() || steps_ == 0) return descent;
   const double wanted = -config_.descent_speed - body.v.z();
-  descent.thrust = std::clamp(kGravity + kDescentGain * wanted, 0.0, config_.vehicle.max_thrust);
+  descent.thrust = std::clamp(hover_thrust_ + kDescentGain * wanted, 0.0, config_.vehicle.max_thrust);
   return descent;
 }
 
@@ -110,6 +119,7 @@ void Simulator::StepPhysics() {
   const Wrench wrench =
       attitude_loop_.Step(ActiveSetpoint(), quadrotor_.state(), quadrotor_.on_ground(), kStep);
   quadrotor_.Step(resting ? Wrench{} : wrench, wind_.velocity() + gust_, kStep);
+  LearnHoverThrust();
   battery_.Draw(quadrotor_.motor_thrusts().sum() / (config_.vehicle.TrueMass() * kGravity), kStep);
   ++steps_;
 }

@@ -96,6 +96,7 @@ class Simulator {
   Truth TruthNow() const;
   std::optional<Image> TakeFrame(const Truth& truth);
   void StepPhysics();
+  void LearnHoverThrust();
   AttitudeSetpoint ActiveSetpoint() const;
   bool SetpointFresh() const;
   double now() const { return static_cast<double>(steps_) * 1e-3; }
@@ -118,6 +119,7 @@ class Simulator {
   AttitudeSetpoint setpoint_;
   Eigen::Vector3d gust_ = Eigen::Vector3d::Zero();  // of a fault, m/s
   double setpoint_time_ = -1e9;
+  double hover_thrust_ = kGravity;  // that the flight controller has learned, m/s^2
 };
 
 }  // namespace chase::simulator

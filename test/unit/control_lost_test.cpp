@@ -45,6 +45,7 @@ class Flight {
       const Vector3d v = body.v;
       Estimate estimate = body.Measured();
       estimate.a_WB = a_;
+      estimate.velocity_sigma = velocity_sigma;
       if (health != Health::kUsable) {
         estimate.p_WB += Vector3d(30, 0, -50);
         estimate.v_WB += (lost_for_ += kStep) * drift;
@@ -54,7 +55,7 @@ class Flight {
       if (!setpoint.motors && off_at < 0.0) off_at = t;
       body.Step(setpoint);
       if (body.p.z() < 0.0) {
-        if (down_at < 0.0) down_at = t, impact = -v.z();
+        if (down_at < 0.0) down_at = t, impact = -v.z(), skid = v.head<2>().norm();
         body.p.z() = 0.0, body.v.setZero();
       }
       a_ = (body.v - v) / kStep;
@@ -67,6 +68,7 @@ class Flight {
   Vector3d drift = Vector3d::Zero();
   Setpoint setpoint;
   double t = 0.0, down_at = -1.0, off_at = -1.0, impact = 0.0, fastest = 0.0;
+  double skid = 0.0, velocity_sigma = 0.0;
 
  private:
   Vector3d a_ = Vector3d::Zero();
@@ -108,6 +110,46 @@ TEST(LostPose, LandsOnceTheVelocityIsTooOldAndStopsTheMotorsOnTheGround) {
       EXPECT_TRUE(flight.controller.is_down());
       EXPECT_EQ(flight.setpoint.thrust, 0.0);
     }
+}
+
+TEST(LostPose, LandsAgainstTheWindAndWithoutSkidding) {
+  Flight flight({0, 0, 2});
+  flight.drift = {0.03, -0.02, 0.02};
+  flight.body.wind = {1.5, 0.0, 0.0};
+  flight.controller.AddPlan(PointPlan({0, 0, 2}));
+  flight.Fly(20.0, Health::kUsable);
+  flight.body.wind = {3.0, 1.0, 0.0};
+  flight.Fly(35.0, Health::kLost);
+  ASSERT_GT(flight.down_at, 0.0);
+  EXPECT_LT(flight.skid, 0.35);
+  EXPECT_LT(flight.impact, 0.75);
+}
+
+TEST(LostPose, HoldsSinceTheVelocityWasMeasuredNotSinceThePoseWasLost) {
+  Flight flight({0, 0, 2});
+  flight.controller.AddPlan(PointPlan({0, 0, 2}));
+  flight.Fly(5.0, Health::kUsable);
+  flight.velocity_sigma = 0.2;
+  flight.Fly(6.5, Health::kUsable);
+  EXPECT_NE(flight.controller.following(), Following::kBrake);
+  flight.Fly(6.9, Health::kLost);
+  EXPECT_EQ(flight.controller.following(), Following::kBrake);
+  flight.Fly(7.2, Health::kLost);
+  EXPECT_EQ(flight.controller.following(), Following::kLand);
+}
+
+TEST(LostPose, FeelsTheGroundWithoutAVelocity) {
+  Flight flight({0, 0, 2});
+  flight.body.mass_factor = 0.97;
+  flight.controller.AddPlan(PointPlan({0, 0, 2}));
+  flight.Fly(5.0, Health::kUsable);
+  while (flight.t < 40.0) {
+    flight.velocity_sigma = 0.1 * (flight.t - 5.0) + 0.6;
+    flight.Fly(flight.t + 0.1, Health::kLost);
+  }
+  ASSERT_GT(flight.down_at, 0.0);
+  EXPECT_GT(flight.off_at, flight.down_at);
+  EXPECT_LT(flight.impact, 1.0);
 }
 
 TEST(LostPose, MotorsRunAsLongAsItIsInTheAir) {

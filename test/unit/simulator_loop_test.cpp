@@ -78,6 +78,22 @@ TEST(Simulator, DescendsLevelWhenSetpointsStop) {
   EXPECT_LT(output.truth.body.v.norm(), 1e-3);
 }
 
+TEST(Simulator, DescendsAtItsSpeedWithMotorsThatGiveLess) {
+  const auto gym = Gym();
+  SimulatorConfig weak = Blind();
+  weak.vehicle.thrust_error = -0.1;
+  Simulator simulator(gym, weak);
+  const Vector3d place = gym.chaser.start + Vector3d(0.0, 0.0, 4.0);
+  Output output = simulator.Advance(0.0);
+  for (int i = 1; i < 2400; ++i) {
+    const double t = 0.005 * i;
+    if (t < 9.0) simulator.SetSetpoint(Pilot(output.truth.body, place), t);
+    output = simulator.Advance(t);
+    EXPECT_GT(output.truth.body.v.z(), t < 9.0 ? -1.0 : -0.65) << t;
+  }
+  EXPECT_NEAR(output.truth.body.v.z(), -0.5, 0.1);
+}
+
 TEST(Simulator, RefusesAnOrientationOfNoLength) {
   Simulator simulator(Gym(), Blind());
   AttitudeSetpoint bad;
