@@ -27,10 +27,10 @@ double Landing::Lift(const Estimate& estimate, double dt) {
 
 double Landing::LiftFor(const Estimate& estimate, double dt) {
   const double doubt = estimate.velocity_sigma / usable_sigma_;
-  if (doubt > 1.0) return std::max(kLeastLift, blind_lift_ * doubt * doubt);
+  const double most = doubt > 1.0 ? std::max(kLeastLift, blind_lift_ * doubt * doubt) : kMostLift;
   const double error = -speed_ - estimate.v_WB.z();
   integral_ = std::clamp(integral_ + kIntegralGain * error * dt, -kMostIntegral, kMostIntegral);
-  return std::clamp(gain_ * error + integral_, kLeastLift, kMostLift);
+  return std::clamp(gain_ * error + integral_, kLeastLift, most);
 }
 
 void Landing::Feel(double support, double dt) {

@@ -19,7 +19,7 @@ class Landing {
         usable_sigma_(config.UsableVelocitySigma()) {}
 
   /// Thrust beyond that of hovering, m/s^2, after `dt` s with the last one. A velocity that is not
-  /// usable is left alone: ever less thrust, so that the ground is felt at last.
+  /// usable cannot make it climb: ever less thrust, so that the ground is felt at last.
   double Lift(const Estimate& estimate, double dt);
 
   /// True once the ground has been felt for long enough; stays true.

@@ -296,11 +296,19 @@ PlanResult Pilot::Search(double t0, const Start& start, const BodyEstimate& body
 }
 
 // Braking while it moves; else where it is, for as long as that can be certified.
+// From what moves and is seen no more there is no evading: its forecast swells until it is
+// everywhere, and the way out leads where nobody looks.
 PlanResult Pilot::Rest(double t0, const Start& start) const {
-  PlanResult plan = RestPlan(config_.planner, Request(t0, start));
+  const bool sees = SeesObstacles(t0 - config_.latency);
+  PlanRequest request = Request(t0, start);
+  std::vector<world::Obstacle>& known = request.obstacles;
+  if (!sees)
+    known.erase(std::remove_if(known.begin(), known.end(), [](const auto& o) { return o.moving; }),
+                known.end());
+  PlanResult plan = RestPlan(config_.planner, request);
   plan.yaw = {start.yaw.yaw};
   if (plan.reason.empty() && IsAtRest(start.state)) plan.verdict = Verdict::kWait;
-  if (SeesObstacles(t0 - config_.latency)) return plan;
+  if (sees) return plan;
   plan.proofs.clear();  // of a world that nobody has seen for a while
   plan.certified_clearance = -1.0;
   plan.reason = "obstacles are not heard of" + (plan.reason.empty() ? "" : "; " + plan.reason);

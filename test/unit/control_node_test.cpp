@@ -225,12 +225,12 @@ TEST(ControlNode, GoesByTheUncertaintyNotByTheHealthAlone) {
   EXPECT_EQ(after(0.0, 1.0, 0.99 * landing, pose_t::HEALTH_DEGRADED).first, +tracking_t::PLAN);
   EXPECT_EQ(after(0.0, 0.0, 0.5 * landing, pose_t::HEALTH_LOST).first, +tracking_t::BRAKE);
   EXPECT_EQ(after(0.0, 0.0, 1.01 * landing, pose_t::HEALTH_DEGRADED).first, +tracking_t::BRAKE);
-  const double blind = 9.81 - ControlConfig().lost_descent;  // goes by no vertical velocity
+  const double blind = 9.81 - ControlConfig().lost_descent;  // at most, by a doubtful velocity
   for (const auto health : {pose_t::HEALTH_DEGRADED, pose_t::HEALTH_LOST}) {
     const auto [following, thrust] =
         after(2.1, 0.0, 1.01 * ControlConfig().UsableVelocitySigma(), health);
     EXPECT_EQ(following, +tracking_t::LAND);
-    EXPECT_NEAR(thrust, blind, 0.01);
+    EXPECT_LE(thrust, blind);
   }
   EXPECT_LT(after(2.1, 0.0, 0.5 * landing, pose_t::HEALTH_LOST).second, blind - 1.0);
 }
