@@ -17,7 +17,6 @@ namespace chase::control {
 
 namespace {
 
-constexpr int kBurst = 2;     // ticks over which queued poses may come
 constexpr size_t kLists = 8;  // 0.4 s at 20 Hz: plans name none older than 0.3 s
 
 double LargestSigma(const Eigen::Matrix3d& covariance) {
@@ -97,11 +96,11 @@ void ControlNode::OnPlan(const plan_t& message) {
 
 void ControlNode::OnPose(const pose_t& message) {
   const double t = bus::Seconds(message.utime, Origin(message.utime));
-  late_ = reckoned_ && t < *reckoned_ - world::kMostAge.pose && ticks_late_ < kBurst;
-  if (late_) return;
+  if (reckoned_ && t < *reckoned_ - world::kMostAge.pose && Silence() <= world::kMostAge.velocity)
+    return;
   reckoned_.reset();
   pose_t_ = t;
-  ticks_without_pose_ = ticks_late_ = 0;
+  ticks_without_pose_ = 0;
   if (epoch_.Change(message.epoch)) {
     controller_.ForgetPlans();
     lists_.clear();
@@ -124,11 +123,11 @@ void ControlNode::OnPose(const pose_t& message) {
 
 // Without poses: by dead reckoning, until the autopilot's own limit on silence may act. Ticks are
 // counted rather than stamps compared: whoever sets the clock does not make the pose old. Poses
-// from before the time that has been reckoned to were queued while their sender hung and come in a
-// burst; those that are late for longer have to do.
+// from before the time that has been reckoned to are left out: they were queued while their sender
+// hung, or come late, and a loop of these gains bears no 0.3 s of delay.
 void ControlNode::Tick(int64_t utime) {
-  if (late_) ++ticks_late_;
-  const double silence = bus::Seconds(ticks_without_pose_++ * kTick, 0);
+  const double silence = Silence();
+  ++ticks_without_pose_;
   if (silence <= world::kMostAge.pose || silence > world::kMostAge.velocity) return;
   const std::optional<Setpoint> setpoint = controller_.Blind(silence);
   if (!setpoint) return;

@@ -37,6 +37,7 @@ class ControlNode : public bus::Node {
   void Send(int64_t utime, const Setpoint& setpoint);
   void SendTracking(int64_t utime);
   std::string Reason() const;
+  double Silence() const { return 1e-6 * static_cast<double>(ticks_without_pose_ * kTick); }
   int64_t Origin(int64_t utime);
 
   bus::Bus& bus_;
@@ -47,10 +48,9 @@ class ControlNode : public bus::Node {
   std::deque<std::pair<int32_t, std::vector<world::Obstacle>>> lists_;  // by seq, newest last
   std::optional<int64_t> origin_;  // utime that the core's seconds count from
   int64_t last_tracking_ = 0;
-  int ticks_without_pose_ = 0, ticks_late_ = 0;
+  int ticks_without_pose_ = 0;
   double pose_t_ = 0.0;             // of the last pose, s
   std::optional<double> reckoned_;  // time that was reckoned to without poses, s
-  bool late_ = false;               // a pose from before that has come
   std::string pose_reason_;         // why the pose is not usable
   int64_t n_plans_ = 0, n_refused_ = 0;
 };
