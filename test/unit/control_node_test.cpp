@@ -360,7 +360,7 @@ TEST(ControlNode, GoesByPosesThatAreAlwaysLateForWantOfOthers) {
     return bench.tracking.back().following;
   };
   EXPECT_EQ(late(0, 300), +tracking_t::BRAKE) << "by dead reckoning";
-  EXPECT_EQ(late(300, 450), +tracking_t::PLAN) << "that is worth no more";
+  EXPECT_EQ(late(300, 450), +tracking_t::STOP) << "which is worth no more";
 }
 
 TEST(ControlNode, SaysTwentyTimesASecondHowWellItFollows) {
