@@ -12,6 +12,7 @@ namespace {
 constexpr double kKnotStep = 0.005;     // s, of the motion over a sweep
 constexpr double kLongestReplay = 3.0;  // s of inertial samples kept for late sweeps
 constexpr double kWaitForImu = 0.08;    // s that a sweep may be ahead of the IMU
+constexpr size_t kMostWaiting = 5;      // sweeps that wait for samples that come late: 0.5 s
 constexpr double kUsualGap = 0.25;      // s between sweeps that were of use
 constexpr double kHoldLag = 0.15;       // s for which a sweep may still come while it stands
 constexpr double kLeastTurn = 1e-2;     // of known directions that is one found
@@ -85,6 +86,7 @@ std::optional<PoseEstimate> Odometry::AddImu(const ImuSample& imu) {
     return std::nullopt;
   }
   heard_ = imu.t;
+  if (sweeps_since_ > 0) samples_late_ = imu.t < newest_sweep_ - kWaitForImu;
   sweeps_since_ = 0;
   for (const ImuSample& sample : spikes_.Take(imu)) Take(sample);
   if (!fused_) return started_ ? std::nullopt : std::optional(AtPowerOn(imu.t));
@@ -122,13 +124,16 @@ void Odometry::AddSweep(Sweep sweep) {
     const double correction = clock_.Correction(end, imu_.newest());
     sweep.start += correction, end += correction;
   }
+  newest_sweep_ = end;
   pending_.push_back({std::move(sweep), imu_.newest(), end});
 }
 
 bool Odometry::SweepReady() const {
   if (pending_.empty() || Aligns()) return false;
-  if (!fused_ || pending_.size() > 1) return true;
   const double end = pending_.front().end;
+  const bool late = fused_ && samples_late_ && sweeps_since_ < 2;
+  if (late && pending_.size() <= kMostWaiting) return imu_.newest() >= end;
+  if (!fused_ || pending_.size() > 1) return true;
   return imu_.newest() >= end || imu_.newest() < end - kWaitForImu;
 }
 

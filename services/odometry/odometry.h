@@ -161,6 +161,8 @@ class Odometry {
   Matrix6d unknown_ = Matrix6d::Zero();  // projector on what the last sweep left to inertia
   double held_ = 0.0;                    // last time that a sweep or standing held the state, s
   int sweeps_since_ = 0;                 // the newest inertial sample
+  bool samples_late_ = false;            // behind the last sweep, by more than jitter
+  double newest_sweep_ = -1e18;          // end of the sweep that came last, s
   double heard_ = -1e18;                 // of the newest inertial sample, used or not, s
   int64_t dropped_sweeps_ = 0, dropped_samples_ = 0;
 };

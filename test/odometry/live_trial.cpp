@@ -5,6 +5,8 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <deque>
+#include <utility>
 
 #include "common/world/random.h"
 #include "services/odometry/odometry.h"
@@ -75,14 +77,19 @@ class Live {
     Steer(t, out.truth);
     if (Out(t)) out.imu.accel.x() += options_.accel_fault;
     Strike(t, &out.imu);
-    if (options_.imu) See(odometry_.AddImu({t, out.imu.accel, out.imu.gyro}), out.truth);
+    truth_.emplace_back(t, out.truth);
+    if (truth_.size() > 400) truth_.pop_front();
+    if (options_.imu) waiting_.push_back({t, out.imu.accel, out.imu.gyro});
+    const double delay = Within(options_.delay_from, t) ? options_.imu_delay : 0.0;
+    for (; !waiting_.empty() && waiting_.front().t <= t - delay; waiting_.pop_front())
+      See(odometry_.AddImu(waiting_.front()));
     if (out.sweep && Within(options_.clock_from, t)) out.sweep->start += options_.clock_step;
     if (out.sweep && !Out(out.sweep->start)) odometry_.AddSweep(FromSimulator(*out.sweep));
     while (odometry_.SweepReady()) {
       const SweepResult result = odometry_.ProcessSweep();
       if (!result.registered) continue;
       if (figures_.sweeps++ > 0 && !result.applied) ++figures_.refused;
-      See(result.pose, out.truth);
+      See(result.pose);
     }
   }
 
@@ -113,8 +120,11 @@ class Live {
     simulator_.SetSetpoint({setpoint.R_WB, setpoint.w_WB_B, setpoint.thrust}, t);
   }
 
-  void See(const std::optional<PoseEstimate>& pose, const simulator::Truth& truth) {
+  void See(const std::optional<PoseEstimate>& pose) {
     if (!pose || pose->health.health == Health::kStarting) return;
+    const auto later = [](const auto& entry, double t) { return entry.first < t - 1e-6; };
+    const auto at = std::lower_bound(truth_.begin(), std::prev(truth_.end()), pose->t, later);
+    const simulator::Truth& truth = at->second;
     figures_.lost += pose->health.health == Health::kLost ? 1 : 0;
     figures_.epochs = pose->epoch;
     if (pose->t < options_.judge_from) return;
@@ -136,6 +146,7 @@ class Live {
       b.col(static_cast<long>(i)) = pair.truth;
       squares += pair.error.cwiseAbs2();
       figures_.worst = std::max(figures_.worst, pair.error.norm());
+      figures_.worst_velocity = std::max(figures_.worst_velocity, pair.velocity_error);
       figures_.moved = std::max(figures_.moved, (pair.error - pairs_[0].error).norm());
       for (int k = 0; k < 3; ++k)
         figures_.covered[k] += std::abs(pair.error[k]) <= 3.0 * pair.sigma[k] ? 1.0 / n : 0.0;
@@ -176,6 +187,8 @@ class Live {
   world::Random random_{3};
   int burst_ = 0;  // samples that a spike still lasts
   Vector3d spike_ = Vector3d::Zero();
+  std::deque<ImuSample> waiting_;                          // that come late
+  std::deque<std::pair<double, simulator::Truth>> truth_;  // of late
   std::vector<Pair> pairs_;
   LiveFigures figures_;
 };

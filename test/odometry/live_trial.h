@@ -24,6 +24,8 @@ struct LiveOptions {
   int spike_length = 1;
   /// For two seconds the LiDAR's stamps are off by `clock_step` s.
   double clock_from = 1e9, clock_step = 0.0;
+  /// For two seconds the IMU's samples come `imu_delay` s late.
+  double delay_from = 1e9, imu_delay = 0.3;
   double land_at = 1e9;  ///< the pilot falls silent: it sinks and stands
   double judge_from = 0.0;
 };
@@ -41,6 +43,7 @@ struct LiveFigures {
   double worst = 0.0;    ///< m
   double end = 0.0;      ///< error at the end, m
   double moved = 0.0;    ///< how far the error went astray from `judge_from` on, m
+  double worst_velocity = 0.0;  ///< largest error of the velocity, m/s
   double velocity_back =
       -1.0;  ///< after the LiDAR's return, until the velocity is within 0.2 m/s, s
   double covered[3] = {0, 0, 0};  ///< share of estimates within three standard deviations, by axis

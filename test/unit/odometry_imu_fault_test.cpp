@@ -72,5 +72,18 @@ TEST(OdometryImuFault, StampsOfTheLidarThatStepCostNoSweep) {
     }
 }
 
+TEST(OdometryImuFault, SamplesThatComeLateAreWaitedFor) {
+  for (int seed = 1; seed <= Layouts(2); ++seed)
+    for (const double delay : {0.1, 0.3}) {
+      LiveOptions options = From(seed);
+      options.delay_from = 10.5;
+      options.imu_delay = delay;
+      const std::string what = fmt::format("samples {} s late ", delay);
+      const LiveFigures figures = Flown(what, static_cast<uint64_t>(seed), options);
+      ExpectGood(figures, what);
+      EXPECT_LT(figures.worst_velocity, 0.2) << what;
+    }
+}
+
 }  // namespace
 }  // namespace chase::odometry
