@@ -33,16 +33,16 @@ struct LiveOptions {
 /// How POSE did against the truth, at every estimate after the start. Without IMU W is the frame in
 /// which the first sweep fits: errors count from the mean of the first second that is judged.
 struct LiveFigures {
-  int sweeps = 0;        ///< after the first
-  int refused = 0;       ///< of these
-  int lost = 0;          ///< estimates that said so
-  int degraded = 0;      ///< the same, from `judge_from` on
-  int epochs = 0;        ///< restarts of the map
-  double ate = 0.0;      ///< RMS of the position error in W, m
-  double aligned = 0.0;  ///< the same after the best fit, m
-  double worst = 0.0;    ///< m
-  double end = 0.0;      ///< error at the end, m
-  double moved = 0.0;    ///< how far the error went astray from `judge_from` on, m
+  int sweeps = 0;               ///< after the first
+  int refused = 0;              ///< of these
+  int lost = 0;                 ///< estimates that said so
+  int degraded = 0;             ///< the same, from `judge_from` on
+  int epochs = 0;               ///< restarts of the map
+  double ate = 0.0;             ///< RMS of the position error in W, m
+  double aligned = 0.0;         ///< the same after the best fit, m
+  double worst = 0.0;           ///< m
+  double end = 0.0;             ///< error at the end, m
+  double moved = 0.0;           ///< how far the error went astray from `judge_from` on, m
   double worst_velocity = 0.0;  ///< largest error of the velocity, m/s
   double velocity_back =
       -1.0;  ///< after the LiDAR's return, until the velocity is within 0.2 m/s, s
