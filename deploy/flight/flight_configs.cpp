@@ -62,12 +62,13 @@ void AddFaults(const world::Scenario& scenario, const FlightOptions& options,
                FlightConfigs* configs) {
   const bool truth = configs->simulator.sensors == "truth" ||
                      (configs->simulator.sensors.empty() && scenario.sensors.mode == "truth");
+  const double flown = options.until > 0.0 ? options.until : scenario.duration_s;
   int number = 0;
   for (const world::FaultSpec& fault : AllFaults(scenario, options)) {
     const world::FaultKind& kind = world::KindOf(fault);
     const std::string misfit = world::Misfit(kind, !truth, !scenario.commands.empty());
     if (!misfit.empty()) throw std::runtime_error("fault " + fault.name + " " + misfit);
-    configs->faults.push_back(world::Settled(fault, scenario.duration_s, options.seed, number++));
+    configs->faults.push_back(world::Settled(fault, flown, options.seed, number++));
     if (kind.victim == "simulator") configs->simulator.faults.push_back(configs->faults.back());
   }
 }

@@ -23,6 +23,7 @@ struct FlightOptions {
   std::string sensors;              ///< raw or truth; empty: as the scenario says
   std::string planner;              ///< empty: planning's default
   std::vector<std::string> faults;  ///< NAME or NAME@SECONDS, besides the scenario's
+  double until = -1.0;              ///< mission time at which it ends, s; else the scenario's
 };
 
 /// The configuration of every process of one flight.

@@ -27,7 +27,6 @@ namespace {
 struct Arguments {
   FlightOptions options;
   std::string log, metrics, print_config;
-  double until = -1.0;
   bool end_on_collision = false, quiet = false;
 };
 
@@ -124,7 +123,7 @@ class Recording {
 double FlyAll(const world::Scenario& scenario, const Arguments& arguments, const Progress& progress,
               const CollisionWatch& watch, Flight* flight) {
   using Clock = std::chrono::steady_clock;
-  double end = arguments.until > 0.0 ? arguments.until : scenario.duration_s + 0.1;
+  double end = arguments.options.until > 0.0 ? arguments.options.until : scenario.duration_s + 0.1;
   const auto start = Clock::now();
   double factor = 0.0;
   long steps = 0;
@@ -156,7 +155,7 @@ int Fly(const world::Scenario& scenario, const Arguments& arguments) {
   const auto record = Record(recording.Close(), flight.lockstep(), factor);
   const logs::Metrics metrics = logs::Compute(record);
   if (!arguments.metrics.empty()) logs::WriteMetricsJson(arguments.metrics, record, metrics);
-  return PrintCriteria(metrics, arguments.until > 0.0);
+  return PrintCriteria(metrics, arguments.options.until > 0.0);
 }
 
 int Run(const Arguments& arguments) {
@@ -192,7 +191,7 @@ void AddOptions(CLI::App* app, Arguments* a) {
                   "NAME or NAME@SECONDS of mission time, besides the scenario's; repeatable");
   app->add_flag("--end-on-collision", a->end_on_collision,
                 "end the flight 0.2 s after the first contact");
-  app->add_option("--until", a->until, "stop at this mission time, s")->check(MissionTimeProblem);
+  app->add_option("--until", a->options.until, "stop at this mission time, s")->check(MissionTimeProblem);
   app->add_option("--print-config", a->print_config,
                   "print the configuration of this process in this scenario and exit");
   app->add_flag("--quiet", a->quiet, "no progress line");
