@@ -9,7 +9,7 @@ namespace {
 constexpr Eigen::Index kMostRows = 16;  // of a Curve
 // Stamps are whole microseconds, in which a body at 10 m/s and 10 m/s^2 moves by 1e-5 of each unit.
 constexpr double kJoin = 1e-4;                 // m, m/s
-constexpr double kLeaveBy = 0.25;              // tau by which planning leaves what the start is in
+constexpr double kLeaveBy = 0.6;               // tau by which planning leaves what the start is in
 constexpr double kRestingSpeed = 0.02;         // m/s
 constexpr double kRestingAcceleration = 0.05;  // m/s^2
 

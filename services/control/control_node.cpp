@@ -17,6 +17,7 @@ namespace chase::control {
 
 namespace {
 
+constexpr auto kMostLate = static_cast<int64_t>(1e6 * world::kMostAge.pose);  // us
 constexpr size_t kLists = 8;  // 0.4 s at 20 Hz: plans name none older than 0.3 s
 
 double LargestSigma(const Eigen::Matrix3d& covariance) {
@@ -94,12 +95,16 @@ void ControlNode::OnPlan(const plan_t& message) {
   bus_.ReportError(fmt::format("PLAN {} left out: {}", message.seq, bad));
 }
 
+// Poses that were queued while somebody hung, or that come late, are left out for as long as dead
+// reckoning is good: a loop of these gains bears no 0.3 s of delay, and what is felt in a pose of
+// old says nothing about the thrust that was asked for of late.
 void ControlNode::OnPose(const pose_t& message) {
+  if (pose_age_.IsLate(message.utime, bus_.Now(), kMostLate)) {
+    if (Silence() <= world::kMostAge.velocity) return;
+    pose_age_.Reset();
+  }
+  pose_age_.Take(message.utime, bus_.Now());
   const double t = bus::Seconds(message.utime, Origin(message.utime));
-  if (reckoned_ && t < *reckoned_ - world::kMostAge.pose && Silence() <= world::kMostAge.velocity)
-    return;
-  reckoned_.reset();
-  pose_t_ = t;
   ticks_without_pose_ = 0;
   if (epoch_.Change(message.epoch)) {
     controller_.ForgetPlans();
@@ -122,16 +127,13 @@ void ControlNode::OnPose(const pose_t& message) {
 }
 
 // Without poses: by dead reckoning, until the autopilot's own limit on silence may act. Ticks are
-// counted rather than stamps compared: whoever sets the clock does not make the pose old. Poses
-// from before the time that has been reckoned to are left out: they were queued while their sender
-// hung, or come late, and a loop of these gains bears no 0.3 s of delay.
+// counted rather than stamps compared: whoever sets the clock does not make the pose old.
 void ControlNode::Tick(int64_t utime) {
   const double silence = Silence();
   ++ticks_without_pose_;
   if (silence <= world::kMostAge.pose || silence > world::kMostAge.velocity) return;
   const std::optional<Setpoint> setpoint = controller_.Blind(silence);
   if (!setpoint) return;
-  reckoned_ = pose_t_ + silence;
   pose_reason_ = "no pose is heard";
   Send(utime, *setpoint);
   SendTracking(utime);

@@ -15,6 +15,7 @@
 #include "common/bus/node.h"
 #include "common/world/plan_check.h"
 #include "services/control/controller.h"
+#include "services/control/pose_age.h"
 
 namespace chase::control {
 
@@ -49,9 +50,8 @@ class ControlNode : public bus::Node {
   std::optional<int64_t> origin_;  // utime that the core's seconds count from
   int64_t last_tracking_ = 0;
   int ticks_without_pose_ = 0;
-  double pose_t_ = 0.0;             // of the last pose, s
-  std::optional<double> reckoned_;  // time that was reckoned to without poses, s
-  std::string pose_reason_;         // why the pose is not usable
+  PoseAge pose_age_;
+  std::string pose_reason_;  // why the pose is not usable
   int64_t n_plans_ = 0, n_refused_ = 0;
 };
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/world/shapes.h"
 #include "services/planning/candidate_set.h"
 #include "services/planning/limits.h"
 #include "services/planning/separations.h"
@@ -15,6 +16,7 @@ using Eigen::Vector3d;
 constexpr double kTimes[] = {0.6, 0.8, 1.0, 1.3, 1.7, 2.2, 3.0};  // s, of a braking
 constexpr double kInTime = 0.05;  // s: contacts are sampled this often
 constexpr double kAlike = 0.01;   // m of clearance that make no difference
+constexpr double kOutBy = 0.6;    // tau by which the ground is left: a climb of 0.2 m from rest
 
 /// Ways to rest ask for safety alone.
 PlanRequest WithoutSight(const PlanRequest& request, const world::State& start, double t0) {
@@ -58,6 +60,19 @@ Curve CurveTo(const world::State& s, double T, const Vector3d& end) {
   Points b = Continued(s, T, 6);
   for (int i = 4; i <= 6; ++i) b.row(i) = end.transpose();
   return ToPower(b, 6);
+}
+
+/// Distance of a point, `d` from its centre, to the solid; of an ellipsoid to first order (Taubin
+/// 1991, eq. 3).
+double Off(const world::Obstacle& o, const Vector3d& d) {
+  using Kind = world::Solid::Kind;
+  if (o.solid == world::Obstacle::Solid::kBox)
+    return world::SignedDistance({Kind::kBox, Vector3d::Zero(), o.half}, o.axes.conjugate() * d);
+  if (o.solid == world::Obstacle::Solid::kCylinder)
+    return world::SignedDistance({Kind::kCylinder, Vector3d::Zero(), o.half}, d);
+  const Vector3d outwards = o.shape * d;
+  const double scale = std::sqrt(d.dot(outwards));
+  return scale > 0.0 ? (scale - 1.0) * scale / outwards.norm() : -HUGE_VAL;
 }
 
 /// One state to come to rest from.
@@ -110,11 +125,14 @@ class Resting {
     const Vector3d p = planning::Evaluate(curve, tau);
     const Limits& l = problem_.limits;
     double standing = HUGE_VAL, moving = HUGE_VAL;
-    for (const Ellipsoid& e : problem_.obstacles) {
-      double& least = e.center.bottomRows(e.center.rows() - 1).isZero() ? standing : moving;
-      least = std::min(least, Off(e, p, tau));
+    for (size_t j = 0; j < problem_.obstacles.size(); ++j) {
+      const Curve& center = problem_.obstacles[j].center;
+      double& least = center.bottomRows(center.rows() - 1).isZero() ? standing : moving;
+      least = std::min(least, Off(request_.obstacles[j], p - planning::Evaluate(center, tau)));
     }
-    if (problem_.target_body) moving = std::min(moving, Off(*problem_.target_body, p, tau));
+    if (problem_.target_body)
+      moving = std::min(moving, Off(*request_.target_body,
+                                    p - planning::Evaluate(problem_.target_body->center, tau)));
     if (!l.height) return {standing, moving};
     const double above = l.ground.Above(p);
     return {std::min({standing, above, config_.drone_radius + l.z_max - above}), moving};
@@ -133,18 +151,13 @@ class Resting {
     return *within_;
   }
 
-  // Along the line to the centre; roughly, and only for comparison.
-  static double Off(const Ellipsoid& e, const Vector3d& p, double tau) {
-    const Vector3d d = p - planning::Evaluate(e.center, tau);
-    const double scale = std::sqrt(d.dot(e.grown_from * d));
-    return scale > 0.0 ? d.norm() * (1.0 - 1.0 / scale) : -HUGE_VAL;
-  }
-
   void SetProblem(double T) {
     if (problem_.duration == T && has_problem_) return;
     has_problem_ = true;
     request_.horizon = T;
     MakeProblem(config_, request_, nullptr, &problem_);
+    for (Ellipsoid& e : problem_.obstacles)
+      if (e.safety_from > 0.0 && e.ground) e.safety_from = kOutBy;
     Limits& l = problem_.limits;
     l.tan_elevation = l.min_distance = 0.0;
     l.view.reset();

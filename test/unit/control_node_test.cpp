@@ -100,10 +100,13 @@ class Bench {
       m.local_covariance[10 * (i + 3)] = speed_sigma * speed_sigma;
     }
     bus_->Publish("POSE", m);
-    lockstep_.RunUntil(utime);
+    RunUntil(utime);
   }
 
-  void RunUntil(int64_t utime) { lockstep_.RunUntil(utime); }
+  void RunUntil(int64_t utime) {
+    latest_ = std::max(latest_, utime);
+    lockstep_.RunUntil(latest_);
+  }
   void SendState(int8_t state, const std::string& sender = "mission") {
     if (!mission_) mission_ = lockstep_.Connect();
     mission_->SetIdentity({sender, "", 0});
@@ -117,6 +120,7 @@ class Bench {
   std::vector<tracking_t> tracking;
 
  private:
+  int64_t latest_ = kStart;
   bus::Lockstep lockstep_{kStart};
   bus::Bus* bus_ = nullptr;
   ControlNode* node_ = nullptr;

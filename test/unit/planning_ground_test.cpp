@@ -186,6 +186,32 @@ TEST(Rest, TheLeastHarmNeverSpeedsUp) {
 }
 
 // Two metres a second sideways past a wall, in a frame that drifts towards it.
+// What is too low to be an obstacle lies within the ground's slabs: a body that has sunk into them
+// comes out gently.
+TEST(Rest, OutOfTheGroundItClimbsWithinTheLimits) {
+  const PlannerConfig config;
+  PlanRequest request;
+  request.obstacles = {Slab({0.0, 0.0, 0.12}, {0.0, 0.0})};
+  for (const double sinking : {0.0, 0.2, 0.44, 0.8}) {
+    request.start = world::State();
+    request.start.p.z() = 0.64;
+    request.start.v = {0.3, 0.0, -sinking};
+    double fastest = 0.0;
+    for (int i = 0; i < 30; ++i) {
+      request.t0 = 0.1 * i;
+      const PlanResult plan = RestPlan(config, request);
+      for (double t = request.t0; t < request.t0 + 0.1; t += 0.02) {
+        const world::State s = plan.trajectory.At(std::min(t, plan.trajectory.end()));
+        EXPECT_LT(s.a.norm(), config.max_acceleration + 1e-6) << sinking << " " << t;
+        fastest = std::max(fastest, s.v.norm());
+      }
+      request.start = plan.trajectory.At(std::min(request.t0 + 0.1, plan.trajectory.end()));
+    }
+    EXPECT_LT(fastest, 2.0) << sinking;
+    EXPECT_GT(request.start.p.z(), 0.42 + config.hard_radius()) << sinking;
+  }
+}
+
 TEST(Pilot, AFrameThatDriftsKeepsOffWhatStands) {
   PlanningConfig config;
   config.takeoff_time = 0.1;
