@@ -7,7 +7,7 @@ struct MostAge {
   double obstacles = 0.3;  ///< planning: brakes and hovers, uncertified; mission: not ready
   double pose = 0.1;       ///< control: levels and sinks; after `velocity` it falls silent as well;
                            ///< mission: not ready
-  double velocity = 2.0;   ///< control: since odometry was usable; brakes until then, then lands;
+  double velocity = 2.0;   ///< control: since it was measured; brakes until then, then lands;
                            ///< mission: EMERGENCY
   double target = 0.5;     ///< mission: not ready, in flight lost; ten frames of the camera
   double status = 2.5;     ///< mission: not ready; two that are sent once a second may be lost

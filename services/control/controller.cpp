@@ -145,16 +145,16 @@ std::optional<Setpoint> Controller::WithoutPose(double t, const Estimate& estima
   if (!flying_) return std::nullopt;
   lost_ = true;
   const bool known = health == Health::kLost;
+  const bool usable = known && estimate.velocity_sigma <= config_.UsableVelocitySigma();
   if (!spot_ && !is_down() && t - last_measured_ <= world::kMostAge.velocity) {
     landing_ = Landing(config_, config_.land_speed);
-    if (known && estimate.velocity_sigma <= config_.UsableVelocitySigma())
-      reckoning_.Begin(t, estimate);
+    if (usable) reckoning_.Begin(t, estimate);
     return Brake(reckoning_.At(t));
   }
   following_ = Following::kLand;
   const double lift = known ? landing_.Lift(estimate, dt) : -config_.lost_descent;
   if (is_down()) return Off();
-  if (!known) return law_.Level(last_yaw_, lift);
+  if (!usable) return law_.Level(last_yaw_, lift);
   const Setpoint setpoint = law_.Sink(estimate, last_yaw_, lift);
   return Finite(setpoint) ? setpoint : law_.Level(last_yaw_, -config_.lost_descent);
 }
