@@ -56,7 +56,7 @@ void RunLive(const ServiceSpec& spec, const Flags& flags) {
   UdpBus bus(flags.url, flags.prefix);
   bus.SetIdentity({spec.name, flags.prefix, bus.Now()});
   const auto node = spec.make_node(bus);
-  StatusReporter reporter(spec.name);
+  StatusReporter reporter(spec.name, LiveVersion(spec.dump_config()));
   const std::string channel = StatusChannel(spec.name);
   const auto report = [&](int64_t now) {
     bus.Publish(channel, reporter.Make(bus, *node, now, true));

@@ -15,6 +15,8 @@
 #include "common/bus/log_bus.h"
 #include "common/bus/part_file.h"
 #include "common/bus/stamp_order.h"
+#include "common/bus/status.h"
+#include "common/config/version.h"
 
 namespace chase::bus {
 namespace {
@@ -59,6 +61,13 @@ std::string TempFile(const std::string& name) {
 std::string Bytes(const std::string& file) {
   std::ifstream in(file, std::ios::binary);
   return {std::istreambuf_iterator<char>(in), {}};
+}
+
+TEST(Status, ALiveVersionTellsHostAndConfiguration) {
+  char host[256] = "";
+  ASSERT_EQ(gethostname(host, sizeof host), 0);
+  const std::string version = LiveVersion("123456789");
+  EXPECT_EQ(version, config::Version() + ", host " + host + ", configuration 930766865");
 }
 
 TEST(Lockstep, DeliversAfterEachProcessLatency) {
