@@ -105,6 +105,8 @@ int Run(const ServiceSpec& spec, const Flags& flags) {
     std::fputs(spec.dump_config().c_str(), stdout);
     return 0;
   }
+  if (!flags.out.empty() && flags.replay.empty())
+    throw std::runtime_error("--out " + flags.out + " does nothing without --replay; name a log");
   std::signal(SIGINT, RequestStop);
   std::signal(SIGTERM, RequestStop);
   if (spec.run && spec.run()) return 0;

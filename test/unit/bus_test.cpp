@@ -103,6 +103,24 @@ TEST(Lockstep, TwoRunsAreByteIdentical) {
   EXPECT_EQ(a, b);
 }
 
+TEST(LogBus, RefusesALogWithoutTheNodesChannels) {
+  const std::string in = testing::TempDir() + "/foreign.lcm",
+                    out = testing::TempDir() + "/none.lcm";
+  LogWriter writer(in);
+  writer.Write(1, "POSE", {1});
+  writer.Close();
+  std::filesystem::remove(out);
+  try {
+    LogBus bus(in, out);
+    Echo node(bus);
+    bus.Run(&node);
+    FAIL() << "replayed without an input";
+  } catch (const std::runtime_error& e) {
+    EXPECT_EQ(e.what(), in + ": holds none of the channels that are heard: IMU");
+  }
+  EXPECT_FALSE(std::filesystem::exists(out));
+}
+
 TEST(LogBus, ReplayAnswersWithTheInputsStampAndRepeats) {
   const std::string in = TempFile("in");
   RecordLockstep(in);
