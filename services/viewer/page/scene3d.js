@@ -91,6 +91,7 @@ export class Scene3D {
     this.dirty = true;
     this.frames = 0;  // that were drawn
     this.drawn = 0;   // when the last one was, s
+    this.due = 0;     // and the next one is
     this.detail = new Detail();
     this.motion = new Motion();
     const draw = () => { this.draw(); requestAnimationFrame(draw); };
@@ -266,7 +267,7 @@ export class Scene3D {
 
   draw() {
     const t = seconds(), dt = t - this.drawn;
-    if (dt < PERIOD - SLACK) return;
+    if (t < this.due - SLACK) return;
     this.resize();
     const moves = this.motion.move(t);
     if (!moves && !this.dirty) return;
@@ -279,6 +280,7 @@ export class Scene3D {
     this.renderer.render(this.scene, this.camera);
     this.frames++;
     this.drawn = t;
+    this.due = Math.max(this.due + PERIOD, t - PERIOD);  // one that was late does not hold the next one back
     if (moves && this.moved && this.detail.note(t, dt)) this.width = 0;  // sized anew
     this.moved = moves;
   }
