@@ -94,8 +94,11 @@ std::vector<std::string> LogInfo::Software() const {
   std::vector<std::string> lines;
   if (!versions.empty()) lines.push_back("versions   " + ByValue(versions));
   if (!hosts.empty()) lines.push_back("host       " + ByValue(hosts));
-  if (!configurations.empty())
-    lines.push_back("configuration (cksum of --dump-config)  " + ByValue(configurations));
+  std::string sums;
+  for (const auto& [process, sum] : configurations)
+    sums += fmt::format("{}{} {}", sums.empty() ? "" : ", ", process, sum);
+  if (!sums.empty())
+    lines.push_back("configuration (cksum of --dump-config)  " + sums);
   else if (!versions.empty())
     lines.push_back("host, configuration  not told: flown in lockstep, or by an older version");
   return lines;

@@ -193,7 +193,7 @@ TEST(LogInfo, TellsVersionHostAndConfiguration) {
   EXPECT_EQ(info.hosts, (std::map<std::string, std::string>{{"planning", "b"}}));
   EXPECT_EQ(info.configurations.at("planning"), "930766865");
   EXPECT_NE(Format(info).find("host       b (planning)\n"), std::string::npos);
-  EXPECT_NE(Format(info).find("930766865 (planning)\n"), std::string::npos);
+  EXPECT_NE(Format(info).find("planning 930766865\n"), std::string::npos);
 }
 
 TEST(LogInfo, ALogCutOffAnywhereIsReadAsFarAsItGoes) {
