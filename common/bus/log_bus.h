@@ -23,7 +23,8 @@ class LogBus : public Bus {
   LogBus(const std::string& in, const std::string& out);
 
   /// Drives `node` through the whole log; ticks it at multiples of its period in between. After
-  /// each event `after` is called with its time, microseconds, where given.
+  /// each event `after` is called with its time, microseconds, where given. Throws
+  /// std::runtime_error when the log cannot be read or holds nothing for the node.
   void Run(Node* node, const std::function<void(int64_t utime)>& after = nullptr);
 
   int64_t Now() const override { return now_; }
@@ -34,6 +35,8 @@ class LogBus : public Bus {
   void PublishRaw(const std::string& channel, Bytes bytes) override;
 
  private:
+  std::string Handled() const;
+
   std::string in_;
   LogWriter out_;
   std::map<std::string, RawHandler> handlers_;

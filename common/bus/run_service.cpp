@@ -56,7 +56,7 @@ void RunLive(const ServiceSpec& spec, const Flags& flags) {
   UdpBus bus(flags.url, flags.prefix);
   bus.SetIdentity({spec.name, flags.prefix, bus.Now()});
   const auto node = spec.make_node(bus);
-  StatusReporter reporter(spec.name);
+  StatusReporter reporter(spec.name, LiveVersion(spec.dump_config()));
   const std::string channel = StatusChannel(spec.name);
   const auto report = [&](int64_t now) {
     bus.Publish(channel, reporter.Make(bus, *node, now, true));
@@ -105,6 +105,8 @@ int Run(const ServiceSpec& spec, const Flags& flags) {
     std::fputs(spec.dump_config().c_str(), stdout);
     return 0;
   }
+  if (!flags.out.empty() && flags.replay.empty())
+    throw std::runtime_error("--out " + flags.out + " does nothing without --replay; name a log");
   std::signal(SIGINT, RequestStop);
   std::signal(SIGTERM, RequestStop);
   if (spec.run && spec.run()) return 0;

@@ -1,7 +1,12 @@
 #include "common/bus/status.h"
 
+#include <fmt/format.h>
 #include <sys/resource.h>
+#include <unistd.h>
 
+#include <climits>
+
+#include "common/config/checksum.h"
 #include "common/config/version.h"
 
 namespace chase::bus {
@@ -49,6 +54,16 @@ int8_t StateCode(NodeReport::State state) {
 
 }  // namespace
 
+std::string LiveVersion(const std::string& configuration) {
+  char host[HOST_NAME_MAX + 1] = "";
+  if (gethostname(host, sizeof host - 1) != 0) host[0] = '\0';
+  return fmt::format("{}, host {}, configuration {}", config::Version(),
+                     host[0] != '\0' ? host : "unknown", config::Checksum(configuration));
+}
+
+StatusReporter::StatusReporter(std::string name, std::string version)
+    : name_(std::move(name)), version_(version.empty() ? config::Version() : std::move(version)) {}
+
 status_t StatusReporter::Make(const Bus& bus, const Node& node, int64_t utime, bool measured) {
   if (start_ < 0) start_ = utime;
   const NodeReport report = node.Report();
@@ -58,7 +73,7 @@ status_t StatusReporter::Make(const Bus& bus, const Node& node, int64_t utime, b
   status.state = StateCode(report.state);
   status.detail = report.detail;
   status.last_error = bus.last_error();
-  status.version = config::Version();
+  status.version = version_;
   status.uptime = static_cast<double>(utime - start_) * 1e-6;
   const double elapsed = last_ < 0 ? 0.0 : static_cast<double>(utime - last_) * 1e-6;
   for (const auto& [name, c] : bus.counters()) {

@@ -9,17 +9,22 @@
 
 namespace chase::bus {
 
+/// The version of a live process, with where it runs and as what: "0.1.0 (commit 1a2b3c4d5e), host
+/// onboard, configuration 930766865". The last is `cksum` of what --dump-config prints.
+std::string LiveVersion(const std::string& configuration);
+
 /// Builds the status messages of one process.
 class StatusReporter {
  public:
-  explicit StatusReporter(std::string name) : name_(std::move(name)) {}
+  /// `version`: what STATUS says of it; empty: config::Version().
+  explicit StatusReporter(std::string name, std::string version = "");
 
   /// Status at `utime`, microseconds. Without `measured` it leaves out what differs from run to
   /// run: processor time, memory and stages.
   status_t Make(const Bus& bus, const Node& node, int64_t utime, bool measured);
 
  private:
-  std::string name_;
+  std::string name_, version_;
   int64_t start_ = -1;
   int64_t last_ = -1;
   std::map<std::string, int64_t> last_received_;

@@ -13,7 +13,11 @@ RECEIVE_BUFFER = 2097152  # bytes; a cloud of 400 kB needs several
 
 
 def url():
-    return os.environ.get("CHASE_LCM_URL", DEFAULT_URL)
+    """Where everything speaks; with room for sweeps and images where the user names none."""
+    told = os.environ.get("LCM_DEFAULT_URL") or DEFAULT_URL
+    if "recv_buf_size=" in told:
+        return told
+    return f"{told}{'&' if '?' in told else '?'}recv_buf_size={RECEIVE_BUFFER}"
 
 
 def endpoint(text):
@@ -80,7 +84,7 @@ def loopback_problem(group, port):
 
 def port_cure():
     return ("cure: stop that program, or choose another port: "
-            "CHASE_LCM_URL='udpm://239.255.76.67:7668?ttl=0&recv_buf_size=2097152'")
+            "LCM_DEFAULT_URL='udpm://239.255.76.67:7668?ttl=0&recv_buf_size=2097152'")
 
 
 def packets(sock, deadline):

@@ -133,9 +133,9 @@ def raise_receive_buffers():
 def check_bus(url):
     where = bus.endpoint(url)
     if not where:
-        raise FlightError(f"CHASE_LCM_URL={url}: not of the form udpm://ADDRESS:PORT?ttl=0")
+        raise FlightError(f"LCM_DEFAULT_URL={url}: not of the form udpm://ADDRESS:PORT?ttl=0")
     if any(row["heavy"] for row in flight_processes()) and not bus.stays_on_host(url):
-        raise FlightError(f"CHASE_LCM_URL={url}: sweeps and images must stay on this host; "
+        raise FlightError(f"LCM_DEFAULT_URL={url}: sweeps and images must stay on this host; "
                           "cure: add ttl=0")
     if problem := bus.loopback_problem(*where):
         raise FlightError(problem)

@@ -44,15 +44,25 @@ std::string Recorded(int64_t first, int64_t last) {
   return fmt::format("{:%Y-%m-%d %H:%M:%S} UTC, {}", fmt::gmtime(first / 1000000), length);
 }
 
-/// Processes of the same version in one place.
-std::string Versions(const std::map<std::string, std::string>& versions) {
+/// Processes of the same value in one place.
+std::string ByValue(const std::map<std::string, std::string>& values) {
   std::map<std::string, std::string> processes;
-  for (const auto& [process, version] : versions)
-    processes[version] += (processes[version].empty() ? "" : ", ") + process;
+  for (const auto& [process, value] : values)
+    processes[value] += (processes[value].empty() ? "" : ", ") + process;
   std::string text;
-  for (const auto& [version, names] : processes)
-    text += fmt::format("{}{} ({})", text.empty() ? "" : "; ", version, names);
+  for (const auto& [value, names] : processes)
+    text += fmt::format("{}{} ({})", text.empty() ? "" : "; ", value, names);
   return text;
+}
+
+/// Takes off `text` what follows `key`, its last; empty where it is not there
+/// (common/bus/status.h).
+std::string CutBehind(const std::string& key, std::string* text) {
+  const size_t at = text->rfind(key);
+  if (at == std::string::npos) return "";
+  const std::string value = text->substr(at + key.size());
+  text->resize(at);
+  return value;
 }
 
 std::string Head(const LogInfo& info) {
@@ -65,8 +75,8 @@ std::string Head(const LogInfo& info) {
   std::string text = fmt::format("log        {}, {} bytes\n", info.file, info.bytes);
   if (first <= last) text += "recorded   " + Recorded(first, last) + "\n";
   if (!info.scenario.empty()) text += "scenario   " + info.scenario + "\n";
-  if (!info.versions.empty()) text += "versions   " + Versions(info.versions) + "\n";
-  return text + "host, configuration  not in a log; a flight's folder has each process's .yaml\n\n";
+  for (const std::string& line : info.Software()) text += line + "\n";
+  return text + "\n";
 }
 
 }  // namespace
@@ -78,6 +88,20 @@ double ChannelInfo::RateHz() const {
 
 double ChannelInfo::MissingShare() const {
   return missing > 0 ? static_cast<double>(missing) / static_cast<double>(missing + count) : 0.0;
+}
+
+std::vector<std::string> LogInfo::Software() const {
+  std::vector<std::string> lines;
+  if (!versions.empty()) lines.push_back("versions   " + ByValue(versions));
+  if (!hosts.empty()) lines.push_back("host       " + ByValue(hosts));
+  std::string sums;
+  for (const auto& [process, sum] : configurations)
+    sums += fmt::format("{}{} {}", sums.empty() ? "" : ", ", process, sum);
+  if (!sums.empty())
+    lines.push_back("configuration (cksum of --dump-config)  " + sums);
+  else if (!versions.empty())
+    lines.push_back("host, configuration  not told: flown in lockstep, or by an older version");
+  return lines;
 }
 
 bool LogInfo::Recorded() const {
@@ -137,8 +161,13 @@ void LogSurvey::AddHead(const LogEvent& e, Channel* channel) {
 void LogSurvey::AddContent(const LogEvent& e, const std::string& type) {
   status_t status;
   scenario_t scenario;
-  if (type == "status_t" && DecodeBytes(e.bytes, &status))
+  if (type == "status_t" && DecodeBytes(e.bytes, &status)) {
+    const std::string configuration = CutBehind(", configuration ", &status.version);
+    const std::string host = CutBehind(", host ", &status.version);
+    if (!configuration.empty()) info_.configurations[status.name] = configuration;
+    if (!host.empty()) info_.hosts[status.name] = host;
     info_.versions[status.name] = status.version;
+  }
   if (type == "scenario_t" && info_.scenario.empty() && DecodeBytes(e.bytes, &scenario))
     info_.scenario = fmt::format("{}, seed {}", scenario.name, scenario.seed);
 }

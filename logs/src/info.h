@@ -33,11 +33,15 @@ struct ChannelInfo {
 struct LogInfo {
   std::string file;
   int64_t bytes = 0;
-  std::vector<ChannelInfo> channels;            ///< by name
-  std::map<std::string, std::string> versions;  ///< by process, of its status messages
-  std::string scenario;                         ///< name and seed; empty: there is none
+  std::vector<ChannelInfo> channels;  ///< by name
+  /// By process, of its status messages; hosts and configurations (`cksum` of what --dump-config
+  /// prints) of live ones only.
+  std::map<std::string, std::string> versions, hosts, configurations;
+  std::string scenario;  ///< name and seed; empty: there is none
   std::vector<Damage> damage;
 
+  /// Lines of versions, hosts and configurations.
+  std::vector<std::string> Software() const;
   bool Whole() const { return damage.empty(); }
   /// Whole, and no channel that figures are computed from has lost more than a hundredth: beyond
   /// that a 99th percentile says nothing. What is too heavy to be always recorded does not count.

@@ -43,6 +43,7 @@ struct Metrics {
   std::string collided_with;                     ///< as Scorer::Nearest() names it; empty: nothing
   std::map<std::string, int64_t> lost_messages;  ///< by channel, by `seq`
   std::map<std::string, double> longest_gap_s;   ///< by channel, between the log's events
+  std::vector<std::string> software;             ///< lines of versions, hosts, configurations
   std::vector<std::string> losses;               ///< a line for each, for people
   bool log_whole = true;                         ///< neither cut off nor damaged
   std::vector<StateFigures> flight_states;       ///< in their order; none without a mission process

@@ -110,6 +110,7 @@ class Gatherer {
     AddStages(&report.metrics);
     for (const ChannelInfo& c : info.channels)
       report.metrics["lost_messages"][c.channel] = c.missing;
+    report.metrics["software"] = info.Software();
     report.metrics["losses"] = info.Losses();
     report.metrics["log_whole"] = info.Whole();
     AddSeries(&report.series);

@@ -159,6 +159,10 @@ class BadUse(unittest.TestCase):
         self.for_each(self.replayable(), lambda program: self.assert_refused(
             run(program, "--replay", "no/such.lcm"), "--out"))
 
+    def test_out_without_replay(self):
+        self.for_each(self.replayable(), lambda program: self.assert_refused(
+            run(program, "--out", "no/such.lcm"), "--out", "--replay"))
+
     def test_port_in_use(self):
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
             taken.bind(("", 0))  # without SO_REUSEADDR: not shared

@@ -89,7 +89,7 @@ class FlightTest(unittest.TestCase):
         self.patch(fly, "build", lambda *programs: self.built.append(programs))
         self.patch(fly, "flight_folder", lambda scenario: self.make_folder())
         port = free_port()
-        self.patch(os, "environ", dict(os.environ, CHASE_LCM_URL=f"udpm://{GROUP}:{port}?ttl=0"))
+        self.patch(os, "environ", dict(os.environ, LCM_DEFAULT_URL=f"udpm://{GROUP}:{port}?ttl=0"))
         for row in fly.flight_processes():
             self.program(row["binary"], SERVICE.format(behaviour=""))
         self.program("chase-scenario", LENGTH.format(duration=2))
@@ -225,10 +225,20 @@ class FlightTest(unittest.TestCase):
         self.assertIn("mapping ended (exit code 3): restarted", err)
 
     def test_sweeps_stay_on_the_host(self):
-        os.environ["CHASE_LCM_URL"] = f"udpm://{GROUP}:{free_port()}?ttl=1"
+        os.environ["LCM_DEFAULT_URL"] = f"udpm://{GROUP}:{free_port()}?ttl=1"
         code, _, err = self.fly()
         self.assertEqual(code, 1)
         self.assertIn("ttl=0", err)
+
+    def test_the_bus_has_one_variable(self):
+        for told, url in ((None, bus.DEFAULT_URL), ("", bus.DEFAULT_URL),
+                          ("udpm://239.1.2.3:7", "udpm://239.1.2.3:7?recv_buf_size=2097152"),
+                          ("udpm://239.1.2.3:7?ttl=0", "udpm://239.1.2.3:7?ttl=0&recv_buf_size=2097152"),
+                          ("udpm://239.1.2.3:7?recv_buf_size=9", "udpm://239.1.2.3:7?recv_buf_size=9")):
+            os.environ.pop("LCM_DEFAULT_URL", None)
+            if told is not None:
+                os.environ["LCM_DEFAULT_URL"] = told
+            self.assertEqual(bus.url(), url)
 
     def test_process_that_refuses_to_start(self):
         self.program("chase-planning", "import sys; sys.exit('planning.yaml:1: no_such: unknown')")
@@ -252,7 +262,7 @@ class FlightTest(unittest.TestCase):
         self.assertIn("stopped", err)
 
     def test_others_on_the_port_are_an_error(self):
-        port = bus.endpoint(os.environ["CHASE_LCM_URL"])[1]
+        port = bus.endpoint(os.environ["LCM_DEFAULT_URL"])[1]
         talker = subprocess.Popen([sys.executable, "-c", textwrap.dedent(f"""
             import socket, time
             sock = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)

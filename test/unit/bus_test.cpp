@@ -15,6 +15,8 @@
 #include "common/bus/log_bus.h"
 #include "common/bus/part_file.h"
 #include "common/bus/stamp_order.h"
+#include "common/bus/status.h"
+#include "common/config/version.h"
 
 namespace chase::bus {
 namespace {
@@ -61,6 +63,13 @@ std::string Bytes(const std::string& file) {
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
+TEST(Status, ALiveVersionTellsHostAndConfiguration) {
+  char host[256] = "";
+  ASSERT_EQ(gethostname(host, sizeof host), 0);
+  const std::string version = LiveVersion("123456789");
+  EXPECT_EQ(version, config::Version() + ", host " + host + ", configuration 930766865");
+}
+
 TEST(Lockstep, DeliversAfterEachProcessLatency) {
   Lockstep lockstep(1000000);
   Source* source = nullptr;
@@ -92,6 +101,24 @@ TEST(Lockstep, TwoRunsAreByteIdentical) {
   const std::string a = RecordLockstep(TempFile("a")), b = RecordLockstep(TempFile("b"));
   EXPECT_GT(a.size(), 10000u);
   EXPECT_EQ(a, b);
+}
+
+TEST(LogBus, RefusesALogWithoutTheNodesChannels) {
+  const std::string in = testing::TempDir() + "/foreign.lcm",
+                    out = testing::TempDir() + "/none.lcm";
+  LogWriter writer(in);
+  writer.Write(1, "POSE", {1});
+  writer.Close();
+  std::filesystem::remove(out);
+  try {
+    LogBus bus(in, out);
+    Echo node(bus);
+    bus.Run(&node);
+    FAIL() << "replayed without an input";
+  } catch (const std::runtime_error& e) {
+    EXPECT_EQ(e.what(), in + ": holds none of the channels that are heard: IMU");
+  }
+  EXPECT_FALSE(std::filesystem::exists(out));
 }
 
 TEST(LogBus, ReplayAnswersWithTheInputsStampAndRepeats) {

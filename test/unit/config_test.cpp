@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "common/config/changes.h"
+#include "common/config/checksum.h"
 
 namespace chase::config {
 namespace {
@@ -167,6 +168,13 @@ TEST(Config, BrokenYamlNamesTheLine) {
 TEST(Config, MissingFileIsNamed) {
   Outer config;
   EXPECT_THROW(Load("/no/such/file.yaml", &config), std::runtime_error);
+}
+
+// What `printf TEXT | cksum` prints.
+TEST(Checksum, IsThatOfCksum) {
+  EXPECT_EQ(Checksum(""), 4294967295u);
+  EXPECT_EQ(Checksum("123456789"), 930766865u);
+  EXPECT_EQ(Checksum(std::string(300, '\xff')), 1718880618u);
 }
 
 TEST(Changes, HoldOnlyWhatDiffersAndLoadBack) {

@@ -13,6 +13,7 @@
 #include "chase/imu_t.hpp"
 #include "chase/obstacles_t.hpp"
 #include "chase/pose_t.hpp"
+#include "chase/status_t.hpp"
 #include "common/logs/log_reader.h"
 #include "logs/src/diff.h"
 #include "logs/src/export.h"
@@ -93,7 +94,8 @@ std::string WriteLog(const std::string& name, const std::function<void(int, imu_
   return file;
 }
 
-Bytes Encoded(const obstacles_t& m) {
+template <class T>
+Bytes Encoded(const T& m) {
   Bytes bytes(static_cast<size_t>(m.getEncodedSize()));
   m.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
   return bytes;
@@ -170,6 +172,28 @@ TEST(LogInfo, CountsAndTypesEveryChannel) {
   EXPECT_EQ(info.channels[1].count, 4);
   EXPECT_TRUE(info.Whole());
   EXPECT_EQ(info.channels[0].missing, 0);
+}
+
+TEST(LogInfo, TellsVersionHostAndConfiguration) {
+  const std::string file = Temp("software.lcm");
+  status_t live{}, lockstep{};
+  live.name = "planning";
+  live.version = "0.1.0 (commit 1a2b), host a, host b, configuration 930766865";
+  lockstep.name = "control";
+  lockstep.version = "0.1.0 (commit 1a2b)";
+  {
+    bus::LogWriter out(file);
+    out.Write(1, "PLANNING_STATUS", Encoded(live));
+    out.Write(2, "CONTROL_STATUS", Encoded(lockstep));
+    out.Close();
+  }
+  const LogInfo info = Describe(file);
+  EXPECT_EQ(info.versions.at("planning"), "0.1.0 (commit 1a2b), host a");
+  EXPECT_EQ(info.versions.at("control"), "0.1.0 (commit 1a2b)");
+  EXPECT_EQ(info.hosts, (std::map<std::string, std::string>{{"planning", "b"}}));
+  EXPECT_EQ(info.configurations.at("planning"), "930766865");
+  EXPECT_NE(Format(info).find("host       b (planning)\n"), std::string::npos);
+  EXPECT_NE(Format(info).find("planning 930766865\n"), std::string::npos);
 }
 
 TEST(LogInfo, ALogCutOffAnywhereIsReadAsFarAsItGoes) {

@@ -14,7 +14,7 @@ export async function drawImage(canvas, text, {about, jpeg}) {
   const bitmap = await createImageBitmap(jpeg);
   if (canvas.width !== about.width) canvas.width = about.width;
   if (canvas.height !== about.height) canvas.height = about.height;
-  const context = canvas.getContext('2d');
+  const context = canvas.getContext('2d', {willReadFrequently: true});  // in memory: software GL is slow at it
   context.drawImage(bitmap, 0, 0);
   bitmap.close();
   if (about.box && about.box.every((v) => v !== null)) {

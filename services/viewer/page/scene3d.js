@@ -1,6 +1,9 @@
 // The 3D scene. World: x east, y north, z up, metres.
 import * as THREE from './three.module.min.js';
 import {OrbitControls} from './OrbitControls.js';
+import {Detail, PERIOD} from './detail.js';
+import {Motion} from './motion.js';
+import {part, merge, setMerged} from './merged.js';
 import {VERDICT_COLORS, T, DRONE, TARGET} from './names.js';
 
 const SWEEPS = 6;        // of the last seconds that stay on the screen
@@ -8,8 +11,11 @@ const TRAIL = 20;        // s
 const MOST_POINTS = 20000;
 const KINDS = ['#8d97a5', '#d9534f', '#6b5f4a'];  // static, moving, ground
 const SIGMAS = 3;        // of the target's ellipsoid; it is small beside the target
+const FOLLOW = 0.3;      // s: time constant of the camera
+const SLACK = 0.008;     // s by which a picture may come early: half a period of a screen of 60 Hz
 const LARGE = 1.5;       // m: half an edge from which on a box would hide what is behind it
 
+const seconds = () => performance.now() / 1000;
 const line = (color, opacity = 1) => {
   const made = new THREE.Line(new THREE.BufferGeometry(),
     new THREE.LineBasicMaterial({color, transparent: opacity < 1, opacity}));
@@ -18,6 +24,14 @@ const line = (color, opacity = 1) => {
 };
 // The wire's quaternions are w x y z.
 const turn = (object, q) => { if (q && q.every((v) => v !== null)) object.quaternion.set(q[1], q[2], q[3], q[0]); };
+const poseOf = ({p, q, half}) => {
+  const object = new THREE.Object3D();
+  object.position.set(...p);
+  turn(object, q);
+  object.scale.set(...half.map((v) => Math.max(v, 0.005)));
+  object.updateMatrix();
+  return object.matrix;
+};
 const place = (object, p) => {
   object.visible = !!p && p.every((v) => v !== null);
   if (object.visible) object.position.set(p[0], p[1], p[2]);
@@ -46,20 +60,12 @@ const setLine = (object, points) => {
 };
 
 function makeDrone() {
-  const group = new THREE.Group();
-  const body = new THREE.MeshLambertMaterial({color: '#dfe5ec'}), rotor = new THREE.MeshLambertMaterial({color: '#4c9be8'});
-  group.add(new THREE.Mesh(new THREE.BoxGeometry(0.22, 0.12, 0.08), body));
-  for (const [x, y] of [[1, 1], [1, -1], [-1, 1], [-1, -1]]) {
-    const disc = new THREE.Mesh(new THREE.CylinderGeometry(0.11, 0.11, 0.02, 16), rotor);
-    disc.rotation.x = Math.PI / 2;
-    disc.position.set(0.16 * x, 0.16 * y, 0.04);
-    group.add(disc);
-  }
-  const nose = new THREE.Mesh(new THREE.ConeGeometry(0.05, 0.16, 12), new THREE.MeshLambertMaterial({color: '#e8702a'}));
-  nose.rotation.z = -Math.PI / 2;
-  nose.position.x = 0.18;
-  group.add(nose);
-  return group;
+  const at = (x, y, z) => new THREE.Matrix4().makeTranslation(x, y, z);
+  const disc = new THREE.CylinderGeometry(0.11, 0.11, 0.02, 16).rotateX(Math.PI / 2);
+  const nose = new THREE.ConeGeometry(0.05, 0.16, 12).rotateZ(-Math.PI / 2);
+  const rotors = [[1, 1], [1, -1], [-1, 1], [-1, -1]].map(([x, y]) => part(disc, '#4c9be8', at(0.16 * x, 0.16 * y, 0.04)));
+  return new THREE.Mesh(merge([part(new THREE.BoxGeometry(0.22, 0.12, 0.08), '#dfe5ec'), ...rotors, part(nose, '#e8702a', at(0.18, 0, 0))]),
+    new THREE.MeshLambertMaterial({vertexColors: true}));
 }
 
 export class Scene3D {
@@ -83,7 +89,11 @@ export class Scene3D {
     this.follow = true;
     this.at = new THREE.Vector3();
     this.dirty = true;
-    this.frames = 0;
+    this.frames = 0;  // that were drawn
+    this.drawn = 0;   // when the last one was, s
+    this.due = 0;     // and the next one is
+    this.detail = new Detail();
+    this.motion = new Motion();
     const draw = () => { this.draw(); requestAnimationFrame(draw); };
     requestAnimationFrame(draw);
   }
@@ -105,7 +115,14 @@ export class Scene3D {
       new THREE.MeshBasicMaterial({color: '#ffd24d', transparent: true, opacity: 0.22, side: THREE.DoubleSide, depthWrite: false}));
     this.fan.frustumCulled = false;
     this.sight = line('#93a0b0', 0.35);
-    this.obstacles = new THREE.Group();
+    this.solid = new THREE.Mesh(new THREE.BufferGeometry(), new THREE.MeshLambertMaterial({vertexColors: true}));
+    this.ground = new THREE.Mesh(new THREE.BufferGeometry(), new THREE.MeshLambertMaterial(
+      {vertexColors: true, transparent: true, opacity: 0.25, depthWrite: false}));
+    this.walls = new THREE.Mesh(new THREE.BufferGeometry(), new THREE.MeshBasicMaterial(
+      {color: KINDS[0], transparent: true, opacity: 0.08, side: THREE.BackSide, depthWrite: false}));
+    this.edges = new THREE.LineSegments(new THREE.BufferGeometry(), new THREE.LineBasicMaterial({color: '#6d7886'}));
+    this.obstacles = [this.solid, this.ground, this.walls, this.edges];
+    for (const thing of this.obstacles) thing.frustumCulled = false;
     this.cloud = new THREE.Points(new THREE.BufferGeometry(), new THREE.PointsMaterial({size: 2, sizeAttenuation: false, vertexColors: true}));
     this.cloud.geometry.setAttribute('position', new THREE.BufferAttribute(new Float32Array(3 * MOST_POINTS), 3));
     this.cloud.geometry.setAttribute('color', new THREE.BufferAttribute(new Float32Array(3 * MOST_POINTS), 3));
@@ -113,31 +130,29 @@ export class Scene3D {
     this.cloud.frustumCulled = false;
     this.sweeps = [];
     this.scene.add(grid, this.drone, this.target, this.covariance, this.trail, this.targetTrail, this.plan, this.stop,
-      this.forecast, this.fan, this.sight, this.obstacles, this.cloud);
+      this.forecast, this.fan, this.sight, ...this.obstacles, this.cloud);
     for (const thing of [this.drone, this.target, this.covariance]) thing.visible = false;
     this.solids = [new THREE.SphereGeometry(1, 16, 10), new THREE.BoxGeometry(2, 2, 2),
       new THREE.CylinderGeometry(1, 1, 2, 20).rotateX(Math.PI / 2)];
-    this.materials = KINDS.map((color, kind) => new THREE.MeshLambertMaterial(
-      {color, transparent: kind === 2, opacity: kind === 2 ? 0.25 : 1, depthWrite: kind !== 2}));
-    this.edges = new THREE.EdgesGeometry(this.solids[1]);
-    this.edgeMaterial = new THREE.LineBasicMaterial({color: '#6d7886'});
-    this.wallMaterial = new THREE.MeshBasicMaterial(
-      {color: '#8d97a5', transparent: true, opacity: 0.08, side: THREE.BackSide, depthWrite: false});
+    this.boxEdges = new THREE.EdgesGeometry(this.solids[1]);
+    this.shaft = new THREE.CylinderGeometry(0.02, 0.02, 1, 6).translate(0, 0.5, 0);
+    this.head = new THREE.ConeGeometry(0.075, 0.25, 8);
+    this.setObstacles([]);
   }
 
   clear() {
     this.sweeps = [];
     this.cloud.geometry.setDrawRange(0, 0);
-    this.obstacles.clear();
-    this.dirty = true;
+    this.setObstacles([]);
   }
 
   setState(state) {
     const {drone, target, plan, forecast} = state;
-    if (place(this.drone, drone?.p)) turn(this.drone, drone.q);
-    if (place(this.target, target?.p)) {
+    const moving = [[this.drone, drone], [this.target, target]].filter(([object, at]) => place(object, at?.p));
+    turn(this.drone, drone?.q);
+    this.motion.aim(seconds(), state.generation, moving.map(([object]) => object));
+    if (this.target.visible) {
       this.target.scale.set(target.radius, target.radius, target.height);
-      this.covariance.position.copy(this.target.position);
       this.covariance.scale.set(...target.axes.map((v) => Math.max(SIGMAS * (v ?? 0), 0.005)));
       turn(this.covariance, target.q);
     }
@@ -149,7 +164,6 @@ export class Scene3D {
     setTube(this.forecast, forecast?.path);
     this.setFan(forecast);
     setLine(this.sight, this.drone.visible && this.target.visible ? [...drone.p, ...target.p] : null);
-    if (this.drone.visible) this.keepInView();
     this.dirty = true;
   }
 
@@ -186,26 +200,28 @@ export class Scene3D {
   }
 
   setObstacles(rows) {
-    this.obstacles.clear();
-    for (const row of rows) {
+    const known = rows.filter((row) => [...row.p, ...row.half].every((v) => v !== null));
+    const arrows = known.flatMap((row) => this.arrow(row)), solid = [...arrows], ground = [], walls = [], edges = [];
+    for (const row of known) {
       const wall = row.kind === 0 && row.solid === 1 && Math.max(...row.half) > LARGE;
-      const mesh = new THREE.Mesh(this.solids[row.solid] ?? this.solids[0],
-        wall ? this.wallMaterial : this.materials[row.kind] ?? this.materials[0]);
-      if (wall) mesh.add(new THREE.LineSegments(this.edges, this.edgeMaterial));
-      if (!place(mesh, row.p) || row.half.some((v) => v === null)) continue;
-      turn(mesh, row.q);
-      mesh.scale.set(...row.half.map((v) => Math.max(v, 0.005)));
-      if (row.kind === 2) mesh.visible = !!this.showGround;
-      this.obstacles.add(mesh);
-      if (row.v && row.v.every((v) => v !== null)) this.addArrow(row);
+      const made = part(this.solids[row.solid] ?? this.solids[0], KINDS[row.kind] ?? KINDS[0], poseOf(row));
+      (wall ? walls : row.kind === 2 ? ground : solid).push(made);
+      if (wall) edges.push(part(this.boxEdges, null, made.matrix));
     }
+    [solid, this.showGround ? ground : [], walls, edges].forEach((parts, i) => setMerged(this.obstacles[i], parts));
+    this.shown = {solids: known.length, arrows: arrows.length / 2};
     this.dirty = true;
   }
 
-  addArrow(row) {
-    const v = new THREE.Vector3(...row.v), speed = v.length();
-    if (speed < 0.05) return;
-    this.obstacles.add(new THREE.ArrowHelper(v.normalize(), new THREE.Vector3(...row.p), Math.min(speed, 5), '#ff8a80', 0.25, 0.15));
+  // Of the velocity: as long as what is covered in a second, 5 m at most.
+  arrow(row) {
+    if (!row.v || row.v.some((v) => v === null)) return [];
+    const v = new THREE.Vector3(...row.v), length = Math.min(v.length(), 5);
+    if (length < 0.05) return [];
+    const turned = new THREE.Quaternion().setFromUnitVectors(new THREE.Vector3(0, 1, 0), v.normalize());
+    const from = new THREE.Vector3(...row.p), to = from.clone().addScaledVector(v, length);
+    const at = (p, size) => new THREE.Matrix4().compose(p, turned, new THREE.Vector3(1, size, 1));
+    return [part(this.shaft, '#ff8a80', at(from, length)), part(this.head, '#ff8a80', at(to, 1))];
   }
 
   // The newest sweep is bright, the ones before fade; colour: height above the lowest.
@@ -223,17 +239,16 @@ export class Scene3D {
       }
     });
     position.needsUpdate = color.needsUpdate = true;
-    this.cloud.geometry.setDrawRange(0, n);
     this.points = n;
     this.dirty = true;
   }
 
   // Moves camera and centre along with the drone.
-  keepInView() {
+  keepInView(dt) {
     if (!this.follow) return;
     const goal = this.target.visible ? this.drone.position.clone().lerp(this.target.position, 0.5) : this.drone.position;
     const step = goal.clone().sub(this.controls.target);
-    if (step.length() < 30 && this.placed) step.multiplyScalar(0.3);
+    if (step.length() < 30 && this.placed) step.multiplyScalar(1 - Math.exp(-dt / FOLLOW));
     this.placed = true;
     this.controls.target.add(step);
     this.camera.position.add(step);
@@ -243,7 +258,7 @@ export class Scene3D {
     const {clientWidth: width, clientHeight: height} = this.canvas;
     if (width === this.width && height === this.height) return;
     [this.width, this.height] = [width, height];
-    this.renderer.setPixelRatio(Math.min(window.devicePixelRatio, 2));
+    this.renderer.setPixelRatio(Math.min(window.devicePixelRatio, 2) * this.detail.pixels);
     this.renderer.setSize(width, height, false);
     this.camera.aspect = width / Math.max(height, 1);
     this.camera.updateProjectionMatrix();
@@ -251,11 +266,22 @@ export class Scene3D {
   }
 
   draw() {
-    this.frames++;
+    const t = seconds(), dt = t - this.drawn;
+    if (t < this.due - SLACK) return;
     this.resize();
-    if (!this.dirty) return;
+    const moves = this.motion.move(t);
+    if (!moves && !this.dirty) return;
+    if (this.target.visible) this.covariance.position.copy(this.target.position);
+    if (this.drone.visible) this.keepInView(Math.min(dt, 1));
+    // The newest sweep comes first, so that the oldest go.
+    this.cloud.geometry.setDrawRange(0, Math.ceil(this.detail.points * (this.points ?? 0)));
     this.dirty = false;
     this.controls.update();
     this.renderer.render(this.scene, this.camera);
+    this.frames++;
+    this.drawn = t;
+    this.due = Math.max(this.due + PERIOD, t - PERIOD);  // one that was late does not hold the next one back
+    if (moves && this.moved && this.detail.note(t, dt)) this.width = 0;  // sized anew
+    this.moved = moves;
   }
 }
