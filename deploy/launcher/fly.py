@@ -100,7 +100,8 @@ def build_and_check(scenario, view=False):
     build("chase-scenario")
     told = json.loads(ask("chase-scenario", scenario))
     build(*(row["binary"] for row in flight_processes()), "chase-flight", "chase-flight-monitor",
-          "chase-recorder", "chase-report", "chase-command", *(["chase-viewer"] if view else []))
+          "chase-recorder", "chase-report", "chase-command", "chase-log", "chase-lidar",
+          *(["chase-viewer"] if view else []))
     ask("chase-flight", scenario, "--print-config", "simulator")  # reads the services' overrides
     return told["duration_s"] + told["settle_s"], told.get("commands", [])
 
