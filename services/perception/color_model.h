@@ -19,6 +19,9 @@ Hsv ToHsv(double blue, double green, double red);
 /// How much a colour looks like the target's, 0 to 1.
 double Score(const ColorConfig& config, const Hsv& color);
 
+/// The share of daylight in an image, up to 1, from its mean brightness. `bgr`: 8 bit 3 channels.
+double Light(const cv::Mat& bgr);
+
 /// How much each pixel looks like the target's colour.
 class ColorModel {
  public:

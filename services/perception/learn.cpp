@@ -100,14 +100,17 @@ double Departure(const Detection& d) {
 /// Aspect, fill and departure of the blobs that the masks mark, as medians: a blob may hold more
 /// than the target. Gives the pairs that do not tell them, and why.
 std::vector<std::string> LearnShape(const std::vector<cv::Mat>& images,
-                                    const std::vector<cv::Mat>& masks, DetectorConfig* config) {
+                                    const std::vector<cv::Mat>& masks,
+                                    const std::vector<Separation>& pictures,
+                                    DetectorConfig* config) {
   const ColorDetector detector(*config, 1.0);
   std::vector<std::string> shapeless;
   std::vector<double> aspects, fills, departures;
   for (size_t i = 0; i < images.size(); ++i) {
     const auto found = detector.Detect(images[i]);
     const Detection* marked = MarkedBlob(found, masks[i]);
-    const std::string why = WhyShapeless(marked, images[i].size());
+    const std::string why =
+        pictures[i].used ? WhyShapeless(marked, images[i].size()) : "its colours are left out";
     if (!why.empty()) {
       shapeless.push_back("pair " + std::to_string(i + 1) + ": " + why);
       continue;
@@ -129,10 +132,12 @@ double Overlap(const ColorDetector& detector, const cv::Mat& bgr, const cv::Mat&
   return best ? Overlap(*best, mask) : 0.0;
 }
 
+/// Over the pictures that the colour is from, a share of all.
 double MeanOverlap(const std::vector<cv::Mat>& images, const std::vector<cv::Mat>& masks,
-                   const ColorDetector& detector) {
+                   const std::vector<Separation>& pictures, const ColorDetector& detector) {
   double sum = 0.0;
-  for (size_t i = 0; i < images.size(); ++i) sum += Overlap(detector, images[i], masks[i]);
+  for (size_t i = 0; i < images.size(); ++i)
+    if (pictures[i].used) sum += Overlap(detector, images[i], masks[i]);
   return sum / static_cast<double>(images.size());
 }
 
@@ -156,12 +161,13 @@ Learned LearnDetector(const std::vector<cv::Mat>& images, const std::vector<cv::
   config.color.white_balance = false;  // the pictures' own light is in the colours
   const LearnedColor color_of = LearnColor(images, masks, config.color);
   config.color = color_of.config;
-  const auto shapeless = LearnShape(images, masks, &config);
+  const auto shapeless = LearnShape(images, masks, color_of.pictures, &config);
   const ColorModel color(config.color);
   Learned best;
   for (int i = 0; i * kInsetStep <= kMostInset; ++i) {
     config.shape.inset = i * kInsetStep;
-    const double overlap = MeanOverlap(images, masks, ColorDetector(config.shape, color, 1.0));
+    const double overlap =
+        MeanOverlap(images, masks, color_of.pictures, ColorDetector(config.shape, color, 1.0));
     if (i == 0 || overlap > best.overlap) best = {config, overlap, shapeless, color_of};
   }
   return best;

@@ -19,7 +19,7 @@ struct ColorConfig {
     v("hue_min_deg", hue_min_deg, "0 red, 30 orange, 60 yellow; may be above hue_max_deg: wraps");
     v("hue_max_deg", hue_max_deg, "upper end of the hue; 0 to 360 is every hue");
     v("saturation_min", saturation_min, "0 grey to 1 pure");
-    v("value_min", value_min, "brightest channel, 0 to 1");
+    v("value_min", value_min, "brightest channel as a share of the light on the scene, 0 to 1");
     v("hue_softness_deg", hue_softness_deg, "width over which the score falls outside the range");
     v("softness", softness, "the same for saturation and value, 0 to 1");
     v("white_balance", white_balance, "undo the tint of the light, estimated on greyish pixels");

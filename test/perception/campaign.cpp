@@ -94,6 +94,7 @@ int main(int argc, char** argv) {
   app.add_option("--first", a.first, "first seed");
   app.add_option("--count", a.count, "seeds");
   app.add_option("--duration", a.stage.duration, "of each flight, s");
+  app.add_option("--light", a.stage.light, "share of the day's");
   app.add_option("--config", a.config, "overrides of perception's config");
   app.add_option("--trace", a.trace, "folder for one CSV a flight");
   app.add_option("--picture", a.picture, "folder for one frame a flight, instead of flying");

@@ -50,6 +50,12 @@ Stage::Body Disturbed(const Stage::Body& body, const Vector3d& p, const Vector3d
   return {body.p + p, Eigen::Quaterniond(Eigen::AngleAxisd(norm, angle / norm)) * body.q};
 }
 
+simulator::CameraConfig CameraIn(double light) {
+  simulator::CameraConfig config;
+  config.light = light;
+  return config;
+}
+
 }  // namespace
 
 Show::Show(const Stage& stage, const world::Rig& rig)
@@ -57,7 +63,8 @@ Show::Show(const Stage& stage, const world::Rig& rig)
       rig_(rig),
       actors_(stage.scenario()),
       scene_(stage.scenario()),
-      camera_({}, rig, stage.scenario().target.color, stage.options().seed),
+      camera_(CameraIn(stage.options().light), rig, stage.scenario().target.color,
+              stage.options().seed),
       lidar_({}, rig, stage.options().seed),
       random_(stage.options().seed * 7919 + 5) {
   const OdometryErrors& error = stage.options().errors;

@@ -29,6 +29,7 @@ struct StageOptions {
   std::string scenario = "deploy/scenarios/gym.yaml";
   uint64_t seed = 1;
   double duration = 20.0;  ///< s
+  double light = 1.0;      ///< share of the day's
   bool distractors = true, screens = true, warm = true;
   OdometryErrors errors;
 };

@@ -98,6 +98,41 @@ TEST(PerceptionColor, FindsTheTargetUnderTintedLight) {
   }
 }
 
+TEST(PerceptionColor, FindsTheTargetInDimLight) {
+  for (const double light : {0.1, 0.15, 0.2, 0.3})
+    for (uint32_t seed = 1; seed <= 10; ++seed) {
+      auto world = StillWorld(3.0);
+      world.light = Eigen::Vector3d::Constant(light);
+      world.image_noise = 3.0;
+      world.seed = seed;
+      const auto shot = Renderer(world).Image(0.0);
+      const auto found = ColorDetector(DetectorConfig{}, 0.45).Detect(shot.bgr);
+      ASSERT_FALSE(found.empty()) << "light " << light << ", seed " << seed;
+      const double overlap = (found[0].box & shot.box).area() / (found[0].box | shot.box).area();
+      EXPECT_GT(overlap, 0.7) << "light " << light << ", seed " << seed;
+      EXPECT_GT(found[0].score, StateConfig{}.acquire_score)
+          << "light " << light << ", seed " << seed;
+    }
+}
+
+TEST(PerceptionColor, WhatIsDarkForItsLightIsNotTheTarget) {
+  const cv::Rect place(150, 80, 40, 70);
+  for (const double light : {1.0, 0.5, 0.25}) {
+    cv::Mat image = Grey() * light;
+    image(place).setTo(0.05 * light * kOrangeBgr);
+    EXPECT_LT(cv::mean(ColorModel{ColorConfig{}}.Score(image)(place))[0], 127.0) << light;
+    image(place).setTo(0.4 * light * kOrangeBgr);
+    EXPECT_GT(cv::mean(ColorModel{ColorConfig{}}.Score(image)(place))[0], 250.0) << light;
+  }
+}
+
+TEST(PerceptionColor, ALampOnTheTargetInTheDarkKeepsItsColour) {
+  cv::Mat image = Grey(15);
+  const cv::Rect place(150, 80, 40, 70);
+  image(place).setTo(kOrangeBgr);
+  EXPECT_GT(cv::mean(ColorModel{ColorConfig{}}.Score(image)(place))[0], 250.0);
+}
+
 TEST(PerceptionSilhouette, EdgesLieBetweenPixels) {
   for (const double shift : {0.0, 0.25, 0.5, 0.75}) {
     // A bright block from u = 100.5 + shift to 140.5 + shift, drawn by area.
