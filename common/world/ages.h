@@ -5,10 +5,10 @@ namespace chase::world {
 /// How old an input may be before whoever needs it does without, s, and what is done then.
 struct MostAge {
   double obstacles = 0.3;  ///< planning: brakes and hovers, uncertified; mission: not ready
-  double pose = 0.1;       ///< control: levels and sinks; after `velocity` it falls silent as well;
-                           ///< mission: not ready
-  double velocity = 2.0;   ///< control: since it was measured; brakes until then, then lands;
-                           ///< mission: EMERGENCY
+  double pose = 0.1;       ///< control: brakes by dead reckoning, also when poses come later than
+                           ///< usual by this; silent after `velocity`; mission: not ready
+  double velocity = 2.0;   ///< control: since its deviation was 0.1 m/s; brakes until then, then
+                           ///< lands; mission: EMERGENCY
   double target = 0.5;     ///< mission: not ready, in flight lost; ten frames of the camera
   double status = 2.5;     ///< mission: not ready; two that are sent once a second may be lost
   double flight_state = 2.0;  ///< planning: holds where it chased, searched or returned; a process

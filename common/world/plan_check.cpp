@@ -9,7 +9,8 @@ namespace {
 constexpr Eigen::Index kMostRows = 16;  // of a Curve
 // Stamps are whole microseconds, in which a body at 10 m/s and 10 m/s^2 moves by 1e-5 of each unit.
 constexpr double kJoin = 1e-4;                 // m, m/s
-constexpr double kLeaveBy = 0.6;               // tau by which planning leaves what the start is in
+constexpr double kLeaveBy = 0.25;              // tau by which planning leaves what the start is in
+constexpr double kLeaveGroundBy = 0.6;         // and the ground, out of which it climbs from rest
 constexpr double kRestingSpeed = 0.02;         // m/s
 constexpr double kRestingAcceleration = 0.05;  // m/s^2
 
@@ -57,7 +58,8 @@ class Examiner {
   }
 
   std::string Complaint(const Proof& proof) {
-    if (!proof.of_sight && proof.from > (claim_.starts_inside ? kLeaveBy : 0.0))
+    const double leave_by = obstacles_[at_].ground ? kLeaveGroundBy : kLeaveBy;
+    if (!proof.of_sight && proof.from > (claim_.starts_inside ? leave_by : 0.0))
       return "is kept off only later";
     if (!proof.of_sight && !(proof.radius >= claim_.hard_radius))
       return "is kept off a smaller sphere";

@@ -191,7 +191,8 @@ void AddOptions(CLI::App* app, Arguments* a) {
                   "NAME or NAME@SECONDS of mission time, besides the scenario's; repeatable");
   app->add_flag("--end-on-collision", a->end_on_collision,
                 "end the flight 0.2 s after the first contact");
-  app->add_option("--until", a->options.until, "stop at this mission time, s")->check(MissionTimeProblem);
+  app->add_option("--until", a->options.until, "stop at this mission time, s")
+      ->check(MissionTimeProblem);
   app->add_option("--print-config", a->print_config,
                   "print the configuration of this process in this scenario and exit");
   app->add_flag("--quiet", a->quiet, "no progress line");

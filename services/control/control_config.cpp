@@ -36,12 +36,12 @@ std::string ControlConfig::Problem() const {
                                {"reset_distance", reset_distance, 0.1, 10.0},
                                {"land_speed", land_speed, 0.1, 2.0},
                                {"descent_speed", descent_speed, 0.1, 2.0},
-                               {"lost_descent", lost_descent, 0.0, 2.0}};
+                               {"lost_descent", lost_descent, 0.01, 2.0}};
   for (int i = 0; i < 3; ++i) {
     bounds.push_back({"position_gain", position_gain[i], 0.1, 50.0});
     bounds.push_back({"velocity_gain", velocity_gain[i], 0.1, 30.0});
     bounds.push_back({"integral_gain", integral_gain[i], 0.0, 20.0});
-    bounds.push_back({"drag", drag[i], 0.0, 5.0});
+    bounds.push_back({"drag", drag[i], i == 2 ? 0.01 : 0.0, 5.0});
     // Routh: s^3 + kv s^2 + kp s + ki has its roots in the left half plane only below this.
     bounds.push_back({"integral_gain", integral_gain[i], 0.0, velocity_gain[i] * position_gain[i]});
   }

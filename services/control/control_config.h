@@ -54,8 +54,8 @@ struct ControlConfig {
 
   /// The least that a proof has to keep clear, m.
   double hard_radius() const { return drone_radius + tracking_tube; }
-  /// The largest deviation of a velocity that is better than none, m/s: thrust that is known to
-  /// `lost_descent` leaves a sinking body, whose drag alone brakes it, that uncertain.
+  /// Standard deviation of the velocity up to which it is used, m/s. Without one, thrust that is
+  /// wrong by `lost_descent` leads to this speed, where drag balances it.
   double UsableVelocitySigma() const { return lost_descent / drag.z(); }
   std::string Problem() const;
 };

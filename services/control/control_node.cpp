@@ -95,9 +95,10 @@ void ControlNode::OnPlan(const plan_t& message) {
   bus_.ReportError(fmt::format("PLAN {} left out: {}", message.seq, bad));
 }
 
-// Poses that were queued while somebody hung, or that come late, are left out for as long as dead
-// reckoning is good: a loop of these gains bears no 0.3 s of delay, and what is felt in a pose of
-// old says nothing about the thrust that was asked for of late.
+// Late poses are left out while dead reckoning is good: with these gains the loop is unstable at
+// 0.3 s of delay, and an acceleration that old is not that of the thrust asked for last. After 2 s
+// they are used, for want of better. Judged by the bus's clock, because a queue shows in no stamp:
+// a replay sees the times at which the recorder heard them.
 void ControlNode::OnPose(const pose_t& message) {
   if (pose_age_.IsLate(message.utime, bus_.Now(), kMostLate)) {
     if (Silence() <= world::kMostAge.velocity) return;

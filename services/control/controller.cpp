@@ -12,7 +12,8 @@ namespace {
 
 constexpr double kJumpBack = 1.0;  // s; less is jitter between publishers
 constexpr double kAtRest = 0.3;    // m/s: gusts about a wind of 3 m/s stir a hovering body by less
-constexpr double kMeasured = 0.1;  // m/s: sweeps leave 0.03, a second without them adds 0.1
+// m/s: POSE of the sentinels has 0.03, and a second without sweeps adds filter.doubt_accel's 0.1.
+constexpr double kMeasured = 0.1;
 
 bool Usable(const Estimate& e) {
   return e.p_WB.allFinite() && e.v_WB.allFinite() && e.a_WB.allFinite() &&
@@ -67,10 +68,12 @@ std::optional<Setpoint> Controller::Answer(double t, const Estimate& estimate, H
   const bool finite = Usable(estimate);
   if (health != Health::kUsable || !finite)
     return WithoutPose(t, estimate, finite ? health : Health::kStarting, dt);
+  last_usable_ = t;
   if (estimate.velocity_sigma <= kMeasured) last_measured_ = t;
   last_estimate_ = estimate;
   reckoning_.Begin(t, estimate);
   last_yaw_ = math::Yaw(estimate.R_WB);
+  if (!spot_) landing_ = Landing(config_, config_.land_speed);
   return Follow(t, estimate, dt);
 }
 
@@ -146,8 +149,9 @@ std::optional<Setpoint> Controller::WithoutPose(double t, const Estimate& estima
   lost_ = true;
   const bool known = health == Health::kLost;
   const bool usable = known && estimate.velocity_sigma <= config_.UsableVelocitySigma();
-  if (!spot_ && !is_down() && t - last_measured_ <= world::kMostAge.velocity) {
-    landing_ = Landing(config_, config_.land_speed);
+  // Inertia drifts since the velocity was measured, dead reckoning since there was one.
+  const double since = known ? last_measured_ : last_usable_;
+  if (!spot_ && !is_down() && t - since <= world::kMostAge.velocity) {
     if (usable) reckoning_.Begin(t, estimate);
     return Brake(reckoning_.At(t));
   }

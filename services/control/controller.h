@@ -15,7 +15,7 @@ namespace chase::control {
 /// How far the estimate can be trusted.
 enum class Health {
   kUsable,
-  kLost,      ///< position no more, velocity for a while
+  kLost,      ///< no position; a velocity with its deviation
   kStarting,  ///< nothing of it
 };
 
@@ -56,7 +56,7 @@ class Controller {
   void Cut() { cut_ = true; }
 
   /// Setpoint for time t [s] of the estimate, nothing while there is nothing to fly. Once flying:
-  /// no plan, brake; no usable pose, brake for as long as a velocity is good (kMostAge.velocity),
+  /// no plan, brake; no usable pose, brake until kMostAge.velocity after the velocity was measured,
   /// by dead reckoning where the estimate is not finite or starting; then land. Motors that have
   /// been stopped on the ground stay so. Time that jumps back starts the controller anew.
   std::optional<Setpoint> Update(double t, const Estimate& estimate, Health health);
@@ -94,7 +94,7 @@ class Controller {
   ErrorBound bound_;
   std::optional<double> last_t_;
   Estimate last_estimate_;
-  double last_measured_ = 0.0;  // s
+  double last_usable_ = 0.0, last_measured_ = 0.0;  // of the pose, the velocity; s
   bool flying_ = false, lost_ = false;
   bool lands_ = false;  // a landing is asked for
   bool cut_ = false;

@@ -17,14 +17,20 @@ constexpr double kLeastLift = -3.0;    // m/s^2: leaves 70 % of the weight to st
 constexpr double kMostLift = 1.0;      // m/s^2: a velocity that is wrong is not climbed after
 constexpr double kIntegralGain = 2.0;  // 1/s^2: takes 2 s at a gain of 4 1/s
 constexpr double kMostIntegral = 1.0;  // m/s^2
+constexpr double kLongestStep = 0.05;  // s; over a longer gap the thrust was not this loop's
 
 }  // namespace
 
 double Landing::Lift(const Estimate& estimate, double dt) {
-  Feel(estimate.a_WB.z() - lift_, dt);
-  return lift_ = LiftFor(estimate, dt);
+  if (dt > kLongestStep)
+    support_ = supported_ = 0.0;
+  else
+    Feel(estimate.a_WB.z() - lift_, dt);
+  return lift_ = LiftFor(estimate, std::min(dt, kLongestStep));
 }
 
+// Once the velocity is not usable: by the square of its deviation, so that after 20 s the ground
+// bears the 1 m/s^2 that are felt, and a body 5 s further down has sunk little faster.
 double Landing::LiftFor(const Estimate& estimate, double dt) {
   const double doubt = estimate.velocity_sigma / usable_sigma_;
   const double most = doubt > 1.0 ? std::max(kLeastLift, blind_lift_ * doubt * doubt) : kMostLift;

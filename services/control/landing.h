@@ -19,7 +19,7 @@ class Landing {
         usable_sigma_(config.UsableVelocitySigma()) {}
 
   /// Thrust beyond that of hovering, m/s^2, after `dt` s with the last one. A velocity that is not
-  /// usable cannot make it climb: ever less thrust, so that the ground is felt at last.
+  /// usable may make it sink faster, but not climb: ever less thrust, so that the ground is felt.
   double Lift(const Estimate& estimate, double dt);
 
   /// True once the ground has been felt for long enough; stays true.

@@ -296,15 +296,16 @@ PlanResult Pilot::Search(double t0, const Start& start, const BodyEstimate& body
 }
 
 // Braking while it moves; else where it is, for as long as that can be certified.
-// From what moves and is seen no more there is no evading: its forecast swells until it is
-// everywhere, and the way out leads where nobody looks.
+// Without new lists moving obstacles are left out: their forecasts' uncertainty grows until it
+// covers every place, and fleeing from it leads into space that nobody observes.
 PlanResult Pilot::Rest(double t0, const Start& start) const {
   const bool sees = SeesObstacles(t0 - config_.latency);
   PlanRequest request = Request(t0, start);
-  std::vector<world::Obstacle>& known = request.obstacles;
+  std::vector<world::Obstacle>& listed = request.obstacles;
   if (!sees)
-    known.erase(std::remove_if(known.begin(), known.end(), [](const auto& o) { return o.moving; }),
-                known.end());
+    listed.erase(
+        std::remove_if(listed.begin(), listed.end(), [](const auto& o) { return o.moving; }),
+        listed.end());
   PlanResult plan = RestPlan(config_.planner, request);
   plan.yaw = {start.yaw.yaw};
   if (plan.reason.empty() && IsAtRest(start.state)) plan.verdict = Verdict::kWait;

@@ -16,7 +16,9 @@ using Eigen::Vector3d;
 constexpr double kTimes[] = {0.6, 0.8, 1.0, 1.3, 1.7, 2.2, 3.0};  // s, of a braking
 constexpr double kInTime = 0.05;  // s: contacts are sampled this often
 constexpr double kAlike = 0.01;   // m of clearance that make no difference
-constexpr double kOutBy = 0.6;    // tau by which the ground is left: a climb of 0.2 m from rest
+// tau by which the ground is left: from rest to rest a climb of 0.5 m is 0.3 m up by then, and
+// slabs reach 0.3 m above what they stand for. The check allows as much: kLeaveGroundBy.
+constexpr double kOutBy = 0.6;
 
 /// Ways to rest ask for safety alone.
 PlanRequest WithoutSight(const PlanRequest& request, const world::State& start, double t0) {
@@ -64,7 +66,7 @@ Curve CurveTo(const world::State& s, double T, const Vector3d& end) {
 
 /// Distance of a point, `d` from its centre, to the solid; of an ellipsoid to first order (Taubin
 /// 1991, eq. 3).
-double Off(const world::Obstacle& o, const Vector3d& d) {
+double DistanceTo(const world::Obstacle& o, const Vector3d& d) {
   using Kind = world::Solid::Kind;
   if (o.solid == world::Obstacle::Solid::kBox)
     return world::SignedDistance({Kind::kBox, Vector3d::Zero(), o.half}, o.axes.conjugate() * d);
@@ -128,11 +130,13 @@ class Resting {
     for (size_t j = 0; j < problem_.obstacles.size(); ++j) {
       const Curve& center = problem_.obstacles[j].center;
       double& least = center.bottomRows(center.rows() - 1).isZero() ? standing : moving;
-      least = std::min(least, Off(request_.obstacles[j], p - planning::Evaluate(center, tau)));
+      least =
+          std::min(least, DistanceTo(request_.obstacles[j], p - planning::Evaluate(center, tau)));
     }
     if (problem_.target_body)
-      moving = std::min(moving, Off(*request_.target_body,
-                                    p - planning::Evaluate(problem_.target_body->center, tau)));
+      moving =
+          std::min(moving, DistanceTo(*request_.target_body,
+                                      p - planning::Evaluate(problem_.target_body->center, tau)));
     if (!l.height) return {standing, moving};
     const double above = l.ground.Above(p);
     return {std::min({standing, above, config_.drone_radius + l.z_max - above}), moving};

@@ -10,7 +10,7 @@ using Eigen::Vector3d;
 
 constexpr double kStep = 1e-3;        // s
 constexpr double kDescentGain = 2.0;  // 1/s
-constexpr double kHoverMemory = 2.0;  // s, of the autopilot's hover thrust
+constexpr double kHoverMemory = 2.0;  // s: above the motors' 0.05 s, below a battery's minutes
 constexpr double kPi = 3.14159265358979323846;
 
 /// Standing on its legs where the scenario puts it, or in the air if that is higher.
@@ -93,11 +93,12 @@ void Simulator::SetSetpoint(const AttitudeSetpoint& setpoint, double t) {
 
 bool Simulator::SetpointFresh() const { return now() - setpoint_time_ <= config_.setpoint_timeout; }
 
-/// What hovering takes, learned by thrust asked for over acceleration felt, as PX4's hover thrust
-/// estimator does: motors and mass are not what an autopilot was told either.
+/// Hover thrust as PX4's estimator learns it, from thrust asked for over acceleration felt: an
+/// autopilot knows neither the motors' true thrust nor the true mass.
 void Simulator::LearnHoverThrust() {
   const double felt = quadrotor_.thrust() / config_.vehicle.TrueMass();
-  if (!SetpointFresh() || !setpoint_.motors || quadrotor_.on_ground() || felt < kGravity / 2) return;
+  if (!SetpointFresh() || !setpoint_.motors || quadrotor_.on_ground() || felt < kGravity / 2)
+    return;
   hover_thrust_ += kStep / kHoverMemory * (setpoint_.thrust / felt * kGravity - hover_thrust_);
 }
 
@@ -109,7 +110,8 @@ AttitudeSetpoint Simulator::ActiveSetpoint() const {
   descent.orientation = Level(body.q);
   if (quadrotor_.on_ground() || steps_ == 0) return descent;
   const double wanted = -config_.descent_speed - body.v.z();
-  descent.thrust = std::clamp(hover_thrust_ + kDescentGain * wanted, 0.0, config_.vehicle.max_thrust);
+  descent.thrust =
+      std::clamp(hover_thrust_ + kDescentGain * wanted, 0.0, config_.vehicle.max_thrust);
   return descent;
 }
 

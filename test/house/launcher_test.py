@@ -130,12 +130,13 @@ class FlightTest(unittest.TestCase):
         self.assertTrue((self.folder / "flight.lcm").exists())
         self.assertIn("working", (self.folder / "odometry.log").read_text(encoding="utf-8"))
 
-    def test_builds_only_what_flies(self):
+    def test_builds_what_flies_and_what_reads_and_records(self):
         self.assertEqual(self.fly()[0], 0)
         first, rest = self.built
         self.assertEqual(first, ("chase-scenario",))
         flying = {row["binary"] for row in fly.flight_processes()}
-        others = {"chase-flight", "chase-flight-monitor", "chase-recorder", "chase-report", "chase-command"}
+        others = {"chase-flight", "chase-flight-monitor", "chase-recorder", "chase-report", "chase-command", "chase-log",
+                  "chase-lidar"}
         self.assertEqual(set(rest), flying | others)
 
     def test_view_starts_an_onlooker(self):

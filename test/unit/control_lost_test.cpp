@@ -1,4 +1,4 @@
-// What is flown without a plan, without a position, without a velocity, and to come down.
+// What is flown without a position, and without a velocity.
 
 #include <gtest/gtest.h>
 
@@ -6,8 +6,7 @@
 
 #include "common/math/rotation.h"
 #include "common/world/ages.h"
-#include "services/control/controller.h"
-#include "test/unit/control_body.h"
+#include "test/unit/control_flight.h"
 
 namespace chase::control {
 namespace {
@@ -15,65 +14,10 @@ namespace {
 using Eigen::Quaterniond;
 using Eigen::Vector3d;
 using test::Body;
-
-constexpr double kStep = 0.005;  // s
-
-Plan PointPlan(const Vector3d& p, double start = 0.0) {
-  return {world::Trajectory::Constant(p, start, 1.0), Eigen::VectorXd::Zero(1), {}};
-}
-
-/// Along x at `speed`, for 5 s.
-Plan LinePlan(const Vector3d& p, double speed, double start = 0.0) {
-  Plan plan = PointPlan(p, start);
-  plan.position.duration = 5.0;
-  plan.position.coefficients.conservativeResize(2, 3);
-  plan.position.coefficients.row(1) = Eigen::RowVector3d(5.0 * speed, 0.0, 0.0);
-  return plan;
-}
-
-/// A body over the ground at z = 0, and what inertial sensors make of it: position lost, velocity
-/// off by a bias that grows with `drift` m/s^2.
-class Flight {
- public:
-  explicit Flight(const Vector3d& p, const ControlConfig& config = {}) : controller(config) {
-    body.p = p;
-  }
-
-  /// Flies on until `until`, s.
-  void Fly(double until, Health health) {
-    for (; t < until - 1e-9; t += kStep) {
-      const Vector3d v = body.v;
-      Estimate estimate = body.Measured();
-      estimate.a_WB = a_;
-      estimate.velocity_sigma = velocity_sigma;
-      if (health != Health::kUsable) {
-        estimate.p_WB += Vector3d(30, 0, -50);
-        estimate.v_WB += (lost_for_ += kStep) * drift;
-        estimate.a_WB += drift;
-      }
-      setpoint = *controller.Update(t, estimate, health);
-      if (!setpoint.motors && off_at < 0.0) off_at = t;
-      body.Step(setpoint);
-      if (body.p.z() < 0.0) {
-        if (down_at < 0.0) down_at = t, impact = -v.z(), skid = v.head<2>().norm();
-        body.p.z() = 0.0, body.v.setZero();
-      }
-      a_ = (body.v - v) / kStep;
-      fastest = std::max(fastest, body.v.norm());
-    }
-  }
-
-  Controller controller;
-  Body body;
-  Vector3d drift = Vector3d::Zero();
-  Setpoint setpoint;
-  double t = 0.0, down_at = -1.0, off_at = -1.0, impact = 0.0, fastest = 0.0;
-  double skid = 0.0, velocity_sigma = 0.0;
-
- private:
-  Vector3d a_ = Vector3d::Zero();
-  double lost_for_ = 0.0;
-};
+using test::Flight;
+using test::kStep;
+using test::LinePlan;
+using test::PointPlan;
 
 TEST(LostPose, BrakesOnTheInertialVelocityAndHoldsTheHeight) {
   Flight flight({0, 0, 2});
@@ -136,6 +80,23 @@ TEST(LostPose, HoldsSinceTheVelocityWasMeasuredNotSinceThePoseWasLost) {
   EXPECT_EQ(flight.controller.following(), Following::kBrake);
   flight.Fly(7.2, Health::kLost);
   EXPECT_EQ(flight.controller.following(), Following::kLand);
+}
+
+TEST(LostPose, ASilentPoseIsBrakedWithoutByDeadReckoningHoweverDoubtfulTheVelocityWas) {
+  Flight flight({0, 0, 2});
+  flight.controller.AddPlan(PointPlan({0, 0, 2}));
+  flight.velocity_sigma = 0.2;
+  flight.Fly(5.0, Health::kUsable);
+  ASSERT_TRUE(flight.controller.Blind(0.2));
+  EXPECT_EQ(flight.controller.following(), Following::kBrake);
+}
+
+TEST(LostPose, AGapBetweenEstimatesIsNoGround) {
+  Landing landing(ControlConfig(), 0.5);
+  Estimate felt;
+  felt.a_WB.z() = 2.0;
+  landing.Lift(felt, 2.0);
+  EXPECT_FALSE(landing.is_down());
 }
 
 TEST(LostPose, ComesDownByAVelocityThatIsNotToBeTrusted) {
@@ -325,96 +286,6 @@ TEST(NewPlans, MoveTheReferenceNoFurtherThanAResetUnlessToTheBody) {
   flight.body.p.x() += 3.0;  // off the plan: a reset starts at the body
   flight.Fly(1.005, Health::kUsable);
   EXPECT_EQ(flight.controller.AddPlan(PointPlan({3, 0, 2}, 1.2)), "");
-}
-
-TEST(AskedToLand, ComesDownOnTheSpotAndStopsTheMotors) {
-  for (const double mass : {0.96, 1.0, 1.04})
-    for (const double wind : {0.0, 3.0}) {
-      Flight flight({1, -1, 2});
-      flight.body.mass_factor = mass;
-      flight.body.wind = {wind, 0, 0};
-      flight.controller.AddPlan(PointPlan({1, -1, 2}));
-      flight.Fly(10.0, Health::kUsable);
-      flight.controller.SetLanding(true);
-      flight.Fly(12.0, Health::kUsable);
-      EXPECT_EQ(flight.controller.following(), Following::kLand);
-      const Vector3d half_way = flight.body.p;
-      flight.Fly(25.0, Health::kUsable);
-      ASSERT_GT(flight.down_at, 0.0) << "mass " << mass << " wind " << wind;
-      EXPECT_LT((half_way - Vector3d(1, -1, half_way.z())).norm(), 0.1);
-      EXPECT_LE(flight.impact, 0.5) << "mass " << mass << " wind " << wind;
-      EXPECT_GT(flight.off_at, flight.down_at) << "mass " << mass << " wind " << wind;
-      EXPECT_LT(flight.off_at, flight.down_at + 1.0) << "mass " << mass << " wind " << wind;
-    }
-}
-
-TEST(AskedToLand, StopsBeforeItComesDown) {
-  Flight flight({0, 0, 2});
-  flight.body.v = {2, 0, 0};
-  Plan plan = LinePlan({0, 0, 2}, 2.0);
-  plan.stop = world::Trajectory::Constant({4, 0, 2}, 2.0, 2.0);
-  plan.stop->coefficients.conservativeResize(3, 3);
-  plan.stop->coefficients.row(1) = Eigen::RowVector3d(4.0, 0.0, 0.0);
-  plan.stop->coefficients.row(2) = Eigen::RowVector3d(-2.0, 0.0, 0.0);
-  flight.controller.AddPlan(plan);
-  flight.Fly(1.0, Health::kUsable);
-  flight.controller.SetLanding(true);
-  flight.Fly(3.0, Health::kUsable);
-  EXPECT_EQ(flight.controller.following(), Following::kStop);
-  EXPECT_NEAR(flight.body.p.z(), 2.0, 0.1);
-  flight.Fly(15.0, Health::kUsable);
-  EXPECT_GT(flight.off_at, 0.0);
-  EXPECT_NEAR(flight.body.p.x(), 6.0, 0.3) << "where it came to rest";
-}
-
-TEST(AskedToLand, HoldsAgainWhenItIsAskedNoMore) {
-  Flight flight({0, 0, 3});
-  flight.controller.AddPlan(PointPlan({0, 0, 3}));
-  flight.Fly(1.0, Health::kUsable);
-  flight.controller.SetLanding(true);
-  flight.Fly(4.0, Health::kUsable);
-  const Vector3d here = flight.body.p;
-  EXPECT_LT(here.z(), 2.2);
-  flight.controller.SetLanding(false);
-  EXPECT_EQ(flight.controller.AddPlan(PointPlan(here, 4.0)), "");
-  flight.Fly(8.0, Health::kUsable);
-  EXPECT_EQ(flight.controller.following(), Following::kStop);
-  EXPECT_NEAR(flight.body.p.z(), here.z(), 0.05);
-  EXPECT_LT(flight.off_at, 0.0);
-}
-
-TEST(AskedToLand, GoesOnDownWithoutAPosition) {
-  Flight flight({0, 0, 3});
-  flight.controller.AddPlan(PointPlan({0, 0, 3}));
-  flight.Fly(1.0, Health::kUsable);
-  flight.controller.SetLanding(true);
-  flight.Fly(3.0, Health::kUsable);
-  flight.Fly(3.5, Health::kLost);
-  EXPECT_EQ(flight.controller.following(), Following::kLand);
-  flight.Fly(15.0, Health::kLost);
-  EXPECT_GT(flight.off_at, flight.down_at);
-  EXPECT_LT(flight.impact, 0.5);
-}
-
-TEST(AskedToLand, MotorsRunAsLongAsItIsInTheAir) {
-  for (const double gust : {-3.0, 3.0}) {
-    Flight flight({0, 0, 40});
-    flight.controller.AddPlan(PointPlan({0, 0, 40}));
-    flight.Fly(20.0, Health::kUsable);
-    flight.controller.SetLanding(true);
-    for (double until = 20.5; until < 60.0; until += 0.5) {
-      flight.body.wind.z() = static_cast<int>(until) % 4 < 2 ? gust : 0.0;
-      flight.Fly(until, Health::kUsable);
-    }
-    EXPECT_LT(flight.off_at, 0.0) << "gust " << gust;
-    EXPECT_LT(flight.body.p.z(), 32.0);
-  }
-}
-
-TEST(AskedToLand, OnTheGroundNothingHappens) {
-  Controller controller{ControlConfig{}};
-  controller.SetLanding(true);
-  EXPECT_FALSE(controller.Update(0.0, Body().Measured(), Health::kUsable).has_value());
 }
 
 }  // namespace

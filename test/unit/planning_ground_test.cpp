@@ -185,7 +185,6 @@ TEST(Rest, TheLeastHarmNeverSpeedsUp) {
   EXPECT_GT(uncertified, 10);
 }
 
-// Two metres a second sideways past a wall, in a frame that drifts towards it.
 // What is too low to be an obstacle lies within the ground's slabs: a body that has sunk into them
 // comes out gently.
 TEST(Rest, OutOfTheGroundItClimbsWithinTheLimits) {
@@ -212,6 +211,7 @@ TEST(Rest, OutOfTheGroundItClimbsWithinTheLimits) {
   }
 }
 
+// Two metres a second sideways past a wall, in a frame that drifts towards it.
 TEST(Pilot, AFrameThatDriftsKeepsOffWhatStands) {
   PlanningConfig config;
   config.takeoff_time = 0.1;

@@ -8,7 +8,8 @@ export class Motion {
   // within the time from the state before to this one, unless it is of another `generation`. Times in seconds.
   aim(t, generation, objects) {
     const span = t - this.at, jumps = generation !== this.generation || span > LONGEST;
-    [this.at, this.span, this.generation] = [t, span, generation];
+    for (const {object} of this.ways) if (!objects.includes(object)) delete object.userData.drawn;
+    [this.at, this.span, this.generation] = [t, jumps ? 0 : span, generation];
     this.ways = objects.map((object) => {
       const to = object.position.clone(), from = jumps || !object.userData.drawn ? to : object.userData.drawn.clone();
       return {object, from, to};

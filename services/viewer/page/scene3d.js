@@ -126,7 +126,7 @@ export class Scene3D {
     this.cloud = new THREE.Points(new THREE.BufferGeometry(), new THREE.PointsMaterial({size: 2, sizeAttenuation: false, vertexColors: true}));
     this.cloud.geometry.setAttribute('position', new THREE.BufferAttribute(new Float32Array(3 * MOST_POINTS), 3));
     this.cloud.geometry.setAttribute('color', new THREE.BufferAttribute(new Float32Array(3 * MOST_POINTS), 3));
-    this.cloud.geometry.setDrawRange(0, 0);
+    this.points = 0;
     this.cloud.frustumCulled = false;
     this.sweeps = [];
     this.scene.add(grid, this.drone, this.target, this.covariance, this.trail, this.targetTrail, this.plan, this.stop,
@@ -142,7 +142,7 @@ export class Scene3D {
 
   clear() {
     this.sweeps = [];
-    this.cloud.geometry.setDrawRange(0, 0);
+    this.points = 0;
     this.setObstacles([]);
   }
 
@@ -245,13 +245,14 @@ export class Scene3D {
 
   // Moves camera and centre along with the drone.
   keepInView(dt) {
-    if (!this.follow) return;
+    if (!this.follow) return false;
     const goal = this.target.visible ? this.drone.position.clone().lerp(this.target.position, 0.5) : this.drone.position;
     const step = goal.clone().sub(this.controls.target);
     if (step.length() < 30 && this.placed) step.multiplyScalar(1 - Math.exp(-dt / FOLLOW));
     this.placed = true;
     this.controls.target.add(step);
     this.camera.position.add(step);
+    return step.length() > 1e-3;
   }
 
   resize() {
@@ -272,10 +273,10 @@ export class Scene3D {
     const moves = this.motion.move(t);
     if (!moves && !this.dirty) return;
     if (this.target.visible) this.covariance.position.copy(this.target.position);
-    if (this.drone.visible) this.keepInView(Math.min(dt, 1));
+    const follows = this.drone.visible && this.keepInView(Math.min(dt, 1));
     // The newest sweep comes first, so that the oldest go.
-    this.cloud.geometry.setDrawRange(0, Math.ceil(this.detail.points * (this.points ?? 0)));
-    this.dirty = false;
+    this.cloud.geometry.setDrawRange(0, Math.ceil(this.detail.points * this.points));
+    this.dirty = follows;
     this.controls.update();
     this.renderer.render(this.scene, this.camera);
     this.frames++;
