@@ -337,17 +337,25 @@ TEST(PlanCheck, RestIsLessThanTwoCentimetresASecond) {
 TEST(PlanCheck, OnlyAnEscapeMayStartInside) {
   Random g(3);
   Case c = test::MakeCase(1);
-  for (Proof& proof : c.claim.proofs)
-    if (!proof.of_sight && proof.obstacle == c.obstacles[0].id) {
-      proof.from = 0.2;
-      auto& planes = proof.separations;
-      while (planes.front().to <= 0.2) planes.erase(planes.begin());
-      planes.front().from = 0.2;
-    }
-  EXPECT_EQ(Verdict(c),
-            "obstacle " + std::to_string(c.obstacles[0].id) + " is kept off only later");
+  const auto begin = [&](double from) {
+    for (Proof& proof : c.claim.proofs)
+      if (!proof.of_sight && proof.obstacle == c.obstacles[0].id) {
+        proof.from = from;
+        auto& planes = proof.separations;
+        while (planes.front().to <= from) planes.erase(planes.begin());
+        planes.front().from = from;
+      }
+  };
+  const std::string later =
+      "obstacle " + std::to_string(c.obstacles[0].id) + " is kept off only later";
+  begin(0.2);
+  EXPECT_EQ(Verdict(c), later);
   c.claim.starts_inside = true;
   EXPECT_EQ(Verdict(c), "");
+  begin(0.5);
+  EXPECT_EQ(Verdict(c), later);
+  c.obstacles[0].ground = true;
+  EXPECT_EQ(Verdict(c), "") << "the ground is left by a climb from rest";
 }
 
 TEST(PlanCheck, RefusesWhatIsNoCurve) {
