@@ -48,12 +48,11 @@ const paused = async () => !(await page.evaluate(() => window.chase.model.play.p
 await until('the scene', async () => { const s = await look(); return s.drone && s.points > 100 && s.plan && s.counts.image > 1; }, 20000);
 const before = await look(), since = Date.now();
 let after = before;
-await until('twenty states, two images and a sweep', async () => {
+await until('twenty states, two images, a sweep, and a drone and a plan that move', async () => {
   after = await look();
-  return ['state', 'image', 'cloud'].every((part, i) => after.counts[part] - before.counts[part] >= [20, 2, 1][i]);
+  const moves = ['drone', 'plan'].every((part) => String(after[part]) !== String(before[part]));
+  return moves && ['state', 'image', 'cloud'].every((part, i) => after.counts[part] - before.counts[part] >= [20, 2, 1][i]);
 });
-assert.notDeepStrictEqual(after.drone, before.drone, 'the drone stands still');
-assert.notDeepStrictEqual(after.plan, before.plan, 'the plan stands still');
 assert.notStrictEqual(after.image, before.image, 'the image stands still');
 assert.ok(after.obstacles > 0 && after.health >= 5 && after.verdict.length > 0);
 const fps = (after.frames - before.frames) / (Date.now() - since) * 1000;
