@@ -29,8 +29,9 @@ double Landing::Lift(const Estimate& estimate, double dt) {
   return lift_ = LiftFor(estimate, std::min(dt, kLongestStep));
 }
 
-// Once the velocity is not usable: by the square of its deviation, so that after 20 s the ground
-// bears the 1 m/s^2 that are felt, and a body 5 s further down has sunk little faster.
+// The bound of a velocity that is not usable goes by the square of its deviation: where that grows
+// by 0.1 m/s^2 the ground bears the 1 m/s^2 that are felt 21 s after the last sweep at the latest,
+// and in the first 10 s no more than 0.2 m/s^2 of thrust are given up.
 double Landing::LiftFor(const Estimate& estimate, double dt) {
   const double doubt = estimate.velocity_sigma / usable_sigma_;
   const double most = doubt > 1.0 ? std::max(kLeastLift, blind_lift_ * doubt * doubt) : kMostLift;

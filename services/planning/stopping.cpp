@@ -16,7 +16,7 @@ using Eigen::Vector3d;
 constexpr double kTimes[] = {0.6, 0.8, 1.0, 1.3, 1.7, 2.2, 3.0};  // s, of a braking
 constexpr double kInTime = 0.05;  // s: contacts are sampled this often
 constexpr double kAlike = 0.01;   // m of clearance that make no difference
-// tau by which the ground is left: from rest to rest a climb of 0.5 m is 0.3 m up by then, and
+// tau by which the ground is left: from rest to rest a climb of 0.5 m is 0.27 m up by then, and
 // slabs reach 0.3 m above what they stand for. The check allows as much: kLeaveGroundBy.
 constexpr double kOutBy = 0.6;
 

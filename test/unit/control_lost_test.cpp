@@ -91,6 +91,17 @@ TEST(LostPose, ASilentPoseIsBrakedWithoutByDeadReckoningHoweverDoubtfulTheVeloci
   EXPECT_EQ(flight.controller.following(), Following::kBrake);
 }
 
+TEST(LostPose, LeansAgainstNoVelocityThatIsNotUsable) {
+  Flight flight({0, 0, 2});
+  flight.controller.AddPlan(PointPlan({0, 0, 2}));
+  flight.Fly(5.0, Health::kUsable);
+  flight.drift = {1.0, 0.0, 0.0};
+  flight.velocity_sigma = 1.01 * ControlConfig().UsableVelocitySigma();
+  flight.Fly(7.5, Health::kLost);
+  EXPECT_EQ(flight.controller.following(), Following::kLand);
+  EXPECT_NEAR((flight.setpoint.R_WB * Vector3d::UnitZ()).z(), 1.0, 1e-9);
+}
+
 TEST(LostPose, AGapBetweenEstimatesIsNoGround) {
   Landing landing(ControlConfig(), 0.5);
   Estimate felt;

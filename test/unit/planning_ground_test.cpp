@@ -185,6 +185,19 @@ TEST(Rest, TheLeastHarmNeverSpeedsUp) {
   EXPECT_GT(uncertified, 10);
 }
 
+// By the line to its centre a wide slab is far away until the body is in it.
+TEST(Rest, SinkingIntoAWideSlabItDoesNotFleeUp) {
+  PlanRequest request;
+  request.obstacles = {Slab({8.0, -8.0, 0.24}, {-0.003, -0.015}),
+                       Slab({8.0, 8.0, 0.18}, {-0.003, 0.01})};
+  request.obstacles[1].id = 2;
+  request.start.p = {12.1, 1.06, 0.64};
+  request.start.v = {-0.05, 0.43, -0.44};
+  const PlanResult plan = RestPlan(PlannerConfig(), request);
+  for (double t = 0.0; t <= plan.trajectory.end(); t += 0.05)
+    EXPECT_LT(plan.trajectory.Velocity(t).z(), 0.5) << plan.reason;
+}
+
 // What is too low to be an obstacle lies within the ground's slabs: a body that has sunk into them
 // comes out gently.
 TEST(Rest, OutOfTheGroundItClimbsWithinTheLimits) {
