@@ -13,6 +13,7 @@ const std::vector<ChannelRow>& ChannelTable() {
       {"POSE", "pose_t", "odometry", false},
       {"SCAN_REGISTERED", "scan_registered_t", "odometry", true},
       {"OBSTACLES", "obstacles_t", "mapping", false},
+      {"UNSEEN", "obstacles_t", "mapping", false},
       {"MAP", "map_t", "mapping", true},
       {"TARGET", "target_t", "perception", false},
       {"PREDICTION", "prediction_t", "prediction", false},

@@ -97,6 +97,7 @@ void Pilot::ChangeFrame() {
   had_target_ = false;
   whereabouts_.Clear();
   obstacles_.clear();
+  unseen_.clear();
   obstacles_time_ = -1e9;
   has_running_ = false;
   home_.reset();
@@ -181,6 +182,7 @@ PlanRequest Pilot::Request(double t0, const Start& start) const {
   request.start = start.state;
   request.yaw = start.yaw;
   request.obstacles = obstacles_;
+  request.unseen = unseen_;
   // What moves is measured, as the target is, in the frame that drifts.
   for (world::Obstacle& o : request.obstacles)
     if (!o.moving) o.velocity_covariance += drift_;

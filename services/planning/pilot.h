@@ -4,6 +4,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "services/planning/planner.h"
@@ -50,6 +51,8 @@ class Pilot {
 
   void SetForecast(const Forecast& forecast);
   void SetObstacles(double t, std::vector<world::Obstacle> obstacles);
+  /// Places near the drone that nobody has looked into.
+  void SetUnseen(std::vector<world::Obstacle> unseen) { unseen_ = std::move(unseen); }
   /// Control says that it flies: a planner that has just been started must not take off again.
   void SetFlying(bool flying) {
     heard_control_ = true;
@@ -98,7 +101,7 @@ class Pilot {
   PlanningConfig config_;
   std::unique_ptr<Planner> planner_;
   std::optional<Forecast> forecast_;
-  std::vector<world::Obstacle> obstacles_;
+  std::vector<world::Obstacle> obstacles_, unseen_;
   Eigen::Matrix3d drift_ =
       Eigen::Matrix3d::Zero();    ///< covariance of the frame's velocity, m^2/s^2
   double obstacles_time_ = -1e9;  ///< s

@@ -82,7 +82,13 @@ plan_t ToMessage(const PlanResult& plan, int64_t origin) {
 PlanningNode::PlanningNode(bus::Bus& bus, const PlanningConfig& config)
     : bus_(bus), config_(config), pilot_(config) {
   bus_.Subscribe<prediction_t>("PREDICTION", [this](const prediction_t& m) { OnPrediction(m); });
-  bus_.Subscribe<obstacles_t>("OBSTACLES", [this](const obstacles_t& m) { OnObstacles(m); });
+  bus_.Subscribe<obstacles_t>("OBSTACLES", [this](const obstacles_t& m) {
+    if (auto list = Listed(m))
+      pilot_.SetObstacles(bus::Seconds(m.utime, *origin_), *std::move(list));
+  });
+  bus_.Subscribe<obstacles_t>("UNSEEN", [this](const obstacles_t& m) {
+    if (auto list = Listed(m)) pilot_.SetUnseen(*std::move(list));
+  });
   bus_.Subscribe<tracking_t>("TRACKING", [this](const tracking_t& m) {
     pilot_.SetFlying(m.following != tracking_t::NONE);
   });
@@ -109,14 +115,14 @@ void PlanningNode::OnPrediction(const prediction_t& message) {
   pilot_.SetForecast(forecast);
 }
 
-void PlanningNode::OnObstacles(const obstacles_t& message) {
-  if (!epoch_.Is(message.epoch)) return;
+std::optional<std::vector<world::Obstacle>> PlanningNode::Listed(const obstacles_t& message) {
+  if (!epoch_.Is(message.epoch)) return std::nullopt;
   const int64_t origin = Origin(message.utime);
   std::vector<world::Obstacle> obstacles;
   for (const obstacle_t& o : message.obstacles)
     if (o.center.n_coefficients <= kMaxCoefficients && obstacles.size() < kMaxObstacles)
       obstacles.push_back(bus::FromMessage(o, origin));
-  pilot_.SetObstacles(bus::Seconds(message.utime, origin), std::move(obstacles));
+  return obstacles;
 }
 
 void PlanningNode::OnState(const flight_state_t& message) {

@@ -12,7 +12,7 @@ LISTENS = {
     "mapping": {"SCAN_REGISTERED", "TARGET"},
     "perception": {"CAMERA_IMAGE", "LIDAR_SCAN", "POSE"},
     "prediction": {"TARGET", "OBSTACLES"},
-    "planning": {"PREDICTION", "OBSTACLES", "POSE", "TRACKING", "FLIGHT_STATE"},
+    "planning": {"PREDICTION", "OBSTACLES", "UNSEEN", "POSE", "TRACKING", "FLIGHT_STATE"},
     "control": {"PLAN", "OBSTACLES", "POSE", "FLIGHT_STATE"},
     "mission": {"COMMAND", "POSE", "OBSTACLES", "TARGET", "PLAN", "TRACKING", "ATTITUDE_SETPOINT",
                 "LIDAR_STATUS", "CAMERA_STATUS", "ODOMETRY_STATUS", "MAPPING_STATUS",
