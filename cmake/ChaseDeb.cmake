@@ -1,7 +1,7 @@
 # chase_VERSION_ARCH.deb for a vehicle or a desk: `deploy/build`, then `cpack` in the build folder.
 get_property(programs GLOBAL PROPERTY CHASE_PROGRAMS)
 list(FILTER programs INCLUDE REGEX "^chase-")
-foreach(program IN ITEMS chase-flight chase-report chase-recorder chase-viewer chase-fcu)
+foreach(program IN ITEMS chase-flight chase-report chase-recorder chase-viewer chase-fcu chase-link)
   if(NOT program IN_LIST programs)
     return()  # a build of some services
   endif()
@@ -72,8 +72,8 @@ set(CPACK_DEBIAN_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_PACKAGE_PRIORITY optional)
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_PACKAGE_DEPENDS
-  "python3, iproute2, procps, init-system-helpers (>= 1.54), systemd | systemd-standalone-sysusers | systemd-sysusers")
-set(CPACK_DEBIAN_PACKAGE_RECOMMENDS "gnuplot-nox, liblcm-bin")
+  "python3, iproute2, procps, gnuplot-nox | gnuplot, init-system-helpers (>= 1.54), systemd | systemd-standalone-sysusers | systemd-sysusers")
+set(CPACK_DEBIAN_PACKAGE_RECOMMENDS liblcm-bin)
 set(CPACK_DEBIAN_PACKAGE_SUGGESTS "default-jre, liblcm-java, libjchart2d-java")
 set(CPACK_COMPONENT_VEHICLE_DESCRIPTION "drone that flies behind a moving target
 Finds a target and the obstacles with a LiDAR, a camera and an IMU, predicts

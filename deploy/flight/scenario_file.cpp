@@ -9,7 +9,8 @@ namespace fs = std::filesystem;
 
 namespace {
 
-/// share/chase beside the folder of this program, where the build links to and the package installs.
+/// share/chase beside the folder of this program, where the build links to and the package
+/// installs.
 fs::path Scenarios() {
   const fs::path program = fs::read_symlink("/proc/self/exe");
   return fs::weakly_canonical(program.parent_path().parent_path() / "share/chase/scenarios");
