@@ -29,7 +29,7 @@ volatile std::sig_atomic_t stop_requested = 0;
 void RequestStop(int) { stop_requested = 1; }
 
 struct Flags {
-  std::string config, url, prefix, replay, out;
+  std::string config, url, prefix, key_file, replay, out;
   bool dump_config = false;
 };
 
@@ -46,6 +46,8 @@ void AddFlags(CLI::App* app, Flags* flags) {
                   "LCM provider (default: $LCM_DEFAULT_URL, else built in)");
   app->add_option("--channel-prefix", flags->prefix,
                   "the vehicle: in front of every channel's name");
+  app->add_option("--key-file", flags->key_file,
+                  "64 hexadecimal digits that seal the vehicle's messages (default: not sealed)");
   app->add_option("--replay", flags->replay, "drive the service by this LCM log, in logical time");
   app->add_option("--out", flags->out, "LCM log that --replay writes");
   config::AddVersion(app);
@@ -53,7 +55,7 @@ void AddFlags(CLI::App* app, Flags* flags) {
 
 /// Live processing until a signal comes or the node is done.
 void RunLive(const ServiceSpec& spec, const Flags& flags) {
-  UdpBus bus(flags.url, flags.prefix);
+  UdpBus bus(flags.url, flags.prefix, LoadSeal(flags.key_file));
   bus.SetIdentity({spec.name, flags.prefix, bus.Now()});
   const auto node = spec.make_node(bus);
   StatusReporter reporter(spec.name, LiveVersion(spec.dump_config()));

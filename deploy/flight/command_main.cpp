@@ -20,7 +20,7 @@ constexpr int64_t kWait = 20'000;  // us at a time for messages
 enum Exit { kAccepted = 0, kBadUse = 1, kRefused = 2, kNoAnswer = 3, kNotReached = 4 };
 
 struct Arguments {
-  std::string command, vehicle, url;
+  std::string command, vehicle, url, key_file;
   bool wait = false, force = false;
   double timeout = 120.0;
 };
@@ -90,7 +90,7 @@ int AwaitEnd(const Arguments& a, Session* session) {
 int Run(const Arguments& a) {
   if (a.force && a.command != "kill")
     return Fail(kBadUse, "--force belongs to kill; see chase-command --help");
-  bus::UdpBus bus(a.url, a.vehicle);
+  bus::UdpBus bus(a.url, a.vehicle, bus::LoadSeal(a.key_file));
   bus.SetIdentity({"command", a.vehicle, bus.Now()});
   Session session(&bus, *world::CommandNamed(a.command), a.force);
   const int code = AwaitAnswer(a, &session);
@@ -112,6 +112,8 @@ void AddOptions(CLI::App* app, Arguments* a) {
       ->check(CLI::IsMember(
           std::vector<std::string>(world::kCommandNames.begin(), world::kCommandNames.end())));
   app->add_option("--vehicle", a->vehicle, "channel prefix of the vehicle that is meant");
+  app->add_option("--key-file", a->key_file,
+                  "64 hexadecimal digits that the vehicle's messages are sealed with");
   app->add_flag("--wait", a->wait,
                 "until the flight is there: in the air, chasing, holding, landed");
   app->add_flag("--force", a->force, "of kill, which cuts the motors wherever it is, and it falls");

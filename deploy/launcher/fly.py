@@ -13,12 +13,12 @@ import sys
 import time
 
 import bus
+import places
 import processes
 import results
 import version
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
-BIN = ROOT / "build" / "bin"
+ROOT, BIN = places.ROOT, places.BIN
 SILENCE_LIMIT = 30.0  # s of wall time in which the mission's time must move
 TAIL = 1.0  # s recorded after the mission's end
 KEEP_FREE = 200  # MB of disk below which sweeps and images are no longer recorded
@@ -33,7 +33,7 @@ class FlightError(Exception):
 
 class Parser(argparse.ArgumentParser):
     def error(self, message):
-        raise FlightError(f"{message}; see deploy/fly --help")
+        raise FlightError(f"{message}; see {places.command('fly')} --help")
 
 
 def seed_number(text):
@@ -43,9 +43,9 @@ def seed_number(text):
 
 
 def parse(arguments):
-    parser = Parser(prog="deploy/fly", description=__doc__)
+    parser = Parser(prog=places.command("fly"), description=__doc__)
     parser.add_argument("scenario", nargs="?", default="gym",
-                        help="name in deploy/scenarios, or a file (default: gym)")
+                        help="name of a scenario, or a file (default: gym)")
     parser.add_argument("--seed", type=seed_number, default=1, help="of noise and gusts (default: 1)")
     parser.add_argument("--version", action="version", version=version.text())
     parser.add_argument("--view", action="store_true", help="look on in a browser, at http://localhost:8080")
@@ -53,7 +53,7 @@ def parse(arguments):
 
 
 def find_scenario(name):
-    scenarios = ROOT / "deploy" / "scenarios"
+    scenarios = places.SHARE / "scenarios"
     for path in (scenarios / f"{name}.yaml", pathlib.Path(name)):
         if path.is_file():
             return path.resolve()
@@ -65,7 +65,7 @@ def find_scenario(name):
 
 
 def flight_processes():
-    table = ROOT / "deploy" / "processes.json"
+    table = places.SHARE / "processes.json"
     try:
         return [row for row in processes.read_table(table.read_bytes(), table.name) if row["fly"]]
     except processes.TableError as error:
@@ -73,14 +73,14 @@ def flight_processes():
 
 
 def set_up():
-    if subprocess.run([ROOT / "deploy" / "setup"], check=False).returncode:
+    if not places.INSTALLED and subprocess.run([ROOT / "deploy" / "setup"], check=False).returncode:
         raise FlightError("the set-up failed; its message above says why")
 
 
 def build(*programs):
     """These programs, and nothing else that the tree holds."""
     command = [ROOT / "deploy" / "build", "build", "--", *programs]
-    if subprocess.run(command, check=False).returncode:
+    if not places.INSTALLED and subprocess.run(command, check=False).returncode:
         raise FlightError("the build failed; its messages above say why")
 
 
@@ -303,9 +303,9 @@ def main():
     try:
         return fly(parse(sys.argv[1:]))
     except FlightError as error:
-        print(f"deploy/fly: {error}", file=sys.stderr)
+        print(f"{places.command('fly')}: {error}", file=sys.stderr)
     except KeyboardInterrupt:
-        print("deploy/fly: stopped; everything it started has ended", file=sys.stderr)
+        print(f"{places.command('fly')}: stopped; everything it started has ended", file=sys.stderr)
     return 1
 
 

@@ -19,7 +19,8 @@ STOP_LIMIT = 5.0  # s from SIGINT to SIGKILL
 
 
 # Of a row of the process table (deploy/processes.json).
-FIELDS = {"name": str, "binary": str, "heavy": bool, "fly": bool, "restart": str, "nice": int}
+FIELDS = {"name": str, "binary": str, "heavy": bool, "fly": bool, "vehicle": bool, "restart": str, "nice": int,
+          "priority": int, "cores": str}
 RESTARTS = ("always", "never")
 
 
@@ -56,6 +57,10 @@ def _row_problem(row):
         return f"binary is {row['binary'][:40]!r}; it begins with chase-"
     if row["restart"] not in RESTARTS:
         return f"restart is {row['restart'][:40]!r}; it is one of {', '.join(RESTARTS)}"
+    if not 0 <= row["priority"] <= 99:
+        return f"priority is {row['priority']}, outside 0 (no real time) to 99"
+    if not re.fullmatch(r"|\d{1,4}(-\d{1,4})?( \d{1,4}(-\d{1,4})?)*", row["cores"]):
+        return f"cores is {row['cores'][:40]!r}; it is like '0 2-3', or empty for any"
     return "" if -20 <= row["nice"] <= 19 else "nice is outside -20 to 19"
 
 
