@@ -1,8 +1,20 @@
 #include "services/lidar/lidar_node.h"
 
+#include <fmt/format.h>
+
+#include <chrono>
+
+#include "common/bus/convert.h"
 #include "services/lidar/convert.h"
 
 namespace chase::lidar {
+namespace {
+
+constexpr int64_t kOldest = 1'000'000;  // us that a packet may wait in the socket
+constexpr double kSilent = 0.2;         // s without a packet: 150 are missing
+constexpr double kFlawed = 5.0;         // s after a loss in which the sensor is called degraded
+
+}  // namespace
 
 LidarNode::LidarNode(bus::Bus& bus, const LidarConfig& config)
     : bus_(bus),
@@ -15,17 +27,34 @@ void LidarNode::Tick(int64_t utime) {
   if (source_->IsRecording())
     TickRecording(utime);
   else
-    TickDevice(utime);
+    TickDevice();
   StopIfRefused();
 }
 
-void LidarNode::TickDevice(int64_t utime) {
+void LidarNode::TickDevice() {
   while (const auto packet = source_->Next()) {
-    if (PacketProblem(packet->bytes.data(), packet->bytes.size()).empty())
-      alignment_.Add(clock_.Unwrap(PacketStamp(packet->bytes.data())), utime);
+    const uint8_t* data = packet->bytes.data();
+    heard_ = bus_.Now();
+    // The stamp is of the first firing; the packet leaves after its last.
+    if (PacketProblem(data, packet->bytes.size()).empty())
+      alignment_.Add(clock_.Unwrap(PacketStamp(data)) + PacketDuration(data), Arrival(*packet));
     Take(*packet);
   }
+  const long flaws = assembler_.lost() + assembler_.malformed();
+  if (flaws != flaws_) flawed_ = bus_.Now();
+  flaws_ = flaws;
 }
+
+/// On the bus's clock, which the wall clock may have left since.
+int64_t LidarNode::Arrival(const RawPacket& packet) const {
+  const auto wall = std::chrono::system_clock::now().time_since_epoch();
+  const int64_t age =
+      std::chrono::duration_cast<std::chrono::microseconds>(wall).count() - packet.capture_utime;
+  return bus_.Now() - (packet.capture_utime > 0 && age >= 0 && age < kOldest ? age : 0);
+}
+
+/// s since the last packet.
+double LidarNode::Silence() const { return bus::Seconds(bus_.Now(), heard_); }
 
 void LidarNode::TickRecording(int64_t utime) {
   if (!first_tick_) first_tick_ = utime;
@@ -69,11 +98,16 @@ bus::NodeReport LidarNode::Report() const {
   using State = bus::NodeReport::State;
   if (assembler_.model().verdict() == ModelCheck::Verdict::kOther)
     return {State::kFailed, assembler_.model().reason()};
+  const bool device = !source_->IsRecording();
+  if (device && heard_ != 0 && Silence() > kSilent)
+    return {State::kFailed,
+            fmt::format("no packet for {:.1f} s; check the sensor's power and cable", Silence())};
   if (sweeps_ == 0) return {State::kStarting, "no whole sweep yet"};
-  const std::string detail = std::to_string(sweeps_) + " sweeps, " +
-                             std::to_string(assembler_.lost()) + " packets lost, " +
-                             std::to_string(assembler_.malformed()) + " malformed";
-  return {assembler_.lost() + assembler_.malformed() > 0 ? State::kDegraded : State::kOk, detail};
+  const bool flawed = device ? flawed_ != 0 && bus::Seconds(bus_.Now(), flawed_) < kFlawed
+                             : assembler_.lost() + assembler_.malformed() > 0;
+  return {flawed ? State::kDegraded : State::kOk,
+          fmt::format("{} sweeps, {} packets lost, {} malformed", sweeps_, assembler_.lost(),
+                      assembler_.malformed())};
 }
 
 }  // namespace chase::lidar

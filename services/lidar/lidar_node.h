@@ -5,7 +5,7 @@
 
 #include "common/bus/bus.h"
 #include "common/bus/node.h"
-#include "services/lidar/clock_alignment.h"
+#include "common/math/clock_alignment.h"
 #include "services/lidar/config.h"
 #include "services/lidar/packet_source.h"
 #include "services/lidar/sweep_assembler.h"
@@ -23,7 +23,9 @@ class LidarNode : public bus::Node {
   bus::NodeReport Report() const override;
 
  private:
-  void TickDevice(int64_t utime);
+  void TickDevice();
+  int64_t Arrival(const RawPacket& packet) const;
+  double Silence() const;
   void TickRecording(int64_t utime);
   void Take(const RawPacket& packet);
   void Publish(const Sweep& sweep);
@@ -33,9 +35,12 @@ class LidarNode : public bus::Node {
   SweepAssembler assembler_;
   SweepAssembler clock_;  // only unwraps the stamps of packets that wait for their time
   std::unique_ptr<PacketSource> source_;
-  ClockAlignment alignment_;
+  math::ClockAlignment alignment_;
   std::optional<RawPacket> next_;
   std::optional<int64_t> first_tick_, first_device_us_;
+  int64_t heard_ = 0;   // when the last packet came, bus's clock; 0: none yet
+  int64_t flawed_ = 0;  // when one was last lost or malformed
+  long flaws_ = 0;      // lost and malformed until then
   long sweeps_ = 0;
   bool done_ = false;
 };

@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 
+#include "common/math/clock_alignment.h"
 #include "lidar_packets.h"
-#include "services/lidar/clock_alignment.h"
 #include "services/lidar/model_check.h"
 #include "services/lidar/sweep_assembler.h"
 
@@ -112,13 +112,13 @@ TEST(LidarModelCheck, TimingDecidesNotTheProductByte) {
 }
 
 TEST(LidarClockAlignment, LateArrivalsDoNotMoveTheClock) {
-  ClockAlignment clock;
+  math::ClockAlignment clock;
   for (int k = 0; k < 1000; ++k) clock.Add(k * 1327, 7'000'000 + k * 1327 + (k * 7919) % 9000);
   EXPECT_NEAR(static_cast<double>(clock.HostTime(0)), 7'000'000.0, 200.0);
 }
 
 TEST(LidarClockAlignment, ASlowSensorClockIsFollowed) {
-  ClockAlignment clock;
+  math::ClockAlignment clock;
   int64_t device = 0;
   for (int k = 0; k < 100000; ++k) {  // 50 ppm over 133 s
     device += 1327;
