@@ -70,7 +70,7 @@ TEST(CameraSource, AFolderGivesItsImagesByName) {
   for (int k = 0; k < 3; ++k) {
     const auto frame = source->Next();
     ASSERT_TRUE(frame);
-    EXPECT_EQ(frame->at<cv::Vec3b>(0, 0)[0], 50 * k);
+    EXPECT_EQ(frame->bgr.at<cv::Vec3b>(0, 0)[0], 50 * k);
   }
   EXPECT_FALSE(source->Next());
 }
@@ -85,7 +85,7 @@ TEST(CameraSource, AVideoGivesAllItsFrames) {
   for (int k = 0; k < 5; ++k) {
     const auto frame = source->Next();
     ASSERT_TRUE(frame);
-    EXPECT_NEAR(frame->at<cv::Vec3b>(20, 20)[1], 40 * k, 4);
+    EXPECT_NEAR(frame->bgr.at<cv::Vec3b>(20, 20)[1], 40 * k, 4);
   }
   EXPECT_FALSE(source->Next());
 }
