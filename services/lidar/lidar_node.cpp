@@ -14,13 +14,21 @@ constexpr int64_t kOldest = 1'000'000;  // us that a packet may wait in the sock
 constexpr double kSilent = 0.2;         // s without a packet: 150 are missing
 constexpr double kFlawed = 5.0;         // s after a loss in which the sensor is called degraded
 
+int64_t WallTime() {
+  const auto now = std::chrono::system_clock::now().time_since_epoch();
+  return std::chrono::duration_cast<std::chrono::microseconds>(now).count();
+}
+
 }  // namespace
 
 LidarNode::LidarNode(bus::Bus& bus, const LidarConfig& config)
     : bus_(bus),
       assembler_(config),
       clock_(config),
-      source_(OpenPacketSource(config.source, config.port)) {}
+      source_(OpenPacketSource(config.source, config.port)) {
+  if (config.clock == "gps" && !source_->IsRecording())
+    positions_ = OpenPacketSource("udp", config.position_port);
+}
 
 void LidarNode::Tick(int64_t utime) {
   if (done_) return;
@@ -45,11 +53,21 @@ void LidarNode::TickDevice() {
   flaws_ = flaws;
 }
 
+/// On the bus's clock.
+int64_t LidarNode::SweepTime(int64_t device_us) {
+  const int64_t aligned = alignment_.HostTime(device_us);
+  if (!positions_) return aligned;
+  const int64_t wall = WallTime(), now = bus_.Now();
+  while (const auto packet = positions_->Next())
+    gps_.Hear(packet->bytes.data(), packet->bytes.size(), wall);
+  const auto utc = gps_.Utc(device_us, wall - (now - aligned));
+  gps_problem_ = utc ? "" : gps_.Problem(wall);
+  return utc ? now - (wall - *utc) : aligned;
+}
+
 /// On the bus's clock, which the wall clock may have left since.
 int64_t LidarNode::Arrival(const RawPacket& packet) const {
-  const auto wall = std::chrono::system_clock::now().time_since_epoch();
-  const int64_t age =
-      std::chrono::duration_cast<std::chrono::microseconds>(wall).count() - packet.capture_utime;
+  const int64_t age = WallTime() - packet.capture_utime;
   return bus_.Now() - (packet.capture_utime > 0 && age >= 0 && age < kOldest ? age : 0);
 }
 
@@ -84,7 +102,7 @@ void LidarNode::Take(const RawPacket& packet) {
 }
 
 void LidarNode::Publish(const Sweep& sweep) {
-  bus_.Publish("LIDAR_SCAN", ToMessage(sweep, alignment_.HostTime(sweep.device_us)));
+  bus_.Publish("LIDAR_SCAN", ToMessage(sweep, SweepTime(sweep.device_us)));
   ++sweeps_;
 }
 
@@ -105,9 +123,10 @@ bus::NodeReport LidarNode::Report() const {
   if (sweeps_ == 0) return {State::kStarting, "no whole sweep yet"};
   const bool flawed = device ? flawed_ != 0 && bus::Seconds(bus_.Now(), flawed_) < kFlawed
                              : assembler_.lost() + assembler_.malformed() > 0;
-  return {flawed ? State::kDegraded : State::kOk,
-          fmt::format("{} sweeps, {} packets lost, {} malformed", sweeps_, assembler_.lost(),
-                      assembler_.malformed())};
+  const std::string clock = gps_problem_.empty() ? "" : "; stamps by arrival: " + gps_problem_;
+  return {flawed || !clock.empty() ? State::kDegraded : State::kOk,
+          fmt::format("{} sweeps, {} packets lost, {} malformed{}", sweeps_, assembler_.lost(),
+                      assembler_.malformed(), clock)};
 }
 
 }  // namespace chase::lidar

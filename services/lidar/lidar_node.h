@@ -7,6 +7,7 @@
 #include "common/bus/node.h"
 #include "common/math/clock_alignment.h"
 #include "services/lidar/config.h"
+#include "services/lidar/gps_clock.h"
 #include "services/lidar/packet_source.h"
 #include "services/lidar/sweep_assembler.h"
 
@@ -24,6 +25,7 @@ class LidarNode : public bus::Node {
 
  private:
   void TickDevice();
+  int64_t SweepTime(int64_t device_us);
   int64_t Arrival(const RawPacket& packet) const;
   double Silence() const;
   void TickRecording(int64_t utime);
@@ -35,6 +37,9 @@ class LidarNode : public bus::Node {
   SweepAssembler assembler_;
   SweepAssembler clock_;  // only unwraps the stamps of packets that wait for their time
   std::unique_ptr<PacketSource> source_;
+  std::unique_ptr<PacketSource> positions_;  // with the clock gps
+  GpsClock gps_;
+  std::string gps_problem_;  // why the last sweep is not stamped by it
   math::ClockAlignment alignment_;
   std::optional<RawPacket> next_;
   std::optional<int64_t> first_tick_, first_device_us_;

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <thread>
 
+#include "../fcu/firing_order.h"
 #include "common/world/scenario.h"
 #include "services/camera/capture_clock.h"
 #include "services/camera/frame_source.h"
@@ -57,12 +58,14 @@ TEST(Drivers, CloudsFromPacketsAreTheSensorsOwn) {
     const auto& b = decoded[k].points;
     ASSERT_EQ(a.x.size(), b.size()) << "sweep " << k;
     ASSERT_GT(b.size(), 20000u);
-    for (std::size_t i = 0; i < b.size(); ++i) {
-      const Eigen::Vector3d p(a.x[i], a.y[i], a.z[i]), q(b[i].x, b[i].y, b[i].z);
+    const std::vector<std::size_t> order = testing::FiringOrder(a);
+    for (std::size_t n = 0; n < b.size(); ++n) {
+      const std::size_t i = order[n];
+      const Eigen::Vector3d p(a.x[i], a.y[i], a.z[i]), q(b[n].x, b[n].y, b[n].z);
       worst = std::max(worst, (p - q).norm());
-      worst_time = std::max(worst_time, std::abs(static_cast<double>(a.t[i]) - b[i].t));
-      ASSERT_EQ(a.ring[i], b[i].ring);
-      ASSERT_EQ(a.intensity[i], b[i].intensity);
+      worst_time = std::max(worst_time, std::abs(static_cast<double>(a.t[i]) - b[n].t));
+      ASSERT_EQ(a.ring[i], b[n].ring);
+      ASSERT_EQ(a.intensity[i], b[n].intensity);
     }
   }
   std::printf("worst point %.6f m, worst firing time %.2f us\n", worst, 1e6 * worst_time);
