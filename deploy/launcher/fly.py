@@ -67,13 +67,20 @@ def find_scenario(name):
     raise FlightError(f"no scenario '{name}'; there are: {', '.join(known)}")
 
 
-def flight_processes(hardware=False):
+def process_table():
     table = ROOT / "deploy" / "processes.json"
     try:
-        return [row for row in processes.read_table(table.read_bytes(), table.name)
-                if row["fly"] or (hardware and row["name"] in DRIVERS)]
+        return processes.read_table(table.read_bytes(), table.name)
     except processes.TableError as error:
         raise FlightError(str(error)) from error
+
+
+def flight_processes():
+    return [row for row in process_table() if row["fly"]]
+
+
+def driver_processes(hardware):
+    return [row for row in process_table() if hardware and row["name"] in DRIVERS]
 
 
 def set_up():
@@ -103,7 +110,7 @@ def build_and_check(scenario, view=False, hardware=False):
     set_up()
     build("chase-scenario")
     told = json.loads(ask("chase-scenario", scenario))
-    build(*(row["binary"] for row in flight_processes(hardware)), "chase-flight", "chase-flight-monitor",
+    build(*(row["binary"] for row in flight_processes() + driver_processes(hardware)), "chase-flight", "chase-flight-monitor",
           "chase-recorder", "chase-report", "chase-command", "chase-log", "chase-lidar",
           *(["chase-viewer"] if view else []))
     ask("chase-flight", scenario, "--print-config", "simulator")  # reads the services' overrides
@@ -178,7 +185,7 @@ class Flight:
         return processes.Child(name, command, self.folder / f"{name}.log", self.env, **options)
 
     def start(self, view):
-        rows = flight_processes(self.hardware)
+        rows = flight_processes() + driver_processes(self.hardware)
         configs = {row["name"]: write_config(self.folder, self.scenario, self.seed, row["name"])
                    for row in rows}
         # All that is said, in one log: reports and replays read it.
