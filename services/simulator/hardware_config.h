@@ -32,6 +32,7 @@ struct HardwareConfig {
   bool mavlink() const { return fcu == "mavlink"; }
   bool packets() const { return lidar == "udp"; }
   bool stream() const { return camera == "mjpeg"; }
+  bool any() const { return mavlink() || packets() || stream(); }
 };
 
 /// Where the camera's stream is to be had.

@@ -1,5 +1,7 @@
 #include "services/simulator/simulator_node.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <fstream>
@@ -22,6 +24,7 @@
 namespace chase::simulator {
 namespace {
 
+constexpr double kMostBehind = 0.3;      // s behind the host's clock that drivers bear
 constexpr int64_t kTruthTicks = 2;       // 100 Hz
 constexpr int64_t kScenarioTicks = 200;  // 1 Hz; FCU_STATUS as well
 
@@ -126,6 +129,12 @@ bus::NodeReport SimulatorNode::Report() const {
   const double t = bus::Seconds(last_tick_, *power_on_) - scenario_.settle_s;
   report.detail = scenario_.name + ", mission time " + std::to_string(std::lround(t)) + " s";
   if (config_.hardware.mavlink()) report.detail += ", PX4 " + hardware_.Words();
+  const double behind = bus::Seconds(bus_.Now(), last_tick_);
+  if (config_.hardware.any() && behind > kMostBehind) {
+    report.state = bus::NodeReport::State::kDegraded;
+    report.detail += fmt::format(
+        ", {:.1f} s behind: drivers go by the host's clock, and this machine is too slow", behind);
+  }
   return report;
 }
 
