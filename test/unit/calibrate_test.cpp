@@ -1,8 +1,14 @@
 #include <gtest/gtest.h>
 
+#include <cstdlib>
+#include <filesystem>
+#include <lcm/lcm-cpp.hpp>
 #include <opencv2/calib3d.hpp>
+#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "chase/camera_image_t.hpp"
+#include "chase/lidar_scan_t.hpp"
 #include "common/world/random.h"
 #include "deploy/calibrate/board.h"
 #include "deploy/calibrate/camera_fit.h"
@@ -160,6 +166,93 @@ TEST(Calibrate, ParallelPlanesAreRefused) {
   const Case c = MakeCase(1, 0.02, 10);
   EXPECT_NE(FitLidar(c.planes, c.guess).problem.find("three directions"), std::string::npos);
   EXPECT_NE(FitLidar({}, c.guess).problem, "");
+}
+
+template <class T>
+void Write(lcm::LogFile* log, const char* channel, T message) {
+  std::vector<uint8_t> bytes(static_cast<std::size_t>(message.getEncodedSize()));
+  message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
+  lcm::LogEvent event;
+  event.eventnum = 0;
+  event.timestamp = message.utime;
+  event.channel = channel;
+  event.data = bytes.data();
+  event.datalen = static_cast<int>(bytes.size());
+  log->writeEvent(&event);
+}
+
+/// A log in which someone holds the board still for half a second at each pose.
+void WriteLog(const std::string& file, const Board& board, const Isometry3d& X_CL) {
+  lcm::LogFile log(file, "w");
+  world::Random random(3);
+  int64_t utime = 1'000'000;
+  for (int k = 0; k < 8; ++k) {
+    const double around = 2.4 * k;
+    const Isometry3d X_CP = BoardAt(board, {0.6 * std::cos(around), 0.6 * std::sin(around), 0.1},
+                                    {0.0, 0.0, 1.6 + 0.05 * k});
+    const cv::Mat photo = Photo(board, X_CP);
+    const Plane plane = Swept(board, X_CP, X_CL, &random);
+    lidar_scan_t scan{};
+    scan.size = static_cast<int32_t>(plane.points.size());
+    for (const Vector3d& p : plane.points) {
+      scan.x.push_back(static_cast<float>(p.x()));
+      scan.y.push_back(static_cast<float>(p.y()));
+      scan.z.push_back(static_cast<float>(p.z()));
+      scan.t.push_back(0.05f);
+      scan.intensity.push_back(50), scan.ring.push_back(0);
+    }
+    camera_image_t image{};
+    image.width = photo.cols, image.height = photo.rows, image.row_stride = 3 * photo.cols;
+    image.pixelformat = camera_image_t::PIXEL_FORMAT_BGR;
+    image.size = image.row_stride * image.height;
+    image.data.assign(photo.datastart, photo.dataend);
+    for (int i = 0; i < 10; ++i, utime += 50'000) {
+      image.utime = utime;
+      Write(&log, "CAMERA_IMAGE", image);
+      scan.utime = utime - 20'000;
+      if (i % 2 == 0) Write(&log, "LIDAR_SCAN", scan);
+    }
+    utime += 300'000;
+  }
+}
+
+int Call(const std::string& arguments) {
+  return std::system((CHASE_CALIBRATE " " + arguments + " > /dev/null 2>&1").c_str());
+}
+
+TEST(CalibrateProgram, FromPicturesAndALogToARigAndPicturesToLookAt) {
+  const std::string folder = ::testing::TempDir() + "calibrate/";
+  std::filesystem::remove_all(folder);
+  std::filesystem::create_directories(folder);
+  Board board;
+  board.square = 0.14, board.marker = 0.105;
+  const std::string sizes = " --square 0.14 --marker 0.105 ";
+  ASSERT_EQ(Call("board --out " + folder + "board.png"), 0);
+  EXPECT_FALSE(cv::imread(folder + "board.png").empty());
+  world::Random random(5);
+  for (int k = 0; k < 10; ++k) {
+    const Vector3d turned(random.Uniform(-0.6, 0.6), random.Uniform(-0.6, 0.6), 0.0);
+    cv::imwrite(folder + "p" + std::to_string(k) + ".png",
+                Photo(board, BoardAt(board, turned, {0.02 * k, -0.02 * k, 1.3 + 0.05 * k})));
+  }
+  ASSERT_EQ(Call("camera " + folder + "p*.png" + sizes + "--out " + folder + "rig.yaml --check " +
+                 folder + "camera.png"),
+            0);
+  Isometry3d truth = LidarInCamera(world::Rig{});
+  truth.translation() += Vector3d(0.05, -0.04, 0.06);
+  WriteLog(folder + "log.lcm", board, truth);
+  ASSERT_EQ(Call("lidar " + folder + "log.lcm" + sizes + "--rig " + folder + "rig.yaml --out " +
+                 folder + "rig.yaml --check " + folder + "lidar.png"),
+            0);
+  RigFile found;
+  config::Load(folder + "rig.yaml", &found);
+  EXPECT_EQ(found.rig.width_px, 640);
+  EXPECT_NEAR(found.rig.focal_px, kFocal, 0.01 * kFocal);
+  EXPECT_LT((LidarInCamera(found.rig).translation() - truth.translation()).norm(), 0.03);
+  EXPECT_FALSE(cv::imread(folder + "camera.png").empty());
+  EXPECT_FALSE(cv::imread(folder + "lidar.png").empty());
+  EXPECT_NE(Call("lidar " + folder + "none.lcm"), 0);
+  EXPECT_NE(Call("camera " + folder + "board.png"), 0) << "one picture is not enough";
 }
 
 TEST(Calibrate, TheRigKeepsWhatTheFitFound) {
