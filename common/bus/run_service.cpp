@@ -23,6 +23,7 @@ namespace chase::bus {
 namespace {
 
 constexpr int64_t kStatusPeriod = 1000000;  // us
+constexpr int64_t kLookPeriod = 50000;      // us: a state that changes is told at once
 
 volatile std::sig_atomic_t stop_requested = 0;
 
@@ -60,14 +61,16 @@ void RunLive(const ServiceSpec& spec, const Flags& flags) {
   const auto node = spec.make_node(bus);
   StatusReporter reporter(spec.name, LiveVersion(spec.dump_config()));
   const std::string channel = StatusChannel(spec.name);
+  NodeReport::State told{};
   const auto report = [&](int64_t now) {
+    told = node->Report().state;
     bus.Publish(channel, reporter.Make(bus, *node, now, true));
   };
   sd_notify(0, "READY=1");
   int64_t now = bus.Now();
   const bool ticked = node->TickPeriod() > 0;
   TickClock ticks(node->TickPeriod(), now);
-  int64_t next_status = now;
+  int64_t next_status = now, next_look = now;
   while (stop_requested == 0 && !node->Done()) {
     now = bus.Now();
     if (ticks.Due(now)) node->Tick(ticks.Take(now));
@@ -75,6 +78,9 @@ void RunLive(const ServiceSpec& spec, const Flags& flags) {
       report(now);
       sd_notify(0, "WATCHDOG=1");
       next_status = std::max(next_status + kStatusPeriod, now);
+    } else if (now >= next_look) {
+      next_look = now + kLookPeriod;
+      if (node->Report().state != told) report(now);
     }
     const int64_t due = ticked ? std::min(ticks.next(), next_status) : next_status;
     bus.Handle(due - bus.Now());

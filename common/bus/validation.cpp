@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "common/bus/image_format.h"
 #include "common/world/commands.h"
 
 namespace chase::bus {
@@ -103,8 +104,10 @@ std::string Problem(const attitude_setpoint_t& m) {
 }
 
 std::string Problem(const camera_image_t& m) {
+  const int64_t raw = static_cast<int64_t>(m.row_stride) * m.height;
+  const bool whole = m.pixelformat == kPixelFormatMjpeg ? m.size > 0 : raw == m.size;
   const bool shape = m.width > 0 && m.height > 0 && m.row_stride > 0 && m.width <= 16384 &&
-                     m.height <= 16384 && static_cast<int64_t>(m.row_stride) * m.height == m.size;
+                     m.height <= 16384 && whole;
   return Check()
       .Time(m.utime)
       .That(shape, "size", "does not agree with height and row_stride")

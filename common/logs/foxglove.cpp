@@ -5,6 +5,7 @@
 #include <cstring>
 
 #include "common/bus/convert.h"
+#include "common/bus/image_format.h"
 #include "common/logs/jpeg.h"
 #include "common/logs/message_types.h"
 #include "common/logs/protobuf.h"
@@ -272,8 +273,9 @@ void Add(const scan_registered_t& m, const LogEvent& e, const ViewerOptions&, Me
   out->push_back({e.channel, "foxglove.PointCloud", CloudBytes(m, "world")});
 }
 void Add(const camera_image_t& m, const LogEvent& e, const ViewerOptions& options, Messages* out) {
-  const std::string jpeg = options.jpeg ? Jpeg(m) : "";
-  if (!options.jpeg)
+  const bool raw = !options.jpeg && m.pixelformat != bus::kPixelFormatMjpeg;
+  const std::string jpeg = raw ? "" : Jpeg(m);
+  if (raw)
     out->push_back({e.channel, "foxglove.RawImage", RawImage(m)});
   else if (!jpeg.empty())
     out->push_back({e.channel, "foxglove.CompressedImage", CompressedImage(m, jpeg)});

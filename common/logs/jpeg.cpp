@@ -4,9 +4,12 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
+#include "common/bus/image_format.h"
+
 namespace chase::logs {
 
 std::string Jpeg(const camera_image_t& m, int quality) {
+  if (m.pixelformat == bus::kPixelFormatMjpeg) return {m.data.begin(), m.data.end()};
   const bool grey = m.pixelformat == camera_image_t::PIXEL_FORMAT_GRAY;
   const int64_t row = int64_t{m.width} * (grey ? 1 : 3);
   if (m.width <= 0 || m.height <= 0 || m.row_stride < row ||

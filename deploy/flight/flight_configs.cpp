@@ -45,6 +45,19 @@ void DeriveView(const world::Rig& rig, planning::PlannerConfig* planner) {
   planner->max_bearing_deg = angle(std::min(rig.center_u_px, rig.width_px - 1 - rig.center_u_px));
 }
 
+/// The drivers' data sheets: what the simulator's devices are.
+void DeriveDrivers(FlightConfigs* configs) {
+  const simulator::SimulatorConfig& simulated = configs->simulator;
+  configs->fcu.port = simulated.hardware.fcu_port;
+  configs->fcu.hover_thrust = simulator::kGravity / simulated.vehicle.max_thrust;
+  configs->lidar.port = simulated.hardware.lidar_port;
+  configs->camera.source = simulator::StreamUrl(simulated.hardware);
+  configs->camera.rate_hz = simulated.camera.rate;
+  configs->camera.width_px = simulated.rig.width_px;
+  configs->camera.height_px = simulated.rig.height_px;
+  configs->camera.exposure = simulated.camera.exposure;
+}
+
 /// The scenario's faults and the command line's, in this order.
 std::vector<world::FaultSpec> AllFaults(world::Scenario scenario, const FlightOptions& options) {
   for (const std::string& text : options.faults) try {
@@ -91,6 +104,7 @@ FlightConfigs Configure(const world::Scenario& scenario, const FlightOptions& op
   configs.control.sigmas = configs.planning.planner.sigmas;
   Override(scenario, "control", &configs.control);
   Override(scenario, "mission", &configs.mission);
+  DeriveDrivers(&configs);
   if (!options.sensors.empty()) configs.simulator.sensors = options.sensors;
   if (!options.planner.empty()) configs.planning.planner_name = options.planner;
   AddFaults(scenario, options, &configs);
@@ -106,9 +120,13 @@ std::string DumpService(const FlightConfigs& configs, const std::string& service
   if (service == "planning") return config::Dump(configs.planning);
   if (service == "control") return config::Dump(configs.control);
   if (service == "mission") return config::Dump(configs.mission);
-  throw std::runtime_error("--print-config " + service +
-                           ": no such process in a flight; use simulator, odometry, mapping, "
-                           "perception, prediction, planning, control or mission");
+  if (service == "fcu") return config::Dump(configs.fcu);
+  if (service == "lidar") return config::Dump(configs.lidar);
+  if (service == "camera") return config::Dump(configs.camera);
+  throw std::runtime_error(
+      "--print-config " + service +
+      ": no such process in a flight; use simulator, odometry, mapping, "
+      "perception, prediction, planning, control, mission, fcu, lidar or camera");
 }
 
 }  // namespace chase::flight

@@ -5,7 +5,10 @@
 #include <vector>
 
 #include "common/world/scenario.h"
+#include "services/camera/config.h"
 #include "services/control/control_node.h"
+#include "services/fcu/fcu_config.h"
+#include "services/lidar/config.h"
 #include "services/mapping/mapping_node.h"
 #include "services/mission/mission_node.h"
 #include "services/odometry/odometry_node.h"
@@ -36,6 +39,9 @@ struct FlightConfigs {
   planning::PlanningConfig planning;
   control::ControlConfig control;
   mission::MissionConfig mission;
+  fcu::FcuConfig fcu;  ///< this and the next two: of drivers on the simulator's devices
+  lidar::LidarConfig lidar;
+  camera::CameraConfig camera;
   std::vector<world::FaultSpec> faults;  ///< each with its time and duration
 };
 

@@ -24,6 +24,7 @@ TAIL = 1.0  # s recorded after the mission's end
 KEEP_FREE = 200  # MB of disk below which sweeps and images are no longer recorded
 LOG_RATE = 15e6  # bytes/s of a recording, sweeps and images included
 LARGEST_SEED = 2**31 - 1
+DRIVERS = ("lidar", "fcu", "camera")  # stand between the simulator and the rest with --hardware
 VIEW_PORTS = range(8080, 8100)  # of --view: the first that nobody listens on
 
 
@@ -48,6 +49,8 @@ def parse(arguments):
                         help="name of a scenario, or a file (default: gym)")
     parser.add_argument("--seed", type=seed_number, default=1, help="of noise and gusts (default: 1)")
     parser.add_argument("--version", action="version", version=version.text())
+    parser.add_argument("--hardware", action="store_true",
+                        help="through the drivers: MAVLink, VLP-16 packets and a video stream in LCM's place")
     parser.add_argument("--view", action="store_true", help="look on in a browser, at http://localhost:8080")
     return parser.parse_args(arguments)
 
@@ -64,12 +67,20 @@ def find_scenario(name):
     raise FlightError(f"no scenario '{name}'; there are: {', '.join(known)}")
 
 
-def flight_processes():
+def process_table():
     table = places.SHARE / "processes.json"
     try:
-        return [row for row in processes.read_table(table.read_bytes(), table.name) if row["fly"]]
+        return processes.read_table(table.read_bytes(), table.name)
     except processes.TableError as error:
         raise FlightError(str(error)) from error
+
+
+def flight_processes():
+    return [row for row in process_table() if row["fly"]]
+
+
+def driver_processes(hardware):
+    return [row for row in process_table() if hardware and row["name"] in DRIVERS]
 
 
 def set_up():
@@ -93,13 +104,13 @@ def ask(program, *arguments):
     return answer.stdout
 
 
-def build_and_check(scenario, view=False):
+def build_and_check(scenario, view=False, hardware=False):
     """Builds what flies. The scenario is read as soon as there is a program that can, long before
     the rest is built. Returns its length [s], take-off included, and its operator's commands."""
     set_up()
     build("chase-scenario")
     told = json.loads(ask("chase-scenario", scenario))
-    build(*(row["binary"] for row in flight_processes()), "chase-flight", "chase-flight-monitor",
+    build(*(row["binary"] for row in flight_processes() + driver_processes(hardware)), "chase-flight", "chase-flight-monitor",
           "chase-recorder", "chase-report", "chase-command", "chase-log", "chase-lidar",
           *(["chase-viewer"] if view else []))
     ask("chase-flight", scenario, "--print-config", "simulator")  # reads the services' overrides
@@ -163,9 +174,9 @@ def write_config(folder, scenario, seed, name):
 class Flight:
     """The processes of one flight and the folder that they leave."""
 
-    def __init__(self, scenario, seed, url, commands=()):
+    def __init__(self, scenario, seed, url, commands=(), hardware=False):
         self.folder = flight_folder(scenario)
-        self.scenario, self.seed = scenario, seed
+        self.scenario, self.seed, self.hardware = scenario, seed, hardware
         self.env = {"LCM_DEFAULT_URL": url}
         self.services, self.logger, self.monitor, self.viewer = [], None, None, None
         self.commands, self.given = list(commands), []
@@ -174,7 +185,7 @@ class Flight:
         return processes.Child(name, command, self.folder / f"{name}.log", self.env, **options)
 
     def start(self, view):
-        rows = flight_processes()
+        rows = flight_processes() + driver_processes(self.hardware)
         configs = {row["name"]: write_config(self.folder, self.scenario, self.seed, row["name"])
                    for row in rows}
         # All that is said, in one log: reports and replays read it.
@@ -192,6 +203,8 @@ class Flight:
                 self.wait_ready()
             command = ["nice", "-n", str(row["nice"]), BIN / row["binary"], "--config",
                        configs[row["name"]]]
+            if self.hardware and row["name"] == "simulator":
+                command.append("--hardware")
             self.services.append(self.child(row["name"], command, notifies=True,
                                             restarts=row["restart"] == "always"))
         self.wait_ready()
@@ -279,12 +292,12 @@ def report(folder):
 
 def fly(options):
     scenario = find_scenario(options.scenario)
-    seconds, commands = build_and_check(scenario, options.view)
+    seconds, commands = build_and_check(scenario, options.view, options.hardware)
     warn_of_disk(seconds)
     raise_receive_buffers()
     url = bus.url()
     check_bus(url)
-    flight = Flight(scenario, options.seed, url, commands)
+    flight = Flight(scenario, options.seed, url, commands, options.hardware)
     print(f"flying {scenario.stem}, seed {options.seed}, into {flight.folder}", flush=True)
     try:
         flight.start(options.view)

@@ -1,56 +1,157 @@
 #include "services/camera/camera_node.h"
 
+#include <fmt/format.h>
+
 #include <cmath>
 
+#include "chase/camera_image_t.hpp"
+#include "common/bus/convert.h"
+#include "common/bus/image_format.h"
 #include "services/camera/image.h"
 
 namespace chase::camera {
+namespace {
 
-CameraNode::CameraNode(bus::Bus& bus, const CameraConfig& config)
-    : bus_(bus), config_(config), source_(OpenFrameSource(config.source, config.rate_hz)) {}
+constexpr int64_t kPoll = 5'000;   // us
+constexpr double kSilent = 0.3;    // s without a frame, or three of its periods
+constexpr double kSurplus = 0.75;  // of the period: what comes sooner after its predecessor is one
 
-int64_t CameraNode::TickPeriod() const { return std::llround(1e6 / config_.rate_hz); }
+}  // namespace
+
+CameraNode::CameraNode(bus::Bus& bus, const CameraConfig& config) : bus_(bus), config_(config) {
+  auto source = OpenFrameSource(config.source, config.rate_hz);
+  if (source->IsRecording())
+    recording_ = std::move(source);
+  else
+    grabber_ = std::make_unique<Grabber>(std::move(source));
+}
+
+int64_t CameraNode::TickPeriod() const {
+  return grabber_ ? kPoll : std::llround(1e6 / config_.rate_hz);
+}
 
 void CameraNode::Tick(int64_t utime) {
   if (done_) return;
-  cv::Mat rgb;
-  {
-    auto timer = bus_.Time("grab");
-    if (const auto frame = source_->Next())
-      rgb = ToRgb(*frame, config_.width_px, config_.height_px);
-  }
-  if (rgb.empty()) return Miss();
-  Publish(rgb, utime);
+  if (grabber_)
+    TickDevice();
+  else
+    TickRecording(utime);
 }
 
-void CameraNode::Miss() {
-  if (source_->IsRecording()) {
+void CameraNode::TickRecording(int64_t utime) {
+  const auto frame = recording_->Next();
+  if (frame)
+    Publish(*frame, utime);
+  else
     done_ = true;
+}
+
+void CameraNode::TickDevice() {
+  if (last_arrival_ == 0) last_arrival_ = bus_.Now();  // silent since the start
+  if (const auto grabbed = grabber_->Take()) TakeFrame(*grabbed);
+  if (const std::string problem = grabber_->Problem(); !problem.empty()) bus_.ReportError(problem);
+}
+
+void CameraNode::TakeFrame(const Grabber::Grabbed& grabbed) {
+  last_arrival_ = bus_.Now();
+  const int64_t utime = CaptureTime(grabbed);
+  const auto period = static_cast<int64_t>(1e6 / config_.rate_hz);
+  if (frames_ > 0 && utime <= last_utime_) {
+    ++backwards_;
+    // A source that began anew, perhaps on another clock.
+    if (last_utime_ - utime < 1'000'000) return;
+  } else if (frames_ > 0 &&
+             static_cast<double>(utime - last_utime_) < kSurplus * static_cast<double>(period)) {
+    ++surplus_;
     return;
   }
-  ++misses_;
-  bus_.ReportError(config_.source + ": no frame; check the cable");
+  Publish(grabbed.frame, utime);
+  age_ = bus::Seconds(bus_.Now(), utime);
 }
 
-void CameraNode::Publish(const cv::Mat& rgb, int64_t utime) {
+/// The middle of the exposure, on the bus's clock.
+int64_t CameraNode::CaptureTime(const Grabber::Grabbed& grabbed) {
+  const int64_t now = bus_.Now();
+  const int64_t arrival = now - (MonotonicTime() - grabbed.arrival);
+  const int64_t delay = std::llround(1e6 * config_.stamp_delay);
+  const Frame& frame = grabbed.frame;
+  stamps_ = frame.clock;
+  switch (frame.clock) {
+    case StampClock::kNone:
+      return arrival - delay;
+    case StampClock::kMonotonic:
+      return clock_.HostTime(now - (MonotonicTime() - frame.stamp), true, arrival) - delay;
+    case StampClock::kWall:
+      return clock_.HostTime(now - (WallTime() - frame.stamp), true, arrival) - delay;
+    case StampClock::kStream:
+      break;
+  }
+  return clock_.HostTime(frame.stamp, false, arrival) - delay;
+}
+
+void CameraNode::Publish(const Frame& frame, int64_t utime) {
+  auto timer = bus_.Time("convert");
+  const cv::Mat rgb = ToRgb(frame.bgr, config_.width_px, config_.height_px);
+  if (rgb.empty()) return;
   camera_image_t m{};
   m.utime = utime;
   m.width = rgb.cols;
   m.height = rgb.rows;
   m.row_stride = 3 * rgb.cols;
   m.pixelformat = camera_image_t::PIXEL_FORMAT_RGB;
-  m.exposure = 0.0;
-  m.size = m.row_stride * m.height;
-  m.data.assign(rgb.datastart, rgb.dataend);
+  m.exposure = config_.exposure > 0.0 ? config_.exposure : frame.exposure;
+  m.readout = config_.readout;
+  if (static_cast<double>(rgb.total() * 3) > 1e6 * config_.raw_limit_mb) {
+    m.pixelformat = bus::kPixelFormatMjpeg;
+    m.data = ToJpeg(rgb, config_.jpeg_quality);
+  } else {
+    m.data.assign(rgb.datastart, rgb.dataend);
+  }
+  m.size = static_cast<int32_t>(m.data.size());
   bus_.Publish("CAMERA_IMAGE", std::move(m));
+  last_utime_ = utime;
   ++frames_;
+}
+
+/// s since the last frame came.
+double CameraNode::Silence() const {
+  return last_arrival_ == 0 ? 0.0 : bus::Seconds(bus_.Now(), last_arrival_);
+}
+
+std::string CameraNode::StampWords() const {
+  switch (stamps_) {
+    case StampClock::kNone:
+      return "stamps by arrival";
+    case StampClock::kMonotonic:
+    case StampClock::kWall:
+      return clock_.believed() ? "the driver's stamps"
+                               : "the driver's stamps, off this host's clock: aligned by arrival";
+    case StampClock::kStream:
+      break;
+  }
+  return "the stream's stamps, aligned by arrival";
 }
 
 bus::NodeReport CameraNode::Report() const {
   using State = bus::NodeReport::State;
-  if (frames_ == 0) return {State::kStarting, "no frame yet"};
-  return {misses_ > 0 ? State::kDegraded : State::kOk,
-          std::to_string(frames_) + " frames, " + std::to_string(misses_) + " missed"};
+  if (!grabber_) {
+    if (frames_ == 0) return {State::kStarting, "no frame yet"};
+    return {State::kOk, fmt::format("{} frames", frames_)};
+  }
+  const double silence = Silence();
+  const std::string why = grabber_->Problem();
+  if (frames_ == 0 && silence < 10.0)
+    return {State::kStarting, "no frame yet" + (why.empty() ? "" : "; " + why)};
+  if (silence > std::max(kSilent, 3.0 / config_.rate_hz))
+    return {State::kFailed,
+            fmt::format("{}: no frame for {:.1f} s{}; check the cable", config_.source, silence,
+                        why.empty() ? "" : " (" + why + ")")};
+  const bool off =
+      stamps_ != StampClock::kStream && stamps_ != StampClock::kNone && !clock_.believed();
+  return {
+      off ? State::kDegraded : State::kOk,
+      fmt::format("{} frames, {} dropped, {} beyond the rate, {} out of order, {:.0f} ms old; {}",
+                  frames_, grabber_->dropped(), surplus_, backwards_, 1e3 * age_, StampWords())};
 }
 
 }  // namespace chase::camera

@@ -1,15 +1,19 @@
 #pragma once
 
 #include <memory>
+#include <string>
 
 #include "common/bus/bus.h"
 #include "common/bus/node.h"
+#include "services/camera/capture_clock.h"
 #include "services/camera/config.h"
 #include "services/camera/frame_source.h"
+#include "services/camera/grabber.h"
 
 namespace chase::camera {
 
-/// Publishes one frame per tick as CAMERA_IMAGE, stamped with the tick.
+/// Publishes frames as CAMERA_IMAGE: a device's when they come, with the time at which they were
+/// captured; a recording's one per tick, stamped with the tick.
 class CameraNode : public bus::Node {
  public:
   CameraNode(bus::Bus& bus, const CameraConfig& config);
@@ -20,13 +24,23 @@ class CameraNode : public bus::Node {
   bus::NodeReport Report() const override;
 
  private:
-  void Miss();
-  void Publish(const cv::Mat& rgb, int64_t utime);
+  void TickRecording(int64_t utime);
+  void TickDevice();
+  void TakeFrame(const Grabber::Grabbed& grabbed);
+  int64_t CaptureTime(const Grabber::Grabbed& grabbed);
+  void Publish(const Frame& frame, int64_t utime);
+  double Silence() const;
+  std::string StampWords() const;
 
   bus::Bus& bus_;
   CameraConfig config_;
-  std::unique_ptr<FrameSource> source_;
-  long frames_ = 0, misses_ = 0;
+  std::unique_ptr<FrameSource> recording_;  // or
+  std::unique_ptr<Grabber> grabber_;
+  CaptureClock clock_;
+  StampClock stamps_ = StampClock::kNone;
+  int64_t last_utime_ = 0, last_arrival_ = 0;  // bus's clock
+  double age_ = 0.0;                           // of the last frame when published, s
+  long frames_ = 0, surplus_ = 0, backwards_ = 0;
   bool done_ = false;
 };
 

@@ -1,11 +1,15 @@
 #include "services/camera/frame_source.h"
 
 #include <algorithm>
+#include <cmath>
+#include <cstdlib>
 #include <filesystem>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/videoio.hpp>
 #include <stdexcept>
 #include <vector>
+
+#include "services/camera/mjpeg_source.h"
 
 namespace chase::camera {
 namespace {
@@ -15,10 +19,11 @@ namespace fs = std::filesystem;
 class FolderSource : public FrameSource {
  public:
   explicit FolderSource(std::vector<fs::path> files) : files_(std::move(files)) {}
-  std::optional<cv::Mat> Next() override {
+  std::optional<Frame> Next() override {
     while (next_ < files_.size()) {
-      cv::Mat frame = cv::imread(files_[next_++].string(), cv::IMREAD_COLOR);
-      if (!frame.empty()) return frame;
+      Frame frame;
+      frame.bgr = cv::imread(files_[next_++].string(), cv::IMREAD_COLOR);
+      if (!frame.bgr.empty()) return frame;
     }
     return std::nullopt;
   }
@@ -31,11 +36,17 @@ class FolderSource : public FrameSource {
 
 class VideoSource : public FrameSource {
  public:
-  VideoSource(const cv::VideoCapture& capture, bool recording)
-      : capture_(capture), recording_(recording) {}
-  std::optional<cv::Mat> Next() override {
-    cv::Mat frame;
-    if (!capture_.read(frame) || frame.empty()) return std::nullopt;
+  /// `clock`: of CAP_PROP_POS_MSEC, where the backend says with it when a frame was captured.
+  VideoSource(const cv::VideoCapture& capture, bool recording, StampClock clock)
+      : capture_(capture), recording_(recording), clock_(clock) {}
+  std::optional<Frame> Next() override {
+    Frame frame;
+    if (!capture_.read(frame.bgr) || frame.bgr.empty()) return std::nullopt;
+    if (clock_ == StampClock::kNone) return frame;
+    frame.stamp = std::llround(1e3 * capture_.get(cv::CAP_PROP_POS_MSEC));
+    if (frame.stamp > 0) frame.clock = clock_;
+    if (clock_ == StampClock::kMonotonic)  // V4L2 counts in 100 us
+      frame.exposure = std::max(0.0, 1e-4 * capture_.get(cv::CAP_PROP_EXPOSURE));
     return frame;
   }
   bool IsRecording() const override { return recording_; }
@@ -43,6 +54,7 @@ class VideoSource : public FrameSource {
  private:
   cv::VideoCapture capture_;
   bool recording_;
+  StampClock clock_;
 };
 
 std::unique_ptr<FrameSource> OpenFolder(const std::string& folder) {
@@ -57,6 +69,7 @@ std::unique_ptr<FrameSource> OpenFolder(const std::string& folder) {
 }
 
 std::unique_ptr<FrameSource> OpenDevice(const std::string& device, double rate_hz) {
+  setenv("OPENCV_VIDEOIO_V4L_SELECT_TIMEOUT", "1", 0);  // s that a read may wait
   cv::VideoCapture capture(device, cv::CAP_V4L2);
   if (!capture.isOpened())
     throw std::runtime_error(device +
@@ -64,12 +77,35 @@ std::unique_ptr<FrameSource> OpenDevice(const std::string& device, double rate_h
                              "other program holds it and that you are in the group video");
   capture.set(cv::CAP_PROP_BUFFERSIZE, 1);
   capture.set(cv::CAP_PROP_FPS, rate_hz);
-  return std::make_unique<VideoSource>(std::move(capture), false);
+  return std::make_unique<VideoSource>(std::move(capture), false, StampClock::kMonotonic);
 }
+
+std::unique_ptr<FrameSource> OpenPipeline(const std::string& pipeline) {
+  cv::VideoCapture capture(pipeline, cv::CAP_GSTREAMER);
+  if (!capture.isOpened())
+    throw std::runtime_error("gst:" + pipeline +
+                             ": GStreamer cannot play this; try it with gst-launch-1.0, and end it "
+                             "in appsink max-buffers=1 drop=true");
+  return std::make_unique<VideoSource>(std::move(capture), false, StampClock::kStream);
+}
+
+std::unique_ptr<FrameSource> OpenStream(const std::string& url) {
+  const std::vector<int> patience = {cv::CAP_PROP_OPEN_TIMEOUT_MSEC, 5000,
+                                     cv::CAP_PROP_READ_TIMEOUT_MSEC, 1000};
+  cv::VideoCapture capture(url, cv::CAP_FFMPEG, patience);
+  if (!capture.isOpened())
+    throw std::runtime_error(url + ": no stream that OpenCV can read; try it with ffplay");
+  return std::make_unique<VideoSource>(std::move(capture), false, StampClock::kStream);
+}
+
+bool BeginsWith(const std::string& text, const char* head) { return text.rfind(head, 0) == 0; }
 
 }  // namespace
 
 std::unique_ptr<FrameSource> OpenFrameSource(const std::string& source, double rate_hz) {
+  if (BeginsWith(source, "http://")) return OpenMjpegSource(source);
+  if (BeginsWith(source, "gst:")) return OpenPipeline(source.substr(4));
+  if (source.find("://") != std::string::npos) return OpenStream(source);
   const auto status = fs::status(source);
   if (!fs::exists(status))
     throw std::runtime_error(source + ": no such device, file or folder; set source");
@@ -78,7 +114,7 @@ std::unique_ptr<FrameSource> OpenFrameSource(const std::string& source, double r
   cv::VideoCapture capture(source, cv::CAP_FFMPEG);
   if (!capture.isOpened())
     throw std::runtime_error(source + ": no video that OpenCV can read; convert it to MP4 or AVI");
-  return std::make_unique<VideoSource>(std::move(capture), true);
+  return std::make_unique<VideoSource>(std::move(capture), true, StampClock::kNone);
 }
 
 }  // namespace chase::camera

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 namespace chase::camera {
@@ -50,6 +51,14 @@ cv::Mat ToRgb(const cv::Mat& frame, int width_px, int height_px) {
   cv::Mat out;
   cv::resize(Centred(rgb, width_px, height_px), out, {width_px, height_px}, 0, 0, cv::INTER_AREA);
   return out;
+}
+
+std::vector<uint8_t> ToJpeg(const cv::Mat& rgb, int quality) {
+  cv::Mat bgr;
+  cv::cvtColor(rgb, bgr, cv::COLOR_RGB2BGR);
+  std::vector<uint8_t> jpeg;
+  cv::imencode(".jpg", bgr, jpeg, {cv::IMWRITE_JPEG_QUALITY, quality});
+  return jpeg;
 }
 
 }  // namespace chase::camera

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cstdint>
 #include <opencv2/core.hpp>
+#include <vector>
 
 namespace chase::camera {
 
@@ -9,5 +11,8 @@ namespace chase::camera {
 /// fx = fy stays true, then resized by area. An empty frame, or one of another kind, gives an empty
 /// image.
 cv::Mat ToRgb(const cv::Mat& frame, int width_px, int height_px);
+
+/// An RGB image as a JPEG file, with loss.
+std::vector<uint8_t> ToJpeg(const cv::Mat& rgb, int quality);
 
 }  // namespace chase::camera

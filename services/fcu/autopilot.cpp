@@ -4,8 +4,6 @@
 
 #include <cmath>
 
-#include "services/fcu/frames.h"
-
 namespace chase::fcu {
 namespace {
 

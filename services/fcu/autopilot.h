@@ -6,7 +6,7 @@
 #include <string>
 
 #include "services/fcu/command.h"
-#include "services/fcu/framing.h"
+#include "services/fcu/mavlink.h"
 #include "services/fcu/status_text.h"
 
 namespace chase::fcu {

@@ -2,8 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <iterator>
-
 namespace chase::fcu {
 namespace {
 
@@ -31,17 +29,6 @@ mav::CommandLong Message(Ask ask) {
 }
 
 }  // namespace
-
-std::string Mode::name() const {
-  static const char* const mains[] = {"no mode",   "MANUAL", "ALTCTL",     "POSCTL",
-                                      "AUTO",      "ACRO",   "OFFBOARD",   "STABILIZED",
-                                      "RATTITUDE", "SIMPLE", "TERMINATION"};
-  static const char* const autos[] = {"",    "READY", "TAKEOFF", "LOITER", "MISSION",
-                                      "RTL", "LAND",  "RTGS",    "FOLLOW", "PRECLAND"};
-  const std::string word = main < std::size(mains) ? mains[main] : fmt::format("mode {}", main);
-  if (main != 4 || sub == 0) return word;
-  return word + "." + (sub < std::size(autos) ? autos[sub] : std::to_string(sub));
-}
 
 std::string Words(Ask ask) {
   switch (ask) {

@@ -4,21 +4,9 @@
 #include <optional>
 #include <string>
 
-#include "services/fcu/mavlink_messages.h"
+#include "services/fcu/mavlink.h"
 
 namespace chase::fcu {
-
-/// PX4's mode as its heartbeat carries it (PX4-Autopilot, px4_custom_mode.h).
-struct Mode {
-  uint8_t main = 0, sub = 0;
-
-  static Mode Of(uint32_t custom_mode) {
-    return {static_cast<uint8_t>(custom_mode >> 16), static_cast<uint8_t>(custom_mode >> 24)};
-  }
-  bool operator==(const Mode& o) const { return main == o.main && sub == o.sub; }
-  std::string name() const;
-};
-inline constexpr Mode kOffboardMode{6, 0}, kLandMode{4, 6};
 
 /// What the bridge may ask for.
 enum class Ask { kNothing, kOffboard, kArm, kLand, kDisarm };

@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "services/fcu/frames.h"
-
 namespace chase::fcu {
 namespace {
 

@@ -5,7 +5,7 @@
 #include <optional>
 
 #include "services/fcu/fcu_config.h"
-#include "services/fcu/payload.h"
+#include "services/fcu/mavlink.h"
 
 /// Our quantities as messages of MAVLink, and back. Times are microseconds of the host's clock.
 namespace chase::fcu {

@@ -5,7 +5,7 @@
 
 #include "services/fcu/clock_sync.h"
 #include "services/fcu/conversions.h"
-#include "services/fcu/framing.h"
+#include "services/fcu/mavlink.h"
 
 namespace chase::fcu {
 

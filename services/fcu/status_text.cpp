@@ -18,7 +18,7 @@ std::string Printable(std::string_view raw) {
 }  // namespace
 
 std::optional<StatusText> StatusTexts::Add(int64_t utime, const mav::Statustext& m) {
-  const std::string_view raw = Text(m.text);
+  const std::string_view raw = mavlink::Text(m.text);
   if (m.id == 0) return StatusText{m.severity, Printable(raw)};
   for (auto it = open_.begin(); it != open_.end();)
     it = utime - it->second.begun > kPatience ? open_.erase(it) : std::next(it);

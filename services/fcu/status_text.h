@@ -5,7 +5,7 @@
 #include <optional>
 #include <string>
 
-#include "services/fcu/payload.h"
+#include "services/fcu/mavlink.h"
 
 namespace chase::fcu {
 

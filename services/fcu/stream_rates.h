@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "services/fcu/mavlink_messages.h"
+#include "services/fcu/mavlink.h"
 
 namespace chase::fcu {
 

@@ -1,31 +1,78 @@
 #include "services/lidar/lidar_node.h"
 
+#include <fmt/format.h>
+
+#include <chrono>
+
+#include "common/bus/convert.h"
 #include "services/lidar/convert.h"
 
 namespace chase::lidar {
+namespace {
+
+constexpr int64_t kOldest = 1'000'000;  // us that a packet may wait in the socket
+constexpr double kSilent = 0.2;         // s without a packet: 150 are missing
+constexpr double kFlawed = 5.0;         // s after a loss in which the sensor is called degraded
+
+int64_t WallTime() {
+  const auto now = std::chrono::system_clock::now().time_since_epoch();
+  return std::chrono::duration_cast<std::chrono::microseconds>(now).count();
+}
+
+}  // namespace
 
 LidarNode::LidarNode(bus::Bus& bus, const LidarConfig& config)
     : bus_(bus),
       assembler_(config),
       clock_(config),
-      source_(OpenPacketSource(config.source, config.port)) {}
+      source_(OpenPacketSource(config.source, config.port)) {
+  if (config.clock == "gps" && !source_->IsRecording())
+    positions_ = OpenPacketSource("udp", config.position_port);
+}
 
 void LidarNode::Tick(int64_t utime) {
   if (done_) return;
   if (source_->IsRecording())
     TickRecording(utime);
   else
-    TickDevice(utime);
+    TickDevice();
   StopIfRefused();
 }
 
-void LidarNode::TickDevice(int64_t utime) {
+void LidarNode::TickDevice() {
   while (const auto packet = source_->Next()) {
-    if (PacketProblem(packet->bytes.data(), packet->bytes.size()).empty())
-      alignment_.Add(clock_.Unwrap(PacketStamp(packet->bytes.data())), utime);
+    const uint8_t* data = packet->bytes.data();
+    heard_ = bus_.Now();
+    // The stamp is of the first firing; the packet leaves after its last.
+    if (PacketProblem(data, packet->bytes.size()).empty())
+      alignment_.Add(clock_.Unwrap(PacketStamp(data)) + PacketDuration(data), Arrival(*packet));
     Take(*packet);
   }
+  const long flaws = assembler_.lost() + assembler_.malformed();
+  if (flaws != flaws_) flawed_ = bus_.Now();
+  flaws_ = flaws;
 }
+
+/// On the bus's clock.
+int64_t LidarNode::SweepTime(int64_t device_us) {
+  const int64_t aligned = alignment_.HostTime(device_us);
+  if (!positions_) return aligned;
+  const int64_t wall = WallTime(), now = bus_.Now();
+  while (const auto packet = positions_->Next())
+    gps_.Hear(packet->bytes.data(), packet->bytes.size(), wall);
+  const auto utc = gps_.Utc(device_us, wall - (now - aligned));
+  gps_problem_ = utc ? "" : gps_.Problem(wall);
+  return utc ? now - (wall - *utc) : aligned;
+}
+
+/// On the bus's clock, which the wall clock may have left since.
+int64_t LidarNode::Arrival(const RawPacket& packet) const {
+  const int64_t age = WallTime() - packet.capture_utime;
+  return bus_.Now() - (packet.capture_utime > 0 && age >= 0 && age < kOldest ? age : 0);
+}
+
+/// s since the last packet.
+double LidarNode::Silence() const { return bus::Seconds(bus_.Now(), heard_); }
 
 void LidarNode::TickRecording(int64_t utime) {
   if (!first_tick_) first_tick_ = utime;
@@ -55,7 +102,7 @@ void LidarNode::Take(const RawPacket& packet) {
 }
 
 void LidarNode::Publish(const Sweep& sweep) {
-  bus_.Publish("LIDAR_SCAN", ToMessage(sweep, alignment_.HostTime(sweep.device_us)));
+  bus_.Publish("LIDAR_SCAN", ToMessage(sweep, SweepTime(sweep.device_us)));
   ++sweeps_;
 }
 
@@ -69,11 +116,17 @@ bus::NodeReport LidarNode::Report() const {
   using State = bus::NodeReport::State;
   if (assembler_.model().verdict() == ModelCheck::Verdict::kOther)
     return {State::kFailed, assembler_.model().reason()};
+  const bool device = !source_->IsRecording();
+  if (device && heard_ != 0 && Silence() > kSilent)
+    return {State::kFailed,
+            fmt::format("no packet for {:.1f} s; check the sensor's power and cable", Silence())};
   if (sweeps_ == 0) return {State::kStarting, "no whole sweep yet"};
-  const std::string detail = std::to_string(sweeps_) + " sweeps, " +
-                             std::to_string(assembler_.lost()) + " packets lost, " +
-                             std::to_string(assembler_.malformed()) + " malformed";
-  return {assembler_.lost() + assembler_.malformed() > 0 ? State::kDegraded : State::kOk, detail};
+  const bool flawed = device ? flawed_ != 0 && bus::Seconds(bus_.Now(), flawed_) < kFlawed
+                             : assembler_.lost() + assembler_.malformed() > 0;
+  const std::string clock = gps_problem_.empty() ? "" : "; stamps by arrival: " + gps_problem_;
+  return {flawed || !clock.empty() ? State::kDegraded : State::kOk,
+          fmt::format("{} sweeps, {} packets lost, {} malformed{}", sweeps_, assembler_.lost(),
+                      assembler_.malformed(), clock)};
 }
 
 }  // namespace chase::lidar

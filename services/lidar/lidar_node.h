@@ -5,8 +5,9 @@
 
 #include "common/bus/bus.h"
 #include "common/bus/node.h"
-#include "services/lidar/clock_alignment.h"
+#include "common/math/clock_alignment.h"
 #include "services/lidar/config.h"
+#include "services/lidar/gps_clock.h"
 #include "services/lidar/packet_source.h"
 #include "services/lidar/sweep_assembler.h"
 
@@ -23,7 +24,10 @@ class LidarNode : public bus::Node {
   bus::NodeReport Report() const override;
 
  private:
-  void TickDevice(int64_t utime);
+  void TickDevice();
+  int64_t SweepTime(int64_t device_us);
+  int64_t Arrival(const RawPacket& packet) const;
+  double Silence() const;
   void TickRecording(int64_t utime);
   void Take(const RawPacket& packet);
   void Publish(const Sweep& sweep);
@@ -33,9 +37,15 @@ class LidarNode : public bus::Node {
   SweepAssembler assembler_;
   SweepAssembler clock_;  // only unwraps the stamps of packets that wait for their time
   std::unique_ptr<PacketSource> source_;
-  ClockAlignment alignment_;
+  std::unique_ptr<PacketSource> positions_;  // with the clock gps
+  GpsClock gps_;
+  std::string gps_problem_;  // why the last sweep is not stamped by it
+  math::ClockAlignment alignment_;
   std::optional<RawPacket> next_;
   std::optional<int64_t> first_tick_, first_device_us_;
+  int64_t heard_ = 0;   // when the last packet came, bus's clock; 0: none yet
+  int64_t flawed_ = 0;  // when one was last lost or malformed
+  long flaws_ = 0;      // lost and malformed until then
   long sweeps_ = 0;
   bool done_ = false;
 };

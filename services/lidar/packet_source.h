@@ -11,7 +11,8 @@ namespace chase::lidar {
 /// A data packet as it came in.
 struct RawPacket {
   std::vector<uint8_t> bytes;
-  int64_t capture_utime = 0;  ///< arrival by the capture's clock, microseconds; 0: not known
+  int64_t capture_utime = 0;  ///< arrival, microseconds since 1970 as the kernel or the capture
+                              ///< says; 0: not known
 };
 
 /// Where data packets come from; position packets are left out.

@@ -1,42 +1,46 @@
 #include "services/lidar/pcap_reader.h"
 
+#include <pcap/pcap.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <cstring>
+#include <memory>
 #include <optional>
 #include <stdexcept>
 
 namespace chase::lidar {
 namespace {
 
-constexpr uint32_t kMicros = 0xa1b2c3d4, kNanos = 0xa1b23c4d, kNextGeneration = 0x0a0d0d0a;
-constexpr size_t kFileHeader = 24, kRecordHeader = 16;
+// The first four bytes of a file: classic pcap in either byte order, in micro- and nanoseconds, and
+// pcapng.
+constexpr uint8_t kMagics[][4] = {{0xd4, 0xc3, 0xb2, 0xa1},
+                                  {0xa1, 0xb2, 0xc3, 0xd4},
+                                  {0x4d, 0x3c, 0xb2, 0xa1},
+                                  {0xa1, 0xb2, 0x3c, 0x4d},
+                                  {0x0a, 0x0d, 0x0d, 0x0a}};
 
 using Bytes = std::vector<uint8_t>;
 
-uint32_t Little(const uint8_t* p) {
-  return static_cast<uint32_t>(p[0]) | static_cast<uint32_t>(p[1]) << 8 |
-         static_cast<uint32_t>(p[2]) << 16 | static_cast<uint32_t>(p[3]) << 24;
-}
-uint32_t Swapped(uint32_t v) {
-  return (v >> 24) | ((v >> 8) & 0xff00u) | ((v << 8) & 0xff0000u) | (v << 24);
-}
+struct Closer {
+  void operator()(pcap_t* capture) const { pcap_close(capture); }
+};
+using Capture = std::unique_ptr<pcap_t, Closer>;
+
 int Big16(const uint8_t* p) { return p[0] << 8 | p[1]; }
 
-struct Format {
-  bool swapped = false, nanos = false;
-  uint32_t Word(const uint8_t* p) const { return swapped ? Swapped(Little(p)) : Little(p); }
-};
-
-std::optional<Format> FormatOf(const Bytes& bytes) {
-  if (bytes.size() < kFileHeader) return std::nullopt;
-  const uint32_t magic = Little(bytes.data());
-  for (const bool swapped : {false, true}) {
-    const uint32_t m = swapped ? Swapped(magic) : magic;
-    if (m == kMicros || m == kNanos) return Format{swapped, m == kNanos};
-  }
-  return std::nullopt;
+Capture Open(const Bytes& bytes, const std::string& file) {
+  char error[PCAP_ERRBUF_SIZE] = "out of memory";
+  FILE* stream = fmemopen(const_cast<uint8_t*>(bytes.data()), bytes.size(), "rb");
+  pcap_t* capture = stream != nullptr ? pcap_fopen_offline(stream, error) : nullptr;
+  if (capture != nullptr) return Capture(capture);
+  if (stream != nullptr) std::fclose(stream);
+  throw std::runtime_error(file + ": no capture that libpcap reads (" + error +
+                           "); record it again, with tcpdump -w");
 }
 
 /// Offset of the IPv4 header in a frame, or nothing.
-std::optional<size_t> IpOffset(uint32_t link_type, const uint8_t* frame, size_t size) {
+std::optional<size_t> IpOffset(int link_type, const uint8_t* frame, size_t size) {
   const auto at = [&](size_t type) -> std::optional<size_t> {
     if (size < type + 2) return std::nullopt;
     if (Big16(frame + type) == 0x8100) type += 4;  // VLAN tag
@@ -44,15 +48,22 @@ std::optional<size_t> IpOffset(uint32_t link_type, const uint8_t* frame, size_t 
     return type + 2;
   };
   switch (link_type) {
-    case 1:
+    case DLT_EN10MB:
       return at(12);
-    case 101:
+    case DLT_RAW:
       return size_t{0};
-    case 113:
+    case DLT_LINUX_SLL:
       return at(14);
+    case DLT_LINUX_SLL2:
+      return size >= 20 && Big16(frame) == 0x0800 ? std::optional<size_t>(20) : std::nullopt;
     default:
       return std::nullopt;
   }
+}
+
+bool IsRead(int link_type) {
+  return link_type == DLT_EN10MB || link_type == DLT_RAW || link_type == DLT_LINUX_SLL ||
+         link_type == DLT_LINUX_SLL2;
 }
 
 std::optional<PcapDatagram> ParseUdp(const uint8_t* ip, size_t size) {
@@ -70,33 +81,26 @@ std::optional<PcapDatagram> ParseUdp(const uint8_t* ip, size_t size) {
 }  // namespace
 
 bool IsPcap(const Bytes& bytes) {
-  return FormatOf(bytes) || (bytes.size() >= 4 && Little(bytes.data()) == kNextGeneration);
+  return bytes.size() >= 4 && std::any_of(std::begin(kMagics), std::end(kMagics), [&](auto& magic) {
+           return std::memcmp(bytes.data(), magic, sizeof magic) == 0;
+         });
 }
 
 std::vector<PcapDatagram> ReadPcap(const Bytes& bytes, const std::string& file) {
-  const auto format = FormatOf(bytes);
-  if (!format)
-    throw std::runtime_error(file + ": pcapng is not read; convert it with editcap -F pcap");
-  const uint32_t link_type = format->Word(bytes.data() + 20) & 0xffffu;
-  if (link_type != 1 && link_type != 101 && link_type != 113)
+  const Capture capture = Open(bytes, file);
+  const int link_type = pcap_datalink(capture.get());
+  if (!IsRead(link_type))
     throw std::runtime_error(file + ": link type " + std::to_string(link_type) +
                              " is not read; capture on Ethernet");
   std::vector<PcapDatagram> out;
-  for (size_t at = kFileHeader; at + kRecordHeader <= bytes.size();) {
-    const uint8_t* record = bytes.data() + at;
-    const size_t size = format->Word(record + 8);
-    at += kRecordHeader;
-    if (size > bytes.size() - at) break;
-    const auto ip = IpOffset(link_type, bytes.data() + at, size);
-    auto datagram =
-        ip ? ParseUdp(bytes.data() + at + *ip, size - *ip) : std::optional<PcapDatagram>();
-    if (datagram) {
-      const uint32_t fraction = format->Word(record + 4);
-      datagram->utime =
-          int64_t{format->Word(record)} * 1000000 + (format->nanos ? fraction / 1000 : fraction);
-      out.push_back(std::move(*datagram));
-    }
-    at += size;
+  pcap_pkthdr* header = nullptr;
+  const uint8_t* frame = nullptr;
+  while (pcap_next_ex(capture.get(), &header, &frame) == 1) {
+    const auto ip = IpOffset(link_type, frame, header->caplen);
+    auto datagram = ip ? ParseUdp(frame + *ip, header->caplen - *ip) : std::nullopt;
+    if (!datagram) continue;
+    datagram->utime = int64_t{header->ts.tv_sec} * 1'000'000 + header->ts.tv_usec;
+    out.push_back(std::move(*datagram));
   }
   return out;
 }

@@ -16,9 +16,9 @@ struct PcapDatagram {
 /// True for classic pcap and pcapng files.
 bool IsPcap(const std::vector<uint8_t>& bytes);
 
-/// All unfragmented IPv4 UDP datagrams of a classic pcap file (either byte order, microseconds or
-/// nanoseconds; Ethernet with or without VLAN tag, raw IP, Linux cooked), in order. Throws
-/// std::runtime_error naming `file`. A record that the file's end cuts off is left out.
+/// All unfragmented IPv4 UDP datagrams of a capture that libpcap reads (pcap and pcapng; Ethernet
+/// with or without VLAN tag, raw IP, Linux cooked), in order. Throws std::runtime_error naming
+/// `file`. A record that the file's end cuts off is left out.
 std::vector<PcapDatagram> ReadPcap(const std::vector<uint8_t>& bytes, const std::string& file);
 
 }  // namespace chase::lidar

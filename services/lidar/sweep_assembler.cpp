@@ -7,6 +7,7 @@ namespace chase::lidar {
 namespace {
 
 constexpr int64_t kHourUs = 3'600'000'000;
+constexpr int64_t kPauseUs = 1'000'000;
 constexpr double kWholeDeg = 355.0;
 constexpr double kWrapDeg = 180.0;
 constexpr size_t kPointsPerSweep = 30000;
@@ -43,8 +44,14 @@ void SweepAssembler::AddPacket(const uint8_t* data, std::vector<Sweep>* done) {
   for (const Firing& firing : packet.firings) AddFiring(packet, firing, stamp_us, done);
 }
 
+/// A gap of a second and more is a sensor that paused, or a clock that was set: what came before
+/// makes no sweep with what comes now.
 void SweepAssembler::CountLost(int64_t stamp_us, double interval_us) {
-  if (last_stamp_us_) {
+  if (last_stamp_us_ && std::llabs(stamp_us - *last_stamp_us_) >= kPauseUs) {
+    if (sweep_) ++broken_off_;
+    sweep_.reset();
+    last_turned_.reset();
+  } else if (last_stamp_us_) {
     const double steps = static_cast<double>(stamp_us - *last_stamp_us_) / interval_us;
     lost_ += std::max(0L, std::lround(steps) - 1);
   }

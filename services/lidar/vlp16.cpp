@@ -118,6 +118,11 @@ uint32_t PacketStamp(const uint8_t* data) {
   return static_cast<uint32_t>(Word(p)) | (static_cast<uint32_t>(Word(p + 2)) << 16);
 }
 
+int64_t PacketDuration(const uint8_t* data) {
+  const bool dual = static_cast<ReturnMode>(data[1204]) == ReturnMode::kDual;
+  return std::llround(1e6 * kBlocks * kBlockPeriod / (dual ? 2.0 : 1.0));
+}
+
 Packet Decode(const uint8_t* data, double min_range, double max_range) {
   Packet out;
   out.stamp_us = PacketStamp(data);

@@ -60,6 +60,9 @@ std::string PacketProblem(const uint8_t* data, size_t size);
 /// Microseconds past the hour of a packet that PacketProblem() passes.
 uint32_t PacketStamp(const uint8_t* data);
 
+/// From its first firing to the end of its last, microseconds.
+int64_t PacketDuration(const uint8_t* data);
+
 /// Decodes a packet that PacketProblem() passes. Azimuth advances between reported values at the
 /// packet's own rate, down to the single laser. The second return of a dual packet is left out
 /// where it repeats the first; ranges outside [min_range, max_range] m are left out.

@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "common/bus/convert.h"
+#include "common/bus/image_format.h"
 
 namespace chase::perception {
 
@@ -54,7 +56,11 @@ Frame FromMessage(const camera_image_t& m, int64_t origin) {
   Frame frame;
   frame.t = bus::Seconds(m.utime, origin);
   const int channels = Channels(m.pixelformat);
-  if (channels == 0) {
+  if (m.pixelformat == bus::kPixelFormatMjpeg) {
+    frame.bgr = cv::imdecode(m.data, cv::IMREAD_COLOR);
+    if (frame.bgr.cols != m.width || frame.bgr.rows != m.height)
+      frame.problem = "image is no JPEG of its width and height";
+  } else if (channels == 0) {
     frame.problem = "pixel format " + std::to_string(m.pixelformat) + " is unknown";
   } else if (m.width <= 0 || m.height <= 0 || m.row_stride < channels * m.width ||
              static_cast<int64_t>(m.row_stride) * m.height > static_cast<int64_t>(m.data.size())) {

@@ -15,6 +15,8 @@ using Eigen::Vector3f;
 constexpr double kPi = 3.14159265358979323846;
 constexpr double kResolution = 0.002;  // m, of a range
 constexpr int kTogether = 8;           // sequences traced at once
+constexpr double kCutDeg = 180.0;      // azimuth at which a sweep begins
+static_assert(kFirings % kFiringsPerPacket == 0, "a packet holds firings of one sweep");
 static_assert(kRings <= kMostPackets && kRings % 8 == 0);
 
 /// Reflectivity at normal incidence, 0 to 255.
@@ -67,6 +69,8 @@ float Incidence(const RayPacket& rays, const HitPacket& hits, int i) {
 
 std::string LidarConfig::Problem() const {
   if (!(rate >= 0.0 && rate <= 10.0)) return "rate is not within 0 to 10 Hz";
+  if (packets && rate != 10.0 && rate != 0.0)
+    return "rate is neither 0 nor 10 Hz, at which data packets come without gaps";
   if (!(noise >= 0.0)) return "noise is below 0 m";
   if (!(dropout >= 0.0 && dropout <= 1.0)) return "dropout is not within 0 to 1";
   if (!(min_range >= 0.0 && max_range > min_range)) return "max_range is not above min_range";
@@ -129,10 +133,14 @@ int Lidar::FireNext(const std::vector<TimedPose>& poses, const Scene& scene) {
   }
   for (RayPacket& packet : rays) packet.count = count;
   scene.TraceAcross(rays, kRings, hits);
-  for (int lane = 0; lane < count; ++lane)
-    for (int ring = 0; ring < kRings; ++ring)
-      Record(firing_ + lane, ring, rays[ring], hits[ring], lane);
+  for (int lane = 0; lane < count; ++lane) RecordFiring(firing_ + lane, rays, hits, lane);
   return count;
+}
+
+void Lidar::RecordFiring(int firing, const RayPacket* rays, const HitPacket* hits, int lane) {
+  if (config_.packets) writer_.Begin(FiringTime(firing), kCutDeg + firing * 360.0 / kFirings);
+  for (int ring = 0; ring < kRings; ++ring) Record(firing, ring, rays[ring], hits[ring], lane);
+  if (config_.packets) writer_.End();
 }
 
 void Lidar::Aim(const TimedPose& body, int lane, RayPacket* rays) const {
@@ -141,8 +149,10 @@ void Lidar::Aim(const TimedPose& body, int lane, RayPacket* rays) const {
   const Vector3f* directions = &directions_[static_cast<std::size_t>((firing_ + lane) * kRings)];
   for (int ring = 0; ring < kRings; ++ring) {
     const Vector3f d = R_WL * directions[ring];
+    const Vector3f o =
+        config_.packets ? Vector3f(origin + LaserHeight(ring) * R_WL.col(2)) : origin;
     RayPacket& packet = rays[ring];
-    packet.ox[lane] = origin.x(), packet.oy[lane] = origin.y(), packet.oz[lane] = origin.z();
+    packet.ox[lane] = o.x(), packet.oy[lane] = o.y(), packet.oz[lane] = o.z();
     packet.dx[lane] = d.x(), packet.dy[lane] = d.y(), packet.dz[lane] = d.z();
   }
 }
@@ -163,11 +173,13 @@ void Lidar::Record(int firing, int ring, const RayPacket& rays, const HitPacket&
       static_cast<float>(measured) * directions_[static_cast<std::size_t>(firing * kRings + ring)];
   sweep_.x.push_back(p.x());
   sweep_.y.push_back(p.y());
-  sweep_.z.push_back(p.z());
+  sweep_.z.push_back(config_.packets ? p.z() + LaserHeight(ring) : p.z());
   sweep_.t.push_back(static_cast<float>(firing * kFiringPeriod + LaserDelay(ring)));
   const float intensity =
       Reflectivity(hits.material[lane]) * (0.3f + 0.7f * Incidence(rays, hits, lane));
-  sweep_.intensity.push_back(static_cast<uint8_t>(std::clamp(intensity, 1.0f, 255.0f)));
+  const auto reflectivity = static_cast<uint8_t>(std::clamp(intensity, 1.0f, 255.0f));
+  if (config_.packets) writer_.Add(ring, measured, reflectivity);
+  sweep_.intensity.push_back(reflectivity);
   sweep_.ring.push_back(static_cast<uint8_t>(ring));
 }
 

@@ -9,6 +9,7 @@
 #include "common/world/random.h"
 #include "common/world/rig.h"
 #include "services/simulator/scene.h"
+#include "services/simulator/velodyne.h"
 
 namespace chase::simulator {
 
@@ -18,6 +19,7 @@ struct LidarConfig {
   double noise = 0.02;
   double dropout = 0.005;
   double min_range = 0.5, max_range = 100.0;
+  bool packets = false;
 
   template <class V>
   void Visit(V& v) {
@@ -26,6 +28,7 @@ struct LidarConfig {
     v("dropout", dropout, "share of returns lost");
     v("min_range", min_range, "m");
     v("max_range", max_range, "m");
+    v("packets", packets, "as a true VLP-16: data packets, lasers up to 11 mm off the centre");
   }
   std::string Problem() const;
 };
@@ -71,10 +74,14 @@ class Lidar {
   /// The sweep that was completed last, once.
   std::optional<Sweep> Take();
 
+  /// The data packets completed since the last call, where the configuration asks for them.
+  std::vector<DataPacket> TakePackets() { return writer_.Take(); }
+
  private:
   double FiringTime(int firing) const;
   int FireNext(const std::vector<TimedPose>& poses, const Scene& scene);
   void Aim(const TimedPose& body, int lane, RayPacket* rays) const;
+  void RecordFiring(int firing, const RayPacket* rays, const HitPacket* hits, int lane);
   void Record(int firing, int ring, const RayPacket& rays, const HitPacket& hits, int lane);
 
   LidarConfig config_;
@@ -86,6 +93,7 @@ class Lidar {
   int firing_ = 0;
   Sweep sweep_;
   std::optional<Sweep> complete_;
+  PacketWriter writer_;
 };
 
 }  // namespace chase::simulator

@@ -55,7 +55,8 @@ std::string SimulatorConfig::Problem() const {
   for (const auto& problem :
        {Named("vehicle", vehicle.Problem()), Named("battery", battery.Problem()),
         Named("attitude_loop", attitude_loop.Problem()), Named("imu", imu.Problem()),
-        Named("lidar", lidar.Problem()), Named("camera", camera.Problem())})
+        Named("lidar", lidar.Problem()), Named("camera", camera.Problem()),
+        Named("hardware", hardware.Problem())})
     if (!problem.empty()) return problem;
   for (const world::FaultSpec& fault : faults)
     if (fault.at < 0.0) return "faults: " + fault.name + " has no time; give its key at, s";
@@ -168,6 +169,7 @@ Output Simulator::Advance(double t) {
   output.imu = imu_.Measure(output.truth.body, now() - last_measurement_);
   last_measurement_ = now();
   output.sweep = lidar_.Take();
+  output.packets = lidar_.TakePackets();
   return output;
 }
 

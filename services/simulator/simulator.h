@@ -11,6 +11,7 @@
 #include "services/simulator/attitude_loop.h"
 #include "services/simulator/battery.h"
 #include "services/simulator/camera.h"
+#include "services/simulator/hardware_config.h"
 #include "services/simulator/imu.h"
 #include "services/simulator/lidar.h"
 #include "services/simulator/quadrotor.h"
@@ -33,6 +34,7 @@ struct SimulatorConfig {
   ImuConfig imu;
   LidarConfig lidar;
   CameraConfig camera;
+  HardwareConfig hardware;
   std::vector<world::FaultSpec> faults;
 
   template <class V>
@@ -49,6 +51,7 @@ struct SimulatorConfig {
     v("imu", imu, "");
     v("lidar", lidar, "");
     v("camera", camera, "");
+    v("hardware", hardware, "");
     v("faults", faults, "of the sensors; each with its time");
   }
   std::string Problem() const;
@@ -68,6 +71,7 @@ struct Output {
   ImuSample imu;
   Truth truth;
   std::optional<Sweep> sweep;
+  std::vector<DataPacket> packets;  ///< of the LiDAR, where asked for
   std::optional<Image> image;
 };
 
@@ -85,8 +89,13 @@ class Simulator {
 
   double charge() const { return battery_.charge(); }  ///< of the battery, 0 to 1
 
-  /// R_WB as the autopilot takes it to be.
-  const Eigen::Quaterniond& attitude() const { return quadrotor_.state().q; }
+  const BodyState& body() const { return quadrotor_.state(); }
+  /// True while a foot touches the ground.
+  bool on_ground() const { return quadrotor_.on_ground(); }
+  /// Of the motors over mass, m/s^2.
+  double thrust() const { return quadrotor_.thrust() / config_.vehicle.TrueMass(); }
+  /// That the flight controller has learned, as asked for over mass, m/s^2.
+  double hover_thrust() const { return hover_thrust_; }
 
   /// Advances to t [s] at 1 kHz, and measures there. Times must grow; the first is 0.
   Output Advance(double t);

@@ -1,5 +1,7 @@
 #include "services/simulator/simulator_node.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <fstream>
@@ -22,6 +24,7 @@
 namespace chase::simulator {
 namespace {
 
+constexpr double kMostBehind = 0.3;      // s behind the host's clock that drivers bear
 constexpr int64_t kTruthTicks = 2;       // 100 Hz
 constexpr int64_t kScenarioTicks = 200;  // 1 Hz; FCU_STATUS as well
 
@@ -33,17 +36,28 @@ std::string ReadText(const std::string& file) {
   return text.str();
 }
 
+/// Packets are a true sensor's.
+SimulatorConfig WithDevices(SimulatorConfig config) {
+  config.lidar.packets = config.lidar.packets || config.hardware.packets();
+  return config;
+}
+
 }  // namespace
 
 SimulatorNode::SimulatorNode(bus::Bus& bus, const SimulatorConfig& config)
     : bus_(bus),
-      config_(config),
+      config_(WithDevices(config)),
       yaml_(ReadText(config.scenario)),
       scenario_(world::ParseScenario(yaml_, config.scenario)),
-      simulator_(scenario_, config),
+      simulator_(scenario_, config_),
+      hardware_(config_, bus.Now()),
       faults_(config.faults, config.seed) {
   const std::string& sensors = config.sensors.empty() ? scenario_.sensors.mode : config.sensors;
   if (sensors == "truth") truth_feed_ = std::make_unique<TruthFeed>(bus, scenario_, config.rig);
+  if (!config_.hardware.mavlink()) Subscribe();
+}
+
+void SimulatorNode::Subscribe() {
   bus_.Subscribe<attitude_setpoint_t>("ATTITUDE_SETPOINT",
                                       [this](const auto& message) { OnSetpoint(message); });
   if (!truth_feed_) bus_.Subscribe<pose_t>("POSE", [this](const auto& m) { OnPose(m); });
@@ -53,7 +67,7 @@ void SimulatorNode::OnPose(const pose_t& message) {
   if (epoch_.Change(message.epoch)) changes_frame_ = true;
   if (!changes_frame_ || message.health == pose_t::HEALTH_STARTING) return;
   changes_frame_ = false;
-  frame_yaw_ = math::WrapAngle(math::Yaw(simulator_.attitude()) -
+  frame_yaw_ = math::WrapAngle(math::Yaw(simulator_.body().q) -
                                math::Yaw(bus::ToQuaternion(message.orientation)));
 }
 
@@ -70,27 +84,40 @@ void SimulatorNode::OnSetpoint(const attitude_setpoint_t& message) {
 
 void SimulatorNode::Tick(int64_t utime) {
   if (!power_on_) power_on_ = utime;
-  last_tick_ = utime;
   AdvanceFaults(utime);
+  hardware_.Steer(bus_.Now(), bus::Seconds(std::max(last_tick_, *power_on_), *power_on_),
+                  &simulator_);
+  last_tick_ = utime;
   Output output;
   {
     const auto timer = bus_.Time("step");
     output = simulator_.Advance(bus::Seconds(utime, *power_on_));
   }
   faults_.Strike(config_.imu, &output.imu);
-  PublishImu(output.imu, utime);
-  if (output.sweep && !faults_.LidarSilent()) PublishSweep(std::move(*output.sweep));
-  if (output.image) {
-    faults_.Strike(&*output.image);
-    PublishImage(std::move(*output.image), utime);
-  }
+  PublishSensors(&output, utime);
   if (ticks_ % kTruthTicks == 0) PublishTruth(output.truth, utime);
   if (ticks_ % kScenarioTicks == 0) {
     PublishScenario(utime);
-    PublishAutopilot(utime);
+    if (!config_.hardware.mavlink()) PublishAutopilot(utime);
   }
   if (truth_feed_) truth_feed_->Publish(output.truth, utime, ticks_);
   ++ticks_;
+}
+
+/// On the bus, or to the drivers where a device has one.
+void SimulatorNode::PublishSensors(Output* output, int64_t utime) {
+  if (!config_.hardware.mavlink()) PublishImu(output->imu, utime);
+  hardware_.Tell(utime, bus_.Now(), simulator_, output->imu);
+  if (!faults_.LidarSilent()) {
+    hardware_.SendPackets(std::move(output->packets), faults_.LidarClock());
+    if (output->sweep && !config_.hardware.packets()) PublishSweep(std::move(*output->sweep));
+  }
+  if (!output->image) return;
+  faults_.Strike(&*output->image);
+  if (config_.hardware.stream())
+    hardware_.SendImage(*output->image, utime, bus_.Now());
+  else
+    PublishImage(std::move(*output->image), utime);
 }
 
 bus::NodeReport SimulatorNode::Report() const {
@@ -101,6 +128,13 @@ bus::NodeReport SimulatorNode::Report() const {
   }
   const double t = bus::Seconds(last_tick_, *power_on_) - scenario_.settle_s;
   report.detail = scenario_.name + ", mission time " + std::to_string(std::lround(t)) + " s";
+  if (config_.hardware.mavlink()) report.detail += ", PX4 " + hardware_.Words();
+  const double behind = bus::Seconds(bus_.Now(), last_tick_);
+  if (config_.hardware.any() && behind > kMostBehind) {
+    report.state = bus::NodeReport::State::kDegraded;
+    report.detail += fmt::format(
+        ", {:.1f} s behind: drivers go by the host's clock, and this machine is too slow", behind);
+  }
   return report;
 }
 

@@ -10,6 +10,7 @@
 #include "common/bus/bus.h"
 #include "common/bus/epoch.h"
 #include "common/bus/node.h"
+#include "services/simulator/hardware.h"
 #include "services/simulator/sensor_faults.h"
 #include "services/simulator/simulator.h"
 #include "services/simulator/truth_feed.h"
@@ -19,7 +20,8 @@ namespace chase::simulator {
 /// ATTITUDE_SETPOINT -> simulator -> IMU, LIDAR_SCAN, CAMERA_IMAGE, TRUTH, SCENARIO, FAULT,
 /// FCU_STATUS. The first tick is power-on. Where the scenario's sensors.mode is "truth", also POSE,
 /// TARGET and OBSTACLES. Else POSE is heard for its frame: like PX4 with its reset counter, the
-/// autopilot takes over the yaw of a frame that odometry begins anew.
+/// autopilot takes over the yaw of a frame that odometry begins anew. Devices that `hardware` gives
+/// to drivers are neither heard nor published here.
 class SimulatorNode : public bus::Node {
  public:
   SimulatorNode(bus::Bus& bus, const SimulatorConfig& config);
@@ -29,6 +31,8 @@ class SimulatorNode : public bus::Node {
   bus::NodeReport Report() const override;
 
  private:
+  void Subscribe();
+  void PublishSensors(Output* output, int64_t utime);
   void OnSetpoint(const attitude_setpoint_t& message);
   void OnPose(const pose_t& message);
   void PublishImu(const ImuSample& sample, int64_t utime);
@@ -44,6 +48,7 @@ class SimulatorNode : public bus::Node {
   std::string yaml_;
   world::Scenario scenario_;
   Simulator simulator_;
+  Hardware hardware_;
   SensorFaults faults_;
   std::unique_ptr<TruthFeed> truth_feed_;
   bus::Epoch epoch_;

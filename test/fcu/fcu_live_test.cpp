@@ -5,16 +5,13 @@
 #include <gtest/gtest.h>
 #include <netinet/in.h>
 #include <sys/socket.h>
-#include <sys/wait.h>
 #include <termios.h>
 #include <unistd.h>
 
 #include <chrono>
 #include <csignal>
 #include <cstdlib>
-#include <fstream>
 #include <functional>
-#include <sstream>
 #include <thread>
 
 #include "chase/attitude_setpoint_t.hpp"
@@ -24,6 +21,7 @@
 #include "common/bus/convert.h"
 #include "common/bus/udp_bus.h"
 #include "common/math/rotation.h"
+#include "process.h"
 #include "stand_in.h"
 
 namespace chase::fcu::testing {
@@ -32,44 +30,9 @@ namespace {
 constexpr int kPort = 14540;
 
 /// chase-fcu with a config of these lines.
-class Process {
+class Process : public chase::testing::Process {
  public:
-  explicit Process(const std::string& config) {
-    static int number = 0;
-    const std::string base = ::testing::TempDir() + "fcu_live_" + std::to_string(++number);
-    std::ofstream(base + ".yaml") << config;
-    errors_ = base + ".err";
-    pid_ = fork();
-    if (pid_ != 0) return;
-    const int err = open(errors_.c_str(), O_CREAT | O_WRONLY | O_TRUNC, 0644);
-    dup2(err, 2);
-    execl(CHASE_FCU, CHASE_FCU, "--config", (base + ".yaml").c_str(), nullptr);
-    _exit(127);
-  }
-  Process(const Process&) = delete;
-  Process& operator=(const Process&) = delete;
-  ~Process() { End(SIGINT); }
-
-  /// Its exit code.
-  int End(int signal) {
-    if (pid_ <= 0) return code_;
-    if (signal != 0) kill(pid_, signal);
-    int status = 0;
-    waitpid(pid_, &status, 0);
-    pid_ = 0;
-    return code_ = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
-  }
-  std::string errors() const {
-    std::ifstream in(errors_);
-    std::ostringstream text;
-    text << in.rdbuf();
-    return text.str();
-  }
-
- private:
-  pid_t pid_ = 0;
-  int code_ = -1;
-  std::string errors_;
+  explicit Process(const std::string& config) : chase::testing::Process(CHASE_FCU, config) {}
 };
 
 /// The autopilot's end of the wire.

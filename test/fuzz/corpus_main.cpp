@@ -99,10 +99,10 @@ void WriteMission(const Events& events) {
 
 void WriteMavlink() {
   world::Random random(1);
-  fcu::FrameWriter writer(1, 1);
-  fcu::testing::ForEachType([&](auto type) {
+  mavlink::FrameWriter writer(1, 1);
+  mavlink::testing::ForEachType([&](auto type) {
     Bytes bytes = {0xFF};
-    const auto message = fcu::testing::RandomMessage<decltype(type)>(&random);
+    const auto message = mavlink::testing::RandomMessage<decltype(type)>(&random);
     const Bytes frame = writer.Write(1'800'000'000'000'000, message);
     bytes.insert(bytes.end(), frame.begin(), frame.end());
     Write("mavlink", "message_" + std::to_string(decltype(type)::kId), bytes);

@@ -19,12 +19,12 @@ void RightChecksums(std::vector<uint8_t>* bytes) {
     uint8_t* frame = bytes->data() + at;
     const size_t end = kHead + frame[1];
     const auto extra =
-        fcu::ChecksumExtra(frame[7] | uint32_t{frame[8]} << 8 | uint32_t{frame[9]} << 16);
+        mavlink::ChecksumExtra(frame[7] | uint32_t{frame[8]} << 8 | uint32_t{frame[9]} << 16);
     if (frame[0] != kMagic || at + end + kChecksum > bytes->size() || !extra) {
       ++at;
       continue;
     }
-    const uint16_t sum = fcu::FrameChecksum(frame + 1, end - 1, *extra);
+    const uint16_t sum = mavlink::FrameChecksum(frame + 1, end - 1, *extra);
     frame[end] = static_cast<uint8_t>(sum & 0xFF);
     frame[end + 1] = static_cast<uint8_t>(sum >> 8);
     at += end + kChecksum;
@@ -38,8 +38,8 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   const size_t piece = 1 + data[0] % 32 * 16;
   std::vector<uint8_t> bytes(data + 1, data + size);
   if (data[0] % 64 >= 32) RightChecksums(&bytes);
-  fcu::Signing signing(fcu::Key{}, 1);
-  fcu::FrameReader sealed(&signing);
+  mavlink::Signing signing(mavlink::Key{}, 1);
+  mavlink::FrameReader sealed(&signing);
   fcu::Bridge bridge{fcu::FcuConfig{}};
   int64_t now = 1'800'000'000'000'000;  // us
   for (size_t at = 0; at < bytes.size(); at += piece) {
@@ -49,7 +49,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     bridge.Tick(now);
     bridge.TakeOutgoing();
     bridge.TakeImu();
-    sealed.Add(now, bytes.data() + at, part, [](const fcu::Frame&) {});
+    sealed.Add(now, bytes.data() + at, part, [](const mavlink::Frame&) {});
   }
   fuzz::Require(!bridge.Words().empty(), "the bridge has something to say");
   return 0;

@@ -147,6 +147,22 @@ class FlightTest(unittest.TestCase):
         port = re.search(r"look on at http://localhost:(\d+)", out).group(1)
         self.assertEqual((self.folder / "viewer.log").read_text(encoding="utf-8"), f"--port {port}\n")
 
+    def test_hardware_flies_through_the_drivers(self):
+        for row in fly.flight_processes() + fly.driver_processes(True):
+            self.program(row["binary"], SERVICE.format(behaviour="print(*sys.argv[1:], flush=True)"))
+        self.assertEqual(self.fly("--hardware")[0], 0)
+        for name in ("fcu", "lidar", "camera"):
+            self.assertIn(f"chase-{name}", self.built[-1])
+            said = (self.folder / f"{name}.log").read_text(encoding="utf-8")
+            self.assertIn(f"--config {self.folder / name}.yaml", said)
+            self.assertNotIn("--hardware", said)
+        self.assertIn("--hardware", (self.folder / "simulator.log").read_text(encoding="utf-8"))
+
+    def test_drivers_fly_only_where_they_are_asked_for(self):
+        self.assertEqual(self.fly()[0], 0)
+        self.assertFalse((self.folder / "fcu.log").exists())
+        self.assertNotIn("--hardware", (self.folder / "simulator.log").read_text(encoding="utf-8"))
+
     def test_view_takes_a_free_port(self):
         with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as sock:
             sock.bind(("", 0))

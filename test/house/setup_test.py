@@ -79,7 +79,7 @@ class Setup(unittest.TestCase):
         self.assertIn("check the network", answer.stderr)
 
     def test_node_modules_once_per_lock_file(self):
-        for folder in ("logs", "services/fcu", "services/viewer"):
+        for folder in ("logs", "common/mavlink", "services/viewer"):
             with self.subTest(folder=folder):
                 path = self.home / folder
                 path.mkdir(parents=True)

@@ -6,7 +6,9 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "chase/camera_image_t.hpp"
+#include "common/bus/image_format.h"
 #include "common/bus/lockstep.h"
+#include "common/bus/validation.h"
 
 namespace chase::camera {
 namespace {
@@ -47,6 +49,41 @@ TEST(CameraNode, AFolderIsPublishedAtTheRateAndThenItIsDone) {
     EXPECT_EQ(images[k].utime, images[0].utime + 50'000 * static_cast<int64_t>(k));
   }
   EXPECT_TRUE(node->Done());
+}
+
+/// A raw frame of 1280 x 720 is larger than the bus's receive buffers.
+TEST(CameraNode, ALargeImageTravelsAsJpegAndIsGood) {
+  const fs::path folder = fs::path(::testing::TempDir()) / "camera_large";
+  fs::remove_all(folder);
+  fs::create_directories(folder);
+  cv::Mat picture(720, 1280, CV_8UC3, cv::Scalar(200, 100, 40));
+  cv::imwrite((folder / "f.png").string(), picture);
+  for (const double limit : {1.0, 0.1}) {
+    CameraConfig config;
+    config.source = folder.string();
+    config.raw_limit_mb = limit;
+    if (limit == 1.0) config.width_px = config.height_px = 0;
+    std::vector<camera_image_t> images;
+    bus::Lockstep lockstep(1'000'000);
+    lockstep.Add("camera", 0,
+                 [&](bus::Bus& bus) { return std::make_unique<CameraNode>(bus, config); });
+    lockstep.SetTap([&](int64_t, const std::string& channel, const bus::Bus::Bytes& bytes) {
+      camera_image_t image;
+      if (channel == "CAMERA_IMAGE" &&
+          image.decode(bytes.data(), 0, static_cast<int>(bytes.size())) > 0)
+        images.push_back(image);
+    });
+    lockstep.RunUntil(1'500'000);
+    ASSERT_EQ(images.size(), 1u);
+    const camera_image_t& m = images[0];
+    EXPECT_EQ(m.pixelformat, bus::kPixelFormatMjpeg);
+    EXPECT_LT(m.size, 100'000);
+    EXPECT_EQ(bus::Problem(m), "");
+    const cv::Mat decoded = cv::imdecode(m.data, cv::IMREAD_COLOR);
+    EXPECT_EQ(decoded.cols, m.width);
+    EXPECT_EQ(decoded.rows, m.height);
+    EXPECT_NEAR(decoded.at<cv::Vec3b>(100, 100)[0], 200, 3);
+  }
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include "services/camera/config.h"
 #include "services/camera/frame_source.h"
 #include "services/camera/image.h"
+#include "services/camera/multipart.h"
 
 namespace chase::camera {
 namespace {
@@ -70,7 +71,7 @@ TEST(CameraSource, AFolderGivesItsImagesByName) {
   for (int k = 0; k < 3; ++k) {
     const auto frame = source->Next();
     ASSERT_TRUE(frame);
-    EXPECT_EQ(frame->at<cv::Vec3b>(0, 0)[0], 50 * k);
+    EXPECT_EQ(frame->bgr.at<cv::Vec3b>(0, 0)[0], 50 * k);
   }
   EXPECT_FALSE(source->Next());
 }
@@ -85,7 +86,7 @@ TEST(CameraSource, AVideoGivesAllItsFrames) {
   for (int k = 0; k < 5; ++k) {
     const auto frame = source->Next();
     ASSERT_TRUE(frame);
-    EXPECT_NEAR(frame->at<cv::Vec3b>(20, 20)[1], 40 * k, 4);
+    EXPECT_NEAR(frame->bgr.at<cv::Vec3b>(20, 20)[1], 40 * k, 4);
   }
   EXPECT_FALSE(source->Next());
 }
@@ -106,6 +107,55 @@ TEST(CameraConfig, ProblemsNameTheField) {
   config = {};
   config.width_px = 0;
   EXPECT_NE(config.Problem().find("height_px"), std::string::npos);
+}
+
+/// Servers differ: hyphens in the header, no lengths, small letters; and bytes come in any pieces.
+TEST(CameraMultipart, PartsComeWholeWhateverThePieces) {
+  const std::string bodies[] = {"first", std::string("\r\n--no\0boundary", 16), ""};
+  for (const bool lengths : {true, false}) {
+    for (const std::string boundary : {"mark", "--mark"}) {
+      std::string stream =
+          "HTTP/1.0 200 OK\r\nServer: x\r\nContent-Type: "
+          "multipart/x-mixed-replace; boundary=\"" +
+          boundary + "\"\r\n\r\n";
+      double t = 1.5;
+      for (const std::string& body : bodies) {
+        stream += "--mark\r\nContent-Type: image/jpeg\r\n";
+        if (lengths) stream += "content-length: " + std::to_string(body.size()) + "\r\n";
+        stream += "X-Timestamp: " + std::to_string(t++) + "\r\n\r\n" + body + "\r\n";
+      }
+      stream += "--mark\r\n";
+      for (const size_t piece : {size_t{1}, size_t{7}, stream.size()}) {
+        MultipartReader reader;
+        std::vector<Part> parts;
+        for (size_t at = 0; at < stream.size(); at += piece)
+          for (Part& part : reader.Add(reinterpret_cast<const uint8_t*>(stream.data()) + at,
+                                       std::min(piece, stream.size() - at)))
+            parts.push_back(std::move(part));
+        ASSERT_EQ(parts.size(), 3u) << reader.problem() << piece << boundary << lengths;
+        for (size_t k = 0; k < 3; ++k) {
+          EXPECT_EQ(std::string(parts[k].body.begin(), parts[k].body.end()), bodies[k]);
+          EXPECT_EQ(std::stod(parts[k].headers["x-timestamp"]), 1.5 + static_cast<double>(k));
+        }
+      }
+    }
+  }
+}
+
+TEST(CameraMultipart, WhatIsNoStreamIsSaid) {
+  const auto problem = [](const std::string& answer) {
+    MultipartReader reader;
+    reader.Add(reinterpret_cast<const uint8_t*>(answer.data()), answer.size());
+    return reader.problem();
+  };
+  EXPECT_NE(problem("HTTP/1.1 404 Not Found\r\n").find("404"), std::string::npos);
+  EXPECT_NE(problem("HTTP/1.1 200 OK\r\nContent-Type: text/html\r\n\r\n").find("text/html"),
+            std::string::npos);
+  EXPECT_NE(problem("HTTP/1.1 200 OK\r\nContent-Type: multipart/mixed;boundary=b\r\n\r\n--b\r\n"
+                    "Content-Length: 99999999999\r\n\r\n")
+                .find("99999999999"),
+            std::string::npos);
+  EXPECT_NE(problem("SSH-2.0-OpenSSH\r\n").find("SSH"), std::string::npos);
 }
 
 }  // namespace

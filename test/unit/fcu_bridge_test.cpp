@@ -236,6 +236,24 @@ TEST(FcuBridge, RefusalsAreSaidInWordsAndGivenUp) {
   EXPECT_TRUE(b.RunUntil(State::kFlying, 12.0)) << b.bridge.Words();
 }
 
+TEST(FcuBridge, AnEmptyBatteryLandsAndIsNoFlightAfterwards) {
+  Flight flight;
+  ASSERT_TRUE(flight.RunUntil(State::kFlying, 12.0));
+  flight.Run(5.0);
+  flight.px4.SetCharge(0.04);
+  ASSERT_TRUE(flight.RunUntil(State::kFailsafe, 3.0)) << flight.bridge.Words();
+  EXPECT_NE(flight.bridge.Words().find("Emergency battery level"), std::string::npos)
+      << flight.bridge.Words();
+  EXPECT_TRUE(flight.px4.mode() == kLandMode);
+  flight.Run(12.0);
+  EXPECT_FALSE(flight.px4.armed()) << "landed and disarmed, with the setpoints still coming";
+  flight.setpoints = false;
+  flight.Run(3.0);
+  flight.setpoints = true;
+  flight.Run(8.0);
+  EXPECT_FALSE(flight.px4.armed()) << "arming is refused: " << flight.bridge.Words();
+}
+
 TEST(FcuBridge, ACheckThatPassesLaterIsWaitedFor) {
   StandInOptions options;
   options.preflight = "heading estimate not stable";

@@ -1,9 +1,9 @@
 #include <gtest/gtest.h>
 
 #include "common/math/rotation.h"
+#include "common/mavlink/frames.h"
 #include "common/world/random.h"
 #include "services/fcu/conversions.h"
-#include "services/fcu/frames.h"
 
 namespace chase::fcu {
 namespace {

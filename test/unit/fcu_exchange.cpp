@@ -11,7 +11,7 @@
 
 namespace {
 
-using namespace chase::fcu;  // NOLINT(google-build-using-namespace)
+using namespace chase::mavlink;  // NOLINT(google-build-using-namespace)
 
 constexpr int64_t kUtime = 1'800'000'000'000'000;
 

@@ -3,7 +3,7 @@
 import { spawnSync } from 'node:child_process'
 import { createRequire } from 'node:module'
 
-const require = createRequire(new URL('../../services/fcu/package.json', import.meta.url))
+const require = createRequire(new URL('../../common/mavlink/package.json', import.meta.url))
 const { minimal, standard, common } = require('mavlink-mappings')
 const { MavLinkPacketSplitter, MavLinkPacketSignature, MavLinkProtocolV1, MavLinkProtocolV2 } = require('node-mavlink')
 

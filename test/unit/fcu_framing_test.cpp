@@ -3,10 +3,10 @@
 #include <set>
 #include <sstream>
 
+#include "common/mavlink/framing.h"
 #include "fcu_random.h"
-#include "services/fcu/framing.h"
 
-namespace chase::fcu {
+namespace chase::mavlink {
 namespace {
 
 constexpr int64_t kUtime = 1'800'000'000'000'000;
@@ -223,4 +223,4 @@ TEST(FcuFraming, FlagsThatAreNotUnderstoodAreRefused) {
 }
 
 }  // namespace
-}  // namespace chase::fcu
+}  // namespace chase::mavlink

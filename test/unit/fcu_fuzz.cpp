@@ -10,6 +10,7 @@
 namespace {
 
 using namespace chase::fcu;  // NOLINT(google-build-using-namespace)
+namespace mavlink = chase::mavlink;
 using chase::world::Random;
 
 constexpr int64_t kUtime = 1'800'000'000'000'000;
@@ -26,8 +27,8 @@ std::vector<uint8_t> Noise(Random* random) {
 std::vector<uint8_t> Frames(Random* random, FrameWriter* plain, FrameWriter* sealed) {
   std::vector<uint8_t> bytes;
   for (uint64_t n = random->Next() % 6; n > 0; --n)
-    testing::WithType(random->Next() % testing::kTypes, [&](auto type) {
-      const auto message = testing::RandomMessage<decltype(type)>(random);
+    mavlink::testing::WithType(random->Next() % mavlink::testing::kTypes, [&](auto type) {
+      const auto message = mavlink::testing::RandomMessage<decltype(type)>(random);
       const auto frame = (random->Next() % 4 == 0 ? sealed : plain)->Write(kUtime, message);
       bytes.insert(bytes.end(), frame.begin(), frame.end());
     });
@@ -79,7 +80,7 @@ int main(int argc, char** argv) {
   Sum sum;
   int64_t bytes_read = 0;
   const auto take = [&](const Frame& frame) {
-    testing::ForEachType([&](auto type) {
+    mavlink::testing::ForEachType([&](auto type) {
       using M = decltype(type);
       if (const auto message = As<M>(frame)) M::Visit(*message, sum);
     });

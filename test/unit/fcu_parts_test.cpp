@@ -124,7 +124,7 @@ template <class M>
 Frame FrameOf(const M& message, uint8_t system = 1, uint8_t component = 1) {
   Frame frame;
   frame.system = system, frame.component = component, frame.id = M::kId;
-  frame.payload = ToPayload(message);
+  frame.payload = mavlink::ToPayload(message);
   return frame;
 }
 

@@ -5,10 +5,10 @@
 #include <tuple>
 #include <type_traits>
 
+#include "common/mavlink/framing.h"
 #include "common/world/random.h"
-#include "services/fcu/framing.h"
 
-namespace chase::fcu::testing {
+namespace chase::mavlink::testing {
 
 /// Fills any message with random bits; every fourth field stays zero, so that there are zeros to
 /// cut. Floats are numbers or infinite, texts end at their first zero.
@@ -63,4 +63,4 @@ void ForEachType(F&& f) {
   for (std::size_t i = 0; i < kTypes; ++i) WithType(i, f);
 }
 
-}  // namespace chase::fcu::testing
+}  // namespace chase::mavlink::testing

@@ -1,10 +1,10 @@
 #include <gtest/gtest.h>
 
+#include "common/mavlink/framing.h"
+#include "common/mavlink/signing.h"
 #include "common/world/random.h"
-#include "services/fcu/framing.h"
-#include "services/fcu/signing.h"
 
-namespace chase::fcu {
+namespace chase::mavlink {
 namespace {
 
 constexpr int64_t kUtime = 1'800'000'000'000'000;
@@ -89,4 +89,4 @@ TEST(FcuSigning, LinksAreCountedApart) {
 }
 
 }  // namespace
-}  // namespace chase::fcu
+}  // namespace chase::mavlink

@@ -3,8 +3,11 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <chrono>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <thread>
 
 #include "lidar_packets.h"
 #include "services/lidar/packet_source.h"
@@ -123,7 +126,7 @@ TEST(LidarSource, BadFilesAreRefusedInOneLine) {
   const Bytes good = StreamPacket(0, 0.0, 0);
   const std::string cut(good.begin(), good.end());
   EXPECT_NE(ErrorOf(TempFile("cut.bin", cut + "x")).find("cut off"), std::string::npos);
-  EXPECT_NE(ErrorOf(TempFile("ng.pcap", "\x0a\x0d\x0d\x0a_____")).find("pcapng"),
+  EXPECT_NE(ErrorOf(TempFile("ng.pcap", "\x0a\x0d\x0d\x0a_____")).find("libpcap"),
             std::string::npos);
   const std::string header("\xd4\xc3\xb2\xa1\x02\0\x04\0\0\0\0\0\0\0\0\0\xff\xff\0\0\x01\0\0\0",
                            24);
@@ -148,6 +151,32 @@ TEST(LidarSource, ACaptureCutOffAnywhereNeverReadsBeyondItsEnd) {
     EXPECT_TRUE(ReadPcap({bytes.begin(), bytes.begin() + static_cast<long>(n)}, "x").empty());
 }
 
+/// One datagram of 4 bytes, as Wireshark saves it: section, interface and enhanced packet blocks.
+TEST(LidarSource, APcapngCaptureIsRead) {
+  const auto block = [](char type, const std::string& body) {
+    const std::string padded = body + std::string((4 - body.size() % 4) % 4, '\0');
+    const auto size = static_cast<char>(12 + padded.size());
+    const std::string length = {size, 0, 0, 0};
+    return std::string({type, 0, 0, 0}) + length + padded + length;
+  };
+  std::string frame(14, '\0');
+  frame[12] = 8;
+  frame += std::string("\x45\0\0\x20\0\0\0\0\x40\x11\0\0\x7f\0\0\1\x7f\0\0\1", 20);
+  frame += std::string("\0\1\x09\x40\0\x0c\0\0", 8) + "data";
+  std::string section =
+      block(0, std::string("\x4d\x3c\x2b\x1a\1\0\0\0", 8) + std::string(8, '\xff'));
+  section.replace(0, 4, "\x0a\x0d\x0d\x0a");
+  const std::string interface = block(1, std::string("\1\0\0\0\0\0\0\0", 8));
+  // 1000002 us after 1970, on interface 0.
+  const std::string head("\0\0\0\0\0\0\0\0\x42\x42\x0f\0\x2e\0\0\0\x2e\0\0\0", 20);
+  const std::string file = section + interface + block(6, head + frame);
+  const auto datagrams = ReadPcap({file.begin(), file.end()}, "x");
+  ASSERT_EQ(datagrams.size(), 1u);
+  EXPECT_EQ(datagrams[0].port, 2368);
+  EXPECT_EQ(datagrams[0].utime, 1000002);
+  EXPECT_EQ(std::string(datagrams[0].payload.begin(), datagrams[0].payload.end()), "data");
+}
+
 TEST(LidarSource, UdpPacketsArriveAndAPortInUseIsRefused) {
   constexpr int kPort = 42368;
   const auto source = OpenPacketSource("udp", kPort);
@@ -160,9 +189,16 @@ TEST(LidarSource, UdpPacketsArriveAndAPortInUseIsRefused) {
   const Bytes sent = StreamPacket(0, 0.0, 0);
   ASSERT_EQ(sendto(fd, sent.data(), sent.size(), 0, reinterpret_cast<sockaddr*>(&to), sizeof to),
             static_cast<ssize_t>(sent.size()));
+  const auto now = [] {
+    const auto wall = std::chrono::system_clock::now().time_since_epoch();
+    return std::chrono::duration_cast<std::chrono::microseconds>(wall).count();
+  };
+  const int64_t sent_at = now();
   close(fd);
+  std::this_thread::sleep_for(std::chrono::milliseconds(200));  // nobody fetches it
   const auto got = source->Next();
   ASSERT_TRUE(got);
+  EXPECT_LT(std::llabs(got->capture_utime - sent_at), 100'000) << "it came when it came";
   EXPECT_TRUE(std::equal(sent.begin(), sent.end(), got->bytes.begin(), got->bytes.end()));
   try {
     OpenPacketSource("udp", kPort);

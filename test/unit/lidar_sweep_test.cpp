@@ -1,7 +1,8 @@
 #include <gtest/gtest.h>
 
+#include "common/math/clock_alignment.h"
 #include "lidar_packets.h"
-#include "services/lidar/clock_alignment.h"
+#include "services/lidar/gps_clock.h"
 #include "services/lidar/model_check.h"
 #include "services/lidar/sweep_assembler.h"
 
@@ -112,13 +113,13 @@ TEST(LidarModelCheck, TimingDecidesNotTheProductByte) {
 }
 
 TEST(LidarClockAlignment, LateArrivalsDoNotMoveTheClock) {
-  ClockAlignment clock;
+  math::ClockAlignment clock;
   for (int k = 0; k < 1000; ++k) clock.Add(k * 1327, 7'000'000 + k * 1327 + (k * 7919) % 9000);
   EXPECT_NEAR(static_cast<double>(clock.HostTime(0)), 7'000'000.0, 200.0);
 }
 
 TEST(LidarClockAlignment, ASlowSensorClockIsFollowed) {
-  ClockAlignment clock;
+  math::ClockAlignment clock;
   int64_t device = 0;
   for (int k = 0; k < 100000; ++k) {  // 50 ppm over 133 s
     device += 1327;
@@ -126,6 +127,57 @@ TEST(LidarClockAlignment, ASlowSensorClockIsFollowed) {
   }
   EXPECT_NEAR(static_cast<double>(clock.HostTime(device)),
               static_cast<double>(device + device / 20000), 10.0);
+}
+
+/// The sensor is switched off and on, or gets its time from a GPS.
+TEST(LidarClockAlignment, AClockThatWasSetIsFollowedAtOnce) {
+  for (const int64_t jump : {-3'000'000'000LL, 1'500'000'000LL}) {
+    math::ClockAlignment clock;
+    for (int k = 0; k < 1000; ++k) clock.Add(5'000'000'000 + 1327 * k, 9'000'000'000 + 1327 * k);
+    clock.Add(5'000'000'000 + jump, 9'100'000'000);
+    EXPECT_EQ(clock.HostTime(5'000'000'000 + jump), 9'100'000'000);
+    EXPECT_EQ(clock.restarts(), 1);
+  }
+}
+
+TEST(LidarSweeps, APauseMakesNoSweepOfTwoHalves) {
+  SweepAssembler assembler(LidarConfig{});
+  std::vector<Sweep> sweeps;
+  const auto feed = [&](int from, int to, uint32_t first_stamp) {
+    for (int k = from; k < to; ++k) {
+      const Bytes bytes = StreamPacket(k, 150.0, first_stamp);
+      for (Sweep& sweep : assembler.Add(bytes.data(), bytes.size())) sweeps.push_back(sweep);
+    }
+  };
+  feed(0, 110, 777'000);       // 1.46 turns
+  feed(110, 330, 20'777'000);  // 20 s later
+  EXPECT_EQ(assembler.lost(), 0) << "a pause is no loss";
+  EXPECT_EQ(assembler.broken_off(), 1);
+  ASSERT_GE(sweeps.size(), 2u);
+  for (const Sweep& sweep : sweeps) EXPECT_LT(sweep.points.back().t, 0.101);
+}
+
+/// Position packets say whether a GPS holds the clock; stamps count from the hour of UTC.
+TEST(LidarGpsClock, StampsAreTimeOfDayWhileThePulseIsLocked) {
+  constexpr int64_t kHour = 3'600'000'000, kNoon = 1'800'000'000LL * 1'000'000 / kHour * kHour;
+  std::array<uint8_t, 512> packet{};
+  GpsClock clock;
+  EXPECT_FALSE(clock.Utc(1'000, kNoon + 2'000));
+  EXPECT_NE(clock.Problem(kNoon).find("no position packet"), std::string::npos);
+  packet[202] = 1;
+  clock.Hear(packet.data(), packet.size(), kNoon);
+  EXPECT_FALSE(clock.Utc(1'000, kNoon + 2'000));
+  EXPECT_NE(clock.Problem(kNoon).find("not locked"), std::string::npos);
+  packet[202] = 2;
+  clock.Hear(packet.data(), packet.size() - 1, kNoon);  // not one
+  EXPECT_FALSE(clock.Utc(1'000, kNoon + 2'000));
+  clock.Hear(packet.data(), packet.size(), kNoon);
+  EXPECT_EQ(clock.Utc(1'000, kNoon + 2'000), kNoon + 1'000);
+  EXPECT_EQ(clock.Utc(7 * kHour + 1'000, kNoon + 2'000), kNoon + 1'000) << "unwrapped";
+  EXPECT_EQ(clock.Utc(kHour - 1'000, kNoon + 1'000), kNoon - 1'000) << "before the hour";
+  EXPECT_EQ(clock.Utc(1'000, kNoon - 500), kNoon + 1'000) << "after it";
+  EXPECT_FALSE(clock.Utc(1'000, kNoon + 700'000)) << "the host's clock is off";
+  EXPECT_FALSE(clock.Utc(1'000, kNoon + 6'000'000)) << "silent for 6 s";
 }
 
 }  // namespace

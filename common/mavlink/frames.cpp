@@ -1,8 +1,8 @@
-#include "services/fcu/frames.h"
+#include "common/mavlink/frames.h"
 
 #include <cmath>
 
-namespace chase::fcu {
+namespace chase::mavlink {
 
 Eigen::Vector3d SwapWorld(const Eigen::Vector3d& v) { return {v.y(), v.x(), -v.z()}; }
 
@@ -24,4 +24,4 @@ Eigen::Matrix3d WorldSwap() {
 
 Eigen::Matrix3d BodySwap() { return Eigen::Vector3d(1, -1, -1).asDiagonal(); }
 
-}  // namespace chase::fcu
+}  // namespace chase::mavlink

@@ -9,7 +9,7 @@
 #include <vector>
 
 /// Message signing of MAVLink 2 (mavlink.io/en/guide/message_signing.html).
-namespace chase::fcu {
+namespace chase::mavlink {
 
 inline constexpr std::size_t kSignatureBytes = 13;  // link, time (6), signature (6)
 
@@ -42,4 +42,4 @@ class Signing {
   std::map<std::tuple<uint8_t, uint8_t, uint8_t>, int64_t> heard_;  // by system, component, link
 };
 
-}  // namespace chase::fcu
+}  // namespace chase::mavlink

@@ -1,9 +1,9 @@
-#include "services/fcu/framing.h"
+#include "common/mavlink/framing.h"
 
 #include <algorithm>
 #include <iterator>
 
-namespace chase::fcu {
+namespace chase::mavlink {
 namespace {
 
 constexpr uint8_t kMagic1 = 0xFE, kMagic2 = 0xFD;
@@ -156,4 +156,4 @@ std::vector<uint8_t> FrameWriter::Write(int64_t utime, uint32_t id, const Payloa
   return frame;
 }
 
-}  // namespace chase::fcu
+}  // namespace chase::mavlink

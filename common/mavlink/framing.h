@@ -8,11 +8,11 @@
 #include <utility>
 #include <vector>
 
-#include "services/fcu/payload.h"
-#include "services/fcu/signing.h"
+#include "common/mavlink/payload.h"
+#include "common/mavlink/signing.h"
 
 /// Frames of MAVLink 1 and 2 (mavlink.io/en/guide/serialization.html).
-namespace chase::fcu {
+namespace chase::mavlink {
 
 /// One frame whose checksum holds, and its signature where the link is signed.
 struct Frame {
@@ -93,4 +93,4 @@ uint16_t FrameChecksum(const uint8_t* data, std::size_t size, uint8_t extra);
 /// CRC_EXTRA of a message; none: no definition has this id.
 std::optional<uint8_t> ChecksumExtra(uint32_t id);
 
-}  // namespace chase::fcu
+}  // namespace chase::mavlink

@@ -1,15 +1,18 @@
-#include "services/lidar/clock_alignment.h"
+#include "common/math/clock_alignment.h"
 
 #include <algorithm>
 
-namespace chase::lidar {
+namespace chase::math {
 namespace {
 constexpr double kCreepPerSecond = 1e-4;
-}
+constexpr int64_t kJump = 1'000'000;  // us
+}  // namespace
 
 void ClockAlignment::Add(int64_t device_us, int64_t arrival_utime) {
   const int64_t offset = arrival_utime - device_us;
-  if (!started_) {
+  const bool jumped = started_ && (offset > offset_us_ + kJump || offset < offset_us_ - kJump);
+  if (jumped) ++restarts_;
+  if (!started_ || jumped) {
     started_ = true;
     offset_us_ = offset;
   } else {
@@ -21,4 +24,4 @@ void ClockAlignment::Add(int64_t device_us, int64_t arrival_utime) {
   last_device_us_ = device_us;
 }
 
-}  // namespace chase::lidar
+}  // namespace chase::math

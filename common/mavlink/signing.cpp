@@ -1,10 +1,10 @@
-#include "services/fcu/signing.h"
+#include "common/mavlink/signing.h"
 
 #include <openssl/evp.h>
 
 #include <algorithm>
 
-namespace chase::fcu {
+namespace chase::mavlink {
 namespace {
 
 constexpr int64_t kEpoch = 1'420'070'400'000'000;  // 2015-01-01, microseconds since 1970
@@ -57,4 +57,4 @@ bool Signing::Accepts(int64_t utime, uint8_t system, uint8_t component, const ui
   return true;
 }
 
-}  // namespace chase::fcu
+}  // namespace chase::mavlink

@@ -8,11 +8,11 @@
 #include <string_view>
 #include <type_traits>
 
-#include "services/fcu/mavlink_messages.h"
+#include "common/mavlink/mavlink_messages.h"
 
 /// Messages to payload bytes and back (mavlink.io/en/guide/serialization.html): little endian, the
 /// fields in wire order without padding, which this host's own memory holds as they are.
-namespace chase::fcu {
+namespace chase::mavlink {
 
 static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__, "fields are copied as they lie in memory");
 
@@ -68,4 +68,4 @@ std::string_view Text(const std::array<char, N>& text) {
           static_cast<std::size_t>(std::find(text.begin(), text.end(), '\0') - text.begin())};
 }
 
-}  // namespace chase::fcu
+}  // namespace chase::mavlink

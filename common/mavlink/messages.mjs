@@ -1,4 +1,4 @@
-// Writes the C++ header with the messages that the bridge uses, from the definitions in the npm
+// Writes the C++ header with the messages that we use, from the definitions in the npm
 // package mavlink-mappings. Usage: node messages.mjs OUT.h
 import { writeFileSync } from 'node:fs'
 import { createRequire } from 'node:module'
@@ -18,7 +18,7 @@ let mappings
 try {
   mappings = createRequire(import.meta.url)('mavlink-mappings')
 } catch {
-  console.error('services/fcu: the npm package mavlink-mappings is missing; cure: deploy/setup')
+  console.error('common/mavlink: the npm package mavlink-mappings is missing; cure: deploy/setup')
   process.exit(1)
 }
 const dialects = [mappings.minimal, mappings.standard, mappings.common]
@@ -63,7 +63,7 @@ ${rows.map(([key, value]) => `  ${key} = ${value},`).join('\n')}
 const checksums = Object.entries(mappings.MSG_ID_MAGIC_NUMBER)
   .map(([id, extra]) => [Number(id), Number(extra)]).sort((a, b) => a[0] - b[0])
 
-writeFileSync(process.argv[2], `// Made by services/fcu/messages.mjs. Not to be edited.
+writeFileSync(process.argv[2], `// Made by common/mavlink/messages.mjs. Not to be edited.
 #pragma once
 
 #include <array>
@@ -71,7 +71,7 @@ writeFileSync(process.argv[2], `// Made by services/fcu/messages.mjs. Not to be 
 #include <cstdint>
 #include <tuple>
 
-namespace chase::fcu::mav {
+namespace chase::mavlink::mav {
 
 ${ENUMS.map(enumeration).join('\n')}
 enum class MavCmd : uint16_t {
@@ -79,7 +79,7 @@ ${COMMANDS.map(c => `  ${c} = ${mappings.common.MavCmd[c]},`).join('\n')}
 };
 
 ${MESSAGES.map(message).join('\n')}
-/// Every message of the bridge.
+/// Every message of ours.
 using AllMessages = std::tuple<${MESSAGES.map(pascal).join(', ')}>;
 
 struct Checksum {
@@ -91,5 +91,5 @@ inline constexpr Checksum kChecksums[] = {
 ${checksums.map(([id, extra]) => `    {${id}, ${extra}},`).join('\n')}
 };
 
-}  // namespace chase::fcu::mav
+}  // namespace chase::mavlink::mav
 `)

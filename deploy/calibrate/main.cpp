@@ -1,0 +1,170 @@
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <fstream>
+#include <opencv2/imgcodecs.hpp>
+#include <stdexcept>
+
+#include "common/config/version.h"
+#include "deploy/calibrate/pictures.h"
+#include "deploy/calibrate/rig_file.h"
+
+namespace chase::calibrate {
+namespace {
+
+constexpr double kWorstRms = 1.0;        // px: above it the model or the board's sizes are wrong
+constexpr double kDistortionGain = 1.5;  // rms without distortion over with it
+constexpr int kPrintedPx = 120;          // a square
+
+struct Arguments {
+  Board board;
+  std::string rig, out, check, log;
+  std::vector<std::string> pictures;
+};
+
+void Require(const std::string& problem) {
+  if (!problem.empty()) throw std::runtime_error(problem);
+}
+
+void WritePicture(const std::string& file, const cv::Mat& picture) {
+  if (picture.empty() || !cv::imwrite(file, picture))
+    throw std::runtime_error(file + ": cannot be written; name a .png in an existing folder");
+}
+
+RigFile LoadRig(const std::string& file) {
+  RigFile rig;
+  if (!file.empty()) config::Load(file, &rig);
+  return rig;
+}
+
+void WriteRig(const std::string& file, const RigFile& rig) {
+  std::ofstream out(file);
+  if (!(out << config::Dump(rig)))
+    throw std::runtime_error(file + ": cannot be written; name a .yaml in an existing folder");
+}
+
+int WriteBoard(const Arguments& a) {
+  Require(a.board.Problem());
+  WritePicture(a.out, a.board.Picture(kPrintedPx));
+  fmt::print("{}: print it so that a square measures {:g} m, and glue it onto something flat\n",
+             a.out, a.board.square);
+  return 0;
+}
+
+int Camera(const Arguments& a) {
+  Require(a.board.Problem());
+  RigFile rig = LoadRig(a.rig);
+  std::vector<View> views;
+  cv::Size size;
+  for (const std::string& file : a.pictures) {
+    const cv::Mat bgr = cv::imread(file, cv::IMREAD_COLOR);
+    if (bgr.empty()) throw std::runtime_error(file + ": no picture that OpenCV reads");
+    if (size.area() > 0 && bgr.size() != size)
+      throw std::runtime_error(
+          fmt::format("{}: {} x {} px, the pictures before {} x {}; give those "
+                      "of one camera",
+                      file, bgr.cols, bgr.rows, size.width, size.height));
+    size = bgr.size();
+    views.push_back(FindBoard(bgr, a.board));
+    fmt::print("{}: {} of {} corners\n", file, views.back().ids.size(), a.board.corners());
+  }
+  const CameraFit fit = FitCamera(views, size);
+  Require(fit.problem);
+  rig.rig.width_px = size.width, rig.rig.height_px = size.height;
+  rig.rig.focal_px = fit.focal_px;
+  rig.rig.center_u_px = fit.center_u_px, rig.rig.center_v_px = fit.center_v_px;
+  WriteRig(a.out, rig);
+  WritePicture(a.check, CameraPicture(views, fit, size));
+  fmt::print(
+      "focal length {:.2f} +- {:.2f} px, centre {:.2f} {:.2f} +- {:.2f} px, corners {:.2f} px "
+      "off ({:.2f} px with distortion)\n{}\n{}\n",
+      fit.focal_px, fit.focal_sigma, fit.center_u_px, fit.center_v_px, fit.center_sigma, fit.rms_px,
+      fit.distorted_rms_px, a.out, a.check);
+  if (fit.rms_px > kDistortionGain * fit.distorted_rms_px && fit.rms_px > 0.3)
+    fmt::print(
+        "warning: the lens bends lines, and no process undistorts; take one that does not\n");
+  if (fit.rms_px > kWorstRms)
+    throw std::runtime_error(fmt::format(
+        "the corners are {:.2f} px off, more than {:g}: check --square, --marker and the board's "
+        "flatness, and leave blurred pictures out",
+        fit.rms_px, kWorstRms));
+  return 0;
+}
+
+int Lidar(const Arguments& a) {
+  Require(a.board.Problem());
+  RigFile rig = LoadRig(a.rig);
+  const Eigen::Isometry3d before = LidarInCamera(rig.rig);
+  const Sightings sightings = ReadSightings(a.log, a.board, rig.rig);
+  fmt::print("{} images, {} show the board, {} sweeps; it stood still {} times\n", sightings.images,
+             sightings.seen, sightings.sweeps, sightings.planes.size());
+  const LidarFit fit = FitLidar(sightings.planes, before);
+  Require(fit.problem);
+  rig.rig = WithLidar(rig.rig, fit.X_CL);
+  WriteRig(a.out, rig);
+  WritePicture(a.check, LidarPicture(sightings, fit, before, rig.rig));
+  const Eigen::Vector3d& p = rig.rig.lidar_position;
+  const Eigen::Vector3d& r = rig.rig.lidar_rpy_deg;
+  fmt::print(
+      "lidar at {:.3f} {:.3f} {:.3f} m, {:.2f} {:.2f} {:.2f} degrees; points {:.1f} mm off "
+      "their planes; sigmas {:.1f} mm, {:.2f} degrees at most\n{}\n{}\n",
+      p.x(), p.y(), p.z(), r.x(), r.y(), r.z(), 1e3 * fit.rms, 1e3 * fit.position_sigma.maxCoeff(),
+      fit.rotation_sigma.maxCoeff() * 180.0 / M_PI, a.out, a.check);
+  return 0;
+}
+
+void AddBoard(CLI::App* app, Board* board) {
+  app->add_option("--columns", board->columns, "squares along the board")->capture_default_str();
+  app->add_option("--rows", board->rows, "squares across")->capture_default_str();
+  app->add_option("--square", board->square, "edge of a square as printed, m")
+      ->capture_default_str();
+  app->add_option("--marker", board->marker, "edge of a marker as printed, m")
+      ->capture_default_str();
+}
+
+void AddOutputs(CLI::App* app, Arguments* a) {
+  app->add_option("--rig", a->rig, "YAML file with the rig so far (default: built in)");
+  app->add_option("--out", a->out, "YAML file to write, for every service's --config")
+      ->capture_default_str();
+  app->add_option("--check", a->check, "picture to look at")->capture_default_str();
+}
+
+int Run(int argc, char** argv) {
+  CLI::App app("Calibrates the camera, and the LiDAR's place to it, with a ChArUco board.",
+               "chase-calibrate");
+  chase::config::AddVersion(&app);
+  app.require_subcommand(1);
+  Arguments board, camera, lidar;
+  board.out = "board.png";
+  camera.out = lidar.out = "rig.yaml";
+  camera.check = "check-camera.png";
+  lidar.check = "check-lidar.png";
+  CLI::App* b = app.add_subcommand("board", "Writes the board to print.");
+  AddBoard(b, &board.board);
+  b->add_option("--out", board.out, "picture to write")->capture_default_str();
+  CLI::App* c = app.add_subcommand("camera", "Focal length and centre from pictures of the board.");
+  c->add_option("pictures", camera.pictures, "of the size that chase-camera publishes")->required();
+  AddBoard(c, &camera.board);
+  AddOutputs(c, &camera);
+  CLI::App* l = app.add_subcommand("lidar", "Pose of the LiDAR from a log with the board.");
+  l->add_option("log", lidar.log, "LCM log with CAMERA_IMAGE and LIDAR_SCAN")->required();
+  AddBoard(l, &lidar.board);
+  AddOutputs(l, &lidar);
+  try {
+    app.parse(argc, argv);
+    return b->parsed() ? WriteBoard(board) : c->parsed() ? Camera(camera) : Lidar(lidar);
+  } catch (const CLI::Success& e) {  // --help
+    return app.exit(e);
+  } catch (const CLI::ParseError& e) {
+    fmt::print(stderr, "chase-calibrate: {}; see chase-calibrate --help\n", e.what());
+  } catch (const std::exception& e) {
+    fmt::print(stderr, "chase-calibrate: {}\n", e.what());
+  }
+  return 1;
+}
+
+}  // namespace
+}  // namespace chase::calibrate
+
+int main(int argc, char** argv) { return chase::calibrate::Run(argc, argv); }

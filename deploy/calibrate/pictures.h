@@ -1,0 +1,22 @@
+#pragma once
+
+#include <opencv2/core.hpp>
+#include <vector>
+
+#include "deploy/calibrate/board.h"
+#include "deploy/calibrate/camera_fit.h"
+#include "deploy/calibrate/lidar_fit.h"
+#include "deploy/calibrate/sightings.h"
+
+namespace chase::calibrate {
+
+/// Every corner of every view where it was found, with its error drawn 20 times: arrows that point
+/// alike in one part of the picture are distortion, empty parts were never looked at.
+cv::Mat CameraPicture(const std::vector<View>& views, const CameraFit& fit, cv::Size size);
+
+/// Each frame with the points that the fit used, by the pose found (green) and by the one before
+/// (red): green has to lie on the board.
+cv::Mat LidarPicture(const Sightings& sightings, const LidarFit& fit,
+                     const Eigen::Isometry3d& before, const world::Rig& rig);
+
+}  // namespace chase::calibrate

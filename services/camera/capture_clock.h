@@ -1,0 +1,24 @@
+#pragma once
+
+#include <cstdint>
+
+#include "common/math/clock_alignment.h"
+
+namespace chase::camera {
+
+/// When frames were captured, on the bus's clock. A stamp that claims to be of a clock of this host
+/// is believed while the frame's age by it is possible; any other clock is aligned by the smallest
+/// delay seen. Microseconds.
+class CaptureClock {
+ public:
+  /// `stamp` as on the bus's clock where `of_host`, else on the device's own.
+  int64_t HostTime(int64_t stamp, bool of_host, int64_t arrival);
+  /// Was the last stamp of the host's clock believed?
+  bool believed() const { return believed_; }
+
+ private:
+  math::ClockAlignment alignment_;
+  bool believed_ = false;
+};
+
+}  // namespace chase::camera

@@ -1,0 +1,386 @@
+#include "services/simulator/px4.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "common/math/rotation.h"
+#include "common/mavlink/frames.h"
+
+namespace chase::simulator {
+namespace {
+
+using Eigen::Vector3d;
+using mavlink::Mode;
+namespace mav = mavlink::mav;
+
+constexpr int64_t kBoot = 12'345'678;  // us
+constexpr double kGravity = 9.81;
+constexpr double kStreamBefore = 1.0;  // s of setpoints before OFFBOARD
+constexpr double kSlowest = 0.5;       // s between setpoints of a stream: 2 Hz
+constexpr double kStill = 0.5;         // s after which it takes itself to have landed
+// MPC_XY_P, MPC_XY_VEL_P_ACC, MPC_Z_P, MPC_Z_VEL_P_ACC, MPC_LAND_SPEED, and bounds.
+constexpr double kPositionGain = 0.95, kVelocityGain = 1.8, kHeightGain = 1.0, kClimbGain = 4.0;
+constexpr double kLandSpeed = 0.7, kMostSpeed = 2.0, kMostPush = 3.0;
+constexpr int64_t kOffsetMemory = 8;  // answers of TIMESYNC over which the offset is averaged
+
+double Seconds(int64_t from, int64_t to) { return 1e-6 * static_cast<double>(to - from); }
+uint8_t Code(mav::MavResult r) { return static_cast<uint8_t>(r); }
+
+/// No longer than `limit`.
+Vector3d Shortened(const Vector3d& v, double limit) {
+  return v.norm() > limit ? Vector3d(v * (limit / v.norm())) : v;
+}
+
+}  // namespace
+
+Px4::Px4(const Px4Options& options, int64_t utime, uint64_t seed)
+    : options_(options),
+      random_(seed),
+      version_2_(!options.starts_in_version_1),
+      boot_(utime - kBoot),
+      now_(utime),
+      mode_(mavlink::kPositionMode),
+      intended_(mavlink::kPositionMode) {
+  // Rates of a companion link before anything is asked for.
+  intervals_ = {{mav::Heartbeat::kId, 1'000'000},
+                {mav::HighresImu::kId, 20'000},
+                {mav::AttitudeQuaternion::kId, 20'000},
+                {mav::LocalPositionNed::kId, 100'000},
+                {mav::ExtendedSysState::kId, 1'000'000},
+                {mav::SysStatus::kId, 1'000'000},
+                {mav::Timesync::kId, 100'000}};
+}
+
+int64_t Px4::Clock(int64_t utime) const {
+  const int64_t since = utime - boot_;
+  return since + static_cast<int64_t>(1e-6 * options_.drift_ppm * static_cast<double>(since));
+}
+
+std::optional<int64_t> Px4::HostTime(int64_t companion_us) const {
+  if (!companion_offset_) return std::nullopt;
+  const auto own = static_cast<double>(companion_us - *companion_offset_);
+  return boot_ + static_cast<int64_t>(own / (1.0 + 1e-6 * options_.drift_ppm));
+}
+
+template <class M>
+void Px4::Send(const M& message) {
+  if (version_2_ || M::kId > 255) {
+    outgoing_.push_back(writer_.Write(now_, message));
+    return;
+  }
+  const mavlink::Payload payload = mavlink::ToPayload(message);
+  Bytes frame(6 + M::kBaseLength);  // MAVLink 1: whole, without extensions
+  frame[0] = 0xFE;
+  frame[1] = static_cast<uint8_t>(M::kBaseLength);
+  frame[2] = sequence_1_++, frame[3] = 1, frame[4] = 1, frame[5] = static_cast<uint8_t>(M::kId);
+  std::copy_n(payload.bytes.begin(), M::kBaseLength, frame.begin() + 6);
+  const uint16_t crc = mavlink::FrameChecksum(frame.data() + 1, frame.size() - 1,
+                                              mavlink::ChecksumExtra(M::kId).value());
+  frame.push_back(static_cast<uint8_t>(crc));
+  frame.push_back(static_cast<uint8_t>(crc >> 8));
+  outgoing_.push_back(frame);
+}
+
+void Px4::Say(const std::string& text, uint8_t severity) {
+  mav::Statustext m;
+  m.severity = severity;
+  m.id = text.size() > m.text.size() ? static_cast<uint16_t>(1 + random_.Next() % 65535) : 0;
+  for (std::size_t at = 0; at == 0 || at < text.size(); at += m.text.size()) {
+    m.text.fill('\0');
+    std::copy_n(text.begin() + static_cast<std::ptrdiff_t>(at),
+                std::min(m.text.size(), text.size() - at), m.text.begin());
+    Send(m);
+    ++m.chunk_seq;
+  }
+}
+
+void Px4::Receive(int64_t clock, const Bytes& bytes) {
+  reader_.Add(clock, bytes.data(), bytes.size(),
+              [&](const mavlink::Frame& frame) { OnFrame(frame, clock); });
+  reader_.Reset();
+}
+
+void Px4::OnFrame(const mavlink::Frame& frame, int64_t clock) {
+  if (frame.version == 2) version_2_ = true;
+  if (mavlink::As<mav::Heartbeat>(frame)) ++seen_.heartbeats;
+  if (const auto m = mavlink::As<mav::CommandLong>(frame)) OnCommand(*m, frame);
+  if (const auto m = mavlink::As<mav::Odometry>(frame)) {
+    ++seen_.odometry;
+    seen_.vision = *m;
+    if (m->estimator_type == 7) Say("ODOMETRY: estimator_type 7 unsupported", 2);
+  }
+  if (const auto m = mavlink::As<mav::Timesync>(frame)) OnTimesync(*m, clock);
+  if (const auto m = mavlink::As<mav::SetAttitudeTarget>(frame)) OnSetpoint(*m);
+}
+
+void Px4::OnSetpoint(const mav::SetAttitudeTarget& m) {
+  if (m.target_system != 1 && m.target_system != 0) return;
+  ++seen_.setpoints;
+  if (!(mode_ == mavlink::kOffboardMode)) ++seen_.setpoints_while_not_offboard;
+  if (Seconds(last_setpoint_, now_) > kSlowest) first_setpoint_ = now_;
+  last_setpoint_ = now_;
+  seen_.setpoint = m;
+}
+
+void Px4::OnTimesync(const mav::Timesync& m, int64_t clock) {
+  ++seen_.timesync;
+  const int64_t own = Clock(clock);
+  if (m.tc1 == 0) return Send(mav::Timesync{1000 * own, m.ts1, 0, 0});
+  const int64_t offset = m.tc1 / 1000 - (m.ts1 / 1000 + own) / 2;
+  seen_.clock_errors.push_back(1e-6 * static_cast<double>((clock - own) - offset));
+  if (!companion_offset_ || std::llabs(offset - *companion_offset_) > 100'000)
+    companion_offset_ = offset;
+  *companion_offset_ += (offset - *companion_offset_) / kOffsetMemory;
+}
+
+bool Px4::StreamAlive() const {
+  return last_setpoint_ != 0 && Seconds(last_setpoint_, now_) <= options_.com_of_loss_t;
+}
+
+bool Px4::Streamed() const {
+  return StreamAlive() && Seconds(first_setpoint_, now_) >= kStreamBefore;
+}
+
+void Px4::OnCommand(const mav::CommandLong& m, const mavlink::Frame& frame) {
+  if (m.target_system != 1 || m.target_component != 1) return;
+  ++seen_.commands;
+  mav::CommandAck ack;
+  ack.command = m.command;
+  ack.result = Handle(m);
+  ack.target_system = frame.system;
+  ack.target_component = frame.component;
+  if (random_.Uniform() >= options_.lost_acks) Send(ack);
+}
+
+uint8_t Px4::Handle(const mav::CommandLong& m) {
+  switch (static_cast<mav::MavCmd>(m.command)) {
+    case mav::MavCmd::DO_SET_MODE:
+      return SetMode({static_cast<uint8_t>(m.param2), static_cast<uint8_t>(m.param3)});
+    case mav::MavCmd::COMPONENT_ARM_DISARM:
+      return Arm(m.param1 > 0.5f);
+    case mav::MavCmd::SET_MESSAGE_INTERVAL:
+      return SetInterval(m);
+  }
+  return Code(mav::MavResult::UNSUPPORTED);
+}
+
+uint8_t Px4::SetInterval(const mav::CommandLong& m) {
+  const auto id = static_cast<uint32_t>(m.param1);
+  if (id == mav::RcChannels::kId) return Code(mav::MavResult::FAILED);  // it has no receiver
+  intervals_[id] = static_cast<int64_t>(m.param2);
+  seen_.rates[id] = 1e6 / static_cast<double>(m.param2);
+  return Code(mav::MavResult::ACCEPTED);
+}
+
+// The switch succeeds without a stream while disarmed: arming is what is then refused.
+uint8_t Px4::SetMode(Mode mode) {
+  if (mode == mavlink::kOffboardMode) {
+    ++seen_.offboard_commands;
+    if (options_.refuses_offboard) return Code(mav::MavResult::DENIED);
+    if (armed_ && !Streamed()) {
+      Say("Switching to mode 'Offboard' is currently not possible: no offboard signal", 4);
+      return Code(mav::MavResult::TEMPORARILY_REJECTED);
+    }
+  }
+  Enter(mode);
+  return Code(mav::MavResult::ACCEPTED);
+}
+
+void Px4::Enter(Mode mode) {
+  mode_ = intended_ = mode;
+  failsafe_ = false;
+  hold_ = body_.p_WB;
+  hold_yaw_ = math::Yaw(body_.R_WB);
+}
+
+uint8_t Px4::Arm(bool on) {
+  if (on == armed_) return Code(mav::MavResult::ACCEPTED);
+  if (!on) {
+    if (!landed_) {
+      Say("Disarming denied: not landed", 2);
+      return Code(mav::MavResult::TEMPORARILY_REJECTED);
+    }
+    armed_ = false;
+    return Code(mav::MavResult::ACCEPTED);
+  }
+  if (options_.refuses_to_arm) return Code(mav::MavResult::DENIED);
+  const bool streams = !(mode_ == mavlink::kOffboardMode) || Streamed();
+  const std::string problem = !options_.preflight.empty()                ? options_.preflight
+                              : body_.charge <= options_.bat_emergen_thr ? "low battery"
+                              : !streams                                 ? "no offboard signal"
+                                                                         : "";
+  if (!problem.empty()) {
+    Say("Arming denied: " + problem, 2);
+    return Code(mav::MavResult::TEMPORARILY_REJECTED);
+  }
+  armed_ = true;
+  has_flown_ = drained_ = false;
+  ++seen_.times_armed;
+  return Code(mav::MavResult::ACCEPTED);
+}
+
+void Px4::Reboot(int64_t utime) {
+  boot_ = utime;
+  mode_ = intended_ = mavlink::kPositionMode;
+  armed_ = failsafe_ = false;
+  first_setpoint_ = last_setpoint_ = 0;
+  version_2_ = !options_.starts_in_version_1;
+  writer_ = mavlink::FrameWriter(1, 1);
+  next_.clear();
+}
+
+void Px4::WatchStream() {
+  if (!armed_ || drained_ || !(intended_ == mavlink::kOffboardMode)) return;
+  const bool lost = !StreamAlive();
+  if (lost && !failsafe_) {
+    Enter(options_.loss_lands ? mavlink::kLandMode : mavlink::kHoldMode);
+    intended_ = mavlink::kOffboardMode;  // it returns by itself when the stream does
+    Say("No offboard signal, failsafe", 1);
+  }
+  if (!lost) mode_ = mavlink::kOffboardMode;
+  failsafe_ = lost;
+}
+
+void Px4::WatchBattery() {
+  if (!armed_ || drained_ || body_.charge > options_.bat_emergen_thr) return;
+  Enter(mavlink::kLandMode);
+  drained_ = failsafe_ = true;
+  Say("Emergency battery level, land immediately", 0);
+}
+
+void Px4::WatchLanding() {
+  const bool still = body_.touches && body_.thrust < kGravity;
+  if (!still) down_since_ = now_;
+  landed_ = !armed_ || Seconds(down_since_, now_) > kStill;
+  if (!landed_) landed_since_ = now_, has_flown_ = has_flown_ || !body_.touches;
+  if (armed_ && landed_ && has_flown_ && Seconds(landed_since_, now_) > options_.com_disarm_land)
+    armed_ = false;
+}
+
+void Px4::Tick(int64_t utime, int64_t clock, const Px4Body& body) {
+  now_ = std::max(now_, utime);
+  body_ = body;
+  WatchStream();
+  WatchBattery();
+  if (!armed_) failsafe_ = false;
+  WatchLanding();
+  Stream(clock);
+}
+
+Px4Demand Px4::Demand(const Px4Body& body) const {
+  if (!armed_) return {};
+  return mode_ == mavlink::kOffboardMode && seen_.setpoint ? OffboardDemand(body) : OwnDemand(body);
+}
+
+Px4Demand Px4::OffboardDemand(const Px4Body& body) const {
+  const mav::SetAttitudeTarget& m = *seen_.setpoint;
+  Px4Demand demand;
+  demand.motors = true;
+  demand.thrust = kGravity * static_cast<double>(m.thrust) / options_.hover;
+  const auto ignored = static_cast<uint8_t>(mav::AttitudeTargetTypemask::ATTITUDE_IGNORE);
+  if ((m.type_mask & ignored) != 0) {  // body rates: no attitude error is left to mend
+    demand.R_WB = body.R_WB;
+    demand.rate = mavlink::SwapBody({m.body_roll_rate, m.body_pitch_rate, m.body_yaw_rate});
+    return demand;
+  }
+  demand.R_WB = mavlink::SwapFrames(Eigen::Quaterniond(m.q[0], m.q[1], m.q[2], m.q[3]));
+  // The rate of yaw counts about the vertical of the earth frame.
+  demand.rate = demand.R_WB.conjugate() * mavlink::SwapWorld({0.0, 0.0, m.body_yaw_rate});
+  return demand;
+}
+
+/// Its own modes: it stays where they began, or sinks. On the ground the motors idle.
+Px4Demand Px4::OwnDemand(const Px4Body& body) const {
+  Px4Demand demand;
+  demand.motors = true;
+  demand.R_WB = math::FromYaw(hold_yaw_);
+  if (body.touches) return demand;
+  Vector3d away = hold_ - body.p_WB;
+  const double height = away.z();
+  away.z() = 0.0;
+  Vector3d wanted = Shortened(kPositionGain * away, kMostSpeed);
+  wanted.z() = mode_ == mavlink::kLandMode
+                   ? -kLandSpeed
+                   : std::clamp(kHeightGain * height, -kLandSpeed, kLandSpeed);
+  Vector3d push = kVelocityGain * (wanted - body.v_WB);
+  push.z() = 0.0;
+  push = Shortened(push, kMostPush);
+  push.z() = body.hover_thrust + kClimbGain * (wanted.z() - body.v_WB.z());
+  push.z() = std::max(push.z(), 0.3 * kGravity);
+  demand.R_WB = math::FromZAxisAndYaw(push, hold_yaw_);
+  demand.thrust = push.norm();
+  return demand;
+}
+
+bool Px4::Due(uint32_t id) {
+  const auto interval = intervals_.find(id);
+  if (interval == intervals_.end()) return false;
+  int64_t& next = next_[id];
+  if (now_ < next) return false;
+  next = std::max(next + interval->second, now_ - interval->second);
+  return true;
+}
+
+void Px4::Stream(int64_t clock) {
+  const int64_t own = Clock(now_);
+  const auto ms = static_cast<uint32_t>(own / 1000);
+  if (Due(mav::Timesync::kId)) Send(mav::Timesync{0, 1000 * Clock(clock), 0, 0});
+  if (Due(mav::HighresImu::kId)) {
+    const Eigen::Vector3f f = mavlink::SwapBody(body_.accel).cast<float>();
+    const Eigen::Vector3f w = mavlink::SwapBody(body_.gyro).cast<float>();
+    mav::HighresImu m;
+    m.time_usec = static_cast<uint64_t>(own);
+    m.xacc = f.x(), m.yacc = f.y(), m.zacc = f.z();
+    m.xgyro = w.x(), m.ygyro = w.y(), m.zgyro = w.z();
+    m.fields_updated = 0x3F;
+    Send(m);
+  }
+  if (Due(mav::AttitudeQuaternion::kId)) {
+    const Eigen::Quaternionf q = mavlink::SwapFrames(body_.R_WB).cast<float>();
+    mav::AttitudeQuaternion m;
+    m.time_boot_ms = ms;
+    m.q1 = q.w(), m.q2 = q.x(), m.q3 = q.y(), m.q4 = q.z();
+    Send(m);
+  }
+  if (Due(mav::LocalPositionNed::kId)) {
+    const Eigen::Vector3f p = mavlink::SwapWorld(body_.p_WB).cast<float>();
+    const Eigen::Vector3f v = mavlink::SwapWorld(body_.v_WB).cast<float>();
+    Send(mav::LocalPositionNed{ms, p.x(), p.y(), p.z(), v.x(), v.y(), v.z()});
+  }
+  StreamState();
+}
+
+void Px4::StreamState() {
+  if (Due(mav::Heartbeat::kId)) {
+    const auto state = !armed_     ? mav::MavState::STANDBY
+                       : failsafe_ ? mav::MavState::CRITICAL
+                                   : mav::MavState::ACTIVE;
+    mav::Heartbeat m;
+    m.type = static_cast<uint8_t>(mav::MavType::QUADROTOR);
+    m.autopilot = static_cast<uint8_t>(options_.autopilot);
+    m.custom_mode = mode_.custom_mode();
+    m.base_mode = static_cast<uint8_t>(1 | (armed_ ? 128 : 0));
+    m.system_status = static_cast<uint8_t>(state);
+    m.mavlink_version = 3;
+    Send(m);
+  }
+  if (Due(mav::ExtendedSysState::kId))
+    Send(mav::ExtendedSysState{0, static_cast<uint8_t>(landed_ ? 1 : 2)});
+  const auto percent = static_cast<int8_t>(std::floor(100.0 * body_.charge + 1e-9));
+  if (Due(mav::SysStatus::kId)) {
+    mav::SysStatus m;
+    m.voltage_battery = static_cast<uint16_t>(14'000.0 + 2'800.0 * body_.charge);  // four cells
+    m.battery_remaining = percent;
+    Send(m);
+  }
+  if (Due(mav::BatteryStatus::kId)) {
+    mav::BatteryStatus m;
+    m.battery_remaining = percent;
+    Send(m);
+  }
+}
+
+std::vector<Px4::Bytes> Px4::TakeOutgoing() { return std::exchange(outgoing_, {}); }
+
+}  // namespace chase::simulator

@@ -1,0 +1,138 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/mavlink/framing.h"
+#include "common/mavlink/px4_mode.h"
+#include "common/world/random.h"
+
+namespace chase::simulator {
+
+/// Parameters of PX4 by their own names, and what a test may break.
+struct Px4Options {
+  double com_of_loss_t = 1.0;       ///< s without setpoints until OFFBOARD is left
+  double com_disarm_land = 2.0;     ///< s on the ground after landing until it disarms
+  bool loss_lands = true;           ///< COM_OBL_RC_ACT: land, otherwise hold
+  double hover = 0.5;               ///< share of full thrust that balances gravity
+  double bat_emergen_thr = 0.05;    ///< charge at which it lands
+  double lost_acks = 0.0;           ///< probability
+  bool starts_in_version_1 = true;  ///< of the protocol, until it hears version 2
+  double drift_ppm = 30.0;          ///< of its clock
+  std::string preflight;            ///< a check that fails; empty: none
+  bool refuses_offboard = false, refuses_to_arm = false;  ///< with DENIED
+  int autopilot = 12;                                     ///< MAV_AUTOPILOT of its heartbeat
+};
+
+/// What it knows of the body that it flies; W is its own world frame, with z up.
+struct Px4Body {
+  Eigen::Vector3d p_WB = Eigen::Vector3d::Zero(), v_WB = Eigen::Vector3d::Zero();  ///< m, m/s
+  Eigen::Quaterniond R_WB = Eigen::Quaterniond::Identity();
+  Eigen::Vector3d accel = {0.0, 0.0, 9.81};        ///< specific force measured, frame B, m/s^2
+  Eigen::Vector3d gyro = Eigen::Vector3d::Zero();  ///< measured, frame B, rad/s
+  bool touches = true;                             ///< the ground
+  double thrust = 0.0;                             ///< over mass, m/s^2
+  double hover_thrust = 9.81;                      ///< asked for, that balances gravity, m/s^2
+  double charge = 0.8;                             ///< of the battery, 0 to 1
+};
+
+/// What it asks of its inner loops.
+struct Px4Demand {
+  bool motors = false;
+  Eigen::Quaterniond R_WB = Eigen::Quaterniond::Identity();
+  Eigen::Vector3d rate = Eigen::Vector3d::Zero();  ///< feed-forward, in the wanted B, rad/s
+  double thrust = 0.0;                             ///< over mass, m/s^2
+};
+
+/// PX4 as its documents describe it and as a real one was measured: OFFBOARD, arming, refusals,
+/// failsafes, streams, clocks (docs.px4.io: Offboard Mode, Safety; mavlink.io: Command, Timesync).
+/// Knows no socket and no clock: times are the host's, microseconds; its own clock began kBoot
+/// before the first one.
+class Px4 {
+ public:
+  using Bytes = std::vector<uint8_t>;
+
+  Px4(const Px4Options& options, int64_t utime, uint64_t seed);
+
+  /// A datagram looked at when the host's clock says `clock`.
+  void Receive(int64_t clock, const Bytes& bytes);
+  /// Applies the rules and sends what is due; times must not fall. `clock`: the host's, which a
+  /// busy simulation's `utime` lags behind.
+  void Tick(int64_t utime, int64_t clock, const Px4Body& body);
+  std::vector<Bytes> TakeOutgoing();
+  Px4Demand Demand(const Px4Body& body) const;
+
+  void PilotMode(mavlink::Mode mode) { Enter(mode); }
+  void PilotArms(bool on) { armed_ = on; }
+  void Reboot(int64_t utime);
+  Px4Options& options() { return options_; }
+
+  bool armed() const { return armed_; }
+  bool failsafe() const { return failsafe_; }
+  mavlink::Mode mode() const { return mode_; }
+  bool landed() const { return landed_; }
+  int64_t Clock(int64_t utime) const;  ///< its own, microseconds
+  /// The host's time of a companion's stamp, by TIMESYNC; none: not known yet.
+  std::optional<int64_t> HostTime(int64_t companion_us) const;
+
+  /// What came in.
+  struct Seen {
+    int heartbeats = 0, setpoints = 0, odometry = 0, commands = 0, timesync = 0;
+    int setpoints_while_not_offboard = 0;
+    int times_armed = 0, offboard_commands = 0;
+    std::optional<mavlink::mav::SetAttitudeTarget> setpoint;
+    std::optional<mavlink::mav::Odometry> vision;
+    std::vector<double> clock_errors;  ///< s, of the host's clock as this side of TIMESYNC sees it
+    std::map<uint32_t, double> rates;  ///< asked for, Hz
+  };
+  const Seen& seen() const { return seen_; }
+
+ private:
+  void OnFrame(const mavlink::Frame& frame, int64_t clock);
+  void OnSetpoint(const mavlink::mav::SetAttitudeTarget& m);
+  void OnTimesync(const mavlink::mav::Timesync& m, int64_t clock);
+  void OnCommand(const mavlink::mav::CommandLong& m, const mavlink::Frame& frame);
+  uint8_t Handle(const mavlink::mav::CommandLong& m);
+  uint8_t SetInterval(const mavlink::mav::CommandLong& m);
+  uint8_t SetMode(mavlink::Mode mode);
+  uint8_t Arm(bool on);
+  void Enter(mavlink::Mode mode);
+  bool Streamed() const;
+  bool StreamAlive() const;
+  void WatchStream();
+  void WatchBattery();
+  void WatchLanding();
+  Px4Demand OffboardDemand(const Px4Body& body) const;
+  Px4Demand OwnDemand(const Px4Body& body) const;
+  void Stream(int64_t clock);
+  void StreamState();
+  bool Due(uint32_t id);
+  template <class M>
+  void Send(const M& message);
+  void Say(const std::string& text, uint8_t severity);
+
+  Px4Options options_;
+  world::Random random_;
+  mavlink::FrameReader reader_;
+  mavlink::FrameWriter writer_{1, 1};
+  uint8_t sequence_1_ = 0;
+  bool version_2_;
+  int64_t boot_, now_;
+  std::optional<int64_t> companion_offset_;  // its clock minus ours, us
+  mavlink::Mode mode_, intended_;
+  bool armed_ = false, failsafe_ = false, landed_ = true, has_flown_ = false, drained_ = false;
+  int64_t first_setpoint_ = 0, last_setpoint_ = 0, landed_since_ = 0, down_since_ = 0;
+  Px4Body body_;
+  Eigen::Vector3d hold_ = Eigen::Vector3d::Zero();  // where its own modes stay
+  double hold_yaw_ = 0.0;
+  std::map<uint32_t, int64_t> next_;       // of each stream
+  std::map<uint32_t, int64_t> intervals_;  // us
+  std::vector<Bytes> outgoing_;
+  Seen seen_;
+};
+
+}  // namespace chase::simulator

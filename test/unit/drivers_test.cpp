@@ -1,0 +1,217 @@
+// The simulator's devices against the drivers that read them, in one process.
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <thread>
+
+#include "../fcu/firing_order.h"
+#include "common/world/scenario.h"
+#include "services/camera/capture_clock.h"
+#include "services/camera/frame_source.h"
+#include "services/camera/grabber.h"
+#include "services/lidar/sweep_assembler.h"
+#include "services/simulator/mjpeg_server.h"
+#include "services/simulator/simulator.h"
+#include "services/simulator/vision_frame.h"
+
+namespace chase {
+namespace {
+
+constexpr int kPort = 38090;
+
+simulator::Output Step(simulator::Simulator* simulator, long tick) {
+  simulator::AttitudeSetpoint up;
+  up.orientation =
+      Eigen::Quaterniond(Eigen::AngleAxisd(0.1, Eigen::Vector3d(1, 1, 1).normalized()));
+  up.thrust = 11.0;
+  up.body_rate = {0.3, -0.2, 0.5};
+  simulator->SetSetpoint(up, 0.005 * static_cast<double>(tick));
+  return simulator->Advance(0.005 * static_cast<double>(tick));
+}
+
+/// In flight, turning: what the driver makes of the packets is what was measured.
+TEST(Drivers, CloudsFromPacketsAreTheSensorsOwn) {
+  simulator::SimulatorConfig config;
+  config.lidar.packets = true;
+  config.camera.rate = 0.0;
+  const auto scenario =
+      world::LoadScenario(std::string(CHASE_SOURCE_DIR) + "/deploy/scenarios/gym.yaml");
+  simulator::Simulator simulator(scenario, config);
+  lidar::SweepAssembler assembler(lidar::LidarConfig{});
+  std::vector<simulator::Sweep> direct;
+  std::vector<lidar::Sweep> decoded;
+  for (long tick = 0; tick < 160; ++tick) {
+    simulator::Output output = Step(&simulator, tick);
+    if (output.sweep) direct.push_back(std::move(*output.sweep));
+    for (simulator::DataPacket& packet : output.packets) {
+      packet.SetStamp(3'599'700'000 + std::llround(1e6 * packet.start));  // wraps on its way
+      for (auto& sweep : assembler.Add(packet.bytes.data(), packet.bytes.size()))
+        decoded.push_back(std::move(sweep));
+    }
+  }
+  ASSERT_GE(decoded.size(), 6u);
+  EXPECT_EQ(assembler.lost(), 0);
+  EXPECT_EQ(assembler.malformed(), 0);
+  double worst = 0.0, worst_time = 0.0;
+  for (std::size_t k = 0; k < decoded.size(); ++k) {
+    const simulator::Sweep& a = direct[k];
+    const auto& b = decoded[k].points;
+    ASSERT_EQ(a.x.size(), b.size()) << "sweep " << k;
+    ASSERT_GT(b.size(), 20000u);
+    const std::vector<std::size_t> order = testing::FiringOrder(a);
+    for (std::size_t n = 0; n < b.size(); ++n) {
+      const std::size_t i = order[n];
+      const Eigen::Vector3d p(a.x[i], a.y[i], a.z[i]), q(b[n].x, b[n].y, b[n].z);
+      worst = std::max(worst, (p - q).norm());
+      worst_time = std::max(worst_time, std::abs(static_cast<double>(a.t[i]) - b[n].t));
+      ASSERT_EQ(a.ring[i], b[n].ring);
+      ASSERT_EQ(a.intensity[i], b[n].intensity);
+    }
+  }
+  std::printf("worst point %.6f m, worst firing time %.2f us\n", worst, 1e6 * worst_time);
+  EXPECT_LT(worst, 1e-3) << "half of the packet's 2 mm";
+  EXPECT_LT(worst_time, 2e-6) << "stamps are whole microseconds";
+}
+
+TEST(Drivers, LasersOffTheCentreSeeWhatTheyWouldSee) {
+  const auto scenario = world::ParseScenario(
+      "name: test\ntarget: {waypoints: [[200, 200], [210, 200]], carrier_size: [0, 0, 0]}\n"
+      "world: {ground: {height: 0}}\n",
+      "test");
+  const simulator::Scene scene(scenario);
+  simulator::LidarConfig config;
+  config.noise = config.dropout = 0.0;
+  config.packets = true;
+  simulator::Lidar lidar(config, world::Rig{}, 1);
+  for (int tick = 0; tick < 20; ++tick)
+    lidar.Advance({{0.005 * tick, {0, 0, 2.0}, Eigen::Quaterniond::Identity()},
+                   {0.005 * (tick + 1), {0, 0, 2.0}, Eigen::Quaterniond::Identity()}},
+                  scene);
+  const auto sweep = lidar.Take();
+  ASSERT_TRUE(sweep);
+  ASSERT_FALSE(sweep->z.empty());
+  // 2 mm of range are a millimetre of height at most.
+  for (std::size_t i = 0; i < sweep->z.size(); ++i) ASSERT_NEAR(sweep->z[i], -2.1, 1.1e-3);
+}
+
+simulator::Image Grey(int value) {
+  simulator::Image image;
+  image.width = 64, image.height = 48;
+  image.rgb.assign(64 * 48 * 3, static_cast<uint8_t>(value));
+  return image;
+}
+
+std::optional<camera::Grabber::Grabbed> Wait(camera::Grabber* grabber,
+                                             simulator::MjpegServer* server) {
+  for (int i = 0; i < 600; ++i) {
+    server->Tick();
+    if (auto taken = grabber->Take()) return taken;
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  return std::nullopt;
+}
+
+TEST(Drivers, AStreamedFrameCarriesItsCaptureTime) {
+  simulator::MjpegServer server(kPort, 95);
+  camera::Grabber grabber(camera::OpenFrameSource("http://127.0.0.1:38090/stream", 20.0));
+  for (int k = 1; k <= 5; ++k) {
+    const int64_t captured = camera::WallTime() - 30'000 - k;
+    std::optional<camera::Grabber::Grabbed> taken;
+    for (int attempt = 0; attempt < 20 && !taken; ++attempt) {  // until it has connected
+      server.Send(Grey(40 * k), captured);
+      for (int i = 0; i < 20 && !taken; ++i) {
+        server.Tick();
+        taken = grabber.Take();
+        if (!taken) std::this_thread::sleep_for(std::chrono::milliseconds(5));
+      }
+    }
+    ASSERT_TRUE(taken) << k << grabber.Problem();
+    EXPECT_EQ(taken->frame.clock, camera::StampClock::kWall);
+    EXPECT_NEAR(static_cast<double>(taken->frame.stamp - captured), 0.0, 1.0);
+    EXPECT_NEAR(taken->frame.bgr.at<cv::Vec3b>(20, 30)[0], 40 * k, 3);
+  }
+}
+
+TEST(Drivers, ACameraThatIsUnpluggedIsFoundAgain) {
+  auto server = std::make_unique<simulator::MjpegServer>(kPort, 95);
+  camera::Grabber grabber(camera::OpenFrameSource("http://127.0.0.1:38090/stream", 20.0));
+  const auto see = [&] {
+    for (int i = 0; i < 100; ++i) {
+      server->Send(Grey(100), camera::WallTime());
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+      if (grabber.Take()) return true;
+    }
+    return false;
+  };
+  ASSERT_TRUE(see());
+  server.reset();
+  for (int i = 0; i < 100 && grabber.Problem().empty(); ++i)
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  EXPECT_NE(grabber.Problem(), "");
+  server = std::make_unique<simulator::MjpegServer>(kPort, 95);
+  EXPECT_TRUE(see());
+}
+
+TEST(Drivers, OfFramesThatNobodyFetchedTheNewestIsKept) {
+  simulator::MjpegServer server(kPort, 95);
+  camera::Grabber grabber(camera::OpenFrameSource("http://127.0.0.1:38090/stream", 20.0));
+  server.Send(Grey(10), camera::WallTime());
+  for (int i = 0; i < 200 && !Wait(&grabber, &server); ++i)
+    server.Send(Grey(10), camera::WallTime());
+  const long before = grabber.dropped();
+  for (int k = 1; k <= 5; ++k) {
+    server.Send(Grey(40 * k), camera::WallTime());
+    for (int i = 0; i < 10; ++i) {
+      server.Tick();
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
+  }
+  const auto taken = grabber.Take();
+  ASSERT_TRUE(taken);
+  EXPECT_NEAR(taken->frame.bgr.at<cv::Vec3b>(20, 30)[0], 200, 3);
+  EXPECT_EQ(grabber.dropped() - before, 4);
+}
+
+/// Vision's frame is turned and shifted against the simulator's, and drifts.
+TEST(Drivers, TheAutopilotLivesInVisionsFrame) {
+  simulator::VisionFrame frame;
+  simulator::BodyState body;
+  const double yaw = 0.7, drift = 0.1;
+  const Eigen::Vector3d p_WO(3.0, -2.0, 0.5);
+  const Eigen::Quaterniond R_WO(Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()));
+  const auto see = [&](int64_t utime, double turned, int resets) {
+    const Eigen::AngleAxisd turn(-turned, Eigen::Vector3d::UnitZ());
+    frame.AddVision(utime, turn * (R_WO.conjugate() * (body.p - p_WO)), 0.4 - yaw - turned, resets);
+  };
+  body.q = Eigen::AngleAxisd(0.4, Eigen::Vector3d::UnitZ());
+  for (int k = 0; k < 200; ++k) {
+    body.p = {0.01 * k, 0.02 * k, 1.0};
+    frame.AddTruth(5'000 * k, body);
+    if (k % 5 == 0) see(5'000 * k, 0.0, 1);
+  }
+  EXPECT_LT((frame.InVision(body).p_WB - R_WO.conjugate() * (body.p - p_WO)).norm(), 1e-9);
+  EXPECT_LT(frame.InWorld(Eigen::Quaterniond::Identity()).angularDistance(R_WO), 1e-9);
+  see(995'000, drift, 1);  // one pose pulls a little
+  EXPECT_NEAR(frame.InWorld(Eigen::Quaterniond::Identity()).angularDistance(R_WO), 0.05 * drift,
+              1e-6);
+  see(995'000, drift, 2);  // a reset is taken over at once
+  EXPECT_NEAR(frame.InWorld(Eigen::Quaterniond::Identity()).angularDistance(R_WO), drift, 1e-6);
+}
+
+TEST(CaptureClock, AStampOfThisHostIsBelievedWhileItIsPossible) {
+  camera::CaptureClock clock;
+  EXPECT_EQ(clock.HostTime(1'000'000, true, 1'040'000), 1'000'000);
+  EXPECT_TRUE(clock.believed());
+  // Five seconds off: another machine's clock. The smallest delay counts as none.
+  camera::CaptureClock other;
+  int64_t host = 0;
+  for (int k = 0; k < 200; ++k) {
+    const int64_t captured = 50'000 * k, delay = 20'000 + 1'000 * (k % 7);
+    host = other.HostTime(captured - 5'000'000, true, captured + delay) - captured;
+  }
+  EXPECT_FALSE(other.believed());
+  EXPECT_NEAR(static_cast<double>(host), 20'000.0, 1'000.0);
+}
+
+}  // namespace
+}  // namespace chase
