@@ -143,6 +143,16 @@ std::string Problem(const flight_state_t& m) {
       .Result();
 }
 
+std::string Problem(const geofence_t& m) {
+  return Check()
+      .Time(m.utime)
+      .That(m.n_corners >= 6 && m.n_corners % 2 == 0, "corners", "are fewer than 3")
+      .Number("corners", m.corners)
+      .Number("floor", m.floor)
+      .Number("ceiling", m.ceiling)
+      .Result();
+}
+
 std::string Problem(const health_t& m) {
   Check check;
   check.Time(m.utime);

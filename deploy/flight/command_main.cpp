@@ -114,10 +114,12 @@ void AddOptions(CLI::App* app, Arguments* a) {
   app->add_option("--vehicle", a->vehicle, "channel prefix of the vehicle that is meant");
   app->add_option("--key-file", a->key_file,
                   "64 hexadecimal digits that the vehicle's messages are sealed with");
-  app->add_flag("--wait", a->wait,
-                "until the flight is there: in the air, chasing, holding, landed");
+  auto* wait = app->add_flag("--wait", a->wait,
+                             "until the flight is there: in the air, chasing, holding, landed");
   app->add_flag("--force", a->force, "of kill, which cuts the motors wherever it is, and it falls");
-  app->add_option("--timeout", a->timeout, "of --wait, s (default 120)")->check(TimeoutProblem);
+  app->add_option("--timeout", a->timeout, "of --wait, s (default 120)")
+      ->check(TimeoutProblem)
+      ->needs(wait);
   app->add_option("--lcm-url", a->url, "LCM provider (default: $LCM_DEFAULT_URL, else built in)");
   app->footer(
       "Exit codes: 0 accepted (with --wait: and reached), 1 bad use, 2 refused, 3 no answer "

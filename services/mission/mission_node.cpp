@@ -6,6 +6,7 @@
 
 #include "chase/command_ack_t.hpp"
 #include "chase/flight_state_t.hpp"
+#include "chase/geofence_t.hpp"
 #include "chase/health_t.hpp"
 #include "common/bus/battery.h"
 #include "common/bus/convert.h"
@@ -136,7 +137,9 @@ void MissionNode::OnStatus(const status_t& message) {
 void MissionNode::Tick(int64_t /*utime*/) {
   mission_.Update(Now());
   SendState();
-  if (ticks_++ % kHealthTicks == 0) SendHealth();
+  if (ticks_++ % kHealthTicks != 0) return;
+  SendHealth();
+  SendGeofence();
 }
 
 void MissionNode::SendState() {
@@ -165,6 +168,24 @@ void MissionNode::SendHealth() {
   }
   m.n_processes = static_cast<int32_t>(m.processes.size());
   bus_.Publish("HEALTH", m);
+}
+
+/// Where it lies is known from take-off on.
+void MissionNode::SendGeofence() {
+  const Geofence& fence = config_.geofence;
+  if (!fence.Exists() || !mission_.home()) return;
+  const Eigen::Vector3d& home = mission_.home()->p;
+  geofence_t m{};
+  m.utime = bus_.Now();
+  m.epoch = mission_.home()->epoch;
+  for (const Eigen::Vector2d& corner : fence.polygon) {
+    m.corners.push_back(home.x() + corner.x());
+    m.corners.push_back(home.y() + corner.y());
+  }
+  m.n_corners = static_cast<int32_t>(m.corners.size());
+  m.floor = home.z() + fence.floor;
+  m.ceiling = home.z() + fence.ceiling;
+  bus_.Publish("GEOFENCE", m);
 }
 
 double MissionNode::Now() const { return Seconds(bus_.Now()); }
