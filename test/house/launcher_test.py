@@ -227,6 +227,21 @@ class FlightTest(unittest.TestCase):
         self.assertIn("mapping ended (exit code 3): restarted", err)
 
     def test_kill_at_a_mission_time_and_restart(self):
+        # It goes on until both are back, however long that takes.
+        self.program("chase-flight-monitor", f"""
+            import json, pathlib, signal, time
+            def say(t, done=False):
+                print(json.dumps(dict(mission_time=t, duration=2, distance=2.5, visible=1.0, rtf=0.0, done=done)), flush=True)
+                time.sleep(0.2)
+            folder, end = pathlib.Path({str(self.bin / "flight")!r}), time.monotonic() + 20
+            for t in (0, 0.5, 1):
+                say(t)
+            while time.monotonic() < end and any(
+                    (folder / f"{{name}}.log").read_text().count("working") < 2 for name in ("planning", "control")):
+                time.sleep(0.1)
+            say(2, done=True)
+            signal.pause()
+            """)
         code, _, err = self.fly("--kill", "planning@1", "--kill", "control@0.5")
         self.assertEqual(code, 0, err)
         for name, others in (("planning", 2), ("control", 2), ("mapping", 1)):
