@@ -113,6 +113,13 @@ TEST(MissionNode, AnswersACommandAndSaysTheNewStateAtOnce) {
   EXPECT_EQ(bench.states.back().has_home, 1);
 }
 
+TEST(MissionNode, LeavesTheTargetsChoiceToPerception) {
+  Bench bench;
+  bench.Run(2.0);
+  bench.Command(command_t::SELECT, 1);
+  EXPECT_TRUE(bench.acks.empty());
+}
+
 TEST(MissionNode, CommandsToOtherVehiclesAreNotItsOwn) {
   Bench bench;
   bench.Run(2.0);
