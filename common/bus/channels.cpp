@@ -21,7 +21,7 @@ const std::vector<ChannelRow>& ChannelTable() {
       {"ATTITUDE_SETPOINT", "attitude_setpoint_t", "control", false, true},
       {"TRACKING", "tracking_t", "control", false},
       {"COMMAND", "command_t", "command, viewer", false, true},
-      {"COMMAND_ACK", "command_ack_t", "mission", false},
+      {"COMMAND_ACK", "command_ack_t", "mission, perception", false},
       {"FLIGHT_STATE", "flight_state_t", "mission", false, true},
       {"HEALTH", "health_t", "mission", false},
       {"GEOFENCE", "geofence_t", "mission", false},

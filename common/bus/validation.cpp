@@ -117,7 +117,7 @@ std::string Problem(const camera_image_t& m) {
 std::string Problem(const command_ack_t& m) {
   return Check()
       .Time(m.utime)
-      .Code("kind", m.kind, world::kKillCommand)
+      .Code("kind", m.kind, world::kSelectCommand)
       .Code("verdict", m.verdict, command_ack_t::REFUSED)
       .Result();
 }
@@ -125,7 +125,7 @@ std::string Problem(const command_ack_t& m) {
 std::string Problem(const command_t& m) {
   return Check()
       .Time(m.utime)
-      .Code("kind", m.kind, world::kKillCommand)
+      .Code("kind", m.kind, world::kSelectCommand)
       .Number("arguments", m.arguments)
       .Result();
 }

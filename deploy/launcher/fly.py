@@ -32,6 +32,17 @@ class FlightError(Exception):
     """One line: what, where, cure."""
 
 
+def kill_wish(text):
+    """(process, mission time in s) of P@SECONDS."""
+    name, _, seconds = text.partition("@")
+    killable = [row["name"] for row in flight_processes() if row["restart"] == "always"]
+    if name not in killable:
+        raise argparse.ArgumentTypeError(f"{text}: no process '{name}' to kill; there are: {', '.join(killable)}")
+    if not re.fullmatch(r"\d+(\.\d+)?", seconds):
+        raise argparse.ArgumentTypeError(f"{text}: '{seconds}' is no mission time in s; give {name}@SECONDS, 0 or more")
+    return name, float(seconds)
+
+
 class Parser(argparse.ArgumentParser):
     def error(self, message):
         raise FlightError(f"{message}; see {places.command('fly')} --help")
@@ -52,6 +63,8 @@ def parse(arguments):
     parser.add_argument("--hardware", action="store_true",
                         help="through the drivers: MAVLink, VLP-16 packets and a video stream in LCM's place")
     parser.add_argument("--view", action="store_true", help="look on in a browser, at http://localhost:8080")
+    parser.add_argument("--kill", type=kill_wish, action="append", default=[], metavar="P@SECONDS",
+                        help="kill -9 of process P at that mission time; it is started anew (may be repeated)")
     return parser.parse_args(arguments)
 
 
@@ -174,12 +187,13 @@ def write_config(folder, scenario, seed, name):
 class Flight:
     """The processes of one flight and the folder that they leave."""
 
-    def __init__(self, scenario, seed, url, commands=(), hardware=False):
+    def __init__(self, scenario, seed, url, commands=(), kills=(), hardware=False):
         self.folder = flight_folder(scenario)
         self.scenario, self.seed, self.hardware = scenario, seed, hardware
         self.env = {"LCM_DEFAULT_URL": url}
         self.services, self.logger, self.monitor, self.viewer = [], None, None, None
         self.commands, self.given = list(commands), []
+        self.kills = sorted(kills, key=lambda kill: kill[1])
 
     def child(self, name, command, **options):
         return processes.Child(name, command, self.folder / f"{name}.log", self.env, **options)
@@ -224,12 +238,11 @@ class Flight:
 
     def complain(self, *watchers, mend=True):
         """Restarts what may be restarted; else raises when a process has ended or hangs."""
-        child, sentence = processes.first_problem(self.services + [self.logger, *watchers])
-        if child and child.restarts and mend:
-            print(f"\n{sentence}: restarted", file=sys.stderr)
-            child.restart()
-        elif child:
-            raise FlightError(f"{sentence}; the end of {child.log}:\n{child.log_tail()}")
+        for child, sentence in processes.problems(self.services + [self.logger, *watchers]):
+            if not (child.restarts and mend):
+                raise FlightError(f"{sentence}; the end of {child.log}:\n{child.log_tail()}")
+            if child.mend():
+                print(f"\n{sentence}: restarted", file=sys.stderr, flush=True)
 
     def command(self, mission_time):
         """Gives the operator's commands that are due."""
@@ -238,9 +251,18 @@ class Flight:
             self.given.append(self.child(f"command-{len(self.given) + 1}-{name}",
                                          [BIN / "chase-command", name]))
 
+    def kill(self, mission_time):
+        """Kills whose time has come."""
+        while self.kills and self.kills[0][1] <= mission_time:
+            name, _ = self.kills.pop(0)
+            child = next(c for c in self.services if c.name == name)
+            print(f"\nt {mission_time:6.1f} s: kill -9 of {name}", file=sys.stderr, flush=True)
+            child.process.kill()
+            child.process.wait()
+
     def watch(self):
         """Shows progress until the mission's end."""
-        last_time, moved = None, time.monotonic()
+        last_time, moved, speed = None, time.monotonic(), 0.0
         while True:
             line = self.monitor.process.stdout.readline()
             if line:
@@ -251,6 +273,9 @@ class Flight:
                     return
                 if progress["mission_time"] != last_time:
                     last_time, moved = progress["mission_time"], time.monotonic()
+                    speed = progress["rtf"]
+            if last_time is not None:  # progress comes once a second
+                self.kill(last_time + speed * (time.monotonic() - moved))
             self.complain(self.monitor)
             if time.monotonic() - moved > SILENCE_LIMIT:
                 raise FlightError(f"the mission's time has not moved for {SILENCE_LIMIT:.0f} s; "
@@ -297,7 +322,7 @@ def fly(options):
     raise_receive_buffers()
     url = bus.url()
     check_bus(url)
-    flight = Flight(scenario, options.seed, url, commands, options.hardware)
+    flight = Flight(scenario, options.seed, url, commands, options.kill, options.hardware)
     print(f"flying {scenario.stem}, seed {options.seed}, into {flight.folder}", flush=True)
     try:
         flight.start(options.view)

@@ -39,9 +39,11 @@ Task TaskOf(int8_t state) {
       return Task::kChase;
     case flight_state_t::RETURN:
       return Task::kReturn;
+    case flight_state_t::LAND:
+      return Task::kLand;
     case flight_state_t::DONE:
       return Task::kDone;
-    default:  // control does the rest of landing, with a pose or without
+    default:
       return Task::kHold;
   }
 }
@@ -91,6 +93,7 @@ PlanningNode::PlanningNode(bus::Bus& bus, const PlanningConfig& config)
   });
   bus_.Subscribe<tracking_t>("TRACKING", [this](const tracking_t& m) {
     pilot_.SetFlying(m.following != tracking_t::NONE);
+    pilot_.SetDescending(m.following == tracking_t::LAND);
   });
   bus_.Subscribe<flight_state_t>("FLIGHT_STATE", [this](const flight_state_t& m) { OnState(m); });
   bus_.Subscribe<pose_t>("POSE", [this](const pose_t& m) { OnPose(m); });

@@ -10,7 +10,7 @@ LISTENS = {
     "camera": set(),
     "odometry": {"LIDAR_SCAN", "IMU"},
     "mapping": {"SCAN_REGISTERED", "TARGET"},
-    "perception": {"CAMERA_IMAGE", "LIDAR_SCAN", "POSE"},
+    "perception": {"CAMERA_IMAGE", "LIDAR_SCAN", "POSE", "COMMAND"},
     "prediction": {"TARGET", "OBSTACLES"},
     "planning": {"PREDICTION", "OBSTACLES", "UNSEEN", "POSE", "TRACKING", "FLIGHT_STATE"},
     "control": {"PLAN", "OBSTACLES", "POSE", "FLIGHT_STATE"},

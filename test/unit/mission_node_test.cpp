@@ -137,6 +137,13 @@ TEST(MissionNode, TellsTheGeofenceInTheFrameWOnceItHasTakenOff) {
   EXPECT_TRUE(free.fences.empty());
 }
 
+TEST(MissionNode, LeavesTheTargetsChoiceToPerception) {
+  Bench bench;
+  bench.Run(2.0);
+  bench.Command(command_t::SELECT, 1);
+  EXPECT_TRUE(bench.acks.empty());
+}
+
 TEST(MissionNode, CommandsToOtherVehiclesAreNotItsOwn) {
   Bench bench;
   bench.Run(2.0);

@@ -301,6 +301,10 @@ TEST(ViewerRequest, CommandsNeedTheToken) {
   EXPECT_NE(RefusalOf(r, ""), "");
   EXPECT_NE(RefusalOf(r, "secret-tokem"), "");
   EXPECT_NE(RefusalOf(r, "secret-token-longer"), "");
+  for (const char* not_from_a_page : {"kill", "select"}) {
+    r.command = not_from_a_page;
+    EXPECT_NE(RefusalOf(r, "secret-token"), "");
+  }
   r.command = "explode";
   EXPECT_NE(RefusalOf(r, "secret-token"), "");
   r.token.clear();
