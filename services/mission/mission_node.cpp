@@ -163,7 +163,7 @@ void MissionNode::SendHealth() {
 
 /// Where it lies is known from take-off on.
 void MissionNode::SendGeofence() {
-  const Geofence& fence = config_.geofence;
+  const world::Geofence& fence = config_.geofence;
   if (!fence.Exists() || !mission_.home()) return;
   const Eigen::Vector3d& home = mission_.home()->p;
   geofence_t m{};
