@@ -28,6 +28,7 @@ endfunction()
 function(chase_program name)
   add_executable(${name} ${ARGN})
   target_link_libraries(${name} PRIVATE chase_options version)
+  set_property(GLOBAL APPEND PROPERTY CHASE_PROGRAMS ${name})
 endfunction()
 
 # chase_test(NAME LIBS... SOURCES... [TIMEOUT s]): a GoogleTest program registered with CTest.

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Bash completion and man pages of every program, from what CLI11 prints for --help.
 
-cli_pages.py BIN_DIR OUT writes OUT/share/bash-completion/completions/chase-* and
-OUT/share/man/man1/chase-*.1."""
+cli_pages.py BIN_DIR OUT [PROGRAM...] writes OUT/share/bash-completion/completions/chase-* and
+OUT/share/man/man1/chase-*.1; of all programs there unless some are named."""
 
 import pathlib
 import re
@@ -108,7 +108,7 @@ def main():
     completions, pages = out / "share/bash-completion/completions", out / "share/man/man1"
     for folder in (completions, pages):
         folder.mkdir(parents=True, exist_ok=True)
-    programs = sorted(bin_dir.glob("chase-*"))
+    programs = [bin_dir / name for name in sys.argv[3:]] or sorted(bin_dir.glob("chase-*"))
     for program in programs:
         page = parsed(help_of(program))
         subpages = {row[0]: parsed(help_of(program, row[0])) for row in page["subcommands"]}

@@ -9,6 +9,12 @@
 
 namespace chase::bus {
 
+namespace {
+
+constexpr size_t kMostChannels = 200;  // names of strangers are not remembered without end
+
+}  // namespace
+
 bool Bus::Count(const std::string& channel, const std::string& problem, int32_t seq,
                 ChannelCounters* counters) {
   if (!problem.empty()) {
@@ -28,7 +34,6 @@ void Bus::SubscribeEvery(const EveryHandler& /*handler*/) {
 }
 
 void Bus::CountAny(const std::string& channel, const uint8_t* data, size_t size) {
-  constexpr size_t kMostChannels = 200;  // names of strangers are not remembered without end
   if (counters_.size() >= kMostChannels && counters_.count(channel) == 0) return;
   ChannelCounters& counters = counters_[channel];
   const auto head = HeadOf(data, size);
@@ -48,6 +53,12 @@ bool Bus::IsForeign(const std::string& channel, const std::string& sender,
                     const std::string& vehicle) const {
   if (identity_.process.empty()) return false;
   return vehicle != identity_.vehicle || !MaySend(channel, sender);
+}
+
+void Bus::Refuse(const std::string& channel, const std::string& why) {
+  if (counters_.size() < kMostChannels || counters_.count(channel) > 0)
+    ++counters_[channel].foreign;
+  ReportError(channel + ": " + why);
 }
 
 std::vector<input_t> Bus::Inputs() const {

@@ -76,6 +76,9 @@ class Bus {
     PublishRaw(channel, std::move(bytes));
   }
 
+  /// Sends a message that another process has encoded, as it is.
+  void Forward(const std::string& channel, Bytes bytes) { PublishRaw(channel, std::move(bytes)); }
+
   /// Time of the event being handled, microseconds: logical where the backend is, else the wall's.
   virtual int64_t Now() const = 0;
 
@@ -99,6 +102,8 @@ class Bus {
   /// Counts a message of any type by its head.
   void CountAny(const std::string& channel, const uint8_t* data, size_t size);
   void Guarded(const std::string& channel, const std::function<void()>& handler);
+  /// Counts a message as a stranger's.
+  void Refuse(const std::string& channel, const std::string& why);
 
  private:
   template <class T>
@@ -114,8 +119,7 @@ class Bus {
       problem = std::string("does not decode: ") + e.what();
     }
     if (problem.empty() && IsForeign(channel, message->sender, message->vehicle)) {
-      ++counters->foreign;
-      ReportError(channel + ": from " + message->sender + " of vehicle '" + message->vehicle + "'");
+      Refuse(channel, "from " + message->sender + " of vehicle '" + message->vehicle + "'");
       return false;
     }
     return Count(channel, problem, problem.empty() ? message->seq : 0, counters);

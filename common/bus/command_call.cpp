@@ -11,7 +11,7 @@ void CommandCall::Turn() {
   m.utime = given_;
   m.id = id_;
   m.kind = static_cast<int8_t>(client_.command());
-  if (force_) m.arguments = {1.0};
+  m.arguments = arguments_;
   m.n_arguments = static_cast<int32_t>(m.arguments.size());
   bus_->Publish("COMMAND", m);
 }

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <cstdint>
+#include <utility>
+#include <vector>
 
 #include "chase/command_ack_t.hpp"
 #include "common/bus/bus.h"
@@ -12,9 +14,13 @@ namespace chase::bus {
 class CommandCall {
  public:
   /// Given now. `kind`: one of command_t's constants; `id`: no other command of this process has
-  /// it; `force`: of kill, which is refused without.
-  CommandCall(Bus& bus, int kind, int64_t id, bool force = false)
-      : bus_(&bus), given_(bus.Now()), id_(id), force_(force), client_(kind, 0.0) {}
+  /// it; `arguments`: as command_t says of the kind.
+  CommandCall(Bus& bus, int kind, int64_t id, std::vector<double> arguments = {})
+      : bus_(&bus),
+        given_(bus.Now()),
+        id_(id),
+        arguments_(std::move(arguments)),
+        client_(kind, 0.0) {}
 
   /// Sends it when that is due: to be called ten times a second or more.
   void Turn();
@@ -32,7 +38,7 @@ class CommandCall {
 
   Bus* bus_;
   int64_t given_, id_;  // given: us
-  bool force_;
+  std::vector<double> arguments_;
   world::CommandClient client_;
 };
 

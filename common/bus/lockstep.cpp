@@ -1,6 +1,7 @@
 #include "common/bus/lockstep.h"
 
 #include <algorithm>
+#include <cmath>
 #include <ctime>
 #include <deque>
 #include <stdexcept>
@@ -41,7 +42,8 @@ class Lockstep::Port : public Bus {
     handlers_[channel] = std::move(handler);
   }
   void PublishRaw(const std::string& channel, Bytes bytes) override {
-    lockstep_->Send(lockstep_->now_ + latency_, channel, std::move(bytes));
+    const auto late = std::llround(lockstep_->load_ * static_cast<double>(latency_));
+    lockstep_->Send(lockstep_->now_ + late, channel, std::move(bytes));
   }
 
  private:

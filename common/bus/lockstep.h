@@ -60,6 +60,9 @@ class Lockstep {
   /// seed. The tap sees all of it.
   void SetLoss(double share, uint64_t seed);
 
+  /// A busy processor: what every process sends takes `times` its latency from now on.
+  void SetLoad(double times) { load_ = times; }
+
   /// Sends bytes as they are, which need be no message.
   void Inject(const std::string& channel, Bus::Bytes bytes) {
     Send(now_, channel, std::move(bytes));
@@ -112,6 +115,7 @@ class Lockstep {
   std::priority_queue<Event, std::vector<Event>, std::greater<>> events_;
   Tap tap_;
   std::map<std::string, int64_t> delays_;  // us
+  double load_ = 1.0;                      // of the latencies
   double loss_ = 0.0;
   world::Random loss_draws_{0};
 };

@@ -1,8 +1,10 @@
 #include "common/bus/log_bus.h"
 
 #include <algorithm>
+#include <set>
 #include <stdexcept>
 
+#include "common/bus/heard_order.h"
 #include "common/bus/message_head.h"
 
 namespace chase::bus {
@@ -32,29 +34,39 @@ std::string LogBus::Handled() const {
   return names;
 }
 
-void LogBus::Run(Node* node, const std::function<void(int64_t)>& after) {
+/// The clock stands still for an event that was logged late.
+void LogBus::Hand(const lcm::LogEvent& event, Node* node, const After& after) {
+  ++events_;
+  const int64_t period = node->TickPeriod(), t = std::max(event.timestamp, reorders_ ? now_ : 0);
+  if (period > 0) {
+    if (next_tick_ < 0) next_tick_ = t;
+    for (; next_tick_ <= t; next_tick_ += period) node->Tick(now_ = next_tick_);
+  }
+  now_ = t;
+  const auto handler = handlers_.find(event.channel);
+  if (handler != handlers_.end()) {
+    heard_ = true;
+    handler->second(static_cast<const uint8_t*>(event.data), static_cast<size_t>(event.datalen));
+  }
+  if (after) after(now_);
+}
+
+void LogBus::Run(Node* node, const After& after) {
+  std::set<std::string> channels;
+  for (const auto& [channel, handler] : handlers_) channels.insert(channel);
+  const HeardOrder order = OrderHeard(in_, identity().process, channels);
+  shortfalls_ = order.Sentences();
+  reorders_ = !order.positions.empty();
   lcm::LogFile log(in_, "r");
-  if (!log.good()) throw std::runtime_error(in_ + ": cannot be read; --replay needs an LCM log");
-  const int64_t period = node->TickPeriod();
-  int64_t next_tick = -1;
-  bool heard = handlers_.empty();
-  while (const lcm::LogEvent* event = log.readNextEvent()) {
-    ++events_;
-    if (period > 0) {
-      if (next_tick < 0) next_tick = event->timestamp;
-      for (; next_tick <= event->timestamp; next_tick += period) node->Tick(now_ = next_tick);
-    }
-    now_ = event->timestamp;
-    const auto handler = handlers_.find(event->channel);
-    if (handler != handlers_.end()) {
-      heard = true;
-      handler->second(static_cast<const uint8_t*>(event->data),
-                      static_cast<size_t>(event->datalen));
-    }
-    if (after) after(now_);
+  heard_ = handlers_.empty();
+  if (!reorders_)
+    while (const lcm::LogEvent* event = log.readNextEvent()) Hand(*event, node, after);
+  for (const int64_t position : order.positions) {
+    fseeko(log.getFilePtr(), position, SEEK_SET);
+    if (const lcm::LogEvent* event = log.readNextEvent()) Hand(*event, node, after);
   }
   if (events_ == 0) throw std::runtime_error(in_ + ": holds no event; is it an LCM log?");
-  if (!heard)
+  if (!heard_)
     throw std::runtime_error(in_ + ": holds none of the channels that are heard: " + Handled());
   out_.Close();
 }

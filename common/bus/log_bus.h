@@ -1,9 +1,11 @@
 #pragma once
 
 #include <functional>
+#include <lcm/lcm-cpp.hpp>
 #include <map>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "common/bus/bus.h"
 #include "common/bus/log_writer.h"
@@ -15,8 +17,8 @@ namespace chase::bus {
 /// log holds none: of no vehicle, started at 0.
 Identity IdentityIn(const std::string& log, const std::string& process);
 
-/// Replays a log file to one node in file order; what the node sends goes to another log file with
-/// the stamp of the event that it answers.
+/// Replays a log file to one node in the order in which it heard the messages (heard_order.h); what
+/// the node sends goes to another log file with the stamp of the event that it answers.
 class LogBus : public Bus {
  public:
   /// Throws std::runtime_error when a file cannot be opened.
@@ -29,6 +31,8 @@ class LogBus : public Bus {
 
   int64_t Now() const override { return now_; }
   int64_t events() const { return events_; }
+  /// After Run: a line for each channel of which the log lacks what was heard, or the reverse.
+  const std::vector<std::string>& shortfalls() const { return shortfalls_; }
 
  protected:
   void SubscribeRaw(const std::string& channel, RawHandler handler) override;
@@ -36,12 +40,16 @@ class LogBus : public Bus {
 
  private:
   std::string Handled() const;
+  using After = std::function<void(int64_t utime)>;
+  void Hand(const lcm::LogEvent& event, Node* node, const After& after);
 
   std::string in_;
   LogWriter out_;
   std::map<std::string, RawHandler> handlers_;
-  int64_t now_ = 0;
+  int64_t now_ = 0, next_tick_ = -1;
   int64_t events_ = 0;
+  bool heard_ = false, reorders_ = false;
+  std::vector<std::string> shortfalls_;
 };
 
 }  // namespace chase::bus

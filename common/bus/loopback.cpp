@@ -15,7 +15,7 @@ namespace chase::bus {
 
 namespace {
 
-constexpr const char* kPrefix = "LOOPBACK_";
+constexpr const char* kPrefix = "LOOPBACK_";  // of what older versions sent
 constexpr int kAttempts = 10;
 constexpr int kWaitMs = 150;
 
@@ -53,13 +53,10 @@ class Socket {
   int fd_;
 };
 
-/// LCM's short message: magic, sequence number, channel, then the payload.
+/// No LCM message, so that loggers and spies pass over it: LCM's begin with LC02 or LC03.
 std::vector<uint8_t> Packet() {
-  const std::string channel = kPrefix + std::to_string(getpid());
-  std::vector<uint8_t> packet = {'L', 'C', '0', '2', 0, 0, 0, 0};
-  packet.insert(packet.end(), channel.begin(), channel.end());
-  packet.push_back(0);
-  return packet;
+  const std::string text = "chase loopback " + std::to_string(getpid());
+  return {text.begin(), text.end()};
 }
 
 bool Join(int fd, const Endpoint& group) {

@@ -55,9 +55,9 @@ std::vector<proof_t> ToMessage(const std::vector<world::Proof>& proofs) {
   return out;
 }
 
-int32_t ObstaclesOf(const plan_t& m) {
+int32_t InputOf(const plan_t& m, const std::string& channel) {
   for (const input_t& input : m.inputs)
-    if (input.channel == "OBSTACLES") return input.seq;
+    if (input.channel == channel) return input.seq;
   return -1;
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "chase/plan_t.hpp"
@@ -13,7 +14,7 @@ std::vector<proof_t> ToMessage(const std::vector<world::Proof>& proofs);
 /// What the plan says of itself, times in seconds from `origin`.
 world::Claim ClaimOf(const plan_t& m, int64_t origin);
 
-/// `seq` of the OBSTACLES that the plan was made from; -1: none.
-int32_t ObstaclesOf(const plan_t& m);
+/// `seq` of the message of `channel` that the plan was made from; -1: none.
+int32_t InputOf(const plan_t& m, const std::string& channel);
 
 }  // namespace chase::bus

@@ -30,7 +30,7 @@ volatile std::sig_atomic_t stop_requested = 0;
 void RequestStop(int) { stop_requested = 1; }
 
 struct Flags {
-  std::string config, url, prefix, replay, out;
+  std::string config, url, prefix, key_file, replay, out;
   bool dump_config = false;
 };
 
@@ -43,18 +43,22 @@ void AddFlags(CLI::App* app, Flags* flags) {
   flags->url = DefaultUrl();
   app->add_option("--config", flags->config, "YAML file that overrides the defaults");
   app->add_flag("--dump-config", flags->dump_config, "print the complete configuration and exit");
-  app->add_option("--lcm-url", flags->url,
-                  "LCM provider (default: $LCM_DEFAULT_URL, else built in)");
-  app->add_option("--channel-prefix", flags->prefix,
-                  "the vehicle: in front of every channel's name");
-  app->add_option("--replay", flags->replay, "drive the service by this LCM log, in logical time");
+  auto* url = app->add_option("--lcm-url", flags->url,
+                              "LCM provider (default: $LCM_DEFAULT_URL, else built in)");
+  auto* prefix = app->add_option("--channel-prefix", flags->prefix,
+                                 "the vehicle: in front of every channel's name");
+  auto* key = app->add_option(
+      "--key-file", flags->key_file,
+      "64 hexadecimal digits that seal the vehicle's messages (default: not sealed)");
+  app->add_option("--replay", flags->replay, "drive the service by this LCM log, in logical time")
+      ->excludes(url, prefix, key);  // what would do nothing is refused
   app->add_option("--out", flags->out, "LCM log that --replay writes");
   config::AddVersion(app);
 }
 
 /// Live processing until a signal comes or the node is done.
 void RunLive(const ServiceSpec& spec, const Flags& flags) {
-  UdpBus bus(flags.url, flags.prefix);
+  UdpBus bus(flags.url, flags.prefix, LoadSeal(flags.key_file));
   bus.SetIdentity({spec.name, flags.prefix, bus.Now()});
   const auto node = spec.make_node(bus);
   StatusReporter reporter(spec.name, LiveVersion(spec.dump_config()));
@@ -103,6 +107,8 @@ void RunReplay(const ServiceSpec& spec, const Flags& flags) {
     bus.Publish(StatusChannel(spec.name), reporter.Make(bus, *node, now, false));
     next_status = now + kStatusPeriod;
   });
+  for (const std::string& line : bus.shortfalls())
+    fmt::print(stderr, "chase-{}: {}\n", spec.name, line);
 }
 
 int Run(const ServiceSpec& spec, const Flags& flags) {

@@ -20,10 +20,6 @@ constexpr int kEveryLight =
     10000;  // messages that wait for a recorder: 5 s of a flight's 2000 a second
 constexpr int64_t kLongestWait = 10'000'000;  // us; beyond it the wall clock was set
 
-void Forward(const lcm::ReceiveBuffer* buffer, const std::string&, Bus::RawHandler* handler) {
-  (*handler)(static_cast<const uint8_t*>(buffer->data), buffer->data_size);
-}
-
 /// Checked before LCM opens its sockets: LCM itself would wait ten seconds and then abort.
 const std::string& Checked(const std::string& url) {
   const std::string problem = LoopbackProblem(url);
@@ -33,8 +29,8 @@ const std::string& Checked(const std::string& url) {
 
 }  // namespace
 
-UdpBus::UdpBus(const std::string& url, const std::string& prefix)
-    : lcm_(Checked(url)), prefix_(prefix), clock_offset_(HostClockOffset()) {
+UdpBus::UdpBus(const std::string& url, const std::string& prefix, const Seal& seal)
+    : lcm_(Checked(url)), prefix_(prefix), clock_offset_(HostClockOffset()), seal_(seal) {
   if (!lcm_.good())
     throw std::runtime_error(fmt::format(
         "{}: LCM cannot open it; check the address and port, or run deploy/doctor", url));
@@ -54,9 +50,23 @@ void UdpBus::Handle(int64_t timeout_us) {
 int64_t UdpBus::Now() const { return SteadyMicroseconds() + clock_offset_; }
 
 void UdpBus::SubscribeRaw(const std::string& channel, RawHandler handler) {
-  handlers_.push_back(std::move(handler));
-  auto* subscription = lcm_.subscribeFunction(prefix_ + channel, &Forward, &handlers_.back());
+  subscriptions_.push_back({this, channel, std::move(handler)});
+  auto* subscription = lcm_.subscribeFunction(prefix_ + channel, &Deliver, &subscriptions_.back());
   subscription->setQueueCapacity(QueueCapacity(channel));
+}
+
+void UdpBus::Deliver(const lcm::ReceiveBuffer* buffer, const std::string& /*channel*/,
+                     Subscription* to) {
+  const auto* data = static_cast<const uint8_t*>(buffer->data);
+  const auto size = to->bus->Opened(to->channel, data, buffer->data_size);
+  if (size) to->handler(data, *size);
+}
+
+std::optional<size_t> UdpBus::Opened(const std::string& channel, const uint8_t* data, size_t size) {
+  if (IsHeavy(channel)) return size;
+  const auto inside = seal_.Open(prefix_ + channel, data, size);
+  if (!inside) Refuse(channel, "without the seal of this vehicle's key; see --key-file");
+  return inside;
 }
 
 void UdpBus::SubscribeEvery(const EveryHandler& handler) {
@@ -79,12 +89,15 @@ void UdpBus::ForwardEvery(const lcm::ReceiveBuffer* buffer, const std::string& c
   const int64_t now = int64_t{wall.tv_sec} * 1000000 + wall.tv_nsec / 1000;
   const int64_t waited = std::clamp<int64_t>(now - buffer->recv_utime, 0, kLongestWait);
   const auto* data = static_cast<const uint8_t*>(buffer->data);
-  bus->CountAny(channel.substr(bus->prefix_.size()), data, buffer->data_size);
-  bus->Guarded(channel,
-               [&] { bus->every_(channel, bus->Now() - waited, data, buffer->data_size); });
+  const std::string name = channel.substr(bus->prefix_.size());
+  const auto size = bus->Opened(name, data, buffer->data_size);
+  if (!size) return;
+  bus->CountAny(name, data, *size);
+  bus->Guarded(channel, [&] { bus->every_(channel, bus->Now() - waited, data, *size); });
 }
 
 void UdpBus::PublishRaw(const std::string& channel, Bytes bytes) {
+  if (!IsHeavy(channel)) seal_.Close(prefix_ + channel, &bytes);
   if (lcm_.publish(prefix_ + channel, bytes.data(), static_cast<unsigned>(bytes.size())) != 0)
     ReportError(fmt::format("{}: could not be sent ({} bytes)", channel, bytes.size()));
 }

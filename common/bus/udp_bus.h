@@ -6,17 +6,20 @@
 #include <string>
 
 #include "common/bus/bus.h"
+#include "common/bus/seal.h"
 
 namespace chase::bus {
 
 /// UDP multicast that stays on this host, with room for a few sweeps and frames.
 inline constexpr char kDefaultUrl[] = "udpm://239.255.76.67:7667?ttl=0&recv_buf_size=2097152";
 
-/// Messages over LCM's UDP multicast. Every channel name gets `prefix` in front.
+/// Messages over LCM's UDP multicast. Every channel name gets `prefix` in front. With a key light
+/// messages are sealed, and those that are not are refused as a stranger's; heavy ones, which stay
+/// on the host, have no seal.
 class UdpBus : public Bus {
  public:
   /// Throws std::runtime_error, one line with the cure, when the bus does not carry messages.
-  UdpBus(const std::string& url, const std::string& prefix);
+  UdpBus(const std::string& url, const std::string& prefix, const Seal& seal = Seal());
 
   /// Waits at most `timeout_us` for messages and hands over those that are there.
   void Handle(int64_t timeout_us);
@@ -33,13 +36,23 @@ class UdpBus : public Bus {
   void PublishRaw(const std::string& channel, Bytes bytes) override;
 
  private:
+  struct Subscription {
+    UdpBus* bus;
+    std::string channel;
+    RawHandler handler;
+  };
+  static void Deliver(const lcm::ReceiveBuffer* buffer, const std::string& channel,
+                      Subscription* subscription);
+  /// Size of a message without its seal; nothing, and counted, where that is not ours.
+  std::optional<size_t> Opened(const std::string& channel, const uint8_t* data, size_t size);
   static void ForwardEvery(const lcm::ReceiveBuffer* buffer, const std::string& channel,
                            UdpBus* bus);
 
   lcm::LCM lcm_;
   std::string prefix_;
-  int64_t clock_offset_;             // us from the steady clock to the wall clock
-  std::deque<RawHandler> handlers_;  // addresses stay
+  int64_t clock_offset_;  // us from the steady clock to the wall clock
+  Seal seal_;
+  std::deque<Subscription> subscriptions_;  // addresses stay
   EveryHandler every_;
 };
 

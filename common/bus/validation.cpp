@@ -117,7 +117,7 @@ std::string Problem(const camera_image_t& m) {
 std::string Problem(const command_ack_t& m) {
   return Check()
       .Time(m.utime)
-      .Code("kind", m.kind, world::kKillCommand)
+      .Code("kind", m.kind, world::kSelectCommand)
       .Code("verdict", m.verdict, command_ack_t::REFUSED)
       .Result();
 }
@@ -125,7 +125,7 @@ std::string Problem(const command_ack_t& m) {
 std::string Problem(const command_t& m) {
   return Check()
       .Time(m.utime)
-      .Code("kind", m.kind, world::kKillCommand)
+      .Code("kind", m.kind, world::kSelectCommand)
       .Number("arguments", m.arguments)
       .Result();
 }
@@ -140,6 +140,16 @@ std::string Problem(const flight_state_t& m) {
       .Code("state", m.state, flight_state_t::EMERGENCY)
       .Code("has_home", m.has_home, 1)
       .Number("home", m.home)
+      .Result();
+}
+
+std::string Problem(const geofence_t& m) {
+  return Check()
+      .Time(m.utime)
+      .That(m.n_corners >= 6 && m.n_corners % 2 == 0, "corners", "are fewer than 3")
+      .Number("corners", m.corners)
+      .Number("floor", m.floor)
+      .Number("ceiling", m.ceiling)
       .Result();
 }
 

@@ -8,6 +8,7 @@
 #include "chase/command_t.hpp"
 #include "chase/event_t.hpp"
 #include "chase/flight_state_t.hpp"
+#include "chase/geofence_t.hpp"
 #include "chase/health_t.hpp"
 #include "chase/imu_t.hpp"
 #include "chase/lidar_scan_t.hpp"
@@ -33,6 +34,7 @@ std::string Problem(const command_ack_t& m);
 std::string Problem(const command_t& m);
 std::string Problem(const event_t& m);
 std::string Problem(const flight_state_t& m);
+std::string Problem(const geofence_t& m);
 std::string Problem(const health_t& m);
 std::string Problem(const imu_t& m);
 std::string Problem(const lidar_scan_t& m);

@@ -7,6 +7,7 @@
 #include "chase/command_t.hpp"
 #include "chase/event_t.hpp"
 #include "chase/flight_state_t.hpp"
+#include "chase/geofence_t.hpp"
 #include "chase/health_t.hpp"
 #include "chase/imu_t.hpp"
 #include "chase/input_t.hpp"
@@ -323,6 +324,16 @@ void VisitFields(const flight_state_t& m, V& v) {
   v("home", m.home);
   v("n_missing", m.n_missing);
   v("missing", m.missing);
+}
+
+template <class V>
+void VisitFields(const geofence_t& m, V& v) {
+  VisitHead(m, v);
+  v("epoch", m.epoch);
+  v("n_corners", m.n_corners);
+  v("corners", m.corners);
+  v("floor", m.floor);
+  v("ceiling", m.ceiling);
 }
 
 template <class V>

@@ -13,7 +13,9 @@ struct MostAge {
   double status = 2.5;     ///< mission: not ready; two that are sent once a second may be lost
   double flight_state = 2.0;  ///< planning: holds where it chased, searched or returned; a process
                               ///< that died is back within that
-  double command = 10.0;      ///< mission: refused; chase-command repeats for half of that
+  double landing_plan =
+      2.0;                ///< control: comes down where it is without a plan that was made to land
+  double command = 10.0;  ///< mission: refused; chase-command repeats for half of that
 };
 inline constexpr MostAge kMostAge;
 

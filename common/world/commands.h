@@ -7,9 +7,10 @@
 namespace chase::world {
 
 /// What an operator may want of the vehicle, by command_t's constants.
-inline constexpr std::array<const char*, 8> kCommandNames = {"takeoff", "chase", "hold", "search",
-                                                             "return",  "land",  "stop", "kill"};
-inline constexpr int kKillCommand = 7;  ///< cuts the motors in the air; needs to be forced
+inline constexpr std::array<const char*, 9> kCommandNames = {
+    "takeoff", "chase", "hold", "search", "return", "land", "stop", "kill", "select"};
+inline constexpr int kKillCommand = 7;    ///< cuts the motors in the air; needs to be forced
+inline constexpr int kSelectCommand = 8;  ///< names the target in the image: perception's
 
 /// The constant of a name such as "takeoff"; nothing where there is none.
 inline std::optional<int> CommandNamed(const std::string& name) {

@@ -72,6 +72,7 @@ std::vector<FaultKind> MakeKinds() {
       {"hidden-for-good", Effect::kHide, s, kForGood, Needs::kSensors},
       {"decoy", Effect::kDecoy, s, kDecoyTime, Needs::kSensors, 2.0},
       {"flood", Effect::kFlood, "", kSensorTime, Needs::kNothing, 1000.0},
+      {"cpu-load", Effect::kLoad, "", kBusTime, Needs::kNothing, 5.0},
       {"disk-full", Effect::kDiskFull, "recorder", kForGood, Needs::kRecorder}};
   kinds.insert(kinds.end(), std::begin(others), std::end(others));
   return kinds;

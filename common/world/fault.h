@@ -39,6 +39,7 @@ struct FaultKind {
     kDelay,       ///< of a channel: `amount` is what its messages are late, s
     kLoss,        ///< of the bus: `amount` is the share of messages lost, at each receiver
     kFlood,       ///< of the bus: `amount` malformed messages a second on every channel
+    kLoad,        ///< of all processes: each takes `amount` times as long
     kDiskFull,    ///< of the recorder
   };
   /// What a flight must have for the fault to strike anything.

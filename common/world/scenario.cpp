@@ -141,7 +141,10 @@ std::string WorldSpec::Problem() const {
 std::string CommandSpec::Problem() const {
   std::string all;
   for (const char* one : kCommandNames) all += (all.empty() ? "" : ", ") + std::string(one);
-  return Check(CommandNamed(command).has_value(), "command", "'" + command + "'", "one of " + all);
+  if (!CommandNamed(command)) return Check(false, "command", "'" + command + "'", "one of " + all);
+  const size_t places = CommandNamed(command) == kSelectCommand ? 2 : 0;
+  return Check(at_px.size() == places, "at_px", std::to_string(at_px.size()) + " numbers",
+               places > 0 ? "[column, row] of select" : "left out but of select");
 }
 
 std::string ServiceOverride::Problem() const {

@@ -253,9 +253,11 @@ struct CriteriaSpec {
 struct CommandSpec {
   std::string command;
   double at_s = 0.0;
+  std::vector<double> at_px;
   template <class V>
   void Visit(V& v) {
-    v("command", command, "takeoff, chase, hold, search, return, land or stop");
+    v("command", command, "takeoff, chase, hold, search, return, land, stop, kill or select");
+    v("at_px", at_px, "of select: column and row in the image");
     v("at_s", at_s, "mission time, s; negative: before the target moves");
   }
   std::string Problem() const;

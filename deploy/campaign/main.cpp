@@ -127,12 +127,15 @@ void AddOptions(CLI::App* app, Options* o) {
   app->add_option("--out", o->setup.out, "folder of the results")->required();
   app->add_option("--programs", o->setup.programs,
                   "folder of chase-flight and chase-world (default: this program's)");
-  app->add_option("--compare", o->compare,
-                  "an earlier campaign's folder or flights.json: what got better and worse");
-  app->add_option("--baseline", o->baseline, "write what a later --compare needs into this file");
+  auto* compare =
+      app->add_option("--compare", o->compare,
+                      "an earlier campaign's folder or flights.json: what got better and worse");
+  auto* baseline = app->add_option("--baseline", o->baseline,
+                                   "write what a later --compare needs into this file");
   app->add_flag("--fly-on", o->setup.fly_on, "a collision does not end a flight");
-  app->add_flag("--list", o->list, "print one command per flight and fly nothing");
-  app->add_flag("--fly", o->fly, "fly the one flight that is named and gather nothing");
+  auto* list = app->add_flag("--list", o->list, "print one command per flight and fly nothing");
+  app->add_flag("--fly", o->fly, "fly the one flight that is named and gather nothing")
+      ->excludes(compare, baseline, list);
   app->add_flag("--quiet", o->quiet, "no progress bar");
 }
 

@@ -20,7 +20,8 @@ constexpr int64_t kWait = 20'000;  // us at a time for messages
 enum Exit { kAccepted = 0, kBadUse = 1, kRefused = 2, kNoAnswer = 3, kNotReached = 4 };
 
 struct Arguments {
-  std::string command, vehicle, url;
+  std::string command, vehicle, url, key_file;
+  std::vector<double> place;  // px
   bool wait = false, force = false;
   double timeout = 120.0;
 };
@@ -28,8 +29,8 @@ struct Arguments {
 /// The command on its way, and the flight's state meanwhile.
 class Session {
  public:
-  Session(bus::UdpBus* bus, int kind, bool force)
-      : bus_(*bus), start_(bus->Now()), call_(*bus, kind, bus->identity().start, force) {
+  Session(bus::UdpBus* bus, int kind, const std::vector<double>& arguments)
+      : bus_(*bus), start_(bus->Now()), call_(*bus, kind, bus->identity().start, arguments) {
     bus_.Subscribe<command_ack_t>("COMMAND_ACK", [this](const command_ack_t& m) { call_.Hear(m); });
     bus_.Subscribe<flight_state_t>("FLIGHT_STATE", [this](const flight_state_t& m) {
       state_ = std::string(Name(static_cast<State>(m.state))) + ": " + m.reason;
@@ -66,8 +67,9 @@ int AwaitAnswer(const Arguments& a, Session* session) {
   while (!call.answered() && !call.GaveUp()) session->Turn();
   if (!call.answered())
     return Fail(kNoAnswer,
-                fmt::format("{}: no answer{}; does chase-mission run{}?", a.command,
+                fmt::format("{}: no answer{}; does chase-{} run{}?", a.command,
                             session->state().empty() ? "" : ", though FLIGHT_STATE is heard",
+                            a.command == "select" ? "perception" : "mission",
                             a.vehicle.empty() ? "" : " on vehicle '" + a.vehicle + "'"));
   if (!call.accepted()) return Fail(kRefused, "refused: " + call.reason());
   fmt::print("{}\n", call.reason());
@@ -90,9 +92,17 @@ int AwaitEnd(const Arguments& a, Session* session) {
 int Run(const Arguments& a) {
   if (a.force && a.command != "kill")
     return Fail(kBadUse, "--force belongs to kill; see chase-command --help");
-  bus::UdpBus bus(a.url, a.vehicle);
+  if (a.command == "select" ? a.place.size() != 2 : !a.place.empty())
+    return Fail(kBadUse,
+                "select X Y takes a column and a row of the image, px, and no other command "
+                "does; see chase-command --help");
+  if (a.wait && a.command == "select")
+    return Fail(kBadUse,
+                "--wait belongs to commands that move the vehicle; see chase-command --help");
+  bus::UdpBus bus(a.url, a.vehicle, bus::LoadSeal(a.key_file));
   bus.SetIdentity({"command", a.vehicle, bus.Now()});
-  Session session(&bus, *world::CommandNamed(a.command), a.force);
+  Session session(&bus, *world::CommandNamed(a.command),
+                  a.force ? std::vector<double>{1.0} : a.place);
   const int code = AwaitAnswer(a, &session);
   return code == kAccepted && a.wait ? AwaitEnd(a, &session) : code;
 }
@@ -107,15 +117,23 @@ std::string TimeoutProblem(const std::string& text) {
 void AddOptions(CLI::App* app, Arguments* a) {
   const char* env = std::getenv("LCM_DEFAULT_URL");
   a->url = env != nullptr && *env != '\0' ? env : bus::kDefaultUrl;
-  app->add_option("command", a->command, "takeoff, chase, hold, search, return, land, stop or kill")
+  app->add_option("command", a->command,
+                  "takeoff, chase, hold, search, return, land, stop, kill or select")
       ->required()
       ->check(CLI::IsMember(
           std::vector<std::string>(world::kCommandNames.begin(), world::kCommandNames.end())));
+  app->add_option("place", a->place,
+                  "of select: X Y, column and row of the target in the image, px")
+      ->expected(0, 2);
   app->add_option("--vehicle", a->vehicle, "channel prefix of the vehicle that is meant");
-  app->add_flag("--wait", a->wait,
-                "until the flight is there: in the air, chasing, holding, landed");
+  app->add_option("--key-file", a->key_file,
+                  "64 hexadecimal digits that the vehicle's messages are sealed with");
+  auto* wait = app->add_flag("--wait", a->wait,
+                             "until the flight is there: in the air, chasing, holding, landed");
   app->add_flag("--force", a->force, "of kill, which cuts the motors wherever it is, and it falls");
-  app->add_option("--timeout", a->timeout, "of --wait, s (default 120)")->check(TimeoutProblem);
+  app->add_option("--timeout", a->timeout, "of --wait, s (default 120)")
+      ->check(TimeoutProblem)
+      ->needs(wait);
   app->add_option("--lcm-url", a->url, "LCM provider (default: $LCM_DEFAULT_URL, else built in)");
   app->footer(
       "Exit codes: 0 accepted (with --wait: and reached), 1 bad use, 2 refused, 3 no answer "

@@ -40,6 +40,9 @@ Faults::Faults(const std::vector<world::FaultSpec>& faults, int64_t mission_star
       Plan(
           fault, [this, lockstep, &kind] { lockstep->SetLoss(kind.amount, random_.Next()); },
           [=] { lockstep->SetLoss(0.0, 0); });
+    if (kind.effect == Effect::kLoad)
+      Plan(
+          fault, [=] { lockstep->SetLoad(kind.amount); }, [=] { lockstep->SetLoad(1.0); });
     if (kind.effect == Effect::kFlood)
       Plan(
           fault, [this, &kind, end = Utime(fault.at + fault.duration)] { Flood(kind.amount, end); },

@@ -102,8 +102,9 @@ FlightConfigs Configure(const world::Scenario& scenario, const FlightOptions& op
   Override(scenario, "planning", &configs.planning);
   configs.control.tracking_tube = configs.planning.planner.tracking_tube;
   configs.control.sigmas = configs.planning.planner.sigmas;
-  Override(scenario, "control", &configs.control);
   Override(scenario, "mission", &configs.mission);
+  configs.control.geofence = configs.mission.geofence;
+  Override(scenario, "control", &configs.control);
   DeriveDrivers(&configs);
   if (!options.sensors.empty()) configs.simulator.sensors = options.sensors;
   if (!options.planner.empty()) configs.planning.planner_name = options.planner;

@@ -185,8 +185,9 @@ void AddOptions(CLI::App* app, Arguments* a) {
   app->add_option("--sensors", a->options.sensors, "raw or truth (default: the scenario's)")
       ->check(CLI::IsMember({"raw", "truth"}));
   app->add_option("--planner", a->options.planner, "planning algorithm (default: chase)");
-  app->add_option("--log", a->log, "record every message into this LCM log");
-  app->add_option("--metrics", a->metrics, "write the figures of the flight into this JSON file");
+  auto* log = app->add_option("--log", a->log, "record every message into this LCM log");
+  auto* metrics = app->add_option("--metrics", a->metrics,
+                                  "write the figures of the flight into this JSON file");
   app->add_option("--fault", a->options.faults,
                   "NAME or NAME@SECONDS of mission time, besides the scenario's; repeatable");
   app->add_flag("--end-on-collision", a->end_on_collision,
@@ -194,7 +195,8 @@ void AddOptions(CLI::App* app, Arguments* a) {
   app->add_option("--until", a->options.until, "stop at this mission time, s")
       ->check(MissionTimeProblem);
   app->add_option("--print-config", a->print_config,
-                  "print the configuration of this process in this scenario and exit");
+                  "print the configuration of this process in this scenario and exit")
+      ->excludes(log, metrics);
   app->add_flag("--quiet", a->quiet, "no progress line");
 }
 

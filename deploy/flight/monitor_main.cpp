@@ -55,7 +55,13 @@ int main(int argc, char** argv) {
   std::string url = env != nullptr ? env : chase::bus::kDefaultUrl, prefix;
   app.add_option("--lcm-url", url, "LCM provider (default: $LCM_DEFAULT_URL, else built in)");
   app.add_option("--channel-prefix", prefix, "put in front of every channel's name");
-  CLI11_PARSE(app, argc, argv);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    if (e.get_exit_code() == 0) return app.exit(e);
+    fmt::print(stderr, "chase-flight-monitor: {}; see chase-flight-monitor --help\n", e.what());
+    return 1;
+  }
   std::signal(SIGINT, [](int) { stop_requested = 1; });
   std::signal(SIGTERM, [](int) { stop_requested = 1; });
   try {

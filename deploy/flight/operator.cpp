@@ -16,7 +16,8 @@ void Operator::Tick(int64_t utime) {
   if (static_cast<size_t>(id_) >= commands_.size()) return;
   const world::CommandSpec& next = commands_[static_cast<size_t>(id_)];
   if (!call_ && bus::Seconds(utime, mission_start_) >= next.at_s)
-    call_.emplace(bus_, *world::CommandNamed(next.command), id_, next.command == "kill");
+    call_.emplace(bus_, *world::CommandNamed(next.command), id_,
+                  next.command == "kill" ? std::vector<double>{1.0} : next.at_px);
   if (!call_) return;
   call_->Turn();
   if (!call_->answered() && !call_->GaveUp()) return;

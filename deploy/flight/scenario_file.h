@@ -4,8 +4,8 @@
 
 namespace chase::flight {
 
-/// The absolute path of a scenario that is given as a file, or by its name in deploy/scenarios or
-/// deploy/scenarios/twelve. Throws std::runtime_error, one line, where there is neither.
+/// The absolute path of a scenario that is given as a file, or by its name in share/chase/scenarios
+/// or its folder twelve. Throws std::runtime_error, one line, where there is neither.
 std::string ScenarioFile(const std::string& scenario);
 
 }  // namespace chase::flight

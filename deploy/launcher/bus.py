@@ -64,11 +64,11 @@ def route_cure(group):
 
 
 def loopback_problem(group, port):
-    """Sends one LCM message to ourselves; a sentence where it does not come back, else ''."""
+    """Sends ourselves a packet that LCM passes over; a sentence where it does not come back, else ''."""
     if not address(group).is_multicast:
         return (f"{group} is no multicast address; cure: use one of 224.0.0.0 to 239.255.255.255, "
                 "such as 239.255.76.67")
-    packet = b"LC02" + struct.pack(">I", 0) + b"LOOPBACK_%d\0" % os.getpid()
+    packet = b"chase loopback %d" % os.getpid()
     try:
         with listener(group, port) as receiver:
             send(packet, group, port)
@@ -125,7 +125,7 @@ def foreign_channels(group, port, seconds):
     before a flight. LCM binds every address: other groups on the same port are heard as well."""
     with listener(group, port) as sock:
         heard = {channel_of(p) for p in packets(sock, time.monotonic() + seconds)}
-    return sorted(c for c in heard if c and not c.startswith("LOOPBACK_"))
+    return sorted(c for c in heard if c)
 
 
 def kernel(name):

@@ -13,12 +13,12 @@ import sys
 import time
 
 import bus
+import places
 import processes
 import results
 import version
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
-BIN = ROOT / "build" / "bin"
+ROOT, BIN = places.ROOT, places.BIN
 SILENCE_LIMIT = 30.0  # s of wall time in which the mission's time must move
 TAIL = 1.0  # s recorded after the mission's end
 KEEP_FREE = 200  # MB of disk below which sweeps and images are no longer recorded
@@ -32,9 +32,20 @@ class FlightError(Exception):
     """One line: what, where, cure."""
 
 
+def kill_wish(text):
+    """(process, mission time in s) of P@SECONDS."""
+    name, _, seconds = text.partition("@")
+    killable = [row["name"] for row in flight_processes() if row["restart"] == "always"]
+    if name not in killable:
+        raise argparse.ArgumentTypeError(f"{text}: no process '{name}' to kill; there are: {', '.join(killable)}")
+    if not re.fullmatch(r"\d+(\.\d+)?", seconds):
+        raise argparse.ArgumentTypeError(f"{text}: '{seconds}' is no mission time in s; give {name}@SECONDS, 0 or more")
+    return name, float(seconds)
+
+
 class Parser(argparse.ArgumentParser):
     def error(self, message):
-        raise FlightError(f"{message}; see deploy/fly --help")
+        raise FlightError(f"{message}; see {places.command('fly')} --help")
 
 
 def seed_number(text):
@@ -44,19 +55,21 @@ def seed_number(text):
 
 
 def parse(arguments):
-    parser = Parser(prog="deploy/fly", description=__doc__)
+    parser = Parser(prog=places.command("fly"), description=__doc__)
     parser.add_argument("scenario", nargs="?", default="gym",
-                        help="name in deploy/scenarios, or a file (default: gym)")
+                        help="name of a scenario, or a file (default: gym)")
     parser.add_argument("--seed", type=seed_number, default=1, help="of noise and gusts (default: 1)")
     parser.add_argument("--version", action="version", version=version.text())
     parser.add_argument("--hardware", action="store_true",
                         help="through the drivers: MAVLink, VLP-16 packets and a video stream in LCM's place")
     parser.add_argument("--view", action="store_true", help="look on in a browser, at http://localhost:8080")
+    parser.add_argument("--kill", type=kill_wish, action="append", default=[], metavar="P@SECONDS",
+                        help="kill -9 of process P at that mission time; it is started anew (may be repeated)")
     return parser.parse_args(arguments)
 
 
 def find_scenario(name):
-    scenarios = ROOT / "deploy" / "scenarios"
+    scenarios = places.SHARE / "scenarios"
     for path in (scenarios / f"{name}.yaml", pathlib.Path(name)):
         if path.is_file():
             return path.resolve()
@@ -68,7 +81,7 @@ def find_scenario(name):
 
 
 def process_table():
-    table = ROOT / "deploy" / "processes.json"
+    table = places.SHARE / "processes.json"
     try:
         return processes.read_table(table.read_bytes(), table.name)
     except processes.TableError as error:
@@ -84,14 +97,14 @@ def driver_processes(hardware):
 
 
 def set_up():
-    if subprocess.run([ROOT / "deploy" / "setup"], check=False).returncode:
+    if not places.INSTALLED and subprocess.run([ROOT / "deploy" / "setup"], check=False).returncode:
         raise FlightError("the set-up failed; its message above says why")
 
 
 def build(*programs):
     """These programs, and nothing else that the tree holds."""
     command = [ROOT / "deploy" / "build", "build", "--", *programs]
-    if subprocess.run(command, check=False).returncode:
+    if not places.INSTALLED and subprocess.run(command, check=False).returncode:
         raise FlightError("the build failed; its messages above say why")
 
 
@@ -174,12 +187,13 @@ def write_config(folder, scenario, seed, name):
 class Flight:
     """The processes of one flight and the folder that they leave."""
 
-    def __init__(self, scenario, seed, url, commands=(), hardware=False):
+    def __init__(self, scenario, seed, url, commands=(), kills=(), hardware=False):
         self.folder = flight_folder(scenario)
         self.scenario, self.seed, self.hardware = scenario, seed, hardware
         self.env = {"LCM_DEFAULT_URL": url}
         self.services, self.logger, self.monitor, self.viewer = [], None, None, None
         self.commands, self.given = list(commands), []
+        self.kills = sorted(kills, key=lambda kill: kill[1])
 
     def child(self, name, command, **options):
         return processes.Child(name, command, self.folder / f"{name}.log", self.env, **options)
@@ -224,12 +238,11 @@ class Flight:
 
     def complain(self, *watchers, mend=True):
         """Restarts what may be restarted; else raises when a process has ended or hangs."""
-        child, sentence = processes.first_problem(self.services + [self.logger, *watchers])
-        if child and child.restarts and mend:
-            print(f"\n{sentence}: restarted", file=sys.stderr)
-            child.restart()
-        elif child:
-            raise FlightError(f"{sentence}; the end of {child.log}:\n{child.log_tail()}")
+        for child, sentence in processes.problems(self.services + [self.logger, *watchers]):
+            if not (child.restarts and mend):
+                raise FlightError(f"{sentence}; the end of {child.log}:\n{child.log_tail()}")
+            if child.mend():
+                print(f"\n{sentence}: restarted", file=sys.stderr, flush=True)
 
     def command(self, mission_time):
         """Gives the operator's commands that are due."""
@@ -238,9 +251,18 @@ class Flight:
             self.given.append(self.child(f"command-{len(self.given) + 1}-{name}",
                                          [BIN / "chase-command", name]))
 
+    def kill(self, mission_time):
+        """Kills whose time has come."""
+        while self.kills and self.kills[0][1] <= mission_time:
+            name, _ = self.kills.pop(0)
+            child = next(c for c in self.services if c.name == name)
+            print(f"\nt {mission_time:6.1f} s: kill -9 of {name}", file=sys.stderr, flush=True)
+            child.process.kill()
+            child.process.wait()
+
     def watch(self):
         """Shows progress until the mission's end."""
-        last_time, moved = None, time.monotonic()
+        last_time, moved, speed = None, time.monotonic(), 0.0
         while True:
             line = self.monitor.process.stdout.readline()
             if line:
@@ -251,6 +273,9 @@ class Flight:
                     return
                 if progress["mission_time"] != last_time:
                     last_time, moved = progress["mission_time"], time.monotonic()
+                    speed = progress["rtf"]
+            if last_time is not None:  # progress comes once a second
+                self.kill(last_time + speed * (time.monotonic() - moved))
             self.complain(self.monitor)
             if time.monotonic() - moved > SILENCE_LIMIT:
                 raise FlightError(f"the mission's time has not moved for {SILENCE_LIMIT:.0f} s; "
@@ -297,7 +322,7 @@ def fly(options):
     raise_receive_buffers()
     url = bus.url()
     check_bus(url)
-    flight = Flight(scenario, options.seed, url, commands, options.hardware)
+    flight = Flight(scenario, options.seed, url, commands, options.kill, options.hardware)
     print(f"flying {scenario.stem}, seed {options.seed}, into {flight.folder}", flush=True)
     try:
         flight.start(options.view)
@@ -316,9 +341,9 @@ def main():
     try:
         return fly(parse(sys.argv[1:]))
     except FlightError as error:
-        print(f"deploy/fly: {error}", file=sys.stderr)
+        print(f"{places.command('fly')}: {error}", file=sys.stderr)
     except KeyboardInterrupt:
-        print("deploy/fly: stopped; everything it started has ended", file=sys.stderr)
+        print(f"{places.command('fly')}: stopped; everything it started has ended", file=sys.stderr)
     return 1
 
 

@@ -15,11 +15,14 @@ PR_SET_PDEATHSIG = 1
 READY_LIMIT = 30.0  # s
 RETRY_AFTER = 12.0  # s without READY after which a process is started once more
 WATCHDOG_LIMIT = 10.0  # s without a sign of life, once ready
+SHORT_LIFE = 5.0  # s; who dies sooner after its start than that, and again, is started anew ever later:
+BACK_OFF = (0.0, 0.5, 1.0, 2.0, 4.0)  # s, by the number of such deaths before in a row
 STOP_LIMIT = 5.0  # s from SIGINT to SIGKILL
 
 
 # Of a row of the process table (deploy/processes.json).
-FIELDS = {"name": str, "binary": str, "heavy": bool, "fly": bool, "restart": str, "nice": int}
+FIELDS = {"name": str, "binary": str, "heavy": bool, "fly": bool, "vehicle": bool, "restart": str, "nice": int,
+          "priority": int, "cores": str}
 RESTARTS = ("always", "never")
 
 
@@ -56,6 +59,10 @@ def _row_problem(row):
         return f"binary is {row['binary'][:40]!r}; it begins with chase-"
     if row["restart"] not in RESTARTS:
         return f"restart is {row['restart'][:40]!r}; it is one of {', '.join(RESTARTS)}"
+    if not 0 <= row["priority"] <= 99:
+        return f"priority is {row['priority']}, outside 0 (no real time) to 99"
+    if not re.fullmatch(r"|\d{1,4}(-\d{1,4})?( \d{1,4}(-\d{1,4})?)*", row["cores"]):
+        return f"cores is {row['cores'][:40]!r}; it is like '0 2-3', or empty for any"
     return "" if -20 <= row["nice"] <= 19 else "nice is outside -20 to 19"
 
 
@@ -85,6 +92,7 @@ class Child:
     def __init__(self, name, command, log, env=None, notifies=False, restarts=False, stdout=None):
         self.name, self.log, self.restarts = name, log, restarts
         self._command, self._stdout, self._retried = command, stdout, False
+        self._deaths, self._restart_at = 0, None  # in a row, each soon after a start
         self._environment = dict(os.environ, **(env or {}))
         self._environment.pop("NOTIFY_SOCKET", None)
         self._socket = self._notify_socket() if notifies else None
@@ -92,11 +100,25 @@ class Child:
 
     def start(self):
         self._ready = not self._socket
-        self._last_sign = time.monotonic()
+        self._last_sign = self._started = time.monotonic()
+        self._restart_at = None
         with open(self.log, "ab") as file:
             self.process = subprocess.Popen(
                 self._command, stdin=subprocess.DEVNULL, stdout=self._stdout or file, stderr=file,
                 env=self._environment, start_new_session=True, preexec_fn=_die_with_parent)
+
+    def mend(self):
+        """Starts it anew once the back-off is over; True when it did."""
+        now = time.monotonic()
+        if self._restart_at is None:
+            if now - self._started >= SHORT_LIFE:
+                self._deaths = 0
+            self._restart_at = now + BACK_OFF[min(self._deaths, len(BACK_OFF) - 1)]
+            self._deaths += 1
+        if now < self._restart_at:
+            return False
+        self.restart()
+        return True
 
     def restart(self):
         self.process.kill()  # where it hangs rather than has ended
@@ -163,12 +185,14 @@ class Child:
                 opened.close()
 
 
+def problems(children):
+    """(child, sentence) of each that has ended or hangs."""
+    return [(child, sentence) for child in children if (sentence := child.problem())]
+
+
 def first_problem(children):
-    """(child, sentence) of the first that has ended or hangs, or (None, '')."""
-    for child in children:
-        if sentence := child.problem():
-            return child, sentence
-    return None, ""
+    """The first of them, or (None, '')."""
+    return next(iter(problems(children)), (None, ""))
 
 
 def wait_ready(children):

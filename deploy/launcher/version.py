@@ -1,15 +1,17 @@
 """What --version says, in the words of the C++ programs."""
 
-import pathlib
 import re
 import subprocess
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
+import places
 
 
 def text():
-    number = re.search(r"project\(chase VERSION (\S+)", (ROOT / "CMakeLists.txt").read_text(encoding="utf-8"))[1]
-    command = ["git", "-C", ROOT, "describe", "--always", "--dirty", "--abbrev=10", "--exclude=*"]
+    if places.INSTALLED:
+        command = [places.BIN / "chase-scenario", "--version"]
+        return subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()
+    number = re.search(r"project\(chase VERSION (\S+)", (places.ROOT / "CMakeLists.txt").read_text(encoding="utf-8"))[1]
+    command = ["git", "-C", places.ROOT, "describe", "--always", "--dirty", "--abbrev=10", "--exclude=*"]
     try:
         answer = subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()
     except (OSError, subprocess.CalledProcessError):

@@ -40,6 +40,15 @@ const std::vector<std::pair<const char*, Better>>& Keys() {
       {"target_rmse_m", Better::kLower},
       {"prediction_error_m", Better::kLower},
       {"real_time_factor", Better::kHigher},
+      {"pose_sigma_max_m", Better::kLower},
+      {"target_known_ratio", Better::kHigher},
+      {"certified_ratio", Better::kHigher},
+      {"tracking_error_m.p50", Better::kLower},
+      {"tracking_error_m.p99", Better::kLower},
+      {"latency_ms.POSE.p99", Better::kLower},
+      {"latency_ms.TARGET.p99", Better::kLower},
+      {"latency_ms.OBSTACLES.p99", Better::kLower},
+      {"stages_ms.planning plan.p99", Better::kLower},
       {"touchdown_speed_mps", Better::kLower},
       {"motors_off_s", Better::kLower},
   };
@@ -83,10 +92,10 @@ std::vector<ComparedFigure> CompareMetrics(const std::string& a, const std::stri
   for (const auto& [key, better] : Keys())
     figures.push_back(Figure(key, At(before, key), At(after, key), better, tolerance));
   std::map<std::string, std::pair<std::string, std::string>> criteria;
-  for (const auto& [name, passed] : before["criteria"].items())
-    criteria[name].first = passed.get<bool>() ? "passed" : "FAILED";
-  for (const auto& [name, passed] : after["criteria"].items())
-    criteria[name].second = passed.get<bool>() ? "passed" : "FAILED";
+  const auto word = [](const Json& passed) { return passed.get<bool>() ? "passed" : "FAILED"; };
+  const Json held_before = At(before, "criteria"), held_after = At(after, "criteria");
+  for (const auto& [name, passed] : held_before.items()) criteria[name].first = word(passed);
+  for (const auto& [name, passed] : held_after.items()) criteria[name].second = word(passed);
   for (const auto& [name, held] : criteria)
     figures.push_back({"criteria." + name, held.first, held.second,
                        held.first == "passed" && held.second != "passed"});

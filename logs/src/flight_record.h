@@ -86,6 +86,7 @@ struct PerceivedObstacle {
 struct FlightRecord {
   world::Scenario scenario;
   int64_t seed = 0;
+  int64_t origin_utime = 0;        ///< of mission time zero, microseconds
   std::vector<TruthSample> truth;  ///< 100 Hz, in time order
   std::vector<PoseSample> poses;
   std::vector<TargetSample> targets;

@@ -104,6 +104,10 @@ std::vector<std::string> LogInfo::Software() const {
   return lines;
 }
 
+std::map<std::string, TextByProcess> LogInfo::SoftwareByKind() const {
+  return {{"versions", versions}, {"hosts", hosts}, {"configurations", configurations}};
+}
+
 bool LogInfo::Recorded() const {
   return Whole() && std::all_of(channels.begin(), channels.end(), [](const ChannelInfo& c) {
            return c.MissingShare() <= kTolerableShare || HeavyUnderAnyPrefix(c.channel);

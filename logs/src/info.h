@@ -30,18 +30,22 @@ struct ChannelInfo {
   double MissingShare() const;
 };
 
+using TextByProcess = std::map<std::string, std::string>;
+
 struct LogInfo {
   std::string file;
   int64_t bytes = 0;
   std::vector<ChannelInfo> channels;  ///< by name
   /// By process, of its status messages; hosts and configurations (`cksum` of what --dump-config
   /// prints) of live ones only.
-  std::map<std::string, std::string> versions, hosts, configurations;
+  TextByProcess versions, hosts, configurations;
   std::string scenario;  ///< name and seed; empty: there is none
   std::vector<Damage> damage;
 
   /// Lines of versions, hosts and configurations.
   std::vector<std::string> Software() const;
+  /// The same for programs: "versions", "hosts", "configurations".
+  std::map<std::string, TextByProcess> SoftwareByKind() const;
   bool Whole() const { return damage.empty(); }
   /// Whole, and no channel that figures are computed from has lost more than a hundredth: beyond
   /// that a 99th percentile says nothing. What is too heavy to be always recorded does not count.

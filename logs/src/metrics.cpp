@@ -133,7 +133,7 @@ void AddLosses(const LogInfo& log, Metrics* m) {
     m->lost_messages[c.channel] = c.missing;
     m->longest_gap_s[c.channel] = 1e-6 * static_cast<double>(c.longest_gap);
   }
-  m->software = log.Software();
+  m->software = log.SoftwareByKind();
   m->losses = log.Losses();
   m->log_whole = log.Whole();
 }

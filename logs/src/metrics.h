@@ -36,19 +36,19 @@ struct Metrics {
   std::map<int, double> verdict_s;      ///< time under each of plan_t's verdicts
   std::map<std::string, double> cpu_s;  ///< by process
   Figure real_time_factor;
-  std::string fault;                             ///< names of those that struck, joined by +
-  double fault_time_s = -1.0;                    ///< mission time of the first; -1: none
-  double flown_s = 0.0;                          ///< of the mission
-  double collision_s = -1.0;                     ///< mission time of the first contact; -1: none
-  std::string collided_with;                     ///< as Scorer::Nearest() names it; empty: nothing
-  std::map<std::string, int64_t> lost_messages;  ///< by channel, by `seq`
-  std::map<std::string, double> longest_gap_s;   ///< by channel, between the log's events
-  std::vector<std::string> software;             ///< lines of versions, hosts, configurations
-  std::vector<std::string> losses;               ///< a line for each, for people
-  bool log_whole = true;                         ///< neither cut off nor damaged
-  std::vector<StateFigures> flight_states;       ///< in their order; none without a mission process
-  Figure touchdown_speed_mps;                    ///< of the landing that ended the flight
-  Figure motors_off_s;                           ///< after touchdown
+  std::string fault;                              ///< names of those that struck, joined by +
+  double fault_time_s = -1.0;                     ///< mission time of the first; -1: none
+  double flown_s = 0.0;                           ///< of the mission
+  double collision_s = -1.0;                      ///< mission time of the first contact; -1: none
+  std::string collided_with;                      ///< as Scorer::Nearest() names it; empty: nothing
+  std::map<std::string, int64_t> lost_messages;   ///< by channel, by `seq`
+  std::map<std::string, double> longest_gap_s;    ///< by channel, between the log's events
+  std::map<std::string, TextByProcess> software;  ///< versions, hosts, configurations
+  std::vector<std::string> losses;                ///< a line for each, for people
+  bool log_whole = true;                          ///< neither cut off nor damaged
+  std::vector<StateFigures> flight_states;  ///< in their order; none without a mission process
+  Figure touchdown_speed_mps;               ///< of the landing that ended the flight
+  Figure motors_off_s;                      ///< after touchdown
   std::map<std::string, bool> criteria;
 
   bool Passed() const;

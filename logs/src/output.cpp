@@ -1,5 +1,7 @@
 #include "logs/src/output.h"
 
+#include <algorithm>
+#include <cstdint>
 #include <filesystem>
 #include <fstream>
 #include <stdexcept>
@@ -28,6 +30,20 @@ void RequireWritable(const std::string& file) {
   const bus::PartFile part(file);
   if (std::filesystem::is_directory(file) || !std::ofstream(part.name()).is_open())
     throw std::runtime_error(file + ": cannot be written; check the folder and its rights");
+}
+
+std::string Base64(const std::string& bytes) {
+  constexpr char kDigits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string text;
+  text.reserve(4 * (bytes.size() + 2) / 3);
+  for (size_t i = 0; i < bytes.size(); i += 3) {
+    const size_t count = std::min<size_t>(bytes.size() - i, 3);
+    unsigned value = 0;
+    for (size_t k = 0; k < 3; ++k)
+      value = value << 8 | (k < count ? static_cast<uint8_t>(bytes[i + k]) : 0U);
+    for (size_t k = 0; k < 4; ++k) text += k <= count ? kDigits[value >> (18 - 6 * k) & 63U] : '=';
+  }
+  return text;
 }
 
 }  // namespace chase::logs

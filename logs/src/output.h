@@ -25,6 +25,9 @@ class OutputFile {
 /// std::runtime_error with one line.
 void WriteFile(const std::string& file, const std::string& text);
 
+/// Bytes as text (RFC 4648, section 4).
+std::string Base64(const std::string& bytes);
+
 /// Throws what WriteFile would throw, before there is anything to write: for a file that is asked
 /// for at the start and written at the end.
 void RequireWritable(const std::string& file);

@@ -28,6 +28,8 @@ std::string FillPage(const std::string& template_file,
   return page;
 }
 
+std::string PartOfPage(const std::string& file) { return ReadText(file, "build again"); }
+
 std::string Embedded(std::string json) {
   for (size_t at = 0; (at = json.find("</", at)) != std::string::npos; at += 3)
     json.replace(at, 2, "<\\/");

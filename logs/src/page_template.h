@@ -11,6 +11,9 @@ namespace chase::logs {
 std::string FillPage(const std::string& template_file,
                      const std::vector<std::pair<std::string, std::string>>& marks);
 
+/// A style sheet or a script that a template is filled with.
+std::string PartOfPage(const std::string& file);
+
 /// JSON that may stand inside a script element.
 std::string Embedded(std::string json);
 

@@ -62,7 +62,7 @@ class Gatherer {
     FlightRecord record;
     record.scenario = world::ParseScenario(scenario_->yaml, log + ": SCENARIO");
     record.seed = scenario_->seed;
-    origin_ = MissionStart(truth_.front());
+    record.origin_utime = origin_ = MissionStart(truth_.front());
     AddTruth(&record);
     AddStates(&record);
     AddEstimates(&record);

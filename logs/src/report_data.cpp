@@ -133,27 +133,8 @@ void AddCertified(const FlightRecord& record, const std::vector<SampleScore>& sc
   }
 }
 
-/// Goes on with the lane's last span where the label is the same.
-void AddSpan(const std::string& lane, const std::string& label, double t,
-             std::vector<ReportData::Span>* spans) {
-  const bool goes_on = !spans->empty() && spans->back().lane == lane;
-  if (goes_on) spans->back().to = t;
-  if (!goes_on || spans->back().label != label) spans->push_back({lane, label, t, t});
-}
-
-void AddTimeLine(const FlightRecord& record, ReportData* data) {
-  std::vector<ReportData::Span>* spans = &data->spans;
-  const double end = record.truth.empty() ? 0.0 : record.truth.back().t;
-  const auto finish = [&] {
-    if (!spans->empty()) spans->back().to = std::max(spans->back().to, end);
-  };
-  for (const StateSample& s : record.states) AddSpan("flight", StateName(s.state), s.t, spans);
-  finish();
-  for (const PlanSample& s : record.plans) AddSpan("verdict", VerdictName(s.verdict), s.t, spans);
-  if (!record.plans.empty()) finish();
-  for (const TargetSample& s : record.targets)
-    AddSpan("target", s.tracking ? "tracked" : "not tracked", s.t, spans);
-  for (const FaultSample& s : record.faults) spans->push_back({"fault", s.name, s.t, s.t});
+void AddFaults(const FlightRecord& record, ReportData* data) {
+  for (const FaultSample& s : record.faults) data->spans.push_back({"fault", s.name, s.t, s.t});
 }
 
 void AddCosts(const FlightRecord& record, ReportData* data) {
@@ -190,6 +171,12 @@ nlohmann::ordered_json ToJson(const ReportData::Series& s) {
   return {{"t", t}, {"value", value}};
 }
 
+/// 1 where the line of sight is blocked.
+nlohmann::ordered_json Blocked(ReportData::Series visible) {
+  for (double& v : visible.value) v = 1.0 - v;
+  return ToJson(visible);
+}
+
 }  // namespace
 
 ReportData PrepareReport(const FlightRecord& record, const std::vector<SampleScore>& scores) {
@@ -200,7 +187,7 @@ ReportData PrepareReport(const FlightRecord& record, const std::vector<SampleSco
   AddPaths(record, &data);
   AddSeries(record, scores, &data);
   AddCertified(record, scores, &data);
-  AddTimeLine(record, &data);
+  AddFaults(record, &data);
   AddCosts(record, &data);
   return data;
 }
@@ -225,7 +212,7 @@ nlohmann::ordered_json ToJson(const ReportData& d) {
   j["spans"] = nlohmann::ordered_json::array();
   for (const ReportData::Span& s : d.spans)
     j["spans"].push_back({{"lane", s.lane}, {"label", s.label}, {"from", s.from}, {"to", s.to}});
-  j["visible"] = ToJson(d.visible);
+  j["blocked"] = Blocked(d.visible);
   j["visible_share"] = ToJson(d.visible_share);
   j["pixel_u"] = ToJson(d.pixel_u);
   j["pixel_v"] = ToJson(d.pixel_v);

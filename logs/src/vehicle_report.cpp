@@ -3,12 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <stdexcept>
+#include <optional>
 #include <utility>
 #include <vector>
 
 #include "chase/attitude_setpoint_t.hpp"
 #include "chase/flight_state_t.hpp"
+#include "chase/geofence_t.hpp"
 #include "chase/obstacles_t.hpp"
 #include "chase/plan_t.hpp"
 #include "chase/pose_t.hpp"
@@ -21,6 +22,7 @@
 #include "common/logs/message_types.h"
 #include "logs/src/flown_plans.h"
 #include "logs/src/landing_figures.h"
+#include "logs/src/lane.h"
 #include "logs/src/log_survey.h"
 
 namespace chase::logs {
@@ -28,8 +30,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr double kLongestStep = 1.0;  // s that a message may stand for until the next one comes
-constexpr double kShown = 0.1;        // s between points of the page
+constexpr double kShown = 0.1;  // s between points of the page
 constexpr const char* kHealths[] = {"ok", "degraded", "lost", "starting"};
 constexpr const char* kTargets[] = {"searching", "tracking", "occluded", "lost"};
 
@@ -39,33 +40,22 @@ bool EndsWith(const std::string& text, const std::string& end) {
 
 double Rounded(double v) { return std::round(v * 1e4) / 1e4; }
 
-/// Seconds under each name, and stretches of time with the same one.
-class Lane {
+/// Values over time, thinned to what an eye can see.
+class Series {
  public:
-  void Add(double t, const std::string& name) {
-    if (!spans_.empty()) {
-      const double step = std::clamp(t - last_, 0.0, kLongestStep);
-      seconds_[spans_.back().name] += step;
-      spans_.back().to = last_ + step;
-    }
-    if (spans_.empty() || spans_.back().name != name || t - last_ > kLongestStep)
-      spans_.push_back({name, t, t});
-    last_ = t;
+  void Add(double t, double value) {
+    if (t < next_ && t > next_ - kLongestGap) return;
+    next_ = t + kShown;
+    t_.push_back(Rounded(t));
+    value_.push_back(Rounded(value));
   }
-  const std::map<std::string, double>& seconds() const { return seconds_; }
-  void AddTo(const std::string& lane, Json* spans) const {
-    for (const Span& s : spans_)
-      spans->push_back({{"lane", lane}, {"label", s.name}, {"from", s.from}, {"to", s.to}});
-  }
+  Json ToJson() const { return {{"t", t_}, {"value", value_}}; }
+  bool empty() const { return t_.empty(); }
 
  private:
-  struct Span {
-    std::string name;
-    double from, to;  // s
-  };
-  std::vector<Span> spans_;
-  std::map<std::string, double> seconds_;
-  double last_ = 0.0;
+  static constexpr double kLongestGap = 10.0;  // s: farther back it is another time
+  double next_ = -1e9;
+  std::vector<double> t_, value_;
 };
 
 Json Quantiles(std::vector<double> values) {
@@ -84,33 +74,35 @@ Json Quantiles(std::vector<double> values) {
 
 class Gatherer {
  public:
+  explicit Gatherer(std::optional<int64_t> origin) : origin_(origin) {}
+
   void Add(const LogEvent& e) {
+    if (first_event_ == 0) first_event_ = e.utime;
     Take<pose_t>(e, "POSE", [this](const pose_t& m) { OnPose(m); });
     Take<target_t>(e, "TARGET", [this](const target_t& m) { OnTarget(m); });
     Take<plan_t>(e, "PLAN", [this](const plan_t& m) { OnPlan(m); });
-    Take<tracking_t>(e, "TRACKING", [this](const tracking_t& m) {
-      errors_.push_back(bus::ToVector(m.error).norm());
-    });
+    Take<tracking_t>(e, "TRACKING", [this](const tracking_t& m) { OnTracking(m); });
     Take<attitude_setpoint_t>(e, "ATTITUDE_SETPOINT", [](const auto&) {});
     Take<obstacles_t>(e, "OBSTACLES", [](const auto&) {});
     Take<flight_state_t>(e, "FLIGHT_STATE", [this](const flight_state_t& m) { OnState(m); });
+    Take<geofence_t>(e, "GEOFENCE", [this](const geofence_t& m) { fence_ = m.corners; });
     status_t status;
     if (EndsWith(e.channel, "_STATUS") && DecodeBytes(e.bytes, &status) &&
         bus::Problem(status).empty())
       statuses_[status.name] = status;
   }
 
-  VehicleReport Report(const std::string& log, const LogInfo& info) {
-    if (poses_ == 0 && plans_ == 0)
-      throw std::runtime_error(log +
-                               ": holds neither TRUTH nor POSE nor PLAN: no flight to report");
+  VehicleReport Report(const LogInfo& info) const {
     VehicleReport report;
+    report.flew = poses_ > 0 || plans_ > 0;
     report.whole = info.Whole();
+    report.origin = origin_.value_or(0);
+    report.log_begin = log_begin_;
     AddFigures(&report.metrics);
     AddStages(&report.metrics);
     for (const ChannelInfo& c : info.channels)
       report.metrics["lost_messages"][c.channel] = c.missing;
-    report.metrics["software"] = info.Software();
+    report.metrics["software"] = Json(info.SoftwareByKind());
     report.metrics["losses"] = info.Losses();
     report.metrics["log_whole"] = info.Whole();
     AddSeries(&report.series);
@@ -123,13 +115,16 @@ class Gatherer {
   void Take(const LogEvent& e, const std::string& name, F handle) {
     T m;
     if (!EndsWith(e.channel, name) || !DecodeBytes(e.bytes, &m) || !bus::Problem(m).empty()) return;
-    if (origin_ == 0) origin_ = m.utime;
+    if (!origin_) origin_ = m.utime;
+    if (latencies_.empty()) log_begin_ = Time(m.utime) - bus::Seconds(e.utime, first_event_);
     end_ = std::max(end_, Time(m.utime));
-    if (name != "PLAN")  // stamped with its start, which is ahead
+    if (name != "PLAN") {  // stamped with its start, which is ahead
       latencies_[name].push_back(1e3 * bus::Seconds(e.utime, m.utime));
+      latency_series_[name].Add(Time(m.utime), latencies_[name].back());
+    }
     handle(m);
   }
-  double Time(int64_t utime) const { return bus::Seconds(utime, origin_); }
+  double Time(int64_t utime) const { return bus::Seconds(utime, *origin_); }
 
   void OnPose(const pose_t& m) {
     const double t = Time(m.utime);
@@ -140,9 +135,13 @@ class Gatherer {
     if (poses_ > 1 && m.epoch != epoch_) ++frame_changes_;
     epoch_ = m.epoch;
     last_p_ = p;
-    speed_ = std::max(speed_, bus::ToVector(m.vel).norm());
-    sigma_ = std::max(sigma_,
-                      std::sqrt(std::max({m.covariance[0], m.covariance[10], m.covariance[20]})));
+    const double speed = bus::ToVector(m.vel).norm();
+    const double sigma =
+        std::sqrt(std::max({m.covariance[0], m.covariance[10], m.covariance[20], 0.0}));
+    speed_ = std::max(speed_, speed);
+    sigma_ = std::max(sigma_, sigma);
+    speeds_.Add(t, speed);
+    sigmas_.Add(t, sigma);
     if (t < next_shown_) return;
     next_shown_ = t + kShown;
     chaser_.emplace_back(p.x(), p.y());
@@ -153,7 +152,16 @@ class Gatherer {
     ++targets_;
     const bool known = m.state == target_t::TRACKING || m.state == target_t::OCCLUDED;
     tracked_ += known;
-    if (known && targets_ % 2 == 0) seen_.emplace_back(m.mean[0], m.mean[1]);  // 10 Hz
+    if (!known) return;
+    if (targets_ % 2 == 0) seen_.emplace_back(m.mean[0], m.mean[1]);  // 10 Hz
+    if (poses_ > 0) distances_.Add(Time(m.utime), (bus::ToVector(m.mean) - last_p_).norm());
+    const auto variances = {m.covariance[0], m.covariance[4], m.covariance[8], 0.0};
+    target_sigmas_.Add(Time(m.utime), std::sqrt(std::max(variances)));
+  }
+
+  void OnTracking(const tracking_t& m) {
+    errors_.push_back(bus::ToVector(m.error).norm());
+    error_series_.Add(Time(m.utime), errors_.back());
   }
 
   void OnPlan(const plan_t& m) {
@@ -162,7 +170,8 @@ class Gatherer {
     verdict_.Add(Time(m.utime), VerdictName(m.verdict));
     if (m.certified_clearance < 0.0) return;
     ++certified_;
-    clearance_.emplace_back(Time(m.utime), m.certified_clearance);
+    least_clearance_ = std::min(least_clearance_.value_or(1e9), m.certified_clearance);
+    clearances_.Add(Time(m.utime), m.certified_clearance);
   }
 
   void OnState(const flight_state_t& m) {
@@ -190,10 +199,7 @@ class Gatherer {
     j["fallbacks"] = fallbacks_;
     j["verdict_s"] = verdict_.seconds();
     j["certified_ratio"] = Share(certified_, plans_);
-    const auto least =
-        std::min_element(clearance_.begin(), clearance_.end(),
-                         [](const auto& a, const auto& b) { return a.second < b.second; });
-    j["certified_clearance_m"] = least == clearance_.end() ? Json() : Json(least->second);
+    j["certified_clearance_m"] = least_clearance_ ? Json(*least_clearance_) : Json();
     j["tracking_error_m"] = Quantiles(errors_);
     for (const auto& [channel, latencies] : latencies_)
       j["latency_ms"][channel] = Quantiles(latencies);
@@ -222,7 +228,18 @@ class Gatherer {
     Json& j = *series;
     j["chaser"] = Points(chaser_);
     j["target"] = Points(seen_);
-    j["clearance"] = Points(clearance_);
+    for (const auto& [name, values] : {std::pair("distance", &distances_),
+                                       {"certified", &clearances_},
+                                       {"speed", &speeds_},
+                                       {"tracking_error", &error_series_},
+                                       {"pose_sigma", &sigmas_},
+                                       {"target_sigma", &target_sigmas_}})
+      if (!values->empty()) j[name] = values->ToJson();
+    for (const auto& [channel, values] : latency_series_) j["latency"][channel] = values.ToJson();
+    for (size_t i = 0; i + 1 < fence_.size(); i += 2) {
+      j["geofence"]["x"].push_back(Rounded(fence_[i]));
+      j["geofence"]["y"].push_back(Rounded(fence_[i + 1]));
+    }
     j["spans"] = Json::array();
     flight_.AddTo("flight", &j["spans"]);
     verdict_.AddTo("verdict", &j["spans"]);
@@ -230,16 +247,20 @@ class Gatherer {
     health_.AddTo("pose", &j["spans"]);
   }
 
-  int64_t origin_ = 0;
-  double end_ = 0.0, next_shown_ = -1e9;  // s
+  std::optional<int64_t> origin_;
+  int64_t first_event_ = 0;                                 // by the log's stamps, us
+  double log_begin_ = 0.0, end_ = 0.0, next_shown_ = -1e9;  // s
   Lane health_, target_, verdict_, flight_;
   long poses_ = 0, targets_ = 0, tracked_ = 0, plans_ = 0, fallbacks_ = 0, certified_ = 0;
   int32_t epoch_ = 0;
   long frame_changes_ = 0;
   Eigen::Vector3d last_p_ = Eigen::Vector3d::Zero();
   double path_ = 0.0, speed_ = 0.0, sigma_ = 0.0;
-  std::vector<std::pair<double, double>> chaser_, seen_, clearance_;
-  std::vector<double> errors_;
+  std::vector<std::pair<double, double>> chaser_, seen_;
+  std::optional<double> least_clearance_;
+  Series distances_, clearances_, speeds_, sigmas_, target_sigmas_, error_series_;
+  std::map<std::string, Series> latency_series_;
+  std::vector<double> errors_, fence_;
   std::map<std::string, std::vector<double>> latencies_;
   std::map<std::string, status_t> statuses_;
   Json states_ = Json::array();
@@ -254,15 +275,15 @@ bool HoldsTruth(const std::string& log) {
   return false;
 }
 
-VehicleReport ReportVehicle(const std::string& log) {
+VehicleReport ReportVehicle(const std::string& log, std::optional<int64_t> origin) {
   LogReader reader(log);
-  Gatherer gatherer;
+  Gatherer gatherer(origin);
   LogSurvey survey;
   for (LogEvent e; reader.Next(&e);) {
     gatherer.Add(e);
     survey.Add(e);
   }
-  return gatherer.Report(log, survey.Take(reader));
+  return gatherer.Report(survey.Take(reader));
 }
 
 }  // namespace chase::logs

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cstdint>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 
 namespace chase::logs {
@@ -8,14 +10,18 @@ namespace chase::logs {
 /// Does the log hold TRUTH, as every simulated flight's does?
 bool HoldsTruth(const std::string& log);
 
-/// What a log tells without the truth: what the vehicle said of itself.
+/// What the vehicle said of itself.
 struct VehicleReport {
   nlohmann::ordered_json metrics;  ///< keys: logs/README.md
-  nlohmann::ordered_json series;   ///< for the page: paths, spans, clearance, tracking error
+  nlohmann::ordered_json series;   ///< for the page: paths, spans, series {t, value}
+  double log_begin = 0.0;          ///< time of the log's first event, s from the origin
+  int64_t origin = 0;              ///< utime of the report's time zero
   bool whole = true;               ///< the log is neither cut off nor damaged
+  bool flew = false;               ///< there is a POSE or a PLAN
 };
 
-/// Throws std::runtime_error with one line when the file is no log or holds neither POSE nor PLAN.
-VehicleReport ReportVehicle(const std::string& log);
+/// `origin`: utime of time zero; none: of the first message. Throws std::runtime_error with one
+/// line when the file is no log.
+VehicleReport ReportVehicle(const std::string& log, std::optional<int64_t> origin = {});
 
 }  // namespace chase::logs

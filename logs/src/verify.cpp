@@ -46,7 +46,7 @@ class Verifier {
 
  private:
   const obstacles_t* ListOf(const plan_t& m) const {
-    const int32_t seq = bus::ObstaclesOf(m);
+    const int32_t seq = bus::InputOf(m, "OBSTACLES");
     const auto at = std::find_if(lists_.rbegin(), lists_.rend(), [&](const obstacles_t& list) {
       return list.seq == seq && list.epoch == m.epoch;
     });

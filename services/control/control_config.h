@@ -3,6 +3,8 @@
 #include <Eigen/Core>
 #include <string>
 
+#include "common/world/geofence.h"
+
 namespace chase::control {
 
 /// Gains and limits of the controller. Per-axis values are in frame W.
@@ -26,6 +28,7 @@ struct ControlConfig {
   double land_speed = 0.5;      ///< m/s
   double descent_speed = 0.4;   ///< m/s
   double lost_descent = 0.1;    ///< m/s^2
+  world::Geofence geofence;
 
   template <class V>
   void Visit(V& v) {
@@ -50,6 +53,7 @@ struct ControlConfig {
     v("descent_speed", descent_speed,
       "of a landing that was asked for, m/s; its loop goes a tenth beyond");
     v("lost_descent", lost_descent, "thrust short of hovering where there is no velocity, m/s^2");
+    v("geofence", geofence, "plans that leave it are not flown; the same as mission's");
   }
 
   /// The least that a proof has to keep clear, m.

@@ -6,7 +6,6 @@
 #include <algorithm>
 
 #include "chase/attitude_setpoint_t.hpp"
-#include "chase/flight_state_t.hpp"
 #include "chase/tracking_t.hpp"
 #include "common/bus/convert.h"
 #include "common/bus/plan_message.h"
@@ -45,11 +44,21 @@ ControlNode::ControlNode(bus::Bus& bus, const ControlConfig& config)
     : bus_(bus), config_(config), controller_(config) {
   bus_.Subscribe<plan_t>("PLAN", [this](const plan_t& m) { OnPlan(m); });
   bus_.Subscribe<obstacles_t>("OBSTACLES", [this](const obstacles_t& m) { OnObstacles(m); });
-  bus_.Subscribe<flight_state_t>("FLIGHT_STATE", [this](const flight_state_t& m) {
-    controller_.SetLanding(m.state == flight_state_t::LAND);
-    if (m.state == flight_state_t::DONE) controller_.Cut();
-  });
+  bus_.Subscribe<flight_state_t>("FLIGHT_STATE", [this](const flight_state_t& m) { OnState(m); });
   bus_.Subscribe<pose_t>("POSE", [this](const pose_t& m) { OnPose(m); });
+}
+
+// Another mission process counts its messages anew.
+void ControlNode::OnState(const flight_state_t& message) {
+  home_.reset();
+  if (message.has_home != 0) home_.emplace(message.epoch, bus::ToVector(message.home));
+  const bool lands = message.state == flight_state_t::LAND;
+  if (!lands)
+    landing_.reset();
+  else if (!landing_ || landing_->first != message.sender_start)
+    landing_ = {message.sender_start, message.seq};
+  controller_.SetLanding(lands);
+  if (message.state == flight_state_t::DONE) controller_.Cut();
 }
 
 void ControlNode::OnObstacles(const obstacles_t& message) {
@@ -63,10 +72,32 @@ void ControlNode::OnObstacles(const obstacles_t& message) {
 
 // The list that the plan was made for; null where it was never heard.
 const std::vector<world::Obstacle>* ControlNode::ListOf(const plan_t& message) const {
-  const int32_t seq = bus::ObstaclesOf(message);
+  const int32_t seq = bus::InputOf(message, "OBSTACLES");
   for (auto list = lists_.rbegin(); list != lists_.rend(); ++list)
     if (list->first == seq) return &list->second;
   return nullptr;
+}
+
+// Whoever plans or leads the flight may err: what leaves the fence, or comes nearer to it than the
+// body keeps to its plan, is not flown, and the plan before comes to rest inside. A last resort is
+// flown, since what else there is stops later; so is what leads a body that is outside nearer to
+// the take-off place.
+std::string ControlNode::Breach(const world::Claim& claim) const {
+  const world::Geofence& fence = config_.geofence;
+  if (!fence.Exists() || claim.last_resort) return "";
+  if (!home_ || !epoch_.Is(home_->first))
+    return "the take-off place is not known, nor the geofence";
+  const std::vector<Eigen::Vector3d> places = world::PlacesOn(claim.position, claim.stop);
+  const Eigen::Vector3d way = p_WB_ - home_->second;
+  const double tube = config_.tracking_tube;
+  const bool near = !fence.Breach(way, tube).empty(), outside = !fence.Breach(way).empty();
+  if (near && (places.back() - home_->second).norm() >= way.norm())
+    return "it leads no way back into the geofence";
+  if (outside) return "";
+  for (const Eigen::Vector3d& p : places)
+    if (std::string breach = fence.Breach(p - home_->second, near ? 0.0 : tube); !breach.empty())
+      return "it leads " + breach;
+  return "";
 }
 
 std::string ControlNode::Refusal(const plan_t& message) {
@@ -77,12 +108,14 @@ std::string ControlNode::Refusal(const plan_t& message) {
   static const std::vector<world::Obstacle> none;
   std::string bad =
       world::Refute(claim, {config_.hard_radius(), config_.sigmas}, list ? *list : none);
+  if (bad.empty()) bad = Breach(claim);
   if (!bad.empty()) return bad;
   Plan plan;
   plan.position = claim.position;
   plan.yaw = Eigen::Map<const Eigen::VectorXd>(message.yaw.data(), message.n_yaw);
   plan.stop = claim.stop;
   plan.seq = message.seq;
+  plan.to_land = landing_ && bus::InputOf(message, "FLIGHT_STATE") >= landing_->second;
   return controller_.AddPlan(plan);
 }
 
@@ -114,6 +147,7 @@ void ControlNode::OnPose(const pose_t& message) {
   if (message.health != pose_t::HEALTH_STARTING && flown_.Change(message.epoch))
     controller_.TurnFrame(math::Yaw(bus::ToQuaternion(message.orientation)));
   const Estimate estimate = FromMessage(message);
+  if (estimate.p_WB.allFinite()) p_WB_ = estimate.p_WB;
   const Health health = HealthOf(message, estimate.velocity_sigma, config_);
   pose_reason_ = health == Health::kUsable ? ""
                  : message.reason.empty()  ? "uncertain"

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "chase/flight_state_t.hpp"
 #include "chase/obstacles_t.hpp"
 #include "chase/plan_t.hpp"
 #include "chase/pose_t.hpp"
@@ -33,7 +34,9 @@ class ControlNode : public bus::Node {
   void OnPlan(const plan_t& message);
   void OnObstacles(const obstacles_t& message);
   void OnPose(const pose_t& message);
+  void OnState(const flight_state_t& message);
   std::string Refusal(const plan_t& message);
+  std::string Breach(const world::Claim& claim) const;
   const std::vector<world::Obstacle>* ListOf(const plan_t& message) const;
   void Send(int64_t utime, const Setpoint& setpoint);
   void SendTracking(int64_t utime);
@@ -46,7 +49,13 @@ class ControlNode : public bus::Node {
   Controller controller_;
   bus::Epoch epoch_;
   bus::Epoch flown_;  // of the last pose that was aligned: the attitude loop goes by it
+  Eigen::Vector3d p_WB_ = Eigen::Vector3d::Zero();                      // of the last pose, m
   std::deque<std::pair<int32_t, std::vector<world::Obstacle>>> lists_;  // by seq, newest last
+  /// Where it took off, in the frame W of this epoch: the geofence counts from there.
+  std::optional<std::pair<int32_t, Eigen::Vector3d>> home_;
+  /// The first FLIGHT_STATE of a mission process that asks for the landing: its `seq`, and when
+  /// that process started.
+  std::optional<std::pair<int64_t, int32_t>> landing_;
   std::optional<int64_t> origin_;  // utime that the core's seconds count from
   int64_t last_tracking_ = 0;
   int ticks_without_pose_ = 0;

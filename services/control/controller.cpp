@@ -12,6 +12,7 @@ namespace {
 
 constexpr double kJumpBack = 1.0;  // s; less is jitter between publishers
 constexpr double kAtRest = 0.3;    // m/s: gusts about a wind of 3 m/s stir a hovering body by less
+constexpr double kAtEnd = 0.3;     // m: planning asks for as much free ground beside the body
 // m/s: POSE of the sentinels has 0.03, and a second without sweeps adds filter.doubt_accel's 0.1.
 constexpr double kMeasured = 0.1;
 
@@ -82,11 +83,12 @@ void Controller::SetLanding(bool wanted) {
     spot_.reset();
     landing_ = Landing(config_, config_.land_speed);
   }
+  if (wanted && !lands_) asked_to_land_ = last_t_.value_or(0.0);
   lands_ = wanted;
 }
 
 std::optional<Setpoint> Controller::Follow(double t, const Estimate& estimate, double dt) {
-  if (const std::optional<Setpoint> setpoint = Descend(estimate, dt)) return setpoint;
+  if (const std::optional<Setpoint> setpoint = Descend(t, estimate, dt)) return setpoint;
   const std::optional<Reference> now = plans_.At(t);
   const std::optional<Reference> ahead = plans_.At(t + config_.lead);
   if (!now || !ahead || !Finite(*now) || !Finite(*ahead)) return Brake(estimate);
@@ -109,9 +111,19 @@ std::optional<Setpoint> Controller::Follow(double t, const Estimate& estimate, d
   return setpoint;
 }
 
+// Planning leads to above the ground that it chooses; whoever is not led comes down here.
+bool Controller::MayDescend(double t, const Estimate& estimate) const {
+  if (estimate.v_WB.norm() > kAtRest) return false;
+  const Plan* plan = plans_.FlownAt(t);
+  if (plan == nullptr || !plan->to_land) return t - asked_to_land_ > world::kMostAge.landing_plan;
+  const bool stops = plan->stop && t >= plan->stop->start;
+  const world::Trajectory& way = stops ? *plan->stop : plan->position;
+  return (way.Position(way.end()) - estimate.p_WB).head<2>().norm() < kAtEnd;
+}
+
 // Held above the spot by the position, down by the vertical velocity alone.
-std::optional<Setpoint> Controller::Descend(const Estimate& estimate, double dt) {
-  if (!flying_ || !lands_ || (!spot_ && estimate.v_WB.norm() > kAtRest)) return std::nullopt;
+std::optional<Setpoint> Controller::Descend(double t, const Estimate& estimate, double dt) {
+  if (!flying_ || !lands_ || (!spot_ && !MayDescend(t, estimate))) return std::nullopt;
   if (!spot_) {
     spot_ = estimate.p_WB;
     landing_ = Landing(config_, config_.descent_speed);

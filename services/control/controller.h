@@ -49,7 +49,8 @@ class Controller {
   /// rad.
   void TurnFrame(double yaw);
 
-  /// A landing on the spot is asked for, or no more: it begins once the body is at rest.
+  /// A landing is asked for, or no more: it begins once the body is at rest where a plan to land
+  /// ends; without such a plan after kMostAge.landing_plan, where it is at rest.
   void SetLanding(bool wanted);
 
   /// Motors off for good, at once, wherever it is: the flight is over, or somebody has ended it.
@@ -77,7 +78,7 @@ class Controller {
  private:
   std::optional<Setpoint> Follow(double t, const Estimate& estimate, double dt);
   std::optional<Setpoint> Brake(const Estimate& estimate);
-  std::optional<Setpoint> Descend(const Estimate& estimate, double dt);
+  std::optional<Setpoint> Descend(double t, const Estimate& estimate, double dt);
   std::optional<Setpoint> Off();
   std::optional<Setpoint> Answer(double t, const Estimate& estimate, Health health, double dt);
   std::optional<Setpoint> Sent(std::optional<Setpoint> setpoint);
@@ -85,6 +86,7 @@ class Controller {
   void RestartIfTimeJumpedBack(double t);
   double StepTo(double t);
   bool IsNear(const Plan& plan) const;
+  bool MayDescend(double t, const Estimate& estimate) const;
 
   ControlConfig config_;
   PlanFollower plans_;
@@ -96,7 +98,8 @@ class Controller {
   Estimate last_estimate_;
   double last_usable_ = 0.0, last_measured_ = 0.0;  // of the pose, the velocity; s
   bool flying_ = false, lost_ = false;
-  bool lands_ = false;  // a landing is asked for
+  bool lands_ = false;          // a landing is asked for
+  double asked_to_land_ = 0.0;  // when, s
   bool cut_ = false;
   std::optional<Eigen::Vector3d> spot_;  // above which it comes down, frame W, m
   Following following_ = Following::kNone;

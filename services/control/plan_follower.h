@@ -17,6 +17,8 @@ struct Plan {
   Eigen::VectorXd yaw = Eigen::VectorXd::Zero(1);  ///< power basis in normalised time, rad
   std::optional<world::Trajectory> stop;           ///< leaves `position` at its start
   int32_t seq = 0;                                 ///< of the message
+  bool to_land = false;  ///< made when a landing had been asked for: its end is above the ground to
+                         ///< come down to
 };
 
 /// Turns a stream of plans into one reference. A plan takes over at its own start; until then the

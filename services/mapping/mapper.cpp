@@ -18,6 +18,7 @@ constexpr double kPassedTime = 6.0;    // s of its way
 constexpr double kOwnPlace = 0.6;      // m around the drone that are free since it is there
 constexpr int kOwnLevels = 1;          // cells above and below it that count as its height
 constexpr double kWindowMargin = 1.0;  // m beyond the list's radius that the decomposition sees
+constexpr int kFirstUnseen = 1 << 29;  // ids beyond those of pieces and of the ground
 constexpr double kMostCoordinate = 6000.0;  // m, what the octree's keys can hold at 0.2 m
 
 /// Distance from p to the surface of an upright ellipse about c, roughly: along the line between.
@@ -67,6 +68,7 @@ Mapper::Mapper(const MappingConfig& config)
       detector_(config.movers, config.grid),
       tracker_(config.movers),
       decomposition_(config.statics, config.grid.resolution),
+      unseen_(config.statics, config.grid.resolution),
       tree_(config.grid.resolution) {}
 
 /// Shortens a ray to the range and to the window's levels; true if it had to.
@@ -176,17 +178,17 @@ bool Mapper::ColumnExtent(const VoxelGrid::Column& column, Extent* extent) {
   return !extent->empty();
 }
 
-/// A column near the drone of which nothing was seen at the drone's own height, while unseen space
-/// is not to be trusted. The drone's own place is known to be free.
-bool Mapper::Closed(const VoxelGrid::Column* column, const Eigen::Vector2d& center,
-                    const Eigen::Vector3d& origin) const {
+/// A column of which nothing was seen at the drone's own height. The drone's own place is known to
+/// be free.
+bool Mapper::IsUnseen(const Key& key, const Eigen::Vector3d& origin) {
+  const Eigen::Vector2d center = grid_.Center(key).head<2>();
   const double distance = (center - origin.head<2>()).norm();
-  if (distance > config_.statics.closed || distance < kOwnPlace) return false;
+  if (distance > config_.statics.unseen || distance < kOwnPlace) return false;
   if (zone_.active() && (center - zone_.center()).norm() < zone_.outer()) return false;
+  const VoxelGrid::Column* column = grid_.Find(key.x, key.y);
   if (!column) return true;
   if (column->occupied > 0) return false;
-  const int middle = grid_.ToKey(origin).z;
-  for (int z = middle - kOwnLevels; z <= middle + kOwnLevels; ++z)
+  for (int z = key.z - kOwnLevels; z <= key.z + kOwnLevels; ++z)
     if (grid_.ContainsLevel(z) && column->voxels[VoxelGrid::Level(z)].sweep > 0) return false;
   return true;
 }
@@ -206,17 +208,6 @@ std::vector<Cell> Mapper::OccupiedColumns(const Eigen::Vector3d& origin, std::se
       const Eigen::Vector2d center = grid_.Center({x, y, 0}).head<2>();
       if ((center - origin.head<2>()).norm() > reach) {
         if (column && column->piece && column->occupied > 0) partial->insert(column->piece);
-        continue;
-      }
-      if (Closed(column, center, origin)) {
-        const int piece = column ? column->piece : 0;
-        const Eigen::Vector2d half = Eigen::Vector2d::Constant(0.5 * grid_.resolution());
-        Cell cell{x, y, piece, {}, grid_.resolution() * grid_.resolution()};
-        for (const double side : {-1.0, 1.0}) {
-          cell.corners.push_back(center + side * half);
-          cell.corners.emplace_back(center.x() + side * half.x(), center.y() - side * half.y());
-        }
-        cells.push_back(std::move(cell));
         continue;
       }
       if (!column) continue;
@@ -244,25 +235,59 @@ std::vector<world::Obstacle> Mapper::Statics(const Eigen::Vector3d& origin, doub
       decomposition_.Update(&cells, partial, zone_.active() ? &target : nullptr, zone_.keep_out());
   *dropped = decomposition_.dropped();
   for (const auto& cell : cells) grid_.Touch(cell.x, cell.y).piece = cell.piece;
+  std::vector<world::Obstacle> obstacles;
+  for (const auto& piece : pieces) {
+    world::Obstacle o = Upright(piece, t);
+    if (PlanDistance(o, origin) <= config_.statics.radius && o.shape.allFinite())
+      obstacles.push_back(std::move(o));
+  }
+  return obstacles;
+}
+
+/// Through the flight volume.
+world::Obstacle Mapper::Upright(const Piece& piece, double t) {
   const StaticConfig& c = config_.statics;
   const double half_band = 0.5 * (c.band_high - c.band_low);
   // The ellipsoid's section must hold the outline at both ends of the flight volume.
   const double grow = 1.0 / std::sqrt(1.0 - std::pow(half_band / c.semi_height, 2));
-  std::vector<world::Obstacle> obstacles;
-  for (const auto& piece : pieces) {
-    world::Obstacle o;
-    o.id = piece.id;
-    Eigen::Vector3d center;
-    center << piece.outline.center,
-        ground_.Height(piece.outline.center.x(), piece.outline.center.y()) + c.band_low + half_band;
-    o.center = world::Trajectory::Constant(center, t, config_.movers.horizon);
-    o.shape.setZero();
-    o.shape.topLeftCorner<2, 2>() = piece.outline.Scaled(grow).shape;
-    o.shape(2, 2) = 1.0 / (c.semi_height * c.semi_height);
-    SetSolid(piece, c.semi_height, &o);
-    if (PlanDistance(o, origin) <= c.radius && o.shape.allFinite()) obstacles.push_back(o);
+  world::Obstacle o;
+  o.id = piece.id;
+  Eigen::Vector3d center;
+  center << piece.outline.center,
+      ground_.Height(piece.outline.center.x(), piece.outline.center.y()) + c.band_low + half_band;
+  o.center = world::Trajectory::Constant(center, t, config_.movers.horizon);
+  o.shape.setZero();
+  o.shape.topLeftCorner<2, 2>() = piece.outline.Scaled(grow).shape;
+  o.shape(2, 2) = 1.0 / (c.semi_height * c.semi_height);
+  SetSolid(piece, c.semi_height, &o);
+  return o;
+}
+
+std::vector<world::Obstacle> Mapper::Unseen(const Eigen::Vector3d& origin, double t) {
+  const double resolution = grid_.resolution();
+  const Key middle = grid_.ToKey(origin);
+  const int n = static_cast<int>(std::ceil(config_.statics.unseen / resolution));
+  std::vector<Cell> cells;
+  for (int x = middle.x - n; x <= middle.x + n; ++x) {
+    for (int y = middle.y - n; y <= middle.y + n; ++y) {
+      if (!IsUnseen({x, y, middle.z}, origin)) continue;
+      const auto piece = unseen_pieces_.find({x, y});
+      Cell cell{
+          x, y, piece == unseen_pieces_.end() ? 0 : piece->second, {}, resolution * resolution};
+      for (const int corner : {0, 1, 2, 3})
+        cell.corners.emplace_back(resolution * (x + corner % 2), resolution * (y + corner / 2));
+      cells.push_back(std::move(cell));
+    }
   }
-  return obstacles;
+  const auto pieces = unseen_.Update(&cells, {}, nullptr, 0.0);
+  unseen_pieces_.clear();
+  for (const auto& cell : cells) unseen_pieces_[{cell.x, cell.y}] = cell.piece;
+  std::vector<world::Obstacle> unseen;
+  for (const auto& piece : pieces) {
+    unseen.push_back(Upright(piece, t));
+    unseen.back().id += kFirstUnseen;
+  }
+  return unseen;
 }
 
 /// Nothing walks through what stands: a mover's forecast ends where its front meets it.
@@ -296,6 +321,7 @@ ObstacleList Mapper::Insert(const Sweep& sweep) {
   ClearGhosts(sweep.t);
   t_ = sweep.t;
   list.obstacles = Statics(sweep.origin, sweep.t, &list.n_dropped);
+  if (config_.statics.unseen > 0.0) list.unseen = Unseen(sweep.origin, sweep.t);
   const StaticConfig& c = config_.statics;
   list.n_static = static_cast<int>(list.obstacles.size());
   const double middle =

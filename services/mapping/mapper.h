@@ -1,8 +1,10 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <map>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "common/world/obstacle.h"
@@ -25,6 +27,7 @@ struct ObstacleList {
   int n_cut = 0;                           ///< left out because the list is bounded
   int n_static = 0, n_moving = 0;          ///< listed and cut
   int n_dropped = 0;                       ///< single columns left out because the target is there
+  std::vector<world::Obstacle> unseen;     ///< places near the drone where nothing was seen
 };
 
 /// Sweeps in, obstacles and an octree out. Everything solid above the ground near the flight volume
@@ -58,11 +61,12 @@ class Mapper {
   void MarkTarget(const std::vector<Footprint>& movers);
   void TrackMovers(const Eigen::Vector3d& origin, const std::vector<Footprint>& expected);
   void ClearGhosts(double t);
-  bool Closed(const VoxelGrid::Column* column, const Eigen::Vector2d& center,
-              const Eigen::Vector3d& origin) const;
+  bool IsUnseen(const Key& key, const Eigen::Vector3d& origin);
   std::vector<Cell> OccupiedColumns(const Eigen::Vector3d& origin, std::set<int>* partial);
   bool ColumnExtent(const VoxelGrid::Column& column, Extent* extent);
   std::vector<world::Obstacle> Statics(const Eigen::Vector3d& origin, double t, int* dropped);
+  std::vector<world::Obstacle> Unseen(const Eigen::Vector3d& origin, double t);
+  world::Obstacle Upright(const Piece& piece, double t);
   void StopAtWalls(world::Obstacle* mover);
   void SetTree(int most);
 
@@ -73,7 +77,8 @@ class Mapper {
   TargetZone zone_;
   MotionDetector detector_;
   Tracker tracker_;
-  Decomposition decomposition_;
+  Decomposition decomposition_, unseen_;
+  std::map<std::pair<int, int>, int> unseen_pieces_;  ///< of the columns x, y
   OccupancyTree tree_;
   std::vector<Return> returns_;
   std::vector<Eigen::Vector3f> near_;

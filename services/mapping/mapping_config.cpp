@@ -51,7 +51,7 @@ std::string GroundConfig::Problem() const {
 std::string StaticConfig::Problem() const {
   return First({Within("radius", radius, 1.0, 50.0), Within("band_low", band_low, -5.0, 50.0),
                 Require(band_high > band_low, "band_high", band_high, "above band_low"),
-                Within("closed", closed, 0.0, radius),
+                Within("unseen", unseen, 0.0, radius),
                 Require(semi_height >= 0.75 * (band_high - band_low), "semi_height", semi_height,
                         "at least 0.75 (band_high - band_low)"),
                 Within("max_length", max_length, 0.4, 20.0),

@@ -47,7 +47,7 @@ struct StaticConfig {
   double radius = 9.0;          ///< obstacles within this of the drone are listed, m
   double band_low = 0.3;        ///< flight volume above the ground, m
   double band_high = 3.9;       ///< the same, upper end: planner.z_max and its hard radius, m
-  double closed = 0.0;          ///< unseen columns within this count as solid, m; 0: none
+  double unseen = 3.0;          ///< unseen columns within this of the drone are listed, m
   double semi_height = 8.0;     ///< vertical semi-axis of the ellipsoids, m
   double max_length = 2.5;      ///< longest piece of a wall, m
   double compact_radius = 0.5;  ///< pieces within such a circle count as round, m
@@ -59,8 +59,9 @@ struct StaticConfig {
     v("radius", radius, "obstacles within this of the drone are listed, m");
     v("band_low", band_low, "lower end of the flight volume above the ground, m");
     v("band_high", band_high, "upper end of the flight volume above the ground, m");
-    v("closed", closed,
-      "unseen columns within this of the drone count as solid, m: its braking distance; 0: free");
+    v("unseen", unseen,
+      "columns within this of the drone of which nothing was seen are listed, m: as far as it "
+      "goes until it stands; 0: none");
     v("semi_height", semi_height, "vertical semi-axis of the ellipsoids, m");
     v("max_length", max_length, "longest piece of a wall, m");
     v("compact_radius", compact_radius, "pieces within such a circle count as round, m");

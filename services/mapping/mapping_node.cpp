@@ -83,7 +83,8 @@ void MappingNode::OnScan(const scan_registered_t& m) {
     auto timer = bus_.Time("map");
     last_list_ = mapper_->Insert(ToSweep(m, t, config_.movers.sweep_time));
   }
-  PublishObstacles(last_list_, m.utime);
+  Publish("UNSEEN", last_list_.unseen, 0, m.utime);
+  Publish("OBSTACLES", last_list_.obstacles, last_list_.n_cut, m.utime);
   {
     auto timer = bus_.Time("tree");
     mapper_->UpdateTree();
@@ -93,15 +94,16 @@ void MappingNode::OnScan(const scan_registered_t& m) {
   SaveTiles();
 }
 
-void MappingNode::PublishObstacles(const ObstacleList& list, int64_t utime) {
+void MappingNode::Publish(const std::string& channel, const std::vector<world::Obstacle>& obstacles,
+                          int n_cut, int64_t utime) {
   obstacles_t out{};
   out.utime = utime;
   out.epoch = epoch_.value();
-  out.n_cut = list.n_cut;
-  for (const auto& obstacle : list.obstacles)
+  out.n_cut = n_cut;
+  for (const auto& obstacle : obstacles)
     out.obstacles.push_back(bus::ToMessage(obstacle, *origin_));
   out.n_obstacles = static_cast<int32_t>(out.obstacles.size());
-  bus_.Publish("OBSTACLES", std::move(out));
+  bus_.Publish(channel, std::move(out));
 }
 
 void MappingNode::PublishMap(int64_t utime) {

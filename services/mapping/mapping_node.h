@@ -26,7 +26,8 @@ class MappingNode : public bus::Node {
  private:
   void OnScan(const scan_registered_t& m);
   void OnTarget(const target_t& m);
-  void PublishObstacles(const ObstacleList& list, int64_t utime);
+  void Publish(const std::string& channel, const std::vector<world::Obstacle>& obstacles, int n_cut,
+               int64_t utime);
   void PublishMap(int64_t utime);
   void SaveTiles();
   double Seconds(int64_t utime);

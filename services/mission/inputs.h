@@ -37,6 +37,7 @@ struct Inputs {
   std::optional<double> target;
   bool target_tracked = false;
   double plan_heard = -1e9;                            ///< s
+  std::string plan_reason;                             ///< of the newest plan
   Eigen::Vector3d plan_end = Eigen::Vector3d::Zero();  ///< where the newest plan ends, frame W
   bool flying = false, landing = false;                ///< as control says
   bool motors_off = false;                             ///< control has stopped them

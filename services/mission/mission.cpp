@@ -7,34 +7,20 @@
 namespace chase::mission {
 
 Answer Mission::Obey(double t, const Command& command) {
-  window_.Forget(t);
-  if (const Answer* before = window_.Find(command)) return *before;
-  return Judge(t, command);
+  const world::CommandAnswer answer =
+      window_.Take(t, {command.sender, command.sender_start, command.id, command.t},
+                   [&] { return Try(t, command); });
+  return {command, answer.accepted, answer.reason};
 }
 
-// What is refused here is not remembered: it is refused again, or has had no effect.
-Answer Mission::Judge(double t, const Command& command) {
-  const auto refuse = [&](const char* reason) { return Answer{command, false, reason}; };
-  const double age = t - command.t;
-  if (command.t < start_) return refuse("it was given before the mission process started");
-  if (age > world::kMostAge.command) return refuse("it is old: given more than 10 s ago");
-  if (age < -world::kMostAge.command)
-    return refuse("it is given in the future: compare the clocks");
-  if (window_.IsFull()) return refuse("too many commands came of late");
-  return window_.Add(Try(t, command));
-}
-
-Answer Mission::Try(double t, const Command& command) {
-  Answer answer{command, false, Refused(command.kind)};
-  if (answer.reason.empty() && command.kind == Event::kKill && !command.force)
-    answer.reason = "kill cuts the motors wherever it is, and it falls: say so with --force";
-  if (!answer.reason.empty()) return answer;
+world::CommandAnswer Mission::Try(double t, const Command& command) {
+  if (std::string refusal = Refused(command.kind); !refusal.empty()) return {false, refusal};
+  if (command.kind == Event::kKill && !command.force)
+    return {false, "kill cuts the motors wherever it is, and it falls: say so with --force"};
   Step(t, command.kind);
   if (state_ == State::kReturn && !KnowsHome()) Step(t, Event::kHomeLost);
   leads_itself_ = false;
-  answer.accepted = true;
-  answer.reason = std::string(Name(state_)) + ": " + reason_;
-  return answer;
+  return {true, std::string(Name(state_)) + ": " + reason_};
 }
 
 std::string Mission::Refused(Event command) const {
@@ -79,6 +65,7 @@ void Mission::Update(double t) {
     if (stepped && event == Event::kLeaving) leads_itself_ = false;  // it would lead out again
   }
   if (leads_itself_) LeadItself(t);
+  HearOfGround();
 }
 
 // In the order in which they count; each moves the state that the one before has led to.
@@ -131,6 +118,15 @@ std::string Mission::Leaving() const {
 
 std::string Mission::Outside() const {
   return KnowsHome() ? config_.geofence.Breach(inputs_.pose->p - home_->p) : "";
+}
+
+std::string Mission::Words() const { return reason_ + (ground_.empty() ? "" : "; " + ground_); }
+
+void Mission::HearOfGround() {
+  if (state_ != State::kLand)
+    ground_.clear();
+  else if (!inputs_.landing && inputs_.plan_reason.rfind("landing", 0) == 0)
+    ground_ = inputs_.plan_reason;
 }
 
 // By then control comes down by itself.

@@ -6,7 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "services/mission/command_window.h"
+#include "common/world/command_window.h"
+#include "services/mission/command.h"
 #include "services/mission/inputs.h"
 #include "services/mission/mission_config.h"
 #include "services/mission/states.h"
@@ -24,7 +25,7 @@ class Mission {
  public:
   /// Commands from before `start` [s] are refused: whoever led the flight then has had them.
   Mission(const MissionConfig& config, double start)
-      : config_(config), start_(start), leads_itself_(config.autostart) {}
+      : config_(config), leads_itself_(config.autostart), window_("mission", start) {}
 
   /// Written to as messages come.
   Inputs& inputs() { return inputs_; }
@@ -38,6 +39,8 @@ class Mission {
 
   State state() const { return state_; }
   const std::string& reason() const { return reason_; }
+  /// The reason and, while it is led to where it lands, what planning says of the ground there.
+  std::string Words() const;
   double since() const { return since_; }  ///< when the state began, s
   const std::optional<Home>& home() const { return home_; }
   const std::vector<std::string>& missing() const { return missing_; }
@@ -45,8 +48,7 @@ class Mission {
 
  private:
   bool Step(double t, Event event, const std::string& detail = "");
-  Answer Judge(double t, const Command& command);
-  Answer Try(double t, const Command& command);
+  world::CommandAnswer Try(double t, const Command& command);
   std::string Refused(Event command) const;
   std::vector<Event> Observed(double t) const;
   bool PoseIsLost(double t) const;
@@ -60,14 +62,15 @@ class Mission {
   std::string Outside() const;
   std::string Detail(Event event) const;
   void LeadItself(double t);
+  void HearOfGround();
 
   MissionConfig config_;
-  double start_;
   bool leads_itself_;  // nobody has commanded anything yet
   Inputs inputs_;
-  CommandWindow window_;
+  world::CommandWindow window_;
   State state_ = State::kIdle;
   std::string reason_ = "switched on";
+  std::string ground_;  // what planning said of it before control came down
   double since_ = 0.0;
   bool began_ = false;
   double last_usable_ = -1e9;  // pose, s

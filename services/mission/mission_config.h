@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "services/mission/geofence.h"
+#include "common/world/geofence.h"
 
 namespace chase::mission {
 
@@ -16,7 +16,7 @@ struct MissionConfig {
   double rest_speed = 0.25;
   double battery_low = 0.25, battery_critical = 0.1;
   double climb_height = 2.0, body_radius = 0.25;
-  Geofence geofence;
+  world::Geofence geofence;
   std::vector<std::string> needs = {"prediction", "planning", "control"};
 
   template <class V>

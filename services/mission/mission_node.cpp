@@ -6,23 +6,17 @@
 
 #include "chase/command_ack_t.hpp"
 #include "chase/flight_state_t.hpp"
+#include "chase/geofence_t.hpp"
 #include "chase/health_t.hpp"
 #include "common/bus/battery.h"
 #include "common/bus/convert.h"
-#include "services/mission/climb_column.h"
+#include "common/world/column.h"
 
 namespace chase::mission {
 
 namespace {
 
 constexpr int64_t kHealthTicks = 10;  // 1 Hz, as the statuses that it sums up
-constexpr int kPlaces = 20;           // on a plan: 0.1 s apart
-
-void Sample(const world::Trajectory& path, double from, double to,
-            std::vector<Eigen::Vector3d>* places) {
-  for (int i = 0; i <= kPlaces; ++i)
-    places->push_back(path.Position(from + (to - from) * i / kPlaces));
-}
 
 }  // namespace
 
@@ -60,6 +54,7 @@ void MissionNode::SubscribeStatuses() {
 }
 
 void MissionNode::OnCommand(const command_t& message) {
+  if (message.kind == command_t::SELECT) return;  // perception's
   const Command command{message.sender,
                         message.sender_start,
                         message.id,
@@ -98,23 +93,20 @@ void MissionNode::OnObstacles(const obstacles_t& message) {
   if (IsAirborne(mission_.state()) || !inputs.pose || inputs.pose->epoch != message.epoch) return;
   std::vector<world::Obstacle> obstacles;
   for (const obstacle_t& o : message.obstacles) obstacles.push_back(bus::FromMessage(o, origin_));
-  inputs.blocked = IsBlocked(obstacles, inputs.pose->p, config_.body_radius, config_.climb_height);
+  inputs.blocked =
+      world::IsColumnBlocked(obstacles, inputs.pose->p, config_.body_radius, config_.climb_height);
 }
 
 void MissionNode::OnPlan(const plan_t& message) {
   Inputs& inputs = mission_.inputs();
   inputs.plan_heard = Now();
+  inputs.plan_reason = message.reason;
   const world::Trajectory plan = bus::FromMessage(message.position, origin_);
   inputs.plan_end = plan.Position(plan.end());
   if (!config_.geofence.Exists()) return;
-  inputs.way.clear();
-  double leaves = plan.end();
-  if (message.stop.n_coefficients > 0) {
-    const world::Trajectory stop = bus::FromMessage(message.stop, origin_);
-    leaves = stop.start;
-    Sample(stop, stop.start, stop.end(), &inputs.way);
-  }
-  Sample(plan, plan.start, leaves, &inputs.way);
+  std::optional<world::Trajectory> stop;
+  if (message.stop.n_coefficients > 0) stop = bus::FromMessage(message.stop, origin_);
+  inputs.way = world::PlacesOn(plan, stop);
 }
 
 void MissionNode::OnTracking(const tracking_t& message) {
@@ -136,7 +128,9 @@ void MissionNode::OnStatus(const status_t& message) {
 void MissionNode::Tick(int64_t /*utime*/) {
   mission_.Update(Now());
   SendState();
-  if (ticks_++ % kHealthTicks == 0) SendHealth();
+  if (ticks_++ % kHealthTicks != 0) return;
+  SendHealth();
+  SendGeofence();
 }
 
 void MissionNode::SendState() {
@@ -144,7 +138,7 @@ void MissionNode::SendState() {
   m.utime = bus_.Now();
   m.epoch = mission_.home() ? mission_.home()->epoch : 0;
   m.state = static_cast<int8_t>(mission_.state());
-  m.reason = mission_.reason();
+  m.reason = mission_.Words();
   m.since = bus::Utime(mission_.since(), origin_);
   m.has_home = mission_.home() ? 1 : 0;
   if (mission_.home()) bus::Set(m.home, mission_.home()->p);
@@ -165,6 +159,24 @@ void MissionNode::SendHealth() {
   }
   m.n_processes = static_cast<int32_t>(m.processes.size());
   bus_.Publish("HEALTH", m);
+}
+
+/// Where it lies is known from take-off on.
+void MissionNode::SendGeofence() {
+  const Geofence& fence = config_.geofence;
+  if (!fence.Exists() || !mission_.home()) return;
+  const Eigen::Vector3d& home = mission_.home()->p;
+  geofence_t m{};
+  m.utime = bus_.Now();
+  m.epoch = mission_.home()->epoch;
+  for (const Eigen::Vector2d& corner : fence.polygon) {
+    m.corners.push_back(home.x() + corner.x());
+    m.corners.push_back(home.y() + corner.y());
+  }
+  m.n_corners = static_cast<int32_t>(m.corners.size());
+  m.floor = home.z() + fence.floor;
+  m.ceiling = home.z() + fence.ceiling;
+  bus_.Publish("GEOFENCE", m);
 }
 
 double MissionNode::Now() const { return Seconds(bus_.Now()); }

@@ -18,7 +18,7 @@
 namespace chase::mission {
 
 /// COMMAND, POSE, OBSTACLES, TARGET, PLAN, TRACKING, ATTITUDE_SETPOINT and statuses in;
-/// FLIGHT_STATE, COMMAND_ACK and HEALTH out. Ticks are the clock.
+/// FLIGHT_STATE, COMMAND_ACK, HEALTH and GEOFENCE out. Ticks are the clock.
 class MissionNode : public bus::Node {
  public:
   MissionNode(bus::Bus& bus, const MissionConfig& config);
@@ -37,6 +37,7 @@ class MissionNode : public bus::Node {
   void OnStatus(const status_t& message);
   void SendState();
   void SendHealth();
+  void SendGeofence();
   double Now() const;
   double Seconds(int64_t utime) const;
 

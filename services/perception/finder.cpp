@@ -31,6 +31,12 @@ Finder::Finder(const PerceptionConfig& config)
       localiser_(config),
       shape_(ShapeOf(config)) {}
 
+void Finder::SetDetector(const DetectorConfig& detector) {
+  config_.detector = detector;
+  detector_ = MakeDetector(detector, config_.fit.edge_sigma_px, config_.rig);
+  localiser_ = Localiser(config_);
+}
+
 void Finder::AddSweep(const Sweep& sweep) {
   if (!sweeps_.empty() && sweep.t < sweeps_.back().sweep.t() - kTimeJump) sweeps_.clear();
   sweeps_.push_back({RangedSweep(sweep), false});

@@ -44,6 +44,9 @@ class Finder {
   /// Throws std::runtime_error when the detector's file or name is not usable.
   explicit Finder(const PerceptionConfig& config);
 
+  /// Another target from now on; poses and sweeps stay. Throws as the constructor does.
+  void SetDetector(const DetectorConfig& detector);
+
   void AddPose(const PoseSample& pose) { poses_.Add(pose); }
   void AddSweep(const Sweep& sweep);
   const PoseHistory& poses() const { return poses_; }

@@ -16,6 +16,7 @@ constexpr double kLeastWidthPx = 6.0;  // what is narrower may be a slit between
 constexpr int kDecoyHits = 3;      // sightings that what stands beside one that drives counts for
 constexpr double kTimeJump = 1.0;  // s back that count as a new recording
 constexpr double kGap = 0.25;      // s between frames in which a target may do anything
+constexpr double kPointed = 1.0;   // s that what is pointed at is looked for there
 constexpr int kSureHits = 5;       // corrections after which the track is trusted
 constexpr double kDrivenSigma = 0.1;  // m, how well that must be known
 constexpr double kStood = 0.2;        // m, within which a target stands
@@ -128,6 +129,7 @@ void Perceiver::AddCandidates(View* view) {
 }
 
 void Perceiver::Seek(View* view) {
+  if (selected_) return TakeSelected(view);
   if (sighting_ && !doubtful_) return;
   FollowCandidates(view);
   AddPartial(*view);
@@ -219,12 +221,43 @@ bool Perceiver::ForgetIfTimeRanBack(double t) {
   const bool jumped = t < last_t_ - kTimeJump;
   if (!jumped && t <= last_t_) return false;
   last_t_ = t;
-  if (!jumped) return true;
+  if (jumped) Forget();
+  return true;
+}
+
+void Perceiver::Forget() {
   track_.reset();
   candidates_.clear();
   decoys_.Clear();
+  selected_.reset();
   state_ = TargetState::kSearching;
-  return true;
+}
+
+void Perceiver::Select(const DetectorConfig& detector, const Eigen::Vector2d& at) {
+  config_.detector = detector;
+  finder_.SetDetector(detector);
+  Forget();
+  selected_ = at;
+  selected_at_ = last_t_;
+}
+
+/// The detection at the pixel that was pointed at, or nearest to it as things move: within its
+/// size.
+void Perceiver::TakeSelected(View* view) {
+  if (view->t - selected_at_ > kPointed) return selected_.reset();
+  const auto off = [&](const Detection& d) {
+    const Eigen::Vector2d low(d.box.x, d.box.y), high(d.box.br().x, d.box.br().y);
+    return (*selected_ - selected_->cwiseMax(low).cwiseMin(high)).norm();
+  };
+  const Detection* nearest = nullptr;
+  for (const Detection& d : view->detections)
+    if (!d.part && off(d) <= d.box.width && (!nearest || off(d) < off(*nearest))) nearest = &d;
+  if (!nearest) return;
+  const auto found = finder_.Acquire(*view, *nearest);
+  if (!found) return;
+  Start(NewCandidate(*found, *view).track, *found);
+  view->taken[static_cast<size_t>(nearest - view->detections.data())] = true;
+  selected_.reset();
 }
 
 TargetEstimate Perceiver::Report(double t, const std::optional<View>& view,

@@ -50,11 +50,16 @@ class Perceiver {
   void AddSweep(const Sweep& sweep) { finder_.AddSweep(sweep); }
   TargetEstimate See(const Frame& frame);
 
+  /// Somebody has pointed at the target, at pixel (u, v) `at` of the last frame: what the detector
+  /// finds there within a second is taken at once, whatever was followed before.
+  void Select(const DetectorConfig& detector, const Eigen::Vector2d& at);
+
   const PoseHistory& poses() const { return finder_.poses(); }
 
  private:
   void Follow(View* view);
   void Seek(View* view);
+  void TakeSelected(View* view);
   void FollowCandidates(View* view);
   void AddPartial(const View& view);
   void AddCandidates(View* view);
@@ -78,6 +83,7 @@ class Perceiver {
   void SwapIfTheOtherDrives(const Sighting& s, Decoy* other, double t);
   void Start(const TargetTrack& track, const Sighting& sighting);
   bool ForgetIfTimeRanBack(double t);
+  void Forget();
 
   PerceptionConfig config_;
   Finder finder_;
@@ -89,13 +95,14 @@ class Perceiver {
   std::optional<Sighting> unsure_;    ///< in the last frame: may be the target, as far as it shows
   bool contested_ = false;            ///< of several things alike in the last frame
   Decoys decoys_;
+  std::optional<Eigen::Vector2d> selected_;           ///< px, not taken yet
   Refused refused_ = {};                              ///< in this frame
   size_t turn_ = 0;                                   ///< detection that is looked at next
   Eigen::Vector3d stood_ = Eigen::Vector3d::Zero();   ///< where the target stood or was, frame W, m
   double stood_since_ = 0.0;                          ///< s
   Eigen::Vector3d last_v_ = Eigen::Vector3d::Zero();  ///< when last seen, frame W, m/s
   Eigen::Vector3d last_p_ = Eigen::Vector3d::Zero();  ///< likewise, m
-  double last_t_ = -1e18;
+  double last_t_ = -1e18, selected_at_ = 0.0;         ///< s
 };
 
 }  // namespace chase::perception

@@ -6,15 +6,22 @@
 #include <opencv2/core.hpp>
 #include <string>
 
+#include "chase/command_ack_t.hpp"
+#include "common/bus/convert.h"
 #include "services/perception/messages.h"
+#include "services/perception/select.h"
 
 namespace chase::perception {
 
 PerceptionNode::PerceptionNode(bus::Bus& bus, const PerceptionConfig& config)
-    : bus_(bus), config_(config), perceiver_(std::make_unique<Perceiver>(config)) {
+    : bus_(bus),
+      config_(config),
+      perceiver_(std::make_unique<Perceiver>(config)),
+      window_("perception", 0.0) {
   cv::setNumThreads(1);  // the same sums in the same order, and no threads beside the flight's
   bus_.Subscribe<camera_image_t>("CAMERA_IMAGE", [this](const camera_image_t& m) { OnImage(m); });
   bus_.Subscribe<lidar_scan_t>("LIDAR_SCAN", [this](const lidar_scan_t& m) { OnScan(m); });
+  bus_.Subscribe<command_t>("COMMAND", [this](const command_t& m) { OnCommand(m); });
   bus_.Subscribe<pose_t>("POSE", [this](const pose_t& m) { OnPose(m); });
 }
 
@@ -31,12 +38,55 @@ void PerceptionNode::OnScan(const lidar_scan_t& message) {
 void PerceptionNode::OnImage(const camera_image_t& message) {
   {
     auto timer = bus_.Time("perceive");
-    last_ = perceiver_->See(FromMessage(message, Origin(message.utime)));
+    frame_ = FromMessage(message, Origin(message.utime));
+    last_ = perceiver_->See(frame_);
   }
+  frame_heard_ = bus_.Now();
   for (size_t i = 0; i < kRefusals; ++i) refused_[i] += last_->refused[i];
   unused_frames_ += !last_->note.empty();
   if (!last_->note.empty()) bus_.ReportError("frame not used: " + last_->note);
   Send(message.utime, *last_);
+}
+
+// The other commands are mission's.
+void PerceptionNode::OnCommand(const command_t& message) {
+  if (message.kind != command_t::SELECT) return;
+  const int64_t start = bus_.identity().start;
+  const world::CommandKey command{message.sender, message.sender_start, message.id,
+                                  bus::Seconds(message.utime, start)};
+  const world::CommandAnswer answer =
+      window_.Take(bus::Seconds(bus_.Now(), start), command, [&] { return Select(message); });
+  command_ack_t m{};
+  m.utime = bus_.Now();
+  m.command_sender = message.sender;
+  m.command_start = message.sender_start;
+  m.id = message.id;
+  m.kind = message.kind;
+  m.verdict = answer.accepted ? command_ack_t::ACCEPTED : command_ack_t::REFUSED;
+  m.reason = answer.reason;
+  bus_.Publish("COMMAND_ACK", m);
+}
+
+world::CommandAnswer PerceptionNode::Select(const command_t& message) {
+  if (message.n_arguments != 2) return {false, "select takes a column and a row of the image, px"};
+  const double u = message.arguments[0], v = message.arguments[1];
+  const double age = bus::Seconds(bus_.Now(), frame_heard_);
+  if (frame_heard_ == 0) return {false, "no image has come yet: does the camera run?"};
+  if (age > world::kMostAge.target)
+    return {false, fmt::format("no image has come for {:.1f} s: does the camera run?", age)};
+  if (!frame_.problem.empty()) return {false, "the last image is not usable: " + frame_.problem};
+  const cv::Size size = frame_.bgr.size();
+  if (!(u >= 0.0 && u <= size.width - 1.0 && v >= 0.0 && v <= size.height - 1.0))
+    return {false, fmt::format("({:g}, {:g}) is outside the image: columns 0 to {}, rows 0 to {}",
+                               u, v, size.width - 1, size.height - 1)};
+  const Selection selection = LearnAt(frame_.bgr, cv::Point2d(u, v), config_.detector);
+  if (!selection.refusal.empty()) return {false, selection.refusal};
+  config_.detector = selection.config;
+  perceiver_->Select(selection.config, {u, v});
+  const ColorConfig& color = selection.config.color;
+  return {true,
+          fmt::format("selected: {} x {} px, hue {:.0f} to {:.0f} degrees", selection.box.width,
+                      selection.box.height, color.hue_min_deg, color.hue_max_deg)};
 }
 
 void PerceptionNode::Send(int64_t utime, const TargetEstimate& target) {

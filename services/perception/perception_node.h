@@ -6,17 +6,19 @@
 #include <string>
 
 #include "chase/camera_image_t.hpp"
+#include "chase/command_t.hpp"
 #include "chase/lidar_scan_t.hpp"
 #include "chase/pose_t.hpp"
 #include "common/bus/bus.h"
 #include "common/bus/epoch.h"
 #include "common/bus/node.h"
+#include "common/world/command_window.h"
 #include "services/perception/perceiver.h"
 
 namespace chase::perception {
 
-/// CAMERA_IMAGE, LIDAR_SCAN and POSE in, TARGET out; every image triggers, and is answered for its
-/// own time.
+/// CAMERA_IMAGE, LIDAR_SCAN, POSE and COMMAND in, TARGET and COMMAND_ACK out; every image triggers,
+/// and is answered for its own time.
 class PerceptionNode : public bus::Node {
  public:
   PerceptionNode(bus::Bus& bus, const PerceptionConfig& config);
@@ -26,6 +28,8 @@ class PerceptionNode : public bus::Node {
   void OnImage(const camera_image_t& message);
   void OnScan(const lidar_scan_t& message);
   void OnPose(const pose_t& message);
+  void OnCommand(const command_t& message);
+  world::CommandAnswer Select(const command_t& message);
   void Send(int64_t utime, const TargetEstimate& target);
   int64_t Origin(int64_t utime);
 
@@ -38,6 +42,9 @@ class PerceptionNode : public bus::Node {
   Refused refused_ = {};       ///< since the start
   int64_t unused_frames_ = 0;  ///< likewise
   std::optional<TargetEstimate> last_;
+  Frame frame_;              ///< the last one
+  int64_t frame_heard_ = 0;  ///< utime; 0: none yet
+  world::CommandWindow window_;
   std::optional<int64_t> origin_;  ///< utime that the core's seconds count from
 };
 

@@ -97,16 +97,19 @@ void Pilot::ChangeFrame() {
   had_target_ = false;
   whereabouts_.Clear();
   obstacles_.clear();
+  unseen_.clear();
   obstacles_time_ = -1e9;
   has_running_ = false;
   home_.reset();
   trail_.Clear();
   way_back_.Reset();
+  way_down_.Reset();
 }
 
 void Pilot::SetTask(Task task, const std::optional<Eigen::Vector3d>& home) {
   if (task_ != task) {
     way_back_.Reset();
+    way_down_.Reset();
     news_ = true;  // to be obeyed at once
   }
   task_ = task;
@@ -181,6 +184,7 @@ PlanRequest Pilot::Request(double t0, const Start& start) const {
   request.start = start.state;
   request.yaw = start.yaw;
   request.obstacles = obstacles_;
+  request.unseen = unseen_;
   // What moves is measured, as the target is, in the frame that drifts.
   for (world::Obstacle& o : request.obstacles)
     if (!o.moving) o.velocity_covariance += drift_;
@@ -223,6 +227,7 @@ PlanResult Pilot::Wait(double t0, const Start& start, const BodyEstimate& body) 
 PlanResult Pilot::Obey(double t0, const Start& start, const BodyEstimate& body) {
   if (task_ == Task::kTakeoff) return Wait(t0, start, body);
   airborne_ = true;  // a climb ends here
+  if (task_ == Task::kLand) return Land(t0, start);
   return task_ == Task::kReturn ? Return(t0, start) : Hold(t0, start, "holding");
 }
 
@@ -239,12 +244,34 @@ PlanResult Pilot::Return(double t0, const Start& start) {
   std::optional<Stop> leg = way_back_.Leg(config_.planner, request, trail_, above,
                                           start.on_plan ? &running_.trajectory : nullptr);
   if (!leg || !SeesObstacles(t0 - config_.latency)) return Hold(t0, start, "no way back");
+  PlanResult plan = Along(request, start, std::move(*leg));
+  plan.reason = "returning";
+  return plan;
+}
+
+PlanResult Pilot::Along(const PlanRequest& request, const Start& start, Stop leg) const {
   PlanResult plan;
   plan.verdict = Verdict::kSafeOnly;
-  plan.reason = "returning";
-  plan.trajectory = std::move(leg->trajectory);
+  plan.trajectory = std::move(leg.trajectory);
   plan.yaw = {start.yaw.yaw};
-  SetProofs(config_.planner, request, std::move(leg->proofs), &plan);
+  SetProofs(config_.planner, request, std::move(leg.proofs), &plan);
+  return plan;
+}
+
+// A plan that ends where it starts lets control come down: it does so above the end of a plan only.
+PlanResult Pilot::Land(double t0, const Start& start) {
+  PlanResult here = Hold(t0, start, "landing");
+  if (descending_ || !SeesObstacles(t0 - config_.latency)) return here;
+  PlanRequest request = Request(t0, start);
+  if (!HasTarget(t0 - config_.latency)) request.target_body.reset();
+  const LandingNeeds needs{config_.planner.drone_radius + config_.landing_room,
+                           std::tan(config_.landing_slope_deg * M_PI / 180.0),
+                           config_.landing_reach};
+  WayDown::Answer answer = way_down_.Lead(config_.planner, request, needs,
+                                          here.trajectory.Position(here.trajectory.end()), home_,
+                                          start.on_plan ? &running_.trajectory : nullptr);
+  PlanResult plan = answer.leg ? Along(request, start, std::move(*answer.leg)) : std::move(here);
+  plan.reason = "landing, " + answer.reason;
   return plan;
 }
 

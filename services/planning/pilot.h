@@ -4,11 +4,13 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "services/planning/planner.h"
 #include "services/planning/planning_config.h"
 #include "services/planning/way_back.h"
+#include "services/planning/way_down.h"
 #include "services/planning/whereabouts.h"
 
 namespace chase::planning {
@@ -39,6 +41,7 @@ enum class Task {
   kChase,    ///< the target, or look for it
   kHold,     ///< brake and hover
   kReturn,   ///< to above the take-off place
+  kLand,     ///< to above level ground; control comes down from there
   kDone,     ///< nothing is flown any more
 };
 
@@ -50,11 +53,16 @@ class Pilot {
 
   void SetForecast(const Forecast& forecast);
   void SetObstacles(double t, std::vector<world::Obstacle> obstacles);
+  /// Places near the drone that nobody has looked into.
+  void SetUnseen(std::vector<world::Obstacle> unseen) { unseen_ = std::move(unseen); }
   /// Control says that it flies: a planner that has just been started must not take off again.
   void SetFlying(bool flying) {
     heard_control_ = true;
     airborne_ = airborne_ || (flying && !has_running_);
   }
+
+  /// Control says that it comes down: nothing leads it aside any more.
+  void SetDescending(bool descending) { descending_ = descending; }
 
   /// Until the first one it climbs and chases by itself. `home` is p_WB where it took off, frame W,
   /// m; nothing: not known.
@@ -91,6 +99,8 @@ class Pilot {
   PlanResult Obey(double t0, const Start& start, const BodyEstimate& body);
   PlanResult Hold(double t0, const Start& start, const std::string& reason);
   PlanResult Return(double t0, const Start& start);
+  PlanResult Land(double t0, const Start& start);
+  PlanResult Along(const PlanRequest& request, const Start& start, Stop leg) const;
   bool SeesObstacles(double t) const;
   PlanResult Search(double t0, const Start& start, const BodyEstimate& body);
   PlanResult BrakeAndLook(double t0, const Start& start, double yaw) const;
@@ -98,7 +108,7 @@ class Pilot {
   PlanningConfig config_;
   std::unique_ptr<Planner> planner_;
   std::optional<Forecast> forecast_;
-  std::vector<world::Obstacle> obstacles_;
+  std::vector<world::Obstacle> obstacles_, unseen_;
   Eigen::Matrix3d drift_ =
       Eigen::Matrix3d::Zero();    ///< covariance of the frame's velocity, m^2/s^2
   double obstacles_time_ = -1e9;  ///< s
@@ -108,7 +118,7 @@ class Pilot {
   bool news_ = false;
   bool obstacles_changed_ = false;
   bool airborne_ = false;
-  bool heard_control_ = false;
+  bool heard_control_ = false, descending_ = false;
   std::optional<double> first_update_;  ///< s
   bool had_target_ = false;
   world::Trajectory last_seen_;  ///< forecast of the target that was chased last
@@ -117,6 +127,7 @@ class Pilot {
   std::optional<Eigen::Vector3d> home_;  // m
   Trail trail_;
   WayBack way_back_;
+  WayDown way_down_;
   Whereabouts whereabouts_;                          ///< of a target that is lost
   Eigen::Vector3d place_ = Eigen::Vector3d::Zero();  ///< from which it is looked for, m
   double fastest_ = 0.0;                             ///< that the target was seen to move, m/s

@@ -40,6 +40,7 @@ struct PlanRequest {
   double target_sigma = 0.0;                   ///< largest standard deviation of p_WT at t0, m
   double target_speed_sigma = 0.0;             ///< and of its velocity, m/s
   std::vector<world::Obstacle> obstacles;      ///< at their true size
+  std::vector<world::Obstacle> unseen;         ///< places that nobody has looked into
   std::optional<world::Obstacle> target_body;  ///< what the drone must not touch of the target
   bool asks_sight = true;
   std::optional<world::Trajectory> running;     ///< the plan being flown, if any

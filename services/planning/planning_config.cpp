@@ -23,6 +23,12 @@ std::string PlanningConfig::Problem() const {
   if (!(stale_prediction > 0.0)) below("stale_prediction", stale_prediction, "above 0 s");
   if (!(takeoff_height >= 0.0)) below("takeoff_height", takeoff_height, "at least 0 m");
   if (!(takeoff_time > 0.5)) below("takeoff_time", takeoff_time, "above 0.5 s");
+  if (!(landing_room >= 0.0 && landing_room <= 5.0))
+    below("landing_room", landing_room, "0 to 5 m");
+  if (!(landing_slope_deg > 0.0 && landing_slope_deg <= 45.0))
+    below("landing_slope_deg", landing_slope_deg, "above 0 and at most 45 degrees");
+  if (!(landing_reach >= 0.0 && landing_reach <= 8.0))
+    below("landing_reach", landing_reach, "0 to 8 m, as far as the map is surely known");
   return text;
 }
 

@@ -39,9 +39,11 @@ Task TaskOf(int8_t state) {
       return Task::kChase;
     case flight_state_t::RETURN:
       return Task::kReturn;
+    case flight_state_t::LAND:
+      return Task::kLand;
     case flight_state_t::DONE:
       return Task::kDone;
-    default:  // control does the rest of landing, with a pose or without
+    default:
       return Task::kHold;
   }
 }
@@ -82,9 +84,16 @@ plan_t ToMessage(const PlanResult& plan, int64_t origin) {
 PlanningNode::PlanningNode(bus::Bus& bus, const PlanningConfig& config)
     : bus_(bus), config_(config), pilot_(config) {
   bus_.Subscribe<prediction_t>("PREDICTION", [this](const prediction_t& m) { OnPrediction(m); });
-  bus_.Subscribe<obstacles_t>("OBSTACLES", [this](const obstacles_t& m) { OnObstacles(m); });
+  bus_.Subscribe<obstacles_t>("OBSTACLES", [this](const obstacles_t& m) {
+    if (auto list = Listed(m))
+      pilot_.SetObstacles(bus::Seconds(m.utime, *origin_), *std::move(list));
+  });
+  bus_.Subscribe<obstacles_t>("UNSEEN", [this](const obstacles_t& m) {
+    if (auto list = Listed(m)) pilot_.SetUnseen(*std::move(list));
+  });
   bus_.Subscribe<tracking_t>("TRACKING", [this](const tracking_t& m) {
     pilot_.SetFlying(m.following != tracking_t::NONE);
+    pilot_.SetDescending(m.following == tracking_t::LAND);
   });
   bus_.Subscribe<flight_state_t>("FLIGHT_STATE", [this](const flight_state_t& m) { OnState(m); });
   bus_.Subscribe<pose_t>("POSE", [this](const pose_t& m) { OnPose(m); });
@@ -109,14 +118,14 @@ void PlanningNode::OnPrediction(const prediction_t& message) {
   pilot_.SetForecast(forecast);
 }
 
-void PlanningNode::OnObstacles(const obstacles_t& message) {
-  if (!epoch_.Is(message.epoch)) return;
+std::optional<std::vector<world::Obstacle>> PlanningNode::Listed(const obstacles_t& message) {
+  if (!epoch_.Is(message.epoch)) return std::nullopt;
   const int64_t origin = Origin(message.utime);
   std::vector<world::Obstacle> obstacles;
   for (const obstacle_t& o : message.obstacles)
     if (o.center.n_coefficients <= kMaxCoefficients && obstacles.size() < kMaxObstacles)
       obstacles.push_back(bus::FromMessage(o, origin));
-  pilot_.SetObstacles(bus::Seconds(message.utime, origin), std::move(obstacles));
+  return obstacles;
 }
 
 void PlanningNode::OnState(const flight_state_t& message) {

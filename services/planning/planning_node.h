@@ -24,7 +24,7 @@ class PlanningNode : public bus::Node {
 
  private:
   void OnPrediction(const prediction_t& message);
-  void OnObstacles(const obstacles_t& message);
+  std::optional<std::vector<world::Obstacle>> Listed(const obstacles_t& message);
   void OnState(const flight_state_t& message);
   void OnPose(const pose_t& message);
   void CheckMission(int64_t utime);

@@ -200,6 +200,26 @@ std::vector<Vector3d> Displacements() {
   return all;
 }
 
+/// What is unseen but for the places that the start is in: the body is there.
+std::vector<world::Obstacle> UnseenAround(const PlannerConfig& config, const PlanRequest& request) {
+  std::vector<world::Obstacle> unseen;
+  for (const world::Obstacle& o : request.unseen)
+    if (DistanceTo(o, request.start.p - o.center.Position(request.t0)) > config.hard_radius())
+      unseen.push_back(o);
+  return unseen;
+}
+
+/// Does the plan keep off all of them until t?
+bool KeepsOff(const PlannerConfig& config, const PlanRequest& request,
+              const std::vector<world::Obstacle>& unseen, const world::Trajectory& plan, double t) {
+  if (unseen.empty() || t <= plan.start) return true;
+  PlanRequest part = WithoutSight(request, request.start, plan.start);
+  part.horizon = t - plan.start;
+  part.obstacles = unseen;
+  part.target_body.reset();
+  return StaysOff(ToCurve(plan, part.t0, part.horizon), MakeProblem(config, part, nullptr), 1.0);
+}
+
 }  // namespace
 
 std::optional<Stop> Brake(const PlannerConfig& config, const PlanRequest& request) {
@@ -296,12 +316,24 @@ std::optional<Stop> WayOut(const PlannerConfig& config, const PlanRequest& reque
                            const world::Trajectory& plan) {
   PlannerConfig hard = config;
   hard.safety_margin = 0.0;
+  const std::vector<world::Obstacle> unseen = UnseenAround(hard, request);
+  const auto is_unseen = [&](const Proof& proof) {
+    return std::any_of(unseen.begin(), unseen.end(),
+                       [&](const auto& o) { return o.id == proof.obstacle; });
+  };
   for (const double after : {kOverdue, 0.2, 0.7, 1.1, HUGE_VAL}) {
     const double t = std::min(plan.start + after, plan.end());
     PlanRequest rest = request;
     rest.t0 = t;
     rest.start = plan.At(t);
-    if (auto stop = Brake(hard, rest)) return stop;
+    rest.obstacles.insert(rest.obstacles.end(), unseen.begin(), unseen.end());
+    std::optional<Stop> stop;
+    if (KeepsOff(hard, request, unseen, plan, t)) stop = Brake(hard, rest);
+    if (stop) {  // whoever checks it hears of obstacles only
+      auto& proofs = stop->proofs;
+      proofs.erase(std::remove_if(proofs.begin(), proofs.end(), is_unseen), proofs.end());
+      return stop;
+    }
     if (t == plan.end()) break;
   }
   return std::nullopt;

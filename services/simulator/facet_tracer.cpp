@@ -166,13 +166,9 @@ CHASE_INLINE Corners CornersOf(const FacetSolid& solid, const Choice& choice) {
 CHASE_INLINE V3 Vertices(const FacetVertex* base, VI index) {
   int at[8];
   memcpy(at, &index, sizeof at);
-  __m256 row[4];
-  for (int i = 0; i < 4; ++i)
-    row[i] = _mm256_set_m128(_mm_load_ps(base[at[i + 4]].p), _mm_load_ps(base[at[i]].p));
-  const __m256 a = _mm256_unpacklo_ps(row[0], row[1]), b = _mm256_unpackhi_ps(row[0], row[1]);
-  const __m256 c = _mm256_unpacklo_ps(row[2], row[3]), d = _mm256_unpackhi_ps(row[2], row[3]);
-  return {(V)_mm256_shuffle_ps(a, c, 0x44), (V)_mm256_shuffle_ps(a, c, 0xee),
-          (V)_mm256_shuffle_ps(b, d, 0x44)};
+  V columns[4];
+  Transpose([&](int lane) { return _mm_load_ps(base[at[lane]].p); }, columns);
+  return {columns[0], columns[1], columns[2]};
 }
 
 /// Where the rays may be within the solid: a span of a body slightly larger, and, of a cylinder,

@@ -10,12 +10,17 @@ constexpr int kMostCells = 256;     // on a ray's way
 constexpr float kCellEdge = 1e-3f;  // share of a triangle at its edges that is not settled, at most
 constexpr float kAboveTop = 1e-3f;  // m, more than the rounding of a height
 
-inline void CrossCell(const GroundGrid& ground, VI ix, VI iy, VI* lanes, Lanes* ray) {
-  const VI below = iy * (ground.columns + 1) + ix, above = below + (ground.columns + 1);
-  const V x0 = Gather(ground.x, ix), x1 = Gather(ground.x + 1, ix);
-  const V y0 = Gather(ground.y, iy), y1 = Gather(ground.y + 1, iy);
-  const V3 a = {x0, y0, Gather(ground.z, below)}, b = {x1, y0, Gather(ground.z + 1, below)};
-  const V3 d = {x0, y1, Gather(ground.z, above)}, e = {x1, y1, Gather(ground.z + 1, above)};
+__attribute__((always_inline)) inline void CrossCell(const GroundGrid& ground, VI ix, VI iy,
+                                                     VI* lanes, Lanes* ray) {
+  const VI first = iy * (ground.columns + 1) + ix;
+  int i[8], j[8], low[8];
+  memcpy(i, &ix, sizeof i), memcpy(j, &iy, sizeof j), memcpy(low, &first, sizeof low);
+  V at[4], z[4];
+  Transpose([&](int k) { return Pairs(ground.x + i[k], ground.y + j[k]); }, at);
+  const float* high = ground.z + ground.columns + 1;
+  Transpose([&](int k) { return Pairs(ground.z + low[k], high + low[k]); }, z);
+  const V3 a = {at[0], at[2], z[0]}, b = {at[1], at[2], z[1]};
+  const V3 d = {at[0], at[3], z[2]}, e = {at[1], at[3], z[3]};
   const Triangle halves[2] = {TriangleOf(a, b, e), TriangleOf(a, e, d)};
   const V way = Sum(a - ray->o) / ground.cells_per_m[0];
   VI settled = AllInt(0);
@@ -31,7 +36,7 @@ inline void CrossCell(const GroundGrid& ground, VI ix, VI iy, VI* lanes, Lanes* 
 }
 
 /// From cell to cell of the grid (Amanatides and Woo 1987), from where the ray comes below the
-/// highest of the ground.
+/// highest of the ground. A ray that may meet its cell waits until all others do or have passed.
 __attribute__((always_inline)) inline void CrossGround(const GroundGrid& ground, VI todo,
                                                        Lanes* ray) {
   if (ground.columns == 1 && ground.rows == 1)
@@ -62,15 +67,16 @@ __attribute__((always_inline)) inline void CrossGround(const GroundGrid& ground,
     const V tx = (Real(ix + ahead_x) - gx) * rx, ty = (Real(iy + ahead_y) - gy) * ry;
     const V next = Min(tx, ty);
     const V lowest = Fma(Pick(climb < 0.0f, next, t), climb, height) - kAboveTop;
-    VI meets = todo & (lowest <= Gather(ground.top, iy * ground.columns + ix));
-    if (Bits(meets) != 0) {
-      const VI tried = meets;
-      CrossCell(ground, ix, iy, &meets, ray);
-      todo &= ~(tried & ~meets);
+    const VI meets = todo & (lowest <= Gather(ground.top, iy * ground.columns + ix));
+    VI on = todo & ~meets;
+    if (Bits(on) == 0) {
+      on = meets;
+      CrossCell(ground, ix, iy, &on, ray);
+      todo = on;
     }
     const VI along_x = tx <= ty;
-    ix += step_x & along_x, iy += step_y & ~along_x;
-    t = next;
+    ix += step_x & along_x & on, iy += step_y & ~along_x & on;
+    t = Pick(on, next, t);
     todo &= (t <= Min(end, ray->t)) & (ix >= 0) & (ix <= last_x) & (iy >= 0) & (iy <= last_y);
     todo &= (climb < 0.0f) | (Fma(t, climb, height) <= ground.highest);
     if (Bits(todo) == 0) return;

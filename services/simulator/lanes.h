@@ -42,6 +42,21 @@ struct V3 {
   V x, y, z;
 };
 
+/// Columns of the eight rows of four that `row(lane)` loads. Quicker than gathers.
+template <class Row>
+__attribute__((always_inline)) inline void Transpose(const Row& row, V* columns) {
+  __m256 r[4];
+  for (int i = 0; i < 4; ++i) r[i] = _mm256_set_m128(row(i + 4), row(i));
+  const __m256 a = _mm256_unpacklo_ps(r[0], r[1]), b = _mm256_unpackhi_ps(r[0], r[1]);
+  const __m256 c = _mm256_unpacklo_ps(r[2], r[3]), d = _mm256_unpackhi_ps(r[2], r[3]);
+  columns[0] = (V)_mm256_shuffle_ps(a, c, 0x44), columns[1] = (V)_mm256_shuffle_ps(a, c, 0xee);
+  columns[2] = (V)_mm256_shuffle_ps(b, d, 0x44), columns[3] = (V)_mm256_shuffle_ps(b, d, 0xee);
+}
+/// Two neighbours each from two arrays.
+inline __m128 Pairs(const float* a, const float* b) {
+  return _mm_loadh_pi(_mm_castpd_ps(_mm_load_sd((const double*)a)), (const __m64*)b);
+}
+
 inline V3 operator-(const V3& a, const V3& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
 inline V3 Along(const V3& o, V t, const V3& d) {
   return {Fma(t, d.x, o.x), Fma(t, d.y, o.y), Fma(t, d.z, o.z)};

@@ -12,7 +12,7 @@ struct Sample {
   double t = 0.0;                              ///< s
   Eigen::Vector3d p_WB, p_WT;                  ///< m
   double distance, clearance, speed, plan_ms;  ///< m, m, m/s, ms
-  int verdict = -1, target_state = -1, health = -1, flight = -1;
+  int verdict = -1, target_state = -1, health = -1, flight = -1, processes = -1;
 };
 
 Sample SampleOf(const Scene& scene, double t);

@@ -17,9 +17,13 @@ int main(int argc, char** argv) {
   spec.add_flags = [&](CLI::App& app) {
     app.add_option("--port", port, "of the page (default: the configuration's, 8080)")
         ->check(CLI::Range(0, 65535));
-    app.add_option("--play", log, "LCM log to play instead of looking at the bus");
-    app.add_option("--token-file", token_file,
-                   "its first line is what commands must carry (default: no commands are taken)");
+    auto* token = app.add_option(
+        "--token-file", token_file,
+        "its first line is what commands must carry (default: no commands are taken)");
+    auto* play = app.add_option("--play", log, "LCM log to play instead of looking at the bus");
+    for (const char* live : {"--lcm-url", "--channel-prefix", "--replay"})
+      play->excludes(app.get_option(live));
+    play->excludes(token);
   };
   spec.dump_config = [&] { return chase::config::Dump(config); };
   spec.load_config = [&](const std::string& file) { chase::config::Load(file, &config); };

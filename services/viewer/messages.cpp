@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "common/bus/convert.h"
+#include "common/world/ages.h"
 
 namespace chase::viewer {
 namespace {
@@ -60,6 +61,13 @@ Flight FromMessage(const flight_state_t& m, int64_t origin) {
   return {Code(m.state), m.reason, bus::Seconds(m.since, origin), m.missing, 0.0};
 }
 
+Fence FromMessage(const geofence_t& m) {
+  Fence fence{{}, m.floor, m.ceiling};
+  for (size_t i = 0; i + 1 < m.corners.size(); i += 2)
+    fence.corners.emplace_back(m.corners[i], m.corners[i + 1]);
+  return fence;
+}
+
 std::vector<world::Obstacle> FromMessage(const obstacles_t& m, int64_t origin) {
   std::vector<world::Obstacle> out;
   for (const obstacle_t& o : m.obstacles) out.push_back(bus::FromMessage(o, origin));
@@ -96,6 +104,13 @@ std::vector<ProcessHealth> Joined(const std::map<std::string, ProcessHealth>& he
   std::vector<ProcessHealth> rows;
   for (const auto& [name, row] : all) rows.push_back(row);
   return rows;
+}
+
+int WorstState(const std::vector<ProcessHealth>& processes) {
+  int worst = -1;
+  for (const ProcessHealth& p : processes)
+    worst = std::max(worst, p.age > world::kMostAge.status ? status_t::FAILED + 0 : p.state);
+  return worst;
 }
 
 double MeanStageMs(const status_t& m, const status_t& before, const std::string& stage) {

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "chase/flight_state_t.hpp"
+#include "chase/geofence_t.hpp"
 #include "chase/health_t.hpp"
 #include "chase/obstacles_t.hpp"
 #include "chase/plan_t.hpp"
@@ -26,6 +27,7 @@ Target FromMessage(const target_t& m);
 Plan FromMessage(const plan_t& m, int64_t origin);
 Forecast FromMessage(const prediction_t& m, int64_t origin);
 Flight FromMessage(const flight_state_t& m, int64_t origin);
+Fence FromMessage(const geofence_t& m);
 std::vector<world::Obstacle> FromMessage(const obstacles_t& m, int64_t origin);
 
 /// `before`: the process's last status, for its share of a core; nullptr: none.
@@ -35,6 +37,9 @@ ProcessHealth FromMessage(const status_t& m, const status_t* before);
 /// `now` [us]; of one that only the latter has heard, that.
 std::vector<ProcessHealth> Joined(const std::map<std::string, ProcessHealth>& heard,
                                   const health_t& mission, int64_t now);
+
+/// The worst state, status_t's constants; who is silent counts as FAILED. -1: there is none.
+int WorstState(const std::vector<ProcessHealth>& processes);
 
 /// Mean time [ms] of what a stage did between two statuses; negative: nothing, or not known.
 double MeanStageMs(const status_t& m, const status_t& before, const std::string& stage);

@@ -88,12 +88,19 @@ json FlightOf(const Flight& f) {
           {"missing", f.missing}};
 }
 
+json FenceOf(const Fence& f) {
+  json corners = json::array();
+  for (const Eigen::Vector2d& p : f.corners) corners.push_back(Numbers(p));
+  return {{"corners", corners}, {"floor", Number(f.floor)}, {"ceiling", Number(f.ceiling)}};
+}
+
 json RowOf(const Sample& s) {
   json row = {Number(s.t),       Number(s.distance), Number(s.clearance), Number(s.speed),
               Number(s.plan_ms), s.verdict,          s.target_state,      s.health};
   for (const Eigen::Vector3d* p : {&s.p_WB, &s.p_WT})
     for (const double v : {p->x(), p->y(), p->z()}) row.push_back(Number(v));
   row.push_back(s.flight);
+  row.push_back(s.processes);
   return row;
 }
 
@@ -124,6 +131,7 @@ std::string StateText(const Scene& scene, double t, int generation,
   if (scene.plan) out["plan"] = PlanOf(*scene.plan);
   if (scene.forecast) out["forecast"] = ForecastOf(*scene.forecast);
   if (scene.flight) out["flight"] = FlightOf(*scene.flight);
+  if (scene.fence) out["fence"] = FenceOf(*scene.fence);
   if (play) out["play"] = PlayOf(*play);
   return Text(out);
 }

@@ -25,11 +25,11 @@ class Playback {
       : player_(file),
         node_(player_, config, std::filesystem::path(file).filename().string()),
         clock_(static_cast<double>(player_.end() - player_.begin()) * 1e-6) {
-    node_.SetStart(player_.begin());
-    player_.Survey(node_.TickPeriod(), [this](int64_t utime) { node_.Remember(utime); });
+    node_.feed().SetStart(player_.begin());
+    player_.Survey(node_.TickPeriod(), [this](int64_t utime) { node_.feed().Remember(utime); });
     node_.OnPlayRequest([this](const Request& request) { Hear(request); });
     Jump();
-    node_.SendHello();
+    node_.feed().SendHello();
   }
 
   void Step(double elapsed, bool tick) {
@@ -43,15 +43,15 @@ class Playback {
   int64_t Utime() const { return player_.begin() + std::llround(clock_.t() * 1e6); }
 
   void Tell() {
-    node_.SetPlay({clock_.t(), clock_.duration(), clock_.speed(), clock_.playing()});
+    node_.feed().SetPlay({clock_.t(), clock_.duration(), clock_.speed(), clock_.playing()});
     node_.Tick(Utime());
   }
 
   /// The scene as it was at the clock's time.
   void Jump() {
-    node_.Forget();
+    node_.feed().Forget();
     player_.Seek(Utime());
-    node_.SetPlay({clock_.t(), clock_.duration(), clock_.speed(), clock_.playing()});
+    node_.feed().SetPlay({clock_.t(), clock_.duration(), clock_.speed(), clock_.playing()});
   }
 
   void Hear(const Request& request) {

@@ -75,6 +75,8 @@ std::string RefusalOf(const Request& request, const std::string& token) {
   if (!world::CommandNamed(request.command)) return "no such command";
   if (world::CommandNamed(request.command) == world::kKillCommand)
     return "not from a page: chase-command kill --force";
+  if (world::CommandNamed(request.command) == world::kSelectCommand)
+    return "not from a page: chase-command select X Y";
   return "";
 }
 

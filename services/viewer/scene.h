@@ -56,6 +56,12 @@ struct Flight {
   double age = 0.0;                  ///< since it was heard, s
 };
 
+/// Where it may fly: a polygon seen from above, between two heights.
+struct Fence {
+  std::vector<Eigen::Vector2d> corners;  ///< m
+  double floor = 0.0, ceiling = 0.0;     ///< z, m
+};
+
 /// The newest of everything.
 struct Scene {
   std::optional<Drone> drone;
@@ -63,8 +69,10 @@ struct Scene {
   std::optional<Plan> plan;
   std::optional<Forecast> forecast;
   std::optional<Flight> flight;
+  std::optional<Fence> fence;
   int following = -1;     ///< tracking_t's constants; -1: not heard
   double plan_ms = -1.0;  ///< mean time per plan of the last second; negative: not known
+  int processes = -1;     ///< worst state of a process, status_t's constants; -1: none is heard
   std::string scenario;   ///< its name; empty: none
 };
 

@@ -7,6 +7,7 @@
 
 #include "services/viewer/assets.h"
 #include "services/viewer/foxglove_protocol.h"
+#include "services/viewer/page_sink.h"
 #include "services/viewer/request.h"
 
 namespace chase::viewer {
@@ -18,29 +19,23 @@ struct ServerConfig {
   Parameters parameters;  ///< that Foxglove may read
 };
 
-/// What a page is told; only the newest of each waits for a slow one.
-enum class Part { kHello, kState, kObstacles, kHealth, kReply, kCloud, kImage };
-
 /// HTTP and WebSocket server with a thread of its own: the page's files, the page's data at /ws,
 /// and Foxglove's protocol for clients that ask for it. Its functions may be called from another
 /// thread and do not wait for any client.
-class Server {
+class Server : public PageSink {
  public:
   /// Throws std::runtime_error, one line with the cure, when the address cannot be listened on.
   Server(const ServerConfig& config, Assets assets);
-  ~Server();
+  ~Server() override;
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;
 
   int port() const;
 
-  /// To all pages. Hello, obstacles and health go to those that come later as well.
-  void Send(Part part, std::string bytes, bool binary = false);
-  /// Only to those that come later.
-  void Retain(Part part, std::string bytes);
+  void Send(Part part, std::string bytes, bool binary) override;
+  void Retain(Part part, std::string bytes) override;
+  bool Wanted(Part part) const override;
   int pages() const;
-  /// Does any page want this heavy part?
-  bool Wanted(Part part) const;
   /// What pages asked for since the last call; of more than 64 the first.
   std::vector<Request> TakeRequests();
 

@@ -151,7 +151,7 @@ class Campaign(unittest.TestCase):
         lines = self.fly("--list", "--scenarios", "gym,mission", "--faults", "all").stdout
         for scenario, mission in (("gym", 0), ("mission", 1)):
             of_place = [line for line in lines.splitlines() if f"/{scenario}.yaml" in line]
-            for fault, times in (("decoy", 1), ("loss-20", 1), ("delay-PLAN", 1), ("disk-full", 0),
+            for fault, times in (("decoy", 1), ("loss-20", 1), ("delay-PLAN", 1), ("cpu-load", 1), ("disk-full", 0),
                                  ("kill-mission", mission)):
                 self.assertEqual(sum(f"--faults {fault} " in line for line in of_place), times, fault)
 

@@ -26,6 +26,7 @@ class Command(unittest.TestCase):
 
     def test_refusals_and_silence(self):
         self.assert_said(command("stop"), 3, "no answer", "chase-mission")
+        self.assert_said(command("select", "1", "2"), 3, "no answer", "chase-perception")
         mission = subprocess.Popen([BIN / "chase-mission", "--channel-prefix", "falcon_"])
         try:
             time.sleep(0.5)
@@ -43,7 +44,9 @@ class Command(unittest.TestCase):
 
     def test_bad_use(self):
         for words in ((), ("fly",), ("stop", "now"), ("land", "--force"), ("stop", "--timeout", "nan"),
-                      ("stop", "--timeout", "0"), ("stop", "--lcm-url", "udpm://nonsense")):
+                      ("stop", "--timeout", "0"), ("stop", "--lcm-url", "udpm://nonsense"), ("select",),
+                      ("select", "5"), ("select", "a", "b"), ("select", "1", "2", "3"), ("hold", "1", "2"),
+                      ("select", "1", "2", "--wait")):
             self.assert_said(command(*words), 1, "chase-command: ")
 
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Missions that the safety envelope ends: battery low and critical, geofence, kill, a blocked way up.
+"""Missions that the safety envelope ends: battery low and critical, geofence, kill, a blocked way up or down.
 
 envelope_test.py BIN_DIR MISSION.yaml"""
 
@@ -19,7 +19,7 @@ TAKEOFF_X = 1.7  # m: the scenario's start
 
 
 def fly(folder, commands, duration, **changes):
-    """Flies the mission changed: services by name, boxes; returns metrics and the log's path."""
+    """Flies the mission changed: services by name, boxes, movers; returns metrics and the log's path."""
     blocks = dict(re.findall(r"^(\w+):(.*?)(?=^\w+:|\Z)", MISSION.read_text(encoding="utf-8"), re.M | re.S))
     blocks["commands"] = json.dumps([{"command": name, "at_s": t} for name, t in commands])
     blocks["duration_s"] = str(duration)
@@ -27,6 +27,7 @@ def fly(folder, commands, duration, **changes):
     for name, config in changes.get("services", {}).items():
         blocks["services"] += f"  - {{name: {name}, config: '{json.dumps(config)}'}}\n"
     blocks["world"] = f"\n  boxes: {json.dumps(changes.get('boxes', []))}{blocks['world']}"
+    blocks["movers"] = json.dumps(changes.get("movers", []))
     text = "".join(f"{key}: {block.rstrip()}\n" for key, block in blocks.items())
     file, log = folder / "mission.yaml", folder / "flight.lcm"
     file.write_text(text, encoding="utf-8")
@@ -61,14 +62,14 @@ class Envelope(unittest.TestCase):
         self.reasons = reasons(log)
         return [s["state"] for s in metrics["flight_states"]], metrics, log
 
-    def truth(self, log):
-        """(t, x, z) of TRUTH, s and m."""
+    def truth(self, log, channel="TRUTH", *columns):
+        """(t, x, z) of TRUTH, s and m, or other columns."""
         out = pathlib.Path(self.folder.name) / "truth.tum"
-        export = subprocess.run([BIN / "chase-log", "export", "--tum", "--channel", "TRUTH", log, out],
+        export = subprocess.run([BIN / "chase-log", "export", "--tum", "--channel", channel, log, out],
                                 check=False, capture_output=True, text=True)
         self.assertEqual(export.returncode, 0, export.stderr)
         rows = [line.split() for line in out.read_text(encoding="utf-8").splitlines() if line[0] != "#"]
-        return [(float(row[0]), float(row[1]), float(row[3])) for row in rows]
+        return [(float(row[0]), *(float(row[i]) for i in columns or (1, 3))) for row in rows]
 
     def assert_in_order(self, states, *expected):
         rest = iter(states)
@@ -102,6 +103,25 @@ class Envelope(unittest.TestCase):
         farthest = max(x for _, x, _ in self.truth(log)) - TAKEOFF_X
         self.assertLess(farthest, reach)
         self.assertGreater(farthest, 0.6 * reach, "it did not even go near")
+
+    def test_control_keeps_the_fence_by_itself(self):
+        reach = 5.0
+        states, _, log = self.fly([("takeoff", -7), ("chase", -2)], 15, services={
+            "control": {"geofence": {"polygon": [[-3, -3], [reach, -3], [reach, 8], [-3, 8]]}}})
+        self.assertEqual(states[-1], "CHASE")  # mission knows no fence
+        farthest = max(x for _, x, _ in self.truth(log)) - TAKEOFF_X
+        self.assertLess(farthest, reach)
+        self.assertGreater(farthest, 0.6 * reach, "it did not even go near")
+
+    def test_lands_beside_what_has_come_below(self):
+        states, metrics, log = self.fly([("takeoff", -7), ("land", 8)], 22, movers=[
+            {"shape": "box", "size": [0.8, 0.8, 0.4], "times": [0, 5, 100],
+             "waypoints": [[1.7, 1.5, 0.2], [1.7, -2.1, 0.2], [1.7, -2.1, 0.2]]}])
+        self.assert_in_order(states, "TAKEOFF", "HOLD", "LAND", "DONE")
+        self.assertTrue(any("to a free place" in reason for reason in self.reasons), self.reasons)
+        x, y = self.truth(log, "TRUTH", 1, 2)[-1][1:]
+        self.assertGreater(max(abs(x - 1.7), abs(y + 2.1)), 0.4 + 0.25 + 0.2)
+        self.assertEqual(metrics["safe_ratio"], 1.0)
 
     def test_kill_cuts_the_motors_in_the_air(self):
         states, _, log = self.fly([("takeoff", -7), ("chase", -2), ("kill", 4), ("hold", 6)], 8)

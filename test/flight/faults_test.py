@@ -109,7 +109,7 @@ class Faults(unittest.TestCase):
 
     def test_fault_that_strikes_nothing_is_refused(self):
         for fault, cure in (("disk-full", "fly live"), ("kill-mission", "commands"),
-                            ("disk-ful", "flood, disk-full")):
+                            ("disk-ful", "cpu-load, disk-full")):
             answer = flight("--fault", fault)
             self.assertEqual((answer.returncode, answer.stdout), (1, ""))
             self.assertEqual(answer.stderr.count("\n"), 1)

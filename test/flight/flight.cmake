@@ -15,10 +15,12 @@ add_test(NAME flight_faults
   COMMAND python3 -B ${CMAKE_SOURCE_DIR}/test/flight/faults_test.py ${bin} ${scenario})
 set_tests_properties(flight_faults PROPERTIES TIMEOUT 300)
 
-# The whole mission among trees; its criteria decide.
-add_test(NAME flight_forest
-  COMMAND ${bin}/chase-flight ${CMAKE_SOURCE_DIR}/deploy/scenarios/forest.yaml --seed 1 --quiet)
-set_tests_properties(flight_forest PROPERTIES TIMEOUT 400)
+# The whole flight among trees, and half a minute in the hall in which planning dies: criteria and bounds decide.
+foreach(name IN ITEMS forest gym)
+  add_test(NAME flight_${name}
+    COMMAND python3 -B ${CMAKE_SOURCE_DIR}/test/flight/bounds_test.py ${bin} ${name})
+  set_tests_properties(flight_${name} PROPERTIES TIMEOUT 400)
+endforeach()
 
 # From take-off to the motors' end on command; its criteria decide.
 add_test(NAME flight_mission

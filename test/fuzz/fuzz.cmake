@@ -35,6 +35,7 @@ chase_fuzz(vlp16 lidar_core)
 chase_fuzz(pcap lidar_source)
 chase_fuzz(mavlink fcu_core)
 chase_fuzz(mission mission_node log_tools)
+chase_fuzz(link link_core)
 get_property(fuzzers GLOBAL PROPERTY CHASE_FUZZERS)
 add_custom_target(fuzzers DEPENDS ${fuzzers})
 

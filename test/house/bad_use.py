@@ -93,6 +93,19 @@ class BadUse(unittest.TestCase):
             self.assertRegex(answer.stdout, r"^\d+\.\d+\.\d+ \(commit [0-9a-z-]+\)\n$")
         self.for_each(sorted(path.name for path in BIN.glob("chase-*")), check)
 
+    def test_every_program_refuses_what_it_does_not_know(self):
+        programs = sorted(path.name for path in BIN.glob("chase-*"))
+        self.for_each(programs, lambda program: self.assert_refused(
+            run(program, "--no-such-flag"), program))
+
+    def test_scripts_name_their_commit(self):
+        for script in ("build", "doctor", "fly", "setup", "slurm/submit", "spy"):
+            with self.subTest(script=script):
+                answer = subprocess.run([TESTS.parent / "deploy" / script, "--version"], check=False,
+                                        capture_output=True, text=True, timeout=LIMIT)
+                self.assertEqual((answer.returncode, answer.stderr), (0, ""))
+                self.assertRegex(answer.stdout, r"^\d+\.\d+\.\d+ \(commit [0-9a-z-]+\)\n$")
+
     def test_scripts_have_help(self):
         for script in ("build", "doctor", "fly", "setup", "slurm/submit", "spy"):
             for flag in ("-h", "--help"):
@@ -162,6 +175,20 @@ class BadUse(unittest.TestCase):
     def test_out_without_replay(self):
         self.for_each(self.replayable(), lambda program: self.assert_refused(
             run(program, "--out", "no/such.lcm"), "--out", "--replay"))
+
+    def test_options_that_would_do_nothing(self):
+        def check(program):
+            for words in (("--lcm-url", "udpm://239.255.76.67:7667"), ("--channel-prefix", "eagle")):
+                self.assert_refused(run(program, "--replay", "a.lcm", "--out", "b.lcm", *words), words[0], "--replay")
+        self.for_each(self.replayable(), check)
+        for program, *words in (("chase-viewer", "--play", "--lcm-url"), ("chase-viewer", "--play", "--token-file"),
+                                ("chase-viewer", "--play", "--channel-prefix"), ("chase-viewer", "--play", "--replay")):
+            with self.subTest(program=program, words=words):
+                self.assert_refused(run(program, *[w for word in words for w in (word, "a.file")]), *words)
+        self.assert_refused(run("chase-command", "land", "--timeout", "5"), "--timeout", "--wait")
+        if TOOL_SERVICES <= set(SERVICES):
+            self.assert_refused(run("chase-flight", "gym", "--print-config", "planning", "--log", "a.lcm"), "--print-config", "--log")
+            self.assert_refused(run("chase-campaign", "--out", "no/such", "--fly", "--compare", "a"), "--fly", "--compare")
 
     def test_port_in_use(self):
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:

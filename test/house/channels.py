@@ -10,9 +10,9 @@ LISTENS = {
     "camera": set(),
     "odometry": {"LIDAR_SCAN", "IMU"},
     "mapping": {"SCAN_REGISTERED", "TARGET"},
-    "perception": {"CAMERA_IMAGE", "LIDAR_SCAN", "POSE"},
+    "perception": {"CAMERA_IMAGE", "LIDAR_SCAN", "POSE", "COMMAND"},
     "prediction": {"TARGET", "OBSTACLES"},
-    "planning": {"PREDICTION", "OBSTACLES", "POSE", "TRACKING", "FLIGHT_STATE"},
+    "planning": {"PREDICTION", "OBSTACLES", "UNSEEN", "POSE", "TRACKING", "FLIGHT_STATE"},
     "control": {"PLAN", "OBSTACLES", "POSE", "FLIGHT_STATE"},
     "mission": {"COMMAND", "POSE", "OBSTACLES", "TARGET", "PLAN", "TRACKING", "ATTITUDE_SETPOINT",
                 "LIDAR_STATUS", "CAMERA_STATUS", "ODOMETRY_STATUS", "MAPPING_STATUS",
@@ -22,7 +22,7 @@ LISTENS = {
     # Ground truth is not for it either: the page shows what the vehicle knows.
     "viewer": {"LIDAR_SCAN", "CAMERA_IMAGE", "IMU", "POSE", "SCAN_REGISTERED", "OBSTACLES", "MAP",
                "TARGET", "PREDICTION", "PLAN", "ATTITUDE_SETPOINT", "TRACKING", "SCENARIO",
-               "FLIGHT_STATE", "HEALTH", "COMMAND", "COMMAND_ACK", "MISSION_STATUS", "LIDAR_STATUS", "CAMERA_STATUS", "ODOMETRY_STATUS", "MAPPING_STATUS",
+               "FLIGHT_STATE", "HEALTH", "GEOFENCE", "COMMAND", "COMMAND_ACK", "MISSION_STATUS", "LIDAR_STATUS", "CAMERA_STATUS", "ODOMETRY_STATUS", "MAPPING_STATUS",
                "PERCEPTION_STATUS", "PREDICTION_STATUS", "PLANNING_STATUS", "CONTROL_STATUS",
                "FCU_STATUS", "SIMULATOR_STATUS", "RECORDER_STATUS"},
     "simulator": {"ATTITUDE_SETPOINT", "POSE"},  # in place of fcu

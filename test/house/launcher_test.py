@@ -191,7 +191,8 @@ class FlightTest(unittest.TestCase):
 
     def test_bad_use_is_told_before_anything_is_built(self):
         for arguments in (["gmy"], ["--seed", "-1"], ["--seed", "1.5"], ["--seed", str(2**31)],
-                          ["--seed", "nan"], ["--no-such"]):
+                          ["--seed", "nan"], ["--no-such"], ["--kill", "simulator@3"],
+                          ["--kill", "planning"], ["--kill", "planning@-1"], ["--kill", "planning@nan"]):
             with self.subTest(arguments=arguments):
                 self.patch(sys, "argv", ["fly", *arguments])
                 err = io.StringIO()
@@ -221,11 +222,11 @@ class FlightTest(unittest.TestCase):
 
     def test_process_that_dies_ends_the_flight(self):
         dying = "time.sleep(0.3); print('broken wing', flush=True); sys.exit(3)"
-        self.program("chase-mapping", SERVICE.format(behaviour=dying))
+        self.program("chase-simulator", SERVICE.format(behaviour=dying))
         self.program("chase-flight-monitor", "import time; time.sleep(60)")
         code, _, err = self.fly()
         self.assertEqual(code, 1)
-        self.assertIn("mapping ended (exit code 3)", err)
+        self.assertIn("simulator ended (exit code 3)", err)
         self.assertIn("broken wing", err)
 
     def test_process_that_may_be_restarted(self):
@@ -240,6 +241,32 @@ class FlightTest(unittest.TestCase):
         code, _, err = self.fly()
         self.assertEqual(code, 0, err)
         self.assertIn("mapping ended (exit code 3): restarted", err)
+
+    def test_kill_at_a_mission_time_and_restart(self):
+        # It goes on until both are back, however long that takes.
+        self.program("chase-flight-monitor", f"""
+            import json, pathlib, signal, time
+            def say(t, done=False):
+                print(json.dumps(dict(mission_time=t, duration=2, distance=2.5, visible=1.0, rtf=0.0, done=done)), flush=True)
+                time.sleep(0.2)
+            folder, end = pathlib.Path({str(self.bin / "flight")!r}), time.monotonic() + 20
+            for t in (0, 0.5, 1):
+                say(t)
+            while time.monotonic() < end and any(
+                    (folder / f"{{name}}.log").read_text().count("working") < 2 for name in ("planning", "control")):
+                time.sleep(0.1)
+            say(2, done=True)
+            signal.pause()
+            """)
+        code, _, err = self.fly("--kill", "planning@1", "--kill", "control@0.5")
+        self.assertEqual(code, 0, err)
+        for name, others in (("planning", 2), ("control", 2), ("mapping", 1)):
+            log = (self.folder / f"{name}.log").read_text(encoding="utf-8")
+            self.assertEqual(log.count("working"), others, name)
+        for name in ("planning", "control"):
+            self.assertRegex(err, rf"t +[01]\.\d s: kill -9 of {name}\n")
+            self.assertIn(f"{name} ended (SIGKILL): restarted", err)
+        self.assertLess(err.index("of control"), err.index("of planning"))
 
     def test_sweeps_stay_on_the_host(self):
         os.environ["LCM_DEFAULT_URL"] = f"udpm://{GROUP}:{free_port()}?ttl=1"
@@ -341,6 +368,23 @@ class Processes(unittest.TestCase):
             second = child.process.pid
             child.retry(after=0.0)
         self.assertEqual(child.process.pid, second)
+
+    def test_what_dies_again_and_again_is_started_ever_later(self):
+        child, now = self.child("pass"), 0.0
+        self.addCleanup(setattr, time, "monotonic", time.monotonic)
+        time.monotonic = lambda: now
+        child._started = now
+        waits = []
+        for _ in range(8):
+            child.process.wait()
+            died = now
+            while not child.mend():
+                now += 0.125  # exact in binary
+            waits.append(now - died)
+        self.assertEqual(waits, [0, 0.5, 1, 2, 4, 4, 4, 4])
+        now += processes.SHORT_LIFE + 1.0
+        child.process.wait()
+        self.assertTrue(child.mend(), "who lived long is back at once")
 
     def test_signal_is_named(self):
         child = self.child("import os; os.abort()")

@@ -13,3 +13,8 @@ set_tests_properties(package_consumer PROPERTIES TIMEOUT 180)
 add_test(NAME scenes COMMAND python3 ${CMAKE_CURRENT_LIST_DIR}/scenes.py
   $<TARGET_FILE_DIR:chase-plan> ${CMAKE_SOURCE_DIR}/deploy/scenarios/scenes)
 set_tests_properties(scenes PROPERTIES TIMEOUT 60)
+# The Debian package: made, judged, unpacked, flown.
+if(TARGET package_contents)
+  add_test(NAME package_deb COMMAND ${Python3_EXECUTABLE} -B ${CMAKE_CURRENT_LIST_DIR}/deb_test.py ${CMAKE_BINARY_DIR})
+  set_tests_properties(package_deb PROPERTIES TIMEOUT 400)
+endif()

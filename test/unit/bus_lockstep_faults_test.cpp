@@ -272,6 +272,18 @@ TEST(LockstepDelay, StrikesOneChannelForItsTime) {
   }
 }
 
+TEST(LockstepLoad, MakesEveryProcessSlowForItsTime) {
+  const Story story = Lived(3000137, [](Lockstep* lockstep) {
+    lockstep->At(1500137, [=] { lockstep->SetLoad(5.0); });
+    lockstep->At(2000137, [=] { lockstep->SetLoad(1.0); });
+  });
+  EXPECT_EQ(story.samples.size(), Arriving(0, 3000137).size());
+  for (size_t i = 0; i < story.samples.size(); ++i) {
+    const bool busy = story.samples[i] > 1500137 && story.samples[i] < 2000137;
+    EXPECT_EQ(story.handled_at[i] - story.samples[i], kUnderWay * (busy ? 5 : 1));
+  }
+}
+
 TEST(LockstepLoss, TakesItsShareOfHeavyAndLightAlikeAndRepeats) {
   const auto plan = [](Lockstep* lockstep) {
     lockstep->At(2000137, [=] { lockstep->SetLoss(0.2, 7); });

@@ -15,13 +15,20 @@ using test::Flight;
 using test::LinePlan;
 using test::PointPlan;
 
+/// A hover that was planned to land from.
+Plan LandingPlan(const Vector3d& p, double start = 0.0) {
+  Plan plan = PointPlan(p, start);
+  plan.to_land = true;
+  return plan;
+}
+
 TEST(AskedToLand, ComesDownOnTheSpotAndStopsTheMotors) {
   for (const double mass : {0.96, 1.0, 1.04})
     for (const double wind : {0.0, 3.0}) {
       Flight flight({1, -1, 2});
       flight.body.mass_factor = mass;
       flight.body.wind = {wind, 0, 0};
-      flight.controller.AddPlan(PointPlan({1, -1, 2}));
+      flight.controller.AddPlan(LandingPlan({1, -1, 2}));
       flight.Fly(10.0, Health::kUsable);
       flight.controller.SetLanding(true);
       flight.Fly(12.0, Health::kUsable);
@@ -57,7 +64,7 @@ TEST(AskedToLand, StopsBeforeItComesDown) {
 
 TEST(AskedToLand, HoldsAgainWhenItIsAskedNoMore) {
   Flight flight({0, 0, 3});
-  flight.controller.AddPlan(PointPlan({0, 0, 3}));
+  flight.controller.AddPlan(LandingPlan({0, 0, 3}));
   flight.Fly(1.0, Health::kUsable);
   flight.controller.SetLanding(true);
   flight.Fly(4.0, Health::kUsable);
@@ -73,7 +80,7 @@ TEST(AskedToLand, HoldsAgainWhenItIsAskedNoMore) {
 
 TEST(AskedToLand, GoesOnDownWithoutAPosition) {
   Flight flight({0, 0, 3});
-  flight.controller.AddPlan(PointPlan({0, 0, 3}));
+  flight.controller.AddPlan(LandingPlan({0, 0, 3}));
   flight.Fly(1.0, Health::kUsable);
   flight.controller.SetLanding(true);
   flight.Fly(3.0, Health::kUsable);
@@ -97,6 +104,38 @@ TEST(AskedToLand, MotorsRunAsLongAsItIsInTheAir) {
     EXPECT_LT(flight.off_at, 0.0) << "gust " << gust;
     EXPECT_LT(flight.body.p.z(), 32.0);
   }
+}
+
+TEST(AskedToLand, FliesToTheEndOfAPlanToLandFirst) {
+  for (const bool stops : {false, true}) {
+    Flight flight({0, 0, 2});
+    Plan plan = LandingPlan({0, 0, 2});
+    plan.position.duration = 5.0;
+    plan.position.coefficients = Eigen::MatrixXd::Zero(4, 3);
+    plan.position.coefficients.row(0) << 0.0, 0.0, 2.0;
+    plan.position.coefficients.row(2) << 9.0, 0.0, 0.0;
+    plan.position.coefficients.row(3) << -6.0, 0.0, 0.0;  // at rest at x = 3 m
+    if (stops) plan.stop = world::Trajectory::Constant({1.056, 0, 2}, 2.0, 1.0);
+    flight.controller.SetLanding(true);
+    flight.controller.AddPlan(plan);
+    flight.Fly(1.0, Health::kUsable);
+    EXPECT_EQ(flight.controller.following(), Following::kPlan) << "though it was at rest at first";
+    flight.Fly(20.0, Health::kUsable);
+    EXPECT_GT(flight.off_at, 0.0);
+    EXPECT_NEAR(flight.body.p.x(), stops ? 1.056 : 3.0, 0.35);
+  }
+}
+
+TEST(AskedToLand, WithoutAPlanToLandItWaitsThenComesDownWhereItIs) {
+  Flight flight({0, 0, 2});
+  flight.controller.AddPlan(PointPlan({0, 0, 2}));
+  flight.Fly(3.0, Health::kUsable);
+  flight.controller.SetLanding(true);
+  flight.Fly(4.9, Health::kUsable);
+  EXPECT_NE(flight.controller.following(), Following::kLand);
+  EXPECT_EQ(flight.controller.AddPlan(PointPlan({0, 0, 2}, 4.9)), "") << "made for something else";
+  flight.Fly(5.1, Health::kUsable);
+  EXPECT_EQ(flight.controller.following(), Following::kLand);
 }
 
 TEST(AskedToLand, OnTheGroundNothingHappens) {

@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "chase/attitude_setpoint_t.hpp"
@@ -22,17 +23,18 @@ class Silent : public bus::Node {};
 /// The node on an in-memory bus, with a hand on both ends.
 class Bench {
  public:
-  explicit Bench(bool hears_obstacles = true) {
+  explicit Bench(bool hears_obstacles = true, const ControlConfig& config = {}) {
     lockstep_.Add("planning", 0, [this, hears_obstacles](bus::Bus& bus) {
       bus_ = &bus;
       bus.Subscribe<attitude_setpoint_t>(
           "ATTITUDE_SETPOINT", [this](const attitude_setpoint_t& m) { out.push_back(m); });
       bus.Subscribe<tracking_t>("TRACKING", [this](const tracking_t& m) { tracking.push_back(m); });
+      bus.Subscribe<flight_state_t>("FLIGHT_STATE", [](const flight_state_t&) {});
       if (hears_obstacles) bus.Subscribe<obstacles_t>("OBSTACLES", [](const obstacles_t&) {});
       return std::make_unique<Silent>();
     });
-    lockstep_.Add("control", 0, [this](bus::Bus& bus) {
-      auto node = std::make_unique<ControlNode>(bus, ControlConfig{});
+    lockstep_.Add("control", 0, [this, config](bus::Bus& bus) {
+      auto node = std::make_unique<ControlNode>(bus, config);
       node_ = node.get();
       return node;
     });
@@ -107,11 +109,14 @@ class Bench {
     latest_ = std::max(latest_, utime);
     lockstep_.RunUntil(latest_);
   }
-  void SendState(int8_t state, const std::string& sender = "mission") {
+  void SendState(int8_t state, const std::string& sender = "mission",
+                 const std::optional<Eigen::Vector3d>& home = {}) {
     if (!mission_) mission_ = lockstep_.Connect();
     mission_->SetIdentity({sender, "", 0});
     flight_state_t m{};
     m.state = state;
+    m.has_home = home ? 1 : 0;
+    if (home) bus::Set(m.home, *home);
     mission_->Publish("FLIGHT_STATE", m);
   }
 
@@ -131,8 +136,9 @@ TEST(ControlNode, LandsWhenTheMissionSaysSoAndNobodyElse) {
   Bench bench;
   int64_t t = kStart;
   const auto following_after = [&](int8_t state, const std::string& sender) {
-    bench.SendPlan(t, {0, 0, 0});
     bench.SendState(state, sender);
+    bench.RunUntil(t);
+    bench.SendPlan(t, {0, 0, 0});
     for (int i = 0; i < 20; ++i) bench.SendPose(t += 5000);
     return int{bench.tracking.back().following};
   };
@@ -142,6 +148,61 @@ TEST(ControlNode, LandsWhenTheMissionSaysSoAndNobodyElse) {
   EXPECT_EQ(bench.tracking.back().reason, "landing");
   EXPECT_EQ(bench.node().Report().state, bus::NodeReport::State::kOk);
   EXPECT_EQ(following_after(flight_state_t::HOLD, "mission"), int{tracking_t::PLAN});
+}
+
+TEST(ControlNode, ComesDownOnlyByAPlanThatWasMadeToLand) {
+  Bench bench;
+  int64_t t = kStart;
+  const auto following = [&] {
+    for (int i = 0; i < 20; ++i) bench.SendPose(t += 5000);
+    return int{bench.tracking.back().following};
+  };
+  bench.SendState(flight_state_t::HOLD);
+  bench.SendPlan(t, {0, 0, 0});
+  EXPECT_EQ(following(), int{tracking_t::PLAN});
+  bench.SendState(flight_state_t::LAND);
+  EXPECT_EQ(following(), int{tracking_t::PLAN}) << "of before";
+  bench.SendState(flight_state_t::LAND);
+  bench.SendPlan(t, {3, 0, 0});
+  bench.SendPlan(t, {0, 0, 0});
+  EXPECT_EQ(following(), int{tracking_t::LAND});
+}
+
+/// Is a plan from rest to rest flown by a body `at` [m] from the take-off place, within a fence of
+/// 1 m around that and 2 m above?
+bool IsFlown(const Eigen::Vector3d& at, const Eigen::Vector3d& from, const Eigen::Vector3d& to,
+             bool knows_home = true, int8_t verdict = plan_t::CHASE) {
+  ControlConfig config;
+  config.geofence.polygon = {{-1, -1}, {1, -1}, {1, 1}, {-1, 1}};
+  config.geofence.ceiling = 2.0;
+  Bench bench(true, config);
+  bench.SendState(flight_state_t::CHASE, "mission",
+                  knows_home ? std::optional<Eigen::Vector3d>(-at) : std::nullopt);
+  bench.SendWall(kStart);
+  bench.SendPose(kStart);  // at [0, 0, 0]
+  plan_t plan = Bench::Certified(kStart + 5000, from - at);
+  plan.verdict = verdict;
+  plan.position.n_coefficients = 18;
+  for (const double share : {0.0, 0.0, 10.0, -15.0, 6.0})
+    for (int i = 0; i < 3; ++i) plan.position.coefficients.push_back(share * (to - from)[i]);
+  bench.Send(plan);
+  bench.SendPose(kStart + 5000);
+  return !bench.out.empty();
+}
+
+TEST(ControlNode, FliesNoPlanThatLeavesTheFence) {
+  const Eigen::Vector3d middle(0, 0, 0), inside(0.85, 0, 0), outside(1.1, 0, 0), above(0, 0, 2.1);
+  EXPECT_TRUE(IsFlown(middle, middle, {0.85, 0, 1.85}));
+  EXPECT_FALSE(IsFlown(middle, middle, outside));
+  EXPECT_FALSE(IsFlown(middle, middle, above));
+  EXPECT_FALSE(IsFlown(middle, middle, {0.9, 0, 0})) << "the body keeps to its plan by 0.12 m";
+  EXPECT_TRUE(IsFlown({0.95, 0, 0}, {0.95, 0, 0}, {0.9, 0, 0})) << "but leaves the edge";
+  EXPECT_FALSE(IsFlown(inside, outside, {1.3, 0, 0})) << "planning is ahead of the body";
+  EXPECT_TRUE(IsFlown({1.5, 0, 0}, {1.5, 0, 0}, {1.2, 0, 0})) << "a way back";
+  EXPECT_FALSE(IsFlown({1.5, 0, 0}, {1.5, 0, 0}, {1.6, 0, 0}));
+  EXPECT_TRUE(IsFlown(middle, middle, outside, true, plan_t::BRAKE))
+      << "what else there is stops later";
+  EXPECT_FALSE(IsFlown(middle, middle, inside, false)) << "nobody knows where the fence is";
 }
 
 TEST(ControlNode, CutsTheMotorsInTheAirWhenTheFlightIsOverAndForGood) {

@@ -1,12 +1,15 @@
 chase_test(logs_tools_test
   LIBS log_tools
   SOURCES ${CMAKE_CURRENT_LIST_DIR}/logs_tools_test.cpp)
+chase_test(logs_info_test
+  LIBS log_tools
+  SOURCES ${CMAKE_CURRENT_LIST_DIR}/logs_info_test.cpp)
 chase_test(logs_metrics_test
   LIBS metrics nlohmann_json::nlohmann_json
   SOURCES ${CMAKE_CURRENT_LIST_DIR}/logs_metrics_test.cpp)
 chase_test(logs_report_test
   LIBS report
-  SOURCES ${CMAKE_CURRENT_LIST_DIR}/logs_report_test.cpp)
+  SOURCES ${CMAKE_CURRENT_LIST_DIR}/logs_report_test.cpp ${CMAKE_CURRENT_LIST_DIR}/logs_moments_test.cpp)
 
 # Every message's name and the fingerprint that lcm-gen gave it.
 get_directory_property(types DIRECTORY ${CMAKE_SOURCE_DIR}/lcmtypes DEFINITION types)

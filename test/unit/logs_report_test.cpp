@@ -1,11 +1,12 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <map>
 #include <nlohmann/json.hpp>
 
+#include "logs/src/metrics.h"
 #include "logs/src/read_flight.h"
 #include "logs/src/report_page.h"
-#include "logs/src/report_plots.h"
 #include "logs_synthetic_flight.h"
 
 namespace chase::logs {
@@ -99,31 +100,64 @@ TEST(ReadFlight, LogsWithoutTruthAreRefusedInOneLine) {
   }
 }
 
+/// A share folder as beside bin/, with a stand-in for Plotly and no viewer.
+std::string Share(const std::string& folder) {
+  fs::create_directories(folder + "/share");
+  for (const auto& part : fs::directory_iterator("logs/page"))
+    fs::copy(part.path(), folder + "/share", fs::copy_options::overwrite_existing);
+  WriteFile(folder + "/share/plotly.min.js", "/* the library */");
+  return folder + "/share";
+}
+
 TEST(Report, PageAndPicturesStandWithoutAnythingElse) {
-  const std::string folder = Fresh("page");
-  testing::WriteSyntheticLog(folder + "/flight.lcm", kYaml);
-  const FlightRecord record = ReadFlight(folder + "/flight.lcm");
-  const auto scores = Score(record);
-  const ReportData data = PrepareReport(record, scores);
-  WritePlots(folder, data);
+  const std::string folder = Fresh("page"), log = folder + "/flight.lcm";
+  testing::WriteSyntheticLog(log, kYaml);
+  const ReportedFlight flight = ReportFlight(log, {true, true, folder});
   for (const char* name :
        {"top_view", "distance", "visibility", "clearance", "pixels", "stages", "cpu"})
     EXPECT_GT(fs::file_size(fs::path(folder) / (std::string(name) + ".png")), 3000u) << name;
-  const std::string plotly = folder + "/plotly.js";
-  WriteFile(plotly, "/* the library */");
-  WritePage(folder + "/report.html", "logs/src/report.html", plotly, data,
-            MetricsJson(record, Compute(record, scores)));
+  WritePage(folder + "/report.html", Share(folder), {flight});
   const std::string page = testing::ReadText(folder + "/report.html");
   EXPECT_NE(page.find("/* the library */"), std::string::npos);
   EXPECT_NE(page.find("\"safe_ratio\""), std::string::npos);
   EXPECT_EQ(page.find("src=\"http"), std::string::npos);
-  EXPECT_EQ(page.find("/*DATA*/null"), std::string::npos);
+  for (const char* mark : {"/*DATA*/", "/*STYLE*/", "/*CHARTS*/", "/*PLAYBACK*/", "/*REPORT*/"})
+    EXPECT_EQ(page.find(mark), std::string::npos) << mark;
+}
+
+TEST(Report, SeriesOfTruthAndVehicleShareTheMissionsTime) {
+  const std::string log = Fresh("times") + "/flight.lcm";
+  testing::SyntheticFlight flight;
+  flight.start_utime = 50'000'000;
+  testing::WriteSyntheticLog(log, kYaml, flight);
+  const auto page = ReportFlight(log, {}).page;
+  const auto& data = page["data"];
+  EXPECT_NEAR(data["distance"]["t"].front(), 0.0, 0.1);  // scored over the mission
+  EXPECT_NEAR(data["speed"]["t"].front(), -3.0, 0.1);    // heard from the start on
+  EXPECT_NEAR(data["speed"]["t"].back(), 12.0, 0.2);
+  EXPECT_NEAR(page["playback"]["begin"], -3.0, 0.01);
+  EXPECT_NEAR(page["playback"]["duration"], 15.0, 0.05);
+  EXPECT_TRUE(data["latency"].contains("POSE"));
+  // The estimate is off by 0.1 m along x: it is drawn beside the truth, not in its place.
+  EXPECT_NE(data["estimated"], data["chaser"]);
+}
+
+TEST(Report, WithoutTruthItTellsWhatTheVehicleSaid) {
+  const std::string log = Fresh("vehicle") + "/flight.lcm";
+  testing::WriteSyntheticLog(log, kYaml);
+  const auto page = ReportFlight(log, {false, true, ""}).page;
+  for (const char* key : {"distance", "certified", "speed", "pose_sigma", "target_sigma"})
+    EXPECT_FALSE(page["data"][key]["t"].empty()) << key;
+  EXPECT_FALSE(page["data"].contains("clearance"));  // only truth knows it
+  EXPECT_EQ(page["vehicle"], page["metrics"]);
+  EXPECT_GT(page["playback"]["frames"].size(), 100u);
 }
 
 TEST(Report, AMissingLibraryIsNamedWithTheCure) {
-  const std::string folder = Fresh("missing");
+  const std::string folder = Fresh("missing"), share = Share(folder);
+  fs::remove(share + "/plotly.min.js");
   try {
-    WritePage(folder + "/r.html", "logs/src/report.html", folder + "/none.js", {}, "{}");
+    WritePage(folder + "/r.html", share, {});
     FAIL() << "there is no library";
   } catch (const std::runtime_error& e) {
     EXPECT_NE(std::string(e.what()).find("npm ci"), std::string::npos);
@@ -133,11 +167,20 @@ TEST(Report, AMissingLibraryIsNamedWithTheCure) {
 
 TEST(Report, TextInTheDataCannotEndTheScript) {
   const std::string folder = Fresh("escape");
-  WriteFile(folder + "/p.js", "");
-  ReportData data;
-  data.title = "</script><b>";
-  WritePage(folder + "/r.html", "logs/src/report.html", folder + "/p.js", data, "{}");
+  ReportedFlight flight;
+  flight.page["title"] = "</script><b>\xff";
+  WritePage(folder + "/r.html", Share(folder), {flight});
   EXPECT_EQ(testing::ReadText(folder + "/r.html").find("</script><b>"), std::string::npos);
+}
+
+TEST(Compare, FlightsWithoutTruthByWhatTheySaid) {
+  const std::string before = R"({"target_known_ratio": 0.9, "latency_ms": {"POSE": {"p99": 5.0}}})";
+  const std::string after = R"({"target_known_ratio": 0.5, "latency_ms": {"POSE": {"p99": 5.01}}})";
+  std::map<std::string, bool> worse;
+  for (const auto& f : CompareMetrics(before, after, 0.01))
+    if (!f.a.empty()) worse[f.key] = f.worse;
+  EXPECT_EQ(worse, (std::map<std::string, bool>{{"target_known_ratio", true},
+                                                {"latency_ms.POSE.p99", false}}));
 }
 
 }  // namespace

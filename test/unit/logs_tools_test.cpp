@@ -2,18 +2,11 @@
 
 #include <cmath>
 #include <filesystem>
-#include <fstream>
-#include <functional>
 #include <map>
-#include <random>
 #include <regex>
-#include <set>
 #include <sstream>
 
-#include "chase/imu_t.hpp"
-#include "chase/obstacles_t.hpp"
 #include "chase/pose_t.hpp"
-#include "chase/status_t.hpp"
 #include "common/logs/log_reader.h"
 #include "logs/src/diff.h"
 #include "logs/src/export.h"
@@ -21,85 +14,14 @@
 #include "logs/src/info.h"
 #include "logs/src/message_fields.h"
 #include "logs/src/output.h"
-#include "logs/src/seq_count.h"
+#include "test/unit/logs_small_log.h"
 
 namespace chase::logs {
 namespace {
 
 namespace fs = std::filesystem;
-
-std::string Temp(const std::string& name) {
-  const fs::path file = fs::path(::testing::TempDir()) / ("chase_logs_" + name);
-  fs::remove_all(file);
-  return file.string();
-}
-
-std::string WriteText(const std::string& name, const std::string& text) {
-  const std::string file = Temp(name);
-  std::ofstream(file, std::ios::binary) << text;
-  return file;
-}
-
-std::string ReadText(const std::string& file) {
-  std::ifstream in(file, std::ios::binary);
-  std::ostringstream text;
-  text << in.rdbuf();
-  return text.str();
-}
-
-std::string ErrorOf(const std::function<void()>& call) {
-  try {
-    call();
-  } catch (const std::runtime_error& e) {
-    return e.what();
-  }
-  return "";
-}
-
-imu_t Imu(int k) {
-  imu_t m{};
-  m.utime = 5000 * k;
-  m.seq = k;
-  m.accel[2] = 9.81;
-  m.gyro[0] = 0.1 * k;
-  return m;
-}
-
-obstacles_t Obstacles(int count) {
-  obstacles_t m{};
-  m.n_obstacles = count;
-  for (int i = 0; i < count; ++i) {
-    obstacle_t o{};
-    o.id = 10 + i;
-    o.center.duration = 1.0;
-    o.center.n_coefficients = 3;
-    o.center.coefficients = {1.0 * i, 2.0, 3.0};
-    m.obstacles.push_back(o);
-  }
-  return m;
-}
-
-/// 20 IMU samples, one of them changed by `change`, and a few obstacle lists.
-std::string WriteLog(const std::string& name, const std::function<void(int, imu_t*)>& change = {},
-                     int imus = 20) {
-  const std::string file = Temp(name);
-  OutputLog log(file);
-  for (int k = 0; k < imus; ++k) {
-    imu_t m = Imu(k);
-    if (change) change(k, &m);
-    log.Write(m.utime, "IMU", m);
-    if (k % 5 == 0) log.Write(m.utime, "OBSTACLES", Obstacles(k / 5));
-  }
-  log.Close();
-  return file;
-}
-
-template <class T>
-Bytes Encoded(const T& m) {
-  Bytes bytes(static_cast<size_t>(m.getEncodedSize()));
-  m.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
-  return bytes;
-}
+using testing::Encoded, testing::ErrorOf, testing::Obstacles, testing::ReadText, testing::Temp;
+using testing::WriteLog, testing::WriteText;
 
 const Field* Find(const std::vector<Field>& fields, const std::string& path) {
   for (const Field& f : fields)
@@ -160,79 +82,6 @@ TEST(FieldTables, ListEveryFieldOfEveryTypeInWireOrder) {
     ++types;
   }
   EXPECT_GE(types, 19);
-}
-
-TEST(LogInfo, CountsAndTypesEveryChannel) {
-  const LogInfo info = Describe(WriteLog("info.lcm"));
-  ASSERT_EQ(info.channels.size(), 2u);
-  EXPECT_EQ(info.channels[0].channel, "IMU");
-  EXPECT_EQ(info.channels[0].type, "imu_t");
-  EXPECT_EQ(info.channels[0].count, 20);
-  EXPECT_NEAR(info.channels[0].RateHz(), 200.0, 1e-9);
-  EXPECT_EQ(info.channels[1].count, 4);
-  EXPECT_TRUE(info.Whole());
-  EXPECT_EQ(info.channels[0].missing, 0);
-}
-
-TEST(LogInfo, TellsVersionHostAndConfiguration) {
-  const std::string file = Temp("software.lcm");
-  status_t live{}, lockstep{};
-  live.name = "planning";
-  live.version = "0.1.0 (commit 1a2b), host a, host b, configuration 930766865";
-  lockstep.name = "control";
-  lockstep.version = "0.1.0 (commit 1a2b)";
-  {
-    bus::LogWriter out(file);
-    out.Write(1, "PLANNING_STATUS", Encoded(live));
-    out.Write(2, "CONTROL_STATUS", Encoded(lockstep));
-    out.Close();
-  }
-  const LogInfo info = Describe(file);
-  EXPECT_EQ(info.versions.at("planning"), "0.1.0 (commit 1a2b), host a");
-  EXPECT_EQ(info.versions.at("control"), "0.1.0 (commit 1a2b)");
-  EXPECT_EQ(info.hosts, (std::map<std::string, std::string>{{"planning", "b"}}));
-  EXPECT_EQ(info.configurations.at("planning"), "930766865");
-  EXPECT_NE(Format(info).find("host       b (planning)\n"), std::string::npos);
-  EXPECT_NE(Format(info).find("planning 930766865\n"), std::string::npos);
-}
-
-TEST(LogInfo, ALogCutOffAnywhereIsReadAsFarAsItGoes) {
-  const std::string whole = ReadText(WriteLog("whole.lcm"));
-  for (size_t n = 4; n < whole.size(); n += 101) {
-    const LogInfo info = Describe(WriteText("cut.lcm", whole.substr(0, n)));
-    long count = 0;
-    for (const auto& c : info.channels) count += c.count;
-    EXPECT_LT(count, 24);
-  }
-}
-
-TEST(SeqCount, CountsWhatNeverCameInAnyOrder) {
-  std::mt19937 random(7);
-  for (int round = 0; round < 200; ++round) {
-    std::vector<int32_t> numbers(1 + random() % 60);
-    for (int32_t& n : numbers) n = static_cast<int32_t>(random() % 80);
-    SeqCount count;
-    for (const int32_t n : numbers) count.Add(n);
-    const std::set<int32_t> different(numbers.begin(), numbers.end());
-    const auto span = *different.rbegin() - *different.begin() + 1;
-    EXPECT_EQ(count.missing(), span - static_cast<int64_t>(different.size())) << "round " << round;
-    EXPECT_EQ(count.first(), *different.begin());
-    EXPECT_EQ(count.last(), *different.rbegin());
-  }
-}
-
-TEST(SeqCount, TakesTheWholeRangeOfNumbers) {
-  SeqCount count;
-  for (const int32_t n : {INT32_MAX, INT32_MIN, 0}) count.Add(n);
-  EXPECT_EQ(count.missing(), (int64_t{1} << 32) - 3);
-}
-
-TEST(LogInfo, WhatIsNoLogIsRefusedInOneLine) {
-  EXPECT_NE(ErrorOf([] { Describe("/nonexistent.lcm"); }).find("no such file"), std::string::npos);
-  EXPECT_NE(ErrorOf([] { Describe(WriteText("t.lcm", "text")); }).find("no LCM log"),
-            std::string::npos);
-  EXPECT_NE(ErrorOf([] { Describe(WriteText("e.lcm", "")); }).find("empty"), std::string::npos);
-  EXPECT_NE(ErrorOf([] { Describe("/tmp"); }).find("no such file"), std::string::npos);
 }
 
 TEST(LogDiff, EqualLogsDoNotDiffer) {
@@ -360,6 +209,18 @@ TEST(Output, PlaceIsKnownToBeWritableBeforeThereIsAnythingToWrite) {
   for (const std::string& bad : {std::string("/no/such/folder/m.json"), ::testing::TempDir()})
     EXPECT_NE(ErrorOf([&] { RequireWritable(bad); }).find("cannot be written"), std::string::npos)
         << bad;
+}
+
+TEST(Output, Base64OfRfc4648) {
+  const std::pair<const char*, const char*> vectors[] = {{"", ""},
+                                                         {"f", "Zg=="},
+                                                         {"fo", "Zm8="},
+                                                         {"foo", "Zm9v"},
+                                                         {"foob", "Zm9vYg=="},
+                                                         {"fooba", "Zm9vYmE="},
+                                                         {"foobar", "Zm9vYmFy"}};
+  for (const auto& [bytes, text] : vectors) EXPECT_EQ(Base64(bytes), text);
+  EXPECT_EQ(Base64("\xff\xfe\xfd"), "//79");
 }
 
 TEST(LogImport, KittiTimesFollowTheAzimuthAndRingZeroIsLowest) {

@@ -149,11 +149,11 @@ TEST(MappingGym, ListIsNearestFirstAndSaysWhatItCut) {
 }
 
 /// Behind the pillar at (4, 5.8) nothing was seen; from the other side it is.
-TEST(MappingGym, UnseenSpaceIsClosedOnRequestUntilItIsSeen) {
+TEST(MappingGym, ListsWhatIsUnseenUntilItIsSeen) {
   const testing::World world = testing::Gym();
-  for (const double closed : {0.0, 5.0}) {
+  for (const double reach : {0.0, 5.0}) {
     MappingConfig config;
-    config.statics.closed = closed;
+    config.statics.unseen = reach;
     Mapper mapper(config);
     std::mt19937 random(1);
     double t = 0.0;
@@ -161,17 +161,19 @@ TEST(MappingGym, UnseenSpaceIsClosedOnRequestUntilItIsSeen) {
       ObstacleList list;
       for (int i = 0; i < 10; ++i, t += 0.1)
         list = mapper.Insert(testing::Scan(world, from, t, {}, &random));
-      return list.obstacles;
+      return list;
     };
-    const auto shadow = look({4.0, 4.0, 1.3});
-    for (const double y : {6.5, 7.0, 7.5})
-      EXPECT_EQ(testing::Holding(shadow, {4.0, y, 1.3}, t) != nullptr, closed > 0.0) << y;
+    const ObstacleList first = look({4.0, 4.0, 1.3});
+    for (const double y : {6.5, 7.0, 7.5}) {
+      EXPECT_EQ(testing::Holding(first.unseen, {4.0, y, 1.3}, t) != nullptr, reach > 0.0) << y;
+      EXPECT_EQ(testing::Holding(first.obstacles, {4.0, y, 1.3}, t), nullptr) << y;
+    }
     for (const double y : {3.0, 4.0, 5.0})  // in full sight
-      EXPECT_EQ(testing::Holding(shadow, {4.0, y, 1.3}, t), nullptr) << y;
-    const auto seen = look({6.0, 7.2, 1.3});
+      EXPECT_EQ(testing::Holding(first.unseen, {4.0, y, 1.3}, t), nullptr) << y;
+    const ObstacleList second = look({6.0, 7.2, 1.3});
     for (const double y : {6.5, 7.0, 7.5})
-      EXPECT_EQ(testing::Holding(seen, {4.0, y, 1.3}, t), nullptr) << y;
-    EXPECT_NE(testing::Holding(seen, {4.0, 5.8, 1.3}, t), nullptr);
+      EXPECT_EQ(testing::Holding(second.unseen, {4.0, y, 1.3}, t), nullptr) << y;
+    EXPECT_NE(testing::Holding(second.obstacles, {4.0, 5.8, 1.3}, t), nullptr);
   }
 }
 

@@ -130,7 +130,7 @@ TEST(Commands, TakeEffectOnceOnABadLine) {
           before = bench.mission.state();
         }
         for (const Answer& a : back.Arrived(bench.t))
-          if (a.command.Key() == command.Key()) client.OnAnswer(a.accepted, a.reason);
+          if (a.command.id == command.id) client.OnAnswer(a.accepted, a.reason);
       }
       ASSERT_TRUE(client.accepted()) << client.reason();
       ++given;

@@ -87,6 +87,26 @@ TEST(Mission, FliesFromTakeOffToLanding) {
   EXPECT_FALSE(bench.Command(Event::kTakeoff).accepted);
 }
 
+TEST(Mission, SaysWhatPlanningKnowsOfTheGroundUntilControlComesDown) {
+  Bench bench;
+  bench.Fly();
+  bench.mission.inputs().plan_reason = "holding";
+  ASSERT_TRUE(bench.Command(Event::kLand).accepted);
+  bench.Run(0.2);
+  EXPECT_EQ(bench.mission.Words(), "landing commanded");
+  bench.mission.inputs().plan_reason = "landing, no level ground is known: here";
+  bench.Run(0.2);
+  const std::string words = "landing commanded; landing, no level ground is known: here";
+  EXPECT_EQ(bench.mission.Words(), words);
+  bench.mission.inputs().landing = true;
+  bench.mission.inputs().plan_reason = "landing";
+  bench.Run(0.2);
+  EXPECT_EQ(bench.mission.Words(), words);
+  ASSERT_TRUE(bench.Command(Event::kHold).accepted);
+  bench.Run(0.2);
+  EXPECT_EQ(bench.mission.Words(), "hold commanded");
+}
+
 TEST(Mission, AChangeOfFrameTurnsReturnIntoLand) {
   Bench bench;
   bench.Fly({3.0, 0.0, 1.0});

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <random>
 
-#include "services/mission/climb_column.h"
+#include "common/world/column.h"
 #include "test/unit/mission_bench.h"
 
 namespace chase::mission {
@@ -11,6 +11,7 @@ namespace {
 
 using Eigen::Vector2d;
 using Eigen::Vector3d;
+using world::Geofence;
 
 /// Angles at p from corner to corner add up to a turn when p is inside: another rule than the
 /// fence's own.
@@ -48,6 +49,17 @@ TEST(Geofence, AgreesWithTheWindingNumberOnRandomStars) {
           Encloses(fence.polygon, p.head<2>()) && p.z() >= fence.floor && p.z() <= fence.ceiling;
       ASSERT_EQ(fence.Breach(p).empty(), inside) << "seed " << seed << ", " << p.transpose();
     }
+  }
+}
+
+TEST(Geofence, AMarginIsTheDistanceToItsEdgesAndHeights) {
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> u(-2.5, 2.5);
+  for (int i = 0; i < 500; ++i) {
+    const Vector3d p(u(random), u(random), 2.0 + u(random));
+    const double room =
+        std::min({2.0 - std::abs(p.x()), 2.0 - std::abs(p.y()), 5.0 - p.z(), p.z() + 1.0});
+    EXPECT_EQ(Box(2.0).Breach(p, 0.3).empty(), room >= 0.3) << p.transpose();
   }
 }
 
@@ -197,11 +209,11 @@ TEST(ClimbColumn, AgreesWithPointsOfTheSolids) {
         x = c + R * (u.norm() > 1.0 ? Vector3d(u.normalized()) : u).cwiseProduct(h);
       nearest = std::min(nearest, (x - Vector3d(0.0, 0.0, std::clamp(x.z(), 0.0, 2.0))).norm());
     }
-    const bool blocked = IsBlocked({o}, Vector3d::Zero(), 0.25, 2.0);
+    const bool blocked = world::IsColumnBlocked({o}, Vector3d::Zero(), 0.25, 2.0);
     EXPECT_TRUE(nearest > 0.22 || blocked) << "seed " << seed << ", " << nearest;
     EXPECT_TRUE(nearest < 0.55 || !blocked) << "seed " << seed << ", " << nearest;
     o.ground = true;
-    EXPECT_FALSE(IsBlocked({o}, Vector3d::Zero(), 0.25, 2.0)) << "what it stands on";
+    EXPECT_FALSE(world::IsColumnBlocked({o}, Vector3d::Zero(), 0.25, 2.0)) << "what it stands on";
   }
 }
 

@@ -7,6 +7,7 @@
 
 #include "chase/command_ack_t.hpp"
 #include "chase/flight_state_t.hpp"
+#include "chase/geofence_t.hpp"
 #include "chase/health_t.hpp"
 #include "common/bus/convert.h"
 #include "common/bus/lockstep.h"
@@ -22,16 +23,16 @@ class Silent : public bus::Node {};
 /// The node on an in-memory bus among stand-ins.
 class Bench {
  public:
-  Bench() {
+  explicit Bench(const MissionConfig& config = {}) {
     for (const char* name : {"prediction", "planning", "control"})
       lockstep_.Add(name, 0, [](bus::Bus&) { return std::make_unique<Silent>(); });
-    lockstep_.Add("mission", 0, [](bus::Bus& bus) {
-      return std::make_unique<MissionNode>(bus, MissionConfig{});
-    });
+    lockstep_.Add("mission", 0,
+                  [config](bus::Bus& bus) { return std::make_unique<MissionNode>(bus, config); });
     lockstep_.Add("listener", 0, [this](bus::Bus& bus) {
       bus.Subscribe<flight_state_t>("FLIGHT_STATE", [this](const auto& m) { states.push_back(m); });
       bus.Subscribe<command_ack_t>("COMMAND_ACK", [this](const auto& m) { acks.push_back(m); });
       bus.Subscribe<health_t>("HEALTH", [this](const auto& m) { healths.push_back(m); });
+      bus.Subscribe<geofence_t>("GEOFENCE", [this](const auto& m) { fences.push_back(m); });
       return std::make_unique<Silent>();
     });
     sensors_ = lockstep_.Connect();
@@ -46,6 +47,7 @@ class Bench {
       pose_t pose{};
       pose.utime = t;
       pose.orientation[0] = 1.0;
+      bus::Set(pose.pos, place);
       sensors_->Publish("POSE", pose);
       obstacles_t obstacles{};
       obstacles.utime = t;
@@ -68,10 +70,12 @@ class Bench {
     Run(0.02);
   }
 
+  Eigen::Vector3d place = Eigen::Vector3d::Zero();  // where it stands, frame W
   bus::Lockstep lockstep_{kStart};
   std::vector<flight_state_t> states;
   std::vector<command_ack_t> acks;
   std::vector<health_t> healths;
+  std::vector<geofence_t> fences;
 
  private:
   std::unique_ptr<bus::Bus> sensors_, operator_;
@@ -111,6 +115,33 @@ TEST(MissionNode, AnswersACommandAndSaysTheNewStateAtOnce) {
   EXPECT_GT(bench.states.size(), before);
   EXPECT_EQ(bench.states.back().state, +flight_state_t::TAKEOFF);
   EXPECT_EQ(bench.states.back().has_home, 1);
+}
+
+TEST(MissionNode, TellsTheGeofenceInTheFrameWOnceItHasTakenOff) {
+  MissionConfig config;
+  config.geofence.polygon = {{-5, -5}, {5, -5}, {0, 5}};
+  Bench bench(config), free;
+  bench.place = {10, 20, 0.5};
+  bench.Run(2.0);
+  EXPECT_TRUE(bench.fences.empty());
+  bench.Command(command_t::TAKEOFF, 1);
+  bench.Run(3.0);
+  ASSERT_GE(bench.fences.size(), 2u);
+  const geofence_t& fence = bench.fences.back();
+  EXPECT_EQ(fence.corners, (std::vector<double>{5, 15, 15, 15, 10, 25}));
+  EXPECT_EQ(fence.floor, -0.5);
+  EXPECT_EQ(fence.ceiling, 30.5);
+  free.Run(2.0);
+  free.Command(command_t::TAKEOFF, 1);
+  free.Run(2.0);
+  EXPECT_TRUE(free.fences.empty());
+}
+
+TEST(MissionNode, LeavesTheTargetsChoiceToPerception) {
+  Bench bench;
+  bench.Run(2.0);
+  bench.Command(command_t::SELECT, 1);
+  EXPECT_TRUE(bench.acks.empty());
 }
 
 TEST(MissionNode, CommandsToOtherVehiclesAreNotItsOwn) {

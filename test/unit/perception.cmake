@@ -20,6 +20,8 @@ chase_test(perception_test LIBS perception_world
           ${perception_test_dir}/perception_alike_test.cpp)
 chase_test(perception_node_test LIBS perception_world perception_node
   SOURCES ${perception_test_dir}/perception_node_test.cpp)
+chase_test(perception_select_test LIBS perception_world perception_node opencv_imgproc
+  SOURCES ${perception_test_dir}/perception_select_test.cpp)
 chase_test(perception_detect_test
   LIBS perception_detect perception_core config opencv_imgproc opencv_imgcodecs opencv_videoio
        nlohmann_json::nlohmann_json

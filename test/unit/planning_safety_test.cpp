@@ -222,6 +222,31 @@ TEST(CertifiedPlan, IsLeftForAStopBeforeAPlannerThatFellSilentIsMissed) {
   EXPECT_LT((plan.stop->Velocity(t) - plan.trajectory.Velocity(t)).norm(), 1e-6);
 }
 
+// A wall that may be there: left in time, where braking later would end in it. A place that the
+// body is in has been seen by touching nothing.
+TEST(CertifiedPlan, IsLeftForAStopInSpaceThatWasSeen) {
+  const PlannerConfig config;
+  PlanRequest request = Hover();
+  world::Trajectory plan{request.t0, 2.0, Eigen::MatrixXd::Zero(2, 3)};
+  plan.coefficients << 0.0, 0.0, 1.5, 3.0, 0.0, 0.0;
+  request.start = plan.At(request.t0);
+  const world::Obstacle wall = Wall(7, 1.45, 0.0);
+  const auto blind = WayOut(config, request, plan);
+  ASSERT_TRUE(blind);
+  EXPECT_LT(LeastDistance(wall, blind->trajectory), config.hard_radius());
+  request.unseen = {wall};
+  const auto stop = WayOut(config, request, plan);
+  ASSERT_TRUE(stop);
+  EXPECT_GE(LeastDistance(wall, stop->trajectory), config.hard_radius() - 1e-6);
+  EXPECT_TRUE(stop->proofs.empty());  // nobody else hears of it
+  request.unseen = {Wall(7, 1.0, 0.0)};
+  EXPECT_FALSE(WayOut(config, request, plan));
+  plan.coefficients.row(1).setZero();
+  request.start = plan.At(request.t0);
+  request.unseen = {Wall(7, 0.2, 0.0)};
+  EXPECT_TRUE(WayOut(config, request, plan));
+}
+
 /// Calls a plan feasible that goes straight on.
 class Liar : public Search {
  public:

@@ -124,6 +124,19 @@ Scene FullScene(double v) {
   return scene;
 }
 
+TEST(ViewerText, TellsTheGeofenceAndTheWorstProcess) {
+  Scene scene;
+  EXPECT_FALSE(json::parse(StateText(scene, 0.0, 0, {})).contains("fence"));
+  EXPECT_EQ(json::parse(StateText(scene, 0.0, 0, {}))["row"][15], -1);
+  scene.fence = Fence{{{-1, 2}, {3, 4}, {kNan, 0}}, -0.5, 30.0};
+  scene.processes = 3;
+  const json state = json::parse(StateText(scene, 0.0, 0, {}));
+  EXPECT_EQ(state["fence"]["corners"], json::parse("[[-1, 2], [3, 4], [null, 0]]"));
+  EXPECT_EQ(state["fence"]["floor"], -0.5);
+  EXPECT_EQ(state["fence"]["ceiling"], 30.0);
+  EXPECT_EQ(state["row"][15], 3);
+}
+
 TEST(ViewerText, WhatIsNotFiniteIsNull) {
   for (const double v : {kNan, kInfinity, -kInfinity, 1e308}) {
     const json state = json::parse(StateText(FullScene(v), v, 0, PlayState{v, v, v, true}));
@@ -288,6 +301,10 @@ TEST(ViewerRequest, CommandsNeedTheToken) {
   EXPECT_NE(RefusalOf(r, ""), "");
   EXPECT_NE(RefusalOf(r, "secret-tokem"), "");
   EXPECT_NE(RefusalOf(r, "secret-token-longer"), "");
+  for (const char* not_from_a_page : {"kill", "select"}) {
+    r.command = not_from_a_page;
+    EXPECT_NE(RefusalOf(r, "secret-token"), "");
+  }
   r.command = "explode";
   EXPECT_NE(RefusalOf(r, "secret-token"), "");
   r.token.clear();

@@ -7,12 +7,14 @@
 #include <filesystem>
 #include <limits>
 #include <map>
+#include <nlohmann/json.hpp>
 #include <random>
 
 #include "chase/imu_t.hpp"
 #include "common/bus/convert.h"
 #include "common/bus/log_writer.h"
 #include "services/viewer/log_player.h"
+#include "services/viewer/recording.h"
 #include "test/unit/viewer_memory_bus.h"
 
 namespace chase::viewer {
@@ -160,6 +162,18 @@ TEST(ViewerNode, ProcessesThatOnlyTheMissionHears) {
   EXPECT_EQ(Joined({{"planning", own}}, {}, 0)[0].restarts, -1);
 }
 
+TEST(ViewerNode, TheWorstProcessIsTheSilentOne) {
+  ProcessHealth fine, slow, quiet;
+  fine.state = status_t::OK;
+  slow.state = status_t::DEGRADED;
+  quiet.state = status_t::OK;
+  quiet.age = 2.6;
+  EXPECT_EQ(WorstState({}), -1);
+  EXPECT_EQ(WorstState({fine}), +status_t::OK);
+  EXPECT_EQ(WorstState({slow, fine}), +status_t::DEGRADED);
+  EXPECT_EQ(WorstState({slow, quiet, fine}), +status_t::FAILED);
+}
+
 class ViewerPlayer : public ::testing::Test {
  protected:
   ViewerPlayer()
@@ -240,6 +254,23 @@ TEST_F(ViewerPlayer, SurveysLightChannelsAtEvenTimes) {
                                          6 * kSecond}));
   EXPECT_EQ(poses_.size(), 51U);
   EXPECT_EQ(scans_, 0);
+}
+
+TEST_F(ViewerPlayer, ALogIsRecordedForAReport) {
+  const Recording recording = RecordLog(file_);
+  EXPECT_EQ(recording.duration, 5.0);
+  std::map<Part, std::vector<const Recording::Frame*>> frames;
+  for (const auto& frame : recording.frames) frames[frame.part].push_back(&frame);
+  ASSERT_NEAR(static_cast<double>(frames[Part::kState].size()), 51.0, 2.0);
+  for (const auto* frame : frames[Part::kState]) {  // the drone is at x = 10 t
+    const auto state = nlohmann::json::parse(frame->bytes);
+    EXPECT_NEAR(state["drone"]["p"][0], std::floor(10.0 * frame->t + 1e-6), 1.0);
+    EXPECT_NEAR(state["play"]["t"], frame->t, 1e-3);
+  }
+  EXPECT_NEAR(static_cast<double>(frames[Part::kCloud].size()), 10.0, 2.0) << "two a second";
+  EXPECT_GT(nlohmann::json::parse(recording.hello)["rows"].size(), 45u);
+  EXPECT_TRUE(std::is_sorted(recording.frames.begin(), recording.frames.end(),
+                             [](const auto& a, const auto& b) { return a.t < b.t; }));
 }
 
 TEST_F(ViewerPlayer, BadLogs) {

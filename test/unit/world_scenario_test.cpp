@@ -131,7 +131,7 @@ TEST(Fault, EveryPromisedNameIsThere) {
         "camera-blur",  "exposure-jump",  "imu-spikes", "imu-bias",        "delay-LIDAR_SCAN",
         "delay-PLAN",   "loss-5",         "loss-20",    "clock-forward",   "clock-back",
         "gust",         "motor-80",       "hidden-4s",  "hidden-for-good", "decoy",
-        "flood",        "disk-full"})
+        "flood",        "cpu-load",       "disk-full"})
     EXPECT_EQ(ParseFault(name).name, name);
 }
 

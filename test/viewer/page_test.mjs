@@ -129,6 +129,24 @@ const drawn = await page.evaluate(() => {
 });
 assert.deepStrictEqual(drawn, {solids: 2, arrows: 1, drone: false, plan: false});
 
+// The geofence stands where it is told, and who is silent is seen on the time line.
+const lines = await page.evaluate(async () => {
+  const {scene, model} = window.chase, corners = [[0, 0], [4, 0], [4, 3]];
+  scene.setState({generation: 0, row: [], fence: {corners, floor: -1, ceiling: 5}});
+  const {array} = scene.fence.geometry.attributes.position, shown = scene.fence.visible;
+  scene.setState({generation: 0, row: []});
+  const {drawTimeline} = await import('./strips.js'), canvas = document.createElement('canvas');
+  Object.assign(canvas.style, {width: '400px', height: '80px', position: 'absolute'});
+  document.body.append(canvas);
+  const rows = model.rows.slice(0, 40).map((row, i) => Object.assign([...row], {0: i, 15: i < 20 ? 1 : 3}));
+  drawTimeline(canvas, rows, 0, 40, 0);
+  const pixel = (x) => [...canvas.getContext('2d').getImageData(x * devicePixelRatio, 72 * devicePixelRatio, 1, 1).data.slice(0, 3)];
+  const seen = [pixel(120), pixel(330)];
+  canvas.remove();
+  return {ends: array.length / 3, low: Math.min(...array), high: Math.max(...array), shown, after: scene.fence.visible, seen};
+});
+assert.deepStrictEqual(lines, {ends: 18, low: -1, high: 5, shown: true, after: false, seen: [[35, 43, 54], [217, 83, 79]]});
+
 // Commands stay off without a token, and a phone needs no scrolling sideways.
 assert.ok(await page.isDisabled('#arm'));
 assert.ok(await page.isDisabled('#buttons button'));

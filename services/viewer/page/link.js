@@ -28,17 +28,17 @@ export class Link {
 
   hear(data) {
     this.ask({ack: 1});
-    if (typeof data === 'string') {
-      this.bytes += data.length;
-      const message = JSON.parse(data);
-      this.handlers[message.type]?.(message);
-      return;
-    }
-    this.bytes += data.byteLength;
-    const kind = new DataView(data).getUint8(0);
-    if (kind === 1) this.handlers.cloud(cloudOf(data));
-    if (kind === 2) this.handlers.image(imageOf(data));
+    this.bytes += data.length ?? data.byteLength;
+    if (typeof data !== 'string') return hearBinary(data, this.handlers);
+    const message = JSON.parse(data);
+    this.handlers[message.type]?.(message);
   }
+}
+
+export function hearBinary(data, handlers) {
+  const kind = new DataView(data).getUint8(0);
+  if (kind === 1) handlers.cloud(cloudOf(data));
+  if (kind === 2) handlers.image(imageOf(data));
 }
 
 // services/viewer/cloud.h says what stands where.

@@ -1,4 +1,5 @@
 import {Link} from './link.js';
+import {Recording} from './recording.js';
 import {Scene3D} from './scene3d.js';
 import {drawTimeline, drawStrips, timeAt} from './strips.js';
 import {drawImage, showHealth, makeCommands, allowCommands} from './panels.js';
@@ -110,7 +111,10 @@ const handlers = {
   cloud(cloud) { window.chase.counts.cloud++; scene.addSweep(cloud.points); },
   image(image) { window.chase.counts.image++; drawImage(page.image, page.imagetext, image).catch(() => {}); },
 };
-const link = new Link(handlers);
+// A report hands the flight over with the page.
+const link = window.chaseRecording ? new Recording(handlers, window.chaseRecording) : new Link(handlers);
+window.chase.link = link;
+page.commands.hidden = !!window.chaseRecording;  // it has been flown
 
 const want = () => link.want(['cloud', 'image'].filter((part) => page[`want${part}`].checked));
 page.wantcloud.onchange = page.wantimage.onchange = () => { want(); if (!page.wantcloud.checked) scene.clear(); };

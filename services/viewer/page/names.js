@@ -7,6 +7,7 @@ export const HEALTHS = ['pose ok', 'pose degraded', 'pose lost', 'pose starting'
 export const HEALTH_COLORS = ['#3fa66b', '#d9a33a', '#d9534f', '#7d8896'];
 export const FOLLOWING = ['no plan', 'plan', 'stop', 'brake', 'land'];
 export const STATE_COLORS = ['#7d8896', '#3fa66b', '#d9a33a', '#d9534f'];  // of a process: starting ok degraded failed
+export const FAULT_COLORS = [null, null, '#d9a33a', '#d9534f'];  // of all processes: the worst
 export const COMMANDS = ['takeoff', 'chase', 'hold', 'search', 'return', 'land', 'stop'];
 
 export const FLIGHT_STATES = ['IDLE', 'READY', 'TAKEOFF', 'CHASE', 'HOLD', 'SEARCH', 'RETURN', 'LAND', 'DONE', 'EMERGENCY'];
@@ -14,6 +15,6 @@ export const FLIGHT_COLORS = ['#7d8896', '#a9c7b4', '#6fbf73', '#3fa66b', '#4c9b
 
 // Columns of a row of samples (services/viewer/page_text.cpp, RowOf).
 export const T = 0, DISTANCE = 1, CLEARANCE = 2, SPEED = 3, PLAN_MS = 4, VERDICT = 5, TARGET_STATE = 6, HEALTH = 7,
-  DRONE = 8, TARGET = 11, FLIGHT = 14;
+  DRONE = 8, TARGET = 11, FLIGHT = 14, PROCESSES = 15;
 
 export const format = (value, digits, unit) => value === null || value === undefined ? `– ${unit}` : `${value.toFixed(digits)} ${unit}`;

@@ -129,7 +129,9 @@ export class Scene3D {
     this.points = 0;
     this.cloud.frustumCulled = false;
     this.sweeps = [];
-    this.scene.add(grid, this.drone, this.target, this.covariance, this.trail, this.targetTrail, this.plan, this.stop,
+    this.fence = new THREE.LineSegments(new THREE.BufferGeometry(), new THREE.LineBasicMaterial({color: '#e05bd0'}));
+    this.fence.frustumCulled = this.fence.visible = false;
+    this.scene.add(this.fence, grid, this.drone, this.target, this.covariance, this.trail, this.targetTrail, this.plan, this.stop,
       this.forecast, this.fan, this.sight, ...this.obstacles, this.cloud);
     for (const thing of [this.drone, this.target, this.covariance]) thing.visible = false;
     this.solids = [new THREE.SphereGeometry(1, 16, 10), new THREE.BoxGeometry(2, 2, 2),
@@ -163,6 +165,7 @@ export class Scene3D {
     setTube(this.stop, plan?.stop);
     setTube(this.forecast, forecast?.path);
     this.setFan(forecast);
+    this.setFence(state.fence);
     setLine(this.sight, this.drone.visible && this.target.visible ? [...drone.p, ...target.p] : null);
     this.dirty = true;
   }
@@ -185,6 +188,18 @@ export class Scene3D {
     }
     this.fan.geometry.setAttribute('position', new THREE.BufferAttribute(new Float32Array(sides), 3));
     this.fan.geometry.setIndex(faces);
+  }
+
+  // Its edges at both heights and between them.
+  setFence(fence) {
+    const key = JSON.stringify(fence ?? null);
+    if (key === this.fenceKey) return;
+    this.fenceKey = key;
+    const lines = (fence?.corners ?? []).flatMap(([x, y], i, all) => {
+      const [u, v] = all[(i + 1) % all.length], {floor, ceiling} = fence;
+      return [x, y, floor, u, v, floor, x, y, ceiling, u, v, ceiling, x, y, floor, x, y, ceiling];
+    });
+    setLine(this.fence, lines);
   }
 
   setTrail(rows, now) {

@@ -1,11 +1,11 @@
 // Time line and strips: plain 2D canvases over the rows of samples.
-import {T, DISTANCE, CLEARANCE, SPEED, PLAN_MS, VERDICT, TARGET_STATE, HEALTH, FLIGHT, VERDICT_COLORS, TARGET_COLORS,
-  HEALTH_COLORS, FLIGHT_COLORS, format} from './names.js';
+import {T, DISTANCE, CLEARANCE, SPEED, PLAN_MS, VERDICT, TARGET_STATE, HEALTH, FLIGHT, PROCESSES, VERDICT_COLORS, TARGET_COLORS,
+  HEALTH_COLORS, FLIGHT_COLORS, FAULT_COLORS, format} from './names.js';
 
 const STRIPS = [['distance', DISTANCE, 'm', 2, '#4c9be8'], ['certified clearance', CLEARANCE, 'm', 2, '#3fa66b'],
   ['speed', SPEED, 'm/s', 2, '#d9a33a'], ['plan time', PLAN_MS, 'ms', 2, '#b455c9']];
 const LANES = [['flight', FLIGHT, FLIGHT_COLORS], ['verdict', VERDICT, VERDICT_COLORS], ['target', TARGET_STATE, TARGET_COLORS],
-  ['pose', HEALTH, HEALTH_COLORS]];
+  ['pose', HEALTH, HEALTH_COLORS], ['faults', PROCESSES, FAULT_COLORS]];
 const LEFT = 60, DIM = '#93a0b0';
 
 function prepare(canvas) {

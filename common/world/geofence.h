@@ -1,10 +1,13 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 #include <string>
 #include <vector>
 
-namespace chase::mission {
+#include "common/world/trajectory.h"
+
+namespace chase::world {
 
 /// Where it may fly: a polygon seen from above and two heights, all counted from the take-off place
 /// along the axes of frame W. No corners: anywhere.
@@ -21,9 +24,15 @@ struct Geofence {
     v("ceiling", ceiling, "height above the take-off place, at most, m");
   }
   bool Exists() const { return !polygon.empty(); }
-  /// Why a place is outside, `p` in m from the take-off place; empty: it is inside.
-  std::string Breach(const Eigen::Vector3d& p) const;
+  /// Why a place is outside, or nearer to the fence than `margin` m, `p` in m from the take-off
+  /// place; empty: it is inside.
+  std::string Breach(const Eigen::Vector3d& p, double margin = 0.0) const;
   std::string Problem() const;
 };
 
-}  // namespace chase::mission
+/// Places, frame W, m, on a plan up to its stop and along that to rest: where it is flown if
+/// nothing more comes. 0.1 s apart or less on plans of 2 s.
+std::vector<Eigen::Vector3d> PlacesOn(const Trajectory& plan,
+                                      const std::optional<Trajectory>& stop);
+
+}  // namespace chase::world

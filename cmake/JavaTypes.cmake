@@ -1,0 +1,10 @@
+# lcm-gen's Java classes of TYPES as the jar OUT, for lcm-spy.
+file(REMOVE_RECURSE ${WORK})
+file(MAKE_DIRECTORY ${WORK}/classes)
+function(run)
+  execute_process(COMMAND ${ARGN} COMMAND_ERROR_IS_FATAL ANY)
+endfunction()
+run(${LCM_GEN} -j --jpath ${WORK}/src ${TYPES})
+file(GLOB sources ${WORK}/src/chase/*.java)
+run(${JAVAC} -nowarn -cp /usr/share/java/lcm.jar -d ${WORK}/classes ${sources})
+run(${JAR} cf ${OUT} -C ${WORK}/classes chase)

@@ -1,0 +1,211 @@
+#include "common/bus/heard_order.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <lcm/lcm-cpp.hpp>
+#include <optional>
+#include <stdexcept>
+
+#include "chase/status_t.hpp"
+#include "common/bus/channels.h"
+#include "common/bus/message_head.h"
+
+namespace chase::bus {
+namespace {
+
+constexpr int64_t kYear2000 = 946684800LL * 1000000;  // us; before it: logical time
+constexpr double kMostSilent = 0.01;                  // share of outputs without their trigger
+
+struct Input {
+  std::string channel;
+  int32_t seq;
+  int64_t position;
+};
+
+/// A message that the process sent.
+struct Output {
+  std::string channel;
+  int64_t utime;  // the log's stamp
+  std::vector<MessageHead::Input> inputs;
+};
+
+struct Recorded {
+  std::vector<Input> inputs;    // in the file's order
+  std::vector<Output> outputs;  // the process's, in the file's order
+  std::map<std::string, int64_t> lost;
+  bool live = false, one_life = true;
+};
+
+Recorded Read(const std::string& log, const std::string& process,
+              const std::set<std::string>& channels) {
+  lcm::LogFile file(log, "r");
+  if (!file.good()) throw std::runtime_error(log + ": cannot be read; --replay needs an LCM log");
+  Recorded recorded;
+  std::map<std::string, int64_t> starts;  // by channel, and the process's own
+  const auto same_life = [&](const std::string& of, int64_t start) {
+    recorded.one_life &= starts.try_emplace(of, start).first->second == start;
+  };
+  for (int64_t at = 0;; at = ftello(file.getFilePtr())) {
+    const lcm::LogEvent* event = file.readNextEvent();
+    if (event == nullptr) break;
+    const auto head = HeadOf(event->data, static_cast<size_t>(std::max(0, event->datalen)));
+    if (!head) continue;
+    if (head->sender == process) {
+      recorded.live |= event->timestamp >= kYear2000;
+      same_life("", head->sender_start);
+      status_t status;
+      if (event->channel != StatusChannel(process))
+        recorded.outputs.push_back({event->channel, event->timestamp, head->inputs});
+      else if (status.decode(event->data, 0, event->datalen) > 0)
+        for (const channel_status_t& c : status.channels) recorded.lost[c.channel] = c.dropped;
+    }
+    if (channels.count(event->channel) == 0) continue;
+    same_life(event->channel, head->sender_start);
+    recorded.inputs.push_back({event->channel, head->seq, at});
+  }
+  return recorded;
+}
+
+/// Of each channel the inputs in the order of their `seq`.
+using Queues = std::map<std::string, std::vector<const Input*>>;
+
+Queues QueuesOf(const std::vector<Input>& inputs) {
+  Queues queues;
+  for (const Input& input : inputs) queues[input.channel].push_back(&input);
+  for (auto& [channel, queue] : queues)
+    std::stable_sort(queue.begin(), queue.end(),
+                     [](const Input* a, const Input* b) { return a->seq < b->seq; });
+  return queues;
+}
+
+/// What was heard between one output and the next, in the file's order.
+std::vector<std::vector<const Input*>> Intervals(const Recorded& recorded, const Queues& queues) {
+  std::vector<std::vector<const Input*>> intervals;
+  std::map<std::string, size_t> next;
+  for (const Output& output : recorded.outputs) {
+    auto& interval = intervals.emplace_back();
+    for (const MessageHead::Input& heard : output.inputs) {
+      const auto queue = queues.find(heard.channel);
+      if (queue == queues.end()) continue;
+      size_t& i = next[heard.channel];
+      for (; i < queue->second.size() && queue->second[i]->seq <= heard.seq; ++i)
+        interval.push_back(queue->second[i]);
+    }
+    std::sort(interval.begin(), interval.end(),
+              [](const Input* a, const Input* b) { return a->position < b->position; });
+  }
+  auto& rest = intervals.emplace_back();
+  for (const auto& [channel, queue] : queues)
+    rest.insert(rest.end(), queue.begin() + static_cast<long>(next[channel]), queue.end());
+  std::sort(rest.begin(), rest.end(),
+            [](const Input* a, const Input* b) { return a->position < b->position; });
+  return intervals;
+}
+
+/// By channel of outputs the channel of inputs that they answer; where there is none: not named.
+std::map<std::string, std::string> Triggers(
+    const std::vector<Output>& outputs, const std::vector<std::vector<const Input*>>& intervals) {
+  struct Count {
+    int64_t outputs = 0, messages = 0;
+  };
+  std::map<std::string, std::map<std::string, Count>> counts;
+  std::map<std::string, int64_t> totals;
+  for (size_t k = 0; k < outputs.size(); ++k) {
+    if (intervals[k].empty()) continue;  // a second answer to the same message
+    ++totals[outputs[k].channel];
+    std::map<std::string, int64_t> here;
+    for (const Input* input : intervals[k]) ++here[input->channel];
+    for (const auto& [channel, messages] : here) {
+      Count& count = counts[outputs[k].channel][channel];
+      ++count.outputs;
+      count.messages += messages;
+    }
+  }
+  std::map<std::string, std::string> triggers;
+  for (const auto& [output, by_input] : counts) {
+    const double least = (1.0 - kMostSilent) * static_cast<double>(totals[output]);
+    int64_t rarest = INT64_MAX;
+    for (const auto& [input, count] : by_input) {
+      if (static_cast<double>(count.outputs) < least || count.messages >= rarest) continue;
+      rarest = count.messages;
+      triggers[output] = input;
+    }
+  }
+  return triggers;
+}
+
+void NoteMissing(const Recorded& recorded, const Queues& queues, HeardOrder* order) {
+  for (const auto& [channel, lost] : recorded.lost)
+    if (lost > 0 && queues.count(channel) > 0) order->missing[channel].lost = lost;
+  std::map<std::string, int32_t> before;  // the highest `seq` that was asked for
+  std::map<std::string, size_t> next;
+  std::map<std::string, HeardOrder::Missing> found;
+  for (const Output& output : recorded.outputs) {
+    for (const MessageHead::Input& heard : output.inputs) {
+      const auto queue = queues.find(heard.channel);
+      if (queue == queues.end()) continue;
+      const auto [last, first_time] =
+          before.try_emplace(heard.channel, std::min(heard.seq, queue->second.front()->seq) - 1);
+      HeardOrder::Missing& m = found[heard.channel];
+      size_t& i = next[heard.channel];
+      int64_t here = 0;
+      for (; i < queue->second.size() && queue->second[i]->seq <= heard.seq; ++i) ++here;
+      const int64_t asked = std::max(0, heard.seq - last->second);
+      m.of += asked;
+      if (asked > here && m.count == 0) m.first_utime = output.utime;
+      m.count += std::max<int64_t>(0, asked - here);
+      last->second = std::max(last->second, heard.seq);
+    }
+  }
+  for (const auto& [channel, m] : found) {
+    if (m.count == 0) continue;
+    const int64_t lost = order->missing[channel].lost;
+    order->missing[channel] = {m.count, m.of, m.first_utime, lost};
+  }
+}
+
+}  // namespace
+
+std::vector<std::string> HeardOrder::Sentences() const {
+  std::vector<std::string> lines;
+  for (const auto& [channel, m] : missing) {
+    if (m.count > 0)
+      lines.push_back(fmt::format(
+          "{}: {} of {} messages that it heard are not in the log; from {:.3f} s on its answers "
+          "may differ",
+          channel, m.count, m.of, 1e-6 * static_cast<double>(m.first_utime)));
+    if (m.lost > 0)
+      lines.push_back(fmt::format(
+          "{}: in the flight it lost {} messages; the replay hears those that the log holds",
+          channel, m.lost));
+  }
+  return lines;
+}
+
+HeardOrder OrderHeard(const std::string& log, const std::string& process,
+                      const std::set<std::string>& channels) {
+  const Recorded recorded = Read(log, process, channels);
+  const Queues queues = QueuesOf(recorded.inputs);
+  HeardOrder order;
+  if (!recorded.one_life || recorded.outputs.empty()) return order;
+  NoteMissing(recorded, queues, &order);
+  if (!recorded.live) return order;
+  auto intervals = Intervals(recorded, queues);
+  const auto triggers = Triggers(recorded.outputs, intervals);
+  for (size_t k = 0; k < intervals.size(); ++k) {
+    auto& interval = intervals[k];
+    const auto trigger =
+        k < recorded.outputs.size() ? triggers.find(recorded.outputs[k].channel) : triggers.end();
+    if (trigger != triggers.end()) {
+      const auto last = std::find_if(interval.rbegin(), interval.rend(), [&](const Input* input) {
+        return input->channel == trigger->second;
+      });
+      if (last != interval.rend()) std::rotate(last.base() - 1, last.base(), interval.end());
+    }
+    for (const Input* input : interval) order.positions.push_back(input->position);
+  }
+  return order;
+}
+
+}  // namespace chase::bus

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <set>
+#include <string>
+#include <vector>
+
+namespace chase::bus {
+
+/// What a process heard in a recorded flight, in its order, as far as the log can tell.
+struct HeardOrder {
+  struct Missing {
+    int64_t count = 0, of = 0;  ///< messages that are not in the log, of those that it heard
+    int64_t first_utime = 0;  ///< of its first output after one, by the log's stamps, microseconds
+    int64_t lost = 0;         ///< messages that the process itself has lost: the log may hold them
+  };
+  std::vector<int64_t> positions;  ///< of the events in the file; empty: in the file's order
+  std::map<std::string, Missing> missing;  ///< by channel; none where nothing is
+
+  /// A line for each channel, for people.
+  std::vector<std::string> Sentences() const;
+};
+
+/// The order in which `process` heard the messages of `channels`. In a log of a live flight every
+/// message that it sent names the `seq` heard last of each channel: what it had heard by then comes
+/// before, the rest after. Of several messages heard between two of its own the one that it answers
+/// comes last: the rarest channel of which there is one before each message of that channel. A log
+/// in lockstep is in the right order already, and so is taken one in which a process of these
+/// began twice. Throws std::runtime_error when the log cannot be read.
+HeardOrder OrderHeard(const std::string& log, const std::string& process,
+                      const std::set<std::string>& channels);
+
+}  // namespace chase::bus

@@ -1,0 +1,84 @@
+#!/usr/bin/env python3
+"""The units of a vehicle, from the process table: units.py TABLE OUT writes OUT/chase.target and one
+OUT/chase-NAME.service for each process that a vehicle has."""
+
+import pathlib
+import sys
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "launcher"))
+sys.dont_write_bytecode = True
+
+import bus  # noqa: E402
+import processes  # noqa: E402
+
+TARGET = """# Everything that flies. `systemctl mask chase-viewer` leaves one out.
+[Unit]
+Description=chase: fly behind a moving target
+Documentation=file:/usr/share/doc/chase/DEPLOYMENT.md
+Wants={services}
+
+[Install]
+WantedBy=multi-user.target
+"""
+
+SERVICE = """[Unit]
+Description=chase: {name}
+Documentation=man:{binary}(1)
+PartOf=chase.target
+Requires=chase-network.service
+After=chase-network.service network.target
+# In flight nothing is given up.
+StartLimitIntervalSec=0
+
+[Service]
+# Ready when its bus works; gives a sign of life every second.
+Type=notify
+WatchdogSec=5
+Restart=on-failure
+RestartSec=0.5
+Environment="LCM_DEFAULT_URL={url}"
+EnvironmentFile=-/etc/chase/environment
+ExecStart=/usr/bin/{binary} --config /etc/chase/{name}.yaml $CHASE_OPTIONS
+KillSignal=SIGINT
+TimeoutStopSec=5
+{scheduling}User=chase
+# For the devices of the camera and the autopilot.
+SupplementaryGroups=video dialout
+NoNewPrivileges=true
+PrivateTmp=true
+ProtectHome=true
+# The one place to write to: save_map: map.bt becomes /var/lib/chase/map.bt.
+ProtectSystem=strict
+StateDirectory=chase
+WorkingDirectory=%S/chase
+"""
+
+
+def scheduling(row):
+    lines = []
+    if row["priority"]:  # below 50, where a real-time kernel has its interrupts
+        lines += ["CPUSchedulingPolicy=fifo", f"CPUSchedulingPriority={row['priority']}"]
+    if row["nice"]:
+        lines.append(f"Nice={row['nice']}")
+    if row["cores"]:
+        lines.append(f"CPUAffinity={row['cores']}")
+    return "".join(line + "\n" for line in lines)
+
+
+def main():
+    if len(sys.argv) != 3:
+        print(__doc__, file=sys.stderr)
+        return 1
+    table, out = map(pathlib.Path, sys.argv[1:])
+    rows = [row for row in processes.read_table(table.read_bytes(), table.name) if row["vehicle"]]
+    out.mkdir(parents=True, exist_ok=True)
+    for row in rows:
+        text = SERVICE.format(**row, url=bus.DEFAULT_URL, scheduling=scheduling(row))
+        (out / f"chase-{row['name']}.service").write_text(text, encoding="utf-8")
+    services = " ".join(f"chase-{row['name']}.service" for row in rows)
+    (out / "chase.target").write_text(TARGET.format(services=services), encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

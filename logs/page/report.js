@@ -1,0 +1,182 @@
+// Header, tables, images of key moments; then the charts.
+const flights = page.flights, two = flights.length === 2;
+const byId = (id) => document.getElementById(id);
+const make = (tag, text = '', name = '') => Object.assign(document.createElement(tag), {textContent: text, className: name});  // never as HTML
+const at = (object, key) => key.split('.').reduce((v, k) => v?.[k], object);
+const UNKNOWN = 'not known';
+const shown = (value, digits = 2, unit = '', scale = 1) =>
+  value === null || value === undefined ? UNKNOWN : `${(scale * value).toFixed(digits)}${unit ? ` ${unit}` : ''}`;
+
+function table(parent, head, rows) {
+  const made = make('table');
+  if (head) {
+    const row = made.insertRow();
+    head.forEach((text, i) => row.append(make('th', text, i ? 'number' : '')));
+  }
+  for (const {cells, worse, mark} of rows) {
+    const row = made.insertRow();
+    cells.forEach((text, i) => row.append(make('td', text, i ? 'number' : '')));
+    if (worse) row.className = 'worse';
+    if (rows.some((r) => r.mark)) row.append(make('td', mark ?? '', mark?.startsWith('✓') ? 'passed' : 'failed'));
+  }
+  parent.append(made);
+  return made;
+}
+
+// [key of metrics.json, words, unit, scale, digits]
+const ROWS = [
+  ['safe_ratio', 'Safe', '%', 100, 2], ['visible_ratio', 'Target in line of sight', '%', 100, 2], ['in_image_ratio', 'Target in the image', '%', 100, 2],
+  ['min_clearance_m', 'Smallest clearance', 'm', 1, 2], ['certified_clearance_m', 'Smallest certified clearance', 'm', 1, 2],
+  ['certificate_kept_ratio', 'Certificate kept', '%', 100, 2], ['tube_exceeded_ratio', 'Outside the tube', '%', 100, 2], ['certified_ratio', 'Plans that are certified', '%', 100, 1],
+  ['distance_ratio', 'Distance over the desired one', '', 1, 3], ['distance_error', 'Its mean absolute error', '', 1, 3],
+  ['travel_ratio', 'Path length, chaser over target', '', 1, 2], ['path_m', 'Path length', 'm', 1, 1], ['speed_max_mps', 'Highest speed', 'm/s', 1, 2],
+  ['acceleration_cost', 'Acceleration cost', 'm²/s⁴', 1, 2], ['jerk_cost', 'Jerk cost', 'm²/s⁶', 1, 1], ['yaw_rate_rms', 'Yaw rate, RMS', 'rad/s', 1, 2],
+  ['plan_ms.p50', 'Planning, median', 'ms', 1, 1], ['plan_ms.p99', 'Planning, 99th percentile', 'ms', 1, 1],
+  ['predict_ms.p50', 'Prediction, median', 'ms', 1, 1], ['predict_ms.p99', 'Prediction, 99th percentile', 'ms', 1, 1],
+  ['replans', 'Plans', '', 1, 0], ['fallbacks', 'Fallbacks', '', 1, 0],
+  ['odometry_ate_m', 'Odometry, RMSE', 'm', 1, 3], ['odometry_ate_aligned_m', 'Odometry, RMSE after alignment', 'm', 1, 3],
+  ['pose_sigma_max_m', 'Pose, largest standard deviation', 'm', 1, 3], ['frame_changes', 'Changes of the frame W', '', 1, 0],
+  ['target_rmse_m', 'Target, RMSE', 'm', 1, 3], ['target_known_ratio', 'Target known', '%', 100, 1],
+  ['prediction_error_m', 'Prediction 1 s ahead, mean error', 'm', 1, 3],
+  ['tracking_error_m.p50', 'Distance from the plan, median', 'm', 1, 3], ['tracking_error_m.p99', 'Distance from the plan, 99th percentile', 'm', 1, 3],
+  ['tracking_error_p99_m', 'Distance from the plan, 99th percentile', 'm', 1, 3],
+  ['latency_ms.POSE.p99', 'Age of POSE, 99th percentile', 'ms', 1, 1], ['latency_ms.TARGET.p99', 'Age of TARGET, 99th percentile', 'ms', 1, 1],
+  ['latency_ms.OBSTACLES.p99', 'Age of OBSTACLES, 99th percentile', 'ms', 1, 1], ['stages_ms.planning plan.p99', 'Planning, 99th percentile', 'ms', 1, 1],
+  ['touchdown_speed_mps', 'Speed at touchdown', 'm/s', 1, 2], ['motors_off_s', 'Motors off after', 's', 1, 1],
+  ['real_time_factor', 'Real-time factor', '', 1, 2], ['flown_s', 'Flown', 's', 1, 1],
+];
+const rowOf = (key) => ROWS.find(([name]) => name === key) ?? [key, key.replace('criteria.', 'criterion '), '', 1, 3];
+
+const criterionOf = ({metrics}, key) => {
+  const name = [key, `${key}_max`].find((n) => n in (metrics.criteria ?? {}));
+  return name === undefined ? undefined : (metrics.criteria[name] ? '✓' : '✗') + (NARROW ? '' : ' criterion');
+};
+
+function showHeader() {
+  byId('title').textContent = two ? `${flights[0].title}: two flights` : flights[0].title;
+  flights.forEach((flight, i) => {
+    if ('passed' in flight.metrics)
+      byId('title').append(make('span', `${two ? `${'AB'[i]} ` : ''}${flight.metrics.passed ? 'passed' : 'failed'}`, `badge ${flight.metrics.passed ? 'good' : 'bad'}`));
+    const {metrics, vehicle} = flight, commits = [...new Set(Object.values(vehicle.software.versions).map((v) => v.match(/commit \w+/)?.[0] ?? v))];
+    const of = metrics.duration_s ? ` of ${metrics.duration_s} s` : '';
+    const factor = metrics.real_time_factor ? `, real-time factor ${metrics.real_time_factor.toFixed(2)}` : '';
+    byId('subtitle').append(make('div', `${two ? `${'AB'[i]}: ${flight.log}, ` : ''}${metrics.flown_s.toFixed(1)} s${of} flown${factor}; ${commits.join(', ')}`));
+    for (const loss of metrics.losses) byId('losses').append(make('p', `${two ? `${'AB'[i]}: ` : ''}${loss}`, 'failed'));
+  });
+  byId('map_text').textContent = flights[0].truth ? 'Paths over the mission. Thin lines: predictions and plans of every half second (switch them in the legend).'
+    : 'Paths as estimated.';
+}
+
+function showFigures() {
+  byId('figures_text').textContent = two ? 'Red rows: B has moved to its worse side by more than 1 %.'
+    : flights[0].truth ? 'Sampled on the truth at 100 Hz over the mission.' : 'What the vehicle said of itself; nobody knows where it really was.';
+  if (two) return compareFigures();
+  const {metrics} = flights[0], known = ROWS.filter(([key]) => at(metrics, key) !== undefined);
+  const rows = known.map(([key, words, unit, scale, digits]) => ({cells: [words, shown(at(metrics, key), digits, unit, scale)], mark: criterionOf(flights[0], key)}));
+  for (const [name, words] of [['complete', 'Mission complete'], ['recorded', 'Log complete']])
+    if (name in (metrics.criteria ?? {})) rows.unshift({cells: [words, metrics.criteria[name] ? 'yes' : 'no'], mark: criterionOf(flights[0], name)});
+  const half = Math.ceil(rows.length / 2);
+  table(byId('figures'), null, rows.slice(0, half));
+  table(byId('figures'), null, rows.slice(half));
+}
+
+function compareFigures() {
+  byId('figures').className = '';
+  const value = (key, side) => {
+    const [, , unit, scale, digits] = rowOf(key), number = at(flights[side].metrics, key);
+    return typeof number === 'number' ? shown(number, digits, unit, scale) : page.compared.find((f) => f.key === key)['ab'[side]] || UNKNOWN;
+  };
+  const rows = page.compared.filter(({a, b}) => a || b).map(({key, worse}) =>
+    ({cells: [rowOf(key)[1], value(key, 0), value(key, 1), worse ? 'WORSE' : ''], worse}));
+  table(byId('figures'), ['', 'A', 'B', ''], rows);
+}
+
+function showSoftware() {
+  flights.forEach(({vehicle: {software}}, i) => {
+    const names = Object.keys(software.versions).sort();
+    if (two) byId('software').append(make('p', 'AB'[i]));
+    table(byId('software'), ['process', 'version', 'host', 'configuration'], names.map((name) =>
+      ({cells: [name, software.versions[name], software.hosts[name] ?? '–', software.configurations[name] ?? '–']})));
+  });
+}
+
+// Seconds and shares of each lane's labels.
+function showSpent() {
+  const rows = new Map();
+  flights.forEach(({data}, i) => {
+    for (const {lane, label, from, to} of data.spans.filter((s) => s.lane !== 'fault')) {
+      const key = `${lane}: ${label}`;
+      if (!rows.has(key)) rows.set(key, flights.map(() => 0));
+      rows.get(key)[i] += to - from;
+    }
+  });
+  table(byId('spent'), two ? ['', 'A', 'B'] : null, [...rows].map(([key, seconds]) => ({cells: [key, ...seconds.map((s) => shown(s, 1, 's'))]})));
+}
+
+function showTimes() {
+  const quantiles = (id, pick) => {
+    const names = [...new Set(flights.flatMap(({vehicle}) => Object.keys(vehicle[pick] ?? {})))];
+    if (!names.length) return byId(id).append(make('p', 'Not in this log: a flight in lockstep does not measure it.'));
+    const both = (name, q) => flights.map(({vehicle}) => shown(vehicle[pick]?.[name]?.[q], 1)).join(' / ');
+    table(byId(id), [two ? 'A / B, ms' : 'ms', 'median', '99 %', 'most'], names.map((name) => ({cells: [name, both(name, 'p50'), both(name, 'p99'), both(name, 'max')]})));
+  };
+  quantiles('latencies', 'latency_ms');
+  quantiles('stages', 'stages_ms');
+  const processes = [...new Set(flights.flatMap(({vehicle}) => Object.keys(vehicle.cpu_s ?? {})))];
+  if (!processes.length) return byId('cpu').append(make('p', 'Not in this log: a flight in lockstep does not measure it.'));
+  const share = ({vehicle, metrics}, name) => shown(vehicle.cpu_s?.[name] === undefined ? null : vehicle.cpu_s[name] / metrics.flown_s, 1, '%', 100);
+  table(byId('cpu'), ['of one core', ...(two ? ['A', 'B'] : [''])], processes.map((name) => ({cells: [name, ...flights.map((f) => share(f, name))]})));
+}
+
+async function showMoment(parent, flight, moment, label) {
+  const figure = make('figure'), canvas = make('canvas');
+  figure.append(canvas, make('figcaption', `${label}${moment.t.toFixed(1)} s: ${moment.label}`));
+  figure.onclick = () => seekPlayback(moment.t);
+  parent.append(figure);
+  Object.assign(canvas, {width: moment.width, height: moment.height});
+  const image = new Image();
+  image.src = `data:image/jpeg;base64,${moment.jpeg}`;
+  await image.decode();
+  const context = canvas.getContext('2d');
+  context.drawImage(image, 0, 0);
+  if (!moment.box) return;
+  const [u, v, w, h] = moment.box;
+  context.strokeStyle = ['#9aa3ae', '#3fe06b', '#ffb020', '#ff5050'][moment.state] ?? '#fff';
+  context.lineWidth = 2;
+  context.strokeRect(u - w / 2, v - h / 2, w, h);
+}
+
+function showMoments() {
+  const box = byId('moments');
+  flights.forEach((flight, i) => flight.moments.forEach((moment) => showMoment(box, flight, moment, two ? `${'AB'[i]}, ` : '')));
+  if (!box.childNodes.length) box.append(make('p', 'No image is in this log.'));
+}
+
+function showPlayback() {
+  if (!viewerFiles) return byId('playback').append(make('p', 'Not in this report: the viewer was built without three.js; run deploy/setup and build again.'));
+  const buttons = flights.map((flight, i) => {
+    const button = make('button', two ? `play ${'AB'[i]}` : 'play');
+    button.onclick = () => {
+      buttons.forEach((b) => b.setAttribute('aria-pressed', b === button));
+      if (!two) button.remove();
+      openPlayback(flight, Math.max(-flight.playback.begin, 0));
+    };
+    byId('playback').append(button);
+    return button;
+  });
+}
+
+const ends = flights.flatMap(({data, metrics}) => [...data.spans.flatMap((s) => [s.from, s.to]), metrics.flown_s]);
+timeRange = [Math.min(0, ...ends), Math.max(...ends)];
+showHeader();
+showFigures();
+showPlayback();
+showMoments();
+showTimeLine(flights);
+showStrips(flights);
+showMap(flights);
+if (two) byId('pixels_card').remove();
+else showPixels(flights[0]);
+showSpent();
+showTimes();
+showSoftware();

@@ -1,0 +1,32 @@
+#include "logs/src/lane.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace chase::logs {
+namespace {
+
+constexpr double kLongestStep = 1.0;  // s that a message may stand for until the next one comes
+
+double Rounded(double t) { return std::round(t * 1e3) / 1e3; }
+
+}  // namespace
+
+void Lane::Add(double t, const std::string& name) {
+  if (!spans_.empty()) {
+    const double step = std::clamp(t - last_, 0.0, kLongestStep);
+    seconds_[spans_.back().name] += step;
+    spans_.back().to = last_ + step;
+  }
+  if (spans_.empty() || spans_.back().name != name || t - last_ > kLongestStep)
+    spans_.push_back({name, t, t});
+  last_ = t;
+}
+
+void Lane::AddTo(const std::string& lane, nlohmann::ordered_json* spans) const {
+  for (const Span& s : spans_)
+    spans->push_back(
+        {{"lane", lane}, {"label", s.name}, {"from", Rounded(s.from)}, {"to", Rounded(s.to)}});
+}
+
+}  // namespace chase::logs

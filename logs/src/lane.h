@@ -1,0 +1,29 @@
+#pragma once
+
+#include <map>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+namespace chase::logs {
+
+/// Seconds under each name, and stretches of time with the same one.
+class Lane {
+ public:
+  /// From `t` [s] on, until the next name or a second at most. Times that go back count as none.
+  void Add(double t, const std::string& name);
+  const std::map<std::string, double>& seconds() const { return seconds_; }
+  /// Adds {lane, label, from, to} of every stretch.
+  void AddTo(const std::string& lane, nlohmann::ordered_json* spans) const;
+
+ private:
+  struct Span {
+    std::string name;
+    double from, to;  // s
+  };
+  std::vector<Span> spans_;
+  std::map<std::string, double> seconds_;
+  double last_ = 0.0;
+};
+
+}  // namespace chase::logs

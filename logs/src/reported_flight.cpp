@@ -1,0 +1,113 @@
+#include "logs/src/reported_flight.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <stdexcept>
+
+#include "logs/src/key_moments.h"
+#include "logs/src/playback.h"
+#include "logs/src/read_flight.h"
+#include "logs/src/report_data.h"
+#include "logs/src/report_plots.h"
+#include "logs/src/vehicle_report.h"
+
+namespace chase::logs {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+/// The flight's end is in the log: that of its mission, or the collision that it was ended by.
+bool HoldsTheEnd(const Metrics& m) { return m.criteria.at("complete") || m.collision_s >= 0.0; }
+
+std::string Shortfall(const FlightRecord& record, const Metrics& metrics) {
+  if (metrics.log_whole && HoldsTheEnd(metrics)) return "";
+  return fmt::format("the log {} at {:.1f} s of {:.1f} s; the figures are of that part",
+                     metrics.log_whole ? "ends" : "is cut off or damaged and ends", metrics.flown_s,
+                     record.scenario.duration_s);
+}
+
+/// What the truth knows of moments.
+std::vector<Moment> MomentsOf(const std::vector<SampleScore>& scores, const Metrics& metrics) {
+  std::vector<Moment> moments;
+  if (metrics.collision_s >= 0.0) moments.push_back({metrics.collision_s, "collision", 0});
+  const auto least = std::min_element(
+      scores.begin(), scores.end(),
+      [](const SampleScore& a, const SampleScore& b) { return a.clearance < b.clearance; });
+  if (least != scores.end()) moments.push_back({least->t, "smallest clearance", 1});
+  return moments;
+}
+
+/// What both kinds of report show.
+Json PageOf(const std::string& log, const std::string& title, const VehicleReport& vehicle,
+            Json data, const std::vector<Moment>& moments, bool images) {
+  Json page;
+  page["title"] = title;
+  page["log"] = log;
+  page["vehicle"] = vehicle.metrics;
+  if (images) {
+    page["moments"] = ImagesAt(log, vehicle.origin, KeyMoments(data["spans"], moments));
+    page["playback"] = PlaybackOf(log, vehicle.log_begin);
+  }
+  page["data"] = std::move(data);
+  return page;
+}
+
+/// The vehicle's series, and those of the truth in place of or beside them.
+Json DataOf(const VehicleReport& vehicle, const ReportData& truth) {
+  Json data = vehicle.series;
+  const Json of_truth = ToJson(truth);
+  for (const auto& [key, value] : of_truth.items()) {
+    if (key != "spans")
+      data[key] = value;
+    else
+      for (const Json& span : value) data["spans"].push_back(span);
+  }
+  return data;
+}
+
+ReportedFlight ByTruth(const std::string& log, const ReportOptions& options) {
+  const FlightRecord record = ReadFlight(log);
+  const auto scores = Score(record);
+  const Metrics metrics = Compute(record, scores);
+  const ReportData truth = PrepareReport(record, scores);
+  if (!options.plots_folder.empty()) WritePlots(options.plots_folder, truth);
+  const VehicleReport vehicle = ReportVehicle(log, record.origin_utime);
+  ReportedFlight flight{log, MetricsJson(record, metrics), {}, Shortfall(record, metrics)};
+  flight.page = PageOf(log, truth.title, vehicle, DataOf(vehicle, truth),
+                       MomentsOf(scores, metrics), options.images);
+  flight.page["truth"] = true;
+  flight.page["metrics"] = Json::parse(flight.metrics);
+  return flight;
+}
+
+ReportedFlight ByVehicle(const std::string& log, const ReportOptions& options) {
+  const VehicleReport vehicle = ReportVehicle(log);
+  if (!vehicle.flew)
+    throw std::runtime_error(log + ": holds neither TRUTH nor POSE nor PLAN: no flight to report");
+  ReportedFlight flight{log, vehicle.metrics.dump(2) + "\n", {}, ""};
+  if (!vehicle.whole)
+    flight.shortfall = "the log is cut off or damaged; the figures are of its rest";
+  flight.page = PageOf(log, "Flight without truth", vehicle, vehicle.series, {}, options.images);
+  flight.page["truth"] = false;
+  flight.page["metrics"] = vehicle.metrics;
+  return flight;
+}
+
+}  // namespace
+
+ReportedFlight ReportFlight(const std::string& log, const ReportOptions& options) {
+  return options.truth ? ByTruth(log, options) : ByVehicle(log, options);
+}
+
+std::string Summary(const ReportedFlight& flight) {
+  const Json& metrics = flight.page["metrics"];
+  std::string text;
+  if (metrics.contains("criteria"))
+    for (const auto& [name, passed] : metrics["criteria"].items())
+      text += fmt::format("{:<20} {}\n", name, passed.get<bool>() ? "passed" : "FAILED");
+  for (const Json& loss : metrics["losses"]) text += loss.get<std::string>() + "\n";
+  return text;
+}
+
+}  // namespace chase::logs

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <string>
+
+namespace chase::logs {
+
+/// A flight as a report shows it.
+struct ReportedFlight {
+  std::string log;
+  std::string metrics;          ///< metrics.json
+  nlohmann::ordered_json page;  ///< what report.js draws: title, truth, metrics, vehicle, data,
+                                ///< moments, playback
+  std::string shortfall;        ///< how the log ends before the flight does; empty: it does not
+};
+
+struct ReportOptions {
+  bool truth = true;         ///< by what really was, and what the vehicle said; else by that alone
+  bool images = true;        ///< with key moments and playback, which take seconds
+  std::string plots_folder;  ///< for pictures (PNG) where there is truth; empty: none
+};
+
+/// Throws std::runtime_error with one line when the log holds nothing to report.
+ReportedFlight ReportFlight(const std::string& log, const ReportOptions& options);
+
+/// The criteria and the losses, a line each, for people.
+std::string Summary(const ReportedFlight& flight);
+
+}  // namespace chase::logs

@@ -1,0 +1,151 @@
+#include "services/viewer/page_feed.h"
+
+#include <cmath>
+
+#include "common/bus/convert.h"
+#include "common/logs/jpeg.h"
+#include "services/viewer/cloud.h"
+
+namespace chase::viewer {
+namespace {
+
+constexpr int kTicksPerSecond = 10, kTicksPerObstacles = 5;
+constexpr int64_t kHalfStep = 25000;  // us: sweeps and frames come in steps of their own
+constexpr double kWholeLog = 1e9;     // s
+
+}  // namespace
+
+PageFeed::PageFeed(bus::Bus& bus, PageSink& sink, const ViewerConfig& config,
+                   const std::string& source)
+    : bus_(bus),
+      sink_(sink),
+      config_(config),
+      source_(source),
+      history_(source.empty() ? config.trail : kWholeLog) {}
+
+double PageFeed::Elapsed(int64_t utime) {
+  if (start_ < 0) start_ = utime;
+  return bus::Seconds(utime, start_);
+}
+
+double PageFeed::Time(int64_t utime) {
+  if (origin_ == 0) origin_ = utime;
+  return bus::Seconds(utime, origin_);
+}
+
+bool PageFeed::Due(Part part, int64_t utime, double rate_hz) {
+  if (!sink_.Wanted(part)) return false;
+  int64_t& last = sent_[part];
+  const auto period = static_cast<int64_t>(1e6 / rate_hz) - kHalfStep;
+  if (utime >= last && utime - last < period) return false;
+  last = utime;
+  return true;
+}
+
+void PageFeed::Take(const pose_t& m) {
+  Time(newest_ = m.utime);
+  if (m.epoch != epoch_ && epoch_ >= 0) {  // what was drawn in the old frame W is nowhere now
+    history_.ForgetPositions();
+    Forget();
+  }
+  epoch_ = m.epoch;
+  scene_.drone = FromMessage(m);
+  pose_heard_ = bus_.Now();
+}
+
+void PageFeed::Take(const plan_t& m) {
+  Time(m.utime);
+  scene_.plan = FromMessage(m, origin_);
+}
+
+void PageFeed::Take(const prediction_t& m) {
+  Time(m.utime);
+  scene_.forecast.reset();
+  if (m.verdict != prediction_t::NO_TARGET) scene_.forecast = FromMessage(m, origin_);
+}
+
+void PageFeed::Take(const obstacles_t& m) {
+  Time(m.utime);
+  obstacles_ = FromMessage(m, origin_);
+  obstacles_sent_ = false;
+}
+
+void PageFeed::Take(const flight_state_t& m) {
+  Time(m.utime);
+  scene_.flight = FromMessage(m, start_ < 0 ? origin_ : start_);
+  flight_heard_ = bus_.Now();
+}
+
+void PageFeed::Take(const scan_registered_t& m) {
+  if (!Due(Part::kCloud, m.utime, config_.cloud_rate_hz)) return;
+  auto timer = bus_.Time("cloud");
+  sink_.Send(Part::kCloud,
+             EncodeCloud(Time(m.utime), bus::ToVector(m.pos), m.x, m.y, m.z,
+                         static_cast<size_t>(config_.cloud_points)),
+             true);
+}
+
+void PageFeed::Take(const camera_image_t& m) {
+  if (!Due(Part::kImage, m.utime, config_.image_rate_hz)) return;
+  auto timer = bus_.Time("image");
+  const std::string jpeg = logs::Jpeg(m, config_.jpeg_quality);
+  if (jpeg.empty()) return;
+  sink_.Send(Part::kImage, EncodeImage(Time(m.utime), m.width, m.height, scene_.target, jpeg),
+             true);
+}
+
+void PageFeed::Take(const status_t& m) {
+  const auto before = statuses_.find(m.name);
+  const status_t* last = before == statuses_.end() ? nullptr : &before->second;
+  health_[m.name] = FromMessage(m, last);
+  status_heard_[m.name] = bus_.Now();
+  if (m.name == "planning" && last) scene_.plan_ms = MeanStageMs(m, *last, "plan");
+  statuses_[m.name] = m;
+}
+
+void PageFeed::Remember(int64_t utime) {
+  scene_.processes = WorstState(Processes());
+  if (origin_ != 0) history_.Add(SampleOf(scene_, Elapsed(utime)));
+}
+
+void PageFeed::Forget() {
+  scene_ = Scene();
+  obstacles_.clear();
+  obstacles_sent_ = false;
+  statuses_.clear();
+  health_.clear();
+  mission_health_.reset();
+  sent_.clear();
+  epoch_ = -1;
+  ++generation_;
+}
+
+void PageFeed::SendHello() {
+  sink_.Retain(Part::kHello,
+               HelloText(source_, play_ ? play_->duration : 0.0, !config_.token.empty(), history_));
+}
+
+std::vector<ProcessHealth> PageFeed::Processes() {
+  const int64_t now = bus_.Now();
+  for (auto& [name, health] : health_) health.age = bus::Seconds(now, status_heard_[name]);
+  return Joined(health_, mission_health_.value_or(health_t{}), now);
+}
+
+void PageFeed::Tick(int64_t utime, const std::string& self) {
+  if (scene_.flight) scene_.flight->age = bus::Seconds(bus_.Now(), flight_heard_);
+  scene_.processes = WorstState(Processes());
+  if (!play_) Remember(utime);
+  const bool second = ticks_++ % kTicksPerSecond == 0;
+  if (!play_ && second) SendHello();
+  if (!sink_.Wanted(Part::kState) || origin_ == 0) return;
+  auto timer = bus_.Time("tick");
+  if (scene_.drone) scene_.drone->age = bus::Seconds(bus_.Now(), pose_heard_);
+  sink_.Send(Part::kState, StateText(scene_, Elapsed(utime), generation_, play_), false);
+  if (!obstacles_sent_ && ticks_ % kTicksPerObstacles == 0) {
+    obstacles_sent_ = true;
+    sink_.Send(Part::kObstacles, ObstaclesText(obstacles_, Time(newest_)), false);
+  }
+  if (second) sink_.Send(Part::kHealth, HealthText(Processes(), self), false);
+}
+
+}  // namespace chase::viewer

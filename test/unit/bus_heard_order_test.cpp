@@ -1,0 +1,160 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <functional>
+#include <lcm/lcm-cpp.hpp>
+#include <map>
+#include <random>
+#include <set>
+
+#include "chase/imu_t.hpp"
+#include "common/bus/heard_order.h"
+#include "common/bus/log_writer.h"
+#include "common/bus/message_head.h"
+
+namespace chase::bus {
+namespace {
+
+constexpr int64_t kStart = 1'700'000'000'000'000;  // us
+
+/// A message on its way into a log.
+struct Sent {
+  int64_t stamp;  // when the recorder got it
+  std::string channel;
+  imu_t message;
+};
+
+/// A process "worker" that answers each SLOW with OUT and hears FAST and OTHER beside it.
+class Flight {
+ public:
+  Flight(uint32_t seed, int64_t start) : random_(seed), start_(start) {}
+
+  /// Runs for `seconds`; every message reaches the worker and the recorder up to 8 ms later, each
+  /// by itself, in the order of its channel.
+  void Run(double seconds) {
+    std::vector<Sent> heard;
+    for (int64_t t = 0; t < std::llround(seconds * 1e6); t += 1000) {
+      if (t % 5000 == 0) Send("FAST", t, &heard);
+      if (t % 40000 == 0) Send("SLOW", t, &heard);
+      if (t % 70000 == 0) Send("OTHER", t, &heard);
+    }
+    std::stable_sort(heard.begin(), heard.end(),
+                     [](const Sent& a, const Sent& b) { return a.stamp < b.stamp; });
+    std::map<std::string, int32_t> newest;
+    for (const Sent& m : heard) {
+      newest[m.channel] = m.message.seq;
+      if (m.channel == "SLOW") Answer(m.stamp, newest);
+    }
+    std::stable_sort(log_.begin(), log_.end(),
+                     [](const Sent& a, const Sent& b) { return a.stamp < b.stamp; });
+  }
+
+  std::string Write(const std::function<bool(const Sent&)>& kept = {}) const {
+    const auto file = std::filesystem::temp_directory_path() / "chase_heard_order.lcm";
+    LogWriter log(file);
+    for (const Sent& m : log_) {
+      if (kept && !kept(m)) continue;
+      std::vector<uint8_t> bytes(static_cast<size_t>(m.message.getEncodedSize()));
+      m.message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
+      log.Write(m.stamp, m.channel, bytes);
+    }
+    log.Close();
+    return file;
+  }
+
+  /// What the worker had heard by each SLOW: by its seq.
+  std::map<int32_t, std::map<std::string, int32_t>> truth;
+
+ private:
+  int64_t Delayed(const std::string& channel, int64_t t) {
+    int64_t& last = last_[channel];
+    return last = std::max(last + 1, start_ + t + static_cast<int64_t>(random_() % 8000));
+  }
+  void Send(const std::string& channel, int64_t t, std::vector<Sent>* heard) {
+    imu_t m{};
+    m.utime = start_ + t;
+    m.seq = seqs_[channel]++;
+    m.sender = "sensor";
+    heard->push_back({Delayed("to worker: " + channel, t), channel, m});
+    log_.push_back({Delayed("to recorder: " + channel, t), channel, m});
+  }
+  void Answer(int64_t t, const std::map<std::string, int32_t>& newest) {
+    imu_t m{};
+    m.utime = t;
+    m.seq = seqs_["OUT"]++;
+    m.sender = "worker";
+    for (const auto& [channel, seq] : newest) m.inputs.push_back({channel, seq});
+    m.n_inputs = static_cast<int32_t>(m.inputs.size());
+    truth[newest.at("SLOW")] = newest;
+    log_.push_back({Delayed("to recorder: OUT", t - start_), "OUT", m});
+  }
+
+  std::mt19937 random_;
+  int64_t start_;
+  std::map<std::string, int64_t> last_;
+  std::map<std::string, int32_t> seqs_;
+  std::vector<Sent> log_;
+};
+
+/// What a node has heard by each SLOW when it hears the log in this order.
+std::map<int32_t, std::map<std::string, int32_t>> Replayed(const std::string& file,
+                                                           const std::vector<int64_t>& positions) {
+  lcm::LogFile log(file, "r");
+  std::map<int32_t, std::map<std::string, int32_t>> out;
+  std::map<std::string, int32_t> newest;
+  for (const int64_t position : positions) {
+    fseeko(log.getFilePtr(), position, SEEK_SET);
+    const lcm::LogEvent* event = log.readNextEvent();
+    const auto head = HeadOf(event->data, static_cast<size_t>(event->datalen));
+    newest[event->channel] = head->seq;
+    if (event->channel == "SLOW") out[head->seq] = newest;
+  }
+  return out;
+}
+
+const std::set<std::string> kInputs = {"FAST", "SLOW", "OTHER"};
+
+TEST(HeardOrder, IsTheProcessesAndNotTheRecorders) {
+  for (uint32_t seed = 1; seed <= 20; ++seed) {
+    Flight flight(seed, kStart);
+    flight.Run(20.0);
+    const std::string file = flight.Write();
+    const HeardOrder order = OrderHeard(file, "worker", kInputs);
+    EXPECT_TRUE(order.Sentences().empty()) << order.Sentences().front();
+    EXPECT_EQ(Replayed(file, order.positions), flight.truth) << "seed " << seed;
+    std::vector<int64_t> sorted = order.positions;
+    std::sort(sorted.begin(), sorted.end());
+    EXPECT_EQ(std::unique(sorted.begin(), sorted.end()), sorted.end()) << "handed over twice";
+    EXPECT_EQ(sorted.size(), 4000u + 500u + 286u);
+    EXPECT_NE(Replayed(file, sorted), flight.truth) << "the file's order would have done";
+  }
+}
+
+TEST(HeardOrder, TellsWhatTheLogLacks) {
+  Flight flight(7, kStart);
+  flight.Run(20.0);
+  const std::string file = flight.Write([](const Sent& m) {
+    return m.channel != "FAST" || m.message.seq < 1000 || m.message.seq >= 1030;
+  });
+  const HeardOrder order = OrderHeard(file, "worker", kInputs);
+  ASSERT_EQ(order.missing.size(), 1u);
+  const auto& fast = order.missing.at("FAST");
+  EXPECT_EQ(fast.count, 30);
+  EXPECT_NEAR(static_cast<double>(fast.of), 4000.0, 15.0);
+  EXPECT_NEAR(1e-6 * static_cast<double>(fast.first_utime - kStart), 5.0, 0.06);
+  EXPECT_NE(order.Sentences().front().find("FAST: 30 of"), std::string::npos);
+}
+
+TEST(HeardOrder, LogicalTimeOtherProcessesAndTwoLivesAreTakenAsTheyStand) {
+  Flight lockstep(1, 1'000'000), live(1, kStart);
+  lockstep.Run(2.0);
+  live.Run(2.0);
+  EXPECT_TRUE(OrderHeard(lockstep.Write(), "worker", kInputs).positions.empty());
+  EXPECT_TRUE(OrderHeard(live.Write(), "nobody", kInputs).positions.empty());
+  EXPECT_FALSE(OrderHeard(live.Write(), "worker", kInputs).positions.empty());
+  EXPECT_THROW(OrderHeard("no/such.lcm", "worker", kInputs), std::runtime_error);
+}
+
+}  // namespace
+}  // namespace chase::bus

@@ -1,0 +1,183 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <map>
+#include <random>
+
+#include "common/bus/seal.h"
+#include "services/link/link_config.h"
+#include "services/link/link_node.h"
+#include "services/link/packet.h"
+
+namespace chase::link {
+namespace {
+
+using Generator = std::mt19937_64;
+
+Bytes RandomBytes(size_t size, Generator* draw) {
+  Bytes bytes(size);
+  for (auto& b : bytes) b = static_cast<uint8_t>((*draw)());
+  return bytes;
+}
+
+/// Sizes from nothing to several packets.
+std::vector<Message> RandomMessages(int n, Generator* draw) {
+  std::vector<Message> messages;
+  for (int i = 0; i < n; ++i) {
+    const size_t size = (*draw)() % ((*draw)() % 4 == 0 ? 9000 : 700);
+    Bytes bytes = RandomBytes(size, draw);
+    bytes.push_back(static_cast<uint8_t>(i));  // no two are alike
+    bytes.push_back(static_cast<uint8_t>(i >> 8));
+    messages.push_back({"CHANNEL_" + std::to_string((*draw)() % 9), bytes});
+  }
+  return messages;
+}
+
+std::vector<Bytes> Pack(const std::vector<Message>& messages, int64_t session, Generator* draw) {
+  Packer packer(session);
+  std::vector<Bytes> packets;
+  for (const Message& m : messages) {
+    EXPECT_TRUE(packer.Add(m.channel, m.bytes.data(), m.bytes.size()));
+    if ((*draw)() % 5 != 0) continue;
+    for (auto& packet : packer.Take(false)) packets.push_back(std::move(packet));
+  }
+  for (auto& packet : packer.Take(false)) packets.push_back(std::move(packet));
+  return packets;
+}
+
+using Count = std::map<std::pair<std::string, Bytes>, int>;
+
+Count CountOf(const std::vector<Message>& messages) {
+  Count count;
+  for (const Message& m : messages) ++count[{m.channel, m.bytes}];
+  return count;
+}
+
+TEST(Packet, AllArriveOverAGoodPath) {
+  Generator draw(1);
+  const auto messages = RandomMessages(500, &draw);
+  Unpacker unpacker;
+  std::vector<Message> came;
+  for (const auto& packet : Pack(messages, 7, &draw)) {
+    EXPECT_LE(packet.size(), Packer::kMostBytes);
+    EXPECT_TRUE(unpacker.Take(packet.data(), packet.size(), &came));
+  }
+  EXPECT_EQ(CountOf(came), CountOf(messages));
+  EXPECT_EQ(unpacker.lost(), 0);
+}
+
+TEST(Packet, DoubledAndDisorderedPacketsGiveEachMessageOnce) {
+  for (uint64_t seed = 1; seed <= 20; ++seed) {
+    Generator draw(seed);
+    const auto messages = RandomMessages(300, &draw);
+    auto packets = Pack(messages, 7, &draw);
+    const auto copies = packets;
+    packets.insert(packets.end(), copies.begin(), copies.end());
+    for (size_t i = 0; i + 8 < packets.size(); i += 8)
+      std::shuffle(packets.begin() + static_cast<long>(i),
+                   packets.begin() + static_cast<long>(i) + 8, draw);
+    Unpacker unpacker;
+    std::vector<Message> came;
+    // The first packet sets where the count begins.
+    for (const auto& packet : packets) unpacker.Take(packet.data(), packet.size(), &came);
+    EXPECT_EQ(CountOf(came), CountOf(messages)) << "seed " << seed;
+  }
+}
+
+TEST(Packet, ALossyPathLosesLittleMoreThanItsShareEvenOfLargeMessages) {
+  Generator draw(3);
+  std::vector<Message> messages = RandomMessages(4000, &draw);
+  int large = 0, came_large = 0;
+  for (const auto& m : messages) large += m.bytes.size() > 1300 ? 1 : 0;
+  Unpacker unpacker;
+  std::vector<Message> came;
+  for (const auto& packet : Pack(messages, 7, &draw))
+    if (draw() % 50 != 0) unpacker.Take(packet.data(), packet.size(), &came);
+  for (const auto& m : came) came_large += m.bytes.size() > 1300 ? 1 : 0;
+  ASSERT_GT(large, 500);
+  EXPECT_GT(static_cast<double>(came.size()), 0.97 * static_cast<double>(messages.size()));
+  EXPECT_GT(came_large, 0.97 * large);
+  EXPECT_GT(unpacker.lost(), 0);
+}
+
+TEST(Packet, ARecordedSessionIsRefusedOnceANewerOneWasHeard) {
+  Generator draw(4);
+  const auto old = Pack(RandomMessages(20, &draw), 7, &draw);
+  const auto fresh = Pack(RandomMessages(20, &draw), 8, &draw);
+  Unpacker unpacker;
+  std::vector<Message> came;
+  for (const auto& packet : fresh) EXPECT_TRUE(unpacker.Take(packet.data(), packet.size(), &came));
+  const size_t n = came.size();
+  for (const auto& packet : old) EXPECT_FALSE(unpacker.Take(packet.data(), packet.size(), &came));
+  for (const auto& packet : fresh) unpacker.Take(packet.data(), packet.size(), &came);
+  EXPECT_EQ(came.size(), n);
+}
+
+TEST(Packet, CutPacketsAreRefusedWhole) {
+  Generator draw(5);
+  const auto packets = Pack(RandomMessages(3, &draw), 7, &draw);
+  for (size_t size = 17; size < packets[0].size(); ++size) {
+    Unpacker unpacker;
+    std::vector<Message> came;
+    const bool taken = unpacker.Take(packets[0].data(), size, &came);
+    EXPECT_TRUE(taken || came.empty());
+  }
+}
+
+TEST(Packet, WhatIsTooLargeIsNotTaken) {
+  Packer packer(1);
+  const Bytes huge(300'000);
+  EXPECT_FALSE(packer.Add("LIDAR_SCAN", huge.data(), huge.size()));
+  EXPECT_FALSE(packer.Add(std::string(65, 'A'), huge.data(), 1));
+  EXPECT_TRUE(packer.Take(false).empty());
+  EXPECT_EQ(packer.Take(true).size(), 1u);
+}
+
+TEST(Seal, AnyChangedBitIsNoticed) {
+  Generator draw(6);
+  bus::Seal::Key key{};
+  for (auto& k : key) k = static_cast<uint8_t>(draw());
+  const bus::Seal seal(key);
+  const Bytes message = RandomBytes(40, &draw);
+  Bytes sealed = message;
+  seal.Close("PLAN", &sealed);
+  ASSERT_EQ(sealed.size(), message.size() + bus::Seal::kTagBytes);
+  EXPECT_EQ(seal.Open("PLAN", sealed.data(), sealed.size()), message.size());
+  EXPECT_FALSE(seal.Open("POSE", sealed.data(), sealed.size()));
+  EXPECT_FALSE(seal.Open("PLAN", message.data(), message.size()));
+  EXPECT_FALSE(seal.Open("PLAN", message.data(), 3));
+  for (size_t bit = 0; bit < 8 * sealed.size(); ++bit) {
+    Bytes changed = sealed;
+    changed[bit / 8] = static_cast<uint8_t>(changed[bit / 8] ^ (1 << bit % 8));
+    EXPECT_FALSE(seal.Open("PLAN", changed.data(), changed.size())) << "bit " << bit;
+  }
+  key[31] ^= 1;
+  EXPECT_FALSE(bus::Seal(key).Open("PLAN", sealed.data(), sealed.size()));
+}
+
+TEST(Link, HeavyMessagesStayAndOnlyCommandsComeBack) {
+  for (const char* channel : {"POSE", "PLAN", "FLIGHT_STATE", "CONTROL_STATUS", "COMMAND_ACK"}) {
+    EXPECT_TRUE(Leaves(channel, true)) << channel;
+    EXPECT_FALSE(Leaves(channel, false)) << channel;
+  }
+  for (const char* channel : {"LIDAR_SCAN", "CAMERA_IMAGE", "SCAN_REGISTERED", "MAP"}) {
+    EXPECT_FALSE(Leaves(channel, true)) << channel;
+    EXPECT_FALSE(Leaves(channel, false)) << channel;
+  }
+  EXPECT_FALSE(Leaves("COMMAND", true));
+  EXPECT_TRUE(Leaves("COMMAND", false));
+}
+
+TEST(LinkConfig, RefusalsNameTheField) {
+  EXPECT_EQ(LinkConfig{}.Problem(), "");
+  LinkConfig config;
+  config.side = "ground";
+  EXPECT_NE(config.Problem().find("peer is empty"), std::string::npos);
+  config.peer = "10.0.0.2:7700";
+  EXPECT_EQ(config.Problem(), "");
+  config.side = "air";
+  EXPECT_NE(config.Problem().find("side is 'air'"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace chase::link

@@ -1,0 +1,97 @@
+#include <gtest/gtest.h>
+
+#include <map>
+#include <random>
+#include <set>
+
+#include "chase/status_t.hpp"
+#include "common/bus/log_writer.h"
+#include "logs/src/info.h"
+#include "logs/src/seq_count.h"
+#include "test/unit/logs_small_log.h"
+
+namespace chase::logs {
+namespace {
+
+using testing::Encoded, testing::ErrorOf, testing::ReadText, testing::Temp, testing::WriteLog;
+using testing::WriteText;
+
+TEST(LogInfo, CountsAndTypesEveryChannel) {
+  const LogInfo info = Describe(WriteLog("info.lcm"));
+  ASSERT_EQ(info.channels.size(), 2u);
+  EXPECT_EQ(info.channels[0].channel, "IMU");
+  EXPECT_EQ(info.channels[0].type, "imu_t");
+  EXPECT_EQ(info.channels[0].count, 20);
+  EXPECT_NEAR(info.channels[0].RateHz(), 200.0, 1e-9);
+  EXPECT_EQ(info.channels[1].count, 4);
+  EXPECT_TRUE(info.Whole());
+  EXPECT_EQ(info.channels[0].missing, 0);
+}
+
+TEST(LogInfo, TellsVersionHostAndConfiguration) {
+  const std::string file = Temp("software.lcm");
+  status_t live{}, lockstep{};
+  live.name = "planning";
+  live.version = "0.1.0 (commit 1a2b), host a, host b, configuration 930766865";
+  lockstep.name = "control";
+  lockstep.version = "0.1.0 (commit 1a2b)";
+  {
+    bus::LogWriter out(file);
+    out.Write(1, "PLANNING_STATUS", Encoded(live));
+    out.Write(2, "CONTROL_STATUS", Encoded(lockstep));
+    out.Close();
+  }
+  const LogInfo info = Describe(file);
+  EXPECT_EQ(info.versions.at("planning"), "0.1.0 (commit 1a2b), host a");
+  EXPECT_EQ(info.versions.at("control"), "0.1.0 (commit 1a2b)");
+  EXPECT_EQ(info.hosts, (std::map<std::string, std::string>{{"planning", "b"}}));
+  EXPECT_EQ(info.configurations.at("planning"), "930766865");
+  const auto software = info.SoftwareByKind();
+  EXPECT_EQ(software.at("versions"), info.versions);
+  EXPECT_EQ(software.at("hosts"), info.hosts);
+  EXPECT_EQ(software.at("configurations"), info.configurations);
+  EXPECT_NE(Format(info).find("host       b (planning)\n"), std::string::npos);
+  EXPECT_NE(Format(info).find("planning 930766865\n"), std::string::npos);
+}
+
+TEST(LogInfo, ALogCutOffAnywhereIsReadAsFarAsItGoes) {
+  const std::string whole = ReadText(WriteLog("whole.lcm"));
+  for (size_t n = 4; n < whole.size(); n += 101) {
+    const LogInfo info = Describe(WriteText("cut.lcm", whole.substr(0, n)));
+    long count = 0;
+    for (const auto& c : info.channels) count += c.count;
+    EXPECT_LT(count, 24);
+  }
+}
+
+TEST(SeqCount, CountsWhatNeverCameInAnyOrder) {
+  std::mt19937 random(7);
+  for (int round = 0; round < 200; ++round) {
+    std::vector<int32_t> numbers(1 + random() % 60);
+    for (int32_t& n : numbers) n = static_cast<int32_t>(random() % 80);
+    SeqCount count;
+    for (const int32_t n : numbers) count.Add(n);
+    const std::set<int32_t> different(numbers.begin(), numbers.end());
+    const auto span = *different.rbegin() - *different.begin() + 1;
+    EXPECT_EQ(count.missing(), span - static_cast<int64_t>(different.size())) << "round " << round;
+    EXPECT_EQ(count.first(), *different.begin());
+    EXPECT_EQ(count.last(), *different.rbegin());
+  }
+}
+
+TEST(SeqCount, TakesTheWholeRangeOfNumbers) {
+  SeqCount count;
+  for (const int32_t n : {INT32_MAX, INT32_MIN, 0}) count.Add(n);
+  EXPECT_EQ(count.missing(), (int64_t{1} << 32) - 3);
+}
+
+TEST(LogInfo, WhatIsNoLogIsRefusedInOneLine) {
+  EXPECT_NE(ErrorOf([] { Describe("/nonexistent.lcm"); }).find("no such file"), std::string::npos);
+  EXPECT_NE(ErrorOf([] { Describe(WriteText("t.lcm", "text")); }).find("no LCM log"),
+            std::string::npos);
+  EXPECT_NE(ErrorOf([] { Describe(WriteText("e.lcm", "")); }).find("empty"), std::string::npos);
+  EXPECT_NE(ErrorOf([] { Describe("/tmp"); }).find("no such file"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace chase::logs

@@ -1,0 +1,221 @@
+// An operator names the target by a pixel of the image.
+
+#include <gtest/gtest.h>
+
+#include <memory>
+#include <opencv2/imgproc.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "chase/command_ack_t.hpp"
+#include "chase/target_t.hpp"
+#include "common/bus/convert.h"
+#include "common/bus/lockstep.h"
+#include "perception_world.h"
+#include "services/perception/perception_node.h"
+#include "services/perception/select.h"
+
+namespace chase::perception {
+namespace {
+
+using perception_test::Thing;
+
+constexpr int64_t kStart = 1'700'000'000'000'000;  // microseconds
+const Eigen::Vector3d kBlue = {0.05, 0.25, 0.9};
+const Eigen::Vector3d kPost(3.0, 1.0, 0.6);  // an orange one beside the target
+
+class Silent : public bus::Node {};
+
+/// The node before a blue target, which stands 3 m ahead of it, and an orange post of its shape.
+class Bench {
+ public:
+  Bench() : world_(World()), renderer_(world_) {
+    lockstep_.Add("command", 0, [this](bus::Bus& bus) {
+      bus_ = &bus;
+      bus.Subscribe<target_t>("TARGET", [this](const target_t& m) { out.push_back(m); });
+      bus.Subscribe<command_ack_t>("COMMAND_ACK", [this](const auto& m) { acks.push_back(m); });
+      return std::make_unique<Silent>();
+    });
+    lockstep_.Add("perception", 0, [](bus::Bus& bus) {
+      return std::make_unique<PerceptionNode>(bus, PerceptionConfig{});
+    });
+  }
+
+  static perception_test::World World() {
+    perception_test::World world = perception_test::StillWorld(3.0);
+    world.target_rgb = kBlue;
+    world.things.push_back({Thing::Kind::kCylinder, kPost, {0.15, 0.15, 0.25}, {1.0, 0.45, 0.05}});
+    return world;
+  }
+
+  void Run(double seconds, bool images = true) {
+    for (const double end = t_ + seconds; t_ < end - 1e-9; t_ += 0.005, ++step_) {
+      lockstep_.RunUntil(Utime());
+      if (step_ % 20 == 1 && step_ > 20) SendScan(t_ - 0.1);
+      if (images && step_ % 10 == 5) SendImage();
+      SendPose();
+      lockstep_.RunUntil(Utime());
+    }
+  }
+
+  /// The answer; `id` tells commands apart.
+  command_ack_t Select(double u, double v, int64_t id) {
+    command_t m{};
+    m.utime = Utime();
+    m.id = id;
+    m.kind = command_t::SELECT;
+    m.n_arguments = 2;
+    m.arguments = {u, v};
+    bus_->Publish("COMMAND", m);
+    lockstep_.RunUntil(Utime());
+    return acks.back();
+  }
+  cv::Point2d TargetPixel() { return Middle(renderer_.Image(t_).box); }
+  static cv::Point2d Middle(const cv::Rect2d& box) { return 0.5 * (box.tl() + box.br()); }
+  double Off(const Eigen::Vector3d& p) const { return (bus::ToVector(out.back().mean) - p).norm(); }
+  Eigen::Vector3d target() const { return world_.target(t_); }
+
+  std::vector<target_t> out;
+  std::vector<command_ack_t> acks;
+
+ private:
+  int64_t Utime() const { return kStart + std::llround(t_ * 1e6); }
+
+  void SendPose() {
+    const PoseSample pose = renderer_.Pose(t_);
+    pose_t m{};
+    m.utime = Utime();
+    bus::Set(m.pos, pose.p_WB);
+    bus::Set(m.vel, pose.v_WB);
+    bus::Set(m.orientation, pose.R_WB);
+    bus_->Publish("POSE", m);
+  }
+
+  void SendScan(double t) {
+    const Sweep sweep = renderer_.Lidar(t);
+    lidar_scan_t m{};
+    m.utime = kStart + std::llround(t * 1e6);
+    for (size_t i = 0; i < sweep.points.size(); ++i) {
+      m.x.push_back(sweep.points[i].x());
+      m.y.push_back(sweep.points[i].y());
+      m.z.push_back(sweep.points[i].z());
+      m.t.push_back(sweep.times[i]);
+    }
+    m.size = static_cast<int32_t>(m.x.size());
+    m.intensity.resize(m.x.size());
+    m.ring.resize(m.x.size());
+    bus_->Publish("LIDAR_SCAN", m);
+  }
+
+  void SendImage() {
+    const cv::Mat bgr = renderer_.Image(t_).bgr;
+    camera_image_t m{};
+    m.utime = Utime();
+    m.width = bgr.cols;
+    m.height = bgr.rows;
+    m.row_stride = 3 * bgr.cols;
+    m.pixelformat = camera_image_t::PIXEL_FORMAT_BGR;
+    m.data.assign(bgr.data, bgr.data + bgr.total() * 3);
+    m.size = static_cast<int32_t>(m.data.size());
+    bus_->Publish("CAMERA_IMAGE", m);
+  }
+
+  perception_test::World world_;
+  perception_test::Renderer renderer_;
+  bus::Lockstep lockstep_{kStart};
+  bus::Bus* bus_ = nullptr;
+  double t_ = 0.0;
+  int step_ = 0;
+};
+
+TEST(Select, WhatIsPointedAtIsChasedAtOnceWhateverItsColour) {
+  Bench bench;
+  bench.Run(0.5);
+  EXPECT_EQ(bench.out.back().state, +target_t::SEARCHING);
+  const cv::Point2d at = bench.TargetPixel();
+  const command_ack_t ack = bench.Select(at.x, at.y, 1);
+  EXPECT_EQ(ack.verdict, +command_ack_t::ACCEPTED) << ack.reason;
+  EXPECT_EQ(ack.reason.find("selected: "), 0U) << ack.reason;
+  bench.Run(0.15);
+  ASSERT_EQ(bench.out.back().state, +target_t::TRACKING) << "though it stands";
+  EXPECT_LT(bench.Off(bench.target()), 0.1);
+  bench.Run(4.0);
+  EXPECT_EQ(bench.out.back().state, +target_t::TRACKING);
+  EXPECT_LT(bench.Off(bench.target()), 0.1) << "and the orange one is nothing to it";
+}
+
+TEST(Select, TheSameCommandAgainIsAnsweredAndNotObeyed) {
+  Bench bench;
+  bench.Run(0.5);
+  const cv::Point2d at = bench.TargetPixel();
+  const auto post = [&] {  // to the left of the target: y grows to the left
+    const world::Rig rig;
+    const double focal = rig.focal_px;
+    return cv::Point2d(at.x - focal * kPost.y() / kPost.x(), at.y);
+  }();
+  ASSERT_EQ(bench.Select(post.x, post.y, 1).verdict, +command_ack_t::ACCEPTED)
+      << bench.acks.back().reason;
+  bench.Run(0.15);
+  ASSERT_LT(bench.Off(kPost), 0.2);
+  const std::string first = bench.acks.back().reason;
+  ASSERT_EQ(bench.Select(at.x, at.y, 2).verdict, +command_ack_t::ACCEPTED);
+  bench.Run(0.15);
+  ASSERT_LT(bench.Off(bench.target()), 0.1);
+  const command_ack_t late = bench.Select(post.x, post.y, 1);
+  EXPECT_EQ(late.verdict, +command_ack_t::ACCEPTED);
+  EXPECT_EQ(late.reason, first);
+  bench.Run(0.5);
+  EXPECT_LT(bench.Off(bench.target()), 0.1) << "where the second one led";
+}
+
+TEST(Select, IsRefusedWithAReason) {
+  Bench bench;
+  const auto refused = [&](double u, double v, const std::string& why) {
+    static int64_t id = 100;
+    const command_ack_t ack = bench.Select(u, v, ++id);
+    EXPECT_EQ(ack.verdict, +command_ack_t::REFUSED);
+    EXPECT_NE(ack.reason.find(why), std::string::npos) << ack.reason;
+  };
+  refused(100.0, 100.0, "no image has come yet");
+  bench.Run(0.5);
+  refused(376.0, 100.0, "(376, 100) is outside the image: columns 0 to 375, rows 0 to 239");
+  refused(100.0, -1.0, "is outside the image");
+  refused(1e300, 5.0, "is outside the image");
+  refused(5.0, 235.0, "");  // the ground
+  const cv::Point2d at = bench.TargetPixel();
+  bench.Run(0.7, false);
+  refused(at.x, at.y, "no image has come for 0.7 s");
+  EXPECT_EQ(bench.out.back().state, +target_t::SEARCHING);
+}
+
+TEST(LearnAt, SaysWhatStandsAgainstAThing) {
+  const DetectorConfig base;
+  const auto picture = [] { return cv::Mat(240, 376, CV_8UC3, cv::Scalar(120, 120, 120)); };
+  const cv::Scalar blue(230, 70, 20);
+  const auto refusal = [&](const cv::Mat& bgr, const cv::Point& at) {
+    return LearnAt(bgr, at, base).refusal;
+  };
+  const auto says = [](const std::string& text, const char* what) {
+    EXPECT_NE(text.find(what), std::string::npos) << text;
+  };
+  cv::Mat good = picture();
+  cv::rectangle(good, {100, 80, 30, 54}, blue, cv::FILLED);
+  const Selection selection = LearnAt(good, {110, 100}, base);
+  EXPECT_EQ(selection.refusal, "");
+  EXPECT_EQ(selection.box, cv::Rect(100, 80, 30, 54));
+  EXPECT_EQ(selection.config.Problem(), "");
+  EXPECT_NEAR(selection.config.shape.aspect, 30.0 / 54.0, 0.03);
+  cv::Mat cut = picture();
+  cv::rectangle(cut, {0, 80, 30, 54}, blue, cv::FILLED);
+  says(refusal(cut, {10, 100}), "the image cuts it");
+  cv::Mat wide = picture();
+  cv::rectangle(wide, {40, 40, 300, 160}, blue, cv::FILLED);
+  says(refusal(wide, {100, 100}), "runs on over");
+  cv::Mat many = picture();
+  for (int x = 20; x < 340; x += 40) cv::rectangle(many, {x, 80, 20, 36}, blue, cv::FILLED);
+  says(refusal(many, {30, 90}), "does not set it apart");
+}
+
+}  // namespace
+}  // namespace chase::perception
