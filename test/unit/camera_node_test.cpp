@@ -76,7 +76,7 @@ TEST(CameraNode, ALargeImageTravelsAsJpegAndIsGood) {
     lockstep.RunUntil(1'500'000);
     ASSERT_EQ(images.size(), 1u);
     const camera_image_t& m = images[0];
-    EXPECT_EQ(m.pixelformat, bus::kPixelFormatMjpeg);
+    ASSERT_EQ(m.pixelformat, bus::kPixelFormatMjpeg);
     EXPECT_LT(m.size, 100'000);
     EXPECT_EQ(bus::Problem(m), "");
     const cv::Mat decoded = cv::imdecode(m.data, cv::IMREAD_COLOR);

@@ -170,6 +170,7 @@ TEST(LidarSource, APcapngCaptureIsRead) {
   // 1000002 us after 1970, on interface 0.
   const std::string head("\0\0\0\0\0\0\0\0\x42\x42\x0f\0\x2e\0\0\0\x2e\0\0\0", 20);
   const std::string file = section + interface + block(6, head + frame);
+  ASSERT_TRUE(IsPcap({file.begin(), file.end()}));
   const auto datagrams = ReadPcap({file.begin(), file.end()}, "x");
   ASSERT_EQ(datagrams.size(), 1u);
   EXPECT_EQ(datagrams[0].port, 2368);

@@ -177,7 +177,8 @@ TEST(LidarGpsClock, StampsAreTimeOfDayWhileThePulseIsLocked) {
   EXPECT_EQ(clock.Utc(kHour - 1'000, kNoon + 1'000), kNoon - 1'000) << "before the hour";
   EXPECT_EQ(clock.Utc(1'000, kNoon - 500), kNoon + 1'000) << "after it";
   EXPECT_FALSE(clock.Utc(1'000, kNoon + 700'000)) << "the host's clock is off";
-  EXPECT_FALSE(clock.Utc(1'000, kNoon + 6'000'000)) << "silent for 6 s";
+  EXPECT_EQ(clock.Utc(4'000'000, kNoon + 4'000'000), kNoon + 4'000'000);
+  EXPECT_FALSE(clock.Utc(6'000'000, kNoon + 6'000'000)) << "silent for 6 s";
 }
 
 }  // namespace
