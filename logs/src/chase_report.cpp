@@ -52,7 +52,7 @@ int Report(const std::string& log, const std::string& out) {
 void RefuseOwnFolders(const std::vector<std::string>& logs, const std::string& out) {
   std::error_code none;
   for (const std::string& log : logs)
-    if (fs::equivalent(fs::path(log).parent_path(), out, none))
+    if (fs::equivalent(fs::absolute(log).parent_path(), out, none))
       throw std::runtime_error("--out " + out + ": holds " + log +
                                " and its own report; name another folder for the comparison");
 }
