@@ -42,13 +42,14 @@ class Lockstep::Port : public Bus {
     handlers_[channel] = std::move(handler);
   }
   void PublishRaw(const std::string& channel, Bytes bytes) override {
-    const auto late = std::llround(lockstep_->load_ * static_cast<double>(latency_));
-    lockstep_->Send(lockstep_->now_ + late, channel, std::move(bytes));
+    const int64_t late = std::llround(lockstep_->load_ * static_cast<double>(latency_));
+    due_ = std::max(due_, lockstep_->now_ + late);  // nothing overtakes when a load ends
+    lockstep_->Send(due_, channel, std::move(bytes));
   }
 
  private:
   Lockstep* lockstep_;
-  int64_t latency_;
+  int64_t latency_, due_ = 0;
   std::map<std::string, RawHandler> handlers_;
 };
 

@@ -84,7 +84,8 @@ void RunLive(const ServiceSpec& spec, const Flags& flags) {
       next_look = now + kLookPeriod;
       if (node->Report().state != told) report(now);
     }
-    const int64_t due = ticked ? std::min(ticks.next(), next_status) : next_status;
+    int64_t due = std::min(next_status, next_look);
+    if (ticked) due = std::min(due, ticks.next());
     bus.Handle(due - bus.Now());
   }
   report(bus.Now());

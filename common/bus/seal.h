@@ -9,7 +9,8 @@
 namespace chase::bus {
 
 /// A tag behind bytes that only who has the key can make: the first 16 bytes of HMAC-SHA256 (RFC
-/// 2104) over a name, a zero and the bytes. Decoders of LCM do not look behind the message.
+/// 2104) over a name, a zero and the bytes. Decoders of LCM do not look behind the message. What
+/// was recorded and is sent again carries a good tag: receivers refuse it by its age alone.
 class Seal {
  public:
   using Key = std::array<uint8_t, 32>;

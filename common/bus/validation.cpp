@@ -150,6 +150,7 @@ std::string Problem(const geofence_t& m) {
       .Number("corners", m.corners)
       .Number("floor", m.floor)
       .Number("ceiling", m.ceiling)
+      .That(m.floor < m.ceiling, "floor", "is not below the ceiling")
       .Result();
 }
 

@@ -31,9 +31,10 @@ double ToEdges(const std::vector<Eigen::Vector2d>& polygon, const Eigen::Vector2
 }
 
 void Sample(const Trajectory& path, double to, std::vector<Eigen::Vector3d>* places) {
-  constexpr int kPlaces = 20;
-  for (int i = 0; i <= kPlaces; ++i)
-    places->push_back(path.Position(path.start + (to - path.start) * i / kPlaces));
+  constexpr double kLeast = 20.0, kMost = 1000.0, kStep = 0.05;  // places; s
+  const int n = static_cast<int>(std::clamp(std::ceil((to - path.start) / kStep), kLeast, kMost));
+  for (int i = 0; i <= n; ++i)
+    places->push_back(path.Position(path.start + (to - path.start) * i / n));
 }
 
 }  // namespace

@@ -31,7 +31,7 @@ struct Geofence {
 };
 
 /// Places, frame W, m, on a plan up to its stop and along that to rest: where it is flown if
-/// nothing more comes. 0.1 s apart or less on plans of 2 s.
+/// nothing more comes. At most 0.05 s apart on plans of up to 50 s.
 std::vector<Eigen::Vector3d> PlacesOn(const Trajectory& plan,
                                       const std::optional<Trajectory>& stop);
 

@@ -48,8 +48,9 @@ ControlNode::ControlNode(bus::Bus& bus, const ControlConfig& config)
   bus_.Subscribe<pose_t>("POSE", [this](const pose_t& m) { OnPose(m); });
 }
 
-// Another mission process counts its messages anew.
+// Another mission process counts its messages anew. What is too old is not of this flight.
 void ControlNode::OnState(const flight_state_t& message) {
+  if (bus::Seconds(bus_.Now(), message.utime) > world::kMostAge.flight_state) return;
   home_.reset();
   if (message.has_home != 0) home_.emplace(message.epoch, bus::ToVector(message.home));
   const bool lands = message.state == flight_state_t::LAND;
@@ -79,14 +80,15 @@ const std::vector<world::Obstacle>* ControlNode::ListOf(const plan_t& message) c
 }
 
 // Whoever plans or leads the flight may err: what leaves the fence, or comes nearer to it than the
-// body keeps to its plan, is not flown, and the plan before comes to rest inside. A last resort is
-// flown, since what else there is stops later; so is what leads a body that is outside nearer to
-// the take-off place.
-std::string ControlNode::Breach(const world::Claim& claim) const {
+// body keeps to its plan, is not flown, and the plan before comes to rest inside. A last resort and
+// a way out of an obstacle's reach are flown, since what else there is touches or stops later; so
+// is what leads a body that is outside nearer to the take-off place, and to the ground where that
+// place is not known.
+std::string ControlNode::Breach(const world::Claim& claim, bool to_land) const {
   const world::Geofence& fence = config_.geofence;
-  if (!fence.Exists() || claim.last_resort) return "";
+  if (!fence.Exists() || claim.starts_inside) return "";  // a last resort may start inside
   if (!home_ || !epoch_.Is(home_->first))
-    return "the take-off place is not known, nor the geofence";
+    return to_land ? "" : "the take-off place is not known, nor the geofence";
   const std::vector<Eigen::Vector3d> places = world::PlacesOn(claim.position, claim.stop);
   const Eigen::Vector3d way = p_WB_ - home_->second;
   const double tube = config_.tracking_tube;
@@ -108,14 +110,14 @@ std::string ControlNode::Refusal(const plan_t& message) {
   static const std::vector<world::Obstacle> none;
   std::string bad =
       world::Refute(claim, {config_.hard_radius(), config_.sigmas}, list ? *list : none);
-  if (bad.empty()) bad = Breach(claim);
-  if (!bad.empty()) return bad;
   Plan plan;
+  plan.to_land = landing_ && bus::InputOf(message, "FLIGHT_STATE") >= landing_->second;
+  if (bad.empty()) bad = Breach(claim, plan.to_land);
+  if (!bad.empty()) return bad;
   plan.position = claim.position;
   plan.yaw = Eigen::Map<const Eigen::VectorXd>(message.yaw.data(), message.n_yaw);
   plan.stop = claim.stop;
   plan.seq = message.seq;
-  plan.to_land = landing_ && bus::InputOf(message, "FLIGHT_STATE") >= landing_->second;
   return controller_.AddPlan(plan);
 }
 

@@ -36,7 +36,7 @@ class ControlNode : public bus::Node {
   void OnPose(const pose_t& message);
   void OnState(const flight_state_t& message);
   std::string Refusal(const plan_t& message);
-  std::string Breach(const world::Claim& claim) const;
+  std::string Breach(const world::Claim& claim, bool to_land) const;
   const std::vector<world::Obstacle>* ListOf(const plan_t& message) const;
   void Send(int64_t utime, const Setpoint& setpoint);
   void SendTracking(int64_t utime);

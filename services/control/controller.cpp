@@ -13,6 +13,7 @@ namespace {
 constexpr double kJumpBack = 1.0;  // s; less is jitter between publishers
 constexpr double kAtRest = 0.3;    // m/s: gusts about a wind of 3 m/s stir a hovering body by less
 constexpr double kAtEnd = 0.3;     // m: planning asks for as much free ground beside the body
+constexpr double kLongestWay = 45.0;  // s to above the ground that planning chose, at 2.2 s a metre
 // m/s: POSE of the sentinels has 0.03, and a second without sweeps adds filter.doubt_accel's 0.1.
 constexpr double kMeasured = 0.1;
 
@@ -111,9 +112,11 @@ std::optional<Setpoint> Controller::Follow(double t, const Estimate& estimate, d
   return setpoint;
 }
 
-// Planning leads to above the ground that it chooses; whoever is not led comes down here.
+// Planning leads to above the ground that it chooses; whoever is not led, or does not get there,
+// comes down here.
 bool Controller::MayDescend(double t, const Estimate& estimate) const {
   if (estimate.v_WB.norm() > kAtRest) return false;
+  if (t - asked_to_land_ > kLongestWay) return true;
   const Plan* plan = plans_.FlownAt(t);
   if (plan == nullptr || !plan->to_land) return t - asked_to_land_ > world::kMostAge.landing_plan;
   const bool stops = plan->stop && t >= plan->stop->start;

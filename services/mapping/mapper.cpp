@@ -284,8 +284,9 @@ std::vector<world::Obstacle> Mapper::Unseen(const Eigen::Vector3d& origin, doubl
   for (const auto& cell : cells) unseen_pieces_[{cell.x, cell.y}] = cell.piece;
   std::vector<world::Obstacle> unseen;
   for (const auto& piece : pieces) {
-    unseen.push_back(Upright(piece, t));
-    unseen.back().id += kFirstUnseen;
+    world::Obstacle o = Upright(piece, t);
+    o.id += kFirstUnseen;
+    if (o.shape.allFinite()) unseen.push_back(std::move(o));
   }
   return unseen;
 }

@@ -72,7 +72,7 @@ Selection LearnAt(const cv::Mat& bgr, const cv::Point& at, const DetectorConfig&
     if (apart.index < kLeastIndex || learned.overlap < kLeastOverlap)
       return Refused("its colour does not set it apart from what else is in view");
     return {"", learned.config, cv::boundingRect(mask)};
-  } catch (const std::invalid_argument& e) {
+  } catch (const std::exception& e) {  // also OpenCV's own
     return Refused(e.what());
   }
 }

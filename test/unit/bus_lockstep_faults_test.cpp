@@ -284,6 +284,16 @@ TEST(LockstepLoad, MakesEveryProcessSlowForItsTime) {
   }
 }
 
+// A process sends one message after the other.
+TEST(LockstepLoad, LetsNothingOvertakeWhenItEnds) {
+  const Story story = Lived(4000137, [](Lockstep* lockstep) {
+    lockstep->At(1500137, [=] { lockstep->SetLoad(1000.0); });
+    lockstep->At(1600137, [=] { lockstep->SetLoad(1.0); });
+  });
+  EXPECT_GT(story.handled_at.back() - kUnderWay, 0);
+  EXPECT_TRUE(std::is_sorted(story.samples.begin(), story.samples.end()));
+}
+
 TEST(LockstepLoss, TakesItsShareOfHeavyAndLightAlikeAndRepeats) {
   const auto plan = [](Lockstep* lockstep) {
     lockstep->At(2000137, [=] { lockstep->SetLoss(0.2, 7); });

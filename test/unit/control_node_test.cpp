@@ -110,10 +110,11 @@ class Bench {
     lockstep_.RunUntil(latest_);
   }
   void SendState(int8_t state, const std::string& sender = "mission",
-                 const std::optional<Eigen::Vector3d>& home = {}) {
+                 const std::optional<Eigen::Vector3d>& home = {}, int64_t age = 0) {
     if (!mission_) mission_ = lockstep_.Connect();
     mission_->SetIdentity({sender, "", 0});
     flight_state_t m{};
+    m.utime = mission_->Now() - age;
     m.state = state;
     m.has_home = home ? 1 : 0;
     if (home) bus::Set(m.home, *home);
@@ -202,6 +203,7 @@ TEST(ControlNode, FliesNoPlanThatLeavesTheFence) {
   EXPECT_FALSE(IsFlown({1.5, 0, 0}, {1.5, 0, 0}, {1.6, 0, 0}));
   EXPECT_TRUE(IsFlown(middle, middle, outside, true, plan_t::BRAKE))
       << "what else there is stops later";
+  EXPECT_TRUE(IsFlown(middle, middle, outside, true, plan_t::ESCAPE));
   EXPECT_FALSE(IsFlown(middle, middle, inside, false)) << "nobody knows where the fence is";
 }
 
@@ -224,6 +226,19 @@ TEST(ControlNode, CutsTheMotorsInTheAirWhenTheFlightIsOverAndForGood) {
   for (int i = 0; i < 20; ++i) bench.SendPose(t += 5000);
   EXPECT_EQ(int{bench.out.back().motors}, int{attitude_setpoint_t::MOTORS_OFF});
   EXPECT_EQ(bench.tracking.back().reason, "the flight is over: motors off");
+}
+
+// As of a recording that somebody plays.
+TEST(ControlNode, HearsNoFlightStateThatIsTooOld) {
+  Bench bench;
+  bench.SendPlan(kStart, {0, 0, 0});
+  bench.SendPose(kStart);
+  bench.SendState(flight_state_t::DONE, "mission", {}, 2100000);
+  bench.SendPose(kStart + 5000);
+  EXPECT_EQ(int{bench.out.back().motors}, int{attitude_setpoint_t::MOTORS_ON});
+  bench.SendState(flight_state_t::DONE, "mission", {}, 1900000);
+  bench.SendPose(kStart + 10000);
+  EXPECT_EQ(int{bench.out.back().motors}, int{attitude_setpoint_t::MOTORS_OFF});
 }
 
 TEST(ControlNode, AnswersEveryPoseWithItsOwnStamp) {
