@@ -47,13 +47,12 @@ void CameraNode::TickRecording(int64_t utime) {
 }
 
 void CameraNode::TickDevice() {
-  if (last_arrival_ == 0) last_arrival_ = bus_.Now();  // silent since the start
+  if (last_picture_ == 0) last_picture_ = bus_.Now();  // silent since the start
   if (const auto grabbed = grabber_->Take()) TakeFrame(*grabbed);
   if (const std::string problem = grabber_->Problem(); !problem.empty()) bus_.ReportError(problem);
 }
 
 void CameraNode::TakeFrame(const Grabber::Grabbed& grabbed) {
-  last_arrival_ = bus_.Now();
   const int64_t utime = CaptureTime(grabbed);
   const auto period = static_cast<int64_t>(1e6 / config_.rate_hz);
   if (frames_ > 0 && utime <= last_utime_) {
@@ -66,7 +65,6 @@ void CameraNode::TakeFrame(const Grabber::Grabbed& grabbed) {
     return;
   }
   Publish(grabbed.frame, utime);
-  age_ = bus::Seconds(bus_.Now(), utime);
 }
 
 /// The middle of the exposure, on the bus's clock.
@@ -92,7 +90,10 @@ int64_t CameraNode::CaptureTime(const Grabber::Grabbed& grabbed) {
 void CameraNode::Publish(const Frame& frame, int64_t utime) {
   auto timer = bus_.Time("convert");
   const cv::Mat rgb = ToRgb(frame.bgr, config_.width_px, config_.height_px);
-  if (rgb.empty()) return;
+  if (rgb.empty()) {
+    ++unusable_;
+    return;
+  }
   camera_image_t m{};
   m.utime = utime;
   m.width = rgb.cols;
@@ -110,12 +111,14 @@ void CameraNode::Publish(const Frame& frame, int64_t utime) {
   m.size = static_cast<int32_t>(m.data.size());
   bus_.Publish("CAMERA_IMAGE", std::move(m));
   last_utime_ = utime;
+  last_picture_ = bus_.Now();
+  age_ = bus::Seconds(last_picture_, utime);
   ++frames_;
 }
 
-/// s since the last frame came.
+/// s since the last picture was published.
 double CameraNode::Silence() const {
-  return last_arrival_ == 0 ? 0.0 : bus::Seconds(bus_.Now(), last_arrival_);
+  return last_picture_ == 0 ? 0.0 : bus::Seconds(bus_.Now(), last_picture_);
 }
 
 std::string CameraNode::StampWords() const {
@@ -140,18 +143,20 @@ bus::NodeReport CameraNode::Report() const {
   }
   const double silence = Silence();
   const std::string why = grabber_->Problem();
+  const long undecodable = grabber_->undecodable() + unusable_;
   if (frames_ == 0 && silence < 10.0)
     return {State::kStarting, "no frame yet" + (why.empty() ? "" : "; " + why)};
   if (silence > std::max(kSilent, 3.0 / config_.rate_hz))
     return {State::kFailed,
-            fmt::format("{}: no frame for {:.1f} s{}; check the cable", config_.source, silence,
-                        why.empty() ? "" : " (" + why + ")")};
+            fmt::format("{}: no frame for {:.1f} s{}, {} undecodable; check the cable",
+                        config_.source, silence, why.empty() ? "" : " (" + why + ")", undecodable)};
   const bool off =
       stamps_ != StampClock::kStream && stamps_ != StampClock::kNone && !clock_.believed();
-  return {
-      off ? State::kDegraded : State::kOk,
-      fmt::format("{} frames, {} dropped, {} beyond the rate, {} out of order, {:.0f} ms old; {}",
-                  frames_, grabber_->dropped(), surplus_, backwards_, 1e3 * age_, StampWords())};
+  return {off ? State::kDegraded : State::kOk,
+          fmt::format("{} frames, {} dropped, {} undecodable, {} beyond the rate, {} out of order, "
+                      "{:.0f} ms old; {}",
+                      frames_, grabber_->dropped(), undecodable, surplus_, backwards_, 1e3 * age_,
+                      StampWords())};
 }
 
 }  // namespace chase::camera

@@ -38,9 +38,9 @@ class CameraNode : public bus::Node {
   std::unique_ptr<Grabber> grabber_;
   CaptureClock clock_;
   StampClock stamps_ = StampClock::kNone;
-  int64_t last_utime_ = 0, last_arrival_ = 0;  // bus's clock
+  int64_t last_utime_ = 0, last_picture_ = 0;  // bus's clock
   double age_ = 0.0;                           // of the last frame when published, s
-  long frames_ = 0, surplus_ = 0, backwards_ = 0;
+  long frames_ = 0, unusable_ = 0, surplus_ = 0, backwards_ = 0;
   bool done_ = false;
 };
 

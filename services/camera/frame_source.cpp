@@ -4,9 +4,11 @@
 #include <cmath>
 #include <cstdlib>
 #include <filesystem>
+#include <functional>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/videoio.hpp>
 #include <stdexcept>
+#include <utility>
 #include <vector>
 
 #include "services/camera/mjpeg_source.h"
@@ -36,12 +38,14 @@ class FolderSource : public FrameSource {
 
 class VideoSource : public FrameSource {
  public:
+  using Open = std::function<cv::VideoCapture()>;  ///< throws std::runtime_error
+
   /// `clock`: of CAP_PROP_POS_MSEC, where the backend says with it when a frame was captured.
-  VideoSource(const cv::VideoCapture& capture, bool recording, StampClock clock)
-      : capture_(capture), recording_(recording), clock_(clock) {}
+  VideoSource(Open open, bool recording, StampClock clock)
+      : open_(std::move(open)), capture_(open_()), recording_(recording), clock_(clock) {}
   std::optional<Frame> Next() override {
     Frame frame;
-    if (!capture_.read(frame.bgr) || frame.bgr.empty()) return std::nullopt;
+    if (!Read(&frame.bgr)) return std::nullopt;
     if (clock_ == StampClock::kNone) return frame;
     frame.stamp = std::llround(1e3 * capture_.get(cv::CAP_PROP_POS_MSEC));
     if (frame.stamp > 0) frame.clock = clock_;
@@ -50,11 +54,31 @@ class VideoSource : public FrameSource {
     return frame;
   }
   bool IsRecording() const override { return recording_; }
+  std::string Problem() const override { return problem_; }
 
  private:
+  /// A device or stream that gives nothing is closed, and opened anew the next time.
+  bool Read(cv::Mat* bgr) {
+    try {
+      if (!recording_ && !capture_.isOpened()) capture_ = open_();
+    } catch (const std::runtime_error& error) {
+      problem_ = error.what();
+      return false;
+    }
+    if (capture_.read(*bgr) && !bgr->empty()) {
+      problem_.clear();
+      return true;
+    }
+    if (!recording_) capture_.release();
+    problem_ = "it has ended or gives no frame";
+    return false;
+  }
+
+  Open open_;
   cv::VideoCapture capture_;
   bool recording_;
   StampClock clock_;
+  std::string problem_;
 };
 
 std::unique_ptr<FrameSource> OpenFolder(const std::string& folder) {
@@ -68,7 +92,7 @@ std::unique_ptr<FrameSource> OpenFolder(const std::string& folder) {
   return std::make_unique<FolderSource>(std::move(files));
 }
 
-std::unique_ptr<FrameSource> OpenDevice(const std::string& device, double rate_hz) {
+cv::VideoCapture OpenDevice(const std::string& device, double rate_hz) {
   setenv("OPENCV_VIDEOIO_V4L_SELECT_TIMEOUT", "1", 0);  // s that a read may wait
   cv::VideoCapture capture(device, cv::CAP_V4L2);
   if (!capture.isOpened())
@@ -77,25 +101,32 @@ std::unique_ptr<FrameSource> OpenDevice(const std::string& device, double rate_h
                              "other program holds it and that you are in the group video");
   capture.set(cv::CAP_PROP_BUFFERSIZE, 1);
   capture.set(cv::CAP_PROP_FPS, rate_hz);
-  return std::make_unique<VideoSource>(std::move(capture), false, StampClock::kMonotonic);
+  return capture;
 }
 
-std::unique_ptr<FrameSource> OpenPipeline(const std::string& pipeline) {
+cv::VideoCapture OpenPipeline(const std::string& pipeline) {
   cv::VideoCapture capture(pipeline, cv::CAP_GSTREAMER);
   if (!capture.isOpened())
     throw std::runtime_error("gst:" + pipeline +
                              ": GStreamer cannot play this; try it with gst-launch-1.0, and end it "
                              "in appsink max-buffers=1 drop=true");
-  return std::make_unique<VideoSource>(std::move(capture), false, StampClock::kStream);
+  return capture;
 }
 
-std::unique_ptr<FrameSource> OpenStream(const std::string& url) {
+cv::VideoCapture OpenStream(const std::string& url) {
   const std::vector<int> patience = {cv::CAP_PROP_OPEN_TIMEOUT_MSEC, 5000,
                                      cv::CAP_PROP_READ_TIMEOUT_MSEC, 1000};
   cv::VideoCapture capture(url, cv::CAP_FFMPEG, patience);
   if (!capture.isOpened())
     throw std::runtime_error(url + ": no stream that OpenCV can read; try it with ffplay");
-  return std::make_unique<VideoSource>(std::move(capture), false, StampClock::kStream);
+  return capture;
+}
+
+cv::VideoCapture OpenFile(const std::string& file) {
+  cv::VideoCapture capture(file, cv::CAP_FFMPEG);
+  if (!capture.isOpened())
+    throw std::runtime_error(file + ": no video that OpenCV can read; convert it to MP4 or AVI");
+  return capture;
 }
 
 bool BeginsWith(const std::string& text, const char* head) { return text.rfind(head, 0) == 0; }
@@ -104,17 +135,21 @@ bool BeginsWith(const std::string& text, const char* head) { return text.rfind(h
 
 std::unique_ptr<FrameSource> OpenFrameSource(const std::string& source, double rate_hz) {
   if (BeginsWith(source, "http://")) return OpenMjpegSource(source);
-  if (BeginsWith(source, "gst:")) return OpenPipeline(source.substr(4));
-  if (source.find("://") != std::string::npos) return OpenStream(source);
+  const auto live = [](VideoSource::Open open, StampClock clock) {
+    return std::make_unique<VideoSource>(std::move(open), false, clock);
+  };
+  if (BeginsWith(source, "gst:"))
+    return live([source] { return OpenPipeline(source.substr(4)); }, StampClock::kStream);
+  if (source.find("://") != std::string::npos)
+    return live([source] { return OpenStream(source); }, StampClock::kStream);
   const auto status = fs::status(source);
   if (!fs::exists(status))
     throw std::runtime_error(source + ": no such device, file or folder; set source");
   if (fs::is_directory(status)) return OpenFolder(source);
-  if (fs::is_character_file(status)) return OpenDevice(source, rate_hz);
-  cv::VideoCapture capture(source, cv::CAP_FFMPEG);
-  if (!capture.isOpened())
-    throw std::runtime_error(source + ": no video that OpenCV can read; convert it to MP4 or AVI");
-  return std::make_unique<VideoSource>(std::move(capture), true, StampClock::kNone);
+  if (fs::is_character_file(status))
+    return live([source, rate_hz] { return OpenDevice(source, rate_hz); }, StampClock::kMonotonic);
+  return std::make_unique<VideoSource>([source] { return OpenFile(source); }, true,
+                                       StampClock::kNone);
 }
 
 }  // namespace chase::camera

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <condition_variable>
 #include <cstdint>
 #include <memory>
 #include <mutex>
@@ -12,7 +13,8 @@
 namespace chase::camera {
 
 /// Reads a device in a thread of its own, so that a frame's arrival is its own and not that of
-/// whoever fetches it. Of frames that nobody has fetched the newest is kept.
+/// whoever fetches it. Of frames that nobody has fetched the newest is kept. A source that gives
+/// nothing or throws is asked again after a fifth of a second.
 class Grabber {
  public:
   struct Grabbed {
@@ -29,16 +31,21 @@ class Grabber {
   std::optional<Grabbed> Take();
   /// Frames that were read and never fetched.
   long dropped() const;
+  /// Frames that were no picture, or over which the source threw.
+  long undecodable() const;
+  /// Of the last frame; empty: none.
   std::string Problem() const;
 
  private:
   void Run();
+  void Accept(Frame frame, int64_t arrival);
 
   std::unique_ptr<FrameSource> source_;
   mutable std::mutex mutex_;
+  std::condition_variable stopped_;
   std::optional<Grabbed> newest_;
   std::string problem_;
-  long dropped_ = 0;
+  long dropped_ = 0, undecodable_ = 0;
   bool stop_ = false;
   std::thread thread_;
 };

@@ -1,20 +1,20 @@
 #include "services/camera/mjpeg_source.h"
 
+#include <fmt/format.h>
 #include <netdb.h>
 #include <poll.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
-#include <cerrno>
+#include <chrono>
 #include <cmath>
 #include <cstdlib>
-#include <cstring>
 #include <deque>
 #include <opencv2/imgcodecs.hpp>
 #include <regex>
 #include <stdexcept>
-#include <thread>
 
+#include "services/camera/connect.h"
 #include "services/camera/multipart.h"
 
 namespace chase::camera {
@@ -43,17 +43,15 @@ class MjpegSource : public FrameSource {
   ~MjpegSource() override { Close(); }
 
   std::optional<Frame> Next() override {
+    const auto until = std::chrono::steady_clock::now() + std::chrono::milliseconds(kPatienceMs);
     while (waiting_.empty()) {
-      if (fd_ < 0 && !Connect()) {
-        std::this_thread::sleep_for(std::chrono::milliseconds(kPatienceMs / 4));
-        return std::nullopt;
-      }
-      if (!Read()) return std::nullopt;
+      if (fd_ < 0 && !Connect()) return std::nullopt;
+      if (!Read() || std::chrono::steady_clock::now() > until) return std::nullopt;
     }
     const Part part = std::move(waiting_.front());
     waiting_.pop_front();
     Frame frame;
-    frame.bgr = cv::imdecode(part.body, cv::IMREAD_COLOR);
+    if (!part.body.empty()) frame.bgr = cv::imdecode(part.body, cv::IMREAD_COLOR);
     const auto stamp = part.headers.find("x-timestamp");
     const double seconds =
         stamp != part.headers.end() ? std::strtod(stamp->second.c_str(), nullptr) : 0.0;
@@ -72,22 +70,22 @@ class MjpegSource : public FrameSource {
     hints.ai_socktype = SOCK_STREAM;
     if (getaddrinfo(address_.host.c_str(), address_.port.c_str(), &hints, &found) != 0)
       return Fail("no such host");
-    fd_ = socket(found->ai_family, SOCK_STREAM | SOCK_CLOEXEC, 0);
-    const timeval patience{kPatienceMs / 1000, 0};  // of connecting as well
-    setsockopt(fd_, SOL_SOCKET, SO_SNDTIMEO, &patience, sizeof patience);
-    const bool connected = fd_ >= 0 && connect(fd_, found->ai_addr, found->ai_addrlen) == 0;
+    std::string why;
+    fd_ = ConnectToAny(found, kPatienceMs, &why);
     freeaddrinfo(found);
-    if (!connected) return Fail(std::strerror(errno));
+    if (fd_ < 0) return Fail(why);
     reader_ = {};
     const std::string request =
         "GET " + address_.path + " HTTP/1.0\r\nHost: " + address_.host + "\r\n\r\n";
     return send(fd_, request.data(), request.size(), MSG_NOSIGNAL) > 0 || Fail("it has gone");
   }
 
-  /// Takes in what has come, after a second at most; false: nothing.
+  /// Takes in what has come; false: nothing, and after a second without a byte it hangs up.
   bool Read() {
     pollfd ready{fd_, POLLIN, 0};
-    if (poll(&ready, 1, kPatienceMs) <= 0) return false;
+    const int polled = poll(&ready, 1, kPatienceMs);
+    if (polled == 0) return Fail(fmt::format("no byte for {} ms", kPatienceMs));
+    if (polled < 0) return false;
     uint8_t buffer[kBufferBytes];
     const ssize_t size = recv(fd_, buffer, sizeof buffer, 0);
     if (size <= 0) return Fail("the stream has ended");
