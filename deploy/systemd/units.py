@@ -3,6 +3,7 @@
 OUT/chase-NAME.service for each process that a vehicle has."""
 
 import pathlib
+import shutil
 import sys
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "launcher"))
@@ -71,7 +72,8 @@ def main():
         return 1
     table, out = map(pathlib.Path, sys.argv[1:])
     rows = [row for row in processes.read_table(table.read_bytes(), table.name) if row["vehicle"]]
-    out.mkdir(parents=True, exist_ok=True)
+    shutil.rmtree(out, ignore_errors=True)  # units of rows that are gone
+    out.mkdir(parents=True)
     for row in rows:
         text = SERVICE.format(**row, url=bus.DEFAULT_URL, scheduling=scheduling(row))
         (out / f"chase-{row['name']}.service").write_text(text, encoding="utf-8")

@@ -12,6 +12,7 @@ namespace {
 
 constexpr int64_t kIdle = 500'000;       // us without a message after which the peer is told of us
 constexpr int64_t kSilence = 3'000'000;  // us after which the peer is gone
+constexpr int kMostTaken = 500;          // packets a tick, so that a flood does not hold it
 constexpr char kCommand[] = "COMMAND";
 
 const LinkConfig& Checked(const LinkConfig& config) {
@@ -23,7 +24,8 @@ const LinkConfig& Checked(const LinkConfig& config) {
 }  // namespace
 
 bool Leaves(const std::string& channel, bool vehicle) {
-  return vehicle ? channel != kCommand && !bus::IsHeavy(channel) : channel == kCommand;
+  if (!vehicle) return channel == kCommand;
+  return channel != kCommand && channel != bus::StatusChannel("link") && !bus::IsHeavy(channel);
 }
 
 LinkNode::LinkNode(bus::Bus& bus, const LinkConfig& config)
@@ -59,7 +61,9 @@ void LinkNode::Tick(int64_t /*utime*/) {
 }
 
 void LinkNode::TakeIn() {
-  while (auto packet = socket_.Next()) {
+  for (int i = 0; i < kMostTaken; ++i) {
+    const auto packet = socket_.Next();
+    if (!packet) return;
     const auto size =
         seal_.Open(config_.is_vehicle() ? "ground" : "vehicle", packet->data(), packet->size());
     std::vector<Message> messages;

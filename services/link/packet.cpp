@@ -131,6 +131,13 @@ struct Unpacker::Record {
   const uint8_t* data = nullptr;
   size_t size = 0;
 
+  /// Is a part as long as the sender makes it? Nothing else may be added up.
+  static bool Fits(uint16_t part, uint16_t parts, uint16_t size) {
+    if (parts == 1) return size <= Packer::kMostBytes;
+    if (part == parts) return size == 2 + Packer::kPartBytes;
+    return part + 1 == parts ? size >= 1 && size <= Packer::kPartBytes : size == Packer::kPartBytes;
+  }
+
   static std::optional<Record> From(Reader* reader) {
     Record r;
     uint8_t name = 0;
@@ -141,7 +148,8 @@ struct Unpacker::Record {
     const uint8_t* text = reader->Skip(name);
     r.data = text == nullptr ? nullptr : reader->Skip(size);
     if (r.data == nullptr || name == 0 || name > kMostName || r.parts == 0 || r.part > r.parts ||
-        (r.parts == 1 && r.part > 0) || r.parts > Packer::kMostParts)
+        (r.parts == 1 && r.part > 0) || r.parts > Packer::kMostParts ||
+        !Fits(r.part, r.parts, size))
       return std::nullopt;
     r.channel.assign(reinterpret_cast<const char*>(text), name);
     r.size = size;
@@ -179,10 +187,15 @@ bool Unpacker::Follows(int64_t session, uint32_t number) {
   }
   if (number >= next_) {
     lost_ += number - next_;
+    const int64_t first = std::max<int64_t>(next_, int64_t{number} - kLateWindow);
+    for (int64_t n = first; n < number; ++n) missing_.insert(n);
     next_ = number + 1;
-  } else if (lost_ > 0) {
+  } else if (missing_.erase(number) == 0) {
+    return true;  // once more
+  } else {
     --lost_;  // it was only late
   }
+  missing_.erase(missing_.begin(), missing_.lower_bound(int64_t{next_} - kLateWindow));
   ++packets_;
   return true;
 }

@@ -75,6 +75,7 @@ class Unpacker {
   int64_t session_ = 0;
   uint32_t next_ = 0;
   int64_t packets_ = 0, lost_ = 0;
+  std::set<int64_t> missing_;  // that may still come
   std::map<uint32_t, Open> open_;
   std::set<uint32_t> done_;
   std::deque<uint32_t> done_order_;

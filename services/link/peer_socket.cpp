@@ -61,8 +61,8 @@ std::optional<std::vector<uint8_t>> PeerSocket::Next() {
     const ssize_t size = recvfrom(fd_, buffer.data(), buffer.size(), 0,
                                   reinterpret_cast<sockaddr*>(&last_), &length);
     if (size < 0) {
-      if (errno == EAGAIN || errno == EWOULDBLOCK) return std::nullopt;
-      continue;  // an error that came back for what we sent
+      if (errno == EINTR || errno == ECONNREFUSED) continue;  // came back for what we sent
+      return std::nullopt;
     }
     if (!named_ || last_.sin_addr.s_addr == peer_->sin_addr.s_addr)
       return std::vector<uint8_t>(buffer.begin(), buffer.begin() + size);

@@ -124,6 +124,74 @@ TEST(Packet, CutPacketsAreRefusedWhole) {
   }
 }
 
+/// A packet of one record, as packet.h has it.
+Bytes OneRecord(uint32_t number, uint32_t message, uint16_t part, uint16_t parts,
+                const Bytes& bytes) {
+  Bytes packet = {'C', 'H', 'L', '1'};
+  const auto put = [&packet](uint64_t value, int size) {
+    for (int i = size - 1; i >= 0; --i) packet.push_back(static_cast<uint8_t>(value >> (8 * i)));
+  };
+  put(7, 8);
+  put(number, 4);
+  put(message, 4);
+  put(part, 2);
+  put(parts, 2);
+  put(1, 1);
+  put(bytes.size(), 2);
+  packet.push_back('A');
+  packet.insert(packet.end(), bytes.begin(), bytes.end());
+  return packet;
+}
+
+TEST(Packet, PartsOfAnotherSizeThanTheirsAreRefused) {
+  struct Case {
+    uint16_t part, parts;
+    size_t least, most;
+  };
+  const size_t whole = Packer::kPartBytes;
+  for (const Case& c :
+       {Case{0, 1, 0, Packer::kMostBytes}, Case{0, 3, whole, whole}, Case{1, 3, whole, whole},
+        Case{2, 3, 1, whole}, Case{3, 3, 2 + whole, 2 + whole}}) {
+    for (const size_t size : {size_t{0}, size_t{1}, whole - 1, whole, whole + 1, whole + 2,
+                              whole + 3, size_t{65'535}}) {
+      Unpacker unpacker;
+      std::vector<Message> came;
+      const Bytes packet = OneRecord(1, 1, c.part, c.parts, Bytes(size, 0x55));
+      EXPECT_EQ(unpacker.Take(packet.data(), packet.size(), &came),
+                size >= c.least && size <= c.most)
+          << "part " << c.part << " of " << c.parts << ", " << size << " bytes";
+    }
+  }
+}
+
+TEST(Packet, AnOversizedPartIsNotAddedToTheLostOne) {
+  Unpacker unpacker;
+  std::vector<Message> came;
+  const Bytes parity(2 + Packer::kPartBytes, 1);
+  for (const Bytes& packet :
+       {OneRecord(1, 1, 0, 2, Bytes(60'000, 0x55)), OneRecord(2, 1, 2, 2, parity)})
+    unpacker.Take(packet.data(), packet.size(), &came);
+  EXPECT_TRUE(came.empty());
+}
+
+TEST(Packet, ALostPacketIsCountedAlthoughItsNeighbourCameTwice) {
+  Unpacker unpacker;
+  std::vector<Message> came;
+  const auto take = [&](uint32_t number) {
+    const Bytes packet = OneRecord(number, number, 0, 1, {1});
+    EXPECT_TRUE(unpacker.Take(packet.data(), packet.size(), &came));
+  };
+  take(1);
+  take(4);  // 2 and 3 are missing
+  for (int i = 0; i < 5; ++i) take(1);
+  EXPECT_EQ(unpacker.lost(), 2);
+  take(2);
+  EXPECT_EQ(unpacker.lost(), 1);
+  take(2);
+  EXPECT_EQ(unpacker.lost(), 1);
+  EXPECT_EQ(unpacker.packets(), 3);
+}
+
 TEST(Packet, WhatIsTooLargeIsNotTaken) {
   Packer packer(1);
   const Bytes huge(300'000);
@@ -164,6 +232,7 @@ TEST(Link, HeavyMessagesStayAndOnlyCommandsComeBack) {
     EXPECT_FALSE(Leaves(channel, true)) << channel;
     EXPECT_FALSE(Leaves(channel, false)) << channel;
   }
+  EXPECT_FALSE(Leaves("LINK_STATUS", true)) << "the ground has a link of its own";
   EXPECT_FALSE(Leaves("COMMAND", true));
   EXPECT_TRUE(Leaves("COMMAND", false));
 }
