@@ -64,6 +64,7 @@ void LinkNode::TakeIn() {
   for (int i = 0; i < kMostTaken; ++i) {
     const auto packet = socket_.Next();
     if (!packet) return;
+    if (packet->empty()) continue;
     const auto size =
         seal_.Open(config_.is_vehicle() ? "ground" : "vehicle", packet->data(), packet->size());
     std::vector<Message> messages;

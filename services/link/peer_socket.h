@@ -19,7 +19,8 @@ class PeerSocket {
   PeerSocket& operator=(const PeerSocket&) = delete;
   ~PeerSocket();
 
-  /// The next datagram that is there. What does not come from a named peer's address is left out.
+  /// The next datagram that is there. Empty where it does not come from a named
+  /// peer's address.
   std::optional<std::vector<uint8_t>> Next();
   /// Where no peer is named, the sender of the last datagram is it from now on.
   void Trust();
