@@ -23,7 +23,8 @@ bool IsWithin(const std::vector<Eigen::Vector2d>& polygon, const Eigen::Vector2d
 double ToEdges(const std::vector<Eigen::Vector2d>& polygon, const Eigen::Vector2d& p) {
   double least = HUGE_VAL;
   for (size_t i = 0; i < polygon.size(); ++i) {
-    const Eigen::Vector2d a = polygon[i], ab = polygon[(i + 1) % polygon.size()] - a;
+    const Eigen::Vector2d& a = polygon[i];
+    const Eigen::Vector2d ab = polygon[(i + 1) % polygon.size()] - a;
     const double along = std::clamp((p - a).dot(ab) / std::max(ab.squaredNorm(), 1e-12), 0.0, 1.0);
     least = std::min(least, (p - a - along * ab).norm());
   }

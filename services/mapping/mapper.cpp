@@ -274,8 +274,9 @@ std::vector<world::Obstacle> Mapper::Unseen(const Eigen::Vector3d& origin, doubl
       const auto piece = unseen_pieces_.find({x, y});
       Cell cell{
           x, y, piece == unseen_pieces_.end() ? 0 : piece->second, {}, resolution * resolution};
-      for (const int corner : {0, 1, 2, 3})
-        cell.corners.emplace_back(resolution * (x + corner % 2), resolution * (y + corner / 2));
+      for (const int i : {0, 1})
+        for (const int j : {0, 1})
+          cell.corners.emplace_back(resolution * (x + i), resolution * (y + j));
       cells.push_back(std::move(cell));
     }
   }
