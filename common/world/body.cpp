@@ -30,22 +30,41 @@ Matrix3d InverseAbove(const Matrix3d& given) {
 
 Body MakeBody(const Obstacle& obstacle, double start, double duration, double sigmas) {
   Body body;
-  body.center = obstacle.center.Reparametrised(start, duration).coefficients;
   body.kind = obstacle.solid;
-  body.half = obstacle.half;
   if (body.kind == Body::Kind::kEllipsoid)
     body.shape = InverseAbove(obstacle.shape);
   else
     body.shape = obstacle.axes.toRotationMatrix();
-  if (obstacle.position_covariance.isZero(0.0) && obstacle.velocity_covariance.isZero(0.0))
-    return body;
+  Retime(obstacle, start, duration, sigmas, &body);
+  return body;
+}
+
+void Retime(const Obstacle& obstacle, double start, double duration, double sigmas, Body* body) {
+  SetCurve(obstacle.center, start, duration, &body->center);
+  body->half = obstacle.half;
+  const bool known =
+      obstacle.position_covariance.isZero(0.0) && obstacle.velocity_covariance.isZero(0.0);
+  body->sigmas = known ? 0.0 : sigmas;
   // The age at tau is since + duration tau.
   const double since = start - obstacle.center.start;
-  body.sigmas = sigmas;
-  body.covariance[0] = obstacle.position_covariance + since * since * obstacle.velocity_covariance;
-  body.covariance[1] = 2.0 * since * duration * obstacle.velocity_covariance;
-  body.covariance[2] = duration * duration * obstacle.velocity_covariance;
-  return body;
+  body->covariance[0] = obstacle.position_covariance + since * since * obstacle.velocity_covariance;
+  body->covariance[1] = 2.0 * since * duration * obstacle.velocity_covariance;
+  body->covariance[2] = duration * duration * obstacle.velocity_covariance;
+}
+
+void SetCurve(const Trajectory& trajectory, double start, double duration, Curve* curve) {
+  const double a = (start - trajectory.start) / trajectory.duration;
+  const double b = duration / trajectory.duration;
+  *curve = trajectory.coefficients;
+  if (curve->rows() == 1 || (a == 0.0 && b == 1.0)) return;
+  // tau = a + b sigma: sum_k c_k (a + b sigma)^k by Horner's rule on polynomials.
+  Curve& c = *curve;
+  c.setZero();
+  const Eigen::Index n = c.rows() - 1;
+  for (Eigen::Index k = n; k >= 0; --k) {
+    for (Eigen::Index i = n; i > 0; --i) c.row(i) = a * c.row(i) + b * c.row(i - 1);
+    c.row(0) = a * c.row(0) + trajectory.coefficients.row(k);
+  }
 }
 
 Vector3d SupportPoint(const Body& body, const Vector3d& n) {

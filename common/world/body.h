@@ -40,6 +40,11 @@ struct Ball {
 /// unknown constant velocity since center.start. NaN where R is not positive definite or its
 /// inverse is no inverse.
 Body MakeBody(const Obstacle& obstacle, double start, double duration, double sigmas);
+/// The same over another time, for a body that was made of an ellipsoid of the same shape.
+void Retime(const Obstacle& obstacle, double start, double duration, double sigmas, Body* body);
+
+/// `trajectory` over [start, start + duration] in normalised time.
+void SetCurve(const Trajectory& trajectory, double start, double duration, Curve* curve);
 
 /// A point of the solid about the origin, without its uncertainty, where n' x is greatest; n is not
 /// zero.

@@ -34,6 +34,18 @@ Controls ToBernstein(const Controls& power) {
   return c;
 }
 
+/// The mean over [from, to].
+Vector3d MeanOf(const Curve& curve, double from, double to) {
+  Vector3d sum = curve.row(0).transpose();
+  double before = from, after = to;  // powers
+  for (Eigen::Index k = 1; k < curve.rows(); ++k) {
+    before *= from;
+    after *= to;
+    sum += (after - before) / ((to - from) * static_cast<double>(k + 1)) * curve.row(k).transpose();
+  }
+  return sum;
+}
+
 /// Cuts at t: returns the part before and leaves the part after in `rest`.
 Controls CutOff(double t, Controls* rest) {
   Controls part = *rest;
@@ -58,10 +70,12 @@ class Prover {
   enum class Answer { kPlane, kOverlap, kOpen };
 
   int Columns() const;
+  Vector3d Between(double from, double to) const;
   Controls MakeControls(int columns) const;
   Vector3d Lowest(const Controls& c, double radius, const Vector3d& n) const;
   double LeastRadius(const Controls& c) const;
   Answer FindPlane(const Controls& c, double tolerance, Separation* s) const;
+  bool Keeps(const Separation& s);
   bool Descend(const Controls& c, Separation s, int depth);
   bool Stop(Kept kept, double tau);
 
@@ -87,6 +101,21 @@ Controls Prover::MakeControls(int columns) const {
       power.col(k).tail<9>() =
           Eigen::Map<const Eigen::Matrix<double, 9, 1>>(body_.covariance[k].data());
   return ToBernstein(power);
+}
+
+/// Of unit length, from the mean of the body's centre to the nearest point between the means of the
+/// balls' centres.
+Vector3d Prover::Between(double from, double to) const {
+  Vector3d n = MeanOf(drone_.center, from, to);
+  if (target_) {
+    const Vector3d along = MeanOf(target_->center, from, to) - n;
+    const Vector3d body = MeanOf(body_.center, from, to) - n;
+    const double length = along.squaredNorm();
+    if (length > 0.0) n += std::clamp(along.dot(body) / length, 0.0, 1.0) * along;
+  }
+  n -= MeanOf(body_.center, from, to);
+  const double distance = n.norm();
+  return distance > 0.0 ? Vector3d(n / distance) : Vector3d::UnitX();
 }
 
 double Prover::LeastRadius(const Controls& c) const {
@@ -143,12 +172,18 @@ bool Prover::Stop(Kept kept, double tau) {
   return false;
 }
 
+/// The separation, if it holds.
+bool Prover::Keeps(const Separation& s) {
+  const double room = ProvenRoom(s, drone_, target_, body_);
+  if (!(room >= 0.0)) return false;
+  result_.room = result_.certificate.empty() ? room : std::min(result_.room, room);
+  result_.certificate.push_back(s);
+  return true;
+}
+
 /// `s`: the interval, and the normal to start from.
 bool Prover::Descend(const Controls& c, Separation s, int depth) {
-  if (FindPlane(c, kSlack, &s) == Answer::kPlane && ProvenRoom(s, drone_, target_, body_) >= 0.0) {
-    result_.certificate.push_back(s);
-    return true;
-  }
+  if (FindPlane(c, kSlack, &s) == Answer::kPlane && Keeps(s)) return true;
   const double middle = 0.5 * (s.from + s.to);
   Controls right = c, point(17, 1);
   const Controls left = CutOff(0.5, &right);
@@ -164,13 +199,15 @@ SeparationResult Prover::Prove(double from, double to) {
   const int columns = Columns();
   if (columns > 16 || !(from >= 0.0 && from < to && to <= 1.0)) return result_;
   if (!(body_.sigmas >= 0.0)) return result_;
+  Separation s{from, to, Between(from, to)};
+  if (Keeps(s)) {
+    result_.kept = Kept::kOff;
+    return result_;
+  }
   Controls c = MakeControls(columns);
   if (!c.allFinite()) return result_;
   if (to < 1.0) c = CutOff(to, &c);
   if (from > 0.0) CutOff(from / to, &c);
-  const Vector3d start = c.topRows<3>().rowwise().mean();
-  const double distance = start.norm();
-  Separation s{from, to, distance > 0.0 ? Vector3d(start / distance) : Vector3d::UnitX()};
   if (Descend(c, s, kDepth)) result_.kept = Kept::kOff;
   return result_;
 }

@@ -64,13 +64,13 @@ void AddSolid(const Body& body, const Vector3d& n, Form* form) {
 /// tight where m = sqrt(x).
 void AddUncertainty(const Separation& s, const Body& body, Form* form) {
   if (body.sigmas == 0.0) return;
-  const double m = std::max(kLeastDeviation, Deviation(body, s.normal, 0.5 * (s.from + s.to)));
+  double squared[3], magnitude[3];
+  for (int k = 0; k < 3; ++k) squared[k] = Quadratic(body.covariance[k], s.normal, &magnitude[k]);
+  const double tau = 0.5 * (s.from + s.to);
+  const double variance = (squared[2] * tau + squared[1]) * tau + squared[0];
+  const double m = std::max(kLeastDeviation, std::sqrt(std::max(0.0, variance)));
   const double half = 0.5 * body.sigmas;
-  for (int k = 0; k < 3; ++k) {
-    double magnitude = 0.0;
-    const double squared = Quadratic(body.covariance[k], s.normal, &magnitude);
-    form->Add(k, -half * squared / m, half * magnitude / m);
-  }
+  for (int k = 0; k < 3; ++k) form->Add(k, -half * squared[k] / m, half * magnitude[k] / m);
   form->Add(0, -half * m, half * m);
 }
 

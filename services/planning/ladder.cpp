@@ -79,7 +79,7 @@ class Ladder : public Planner {
     return v == Verdict::kChase || v == Verdict::kWider || v == Verdict::kKept;
   }
   // The proofs of a plan for whoever flies it, and its way out; false where it has none.
-  bool Certify(const PlanRequest& request, PlanResult* result) const {
+  bool Certify(const PlanRequest& request, PlanResult* result) {
     const auto& obstacles = used_->obstacles;
     const bool asked =
         used_->target_body || std::any_of(obstacles.begin(), obstacles.end(),
@@ -87,7 +87,7 @@ class Ladder : public Planner {
     if (!asked && !obstacles.empty()) return true;
     auto proofs = ProveOff(Curve(result->trajectory.coefficients), *used_, sight_from_);
     if (!proofs) return false;
-    auto stop = WayOut(config_, request, result->trajectory);
+    auto stop = WayOut(config_, request, result->trajectory, &stopping_);
     if (!stop) return false;
     SetProofs(config_, request, std::move(*proofs), result);
     result->stop = std::move(stop->trajectory);
@@ -344,7 +344,8 @@ class Ladder : public Planner {
   TableShelf shelf_;
   Refiner refiner_;
   PlanProof proof_;
-  Problem problem_, shorter_;      ///< over the whole horizon, over a part of it
+  Problem problem_, shorter_;  ///< over the whole horizon, over a part of it
+  Problem stopping_;
   PlanRequest part_;               ///< what shorter_ was made from
   const Problem* used_ = nullptr;  ///< of the two, the one whose plan is taken
   double sight_from_ = 0.0;        ///< of that plan

@@ -113,27 +113,43 @@ struct Growth {
 
 // Boxes around the Minkowski sums: half the sides of the solid's, and what it is grown by at most.
 void SetBoxes(const world::Obstacle& o, const Growth& most, Ellipsoid* e) {
-  Eigen::Array3d half = HalfSidesOf(o.shape);
+  Eigen::Array3d half = o.half.array();
   if (o.solid == world::Obstacle::Solid::kBox)
     half = (o.axes.toRotationMatrix().cwiseAbs() * o.half).array();
-  else if (o.solid == world::Obstacle::Solid::kCylinder)
-    half = o.half.array();
+  else if (o.solid == world::Obstacle::Solid::kEllipsoid)
+    half = HalfSidesOf(o.shape);
   e->safety_half = half + most.safety;
   e->sight_half = half + most.sight;
 }
 
-// At no cost where the obstacle is what it was.
-void Grow(const world::Obstacle& o, const Growth& growth, Ellipsoid* e) {
-  if (e->grown_by[0] == growth.safety && e->grown_by[1] == growth.sight &&
-      IsSameShape(e->grown_from, o.shape))
+// What depends on the shape alone is kept where the obstacle is what it was. Without a search
+// nothing has to be grown that has a body.
+void SetShapes(const PlannerConfig& config, const PlanRequest& request, const world::Obstacle& o,
+               const Growth& growth, Ellipsoid* e) {
+  const bool same = IsSameShape(e->grown_from, o.shape);
+  e->grown_from = o.shape;
+  if (!config.minkowski_sums)
+    e->body.reset();
+  else if (same && e->body && e->body->kind == o.solid && o.solid == world::Body::Kind::kEllipsoid)
+    world::Retime(o, request.t0, request.horizon, config.sigmas, &*e->body);
+  else
+    e->body = world::MakeBody(o, request.t0, request.horizon, config.sigmas);
+  if (o.ground) {  // heights sort out candidates; no ellipsoid fits a slab
+    e->safety = e->sight = kPoint * Eigen::Matrix3d::Identity();
+    e->grown_by[0] = -1.0;
     return;
+  }
+  if (!request.asks_sight && e->body) {
+    e->grown_by[0] = -1.0;
+    return;
+  }
+  if (same && e->grown_by[0] == growth.safety && e->grown_by[1] == growth.sight) return;
   e->safety = e->sight = o.shape;
   if (growth.safety > 0.0 || growth.sight > 0.0) {
     const world::Inflation inflation(o.shape);
     if (growth.safety > 0.0) e->safety = inflation.By(growth.safety);
     if (growth.sight > 0.0) e->sight = inflation.By(growth.sight);
   }
-  e->grown_from = o.shape;
   e->grown_by[0] = growth.safety;
   e->grown_by[1] = growth.sight;
 }
@@ -195,16 +211,16 @@ void ClearStart(const world::Obstacle& o, double growth, const Curve& start, Ell
 
 // Takes the margin, never the hard radius, back until the start is outside.
 void RelaxSafety(const world::Obstacle& o, double hard, double margin, double uncertainty,
-                 Start* start, Ellipsoid* e, std::string* notes) {
+                 bool searched, Start* start, Ellipsoid* e, std::string* notes) {
   for (double share : kShares) {
     e->safety_radius = hard + share * margin;
-    if (share < 1.0 && !o.ground) {
+    if (share < 1.0 && searched) {
       e->safety = Grown(o, e->safety_radius + uncertainty);
       e->grown_by[0] = -1.0;
     }
     if (!start->IsSafe(*e, e->safety_radius)) continue;
     if (share < 1.0) Note(notes, "starts within the margin of obstacle " + std::to_string(e->id));
-    if (e->body && !o.ground) ClearStart(o, e->safety_radius + uncertainty, start->curve(), e);
+    if (e->body && searched) ClearStart(o, e->safety_radius + uncertainty, start->curve(), e);
     return;
   }
   e->safety_from = kLeaveBy;
@@ -311,7 +327,7 @@ void SetTargetBody(const world::Obstacle& o, double hard, Start* start, Problem*
                    std::string* notes) {
   Ellipsoid e;
   e.id = kTargetId;
-  e.body = BodyOf(o, *problem);
+  e.body = world::MakeBody(o, problem->t0, problem->duration, problem->sigmas);
   e.center = ToCurve(o.center, problem->t0, problem->duration);
   e.grown_from = o.shape;
   e.sight_from = 1.0;
@@ -395,24 +411,19 @@ void MakeProblem(const PlannerConfig& config, const PlanRequest& request, std::s
     e->sight_from = asks_sight ? 0.0 : 1.0;
     e->sight_share = 1.0;
     e->safety_radius = hard + margin;
-    SetCurve(o.center, request.t0, request.horizon, &e->center);
+    world::SetCurve(o.center, request.t0, request.horizon, &e->center);
     const double then = Uncertainty(o, *problem, 1.0), now = Uncertainty(o, *problem, 0.0);
     const Growth growth{hard + margin + 0.5 * (now + then), sight + 0.5 * (now + then)};
-    Grow(o, growth, e);
-    if (o.ground) {  // heights sort out candidates; no ellipsoid fits a slab
-      e->safety = e->sight = kPoint * Eigen::Matrix3d::Identity();
-      e->grown_by[0] = -1.0;
-    }
+    SetShapes(config, request, o, growth, e);
     const double most = std::max(now, then);
     const Growth widest{hard + margin + most,
                         config.sight_margin + problem->target_growth.sum() + most};
     SetBoxes(o, widest, e);
-    e->body.reset();
-    if (config.minkowski_sums) e->body = BodyOf(o, *problem);
-    if (e->body && !o.ground) ClearStart(o, hard + margin + 0.5 * (now + then), problem->start, e);
+    const bool searched = !o.ground && (request.asks_sight || !e->body);
+    if (e->body && searched) ClearStart(o, growth.safety, problem->start, e);
     // Far from start and target no margin has to give way.
     if (!MayTouch(own, e->center, e->safety_half.max(e->sight_half), kClear)) continue;
-    RelaxSafety(o, hard, margin, now, &start, e, notes);
+    RelaxSafety(o, hard, margin, now, searched, &start, e, notes);
     if (!asks_sight) continue;
     RelaxSight(o, growth, first, target, *problem, &start, e, notes);
   }
@@ -465,27 +476,9 @@ void WithRoom(const Problem& problem, double room, Enlargements* memory, Problem
   }
 }
 
-void SetCurve(const world::Trajectory& trajectory, double start, double duration, Curve* curve) {
-  if (trajectory.coefficients.rows() == 1 && curve->rows() == 1) {
-    curve->row(0) = trajectory.coefficients.row(0);
-    return;
-  }
-  const double a = (start - trajectory.start) / trajectory.duration;
-  const double b = duration / trajectory.duration;
-  *curve = trajectory.coefficients;
-  if (curve->rows() == 1 || (a == 0.0 && b == 1.0)) return;
-  Curve& c = *curve;
-  c.setZero();
-  const Eigen::Index n = c.rows() - 1;
-  for (Eigen::Index k = n; k >= 0; --k) {
-    for (Eigen::Index i = n; i > 0; --i) c.row(i) = a * c.row(i) + b * c.row(i - 1);
-    c.row(0) = a * c.row(0) + trajectory.coefficients.row(k);
-  }
-}
-
 Curve ToCurve(const world::Trajectory& trajectory, double start, double duration) {
   Curve curve;
-  SetCurve(trajectory, start, duration, &curve);
+  world::SetCurve(trajectory, start, duration, &curve);
   return curve;
 }
 

@@ -13,8 +13,7 @@
 
 namespace chase::planning {
 
-/// Power-basis coefficients of a curve in normalised time tau in [0,1]; row k: tau^k, frame W, m.
-using Curve = Eigen::Matrix<double, Eigen::Dynamic, 3, 0, 16, 3>;
+using world::Curve;
 
 /// An obstacle as the planner sees it: the true ellipsoid grown for the drone's safety and, less,
 /// for the line of sight.
@@ -108,7 +107,6 @@ void WithRoom(const Problem& problem, double room, Enlargements* memory, Problem
 
 /// `trajectory` over [start, start + duration] in normalised time.
 Curve ToCurve(const world::Trajectory& trajectory, double start, double duration);
-void SetCurve(const world::Trajectory& trajectory, double start, double duration, Curve* curve);
 
 /// Value of the curve's derivative of the given order with respect to tau.
 Eigen::Vector3d Evaluate(const Curve& curve, double tau, int order = 0);

@@ -17,6 +17,12 @@ std::optional<Box> BoxAround(const Curve& plan) {
 
 Box Union(const Box& a, const Box& b) { return {a.low.min(b.low), a.high.max(b.high)}; }
 
+math::Polynomial TargetRadius(const Problem& problem, double share) {
+  math::Polynomial radius = share * problem.target_growth;
+  radius[0] += share * problem.sight_radius;
+  return radius;
+}
+
 // A plan that starts within an obstacle's hard shape has to leave it: along the way out at its
 // start the distance never shrinks.
 bool Leaves(const Curve& plan, const Ellipsoid& e) {
@@ -35,60 +41,51 @@ bool Leaves(const Curve& plan, const Ellipsoid& e) {
 class Prover {
  public:
   Prover(const Curve& plan, const Problem& problem, double sight_from)
-      : plan_(plan), problem_(problem), sight_from_(sight_from) {}
+      : problem_(problem),
+        sight_from_(sight_from),
+        drone_(DroneBall(plan, 0.0)),
+        target_(TargetBall(problem, 1.0)) {}
 
   // Asks all of the obstacle where it might matter; adds the proofs to `proofs`, if there are to be
   // any.
-  bool IsOff(const Ellipsoid& e, std::vector<Proof>* proofs) const {
+  bool IsOff(const Ellipsoid& e, std::vector<Proof>* proofs) {
     const bool sight = std::max(sight_from_, e.sight_from) < 1.0;
-    if (e.safety_from > 0.0 && !Leaves(plan_, e)) return false;
-    return Prove(e, *e.body, false, e.safety_from, proofs) &&
-           (!sight || Prove(e, *e.body, true, std::max(sight_from_, e.sight_from), proofs));
+    if (e.safety_from > 0.0 && !Leaves(drone_.center, e)) return false;
+    return Prove(e, false, e.safety_from, proofs) &&
+           (!sight || Prove(e, true, std::max(sight_from_, e.sight_from), proofs));
   }
 
  private:
-  bool Prove(const Ellipsoid& e, const world::Body& body, bool of_sight, double from,
-             std::vector<Proof>* proofs) const {
-    const world::Ball drone =
-        DroneBall(plan_, of_sight ? e.sight_share * problem_.sight_radius : e.safety_radius);
-    const world::Ball target = TargetBall(problem_, e.sight_share);
+  bool Prove(const Ellipsoid& e, bool of_sight, double from, std::vector<Proof>* proofs) {
+    drone_.radius[0] = of_sight ? e.sight_share * problem_.sight_radius : e.safety_radius;
+    if (of_sight) target_.radius = TargetRadius(problem_, e.sight_share);
     world::SeparationResult result =
-        world::Separate(drone, of_sight ? &target : nullptr, body, from, 1.0);
+        world::Separate(drone_, of_sight ? &target_ : nullptr, *e.body, from, 1.0);
     if (result.kept != world::Kept::kOff) return false;
     if (!proofs) return true;
-    Proof proof{e.id, of_sight, from, drone.radius[0], math::Polynomial::Zero(2), {}, HUGE_VAL};
-    if (of_sight) proof.target_radius = target.radius;
-    for (const world::Separation& s : result.certificate)
-      proof.room =
-          std::min(proof.room, world::ProvenRoom(s, drone, of_sight ? &target : nullptr, body));
-    proof.separations = std::move(result.certificate);
-    proofs->push_back(std::move(proof));
+    proofs->push_back({e.id, of_sight, from, drone_.radius[0], math::Polynomial::Zero(2),
+                       std::move(result.certificate), result.room});
+    if (of_sight) proofs->back().target_radius = target_.radius;
     return true;
   }
 
-  const Curve& plan_;
   const Problem& problem_;
   double sight_from_;
+  world::Ball drone_, target_;  ///< of radii that are set for each obstacle
 };
 
 }  // namespace
-
-world::Body BodyOf(const world::Obstacle& obstacle, const Problem& problem) {
-  return world::MakeBody(obstacle, problem.t0, problem.duration, problem.sigmas);
-}
 
 world::Ball DroneBall(const Curve& plan, double radius) {
   return {plan, math::Polynomial::Constant(1, radius)};
 }
 
 world::Ball TargetBall(const Problem& problem, double share) {
-  math::Polynomial radius = share * problem.target_growth;
-  radius[0] += share * problem.sight_radius;
-  return {problem.target, radius};
+  return {problem.target, TargetRadius(problem, share)};
 }
 
 bool StaysOff(const Curve& plan, const Problem& problem, double sight_from, int* first) {
-  const Prover prover(plan, problem, sight_from);
+  Prover prover(plan, problem, sight_from);
   const std::optional<Box> box = BoxAround(plan), seen = BoxAround(problem.target);
   const auto is_off = [&](const Ellipsoid& e) {
     if (!e.body) return true;
@@ -113,8 +110,9 @@ bool StaysOff(const Curve& plan, const Problem& problem, double sight_from, int*
 
 std::optional<std::vector<Proof>> ProveOff(const Curve& plan, const Problem& problem,
                                            double sight_from) {
-  const Prover prover(plan, problem, sight_from);
+  Prover prover(plan, problem, sight_from);
   std::vector<Proof> proofs;
+  proofs.reserve(2 * problem.obstacles.size() + 1);
   for (const Ellipsoid& e : problem.obstacles)
     if (e.body && !prover.IsOff(e, &proofs)) return std::nullopt;
   if (problem.target_body && !prover.IsOff(*problem.target_body, &proofs)) return std::nullopt;

@@ -19,9 +19,6 @@ bool StaysOff(const Curve& plan, const Problem& problem, double sight_from, int*
 std::optional<std::vector<Proof>> ProveOff(const Curve& plan, const Problem& problem,
                                            double sight_from);
 
-/// The obstacle over the problem's time.
-world::Body BodyOf(const world::Obstacle& obstacle, const Problem& problem);
-
 /// The drone's ball, and the target's end of the line of sight with its uncertainty; `share` of the
 /// latter.
 world::Ball DroneBall(const Curve& plan, double radius);

@@ -77,11 +77,27 @@ double DistanceTo(const world::Obstacle& o, const Vector3d& d) {
   return scale > 0.0 ? (scale - 1.0) * scale / outwards.norm() : -HUGE_VAL;
 }
 
-/// One state to come to rest from.
+/// Comes to rest from the request's start, or from other states.
 class Resting {
  public:
-  Resting(const PlannerConfig& config, const PlanRequest& request)
-      : config_(config), request_(request), heights_(BrakeCurve(request.start, kTimes[0])) {}
+  /// `memory`: of earlier ways to rest from the same obstacles.
+  Resting(const PlannerConfig& config, PlanRequest request, Problem* memory = nullptr)
+      : config_(config), request_(std::move(request)), problem_(memory ? *memory : own_) {
+    From(request_.start, request_.t0);
+  }
+  void From(const world::State& start, double t0) {
+    request_.start = start;
+    request_.t0 = t0;
+    heights_ = BrakeCurve(start, kTimes[0]);
+    has_problem_ = false;
+    within_.reset();
+  }
+
+  std::optional<Stop> Brake() {
+    for (const double T : kTimes)
+      if (auto stop = Certified(BrakeCurve(request_.start, T), T)) return stop;
+    return std::nullopt;
+  }
 
   /// A certified way over T, if the curve is one.
   std::optional<Stop> Certified(const Curve& curve, double T) {
@@ -177,7 +193,8 @@ class Resting {
   const PlannerConfig& config_;
   PlanRequest request_;
   Curve heights_;
-  Problem problem_;
+  Problem own_;
+  Problem& problem_;
   bool has_problem_ = false;
   std::optional<std::pair<double, double>> within_;
 };
@@ -223,10 +240,7 @@ bool KeepsOff(const PlannerConfig& config, const PlanRequest& request,
 }  // namespace
 
 std::optional<Stop> Brake(const PlannerConfig& config, const PlanRequest& request) {
-  Resting resting(config, WithoutSight(request, request.start, request.t0));
-  for (const double T : kTimes)
-    if (auto stop = resting.Certified(BrakeCurve(request.start, T), T)) return stop;
-  return std::nullopt;
+  return Resting(config, WithoutSight(request, request.start, request.t0)).Brake();
 }
 
 std::optional<Stop> GoTo(const PlannerConfig& config, const PlanRequest& request,
@@ -313,7 +327,7 @@ PlanResult RestPlan(const PlannerConfig& config, const PlanRequest& request) {
 }
 
 std::optional<Stop> WayOut(const PlannerConfig& config, const PlanRequest& request,
-                           const world::Trajectory& plan) {
+                           const world::Trajectory& plan, Problem* memory) {
   PlannerConfig hard = config;
   hard.safety_margin = 0.0;
   const std::vector<world::Obstacle> unseen = UnseenAround(hard, request);
@@ -321,14 +335,14 @@ std::optional<Stop> WayOut(const PlannerConfig& config, const PlanRequest& reque
     return std::any_of(unseen.begin(), unseen.end(),
                        [&](const auto& o) { return o.id == proof.obstacle; });
   };
+  PlanRequest rest = WithoutSight(request, request.start, request.t0);
+  rest.obstacles.insert(rest.obstacles.end(), unseen.begin(), unseen.end());
+  Resting resting(hard, std::move(rest), memory);
   for (const double after : {kOverdue, 0.2, 0.7, 1.1, HUGE_VAL}) {
     const double t = std::min(plan.start + after, plan.end());
-    PlanRequest rest = request;
-    rest.t0 = t;
-    rest.start = plan.At(t);
-    rest.obstacles.insert(rest.obstacles.end(), unseen.begin(), unseen.end());
+    resting.From(plan.At(t), t);
     std::optional<Stop> stop;
-    if (KeepsOff(hard, request, unseen, plan, t)) stop = Brake(hard, rest);
+    if (KeepsOff(hard, request, unseen, plan, t)) stop = resting.Brake();
     if (stop) {  // whoever checks it hears of obstacles only
       auto& proofs = stop->proofs;
       proofs.erase(std::remove_if(proofs.begin(), proofs.end(), is_unseen), proofs.end());

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "services/planning/planner.h"
+#include "services/planning/problem.h"
 
 namespace chase::planning {
 
@@ -46,7 +47,8 @@ void SetProofs(const PlannerConfig& config, const PlanRequest& request, std::vec
 /// Where `plan` can be left for a certified rest: as soon as a new plan is overdue, else sooner or
 /// later. Braking keeps the hard radius and gives up the margin. After FASTER, Tordesillas et al.
 /// 2019: a plan is flown only with such a way out. What is unseen is kept off until then and after.
+/// `memory`: of earlier calls, if any.
 std::optional<Stop> WayOut(const PlannerConfig& config, const PlanRequest& request,
-                           const world::Trajectory& plan);
+                           const world::Trajectory& plan, Problem* memory = nullptr);
 
 }  // namespace chase::planning
