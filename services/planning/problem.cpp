@@ -6,20 +6,13 @@
 
 #include "services/planning/candidate_set.h"
 #include "services/planning/field_of_view.h"
+#include "services/planning/margins.h"
 #include "services/planning/separations.h"
 
 namespace chase::planning {
 namespace {
 
-// Margins are taken back in these shares until the start, the target, or the line of sight at the
-// start is outside the shape.
-constexpr double kShares[] = {1.0, 0.75, 0.5, 0.25, 0.0};
-constexpr double kClear = 1.02;       // squared distance; as a factor of lengths more than enough
-constexpr double kPoint = 1e6;        // 1/m^2, of a shape that sorts out nothing
-constexpr double kLeaveBy = 0.25;     // tau by which a plan has left an obstacle that it starts in
 constexpr double kBackInView = 0.25;  // tau by which a plan sees a target that it starts without
-
-double SquaredNorm(const Eigen::Matrix3d& R, const Eigen::Vector3d& x) { return x.dot(R * x); }
 
 // Deviations of the obstacle's position along the worst axis, times sigmas, at tau.
 double Uncertainty(const world::Obstacle& o, const Problem& problem, double tau) {
@@ -29,87 +22,6 @@ double Uncertainty(const world::Obstacle& o, const Problem& problem, double tau)
       o.position_covariance.diagonal() + age * age * o.velocity_covariance.diagonal();
   return problem.sigmas * std::sqrt(std::max(0.0, variance.maxCoeff()));
 }
-
-constexpr int kSamples = 24;
-
-// A curve and boxes around it and its quarters, where its degree allows them.
-struct Hull {
-  static constexpr int kQuarters = 4;
-  const Curve& curve;
-  bool has_boxes;
-  Box whole, quarters[kQuarters];
-
-  explicit Hull(const Curve& curve_) : curve(curve_), has_boxes(curve.rows() <= 7) {
-    whole = {Eigen::Array3d::Constant(-HUGE_VAL), Eigen::Array3d::Constant(HUGE_VAL)};
-    if (!has_boxes) return;
-    Points left = ToPoints(curve, 6);
-    whole = BoxOf(left, 7, 1e-6);
-    Points right = Halve(&left);
-    for (int a = 0; a < 2; ++a) {
-      Points* half = a == 0 ? &left : &right;
-      const Points later = Halve(half);
-      quarters[2 * a] = BoxOf(*half, 7, 1e-6);
-      quarters[2 * a + 1] = BoxOf(later, 7, 1e-6);
-    }
-  }
-
- private:
-  // Leaves the first half and returns the second.
-  static Points Halve(Points* points) {
-    Points right = *points;
-    for (int a = 0; a < 3; ++a)
-      for (int k = 1; k < 7; ++k) {
-        for (int i = 0; i + k < 7; ++i) right(i, a) = 0.5 * (right(i, a) + right(i + 1, a));
-        (*points)(k, a) = right(0, a);
-      }
-    return right;
-  }
-};
-
-// A quick sufficient test that the curve stays well out.
-bool IsPlainlyOutside(const Hull& curve, const Curve& center, const Eigen::Array3d& half) {
-  if (!curve.has_boxes) return false;
-  if (!MayTouch(curve.whole, center, half, kClear)) return true;
-  for (const Box& box : curve.quarters)
-    if (MayTouch(box, center, half, kClear)) return false;
-  return true;
-}
-
-bool StaysOutside(const Curve& curve, const Curve& center, const Eigen::Matrix3d& R, double limit) {
-  for (int i = 0; i <= kSamples; ++i) {
-    const double tau = static_cast<double>(i) / kSamples;
-    if (SquaredNorm(R, Evaluate(curve, tau) - Evaluate(center, tau)) <= limit) return false;
-  }
-  return true;
-}
-
-void Note(std::string* notes, const std::string& text) {
-  if (!notes) return;
-  if (!notes->empty()) *notes += "; ";
-  *notes += text;
-}
-
-// The line of sight at the start and a box around it.
-struct FirstSight {
-  Eigen::Vector3d p, q;
-  Box box;
-
-  explicit FirstSight(const Problem& problem)
-      : p(problem.start.row(0).transpose()), q(problem.target.row(0).transpose()) {
-    box = {p.array().min(q.array()) - 1e-6, p.array().max(q.array()) + 1e-6};
-  }
-  bool IsBeyond(const Curve& center, const Eigen::Matrix3d& R, const Eigen::Array3d& half,
-                double limit) const {
-    const Curve first = center.topRows(1);
-    return !MayTouch(box, first, half, limit) ||
-           world::SegmentSquaredDistance(p, q, center.row(0).transpose(), R) > limit;
-  }
-};
-
-// What the ellipsoids are grown by, m.
-struct Growth {
-  double safety, sight;
-};
 
 // Boxes around the Minkowski sums: half the sides of the solid's, and what it is grown by at most.
 void SetBoxes(const world::Obstacle& o, const Growth& most, Ellipsoid* e) {
@@ -152,121 +64,6 @@ void SetShapes(const PlannerConfig& config, const PlanRequest& request, const wo
   }
   e->grown_by[0] = growth.safety;
   e->grown_by[1] = growth.sight;
-}
-
-Eigen::Matrix3d Grown(const world::Obstacle& o, double margin) {
-  return margin > 0.0 ? world::Inflated(o.shape, margin) : o.shape;
-}
-
-// Margins that give way at the start: whether what stands at tau = 0 is off the obstacle.
-class Start {
- public:
-  explicit Start(const Problem& problem) : problem_(problem) {
-    start_.center = problem.start.topRows(1);
-    seen_.center = problem.target.topRows(1);
-  }
-  bool IsSafe(const Ellipsoid& e, double radius) {
-    if (!e.body) {
-      const Eigen::Vector3d offset = (problem_.start.row(0) - e.center.row(0)).transpose();
-      return SquaredNorm(e.safety, offset) > 1.0;
-    }
-    start_.radius = math::Polynomial::Constant(1, radius);
-    return IsOff(e, nullptr);
-  }
-  const Curve& curve() const { return problem_.start; }
-  bool IsInSight(const Ellipsoid& e, double share) {
-    start_.radius = math::Polynomial::Constant(1, share * problem_.sight_radius);
-    seen_.radius = TargetBall(problem_, share).radius.head(1);
-    return IsOff(e, &seen_);
-  }
-
- private:
-  // Off by a little more than nothing, so that a plan can be, too.
-  bool IsOff(const Ellipsoid& e, const world::Ball* target) {
-    world::Body body = *e.body;
-    body.center = body.center.topRows(1).eval();
-    body.covariance[1].setZero();
-    body.covariance[2].setZero();
-    start_.radius[0] += kRounding;
-    return world::Separate(start_, target, body).kept == world::Kept::kOff;
-  }
-  static constexpr double kRounding = 1e-4;  // m
-  const Problem& problem_;
-  world::Ball start_, seen_;
-};
-
-// The ellipsoid only sorts candidates out before the proof looks at the solid. Where it holds a
-// start that is off the solid, none would be left: there it is smaller, or sorts out nothing.
-void ClearStart(const world::Obstacle& o, double growth, const Curve& start, Ellipsoid* e) {
-  const Eigen::Vector3d offset = (start.row(0) - e->center.row(0)).transpose();
-  for (const double share : {1.0, 0.5, 0.0}) {
-    if (share < 1.0) {
-      e->safety = Grown(o, share * growth);
-      e->grown_by[0] = -1.0;
-    }
-    if (SquaredNorm(e->safety, offset) > kClear) return;
-  }
-  e->safety = kPoint * Eigen::Matrix3d::Identity();
-}
-
-// Takes the margin, never the hard radius, back until the start is outside.
-void RelaxSafety(const world::Obstacle& o, double hard, double margin, double uncertainty,
-                 bool searched, Start* start, Ellipsoid* e, std::string* notes) {
-  for (double share : kShares) {
-    e->safety_radius = hard + share * margin;
-    if (share < 1.0 && searched) {
-      e->safety = Grown(o, e->safety_radius + uncertainty);
-      e->grown_by[0] = -1.0;
-    }
-    if (!start->IsSafe(*e, e->safety_radius)) continue;
-    if (share < 1.0) Note(notes, "starts within the margin of obstacle " + std::to_string(e->id));
-    if (e->body && searched) ClearStart(o, e->safety_radius + uncertainty, start->curve(), e);
-    return;
-  }
-  e->safety_from = kLeaveBy;
-  Note(notes, "starts inside obstacle " + std::to_string(e->id));
-}
-
-// The largest share of the margin that the target keeps out of, and the line of sight at the start
-// too, where it keeps out of any.
-void RelaxSight(const world::Obstacle& o, const Growth& growth, const FirstSight& first,
-                const Hull& target, const Problem& problem, Start* start, Ellipsoid* e,
-                std::string* notes) {
-  const auto target_is_off = [&](double share) {
-    if (IsPlainlyOutside(target, e->center, e->sight_half)) return true;
-    if (!e->body)
-      return StaysOutside(target.curve, e->center, e->sight, share > 0.0 ? kClear : 1.0);
-    return world::Separate(TargetBall(problem, share), nullptr, *e->body).kept == world::Kept::kOff;
-  };
-  const auto begins_in_sight = [&](double share) {
-    if (!first.IsBeyond(e->center, e->sight, e->sight_half, share > 0.0 ? kClear : 1.0))
-      return false;
-    return !e->body || start->IsInSight(*e, share);
-  };
-  double kept = -1.0;
-  const auto take = [&](double share) {
-    e->sight_share = share;
-    e->sight = Grown(o, share * growth.sight);
-    e->grown_by[1] = -1.0;
-  };
-  for (double share : kShares) {
-    if (share < 1.0) take(share);
-    if (!target_is_off(share)) continue;
-    if (kept < 0.0) kept = share;
-    if (!begins_in_sight(share)) continue;
-    if (share < kept)
-      Note(notes, "sight starts within the margin of obstacle " + std::to_string(e->id));
-    else if (share < 1.0)
-      Note(notes, "the target passes within the sight margin of obstacle " + std::to_string(e->id));
-    return;
-  }
-  if (kept >= 0.0) {
-    if (kept < 1.0)
-      Note(notes, "the target passes within the sight margin of obstacle " + std::to_string(e->id));
-    return take(kept);
-  }
-  e->sight_from = 1.0;
-  Note(notes, "obstacle " + std::to_string(e->id) + " holds the target, its shadow is ignored");
 }
 
 // How far a motion with speed v and acceleration a goes on that `brake` slows down after a moment.

@@ -109,30 +109,34 @@ class Resting {
     return Stop{{request_.t0, T, curve}, std::move(*proofs), true};
   }
 
-  bool KeepsSpeed(const Curve& curve, double T) {
+  /// Within the limits of speed and acceleration.
+  bool CanBeFlown(const Curve& curve, double T) {
     SetProblem(T);
-    Problem speed;
-    speed.duration = T;
-    speed.limits.speed = problem_.limits.speed;
-    speed.target = problem_.target;
-    return curve.allFinite() && KeepsLimits(curve, speed);
+    Problem motion;
+    motion.duration = T;
+    motion.limits.speed = problem_.limits.speed;
+    motion.limits.acceleration = problem_.limits.acceleration;
+    motion.target = problem_.target;
+    return curve.allFinite() && KeepsLimits(curve, motion);
   }
 
-  /// Time of the first sampled contact, s, infinite where there is none, and the least clearance.
-  /// The ground and the greatest height count as an obstacle's surface. What stands and holds the
-  /// start is not as the map says: the body is there and has touched nothing. As far in as the
-  /// quickest braking goes is no contact with it, and to flee it is no gain.
+  /// Time of the first contact between samples, s, infinite where there is none, and the least
+  /// clearance. The ground and the greatest height count as an obstacle's surface. What stands and
+  /// holds the start is not as the map says: the body is there and has touched nothing. As far in
+  /// as the quickest braking goes is no contact with it, and to flee it is no gain.
   std::pair<double, double> Harm(const Curve& curve, double T) {
     const auto [within, gain] = Within();
     SetProblem(T);
-    double contact = HUGE_VAL, least = gain;
+    double contact = HUGE_VAL, least = gain, room_before = 0.0;
     const int n = static_cast<int>(std::ceil(T / kInTime));
-    for (int i = 1; i <= n; ++i) {
-      const double tau = static_cast<double>(i) / n;
-      const auto [standing, moving] = Clearances(curve, tau);
-      least = std::min({least, standing, moving});
-      if ((standing < within || moving < config_.drone_radius) && contact == HUGE_VAL)
-        contact = tau * T;
+    for (int i = 0; i <= n; ++i) {
+      const auto [standing, moving] = Clearances(curve, static_cast<double>(i) / n);
+      const double room = std::min(standing - within, moving - config_.drone_radius);
+      if (i > 0) least = std::min({least, standing, moving});
+      if (i > 0 && room < 0.0 && contact == HUGE_VAL)
+        contact =
+            T / n * (i - 1 + std::max(0.0, room_before) / (std::max(0.0, room_before) - room));
+      room_before = room;
     }
     return {contact, least};
   }
@@ -280,9 +284,11 @@ Stop Evade(const PlannerConfig& config, const PlanRequest& request) {
     least = harm;
     best.trajectory = {request.t0, T, curve};
   };
-  for (const double T : {kTimes[0], kTimes[2], kTimes[4]}) {
+  constexpr double kLongest = kTimes[4];
+  for (const double T : {kTimes[0], kTimes[2], kLongest}) {
     Resting braking(config, rest);
-    weigh(&braking, BrakeCurve(request.start, T), T);
+    const Curve curve = BrakeCurve(request.start, T);
+    if (T == kLongest || braking.CanBeFlown(curve, T)) weigh(&braking, curve, T);
   }
   for (const Vector3d& d : displacements)
     for (int i = 0; i < 2; ++i) {
@@ -290,7 +296,7 @@ Stop Evade(const PlannerConfig& config, const PlanRequest& request) {
       const Vector3d end = ToPoints(BrakeCurve(request.start, T), 5).row(5).transpose() + d;
       const Curve curve = CurveTo(request.start, T, end);
       if (auto stop = resting[i].Certified(curve, T)) return *stop;
-      if (resting[i].KeepsSpeed(curve, T)) weigh(&resting[i], curve, T);
+      if (resting[i].CanBeFlown(curve, T)) weigh(&resting[i], curve, T);
     }
   if (least.first < 0.0)  // none is finite
     best.trajectory = world::Trajectory::Constant(request.start.p, request.t0, 1.0);

@@ -97,7 +97,7 @@ TEST(Evasion, WhereNothingCanBeCertifiedTheContactComesAsLateAsCanBe) {
   const PlannerConfig config;
   for (const double speed : {2.0, 4.0, -3.0}) {
     PlanRequest request = Hover();
-    request.obstacles = {Wall(1, request.start.p.x() - 0.35 * speed, speed)};
+    request.obstacles = {Wall(1, request.start.p.x() - 0.5 * speed, speed)};
     const PlanResult plan = RestPlan(config, request);
     EXPECT_EQ(plan.verdict, Verdict::kBrake) << plan.reason;
     EXPECT_LT(plan.certified_clearance, 0.0);
