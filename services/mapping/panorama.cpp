@@ -25,13 +25,19 @@ double Diamond(double x, double y) {
 void Panorama::Take(const Eigen::Vector3d& origin, const std::vector<Return>& returns,
                     const std::vector<int>& owner) {
   origin_ = origin.head<2>();
+  height_ = origin.z();
   bins_.assign(kBins, {INFINITY, INFINITY, 0.0f, kNobody});
+  lowest_.assign(kBins * kBands, INFINITY);
   for (size_t i = 0; i < returns.size(); ++i) {
     const Return& r = returns[i];
     const Eigen::Vector2d d = r.p.head<2>().cast<double>() - origin_;
     const auto range = static_cast<float>(d.norm());
-    Bin& bin = bins_[static_cast<size_t>(0.25 * kBins * Diamond(d.x(), d.y())) % kBins];
+    const size_t b = static_cast<size_t>(0.25 * kBins * Diamond(d.x(), d.y())) % kBins;
+    Bin& bin = bins_[b];
     bin.farthest = std::max(bin.farthest, range);
+    const int band = std::min(static_cast<int>(range / static_cast<float>(kBand)), kBands - 1);
+    float& lowest = lowest_[b * kBands + static_cast<size_t>(band)];
+    lowest = std::min(lowest, (r.p.z() - static_cast<float>(height_)) / std::max(range, 1e-3f));
     if (r.label == Label::kGround || r.label == Label::kFar) continue;
     if (range < bin.first) {
       if (bin.owner != owner[i]) bin.second = bin.first;
@@ -41,6 +47,8 @@ void Panorama::Take(const Eigen::Vector3d& origin, const std::vector<Return>& re
       bin.second = range;
     }
   }
+  for (size_t i = lowest_.size() - 1; i-- > 0;)
+    if (i % kBands != kBands - 1) lowest_[i] = std::min(lowest_[i], lowest_[i + 1]);
 }
 
 template <class Check>
@@ -50,7 +58,7 @@ bool Panorama::Any(const Eigen::Vector2d& d, Check check) const {
       std::clamp(static_cast<int>(std::ceil(0.25 * kBins * std::max(kStep, kBeside / d.norm()))), 1,
                  kBins / 8);
   for (int b = middle - reach; b <= middle + reach; ++b)
-    if (check(bins_[static_cast<size_t>((b + kBins) % kBins)])) return true;
+    if (check(static_cast<size_t>((b + kBins) % kBins))) return true;
   return false;
 }
 
@@ -58,18 +66,22 @@ bool Panorama::Hides(const Eigen::Vector2d& p, int owner) const {
   const Eigen::Vector2d d = p - origin_;
   const double range = d.norm();
   if (bins_.empty() || !(range > 0.0)) return false;
-  return Any(d, [&](const Bin& bin) {
-    return (bin.owner == owner ? bin.second : bin.first) < range - kInFront;
+  return Any(d, [&](size_t b) {
+    return (bins_[b].owner == owner ? bins_[b].second : bins_[b].first) < range - kInFront;
   });
 }
 
-bool Panorama::Sees(const Eigen::Vector2d& p) const {
+bool Panorama::Sees(const Eigen::Vector2d& p, double z) const {
   const Eigen::Vector2d d = p - origin_;
   const double range = d.norm();
   if (bins_.empty()) return true;
   if (!(range > 0.0)) return false;
-  return !Any(d, [&](const Bin& bin) { return bin.first < range - kInFront; }) &&
-         Any(d, [&](const Bin& bin) { return bin.farthest > range; });
+  const auto beyond =
+      static_cast<size_t>(std::min(static_cast<int>(range / kBand) + 1, kBands - 1));
+  return !Any(d, [&](size_t b) { return bins_[b].first < range - kInFront; }) &&
+         Any(d, [&](size_t b) {
+           return bins_[b].farthest > range && height_ + lowest_[b * kBands + beyond] * range <= z;
+         });
 }
 
 }  // namespace chase::mapping

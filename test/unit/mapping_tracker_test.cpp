@@ -67,6 +67,23 @@ Panorama Seen(double gap) {
   return panorama;
 }
 
+/// From (0, -2) and this height into the open, no ray lower than `low` where y is 0.
+Panorama SeenFrom(double height, double low) {
+  std::vector<Return> returns;
+  for (double angle = -1.4; angle < 1.4; angle += 0.002)
+    for (const double rise : {0.0, 0.5}) {
+      const double far = 5.0, slope = (low + rise - height) * std::cos(angle) / 2.0;
+      Return r;
+      r.p =
+          Eigen::Vector3d(far * std::sin(angle), far * std::cos(angle) - 2.0, height + far * slope)
+              .cast<float>();
+      returns.push_back(r);
+    }
+  Panorama panorama;
+  panorama.Take({0.0, -2.0, height}, returns, std::vector<int>(returns.size(), -1));
+  return panorama;
+}
+
 /// What something hides is not missed: it stays listed, ever less certain where; what is nowhere to
 /// be seen although its place is in view is not.
 TEST(MappingTracker, OnlyWhatIsHiddenStaysListed) {
@@ -92,6 +109,25 @@ TEST(MappingTracker, OnlyWhatIsHiddenStaysListed) {
       }
       if (t > 2.9 && hidden) {
         EXPECT_EQ(clusters[0].track, id) << t;
+      }
+    }
+  }
+}
+
+/// What all rays pass over is not missed either: a walker under the drone.
+TEST(MappingTracker, WhatRaysPassOverStaysListed) {
+  for (const double low : {0.9, 1.8}) {
+    Tracker tracker(MoverConfig{});
+    for (double t = 0.0; t < 3.0; t += 0.1) {
+      tracker.Predict(t);
+      std::vector<Cluster> clusters;
+      if (t < 1.5) clusters.push_back(BoxCluster({1.5 * t - 2.0, 0.0}, 0.5));
+      tracker.Update(t > 1.5 ? SeenFrom(2.4, low) : Panorama(), &clusters);
+      if (t > 1.0 && t < 1.5) {
+        ASSERT_EQ(tracker.Obstacles(1.5, 8.0, 1.0).size(), 1u) << t;
+      }
+      if (t > 2.0) {
+        EXPECT_EQ(tracker.Obstacles(1.5, 8.0, 1.0).size(), low > 1.5 ? 1u : 0u) << t;
       }
     }
   }
