@@ -105,10 +105,11 @@ def cores():
 
 
 def disk():
-    free = shutil.disk_usage(places.ROOT).free
+    where = places.RECORDS if places.RECORDS.exists() else places.ROOT
+    free = shutil.disk_usage(where).free
     if free < FREE_SPACE:
-        return FAILURE, f"{free / 1e9:.1f} GB free in {places.ROOT}; cure: free {FREE_SPACE / 1e9:.0f} GB"
-    return OK, f"{free / 1e9:.0f} GB free"
+        return FAILURE, f"{free / 1e9:.1f} GB free in {where}; cure: free {FREE_SPACE / 1e9:.0f} GB"
+    return OK, f"{free / 1e9:.0f} GB free in {where}"
 
 
 def judged(check):

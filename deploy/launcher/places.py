@@ -5,6 +5,8 @@ import pathlib
 SHARE = pathlib.Path(__file__).resolve().parents[1]  # deploy/, or share/chase: process table, scenarios
 INSTALLED = not (SHARE / "setup").exists()
 ROOT = pathlib.Path.cwd() if INSTALLED else SHARE.parent  # flights go below it, into logs/
+RECORDS = pathlib.Path("/var/lib/chase") if INSTALLED else ROOT  # of the units
+ENVIRONMENT = pathlib.Path("/etc/chase/environment")  # of the units
 BIN = SHARE.parents[1] / "bin" if INSTALLED else ROOT / "build" / "bin"
 
 

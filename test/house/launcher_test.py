@@ -284,6 +284,14 @@ class FlightTest(unittest.TestCase):
                 os.environ["LCM_DEFAULT_URL"] = told
             self.assertEqual(bus.url(), url)
 
+    def test_the_bus_of_an_installed_vehicle(self):
+        file = pathlib.Path(self.enterContext(tempfile.TemporaryDirectory())) / "environment"
+        self.assertIsNone(bus.configured(file))
+        file.write_text("# LCM_DEFAULT_URL=no\nCHASE_OPTIONS=--channel-prefix falcon_\n")
+        self.assertIsNone(bus.configured(file))
+        file.write_text('LCM_DEFAULT_URL="udpm://239.1.2.3:7000?ttl=0"\n')
+        self.assertEqual(bus.configured(file), "udpm://239.1.2.3:7000?ttl=0")
+
     def test_process_that_refuses_to_start(self):
         self.program("chase-planning", "import sys; sys.exit('planning.yaml:1: no_such: unknown')")
         code, _, err = self.fly()
