@@ -11,9 +11,12 @@
 #include "logs/src/copy.h"
 #include "logs/src/diff.h"
 #include "logs/src/export.h"
+#include "logs/src/flight_samples.h"
+#include "logs/src/identify.h"
 #include "logs/src/import.h"
 #include "logs/src/info.h"
 #include "logs/src/migrate.h"
+#include "logs/src/output.h"
 #include "logs/src/verify.h"
 
 namespace {
@@ -224,16 +227,44 @@ void AddDiff(CLI::App* app, Arguments* a, int* exit_code) {
   });
 }
 
+/// The log of a flight's folder, or the log itself.
+std::string LogOf(const std::string& flight) {
+  namespace fs = std::filesystem;
+  return fs::is_directory(flight) ? (fs::path(flight) / "flight.lcm").string() : flight;
+}
+
+void RunIdentify(const Arguments& a) {
+  const std::string log = LogOf(a.in);
+  RefuseSame(log, a.out);
+  if (!a.out.empty()) RequireWritable(a.out);
+  const auto identified = Identify(ReadSamples(log, Progress()));
+  if (!identified)
+    throw std::runtime_error(log + ": less than 5 s of it are flight by plans with a good pose");
+  std::fputs(Format(*identified).c_str(), stdout);
+  if (a.out.empty()) return;
+  const std::string text = ControlFile(*identified, log);
+  if (text.empty())
+    throw std::runtime_error(log + ": tells nothing that control has; " + a.out +
+                             " is not written");
+  WriteFile(a.out, text);
+}
+
+void AddIdentify(CLI::App* app, Arguments* a) {
+  auto* sub = app->add_subcommand(
+      "identify", "Drag, thrust curve and delays of a vehicle from a flight, with uncertainties.");
+  sub->add_option("FLIGHT", a->in, "LCM log, or the folder of a flight")->required();
+  sub->add_option("--out", a->out,
+                  "file to write for chase-control --config: what the flight tells");
+  sub->callback([a] { RunIdentify(*a); });
+}
+
 void AddVerify(CLI::App* app, Arguments* a, int* exit_code) {
   auto* sub = app->add_subcommand(
       "verify",
       "Checks the proofs of every plan in exact arithmetic; exit 1 if one does not hold.");
   sub->add_option("FLIGHT", a->in, "LCM log, or the folder of a flight")->required();
   sub->callback([a, exit_code] {
-    namespace fs = std::filesystem;
-    const std::string log =
-        fs::is_directory(a->in) ? (fs::path(a->in) / "flight.lcm").string() : a->in;
-    const Verification verification = Verify(log);
+    const Verification verification = Verify(LogOf(a->in));
     std::fputs(Format(verification).c_str(), stdout);
     *exit_code = verification.Holds() ? 0 : 1;
   });
@@ -245,7 +276,9 @@ void AddVerify(CLI::App* app, Arguments* a, int* exit_code) {
 /// differ, one does not hold; 2 an option that would do nothing.
 int main(int argc, char** argv) {
   CLI::App app{
-      "Shows, imports, exports, compares, cuts, merges, repairs, migrates and verifies LCM logs."};
+      "Shows, imports, exports, compares, cuts, merges, repairs, migrates and verifies LCM logs, "
+      "and "
+      "identifies vehicles by them."};
   app.name("chase-log");
   chase::config::AddVersion(&app);
   app.require_subcommand(1);
@@ -253,6 +286,7 @@ int main(int argc, char** argv) {
   int exit_code = 0;
   AddInfo(&app, &arguments);
   AddVerify(&app, &arguments, &exit_code);
+  AddIdentify(&app, &arguments);
   AddImport(&app, &arguments);
   AddExport(&app, &arguments);
   AddDiff(&app, &arguments, &exit_code);

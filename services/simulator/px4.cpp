@@ -1,6 +1,7 @@
 #include "services/simulator/px4.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
@@ -24,6 +25,24 @@ constexpr double kPositionGain = 0.95, kVelocityGain = 1.8, kHeightGain = 1.0, k
 constexpr double kLandSpeed = 0.7, kMostSpeed = 2.0, kMostPush = 3.0;
 constexpr int64_t kOffsetMemory = 8;  // answers of TIMESYNC over which the offset is averaged
 
+/// The setpoint without the rates that its mask leaves out.
+mav::SetAttitudeTarget Heeded(mav::SetAttitudeTarget m) {
+  using Mask = mav::AttitudeTargetTypemask;
+  const auto ignored = [&](Mask bit) { return (m.type_mask & static_cast<uint8_t>(bit)) != 0; };
+  if (ignored(Mask::BODY_ROLL_RATE_IGNORE)) m.body_roll_rate = 0.0f;
+  if (ignored(Mask::BODY_PITCH_RATE_IGNORE)) m.body_pitch_rate = 0.0f;
+  if (ignored(Mask::BODY_YAW_RATE_IGNORE)) m.body_yaw_rate = 0.0f;
+  if (ignored(Mask::ATTITUDE_IGNORE)) m.q = {1.0f, 0.0f, 0.0f, 0.0f};
+  return m;
+}
+
+template <class... Numbers>
+bool Finite(Numbers... numbers) {
+  return (std::isfinite(numbers) && ...);
+}
+
+bool Finite(const std::array<float, 4>& q) { return Finite(q[0], q[1], q[2], q[3]); }
+
 double Seconds(int64_t from, int64_t to) { return 1e-6 * static_cast<double>(to - from); }
 uint8_t Code(mav::MavResult r) { return static_cast<uint8_t>(r); }
 
@@ -41,16 +60,8 @@ Px4::Px4(const Px4Options& options, int64_t utime, uint64_t seed)
       boot_(utime - kBoot),
       now_(utime),
       mode_(mavlink::kPositionMode),
-      intended_(mavlink::kPositionMode) {
-  // Rates of a companion link before anything is asked for.
-  intervals_ = {{mav::Heartbeat::kId, 1'000'000},
-                {mav::HighresImu::kId, 20'000},
-                {mav::AttitudeQuaternion::kId, 20'000},
-                {mav::LocalPositionNed::kId, 100'000},
-                {mav::ExtendedSysState::kId, 1'000'000},
-                {mav::SysStatus::kId, 1'000'000},
-                {mav::Timesync::kId, 100'000}};
-}
+      intended_(mavlink::kPositionMode),
+      intervals_(DefaultIntervals()) {}
 
 int64_t Px4::Clock(int64_t utime) const {
   const int64_t since = utime - boot_;
@@ -58,28 +69,24 @@ int64_t Px4::Clock(int64_t utime) const {
 }
 
 std::optional<int64_t> Px4::HostTime(int64_t companion_us) const {
-  if (!companion_offset_) return std::nullopt;
-  const auto own = static_cast<double>(companion_us - *companion_offset_);
+  const auto offset = offsets_.find(vision_sender_);
+  if (offset == offsets_.end()) return std::nullopt;
+  const auto own = static_cast<double>(companion_us - offset->second);
   return boot_ + static_cast<int64_t>(own / (1.0 + 1e-6 * options_.drift_ppm));
 }
 
-template <class M>
-void Px4::Send(const M& message) {
-  if (version_2_ || M::kId > 255) {
-    outgoing_.push_back(writer_.Write(now_, message));
-    return;
-  }
-  const mavlink::Payload payload = mavlink::ToPayload(message);
-  Bytes frame(6 + M::kBaseLength);  // MAVLink 1: whole, without extensions
+/// A frame of MAVLink 1: whole, without extensions.
+Px4::Bytes Px4::InVersion1(uint32_t id, std::size_t length, const mavlink::Payload& payload) {
+  Bytes frame(6 + length);
   frame[0] = 0xFE;
-  frame[1] = static_cast<uint8_t>(M::kBaseLength);
-  frame[2] = sequence_1_++, frame[3] = 1, frame[4] = 1, frame[5] = static_cast<uint8_t>(M::kId);
-  std::copy_n(payload.bytes.begin(), M::kBaseLength, frame.begin() + 6);
+  frame[1] = static_cast<uint8_t>(length);
+  frame[2] = sequence_1_++, frame[3] = 1, frame[4] = 1, frame[5] = static_cast<uint8_t>(id);
+  std::copy_n(payload.bytes.begin(), length, frame.begin() + 6);
   const uint16_t crc = mavlink::FrameChecksum(frame.data() + 1, frame.size() - 1,
-                                              mavlink::ChecksumExtra(M::kId).value());
+                                              mavlink::ChecksumExtra(id).value());
   frame.push_back(static_cast<uint8_t>(crc));
   frame.push_back(static_cast<uint8_t>(crc >> 8));
-  outgoing_.push_back(frame);
+  return frame;
 }
 
 void Px4::Say(const std::string& text, uint8_t severity) {
@@ -105,17 +112,25 @@ void Px4::OnFrame(const mavlink::Frame& frame, int64_t clock) {
   if (frame.version == 2) version_2_ = true;
   if (mavlink::As<mav::Heartbeat>(frame)) ++seen_.heartbeats;
   if (const auto m = mavlink::As<mav::CommandLong>(frame)) OnCommand(*m, frame);
-  if (const auto m = mavlink::As<mav::Odometry>(frame)) {
-    ++seen_.odometry;
-    seen_.vision = *m;
-    if (m->estimator_type == 7) Say("ODOMETRY: estimator_type 7 unsupported", 2);
-  }
-  if (const auto m = mavlink::As<mav::Timesync>(frame)) OnTimesync(*m, clock);
+  if (const auto m = mavlink::As<mav::Odometry>(frame)) OnOdometry(*m, SenderOf(frame));
+  if (const auto m = mavlink::As<mav::Timesync>(frame)) OnTimesync(*m, SenderOf(frame), clock);
   if (const auto m = mavlink::As<mav::SetAttitudeTarget>(frame)) OnSetpoint(*m);
 }
 
-void Px4::OnSetpoint(const mav::SetAttitudeTarget& m) {
-  if (m.target_system != 1 && m.target_system != 0) return;
+// Velocities and covariances may be NaN, which says that they are not known.
+void Px4::OnOdometry(const mav::Odometry& m, Sender sender) {
+  if (!Finite(m.x, m.y, m.z) || !Finite(m.q)) return;
+  ++seen_.odometry;
+  seen_.vision = m;
+  vision_sender_ = sender;
+  if (m.estimator_type == 7) Say("ODOMETRY: estimator_type 7 unsupported", 2);
+}
+
+void Px4::OnSetpoint(const mav::SetAttitudeTarget& message) {
+  if (message.target_system != 1 && message.target_system != 0) return;
+  const mav::SetAttitudeTarget m = Heeded(message);
+  if (!Finite(m.q) || !Finite(m.body_roll_rate, m.body_pitch_rate, m.body_yaw_rate, m.thrust))
+    return;
   ++seen_.setpoints;
   if (!(mode_ == mavlink::kOffboardMode)) ++seen_.setpoints_while_not_offboard;
   if (Seconds(last_setpoint_, now_) > kSlowest) first_setpoint_ = now_;
@@ -123,15 +138,16 @@ void Px4::OnSetpoint(const mav::SetAttitudeTarget& m) {
   seen_.setpoint = m;
 }
 
-void Px4::OnTimesync(const mav::Timesync& m, int64_t clock) {
+// Each peer has a clock of its own: vision's stamps are of the one that sends it.
+void Px4::OnTimesync(const mav::Timesync& m, Sender sender, int64_t clock) {
   ++seen_.timesync;
   const int64_t own = Clock(clock);
   if (m.tc1 == 0) return Send(mav::Timesync{1000 * own, m.ts1, 0, 0});
   const int64_t offset = m.tc1 / 1000 - (m.ts1 / 1000 + own) / 2;
   seen_.clock_errors.push_back(1e-6 * static_cast<double>((clock - own) - offset));
-  if (!companion_offset_ || std::llabs(offset - *companion_offset_) > 100'000)
-    companion_offset_ = offset;
-  *companion_offset_ += (offset - *companion_offset_) / kOffsetMemory;
+  int64_t& known = offsets_.emplace(sender, offset).first->second;
+  if (std::llabs(offset - known) > 100'000) known = offset;
+  known += (offset - known) / kOffsetMemory;
 }
 
 bool Px4::StreamAlive() const {
@@ -163,14 +179,6 @@ uint8_t Px4::Handle(const mav::CommandLong& m) {
       return SetInterval(m);
   }
   return Code(mav::MavResult::UNSUPPORTED);
-}
-
-uint8_t Px4::SetInterval(const mav::CommandLong& m) {
-  const auto id = static_cast<uint32_t>(m.param1);
-  if (id == mav::RcChannels::kId) return Code(mav::MavResult::FAILED);  // it has no receiver
-  intervals_[id] = static_cast<int64_t>(m.param2);
-  seen_.rates[id] = 1e6 / static_cast<double>(m.param2);
-  return Code(mav::MavResult::ACCEPTED);
 }
 
 // The switch succeeds without a stream while disarmed: arming is what is then refused.
@@ -277,7 +285,7 @@ Px4Demand Px4::OffboardDemand(const Px4Body& body) const {
   const mav::SetAttitudeTarget& m = *seen_.setpoint;
   Px4Demand demand;
   demand.motors = true;
-  demand.thrust = kGravity * static_cast<double>(m.thrust) / options_.hover;
+  demand.thrust = kGravity * std::clamp(static_cast<double>(m.thrust), 0.0, 1.0) / options_.hover;
   const auto ignored = static_cast<uint8_t>(mav::AttitudeTargetTypemask::ATTITUDE_IGNORE);
   if ((m.type_mask & ignored) != 0) {  // body rates: no attitude error is left to mend
     demand.R_WB = body.R_WB;
@@ -311,74 +319,6 @@ Px4Demand Px4::OwnDemand(const Px4Body& body) const {
   demand.R_WB = math::FromZAxisAndYaw(push, hold_yaw_);
   demand.thrust = push.norm();
   return demand;
-}
-
-bool Px4::Due(uint32_t id) {
-  const auto interval = intervals_.find(id);
-  if (interval == intervals_.end()) return false;
-  int64_t& next = next_[id];
-  if (now_ < next) return false;
-  next = std::max(next + interval->second, now_ - interval->second);
-  return true;
-}
-
-void Px4::Stream(int64_t clock) {
-  const int64_t own = Clock(now_);
-  const auto ms = static_cast<uint32_t>(own / 1000);
-  if (Due(mav::Timesync::kId)) Send(mav::Timesync{0, 1000 * Clock(clock), 0, 0});
-  if (Due(mav::HighresImu::kId)) {
-    const Eigen::Vector3f f = mavlink::SwapBody(body_.accel).cast<float>();
-    const Eigen::Vector3f w = mavlink::SwapBody(body_.gyro).cast<float>();
-    mav::HighresImu m;
-    m.time_usec = static_cast<uint64_t>(own);
-    m.xacc = f.x(), m.yacc = f.y(), m.zacc = f.z();
-    m.xgyro = w.x(), m.ygyro = w.y(), m.zgyro = w.z();
-    m.fields_updated = 0x3F;
-    Send(m);
-  }
-  if (Due(mav::AttitudeQuaternion::kId)) {
-    const Eigen::Quaternionf q = mavlink::SwapFrames(body_.R_WB).cast<float>();
-    mav::AttitudeQuaternion m;
-    m.time_boot_ms = ms;
-    m.q1 = q.w(), m.q2 = q.x(), m.q3 = q.y(), m.q4 = q.z();
-    Send(m);
-  }
-  if (Due(mav::LocalPositionNed::kId)) {
-    const Eigen::Vector3f p = mavlink::SwapWorld(body_.p_WB).cast<float>();
-    const Eigen::Vector3f v = mavlink::SwapWorld(body_.v_WB).cast<float>();
-    Send(mav::LocalPositionNed{ms, p.x(), p.y(), p.z(), v.x(), v.y(), v.z()});
-  }
-  StreamState();
-}
-
-void Px4::StreamState() {
-  if (Due(mav::Heartbeat::kId)) {
-    const auto state = !armed_     ? mav::MavState::STANDBY
-                       : failsafe_ ? mav::MavState::CRITICAL
-                                   : mav::MavState::ACTIVE;
-    mav::Heartbeat m;
-    m.type = static_cast<uint8_t>(mav::MavType::QUADROTOR);
-    m.autopilot = static_cast<uint8_t>(options_.autopilot);
-    m.custom_mode = mode_.custom_mode();
-    m.base_mode = static_cast<uint8_t>(1 | (armed_ ? 128 : 0));
-    m.system_status = static_cast<uint8_t>(state);
-    m.mavlink_version = 3;
-    Send(m);
-  }
-  if (Due(mav::ExtendedSysState::kId))
-    Send(mav::ExtendedSysState{0, static_cast<uint8_t>(landed_ ? 1 : 2)});
-  const auto percent = static_cast<int8_t>(std::floor(100.0 * body_.charge + 1e-9));
-  if (Due(mav::SysStatus::kId)) {
-    mav::SysStatus m;
-    m.voltage_battery = static_cast<uint16_t>(14'000.0 + 2'800.0 * body_.charge);  // four cells
-    m.battery_remaining = percent;
-    Send(m);
-  }
-  if (Due(mav::BatteryStatus::kId)) {
-    mav::BatteryStatus m;
-    m.battery_remaining = percent;
-    Send(m);
-  }
 }
 
 std::vector<Px4::Bytes> Px4::TakeOutgoing() { return std::exchange(outgoing_, {}); }

@@ -5,6 +5,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "common/mavlink/framing.h"
@@ -76,7 +77,7 @@ class Px4 {
   mavlink::Mode mode() const { return mode_; }
   bool landed() const { return landed_; }
   int64_t Clock(int64_t utime) const;  ///< its own, microseconds
-  /// The host's time of a companion's stamp, by TIMESYNC; none: not known yet.
+  /// The host's time of a stamp of whoever sends ODOMETRY, by TIMESYNC; none: not known yet.
   std::optional<int64_t> HostTime(int64_t companion_us) const;
 
   /// What came in.
@@ -93,8 +94,11 @@ class Px4 {
 
  private:
   void OnFrame(const mavlink::Frame& frame, int64_t clock);
-  void OnSetpoint(const mavlink::mav::SetAttitudeTarget& m);
-  void OnTimesync(const mavlink::mav::Timesync& m, int64_t clock);
+  void OnSetpoint(const mavlink::mav::SetAttitudeTarget& message);
+  using Sender = std::pair<uint8_t, uint8_t>;  // system, component
+  static Sender SenderOf(const mavlink::Frame& frame) { return {frame.system, frame.component}; }
+  void OnOdometry(const mavlink::mav::Odometry& m, Sender sender);
+  void OnTimesync(const mavlink::mav::Timesync& m, Sender sender, int64_t clock);
   void OnCommand(const mavlink::mav::CommandLong& m, const mavlink::Frame& frame);
   uint8_t Handle(const mavlink::mav::CommandLong& m);
   uint8_t SetInterval(const mavlink::mav::CommandLong& m);
@@ -111,8 +115,15 @@ class Px4 {
   void Stream(int64_t clock);
   void StreamState();
   bool Due(uint32_t id);
+  static const std::map<uint32_t, int64_t>& DefaultIntervals();
   template <class M>
-  void Send(const M& message);
+  void Send(const M& message) {
+    if (version_2_ || M::kId > 255)
+      outgoing_.push_back(writer_.Write(now_, message));
+    else
+      outgoing_.push_back(InVersion1(M::kId, M::kBaseLength, mavlink::ToPayload(message)));
+  }
+  Bytes InVersion1(uint32_t id, std::size_t length, const mavlink::Payload& payload);
   void Say(const std::string& text, uint8_t severity);
 
   Px4Options options_;
@@ -122,7 +133,8 @@ class Px4 {
   uint8_t sequence_1_ = 0;
   bool version_2_;
   int64_t boot_, now_;
-  std::optional<int64_t> companion_offset_;  // its clock minus ours, us
+  std::map<Sender, int64_t> offsets_;  // clocks of those who answer TIMESYNC minus ours, us
+  Sender vision_sender_{};             // of the last ODOMETRY
   mavlink::Mode mode_, intended_;
   bool armed_ = false, failsafe_ = false, landed_ = true, has_flown_ = false, drained_ = false;
   int64_t first_setpoint_ = 0, last_setpoint_ = 0, landed_since_ = 0, down_since_ = 0;

@@ -31,13 +31,15 @@ uint64_t Key(const sockaddr_in& address) {
 
 }  // namespace
 
-UdpSocket::UdpSocket(const std::string& host, int port, int own_port)
-    : fd_(socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0)) {
+// Whoever sends to its own host hears its own host alone.
+UdpSocket::UdpSocket(const std::string& host, int port, int own_port) {
   const in_addr_t ip = inet_addr(host.c_str());
   if (ip == INADDR_NONE)
     throw std::runtime_error("hardware.host " + host + " is no address; write 127.0.0.1");
+  fd_ = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
   to_ = Address(ip, port);
-  const sockaddr_in own = Address(htonl(INADDR_ANY), own_port);
+  const bool local = ntohl(ip) >> IN_CLASSA_NSHIFT == IN_LOOPBACKNET;
+  const sockaddr_in own = Address(htonl(local ? INADDR_LOOPBACK : INADDR_ANY), own_port);
   if (fd_ >= 0 && bind(fd_, Raw(own), sizeof own) == 0) return;
   const std::string why = std::strerror(errno);
   if (fd_ >= 0) close(fd_);

@@ -12,7 +12,8 @@ namespace chase::simulator {
 /// Datagrams to one address and to whoever has written lately.
 class UdpSocket {
  public:
-  /// `own_port` 0: any. Throws std::runtime_error with one line that says what and how to mend it.
+  /// `own_port` 0: any; of the loopback alone where `host` is on it. Throws std::runtime_error with
+  /// one line that says what and how to mend it.
   UdpSocket(const std::string& host, int port, int own_port);
   ~UdpSocket();
   UdpSocket(const UdpSocket&) = delete;
@@ -27,7 +28,7 @@ class UdpSocket {
     sockaddr_in address;
     int64_t heard;
   };
-  int fd_;
+  int fd_ = -1;
   sockaddr_in to_{};
   std::map<uint64_t, Peer> others_;  // by address and port
 };

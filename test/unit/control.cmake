@@ -1,4 +1,4 @@
-chase_test(control_test LIBS control_core
+chase_test(control_test LIBS control_core log_tools config
   SOURCES ${CMAKE_CURRENT_LIST_DIR}/control_test.cpp ${CMAKE_CURRENT_LIST_DIR}/control_law_test.cpp
           ${CMAKE_CURRENT_LIST_DIR}/control_plan_test.cpp
           ${CMAKE_CURRENT_LIST_DIR}/control_lost_test.cpp

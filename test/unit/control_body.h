@@ -16,6 +16,8 @@ struct Body {
   double drag = 0.25;                              // 1/s, against the air
   double mass_factor = 1.0;                        // true over assumed mass
   int latency_ms = 0;                              // of a setpoint
+  // The motors give 1 + thrust_error + thrust_curve (asked / 9.81 - 1) of what they are asked.
+  double thrust_error = 0.0, thrust_curve = 0.0;
   // What the vehicle is like.
   double attitude_gain = 6.5;          // 1/s
   double rate_time_constant = 0.05;    // s
@@ -47,7 +49,8 @@ struct Body {
         (2.0 * attitude_gain * error.vec() + s.w_WB_B).cwiseMax(-4.0).cwiseMin(4.0);
     w += dt / rate_time_constant * (wanted - w);
     thrust += dt / thrust_time_constant * (s.thrust - thrust);
-    a = q * Eigen::Vector3d(0, 0, thrust / mass_factor) - drag * (v - wind) -
+    const double given = thrust * (1.0 + thrust_error + thrust_curve * (thrust / 9.81 - 1.0));
+    a = q * Eigen::Vector3d(0, 0, given / mass_factor) - drag * (v - wind) -
         Eigen::Vector3d(0, 0, 9.81);
     p += dt * v + 0.5 * dt * dt * a;
     v += dt * a;

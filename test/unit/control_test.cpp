@@ -5,7 +5,9 @@
 #include <limits>
 #include <vector>
 
+#include "common/config/config.h"
 #include "common/math/rotation.h"
+#include "logs/src/identify.h"
 #include "services/control/controller.h"
 #include "test/unit/control_body.h"
 
@@ -52,7 +54,15 @@ struct Error {
   double rms = 0.0, peak = 0.0;
 };
 
-Error FlyCircle(Body body, double from, double to, const ControlConfig& config = {}) {
+/// What a log of the flight would hold.
+void Record(double t, const Body& body, const Setpoint& asked, logs::FlightSamples* flight) {
+  const Vector3d force = body.q.conjugate() * (body.a + Vector3d(0, 0, 9.81));
+  flight->motions.push_back({t, force, body.w, body.v, body.q, 0.0, 0});
+  flight->asked.push_back({t, asked.R_WB, asked.w_WB_B, asked.thrust});
+}
+
+Error FlyCircle(Body body, double from, double to, const ControlConfig& config = {},
+                logs::FlightSamples* flight = nullptr) {
   Controller controller(config);
   double sum = 0.0;
   int n = 0;
@@ -61,6 +71,7 @@ Error FlyCircle(Body body, double from, double to, const ControlConfig& config =
     const double t = i * kStep;
     if (i % 8 == 0) controller.AddPlan(CirclePlan(t));  // a plan every 40 ms
     const auto setpoint = controller.Update(t, body.Measured(), Health::kUsable);
+    if (flight != nullptr) Record(t, body, *setpoint, flight);
     body.Step(*setpoint);
     const Vector3d wanted(2 * std::cos(t + kStep), 2 * std::sin(t + kStep), 1.0);
     if (t < from) continue;
@@ -108,6 +119,24 @@ TEST(ControlLoop, FliesCircleInWindWithWrongMass) {
   Report("wind 3 m/s, mass +5 %, 20 ms:", e);
   EXPECT_LT(e.rms, 0.06);
   EXPECT_LT(e.peak, 0.12);
+}
+
+// The controller's own figures, then what its first flight told of the vehicle.
+TEST(ControlLoop, FliesCircleByWhatTheFirstOneTold) {
+  Body body = OnCircle();
+  body.drag = 1.0;
+  body.thrust_error = -0.1, body.thrust_curve = 0.1;
+  logs::FlightSamples flight;
+  const Error before = FlyCircle(body, 3.0, 20.0, {}, &flight);
+  Report("drag 1 /s, thrust -10 %:", before);
+  const auto found = logs::Identify(flight);
+  ASSERT_TRUE(found);
+  ControlConfig identified;
+  config::LoadText(logs::ControlFile(*found, "the first circle"), "identified", &identified);
+  const Error after = FlyCircle(body, 3.0, 20.0, identified);
+  Report("the same, identified:", after);
+  EXPECT_LE(after.rms, 0.08);
+  EXPECT_GT(before.rms, 2.0 * after.rms) << "nothing to identify";
 }
 
 TEST(ControlLoop, ErrorBoundHoldsForTheHalfSecondToCome) {

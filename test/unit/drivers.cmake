@@ -1,3 +1,9 @@
+if(TARGET simulator_hardware)
+  chase_test(simulator_px4_test LIBS simulator_hardware
+    SOURCES ${CMAKE_CURRENT_LIST_DIR}/simulator_px4_test.cpp)
+  set_tests_properties(simulator_px4_test PROPERTIES RUN_SERIAL TRUE)  # a UDP port
+endif()
+
 # The simulator's devices and the drivers that read them.
 if(TARGET simulator_hardware AND TARGET lidar_core AND TARGET camera_source)
   chase_test(drivers_test LIBS simulator_hardware scenario lidar_core camera_source

@@ -4,6 +4,9 @@ chase_test(logs_tools_test
 chase_test(logs_info_test
   LIBS log_tools
   SOURCES ${CMAKE_CURRENT_LIST_DIR}/logs_info_test.cpp)
+chase_test(logs_identify_test
+  LIBS log_tools control_core config
+  SOURCES ${CMAKE_CURRENT_LIST_DIR}/logs_identify_test.cpp)
 chase_test(logs_metrics_test
   LIBS metrics nlohmann_json::nlohmann_json
   SOURCES ${CMAKE_CURRENT_LIST_DIR}/logs_metrics_test.cpp)

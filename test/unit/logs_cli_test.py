@@ -322,7 +322,7 @@ class LogTools(unittest.TestCase):
 
     def test_every_command_has_help(self):
         for command in ("info", "import", "export", "diff", "cut", "filter", "merge", "repair",
-                        "migrate", "verify"):
+                        "migrate", "verify", "identify"):
             self.assertIn("Usage:", self.good(command, "--help"))
 
 

@@ -1,0 +1,107 @@
+#include "logs/src/identify.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "common/config/config.h"
+#include "services/control/control_config.h"
+
+namespace chase::logs {
+namespace {
+
+// Twice the uncertainty may cost control 0.03 m, a quarter of its tracking tube: by its
+// position_gain of 6 1/s^2 that is an acceleration of 0.18 m/s^2.
+constexpr double kDragEnough = 0.045;      // 1/s, at 2 m/s
+constexpr double kScaleEnough = 0.01;      // of gravity
+constexpr double kCurvatureEnough = 0.04;  // at a tilt of 35 degrees, 22 % beyond the hover
+constexpr double kTimeEnough = 0.005;      // s: a setpoint's period
+constexpr double kGainEnough = 0.5;        // 1/s: of a lag of 1/6.5 s by a period and more
+constexpr double kShareEnough = 0.05;      // of a lag of 1/6.5 s by a period and more
+
+struct Row {
+  const char *name, *unit;
+  Parameter parameter;
+  double enough;        // uncertainty
+  const char* excited;  // by what motion
+};
+
+std::vector<Row> Rows(const Identification& i) {
+  const char* const level = "level flight to and fro at 1 m/s and more, on two courses";
+  const char* const climbs = "climbs and descents at 1 m/s";
+  const char* const agile = "quick turns and changes of speed";
+  return {{"drag, horizontal", "1/s", i.drag_horizontal, kDragEnough, level},
+          {"  forward", "1/s", i.drag_forward, kDragEnough, "level flight nose first"},
+          {"  sideways", "1/s", i.drag_sideways, kDragEnough, "level flight sideways"},
+          {"drag, vertical", "1/s", i.drag_vertical, kDragEnough, climbs},
+          {"hover thrust", "m/s^2", i.hover_thrust, kScaleEnough * i.hover_thrust.value, climbs},
+          {"thrust scale", "", i.thrust_scale, kScaleEnough, climbs},
+          {"thrust curvature", "", i.thrust_curvature, kCurvatureEnough, climbs},
+          {"thrust lag", "s", i.thrust_lag, kTimeEnough, climbs},
+          {"attitude gain", "1/s", i.attitude_gain, kGainEnough, agile},
+          {"rates followed", "", i.rate_share, kShareEnough, agile},
+          {"rate lag", "s", i.rate_lag, kTimeEnough, agile},
+          {"lead", "s", i.lead, kTimeEnough, agile}};
+}
+
+bool Told(const Parameter& p, double enough) {
+  return std::isfinite(p.value) && p.sigma <= enough;  // false for NaN
+}
+
+std::string Line(const Row& row, double seconds) {
+  std::string text = fmt::format("{:<18} {:>8.4f} +- {:<8.4f} {:<6}", row.name, row.parameter.value,
+                                 row.parameter.sigma, row.unit);
+  if (!Told(row.parameter, row.enough)) {
+    const double more = row.parameter.sigma / row.enough;
+    text +=
+        fmt::format(" not told, +- {:.3g} is needed: {}, {:.1f} times as strong or for {:.0f} s",
+                    row.enough, row.excited, more, std::ceil(seconds * more * more));
+  }
+  return text.substr(0, text.find_last_not_of(' ') + 1) + "\n";
+}
+
+std::string PlusMinus(const Parameter& p) { return fmt::format("+- {:.2g}", p.sigma); }
+
+// Within what control takes: a drag may come out somewhat below nothing.
+double Rounded(double value, double low, double high) {
+  return std::round(std::clamp(value, low, high) * 1e4) / 1e4;
+}
+
+}  // namespace
+
+std::string Format(const Identification& i) {
+  std::string text = fmt::format(
+      "{:.1f} s of flight; speed forward {:.2f}, sideways {:.2f}, vertical {:.2f} m/s rms\n",
+      i.seconds, i.speeds.x(), i.speeds.y(), i.speeds.z());
+  for (const Row& row : Rows(i)) text += Line(row, i.seconds);
+  if (Told(i.thrust_scale, kScaleEnough))
+    text += fmt::format("chase-fcu's hover_thrust: times {:.3f}\n", 1.0 / i.thrust_scale.value);
+  return text;
+}
+
+std::string ControlFile(const Identification& i, const std::string& origin) {
+  const bool level = Told(i.drag_horizontal, kDragEnough);
+  const bool vertical = Told(i.drag_vertical, kDragEnough);
+  control::ControlConfig config;
+  std::string text;
+  if (level || vertical) {
+    const double xy = level ? Rounded(i.drag_horizontal.value, 0.0, 5.0) : config.drag.x();
+    const double z = vertical ? Rounded(i.drag_vertical.value, 0.01, 5.0) : config.drag.z();
+    const std::string own = "as control has it: the flight does not tell";
+    text += fmt::format("drag: [{0}, {0}, {1}]  # 1/s; x and y {2}; z {3}\n", xy, z,
+                        level ? PlusMinus(i.drag_horizontal) : own,
+                        vertical ? PlusMinus(i.drag_vertical) : own);
+  }
+  if (Told(i.lead, kTimeEnough))
+    text += fmt::format("lead: {}  # s; {}\n", Rounded(i.lead.value, 0.0, 0.3), PlusMinus(i.lead));
+  if (text.empty()) return text;
+  config::LoadText(text, origin, &config);  // as control will read it
+  return fmt::format(
+             "# By chase-log identify from {}, {:.1f} s of flight; standard uncertainties.\n",
+             origin, i.seconds) +
+         text;
+}
+
+}  // namespace chase::logs

@@ -1,0 +1,119 @@
+// What the autopilot sends by itself, and how often.
+#include <algorithm>
+#include <cmath>
+
+#include "common/mavlink/frames.h"
+#include "services/simulator/px4.h"
+
+namespace chase::simulator {
+namespace {
+
+namespace mav = mavlink::mav;
+
+constexpr double kMostId = 0xFFFFFF;  // of a MAVLink 2 message
+
+uint8_t Code(mav::MavResult r) { return static_cast<uint8_t>(r); }
+
+}  // namespace
+
+/// Of a companion link before anything is asked for, us.
+const std::map<uint32_t, int64_t>& Px4::DefaultIntervals() {
+  static const std::map<uint32_t, int64_t> intervals = {{mav::Heartbeat::kId, 1'000'000},
+                                                        {mav::HighresImu::kId, 20'000},
+                                                        {mav::AttitudeQuaternion::kId, 20'000},
+                                                        {mav::LocalPositionNed::kId, 100'000},
+                                                        {mav::ExtendedSysState::kId, 1'000'000},
+                                                        {mav::SysStatus::kId, 1'000'000},
+                                                        {mav::Timesync::kId, 100'000}};
+  return intervals;
+}
+
+// mavlink.io, MAV_CMD_SET_MESSAGE_INTERVAL: us; -1 ends the stream, 0 asks for the default rate.
+uint8_t Px4::SetInterval(const mav::CommandLong& m) {
+  const auto number = static_cast<double>(m.param1), interval = static_cast<double>(m.param2);
+  const bool sound = number >= 0.0 && number <= kMostId && interval <= INT32_MAX &&
+                     (interval >= 0.0 || interval == -1.0);  // all false for NaN
+  if (!sound) return Code(mav::MavResult::DENIED);
+  const auto id = static_cast<uint32_t>(number);
+  if (id == mav::RcChannels::kId) return Code(mav::MavResult::FAILED);  // it has no receiver
+  const auto usual = DefaultIntervals().find(id);
+  intervals_.erase(id);
+  next_.erase(id);
+  if (interval > 0.0)
+    intervals_[id] = std::max<int64_t>(1, static_cast<int64_t>(interval));
+  else if (interval == 0.0 && usual != DefaultIntervals().end())
+    intervals_.insert(*usual);
+  const auto now = intervals_.find(id);
+  seen_.rates[id] = now == intervals_.end() ? 0.0 : 1e6 / static_cast<double>(now->second);
+  return Code(mav::MavResult::ACCEPTED);
+}
+
+bool Px4::Due(uint32_t id) {
+  const auto interval = intervals_.find(id);
+  if (interval == intervals_.end()) return false;
+  int64_t& next = next_[id];
+  if (now_ < next) return false;
+  next = std::max(next + interval->second, now_ - interval->second);
+  return true;
+}
+
+void Px4::Stream(int64_t clock) {
+  const int64_t own = Clock(now_);
+  const auto ms = static_cast<uint32_t>(own / 1000);
+  if (Due(mav::Timesync::kId)) Send(mav::Timesync{0, 1000 * Clock(clock), 0, 0});
+  if (Due(mav::HighresImu::kId)) {
+    const Eigen::Vector3f f = mavlink::SwapBody(body_.accel).cast<float>();
+    const Eigen::Vector3f w = mavlink::SwapBody(body_.gyro).cast<float>();
+    mav::HighresImu m;
+    m.time_usec = static_cast<uint64_t>(own);
+    m.xacc = f.x(), m.yacc = f.y(), m.zacc = f.z();
+    m.xgyro = w.x(), m.ygyro = w.y(), m.zgyro = w.z();
+    m.fields_updated = 0x3F;
+    Send(m);
+  }
+  if (Due(mav::AttitudeQuaternion::kId)) {
+    const Eigen::Quaternionf q = mavlink::SwapFrames(body_.R_WB).cast<float>();
+    mav::AttitudeQuaternion m;
+    m.time_boot_ms = ms;
+    m.q1 = q.w(), m.q2 = q.x(), m.q3 = q.y(), m.q4 = q.z();
+    Send(m);
+  }
+  if (Due(mav::LocalPositionNed::kId)) {
+    const Eigen::Vector3f p = mavlink::SwapWorld(body_.p_WB).cast<float>();
+    const Eigen::Vector3f v = mavlink::SwapWorld(body_.v_WB).cast<float>();
+    Send(mav::LocalPositionNed{ms, p.x(), p.y(), p.z(), v.x(), v.y(), v.z()});
+  }
+  StreamState();
+}
+
+void Px4::StreamState() {
+  if (Due(mav::Heartbeat::kId)) {
+    const auto state = !armed_     ? mav::MavState::STANDBY
+                       : failsafe_ ? mav::MavState::CRITICAL
+                                   : mav::MavState::ACTIVE;
+    mav::Heartbeat m;
+    m.type = static_cast<uint8_t>(mav::MavType::QUADROTOR);
+    m.autopilot = static_cast<uint8_t>(options_.autopilot);
+    m.custom_mode = mode_.custom_mode();
+    m.base_mode = static_cast<uint8_t>(1 | (armed_ ? 128 : 0));
+    m.system_status = static_cast<uint8_t>(state);
+    m.mavlink_version = 3;
+    Send(m);
+  }
+  if (Due(mav::ExtendedSysState::kId))
+    Send(mav::ExtendedSysState{0, static_cast<uint8_t>(landed_ ? 1 : 2)});
+  const auto percent = static_cast<int8_t>(std::floor(100.0 * body_.charge + 1e-9));
+  if (Due(mav::SysStatus::kId)) {
+    mav::SysStatus m;
+    m.voltage_battery = static_cast<uint16_t>(14'000.0 + 2'800.0 * body_.charge);  // four cells
+    m.battery_remaining = percent;
+    Send(m);
+  }
+  if (Due(mav::BatteryStatus::kId)) {
+    mav::BatteryStatus m;
+    m.battery_remaining = percent;
+    Send(m);
+  }
+}
+
+}  // namespace chase::simulator

@@ -1,0 +1,222 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <map>
+#include <string>
+
+#include "common/mavlink/framing.h"
+#include "services/simulator/px4.h"
+#include "services/simulator/udp_socket.h"
+
+namespace chase::simulator {
+namespace {
+
+namespace mav = mavlink::mav;
+
+constexpr int64_t kStart = 1'700'000'000'000'000;  // us
+constexpr int kPort = 45'873;
+constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
+
+/// The autopilot and those who write to it.
+class Link {
+ public:
+  Link() : px4_(Options(), kStart, 1) {}
+
+  template <class M>
+  void Send(const M& message, uint8_t system = 1, uint8_t component = 191) {
+    mavlink::FrameWriter writer(system, component);
+    px4_.Receive(now_, writer.Write(now_, message));
+  }
+
+  /// Messages of each type that it sends in a second.
+  std::map<uint32_t, int> Second() {
+    std::map<uint32_t, int> count;
+    mavlink::FrameReader reader;
+    for (int i = 0; i < 400; ++i, now_ += 2'500) {
+      px4_.Tick(now_, now_, {});
+      for (const auto& bytes : px4_.TakeOutgoing())
+        reader.Add(now_, bytes.data(), bytes.size(), [&](const mavlink::Frame& f) {
+          ++count[f.id];
+          if (const auto m = mavlink::As<mav::CommandAck>(f)) result_ = m->result;
+        });
+    }
+    return count;
+  }
+
+  /// The answer to MAV_CMD_SET_MESSAGE_INTERVAL.
+  mav::MavResult Ask(float id, float interval) {
+    mav::CommandLong m;
+    m.command = static_cast<uint16_t>(mav::MavCmd::SET_MESSAGE_INTERVAL);
+    m.target_system = m.target_component = 1;
+    m.param1 = id, m.param2 = interval;
+    Send(m);
+    Second();
+    return static_cast<mav::MavResult>(result_);
+  }
+
+  /// A companion whose clock is `ahead` us of the host's answers to TIMESYNC.
+  void Answer(uint8_t system, uint8_t component, int64_t ahead) {
+    for (int i = 0; i < 50; ++i)
+      Send(mav::Timesync{1000 * (now_ + ahead), 1000 * px4_.Clock(now_), 0, 0}, system, component);
+  }
+
+  Px4& px4() { return px4_; }
+  int64_t now() const { return now_; }
+
+ private:
+  static Px4Options Options() {
+    Px4Options options;
+    options.starts_in_version_1 = false;
+    return options;
+  }
+
+  Px4 px4_;
+  int64_t now_ = kStart;
+  uint8_t result_ = 255;
+};
+
+const auto kImu = static_cast<float>(mav::HighresImu::kId);
+
+TEST(Px4, StreamsAtTheIntervalThatIsAskedFor) {
+  Link link;
+  EXPECT_NEAR(link.Second()[mav::HighresImu::kId], 50, 2);
+  EXPECT_EQ(link.Ask(kImu, 10'000.0f), mav::MavResult::ACCEPTED);
+  EXPECT_NEAR(link.Second()[mav::HighresImu::kId], 100, 1);
+  EXPECT_EQ(link.Ask(kImu, -1.0f), mav::MavResult::ACCEPTED);  // no more
+  EXPECT_EQ(link.Second()[mav::HighresImu::kId], 0);
+  EXPECT_EQ(link.Ask(kImu, 0.0f), mav::MavResult::ACCEPTED);  // as at first
+  EXPECT_NEAR(link.Second()[mav::HighresImu::kId], 50, 2);
+  const auto unusual = static_cast<float>(mav::BatteryStatus::kId);  // its default rate is none
+  EXPECT_EQ(link.Ask(unusual, 100'000.0f), mav::MavResult::ACCEPTED);
+  EXPECT_NEAR(link.Second()[mav::BatteryStatus::kId], 10, 1);
+  EXPECT_EQ(link.Ask(unusual, 0.0f), mav::MavResult::ACCEPTED);
+  EXPECT_EQ(link.Second()[mav::BatteryStatus::kId], 0);
+}
+
+TEST(Px4, RefusesIntervalsThatAreNone) {
+  Link link;
+  for (const float interval : {kNaN, kInfinity, -kInfinity, -2.0f, -0.5f, 1e30f})
+    EXPECT_EQ(link.Ask(kImu, interval), mav::MavResult::DENIED) << interval;
+  for (const float id : {kNaN, kInfinity, -1.0f, 1e9f})
+    EXPECT_EQ(link.Ask(id, 10'000.0f), mav::MavResult::DENIED) << id;
+  EXPECT_NEAR(link.Second()[mav::HighresImu::kId], 50, 2);
+}
+
+mav::Odometry Vision() {
+  mav::Odometry m;
+  m.q = {1.0f, 0.0f, 0.0f, 0.0f};
+  m.x = 3.0f;
+  return m;
+}
+
+TEST(Px4, TakesNoPoseThatIsNotFinite) {
+  Link link;
+  link.Send(Vision());
+  ASSERT_EQ(link.px4().seen().odometry, 1);
+  for (const float bad : {kNaN, kInfinity})
+    for (int field = 0; field < 7; ++field) {
+      mav::Odometry m = Vision();
+      (field == 0   ? m.x
+       : field == 1 ? m.y
+       : field == 2 ? m.z
+                    : m.q[static_cast<size_t>(field - 3)]) = bad;
+      link.Send(m);
+      EXPECT_EQ(link.px4().seen().odometry, 1) << field;
+      EXPECT_EQ(link.px4().seen().vision->x, 3.0f) << field;
+    }
+  mav::Odometry m = Vision();
+  m.vx = m.pose_covariance[0] = kNaN;  // not known, which is no fault
+  link.Send(m);
+  EXPECT_EQ(link.px4().seen().odometry, 2);
+}
+
+/// Its demand under OFFBOARD by a setpoint with this thrust.
+Px4Demand DemandFor(float thrust) {
+  Link link;
+  mav::SetAttitudeTarget m;
+  m.q = {1.0f, 0.0f, 0.0f, 0.0f};
+  m.target_system = 1;
+  m.thrust = thrust;
+  link.px4().PilotMode(mavlink::kOffboardMode);
+  link.px4().PilotArms(true);
+  link.Send(m);
+  return link.px4().Demand({});
+}
+
+TEST(Px4, ThrustIsAShare) {
+  const double most = 9.81 / Px4Options{}.hover;
+  EXPECT_NEAR(DemandFor(0.5f).thrust, 9.81, 1e-6);
+  EXPECT_NEAR(DemandFor(7.0f).thrust, most, 1e-6);
+  EXPECT_NEAR(DemandFor(-1.0f).thrust, 0.0, 1e-6);
+}
+
+TEST(Px4, TakesNoSetpointThatIsNotFinite) {
+  for (const float bad : {kNaN, kInfinity}) {
+    Link link;
+    mav::SetAttitudeTarget m;
+    m.q = {1.0f, 0.0f, 0.0f, 0.0f};
+    m.thrust = bad;
+    link.Send(m);
+    m.thrust = 0.5f;
+    m.q[2] = bad;
+    link.Send(m);
+    EXPECT_EQ(link.px4().seen().setpoints, 0);
+    m.type_mask = static_cast<uint8_t>(mav::AttitudeTargetTypemask::ATTITUDE_IGNORE);
+    link.Send(m);  // rates: the attitude is left out
+    EXPECT_EQ(link.px4().seen().setpoints, 1);
+  }
+}
+
+// A ground station answers as well, by a clock of its own.
+TEST(Px4, TimesOfVisionAreOfTheClockOfItsSender) {
+  Link link;
+  link.Answer(1, 191, 5'000'000);
+  link.Send(Vision());
+  const int64_t stamp = link.now() + 5'000'000;
+  ASSERT_TRUE(link.px4().HostTime(stamp));
+  EXPECT_NEAR(static_cast<double>(*link.px4().HostTime(stamp) - link.now()), 0.0, 1000.0);
+  link.Answer(255, 190, -9'000'000'000);
+  EXPECT_NEAR(static_cast<double>(*link.px4().HostTime(stamp) - link.now()), 0.0, 1000.0);
+}
+
+long OpenFiles() {
+  const std::filesystem::directory_iterator files("/proc/self/fd");
+  return std::distance(begin(files), end(files));
+}
+
+TEST(UdpSocket, LeavesNoFileOpenWhenItFails) {
+  const long before = OpenFiles();
+  EXPECT_THROW(UdpSocket("nowhere", 14540, 0), std::runtime_error);
+  {
+    const UdpSocket first("127.0.0.1", 14540, kPort);
+    EXPECT_THROW(UdpSocket("127.0.0.1", 14540, kPort), std::runtime_error);
+  }
+  EXPECT_EQ(OpenFiles(), before);
+}
+
+/// The address that the port is bound to, as the kernel lists it.
+std::string AddressOf(int port) {
+  char suffix[8];
+  std::snprintf(suffix, sizeof suffix, ":%04X", static_cast<unsigned>(port));
+  std::ifstream list("/proc/net/udp");
+  for (std::string word; list >> word;)
+    if (word.size() == 13 && word.substr(8) == suffix) return word.substr(0, 8);
+  return "none";
+}
+
+TEST(UdpSocket, HearsItsOwnHostAloneWhereItSendsThere) {
+  {
+    const UdpSocket local("127.0.0.1", 14540, kPort);
+    EXPECT_EQ(AddressOf(kPort), "0100007F");
+  }
+  const UdpSocket wide("192.0.2.1", 14540, kPort);
+  EXPECT_EQ(AddressOf(kPort), "00000000");
+}
+
+}  // namespace
+}  // namespace chase::simulator
