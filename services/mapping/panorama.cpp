@@ -76,20 +76,12 @@ bool Panorama::Sees(const Eigen::Vector2d& p, double z) const {
   const double range = d.norm();
   if (bins_.empty()) return true;
   if (!(range > 0.0)) return false;
+  const auto beyond =
+      static_cast<size_t>(std::min(static_cast<int>(range / kBand) + 1, kBands - 1));
   return !Any(d, [&](size_t b) { return bins_[b].first < range - kInFront; }) &&
-         Any(d, [&](size_t b) { return Lowest(b, range) <= z; });
-}
-
-double Panorama::PassedOver(const Eigen::Vector2d& p) const {
-  const Eigen::Vector2d d = p - origin_;
-  if (bins_.empty()) return INFINITY;
-  return Lowest(static_cast<size_t>(0.25 * kBins * Diamond(d.x(), d.y())) % kBins, d.norm());
-}
-
-double Panorama::Lowest(size_t bin, double range) const {
-  if (!(bins_[bin].farthest > range)) return INFINITY;
-  const int beyond = std::min(static_cast<int>(range / kBand) + 1, kBands - 1);
-  return height_ + lowest_[bin * kBands + static_cast<size_t>(beyond)] * range;
+         Any(d, [&](size_t b) {
+           return bins_[b].farthest > range && height_ + lowest_[b * kBands + beyond] * range <= z;
+         });
 }
 
 }  // namespace chase::mapping

@@ -19,8 +19,6 @@ class Panorama {
   /// True where rays went through p, or passed beside it, no higher than z: what is there and as
   /// high would have been seen. Before the first sweep everywhere.
   bool Sees(const Eigen::Vector2d& p, double z) const;
-  /// Height of the lowest ray that went beyond p over it, frame W, m; infinite where none did.
-  double PassedOver(const Eigen::Vector2d& p) const;
   const Eigen::Vector2d& origin() const { return origin_; }
 
  private:
@@ -36,9 +34,6 @@ class Panorama {
   /// matters.
   template <class Check>
   bool Any(const Eigen::Vector2d& d, Check check) const;
-
-  /// Of the rays of a bin that went beyond `range` the lowest's height there.
-  double Lowest(size_t bin, double range) const;
 
   Eigen::Vector2d origin_ = Eigen::Vector2d::Zero();
   double height_ = 0.0;  ///< of the sensor, frame W, m

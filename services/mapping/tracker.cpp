@@ -1,8 +1,6 @@
 #include "services/mapping/tracker.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include "common/track/association.h"
@@ -26,7 +24,6 @@ constexpr double kDetected = 0.9;      // probability of a detection of what is 
 constexpr double kClutter = 0.005;  // 1/m^2 new clusters a sweep: five in the 18 m around the drone
 constexpr double kOwn = 20.0;       // likelihood ratio of what lies within a track's outline
 constexpr double kVague = 0.2;      // of returns there that show too few ends of a body
-constexpr double kWithin = 0.5;     // share of the half width that is surely the body's
 constexpr double kBorn = 0.5;       // existence of a new track
 constexpr double kListed = 0.5;     // from which a track is listed
 constexpr double kDead = 0.25;      // below which a track ends
@@ -39,33 +36,6 @@ void Shape(Track* track) {
   track->outline = SmallestEllipse(corners, 0.01, kThinnest);
   track->reach = 0.0;
   for (const auto& q : corners) track->reach = std::max(track->reach, q.norm());
-}
-
-/// The ellipsoid as an upright cylinder from `bottom` to `top`, and the ellipsoid about that.
-void Cap(double top, double bottom, world::Obstacle* o) {
-  const Eigen::Matrix2d level = o->shape.topLeftCorner<2, 2>();
-  const double radius = 1.0 / std::sqrt(level.selfadjointView<Eigen::Upper>().eigenvalues()[0]);
-  o->solid = world::Obstacle::Solid::kCylinder;
-  o->half << radius, radius, 0.5 * (top - bottom);
-  o->center.coefficients(0, 2) = 0.5 * (top + bottom);
-  o->shape = 0.5 * o->half.cwiseAbs2().cwiseInverse().asDiagonal().toDenseMatrix();
-}
-
-/// The middle of the body and both its sides as they are seen.
-std::array<Eigen::Vector2d, 3> Across(const Track& track, const Panorama& panorama, double half) {
-  const Eigen::Vector2d c = track.Outline().center;
-  Eigen::Vector2d across(panorama.origin().y() - c.y(), c.x() - panorama.origin().x());
-  across *= half / std::max(1e-6, across.norm());
-  return {c - across, c, c + across};
-}
-
-/// What has been seen is no higher than the lowest rays that go over all of it. Of what they pass
-/// at its side nothing is learned.
-void LimitTop(const Panorama& panorama, Track* track) {
-  double top = -INFINITY;
-  for (const Eigen::Vector2d& p : Across(*track, panorama, kWithin * track->reach))
-    top = std::max(top, panorama.PassedOver(p));
-  if (top > track->z) track->top = std::min(track->top, top);
 }
 
 }  // namespace
@@ -110,14 +80,17 @@ double Tracker::Ratio(const Track& track, const Cluster& cluster) const {
 
 /// Probability of a detection, from what is in view of the place and its likely width.
 double Tracker::Detection(const Track& track, const Panorama& panorama) const {
-  const double half = std::max(0.7 * track.reach, std::sqrt(track.body.CenterVariance()));
+  const Eigen::Vector2d c = track.Outline().center;
+  Eigen::Vector2d across(panorama.origin().y() - c.y(), c.x() - panorama.origin().x());
+  across *= std::max(0.7 * track.reach, std::sqrt(track.body.CenterVariance())) /
+            std::max(1e-6, across.norm());
   double seen = 0.0;
-  for (const Eigen::Vector2d& p : Across(track, panorama, half))
-    seen += panorama.Sees(p, track.z) / 3.0;
+  for (const double side : {-1.0, 0.0, 1.0})
+    seen += panorama.Sees(c + side * across, track.z) / 3.0;
   return kDetected * seen * seen;
 }
 
-void Tracker::Correct(const Cluster& cluster, const Panorama& panorama, Track* track) const {
+void Tracker::Correct(const Cluster& cluster, Track* track) const {
   const Sight sight = track->body.Correct(cluster.reaches, config_.measurement, kUnseen);
   if (sight.ends < kFewestEnds) return Shape(track);  // may be anything that stands there
   track->rigid += 0.5 * (static_cast<double>(sight.rigid) / sight.ends - track->rigid);
@@ -126,7 +99,6 @@ void Tracker::Correct(const Cluster& cluster, const Panorama& panorama, Track* t
   ++track->row;
   track->z += 0.3 * (cluster.center.z() - track->z);
   Shape(track);
-  LimitTop(panorama, track);
 }
 
 void Tracker::Confirm(Track* track) const {
@@ -181,7 +153,7 @@ void Tracker::Update(const Panorama& panorama, std::vector<Cluster>* clusters) {
     if (assigned[i] >= 0) {
       Cluster& cluster = (*clusters)[static_cast<size_t>(assigned[i])];
       cluster.track = track.id;
-      Correct(cluster, panorama, &track);
+      Correct(cluster, &track);
       Confirm(&track);
     }
     if (track.seen != t_) track.row = 0;
@@ -251,7 +223,6 @@ std::vector<world::Obstacle> Tracker::Obstacles(double middle, double semi_heigh
     o.shape.setZero();
     o.shape.topLeftCorner<2, 2>() = outline.Scaled(grow).shape;
     o.shape(2, 2) = 1.0 / (semi_height * semi_height);
-    if (std::isfinite(track.top)) Cap(track.top, middle - semi_height, &o);
     o.position_covariance = track.body.CenterVariance() * level;
     o.velocity_covariance = track.body.VelocityVariance() * level;
     obstacles.push_back(o);

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <cmath>
 #include <vector>
 
 #include "common/world/obstacle.h"
@@ -15,10 +14,9 @@ namespace chase::mapping {
 struct Track {
   int id = 0;
   BodyFilter body;
-  double z = 0.0;         ///< of the centre, m
-  double top = INFINITY;  ///< no higher than this, m
-  Ellipse outline;        ///< in plan, about body.p()
-  double reach = 0.0;     ///< of the outline's corners from body.p(), m
+  double z = 0.0;      ///< of the centre, m
+  Ellipse outline;     ///< in plan, about body.p()
+  double reach = 0.0;  ///< of the outline's corners from body.p(), m
   Eigen::Vector2d birth = Eigen::Vector2d::Zero();
   double born = 0.0, seen = 0.0, moved = 0.0;  ///< s: first, last detection; last time not at rest
   double known = 0.0;                          ///< s, when it was confirmed
@@ -52,15 +50,15 @@ class Tracker {
   /// True while returns of this track are to be kept out of the static map.
   bool Moves(int id) const;
   const std::vector<Track>& tracks() const { return tracks_; }
-  /// Confirmed tracks that are more likely there than not, with a linear centre: as upright
-  /// ellipsoids, or as upright cylinders where rays have passed over them.
+  /// Confirmed tracks that are more likely there than not, as upright ellipsoids with a linear
+  /// centre.
   std::vector<world::Obstacle> Obstacles(double middle, double semi_height, double grow) const;
 
  private:
   bool Rests(const Track& track) const { return t_ - track.moved > config_.settle; }
   double Ratio(const Track& track, const Cluster& cluster) const;
   double Detection(const Track& track, const Panorama& panorama) const;
-  void Correct(const Cluster& cluster, const Panorama& panorama, Track* track) const;
+  void Correct(const Cluster& cluster, Track* track) const;
   void Confirm(Track* track) const;
   void Birth(Cluster* cluster);
   void Unite();

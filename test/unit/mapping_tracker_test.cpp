@@ -133,34 +133,6 @@ TEST(MappingTracker, WhatRaysPassOverStaysListed) {
   }
 }
 
-/// Rays that go over all of a body say how high it is at most; those that pass at its side nothing.
-TEST(MappingTracker, WhatRaysPassOverHasATop) {
-  for (const double low : {0.9, 1.8}) {
-    Tracker tracker(MoverConfig{});
-    for (double t = 0.0; t < 1.5; t += 0.1) {
-      tracker.Predict(t);
-      std::vector<Cluster> clusters = {BoxCluster({1.5 * t - 1.0, 0.0}, 0.3)};
-      tracker.Update(SeenFrom(2.4, low), &clusters);
-    }
-    const auto obstacles = tracker.Obstacles(1.5, 8.0, 1.0);
-    ASSERT_EQ(obstacles.size(), 1u);
-    const world::Obstacle& o = obstacles[0];
-    if (low < 1.0) {
-      EXPECT_EQ(o.solid, world::Obstacle::Solid::kEllipsoid);
-      continue;
-    }
-    EXPECT_EQ(o.solid, world::Obstacle::Solid::kCylinder);
-    EXPECT_GE(o.half.x(), 0.3);
-    const double center = o.center.Position(o.center.start).z();
-    EXPECT_NEAR(center + o.half.z(), 1.8, 0.1);
-    EXPECT_NEAR(center - o.half.z(), 1.5 - 8.0, 1e-9);
-    for (const double up : {-1.0, 1.0}) {  // the ellipsoid is about the cylinder
-      const Eigen::Vector3d rim(o.half.x(), 0.0, up * o.half.z());
-      EXPECT_LE(rim.dot(o.shape * rim), 1.0 + 1e-9);
-    }
-  }
-}
-
 TEST(MappingTracker, WhatStandsIsNeverListed) {
   std::mt19937 random(1);
   std::normal_distribution<double> normal(0.0, 0.05);
