@@ -52,21 +52,6 @@ void Retime(const Obstacle& obstacle, double start, double duration, double sigm
   body->covariance[2] = duration * duration * obstacle.velocity_covariance;
 }
 
-void SetCurve(const Trajectory& trajectory, double start, double duration, Curve* curve) {
-  const double a = (start - trajectory.start) / trajectory.duration;
-  const double b = duration / trajectory.duration;
-  *curve = trajectory.coefficients;
-  if (curve->rows() == 1 || (a == 0.0 && b == 1.0)) return;
-  // tau = a + b sigma: sum_k c_k (a + b sigma)^k by Horner's rule on polynomials.
-  Curve& c = *curve;
-  c.setZero();
-  const Eigen::Index n = c.rows() - 1;
-  for (Eigen::Index k = n; k >= 0; --k) {
-    for (Eigen::Index i = n; i > 0; --i) c.row(i) = a * c.row(i) + b * c.row(i - 1);
-    c.row(0) = a * c.row(0) + trajectory.coefficients.row(k);
-  }
-}
-
 Vector3d SupportPoint(const Body& body, const Vector3d& n) {
   switch (body.kind) {
     case Body::Kind::kEllipsoid: {

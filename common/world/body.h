@@ -43,9 +43,6 @@ Body MakeBody(const Obstacle& obstacle, double start, double duration, double si
 /// The same over another time, for a body that was made of an ellipsoid of the same shape.
 void Retime(const Obstacle& obstacle, double start, double duration, double sigmas, Body* body);
 
-/// `trajectory` over [start, start + duration] in normalised time.
-void SetCurve(const Trajectory& trajectory, double start, double duration, Curve* curve);
-
 /// A point of the solid about the origin, without its uncertainty, where n' x is greatest; n is not
 /// zero.
 Eigen::Vector3d SupportPoint(const Body& body, const Eigen::Vector3d& n);

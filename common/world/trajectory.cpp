@@ -20,15 +20,8 @@ State Trajectory::At(double t) const {
 }
 
 Trajectory Trajectory::Reparametrised(double new_start, double new_duration) const {
-  // tau = a + b sigma: expand sum_k c_k (a + b sigma)^k by Horner's rule on polynomials.
-  const double a = (new_start - start) / duration;
-  const double b = new_duration / duration;
-  Trajectory result{new_start, new_duration, Eigen::MatrixXd::Zero(degree() + 1, 3)};
-  auto& r = result.coefficients;
-  for (int k = degree(); k >= 0; --k) {
-    for (int i = degree(); i > 0; --i) r.row(i) = a * r.row(i) + b * r.row(i - 1);
-    r.row(0) = a * r.row(0) + coefficients.row(k);
-  }
+  Trajectory result{new_start, new_duration, {}};
+  SetCurve(*this, new_start, new_duration, &result.coefficients);
   return result;
 }
 

@@ -31,4 +31,21 @@ struct Trajectory {
   static Trajectory Constant(const Eigen::Vector3d& p, double start, double duration);
 };
 
+/// Coefficients of `trajectory` over [start, start + duration] in normalised time.
+template <class Coefficients>
+void SetCurve(const Trajectory& trajectory, double start, double duration, Coefficients* curve) {
+  const double a = (start - trajectory.start) / trajectory.duration;
+  const double b = duration / trajectory.duration;
+  *curve = trajectory.coefficients;
+  if (curve->rows() == 1 || (a == 0.0 && b == 1.0)) return;
+  // tau = a + b sigma: sum_k c_k (a + b sigma)^k by Horner's rule on polynomials.
+  Coefficients& c = *curve;
+  c.setZero();
+  const Eigen::Index n = c.rows() - 1;
+  for (Eigen::Index k = n; k >= 0; --k) {
+    for (Eigen::Index i = n; i > 0; --i) c.row(i) = a * c.row(i) + b * c.row(i - 1);
+    c.row(0) = a * c.row(0) + trajectory.coefficients.row(k);
+  }
+}
+
 }  // namespace chase::world

@@ -35,7 +35,7 @@ void Panorama::Take(const Eigen::Vector3d& origin, const std::vector<Return>& re
     const size_t b = static_cast<size_t>(0.25 * kBins * Diamond(d.x(), d.y())) % kBins;
     Bin& bin = bins_[b];
     bin.farthest = std::max(bin.farthest, range);
-    const int band = std::min(static_cast<int>(range / static_cast<float>(kBand)), kBands - 1);
+    const int band = static_cast<int>(std::min(range / static_cast<float>(kBand), kBands - 1.0f));
     float& lowest = lowest_[b * kBands + static_cast<size_t>(band)];
     lowest = std::min(lowest, (r.p.z() - static_cast<float>(height_)) / std::max(range, 1e-3f));
     if (r.label == Label::kGround || r.label == Label::kFar) continue;
@@ -75,9 +75,8 @@ bool Panorama::Sees(const Eigen::Vector2d& p, double z) const {
   const Eigen::Vector2d d = p - origin_;
   const double range = d.norm();
   if (bins_.empty()) return true;
-  if (!(range > 0.0)) return false;
-  const auto beyond =
-      static_cast<size_t>(std::min(static_cast<int>(range / kBand) + 1, kBands - 1));
+  const auto beyond = static_cast<size_t>(range / kBand) + 1;
+  if (!(range > 0.0) || beyond >= kBands) return false;
   return !Any(d, [&](size_t b) { return bins_[b].first < range - kInFront; }) &&
          Any(d, [&](size_t b) {
            return bins_[b].farthest > range && height_ + lowest_[b * kBands + beyond] * range <= z;

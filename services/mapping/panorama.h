@@ -23,7 +23,7 @@ class Panorama {
 
  private:
   static constexpr int kBins = 1024;
-  static constexpr int kBands = 80;      ///< of ranges, the last one open
+  static constexpr int kBands = 128;  ///< of ranges, the last one open: beyond it nothing is seen
   static constexpr double kBand = 0.25;  ///< m
   struct Bin {
     float first, second;  ///< m, of the nearest return and of the nearest of another owner

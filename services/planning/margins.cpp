@@ -73,12 +73,12 @@ bool FirstSight::IsBeyond(const Curve& center, const Eigen::Matrix3d& R, const E
          world::SegmentSquaredDistance(p, q, center.row(0).transpose(), R) > limit;
 }
 
-Start::Start(const Problem& problem) : problem_(problem) {
+StartCheck::StartCheck(const Problem& problem) : problem_(problem) {
   start_.center = problem.start.topRows(1);
   seen_.center = problem.target.topRows(1);
 }
 
-bool Start::IsSafe(const Ellipsoid& e, double radius) {
+bool StartCheck::IsSafe(const Ellipsoid& e, double radius) {
   if (!e.body) {
     const Eigen::Vector3d offset = (problem_.start.row(0) - e.center.row(0)).transpose();
     return SquaredNorm(e.safety, offset) > 1.0;
@@ -87,13 +87,13 @@ bool Start::IsSafe(const Ellipsoid& e, double radius) {
   return IsOff(e, nullptr);
 }
 
-bool Start::IsInSight(const Ellipsoid& e, double share) {
+bool StartCheck::IsInSight(const Ellipsoid& e, double share) {
   start_.radius = math::Polynomial::Constant(1, share * problem_.sight_radius);
-  seen_.radius = TargetBall(problem_, share).radius.head(1);
+  seen_.radius = TargetRadius(problem_, share).head(1);
   return IsOff(e, &seen_);
 }
 
-bool Start::IsOff(const Ellipsoid& e, const world::Ball* target) {
+bool StartCheck::IsOff(const Ellipsoid& e, const world::Ball* target) {
   world::Body body = *e.body;
   body.center = body.center.topRows(1).eval();
   body.covariance[1].setZero();
@@ -121,7 +121,7 @@ void ClearStart(const world::Obstacle& o, double growth, const Curve& start, Ell
 }
 
 void RelaxSafety(const world::Obstacle& o, double hard, double margin, double uncertainty,
-                 bool searched, Start* start, Ellipsoid* e, std::string* notes) {
+                 bool searched, StartCheck* start, Ellipsoid* e, std::string* notes) {
   for (double share : kShares) {
     e->safety_radius = hard + share * margin;
     if (share < 1.0 && searched) {
@@ -138,7 +138,7 @@ void RelaxSafety(const world::Obstacle& o, double hard, double margin, double un
 }
 
 void RelaxSight(const world::Obstacle& o, const Growth& growth, const FirstSight& first,
-                const Hull& target, const Problem& problem, Start* start, Ellipsoid* e,
+                const Hull& target, const Problem& problem, StartCheck* start, Ellipsoid* e,
                 std::string* notes) {
   const auto target_is_off = [&](double share) {
     if (IsPlainlyOutside(target, e->center, e->sight_half)) return true;

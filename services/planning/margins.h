@@ -49,10 +49,11 @@ struct FirstSight {
                 double limit) const;
 };
 
-/// Margins that give way at the start: whether what stands at tau = 0 is off the obstacle.
-class Start {
+/// Margins that give way at the start: whether the drone, or its line of sight, is clear of the
+/// obstacle there.
+class StartCheck {
  public:
-  explicit Start(const Problem& problem);
+  explicit StartCheck(const Problem& problem);
   bool IsSafe(const Ellipsoid& e, double radius);
   bool IsInSight(const Ellipsoid& e, double share);
   const Curve& curve() const { return problem_.start; }
@@ -72,12 +73,12 @@ void ClearStart(const world::Obstacle& o, double growth, const Curve& start, Ell
 /// Takes the margin, never the hard radius, back until the start is outside. `searched`: by
 /// ellipsoids too.
 void RelaxSafety(const world::Obstacle& o, double hard, double margin, double uncertainty,
-                 bool searched, Start* start, Ellipsoid* e, std::string* notes);
+                 bool searched, StartCheck* start, Ellipsoid* e, std::string* notes);
 
 /// The largest share of the margin that the target keeps out of, and the line of sight at the start
 /// too, where it keeps out of any.
 void RelaxSight(const world::Obstacle& o, const Growth& growth, const FirstSight& first,
-                const Hull& target, const Problem& problem, Start* start, Ellipsoid* e,
+                const Hull& target, const Problem& problem, StartCheck* start, Ellipsoid* e,
                 std::string* notes);
 
 /// Adds a clause to the notes, if there are any.

@@ -34,8 +34,7 @@ void SetBoxes(const world::Obstacle& o, const Growth& most, Ellipsoid* e) {
   e->sight_half = half + most.sight;
 }
 
-// What depends on the shape alone is kept where the obstacle is what it was. Without a search
-// nothing has to be grown that has a body.
+// What depends on the shape alone is kept where the obstacle is what it was.
 void SetShapes(const PlannerConfig& config, const PlanRequest& request, const world::Obstacle& o,
                const Growth& growth, Ellipsoid* e) {
   const bool same = IsSameShape(e->grown_from, o.shape);
@@ -46,12 +45,10 @@ void SetShapes(const PlannerConfig& config, const PlanRequest& request, const wo
     world::Retime(o, request.t0, request.horizon, config.sigmas, &*e->body);
   else
     e->body = world::MakeBody(o, request.t0, request.horizon, config.sigmas);
-  if (o.ground) {  // heights sort out candidates; no ellipsoid fits a slab
+  // Heights sort out candidates on the ground, as no ellipsoid fits a slab; without a search there
+  // are none.
+  if (o.ground || (!request.asks_sight && e->body)) {
     e->safety = e->sight = kPoint * Eigen::Matrix3d::Identity();
-    e->grown_by[0] = -1.0;
-    return;
-  }
-  if (!request.asks_sight && e->body) {
     e->grown_by[0] = -1.0;
     return;
   }
@@ -120,7 +117,7 @@ Curve StartCurve(const world::State& s, double T) {
 }
 
 // The target's own body, to which no margin is kept.
-void SetTargetBody(const world::Obstacle& o, double hard, Start* start, Problem* problem,
+void SetTargetBody(const world::Obstacle& o, double hard, StartCheck* start, Problem* problem,
                    std::string* notes) {
   Ellipsoid e;
   e.id = kTargetId;
@@ -196,7 +193,7 @@ void MakeProblem(const PlannerConfig& config, const PlanRequest& request, std::s
   const double hard = config.hard_radius(), margin = config.safety_margin;
   const Hull target(problem->target);
   const FirstSight first(*problem);
-  Start start(*problem);
+  StartCheck start(*problem);
   const Box own{target.whole.low.min(first.box.low), target.whole.high.max(first.box.high)};
   for (size_t j = 0; j < request.obstacles.size(); ++j) {
     const world::Obstacle& o = request.obstacles[j];

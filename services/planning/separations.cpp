@@ -17,12 +17,6 @@ std::optional<Box> BoxAround(const Curve& plan) {
 
 Box Union(const Box& a, const Box& b) { return {a.low.min(b.low), a.high.max(b.high)}; }
 
-math::Polynomial TargetRadius(const Problem& problem, double share) {
-  math::Polynomial radius = share * problem.target_growth;
-  radius[0] += share * problem.sight_radius;
-  return radius;
-}
-
 // A plan that starts within an obstacle's hard shape has to leave it: along the way out at its
 // start the distance never shrinks.
 bool Leaves(const Curve& plan, const Ellipsoid& e) {
@@ -78,6 +72,12 @@ class Prover {
 
 world::Ball DroneBall(const Curve& plan, double radius) {
   return {plan, math::Polynomial::Constant(1, radius)};
+}
+
+math::Polynomial TargetRadius(const Problem& problem, double share) {
+  math::Polynomial radius = share * problem.target_growth;
+  radius[0] += share * problem.sight_radius;
+  return radius;
 }
 
 world::Ball TargetBall(const Problem& problem, double share) {

@@ -21,6 +21,7 @@ std::optional<std::vector<Proof>> ProveOff(const Curve& plan, const Problem& pro
 
 /// The drone's ball, and the target's end of the line of sight with its uncertainty; `share` of the
 /// latter.
+math::Polynomial TargetRadius(const Problem& problem, double share);
 world::Ball DroneBall(const Curve& plan, double radius);
 world::Ball TargetBall(const Problem& problem, double share);
 

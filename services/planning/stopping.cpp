@@ -74,17 +74,20 @@ double DistanceTo(const world::Obstacle& o, const Vector3d& d) {
     return world::SignedDistance({Kind::kCylinder, Vector3d::Zero(), o.half}, d);
   const Vector3d outwards = o.shape * d;
   const double scale = std::sqrt(d.dot(outwards));
-  return scale > 0.0 ? (scale - 1.0) * scale / outwards.norm() : -HUGE_VAL;
+  // At the centre no farther in than the least semi-axis.
+  return scale > 0.0 ? (scale - 1.0) * scale / outwards.norm() : -1.0 / std::sqrt(o.shape.trace());
 }
 
 /// Comes to rest from the request's start, or from other states.
 class Resting {
  public:
-  /// `memory`: of earlier ways to rest from the same obstacles.
+  /// `memory`: working memory of earlier calls, whatever their obstacles.
   Resting(const PlannerConfig& config, PlanRequest request, Problem* memory = nullptr)
       : config_(config), request_(std::move(request)), problem_(memory ? *memory : own_) {
     From(request_.start, request_.t0);
   }
+  Resting(const Resting&) = delete;  // problem_ may be its own
+
   void From(const world::State& start, double t0) {
     request_.start = start;
     request_.t0 = t0;
@@ -120,10 +123,10 @@ class Resting {
     return curve.allFinite() && KeepsLimits(curve, motion);
   }
 
-  /// Time of the first contact between samples, s, infinite where there is none, and the least
-  /// clearance. The ground and the greatest height count as an obstacle's surface. What stands and
-  /// holds the start is not as the map says: the body is there and has touched nothing. As far in
-  /// as the quickest braking goes is no contact with it, and to flee it is no gain.
+  /// Time of the first contact, s, interpolated between samples, infinite where there is none, and
+  /// the least clearance. The ground and the greatest height count as an obstacle's surface. Where
+  /// the map has a static obstacle at the start it is wrong, as the body is there: going as far in
+  /// as the quickest braking is no contact with it, and to flee it is no gain.
   std::pair<double, double> Harm(const Curve& curve, double T) {
     const auto [within, gain] = Within();
     SetProblem(T);
@@ -285,10 +288,10 @@ Stop Evade(const PlannerConfig& config, const PlanRequest& request) {
     best.trajectory = {request.t0, T, curve};
   };
   constexpr double kLongest = kTimes[4];
+  Resting braking(config, rest);
   for (const double T : {kTimes[0], kTimes[2], kLongest}) {
-    Resting braking(config, rest);
     const Curve curve = BrakeCurve(request.start, T);
-    if (T == kLongest || braking.CanBeFlown(curve, T)) weigh(&braking, curve, T);
+    if (braking.CanBeFlown(curve, T)) weigh(&braking, curve, T);
   }
   for (const Vector3d& d : displacements)
     for (int i = 0; i < 2; ++i) {
@@ -298,6 +301,8 @@ Stop Evade(const PlannerConfig& config, const PlanRequest& request) {
       if (auto stop = resting[i].Certified(curve, T)) return *stop;
       if (resting[i].CanBeFlown(curve, T)) weigh(&resting[i], curve, T);
     }
+  if (least.first < 0.0)  // none can be flown
+    weigh(&braking, BrakeCurve(request.start, kLongest), kLongest);
   if (least.first < 0.0)  // none is finite
     best.trajectory = world::Trajectory::Constant(request.start.p, request.t0, 1.0);
   return best;

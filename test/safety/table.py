@@ -119,6 +119,9 @@ def problems(registered, table):
         found += in_line(line, rows, cases)
         if line.program not in registered:
             found.append(f"'{line.hazard}': {line.program} is not registered with CTest")
+    found += [f"{EQUIVALENT.name}: {block['file']} does not hold: {block['line']}"
+              for block in blocks(EQUIVALENT)
+              if block["line"] not in tree.text(pathlib.Path(block["file"]))]
     return found
 
 

@@ -118,7 +118,7 @@ TEST(MappingTracker, OnlyWhatIsHiddenStaysListed) {
 TEST(MappingTracker, WhatRaysPassOverStaysListed) {
   for (const double low : {0.9, 1.8}) {
     Tracker tracker(MoverConfig{});
-    for (double t = 0.0; t < 3.0; t += 0.1) {
+    for (double t = 0.0; t < 6.0; t += 0.1) {
       tracker.Predict(t);
       std::vector<Cluster> clusters;
       if (t < 1.5) clusters.push_back(BoxCluster({1.5 * t - 2.0, 0.0}, 0.5));
@@ -126,8 +126,8 @@ TEST(MappingTracker, WhatRaysPassOverStaysListed) {
       if (t > 1.0 && t < 1.5) {
         ASSERT_EQ(tracker.Obstacles(1.5, 8.0, 1.0).size(), 1u) << t;
       }
-      if (t > 2.0) {
-        EXPECT_EQ(tracker.Obstacles(1.5, 8.0, 1.0).size(), low > 1.5 ? 1u : 0u) << t;
+      if (t > 2.0 && (t < 4.1 || t > 4.5)) {  // exp(-t / lifetime) is a half after 2.8 s
+        EXPECT_EQ(tracker.Obstacles(1.5, 8.0, 1.0).size(), low > 1.5 && t < 4.3 ? 1u : 0u) << t;
       }
     }
   }

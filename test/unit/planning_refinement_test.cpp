@@ -207,23 +207,44 @@ PlanRequest WalkPastPillar(double pillar_y) {
   return request;
 }
 
-// Shapes are kept from plan to plan: margins that gave way must not stay away, nor the other way.
+void ExpectSame(const std::vector<Proof>& a, const std::vector<Proof>& b) {
+  ASSERT_EQ(a.size(), b.size());
+  for (size_t i = 0; i < a.size(); ++i) {
+    EXPECT_EQ(a[i].obstacle, b[i].obstacle);
+    EXPECT_EQ(a[i].radius, b[i].radius);
+    ASSERT_EQ(a[i].separations.size(), b[i].separations.size());
+    for (size_t k = 0; k < a[i].separations.size(); ++k)
+      EXPECT_EQ(a[i].separations[k].normal, b[i].separations[k].normal);
+  }
+}
+
+// Shapes and bodies are kept from plan to plan, in search and in stops: of other obstacles, or of
+// margins that gave way, nothing must stay.
 TEST(Planner, AnswersDoNotDependOnWhatWasAskedBefore) {
   const PlannerConfig config;
-  const PlanRequest within = WalkPastPillar(0.885), outside = WalkPastPillar(1.5);
-  const PlanResult fresh_within = MakePlanner("chase", config)->Plan(within);
-  const PlanResult fresh_outside = MakePlanner("chase", config)->Plan(outside);
-  EXPECT_NE(fresh_within.reason.find("starts within the margin of obstacle 7"), std::string::npos);
-  EXPECT_EQ(fresh_outside.reason, "");
+  std::vector<PlanRequest> requests(5, WalkPastPillar(0.885));
+  for (size_t i = 1; i < requests.size(); ++i) requests[i] = WalkPastPillar(1.5);
+  requests[2].obstacles[0].shape = Eigen::Vector3d(2.0, 6.0, 0.1).asDiagonal();
+  requests[3].obstacles[0].solid = world::Obstacle::Solid::kBox;
+  requests[3].obstacles[0].half = {0.35, 0.35, 2.0};
+  requests[4].obstacles.insert(requests[4].obstacles.begin(), WalkPastPillar(-2.0).obstacles[0]);
+  requests[4].obstacles[0].id = 8;
+  std::vector<PlanResult> fresh;
+  for (const PlanRequest& request : requests)
+    fresh.push_back(MakePlanner("chase", config)->Plan(request));
+  EXPECT_NE(fresh[0].reason.find("starts within the margin of obstacle 7"), std::string::npos);
+  EXPECT_EQ(fresh[1].reason, "");
   const auto planner = MakePlanner("chase", config);
-  for (int i = 0; i < 2; ++i)
-    for (const bool inside : {true, false, false, true}) {
-      const PlanResult plan = planner->Plan(inside ? within : outside);
-      const PlanResult& expected = inside ? fresh_within : fresh_outside;
-      EXPECT_EQ(plan.trajectory.coefficients, expected.trajectory.coefficients);
-      EXPECT_EQ(plan.reason, expected.reason);
-      EXPECT_EQ(plan.yaw, expected.yaw);
-    }
+  for (const size_t i : {0, 1, 1, 0, 0, 2, 1, 3, 2, 4, 3, 1, 4, 2}) {
+    const PlanResult plan = planner->Plan(requests[i]);
+    EXPECT_EQ(plan.trajectory.coefficients, fresh[i].trajectory.coefficients);
+    EXPECT_EQ(plan.reason, fresh[i].reason);
+    EXPECT_EQ(plan.yaw, fresh[i].yaw);
+    ASSERT_TRUE(plan.stop && fresh[i].stop);
+    EXPECT_EQ(plan.stop->coefficients, fresh[i].stop->coefficients);
+    ExpectSame(plan.proofs, fresh[i].proofs);
+    ExpectSame(plan.stop_proofs, fresh[i].stop_proofs);
+  }
 }
 
 // The line of sight passes a pillar within its margin when the plan starts: the margin gives way

@@ -93,7 +93,7 @@ TEST(Evasion, WhatCannotBeBrakedForIsEvadedAndCertified) {
   EXPECT_EQ(aside, 4);
 }
 
-TEST(Evasion, WhereNothingCanBeCertifiedTheContactComesAsLateAsCanBe) {
+TEST(Evasion, WhereNothingCanBeCertifiedTheContactComesLaterThanAtRest) {
   const PlannerConfig config;
   for (const double speed : {2.0, 4.0, -3.0}) {
     PlanRequest request = Hover();
