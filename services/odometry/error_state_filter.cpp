@@ -10,6 +10,10 @@ namespace chase::odometry {
 
 namespace {
 
+/// Logarithm of how much likelier a jump must make an innovation: one in a day of ten sweeps a
+/// second.
+constexpr double kJumps = 14.0;
+
 using math::ExpSO3;
 using math::Hat;
 using math::LogSO3;
@@ -47,6 +51,33 @@ using JacobianRows = Eigen::Matrix<double, Eigen::Dynamic, kStates>;
 
 void Symmetrise(ErrorCovariance* P) { *P = (0.5 * (*P + P->transpose())).eval(); }
 
+/// The covariance if the biases have jumped `age` s ago. Sweeps have held place and attitude until
+/// `gap` s ago, velocity not yet. To first order a jump (b_g, b_a) turns the body by -R b_g gap,
+/// adds the velocity -R b_a age + Hat(force) R b_g gap^2 / 2 and moves it as these do.
+ErrorCovariance AfterJump(const NavState& state, double gap, double age) {
+  constexpr double kGyro = 0.017, kAccel = 0.2;  // rad/s, m/s^2: offsets of a BMI088, data sheet
+  const Eigen::Matrix3d R = state.R_WB.toRotationMatrix();
+  const Eigen::Matrix3d turned = Hat(state.a - state.g) * R;
+  Eigen::Matrix<double, kStates, 6> effect = Eigen::Matrix<double, kStates, 6>::Zero();
+  effect.block<3, 3>(kP, 0) = gap * gap * gap / 6.0 * turned;
+  effect.block<3, 3>(kV, 0) = gap * gap / 2.0 * turned;
+  effect.block<3, 3>(kTheta, 0) = -gap * R;
+  effect.block<3, 3>(kGyroBias, 0).setIdentity();
+  effect.block<3, 3>(kP, 3) = -gap * (age - gap / 2.0) * R;
+  effect.block<3, 3>(kV, 3) = -age * R;
+  effect.block<3, 3>(kAccelBias, 3).setIdentity();
+  effect.leftCols<3>() *= kGyro;
+  effect.rightCols<3>() *= kAccel;
+  return state.P + effect * effect.transpose();
+}
+
+/// Of an innovation, up to a constant; minus infinity where its covariance is none.
+double LogLikelihood(const Eigen::VectorXd& innovation, const Eigen::MatrixXd& covariance) {
+  const Eigen::LDLT<Eigen::MatrixXd> solver(covariance);
+  if (solver.info() != Eigen::Success || !(solver.vectorD().minCoeff() > 0.0)) return -HUGE_VAL;
+  return -0.5 * (innovation.dot(solver.solve(innovation)) + solver.vectorD().array().log().sum());
+}
+
 /// Kalman update in Joseph's form; refused where the innovation's covariance is singular or the
 /// normalised innovation squared per direction exceeds `largest_nis`. Above `usual_nis` the noise
 /// is taken larger by as much: inertia tells a tenth of a second better than a match that is at
@@ -70,6 +101,33 @@ UpdateResult Correct(const JacobianRows& H, const Eigen::VectorXd& innovation,
   state->P = (I_KH * state->P * I_KH.transpose() + K * noise * K.transpose()).eval();
   Symmetrise(&state->P);
   return {true, nis};
+}
+
+/// Opens the covariance where biases that jumped explain the innovation and are by far likelier
+/// than that nothing did, and likelier than a pose that is off at once, as by wrong stamps. A turn
+/// is felt at once, an acceleration by the sweep after.
+void OpenAfterJump(double usual_nis, const JacobianRows& H, const Eigen::VectorXd& innovation,
+                   const Eigen::MatrixXd& noise, double gap, NavState* state) {
+  constexpr double kOff = 0.02, kTurned = 0.005;  // m, rad: 20 ms at 1 m/s and 0.25 rad/s
+  const auto covariance = [&](const ErrorCovariance& P) -> Eigen::MatrixXd {
+    return H * P * H.transpose() + noise;
+  };
+  ErrorCovariance off = state->P;
+  AddDiagonal(kP, kOff * kOff, &off);
+  AddDiagonal(kTheta, kTurned * kTurned, &off);
+  double likeliest = std::max(LogLikelihood(innovation, covariance(state->P)) + kJumps,
+                              LogLikelihood(innovation, covariance(off)));
+  const NavState before = *state;
+  for (const double age : {gap, 2.0 * gap}) {
+    const ErrorCovariance jumped = AfterJump(before, gap, age);
+    const Eigen::MatrixXd explained = covariance(jumped);
+    const double nis = innovation.dot(explained.ldlt().solve(innovation));
+    const double likelihood = LogLikelihood(innovation, explained);
+    if (!(nis <= usual_nis * static_cast<double>(innovation.size())) || !(likelihood > likeliest))
+      continue;
+    likeliest = likelihood;
+    state->P = jumped;
+  }
 }
 
 /// What the unknown directions U, left at the prediction, do to the known ones V of a match: an
@@ -157,7 +215,8 @@ void Inject(const ErrorVector& dx, NavState* state) {
   state->g += dx.segment<3>(kGravity);
 }
 
-UpdateResult Update(const FilterConfig& config, const PoseMeasurement& z, NavState* state) {
+UpdateResult Update(const FilterConfig& config, const PoseMeasurement& z, double gap,
+                    NavState* state) {
   const auto& V = z.known;
   const Eigen::Index k = V.cols();
   if (k == 0) return {};
@@ -179,7 +238,9 @@ UpdateResult Update(const FilterConfig& config, const PoseMeasurement& z, NavSta
   H.setZero();
   H.middleCols<3>(kP) = onto.leftCols<3>();
   H.middleCols<3>(kTheta) = onto.rightCols<3>();
-  return Correct(H, onto * e, noise, config.usual_nis, config.largest_nis, state);
+  const Eigen::VectorXd innovation = onto * e;
+  OpenAfterJump(config.usual_nis, H, innovation, noise, gap, state);
+  return Correct(H, innovation, noise, config.usual_nis, config.largest_nis, state);
 }
 
 void HoldStill(const Eigen::Vector3d& gyro, NavState* state) {

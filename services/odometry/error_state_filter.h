@@ -113,7 +113,10 @@ struct UpdateResult {
 
 /// Kalman update; leaves the state as it is where the numbers do not allow one or the innovation is
 /// too large to be of noise. One that is larger than the covariances explain makes these larger: by
-/// as much of the correction as they do not explain.
-UpdateResult Update(const FilterConfig& config, const PoseMeasurement& z, NavState* state);
+/// as much of the correction as they do not explain; unless biases that have jumped in the last
+/// `gap` s, since the update before (0: they have not), explain it all and are by far likelier
+/// (generalised likelihood ratio, Willsky and Jones 1976): then these are open again.
+UpdateResult Update(const FilterConfig& config, const PoseMeasurement& z, double gap,
+                    NavState* state);
 
 }  // namespace chase::odometry

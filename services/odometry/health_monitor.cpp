@@ -51,6 +51,7 @@ void HealthMonitor::OnSweep(double end, int returns, double imu_t, bool imu_sile
         Text("sweep ends %.0f ms away from the newest IMU sample", 1e3 * (imu_t - end));
   else if (returns < (1.0 - config_.dropped_share) * usual)
     sweep_problem_ = Text("%.0f %% of the usual returns", 100.0 * returns / usual);
+  if (!sweep_problem_.empty()) unusual_until_ = end + 1.0;
 }
 
 void HealthMonitor::OnMatch(double end, const MatchResult& match, bool applied) {

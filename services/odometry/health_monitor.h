@@ -47,6 +47,8 @@ class HealthMonitor {
   /// The sweep's stamps were off and have been put right.
   void OnClock() { sweep_problem_ = "the LiDAR's clock is not the IMU's"; }
   void OnMatch(double end, const MatchResult& match, bool applied);
+  /// Stamps and returns of the sweeps have been as usual for a second.
+  bool IsUsual(double t) const { return t > unusual_until_; }
 
   /// `position_sigma`: of the place in the local map, m; `velocity_sigma`: m/s. Where sweeps hold
   /// the body but along a direction that nothing fixes, its place along it matters to nobody who
@@ -64,7 +66,7 @@ class HealthMonitor {
   double usual_returns_ = 0.0;
   double nis_ = 0.0;  // running mean
   int matches_ = 0;   // that were applied, the first sweep among them
-  double imu_gap_until_ = -1e18;
+  double imu_gap_until_ = -1e18, unusual_until_ = -1e18;
   std::string sweep_problem_;  // of the newest sweep
   std::string match_problem_;
 };

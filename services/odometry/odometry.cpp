@@ -245,8 +245,10 @@ bool Odometry::Apply(const Prepared& prepared, MatchResult* match) {
   NavState state = prepared.predicted;
   standing_.See(match->X_WB.p);
   if (standing_.holds()) HoldStill(standing_.gyro(), &state);
+  // Stamps that are off look like biases that jumped.
+  const double gap = health_.IsUsual(prepared.end) ? prepared.end - held_ : 0.0;
   const UpdateResult update =
-      Update(config_.filter, {match->X_WB, match->known, match->information}, &state);
+      Update(config_.filter, {match->X_WB, match->known, match->information}, gap, &state);
   match->nis = update.nis;
   match->misfit = update.nis > config_.filter.largest_nis;
   if (!update.applied) return false;

@@ -94,6 +94,10 @@ class Live {
   }
 
   void Strike(double t, simulator::ImuSample* imu) {
+    if (t >= options_.jump_from) {
+      imu->gyro.array() += options_.gyro_jump;
+      imu->accel.array() += options_.accel_jump;
+    }
     if (!Within(options_.spikes_from, t)) return;
     if (burst_ == 0 && random_.Uniform() < options_.spikes_share) {
       burst_ = 1 + static_cast<int>(random_.Next() % static_cast<uint64_t>(options_.spike_length));

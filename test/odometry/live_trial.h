@@ -22,6 +22,8 @@ struct LiveOptions {
   /// full scale (16 g, 2000 deg/s) on an axis.
   double spikes_from = 1e9, spikes_share = 0.02, spike_size = 1.0;
   int spike_length = 1;
+  /// From then on so much is added to the biases along each axis, rad/s and m/s^2.
+  double jump_from = 1e9, gyro_jump = 0.0, accel_jump = 0.0;
   /// For two seconds the LiDAR's stamps are off by `clock_step` s.
   double clock_from = 1e9, clock_step = 0.0;
   /// For two seconds the IMU's samples come `imu_delay` s late.

@@ -58,6 +58,23 @@ TEST(OdometryImuFault, SpikesAreLeftOut) {
       }
 }
 
+TEST(OdometryImuFault, BiasesThatJumpAreLearntAnew) {
+  struct Jump {
+    double gyro, accel;  // rad/s, m/s^2
+  };
+  for (int seed = 1; seed <= Layouts(2); ++seed)
+    for (const Jump jump : {Jump{0.015, 0.25}, {-0.01, 0.1}, {0.0, -0.25}, {0.005, 0.0}}) {
+      LiveOptions options = From(seed);
+      options.jump_from = 10.5;
+      options.gyro_jump = jump.gyro;
+      options.accel_jump = jump.accel;
+      const std::string what = fmt::format("jump by {} rad/s, {} m/s^2 ", jump.gyro, jump.accel);
+      const LiveFigures figures = Flown(what, static_cast<uint64_t>(seed), options);
+      ExpectGood(figures, what);
+      EXPECT_LT(figures.worst_velocity, 0.2) << what;
+    }
+}
+
 TEST(OdometryImuFault, StampsOfTheLidarThatStepCostNoSweep) {
   for (int seed = 1; seed <= Layouts(1); ++seed)
     for (const double step : {-60.0, -1.0, 1.0, 60.0}) {

@@ -311,7 +311,7 @@ TEST(ErrorStateFilter, UpdateLeavesUnknownDirectionsAlone) {
   z.known = Eigen::MatrixXd::Zero(6, 5);
   for (int i = 0; i < 5; ++i) z.known(i < 1 ? 0 : i + 1, i) = 1.0;  // all but y
   z.information = 1e4 * Eigen::Matrix<double, 6, 6>::Identity();
-  const UpdateResult result = Update(FilterConfig{}, z, &state);
+  const UpdateResult result = Update(FilterConfig{}, z, 0.1, &state);
   EXPECT_TRUE(result.applied);
   EXPECT_NEAR(state.p.y(), 0.0, 1e-12);
   EXPECT_GT(state.p.x(), 0.09);
@@ -345,9 +345,9 @@ TEST(ErrorStateFilter, UnknownDirectionsBlurTheKnownOnesTheyAreCoupledTo) {
                     1e6 * Eigen::Matrix<double, 6, 6>::Identity()};
   for (int i = 0; i < 5; ++i) z.known(i < 1 ? 0 : i + 1, i) = 1.0;  // all but y
   NavState coupled = state;
-  ASSERT_TRUE(Update(FilterConfig{}, z, &state).applied);
+  ASSERT_TRUE(Update(FilterConfig{}, z, 0.1, &state).applied);
   z.information(0, 1) = z.information(1, 0) = 0.05e6;
-  ASSERT_TRUE(Update(FilterConfig{}, z, &coupled).applied);
+  ASSERT_TRUE(Update(FilterConfig{}, z, 0.1, &coupled).applied);
   EXPECT_LT(std::sqrt(state.P(0, 0)), 8.2e-4);
   EXPECT_GT(std::sqrt(coupled.P(0, 0)), 9.5e-4);  // 0.05 m of blur tell nothing of x
 }
@@ -365,8 +365,8 @@ struct Innovation {
 
 TEST(ErrorStateFilter, AMatchAtOddsWithThePredictionCountsForLess) {
   Innovation usual(0.02), large(0.2);
-  ASSERT_TRUE(Update(FilterConfig{}, usual.z, &usual.state).applied);
-  ASSERT_TRUE(Update(FilterConfig{}, large.z, &large.state).applied);
+  ASSERT_TRUE(Update(FilterConfig{}, usual.z, 0.1, &usual.state).applied);
+  ASSERT_TRUE(Update(FilterConfig{}, large.z, 0.1, &large.state).applied);
   EXPECT_LT(std::sqrt(usual.state.P(0, 0)), 0.002);
   EXPECT_GT(usual.state.p.x(), 0.95 * 0.02);
   EXPECT_LT(large.state.p.x(), 0.97 * 0.2);
@@ -375,7 +375,7 @@ TEST(ErrorStateFilter, AMatchAtOddsWithThePredictionCountsForLess) {
 
 TEST(ErrorStateFilter, ImpossibleInnovationIsRefused) {
   Innovation innovation(0.5);
-  const UpdateResult result = Update(FilterConfig{}, innovation.z, &innovation.state);
+  const UpdateResult result = Update(FilterConfig{}, innovation.z, 0.1, &innovation.state);
   EXPECT_FALSE(result.applied);
   EXPECT_GT(result.nis, FilterConfig{}.largest_nis);
   EXPECT_EQ(innovation.state.p, Eigen::Vector3d::Zero());
@@ -386,7 +386,7 @@ TEST(ErrorStateFilter, UpdateWithoutInformationIsRefused) {
   PoseMeasurement z;
   z.known = Eigen::MatrixXd::Identity(6, 6);
   z.information.setZero();
-  EXPECT_FALSE(Update(FilterConfig{}, z, &state).applied);
+  EXPECT_FALSE(Update(FilterConfig{}, z, 0.1, &state).applied);
   EXPECT_TRUE(state.p.allFinite());
 }
 
@@ -400,7 +400,7 @@ TEST(ErrorStateFilter, VelocityFromExactPosesSettles) {
   for (int i = 1; i <= 60; ++i) {
     z.X_WB.p.x() += 0.1 * (i <= 40 ? 1.0 : 2.0);
     PropagateBlind(config, 0.1 * i, &state);
-    ASSERT_TRUE(Update(config, z, &state).applied) << i;
+    ASSERT_TRUE(Update(config, z, 0.1, &state).applied) << i;
     if (i == 40) {
       EXPECT_NEAR(state.v.x(), 1.0, 1e-3);
     }
