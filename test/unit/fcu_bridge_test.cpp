@@ -308,7 +308,9 @@ TEST(FcuBridge, AnAutopilotThatBeginsAnewIsAskedForItsStreamsAgain) {
   flight.setpoints = false;
   flight.Run(10.0);
   flight.px4.Reboot(flight.now());
+  const int before = flight.px4.seen().commands;
   flight.Run(10.0);
+  EXPECT_GT(flight.px4.seen().commands, before);
   EXPECT_EQ(flight.bridge.clock().restarts(), 1);
   EXPECT_EQ(flight.bridge.rates().missing(), "");
   flight.setpoints = true;
