@@ -253,6 +253,7 @@ void Px4::Reboot(int64_t utime) {
   writer_ = mavlink::FrameWriter(1, 1);
   next_.clear();
   intervals_ = DefaultIntervals();
+  seen_.rates.clear();
   offsets_.clear();
   vision_sender_ = {};
 }

@@ -88,7 +88,7 @@ class Px4 {
     std::optional<mavlink::mav::SetAttitudeTarget> setpoint;
     std::optional<mavlink::mav::Odometry> vision;
     std::vector<double> clock_errors;  ///< s, of the host's clock as this side of TIMESYNC sees it
-    std::map<uint32_t, double> rates;  ///< asked for, Hz
+    std::map<uint32_t, double> rates;  ///< asked for since it began, Hz
   };
   const Seen& seen() const { return seen_; }
 
