@@ -8,10 +8,28 @@ namespace {
 using Eigen::Index;
 using Eigen::Vector3d;
 
+constexpr double kInstant = 0.1;  // s
+constexpr int kMemory = 5;        // instants
 // Known beforehand, standard deviations.
 constexpr double kDrag = 5.0;  // 1/s, control's bound
 constexpr double kWind = 3.0;  // m/s^2: 10 m/s at 0.3 1/s
 
+/// Means over `width` instants.
+Regression Averaged(const Regression& r, Index width) {
+  Regression means = r;
+  const Index n = r.y.size() / (r.rows * width) * r.rows;
+  means.X = Eigen::MatrixXd::Zero(n, r.X.cols());
+  means.y = Eigen::VectorXd::Zero(n);
+  for (Index row = 0; row < n * width; ++row) {
+    const Index mean = row / (r.rows * width) * r.rows + row % r.rows;
+    means.X.row(mean) += r.X.row(row) / static_cast<double>(width);
+    means.y[mean] += r.y[row] / static_cast<double>(width);
+  }
+  return means;
+}
+
+/// Gusts come as an autoregression. Its instants are so long that the noise of a velocity is small
+/// beside its change from one to the next.
 Regression AcrossThrust(const SettledFlight& flight) {
   Regression r = flight.Empty(2, {kDrag, kDrag, kWind, kWind, kAccelBias, kAccelBias});
   for (Index k = 0; k < flight.size(); ++k) {
@@ -26,8 +44,8 @@ Regression AcrossThrust(const SettledFlight& flight) {
     }
   }
   flight.AddWander(&r);
-  r.memory = flight.GustMemory();
-  return r;
+  r.memory = kMemory;
+  return Averaged(r, std::max<Index>(1, std::lround(kInstant / flight.period())));
 }
 
 /// The mean of both directions with the least variance. Control knows one drag for all headings:

@@ -22,8 +22,7 @@ class SettledFlight {
   /// Whether there are 5 s of it, and setpoints.
   bool Suffices() const;
   double seconds() const { return seconds_; }
-  /// Instants of an autoregression that tells gusts beneath white noise.
-  int GustMemory() const { return static_cast<int>(std::lround(kGustMemory / period_)); }
+  double period() const { return period_; }  ///< between samples, median, s
   /// By which setpoints that are held come late, to one standard deviation, s: the time of a sample
   /// in their period is not known.
   double hold() const { return hold_; }
@@ -65,8 +64,6 @@ class SettledFlight {
   void AddWander(Regression* r) const;
 
  private:
-  static constexpr double kGustMemory = 0.1;  // s
-
   const FlightSamples& flight_;
   std::vector<size_t> settled_;
   double seconds_ = 0.0, period_ = 0.0, hold_ = 0.0;

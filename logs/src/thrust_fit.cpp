@@ -11,7 +11,8 @@ using Eigen::Index;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
 
-constexpr int kRounds = 2;  // of thrust and vertical drag, each by the other
+constexpr double kGustMemory = 0.1;  // s: gusts beneath white noise
+constexpr int kRounds = 2;           // of thrust and vertical drag, each by the other
 // Known beforehand, standard deviations.
 constexpr double kDrag = 5.0;      // 1/s, control's bound
 constexpr double kConstant = 3.0;  // m/s^2: wind of 10 m/s at 0.3 1/s
@@ -31,7 +32,7 @@ Regression AlongThrust(const SettledFlight& flight, const Lags& lags, double mea
   const auto asked = flight.Through<1>(
       lags, [](const Motion&, const Asked& a) { return Eigen::Matrix<double, 1, 1>(a.thrust); });
   Regression r = flight.Empty(1, {kGain, kGain, kAccelBias});
-  r.memory = flight.GustMemory();
+  r.memory = static_cast<int>(std::lround(kGustMemory / flight.period()));
   for (Index k = 0; k < flight.size(); ++k) {
     const double u = asked[static_cast<size_t>(k)][0];
     r.y[k] = flight.at(k).accel.z() + drag[k];
