@@ -176,21 +176,25 @@ TEST(Identify, SaysWhereALongerFlightWouldNotHelp) {
 }
 
 TEST(Identify, FlightsWithoutThrustOrSpeedShowNothing) {
-  FlightSamples still;
-  Motion motion;
-  motion.accel.z() = 9.81;
-  Asked nothing;
-  for (; motion.t < 10.0; motion.t = nothing.t += kStep) {
-    still.motions.push_back(motion);
-    still.asked.push_back(nothing);
+  for (const double thrust : {0.0, 9.81}) {
+    FlightSamples still;
+    Motion motion;
+    motion.accel.z() = 9.81;
+    Asked asked;
+    asked.thrust = thrust;
+    for (; motion.t < 10.0; motion.t = asked.t += kStep) {
+      still.motions.push_back(motion);
+      still.asked.push_back(asked);
+    }
+    const auto found = Identify(still);
+    ASSERT_TRUE(found);
+    EXPECT_EQ(Format(*found).find("nan"), std::string::npos) << Format(*found);
+    for (const Parameter& drag :
+         {found->drag_forward, found->drag_horizontal, found->drag_vertical})
+      EXPECT_TRUE(std::isinf(drag.sigma)) << thrust;
+    EXPECT_EQ(std::isinf(found->hover_thrust.sigma), thrust == 0.0);
+    EXPECT_EQ(ControlFile(*found, "still.lcm"), "");
   }
-  const auto found = Identify(still);
-  ASSERT_TRUE(found);
-  EXPECT_EQ(Format(*found).find("nan"), std::string::npos) << Format(*found);
-  for (const Parameter& p : {found->drag_horizontal, found->drag_vertical, found->hover_thrust,
-                             found->thrust_curvature, found->lead})
-    EXPECT_TRUE(std::isinf(p.sigma));
-  EXPECT_EQ(ControlFile(*found, "still.lcm"), "");
 }
 
 }  // namespace

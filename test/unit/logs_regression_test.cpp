@@ -48,7 +48,7 @@ TEST(Regression, CoversTheTruthUnderNoiseWithAMemoryAndOutliers) {
     // 95 % of 100: fewer than 88 come by chance once in 250 times.
     EXPECT_GE(within, 88) << memory;
     EXPECT_LE(claimed, 4.0 * squares) << memory;
-    EXPECT_LE(std::sqrt(squares / 100.0), 0.03) << memory;
+    EXPECT_LE(std::sqrt(squares / 100.0), 0.02) << memory;
   }
 }
 
