@@ -8,7 +8,7 @@ namespace {
 using Eigen::Index;
 using Eigen::Vector3d;
 
-constexpr double kInstant = 0.1;  // s
+constexpr double kInstant = 0.1;  // s: a sweep, in which odometry corrects its velocity once
 constexpr int kMemory = 5;        // instants
 // Known beforehand, standard deviations.
 constexpr double kDrag = 5.0;  // 1/s, control's bound

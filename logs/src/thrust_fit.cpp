@@ -96,7 +96,7 @@ void FindThrust(const SettledFlight& flight, const Vector3d& wind, Identificatio
   }
   result->drag_vertical = drag;
   FindHover(found.solution, mean, climbs.mean(), result);
-  if (!found.converged) return;
+  if (!found.converged) return;  // what stands above leans little on the lags
   result->thrust_lag = WithSystematic(LagAndDelay(found.solution), flight.hold());
 }
 
