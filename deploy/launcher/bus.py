@@ -8,8 +8,6 @@ import socket
 import struct
 import time
 
-import places
-
 DEFAULT_URL = "udpm://239.255.76.67:7667?ttl=0&recv_buf_size=2097152"
 RECEIVE_BUFFER = 2097152  # bytes; a cloud of 400 kB needs several
 
@@ -24,10 +22,9 @@ def configured(file):
     return told[-1] if told else None
 
 
-def url():
+def url(otherwise=None):
     """Where everything speaks; with room for sweeps and images where the user names none."""
-    told = (os.environ.get("LCM_DEFAULT_URL") or (places.INSTALLED and configured(places.ENVIRONMENT))
-            or DEFAULT_URL)
+    told = os.environ.get("LCM_DEFAULT_URL") or otherwise or DEFAULT_URL
     if "recv_buf_size=" in told:
         return told
     return f"{told}{'&' if '?' in told else '?'}recv_buf_size={RECEIVE_BUFFER}"

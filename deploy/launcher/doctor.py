@@ -41,13 +41,18 @@ def default_buffer():
     return OK, f"net.core.rmem_default is {size}"
 
 
+def url():
+    """Where the units of an installed vehicle speak; in the source tree, where a flight does."""
+    return bus.url(bus.configured(places.ENVIRONMENT) if places.INSTALLED else None)
+
+
 def where():
-    return bus.endpoint(bus.url())
+    return bus.endpoint(url())
 
 
 def multicast():
     if not where():
-        return FAILURE, f"LCM_DEFAULT_URL={bus.url()}: not of the form udpm://ADDRESS:PORT?ttl=0"
+        return FAILURE, f"LCM_DEFAULT_URL={url()}: not of the form udpm://ADDRESS:PORT?ttl=0"
     problem = bus.loopback_problem(*where())
     return (FAILURE, problem) if problem else (OK, "own messages come back on %s:%d" % where())
 
@@ -105,11 +110,11 @@ def cores():
 
 
 def disk():
-    where = places.RECORDS if places.RECORDS.exists() else places.ROOT
-    free = shutil.disk_usage(where).free
+    folder = places.RECORDS if places.RECORDS.exists() else places.ROOT
+    free = shutil.disk_usage(folder).free
     if free < FREE_SPACE:
-        return FAILURE, f"{free / 1e9:.1f} GB free in {where}; cure: free {FREE_SPACE / 1e9:.0f} GB"
-    return OK, f"{free / 1e9:.0f} GB free in {where}"
+        return FAILURE, f"{free / 1e9:.1f} GB free in {folder}; cure: free {FREE_SPACE / 1e9:.0f} GB"
+    return OK, f"{free / 1e9:.0f} GB free in {folder}"
 
 
 def judged(check):

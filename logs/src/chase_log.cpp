@@ -26,7 +26,7 @@ using namespace chase::logs;
 constexpr std::chrono::milliseconds kProgressPeriod(200);
 
 struct Arguments {
-  std::string in, out, other, format, channel;
+  std::string in, out, other, format, channel, config;
   std::vector<std::string> ignore, files;
   Selection selection;
   double tolerance = 0.0;
@@ -236,15 +236,17 @@ std::string LogOf(const std::string& flight) {
 void RunIdentify(const Arguments& a) {
   const std::string log = LogOf(a.in);
   RefuseSame(log, a.out);
+  if (!a.config.empty() && a.out.empty())
+    throw BadOption("--config: does nothing without --out; name the file to write");
   if (!a.out.empty()) RequireWritable(a.out);
   const auto identified = Identify(ReadSamples(log, Progress()));
   if (!identified)
     throw std::runtime_error(log + ": less than 5 s of it are flight by plans with a good pose");
   std::fputs(Format(*identified).c_str(), stdout);
   if (a.out.empty()) return;
-  const std::string text = ControlFile(*identified, log);
+  const std::string text = ControlFile(*identified, log, a.config);
   if (text.empty())
-    throw std::runtime_error(log + ": tells nothing that control has; " + a.out +
+    throw std::runtime_error(log + ": shows nothing that control has; " + a.out +
                              " is not written");
   WriteFile(a.out, text);
 }
@@ -254,7 +256,9 @@ void AddIdentify(CLI::App* app, Arguments* a) {
       "identify", "Drag, thrust curve and delays of a vehicle from a flight, with uncertainties.");
   sub->add_option("FLIGHT", a->in, "LCM log, or the folder of a flight")->required();
   sub->add_option("--out", a->out,
-                  "file to write for chase-control --config: what the flight tells");
+                  "file to write for chase-control --config: what the flight shows");
+  sub->add_option("--config", a->config,
+                  "control's file today: an axis whose drag the flight does not show is kept");
   sub->callback([a] { RunIdentify(*a); });
 }
 

@@ -10,8 +10,8 @@
 #include "chase/pose_t.hpp"
 #include "chase/tracking_t.hpp"
 #include "common/bus/convert.h"
-#include "common/bus/validation.h"
-#include "common/logs/message_types.h"
+#include "common/math/rotation.h"
+#include "logs/src/good_message.h"
 
 namespace chase::logs {
 namespace {
@@ -23,10 +23,6 @@ constexpr int64_t kOld = 100'000;  // us of a setpoint: as old as a pose may be 
 constexpr int64_t kLearned = 20'000'000;
 constexpr double kAirborne = 0.3;  // m/s: no body stands at that; as control has it
 
-bool EndsWith(const std::string& text, const std::string& end) {
-  return text.size() >= end.size() && text.compare(text.size() - end.size(), end.size(), end) == 0;
-}
-
 /// The messages of one channel; a vehicle's prefix may stand before its name.
 template <class T>
 class Channel {
@@ -35,14 +31,17 @@ class Channel {
 
   void Take(const LogEvent& e) {
     T m;
-    if (!EndsWith(e.channel, name_) || !DecodeBytes(e.bytes, &m) || !bus::Problem(m).empty())
-      return;
+    if (IsOn(e, name_)) ++count_;
+    if (!Good(e, name_, &m)) return;
     if (found_.empty()) found_ = e.channel;
     if (found_ != e.channel) several_ = true;
     messages_.push_back(std::move(m));
   }
   /// In the order of stamps.
   const std::vector<T>& Sorted(const std::string& log) {
+    if (messages_.empty() && count_ > 0)
+      throw std::runtime_error(log + ": all " + std::to_string(count_) + " messages of " + name_ +
+                               " are malformed; chase-log info says of which type they are");
     if (messages_.empty())
       throw std::runtime_error(log + ": holds no " + name_ +
                                "; identify needs IMU, POSE, ATTITUDE_SETPOINT and TRACKING");
@@ -57,6 +56,7 @@ class Channel {
  private:
   std::string name_, found_;
   bool several_ = false;
+  long count_ = 0;
   std::vector<T> messages_;
 };
 
@@ -71,6 +71,19 @@ const T* LastOf(const std::vector<T>& messages, int64_t utime) {
 bool Usable(const pose_t& m) {
   return (m.health == pose_t::HEALTH_OK || m.health == pose_t::HEALTH_DEGRADED) &&
          m.correcting == 0;
+}
+
+Eigen::Quaterniond Rotation(const pose_t& m) {
+  return bus::ToQuaternion(m.orientation).normalized();
+}
+
+/// In frame B, whose axes are uncertain as well.
+Eigen::Matrix3d VelocityCovariance(const pose_t& m) {
+  const Eigen::Map<const Eigen::Matrix<double, 9, 9, Eigen::RowMajor>> P(m.local_covariance);
+  const Eigen::Matrix3d R_BW = Rotation(m).conjugate().toRotationMatrix();
+  Eigen::Matrix<double, 3, 6> change;  // of the velocity, by its error and the rotation's
+  change << R_BW, R_BW * math::Hat(bus::ToVector(m.vel));
+  return change * P.bottomRightCorner<6, 6>() * change.transpose();
 }
 
 class Joiner {
@@ -127,12 +140,12 @@ class Joiner {
         a == b ? 0.0 : bus::Seconds(m.utime, a->utime) / bus::Seconds(b->utime, a->utime);
     Motion motion;
     const pose_t* later = LastOf(poses_, m.utime + kLearned);
-    if (!Usable(*later)) later = a;
+    if (!Usable(*later) || later->epoch != a->epoch) later = a;
     motion.accel = bus::ToVector(m.accel) - bus::ToVector(later->accel_bias);
     motion.w_WB_B = bus::ToVector(m.gyro) - bus::ToVector(later->gyro_bias);
     motion.v_WB = (1.0 - share) * bus::ToVector(a->vel) + share * bus::ToVector(b->vel);
-    motion.R_WB = bus::ToQuaternion(a->orientation).slerp(share, bus::ToQuaternion(b->orientation));
-    motion.velocity_sigma = std::sqrt(std::max(0.0, a->local_covariance[3 * 9 + 3]));
+    motion.R_WB = Rotation(*a).slerp(share, Rotation(*b));
+    motion.velocity_covariance = VelocityCovariance(*a);
     return motion;
   }
 

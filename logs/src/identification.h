@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <limits>
 #include <optional>
 #include <vector>
 
@@ -13,8 +14,8 @@ struct Motion {
   Eigen::Vector3d w_WB_B = Eigen::Vector3d::Zero();  ///< rad/s
   Eigen::Vector3d v_WB = Eigen::Vector3d::Zero();    ///< m/s
   Eigen::Quaterniond R_WB = Eigen::Quaterniond::Identity();
-  double velocity_sigma = 0.0;  ///< of an axis of v_WB, m/s
-  int stretch = 0;              ///< of flight without a gap
+  Eigen::Matrix3d velocity_covariance = Eigen::Matrix3d::Zero();  ///< of v_WB in frame B, m^2/s^2
+  int stretch = 0;                                                ///< of flight without a gap
 };
 
 /// What the autopilot is asked for from t on.
@@ -31,17 +32,19 @@ struct FlightSamples {
   std::vector<Asked> asked;
 };
 
+/// An estimate with its standard uncertainty, infinite where the flight does not show it.
 struct Parameter {
-  double value = 0.0, sigma = 0.0;  ///< its standard uncertainty
+  double value = 0.0, sigma = std::numeric_limits<double>::infinity();
+  double systematic = 0.0;  ///< the part of sigma that more of the same flight does not lessen
 };
 
-/// What a flight tells of its vehicle.
+/// A vehicle as its flight shows it.
 struct Identification {
   double seconds = 0.0;                              ///< of flight that it rests on
   Eigen::Vector3d speeds = Eigen::Vector3d::Zero();  ///< root mean squares, frame B, m/s
   Parameter drag_forward, drag_sideways;             ///< linear, over mass, along x and y of B, 1/s
   Parameter drag_horizontal;                         ///< of both, 1/s
-  Parameter drag_vertical;                           ///< 1/s
+  Parameter drag_vertical;                           ///< along z of B, 1/s
   Parameter hover_thrust;                            ///< that has to be asked for, m/s^2
   Parameter thrust_scale;                            ///< given over asked for, at the hover
   Parameter thrust_curvature;  ///< change of that share per relative change of thrust
@@ -52,10 +55,7 @@ struct Identification {
   Parameter lead;              ///< by which the thrust's direction lags what is asked, s
 };
 
-/// Three regressions. Drag: what the accelerometer feels across the thrust, which is no thrust,
-/// against the velocity (Leishman et al. 2014, IEEE Control Systems 34); wind and what is left of
-/// the accelerometer's bias are constants of it. Thrust: what it feels along the thrust. Attitude:
-/// the gyroscope against error and feed-forward. Nothing where there are less than 5 s of flight.
+/// Three regressions: drag, thrust, attitude. Nothing where there are less than 5 s of flight.
 std::optional<Identification> Identify(const FlightSamples& flight);
 
 }  // namespace chase::logs

@@ -46,19 +46,30 @@ std::vector<Row> Rows(const Identification& i) {
           {"lead", "s", i.lead, kTimeEnough, agile}};
 }
 
-bool Told(const Parameter& p, double enough) {
+bool Shown(const Parameter& p, double enough) {
   return std::isfinite(p.value) && p.sigma <= enough;  // false for NaN
 }
 
+/// What flight would show it; time helps against what averages apart alone.
+std::string Cure(const Row& row, double seconds) {
+  const Parameter& p = row.parameter;
+  std::string text =
+      fmt::format(" not observable, +- {:.3g} is needed: {}", row.enough, row.excited);
+  if (p.systematic >= row.enough)
+    return text + fmt::format("; however long it is, +- {:.3g} is left", p.systematic);
+  if (!std::isfinite(p.sigma)) return text;
+  const double left = p.systematic * p.systematic;
+  const double more = (p.sigma * p.sigma - left) / (row.enough * row.enough - left);
+  return text + fmt::format(", {:.1f} times as strong or for {:.0f} s", std::sqrt(more),
+                            std::ceil(seconds * more));
+}
+
 std::string Line(const Row& row, double seconds) {
-  std::string text = fmt::format("{:<18} {:>8.4f} +- {:<8.4f} {:<6}", row.name, row.parameter.value,
-                                 row.parameter.sigma, row.unit);
-  if (!Told(row.parameter, row.enough)) {
-    const double more = row.parameter.sigma / row.enough;
-    text +=
-        fmt::format(" not told, +- {:.3g} is needed: {}, {:.1f} times as strong or for {:.0f} s",
-                    row.enough, row.excited, more, std::ceil(seconds * more * more));
-  }
+  const Parameter& p = row.parameter;
+  std::string text = fmt::format("{:<18} {:>20} {:<6}", row.name, "-", row.unit);
+  if (std::isfinite(p.sigma))
+    text = fmt::format("{:<18} {:>8.4f} +- {:<8.4f} {:<6}", row.name, p.value, p.sigma, row.unit);
+  if (!Shown(p, row.enough)) text += Cure(row, seconds);
   return text.substr(0, text.find_last_not_of(' ') + 1) + "\n";
 }
 
@@ -76,25 +87,29 @@ std::string Format(const Identification& i) {
       "{:.1f} s of flight; speed forward {:.2f}, sideways {:.2f}, vertical {:.2f} m/s rms\n",
       i.seconds, i.speeds.x(), i.speeds.y(), i.speeds.z());
   for (const Row& row : Rows(i)) text += Line(row, i.seconds);
-  if (Told(i.thrust_scale, kScaleEnough))
-    text += fmt::format("chase-fcu's hover_thrust: times {:.3f}\n", 1.0 / i.thrust_scale.value);
+  if (Shown(i.thrust_scale, kScaleEnough))
+    text +=
+        fmt::format("chase-fcu: h (1 + motor_curve (h - 1)), h its hover_thrust, times {:.3f}\n",
+                    1.0 / i.thrust_scale.value);
   return text;
 }
 
-std::string ControlFile(const Identification& i, const std::string& origin) {
-  const bool level = Told(i.drag_horizontal, kDragEnough);
-  const bool vertical = Told(i.drag_vertical, kDragEnough);
+std::string ControlFile(const Identification& i, const std::string& origin,
+                        const std::string& present) {
+  const bool level = Shown(i.drag_horizontal, kDragEnough);
+  const bool vertical = Shown(i.drag_vertical, kDragEnough);
   control::ControlConfig config;
+  if (!present.empty()) config::Load(present, &config);
   std::string text;
-  if (level || vertical) {
-    const double xy = level ? Rounded(i.drag_horizontal.value, 0.0, 5.0) : config.drag.x();
-    const double z = vertical ? Rounded(i.drag_vertical.value, 0.01, 5.0) : config.drag.z();
-    const std::string own = "as control has it: the flight does not tell";
-    text += fmt::format("drag: [{0}, {0}, {1}]  # 1/s; x and y {2}; z {3}\n", xy, z,
-                        level ? PlusMinus(i.drag_horizontal) : own,
-                        vertical ? PlusMinus(i.drag_vertical) : own);
+  if (present.empty() ? level && vertical : level || vertical) {
+    if (level) config.drag.head<2>().setConstant(Rounded(i.drag_horizontal.value, 0.0, 5.0));
+    if (vertical) config.drag.z() = Rounded(i.drag_vertical.value, 0.01, 5.0);
+    text += fmt::format("drag: [{}, {}, {}]  # 1/s; x and y {}; z {}; along B, taken for W\n",
+                        config.drag.x(), config.drag.y(), config.drag.z(),
+                        level ? PlusMinus(i.drag_horizontal) : "as in " + present,
+                        vertical ? PlusMinus(i.drag_vertical) : "as in " + present);
   }
-  if (Told(i.lead, kTimeEnough))
+  if (Shown(i.lead, kTimeEnough))
     text += fmt::format("lead: {}  # s; {}\n", Rounded(i.lead.value, 0.0, 0.3), PlusMinus(i.lead));
   if (text.empty()) return text;
   config::LoadText(text, origin, &config);  // as control will read it

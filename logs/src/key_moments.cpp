@@ -7,10 +7,8 @@
 #include "chase/camera_image_t.hpp"
 #include "chase/target_t.hpp"
 #include "common/bus/convert.h"
-#include "common/bus/validation.h"
 #include "common/logs/jpeg.h"
-#include "common/logs/log_reader.h"
-#include "common/logs/message_types.h"
+#include "logs/src/good_message.h"
 #include "logs/src/output.h"
 
 namespace chase::logs {
@@ -24,10 +22,6 @@ constexpr double kLongest = 1.0;  // s until an image must have come
 constexpr int kQuality = 75;      // of 100, as JPEG
 
 enum Rank { kFault, kState, kLoss, kVerdict, kMiddle };
-
-bool EndsWith(const std::string& text, const std::string& end) {
-  return text.size() >= end.size() && text.compare(text.size() - end.size(), end.size(), end) == 0;
-}
 
 /// What a span's beginning means; no label: nothing.
 Moment MomentOf(const Json& span) {
@@ -50,8 +44,8 @@ class ImageFinder {
       : origin_(origin), moments_(moments) {}
 
   void Add(const LogEvent& e) {
-    if (EndsWith(e.channel, "CAMERA_IMAGE")) AddImage(e);
-    if (EndsWith(e.channel, "TARGET")) AddTarget(e);
+    AddImage(e);
+    AddTarget(e);
   }
   Json Take() { return std::move(found_); }
 
@@ -59,7 +53,7 @@ class ImageFinder {
   void AddImage(const LogEvent& e) {
     if (next_ == moments_.size()) return;
     camera_image_t m;
-    if (!DecodeBytes(e.bytes, &m) || !bus::Problem(m).empty()) return;
+    if (!Good(e, "CAMERA_IMAGE", &m)) return;
     const double t = bus::Seconds(m.utime, origin_);
     while (next_ < moments_.size() && t > moments_[next_].t + kLongest) ++next_;
     if (next_ == moments_.size() || t < moments_[next_].t) return;
@@ -77,7 +71,7 @@ class ImageFinder {
 
   void AddTarget(const LogEvent& e) {
     target_t m;
-    if (of_utime_.empty() || !DecodeBytes(e.bytes, &m) || !bus::Problem(m).empty()) return;
+    if (of_utime_.empty() || !Good(e, "TARGET", &m)) return;
     const auto image = of_utime_.find(m.utime);
     if (image == of_utime_.end()) return;
     Json& moment = found_[image->second];

@@ -8,12 +8,11 @@ namespace {
 
 using Model = std::function<Regression(const Lags&)>;
 
-constexpr double kStep = 1e-3;   // s: of the difference quotients, a fifth of a sample's period
+constexpr double kStep = 1e-3;   // s: of the difference quotients, small beside any lag
 constexpr double kMost = 0.3;    // s: the bound of control's `lead`
 constexpr double kClose = 1e-5;  // s: a step that is none
 constexpr int kSteps = 15, kHalvings = 6;
 
-// A delay somewhat below 0 is within the noise of one that is 0.
 Lags Bounded(const Lags& lags) {
   return {std::clamp(lags.lag, 2.0 * kStep, kMost), std::clamp(lags.delay, -0.02, kMost)};
 }
@@ -56,19 +55,37 @@ Lags Improved(const Model& model, const Lags& at, const Lags& aim, double cost) 
   return at;
 }
 
+/// Whether the lags are in their range, and a whole step from them is within the uncertainty.
+bool Converged(const Lags& at, const Solution& linearised) {
+  const Eigen::Index p = linearised.value.size() - 2;
+  const Eigen::Vector2d step = linearised.value.tail<2>() - Eigen::Vector2d(at.lag, at.delay);
+  const Lags within = Bounded({at.lag - kClose, at.delay - kClose});
+  return step[0] * step[0] <= linearised.covariance(p, p) &&
+         step[1] * step[1] <= linearised.covariance(p + 1, p + 1) && within.lag < at.lag &&
+         within.delay < at.delay && at.lag < kMost && at.delay < kMost;
+}
+
 }  // namespace
 
 LaggedSolution SolveLagged(const Model& model) {
-  Lags at = BestOfGrid(model);
+  LaggedSolution result;
+  result.at = BestOfGrid(model);
   for (int i = 0;; ++i) {
+    const Lags at = result.at;
     const Solution linear = Solve(model(at));
     const Eigen::Index p = linear.value.size();
-    LaggedSolution result = {at, Solve(Linearised(model, at, linear.value))};
-    const Lags next =
-        Improved(model, at, {result.solution.value[p], result.solution.value[p + 1]}, linear.cost);
-    const double step = std::abs(next.lag - at.lag) + std::abs(next.delay - at.delay);
-    if (step < kClose || i == kSteps) return result;
-    at = next;
+    const Regression linearised = Linearised(model, at, linear.value);
+    result.solution = Solve(linearised);
+    const Eigen::Vector2d aim = result.solution.value.tail<2>();
+    result.at = Improved(model, at, {aim[0], aim[1]}, linear.cost);
+    const double step = std::abs(result.at.lag - at.lag) + std::abs(result.at.delay - at.delay);
+    if (step >= kClose && i < kSteps) continue;
+    result.at = at;
+    result.converged = step < kClose && Converged(at, result.solution);
+    result.slopes = linearised.X;
+    result.solution.value.head(p) = linear.value;
+    result.solution.value.tail<2>() << at.lag, at.delay;
+    return result;
   }
 }
 

@@ -17,17 +17,11 @@
 #include "chase/tracking_t.hpp"
 #include "chase/truth_t.hpp"
 #include "common/bus/convert.h"
-#include "common/bus/validation.h"
-#include "common/logs/log_reader.h"
-#include "common/logs/message_types.h"
+#include "logs/src/good_message.h"
 #include "logs/src/log_survey.h"
 
 namespace chase::logs {
 namespace {
-
-bool EndsWith(const std::string& text, const std::string& end) {
-  return text.size() >= end.size() && text.compare(text.size() - end.size(), end.size(), end) == 0;
-}
 
 double Yaw(const double (&q)[4]) {
   return std::atan2(2 * (q[0] * q[3] + q[1] * q[2]), 1 - 2 * (q[2] * q[2] + q[3] * q[3]));
@@ -75,12 +69,6 @@ class Gatherer {
   }
 
  private:
-  /// A vehicle's prefix may stand before the channel's name.
-  template <class T>
-  static bool Good(const LogEvent& e, const std::string& name, T* message) {
-    return EndsWith(e.channel, name) && DecodeBytes(e.bytes, message) &&
-           bus::Problem(*message).empty();
-  }
   template <class T>
   static bool Take(const LogEvent& e, const std::string& name, std::vector<T>* messages) {
     T message;

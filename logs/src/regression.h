@@ -10,13 +10,15 @@ struct Regression {
   Eigen::MatrixXd X;
   Eigen::VectorXd y, prior;
   int rows = 1;
-  int memory = 0;  ///< instants of the autoregression that the noise is taken for; 0: white
+  int memory = 0;  ///< instants of the autoregression that the noise is taken for, fewer than
+                   ///< there are; 0: white
 };
 
 struct Solution {
   Eigen::VectorXd value;
   Eigen::MatrixXd covariance;  ///< of `value`
-  double cost = 0.0;           ///< sum of Huber's function of the residuals
+  double cost = 0.0;  ///< twice the sum of Huber's function of the residuals, whose bend is at
+                      ///< three of their own deviations
 };
 
 /// Least squares with Huber's weights (beyond three deviations; Huber 1964), where the noise has a

@@ -17,10 +17,8 @@
 #include "chase/target_t.hpp"
 #include "chase/tracking_t.hpp"
 #include "common/bus/convert.h"
-#include "common/bus/validation.h"
-#include "common/logs/log_reader.h"
-#include "common/logs/message_types.h"
 #include "logs/src/flown_plans.h"
+#include "logs/src/good_message.h"
 #include "logs/src/landing_figures.h"
 #include "logs/src/lane.h"
 #include "logs/src/log_survey.h"
@@ -33,10 +31,6 @@ using Json = nlohmann::ordered_json;
 constexpr double kShown = 0.1;  // s between points of the page
 constexpr const char* kHealths[] = {"ok", "degraded", "lost", "starting"};
 constexpr const char* kTargets[] = {"searching", "tracking", "occluded", "lost"};
-
-bool EndsWith(const std::string& text, const std::string& end) {
-  return text.size() >= end.size() && text.compare(text.size() - end.size(), end.size(), end) == 0;
-}
 
 double Rounded(double v) { return std::round(v * 1e4) / 1e4; }
 
@@ -87,9 +81,7 @@ class Gatherer {
     Take<flight_state_t>(e, "FLIGHT_STATE", [this](const flight_state_t& m) { OnState(m); });
     Take<geofence_t>(e, "GEOFENCE", [this](const geofence_t& m) { fence_ = m.corners; });
     status_t status;
-    if (EndsWith(e.channel, "_STATUS") && DecodeBytes(e.bytes, &status) &&
-        bus::Problem(status).empty())
-      statuses_[status.name] = status;
+    if (Good(e, "_STATUS", &status)) statuses_[status.name] = status;
   }
 
   VehicleReport Report(const LogInfo& info) const {
@@ -114,7 +106,7 @@ class Gatherer {
   template <class T, class F>
   void Take(const LogEvent& e, const std::string& name, F handle) {
     T m;
-    if (!EndsWith(e.channel, name) || !DecodeBytes(e.bytes, &m) || !bus::Problem(m).empty()) return;
+    if (!Good(e, name, &m)) return;
     if (!origin_) origin_ = m.utime;
     if (latencies_.empty()) log_begin_ = Time(m.utime) - bus::Seconds(e.utime, first_event_);
     end_ = std::max(end_, Time(m.utime));
@@ -271,7 +263,7 @@ class Gatherer {
 bool HoldsTruth(const std::string& log) {
   LogReader reader(log);
   for (LogEvent e; reader.Next(&e);)
-    if (EndsWith(e.channel, "TRUTH")) return true;
+    if (IsOn(e, "TRUTH")) return true;
   return false;
 }
 

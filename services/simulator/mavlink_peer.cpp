@@ -23,7 +23,7 @@ void MavlinkPeer::FollowVision() {
   if (px4_.seen().odometry == poses_) return;
   poses_ = px4_.seen().odometry;
   const auto& m = *px4_.seen().vision;
-  const auto utime = px4_.HostTime(static_cast<int64_t>(m.time_usec));
+  const auto utime = px4_.HostTime(m.time_usec);
   if (!utime) return;
   const Eigen::Quaterniond q(m.q[0], m.q[1], m.q[2], m.q[3]);
   frame_.AddVision(*utime, mavlink::SwapWorld({m.x, m.y, m.z}), math::Yaw(mavlink::SwapFrames(q)),

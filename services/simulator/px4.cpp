@@ -15,6 +15,7 @@ using Eigen::Vector3d;
 using mavlink::Mode;
 namespace mav = mavlink::mav;
 
+constexpr double kLatest = 1e17;       // us, 3000 years: stamps beyond are none
 constexpr int64_t kBoot = 12'345'678;  // us
 constexpr double kGravity = 9.81;
 constexpr double kStreamBefore = 1.0;  // s of setpoints before OFFBOARD
@@ -25,7 +26,7 @@ constexpr double kPositionGain = 0.95, kVelocityGain = 1.8, kHeightGain = 1.0, k
 constexpr double kLandSpeed = 0.7, kMostSpeed = 2.0, kMostPush = 3.0;
 constexpr int64_t kOffsetMemory = 8;  // answers of TIMESYNC over which the offset is averaged
 
-/// The setpoint without the rates that its mask leaves out.
+/// The setpoint with no rates and no rotation where its mask leaves them out.
 mav::SetAttitudeTarget Heeded(mav::SetAttitudeTarget m) {
   using Mask = mav::AttitudeTargetTypemask;
   const auto ignored = [&](Mask bit) { return (m.type_mask & static_cast<uint8_t>(bit)) != 0; };
@@ -41,7 +42,21 @@ bool Finite(Numbers... numbers) {
   return (std::isfinite(numbers) && ...);
 }
 
-bool Finite(const std::array<float, 4>& q) { return Finite(q[0], q[1], q[2], q[3]); }
+/// To unit length; false where it is not finite or farther from that than the bus takes.
+bool Normalise(std::array<float, 4>* q) {
+  Eigen::Map<Eigen::Vector4f> v(q->data());
+  if (!(std::abs(v.squaredNorm() - 1.0f) < 1e-2f)) return false;
+  v.normalize();
+  return true;
+}
+
+/// One of those that it flies; none for anything else, NaN as well.
+std::optional<Mode> ModeOf(float main, float sub) {
+  for (const Mode& mode :
+       {mavlink::kOffboardMode, mavlink::kLandMode, mavlink::kHoldMode, mavlink::kPositionMode})
+    if (main == mode.main && sub == mode.sub) return mode;
+  return std::nullopt;
+}
 
 double Seconds(int64_t from, int64_t to) { return 1e-6 * static_cast<double>(to - from); }
 uint8_t Code(mav::MavResult r) { return static_cast<uint8_t>(r); }
@@ -68,10 +83,10 @@ int64_t Px4::Clock(int64_t utime) const {
   return since + static_cast<int64_t>(1e-6 * options_.drift_ppm * static_cast<double>(since));
 }
 
-std::optional<int64_t> Px4::HostTime(int64_t companion_us) const {
+std::optional<int64_t> Px4::HostTime(uint64_t companion_us) const {
   const auto offset = offsets_.find(vision_sender_);
-  if (offset == offsets_.end()) return std::nullopt;
-  const auto own = static_cast<double>(companion_us - offset->second);
+  if (offset == offsets_.end() || static_cast<double>(companion_us) > kLatest) return std::nullopt;
+  const auto own = static_cast<double>(static_cast<int64_t>(companion_us) - offset->second);
   return boot_ + static_cast<int64_t>(own / (1.0 + 1e-6 * options_.drift_ppm));
 }
 
@@ -118,8 +133,8 @@ void Px4::OnFrame(const mavlink::Frame& frame, int64_t clock) {
 }
 
 // Velocities and covariances may be NaN, which says that they are not known.
-void Px4::OnOdometry(const mav::Odometry& m, Sender sender) {
-  if (!Finite(m.x, m.y, m.z) || !Finite(m.q)) return;
+void Px4::OnOdometry(mav::Odometry m, Sender sender) {
+  if (!Finite(m.x, m.y, m.z) || !Normalise(&m.q)) return;
   ++seen_.odometry;
   seen_.vision = m;
   vision_sender_ = sender;
@@ -128,8 +143,8 @@ void Px4::OnOdometry(const mav::Odometry& m, Sender sender) {
 
 void Px4::OnSetpoint(const mav::SetAttitudeTarget& message) {
   if (message.target_system != 1 && message.target_system != 0) return;
-  const mav::SetAttitudeTarget m = Heeded(message);
-  if (!Finite(m.q) || !Finite(m.body_roll_rate, m.body_pitch_rate, m.body_yaw_rate, m.thrust))
+  mav::SetAttitudeTarget m = Heeded(message);
+  if (!Normalise(&m.q) || !Finite(m.body_roll_rate, m.body_pitch_rate, m.body_yaw_rate, m.thrust))
     return;
   ++seen_.setpoints;
   if (!(mode_ == mavlink::kOffboardMode)) ++seen_.setpoints_while_not_offboard;
@@ -172,7 +187,7 @@ void Px4::OnCommand(const mav::CommandLong& m, const mavlink::Frame& frame) {
 uint8_t Px4::Handle(const mav::CommandLong& m) {
   switch (static_cast<mav::MavCmd>(m.command)) {
     case mav::MavCmd::DO_SET_MODE:
-      return SetMode({static_cast<uint8_t>(m.param2), static_cast<uint8_t>(m.param3)});
+      return SetMode(ModeOf(m.param2, m.param3));
     case mav::MavCmd::COMPONENT_ARM_DISARM:
       return Arm(m.param1 > 0.5f);
     case mav::MavCmd::SET_MESSAGE_INTERVAL:
@@ -182,8 +197,9 @@ uint8_t Px4::Handle(const mav::CommandLong& m) {
 }
 
 // The switch succeeds without a stream while disarmed: arming is what is then refused.
-uint8_t Px4::SetMode(Mode mode) {
-  if (mode == mavlink::kOffboardMode) {
+uint8_t Px4::SetMode(std::optional<Mode> mode) {
+  if (!mode) return Code(mav::MavResult::DENIED);
+  if (*mode == mavlink::kOffboardMode) {
     ++seen_.offboard_commands;
     if (options_.refuses_offboard) return Code(mav::MavResult::DENIED);
     if (armed_ && !Streamed()) {
@@ -191,7 +207,7 @@ uint8_t Px4::SetMode(Mode mode) {
       return Code(mav::MavResult::TEMPORARILY_REJECTED);
     }
   }
-  Enter(mode);
+  Enter(*mode);
   return Code(mav::MavResult::ACCEPTED);
 }
 
@@ -236,6 +252,10 @@ void Px4::Reboot(int64_t utime) {
   version_2_ = !options_.starts_in_version_1;
   writer_ = mavlink::FrameWriter(1, 1);
   next_.clear();
+  intervals_ = DefaultIntervals();
+  seen_.rates.clear();
+  offsets_.clear();
+  vision_sender_ = {};
 }
 
 void Px4::WatchStream() {

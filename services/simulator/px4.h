@@ -78,7 +78,7 @@ class Px4 {
   bool landed() const { return landed_; }
   int64_t Clock(int64_t utime) const;  ///< its own, microseconds
   /// The host's time of a stamp of whoever sends ODOMETRY, by TIMESYNC; none: not known yet.
-  std::optional<int64_t> HostTime(int64_t companion_us) const;
+  std::optional<int64_t> HostTime(uint64_t companion_us) const;
 
   /// What came in.
   struct Seen {
@@ -88,7 +88,7 @@ class Px4 {
     std::optional<mavlink::mav::SetAttitudeTarget> setpoint;
     std::optional<mavlink::mav::Odometry> vision;
     std::vector<double> clock_errors;  ///< s, of the host's clock as this side of TIMESYNC sees it
-    std::map<uint32_t, double> rates;  ///< asked for, Hz
+    std::map<uint32_t, double> rates;  ///< asked for since it began, Hz
   };
   const Seen& seen() const { return seen_; }
 
@@ -97,12 +97,12 @@ class Px4 {
   void OnSetpoint(const mavlink::mav::SetAttitudeTarget& message);
   using Sender = std::pair<uint8_t, uint8_t>;  // system, component
   static Sender SenderOf(const mavlink::Frame& frame) { return {frame.system, frame.component}; }
-  void OnOdometry(const mavlink::mav::Odometry& m, Sender sender);
+  void OnOdometry(mavlink::mav::Odometry m, Sender sender);
   void OnTimesync(const mavlink::mav::Timesync& m, Sender sender, int64_t clock);
   void OnCommand(const mavlink::mav::CommandLong& m, const mavlink::Frame& frame);
   uint8_t Handle(const mavlink::mav::CommandLong& m);
   uint8_t SetInterval(const mavlink::mav::CommandLong& m);
-  uint8_t SetMode(mavlink::Mode mode);
+  uint8_t SetMode(std::optional<mavlink::Mode> mode);
   uint8_t Arm(bool on);
   void Enter(mavlink::Mode mode);
   bool Streamed() const;
@@ -142,7 +142,7 @@ class Px4 {
   Eigen::Vector3d hold_ = Eigen::Vector3d::Zero();  // where its own modes stay
   double hold_yaw_ = 0.0;
   std::map<uint32_t, int64_t> next_;       // of each stream
-  std::map<uint32_t, int64_t> intervals_;  // us
+  std::map<uint32_t, int64_t> intervals_;  // us; 0: none
   std::vector<Bytes> outgoing_;
   Seen seen_;
 };

@@ -11,49 +11,46 @@ namespace {
 namespace mav = mavlink::mav;
 
 constexpr double kMostId = 0xFFFFFF;  // of a MAVLink 2 message
+constexpr int64_t kNone = 0;          // us: the stream does not run
 
 uint8_t Code(mav::MavResult r) { return static_cast<uint8_t>(r); }
 
 }  // namespace
 
-/// Of a companion link before anything is asked for, us.
+/// All that it can send: on a companion link before anything is asked for, us.
 const std::map<uint32_t, int64_t>& Px4::DefaultIntervals() {
-  static const std::map<uint32_t, int64_t> intervals = {{mav::Heartbeat::kId, 1'000'000},
-                                                        {mav::HighresImu::kId, 20'000},
-                                                        {mav::AttitudeQuaternion::kId, 20'000},
-                                                        {mav::LocalPositionNed::kId, 100'000},
-                                                        {mav::ExtendedSysState::kId, 1'000'000},
-                                                        {mav::SysStatus::kId, 1'000'000},
-                                                        {mav::Timesync::kId, 100'000}};
+  static const std::map<uint32_t, int64_t> intervals = {
+      {mav::Heartbeat::kId, 1'000'000},        {mav::HighresImu::kId, 20'000},
+      {mav::AttitudeQuaternion::kId, 20'000},  {mav::LocalPositionNed::kId, 100'000},
+      {mav::ExtendedSysState::kId, 1'000'000}, {mav::SysStatus::kId, 1'000'000},
+      {mav::BatteryStatus::kId, kNone},        {mav::Timesync::kId, 100'000}};
   return intervals;
 }
 
 // mavlink.io, MAV_CMD_SET_MESSAGE_INTERVAL: us; -1 ends the stream, 0 asks for the default rate.
+// PX4 fails for the heartbeat, and for what it has no stream of (without a receiver: RC_CHANNELS).
 uint8_t Px4::SetInterval(const mav::CommandLong& m) {
   const auto number = static_cast<double>(m.param1), interval = static_cast<double>(m.param2);
   const bool sound = number >= 0.0 && number <= kMostId && interval <= INT32_MAX &&
                      (interval >= 0.0 || interval == -1.0);  // all false for NaN
   if (!sound) return Code(mav::MavResult::DENIED);
-  const auto id = static_cast<uint32_t>(number);
-  if (id == mav::RcChannels::kId) return Code(mav::MavResult::FAILED);  // it has no receiver
-  const auto usual = DefaultIntervals().find(id);
-  intervals_.erase(id);
-  next_.erase(id);
-  if (interval > 0.0)
-    intervals_[id] = std::max<int64_t>(1, static_cast<int64_t>(interval));
-  else if (interval == 0.0 && usual != DefaultIntervals().end())
-    intervals_.insert(*usual);
-  const auto now = intervals_.find(id);
-  seen_.rates[id] = now == intervals_.end() ? 0.0 : 1e6 / static_cast<double>(now->second);
+  const auto usual = DefaultIntervals().find(static_cast<uint32_t>(number));
+  if (usual == DefaultIntervals().end() || usual->first == mav::Heartbeat::kId)
+    return Code(mav::MavResult::FAILED);
+  int64_t& now = intervals_[usual->first];
+  now = interval < 0.0    ? kNone
+        : interval == 0.0 ? usual->second
+                          : std::max<int64_t>(1, static_cast<int64_t>(interval));
+  next_.erase(usual->first);
+  seen_.rates[usual->first] = now == kNone ? 0.0 : 1e6 / static_cast<double>(now);
   return Code(mav::MavResult::ACCEPTED);
 }
 
 bool Px4::Due(uint32_t id) {
-  const auto interval = intervals_.find(id);
-  if (interval == intervals_.end()) return false;
+  const int64_t interval = intervals_.at(id);
   int64_t& next = next_[id];
-  if (now_ < next) return false;
-  next = std::max(next + interval->second, now_ - interval->second);
+  if (interval == kNone || now_ < next) return false;
+  next = std::max(next + interval, now_ - interval);
   return true;
 }
 

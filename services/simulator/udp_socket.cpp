@@ -31,7 +31,7 @@ uint64_t Key(const sockaddr_in& address) {
 
 }  // namespace
 
-// Whoever sends to its own host hears its own host alone.
+// Whoever sends to the loopback hears the loopback alone.
 UdpSocket::UdpSocket(const std::string& host, int port, int own_port) {
   const in_addr_t ip = inet_addr(host.c_str());
   if (ip == INADDR_NONE)

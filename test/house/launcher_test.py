@@ -20,7 +20,9 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "deploy" / "launcher"))
 
 import bus  # noqa: E402
+import doctor  # noqa: E402
 import fly  # noqa: E402
+import places  # noqa: E402
 import processes  # noqa: E402
 import results  # noqa: E402
 
@@ -291,6 +293,12 @@ class FlightTest(unittest.TestCase):
         self.assertIsNone(bus.configured(file))
         file.write_text('LCM_DEFAULT_URL="udpm://239.1.2.3:7000?ttl=0"\n')
         self.assertEqual(bus.configured(file), "udpm://239.1.2.3:7000?ttl=0")
+        # The doctor looks at the units' bus; what a user flies there is no business of theirs.
+        os.environ.pop("LCM_DEFAULT_URL")
+        self.patch(places, "INSTALLED", True)
+        self.patch(places, "ENVIRONMENT", file)
+        self.assertEqual(bus.url(), bus.DEFAULT_URL)
+        self.assertTrue(doctor.url().startswith("udpm://239.1.2.3:7000?"))
 
     def test_process_that_refuses_to_start(self):
         self.program("chase-planning", "import sys; sys.exit('planning.yaml:1: no_such: unknown')")

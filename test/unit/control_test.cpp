@@ -57,7 +57,7 @@ struct Error {
 /// What a log of the flight would hold.
 void Record(double t, const Body& body, const Setpoint& asked, logs::FlightSamples* flight) {
   const Vector3d force = body.q.conjugate() * (body.a + Vector3d(0, 0, 9.81));
-  flight->motions.push_back({t, force, body.w, body.v, body.q, 0.0, 0});
+  flight->motions.push_back({t, force, body.w, body.v, body.q, Eigen::Matrix3d::Zero(), 0});
   flight->asked.push_back({t, asked.R_WB, asked.w_WB_B, asked.thrust});
 }
 

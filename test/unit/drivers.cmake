@@ -1,7 +1,6 @@
 if(TARGET simulator_hardware)
   chase_test(simulator_px4_test LIBS simulator_hardware
     SOURCES ${CMAKE_CURRENT_LIST_DIR}/simulator_px4_test.cpp)
-  set_tests_properties(simulator_px4_test PROPERTIES RUN_SERIAL TRUE)  # a UDP port
 endif()
 
 # The simulator's devices and the drivers that read them.

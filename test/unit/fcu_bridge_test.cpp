@@ -308,7 +308,9 @@ TEST(FcuBridge, AnAutopilotThatBeginsAnewIsAskedForItsStreamsAgain) {
   flight.setpoints = false;
   flight.Run(10.0);
   flight.px4.Reboot(flight.now());
+  EXPECT_EQ(flight.px4.seen().rates.size(), 0u);
   flight.Run(10.0);
+  EXPECT_GE(flight.px4.seen().rates.size(), 6u) << "all but RC_CHANNELS, which it lacks";
   EXPECT_EQ(flight.bridge.clock().restarts(), 1);
   EXPECT_EQ(flight.bridge.rates().missing(), "");
   flight.setpoints = true;

@@ -320,6 +320,36 @@ class LogTools(unittest.TestCase):
         self.assertEqual(topics["CAMERA_IMAGE"]["schema"], "foxglove.CompressedImage")
         self.assertLess(topics["CAMERA_IMAGE"]["first"]["data"], 376 * 240 / 2)
 
+    def test_identify_takes_a_flights_folder(self):
+        text = self.good("identify", self.folder)
+        self.assertEqual(text, self.good("identify", self.log))
+        self.assertRegex(text, r"drag, horizontal .* not observable, .*level flight to and fro")
+
+    def test_identify_writes_what_a_climb_shows(self):
+        out, present = self.folder / "climb.yaml", self.folder / "control.yaml"
+        self.good("identify", self.log, "--out", out)
+        self.assertNotIn("drag:", out.read_text(), "control's own would be lost")
+        present.write_text("drag: [0.5, 0.4, 0.3]\n")
+        self.good("identify", self.log, "--out", out, "--config", present)
+        self.assertRegex(out.read_text(), r"drag: \[0\.5, 0\.4, 0\.1\d*\]")
+        answer = run("chase-control", "--config", out, "--dump-config")
+        self.assertEqual(answer.returncode, 0, answer.stderr)
+
+    def test_identify_says_what_it_lacks(self):
+        out = self.folder / "none.yaml"
+        short = self.folder / "short.lcm"
+        self.good("cut", self.log, short, "--to", "3")
+        no_imu = self.without("identify.lcm", lambda channel, k: channel == "IMU")
+        for code, words, arguments in ((1, "less than 5 s", (short, "--out", out)),
+                                       (1, "holds no IMU", (no_imu, "--out", out)),
+                                       (1, "control.yaml", (self.log, "--out", out, "--config",
+                                                            self.folder / "no/control.yaml")),
+                                       (2, "--out", (self.log, "--config", out)),
+                                       (1, "is read", (self.log, "--out", self.log))):
+            with self.subTest(words=words):
+                self.assert_refused(run("chase-log", "identify", *arguments), code, words)
+                self.assertFalse(out.exists())
+
     def test_every_command_has_help(self):
         for command in ("info", "import", "export", "diff", "cut", "filter", "merge", "repair",
                         "migrate", "verify", "identify"):

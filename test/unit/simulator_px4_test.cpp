@@ -1,12 +1,14 @@
+#include <arpa/inet.h>
 #include <gtest/gtest.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <limits>
 #include <map>
-#include <string>
+#include <optional>
 
 #include "common/mavlink/framing.h"
 #include "services/simulator/px4.h"
@@ -18,7 +20,6 @@ namespace {
 namespace mav = mavlink::mav;
 
 constexpr int64_t kStart = 1'700'000'000'000'000;  // us
-constexpr int kPort = 45'873;
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
@@ -42,21 +43,26 @@ class Link {
       for (const auto& bytes : px4_.TakeOutgoing())
         reader.Add(now_, bytes.data(), bytes.size(), [&](const mavlink::Frame& f) {
           ++count[f.id];
-          if (const auto m = mavlink::As<mav::CommandAck>(f)) result_ = m->result;
+          if (const auto m = mavlink::As<mav::CommandAck>(f))
+            result_ = static_cast<mav::MavResult>(m->result);
         });
     }
     return count;
   }
 
-  /// The answer to MAV_CMD_SET_MESSAGE_INTERVAL.
-  mav::MavResult Ask(float id, float interval) {
+  /// The answer to a command; none: there was none.
+  std::optional<mav::MavResult> Command(mav::MavCmd command, float p1, float p2, float p3 = 0.0f) {
     mav::CommandLong m;
-    m.command = static_cast<uint16_t>(mav::MavCmd::SET_MESSAGE_INTERVAL);
+    m.command = static_cast<uint16_t>(command);
     m.target_system = m.target_component = 1;
-    m.param1 = id, m.param2 = interval;
+    m.param1 = p1, m.param2 = p2, m.param3 = p3;
+    result_.reset();
     Send(m);
     Second();
-    return static_cast<mav::MavResult>(result_);
+    return result_;
+  }
+  std::optional<mav::MavResult> Ask(float id, float interval) {
+    return Command(mav::MavCmd::SET_MESSAGE_INTERVAL, id, interval);
   }
 
   /// A companion whose clock is `ahead` us of the host's answers to TIMESYNC.
@@ -77,7 +83,7 @@ class Link {
 
   Px4 px4_;
   int64_t now_ = kStart;
-  uint8_t result_ = 255;
+  std::optional<mav::MavResult> result_;
 };
 
 const auto kImu = static_cast<float>(mav::HighresImu::kId);
@@ -107,6 +113,28 @@ TEST(Px4, RefusesIntervalsThatAreNone) {
   EXPECT_NEAR(link.Second()[mav::HighresImu::kId], 50, 2);
 }
 
+TEST(Px4, FailsForTheHeartbeatAndForWhatItHasNoStreamOf) {
+  Link link;
+  for (const uint32_t id : {mav::Heartbeat::kId, mav::RcChannels::kId, mav::RawImu::kId, 77'777u})
+    for (const float interval : {-1.0f, 0.0f, 10'000.0f})
+      EXPECT_EQ(link.Ask(static_cast<float>(id), interval), mav::MavResult::FAILED) << id;
+  EXPECT_NEAR(link.Second()[mav::Heartbeat::kId], 1, 1);
+}
+
+TEST(Px4, DeniesModesThatItDoesNotKnow) {
+  Link link;
+  const auto mode = [&](float main, float sub) {
+    return link.Command(mav::MavCmd::DO_SET_MODE, 1.0f, main, sub);
+  };
+  for (const float bad : {kNaN, kInfinity, -1.0f, 0.0f, 1e9f, 262.0f, 6.5f})
+    EXPECT_EQ(mode(bad, 0.0f), mav::MavResult::DENIED) << bad;
+  for (const float bad : {kNaN, 1e9f, -3.0f, 259.0f, 99.0f})
+    EXPECT_EQ(mode(4.0f, bad), mav::MavResult::DENIED) << bad;
+  EXPECT_TRUE(link.px4().mode() == mavlink::kPositionMode);
+  EXPECT_EQ(mode(4.0f, 6.0f), mav::MavResult::ACCEPTED);
+  EXPECT_TRUE(link.px4().mode() == mavlink::kLandMode);
+}
+
 mav::Odometry Vision() {
   mav::Odometry m;
   m.q = {1.0f, 0.0f, 0.0f, 0.0f};
@@ -133,6 +161,28 @@ TEST(Px4, TakesNoPoseThatIsNotFinite) {
   m.vx = m.pose_covariance[0] = kNaN;  // not known, which is no fault
   link.Send(m);
   EXPECT_EQ(link.px4().seen().odometry, 2);
+}
+
+TEST(Px4, RotationsAreOfUnitLength) {
+  for (const float w : {0.0f, 1e-20f, 0.98f, 1.02f, 1e20f}) {
+    Link link;
+    mav::Odometry pose = Vision();
+    mav::SetAttitudeTarget setpoint;
+    setpoint.target_system = 1;
+    pose.q = setpoint.q = {w, 0.0f, 0.0f, 0.0f};
+    link.Send(pose);
+    link.Send(setpoint);
+    EXPECT_EQ(link.px4().seen().odometry + link.px4().seen().setpoints, 0) << w;
+  }
+  Link link;
+  mav::Odometry pose = Vision();
+  mav::SetAttitudeTarget setpoint;
+  setpoint.target_system = 1;
+  pose.q = setpoint.q = {1.004f, 0.0f, 0.0f, 0.0f};  // rounded by whoever sent it
+  link.Send(pose);
+  link.Send(setpoint);
+  EXPECT_EQ(link.px4().seen().vision.value().q[0], 1.0f);
+  EXPECT_EQ(link.px4().seen().setpoint.value().q[0], 1.0f);
 }
 
 /// Its demand under OFFBOARD by a setpoint with this thrust.
@@ -177,11 +227,30 @@ TEST(Px4, TimesOfVisionAreOfTheClockOfItsSender) {
   Link link;
   link.Answer(1, 191, 5'000'000);
   link.Send(Vision());
-  const int64_t stamp = link.now() + 5'000'000;
+  const auto stamp = static_cast<uint64_t>(link.now() + 5'000'000);
   ASSERT_TRUE(link.px4().HostTime(stamp));
   EXPECT_NEAR(static_cast<double>(*link.px4().HostTime(stamp) - link.now()), 0.0, 1000.0);
   link.Answer(255, 190, -9'000'000'000);
   EXPECT_NEAR(static_cast<double>(*link.px4().HostTime(stamp) - link.now()), 0.0, 1000.0);
+}
+
+TEST(Px4, AStampThatNoClockShowsHasNoTime) {
+  Link link;
+  link.Answer(1, 191, -9'000'000'000'000'000);  // the offset is as far away as TIMESYNC can say
+  link.Send(Vision());
+  for (const uint64_t stamp : {uint64_t{1} << 63, (uint64_t{1} << 63) - 1, ~uint64_t{0}})
+    EXPECT_FALSE(link.px4().HostTime(stamp)) << stamp;
+}
+
+TEST(Px4, BeginsAnewWithItsOwnStreamsAndNobodysClock) {
+  Link link;
+  link.Answer(1, 191, 5'000'000);
+  link.Send(Vision());
+  link.Ask(kImu, 10'000.0f);
+  ASSERT_TRUE(link.px4().HostTime(kStart));
+  link.px4().Reboot(link.now());
+  EXPECT_NEAR(link.Second()[mav::HighresImu::kId], 50, 2);
+  EXPECT_FALSE(link.px4().HostTime(kStart));
 }
 
 long OpenFiles() {
@@ -189,33 +258,39 @@ long OpenFiles() {
   return std::distance(begin(files), end(files));
 }
 
+/// The number of the file that is opened next.
+int NextFile() {
+  const int file = dup(STDIN_FILENO);
+  close(file);
+  return file;
+}
+
+sockaddr_in Bound(int file) {
+  sockaddr_in address{};
+  socklen_t length = sizeof address;
+  EXPECT_EQ(getsockname(file, reinterpret_cast<sockaddr*>(&address), &length), 0);
+  return address;
+}
+
 TEST(UdpSocket, LeavesNoFileOpenWhenItFails) {
   const long before = OpenFiles();
   EXPECT_THROW(UdpSocket("nowhere", 14540, 0), std::runtime_error);
   {
-    const UdpSocket first("127.0.0.1", 14540, kPort);
-    EXPECT_THROW(UdpSocket("127.0.0.1", 14540, kPort), std::runtime_error);
+    const int file = NextFile();
+    const UdpSocket first("127.0.0.1", 14540, 0);
+    const int taken = ntohs(Bound(file).sin_port);
+    EXPECT_THROW(UdpSocket("127.0.0.1", 14540, taken), std::runtime_error);
   }
   EXPECT_EQ(OpenFiles(), before);
 }
 
-/// The address that the port is bound to, as the kernel lists it.
-std::string AddressOf(int port) {
-  char suffix[8];
-  std::snprintf(suffix, sizeof suffix, ":%04X", static_cast<unsigned>(port));
-  std::ifstream list("/proc/net/udp");
-  for (std::string word; list >> word;)
-    if (word.size() == 13 && word.substr(8) == suffix) return word.substr(0, 8);
-  return "none";
-}
-
-TEST(UdpSocket, HearsItsOwnHostAloneWhereItSendsThere) {
-  {
-    const UdpSocket local("127.0.0.1", 14540, kPort);
-    EXPECT_EQ(AddressOf(kPort), "0100007F");
+TEST(UdpSocket, HearsTheLoopbackAloneWhereItSendsThere) {
+  const int file = NextFile();
+  for (const auto& [host, own] : std::map<const char*, in_addr_t>{{"127.0.0.1", INADDR_LOOPBACK},
+                                                                  {"192.0.2.1", INADDR_ANY}}) {
+    const UdpSocket socket(host, 14540, 0);
+    EXPECT_EQ(ntohl(Bound(file).sin_addr.s_addr), own) << host;
   }
-  const UdpSocket wide("192.0.2.1", 14540, kPort);
-  EXPECT_EQ(AddressOf(kPort), "00000000");
 }
 
 }  // namespace
