@@ -16,9 +16,9 @@ namespace {
 
 constexpr int64_t kStatusPeriod = 1000000;  // us
 
-double ThreadCpu() {
+double Seconds(clockid_t clock) {
   timespec t{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+  clock_gettime(clock, &t);
   return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
 }
 
@@ -73,7 +73,7 @@ struct Lockstep::Process {
   std::deque<Event> inbox;          // what came
   int64_t buffer = 0;               // bytes that still find place in the socket
   std::map<std::string, int> room;  // messages that each channel still has place for
-  double cpu_s = 0.0;
+  double wall_s = 0.0;
 
   void Stop(bool freeze) {
     ++stops;
@@ -91,9 +91,9 @@ struct Lockstep::Process {
   }
   template <class F>
   void Run(const F& work) {
-    const double start = ThreadCpu();
+    const double start = Seconds(CLOCK_MONOTONIC);
     work();
-    cpu_s += ThreadCpu() - start;
+    wall_s += Seconds(CLOCK_MONOTONIC) - start;
   }
 };
 
@@ -217,6 +217,7 @@ void Lockstep::Deliver(const Event& event) {
 }
 
 void Lockstep::RunUntil(int64_t utime) {
+  const double wall = Seconds(CLOCK_MONOTONIC), cpu = Seconds(CLOCK_THREAD_CPUTIME_ID);
   while (!events_.empty() && events_.top().utime <= utime) {
     const Event event = events_.top();
     events_.pop();
@@ -224,6 +225,8 @@ void Lockstep::RunUntil(int64_t utime) {
     Deliver(event);
   }
   now_ = utime;
+  wall_s_ += Seconds(CLOCK_MONOTONIC) - wall;
+  cpu_s_ += Seconds(CLOCK_THREAD_CPUTIME_ID) - cpu;
 }
 
 bool Lockstep::Done() const {
@@ -232,10 +235,13 @@ bool Lockstep::Done() const {
   return false;
 }
 
+/// Processor time by shares of wall time: the processor's own clock is a system call, some thousands
+/// of them in a simulated second.
 std::map<std::string, Lockstep::Usage> Lockstep::Usages() const {
+  const double share = wall_s_ > 0.0 ? cpu_s_ / wall_s_ : 0.0;
   std::map<std::string, Usage> usages;
   for (const auto& process : processes_) {
-    usages[process->name].cpu_s = process->cpu_s;
+    usages[process->name].cpu_s = share * process->wall_s;
     if (process->life) usages[process->name].stages = process->life->port.stages().Summaries();
   }
   return usages;

@@ -116,6 +116,7 @@ class Lockstep {
   Tap tap_;
   std::map<std::string, int64_t> delays_;  // us
   double load_ = 1.0;                      // of the latencies
+  double wall_s_ = 0.0, cpu_s_ = 0.0;      // spent in RunUntil()
   double loss_ = 0.0;
   world::Random loss_draws_{0};
 };
