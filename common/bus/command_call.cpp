@@ -1,6 +1,5 @@
 #include "common/bus/command_call.h"
 
-#include "chase/command_t.hpp"
 #include "common/bus/convert.h"
 
 namespace chase::bus {
@@ -23,5 +22,24 @@ void CommandCall::Hear(const command_ack_t& ack) {
 }
 
 double CommandCall::Elapsed() const { return Seconds(bus_->Now(), given_); }
+
+world::CommandKey KeyOf(const command_t& m, int64_t origin) {
+  return {m.sender, m.sender_start, m.id, Seconds(m.utime, origin)};
+}
+
+bool IsForced(const command_t& m) { return m.n_arguments == 1 && m.arguments[0] == 1.0; }
+
+command_ack_t Acknowledgement(const command_t& m, const world::CommandAnswer& answer,
+                              int64_t utime) {
+  command_ack_t ack{};
+  ack.utime = utime;
+  ack.command_sender = m.sender;
+  ack.command_start = m.sender_start;
+  ack.id = m.id;
+  ack.kind = m.kind;
+  ack.verdict = answer.accepted ? command_ack_t::ACCEPTED : command_ack_t::REFUSED;
+  ack.reason = answer.reason;
+  return ack;
+}
 
 }  // namespace chase::bus

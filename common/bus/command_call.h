@@ -5,7 +5,9 @@
 #include <vector>
 
 #include "chase/command_ack_t.hpp"
+#include "chase/command_t.hpp"
 #include "common/bus/bus.h"
+#include "common/world/command_window.h"
 #include "common/world/commands.h"
 
 namespace chase::bus {
@@ -41,5 +43,13 @@ class CommandCall {
   std::vector<double> arguments_;
   world::CommandClient client_;
 };
+
+/// Which command it is; its time counts from `origin`, us.
+world::CommandKey KeyOf(const command_t& m, int64_t origin);
+/// Does it say that it is meant?
+bool IsForced(const command_t& m);
+/// What answers it at `utime`.
+command_ack_t Acknowledgement(const command_t& m, const world::CommandAnswer& answer,
+                              int64_t utime);
 
 }  // namespace chase::bus

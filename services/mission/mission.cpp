@@ -6,11 +6,8 @@
 
 namespace chase::mission {
 
-Answer Mission::Obey(double t, const Command& command) {
-  const world::CommandAnswer answer =
-      window_.Take(t, {command.sender, command.sender_start, command.id, command.t},
-                   [&] { return Try(t, command); });
-  return {command, answer.accepted, answer.reason};
+world::CommandAnswer Mission::Obey(double t, const Command& command) {
+  return window_.Take(t, command, [&] { return Try(t, command); });
 }
 
 world::CommandAnswer Mission::Try(double t, const Command& command) {

@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "common/world/command_window.h"
-#include "services/mission/command.h"
 #include "services/mission/inputs.h"
 #include "services/mission/mission_config.h"
 #include "services/mission/states.h"
@@ -18,6 +17,12 @@ namespace chase::mission {
 struct Home {
   Eigen::Vector3d p = Eigen::Vector3d::Zero();  ///< p_WB where it took off, frame W, m
   int32_t epoch = 0;                            ///< of that frame W
+};
+
+/// One command of one sender.
+struct Command : world::CommandKey {
+  Event kind = Event::kStop;
+  bool force = false;  ///< says that it is meant
 };
 
 /// Leads a flight from switch-on to landing: commands and what is observed in, a state out.
@@ -32,7 +37,7 @@ class Mission {
 
   /// Obeys or refuses a command that came at time `t` [s]. The same command again gets the same
   /// answer and changes nothing.
-  Answer Obey(double t, const Command& command);
+  world::CommandAnswer Obey(double t, const Command& command);
 
   /// Moves on by what is observed at time `t` [s], which never goes back.
   void Update(double t);

@@ -4,11 +4,11 @@
 
 #include <algorithm>
 
-#include "chase/command_ack_t.hpp"
 #include "chase/flight_state_t.hpp"
 #include "chase/geofence_t.hpp"
 #include "chase/health_t.hpp"
 #include "common/bus/battery.h"
+#include "common/bus/command_call.h"
 #include "common/bus/convert.h"
 #include "common/world/column.h"
 
@@ -55,22 +55,10 @@ void MissionNode::SubscribeStatuses() {
 
 void MissionNode::OnCommand(const command_t& message) {
   if (message.kind == command_t::SELECT) return;  // perception's
-  const Command command{message.sender,
-                        message.sender_start,
-                        message.id,
-                        Seconds(message.utime),
-                        static_cast<Event>(message.kind),
-                        message.n_arguments == 1 && message.arguments[0] == 1.0};
-  const Answer answer = mission_.Obey(Now(), command);
-  command_ack_t m{};
-  m.utime = bus_.Now();
-  m.command_sender = command.sender;
-  m.command_start = command.sender_start;
-  m.id = command.id;
-  m.kind = message.kind;
-  m.verdict = answer.accepted ? command_ack_t::ACCEPTED : command_ack_t::REFUSED;
-  m.reason = answer.reason;
-  bus_.Publish("COMMAND_ACK", m);
+  const world::CommandAnswer answer = mission_.Obey(
+      Now(),
+      {bus::KeyOf(message, origin_), static_cast<Event>(message.kind), bus::IsForced(message)});
+  bus_.Publish("COMMAND_ACK", bus::Acknowledgement(message, answer, bus_.Now()));
   if (answer.accepted) SendState();
 }
 

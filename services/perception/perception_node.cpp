@@ -6,7 +6,7 @@
 #include <opencv2/core.hpp>
 #include <string>
 
-#include "chase/command_ack_t.hpp"
+#include "common/bus/command_call.h"
 #include "common/bus/convert.h"
 #include "services/perception/messages.h"
 #include "services/perception/select.h"
@@ -52,19 +52,9 @@ void PerceptionNode::OnImage(const camera_image_t& message) {
 void PerceptionNode::OnCommand(const command_t& message) {
   if (message.kind != command_t::SELECT) return;
   const int64_t start = bus_.identity().start;
-  const world::CommandKey command{message.sender, message.sender_start, message.id,
-                                  bus::Seconds(message.utime, start)};
-  const world::CommandAnswer answer =
-      window_.Take(bus::Seconds(bus_.Now(), start), command, [&] { return Select(message); });
-  command_ack_t m{};
-  m.utime = bus_.Now();
-  m.command_sender = message.sender;
-  m.command_start = message.sender_start;
-  m.id = message.id;
-  m.kind = message.kind;
-  m.verdict = answer.accepted ? command_ack_t::ACCEPTED : command_ack_t::REFUSED;
-  m.reason = answer.reason;
-  bus_.Publish("COMMAND_ACK", m);
+  const world::CommandAnswer answer = window_.Take(
+      bus::Seconds(bus_.Now(), start), bus::KeyOf(message, start), [&] { return Select(message); });
+  bus_.Publish("COMMAND_ACK", bus::Acknowledgement(message, answer, bus_.Now()));
 }
 
 world::CommandAnswer PerceptionNode::Select(const command_t& message) {

@@ -27,8 +27,8 @@ class Bench {
     }
   }
 
-  Answer Command(Event kind, int64_t id = 0) {
-    return mission.Obey(t, {"command", 1, id != 0 ? id : ++last_id, t, kind});
+  world::CommandAnswer Command(Event kind, int64_t id = 0) {
+    return mission.Obey(t, {{"command", 1, id != 0 ? id : ++last_id, t}, kind});
   }
 
   /// In the air at `p`, in HOLD.

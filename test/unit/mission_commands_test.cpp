@@ -17,7 +17,7 @@ TEST(Commands, OfAnotherTimeAreRefused) {
   Bench bench({}, 9.0);
   bench.Fly();
   const auto given = [&](double t, int64_t id) {
-    return bench.mission.Obey(bench.t, {"command", 1, id, t, Event::kChase});
+    return bench.mission.Obey(bench.t, {{"command", 1, id, t}, Event::kChase});
   };
   EXPECT_FALSE(given(8.9, 100).accepted) << "before the process started";
   EXPECT_FALSE(given(bench.t + 11.0, 102).accepted) << "from the future";
@@ -31,7 +31,7 @@ TEST(Commands, AreToldApartBySenderStartAndId) {
   Bench bench;
   bench.Fly();
   const auto obey = [&](const char* sender, int64_t start, int64_t id, Event kind) {
-    return bench.mission.Obey(bench.t, {sender, start, id, bench.t, kind}).accepted;
+    return bench.mission.Obey(bench.t, {{sender, start, id, bench.t}, kind}).accepted;
   };
   EXPECT_TRUE(obey("command", 1, 500, Event::kChase));
   for (const auto& [sender, start, id] :
@@ -49,12 +49,13 @@ TEST(Commands, ARefusedOneStaysRefused) {
   Bench bench;
   bench.hears_target = false;
   bench.Run(1.0);
-  const Answer first = bench.Command(Event::kTakeoff, 7);
+  const Command command{{"command", 1, 7, bench.t}, Event::kTakeoff};
+  const world::CommandAnswer first = bench.mission.Obey(bench.t, command);
   EXPECT_FALSE(first.accepted);
   bench.hears_target = true;
   bench.Run(0.5);
   ASSERT_EQ(bench.mission.state(), State::kReady);
-  const Answer again = bench.mission.Obey(bench.t, first.command);
+  const world::CommandAnswer again = bench.mission.Obey(bench.t, command);
   EXPECT_FALSE(again.accepted);
   EXPECT_EQ(again.reason, first.reason);
   EXPECT_EQ(bench.mission.state(), State::kReady);
@@ -67,9 +68,10 @@ TEST(Commands, MoreThanCanBeRememberedAreRefusedAndNoneIsObeyedTwice) {
   std::vector<Command> obeyed;
   int refused = 0;
   for (int64_t id = 1000; id < 1400; ++id) {
-    const Answer answer = bench.Command(id % 2 == 0 ? Event::kChase : Event::kHold, id);
-    if (answer.accepted) obeyed.push_back(answer.command);
-    refused += !answer.accepted;
+    const Command command{{"command", 1, id, bench.t}, id % 2 == 0 ? Event::kChase : Event::kHold};
+    const bool accepted = bench.mission.Obey(bench.t, command).accepted;
+    if (accepted) obeyed.push_back(command);
+    refused += !accepted;
   }
   EXPECT_GT(refused, 100);
   const State state = bench.mission.state();
@@ -113,24 +115,24 @@ TEST(Commands, TakeEffectOnceOnABadLine) {
     Bench bench;
     bench.Fly();
     BadLine<Command> there(&random);
-    BadLine<Answer> back(&random);
+    BadLine<std::pair<int64_t, world::CommandAnswer>> back(&random);
     int given = 0, changes = 0;
     State before = bench.mission.state();
     for (int64_t id = 1; id <= 100; ++id) {
       const Event kind = id % 2 == 1 ? Event::kChase : Event::kHold;
-      const Command command{"command", 5, 10'000 + id, bench.t, kind};
+      const Command command{{"command", 5, 10'000 + id, bench.t}, kind};
       world::CommandClient client(static_cast<int>(kind), bench.t);
       while (!client.answered()) {
         ASSERT_FALSE(client.GaveUp(bench.t)) << "seed " << seed << ", command " << id;
         if (client.Due(bench.t)) there.Send(bench.t, command);
         bench.Run(kTick);
         for (const Command& c : there.Arrived(bench.t)) {
-          back.Send(bench.t, bench.mission.Obey(bench.t, c));
+          back.Send(bench.t, {c.id, bench.mission.Obey(bench.t, c)});
           changes += bench.mission.state() != before;
           before = bench.mission.state();
         }
-        for (const Answer& a : back.Arrived(bench.t))
-          if (a.command.id == command.id) client.OnAnswer(a.accepted, a.reason);
+        for (const auto& [of, answer] : back.Arrived(bench.t))
+          if (of == command.id) client.OnAnswer(answer.accepted, answer.reason);
       }
       ASSERT_TRUE(client.accepted()) << client.reason();
       ++given;
@@ -147,9 +149,9 @@ TEST(Commands, KillNeedsForceInEveryState) {
     if (flies) bench.Fly();
     const State before = bench.mission.state();
     const auto kill = [&](bool force, int64_t id) {
-      return bench.mission.Obey(bench.t, {"command", 1, id, bench.t, Event::kKill, force});
+      return bench.mission.Obey(bench.t, {{"command", 1, id, bench.t}, Event::kKill, force});
     };
-    const Answer refused = kill(false, 900);
+    const world::CommandAnswer refused = kill(false, 900);
     EXPECT_FALSE(refused.accepted);
     EXPECT_NE(refused.reason.find("--force"), std::string::npos);
     EXPECT_EQ(bench.mission.state(), before);

@@ -37,7 +37,7 @@ TEST(Mission, IsReadyOnlyWhenNothingIsMissing) {
     EXPECT_EQ(one.mission.state(), State::kIdle) << c.what;
     ASSERT_EQ(one.mission.missing().size(), 1u) << c.what;
     EXPECT_EQ(one.mission.missing()[0].rfind(c.what, 0), 0u) << one.mission.missing()[0];
-    const Answer answer = one.Command(Event::kTakeoff);
+    const world::CommandAnswer answer = one.Command(Event::kTakeoff);
     EXPECT_FALSE(answer.accepted);
     EXPECT_NE(answer.reason.find(c.what), std::string::npos) << answer.reason;
   }
@@ -124,7 +124,7 @@ TEST(Mission, ReturnInAnotherFrameIsALandingAtOnce) {
   ++bench.pose.epoch;
   bench.Run(0.1);
   ASSERT_EQ(bench.mission.state(), State::kHold);
-  const Answer answer = bench.Command(Event::kReturn);
+  const world::CommandAnswer answer = bench.Command(Event::kReturn);
   EXPECT_TRUE(answer.accepted);
   EXPECT_NE(answer.reason.find("not known"), std::string::npos) << answer.reason;
   EXPECT_EQ(bench.mission.state(), State::kLand);

@@ -153,7 +153,7 @@ TEST(Envelope, ALowBatteryRefusesWhatLeadsAway) {
   bench.Run(0.2);
   ASSERT_EQ(bench.mission.state(), State::kReturn);
   for (const Event command : {Event::kChase, Event::kHold, Event::kSearch}) {
-    const Answer answer = bench.Command(command);
+    const world::CommandAnswer answer = bench.Command(command);
     EXPECT_FALSE(answer.accepted);
     EXPECT_NE(answer.reason.find("battery is low"), std::string::npos) << answer.reason;
   }
