@@ -27,10 +27,11 @@ std::optional<int64_t> Read(const std::string& file) {
 }  // namespace
 
 int64_t SteadyMicroseconds() { return Microseconds<std::chrono::steady_clock>(); }
+int64_t WallMicroseconds() { return Microseconds<std::chrono::system_clock>(); }
 
 int64_t HostClockOffset(const std::string& file) {
   if (const auto agreed = Read(file)) return *agreed;
-  const int64_t own = Microseconds<std::chrono::system_clock>() - SteadyMicroseconds();
+  const int64_t own = WallMicroseconds() - SteadyMicroseconds();
   // Whole from the first moment on, and never over another's: written aside, then linked.
   const std::string aside = fmt::format("{}.{}", file, getpid());
   std::ofstream(aside) << own << '\n';

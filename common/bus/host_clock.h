@@ -13,7 +13,8 @@ inline constexpr char kClockFile[] = "/dev/shm/chase-clock";
 /// `file` can be neither written nor read, as it is now.
 int64_t HostClockOffset(const std::string& file = kClockFile);
 
-/// The steady clock, us.
+/// The steady clock, and the time since 1970, us.
 int64_t SteadyMicroseconds();
+int64_t WallMicroseconds();
 
 }  // namespace chase::bus

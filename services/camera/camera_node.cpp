@@ -6,6 +6,7 @@
 
 #include "chase/camera_image_t.hpp"
 #include "common/bus/convert.h"
+#include "common/bus/host_clock.h"
 #include "common/bus/image_format.h"
 #include "services/camera/image.h"
 
@@ -70,7 +71,7 @@ void CameraNode::TakeFrame(const Grabber::Grabbed& grabbed) {
 /// The middle of the exposure, on the bus's clock.
 int64_t CameraNode::CaptureTime(const Grabber::Grabbed& grabbed) {
   const int64_t now = bus_.Now();
-  const int64_t arrival = now - (MonotonicTime() - grabbed.arrival);
+  const int64_t arrival = now - (bus::SteadyMicroseconds() - grabbed.arrival);
   const int64_t delay = std::llround(1e6 * config_.stamp_delay);
   const Frame& frame = grabbed.frame;
   stamps_ = frame.clock;
@@ -78,9 +79,10 @@ int64_t CameraNode::CaptureTime(const Grabber::Grabbed& grabbed) {
     case StampClock::kNone:
       return arrival - delay;
     case StampClock::kMonotonic:
-      return clock_.HostTime(now - (MonotonicTime() - frame.stamp), true, arrival) - delay;
+      return clock_.HostTime(now - (bus::SteadyMicroseconds() - frame.stamp), true, arrival) -
+             delay;
     case StampClock::kWall:
-      return clock_.HostTime(now - (WallTime() - frame.stamp), true, arrival) - delay;
+      return clock_.HostTime(now - (bus::WallMicroseconds() - frame.stamp), true, arrival) - delay;
     case StampClock::kStream:
       break;
   }

@@ -4,21 +4,14 @@
 #include <exception>
 #include <utility>
 
+#include "common/bus/host_clock.h"
+
 namespace chase::camera {
 namespace {
 
 constexpr std::chrono::milliseconds kPause(200);  // after a source gave nothing
 
-template <class Clock>
-int64_t Microseconds() {
-  const auto now = Clock::now().time_since_epoch();
-  return std::chrono::duration_cast<std::chrono::microseconds>(now).count();
-}
-
 }  // namespace
-
-int64_t MonotonicTime() { return Microseconds<std::chrono::steady_clock>(); }
-int64_t WallTime() { return Microseconds<std::chrono::system_clock>(); }
 
 Grabber::Grabber(std::unique_ptr<FrameSource> source)
     : source_(std::move(source)), thread_([this] { Run(); }) {}
@@ -45,7 +38,7 @@ void Grabber::Run() {
       problem = error.what();
       threw = true;
     }
-    const int64_t arrival = MonotonicTime();
+    const int64_t arrival = bus::SteadyMicroseconds();
     std::unique_lock<std::mutex> lock(mutex_);
     problem_ = problem;
     if (threw) ++undecodable_;

@@ -50,8 +50,4 @@ class Grabber {
   std::thread thread_;
 };
 
-/// The monotonic clock and the time since 1970, microseconds.
-int64_t MonotonicTime();
-int64_t WallTime();
-
 }  // namespace chase::camera

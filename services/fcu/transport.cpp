@@ -16,6 +16,8 @@
 #include <stdexcept>
 #include <thread>
 
+#include "common/bus/udp_port.h"
+
 namespace chase::fcu {
 namespace {
 
@@ -156,21 +158,6 @@ class Serial : public Reading {
   ssize_t Read(uint8_t* buffer, std::size_t size) override { return read(fd(), buffer, size); }
 };
 
-std::unique_ptr<Transport> OpenUdp(int port) {
-  const int fd = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
-  if (fd < 0) throw Failure("UDP socket", "raise the limit on open files");
-  sockaddr_in address{};
-  address.sin_family = AF_INET;
-  address.sin_port = htons(static_cast<uint16_t>(port));
-  address.sin_addr.s_addr = htonl(INADDR_ANY);
-  if (bind(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0)
-    return std::make_unique<Udp>(fd, port);
-  const auto failure = Failure("UDP port " + std::to_string(port),
-                               "stop the program that holds it or set another port");
-  close(fd);
-  throw failure;
-}
-
 std::optional<speed_t> Speed(int baud) {
   switch (baud) {
     case 57600:
@@ -226,7 +213,8 @@ std::unique_ptr<Transport> OpenSerial(const std::string& device, int baud) {
 }  // namespace
 
 std::unique_ptr<Transport> OpenTransport(const std::string& link, int port, int baud) {
-  return link == "udp" ? OpenUdp(port) : OpenSerial(link, baud);
+  if (link == "udp") return std::make_unique<Udp>(bus::OpenUdpPort(port), port);
+  return OpenSerial(link, baud);
 }
 
 }  // namespace chase::fcu

@@ -2,9 +2,8 @@
 
 #include <fmt/format.h>
 
-#include <chrono>
-
 #include "common/bus/convert.h"
+#include "common/bus/host_clock.h"
 #include "services/lidar/convert.h"
 
 namespace chase::lidar {
@@ -13,11 +12,6 @@ namespace {
 constexpr int64_t kOldest = 1'000'000;  // us that a packet may wait in the socket
 constexpr double kSilent = 0.2;         // s without a packet: 150 are missing
 constexpr double kFlawed = 5.0;         // s after a loss in which the sensor is called degraded
-
-int64_t WallTime() {
-  const auto now = std::chrono::system_clock::now().time_since_epoch();
-  return std::chrono::duration_cast<std::chrono::microseconds>(now).count();
-}
 
 }  // namespace
 
@@ -57,7 +51,7 @@ void LidarNode::TickDevice() {
 int64_t LidarNode::SweepTime(int64_t device_us) {
   const int64_t aligned = alignment_.HostTime(device_us);
   if (!positions_) return aligned;
-  const int64_t wall = WallTime(), now = bus_.Now();
+  const int64_t wall = bus::WallMicroseconds(), now = bus_.Now();
   while (const auto packet = positions_->Next())
     gps_.Hear(packet->bytes.data(), packet->bytes.size(), wall);
   const auto utc = gps_.Utc(device_us, wall - (now - aligned));
@@ -67,7 +61,7 @@ int64_t LidarNode::SweepTime(int64_t device_us) {
 
 /// On the bus's clock, which the wall clock may have left since.
 int64_t LidarNode::Arrival(const RawPacket& packet) const {
-  const int64_t age = WallTime() - packet.capture_utime;
+  const int64_t age = bus::WallMicroseconds() - packet.capture_utime;
   return bus_.Now() - (packet.capture_utime > 0 && age >= 0 && age < kOldest ? age : 0);
 }
 

@@ -1,12 +1,11 @@
 #include "services/lidar/udp_source.h"
 
-#include <netinet/in.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
-#include <cerrno>
 #include <cstring>
-#include <stdexcept>
+
+#include "common/bus/udp_port.h"
 
 namespace chase::lidar {
 namespace {
@@ -51,20 +50,10 @@ class UdpSource : public PacketSource {
 }  // namespace
 
 std::unique_ptr<PacketSource> OpenUdpSource(int port) {
-  const int fd = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
-  if (fd < 0) throw std::runtime_error(std::string("UDP socket: ") + std::strerror(errno));
-  auto source = std::make_unique<UdpSource>(fd);
-  setsockopt(fd, SOL_SOCKET, SO_RCVBUF, &kReceiveBufferBytes, sizeof kReceiveBufferBytes);
+  const int fd = bus::OpenUdpPort(port, INADDR_ANY, kReceiveBufferBytes);
   const int yes = 1;
   setsockopt(fd, SOL_SOCKET, SO_TIMESTAMPNS, &yes, sizeof yes);
-  sockaddr_in address{};
-  address.sin_family = AF_INET;
-  address.sin_port = htons(static_cast<uint16_t>(port));
-  address.sin_addr.s_addr = htonl(INADDR_ANY);
-  if (bind(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0)
-    throw std::runtime_error("UDP port " + std::to_string(port) + ": " + std::strerror(errno) +
-                             "; stop the program that holds it or set another port");
-  return source;
+  return std::make_unique<UdpSource>(fd);
 }
 
 }  // namespace chase::lidar

@@ -4,10 +4,9 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-#include <array>
-#include <cerrno>
-#include <cstring>
 #include <stdexcept>
+
+#include "common/bus/udp_port.h"
 
 namespace chase::link {
 namespace {
@@ -38,37 +37,18 @@ sockaddr_in PeerOf(const std::string& text) {
 
 PeerSocket::PeerSocket(int port, const std::string& peer) : fd_(-1), named_(!peer.empty()) {
   if (named_) peer_ = PeerOf(peer);
-  fd_ = socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-  if (fd_ < 0) throw std::runtime_error(std::string("UDP socket: ") + std::strerror(errno));
-  setsockopt(fd_, SOL_SOCKET, SO_RCVBUF, &kReceiveBufferBytes, sizeof kReceiveBufferBytes);
-  sockaddr_in own{};
-  own.sin_family = AF_INET;
-  own.sin_port = htons(static_cast<uint16_t>(port));
-  own.sin_addr.s_addr = htonl(INADDR_ANY);
-  if (bind(fd_, reinterpret_cast<const sockaddr*>(&own), sizeof own) == 0) return;
-  const std::string why = std::strerror(errno);
-  close(fd_);
-  throw std::runtime_error("UDP port " + std::to_string(port) + ": " + why +
-                           "; stop the program that holds it or set another port");
+  fd_ = bus::OpenUdpPort(port, INADDR_ANY, kReceiveBufferBytes);
 }
 
 PeerSocket::~PeerSocket() { close(fd_); }
 
 std::optional<std::vector<uint8_t>> PeerSocket::Next() {
-  std::array<uint8_t, 2048> buffer{};
-  for (;;) {
-    socklen_t length = sizeof last_;
-    const ssize_t size = recvfrom(fd_, buffer.data(), buffer.size(), 0,
-                                  reinterpret_cast<sockaddr*>(&last_), &length);
-    if (size < 0) {
-      if (errno == EINTR || errno == ECONNREFUSED) continue;  // came back for what we sent
-      return std::nullopt;
-    }
-    if (!named_ || last_.sin_addr.s_addr == peer_->sin_addr.s_addr)
-      return std::vector<uint8_t>(buffer.begin(), buffer.begin() + size);
+  std::optional<std::vector<uint8_t>> datagram = bus::NextDatagram(fd_, &last_);
+  if (datagram && named_ && last_.sin_addr.s_addr != peer_->sin_addr.s_addr) {
     ++strangers_;
-    return std::vector<uint8_t>();  // whoever reads counts what it took
+    datagram->clear();  // whoever reads counts what it took
   }
+  return datagram;
 }
 
 void PeerSocket::Trust() {

@@ -1,18 +1,14 @@
 #include "services/simulator/hardware.h"
 
-#include <chrono>
 #include <cmath>
+
+#include "common/bus/host_clock.h"
 
 namespace chase::simulator {
 namespace {
 
 // The sensor counts from its own power-on, as without a GPS.
 constexpr int64_t kLidarBoot = 3'590'000'000;  // us past the hour: it wraps 10 s later
-
-int64_t WallTime() {
-  const auto now = std::chrono::system_clock::now().time_since_epoch();
-  return std::chrono::duration_cast<std::chrono::microseconds>(now).count();
-}
 
 }  // namespace
 
@@ -42,7 +38,7 @@ void Hardware::SendPackets(std::vector<DataPacket> packets, double clock_error) 
 }
 
 void Hardware::SendImage(const Image& image, int64_t utime, int64_t clock) {
-  if (camera_) camera_->Send(image, WallTime() - (clock - utime));
+  if (camera_) camera_->Send(image, bus::WallMicroseconds() - (clock - utime));
 }
 
 }  // namespace chase::simulator

@@ -5,6 +5,7 @@
 #include <thread>
 
 #include "../fcu/firing_order.h"
+#include "common/bus/host_clock.h"
 #include "common/world/scenario.h"
 #include "services/camera/capture_clock.h"
 #include "services/camera/frame_source.h"
@@ -116,7 +117,7 @@ TEST(Drivers, AStreamedFrameCarriesItsCaptureTime) {
   simulator::MjpegServer server(kPort, 95);
   camera::Grabber grabber(camera::OpenFrameSource("http://127.0.0.1:38090/stream", 20.0));
   for (int k = 1; k <= 5; ++k) {
-    const int64_t captured = camera::WallTime() - 30'000 - k;
+    const int64_t captured = bus::WallMicroseconds() - 30'000 - k;
     std::optional<camera::Grabber::Grabbed> taken;
     for (int attempt = 0; attempt < 20 && !taken; ++attempt) {  // until it has connected
       server.Send(Grey(40 * k), captured);
@@ -138,7 +139,7 @@ TEST(Drivers, ACameraThatIsUnpluggedIsFoundAgain) {
   camera::Grabber grabber(camera::OpenFrameSource("http://127.0.0.1:38090/stream", 20.0));
   const auto see = [&] {
     for (int i = 0; i < 100; ++i) {
-      server->Send(Grey(100), camera::WallTime());
+      server->Send(Grey(100), bus::WallMicroseconds());
       std::this_thread::sleep_for(std::chrono::milliseconds(20));
       if (grabber.Take()) return true;
     }
@@ -156,12 +157,12 @@ TEST(Drivers, ACameraThatIsUnpluggedIsFoundAgain) {
 TEST(Drivers, OfFramesThatNobodyFetchedTheNewestIsKept) {
   simulator::MjpegServer server(kPort, 95);
   camera::Grabber grabber(camera::OpenFrameSource("http://127.0.0.1:38090/stream", 20.0));
-  server.Send(Grey(10), camera::WallTime());
+  server.Send(Grey(10), bus::WallMicroseconds());
   for (int i = 0; i < 200 && !Wait(&grabber, &server); ++i)
-    server.Send(Grey(10), camera::WallTime());
+    server.Send(Grey(10), bus::WallMicroseconds());
   const long before = grabber.dropped();
   for (int k = 1; k <= 5; ++k) {
-    server.Send(Grey(40 * k), camera::WallTime());
+    server.Send(Grey(40 * k), bus::WallMicroseconds());
     for (int i = 0; i < 10; ++i) {
       server.Tick();
       std::this_thread::sleep_for(std::chrono::milliseconds(10));
