@@ -58,18 +58,19 @@ Setpoint AttitudeFor(const Vector3d& thrust, const Vector3d& thrust_rate, double
 
 Setpoint TrackingLaw::Track(const Estimate& estimate, const Reference& now, const Reference& ahead,
                             double dt) {
-  Weigh(estimate, dt);
+  Learn(estimate, dt);
+  const Vector3d drag(drag_.value(), drag_.value(), config_.drag.z());
   const Vector3d before = integral_;
   Integrate(now.state.p - estimate.p_WB, dt);
   const Vector3d feed_forward =
-      ahead.state.a + config_.drag.cwiseProduct(now.state.v) + kGravity * Vector3d::UnitZ();
+      ahead.state.a + drag.cwiseProduct(now.state.v) + kGravity * Vector3d::UnitZ();
   const Vector3d wanted = feed_forward + Feedback(estimate, now.state) + integral_;
   const Vector3d thrust = LimitThrust(wanted, config_);
   // Anti-windup: what the limits cut off is not asked for more of (conditional integration).
   const Vector3d cut = wanted - thrust;
   for (int i = 0; i < 3; ++i)
     if (cut[i] * (integral_[i] - before[i]) > 0.0) integral_[i] = before[i];
-  const Vector3d thrust_rate = ahead.state.j + config_.drag.cwiseProduct(ahead.state.a);
+  const Vector3d thrust_rate = ahead.state.j + drag.cwiseProduct(ahead.state.a);
 
   const double yaw = math::Yaw(estimate.R_WB);
   const double turn =
@@ -102,6 +103,7 @@ Setpoint TrackingLaw::Level(double yaw, double lift) const {
 void TrackingLaw::Turn(double yaw) {
   integral_ = math::FromYaw(yaw) * integral_;
   trim_ = math::FromYaw(yaw) * trim_;
+  drag_.Turn(yaw);
 }
 
 double TrackingLaw::Asked(double thrust) const {
@@ -124,15 +126,21 @@ Vector3d TrackingLaw::Feedback(const Estimate& estimate, const world::State& ref
   return config_.velocity_gain.cwiseProduct(velocity_error);
 }
 
-// What the gain learns the integral need not ask for any more: what is asked for does not jump.
-void TrackingLaw::Weigh(const Estimate& estimate, double dt) {
-  const double before = thrust_gain();
+void TrackingLaw::Learn(const Estimate& estimate, double dt) {
   followed_ += dt;
   airborne_ = airborne_ || estimate.v_WB.norm() > kAirborne || followed_ > kLiftOff;
   if (!airborne_) return;
-  const Vector3d force =
-      estimate.a_WB + kGravity * Vector3d::UnitZ() + config_.drag.cwiseProduct(estimate.v_WB);
-  gain_.Add(asked_, force.dot(estimate.R_WB * Vector3d::UnitZ()), std::min(dt, kLongestStep));
+  const double step = std::min(dt, kLongestStep);
+  const Eigen::Matrix3d R_WB = estimate.R_WB.toRotationMatrix();
+  const Vector3d felt = estimate.a_WB + kGravity * Vector3d::UnitZ();
+  drag_.Add(R_WB.transpose() * felt, estimate.v_WB, R_WB, step);
+  Weigh(felt + config_.drag.cwiseProduct(estimate.v_WB), estimate, step);
+}
+
+// What the gain learns the integral need not ask for any more: what is asked for does not jump.
+void TrackingLaw::Weigh(const Vector3d& force, const Estimate& estimate, double dt) {
+  const double before = thrust_gain();
+  gain_.Add(asked_, force.dot(estimate.R_WB * Vector3d::UnitZ()), dt);
   const double bears = (kGravity + integral_.z()) * thrust_gain() / before - kGravity;
   integral_.z() = std::clamp(bears, -config_.integral_limit, config_.integral_limit);
 }

@@ -4,6 +4,7 @@
 
 #include "common/world/state.h"
 #include "services/control/control_config.h"
+#include "services/control/drag_estimate.h"
 #include "services/control/thrust_gain.h"
 
 namespace chase::control {
@@ -50,7 +51,8 @@ Setpoint AttitudeFor(const Eigen::Vector3d& thrust, const Eigen::Vector3d& thrus
 /// what the motors have been seen to give.
 class TrackingLaw {
  public:
-  explicit TrackingLaw(const ControlConfig& config) : config_(config) {}
+  explicit TrackingLaw(const ControlConfig& config)
+      : config_(config), drag_(0.5 * (config.drag.x() + config.drag.y())) {}
 
   /// `now` gives position and velocity to compare with the estimate, `ahead` the acceleration, jerk
   /// and yaw fed forward. `dt` is the time since the last call, s: 0 leaves the integral alone.
@@ -80,7 +82,8 @@ class TrackingLaw {
  private:
   Eigen::Vector3d Feedback(const Estimate& estimate, const world::State& reference) const;
   void Integrate(const Eigen::Vector3d& position_error, double dt);
-  void Weigh(const Estimate& estimate, double dt);
+  void Learn(const Estimate& estimate, double dt);
+  void Weigh(const Eigen::Vector3d& force, const Estimate& estimate, double dt);
   double Asked(double thrust) const;
   double AlongBody(const Eigen::Vector3d& thrust, const Estimate& estimate) const;
 
@@ -88,6 +91,7 @@ class TrackingLaw {
   Eigen::Vector3d integral_ = Eigen::Vector3d::Zero();
   Eigen::Vector3d trim_ = Eigen::Vector3d::Zero();
   ThrustGain gain_;
+  DragEstimate drag_;
   double asked_ = kGravity;  // last, m/s^2
   double followed_ = 0.0;    // plans, for this long, s
   bool airborne_ = false;    // on the ground it is not the motors alone that bear the weight

@@ -1,5 +1,6 @@
 chase_test(control_test LIBS control_core log_tools config
   SOURCES ${CMAKE_CURRENT_LIST_DIR}/control_test.cpp ${CMAKE_CURRENT_LIST_DIR}/control_law_test.cpp
+          ${CMAKE_CURRENT_LIST_DIR}/control_drag_test.cpp
           ${CMAKE_CURRENT_LIST_DIR}/control_plan_test.cpp
           ${CMAKE_CURRENT_LIST_DIR}/control_lost_test.cpp
           ${CMAKE_CURRENT_LIST_DIR}/control_landing_test.cpp)

@@ -76,6 +76,18 @@ TEST(TrackingLaw, HoversAtRest) {
   EXPECT_LT(s.w_WB_B.norm(), 1e-12);
 }
 
+TEST(TrackingLaw, FeedsDragForward) {
+  ControlConfig config;
+  Reference along;
+  along.state.v = {2.0, -1.0, 0.5};
+  Estimate estimate;
+  estimate.v_WB = along.state.v;
+  const Setpoint s = TrackingLaw(config).Track(estimate, along, along, 0.0);
+  const Vector3d up = s.R_WB * Vector3d::UnitZ();
+  const Vector3d wanted = config.drag.cwiseProduct(along.state.v) + Vector3d(0.0, 0.0, kGravity);
+  EXPECT_LT((up - wanted.normalized()).norm(), 1e-9);
+}
+
 TEST(TrackingLaw, IntegralIsLimited) {
   ControlConfig config;
   TrackingLaw law(config);
