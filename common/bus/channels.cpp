@@ -24,7 +24,7 @@ const std::vector<ChannelRow>& ChannelTable() {
       {"COMMAND_ACK", "command_ack_t", "mission, perception", false},
       {"FLIGHT_STATE", "flight_state_t", "mission", false, true},
       {"HEALTH", "health_t", "mission", false},
-      {"GEOFENCE", "geofence_t", "mission", false},
+      {"GEOFENCE", "geofence_t", "mission", false, true},
       {"TRUTH", "truth_t", "simulator", false},
       {"SCENARIO", "scenario_t", "simulator", false},
       {"FAULT", "event_t", "simulator, chase-flight", false},

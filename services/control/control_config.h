@@ -53,7 +53,7 @@ struct ControlConfig {
     v("descent_speed", descent_speed,
       "of a landing that was asked for, m/s; its loop goes a tenth beyond");
     v("lost_descent", lost_descent, "thrust short of hovering where there is no velocity, m/s^2");
-    v("geofence", geofence, "plans that leave it are not flown; the same as mission's");
+    v("geofence", geofence, "plans that leave it are not flown; none: mission's");
   }
 
   /// The least that a proof has to keep clear, m.

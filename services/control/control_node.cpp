@@ -41,17 +41,18 @@ Health HealthOf(const pose_t& m, double velocity_sigma, const ControlConfig& con
 }  // namespace
 
 ControlNode::ControlNode(bus::Bus& bus, const ControlConfig& config)
-    : bus_(bus), config_(config), controller_(config) {
+    : bus_(bus), config_(config), controller_(config), fence_(config.geofence) {
   bus_.Subscribe<plan_t>("PLAN", [this](const plan_t& m) { OnPlan(m); });
   bus_.Subscribe<obstacles_t>("OBSTACLES", [this](const obstacles_t& m) { OnObstacles(m); });
   bus_.Subscribe<flight_state_t>("FLIGHT_STATE", [this](const flight_state_t& m) { OnState(m); });
+  bus_.Subscribe<geofence_t>("GEOFENCE", [this](const geofence_t& m) { OnGeofence(m); });
   bus_.Subscribe<pose_t>("POSE", [this](const pose_t& m) { OnPose(m); });
 }
 
 // Another mission process counts its messages anew. What is too old is not of this flight.
 void ControlNode::OnState(const flight_state_t& message) {
   if (bus::Seconds(bus_.Now(), message.utime) > world::kMostAge.flight_state) return;
-  home_.reset();
+  // One that began anew in flight knows none; the place has not moved.
   if (message.has_home != 0) home_.emplace(message.epoch, bus::ToVector(message.home));
   const bool lands = message.state == flight_state_t::LAND;
   if (!lands)
@@ -60,6 +61,16 @@ void ControlNode::OnState(const flight_state_t& message) {
     landing_ = {message.sender_start, message.seq};
   controller_.SetLanding(lands);
   if (message.state == flight_state_t::DONE) controller_.Cut();
+}
+
+void ControlNode::OnGeofence(const geofence_t& message) {
+  if (config_.geofence.Exists() || !home_ || home_->first != message.epoch) return;
+  const Eigen::Vector3d& home = home_->second;
+  fence_.polygon.clear();
+  for (int32_t i = 0; i + 1 < message.n_corners; i += 2)
+    fence_.polygon.emplace_back(message.corners[i] - home.x(), message.corners[i + 1] - home.y());
+  fence_.floor = message.floor - home.z();
+  fence_.ceiling = message.ceiling - home.z();
 }
 
 void ControlNode::OnObstacles(const obstacles_t& message) {
@@ -85,19 +96,18 @@ const std::vector<world::Obstacle>* ControlNode::ListOf(const plan_t& message) c
 // is what leads a body that is outside nearer to the take-off place, and to the ground where that
 // place is not known.
 std::string ControlNode::Breach(const world::Claim& claim, bool to_land) const {
-  const world::Geofence& fence = config_.geofence;
-  if (!fence.Exists() || claim.starts_inside) return "";  // a last resort may start inside
+  if (!fence_.Exists() || claim.starts_inside) return "";  // a last resort may start inside
   if (!home_ || !epoch_.Is(home_->first))
     return to_land ? "" : "the take-off place is not known, nor the geofence";
   const std::vector<Eigen::Vector3d> places = world::PlacesOn(claim.position, claim.stop);
   const Eigen::Vector3d way = p_WB_ - home_->second;
   const double tube = config_.tracking_tube;
-  const bool near = !fence.Breach(way, tube).empty(), outside = !fence.Breach(way).empty();
+  const bool near = !fence_.Breach(way, tube).empty(), outside = !fence_.Breach(way).empty();
   if (near && (places.back() - home_->second).norm() >= way.norm())
     return "it leads no way back into the geofence";
   if (outside) return "";
   for (const Eigen::Vector3d& p : places)
-    if (std::string breach = fence.Breach(p - home_->second, near ? 0.0 : tube); !breach.empty())
+    if (std::string breach = fence_.Breach(p - home_->second, near ? 0.0 : tube); !breach.empty())
       return "it leads " + breach;
   return "";
 }

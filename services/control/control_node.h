@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "chase/flight_state_t.hpp"
+#include "chase/geofence_t.hpp"
 #include "chase/obstacles_t.hpp"
 #include "chase/plan_t.hpp"
 #include "chase/pose_t.hpp"
@@ -20,8 +21,8 @@
 
 namespace chase::control {
 
-/// PLAN, OBSTACLES, FLIGHT_STATE and POSE in, ATTITUDE_SETPOINT and TRACKING out; every POSE
-/// triggers. Ticks only notice that there are none.
+/// PLAN, OBSTACLES, FLIGHT_STATE, GEOFENCE and POSE in, ATTITUDE_SETPOINT and TRACKING out; every
+/// POSE triggers. Ticks only notice that there are none.
 class ControlNode : public bus::Node {
  public:
   ControlNode(bus::Bus& bus, const ControlConfig& config);
@@ -35,6 +36,7 @@ class ControlNode : public bus::Node {
   void OnObstacles(const obstacles_t& message);
   void OnPose(const pose_t& message);
   void OnState(const flight_state_t& message);
+  void OnGeofence(const geofence_t& message);
   std::string Refusal(const plan_t& message);
   std::string Breach(const world::Claim& claim, bool to_land) const;
   const std::vector<world::Obstacle>* ListOf(const plan_t& message) const;
@@ -53,6 +55,7 @@ class ControlNode : public bus::Node {
   std::deque<std::pair<int32_t, std::vector<world::Obstacle>>> lists_;  // by seq, newest last
   /// Where it took off, in the frame W of this epoch: the geofence counts from there.
   std::optional<std::pair<int32_t, Eigen::Vector3d>> home_;
+  world::Geofence fence_;  // its own, else what mission told last
   /// The first FLIGHT_STATE of a mission process that asks for the landing: its `seq`, and when
   /// that process started.
   std::optional<std::pair<int64_t, int32_t>> landing_;

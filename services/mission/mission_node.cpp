@@ -116,9 +116,7 @@ void MissionNode::OnStatus(const status_t& message) {
 void MissionNode::Tick(int64_t /*utime*/) {
   mission_.Update(Now());
   SendState();
-  if (ticks_++ % kHealthTicks != 0) return;
-  SendHealth();
-  SendGeofence();
+  if (ticks_++ % kHealthTicks == 0) SendHealth();
 }
 
 void MissionNode::SendState() {
@@ -133,6 +131,7 @@ void MissionNode::SendState() {
   m.missing = mission_.missing();
   m.n_missing = static_cast<int32_t>(m.missing.size());
   bus_.Publish("FLIGHT_STATE", m);
+  SendGeofence();  // behind it: it counts from the place that is told there
 }
 
 void MissionNode::SendHealth() {

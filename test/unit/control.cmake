@@ -9,4 +9,5 @@ if(TARGET planning_core)
     SOURCES ${CMAKE_CURRENT_LIST_DIR}/control_plan_check_test.cpp)
 endif()
 chase_test(control_node_test LIBS control_node
-  SOURCES ${CMAKE_CURRENT_LIST_DIR}/control_node_test.cpp)
+  SOURCES ${CMAKE_CURRENT_LIST_DIR}/control_node_test.cpp
+          ${CMAKE_CURRENT_LIST_DIR}/control_state_test.cpp)

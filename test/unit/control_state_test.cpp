@@ -1,0 +1,155 @@
+// What control makes of the mission's words: states and the fence.
+#include <gtest/gtest.h>
+
+#include <optional>
+#include <string>
+
+#include "test/unit/control_node_bench.h"
+
+namespace chase::control {
+namespace {
+
+using test::Bench;
+using test::kStart;
+
+TEST(ControlNode, LandsWhenTheMissionSaysSoAndNobodyElse) {
+  Bench bench;
+  int64_t t = kStart;
+  const auto following_after = [&](int8_t state, const std::string& sender) {
+    bench.SendState(state, sender);
+    bench.RunUntil(t);
+    bench.SendPlan(t, {0, 0, 0});
+    for (int i = 0; i < 20; ++i) bench.SendPose(t += 5000);
+    return int{bench.tracking.back().following};
+  };
+  EXPECT_EQ(following_after(flight_state_t::HOLD, "mission"), int{tracking_t::PLAN});
+  EXPECT_EQ(following_after(flight_state_t::LAND, "planning"), int{tracking_t::PLAN});
+  EXPECT_EQ(following_after(flight_state_t::LAND, "mission"), int{tracking_t::LAND});
+  EXPECT_EQ(bench.tracking.back().reason, "landing");
+  EXPECT_EQ(bench.node().Report().state, bus::NodeReport::State::kOk);
+  EXPECT_EQ(following_after(flight_state_t::HOLD, "mission"), int{tracking_t::PLAN});
+}
+
+TEST(ControlNode, ComesDownOnlyByAPlanThatWasMadeToLand) {
+  Bench bench;
+  int64_t t = kStart;
+  const auto following = [&] {
+    for (int i = 0; i < 20; ++i) bench.SendPose(t += 5000);
+    return int{bench.tracking.back().following};
+  };
+  bench.SendState(flight_state_t::HOLD);
+  bench.SendPlan(t, {0, 0, 0});
+  EXPECT_EQ(following(), int{tracking_t::PLAN});
+  bench.SendState(flight_state_t::LAND);
+  EXPECT_EQ(following(), int{tracking_t::PLAN}) << "of before";
+  bench.SendState(flight_state_t::LAND);
+  bench.SendPlan(t, {3, 0, 0});
+  bench.SendPlan(t, {0, 0, 0});
+  EXPECT_EQ(following(), int{tracking_t::LAND});
+}
+
+/// Is a plan from rest to rest flown by a body `at` [m] from the take-off place, within a fence of
+/// 1 m around that and 2 m above?
+bool IsFlown(const Eigen::Vector3d& at, const Eigen::Vector3d& from, const Eigen::Vector3d& to,
+             bool knows_home = true, int8_t verdict = plan_t::CHASE, bool is_told = false) {
+  ControlConfig config;
+  if (!is_told) {
+    config.geofence.polygon = {{-1, -1}, {1, -1}, {1, 1}, {-1, 1}};
+    config.geofence.ceiling = 2.0;
+  }
+  Bench bench(true, config);
+  bench.SendState(flight_state_t::CHASE, "mission",
+                  knows_home ? std::optional<Eigen::Vector3d>(-at) : std::nullopt);
+  if (is_told) bench.SendFence(-at);
+  bench.SendWall(kStart);
+  bench.SendPose(kStart);  // at [0, 0, 0]
+  plan_t plan = Bench::Certified(kStart + 5000, from - at);
+  plan.verdict = verdict;
+  plan.position.n_coefficients = 18;
+  for (const double share : {0.0, 0.0, 10.0, -15.0, 6.0})
+    for (int i = 0; i < 3; ++i) plan.position.coefficients.push_back(share * (to - from)[i]);
+  bench.Send(plan);
+  bench.SendPose(kStart + 5000);
+  return !bench.out.empty();
+}
+
+TEST(ControlNode, FliesNoPlanThatLeavesTheFence) {
+  const Eigen::Vector3d middle(0, 0, 0), inside(0.85, 0, 0), outside(1.1, 0, 0), above(0, 0, 2.1);
+  EXPECT_TRUE(IsFlown(middle, middle, {0.85, 0, 1.85}));
+  EXPECT_FALSE(IsFlown(middle, middle, outside));
+  EXPECT_FALSE(IsFlown(middle, middle, above));
+  EXPECT_FALSE(IsFlown(middle, middle, {0.9, 0, 0})) << "the body keeps to its plan by 0.12 m";
+  EXPECT_TRUE(IsFlown({0.95, 0, 0}, {0.95, 0, 0}, {0.9, 0, 0})) << "but leaves the edge";
+  EXPECT_FALSE(IsFlown(inside, outside, {1.3, 0, 0})) << "planning is ahead of the body";
+  EXPECT_TRUE(IsFlown({1.5, 0, 0}, {1.5, 0, 0}, {1.2, 0, 0})) << "a way back";
+  EXPECT_FALSE(IsFlown({1.5, 0, 0}, {1.5, 0, 0}, {1.6, 0, 0}));
+  EXPECT_TRUE(IsFlown(middle, middle, outside, true, plan_t::BRAKE))
+      << "what else there is stops later";
+  EXPECT_TRUE(IsFlown(middle, middle, outside, true, plan_t::ESCAPE));
+  EXPECT_FALSE(IsFlown(middle, middle, inside, false)) << "nobody knows where the fence is";
+}
+
+TEST(ControlNode, KeepsTheFenceThatMissionTellsWhereItHasNoneItself) {
+  const Eigen::Vector3d middle(0, 0, 0), at(0.5, 0.3, 0);
+  for (const bool is_told : {false, true}) {
+    EXPECT_TRUE(IsFlown(at, at, {0.85, 0, 1.85}, true, plan_t::CHASE, is_told)) << is_told;
+    EXPECT_FALSE(IsFlown(at, at, {1.1, 0, 0}, true, plan_t::CHASE, is_told)) << is_told;
+    EXPECT_FALSE(IsFlown(middle, middle, {0, 0, 2.1}, true, plan_t::CHASE, is_told)) << is_told;
+  }
+}
+
+// A mission process that began anew in flight knows neither place nor fence.
+TEST(ControlNode, RemembersPlaceAndFenceWhenMissionDies) {
+  Bench bench;
+  bench.SendState(flight_state_t::CHASE, "mission", Eigen::Vector3d(0, 0, 0));
+  bench.SendFence({0, 0, 0});
+  bench.SendState(flight_state_t::HOLD);
+  bench.SendWall(kStart);
+  bench.SendPose(kStart);
+  bench.Send(Bench::Certified(kStart + 5000, {0, 0, 0}));
+  bench.SendPose(kStart + 5000);
+  ASSERT_EQ(bench.out.size(), 1u) << "it goes on inside";
+  plan_t out = Bench::Certified(kStart + 10000, {0.3, 0, 0});
+  out.position.coefficients[1] = -1.5;
+  bench.Send(out);
+  bench.SendPose(kStart + 10000);
+  EXPECT_NE(bench.node().Report().detail.find("1 refused"), std::string::npos)
+      << bench.node().Report().detail;
+}
+
+TEST(ControlNode, CutsTheMotorsInTheAirWhenTheFlightIsOverAndForGood) {
+  Bench bench;
+  int64_t t = kStart;
+  bench.SendPlan(t, {0, 0, 0});
+  for (int i = 0; i < 20; ++i) bench.SendPose(t += 5000);
+  ASSERT_EQ(int{bench.out.back().motors}, int{attitude_setpoint_t::MOTORS_ON});
+  bench.SendState(flight_state_t::DONE, "planning");
+  bench.SendPose(t += 5000);
+  EXPECT_EQ(int{bench.out.back().motors}, int{attitude_setpoint_t::MOTORS_ON})
+      << "not its business";
+  bench.SendState(flight_state_t::DONE);
+  bench.SendPose(t += 5000);
+  EXPECT_EQ(int{bench.out.back().motors}, int{attitude_setpoint_t::MOTORS_OFF});
+  EXPECT_EQ(bench.out.back().thrust, 0.0);
+  bench.SendState(flight_state_t::CHASE);
+  bench.SendPlan(t, {0, 0, 0});
+  for (int i = 0; i < 20; ++i) bench.SendPose(t += 5000);
+  EXPECT_EQ(int{bench.out.back().motors}, int{attitude_setpoint_t::MOTORS_OFF});
+  EXPECT_EQ(bench.tracking.back().reason, "the flight is over: motors off");
+}
+
+// As of a recording that somebody plays.
+TEST(ControlNode, HearsNoFlightStateThatIsTooOld) {
+  Bench bench;
+  bench.SendPlan(kStart, {0, 0, 0});
+  bench.SendPose(kStart);
+  bench.SendState(flight_state_t::DONE, "mission", {}, 2100000);
+  bench.SendPose(kStart + 5000);
+  EXPECT_EQ(int{bench.out.back().motors}, int{attitude_setpoint_t::MOTORS_ON});
+  bench.SendState(flight_state_t::DONE, "mission", {}, 1900000);
+  bench.SendPose(kStart + 10000);
+  EXPECT_EQ(int{bench.out.back().motors}, int{attitude_setpoint_t::MOTORS_OFF});
+}
+
+}  // namespace
+}  // namespace chase::control
