@@ -90,6 +90,10 @@ std::string Autopilot::Unfit() const {
       return "the autopilot shuts down";
     case mav::MavState::FLIGHT_TERMINATION:
       return "the autopilot has ended the flight";
+    // A stream would bring OFFBOARD back by itself.
+    case mav::MavState::CRITICAL:
+    case mav::MavState::EMERGENCY:
+      return "the autopilot is in a failsafe";
     case mav::MavState::BOOT:
     case mav::MavState::UNINIT:
       return "the autopilot starts";

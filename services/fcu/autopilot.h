@@ -29,7 +29,8 @@ class Autopilot {
   bool failsafe() const;
   Mode mode() const { return Mode::Of(heartbeat_.custom_mode); }
   bool on_ground() const;
-  /// Why it cannot fly now by its own state (starting, calibrating ...); empty: it can.
+  /// Why it cannot fly now by its own state (starting, calibrating, in a failsafe ...); empty: it
+  /// can.
   std::string Unfit() const;
   /// What else speaks on the link in an autopilot's place; empty: nobody.
   const std::string& stranger() const { return stranger_; }

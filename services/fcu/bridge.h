@@ -31,6 +31,8 @@ class Bridge {
   void OnPose(const Pose& pose, int64_t now);
   /// `utime`: the message's own stamp. One that does not rise is a repetition and left out.
   void OnSetpoint(const Setpoint& setpoint, int64_t utime, int64_t now);
+  /// As Handshake::Kill.
+  void Kill() { handshake_.Kill(); }
   /// Whatever is due; to be called at twice the rate of setpoints or faster.
   void Tick(int64_t now);
 

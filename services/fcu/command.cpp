@@ -8,17 +8,20 @@ namespace {
 constexpr int64_t kUnanswered = 500'000;  // us until it is sent again
 constexpr int64_t kTryAgain = 2'000'000;  // us after "not now", and after an effect that stays out
 constexpr float kCustomModeEnabled = 1.0f;  // MAV_MODE_FLAG
+// mavlink.io, MAV_CMD_COMPONENT_ARM_DISARM: without it a PX4 that has not landed does not disarm.
+constexpr float kForce = 21196.0f;
 
 uint16_t Number(Ask ask) {
-  return static_cast<uint16_t>(ask == Ask::kArm || ask == Ask::kDisarm
-                                   ? mav::MavCmd::COMPONENT_ARM_DISARM
-                                   : mav::MavCmd::DO_SET_MODE);
+  return static_cast<uint16_t>(ask == Ask::kOffboard || ask == Ask::kLand
+                                   ? mav::MavCmd::DO_SET_MODE
+                                   : mav::MavCmd::COMPONENT_ARM_DISARM);
 }
 
 mav::CommandLong Message(Ask ask) {
   mav::CommandLong m;
   m.command = Number(ask);
   if (ask == Ask::kArm) m.param1 = 1.0f;
+  if (ask == Ask::kKill) m.param2 = kForce;
   if (ask == Ask::kOffboard || ask == Ask::kLand) {
     const Mode mode = ask == Ask::kOffboard ? kOffboardMode : kLandMode;
     m.param1 = kCustomModeEnabled;
@@ -40,6 +43,8 @@ std::string Words(Ask ask) {
       return "landing";
     case Ask::kDisarm:
       return "disarming";
+    case Ask::kKill:
+      return "disarming by force";
     case Ask::kNothing:
       break;
   }

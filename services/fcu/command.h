@@ -9,7 +9,7 @@
 namespace chase::fcu {
 
 /// What the bridge may ask for.
-enum class Ask { kNothing, kOffboard, kArm, kLand, kDisarm };
+enum class Ask { kNothing, kOffboard, kArm, kLand, kDisarm, kKill };
 std::string Words(Ask ask);
 /// MAV_RESULT in words.
 std::string Words(mav::MavResult result);

@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "chase/imu_t.hpp"
+#include "common/bus/command_call.h"
 #include "common/bus/convert.h"
 
 namespace chase::fcu {
@@ -58,16 +59,28 @@ FcuNode::FcuNode(bus::Bus& bus, const FcuConfig& config)
     : bus_(bus),
       config_(config),
       bridge_(config, LoadKey(config.signing_key_file)),
-      transport_(OpenTransport(config.link, config.port, config.baud)) {
+      transport_(OpenTransport(config.link, config.port, config.baud)),
+      window_("fcu", 0.0) {
   bus_.Subscribe<pose_t>("POSE", [this](const pose_t& m) { OnPose(m); });
   bus_.Subscribe<attitude_setpoint_t>("ATTITUDE_SETPOINT",
                                       [this](const attitude_setpoint_t& m) { OnSetpoint(m); });
+  bus_.Subscribe<command_t>("COMMAND", [this](const command_t& m) { OnCommand(m); });
 }
 
 void FcuNode::OnPose(const pose_t& message) { bridge_.OnPose(FromMessage(message), bus_.Now()); }
 
 void FcuNode::OnSetpoint(const attitude_setpoint_t& message) {
   bridge_.OnSetpoint(FromMessage(message), message.utime, bus_.Now());
+}
+
+/// Mission answers; where it or control hangs the motors are cut all the same.
+void FcuNode::OnCommand(const command_t& message) {
+  if (message.kind != command_t::KILL || !bus::IsForced(message)) return;
+  const int64_t start = bus_.identity().start;
+  window_.Take(bus::Seconds(bus_.Now(), start), bus::KeyOf(message, start), [this] {
+    bridge_.Kill();
+    return world::CommandAnswer{true, ""};
+  });
 }
 
 /// The tick's own time may lag behind; what happens here is measured on the bus's clock.

@@ -107,6 +107,8 @@ const HandshakeTable::Row HandshakeTable::kRows[] = {
     {State::kDisarming, Disarmed, State::kDone, "landed and disarmed"},
     {State::kDisarming, GivesUp, State::kRefused, "disarming did not come"},
 
+    {State::kKilling, Disarmed, State::kDone, "killed by command: disarmed by force"},
+
     {State::kDone, Released, State::kStandby, "ready for another flight"},
     {State::kPilot, GivenBack, State::kStandby, "the pilot may give it back"},
     {State::kPilot, Released, State::kStandby, "ready for another flight"},
@@ -133,11 +135,17 @@ void Handshake::Update(const Facts& facts) {
   if (state_ == State::kArming) asked_to_arm_ = facts.utime;
   if (state_ == State::kLanding && facts.mode == kLandMode) landing_heard_ = true;
   // Landing and disarming have no alternative: what is refused is asked for again.
-  if ((state_ == State::kLanding || state_ == State::kDisarming) &&
+  if ((state_ == State::kLanding || state_ == State::kDisarming || state_ == State::kKilling) &&
       command_.answer() == Command::Answer::kRefused)
     command_.Begin(command_.ask(), facts.utime + 1'000'000);
   for (const HandshakeTable::Row& row : HandshakeTable::kRows)
     if (row.from == state_ && row.when(*this)) return Enter(row.to, row.why);
+}
+
+void Handshake::Kill() {
+  const bool ours = state_ == State::kFlying || state_ == State::kLanding ||
+                    state_ == State::kDisarming || state_ == State::kFailsafe;
+  if (ours) Enter(State::kKilling, "killed by command");
 }
 
 void Handshake::Enter(State state, const std::string& why) {
@@ -159,6 +167,8 @@ void Handshake::Enter(State state, const std::string& why) {
       return command_.Begin(Ask::kLand, facts_.utime);
     case State::kDisarming:
       return command_.Begin(Ask::kDisarm, facts_.utime);
+    case State::kKilling:
+      return command_.Begin(Ask::kKill, facts_.utime);
     default:
       return command_.Drop();
   }
@@ -167,7 +177,8 @@ void Handshake::Enter(State state, const std::string& why) {
 std::string Handshake::Name(State state) {
   static const char* const names[] = {"no autopilot", "standby", "streaming", "asking for OFFBOARD",
                                       "arming",       "flying",  "landing",   "disarming",
-                                      "done",         "pilot",   "failsafe",  "refused"};
+                                      "killing",      "done",    "pilot",     "failsafe",
+                                      "refused"};
   return names[static_cast<std::size_t>(state)];
 }
 

@@ -24,6 +24,7 @@ constexpr double kStill = 0.5;         // s after which it takes itself to have 
 // MPC_XY_P, MPC_XY_VEL_P_ACC, MPC_Z_P, MPC_Z_VEL_P_ACC, MPC_LAND_SPEED, and bounds.
 constexpr double kPositionGain = 0.95, kVelocityGain = 1.8, kHeightGain = 1.0, kClimbGain = 4.0;
 constexpr double kLandSpeed = 0.7, kMostSpeed = 2.0, kMostPush = 3.0;
+constexpr float kForce = 21196.0f;    // param2 of arming and disarming
 constexpr int64_t kOffsetMemory = 8;  // answers of TIMESYNC over which the offset is averaged
 
 /// The setpoint with no rates and no rotation where its mask leaves them out.
@@ -189,7 +190,7 @@ uint8_t Px4::Handle(const mav::CommandLong& m) {
     case mav::MavCmd::DO_SET_MODE:
       return SetMode(ModeOf(m.param2, m.param3));
     case mav::MavCmd::COMPONENT_ARM_DISARM:
-      return Arm(m.param1 > 0.5f);
+      return Arm(m.param1 > 0.5f, m.param2 == kForce);
     case mav::MavCmd::SET_MESSAGE_INTERVAL:
       return SetInterval(m);
   }
@@ -218,10 +219,11 @@ void Px4::Enter(Mode mode) {
   hold_yaw_ = math::Yaw(body_.R_WB);
 }
 
-uint8_t Px4::Arm(bool on) {
+// Disarming by force heeds nothing; from outside arming by force is arming.
+uint8_t Px4::Arm(bool on, bool forced) {
   if (on == armed_) return Code(mav::MavResult::ACCEPTED);
   if (!on) {
-    if (!landed_) {
+    if (!landed_ && !forced) {
       Say("Disarming denied: not landed", 2);
       return Code(mav::MavResult::TEMPORARILY_REJECTED);
     }

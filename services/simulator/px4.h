@@ -103,7 +103,7 @@ class Px4 {
   uint8_t Handle(const mavlink::mav::CommandLong& m);
   uint8_t SetInterval(const mavlink::mav::CommandLong& m);
   uint8_t SetMode(std::optional<mavlink::Mode> mode);
-  uint8_t Arm(bool on);
+  uint8_t Arm(bool on, bool forced);
   void Enter(mavlink::Mode mode);
   bool Streamed() const;
   bool StreamAlive() const;

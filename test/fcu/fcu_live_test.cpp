@@ -15,6 +15,7 @@
 #include <thread>
 
 #include "chase/attitude_setpoint_t.hpp"
+#include "chase/command_t.hpp"
 #include "chase/imu_t.hpp"
 #include "chase/pose_t.hpp"
 #include "chase/status_t.hpp"
@@ -219,6 +220,34 @@ TEST(FcuLive, ThePilotTakesItAndAKilledBridgeIsNoDisaster) {
   world.Run(3.0);
   EXPECT_EQ(world.px4.seen().times_armed, 1);
   EXPECT_FALSE(world.px4.mode() == kOffboardMode);
+}
+
+TEST(FcuLive, AForcedKillDisarmsInTheAir) {
+  UdpWire wire;
+  World world(&wire);
+  Process fcu("port: 14540\n");
+  ASSERT_TRUE(world.RunUntil("flying: armed and in OFFBOARD", 25.0)) << world.status.detail;
+  world.Run(2.0);
+  bus::UdpBus station(bus::kDefaultUrl, "");
+  station.SetIdentity({"command", "", station.Now()});
+  const auto kill = [&](int64_t id, std::vector<double> arguments) {
+    command_t m{};
+    m.utime = station.Now();
+    m.id = id;
+    m.kind = command_t::KILL;
+    m.arguments = std::move(arguments);
+    m.n_arguments = static_cast<int32_t>(m.arguments.size());
+    station.Publish("COMMAND", m);
+    world.Run(1.0, [&] { return !world.px4.armed(); });
+  };
+  kill(1, {});
+  EXPECT_TRUE(world.px4.armed()) << "not forced";
+  const int64_t before = station.Now();
+  kill(2, {1.0});
+  EXPECT_FALSE(world.px4.armed());
+  std::printf("disarmed %.1f ms after the command\n",
+              1e-3 * static_cast<double>(station.Now() - before));
+  EXPECT_TRUE(world.RunUntil("done: killed by command", 3.0)) << world.status.detail;
 }
 
 TEST(FcuLive, ErrorsSayWhatAndHow) {

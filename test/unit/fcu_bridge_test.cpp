@@ -91,6 +91,53 @@ TEST(FcuBridge, NeverSendsAStaleSetpoint) {
   EXPECT_TRUE(flight.RunUntil(State::kDone, 20.0));
 }
 
+// PX4 refuses a plain disarming in the air.
+TEST(FcuBridge, OnlyAKillCutsTheMotorsInTheAir) {
+  Flight flight;
+  ASSERT_TRUE(flight.RunUntil(State::kFlying, 12.0));
+  flight.Run(5.0);
+  flight.motors = false;
+  flight.Run(0.5);
+  EXPECT_EQ(flight.bridge.handshake().state(), State::kLanding) << flight.bridge.Words();
+  EXPECT_TRUE(flight.px4.armed());
+  ASSERT_GT(flight.px4.p_WB().z(), 0.5);
+  flight.bridge.Kill();
+  flight.Run(0.1);
+  EXPECT_FALSE(flight.px4.armed());
+  EXPECT_TRUE(flight.RunUntil(State::kDone, 1.5)) << flight.bridge.Words();
+  EXPECT_NE(flight.bridge.Words().find("killed by command"), std::string::npos);
+}
+
+TEST(FcuBridge, AKillIsSentUntilItIsObeyed) {
+  StandInOptions options;
+  options.lost_acks = 1.0;
+  Flight flight(options);
+  ASSERT_TRUE(flight.RunUntil(State::kFlying, 12.0));
+  flight.Run(5.0);
+  flight.link = false;
+  flight.bridge.Kill();
+  flight.Run(0.7);
+  EXPECT_TRUE(flight.px4.armed());
+  flight.link = true;
+  flight.Run(0.7);
+  EXPECT_FALSE(flight.px4.armed());
+}
+
+TEST(FcuBridge, AKillIsNotForAPilotWhoHasItNorForTheFlightToCome) {
+  Flight flight;
+  flight.setpoints = false;
+  flight.Run(3.0);
+  flight.bridge.Kill();
+  flight.setpoints = true;
+  ASSERT_TRUE(flight.RunUntil(State::kFlying, 12.0)) << flight.bridge.Words();
+  flight.Run(5.0);
+  flight.px4.PilotMode({3, 0});
+  ASSERT_TRUE(flight.RunUntil(State::kPilot, 2.0));
+  flight.bridge.Kill();
+  flight.Run(3.0);
+  EXPECT_TRUE(flight.px4.armed());
+}
+
 TEST(FcuBridge, ARepeatedSetpointIsNoFreshOne) {
   Flight flight;
   ASSERT_TRUE(flight.RunUntil(State::kFlying, 12.0));
@@ -203,6 +250,27 @@ TEST(FcuBridge, LinkLossEndsInALatchedFailsafe) {
   flight.Run(10.0);
   EXPECT_EQ(flight.px4.seen().setpoints, sent);
   EXPECT_FALSE(flight.px4.mode() == kOffboardMode) << flight.bridge.Words();
+}
+
+TEST(FcuBridge, ABridgeThatBeginsAnewDoesNotStreamIntoAFailsafe) {
+  FcuConfig config;
+  config.engage = "pilot";
+  Flight flight({}, config);
+  ASSERT_TRUE(flight.RunUntil(State::kStreaming, 12.0));
+  flight.px4.PilotMode(kOffboardMode);
+  flight.px4.PilotArms(true);
+  ASSERT_TRUE(flight.RunUntil(State::kFlying, 3.0));
+  flight.Run(5.0);
+  flight.link = false;
+  flight.Run(1.5);
+  ASSERT_TRUE(flight.px4.failsafe());
+  flight.bridge = Bridge(config);
+  flight.link = true;
+  flight.Run(3.0);
+  EXPECT_FALSE(flight.px4.mode() == kOffboardMode) << flight.bridge.Words();
+  EXPECT_NE(flight.bridge.Words().find("in a failsafe"), std::string::npos);
+  flight.px4.PilotMode({3, 0});
+  ASSERT_TRUE(flight.RunUntil(State::kStreaming, 3.0)) << "the pilot has ended it";
 }
 
 TEST(FcuBridge, RefusalsAreSaidInWordsAndGivenUp) {

@@ -91,6 +91,7 @@ TEST(FcuHandshake, KeepsItsPromisesInAnyOrderOfInputs) {
       chaos.Answer(&handshake);
       if (facts.wish) wished = facts.utime;
       handshake.Update(facts);
+      if (chaos.random().Next() % 2000 == 0) handshake.Kill();
       const State state = handshake.state();
       reached.insert(state);
       stream_since = !handshake.streams() ? 0 : stream_since == 0 ? facts.utime : stream_since;
@@ -98,14 +99,17 @@ TEST(FcuHandshake, KeepsItsPromisesInAnyOrderOfInputs) {
       // disarm what we armed too late; where the pilot engages he may give it back.
       if (Latched(last) && state != last) {
         const bool released = !facts.armed && facts.utime - wished >= 2'000'000;
+        const bool killed = last == State::kFailsafe && state == State::kKilling;
         const bool given_back = last == State::kPilot && !engages && !facts.failsafe;
-        EXPECT_TRUE(released || given_back || state == State::kDisarming) << seed;
+        EXPECT_TRUE(released || given_back || killed || state == State::kDisarming) << seed;
       }
-      EXPECT_FALSE((Latched(state) || state == State::kLanding) && handshake.streams());
+      EXPECT_FALSE((Latched(state) || state == State::kLanding || state == State::kKilling) &&
+                   handshake.streams());
       if (const auto command = handshake.NextCommand(facts.utime)) {
         EXPECT_TRUE(engages || command->param1 == 0.0f || command->param2 == 4.0f)
             << "only lands and disarms where the pilot engages";
-        EXPECT_NE(command->param2, 21196.0f) << "never by force";
+        EXPECT_EQ(command->param2 == 21196.0f, state == State::kKilling)
+            << "by force: a kill alone";
         if (IsArm(*command) || IsOffboard(*command)) {
           EXPECT_TRUE(facts.wish && facts.missing.empty() && !facts.armed) << seed;
           EXPECT_TRUE(stream_since != 0 && facts.utime - stream_since >= 1'000'000) << seed;
@@ -118,7 +122,7 @@ TEST(FcuHandshake, KeepsItsPromisesInAnyOrderOfInputs) {
       last = state;
     }
   }
-  EXPECT_EQ(reached.size(), 12u) << "states that were visited";
+  EXPECT_EQ(reached.size(), 13u) << "states that were visited";
   EXPECT_GT(armings, 50);
 }
 
