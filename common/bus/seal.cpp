@@ -37,6 +37,13 @@ std::array<uint8_t, Seal::kTagBytes> Seal::Tag(const std::string& name, const ui
   return tag;
 }
 
+bool Heard::IsNew(const MessageHead& head) {
+  const auto [newest, first] = newest_.try_emplace({head.sender, head.sender_start}, head.seq);
+  if (!first && head.seq <= newest->second) return false;
+  newest->second = head.seq;
+  return true;
+}
+
 Seal LoadSeal(const std::string& file) {
   if (file.empty()) return Seal();
   std::ifstream in(file);

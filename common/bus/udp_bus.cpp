@@ -50,7 +50,7 @@ void UdpBus::Handle(int64_t timeout_us) {
 int64_t UdpBus::Now() const { return SteadyMicroseconds() + clock_offset_; }
 
 void UdpBus::SubscribeRaw(const std::string& channel, RawHandler handler) {
-  subscriptions_.push_back({this, channel, std::move(handler)});
+  subscriptions_.push_back({this, channel, std::move(handler), {}});
   auto* subscription = lcm_.subscribeFunction(prefix_ + channel, &Deliver, &subscriptions_.back());
   subscription->setQueueCapacity(QueueCapacity(channel));
 }
@@ -58,15 +58,22 @@ void UdpBus::SubscribeRaw(const std::string& channel, RawHandler handler) {
 void UdpBus::Deliver(const lcm::ReceiveBuffer* buffer, const std::string& /*channel*/,
                      Subscription* to) {
   const auto* data = static_cast<const uint8_t*>(buffer->data);
-  const auto size = to->bus->Opened(to->channel, data, buffer->data_size);
+  const auto size = to->bus->Opened(to->channel, data, buffer->data_size, &to->heard);
   if (size) to->handler(data, *size);
 }
 
-std::optional<size_t> UdpBus::Opened(const std::string& channel, const uint8_t* data, size_t size) {
-  if (IsHeavy(channel)) return size;
+std::optional<size_t> UdpBus::Opened(const std::string& channel, const uint8_t* data, size_t size,
+                                     Heard* heard) {
+  if (IsHeavy(channel) || !seal_.on()) return size;
   const auto inside = seal_.Open(prefix_ + channel, data, size);
-  if (!inside) Refuse(channel, "without the seal of this vehicle's key; see --key-file");
-  return inside;
+  if (!inside) {
+    Refuse(channel, "without the seal of this vehicle's key; see --key-file");
+    return std::nullopt;
+  }
+  const auto head = HeadOf(data, *inside);
+  if (!head || heard->IsNew(*head)) return inside;  // without a head: malformed, and counted so
+  Refuse(channel, "recorded and sent again");
+  return std::nullopt;
 }
 
 void UdpBus::SubscribeEvery(const EveryHandler& handler) {
@@ -90,7 +97,7 @@ void UdpBus::ForwardEvery(const lcm::ReceiveBuffer* buffer, const std::string& c
   const int64_t waited = std::clamp<int64_t>(now - buffer->recv_utime, 0, kLongestWait);
   const auto* data = static_cast<const uint8_t*>(buffer->data);
   const std::string name = channel.substr(bus->prefix_.size());
-  const auto size = bus->Opened(name, data, buffer->data_size);
+  const auto size = bus->Opened(name, data, buffer->data_size, &bus->every_heard_[name]);
   if (!size) return;
   bus->CountAny(name, data, *size);
   bus->Guarded(channel, [&] { bus->every_(channel, bus->Now() - waited, data, *size); });

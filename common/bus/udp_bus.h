@@ -40,11 +40,14 @@ class UdpBus : public Bus {
     UdpBus* bus;
     std::string channel;
     RawHandler handler;
+    Heard heard;
   };
   static void Deliver(const lcm::ReceiveBuffer* buffer, const std::string& channel,
                       Subscription* subscription);
-  /// Size of a message without its seal; nothing, and counted, where that is not ours.
-  std::optional<size_t> Opened(const std::string& channel, const uint8_t* data, size_t size);
+  /// Size of a message without its seal; nothing, and counted, where that is not ours or has come
+  /// before.
+  std::optional<size_t> Opened(const std::string& channel, const uint8_t* data, size_t size,
+                               Heard* heard);
   static void ForwardEvery(const lcm::ReceiveBuffer* buffer, const std::string& channel,
                            UdpBus* bus);
 
@@ -54,6 +57,7 @@ class UdpBus : public Bus {
   Seal seal_;
   std::deque<Subscription> subscriptions_;  // addresses stay
   EveryHandler every_;
+  std::map<std::string, Heard> every_heard_;  // by channel
 };
 
 }  // namespace chase::bus

@@ -356,14 +356,15 @@ def forge(vehicle, key, other):
         for _ in range(20):
             for channel, data in messages("PLAN", "ATTITUDE_SETPOINT").items():
                 perfect = wire.of_vehicle(data, vehicle)
-                if vehicle == "falcon_":  # only the key tells it from its own
-                    tries = [perfect, wire.seal(vehicle + channel, perfect, other), wire.seal(vehicle + "POSE", perfect, key)]
+                if vehicle == "falcon_":  # only the key tells it from its own, and the number from a recording
+                    tries = [perfect, wire.seal(vehicle + channel, perfect, other),
+                             wire.seal(vehicle + "POSE", perfect, key), wire.seal(vehicle + channel, perfect, key)]
                 else:  # without one, the envelope does
                     tries = [wire.of_vehicle(data, "falcon_"), wire.of_vehicle(data, vehicle, "stranger"), data]
                 for number, message in enumerate(tries):
-                    for packet in wire.datagrams(vehicle + channel, message, 3 * count + number):
+                    for packet in wire.datagrams(vehicle + channel, message, 4 * count + number):
                         out.sendto(packet, (wire.GROUP, wire.PORT))
-            count += 3
+            count += len(tries)
             time.sleep(0.02)
     return count
 

@@ -201,6 +201,19 @@ TEST(Packet, WhatIsTooLargeIsNotTaken) {
   EXPECT_EQ(packer.Take(true).size(), 1u);
 }
 
+TEST(Heard, WhatWasHeardIsNotNewAgain) {
+  bus::Heard heard;
+  const auto is_new = [&heard](const char* sender, int64_t start, int32_t seq) {
+    return heard.IsNew({0, seq, sender, "", start, {}});
+  };
+  EXPECT_TRUE(is_new("control", 7, 4));
+  EXPECT_TRUE(is_new("control", 7, 6)) << "one was lost";
+  for (const int32_t seq : {6, 5, 4, 0}) EXPECT_FALSE(is_new("control", 7, seq)) << seq;
+  EXPECT_TRUE(is_new("viewer", 7, 0)) << "each sender counts its own";
+  EXPECT_TRUE(is_new("control", 8, 0)) << "and each of its processes";
+  EXPECT_FALSE(is_new("control", 7, 6)) << "also after the next one began";
+}
+
 TEST(Seal, AnyChangedBitIsNoticed) {
   Generator draw(6);
   bus::Seal::Key key{};
