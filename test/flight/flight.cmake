@@ -61,6 +61,12 @@ add_test(NAME flight_live
   WORKING_DIRECTORY ${CMAKE_SOURCE_DIR})
 set_tests_properties(flight_live PROPERTIES TIMEOUT 300 RUN_SERIAL TRUE)
 
+# One process dies in it and comes back; every one at three times: test/flight/live_kills.
+add_test(NAME flight_live_kill
+  COMMAND ${CMAKE_SOURCE_DIR}/test/flight/live_kills --at 20 planning
+  WORKING_DIRECTORY ${CMAKE_SOURCE_DIR})
+set_tests_properties(flight_live_kill PROPERTIES TIMEOUT 300 RUN_SERIAL TRUE)
+
 # Campaigns: their statistics, and the program with stand-ins for the flights.
 chase_test(campaign_statistics_test LIBS statistics
   SOURCES ${CMAKE_CURRENT_LIST_DIR}/campaign_statistics_test.cpp)
