@@ -27,6 +27,7 @@ class DragEstimate {
       information_ += weight * row * row.transpose();
       sums_ += weight * (force[axis] + guess_ * e.dot(v)) * row;
     }
+    if (!information_.allFinite() || !sums_.allFinite()) *this = DragEstimate(guess_);
   }
   double value() const {
     Eigen::Matrix3d information = information_;

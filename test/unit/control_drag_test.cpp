@@ -78,6 +78,12 @@ TEST(DragEstimate, ForgetsAndKeepsWithinBounds) {
   EXPECT_EQ(estimate.value(), 0.25) << "a long gap leaves the guess";
 }
 
+TEST(DragEstimate, ForgetsAllWhereNumbersOverflow) {
+  DragEstimate estimate(0.3);
+  estimate.Add({1e300, 0, 9.81}, {1e300, 0, 0}, Matrix3d::Identity(), kStep);
+  EXPECT_EQ(estimate.value(), 0.3);
+}
+
 // The wind turns with the frame that it is told in.
 TEST(DragEstimate, ATurnOfTheFrameChangesNothing) {
   const double yaw = 1.1;
