@@ -7,7 +7,7 @@
 #include "common/config/changes.h"
 #include "deploy/worlds/rounding.h"
 #include "services/control/control_config.h"
-#include "services/perception/learn.h"
+#include "services/perception/tools/learn.h"
 #include "services/prediction/prediction_node.h"
 
 namespace chase::worlds {

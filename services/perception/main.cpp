@@ -2,9 +2,9 @@
 #include <cstring>
 
 #include "common/bus/run_service.h"
-#include "services/perception/calibration_picture.h"
-#include "services/perception/learn.h"
 #include "services/perception/perception_node.h"
+#include "services/perception/tools/calibration_picture.h"
+#include "services/perception/tools/learn.h"
 
 int main(int argc, char** argv) {
   const auto asks = [&](const char* flag) {

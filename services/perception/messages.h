@@ -6,7 +6,7 @@
 #include "chase/lidar_scan_t.hpp"
 #include "chase/pose_t.hpp"
 #include "chase/target_t.hpp"
-#include "services/perception/perceiver.h"
+#include "services/perception/belief/perceiver.h"
 
 namespace chase::perception {
 

@@ -9,7 +9,7 @@
 #include "common/bus/command_call.h"
 #include "common/bus/convert.h"
 #include "services/perception/messages.h"
-#include "services/perception/select.h"
+#include "services/perception/tools/select.h"
 
 namespace chase::perception {
 

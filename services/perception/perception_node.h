@@ -13,7 +13,7 @@
 #include "common/bus/epoch.h"
 #include "common/bus/node.h"
 #include "common/world/command_window.h"
-#include "services/perception/perceiver.h"
+#include "services/perception/belief/perceiver.h"
 
 namespace chase::perception {
 

@@ -17,8 +17,8 @@
 
 #include "common/config/config.h"
 #include "common/config/version.h"
-#include "services/perception/learn.h"
-#include "services/perception/perceiver.h"
+#include "services/perception/belief/perceiver.h"
+#include "services/perception/tools/learn.h"
 
 namespace chase::perception {
 namespace {

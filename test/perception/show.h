@@ -3,8 +3,8 @@
 #include <opencv2/core.hpp>
 #include <random>
 
-#include "services/perception/point_selector.h"
-#include "services/perception/pose_history.h"
+#include "services/perception/sensors/point_selector.h"
+#include "services/perception/sensors/pose_history.h"
 #include "services/simulator/actors.h"
 #include "services/simulator/camera.h"
 #include "services/simulator/lidar.h"

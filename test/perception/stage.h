@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "common/world/scenario.h"
-#include "services/perception/perceiver.h"
+#include "services/perception/belief/perceiver.h"
 
 /// Flights for perception made with the simulator's own world, camera and LiDAR: the target drives
 /// its scenario's path, the drone follows it on rails, poses carry the errors of odometry.

@@ -1,8 +1,8 @@
 // When something that may be the target has surely driven.
 #include <gtest/gtest.h>
 
-#include "services/perception/candidate.h"
-#include "services/perception/decoys.h"
+#include "services/perception/belief/candidate.h"
+#include "services/perception/belief/decoys.h"
 
 namespace chase::perception {
 namespace {

@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "common/config/config.h"
-#include "services/perception/detect_command.h"
-#include "services/perception/picture.h"
+#include "services/perception/tools/detect_command.h"
+#include "services/perception/tools/picture.h"
 
 namespace chase::perception {
 namespace {

@@ -10,11 +10,11 @@
 #include <vector>
 
 #include "perception_world.h"
-#include "services/perception/color_detector.h"
-#include "services/perception/image_check.h"
-#include "services/perception/learn_color.h"
-#include "services/perception/marker_detector.h"
-#include "services/perception/silhouette.h"
+#include "services/perception/sensors/image_check.h"
+#include "services/perception/sight/color_detector.h"
+#include "services/perception/sight/marker_detector.h"
+#include "services/perception/sight/silhouette.h"
+#include "services/perception/tools/learn_color.h"
 
 namespace chase::perception {
 namespace {

@@ -4,8 +4,8 @@
 #include <random>
 
 #include "perception_world.h"
-#include "services/perception/localiser.h"
-#include "services/perception/target_track.h"
+#include "services/perception/belief/target_track.h"
+#include "services/perception/place/localiser.h"
 
 namespace chase::perception {
 namespace {

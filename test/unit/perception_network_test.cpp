@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "perception_world.h"
-#include "services/perception/network_detector.h"
+#include "services/perception/sight/network_detector.h"
 
 namespace chase::perception {
 namespace {

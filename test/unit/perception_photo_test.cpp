@@ -11,8 +11,8 @@
 #include <string>
 #include <vector>
 
-#include "services/perception/learn.h"
-#include "services/perception/perceiver.h"
+#include "services/perception/belief/perceiver.h"
+#include "services/perception/tools/learn.h"
 
 namespace chase::perception {
 namespace {

@@ -7,12 +7,12 @@
 #include <random>
 
 #include "perception_world.h"
-#include "services/perception/candidate.h"
-#include "services/perception/color_detector.h"
-#include "services/perception/inner_edges.h"
-#include "services/perception/localiser.h"
-#include "services/perception/silhouette.h"
-#include "services/perception/target_points.h"
+#include "services/perception/belief/candidate.h"
+#include "services/perception/place/localiser.h"
+#include "services/perception/place/target_points.h"
+#include "services/perception/sight/color_detector.h"
+#include "services/perception/sight/inner_edges.h"
+#include "services/perception/sight/silhouette.h"
 
 namespace chase::perception {
 namespace {

@@ -14,7 +14,7 @@
 #include "common/bus/lockstep.h"
 #include "perception_world.h"
 #include "services/perception/perception_node.h"
-#include "services/perception/select.h"
+#include "services/perception/tools/select.h"
 
 namespace chase::perception {
 namespace {

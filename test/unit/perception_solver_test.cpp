@@ -7,8 +7,8 @@
 #include <memory>
 #include <random>
 
-#include "services/perception/fit_problem.h"
-#include "services/perception/quick_fit.h"
+#include "services/perception/place/fit_problem.h"
+#include "services/perception/place/quick_fit.h"
 
 namespace chase::perception {
 namespace {

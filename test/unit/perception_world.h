@@ -7,7 +7,7 @@
 #include <random>
 #include <vector>
 
-#include "services/perception/perceiver.h"
+#include "services/perception/belief/perceiver.h"
 
 /// A small world of its own for perception's tests: images and sweeps by closed-form ray casting,
 /// independent of the simulator and of the code under test (which only lends its message structs).

@@ -1,0 +1,49 @@
+#pragma once
+
+#include "services/perception/belief/finder.h"
+
+namespace chase::perception {
+
+/// Something that may be the target, followed until it is known whether it drives or stands.
+struct Candidate {
+  TargetTrack track;
+  TargetGaussian first;  ///< as it was first known well
+  double since = 0.0;    ///< when it was first seen, s
+  Sighting last;         ///< the last one
+  double range = 0.0;    ///< from the camera when it was last seen, m
+  double px = 0.0;       ///< what one pixel spanned there at first, m
+  bool ranged = false;   ///< `first` has its range from LiDAR points, not from the size alone
+  /// Along the line of sight, as far as one pixel less of its height moves it; frame W, m.
+  Eigen::Vector2d range_px = Eigen::Vector2d::UnitX();
+
+  bool part = false;     ///< a piece of something larger, always so far: it must drive
+  double known = 0.0;    ///< time of `first`, s
+  int sweeps = 0;        ///< sightings with LiDAR points
+  double swept = -1e18;  ///< time of the last such one, s
+
+  /// Takes over a sighting at the track's time.
+  void Correct(const Sighting& sighting);
+
+  /// True when something has come before a side of what was all in view, and LiDAR still tells
+  /// where it is.
+  bool HiddenIn(const Sighting& sighting) const;
+
+  /// True when it has surely moved from where it was first seen.
+  bool Drives() const;
+  /// True when it has gone the way that its velocity tells, as a thing does and pieces of one do
+  /// not.
+  bool Steady() const;
+  /// True when it has also gone this way [m], further than what is seen of a standing thing may
+  /// seem to.
+  bool SurelyDrives(double way) const;
+  /// True when its speed is no chance, with LiDAR points on it just now.
+  bool Fast() const;
+};
+
+/// Something seen for the first time.
+Candidate NewCandidate(const Sighting& sighting, const View& view);
+
+/// Leaves nothing known of its velocity, as where that was the hidden target's.
+void ForgetVelocity(const MotionConfig& config, Candidate* candidate);
+
+}  // namespace chase::perception

@@ -1,0 +1,176 @@
+#include "services/perception/belief/finder.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "services/perception/place/target_points.h"
+#include "services/perception/sensors/image_check.h"
+#include "services/perception/sight/silhouette.h"
+
+namespace chase::perception {
+
+namespace {
+
+constexpr size_t kMaxSweeps = 4;
+constexpr double kOdds = 0.0;      // logarithm of the odds that a sighting needs,
+constexpr int kStillJoined = 2;    // frames without it after which a like colour may have gone
+constexpr double kSureOdds = 8.0;  // and with which no other is tried
+constexpr double kRival = 6.0;     // less, of something else that makes a sighting contested
+constexpr size_t kMostTried = 4;   // detections a track and frame
+constexpr int kKnownHits = 10;     // sightings after which a track's range is trusted
+constexpr double kLargest = 1.3, kLargestPx = 4.0;  // of pieces together, times what is expected
+constexpr double kTimeJump = 1.0;                   // s back that count as a new recording
+
+bool Overlap(const Detection& a, const Detection& b) { return (a.box & b.box).area() > 0.0; }
+
+}  // namespace
+
+Finder::Finder(const PerceptionConfig& config)
+    : config_(config),
+      detector_(MakeDetector(config.detector, config.fit.edge_sigma_px, config.rig)),
+      localiser_(config),
+      shape_(ShapeOf(config)) {}
+
+void Finder::SetDetector(const DetectorConfig& detector) {
+  config_.detector = detector;
+  detector_ = MakeDetector(detector, config_.fit.edge_sigma_px, config_.rig);
+  localiser_ = Localiser(config_);
+}
+
+void Finder::AddSweep(const Sweep& sweep) {
+  if (!sweeps_.empty() && sweep.t < sweeps_.back().sweep.t() - kTimeJump) sweeps_.clear();
+  sweeps_.push_back({RangedSweep(sweep), false});
+  if (sweeps_.size() > kMaxSweeps) sweeps_.pop_front();
+}
+
+void Finder::MarkSweepsUsed() {
+  for (auto& s : sweeps_) s.used = true;
+}
+
+std::optional<View> Finder::Look(const Frame& frame, std::string* note) const {
+  *note = frame.problem.empty() ? ImageProblem(frame.bgr, config_.rig) : frame.problem;
+  if (!note->empty()) return std::nullopt;
+  const auto pose = poses_.At(frame.t, config_.max_extrapolation);
+  if (!pose) {
+    *note = poses_.Nearest(frame.t, config_.max_pose_age) ? "the pose is too old" : "no pose";
+    return std::nullopt;
+  }
+  View view{frame.t, *pose, CameraAt(*pose, config_.rig), frame.bgr, {}, {}};
+  view.detections = detector_->Detect(frame.bgr);
+  view.taken.assign(view.detections.size(), false);
+  return view;
+}
+
+Clusters Finder::Points(const View& view, const Detection& detection, const Eigen::Vector3d& v_WT,
+                        bool fresh_only) const {
+  Clusters all;
+  for (auto it = sweeps_.rbegin(); it != sweeps_.rend(); ++it) {
+    if ((fresh_only && it->used) || view.t - it->sweep.t() > config_.max_sweep_age) continue;
+    if (it->sweep.t() > view.t) continue;
+    Clusters clusters = SelectPoints(it->sweep, poses_, view.camera, view.t, detection, v_WT);
+    for (auto& c : clusters) all.push_back(std::move(c));
+    if (!fresh_only) break;  // only the newest
+  }
+  std::stable_sort(all.begin(), all.end(),
+                   [](const auto& a, const auto& b) { return a.front().range < b.front().range; });
+  return all;
+}
+
+std::optional<Sighting> Finder::Try(const TargetTrack& track, const View& view,
+                                    const Detection& detection, bool fresh_sweeps_only) const {
+  FitInput input;
+  input.prior = track.state;
+  input.shape = track.shape;
+  input.camera = view.camera;
+  input.detection = &detection;
+  input.reappears = track.misses > 0 || track.partial;
+  input.joined = track.joined && track.misses <= kStillJoined;
+  const auto fit =
+      localiser_.Correct(input, Points(view, detection, track.state.velocity(), fresh_sweeps_only));
+  if (!fit || fit->log_odds < kOdds) return std::nullopt;
+  // What is hardly known has its range from the size alone; a sweep that was used still tells.
+  if (fit->n_points == 0 && fresh_sweeps_only && (track.hits < kKnownHits || track.partial)) {
+    FitInput placed = input;
+    placed.prior = fit->posterior;
+    const auto points = [&](const Eigen::Vector3d& v) { return Points(view, detection, v, false); };
+    if (SeenThrough(placed, points(track.state.velocity()))) return std::nullopt;
+    if (track.partial &&
+        HitElsewhere(placed, points(Eigen::Vector3d::Zero()), config_.fit.lidar_gate))
+      return std::nullopt;
+  }
+  return Sighting{*fit, detection, fit->n_points};
+}
+
+std::optional<Sighting> Finder::FindWhole(const TargetTrack& track, const View& view,
+                                          const std::vector<size_t>& inside, const Refuses& refuses,
+                                          const SearchBoxes& boxes) const {
+  std::vector<Sighting> found;
+  std::vector<cv::Rect> tried;
+  for (const size_t i : inside) {
+    if (tried.size() >= kMostTried) break;
+    const auto piece = Within(boxes, view.bgr, view.detections[i]);
+    if (!piece || std::count(tried.begin(), tried.end(), piece->mask_box) > 0) continue;
+    tried.push_back(piece->mask_box);
+    const auto s = Try(track, view, *piece, true);
+    if (!s || refuses(*s)) continue;
+    found.push_back(*s);
+    if (track.misses == 0 && s->fit.whole && s->fit.log_odds > kSureOdds) break;
+  }
+  if (found.empty()) return std::nullopt;
+  auto best = *std::max_element(found.begin(), found.end(), [](const auto& a, const auto& b) {
+    return a.fit.log_odds < b.fit.log_odds;
+  });
+  best.contested = std::any_of(found.begin(), found.end(), [&](const Sighting& s) {
+    return s.fit.log_odds > best.fit.log_odds - kRival && !Overlap(s.detection, best.detection);
+  });
+  return best;
+}
+
+/// Pieces of one thing, parted by what hides it.
+std::optional<Sighting> Finder::FindPieces(const TargetTrack& track, const View& view,
+                                           const std::vector<size_t>& inside,
+                                           const Refuses& refuses, const SearchBoxes& boxes) const {
+  if (inside.size() < 2 || inside.size() > kMostTried) return std::nullopt;
+  std::vector<Detection> pieces;
+  for (const size_t i : inside)
+    if (!view.detections[i].mask.empty()) pieces.push_back(view.detections[i]);
+  if (pieces.size() < 2) return std::nullopt;
+  const Detection merged = Merge(view.bgr, pieces);
+  const auto too_large = [](double seen, double wanted) {
+    return seen > kLargest * wanted + kLargestPx;
+  };
+  if (too_large(merged.box.width, boxes.expected.width) ||
+      too_large(merged.box.height, boxes.expected.height))
+    return std::nullopt;
+  const auto s = Try(track, view, merged, true);
+  return s && !refuses(*s) ? s : std::nullopt;
+}
+
+std::optional<Sighting> Finder::Find(const TargetTrack& track, View* view,
+                                     const Refuses& refuses) const {
+  const auto boxes = WhereToLook(track, view->camera);
+  if (!boxes) return std::nullopt;
+  std::vector<size_t> inside;
+  for (size_t i = 0; i < view->detections.size(); ++i)
+    if (!view->taken[i] && (view->detections[i].box & boxes->search).area() > 0.0)
+      inside.push_back(i);
+  std::stable_sort(inside.begin(), inside.end(), [&](size_t a, size_t b) {
+    return Likeness(view->detections[a].box, *boxes) > Likeness(view->detections[b].box, *boxes);
+  });
+  if (inside.size() > kMostTried) inside.resize(kMostTried);
+  auto best = FindWhole(track, *view, inside, refuses, *boxes);
+  if (!best) best = FindPieces(track, *view, inside, refuses, *boxes);
+  if (best)
+    for (const size_t i : inside)
+      view->taken[i] = view->taken[i] || Overlap(view->detections[i], best->detection);
+  return best;
+}
+
+std::optional<Sighting> Finder::Acquire(const View& view, const Detection& detection) const {
+  const auto fit = localiser_.Acquire(shape_, view.camera, detection,
+                                      Points(view, detection, Eigen::Vector3d::Zero(), false));
+  if (!fit) return std::nullopt;
+  return Sighting{*fit, detection, fit->n_points};
+}
+
+}  // namespace chase::perception

@@ -1,0 +1,318 @@
+#include "services/perception/belief/perceiver.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "services/perception/belief/sightings.h"
+
+namespace chase::perception {
+
+namespace {
+
+constexpr double kUnknownVariance = 1e4;  // m^2, while nothing is known
+constexpr int kCandidateMisses = 2;       // frames without it that end a candidate
+constexpr size_t kMaxCandidates = 6;
+constexpr double kLeastWidthPx = 6.0;  // what is narrower may be a slit between things
+constexpr int kDecoyHits = 3;      // sightings that what stands beside one that drives counts for
+constexpr double kTimeJump = 1.0;  // s back that count as a new recording
+constexpr double kGap = 0.25;      // s between frames in which a target may do anything
+constexpr double kPointed = 1.0;   // s that what is pointed at is looked for there
+constexpr int kSureHits = 5;       // corrections after which the track is trusted
+constexpr double kDrivenSigma = 0.1;  // m, how well that must be known
+constexpr double kStood = 0.2;        // m, within which a target stands
+constexpr double kStoodFor = 0.6;     // s, likewise
+
+}  // namespace
+
+Perceiver::Perceiver(const PerceptionConfig& config)
+    : config_(config), finder_(config), decoys_(config.state) {}
+
+void Perceiver::Follow(View* view) {
+  if (!track_) return;
+  const auto refuses = [&](const Sighting& s) { return IsRatherDecoy(s, *view); };
+  auto taken = view->taken;
+  const auto found = finder_.Find(*track_, view, refuses);
+  contested_ = found && found->contested && track_->misses > 0;
+  if (!found || !Sure(*found)) {
+    view->taken = taken;
+    ++track_->misses;
+    unsure_ = found;
+    return;
+  }
+  sighting_ = found;
+  track_->Correct(found->fit);
+  if (!doubtful_) candidates_.clear();
+}
+
+void Perceiver::FollowCandidates(View* view) {
+  for (auto& c : candidates_) {
+    const auto again = finder_.Find(c.track, view, [&](const Sighting& s) {
+      return (s.detection.part || s.detection.edged) && !c.part;
+    });
+    const bool partly =
+        c.track.partial || (again && (again->detection.edged || c.HiddenIn(*again)));
+    if (!again || !(again->fit.whole || partly)) {
+      ++c.track.misses;
+      continue;
+    }
+    c.Correct(*again);
+    c.range = (c.track.state.position() - view->camera.p_WC).norm();
+  }
+  DropMissed();
+}
+
+void Perceiver::DropMissed() {
+  candidates_.erase(
+      std::remove_if(candidates_.begin(), candidates_.end(),
+                     [](const Candidate& c) { return c.track.misses >= kCandidateMisses; }),
+      candidates_.end());
+}
+
+bool Perceiver::MayBeNew(const Detection& d) const {
+  return (d.edged || d.score >= config_.state.acquire_score) && d.box.width >= kLeastWidthPx;
+}
+
+/// Counts why nothing was made of a detection.
+void Perceiver::CountRefused(const Detection& d) {
+  Refusal why = finder_.HasSweeps() ? Refusal::kContradicted : Refusal::kNoRange;
+  if (d.box.width < kLeastWidthPx)
+    why = Refusal::kTooSmall;
+  else if (!d.edged && d.score < config_.state.acquire_score)
+    why = Refusal::kWrongShape;
+  ++refused_[static_cast<size_t>(why)];
+}
+
+/// True when a candidate is followed there.
+bool Perceiver::Followed(const Sighting& s) const {
+  return std::any_of(candidates_.begin(), candidates_.end(), [&](const Candidate& c) {
+    return (c.track.state.position() - s.fit.posterior.position()).norm() <
+           config_.state.decoy_radius;
+  });
+}
+
+/// What may be the hidden target, half of it seen, is followed on its own to see whether it drives.
+void Perceiver::AddPartial(const View& view) {
+  if (!unsure_ || unsure_->fit.whole || unsure_->n_points == 0) return;
+  if (Followed(*unsure_) || candidates_.size() >= kMaxCandidates) return;
+  if (!Plausible(*unsure_, view.t)) return;
+  candidates_.push_back(NewCandidate(*unsure_, view));
+  ForgetVelocity(config_.motion, &candidates_.back());
+}
+
+void Perceiver::AddCandidates(View* view) {
+  std::vector<size_t> order;  // near before far, the middle before the border
+  for (size_t i = 0; i < view->detections.size(); ++i) {
+    if (view->taken[i]) continue;
+    if (MayBeNew(view->detections[i]))
+      order.push_back(i);
+    else
+      CountRefused(view->detections[i]);
+  }
+  std::stable_sort(order.begin(), order.end(), [&](size_t a, size_t b) {
+    return Prominence(view->detections[a], config_.rig) >
+           Prominence(view->detections[b], config_.rig);
+  });
+  const bool comes_back = track_ && !doubtful_ && track_->Proven();
+  for (const size_t i : order) {
+    if (candidates_.size() >= kMaxCandidates) return;
+    const auto found = finder_.Acquire(*view, view->detections[i]);
+    if (!found) CountRefused(view->detections[i]);
+    if (!found || !Plausible(*found, view->t)) continue;
+    // Part of something, of which no LiDAR point tells the range, is a thing of its own only where
+    // the target may come back.
+    const bool piece = found->detection.part || found->detection.edged;
+    if ((piece || !found->fit.whole) && found->n_points == 0 && !comes_back) continue;
+    if (piece && found->n_points == 0 && !found->detection.edged) continue;
+    if (Followed(*found)) continue;
+    candidates_.push_back(NewCandidate(*found, *view));
+  }
+}
+
+void Perceiver::Seek(View* view) {
+  if (selected_) return TakeSelected(view);
+  if (sighting_ && !doubtful_) return;
+  FollowCandidates(view);
+  AddPartial(*view);
+  AddCandidates(view);
+  Promote(*view);
+}
+
+void Perceiver::Promote(const View& view) {
+  const auto better = [](const Candidate& a, const Candidate& b) {
+    return a.Drives() != b.Drives() ? a.Drives() : a.since < b.since;
+  };
+  const Candidate* best = nullptr;
+  for (const auto& c : candidates_)
+    if (Ready(c, view.t) && (!best || better(c, *best))) best = &c;
+  if (!best) return;
+  const Candidate chosen = *best;
+  const bool drives = chosen.Drives() || PieceIsReady(chosen);
+  for (const auto& c : candidates_)
+    if (&c != best && drives && !c.Drives() && !c.part &&
+        c.track.hits >= config_.state.confirm_frames)
+      decoys_.Note(c.track.state.position(), view.t, kDecoyHits);
+  if (sighting_) decoys_.Note(track_->state.position(), view.t, kDecoyHits);
+  Start(chosen.track, chosen.last);
+  doubtful_ = !drives;
+  candidates_.clear();
+}
+
+void Perceiver::Start(const TargetTrack& track, const Sighting& sighting) {
+  track_ = track;
+  doubtful_ = false;
+  stood_ = track.state.position();
+  stood_since_ = track.t;
+  sighting_ = sighting;
+  state_ = TargetState::kTracking;
+}
+
+void Perceiver::Judge(double t) {
+  if (!track_) return;
+  const double unseen = t - track_->seen;
+  if (unseen < config_.state.hidden_after)
+    state_ = TargetState::kTracking;
+  else if (state_ != TargetState::kLost)
+    state_ =
+        unseen > config_.state.lost_after || track_->HorizontalSigma() > config_.state.lost_sigma
+            ? TargetState::kLost
+            : TargetState::kOccluded;
+  if (unseen > 0.0) return;
+  last_v_ = track_->state.velocity();
+  last_p_ = track_->state.position();
+  if ((last_p_ - stood_).norm() < kStood) return;
+  doubtful_ = false;
+  stood_ = last_p_;
+  stood_since_ = t;
+}
+
+/// While the target is surely in view, what else looks just like it is not the target. One of them
+/// a frame is placed.
+void Perceiver::Remember(const View& view) {
+  if (!track_ || doubtful_ || track_->seen < view.t || track_->hits < kSureHits) return;
+  decoys_.Forget(view.t, track_->state.position());
+  const size_t n = view.detections.size();
+  for (size_t k = 0; k < n; ++k) {
+    const size_t i = (k + turn_) % n;
+    if (view.taken[i] || view.detections[i].part || !MayBeNew(view.detections[i])) continue;
+    turn_ = i + 1;
+    const auto found = finder_.Acquire(view, view.detections[i]);
+    if (!found || !found->fit.whole) return;
+    const Eigen::Vector3d p = found->fit.posterior.position();
+    if ((p - track_->state.position()).norm() < config_.state.decoy_radius) return;
+    Decoy* decoy = decoys_.Note(p, view.t);
+    if (decoy) SwapIfTheOtherDrives(*found, decoy, view.t);
+    return;
+  }
+}
+
+/// The one that drives is the target, and the one that stands is not.
+void Perceiver::SwapIfTheOtherDrives(const Sighting& s, Decoy* other, double t) {
+  const double sigma = std::sqrt(s.fit.posterior.covariance.topLeftCorner<3, 3>().trace());
+  const bool stands =
+      t - stood_since_ > kStoodFor && (track_->state.position() - stood_).norm() < kStood;
+  if (!stands || !other->Driven(config_.state.decoy_radius) || sigma > kDrivenSigma) return;
+  const Eigen::Vector3d stood = track_->state.position();
+  *other = {stood, stood, t, other->hits};
+  Start({s.fit.posterior, s.fit.shape, t, t, 1, 0, s.fit.joined}, s);
+}
+
+/// True when the frame is newer than the last one, or starts a recording anew.
+bool Perceiver::ForgetIfTimeRanBack(double t) {
+  const bool jumped = t < last_t_ - kTimeJump;
+  if (!jumped && t <= last_t_) return false;
+  last_t_ = t;
+  if (jumped) Forget();
+  return true;
+}
+
+void Perceiver::Forget() {
+  track_.reset();
+  candidates_.clear();
+  decoys_.Clear();
+  selected_.reset();
+  state_ = TargetState::kSearching;
+}
+
+void Perceiver::Select(const DetectorConfig& detector, const Eigen::Vector2d& at) {
+  config_.detector = detector;
+  finder_.SetDetector(detector);
+  Forget();
+  selected_ = at;
+  selected_at_ = last_t_;
+}
+
+/// The detection at the pixel that was pointed at, or nearest to it as things move: within its
+/// size.
+void Perceiver::TakeSelected(View* view) {
+  if (view->t - selected_at_ > kPointed) return selected_.reset();
+  const auto off = [&](const Detection& d) {
+    const Eigen::Vector2d low(d.box.x, d.box.y), high(d.box.br().x, d.box.br().y);
+    return (*selected_ - selected_->cwiseMax(low).cwiseMin(high)).norm();
+  };
+  const Detection* nearest = nullptr;
+  for (const Detection& d : view->detections)
+    if (!d.part && off(d) <= d.box.width && (!nearest || off(d) < off(*nearest))) nearest = &d;
+  if (!nearest) return;
+  const auto found = finder_.Acquire(*view, *nearest);
+  if (!found) return;
+  Start(NewCandidate(*found, *view).track, *found);
+  view->taken[static_cast<size_t>(nearest - view->detections.data())] = true;
+  selected_.reset();
+}
+
+TargetEstimate Perceiver::Report(double t, const std::optional<View>& view,
+                                 std::string note) const {
+  TargetEstimate out;
+  out.t = t;
+  out.state = state_;
+  out.size =
+      track_ ? track_->shape.size : Eigen::Vector2d(config_.target_radius, config_.target_height);
+  out.note = std::move(note);
+  out.refused = refused_;
+  if (sighting_) {
+    out.box = sighting_->detection.box;
+    out.score = sighting_->detection.score;
+    out.n_points = sighting_->n_points;
+  }
+  out.covariance = out.velocity_covariance = kUnknownVariance * Eigen::Matrix3d::Identity();
+  if (!track_) return out;
+  out.p_WT = track_->state.position();
+  out.v_WT = track_->state.velocity();
+  if (state_ == TargetState::kLost) return out;
+  out.velocity_covariance = track_->state.covariance.bottomRightCorner<3, 3>();
+  const auto pose = view ? view->pose : finder_.poses().Nearest(t, 1e9).value_or(PoseSample{});
+  out.covariance =
+      PublishedCovariance(*track_, pose, config_.detector.shape.outline_sigma, config_.motion);
+  return out;
+}
+
+TargetEstimate Perceiver::See(const Frame& frame) {
+  const bool newer = ForgetIfTimeRanBack(frame.t);
+  std::string note;
+  auto view = finder_.Look(frame, &note);
+  if (view && !newer) {
+    view.reset();
+    note = "the frame is not newer than the last one";
+  }
+  sighting_.reset();
+  unsure_.reset();
+  contested_ = false;
+  refused_ = {};
+  if (track_ && frame.t - track_->seen > kGap) track_->misses = std::max(1, track_->misses);
+  if (track_ && state_ != TargetState::kLost) track_->Predict(frame.t, config_.motion);
+  for (auto& c : candidates_) c.track.Predict(frame.t, config_.motion);
+  if (view) {
+    if (state_ != TargetState::kLost) Follow(&*view);
+    Seek(&*view);
+    if (sighting_ || !candidates_.empty()) finder_.MarkSweepsUsed();
+    Remember(*view);
+  } else if (newer) {
+    if (track_) ++track_->misses;
+    for (auto& c : candidates_) ++c.track.misses;
+    DropMissed();
+  }
+  Judge(frame.t);
+  return Report(frame.t, view, std::move(note));
+}
+
+}  // namespace chase::perception

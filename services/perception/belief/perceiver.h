@@ -1,0 +1,108 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "services/perception/belief/candidate.h"
+#include "services/perception/belief/decoys.h"
+#include "services/perception/belief/finder.h"
+
+namespace chase::perception {
+
+enum class TargetState { kSearching, kTracking, kOccluded, kLost };
+
+/// Why a detection was not taken for a new target, worst first.
+enum class Refusal { kTooSmall, kWrongShape, kNoRange, kContradicted };
+inline constexpr size_t kRefusals = 4;
+inline constexpr std::array<const char*, kRefusals> kWhyRefused = {
+    "too small", "of another aspect, fill or colour", "no LiDAR, and the size tells no range",
+    "outline, size and LiDAR contradict each other"};
+/// Detections by Refusal.
+using Refused = std::array<int64_t, kRefusals>;
+
+/// The target at a frame's time as a Gaussian of its centre.
+struct TargetEstimate {
+  double t = 0.0;  ///< s
+  TargetState state = TargetState::kSearching;
+  Eigen::Vector3d p_WT = Eigen::Vector3d::Zero();                     ///< frame W, m
+  Eigen::Vector3d v_WT = Eigen::Vector3d::Zero();                     ///< frame W, m/s
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity();           ///< of p_WT, m^2
+  Eigen::Matrix3d velocity_covariance = Eigen::Matrix3d::Identity();  ///< of v_WT, m^2/s^2
+  Eigen::Vector2d size = Eigen::Vector2d::Zero();                     ///< radius, height, m
+  cv::Rect2d box;                                                     ///< px; empty: not seen
+  double score = 0.0;                                                 ///< of the detection, 0 to 1
+  int n_points = 0;                                                   ///< LiDAR points used
+  std::string note;      ///< what was missing; else empty
+  Refused refused = {};  ///< detections of this frame that no track was started from
+};
+
+/// Finds the target, follows it and says how sure it is. Feed it poses and sweeps as they come and
+/// ask with each frame.
+class Perceiver {
+ public:
+  /// Throws std::runtime_error when the detector's file or name is not usable.
+  explicit Perceiver(const PerceptionConfig& config);
+
+  void AddPose(const PoseSample& pose) { finder_.AddPose(pose); }
+  void AddSweep(const Sweep& sweep) { finder_.AddSweep(sweep); }
+  TargetEstimate See(const Frame& frame);
+
+  /// Somebody has pointed at the target, at pixel (u, v) `at` of the last frame: what the detector
+  /// finds there within a second is taken at once, whatever was followed before.
+  void Select(const DetectorConfig& detector, const Eigen::Vector2d& at);
+
+  const PoseHistory& poses() const { return finder_.poses(); }
+
+ private:
+  void Follow(View* view);
+  void Seek(View* view);
+  void TakeSelected(View* view);
+  void FollowCandidates(View* view);
+  void AddPartial(const View& view);
+  void AddCandidates(View* view);
+  void DropMissed();
+  void Promote(const View& view);
+  void Remember(const View& view);
+  void Judge(double t);
+  TargetEstimate Report(double t, const std::optional<View>& view, std::string note) const;
+
+  bool MayBeNew(const Detection& d) const;
+  void CountRefused(const Detection& d);
+  bool Followed(const Sighting& s) const;
+  bool Vague() const;
+  bool Sure(const Sighting& s) const;
+  bool Ready(const Candidate& candidate, double t) const;
+  bool PieceIsReady(const Candidate& candidate) const;
+  bool StandsLongEnough(const Candidate& candidate, double t) const;
+  bool SizedBadly(const Candidate& candidate) const;
+  bool Plausible(const Sighting& s, double t) const;
+  bool IsRatherDecoy(const Sighting& s, const View& view) const;
+  void SwapIfTheOtherDrives(const Sighting& s, Decoy* other, double t);
+  void Start(const TargetTrack& track, const Sighting& sighting);
+  bool ForgetIfTimeRanBack(double t);
+  void Forget();
+
+  PerceptionConfig config_;
+  Finder finder_;
+  TargetState state_ = TargetState::kSearching;
+  std::optional<TargetTrack> track_;
+  std::vector<Candidate> candidates_;
+  std::optional<Sighting> sighting_;  ///< of the last frame
+  bool doubtful_ = false;             ///< it stood when it was taken, and has stood since
+  std::optional<Sighting> unsure_;    ///< in the last frame: may be the target, as far as it shows
+  bool contested_ = false;            ///< of several things alike in the last frame
+  Decoys decoys_;
+  std::optional<Eigen::Vector2d> selected_;           ///< px, not taken yet
+  Refused refused_ = {};                              ///< in this frame
+  size_t turn_ = 0;                                   ///< detection that is looked at next
+  Eigen::Vector3d stood_ = Eigen::Vector3d::Zero();   ///< where the target stood or was, frame W, m
+  double stood_since_ = 0.0;                          ///< s
+  Eigen::Vector3d last_v_ = Eigen::Vector3d::Zero();  ///< when last seen, frame W, m/s
+  Eigen::Vector3d last_p_ = Eigen::Vector3d::Zero();  ///< likewise, m
+  double last_t_ = -1e18, selected_at_ = 0.0;         ///< s
+};
+
+}  // namespace chase::perception

@@ -1,0 +1,124 @@
+#include <algorithm>
+#include <cmath>
+
+#include "services/perception/belief/perceiver.h"
+#include "services/perception/belief/sightings.h"
+
+// What the Perceiver takes for its target.
+
+namespace chase::perception {
+
+namespace {
+
+constexpr double kGateSigmas = 3.0;
+constexpr double kReachMargin = 0.5;    // m
+constexpr double kUsualSpeed = 1.5;     // m/s
+constexpr int kSoonBack = 6;            // frames hidden after which one side at most may be
+constexpr double kReachGate = 11.3;     // squared distance from a hidden target's prediction, 3 dof
+constexpr double kWellInside = 2.3;     // likewise of what is alone, where it may be elsewhere,
+constexpr double kFarFromSure = 1.0;    // m, within this standard deviation
+constexpr double kExpectedGate = 4.6;   // likewise of what need not drive, 2 dof
+constexpr int kPieceHits = 4;           // sightings of a piece or a half before it is taken,
+constexpr double kPieceWay = 0.15;      // m that it must have driven,
+constexpr int kPieceSweeps = 2;         // of them with LiDAR points, for what has come out wholly,
+constexpr int kNewPieceHits = 10;       // and where none was ever seen, nor LiDAR tells much
+constexpr double kNewPieceWay = 0.3;    // m, likewise
+constexpr double kDecoySigma = 0.1;     // m, how well its place is known
+constexpr double kSmallPx = 12.0;       // width below which the size tells the range badly
+constexpr double kFar = 5.0;            // m, from where fewer pixels tell what stands there
+constexpr double kTrusted = 0.3;        // s that a track not seen is preferred to anything new
+constexpr double kStandingSpeed = 0.2;  // m/s
+
+}  // namespace
+
+/// True when a look-alike known to stand there explains a sighting better than the target does.
+bool Perceiver::IsRatherDecoy(const Sighting& s, const View& view) const {
+  const Decoy* decoy = decoys_.At(s.fit.posterior.position());
+  if (!decoy) return false;
+  TargetTrack standing{s.fit.posterior, s.fit.shape, view.t, view.t, 1, 0};
+  standing.state.mean << decoy->p_W, Eigen::Vector3d::Zero();
+  standing.state.covariance = Matrix6d::Identity() * kDecoySigma * kDecoySigma;
+  if (track_) {  // on the same terms
+    standing.misses = track_->misses;
+    standing.joined = track_->joined;
+  }
+  const auto other = finder_.Try(standing, view, s.detection, false);
+  return other && other->fit.log_odds > s.fit.log_odds;
+}
+
+bool Perceiver::Plausible(const Sighting& s, double t) const {
+  const Eigen::Vector3d p_WT = s.fit.posterior.position();
+  if (decoys_.At(p_WT)) return false;
+  if (!track_ || doubtful_ || !track_->Proven()) return true;
+  const double way = (p_WT - last_p_).norm(), unseen = t - track_->seen;
+  if (state_ != TargetState::kLost) {
+    const Eigen::Vector3d d = p_WT - track_->state.position();
+    if (std::abs(d.z()) >= kGateSigmas * config_.motion.ground_sigma) return false;
+    const Eigen::Matrix3d P = track_->state.covariance.topLeftCorner<3, 3>();
+    if (d.dot(P.ldlt().solve(d)) < kReachGate) return true;
+    // The prediction may err by more than it claims, where the fit slipped to what stood behind.
+    return Clear(s) && way < kReachMargin + kUsualSpeed * unseen;
+  }
+  return way < kReachMargin + config_.motion.max_speed * unseen;
+}
+
+/// Hidden for so long that a look-alike may lie where the target may be as well.
+bool Perceiver::Vague() const {
+  return track_ && track_->misses > 0 && track_->HorizontalSigma() > config_.state.sure_sigma;
+}
+
+/// True for a sighting after which nothing need be asked: all of the target, close to where it was
+/// expected, and nothing else that could be it.
+bool Perceiver::Sure(const Sighting& s) const {
+  if (track_->misses == 0) return true;
+  if (s.contested) return false;
+  const Eigen::Vector2d off = (s.fit.posterior.position() - track_->state.position()).head<2>();
+  const Eigen::Matrix2d P = track_->state.covariance.topLeftCorner<2, 2>();
+  const double squared = off.dot(P.ldlt().solve(off));
+  const bool near = off.norm() < config_.state.decoy_radius;
+  const bool alone = candidates_.empty() && track_->HorizontalSigma() < kFarFromSure;
+  if (Vague()) return AllSeen(s) && (near || (alone && squared < kWellInside));
+  if (LeftOut(s) > 1 && track_->misses > kSoonBack) return false;
+  return near || squared < kExpectedGate;
+}
+
+/// True when it is too small for its size to tell the range, and LiDAR never did. A standing thing
+/// of another size would then seem to drive as the drone does.
+bool Perceiver::SizedBadly(const Candidate& c) const {
+  const Detection& d = c.last.detection;
+  return !track_ && c.sweeps == 0 && !d.p_CT && d.box.width < kSmallPx;
+}
+
+/// Of a piece of something larger, or what is hidden or cut off in part, once it has driven further
+/// than what shows of it may seem to, or has come out wholly and LiDAR tells that it drives.
+bool Perceiver::PieceIsReady(const Candidate& c) const {
+  const bool hasty = !track_ && (LeavesImage(c.last.detection) || c.last.n_points < kClearPoints);
+  if (c.track.hits < (hasty ? kNewPieceHits : kPieceHits)) return false;
+  const bool came_out = !hasty && AllSeen(c.last) && c.sweeps >= kPieceSweeps && c.Fast();
+  return came_out || c.SurelyDrives(hasty ? kNewPieceWay : kPieceWay);
+}
+
+/// Of what stands: after a while, unless the target stood there. A target that drove when it was
+/// last seen must have had the time to stop.
+bool Perceiver::StandsLongEnough(const Candidate& c, double t) const {
+  const bool stood_here = track_ && last_v_.norm() < kStandingSpeed &&
+                          (c.track.state.position() - last_p_).norm() < config_.state.decoy_radius;
+  const bool may_stand =
+      !c.last.detection.AnyCut() && (!track_ || t - track_->seen > config_.motion.hidden_time);
+  const double wait = config_.state.standing_after * std::max(1.0, std::pow(c.range / kFar, 2));
+  return stood_here || (may_stand && c.range < config_.state.standing_range && t - c.since >= wait);
+}
+
+/// What drives is taken at once.
+bool Perceiver::Ready(const Candidate& c, double t) const {
+  if (c.track.misses > 0 || c.track.hits < config_.state.confirm_frames) return false;
+  const bool trusted = !doubtful_ && !contested_ && !Vague();
+  if (track_ && trusted && t - track_->seen < kTrusted) return false;
+  const Detection& d = c.last.detection;
+  const bool unclear = d.AnyCut() && c.last.n_points < kClearPoints;
+  const bool piece = c.part || c.track.partial || LeavesImage(d) || unclear;
+  if (!SizedBadly(c) && (piece ? PieceIsReady(c) : c.Drives())) return true;
+  return !piece && !sighting_ && StandsLongEnough(c, t);
+}
+
+}  // namespace chase::perception

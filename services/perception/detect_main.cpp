@@ -1,3 +1,0 @@
-#include "services/perception/detect_command.h"
-
-int main(int argc, char** argv) { return chase::perception::Detect(argc, argv); }

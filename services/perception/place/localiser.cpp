@@ -1,0 +1,212 @@
+#include "services/perception/place/localiser.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "services/perception/place/odds.h"
+#include "services/perception/place/quick_fit.h"
+#include "services/perception/place/readings.h"
+#include "services/perception/place/target_points.h"
+
+namespace chase::perception {
+
+namespace {
+
+constexpr double kSharpTurn = 0.02;   // how often the target does what the motion leaves out
+constexpr double kClear = 3.0;        // squared distance from the prediction that needs no other
+constexpr int kFewRays = 3;           // through it, as the edge of a thing may let pass
+constexpr double kNegligible = 7.0;   // logarithm of the odds of a hypothesis that is left out
+constexpr int kLeastSides = 2;        // that must be seen; one where the lidar surely hit it
+constexpr int kMostClusters = 2;      // that are tried
+constexpr double kMinVisible = 0.15;  // share of the expected box that a detection must cover
+constexpr double kHiddenPriorShare = 0.6;  // of the prior's gate where sides are left out
+
+bool Visible(const FitInput& input) {
+  if (input.detection->p_CT) return true;
+  const auto expected = ProjectTarget(input.camera, input.prior.position(), input.shape);
+  return !expected || input.detection->box.area() >= kMinVisible * expected->area();
+}
+
+/// The sides of a reading that the detection shows.
+Sides Seen(Sides sides, const Detection& d) {
+  for (size_t i = 0; i < sides.size(); ++i) sides[i] = sides[i] && !d.silhouette.samples[i].empty();
+  return sides;
+}
+
+bool GoesOn(const Detection& d) {
+  return std::any_of(d.goes_on.begin(), d.goes_on.end(), [](bool on) { return on; });
+}
+
+}  // namespace
+
+bool Localiser::Agrees(const FitResult& fit, double prior_gate) const {
+  if (!fit.ok || fit.prior_distance > prior_gate) return false;
+  return fit.point_rms <= 3.0 * config_.fit.lidar_sigma;
+}
+
+bool Localiser::EdgesAgree(const FitResult& fit, const FitInput& input) const {
+  const auto least = input.points.size() < kSurelyHit ? kLeastSides : 1;
+  if (!input.detection->p_CT && std::count(fit.used.begin(), fit.used.end(), true) < least)
+    return false;
+  const double gate =
+      std::max(config_.fit.edge_gate_px, 1.6 * input.detection->silhouette.sigma_px);
+  for (size_t side = 0; side < 4; ++side) {
+    if (fit.used[side] && std::abs(fit.edge_px[side]) > gate) return false;
+    const bool left_out =
+        !input.use_side[side] && !input.detection->silhouette.samples[side].empty();
+    if (left_out && std::abs(fit.edge_px[side]) < HiddenBy(input)) return false;
+    // Where the range is not known, what goes on beyond a side is a larger thing.
+    if (left_out && fit.edge_px[side] > 0.0 && !RangeIsKnown(input)) return false;
+  }
+  return true;
+}
+
+const Localiser::Hypothesis& Localiser::Best(const std::vector<Hypothesis>& all) {
+  return *std::max_element(all.begin(), all.end(), [](const Hypothesis& a, const Hypothesis& b) {
+    return a.log_weight < b.log_weight;
+  });
+}
+
+std::vector<Localiser::Hypothesis> Localiser::Refined(std::vector<Hypothesis> quick) const {
+  std::vector<Hypothesis> all;
+  if (quick.empty()) return all;
+  const double least = Best(quick).log_weight - kNegligible;
+  for (auto& h : quick) {
+    if (h.log_weight < least) continue;
+    const auto fit = Refined(h.input, h.fit);
+    if (!fit) continue;
+    h.fit = *fit;
+    h.log_weight = h.log_prior + LogTarget(h.fit, h.input, config_.fit);
+    all.push_back(std::move(h));
+  }
+  return all;
+}
+
+/// One Gaussian with the mean and covariance of the mixture; all else from the likeliest.
+FitResult Localiser::Joined(const std::vector<Hypothesis>& all) {
+  const Hypothesis& best = Best(all);
+  const auto weight = [&](const Hypothesis& h) { return std::exp(h.log_weight - best.log_weight); };
+  FitResult out = best.fit;
+  double total = 0.0;
+  Vector6d mean = Vector6d::Zero();
+  for (const auto& h : all) {
+    total += weight(h);
+    mean += weight(h) * h.fit.posterior.mean;
+  }
+  mean /= total;
+  Matrix6d covariance = Matrix6d::Zero();
+  for (const auto& h : all) {
+    const Vector6d d = h.fit.posterior.mean - mean;
+    covariance += weight(h) / total * (h.fit.posterior.covariance + d * d.transpose());
+  }
+  out.posterior.mean = mean;
+  out.posterior.covariance = covariance;
+  out.log_odds = best.log_weight + std::log(total);
+  return out;
+}
+
+std::optional<FitResult> Localiser::WholeReading(FitInput* input) const {
+  input->use_side = kReadings[0];
+  FitResult fit = QuickFit(*input, config_.fit);
+  if (!Agrees(fit, config_.fit.prior_gate) || !EdgesAgree(fit, *input)) return std::nullopt;
+  return fit;
+}
+
+std::optional<FitResult> Localiser::Refined(const FitInput& input, const FitResult& quick) const {
+  FitResult fit = FitTarget(input, config_.fit, &quick);
+  if (!fit.ok) return std::nullopt;
+  return fit;
+}
+
+void Localiser::Weigh(const FitInput& given, double log_prior, size_t readings, bool all,
+                      std::vector<Hypothesis>* out) const {
+  FitInput input = given;
+  const double prior_gate = config_.fit.prior_gate;
+  const auto sensible = Sensible(input);
+  // Where a like colour goes on, both sides may be another thing's, as the points tell.
+  const bool joined = !input.points.empty() && (input.joined || GoesOn(*input.detection));
+  std::vector<Sides> tried;
+  bool explained = !joined && !out->empty();
+  for (size_t k = 0; k < readings; ++k) {
+    if (k >= kOneHidden && explained) return;
+    if (!all && !sensible(kReadings[k])) continue;
+    const Sides seen = Seen(kReadings[k], *input.detection);
+    if (std::count(tried.begin(), tried.end(), seen) > 0) continue;
+    tried.push_back(seen);
+    input.use_side = kReadings[k];
+    const FitResult fit = QuickFit(input, config_.fit);
+    const double gate = k == 0 ? prior_gate : kHiddenPriorShare * prior_gate;
+    if (!Agrees(fit, gate) || !EdgesAgree(fit, input)) continue;
+    out->push_back({input, fit, log_prior, log_prior + LogTarget(fit, input, config_.fit)});
+    explained = explained || (!joined && RaysThrough(input, fit.posterior) < kFewRays);
+  }
+}
+
+std::optional<FitResult> Localiser::JoinedReading(FitInput* input) const {
+  const double log_clutter = LogClutter(*input);
+  const auto whole = WholeReading(input);
+  const bool clear =
+      whole && whole->prior_distance < kClear && RaysThrough(*input, whole->posterior) < kFewRays;
+  if (clear) {
+    auto fit = Refined(*input, *whole);
+    if (fit) fit->log_odds = LogTarget(*fit, *input, config_.fit) - log_clutter;
+    return fit;
+  }
+  std::vector<Hypothesis> all;
+  // Where the range is not known, two opposite sides must give it.
+  const bool known = RangeIsKnown(*input);
+  Weigh(*input, std::log(1.0 - kSharpTurn), known ? kReadings.size() : kOneHidden, !whole, &all);
+  Weigh(AfterASharpTurn(*input), std::log(kSharpTurn), kOneHidden, !whole, &all);
+  all = Refined(std::move(all));
+  if (all.empty()) return std::nullopt;
+  FitResult fit = Joined(all);
+  fit.log_odds -= log_clutter;
+  return fit;
+}
+
+std::optional<FitResult> Localiser::DisplacedReading(
+    const FitInput& input, const std::vector<TargetPoint>& cluster) const {
+  auto moved = AtRangeOf(cluster, input);
+  if (!moved) return std::nullopt;
+  moved->points = PointsOnTarget(*moved, cluster, config_.fit.lidar_gate);
+  if (moved->points.size() < kSurelyHit) return std::nullopt;
+  auto fit = JoinedReading(&*moved);
+  if (fit) fit->log_odds += std::log(kSharpTurn);
+  return fit;
+}
+
+std::optional<FitResult> Localiser::Correct(const FitInput& predicted,
+                                            const Clusters& clusters) const {
+  if (!Visible(predicted)) return std::nullopt;
+  FitInput input = predicted;
+  input.hits = &clusters;
+  const double gate = config_.fit.lidar_gate + 2.0 * RangeSigma(predicted.prior, predicted.camera);
+  const double all = CountPoints(clusters);
+  // What stands before the target may lend the blob's edge a few points, and what stands behind it
+  // too: the fit that explains most of them is taken.
+  std::optional<FitResult> best;
+  double best_score = 0.0;
+  int tried = 0;
+  for (const auto& cluster : clusters) {
+    input.points = PointsOnTarget(predicted, cluster, gate);
+    std::optional<FitResult> fit;
+    if (!input.points.empty()) {
+      if (++tried > kMostClusters) break;
+      fit = JoinedReading(&input);
+    }
+    if (!fit || fit->log_odds < 0.0) fit = DisplacedReading(input, cluster);
+    if (!fit) continue;
+    const double score = fit->log_odds - LogUnexplained(all - static_cast<double>(cluster.size()));
+    if (best && score <= best_score) continue;
+    best = fit;
+    best_score = score;
+  }
+  if (best) return best;
+  input.points.clear();
+  if (SeenThrough(predicted, clusters)) return std::nullopt;
+  best = JoinedReading(&input);
+  if (best) best->log_odds -= LogUnexplained(all);
+  return best;
+}
+
+}  // namespace chase::perception

@@ -1,0 +1,60 @@
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "services/perception/place/target_fit.h"
+
+namespace chase::perception {
+
+/// Turns one detection and the LiDAR points on it into a position, or refuses it: what hides part
+/// of the target, or only looks like it, must not bend the estimate.
+class Localiser {
+ public:
+  explicit Localiser(const PerceptionConfig& config) : config_(config) {}
+
+  /// Corrects a predicted target. Sides of the silhouette that lie too far inside are taken as
+  /// hidden and left out; nothing when no reading of the detection agrees with the prediction.
+  std::optional<FitResult> Correct(const FitInput& predicted, const Clusters& clusters) const;
+
+  /// Places a target of which nothing is known: range from the points, or from the apparent size
+  /// when no point hits. Nothing when size, points and outline contradict each other.
+  std::optional<FitResult> Acquire(const TargetShape& shape, const Camera& camera,
+                                   const Detection& detection, const Clusters& clusters) const;
+
+ private:
+  /// One way to explain a detection: which sides are seen, whether the target turned sharply.
+  struct Hypothesis {
+    FitInput input;
+    FitResult fit;
+    double log_prior = 0.0, log_weight = 0.0;
+  };
+
+  /// The quick fit to all sides, if it agrees with all of them.
+  std::optional<FitResult> WholeReading(FitInput* input) const;
+  /// The same in full, started there.
+  std::optional<FitResult> Refined(const FitInput& input, const FitResult& quick) const;
+  /// Those that count, in full.
+  std::vector<Hypothesis> Refined(std::vector<Hypothesis> quick) const;
+  /// All hypotheses that agree with the prediction, weighed and joined into one Gaussian.
+  std::optional<FitResult> JoinedReading(FitInput* input) const;
+  /// Where the prediction erred along the line of sight, as the points of a cluster tell.
+  std::optional<FitResult> DisplacedReading(const FitInput& input,
+                                            const std::vector<TargetPoint>& cluster) const;
+  std::optional<FitResult> AcquirePartial(FitInput* input, const Clusters& clusters) const;
+  std::optional<FitResult> AcquirePartialBySize(FitInput* input) const;
+  static const Hypothesis& Best(const std::vector<Hypothesis>& all);
+  static FitResult Joined(const std::vector<Hypothesis>& all);
+  void Weigh(const FitInput& input, double log_prior, size_t readings, bool all,
+             std::vector<Hypothesis>* out) const;
+  bool EdgesAgree(const FitResult& fit, const FitInput& input) const;
+  bool Agrees(const FitResult& fit, double prior_gate) const;
+  TargetGaussian Guess(const Camera& camera, const Detection& detection, double range,
+                       double range_sigma) const;
+
+  static constexpr size_t kSurelyHit = 10;  ///< LiDAR points that are no chance
+
+  PerceptionConfig config_;
+};
+
+}  // namespace chase::perception

@@ -1,0 +1,51 @@
+#pragma once
+
+#include <array>
+#include <functional>
+#include <optional>
+#include <vector>
+
+#include "services/perception/place/target_fit.h"
+
+namespace chase::perception {
+
+// Ways to read a silhouette: which sides are the target's, and whether it has just turned sharply.
+
+using Sides = std::array<bool, 4>;  ///< by Side: seen
+
+/// From all sides seen to all but the bottom hidden or run into a like colour.
+inline constexpr std::array<Sides, 12> kReadings = {{{true, true, true, true},
+                                                     {false, true, true, true},
+                                                     {true, false, true, true},
+                                                     {true, true, false, true},
+                                                     {true, true, true, false},
+                                                     {false, true, false, true},
+                                                     {false, true, true, false},
+                                                     {true, false, false, true},
+                                                     {true, false, true, false},
+                                                     {true, true, false, false},
+                                                     {false, false, true, true},
+                                                     {false, false, false, true}}};
+inline constexpr size_t kOneHidden = 5;  ///< of them, with at most one side left out
+
+/// Least distance of a hidden side from the fitted outline, px.
+double HiddenBy(const FitInput& input);
+
+/// True when the prediction or the LiDAR tells how far away it is.
+bool RangeIsKnown(const FitInput& input);
+
+/// Tells which readings may hold: sides are left out only where the blob is smaller or larger than
+/// expected. All may hold while the range is not known.
+std::function<bool(const Sides&)> Sensible(const FitInput& input);
+
+/// The same with the prediction of a target that has just braked, turned or been pushed; across the
+/// line of sight only unless points tell the range, since the apparent size alone would take every
+/// pixel that is hidden for a leap.
+FitInput AfterASharpTurn(const FitInput& input);
+
+/// The same with the prediction moved along the line of sight to the range of these points, its
+/// heading unknown: a box may turn while its width alone tells its range. Nothing where the
+/// detection is too wide or too narrow for the target there.
+std::optional<FitInput> AtRangeOf(const std::vector<TargetPoint>& cluster, const FitInput& input);
+
+}  // namespace chase::perception

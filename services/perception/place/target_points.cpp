@@ -1,0 +1,90 @@
+#include "services/perception/place/target_points.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "services/perception/place/fit_problem.h"
+
+namespace chase::perception {
+
+namespace {
+
+constexpr size_t kMinPoints = 3;    // of a cluster that gives a range
+constexpr size_t kMostPoints = 40;  // in a fit
+constexpr int kManyPoints = 5;      // that went through it: the target is not there
+constexpr double kManyHits = 10.0;  // that hit the detection elsewhere: it is something else
+constexpr double kCore = 0.6;       // share of the target that such a ray goes through
+constexpr double kMostOfIt = 0.8;   // likewise of a target that is placed well
+constexpr double kBehind = 0.25;    // m behind the target where such a ray ends at least
+
+/// True when the lidar looked through this share of where the target should be, and hit something
+/// behind it.
+bool SawThrough(const TargetPoint& point, const FitInput& input, const TargetGaussian& target,
+                double core, double range_sigma) {
+  const Eigen::Vector3d center = target.position() - point.age * target.velocity();
+  const Eigen::Vector3d ray = point.p_W - point.p_WL, to_center = center - point.p_WL;
+  const double length = std::max(1e-6, ray.head<2>().norm());
+  const double along = ray.head<2>().dot(to_center.head<2>()) / length;
+  const double beside = std::abs(ray.x() * to_center.y() - ray.y() * to_center.x()) / length;
+  const double above = point.p_WL.z() + along / length * ray.z() - center.z();
+  return beside < core * input.shape.size[0] &&
+         std::abs(above) < core * 0.5 * input.shape.size[1] &&
+         length > along + input.shape.MostHalfWidth() + kBehind + 2.0 * range_sigma;
+}
+
+}  // namespace
+
+double RangeSigma(const TargetGaussian& target, const Camera& camera) {
+  const Eigen::Vector3d sight = (target.position() - camera.p_WC).normalized();
+  return std::sqrt(sight.dot(target.covariance.topLeftCorner<3, 3>() * sight));
+}
+
+std::vector<TargetPoint> PointsOnTarget(const FitInput& input,
+                                        const std::vector<TargetPoint>& cluster, double gate) {
+  const Vector9d y = Unknowns(input.prior, input.shape);
+  std::vector<TargetPoint> kept;
+  for (const auto& p : cluster)
+    if (std::abs(SurfaceDistance(input.shape, p, 1.0, y, nullptr)) < gate) kept.push_back(p);
+  if (!GivesRange(kept)) return {};
+  const size_t step = 1 + kept.size() / kMostPoints;  // more would not tell more
+  std::vector<TargetPoint> some;
+  for (size_t i = 0; i < kept.size(); i += step) some.push_back(kept[i]);
+  return some;
+}
+
+bool SeenThrough(const FitInput& input, const Clusters& clusters) {
+  int count = 0;
+  for (const auto& cluster : clusters)
+    for (const auto& p : cluster)
+      count += SawThrough(p, input, input.prior, kCore, RangeSigma(input.prior, input.camera));
+  return count >= kManyPoints;
+}
+
+int RaysThrough(const FitInput& input, const TargetGaussian& target) {
+  int count = 0;
+  if (!input.hits) return count;
+  for (const auto& cluster : *input.hits)
+    for (const auto& p : cluster) count += SawThrough(p, input, target, kMostOfIt, 0.0);
+  return count;
+}
+
+bool HitElsewhere(const FitInput& input, const Clusters& clusters, double gate) {
+  if (CountPoints(clusters) < kManyHits) return false;
+  return std::all_of(clusters.begin(), clusters.end(), [&](const auto& cluster) {
+    return PointsOnTarget(input, cluster, gate).empty();
+  });
+}
+
+double CountPoints(const Clusters& clusters) {
+  size_t count = 0;
+  for (const auto& cluster : clusters) count += cluster.size();
+  return static_cast<double>(count);
+}
+
+double MedianRange(const std::vector<TargetPoint>& cluster) {
+  return cluster[cluster.size() / 2].range;
+}
+
+bool GivesRange(const std::vector<TargetPoint>& cluster) { return cluster.size() >= kMinPoints; }
+
+}  // namespace chase::perception

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <vector>
+
+#include "services/perception/place/target_fit.h"
+
+namespace chase::perception {
+
+// LiDAR points against a predicted target.
+
+/// Standard deviation of the target's position along the line of sight [m].
+double RangeSigma(const TargetGaussian& target, const Camera& camera);
+
+/// The points of a cluster that lie within `gate` m of the predicted surface, thinned; none when
+/// they are too few to give a range.
+std::vector<TargetPoint> PointsOnTarget(const FitInput& input,
+                                        const std::vector<TargetPoint>& cluster, double gate);
+
+/// True when the lidar looked well through where the target should be, and hit something behind it
+/// several times: the target is not there.
+bool SeenThrough(const FitInput& input, const Clusters& clusters);
+
+/// Rays to the points on the detection that go through a target placed there, and end behind it.
+int RaysThrough(const FitInput& input, const TargetGaussian& target);
+
+/// True when many points hit the detection, and none of them the target as predicted.
+bool HitElsewhere(const FitInput& input, const Clusters& clusters, double gate);
+
+/// Points in all clusters.
+double CountPoints(const Clusters& clusters);
+
+/// From the camera [m]; the cluster must hold enough points to give a range.
+double MedianRange(const std::vector<TargetPoint>& cluster);
+bool GivesRange(const std::vector<TargetPoint>& cluster);
+
+}  // namespace chase::perception

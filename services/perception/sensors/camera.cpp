@@ -1,0 +1,75 @@
+#include "services/perception/sensors/camera.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace chase::perception {
+
+namespace {
+
+constexpr double kNearest = 0.05;  // m
+constexpr int kRimPoints = 16;
+
+}  // namespace
+
+Eigen::Vector3d Camera::Ray(double u, double v) const {
+  return R_WC * Eigen::Vector3d((u - rig.center_u_px) / rig.focal_px,
+                                (v - rig.center_v_px) / rig.focal_px, 1.0);
+}
+
+std::optional<Eigen::Vector2d> Camera::Project(const Eigen::Vector3d& p_W) const {
+  return Pixel(R_WC.transpose() * (p_W - p_WC));
+}
+
+std::optional<Eigen::Vector2d> Camera::Pixel(const Eigen::Vector3d& p_C) const {
+  if (p_C.z() < kNearest) return std::nullopt;
+  return rig.Project(p_C);
+}
+
+Camera CameraAt(const PoseSample& pose, const world::Rig& rig) {
+  const Eigen::Matrix3d R_WB = pose.R_WB.toRotationMatrix();
+  return {rig, R_WB * rig.R_BC(), pose.p_WB + R_WB * rig.camera_position};
+}
+
+TargetShape ShapeOf(const PerceptionConfig& config) {
+  TargetShape shape;
+  shape.kind = config.target_shape == "sphere" ? TargetShape::Kind::kSphere
+               : config.target_shape == "box"  ? TargetShape::Kind::kBox
+                                               : TargetShape::Kind::kCylinder;
+  shape.size = {config.target_radius, config.target_height};
+  shape.variance.setConstant(config.fit.shape_sigma * config.fit.shape_sigma);
+  return shape;
+}
+
+std::optional<cv::Rect2d> ProjectTarget(const Camera& camera, const Eigen::Vector3d& p_WT,
+                                        const TargetShape& shape) {
+  const double radius = shape.size[0];
+  Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();
+  double around = radius, above = 0.5 * shape.size[1], beyond = 0.0;
+  if (shape.sphere()) {  // seen is the circle along which lines of sight touch it
+    const Eigen::Vector3d sight = p_WT - camera.p_WC;
+    const double range = sight.norm();
+    if (range <= radius) return std::nullopt;
+    axes = Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), sight).toRotationMatrix();
+    beyond = -radius * radius / range;
+    around = radius * std::sqrt(1.0 - radius * radius / (range * range));
+    above = 0.0;
+  }
+  const Eigen::Matrix2d turn = Eigen::Rotation2Dd(shape.yaw).toRotationMatrix();
+  Eigen::Vector2d low(1e9, 1e9), high(-1e9, -1e9);
+  for (int i = 0; i < 2 * kRimPoints; ++i) {
+    const int step = i / 2;
+    const double angle = 2.0 * M_PI * step / kRimPoints;
+    Eigen::Vector2d place(std::cos(angle), std::sin(angle));
+    if (shape.box()) place = turn * (place / place.lpNorm<Eigen::Infinity>());
+    const Eigen::Vector3d rim(around * place.x(), around * place.y(),
+                              beyond + (i % 2 ? above : -above));
+    const auto px = camera.Project(p_WT + axes * rim);
+    if (!px) return std::nullopt;
+    low = low.cwiseMin(*px);
+    high = high.cwiseMax(*px);
+  }
+  return cv::Rect2d(low.x(), low.y(), high.x() - low.x(), high.y() - low.y());
+}
+
+}  // namespace chase::perception

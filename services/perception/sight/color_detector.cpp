@@ -1,0 +1,126 @@
+#include "services/perception/sight/color_detector.h"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+#include "services/perception/sight/inner_edges.h"
+#include "services/perception/sight/silhouette.h"
+
+namespace chase::perception {
+
+namespace {
+
+constexpr double kMaskScore = 127.0;  // half of full score: the blob's pixels
+constexpr double kOneThing = 0.85;    // score of a blob that is surely not several
+constexpr double kWellShaped = 0.35;  // of a piece of one that may be
+constexpr int kSplitArea = 60;        // px^2 of a blob that may be several
+constexpr size_t kMostPieces = 10;
+
+double Bell(double x, double sigma) { return std::exp(-0.5 * (x / sigma) * (x / sigma)); }
+
+/// Pixels of the colour: small holes filled, threads between blobs cut.
+cv::Mat Mask(const cv::Mat& score) {
+  static const cv::Mat kCross = cv::getStructuringElement(cv::MORPH_CROSS, {3, 3});
+  cv::Mat mask;
+  cv::threshold(score, mask, kMaskScore, 255.0, cv::THRESH_BINARY);
+  cv::morphologyEx(mask, mask, cv::MORPH_CLOSE, kCross);
+  cv::morphologyEx(mask, mask, cv::MORPH_OPEN, kCross);
+  return mask;
+}
+
+/// First and last pixel of each row: they have the hull of all.
+std::vector<cv::Point> RowEnds(const cv::Mat& mask) {
+  std::vector<cv::Point> ends;
+  for (int y = 0; y < mask.rows; ++y) {
+    const uint8_t* row = mask.ptr<uint8_t>(y);
+    int first = 0, last = mask.cols - 1;
+    while (first <= last && row[first] == 0) ++first;
+    if (first > last) continue;
+    while (row[last] == 0) --last;
+    ends.emplace_back(first, y);
+    if (last > first) ends.emplace_back(last, y);
+  }
+  return ends;
+}
+
+}  // namespace
+
+double ColorDetector::ShapeScore(const Detection& d, double area, double hull_area) const {
+  const double solid = std::min(1.0, area / std::max(hull_area, 1.0));
+  if (d.AnyCut()) return 0.6 * solid;
+  const double aspect = d.box.width / d.box.height, fill = area / d.box.area();
+  return solid * Bell(std::log(aspect / shape_.aspect), shape_.aspect_tolerance) *
+         Bell(fill - shape_.fill, shape_.fill_tolerance);
+}
+
+Detection ColorDetector::Describe(const cv::Mat& bgr, const cv::Mat& score,
+                                  const std::vector<cv::Point>& contour) const {
+  Detection d;
+  d.mask_box = cv::boundingRect(contour);
+  d.box = EdgeBox(d.mask_box);
+  d.mask = cv::Mat::zeros(d.mask_box.size(), CV_8U);
+  cv::drawContours(d.mask, std::vector<std::vector<cv::Point>>{contour}, 0, 255, cv::FILLED,
+                   cv::LINE_8, cv::noArray(), INT_MAX, -d.mask_box.tl());
+  d.inset_px = shape_.inset * d.box.width;
+  d.cut = CutSides(d.mask_box, bgr.size());
+  Rate(score, &d);
+  return d;
+}
+
+void ColorDetector::Rate(const cv::Mat& score, Detection* d) const {
+  std::vector<cv::Point> hull;
+  cv::convexHull(RowEnds(d->mask), hull);
+  const double half_border = 0.5 * static_cast<double>(hull.size());  // hulls run through
+  const double area = cv::countNonZero(d->mask);                      // pixel centres
+  const double hull_area =
+      cv::contourArea(hull) + std::max(half_border, 0.5 * cv::arcLength(hull, true));
+  const double color = cv::mean(score(d->mask_box), d->mask)[0] / 255.0;
+  d->score = color * ShapeScore(*d, area, hull_area);
+}
+
+void ColorDetector::AddPieces(const cv::Mat& bgr, const cv::Mat& score,
+                              std::vector<Detection>* found) const {
+  std::vector<Detection> pieces;
+  for (const auto& whole : *found) {
+    if (whole.score > kOneThing || cv::countNonZero(whole.mask) < kSplitArea) continue;
+    auto parts = Split(bgr, whole);
+    for (auto& piece : SplitAtEdges(bgr, whole)) parts.push_back(std::move(piece));
+    for (auto& piece : parts) {
+      Rate(score, &piece);
+      piece.part = whole.score > kWellShaped;
+      // What another thing ends need not have the target's shape.
+      if (piece.edged || piece.score > kWellShaped) pieces.push_back(std::move(piece));
+    }
+  }
+  std::stable_sort(pieces.begin(), pieces.end(),
+                   [](const Detection& a, const Detection& b) { return a.score > b.score; });
+  if (pieces.size() > kMostPieces) pieces.resize(kMostPieces);
+  for (auto& piece : pieces) found->push_back(std::move(piece));
+}
+
+std::vector<Detection> ColorDetector::Detect(const cv::Mat& bgr) const {
+  const cv::Mat score = color_.Score(bgr);
+  std::vector<std::vector<cv::Point>> contours;
+  cv::findContours(Mask(score), contours, cv::RETR_EXTERNAL, cv::CHAIN_APPROX_NONE);
+  std::vector<Detection> found;
+  for (const auto& contour : contours) {
+    const cv::Rect box = cv::boundingRect(contour);
+    if (box.area() < shape_.min_area_px) continue;
+    Detection d = Describe(bgr, score, contour);
+    if (d.score >= shape_.min_score && cv::countNonZero(d.mask) >= shape_.min_area_px)
+      found.push_back(std::move(d));
+  }
+  std::stable_sort(found.begin(), found.end(),
+                   [](const Detection& a, const Detection& b) { return a.score > b.score; });
+  if (found.size() > static_cast<size_t>(shape_.max_candidates))
+    found.resize(static_cast<size_t>(shape_.max_candidates));
+  for (auto& d : found) {
+    d.silhouette = TraceSilhouette(bgr, d.mask, d.mask_box, d.cut);
+    d.silhouette.sigma_px = std::hypot(edge_sigma_px_, shape_.outline_sigma * d.box.width);
+  }
+  AddPieces(bgr, score, &found);
+  return found;
+}
+
+}  // namespace chase::perception

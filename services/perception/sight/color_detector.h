@@ -1,0 +1,37 @@
+#pragma once
+
+#include <utility>
+#include <vector>
+
+#include "services/perception/sight/color_model.h"
+#include "services/perception/sight/detector.h"
+
+namespace chase::perception {
+
+/// Blobs of the target's colour, ranked by their shape, and after them pieces of those that
+/// may be several things, ranked likewise.
+class ColorDetector : public Detector {
+ public:
+  ColorDetector(const DetectorConfig& config, double edge_sigma_px)
+      : ColorDetector(config.shape, ColorModel(config.color), edge_sigma_px) {}
+  ColorDetector(const ShapeConfig& shape, ColorModel color, double edge_sigma_px)
+      : shape_(shape), color_(std::move(color)), edge_sigma_px_(edge_sigma_px) {}
+
+  std::vector<Detection> Detect(const cv::Mat& bgr) const override;
+
+ private:
+  Detection Describe(const cv::Mat& bgr, const cv::Mat& score,
+                     const std::vector<cv::Point>& contour) const;
+  void Rate(const cv::Mat& score, Detection* d) const;
+  /// Adds the best pieces of large enough blobs that are not surely one thing: those that an edge
+  /// inside the blob ends, whatever their shape, and of the others the well shaped.
+  void AddPieces(const cv::Mat& bgr, const cv::Mat& score, std::vector<Detection>* found) const;
+  /// 0 to 1 from aspect, fill and straightness; aspect and fill say nothing where the image ends.
+  double ShapeScore(const Detection& d, double area, double hull_area) const;
+
+  ShapeConfig shape_;
+  ColorModel color_;
+  double edge_sigma_px_;
+};
+
+}  // namespace chase::perception

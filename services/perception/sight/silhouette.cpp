@@ -1,0 +1,290 @@
+#include "services/perception/sight/silhouette.h"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+namespace chase::perception {
+
+namespace {
+
+constexpr int kMaxSamples = 8;          // a side
+constexpr double kSideFrom = 0.25;      // rows used for left and right, share of the height:
+constexpr double kSideTo = 0.85;        // without the caps
+constexpr double kCapHalfWidth = 0.22;  // columns used for top and bottom, around the middle
+constexpr double kMinContrast = 30.0;   // colour difference that allows placing between pixels
+constexpr int kLeastDepth = 4;          // pixels across, fewer are not placed between pixels
+constexpr int kCutReach = 3;            // px from a window's border within which it has cut
+constexpr size_t kMostLines = 6;        // that a blob is split along
+constexpr int kLeastPiece = 5;          // px, width of a piece
+constexpr double kSteep = 0.33;         // of a blob's extent that no leaning side jumps at once
+constexpr int kBorder = 1;              // px; nearer to the image's border counts as cut
+
+using Color = Eigen::Vector3d;
+
+/// A line of pixels across the image, `at` counting inwards to the blob.
+struct Line {
+  const cv::Mat* bgr;
+  cv::Point start, step;  // `start`: the blob's first pixel; `step`: one pixel into the blob
+
+  bool Has(int at) const {
+    const cv::Point p = start + at * step;
+    return p.x >= 0 && p.y >= 0 && p.x < bgr->cols && p.y < bgr->rows;
+  }
+  Color At(int at) const {
+    const cv::Point p = start + at * step;
+    const auto& c = bgr->at<cv::Vec3b>(p);
+    return {static_cast<double>(c[0]), static_cast<double>(c[1]), static_cast<double>(c[2])};
+  }
+};
+
+/// Where the edge lies, px from the first pixel's outer side, positive into the blob: the two
+/// pixels at the edge are mixtures of their neighbours, and their shares add up to the place.
+/// Neighbours further off may be of another shade.
+double EdgeOffset(const Line& line, int depth) {
+  if (depth < kLeastDepth || !line.Has(-2)) return 0.0;
+  const Color inside = line.At(1), outside = line.At(-2);
+  const Color span = inside - outside;
+  if (span.norm() < kMinContrast) return 0.0;
+  double covered = 0.0;
+  for (const int i : {-1, 0})
+    covered += std::clamp((line.At(i) - outside).dot(span) / span.squaredNorm(), 0.0, 1.0);
+  return 1.0 - covered;
+}
+
+/// First and last set pixel of a row or column, or (-1, -1).
+std::pair<int, int> Extent(const cv::Mat& line) {
+  int first = -1, last = -1;
+  const int n = static_cast<int>(line.total());
+  for (int i = 0; i < n; ++i)
+    if (line.rows == 1 ? line.at<uint8_t>(0, i) : line.at<uint8_t>(i, 0)) {
+      if (first < 0) first = i;
+      last = i;
+    }
+  return {first, last};
+}
+
+int Stride(int from, int to) { return std::max(1, (to - from + kMaxSamples) / kMaxSamples); }
+
+void TraceSides(const cv::Mat& bgr, const cv::Mat& mask, const cv::Rect& roi,
+                const std::array<bool, 4>& cut, Silhouette* out) {
+  const int from = static_cast<int>(kSideFrom * roi.height);
+  const int to = std::max(from + 1, static_cast<int>(kSideTo * roi.height));
+  for (int y = from; y < to; y += Stride(from, to)) {
+    const auto [first, last] = Extent(mask.row(y));
+    if (first < 0) continue;
+    const int v = roi.y + y, depth = last - first + 1;
+    const Line left{&bgr, {roi.x + first, v}, {1, 0}}, right{&bgr, {roi.x + last, v}, {-1, 0}};
+    if (!cut[kLeft])
+      out->samples[kLeft].emplace_back(roi.x + first - 0.5 + EdgeOffset(left, depth), v);
+    if (!cut[kRight])
+      out->samples[kRight].emplace_back(roi.x + last + 0.5 - EdgeOffset(right, depth), v);
+  }
+}
+
+void TraceCaps(const cv::Mat& bgr, const cv::Mat& mask, const cv::Rect& roi,
+               const std::array<bool, 4>& cut, Silhouette* out) {
+  const double middle = 0.5 * (roi.width - 1), half = kCapHalfWidth * roi.width;
+  const int from = std::max(0, static_cast<int>(std::ceil(middle - half)));
+  const int to = std::min(roi.width, static_cast<int>(std::floor(middle + half)) + 1);
+  for (int x = from; x < to; x += Stride(from, to)) {
+    const auto [first, last] = Extent(mask.col(x));
+    if (first < 0) continue;
+    const int u = roi.x + x, depth = last - first + 1;
+    const Line top{&bgr, {u, roi.y + first}, {0, 1}}, bottom{&bgr, {u, roi.y + last}, {0, -1}};
+    if (!cut[kTop])
+      out->samples[kTop].emplace_back(u, roi.y + first - 0.5 + EdgeOffset(top, depth));
+    if (!cut[kBottom])
+      out->samples[kBottom].emplace_back(u, roi.y + last + 0.5 - EdgeOffset(bottom, depth));
+  }
+}
+
+/// True when the blob goes on at this pixel.
+bool On(const Detection& d, int x, int y) {
+  const cv::Point p(x - d.mask_box.x, y - d.mask_box.y);
+  return p.x >= 0 && p.y >= 0 && p.x < d.mask.cols && p.y < d.mask.rows &&
+         d.mask.at<uint8_t>(p) != 0;
+}
+
+/// Side of a box, px.
+int SideOf(const cv::Rect& box, size_t side) {
+  return side == kLeft ? box.x : side == kRight ? box.br().x : side == kTop ? box.y : box.br().y;
+}
+
+/// A side of a piece at which a like colour goes on stays one where it still ends the piece.
+void KeepCut(const Detection& piece, Detection* out) {
+  for (size_t side = 0; side < 4; ++side)
+    if (piece.goes_on[side] && SideOf(piece.mask_box, side) == SideOf(out->mask_box, side)) {
+      out->cut[side] = out->goes_on[side] = true;
+      out->parted[side] = piece.parted[side];
+    }
+}
+
+/// Takes out what the window has cut off: samples beyond which the blob goes on, and sides of which
+/// no sample is left.
+void LeaveOutCut(const Detection& whole, const cv::Rect& window, Detection* piece) {
+  for (size_t side = 0; side < 4; ++side) {
+    auto& samples = piece->silhouette.samples[side];
+    const bool upright = side == kLeft || side == kRight;
+    const int beyond = side == kLeft    ? window.x - 1
+                       : side == kRight ? window.br().x
+                       : side == kTop   ? window.y - 1
+                                        : window.br().y;
+    const auto goes_on = [&](const Eigen::Vector2d& px) {
+      const int along = static_cast<int>(std::lround(upright ? px.y() : px.x()));
+      return std::abs((upright ? px.x() : px.y()) - beyond) < kCutReach &&
+             (upright ? On(whole, beyond, along) : On(whole, along, beyond));
+    };
+    const bool some = !samples.empty();
+    samples.erase(std::remove_if(samples.begin(), samples.end(), goes_on), samples.end());
+    if (some && samples.empty()) piece->cut[side] = piece->goes_on[side] = true;
+  }
+}
+
+/// A column at which the blob's upper or lower end jumps: there one thing ends before another.
+struct Jump {
+  int column, height;
+};
+
+/// Of jumps closer together than a piece may be wide, as where a side leans or threads join two
+/// things, the highest.
+std::vector<Jump> Jumps(const cv::Mat& mask) {
+  const int least = std::max(3, mask.rows / 12);
+  std::vector<std::pair<int, int>> ends;
+  for (int x = 0; x < mask.cols; ++x) ends.push_back(Extent(mask.col(x)));
+  std::vector<Jump> jumps;
+  for (int x = kLeastPiece; x <= mask.cols - kLeastPiece; ++x) {
+    const auto &a = ends[static_cast<size_t>(x - 1)], &b = ends[static_cast<size_t>(x)];
+    const int height = std::max(std::abs(a.first - b.first), std::abs(a.second - b.second));
+    if (height < least) continue;
+    if (jumps.empty() || x - jumps.back().column >= kLeastPiece)
+      jumps.push_back({x, height});
+    else if (height > jumps.back().height)
+      jumps.back() = {x, height};
+  }
+  return jumps;
+}
+
+/// The part of a blob inside a window without slivers along it, as the leaning side of what was cut
+/// off leaves them; nothing when none is left.
+std::optional<Detection> CropWithoutSlivers(const cv::Mat& bgr, const Detection& detection,
+                                            const cv::Rect& window, bool upright) {
+  const cv::Rect view = detection.mask_box & window;
+  if (view.empty()) return std::nullopt;
+  const cv::Mat line = cv::Mat::ones(upright ? 1 : kLeastPiece, upright ? kLeastPiece : 1, CV_8U);
+  Detection cleared = detection;
+  cleared.mask = detection.mask.clone();
+  cv::Mat seen = cleared.mask(view - detection.mask_box.tl());
+  cv::Mat framed;  // what lies beyond the window is none of the piece
+  cv::copyMakeBorder(seen, framed, kLeastPiece, kLeastPiece, kLeastPiece, kLeastPiece,
+                     cv::BORDER_CONSTANT | cv::BORDER_ISOLATED, cv::Scalar(0));
+  cv::morphologyEx(framed, framed, cv::MORPH_OPEN, line);
+  framed(cv::Rect(kLeastPiece, kLeastPiece, seen.cols, seen.rows)).copyTo(seen);
+  return CropTo(bgr, cleared, window);
+}
+
+/// Adds the pieces between any two of the lines across a blob. The side of a thing may lean over a
+/// few columns, but jumps as high as `steep` are its end.
+void AddBetween(const cv::Mat& bgr, const Detection& detection, std::vector<Jump> lines,
+                bool upright, std::vector<Detection>* pieces) {
+  const cv::Rect& box = detection.mask_box;
+  const int steep = static_cast<int>(kSteep * (upright ? box.height : box.width));
+  lines.insert(lines.begin(), {0, steep});
+  lines.push_back({upright ? box.width : box.height, steep});
+  const size_t n = lines.size();
+  if (n < 3 || n > kMostLines) return;
+  for (size_t a = 0; a + 1 < n; ++a)
+    for (size_t b = a + 1; b < n; ++b) {
+      const int from = lines[a].column, size = lines[b].column - from;
+      if (b - a == n - 1 || size < kLeastPiece) continue;
+      const cv::Rect window = upright ? cv::Rect(box.x + from, box.y, size, box.height)
+                                      : cv::Rect(box.x, box.y + from, box.width, size);
+      auto piece = std::min(lines[a].height, lines[b].height) < steep
+                       ? CropTo(bgr, detection, window)
+                       : CropWithoutSlivers(bgr, detection, window, upright);
+      if (!piece) continue;
+      piece->parted = piece->goes_on;
+      pieces->push_back(std::move(*piece));
+    }
+}
+
+}  // namespace
+
+Silhouette TraceSilhouette(const cv::Mat& bgr, const cv::Mat& mask, const cv::Rect& roi,
+                           const std::array<bool, 4>& cut) {
+  Silhouette out;
+  TraceSides(bgr, mask, roi, cut, &out);
+  TraceCaps(bgr, mask, roi, cut, &out);
+  return out;
+}
+
+cv::Mat Region(const Detection& detection) {
+  if (detection.mask.empty() || detection.inset_px <= 0.0) return detection.mask;
+  cv::Mat framed, distance;  // the frame counts as outside
+  cv::copyMakeBorder(detection.mask, framed, 1, 1, 1, 1, cv::BORDER_CONSTANT, cv::Scalar(0));
+  cv::distanceTransform(framed, distance, cv::DIST_L2, cv::DIST_MASK_PRECISE);
+  const cv::Rect inner(1, 1, detection.mask.cols, detection.mask.rows);
+  return cv::Mat(distance > detection.inset_px)(inner).clone();
+}
+
+cv::Rect2d EdgeBox(const cv::Rect& roi) {
+  return {roi.x - 0.5, roi.y - 0.5, static_cast<double>(roi.width),
+          static_cast<double>(roi.height)};
+}
+
+std::array<bool, 4> CutSides(const cv::Rect& roi, const cv::Size& image) {
+  std::array<bool, 4> cut;
+  cut[kLeft] = roi.x <= kBorder;
+  cut[kRight] = roi.x + roi.width >= image.width - kBorder;
+  cut[kTop] = roi.y <= kBorder;
+  cut[kBottom] = roi.y + roi.height >= image.height - kBorder;
+  return cut;
+}
+
+std::optional<Detection> CropTo(const cv::Mat& bgr, const Detection& detection,
+                                const cv::Rect& window) {
+  const cv::Rect view = detection.mask_box & window;
+  if (view.empty()) return std::nullopt;
+  const cv::Mat seen = detection.mask(view - detection.mask_box.tl());
+  const cv::Rect tight = cv::boundingRect(seen);
+  if (tight.empty()) return std::nullopt;
+  Detection out = detection;
+  out.mask_box = tight + view.tl();
+  out.mask = seen(tight).clone();
+  out.box = EdgeBox(out.mask_box);
+  out.cut = CutSides(out.mask_box, bgr.size());
+  out.goes_on = out.parted = {};
+  KeepCut(detection, &out);
+  out.silhouette = TraceSilhouette(bgr, out.mask, out.mask_box, out.cut);
+  LeaveOutCut(detection, window, &out);
+  out.silhouette.sigma_px = detection.silhouette.sigma_px;
+  return out;
+}
+
+std::vector<Detection> Split(const cv::Mat& bgr, const Detection& detection) {
+  std::vector<Detection> pieces;
+  AddBetween(bgr, detection, Jumps(detection.mask), true, &pieces);
+  AddBetween(bgr, detection, Jumps(detection.mask.t()), false, &pieces);
+  return pieces;
+}
+
+Detection Merge(const cv::Mat& bgr, const std::vector<Detection>& pieces) {
+  Detection out = pieces.front();
+  for (const auto& piece : pieces) out.mask_box |= piece.mask_box;
+  out.mask = cv::Mat::zeros(out.mask_box.size(), CV_8U);
+  for (const auto& piece : pieces) {
+    cv::Mat place = out.mask(piece.mask_box - out.mask_box.tl());
+    cv::max(place, piece.mask, place);
+    out.score = std::max(out.score, piece.score);
+  }
+  out.box = EdgeBox(out.mask_box);
+  out.cut = CutSides(out.mask_box, bgr.size());
+  out.goes_on = out.parted = {};
+  for (const auto& piece : pieces) KeepCut(piece, &out);
+  const double sigma = out.silhouette.sigma_px;
+  out.silhouette = TraceSilhouette(bgr, out.mask, out.mask_box, out.cut);
+  out.silhouette.sigma_px = sigma;
+  return out;
+}
+
+}  // namespace chase::perception

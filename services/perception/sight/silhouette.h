@@ -1,0 +1,40 @@
+#pragma once
+
+#include <array>
+#include <opencv2/core.hpp>
+#include <optional>
+#include <vector>
+
+#include "services/perception/sight/detector.h"
+
+namespace chase::perception {
+
+/// Outline of a blob: `mask` (8 bit, 255 on the blob) lies at `roi` in `bgr`. Each edge is placed
+/// between pixels from how the colour goes over from the blob to what lies beside it. Sides in
+/// `cut` get no samples.
+Silhouette TraceSilhouette(const cv::Mat& bgr, const cv::Mat& mask, const cv::Rect& roi,
+                           const std::array<bool, 4>& cut);
+
+/// The mask of a detection less the border that does not count: 8 bit, 255 on the target, lies
+/// where the mask does.
+cv::Mat Region(const Detection& detection);
+
+/// Edges of a block of pixels where the first pixel's centre is (0, 0).
+cv::Rect2d EdgeBox(const cv::Rect& roi);
+
+/// Which sides of `roi` lie at the border of an image of this size.
+std::array<bool, 4> CutSides(const cv::Rect& roi, const cv::Size& image);
+
+/// The part of a detection inside `window`, px; samples at which it goes on are left out, and sides
+/// without any are cut. The detection must carry a mask; nothing when no part of it lies inside.
+std::optional<Detection> CropTo(const cv::Mat& bgr, const Detection& detection,
+                                const cv::Rect& window);
+
+/// Pieces of a blob that several things of one colour make up together, split where an end of its
+/// columns or of its rows jumps; none where none does.
+std::vector<Detection> Split(const cv::Mat& bgr, const Detection& detection);
+
+/// One detection out of several pieces: the union of their masks. All must carry masks.
+Detection Merge(const cv::Mat& bgr, const std::vector<Detection>& pieces);
+
+}  // namespace chase::perception

@@ -1,0 +1,189 @@
+#include "services/perception/tools/learn_color.h"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+#include <optional>
+#include <utility>
+
+#include "services/perception/sight/color_model.h"
+
+namespace chase::perception {
+
+namespace {
+
+constexpr double kTail = 0.03;       // share of the pixels beyond either limit: marking errors
+constexpr double kOtherLight = 3.0;  // degrees, what the hue shifts by in light not yet seen: sweep
+constexpr double kShade = 0.5;       // brightness in shade, share of the darkest one learned
+constexpr double kGlare = 0.8;       // saturation in glare, share of the palest one learned: sweep
+constexpr double kAccepted = 0.5;    // score of a pixel that the detector takes
+constexpr double kBorder = 0.35;     // of the mask's lesser extent: masks are drawn inside outlines
+constexpr double kWorthIt = 0.5;     // of a picture's index, gained by leaving one out: sweep
+constexpr size_t kSamples = 1000;    // of a picture and kind: 1 % standard deviation of a share
+
+/// Colours of one picture.
+struct Samples {
+  std::vector<Hsv> target, near, far;
+  double near_ratio, far_ratio;  ///< pixels of the background over those of the target
+};
+
+std::vector<Hsv> Pick(const cv::Mat& bgr, const cv::Mat& where) {
+  std::vector<cv::Point> at;
+  cv::findNonZero(where, at);
+  std::vector<Hsv> picked;
+  const size_t step = 1 + at.size() / kSamples;
+  for (size_t i = 0; i < at.size(); i += step) {
+    const auto& p = bgr.at<cv::Vec3b>(at[i]);
+    picked.push_back(ToHsv(p[0] / 255.0, p[1] / 255.0, p[2] / 255.0));
+  }
+  return picked;
+}
+
+Samples SamplesOf(const cv::Mat& bgr, const cv::Mat& mask) {
+  const cv::Rect box = cv::boundingRect(mask);
+  const int border = static_cast<int>(kBorder * std::min(box.width, box.height));
+  const cv::Mat square = cv::Mat::ones(2 * border + 1, 2 * border + 1, CV_8U);
+  cv::Mat grown, near = cv::Mat::zeros(mask.size(), CV_8U);
+  cv::dilate(mask, grown, square);
+  const cv::Rect window(box.tl() - cv::Point(box.width, box.height),
+                        cv::Size(3 * box.width, 3 * box.height));
+  near(window & cv::Rect({}, mask.size())).setTo(255);
+  const cv::Mat far = grown == 0;
+  near &= far;
+  const double n = cv::countNonZero(mask);
+  return {Pick(bgr, mask), Pick(bgr, near), Pick(bgr, far), cv::countNonZero(near) / n,
+          cv::countNonZero(far) / n};
+}
+
+double Share(const ColorConfig& range, const std::vector<Hsv>& of) {
+  const auto n = std::count_if(of.begin(), of.end(),
+                               [&](const Hsv& c) { return Score(range, c) >= kAccepted; });
+  return static_cast<double>(n) / static_cast<double>(std::max<size_t>(1, of.size()));
+}
+
+/// Circular mean of the hues, degrees. What is grey or dark has no hue: each weighs by its chroma.
+double MeanHue(const std::vector<Samples>& all, const std::vector<bool>& used) {
+  double x = 0.0, y = 0.0;
+  for (size_t i = 0; i < all.size(); ++i)
+    for (const auto& c : all[i].target) {
+      if (!used[i]) continue;
+      const double weight = c.saturation * c.value / static_cast<double>(all[i].target.size());
+      x += weight * std::cos(c.hue_deg * M_PI / 180.0);
+      y += weight * std::sin(c.hue_deg * M_PI / 180.0);
+    }
+  return std::atan2(y, x) * 180.0 / M_PI;
+}
+
+/// A value and what it counts for.
+using Weighed = std::pair<double, double>;
+
+/// The value below which `share` of the weight lies.
+double Percentile(std::vector<Weighed> values, double share) {
+  std::sort(values.begin(), values.end());
+  double total = 0.0, sum = 0.0;
+  for (const auto& v : values) total += v.second;
+  for (const auto& v : values)
+    if ((sum += v.second) >= share * total) return v.first;
+  return values.back().first;
+}
+
+struct Range {
+  ColorConfig config;
+  double width_deg;  ///< of the hue
+};
+
+Range RangeOf(const std::vector<Samples>& all, const std::vector<bool>& used,
+              const ColorConfig& base) {
+  std::vector<Weighed> hue, saturation, value;
+  const double middle = MeanHue(all, used);
+  for (size_t i = 0; i < all.size(); ++i)
+    for (const auto& c : all[i].target) {
+      if (!used[i]) continue;
+      const double weight = 1.0 / static_cast<double>(all[i].target.size());
+      hue.emplace_back(std::remainder(c.hue_deg - middle, 360.0), weight);
+      saturation.emplace_back(c.saturation, weight);
+      value.emplace_back(c.value, weight);
+    }
+  const double low = Percentile(hue, kTail) - kOtherLight;
+  const double high = Percentile(hue, 1.0 - kTail) + kOtherLight;
+  ColorConfig config = base;
+  config.hue_min_deg = std::fmod(middle + low + 720.0, 360.0);
+  config.hue_max_deg = std::fmod(middle + high + 720.0, 360.0);
+  if (high - low >= 360.0) config.hue_min_deg = 0.0, config.hue_max_deg = 360.0;
+  config.saturation_min = kGlare * Percentile(saturation, kTail);
+  config.value_min = kShade * Percentile(value, kTail);
+  return {config, high - low};
+}
+
+std::vector<Separation> Separations(const std::vector<Samples>& all, const ColorConfig& range) {
+  std::vector<Separation> out;
+  for (const auto& s : all) {
+    out.emplace_back();
+    out.back().target = Share(range, s.target);
+    out.back().near = Share(range, s.near);
+    out.back().far = Share(range, s.far);
+    out.back().index = out.back().target / (1.0 + out.back().near * s.near_ratio) /
+                       (1.0 + out.back().far * s.far_ratio);
+  }
+  return out;
+}
+
+double Sum(const std::vector<Separation>& all) {
+  double sum = 0.0;
+  for (const auto& s : all) sum += s.index;
+  return sum;
+}
+
+std::vector<bool> Without(std::vector<bool> used, size_t i) {
+  used[i] = false;
+  return used;
+}
+
+/// The pictures to learn from: as long as the others separate all pictures better without one, the
+/// worst such one goes. What a picture can lose or win is bounded by 1.
+std::vector<bool> Consensus(const std::vector<Samples>& all, const ColorConfig& base) {
+  std::vector<bool> used(all.size(), true);
+  const auto quality = [&](const std::vector<bool>& of) {
+    return Sum(Separations(all, RangeOf(all, of, base).config));
+  };
+  double best = quality(used);
+  for (size_t left = all.size(); left > 1; --left) {
+    std::optional<size_t> worst;
+    for (size_t i = 0; i < all.size(); ++i) {
+      if (!used[i]) continue;
+      const double without = quality(Without(used, i));
+      if (without <= (worst ? best : best + kWorthIt)) continue;
+      best = without;
+      worst = i;
+    }
+    if (!worst) break;
+    used[*worst] = false;
+  }
+  return used;
+}
+
+}  // namespace
+
+LearnedColor LearnColor(const std::vector<cv::Mat>& images, const std::vector<cv::Mat>& masks,
+                        const ColorConfig& base) {
+  std::vector<Samples> all;
+  for (size_t i = 0; i < images.size(); ++i) all.push_back(SamplesOf(images[i], masks[i]));
+  const std::vector<bool> used = Consensus(all, base);
+  const Range range = RangeOf(all, used, base);
+  LearnedColor out{range.config, Separations(all, range.config)};
+  const auto count = std::count(used.begin(), used.end(), true);
+  for (size_t i = 0; i < all.size(); ++i) {
+    out.pictures[i].used = used[i];
+    std::vector<bool> alone(all.size(), false);
+    alone[i] = true;
+    out.pictures[i].width_deg = RangeOf(all, alone, base).width_deg;
+    if (!used[i] || count < 2) continue;
+    const double narrower = range.width_deg - RangeOf(all, Without(used, i), base).width_deg;
+    if (out.widest >= 0 && narrower <= out.narrower_deg) continue;
+    out.widest = static_cast<int>(i);
+    out.narrower_deg = narrower;
+  }
+  return out;
+}
+
+}  // namespace chase::perception

@@ -1,0 +1,81 @@
+#include "services/perception/tools/picture.h"
+
+#include <cmath>
+
+#include "services/perception/place/localiser.h"
+#include "services/perception/place/target_points.h"
+#include "services/perception/sight/silhouette.h"
+
+namespace chase::perception {
+
+namespace {
+
+constexpr double kSameShape = 0.01;  // share by which the aspect of a resized picture may differ
+
+/// The camera at the picture's resolution; nothing where it shows another part of the world.
+std::optional<world::Rig> RigFor(const world::Rig& rig, const cv::Size& size) {
+  const double scale = static_cast<double>(size.width) / rig.width_px;
+  if (std::abs(scale * rig.height_px - size.height) > kSameShape * size.height) return std::nullopt;
+  world::Rig scaled = rig;
+  scaled.width_px = size.width;
+  scaled.height_px = size.height;
+  scaled.focal_px *= scale;
+  scaled.center_u_px = (rig.center_u_px + 0.5) * scale - 0.5;
+  scaled.center_v_px = (rig.center_v_px + 0.5) * scale - 0.5;
+  return scaled;
+}
+
+}  // namespace
+
+const Detection* MostLikely(const std::vector<Detection>& found) {
+  const Detection* best = nullptr;
+  for (const auto& d : found) {
+    const bool candidate = !best || (!d.part && !d.edged && !d.AnyCut());
+    if (candidate && (!best || d.score > best->score)) best = &d;
+  }
+  return best;
+}
+
+double Overlap(const Detection& detection, const cv::Mat& mask) {
+  cv::Mat whole = cv::Mat::zeros(mask.size(), CV_8U);
+  if (detection.mask.empty())
+    whole(cv::Rect(detection.box) & cv::Rect({0, 0}, mask.size())).setTo(255);
+  else
+    Region(detection).copyTo(whole(detection.mask_box));
+  const int both = cv::countNonZero((whole > 0) & (mask > 0));
+  const int either = cv::countNonZero((whole > 0) | (mask > 0));
+  return either > 0 ? static_cast<double>(both) / either : 1.0;
+}
+
+PictureDetector::PictureDetector(const PerceptionConfig& config) : config_(config) {
+  MakeDetector(config.detector, config.fit.edge_sigma_px, config.rig);
+}
+
+std::optional<PictureTarget> PictureDetector::Find(const cv::Mat& bgr) const {
+  const auto rig = RigFor(config_.rig, bgr.size());
+  const auto detector =
+      MakeDetector(config_.detector, config_.fit.edge_sigma_px, rig.value_or(config_.rig));
+  const auto found = detector->Detect(bgr);
+  const Detection* best = MostLikely(found);
+  if (!best || best->score < config_.state.acquire_score) return std::nullopt;
+  PictureTarget target{*best, {}, {}};
+  if (!rig) return target;
+  const Camera camera = CameraAt({}, *rig);
+  const auto fit = Localiser(config_).Acquire(ShapeOf(config_), camera, *best, {});
+  if (!fit) return target;
+  target.range = (fit->posterior.position() - camera.p_WC).norm();
+  target.range_sigma = std::hypot(RangeSigma(fit->posterior, camera),
+                                  config_.detector.shape.outline_sigma * *target.range);
+  return target;
+}
+
+void Evaluation::Add(const std::optional<PictureTarget>& target, const cv::Mat& mask) {
+  const bool there = cv::countNonZero(mask) > 0;
+  const double overlap = target && there ? Overlap(target->detection, mask) : 0.0;
+  with_target += there;
+  claimed += target.has_value();
+  found += overlap >= kFound;
+  overlaps += overlap;
+}
+
+}  // namespace chase::perception
