@@ -152,6 +152,7 @@ std::string PerceptionConfig::Problem() const {
       .In("rig.width_px", rig.width_px, 16, 16384)
       .In("rig.height_px", rig.height_px, 16, 16384)
       .In("rig.focal_px", rig.focal_px, 10, 20000)
+      .That(rig.LensProblem().empty(), rig.LensProblem())
       .Finite("rig.center_u_px", rig.center_u_px)
       .Finite("rig.center_v_px", rig.center_v_px)
       .Finite("rig.camera_pitch_deg", rig.camera_pitch_deg)

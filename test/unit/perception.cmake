@@ -11,6 +11,8 @@ chase_test(perception_image_test
           ${perception_test_dir}/perception_photo_test.cpp)
 chase_test(perception_solver_test LIBS perception_core Ceres::ceres
   SOURCES ${perception_test_dir}/perception_solver_test.cpp)
+chase_test(perception_camera_test LIBS perception_core opencv_calib3d
+  SOURCES ${perception_test_dir}/perception_camera_test.cpp)
 chase_test(perception_pieces_test LIBS perception_world opencv_imgproc
   SOURCES ${perception_test_dir}/perception_pieces_test.cpp)
 chase_test(perception_test LIBS perception_world

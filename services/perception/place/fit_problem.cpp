@@ -146,9 +146,10 @@ void FitProblem::AddEdges() {
     const auto& samples = input_.detection->silhouette.samples[side];
     edges_[side].reserve(samples.size());
     for (const auto& px : samples) {
-      const Eigen::Vector3d ray = input_.camera.Ray(px.x(), px.y());
+      const Camera camera = input_.camera.AtRow(px.y());
+      const Eigen::Vector3d ray = camera.Ray(px.x(), px.y());
       edges_[side].push_back(
-          {ToPlan(input_.camera.p_WC, ray), 1.0 / PerPixel(input_.camera, ray, Upright(side))});
+          {ToPlan(camera.p_WC, ray), 1.0 / PerPixel(camera, ray, Upright(side))});
     }
   }
 }

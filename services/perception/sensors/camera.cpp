@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/math/rotation.h"
+
 namespace chase::perception {
 
 namespace {
@@ -13,8 +15,7 @@ constexpr int kRimPoints = 16;
 }  // namespace
 
 Eigen::Vector3d Camera::Ray(double u, double v) const {
-  return R_WC * Eigen::Vector3d((u - rig.center_u_px) / rig.focal_px,
-                                (v - rig.center_v_px) / rig.focal_px, 1.0);
+  return R_WC * rig.Ray({u, v});
 }
 
 std::optional<Eigen::Vector2d> Camera::Project(const Eigen::Vector3d& p_W) const {
@@ -26,9 +27,19 @@ std::optional<Eigen::Vector2d> Camera::Pixel(const Eigen::Vector3d& p_C) const {
   return rig.Project(p_C);
 }
 
+Camera Camera::AtRow(double v) const {
+  Camera camera = *this;
+  const double dt = rig.readout * (v - 0.5 * (rig.height_px - 1)) / rig.height_px;
+  if (dt == 0.0) return camera;
+  camera.p_WC += dt * v_WC;
+  camera.R_WC = math::ExpSO3(dt * w_WC) * R_WC;
+  return camera;
+}
+
 Camera CameraAt(const PoseSample& pose, const world::Rig& rig) {
   const Eigen::Matrix3d R_WB = pose.R_WB.toRotationMatrix();
-  return {rig, R_WB * rig.R_BC(), pose.p_WB + R_WB * rig.camera_position};
+  const Eigen::Vector3d w_WB = R_WB * pose.w_WB_B, arm = R_WB * rig.camera_position;
+  return {rig, R_WB * rig.R_BC(), pose.p_WB + arm, pose.v_WB + w_WB.cross(arm), w_WB};
 }
 
 TargetShape ShapeOf(const PerceptionConfig& config) {

@@ -10,11 +10,16 @@
 
 namespace chase::perception {
 
-/// The camera at one time: X_WC and the pinhole.
+/// The camera at one time: X_WC, its rates and the lens.
 struct Camera {
   world::Rig rig;
   Eigen::Matrix3d R_WC = Eigen::Matrix3d::Identity();
   Eigen::Vector3d p_WC = Eigen::Vector3d::Zero();  ///< frame W, m
+  Eigen::Vector3d v_WC = Eigen::Vector3d::Zero();  ///< frame W, m/s
+  Eigen::Vector3d w_WC = Eigen::Vector3d::Zero();  ///< frame W, rad/s
+
+  /// The camera when row v [px] was read out; the pose is the middle row's.
+  Camera AtRow(double v) const;
 
   /// Direction of the line of sight through (u, v) px, frame W, z_C component 1.
   Eigen::Vector3d Ray(double u, double v) const;

@@ -59,14 +59,17 @@ Detection MarkerDetector::Describe(const std::vector<cv::Point2f>& corners) cons
   const auto half = static_cast<float>(0.5 * config_.side);
   const std::vector<cv::Point3f> square = {
       {-half, half, 0}, {half, half, 0}, {half, -half, 0}, {-half, -half, 0}};
-  const cv::Matx33d K(rig_.focal_px, 0, rig_.center_u_px, 0, rig_.focal_px, rig_.center_v_px, 0, 0,
-                      1);
+  std::vector<cv::Point2d> seen;  // as a pinhole shows them at distance 1
+  for (const auto& px : corners) {
+    const Eigen::Vector3d ray = rig_.Ray({px.x, px.y});
+    seen.emplace_back(ray.x(), ray.y());
+  }
   cv::Vec3d rotation, translation;
   Detection d;
   const cv::Rect2f box = cv::boundingRect(corners);
   d.box = cv::Rect2d(box.x, box.y, box.width, box.height);
   d.score = 1.0;
-  if (!cv::solvePnP(square, corners, K, cv::noArray(), rotation, translation, false,
+  if (!cv::solvePnP(square, seen, cv::Matx33d::eye(), cv::noArray(), rotation, translation, false,
                     cv::SOLVEPNP_IPPE_SQUARE))
     return d;
   const Eigen::Vector3d marker(translation[0], translation[1], translation[2]);

@@ -21,6 +21,7 @@ std::optional<world::Rig> RigFor(const world::Rig& rig, const cv::Size& size) {
   scaled.height_px = size.height;
   scaled.focal_px *= scale;
   scaled.center_u_px = (rig.center_u_px + 0.5) * scale - 0.5;
+  scaled.readout = 0.0;  // nothing moves
   scaled.center_v_px = (rig.center_v_px + 0.5) * scale - 0.5;
   return scaled;
 }
