@@ -8,7 +8,6 @@
 #include <random>
 
 #include "services/perception/place/fit_problem.h"
-#include "services/perception/place/quick_fit.h"
 
 namespace chase::perception {
 namespace {
@@ -209,14 +208,14 @@ TEST(PerceptionSolver, ABoxIsPlacedHoweverItIsTurned) {
       }
     scene.input.prior.mean.head<3>() += Vector3d(0.1, 0.1, -0.1);
     scene.input.prior.covariance = 10.0 * Matrix6d::Identity();
-    const auto fit = QuickFit(scene.input, {});
+    const auto fit = FitTarget(scene.input, {});
     ASSERT_TRUE(fit.ok) << "seed " << seed;
     worst = std::max(worst, (fit.posterior.position() - box.center).norm());
     const double turn = fit.shape.yaw - box.yaw;
     EXPECT_LT(std::abs(std::remainder(turn, 0.5 * M_PI)), 0.02) << "seed " << seed;
     scene.input.shape.kind = TargetShape::Kind::kCylinder;
     scene.input.shape.size[0] = scene.input.shape.MeanHalfWidth() * 4.0 / M_PI;
-    const Vector3d round = QuickFit(scene.input, {}).posterior.position() - box.center;
+    const Vector3d round = FitTarget(scene.input, {}).posterior.position() - box.center;
     worst_round = std::max(worst_round, round.head<2>().norm());
   }
   EXPECT_LT(worst, 0.01);
@@ -353,7 +352,7 @@ void ExpectSame(const FitResult& fit, Reference* reference) {
   EXPECT_NEAR(fit.shape.variance[1], C(kHeightAt, kHeightAt), 0.01 * C(kHeightAt, kHeightAt));
 }
 
-TEST(PerceptionSolver, BothSolversFindWhatCeresFindsBlockByBlock) {
+TEST(PerceptionSolver, FindsWhatCeresFindsBlockByBlock) {
   FitConfig config;
   config.estimate_shape = true;
   config.max_iterations = 60;
@@ -361,40 +360,19 @@ TEST(PerceptionSolver, BothSolversFindWhatCeresFindsBlockByBlock) {
     const Scene scene(seed);
     Reference reference(scene, config);
     SCOPED_TRACE(testing::Message() << "seed " << seed);
-    const auto quick = QuickFit(scene.input, config);
-    ExpectSame(quick, &reference);
     ExpectSame(FitTarget(scene.input, config), &reference);
-    ExpectSame(FitTarget(scene.input, config, &quick), &reference);
   }
-}
-
-/// Where the solution lies on a kink of a residual, a fresh trust region may get past it.
-TEST(PerceptionSolver, RefiningWhatHasConvergedChangesHardlyAnything) {
-  FitConfig config;
-  config.max_iterations = 60;
-  int changed = 0;
-  for (unsigned seed = 1; seed <= 200; ++seed) {
-    const Scene scene(seed);
-    const auto quick = QuickFit(scene.input, config);
-    const auto full = FitTarget(scene.input, config, &quick);
-    ASSERT_TRUE(quick.ok && full.ok) << "seed " << seed;
-    EXPECT_LE(full.cost, quick.cost * (1.0 + 1e-9)) << "seed " << seed;
-    const Matrix6d off = quick.posterior.covariance - full.posterior.covariance;
-    changed += std::abs(quick.log_evidence - full.log_evidence) > 0.01 ||
-               off.norm() > 0.01 * full.posterior.covariance.norm();
-  }
-  EXPECT_LE(changed, 2);
 }
 
 TEST(PerceptionSolver, AProblemWithoutARootIsRefused) {
   Scene scene(1);
   scene.input.prior.covariance.setZero();
-  EXPECT_FALSE(QuickFit(scene.input, {}).ok);
+  EXPECT_FALSE(FitTarget(scene.input, {}).ok);
   scene.input.prior.covariance.setConstant(std::nan(""));
-  EXPECT_FALSE(QuickFit(scene.input, {}).ok);
+  EXPECT_FALSE(FitTarget(scene.input, {}).ok);
   Scene wild(1);
   wild.input.points.front().p_W.x() = std::nan("");
-  EXPECT_FALSE(QuickFit(wild.input, {}).ok);
+  EXPECT_FALSE(FitTarget(wild.input, {}).ok);
 }
 
 }  // namespace

@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "services/perception/place/odds.h"
-#include "services/perception/place/quick_fit.h"
 #include "services/perception/place/readings.h"
 #include "services/perception/place/target_points.h"
 
@@ -15,7 +14,6 @@ namespace {
 constexpr double kSharpTurn = 0.02;   // how often the target does what the motion leaves out
 constexpr double kClear = 3.0;        // squared distance from the prediction that needs no other
 constexpr int kFewRays = 3;           // through it, as the edge of a thing may let pass
-constexpr double kNegligible = 7.0;   // logarithm of the odds of a hypothesis that is left out
 constexpr int kLeastSides = 2;        // that must be seen; one where the lidar surely hit it
 constexpr int kMostClusters = 2;      // that are tried
 constexpr double kMinVisible = 0.15;  // share of the expected box that a detection must cover
@@ -67,21 +65,6 @@ const Localiser::Hypothesis& Localiser::Best(const std::vector<Hypothesis>& all)
   });
 }
 
-std::vector<Localiser::Hypothesis> Localiser::Refined(std::vector<Hypothesis> quick) const {
-  std::vector<Hypothesis> all;
-  if (quick.empty()) return all;
-  const double least = Best(quick).log_weight - kNegligible;
-  for (auto& h : quick) {
-    if (h.log_weight < least) continue;
-    const auto fit = Refined(h.input, h.fit);
-    if (!fit) continue;
-    h.fit = *fit;
-    h.log_weight = h.log_prior + LogTarget(h.fit, h.input, config_.fit);
-    all.push_back(std::move(h));
-  }
-  return all;
-}
-
 /// One Gaussian with the mean and covariance of the mixture; all else from the likeliest.
 FitResult Localiser::Joined(const std::vector<Hypothesis>& all) {
   const Hypothesis& best = Best(all);
@@ -107,14 +90,8 @@ FitResult Localiser::Joined(const std::vector<Hypothesis>& all) {
 
 std::optional<FitResult> Localiser::WholeReading(FitInput* input) const {
   input->use_side = kReadings[0];
-  FitResult fit = QuickFit(*input, config_.fit);
+  FitResult fit = FitTarget(*input, config_.fit);
   if (!Agrees(fit, config_.fit.prior_gate) || !EdgesAgree(fit, *input)) return std::nullopt;
-  return fit;
-}
-
-std::optional<FitResult> Localiser::Refined(const FitInput& input, const FitResult& quick) const {
-  FitResult fit = FitTarget(input, config_.fit, &quick);
-  if (!fit.ok) return std::nullopt;
   return fit;
 }
 
@@ -134,10 +111,10 @@ void Localiser::Weigh(const FitInput& given, double log_prior, size_t readings, 
     if (std::count(tried.begin(), tried.end(), seen) > 0) continue;
     tried.push_back(seen);
     input.use_side = kReadings[k];
-    const FitResult fit = QuickFit(input, config_.fit);
+    const FitResult fit = FitTarget(input, config_.fit);
     const double gate = k == 0 ? prior_gate : kHiddenPriorShare * prior_gate;
     if (!Agrees(fit, gate) || !EdgesAgree(fit, input)) continue;
-    out->push_back({input, fit, log_prior, log_prior + LogTarget(fit, input, config_.fit)});
+    out->push_back({fit, log_prior + LogTarget(fit, input, config_.fit)});
     explained = explained || (!joined && RaysThrough(input, fit.posterior) < kFewRays);
   }
 }
@@ -148,8 +125,8 @@ std::optional<FitResult> Localiser::JoinedReading(FitInput* input) const {
   const bool clear =
       whole && whole->prior_distance < kClear && RaysThrough(*input, whole->posterior) < kFewRays;
   if (clear) {
-    auto fit = Refined(*input, *whole);
-    if (fit) fit->log_odds = LogTarget(*fit, *input, config_.fit) - log_clutter;
+    FitResult fit = *whole;
+    fit.log_odds = LogTarget(fit, *input, config_.fit) - log_clutter;
     return fit;
   }
   std::vector<Hypothesis> all;
@@ -157,7 +134,6 @@ std::optional<FitResult> Localiser::JoinedReading(FitInput* input) const {
   const bool known = RangeIsKnown(*input);
   Weigh(*input, std::log(1.0 - kSharpTurn), known ? kReadings.size() : kOneHidden, !whole, &all);
   Weigh(AfterASharpTurn(*input), std::log(kSharpTurn), kOneHidden, !whole, &all);
-  all = Refined(std::move(all));
   if (all.empty()) return std::nullopt;
   FitResult fit = Joined(all);
   fit.log_odds -= log_clutter;

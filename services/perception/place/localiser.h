@@ -25,17 +25,12 @@ class Localiser {
  private:
   /// One way to explain a detection: which sides are seen, whether the target turned sharply.
   struct Hypothesis {
-    FitInput input;
     FitResult fit;
-    double log_prior = 0.0, log_weight = 0.0;
+    double log_weight = 0.0;
   };
 
-  /// The quick fit to all sides, if it agrees with all of them.
+  /// The fit to all sides, if it agrees with all of them.
   std::optional<FitResult> WholeReading(FitInput* input) const;
-  /// The same in full, started there.
-  std::optional<FitResult> Refined(const FitInput& input, const FitResult& quick) const;
-  /// Those that count, in full.
-  std::vector<Hypothesis> Refined(std::vector<Hypothesis> quick) const;
   /// All hypotheses that agree with the prediction, weighed and joined into one Gaussian.
   std::optional<FitResult> JoinedReading(FitInput* input) const;
   /// Where the prediction erred along the line of sight, as the points of a cluster tell.

@@ -105,7 +105,7 @@ std::optional<FitResult> Localiser::Acquire(const TargetShape& shape, const Came
     input.prior = Guess(camera, detection, range, 0.3);
     input.points = PointsOnTarget(input, cluster, 2.0 * config_.fit.lidar_gate);
     const auto fit = WholeReading(&input);
-    if (good(fit)) return Refined(input, *fit);
+    if (good(fit)) return fit;
   }
   if (const auto hit = AcquirePartial(&input, clusters)) return hit;
   const auto not_through = [&](const std::optional<FitResult>& fit) {
@@ -128,8 +128,7 @@ std::optional<FitResult> Localiser::Acquire(const TargetShape& shape, const Came
   input.points.clear();
   const auto fit = WholeReading(&input);
   if (!good(fit)) return partial();
-  const FitInput given = input;
-  return not_through(fit) ? Refined(given, *fit) : std::nullopt;
+  return not_through(fit);
 }
 
 }  // namespace chase::perception

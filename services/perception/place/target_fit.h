@@ -58,8 +58,7 @@ struct FitResult {
 
 /// The most likely position and velocity of the target (of a box its heading, too) from silhouette,
 /// LiDAR points, each at its own time, and prediction, with the covariance: one step of an iterated
-/// extended Kalman filter. Starts at `start`, or at the prediction.
-FitResult FitTarget(const FitInput& input, const FitConfig& config,
-                    const FitResult* start = nullptr);
+/// extended Kalman filter, by Ceres' TinySolver from the prediction on.
+FitResult FitTarget(const FitInput& input, const FitConfig& config);
 
 }  // namespace chase::perception
