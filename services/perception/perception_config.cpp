@@ -100,7 +100,6 @@ std::string FitConfig::Problem() const {
       .In("edge_weight", edge_weight, 0.1, 100)
       .In("lidar_sigma", lidar_sigma, 1e-3, 1)
       .In("lidar_weight", lidar_weight, 1, 1000)
-      .In("edge_gate_px", edge_gate_px, 0.2, 50)
       .In("prior_gate", prior_gate, 6, 1000)
       .In("lidar_gate", lidar_gate, 0.02, 5)
       .In("shape_sigma", shape_sigma, 1e-4, 1)

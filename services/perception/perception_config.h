@@ -114,19 +114,19 @@ struct DetectorConfig {
 struct FitConfig {
   double edge_sigma_px = 0.5, edge_weight = 3.0;
   double lidar_sigma = 0.025, lidar_weight = 16.0;
-  double edge_gate_px = 1.5, prior_gate = 30.0, lidar_gate = 0.35;
+  double prior_gate = 30.0, lidar_gate = 0.35;
   bool estimate_shape = false;
   double shape_sigma = 0.03;
   int max_iterations = 8;
 
   template <class V>
   void Visit(V& v) {
-    v("edge_sigma_px", edge_sigma_px, "of one edge of the silhouette");
+    v("edge_sigma_px", edge_sigma_px,
+      "of one edge of the silhouette where the image is sharp; more where it is blurred");
     v("edge_weight", edge_weight, "independent samples that one edge counts for");
     v("lidar_sigma", lidar_sigma, "of one LiDAR point, m");
     v("lidar_weight", lidar_weight,
       "independent samples that one sweep's points count for at most");
-    v("edge_gate_px", edge_gate_px, "an edge further off is taken as hidden");
     v("prior_gate", prior_gate, "greatest squared Mahalanobis distance from the prediction, 6 dof");
     v("lidar_gate", lidar_gate, "points further from the expected surface are something else, m");
     v("estimate_shape", estimate_shape, "estimate radius and height as well");

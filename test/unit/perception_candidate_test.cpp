@@ -15,7 +15,7 @@ Candidate CandidateAt(const Vector3d& first, const Vector3d& now, double sigma) 
   c.first.covariance = sigma * sigma * Matrix6d::Identity();
   c.track.state = c.first;
   c.track.state.mean.head<3>() = now;
-  c.px = 3.0 / 220.0;
+  c.edge = 0.5 * 3.0 / 220.0;
   return c;
 }
 
@@ -31,8 +31,8 @@ TEST(PerceptionCandidate, DrivesOnceItsWayIsMoreThanItsErrorsAndItsEdges) {
 TEST(PerceptionCandidate, WhatOnlyTheSizeTellsOfItsRangeIsNoWay) {
   const Vector3d p(20.0, 0.0, 0.55);  // seven pixels high: one pixel is three metres of range
   Candidate c = CandidateAt(p, p + Vector3d(-4.0, 0.15, 0.0), 0.03);
-  c.px = 20.0 / 220.0;
-  c.range_px = {3.0, 0.0};
+  c.edge = 0.5 * 20.0 / 220.0;
+  c.range_error = {3.0, 0.0};
   EXPECT_FALSE(c.Drives());
   c.ranged = true;
   EXPECT_TRUE(c.Drives());
@@ -41,7 +41,7 @@ TEST(PerceptionCandidate, WhatOnlyTheSizeTellsOfItsRangeIsNoWay) {
 TEST(PerceptionCandidate, HitByTheLidarAndWholeItDrivesSooner) {
   const Vector3d p(2.0, 0.0, 0.55);
   Candidate c = CandidateAt(p, p + Vector3d(0.0, 0.05, 0.0), 0.005);
-  c.range_px = {0.05, 0.0};
+  c.range_error = {0.05, 0.0};
   EXPECT_FALSE(c.Drives());
   c.ranged = true;
   EXPECT_TRUE(c.Drives());
@@ -52,7 +52,7 @@ TEST(PerceptionCandidate, HitByTheLidarAndWholeItDrivesSooner) {
 TEST(PerceptionCandidate, SeenSharplyItDrivesSoonerAcrossTheLineOfSight) {
   const Vector3d p(2.0, 0.0, 0.55);
   Candidate across = CandidateAt(p, p + Vector3d(0.0, 0.04, 0.0), 0.004);
-  across.px = 2.0 / 220.0;
+  across.edge = 0.5 * 2.0 / 220.0;
   EXPECT_FALSE(across.Drives());
   across.last.detection.box = {100.0, 80.0, 33.0, 55.0};
   EXPECT_TRUE(across.Drives());

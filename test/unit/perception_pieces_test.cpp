@@ -230,8 +230,8 @@ TEST(PerceptionCandidate, WithoutPointsAWayAlongTheLineOfSightIsNotSure) {
     c.track.state = c.first;
     c.track.state.mean << kTarget + way, way;
     c.track.t = 1.0;
-    c.px = 3.0 / 220.0;
-    c.range_px = {0.05, 0.0};
+    c.edge = 0.5 * 3.0 / 220.0;
+    c.range_error = {0.05, 0.0};
     return c;
   };
   Candidate along = gone({0.4, 0.0, 0.0}), across = gone({0.0, 0.4, 0.0});

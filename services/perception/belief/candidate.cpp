@@ -10,10 +10,10 @@ namespace chase::perception {
 
 namespace {
 
-constexpr double kMoved = 0.04, kMovedPx = 2.5;  // m and px that an edge may seem to move
-constexpr double kMovedUnclear = 0.06, kMovedUnclearPx = 4.0;  // where something may hide it
-constexpr double kMovedAcross = 0.03, kMovedAcrossPx = 2.0;    // where all of it is seen sharply
-constexpr double kSharpWidthPx = 12.0;  // from which its place across is known so well
+constexpr double kMoved = 0.04, kMovedEdges = 5.0;  // m and sigmas that an edge may seem to move
+constexpr double kMovedUnclear = 0.06, kMovedUnclearEdges = 8.0;  // where something may hide it
+constexpr double kMovedAcross = 0.03, kMovedAcrossEdges = 4.0;    // where all of it is seen sharply
+constexpr double kSharpWidth = 24.0;  // sigmas of an edge from which its place across is known
 constexpr double kMovedGate = 11.8;     // squared distance, 2 dof, that chance does not reach
 constexpr double kSlow = 0.1;           // m/s, what is slower stands, as far as errors go
 constexpr double kFast = 0.3;           // m/s that LiDAR points of two sweeps tell from standing,
@@ -46,7 +46,7 @@ void Candidate::Correct(const Sighting& sighting) {
   };
   // Before, what hid it, or what a small one seemed a piece of, may have seemed its edge.
   const bool out = was_partial && !track.partial && !SurelyDrives(kSureWay);
-  const bool alone = was_part && !part && d.box.width < kSharpWidthPx;
+  const bool alone = was_part && !part && d.box.width < kSharpWidth * d.silhouette.sigma_px;
   const bool stands = !Drives() && track.t - known > kAnew;
   if (!out && !alone && !stands && (Drives() || spread(track.state) > kBetter * spread(first)))
     return;
@@ -65,8 +65,9 @@ Candidate NewCandidate(const Sighting& sighting, const View& view) {
   c.ranged = sighting.n_points > 0;
   const Eigen::Vector3d sight = c.track.state.position() - view.camera.p_WC;
   c.range = sight.norm();
-  c.px = c.range / view.camera.rig.focal_px;
-  c.range_px = sight.head<2>() / sighting.detection.box.height;
+  const double sigma_px = sighting.detection.silhouette.sigma_px;
+  c.edge = sigma_px * c.range / view.camera.rig.focal_px;
+  c.range_error = 2.0 * sigma_px * sight.head<2>() / sighting.detection.box.height;
   c.part = sighting.detection.part || sighting.detection.edged;
   CountSweep(&c);
   return c;
@@ -102,7 +103,7 @@ bool Candidate::Steady() const {
 
 bool Candidate::SurelyDrives(double way) const {
   Eigen::Vector2d d = (track.state.position() - first.position()).head<2>();
-  const Eigen::Vector2d n = range_px.normalized();
+  const Eigen::Vector2d n = range_error.normalized();
   if (!ranged || last.n_points == 0) d -= n.dot(d) * n;  // what shows of it may grow
   return Drives() && Steady() && d.norm() > way;
 }
@@ -116,16 +117,16 @@ bool Candidate::Drives() const {
   Eigen::Vector2d d = (track.state.position() - first.position()).head<2>();
   Eigen::Matrix2d P =
       track.state.covariance.topLeftCorner<2, 2>() + first.covariance.topLeftCorner<2, 2>();
-  if (!ranged) P += range_px * range_px.transpose();  // edges err alike from frame to frame
+  if (!ranged) P += range_error * range_error.transpose();  // edges err alike from frame to frame
   if (d.dot(P.ldlt().solve(d)) < kMovedGate || d.norm() < kSlow * (track.t - known)) return false;
-  const Eigen::Vector2d n = range_px.normalized();
+  const Eigen::Vector2d n = range_error.normalized();
   const double along = n.dot(d), sigma = std::sqrt(n.dot(P * n));
-  if (clear && last.detection.box.width > kSharpWidthPx &&
-      (d - along * n).norm() > std::max(kMovedAcross, kMovedAcrossPx * px))
+  if (clear && last.detection.box.width > kSharpWidth * last.detection.silhouette.sigma_px &&
+      (d - along * n).norm() > std::max(kMovedAcross, kMovedAcrossEdges * edge))
     return true;
   if (std::abs(along) < kKnownSigmas * sigma) d -= along * n;  // may be no way at all
-  return d.norm() > (ranged && clear ? std::max(kMoved, kMovedPx * px)
-                                     : std::max(kMovedUnclear, kMovedUnclearPx * px));
+  return d.norm() > (ranged && clear ? std::max(kMoved, kMovedEdges * edge)
+                                     : std::max(kMovedUnclear, kMovedUnclearEdges * edge));
 }
 
 }  // namespace chase::perception

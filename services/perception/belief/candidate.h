@@ -11,10 +11,10 @@ struct Candidate {
   double since = 0.0;    ///< when it was first seen, s
   Sighting last;         ///< the last one
   double range = 0.0;    ///< from the camera when it was last seen, m
-  double px = 0.0;       ///< what one pixel spanned there at first, m
+  double edge = 0.0;     ///< standard deviation of an edge of it at first, across, m
   bool ranged = false;   ///< `first` has its range from LiDAR points, not from the size alone
-  /// Along the line of sight, as far as one pixel less of its height moves it; frame W, m.
-  Eigen::Vector2d range_px = Eigen::Vector2d::UnitX();
+  /// Along the line of sight, as far as both ends of its height may err alike; frame W, m.
+  Eigen::Vector2d range_error = Eigen::Vector2d::UnitX();
 
   bool part = false;     ///< a piece of something larger, always so far: it must drive
   double known = 0.0;    ///< time of `first`, s

@@ -18,7 +18,7 @@ constexpr double kSureOdds = 8.0;  // and with which no other is tried
 constexpr double kRival = 6.0;     // less, of something else that makes a sighting contested
 constexpr size_t kMostTried = 4;   // detections a track and frame
 constexpr int kKnownHits = 10;     // sightings after which a track's range is trusted
-constexpr double kLargest = 1.3, kLargestPx = 4.0;  // of pieces together, times what is expected
+constexpr double kLargest = 1.4;  // of pieces together, times what is expected
 constexpr double kTimeJump = 1.0;                   // s back that count as a new recording
 
 bool Overlap(const Detection& a, const Detection& b) { return (a.box & b.box).area() > 0.0; }
@@ -137,7 +137,7 @@ std::optional<Sighting> Finder::FindPieces(const TargetTrack& track, const View&
   if (pieces.size() < 2) return std::nullopt;
   const Detection merged = Merge(view.bgr, pieces);
   const auto too_large = [](double seen, double wanted) {
-    return seen > kLargest * wanted + kLargestPx;
+    return seen > kLargest * wanted;
   };
   if (too_large(merged.box.width, boxes.expected.width) ||
       too_large(merged.box.height, boxes.expected.height))
@@ -148,7 +148,8 @@ std::optional<Sighting> Finder::FindPieces(const TargetTrack& track, const View&
 
 std::optional<Sighting> Finder::Find(const TargetTrack& track, View* view,
                                      const Refuses& refuses) const {
-  const auto boxes = WhereToLook(track, view->camera);
+  const auto boxes = WhereToLook(track.state, track.shape, view->camera,
+                                 config_.motion.tilt_sigma_deg * M_PI / 180.0);
   if (!boxes) return std::nullopt;
   std::vector<size_t> inside;
   for (size_t i = 0; i < view->detections.size(); ++i)

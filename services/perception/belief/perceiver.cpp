@@ -12,7 +12,7 @@ namespace {
 constexpr double kUnknownVariance = 1e4;  // m^2, while nothing is known
 constexpr int kCandidateMisses = 2;       // frames without it that end a candidate
 constexpr size_t kMaxCandidates = 6;
-constexpr double kLeastWidthPx = 6.0;  // what is narrower may be a slit between things
+constexpr double kLeastWidth = 12.0;  // standard deviations of a sharp edge; less may be a slit
 constexpr int kDecoyHits = 3;      // sightings that what stands beside one that drives counts for
 constexpr double kTimeJump = 1.0;  // s back that count as a new recording
 constexpr double kGap = 0.25;      // s between frames in which a target may do anything
@@ -69,13 +69,13 @@ void Perceiver::DropMissed() {
 }
 
 bool Perceiver::MayBeNew(const Detection& d) const {
-  return (d.edged || d.score >= config_.state.acquire_score) && d.box.width >= kLeastWidthPx;
+  return (d.edged || d.score >= config_.state.acquire_score) && d.box.width >= kLeastWidth * config_.fit.edge_sigma_px;
 }
 
 /// Counts why nothing was made of a detection.
 void Perceiver::CountRefused(const Detection& d) {
   Refusal why = finder_.HasSweeps() ? Refusal::kContradicted : Refusal::kNoRange;
-  if (d.box.width < kLeastWidthPx)
+  if (d.box.width < kLeastWidth * config_.fit.edge_sigma_px)
     why = Refusal::kTooSmall;
   else if (!d.edged && d.score < config_.state.acquire_score)
     why = Refusal::kWrongShape;

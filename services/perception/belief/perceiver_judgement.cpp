@@ -24,7 +24,7 @@ constexpr int kPieceSweeps = 2;         // of them with LiDAR points, for what h
 constexpr int kNewPieceHits = 10;       // and where none was ever seen, nor LiDAR tells much
 constexpr double kNewPieceWay = 0.3;    // m, likewise
 constexpr double kDecoySigma = 0.1;     // m, how well its place is known
-constexpr double kSmallPx = 12.0;       // width below which the size tells the range badly
+constexpr double kSmall = 24.0;         // sigmas of an edge below which a width tells no range
 constexpr double kFar = 5.0;            // m, from where fewer pixels tell what stands there
 constexpr double kTrusted = 0.3;        // s that a track not seen is preferred to anything new
 constexpr double kStandingSpeed = 0.2;  // m/s
@@ -86,7 +86,7 @@ bool Perceiver::Sure(const Sighting& s) const {
 /// of another size would then seem to drive as the drone does.
 bool Perceiver::SizedBadly(const Candidate& c) const {
   const Detection& d = c.last.detection;
-  return !track_ && c.sweeps == 0 && !d.p_CT && d.box.width < kSmallPx;
+  return !track_ && c.sweeps == 0 && !d.p_CT && d.box.width < kSmall * config_.fit.edge_sigma_px;
 }
 
 /// Of a piece of something larger, or what is hidden or cut off in part, once it has driven further

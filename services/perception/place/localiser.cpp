@@ -14,6 +14,7 @@ namespace {
 constexpr double kSharpTurn = 0.02;   // how often the target does what the motion leaves out
 constexpr double kClear = 3.0;        // squared distance from the prediction that needs no other
 constexpr int kFewRays = 3;           // through it, as the edge of a thing may let pass
+constexpr double kEdgeGate = 3.0;     // standard deviations of an edge that is the target's
 constexpr int kLeastSides = 2;        // that must be seen; one where the lidar surely hit it
 constexpr int kMostClusters = 2;      // that are tried
 constexpr double kMinVisible = 0.15;  // share of the expected box that a detection must cover
@@ -46,8 +47,7 @@ bool Localiser::EdgesAgree(const FitResult& fit, const FitInput& input) const {
   const auto least = input.points.size() < kSurelyHit ? kLeastSides : 1;
   if (!input.detection->p_CT && std::count(fit.used.begin(), fit.used.end(), true) < least)
     return false;
-  const double gate =
-      std::max(config_.fit.edge_gate_px, 1.6 * input.detection->silhouette.sigma_px);
+  const double gate = kEdgeGate * input.detection->silhouette.sigma_px;
   for (size_t side = 0; side < 4; ++side) {
     if (fit.used[side] && std::abs(fit.edge_px[side]) > gate) return false;
     const bool left_out =

@@ -12,14 +12,15 @@ namespace {
 constexpr int kSidesOfNew = 3;           // of what nothing is known of yet
 constexpr double kSizedRange = 0.24;     // m, standard deviation of a range from one size alone
 constexpr double kMaxRangeError = 0.15;  // share of the range; a worse first fix is none
-constexpr double kLarger = 1.15, kLargerPx = 3.0;  // times the target's size, and px more
+constexpr double kLarger = 1.15, kLargerSigmas = 6.0;  // times its size, and of an edge more
 
 /// True for a detection that the target cannot fill at this range.
 bool LargerThanTarget(const FitInput& input, double range) {
   const double px = kLarger * input.camera.rig.focal_px / range;
+  const double more = kLargerSigmas * input.detection->silhouette.sigma_px;
   const auto& box = input.detection->box;
-  return box.width > 2.0 * px * input.shape.MostHalfWidth() + kLargerPx ||
-         box.height > px * input.shape.size[1] + kLargerPx;
+  return box.width > 2.0 * px * input.shape.MostHalfWidth() + more ||
+         box.height > px * input.shape.size[1] + more;
 }
 
 }  // namespace

@@ -16,8 +16,8 @@ constexpr double kRunsOn = 0.04;      // how often a like colour goes on beyond 
 constexpr double kRunsOnToo = 0.5;    // and beyond another one then
 
 // What else has the target's colour: so many blobs a frame, anywhere in the image, sides so far
-// apart, as far away as may be.
-constexpr double kClutter = 0.3, kClutterSidePx = 60.0, kClutterDepth = 10.0;
+// apart (shares of its width), as far away as may be.
+constexpr double kClutter = 0.3, kClutterSide = 0.16, kClutterDepth = 10.0;
 constexpr double kStray = 0.02;   // how often a measured position is not the target's
 constexpr double kNearest = 0.2;  // m, of ranges that scale pixels
 constexpr double kUnexplained = 0.5, kMostUnexplained = 6.0;  // for points at other ranges
@@ -96,7 +96,7 @@ double LogClutter(const FitInput& input) {
   const auto add = [&](Side a, Side b, double extent) {
     const int seen = !samples[a].empty() + !samples[b].empty();
     if (seen > 0) sum -= std::log(extent);
-    if (seen > 1) sum -= std::log(kClutterSidePx);
+    if (seen > 1) sum -= std::log(kClutterSide * rig.width_px);
   };
   add(kLeft, kRight, rig.width_px);
   add(kTop, kBottom, rig.height_px);

@@ -9,7 +9,7 @@ namespace chase::perception {
 
 namespace {
 
-constexpr double kHiddenBy = 1.0;     // px
+constexpr double kHiddenBy = 2.0;     // standard deviations of an edge
 constexpr double kTurnSpeed = 1.0;    // m/s, standard deviation of the speed a sharp turn adds
 constexpr double kTurnShift = 0.12;   // m, and of the place
 constexpr double kKnownShare = 0.03;  // of the range, standard deviation of the prediction
@@ -19,7 +19,7 @@ constexpr double kSizeError = 0.1;    // share of the width that the outline may
 }  // namespace
 
 double HiddenBy(const FitInput& input) {
-  return std::max(kHiddenBy, input.detection->silhouette.sigma_px);
+  return kHiddenBy * input.detection->silhouette.sigma_px;
 }
 
 bool RangeIsKnown(const FitInput& input) {

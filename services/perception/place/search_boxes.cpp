@@ -10,9 +10,7 @@ namespace chase::perception {
 namespace {
 
 constexpr double kBoxMargin = 0.25;  // share of the expected box in which a piece may lie
-constexpr double kBoxMarginPx = 4.0;
 constexpr double kLarger = 1.1;  // times the expected size: more than the target
-constexpr double kTrimPx = 2.0;  // left around the expected box of what is larger
 constexpr double kGateSigmas = 3.0;
 
 cv::Rect2d Grown(const cv::Rect2d& box, double dx, double dy) {
@@ -21,23 +19,26 @@ cv::Rect2d Grown(const cv::Rect2d& box, double dx, double dy) {
 
 }  // namespace
 
-std::optional<SearchBoxes> WhereToLook(const TargetTrack& track, const Camera& camera) {
-  const auto box = ProjectTarget(camera, track.state.position(), track.shape);
+std::optional<SearchBoxes> WhereToLook(const TargetGaussian& thing, const TargetShape& shape,
+                                       const Camera& camera, double tilt) {
+  const auto box = ProjectTarget(camera, thing.position(), shape);
   if (!box) return std::nullopt;
-  const double range = (track.state.position() - camera.p_WC).norm();
+  const double range = (thing.position() - camera.p_WC).norm();
   const double sigma =
-      std::sqrt(track.state.covariance.topLeftCorner<3, 3>().diagonal().maxCoeff());
+      std::sqrt(thing.covariance.topLeftCorner<3, 3>().diagonal().maxCoeff());
   const double spread = kGateSigmas * sigma / range * camera.rig.focal_px;
-  const double margin = kBoxMarginPx + spread;
+  const double tilted = kGateSigmas * tilt * camera.rig.focal_px;
+  const double margin = tilted + spread, trim = 0.5 * tilted + spread;
   return SearchBoxes{
       *box, Grown(*box, margin + kBoxMargin * box->width, margin + kBoxMargin * box->height),
-      Grown(*box, kTrimPx + spread, kTrimPx + spread)};
+      Grown(*box, trim, trim)};
 }
 
 std::optional<Detection> Within(const SearchBoxes& boxes, const cv::Mat& bgr,
                                 const Detection& detection) {
-  const bool larger = detection.box.width > kLarger * boxes.expected.width + kTrimPx ||
-                      detection.box.height > kLarger * boxes.expected.height + kTrimPx;
+  const double more = 4.0 * detection.silhouette.sigma_px;
+  const bool larger = detection.box.width > kLarger * boxes.expected.width + more ||
+                      detection.box.height > kLarger * boxes.expected.height + more;
   if (detection.mask.empty() || !larger) return detection;
   const cv::Rect2d& trim = boxes.trim;
   const cv::Rect window(static_cast<int>(std::floor(trim.x)), static_cast<int>(std::floor(trim.y)),

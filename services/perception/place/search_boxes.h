@@ -2,7 +2,7 @@
 
 #include <optional>
 
-#include "services/perception/belief/target_track.h"
+#include "services/perception/place/target_fit.h"
 
 namespace chase::perception {
 
@@ -13,8 +13,9 @@ struct SearchBoxes {
   cv::Rect2d trim;      ///< all of it lies here
 };
 
-/// Nothing where the track lies behind the camera.
-std::optional<SearchBoxes> WhereToLook(const TargetTrack& track, const Camera& camera);
+/// Nothing where it lies behind the camera. `tilt`: standard deviation of the camera's, rad.
+std::optional<SearchBoxes> WhereToLook(const TargetGaussian& thing, const TargetShape& shape,
+                                       const Camera& camera, double tilt);
 
 /// The part of a detection that may be the thing: where the detection is larger, a like colour
 /// behind goes on outside. Nothing where no part of it lies inside.

@@ -14,6 +14,7 @@ namespace {
 constexpr double kMaskScore = 127.0;  // half of full score: the blob's pixels
 constexpr double kOneThing = 0.85;    // score of a blob that is surely not several
 constexpr double kWellShaped = 0.35;  // of a piece of one that may be
+constexpr double kSharp = 2.0;        // px, width of an edge between two pixels or on one
 constexpr int kSplitArea = 60;        // px^2 of a blob that may be several
 constexpr size_t kMostPieces = 10;
 
@@ -117,7 +118,8 @@ std::vector<Detection> ColorDetector::Detect(const cv::Mat& bgr) const {
     found.resize(static_cast<size_t>(shape_.max_candidates));
   for (auto& d : found) {
     d.silhouette = TraceSilhouette(bgr, d.mask, d.mask_box, d.cut);
-    d.silhouette.sigma_px = std::hypot(edge_sigma_px_, shape_.outline_sigma * d.box.width);
+    const double blur = std::max(1.0, EdgeWidth(bgr, d.mask, d.mask_box) / kSharp);
+    d.silhouette.sigma_px = std::hypot(blur * edge_sigma_px_, shape_.outline_sigma * d.box.width);
   }
   AddPieces(bgr, score, &found);
   return found;

@@ -14,6 +14,7 @@ constexpr double kSideTo = 0.85;        // without the caps
 constexpr double kCapHalfWidth = 0.22;  // columns used for top and bottom, around the middle
 constexpr double kMinContrast = 30.0;   // colour difference that allows placing between pixels
 constexpr int kLeastDepth = 4;          // pixels across, fewer are not placed between pixels
+constexpr int kReachShare = 8;          // of the blob, that its edges are looked for in
 constexpr int kCutReach = 3;            // px from a window's border within which it has cut
 constexpr size_t kMostLines = 6;        // that a blob is split along
 constexpr int kLeastPiece = 5;          // px, width of a piece
@@ -62,6 +63,18 @@ std::pair<int, int> Extent(const cv::Mat& line) {
       last = i;
     }
   return {first, last};
+}
+
+/// What EdgeWidth() says, of one line; nothing where inside and outside are too much alike.
+std::optional<double> WidthOn(const Line& line, int depth) {
+  const int reach = std::max(kLeastDepth / 2, depth / kReachShare);
+  if (depth < kLeastDepth || !line.Has(-reach - 1)) return std::nullopt;
+  const double span = (line.At(reach) - line.At(-reach - 1)).norm();
+  if (span < kMinContrast) return std::nullopt;
+  double steepest = 0.0;
+  for (int i = -reach; i <= reach; ++i)
+    steepest = std::max(steepest, (line.At(i) - line.At(i - 1)).norm());
+  return std::max(1.0, span / steepest);
 }
 
 int Stride(int from, int to) { return std::max(1, (to - from + kMaxSamples) / kMaxSamples); }
@@ -216,6 +229,24 @@ Silhouette TraceSilhouette(const cv::Mat& bgr, const cv::Mat& mask, const cv::Re
   TraceSides(bgr, mask, roi, cut, &out);
   TraceCaps(bgr, mask, roi, cut, &out);
   return out;
+}
+
+double EdgeWidth(const cv::Mat& bgr, const cv::Mat& mask, const cv::Rect& roi) {
+  std::vector<double> widths;
+  const int from = static_cast<int>(kSideFrom * roi.height);
+  const int to = std::max(from + 1, static_cast<int>(kSideTo * roi.height));
+  for (int y = from; y < to; y += Stride(from, to)) {
+    const auto [first, last] = Extent(mask.row(y));
+    if (first < 0) continue;
+    const int v = roi.y + y, depth = last - first + 1;
+    for (const Line& line : {Line{&bgr, {roi.x + first, v}, {1, 0}},
+                             Line{&bgr, {roi.x + last, v}, {-1, 0}}})
+      if (const auto width = WidthOn(line, depth)) widths.push_back(*width);
+  }
+  if (widths.empty()) return 1.0;
+  const auto middle = widths.begin() + static_cast<std::ptrdiff_t>(widths.size() / 2);
+  std::nth_element(widths.begin(), middle, widths.end());
+  return *middle;
 }
 
 cv::Mat Region(const Detection& detection) {

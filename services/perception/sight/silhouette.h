@@ -15,6 +15,11 @@ namespace chase::perception {
 Silhouette TraceSilhouette(const cv::Mat& bgr, const cv::Mat& mask, const cv::Rect& roi,
                            const std::array<bool, 4>& cut);
 
+/// How wide the edges of a blob are in the image: from the inside's colour to the outside's at the
+/// steepest slope between them, px, the median over its rows; 1 or more. Optics, focus and motion
+/// blur it, and so does a picture that was enlarged.
+double EdgeWidth(const cv::Mat& bgr, const cv::Mat& mask, const cv::Rect& roi);
+
 /// The mask of a detection less the border that does not count: 8 bit, 255 on the target, lies
 /// where the mask does.
 cv::Mat Region(const Detection& detection);
