@@ -13,4 +13,4 @@ if(TARGET simulator_core)
 endif()
 chase_program(perception_photos ${CMAKE_SOURCE_DIR}/test/perception/photos.cpp)
 target_link_libraries(perception_photos PRIVATE perception_core config opencv_imgcodecs
-  opencv_imgproc CLI11::CLI11 fmt::fmt)
+  opencv_imgproc opencv_photo CLI11::CLI11 fmt::fmt)

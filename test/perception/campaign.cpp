@@ -100,6 +100,7 @@ int main(int argc, char** argv) {
   app.add_option("--picture", a.picture, "folder for one frame a flight, instead of flying");
   app.add_option("--at", a.picture_at, "time of that frame, s");
   app.add_flag("--each", a.each, "a line for every flight");
+  app.add_flag("--absent", a.stage.absent, "no target, nor a thing just like it: only look-alikes");
   app.add_flag("!--no-distractors", a.stage.distractors);
   app.add_flag("!--no-screens", a.stage.screens);
   CLI11_PARSE(app, argc, argv);

@@ -10,6 +10,7 @@
 #include <numeric>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
+#include <opencv2/photo.hpp>
 #include <random>
 #include <stdexcept>
 #include <string>
@@ -19,6 +20,7 @@
 #include "common/config/version.h"
 #include "services/perception/belief/perceiver.h"
 #include "services/perception/tools/learn.h"
+#include "services/perception/tools/picture.h"
 
 namespace chase::perception {
 namespace {
@@ -80,6 +82,15 @@ cv::Mat Darkened(const cv::Mat& bgr, double brightness) {
   return out;
 }
 
+/// The photo without its target: what surrounds it goes on where it was.
+cv::Mat Without(const Photo& photo) {
+  cv::Mat grown, out;
+  const int border = std::max(3, cv::boundingRect(photo.mask).width / 4);
+  cv::dilate(photo.mask, grown, cv::Mat::ones(2 * border + 1, 2 * border + 1, CV_8U));
+  cv::inpaint(photo.bgr, grown, out, 3.0, cv::INPAINT_TELEA);
+  return out;
+}
+
 /// With `dark` above 0 the first photo is given once more, darkened to that share.
 Learned Learn(const std::vector<Photo>& photos, const std::vector<bool>& chosen,
               const DetectorConfig& base, double dark = 0.0) {
@@ -96,8 +107,10 @@ double Mean(const std::vector<double>& values) {
 
 void RunDraws(const Arguments& a, const std::vector<Photo>& photos, const DetectorConfig& base) {
   std::vector<double> means;
+  std::vector<cv::Mat> absent;
+  for (const Photo& photo : photos) absent.push_back(Without(photo));
   std::vector<std::vector<double>> by_photo(photos.size());
-  size_t missed = 0, shown = 0;
+  size_t missed = 0, shown = 0, claimed = 0, invented = 0;
   for (unsigned seed = 1; seed <= a.draws; ++seed) {
     const auto chosen = Draw(photos.size(), a.train, seed);
     std::string names;
@@ -112,6 +125,11 @@ void RunDraws(const Arguments& a, const std::vector<Photo>& photos, const Detect
         sum += overlap;
         by_photo[i].push_back(overlap);
         missed += overlap <= 0.0;
+        PerceptionConfig config;
+        config.detector = learned.config;
+        const PictureDetector detector(config);
+        claimed += detector.Find(photos[i].bgr).has_value();
+        invented += detector.Find(absent[i]).has_value();
         ++shown;
       }
     } catch (const std::exception& e) {
@@ -138,6 +156,8 @@ void RunDraws(const Arguments& a, const std::vector<Photo>& photos, const Detect
       1.96 * std::sqrt(squares / std::max(1.0, n - 1.0) / n),
       *std::min_element(means.begin(), means.end()),
       std::count_if(means.begin(), means.end(), [](double m) { return m < 0.6; }), missed, shown);
+  fmt::print("accepted: {} of {} with the target, {} of {} where it is painted over\n", claimed,
+             shown, invented, shown);
 }
 
 cv::Mat Scaled(const cv::Mat& bgr, int width_px) {

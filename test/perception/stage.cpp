@@ -153,6 +153,10 @@ void Stage::AddDistractors() {
                {c.radius, c.radius, 0.5 * c.height},
                0.0};
     }
+    if (kind == kTwin && options_.absent) {
+      scenario_.world.cylinders.pop_back();
+      break;
+    }
     solids.push_back(solid);
     orange_.push_back(solid);
     ++kind;

@@ -31,6 +31,7 @@ struct StageOptions {
   double duration = 20.0;  ///< s
   double light = 1.0;      ///< share of the day's
   bool distractors = true, screens = true, warm = true;
+  bool absent = false;  ///< no target is there, nor a thing just like it
   OdometryErrors errors;
 };
 
