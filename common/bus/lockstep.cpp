@@ -235,8 +235,8 @@ bool Lockstep::Done() const {
   return false;
 }
 
-/// Processor time by shares of wall time: the processor's own clock is a system call, some thousands
-/// of them in a simulated second.
+/// Processor time by shares of wall time: the processor's own clock is a system call, some
+/// thousands of them in a simulated second.
 std::map<std::string, Lockstep::Usage> Lockstep::Usages() const {
   const double share = wall_s_ > 0.0 ? cpu_s_ / wall_s_ : 0.0;
   std::map<std::string, Usage> usages;

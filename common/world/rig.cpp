@@ -8,8 +8,8 @@ namespace chase::world {
 
 namespace {
 
-constexpr int kInversions = 8;    // for 1e-9 px within 60 degrees of the axis
-constexpr double kStep = 1e-6;    // of differences
+constexpr int kInversions = 8;  // for 1e-9 px within 60 degrees of the axis
+constexpr double kStep = 1e-6;  // of differences
 
 }  // namespace
 
@@ -37,7 +37,8 @@ Eigen::Vector2d Rig::Bent(const Eigen::Vector2d& x) const {
   if (lens == "fisheye") {  // Kannala and Brandt 2006
     const double a = std::atan(r), a2 = a * a;
     return r < 1e-9 ? x
-                    : Eigen::Vector2d(a / r * (1.0 + a2 * (k[0] + a2 * (k[1] + a2 * (k[2] + a2 * k[3])))) * x);
+                    : Eigen::Vector2d(
+                          a / r * (1.0 + a2 * (k[0] + a2 * (k[1] + a2 * (k[2] + a2 * k[3])))) * x);
   }
   if (lens != "plumb_bob") return x;
   const double radial = 1.0 + r2 * (k[0] + r2 * (k[1] + r2 * k[4]));  // Brown 1966
@@ -47,8 +48,7 @@ Eigen::Vector2d Rig::Bent(const Eigen::Vector2d& x) const {
 }
 
 Eigen::Vector2d Rig::Project(const Eigen::Vector3d& p_C) const {
-  return Eigen::Vector2d(center_u_px, center_v_px) +
-         focal_px * Bent(p_C.head<2>() / p_C.z());
+  return Eigen::Vector2d(center_u_px, center_v_px) + focal_px * Bent(p_C.head<2>() / p_C.z());
 }
 
 Eigen::Vector3d Rig::Ray(const Eigen::Vector2d& px) const {

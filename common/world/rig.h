@@ -5,8 +5,8 @@
 
 namespace chase::world {
 
-/// Where the sensors sit on the body, and the camera: a pinhole behind a lens. Shared by the simulator, odometry and
-/// perception; a flight overrides it from one calibration file.
+/// Where the sensors sit on the body, and the camera: a pinhole behind a lens. Shared by the
+/// simulator, odometry and perception; a flight overrides it from one calibration file.
 struct Rig {
   Eigen::Vector3d lidar_position = {0.0, 0.0, 0.10};   ///< p_BL, frame B, m
   Eigen::Vector3d lidar_rpy_deg = {0.0, 0.0, 0.0};     ///< R_BL = Rz(yaw) Ry(pitch) Rx(roll)

@@ -163,9 +163,9 @@ Shot Show::Image(double t) {
   auto image = camera_.Render(body.p, body.q, t, scene_, target.cylinder);
   for (const auto& solid : stage_.orange()) PaintOne(solid, body, &image);
   Shot shot;
-  shot.visible_share = stage_.options().absent ? 0.0
-                                               : camera_.View().visible_share *
-                                                     ShareInImage(body, target.cylinder);
+  shot.visible_share = stage_.options().absent
+                           ? 0.0
+                           : camera_.View().visible_share * ShareInImage(body, target.cylinder);
   shot.bgr.create(image.height, image.width, CV_8UC3);
   const Vector3d light = stage_.light();
   for (int i = 0; i < image.width * image.height; ++i)

@@ -51,7 +51,8 @@ TEST(PerceptionLens, BendsAsOpenCvSaysAndBack) {
   }
 }
 
-/// The target's four sides at the rows of an image that is read out while the camera flies and turns.
+/// The target's four sides at the rows of an image that is read out while the camera flies and
+/// turns.
 TEST(PerceptionLens, ARollingShutterMovesNothing) {
   world::Rig rig;
   rig.readout = 0.03;

@@ -14,13 +14,13 @@ constexpr double kMoved = 0.04, kMovedEdges = 5.0;  // m and sigmas that an edge
 constexpr double kMovedUnclear = 0.06, kMovedUnclearEdges = 8.0;  // where something may hide it
 constexpr double kMovedAcross = 0.03, kMovedAcrossEdges = 4.0;    // where all of it is seen sharply
 constexpr double kSharpWidth = 24.0;  // sigmas of an edge from which its place across is known
-constexpr double kMovedGate = 11.8;     // squared distance, 2 dof, that chance does not reach
-constexpr double kSlow = 0.1;           // m/s, what is slower stands, as far as errors go
-constexpr double kFast = 0.3;           // m/s that LiDAR points of two sweeps tell from standing,
-constexpr double kFastGate = 30.0;      // and its squared distance from it, 2 dof
-constexpr int kShownHits = 2;           // sightings before something may hide a side
-constexpr double kFastAge = 0.08;       // s since the last of them, at most
-constexpr double kKnownSigmas = 1.5;    // from which a way along the line of sight counts
+constexpr double kMovedGate = 11.8;   // squared distance, 2 dof, that chance does not reach
+constexpr double kSlow = 0.1;         // m/s, what is slower stands, as far as errors go
+constexpr double kFast = 0.3;         // m/s that LiDAR points of two sweeps tell from standing,
+constexpr double kFastGate = 30.0;    // and its squared distance from it, 2 dof
+constexpr int kShownHits = 2;         // sightings before something may hide a side
+constexpr double kFastAge = 0.08;     // s since the last of them, at most
+constexpr double kKnownSigmas = 1.5;  // from which a way along the line of sight counts
 constexpr double kAstray = 0.1, kAstrayShare = 0.5;  // m and share of its way, off what is told
 constexpr double kSureWay = 0.15;                    // m
 constexpr double kAnew = 2.0;     // s that it stood, after which its way is counted anew

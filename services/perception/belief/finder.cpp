@@ -18,8 +18,8 @@ constexpr double kSureOdds = 8.0;  // and with which no other is tried
 constexpr double kRival = 6.0;     // less, of something else that makes a sighting contested
 constexpr size_t kMostTried = 4;   // detections a track and frame
 constexpr int kKnownHits = 10;     // sightings after which a track's range is trusted
-constexpr double kLargest = 1.4;  // of pieces together, times what is expected
-constexpr double kTimeJump = 1.0;                   // s back that count as a new recording
+constexpr double kLargest = 1.4;   // of pieces together, times what is expected
+constexpr double kTimeJump = 1.0;  // s back that count as a new recording
 
 bool Overlap(const Detection& a, const Detection& b) { return (a.box & b.box).area() > 0.0; }
 
@@ -136,9 +136,7 @@ std::optional<Sighting> Finder::FindPieces(const TargetTrack& track, const View&
     if (!view.detections[i].mask.empty()) pieces.push_back(view.detections[i]);
   if (pieces.size() < 2) return std::nullopt;
   const Detection merged = Merge(view.bgr, pieces);
-  const auto too_large = [](double seen, double wanted) {
-    return seen > kLargest * wanted;
-  };
+  const auto too_large = [](double seen, double wanted) { return seen > kLargest * wanted; };
   if (too_large(merged.box.width, boxes.expected.width) ||
       too_large(merged.box.height, boxes.expected.height))
     return std::nullopt;

@@ -69,7 +69,8 @@ void Perceiver::DropMissed() {
 }
 
 bool Perceiver::MayBeNew(const Detection& d) const {
-  return (d.edged || d.score >= config_.state.acquire_score) && d.box.width >= kLeastWidth * config_.fit.edge_sigma_px;
+  return (d.edged || d.score >= config_.state.acquire_score) &&
+         d.box.width >= kLeastWidth * config_.fit.edge_sigma_px;
 }
 
 /// Counts why nothing was made of a detection.

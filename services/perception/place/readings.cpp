@@ -18,9 +18,7 @@ constexpr double kSizeError = 0.1;    // share of the width that the outline may
 
 }  // namespace
 
-double HiddenBy(const FitInput& input) {
-  return kHiddenBy * input.detection->silhouette.sigma_px;
-}
+double HiddenBy(const FitInput& input) { return kHiddenBy * input.detection->silhouette.sigma_px; }
 
 bool RangeIsKnown(const FitInput& input) {
   return !input.points.empty() || RangeSigma(input.prior, input.camera) < kKnownRange;

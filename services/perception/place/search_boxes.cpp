@@ -10,7 +10,7 @@ namespace chase::perception {
 namespace {
 
 constexpr double kBoxMargin = 0.25;  // share of the expected box in which a piece may lie
-constexpr double kLarger = 1.1;  // times the expected size: more than the target
+constexpr double kLarger = 1.1;      // times the expected size: more than the target
 constexpr double kGateSigmas = 3.0;
 
 cv::Rect2d Grown(const cv::Rect2d& box, double dx, double dy) {
@@ -24,8 +24,7 @@ std::optional<SearchBoxes> WhereToLook(const TargetGaussian& thing, const Target
   const auto box = ProjectTarget(camera, thing.position(), shape);
   if (!box) return std::nullopt;
   const double range = (thing.position() - camera.p_WC).norm();
-  const double sigma =
-      std::sqrt(thing.covariance.topLeftCorner<3, 3>().diagonal().maxCoeff());
+  const double sigma = std::sqrt(thing.covariance.topLeftCorner<3, 3>().diagonal().maxCoeff());
   const double spread = kGateSigmas * sigma / range * camera.rig.focal_px;
   const double tilted = kGateSigmas * tilt * camera.rig.focal_px;
   const double margin = tilted + spread, trim = 0.5 * tilted + spread;

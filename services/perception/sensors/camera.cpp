@@ -14,9 +14,7 @@ constexpr int kRimPoints = 16;
 
 }  // namespace
 
-Eigen::Vector3d Camera::Ray(double u, double v) const {
-  return R_WC * rig.Ray({u, v});
-}
+Eigen::Vector3d Camera::Ray(double u, double v) const { return R_WC * rig.Ray({u, v}); }
 
 std::optional<Eigen::Vector2d> Camera::Project(const Eigen::Vector3d& p_W) const {
   return Pixel(R_WC.transpose() * (p_W - p_WC));

@@ -239,8 +239,8 @@ double EdgeWidth(const cv::Mat& bgr, const cv::Mat& mask, const cv::Rect& roi) {
     const auto [first, last] = Extent(mask.row(y));
     if (first < 0) continue;
     const int v = roi.y + y, depth = last - first + 1;
-    for (const Line& line : {Line{&bgr, {roi.x + first, v}, {1, 0}},
-                             Line{&bgr, {roi.x + last, v}, {-1, 0}}})
+    for (const Line& line :
+         {Line{&bgr, {roi.x + first, v}, {1, 0}}, Line{&bgr, {roi.x + last, v}, {-1, 0}}})
       if (const auto width = WidthOn(line, depth)) widths.push_back(*width);
   }
   if (widths.empty()) return 1.0;
