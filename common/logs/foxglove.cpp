@@ -1,11 +1,11 @@
 #include "common/logs/foxglove.h"
 
-#include <Eigen/Eigenvalues>
 #include <cmath>
 #include <cstring>
 
 #include "common/bus/convert.h"
 #include "common/bus/image_format.h"
+#include "common/logs/foxglove_scene.h"
 #include "common/logs/jpeg.h"
 #include "common/logs/message_types.h"
 #include "common/logs/protobuf.h"
@@ -19,39 +19,13 @@ using Eigen::Quaterniond;
 using Eigen::Vector3d;
 using Messages = std::vector<ViewerMessage>;
 
-constexpr int kCurvePoints = 25;  // 0.1 s of a horizon of 2.5 s
 constexpr float kPointGrid =
-    8192.0f;                         // per m: a twentieth of the VLP-16's 2 mm; noise does not pack
-constexpr double kThickness = 0.04;  // of a curve, m
-
-struct Tint {
-  double r, g, b, a;
-};
-constexpr Tint kStill = {0.55, 0.57, 0.6, 0.5}, kMoving = {0.8, 0.2, 0.2, 0.6},
-               kGround = {0.5, 0.45, 0.35, 0.3}, kTarget = {0.91, 0.44, 0.04, 0.9},
-               kPlan = {0.12, 0.37, 0.66, 1.0}, kForecast = {0.91, 0.44, 0.04, 1.0};
+    8192.0f;  // per m: a twentieth of the VLP-16's 2 mm; noise does not pack
 
 const Schema& OurTypes() {
   static const Schema types(LcmToday());
   return types;
 }
-
-Proto Stamp(int64_t utime) {
-  return Proto().Int(1, utime / 1000000).Int(2, utime % 1000000 * 1000);
-}
-Proto Vector(const Vector3d& v) {
-  return Proto().Double(1, v.x()).Double(2, v.y()).Double(3, v.z());
-}
-Proto Rotation(const Quaterniond& q) {
-  return Proto().Double(1, q.x()).Double(2, q.y()).Double(3, q.z()).Double(4, q.w());
-}
-Proto Pose(const Vector3d& p, const Quaterniond& q) {
-  return Proto().Put(1, Vector(p)).Put(2, Rotation(q));
-}
-Proto Color(const Tint& t) {
-  return Proto().Double(1, t.r).Double(2, t.g).Double(3, t.b).Double(4, t.a);
-}
-Quaterniond ToRotation(const double (&q)[4]) { return {q[0], q[1], q[2], q[3]}; }
 
 /// x y z as float32 on a grid of 0.12 mm, then intensity and ring as bytes.
 template <class Cloud>
@@ -139,77 +113,6 @@ std::string Transforms(const pose_t& m) {
       .bytes();
 }
 
-// SceneEntity's numbers of the primitives.
-enum Primitive { kCube = 8, kSphere = 9, kCylinder = 10, kLine = 11 };
-
-/// The entity that all earlier ones of this name give way to.
-Proto Entity(int64_t utime, const char* name) {
-  return Proto().Put(1, Stamp(utime)).Bytes(2, "world").Bytes(3, name).Put(4, Proto());
-}
-
-std::string Scene(const Proto& entity) { return Proto().Put(2, entity).bytes(); }
-
-Proto Solid(Primitive kind, const Proto& pose, const Vector3d& size, const Tint& tint) {
-  Proto solid;
-  solid.Put(1, pose).Put(2, Vector(size));
-  if (kind == kCylinder) solid.Double(3, 1.0).Double(4, 1.0);
-  return solid.Put(kind == kCylinder ? 5 : 3, Color(tint));
-}
-
-Proto Curve(const polynomial_t& m, const Tint& tint) {
-  const world::Trajectory path = bus::FromMessage(m, m.utime);
-  Proto line;
-  line.Int(1, 0).Put(2, Pose(Vector3d::Zero(), Quaterniond::Identity())).Double(3, kThickness);
-  for (int i = 0; i <= kCurvePoints; ++i)
-    line.Put(5, Vector(path.Position(path.start + path.duration * i / kCurvePoints)));
-  return line.Put(6, Color(tint));
-}
-
-/// { x : x' R x <= 1 } has half axes 1 / sqrt(eigenvalue) along the eigenvectors.
-void AddEllipsoid(const world::Obstacle& o, const Vector3d& center, const Tint& tint,
-                  Proto* entity) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(o.shape);
-  Eigen::Matrix3d R = axes.eigenvectors();
-  if (R.determinant() < 0.0) R.col(0) *= -1.0;
-  const Vector3d size = 2.0 * axes.eigenvalues().cwiseMax(1e-9).cwiseSqrt().cwiseInverse();
-  entity->Put(kSphere, Solid(kSphere, Pose(center, Quaterniond(R)), size, tint));
-}
-
-std::string ObstacleScene(const obstacles_t& m) {
-  Proto entity = Entity(m.utime, "obstacles");
-  for (const obstacle_t& o : m.obstacles) {
-    const Tint& tint = o.kind == obstacle_t::MOVING   ? kMoving
-                       : o.kind == obstacle_t::GROUND ? kGround
-                                                      : kStill;
-    const world::Obstacle obstacle = bus::FromMessage(o, m.utime);
-    const Vector3d center = obstacle.center.Position(0.0);
-    const Vector3d size = 2.0 * bus::ToVector(o.half);
-    const Quaterniond q = ToRotation(o.orientation);
-    if (o.solid == obstacle_t::BOX)
-      entity.Put(kCube, Solid(kCube, Pose(center, q), size, tint));
-    else if (o.solid == obstacle_t::CYLINDER)
-      entity.Put(kCylinder, Solid(kCylinder, Pose(center, Quaterniond::Identity()), size, tint));
-    else
-      AddEllipsoid(obstacle, center, tint, &entity);
-  }
-  return Scene(entity);
-}
-
-std::string TargetScene(const target_t& m) {
-  Proto entity = Entity(m.utime, "target");
-  if (m.state == target_t::TRACKING || m.state == target_t::OCCLUDED)
-    entity.Put(kCylinder, Solid(kCylinder, Pose(bus::ToVector(m.mean), Quaterniond::Identity()),
-                                {2 * m.radius, 2 * m.radius, m.height}, kTarget));
-  return Scene(entity);
-}
-
-std::string CurveScene(int64_t utime, const char* name, const polynomial_t& path,
-                       const Tint& tint) {
-  Proto entity = Entity(utime, name);
-  if (path.n_coefficients > 0) entity.Put(kLine, Curve(path, tint));
-  return Scene(entity);
-}
-
 std::string LogLine(int64_t utime, int level, const std::string& text, const std::string& name) {
   return Proto().Put(1, Stamp(utime)).Int(2, level).Bytes(3, text).Bytes(4, name).bytes();
 }
@@ -235,19 +138,23 @@ void AddDrawn(const truth_t& m, const std::string& channel, Messages* out) {
   out->push_back({channel + "/pose", "foxglove.PoseInFrame",
                   PoseInWorld(m.utime, bus::ToVector(m.pos), ToRotation(m.orientation))});
 }
+void AddScene(const std::string& scene, const std::string& channel, Messages* out) {
+  out->push_back({channel + "/scene", "foxglove.SceneUpdate", scene});
+}
 void AddDrawn(const obstacles_t& m, const std::string& channel, Messages* out) {
-  out->push_back({channel + "/scene", "foxglove.SceneUpdate", ObstacleScene(m)});
+  AddScene(SceneOf(m), channel, out);
 }
 void AddDrawn(const target_t& m, const std::string& channel, Messages* out) {
-  out->push_back({channel + "/scene", "foxglove.SceneUpdate", TargetScene(m)});
+  AddScene(SceneOf(m), channel, out);
 }
 void AddDrawn(const plan_t& m, const std::string& channel, Messages* out) {
-  out->push_back(
-      {channel + "/scene", "foxglove.SceneUpdate", CurveScene(m.utime, "plan", m.position, kPlan)});
+  AddScene(SceneOf(m), channel, out);
 }
 void AddDrawn(const prediction_t& m, const std::string& channel, Messages* out) {
-  out->push_back({channel + "/scene", "foxglove.SceneUpdate",
-                  CurveScene(m.utime, "prediction", m.target, kForecast)});
+  AddScene(SceneOf(m), channel, out);
+}
+void AddDrawn(const geofence_t& m, const std::string& channel, Messages* out) {
+  AddScene(SceneOf(m), channel, out);
 }
 void AddDrawn(const status_t& m, const std::string& channel, Messages* out) {
   out->push_back({channel + "/log", "foxglove.Log", LogLine(m)});

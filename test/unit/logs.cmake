@@ -1,6 +1,9 @@
 chase_test(logs_tools_test
   LIBS log_tools
   SOURCES ${CMAKE_CURRENT_LIST_DIR}/logs_tools_test.cpp)
+chase_test(logs_scene_test
+  LIBS logs
+  SOURCES ${CMAKE_CURRENT_LIST_DIR}/logs_scene_test.cpp)
 chase_test(logs_info_test
   LIBS log_tools
   SOURCES ${CMAKE_CURRENT_LIST_DIR}/logs_info_test.cpp)
@@ -38,5 +41,9 @@ if(TARGET chase-flight)
     COMMAND ${Python3_EXECUTABLE} -B ${CMAKE_CURRENT_LIST_DIR}/logs_cli_test.py ${CMAKE_BINARY_DIR}/bin)
   add_test(NAME logs_python
     COMMAND ${Python3_EXECUTABLE} -B ${CMAKE_CURRENT_LIST_DIR}/logs_python_test.py ${CMAKE_BINARY_DIR}/bin)
+  add_test(NAME logs_mcap
+    COMMAND ${Python3_EXECUTABLE} -B ${CMAKE_CURRENT_LIST_DIR}/mcap_size_test.py ${CMAKE_BINARY_DIR}/bin
+            ${CMAKE_BINARY_DIR}/test/flight.lcm)
   set_tests_properties(logs_cli logs_python PROPERTIES TIMEOUT 300)
+  set_tests_properties(logs_mcap PROPERTIES TIMEOUT 300 FIXTURES_REQUIRED recorded_flight SKIP_RETURN_CODE 77)
 endif()
