@@ -22,9 +22,9 @@ std::string Commander::RefusalHere(const Request& request) const {
 
 void Commander::Take(const Request& request) {
   const std::string refusal = RefusalHere(request);
-  if (!refusal.empty()) return Settle(request.command, refusal, "");
+  if (!refusal.empty()) return Settle(request, refusal, "");
   given_.push_back(
-      {request.command, bus::CommandCall(bus_, *world::CommandNamed(request.command), next_id_++)});
+      {request, bus::CommandCall(bus_, *world::CommandNamed(request.command), next_id_++)});
 }
 
 void Commander::Turn() {
@@ -32,19 +32,19 @@ void Commander::Turn() {
   for (Given& given : std::exchange(given_, {})) {
     given.call.Turn();
     if (given.call.answered())
-      Settle(given.command, given.call.accepted() ? "" : given.call.reason(), given.call.reason());
+      Settle(given.request, given.call.accepted() ? "" : given.call.reason(), given.call.reason());
     else if (given.call.GaveUp())
-      Settle(given.command, "no answer; does chase-mission run?", "");
+      Settle(given.request, "no answer; does chase-mission run?", "");
     else
       open.push_back(std::move(given));
   }
   given_ = std::move(open);
 }
 
-void Commander::Settle(const std::string& command, const std::string& refusal,
+void Commander::Settle(const Request& request, const std::string& refusal,
                        const std::string& words) {
   ++(refusal.empty() ? taken_ : refused_);
-  reply_(command, refusal, words);
+  reply_(request, refusal, words);
 }
 
 }  // namespace chase::viewer

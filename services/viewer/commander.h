@@ -9,13 +9,13 @@
 
 namespace chase::viewer {
 
-/// Gives the vehicle what pages command with the right token, each command until it is answered.
+/// Gives the vehicle what pages and Foxglove command with the right token, each command until it is
+/// answered.
 class Commander {
  public:
-  /// `reply(command, refusal, words)` is called once for each command; refusal: empty where the
+  /// `reply(request, refusal, words)` is called once for each command; refusal: empty where the
   /// vehicle has taken it. `token`: empty: all are refused. `live`: false: all are refused.
-  using Reply =
-      std::function<void(const std::string&, const std::string&, const std::string& words)>;
+  using Reply = std::function<void(const Request&, const std::string&, const std::string& words)>;
   Commander(bus::Bus& bus, std::string token, bool live, Reply reply);
 
   void Take(const Request& request);
@@ -29,12 +29,12 @@ class Commander {
 
  private:
   struct Given {
-    std::string command;
+    Request request;
     bus::CommandCall call;
   };
   static constexpr size_t kMost = 8;  // under way: a finger is no faster than their answers
   std::string RefusalHere(const Request& request) const;
-  void Settle(const std::string& command, const std::string& refusal, const std::string& words);
+  void Settle(const Request& request, const std::string& refusal, const std::string& words);
 
   bus::Bus& bus_;
   std::string token_;

@@ -2,12 +2,15 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
+#include <string_view>
 
 namespace chase::viewer {
 namespace {
 
 using nlohmann::json;
 
+constexpr uint32_t kService = 1;
+constexpr std::string_view kEncoding = "json";
 constexpr char kDigits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
 
 std::string Text(const json& j) { return j.dump(-1, ' ', false, json::error_handler_t::replace); }
@@ -15,6 +18,21 @@ std::string Text(const json& j) { return j.dump(-1, ' ', false, json::error_hand
 template <class T>
 void LittleEndian(T value, std::string* out) {
   for (size_t i = 0; i < sizeof(T); ++i) out->push_back(static_cast<char>(value >> (8 * i) & 0xff));
+}
+
+uint32_t ReadLittleEndian(const std::string& bytes, size_t at) {
+  uint32_t value = 0;
+  for (size_t i = 4; i-- > 0;) value = value << 8 | static_cast<uint8_t>(bytes[at + i]);
+  return value;
+}
+
+/// Of an object with these members, as a JSON schema.
+json ObjectOf(const json& members) {
+  const std::string schema = Text({{"type", "object"}, {"properties", members}});
+  return {{"encoding", kEncoding},
+          {"schemaName", "chase.command"},
+          {"schemaEncoding", "jsonschema"},
+          {"schema", schema}};
 }
 
 std::string Warning(const std::string& what) {
@@ -58,11 +76,16 @@ std::string Base64(const std::string& bytes) {
   return out;
 }
 
-std::string ServerInfoText(const std::string& name, const std::string& session) {
+std::string ServerInfoText(const std::string& name, const std::string& session, bool services) {
+  json capabilities = json::array({"parameters"}), encodings = json::array();
+  if (services) {
+    capabilities.push_back("services");
+    encodings.push_back(kEncoding);
+  }
   return Text({{"op", "serverInfo"},
                {"name", name},
-               {"capabilities", {"parameters"}},
-               {"supportedEncodings", json::array()},
+               {"capabilities", capabilities},
+               {"supportedEncodings", encodings},
                {"metadata", json::object()},
                {"sessionId", session}});
 }
@@ -77,6 +100,41 @@ std::string AdvertiseText(const std::vector<FoxgloveChannel>& channels) {
                     {"schema", Base64(c.descriptors)},
                     {"schemaEncoding", "protobuf"}});
   return Text({{"op", "advertise"}, {"channels", rows}});
+}
+
+std::string AdvertiseServiceText() {
+  const json text = {{"type", "string"}}, truth = {{"type", "boolean"}};
+  const json service = {{"id", kService},
+                        {"name", "command"},
+                        {"type", "chase.command"},
+                        {"request", ObjectOf({{"command", text}, {"token", text}})},
+                        {"response", ObjectOf({{"accepted", truth}, {"words", text}})}};
+  return Text({{"op", "advertiseServices"}, {"services", json::array({service})}});
+}
+
+std::optional<ServiceCall> ServiceCallOf(const std::string& bytes) {
+  constexpr size_t kHead = 13;  // opcode and three numbers
+  const size_t payload = kHead + kEncoding.size();
+  if (bytes.size() < payload || bytes[0] != '\2' || ReadLittleEndian(bytes, 1) != kService ||
+      ReadLittleEndian(bytes, 9) != kEncoding.size() ||
+      bytes.compare(kHead, kEncoding.size(), kEncoding) != 0)
+    return std::nullopt;
+  return ServiceCall{ReadLittleEndian(bytes, 5), bytes.substr(payload)};
+}
+
+std::string CommandAnswer(uint32_t call, const std::string& refusal, const std::string& words) {
+  std::string out(1, '\3');
+  for (const uint32_t number : {kService, call, static_cast<uint32_t>(kEncoding.size())})
+    LittleEndian(number, &out);
+  return out.append(kEncoding) +
+         Text({{"accepted", refusal.empty()}, {"words", refusal.empty() ? words : refusal}});
+}
+
+std::string CallFailureText(const ServiceCall& call) {
+  return Text({{"op", "serviceCallFailure"},
+               {"serviceId", kService},
+               {"callId", call.call},
+               {"message", "not {command, token}"}});
 }
 
 std::string MessageData(uint32_t subscription, int64_t utime, const std::string& payload) {

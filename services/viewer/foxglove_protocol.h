@@ -19,12 +19,27 @@ struct FoxgloveChannel {
 };
 
 std::string Base64(const std::string& bytes);
-std::string ServerInfoText(const std::string& name, const std::string& session);
+/// `services`: there are some.
+std::string ServerInfoText(const std::string& name, const std::string& session, bool services);
 std::string AdvertiseText(const std::vector<FoxgloveChannel>& channels);
 
 /// Message of a subscription: opcode 1, uint32 subscription, uint64 nanoseconds, payload; little
 /// endian.
 std::string MessageData(uint32_t subscription, int64_t utime, const std::string& payload);
+
+/// The one service, "command": JSON {command, token} in, {accepted, words} out.
+std::string AdvertiseServiceText();
+/// A client's binary message: opcode 2, uint32 service, uint32 call, uint32 length of the
+/// encoding's name, that name, payload; little endian. Nothing when it is no call of ours in JSON.
+struct ServiceCall {
+  uint32_t call = 0;
+  std::string payload;
+};
+std::optional<ServiceCall> ServiceCallOf(const std::string& bytes);
+/// The answer, likewise with opcode 3. `refusal`: empty where the vehicle has taken the command.
+std::string CommandAnswer(uint32_t call, const std::string& refusal, const std::string& words);
+/// The payload is not what the service takes.
+std::string CallFailureText(const ServiceCall& call);
 
 using Parameters = std::vector<std::pair<std::string, std::string>>;
 

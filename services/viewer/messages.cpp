@@ -49,6 +49,7 @@ Plan FromMessage(const plan_t& m, int64_t origin) {
   p.path = bus::FromMessage(m.position, origin);
   if (m.stop.n_coefficients > 0) p.stop = bus::FromMessage(m.stop, origin);
   p.clearance = m.certified_clearance;
+  p.radius = m.hard_radius;
   return p;
 }
 

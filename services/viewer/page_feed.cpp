@@ -65,7 +65,7 @@ void PageFeed::Take(const prediction_t& m) {
 }
 
 void PageFeed::Take(const obstacles_t& m) {
-  Time(m.utime);
+  Time(newest_ = m.utime);
   obstacles_ = FromMessage(m, origin_);
   obstacles_sent_ = false;
 }
@@ -76,13 +76,20 @@ void PageFeed::Take(const flight_state_t& m) {
   flight_heard_ = bus_.Now();
 }
 
-void PageFeed::Take(const scan_registered_t& m) {
+template <class Sweep>
+void PageFeed::SendCloud(const Sweep& m, const Eigen::Vector3d& centre) {
   if (!Due(Part::kCloud, m.utime, config_.cloud_rate_hz)) return;
   auto timer = bus_.Time("cloud");
-  sink_.Send(Part::kCloud,
-             EncodeCloud(Time(m.utime), bus::ToVector(m.pos), m.x, m.y, m.z,
-                         static_cast<size_t>(config_.cloud_points)),
-             true);
+  sink_.Send(
+      Part::kCloud,
+      EncodeCloud(Time(m.utime), centre, m.x, m.y, m.z, static_cast<size_t>(config_.cloud_points)),
+      true);
+}
+
+void PageFeed::Take(const scan_registered_t& m) { SendCloud(m, bus::ToVector(m.pos)); }
+
+void PageFeed::Take(const lidar_scan_t& m) {
+  if (!scene_.drone) SendCloud(m, Eigen::Vector3d::Zero());
 }
 
 void PageFeed::Take(const camera_image_t& m) {
@@ -137,7 +144,7 @@ void PageFeed::Tick(int64_t utime, const std::string& self) {
   if (!play_) Remember(utime);
   const bool second = ticks_++ % kTicksPerSecond == 0;
   if (!play_ && second) SendHello();
-  if (!sink_.Wanted(Part::kState) || origin_ == 0) return;
+  if (!sink_.Wanted(Part::kState) || (origin_ == 0 && !play_)) return;
   auto timer = bus_.Time("tick");
   if (scene_.drone) scene_.drone->age = bus::Seconds(bus_.Now(), pose_heard_);
   sink_.Send(Part::kState, StateText(scene_, Elapsed(utime), generation_, play_), false);

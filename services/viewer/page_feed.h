@@ -7,6 +7,7 @@
 
 #include "chase/camera_image_t.hpp"
 #include "chase/health_t.hpp"
+#include "chase/lidar_scan_t.hpp"
 #include "chase/scan_registered_t.hpp"
 #include "chase/tracking_t.hpp"
 #include "common/bus/bus.h"
@@ -32,6 +33,8 @@ class PageFeed {
   void Take(const obstacles_t& m);
   void Take(const tracking_t& m) { scene_.following = Code(m.following); }
   void Take(const scan_registered_t& m);
+  /// Shown where it was measured, in frame L, as long as no pose says where that is.
+  void Take(const lidar_scan_t& m);
   void Take(const camera_image_t& m);
   void Take(const flight_state_t& m);
   void Take(const geofence_t& m) { scene_.fence = FromMessage(m); }
@@ -55,6 +58,8 @@ class PageFeed {
  private:
   /// Is a heavy part wanted and due? Then it counts as sent.
   bool Due(Part part, int64_t utime, double rate_hz);
+  template <class Sweep>
+  void SendCloud(const Sweep& m, const Eigen::Vector3d& centre);
   std::vector<ProcessHealth> Processes();
   /// Of a message: s from the first one's time.
   double Time(int64_t utime);
@@ -68,7 +73,7 @@ class PageFeed {
   std::optional<PlayState> play_;
 
   int64_t origin_ = 0;                         // utime of the first message; 0: none yet
-  int64_t newest_ = 0;                         // utime of the newest pose or plan
+  int64_t newest_ = 0;                         // utime of the newest pose or obstacles
   int64_t start_ = -1;                         // of the first tick
   int64_t pose_heard_ = 0, flight_heard_ = 0;  // when, by the bus's clock
   std::map<std::string, int64_t> status_heard_;

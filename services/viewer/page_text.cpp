@@ -68,6 +68,7 @@ json PlanOf(const Plan& p) {
   json out = {{"verdict", p.verdict},
               {"reason", p.reason},
               {"clearance", Number(p.clearance)},
+              {"radius", Number(p.radius)},
               {"path", Path(p.path, kPathPoints)}};
   if (p.stop) out["stop"] = Path(*p.stop, kPathPoints / 2);
   return out;

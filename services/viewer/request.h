@@ -7,13 +7,15 @@
 
 namespace chase::viewer {
 
-/// What a page asks for. Several may stand in one message.
+/// What a page, or a client of Foxglove's by a service, asks for. Several may stand in one message.
 struct Request {
   int64_t acknowledged = 0;                       ///< frames taken since the last request
   std::optional<std::vector<std::string>> wants;  ///< heavy parts: "cloud", "image"
   std::optional<bool> play;
   std::optional<double> speed, seek;  ///< seek: s from the log's beginning
   std::string command, token;         ///< command: empty where there is none
+  uint64_t caller = 0;  ///< who alone is answered, by a service of Foxglove's; 0: all pages are
+  uint32_t call = 0;    ///< the caller's number of it
 };
 
 /// Nothing when the text is no request: other JSON, none at all, or values of other types.

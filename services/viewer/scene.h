@@ -38,6 +38,7 @@ struct Plan {
   world::Trajectory path;
   std::optional<world::Trajectory> stop;  ///< certified, leaves `path` at its start
   double clearance = -1.0;                ///< certified, m; negative: not certified
+  double radius = 0.0;                    ///< of the sphere that is kept free at least, m
 };
 
 struct Forecast {

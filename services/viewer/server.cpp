@@ -4,6 +4,7 @@
 #include <chrono>
 #include <stdexcept>
 
+#include "services/viewer/page_text.h"
 #include "services/viewer/web.h"
 
 namespace chase::viewer {
@@ -147,6 +148,14 @@ bool Server::Wanted(Part part) const {
 std::vector<Request> Server::TakeRequests() {
   const std::lock_guard lock(hub_->inbox_mutex);
   return std::exchange(hub_->inbox, {});
+}
+
+void Server::Answer(const Request& request, const std::string& refusal, const std::string& words) {
+  if (request.caller == 0)
+    return Send(Part::kReply, ReplyText(request.command, refusal, words), false);
+  Post(*hub_, [hub = hub_.get(), request, bytes = CommandAnswer(request.call, refusal, words)] {
+    for (Client* client : hub->clients) client->OfferAnswer(request.caller, bytes);
+  });
 }
 
 void Server::Advertise(const FoxgloveChannel& channel) {

@@ -17,6 +17,7 @@ struct ServerConfig {
   int port = 0;           ///< 0: any free one
   int max_clients = 64;   ///< connections at a time; more are closed at once
   Parameters parameters;  ///< that Foxglove may read
+  bool commands = false;  ///< Foxglove is offered the service that gives commands
 };
 
 /// HTTP and WebSocket server with a thread of its own: the page's files, the page's data at /ws,
@@ -36,8 +37,10 @@ class Server : public PageSink {
   void Retain(Part part, std::string bytes) override;
   bool Wanted(Part part) const override;
   int pages() const;
-  /// What pages asked for since the last call; of more than 64 the first.
+  /// What clients asked for since the last call; of more than 64 the first.
   std::vector<Request> TakeRequests();
+  /// To a command: to who called the service, or to all pages. As ReplyText has it.
+  void Answer(const Request& request, const std::string& refusal, const std::string& words);
 
   /// A channel for Foxglove; ids count from 1 and stay below kMostChannels.
   static constexpr uint32_t kMostChannels = 256;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 
 #include "chase/attitude_setpoint_t.hpp"
 #include "chase/camera_image_t.hpp"
@@ -25,6 +26,10 @@
 
 namespace chase::viewer {
 
+/// Pages are told all that is shown, but for places that nothing was seen of: they have the form of
+/// obstacles and are none.
+inline bool IsOnPage(std::string_view channel) { return channel != "UNSEEN"; }
+
 /// Hands every good message of the channels that pages and Foxglove show to `hear(channel,
 /// message)`.
 template <class Hear>
@@ -37,6 +42,7 @@ void SubscribeShown(bus::Bus& bus, const Hear& hear) {
   bus.Subscribe<plan_t>("PLAN", on("PLAN"));
   bus.Subscribe<prediction_t>("PREDICTION", on("PREDICTION"));
   bus.Subscribe<obstacles_t>("OBSTACLES", on("OBSTACLES"));
+  bus.Subscribe<obstacles_t>("UNSEEN", on("UNSEEN"));
   bus.Subscribe<tracking_t>("TRACKING", on("TRACKING"));
   bus.Subscribe<scan_registered_t>("SCAN_REGISTERED", on("SCAN_REGISTERED"));
   bus.Subscribe<camera_image_t>("CAMERA_IMAGE", on("CAMERA_IMAGE"));
@@ -62,6 +68,7 @@ void SubscribeShown(bus::Bus& bus, const Hear& hear) {
   bus.Subscribe<status_t>("FCU_STATUS", on("FCU_STATUS"));
   bus.Subscribe<status_t>("SIMULATOR_STATUS", on("SIMULATOR_STATUS"));
   bus.Subscribe<status_t>("RECORDER_STATUS", on("RECORDER_STATUS"));
+  bus.Subscribe<status_t>("LINK_STATUS", on("LINK_STATUS"));
 }
 
 }  // namespace chase::viewer

@@ -13,6 +13,7 @@ ServerConfig ServerConfigOf(const ViewerConfig& config, const std::string& sourc
   out.address = config.address;
   out.port = config.port;
   out.max_clients = config.max_clients;
+  out.commands = !config.token.empty() && source.empty();
   out.parameters = {{"version", config::Version()},
                     {"source", source.empty() ? "live" : source},
                     {"cloud_points", std::to_string(config.cloud_points)},
@@ -27,17 +28,12 @@ ViewerNode::ViewerNode(bus::Bus& bus, const ViewerConfig& config, const std::str
       foxglove_(server_),
       feed_(bus, server_, config, source),
       commander_(bus, config.token, source.empty(),
-                 [this](const auto&... answer) { Answer(answer...); }) {
+                 [this](const auto&... answer) { server_.Answer(answer...); }) {
   SubscribeShown(bus, [this](const char* channel, const auto& m) {
-    feed_.Take(m);
+    if (IsOnPage(channel)) feed_.Take(m);
     if constexpr (std::is_same_v<std::decay_t<decltype(m)>, command_ack_t>) commander_.Hear(m);
     foxglove_.Offer(channel, m);
   });
-}
-
-void ViewerNode::Answer(const std::string& command, const std::string& refusal,
-                        const std::string& words) {
-  server_.Send(Part::kReply, ReplyText(command, refusal, words), false);
 }
 
 void ViewerNode::Tick(int64_t utime) {

@@ -30,8 +30,6 @@ class ViewerNode : public bus::Node {
   int port() const { return server_.port(); }
 
  private:
-  void Answer(const std::string& command, const std::string& refusal, const std::string& words);
-
   Server server_;
   FoxgloveFeed foxglove_;
   PageFeed feed_;

@@ -46,6 +46,7 @@ class WebSocket : public Client, public std::enable_shared_from_this<WebSocket> 
         slot_(std::move(slot)),
         outbox_(protocol.empty() ? kPageLimits : kFoxgloveLimits) {
     if (!protocol.empty()) foxglove_.emplace(&hub.config.parameters);
+    number_ = ++hub.last_client;
     websocket::stream_base::timeout timeout{kHttpLimit, kSilence, true};
     stream_.set_option(timeout);
     stream_.read_message_max(kMostText);
@@ -79,6 +80,9 @@ class WebSocket : public Client, public std::enable_shared_from_this<WebSocket> 
               std::make_shared<const std::string>(MessageData(subscription, utime, payload)),
               true});
   }
+  void OfferAnswer(uint64_t caller, const std::string& bytes) override {
+    if (caller == number_) Push({kAnswer, std::make_shared<const std::string>(bytes), true});
+  }
   bool Wants(Part part) const override {
     return (part == Part::kCloud && wants_cloud_) || (part == Part::kImage && wants_image_);
   }
@@ -94,8 +98,9 @@ class WebSocket : public Client, public std::enable_shared_from_this<WebSocket> 
     hub_.clients.insert(this);
     hub_.Recount();
     if (foxglove_) {
-      PushText(kAnswer, ServerInfoText("chase", hub_.session));
+      PushText(kAnswer, ServerInfoText("chase", hub_.session, hub_.config.commands));
       PushText(kAdvertisement, AdvertiseText(hub_.channels));
+      if (hub_.config.commands) PushText(kAnswer, AdvertiseServiceText());
     } else {
       for (const auto& [part, frame] : hub_.retained) Push(frame);
     }
@@ -110,7 +115,7 @@ class WebSocket : public Client, public std::enable_shared_from_this<WebSocket> 
       if (self->stream_.got_text())
         self->Hear(text);
       else
-        ++self->hub_.malformed;
+        self->HearBinary(text);
       self->Read();
     });
   }
@@ -132,6 +137,23 @@ class WebSocket : public Client, public std::enable_shared_from_this<WebSocket> 
     if (request->play || request->speed || request->seek || !request->command.empty())
       hub_.Ask(*request);
     Flush();
+  }
+
+  /// A call of Foxglove's service, where it is offered.
+  void HearBinary(const std::string& bytes) {
+    const auto call = foxglove_ && hub_.config.commands ? ServiceCallOf(bytes) : std::nullopt;
+    auto request = call ? ParseRequest(call->payload) : std::nullopt;
+    if (!request || request->command.empty()) {
+      ++hub_.malformed;
+      if (call) PushText(kAnswer, CallFailureText(*call));
+      return;
+    }
+    Request command;
+    command.command = request->command;
+    command.token = request->token;
+    command.caller = number_;
+    command.call = call->call;
+    hub_.Ask(command);
   }
 
   void Want(const std::vector<std::string>& parts) {
@@ -171,6 +193,7 @@ class WebSocket : public Client, public std::enable_shared_from_this<WebSocket> 
   websocket::stream<beast::tcp_stream> stream_;
   Server::Hub& hub_;
   Slot slot_;
+  uint64_t number_ = 0;  ///< among all clients, from 1
   beast::flat_buffer buffer_;
   Outbox outbox_;
   std::shared_ptr<const std::string> writing_;

@@ -25,6 +25,8 @@ class Client {
   virtual void OfferPart(Part part, const Frame& frame) = 0;
   virtual void OfferChannels(const std::string& advertisement) = 0;
   virtual void OfferMessage(uint32_t channel, int64_t utime, const std::string& payload) = 0;
+  /// To a call of the service, if `caller` is this client.
+  virtual void OfferAnswer(uint64_t caller, const std::string& bytes) = 0;
   virtual bool Wants(Part part) const = 0;
   /// Sets true what it has subscribed to.
   virtual void MarkSubscribed(std::array<bool, Server::kMostChannels>* channels) const = 0;
@@ -46,8 +48,9 @@ struct Server::Hub {
   std::set<Client*> clients;
   std::map<Part, Frame> retained;
   std::vector<FoxgloveChannel> channels;
-  int port = 0;         ///< that is listened on
-  std::string session;  ///< tells Foxglove one start of the server from the next
+  uint64_t last_client = 0;  ///< number of the newest
+  int port = 0;              ///< that is listened on
+  std::string session;       ///< tells Foxglove one start of the server from the next
 
   std::mutex inbox_mutex;
   std::vector<Request> inbox;

@@ -1,9 +1,10 @@
 chase_test(viewer_core_test
   LIBS viewer_core nlohmann_json::nlohmann_json
-  SOURCES ${CMAKE_CURRENT_LIST_DIR}/viewer_core_test.cpp)
+  SOURCES ${CMAKE_CURRENT_LIST_DIR}/viewer_core_test.cpp ${CMAKE_CURRENT_LIST_DIR}/viewer_foxglove_test.cpp)
 chase_test(viewer_node_test
   LIBS viewer_node nlohmann_json::nlohmann_json
-  SOURCES ${CMAKE_CURRENT_LIST_DIR}/viewer_node_test.cpp ${CMAKE_CURRENT_LIST_DIR}/viewer_commander_test.cpp)
+  SOURCES ${CMAKE_CURRENT_LIST_DIR}/viewer_node_test.cpp ${CMAKE_CURRENT_LIST_DIR}/viewer_commander_test.cpp
+          ${CMAKE_CURRENT_LIST_DIR}/viewer_any_log_test.cpp)
 add_dependencies(viewer_node_test viewer_page)
 
 add_test(NAME viewer_commands

@@ -19,11 +19,11 @@ constexpr const char* kToken = "a token of the test";
 /// A commander, a bus that keeps what is sent, and what was answered.
 struct Desk {
   explicit Desk(const std::string& token = kToken, bool live = true)
-      : commander(bus, token, live,
-                  [this](const std::string& command, const std::string& refusal,
-                         const std::string& words) {
-                    replies.push_back(command + "|" + refusal + "|" + words);
-                  }) {
+      : commander(
+            bus, token, live,
+            [this](const Request& request, const std::string& refusal, const std::string& words) {
+              replies.push_back(request.command + "|" + refusal + "|" + words);
+            }) {
     bus.SetIdentity({"viewer", "", 7});
   }
   void Ask(const std::string& text) {

@@ -8,7 +8,6 @@
 #include <set>
 
 #include "services/viewer/cloud.h"
-#include "services/viewer/foxglove_protocol.h"
 #include "services/viewer/history.h"
 #include "services/viewer/outbox.h"
 #include "services/viewer/page_text.h"
@@ -309,50 +308,6 @@ TEST(ViewerRequest, CommandsNeedTheToken) {
   EXPECT_NE(RefusalOf(r, "secret-token"), "");
   r.token.clear();
   EXPECT_NE(RefusalOf(r, ""), "");  // no token configured: off, whatever comes
-}
-
-TEST(ViewerFoxglove, Base64) {
-  EXPECT_EQ(Base64(""), "");
-  EXPECT_EQ(Base64("f"), "Zg==");
-  EXPECT_EQ(Base64("fo"), "Zm8=");
-  EXPECT_EQ(Base64("foobar"), "Zm9vYmFy");
-  EXPECT_EQ(Base64("\xff\xfe"), "//4=");
-}
-
-TEST(ViewerFoxglove, SubscribesAndLetsGo) {
-  const Parameters parameters = {{"version", "1"}, {"source", "live"}};
-  FoxgloveClient client(&parameters);
-  EXPECT_EQ(client.Hear(R"({"op":"subscribe","subscriptions":[{"id":0,"channelId":7}]})"), "");
-  EXPECT_EQ(client.channels().at(0), 7U);
-  EXPECT_EQ(client.Hear(R"({"op":"unsubscribe","subscriptionIds":[0]})"), "");
-  EXPECT_TRUE(client.channels().empty());
-  const json all =
-      json::parse(client.Hear(R"({"op":"getParameters","parameterNames":[],"id":"a"})"));
-  EXPECT_EQ(all["parameters"].size(), 2U);
-  EXPECT_EQ(all["id"], "a");
-  const json refused = json::parse(client.Hear(R"({"op":"setParameters","parameters":[]})"));
-  EXPECT_EQ(refused["op"], "status");
-}
-
-TEST(ViewerFoxglove, GarbageIsAnsweredAndBounded) {
-  const Parameters none;
-  FoxgloveClient client(&none);
-  for (const char* text :
-       {"", "x", "[]", R"({"op":1})", R"({"op":"subscribe","subscriptions":[{"id":-1}]})",
-        R"({"op":"subscribe","subscriptions":[{"id":1,"channelId":99999999999}]})"})
-    EXPECT_EQ(json::parse(client.Hear(text))["op"], "status") << text;
-  EXPECT_EQ(client.Hear(R"({"op":"subscribe","subscriptions":7})").empty(), false);
-  for (int i = 0; i < 1000; ++i)
-    client.Hear(R"({"op":"subscribe","subscriptions":[{"id":)" + std::to_string(i) +
-                R"(,"channelId":1}]})");
-  EXPECT_EQ(client.channels().size(), FoxgloveClient::kMostSubscriptions);
-}
-
-TEST(ViewerFoxglove, MessageData) {
-  const std::string bytes = MessageData(0x01020304, 5, "payload");
-  EXPECT_EQ(bytes.substr(0, 5), std::string("\1\4\3\2\1", 5));
-  EXPECT_EQ(bytes.substr(5, 8), std::string("\x88\x13\0\0\0\0\0\0", 8));  // 5000 ns
-  EXPECT_EQ(bytes.substr(13), "payload");
 }
 
 TEST(ViewerConfig, NamesWhatIsWrong) {

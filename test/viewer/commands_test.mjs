@@ -42,6 +42,32 @@ await statuses();
 assert.strictEqual(replies.length, heard, 'answered more than once');
 assert.ok(commands > 0);
 
+// By Foxglove's service: offered because there is a token, and bound to it.
+const {FoxgloveClient} = load('@foxglove/ws-protocol'), {WebSocket} = load('ws');
+const foxglove = new FoxgloveClient({ws: new WebSocket(`ws://127.0.0.1:${viewer.port}/`, [FoxgloveClient.SUPPORTED_SUBPROTOCOL])});
+const answers = new Map();
+let services, failures = 0;
+foxglove.on('advertiseServices', (list) => { services = list; });
+foxglove.on('serviceCallResponse', ({callId, data}) => answers.set(callId, JSON.parse(new TextDecoder().decode(data))));
+foxglove.on('serviceCallFailure', () => failures++);
+await until('the service', () => services);
+async function call(callId, payload) {
+  const data = new TextEncoder().encode(typeof payload === 'string' ? payload : JSON.stringify(payload));
+  foxglove.sendServiceCallRequest({serviceId: services[0].id, callId, encoding: 'json', data: new DataView(data.buffer)});
+  const before = failures;
+  await until('an answer', () => answers.has(callId) || failures > before, 8000);
+  return answers.get(callId);
+}
+assert.deepStrictEqual(await call(1, {command: 'land', token: 'wrong'}), {accepted: false, words: 'wrong token'});
+assert.deepStrictEqual(await call(2, {command: 'land'}), {accepted: false, words: 'wrong token'});
+assert.strictEqual(await call(3, '{'), undefined);
+assert.strictEqual(await call(4, {token: TOKEN}), undefined);
+assert.deepStrictEqual(await call(5, {command: 'kill', token: TOKEN}), {accepted: false, words: 'not from a page: chase-command kill --force'});
+const toPages = replies.length;
+assert.match((await call(6, {command: 'takeoff', token: TOKEN})).words, /^takeoff in IDLE: .*POSE is not heard/);
+assert.strictEqual(replies.length, toPages, 'pages heard the answer');
+foxglove.close();
+
 // The same by hand in a browser: the buttons wait for the arm switch and a token.
 const CHROMIUM = '/usr/bin/chromium';
 if (fs.existsSync(CHROMIUM)) {

@@ -18,7 +18,7 @@ const EXPECTED = {
 async function connect(port, protocols) {
   const socket = new WebSocket(`ws://127.0.0.1:${port}/`, protocols);
   const client = new FoxgloveClient({ws: socket});
-  const seen = {socket, client, channels: new Map(), types: new Map(), counts: new Map(), first: new Map(), errors: [], statuses: []};
+  const seen = {socket, client, channels: new Map(), types: new Map(), counts: new Map(), first: new Map(), most: new Map(), errors: [], statuses: []};
   client.on('error', (error) => seen.errors.push(error));
   client.on('status', (status) => seen.statuses.push(status));
   client.on('serverInfo', (info) => { seen.info = info; });
@@ -42,6 +42,10 @@ async function connect(port, protocols) {
     assert.ok(timestamp > 0n, topic);
     seen.counts.set(topic, (seen.counts.get(topic) ?? 0) + 1);
     seen.first.set(topic, seen.first.get(topic) ?? type.toObject(message));
+    for (const [part, list] of Object.entries(message.entities?.[0] ?? {})) {
+      const most = seen.most.get(topic) ?? {};
+      seen.most.set(topic, {...most, [part]: Math.max(most[part] ?? 0, list?.length ?? 0)});
+    }
   });
   await until(`serverInfo (${protocols})`, () => seen.info);
   return seen;
@@ -68,6 +72,23 @@ assert.strictEqual(cloud.data.length % cloud.point_stride, 0);
 assert.ok(cloud.data.length > 1000 * cloud.point_stride);
 assert.strictEqual(Buffer.from(seen.first.get('CAMERA_IMAGE').data).readUInt16BE(0), 0xffd8);
 assert.deepStrictEqual(seen.first.get('/tf').transforms.map((t) => t.child_frame_id), ['body', 'lidar', 'camera']);
+
+// The layout to import names nothing that is not there.
+const layout = JSON.parse(await (await fetch(`${viewer.url}foxglove-layout.json`)).text());
+const named = new Set();
+for (const {topics, imageMode, paths} of Object.values(layout.configById)) {
+  for (const topic of [...Object.keys(topics ?? {}), ...Object.values(imageMode ?? {})]) named.add(topic);
+  for (const {value} of paths ?? []) {
+    const [topic, field] = /^([A-Z_]+)\.(\w+)/.exec(value).slice(1);
+    assert.ok(seen.types.get(topic)?.fields[field], value);
+  }
+}
+for (const topic of named) assert.ok(seen.channels.has(topic) || topic === 'GEOFENCE/scene', `the layout shows ${topic}`);  // the gym has none
+assert.ok(named.size >= 8);
+
+// What is drawn: the target with its uncertainty, the plan with its stop, the forecast with its spread.
+for (const [topic, part, least] of [['TARGET/scene', 'spheres', 1], ['PLAN/scene', 'lines', 2], ['PREDICTION/scene', 'spheres', 5]])
+  assert.ok((seen.most.get(topic)?.[part] ?? 0) >= least, `${topic}: ${JSON.stringify(seen.most.get(topic))}`);
 
 seen.client.getParameters([], 'all');
 await until('parameters', () => seen.parameters);

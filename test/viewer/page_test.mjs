@@ -127,7 +127,23 @@ const drawn = await page.evaluate(() => {
   scene.setState({generation: 0, row: [], drone: {p: [null, 0, 0], q: [1, 0, 0, 0]}, plan: {verdict: 9, path: [null, 1, 2, 3, 4, 5]}});
   return {...scene.shown, drone: scene.drone.visible, plan: scene.plan.visible};
 });
-assert.deepStrictEqual(drawn, {solids: 2, arrows: 1, drone: false, plan: false});
+assert.deepStrictEqual(drawn, {solids: 2, arrows: 1, grown: 0, drone: false, plan: false});
+
+// Obstacles are grown by what plans keep free, the target has its 3 sigma, the forecast its 2, and the stop its verdict's colour.
+const told = await page.evaluate(async () => {
+  const {scene} = window.chase, {VERDICT_COLORS} = await import('./names.js');
+  const path = [0, 0, 1, 1, 0, 1, 2, 0, 1], row = {id: 1, kind: 0, q: [1, 0, 0, 0]};
+  scene.setObstacles([{...row, solid: 1, p: [0, 0, 1], half: [1, 2, 1]}, {...row, kind: 2, solid: 1, p: [9, 9, 9], half: [1, 1, 1]}]);
+  scene.setState({generation: 1, row: [], plan: {verdict: 3, radius: 0.4, path, stop: path}, forecast: {path, spread: [0.5, 0.5]},
+    target: {p: [0, 0, 0], axes: [0.1, 0.2, 0.3], q: [1, 0, 0, 0], radius: 0.2, height: 1}});
+  const {grown, fan, covariance, stop} = scene;
+  const size = (mesh, axis) => { mesh.geometry.computeBoundingBox(); return Number(mesh.geometry.boundingBox.max[axis].toFixed(3)); };
+  const seen = {grown: [size(grown, 'x'), size(grown, 'y')], sigma: covariance.scale.toArray().map((v) => Number(v.toFixed(3))),
+    fan: fan.visible && size(fan, 'y'), stop: stop.visible && `#${stop.material.color.getHexString()}` === VERDICT_COLORS[3]};
+  document.getElementById('showgrown').click();
+  return {...seen, hidden: !grown.visible};
+});
+assert.deepStrictEqual(told, {grown: [1.4, 2.4], sigma: [0.3, 0.6, 0.9], fan: 1, stop: true, hidden: true});
 
 // The geofence stands where it is told, and who is silent is seen on the time line.
 const lines = await page.evaluate(async () => {
@@ -141,7 +157,7 @@ const lines = await page.evaluate(async () => {
   const rows = model.rows.slice(0, 40).map((row, i) => Object.assign([...row], {0: i, 15: i < 20 ? 1 : 3}));
   drawTimeline(canvas, rows, 0, 40, 0);
   const pixel = (x) => [...canvas.getContext('2d').getImageData(x * devicePixelRatio, 72 * devicePixelRatio, 1, 1).data.slice(0, 3)];
-  const seen = [pixel(120), pixel(330)];
+  const seen = [pixel(120), pixel(380)];  // beside the words
   canvas.remove();
   return {ends: array.length / 3, low: Math.min(...array), high: Math.max(...array), shown, after: scene.fence.visible, seen};
 });

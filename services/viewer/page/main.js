@@ -3,7 +3,7 @@ import {Recording} from './recording.js';
 import {Scene3D} from './scene3d.js';
 import {drawTimeline, drawStrips, timeAt} from './strips.js';
 import {drawImage, showHealth, makeCommands, allowCommands} from './panels.js';
-import {T, DRONE, VERDICTS, VERDICT_COLORS, TARGET_STATES, HEALTHS, FOLLOWING, FLIGHT_STATES,
+import {T, DRONE, VERDICTS, VERDICT_COLORS, SCENE_COLORS, SCENE_WORDS, TARGET_STATES, HEALTHS, FOLLOWING, FLIGHT_STATES,
   FLIGHT_COLORS, format} from './names.js';
 
 const WINDOW = 60;   // s of a live flight that the strips show
@@ -115,11 +115,14 @@ const handlers = {
 const link = window.chaseRecording ? new Recording(handlers, window.chaseRecording) : new Link(handlers);
 window.chase.link = link;
 page.commands.hidden = !!window.chaseRecording;  // it has been flown
+document.body.classList.toggle('recorded', page.commands.hidden);
 
 const want = () => link.want(['cloud', 'image'].filter((part) => page[`want${part}`].checked));
-page.wantcloud.onchange = page.wantimage.onchange = () => { want(); if (!page.wantcloud.checked) scene.clear(); };
+page.wantcloud.onchange = page.wantimage.onchange = () => { want(); if (!page.wantcloud.checked) scene.clearSweeps(); };
 page.follow.onchange = () => { scene.follow = page.follow.checked; };
-page.showground.onchange = () => { scene.showGround = page.showground.checked; };
+const redraw = () => scene.setObstacles(scene.rows);
+page.showground.onchange = () => { scene.showGround = page.showground.checked; redraw(); };
+page.showgrown.onchange = () => { scene.showGrown = page.showgrown.checked; redraw(); };
 
 page.playbutton.onclick = () => link.ask({play: !model.play?.playing});
 page.speed.onchange = () => { link.ask({speed: Number(page.speed.value)}); page.speed.blur(); };
@@ -129,11 +132,18 @@ for (const canvas of [page.timeline, page.strips])
   canvas.onclick = (event) => { if (model.play) link.ask({seek: timeAt(canvas, event, ...span())}); };
 
 makeCommands(page, (request) => link.ask(request));
-page.legend.replaceChildren(...VERDICTS.map((name, i) => {
-  const entry = document.createElement('span'), box = document.createElement('i');
-  box.style.background = VERDICT_COLORS[i];
-  entry.append(box, name);
-  return entry;
-}));
+const legend = (name, entries) => {
+  const line = document.createElement('div'), made = entries.map(([text, color]) => {
+    const entry = document.createElement('span'), box = document.createElement('i');
+    box.style.background = color;
+    entry.append(box, text);
+    return entry;
+  });
+  line.append(name, ...made);
+  return line;
+};
+page.legend.replaceChildren(legend('', Object.entries(SCENE_WORDS).map(([key, text]) => [text, SCENE_COLORS[key]])),
+  legend('plan, wide: its stop ', VERDICTS.map((name, i) => [name, VERDICT_COLORS[i]])));
+page.colors.open = innerWidth > 800;  // a phone's scene has no room for them
 page.safety.onsubmit = (event) => event.preventDefault();
 window.addEventListener('resize', drawLines);

@@ -4,12 +4,12 @@ import {OrbitControls} from './OrbitControls.js';
 import {Detail, PERIOD} from './detail.js';
 import {Motion} from './motion.js';
 import {part, merge, setMerged} from './merged.js';
-import {VERDICT_COLORS, T, DRONE, TARGET} from './names.js';
+import {VERDICT_COLORS, SCENE_COLORS, T, DRONE, TARGET} from './names.js';
 
 const SWEEPS = 6;        // of the last seconds that stay on the screen
 const TRAIL = 20;        // s
 const MOST_POINTS = 20000;
-const KINDS = ['#8d97a5', '#d9534f', '#6b5f4a'];  // static, moving, ground
+const KINDS = ['still', 'moving', 'ground'].map((kind) => SCENE_COLORS[kind]);
 const SIGMAS = 3;        // of the target's ellipsoid; it is small beside the target
 const FOLLOW = 0.3;      // s: time constant of the camera
 const SLACK = 0.008;     // s by which a picture may come early: half a period of a screen of 60 Hz
@@ -59,11 +59,25 @@ const setLine = (object, points) => {
   object.geometry.setAttribute('position', new THREE.BufferAttribute(new Float32Array(points), 3));
 };
 
+// The unit sphere's three circles, as ends of lines.
+function circles(count) {
+  const ends = [], angle = 2 * Math.PI / count;
+  for (const [u, v] of [[0, 1], [1, 2], [2, 0]])
+    for (let i = 0; i < 2 * count; ++i) {
+      const p = [0, 0, 0], k = Math.ceil(i / 2);
+      [p[u], p[v]] = [Math.cos(k * angle), Math.sin(k * angle)];
+      ends.push(...p);
+    }
+  const geometry = new THREE.BufferGeometry();
+  geometry.setAttribute('position', new THREE.Float32BufferAttribute(ends, 3));
+  return geometry;
+}
+
 function makeDrone() {
   const at = (x, y, z) => new THREE.Matrix4().makeTranslation(x, y, z);
   const disc = new THREE.CylinderGeometry(0.11, 0.11, 0.02, 16).rotateX(Math.PI / 2);
   const nose = new THREE.ConeGeometry(0.05, 0.16, 12).rotateZ(-Math.PI / 2);
-  const rotors = [[1, 1], [1, -1], [-1, 1], [-1, -1]].map(([x, y]) => part(disc, '#4c9be8', at(0.16 * x, 0.16 * y, 0.04)));
+  const rotors = [[1, 1], [1, -1], [-1, 1], [-1, -1]].map(([x, y]) => part(disc, SCENE_COLORS.drone, at(0.16 * x, 0.16 * y, 0.04)));
   return new THREE.Mesh(merge([part(new THREE.BoxGeometry(0.22, 0.12, 0.08), '#dfe5ec'), ...rotors, part(nose, '#e8702a', at(0.18, 0, 0))]),
     new THREE.MeshLambertMaterial({vertexColors: true}));
 }
@@ -102,17 +116,17 @@ export class Scene3D {
     const grid = new THREE.GridHelper(200, 100, '#2c3542', '#222a34');
     grid.rotation.x = Math.PI / 2;
     this.drone = makeDrone();
-    const orange = new THREE.MeshLambertMaterial({color: '#e8702a'});
+    const orange = new THREE.MeshLambertMaterial({color: SCENE_COLORS.target});
     this.target = new THREE.Mesh(new THREE.CylinderGeometry(1, 1, 1, 24).rotateX(Math.PI / 2), orange);
-    this.covariance = new THREE.Mesh(new THREE.SphereGeometry(1, 20, 12),
-      new THREE.MeshBasicMaterial({color: '#ffd24d', wireframe: true, transparent: true, opacity: 0.5, depthTest: false}));
-    this.trail = line('#4c9be8', 0.6);
-    this.targetTrail = line('#e8702a', 0.5);
+    this.covariance = new THREE.Mesh(new THREE.SphereGeometry(1, 10, 8),
+      new THREE.MeshBasicMaterial({color: SCENE_COLORS.sigma, wireframe: true, transparent: true, opacity: 0.5, depthTest: false}));
+    this.trail = line(SCENE_COLORS.drone, 0.6);
+    this.targetTrail = line(SCENE_COLORS.target, 0.5);
     this.plan = tube('#ffffff', 0.035, 1);
     this.stop = tube('#ffffff', 0.06, 0.35);
-    this.forecast = tube('#ffd24d', 0.025, 1);
+    this.forecast = tube(SCENE_COLORS.forecast, 0.025, 1);
     this.fan = new THREE.Mesh(new THREE.BufferGeometry(),
-      new THREE.MeshBasicMaterial({color: '#ffd24d', transparent: true, opacity: 0.22, side: THREE.DoubleSide, depthWrite: false}));
+      new THREE.MeshBasicMaterial({color: SCENE_COLORS.forecast, transparent: true, opacity: 0.22, side: THREE.DoubleSide, depthWrite: false}));
     this.fan.frustumCulled = false;
     this.sight = line('#93a0b0', 0.35);
     this.solid = new THREE.Mesh(new THREE.BufferGeometry(), new THREE.MeshLambertMaterial({vertexColors: true}));
@@ -121,7 +135,8 @@ export class Scene3D {
     this.walls = new THREE.Mesh(new THREE.BufferGeometry(), new THREE.MeshBasicMaterial(
       {color: KINDS[0], transparent: true, opacity: 0.08, side: THREE.BackSide, depthWrite: false}));
     this.edges = new THREE.LineSegments(new THREE.BufferGeometry(), new THREE.LineBasicMaterial({color: '#6d7886'}));
-    this.obstacles = [this.solid, this.ground, this.walls, this.edges];
+    this.grown = new THREE.LineSegments(new THREE.BufferGeometry(), new THREE.LineBasicMaterial({color: SCENE_COLORS.grown, transparent: true, opacity: 0.45}));
+    this.obstacles = [this.solid, this.ground, this.walls, this.edges, this.grown];
     for (const thing of this.obstacles) thing.frustumCulled = false;
     this.cloud = new THREE.Points(new THREE.BufferGeometry(), new THREE.PointsMaterial({size: 2, sizeAttenuation: false, vertexColors: true}));
     this.cloud.geometry.setAttribute('position', new THREE.BufferAttribute(new Float32Array(3 * MOST_POINTS), 3));
@@ -129,7 +144,7 @@ export class Scene3D {
     this.points = 0;
     this.cloud.frustumCulled = false;
     this.sweeps = [];
-    this.fence = new THREE.LineSegments(new THREE.BufferGeometry(), new THREE.LineBasicMaterial({color: '#e05bd0'}));
+    this.fence = new THREE.LineSegments(new THREE.BufferGeometry(), new THREE.LineBasicMaterial({color: SCENE_COLORS.fence}));
     this.fence.frustumCulled = this.fence.visible = false;
     this.scene.add(this.fence, grid, this.drone, this.target, this.covariance, this.trail, this.targetTrail, this.plan, this.stop,
       this.forecast, this.fan, this.sight, ...this.obstacles, this.cloud);
@@ -137,15 +152,25 @@ export class Scene3D {
     this.solids = [new THREE.SphereGeometry(1, 16, 10), new THREE.BoxGeometry(2, 2, 2),
       new THREE.CylinderGeometry(1, 1, 2, 20).rotateX(Math.PI / 2)];
     this.boxEdges = new THREE.EdgesGeometry(this.solids[1]);
+    this.outlines = [circles(16), this.boxEdges,
+      new THREE.EdgesGeometry(new THREE.CylinderGeometry(1, 1, 2, 12).rotateX(Math.PI / 2), 20)];
+    this.rows = [];
+    this.radius = 0;         // m, by which shapes are grown
+    this.showGrown = true;
     this.shaft = new THREE.CylinderGeometry(0.02, 0.02, 1, 6).translate(0, 0.5, 0);
     this.head = new THREE.ConeGeometry(0.075, 0.25, 8);
     this.setObstacles([]);
   }
 
   clear() {
+    this.clearSweeps();
+    this.setObstacles([]);
+  }
+
+  clearSweeps() {
     this.sweeps = [];
     this.points = 0;
-    this.setObstacles([]);
+    this.dirty = true;
   }
 
   setState(state) {
@@ -165,6 +190,7 @@ export class Scene3D {
     setTube(this.stop, plan?.stop);
     setTube(this.forecast, forecast?.path);
     this.setFan(forecast);
+    this.grow(plan?.radius ?? 0);
     this.setFence(state.fence);
     setLine(this.sight, this.drone.visible && this.target.visible ? [...drone.p, ...target.p] : null);
     this.dirty = true;
@@ -214,7 +240,21 @@ export class Scene3D {
     this.dirty = true;
   }
 
+  // Where the drone's centre may not be: obstacles grown by what plans keep free.
+  grow(radius) {
+    if (radius === this.radius) return;
+    this.radius = radius;
+    this.setObstacles(this.rows);
+  }
+
+  grownOf(known) {
+    if (!this.showGrown || this.radius <= 0) return [];
+    return known.filter((row) => row.kind !== 2).map((row) =>
+      part(this.outlines[row.solid] ?? this.outlines[0], null, poseOf({...row, half: row.half.map((v) => v + this.radius)})));
+  }
+
   setObstacles(rows) {
+    this.rows = rows;
     const known = rows.filter((row) => [...row.p, ...row.half].every((v) => v !== null));
     const arrows = known.flatMap((row) => this.arrow(row)), solid = [...arrows], ground = [], walls = [], edges = [];
     for (const row of known) {
@@ -223,8 +263,9 @@ export class Scene3D {
       (wall ? walls : row.kind === 2 ? ground : solid).push(made);
       if (wall) edges.push(part(this.boxEdges, null, made.matrix));
     }
-    [solid, this.showGround ? ground : [], walls, edges].forEach((parts, i) => setMerged(this.obstacles[i], parts));
-    this.shown = {solids: known.length, arrows: arrows.length / 2};
+    const grown = this.grownOf(known);
+    [solid, this.showGround ? ground : [], walls, edges, grown].forEach((parts, i) => setMerged(this.obstacles[i], parts));
+    this.shown = {solids: known.length, arrows: arrows.length / 2, grown: grown.length};
     this.dirty = true;
   }
 
@@ -236,7 +277,7 @@ export class Scene3D {
     const turned = new THREE.Quaternion().setFromUnitVectors(new THREE.Vector3(0, 1, 0), v.normalize());
     const from = new THREE.Vector3(...row.p), to = from.clone().addScaledVector(v, length);
     const at = (p, size) => new THREE.Matrix4().compose(p, turned, new THREE.Vector3(1, size, 1));
-    return [part(this.shaft, '#ff8a80', at(from, length)), part(this.head, '#ff8a80', at(to, 1))];
+    return [part(this.shaft, SCENE_COLORS.velocity, at(from, length)), part(this.head, SCENE_COLORS.velocity, at(to, 1))];
   }
 
   // The newest sweep is bright, the ones before fade; colour: height above the lowest.

@@ -1,12 +1,12 @@
 // Time line and strips: plain 2D canvases over the rows of samples.
-import {T, DISTANCE, CLEARANCE, SPEED, PLAN_MS, VERDICT, TARGET_STATE, HEALTH, FLIGHT, PROCESSES, VERDICT_COLORS, TARGET_COLORS,
-  HEALTH_COLORS, FLIGHT_COLORS, FAULT_COLORS, format} from './names.js';
+import {T, DISTANCE, CLEARANCE, SPEED, PLAN_MS, VERDICT, TARGET_STATE, HEALTH, FLIGHT, PROCESSES, VERDICTS, VERDICT_COLORS,
+  TARGET_STATES, TARGET_COLORS, HEALTHS, HEALTH_COLORS, FLIGHT_STATES, FLIGHT_COLORS, FAULTS, FAULT_COLORS, format} from './names.js';
 
 const STRIPS = [['distance', DISTANCE, 'm', 2, '#4c9be8'], ['certified clearance', CLEARANCE, 'm', 2, '#3fa66b'],
   ['speed', SPEED, 'm/s', 2, '#d9a33a'], ['plan time', PLAN_MS, 'ms', 2, '#b455c9']];
-const LANES = [['flight', FLIGHT, FLIGHT_COLORS], ['verdict', VERDICT, VERDICT_COLORS], ['target', TARGET_STATE, TARGET_COLORS],
-  ['pose', HEALTH, HEALTH_COLORS], ['faults', PROCESSES, FAULT_COLORS]];
-const LEFT = 60, DIM = '#93a0b0';
+const LANES = [['flight', FLIGHT, FLIGHT_STATES, FLIGHT_COLORS], ['verdict', VERDICT, VERDICTS, VERDICT_COLORS],
+  ['target', TARGET_STATE, TARGET_STATES, TARGET_COLORS], ['pose', HEALTH, HEALTHS, HEALTH_COLORS], ['faults', PROCESSES, FAULTS, FAULT_COLORS]];
+const LEFT = 60, DIM = '#93a0b0', DARK = '#0c1116';
 
 function prepare(canvas) {
   const ratio = window.devicePixelRatio, width = canvas.clientWidth, height = canvas.clientHeight;
@@ -31,7 +31,7 @@ export function drawTimeline(canvas, rows, from, to, now) {
   const {context, width, height} = prepare(canvas);
   const x = (t) => LEFT + (width - LEFT - 8) * (t - from) / Math.max(to - from, 1e-6);
   const step = height / LANES.length;
-  LANES.forEach(([name, column, colors], lane) => {
+  LANES.forEach(([name, column, words, colors], lane) => {
     const top = lane * step + 2;
     context.fillStyle = DIM;
     context.fillText(name, 8, top + step / 2 - 1);
@@ -44,6 +44,10 @@ export function drawTimeline(canvas, rows, from, to, now) {
       if (!color || b < LEFT) continue;
       context.fillStyle = color;
       context.fillRect(a, top, Math.max(b - a, 1), step - 4);
+      const word = words[rows[i][column]];
+      if (context.measureText(word).width + 8 > b - a) continue;
+      context.fillStyle = DARK;
+      context.fillText(word, a + 4, top + step / 2 - 1);
     }
   });
   cursor(context, x(now), height);
@@ -72,8 +76,11 @@ export function drawStrips(canvas, rows, from, to, now) {
     context.fillStyle = DIM;
     context.fillText(most.toPrecision(2), 8, top + 9);
     context.fillText('0', 8, top + step - 8);
+    const text = `${name}  ${format(current?.[column], digits, unit)}`;
+    context.fillStyle = '#1a2028c0';  // the line goes on below
+    context.fillRect(LEFT + 4, top + 4, context.measureText(text).width + 8, 14);
     context.fillStyle = '#dfe5ec';
-    context.fillText(`${name}  ${format(current?.[column], digits, unit)}`, LEFT + 8, top + 11);
+    context.fillText(text, LEFT + 8, top + 11);
   });
   cursor(context, x(now), height);
 }

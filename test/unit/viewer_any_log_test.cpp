@@ -1,0 +1,95 @@
+// Logs that hold little: a LiDAR's recording, obstacles alone; and that no channel is forgotten.
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "chase/lidar_scan_t.hpp"
+#include "chase/obstacles_t.hpp"
+#include "common/bus/channels.h"
+#include "common/bus/log_writer.h"
+#include "services/viewer/recording.h"
+#include "services/viewer/shown_channels.h"
+#include "test/unit/viewer_memory_bus.h"
+
+namespace chase::viewer {
+namespace {
+
+using nlohmann::json;
+
+/// A log of two seconds with one message of `make(utime)` each 0.1 s, as the page gets it.
+template <class Make>
+Recording Recorded(const std::string& channel, const Make& make) {
+  const auto file = std::filesystem::temp_directory_path() /
+                    ("viewer_" + channel + std::to_string(::getpid()) + ".lcm");
+  bus::LogWriter log(file);
+  for (int64_t utime = kSecond; utime <= 3 * kSecond; utime += kSecond / 10)
+    log.Write(utime, channel, BytesOf(make(utime)));
+  log.Close();
+  const Recording recording = RecordLog(file);
+  std::filesystem::remove(file);
+  return recording;
+}
+
+int CountOf(const Recording& recording, Part part) {
+  return static_cast<int>(
+      std::count_if(recording.frames.begin(), recording.frames.end(),
+                    [part](const Recording::Frame& frame) { return frame.part == part; }));
+}
+
+TEST(ViewerAnyLog, SweepsAloneAreShownAndPlayed) {
+  const Recording recording = Recorded("LIDAR_SCAN", [](int64_t utime) {
+    lidar_scan_t m{};
+    m.utime = utime;
+    m.size = 2;
+    m.x = m.y = m.z = m.t = {0.0F, 1.0F};
+    m.intensity = m.ring = {0, 1};
+    return m;
+  });
+  EXPECT_GE(CountOf(recording, Part::kState), 20);
+  EXPECT_GE(CountOf(recording, Part::kCloud), 3);
+}
+
+TEST(ViewerAnyLog, MoversAreWhereTheirOwnTimeSays) {
+  const Recording recording = Recorded("OBSTACLES", [](int64_t utime) {
+    obstacle_t mover{};
+    mover.kind = obstacle_t::MOVING;
+    mover.center.utime = utime;
+    mover.center.duration = 1.0;
+    mover.center.n_coefficients = 6;
+    mover.center.coefficients = {1e-6 * static_cast<double>(utime), 0, 0, 1, 0, 0};  // x = t
+    mover.shape[0] = mover.shape[3] = mover.shape[5] = 1.0;
+    mover.orientation[0] = mover.existence = 1.0;
+    obstacles_t m{};
+    m.utime = utime;
+    m.n_obstacles = 1;
+    m.obstacles = {mover};
+    return m;
+  });
+  ASSERT_GT(CountOf(recording, Part::kObstacles), 2);
+  for (const Recording::Frame& frame : recording.frames) {
+    if (frame.part != Part::kObstacles) continue;
+    EXPECT_NEAR(json::parse(frame.bytes)["rows"][0]["p"][0], 1.0 + frame.t, 0.11);
+  }
+}
+
+TEST(ViewerAnyLog, EveryChannelIsShownButTheTruth) {
+  class ListeningBus : public MemoryBus {
+   public:
+    std::set<std::string> heard;
+
+   protected:
+    void SubscribeRaw(const std::string& channel, RawHandler) override { heard.insert(channel); }
+  } listener;
+  SubscribeShown(listener, [](const char*, const auto&) {});
+  for (const bus::ChannelRow& row : bus::ChannelTable())
+    EXPECT_EQ(listener.heard.count(row.channel),
+              row.channel == "TRUTH" || row.channel == "FAULT" ? 0U : 1U)
+        << row.channel;
+}
+
+}  // namespace
+}  // namespace chase::viewer
