@@ -58,19 +58,19 @@ Controls CutOff(double t, Controls* rest) {
   return part;
 }
 
-/// One attempt to separate a body from two balls.
+/// One attempt to separate a body from two balls, an interval at a time.
 class Prover {
  public:
   Prover(const Ball& drone, const Ball* target, const Body& body)
       : drone_(drone), target_(target), body_(body) {}
 
-  SeparationResult Prove(double from, double to);
+  /// `s`: the interval, and the normal to start from.
+  SeparationResult Prove(const Separation& s);
 
  private:
   enum class Answer { kPlane, kOverlap, kOpen };
 
   int Columns() const;
-  Vector3d Between(double from, double to) const;
   Controls MakeControls(int columns) const;
   Vector3d Lowest(const Controls& c, double radius, const Vector3d& n) const;
   double LeastRadius(const Controls& c) const;
@@ -101,21 +101,6 @@ Controls Prover::MakeControls(int columns) const {
       power.col(k).tail<9>() =
           Eigen::Map<const Eigen::Matrix<double, 9, 1>>(body_.covariance[k].data());
   return ToBernstein(power);
-}
-
-/// Of unit length, from the mean of the body's centre to the nearest point between the means of the
-/// balls' centres.
-Vector3d Prover::Between(double from, double to) const {
-  Vector3d n = MeanOf(drone_.center, from, to);
-  if (target_) {
-    const Vector3d along = MeanOf(target_->center, from, to) - n;
-    const Vector3d body = MeanOf(body_.center, from, to) - n;
-    const double length = along.squaredNorm();
-    if (length > 0.0) n += std::clamp(along.dot(body) / length, 0.0, 1.0) * along;
-  }
-  n -= MeanOf(body_.center, from, to);
-  const double distance = n.norm();
-  return distance > 0.0 ? Vector3d(n / distance) : Vector3d::UnitX();
 }
 
 double Prover::LeastRadius(const Controls& c) const {
@@ -174,9 +159,15 @@ bool Prover::Stop(Kept kept, double tau) {
 
 /// The separation, if it holds.
 bool Prover::Keeps(const Separation& s) {
-  const double room = ProvenRoom(s, drone_, target_, body_);
-  if (!(room >= 0.0)) return false;
-  result_.room = result_.certificate.empty() ? room : std::min(result_.room, room);
+  const Sweep drone(drone_, s.from, s.to, DegreeOf(drone_, body_));
+  std::optional<Sweep> target;
+  if (target_) target.emplace(*target_, s.from, s.to, DegreeOf(*target_, body_));
+  const Rooms room = ProvenRooms(s.normal, drone, target ? &*target : nullptr, body_);
+  if (!(room.Least() >= 0.0)) return false;
+  const bool first = result_.certificate.empty();
+  result_.room = first ? room
+                       : Rooms{std::min(result_.room.drone, room.drone),
+                               std::min(result_.room.target, room.target)};
   result_.certificate.push_back(s);
   return true;
 }
@@ -195,28 +186,65 @@ bool Prover::Descend(const Controls& c, Separation s, int depth) {
          Descend(right, {middle, s.to, now.normal}, depth - 1);
 }
 
-SeparationResult Prover::Prove(double from, double to) {
+SeparationResult Prover::Prove(const Separation& s) {
   const int columns = Columns();
-  if (columns > 16 || !(from >= 0.0 && from < to && to <= 1.0)) return result_;
-  if (!(body_.sigmas >= 0.0)) return result_;
-  Separation s{from, to, Between(from, to)};
-  if (Keeps(s)) {
-    result_.kept = Kept::kOff;
-    return result_;
-  }
+  if (columns > Sweep::kTerms || !(body_.sigmas >= 0.0)) return result_;
   Controls c = MakeControls(columns);
   if (!c.allFinite()) return result_;
-  if (to < 1.0) c = CutOff(to, &c);
-  if (from > 0.0) CutOff(from / to, &c);
+  if (s.to < 1.0) c = CutOff(s.to, &c);
+  if (s.from > 0.0) CutOff(s.from / s.to, &c);
   if (Descend(c, s, kDepth)) result_.kept = Kept::kOff;
   return result_;
 }
 
 }  // namespace
 
+Separator::Separator(const Ball& drone, const Ball* target, double from, double to)
+    : from_(from), to_(to), drone_(MakeParty(drone)) {
+  if (target) target_.emplace(MakeParty(*target));
+}
+
+Separator::Party Separator::MakeParty(const Ball& ball) const {
+  return {&ball, Sweep(ball, from_, to_, 0), MeanOf(ball.center, from_, to_)};
+}
+
+void Separator::TakeRadii() {
+  drone_.sweep.SetRadius(drone_.ball->radius);
+  if (target_) target_->sweep.SetRadius(target_->ball->radius);
+}
+
+void Separator::Raise(Party* party, const Body& body) const {
+  const int degree = DegreeOf(*party->ball, body);
+  if (party->sweep.degree != degree) party->sweep = Sweep(*party->ball, from_, to_, degree);
+}
+
+/// Of unit length, from the mean of the body's centre to the nearest point between the means of the
+/// balls' centres.
+Vector3d Separator::Between(const Body& body) const {
+  const Vector3d center = MeanOf(body.center, from_, to_);
+  Vector3d n = drone_.mean - center;
+  if (target_) {
+    const Vector3d along = target_->mean - drone_.mean;
+    const double length = along.squaredNorm();
+    if (length > 0.0) n -= std::clamp(along.dot(n) / length, -1.0, 0.0) * along;
+  }
+  const double distance = n.norm();
+  return distance > 0.0 ? Vector3d(n / distance) : Vector3d::UnitX();
+}
+
+SeparationResult Separator::From(const Body& body) {
+  Raise(&drone_, body);
+  if (target_) Raise(&*target_, body);
+  const Separation s{from_, to_, Between(body)};
+  const Rooms room = ProvenRooms(s.normal, drone_.sweep, target_ ? &target_->sweep : nullptr, body);
+  if (room.Least() >= 0.0) return {Kept::kOff, {s}, room, 0.0};
+  if (!(from_ >= 0.0 && from_ < to_ && to_ <= 1.0)) return {};
+  return Prover(*drone_.ball, target_ ? target_->ball : nullptr, body).Prove(s);
+}
+
 SeparationResult Separate(const Ball& drone, const Ball* target, const Body& body, double from,
                           double to) {
-  return Prover(drone, target, body).Prove(from, to);
+  return Separator(drone, target, from, to).From(body);
 }
 
 }  // namespace chase::world

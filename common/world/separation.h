@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "common/world/separation_check.h"
@@ -15,15 +16,40 @@ enum class Kept {
 struct SeparationResult {
   Kept kept = Kept::kUndecided;
   std::vector<Separation> certificate;  ///< in order, covers [from, to]; only with kOff
-  double room = 0.0;                    ///< least that it proves beyond the radii, m
+  Rooms room{0.0, 0.0};                 ///< least that it proves beyond the radii
   double tau = 0.0;
 };
 
-/// Planes that keep the body away from the drone's ball, or from the hull of the drone's and the
+/// Planes that keep bodies away from the drone's ball, or from the hull of the drone's and the
 /// target's ball where there is a `target`, for tau in [from, to] (all of it in [0,1]). The plane
 /// across the line between their means is tried first. An interval gets the plane between the body
 /// and the nearest point of the hull of all control points there, and is halved where there is
 /// none. What is returned as kOff has passed IsCertificate.
+class Separator {
+ public:
+  /// Keeps pointers to the balls.
+  Separator(const Ball& drone, const Ball* target, double from = 0.0, double to = 1.0);
+
+  /// To be called when the balls' radii have changed.
+  void TakeRadii();
+  SeparationResult From(const Body& body);
+
+ private:
+  struct Party {
+    const Ball* ball;
+    Sweep sweep;
+    Eigen::Vector3d mean;  ///< of the centre
+  };
+  Party MakeParty(const Ball& ball) const;
+  void Raise(Party* party, const Body& body) const;
+  Eigen::Vector3d Between(const Body& body) const;
+
+  double from_, to_;
+  Party drone_;
+  std::optional<Party> target_;
+};
+
+/// The same for one body.
 SeparationResult Separate(const Ball& drone, const Ball* target, const Body& body,
                           double from = 0.0, double to = 1.0);
 

@@ -11,24 +11,28 @@ using Eigen::Vector3d;
 
 constexpr double kNothing = -HUGE_VAL;
 constexpr double kRounding = 0x1p-53;
-constexpr int kTerms = 16;
+constexpr int kTerms = Sweep::kTerms;
 
-/// A polynomial in the power basis whose coefficients are within roundings * kRounding * size of
-/// the true ones, where size bounds the sum of the absolute values of all that is added up.
+/// A polynomial in the power basis whose coefficients are within 20 kRounding * size of the true
+/// ones, where size bounds the sum of the absolute values of all that is added up.
 struct Form {
+  int terms = 1;
   double f[kTerms] = {};
   double size = 0.0;
 
   void Add(int k, double value, double magnitude) {
     f[k] += value;
     size += magnitude;
+    terms = std::max(terms, k + 1);
   }
 };
 
-bool IsUsable(const Separation& s) {
-  const double squared = s.normal.squaredNorm();
-  return s.from >= 0.0 && s.from < s.to && s.to <= 1.0 && squared >= 0.5 && squared <= 2.0;
+bool IsInterval(double from, double to) { return from >= 0.0 && from < to && to <= 1.0; }
+bool IsNormal(const Vector3d& n) {
+  const double squared = n.squaredNorm();
+  return squared >= 0.5 && squared <= 2.0;
 }
+bool IsUsable(const Separation& s) { return IsInterval(s.from, s.to) && IsNormal(s.normal); }
 
 /// n' M n and the sum of the absolute values of its terms.
 double Quadratic(const Eigen::Matrix3d& M, const Vector3d& n, double* magnitude) {
@@ -60,26 +64,25 @@ void AddSolid(const Body& body, const Vector3d& n, Form* form) {
   }
 }
 
-/// Adds minus an upper bound of sigmas sqrt(n' S(tau) n): sqrt(x) <= (x / m + m) / 2 for every m,
-/// tight where m = sqrt(x).
-void AddUncertainty(const Separation& s, const Body& body, Form* form) {
+/// Adds minus an upper bound of sigmas sqrt(n' S n): sqrt(x) <= (x / m + m) / 2 for every m, tight
+/// at `tau`, where m = sqrt(x).
+void AddUncertainty(const Vector3d& n, double tau, const Body& body, Form* form) {
   if (body.sigmas == 0.0) return;
   double squared[3], magnitude[3];
-  for (int k = 0; k < 3; ++k) squared[k] = Quadratic(body.covariance[k], s.normal, &magnitude[k]);
-  const double tau = 0.5 * (s.from + s.to);
+  for (int k = 0; k < 3; ++k) squared[k] = Quadratic(body.covariance[k], n, &magnitude[k]);
   const double variance = (squared[2] * tau + squared[1]) * tau + squared[0];
   const double m = std::max(kLeastDeviation, std::sqrt(std::max(0.0, variance)));
-  const double half = 0.5 * body.sigmas;
-  for (int k = 0; k < 3; ++k) form->Add(k, -half * squared[k] / m, half * magnitude[k] / m);
+  const double half = 0.5 * body.sigmas, over = half / m;
+  for (int k = 0; k < 3; ++k) form->Add(k, -over * squared[k], over * magnitude[k]);
   form->Add(0, -half * m, half * m);
 }
 
-/// Adds n' curve with the sign; false where the degree is too high.
-bool AddCurve(const Curve& curve, const Vector3d& n, double sign, Form* form) {
+/// Adds minus n' curve; false where the degree is too high.
+bool AddCurve(const Curve& curve, const Vector3d& n, Form* form) {
   if (curve.rows() > kTerms) return false;
   const Vector3d absolute = n.cwiseAbs();
   for (int k = 0; k < curve.rows(); ++k)
-    form->Add(k, sign * (n.x() * curve(k, 0) + n.y() * curve(k, 1) + n.z() * curve(k, 2)),
+    form->Add(k, -(n.x() * curve(k, 0) + n.y() * curve(k, 1) + n.z() * curve(k, 2)),
               absolute.x() * std::abs(curve(k, 0)) + absolute.y() * std::abs(curve(k, 1)) +
                   absolute.z() * std::abs(curve(k, 2)));
   return true;
@@ -100,47 +103,50 @@ const Weights& BernsteinWeights(int n) {
   return all[static_cast<size_t>(n)];
 }
 
-/// A lower bound of the form on [from, to], from its Bernstein coefficients there.
+/// Power coefficients f over [0,1] to Bernstein coefficients of degree n >= terms - 1 over
+/// [from, to]; f is used up.
+void ToBernstein(double* f, int terms, int n, double from, double to, double* b) {
+  if (from > 0.0)
+    for (int i = 0; i + 1 < terms; ++i)
+      for (int k = terms - 2; k >= i; --k) f[k] += from * f[k + 1];
+  const double w = to - from;
+  double power = 1.0;
+  for (int k = 1; k < terms; ++k) f[k] *= power *= w;
+  const Weights& weights = BernsteinWeights(n);
+  for (int i = 0; i <= n; ++i) {
+    const auto& row = weights[static_cast<size_t>(i)];
+    b[i] = f[0];
+    for (int j = 1; j <= std::min(i, terms - 1); ++j) b[i] += row[static_cast<size_t>(j)] * f[j];
+  }
+}
+
+/// A lower bound of n' p - |n| r plus the form over the sweep's interval, from its Bernstein
+/// coefficients there.
 ///
 /// Rounding: with absolute values in place of all terms, f(from + w s) has coefficients of sum at
 /// most `size`, because from + w <= 1, and the weights of the Bernstein form are at most 1; so
-/// every number on the way is at most size and every rounding costs at most u size. A coefficient
-/// of the form takes at most 20 roundings, the shift by `from` 2 n + 1, the powers of w 2 n + 1,
-/// the weights and their sum n + 3: below 105 for n <= 15. Numbers below 1e-300 may vanish.
-double LowestOf(Form form, int n, double from, double to) {
-  double* f = form.f;
-  if (from > 0.0)
-    for (int i = 0; i < n; ++i)
-      for (int k = n - 1; k >= i; --k) f[k] += from * f[k + 1];
-  const double w = to - from;
-  double power = 1.0;
-  for (int k = 1; k <= n; ++k) f[k] *= power *= w;
-  const Weights& weights = BernsteinWeights(n);
-  double lowest = f[0];
-  for (int i = 1; i <= n; ++i) {
-    double b = 0.0;
-    for (int j = 0; j <= i; ++j)
-      b += weights[static_cast<size_t>(i)][static_cast<size_t>(j)] * f[j];
-    lowest = b < lowest ? b : lowest;
-    if (!(b > kNothing)) return kNothing;
+/// every number on the way is at most size and every rounding costs at most u size. The shift by
+/// `from` takes 2 n + 1 roundings, the powers of w 2 n + 1, the weights and their sum n + 3; before
+/// that a coefficient of the form takes at most 20, after it a product and four sums are left:
+/// below 105 for n <= 15. Numbers below 1e-300 may vanish.
+double RoomOf(const Vector3d& n, double length, const Sweep& sweep, Form form) {
+  if (sweep.degree + 1 < form.terms) return kNothing;
+  double b[kTerms];
+  ToBernstein(form.f, form.terms, sweep.degree, sweep.from, sweep.to, b);
+  double lowest = HUGE_VAL;
+  for (int i = 0; i <= sweep.degree; ++i) {
+    const double at = n.x() * sweep.points[0][i] + n.y() * sweep.points[1][i] +
+                      n.z() * sweep.points[2][i] - length * sweep.points[3][i] + b[i];
+    lowest = at < lowest ? at : lowest;
   }
-  if (!(form.size < 1e300)) return kNothing;
-  return lowest - 128.0 * kRounding * form.size - 1e-300;
+  const double size = form.size + std::abs(n.x()) * sweep.size[0] +
+                      std::abs(n.y()) * sweep.size[1] + std::abs(n.z()) * sweep.size[2] +
+                      length * sweep.size[3];
+  return size < 1e300 ? lowest - 128.0 * kRounding * size - 1e-300 : kNothing;
 }
 
-int DegreeOf(const Ball& ball, const Body& body) {
-  const Eigen::Index rows = std::max({ball.center.rows(), ball.radius.size(), body.center.rows(),
-                                      Eigen::Index{body.sigmas == 0.0 ? 1 : 3}});
-  return static_cast<int>(rows) - 1;
-}
-
-/// `form`: what the body takes. The lower bound for one ball.
-double RoomOf(const Separation& s, const Ball& ball, const Body& body, double length, Form form) {
-  const int n = DegreeOf(ball, body);
-  if (n >= kTerms || !AddCurve(ball.center, s.normal, 1.0, &form)) return kNothing;
-  for (int k = 0; k < ball.radius.size(); ++k)
-    form.Add(k, -length * ball.radius[k], length * std::abs(ball.radius[k]));
-  return LowestOf(form, n, s.from, s.to);
+int DegreeOf(const Ball& ball) {
+  return static_cast<int>(std::max(ball.center.rows(), ball.radius.size())) - 1;
 }
 
 }  // namespace
@@ -153,16 +159,57 @@ bool IsWellFormed(const std::vector<Separation>& certificate, double from, doubl
   return certificate.back().to >= to;
 }
 
-double ProvenRoom(const Separation& s, const Ball& drone, const Ball* target, const Body& body) {
-  if (!IsUsable(s) || !(body.half.minCoeff() >= 0.0) || !(body.sigmas >= 0.0)) return kNothing;
+Sweep::Sweep(const Ball& ball, double from_, double to_, int least)
+    : from(from_), to(to_), degree(std::max(DegreeOf(ball), least)) {
+  if (degree >= kTerms || !IsInterval(from, to)) degree = -1;
+  if (degree < 0) return;
+  const int terms = static_cast<int>(ball.center.rows());
+  for (int a = 0; a < 3; ++a) {
+    double f[kTerms];
+    size[a] = 0.0;
+    for (int k = 0; k < terms; ++k) size[a] += std::abs(f[k] = ball.center(k, a));
+    ToBernstein(f, terms, degree, from, to, points[a]);
+  }
+  SetRadius(ball.radius);
+}
+
+void Sweep::SetRadius(const math::Polynomial& radius) {
+  const int terms = static_cast<int>(radius.size());
+  if (terms > degree + 1) degree = -1;
+  if (degree < 0) return;
+  double f[kTerms] = {};
+  size[3] = 0.0;
+  for (int k = 0; k < terms; ++k) size[3] += std::abs(f[k] = radius[k]);
+  ToBernstein(f, terms, degree, from, to, points[3]);
+}
+
+int DegreeOf(const Ball& ball, const Body& body) {
+  const int asked = body.sigmas == 0.0 ? 0 : 2;
+  return std::max({DegreeOf(ball), static_cast<int>(body.center.rows()) - 1, asked});
+}
+
+Rooms ProvenRooms(const Vector3d& n, const Sweep& drone, const Sweep* target, const Body& body) {
+  constexpr Rooms kNone{kNothing, kNothing};
+  if (!IsNormal(n) || !(body.half.minCoeff() >= 0.0) || !(body.sigmas >= 0.0)) return kNone;
   Form form;
-  AddSolid(body, s.normal, &form);
-  AddUncertainty(s, body, &form);
-  if (!AddCurve(body.center, s.normal, -1.0, &form)) return kNothing;
-  const double length = s.normal.norm();
-  double room = RoomOf(s, drone, body, length, form);
-  if (target) room = std::min(room, RoomOf(s, *target, body, length, form));
-  return room / length - 8.0 * kRounding * std::abs(room);  // |n| and the quotient are rounded
+  AddSolid(body, n, &form);
+  AddUncertainty(n, 0.5 * (drone.from + drone.to), body, &form);
+  if (!AddCurve(body.center, n, &form)) return kNone;
+  const double length = n.norm();
+  const auto room_of = [&](const Sweep& sweep) {
+    const double room = RoomOf(n, length, sweep, form);
+    return room / length - 8.0 * kRounding * std::abs(room);  // |n| and the quotient are rounded
+  };
+  return {room_of(drone), target ? room_of(*target) : HUGE_VAL};
+}
+
+double ProvenRoom(const Separation& s, const Ball& drone, const Ball* target, const Body& body) {
+  const auto sweep = [&](const Ball& ball) {
+    return Sweep(ball, s.from, s.to, DegreeOf(ball, body));
+  };
+  if (!target) return ProvenRooms(s.normal, sweep(drone), nullptr, body).Least();
+  const Sweep second = sweep(*target);
+  return ProvenRooms(s.normal, sweep(drone), &second, body).Least();
 }
 
 bool IsCertificate(const std::vector<Separation>& certificate, double from, double to,

@@ -23,10 +23,38 @@ constexpr double kLeastDeviation = 1e-7;
 /// [0,1] with a normal of about unit length?
 bool IsWellFormed(const std::vector<Separation>& certificate, double from, double to);
 
-/// What a separation proves about [from, to] beyond the balls' radii: a lower bound of
-/// n' (p - c) - h(n) - |n| r, over |n|, m; negative infinity where the input is no input (an
-/// interval outside [0,1], a normal of another length, NaN, a degree above 15). `target`: null, or
-/// the second ball. In floating point with a bound on all rounding, well below a microsecond.
+/// A ball over [from, to] in Bernstein form, to be kept off many bodies.
+struct Sweep {
+  static constexpr int kTerms = 16;
+
+  /// Of the given degree, or that of the ball where it is higher.
+  Sweep(const Ball& ball, double from, double to, int degree);
+  void SetRadius(const math::Polynomial& radius);
+
+  double from, to;
+  int degree;  ///< below 0: no interval of [0,1], or a degree above 15: nothing is proven
+  double points[4][kTerms];  ///< coefficients of x, y, z of the centre and of the radius, m
+  double size[4];            ///< of each the sum of the absolute values in the power basis, m
+};
+
+/// The least degree at which a ball is asked of a body.
+int DegreeOf(const Ball& ball, const Body& body);
+
+/// What a plane proves of each ball, m.
+struct Rooms {
+  double drone, target;
+
+  double Least() const { return drone < target ? drone : target; }
+};
+
+/// What a separation by a plane with this normal proves about the sweeps' interval beyond the
+/// balls' radii: a lower bound of n' (p - c) - h(n) - |n| r, over |n|; negative infinity where the
+/// input is no input (a sweep that is none or of too low a degree, a normal of another length,
+/// NaN). `target`: null, then its room is infinite, or the second ball, over the same interval. In
+/// floating point with a bound on all rounding, in about 0.1 us.
+Rooms ProvenRooms(const Eigen::Vector3d& normal, const Sweep& drone, const Sweep* target,
+                  const Body& body);
+/// The least of them, for balls that are not asked of other bodies.
 double ProvenRoom(const Separation& separation, const Ball& drone, const Ball* target,
                   const Body& body);
 

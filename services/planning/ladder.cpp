@@ -344,8 +344,8 @@ class Ladder : public Planner {
   TableShelf shelf_;
   Refiner refiner_;
   PlanProof proof_;
-  Problem problem_, shorter_;      ///< over the whole horizon, over a part of it
-  Problem stopping_;               ///< memory of ways to rest
+  Problem problem_, shorter_;  ///< over the whole horizon, over a part of it
+  StopMemory stopping_;
   PlanRequest part_;               ///< what shorter_ was made from
   const Problem* used_ = nullptr;  ///< of the two, the one whose plan is taken
   double sight_from_ = 0.0;        ///< of that plan

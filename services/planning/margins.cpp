@@ -146,7 +146,9 @@ void RelaxSight(const world::Obstacle& o, const Growth& growth, const FirstSight
       return StaysOutside(target.curve, e->center, e->sight, share > 0.0 ? kClear : 1.0);
     return world::Separate(TargetBall(problem, share), nullptr, *e->body).kept == world::Kept::kOff;
   };
+  const bool beside = !MayTouch(first.box, e->center.topRows(1), e->sight_half, kClear);
   const auto begins_in_sight = [&](double share) {
+    if (beside) return true;
     if (!first.IsBeyond(e->center, e->sight, e->sight_half, share > 0.0 ? kClear : 1.0))
       return false;
     return !e->body || start->IsInSight(*e, share);

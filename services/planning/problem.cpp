@@ -14,14 +14,23 @@ namespace {
 
 constexpr double kBackInView = 0.25;  // tau by which a plan sees a target that it starts without
 
-// Deviations of the obstacle's position along the worst axis, times sigmas, at tau.
-double Uncertainty(const world::Obstacle& o, const Problem& problem, double tau) {
-  if (o.position_covariance.isZero(0.0) && o.velocity_covariance.isZero(0.0)) return 0.0;
-  const double age = problem.t0 + tau * problem.duration - o.center.start;
-  const Eigen::Vector3d variance =
-      o.position_covariance.diagonal() + age * age * o.velocity_covariance.diagonal();
-  return problem.sigmas * std::sqrt(std::max(0.0, variance.maxCoeff()));
-}
+// Deviations of the obstacle's position along the worst axis, times sigmas.
+struct Uncertainty {
+  double now = 0.0, then = 0.0;  // at tau = 0 and 1
+
+  Uncertainty(const world::Obstacle& o, const Problem& problem) {
+    if (o.position_covariance.isZero(0.0) && o.velocity_covariance.isZero(0.0)) return;
+    const auto deviations = [&](double t) {
+      const double age = t - o.center.start;
+      const Eigen::Vector3d variance =
+          o.position_covariance.diagonal() + age * age * o.velocity_covariance.diagonal();
+      return problem.sigmas * std::sqrt(std::max(0.0, variance.maxCoeff()));
+    };
+    now = deviations(problem.t0);
+    then = deviations(problem.t0 + problem.duration);
+  }
+  double most() const { return std::max(now, then); }
+};
 
 // Boxes around the Minkowski sums: half the sides of the solid's, and what it is grown by at most.
 void SetBoxes(const world::Obstacle& o, const Growth& most, Ellipsoid* e) {
@@ -29,7 +38,8 @@ void SetBoxes(const world::Obstacle& o, const Growth& most, Ellipsoid* e) {
   if (o.solid == world::Obstacle::Solid::kBox)
     half = (o.axes.toRotationMatrix().cwiseAbs() * o.half).array();
   else if (o.solid == world::Obstacle::Solid::kEllipsoid)
-    half = HalfSidesOf(o.shape);
+    half =
+        e->body ? Eigen::Array3d(e->body->shape.diagonal().array().sqrt()) : HalfSidesOf(o.shape);
   e->safety_half = half + most.safety;
   e->sight_half = half + most.sight;
 }
@@ -126,8 +136,7 @@ void SetTargetBody(const world::Obstacle& o, double hard, StartCheck* start, Pro
   e.grown_from = o.shape;
   e.sight_from = 1.0;
   e.safety_radius = hard;
-  const double most = std::max(Uncertainty(o, *problem, 0.0), Uncertainty(o, *problem, 1.0));
-  SetBoxes(o, {hard + most, 0.0}, &e);
+  SetBoxes(o, {hard + Uncertainty(o, *problem).most(), 0.0}, &e);
   if (!start->IsSafe(e, hard)) {
     e.safety_from = kLeaveBy;
     Note(notes, "starts at the target");
@@ -194,6 +203,7 @@ void MakeProblem(const PlannerConfig& config, const PlanRequest& request, std::s
   const Hull target(problem->target);
   const FirstSight first(*problem);
   StartCheck start(*problem);
+  const Box at_start{first.p.array(), first.p.array()};
   const Box own{target.whole.low.min(first.box.low), target.whole.high.max(first.box.high)};
   for (size_t j = 0; j < request.obstacles.size(); ++j) {
     const world::Obstacle& o = request.obstacles[j];
@@ -205,21 +215,24 @@ void MakeProblem(const PlannerConfig& config, const PlanRequest& request, std::s
     e->sight_from = asks_sight ? 0.0 : 1.0;
     e->sight_share = 1.0;
     e->safety_radius = hard + margin;
-    world::SetCurve(o.center, request.t0, request.horizon, &e->center);
-    const double then = Uncertainty(o, *problem, 1.0), now = Uncertainty(o, *problem, 0.0);
-    const Growth growth{hard + margin + 0.5 * (now + then), sight + 0.5 * (now + then)};
+    const Uncertainty uncertain(o, *problem);
+    const double mean = 0.5 * (uncertain.now + uncertain.then), most = uncertain.most();
+    const Growth growth{hard + margin + mean, sight + mean};
     SetShapes(config, request, o, growth, e);
-    const double most = std::max(now, then);
+    if (e->body)
+      e->center = e->body->center;
+    else
+      world::SetCurve(o.center, request.t0, request.horizon, &e->center);
     const Growth widest{hard + margin + most,
                         config.sight_margin + problem->target_growth.sum() + most};
     SetBoxes(o, widest, e);
     const bool searched = !o.ground && (request.asks_sight || !e->body);
     if (e->body && searched) ClearStart(o, growth.safety, problem->start, e);
     // Far from start and target no margin has to give way.
-    if (!MayTouch(own, e->center, e->safety_half.max(e->sight_half), kClear)) continue;
-    RelaxSafety(o, hard, margin, now, searched, &start, e, notes);
-    if (!asks_sight) continue;
-    RelaxSight(o, growth, first, target, *problem, &start, e, notes);
+    if (MayTouch(at_start, e->center, e->safety_half, kClear))
+      RelaxSafety(o, hard, margin, uncertain.now, searched, &start, e, notes);
+    if (asks_sight && MayTouch(own, e->center, e->sight_half, kClear))
+      RelaxSight(o, growth, first, target, *problem, &start, e, notes);
   }
   problem->target_body.reset();
   if (request.target_body) SetTargetBody(*request.target_body, hard, &start, problem, notes);

@@ -9,13 +9,36 @@
 namespace chase::planning {
 namespace {
 
-// A box that holds a plan and, if asked, the line of sight; none where its degree is too high.
+// A box that holds a plan; none where its degree is too high.
 std::optional<Box> BoxAround(const Curve& plan) {
   if (plan.rows() > 7) return std::nullopt;
   return BoxOf(ToPoints(plan, 6), 7, 1e-6);
 }
 
-Box Union(const Box& a, const Box& b) { return {a.low.min(b.low), a.high.max(b.high)}; }
+// Sorts out what is plainly far from the plan, and from the line of sight where that is asked for.
+class Sieve {
+ public:
+  Sieve(const Curve& plan, const Problem& problem, double sight_from)
+      : sight_(sight_from < 1.0), box_(BoxAround(plan)) {
+    if (!sight_ || !box_) return;
+    const std::optional<Box> seen = BoxAround(problem.target);
+    if (seen)
+      box_ = Box{box_->low.min(seen->low), box_->high.max(seen->high)};
+    else
+      box_.reset();
+  }
+
+  // Of obstacles that stand for a solid.
+  bool IsNear(const Ellipsoid& e) const {
+    if (!e.body) return false;
+    if (!box_) return true;
+    return MayTouch(*box_, e.center, sight_ ? e.safety_half.max(e.sight_half) : e.safety_half, 1.0);
+  }
+
+ private:
+  bool sight_;
+  std::optional<Box> box_;
+};
 
 // A plan that starts within an obstacle's hard shape has to leave it: along the way out at its
 // start the distance never shrinks.
@@ -38,34 +61,86 @@ class Prover {
       : problem_(problem),
         sight_from_(sight_from),
         drone_(DroneBall(plan, 0.0)),
-        target_(TargetBall(problem, 1.0)) {}
+        eye_(drone_),
+        target_(TargetBall(problem, 1.0)),
+        safety_(drone_, nullptr),
+        sight_(eye_, &target_) {}
 
   // Asks all of the obstacle where it might matter; adds the proofs to `proofs`, if there are to be
-  // any.
+  // any. The planes that keep the line of sight off keep the drone's ball off, too: they prove
+  // safety where that leaves more than others do, so that the least clearance has planes of its
+  // own.
   bool IsOff(const Ellipsoid& e, std::vector<Proof>* proofs) {
-    const bool sight = std::max(sight_from_, e.sight_from) < 1.0;
     if (e.safety_from > 0.0 && !Leaves(drone_.center, e)) return false;
-    return Prove(e, false, e.safety_from, proofs) &&
-           (!sight || Prove(e, true, std::max(sight_from_, e.sight_from), proofs));
+    world::SeparationResult safety, sight;
+    const double from = SightFrom(e);
+    if (from < 1.0 && !IsKept(sight = KeepInSight(e))) return false;
+    const double left = sight.room.drone - (e.safety_radius - SightRadius(e));
+    const bool shared =
+        from <= e.safety_from && left > kSlack && (!proofs || e.safety_radius + left > least_);
+    if (!shared && !IsKept(safety = KeepOff(e))) return false;
+    if (!proofs) return true;
+    if (shared) {
+      safety.certificate = sight.certificate;
+      safety.room.drone = left;
+    }
+    least_ = std::min(least_, e.safety_radius + safety.room.drone);
+    Add(e.id, e.safety_from, e.safety_radius, std::move(safety), proofs);
+    if (from >= 1.0) return true;
+    Add(e.id, from, SightRadius(e), std::move(sight), proofs);
+    proofs->back().of_sight = true;
+    proofs->back().target_radius = target_.radius;
+    return true;
   }
 
+  // How many proofs: of safety, and of sight.
+  int Asks(const Ellipsoid& e) const { return SightFrom(e) < 1.0 ? 2 : 1; }
+
  private:
-  bool Prove(const Ellipsoid& e, bool of_sight, double from, std::vector<Proof>* proofs) {
-    drone_.radius[0] = of_sight ? e.sight_share * problem_.sight_radius : e.safety_radius;
-    if (of_sight) target_.radius = TargetRadius(problem_, e.sight_share);
-    world::SeparationResult result =
-        world::Separate(drone_, of_sight ? &target_ : nullptr, *e.body, from, 1.0);
-    if (result.kept != world::Kept::kOff) return false;
-    if (!proofs) return true;
-    proofs->push_back({e.id, of_sight, from, drone_.radius[0], math::Polynomial::Zero(2),
-                       std::move(result.certificate), result.room});
-    if (of_sight) proofs->back().target_radius = target_.radius;
-    return true;
+  static constexpr double kSlack = 1e-9;  // m; more than the rounding of a room
+
+  static bool IsKept(const world::SeparationResult& result) {
+    return result.kept == world::Kept::kOff;
+  }
+  double SightFrom(const Ellipsoid& e) const { return std::max(sight_from_, e.sight_from); }
+  double SightRadius(const Ellipsoid& e) const { return e.sight_share * problem_.sight_radius; }
+
+  world::SeparationResult KeepOff(const Ellipsoid& e) {
+    if (drone_.radius[0] != e.safety_radius) {
+      drone_.radius[0] = e.safety_radius;
+      safety_.TakeRadii();
+    }
+    if (e.safety_from > 0.0) return world::Separate(drone_, nullptr, *e.body, e.safety_from);
+    return safety_.From(*e.body);
+  }
+
+  world::SeparationResult KeepInSight(const Ellipsoid& e) {
+    if (e.sight_share != share_) {
+      share_ = e.sight_share;
+      eye_.radius[0] = SightRadius(e);
+      target_.radius = TargetRadius(problem_, share_);
+      sight_.TakeRadii();
+    }
+    if (SightFrom(e) > 0.0) return world::Separate(eye_, &target_, *e.body, SightFrom(e));
+    return sight_.From(*e.body);
+  }
+
+  static void Add(int obstacle, double from, double radius, world::SeparationResult&& result,
+                  std::vector<Proof>* proofs) {
+    Proof& proof = proofs->emplace_back();
+    proof.obstacle = obstacle;
+    proof.from = from;
+    proof.radius = radius;
+    proof.separations = std::move(result.certificate);
+    proof.room = result.room.drone;
   }
 
   const Problem& problem_;
   double sight_from_;
-  world::Ball drone_, target_;  ///< of radii that are set for each obstacle
+  world::Ball drone_, eye_, target_;  ///< the last two: ends of the line of sight
+  double share_ = -1.0;               ///< of the margins of sight that their radii are
+  world::Separator safety_, sight_;
+  double least_ = HUGE_VAL;  ///< distance to the obstacles of the proofs so far, m
 };
 
 }  // namespace
@@ -86,12 +161,9 @@ world::Ball TargetBall(const Problem& problem, double share) {
 
 bool StaysOff(const Curve& plan, const Problem& problem, double sight_from, int* first) {
   Prover prover(plan, problem, sight_from);
-  const std::optional<Box> box = BoxAround(plan), seen = BoxAround(problem.target);
+  const Sieve sieve(plan, problem, sight_from);
   const auto is_off = [&](const Ellipsoid& e) {
-    if (!e.body) return true;
-    const bool far = box && seen &&
-                     !MayTouch(Union(*box, *seen), e.center, e.safety_half.max(e.sight_half), 1.0);
-    return far || prover.IsOff(e, nullptr);
+    return !sieve.IsNear(e) || prover.IsOff(e, nullptr);
   };
   const int n = static_cast<int>(problem.obstacles.size());
   const auto is_off_at = [&](int j) {
@@ -108,13 +180,23 @@ bool StaysOff(const Curve& plan, const Problem& problem, double sight_from, int*
   return true;
 }
 
+// Where a plan fails it fails at what is near: that is asked first.
 std::optional<std::vector<Proof>> ProveOff(const Curve& plan, const Problem& problem,
                                            double sight_from) {
   Prover prover(plan, problem, sight_from);
-  std::vector<Proof> proofs;
-  proofs.reserve(2 * problem.obstacles.size() + 1);
+  const Sieve sieve(plan, problem, sight_from);
+  std::vector<Proof> near, proofs;
   for (const Ellipsoid& e : problem.obstacles)
-    if (e.body && !prover.IsOff(e, &proofs)) return std::nullopt;
+    if (sieve.IsNear(e) && !prover.IsOff(e, &near)) return std::nullopt;
+  proofs.reserve(2 * problem.obstacles.size() + 1);
+  auto next = near.begin();
+  for (const Ellipsoid& e : problem.obstacles) {
+    if (sieve.IsNear(e)) {
+      for (int i = prover.Asks(e); i > 0; --i) proofs.push_back(std::move(*next++));
+    } else if (e.body && !prover.IsOff(e, &proofs)) {
+      return std::nullopt;
+    }
+  }
   if (problem.target_body && !prover.IsOff(*problem.target_body, &proofs)) return std::nullopt;
   return proofs;
 }

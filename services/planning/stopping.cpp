@@ -20,16 +20,6 @@ constexpr double kAlike = 0.01;   // m of clearance that make no difference
 // slabs reach 0.3 m above what they stand for. The check allows as much: kLeaveGroundBy.
 constexpr double kOutBy = 0.6;
 
-/// Ways to rest ask for safety alone.
-PlanRequest WithoutSight(const PlanRequest& request, const world::State& start, double t0) {
-  PlanRequest rest = request;
-  rest.t0 = t0;
-  rest.start = start;
-  rest.asks_sight = false;
-  rest.running.reset();
-  return rest;
-}
-
 /// Coefficients in Bernstein form of degree n that continue position, velocity, acceleration and
 /// jerk of s over T; the rest are zero.
 Points Continued(const world::State& s, double T, int n) {
@@ -78,15 +68,23 @@ double DistanceTo(const world::Obstacle& o, const Vector3d& d) {
   return scale > 0.0 ? (scale - 1.0) * scale / outwards.norm() : -1.0 / std::sqrt(o.shape.trace());
 }
 
-/// Comes to rest from the request's start, or from other states.
+/// Comes to rest from the request's start, or from other states; sight is not asked for.
 class Resting {
  public:
-  /// `memory`: working memory of earlier calls, whatever their obstacles.
-  Resting(const PlannerConfig& config, PlanRequest request, Problem* memory = nullptr)
-      : config_(config), request_(std::move(request)), problem_(memory ? *memory : own_) {
-    From(request_.start, request_.t0);
+  Resting(const PlannerConfig& config, const PlanRequest& request, StopMemory* memory = nullptr)
+      : config_(config),
+        request_(memory ? memory->request : own_.request),
+        problem_(memory ? memory->problem : own_.problem) {
+    request_ = request;
+    request_.asks_sight = false;
+    From(request.start, request.t0);
   }
-  Resting(const Resting&) = delete;  // problem_ may be its own
+  Resting(const Resting&) = delete;  // request_ and problem_ may be its own
+
+  void KeepOff(const std::vector<world::Obstacle>& more) {
+    request_.obstacles.insert(request_.obstacles.end(), more.begin(), more.end());
+    has_problem_ = false;
+  }
 
   void From(const world::State& start, double t0) {
     request_.start = start;
@@ -105,8 +103,7 @@ class Resting {
   /// A certified way over T, if the curve is one.
   std::optional<Stop> Certified(const Curve& curve, double T) {
     SetProblem(T);
-    if (!curve.allFinite() || !KeepsLimits(curve, problem_) || !StaysOff(curve, problem_, 1.0))
-      return std::nullopt;
+    if (!curve.allFinite() || !KeepsLimits(curve, problem_)) return std::nullopt;
     auto proofs = ProveOff(curve, problem_, 1.0);
     if (!proofs) return std::nullopt;
     return Stop{{request_.t0, T, curve}, std::move(*proofs), true};
@@ -198,10 +195,10 @@ class Resting {
   }
 
   const PlannerConfig& config_;
-  PlanRequest request_;
-  Curve heights_;
-  Problem own_;
+  StopMemory own_;
+  PlanRequest& request_;
   Problem& problem_;
+  Curve heights_;
   bool has_problem_ = false;
   std::optional<std::pair<double, double>> within_;
 };
@@ -237,7 +234,9 @@ std::vector<world::Obstacle> UnseenAround(const PlannerConfig& config, const Pla
 bool KeepsOff(const PlannerConfig& config, const PlanRequest& request,
               const std::vector<world::Obstacle>& unseen, const world::Trajectory& plan, double t) {
   if (unseen.empty() || t <= plan.start) return true;
-  PlanRequest part = WithoutSight(request, request.start, plan.start);
+  PlanRequest part = request;
+  part.asks_sight = false;
+  part.t0 = plan.start;
   part.horizon = t - plan.start;
   part.obstacles = unseen;
   part.target_body.reset();
@@ -247,7 +246,7 @@ bool KeepsOff(const PlannerConfig& config, const PlanRequest& request,
 }  // namespace
 
 std::optional<Stop> Brake(const PlannerConfig& config, const PlanRequest& request) {
-  return Resting(config, WithoutSight(request, request.start, request.t0)).Brake();
+  return Resting(config, request).Brake();
 }
 
 std::optional<Stop> GoTo(const PlannerConfig& config, const PlanRequest& request,
@@ -256,7 +255,7 @@ std::optional<Stop> GoTo(const PlannerConfig& config, const PlanRequest& request
   // the acceleration of the shortest way at 5 m/s^2.
   constexpr double kPace = 1.0, kLeast = 1.5;  // m/s, s
   const double quickest = std::max(kLeast, (end - request.start.p).norm() / kPace);
-  Resting resting(config, WithoutSight(request, request.start, request.t0));
+  Resting resting(config, request);
   for (const double slower : {1.0, 1.5, 2.2}) {
     const double T = slower * quickest;
     if (auto stop = resting.Certified(CurveTo(request.start, T, end), T)) return stop;
@@ -269,15 +268,14 @@ std::optional<Stop> GoOn(const PlannerConfig& config, const PlanRequest& request
   constexpr double kLeast = 0.1;  // s
   const double T = way.end() - request.t0;
   if (T < kLeast || request.t0 < way.start) return std::nullopt;
-  Resting resting(config, WithoutSight(request, request.start, request.t0));
+  Resting resting(config, request);
   return resting.Certified(ToCurve(way, request.t0, T), T);
 }
 
 Stop Evade(const PlannerConfig& config, const PlanRequest& request) {
   static const std::vector<Vector3d> displacements = Displacements();
   constexpr double kOver[] = {1.0, 1.6};
-  const PlanRequest rest = WithoutSight(request, request.start, request.t0);
-  Resting resting[] = {{config, rest}, {config, rest}};
+  Resting resting[] = {{config, request}, {config, request}};
   Stop best;
   std::pair<double, double> least{-HUGE_VAL, -HUGE_VAL};
   const auto weigh = [&](Resting* way, const Curve& curve, double T) {
@@ -288,7 +286,7 @@ Stop Evade(const PlannerConfig& config, const PlanRequest& request) {
     best.trajectory = {request.t0, T, curve};
   };
   constexpr double kLongest = kTimes[4];
-  Resting braking(config, rest);
+  Resting braking(config, request);
   for (const double T : {kTimes[0], kTimes[2], kLongest}) {
     const Curve curve = BrakeCurve(request.start, T);
     if (braking.CanBeFlown(curve, T)) weigh(&braking, curve, T);
@@ -338,7 +336,7 @@ PlanResult RestPlan(const PlannerConfig& config, const PlanRequest& request) {
 }
 
 std::optional<Stop> WayOut(const PlannerConfig& config, const PlanRequest& request,
-                           const world::Trajectory& plan, Problem* memory) {
+                           const world::Trajectory& plan, StopMemory* memory) {
   PlannerConfig hard = config;
   hard.safety_margin = 0.0;
   const std::vector<world::Obstacle> unseen = UnseenAround(hard, request);
@@ -346,9 +344,8 @@ std::optional<Stop> WayOut(const PlannerConfig& config, const PlanRequest& reque
     return std::any_of(unseen.begin(), unseen.end(),
                        [&](const auto& o) { return o.id == proof.obstacle; });
   };
-  PlanRequest rest = WithoutSight(request, request.start, request.t0);
-  rest.obstacles.insert(rest.obstacles.end(), unseen.begin(), unseen.end());
-  Resting resting(hard, std::move(rest), memory);
+  Resting resting(hard, request, memory);
+  resting.KeepOff(unseen);
   for (const double after : {kOverdue, 0.2, 0.7, 1.1, HUGE_VAL}) {
     const double t = std::min(plan.start + after, plan.end());
     resting.From(plan.At(t), t);

@@ -70,6 +70,36 @@ TEST(Separation, KeepsOffWhatStaysClearAndNothingThatComesCloser) {
   Expect(ProveRandomPairs(1, 3000));
 }
 
+/// Asked of many bodies in a row, of other degrees, radii and uncertainties, the balls get the
+/// answers that they get for each alone.
+TEST(Separation, ManyBodiesGetTheAnswersOfOne) {
+  int kept = 0;
+  for (uint64_t seed = 0; seed < 100; ++seed) {
+    Random random(seed, 21);
+    SeparationPair pair = RandomPair(&random);
+    Separator many(pair.drone, pair.second());
+    for (int i = 0; i < 20; ++i) {
+      Body body = RandomPair(&random).body;
+      if (i % 5 == 0) body.center.conservativeResizeLike(Curve::Zero(10, 3));
+      if (i % 3 == 0) pair.drone.radius *= random.Uniform(0.5, 1.4);
+      many.TakeRadii();
+      const SeparationResult a = many.From(body), b = Separate(pair.drone, pair.second(), body);
+      ASSERT_EQ(a.kept, b.kept) << seed << " " << i;
+      ASSERT_EQ(a.certificate.size(), b.certificate.size());
+      for (size_t k = 0; k < a.certificate.size(); ++k)
+        EXPECT_EQ(a.certificate[k].normal, b.certificate[k].normal);
+      if (a.kept != Kept::kOff) continue;
+      ++kept;
+      EXPECT_TRUE(IsCertificate(a.certificate, 0.0, 1.0, pair.drone, pair.second(), body));
+      // What holds for both holds for the drone's ball, with what is left of it as its radius.
+      Ball drone = pair.drone;
+      drone.radius[0] += a.room.drone - 1e-9;
+      EXPECT_TRUE(IsCertificate(a.certificate, 0.0, 1.0, drone, nullptr, body));
+    }
+  }
+  EXPECT_GT(kept, 500);
+}
+
 /// --gtest_also_run_disabled_tests --gtest_filter=*HundredThousand*: about ten minutes.
 TEST(Separation, DISABLED_HundredThousandPairs) { Expect(ProveRandomPairs(2, 100000)); }
 
