@@ -37,7 +37,7 @@ struct PlanRequest {
   world::State start;                          ///< at t0
   std::optional<YawStart> yaw;                 ///< at t0; none: towards the target
   world::Trajectory target;                    ///< p_WT(t)
-  double target_sigma = 0.0;                   ///< largest standard deviation of p_WT at t0, m
+  double target_sigma = 0.0;                   ///< largest deviation of p_WT at target.start, m
   double target_speed_sigma = 0.0;             ///< and of its velocity, m/s
   std::vector<world::Obstacle> obstacles;      ///< at their true size
   std::vector<world::Obstacle> unseen;         ///< places that nobody has looked into

@@ -144,13 +144,14 @@ void SetTargetBody(const world::Obstacle& o, double hard, StartCheck* start, Pro
   problem->target_body = e;
 }
 
-// A chord over the deviation, which is convex in tau.
+// A chord over the deviation, which is convex in tau and grows with the forecast's age.
 math::Polynomial TargetGrowth(const PlannerConfig& config, const PlanRequest& request) {
-  const double now = config.sigmas * request.target_sigma;
-  const double then = config.sigmas * std::hypot(request.target_sigma,
-                                                 request.target_speed_sigma * request.horizon);
+  const double age = request.t0 - request.target.start;
+  const auto deviations = [&](double since) {
+    return config.sigmas * std::hypot(request.target_sigma, request.target_speed_sigma * since);
+  };
   math::Polynomial growth(2);
-  growth << now, then - now;
+  growth << deviations(age), deviations(age + request.horizon) - deviations(age);
   return growth;
 }
 
