@@ -1,0 +1,178 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+
+#include "common/world/plan_check.h"
+#include "common/world/random.h"
+#include "services/planning/pilot.h"
+
+// Whole flights of the pilot behind a target that goes round among pillars, is lost for a while and
+// found again: each plan follows from the one before, in time, and holds for whoever checks it.
+
+namespace chase::planning {
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr double kPeriod = 0.01, kSeen = 0.3, kListed = 0.1;  // s
+constexpr double kRound = 3.0, kSpeed = 0.8;                  // m, m/s
+constexpr double kClimbed = 4.0;                              // s; the target waits until then
+
+struct Course {
+  std::function<Forecast(double)> forecast;
+  std::vector<world::Obstacle> obstacles;
+  double lost, found, end;  ///< s
+};
+
+/// Constant acceleration from now on.
+Forecast ForecastOf(double t, const Vector3d& p, const Vector3d& v, const Vector3d& a) {
+  constexpr double kHorizon = 2.5;
+  Forecast f;
+  f.t = t;
+  f.has_target = true;
+  f.target = {t, kHorizon, Eigen::MatrixXd::Zero(3, 3)};
+  f.target.coefficients.row(0) = p.transpose();
+  f.target.coefficients.row(1) = kHorizon * v.transpose();
+  f.target.coefficients.row(2) = 0.5 * kHorizon * kHorizon * a.transpose();
+  f.sigma = 0.03;
+  f.speed_sigma = 0.05;
+  f.radius = 0.3;
+  f.height = 1.7;
+  return f;
+}
+
+Forecast GoingRound(double t) {
+  const double angle = kSpeed / kRound * t;
+  const Vector3d along(std::cos(angle), std::sin(angle), 0.0), inwards(-along.y(), along.x(), 0.0);
+  const Vector3d p = kRound * Vector3d(along.y(), 1.0 - along.x(), 0.0) + Vector3d(0.0, 0.0, 0.85);
+  return ForecastOf(t, p, kSpeed * along, kSpeed * kSpeed / kRound * inwards);
+}
+
+/// Away from the target's round and from the place of the start.
+std::vector<world::Obstacle> RandomPillars(unsigned seed) {
+  world::Random random(seed, 3);
+  std::vector<world::Obstacle> pillars;
+  while (pillars.size() < 6) {
+    const Vector3d p(random.Uniform(-6.0, 6.0), random.Uniform(-3.0, 9.0), 1.5);
+    const double off = std::abs((p.head<2>() - Eigen::Vector2d(0.0, kRound)).norm() - kRound);
+    if (off < 1.2 || p.head<2>().norm() < 3.5) continue;
+    world::Obstacle o;
+    o.id = static_cast<int>(pillars.size());
+    o.solid = world::Obstacle::Solid::kCylinder;
+    o.half = {0.25, 0.25, 2.0};
+    o.shape = (2.0 * o.half.cwiseAbs2()).cwiseInverse().asDiagonal();
+    o.center = world::Trajectory::Constant(p, 0.0, 1.0);
+    o.position_covariance.diagonal().setConstant(1e-4);
+    pillars.push_back(o);
+  }
+  return pillars;
+}
+
+/// What control is told of a plan.
+world::Claim ClaimOf(const PlanResult& plan, const world::Trajectory& target,
+                     const PlannerConfig& c) {
+  world::Claim claim;
+  claim.position = plan.trajectory;
+  claim.target = target;
+  claim.stop = plan.stop;
+  claim.proofs = plan.proofs;
+  claim.stop_proofs = plan.stop_proofs;
+  claim.hard_radius = c.hard_radius();
+  claim.sigmas = c.sigmas;
+  claim.certified = plan.certified_clearance >= 0.0;
+  claim.last_resort = plan.verdict == Verdict::kBrake || plan.verdict == Verdict::kWait;
+  claim.starts_inside = claim.last_resort || plan.verdict == Verdict::kEscape;
+  return claim;
+}
+
+struct Counts {
+  int plans = 0, chases = 0, of = 0, searches = 0, certified = 0;
+};
+
+class Flown {
+ public:
+  Flown(const Course& course, unsigned seed) : course_(course), seed_(seed) {}
+
+  void Fly(Counts* counts) {
+    double seen = -1.0, listed = -1.0;
+    for (; t_ < course_.end; t_ += kPeriod) {
+      if (t_ - listed > kListed - 1e-9) pilot_.SetObstacles(listed = t_, course_.obstacles);
+      const bool visible = t_ < course_.lost || t_ > course_.found;
+      if (visible && t_ - seen > kSeen - 1e-9)
+        pilot_.SetForecast(forecast_ = course_.forecast(seen = t_));
+      pilot_.SetFlying(!plans_.empty());
+      if (const auto plan = pilot_.Update(t_, Body())) Take(*plan, counts);
+    }
+  }
+
+  // Flies each plan from its start on.
+  BodyEstimate Body() const {
+    const auto flown = std::find_if(plans_.rbegin(), plans_.rend(),
+                                    [&](const PlanResult& p) { return p.trajectory.start <= t_; });
+    if (flown == plans_.rend()) return {{-2.5, 0.0, 0.1}, Vector3d::Zero(), 0.0};
+    const world::Trajectory& way = flown->trajectory;
+    const double now = std::min(t_, way.end()), tau = (now - way.start) / way.duration;
+    return {way.Position(now), t_ < way.end() ? way.Velocity(now) : Vector3d::Zero(),
+            YawAt(flown->yaw, tau, way.duration).yaw};
+  }
+
+ private:
+  void Take(const PlanResult& plan, Counts* counts) {
+    if (!plans_.empty() && plans_.back().reason != "climbing") Follows(plans_.back(), plan);
+    const std::string bad =
+        world::Refute(ClaimOf(plan, forecast_.target, config_.planner),
+                      {config_.planner.hard_radius(), config_.planner.sigmas}, course_.obstacles);
+    if (plan.reason != "climbing") {
+      EXPECT_EQ(bad, "") << seed_ << " " << t_ << " " << Name(plan.verdict) << plan.reason;
+      ++counts->plans;
+      counts->certified += plan.certified_clearance >= 0.0;
+    }
+    const bool sight = plan.verdict <= Verdict::kKept;
+    const double stale = course_.lost + config_.stale_prediction + kPeriod;
+    const bool gone = t_ > stale && t_ < course_.found;
+    EXPECT_FALSE(sight && gone) << t_;
+    EXPECT_TRUE(sight || !plan.reason.empty()) << Name(plan.verdict);
+    const bool settled = (t_ > kClimbed + 2.0 && t_ < course_.lost) || t_ > course_.found + 3.0;
+    counts->of += settled;
+    counts->chases += settled && sight;
+    counts->searches += gone && plan.reason.find("lost") != std::string::npos;
+    plans_.push_back(plan);
+  }
+
+  // It begins where and as the one before is then, neither too soon nor too late after it.
+  void Follows(const PlanResult& before, const PlanResult& plan) const {
+    const double start = plan.trajectory.start, gap = start - before.trajectory.start;
+    EXPECT_NEAR(start, t_ + config_.latency, 1e-9);
+    EXPECT_GE(gap, config_.min_period - 1e-6) << t_;
+    EXPECT_LE(gap, config_.replan_period + kPeriod + 1e-6) << t_;
+    const double then = std::min(start, before.trajectory.end());
+    EXPECT_LT((plan.trajectory.Position(start) - before.trajectory.Position(then)).norm(), 1e-6);
+    if (start < before.trajectory.end()) {
+      EXPECT_LT((plan.trajectory.Velocity(start) - before.trajectory.Velocity(start)).norm(), 1e-6);
+    }
+  }
+
+  PlanningConfig config_;
+  Pilot pilot_{config_};
+  Course course_;
+  unsigned seed_;
+  double t_ = 0.0;
+  Forecast forecast_;
+  std::vector<PlanResult> plans_;
+};
+
+TEST(Flights, EachPlanFollowsFromTheOneBeforeAndHolds) {
+  Counts counts;
+  for (unsigned seed = 0; seed < 8; ++seed)
+    Flown({GoingRound, RandomPillars(seed), 12.0, 16.0, 22.0}, seed).Fly(&counts);
+  std::printf("%d plans, %d certified; in sight %d of %d; %d of searches\n", counts.plans,
+              counts.certified, counts.chases, counts.of, counts.searches);
+  EXPECT_GE(counts.chases, 0.9 * counts.of);
+  EXPECT_GT(counts.searches, 8);
+  EXPECT_GE(counts.certified, 0.95 * counts.plans);
+}
+
+}  // namespace
+}  // namespace chase::planning

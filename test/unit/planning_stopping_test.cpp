@@ -1,0 +1,220 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "common/world/random.h"
+#include "services/planning/stopping.h"
+
+// Ways to rest, against brakings written anew and judged by sampled distances.
+
+namespace chase::planning {
+namespace {
+
+using Eigen::Vector3d;
+using world::Random;
+
+constexpr int kInstants = 200;
+
+Vector3d RandomVector(Random* random, double x, double y, double z) {
+  const double a = random->Uniform(-x, x), b = random->Uniform(-y, y);
+  return {a, b, random->Uniform(-z, z)};
+}
+
+/// An upright cylinder that stands, or walks.
+world::Obstacle RandomCylinder(Random* random, int id, const Vector3d& at) {
+  world::Obstacle o;
+  o.id = id;
+  o.moving = random->Uniform() < 0.5;
+  o.solid = world::Obstacle::Solid::kCylinder;
+  const double radius = random->Uniform(0.1, 0.6);
+  o.half = {radius, radius, random->Uniform(0.5, 2.0)};
+  o.shape = (2.0 * o.half.cwiseAbs2()).cwiseInverse().asDiagonal();
+  o.center = {0.0, 1.0, Eigen::MatrixXd::Zero(o.moving ? 2 : 1, 3)};
+  o.center.coefficients.row(0) = at.transpose();
+  if (o.moving) o.center.coefficients.row(1) = RandomVector(random, 1.5, 1.5, 0.0).transpose();
+  return o;
+}
+
+double Distance(const world::Obstacle& o, const Vector3d& p, double t) {
+  const Vector3d d = p - o.center.Position(t);
+  const double across = d.head<2>().norm() - o.half.x(), above = std::abs(d.z()) - o.half.z();
+  return std::hypot(std::max(0.0, across), std::max(0.0, above)) +
+         std::min(0.0, std::max(across, above));
+}
+
+/// Fast, at a height that no limit is near to, among one to six cylinders that leave the start
+/// free.
+PlanRequest RandomRequest(const PlannerConfig& c, unsigned seed) {
+  Random random(seed, 5);
+  PlanRequest request;
+  request.t0 = random.Uniform(0.0, 2.0);
+  request.start.p = {0.0, 0.0, random.Uniform(1.4, 1.6)};
+  request.start.v = RandomVector(&random, 2.5, 2.5, 0.3);
+  request.start.a = RandomVector(&random, 2.0, 2.0, 0.3);
+  request.target = world::Trajectory::Constant({0.0, 0.0, 50.0}, 0.0, 5.0);
+  const int n = 1 + static_cast<int>(random.Next() % 6);
+  while (static_cast<int>(request.obstacles.size()) < n) {
+    const int id = static_cast<int>(request.obstacles.size());
+    const auto o =
+        RandomCylinder(&random, id, RandomVector(&random, 3.0, 3.0, 1.0) + Vector3d(0.0, 0.0, 1.5));
+    const double room = c.hard_radius() + c.safety_margin + 0.01;
+    if (Distance(o, request.start.p, request.t0) > room) request.obstacles.push_back(o);
+  }
+  return request;
+}
+
+/// The curve of degree 5 that continues the start and comes to rest at T without acceleration.
+world::Trajectory Braking(const PlanRequest& request, double T) {
+  const world::State& s = request.start;
+  world::Trajectory way{request.t0, T, Eigen::MatrixXd::Zero(6, 3)};
+  auto& c = way.coefficients;
+  c.row(0) = s.p.transpose();
+  c.row(1) = T * s.v.transpose();
+  c.row(2) = T * T / 2.0 * s.a.transpose();
+  c.row(3) = T * T * T / 6.0 * s.j.transpose();
+  c.row(4) = -(c.row(1) + 1.5 * c.row(2) + 1.5 * c.row(3));
+  c.row(5) = -(2.0 * c.row(2) + 6.0 * c.row(3) + 12.0 * c.row(4)) / 20.0;
+  return way;
+}
+
+/// Least of what is left of distances, speed and acceleration, the last two as shares.
+double Room(const PlannerConfig& c, const PlanRequest& request, const world::Trajectory& way) {
+  const double speed = std::max(c.max_speed, request.start.v.norm());
+  const double acceleration = std::max(c.max_acceleration, request.start.a.norm());
+  double least = HUGE_VAL;
+  for (int i = 0; i <= kInstants; ++i) {
+    const double t = way.start + way.duration * i / kInstants;
+    for (const world::Obstacle& o : request.obstacles)
+      least = std::min(least, Distance(o, way.Position(t), t) - c.hard_radius() - c.safety_margin);
+    if (i == 0) continue;  // what the start has is allowed
+    least = std::min(least, 1.0 - way.Velocity(t).norm() / speed);
+    least = std::min(least, 1.0 - way.Acceleration(t).norm() / acceleration);
+  }
+  return least;
+}
+
+// Of brakings that take 0.6 to 3 s one is found that takes at most 1.4 times as long as the
+// quickest, where they are free for that long; none where all touch or ask for too much.
+TEST(Brake, FindsAQuickOneWhereThereIsOneAndNoneElse) {
+  const PlannerConfig c;
+  constexpr double kStep = 0.02, kLonger = 1.4;
+  int found = 0, none = 0;
+  for (unsigned seed = 0; seed < 600; ++seed) {
+    const PlanRequest request = RandomRequest(c, seed);
+    double free_since = HUGE_VAL, quick = HUGE_VAL;
+    bool any = false;
+    for (double T = 0.6; T <= 3.0 + 1e-9 && quick == HUGE_VAL; T += kStep) {
+      const double room = Room(c, request, Braking(request, T));
+      any = any || room > -0.005;
+      if (room <= 0.005)
+        free_since = HUGE_VAL;
+      else if (free_since == HUGE_VAL)
+        free_since = T;
+      if (T >= kLonger * free_since) quick = T;
+    }
+    const auto stop = Brake(c, request);
+    if (quick < HUGE_VAL) {
+      ASSERT_TRUE(stop) << seed;
+      EXPECT_LE(stop->trajectory.duration, quick + kStep) << seed;
+    }
+    found += stop.has_value();
+    none += !any;
+    if (!stop) continue;
+    EXPECT_TRUE(any) << seed;
+    const world::Trajectory& way = stop->trajectory;
+    const world::Trajectory same = Braking(request, way.duration);
+    EXPECT_TRUE(way.start == request.t0 && stop->certified);
+    EXPECT_LT((way.Position(way.end()) - same.Position(way.end())).norm(), 1e-9) << seed;
+    EXPECT_LT((way.Velocity(way.start + 0.3) - same.Velocity(way.start + 0.3)).norm(), 1e-9);
+    EXPECT_GE(Room(c, request, way), -1e-6) << seed;
+    EXPECT_EQ(stop->proofs.size(), request.obstacles.size());
+  }
+  EXPECT_GT(found, 100);
+  EXPECT_GT(none, 20);
+}
+
+// What leads to a place is certified, leads there and rests there.
+TEST(GoTo, LeadsToThePlaceWhereTheWayIsFree) {
+  const PlannerConfig c;
+  int found = 0;
+  for (unsigned seed = 0; seed < 300; ++seed) {
+    PlanRequest request = RandomRequest(c, seed);
+    request.start.v *= 0.2;
+    request.start.a.setZero();
+    Random random(seed, 6);
+    const Vector3d end = request.start.p + RandomVector(&random, 4.0, 4.0, 0.2);
+    const auto way = GoTo(c, request, end);
+    request.obstacles.clear();
+    EXPECT_TRUE(GoTo(c, request, end)) << seed;
+    if (!way) continue;
+    ++found;
+    request = RandomRequest(c, seed);
+    EXPECT_GE(Room(c, request, way->trajectory), -1e-6) << seed;
+    EXPECT_LT((way->trajectory.Position(way->trajectory.end()) - end).norm(), 1e-9) << seed;
+    EXPECT_TRUE(world::EndsAtRest(way->trajectory)) << seed;
+    // Its rest is as certified, later on.
+    request.t0 += 0.4;
+    request.start = way->trajectory.At(request.t0);
+    const auto rest = GoOn(c, request, way->trajectory);
+    ASSERT_TRUE(rest) << seed;
+    EXPECT_NEAR(rest->trajectory.end(), way->trajectory.end(), 1e-9);
+    EXPECT_LT(
+        (rest->trajectory.Position(request.t0 + 0.5) - way->trajectory.Position(request.t0 + 0.5))
+            .norm(),
+        1e-9);
+  }
+  EXPECT_GT(found, 60);
+}
+
+/// When a way first touches, s after its start; infinite where it never does.
+double FirstContact(const PlannerConfig& c, const PlanRequest& request,
+                    const world::Trajectory& way) {
+  for (double t = way.start; t <= way.end(); t += 0.005)
+    for (const world::Obstacle& o : request.obstacles)
+      if (Distance(o, way.Position(t), t) < c.drone_radius) return t - way.start;
+  return HUGE_VAL;
+}
+
+// Walkers close in from all sides: what is flown touches no earlier than any braking within the
+// limits would.
+TEST(Evade, TouchesNoEarlierThanABraking) {
+  const PlannerConfig c;
+  int weighed = 0, later = 0;
+  for (unsigned seed = 0; seed < 40; ++seed) {
+    Random random(seed, 7);
+    PlanRequest request = RandomRequest(c, seed);
+    request.start.v *= 0.5;
+    request.obstacles.clear();
+    const PlanRequest alone = request;
+    const double speed = random.Uniform(2.6, 3.5);
+    for (int i = 0; i < 10; ++i) {
+      const double angle = 2.0 * M_PI * (i + random.Uniform(-0.1, 0.1)) / 10.0;
+      const Vector3d away(std::cos(angle), std::sin(angle), 0.0);
+      world::Obstacle o = RandomCylinder(&random, i, 2.2 * away + Vector3d(0.0, 0.0, 1.5));
+      o.half = {0.5, 0.5, 4.0};
+      o.center.start = request.t0;
+      o.center.coefficients = Eigen::MatrixXd::Zero(2, 3);
+      o.center.coefficients << 2.2 * away.transpose(), -speed * away.transpose();
+      o.center.coefficients(0, 2) = 1.5;
+      o.moving = true;
+      request.obstacles.push_back(o);
+    }
+    const Stop stop = Evade(c, request);
+    if (stop.certified) continue;
+    ++weighed;
+    const double contact = FirstContact(c, request, stop.trajectory);
+    double best = 0.0;
+    for (const double T : {0.6, 1.0, 1.7}) {
+      const world::Trajectory way = Braking(request, T);
+      if (Room(c, alone, way) > 0.01) best = std::max(best, FirstContact(c, request, way));
+    }
+    EXPECT_GE(contact, best - 0.03) << seed;
+    EXPECT_GE(Room(c, alone, stop.trajectory), -1e-6) << seed;
+    later += contact > best + 0.05;
+  }
+  EXPECT_GT(weighed, 10);
+  EXPECT_GT(later, 0);
+}
+
+}  // namespace
+}  // namespace chase::planning
