@@ -141,7 +141,7 @@ std::string SceneOf(const target_t& m) {
 }
 
 std::string SceneOf(const plan_t& m) {
-  const auto verdict = static_cast<size_t>(m.verdict);
+  const auto verdict = static_cast<uint8_t>(m.verdict);
   Tint tint = verdict < std::size(kVerdicts) ? kVerdicts[verdict] : kUnknown;
   Proto entity = Entity(m.utime, "plan");
   if (m.position.n_coefficients > 0) entity.Put(kLine, Curve(m.position, kThickness, tint));
