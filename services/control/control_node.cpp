@@ -67,7 +67,7 @@ void ControlNode::OnGeofence(const geofence_t& message) {
   if (config_.geofence.Exists() || !home_ || home_->first != message.epoch) return;
   const Eigen::Vector3d& home = home_->second;
   fence_.polygon.clear();
-  for (int32_t i = 0; i + 1 < message.n_corners; i += 2)
+  for (std::size_t i = 0; i + 1 < message.corners.size(); i += 2)
     fence_.polygon.emplace_back(message.corners[i] - home.x(), message.corners[i + 1] - home.y());
   fence_.floor = message.floor - home.z();
   fence_.ceiling = message.ceiling - home.z();
