@@ -56,8 +56,9 @@ const page = await pageClient(viewer.port);
 page.ask({speed: 5});
 const seen = await connect(viewer.port, [FoxgloveClient.SUPPORTED_SUBPROTOCOL]);
 assert.deepStrictEqual(seen.info.capabilities, ['parameters']);
+const keepPlaying = () => { if (page.newest.state?.play && !page.newest.state.play.playing) page.ask({play: true}); };
 await until('a message on every channel', () => {
-  if (page.newest.state?.play && !page.newest.state.play.playing) page.ask({play: true});
+  keepPlaying();
   return seen.channels.size >= Object.keys(EXPECTED).length &&
     Object.keys(EXPECTED).every((topic) => seen.channels.has(topic)) &&
     [...seen.channels.keys()].every((topic) => seen.counts.has(topic));
@@ -86,9 +87,12 @@ for (const {topics, imageMode, paths} of Object.values(layout.configById)) {
 for (const topic of named) assert.ok(seen.channels.has(topic) || topic === 'GEOFENCE/scene', `the layout shows ${topic}`);  // the gym has none
 assert.ok(named.size >= 8);
 
-// What is drawn: the target with its uncertainty, the plan with its stop, the forecast with its spread.
+// What is drawn, once the target is tracked: with its uncertainty, the plan with its stop, the forecast with its spread.
 for (const [topic, part, least] of [['TARGET/scene', 'spheres', 1], ['PLAN/scene', 'lines', 2], ['PREDICTION/scene', 'spheres', 5]])
-  assert.ok((seen.most.get(topic)?.[part] ?? 0) >= least, `${topic}: ${JSON.stringify(seen.most.get(topic))}`);
+  await until(`${topic} with ${least} ${part}`, () => {
+    keepPlaying();
+    return (seen.most.get(topic)?.[part] ?? 0) >= least;
+  });
 
 seen.client.getParameters([], 'all');
 await until('parameters', () => seen.parameters);
