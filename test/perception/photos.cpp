@@ -127,6 +127,7 @@ void RunDraws(const Arguments& a, const std::vector<Photo>& photos, const Detect
         missed += overlap <= 0.0;
         PerceptionConfig config;
         config.detector = learned.config;
+        config.state.acquire_score = learned.acquire_score;
         const PictureDetector detector(config);
         claimed += detector.Find(photos[i].bgr).has_value();
         invented += detector.Find(absent[i]).has_value();
@@ -201,7 +202,9 @@ double Median(std::vector<double> values) {
 
 void RunService(const Arguments& a, const std::vector<Photo>& photos, PerceptionConfig config) {
   const auto chosen = Draw(photos.size(), a.train, 1);
-  config.detector = Learn(photos, chosen, config.detector).config;
+  const Learned learned = Learn(photos, chosen, config.detector);
+  config.detector = learned.config;
+  config.state.acquire_score = learned.acquire_score;
   // Its height is twice its width at the foot, more or less; a scale is fitted below.
   config.target_radius = 0.5 * config.target_height * config.detector.shape.aspect;
   config.rig.camera_pitch_deg = 0.0;

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "services/perception/belief/perceiver.h"
+#include "services/perception/sight/color_detector.h"
 #include "services/perception/tools/learn.h"
 
 namespace chase::perception {
@@ -216,6 +217,17 @@ Marked Shaped(const std::vector<cv::Point>& outline) {
 }
 
 Marked Cone() { return Shaped({{135, 70}, {145, 70}, {165, 170}, {115, 170}}); }
+
+TEST(PerceptionLearn, PartsTheTargetFromWhatLooksAlikeInThePictures) {
+  Marked a(40, 50, 0);
+  a.bgr(cv::Rect(180, 100, 40, 60)).setTo(cv::Scalar(20, 110, 240));  // wider
+  const Learned learned = LearnDetector({a.bgr}, {a.mask}, {});
+  const auto found = ColorDetector(learned.config, 1.0).Detect(a.bgr);
+  ASSERT_GE(found.size(), 2u);
+  EXPECT_GT(found[0].score, learned.acquire_score);
+  EXPECT_LT(found[1].score, learned.acquire_score);
+  EXPECT_GT(found[1].score, StateConfig{}.acquire_score);  // it was taken for the target
+}
 
 TEST(PerceptionLearn, TellsHowFarTheOutlineIsFromTheModels) {
   const auto departure = [](const Marked& m) {

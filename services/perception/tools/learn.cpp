@@ -141,6 +141,23 @@ double MeanOverlap(const std::vector<cv::Mat>& images, const std::vector<cv::Mat
   return sum / static_cast<double>(images.size());
 }
 
+/// Half-way between the target's scores, in the median, and the best of anything else's in the
+/// pictures that the colour is from.
+double AcquireScore(const std::vector<cv::Mat>& images, const std::vector<cv::Mat>& masks,
+                    const std::vector<Separation>& pictures, const ColorDetector& detector) {
+  std::vector<double> target;
+  double other = 0.0;
+  for (size_t i = 0; i < images.size(); ++i) {
+    if (!pictures[i].used) continue;
+    const auto found = detector.Detect(images[i]);
+    if (const Detection* marked = MarkedBlob(found, masks[i])) target.push_back(marked->score);
+    for (const auto& d : found)
+      if (!d.part && !d.edged && cv::countNonZero(d.mask & masks[i](d.mask_box)) == 0)
+        other = std::max(other, d.score);
+  }
+  return 0.5 * (Median(std::move(target)) + other);
+}
+
 }  // namespace
 
 double Overlap(const DetectorConfig& config, const cv::Mat& bgr, const cv::Mat& mask) {
@@ -168,8 +185,10 @@ Learned LearnDetector(const std::vector<cv::Mat>& images, const std::vector<cv::
     config.shape.inset = i * kInsetStep;
     const double overlap =
         MeanOverlap(images, masks, color_of.pictures, ColorDetector(config.shape, color, 1.0));
-    if (i == 0 || overlap > best.overlap) best = {config, overlap, shapeless, color_of};
+    if (i == 0 || overlap > best.overlap) best = {config, 0.0, overlap, shapeless, color_of};
   }
+  best.acquire_score =
+      AcquireScore(images, masks, color_of.pictures, ColorDetector(best.config.shape, color, 1.0));
   return best;
 }
 

@@ -11,6 +11,7 @@ namespace chase::perception {
 /// What is learned from, and how well the learned detector marks it.
 struct Learned {
   DetectorConfig config;
+  double acquire_score = 0.0;          ///< that parts the target from all else in the pictures
   double overlap = 0.0;                ///< mean of intersection over union with the masks
   std::vector<std::string> shapeless;  ///< pairs that do not tell the shape, and why
   LearnedColor color;                  ///< how well it separates, and which pictures it is from

@@ -69,6 +69,7 @@ void Learn(const std::vector<std::string>& files, const std::string& base, const
   }
   const Learned learned = LearnDetector(images, masks, config.detector);
   config.detector = learned.config;
+  config.state.acquire_score = learned.acquire_score;
   const std::string text = Quality(files, learned) + Checked(config);
   if (!(std::ofstream(out) << text))
     throw std::runtime_error(out + ": cannot be written; name a file in an existing folder");
