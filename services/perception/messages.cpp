@@ -36,19 +36,11 @@ cv::Mat ToBgr(const cv::Mat& image, int32_t pixelformat) {
   return bgr;
 }
 
-int8_t Code(TargetState state) {
-  switch (state) {
-    case TargetState::kSearching:
-      return target_t::SEARCHING;
-    case TargetState::kTracking:
-      return target_t::TRACKING;
-    case TargetState::kOccluded:
-      return target_t::OCCLUDED;
-    case TargetState::kLost:
-      break;
-  }
-  return target_t::LOST;
-}
+// The wire counts the states in the same order.
+static_assert(static_cast<int>(TargetState::kSearching) == target_t::SEARCHING &&
+              static_cast<int>(TargetState::kTracking) == target_t::TRACKING &&
+              static_cast<int>(TargetState::kOccluded) == target_t::OCCLUDED &&
+              static_cast<int>(TargetState::kLost) == target_t::LOST);
 
 }  // namespace
 
@@ -111,7 +103,7 @@ PoseSample FromMessage(const pose_t& m, int64_t origin) {
 target_t ToMessage(const TargetEstimate& target, int64_t utime) {
   target_t m{};
   m.utime = utime;
-  m.state = Code(target.state);
+  m.state = static_cast<int8_t>(target.state);
   bus::Set(m.mean, target.p_WT);
   bus::Set(m.covariance, target.covariance);
   bus::Set(m.velocity_covariance, target.velocity_covariance);

@@ -70,7 +70,7 @@ TEST(PerceptionCandidate, ASpeedByLidarPointsIsAWay) {
   c.track.state.covariance.block<2, 2>(3, 3) = 0.01 * Eigen::Matrix2d::Identity();
   EXPECT_FALSE(c.Drives()) << "edges alone make up speeds along the line of sight";
   c.ranged = true;
-  c.last.n_points = 20;
+  c.last.fit.n_points = 20;
   c.known = c.track.t = c.swept = 0.05;
   EXPECT_FALSE(c.Drives()) << "one sweep tells no speed";
   c.track.t = c.swept = 0.15;
@@ -174,12 +174,12 @@ TEST(PerceptionCandidate, IsFollowedWhereASideIsHiddenAndLidarTellsWhereItIs) {
   c.ranged = true;
   c.track.hits = 2;
   Sighting hidden;
-  hidden.n_points = 20;
+  hidden.fit.n_points = 20;
   hidden.fit.used = {false, true, true, true};
   for (auto& samples : hidden.detection.silhouette.samples) samples.resize(3);
   ASSERT_TRUE(c.HiddenIn(hidden));
   Sighting s = hidden;
-  s.n_points = 5;
+  s.fit.n_points = 5;
   EXPECT_FALSE(c.HiddenIn(s)) << "the range is a guess";
   s = hidden;
   s.fit.used[kTop] = false;
@@ -197,7 +197,7 @@ TEST(PerceptionCandidate, CountsSightingsWithLidarPoints) {
   s.fit.posterior = c.track.state;
   for (const int points : {0, 12, 0, 9}) {
     c.track.t += 0.05;
-    s.n_points = points;
+    s.fit.n_points = points;
     c.Correct(s);
   }
   EXPECT_EQ(c.sweeps, 2);

@@ -241,7 +241,7 @@ TEST(PerceptionCandidate, WithoutPointsAWayAlongTheLineOfSightIsNotSure) {
   EXPECT_FALSE(across.SurelyDrives(0.5));
   along.ranged = true;
   EXPECT_FALSE(along.SurelyDrives(0.15)) << "points of the first time alone";
-  along.last.n_points = 20;
+  along.last.fit.n_points = 20;
   EXPECT_TRUE(along.SurelyDrives(0.15));
 }
 

@@ -27,7 +27,7 @@ constexpr double kAnew = 2.0;     // s that it stood, after which its way is cou
 constexpr double kBetter = 0.25;  // share of the first variance from which a start is taken anew
 
 void CountSweep(Candidate* c) {
-  if (c->last.n_points == 0) return;
+  if (c->last.fit.n_points == 0) return;
   ++c->sweeps;
   c->swept = c->track.t;
 }
@@ -51,7 +51,7 @@ void Candidate::Correct(const Sighting& sighting) {
   if (!out && !alone && !stands && (Drives() || spread(track.state) > kBetter * spread(first)))
     return;
   first = track.state;
-  ranged = sighting.n_points > 0;
+  ranged = sighting.fit.n_points > 0;
   known = track.t;
 }
 
@@ -62,7 +62,7 @@ Candidate NewCandidate(const Sighting& sighting, const View& view) {
   c.first = sighting.fit.posterior;
   c.since = c.known = view.t;
   c.last = sighting;
-  c.ranged = sighting.n_points > 0;
+  c.ranged = sighting.fit.n_points > 0;
   const Eigen::Vector3d sight = c.track.state.position() - view.camera.p_WC;
   c.range = sight.norm();
   const double sigma_px = sighting.detection.silhouette.sigma_px;
@@ -84,7 +84,7 @@ void ForgetVelocity(const MotionConfig& config, Candidate* candidate) {
 }
 
 bool Candidate::HiddenIn(const Sighting& s) const {
-  return ranged && !part && track.hits >= kShownHits && s.n_points >= kClearPoints &&
+  return ranged && !part && track.hits >= kShownHits && s.fit.n_points >= kClearPoints &&
          !s.detection.AnyCut() && LeftOut(s) == 1;
 }
 
@@ -104,7 +104,7 @@ bool Candidate::Steady() const {
 bool Candidate::SurelyDrives(double way) const {
   Eigen::Vector2d d = (track.state.position() - first.position()).head<2>();
   const Eigen::Vector2d n = range_error.normalized();
-  if (!ranged || last.n_points == 0) d -= n.dot(d) * n;  // what shows of it may grow
+  if (!ranged || last.fit.n_points == 0) d -= n.dot(d) * n;  // what shows of it may grow
   return Drives() && Steady() && d.norm() > way;
 }
 
@@ -112,7 +112,7 @@ bool Candidate::Drives() const {
   // A side that was never seen, and is not now, does not seem to move it.
   const bool clear = !last.detection.AnyCut() && (last.fit.whole || track.partial);
   // Taken from its size, its range may be wrong, and so may be its speed; one sweep tells none.
-  const bool told = ranged && last.n_points > 0 && track.t > known;
+  const bool told = ranged && last.fit.n_points > 0 && track.t > known;
   if (clear && told && Fast()) return true;
   Eigen::Vector2d d = (track.state.position() - first.position()).head<2>();
   Eigen::Matrix2d P =

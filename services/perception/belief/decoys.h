@@ -30,7 +30,6 @@ class Decoys {
   /// Leaves out what is too old, or where the target stands itself.
   void Forget(double t, const Eigen::Vector3d& p_WT);
   void Clear() { all_.clear(); }
-  const std::vector<Decoy>& all() const { return all_; }
 
  private:
   StateConfig config_;

@@ -43,8 +43,8 @@ void Finder::AddSweep(const Sweep& sweep) {
   if (sweeps_.size() > kMaxSweeps) sweeps_.pop_front();
 }
 
-void Finder::MarkSweepsUsed() {
-  for (auto& s : sweeps_) s.used = true;
+void Finder::MarkSweepsUsed(double t) {
+  for (auto& s : sweeps_) s.used = s.used || s.sweep.t() <= t;
 }
 
 std::optional<View> Finder::Look(const Frame& frame, std::string* note) const {
@@ -98,7 +98,7 @@ std::optional<Sighting> Finder::Try(const TargetTrack& track, const View& view,
         HitElsewhere(placed, points(Eigen::Vector3d::Zero()), config_.fit.lidar_gate))
       return std::nullopt;
   }
-  return Sighting{*fit, detection, fit->n_points};
+  return Sighting{*fit, detection};
 }
 
 std::optional<Sighting> Finder::FindWhole(const TargetTrack& track, const View& view,
@@ -107,7 +107,6 @@ std::optional<Sighting> Finder::FindWhole(const TargetTrack& track, const View& 
   std::vector<Sighting> found;
   std::vector<cv::Rect> tried;
   for (const size_t i : inside) {
-    if (tried.size() >= kMostTried) break;
     const auto piece = Within(boxes, view.bgr, view.detections[i]);
     if (!piece || std::count(tried.begin(), tried.end(), piece->mask_box) > 0) continue;
     tried.push_back(piece->mask_box);
@@ -130,7 +129,6 @@ std::optional<Sighting> Finder::FindWhole(const TargetTrack& track, const View& 
 std::optional<Sighting> Finder::FindPieces(const TargetTrack& track, const View& view,
                                            const std::vector<size_t>& inside,
                                            const Refuses& refuses, const SearchBoxes& boxes) const {
-  if (inside.size() < 2 || inside.size() > kMostTried) return std::nullopt;
   std::vector<Detection> pieces;
   for (const size_t i : inside)
     if (!view.detections[i].mask.empty()) pieces.push_back(view.detections[i]);
@@ -169,7 +167,7 @@ std::optional<Sighting> Finder::Acquire(const View& view, const Detection& detec
   const auto fit = localiser_.Acquire(shape_, view.camera, detection,
                                       Points(view, detection, Eigen::Vector3d::Zero(), false));
   if (!fit) return std::nullopt;
-  return Sighting{*fit, detection, fit->n_points};
+  return Sighting{*fit, detection};
 }
 
 }  // namespace chase::perception

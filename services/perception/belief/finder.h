@@ -34,7 +34,6 @@ struct View {
 struct Sighting {
   FitResult fit;
   Detection detection;
-  int n_points = 0;
   bool contested = false;  ///< something else explains the prediction nearly as well
 };
 
@@ -64,8 +63,8 @@ class Finder {
   /// One detection as a target of which nothing is known.
   std::optional<Sighting> Acquire(const View& view, const Detection& detection) const;
   bool HasSweeps() const { return !sweeps_.empty(); }
-  /// Sweeps count once.
-  void MarkSweepsUsed();
+  /// Sweeps count once: those that a frame at t [s] could see.
+  void MarkSweepsUsed(double t);
 
  private:
   struct KeptSweep {

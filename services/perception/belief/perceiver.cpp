@@ -32,7 +32,6 @@ void Perceiver::Follow(View* view) {
   const auto refuses = [&](const Sighting& s) { return IsRatherDecoy(s, *view); };
   auto taken = view->taken;
   const auto found = finder_.Find(*track_, view, refuses);
-  contested_ = found && found->contested && track_->misses > 0;
   if (!found || !Sure(*found)) {
     view->taken = taken;
     ++track_->misses;
@@ -93,7 +92,7 @@ bool Perceiver::Followed(const Sighting& s) const {
 
 /// What may be the hidden target, half of it seen, is followed on its own to see whether it drives.
 void Perceiver::AddPartial(const View& view) {
-  if (!unsure_ || unsure_->fit.whole || unsure_->n_points == 0) return;
+  if (!unsure_ || unsure_->fit.whole || unsure_->fit.n_points == 0) return;
   if (Followed(*unsure_) || candidates_.size() >= kMaxCandidates) return;
   if (!Plausible(*unsure_, view.t)) return;
   candidates_.push_back(NewCandidate(*unsure_, view));
@@ -122,8 +121,8 @@ void Perceiver::AddCandidates(View* view) {
     // Part of something, of which no LiDAR point tells the range, is a thing of its own only where
     // the target may come back.
     const bool piece = found->detection.part || found->detection.edged;
-    if ((piece || !found->fit.whole) && found->n_points == 0 && !comes_back) continue;
-    if (piece && found->n_points == 0 && !found->detection.edged) continue;
+    if ((piece || !found->fit.whole) && found->fit.n_points == 0 && !comes_back) continue;
+    if (piece && found->fit.n_points == 0 && !found->detection.edged) continue;
     if (Followed(*found)) continue;
     candidates_.push_back(NewCandidate(*found, *view));
   }
@@ -264,7 +263,6 @@ void Perceiver::TakeSelected(View* view) {
 TargetEstimate Perceiver::Report(double t, const std::optional<View>& view,
                                  std::string note) const {
   TargetEstimate out;
-  out.t = t;
   out.state = state_;
   out.size =
       track_ ? track_->shape.size : Eigen::Vector2d(config_.target_radius, config_.target_height);
@@ -273,7 +271,7 @@ TargetEstimate Perceiver::Report(double t, const std::optional<View>& view,
   if (sighting_) {
     out.box = sighting_->detection.box;
     out.score = sighting_->detection.score;
-    out.n_points = sighting_->n_points;
+    out.n_points = sighting_->fit.n_points;
   }
   out.covariance = out.velocity_covariance = kUnknownVariance * Eigen::Matrix3d::Identity();
   if (!track_) return out;
@@ -297,7 +295,6 @@ TargetEstimate Perceiver::See(const Frame& frame) {
   }
   sighting_.reset();
   unsure_.reset();
-  contested_ = false;
   refused_ = {};
   if (track_ && frame.t - track_->seen > kGap) track_->misses = std::max(1, track_->misses);
   if (track_ && state_ != TargetState::kLost) track_->Predict(frame.t, config_.motion);
@@ -305,14 +302,14 @@ TargetEstimate Perceiver::See(const Frame& frame) {
   if (view) {
     if (state_ != TargetState::kLost) Follow(&*view);
     Seek(&*view);
-    if (sighting_ || !candidates_.empty()) finder_.MarkSweepsUsed();
+    if (sighting_ || !candidates_.empty()) finder_.MarkSweepsUsed(frame.t);
     Remember(*view);
   } else if (newer) {
     if (track_) ++track_->misses;
     for (auto& c : candidates_) ++c.track.misses;
     DropMissed();
   }
-  Judge(frame.t);
+  if (newer) Judge(frame.t);
   return Report(frame.t, view, std::move(note));
 }
 

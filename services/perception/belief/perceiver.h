@@ -25,7 +25,6 @@ using Refused = std::array<int64_t, kRefusals>;
 
 /// The target at a frame's time as a Gaussian of its centre.
 struct TargetEstimate {
-  double t = 0.0;  ///< s
   TargetState state = TargetState::kSearching;
   Eigen::Vector3d p_WT = Eigen::Vector3d::Zero();                     ///< frame W, m
   Eigen::Vector3d v_WT = Eigen::Vector3d::Zero();                     ///< frame W, m/s
@@ -53,8 +52,6 @@ class Perceiver {
   /// Somebody has pointed at the target, at pixel (u, v) `at` of the last frame: what the detector
   /// finds there within a second is taken at once, whatever was followed before.
   void Select(const DetectorConfig& detector, const Eigen::Vector2d& at);
-
-  const PoseHistory& poses() const { return finder_.poses(); }
 
  private:
   void Follow(View* view);
@@ -93,7 +90,6 @@ class Perceiver {
   std::optional<Sighting> sighting_;  ///< of the last frame
   bool doubtful_ = false;             ///< it stood when it was taken, and has stood since
   std::optional<Sighting> unsure_;    ///< in the last frame: may be the target, as far as it shows
-  bool contested_ = false;            ///< of several things alike in the last frame
   Decoys decoys_;
   std::optional<Eigen::Vector2d> selected_;           ///< px, not taken yet
   Refused refused_ = {};                              ///< in this frame

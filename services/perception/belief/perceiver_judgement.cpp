@@ -92,7 +92,8 @@ bool Perceiver::SizedBadly(const Candidate& c) const {
 /// Of a piece of something larger, or what is hidden or cut off in part, once it has driven further
 /// than what shows of it may seem to, or has come out wholly and LiDAR tells that it drives.
 bool Perceiver::PieceIsReady(const Candidate& c) const {
-  const bool hasty = !track_ && (LeavesImage(c.last.detection) || c.last.n_points < kClearPoints);
+  const bool hasty =
+      !track_ && (LeavesImage(c.last.detection) || c.last.fit.n_points < kClearPoints);
   if (c.track.hits < (hasty ? kNewPieceHits : kPieceHits)) return false;
   const bool came_out = !hasty && AllSeen(c.last) && c.sweeps >= kPieceSweeps && c.Fast();
   return came_out || c.SurelyDrives(hasty ? kNewPieceWay : kPieceWay);
@@ -112,10 +113,10 @@ bool Perceiver::StandsLongEnough(const Candidate& c, double t) const {
 /// What drives is taken at once.
 bool Perceiver::Ready(const Candidate& c, double t) const {
   if (c.track.misses > 0 || c.track.hits < config_.state.confirm_frames) return false;
-  const bool trusted = !doubtful_ && !contested_ && !Vague();
+  const bool trusted = !doubtful_ && !(unsure_ && unsure_->contested) && !Vague();
   if (track_ && trusted && t - track_->seen < kTrusted) return false;
   const Detection& d = c.last.detection;
-  const bool unclear = d.AnyCut() && c.last.n_points < kClearPoints;
+  const bool unclear = d.AnyCut() && c.last.fit.n_points < kClearPoints;
   const bool piece = c.part || c.track.partial || LeavesImage(d) || unclear;
   if (!SizedBadly(c) && (piece ? PieceIsReady(c) : c.Drives())) return true;
   return !piece && !sighting_ && StandsLongEnough(c, t);

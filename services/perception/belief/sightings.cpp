@@ -25,7 +25,7 @@ bool AllSeen(const Sighting& s) {
 
 bool Clear(const Sighting& s) {
   const Detection& d = s.detection;
-  return s.fit.whole && s.n_points >= kClearPoints && !d.part && !d.edged && !d.AnyCut();
+  return s.fit.whole && s.fit.n_points >= kClearPoints && !d.part && !d.edged && !d.AnyCut();
 }
 
 }  // namespace chase::perception

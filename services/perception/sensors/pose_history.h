@@ -33,8 +33,6 @@ class PoseHistory {
   /// The sample nearest to t if it is at most `max_age` s away.
   std::optional<PoseSample> Nearest(double t, double max_age) const;
 
-  bool empty() const { return samples_.empty(); }
-
  private:
   std::deque<PoseSample> samples_;
 };

@@ -76,6 +76,7 @@ std::string WhyShapeless(const Detection* marked, const cv::Size& image) {
 }
 
 double Median(std::vector<double> values) {
+  if (values.empty()) return 0.0;
   std::sort(values.begin(), values.end());
   return 0.5 * (values[(values.size() - 1) / 2] + values[values.size() / 2]);
 }

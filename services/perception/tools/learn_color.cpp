@@ -174,9 +174,6 @@ LearnedColor LearnColor(const std::vector<cv::Mat>& images, const std::vector<cv
   const auto count = std::count(used.begin(), used.end(), true);
   for (size_t i = 0; i < all.size(); ++i) {
     out.pictures[i].used = used[i];
-    std::vector<bool> alone(all.size(), false);
-    alone[i] = true;
-    out.pictures[i].width_deg = RangeOf(all, alone, base).width_deg;
     if (!used[i] || count < 2) continue;
     const double narrower = range.width_deg - RangeOf(all, Without(used, i), base).width_deg;
     if (out.widest >= 0 && narrower <= out.narrower_deg) continue;

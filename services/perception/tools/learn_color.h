@@ -15,8 +15,7 @@ struct Separation {
   /// Their balance: the true positive rate over one and the false positives for each pixel of the
   /// target, near it and anywhere. 1: parted wholly.
   double index = 0.0;
-  bool used = true;        ///< false: left out, since with it the range separates worse
-  double width_deg = 0.0;  ///< of the hue learned from this picture alone
+  bool used = true;  ///< false: left out, since with it the range separates worse
 };
 
 struct LearnedColor {
