@@ -15,7 +15,8 @@ std::string BatteryWords(double share) {
 
 std::optional<double> BatteryIn(const status_t& status) {
   if (status.name != "fcu") return std::nullopt;
-  const size_t at = status.detail.find("battery ");
+  // The autopilot's own texts are quoted before it, and may speak of the battery, too.
+  const size_t at = status.detail.rfind("battery ");
   int percent = 0, end = 0;
   if (at == std::string::npos ||
       std::sscanf(status.detail.c_str() + at, "battery %3d %%%n", &percent, &end) != 1 ||

@@ -18,6 +18,11 @@ struct Mode {
   bool operator==(const Mode& o) const { return main == o.main && sub == o.sub; }
   std::string name() const;
 };
+/// Flown by a pilot: MANUAL, ALTCTL, POSCTL, ACRO, STABILIZED.
+inline bool IsByStick(const Mode& mode) {
+  return mode.main == 1 || mode.main == 2 || mode.main == 3 || mode.main == 5 || mode.main == 7;
+}
+
 inline constexpr Mode kOffboardMode{6, 0}, kLandMode{4, 6}, kHoldMode{4, 3}, kPositionMode{3, 0};
 
 }  // namespace chase::mavlink

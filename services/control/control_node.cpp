@@ -182,7 +182,7 @@ void ControlNode::Tick(int64_t utime) {
   const std::optional<Setpoint> setpoint = controller_.Blind(silence);
   if (!setpoint) return;
   pose_reason_ = "no pose is heard";
-  Send(utime, *setpoint);
+  Send(bus_.Now(), *setpoint);  // a tick's own time may lag behind the last pose's
   SendTracking(utime);
 }
 

@@ -115,8 +115,8 @@ std::optional<Setpoint> Controller::Follow(double t, const Estimate& estimate, d
 // Planning leads to above the ground that it chooses; whoever is not led, or does not get there,
 // comes down here.
 bool Controller::MayDescend(double t, const Estimate& estimate) const {
+  if (t - asked_to_land_ > kLongestWay) return true;  // gusts may never let it rest
   if (estimate.v_WB.norm() > kAtRest) return false;
-  if (t - asked_to_land_ > kLongestWay) return true;
   const Plan* plan = plans_.FlownAt(t);
   if (plan == nullptr || !plan->to_land) return t - asked_to_land_ > world::kMostAge.landing_plan;
   const bool stops = plan->stop && t >= plan->stop->start;

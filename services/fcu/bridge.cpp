@@ -159,6 +159,7 @@ Facts Bridge::Gather(int64_t now) const {
   f.motors_off = IsFresh(now) && !setpoint_->motors;
   f.blind = !pose_ || PoseAge(now) > world::kMostAge.velocity;
   f.missing = missing_;
+  f.asked = !led_ || asked_;
   f.said = autopilot_.Warning(now, kWarningAge);
   return f;
 }
@@ -170,6 +171,7 @@ void Bridge::Tick(int64_t now) {
   restarts_ = clock_.restarts();
   missing_ = heard_ ? Missing(now) : "no PX4 is heard";
   handshake_.Update(Gather(now));
+  if (handshake_.ended()) asked_ = false;
   if (Due(now, kHeartbeatPeriod, &next_heartbeat_)) SendHeartbeat(now);
   if (!autopilot_.known()) return;
   if (Due(now, kTimesyncPeriod, &next_timesync_)) AskTime(now);

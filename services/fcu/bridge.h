@@ -31,6 +31,12 @@ class Bridge {
   void OnPose(const Pose& pose, int64_t now);
   /// `utime`: the message's own stamp. One that does not rise is a repetition and left out.
   void OnSetpoint(const Setpoint& setpoint, int64_t utime, int64_t now);
+  /// Whoever leads the flights says where they are: `may_begin` on the ground and during a
+  /// take-off.
+  void OnFlightState(bool may_begin) {
+    led_ = true;
+    asked_ = asked_ || may_begin;
+  }
   /// As Handshake::Kill.
   void Kill() { handshake_.Kill(); }
   /// Whatever is due; to be called at twice the rate of setpoints or faster.
@@ -94,6 +100,7 @@ class Bridge {
   std::deque<int64_t> time_requests_;  // sent, ns
   bool heard_ = false;
   int restarts_ = 0;
+  bool led_ = false, asked_ = false;  // is a mission heard, and Facts::asked
   std::string missing_ = "no PX4 is heard";
   int64_t setpoints_sent_ = 0, odometry_sent_ = 0;
   std::vector<Bytes> outgoing_;

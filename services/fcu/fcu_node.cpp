@@ -5,6 +5,7 @@
 #include <fstream>
 #include <stdexcept>
 
+#include "chase/flight_state_t.hpp"
 #include "chase/imu_t.hpp"
 #include "common/bus/command_call.h"
 #include "common/bus/convert.h"
@@ -64,6 +65,10 @@ FcuNode::FcuNode(bus::Bus& bus, const FcuConfig& config)
   bus_.Subscribe<pose_t>("POSE", [this](const pose_t& m) { OnPose(m); });
   bus_.Subscribe<attitude_setpoint_t>("ATTITUDE_SETPOINT",
                                       [this](const attitude_setpoint_t& m) { OnSetpoint(m); });
+  bus_.Subscribe<flight_state_t>("FLIGHT_STATE", [this](const flight_state_t& m) {
+    bridge_.OnFlightState(m.state == flight_state_t::IDLE || m.state == flight_state_t::READY ||
+                          m.state == flight_state_t::TAKEOFF);
+  });
   bus_.Subscribe<command_t>("COMMAND", [this](const command_t& m) { OnCommand(m); });
 }
 

@@ -11,6 +11,7 @@ using State = Handshake::State;
 constexpr double kStreamBefore = 1.2;  // s
 constexpr double kSilent = 0.5;        // s without a setpoint in flight; PX4's COM_OF_LOSS_T is 1.0
 constexpr double kWithdrawn = 2.0;     // s without a setpoint: the next one is another flight's
+constexpr double kHeartbeat = 1.2;     // s in which the autopilot has told its state once more
 constexpr double kLateArming = 10.0;   // s after asking in which arming is still our doing
 
 }  // namespace
@@ -34,7 +35,11 @@ struct HandshakeTable {
   static bool TakenOver(H h) { return Flies(h) && Ready(h); }
   /// Only who lets the pilot engage streams while somebody else flies.
   static bool Others(H h) { return h.facts_.armed && !InOffboard(h) && h.engages_; }
-  static bool Begins(H h) { return Ready(h) && !(h.facts_.armed && h.engages_); }
+  /// A process that comes back after an autopilot's landing goes on where it was: that is no
+  /// flight.
+  static bool Begins(H h) {
+    return Ready(h) && !(h.engages_ && (h.facts_.armed || !h.facts_.asked));
+  }
   static bool Streamed(H h) { return h.engages_ && h.InState() >= kStreamBefore; }
   static bool Refused(H h) { return h.command_.answer() == Command::Answer::kRefused; }
   static bool GivesUp(H h) { return h.InState() >= h.give_up_after_; }
@@ -50,10 +55,12 @@ struct HandshakeTable {
   static bool OffInTheAir(H h) { return h.facts_.motors_off && !h.facts_.on_ground; }
   static bool Blind(H h) { return h.facts_.blind; }
   static bool Ceased(H h) { return h.WithoutWish() >= kSilent; }
+  /// Not before an arming on its way would have been heard of.
+  static bool Killed(H h) { return Disarmed(h) && h.InState() >= kHeartbeat; }
   static bool OnGround(H h) { return h.facts_.on_ground; }
   static bool PilotLands(H h) {
-    return h.landing_heard_ && !(h.facts_.mode == kLandMode) && !InOffboard(h) &&
-           !h.facts_.failsafe;
+    const bool left = h.landing_heard_ && !(h.facts_.mode == kLandMode) && !InOffboard(h);
+    return (left || IsByStick(h.facts_.mode)) && !h.facts_.failsafe;
   }
   static bool Released(H h) { return h.Withdrawn() && !h.facts_.armed; }
   static bool GivenBack(H h) { return !h.engages_ && !h.facts_.failsafe; }
@@ -107,7 +114,7 @@ const HandshakeTable::Row HandshakeTable::kRows[] = {
     {State::kDisarming, Disarmed, State::kDone, "landed and disarmed"},
     {State::kDisarming, GivesUp, State::kRefused, "disarming did not come"},
 
-    {State::kKilling, Disarmed, State::kDone, "killed by command: disarmed by force"},
+    {State::kKilling, Killed, State::kDone, "killed by command: disarmed by force"},
 
     {State::kDone, Released, State::kStandby, "ready for another flight"},
     {State::kPilot, GivenBack, State::kStandby, "the pilot may give it back"},
@@ -142,9 +149,16 @@ void Handshake::Update(const Facts& facts) {
     if (row.from == state_ && row.when(*this)) return Enter(row.to, row.why);
 }
 
+/// Once it lands nothing is asked again: whoever takes it out of that mode is the pilot.
+std::optional<mav::CommandLong> Handshake::NextCommand(int64_t utime) {
+  if (state_ == State::kLanding && facts_.mode == kLandMode) return std::nullopt;
+  return command_.Tick(utime);
+}
+
 void Handshake::Kill() {
-  const bool ours = state_ == State::kFlying || state_ == State::kLanding ||
-                    state_ == State::kDisarming || state_ == State::kFailsafe;
+  const bool ours = state_ == State::kArming || state_ == State::kFlying ||
+                    state_ == State::kLanding || state_ == State::kDisarming ||
+                    state_ == State::kFailsafe;
   if (ours) Enter(State::kKilling, "killed by command");
 }
 

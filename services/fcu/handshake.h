@@ -20,6 +20,7 @@ struct Facts {
   bool blind = false;       ///< the estimate is older than a flight may go on with
   std::string missing;      ///< what a flight must not begin without; empty: nothing
   std::string said;         ///< the autopilot's last warning
+  bool asked = true;        ///< whoever leads the flights has begun one since the last one's end
 };
 
 /// From the first setpoint to the last: stream, OFFBOARD, arm, fly, land, disarm. The autopilot's
@@ -55,9 +56,13 @@ class Handshake {
     command_.OnAck(command, result, utime);
   }
   /// The command to send now, without its target.
-  std::optional<mav::CommandLong> NextCommand(int64_t utime) { return command_.Tick(utime); }
+  std::optional<mav::CommandLong> NextCommand(int64_t utime);
 
   State state() const { return state_; }
+  /// Is a flight over that had begun?
+  bool ended() const {
+    return state_ == State::kDone || state_ == State::kPilot || state_ == State::kFailsafe;
+  }
   /// May setpoints be sent?
   bool streams() const;
   /// Why the state is what it is.

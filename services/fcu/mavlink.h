@@ -18,6 +18,7 @@ using mavlink::FrameWriter;
 using mavlink::Key;
 using mavlink::Signing;
 
+using mavlink::IsByStick;
 using mavlink::kLandMode;
 using mavlink::kOffboardMode;
 using mavlink::Mode;

@@ -44,6 +44,7 @@ bool Mission::Step(double t, Event event, const std::string& detail) {
   const Transition* row = Find(state_, event);
   if (row == nullptr) return false;
   if (row->to != state_) since_ = t;
+  if (row->to == State::kEmergency) was_landing_ = state_ == State::kLand;
   state_ = row->to;
   reason_ = row->reason + (detail.empty() ? "" : ": " + detail);
   if (event == Event::kTakeoff && inputs_.pose) home_ = Home{inputs_.pose->p, inputs_.pose->epoch};
@@ -60,6 +61,8 @@ void Mission::Update(double t) {
   for (const Event event : Observed(t)) {
     const bool stepped = Step(t, event, Detail(event));
     if (stepped && event == Event::kLeaving) leads_itself_ = false;  // it would lead out again
+    if (stepped && event == Event::kPoseBack && was_landing_)
+      Step(t, Event::kLand, "before the pose was lost");
   }
   if (leads_itself_) LeadItself(t);
   HearOfGround();

@@ -77,8 +77,8 @@ class Mission {
   std::string reason_ = "switched on";
   std::string ground_;  // what planning said of it before control came down
   double since_ = 0.0;
-  bool began_ = false;
-  double last_usable_ = -1e9;  // pose, s
+  bool began_ = false, was_landing_ = false;  // the latter: when the emergency began
+  double last_usable_ = -1e9;                 // pose, s
   std::optional<Home> home_;
   std::vector<std::string> missing_;
 };

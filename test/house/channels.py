@@ -18,7 +18,7 @@ LISTENS = {
                 "LIDAR_STATUS", "CAMERA_STATUS", "ODOMETRY_STATUS", "MAPPING_STATUS",
                 "PERCEPTION_STATUS", "PREDICTION_STATUS", "PLANNING_STATUS", "CONTROL_STATUS",
                 "FCU_STATUS", "SIMULATOR_STATUS", "RECORDER_STATUS"},
-    "fcu": {"ATTITUDE_SETPOINT", "POSE", "COMMAND"},
+    "fcu": {"ATTITUDE_SETPOINT", "POSE", "COMMAND", "FLIGHT_STATE"},
     # Ground truth is not for it either: the page shows what the vehicle knows.
     "viewer": {"LIDAR_SCAN", "CAMERA_IMAGE", "IMU", "POSE", "SCAN_REGISTERED", "OBSTACLES", "UNSEEN", "MAP", "LINK_STATUS",
                "TARGET", "PREDICTION", "PLAN", "ATTITUDE_SETPOINT", "TRACKING", "SCENARIO",

@@ -62,6 +62,22 @@ TEST(AskedToLand, StopsBeforeItComesDown) {
   EXPECT_NEAR(flight.body.p.x(), 6.0, 0.3) << "where it came to rest";
 }
 
+TEST(AskedToLand, GustsDelayItButNotForEver) {
+  Flight flight({0, 0, 2});
+  flight.controller.AddPlan(LandingPlan({0, 0, 2}));
+  flight.Fly(1.0, Health::kUsable);
+  flight.controller.SetLanding(true);
+  int n = 0;
+  for (double t = 1.0; t < 80.0; t += 0.02) {
+    flight.body.v.x() = n++ % 2 ? 0.8 : -0.8;
+    flight.Fly(t, Health::kUsable);
+    if (t < 40.0) {
+      ASSERT_NE(flight.controller.following(), Following::kLand) << t;
+    }
+  }
+  EXPECT_GT(flight.off_at, 0.0);
+}
+
 TEST(AskedToLand, HoldsAgainWhenItIsAskedNoMore) {
   Flight flight({0, 0, 3});
   flight.controller.AddPlan(LandingPlan({0, 0, 3}));

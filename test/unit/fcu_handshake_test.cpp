@@ -192,6 +192,88 @@ TEST(FcuHandshake, UnansweredCommandsAreSentAgainAndCounted) {
   EXPECT_FALSE(command.Tick(kStart + 60'000'000));
 }
 
+/// In flight, armed and in OFFBOARD.
+struct InFlight {
+  Handshake handshake{true, kGiveUp};
+  Facts facts;
+  InFlight() {
+    facts.utime = kStart;
+    facts.heard = facts.armed = facts.wish = true;
+    facts.mode = kOffboardMode;
+    Run(0.1);
+  }
+  void Run(double seconds) {
+    for (int i = 0; i < static_cast<int>(seconds * 1e6) / kTick; ++i, facts.utime += kTick)
+      handshake.Update(facts);
+  }
+};
+
+TEST(FcuHandshake, AFlightThatIsOverIsNotGoneOnWith) {
+  InFlight flight;
+  ASSERT_EQ(flight.handshake.state(), State::kFlying);
+  flight.facts.wish = false;  // control hangs
+  flight.Run(0.7);
+  ASSERT_EQ(flight.handshake.state(), State::kLanding);
+  flight.facts.mode = kLandMode;
+  flight.Run(2.0);
+  flight.facts.armed = false;
+  flight.facts.on_ground = true;
+  flight.facts.asked = false;  // mission still says that it chases
+  flight.Run(3.0);
+  flight.facts.wish = true;  // control is back
+  flight.Run(20.0);
+  EXPECT_EQ(flight.handshake.state(), State::kStandby);
+  flight.facts.asked = true;
+  flight.Run(0.1);
+  EXPECT_EQ(flight.handshake.state(), State::kStreaming) << "another flight";
+}
+
+TEST(FcuHandshake, APilotMayTakeItFromALandingAtAnyMoment) {
+  for (const double after : {0.05, 0.3, 0.9, 1.7, 2.4}) {
+    for (const bool heard : {false, true}) {
+      InFlight flight;
+      flight.facts.wish = false;
+      flight.Run(0.7);
+      ASSERT_EQ(flight.handshake.state(), State::kLanding);
+      ASSERT_TRUE(flight.handshake.NextCommand(flight.facts.utime));
+      flight.handshake.OnAck(176, 0, flight.facts.utime);
+      if (heard) flight.facts.mode = kLandMode;
+      int asked = 0;
+      for (int i = 0; i < static_cast<int>(after * 100); ++i) {
+        flight.Run(0.01);
+        asked += flight.handshake.NextCommand(flight.facts.utime).has_value();
+      }
+      if (heard) {
+        EXPECT_EQ(asked, 0) << after;
+      }
+      flight.facts.mode = kPosition;
+      flight.Run(0.01);
+      EXPECT_EQ(flight.handshake.state(), State::kPilot) << after;
+      EXPECT_FALSE(flight.handshake.NextCommand(flight.facts.utime + 5'000'000));
+    }
+  }
+}
+
+TEST(FcuHandshake, AKillMeetsAnArmingThatIsOnItsWay) {
+  Handshake handshake(true, kGiveUp);
+  Facts facts;
+  facts.utime = kStart;
+  facts.heard = facts.wish = facts.on_ground = true;
+  facts.mode = kOffboardMode;
+  for (int i = 0; i < 150; ++i, facts.utime += kTick) handshake.Update(facts);
+  ASSERT_EQ(handshake.state(), State::kArming);
+  handshake.Kill();
+  for (int i = 0; i < 50; ++i, facts.utime += kTick) handshake.Update(facts);
+  EXPECT_EQ(handshake.state(), State::kKilling);
+  facts.armed = true;
+  for (int i = 0; i < 300; ++i, facts.utime += kTick) {
+    handshake.Update(facts);
+    if (const auto m = handshake.NextCommand(facts.utime); m && m->param2 > 0.0f)
+      facts.armed = false;
+  }
+  EXPECT_EQ(handshake.state(), State::kDone);
+}
+
 TEST(FcuHandshake, AnArmingThatComesTooLateIsTakenBack) {
   Handshake handshake(true, kGiveUp);
   Facts facts;

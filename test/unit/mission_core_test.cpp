@@ -150,6 +150,18 @@ TEST(Mission, WithoutAPoseItIsAnEmergencyUntilThereIsOne) {
   EXPECT_EQ(bench.mission.state(), State::kDone);
 }
 
+TEST(Mission, ALandingGoesOnOnceThereIsAPoseAgain) {
+  Bench bench;
+  bench.Fly();
+  ASSERT_TRUE(bench.Command(Event::kLand).accepted);
+  bench.pose.usable = bench.pose.healthy = false;
+  bench.Run(2.2);
+  ASSERT_EQ(bench.mission.state(), State::kEmergency);
+  bench.pose.usable = true;
+  bench.Run(0.1);
+  EXPECT_EQ(bench.mission.state(), State::kLand) << bench.mission.reason();
+}
+
 TEST(Mission, StartedInFlightItHoldsAndDoesNotGoOnWithALanding) {
   Bench flying;
   flying.mission.inputs().flying = true;

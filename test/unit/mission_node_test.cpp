@@ -9,6 +9,7 @@
 #include "chase/flight_state_t.hpp"
 #include "chase/geofence_t.hpp"
 #include "chase/health_t.hpp"
+#include "common/bus/battery.h"
 #include "common/bus/convert.h"
 #include "common/bus/lockstep.h"
 
@@ -151,6 +152,15 @@ TEST(MissionNode, CommandsToOtherVehiclesAreNotItsOwn) {
   EXPECT_TRUE(bench.acks.empty());
   EXPECT_EQ(bench.states.back().state, +flight_state_t::READY);
   EXPECT_EQ(bench.lockstep_.bus("mission").counters().at("COMMAND").foreign, 1);
+}
+
+TEST(Battery, IsReadBehindTheAutopilotsOwnWords) {
+  status_t status{};
+  status.name = "fcu";
+  status.detail = "failsafe: Emergency battery level, land immediately; POSCTL, armed, battery 7 %";
+  EXPECT_EQ(bus::BatteryIn(status), 0.07);
+  status.detail = "failsafe: low battery level";
+  EXPECT_FALSE(bus::BatteryIn(status));
 }
 
 TEST(MissionNode, HealthCountsTheLivesOfEveryProcess) {
