@@ -16,10 +16,11 @@ namespace chase::world {
 struct Proof {
   int obstacle = 0;  ///< its id; kTargetBody: not one of the list
   bool of_sight = false;
-  double from = 0.0;                                           ///< tau
-  double radius = 0.0;                                         ///< about the drone, m
-  math::Polynomial target_radius = math::Polynomial::Zero(2);  ///< about the target, m
-  std::vector<Separation> separations;
+  double from = 0.0;    ///< tau
+  double radius = 0.0;  ///< about the drone, m
+  /// About the target, coefficients of 1 and tau, m.
+  Eigen::Vector2d target_radius = Eigen::Vector2d::Zero();
+  Certificate separations;
   double room = 0.0;  ///< least that it proves beyond the radius, m; known to its maker only
 };
 inline constexpr int kTargetBody = -1;  ///< proofs about the target's own body: nobody lists it

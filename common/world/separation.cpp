@@ -37,6 +37,11 @@ Controls ToBernstein(const Controls& power) {
 /// The mean over [from, to].
 Vector3d MeanOf(const Curve& curve, double from, double to) {
   Vector3d sum = curve.row(0).transpose();
+  if (from == 0.0 && to == 1.0) {
+    for (Eigen::Index k = 1; k < curve.rows(); ++k)
+      sum += 1.0 / static_cast<double>(k + 1) * curve.row(k).transpose();
+    return sum;
+  }
   double before = from, after = to;  // powers
   for (Eigen::Index k = 1; k < curve.rows(); ++k) {
     before *= from;
@@ -237,7 +242,7 @@ SeparationResult Separator::From(const Body& body) {
   if (target_) Raise(&*target_, body);
   const Separation s{from_, to_, Between(body)};
   const Rooms room = ProvenRooms(s.normal, drone_.sweep, target_ ? &target_->sweep : nullptr, body);
-  if (room.Least() >= 0.0) return {Kept::kOff, {s}, room, 0.0};
+  if (room.Least() >= 0.0) return {Kept::kOff, Certificate(s), room, 0.0};
   if (!(from_ >= 0.0 && from_ < to_ && to_ <= 1.0)) return {};
   return Prover(*drone_.ball, target_ ? target_->ball : nullptr, body).Prove(s);
 }

@@ -15,8 +15,8 @@ enum class Kept {
 
 struct SeparationResult {
   Kept kept = Kept::kUndecided;
-  std::vector<Separation> certificate;  ///< in order, covers [from, to]; only with kOff
-  Rooms room{0.0, 0.0};                 ///< least that it proves beyond the radii
+  Certificate certificate;  ///< in order, covers [from, to]; only with kOff
+  Rooms room{0.0, 0.0};     ///< least that it proves beyond the radii
   double tau = 0.0;
 };
 

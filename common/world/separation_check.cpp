@@ -129,10 +129,11 @@ void ToBernstein(double* f, int terms, int n, double from, double to, double* b)
 /// `from` takes 2 n + 1 roundings, the powers of w 2 n + 1, the weights and their sum n + 3; before
 /// that a coefficient of the form takes at most 20, after it a product and four sums are left:
 /// below 105 for n <= 15. Numbers below 1e-300 may vanish.
-double RoomOf(const Vector3d& n, double length, const Sweep& sweep, Form form) {
+double RoomOf(const Vector3d& n, double length, const Sweep& sweep, const Form& form) {
   if (sweep.degree + 1 < form.terms) return kNothing;
-  double b[kTerms];
-  ToBernstein(form.f, form.terms, sweep.degree, sweep.from, sweep.to, b);
+  double f[kTerms], b[kTerms];
+  std::copy(form.f, form.f + form.terms, f);
+  ToBernstein(f, form.terms, sweep.degree, sweep.from, sweep.to, b);
   double lowest = HUGE_VAL;
   for (int i = 0; i <= sweep.degree; ++i) {
     const double at = n.x() * sweep.points[0][i] + n.y() * sweep.points[1][i] +
@@ -151,7 +152,7 @@ int DegreeOf(const Ball& ball) {
 
 }  // namespace
 
-bool IsWellFormed(const std::vector<Separation>& certificate, double from, double to) {
+bool IsWellFormed(const Certificate& certificate, double from, double to) {
   if (certificate.empty() || !(certificate.front().from <= from)) return false;
   for (size_t i = 0; i < certificate.size(); ++i)
     if (!IsUsable(certificate[i]) || (i > 0 && !(certificate[i].from <= certificate[i - 1].to)))
@@ -212,8 +213,8 @@ double ProvenRoom(const Separation& s, const Ball& drone, const Ball* target, co
   return ProvenRooms(s.normal, sweep(drone), &second, body).Least();
 }
 
-bool IsCertificate(const std::vector<Separation>& certificate, double from, double to,
-                   const Ball& drone, const Ball* target, const Body& body) {
+bool IsCertificate(const Certificate& certificate, double from, double to, const Ball& drone,
+                   const Ball* target, const Body& body) {
   if (!IsWellFormed(certificate, from, to)) return false;
   for (const Separation& s : certificate)
     if (!(ProvenRoom(s, drone, target, body) >= 0.0)) return false;

@@ -1,19 +1,11 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <vector>
 
 #include "common/world/body.h"
+#include "common/world/certificate.h"
 
 namespace chase::world {
-
-/// For tau in [from, to] the body stays on one side of a plane and the ball (or the two balls, and
-/// so their convex hull) on the other: n' (p - c) >= h(n) + |n| r, h the support of the body with
-/// its uncertainty. A certificate of a body is a list of these whose intervals follow each other.
-struct Separation {
-  double from = 0.0, to = 1.0;
-  Eigen::Vector3d normal = Eigen::Vector3d::UnitX();  ///< n, frame W, |n|^2 in [1/2, 2]
-};
 
 /// A variance along n smaller than the square of this is bounded as if it were that, m: the bound
 /// of the square root is a tangent and needs a slope.
@@ -21,7 +13,7 @@ constexpr double kLeastDeviation = 1e-7;
 
 /// Do the separations follow each other without a gap and cover [from, to], each an interval of
 /// [0,1] with a normal of about unit length?
-bool IsWellFormed(const std::vector<Separation>& certificate, double from, double to);
+bool IsWellFormed(const Certificate& certificate, double from, double to);
 
 /// A ball over [from, to] in Bernstein form, to be kept off many bodies.
 struct Sweep {
@@ -60,11 +52,11 @@ double ProvenRoom(const Separation& separation, const Ball& drone, const Ball* t
 
 /// Is it well formed, with a proven room of 0 or more in each separation? True is a proof that the
 /// body is kept off over [from, to]; false says that this certificate is none.
-bool IsCertificate(const std::vector<Separation>& certificate, double from, double to,
-                   const Ball& drone, const Ball* target, const Body& body);
+bool IsCertificate(const Certificate& certificate, double from, double to, const Ball& drone,
+                   const Ball* target, const Body& body);
 
 /// The same question in exact integer arithmetic, square roots rounded up: the reference.
-bool IsCertificateExact(const std::vector<Separation>& certificate, double from, double to,
-                        const Ball& drone, const Ball* target, const Body& body);
+bool IsCertificateExact(const Certificate& certificate, double from, double to, const Ball& drone,
+                        const Ball* target, const Body& body);
 
 }  // namespace chase::world

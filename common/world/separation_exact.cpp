@@ -118,8 +118,8 @@ bool IsKeptOff(const Separation& s, const Ball& ball, const Body& body,
 
 }  // namespace
 
-bool IsCertificateExact(const std::vector<Separation>& certificate, double from, double to,
-                        const Ball& drone, const Ball* target, const Body& body) {
+bool IsCertificateExact(const Certificate& certificate, double from, double to, const Ball& drone,
+                        const Ball* target, const Body& body) {
   if (!IsWellFormed(certificate, from, to) || !IsUsable(drone) || !IsUsable(body)) return false;
   if (target && !IsUsable(*target)) return false;
   for (const Separation& s : certificate) {

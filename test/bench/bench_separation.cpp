@@ -20,18 +20,18 @@ constexpr int kBodies = 50;
 struct Plan {
   Ball drone, target;
   std::vector<Body> bodies;
-  std::vector<std::vector<Separation>> certificates;
+  std::vector<Certificate> certificates;
   int intervals = 0;
 };
 
 /// Proofs of the thirds of the horizon, one after the other; empty where there is none.
-std::vector<Separation> InThirds(const Plan& plan, const Body& body) {
-  std::vector<Separation> all;
+Certificate InThirds(const Plan& plan, const Body& body) {
+  Certificate all;
   for (int i = 0; i < 3; ++i) {
     const SeparationResult third =
         Separate(plan.drone, &plan.target, body, i / 3.0, i == 2 ? 1.0 : (i + 1) / 3.0);
     if (third.kept != Kept::kOff) return {};
-    all.insert(all.end(), third.certificate.begin(), third.certificate.end());
+    for (const Separation& s : third.certificate) all.push_back(s);
   }
   return all;
 }
@@ -42,7 +42,7 @@ Plan MakePlan() {
   Plan plan{pair.drone, pair.target, {}, {}, 0};
   while (plan.bodies.size() < kBodies) {
     const Body body = RandomBody(&random, RandomPlace(&random, pair));
-    const std::vector<Separation> certificate = InThirds(plan, body);
+    const Certificate certificate = InThirds(plan, body);
     if (certificate.size() != 3) continue;
     plan.bodies.push_back(body);
     plan.certificates.push_back(certificate);

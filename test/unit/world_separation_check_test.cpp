@@ -14,7 +14,6 @@ namespace {
 
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
-using Certificate = std::vector<Separation>;
 
 bool Holds(const Certificate& c, const SeparationPair& pair) {
   return IsCertificate(c, 0.0, 1.0, pair.drone, pair.second(), pair.body);
@@ -248,6 +247,29 @@ TEST(SeparationCheck, AcceptsNothingThatExactArithmeticRefuses) {
     ASSERT_FALSE(exact()) << seed;
   }
   EXPECT_GT(further, 300) << "the bound on rounding was not tried";
+}
+
+// ---- the list itself ----
+
+TEST(Certificate, KeepsItsOrderWhileItGrowsAndShrinks) {
+  const auto nth = [](int i) { return Separation{0.1 * i, 0.1 * (i + 1), Vector3d::UnitY()}; };
+  Certificate c;
+  for (int n = 0; n < 5; ++n) {
+    EXPECT_EQ(c.empty(), n == 0);
+    c.push_back(nth(n));
+    ASSERT_EQ(c.size(), static_cast<size_t>(n + 1));
+    for (int i = 0; i <= n; ++i) EXPECT_EQ(c[static_cast<size_t>(i)].from, 0.1 * i) << n;
+    EXPECT_EQ(c.front().from, 0.0);
+    EXPECT_EQ(c.back().from, 0.1 * n);
+  }
+  for (const int left : {1, 2, 3, 4}) {  // the first goes, again and again
+    c.erase(c.begin());
+    const Certificate copy = c;
+    ASSERT_EQ(copy.size(), static_cast<size_t>(5 - left));
+    for (int i = left; i < 5; ++i) EXPECT_EQ(copy[static_cast<size_t>(i - left)].from, 0.1 * i);
+  }
+  c.clear();
+  EXPECT_EQ(c.begin(), c.end());
 }
 
 // ---- input that is none ----
