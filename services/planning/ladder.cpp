@@ -41,10 +41,14 @@ class Ladder : public Planner {
         search_(std::move(search)),
         placer_(config),
         shelf_(config),
-        refiner_(config) {}
+        refiner_(config) {
+    proof_.Remember(&separations_);
+    refiner_.Remember(&separations_);
+  }
 
   PlanResult Plan(const PlanRequest& request) override {
     std::string notes;
+    separations_.Clear();
     MakeProblem(config_, request, &notes, &problem_);
     used_ = &problem_;
     sight_from_ = 0.0;
@@ -70,6 +74,7 @@ class Ladder : public Planner {
     if (!(rest.horizon > 0.05)) return false;
     const Problem problem = MakeProblem(tight_, rest, nullptr);
     const Curve curve = ToCurve(plan, rest.t0, rest.horizon);
+    separations_.Clear();
     proof_.Reset(problem, 0.0, config_.exact_visibility);
     return proof_.Holds(curve) && KeepsLimits(curve, problem);
   }
@@ -85,7 +90,8 @@ class Ladder : public Planner {
         used_->target_body || std::any_of(obstacles.begin(), obstacles.end(),
                                           [](const auto& e) { return e.body.has_value(); });
     if (!asked && !obstacles.empty()) return true;
-    auto proofs = ProveOff(Curve(result->trajectory.coefficients), *used_, sight_from_);
+    auto proofs =
+        ProveOff(Curve(result->trajectory.coefficients), *used_, sight_from_, &separations_);
     if (!proofs) return false;
     auto stop = WayOut(config_, request, result->trajectory, &stopping_);
     if (!stop) return false;
@@ -344,6 +350,7 @@ class Ladder : public Planner {
   TableShelf shelf_;
   Refiner refiner_;
   PlanProof proof_;
+  SeparationMemory separations_;
   Problem problem_, shorter_;  ///< over the whole horizon, over a part of it
   StopMemory stopping_;
   PlanRequest part_;               ///< what shorter_ was made from

@@ -190,7 +190,7 @@ bool PlanProof::Holds(const Curve& plan, bool exactly) {
     if (bounds && cleared_[j]) continue;
     if (!RowHolds(rows_[j], plan, small ? &p : nullptr, exactly)) return false;
   }
-  return StaysOff(plan, *problem_, sight_from_, &first_);
+  return StaysOff(plan, *problem_, sight_from_, &first_, memory_);
 }
 
 }  // namespace chase::planning

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "services/planning/fast_kernels.h"
-#include "services/planning/problem.h"
+#include "services/planning/separations.h"
 
 namespace chase::planning {
 
@@ -29,6 +29,8 @@ class PlanProof {
   /// tau = `sight_from` on (1: never); `exact` as for IsInSight. Where the problem has a reach,
   /// there are rows for the obstacles near it only, until a plan that leaves it is asked for.
   void Reset(const Problem& problem, double sight_from, bool exact);
+  /// Keeps there what separates the last plan from what is near it.
+  void Remember(SeparationMemory* memory) { memory_ = memory; }
 
   /// Without `exactly`, what bounds and subdivision leave open counts as refused: for plans that
   /// may be dispensed with, because the integers take milliseconds.
@@ -70,6 +72,7 @@ class PlanProof {
 
   const kernels::Table* kernels_;
   const Problem* problem_ = nullptr;
+  SeparationMemory* memory_ = nullptr;
   bool exact_sight_ = true, usable_ = false, small_ = false, linear_ = true, all_ = true,
        laid_out_ = false;
   int degree_ = 5, n_exact_ = 0;

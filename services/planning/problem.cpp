@@ -210,6 +210,7 @@ void MakeProblem(const PlannerConfig& config, const PlanRequest& request, std::s
     const world::Obstacle& o = request.obstacles[j];
     Ellipsoid* e = &problem->obstacles[j];
     e->id = o.id;
+    e->index = static_cast<int>(j);
     e->safety_from = 0.0;
     const bool asks_sight = request.asks_sight && !o.ground;
     e->ground = o.ground;

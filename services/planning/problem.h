@@ -19,6 +19,7 @@ using world::Curve;
 /// for the line of sight.
 struct Ellipsoid {
   int id = 0;
+  int index = -1;  ///< in the request's list; -1: not one of it
   Curve center;
   Eigen::Matrix3d safety;  ///< must not hold the drone's centre
   Eigen::Matrix3d sight;   ///< must not cross the segment from drone to target

@@ -18,6 +18,9 @@ class Refiner {
  public:
   explicit Refiner(const PlannerConfig& config) : config_(config), shelf_(config) {}
 
+  /// As for PlanProof.
+  void Remember(SeparationMemory* memory) { proof_.Remember(memory); }
+
   /// How far Improve may move a control point, m; Repair goes further, within the problem's reach.
   static constexpr double kReach = 0.5;
 

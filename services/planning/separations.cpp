@@ -66,19 +66,19 @@ class Prover {
         safety_(drone_, nullptr),
         sight_(eye_, &target_) {}
 
-  // Asks all of the obstacle where it might matter; adds the proofs to `proofs`, if there are to be
-  // any. The planes that keep the line of sight off keep the drone's ball off, too: they prove
-  // safety where that leaves more than others do, so that the least clearance has planes of its
-  // own.
-  bool IsOff(const Ellipsoid& e, std::vector<Proof>* proofs) {
+  // Asks all of the obstacle where it might matter, `memory` first, if there is one; adds the
+  // proofs to `proofs`, if there are to be any. The planes that keep the line of sight off keep the
+  // drone's ball off, too: they prove safety where that leaves more than others do, so that the
+  // least clearance has planes of its own.
+  bool IsOff(const Ellipsoid& e, std::vector<Proof>* proofs, SeparationMemory* memory) {
     if (e.safety_from > 0.0 && !Leaves(drone_.center, e)) return false;
     world::SeparationResult safety, sight;
     const double from = SightFrom(e);
-    if (from < 1.0 && !IsKept(sight = KeepInSight(e))) return false;
+    if (from < 1.0 && !IsKept(sight = InSight(e, memory))) return false;
     const double left = sight.room.drone - (e.safety_radius - SightRadius(e));
     const bool shared =
         from <= e.safety_from && left > kSlack && (!proofs || e.safety_radius + left > least_);
-    if (!shared && !IsKept(safety = KeepOff(e))) return false;
+    if (!shared && !IsKept(safety = Off(e, memory))) return false;
     if (!proofs) return true;
     if (shared) {
       safety.certificate = sight.certificate;
@@ -89,7 +89,7 @@ class Prover {
     if (from >= 1.0) return true;
     Add(e.id, from, SightRadius(e), std::move(sight), proofs);
     proofs->back().of_sight = true;
-    proofs->back().target_radius = target_.radius;
+    proofs->back().target_radius = TargetRadius(problem_, e.sight_share);
     return true;
   }
 
@@ -104,6 +104,27 @@ class Prover {
   }
   double SightFrom(const Ellipsoid& e) const { return std::max(sight_from_, e.sight_from); }
   double SightRadius(const Ellipsoid& e) const { return e.sight_share * problem_.sight_radius; }
+
+  template <class Answer>
+  static world::SeparationResult Remembered(SeparationMemory* memory,
+                                            const SeparationMemory::Question& question,
+                                            Answer answer) {
+    if (!memory || question.obstacle < 0) return answer();
+    if (const world::SeparationResult* known = memory->Find(question)) return *known;
+    const world::SeparationResult result = answer();
+    if (IsKept(result)) memory->Add(question, result);
+    return result;
+  }
+
+  world::SeparationResult Off(const Ellipsoid& e, SeparationMemory* memory) {
+    return Remembered(memory, {e.index, -1.0, e.safety_radius, e.safety_from},
+                      [&] { return KeepOff(e); });
+  }
+
+  world::SeparationResult InSight(const Ellipsoid& e, SeparationMemory* memory) {
+    return Remembered(memory, {e.index, e.sight_share, SightRadius(e), SightFrom(e)},
+                      [&] { return KeepInSight(e); });
+  }
 
   world::SeparationResult KeepOff(const Ellipsoid& e) {
     if (drone_.radius[0] != e.safety_radius) {
@@ -145,6 +166,22 @@ class Prover {
 
 }  // namespace
 
+void SeparationMemory::About(const Curve& curve, const Problem& problem) {
+  if (curve.rows() == curve_.rows() && curve == curve_ && t0_ == problem.t0 &&
+      duration_ == problem.duration)
+    return;
+  curve_ = curve;
+  t0_ = problem.t0;
+  duration_ = problem.duration;
+  answers_.clear();
+}
+
+const world::SeparationResult* SeparationMemory::Find(const Question& question) const {
+  for (const auto& [asked, answer] : answers_)
+    if (asked == question) return &answer;
+  return nullptr;
+}
+
 world::Ball DroneBall(const Curve& plan, double radius) {
   return {plan, math::Polynomial::Constant(1, radius)};
 }
@@ -159,11 +196,13 @@ world::Ball TargetBall(const Problem& problem, double share) {
   return {problem.target, TargetRadius(problem, share)};
 }
 
-bool StaysOff(const Curve& plan, const Problem& problem, double sight_from, int* first) {
+bool StaysOff(const Curve& plan, const Problem& problem, double sight_from, int* first,
+              SeparationMemory* memory) {
   Prover prover(plan, problem, sight_from);
   const Sieve sieve(plan, problem, sight_from);
+  if (memory) memory->About(plan, problem);
   const auto is_off = [&](const Ellipsoid& e) {
-    return !sieve.IsNear(e) || prover.IsOff(e, nullptr);
+    return !sieve.IsNear(e) || prover.IsOff(e, nullptr, memory);
   };
   const int n = static_cast<int>(problem.obstacles.size());
   const auto is_off_at = [&](int j) {
@@ -182,22 +221,24 @@ bool StaysOff(const Curve& plan, const Problem& problem, double sight_from, int*
 
 // Where a plan fails it fails at what is near: that is asked first.
 std::optional<std::vector<Proof>> ProveOff(const Curve& plan, const Problem& problem,
-                                           double sight_from) {
+                                           double sight_from, SeparationMemory* memory) {
   Prover prover(plan, problem, sight_from);
   const Sieve sieve(plan, problem, sight_from);
+  if (memory) memory->About(plan, problem);
   std::vector<Proof> near, proofs;
   for (const Ellipsoid& e : problem.obstacles)
-    if (sieve.IsNear(e) && !prover.IsOff(e, &near)) return std::nullopt;
+    if (sieve.IsNear(e) && !prover.IsOff(e, &near, memory)) return std::nullopt;
   proofs.reserve(2 * problem.obstacles.size() + 1);
   auto next = near.begin();
   for (const Ellipsoid& e : problem.obstacles) {
     if (sieve.IsNear(e)) {
       for (int i = prover.Asks(e); i > 0; --i) proofs.push_back(std::move(*next++));
-    } else if (e.body && !prover.IsOff(e, &proofs)) {
+    } else if (e.body && !prover.IsOff(e, &proofs, nullptr)) {
       return std::nullopt;
     }
   }
-  if (problem.target_body && !prover.IsOff(*problem.target_body, &proofs)) return std::nullopt;
+  if (problem.target_body && !prover.IsOff(*problem.target_body, &proofs, nullptr))
+    return std::nullopt;
   return proofs;
 }
 

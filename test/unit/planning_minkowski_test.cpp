@@ -5,6 +5,7 @@
 
 #include "services/planning/planner.h"
 #include "services/planning/problem.h"
+#include "services/planning/separations.h"
 #include "test/unit/planning_instances.h"
 #include "test/unit/separation_model.h"
 
@@ -201,6 +202,51 @@ TEST(Minkowski, CertifiedPlansKeepOffWhatTheySayTheyDo) {
   std::printf("%u plans, %d certified, %d false\n", 2 * n, certified, false_accepts);
   EXPECT_GT(certified, static_cast<int>(n));
   EXPECT_GT(in_sight, static_cast<int>(n) / 5);
+}
+
+void ExpectSameProofs(const std::vector<Proof>& a, const std::vector<Proof>& b) {
+  ASSERT_EQ(a.size(), b.size());
+  for (size_t i = 0; i < a.size(); ++i) {
+    EXPECT_TRUE(a[i].obstacle == b[i].obstacle && a[i].of_sight == b[i].of_sight);
+    EXPECT_TRUE(a[i].from == b[i].from && a[i].radius == b[i].radius && a[i].room == b[i].room);
+    EXPECT_EQ(a[i].target_radius, b[i].target_radius);
+    ASSERT_EQ(a[i].separations.size(), b[i].separations.size());
+    for (size_t k = 0; k < a[i].separations.size(); ++k) {
+      const world::Separation &s = a[i].separations[k], &r = b[i].separations[k];
+      EXPECT_TRUE(s.from == r.from && s.to == r.to && s.normal == r.normal);
+    }
+  }
+}
+
+/// What was found out while the plan was tried, and while others were, makes the same proofs.
+TEST(Minkowski, ProofsAreTheSameFromMemory) {
+  const PlannerConfig c;
+  const auto planner = MakePlanner("chase", c);
+  int proven = 0, with_less = 0;
+  for (unsigned seed = 1; seed <= 100; ++seed) {
+    const PlanRequest request = RandomRequest(c, seed);
+    const PlanResult plan = planner->Plan(request);
+    if (plan.trajectory.duration != request.horizon) continue;
+    const Problem problem = MakeProblem(c, request, nullptr);
+    const Curve curve = plan.trajectory.coefficients;
+    Curve other = curve;
+    other.row(1).x() += 0.1;
+    for (const double sight_from : {0.0, 1.0}) {
+      const auto proofs = ProveOff(curve, problem, sight_from);
+      SeparationMemory memory;
+      StaysOff(other, problem, sight_from, nullptr, &memory);
+      const bool off = StaysOff(curve, problem, sight_from, nullptr, &memory);
+      const auto again = ProveOff(curve, problem, sight_from, &memory);
+      ASSERT_EQ(again.has_value(), proofs.has_value()) << seed;
+      EXPECT_EQ(off, proofs.has_value()) << seed;
+      if (!proofs) continue;
+      ExpectSameProofs(*again, *proofs);
+      ++proven;
+      for (const Ellipsoid& e : problem.obstacles) with_less += e.sight_share < 1.0;
+    }
+  }
+  EXPECT_GT(proven, 50);
+  EXPECT_GT(with_less, 20);
 }
 
 /// Gap of the way's ball, or of its hull with the target's, at tau.
