@@ -206,6 +206,13 @@ bool Tracker::Moves(int id) const {
 
 std::vector<world::Obstacle> Tracker::Obstacles(double middle, double semi_height,
                                                 double grow) const {
+  // Changes of velocity to come, `change_rate` a second, add rate t^3 / 3 times their variance to
+  // that of the place: for kAhead s that is at most kAhead / 3 of the rate as a velocity's. With 1
+  // s in its place walkers are beyond two deviations in 3.8 instead of 4.7 % after 1 s, and in
+  // three crowds (1011 to 1013) 285 instead of 164 plans fall back.
+  constexpr double kAhead = 0.5;  // s
+  const double to_come =
+      kAhead / 3.0 * config_.change_rate * config_.change_speed * config_.change_speed;
   const Eigen::Matrix3d level = Eigen::Vector3d(1.0, 1.0, 0.0).asDiagonal();
   std::vector<world::Obstacle> obstacles;
   for (const auto& track : tracks_) {
@@ -224,7 +231,7 @@ std::vector<world::Obstacle> Tracker::Obstacles(double middle, double semi_heigh
     o.shape.topLeftCorner<2, 2>() = outline.Scaled(grow).shape;
     o.shape(2, 2) = 1.0 / (semi_height * semi_height);
     o.position_covariance = track.body.CenterVariance() * level;
-    o.velocity_covariance = track.body.VelocityVariance() * level;
+    o.velocity_covariance = (track.body.VelocityVariance() + to_come) * level;
     obstacles.push_back(o);
   }
   return obstacles;
