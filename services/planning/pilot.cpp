@@ -194,6 +194,9 @@ PlanRequest Pilot::Request(double t0, const Start& start) const {
   request.target = forecast_->target;
   request.target_sigma = forecast_->sigma;
   request.target_speed_sigma = forecast_->speed_sigma;
+  // One that is lost could be anywhere soon, and there is no way to rest from that.
+  if (HasTarget(t0 - config_.latency))
+    request.target_manoeuvre = {config_.target_acceleration, config_.target_memory};
   request.target_body = TargetBody(*forecast_);
   request.horizon = std::clamp(forecast_->target.end() - t0, kShortestHorizon, config_.horizon);
   if (start.on_plan) request.running = running_.trajectory;  // off it, it is no way out

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "common/world/manoeuvre.h"
 #include "common/world/obstacle.h"
 #include "common/world/plan_check.h"
 #include "common/world/state.h"
@@ -39,6 +40,7 @@ struct PlanRequest {
   world::Trajectory target;                    ///< p_WT(t)
   double target_sigma = 0.0;                   ///< largest deviation of p_WT at target.start, m
   double target_speed_sigma = 0.0;             ///< and of its velocity, m/s
+  world::Manoeuvre target_manoeuvre;           ///< that it does not foresee
   std::vector<world::Obstacle> obstacles;      ///< at their true size
   std::vector<world::Obstacle> unseen;         ///< places that nobody has looked into
   std::optional<world::Obstacle> target_body;  ///< what the drone must not touch of the target

@@ -21,6 +21,10 @@ std::string PlanningConfig::Problem() const {
   if (!(latency >= 0.0 && latency <= 0.5)) below("latency", latency, "0 to 0.5 s");
   if (!(reset_threshold > 0.0)) below("reset_threshold", reset_threshold, "above 0 m");
   if (!(stale_prediction > 0.0)) below("stale_prediction", stale_prediction, "above 0 s");
+  if (!(target_acceleration >= 0.0 && target_acceleration <= 20.0))
+    below("target_acceleration", target_acceleration, "0 to 20 m/s^2");
+  if (!(target_memory >= 0.05 && target_memory <= 60.0))
+    below("target_memory", target_memory, "0.05 to 60 s");
   if (!(takeoff_height >= 0.0)) below("takeoff_height", takeoff_height, "at least 0 m");
   if (!(takeoff_time > 0.5)) below("takeoff_time", takeoff_time, "above 0.5 s");
   if (!(landing_room >= 0.0 && landing_room <= 5.0))

@@ -15,6 +15,8 @@ struct PlanningConfig {
   double latency = 0.04;
   double reset_threshold = 0.7;
   double stale_prediction = 1.4;
+  double target_acceleration = 0.5;
+  double target_memory = 0.5;
   double takeoff_height = 1.2;
   double takeoff_time = 3.0;
   double search_yaw_rate = 1.0;
@@ -33,6 +35,9 @@ struct PlanningConfig {
     v("reset_threshold", reset_threshold,
       "tracking error above which a plan starts from the estimate, m");
     v("stale_prediction", stale_prediction, "age at which a prediction counts as none, s");
+    v("target_acceleration", target_acceleration,
+      "standard deviation of what the forecast of the target does not foresee, per axis, m/s^2");
+    v("target_memory", target_memory, "time constant of that acceleration, s");
     v("takeoff_height", takeoff_height, "climb before the chase, above the start, m");
     v("takeoff_time", takeoff_time, "duration of that climb, s");
     v("search_yaw_rate", search_yaw_rate, "turning while the target is lost, rad/s");

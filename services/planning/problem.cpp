@@ -8,6 +8,7 @@
 #include "services/planning/field_of_view.h"
 #include "services/planning/margins.h"
 #include "services/planning/separations.h"
+#include "services/planning/stopping.h"
 
 namespace chase::planning {
 namespace {
@@ -126,9 +127,20 @@ Curve StartCurve(const world::State& s, double T) {
   return c;
 }
 
-// The target's own body, to which no margin is kept.
-void SetTargetBody(const world::Obstacle& o, double hard, StartCheck* start, Problem* problem,
-                   std::string* notes) {
+// Until `ahead` s after its forecast was made the target's manoeuvres add at most this times the
+// square of the time to the variance of its place, as what they add grows over that square,
+// m^2/s^2.
+double ManoeuvreRate(const world::Manoeuvre& manoeuvre, double ahead) {
+  return ahead > 0.0 ? manoeuvre.Variance(ahead) / (ahead * ahead) : 0.0;
+}
+
+// The target's own body, to which no margin is kept. Its manoeuvres count for `flown` s; they add
+// to its velocity's variance, so that they go on to count after that, but for less than they may.
+void SetTargetBody(const PlanRequest& request, double flown, double hard, StartCheck* start,
+                   Problem* problem, std::string* notes) {
+  world::Obstacle o = *request.target_body;
+  const double ahead = request.t0 + std::min(flown, request.horizon) - o.center.start;
+  o.velocity_covariance.diagonal().array() += ManoeuvreRate(request.target_manoeuvre, ahead);
   Ellipsoid e;
   e.id = kTargetId;
   e.body = world::MakeBody(o, problem->t0, problem->duration, problem->sigmas);
@@ -148,7 +160,9 @@ void SetTargetBody(const world::Obstacle& o, double hard, StartCheck* start, Pro
 math::Polynomial TargetGrowth(const PlannerConfig& config, const PlanRequest& request) {
   const double age = request.t0 - request.target.start;
   const auto deviations = [&](double since) {
-    return config.sigmas * std::hypot(request.target_sigma, request.target_speed_sigma * since);
+    const double steadily = std::hypot(request.target_sigma, request.target_speed_sigma * since);
+    return config.sigmas *
+           std::hypot(steadily, std::sqrt(request.target_manoeuvre.Variance(since)));
   };
   math::Polynomial growth(2);
   growth << deviations(age), deviations(age + request.horizon) - deviations(age);
@@ -237,7 +251,10 @@ void MakeProblem(const PlannerConfig& config, const PlanRequest& request, std::s
       RelaxSight(o, growth, first, target, *problem, &start, e, notes);
   }
   problem->target_body.reset();
-  if (request.target_body) SetTargetBody(*request.target_body, hard, &start, problem, notes);
+  // A plan that chases is flown until its stop begins, or until a newer one takes its place; ways
+  // to rest are flown to their ends.
+  const double flown = request.asks_sight ? kOverdue : request.horizon;
+  if (request.target_body) SetTargetBody(request, flown, hard, &start, problem, notes);
 }
 
 Problem MakeProblem(const PlannerConfig& config, const PlanRequest& request, std::string* notes) {

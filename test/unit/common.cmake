@@ -10,5 +10,6 @@ chase_test(world_separation_test
   SOURCES ${CMAKE_CURRENT_LIST_DIR}/world_separation_test.cpp
           ${CMAKE_CURRENT_LIST_DIR}/world_separation_check_test.cpp
           ${CMAKE_CURRENT_LIST_DIR}/world_body_test.cpp
+          ${CMAKE_CURRENT_LIST_DIR}/world_manoeuvre_test.cpp
           ${CMAKE_CURRENT_LIST_DIR}/separation_model.cpp
   TIMEOUT 300)

@@ -63,6 +63,7 @@ PlanRequest RandomRequest(const PlannerConfig& config, unsigned seed) {
   Random random(seed, 77);
   request.target_sigma = random.Uniform(0.0, 0.05);
   request.target_speed_sigma = random.Uniform(0.0, 0.1);
+  request.target_manoeuvre = {random.Uniform(0.0, 0.5), random.Uniform(0.2, 2.0)};
   const int n = 2 + static_cast<int>(random.Next() % 9);
   for (int i = 0; i < n; ++i) request.obstacles.push_back(RandomObstacle(&random, request, i));
   return request;
@@ -103,6 +104,14 @@ double LeastGap(const world::Trajectory& way, double radius, double from, const 
   return least;
 }
 
+/// Standard deviation of the target's place along an axis at t, m.
+double TargetSigma(const PlanRequest& request, double t) {
+  const double since = t - request.target.start;
+  const double v = request.target_speed_sigma * since;
+  return std::sqrt(request.target_sigma * request.target_sigma + v * v +
+                   request.target_manoeuvre.Variance(since));
+}
+
 /// What a plan that is called certified promises, one sentence per broken promise.
 std::vector<std::string> BrokenPromises(const PlannerConfig& c, const PlanRequest& request,
                                         const PlanResult& plan) {
@@ -134,10 +143,10 @@ std::vector<std::string> BrokenPromises(const PlannerConfig& c, const PlanReques
     if (p.of_sight && plan.reason.empty())
       for (const double tau : {0.0, 0.5, 1.0}) {
         const double t = plan.trajectory.start + tau * plan.trajectory.duration;
-        const double sigma = std::hypot(request.target_sigma,
-                                        request.target_speed_sigma * (t - request.target.start));
         check("uncertainty in sight of ",
-              math::Evaluate(p.target_radius, tau) - c.sight_margin - c.sigmas * sigma, p.obstacle);
+              math::Evaluate(p.target_radius, tau) - c.sight_margin -
+                  c.sigmas * TargetSigma(request, t),
+              p.obstacle);
       }
   }
   if (safety.size() != request.obstacles.size()) broken.push_back("an obstacle without a proof");
@@ -327,9 +336,7 @@ TEST(Minkowski, ProblemsAskForWhatTheBodiesAre) {
     request.target.coefficients.topRows(target.rows()) = target;
     const Problem problem = MakeProblem(c, request, nullptr);
     for (const double tau : {0.0, 0.4, 1.0}) {
-      const double since = request.t0 + tau * request.horizon - request.target.start;
-      const double deviations =
-          c.sigmas * std::hypot(request.target_sigma, request.target_speed_sigma * since);
+      const double deviations = c.sigmas * TargetSigma(request, request.t0 + tau * request.horizon);
       EXPECT_GE(math::Evaluate(problem.target_growth, tau), deviations - 1e-12);
       EXPECT_TRUE(tau == 0.4 ||
                   std::abs(math::Evaluate(problem.target_growth, tau) - deviations) < 1e-12);

@@ -283,13 +283,26 @@ TEST(Pilot, TheForecastsUncertaintyAndBodyReachThePlan) {
   ASSERT_TRUE(plan);
   ASSERT_GE(plan->certified_clearance, 0.0) << plan->reason;
   const PlannerConfig& c = config.planner;
+  const auto distance = [&](const world::Trajectory& way, double t) {
+    const Eigen::Vector3d d = way.Position(t) - forecast.target.Position(t);
+    return std::hypot(std::max(0.0, d.head<2>().norm() - forecast.radius),
+                      std::max(0.0, std::abs(d.z()) - 0.5 * forecast.height));
+  };
   for (double t = plan->trajectory.start; t <= plan->trajectory.end(); t += 0.02) {
     const double since = t - forecast.t;
     const double deviations = c.sigmas * std::hypot(forecast.sigma, since * forecast.speed_sigma);
-    const Eigen::Vector3d d = plan->trajectory.Position(t) - forecast.target.Position(t);
-    const double off = std::hypot(std::max(0.0, d.head<2>().norm() - forecast.radius),
-                                  std::max(0.0, std::abs(d.z()) - 0.5 * forecast.height));
-    EXPECT_GE(off, c.hard_radius() + deviations - 1e-3) << since;
+    EXPECT_GE(distance(plan->trajectory, t), c.hard_radius() + deviations - 1e-3) << since;
+  }
+  // Until the stop begins, and along it, the target manoeuvres, too.
+  const world::Manoeuvre manoeuvre{config.target_acceleration, config.target_memory};
+  const auto sigma = [&](double since) {
+    const double v = since * forecast.speed_sigma;
+    return std::sqrt(forecast.sigma * forecast.sigma + v * v + manoeuvre.Variance(since));
+  };
+  ASSERT_TRUE(plan->stop);
+  for (double t = plan->trajectory.start; t <= plan->stop->end(); t += 0.02) {
+    const world::Trajectory& way = t < plan->stop->start ? plan->trajectory : *plan->stop;
+    EXPECT_GE(distance(way, t), c.hard_radius() + c.sigmas * sigma(t - forecast.t) - 1e-3) << t;
   }
   int sights = 0;
   for (const Proof& p : plan->proofs) {
@@ -297,10 +310,7 @@ TEST(Pilot, TheForecastsUncertaintyAndBodyReachThePlan) {
     ++sights;
     EXPECT_GE(p.target_radius[0], c.sight_margin + c.sigmas * forecast.sigma - 1e-9);
     EXPECT_GE(p.target_radius.sum(),
-              c.sight_margin +
-                  c.sigmas *
-                      std::hypot(forecast.sigma, plan->trajectory.duration * forecast.speed_sigma) -
-                  1e-9);
+              c.sight_margin + c.sigmas * sigma(plan->trajectory.duration) - 1e-9);
   }
   EXPECT_EQ(sights, 1);
 }
