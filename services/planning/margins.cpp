@@ -14,8 +14,9 @@ constexpr double kShares[] = {1.0, 0.75, 0.5, 0.25, 0.0};
 constexpr int kSamples = 24;
 constexpr double kRounding = 1e-4;  // m
 
-Eigen::Matrix3d Grown(const world::Obstacle& o, double margin) {
-  return margin > 0.0 ? world::Inflated(o.shape, margin) : o.shape;
+Eigen::Matrix3d Grown(const world::Obstacle& o, const Ellipsoid& e, double margin) {
+  const Eigen::Matrix3d shape = SortingShape(o, e);
+  return margin > 0.0 ? world::Inflated(shape, margin) : shape;
 }
 
 // Leaves the first half and returns the second.
@@ -112,7 +113,7 @@ void ClearStart(const world::Obstacle& o, double growth, const Curve& start, Ell
   const Eigen::Vector3d offset = (start.row(0) - e->center.row(0)).transpose();
   for (const double share : {1.0, 0.5, 0.0}) {
     if (share < 1.0) {
-      e->safety = Grown(o, share * growth);
+      e->safety = Grown(o, *e, share * growth);
       e->grown_by[0] = -1.0;
     }
     if (SquaredNorm(e->safety, offset) > kClear) return;
@@ -125,7 +126,7 @@ void RelaxSafety(const world::Obstacle& o, double hard, double margin, double un
   for (double share : kShares) {
     e->safety_radius = hard + share * margin;
     if (share < 1.0 && searched) {
-      e->safety = Grown(o, e->safety_radius + uncertainty);
+      e->safety = Grown(o, *e, e->safety_radius + uncertainty);
       e->grown_by[0] = -1.0;
     }
     if (!start->IsSafe(*e, e->safety_radius)) continue;
@@ -156,7 +157,7 @@ void RelaxSight(const world::Obstacle& o, const Growth& growth, const FirstSight
   double kept = -1.0;
   const auto take = [&](double share) {
     e->sight_share = share;
-    e->sight = Grown(o, share * growth.sight);
+    e->sight = Grown(o, *e, share * growth.sight);
     e->grown_by[1] = -1.0;
   };
   for (double share : kShares) {

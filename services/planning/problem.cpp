@@ -64,9 +64,10 @@ void SetShapes(const PlannerConfig& config, const PlanRequest& request, const wo
     return;
   }
   if (same && e->grown_by[0] == growth.safety && e->grown_by[1] == growth.sight) return;
-  e->safety = e->sight = o.shape;
+  const Eigen::Matrix3d shape = SortingShape(o, *e);
+  e->safety = e->sight = shape;
   if (growth.safety > 0.0 || growth.sight > 0.0) {
-    const world::Inflation inflation(o.shape);
+    const world::Inflation inflation(shape);
     if (growth.safety > 0.0) e->safety = inflation.By(growth.safety);
     if (growth.sight > 0.0) e->sight = inflation.By(growth.sight);
   }

@@ -182,6 +182,38 @@ TEST(Margins, GiveWayToTheHardRadiusAndNoFurther) {
 }
 
 // Nothing but its body keeps the drone off the target: no least distance, and a wish to be in it.
+/// A target walks through a door of 1.4 m in a wall whose halves are boxes of 4 m.
+TEST(Doors, OfAWallOfLongBoxesAreFollowedThrough) {
+  const auto planner = MakePlanner("chase", PlannerConfig{});
+  PlanRequest request;
+  request.start.p = {-1.4, 0.0, 1.4};
+  request.start.v = {0.9, 0.0, 0.0};
+  request.target.duration = request.horizon;
+  request.target.coefficients = Eigen::MatrixXd::Zero(2, 3);
+  request.target.coefficients.row(1) << 0.9 * request.horizon, 0.0, 0.0;
+  request.target_sigma = 0.05;
+  for (const double side : {-1.0, 1.0}) {
+    world::Obstacle wall;
+    wall.id = static_cast<int>(request.obstacles.size());
+    wall.solid = world::Obstacle::Solid::kBox;
+    wall.half = {0.1, 2.0, 1.5};
+    wall.shape = (3.0 * wall.half.cwiseAbs2()).cwiseInverse().asDiagonal();
+    wall.center = world::Trajectory::Constant({3.0, 2.7 * side, 1.5}, 0.0, 1.0);
+    request.obstacles.push_back(wall);
+  }
+  for (int i = 0; i < 24; ++i) {
+    request.target.start = request.t0;
+    request.target.coefficients.row(0) << 1.0 + 0.9 * request.t0, 0.0, 0.85;
+    const PlanResult plan = planner->Plan(request);
+    EXPECT_LE(plan.verdict, Verdict::kKept) << request.t0 << " " << plan.reason;
+    EXPECT_GE(plan.certified_clearance, 0.0) << request.t0;
+    request.t0 += 0.25;
+    request.start = plan.trajectory.At(std::min(request.t0, plan.trajectory.end()));
+    request.running = plan.trajectory;
+  }
+  EXPECT_GT(request.start.p.x(), 3.5);
+}
+
 TEST(TargetBody, IsKeptOffByPlansThatItDrivesAt) {
   PlannerConfig config;
   config.min_distance = 0.0;
