@@ -38,13 +38,16 @@ Eigen::Vector2d Direction(int k) {
 
 BodyFilter::BodyFilter(const Eigen::Vector2d& center, const Reaches& seen, double speed,
                        double unseen) {
-  x_.head<2>() = center;
-  P_(2, 2) = P_(3, 3) = speed * speed;
+  Hypothesis born;
+  born.x.head<2>() = center;
+  born.P(2, 2) = born.P(3, 3) = speed * speed;
+  born.weight = 1.0;
   for (int k = 0; k < kDirections; ++k) {
     const Reach& reach = seen[static_cast<size_t>(k)];
-    x_[4 + k] = reach.along - Direction(k).dot(center);
-    P_(4 + k, 4 + k) = std::pow(reach.edge ? kEnd : unseen, 2);
+    born.x[4 + k] = reach.along - Direction(k).dot(center);
+    born.P(4 + k, 4 + k) = std::pow(reach.edge ? kEnd : unseen, 2);
   }
+  Take(born, {});
 }
 
 double Footprint::Excess(const Eigen::Vector2d& q, double age) const {
@@ -58,48 +61,73 @@ double Footprint::Excess(const Eigen::Vector2d& q, double age) const {
   return most;
 }
 
-/// A change that was not confirmed by a sweep is one that may have been: same mean, its variance.
-void BodyFilter::Predict(double dt, const MotionNoise& noise) {
-  P_ += change_ * (Changed() - P_);
-  x_.head<2>() += dt * x_.segment<2>(2);
-  P_.topRows<2>() += dt * P_.middleRows<2>(2);
-  P_.leftCols<2>() += dt * P_.middleCols<2>(2);
-  const double q = noise.acceleration * noise.acceleration;
-  for (int i = 0; i < 2; ++i) {
-    P_(i, i) += 0.25 * q * std::pow(dt, 4);
-    P_(i, i + 2) += 0.5 * q * std::pow(dt, 3);
-    P_(i + 2, i) += 0.5 * q * std::pow(dt, 3);
-    P_(i + 2, i + 2) += q * dt * dt;
-  }
-  P_.diagonal().tail<kDirections>().array() += kReshape * kReshape * dt;
-  change_ = 1.0 - std::exp(-noise.change_rate * dt);
-  change_speed_ = noise.change_speed;
-  change_time_ = dt;
+BodyFilter::Hypothesis BodyFilter::Merged(const Hypothesis& a, const Hypothesis& b) {
+  Hypothesis both;
+  both.weight = a.weight + b.weight;
+  const double w = both.weight > 0.0 ? b.weight / both.weight : 0.0;
+  const State apart = b.x - a.x;
+  both.x = a.x + w * apart;
+  both.P = a.P + w * (b.P - a.P) + w * (1.0 - w) * apart * apart.transpose();
+  both.P = (0.5 * (both.P + both.P.transpose())).eval();
+  return both;
 }
 
-/// The covariance if the velocity changed at some time of the last step, any as likely: of the
+void BodyFilter::Take(const Hypothesis& went_on, const Hypothesis& changed) {
+  ways_ = {went_on, changed};
+  all_ = Merged(went_on, changed);
+}
+
+/// Probability of a change that nothing tells of yet, up to `from` s before now.
+double BodyFilter::ChangeSince(double from) const {
+  return 1.0 - std::exp(-noise_.change_rate * std::max(0.0, unseen_ - from));
+}
+
+/// If the velocity changed between `unseen_` and `from` s before now, any time as likely: of the
 /// place by the mean square of the time since then.
-BodyFilter::Covariance BodyFilter::Changed() const {
-  Covariance P = P_;
-  const double q = change_speed_ * change_speed_, t = change_time_;
+BodyFilter::Hypothesis BodyFilter::Changed(const Hypothesis& before, double from) const {
+  Hypothesis after = before;
+  const double q = noise_.change_speed * noise_.change_speed, until = std::max(from, unseen_);
   for (int i = 0; i < 2; ++i) {
-    P(i, i) += q * t * t / 3.0;
-    P(i, i + 2) += q * t / 2.0;
-    P(i + 2, i) += q * t / 2.0;
-    P(i + 2, i + 2) += q;
+    after.P(i, i) += q * (from * from + from * until + until * until) / 3.0;
+    after.P(i, i + 2) += q * (from + until) / 2.0;
+    after.P(i + 2, i) += q * (from + until) / 2.0;
+    after.P(i + 2, i + 2) += q;
   }
-  return P;
+  return after;
+}
+
+/// A change that no sweep could tell of is one that may have been: same mean, its variance.
+void BodyFilter::Predict(double dt, const MotionNoise& noise) {
+  const double q = noise.acceleration * noise.acceleration, change = ChangeSince(0.0);
+  for (auto& way : ways_) {
+    auto& P = way.P;
+    if (!seen_) P += change * (Changed(way, 0.0).P - P);
+    way.x.head<2>() += dt * way.x.segment<2>(2);
+    P.topRows<2>() += dt * P.middleRows<2>(2);
+    P.leftCols<2>() += dt * P.middleCols<2>(2);
+    for (int i = 0; i < 2; ++i) {
+      P(i, i) += 0.25 * q * std::pow(dt, 4);
+      P(i, i + 2) += 0.5 * q * std::pow(dt, 3);
+      P(i + 2, i) += 0.5 * q * std::pow(dt, 3);
+      P(i + 2, i + 2) += q * dt * dt;
+    }
+    P.diagonal().tail<kDirections>().array() += kReshape * kReshape * dt;
+  }
+  noise_ = noise;
+  unseen_ = seen_ ? unseen_ + dt : dt;
+  seen_ = false;
+  Take(ways_[0], ways_[1]);
 }
 
 Footprint BodyFilter::Expected(double sigma, double most) const {
   Footprint f;
   f.p = p();
   f.v = v();
-  const Covariance P = Changed();
+  const Covariance P = Changed(all_, 0.0).P;
   for (int k = 0; k < kDirections; ++k) {
     const auto i = static_cast<size_t>(k);
     const Row row = Model(k, 0.0);
-    f.reach[i] = x_[4 + k];
+    f.reach[i] = all_.x[4 + k];
     f.sigma[i] = std::min(most, std::sqrt(row.dot(P * row.transpose()) + sigma * sigma));
     f.radius = std::max(f.radius, std::abs(f.reach[i]) + 4.0 * f.sigma[i]);
   }
@@ -128,7 +156,7 @@ int BodyFilter::Reshape(const Reaches& seen, const std::array<double, kDirection
       if (!seen[i].edge) continue;
       const Eigen::Vector2d d = Direction(k);
       const double rest = (innovation[i] - d.dot(shift)) / kOutlier;
-      const double doubt = P_(4 + k, 4 + k) / (kOutlier * kOutlier);
+      const double doubt = all_.P(4 + k, 4 + k) / (kOutlier * kOutlier);
       const double weight = 1.0 / (std::pow(1.0 + rest * rest, 2) * (1.0 + doubt));
       a += weight * d * d.transpose();
       b += weight * innovation[i] * d;
@@ -140,10 +168,10 @@ int BodyFilter::Reshape(const Reaches& seen, const std::array<double, kDirection
     const size_t i = static_cast<size_t>(k);
     if (!seen[i].edge) continue;
     const double rest = innovation[i] - Direction(k).dot(shift);
-    if (std::abs(rest) > kOutlier)
-      P_(4 + k, 4 + k) += rest * rest;
+    if (std::abs(rest) <= kOutlier)
+      rigid += all_.P(4 + k, 4 + k) < kKnown * kKnown;
     else
-      rigid += P_(4 + k, 4 + k) < kKnown * kKnown;
+      for (auto& way : ways_) way.P(4 + k, 4 + k) += rest * rest;
   }
   return rigid;
 }
@@ -156,71 +184,83 @@ void BodyFilter::Uncover(const Reaches& seen, double unseen) {
     const Reach& reach = seen[static_cast<size_t>(k)];
     End& end = ends_[static_cast<size_t>(k)];
     if (reach.edge) {
-      end = {x_[4 + k], std::min(end.points + 2, kMostPoints)};
+      end = {all_.x[4 + k], std::min(end.points + 2, kMostPoints)};
       continue;
     }
     end.points = std::max(0, end.points - 1);
-    double beyond = reach.along - Model(k, reach.age).dot(x_);
+    double beyond = reach.along - Model(k, reach.age).dot(all_.x);
     if (end.points >= kSure)
-      beyond = std::min(beyond, std::max(0.0, end.place + kStretch - x_[4 + k]));
-    if (beyond <= 0.0) {  // hidden, or never was: doubted first, then forgotten slowly
-      if (P_(4 + k, 4 + k) < kKnown * kKnown)
-        P_(4 + k, 4 + k) += kDoubt * kDoubt;
-      else
-        x_[4 + k] += kShrink * beyond;
-      continue;
+      beyond = std::min(beyond, std::max(0.0, end.place + kStretch - all_.x[4 + k]));
+    const bool known = all_.P(4 + k, 4 + k) < kKnown * kKnown;
+    for (auto& way : ways_) {
+      if (beyond <= 0.0 && known) {  // hidden, or never was: doubted first, then forgotten slowly
+        way.P(4 + k, 4 + k) += kDoubt * kDoubt;
+        continue;
+      }
+      way.x[4 + k] += beyond > 0.0 ? beyond : kShrink * beyond;
+      if (beyond <= 0.0) continue;
+      way.P.row(4 + k).setZero();
+      way.P.col(4 + k).setZero();
+      way.P(4 + k, 4 + k) = unseen * unseen;
     }
-    x_[4 + k] += beyond;
-    P_.row(4 + k).setZero();
-    P_.col(4 + k).setZero();
-    P_(4 + k, 4 + k) = unseen * unseen;
   }
+  Take(ways_[0], ways_[1]);
 }
 
-/// Kalman update; returns the log likelihood of the innovations z but for a constant.
-double BodyFilter::Update(const Eigen::MatrixXd& model, const Eigen::VectorXd& z, double sigma,
-                          State* x, Covariance* P) const {
+namespace {
+
+/// Kalman update of x and P by the innovation at the state `at`; returns the log likelihood but for
+/// a constant.
+template <class State, class Covariance>
+double Update(const Eigen::MatrixXd& model, const Eigen::VectorXd& z, double sigma, State* x,
+              Covariance* P) {
   Eigen::MatrixXd S = model * *P * model.transpose();
   S += kCommon * kCommon * model.leftCols<2>() * model.leftCols<2>().transpose();
   S.diagonal().array() += sigma * sigma;
   const Eigen::LLT<Eigen::MatrixXd> factors(S);
   const Eigen::MatrixXd gain = factors.solve(model * *P).transpose();
-  *x += gain * z;
+  const Eigen::VectorXd innovation = z - model * *x;
+  *x += gain * innovation;
   *P -= gain * S * gain.transpose();
   const Eigen::MatrixXd L = factors.matrixL();
-  return -0.5 * z.dot(factors.solve(z)) - L.diagonal().array().log().sum();
+  return -0.5 * innovation.dot(factors.solve(innovation)) - L.diagonal().array().log().sum();
 }
+
+}  // namespace
 
 Sight BodyFilter::Correct(const Reaches& seen, double sigma, double unseen) {
   std::array<double, kDirections> innovation{};
-  for (int k = 0; k < kDirections; ++k) {
-    const Reach& reach = seen[static_cast<size_t>(k)];
-    innovation[static_cast<size_t>(k)] = reach.along - Model(k, reach.age).dot(x_);
-  }
-  const int rigid = Reshape(seen, innovation);
   Eigen::Matrix<double, kDirections, kStates> H;
   Eigen::Matrix<double, kDirections, 1> z;
   int n = 0;
+  double age = 0.0;
   for (int k = 0; k < kDirections; ++k) {
-    const size_t i = static_cast<size_t>(k);
-    if (!seen[i].edge) continue;
-    H.row(n) = Model(k, seen[i].age);
-    z[n++] = innovation[i];
+    const Reach& reach = seen[static_cast<size_t>(k)];
+    const Row row = Model(k, reach.age);
+    innovation[static_cast<size_t>(k)] = reach.along - row.dot(all_.x);
+    if (!reach.edge) continue;
+    H.row(n) = row;
+    z[n++] = reach.along;
+    age += reach.age;
   }
+  const int rigid = Reshape(seen, innovation);
   if (n > 0) {
-    const Eigen::MatrixXd model = H.topRows(n);
-    State changed = x_;
-    Covariance P_changed = Changed();
-    const double on = Update(model, z.head(n), sigma, &x_, &P_);
-    const double off = Update(model, z.head(n), sigma, &changed, &P_changed);
-    const double odds = change_ / (1.0 - change_) * std::exp(std::clamp(off - on, -60.0, 60.0));
-    const double w = odds / (1.0 + odds);
-    const State apart = changed - x_;
-    x_ += w * apart;
-    P_ += w * (P_changed - P_) + w * (1.0 - w) * apart * apart.transpose();
-    P_ = (0.5 * (P_ + P_.transpose())).eval();
+    age /= n;
+    const double change = ChangeSince(age);
+    std::array<Hypothesis, 4> next = {ways_[0], ways_[1], Changed(ways_[0], age),
+                                      Changed(ways_[1], age)};
+    std::array<double, 4> odds{};
+    for (size_t i = 0; i < 4; ++i)
+      odds[i] = std::log(next[i].weight * (i < 2 ? 1.0 - change : change)) +
+                Update(H.topRows(n), z.head(n), sigma, &next[i].x, &next[i].P);
+    const double most = *std::max_element(odds.begin(), odds.end());
+    double sum = 0.0;
+    for (size_t i = 0; i < 4; ++i) sum += next[i].weight = std::exp(odds[i] - most);
+    for (auto& way : next) way.weight /= sum;
+    Take(Merged(next[0], next[1]), Merged(next[2], next[3]));
+    unseen_ = age;
+    seen_ = true;
   }
-  change_ = 0.0;
   Uncover(seen, unseen);
   return {n, rigid};
 }
@@ -231,9 +271,9 @@ double BodyFilter::Distance(const Reaches& seen, double sigma, double least) con
   for (int k = 0; k < kDirections; ++k) {
     const Reach& reach = seen[static_cast<size_t>(k)];
     const Row row = Model(k, reach.age);
-    const double innovation = reach.along - row.dot(x_);
+    const double innovation = reach.along - row.dot(all_.x);
     if (!reach.edge) continue;
-    const double s = std::max(row.dot(P_ * row.transpose()) + sigma * sigma, least * least);
+    const double s = std::max(row.dot(all_.P * row.transpose()) + sigma * sigma, least * least);
     sum += std::min(kMostTerm, innovation * innovation / s) + std::log(s / (least * least));
     ++n;
   }
@@ -246,7 +286,7 @@ Points2 BodyFilter::Outline() const {
       {-kSquare, -kSquare}, {kSquare, -kSquare}, {kSquare, kSquare}, {-kSquare, kSquare}};
   for (int k = 0; k < kDirections && !polygon.empty(); ++k) {
     Points2 cut;
-    const auto beyond = [&](const Eigen::Vector2d& q) { return Direction(k).dot(q) - x_[4 + k]; };
+    const auto beyond = [&](const Eigen::Vector2d& q) { return Direction(k).dot(q) - all_.x[4 + k]; };
     for (size_t i = 0; i < polygon.size(); ++i) {
       const Eigen::Vector2d &a = polygon[i], &b = polygon[(i + 1) % polygon.size()];
       const double fa = beyond(a), fb = beyond(b);
@@ -265,13 +305,14 @@ double BodyFilter::CenterVariance() const {
     row[axis] = 1.0;
     row[4 + axis * kDirections / 4] = 0.5;
     row[4 + axis * kDirections / 4 + kDirections / 2] = -0.5;
-    sum += row.dot(P_ * row.transpose());
+    sum += row.dot(all_.P * row.transpose());
   }
   return 0.5 * sum;
 }
 
 double BodyFilter::VelocityVariance() const {
-  return 0.5 * (P_(2, 2) + P_(3, 3)) + change_ * change_speed_ * change_speed_;
+  const double change = seen_ ? 0.0 : ChangeSince(0.0);
+  return 0.5 * (all_.P(2, 2) + all_.P(3, 3)) + change * noise_.change_speed * noise_.change_speed;
 }
 
 }  // namespace chase::mapping

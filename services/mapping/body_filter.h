@@ -48,9 +48,10 @@ struct Footprint {
 /// Sun, Li and Lan 2014, extended objects by support functions): a sweep measures d_k . (p - age v)
 /// + h_k where the body's end is in view. What comes into view, or is hidden, on one side changes
 /// the outline there and leaves the motion alone. Two hypotheses a sweep, that the velocity has
-/// gone on and that it has changed at once, are merged by their likelihood: the generalised
-/// pseudo-Bayesian filter of first order (Ackerson and Fu 1970), to which the interacting multiple
-/// model comes down where changes do not depend on each other.
+/// gone on and that it has changed at once, are told apart by two sweeps and merged then by their
+/// likelihood: the generalised pseudo-Bayesian filter of second order (Chang and Athans 1978). What
+/// a sweep shows is older than its end by the age of its returns, and so are the changes that it
+/// can tell of.
 class BodyFilter {
  public:
   static constexpr int kStates = 4 + kDirections;
@@ -72,8 +73,8 @@ class BodyFilter {
   /// at least `least`^2 m^2. Below zero if nothing can be compared.
   double Distance(const Reaches& seen, double sigma, double least) const;
 
-  Eigen::Vector2d p() const { return x_.head<2>(); }
-  Eigen::Vector2d v() const { return x_.segment<2>(2); }
+  Eigen::Vector2d p() const { return all_.x.head<2>(); }
+  Eigen::Vector2d v() const { return all_.x.segment<2>(2); }
   /// Corners of the outline about p, counter-clockwise; empty if the reaches contradict each other.
   Points2 Outline() const;
   /// Variance of the outline's centre and of the velocity, mean over the axes, m^2 and m^2/s^2.
@@ -82,11 +83,18 @@ class BodyFilter {
 
  private:
   using Row = Eigen::Matrix<double, 1, kStates>;
+  /// What may be, and how likely it is.
+  struct Hypothesis {
+    State x = State::Zero();
+    Covariance P = Covariance::Zero();
+    double weight = 0.0;
+  };
   static Row Model(int k, double age);
+  static Hypothesis Merged(const Hypothesis& a, const Hypothesis& b);
+  void Take(const Hypothesis& went_on, const Hypothesis& changed);
+  Hypothesis Changed(const Hypothesis& before, double from) const;
+  double ChangeSince(double from) const;
   void Uncover(const Reaches& seen, double unseen);
-  double Update(const Eigen::MatrixXd& model, const Eigen::VectorXd& z, double sigma, State* x,
-                Covariance* P) const;
-  Covariance Changed() const;
   int Reshape(const Reaches& seen, const std::array<double, kDirections>& innovation);
 
   /// Where an end was last in view, m from p, and how sure that is: it grows while the end is seen.
@@ -95,12 +103,13 @@ class BodyFilter {
     int points = 0;
   };
 
-  State x_ = State::Zero();
   std::array<End, kDirections> ends_{};
-  Covariance P_ = Covariance::Zero();  ///< if the velocity went on
-  double change_ = 0.0;                ///< probability that it has changed since the last sweep
-  double change_speed_ = 0.0;          ///< m/s
-  double change_time_ = 0.0;           ///< s, within which it has
+  std::array<Hypothesis, 2> ways_{};  ///< the velocity went on until the last sweep; it changed
+                                      ///< since the one before
+  Hypothesis all_;                    ///< these merged
+  MotionNoise noise_;
+  double unseen_ = 0.0;  ///< s before now, since when no return tells of a change of velocity
+  bool seen_ = true;     ///< since the last prediction
 };
 
 }  // namespace chase::mapping
