@@ -154,9 +154,9 @@ std::vector<int> MotionDetector::Look(const Eigen::Vector3d& origin,
 bool MotionDetector::Join(const std::vector<Return>& returns,
                           std::vector<Cluster>* clusters) const {
   const auto middle = [&](const Cluster& cluster) {
-    Eigen::Vector2f sum = Eigen::Vector2f::Zero();
-    for (const int i : cluster.members) sum += returns[static_cast<size_t>(i)].p.head<2>();
-    return Eigen::Vector2d((sum / static_cast<float>(cluster.members.size())).cast<double>());
+    Eigen::Vector3f sum = Eigen::Vector3f::Zero();
+    for (const int i : cluster.members) sum += returns[static_cast<size_t>(i)].p;
+    return Eigen::Vector3d((sum / static_cast<float>(cluster.members.size())).cast<double>());
   };
   bool joined = false;
   for (size_t i = 0; i < clusters->size(); ++i)
@@ -165,7 +165,7 @@ bool MotionDetector::Join(const std::vector<Return>& returns,
       if (i == j || whole.track < 0 || whole.track != part.track) continue;
       if (whole.members.size() < part.members.size()) continue;
       part.track = -1;
-      const Eigen::Vector2d between = 0.5 * (middle(whole) + middle(part));
+      const Eigen::Vector3d between = 0.5 * (middle(whole) + middle(part));
       if (!panorama_.Hides(between, static_cast<int>(i)) ||
           !panorama_.Hides(between, static_cast<int>(j)))
         continue;
@@ -215,12 +215,13 @@ bool MotionDetector::Finish(const std::vector<Return>& returns, const std::vecto
     size_t best = 0;
     for (size_t i = 1; i < points.size(); ++i)
       if (d.dot(points[i]) > d.dot(points[best])) best = i;
+    const Return& end = returns[static_cast<size_t>(cluster->members[best])];
     const Eigen::Vector2d view = origin - points[best];
     Reach& reach = cluster->reaches[static_cast<size_t>(k)];
     reach.along = d.dot(points[best]);
-    reach.age = returns[static_cast<size_t>(cluster->members[best])].age;
+    reach.age = end.age;
     reach.edge = d.dot(view) > kGrazing * view.norm() && view.norm() < range_ - kRim &&
-                 !panorama_.Hides(points[best], self);
+                 !panorama_.Hides(end.p.cast<double>(), self);
     ends[static_cast<size_t>(k)] = points[best].cast<float>();
   }
   Touch(returns, owner, self, ends, cluster);

@@ -26,19 +26,21 @@ void Panorama::Take(const Eigen::Vector3d& origin, const std::vector<Return>& re
                     const std::vector<int>& owner) {
   origin_ = origin.head<2>();
   height_ = origin.z();
-  bins_.assign(kBins, {INFINITY, INFINITY, 0.0f, kNobody});
+  bins_.assign(kBins * kRises, {INFINITY, INFINITY, kNobody});
+  farthest_.assign(kBins, 0.0f);
   lowest_.assign(kBins * kBands, INFINITY);
   for (size_t i = 0; i < returns.size(); ++i) {
     const Return& r = returns[i];
     const Eigen::Vector2d d = r.p.head<2>().cast<double>() - origin_;
     const auto range = static_cast<float>(d.norm());
     const size_t b = static_cast<size_t>(0.25 * kBins * Diamond(d.x(), d.y())) % kBins;
-    Bin& bin = bins_[b];
-    bin.farthest = std::max(bin.farthest, range);
+    const float slope = (r.p.z() - static_cast<float>(height_)) / std::max(range, 1e-3f);
+    farthest_[b] = std::max(farthest_[b], range);
     const int band = static_cast<int>(std::min(range / static_cast<float>(kBand), kBands - 1.0f));
     float& lowest = lowest_[b * kBands + static_cast<size_t>(band)];
-    lowest = std::min(lowest, (r.p.z() - static_cast<float>(height_)) / std::max(range, 1e-3f));
+    lowest = std::min(lowest, slope);
     if (r.label == Label::kGround || r.label == Label::kFar) continue;
+    Bin& bin = bins_[b * kRises + static_cast<size_t>(Rise(slope))];
     if (range < bin.first) {
       if (bin.owner != owner[i]) bin.second = bin.first;
       bin.first = range;
@@ -51,36 +53,42 @@ void Panorama::Take(const Eigen::Vector3d& origin, const std::vector<Return>& re
     if (i % kBands != kBands - 1) lowest_[i] = std::min(lowest_[i], lowest_[i + 1]);
 }
 
+int Panorama::Rise(double slope) {
+  return static_cast<int>(std::clamp(slope / kRise + 0.5 * kRises, 0.0, kRises - 1.0));
+}
+
 template <class Check>
-bool Panorama::Any(const Eigen::Vector2d& d, Check check) const {
+bool Panorama::Any(const Eigen::Vector2d& d, double beside, Check check) {
   const int middle = static_cast<int>(0.25 * kBins * Diamond(d.x(), d.y()));
   const int reach =
-      std::clamp(static_cast<int>(std::ceil(0.25 * kBins * std::max(kStep, kBeside / d.norm()))), 1,
+      std::clamp(static_cast<int>(std::ceil(0.25 * kBins * std::max(kStep, beside / d.norm()))), 1,
                  kBins / 8);
   for (int b = middle - reach; b <= middle + reach; ++b)
     if (check(static_cast<size_t>((b + kBins) % kBins))) return true;
   return false;
 }
 
-bool Panorama::Hides(const Eigen::Vector2d& p, int owner) const {
-  const Eigen::Vector2d d = p - origin_;
+bool Panorama::Hides(const Eigen::Vector3d& p, int owner) const {
+  const Eigen::Vector2d d = p.head<2>() - origin_;
   const double range = d.norm();
   if (bins_.empty() || !(range > 0.0)) return false;
-  return Any(d, [&](size_t b) {
-    return (bins_[b].owner == owner ? bins_[b].second : bins_[b].first) < range - kInFront;
+  const auto rise = static_cast<size_t>(Rise((p.z() - height_) / range));
+  return Any(d, kBeside, [&](size_t b) {
+    const Bin& bin = bins_[b * kRises + rise];
+    return (bin.owner == owner ? bin.second : bin.first) < range - kInFront;
   });
 }
 
-bool Panorama::Sees(const Eigen::Vector2d& p, double z) const {
-  const Eigen::Vector2d d = p - origin_;
+/// Directions without a return tell nothing: the sky, or what is too near.
+bool Panorama::Sees(const Eigen::Vector3d& p) const {
+  const Eigen::Vector2d d = p.head<2>() - origin_;
   const double range = d.norm();
   if (bins_.empty()) return true;
   const auto beyond = static_cast<size_t>(range / kBand) + 1;
-  if (!(range > 0.0) || beyond >= kBands) return false;
-  return !Any(d, [&](size_t b) { return bins_[b].first < range - kInFront; }) &&
-         Any(d, [&](size_t b) {
-           return bins_[b].farthest > range && height_ + lowest_[b * kBands + beyond] * range <= z;
-         });
+  if (!(range > 0.0) || beyond >= kBands || Hides(p, kNobody)) return false;
+  return Any(d, 0.0, [&](size_t b) {
+    return farthest_[b] > range && height_ + lowest_[b * kBands + beyond] * range <= p.z();
+  });
 }
 
 }  // namespace chase::mapping

@@ -85,8 +85,10 @@ double Tracker::Detection(const Track& track, const Panorama& panorama) const {
   across *= std::max(0.7 * track.reach, std::sqrt(track.body.CenterVariance())) /
             std::max(1e-6, across.norm());
   double seen = 0.0;
-  for (const double side : {-1.0, 0.0, 1.0})
-    seen += panorama.Sees(c + side * across, track.z) / 3.0;
+  for (const double side : {-1.0, 0.0, 1.0}) {
+    const Eigen::Vector2d q = c + side * across;
+    seen += panorama.Sees({q.x(), q.y(), track.z}) / 3.0;
+  }
   return kDetected * seen * seen;
 }
 

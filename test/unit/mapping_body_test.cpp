@@ -219,15 +219,16 @@ TEST(MappingPanorama, HidesWhatIsBehindAndNotWhatIsBeside) {
   returns[0].p = {4.0f, 0.0f, 1.0f};
   returns[1].p = {0.0f, 9.0f, 1.0f};
   Panorama panorama;
-  EXPECT_FALSE(panorama.Hides({8.0, 0.0}, -3));  // before the first sweep
+  EXPECT_FALSE(panorama.Hides({8.0, 0.0, 0.5}, -3));  // before the first sweep
   panorama.Take({0.0, 0.0, 1.5}, returns, {-1, 2});
-  EXPECT_TRUE(panorama.Hides({8.0, 0.0}, 0));
-  EXPECT_TRUE(panorama.Hides({8.0, 0.1}, 0));
-  EXPECT_FALSE(panorama.Hides({8.0, 1.0}, 0));
-  EXPECT_FALSE(panorama.Hides({3.9, 0.0}, 0));
-  EXPECT_TRUE(panorama.Hides({0.0, 12.0}, 1));
-  EXPECT_FALSE(panorama.Hides({0.0, 12.0}, 2));  // its own returns
-  EXPECT_FALSE(panorama.Hides({0.0, 0.0}, 0));
+  EXPECT_TRUE(panorama.Hides({8.0, 0.0, 0.5}, 0));
+  EXPECT_TRUE(panorama.Hides({8.0, 0.1, 0.5}, 0));
+  EXPECT_FALSE(panorama.Hides({8.0, 0.0, 1.6}, 0));  // looks over it
+  EXPECT_FALSE(panorama.Hides({8.0, 1.0, 0.5}, 0));
+  EXPECT_FALSE(panorama.Hides({3.9, 0.0, 0.5}, 0));
+  EXPECT_TRUE(panorama.Hides({0.0, 12.0, 1.2}, 1));
+  EXPECT_FALSE(panorama.Hides({0.0, 12.0, 1.2}, 2));  // its own returns
+  EXPECT_FALSE(panorama.Hides({0.0, 0.0, 1.5}, 0));
 }
 
 /// A full turn of either sense from any start, seen from a tilted sensor.

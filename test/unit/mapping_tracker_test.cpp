@@ -133,6 +133,35 @@ TEST(MappingTracker, WhatRaysPassOverStaysListed) {
   }
 }
 
+/// From (0, -0.6): a wall at 5 m, but no return at all where a walker at (0, 0) is too near for the
+/// sensor to range it.
+Panorama TooNear() {
+  std::vector<Return> returns;
+  for (double angle = -3.1; angle < 3.1; angle += 0.003) {
+    if (std::abs(angle) < std::asin(0.25 / 0.6)) continue;
+    Return r;
+    r.p = Eigen::Vector3d(5.0 * std::sin(angle), 5.0 * std::cos(angle) - 0.6, 1.0).cast<float>();
+    returns.push_back(r);
+  }
+  Panorama panorama;
+  panorama.Take({0.0, -0.6, 1.2}, returns, std::vector<int>(returns.size(), -1));
+  return panorama;
+}
+
+/// Nothing tells of what is nearer than the sensor can see: it is not missed.
+TEST(MappingTracker, WhatIsTooNearStaysListed) {
+  Tracker tracker(MoverConfig{});
+  for (double t = 0.0; t < 3.5; t += 0.1) {
+    tracker.Predict(t);
+    std::vector<Cluster> clusters;
+    if (t < 1.5) clusters.push_back(BoxCluster({std::min(0.0, 1.0 * t - 1.5), 0.0}, 0.25));
+    tracker.Update(t > 1.5 ? TooNear() : Panorama(), &clusters);
+    if (t > 1.0) {
+      ASSERT_EQ(tracker.Obstacles(1.5, 8.0, 1.0).size(), 1u) << t;
+    }
+  }
+}
+
 TEST(MappingTracker, WhatStandsIsNeverListed) {
   std::mt19937 random(1);
   std::normal_distribution<double> normal(0.0, 0.05);
