@@ -38,6 +38,7 @@ struct Footprint {
   Eigen::Vector2d p = Eigen::Vector2d::Zero(), v = Eigen::Vector2d::Zero();  ///< m, m/s
   std::array<double, kDirections> reach{}, sigma{};                          ///< m
   double radius = 0.0;  ///< m from p, beyond which nothing lies within four deviations
+  int stood = 0;        ///< sweeps in which it did not move
 
   /// How many deviations a return of this age [s] lies beyond the outline; negative inside.
   double Excess(const Eigen::Vector2d& q, double age) const;

@@ -72,7 +72,9 @@ std::vector<MotionDetector::Candidate> MotionDetector::Candidates(
     if (r.label != Label::kStatic) continue;
     const Voxel* voxel = grid->At(r.key);
     const int body = NearestBody(expected, r, config_.gate, &excess);
-    const bool settled = voxel && voxel->hits >= kSettledHits;
+    // What stands where a body does, and stood there before it, is something else.
+    const int stood = body < 0 ? 0 : expected[static_cast<size_t>(body)].stood;
+    const bool settled = voxel && voxel->hits >= std::min(255, kSettledHits + stood);
     if (voxel && voxel->occupied && voxel->free_sweeps < ever_free_ && (settled || body < 0)) {
       if (!settled) doubtful.push_back(static_cast<int>(i));
       continue;

@@ -15,6 +15,7 @@ constexpr double kUnseen = 0.5;      // m, standard deviation of an end out of s
 constexpr double kReach = 0.125;     // m, the same where returns are divided: four are in the gate
 constexpr double kTentativeAge = 0.8;  // s after which an unconfirmed track does not count
 constexpr double kRestSpeed = 0.25;    // m/s
+constexpr double kHandOver = 0.3;      // s, at rest, until the static map holds it for sure
 constexpr double kSure = 2.5;          // standard deviations of a speed that is one
 constexpr double kLeastSpread = 0.12;  // m, of a reach when clusters are assigned
 constexpr int kFewestEnds = 3;         // directions with an end in view that tell of a body
@@ -52,10 +53,11 @@ void Tracker::Predict(double t) {
 std::vector<Footprint> Tracker::Expected() const {
   std::vector<Footprint> bodies;
   for (const auto& track : tracks_) {
-    if (!track.confirmed || Rests(track)) continue;
+    if (!track.confirmed) continue;
     Footprint body = track.body.Expected(config_.measurement, kReach);
     if (*std::min_element(body.sigma.begin(), body.sigma.end()) >= kReach) continue;
     body.track = track.id;
+    body.stood = track.stood;
     bodies.push_back(body);
   }
   return bodies;
@@ -106,6 +108,7 @@ void Tracker::Correct(const Cluster& cluster, Track* track) const {
 void Tracker::Confirm(Track* track) const {
   const double speed = track->body.v().norm();
   const double sigma = std::sqrt(track->body.VelocityVariance());
+  track->stood = speed > kRestSpeed ? 0 : track->stood + 1;
   if (speed > kRestSpeed) track->moved = t_;
   if (track->confirmed) return;
   track->trail.push_back(track->body.p());
@@ -219,6 +222,7 @@ std::vector<world::Obstacle> Tracker::Obstacles(double middle, double semi_heigh
   std::vector<world::Obstacle> obstacles;
   for (const auto& track : tracks_) {
     if (!track.confirmed || track.existence < kListed) continue;
+    if (track.seen - track.moved > config_.settle + kHandOver) continue;
     const Ellipse outline = track.Outline();
     world::Obstacle o;
     o.id = track.id;

@@ -20,6 +20,7 @@ struct Track {
   Eigen::Vector2d birth = Eigen::Vector2d::Zero();
   double born = 0.0, seen = 0.0, moved = 0.0;  ///< s: first, last detection; last time not at rest
   double known = 0.0;                          ///< s, when it was confirmed
+  int stood = 0;                               ///< sweeps at rest since it last moved
   double existence = 0.5;                      ///< probability
   int detections = 0;
   int row = 0;         ///< of them, without a sweep between them in which it was not seen
@@ -39,7 +40,7 @@ class Tracker {
   /// Moves all tracks to time t [s].
   void Predict(double t);
   /// Where returns of confirmed tracks whose place is known are expected, at the time of the last
-  /// prediction.
+  /// prediction. Tracks at rest too: they may walk on.
   std::vector<Footprint> Expected() const;
   /// Assigns the clusters, which it marks with their track.
   void Update(const Panorama& panorama, std::vector<Cluster>* clusters);
@@ -50,8 +51,8 @@ class Tracker {
   /// True while returns of this track are to be kept out of the static map.
   bool Moves(int id) const;
   const std::vector<Track>& tracks() const { return tracks_; }
-  /// Confirmed tracks that are more likely there than not, as upright ellipsoids with a linear
-  /// centre.
+  /// Confirmed tracks that are more likely there than not and that the static map does not hold, as
+  /// upright ellipsoids with a linear centre.
   std::vector<world::Obstacle> Obstacles(double middle, double semi_height, double grow) const;
 
  private:
