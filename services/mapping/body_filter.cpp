@@ -299,15 +299,18 @@ Points2 BodyFilter::Outline() const {
 }
 
 double BodyFilter::CenterVariance() const {
-  double sum = 0.0;
-  for (int axis = 0; axis < 2; ++axis) {
-    Row row = Row::Zero();
-    row[axis] = 1.0;
-    row[4 + axis * kDirections / 4] = 0.5;
-    row[4 + axis * kDirections / 4 + kDirections / 2] = -0.5;
-    sum += row.dot(all_.P * row.transpose());
-  }
-  return 0.5 * sum;
+  return 0.5 * (CenterVariance(Eigen::Vector2d::UnitX()) + CenterVariance(Eigen::Vector2d::UnitY()));
+}
+
+double BodyFilter::CenterVariance(const Eigen::Vector2d& d) const {
+  constexpr int kHalf = kDirections / 2;
+  const double turn = std::atan2(d.y(), d.x()) / (2.0 * M_PI);
+  const int k = (static_cast<int>(std::lround(turn * kDirections)) + kDirections) % kHalf;
+  Row row = Row::Zero();
+  row.head<2>() = Direction(k).transpose();
+  row[4 + k] = 0.5;
+  row[4 + k + kHalf] = -0.5;
+  return row.dot(all_.P * row.transpose());
 }
 
 double BodyFilter::VelocityVariance() const {

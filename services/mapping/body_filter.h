@@ -80,6 +80,8 @@ class BodyFilter {
   Points2 Outline() const;
   /// Variance of the outline's centre and of the velocity, mean over the axes, m^2 and m^2/s^2.
   double CenterVariance() const;
+  /// The same along the unit vector d, or a direction next to it.
+  double CenterVariance(const Eigen::Vector2d& d) const;
   double VelocityVariance() const;
 
  private:
