@@ -7,7 +7,7 @@ namespace chase::mapping {
 
 namespace {
 
-constexpr int kNobody = -2;
+constexpr int kNobody = -2;        // nothing, or what is too near for a return
 constexpr double kInFront = 0.15;  // m, what is nearer by this hides
 constexpr double kBeside = 0.15;   // m, half width of what must be clear for an edge to be one
 constexpr double kStep = 0.012;    // rad, the same at least: some azimuth steps of the scanner
@@ -49,6 +49,10 @@ void Panorama::Take(const Eigen::Vector3d& origin, const std::vector<Return>& re
       bin.second = range;
     }
   }
+  const auto empty = [this](size_t b) { return !(farthest_[b % kBins] > 0.0f); };
+  for (size_t b = 0; b < kBins; ++b)
+    if (empty(b + kBins - 1) && empty(b) && empty(b + 1))
+      std::fill_n(&bins_[b * kRises], kRises, Bin{0.0f, 0.0f, kNobody});
   for (size_t i = lowest_.size() - 1; i-- > 0;)
     if (i % kBands != kBands - 1) lowest_[i] = std::min(lowest_[i], lowest_[i + 1]);
 }
@@ -79,7 +83,6 @@ bool Panorama::Hides(const Eigen::Vector3d& p, int owner) const {
   });
 }
 
-/// Directions without a return tell nothing: the sky, or what is too near.
 bool Panorama::Sees(const Eigen::Vector3d& p) const {
   const Eigen::Vector2d d = p.head<2>() - origin_;
   const double range = d.norm();

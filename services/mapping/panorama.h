@@ -8,7 +8,8 @@
 namespace chase::mapping {
 
 /// The nearest returns of a sweep by their direction from the sensor, the ground's left out: what
-/// hides what. And how low rays passed that went farther: what would have been seen.
+/// hides what. Where no ray had a return, neither from the ground, something is too near for the
+/// sensor. And how low rays passed that went farther: what would have been seen.
 class Panorama {
  public:
   /// `owner[i]`: cluster of return i, or -1.

@@ -218,9 +218,16 @@ TEST(MappingPanorama, HidesWhatIsBehindAndNotWhatIsBeside) {
   std::vector<Return> returns(2);
   returns[0].p = {4.0f, 0.0f, 1.0f};
   returns[1].p = {0.0f, 9.0f, 1.0f};
+  for (int i = 0; i < 2000; ++i) {  // a wall all around, but for some directions without a return
+    const float a = 2e-3f * static_cast<float>(M_PI) * static_cast<float>(i) / 2.0f;
+    if (i > 1000 && i < 1100) continue;
+    returns.emplace_back().p = {20.0f * std::cos(a), 20.0f * std::sin(a), 1.0f};
+  }
+  std::vector<int> owner(returns.size(), -1);
+  owner[1] = 2;
   Panorama panorama;
   EXPECT_FALSE(panorama.Hides({8.0, 0.0, 0.5}, -3));  // before the first sweep
-  panorama.Take({0.0, 0.0, 1.5}, returns, {-1, 2});
+  panorama.Take({0.0, 0.0, 1.5}, returns, owner);
   EXPECT_TRUE(panorama.Hides({8.0, 0.0, 0.5}, 0));
   EXPECT_TRUE(panorama.Hides({8.0, 0.1, 0.5}, 0));
   EXPECT_FALSE(panorama.Hides({8.0, 0.0, 1.6}, 0));  // looks over it
@@ -229,6 +236,8 @@ TEST(MappingPanorama, HidesWhatIsBehindAndNotWhatIsBeside) {
   EXPECT_TRUE(panorama.Hides({0.0, 12.0, 1.2}, 1));
   EXPECT_FALSE(panorama.Hides({0.0, 12.0, 1.2}, 2));  // its own returns
   EXPECT_FALSE(panorama.Hides({0.0, 0.0, 1.5}, 0));
+  EXPECT_TRUE(panorama.Hides({-5.0, -0.8, 1.2}, 0));  // what is too near for a return
+  EXPECT_FALSE(panorama.Hides({-5.0, 0.8, 1.2}, 0));
 }
 
 /// A full turn of either sense from any start, seen from a tilted sensor.
