@@ -83,6 +83,8 @@ class BodyFilter {
   /// The same along the unit vector d, or a direction next to it.
   double CenterVariance(const Eigen::Vector2d& d) const;
   double VelocityVariance() const;
+  /// The same of p, m^2.
+  double PlaceVariance() const { return 0.5 * all_.P.diagonal().head<2>().sum(); }
 
  private:
   using Row = Eigen::Matrix<double, 1, kStates>;

@@ -12,7 +12,8 @@ namespace {
 constexpr double kThinnest = 0.1;    // m, half width of a mover at least
 constexpr double kFirstSpeed = 2.5;  // m/s, standard deviation of an unknown velocity
 constexpr double kUnseen = 0.5;      // m, standard deviation of an end out of sight
-constexpr double kReach = 0.125;     // m, the same where returns are divided: four are in the gate
+constexpr double kReach = 0.125;   // m, the same where returns are divided: four are in the gate
+constexpr double kPlace = 0.25;       // m, of a place where they are: two are within four of these
 constexpr double kTentativeAge = 0.8;  // s after which an unconfirmed track does not count
 constexpr double kRestSpeed = 0.25;    // m/s
 constexpr double kHandOver = 0.3;      // s, at rest, until the static map holds it for sure
@@ -55,8 +56,8 @@ std::vector<Footprint> Tracker::Expected() const {
   std::vector<Footprint> bodies;
   for (const auto& track : tracks_) {
     if (!track.confirmed) continue;
+    if (track.body.PlaceVariance() > kPlace * kPlace) continue;
     Footprint body = track.body.Expected(config_.measurement, kReach);
-    if (*std::min_element(body.sigma.begin(), body.sigma.end()) >= kReach) continue;
     body.track = track.id;
     body.stood = track.stood;
     bodies.push_back(body);
@@ -169,12 +170,17 @@ void Tracker::Update(const Panorama& panorama, std::vector<Cluster>* clusters) {
     if (cluster.track < 0) Birth(&cluster);
 }
 
-/// Of two tracks on one body the older one stays.
+/// Of two tracks on one body the older one stays. Two that were both seen as movers are two; one
+/// that was born after the other was last seen may be that one, found again.
 void Tracker::Unite() {
   const auto same = [](const Track& a, const Track& b) {
+    const bool again = a.seen < b.born;
+    if (!a.confirmed || (b.confirmed && !again)) return false;
     const double sigma = std::sqrt(a.body.VelocityVariance() + b.body.VelocityVariance());
-    return a.confirmed && a.Outline().Level(b.Outline().center) < 1.0 &&
-           (a.body.v() - b.body.v()).norm() < std::max(kSameSpeed, kSure * sigma);
+    if ((a.body.v() - b.body.v()).norm() > std::max(kSameSpeed, kSure * sigma)) return false;
+    const double far = kSure * std::sqrt(a.body.CenterVariance() + b.body.CenterVariance());
+    const Eigen::Vector2d place = b.Outline().center;
+    return a.Outline().Level(place) < 1.0 || (again && (place - a.Outline().center).norm() < far);
   };
   for (size_t i = 0; i < tracks_.size(); ++i)
     for (size_t j = tracks_.size() - 1; j > i; --j) {
