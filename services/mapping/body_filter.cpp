@@ -286,7 +286,9 @@ Points2 BodyFilter::Outline() const {
       {-kSquare, -kSquare}, {kSquare, -kSquare}, {kSquare, kSquare}, {-kSquare, kSquare}};
   for (int k = 0; k < kDirections && !polygon.empty(); ++k) {
     Points2 cut;
-    const auto beyond = [&](const Eigen::Vector2d& q) { return Direction(k).dot(q) - all_.x[4 + k]; };
+    const auto beyond = [&](const Eigen::Vector2d& q) {
+      return Direction(k).dot(q) - all_.x[4 + k];
+    };
     for (size_t i = 0; i < polygon.size(); ++i) {
       const Eigen::Vector2d &a = polygon[i], &b = polygon[(i + 1) % polygon.size()];
       const double fa = beyond(a), fb = beyond(b);
@@ -299,7 +301,8 @@ Points2 BodyFilter::Outline() const {
 }
 
 double BodyFilter::CenterVariance() const {
-  return 0.5 * (CenterVariance(Eigen::Vector2d::UnitX()) + CenterVariance(Eigen::Vector2d::UnitY()));
+  return 0.5 *
+         (CenterVariance(Eigen::Vector2d::UnitX()) + CenterVariance(Eigen::Vector2d::UnitY()));
 }
 
 double BodyFilter::CenterVariance(const Eigen::Vector2d& d) const {

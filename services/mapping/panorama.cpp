@@ -64,33 +64,32 @@ int Panorama::Rise(double slope) {
 template <class Check>
 bool Panorama::Any(const Eigen::Vector2d& d, double beside, Check check) {
   const int middle = static_cast<int>(0.25 * kBins * Diamond(d.x(), d.y()));
-  const int reach =
-      std::clamp(static_cast<int>(std::ceil(0.25 * kBins * std::max(kStep, beside / d.norm()))), 1,
-                 kBins / 8);
+  const int reach = std::clamp(
+      static_cast<int>(std::ceil(0.25 * kBins * std::max(kStep, beside / d.norm()))), 1, kBins / 8);
   for (int b = middle - reach; b <= middle + reach; ++b)
     if (check(static_cast<size_t>((b + kBins) % kBins))) return true;
   return false;
 }
 
-bool Panorama::Hides(const Eigen::Vector3d& p, int owner) const {
+bool Panorama::Hides(const Eigen::Vector3d& p, int owner, double depth) const {
   const Eigen::Vector2d d = p.head<2>() - origin_;
   const double range = d.norm();
   if (bins_.empty() || !(range > 0.0)) return false;
   const auto rise = static_cast<size_t>(Rise((p.z() - height_) / range));
   return Any(d, kBeside, [&](size_t b) {
     const Bin& bin = bins_[b * kRises + rise];
-    return (bin.owner == owner ? bin.second : bin.first) < range - kInFront;
+    return (bin.owner == owner ? bin.second : bin.first) < range - depth - kInFront;
   });
 }
 
-bool Panorama::Sees(const Eigen::Vector3d& p) const {
+bool Panorama::Sees(const Eigen::Vector3d& p, double depth) const {
   const Eigen::Vector2d d = p.head<2>() - origin_;
-  const double range = d.norm();
+  const double range = d.norm(), front = range - depth;
   if (bins_.empty()) return true;
-  const auto beyond = static_cast<size_t>(range / kBand) + 1;
-  if (!(range > 0.0) || beyond >= kBands || Hides(p, kNobody)) return false;
+  const auto beyond = static_cast<size_t>(std::max(0.0, front) / kBand) + 1;
+  if (!(front > 0.0) || beyond >= kBands || Hides(p, kNobody, depth)) return false;
   return Any(d, 0.0, [&](size_t b) {
-    return farthest_[b] > range && height_ + lowest_[b * kBands + beyond] * range <= p.z();
+    return farthest_[b] > front && height_ + lowest_[b * kBands + beyond] * range <= p.z();
   });
 }
 

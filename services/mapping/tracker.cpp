@@ -12,8 +12,8 @@ namespace {
 constexpr double kThinnest = 0.1;    // m, half width of a mover at least
 constexpr double kFirstSpeed = 2.5;  // m/s, standard deviation of an unknown velocity
 constexpr double kUnseen = 0.5;      // m, standard deviation of an end out of sight
-constexpr double kReach = 0.125;   // m, the same where returns are divided: four are in the gate
-constexpr double kPlace = 0.25;       // m, of a place where they are: two are within four of these
+constexpr double kReach = 0.125;     // m, the same where returns are divided: four are in the gate
+constexpr double kPlace = 0.25;      // m, of a place where they are: two are within four of these
 constexpr double kTentativeAge = 0.8;  // s after which an unconfirmed track does not count
 constexpr double kRestSpeed = 0.25;    // m/s
 constexpr double kHandOver = 0.3;      // s, at rest, until the static map holds it for sure
@@ -23,7 +23,7 @@ constexpr int kFewestEnds = 3;         // directions with an end in view that te
 constexpr double kRigid = 0.5;         // share of ends in view that move as those of one body
 constexpr double kSameSpeed = 0.5;     // m/s, difference of two tracks of one body
 constexpr double kDetected = 0.9;      // probability of a detection of what is in full view
-constexpr double kHidden = 1e-6;    // the same, at least, of what is out of view
+constexpr double kHidden = 1e-6;       // the same, at least, of what is out of view
 constexpr double kClutter = 0.005;  // 1/m^2 new clusters a sweep: five in the 18 m around the drone
 constexpr double kOwn = 20.0;       // likelihood ratio of what lies within a track's outline
 constexpr double kVague = 0.2;      // of returns there that show too few ends of a body
@@ -82,16 +82,19 @@ double Tracker::Ratio(const Track& track, const Cluster& cluster) const {
   return std::max(ratio, own ? kOwn : inside);
 }
 
-/// Probability of a detection, from what is in view of the place and its likely width.
+/// Probability of a detection, from what is in view of the place and its likely width. What stands
+/// where the body should be hides nothing of it: its front is nearer.
 double Tracker::Detection(const Track& track, const Panorama& panorama) const {
-  const Eigen::Vector2d c = track.Outline().center;
-  Eigen::Vector2d across(panorama.origin().y() - c.y(), c.x() - panorama.origin().x());
-  across /= std::max(1e-6, across.norm());
-  across *= std::max(0.5 * track.reach, std::sqrt(track.body.CenterVariance(across)));
+  const Ellipse outline = track.Outline();
+  Eigen::Vector2d view = panorama.origin() - outline.center;
+  view /= std::max(1e-6, view.norm());
+  const Eigen::Vector2d across(view.y(), -view.x());
+  const double depth = std::sqrt(view.dot(outline.shape.inverse() * view));
+  const double aside = std::max(0.5 * track.reach, std::sqrt(track.body.CenterVariance(across)));
   double seen = 0.0;
   for (const double side : {-1.0, 0.0, 1.0}) {
-    const Eigen::Vector2d q = c + side * across;
-    seen += panorama.Sees({q.x(), q.y(), track.z}) / 3.0;
+    const Eigen::Vector2d q = outline.center + side * aside * across;
+    seen += panorama.Sees({q.x(), q.y(), track.z}, depth) / 3.0;
   }
   return kDetected * seen * seen;
 }

@@ -100,7 +100,8 @@ std::vector<const Obstacle*> WalkerJudge::Match(const Shot& shot,
 void WalkerJudge::EndSighting(Walker* w) {
   if (w->seen_near && !w->ids.empty()) figures.one_id.Add(w->ids.size() == 1);
   if (trace_ && w->ids.size() > 1)
-    fmt::print("        sighting of walker {} had {} ids\n", w - walkers_.data() + 1, w->ids.size());
+    fmt::print("        sighting of walker {} had {} ids\n", w - walkers_.data() + 1,
+               w->ids.size());
   w->ids.clear();
   w->seen_near = false;
   w->began = w->listed = -1.0;
