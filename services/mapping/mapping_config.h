@@ -80,7 +80,7 @@ struct MoverConfig {
   double acceleration = 0.4;      ///< process noise, m/s^2
   double change_rate = 0.2;       ///< sudden changes of velocity, 1/s
   double change_speed = 1.0;      ///< standard deviation of such a change, per axis, m/s
-  double measurement = 0.03;      ///< standard deviation of where an end is seen, m: a VLP-16's range
+  double measurement = 0.04;      ///< standard deviation of where an end is seen, m
   int confirm_sweeps = 4;         ///< detections in a row before a track may be listed
   double confirm_distance = 0.3;  ///< net travel before a track may be listed, m
   double confirm_speed = 0.3;     ///< speed before a track may be listed, m/s

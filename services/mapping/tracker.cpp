@@ -23,7 +23,6 @@ constexpr int kFewestEnds = 3;         // directions with an end in view that te
 constexpr double kRigid = 0.5;         // share of ends in view that move as those of one body
 constexpr double kSameSpeed = 0.5;     // m/s, difference of two tracks of one body
 constexpr double kDetected = 0.9;      // probability of a detection of what is in full view
-constexpr double kHidden = 1e-6;       // the same, at least, of what is out of view
 constexpr double kClutter = 0.005;  // 1/m^2 new clusters a sweep: five in the 18 m around the drone
 constexpr double kOwn = 20.0;       // likelihood ratio of what lies within a track's outline
 constexpr double kVague = 0.2;      // of returns there that show too few ends of a body
@@ -146,11 +145,12 @@ void Tracker::Update(const Panorama& panorama, std::vector<Cluster>* clusters) {
   std::vector<track::Prior> priors;
   Eigen::MatrixXd ratio(tracks_.size(), clusters->size());
   for (size_t i = 0; i < tracks_.size(); ++i) {
-    priors.push_back({tracks_[i].existence, std::max(kHidden, Detection(tracks_[i], panorama))});
+    priors.push_back({tracks_[i].existence, Detection(tracks_[i], panorama)});
     for (size_t j = 0; j < clusters->size(); ++j) {
+      auto& entry = ratio(static_cast<int>(i), static_cast<int>(j));
+      entry = Ratio(tracks_[i], (*clusters)[j]);
       // What was seen could be seen, whatever else seems to hide the place.
-      ratio(static_cast<int>(i), static_cast<int>(j)) =
-          Ratio(tracks_[i], (*clusters)[j]) * kDetected / priors[i].detection;
+      if (entry > 1.0) priors[i].detection = kDetected;
     }
   }
   const auto association = track::Associate(priors, ratio);
