@@ -91,6 +91,22 @@ TEST(FcuBridge, NeverSendsAStaleSetpoint) {
   EXPECT_TRUE(flight.RunUntil(State::kDone, 20.0));
 }
 
+TEST(FcuBridge, ArmsAnewOnlyWhenMissionTakesOffAnew) {
+  Flight flight;
+  flight.bridge.OnFlightState(true);
+  ASSERT_TRUE(flight.RunUntil(State::kFlying, 12.0));
+  flight.bridge.OnFlightState(false);
+  flight.Run(5.0);
+  flight.setpoints = false;  // control hangs
+  ASSERT_TRUE(flight.RunUntil(State::kStandby, 30.0)) << flight.bridge.Words();
+  flight.setpoints = true;
+  flight.bridge.OnFlightState(false);
+  flight.Run(20.0);
+  EXPECT_FALSE(flight.px4.armed());
+  flight.bridge.OnFlightState(true);
+  EXPECT_TRUE(flight.RunUntil(State::kFlying, 12.0)) << flight.bridge.Words();
+}
+
 // PX4 refuses a plain disarming in the air.
 TEST(FcuBridge, OnlyAKillCutsTheMotorsInTheAir) {
   Flight flight;

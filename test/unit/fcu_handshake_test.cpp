@@ -192,15 +192,18 @@ TEST(FcuHandshake, UnansweredCommandsAreSentAgainAndCounted) {
   EXPECT_FALSE(command.Tick(kStart + 60'000'000));
 }
 
-/// In flight, armed and in OFFBOARD.
-struct InFlight {
+/// In OFFBOARD: armed and in flight, or on the ground and asking to arm.
+struct Engaged {
   Handshake handshake{true, kGiveUp};
   Facts facts;
-  InFlight() {
+  explicit Engaged(bool flies) {
     facts.utime = kStart;
-    facts.heard = facts.armed = facts.wish = true;
+    facts.heard = facts.wish = true;
+    facts.armed = flies;
+    facts.on_ground = !flies;
     facts.mode = kOffboardMode;
-    Run(0.1);
+    Run(1.5);
+    EXPECT_EQ(handshake.state(), flies ? State::kFlying : State::kArming);
   }
   void Run(double seconds) {
     for (int i = 0; i < static_cast<int>(seconds * 1e6) / kTick; ++i, facts.utime += kTick)
@@ -209,8 +212,7 @@ struct InFlight {
 };
 
 TEST(FcuHandshake, AFlightThatIsOverIsNotGoneOnWith) {
-  InFlight flight;
-  ASSERT_EQ(flight.handshake.state(), State::kFlying);
+  Engaged flight(true);
   flight.facts.wish = false;  // control hangs
   flight.Run(0.7);
   ASSERT_EQ(flight.handshake.state(), State::kLanding);
@@ -231,7 +233,7 @@ TEST(FcuHandshake, AFlightThatIsOverIsNotGoneOnWith) {
 TEST(FcuHandshake, APilotMayTakeItFromALandingAtAnyMoment) {
   for (const double after : {0.05, 0.3, 0.9, 1.7, 2.4}) {
     for (const bool heard : {false, true}) {
-      InFlight flight;
+      Engaged flight(true);
       flight.facts.wish = false;
       flight.Run(0.7);
       ASSERT_EQ(flight.handshake.state(), State::kLanding);
@@ -255,40 +257,28 @@ TEST(FcuHandshake, APilotMayTakeItFromALandingAtAnyMoment) {
 }
 
 TEST(FcuHandshake, AKillMeetsAnArmingThatIsOnItsWay) {
-  Handshake handshake(true, kGiveUp);
-  Facts facts;
-  facts.utime = kStart;
-  facts.heard = facts.wish = facts.on_ground = true;
-  facts.mode = kOffboardMode;
-  for (int i = 0; i < 150; ++i, facts.utime += kTick) handshake.Update(facts);
-  ASSERT_EQ(handshake.state(), State::kArming);
-  handshake.Kill();
-  for (int i = 0; i < 50; ++i, facts.utime += kTick) handshake.Update(facts);
-  EXPECT_EQ(handshake.state(), State::kKilling);
-  facts.armed = true;
-  for (int i = 0; i < 300; ++i, facts.utime += kTick) {
-    handshake.Update(facts);
-    if (const auto m = handshake.NextCommand(facts.utime); m && m->param2 > 0.0f)
-      facts.armed = false;
+  Engaged arming(false);
+  arming.handshake.Kill();
+  arming.Run(0.5);
+  EXPECT_EQ(arming.handshake.state(), State::kKilling);
+  arming.facts.armed = true;
+  for (int i = 0; i < 300; ++i) {
+    arming.Run(0.01);
+    if (const auto m = arming.handshake.NextCommand(arming.facts.utime); m && m->param2 > 0.0f)
+      arming.facts.armed = false;
   }
-  EXPECT_EQ(handshake.state(), State::kDone);
+  EXPECT_EQ(arming.handshake.state(), State::kDone);
 }
 
 TEST(FcuHandshake, AnArmingThatComesTooLateIsTakenBack) {
-  Handshake handshake(true, kGiveUp);
-  Facts facts;
-  facts.utime = kStart;
-  facts.heard = facts.wish = facts.on_ground = true;
-  facts.mode = kOffboardMode;
-  for (int i = 0; i < 150; ++i, facts.utime += kTick) handshake.Update(facts);
-  ASSERT_EQ(handshake.state(), State::kArming);
-  facts.wish = false;
-  handshake.Update(facts);
-  ASSERT_EQ(handshake.state(), State::kStandby);
-  facts.armed = true;
-  handshake.Update(facts);
-  EXPECT_EQ(handshake.state(), State::kDisarming);
-  const auto command = handshake.NextCommand(facts.utime);
+  Engaged arming(false);
+  arming.facts.wish = false;
+  arming.Run(0.01);
+  ASSERT_EQ(arming.handshake.state(), State::kStandby);
+  arming.facts.armed = true;
+  arming.Run(0.01);
+  EXPECT_EQ(arming.handshake.state(), State::kDisarming);
+  const auto command = arming.handshake.NextCommand(arming.facts.utime);
   ASSERT_TRUE(command);
   EXPECT_EQ(command->command, 400);
   EXPECT_EQ(command->param1, 0.0f);
