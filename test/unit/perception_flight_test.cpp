@@ -224,6 +224,12 @@ TEST(PerceptionFaults, AFrameThatIsNotNewerIsSaidAndChangesNothing) {
   }
   perceiver.AddPose(renderer.Pose(0.55));
   EXPECT_EQ(perceiver.See({0.55, renderer.Image(0.55).bgr, {}}).note, "");
+  for (double t = 0.6; t < 0.95; t += 0.05) {
+    perceiver.AddPose(renderer.Pose(t));
+    last = perceiver.See({t, cv::Mat::zeros(bgr.size(), CV_8UC3), {}});
+  }
+  ASSERT_EQ(last.state, TargetState::kOccluded);
+  EXPECT_EQ(perceiver.See({0.57, bgr, {}}).state, TargetState::kOccluded);
 }
 
 TEST(PerceptionFaults, ImagesTornSidewaysDoNotMoveTheTarget) {
