@@ -26,11 +26,8 @@ PlannerConfig WithSmallerMargins(PlannerConfig config) {
   return config;
 }
 
-PlanRequest OverRestOf(const PlanRequest& request, const world::Trajectory& plan) {
-  PlanRequest rest = request;
-  rest.start = plan.At(request.t0);
-  rest.horizon = plan.end() - request.t0;
-  return rest;
+Stretch RestOf(const world::Trajectory& plan, const Stretch& over) {
+  return {over.t0, plan.end() - over.t0, plan.At(over.t0), over.asks_sight};
 }
 
 class Ladder : public Planner {
@@ -49,7 +46,7 @@ class Ladder : public Planner {
   PlanResult Plan(const PlanRequest& request) override {
     std::string notes;
     separations_.Clear();
-    MakeProblem(config_, request, &notes, &problem_);
+    MakeProblem(config_, request, request, &notes, &problem_);
     used_ = &problem_;
     sight_from_ = 0.0;
     PlanResult result;
@@ -70,13 +67,13 @@ class Ladder : public Planner {
   }
 
   bool IsCertified(const PlanRequest& request, const world::Trajectory& plan) override {
-    const PlanRequest rest = OverRestOf(request, plan);
+    const Stretch rest = RestOf(plan, request);
     if (!(rest.horizon > 0.05)) return false;
-    const Problem problem = MakeProblem(tight_, rest, nullptr);
+    MakeProblem(tight_, request, rest, nullptr, &shorter_);
     const Curve curve = ToCurve(plan, rest.t0, rest.horizon);
     separations_.Clear();
-    proof_.Reset(problem, 0.0, config_.exact_visibility);
-    return proof_.Holds(curve) && KeepsLimits(curve, problem);
+    proof_.Reset(shorter_, 0.0, config_.exact_visibility);
+    return proof_.Holds(curve) && KeepsLimits(curve, shorter_);
   }
 
  private:
@@ -233,9 +230,9 @@ class Ladder : public Planner {
   // The problem over a shorter horizon, where that is asked for.
   Problem* Over(const PlanRequest& request, double horizon, bool tight, std::string* notes) {
     if (horizon == request.horizon && !tight) return &problem_;
-    part_ = request;
-    part_.horizon = horizon;
-    MakeProblem(tight ? tight_ : config_, part_, notes, &shorter_);
+    Stretch part = request;
+    part.horizon = horizon;
+    MakeProblem(tight ? tight_ : config_, request, part, notes, &shorter_);
     return &shorter_;
   }
 
@@ -291,13 +288,14 @@ class Ladder : public Planner {
     if (!request.running || request.running->end() - request.t0 < 0.3 ||
         !IsCertified(request, *request.running))
       return false;
-    part_ = OverRestOf(request, *request.running);
-    const Curve curve = ToCurve(*request.running, part_.t0, part_.horizon);
+    const Stretch rest = RestOf(*request.running, request);
+    const Curve curve = ToCurve(*request.running, rest.t0, rest.horizon);
     result->verdict = Verdict::kKept;
     result->reason = "no candidate is feasible, the running plan still is";
-    result->trajectory = ToTrajectory(curve, part_.t0, part_.horizon);
-    result->cost = Evaluate(config_, MakeProblem(config_, part_, nullptr), curve);
-    MakeProblem(tight_, part_, nullptr, &shorter_);
+    result->trajectory = ToTrajectory(curve, rest.t0, rest.horizon);
+    MakeProblem(config_, request, rest, nullptr, &shorter_);
+    result->cost = Evaluate(config_, shorter_, curve);
+    MakeProblem(tight_, request, rest, nullptr, &shorter_);
     used_ = &shorter_;
     sight_from_ = 0.0;
     return true;
@@ -338,10 +336,10 @@ class Ladder : public Planner {
     rest.feasible = result->feasible;
     *result = std::move(rest);
     used_ = &problem_;
-    part_ = request;
-    part_.horizon = result->trajectory.duration;
-    result->cost = Evaluate(config_, MakeProblem(config_, part_, nullptr),
-                            Curve(result->trajectory.coefficients));
+    Stretch part = request;
+    part.horizon = result->trajectory.duration;
+    MakeProblem(config_, request, part, nullptr, &shorter_);
+    result->cost = Evaluate(config_, shorter_, Curve(result->trajectory.coefficients));
   }
 
   PlannerConfig config_, tight_;  ///< tight_: half of the margins
@@ -352,8 +350,7 @@ class Ladder : public Planner {
   PlanProof proof_;
   SeparationMemory separations_;
   Problem problem_, shorter_;  ///< over the whole horizon, over a part of it
-  StopMemory stopping_;
-  PlanRequest part_;               ///< what shorter_ was made from
+  Problem stopping_;
   const Problem* used_ = nullptr;  ///< of the two, the one whose plan is taken
   double sight_from_ = 0.0;        ///< of that plan
   bool refinable_ = false;

@@ -38,8 +38,10 @@ void PlanProof::AddRows(int obstacle) {
   const double from = std::max(sight_from_, e.sight_from);
   const bool sight = from < 1.0;
   const bool fused = sight && from == e.safety_from && e.safety == e.sight;
-  rows_.push_back({obstacle, true, fused, e.safety_from});
-  if (sight && !fused) rows_.push_back({obstacle, false, true, from});
+  const bool decides = !e.body;
+  decides_ = decides_ || decides;
+  rows_.push_back({obstacle, true, fused, decides, e.safety_from});
+  if (sight && !fused) rows_.push_back({obstacle, false, true, decides, from});
   linear_ = linear_ && e.center.rows() <= 2;
   for (int a = 0; a < 3; ++a)
     center_size_ = std::max(center_size_, e.center.col(a).cwiseAbs().sum());
@@ -50,6 +52,7 @@ void PlanProof::SetRows(bool all) {
   laid_out_ = true;
   rows_.clear();
   usable_ = linear_ = true;
+  decides_ = false;
   center_size_ = 0.0;
   if (all) {
     for (int j = 0; j < static_cast<int>(problem_->obstacles.size()); ++j) AddRows(j);
@@ -165,9 +168,12 @@ bool PlanProof::RowHolds(const Row& row, const Curve& plan, const Local* p, bool
 
 bool PlanProof::RowHolds(int row, const Curve& plan) {
   if (!IsUsable()) return false;
+  const Row& r = rows_[static_cast<size_t>(row)];
+  first_ = r.obstacle;
+  if (!r.decides) return true;
   Local p{};
   const bool small = small_ && MakeLocal(plan, degree_, &p);
-  return RowHolds(rows_[static_cast<size_t>(row)], plan, small ? &p : nullptr, true);
+  return RowHolds(r, plan, small ? &p : nullptr, true);
 }
 
 bool PlanProof::Holds(const Curve& plan, bool exactly) {
@@ -180,14 +186,14 @@ bool PlanProof::Holds(const Curve& plan, bool exactly) {
     small = small_ && MakeLocal(plan, degree_, &p);
   }
   if (!usable_) return false;
-  const bool bounds = small && linear_ && !rows_.empty();
+  const bool bounds = small && linear_ && decides_;
   if (bounds) {
     for (int i = 0; i <= degree_; ++i) std::copy(p.point[i], p.point[i] + 3, input_.plan[i]);
     input_.size = std::max(p.size, target_.size) + center_size_ + origin_.cwiseAbs().maxCoeff();
     kernels_->prove(input_, cleared_.data());
   }
   for (size_t j = 0; j < rows_.size(); ++j) {
-    if (bounds && cleared_[j]) continue;
+    if (!rows_[j].decides || (bounds && cleared_[j])) continue;
     if (!RowHolds(rows_[j], plan, small ? &p : nullptr, exactly)) return false;
   }
   return StaysOff(plan, *problem_, sight_from_, &first_, memory_);

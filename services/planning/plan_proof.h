@@ -8,8 +8,9 @@
 
 namespace chase::planning {
 
-/// Proves plans safe and in sight of the target, one problem, many plans in a row. A plan is
-/// accepted only where bounds that include all rounding, or exact arithmetic, say so: first planes
+/// Proves plans safe and in sight of the target, one problem, many plans in a row. What stands for
+/// a solid is kept off by planes in the Minkowski sum. An ellipsoid that stands for itself is so
+/// only where bounds that include all rounding, or exact arithmetic, say so: first planes
 /// that separate and bounds on d_p, d_q, d_s (many shapes at a time), then subdivision, then
 /// Sturm's theorem in integers. The verdict is that of IsFeasible with exact arithmetic, limits
 /// aside.
@@ -20,7 +21,8 @@ class PlanProof {
   struct Row {
     int obstacle;
     bool safety, sight;
-    double from;  ///< tau
+    bool decides;  ///< else the shape only sorts candidates, and planes about its body decide
+    double from;   ///< tau
   };
 
   explicit PlanProof(const kernels::Table& kernels = kernels::Kernels()) : kernels_(&kernels) {}
@@ -35,7 +37,7 @@ class PlanProof {
   /// Without `exactly`, what bounds and subdivision leave open counts as refused: for plans that
   /// may be dispensed with, because the integers take milliseconds.
   bool Holds(const Curve& plan, bool exactly = true);
-  /// The same for one row only.
+  /// The same for one row only, where its shape decides; Holds asks its obstacle first.
   bool RowHolds(int row, const Curve& plan);
   /// Whether the target itself stays outside the row's shape while sight is asked.
   bool TargetIsOutside(int row) const;
@@ -74,7 +76,7 @@ class PlanProof {
   const Problem* problem_ = nullptr;
   SeparationMemory* memory_ = nullptr;
   bool exact_sight_ = true, usable_ = false, small_ = false, linear_ = true, all_ = true,
-       laid_out_ = false;
+       laid_out_ = false, decides_ = false;
   int degree_ = 5, n_exact_ = 0;
   int first_ = -1;  ///< obstacle that the last plan failed at
   double sight_from_ = 0.0;

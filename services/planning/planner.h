@@ -32,19 +32,23 @@ using world::Proof;
 inline constexpr int kTargetId = world::kTargetBody;
 
 /// One chasing problem (Jeon 2021, Problem 2). Frame W; times in seconds from a common origin.
-struct PlanRequest {
-  double t0 = 0.0;                             ///< start of the horizon, s
-  double horizon = 2.5;                        ///< T, s
-  world::State start;                          ///< at t0
-  std::optional<YawStart> yaw;                 ///< at t0; none: towards the target
-  world::Trajectory target;                    ///< p_WT(t)
-  double target_sigma = 0.0;                   ///< largest deviation of p_WT at target.start, m
-  double target_speed_sigma = 0.0;             ///< and of its velocity, m/s
-  world::Manoeuvre target_manoeuvre;           ///< that it does not foresee
-  std::vector<world::Obstacle> obstacles;      ///< at their true size
-  std::vector<world::Obstacle> unseen;         ///< places that nobody has looked into
-  std::optional<world::Obstacle> target_body;  ///< what the drone must not touch of the target
-  bool asks_sight = true;
+/// The stretch of time that a plan is made for, and how it begins.
+struct Stretch {
+  double t0 = 0.0;         ///< start of the horizon, s
+  double horizon = 2.5;    ///< T, s
+  world::State start;      ///< at t0
+  bool asks_sight = true;  ///< of the target
+};
+
+struct PlanRequest : Stretch {
+  std::optional<YawStart> yaw;                  ///< at t0; none: towards the target
+  world::Trajectory target;                     ///< p_WT(t)
+  double target_sigma = 0.0;                    ///< largest deviation of p_WT at target.start, m
+  double target_speed_sigma = 0.0;              ///< and of its velocity, m/s
+  world::Manoeuvre target_manoeuvre;            ///< that it does not foresee
+  std::vector<world::Obstacle> obstacles;       ///< at their true size
+  std::vector<world::Obstacle> unseen;          ///< places that nobody has looked into
+  std::optional<world::Obstacle> target_body;   ///< what the drone must not touch of the target
   std::optional<world::Trajectory> running;     ///< the plan being flown, if any
   std::vector<world::Trajectory> running_rest;  ///< its further pieces, in order, if it has any
 };

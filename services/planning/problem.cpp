@@ -46,19 +46,19 @@ void SetBoxes(const world::Obstacle& o, const Growth& most, Ellipsoid* e) {
 }
 
 // What depends on the shape alone is kept where the obstacle is what it was.
-void SetShapes(const PlannerConfig& config, const PlanRequest& request, const world::Obstacle& o,
+void SetShapes(const PlannerConfig& config, const Stretch& over, const world::Obstacle& o,
                const Growth& growth, Ellipsoid* e) {
   const bool same = IsSameShape(e->grown_from, o.shape);
   e->grown_from = o.shape;
   if (!config.minkowski_sums)
     e->body.reset();
   else if (same && e->body && e->body->kind == o.solid && o.solid == world::Body::Kind::kEllipsoid)
-    world::Retime(o, request.t0, request.horizon, config.sigmas, &*e->body);
+    world::Retime(o, over.t0, over.horizon, config.sigmas, &*e->body);
   else
-    e->body = world::MakeBody(o, request.t0, request.horizon, config.sigmas);
+    e->body = world::MakeBody(o, over.t0, over.horizon, config.sigmas);
   // Heights sort out candidates on the ground, as no ellipsoid fits a slab; without a search there
   // are none.
-  if (o.ground || (!request.asks_sight && e->body)) {
+  if (o.ground || (!over.asks_sight && e->body)) {
     e->safety = e->sight = kPoint * Eigen::Matrix3d::Identity();
     e->grown_by[0] = -1.0;
     return;
@@ -86,8 +86,8 @@ double Overshoot(double v, double a, double brake) {
 // Heights give way to what the start cannot help only, so that none sinks. What is below the drone
 // its LiDAR sees on the way there only: it comes down along that slope, or slowly, until it is
 // level with people.
-Limits MakeLimits(const PlannerConfig& c, const world::State& s, const Eigen::Vector3d& target,
-                  const Ground& ground, double horizon) {
+Limits MakeLimits(const PlannerConfig& c, const Stretch& over, const Eigen::Vector3d& target,
+                  const Ground& ground) {
   constexpr double kRounding = 1e-6, kBrake = 2.0;  // m; m/s^2 where no limit is set
   constexpr double kOverhead = 10.0;                // tangent from which there is no side to be on
   constexpr double kUnseenDrop = 0.15;              // m: replanned, half a metre a second
@@ -96,6 +96,7 @@ Limits MakeLimits(const PlannerConfig& c, const world::State& s, const Eigen::Ve
   const auto at_least = [](double limit, double now) {
     return limit > 0.0 ? std::max(limit, (1.0 + kRounding) * now + kRounding) : 0.0;
   };
+  const world::State& s = over.start;
   Limits limits;
   limits.speed = at_least(c.max_speed, s.v.norm());
   limits.acceleration = at_least(c.max_acceleration, s.a.norm());
@@ -103,7 +104,7 @@ Limits MakeLimits(const PlannerConfig& c, const world::State& s, const Eigen::Ve
   const double brake = c.max_acceleration > 0.0 ? 0.5 * c.max_acceleration : kBrake;
   const double v = ground.Rise(s.v), a = ground.Rise(s.a), z = ground.Above(s.p);
   limits.ground = ground;
-  const double seen_to = z - kUnseenDrop - kSightSlope * s.v.head<2>().norm() * horizon;
+  const double seen_to = z - kUnseenDrop - kSightSlope * s.v.head<2>().norm() * over.horizon;
   const double lowest = seen_to > kPerson ? std::max(c.z_min, seen_to) : c.z_min;
   limits.z_min = std::min(lowest, z - Overshoot(-v, -a, brake) - kRounding);
   limits.z_max = std::max(c.z_max, z + Overshoot(v, a, brake) + kRounding);
@@ -112,6 +113,7 @@ Limits MakeLimits(const PlannerConfig& c, const world::State& s, const Eigen::Ve
   const double now = std::abs(r.z()) / std::max(r.head<2>().norm(), 1e-3);
   limits.tan_elevation = now < kOverhead ? at_least(tangent, now) : 0.0;
   limits.min_distance = std::min(c.min_distance, 0.9 * r.norm());
+  if (!over.asks_sight) return limits;
   limits.view = c.view();
   const double below = SeenAt(r, s.a, nullptr).x();
   const bool seen = limits.view && below < limits.view->down && below > -limits.view->up;
@@ -140,7 +142,7 @@ double ManoeuvreRate(const world::Manoeuvre& manoeuvre, double ahead) {
 void SetTargetBody(const PlanRequest& request, double flown, double hard, StartCheck* start,
                    Problem* problem, std::string* notes) {
   world::Obstacle o = *request.target_body;
-  const double ahead = request.t0 + std::min(flown, request.horizon) - o.center.start;
+  const double ahead = problem->t0 + std::min(flown, problem->duration) - o.center.start;
   o.velocity_covariance.diagonal().array() += ManoeuvreRate(request.target_manoeuvre, ahead);
   Ellipsoid e;
   e.id = kTargetId;
@@ -158,15 +160,16 @@ void SetTargetBody(const PlanRequest& request, double flown, double hard, StartC
 }
 
 // A chord over the deviation, which is convex in tau and grows with the forecast's age.
-math::Polynomial TargetGrowth(const PlannerConfig& config, const PlanRequest& request) {
-  const double age = request.t0 - request.target.start;
+math::Polynomial TargetGrowth(const PlannerConfig& config, const PlanRequest& request,
+                              const Stretch& over) {
+  const double age = over.t0 - request.target.start;
   const auto deviations = [&](double since) {
     const double steadily = std::hypot(request.target_sigma, request.target_speed_sigma * since);
     return config.sigmas *
            std::hypot(steadily, std::sqrt(request.target_manoeuvre.Variance(since)));
   };
   math::Polynomial growth(2);
-  growth << deviations(age), deviations(age + request.horizon) - deviations(age);
+  growth << deviations(age), deviations(age + over.horizon) - deviations(age);
   return growth;
 }
 
@@ -199,35 +202,42 @@ int Problem::n_candidates() const {
   return n;
 }
 
-void MakeProblem(const PlannerConfig& config, const PlanRequest& request, std::string* notes,
-                 Problem* problem) {
-  problem->t0 = request.t0;
-  problem->duration = request.horizon;
+void MakeProblem(const PlannerConfig& config, const PlanRequest& request, const Stretch& over,
+                 std::string* notes, Problem* problem,
+                 const std::vector<world::Obstacle>& besides) {
+  problem->t0 = over.t0;
+  problem->duration = over.horizon;
   problem->degree = config.degree;
-  problem->start = StartCurve(request.start, request.horizon);
-  problem->target = ToCurve(request.target, request.t0, request.horizon);
-  problem->limits = MakeLimits(config, request.start, problem->target.row(0).transpose(),
-                               GroundOf(request.obstacles), request.horizon);
+  problem->start = StartCurve(over.start, over.horizon);
+  problem->target = ToCurve(request.target, over.t0, over.horizon);
+  problem->limits =
+      MakeLimits(config, over, problem->target.row(0).transpose(), GroundOf(request.obstacles));
   problem->skeletons.clear();
   problem->reach.reset();
-  problem->obstacles.resize(request.obstacles.size());
+  const size_t listed = request.obstacles.size();
+  problem->obstacles.resize(listed + besides.size());
   problem->sigmas = config.sigmas;
   problem->sight_radius = config.sight_margin;
-  problem->target_growth = TargetGrowth(config, request);
+  problem->target_growth.setZero(2);
+  if (over.asks_sight) problem->target_growth = TargetGrowth(config, request, over);
   const double sight = config.sight_margin + 0.5 * problem->target_growth.sum();
   const double hard = config.hard_radius(), margin = config.safety_margin;
-  const Hull target(problem->target);
   const FirstSight first(*problem);
   StartCheck start(*problem);
   const Box at_start{first.p.array(), first.p.array()};
-  const Box own{target.whole.low.min(first.box.low), target.whole.high.max(first.box.high)};
-  for (size_t j = 0; j < request.obstacles.size(); ++j) {
-    const world::Obstacle& o = request.obstacles[j];
+  std::optional<Hull> target;
+  Box own = first.box;
+  if (over.asks_sight) {
+    target.emplace(problem->target);
+    own = {own.low.min(target->whole.low), own.high.max(target->whole.high)};
+  }
+  for (size_t j = 0; j < problem->obstacles.size(); ++j) {
+    const world::Obstacle& o = j < listed ? request.obstacles[j] : besides[j - listed];
     Ellipsoid* e = &problem->obstacles[j];
     e->id = o.id;
     e->index = static_cast<int>(j);
     e->safety_from = 0.0;
-    const bool asks_sight = request.asks_sight && !o.ground;
+    const bool asks_sight = over.asks_sight && !o.ground;
     e->ground = o.ground;
     e->sight_from = asks_sight ? 0.0 : 1.0;
     e->sight_share = 1.0;
@@ -235,32 +245,32 @@ void MakeProblem(const PlannerConfig& config, const PlanRequest& request, std::s
     const Uncertainty uncertain(o, *problem);
     const double mean = 0.5 * (uncertain.now + uncertain.then), most = uncertain.most();
     const Growth growth{hard + margin + mean, sight + mean};
-    SetShapes(config, request, o, growth, e);
+    SetShapes(config, over, o, growth, e);
     if (e->body)
       e->center = e->body->center;
     else
-      world::SetCurve(o.center, request.t0, request.horizon, &e->center);
+      world::SetCurve(o.center, over.t0, over.horizon, &e->center);
     const Growth widest{hard + margin + most,
                         config.sight_margin + problem->target_growth.sum() + most};
     SetBoxes(o, widest, e);
-    const bool searched = !o.ground && (request.asks_sight || !e->body);
+    const bool searched = !o.ground && (over.asks_sight || !e->body);
     if (e->body && searched) ClearStart(o, growth.safety, problem->start, e);
     // Far from start and target no margin has to give way.
     if (MayTouch(at_start, e->center, e->safety_half, kClear))
       RelaxSafety(o, hard, margin, uncertain.now, searched, &start, e, notes);
     if (asks_sight && MayTouch(own, e->center, e->sight_half, kClear))
-      RelaxSight(o, growth, first, target, *problem, &start, e, notes);
+      RelaxSight(o, growth, first, *target, *problem, &start, e, notes);
   }
   problem->target_body.reset();
   // A plan that chases is flown until its stop begins, or until a newer one takes its place; ways
   // to rest are flown to their ends.
-  const double flown = request.asks_sight ? kOverdue : request.horizon;
+  const double flown = over.asks_sight ? kOverdue : over.horizon;
   if (request.target_body) SetTargetBody(request, flown, hard, &start, problem, notes);
 }
 
 Problem MakeProblem(const PlannerConfig& config, const PlanRequest& request, std::string* notes) {
   Problem problem;
-  MakeProblem(config, request, notes, &problem);
+  MakeProblem(config, request, request, notes, &problem);
   return problem;
 }
 

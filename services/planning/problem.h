@@ -97,9 +97,11 @@ Ground GroundOf(const std::vector<world::Obstacle>& obstacles);
 /// what the start already breaks; `notes` gets one clause for each such relaxation that weakens the
 /// certificate. Leaves the skeletons empty.
 Problem MakeProblem(const PlannerConfig& config, const PlanRequest& request, std::string* notes);
-/// The same in the memory of an earlier problem.
-void MakeProblem(const PlannerConfig& config, const PlanRequest& request, std::string* notes,
-                 Problem* problem);
+/// The same in the memory of an earlier problem, over another stretch and with obstacles `besides`
+/// the request's, which come last, where that is asked for.
+void MakeProblem(const PlannerConfig& config, const PlanRequest& request, const Stretch& over,
+                 std::string* notes, Problem* problem,
+                 const std::vector<world::Obstacle>& besides = {});
 
 /// The problem with the obstacles near its reach (all, where there is none) only, enlarged by
 /// `room` m to all sides where the start and the target, for sight also the line of sight at the

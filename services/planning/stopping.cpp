@@ -71,24 +71,15 @@ double DistanceTo(const world::Obstacle& o, const Vector3d& d) {
 /// Comes to rest from the request's start, or from other states; sight is not asked for.
 class Resting {
  public:
-  Resting(const PlannerConfig& config, const PlanRequest& request, StopMemory* memory = nullptr)
-      : config_(config),
-        request_(memory ? memory->request : own_.request),
-        problem_(memory ? memory->problem : own_.problem) {
-    request_ = request;
-    request_.asks_sight = false;
+  Resting(const PlannerConfig& config, const PlanRequest& request,
+          const std::vector<world::Obstacle>& besides = {}, Problem* memory = nullptr)
+      : config_(config), request_(request), besides_(besides), problem_(memory ? *memory : own_) {
     From(request.start, request.t0);
   }
-  Resting(const Resting&) = delete;  // request_ and problem_ may be its own
-
-  void KeepOff(const std::vector<world::Obstacle>& more) {
-    request_.obstacles.insert(request_.obstacles.end(), more.begin(), more.end());
-    has_problem_ = false;
-  }
+  Resting(const Resting&) = delete;  // problem_ may be its own
 
   void From(const world::State& start, double t0) {
-    request_.start = start;
-    request_.t0 = t0;
+    over_ = {t0, 0.0, start, false};
     heights_ = BrakeCurve(start, kTimes[0]);
     has_problem_ = false;
     within_.reset();
@@ -96,7 +87,7 @@ class Resting {
 
   std::optional<Stop> Brake() {
     for (const double T : kTimes)
-      if (auto stop = Certified(BrakeCurve(request_.start, T), T)) return stop;
+      if (auto stop = Certified(BrakeCurve(over_.start, T), T)) return stop;
     return std::nullopt;
   }
 
@@ -106,7 +97,7 @@ class Resting {
     if (!curve.allFinite() || !KeepsLimits(curve, problem_)) return std::nullopt;
     auto proofs = ProveOff(curve, problem_, 1.0);
     if (!proofs) return std::nullopt;
-    return Stop{{request_.t0, T, curve}, std::move(*proofs), true};
+    return Stop{{over_.t0, T, curve}, std::move(*proofs), true};
   }
 
   /// Within the limits of speed and acceleration.
@@ -142,6 +133,11 @@ class Resting {
   }
 
  private:
+  const world::Obstacle& Obstacle(size_t j) const {
+    const size_t listed = request_.obstacles.size();
+    return j < listed ? request_.obstacles[j] : besides_[j - listed];
+  }
+
   /// Of what stands and of what moves.
   std::pair<double, double> Clearances(const Curve& curve, double tau) const {
     const Vector3d p = planning::Evaluate(curve, tau);
@@ -150,8 +146,7 @@ class Resting {
     for (size_t j = 0; j < problem_.obstacles.size(); ++j) {
       const Curve& center = problem_.obstacles[j].center;
       double& least = center.bottomRows(center.rows() - 1).isZero() ? standing : moving;
-      least =
-          std::min(least, DistanceTo(request_.obstacles[j], p - planning::Evaluate(center, tau)));
+      least = std::min(least, DistanceTo(Obstacle(j), p - planning::Evaluate(center, tau)));
     }
     if (problem_.target_body)
       moving =
@@ -178,13 +173,12 @@ class Resting {
   void SetProblem(double T) {
     if (problem_.duration == T && has_problem_) return;
     has_problem_ = true;
-    request_.horizon = T;
-    MakeProblem(config_, request_, nullptr, &problem_);
+    over_.horizon = T;
+    MakeProblem(config_, request_, over_, nullptr, &problem_, besides_);
     for (Ellipsoid& e : problem_.obstacles)
       if (e.safety_from > 0.0 && e.ground) e.safety_from = kOutBy;
     Limits& l = problem_.limits;
     l.tan_elevation = l.min_distance = 0.0;
-    l.view.reset();
     // Braking may leave the heights as far as the quickest way of it must.
     const Points points = ToPoints(heights_, 5);
     for (int i = 0; i <= 5; ++i) {
@@ -195,8 +189,10 @@ class Resting {
   }
 
   const PlannerConfig& config_;
-  StopMemory own_;
-  PlanRequest& request_;
+  const PlanRequest& request_;
+  const std::vector<world::Obstacle> besides_;
+  Stretch over_;
+  Problem own_;
   Problem& problem_;
   Curve heights_;
   bool has_problem_ = false;
@@ -234,12 +230,10 @@ std::vector<world::Obstacle> UnseenAround(const PlannerConfig& config, const Pla
 bool KeepsOff(const PlannerConfig& config, const PlanRequest& request,
               const std::vector<world::Obstacle>& unseen, const world::Trajectory& plan, double t) {
   if (unseen.empty() || t <= plan.start) return true;
-  PlanRequest part = request;
-  part.asks_sight = false;
-  part.t0 = plan.start;
-  part.horizon = t - plan.start;
+  PlanRequest part;
+  static_cast<Stretch&>(part) = {plan.start, t - plan.start, request.start, false};
+  part.target = request.target;
   part.obstacles = unseen;
-  part.target_body.reset();
   return StaysOff(ToCurve(plan, part.t0, part.horizon), MakeProblem(config, part, nullptr), 1.0);
 }
 
@@ -336,7 +330,7 @@ PlanResult RestPlan(const PlannerConfig& config, const PlanRequest& request) {
 }
 
 std::optional<Stop> WayOut(const PlannerConfig& config, const PlanRequest& request,
-                           const world::Trajectory& plan, StopMemory* memory) {
+                           const world::Trajectory& plan, Problem* memory) {
   PlannerConfig hard = config;
   hard.safety_margin = 0.0;
   const std::vector<world::Obstacle> unseen = UnseenAround(hard, request);
@@ -344,8 +338,7 @@ std::optional<Stop> WayOut(const PlannerConfig& config, const PlanRequest& reque
     return std::any_of(unseen.begin(), unseen.end(),
                        [&](const auto& o) { return o.id == proof.obstacle; });
   };
-  Resting resting(hard, request, memory);
-  resting.KeepOff(unseen);
+  Resting resting(hard, request, unseen, memory);
   for (const double after : {kOverdue, 0.2, 0.7, 1.1, HUGE_VAL}) {
     const double t = std::min(plan.start + after, plan.end());
     resting.From(plan.At(t), t);

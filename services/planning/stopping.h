@@ -15,12 +15,6 @@ struct Stop {
   bool certified = false;
 };
 
-/// Memory of ways to rest from one call to the next, whatever they were asked about.
-struct StopMemory {
-  PlanRequest request;
-  Problem problem;
-};
-
 /// Comes to rest: b3 = b4 = b5 in Bernstein form, which continues position, velocity, acceleration
 /// and jerk and ends with none. Of several durations the shortest that is certified clear of
 /// obstacles and of the target's body within the limits. Sight is not asked for.
@@ -53,8 +47,8 @@ void SetProofs(const PlannerConfig& config, const PlanRequest& request, std::vec
 /// Where `plan` can be left for a certified rest: as soon as a new plan is overdue, else sooner or
 /// later. Braking keeps the hard radius and gives up the margin. After FASTER, Tordesillas et al.
 /// 2019: a plan is flown only with such a way out. What is unseen is kept off until then and after.
-/// `memory`: of earlier calls, if any.
+/// `memory`: of an earlier call, if any.
 std::optional<Stop> WayOut(const PlannerConfig& config, const PlanRequest& request,
-                           const world::Trajectory& plan, StopMemory* memory = nullptr);
+                           const world::Trajectory& plan, Problem* memory = nullptr);
 
 }  // namespace chase::planning
