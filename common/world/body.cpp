@@ -6,6 +6,9 @@
 #include <cmath>
 #include <limits>
 
+#include "common/math/bernstein.h"
+#include "common/math/simplex.h"
+
 namespace chase::world {
 
 using Eigen::Matrix3d;
@@ -75,7 +78,9 @@ Vector3d SupportPoint(const Body& body, const Vector3d& n) {
   return Vector3d::Zero();
 }
 
-Vector3d Outwards(const Body& body, const Vector3d& offset) {
+namespace {
+
+Vector3d LevelNormal(const Body& body, const Vector3d& offset) {
   Vector3d n = offset;
   if (body.kind == Body::Kind::kEllipsoid) {
     n = body.shape.ldlt().solve(offset);
@@ -94,6 +99,37 @@ Vector3d Outwards(const Body& body, const Vector3d& offset) {
   }
   const double length = n.norm();
   return length > 0.0 && std::isfinite(length) ? Vector3d(n / length) : Vector3d::UnitZ();
+}
+
+}  // namespace
+
+Vector3d Outwards(const Body& body, const Vector3d& offset) {
+  constexpr int kSteps = 64;
+  constexpr double kTouch = 1e-6, kExact = 1e-9;  // m
+  const Vector3d level = LevelNormal(body, offset);
+  math::Simplex from;  // offset less the solid
+  Vector3d n = level;
+  for (int i = 0; i < kSteps; ++i) {
+    const Vector3d z = offset - SupportPoint(body, n);
+    if (i > 0 && n.dot(z) > from.nearest().norm() - kExact) break;
+    if (!z.allFinite() || !from.Add(z)) break;
+    const double distance = from.nearest().norm();
+    if (distance < kTouch) return level;
+    n = from.nearest() / distance;
+  }
+  return n.dot(offset - SupportPoint(body, n)) > kTouch ? n : level;
+}
+
+bool Leaves(const Curve& curve, const Body& body, double until, double slack) {
+  const Vector3d out = Outwards(body, (curve.row(0) - body.center.row(0)).transpose());
+  const Eigen::Index n = std::max(curve.rows(), body.center.rows());
+  math::Polynomial along = math::Polynomial::Zero(n);
+  along.head(curve.rows()) = curve * out;
+  along.head(body.center.rows()) -= body.center * out;
+  math::Polynomial rate = math::Derivative(along);
+  double scale = 1.0;  // of tau, to [0, until]
+  for (Eigen::Index k = 0; k < rate.size(); ++k, scale *= until) rate[k] *= scale;
+  return math::PowerToBernstein(rate).minCoeff() >= -slack;
 }
 
 double Deviation(const Body& body, const Vector3d& n, double tau) {

@@ -47,9 +47,14 @@ void Retime(const Obstacle& obstacle, double start, double duration, double sigm
 /// zero.
 Eigen::Vector3d SupportPoint(const Body& body, const Eigen::Vector3d& n);
 
-/// Unit normal of the body's surface where a point at `offset` from its centre, inside or out, is
-/// to leave it: of the level set of the solid that the point lies on.
+/// Unit vector along which a point at `offset` from the body's centre is to leave it: from the
+/// nearest point of the solid; for one inside, normal to the level set that it lies on.
 Eigen::Vector3d Outwards(const Body& body, const Eigen::Vector3d& offset);
+
+/// Does a curve that starts near the body, or within it, come no nearer to it for tau in
+/// [0, until], but for `slack` m of a unit of tau? Along Outwards() at its start it never goes
+/// back, so that the plane between them moves away from the body with it.
+bool Leaves(const Curve& curve, const Body& body, double until, double slack = 0.0);
 
 /// Standard deviation of the body's position along n at tau, times |n|, m.
 double Deviation(const Body& body, const Eigen::Vector3d& n, double tau);

@@ -9,6 +9,7 @@ namespace {
 constexpr Eigen::Index kMostRows = 16;  // of a Curve
 // Stamps are whole microseconds, in which a body at 10 m/s and 10 m/s^2 moves by 1e-5 of each unit.
 constexpr double kJoin = 1e-4;                 // m, m/s
+constexpr double kWayOut = 1e-4;               // m of a unit of tau
 constexpr double kLeaveBy = 0.25;              // tau by which planning leaves what the start is in
 constexpr double kLeaveGroundBy = 0.6;         // and the ground, out of which it climbs from rest
 constexpr double kRestingSpeed = 0.02;         // m/s
@@ -70,7 +71,10 @@ class Examiner {
     if (proof.of_sight) target_.radius = proof.target_radius;
     const bool holds = is_certificate_(proof.separations, proof.from, 1.0, drone_,
                                        proof.of_sight ? &target_ : nullptr, *body_);
-    if (holds) return "";
+    if (holds && (proof.of_sight || proof.from <= 0.0 ||
+                  Leaves(of_.coefficients, *body_, proof.from, kWayOut)))
+      return "";
+    if (holds) return "is not left by the shortest way";
     return proof.of_sight ? "has a proof of sight that does not hold"
                           : "has a proof of safety that does not hold";
   }

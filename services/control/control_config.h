@@ -24,7 +24,7 @@ struct ControlConfig {
   double drone_radius = 0.25;   ///< m
   double tracking_tube = 0.12;  ///< m
   double sigmas = 2.0;
-  double reset_distance = 0.9;  ///< m
+  double reset_distance = 0.3;  ///< m
   double land_speed = 0.5;      ///< m/s
   double descent_speed = 0.4;   ///< m/s
   double lost_descent = 0.1;    ///< m/s^2

@@ -92,12 +92,18 @@ void Pilot::SetObstacles(double t, std::vector<world::Obstacle> obstacles) {
   obstacles_changed_ = true;
 }
 
+void Pilot::SetUnseen(double t, std::vector<world::Obstacle> unseen) {
+  unseen_time_ = t;
+  unseen_ = std::move(unseen);
+}
+
 void Pilot::ChangeFrame() {
   forecast_.reset();
   had_target_ = false;
   whereabouts_.Clear();
   obstacles_.clear();
   unseen_.clear();
+  unseen_time_.reset();
   obstacles_time_ = -1e9;
   has_running_ = false;
   home_.reset();
@@ -117,7 +123,7 @@ void Pilot::SetTask(Task task, const std::optional<Eigen::Vector3d>& home) {
 }
 
 bool Pilot::SeesObstacles(double t) const {
-  return t - obstacles_time_ <= world::kMostAge.obstacles;
+  return t - std::min(obstacles_time_, unseen_time_.value_or(t)) <= world::kMostAge.obstacles;
 }
 
 bool Pilot::HasTarget(double t) const {
@@ -143,6 +149,7 @@ std::optional<PlanResult> Pilot::Update(double t, const BodyEstimate& body) {
   const double t0 = t + config_.latency;
   const Start start = StartAt(t, t0, body);
   if (!first_update_) first_update_ = t;
+  news_ = news_ || !start.follows;
   if (obstacles_changed_ && has_running_ && HasTarget(t)) {
     obstacles_changed_ = false;
     news_ = news_ || !planner_->IsCertified(Request(t0, start), running_.trajectory);
@@ -160,22 +167,37 @@ std::optional<PlanResult> Pilot::Update(double t, const BodyEstimate& body) {
   return plan;
 }
 
-// On the running plan, at its end once it is over; on the estimate when there is no plan or the
-// body is too far from it.
+// On the running plan, on its stop from when that begins, as control does; at rest once it is over.
+// On the estimate when there is no plan or the body has left the tube about it.
 Pilot::Start Pilot::StartAt(double t, double t0, const BodyEstimate& body) const {
-  const world::Trajectory& plan = running_.trajectory;
-  const double now = std::clamp(t, plan.start, plan.end());
-  if (!has_running_ || (plan.Position(now) - body.p).norm() > config_.reset_threshold)
-    return {{body.p, has_running_ || airborne_ ? body.v : Eigen::Vector3d::Zero()},
-            {body.yaw, 0.0}};
-  const double tau = std::clamp((t0 - plan.start) / plan.duration, 0.0, 1.0);
-  Start start{plan.At(plan.start + tau * plan.duration), YawAt(running_.yaw, tau, plan.duration),
-              true};
-  if (t0 >= plan.end()) {
+  const bool flies = has_running_ || airborne_;
+  const Eigen::Vector3d v = flies ? body.v : Eigen::Vector3d::Zero();
+  const Start estimate{{body.p + (t0 - t) * v, v}, {body.yaw, 0.0}, false, !has_running_};
+  if (!has_running_) return estimate;
+  const world::Trajectory& way = FlownAt(t);
+  const double now = std::clamp(t, way.start, way.end());  // the newest plan may not have begun
+  const Eigen::Vector3d then = body.p + std::max(0.0, now - t) * body.v;
+  if ((way.Position(now) - then).norm() > config_.planner.tracking_tube) return estimate;
+  const world::Trajectory &flown = FlownAt(t0), &plan = running_.trajectory;
+  const double left = std::min(flown.start, plan.end());  // of the plan, where its stop is flown
+  const bool on_plan = &flown == &plan;
+  const double tau = std::clamp(((on_plan ? t0 : left) - plan.start) / plan.duration, 0.0, 1.0);
+  Start start{flown.At(std::clamp(t0, flown.start, flown.end())),
+              YawAt(running_.yaw, tau, plan.duration), on_plan};
+  if (!on_plan) {  // its rate falls evenly over the stop
+    const double s = std::min((t0 - left) / flown.duration, 1.0);
+    start.yaw.yaw += start.yaw.rate * flown.duration * (s - 0.5 * s * s);
+    start.yaw.rate *= 1.0 - s;
+  }
+  if (t0 >= flown.end()) {
     start.state.v = start.state.a = start.state.j = Eigen::Vector3d::Zero();
     start.yaw.rate = 0.0;
   }
   return start;
+}
+
+const world::Trajectory& Pilot::FlownAt(double t) const {
+  return running_.stop && t >= running_.stop->start ? *running_.stop : running_.trajectory;
 }
 
 PlanRequest Pilot::Request(double t0, const Start& start) const {
@@ -185,6 +207,8 @@ PlanRequest Pilot::Request(double t0, const Start& start) const {
   request.yaw = start.yaw;
   request.obstacles = obstacles_;
   request.unseen = unseen_;
+  if (start.follows && has_running_) request.stop = running_.stop;
+  if (start.on_plan) request.running = running_.trajectory;  // off it, it is no way out
   // What moves is measured, as the target is, in the frame that drifts.
   for (world::Obstacle& o : request.obstacles)
     if (!o.moving) o.velocity_covariance += drift_;
@@ -199,7 +223,6 @@ PlanRequest Pilot::Request(double t0, const Start& start) const {
     request.target_manoeuvre = {config_.target_acceleration, config_.target_memory};
   request.target_body = TargetBody(*forecast_);
   request.horizon = std::clamp(forecast_->target.end() - t0, kShortestHorizon, config_.horizon);
-  if (start.on_plan) request.running = running_.trajectory;  // off it, it is no way out
   return request;
 }
 
@@ -310,7 +333,6 @@ PlanResult Pilot::Search(double t0, const Start& start, const BodyEstimate& body
       {start.state.p.x() + near * way.x(), start.state.p.y() + near * way.y(), place_.z()}, t0,
       request.horizon);
   request.target_body.reset();
-  if (start.on_plan) request.running = running_.trajectory;
   PlanResult plan = planner_->Plan(request);
   const bool shows = plan.verdict < Verdict::kSafeOnly;
   const bool goes =

@@ -53,8 +53,8 @@ class Pilot {
 
   void SetForecast(const Forecast& forecast);
   void SetObstacles(double t, std::vector<world::Obstacle> obstacles);
-  /// Places near the drone that nobody has looked into.
-  void SetUnseen(std::vector<world::Obstacle> unseen) { unseen_ = std::move(unseen); }
+  /// Places near the drone that nobody has looked into; once heard they go stale as obstacles do.
+  void SetUnseen(double t, std::vector<world::Obstacle> unseen);
   /// Control says that it flies: a planner that has just been started must not take off again.
   void SetFlying(bool flying) {
     heard_control_ = true;
@@ -82,7 +82,8 @@ class Pilot {
   struct Start {
     world::State state;
     YawStart yaw;
-    bool on_plan = false;  ///< taken from the running plan, not from the estimate
+    bool on_plan = false;  ///< taken from the running plan, not from its stop or the estimate
+    bool follows = true;   ///< the body was within the tube about what is flown
   };
 
   bool IsDue(double t) const;
@@ -90,6 +91,7 @@ class Pilot {
   bool Chases() const { return !task_ || *task_ == Task::kChase; }
   bool HasTarget(double t) const;
   Start StartAt(double t, double t0, const BodyEstimate& body) const;
+  const world::Trajectory& FlownAt(double t) const;
   PlanRequest Request(double t0, const Start& start) const;
   PlanResult Chase(double t0, const Start& start);
   PlanResult Wait(double t0, const Start& start, const BodyEstimate& body);
@@ -110,8 +112,9 @@ class Pilot {
   std::optional<Forecast> forecast_;
   std::vector<world::Obstacle> obstacles_, unseen_;
   Eigen::Matrix3d drift_ =
-      Eigen::Matrix3d::Zero();    ///< covariance of the frame's velocity, m^2/s^2
-  double obstacles_time_ = -1e9;  ///< s
+      Eigen::Matrix3d::Zero();         ///< covariance of the frame's velocity, m^2/s^2
+  double obstacles_time_ = -1e9;       ///< s
+  std::optional<double> unseen_time_;  ///< s
   PlanResult running_;
   bool has_running_ = false;
   double last_planned_ = -1e9;

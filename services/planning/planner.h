@@ -50,6 +50,7 @@ struct PlanRequest : Stretch {
   std::vector<world::Obstacle> unseen;          ///< places that nobody has looked into
   std::optional<world::Obstacle> target_body;   ///< what the drone must not touch of the target
   std::optional<world::Trajectory> running;     ///< the plan being flown, if any
+  std::optional<world::Trajectory> stop;        ///< of that plan; from its start on, flown
   std::vector<world::Trajectory> running_rest;  ///< its further pieces, in order, if it has any
 };
 

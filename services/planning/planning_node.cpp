@@ -89,7 +89,7 @@ PlanningNode::PlanningNode(bus::Bus& bus, const PlanningConfig& config)
       pilot_.SetObstacles(bus::Seconds(m.utime, *origin_), *std::move(list));
   });
   bus_.Subscribe<obstacles_t>("UNSEEN", [this](const obstacles_t& m) {
-    if (auto list = Listed(m)) pilot_.SetUnseen(*std::move(list));
+    if (auto list = Listed(m)) pilot_.SetUnseen(bus::Seconds(m.utime, *origin_), *std::move(list));
   });
   bus_.Subscribe<tracking_t>("TRACKING", [this](const tracking_t& m) {
     pilot_.SetFlying(m.following != tracking_t::NONE);

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/math/bernstein.h"
 #include "services/planning/candidate_set.h"
 
 namespace chase::planning {
@@ -40,21 +39,6 @@ class Sieve {
   std::optional<Box> box_;
 };
 
-// A plan that starts within an obstacle's hard shape has to leave it: along the way out at its
-// start the distance never shrinks.
-bool Leaves(const Curve& plan, const Ellipsoid& e) {
-  const Eigen::Vector3d offset = (plan.row(0) - e.center.row(0)).transpose();
-  const Eigen::Vector3d out = world::Outwards(*e.body, offset);
-  const Eigen::Index n = std::max(plan.rows(), e.center.rows());
-  math::Polynomial along = math::Polynomial::Zero(n);
-  along.head(plan.rows()) = plan * out;
-  along.head(e.center.rows()) -= e.center * out;
-  math::Polynomial rate = math::Derivative(along);
-  double scale = 1.0;  // of tau, to [0, safety_from]
-  for (Eigen::Index k = 0; k < rate.size(); ++k, scale *= e.safety_from) rate[k] *= scale;
-  return math::PowerToBernstein(rate).minCoeff() >= 0.0;
-}
-
 class Prover {
  public:
   Prover(const Curve& plan, const Problem& problem, double sight_from)
@@ -71,7 +55,7 @@ class Prover {
   // drone's ball off, too: they prove safety where that leaves more than others do, so that the
   // least clearance has planes of its own.
   bool IsOff(const Ellipsoid& e, std::vector<Proof>* proofs, SeparationMemory* memory) {
-    if (e.safety_from > 0.0 && !Leaves(drone_.center, e)) return false;
+    if (e.safety_from > 0.0 && !world::Leaves(drone_.center, *e.body, e.safety_from)) return false;
     world::SeparationResult safety, sight;
     const double from = SightFrom(e);
     if (from < 1.0 && !IsKept(sight = InSight(e, memory))) return false;

@@ -94,7 +94,8 @@ class Resting {
   /// A certified way over T, if the curve is one.
   std::optional<Stop> Certified(const Curve& curve, double T) {
     SetProblem(T);
-    if (!curve.allFinite() || !KeepsLimits(curve, problem_)) return std::nullopt;
+    if (!curve.allFinite() || !KeepsLimits(curve, problem_) || !IsForecast(curve, T))
+      return std::nullopt;
     auto proofs = ProveOff(curve, problem_, 1.0);
     if (!proofs) return std::nullopt;
     return Stop{{over_.t0, T, curve}, std::move(*proofs), true};
@@ -136,6 +137,22 @@ class Resting {
   const world::Obstacle& Obstacle(size_t j) const {
     const size_t listed = request_.obstacles.size();
     return j < listed ? request_.obstacles[j] : besides_[j - listed];
+  }
+
+  /// Is what moves in curves forecast for as long as it could come to the way? Beyond its end such
+  /// a curve is no forecast.
+  bool IsForecast(const Curve& way, double T) const {
+    constexpr double kRounding = 1e-3, kFast = 2.0;  // s; m/s
+    const Box box = BoxOf(ToPoints(way, 6), 7, 0.0);
+    for (size_t j = 0; j < problem_.obstacles.size(); ++j) {
+      const world::Trajectory& center = Obstacle(j).center;
+      const double unknown = over_.t0 + T - center.end();
+      if (center.degree() < 2 || unknown < kRounding) continue;
+      const Curve last = center.Position(center.end()).transpose();
+      if (MayTouch(box, last, problem_.obstacles[j].safety_half + kFast * unknown, 1.0))
+        return false;
+    }
+    return true;
   }
 
   /// Of what stands and of what moves.
@@ -217,6 +234,11 @@ std::vector<Vector3d> Displacements() {
   return all;
 }
 
+PlannerConfig WithoutMargin(PlannerConfig config) {
+  config.safety_margin = 0.0;
+  return config;
+}
+
 /// What is unseen but for the places that the start is in: the body is there.
 std::vector<world::Obstacle> UnseenAround(const PlannerConfig& config, const PlanRequest& request) {
   std::vector<world::Obstacle> unseen;
@@ -226,14 +248,20 @@ std::vector<world::Obstacle> UnseenAround(const PlannerConfig& config, const Pla
   return unseen;
 }
 
-/// Does the plan keep off all of them until t?
+/// Does the plan keep off all of them until t, and off the target's body where its own proof counts
+/// on its being left before that?
 bool KeepsOff(const PlannerConfig& config, const PlanRequest& request,
               const std::vector<world::Obstacle>& unseen, const world::Trajectory& plan, double t) {
-  if (unseen.empty() || t <= plan.start) return true;
+  const bool late = request.target_body && t > plan.start + kOverdue;
+  if ((unseen.empty() && !late) || t <= plan.start) return true;
   PlanRequest part;
   static_cast<Stretch&>(part) = {plan.start, t - plan.start, request.start, false};
   part.target = request.target;
   part.obstacles = unseen;
+  if (late) {
+    part.target_body = request.target_body;
+    part.target_manoeuvre = request.target_manoeuvre;
+  }
   return StaysOff(ToCurve(plan, part.t0, part.horizon), MakeProblem(config, part, nullptr), 1.0);
 }
 
@@ -266,10 +294,49 @@ std::optional<Stop> GoOn(const PlannerConfig& config, const PlanRequest& request
   return resting.Certified(ToCurve(way, request.t0, T), T);
 }
 
+namespace {
+
+// The way that was committed to with the running plan: what is left of that plan until its stop,
+// and the stop, where they still hold without a margin.
+std::optional<PlanResult> Committed(const PlannerConfig& config, const PlanRequest& request) {
+  if (!request.stop) return std::nullopt;
+  PlanResult result;
+  if (request.t0 >= request.stop->start) {
+    auto stop = GoOn(config, request, *request.stop);
+    if (!stop) return std::nullopt;
+    result.verdict = Verdict::kBrake;
+    result.reason = "on the stop of the plan before";
+    result.trajectory = std::move(stop->trajectory);
+    SetProofs(config, request, std::move(stop->proofs), &result);
+    return result;
+  }
+  if (!request.running || request.stop->start > request.running->end()) return std::nullopt;
+  const double T = request.stop->start - request.t0;
+  Resting resting(config, request);
+  auto rest = resting.Certified(ToCurve(*request.running, request.t0, T), T);
+  if (!rest) return std::nullopt;
+  resting.From(request.running->At(request.stop->start), request.stop->start);
+  auto stop = resting.Certified(ToCurve(*request.stop, request.stop->start, request.stop->duration),
+                                request.stop->duration);
+  if (!stop) return std::nullopt;
+  result.verdict = Verdict::kSafeOnly;
+  result.reason = "the running plan until its stop";
+  result.trajectory = std::move(rest->trajectory);
+  SetProofs(config, request, std::move(rest->proofs), &result);
+  result.stop = std::move(stop->trajectory);
+  result.stop_proofs = std::move(stop->proofs);
+  return result;
+}
+
+}  // namespace
+
 Stop Evade(const PlannerConfig& config, const PlanRequest& request) {
   static const std::vector<Vector3d> displacements = Displacements();
   constexpr double kOver[] = {1.0, 1.6};
+  const std::vector<world::Obstacle> unseen = UnseenAround(config, request);
   Resting resting[] = {{config, request}, {config, request}};
+  Resting seen[] = {{config, request, unseen}, {config, request, unseen}};
+  std::optional<Stop> blind;  // certified but for what nobody has looked into
   Stop best;
   std::pair<double, double> least{-HUGE_VAL, -HUGE_VAL};
   const auto weigh = [&](Resting* way, const Curve& curve, double T) {
@@ -290,9 +357,14 @@ Stop Evade(const PlannerConfig& config, const PlanRequest& request) {
       const double T = kOver[i];
       const Vector3d end = ToPoints(BrakeCurve(request.start, T), 5).row(5).transpose() + d;
       const Curve curve = CurveTo(request.start, T, end);
-      if (auto stop = resting[i].Certified(curve, T)) return *stop;
-      if (resting[i].CanBeFlown(curve, T)) weigh(&resting[i], curve, T);
+      if (auto stop = resting[i].Certified(curve, T)) {
+        if (unseen.empty() || seen[i].Certified(curve, T)) return *stop;
+        if (!blind) blind = std::move(stop);
+        continue;
+      }
+      if (!blind && resting[i].CanBeFlown(curve, T)) weigh(&resting[i], curve, T);
     }
+  if (blind) return *blind;
   if (least.first < 0.0)  // none can be flown
     weigh(&braking, BrakeCurve(request.start, kLongest), kLongest);
   if (least.first < 0.0)  // none is finite
@@ -313,8 +385,12 @@ void SetProofs(const PlannerConfig& config, const PlanRequest& request, std::vec
 }
 
 PlanResult RestPlan(const PlannerConfig& config, const PlanRequest& request) {
+  const PlannerConfig hard = WithoutMargin(config);
   PlanResult result;
   std::optional<Stop> stop = Brake(config, request);
+  if (!stop) stop = Brake(hard, request);
+  if (!stop)
+    if (auto committed = Committed(hard, request)) return *committed;
   result.verdict = Verdict::kBrake;
   if (!stop) {
     stop = Evade(config, request);
@@ -331,8 +407,7 @@ PlanResult RestPlan(const PlannerConfig& config, const PlanRequest& request) {
 
 std::optional<Stop> WayOut(const PlannerConfig& config, const PlanRequest& request,
                            const world::Trajectory& plan, Problem* memory) {
-  PlannerConfig hard = config;
-  hard.safety_margin = 0.0;
+  const PlannerConfig hard = WithoutMargin(config);
   const std::vector<world::Obstacle> unseen = UnseenAround(hard, request);
   const auto is_unseen = [&](const Proof& proof) {
     return std::any_of(unseen.begin(), unseen.end(),

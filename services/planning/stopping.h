@@ -36,7 +36,8 @@ Stop Evade(const PlannerConfig& config, const PlanRequest& request);
 /// When the certified stop of a plan begins, s after its start: several periods of planning.
 inline constexpr double kOverdue = 0.4;
 
-/// Brake, or else Evade, as a plan; the reason says what it is not.
+/// Brake, the rest of the running plan until its stop and that stop, or else Evade, as a plan; the
+/// reason says what it is not.
 PlanResult RestPlan(const PlannerConfig& config, const PlanRequest& request);
 
 /// What the proofs, and the height above the ground, leave to the drone's sphere goes with them;

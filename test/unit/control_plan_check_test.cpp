@@ -222,9 +222,10 @@ bool NeverRest(Case* c, Random& g) {
   return true;
 }
 
+/// What may start inside may, of what it moves away from.
 bool SpeakLater(Case* c, Random& g) {
   Proof& proof = AnyProof(c, g);
-  if (proof.of_sight) return false;
+  if (proof.of_sight || c->claim.starts_inside) return false;
   proof.from = Uniform(g, 1e-6, 1.0);
   while (proof.separations.size() > 1 && proof.separations.front().to <= proof.from)
     proof.separations.erase(proof.separations.begin());
@@ -334,28 +335,56 @@ TEST(PlanCheck, RestIsLessThanTwoCentimetresASecond) {
   EXPECT_FALSE(ends_at_rest(0.0, -0.06));
 }
 
+/// The first obstacle that the plan moves away from for half of its time, or that it does not.
+int FirstThat(bool leaves, const Case& c) {
+  const world::Trajectory& way = c.claim.position;
+  for (size_t i = 0; i < c.obstacles.size(); ++i) {
+    const world::Body body = world::MakeBody(c.obstacles[i], way.start, way.duration, 2.0);
+    if (world::Leaves(way.coefficients, body, leaves ? 0.5 : 0.2) == leaves)
+      return static_cast<int>(i);
+  }
+  return -1;
+}
+
 TEST(PlanCheck, OnlyAnEscapeMayStartInside) {
-  Random g(3);
   Case c = test::MakeCase(1);
-  const auto begin = [&](double from) {
+  const int away = FirstThat(true, c);
+  ASSERT_GE(away, 0);
+  world::Obstacle& left = c.obstacles[static_cast<size_t>(away)];
+  const auto begin = [&c](double from, int id) {
     for (Proof& proof : c.claim.proofs)
-      if (!proof.of_sight && proof.obstacle == c.obstacles[0].id) {
+      if (!proof.of_sight && proof.obstacle == id) {
         proof.from = from;
         auto& planes = proof.separations;
         while (planes.front().to <= from) planes.erase(planes.begin());
         planes.front().from = from;
       }
   };
-  const std::string later =
-      "obstacle " + std::to_string(c.obstacles[0].id) + " is kept off only later";
-  begin(0.2);
+  const std::string later = "obstacle " + std::to_string(left.id) + " is kept off only later";
+  begin(0.2, left.id);
   EXPECT_EQ(Verdict(c), later);
   c.claim.starts_inside = true;
   EXPECT_EQ(Verdict(c), "");
-  begin(0.5);
+  begin(0.5, left.id);
   EXPECT_EQ(Verdict(c), later);
-  c.obstacles[0].ground = true;
+  left.ground = true;
   EXPECT_EQ(Verdict(c), "") << "the ground is left by a climb from rest";
+}
+
+TEST(PlanCheck, AnEscapeComesNoNearerToWhatItLeaves) {
+  Case c = test::MakeCase(1);
+  c.claim.starts_inside = true;
+  const int toward = FirstThat(false, c);
+  ASSERT_GE(toward, 0);
+  const int id = c.obstacles[static_cast<size_t>(toward)].id;
+  for (Proof& proof : c.claim.proofs)
+    if (!proof.of_sight && proof.obstacle == id) {
+      proof.from = 0.2;
+      auto& planes = proof.separations;
+      while (planes.front().to <= 0.2) planes.erase(planes.begin());
+      planes.front().from = 0.2;
+    }
+  EXPECT_EQ(Verdict(c), "obstacle " + std::to_string(id) + " is not left by the shortest way");
 }
 
 TEST(PlanCheck, RefusesWhatIsNoCurve) {

@@ -39,9 +39,15 @@ class Flight {
 
   BodyEstimate Body() const {
     if (!flown) return {{0.0, 0.0, 0.1}, {0.0, 0.0, 0.0}, 0.0};
-    const world::Trajectory& plan = flown->trajectory;
-    const double now = std::min(t, plan.end()), tau = (now - plan.start) / plan.duration;
-    return {plan.Position(now), plan.Velocity(now), YawAt(flown->yaw, tau, plan.duration).yaw};
+    const world::Trajectory &plan = flown->trajectory, &way = FlownAt(t);
+    const double now = std::min(t, way.end());
+    const double tau = std::min(1.0, (t - plan.start) / plan.duration);
+    return {way.Position(now), way.Velocity(now), YawAt(flown->yaw, tau, plan.duration).yaw};
+  }
+
+  /// As control does it: a plan until its stop begins, then that.
+  const world::Trajectory& FlownAt(double time) const {
+    return flown->stop && time >= flown->stop->start ? *flown->stop : flown->trajectory;
   }
 
   Pilot pilot;
@@ -55,11 +61,11 @@ class Flight {
  private:
   void Switch() {
     if (flown) {
-      const double before = std::min(waiting->trajectory.start, flown->trajectory.end());
-      largest_kink =
-          std::max(largest_kink, (flown->trajectory.Position(before) -
-                                  waiting->trajectory.Position(waiting->trajectory.start))
-                                     .norm());
+      const double start = waiting->trajectory.start;
+      const world::Trajectory& way = FlownAt(start);
+      largest_kink = std::max(
+          largest_kink,
+          (way.Position(std::min(start, way.end())) - waiting->trajectory.Position(start)).norm());
     }
     flown = waiting;
     waiting.reset();
@@ -141,6 +147,54 @@ TEST(Pilot, LargeTrackingErrorRestartsFromTheEstimate) {
   EXPECT_LT((plan->trajectory.Position(plan->trajectory.start) - away).norm(), 1e-9);
 }
 
+TEST(Pilot, ABodyOutsideTheTubeIsPlannedForAtOnceFromWhereItIs) {
+  const PlanningConfig config;
+  for (const double off : {0.9, 1.1}) {
+    Flight flight(config);
+    flight.Run(4.0, false);
+    flight.Run(4.0, true);
+    // As soon as a plan is flown, which nothing new replaces for `replan_period`.
+    while (flight.pilot.running().trajectory.start > flight.t ||
+           flight.pilot.running().trajectory.start < flight.t - kPeriod)
+      flight.Run(kPeriod, true);
+    BodyEstimate body = flight.Body();
+    body.p.y() += off * config.planner.tracking_tube;
+    const auto plan = flight.pilot.Update(flight.t + config.min_period, body);
+    EXPECT_EQ(plan.has_value(), off > 1.0);
+    if (!plan) continue;
+    const Eigen::Vector3d ahead = body.p + config.latency * body.v;
+    EXPECT_LT((plan->trajectory.Position(plan->trajectory.start) - ahead).norm(), 1e-9);
+  }
+}
+
+// The planner hangs while control goes over to the stop: what it plans then begins on that.
+TEST(Pilot, APlanAfterALongSilenceBeginsOnTheStopThatIsFlown) {
+  Flight flight{PlanningConfig()};
+  flight.Run(4.0, false);
+  flight.Run(4.0, true);
+  while (flight.waiting) flight.Run(kPeriod, true);
+  ASSERT_TRUE(flight.flown->stop);
+  const world::Trajectory stop = *flight.flown->stop;
+  flight.t = stop.start + 0.5 * stop.duration;
+  const BodyEstimate body = flight.Body();
+  ASSERT_GT((flight.flown->trajectory.Position(flight.t) - body.p).norm(), 0.01);
+  const auto plan = flight.pilot.Update(flight.t, body);
+  ASSERT_TRUE(plan);
+  const double start = plan->trajectory.start;
+  EXPECT_LT((plan->trajectory.Position(start) - stop.Position(start)).norm(), 1e-6);
+  EXPECT_LT((plan->trajectory.Velocity(start) - stop.Velocity(start)).norm(), 1e-6);
+}
+
+TEST(Pilot, OutdatedUnseenPlacesCountAsOutdatedObstacles) {
+  for (const bool heard : {false, true}) {
+    Flight flight{PlanningConfig()};
+    flight.Run(4.0, false);
+    if (heard) flight.pilot.SetUnseen(flight.t, {});
+    flight.Run(2.0, true);
+    EXPECT_EQ(flight.plans.back().reason.find("obstacles are not heard of") == 0, heard);
+  }
+}
+
 TEST(Pilot, ARestartedChaseBeginsAtTheEstimatesVelocityWithoutAcceleration) {
   Flight flight{PlanningConfig()};
   flight.Run(4.0, false);
@@ -151,7 +205,7 @@ TEST(Pilot, ARestartedChaseBeginsAtTheEstimatesVelocityWithoutAcceleration) {
     plan = flight.pilot.Update(t, pushed);
   ASSERT_TRUE(plan);
   const world::State start = plan->trajectory.At(plan->trajectory.start);
-  EXPECT_LT((start.p - pushed.p).norm(), 1e-6);
+  EXPECT_LT((start.p - pushed.p - PlanningConfig().latency * pushed.v).norm(), 1e-6);
   EXPECT_LT((start.v - pushed.v).norm(), 1e-6);
   EXPECT_LT(start.a.norm(), 1e-6);
 }
@@ -238,7 +292,8 @@ TEST(Pilot, NothingOfAnotherFrameIsPlannedWith) {
   const auto plan = flight.pilot.Update(flight.t, body);
   ASSERT_TRUE(plan) << "the running plan is void";
   EXPECT_GE(plan->verdict, Verdict::kBrake) << "there is no target in this frame yet";
-  EXPECT_LT((plan->trajectory.Position(plan->trajectory.start) - body.p).norm(), 1e-9);
+  const Eigen::Vector3d ahead = PlanningConfig().latency * body.v;
+  EXPECT_LT((plan->trajectory.Position(plan->trajectory.start) - body.p - ahead).norm(), 1e-9);
   EXPECT_LT(plan->certified_clearance, 0.0) << "no obstacles were listed in this frame yet";
 }
 

@@ -177,6 +177,74 @@ double FirstContact(const PlannerConfig& c, const PlanRequest& request,
 
 // Walkers close in from all sides: what is flown touches no earlier than any braking within the
 // limits would.
+// A plan that was certified with its stop is flown on where nothing else can be certified from
+// where the body is by now: until that stop begins, and along it.
+TEST(Rest, GoesOnWithTheStopThatWasCommittedTo) {
+  const PlannerConfig config;
+  PlannerConfig hard = config;
+  hard.safety_margin = 0.0;
+  int before = 0, along = 0;
+  for (unsigned seed = 1; seed <= 3000; ++seed) {
+    PlanRequest request = RandomRequest(config, seed);
+    const world::Trajectory plan = Braking(request, 2.2);
+    const std::optional<Stop> stop = WayOut(config, request, plan);
+    if (!stop) continue;
+    const world::Trajectory& way = stop->trajectory;
+    request.running = plan;
+    request.stop = way;
+    for (const double t : {0.5 * (plan.start + way.start), way.start + 0.4 * way.duration}) {
+      request.t0 = t;
+      request.start = t < way.start ? plan.At(t) : way.At(t);
+      if (Brake(config, request) || Brake(hard, request)) continue;
+      const PlanResult rest = RestPlan(config, request);
+      const bool holds = rest.reason == (t < way.start ? "the running plan until its stop"
+                                                       : "on the stop of the plan before");
+      if (!holds) {
+        EXPECT_FALSE(GoOn(hard, request, t < way.start ? plan : way)) << seed;
+        continue;
+      }
+      ++(t < way.start ? before : along);
+      EXPECT_GE(rest.certified_clearance, 0.0);
+      const world::Trajectory& last = t < way.start ? *rest.stop : rest.trajectory;
+      EXPECT_LT((last.Position(last.end()) - way.Position(way.end())).norm(), 1e-6);
+      for (double at = t; at < way.end(); at += 0.02) {
+        const bool stops = rest.stop && at >= rest.stop->start;
+        const Vector3d p = stops ? rest.stop->Position(at) : rest.trajectory.Position(at);
+        for (const auto& o : request.obstacles)
+          EXPECT_GT(Distance(o, p, at), config.hard_radius() - 1e-6) << seed << " " << at;
+      }
+    }
+  }
+  EXPECT_GT(before, 0);
+  EXPECT_GT(along, 0);
+  std::printf("%d before a stop, %d along it\n", before, along);
+}
+
+// A quartic that ends at rest before a wall says nothing of what comes after.
+TEST(Brake, CountsOnNoForecastBeyondItsEnd) {
+  PlannerConfig config;
+  config.z_min = config.z_max = 0.0;
+  PlanRequest request;
+  request.start.p = {0.0, 0.0, 1.0};
+  request.start.v = {1.0, 0.0, 0.0};
+  request.target = world::Trajectory::Constant({0.0, 0.0, 50.0}, 0.0, 5.0);
+  world::Obstacle walker;
+  walker.solid = world::Obstacle::Solid::kCylinder;
+  walker.half = {0.25, 0.25, 0.9};
+  walker.shape = (2.0 * walker.half.cwiseAbs2()).cwiseInverse().asDiagonal();
+  walker.moving = true;
+  walker.center = {0.0, 0.1, Eigen::MatrixXd::Zero(5, 3)};
+  for (const double away : {1.5, 4.0}) {
+    walker.center.coefficients.row(0) << 0.0, away, 0.9;
+    request.obstacles = {walker};
+    EXPECT_EQ(Brake(config, request).has_value(), away > 2.0) << away;
+  }
+  walker.center.duration = 3.0;
+  walker.center.coefficients.row(0) << 0.0, 1.5, 0.9;
+  request.obstacles = {walker};
+  EXPECT_TRUE(Brake(config, request)) << "forecast for as long as it takes";
+}
+
 TEST(Evade, TouchesNoEarlierThanABraking) {
   const PlannerConfig c;
   int weighed = 0, later = 0;

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
+#include <Eigen/Geometry>
 #include <Eigen/LU>
 
 #include "common/world/separation.h"
@@ -151,6 +152,65 @@ TEST(EnclosingEllipsoid, HasTheLeastHorizontalProjection) {
       ASSERT_LE(best, area(other) * (1.0 + 1e-9)) << seed << " s " << s;
     }
   }
+}
+
+/// Least distance to points of the solid, drawn and refined about the best.
+double NearestByTrial(const Body& body, const Vector3d& offset, Random* random) {
+  Vector3d n = Vector3d::UnitZ();
+  double best = -HUGE_VAL;
+  for (double spread = 1.0; spread > 1e-6; spread *= 0.9)
+    for (int i = 0; i < 40; ++i) {
+      const Vector3d x(random->Uniform(-1.0, 1.0), random->Uniform(-1.0, 1.0),
+                       random->Uniform(-1.0, 1.0));
+      const Vector3d m = (n + spread * x).normalized();
+      const double distance = m.dot(offset - SupportPoint(body, m));  // no farther than the solid
+      if (distance > best) best = distance, n = m;
+    }
+  return best;
+}
+
+TEST(Outwards, PointsAwayFromTheNearestPoint) {
+  Random random(5);
+  int outside = 0;
+  for (int i = 0; i < 300; ++i) {
+    Body body;
+    body.kind = static_cast<Body::Kind>(i % 3);
+    body.half =
+        Vector3d(random.Uniform(0.05, 2.0), random.Uniform(0.05, 2.0), random.Uniform(0.05, 2.0));
+    if (body.kind == Body::Kind::kCylinder) body.half.y() = body.half.x();
+    const Eigen::Matrix3d R =
+        Eigen::Quaterniond(random.Uniform(-1.0, 1.0), random.Uniform(-1.0, 1.0),
+                           random.Uniform(-1.0, 1.0), random.Uniform(-1.0, 1.0))
+            .normalized()
+            .toRotationMatrix();
+    body.shape = body.kind == Body::Kind::kEllipsoid
+                     ? Eigen::Matrix3d(R * body.half.cwiseAbs2().asDiagonal() * R.transpose())
+                     : R;
+    const Vector3d offset(random.Uniform(-3, 3), random.Uniform(-3, 3), random.Uniform(-3, 3));
+    const Vector3d n = Outwards(body, offset);
+    EXPECT_NEAR(n.norm(), 1.0, 1e-9);
+    const double distance = NearestByTrial(body, offset, &random);
+    if (distance < 0.0) continue;
+    ++outside;
+    EXPECT_NEAR(n.dot(offset - SupportPoint(body, n)), distance, 1e-4) << i << ", kind " << i % 3;
+  }
+  EXPECT_GT(outside, 200);
+}
+
+// Off the corner of a box: along either face's normal alone it could come nearer to the edge.
+TEST(Leaves, NoWayThatComesNearer) {
+  Body body;
+  body.kind = Body::Kind::kBox;
+  body.half = Vector3d::Ones();
+  Curve way = Curve::Zero(2, 3);
+  way.row(0) << 1.2, 1.2, 0.0;
+  way.row(1) << 0.1, -0.15, 0.0;
+  EXPECT_FALSE(Leaves(way, body, 0.25));
+  way.row(1) << 0.15, -0.1, 0.0;
+  EXPECT_TRUE(Leaves(way, body, 0.25));
+  body.center = Curve::Zero(2, 3);
+  body.center.row(1) << 0.1, 0.1, 0.0;
+  EXPECT_FALSE(Leaves(way, body, 0.25)) << "it comes after it";
 }
 
 }  // namespace
