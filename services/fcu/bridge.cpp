@@ -43,14 +43,21 @@ Bridge::Bridge(const FcuConfig& config, const std::optional<Key>& key)
   if (config.system == 0) writer_.SetSystem(1);  // until the autopilot's is known
 }
 
+bool Bridge::Hears(int64_t now) const {
+  return autopilot_.known() && autopilot_.silence(now) <= config_.autopilot_silence;
+}
+
 void Bridge::Receive(int64_t arrival, int64_t now, const uint8_t* data, std::size_t size,
-                     bool whole) {
-  reader_.Add(now, data, size, [&](const Frame& frame) { OnFrame(frame, {arrival, now}); });
+                     bool whole, uint64_t from) {
+  if (from != peer_ && Hears(now)) return;
+  reader_.Add(now, data, size, [&](const Frame& frame) { OnFrame(frame, {arrival, now, from}); });
   if (whole) reader_.Reset();
 }
 
 void Bridge::OnFrame(const Frame& frame, const Heard& when) {
-  if (!autopilot_.Take(frame, when.now)) return;
+  const bool beats = frame.id == mav::Heartbeat::kId;
+  if ((when.from != peer_ && !beats) || !autopilot_.Take(frame, when.now)) return;
+  if (beats) peer_ = when.from;
   if (config_.system == 0) writer_.SetSystem(autopilot_.system());
   rates_.OnMessage(frame.id);
   if (const auto m = As<mav::Timesync>(frame)) OnTimesync(*m, when);
@@ -166,7 +173,7 @@ Facts Bridge::Gather(int64_t now) const {
 
 void Bridge::Tick(int64_t now) {
   const bool was_heard = heard_;
-  heard_ = autopilot_.known() && autopilot_.silence(now) <= config_.autopilot_silence;
+  heard_ = Hears(now);
   if ((heard_ && !was_heard) || clock_.restarts() != restarts_) rates_.Restart();
   restarts_ = clock_.restarts();
   missing_ = heard_ ? Missing(now) : "no PX4 is heard";

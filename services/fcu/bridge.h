@@ -26,8 +26,11 @@ class Bridge {
   explicit Bridge(const FcuConfig& config, const std::optional<Key>& key = std::nullopt);
 
   /// Bytes that arrived at `arrival` and are looked at `now`. `whole`: a datagram, in which no
-  /// frame is left unfinished.
-  void Receive(int64_t arrival, int64_t now, const uint8_t* data, std::size_t size, bool whole);
+  /// frame is left unfinished. `from`: its sender; while the autopilot is heard nobody else is.
+  void Receive(int64_t arrival, int64_t now, const uint8_t* data, std::size_t size, bool whole,
+               uint64_t from = 0);
+  /// Whom the autopilot's heartbeat came from: what goes out is for him. 0: nobody yet.
+  uint64_t peer() const { return peer_; }
   void OnPose(const Pose& pose, int64_t now);
   /// `utime`: the message's own stamp. One that does not rise is a repetition and left out.
   void OnSetpoint(const Setpoint& setpoint, int64_t utime, int64_t now);
@@ -61,6 +64,7 @@ class Bridge {
  private:
   struct Heard {
     int64_t arrival, now;
+    uint64_t from;
   };
   void OnFrame(const Frame& frame, const Heard& when);
   void OnTimesync(const mav::Timesync& m, const Heard& when);
@@ -73,6 +77,7 @@ class Bridge {
   std::string PoseProblem(int64_t now) const;
   std::string AttitudeProblem(int64_t now) const;
   double PoseAge(int64_t now) const;
+  bool Hears(int64_t now) const;
   bool IsFresh(int64_t now) const;
 
   template <class M>
@@ -98,6 +103,7 @@ class Bridge {
   int64_t setpoint_arrival_ = 0, setpoint_utime_ = 0, next_setpoint_ = 0;
   int64_t next_heartbeat_ = 0, next_timesync_ = 0;
   std::deque<int64_t> time_requests_;  // sent, ns
+  uint64_t peer_ = 0;
   bool heard_ = false;
   int restarts_ = 0;
   bool led_ = false, asked_ = false;  // is a mission heard, and Facts::asked

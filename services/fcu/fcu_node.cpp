@@ -99,10 +99,8 @@ void FcuNode::Tick(int64_t /*utime*/) {
 }
 
 void FcuNode::TakeIn(int64_t now) {
-  const int64_t before = bridge_.reader().counters().frames;
   for (const Arrival& a : transport_->Take())
-    bridge_.Receive(now - a.age, now, a.bytes.data(), a.bytes.size(), transport_->whole());
-  if (bridge_.reader().counters().frames != before) transport_->Trust();
+    bridge_.Receive(now - a.age, now, a.bytes.data(), a.bytes.size(), transport_->whole(), a.peer);
   for (const ImuSample& sample : bridge_.TakeImu()) {
     imu_t m{};
     m.utime = sample.utime;
@@ -113,7 +111,7 @@ void FcuNode::TakeIn(int64_t now) {
 }
 
 void FcuNode::SendOut() {
-  for (const auto& bytes : bridge_.TakeOutgoing()) transport_->Send(bytes);
+  for (const auto& bytes : bridge_.TakeOutgoing()) transport_->Send(bytes, bridge_.peer());
 }
 
 void FcuNode::Notice() {

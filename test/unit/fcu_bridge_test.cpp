@@ -440,6 +440,40 @@ TEST(FcuBridge, ResetsAreCountedPerEpoch) {
   }
 }
 
+/// A heartbeat of a PX4 of that system.
+std::vector<uint8_t> Beat(uint8_t system, int64_t utime) {
+  FrameWriter writer(system, 1);
+  mav::Heartbeat m;
+  m.autopilot = 12;
+  return writer.Write(utime, m);
+}
+
+TEST(FcuBridge, AnswersWhomTheHeartbeatCameFromAndNobodyElseWhileItBeats) {
+  Bridge bridge{FcuConfig{}};
+  int64_t now = kFlightStart;
+  const auto hear = [&](const std::vector<uint8_t>& bytes, uint64_t from) {
+    bridge.Receive(now, now, bytes.data(), bytes.size(), true, from);
+    bridge.Tick(now);
+    return bridge.peer();
+  };
+  FrameWriter writer(1, 1);
+  mav::AttitudeQuaternion attitude;
+  attitude.q1 = 1.0f;
+  EXPECT_EQ(hear(writer.Write(now, attitude), 7), 0u) << "no heartbeat";
+  EXPECT_EQ(hear(Beat(1, now), 5), 5u);
+  EXPECT_EQ(hear(Beat(1, now), 6), 5u) << "in its name, from elsewhere";
+  EXPECT_EQ(hear(Beat(2, now), 6), 5u);
+  hear(writer.Write(now, attitude), 6);
+  EXPECT_FALSE(bridge.autopilot().attitude());
+  hear(writer.Write(now, attitude), 5);
+  EXPECT_TRUE(bridge.autopilot().attitude());
+  now += 2'000'000;
+  EXPECT_EQ(hear(Beat(1, now), 6), 5u);
+  now += 1'500'000;
+  EXPECT_EQ(hear(writer.Write(now, attitude), 6), 5u) << "silent, but this is no heartbeat";
+  EXPECT_EQ(hear(Beat(1, now), 6), 6u);
+}
+
 // Whatever is lost on the way: it flies, and it ends.
 TEST(FcuBridge, FliesAndEndsOnALossyLink) {
   for (uint64_t seed = 1; seed <= 20; ++seed) {
