@@ -7,7 +7,8 @@
 namespace chase::fcu {
 namespace {
 
-constexpr uint8_t kComponent = 1;  // MAV_COMP_ID_AUTOPILOT1
+constexpr uint8_t kComponent = 1;   // MAV_COMP_ID_AUTOPILOT1
+constexpr double kLandedAge = 2.5;  // s: it comes once a second where it has not been asked for
 
 template <class E>
 bool Has(uint8_t bits, E flag) {
@@ -46,6 +47,7 @@ void Autopilot::TakeState(const Frame& frame, int64_t utime) {
     if (position.allFinite()) position_ = SwapWorld(position);
   } else if (const auto e = As<mav::ExtendedSysState>(frame)) {
     landed_ = e->landed_state;
+    landed_utime_ = utime;
   } else if (const auto s = As<mav::SysStatus>(frame)) {
     if (s->battery_remaining >= 0) battery_percent_ = s->battery_remaining;
     if (s->voltage_battery != UINT16_MAX) volts_ = 1e-3 * s->voltage_battery;
@@ -78,8 +80,13 @@ bool Autopilot::failsafe() const {
   }
 }
 
-bool Autopilot::on_ground() const {
-  return landed_ == static_cast<uint8_t>(mav::MavLandedState::ON_GROUND);
+mav::MavLandedState Autopilot::Landed(int64_t utime) const {
+  const bool old = 1e-6 * static_cast<double>(utime - landed_utime_) > kLandedAge;
+  return old ? mav::MavLandedState::UNDEFINED : static_cast<mav::MavLandedState>(landed_);
+}
+
+bool Autopilot::on_ground(int64_t utime) const {
+  return Landed(utime) == mav::MavLandedState::ON_GROUND;
 }
 
 std::string Autopilot::Unfit() const {
@@ -107,10 +114,11 @@ std::string Autopilot::Warning(int64_t utime, double seconds) const {
   return warning_utime_ != 0 && recent ? warning_.text : "";
 }
 
-std::string Autopilot::Words() const {
+std::string Autopilot::Words(int64_t utime) const {
   static const char* const landed[] = {"unknown", "on ground", "in air", "taking off", "landing"};
+  const auto state = static_cast<std::size_t>(Landed(utime));
   std::string words = fmt::format("mode {}, {}, {}", mode().name(), armed() ? "armed" : "disarmed",
-                                  landed_ < std::size(landed) ? landed[landed_] : "unknown");
+                                  state < std::size(landed) ? landed[state] : "unknown");
   if (battery_percent_) words += fmt::format(", battery {} %", *battery_percent_);
   if (volts_) words += fmt::format(" {:.1f} V", *volts_);
   if (channels_) words += *channels_ > 0 ? ", receiver heard" : ", no receiver";

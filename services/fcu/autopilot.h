@@ -28,7 +28,8 @@ class Autopilot {
   /// CRITICAL, EMERGENCY or FLIGHT_TERMINATION.
   bool failsafe() const;
   Mode mode() const { return Mode::Of(heartbeat_.custom_mode); }
-  bool on_ground() const;
+  /// By its own word, which must not be old.
+  bool on_ground(int64_t utime) const;
   /// Why it cannot fly now by its own state (starting, calibrating, in a failsafe ...); empty: it
   /// can.
   std::string Unfit() const;
@@ -45,10 +46,11 @@ class Autopilot {
 
   /// The last text of severity warning or worse that is no older than `seconds`.
   std::string Warning(int64_t utime, double seconds) const;
-  /// Battery, landed state, receiver in a few words.
-  std::string Words() const;
+  /// Mode, battery, landed state, receiver in a few words, which bus::FcuState reads.
+  std::string Words(int64_t utime) const;
 
  private:
+  mav::MavLandedState Landed(int64_t utime) const;
   bool TakeHeartbeat(const Frame& frame, int64_t utime);
   void TakeState(const Frame& frame, int64_t utime);
 
@@ -56,6 +58,7 @@ class Autopilot {
   mav::Heartbeat heartbeat_;
   int64_t heartbeat_utime_ = 0;
   uint8_t landed_ = 0;
+  int64_t landed_utime_ = 0;  // when it said so
   std::optional<Attitude> attitude_;
   std::optional<Eigen::Vector3d> position_;
   std::optional<int> battery_percent_, channels_;

@@ -161,7 +161,7 @@ Facts Bridge::Gather(int64_t now) const {
   f.armed = autopilot_.armed();
   f.failsafe = autopilot_.failsafe();
   f.mode = autopilot_.mode();
-  f.on_ground = autopilot_.on_ground();
+  f.on_ground = autopilot_.on_ground(now);
   f.wish = IsFresh(now) && setpoint_->motors;
   f.motors_off = IsFresh(now) && !setpoint_->motors;
   f.blind = !pose_ || PoseAge(now) > world::kMostAge.velocity;
@@ -172,6 +172,7 @@ Facts Bridge::Gather(int64_t now) const {
 }
 
 void Bridge::Tick(int64_t now) {
+  ticked_ = now;
   const bool was_heard = heard_;
   heard_ = Hears(now);
   if ((heard_ && !was_heard) || clock_.restarts() != restarts_) rates_.Restart();
@@ -228,7 +229,7 @@ std::string Bridge::Words() const {
   if (!heard_) return words;
   if (handshake_.state() == Handshake::State::kStandby)
     words += missing_.empty() ? "; waits for setpoints" : "; waits: " + missing_;
-  words += "; " + autopilot_.Words();
+  words += "; " + autopilot_.Words(ticked_);
   words += fmt::format("; clock +-{:.2f} ms, round trip {:.1f} ms", 1e3 * clock_.jitter(),
                        1e3 * clock_.round_trip());
   words += fmt::format("; {} {:.0f} Hz", imu_.source(), rates_.rate(mav::HighresImu::kId));

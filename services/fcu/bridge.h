@@ -106,6 +106,7 @@ class Bridge {
   uint64_t peer_ = 0;
   bool heard_ = false;
   int restarts_ = 0;
+  int64_t ticked_ = 0;
   bool led_ = false, asked_ = false;  // is a mission heard, and Facts::asked
   std::string missing_ = "no PX4 is heard";
   int64_t setpoints_sent_ = 0, odometry_sent_ = 0;

@@ -35,6 +35,12 @@ struct HandshakeTable {
   static bool TakenOver(H h) { return Flies(h) && Ready(h); }
   /// Only who lets the pilot engage streams while somebody else flies.
   static bool Others(H h) { return h.facts_.armed && !InOffboard(h) && h.engages_; }
+  /// Nobody's but the autopilot's: whoever flew it may have been the process before this one.
+  static bool InFailsafe(H h) {
+    return h.facts_.armed && h.facts_.failsafe && !InOffboard(h) && !IsByStick(h.facts_.mode);
+  }
+  static bool PilotHasIt(H h) { return IsByStick(h.facts_.mode) && !h.facts_.failsafe; }
+  static bool FoundInFailsafe(H h) { return h.engages_ && InFailsafe(h); }
   /// A process that comes back after an autopilot's landing goes on where it was: that is no
   /// flight.
   static bool Begins(H h) {
@@ -60,7 +66,7 @@ struct HandshakeTable {
   static bool OnGround(H h) { return h.facts_.on_ground; }
   static bool PilotLands(H h) {
     const bool left = h.landing_heard_ && !(h.facts_.mode == kLandMode) && !InOffboard(h);
-    return (left || IsByStick(h.facts_.mode)) && !h.facts_.failsafe;
+    return (left && !h.facts_.failsafe) || PilotHasIt(h);
   }
   static bool Released(H h) { return h.Withdrawn() && !h.facts_.armed; }
   static bool GivenBack(H h) { return !h.engages_ && !h.facts_.failsafe; }
@@ -74,6 +80,7 @@ const HandshakeTable::Row HandshakeTable::kRows[] = {
     {State::kStandby, Silent, State::kNoAutopilot, "the autopilot's heartbeat has ceased"},
     {State::kStandby, TakenOver, State::kFlying, "armed and in OFFBOARD already"},
     {State::kStandby, ArmedLate, State::kDisarming, "armed after we had given up"},
+    {State::kStandby, FoundInFailsafe, State::kFailsafe, "found in a failsafe of the autopilot"},
     {State::kStandby, Others, State::kPilot, "somebody else flies"},
     {State::kStandby, Begins, State::kStreaming, "setpoints come"},
 
@@ -158,7 +165,8 @@ std::optional<mav::CommandLong> Handshake::NextCommand(int64_t utime) {
 void Handshake::Kill() {
   const bool ours = state_ == State::kArming || state_ == State::kFlying ||
                     state_ == State::kLanding || state_ == State::kDisarming ||
-                    state_ == State::kFailsafe;
+                    (state_ == State::kFailsafe && !HandshakeTable::PilotHasIt(*this)) ||
+                    (state_ == State::kStandby && HandshakeTable::InFailsafe(*this));
   if (ours) Enter(State::kKilling, "killed by command");
 }
 

@@ -49,8 +49,9 @@ class Handshake {
       : engages_(engages), give_up_after_(give_up_after) {}
 
   void Update(const Facts& facts);
-  /// An operator wants the motors off wherever the vehicle is: obeyed while it is ours to fly or
-  /// comes down after we flew it, not on the ground before and not from a pilot who has it.
+  /// An operator wants the motors off wherever the vehicle is: obeyed while it is ours to fly,
+  /// comes down after we flew it or is in a failsafe; not on the ground before and not from a pilot
+  /// who has it.
   void Kill();
   void OnAck(uint16_t command, uint8_t result, int64_t utime) {
     command_.OnAck(command, result, utime);

@@ -270,6 +270,46 @@ TEST(FcuHandshake, AKillMeetsAnArmingThatIsOnItsWay) {
   EXPECT_EQ(arming.handshake.state(), State::kDone);
 }
 
+// A process that began anew did not see whose flight it was; a failsafe is no pilot.
+TEST(FcuHandshake, AKillReachesAFailsafeThatIsFoundButNoPilot) {
+  struct Case {
+    Mode mode;
+    bool failsafe, killed;
+  };
+  for (const bool engages : {true, false}) {
+    for (const Case& c : {Case{kLandMode, true, true}, Case{{4, 5}, true, true},
+                          Case{kPosition, true, false}, Case{kLandMode, false, false}}) {
+      Handshake handshake(engages, kGiveUp);
+      Facts facts;
+      facts.utime = kStart;
+      facts.heard = facts.armed = facts.wish = true;
+      facts.missing = c.failsafe ? "the autopilot is in a failsafe" : "";
+      facts.failsafe = c.failsafe;
+      facts.mode = c.mode;
+      for (int i = 0; i < 200; ++i, facts.utime += kTick) handshake.Update(facts);
+      if (engages) {
+        EXPECT_EQ(handshake.state(), c.killed ? State::kFailsafe : State::kPilot);
+      }
+      handshake.Kill();
+      EXPECT_EQ(handshake.state() == State::kKilling, c.killed) << handshake.reason();
+      EXPECT_EQ(handshake.NextCommand(facts.utime).has_value(), c.killed);
+    }
+  }
+}
+
+TEST(FcuHandshake, AKillIsNotForAPilotWhoTookItFromAFailsafe) {
+  Engaged flight(true);
+  flight.facts.failsafe = true;
+  flight.facts.mode = kLandMode;
+  flight.Run(0.1);
+  ASSERT_EQ(flight.handshake.state(), State::kFailsafe);
+  flight.facts.failsafe = false;
+  flight.facts.mode = kPosition;
+  flight.Run(0.1);
+  flight.handshake.Kill();
+  EXPECT_EQ(flight.handshake.state(), State::kFailsafe);
+}
+
 TEST(FcuHandshake, AnArmingThatComesTooLateIsTakenBack) {
   Engaged arming(false);
   arming.facts.wish = false;

@@ -176,5 +176,19 @@ TEST(FcuAutopilot, ListensToOnePx4Only) {
   EXPECT_TRUE(autopilot.armed());
 }
 
+TEST(FcuAutopilot, StandsNoLongerThanItSaysSo) {
+  Autopilot autopilot(0);
+  mav::Heartbeat heartbeat;
+  heartbeat.autopilot = 12;
+  autopilot.Take(FrameOf(heartbeat, 1), kStart);
+  mav::ExtendedSysState state;
+  state.landed_state = static_cast<uint8_t>(mav::MavLandedState::ON_GROUND);
+  autopilot.Take(FrameOf(state, 1), kStart);
+  EXPECT_TRUE(autopilot.on_ground(kStart + 2'000'000));
+  EXPECT_FALSE(autopilot.on_ground(kStart + 3'000'000));
+  EXPECT_NE(autopilot.Words(kStart + 2'000'000).find(", on ground"), std::string::npos);
+  EXPECT_NE(autopilot.Words(kStart + 3'000'000).find(", unknown"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace chase::fcu
