@@ -6,6 +6,7 @@
 #include <cmath>
 #include <utility>
 
+#include "common/math/rotation.h"
 #include "common/world/ages.h"
 
 namespace chase::fcu {
@@ -104,24 +105,48 @@ void Bridge::OnPose(const Pose& pose, int64_t now) {
   }
   pose_ = pose;
   pose_arrival_ = now;
-  if (!pose.usable || !heard_ || PoseAge(now) > world::kMostAge.pose) return;
+  if (!pose.starting && frame_ != pose.epoch) TakeFrame(now);
+  const bool in_frame = frame_ == pose.epoch;
+  if (!pose.starting) framed_ = in_frame;
+  if (in_frame) pose_ = Turned(pose, turn_);
+  if (!pose.usable || !heard_ || !in_frame || PoseAge(now) > world::kMostAge.pose) return;
   if (!Due(pose.utime, Period(config_.odometry_rate), &next_odometry_)) return;
-  Send(now, ExternalVision(pose, resets_));
+  Send(now, ExternalVision(*pose_, resets_));
   ++odometry_sent_;
+}
+
+/// On the ground the autopilot takes its heading from POSE. In the air the heading that it flies by
+/// must not turn under the setpoints: it is told a W turned to where its own attitude has it, by
+/// the same yaw as long as that W lasts; without its attitude, nothing of that W.
+void Bridge::TakeFrame(int64_t now) {
+  if (!heard_) return;
+  double turn = 0.0;
+  if (autopilot_.armed() && !autopilot_.on_ground(now)) {
+    const auto& attitude = autopilot_.attitude();
+    if (!attitude || Seconds(attitude->utime, now) > kAttitudeAge) return;
+    turn = math::Yaw(attitude->R_WB * pose_->R_WB.conjugate());
+    // Whoever begins anew in flight cannot tell a turn from what the autopilot is off.
+    if (!frame_ && std::abs(turn) <= config_.attitude_gate_deg * M_PI / 180.0) turn = 0.0;
+  }
+  turn_ = turn;
+  frame_ = pose_->epoch;
+  frame_since_ = pose_->utime;
+  setpoint_.reset();
 }
 
 void Bridge::OnSetpoint(const Setpoint& setpoint, int64_t utime, int64_t now) {
   // A publisher that begins anew may have an older clock.
   const bool repeated = utime == setpoint_utime_ ||
                         (utime < setpoint_utime_ && Seconds(setpoint_arrival_, now) < 1.0);
-  if (setpoint_ && repeated) return;
+  if ((setpoint_ && repeated) || utime < frame_since_) return;
+  frame_since_ = 0;
   setpoint_ = setpoint;
   setpoint_utime_ = utime;
   setpoint_arrival_ = now;
 }
 
 bool Bridge::IsFresh(int64_t now) const {
-  return setpoint_ && Seconds(setpoint_arrival_, now) <= config_.setpoint_age;
+  return setpoint_ && framed_ && Seconds(setpoint_arrival_, now) <= config_.setpoint_age;
 }
 
 double Bridge::PoseAge(int64_t now) const {
@@ -179,6 +204,8 @@ void Bridge::Tick(int64_t now) {
   restarts_ = clock_.restarts();
   missing_ = heard_ ? Missing(now) : "no PX4 is heard";
   handshake_.Update(Gather(now));
+  const bool flies = handshake_.state() == Handshake::State::kFlying;
+  disagreement_ = flies && pose_ && frame_ == pose_->epoch ? AttitudeProblem(now) : "";
   if (handshake_.ended()) asked_ = false;
   if (Due(now, kHeartbeatPeriod, &next_heartbeat_)) SendHeartbeat(now);
   if (!autopilot_.known()) return;
@@ -199,7 +226,7 @@ void Bridge::SendHeartbeat(int64_t now) {
 }
 
 void Bridge::SendSetpoint(int64_t now) {
-  mav::SetAttitudeTarget m = AttitudeTarget(*setpoint_, pose_->R_WB, config_);
+  mav::SetAttitudeTarget m = AttitudeTarget(Turned(*setpoint_, turn_), pose_->R_WB, config_);
   m.time_boot_ms = static_cast<uint32_t>(now / 1000);
   m.target_system = autopilot_.system();
   m.target_component = static_cast<uint8_t>(mav::MavComponent::AUTOPILOT1);
@@ -229,6 +256,7 @@ std::string Bridge::Words() const {
   if (!heard_) return words;
   if (handshake_.state() == Handshake::State::kStandby)
     words += missing_.empty() ? "; waits for setpoints" : "; waits: " + missing_;
+  if (!disagreement_.empty()) words += "; " + disagreement_;
   words += "; " + autopilot_.Words(ticked_);
   words += fmt::format("; clock +-{:.2f} ms, round trip {:.1f} ms", 1e3 * clock_.jitter(),
                        1e3 * clock_.round_trip());

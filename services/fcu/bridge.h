@@ -58,6 +58,8 @@ class Bridge {
   bool heard() const { return heard_; }
   /// What a flight waits for; empty: nothing.
   const std::string& missing() const { return missing_; }
+  /// In flight, how the autopilot's attitude differs from POSE; empty: within the gate.
+  const std::string& disagreement() const { return disagreement_; }
   /// All of it on one line.
   std::string Words() const;
 
@@ -78,6 +80,7 @@ class Bridge {
   std::string AttitudeProblem(int64_t now) const;
   double PoseAge(int64_t now) const;
   bool Hears(int64_t now) const;
+  void TakeFrame(int64_t now);
   bool IsFresh(int64_t now) const;
 
   template <class M>
@@ -99,6 +102,10 @@ class Bridge {
   std::optional<Pose> pose_;
   int64_t pose_arrival_ = 0, next_odometry_ = 0;
   uint8_t resets_ = 0;
+  std::optional<int32_t> frame_;  // epoch of the frame W that setpoints are in
+  int64_t frame_since_ = 0;       // stamp of its first pose, until a setpoint in it has come
+  double turn_ = 0.0;             // yaw of that W in the frame that the autopilot is told, rad
+  bool framed_ = false;           // no other W has come that is not taken yet
   std::optional<Setpoint> setpoint_;
   int64_t setpoint_arrival_ = 0, setpoint_utime_ = 0, next_setpoint_ = 0;
   int64_t next_heartbeat_ = 0, next_timesync_ = 0;
@@ -108,7 +115,7 @@ class Bridge {
   int restarts_ = 0;
   int64_t ticked_ = 0;
   bool led_ = false, asked_ = false;  // is a mission heard, and Facts::asked
-  std::string missing_ = "no PX4 is heard";
+  std::string missing_ = "no PX4 is heard", disagreement_;
   int64_t setpoints_sent_ = 0, odometry_sent_ = 0;
   std::vector<Bytes> outgoing_;
   std::vector<ImuSample> samples_;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/math/rotation.h"
+
 namespace chase::fcu {
 namespace {
 
@@ -56,6 +58,22 @@ Eigen::Vector3d RateTowards(const Eigen::Quaterniond& R, const Eigen::Quaternion
 }
 
 }  // namespace
+
+Pose Turned(Pose pose, double yaw) {
+  const Eigen::Quaterniond turn = math::FromYaw(yaw);
+  pose.p_WB = turn * pose.p_WB;
+  pose.v_WB = turn * pose.v_WB;
+  pose.R_WB = turn * pose.R_WB;
+  Matrix9d turns = Matrix9d::Zero();
+  for (int i = 0; i < 9; i += 3) turns.block<3, 3>(i, i) = turn.toRotationMatrix();
+  pose.covariance = turns * pose.covariance * turns.transpose();
+  return pose;
+}
+
+Setpoint Turned(Setpoint setpoint, double yaw) {
+  setpoint.R_WB = math::FromYaw(yaw) * setpoint.R_WB;
+  return setpoint;
+}
 
 double ThrustShare(double thrust, double hover, double curve) {
   const double at_hover = curve * hover * hover + (1.0 - curve) * hover;

@@ -21,6 +21,7 @@ struct Pose {
   Matrix9d covariance = Matrix9d::Zero();            ///< of (p_WB, v_WB, rotation error in W)
   int32_t epoch = 0;                                 ///< of the frame W
   bool usable = false, degraded = false;
+  bool starting = false;  ///< W is not known yet: setpoints are in the frame of before
 };
 
 struct Setpoint {
@@ -29,6 +30,10 @@ struct Setpoint {
   double thrust = 0.0;                               ///< over mass, m/s^2
   bool motors = false;
 };
+
+/// The same in a frame whose z axis is that of W and in which the x axis of W has this yaw, rad.
+Pose Turned(Pose pose, double yaw);
+Setpoint Turned(Setpoint setpoint, double yaw);
 
 struct ImuSample {
   int64_t utime = 0;

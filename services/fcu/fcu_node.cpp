@@ -42,6 +42,7 @@ Pose FromMessage(const pose_t& m) {
   pose.epoch = m.epoch;
   pose.usable = m.health == pose_t::HEALTH_OK || m.health == pose_t::HEALTH_DEGRADED;
   pose.degraded = m.health == pose_t::HEALTH_DEGRADED;
+  pose.starting = m.health == pose_t::HEALTH_STARTING;
   return pose;
 }
 
@@ -149,7 +150,8 @@ bus::NodeReport FcuNode::Report() const {
   }
   const State state = bridge_.handshake().state();
   const std::string lacking = bridge_.rates().missing();
-  const bool worse = state == State::kRefused || state == State::kFailsafe || !lacking.empty();
+  const bool worse = state == State::kRefused || state == State::kFailsafe || !lacking.empty() ||
+                     !bridge_.disagreement().empty();
   return {worse ? Level::kDegraded : Level::kOk,
           bridge_.Words() + (lacking.empty() ? "" : "; slow: " + lacking)};
 }

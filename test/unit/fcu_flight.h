@@ -25,7 +25,9 @@ class Flight {
   StandIn px4;
   bool setpoints = true, motors = true, poses = true, link = true;
   double height = 1.5;
-  double loss = 0.0;  ///< probability that a datagram is lost, each way
+  int32_t epoch = 0;    ///< of odometry's frame W
+  double turned = 0.0;  ///< yaw of the autopilot's frame in W, rad
+  double loss = 0.0;    ///< probability that a datagram is lost, each way
   std::vector<ImuSample> imu;
   std::vector<double> imu_errors;  ///< s: stamp against when it was measured
   std::vector<std::string> states;
@@ -77,9 +79,11 @@ class Flight {
     if (poses) {
       Pose pose;
       pose.utime = now_;
+      pose.epoch = epoch;
       pose.p_WB = px4.p_WB();
       pose.v_WB = px4.v_WB();
       pose.R_WB = px4.R_WB();
+      pose = Turned(pose, turned);
       pose.covariance = Matrix9d::Identity() * 1e-4;
       pose.usable = true;
       bridge.OnPose(pose, now_);
@@ -89,7 +93,7 @@ class Flight {
     const Eigen::Vector3d goal(0, 0, height);
     const Eigen::Vector3d a = 2.0 * (goal - px4.p_WB()) - 2.5 * px4.v_WB();
     const Eigen::Vector3d force = a.cwiseMax(-3.0).cwiseMin(3.0) + Eigen::Vector3d(0, 0, 9.81);
-    setpoint.R_WB = math::FromZAxisAndYaw(force, 0.0);
+    setpoint.R_WB = math::FromYaw(turned) * math::FromZAxisAndYaw(force, 0.0);
     setpoint.thrust = force.norm();
     setpoint.motors = motors;
     bridge.OnSetpoint(setpoint, now_, now_);
