@@ -10,6 +10,7 @@ struct NodeReport {
   enum class State { kStarting, kOk, kDegraded, kFailed };
   State state = State::kOk;
   std::string detail;
+  std::string phase = {};  ///< the status is sent at once when this changes, or the state
 };
 
 /// A node converts and wires. It is constructed as `SomeNode(Bus&, const SomeConfig&)`, subscribes

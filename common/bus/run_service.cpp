@@ -23,7 +23,7 @@ namespace chase::bus {
 namespace {
 
 constexpr int64_t kStatusPeriod = 1000000;  // us
-constexpr int64_t kLookPeriod = 50000;      // us: a state that changes is told at once
+constexpr int64_t kLookPeriod = 50000;      // us: what changes is told at once
 
 volatile std::sig_atomic_t stop_requested = 0;
 
@@ -63,9 +63,9 @@ void RunLive(const ServiceSpec& spec, const Flags& flags) {
   const auto node = spec.make_node(bus);
   StatusReporter reporter(spec.name, LiveVersion(spec.dump_config()));
   const std::string channel = StatusChannel(spec.name);
-  NodeReport::State told{};
+  NodeReport told;
   const auto report = [&](int64_t now) {
-    told = node->Report().state;
+    told = node->Report();
     bus.Publish(channel, reporter.Make(bus, *node, now, true));
   };
   sd_notify(0, "READY=1");
@@ -82,7 +82,8 @@ void RunLive(const ServiceSpec& spec, const Flags& flags) {
       next_status = std::max(next_status + kStatusPeriod, now);
     } else if (now >= next_look) {
       next_look = now + kLookPeriod;
-      if (node->Report().state != told) report(now);
+      const NodeReport is = node->Report();
+      if (is.state != told.state || is.phase != told.phase) report(now);
     }
     int64_t due = std::min(next_status, next_look);
     if (ticked) due = std::min(due, ticks.next());

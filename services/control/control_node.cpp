@@ -38,6 +38,12 @@ Health HealthOf(const pose_t& m, double velocity_sigma, const ControlConfig& con
   return lost ? Health::kLost : Health::kUsable;
 }
 
+// In any other state nothing is to leave the ground.
+bool AsksToFly(int8_t state) {
+  return state != flight_state_t::IDLE && state != flight_state_t::READY &&
+         state != flight_state_t::HOLD && state != flight_state_t::DONE;
+}
+
 }  // namespace
 
 ControlNode::ControlNode(bus::Bus& bus, const ControlConfig& config)
@@ -46,6 +52,7 @@ ControlNode::ControlNode(bus::Bus& bus, const ControlConfig& config)
   bus_.Subscribe<obstacles_t>("OBSTACLES", [this](const obstacles_t& m) { OnObstacles(m); });
   bus_.Subscribe<flight_state_t>("FLIGHT_STATE", [this](const flight_state_t& m) { OnState(m); });
   bus_.Subscribe<geofence_t>("GEOFENCE", [this](const geofence_t& m) { OnGeofence(m); });
+  bus_.Subscribe<status_t>("FCU_STATUS", [this](const status_t& m) { autopilot_.Hear(m); });
   bus_.Subscribe<pose_t>("POSE", [this](const pose_t& m) { OnPose(m); });
 }
 
@@ -54,6 +61,7 @@ void ControlNode::OnState(const flight_state_t& message) {
   if (bus::Seconds(bus_.Now(), message.utime) > world::kMostAge.flight_state) return;
   // One that began anew in flight knows none; the place has not moved.
   if (message.has_home != 0) home_.emplace(message.epoch, bus::ToVector(message.home));
+  asked_to_fly_ = AsksToFly(message.state) ? message.utime : 0;
   const bool lands = message.state == flight_state_t::LAND;
   if (!lands)
     landing_.reset();
@@ -164,6 +172,9 @@ void ControlNode::OnPose(const pose_t& message) {
   pose_reason_ = health == Health::kUsable ? ""
                  : message.reason.empty()  ? "uncertain"
                                            : message.reason;
+  const bool asked = bus::Seconds(message.utime, asked_to_fly_) <= world::kMostAge.flight_state;
+  controller_.SetAutopilot(autopilot_.Obeys(message.utime),
+                           autopilot_.IsOnGround(message.utime) && asked);
   std::optional<Setpoint> setpoint;
   {
     auto timer = bus_.Time("control");
@@ -212,7 +223,8 @@ void ControlNode::SendTracking(int64_t utime) {
 std::string ControlNode::Reason() const {
   switch (controller_.following()) {
     case Following::kNone:
-      return "waiting for a plan and a pose";
+      return controller_.stands() ? "on the ground: waiting for the autopilot and a plan"
+                                  : "waiting for a plan and a pose";
     case Following::kPlan:
       return "";
     case Following::kStop:

@@ -12,6 +12,7 @@
 #include "chase/obstacles_t.hpp"
 #include "chase/plan_t.hpp"
 #include "chase/pose_t.hpp"
+#include "common/bus/autopilot_state.h"
 #include "common/bus/bus.h"
 #include "common/bus/epoch.h"
 #include "common/bus/node.h"
@@ -21,8 +22,8 @@
 
 namespace chase::control {
 
-/// PLAN, OBSTACLES, FLIGHT_STATE, GEOFENCE and POSE in, ATTITUDE_SETPOINT and TRACKING out; every
-/// POSE triggers. Ticks only notice that there are none.
+/// PLAN, OBSTACLES, FLIGHT_STATE, GEOFENCE, FCU_STATUS and POSE in, ATTITUDE_SETPOINT and TRACKING
+/// out; every POSE triggers. Ticks only notice that there are none.
 class ControlNode : public bus::Node {
  public:
   ControlNode(bus::Bus& bus, const ControlConfig& config);
@@ -59,6 +60,8 @@ class ControlNode : public bus::Node {
   /// The first FLIGHT_STATE of a mission process that asks for the landing: its `seq`, and when
   /// that process started.
   std::optional<std::pair<int64_t, int32_t>> landing_;
+  bus::AutopilotState autopilot_;
+  int64_t asked_to_fly_ = 0;       // utime of the last FLIGHT_STATE that asks for a flight
   std::optional<int64_t> origin_;  // utime that the core's seconds count from
   int64_t last_tracking_ = 0;
   int ticks_without_pose_ = 0;

@@ -76,6 +76,7 @@ std::optional<Setpoint> Controller::Answer(double t, const Estimate& estimate, H
   reckoning_.Begin(t, estimate);
   last_yaw_ = math::Yaw(estimate.R_WB);
   if (!spot_) landing_ = Landing(config_, config_.land_speed);
+  if (Waits(t)) return Idle();
   return Follow(t, estimate, dt);
 }
 
@@ -99,7 +100,7 @@ std::optional<Setpoint> Controller::Follow(double t, const Estimate& estimate, d
     plans_.Clear();
     return Brake(estimate);
   }
-  const Setpoint setpoint = law_.Track(estimate, *now, *ahead, flying_ ? dt : 0.0);
+  const Setpoint setpoint = law_.Track(estimate, *now, *ahead, flying_ && obeys_ ? dt : 0.0);
   if (!Finite(setpoint)) return Brake(estimate);
   flying_ = true;
   lost_ = false;
@@ -135,10 +136,10 @@ std::optional<Setpoint> Controller::Descend(double t, const Estimate& estimate, 
   Reference down;
   down.state.p = {spot_->x(), spot_->y(), estimate.p_WB.z()};
   down.state.v.z() = estimate.v_WB.z();
-  down.state.a.z() = landing_.Lift(estimate, dt);
+  down.state.a.z() = landing_.Lift(estimate, Felt(dt));
   down.yaw = yaw_on_spot_;
   following_ = Following::kLand;
-  const Setpoint setpoint = law_.Track(estimate, down, down, dt);
+  const Setpoint setpoint = law_.Track(estimate, down, down, obeys_ ? dt : 0.0);
   return Finite(setpoint) ? setpoint : law_.Level(last_yaw_, -config_.lost_descent);
 }
 
@@ -147,6 +148,13 @@ std::optional<Setpoint> Controller::Brake(const Estimate& estimate) {
   following_ = Following::kBrake;
   const Setpoint setpoint = law_.Brake(estimate, last_yaw_);
   return Finite(setpoint) ? setpoint : law_.Level(last_yaw_, -config_.lost_descent);
+}
+
+// The autopilot wants to be asked for something before it obeys.
+Setpoint Controller::Idle() const {
+  Setpoint setpoint = law_.Level(last_yaw_, -kGravity);  // cut to the least thrust
+  setpoint.motors = !lands_;
+  return setpoint;
 }
 
 std::optional<Setpoint> Controller::Off() {
@@ -171,7 +179,7 @@ std::optional<Setpoint> Controller::WithoutPose(double t, const Estimate& estima
     return Brake(reckoning_.At(t));
   }
   following_ = Following::kLand;
-  const double lift = known ? landing_.Lift(estimate, dt) : -config_.lost_descent;
+  const double lift = known ? landing_.Lift(estimate, Felt(dt)) : -config_.lost_descent;
   if (is_down()) return Off();
   if (!usable) return law_.Level(last_yaw_, lift);
   const Setpoint setpoint = law_.Sink(estimate, last_yaw_, lift);

@@ -53,6 +53,14 @@ class Controller {
   /// ends; without such a plan after kMostAge.landing_plan, where it is at rest.
   void SetLanding(bool wanted);
 
+  /// Does the autopilot fly by what it is asked for? Nothing is learnt from what it does otherwise.
+  /// `stands`: it says that it is on the ground while a flight is asked for. Until it obeys and a
+  /// plan begins the motors are to idle then; for a landing, to stop.
+  void SetAutopilot(bool obeys, bool stands) {
+    obeys_ = obeys;
+    stands_ = stands;
+  }
+
   /// Motors off for good, at once, wherever it is: the flight is over, or somebody has ended it.
   void Cut() { cut_ = true; }
 
@@ -69,6 +77,7 @@ class Controller {
   Following following() const { return following_; }
   bool is_down() const { return landing_.is_down(); }
   bool is_cut() const { return cut_; }
+  bool stands() const { return stands_; }
   /// Reference minus estimate, m; 0 unless there is a reference that is followed.
   const Eigen::Vector3d& error() const { return error_; }
   double error_bound() const { return bound_.value(); }  ///< of its length, m
@@ -80,6 +89,10 @@ class Controller {
   std::optional<Setpoint> Brake(const Estimate& estimate);
   std::optional<Setpoint> Descend(double t, const Estimate& estimate, double dt);
   std::optional<Setpoint> Off();
+  bool Waits(double t) const { return stands_ && !flying_ && !(obeys_ && plans_.FlownAt(t)); }
+  Setpoint Idle() const;
+  /// What a landing that somebody else flies feels is not the ground.
+  double Felt(double dt) const { return obeys_ || stands_ ? dt : 0.0; }
   std::optional<Setpoint> Answer(double t, const Estimate& estimate, Health health, double dt);
   std::optional<Setpoint> Sent(std::optional<Setpoint> setpoint);
   std::optional<Setpoint> WithoutPose(double t, const Estimate& estimate, Health health, double dt);
@@ -101,6 +114,7 @@ class Controller {
   bool lands_ = false;          // a landing is asked for
   double asked_to_land_ = 0.0;  // when, s
   bool cut_ = false;
+  bool obeys_ = true, stands_ = false;   // the autopilot
   std::optional<Eigen::Vector3d> spot_;  // above which it comes down, frame W, m
   Following following_ = Following::kNone;
   double last_yaw_ = 0.0, yaw_on_spot_ = 0.0;  // rad

@@ -149,11 +149,14 @@ bus::NodeReport FcuNode::Report() const {
     return {patient ? Level::kStarting : Level::kFailed, Silence() + "; " + bridge_.Words()};
   }
   const State state = bridge_.handshake().state();
+  const Autopilot& autopilot = bridge_.autopilot();
   const std::string lacking = bridge_.rates().missing();
   const bool worse = state == State::kRefused || state == State::kFailsafe || !lacking.empty() ||
                      !bridge_.disagreement().empty();
   return {worse ? Level::kDegraded : Level::kOk,
-          bridge_.Words() + (lacking.empty() ? "" : "; slow: " + lacking)};
+          bridge_.Words() + (lacking.empty() ? "" : "; slow: " + lacking),
+          fmt::format("{} {} {}", Handshake::Name(state), autopilot.armed(),
+                      autopilot.on_ground(now_))};
 }
 
 }  // namespace chase::fcu

@@ -141,7 +141,8 @@ bool Pilot::MayPlan(double t) const {
   if (task_ == Task::kDone) return false;
   if (has_running_) return true;
   if (!task_) return heard_control_ || t >= *first_update_ + kHearControl;
-  return airborne_ || (heard_control_ && (task_ == Task::kTakeoff || task_ == Task::kChase));
+  return airborne_ ||
+         (heard_control_ && !waits_ && (task_ == Task::kTakeoff || task_ == Task::kChase));
 }
 
 std::optional<PlanResult> Pilot::Update(double t, const BodyEstimate& body) {

@@ -61,6 +61,9 @@ class Pilot {
     airborne_ = airborne_ || (flying && !has_running_);
   }
 
+  /// It stands on the ground and the autopilot does not obey yet: a mission's climb waits.
+  void SetWaiting(bool waiting) { waits_ = waiting; }
+
   /// Control says that it comes down: nothing leads it aside any more.
   void SetDescending(bool descending) { descending_ = descending; }
 
@@ -121,7 +124,7 @@ class Pilot {
   bool news_ = false;
   bool obstacles_changed_ = false;
   bool airborne_ = false;
-  bool heard_control_ = false, descending_ = false;
+  bool heard_control_ = false, descending_ = false, waits_ = false;
   std::optional<double> first_update_;  ///< s
   bool had_target_ = false;
   world::Trajectory last_seen_;  ///< forecast of the target that was chased last

@@ -96,6 +96,7 @@ PlanningNode::PlanningNode(bus::Bus& bus, const PlanningConfig& config)
     pilot_.SetDescending(m.following == tracking_t::LAND);
   });
   bus_.Subscribe<flight_state_t>("FLIGHT_STATE", [this](const flight_state_t& m) { OnState(m); });
+  bus_.Subscribe<status_t>("FCU_STATUS", [this](const status_t& m) { autopilot_.Hear(m); });
   bus_.Subscribe<pose_t>("POSE", [this](const pose_t& m) { OnPose(m); });
 }
 
@@ -150,6 +151,7 @@ void PlanningNode::OnPose(const pose_t& message) {
     target_ = {};
   }
   CheckMission(message.utime);
+  pilot_.SetWaiting(autopilot_.IsOnGround(message.utime) && !autopilot_.Obeys(message.utime));
   const double t = bus::Seconds(message.utime, Origin(message.utime));
   std::optional<PlanResult> plan;
   {

@@ -9,6 +9,7 @@
 #include "chase/pose_t.hpp"
 #include "chase/prediction_t.hpp"
 #include "chase/tracking_t.hpp"
+#include "common/bus/autopilot_state.h"
 #include "common/bus/bus.h"
 #include "common/bus/epoch.h"
 #include "common/bus/node.h"
@@ -16,7 +17,7 @@
 
 namespace chase::planning {
 
-/// PREDICTION, OBSTACLES, FLIGHT_STATE and POSE in, PLAN out; POSE is the clock.
+/// PREDICTION, OBSTACLES, FLIGHT_STATE, FCU_STATUS and POSE in, PLAN out; POSE is the clock.
 class PlanningNode : public bus::Node {
  public:
   PlanningNode(bus::Bus& bus, const PlanningConfig& config);
@@ -35,6 +36,7 @@ class PlanningNode : public bus::Node {
   PlanningConfig config_;
   Pilot pilot_;
   bus::Epoch epoch_;
+  bus::AutopilotState autopilot_;
   std::optional<int64_t> origin_;  // utime that the core's seconds count from
   int64_t state_utime_ = 0;        // of the newest FLIGHT_STATE; 0: none
   Task task_ = Task::kGround;      // that it asked for

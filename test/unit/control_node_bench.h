@@ -10,6 +10,7 @@
 #include "chase/attitude_setpoint_t.hpp"
 #include "chase/flight_state_t.hpp"
 #include "chase/geofence_t.hpp"
+#include "chase/status_t.hpp"
 #include "chase/tracking_t.hpp"
 #include "common/bus/convert.h"
 #include "common/bus/lockstep.h"
@@ -95,6 +96,7 @@ class Bench {
                 double sigma = 0.0, double speed_sigma = 0.0) {
     pose_t m{};
     m.utime = utime;
+    m.pos[2] = height;
     m.epoch = epoch;
     m.orientation[0] = 1.0;
     m.health = health;
@@ -122,6 +124,17 @@ class Bench {
     mission_->Publish("FLIGHT_STATE", m);
   }
 
+  /// What the bridge says of the autopilot: "flying: ...; mode OFFBOARD, armed, in air".
+  void SendAutopilot(const std::string& words) {
+    if (!fcu_) fcu_ = lockstep_.Connect();
+    fcu_->SetIdentity({"fcu", "", 0});
+    status_t m{};
+    m.utime = fcu_->Now();
+    m.name = "fcu";
+    m.detail = words;
+    fcu_->Publish("FCU_STATUS", m);
+  }
+
   /// A fence about the take-off place `home`.
   void SendFence(const Eigen::Vector3d& home, int32_t epoch = 0) {
     geofence_t m{};
@@ -136,6 +149,7 @@ class Bench {
     mission_->Publish("GEOFENCE", m);
   }
 
+  double height = 0.0;  ///< of the body by its poses, m
   const ControlNode& node() const { return *node_; }
   std::vector<attitude_setpoint_t> out;
   std::vector<tracking_t> tracking;
@@ -145,7 +159,7 @@ class Bench {
   bus::Lockstep lockstep_{kStart};
   bus::Bus* bus_ = nullptr;
   ControlNode* node_ = nullptr;
-  std::unique_ptr<bus::Bus> mission_;
+  std::unique_ptr<bus::Bus> mission_, fcu_;
 };
 
 }  // namespace chase::control::test

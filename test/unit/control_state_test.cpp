@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 
+#include "common/world/ages.h"
 #include "test/unit/control_node_bench.h"
 
 namespace chase::control {
@@ -115,6 +116,111 @@ TEST(ControlNode, RemembersPlaceAndFenceWhenMissionDies) {
   bench.SendPose(kStart + 10000);
   EXPECT_NE(bench.node().Report().detail.find("1 refused"), std::string::npos)
       << bench.node().Report().detail;
+}
+
+constexpr const char* kStands =
+    "arming: in OFFBOARD; mode OFFBOARD, disarmed, on ground, battery 80 %";
+constexpr const char* kArmed = "flying: armed and in OFFBOARD; mode OFFBOARD, armed, on ground";
+constexpr const char* kFlies = "flying: armed and in OFFBOARD; mode OFFBOARD, armed, in air";
+constexpr const char* kPilots = "pilot: the mode was changed; mode POSCTL, armed, in air";
+
+TEST(ControlNode, IdlesOnTheGroundUntilTheAutopilotObeysAndAPlanBegins) {
+  Bench bench;
+  int64_t t = kStart;
+  const auto run = [&](const char* words, int8_t state) {
+    const size_t before = bench.out.size();
+    for (int i = 0; i < 40; ++i) {
+      if (i % 10 == 0) bench.SendAutopilot(words), bench.SendState(state);
+      bench.SendPose(t += 5000);
+    }
+    return bench.out.size() - before;
+  };
+  EXPECT_EQ(run(kStands, flight_state_t::READY), 0u);
+  EXPECT_EQ(run(kStands, flight_state_t::HOLD), 0u) << "an operator has stopped it";
+  ASSERT_GE(run(kStands, flight_state_t::TAKEOFF), 39u);
+  EXPECT_EQ(bench.out.back().motors, +attitude_setpoint_t::MOTORS_ON);
+  EXPECT_NEAR(bench.out.back().thrust, ControlConfig().min_thrust, 1e-9);
+  EXPECT_EQ(bench.tracking.back().following, +tracking_t::NONE);
+  bench.SendPlan(t, {0, 0, 1}, 60.0);
+  EXPECT_EQ(run(kStands, flight_state_t::CHASE), 40u);
+  EXPECT_EQ(bench.tracking.back().following, +tracking_t::NONE) << "it cannot climb";
+  EXPECT_NEAR(bench.out.back().thrust, ControlConfig().min_thrust, 1e-9);
+  EXPECT_EQ(run(kArmed, flight_state_t::CHASE), 40u);
+  EXPECT_EQ(bench.tracking.back().following, +tracking_t::PLAN);
+  EXPECT_GT(bench.out.back().thrust, 10.0);
+}
+
+TEST(ControlNode, ALandingBeforeAFlightStopsTheMotors) {
+  Bench bench;
+  int64_t t = kStart;
+  for (const int8_t state : {flight_state_t::TAKEOFF, flight_state_t::LAND}) {
+    bench.SendAutopilot(kArmed);
+    bench.SendState(state);
+    for (int i = 0; i < 10; ++i) bench.SendPose(t += 5000);
+    ASSERT_FALSE(bench.out.empty());
+    EXPECT_EQ(bench.out.back().motors == attitude_setpoint_t::MOTORS_OFF,
+              state == flight_state_t::LAND);
+  }
+}
+
+TEST(ControlNode, ABodyInTheAirIsNotAskedToIdle) {
+  Bench bench;
+  bench.SendAutopilot(kPilots);
+  bench.SendState(flight_state_t::TAKEOFF);
+  for (int i = 0; i < 10; ++i) bench.SendPose(kStart + 5000 * i);
+  EXPECT_TRUE(bench.out.empty());
+}
+
+TEST(ControlNode, AMissionThatFellSilentAsksForNoFlight) {
+  Bench bench;
+  bench.SendState(flight_state_t::TAKEOFF);
+  for (int64_t t = kStart; t < kStart + 3'000'000; t += 50'000) {
+    bench.SendAutopilot(kStands);
+    bench.SendPose(t);
+  }
+  ASSERT_FALSE(bench.out.empty());
+  EXPECT_NEAR(bus::Seconds(bench.out.back().utime, kStart), world::kMostAge.flight_state, 0.1);
+}
+
+// A body that a pilot holds 0.3 m below the plan: the thrust goes up by the error, and no further.
+TEST(ControlNode, LearnsNothingWhileAPilotFlies) {
+  const auto grows = [](const char* words) {
+    Bench bench;
+    bench.SendPlan(kStart, {0, 0, 0}, 60.0);
+    double first = 0.0;
+    int64_t t = kStart;
+    for (int i = 0; i < 1000; ++i) {
+      if (i % 200 == 0) bench.SendAutopilot(words);
+      bench.height = i < 5 ? 0.0 : -0.3;
+      bench.SendPose(t += 5000);
+      if (i == 10) first = bench.out.back().thrust;
+    }
+    return bench.out.back().thrust - first;
+  };
+  EXPECT_GT(std::abs(grows(kFlies)), 0.5);
+  EXPECT_NEAR(grows(kPilots), 0.0, 1e-9);
+  EXPECT_NEAR(grows("landing: the pose is lost; mode AUTO.LAND, armed, in air"), 0.0, 1e-9);
+  EXPECT_NEAR(grows("flying: armed; mode OFFBOARD, disarmed, on ground"), 0.0, 1e-9);
+  EXPECT_GT(std::abs(grows("simulated, battery 80 %")), 0.5) << "nobody tells";
+}
+
+// The way down of a pilot is not felt as the ground.
+TEST(ControlNode, IsNotDownWhileAPilotFlies) {
+  // The autopilot may have been the first to notice.
+  for (const char* words : {kFlies, "done: landed; mode AUTO.LAND, disarmed, on ground"}) {
+    Bench bench;
+    int64_t t = kStart;
+    bench.SendPlan(t, {0, 0, 0}, 60.0);
+    const auto run = [&](const char* said) {
+      for (int i = 0; i < 1000; ++i) {
+        if (i % 100 == 0) bench.SendAutopilot(said), bench.SendState(flight_state_t::LAND);
+        bench.SendPose(t += 5000);
+      }
+      return bench.out.back().motors == attitude_setpoint_t::MOTORS_OFF;
+    };
+    EXPECT_FALSE(run(kPilots));
+    EXPECT_TRUE(run(words)) << "what bears it is the ground";
+  }
 }
 
 TEST(ControlNode, CutsTheMotorsInTheAirWhenTheFlightIsOverAndForGood) {

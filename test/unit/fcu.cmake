@@ -4,7 +4,7 @@ chase_test(fcu_framing_test LIBS fcu_core world
 # A stand-in for PX4, for tests in logical time and live ones.
 chase_library(fcu_stand_in ${CMAKE_SOURCE_DIR}/test/fcu/stand_in.cpp)
 target_link_libraries(fcu_stand_in PUBLIC fcu_core simulator_px4 world)
-chase_test(fcu_test LIBS fcu_core fcu_stand_in fcu_transport math world
+chase_test(fcu_test LIBS fcu_core fcu_stand_in fcu_transport bus math world
   SOURCES ${CMAKE_CURRENT_LIST_DIR}/fcu_conversions_test.cpp
           ${CMAKE_CURRENT_LIST_DIR}/fcu_parts_test.cpp ${CMAKE_CURRENT_LIST_DIR}/fcu_handshake_test.cpp
           ${CMAKE_CURRENT_LIST_DIR}/fcu_bridge_test.cpp

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include "common/bus/autopilot_state.h"
 #include "fcu_flight.h"
 #include "services/fcu/bridge.h"
 
@@ -472,6 +473,33 @@ TEST(FcuBridge, AnswersWhomTheHeartbeatCameFromAndNobodyElseWhileItBeats) {
   now += 1'500'000;
   EXPECT_EQ(hear(writer.Write(now, attitude), 6), 5u) << "silent, but this is no heartbeat";
   EXPECT_EQ(hear(Beat(1, now), 6), 6u);
+}
+
+TEST(FcuBridge, ItsWordsTellWhoFliesAndWhereItStands) {
+  Flight flight;
+  bus::AutopilotState state;
+  const auto hear = [&] {
+    status_t m{};
+    m.utime = flight.now();
+    m.name = "fcu";
+    m.detail = flight.bridge.Words();
+    state.Hear(m);
+    return std::pair(state.Obeys(flight.now()), state.IsOnGround(flight.now()));
+  };
+  EXPECT_EQ(hear(), std::pair(true, false)) << "nobody has told anything";
+  ASSERT_TRUE(flight.RunUntil(State::kArming, 12.0));
+  EXPECT_EQ(hear(), std::pair(false, true));
+  ASSERT_TRUE(flight.RunUntil(State::kFlying, 12.0));
+  EXPECT_TRUE(hear().first);
+  flight.Run(5.0);
+  EXPECT_EQ(hear(), std::pair(true, false));
+  flight.px4.PilotMode({3, 0});
+  flight.Run(1.5);
+  EXPECT_EQ(hear(), std::pair(false, false));
+  EXPECT_TRUE(state.Obeys(flight.now() + 3'000'000)) << "not known any more";
+  flight.link = false;
+  flight.Run(5.0);
+  EXPECT_EQ(hear(), std::pair(false, false)) << "the autopilot is silent";
 }
 
 // Whatever is lost on the way: it flies, and it ends.

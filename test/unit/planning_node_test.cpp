@@ -25,7 +25,9 @@ constexpr int64_t kNever = kStart + 1000000000;  // us
 
 /// What else happens in a flight.
 struct Events {
-  double height = 0.1;            // where the body is before there is a plan, m
+  double height = 0.1;  // where the body is before there is a plan, m
+  int64_t obeys_from =
+      kStart;  // the autopilot does from then on, and stands on the ground until then
   int64_t flying_from = kNever;   // control says from then on that it flies, us
   int64_t frame_at = kNever;      // the frame of odometry changes, us
   int64_t obstacles_at = kNever;  // obstacles speak of the new one, us
@@ -49,6 +51,7 @@ class Company : public bus::Node {
       none.epoch = utime >= events_.obstacles_at;
       bus_.Publish("OBSTACLES", none);
     }
+    if (events_.obeys_from > kStart && (utime - kStart) % 1000000 == 0) Autopilot(utime);
     if (utime >= events_.flying_from && (utime - kStart) % 50000 == 0) {
       tracking_t tracking{};
       tracking.utime = utime;
@@ -73,6 +76,23 @@ class Company : public bus::Node {
       p = x.Position(std::min(bus::Seconds(utime, kStart), x.end()));
     }
     return p;
+  }
+  // Under a mission, and with control.
+  void Autopilot(int64_t utime) {
+    status_t status{};
+    status.utime = utime;
+    status.name = "fcu";
+    status.detail = utime >= events_.obeys_from ? "flying: armed; mode OFFBOARD, armed, on ground"
+                                                : "arming: x; mode OFFBOARD, disarmed, on ground";
+    bus_.Publish("FCU_STATUS", status);
+    flight_state_t state{};
+    state.utime = utime;
+    state.state = flight_state_t::TAKEOFF;
+    bus_.SetIdentity({"mission", "", kStart});
+    bus_.Publish("FLIGHT_STATE", state);
+    tracking_t tracking{};
+    tracking.utime = utime;
+    bus_.Publish("TRACKING", tracking);
   }
   void Forecast(int64_t utime) {
     prediction_t m{};
@@ -120,6 +140,15 @@ TEST(PlanningNode, ClimbsAndWaitsWithoutAForecast) {
   for (const plan_t& plan : plans) EXPECT_EQ(+plan.verdict, +plan_t::WAIT) << plan.reason;
   const auto last = bus::FromMessage(plans.back().position, kStart);
   EXPECT_NEAR(last.Position(last.end()).z(), 0.1 + PlanningConfig{}.takeoff_height, 1e-6);
+}
+
+TEST(PlanningNode, ClimbsOnceTheAutopilotObeys) {
+  Events events;
+  events.obeys_from = kStart + 8000000;
+  const auto plans = Fly(kNever, kNever, kStart + 15000000, events);
+  ASSERT_FALSE(plans.empty());
+  EXPECT_GE(plans.front().utime, events.obeys_from);
+  EXPECT_EQ(plans.front().reason, "climbing");
 }
 
 TEST(PlanningNode, ChasesAForecastWithoutJumpsFromPlanToPlan) {

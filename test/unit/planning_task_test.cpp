@@ -33,6 +33,24 @@ TEST(Task, TakeOffClimbsAndHoversThoughATargetIsThere) {
   EXPECT_EQ(flight.plans.back().reason, "climbed");
 }
 
+TEST(Task, TheClimbBeginsWhenTheAutopilotObeys) {
+  for (const Task task : {Task::kTakeoff, Task::kChase}) {
+    Flight flight;
+    flight.pilot.SetTask(task, flight.home());
+    flight.pilot.SetWaiting(true);
+    flight.Run(10.0);
+    EXPECT_TRUE(flight.plans.empty());
+    flight.pilot.SetWaiting(false);
+    flight.Run(1.0);
+    ASSERT_FALSE(flight.plans.empty());
+    EXPECT_EQ(flight.plans.front().reason, "climbing");
+    flight.pilot.SetWaiting(true);  // what is known grows old, or is wrong: it is under way
+    flight.Run(7.0);
+    EXPECT_LT((flight.Body().p - Vector3d(0, 0, 0.1 + PlanningConfig().takeoff_height)).norm(),
+              1e-6);
+  }
+}
+
 TEST(Task, StartedInFlightItBrakesAndNeverClimbs) {
   for (const Task task :
        {Task::kGround, Task::kTakeoff, Task::kHold, Task::kChase, Task::kReturn}) {

@@ -1,0 +1,27 @@
+#pragma once
+
+#include <cstdint>
+
+#include "chase/status_t.hpp"
+
+namespace chase::bus {
+
+/// What FCU_STATUS has told of the autopilot. Times in microseconds, of the same clock as utime.
+class AutopilotState {
+ public:
+  void Hear(const status_t& message);
+
+  /// Is it armed and ours to fly, as far as is known? Where nobody tells, as in a simulation
+  /// without an autopilot, or nobody has for a while, it is.
+  bool Obeys(int64_t utime) const { return !IsKnown(utime) || obeys_; }
+  /// Does it say that it stands on the ground?
+  bool IsOnGround(int64_t utime) const { return IsKnown(utime) && on_ground_; }
+
+ private:
+  bool IsKnown(int64_t utime) const;
+
+  int64_t heard_ = 0;  // 0: never
+  bool obeys_ = false, on_ground_ = false;
+};
+
+}  // namespace chase::bus
