@@ -132,12 +132,14 @@ void Mission::HearOfGround() {
 // By then control comes down by itself.
 bool Mission::PoseIsLost(double t) const { return t - last_usable_ > world::kMostAge.velocity; }
 
-// At rest at the end of a plan that was made since.
+// At rest at the end of a plan that was made since, and that far up: a plan may also end where it
+// stands.
 bool Mission::IsUp() const {
   constexpr double kAtEnd = 0.1;  // m: several times what control is off while it climbs
   const std::optional<PoseReport>& pose = inputs_.pose;
   return pose && inputs_.plan_heard > since_ && (pose->p - inputs_.plan_end).norm() < kAtEnd &&
-         pose->v.norm() < config_.rest_speed;
+         pose->v.norm() < config_.rest_speed &&
+         (!KnowsHome() || pose->p.z() - home_->p.z() > 0.5 * config_.climb_height);
 }
 
 bool Mission::KnowsHome() const {

@@ -28,7 +28,8 @@ struct MissionConfig {
     v("rest_speed", rest_speed, "below this the body is at rest, m/s");
     v("battery_low", battery_low, "share of the charge at which it returns; 0: never");
     v("battery_critical", battery_critical, "share at which it lands where it is; 0: never");
-    v("climb_height", climb_height, "above the take-off place that has to be free of obstacles, m");
+    v("climb_height", climb_height,
+      "above the take-off place that has to be free of obstacles, m; half of it is a climb");
     v("body_radius", body_radius, "of the column that is looked at for that, m");
     v("geofence", geofence, "that it stays in");
     v("needs", needs, "processes without whose status it does not take off");

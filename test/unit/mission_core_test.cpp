@@ -54,10 +54,10 @@ TEST(Mission, FliesFromTakeOffToLanding) {
   EXPECT_TRUE(bench.Command(Event::kTakeoff).accepted);
   EXPECT_EQ(bench.mission.state(), State::kTakeoff);
   bench.mission.inputs().plan_heard = bench.t + 0.05;
-  bench.mission.inputs().plan_end = {0.0, 0.0, 1.0};
+  bench.mission.inputs().plan_end = {0.0, 0.0, 1.2};
   bench.Run(1.0);
   EXPECT_EQ(bench.mission.state(), State::kTakeoff);
-  bench.pose.p.z() = 0.95;
+  bench.pose.p.z() = 1.15;
   bench.Run(0.2);
   EXPECT_EQ(bench.mission.state(), State::kHold);
   EXPECT_TRUE(bench.Command(Event::kChase).accepted);
@@ -85,6 +85,22 @@ TEST(Mission, FliesFromTakeOffToLanding) {
   bench.Run(0.1);
   EXPECT_EQ(bench.mission.state(), State::kDone);
   EXPECT_FALSE(bench.Command(Event::kTakeoff).accepted);
+}
+
+// A vehicle that does not lift off is at rest at the end of a plan that goes nowhere.
+TEST(Mission, AClimbIsOverOnlyHalfOfItAboveHome) {
+  Bench bench;
+  bench.pose.p.z() = 7.0;
+  bench.Run(0.2);
+  ASSERT_TRUE(bench.Command(Event::kTakeoff).accepted);
+  const double half = 0.5 * MissionConfig().climb_height;
+  for (const double height : {0.0, half - 0.05, half + 0.05}) {
+    bench.pose.p.z() = 7.0 + height;
+    bench.mission.inputs().plan_heard = bench.t + 0.05;
+    bench.mission.inputs().plan_end = bench.pose.p;
+    bench.Run(1.0);
+    EXPECT_EQ(bench.mission.state(), height > half ? State::kHold : State::kTakeoff) << height;
+  }
 }
 
 TEST(Mission, SaysWhatPlanningKnowsOfTheGroundUntilControlComesDown) {
