@@ -23,6 +23,7 @@ const std::vector<ChannelRow>& ChannelTable() {
       {"COMMAND", "command_t", "command, viewer", false, true},
       {"COMMAND_ACK", "command_ack_t", "mission, perception", false},
       {"FLIGHT_STATE", "flight_state_t", "mission", false, true},
+      {"HOME", "flight_state_t", "control", false, true},
       {"HEALTH", "health_t", "mission", false},
       {"GEOFENCE", "geofence_t", "mission", false, true},
       {"TRUTH", "truth_t", "simulator", false},

@@ -60,7 +60,10 @@ ControlNode::ControlNode(bus::Bus& bus, const ControlConfig& config)
 void ControlNode::OnState(const flight_state_t& message) {
   if (bus::Seconds(bus_.Now(), message.utime) > world::kMostAge.flight_state) return;
   // One that began anew in flight knows none; the place has not moved.
-  if (message.has_home != 0) home_.emplace(message.epoch, bus::ToVector(message.home));
+  if (message.has_home != 0)
+    home_.emplace(message.epoch, bus::ToVector(message.home));
+  else if (home_)
+    TellHome(message);
   asked_to_fly_ = AsksToFly(message.state) ? message.utime : 0;
   const bool lands = message.state == flight_state_t::LAND;
   if (!lands)
@@ -69,6 +72,15 @@ void ControlNode::OnState(const flight_state_t& message) {
     landing_ = {message.sender_start, message.seq};
   controller_.SetLanding(lands);
   if (message.state == flight_state_t::DONE) controller_.Cut();
+}
+
+// What mission says, with the place that it has forgotten.
+void ControlNode::TellHome(flight_state_t heard) {
+  heard.utime = bus_.Now();
+  heard.epoch = home_->first;
+  heard.has_home = 1;
+  bus::Set(heard.home, home_->second);
+  bus_.Publish("HOME", heard);
 }
 
 void ControlNode::OnGeofence(const geofence_t& message) {

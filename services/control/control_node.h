@@ -22,8 +22,8 @@
 
 namespace chase::control {
 
-/// PLAN, OBSTACLES, FLIGHT_STATE, GEOFENCE, FCU_STATUS and POSE in, ATTITUDE_SETPOINT and TRACKING
-/// out; every POSE triggers. Ticks only notice that there are none.
+/// PLAN, OBSTACLES, FLIGHT_STATE, GEOFENCE, FCU_STATUS and POSE in, ATTITUDE_SETPOINT, TRACKING and
+/// HOME out; every POSE triggers. Ticks only notice that there are none.
 class ControlNode : public bus::Node {
  public:
   ControlNode(bus::Bus& bus, const ControlConfig& config);
@@ -37,6 +37,7 @@ class ControlNode : public bus::Node {
   void OnObstacles(const obstacles_t& message);
   void OnPose(const pose_t& message);
   void OnState(const flight_state_t& message);
+  void TellHome(flight_state_t heard);
   void OnGeofence(const geofence_t& message);
   std::string Refusal(const plan_t& message);
   std::string Breach(const world::Claim& claim, bool to_land) const;

@@ -39,6 +39,11 @@ class Mission {
   /// answer and changes nothing.
   world::CommandAnswer Obey(double t, const Command& command);
 
+  /// Who outlived the mission process before this one says where that took off.
+  void Remember(const Home& home) {
+    if (!home_ && IsAirborne(state_)) home_ = home;
+  }
+
   /// Moves on by what is observed at time `t` [s], which never goes back.
   void Update(double t);
 

@@ -35,6 +35,9 @@ MissionNode::MissionNode(bus::Bus& bus, const MissionConfig& config)
   bus_.Subscribe<attitude_setpoint_t>("ATTITUDE_SETPOINT", [this](const attitude_setpoint_t& m) {
     mission_.inputs().motors_off = m.motors == attitude_setpoint_t::MOTORS_OFF;
   });
+  bus_.Subscribe<flight_state_t>("HOME", [this](const flight_state_t& m) {
+    mission_.Remember({bus::ToVector(m.home), m.epoch});
+  });
   SubscribeStatuses();
 }
 

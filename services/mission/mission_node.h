@@ -17,7 +17,7 @@
 
 namespace chase::mission {
 
-/// COMMAND, POSE, OBSTACLES, TARGET, PLAN, TRACKING, ATTITUDE_SETPOINT and statuses in;
+/// COMMAND, POSE, OBSTACLES, TARGET, PLAN, TRACKING, ATTITUDE_SETPOINT, HOME and statuses in;
 /// FLIGHT_STATE, COMMAND_ACK, HEALTH and GEOFENCE out. Ticks are the clock.
 class MissionNode : public bus::Node {
  public:

@@ -26,9 +26,9 @@
 
 namespace chase::viewer {
 
-/// Pages are told all that is shown, but for places that nothing was seen of: they have the form of
-/// obstacles and are none.
-inline bool IsOnPage(std::string_view channel) { return channel != "UNSEEN"; }
+/// Pages are told all that is shown, but for what has the form of obstacles or of mission's word
+/// and is none: places that nothing was seen of, and the take-off place that control remembers.
+inline bool IsOnPage(std::string_view channel) { return channel != "UNSEEN" && channel != "HOME"; }
 
 /// Hands every good message of the channels that pages and Foxglove show to `hear(channel,
 /// message)`.
@@ -47,6 +47,7 @@ void SubscribeShown(bus::Bus& bus, const Hear& hear) {
   bus.Subscribe<scan_registered_t>("SCAN_REGISTERED", on("SCAN_REGISTERED"));
   bus.Subscribe<camera_image_t>("CAMERA_IMAGE", on("CAMERA_IMAGE"));
   bus.Subscribe<flight_state_t>("FLIGHT_STATE", on("FLIGHT_STATE"));
+  bus.Subscribe<flight_state_t>("HOME", on("HOME"));
   bus.Subscribe<command_ack_t>("COMMAND_ACK", on("COMMAND_ACK"));
   bus.Subscribe<geofence_t>("GEOFENCE", on("GEOFENCE"));
   bus.Subscribe<health_t>("HEALTH", on("HEALTH"));

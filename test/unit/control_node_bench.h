@@ -32,6 +32,8 @@ class Bench {
           "ATTITUDE_SETPOINT", [this](const attitude_setpoint_t& m) { out.push_back(m); });
       bus.Subscribe<tracking_t>("TRACKING", [this](const tracking_t& m) { tracking.push_back(m); });
       bus.Subscribe<flight_state_t>("FLIGHT_STATE", [](const flight_state_t&) {});
+      bus.Subscribe<flight_state_t>("HOME",
+                                    [this](const flight_state_t& m) { homes.push_back(m); });
       if (hears_obstacles) bus.Subscribe<obstacles_t>("OBSTACLES", [](const obstacles_t&) {});
       return std::make_unique<Silent>();
     });
@@ -153,6 +155,7 @@ class Bench {
   const ControlNode& node() const { return *node_; }
   std::vector<attitude_setpoint_t> out;
   std::vector<tracking_t> tracking;
+  std::vector<flight_state_t> homes;
 
  private:
   int64_t latest_ = kStart;

@@ -118,6 +118,19 @@ TEST(ControlNode, RemembersPlaceAndFenceWhenMissionDies) {
       << bench.node().Report().detail;
 }
 
+TEST(ControlNode, TellsAMissionThatBeganAnewWhereItTookOff) {
+  Bench bench;
+  bench.SendState(flight_state_t::READY);
+  bench.SendState(flight_state_t::TAKEOFF, "mission", Eigen::Vector3d(1, 2, 3));
+  bench.RunUntil(kStart + 5000);
+  EXPECT_TRUE(bench.homes.empty()) << "nobody has forgotten anything";
+  bench.SendState(flight_state_t::HOLD);
+  bench.RunUntil(kStart + 10000);
+  ASSERT_EQ(bench.homes.size(), 1u);
+  EXPECT_EQ(bench.homes[0].has_home, 1);
+  EXPECT_EQ(bus::ToVector(bench.homes[0].home), Eigen::Vector3d(1, 2, 3));
+}
+
 constexpr const char* kStands =
     "arming: in OFFBOARD; mode OFFBOARD, disarmed, on ground, battery 80 %";
 constexpr const char* kArmed = "flying: armed and in OFFBOARD; mode OFFBOARD, armed, on ground";

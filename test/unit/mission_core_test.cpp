@@ -186,6 +186,16 @@ TEST(Mission, StartedInFlightItHoldsAndDoesNotGoOnWithALanding) {
   EXPECT_FALSE(flying.mission.home().has_value());
   EXPECT_EQ((flying.Command(Event::kReturn), flying.mission.state()), State::kLand);
 
+  Bench told;
+  told.mission.Remember({{1.0, 2.0, 0.0}, told.pose.epoch});
+  told.mission.inputs().flying = true;
+  told.Run(0.1);
+  EXPECT_FALSE(told.mission.home().has_value()) << "of another flight, for all that is known";
+  told.mission.Remember({{1.0, 2.0, 0.0}, told.pose.epoch});
+  told.mission.Remember({{3.0, 4.0, 0.0}, told.pose.epoch});
+  EXPECT_EQ(told.mission.home()->p, Eigen::Vector3d(1.0, 2.0, 0.0));
+  EXPECT_EQ((told.Command(Event::kReturn), told.mission.state()), State::kReturn);
+
   Bench landing;
   landing.mission.inputs().flying = landing.mission.inputs().landing = true;
   landing.Run(0.1);

@@ -138,6 +138,27 @@ TEST(MissionNode, TellsTheGeofenceInTheFrameWOnceItHasTakenOff) {
   EXPECT_TRUE(free.fences.empty());
 }
 
+TEST(MissionNode, StartedInFlightItHearsFromControlWhereItTookOff) {
+  Bench bench;
+  const auto control = bench.lockstep_.Connect();
+  control->SetIdentity({"control", "", kStart});
+  tracking_t tracking{};
+  tracking.utime = kStart;
+  tracking.following = tracking_t::PLAN;
+  control->Publish("TRACKING", tracking);
+  bench.Run(1.0);
+  EXPECT_EQ(bench.states.back().state, +flight_state_t::HOLD);
+  EXPECT_EQ(bench.states.back().has_home, 0);
+  flight_state_t home{};
+  home.utime = kStart;
+  home.has_home = 1;
+  bus::Set(home.home, Eigen::Vector3d(1, 2, 3));
+  control->Publish("HOME", home);
+  bench.Run(0.5);
+  EXPECT_EQ(bench.states.back().has_home, 1);
+  EXPECT_EQ(bus::ToVector(bench.states.back().home), Eigen::Vector3d(1, 2, 3));
+}
+
 TEST(MissionNode, LeavesTheTargetsChoiceToPerception) {
   Bench bench;
   bench.Run(2.0);
