@@ -27,7 +27,9 @@ Description=chase: {name}
 Documentation=man:{binary}(1)
 PartOf=chase.target
 Requires=chase-network.service
-After=chase-network.service network.target
+# A clock that is set in flight ages every message at once.
+Wants=time-sync.target
+After=chase-network.service network.target time-sync.target
 # In flight nothing is given up.
 StartLimitIntervalSec=0
 
