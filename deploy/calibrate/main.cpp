@@ -9,6 +9,7 @@
 #include "common/config/version.h"
 #include "deploy/calibrate/pictures.h"
 #include "deploy/calibrate/rig_file.h"
+#include "deploy/calibrate/sweep_picture.h"
 
 namespace chase::calibrate {
 namespace {
@@ -21,6 +22,7 @@ struct Arguments {
   Board board;
   std::string rig, out, check, log;
   std::vector<std::string> pictures;
+  double at = 1.0;  // s
 };
 
 void Require(const std::string& problem) {
@@ -114,6 +116,12 @@ int Lidar(const Arguments& a) {
   return 0;
 }
 
+int Check(const Arguments& a) {
+  WritePicture(a.check, SweepPicture(a.log, LoadRig(a.rig).rig, a.at));
+  fmt::print("{}\n", a.check);
+  return 0;
+}
+
 void AddBoard(CLI::App* app, Board* board) {
   app->add_option("--columns", board->columns, "squares along the board")->capture_default_str();
   app->add_option("--rows", board->rows, "squares across")->capture_default_str();
@@ -135,10 +143,11 @@ int Run(int argc, char** argv) {
                "chase-calibrate");
   chase::config::AddVersion(&app);
   app.require_subcommand(1);
-  Arguments board, camera, lidar;
+  Arguments board, camera, lidar, check;
   board.out = "board.png";
   camera.out = lidar.out = "rig.yaml";
   camera.check = "check-camera.png";
+  check.check = "calibration.png";
   lidar.check = "check-lidar.png";
   CLI::App* b = app.add_subcommand("board", "Writes the board to print.");
   AddBoard(b, &board.board);
@@ -151,8 +160,14 @@ int Run(int argc, char** argv) {
   l->add_option("log", lidar.log, "LCM log with CAMERA_IMAGE and LIDAR_SCAN")->required();
   AddBoard(l, &lidar.board);
   AddOutputs(l, &lidar);
+  CLI::App* k = app.add_subcommand("check", "Draws a sweep's points into a frame of a log.");
+  k->add_option("log", check.log, "LCM log with CAMERA_IMAGE, LIDAR_SCAN and POSE")->required();
+  k->add_option("--rig", check.rig, "YAML file with the rig (default: built in)");
+  k->add_option("--at", check.at, "s after the log's first image")->capture_default_str();
+  k->add_option("--out", check.check, "picture to write")->capture_default_str();
   try {
     app.parse(argc, argv);
+    if (k->parsed()) return Check(check);
     return b->parsed() ? WriteBoard(board) : c->parsed() ? Camera(camera) : Lidar(lidar);
   } catch (const CLI::Success& e) {  // --help
     return app.exit(e);

@@ -1,12 +1,11 @@
 #include "deploy/calibrate/sightings.h"
 
-#include <lcm/lcm-cpp.hpp>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core/eigen.hpp>
 #include <stdexcept>
 
-#include "common/bus/validation.h"
 #include "deploy/calibrate/camera_fit.h"
+#include "deploy/calibrate/decode.h"
 #include "services/perception/messages.h"
 
 namespace chase::calibrate {
@@ -24,15 +23,6 @@ struct Swept {
   int64_t utime;
   std::vector<Eigen::Vector3d> points;
 };
-
-template <class T>
-bool Decode(const lcm::LogEvent& event, T* m) {
-  try {
-    return m->decode(event.data, 0, event.datalen) == event.datalen && bus::Problem(*m).empty();
-  } catch (const std::exception&) {  // generated decoders throw on negative lengths
-    return false;
-  }
-}
 
 /// Mean way of the corners that both views show, px; large where there is none.
 double Moved(const View& a, const View& b) {

@@ -12,5 +12,5 @@ if(TARGET simulator_core)
     CLI11::CLI11 fmt::fmt)
 endif()
 chase_program(perception_photos ${CMAKE_SOURCE_DIR}/test/perception/photos.cpp)
-target_link_libraries(perception_photos PRIVATE perception_core config opencv_imgcodecs
+target_link_libraries(perception_photos PRIVATE detect perception_core config opencv_imgcodecs
   opencv_imgproc opencv_photo CLI11::CLI11 fmt::fmt)

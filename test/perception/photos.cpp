@@ -18,9 +18,9 @@
 
 #include "common/config/config.h"
 #include "common/config/version.h"
+#include "deploy/detect/picture.h"
 #include "services/perception/belief/perceiver.h"
 #include "services/perception/tools/learn.h"
-#include "services/perception/tools/picture.h"
 
 namespace chase::perception {
 namespace {

@@ -25,6 +25,6 @@ chase_test(perception_node_test LIBS perception_world perception_node
 chase_test(perception_select_test LIBS perception_world perception_node opencv_imgproc
   SOURCES ${perception_test_dir}/perception_select_test.cpp)
 chase_test(perception_detect_test
-  LIBS perception_detect perception_core config opencv_imgproc opencv_imgcodecs opencv_videoio
+  LIBS detect perception_core config opencv_imgproc opencv_imgcodecs opencv_videoio
        nlohmann_json::nlohmann_json
   SOURCES ${perception_test_dir}/perception_detect_test.cpp)

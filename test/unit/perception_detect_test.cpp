@@ -11,8 +11,9 @@
 #include <vector>
 
 #include "common/config/config.h"
-#include "services/perception/tools/detect_command.h"
-#include "services/perception/tools/picture.h"
+#include "deploy/detect/detect_command.h"
+#include "deploy/detect/picture.h"
+#include "services/perception/tools/learn.h"
 
 namespace chase::perception {
 namespace {

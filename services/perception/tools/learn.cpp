@@ -11,7 +11,6 @@
 #include "services/perception/sight/color_detector.h"
 #include "services/perception/sight/color_model.h"
 #include "services/perception/sight/silhouette.h"
-#include "services/perception/tools/picture.h"
 
 namespace chase::perception {
 
@@ -127,7 +126,7 @@ std::vector<std::string> LearnShape(const std::vector<cv::Mat>& images,
   return shapeless;
 }
 
-double Overlap(const ColorDetector& detector, const cv::Mat& bgr, const cv::Mat& mask) {
+double BestOverlap(const ColorDetector& detector, const cv::Mat& bgr, const cv::Mat& mask) {
   const auto found = detector.Detect(bgr);
   const Detection* best = MostLikely(found);
   return best ? Overlap(*best, mask) : 0.0;
@@ -138,7 +137,7 @@ double MeanOverlap(const std::vector<cv::Mat>& images, const std::vector<cv::Mat
                    const std::vector<Separation>& pictures, const ColorDetector& detector) {
   double sum = 0.0;
   for (size_t i = 0; i < images.size(); ++i)
-    if (pictures[i].used) sum += Overlap(detector, images[i], masks[i]);
+    if (pictures[i].used) sum += BestOverlap(detector, images[i], masks[i]);
   return sum / static_cast<double>(images.size());
 }
 
@@ -161,8 +160,28 @@ double AcquireScore(const std::vector<cv::Mat>& images, const std::vector<cv::Ma
 
 }  // namespace
 
+const Detection* MostLikely(const std::vector<Detection>& found) {
+  const Detection* best = nullptr;
+  for (const auto& d : found) {
+    const bool candidate = !best || (!d.part && !d.edged && !d.AnyCut());
+    if (candidate && (!best || d.score > best->score)) best = &d;
+  }
+  return best;
+}
+
+double Overlap(const Detection& detection, const cv::Mat& mask) {
+  cv::Mat whole = cv::Mat::zeros(mask.size(), CV_8U);
+  if (detection.mask.empty())
+    whole(cv::Rect(detection.box) & cv::Rect({0, 0}, mask.size())).setTo(255);
+  else
+    Region(detection).copyTo(whole(detection.mask_box));
+  const int both = cv::countNonZero((whole > 0) & (mask > 0));
+  const int either = cv::countNonZero((whole > 0) | (mask > 0));
+  return either > 0 ? static_cast<double>(both) / either : 1.0;
+}
+
 double Overlap(const DetectorConfig& config, const cv::Mat& bgr, const cv::Mat& mask) {
-  return Overlap(ColorDetector(config, 1.0), bgr, mask);
+  return BestOverlap(ColorDetector(config, 1.0), bgr, mask);
 }
 
 Learned LearnDetector(const std::vector<cv::Mat>& images, const std::vector<cv::Mat>& given,

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "services/perception/sight/detector.h"
 #include "services/perception/tools/learn_color.h"
 
 namespace chase::perception {
@@ -24,6 +25,14 @@ struct Learned {
 /// shape.
 Learned LearnDetector(const std::vector<cv::Mat>& images, const std::vector<cv::Mat>& masks,
                       const DetectorConfig& base);
+
+/// Of several detections of one picture the target's: the best whole, or a piece that scores more,
+/// is not cut anywhere and is no piece of a good whole. Null where there is none.
+const Detection* MostLikely(const std::vector<Detection>& found);
+
+/// Intersection over union of a detection's region with a mask of the whole picture (8 bit, not 0
+/// on the target); of its box where it has no region.
+double Overlap(const Detection& detection, const cv::Mat& mask);
 
 /// Intersection over union of the detector's best region with a mask; 0 where nothing is found.
 double Overlap(const DetectorConfig& config, const cv::Mat& bgr, const cv::Mat& mask);

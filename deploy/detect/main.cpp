@@ -1,3 +1,3 @@
-#include "services/perception/tools/detect_command.h"
+#include "deploy/detect/detect_command.h"
 
 int main(int argc, char** argv) { return chase::perception::Detect(argc, argv); }

@@ -1,10 +1,10 @@
-#include "services/perception/tools/picture.h"
+#include "deploy/detect/picture.h"
 
 #include <cmath>
 
 #include "services/perception/place/localiser.h"
 #include "services/perception/place/target_points.h"
-#include "services/perception/sight/silhouette.h"
+#include "services/perception/tools/learn.h"
 
 namespace chase::perception {
 
@@ -27,26 +27,6 @@ std::optional<world::Rig> RigFor(const world::Rig& rig, const cv::Size& size) {
 }
 
 }  // namespace
-
-const Detection* MostLikely(const std::vector<Detection>& found) {
-  const Detection* best = nullptr;
-  for (const auto& d : found) {
-    const bool candidate = !best || (!d.part && !d.edged && !d.AnyCut());
-    if (candidate && (!best || d.score > best->score)) best = &d;
-  }
-  return best;
-}
-
-double Overlap(const Detection& detection, const cv::Mat& mask) {
-  cv::Mat whole = cv::Mat::zeros(mask.size(), CV_8U);
-  if (detection.mask.empty())
-    whole(cv::Rect(detection.box) & cv::Rect({0, 0}, mask.size())).setTo(255);
-  else
-    Region(detection).copyTo(whole(detection.mask_box));
-  const int both = cv::countNonZero((whole > 0) & (mask > 0));
-  const int either = cv::countNonZero((whole > 0) | (mask > 0));
-  return either > 0 ? static_cast<double>(both) / either : 1.0;
-}
 
 PictureDetector::PictureDetector(const PerceptionConfig& config) : config_(config) {
   MakeDetector(config.detector, config.fit.edge_sigma_px, config.rig);

@@ -1,4 +1,4 @@
-#include "services/perception/tools/detect_command.h"
+#include "deploy/detect/detect_command.h"
 
 #include <fmt/format.h>
 
@@ -18,8 +18,8 @@
 
 #include "common/config/config.h"
 #include "common/config/version.h"
+#include "deploy/detect/picture.h"
 #include "services/perception/sight/silhouette.h"
-#include "services/perception/tools/picture.h"
 
 namespace chase::perception {
 

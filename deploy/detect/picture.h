@@ -2,7 +2,6 @@
 
 #include <opencv2/core.hpp>
 #include <optional>
-#include <vector>
 
 #include "services/perception/perception_config.h"
 #include "services/perception/sight/detector.h"
@@ -10,14 +9,6 @@
 namespace chase::perception {
 
 // The target in single pictures: no pose, no LiDAR, no past.
-
-/// Of several detections of one picture the target's: the best whole, or a piece that scores more,
-/// is not cut anywhere and is no piece of a good whole. Null where there is none.
-const Detection* MostLikely(const std::vector<Detection>& found);
-
-/// Intersection over union of a detection's region with a mask of the whole picture (8 bit, not 0
-/// on the target); of its box where it has no region.
-double Overlap(const Detection& detection, const cv::Mat& mask);
 
 /// What one picture shows of the target.
 struct PictureTarget {
