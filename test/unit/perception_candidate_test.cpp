@@ -71,9 +71,9 @@ TEST(PerceptionCandidate, ASpeedByLidarPointsIsAWay) {
   EXPECT_FALSE(c.Drives()) << "edges alone make up speeds along the line of sight";
   c.ranged = true;
   c.last.fit.n_points = 20;
-  c.known = c.track.t = c.swept = 0.05;
+  c.known = c.track.t = c.track.ranged = 0.05;
   EXPECT_FALSE(c.Drives()) << "one sweep tells no speed";
-  c.track.t = c.swept = 0.15;
+  c.track.t = c.track.ranged = 0.15;
   EXPECT_TRUE(c.Drives());
   c.track.t = 0.3;
   EXPECT_FALSE(c.Fast()) << "the points are old";
@@ -201,7 +201,7 @@ TEST(PerceptionCandidate, CountsSightingsWithLidarPoints) {
     c.Correct(s);
   }
   EXPECT_EQ(c.sweeps, 2);
-  EXPECT_DOUBLE_EQ(c.swept, c.track.t);
+  EXPECT_DOUBLE_EQ(c.track.ranged, c.track.t);
 }
 
 TEST(PerceptionDecoys, TwoThatStandCloseTogetherAreNotOneThatDrives) {

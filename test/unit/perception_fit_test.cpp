@@ -71,7 +71,6 @@ FitInput InputFor(const PoseSample& pose, const Vector3d& guess, double sigma) {
   FitInput input;
   input.prior = Prior(guess, sigma);
   input.shape.size = {kRadius, kHeight};
-  input.shape.variance = {9e-4, 9e-4};
   input.camera = CameraAt(pose, {});
   return input;
 }
@@ -152,24 +151,6 @@ TEST(PerceptionFit, SingularPriorIsRefused) {
   EXPECT_FALSE(FitTarget(input, {}).ok);
   input.prior.covariance.setConstant(std::nan(""));
   EXPECT_FALSE(FitTarget(input, {}).ok);
-}
-
-TEST(PerceptionFit, RadiusAndHeightCanBeEstimated) {
-  std::mt19937 random(9);
-  const Vector3d target(2.5, 0.0, 0.55);
-  auto input = InputFor(BodyAt({0, 0, 1.2}, 0, 0, 0), target, 0.3);
-  input.shape.size = {0.13, 0.44};
-  const auto outline = DenseOutline(input.camera, target);
-  input.detection = &outline;
-  input.points = SidePoints(target, {0, 0, 1.3}, 0.01, &random);
-  FitConfig config;
-  config.estimate_shape = true;
-  config.shape_sigma = 0.05;
-  const auto fit = FitTarget(input, config);
-  ASSERT_TRUE(fit.ok);
-  EXPECT_NEAR(fit.shape.size[0], kRadius, 0.01);
-  EXPECT_NEAR(fit.shape.size[1], kHeight, 0.03);
-  EXPECT_LT(fit.shape.variance[0], input.shape.variance[0]);
 }
 
 /// What hides one half of the target must not pull it nor push it away.

@@ -185,11 +185,11 @@ TEST(PerceptionRays, ManyPointsAndNoneOfThemOnTheTargetHitAnotherThing) {
   const std::vector<TargetPoint> seven(behind.begin(), behind.begin() + 7);
   std::vector<TargetPoint> mixed = on;
   mixed.insert(mixed.end(), seven.begin(), seven.end());
-  EXPECT_TRUE(HitElsewhere(input, {behind}, 0.1));
-  EXPECT_FALSE(HitElsewhere(input, {on, seven}, 0.1));
-  EXPECT_FALSE(HitElsewhere(input, {mixed}, 0.1));
+  EXPECT_TRUE(HitElsewhere(input, {behind}));
+  EXPECT_FALSE(HitElsewhere(input, {on, seven}));
+  EXPECT_FALSE(HitElsewhere(input, {mixed}));
   behind.pop_back();
-  EXPECT_FALSE(HitElsewhere(input, {behind}, 0.1));
+  EXPECT_FALSE(HitElsewhere(input, {behind}));
 }
 
 /// Something grey hides the left half of the target.

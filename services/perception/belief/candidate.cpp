@@ -4,8 +4,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "services/perception/belief/sightings.h"
-
 namespace chase::perception {
 
 namespace {
@@ -13,24 +11,16 @@ namespace {
 constexpr double kMoved = 0.04, kMovedEdges = 5.0;  // m and sigmas that an edge may seem to move
 constexpr double kMovedUnclear = 0.06, kMovedUnclearEdges = 8.0;  // where something may hide it
 constexpr double kMovedAcross = 0.03, kMovedAcrossEdges = 4.0;    // where all of it is seen sharply
-constexpr double kSharpWidth = 24.0;  // sigmas of an edge from which its place across is known
 constexpr double kMovedGate = 11.8;   // squared distance, 2 dof, that chance does not reach
 constexpr double kSlow = 0.1;         // m/s, what is slower stands, as far as errors go
 constexpr double kFast = 0.3;         // m/s that LiDAR points of two sweeps tell from standing,
 constexpr double kFastGate = 30.0;    // and its squared distance from it, 2 dof
 constexpr int kShownHits = 2;         // sightings before something may hide a side
-constexpr double kFastAge = 0.08;     // s since the last of them, at most
+constexpr double kFastAge = 0.08;     // s since the last such points, at most
 constexpr double kKnownSigmas = 1.5;  // from which a way along the line of sight counts
 constexpr double kAstray = 0.1, kAstrayShare = 0.5;  // m and share of its way, off what is told
-constexpr double kSureWay = 0.15;                    // m
 constexpr double kAnew = 2.0;     // s that it stood, after which its way is counted anew
 constexpr double kBetter = 0.25;  // share of the first variance from which a start is taken anew
-
-void CountSweep(Candidate* c) {
-  if (c->last.fit.n_points == 0) return;
-  ++c->sweeps;
-  c->swept = c->track.t;
-}
 
 }  // namespace
 
@@ -38,15 +28,15 @@ void Candidate::Correct(const Sighting& sighting) {
   const bool was_partial = track.partial, was_part = part;
   track.Correct(sighting.fit);
   last = sighting;
-  CountSweep(this);
+  sweeps += sighting.fit.n_points > 0;
   const Detection& d = sighting.detection;
-  part = part && (d.part || d.edged || d.AnyCut());
+  part = part && (d.Piece() || d.AnyCut());
   const auto spread = [](const TargetGaussian& g) {
     return g.covariance.topLeftCorner<2, 2>().trace();
   };
   // Before, what hid it, or what a small one seemed a piece of, may have seemed its edge.
   const bool out = was_partial && !track.partial && !SurelyDrives(kSureWay);
-  const bool alone = was_part && !part && d.box.width < kSharpWidth * d.silhouette.sigma_px;
+  const bool alone = was_part && !part && d.box.width < kSharpSigmas * d.silhouette.sigma_px;
   const bool stands = !Drives() && track.t - known > kAnew;
   if (!out && !alone && !stands && (Drives() || spread(track.state) > kBetter * spread(first)))
     return;
@@ -57,8 +47,7 @@ void Candidate::Correct(const Sighting& sighting) {
 
 Candidate NewCandidate(const Sighting& sighting, const View& view) {
   Candidate c;
-  c.track = {sighting.fit.posterior, sighting.fit.shape, view.t, view.t, 1, 0,
-             sighting.fit.joined,    !sighting.fit.whole};
+  c.track = StartTrack(sighting.fit, view.t);
   c.first = sighting.fit.posterior;
   c.since = c.known = view.t;
   c.last = sighting;
@@ -68,28 +57,18 @@ Candidate NewCandidate(const Sighting& sighting, const View& view) {
   const double sigma_px = sighting.detection.silhouette.sigma_px;
   c.edge = sigma_px * c.range / view.camera.rig.focal_px;
   c.range_error = 2.0 * sigma_px * sight.head<2>() / sighting.detection.box.height;
-  c.part = sighting.detection.part || sighting.detection.edged;
-  CountSweep(&c);
+  c.part = sighting.detection.Piece();
+  c.sweeps = c.ranged;
   return c;
 }
 
-void ForgetVelocity(const MotionConfig& config, Candidate* candidate) {
-  const double speed = config.initial_speed_sigma, vertical = config.initial_vertical_speed_sigma;
-  auto& state = candidate->track.state;
-  state.mean.tail<3>().setZero();
-  state.covariance.topRightCorner<3, 3>().setZero();
-  state.covariance.bottomLeftCorner<3, 3>().setZero();
-  state.covariance.bottomRightCorner<3, 3>() =
-      Eigen::Vector3d(speed * speed, speed * speed, vertical * vertical).asDiagonal();
-}
-
 bool Candidate::HiddenIn(const Sighting& s) const {
-  return ranged && !part && track.hits >= kShownHits && s.fit.n_points >= kClearPoints &&
-         !s.detection.AnyCut() && LeftOut(s) == 1;
+  return ranged && !part && track.hits >= kShownHits && s.SurelyHit() && !s.detection.AnyCut() &&
+         s.LeftOut() == 1;
 }
 
 bool Candidate::Fast() const {
-  if (track.t - swept > kFastAge) return false;
+  if (track.t - track.ranged > kFastAge) return false;
   const Eigen::Vector2d v = track.state.velocity().head<2>();
   return v.norm() > kFast &&
          v.dot(track.state.covariance.block<2, 2>(3, 3).ldlt().solve(v)) > kFastGate;
@@ -121,7 +100,7 @@ bool Candidate::Drives() const {
   if (d.dot(P.ldlt().solve(d)) < kMovedGate || d.norm() < kSlow * (track.t - known)) return false;
   const Eigen::Vector2d n = range_error.normalized();
   const double along = n.dot(d), sigma = std::sqrt(n.dot(P * n));
-  if (clear && last.detection.box.width > kSharpWidth * last.detection.silhouette.sigma_px &&
+  if (clear && last.detection.box.width > kSharpSigmas * last.detection.silhouette.sigma_px &&
       (d - along * n).norm() > std::max(kMovedAcross, kMovedAcrossEdges * edge))
     return true;
   if (std::abs(along) < kKnownSigmas * sigma) d -= along * n;  // may be no way at all

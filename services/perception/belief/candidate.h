@@ -4,8 +4,14 @@
 
 namespace chase::perception {
 
+/// Sigmas of an edge from which a width tells a range, and a place across is known.
+inline constexpr double kSharpSigmas = 24.0;
+
 /// Something that may be the target, followed until it is known whether it drives or stands.
 struct Candidate {
+  static constexpr double kSureWay = 0.15;  ///< m, further than what shows of it may seem to go
+  static constexpr int kConfirmFrames = 2;  ///< that must agree before it is believed
+
   TargetTrack track;
   TargetGaussian first;  ///< as it was first known well
   double since = 0.0;    ///< when it was first seen, s
@@ -16,10 +22,9 @@ struct Candidate {
   /// Along the line of sight, as far as both ends of its height may err alike; frame W, m.
   Eigen::Vector2d range_error = Eigen::Vector2d::UnitX();
 
-  bool part = false;     ///< a piece of something larger, always so far: it must drive
-  double known = 0.0;    ///< time of `first`, s
-  int sweeps = 0;        ///< sightings with LiDAR points
-  double swept = -1e18;  ///< time of the last such one, s
+  bool part = false;   ///< a piece of something larger, always so far: it must drive
+  double known = 0.0;  ///< time of `first`, s
+  int sweeps = 0;      ///< sightings with LiDAR points
 
   /// Takes over a sighting at the track's time.
   void Correct(const Sighting& sighting);
@@ -42,8 +47,5 @@ struct Candidate {
 
 /// Something seen for the first time.
 Candidate NewCandidate(const Sighting& sighting, const View& view);
-
-/// Leaves nothing known of its velocity, as where that was the hidden target's.
-void ForgetVelocity(const MotionConfig& config, Candidate* candidate);
 
 }  // namespace chase::perception

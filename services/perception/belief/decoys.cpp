@@ -6,8 +6,9 @@ namespace chase::perception {
 
 namespace {
 
-constexpr int kKnownHits = 3;    // sightings that make a look-alike
-constexpr double kDriven = 1.2;  // radii from where first seen
+constexpr int kKnownHits = 3;     // sightings that make a look-alike
+constexpr double kDriven = 1.2;   // radii from where first seen
+constexpr double kMemory = 60.0;  // s that one not seen again is remembered
 constexpr size_t kMaxDecoys = 32;
 
 }  // namespace
@@ -42,7 +43,7 @@ Decoy* Decoys::Note(const Eigen::Vector3d& p_W, double t, int hits) {
 void Decoys::Forget(double t, const Eigen::Vector3d& p_WT) {
   all_.erase(std::remove_if(all_.begin(), all_.end(),
                             [&](const Decoy& d) {
-                              return t - d.t > config_.decoy_memory ||
+                              return t - d.t > kMemory ||
                                      (d.p_W - p_WT).norm() < config_.decoy_radius;
                             }),
              all_.end());

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "services/perception/place/target_points.h"
 #include "services/perception/sensors/image_check.h"
 #include "services/perception/sight/silhouette.h"
 
@@ -19,11 +18,26 @@ constexpr double kRival = 6.0;     // less, of something else that makes a sight
 constexpr size_t kMostTried = 4;   // detections a track and frame
 constexpr int kKnownHits = 10;     // sightings after which a track's range is trusted
 constexpr double kLargest = 1.4;   // of pieces together, times what is expected
-constexpr double kTimeJump = 1.0;  // s back that count as a new recording
+constexpr double kMaxExtrapolation = 0.05;  // s that the nearest pose is carried to a frame
+constexpr double kMaxPoseAge = 0.2;   // s; with a pose this near it is too old, else there is none
+constexpr double kMaxSweepAge = 0.3;  // s; older points are not used
 
 bool Overlap(const Detection& a, const Detection& b) { return (a.box & b.box).area() > 0.0; }
 
 }  // namespace
+
+long Sighting::LeftOut() const {
+  long count = 0;
+  for (size_t side = 0; side < 4; ++side)
+    count += !fit.used[side] && !detection.silhouette.samples[side].empty();
+  return count;
+}
+
+bool Sighting::AllSeen() const {
+  const auto& used = fit.used;
+  const bool all = std::all_of(used.begin(), used.end(), [](bool side) { return side; });
+  return fit.whole && (all || detection.p_CT);
+}
 
 Finder::Finder(const PerceptionConfig& config)
     : config_(config),
@@ -38,7 +52,7 @@ void Finder::SetDetector(const DetectorConfig& detector) {
 }
 
 void Finder::AddSweep(const Sweep& sweep) {
-  if (!sweeps_.empty() && sweep.t < sweeps_.back().sweep.t() - kTimeJump) sweeps_.clear();
+  if (!sweeps_.empty() && sweep.t < sweeps_.back().sweep.t() - PoseHistory::kSpan) sweeps_.clear();
   sweeps_.push_back({RangedSweep(sweep), false});
   if (sweeps_.size() > kMaxSweeps) sweeps_.pop_front();
 }
@@ -50,9 +64,9 @@ void Finder::MarkSweepsUsed(double t) {
 std::optional<View> Finder::Look(const Frame& frame, std::string* note) const {
   *note = frame.problem.empty() ? ImageProblem(frame.bgr, config_.rig) : frame.problem;
   if (!note->empty()) return std::nullopt;
-  const auto pose = poses_.At(frame.t, config_.max_extrapolation);
+  const auto pose = poses_.At(frame.t, kMaxExtrapolation);
   if (!pose) {
-    *note = poses_.Nearest(frame.t, config_.max_pose_age) ? "the pose is too old" : "no pose";
+    *note = poses_.Nearest(frame.t, kMaxPoseAge) ? "the pose is too old" : "no pose";
     return std::nullopt;
   }
   View view{frame.t, *pose, CameraAt(*pose, config_.rig), frame.bgr, {}, {}};
@@ -65,7 +79,7 @@ Clusters Finder::Points(const View& view, const Detection& detection, const Eige
                         bool fresh_only) const {
   Clusters all;
   for (auto it = sweeps_.rbegin(); it != sweeps_.rend(); ++it) {
-    if ((fresh_only && it->used) || view.t - it->sweep.t() > config_.max_sweep_age) continue;
+    if ((fresh_only && it->used) || view.t - it->sweep.t() > kMaxSweepAge) continue;
     if (it->sweep.t() > view.t) continue;
     Clusters clusters = SelectPoints(it->sweep, poses_, view.camera, view.t, detection, v_WT);
     for (auto& c : clusters) all.push_back(std::move(c));
@@ -94,9 +108,7 @@ std::optional<Sighting> Finder::Try(const TargetTrack& track, const View& view,
     placed.prior = fit->posterior;
     const auto points = [&](const Eigen::Vector3d& v) { return Points(view, detection, v, false); };
     if (SeenThrough(placed, points(track.state.velocity()))) return std::nullopt;
-    if (track.partial &&
-        HitElsewhere(placed, points(Eigen::Vector3d::Zero()), config_.fit.lidar_gate))
-      return std::nullopt;
+    if (track.partial && HitElsewhere(placed, points(Eigen::Vector3d::Zero()))) return std::nullopt;
   }
   return Sighting{*fit, detection};
 }

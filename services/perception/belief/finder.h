@@ -10,6 +10,7 @@
 #include "services/perception/belief/target_track.h"
 #include "services/perception/place/localiser.h"
 #include "services/perception/place/search_boxes.h"
+#include "services/perception/place/target_points.h"
 
 namespace chase::perception {
 
@@ -35,6 +36,17 @@ struct Sighting {
   FitResult fit;
   Detection detection;
   bool contested = false;  ///< something else explains the prediction nearly as well
+
+  /// Sides that the detection shows and the reading does not take for the target's.
+  long LeftOut() const;
+  /// True when nothing of it is left out, nor cut off.
+  bool AllSeen() const;
+  /// True when LiDAR points tell that it is one thing.
+  bool SurelyHit() const { return fit.n_points >= kSurelyHit; }
+  /// True when all of it is seen, on its own, and LiDAR points tell where it is.
+  bool Clear() const {
+    return fit.whole && SurelyHit() && !detection.Piece() && !detection.AnyCut();
+  }
 };
 
 /// Keeps poses and sweeps; finds a given thing, or a new one, in a frame.

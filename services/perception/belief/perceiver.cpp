@@ -3,21 +3,20 @@
 #include <algorithm>
 #include <cmath>
 
-#include "services/perception/belief/sightings.h"
-
 namespace chase::perception {
 
 namespace {
 
+constexpr double kHiddenAfter = 0.08;     // s unseen: occluded
+constexpr double kLostSigma = 3.0;        // m, horizontal standard deviation of what is lost
 constexpr double kUnknownVariance = 1e4;  // m^2, while nothing is known
 constexpr int kCandidateMisses = 2;       // frames without it that end a candidate
 constexpr size_t kMaxCandidates = 6;
 constexpr double kLeastWidth = 12.0;  // standard deviations of a sharp edge; less may be a slit
-constexpr int kDecoyHits = 3;      // sightings that what stands beside one that drives counts for
-constexpr double kTimeJump = 1.0;  // s back that count as a new recording
-constexpr double kGap = 0.25;      // s between frames in which a target may do anything
-constexpr double kPointed = 1.0;   // s that what is pointed at is looked for there
-constexpr int kSureHits = 5;       // corrections after which the track is trusted
+constexpr int kDecoyHits = 3;     // sightings that what stands beside one that drives counts for
+constexpr double kGap = 0.25;     // s between frames in which a target may do anything
+constexpr double kPointed = 1.0;  // s that what is pointed at is looked for there
+constexpr int kSureHits = 5;      // corrections after which the track is trusted
 constexpr double kDrivenSigma = 0.1;  // m, how well that must be known
 constexpr double kStood = 0.2;        // m, within which a target stands
 constexpr double kStoodFor = 0.6;     // s, likewise
@@ -45,9 +44,8 @@ void Perceiver::Follow(View* view) {
 
 void Perceiver::FollowCandidates(View* view) {
   for (auto& c : candidates_) {
-    const auto again = finder_.Find(c.track, view, [&](const Sighting& s) {
-      return (s.detection.part || s.detection.edged) && !c.part;
-    });
+    const auto again = finder_.Find(
+        c.track, view, [&](const Sighting& s) { return s.detection.Piece() && !c.part; });
     const bool partly =
         c.track.partial || (again && (again->detection.edged || c.HiddenIn(*again)));
     if (!again || !(again->fit.whole || partly)) {
@@ -96,7 +94,7 @@ void Perceiver::AddPartial(const View& view) {
   if (Followed(*unsure_) || candidates_.size() >= kMaxCandidates) return;
   if (!Plausible(*unsure_, view.t)) return;
   candidates_.push_back(NewCandidate(*unsure_, view));
-  ForgetVelocity(config_.motion, &candidates_.back());
+  candidates_.back().track.state.ForgetVelocity();
 }
 
 void Perceiver::AddCandidates(View* view) {
@@ -120,7 +118,7 @@ void Perceiver::AddCandidates(View* view) {
     if (!found || !Plausible(*found, view->t)) continue;
     // Part of something, of which no LiDAR point tells the range, is a thing of its own only where
     // the target may come back.
-    const bool piece = found->detection.part || found->detection.edged;
+    const bool piece = found->detection.Piece();
     if ((piece || !found->fit.whole) && found->fit.n_points == 0 && !comes_back) continue;
     if (piece && found->fit.n_points == 0 && !found->detection.edged) continue;
     if (Followed(*found)) continue;
@@ -148,8 +146,7 @@ void Perceiver::Promote(const View& view) {
   const Candidate chosen = *best;
   const bool drives = chosen.Drives() || PieceIsReady(chosen);
   for (const auto& c : candidates_)
-    if (&c != best && drives && !c.Drives() && !c.part &&
-        c.track.hits >= config_.state.confirm_frames)
+    if (&c != best && drives && !c.Drives() && !c.part && c.track.hits >= Candidate::kConfirmFrames)
       decoys_.Note(c.track.state.position(), view.t, kDecoyHits);
   if (sighting_) decoys_.Note(track_->state.position(), view.t, kDecoyHits);
   Start(chosen.track, chosen.last);
@@ -169,13 +166,12 @@ void Perceiver::Start(const TargetTrack& track, const Sighting& sighting) {
 void Perceiver::Judge(double t) {
   if (!track_) return;
   const double unseen = t - track_->seen;
-  if (unseen < config_.state.hidden_after)
+  if (unseen < kHiddenAfter)
     state_ = TargetState::kTracking;
   else if (state_ != TargetState::kLost)
-    state_ =
-        unseen > config_.state.lost_after || track_->HorizontalSigma() > config_.state.lost_sigma
-            ? TargetState::kLost
-            : TargetState::kOccluded;
+    state_ = unseen > config_.state.lost_after || track_->HorizontalSigma() > kLostSigma
+                 ? TargetState::kLost
+                 : TargetState::kOccluded;
   if (unseen > 0.0) return;
   last_v_ = track_->state.velocity();
   last_p_ = track_->state.position();
@@ -213,12 +209,12 @@ void Perceiver::SwapIfTheOtherDrives(const Sighting& s, Decoy* other, double t) 
   if (!stands || !other->Driven(config_.state.decoy_radius) || sigma > kDrivenSigma) return;
   const Eigen::Vector3d stood = track_->state.position();
   *other = {stood, stood, t, other->hits};
-  Start({s.fit.posterior, s.fit.shape, t, t, 1, 0, s.fit.joined}, s);
+  Start(StartTrack(s.fit, t), s);
 }
 
 /// True when the frame is newer than the last one, or starts a recording anew.
 bool Perceiver::ForgetIfTimeRanBack(double t) {
-  const bool jumped = t < last_t_ - kTimeJump;
+  const bool jumped = t < last_t_ - PoseHistory::kSpan;
   if (!jumped && t <= last_t_) return false;
   last_t_ = t;
   if (jumped) Forget();

@@ -2,7 +2,6 @@
 #include <cmath>
 
 #include "services/perception/belief/perceiver.h"
-#include "services/perception/belief/sightings.h"
 
 // What the Perceiver takes for its target.
 
@@ -10,6 +9,8 @@ namespace chase::perception {
 
 namespace {
 
+constexpr double kSureSigma = 0.6;  // m of a hidden target above which what is found must drive
+constexpr double kStandingRange = 10.0;  // m, what stands further off is not taken
 constexpr double kGateSigmas = 3.0;
 constexpr double kReachMargin = 0.5;    // m
 constexpr double kUsualSpeed = 1.5;     // m/s
@@ -19,12 +20,10 @@ constexpr double kWellInside = 2.3;     // likewise of what is alone, where it m
 constexpr double kFarFromSure = 1.0;    // m, within this standard deviation
 constexpr double kExpectedGate = 4.6;   // likewise of what need not drive, 2 dof
 constexpr int kPieceHits = 4;           // sightings of a piece or a half before it is taken,
-constexpr double kPieceWay = 0.15;      // m that it must have driven,
 constexpr int kPieceSweeps = 2;         // of them with LiDAR points, for what has come out wholly,
 constexpr int kNewPieceHits = 10;       // and where none was ever seen, nor LiDAR tells much
 constexpr double kNewPieceWay = 0.3;    // m, likewise
 constexpr double kDecoySigma = 0.1;     // m, how well its place is known
-constexpr double kSmall = 24.0;         // sigmas of an edge below which a width tells no range
 constexpr double kFar = 5.0;            // m, from where fewer pixels tell what stands there
 constexpr double kTrusted = 0.3;        // s that a track not seen is preferred to anything new
 constexpr double kStandingSpeed = 0.2;  // m/s
@@ -35,7 +34,8 @@ constexpr double kStandingSpeed = 0.2;  // m/s
 bool Perceiver::IsRatherDecoy(const Sighting& s, const View& view) const {
   const Decoy* decoy = decoys_.At(s.fit.posterior.position());
   if (!decoy) return false;
-  TargetTrack standing{s.fit.posterior, s.fit.shape, view.t, view.t, 1, 0};
+  TargetTrack standing = StartTrack(s.fit, view.t);
+  standing.partial = standing.joined = false;
   standing.state.mean << decoy->p_W, Eigen::Vector3d::Zero();
   standing.state.covariance = Matrix6d::Identity() * kDecoySigma * kDecoySigma;
   if (track_) {  // on the same terms
@@ -53,18 +53,18 @@ bool Perceiver::Plausible(const Sighting& s, double t) const {
   const double way = (p_WT - last_p_).norm(), unseen = t - track_->seen;
   if (state_ != TargetState::kLost) {
     const Eigen::Vector3d d = p_WT - track_->state.position();
-    if (std::abs(d.z()) >= kGateSigmas * config_.motion.ground_sigma) return false;
+    if (std::abs(d.z()) >= kGateSigmas * kGroundSigma) return false;
     const Eigen::Matrix3d P = track_->state.covariance.topLeftCorner<3, 3>();
     if (d.dot(P.ldlt().solve(d)) < kReachGate) return true;
     // The prediction may err by more than it claims, where the fit slipped to what stood behind.
-    return Clear(s) && way < kReachMargin + kUsualSpeed * unseen;
+    return s.Clear() && way < kReachMargin + kUsualSpeed * unseen;
   }
   return way < kReachMargin + config_.motion.max_speed * unseen;
 }
 
 /// Hidden for so long that a look-alike may lie where the target may be as well.
 bool Perceiver::Vague() const {
-  return track_ && track_->misses > 0 && track_->HorizontalSigma() > config_.state.sure_sigma;
+  return track_ && track_->misses > 0 && track_->HorizontalSigma() > kSureSigma;
 }
 
 /// True for a sighting after which nothing need be asked: all of the target, close to where it was
@@ -77,8 +77,8 @@ bool Perceiver::Sure(const Sighting& s) const {
   const double squared = off.dot(P.ldlt().solve(off));
   const bool near = off.norm() < config_.state.decoy_radius;
   const bool alone = candidates_.empty() && track_->HorizontalSigma() < kFarFromSure;
-  if (Vague()) return AllSeen(s) && (near || (alone && squared < kWellInside));
-  if (LeftOut(s) > 1 && track_->misses > kSoonBack) return false;
+  if (Vague()) return s.AllSeen() && (near || (alone && squared < kWellInside));
+  if (s.LeftOut() > 1 && track_->misses > kSoonBack) return false;
   return near || squared < kExpectedGate;
 }
 
@@ -86,17 +86,17 @@ bool Perceiver::Sure(const Sighting& s) const {
 /// of another size would then seem to drive as the drone does.
 bool Perceiver::SizedBadly(const Candidate& c) const {
   const Detection& d = c.last.detection;
-  return !track_ && c.sweeps == 0 && !d.p_CT && d.box.width < kSmall * config_.fit.edge_sigma_px;
+  return !track_ && c.sweeps == 0 && !d.p_CT &&
+         d.box.width < kSharpSigmas * config_.fit.edge_sigma_px;
 }
 
 /// Of a piece of something larger, or what is hidden or cut off in part, once it has driven further
 /// than what shows of it may seem to, or has come out wholly and LiDAR tells that it drives.
 bool Perceiver::PieceIsReady(const Candidate& c) const {
-  const bool hasty =
-      !track_ && (LeavesImage(c.last.detection) || c.last.fit.n_points < kClearPoints);
+  const bool hasty = !track_ && (c.last.detection.LeavesImage() || !c.last.SurelyHit());
   if (c.track.hits < (hasty ? kNewPieceHits : kPieceHits)) return false;
-  const bool came_out = !hasty && AllSeen(c.last) && c.sweeps >= kPieceSweeps && c.Fast();
-  return came_out || c.SurelyDrives(hasty ? kNewPieceWay : kPieceWay);
+  const bool came_out = !hasty && c.last.AllSeen() && c.sweeps >= kPieceSweeps && c.Fast();
+  return came_out || c.SurelyDrives(hasty ? kNewPieceWay : Candidate::kSureWay);
 }
 
 /// Of what stands: after a while, unless the target stood there. A target that drove when it was
@@ -104,20 +104,19 @@ bool Perceiver::PieceIsReady(const Candidate& c) const {
 bool Perceiver::StandsLongEnough(const Candidate& c, double t) const {
   const bool stood_here = track_ && last_v_.norm() < kStandingSpeed &&
                           (c.track.state.position() - last_p_).norm() < config_.state.decoy_radius;
-  const bool may_stand =
-      !c.last.detection.AnyCut() && (!track_ || t - track_->seen > config_.motion.hidden_time);
+  const bool may_stand = !c.last.detection.AnyCut() && (!track_ || t - track_->seen > kHiddenTime);
   const double wait = config_.state.standing_after * std::max(1.0, std::pow(c.range / kFar, 2));
-  return stood_here || (may_stand && c.range < config_.state.standing_range && t - c.since >= wait);
+  return stood_here || (may_stand && c.range < kStandingRange && t - c.since >= wait);
 }
 
 /// What drives is taken at once.
 bool Perceiver::Ready(const Candidate& c, double t) const {
-  if (c.track.misses > 0 || c.track.hits < config_.state.confirm_frames) return false;
+  if (c.track.misses > 0 || c.track.hits < Candidate::kConfirmFrames) return false;
   const bool trusted = !doubtful_ && !(unsure_ && unsure_->contested) && !Vague();
   if (track_ && trusted && t - track_->seen < kTrusted) return false;
   const Detection& d = c.last.detection;
-  const bool unclear = d.AnyCut() && c.last.fit.n_points < kClearPoints;
-  const bool piece = c.part || c.track.partial || LeavesImage(d) || unclear;
+  const bool unclear = d.AnyCut() && !c.last.SurelyHit();
+  const bool piece = c.part || c.track.partial || d.LeavesImage() || unclear;
   if (!SizedBadly(c) && (piece ? PieceIsReady(c) : c.Drives())) return true;
   return !piece && !sighting_ && StandsLongEnough(c, t);
 }

@@ -11,7 +11,10 @@ namespace chase::perception {
 namespace {
 
 constexpr int kProvenHits = 20;
-constexpr double kRangedFor = 0.5;    // s, some sweeps
+constexpr double kHiddenDensity = 0.5;     // m^2/s^3 while not seen: a turn lasts, and adds up
+constexpr double kVerticalDensity = 0.02;  // m^2/s^3
+constexpr double kFloorSigma = 0.003;      // m, added to every axis of the covariance sent out
+constexpr double kRangedFor = 0.5;         // s, some sweeps
 constexpr double kTurnDensity = 1.0;  // rad^2/s: a corner taken at 1 rad/s lasts about a second
 
 }  // namespace
@@ -21,9 +24,9 @@ void TargetTrack::Predict(double to, const MotionConfig& config) {
   if (!(dt > 0.0)) return;
   Matrix6d F = Matrix6d::Identity();
   F.topRightCorner<3, 3>() = dt * Eigen::Matrix3d::Identity();
-  if (misses > 0) F.bottomRightCorner<3, 3>() *= std::exp(-dt / config.hidden_time);
-  const double density = misses > 0 ? config.hidden_density : config.acceleration_density;
-  const Eigen::Vector3d q(density, density, config.vertical_density);
+  if (misses > 0) F.bottomRightCorner<3, 3>() *= std::exp(-dt / kHiddenTime);
+  const double density = misses > 0 ? kHiddenDensity : config.acceleration_density;
+  const Eigen::Vector3d q(density, density, kVerticalDensity);
   Matrix6d Q = Matrix6d::Zero();
   Q.topLeftCorner<3, 3>() = (q * dt * dt * dt / 3.0).asDiagonal();
   Q.topRightCorner<3, 3>() = (q * dt * dt / 2.0).asDiagonal();
@@ -34,7 +37,7 @@ void TargetTrack::Predict(double to, const MotionConfig& config) {
   state.covariance = F * state.covariance * F.transpose() + Q;
   shape.yaw_variance = std::min(TargetShape::kAnyYaw, shape.yaw_variance + kTurnDensity * dt);
   t = to;
-  const double most = config.ground_sigma * config.ground_sigma;  // it stays on the ground
+  const double most = kGroundSigma * kGroundSigma;  // it stays on the ground
   if (misses == 0 || state.covariance(2, 2) < most) return;
   const double share = std::sqrt(most / state.covariance(2, 2));
   state.covariance.row(2) *= share;
@@ -50,6 +53,14 @@ void TargetTrack::Correct(const FitResult& fit) {
   partial = partial && !fit.whole;
   misses = 0;
   ++hits;
+}
+
+TargetTrack StartTrack(const FitResult& fit, double t) {
+  TargetTrack track;
+  track.t = t;
+  track.partial = true;
+  track.Correct(fit);
+  return track;
 }
 
 bool TargetTrack::Proven() const { return hits >= kProvenHits; }
@@ -71,7 +82,7 @@ Eigen::Matrix3d PublishedCovariance(const TargetTrack& track, const PoseSample& 
   // p_WT = p_WB + R_WB p_BT: a small rotation dr of the body in W moves it by dr x (p_WT - p_WB).
   Eigen::Matrix<double, 3, 6> J;
   J << Eigen::Matrix3d::Identity(), -math::Hat(track.state.position() - pose.p_WB);
-  const double floor = config.floor_sigma * config.floor_sigma;
+  const double floor = kFloorSigma * kFloorSigma;
   // What is not shaped as the model seems nearer or farther, alike in every frame without points.
   const double share = track.t - track.ranged > kRangedFor ? outline_sigma : 0.0;
   const Eigen::Vector3d off = share * (track.state.position() - pose.p_WB);

@@ -6,6 +6,9 @@
 
 namespace chase::perception {
 
+inline constexpr double kHiddenTime = 3.0;    ///< s over which what is not seen may stop or turn
+inline constexpr double kGroundSigma = 0.15;  ///< m that the ground rises or falls meanwhile
+
 /// One thing believed to be the target, followed from frame to frame.
 struct TargetTrack {
   TargetGaussian state;  ///< at time t
@@ -29,6 +32,9 @@ struct TargetTrack {
   /// Standard deviation of the position, the greater one of x and y, m.
   double HorizontalSigma() const;
 };
+
+/// What is first seen at t [s].
+TargetTrack StartTrack(const FitResult& fit, double t);
 
 /// Covariance of the target's position [m^2, frame W] with what the filter cannot know of itself:
 /// the drone's pose, which shifts all measurements alike, the outline's departure from the model

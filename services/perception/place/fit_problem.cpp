@@ -8,11 +8,9 @@ namespace chase::perception {
 
 namespace {
 
-constexpr double kOutlier = 2.0;      // standard deviations where outliers begin
-constexpr double kWorst = 3.0;        // standard deviations that an outlier counts for
-constexpr double kShapeFloor = 1e-6;  // m^2
-constexpr double kYawFloor = 1e-6;    // rad^2
-constexpr double kNearest = 0.2;      // m, of ranges that scale pixels
+constexpr double kOutlier = 2.0;    // standard deviations where outliers begin
+constexpr double kWorst = 3.0;      // standard deviations that an outlier counts for
+constexpr double kYawFloor = 1e-6;  // rad^2
 constexpr double kLeastPerPx = 1e-6;
 
 PlanRay ToPlan(const Eigen::Vector3d& p_WC, const Eigen::Vector3d& ray) {
@@ -34,9 +32,11 @@ double PerPixel(const Camera& camera, const Eigen::Vector3d& ray, bool upright) 
   return std::max(kLeastPerPx, std::abs(span));
 }
 
+Solid SolidOf(const TargetShape& shape) { return {shape.box(), shape.size[0], shape.size[1]}; }
+
 /// Of one of `samples` that count for `weight` independent ones together.
 double Share(size_t samples, double weight) {
-  return std::min(1.0, weight / static_cast<double>(samples));
+  return std::min(1.0, weight / static_cast<double>(std::max<size_t>(1, samples)));
 }
 
 double Median(std::vector<double> values) {
@@ -81,63 +81,34 @@ class Cauchy {
   double share_, product_ = 1.0, log_ = 0.0;
 };
 
-/// Sums up the cost alone.
-struct CostSum {
-  static constexpr bool kDerivatives = false;
-  double cost = 0.0;
-  void AddEdge(double, double, const Vector9d&) {}
-  void Add(double, double, const Vector9d&) {}
-};
-
-/// Sums up cost and normal equations.
-template <int N>
-struct NormalSum : NormalEquations<N> {
-  static constexpr bool kDerivatives = true;
-  static constexpr int kUnknowns = N;
-  /// An edge does not depend on the velocity, nor a round one on the heading.
-  void AddEdge(double weight, double residual, const Vector9d& row) {
-    if (N > 6) return Add(weight, residual, row);
-    const Eigen::Vector3d weighed = weight * row.head<3>();
-    this->gradient.template head<3>() += residual * weighed;
-    this->information.template topLeftCorner<3, 3>() += weighed * row.head<3>().transpose();
-  }
-  void Add(double weight, double residual, const Vector9d& row) {
-    const Eigen::Matrix<double, N, 1> weighed = weight * row.head<N>();
-    this->gradient += residual * weighed;
-    this->information.noalias() += weighed * row.head<N>().transpose();
-  }
-};
-
 }  // namespace
 
-Vector9d Unknowns(const TargetGaussian& target, const TargetShape& shape) {
-  Vector9d y;
-  y << target.mean, shape.yaw, shape.size;
+Vector7d Unknowns(const TargetGaussian& target, const TargetShape& shape) {
+  Vector7d y;
+  y << target.mean, shape.yaw;
   return y;
 }
 
-double SurfaceDistance(const TargetShape& shape, const TargetPoint& point, double scale,
-                       const Vector9d& y, Vector9d* gradient) {
-  if (shape.sphere()) return SpherePointResidual{point.p_W, point.age, scale}(y, gradient);
-  return PointResidual{point.p_W, shape.box(), point.age, scale}(y, gradient);
+Residual SurfaceDistance(const TargetShape& shape, const TargetPoint& point, const Vector7d& y) {
+  return (shape.sphere() ? SpherePointResidual : PointResidual)(point.p_W, point.age,
+                                                                SolidOf(shape), y);
 }
 
 FitProblem::FitProblem(const FitInput& input, const FitConfig& config)
-    : input_(input), config_(config) {
+    : input_(input), config_(config), solid_(SolidOf(input.shape)) {
   const Eigen::LLT<Matrix6d> llt(input.prior.covariance);
   if (llt.info() != Eigen::Success) return;
   root_ = llt.matrixL().solve(Matrix6d::Identity());
   if (!root_.allFinite()) return;
   ok_ = true;
-  information_ = root_.transpose() * root_;
-  shape_information_ << 1.0 / std::max(kYawFloor, input.shape.yaw_variance),
-      input.shape.variance.cwiseMax(kShapeFloor).cwiseInverse();
+  information_.topLeftCorner<6, 6>() = root_.transpose() * root_;
+  information_(kYawAt, kYawAt) = 1.0 / std::max(kYawFloor, input.shape.yaw_variance);
   prior_range_ = Range(Start());
   AddEdges();
   AddPosition();
 }
 
-double FitProblem::Range(const Vector9d& y) const {
+double FitProblem::Range(const Vector7d& y) const {
   return std::max(kNearest, (y.head<2>() - input_.camera.p_WC.head<2>()).norm());
 }
 
@@ -163,115 +134,44 @@ void FitProblem::AddPosition() {
   position_ = input_.camera.p_WC + R * *input_.detection->p_CT;
 }
 
-double FitProblem::EdgeResidual(size_t side, const Edge& edge, double scale, const Vector9d& y,
-                                Vector9d* gradient) const {
+Residual FitProblem::EdgeResidual(size_t side, const Edge& edge, const Vector7d& y) const {
+  const double sign = Sign(side);
   if (input_.shape.sphere())
-    return TangentResidual{edge.ray, Upright(side), Sign(side), scale * edge.px}(y, gradient);
-  const bool square = input_.shape.box();
-  if (Upright(side))
-    return SideResidual{edge.ray, square, Sign(side), scale * edge.px}(y, gradient);
-  return CapResidual{edge.ray, square, Sign(side), scale * edge.px}(y, gradient);
+    return TangentResidual(edge.ray, solid_, Upright(side), sign, y).Scaled(edge.px);
+  return (Upright(side) ? SideResidual : CapResidual)(edge.ray, solid_, sign, y).Scaled(edge.px);
 }
 
-template <class Sum>
-void FitProblem::EvaluatePrior(const Vector9d& y, Sum* sum) const {
-  const Vector6d d = y.head<6>() - input_.prior.mean;
-  const Vector6d gradient = information_ * d;
-  sum->cost += 0.5 * d.dot(gradient);
-  const Eigen::Vector3d off = y.tail<3>() - Start().tail<3>();
-  const Eigen::Vector3d by_shape = shape_information_.cwiseProduct(off);
-  sum->cost += 0.5 * off.dot(by_shape);  // what is not sought stays where it starts
-  if constexpr (Sum::kDerivatives) {
-    sum->gradient.template head<6>() += gradient;
-    sum->information.template topLeftCorner<6, 6>() += information_;
-    constexpr int kMore = Sum::kUnknowns - 6;
-    sum->gradient.template tail<kMore>() += by_shape.head<kMore>();
-    sum->information.diagonal().template tail<kMore>() += shape_information_.head<kMore>();
-  }
-}
-
-template <class Sum>
-void FitProblem::EvaluateEdges(const Vector9d& y, Sum* sum) const {
-  Vector9d row;
+NormalEquations FitProblem::Linearised(const Vector7d& y) const {
+  NormalEquations sum;
+  const Vector7d off = y - Start();
+  sum.information = information_;
+  sum.gradient = information_ * off;
+  sum.cost = 0.5 * off.dot(sum.gradient);
   for (size_t side = 0; side < 4; ++side) {
     if (!input_.use_side[side] || edges_[side].empty()) continue;
-    Cauchy loss(Share(edges_[side].size(), config_.edge_weight));
+    Cauchy loss(Share(edges_[side].size(), kEdgeWeight));
     const double scale = 1.0 / (input_.detection->silhouette.sigma_px * prior_range_);
     for (const auto& edge : edges_[side]) {
-      const double r = EdgeResidual(side, edge, scale, y, Sum::kDerivatives ? &row : nullptr);
-      sum->AddEdge(loss.Weight(r * r), r, row);
+      const Residual r = EdgeResidual(side, edge, y).Scaled(scale);
+      sum.Add(loss.Weight(r.value * r.value), r);
     }
-    sum->cost += loss.Cost();
+    sum.cost += loss.Cost();
   }
-}
-
-template <class Sum>
-void FitProblem::EvaluatePoints(const Vector9d& y, Sum* sum) const {
-  if (input_.points.empty()) return;
-  Vector9d row;
-  Cauchy loss(Share(input_.points.size(), config_.lidar_weight));
-  const double scale = 1.0 / config_.lidar_sigma;
+  Cauchy loss(Share(input_.points.size(), kLidarWeight));
   for (const auto& p : input_.points) {
-    const double r = SurfaceDistance(input_.shape, p, scale, y, Sum::kDerivatives ? &row : nullptr);
-    sum->Add(loss.Weight(r * r), r, row);
+    const Residual r = SurfaceDistance(input_.shape, p, y).Scaled(1.0 / config_.lidar_sigma);
+    sum.Add(loss.Weight(r.value * r.value), r);
   }
-  sum->cost += loss.Cost();
-}
-
-template <class Sum>
-void FitProblem::EvaluatePosition(const Vector9d& y, Sum* sum) const {
-  if (!position_information_) return;
-  const Eigen::Vector3d off = y.head<3>() - position_;
-  const Eigen::Vector3d gradient = *position_information_ * off;
-  Cauchy loss(1.0);
-  const double weight = loss.Weight(off.dot(gradient));
-  sum->cost += loss.Cost();
-  if constexpr (Sum::kDerivatives) {
-    sum->gradient.template head<3>() += weight * gradient;
-    sum->information.template topLeftCorner<3, 3>() += weight * *position_information_;
-  }
-}
-
-template <class Sum>
-void FitProblem::Evaluate(const Vector9d& y, Sum* sum) const {
-  EvaluatePrior(y, sum);
-  EvaluateEdges(y, sum);
-  EvaluatePoints(y, sum);
-  EvaluatePosition(y, sum);
-}
-
-double FitProblem::Cost(const Vector9d& y) const {
-  CostSum sum;
-  Evaluate(y, &sum);
-  return sum.cost;
-}
-
-template <int N>
-NormalEquations<N> FitProblem::Linearised(const Vector9d& y) const {
-  NormalSum<N> sum;
-  Evaluate(y, &sum);
+  sum.cost += loss.Cost();
+  if (!position_information_) return sum;
+  const Eigen::Vector3d beside = y.head<3>() - position_;
+  const Eigen::Vector3d gradient = *position_information_ * beside;
+  Cauchy stray(1.0);
+  const double weight = stray.Weight(beside.dot(gradient));
+  sum.cost += stray.Cost();
+  sum.gradient.head<3>() += weight * gradient;
+  sum.information.topLeftCorner<3, 3>() += weight * *position_information_;
   return sum;
-}
-
-template NormalEquations<6> FitProblem::Linearised<6>(const Vector9d&) const;
-template NormalEquations<7> FitProblem::Linearised<7>(const Vector9d&) const;
-template NormalEquations<9> FitProblem::Linearised<9>(const Vector9d&) const;
-
-/// Residuals of one side in px, without loss or weights.
-std::vector<double> FitProblem::EdgeResiduals(size_t side, const Vector9d& y) const {
-  std::vector<double> all;
-  all.reserve(edges_[side].size());
-  for (const auto& edge : edges_[side])
-    all.push_back(EdgeResidual(side, edge, 1.0 / Range(y), y, nullptr));
-  return all;
-}
-
-std::vector<double> FitProblem::PointResiduals(const Vector9d& y) const {
-  std::vector<double> all;
-  all.reserve(input_.points.size());
-  for (const auto& p : input_.points)
-    all.push_back(SurfaceDistance(input_.shape, p, 1.0, y, nullptr));
-  return all;
 }
 
 void FitProblem::ReadSides(const std::array<std::vector<double>, 4>& edges, FitResult* out) const {
@@ -292,40 +192,40 @@ bool FitProblem::ReadEvidence(const std::array<std::vector<double>, 4>& edges,
   const Eigen::LLT<Matrix6d> posterior(out->posterior.covariance);
   if (posterior.info() != Eigen::Success) return false;
   const double log_posterior = posterior.matrixLLT().diagonal().array().log().sum();
-  double log_prior = -root_.diagonal().array().log().sum();
-  if (input_.shape.box())  // the heading counts by itself
-    log_prior -= 0.5 * std::log(shape_information_[0] * out->shape.yaw_variance);
+  const double log_prior = -root_.diagonal().array().log().sum() -
+                           0.5 * std::log(information_(kYawAt, kYawAt) * out->shape.yaw_variance);
   double cost = 0.5 * out->prior_distance;
   for (size_t side = 0; side < 4; ++side)
     if (out->used[side])
-      cost += BoundedCost(edges[side], input_.detection->silhouette.sigma_px, config_.edge_weight);
-  cost += BoundedCost(points, config_.lidar_sigma, config_.lidar_weight);
+      cost += BoundedCost(edges[side], input_.detection->silhouette.sigma_px, kEdgeWeight);
+  cost += BoundedCost(points, config_.lidar_sigma, kLidarWeight);
   out->log_evidence = -cost + log_posterior - log_prior;
   return std::isfinite(out->log_evidence);
 }
 
-FitResult FitProblem::Read(const Vector9d& y, const Matrix9d& covariance, double cost) const {
+FitResult FitProblem::Read(const Vector7d& y, const Matrix7d& covariance, double cost) const {
   FitResult out;
   out.posterior.mean = y.head<6>();
   out.posterior.covariance = covariance.topLeftCorner<6, 6>();
   out.shape = input_.shape;
-  out.shape.size = y.tail<2>();
-  if (config_.estimate_shape) out.shape.variance = covariance.diagonal().tail<2>();
+  out.shape.yaw = y[kYawAt];
+  out.shape.yaw_variance = covariance(kYawAt, kYawAt);
   out.cost = cost;
-  out.prior_distance = (root_ * (out.posterior.mean - input_.prior.mean)).squaredNorm();
-  if (input_.shape.box()) {
-    out.shape.yaw = y[kYawAt];
-    out.shape.yaw_variance = covariance(kYawAt, kYawAt);
-    const double turn = y[kYawAt] - input_.shape.yaw;
-    out.prior_distance += shape_information_[0] * turn * turn;
-  }
+  const double turn = y[kYawAt] - input_.shape.yaw;
+  out.prior_distance = (root_ * (out.posterior.mean - input_.prior.mean)).squaredNorm() +
+                       information_(kYawAt, kYawAt) * turn * turn;
   std::array<std::vector<double>, 4> edges;
-  for (size_t side = 0; side < 4; ++side) edges[side] = EdgeResiduals(side, y);
+  for (size_t side = 0; side < 4; ++side)
+    for (const auto& edge : edges_[side])
+      edges[side].push_back(EdgeResidual(side, edge, y).value / Range(y));
   ReadSides(edges, &out);
-  const auto points = PointResiduals(y);
+  std::vector<double> points;
+  for (const auto& p : input_.points) {
+    points.push_back(SurfaceDistance(input_.shape, p, y).value);
+    out.point_rms += points.back() * points.back();
+  }
   out.n_points = static_cast<int>(points.size());
-  for (double r : points) out.point_rms += r * r / static_cast<double>(points.size());
-  out.point_rms = std::sqrt(out.point_rms);
+  out.point_rms = std::sqrt(out.point_rms / std::max(1, out.n_points));
   out.ok = out.posterior.covariance.allFinite() && ReadEvidence(edges, points, &out);
   return out;
 }

@@ -3,14 +3,15 @@
 #include <algorithm>
 #include <cmath>
 
-#include "services/perception/place/odds.h"
-#include "services/perception/place/readings.h"
+#include "services/perception/place/hypotheses.h"
 #include "services/perception/place/target_points.h"
 
 namespace chase::perception {
 
 namespace {
 
+// Greatest squared Mahalanobis distance from the prediction, 6 dof.
+constexpr double kPriorGate = 30.0;
 constexpr double kSharpTurn = 0.02;   // how often the target does what the motion leaves out
 constexpr double kClear = 3.0;        // squared distance from the prediction that needs no other
 constexpr int kFewRays = 3;           // through it, as the edge of a thing may let pass
@@ -91,14 +92,13 @@ FitResult Localiser::Joined(const std::vector<Hypothesis>& all) {
 std::optional<FitResult> Localiser::WholeReading(FitInput* input) const {
   input->use_side = kReadings[0];
   FitResult fit = FitTarget(*input, config_.fit);
-  if (!Agrees(fit, config_.fit.prior_gate) || !EdgesAgree(fit, *input)) return std::nullopt;
+  if (!Agrees(fit, kPriorGate) || !EdgesAgree(fit, *input)) return std::nullopt;
   return fit;
 }
 
 void Localiser::Weigh(const FitInput& given, double log_prior, size_t readings, bool all,
                       std::vector<Hypothesis>* out) const {
   FitInput input = given;
-  const double prior_gate = config_.fit.prior_gate;
   const auto sensible = Sensible(input);
   // Where a like colour goes on, both sides may be another thing's, as the points tell.
   const bool joined = !input.points.empty() && (input.joined || GoesOn(*input.detection));
@@ -112,7 +112,7 @@ void Localiser::Weigh(const FitInput& given, double log_prior, size_t readings, 
     tried.push_back(seen);
     input.use_side = kReadings[k];
     const FitResult fit = FitTarget(input, config_.fit);
-    const double gate = k == 0 ? prior_gate : kHiddenPriorShare * prior_gate;
+    const double gate = k == 0 ? kPriorGate : kHiddenPriorShare * kPriorGate;
     if (!Agrees(fit, gate) || !EdgesAgree(fit, input)) continue;
     out->push_back({fit, log_prior + LogTarget(fit, input, config_.fit)});
     explained = explained || (!joined && RaysThrough(input, fit.posterior) < kFewRays);
@@ -144,7 +144,7 @@ std::optional<FitResult> Localiser::DisplacedReading(
     const FitInput& input, const std::vector<TargetPoint>& cluster) const {
   auto moved = AtRangeOf(cluster, input);
   if (!moved) return std::nullopt;
-  moved->points = PointsOnTarget(*moved, cluster, config_.fit.lidar_gate);
+  moved->points = PointsOnTarget(*moved, cluster, kLidarGate);
   if (moved->points.size() < kSurelyHit) return std::nullopt;
   auto fit = JoinedReading(&*moved);
   if (fit) fit->log_odds += std::log(kSharpTurn);
@@ -156,8 +156,8 @@ std::optional<FitResult> Localiser::Correct(const FitInput& predicted,
   if (!Visible(predicted)) return std::nullopt;
   FitInput input = predicted;
   input.hits = &clusters;
-  const double gate = config_.fit.lidar_gate + 2.0 * RangeSigma(predicted.prior, predicted.camera);
-  const double all = CountPoints(clusters);
+  const double gate = kLidarGate + 2.0 * RangeSigma(predicted.prior, predicted.camera);
+  const auto all = static_cast<double>(CountPoints(clusters));
   // What stands before the target may lend the blob's edge a few points, and what stands behind it
   // too: the fit that explains most of them is taken.
   std::optional<FitResult> best;

@@ -47,8 +47,6 @@ class Localiser {
   TargetGaussian Guess(const Camera& camera, const Detection& detection, double range,
                        double range_sigma) const;
 
-  static constexpr size_t kSurelyHit = 10;  ///< LiDAR points that are no chance
-
   PerceptionConfig config_;
 };
 

@@ -32,14 +32,11 @@ TargetGaussian Localiser::Guess(const Camera& camera, const Detection& detection
                                          detection.box.y + 0.5 * detection.box.height)
                                     .normalized();
   const double side_sigma = 0.5 * config_.target_height + 0.1 * range;
-  const double speed = config_.motion.initial_speed_sigma;
-  const double vertical = config_.motion.initial_vertical_speed_sigma;
   TargetGaussian g;
-  g.mean << camera.p_WC + range * sight, Eigen::Vector3d::Zero();
-  g.covariance.setZero();
+  g.mean.head<3>() = camera.p_WC + range * sight;
   g.covariance.topLeftCorner<3, 3>() = side_sigma * side_sigma * Eigen::Matrix3d::Identity() +
                                        range_sigma * range_sigma * sight * sight.transpose();
-  g.covariance.diagonal().tail<3>() << speed * speed, speed * speed, vertical * vertical;
+  g.ForgetVelocity();
   return g;
 }
 
@@ -51,7 +48,7 @@ std::optional<FitResult> Localiser::AcquirePartial(FitInput* input,
     const double range = MedianRange(cluster) + input->shape.size[0];
     if (LargerThanTarget(*input, range)) continue;
     input->prior = Guess(input->camera, *input->detection, range, 0.3);
-    input->points = PointsOnTarget(*input, cluster, 2.0 * config_.fit.lidar_gate);
+    input->points = PointsOnTarget(*input, cluster, 2.0 * kLidarGate);
     if (input->points.size() < kSurelyHit) continue;
     input->reappears = true;
     const auto fit = JoinedReading(input);
@@ -104,7 +101,7 @@ std::optional<FitResult> Localiser::Acquire(const TargetShape& shape, const Came
     if (!GivesRange(cluster)) continue;
     const double range = MedianRange(cluster) + shape.size[0];
     input.prior = Guess(camera, detection, range, 0.3);
-    input.points = PointsOnTarget(input, cluster, 2.0 * config_.fit.lidar_gate);
+    input.points = PointsOnTarget(input, cluster, 2.0 * kLidarGate);
     const auto fit = WholeReading(&input);
     if (good(fit)) return fit;
   }
@@ -118,7 +115,7 @@ std::optional<FitResult> Localiser::Acquire(const TargetShape& shape, const Came
   const auto partial = [&]() -> std::optional<FitResult> {
     if (detection.p_CT) return std::nullopt;
     const auto fit = not_through(AcquirePartialBySize(&input));
-    if (fit && HitElsewhere(input, clusters, config_.fit.lidar_gate)) return std::nullopt;
+    if (fit && HitElsewhere(input, clusters)) return std::nullopt;
     return fit;
   };
   if (!detection.p_CT && detection.AnyCut()) return partial();

@@ -12,6 +12,13 @@
 
 namespace chase::perception {
 
+inline constexpr double kNearest = 0.2;  ///< m, of ranges that scale pixels
+/// Independent samples that one edge, and at most those that one sweep's points, count for.
+inline constexpr double kEdgeWeight = 3.0, kLidarWeight = 16.0;
+
+/// Standard deviations of a new target's speed, horizontal and vertical, m/s.
+inline constexpr double kNewSpeed = 1.2, kNewClimb = 0.1;
+
 using Vector6d = Eigen::Matrix<double, 6, 1>;
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
 
@@ -22,6 +29,14 @@ struct TargetGaussian {
 
   Eigen::Vector3d position() const { return mean.head<3>(); }
   Eigen::Vector3d velocity() const { return mean.tail<3>(); }
+  /// Leaves nothing known of the velocity.
+  void ForgetVelocity() {
+    mean.tail<3>().setZero();
+    covariance.topRightCorner<3, 3>().setZero();
+    covariance.bottomLeftCorner<3, 3>().setZero();
+    covariance.bottomRightCorner<3, 3>() =
+        Eigen::Vector3d(kNewSpeed, kNewSpeed, kNewClimb).cwiseAbs2().asDiagonal();
+  }
 };
 
 /// All that is known for one frame. The time of the frame is that of `prior`.
@@ -56,9 +71,15 @@ struct FitResult {
   double log_odds = 0.0;  ///< of being the target rather than anything else of its colour
 };
 
+/// When the solver ends: iterations, and change of the cost, as a share.
+struct Effort {
+  int iterations = 8;
+  double tolerance = 1e-5;
+};
+
 /// The most likely position and velocity of the target (of a box its heading, too) from silhouette,
 /// LiDAR points, each at its own time, and prediction, with the covariance: one step of an iterated
 /// extended Kalman filter, by Ceres' TinySolver from the prediction on.
-FitResult FitTarget(const FitInput& input, const FitConfig& config);
+FitResult FitTarget(const FitInput& input, const FitConfig& config, const Effort& effort = {});
 
 }  // namespace chase::perception

@@ -12,7 +12,6 @@ namespace {
 constexpr size_t kMinPoints = 3;    // of a cluster that gives a range
 constexpr size_t kMostPoints = 40;  // in a fit
 constexpr int kManyPoints = 5;      // that went through it: the target is not there
-constexpr double kManyHits = 10.0;  // that hit the detection elsewhere: it is something else
 constexpr double kCore = 0.6;       // share of the target that such a ray goes through
 constexpr double kMostOfIt = 0.8;   // likewise of a target that is placed well
 constexpr double kBehind = 0.25;    // m behind the target where such a ray ends at least
@@ -41,10 +40,10 @@ double RangeSigma(const TargetGaussian& target, const Camera& camera) {
 
 std::vector<TargetPoint> PointsOnTarget(const FitInput& input,
                                         const std::vector<TargetPoint>& cluster, double gate) {
-  const Vector9d y = Unknowns(input.prior, input.shape);
+  const Vector7d y = Unknowns(input.prior, input.shape);
   std::vector<TargetPoint> kept;
   for (const auto& p : cluster)
-    if (std::abs(SurfaceDistance(input.shape, p, 1.0, y, nullptr)) < gate) kept.push_back(p);
+    if (std::abs(SurfaceDistance(input.shape, p, y).value) < gate) kept.push_back(p);
   if (!GivesRange(kept)) return {};
   const size_t step = 1 + kept.size() / kMostPoints;  // more would not tell more
   std::vector<TargetPoint> some;
@@ -68,17 +67,17 @@ int RaysThrough(const FitInput& input, const TargetGaussian& target) {
   return count;
 }
 
-bool HitElsewhere(const FitInput& input, const Clusters& clusters, double gate) {
-  if (CountPoints(clusters) < kManyHits) return false;
+bool HitElsewhere(const FitInput& input, const Clusters& clusters) {
+  if (CountPoints(clusters) < kSurelyHit) return false;
   return std::all_of(clusters.begin(), clusters.end(), [&](const auto& cluster) {
-    return PointsOnTarget(input, cluster, gate).empty();
+    return PointsOnTarget(input, cluster, kLidarGate).empty();
   });
 }
 
-double CountPoints(const Clusters& clusters) {
+size_t CountPoints(const Clusters& clusters) {
   size_t count = 0;
   for (const auto& cluster : clusters) count += cluster.size();
-  return static_cast<double>(count);
+  return count;
 }
 
 double MedianRange(const std::vector<TargetPoint>& cluster) {

@@ -8,6 +8,10 @@ namespace chase::perception {
 
 // LiDAR points against a predicted target.
 
+inline constexpr double kLidarGate = 0.35;  ///< m from the surface: further off is something else
+/// LiDAR points that are no chance: what they hit is one thing.
+inline constexpr int kSurelyHit = 10;
+
 /// Standard deviation of the target's position along the line of sight [m].
 double RangeSigma(const TargetGaussian& target, const Camera& camera);
 
@@ -24,10 +28,10 @@ bool SeenThrough(const FitInput& input, const Clusters& clusters);
 int RaysThrough(const FitInput& input, const TargetGaussian& target);
 
 /// True when many points hit the detection, and none of them the target as predicted.
-bool HitElsewhere(const FitInput& input, const Clusters& clusters, double gate);
+bool HitElsewhere(const FitInput& input, const Clusters& clusters);
 
 /// Points in all clusters.
-double CountPoints(const Clusters& clusters);
+size_t CountPoints(const Clusters& clusters);
 
 /// From the camera [m]; the cluster must hold enough points to give a range.
 double MedianRange(const std::vector<TargetPoint>& cluster);

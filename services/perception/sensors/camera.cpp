@@ -46,7 +46,6 @@ TargetShape ShapeOf(const PerceptionConfig& config) {
                : config.target_shape == "box"  ? TargetShape::Kind::kBox
                                                : TargetShape::Kind::kCylinder;
   shape.size = {config.target_radius, config.target_height};
-  shape.variance.setConstant(config.fit.shape_sigma * config.fit.shape_sigma);
   return shape;
 }
 

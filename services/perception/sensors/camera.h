@@ -32,7 +32,7 @@ struct Camera {
 /// The camera of a body at this pose.
 Camera CameraAt(const PoseSample& pose, const world::Rig& rig);
 
-/// The target's solid, and how well it is known. A box stands upright on a square.
+/// The target's solid. A box stands upright on a square.
 struct TargetShape {
   enum class Kind { kCylinder, kSphere, kBox };
   /// Variance of an unknown heading: uniform over the quarter turn after which a box looks the
@@ -40,9 +40,8 @@ struct TargetShape {
   static constexpr double kAnyYaw = M_PI * M_PI / 48.0;
 
   Kind kind = Kind::kCylinder;
-  Eigen::Vector2d size = {0.15, 0.5};                  ///< half the width (the radius), height, m
-  Eigen::Vector2d variance = Eigen::Vector2d::Zero();  ///< m^2
-  double yaw = 0.0, yaw_variance = kAnyYaw;            ///< of a box, rad
+  Eigen::Vector2d size = {0.15, 0.5};        ///< half the width (the radius), height, m
+  double yaw = 0.0, yaw_variance = kAnyYaw;  ///< of a box, rad
 
   bool sphere() const { return kind == Kind::kSphere; }
   bool box() const { return kind == Kind::kBox; }

@@ -9,7 +9,6 @@ namespace chase::perception {
 
 namespace {
 
-constexpr double kSpan = 1.0;     // s that are kept
 constexpr double kMaxGap = 0.15;  // s between samples that are still joined
 
 PoseSample Between(const PoseSample& a, const PoseSample& b, double t) {

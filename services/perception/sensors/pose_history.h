@@ -21,6 +21,8 @@ struct PoseSample {
 /// The last second of poses, to ask where the body was.
 class PoseHistory {
  public:
+  static constexpr double kSpan = 1.0;  ///< s that are kept; further back a new recording begins
+
   /// Samples that do not move time forward are left out; a jump back by more than a second starts
   /// anew.
   void Add(const PoseSample& sample);

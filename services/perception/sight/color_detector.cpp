@@ -11,11 +11,14 @@ namespace chase::perception {
 
 namespace {
 
-constexpr double kMaskScore = 127.0;  // half of full score: the blob's pixels
-constexpr double kOneThing = 0.85;    // score of a blob that is surely not several
-constexpr double kWellShaped = 0.35;  // of a piece of one that may be
-constexpr double kSharp = 2.0;        // px, width of an edge between two pixels or on one
-constexpr int kSplitArea = 60;        // px^2 of a blob that may be several
+constexpr double kAspectTolerance = 0.35;  // one standard deviation of its logarithm
+constexpr double kFillTolerance = 0.2;     // one standard deviation
+constexpr size_t kMaxBlobs = 16;           // the best so many are looked at
+constexpr double kMaskScore = 127.0;       // half of full score: the blob's pixels
+constexpr double kOneThing = 0.85;         // score of a blob that is surely not several
+constexpr double kWellShaped = 0.35;       // of a piece of one that may be
+constexpr double kSharp = 2.0;             // px, width of an edge between two pixels or on one
+constexpr int kSplitArea = 60;             // px^2 of a blob that may be several
 constexpr size_t kMostPieces = 10;
 
 double Bell(double x, double sigma) { return std::exp(-0.5 * (x / sigma) * (x / sigma)); }
@@ -51,8 +54,8 @@ double ColorDetector::ShapeScore(const Detection& d, double area, double hull_ar
   const double solid = std::min(1.0, area / std::max(hull_area, 1.0));
   if (d.AnyCut()) return 0.6 * solid;
   const double aspect = d.box.width / d.box.height, fill = area / d.box.area();
-  return solid * Bell(std::log(aspect / shape_.aspect), shape_.aspect_tolerance) *
-         Bell(fill - shape_.fill, shape_.fill_tolerance);
+  return solid * Bell(std::log(aspect / shape_.aspect), kAspectTolerance) *
+         Bell(fill - shape_.fill, kFillTolerance);
 }
 
 Detection ColorDetector::Describe(const cv::Mat& bgr, const cv::Mat& score,
@@ -107,15 +110,13 @@ std::vector<Detection> ColorDetector::Detect(const cv::Mat& bgr) const {
   std::vector<Detection> found;
   for (const auto& contour : contours) {
     const cv::Rect box = cv::boundingRect(contour);
-    if (box.area() < shape_.min_area_px) continue;
+    if (box.area() < kLeastArea) continue;
     Detection d = Describe(bgr, score, contour);
-    if (d.score >= shape_.min_score && cv::countNonZero(d.mask) >= shape_.min_area_px)
-      found.push_back(std::move(d));
+    if (cv::countNonZero(d.mask) >= kLeastArea) found.push_back(std::move(d));
   }
   std::stable_sort(found.begin(), found.end(),
                    [](const Detection& a, const Detection& b) { return a.score > b.score; });
-  if (found.size() > static_cast<size_t>(shape_.max_candidates))
-    found.resize(static_cast<size_t>(shape_.max_candidates));
+  if (found.size() > kMaxBlobs) found.resize(kMaxBlobs);
   for (auto& d : found) {
     d.silhouette = TraceSilhouette(bgr, d.mask, d.mask_box, d.cut);
     const double blur = std::max(1.0, EdgeWidth(bgr, d.mask, d.mask_box) / kSharp);

@@ -12,6 +12,8 @@ namespace chase::perception {
 /// may be several things, ranked likewise.
 class ColorDetector : public Detector {
  public:
+  static constexpr double kLeastArea = 20.0;  ///< px^2; smaller blobs are noise
+
   ColorDetector(const DetectorConfig& config, double edge_sigma_px)
       : ColorDetector(config.shape, ColorModel(config.color), edge_sigma_px) {}
   ColorDetector(const ShapeConfig& shape, ColorModel color, double edge_sigma_px)

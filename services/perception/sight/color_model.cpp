@@ -8,6 +8,9 @@ namespace chase::perception {
 
 namespace {
 
+constexpr double kHueSoftness = 6.0;                // degrees outside over which the score falls,
+constexpr double kSoftness = 0.12;                  // and likewise of saturation and value
+constexpr double kMinGain = 0.75, kMaxGain = 1.33;  // of a channel
 constexpr int kBits = 6;
 constexpr uint32_t kLevels = 1 << kBits;
 // Pixels below tell the light's tint: earth, bark and concrete under a warm lamp reach 0.5.
@@ -28,10 +31,8 @@ double HueOutside(double hue, double low, double high) {
   return after <= width ? 0.0 : std::min(after - width, 360.0 - after);
 }
 
-/// 1 at or above the limit, falling to 0 over `softness` below it.
-double Ramp(double x, double limit, double softness) {
-  return std::clamp(1.0 + (x - limit) / softness, 0.0, 1.0);
-}
+/// 1 at or above the limit, falling to 0 over kSoftness below it.
+double Ramp(double x, double limit) { return std::clamp(1.0 + (x - limit) / kSoftness, 0.0, 1.0); }
 
 }  // namespace
 
@@ -50,9 +51,8 @@ Hsv ToHsv(double b, double g, double r) {
 
 double Score(const ColorConfig& config, const Hsv& c) {
   const double outside = HueOutside(c.hue_deg, config.hue_min_deg, config.hue_max_deg);
-  return std::max(0.0, 1.0 - outside / config.hue_softness_deg) *
-         Ramp(c.saturation, config.saturation_min, config.softness) *
-         Ramp(c.value, config.value_min, config.softness);
+  return std::max(0.0, 1.0 - outside / kHueSoftness) * Ramp(c.saturation, config.saturation_min) *
+         Ramp(c.value, config.value_min);
 }
 
 double Light(const cv::Mat& bgr) {
@@ -94,7 +94,7 @@ Eigen::Vector3d ColorModel::Gains(const cv::Mat& bgr) const {
   // would otherwise do the same.
   gains[0] = std::max(gains[0], 1.0);
   gains[2] = std::min(gains[2], 1.0);
-  return gains.cwiseMax(config_.min_gain).cwiseMin(config_.max_gain);
+  return gains.cwiseMax(kMinGain).cwiseMin(kMaxGain);
 }
 
 cv::Mat ColorModel::Score(const cv::Mat& bgr) const {
@@ -108,8 +108,7 @@ cv::Mat ColorModel::Score(const cv::Mat& bgr) const {
       balanced[c][i] = static_cast<uint32_t>(
           std::min(255.0, static_cast<double>(i) * gains[static_cast<int>(c)]));
     const double level = ((static_cast<uint32_t>(i) >> usual) + 0.5) / (256 >> usual);
-    value[i] = static_cast<uint32_t>(
-        std::lround(255.0 * Ramp(level / light, config_.value_min, config_.softness)));
+    value[i] = static_cast<uint32_t>(std::lround(255.0 * Ramp(level / light, config_.value_min)));
   }
   cv::Mat score(bgr.size(), CV_8U);
   for (int y = 0; y < bgr.rows; ++y) {

@@ -37,6 +37,14 @@ struct Detection {
   Eigen::Matrix3d p_CT_covariance = Eigen::Matrix3d::Identity();  ///< frame C, m^2
 
   bool AnyCut() const { return cut[kLeft] || cut[kRight] || cut[kTop] || cut[kBottom]; }
+  /// True for a piece of a larger blob.
+  bool Piece() const { return part || edged; }
+  /// True when the image's border cuts it.
+  bool LeavesImage() const {
+    for (size_t side = 0; side < 4; ++side)
+      if (cut[side] && !goes_on[side]) return true;
+    return false;
+  }
 };
 
 /// Finds things in one image that may be the target, best first.

@@ -12,6 +12,8 @@ namespace chase::perception {
 
 namespace {
 
+constexpr double kCornerSigma = 0.5;  // px, standard deviation of a corner
+
 int DictionaryByName(const std::string& name) {
   static const std::map<std::string, int> kNames = {
       {"DICT_4X4_50", cv::aruco::DICT_4X4_50},
@@ -75,7 +77,7 @@ Detection MarkerDetector::Describe(const std::vector<cv::Point2f>& corners) cons
   const Eigen::Vector3d marker(translation[0], translation[1], translation[2]);
   const double range = marker.norm();
   const Eigen::Vector3d sight = marker / range;
-  const double across = config_.corner_sigma_px * range / rig_.focal_px;
+  const double across = kCornerSigma * range / rig_.focal_px;
   d.p_CT = marker + config_.depth * sight;
   // Range from the apparent edge; the marker may also be seen at an angle, so that its target's
   // centre does not lie exactly behind it.

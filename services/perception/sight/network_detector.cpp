@@ -11,6 +11,8 @@ namespace chase::perception {
 
 namespace {
 
+constexpr double kSameBox = 0.45;   // overlap above which two boxes are one
+constexpr double kEdgeSigma = 2.5;  // px, standard deviation of a box's edge
 constexpr int kBoxFields = 4;
 constexpr float kMostScore = 1.001f;  // what is above is no score, as in a transposed output
 
@@ -107,7 +109,7 @@ Detection NetworkDetector::Describe(const float* row, const cv::Size& image) con
                      static_cast<int>(d.box.width + 0.999), static_cast<int>(d.box.height + 0.999));
   d.cut = CutSides(roi, image);
   d.box -= cv::Point2d(0.5, 0.5);  // from pixel corners to pixel centres
-  d.silhouette = FromBox(d.box, d.cut, config_.edge_sigma_px);
+  d.silhouette = FromBox(d.box, d.cut, kEdgeSigma);
   return d;
 }
 
@@ -121,7 +123,7 @@ std::vector<Detection> NetworkDetector::Detect(const cv::Mat& bgr) const {
   std::stable_sort(all.begin(), all.end(),
                    [](const Detection& a, const Detection& b) { return a.score > b.score; });
   for (const auto& d : all) {
-    const auto same = [&](const Detection& k) { return Overlap(k.box, d.box) > config_.overlap; };
+    const auto same = [&](const Detection& k) { return Overlap(k.box, d.box) > kSameBox; };
     if (d.box.area() > 0.0 && std::none_of(kept.begin(), kept.end(), same)) kept.push_back(d);
   }
   return kept;

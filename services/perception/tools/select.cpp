@@ -6,7 +6,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "services/perception/sight/color_model.h"
+#include "services/perception/sight/color_detector.h"
 #include "services/perception/tools/learn.h"
 
 namespace chase::perception {
@@ -45,9 +45,9 @@ std::string Percent(double share) {
 }
 
 /// What the size of the thing has against it; empty: nothing.
-std::string Unfit(const cv::Mat& mask, const DetectorConfig& base) {
+std::string Unfit(const cv::Mat& mask) {
   const double area = cv::countNonZero(mask), share = area / static_cast<double>(mask.total());
-  if (area < base.shape.min_area_px)
+  if (area < ColorDetector::kLeastArea)
     return "only " + std::to_string(static_cast<int>(area)) +
            " pixels of one colour are there: go nearer";
   if (share > kMostShare)
@@ -65,7 +65,7 @@ Selection LearnAt(const cv::Mat& bgr, const cv::Point& at, const DetectorConfig&
   cv::Mat mask = cv::Mat::zeros(bgr.size(), CV_8U);
   cv::circle(mask, at, kPatch, 255, cv::FILLED);
   for (int i = 0; i < kGrowths; ++i) mask = Grown(bgr, mask, color);
-  if (std::string unfit = Unfit(mask, base); !unfit.empty()) return Refused(std::move(unfit));
+  if (std::string unfit = Unfit(mask); !unfit.empty()) return Refused(std::move(unfit));
   try {
     const Learned learned = LearnDetector({bgr}, {mask}, base);
     const Separation& apart = learned.color.pictures.front();

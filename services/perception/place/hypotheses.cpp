@@ -1,4 +1,4 @@
-#include "services/perception/place/odds.h"
+#include "services/perception/place/hypotheses.h"
 
 #include <Eigen/Cholesky>
 #include <algorithm>
@@ -10,6 +10,13 @@ namespace chase::perception {
 
 namespace {
 
+constexpr double kHiddenBy = 2.0;     // standard deviations of an edge
+constexpr double kTurnSpeed = 1.0;    // m/s, standard deviation of the speed a sharp turn adds
+constexpr double kTurnShift = 0.12;   // m, and of the place
+constexpr double kKnownShare = 0.03;  // of the range, standard deviation of the prediction
+constexpr double kKnownRange = 0.25;  // m, likewise
+constexpr double kSizeError = 0.1;    // share of the width that the outline may err by
+
 constexpr double kHidden = 0.02;      // how often a given side is hidden,
 constexpr double kStillHidden = 0.3;  // and of what comes back from behind something
 constexpr double kRunsOn = 0.04;      // how often a like colour goes on beyond a side,
@@ -18,14 +25,13 @@ constexpr double kRunsOnToo = 0.5;    // and beyond another one then
 // What else has the target's colour: so many blobs a frame, anywhere in the image, sides so far
 // apart (shares of its width), as far away as may be.
 constexpr double kClutter = 0.3, kClutterSide = 0.16, kClutterDepth = 10.0;
-constexpr double kStray = 0.02;   // how often a measured position is not the target's
-constexpr double kNearest = 0.2;  // m, of ranges that scale pixels
+constexpr double kStray = 0.02;  // how often a measured position is not the target's
 constexpr double kUnexplained = 0.5, kMostUnexplained = 6.0;  // for points at other ranges
 constexpr double kThrough = 1.0, kMostThrough = 20.0;         // for rays that went through it
 
 /// Density of the sides as they were seen, hidden ones anywhere inside.
-double LogSides(const FitResult& fit, const FitInput& input, const FitConfig& config) {
-  const double sigma = input.detection->silhouette.sigma_px / std::sqrt(config.edge_weight);
+double LogSides(const FitResult& fit, const FitInput& input) {
+  const double sigma = input.detection->silhouette.sigma_px / std::sqrt(kEdgeWeight);
   const double range = (fit.posterior.position() - input.camera.p_WC).norm();
   const double px = input.camera.rig.focal_px / std::max(kNearest, range);
   double sum = 0.0;
@@ -78,11 +84,62 @@ double LogPosition(const FitResult& fit, const FitInput& input) {
 
 }  // namespace
 
+double HiddenBy(const FitInput& input) { return kHiddenBy * input.detection->silhouette.sigma_px; }
+
+bool RangeIsKnown(const FitInput& input) {
+  return !input.points.empty() || RangeSigma(input.prior, input.camera) < kKnownRange;
+}
+
+FitInput AfterASharpTurn(const FitInput& input) {
+  Eigen::Vector2d sight = (input.prior.position() - input.camera.p_WC).head<2>().normalized();
+  Eigen::Matrix2d across = Eigen::Matrix2d::Identity();
+  if (input.points.empty()) across -= sight * sight.transpose();
+  FitInput turned = input;
+  turned.prior.covariance.topLeftCorner<2, 2>() += kTurnShift * kTurnShift * across;
+  turned.prior.covariance.block<2, 2>(3, 3) += kTurnSpeed * kTurnSpeed * across;
+  if (!input.points.empty()) turned.shape.yaw_variance = TargetShape::kAnyYaw;
+  return turned;
+}
+
+std::optional<FitInput> AtRangeOf(const std::vector<TargetPoint>& cluster, const FitInput& input) {
+  if (!GivesRange(cluster)) return std::nullopt;
+  const double range = MedianRange(cluster) + input.shape.size[0];
+  const double px = input.camera.rig.focal_px / range, seen = 0.5 * input.detection->box.width / px;
+  if (seen < (1.0 - kSizeError) * input.shape.size[0] ||
+      seen > (1.0 + kSizeError) * input.shape.MostHalfWidth())
+    return std::nullopt;
+  const Eigen::Vector3d to_prior = input.prior.position() - input.camera.p_WC;
+  const Eigen::Vector3d sight = to_prior.normalized();
+  const double shift = range - to_prior.norm();
+  FitInput moved = input;
+  moved.prior.mean.head<3>() += shift * sight;
+  moved.prior.covariance.topLeftCorner<3, 3>() += shift * shift * sight * sight.transpose();
+  moved.prior.covariance.block<2, 2>(3, 3) += kTurnSpeed * kTurnSpeed * Eigen::Matrix2d::Identity();
+  moved.shape.yaw_variance = TargetShape::kAnyYaw;
+  return moved;
+}
+
+std::function<bool(const Sides&)> Sensible(const FitInput& input) {
+  const auto expected = ProjectTarget(input.camera, input.prior.position(), input.shape);
+  const double range = (input.prior.position() - input.camera.p_WC).norm();
+  const double share = RangeSigma(input.prior, input.camera) / range;
+  if (!expected || share > kKnownShare) return [](const Sides&) { return true; };
+  const auto fits = [share, by = HiddenBy(input)](double seen, double wanted) {
+    return std::abs(seen - wanted) < by + 3.0 * share * wanted;
+  };
+  const bool wide = fits(input.detection->box.width, expected->width);
+  const bool high = fits(input.detection->box.height, expected->height);
+  return [wide, high](const Sides& use) {
+    const bool sides = use[kLeft] && use[kRight], caps = use[kTop] && use[kBottom];
+    return (sides || !wide) && (caps || !high);
+  };
+}
+
 double LogTarget(const FitResult& fit, const FitInput& input, const FitConfig& config) {
-  double sum = fit.log_evidence + LogSides(fit, input, config);
+  double sum = fit.log_evidence + LogSides(fit, input);
   if (input.detection->p_CT) sum += LogPosition(fit, input);
   if (fit.n_points > 0) {
-    const double n = std::min(config.lidar_weight, static_cast<double>(fit.n_points));
+    const double n = std::min(kLidarWeight, static_cast<double>(fit.n_points));
     sum -= std::log(config.lidar_sigma / std::sqrt(n) * std::sqrt(2.0 * M_PI));
     sum -= std::min(kMostThrough, kThrough * RaysThrough(input, fit.posterior));
   }
