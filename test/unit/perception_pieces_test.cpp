@@ -11,7 +11,6 @@
 #include "services/perception/place/localiser.h"
 #include "services/perception/place/target_points.h"
 #include "services/perception/sight/color_detector.h"
-#include "services/perception/sight/inner_edges.h"
 #include "services/perception/sight/silhouette.h"
 
 namespace chase::perception {

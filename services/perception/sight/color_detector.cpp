@@ -4,7 +4,6 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
-#include "services/perception/sight/inner_edges.h"
 #include "services/perception/sight/silhouette.h"
 
 namespace chase::perception {
@@ -37,12 +36,8 @@ cv::Mat Mask(const cv::Mat& score) {
 std::vector<cv::Point> RowEnds(const cv::Mat& mask) {
   std::vector<cv::Point> ends;
   for (int y = 0; y < mask.rows; ++y) {
-    const uint8_t* row = mask.ptr<uint8_t>(y);
-    int first = 0, last = mask.cols - 1;
-    while (first <= last && row[first] == 0) ++first;
-    if (first > last) continue;
-    while (row[last] == 0) --last;
-    ends.emplace_back(first, y);
+    const auto [first, last] = Extent(mask.row(y));
+    if (first >= 0) ends.emplace_back(first, y);
     if (last > first) ends.emplace_back(last, y);
   }
   return ends;

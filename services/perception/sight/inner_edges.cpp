@@ -1,5 +1,3 @@
-#include "services/perception/sight/inner_edges.h"
-
 #include <algorithm>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
@@ -18,11 +16,9 @@ constexpr int kGap = 2;                // rows from one of its peaks to the next
 constexpr double kLean = 1.6;          // px, likewise
 constexpr size_t kMostEdges = 4;       // the clearest of a blob
 constexpr double kClearLength = 30.0;  // rows that make an edge no clearer
-constexpr int kLeastPiece = 5;         // px, width of a piece
 constexpr int kBorder = 2;             // px from the blob's own outline that hold no inner edge
 constexpr int kBeyond = 2;             // rows of a piece beyond its edges
 constexpr double kAlongside = 0.5;     // share of the shorter edge that two of a piece run together
-constexpr size_t kMaxSamples = 8;
 
 /// An edge from row to row, in the coordinates of the blob's box.
 struct Edge {

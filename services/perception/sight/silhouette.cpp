@@ -8,7 +8,6 @@ namespace chase::perception {
 
 namespace {
 
-constexpr int kMaxSamples = 8;          // a side
 constexpr double kSideFrom = 0.25;      // rows used for left and right, share of the height:
 constexpr double kSideTo = 0.85;        // without the caps
 constexpr double kCapHalfWidth = 0.22;  // columns used for top and bottom, around the middle
@@ -17,7 +16,6 @@ constexpr int kLeastDepth = 4;          // pixels across, fewer are not placed b
 constexpr int kReachShare = 8;          // of the blob, that its edges are looked for in
 constexpr int kCutReach = 3;            // px from a window's border within which it has cut
 constexpr size_t kMostLines = 6;        // that a blob is split along
-constexpr int kLeastPiece = 5;          // px, width of a piece
 constexpr double kSteep = 0.33;         // of a blob's extent that no leaning side jumps at once
 constexpr int kBorder = 1;              // px; nearer to the image's border counts as cut
 
@@ -53,18 +51,6 @@ double EdgeOffset(const Line& line, int depth) {
   return 1.0 - covered;
 }
 
-/// First and last set pixel of a row or column, or (-1, -1).
-std::pair<int, int> Extent(const cv::Mat& line) {
-  int first = -1, last = -1;
-  const int n = static_cast<int>(line.total());
-  for (int i = 0; i < n; ++i)
-    if (line.rows == 1 ? line.at<uint8_t>(0, i) : line.at<uint8_t>(i, 0)) {
-      if (first < 0) first = i;
-      last = i;
-    }
-  return {first, last};
-}
-
 /// What EdgeWidth() says, of one line; nothing where inside and outside are too much alike.
 std::optional<double> WidthOn(const Line& line, int depth) {
   const int reach = std::max(kLeastDepth / 2, depth / kReachShare);
@@ -77,39 +63,31 @@ std::optional<double> WidthOn(const Line& line, int depth) {
   return std::max(1.0, span / steepest);
 }
 
-int Stride(int from, int to) { return std::max(1, (to - from + kMaxSamples) / kMaxSamples); }
-
-void TraceSides(const cv::Mat& bgr, const cv::Mat& mask, const cv::Rect& roi,
-                const std::array<bool, 4>& cut, Silhouette* out) {
-  const int from = static_cast<int>(kSideFrom * roi.height);
-  const int to = std::max(from + 1, static_cast<int>(kSideTo * roi.height));
-  for (int y = from; y < to; y += Stride(from, to)) {
-    const auto [first, last] = Extent(mask.row(y));
+/// Shows lines that cross the blob, along the rows between its caps or the columns around its
+/// middle: from either end of the blob, and how many pixels lie between.
+template <class Show>
+void ForEachCrossing(const cv::Mat& bgr, const cv::Mat& mask, const cv::Rect& roi, bool rows,
+                     const Show& show) {
+  const double middle = 0.5 * (roi.width - 1), half = kCapHalfWidth * roi.width;
+  const int from = rows ? static_cast<int>(kSideFrom * roi.height)
+                        : std::max(0, static_cast<int>(std::ceil(middle - half)));
+  const int to = rows ? std::max(from + 1, static_cast<int>(kSideTo * roi.height))
+                      : std::min(roi.width, static_cast<int>(std::floor(middle + half)) + 1);
+  const int stride = std::max(1, (to - from + kMaxSamples) / kMaxSamples);
+  const cv::Point step(rows, !rows);
+  for (int i = from; i < to; i += stride) {
+    const auto [first, last] = Extent(rows ? mask.row(i) : mask.col(i));
     if (first < 0) continue;
-    const int v = roi.y + y, depth = last - first + 1;
-    const Line left{&bgr, {roi.x + first, v}, {1, 0}}, right{&bgr, {roi.x + last, v}, {-1, 0}};
-    if (!cut[kLeft])
-      out->samples[kLeft].emplace_back(roi.x + first - 0.5 + EdgeOffset(left, depth), v);
-    if (!cut[kRight])
-      out->samples[kRight].emplace_back(roi.x + last + 0.5 - EdgeOffset(right, depth), v);
+    const cv::Point start = roi.tl() + i * cv::Point(!rows, rows);
+    show(Line{&bgr, start + first * step, step}, Line{&bgr, start + last * step, -step},
+         last - first + 1);
   }
 }
 
-void TraceCaps(const cv::Mat& bgr, const cv::Mat& mask, const cv::Rect& roi,
-               const std::array<bool, 4>& cut, Silhouette* out) {
-  const double middle = 0.5 * (roi.width - 1), half = kCapHalfWidth * roi.width;
-  const int from = std::max(0, static_cast<int>(std::ceil(middle - half)));
-  const int to = std::min(roi.width, static_cast<int>(std::floor(middle + half)) + 1);
-  for (int x = from; x < to; x += Stride(from, to)) {
-    const auto [first, last] = Extent(mask.col(x));
-    if (first < 0) continue;
-    const int u = roi.x + x, depth = last - first + 1;
-    const Line top{&bgr, {u, roi.y + first}, {0, 1}}, bottom{&bgr, {u, roi.y + last}, {0, -1}};
-    if (!cut[kTop])
-      out->samples[kTop].emplace_back(u, roi.y + first - 0.5 + EdgeOffset(top, depth));
-    if (!cut[kBottom])
-      out->samples[kBottom].emplace_back(u, roi.y + last + 0.5 - EdgeOffset(bottom, depth));
-  }
+/// Where the edge at the line's start lies, px.
+Eigen::Vector2d EdgeAt(const Line& line, int depth) {
+  const Eigen::Vector2d start(line.start.x, line.start.y), step(line.step.x, line.step.y);
+  return start - 0.5 * step + EdgeOffset(line, depth) * step;
 }
 
 /// True when the blob goes on at this pixel.
@@ -223,26 +201,36 @@ void AddBetween(const cv::Mat& bgr, const Detection& detection, std::vector<Jump
 
 }  // namespace
 
+std::pair<int, int> Extent(const cv::Mat& line) {
+  int first = -1, last = -1;
+  const int n = static_cast<int>(line.total());
+  for (int i = 0; i < n; ++i)
+    if (line.rows == 1 ? line.at<uint8_t>(0, i) : line.at<uint8_t>(i, 0)) {
+      if (first < 0) first = i;
+      last = i;
+    }
+  return {first, last};
+}
+
 Silhouette TraceSilhouette(const cv::Mat& bgr, const cv::Mat& mask, const cv::Rect& roi,
                            const std::array<bool, 4>& cut) {
   Silhouette out;
-  TraceSides(bgr, mask, roi, cut, &out);
-  TraceCaps(bgr, mask, roi, cut, &out);
+  for (const bool rows : {true, false}) {
+    const Side low = rows ? kLeft : kTop, high = rows ? kRight : kBottom;
+    ForEachCrossing(bgr, mask, roi, rows, [&](const Line& first, const Line& last, int depth) {
+      if (!cut[low]) out.samples[low].push_back(EdgeAt(first, depth));
+      if (!cut[high]) out.samples[high].push_back(EdgeAt(last, depth));
+    });
+  }
   return out;
 }
 
 double EdgeWidth(const cv::Mat& bgr, const cv::Mat& mask, const cv::Rect& roi) {
   std::vector<double> widths;
-  const int from = static_cast<int>(kSideFrom * roi.height);
-  const int to = std::max(from + 1, static_cast<int>(kSideTo * roi.height));
-  for (int y = from; y < to; y += Stride(from, to)) {
-    const auto [first, last] = Extent(mask.row(y));
-    if (first < 0) continue;
-    const int v = roi.y + y, depth = last - first + 1;
-    for (const Line& line :
-         {Line{&bgr, {roi.x + first, v}, {1, 0}}, Line{&bgr, {roi.x + last, v}, {-1, 0}}})
+  ForEachCrossing(bgr, mask, roi, true, [&](const Line& first, const Line& last, int depth) {
+    for (const Line& line : {first, last})
       if (const auto width = WidthOn(line, depth)) widths.push_back(*width);
-  }
+  });
   if (widths.empty()) return 1.0;
   const auto middle = widths.begin() + static_cast<std::ptrdiff_t>(widths.size() / 2);
   std::nth_element(widths.begin(), middle, widths.end());

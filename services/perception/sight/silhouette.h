@@ -3,11 +3,18 @@
 #include <array>
 #include <opencv2/core.hpp>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "services/perception/sight/detector.h"
 
 namespace chase::perception {
+
+inline constexpr int kMaxSamples = 8;  ///< of a side
+inline constexpr int kLeastPiece = 5;  ///< px, width of a piece
+
+/// First and last set pixel of a row or column, or (-1, -1).
+std::pair<int, int> Extent(const cv::Mat& line);
 
 /// Outline of a blob: `mask` (8 bit, 255 on the blob) lies at `roi` in `bgr`. Each edge is placed
 /// between pixels from how the colour goes over from the blob to what lies beside it. Sides in
@@ -38,6 +45,11 @@ std::optional<Detection> CropTo(const cv::Mat& bgr, const Detection& detection,
 /// Pieces of a blob that several things of one colour make up together, split where an end of its
 /// columns or of its rows jumps; none where none does.
 std::vector<Detection> Split(const cv::Mat& bgr, const Detection& detection);
+
+/// Pieces of a blob on either side of an upright edge inside it, where one thing stands before
+/// another of its colour in other light. Such a side has samples like an outline; beyond the rows
+/// of its edges a piece is cut. In inner_edges.cpp.
+std::vector<Detection> SplitAtEdges(const cv::Mat& bgr, const Detection& detection);
 
 /// One detection out of several pieces: the union of their masks. All must carry masks.
 Detection Merge(const cv::Mat& bgr, const std::vector<Detection>& pieces);
