@@ -12,6 +12,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <opencv2/videoio.hpp>
+#include <set>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -141,7 +142,7 @@ std::string ToText(const std::optional<PictureTarget>& target) {
 }
 
 void WriteAnnotated(const Picture& picture, const std::optional<PictureTarget>& target,
-                    const std::string& folder) {
+                    const std::string& folder, std::set<std::string>* written) {
   fs::create_directories(folder);
   cv::Mat drawn = picture.bgr.clone();
   const int thick = std::max(1, drawn.rows / 240);
@@ -160,7 +161,9 @@ void WriteAnnotated(const Picture& picture, const std::optional<PictureTarget>& 
   cv::putText(drawn, text, at, cv::FONT_HERSHEY_SIMPLEX, scale, {0, 255, 0}, thick, cv::LINE_AA);
   std::string name = fs::path(picture.name).filename().string();
   std::replace(name.begin(), name.end(), '#', '-');
-  const std::string file = (fs::path(folder) / (name + ".png")).string();
+  std::string unused = name;  // pictures of several folders may be called alike
+  for (int i = 2; !written->insert(unused).second; ++i) unused = fmt::format("{}-{}", name, i);
+  const std::string file = (fs::path(folder) / (unused + ".png")).string();
   if (!cv::imwrite(file, drawn)) throw std::runtime_error(file + ": cannot be written");
 }
 
@@ -179,7 +182,8 @@ json ToJson(const Evaluation& e) {
 int Run(const Arguments& a) {
   PerceptionConfig config;
   if (!a.config.empty()) config::Load(a.config, &config);
-  const PictureDetector detector(config);
+  PictureDetector detector(config);
+  std::set<std::string> written;
   json pictures = json::array();
   Evaluation evaluation;
   int failed = 0;
@@ -194,7 +198,7 @@ int Run(const Arguments& a) {
   const auto show = [&](const Picture& picture) {
     const auto target = detector.Find(picture.bgr);
     if (!a.masks.empty()) evaluation.Add(target, MaskFor(picture, a.masks));
-    if (!a.out.empty()) WriteAnnotated(picture, target, a.out);
+    if (!a.out.empty()) WriteAnnotated(picture, target, a.out, &written);
     if (a.json)
       pictures.push_back(ToJson(picture, target));
     else

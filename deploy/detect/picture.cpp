@@ -28,15 +28,18 @@ std::optional<world::Rig> RigFor(const world::Rig& rig, const cv::Size& size) {
 
 }  // namespace
 
-PictureDetector::PictureDetector(const PerceptionConfig& config) : config_(config) {
-  MakeDetector(config.detector, config.fit.edge_sigma_px, config.rig);
-}
+PictureDetector::PictureDetector(const PerceptionConfig& config)
+    : config_(config),
+      size_(config.rig.width_px, config.rig.height_px),
+      detector_(MakeDetector(config.detector, config.fit.edge_sigma_px, config.rig)) {}
 
-std::optional<PictureTarget> PictureDetector::Find(const cv::Mat& bgr) const {
+std::optional<PictureTarget> PictureDetector::Find(const cv::Mat& bgr) {
   const auto rig = RigFor(config_.rig, bgr.size());
-  const auto detector =
-      MakeDetector(config_.detector, config_.fit.edge_sigma_px, rig.value_or(config_.rig));
-  const auto found = detector->Detect(bgr);
+  if (bgr.size() != size_)
+    detector_ =
+        MakeDetector(config_.detector, config_.fit.edge_sigma_px, rig.value_or(config_.rig));
+  size_ = bgr.size();
+  const auto found = detector_->Detect(bgr);
   const Detection* best = MostLikely(found);
   if (!best || best->score < config_.state.acquire_score) return std::nullopt;
   PictureTarget target{*best, {}, {}};

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <memory>
 #include <opencv2/core.hpp>
 #include <optional>
 
@@ -24,10 +25,12 @@ class PictureDetector {
   explicit PictureDetector(const PerceptionConfig& config);
 
   /// Nothing where no detection scores `state.acquire_score`.
-  std::optional<PictureTarget> Find(const cv::Mat& bgr) const;
+  std::optional<PictureTarget> Find(const cv::Mat& bgr);
 
  private:
   PerceptionConfig config_;
+  cv::Size size_;  ///< of the pictures that the detector is for
+  std::unique_ptr<Detector> detector_;
 };
 
 /// Counts over pictures with masks. One is found where the overlap is at least half.

@@ -1,5 +1,7 @@
 #include "services/perception/messages.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <opencv2/imgcodecs.hpp>
@@ -34,6 +36,14 @@ cv::Mat ToBgr(const cv::Mat& image, int32_t pixelformat) {
   else
     image.copyTo(bgr);
   return bgr;
+}
+
+/// Why the target is not tracked; empty where it is.
+std::string Reason(const TargetEstimate& target) {
+  if (target.state == TargetState::kTracking) return "";
+  if (!target.note.empty()) return target.note;
+  if (target.state == TargetState::kSearching) return "no detection was taken for the target yet";
+  return fmt::format("not seen for {:.1f} s", target.unseen);
 }
 
 // The wire counts the states in the same order.
@@ -115,8 +125,9 @@ target_t ToMessage(const TargetEstimate& target, int64_t utime) {
   std::copy(box, box + 4, m.box_px);
   m.score = target.score;
   m.n_points = target.n_points;
-  m.existence = m.state == target_t::TRACKING || m.state == target_t::OCCLUDED ? 1.0 : 0.0;
-  m.reason = target.note;
+  const bool there = m.state == target_t::TRACKING || m.state == target_t::OCCLUDED;
+  m.existence = there ? std::exp(-target.unseen / kHiddenTime) : 0.0;
+  m.reason = Reason(target);
   return m;
 }
 

@@ -128,7 +128,7 @@ void RunDraws(const Arguments& a, const std::vector<Photo>& photos, const Detect
         PerceptionConfig config;
         config.detector = learned.config;
         config.state.acquire_score = learned.acquire_score;
-        const PictureDetector detector(config);
+        PictureDetector detector(config);
         claimed += detector.Find(photos[i].bgr).has_value();
         invented += detector.Find(absent[i]).has_value();
         ++shown;

@@ -4,7 +4,7 @@ target_link_libraries(perception_world PUBLIC perception_core)
 target_include_directories(perception_world PUBLIC ${perception_test_dir})
 
 chase_test(perception_image_test
-  LIBS perception_world opencv_imgproc opencv_imgcodecs opencv_aruco opencv_dnn
+  LIBS perception_world detect opencv_imgproc opencv_imgcodecs opencv_aruco opencv_dnn
   SOURCES ${perception_test_dir}/perception_detector_test.cpp
           ${perception_test_dir}/perception_marker_test.cpp
           ${perception_test_dir}/perception_network_test.cpp

@@ -4,7 +4,8 @@
 #include <cmath>
 #include <opencv2/calib3d.hpp>
 
-#include "services/perception/place/target_fit.h"
+#include "services/perception/place/hypotheses.h"
+#include "services/perception/place/target_points.h"
 
 namespace chase::perception {
 namespace {
@@ -90,6 +91,59 @@ TEST(PerceptionLens, ARollingShutterMovesNothing) {
   input.camera.rig.readout = 0.0;
   EXPECT_GT((FitTarget(input, {}).posterior.position() - target).norm(), 0.03)
       << "else this shows nothing";
+}
+
+/// A camera that looks along x, and lines of sight far off its axis.
+const std::vector<Vector3d> kSights = {
+    {1, 0, 0}, {1, 0.8, 0}, {1, -0.9, 0.3}, {1, 0.2, -0.5}, {1, -0.7, -0.4}};
+
+Camera LookingAlongX(const world::Rig& rig) {
+  Camera camera;
+  camera.rig = rig;
+  camera.R_WC << 0, 0, 1, -1, 0, 0, 0, -1, 0;
+  return camera;
+}
+
+TEST(PerceptionRange, BySizeHoldsFarOffTheAxisAndBehindAnyLens) {
+  for (const auto& rig : {WideRig("pinhole", {}), WideRig("plumb_bob", {-0.1, 0.01}),
+                          WideRig("fisheye", {0.03, -0.01, 0.004, -0.001})})
+    for (const Vector3d& sight : kSights)
+      for (const double range : {1.5, 4.0, 9.0}) {
+        const Camera camera = LookingAlongX(rig);
+        const auto box = ProjectTarget(camera, range * sight.normalized(), {});
+        ASSERT_TRUE(box);
+        for (const bool by_height : {false, true})
+          EXPECT_NEAR(RangeBySize(camera, *box, {}, by_height), range, 0.02 * range)
+              << rig.lens << " " << sight.transpose() << " by height " << by_height;
+      }
+}
+
+TEST(PerceptionRange, PointsOnATargetOffTheAxisMoveItsPrediction) {
+  for (const Vector3d& sight : kSights) {
+    FitInput input;
+    input.camera = LookingAlongX(WideRig("pinhole", {}));
+    Detection d;
+    d.box = *ProjectTarget(input.camera, 4.0 * sight.normalized(), {});
+    input.detection = &d;
+    input.prior.mean.head<3>() = 5.0 * sight.normalized();
+    const std::vector<TargetPoint> hits(12,
+                                        TargetPoint{Vector3d::Zero(), Vector3d::Zero(), 0.0, 3.85});
+    const auto moved = AtRangeOf(hits, input);
+    ASSERT_TRUE(moved) << "too wide or narrow for it there: " << sight.transpose();
+    EXPECT_NEAR(moved->prior.position().norm(), 4.0, 1e-9);
+    d.box.width *= 1.5;
+    EXPECT_FALSE(AtRangeOf(hits, input));
+  }
+}
+
+TEST(PerceptionRange, OfANewTargetIsAsSureAsWhatToldIt) {
+  const Camera camera = LookingAlongX(WideRig("pinhole", {}));
+  for (const Vector3d& sight : kSights) {
+    const cv::Rect2d box = *ProjectTarget(camera, 4.0 * sight.normalized(), {});
+    const TargetGaussian g = NewTarget(camera, box, {}, 4.0, 0.3);
+    EXPECT_NEAR(RangeSigma(g, camera), 0.3, 1e-9);
+    EXPECT_NEAR(g.position().norm(), 4.0, 1e-9);
+  }
 }
 
 }  // namespace

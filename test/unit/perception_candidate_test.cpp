@@ -191,6 +191,15 @@ TEST(PerceptionCandidate, IsFollowedWhereASideIsHiddenAndLidarTellsWhereItIs) {
   EXPECT_FALSE(c.HiddenIn(hidden)) << "never yet in view for long enough";
 }
 
+TEST(PerceptionCandidate, PointsOfTheFirstSightingRangeItsTrack) {
+  Sighting s;
+  s.detection.box = {0, 0, 20, 40};
+  const View view{2.5, {}, {}, {}, {}, {}};
+  EXPECT_LT(NewCandidate(s, view).track.ranged, 0.0);
+  s.fit.n_points = 12;
+  EXPECT_EQ(NewCandidate(s, view).track.ranged, 2.5);
+}
+
 TEST(PerceptionCandidate, CountsSightingsWithLidarPoints) {
   Candidate c = CandidateAt({3.0, 0.0, 0.55}, {3.0, 0.0, 0.55}, 0.01);
   Sighting s;

@@ -40,7 +40,7 @@ cv::Mat MaskOf(const cv::Rect& place) {
 TEST(PerceptionPicture, GivesRegionAndRangeAtAnyResolution) {
   PerceptionConfig config;
   config.rig.camera_pitch_deg = 0.0;
-  const PictureDetector detector(config);
+  PictureDetector detector(config);
   const double range = config.rig.focal_px * config.target_height / kPlace.height;
   for (const double scale : {1.0, 2.0, 4.0}) {
     cv::Mat bgr, mask;
@@ -126,6 +126,18 @@ TEST_F(DetectCommand, WritesJsonPicturesAndFigures) {
   const cv::Mat drawn = cv::imread(File("out/a.png.png"));
   ASSERT_EQ(drawn.size(), cv::Size(376, 240));
   EXPECT_GT(cv::norm(drawn, Scene(kOrange)), 0.0);
+}
+
+TEST_F(DetectCommand, PicturesCalledAlikeAreAllWritten) {
+  for (const std::string folder : {"x", "y"}) {
+    fs::create_directories(folder_ / folder);
+    cv::imwrite(File(folder + "/a.png"), Scene(folder == "x" ? kOrange : kGrey));
+  }
+  ASSERT_EQ(Command({File("x"), File("y"), "--out", File("out")}).code, 0);
+  const cv::Mat first = cv::imread(File("out/a.png.png")),
+                second = cv::imread(File("out/a.png-2.png"));
+  ASSERT_EQ(first.size(), second.size());
+  EXPECT_GT(cv::norm(first, second), 0.0);
 }
 
 TEST_F(DetectCommand, ReadsTheFramesOfAVideo) {

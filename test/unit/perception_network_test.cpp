@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "deploy/detect/picture.h"
 #include "perception_world.h"
 #include "services/perception/sight/network_detector.h"
 
@@ -250,6 +251,19 @@ TEST(PerceptionNetwork, WhatItsBoxesShowIsTracked) {
     }
   }
   std::filesystem::remove(file);
+}
+
+TEST(PerceptionNetwork, ItsFileIsReadOnceForManyPictures) {
+  PerceptionConfig config;
+  config.detector.kind = "network";
+  config.detector.network.file = testing::TempDir() + "perception_tiny_pictures.onnx";
+  config.detector.network.input_width_px = kNetWidth;
+  config.detector.network.input_height_px = kNetHeight;
+  WriteNetwork(config.detector.network.file, 24.0 * (235.0 - 12.0) / 255.0);
+  PictureDetector detector(config);
+  std::filesystem::remove(config.detector.network.file);
+  const cv::Mat grey(config.rig.height_px, config.rig.width_px, CV_8UC3, cv::Scalar::all(120));
+  for (int i = 0; i < 2; ++i) EXPECT_NO_THROW(detector.Find(grey));
 }
 
 TEST(PerceptionNetwork, MissingAndBrokenFilesAreRefused) {

@@ -13,6 +13,7 @@
 #include "common/bus/lockstep.h"
 #include "common/config/config.h"
 #include "perception_world.h"
+#include "services/perception/messages.h"
 
 namespace chase::perception {
 namespace {
@@ -158,6 +159,26 @@ TEST(PerceptionNode, StartsWaitingAndSearches) {
   ASSERT_EQ(bench.out.size(), 1u);
   EXPECT_EQ(bench.out[0].state, +target_t::SEARCHING);
   EXPECT_EQ(bench.Report().detail, "no pose");
+}
+
+TEST(PerceptionMessages, ATargetNotSeenExistsTheLessTheLongerAndSaysWhy) {
+  TargetEstimate target;
+  double before = 1.0;
+  for (const TargetState state :
+       {TargetState::kTracking, TargetState::kOccluded, TargetState::kOccluded}) {
+    target.state = state;
+    const target_t m = ToMessage(target, 0);
+    EXPECT_EQ(m.reason.empty(), state == TargetState::kTracking);
+    EXPECT_TRUE(target.unseen == 0.0 ? m.existence == 1.0 : m.existence < before);
+    EXPECT_GT(m.existence, 0.0);
+    before = m.existence;
+    target.unseen += 1.0;
+  }
+  for (const TargetState state : {TargetState::kSearching, TargetState::kLost}) {
+    target.state = state;
+    EXPECT_EQ(ToMessage(target, 0).existence, 0.0);
+    EXPECT_FALSE(ToMessage(target, 0).reason.empty());
+  }
 }
 
 TEST(PerceptionNode, LostPosesAreNotUsed) {

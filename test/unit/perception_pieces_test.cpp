@@ -191,6 +191,27 @@ TEST(PerceptionRays, ManyPointsAndNoneOfThemOnTheTargetHitAnotherThing) {
   EXPECT_FALSE(HitElsewhere(input, {behind}));
 }
 
+TEST(PerceptionPieces, WhatGoesWithTheWidthIsThePiecesOwn) {
+  cv::Mat bgr(240, 376, CV_8UC3, cv::Scalar::all(120));
+  bgr(cv::Rect(100, 60, 80, 90)).setTo(cv::Scalar(12, 105, 235));
+  DetectorConfig config;
+  config.shape.inset = 0.1;
+  config.shape.outline_sigma = 0.05;
+  const auto whole = ColorDetector(config, 0.5).Detect(bgr).front();
+  ASSERT_EQ(whole.box.width, 80.0);
+  EXPECT_DOUBLE_EQ(whole.inset_px, 8.0);
+  const auto left = CropTo(bgr, whole, {100, 0, 20, 240});
+  const auto right = CropTo(bgr, whole, {150, 0, 30, 240});
+  ASSERT_TRUE(left && right);
+  EXPECT_DOUBLE_EQ(left->inset_px, 2.0);
+  EXPECT_DOUBLE_EQ(left->silhouette.departure_px, 1.0);
+  EXPECT_NEAR(std::pow(whole.silhouette.sigma_px, 2) - std::pow(left->silhouette.sigma_px, 2),
+              4.0 * 4.0 - 1.0 * 1.0, 1e-9);
+  const auto merged = Merge(bgr, {*left, *right});
+  EXPECT_DOUBLE_EQ(merged.inset_px, whole.inset_px);
+  EXPECT_NEAR(merged.silhouette.sigma_px, whole.silhouette.sigma_px, 1e-9);
+}
+
 /// Something grey hides the left half of the target.
 TEST(PerceptionAcquire, HalfOfATargetIsPlacedByItsHeightUnlessPointsTellAnotherRange) {
   const Localiser localiser(PerceptionConfig{});

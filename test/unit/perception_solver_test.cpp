@@ -18,13 +18,16 @@ constexpr double kStep = 1e-6;
 /// A cylinder seen by the camera and the lidar with noise, some samples far off.
 class Scene {
  public:
-  explicit Scene(unsigned seed) : random_(seed) {
+  explicit Scene(unsigned seed, const char* lens = "pinhole") : random_(seed) {
     const Vector3d target(3.0 + Uniform(), Uniform(), 0.55);
     const Eigen::Quaterniond tilt(Eigen::AngleAxisd(0.15 * Uniform(), Vector3d::UnitY()));
     PoseSample pose;
     pose.p_WB = {0.0, 0.0, 1.0 + 0.6 * Uniform()};
     pose.R_WB = tilt;
-    input.camera = CameraAt(pose, {});
+    world::Rig rig;
+    rig.lens = lens;
+    if (rig.lens == "fisheye") rig.lens_coefficients << 0.1, -0.02, 0.0, 0.0, 0.0;
+    input.camera = CameraAt(pose, rig);
     Outline(target);
     for (int i = 0; i < 24; ++i) Hit(target, pose.p_WB);
     input.prior.mean << target + 0.1 * Vector3d(Uniform(), Uniform(), Uniform()),
@@ -359,7 +362,7 @@ void ExpectSame(const FitResult& fit, Reference* reference) {
 TEST(PerceptionSolver, FindsWhatCeresFindsBlockByBlock) {
   const FitConfig config;
   for (unsigned seed = 1; seed <= 40; ++seed) {
-    const Scene scene(seed);
+    const Scene scene(seed, seed % 2 ? "pinhole" : "fisheye");
     Reference reference(scene, config);
     SCOPED_TRACE(testing::Message() << "seed " << seed);
     ExpectSame(FitTarget(scene.input, config, {400, 1e-9}), &reference);

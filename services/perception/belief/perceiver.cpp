@@ -273,6 +273,7 @@ TargetEstimate Perceiver::Report(double t, const std::optional<View>& view,
   if (!track_) return out;
   out.p_WT = track_->state.position();
   out.v_WT = track_->state.velocity();
+  out.unseen = std::max(0.0, t - track_->seen);
   if (state_ == TargetState::kLost) return out;
   out.velocity_covariance = track_->state.covariance.bottomRightCorner<3, 3>();
   const auto pose = view ? view->pose : finder_.poses().Nearest(t, 1e9).value_or(PoseSample{});

@@ -34,6 +34,7 @@ struct TargetEstimate {
   cv::Rect2d box;                                                     ///< px; empty: not seen
   double score = 0.0;                                                 ///< of the detection, 0 to 1
   int n_points = 0;                                                   ///< LiDAR points used
+  double unseen = 0.0;                                                ///< since it was seen last, s
   std::string note;      ///< what was missing; else empty
   Refused refused = {};  ///< detections of this frame that no track was started from
 };

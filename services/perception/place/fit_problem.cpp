@@ -23,9 +23,12 @@ double Sign(size_t side) { return side == kRight || side == kTop ? 1.0 : -1.0; }
 
 /// What lies between the lines of sight half a pixel to either side: the angle in the plan view
 /// [rad] for the left and right edges, the change of slope for the others.
-double PerPixel(const Camera& camera, const Eigen::Vector3d& ray, bool upright) {
-  const Eigen::Vector3d half = camera.R_WC.col(upright ? 0 : 1) * (0.5 / camera.rig.focal_px);
-  const PlanRay a = ToPlan(camera.p_WC, ray - half), b = ToPlan(camera.p_WC, ray + half);
+double PerPixel(const Camera& camera, const Eigen::Vector2d& px, bool upright) {
+  const Eigen::Vector2d half = upright ? Eigen::Vector2d(0.5, 0.0) : Eigen::Vector2d(0.0, 0.5);
+  const auto at = [&](const Eigen::Vector2d& p) {
+    return ToPlan(camera.p_WC, camera.Ray(p.x(), p.y()));
+  };
+  const PlanRay a = at(px - half), b = at(px + half);
   const double span = upright
                           ? a.direction.x() * b.direction.y() - a.direction.y() * b.direction.x()
                           : b.slope - a.slope;
@@ -119,8 +122,7 @@ void FitProblem::AddEdges() {
     for (const auto& px : samples) {
       const Camera camera = input_.camera.AtRow(px.y());
       const Eigen::Vector3d ray = camera.Ray(px.x(), px.y());
-      edges_[side].push_back(
-          {ToPlan(camera.p_WC, ray), 1.0 / PerPixel(camera, ray, Upright(side))});
+      edges_[side].push_back({ToPlan(camera.p_WC, ray), 1.0 / PerPixel(camera, px, Upright(side))});
     }
   }
 }

@@ -15,6 +15,7 @@ constexpr double kTurnSpeed = 1.0;    // m/s, standard deviation of the speed a 
 constexpr double kTurnShift = 0.12;   // m, and of the place
 constexpr double kKnownShare = 0.03;  // of the range, standard deviation of the prediction
 constexpr double kKnownRange = 0.25;  // m, likewise
+constexpr double kAside = 0.1;        // share of the range that a new target may lie beside its box
 constexpr double kSizeError = 0.1;    // share of the width that the outline may err by
 
 constexpr double kHidden = 0.02;      // how often a given side is hidden,
@@ -101,12 +102,29 @@ FitInput AfterASharpTurn(const FitInput& input) {
   return turned;
 }
 
+TargetGaussian NewTarget(const Camera& camera, const cv::Rect2d& box, const TargetShape& shape,
+                         double range, double range_sigma) {
+  const Eigen::Vector3d sight = camera.Sight(box);
+  const Eigen::Matrix3d along = sight * sight.transpose();
+  const double beside = 0.5 * shape.size[1] + kAside * range;
+  TargetGaussian g;
+  g.mean.head<3>() = camera.p_WC + range * sight;
+  g.covariance.topLeftCorner<3, 3>() =
+      beside * beside * (Eigen::Matrix3d::Identity() - along) + range_sigma * range_sigma * along;
+  g.ForgetVelocity();
+  return g;
+}
+
 std::optional<FitInput> AtRangeOf(const std::vector<TargetPoint>& cluster, const FitInput& input) {
   if (!GivesRange(cluster)) return std::nullopt;
   const double range = MedianRange(cluster) + input.shape.size[0];
-  const double px = input.camera.rig.focal_px / range, seen = 0.5 * input.detection->box.width / px;
-  if (seen < (1.0 - kSizeError) * input.shape.size[0] ||
-      seen > (1.0 + kSizeError) * input.shape.MostHalfWidth())
+  const auto& seen = input.detection->box;
+  const auto width = [&](double half) {
+    const auto box = BoxAtRange(input.camera, seen, range, Round(input.shape, half));
+    return box ? box->width : 0.0;
+  };
+  if (seen.width < (1.0 - kSizeError) * width(input.shape.size[0]) ||
+      seen.width > (1.0 + kSizeError) * width(input.shape.MostHalfWidth()))
     return std::nullopt;
   const Eigen::Vector3d to_prior = input.prior.position() - input.camera.p_WC;
   const Eigen::Vector3d sight = to_prior.normalized();

@@ -43,6 +43,10 @@ std::function<bool(const Sides&)> Sensible(const FitInput& input);
 /// pixel that is hidden for a leap.
 FitInput AfterASharpTurn(const FitInput& input);
 
+/// A target of which nothing is known but its range [m] and that it shows in this box.
+TargetGaussian NewTarget(const Camera& camera, const cv::Rect2d& box, const TargetShape& shape,
+                         double range, double range_sigma);
+
 /// The same with the prediction moved along the line of sight to the range of these points, its
 /// heading unknown: a box may turn while its width alone tells its range. Nothing where the
 /// detection is too wide or too narrow for the target there.

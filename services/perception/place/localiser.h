@@ -44,8 +44,6 @@ class Localiser {
              std::vector<Hypothesis>* out) const;
   bool EdgesAgree(const FitResult& fit, const FitInput& input) const;
   bool Agrees(const FitResult& fit, double prior_gate) const;
-  TargetGaussian Guess(const Camera& camera, const Detection& detection, double range,
-                       double range_sigma) const;
 
   PerceptionConfig config_;
 };

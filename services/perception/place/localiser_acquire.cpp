@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "services/perception/place/hypotheses.h"
 #include "services/perception/place/localiser.h"
 #include "services/perception/place/target_points.h"
 
@@ -10,35 +11,23 @@ namespace chase::perception {
 namespace {
 
 constexpr int kSidesOfNew = 3;           // of what nothing is known of yet
+constexpr double kHitRange = 0.3;        // m, standard deviation of a range from points
+constexpr double kSizedShare = 0.4;      // of the range, likewise from the width alone
 constexpr double kSizedRange = 0.24;     // m, standard deviation of a range from one size alone
 constexpr double kMaxRangeError = 0.15;  // share of the range; a worse first fix is none
 constexpr double kLarger = 1.15, kLargerSigmas = 6.0;  // times its size, and of an edge more
 
 /// True for a detection that the target cannot fill at this range.
 bool LargerThanTarget(const FitInput& input, double range) {
-  const double px = kLarger * input.camera.rig.focal_px / range;
-  const double more = kLargerSigmas * input.detection->silhouette.sigma_px;
   const auto& box = input.detection->box;
-  return box.width > 2.0 * px * input.shape.MostHalfWidth() + more ||
-         box.height > px * input.shape.size[1] + more;
+  const double more = kLargerSigmas * input.detection->silhouette.sigma_px;
+  const auto most =
+      BoxAtRange(input.camera, box, range, Round(input.shape, input.shape.MostHalfWidth()));
+  return most &&
+         (box.width > kLarger * most->width + more || box.height > kLarger * most->height + more);
 }
 
 }  // namespace
-
-TargetGaussian Localiser::Guess(const Camera& camera, const Detection& detection, double range,
-                                double range_sigma) const {
-  const Eigen::Vector3d sight = camera
-                                    .Ray(detection.box.x + 0.5 * detection.box.width,
-                                         detection.box.y + 0.5 * detection.box.height)
-                                    .normalized();
-  const double side_sigma = 0.5 * config_.target_height + 0.1 * range;
-  TargetGaussian g;
-  g.mean.head<3>() = camera.p_WC + range * sight;
-  g.covariance.topLeftCorner<3, 3>() = side_sigma * side_sigma * Eigen::Matrix3d::Identity() +
-                                       range_sigma * range_sigma * sight * sight.transpose();
-  g.ForgetVelocity();
-  return g;
-}
 
 /// Half of a target whose range the points tell; what goes on beyond it is a larger thing.
 std::optional<FitResult> Localiser::AcquirePartial(FitInput* input,
@@ -47,7 +36,7 @@ std::optional<FitResult> Localiser::AcquirePartial(FitInput* input,
     if (cluster.size() < kSurelyHit) continue;
     const double range = MedianRange(cluster) + input->shape.size[0];
     if (LargerThanTarget(*input, range)) continue;
-    input->prior = Guess(input->camera, *input->detection, range, 0.3);
+    input->prior = NewTarget(input->camera, input->detection->box, input->shape, range, kHitRange);
     input->points = PointsOnTarget(*input, cluster, 2.0 * kLidarGate);
     if (input->points.size() < kSurelyHit) continue;
     input->reappears = true;
@@ -63,14 +52,14 @@ std::optional<FitResult> Localiser::AcquirePartial(FitInput* input,
 std::optional<FitResult> Localiser::AcquirePartialBySize(FitInput* input) const {
   const auto& d = *input->detection;
   const auto seen = [&](Side side) { return !d.silhouette.samples[side].empty(); };
-  const auto& size = input->shape.size;
-  const double focal = input->camera.rig.focal_px;
+  const auto by_size = [&](bool by_height) {
+    return RangeBySize(input->camera, d.box, input->shape, by_height);
+  };
   std::vector<double> ranges;
-  if (seen(kTop) && seen(kBottom)) ranges.push_back(focal * size[1] / d.box.height);
-  if (d.edged && seen(kLeft) && seen(kRight))
-    ranges.push_back(focal * 2.0 * input->shape.MeanHalfWidth() / d.box.width);
+  if (seen(kTop) && seen(kBottom)) ranges.push_back(by_size(true));
+  if (d.edged && seen(kLeft) && seen(kRight)) ranges.push_back(by_size(false));
   for (const double range : ranges) {
-    input->prior = Guess(input->camera, d, range, kSizedRange);
+    input->prior = NewTarget(input->camera, d.box, input->shape, range, kSizedRange);
     input->points.clear();
     input->reappears = true;
     const auto fit = JoinedReading(input);
@@ -100,7 +89,7 @@ std::optional<FitResult> Localiser::Acquire(const TargetShape& shape, const Came
   for (const auto& cluster : clusters) {
     if (!GivesRange(cluster)) continue;
     const double range = MedianRange(cluster) + shape.size[0];
-    input.prior = Guess(camera, detection, range, 0.3);
+    input.prior = NewTarget(camera, detection.box, shape, range, kHitRange);
     input.points = PointsOnTarget(input, cluster, 2.0 * kLidarGate);
     const auto fit = WholeReading(&input);
     if (good(fit)) return fit;
@@ -119,10 +108,9 @@ std::optional<FitResult> Localiser::Acquire(const TargetShape& shape, const Came
     return fit;
   };
   if (!detection.p_CT && detection.AnyCut()) return partial();
-  const double range = detection.p_CT ? detection.p_CT->norm()
-                                      : camera.rig.focal_px * 2.0 * shape.MeanHalfWidth() /
-                                            std::max(1.0, detection.box.width);
-  input.prior = Guess(camera, detection, range, 0.4 * range);
+  const double range =
+      detection.p_CT ? detection.p_CT->norm() : RangeBySize(camera, detection.box, shape, false);
+  input.prior = NewTarget(camera, detection.box, shape, range, kSizedShare * range);
   input.points.clear();
   const auto fit = WholeReading(&input);
   if (!good(fit)) return partial();

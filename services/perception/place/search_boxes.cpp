@@ -25,8 +25,8 @@ std::optional<SearchBoxes> WhereToLook(const TargetGaussian& thing, const Target
   if (!box) return std::nullopt;
   const double range = (thing.position() - camera.p_WC).norm();
   const double sigma = std::sqrt(thing.covariance.topLeftCorner<3, 3>().diagonal().maxCoeff());
-  const double spread = kGateSigmas * sigma / range * camera.rig.focal_px;
-  const double tilted = kGateSigmas * tilt * camera.rig.focal_px;
+  const double px = camera.PixelsPerRadian({box->x + 0.5 * box->width, box->y + 0.5 * box->height});
+  const double spread = kGateSigmas * sigma / range * px, tilted = kGateSigmas * tilt * px;
   const double margin = tilted + spread, trim = 0.5 * tilted + spread;
   return SearchBoxes{
       *box, Grown(*box, margin + kBoxMargin * box->width, margin + kBoxMargin * box->height),

@@ -11,10 +11,23 @@ namespace {
 
 constexpr double kNearest = 0.05;  // m
 constexpr int kRimPoints = 16;
+constexpr int kRangeSteps = 5;  // a size is nearly inverse to the range
 
 }  // namespace
 
 Eigen::Vector3d Camera::Ray(double u, double v) const { return R_WC * rig.Ray({u, v}); }
+
+Eigen::Vector3d Camera::Sight(const cv::Rect2d& box) const {
+  return Ray(box.x + 0.5 * box.width, box.y + 0.5 * box.height).normalized();
+}
+
+double Camera::PixelsPerRadian(const Eigen::Vector2d& px) const {
+  const auto span = [&](const Eigen::Vector2d& half) {
+    const Eigen::Vector2d a = px - half, b = px + half;
+    return (Ray(b.x(), b.y()).normalized() - Ray(a.x(), a.y()).normalized()).norm();
+  };
+  return 1.0 / std::min(span({0.5, 0.0}), span({0.0, 0.5}));
+}
 
 std::optional<Eigen::Vector2d> Camera::Project(const Eigen::Vector3d& p_W) const {
   return Pixel(R_WC.transpose() * (p_W - p_WC));
@@ -38,6 +51,12 @@ Camera CameraAt(const PoseSample& pose, const world::Rig& rig) {
   const Eigen::Matrix3d R_WB = pose.R_WB.toRotationMatrix();
   const Eigen::Vector3d w_WB = R_WB * pose.w_WB_B, arm = R_WB * rig.camera_position;
   return {rig, R_WB * rig.R_BC(), pose.p_WB + arm, pose.v_WB + w_WB.cross(arm), w_WB};
+}
+
+TargetShape Round(TargetShape shape, double half) {
+  if (shape.box()) shape.kind = TargetShape::Kind::kCylinder;
+  shape.size[0] = half;
+  return shape;
 }
 
 TargetShape ShapeOf(const PerceptionConfig& config) {
@@ -78,6 +97,27 @@ std::optional<cv::Rect2d> ProjectTarget(const Camera& camera, const Eigen::Vecto
     high = high.cwiseMax(*px);
   }
   return cv::Rect2d(low.x(), low.y(), high.x() - low.x(), high.y() - low.y());
+}
+
+std::optional<cv::Rect2d> BoxAtRange(const Camera& camera, const cv::Rect2d& seen, double range,
+                                     const TargetShape& shape) {
+  return ProjectTarget(camera, camera.p_WC + range * camera.Sight(seen), shape);
+}
+
+double RangeBySize(const Camera& camera, const cv::Rect2d& seen, const TargetShape& shape,
+                   bool by_height) {
+  const TargetShape round = Round(shape, shape.MeanHalfWidth());
+  const auto size = [&](const cv::Rect2d& box) { return by_height ? box.height : box.width; };
+  const double wanted = std::max(1.0, size(seen));
+  double range = camera.rig.focal_px * (by_height ? shape.size[1] : 2.0 * round.size[0]) / wanted;
+  cv::Rect2d aim = seen;
+  for (int i = 0; i < kRangeSteps; ++i) {
+    const auto box = BoxAtRange(camera, aim, range, round);
+    if (!box) break;  // nearer than it is large
+    range *= size(*box) / wanted;
+    aim += 0.5 * (seen.tl() + seen.br() - box->tl() - box->br());  // its centre lies beside
+  }
+  return range;
 }
 
 }  // namespace chase::perception

@@ -23,6 +23,10 @@ struct Camera {
 
   /// Direction of the line of sight through (u, v) px, frame W, z_C component 1.
   Eigen::Vector3d Ray(double u, double v) const;
+  /// Likewise through the middle of a box, px; unit.
+  Eigen::Vector3d Sight(const cv::Rect2d& box) const;
+  /// Pixels that one radian spans at a pixel, along the axis where they are the more.
+  double PixelsPerRadian(const Eigen::Vector2d& px) const;
   /// Pixel of p_W [m]; nothing when it lies behind or nearer than 5 cm.
   std::optional<Eigen::Vector2d> Project(const Eigen::Vector3d& p_W) const;
   /// Likewise of a point in frame C [m].
@@ -50,6 +54,9 @@ struct TargetShape {
   double MostHalfWidth() const { return (box() ? M_SQRT2 : 1.0) * size[0]; }
 };
 
+/// What is round and as wide, at any heading, as a target whose half width is `half` m.
+TargetShape Round(TargetShape shape, double half);
+
 /// The target as the config describes it.
 TargetShape ShapeOf(const PerceptionConfig& config);
 
@@ -57,5 +64,14 @@ TargetShape ShapeOf(const PerceptionConfig& config);
 /// of the sphere that is seen; nothing when any part lies behind the camera.
 std::optional<cv::Rect2d> ProjectTarget(const Camera& camera, const Eigen::Vector3d& p_WT,
                                         const TargetShape& shape);
+
+/// Likewise of a target `range` m away in the middle of `seen`, px.
+std::optional<cv::Rect2d> BoxAtRange(const Camera& camera, const cv::Rect2d& seen, double range,
+                                     const TargetShape& shape);
+
+/// Range [m] at which the target shows as wide, or as high, as `seen` [px], in its middle; its
+/// heading is not known.
+double RangeBySize(const Camera& camera, const cv::Rect2d& seen, const TargetShape& shape,
+                   bool by_height);
 
 }  // namespace chase::perception

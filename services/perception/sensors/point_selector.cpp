@@ -120,10 +120,7 @@ Clusters SelectPoints(const RangedSweep& sweep, const PoseHistory& poses, const 
                       double t_frame, const Detection& detection, const Eigen::Vector3d& v_WT) {
   const auto pose = poses.At(sweep.t() + 0.05, 0.06);
   if (!pose) return {};
-  const Eigen::Vector3d sight = camera
-                                    .Ray(detection.box.x + 0.5 * detection.box.width,
-                                         detection.box.y + 0.5 * detection.box.height)
-                                    .normalized();
+  const Eigen::Vector3d sight = camera.Sight(detection.box);
   const Eigen::Vector3f sight_L =
       (camera.rig.R_BL().transpose() * (pose->R_WB.conjugate() * sight)).cast<float>();
   const auto cosine =

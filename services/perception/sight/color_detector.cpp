@@ -115,7 +115,8 @@ std::vector<Detection> ColorDetector::Detect(const cv::Mat& bgr) const {
   for (auto& d : found) {
     d.silhouette = TraceSilhouette(bgr, d.mask, d.mask_box, d.cut);
     const double blur = std::max(1.0, EdgeWidth(bgr, d.mask, d.mask_box) / kSharp);
-    d.silhouette.sigma_px = std::hypot(blur * edge_sigma_px_, shape_.outline_sigma * d.box.width);
+    d.silhouette.departure_px = shape_.outline_sigma * d.box.width;
+    d.silhouette.sigma_px = std::hypot(blur * edge_sigma_px_, d.silhouette.departure_px);
   }
   AddPieces(bgr, score, &found);
   return found;

@@ -18,6 +18,7 @@ enum Side { kLeft = 0, kRight = 1, kTop = 2, kBottom = 3 };
 struct Silhouette {
   std::array<std::vector<Eigen::Vector2d>, 4> samples;  ///< by Side, (u, v) px
   double sigma_px = 0.5;                                ///< standard deviation of one edge
+  double departure_px = 0.0;  ///< the part of it that goes with the detection's width
 };
 
 /// One thing in the image that may be the target.

@@ -102,12 +102,27 @@ int SideOf(const cv::Rect& box, size_t side) {
   return side == kLeft ? box.x : side == kRight ? box.br().x : side == kTop ? box.y : box.br().y;
 }
 
+/// Outline, cuts, and what goes with the width, of a detection made of another's pixels, or of
+/// several; mask and mask_box are its own.
+void Describe(const cv::Mat& bgr, Detection* d) {
+  const double width = d->box.width, departure = d->silhouette.departure_px;
+  const double sharp = std::sqrt(std::pow(d->silhouette.sigma_px, 2) - departure * departure);
+  d->box = EdgeBox(d->mask_box);
+  d->cut = CutSides(d->mask_box, bgr.size());
+  d->goes_on = d->parted = {};
+  d->silhouette = TraceSilhouette(bgr, d->mask, d->mask_box, d->cut);
+  d->silhouette.departure_px = departure * d->box.width / width;
+  d->silhouette.sigma_px = std::hypot(sharp, d->silhouette.departure_px);
+  d->inset_px *= d->box.width / width;
+}
+
 /// A side of a piece at which a like colour goes on stays one where it still ends the piece.
 void KeepCut(const Detection& piece, Detection* out) {
   for (size_t side = 0; side < 4; ++side)
     if (piece.goes_on[side] && SideOf(piece.mask_box, side) == SideOf(out->mask_box, side)) {
       out->cut[side] = out->goes_on[side] = true;
       out->parted[side] = piece.parted[side];
+      out->silhouette.samples[side].clear();
     }
 }
 
@@ -270,13 +285,9 @@ std::optional<Detection> CropTo(const cv::Mat& bgr, const Detection& detection,
   Detection out = detection;
   out.mask_box = tight + view.tl();
   out.mask = seen(tight).clone();
-  out.box = EdgeBox(out.mask_box);
-  out.cut = CutSides(out.mask_box, bgr.size());
-  out.goes_on = out.parted = {};
+  Describe(bgr, &out);
   KeepCut(detection, &out);
-  out.silhouette = TraceSilhouette(bgr, out.mask, out.mask_box, out.cut);
   LeaveOutCut(detection, window, &out);
-  out.silhouette.sigma_px = detection.silhouette.sigma_px;
   return out;
 }
 
@@ -296,13 +307,8 @@ Detection Merge(const cv::Mat& bgr, const std::vector<Detection>& pieces) {
     cv::max(place, piece.mask, place);
     out.score = std::max(out.score, piece.score);
   }
-  out.box = EdgeBox(out.mask_box);
-  out.cut = CutSides(out.mask_box, bgr.size());
-  out.goes_on = out.parted = {};
+  Describe(bgr, &out);
   for (const auto& piece : pieces) KeepCut(piece, &out);
-  const double sigma = out.silhouette.sigma_px;
-  out.silhouette = TraceSilhouette(bgr, out.mask, out.mask_box, out.cut);
-  out.silhouette.sigma_px = sigma;
   return out;
 }
 
