@@ -10,16 +10,11 @@ namespace {
 constexpr double kHiddenAfter = 0.08;     // s unseen: occluded
 constexpr double kLostSigma = 3.0;        // m, horizontal standard deviation of what is lost
 constexpr double kUnknownVariance = 1e4;  // m^2, while nothing is known
-constexpr int kCandidateMisses = 2;       // frames without it that end a candidate
-constexpr size_t kMaxCandidates = 6;
-constexpr double kLeastWidth = 12.0;  // standard deviations of a sharp edge; less may be a slit
-constexpr int kDecoyHits = 3;     // sightings that what stands beside one that drives counts for
-constexpr double kGap = 0.25;     // s between frames in which a target may do anything
-constexpr double kPointed = 1.0;  // s that what is pointed at is looked for there
-constexpr int kSureHits = 5;      // corrections after which the track is trusted
-constexpr double kDrivenSigma = 0.1;  // m, how well that must be known
-constexpr double kStood = 0.2;        // m, within which a target stands
-constexpr double kStoodFor = 0.6;     // s, likewise
+constexpr double kGap = 0.25;             // s between frames in which a target may do anything
+constexpr int kSureHits = 5;              // corrections after which the track is trusted
+constexpr double kDrivenSigma = 0.1;      // m, how well that must be known
+constexpr double kStood = 0.2;            // m, within which a target stands
+constexpr double kStoodFor = 0.6;         // s, likewise
 
 }  // namespace
 
@@ -39,124 +34,12 @@ void Perceiver::Follow(View* view) {
   }
   sighting_ = found;
   track_->Correct(found->fit);
-  if (!doubtful_) candidates_.clear();
-}
-
-void Perceiver::FollowCandidates(View* view) {
-  for (auto& c : candidates_) {
-    const auto again = finder_.Find(
-        c.track, view, [&](const Sighting& s) { return s.detection.Piece() && !c.part; });
-    const bool partly =
-        c.track.partial || (again && (again->detection.edged || c.HiddenIn(*again)));
-    if (!again || !(again->fit.whole || partly)) {
-      ++c.track.misses;
-      continue;
-    }
-    c.Correct(*again);
-    c.range = (c.track.state.position() - view->camera.p_WC).norm();
-  }
-  DropMissed();
-}
-
-void Perceiver::DropMissed() {
-  candidates_.erase(
-      std::remove_if(candidates_.begin(), candidates_.end(),
-                     [](const Candidate& c) { return c.track.misses >= kCandidateMisses; }),
-      candidates_.end());
-}
-
-bool Perceiver::MayBeNew(const Detection& d) const {
-  return (d.edged || d.score >= config_.state.acquire_score) &&
-         d.box.width >= kLeastWidth * config_.fit.edge_sigma_px;
-}
-
-/// Counts why nothing was made of a detection.
-void Perceiver::CountRefused(const Detection& d) {
-  Refusal why = finder_.HasSweeps() ? Refusal::kContradicted : Refusal::kNoRange;
-  if (d.box.width < kLeastWidth * config_.fit.edge_sigma_px)
-    why = Refusal::kTooSmall;
-  else if (!d.edged && d.score < config_.state.acquire_score)
-    why = Refusal::kWrongShape;
-  ++refused_[static_cast<size_t>(why)];
-}
-
-/// True when a candidate is followed there.
-bool Perceiver::Followed(const Sighting& s) const {
-  return std::any_of(candidates_.begin(), candidates_.end(), [&](const Candidate& c) {
-    return (c.track.state.position() - s.fit.posterior.position()).norm() <
-           config_.state.decoy_radius;
-  });
-}
-
-/// What may be the hidden target, half of it seen, is followed on its own to see whether it drives.
-void Perceiver::AddPartial(const View& view) {
-  if (!unsure_ || unsure_->fit.whole || unsure_->fit.n_points == 0) return;
-  if (Followed(*unsure_) || candidates_.size() >= kMaxCandidates) return;
-  if (!Plausible(*unsure_, view.t)) return;
-  candidates_.push_back(NewCandidate(*unsure_, view));
-  candidates_.back().track.state.ForgetVelocity();
-}
-
-void Perceiver::AddCandidates(View* view) {
-  std::vector<size_t> order;  // near before far, the middle before the border
-  for (size_t i = 0; i < view->detections.size(); ++i) {
-    if (view->taken[i]) continue;
-    if (MayBeNew(view->detections[i]))
-      order.push_back(i);
-    else
-      CountRefused(view->detections[i]);
-  }
-  std::stable_sort(order.begin(), order.end(), [&](size_t a, size_t b) {
-    return Prominence(view->detections[a], config_.rig) >
-           Prominence(view->detections[b], config_.rig);
-  });
-  const bool comes_back = track_ && !doubtful_ && track_->Proven();
-  for (const size_t i : order) {
-    if (candidates_.size() >= kMaxCandidates) return;
-    const auto found = finder_.Acquire(*view, view->detections[i]);
-    if (!found) CountRefused(view->detections[i]);
-    if (!found || !Plausible(*found, view->t)) continue;
-    // Part of something, of which no LiDAR point tells the range, is a thing of its own only where
-    // the target may come back.
-    const bool piece = found->detection.Piece();
-    if ((piece || !found->fit.whole) && found->fit.n_points == 0 && !comes_back) continue;
-    if (piece && found->fit.n_points == 0 && !found->detection.edged) continue;
-    if (Followed(*found)) continue;
-    candidates_.push_back(NewCandidate(*found, *view));
-  }
-}
-
-void Perceiver::Seek(View* view) {
-  if (selected_) return TakeSelected(view);
-  if (sighting_ && !doubtful_) return;
-  FollowCandidates(view);
-  AddPartial(*view);
-  AddCandidates(view);
-  Promote(*view);
-}
-
-void Perceiver::Promote(const View& view) {
-  const auto better = [](const Candidate& a, const Candidate& b) {
-    return a.Drives() != b.Drives() ? a.Drives() : a.since < b.since;
-  };
-  const Candidate* best = nullptr;
-  for (const auto& c : candidates_)
-    if (Ready(c, view.t) && (!best || better(c, *best))) best = &c;
-  if (!best) return;
-  const Candidate chosen = *best;
-  const bool drives = chosen.Drives() || PieceIsReady(chosen);
-  for (const auto& c : candidates_)
-    if (&c != best && drives && !c.Drives() && !c.part && c.track.hits >= Candidate::kConfirmFrames)
-      decoys_.Note(c.track.state.position(), view.t, kDecoyHits);
-  if (sighting_) decoys_.Note(track_->state.position(), view.t, kDecoyHits);
-  Start(chosen.track, chosen.last);
-  doubtful_ = !drives;
-  candidates_.clear();
+  if (!tentative_) candidates_.clear();
 }
 
 void Perceiver::Start(const TargetTrack& track, const Sighting& sighting) {
   track_ = track;
-  doubtful_ = false;
+  tentative_ = false;
   stood_ = track.state.position();
   stood_since_ = track.t;
   sighting_ = sighting;
@@ -176,15 +59,15 @@ void Perceiver::Judge(double t) {
   last_v_ = track_->state.velocity();
   last_p_ = track_->state.position();
   if ((last_p_ - stood_).norm() < kStood) return;
-  doubtful_ = false;
+  tentative_ = false;
   stood_ = last_p_;
   stood_since_ = t;
 }
 
 /// While the target is surely in view, what else looks just like it is not the target. One of them
 /// a frame is placed.
-void Perceiver::Remember(const View& view) {
-  if (!track_ || doubtful_ || track_->seen < view.t || track_->hits < kSureHits) return;
+void Perceiver::NoteDecoys(const View& view) {
+  if (!track_ || tentative_ || track_->seen < view.t || track_->hits < kSureHits) return;
   decoys_.Forget(view.t, track_->state.position());
   const size_t n = view.detections.size();
   for (size_t k = 0; k < n; ++k) {
@@ -237,25 +120,6 @@ void Perceiver::Select(const DetectorConfig& detector, const Eigen::Vector2d& at
   selected_at_ = last_t_;
 }
 
-/// The detection at the pixel that was pointed at, or nearest to it as things move: within its
-/// size.
-void Perceiver::TakeSelected(View* view) {
-  if (view->t - selected_at_ > kPointed) return selected_.reset();
-  const auto off = [&](const Detection& d) {
-    const Eigen::Vector2d low(d.box.x, d.box.y), high(d.box.br().x, d.box.br().y);
-    return (*selected_ - selected_->cwiseMax(low).cwiseMin(high)).norm();
-  };
-  const Detection* nearest = nullptr;
-  for (const Detection& d : view->detections)
-    if (!d.part && off(d) <= d.box.width && (!nearest || off(d) < off(*nearest))) nearest = &d;
-  if (!nearest) return;
-  const auto found = finder_.Acquire(*view, *nearest);
-  if (!found) return;
-  Start(NewCandidate(*found, *view).track, *found);
-  view->taken[static_cast<size_t>(nearest - view->detections.data())] = true;
-  selected_.reset();
-}
-
 TargetEstimate Perceiver::Report(double t, const std::optional<View>& view,
                                  std::string note) const {
   TargetEstimate out;
@@ -300,7 +164,7 @@ TargetEstimate Perceiver::See(const Frame& frame) {
     if (state_ != TargetState::kLost) Follow(&*view);
     Seek(&*view);
     if (sighting_ || !candidates_.empty()) finder_.MarkSweepsUsed(frame.t);
-    Remember(*view);
+    NoteDecoys(*view);
   } else if (newer) {
     if (track_) ++track_->misses;
     for (auto& c : candidates_) ++c.track.misses;

@@ -62,8 +62,8 @@ class Perceiver {
   void AddPartial(const View& view);
   void AddCandidates(View* view);
   void DropMissed();
-  void Promote(const View& view);
-  void Remember(const View& view);
+  void Confirm(const View& view);
+  void NoteDecoys(const View& view);
   void Judge(double t);
   TargetEstimate Report(double t, const std::optional<View>& view, std::string note) const;
 
@@ -76,7 +76,7 @@ class Perceiver {
   bool PieceIsReady(const Candidate& candidate) const;
   bool StandsLongEnough(const Candidate& candidate, double t) const;
   bool SizedBadly(const Candidate& candidate) const;
-  bool Plausible(const Sighting& s, double t) const;
+  bool InGate(const Sighting& s, double t) const;
   bool IsRatherDecoy(const Sighting& s, const View& view) const;
   void SwapIfTheOtherDrives(const Sighting& s, Decoy* other, double t);
   void Start(const TargetTrack& track, const Sighting& sighting);
@@ -89,7 +89,7 @@ class Perceiver {
   std::optional<TargetTrack> track_;
   std::vector<Candidate> candidates_;
   std::optional<Sighting> sighting_;  ///< of the last frame
-  bool doubtful_ = false;             ///< it stood when it was taken, and has stood since
+  bool tentative_ = false;            ///< it stood when it was taken, and has stood since
   std::optional<Sighting> unsure_;    ///< in the last frame: may be the target, as far as it shows
   Decoys decoys_;
   std::optional<Eigen::Vector2d> selected_;           ///< px, not taken yet

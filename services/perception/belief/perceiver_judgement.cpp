@@ -46,10 +46,10 @@ bool Perceiver::IsRatherDecoy(const Sighting& s, const View& view) const {
   return other && other->fit.log_odds > s.fit.log_odds;
 }
 
-bool Perceiver::Plausible(const Sighting& s, double t) const {
+bool Perceiver::InGate(const Sighting& s, double t) const {
   const Eigen::Vector3d p_WT = s.fit.posterior.position();
   if (decoys_.At(p_WT)) return false;
-  if (!track_ || doubtful_ || !track_->Proven()) return true;
+  if (!track_ || tentative_ || !track_->Proven()) return true;
   const double way = (p_WT - last_p_).norm(), unseen = t - track_->seen;
   if (state_ != TargetState::kLost) {
     const Eigen::Vector3d d = p_WT - track_->state.position();
@@ -112,7 +112,7 @@ bool Perceiver::StandsLongEnough(const Candidate& c, double t) const {
 /// What drives is taken at once.
 bool Perceiver::Ready(const Candidate& c, double t) const {
   if (c.track.misses > 0 || c.track.hits < Candidate::kConfirmFrames) return false;
-  const bool trusted = !doubtful_ && !(unsure_ && unsure_->contested) && !Vague();
+  const bool trusted = !tentative_ && !(unsure_ && unsure_->contested) && !Vague();
   if (track_ && trusted && t - track_->seen < kTrusted) return false;
   const Detection& d = c.last.detection;
   const bool unclear = d.AnyCut() && !c.last.SurelyHit();
