@@ -29,7 +29,8 @@ struct CommandAnswer {
 
 /// Answers given of late, so that a command that comes again is answered and not obeyed again. A
 /// command is known for as long as it may still be obeyed: older ones are refused by their age, and
-/// where so many came in that time that there is no room, new ones are.
+/// where so many came in that time that there is no room, new ones are. Urgent ones, which do no
+/// harm when obeyed twice, have room of their own and are always taken: the oldest is forgotten.
 class CommandWindow {
  public:
   /// Commands from before `start` [s] are refused: whoever was there then has had them. `process`
@@ -39,30 +40,36 @@ class CommandWindow {
   /// The answer at time `t` [s]: the one that it got before, a refusal, or that of `obey`, which is
   /// called at most once for a command.
   template <class Obey>
-  CommandAnswer Take(double t, const CommandKey& command, const Obey& obey) {
-    while (!answers_.empty() && t - answers_.front().first.t > kMostAge.command)
-      answers_.pop_front();
-    for (const auto& [before, answer] : answers_)
-      if (before.Key() == command.Key()) return answer;
+  CommandAnswer Take(double t, const CommandKey& command, const Obey& obey, bool urgent = false) {
+    for (Answers* answers : {&answers_, &urgent_}) {
+      while (!answers->empty() && t - answers->front().first.t > kMostAge.command)
+        answers->pop_front();
+      for (const auto& [before, answer] : *answers)
+        if (before.Key() == command.Key()) return answer;
+    }
     // What is refused here is not remembered: it is refused again, or has had no effect.
     if (std::string untimely = Untimely(t, command.t); !untimely.empty())
       return {false, std::move(untimely)};
-    answers_.emplace_back(command, obey());
-    return answers_.back().second;
+    if (!urgent && answers_.size() >= kMost) return {false, "too many commands came of late"};
+    if (urgent && urgent_.size() >= kMost) urgent_.pop_front();
+    Answers& answers = urgent ? urgent_ : answers_;
+    answers.emplace_back(command, obey());
+    return answers.back().second;
   }
 
  private:
+  using Answers = std::deque<std::pair<CommandKey, CommandAnswer>>;
+
   std::string Untimely(double t, double given) const {
     if (given < start_) return "it was given before the " + process_ + " process started";
     if (t - given > kMostAge.command) return "it is old: given more than 10 s ago";
-    if (given - t > kMostAge.command) return "it is given in the future: compare the clocks";
-    return answers_.size() >= kMost ? "too many commands came of late" : "";
+    return given - t > kMostAge.command ? "it is given in the future: compare the clocks" : "";
   }
 
   static constexpr std::size_t kMost = 256;  // 25 a second for as long as they are known
   std::string process_;
   double start_;
-  std::deque<std::pair<CommandKey, CommandAnswer>> answers_;
+  Answers answers_, urgent_;
 };
 
 }  // namespace chase::world

@@ -7,7 +7,9 @@
 namespace chase::mission {
 
 world::CommandAnswer Mission::Obey(double t, const Command& command) {
-  return window_.Take(t, command, [&] { return Try(t, command); });
+  const bool urgent = command.kind == Event::kStop || command.kind == Event::kKill;
+  return window_.Take(
+      t, command, [&] { return Try(t, command); }, urgent);
 }
 
 world::CommandAnswer Mission::Try(double t, const Command& command) {

@@ -83,6 +83,26 @@ TEST(Commands, MoreThanCanBeRememberedAreRefusedAndNoneIsObeyedTwice) {
   EXPECT_TRUE(bench.Command(Event::kHold, 2000).accepted) << "after a while there is room";
 }
 
+TEST(Commands, StopAndKillAreTakenHoweverManyCame) {
+  for (const Event urgent : {Event::kStop, Event::kKill}) {
+    Bench bench;
+    bench.Fly();
+    int64_t id = 1000;
+    while (id < 1600) bench.Command(id % 2 == 0 ? Event::kHold : Event::kChase, id), ++id;
+    ASSERT_TRUE(bench.Command(Event::kChase, 1000).accepted) << "known still: the same answer";
+    ASSERT_FALSE(bench.Command(Event::kChase, id++).accepted) << "no room";
+    for (int i = 0; i < 600; ++i)  // not even by a flood of themselves
+      ASSERT_TRUE(bench.Command(Event::kStop, id++).accepted) << i;
+    const Command command{{"command", 1, ++id, bench.t}, urgent, true};
+    const world::CommandAnswer answer = bench.mission.Obey(bench.t, command);
+    EXPECT_TRUE(answer.accepted) << answer.reason;
+    EXPECT_EQ(bench.mission.state(), urgent == Event::kStop ? State::kHold : State::kDone);
+    EXPECT_TRUE(bench.mission.Obey(bench.t, command).accepted) << "the same answer again";
+    EXPECT_FALSE(bench.mission.Obey(bench.t, {{"command", 1, ++id, 0.0}, urgent, true}).accepted)
+        << "an old one is refused all the same";
+  }
+}
+
 /// What is under way on a bus that loses, doubles and delays.
 template <class T>
 class BadLine {
