@@ -39,14 +39,22 @@ std::string Mission::Overridden(State to) const {
   if (to == State::kDone || to == State::kLand) return "";
   if (IsCritical()) return "the battery is critical: it only lands";
   if (to == State::kReturn) return "";
-  return IsLow() ? "the battery is low: it returns or lands" : "";
+  if (IsLow()) return "the battery is low: it returns or lands";
+  if (to == State::kTakeoff) return "";  // from there the fence counts anew
+  if (const std::string outside = Outside(); !outside.empty())
+    return "it is " + outside + ": it returns or lands";
+  const bool leads_about = to == State::kChase || to == State::kSearch;
+  return leads_about && config_.geofence.Exists() && !KnowsHome()
+             ? "the take-off place is not known, nor the geofence"
+             : "";
 }
 
 bool Mission::Step(double t, Event event, const std::string& detail) {
   const Transition* row = Find(state_, event);
   if (row == nullptr) return false;
   if (row->to != state_) since_ = t;
-  if (row->to == State::kEmergency) was_landing_ = state_ == State::kLand;
+  if (row->to == State::kEmergency) before_ = state_;
+  if (row->to == State::kReturn) nearest_ = HUGE_VAL;
   state_ = row->to;
   reason_ = row->reason + (detail.empty() ? "" : ": " + detail);
   if (event == Event::kTakeoff && inputs_.pose) home_ = Home{inputs_.pose->p, inputs_.pose->epoch};
@@ -60,14 +68,30 @@ void Mission::Update(double t) {
   }
   if (inputs_.pose && inputs_.pose->usable) last_usable_ = std::max(last_usable_, inputs_.pose->t);
   missing_ = Missing(config_, inputs_, t);
+  NoteProgress(t);
   for (const Event event : Observed(t)) {
     const bool stepped = Step(t, event, Detail(event));
     if (stepped && event == Event::kLeaving) leads_itself_ = false;  // it would lead out again
-    if (stepped && event == Event::kPoseBack && was_landing_)
-      Step(t, Event::kLand, "before the pose was lost");
+    if (stepped && event == Event::kPoseBack) Resume(t);
   }
   if (leads_itself_) LeadItself(t);
   HearOfGround();
+}
+
+/// What was on its way down or back goes on so.
+void Mission::Resume(double t) {
+  const char* when = "before the pose was lost";
+  if (before_ == State::kLand) Step(t, Event::kLand, when);
+  if (before_ == State::kReturn) Step(t, Event::kReturn, when);
+}
+
+void Mission::NoteProgress(double t) {
+  constexpr double kNearer = 0.3;  // m, beyond what the pose wavers by
+  if (state_ != State::kReturn || !KnowsHome()) return;
+  const double distance = (inputs_.pose->p - home_->p).head<2>().norm();
+  if (distance > nearest_ - kNearer) return;
+  nearest_ = distance;
+  nearest_since_ = t;
 }
 
 // In the order in which they count; each moves the state that the one before has led to.
@@ -91,6 +115,9 @@ std::vector<Event> Mission::Observed(double t) const {
   add(IsCritical(), Event::kBatteryCritical);
   add(!KnowsHome(), Event::kHomeLost);
   add(IsHome(), Event::kHome);
+  add(state_ == State::kReturn && config_.return_patience > 0.0 &&
+          t - nearest_since_ > config_.return_patience,
+      Event::kNoNearer);
   return events;
 }
 

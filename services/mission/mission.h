@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cmath>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -73,6 +74,8 @@ class Mission {
   std::string Detail(Event event) const;
   void LeadItself(double t);
   void HearOfGround();
+  void Resume(double t);
+  void NoteProgress(double t);
 
   MissionConfig config_;
   bool leads_itself_;  // nobody has commanded anything yet
@@ -82,8 +85,11 @@ class Mission {
   std::string reason_ = "switched on";
   std::string ground_;  // what planning said of it before control came down
   double since_ = 0.0;
-  bool began_ = false, was_landing_ = false;  // the latter: when the emergency began
-  double last_usable_ = -1e9;                 // pose, s
+  bool began_ = false;
+  State before_ = State::kHold;  // the emergency
+  double last_usable_ = -1e9;    // pose, s
+  double nearest_ = HUGE_VAL;    // to the take-off place in this RETURN, level, m
+  double nearest_since_ = 0.0;   // s
   std::optional<Home> home_;
   std::vector<std::string> missing_;
 };

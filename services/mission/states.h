@@ -40,6 +40,7 @@ enum class Event {
   kGaveUp,    ///< it has been looked for long enough
   kHome,      ///< over the take-off place, at rest
   kHomeLost,  ///< the take-off place is not known in the frame W of today
+  kNoNearer,  ///< to the take-off place for so long that it will not get there
   kPoseLost,  ///< for so long that control comes down by itself
   kPoseBack,
   kMotorsOff,
@@ -48,7 +49,7 @@ enum class Event {
   kBatteryLow,       ///< time to return
   kBatteryCritical,  ///< time to land
 };
-inline constexpr int kEvents = 25;
+inline constexpr int kEvents = 26;
 
 struct Transition {
   State from;

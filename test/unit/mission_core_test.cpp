@@ -178,6 +178,59 @@ TEST(Mission, ALandingGoesOnOnceThereIsAPoseAgain) {
   EXPECT_EQ(bench.mission.state(), State::kLand) << bench.mission.reason();
 }
 
+TEST(Mission, AReturnGoesOnOnceThereIsAPoseAgain) {
+  Bench bench;
+  bench.Fly({3.0, 0.0, 1.0});
+  ASSERT_TRUE(bench.Command(Event::kReturn).accepted);
+  bench.pose.usable = bench.pose.healthy = false;
+  bench.Run(2.2);
+  ASSERT_EQ(bench.mission.state(), State::kEmergency);
+  bench.pose.usable = true;
+  bench.Run(0.1);
+  EXPECT_EQ(bench.mission.state(), State::kReturn) << bench.mission.reason();
+  bench.pose.usable = false;
+  bench.Run(2.2);
+  ASSERT_EQ(bench.mission.state(), State::kEmergency);
+  bench.pose.usable = true;
+  ++bench.pose.epoch;
+  bench.Run(0.1);
+  EXPECT_EQ(bench.mission.state(), State::kLand) << "the take-off place is not known any more";
+}
+
+TEST(Mission, AReturnThatComesNoNearerLands) {
+  MissionConfig config;
+  config.return_patience = 10.0;
+  Bench bench(config);
+  bench.Fly({20.0, 0.0, 1.0});
+  ASSERT_TRUE(bench.Command(Event::kReturn).accepted);
+  for (int i = 0; i < 30; ++i) {  // slowly, but it comes
+    bench.pose.p.x() -= 0.4;
+    bench.Run(8.0);
+    ASSERT_EQ(bench.mission.state(), State::kReturn) << bench.pose.p.x();
+  }
+  for (int i = 0; i < 3; ++i) {  // to and fro
+    bench.pose.p.x() += i % 2 == 0 ? 2.0 : -2.0;
+    bench.Run(0.5);
+    ASSERT_EQ(bench.mission.state(), State::kReturn) << i;
+  }
+  ASSERT_TRUE(bench.Command(Event::kReturn).accepted) << "the operator asks for patience";
+  bench.Run(9.5);
+  EXPECT_EQ(bench.mission.state(), State::kReturn);
+  bench.Run(1.0);
+  EXPECT_EQ(bench.mission.state(), State::kLand);
+  EXPECT_EQ(bench.mission.reason(), "it gets no nearer to the take-off place: landing here");
+}
+
+TEST(Mission, AReturnWithoutEndIsAskedForByNoPatience) {
+  MissionConfig config;
+  config.return_patience = 0.0;
+  Bench bench(config);
+  bench.Fly({20.0, 0.0, 1.0});
+  ASSERT_TRUE(bench.Command(Event::kReturn).accepted);
+  bench.Run(300.0);
+  EXPECT_EQ(bench.mission.state(), State::kReturn);
+}
+
 TEST(Mission, StartedInFlightItHoldsAndDoesNotGoOnWithALanding) {
   Bench flying;
   flying.mission.inputs().flying = true;

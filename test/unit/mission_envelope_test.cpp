@@ -113,6 +113,31 @@ TEST(Envelope, WhoIsOutsideReturns) {
   }
 }
 
+TEST(Envelope, OutsideTheFenceOnlyReturnAndLandingAreObeyed) {
+  MissionConfig config;
+  config.geofence = Box(10.0);
+  Bench bench(config);
+  bench.Fly();
+  bench.pose.p.x() = 10.1;
+  bench.Run(0.2);
+  ASSERT_EQ(bench.mission.state(), State::kReturn);
+  for (const Event command : {Event::kChase, Event::kSearch, Event::kHold, Event::kStop}) {
+    const world::CommandAnswer answer = bench.Command(command);
+    EXPECT_FALSE(answer.accepted) << Name(command);
+    EXPECT_EQ(answer.reason, "it is outside the geofence: it returns or lands");
+    EXPECT_EQ(bench.mission.state(), State::kReturn);
+  }
+  EXPECT_TRUE(bench.Command(Event::kReturn).accepted);
+  bench.pose.p.x() = 9.9;
+  bench.Run(0.1);
+  EXPECT_TRUE(bench.Command(Event::kHold).accepted) << "inside again";
+  ++bench.pose.epoch;
+  bench.Run(0.1);
+  const world::CommandAnswer answer = bench.Command(Event::kChase);
+  EXPECT_FALSE(answer.accepted);
+  EXPECT_EQ(answer.reason, "the take-off place is not known, nor the geofence");
+}
+
 TEST(Envelope, InAnotherFrameTheFenceIsNotKnownAndNothingLeadsAbout) {
   MissionConfig config;
   config.geofence = Box(10.0);
