@@ -42,8 +42,9 @@ struct Inputs {
   bool flying = false, landing = false;                ///< as control says
   bool motors_off = false;                             ///< control has stopped them
   /// Places on the newest plan up to its stop and on to rest: where it flies if nothing more comes.
-  std::vector<Eigen::Vector3d> way;                ///< frame W
-  bool blocked = false;                            ///< something reaches into the climb's column
+  std::vector<Eigen::Vector3d> way;  ///< frame W
+  bool blocked = false;              ///< something reaches into the climb's column
+  std::string hand_over;  ///< why the flight is not ours any more, as fcu says; empty: it is
   std::optional<double> battery;                   ///< share of its charge; nothing: nobody says
   std::map<std::string, ProcessReport> processes;  ///< by name
 

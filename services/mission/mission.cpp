@@ -149,7 +149,11 @@ std::string Mission::Outside() const {
   return KnowsHome() ? config_.geofence.Breach(inputs_.pose->p - home_->p) : "";
 }
 
-std::string Mission::Words() const { return reason_ + (ground_.empty() ? "" : "; " + ground_); }
+std::string Mission::Words() const {
+  const std::string words = reason_ + (ground_.empty() ? "" : "; " + ground_);
+  if (!IsAirborne(state_) || inputs_.hand_over.empty()) return words;
+  return words + "; fcu: " + inputs_.hand_over;
+}
 
 void Mission::HearOfGround() {
   if (state_ != State::kLand)

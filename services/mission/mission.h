@@ -50,7 +50,8 @@ class Mission {
 
   State state() const { return state_; }
   const std::string& reason() const { return reason_; }
-  /// The reason and, while it is led to where it lands, what planning says of the ground there.
+  /// The reason and, while it is led to where it lands, what planning says of the ground there;
+  /// in the air also who else flies.
   std::string Words() const;
   double since() const { return since_; }  ///< when the state began, s
   const std::optional<Home>& home() const { return home_; }

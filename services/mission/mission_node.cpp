@@ -10,6 +10,7 @@
 #include "common/bus/battery.h"
 #include "common/bus/command_call.h"
 #include "common/bus/convert.h"
+#include "common/bus/hand_over.h"
 #include "common/world/column.h"
 
 namespace chase::mission {
@@ -112,6 +113,7 @@ void MissionNode::OnStatus(const status_t& message) {
   report.failed = message.state == status_t::FAILED;
   report.start = message.sender_start;
   mission_.inputs().Heard(message.name, report);
+  if (message.name == "fcu") mission_.inputs().hand_over = bus::HandOverIn(message);
   if (const std::optional<double> battery = bus::BatteryIn(message))
     mission_.inputs().battery = battery;
 }

@@ -231,6 +231,17 @@ TEST(Mission, AReturnWithoutEndIsAskedForByNoPatience) {
   EXPECT_EQ(bench.mission.state(), State::kReturn);
 }
 
+TEST(Mission, SaysWhoElseFlies) {
+  Bench bench;
+  bench.Fly();
+  bench.mission.inputs().hand_over = "pilot: the mode was changed: the pilot has it";
+  bench.Run(0.1);
+  EXPECT_EQ(bench.mission.Words(),
+            "hold commanded; fcu: pilot: the mode was changed: the pilot has it");
+  bench.mission.inputs().hand_over.clear();
+  EXPECT_EQ(bench.mission.Words(), "hold commanded");
+}
+
 TEST(Mission, StartedInFlightItHoldsAndDoesNotGoOnWithALanding) {
   Bench flying;
   flying.mission.inputs().flying = true;

@@ -11,7 +11,9 @@
 #include "chase/health_t.hpp"
 #include "common/bus/battery.h"
 #include "common/bus/convert.h"
+#include "common/bus/hand_over.h"
 #include "common/bus/lockstep.h"
+#include "services/fcu/handshake.h"
 
 namespace chase::mission {
 namespace {
@@ -182,6 +184,42 @@ TEST(Battery, IsReadBehindTheAutopilotsOwnWords) {
   EXPECT_EQ(bus::BatteryIn(status), 0.07);
   status.detail = "failsafe: low battery level";
   EXPECT_FALSE(bus::BatteryIn(status));
+}
+
+TEST(HandOver, IsReadInTheBridgesOwnWords) {
+  using fcu::Handshake;
+  using Fcu = Handshake::State;
+  status_t status{};
+  status.name = "fcu";
+  for (const Fcu state : {Fcu::kPilot, Fcu::kFailsafe, Fcu::kLanding, Fcu::kDone, Fcu::kRefused}) {
+    const std::string head = Handshake::Name(state) + ": setpoints have ceased: it lands";
+    status.detail = head + "; POSCTL, armed, battery 70 %";
+    EXPECT_EQ(bus::HandOverIn(status), head);
+  }
+  for (const char* ours :
+       {"flying: armed and in OFFBOARD; OFFBOARD, armed", "standby: the pilot may give it back",
+        "battery 80 %", "", "no autopilot: no heartbeat of a PX4 yet"}) {
+    status.detail = ours;
+    EXPECT_EQ(bus::HandOverIn(status), "") << ours;
+  }
+  status.name = "planning";
+  status.detail = "done: landed";
+  EXPECT_EQ(bus::HandOverIn(status), "");
+}
+
+TEST(MissionNode, SaysWhoElseFlies) {
+  struct Bridge : bus::Node {
+    bus::NodeReport Report() const override {
+      return {bus::NodeReport::State::kOk, "pilot: the pilot has it; POSCTL, armed"};
+    }
+  };
+  Bench bench;
+  bench.lockstep_.Add("fcu", 0, [](bus::Bus&) { return std::make_unique<Bridge>(); });
+  bench.Run(2.0);
+  EXPECT_EQ(bench.states.back().reason.find("pilot"), std::string::npos) << "on the ground";
+  bench.Command(command_t::TAKEOFF, 1);
+  bench.Run(0.2);
+  EXPECT_EQ(bench.states.back().reason, "take-off commanded; fcu: pilot: the pilot has it");
 }
 
 TEST(MissionNode, HealthCountsTheLivesOfEveryProcess) {
