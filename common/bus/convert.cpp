@@ -59,6 +59,15 @@ obstacle_t ToMessage(const world::Obstacle& o, int64_t origin) {
   return m;
 }
 
+world::Geofence FromMessage(const geofence_t& m, const Eigen::Vector3d& home) {
+  world::Geofence fence;
+  for (std::size_t i = 0; i + 1 < m.corners.size(); i += 2)
+    fence.polygon.emplace_back(m.corners[i] - home.x(), m.corners[i + 1] - home.y());
+  fence.floor = m.floor - home.z();
+  fence.ceiling = m.ceiling - home.z();
+  return fence;
+}
+
 void Set(double (&out)[3], const Eigen::Vector3d& v) {
   for (int i = 0; i < 3; ++i) out[i] = v[i];
 }

@@ -3,9 +3,11 @@
 #include <Eigen/Geometry>
 #include <string>
 
+#include "chase/geofence_t.hpp"
 #include "chase/obstacle_t.hpp"
 #include "chase/polynomial_t.hpp"
 #include "chase/pose_t.hpp"
+#include "common/world/geofence.h"
 #include "common/world/obstacle.h"
 #include "common/world/trajectory.h"
 
@@ -25,6 +27,9 @@ polynomial_t ToMessage(const world::Trajectory& trajectory, int64_t origin);
 
 world::Obstacle FromMessage(const obstacle_t& m, int64_t origin);
 obstacle_t ToMessage(const world::Obstacle& obstacle, int64_t origin);
+
+/// Counted from the take-off place, p_WB = `home` [m], as the core's are.
+world::Geofence FromMessage(const geofence_t& m, const Eigen::Vector3d& home);
 
 inline Eigen::Vector3d ToVector(const double (&v)[3]) { return {v[0], v[1], v[2]}; }
 inline Eigen::Quaterniond ToQuaternion(const double (&q)[4]) { return {q[0], q[1], q[2], q[3]}; }

@@ -56,6 +56,18 @@ std::string Geofence::Breach(const Eigen::Vector3d& p, double margin) const {
   return p.z() + margin > ceiling ? "above the geofence" : "";
 }
 
+std::string Geofence::Refusal(const Eigen::Vector3d& p, const std::vector<Eigen::Vector3d>& places,
+                              double margin) const {
+  const bool near = !Breach(p, margin).empty() || !Breach(places.front(), margin).empty();
+  const bool outside = !Breach(p).empty();
+  if (near && places.back().norm() >= p.norm()) return "it leads no way back into the geofence";
+  if (outside) return "";
+  for (const Eigen::Vector3d& place : places)
+    if (std::string breach = Breach(place, near ? 0.0 : margin); !breach.empty())
+      return "it leads " + breach;
+  return "";
+}
+
 std::string Geofence::Problem() const {
   if (!Exists()) return "";
   if (polygon.size() < 3) return "polygon has fewer than 3 corners";

@@ -27,6 +27,11 @@ struct Geofence {
   /// Why a place is outside, or nearer to the fence than `margin` m, `p` in m from the take-off
   /// place; empty: it is inside.
   std::string Breach(const Eigen::Vector3d& p, double margin = 0.0) const;
+  /// Why a body at `p` is not to be led along `places`, all counted from the take-off place, m;
+  /// empty: it may be. Inside they keep `margin` m off the fence; one that is nearer to it, or
+  /// starts there, is led inside and nearer to the take-off place; one that is outside only nearer.
+  std::string Refusal(const Eigen::Vector3d& p, const std::vector<Eigen::Vector3d>& places,
+                      double margin) const;
   std::string Problem() const;
 };
 

@@ -85,12 +85,7 @@ void ControlNode::TellHome(flight_state_t heard) {
 
 void ControlNode::OnGeofence(const geofence_t& message) {
   if (config_.geofence.Exists() || !home_ || home_->first != message.epoch) return;
-  const Eigen::Vector3d& home = home_->second;
-  fence_.polygon.clear();
-  for (std::size_t i = 0; i + 1 < message.corners.size(); i += 2)
-    fence_.polygon.emplace_back(message.corners[i] - home.x(), message.corners[i + 1] - home.y());
-  fence_.floor = message.floor - home.z();
-  fence_.ceiling = message.ceiling - home.z();
+  fence_ = bus::FromMessage(message, home_->second);
 }
 
 void ControlNode::OnObstacles(const obstacles_t& message) {
@@ -119,17 +114,9 @@ std::string ControlNode::Breach(const world::Claim& claim, bool to_land) const {
   if (!fence_.Exists() || claim.starts_inside) return "";  // a last resort may start inside
   if (!home_ || !epoch_.Is(home_->first))
     return to_land ? "" : "the take-off place is not known, nor the geofence";
-  const std::vector<Eigen::Vector3d> places = world::PlacesOn(claim.position, claim.stop);
-  const Eigen::Vector3d way = p_WB_ - home_->second;
-  const double tube = config_.tracking_tube;
-  const bool near = !fence_.Breach(way, tube).empty(), outside = !fence_.Breach(way).empty();
-  if (near && (places.back() - home_->second).norm() >= way.norm())
-    return "it leads no way back into the geofence";
-  if (outside) return "";
-  for (const Eigen::Vector3d& p : places)
-    if (std::string breach = fence_.Breach(p - home_->second, near ? 0.0 : tube); !breach.empty())
-      return "it leads " + breach;
-  return "";
+  std::vector<Eigen::Vector3d> places = world::PlacesOn(claim.position, claim.stop);
+  for (Eigen::Vector3d& p : places) p -= home_->second;
+  return fence_.Refusal(p_WB_ - home_->second, places, config_.tracking_tube);
 }
 
 std::string ControlNode::Refusal(const plan_t& message) {

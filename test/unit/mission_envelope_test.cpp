@@ -77,6 +77,26 @@ TEST(Geofence, IsCheckedAndNotFiniteIsOutside) {
   EXPECT_EQ(Geofence().Breach({1e6, 0.0, 0.0}), "") << "no fence";
 }
 
+TEST(Geofence, RefusesWaysThatLeadOutOrTooNear) {
+  const Geofence fence = Box(2.0);
+  const double margin = 0.12;
+  const auto refusal = [&](const Vector3d& p, double from, double to) {
+    return fence.Refusal(p, {{from, 0.0, 1.0}, {0.5 * (from + to), 0.0, 1.0}, {to, 0.0, 1.0}},
+                         margin);
+  };
+  EXPECT_EQ(refusal({1.0, 0.0, 1.0}, 1.0, 1.85), "");
+  EXPECT_EQ(refusal({1.0, 0.0, 1.0}, 1.0, 1.95), "it leads too near to the geofence");
+  EXPECT_EQ(refusal({1.0, 0.0, 1.0}, 1.0, 2.05), "it leads outside the geofence");
+  EXPECT_EQ(refusal({1.95, 0.0, 1.0}, 1.95, 1.90), "") << "too near, nearer home";
+  EXPECT_EQ(refusal({1.95, 0.0, 1.0}, 1.95, 1.97), "it leads no way back into the geofence");
+  EXPECT_EQ(refusal({1.95, 0.0, 1.0}, 2.05, 1.90), "it leads outside the geofence");
+  EXPECT_EQ(refusal({2.5, 0.0, 1.0}, 2.5, 2.3), "") << "outside, nearer home";
+  EXPECT_EQ(refusal({2.5, 0.0, 1.0}, 2.5, 2.6), "it leads no way back into the geofence");
+  // The plan rests nearer to the fence than the body, which is off it by less than the tube.
+  EXPECT_EQ(refusal({1.87, 0.0, 1.0}, 1.89, 1.0), "");
+  EXPECT_EQ(refusal({1.87, 0.0, 1.0}, 1.89, 1.9), "it leads no way back into the geofence");
+}
+
 TEST(Envelope, AWayOutOfTheFenceIsHeldInsideWhateverTheState) {
   MissionConfig config;
   config.geofence = Box(10.0);
