@@ -278,7 +278,7 @@ PlanResult Pilot::Return(double t0, const Start& start) {
 
 PlanResult Pilot::Along(const PlanRequest& request, const Start& start, Stop leg) const {
   PlanResult plan;
-  plan.verdict = Verdict::kSafeOnly;
+  plan.verdict = LeavesObstacles(leg.proofs) ? Verdict::kEscape : Verdict::kSafeOnly;
   plan.trajectory = std::move(leg.trajectory);
   plan.yaw = {start.yaw.yaw};
   SetProofs(config_.planner, request, std::move(leg.proofs), &plan);

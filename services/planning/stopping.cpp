@@ -384,6 +384,10 @@ void SetProofs(const PlannerConfig& config, const PlanRequest& request, std::vec
   result->proofs = std::move(proofs);
 }
 
+bool LeavesObstacles(const std::vector<Proof>& proofs) {
+  return std::any_of(proofs.begin(), proofs.end(), [](const Proof& p) { return p.from > 0.0; });
+}
+
 PlanResult RestPlan(const PlannerConfig& config, const PlanRequest& request) {
   const PlannerConfig hard = WithoutMargin(config);
   PlanResult result;
@@ -397,9 +401,7 @@ PlanResult RestPlan(const PlannerConfig& config, const PlanRequest& request) {
     if (stop->certified) result.verdict = Verdict::kEscape;
     result.reason = stop->certified ? "nor is braking" : "nor is braking, nor any way aside";
   }
-  const auto late = [](const Proof& p) { return p.from > 0.0; };
-  if (std::any_of(stop->proofs.begin(), stop->proofs.end(), late))
-    result.verdict = Verdict::kEscape;
+  if (LeavesObstacles(stop->proofs)) result.verdict = Verdict::kEscape;
   result.trajectory = std::move(stop->trajectory);
   if (stop->certified) SetProofs(config, request, std::move(stop->proofs), &result);
   return result;

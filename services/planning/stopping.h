@@ -36,6 +36,9 @@ Stop Evade(const PlannerConfig& config, const PlanRequest& request);
 /// When the certified stop of a plan begins, s after its start: several periods of planning.
 inline constexpr double kOverdue = 0.4;
 
+/// Do the proofs hold only once an obstacle is left that the start is in? Such a plan is an ESCAPE.
+bool LeavesObstacles(const std::vector<Proof>& proofs);
+
 /// Brake, the rest of the running plan until its stop and that stop, or else Evade, as a plan; the
 /// reason says what it is not.
 PlanResult RestPlan(const PlannerConfig& config, const PlanRequest& request);

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "test/unit/planning_flight.h"
@@ -123,6 +124,23 @@ TEST(Task, ReturnWithoutAPlaceHolds) {
   flight.Run(4.0);
   EXPECT_LT((flight.Body().p - before).norm(), 1.5);
   EXPECT_EQ(flight.plans.back().reason, "the take-off place is not known");
+}
+
+TEST(Task, ReturnOutOfAnObstaclesReachIsAnEscape) {
+  Flight flight({0.64, 0.0, 1.6});
+  flight.obstacles = {Pillar(1, 0.0, 0.0)};  // 0.34 m off: nearer than the hard radius
+  flight.flying_before = true;
+  flight.pilot.SetTask(Task::kReturn, Vector3d(6.0, 0.0, 0.1));
+  flight.Run(20.0);
+  int late = 0;
+  for (const PlanResult& plan : flight.plans) {
+    const bool leaves = std::any_of(plan.proofs.begin(), plan.proofs.end(),
+                                    [](const Proof& proof) { return proof.from > 0.0; });
+    late += leaves ? 1 : 0;
+    EXPECT_EQ(plan.verdict == Verdict::kEscape, leaves) << plan.reason;
+  }
+  EXPECT_GT(late, 0);
+  EXPECT_LT((flight.Body().p - Vector3d(6.0, 0.0, 1.6)).head<2>().norm(), 0.05);
 }
 
 TEST(Trail, LosesItsLoops) {
