@@ -17,6 +17,8 @@ constexpr double kStraight = 1.5;    // s between turns, about
 constexpr double kRoams = 10.0;      // m from where it was last known, before it turns back
 constexpr double kBody = 0.2;        // m that the target keeps from what stands, at least
 constexpr double kReaction = 0.4;    // s before a turn shows anything
+constexpr double kMostBack = 10.0;   // s that are gone through after a time without a search,
+constexpr double kMostSteps = 20.0;  // in so many steps, so that it takes its time at most
 constexpr int kHeadings = 36;
 constexpr double kEnough = 0.3;  // effective share of the hypotheses, else new ones
 
@@ -75,9 +77,11 @@ void Whereabouts::Begin(double t, const Eigen::Vector3d& p, const Eigen::Vector3
 
 void Whereabouts::Advance(double t, const std::vector<world::Obstacle>& obstacles,
                           const Eigen::Vector3d& eye, double yaw, const View& view) {
-  while (t_ + kStep <= t) {
-    Move(t_, kStep, obstacles);
-    t_ += kStep;
+  t_ = std::max(t_, t - kMostBack);
+  const double step = std::max(kStep, (t - t_) / kMostSteps);
+  while (t_ + step <= t) {
+    Move(t_, step, obstacles);
+    t_ += step;
     Look(t_, obstacles, eye, yaw, view);
     Resample();
   }

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <ctime>
 
 #include "common/world/random.h"
 #include "services/planning/whereabouts.h"
@@ -59,6 +60,24 @@ TEST(Whereabouts, GoThroughNoWallAndHideBehindIt) {
   for (double t = 0.0; t < 4.0; t += kStep) where.Advance(t, wall, kEye, 0.0, kCamera);
   EXPECT_LT(where.BestGaze(0.0, 1.5, kCamera).share, 0.1) << "behind the wall none is seen";
   EXPECT_GT(where.Likeliest(1.5).x(), 4.0);
+}
+
+/// Processor time of an update at t, s, of a search that was begun at 0 and had come to `before`.
+double UpdateTime(double before, double t) {
+  const auto walls = Wall({20.0, -20.0}, {20.0, 20.0});
+  Whereabouts where;
+  where.Begin(0.0, {3.0, 0.0, 0.5}, {1.0, 0.0, 0.0}, 1.0);
+  where.Advance(before, walls, kEye, 0.0, kCamera);
+  const std::clock_t begun = std::clock();
+  where.Advance(t, walls, kEye, 0.0, kCamera);
+  EXPECT_LE((where.Likeliest(1.0) - Eigen::Vector3d(3.0, 0.0, 0.5)).norm(), 1.25 * t);
+  return static_cast<double>(std::clock() - begun) / CLOCKS_PER_SEC;
+}
+
+TEST(Whereabouts, AreSoonFoundAfterALongTimeWithoutASearch) {
+  const double two_seconds = UpdateTime(0.0, 2.0);
+  EXPECT_LT(UpdateTime(0.0, 600.0), 10.0 * two_seconds) << "begun late";
+  EXPECT_LT(UpdateTime(2.0, 600.0), 10.0 * two_seconds) << "gone on with late";
 }
 
 /// A target passes the camera, leaves the image and turns as it likes. Time until it is in the
