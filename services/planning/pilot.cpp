@@ -254,8 +254,8 @@ PlanResult Pilot::Wait(double t0, const Start& start, const BodyEstimate& body) 
 PlanResult Pilot::Obey(double t0, const Start& start, const BodyEstimate& body) {
   if (task_ == Task::kTakeoff) return Wait(t0, start, body);
   airborne_ = true;  // a climb ends here
-  if (task_ == Task::kLand) return Land(t0, start);
-  return task_ == Task::kReturn ? Return(t0, start) : Hold(t0, start, "holding");
+  if (task_ == Task::kLand) return Land(t0, start, body);
+  return task_ == Task::kReturn ? Return(t0, start, body) : Hold(t0, start, "holding");
 }
 
 PlanResult Pilot::Hold(double t0, const Start& start, const std::string& reason) {
@@ -264,12 +264,23 @@ PlanResult Pilot::Hold(double t0, const Start& start, const std::string& reason)
   return plan;
 }
 
-PlanResult Pilot::Return(double t0, const Start& start) {
+// Control flies none that leaves the fence.
+MayFly Pilot::InFence(const Eigen::Vector3d& p_WB) const {
+  return [this, p_WB](const world::Trajectory& leg) {
+    if (!fence_.Exists() || !home_) return true;
+    std::vector<Eigen::Vector3d> places = world::PlacesOn(leg, std::nullopt);
+    for (Eigen::Vector3d& p : places) p -= *home_;
+    return fence_.Refusal(p_WB - *home_, places, config_.planner.tracking_tube).empty();
+  };
+}
+
+PlanResult Pilot::Return(double t0, const Start& start, const BodyEstimate& body) {
   if (!home_) return Hold(t0, start, "the take-off place is not known");
   const Eigen::Vector3d above = *home_ + config_.takeoff_height * Eigen::Vector3d::UnitZ();
   const PlanRequest request = Request(t0, start);
-  std::optional<Stop> leg = way_back_.Leg(config_.planner, request, trail_, above,
-                                          start.on_plan ? &running_.trajectory : nullptr);
+  std::optional<Stop> leg =
+      way_back_.Leg(config_.planner, request, trail_, above,
+                    start.on_plan ? &running_.trajectory : nullptr, InFence(body.p));
   if (!leg || !SeesObstacles(t0 - config_.latency)) return Hold(t0, start, "no way back");
   PlanResult plan = Along(request, start, std::move(*leg));
   plan.reason = "returning";
@@ -286,7 +297,7 @@ PlanResult Pilot::Along(const PlanRequest& request, const Start& start, Stop leg
 }
 
 // A plan that ends where it starts lets control come down: it does so above the end of a plan only.
-PlanResult Pilot::Land(double t0, const Start& start) {
+PlanResult Pilot::Land(double t0, const Start& start, const BodyEstimate& body) {
   PlanResult here = Hold(t0, start, "landing");
   if (descending_ || !SeesObstacles(t0 - config_.latency)) return here;
   PlanRequest request = Request(t0, start);
@@ -294,9 +305,9 @@ PlanResult Pilot::Land(double t0, const Start& start) {
   const LandingNeeds needs{config_.planner.drone_radius + config_.landing_room,
                            std::tan(config_.landing_slope_deg * M_PI / 180.0),
                            config_.landing_reach};
-  WayDown::Answer answer = way_down_.Lead(config_.planner, request, needs,
-                                          here.trajectory.Position(here.trajectory.end()), home_,
-                                          start.on_plan ? &running_.trajectory : nullptr);
+  WayDown::Answer answer = way_down_.Lead(
+      config_.planner, request, needs, here.trajectory.Position(here.trajectory.end()), home_,
+      start.on_plan ? &running_.trajectory : nullptr, InFence(body.p));
   PlanResult plan = answer.leg ? Along(request, start, std::move(*answer.leg)) : std::move(here);
   plan.reason = "landing, " + answer.reason;
   return plan;

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "common/world/geofence.h"
 #include "services/planning/planner.h"
 #include "services/planning/planning_config.h"
 #include "services/planning/way_back.h"
@@ -71,6 +72,9 @@ class Pilot {
   /// m; nothing: not known.
   void SetTask(Task task, const std::optional<Eigen::Vector3d>& home);
 
+  /// Ways back and down keep to it. It counts from `home`: where that is not known there is none.
+  void SetFence(world::Geofence fence) { fence_ = std::move(fence); }
+
   /// Forgets all that was said in the frame W that was: forecast, obstacles, the running plan.
   void ChangeFrame();
 
@@ -103,8 +107,9 @@ class Pilot {
   PlanResult Rest(double t0, const Start& start) const;
   PlanResult Obey(double t0, const Start& start, const BodyEstimate& body);
   PlanResult Hold(double t0, const Start& start, const std::string& reason);
-  PlanResult Return(double t0, const Start& start);
-  PlanResult Land(double t0, const Start& start);
+  PlanResult Return(double t0, const Start& start, const BodyEstimate& body);
+  PlanResult Land(double t0, const Start& start, const BodyEstimate& body);
+  MayFly InFence(const Eigen::Vector3d& p_WB) const;
   PlanResult Along(const PlanRequest& request, const Start& start, Stop leg) const;
   bool SeesObstacles(double t) const;
   PlanResult Search(double t0, const Start& start, const BodyEstimate& body);
@@ -131,6 +136,7 @@ class Pilot {
   double climb_end_ = 0.0;
   std::optional<Task> task_;
   std::optional<Eigen::Vector3d> home_;  // m
+  world::Geofence fence_;
   Trail trail_;
   WayBack way_back_;
   WayDown way_down_;

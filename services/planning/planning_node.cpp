@@ -97,6 +97,9 @@ PlanningNode::PlanningNode(bus::Bus& bus, const PlanningConfig& config)
   });
   bus_.Subscribe<flight_state_t>("FLIGHT_STATE", [this](const flight_state_t& m) { OnState(m); });
   bus_.Subscribe<status_t>("FCU_STATUS", [this](const status_t& m) { autopilot_.Hear(m); });
+  bus_.Subscribe<geofence_t>("GEOFENCE", [this](const geofence_t& m) {
+    if (home_ && epoch_.Is(m.epoch)) pilot_.SetFence(bus::FromMessage(m, *home_));
+  });
   bus_.Subscribe<pose_t>("POSE", [this](const pose_t& m) { OnPose(m); });
 }
 
@@ -133,7 +136,8 @@ void PlanningNode::OnState(const flight_state_t& message) {
   state_utime_ = message.utime;
   task_ = TaskOf(message.state);
   const bool knows_home = message.has_home != 0 && epoch_.Is(message.epoch);
-  pilot_.SetTask(task_, knows_home ? std::optional(bus::ToVector(message.home)) : std::nullopt);
+  home_ = knows_home ? std::optional(bus::ToVector(message.home)) : std::nullopt;
+  pilot_.SetTask(task_, home_);
 }
 
 // Whoever leads the flight has fallen silent: what moves the vehicle about ends.
@@ -148,6 +152,7 @@ void PlanningNode::OnPose(const pose_t& message) {
   if (message.health != pose_t::HEALTH_OK && message.health != pose_t::HEALTH_DEGRADED) return;
   if (epoch_.Change(message.epoch)) {
     pilot_.ChangeFrame();
+    home_.reset();
     target_ = {};
   }
   CheckMission(message.utime);

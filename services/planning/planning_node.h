@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "chase/flight_state_t.hpp"
+#include "chase/geofence_t.hpp"
 #include "chase/obstacles_t.hpp"
 #include "chase/plan_t.hpp"
 #include "chase/pose_t.hpp"
@@ -17,7 +18,8 @@
 
 namespace chase::planning {
 
-/// PREDICTION, OBSTACLES, FLIGHT_STATE, FCU_STATUS and POSE in, PLAN out; POSE is the clock.
+/// PREDICTION, OBSTACLES, FLIGHT_STATE, GEOFENCE, FCU_STATUS and POSE in, PLAN out; POSE is the
+/// clock.
 class PlanningNode : public bus::Node {
  public:
   PlanningNode(bus::Bus& bus, const PlanningConfig& config);
@@ -37,10 +39,11 @@ class PlanningNode : public bus::Node {
   Pilot pilot_;
   bus::Epoch epoch_;
   bus::AutopilotState autopilot_;
-  std::optional<int64_t> origin_;  // utime that the core's seconds count from
-  int64_t state_utime_ = 0;        // of the newest FLIGHT_STATE; 0: none
-  Task task_ = Task::kGround;      // that it asked for
-  polynomial_t target_{};          // as predicted; no coefficients: none yet
+  std::optional<int64_t> origin_;        // utime that the core's seconds count from
+  int64_t state_utime_ = 0;              // of the newest FLIGHT_STATE; 0: none
+  Task task_ = Task::kGround;            // that it asked for
+  std::optional<Eigen::Vector3d> home_;  // that it tells: GEOFENCE counts from there, m
+  polynomial_t target_{};                // as predicted; no coefficients: none yet
   int64_t n_plans_ = 0;
   int64_t n_verdicts_[7] = {};
 };

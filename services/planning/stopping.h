@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <vector>
 
@@ -14,6 +15,9 @@ struct Stop {
   std::vector<Proof> proofs;
   bool certified = false;
 };
+
+/// Would control fly that leg? It keeps to the geofence.
+using MayFly = std::function<bool(const world::Trajectory& leg)>;
 
 /// Comes to rest: b3 = b4 = b5 in Bernstein form, which continues position, velocity, acceleration
 /// and jerk and ends with none. Of several durations the shortest that is certified clear of

@@ -11,6 +11,8 @@ using Eigen::Vector3d;
 constexpr double kReach = 8.0;          // m of a leg: the map is surely known that far
 constexpr std::size_t kMostTried = 12;  // goals of one leg, so that a plan takes its time at most
 constexpr double kAtHome = 1.0;         // m: the trail's first points, the climb among them
+constexpr double kStride = 1.0;         // m between places where there is no trail
+constexpr double kSteep = 0.1;          // m below: what is there may be out of the LiDAR's view
 
 /// The places that a leg may end at by their place on the way: home, then the trail.
 std::vector<std::size_t> InReach(const std::vector<Vector3d>& way, const Vector3d& p) {
@@ -25,8 +27,14 @@ std::vector<std::size_t> InReach(const std::vector<Vector3d>& way, const Vector3
 
 std::vector<Vector3d> Way(const Trail& trail, const Vector3d& home) {
   std::vector<Vector3d> way = {home};
-  for (const Vector3d& p : trail.points())
-    if ((p - home).norm() > kAtHome && p.z() > home.z() - kAtHome) way.push_back(p);
+  for (const Vector3d& p : trail.points()) {
+    const bool climbs = (p - home).head<2>().norm() < kAtHome && p.z() < home.z() + kAtHome;
+    if (climbs) continue;
+    const double gap = way.size() == 1 ? (p - home).norm() : 0.0;
+    if (gap > kAtHome + kStride)
+      for (double d = kStride; d < gap; d += kStride) way.push_back(home + d / gap * (p - home));
+    way.push_back(p);
+  }
   return way;
 }
 
@@ -45,12 +53,19 @@ void Trail::Add(const Vector3d& p) {
 
 std::optional<Stop> WayBack::Leg(const PlannerConfig& config, const PlanRequest& request,
                                  const Trail& trail, const Vector3d& home,
-                                 const world::Trajectory* flown) {
+                                 const world::Trajectory* flown, const MayFly& may_fly) {
   if (flown == nullptr) goal_.reset();
   const std::vector<Vector3d> way = Way(trail, home);
   const std::vector<std::size_t> goals = InReach(way, request.start.p);
+  const auto to = [&](const Vector3d& p) {
+    std::optional<Stop> leg = GoTo(config, request, p);
+    return leg && may_fly(leg->trajectory) ? std::move(leg) : std::nullopt;
+  };
+  // Where it may not come down so steeply: above that place.
   const auto try_goal = [&](std::size_t i) {
-    std::optional<Stop> leg = GoTo(config, request, way[i]);
+    std::optional<Stop> leg = to(way[i]);
+    const double z = request.start.p.z();
+    if (!leg && way[i].z() < z - kSteep) leg = to({way[i].x(), way[i].y(), z});
     if (leg) goal_ = i;
     return leg;
   };
@@ -59,7 +74,7 @@ std::optional<Stop> WayBack::Leg(const PlannerConfig& config, const PlanRequest&
     if (goal_ && i < *goal_)
       if (auto leg = try_goal(i)) return leg;
   if (goal_)
-    if (auto leg = GoOn(config, request, *flown)) return leg;
+    if (auto leg = GoOn(config, request, *flown); leg && may_fly(leg->trajectory)) return leg;
   for (const std::size_t i : goals)
     if (!goal_ || i >= *goal_)
       if (auto leg = try_goal(i)) return leg;

@@ -25,14 +25,16 @@ class Trail {
 };
 
 /// Back to where it took off, leg by leg: straight where that can be certified, else along the
-/// trail.
+/// trail. A trail that begins elsewhere, as that of a process started in flight, is led straight
+/// on.
 class WayBack {
  public:
   /// The next leg from the request's start, or what is left of the one being flown, if `flown` is
-  /// that; nothing where none can be certified. It ends at rest, at `home` in the end.
+  /// that; nothing where none can be certified and `may_fly`. It ends at rest, at `home` in the
+  /// end.
   std::optional<Stop> Leg(const PlannerConfig& config, const PlanRequest& request,
                           const Trail& trail, const Eigen::Vector3d& home,
-                          const world::Trajectory* flown);
+                          const world::Trajectory* flown, const MayFly& may_fly);
   /// Another task: the next leg is a first one.
   void Reset() { goal_.reset(); }
 

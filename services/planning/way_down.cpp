@@ -137,13 +137,16 @@ Footing FootingAt(const std::vector<world::Obstacle>& obstacles, const LandingNe
 
 WayDown::Answer WayDown::Lead(const PlannerConfig& config, const PlanRequest& request,
                               const LandingNeeds& needs, const Vector3d& rest,
-                              const std::optional<Vector3d>& home, const world::Trajectory* flown) {
+                              const std::optional<Vector3d>& home, const world::Trajectory* flown,
+                              const MayFly& may_fly) {
   const Survey survey(request, needs, rest, home);
   const auto to = [&](const Vector3d& spot) -> std::optional<Stop> {
     const bool led = flown && (flown->Position(flown->end()) - spot).norm() < kSame;
     if (led)
-      if (auto leg = GoOn(config, request, *flown)) return leg;
-    return GoTo(config, request, spot);
+      if (auto leg = GoOn(config, request, *flown); leg && may_fly(leg->trajectory)) return leg;
+    std::optional<Stop> leg = GoTo(config, request, spot);
+    if (leg && !may_fly(leg->trajectory)) leg.reset();
+    return leg;
   };
   const auto way = [&](const Vector3d& spot) { return (spot - request.start.p).head<2>().norm(); };
   const Footing here = survey.At(rest);

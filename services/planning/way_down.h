@@ -45,10 +45,10 @@ class WayDown {
   /// straight and certified; none where `rest`, at which braking ends, is above such ground, or
   /// where no better is known: then the reason says so. Where it took off, `home` (p_WB), the
   /// ground has borne it. Where none is level, a place that is not taken does. `flown` is the
-  /// running plan, if the start lies on it. Frame W.
+  /// running plan, if the start lies on it. Legs are such as `may_fly`. Frame W.
   Answer Lead(const PlannerConfig& config, const PlanRequest& request, const LandingNeeds& needs,
               const Eigen::Vector3d& rest, const std::optional<Eigen::Vector3d>& home,
-              const world::Trajectory* flown);
+              const world::Trajectory* flown, const MayFly& may_fly);
   /// Another task: the next place is a first one.
   void Reset() { spot_.reset(); }
 

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "chase/geofence_t.hpp"
 #include "common/bus/convert.h"
 #include "common/bus/lockstep.h"
 
@@ -32,6 +33,8 @@ struct Events {
   int64_t frame_at = kNever;      // the frame of odometry changes, us
   int64_t obstacles_at = kNever;  // obstacles speak of the new one, us
   int64_t forecasts_at = kNever;  // forecasts do, us
+  bool returns = false;           // mission wants it back, 5 m along x
+  bool is_fenced = false;         // inside a fence that has a notch across that way
 };
 
 /// Plays the drone and the target: hovers where the newest plan wants it, forecasts a straight
@@ -58,6 +61,7 @@ class Company : public bus::Node {
       tracking.following = tracking_t::PLAN;
       bus_.Publish("TRACKING", tracking);
     }
+    if (events_.returns && (utime - kStart) % 100000 == 0) Lead(utime);
     pose_t pose{};
     pose.utime = utime;
     pose.epoch = utime >= events_.frame_at;
@@ -93,6 +97,22 @@ class Company : public bus::Node {
     tracking_t tracking{};
     tracking.utime = utime;
     bus_.Publish("TRACKING", tracking);
+  }
+  void Lead(int64_t utime) {
+    flight_state_t state{};
+    state.utime = utime;
+    state.state = flight_state_t::RETURN;
+    state.has_home = 1;
+    state.home[0] = 5.0;
+    bus_.SetIdentity({"mission", "", kStart});
+    bus_.Publish("FLIGHT_STATE", state);
+    if (!events_.is_fenced) return;
+    geofence_t fence{};
+    fence.corners = {-1, -1, 2, -1, 2, 3, 4, 3, 4, -1, 6, -1, 6, 4, -1, 4};
+    fence.n_corners = static_cast<int32_t>(fence.corners.size());
+    fence.floor = -1.0;
+    fence.ceiling = 5.0;
+    bus_.Publish("GEOFENCE", fence);
   }
   void Forecast(int64_t utime) {
     prediction_t m{};
@@ -188,6 +208,24 @@ TEST(PlanningNode, APlannerStartedInFlightDoesNotClimb) {
   for (const plan_t& plan : plans) {
     const auto way = bus::FromMessage(plan.position, kStart);
     EXPECT_NEAR(way.Position(way.end()).z(), events.height, 0.01) << plan.reason;
+  }
+}
+
+TEST(PlanningNode, KeepsTheWayBackInsideTheFenceThatMissionTells) {
+  for (const bool is_fenced : {false, true}) {
+    Events events;
+    events.height = 1.5;
+    events.flying_from = kStart;
+    events.returns = true;
+    events.is_fenced = is_fenced;
+    const auto plans = Fly(kNever, kNever, kStart + 15000000, events);
+    ASSERT_FALSE(plans.empty());
+    const auto last = bus::FromMessage(plans.back().position, kStart);
+    const double x = last.Position(last.end()).x();
+    if (is_fenced)
+      EXPECT_LT(x, 2.0 - PlanningConfig{}.planner.tracking_tube);
+    else
+      EXPECT_NEAR(x, 5.0, 0.1);
   }
 }
 

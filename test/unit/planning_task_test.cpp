@@ -126,6 +126,17 @@ TEST(Task, ReturnWithoutAPlaceHolds) {
   EXPECT_EQ(flight.plans.back().reason, "the take-off place is not known");
 }
 
+TEST(Task, ReturnOfAPlannerStartedFarFromHomeGoesStraightOn) {
+  Flight flight({20.0, 5.0, 3.0});
+  flight.flying_before = true;
+  const Vector3d home(0.0, 0.0, 0.1);
+  flight.pilot.SetTask(Task::kReturn, home);
+  flight.Run(60.0);
+  EXPECT_LT((flight.Body().p - home).head<2>().norm(), 0.05);
+  EXPECT_NEAR(flight.Body().p.z(), 0.1 + PlanningConfig().takeoff_height, 0.05);
+  for (const PlanResult& plan : flight.plans) EXPECT_GE(plan.certified_clearance, 0.0);
+}
+
 TEST(Task, ReturnOutOfAnObstaclesReachIsAnEscape) {
   Flight flight({0.64, 0.0, 1.6});
   flight.obstacles = {Pillar(1, 0.0, 0.0)};  // 0.34 m off: nearer than the hard radius
@@ -141,6 +152,91 @@ TEST(Task, ReturnOutOfAnObstaclesReachIsAnEscape) {
   }
   EXPECT_GT(late, 0);
   EXPECT_LT((flight.Body().p - Vector3d(6.0, 0.0, 1.6)).head<2>().norm(), 0.05);
+}
+
+/// An L: along x to 14 m, and there along y.
+world::Geofence Angle() {
+  world::Geofence fence;
+  fence.polygon = {{-2, -2}, {14, -2}, {14, 14}, {10, 14}, {10, 2}, {-2, 2}};
+  return fence;
+}
+
+TEST(Task, ReturnAndLandingKeepToAConcaveFence) {
+  for (const Task task : {Task::kReturn, Task::kLand}) {
+    Flight flight({12.0, 4.0, 1.5});
+    flight.flying_before = true;
+    // To land: on a block, in the middle of which it is; the fence has room on one side.
+    world::Obstacle block = Pillar(1, 11.0, 4.0);
+    block.half = {2.0, 2.0, 0.3};
+    block.center = world::Trajectory::Constant({11.0, 4.0, 0.3}, 0.0, 1.0);
+    block.shape = (2.0 * block.half.cwiseAbs2()).cwiseInverse().asDiagonal();
+    if (task == Task::kLand) flight.obstacles = {block};
+    flight.pilot.SetTask(task, Vector3d(0.0, 0.0, 0.1));
+    flight.pilot.SetFence(Angle());
+    flight.Run(25.0);
+    for (const PlanResult& plan : flight.plans)
+      for (const Vector3d& p : world::PlacesOn(plan.trajectory, std::nullopt))
+        ASSERT_EQ(Angle().Breach(p - Vector3d(0.0, 0.0, 0.1), 0.1), "") << p.transpose();
+    EXPECT_GT((flight.Body().p - Vector3d(12.0, 4.0, 1.5)).norm(), 0.5) << "as far as it may";
+  }
+}
+
+/// Where the way back along the trail ends, from the trail's end.
+Vector3d Walk(const Trail& trail, const Vector3d& home, const world::Geofence& fence = {}) {
+  PlanRequest request;
+  request.start.p = trail.points().back();
+  WayBack way_back;
+  const auto in_fence = [&](const world::Trajectory& leg) {
+    const auto places = world::PlacesOn(leg, std::nullopt);
+    return fence.Refusal(request.start.p, places, 0.12).empty();
+  };
+  for (int i = 0; i < 60; ++i) {
+    request.target = world::Trajectory::Constant(request.start.p, request.t0, 1.0);
+    const auto leg = way_back.Leg({}, request, trail, home, nullptr, in_fence);
+    if (!leg) break;
+    EXPECT_TRUE(in_fence(leg->trajectory)) << request.start.p.transpose();
+    request.t0 = leg->trajectory.end();
+    request.start.p = leg->trajectory.Position(request.t0);
+  }
+  return request.start.p;
+}
+
+void Lead(const Vector3d& from, const Vector3d& to, Trail* trail) {
+  for (int i = 0; i <= 100; ++i) trail->Add(from + 0.01 * i * (to - from));
+}
+
+TEST(Trail, ReachesBackDownhillAndUphill) {
+  for (const double slope : {-0.3, 0.1}) {
+    const Vector3d home(0.0, 0.0, 1.6), middle(15.0, 0.0, 1.6 + 15.0 * slope);
+    Trail trail;
+    Lead({0.0, 0.0, 0.1}, home, &trail);
+    Lead(home, middle, &trail);
+    Lead(middle, middle + Vector3d(0.0, 15.0, 15.0 * slope), &trail);
+    EXPECT_LT((Walk(trail, home) - home).head<2>().norm(), 1e-6) << slope;
+  }
+}
+
+TEST(Trail, LeadsAroundTheCornerOfAFence) {
+  const Vector3d home(0.0, 0.0, 1.6), corner(12.0, 0.0, 1.6), end(12.0, 12.0, 1.6);
+  Trail trail;
+  Lead(home, corner, &trail);
+  Lead(corner, end, &trail);
+  EXPECT_LT((Walk(trail, home, Angle()) - home).norm(), 1e-6);
+}
+
+TEST(Trail, ThatBeginsElsewhereIsLedOnToHome) {
+  const Vector3d home(0.0, 0.0, 1.6), start(30.0, 10.0, 4.0);
+  Trail trail;
+  Lead(start, start + Vector3d(0.0, 10.0, 0.0), &trail);
+  EXPECT_LT((Walk(trail, home) - home).head<2>().norm(), 1e-6);
+}
+
+TEST(Trail, ThatClimbedSteeplyLeadsBackLevel) {
+  const Vector3d home(0.0, 0.0, 1.6), low(12.0, 0.0, 1.6), high(12.0, 0.0, 3.4);
+  Trail trail;
+  Lead(home, low, &trail);
+  Lead(low, high, &trail);
+  EXPECT_LT((Walk(trail, home) - home).head<2>().norm(), 1e-6);
 }
 
 TEST(Trail, LosesItsLoops) {
