@@ -42,9 +42,12 @@ const ROWS = [
   ['tracking_error_p99_m', 'Distance from the plan, 99th percentile', 'm', 1, 3],
   ['latency_ms.POSE.p99', 'Age of POSE, 99th percentile', 'ms', 1, 1], ['latency_ms.TARGET.p99', 'Age of TARGET, 99th percentile', 'ms', 1, 1],
   ['latency_ms.OBSTACLES.p99', 'Age of OBSTACLES, 99th percentile', 'ms', 1, 1], ['stages_ms.planning plan.p99', 'Planning, 99th percentile', 'ms', 1, 1],
+  ['reaction_s', 'Reaction after the age limit', 's', 1, 2], ['recovery_s', "Recovered after the fault's end", 's', 1, 2],
+  ['nonfinite_setpoints', 'Setpoints that are no numbers', '', 1, 0],
   ['touchdown_speed_mps', 'Speed at touchdown', 'm/s', 1, 2], ['motors_off_s', 'Motors off after', 's', 1, 1],
   ['real_time_factor', 'Real-time factor', '', 1, 2], ['flown_s', 'Flown', 's', 1, 1],
 ];
+const MOST_CHANGES = 200;
 const rowOf = (key) => ROWS.find(([name]) => name === key) ?? [key, key.replace('criteria.', 'criterion '), '', 1, 3];
 
 const criterionOf = ({metrics}, key) => {
@@ -98,6 +101,22 @@ function showSoftware() {
     table(byId('software'), ['process', 'version', 'host', 'configuration'], names.map((name) =>
       ({cells: [name, software.versions[name], software.hosts[name] ?? '–', software.configurations[name] ?? '–']})));
   });
+}
+
+// Faults, and why the flight's state, what is planned, the target and the pose became what they are.
+function showChanges() {
+  const rows = flights.flatMap(({data, metrics}, i) => data.spans.flatMap((s) => {
+    const side = two ? [`${'AB'[i]}`] : [], of = (t, what, reason) => ({t, cells: [...side, `${t.toFixed(2)} s`, `${s.lane}: ${what}`, reason]});
+    if (s.lane !== 'fault') return s.reason || s.lane === 'flight' ? [of(s.from, s.label, s.reason ?? '')] : [];
+    const ended = metrics.faults?.some((f) => f.name === s.label && f.end_s !== null && Math.abs(f.end_s - s.to) < 0.01);
+    return [of(s.from, `${s.label} begins`, ''), ...(ended ? [of(s.to, `${s.label} ends`, '')] : [])];
+  })).sort((a, b) => a.t - b.t);
+  if (!rows.length) return;
+  const shownRows = rows.slice(0, MOST_CHANGES), details = make('details');
+  details.append(make('summary', `Changes and their reasons (${rows.length})`));
+  table(details, null, shownRows);
+  if (rows.length > shownRows.length) details.append(make('p', `and ${rows.length - shownRows.length} more`));
+  byId('changes').append(details);
 }
 
 // Seconds and shares of each lane's labels.
@@ -173,6 +192,7 @@ showFigures();
 showPlayback();
 showMoments();
 showTimeLine(flights);
+showChanges();
 showStrips(flights);
 showMap(flights);
 if (two) byId('pixels_card').remove();

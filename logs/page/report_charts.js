@@ -1,6 +1,6 @@
 // Charts over time share one range and one cursor; a map; bars.
 const COLORS = {chaser: '#1f5fa8', target: '#e8710a', grey: '#8a8f98', good: '#1d7f4b', bad: '#c62828'};
-const LABELS = {chase: '#3fa66b', wider: '#8ccf90', kept: '#4c9be8', 'safe only': '#d9a33a', brake: '#d9534f', wait: '#9aa3ae', escape: '#b455c9',
+const LABELS = {chase: '#3fa66b', wider: '#8ccf90', kept: '#4c9be8', safe_only: '#d9a33a', brake: '#d9534f', wait: '#9aa3ae', escape: '#b455c9',
   tracking: '#3fa66b', searching: '#9aa3ae', occluded: '#d9a33a', ok: '#3fa66b', degraded: '#d9a33a', starting: '#9aa3ae', lost: '#d9534f',
   IDLE: '#9aa3ae', READY: '#a9c7b4', TAKEOFF: '#6fbf73', CHASE: '#3fa66b', HOLD: '#4c9be8', SEARCH: '#d9a33a', RETURN: '#b455c9',
   LAND: '#8a6fd1', DONE: '#5b6675', EMERGENCY: '#d9534f'};
@@ -92,23 +92,28 @@ function showMap(flights) {
   draw('map', traces, {height: NARROW ? 520 : 720, xaxis: axis('x, east [m]'), yaxis: axis('y, north [m]', {scaleanchor: 'x', scaleratio: 1})});
 }
 
-// Bars from lane to lane, of two flights below one another; a fault is a mark.
+// Bars from lane to lane, of two flights below one another; a fault has a mark where it begins.
 function showTimeLine(flights) {
   const two = flights.length === 2, order = ['fault', 'pose', 'target', 'verdict', 'flight'];
   const spans = flights.flatMap(({data}, i) => data.spans.map((s) => ({...s, row: two ? `${s.lane} ${'AB'[i]}` : s.lane})));
   const rows = order.flatMap((lane) => two ? [`${lane} B`, `${lane} A`] : [lane]).filter((row) => spans.some((s) => s.row === row));
+  const marks = spans.filter((s) => s.lane === 'fault');
   const traces = [...new Set(spans.map((s) => s.label))].map((label) => {
     const own = spans.filter((s) => s.label === label);
-    if (own[0].lane === 'fault') return {name: label, x: own.map((s) => s.from), y: own.map((s) => s.row), mode: 'markers+text',
-      text: label, textposition: 'top center', marker: {symbol: 'x', size: 10, color: COLORS.bad}};
     return {name: label, type: 'bar', orientation: 'h', base: own.map((s) => s.from), x: own.map((s) => Math.max(s.to - s.from, 0.02)),
-      y: own.map((s) => s.row), marker: {color: LABELS[label], line: {width: 0}},
-      hovertemplate: `${label}, from %{base:.1f} s, %{x:.1f} s long<extra></extra>`};
+      y: own.map((s) => s.row), marker: {color: LABELS[label] ?? COLORS.bad, opacity: own[0].lane === 'fault' ? 0.35 : 1, line: {width: 0}},
+      customdata: own.map((s) => [plain(s.reason ?? ''), s.to]),
+      hovertemplate: `${plain(label)}, from %{base:.1f} to %{customdata[1]:.1f} s<br>%{customdata[0]}<extra></extra>`};
   });
+  if (marks.length) traces.push({name: 'fault begins', x: marks.map((s) => s.from), y: marks.map((s) => s.row), mode: 'markers+text', showlegend: false,
+    text: marks.map((s) => s.label), textposition: 'top right', marker: {symbol: 'x', size: 10, color: COLORS.bad}, hoverinfo: 'skip'});
   drawOverTime('timeline', traces, {height: 110 + 34 * rows.length, barmode: 'overlay', bargap: 0.25, margin: {...MARGIN, t: 20},
     legend: {orientation: 'h', y: -0.25, yanchor: 'top', x: 0, font: {size: 11}},
     yaxis: {categoryorder: 'array', categoryarray: rows, fixedrange: true}});
 }
+
+// Plotly reads some HTML; what a log says is none.
+const plain = (text) => text.replace(/[<>&]/g, (c) => ({'<': '&lt;', '>': '&gt;', '&': '&amp;'})[c]);
 
 // What is drawn over time: [key, name, colour, dash, filled]. Of two flights the first that both hold.
 const STRIPS = [

@@ -49,6 +49,9 @@ const std::vector<std::pair<const char*, Better>>& Keys() {
       {"latency_ms.TARGET.p99", Better::kLower},
       {"latency_ms.OBSTACLES.p99", Better::kLower},
       {"stages_ms.planning plan.p99", Better::kLower},
+      {"reaction_s", Better::kLower},
+      {"recovery_s", Better::kLower},
+      {"nonfinite_setpoints", Better::kLower},
       {"touchdown_speed_mps", Better::kLower},
       {"motors_off_s", Better::kLower},
   };

@@ -34,7 +34,21 @@ struct TruthSample {
 /// The flight's state from then on.
 struct StateSample {
   double t = 0.0;
-  int state = 0;  ///< flight_state_t's constants
+  int state = 0;         ///< flight_state_t's constants
+  std::string reason{};  ///< what led to it
+};
+
+/// A message of an input that may get too old.
+struct HeardSample {
+  double t = 0.0;      ///< when it was heard
+  double stamp = 0.0;  ///< its own time
+};
+
+/// What control follows from then on.
+struct TrackingSample {
+  double t = 0.0;
+  int following = 0;      ///< tracking_t's constants
+  int32_t plan_seq = -1;  ///< of the plan that is followed
 };
 
 struct PoseSample {
@@ -61,12 +75,15 @@ struct PlanSample {
   std::optional<world::Trajectory> stop;  ///< its way to rest, in mission time
   double certified_clearance = -1.0;      ///< m; negative: not certified
   double hard_radius = 0.0;               ///< m
+  double heard = 0.0;                     ///< before t, which is when it takes over
+  int32_t seq = -1;
 };
 
 /// A fault that struck.
 struct FaultSample {
   double t = 0.0;
   std::string name;
+  std::optional<double> end{};  ///< none: it lasted as long as the log
 };
 
 /// Figures of one stage of one process, ms.
@@ -93,6 +110,10 @@ struct FlightRecord {
   std::vector<PredictionSample> predictions;
   std::vector<PlanSample> plans;
   std::vector<FaultSample> faults;
+  std::map<std::string, std::vector<HeardSample>>
+      heard;  ///< by channel, of those with an age limit
+  std::vector<TrackingSample> tracking;
+  long nonfinite_setpoints = 0;     ///< ATTITUDE_SETPOINTs that hold a number which is none
   std::vector<StateSample> states;  ///< one for every change; none: no mission process was there
   std::vector<StageFigures> stages;
   std::vector<PerceivedObstacle> obstacles;

@@ -19,7 +19,7 @@ std::string StateName(int state) { return kNames[state]; }
 
 void AddLanding(const FlightRecord& record, Metrics* metrics) {
   for (const StateSample& s : record.states)
-    metrics->flight_states.push_back({StateName(s.state), s.t});
+    metrics->flight_states.push_back({StateName(s.state), s.t, s.reason});
   const std::vector<TruthSample>& truth = record.truth;
   const bool done = !record.states.empty() && record.states.back().state == flight_state_t::DONE;
   if (!done || truth.empty()) return;

@@ -12,21 +12,23 @@ double Rounded(double t) { return std::round(t * 1e3) / 1e3; }
 
 }  // namespace
 
-void Lane::Add(double t, const std::string& name) {
+void Lane::Add(double t, const std::string& name, const std::string& reason) {
   if (!spans_.empty()) {
     const double step = std::clamp(t - last_, 0.0, kLongestStep);
     seconds_[spans_.back().name] += step;
     spans_.back().to = last_ + step;
   }
   if (spans_.empty() || spans_.back().name != name || t - last_ > kLongestStep)
-    spans_.push_back({name, t, t});
+    spans_.push_back({name, reason, t, t});
   last_ = t;
 }
 
 void Lane::AddTo(const std::string& lane, nlohmann::ordered_json* spans) const {
-  for (const Span& s : spans_)
+  for (const Span& s : spans_) {
     spans->push_back(
         {{"lane", lane}, {"label", s.name}, {"from", Rounded(s.from)}, {"to", Rounded(s.to)}});
+    if (!s.reason.empty()) spans->back()["reason"] = s.reason;
+  }
 }
 
 }  // namespace chase::logs

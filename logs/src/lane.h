@@ -10,15 +10,16 @@ namespace chase::logs {
 /// Seconds under each name, and stretches of time with the same one.
 class Lane {
  public:
-  /// From `t` [s] on, until the next name or a second at most. Times that go back count as none.
-  void Add(double t, const std::string& name);
+  /// From `t` [s] on, until the next name or a second at most. Times that go back count as none. A
+  /// stretch has the reason that it began with.
+  void Add(double t, const std::string& name, const std::string& reason = "");
   const std::map<std::string, double>& seconds() const { return seconds_; }
-  /// Adds {lane, label, from, to} of every stretch.
+  /// Adds {lane, label, from, to} of every stretch, and its reason where it has one.
   void AddTo(const std::string& lane, nlohmann::ordered_json* spans) const;
 
  private:
   struct Span {
-    std::string name;
+    std::string name, reason;
     double from, to;  // s
   };
   std::vector<Span> spans_;

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "logs/src/estimate_errors.h"
+#include "logs/src/fault_figures.h"
 #include "logs/src/flown_plans.h"
 #include "logs/src/landing_figures.h"
 
@@ -108,13 +109,6 @@ void AddEstimates(const FlightRecord& record, Metrics* m) {
   m->prediction_error_m = PredictionError(record, 1.0);
 }
 
-void AddFaults(const FlightRecord& record, Metrics* m) {
-  for (const FaultSample& fault : record.faults) {
-    if (m->fault.empty()) m->fault_time_s = fault.t;
-    m->fault += (m->fault.empty() ? "" : "+") + fault.name;
-  }
-}
-
 void AddCollision(const FlightRecord& record, const std::vector<SampleScore>& scores, Metrics* m) {
   const auto contact =
       std::find_if(scores.begin(), scores.end(), [](const SampleScore& s) { return !s.Safe(); });
@@ -141,6 +135,7 @@ void AddLosses(const LogInfo& log, Metrics* m) {
 void AddCriteria(const FlightRecord& record, Metrics* m) {
   const world::Scenario& scenario = record.scenario;
   const world::CriteriaSpec& c = scenario.criteria;
+  m->criteria["finite_setpoints"] = m->nonfinite_setpoints == 0;
   m->criteria["recorded"] = record.log.Recorded();
   m->criteria["complete"] = m->flown_s >= scenario.duration_s - kEndTolerance;
   if (c.safe_ratio >= 0.0) m->criteria["safe_ratio"] = AtLeast(m->safe_ratio, c.safe_ratio);
@@ -173,6 +168,7 @@ Metrics Compute(const FlightRecord& record, const std::vector<SampleScore>& scor
   m.flown_s = scores.empty() ? 0.0 : scores.back().t;
   m.cpu_s = record.cpu_s;
   m.real_time_factor = record.real_time_factor;
+  m.nonfinite_setpoints = record.nonfinite_setpoints;
   AddFaults(record, &m);
   AddCollision(record, scores, &m);
   AddRatios(record, scores, &m);

@@ -18,6 +18,17 @@ struct TimeFigures {
 struct StateFigures {
   std::string name;   ///< of flight_state_t's constant
   double at_s = 0.0;  ///< mission time of its beginning
+  std::string reason;
+};
+
+/// How the flight took a fault.
+struct FaultFigures {
+  std::string name;
+  double at_s = 0.0;                 ///< mission time
+  std::optional<double> end_s;       ///< mission time; none: it did not end
+  std::string input;                 ///< that was reacted to, or not, for the longest; empty: none
+  std::optional<double> reaction_s;  ///< from that input's age limit; none: none was reached
+  std::optional<double> recovery_s;  ///< from its end; none: no end, or not recovered
 };
 
 /// Figures of a flight; empty where the log holds nothing to compute them from. Definitions: see
@@ -36,8 +47,12 @@ struct Metrics {
   std::map<int, double> verdict_s;      ///< time under each of plan_t's verdicts
   std::map<std::string, double> cpu_s;  ///< by process
   Figure real_time_factor;
-  std::string fault;                              ///< names of those that struck, joined by +
-  double fault_time_s = -1.0;                     ///< mission time of the first; -1: none
+  std::string fault;                 ///< names of those that struck, joined by +
+  double fault_time_s = -1.0;        ///< mission time of the first; -1: none
+  std::vector<FaultFigures> faults;  ///< in the order of their beginnings
+  Figure reaction_s;  ///< the longest of the faults'; none: no input reached its limit
+  Figure recovery_s;  ///< the same; none also where one was not recovered from
+  long nonfinite_setpoints = 0;
   double flown_s = 0.0;                           ///< of the mission
   double collision_s = -1.0;                      ///< mission time of the first contact; -1: none
   std::string collided_with;                      ///< as Scorer::Nearest() names it; empty: nothing

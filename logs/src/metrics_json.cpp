@@ -28,6 +28,18 @@ Json ByHorizon(const std::map<double, double>& errors) {
   return out;
 }
 
+Json Faults(const std::vector<FaultFigures>& faults) {
+  Json out = Json::array();
+  for (const FaultFigures& f : faults)
+    out.push_back({{"name", f.name},
+                   {"at_s", f.at_s},
+                   {"end_s", Number(f.end_s)},
+                   {"input", f.input},
+                   {"reaction_s", Number(f.reaction_s)},
+                   {"recovery_s", Number(f.recovery_s)}});
+  return out;
+}
+
 Json Verdicts(const std::map<int, double>& seconds) {
   Json out = Json::object();
   for (int v = 0; v < 7; ++v) {
@@ -46,6 +58,10 @@ std::string MetricsJson(const FlightRecord& record, const Metrics& m) {
   j["duration_s"] = record.scenario.duration_s;
   j["fault"] = m.fault;
   j["fault_time_s"] = m.fault_time_s;
+  j["faults"] = Faults(m.faults);
+  j["reaction_s"] = Number(m.reaction_s);
+  j["recovery_s"] = Number(m.recovery_s);
+  j["nonfinite_setpoints"] = m.nonfinite_setpoints;
   j["flown_s"] = m.flown_s;
   j["collision_s"] = m.collision_s;
   j["collided_with"] = m.collided_with;
@@ -83,7 +99,7 @@ std::string MetricsJson(const FlightRecord& record, const Metrics& m) {
   j["log_whole"] = m.log_whole;
   if (!m.flight_states.empty()) {
     for (const StateFigures& s : m.flight_states)
-      j["flight_states"].push_back({{"state", s.name}, {"at_s", s.at_s}});
+      j["flight_states"].push_back({{"state", s.name}, {"at_s", s.at_s}, {"reason", s.reason}});
     j["touchdown_speed_mps"] = Number(m.touchdown_speed_mps);
     j["motors_off_s"] = Number(m.motors_off_s);
   }

@@ -4,7 +4,9 @@
 #include <cmath>
 #include <optional>
 #include <stdexcept>
+#include <utility>
 
+#include "chase/attitude_setpoint_t.hpp"
 #include "chase/event_t.hpp"
 #include "chase/flight_state_t.hpp"
 #include "chase/obstacles_t.hpp"
@@ -35,13 +37,16 @@ class Gatherer {
       if (!first_event_) first_event_ = e.utime;
       last_event_ = e.utime;
     }
-    Take(e, "POSE", &poses_);
-    Take(e, "TARGET", &targets_);
+    Hear(e, "POSE", &poses_);
+    Hear(e, "TARGET", &targets_);
     Take(e, "PREDICTION", &predictions_);
-    Take(e, "PLAN", &plans_);
+    if (Take(e, "PLAN", &plans_)) plans_heard_.push_back(Heard(e));
     Take(e, "FAULT", &faults_);
-    Take(e, "FLIGHT_STATE", &states_);
-    Take(e, "TRACKING", &tracking_);
+    Hear(e, "FLIGHT_STATE", &states_);
+    if (Take(e, "TRACKING", &tracking_)) tracking_heard_.push_back(Heard(e));
+    if (obstacles_t message; Good(e, "OBSTACLES", &message))
+      heard_["OBSTACLES"].emplace_back(Heard(e), message.utime);
+    AddSetpoint(e);
     TakeLast(e, "SCENARIO", &scenario_);
     TakeLast(e, "OBSTACLES", &obstacles_);
     status_t status;
@@ -58,6 +63,7 @@ class Gatherer {
     record.seed = scenario_->seed;
     record.origin_utime = origin_ = MissionStart(truth_.front());
     AddTruth(&record);
+    AddHeard(&record);
     AddStates(&record);
     AddEstimates(&record);
     AddPlans(&record);
@@ -76,10 +82,28 @@ class Gatherer {
     messages->push_back(std::move(message));
     return true;
   }
+  /// Takes what may get too old, too.
+  template <class T>
+  void Hear(const LogEvent& e, const std::string& name, std::vector<T>* messages) {
+    if (Take(e, name, messages)) heard_[name].emplace_back(Heard(e), messages->back().utime);
+  }
+  /// By the truth's clock, which counts the flight's time however fast the log's stamps run.
+  int64_t Heard(const LogEvent& e) const {
+    return truth_.empty() ? e.utime : truth_.back().utime + e.utime - last_event_;
+  }
   template <class T>
   static void TakeLast(const LogEvent& e, const std::string& name, std::optional<T>* message) {
     T fresh;
     if (Good(e, name, &fresh)) *message = std::move(fresh);
+  }
+
+  /// One that is not sound is what is looked for.
+  void AddSetpoint(const LogEvent& e) {
+    attitude_setpoint_t m;
+    if (!IsOn(e, "ATTITUDE_SETPOINT") || !DecodeBytes(e.bytes, &m)) return;
+    const auto finite = [](double v) { return std::isfinite(v); };
+    nonfinite_setpoints_ += !std::all_of(m.orientation, m.orientation + 4, finite) ||
+                            !std::all_of(m.body_rate, m.body_rate + 3, finite) || !finite(m.thrust);
   }
 
   double Time(int64_t utime) const { return bus::Seconds(utime, origin_); }
@@ -90,10 +114,20 @@ class Gatherer {
                      [](const TruthSample& a, const TruthSample& b) { return a.t < b.t; });
   }
 
+  void AddHeard(FlightRecord* record) const {
+    for (const auto& [channel, samples] : heard_)
+      for (const auto& [heard, stamp] : samples)
+        record->heard[channel].push_back({Time(heard), Time(stamp)});
+    for (size_t i = 0; i < tracking_.size(); ++i)
+      record->tracking.push_back(
+          {Time(tracking_heard_[i]), tracking_[i].following, tracking_[i].plan_seq});
+    record->nonfinite_setpoints = nonfinite_setpoints_;
+  }
+
   void AddStates(FlightRecord* record) const {
     for (const flight_state_t& m : states_)
       if (record->states.empty() || record->states.back().state != m.state)
-        record->states.push_back({Time(m.utime), m.state});
+        record->states.push_back({Time(m.utime), m.state, m.reason});
     size_t state = 0, tracking = 0;
     for (TruthSample& s : record->truth) {
       while (state < record->states.size() && record->states[state].t <= s.t) ++state;
@@ -116,10 +150,16 @@ class Gatherer {
     for (const prediction_t& m : predictions_)
       record->predictions.push_back({Time(m.utime), m.verdict != prediction_t::NO_TARGET,
                                      bus::FromMessage(m.target, origin_)});
-    for (const plan_t& m : plans_) {
-      PlanSample plan{
-          Time(m.utime),         m.verdict,    bus::FromMessage(m.position, origin_), {},
-          m.certified_clearance, m.hard_radius};
+    for (size_t i = 0; i < plans_.size(); ++i) {
+      const plan_t& m = plans_[i];
+      PlanSample plan{Time(m.utime),
+                      m.verdict,
+                      bus::FromMessage(m.position, origin_),
+                      {},
+                      m.certified_clearance,
+                      m.hard_radius,
+                      Time(plans_heard_[i]),
+                      m.seq};
       if (m.stop.n_coefficients > 0) plan.stop = bus::FromMessage(m.stop, origin_);
       record->plans.push_back(std::move(plan));
     }
@@ -127,9 +167,16 @@ class Gatherer {
 
   void AddFaults(FlightRecord* record) const {
     for (const event_t& m : faults_)
-      if (m.phase == event_t::BEGINS) record->faults.push_back({Time(m.utime), m.name});
+      if (m.phase == event_t::BEGINS) record->faults.push_back({Time(m.utime), m.name, EndOf(m)});
     std::stable_sort(record->faults.begin(), record->faults.end(),
                      [](const FaultSample& a, const FaultSample& b) { return a.t < b.t; });
+  }
+
+  std::optional<double> EndOf(const event_t& begin) const {
+    const auto end = std::find_if(faults_.begin(), faults_.end(), [&](const event_t& m) {
+      return m.phase == event_t::ENDS && m.name == begin.name && m.utime >= begin.utime;
+    });
+    return end == faults_.end() ? std::nullopt : std::optional(Time(end->utime));
   }
 
   void AddStatuses(FlightRecord* record) const {
@@ -169,6 +216,9 @@ class Gatherer {
   std::vector<event_t> faults_;
   std::vector<flight_state_t> states_;
   std::vector<tracking_t> tracking_;
+  std::vector<int64_t> plans_heard_, tracking_heard_;                      // us
+  std::map<std::string, std::vector<std::pair<int64_t, int64_t>>> heard_;  // when, stamp; us
+  long nonfinite_setpoints_ = 0;
   std::optional<scenario_t> scenario_;
   std::optional<obstacles_t> obstacles_;
   std::map<std::string, status_t> statuses_;

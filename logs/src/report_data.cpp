@@ -134,7 +134,9 @@ void AddCertified(const FlightRecord& record, const std::vector<SampleScore>& sc
 }
 
 void AddFaults(const FlightRecord& record, ReportData* data) {
-  for (const FaultSample& s : record.faults) data->spans.push_back({"fault", s.name, s.t, s.t});
+  const double last = record.truth.empty() ? 0.0 : record.truth.back().t;
+  for (const FaultSample& s : record.faults)
+    data->spans.push_back({"fault", s.name, s.t, std::max(s.t, s.end.value_or(last))});
 }
 
 void AddCosts(const FlightRecord& record, ReportData* data) {

@@ -33,7 +33,7 @@ struct ReportData {
   std::vector<Outline> predictions, plans;  ///< fans, open
   Series distance, clearance, visible, visible_share;
   Series certified;                   ///< clearance that the plan flown then certified, m
-  std::vector<Span> spans;            ///< faults
+  std::vector<Span> spans;            ///< faults, from beginning to end
   Series pixel_u, pixel_v;            ///< of frames with the target in the image
   std::vector<StageFigures> stages;   ///< slowest first
   std::vector<NamedValue> cpu_share;  ///< processor time over flight time, per cent

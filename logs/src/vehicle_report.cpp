@@ -121,7 +121,7 @@ class Gatherer {
   void OnPose(const pose_t& m) {
     const double t = Time(m.utime);
     const Eigen::Vector3d p = bus::ToVector(m.pos);
-    health_.Add(t, kHealths[m.health]);
+    health_.Add(t, kHealths[m.health], m.reason);
     const bool same = poses_++ > 0 && m.epoch == epoch_;
     if (same) path_ += (p - last_p_).norm();
     if (poses_ > 1 && m.epoch != epoch_) ++frame_changes_;
@@ -140,7 +140,7 @@ class Gatherer {
   }
 
   void OnTarget(const target_t& m) {
-    target_.Add(Time(m.utime), kTargets[m.state]);
+    target_.Add(Time(m.utime), kTargets[m.state], m.reason);
     ++targets_;
     const bool known = m.state == target_t::TRACKING || m.state == target_t::OCCLUDED;
     tracked_ += known;
@@ -159,7 +159,7 @@ class Gatherer {
   void OnPlan(const plan_t& m) {
     ++plans_;
     fallbacks_ += m.verdict > plan_t::WIDER;
-    verdict_.Add(Time(m.utime), VerdictName(m.verdict));
+    verdict_.Add(Time(m.utime), VerdictName(m.verdict), m.reason);
     if (m.certified_clearance < 0.0) return;
     ++certified_;
     least_clearance_ = std::min(least_clearance_.value_or(1e9), m.certified_clearance);
@@ -167,9 +167,10 @@ class Gatherer {
   }
 
   void OnState(const flight_state_t& m) {
-    flight_.Add(Time(m.utime), StateName(m.state));
+    flight_.Add(Time(m.utime), StateName(m.state), m.reason);
     if (states_.empty() || states_.back()["state"] != StateName(m.state))
-      states_.push_back({{"state", StateName(m.state)}, {"at_s", Time(m.utime)}});
+      states_.push_back(
+          {{"state", StateName(m.state)}, {"at_s", Time(m.utime)}, {"reason", m.reason}});
   }
 
   static Json Share(long part, long all) {

@@ -13,7 +13,7 @@ chase_test(logs_identify_test
           ${CMAKE_CURRENT_LIST_DIR}/logs_regression_test.cpp)
 chase_test(logs_metrics_test
   LIBS metrics nlohmann_json::nlohmann_json
-  SOURCES ${CMAKE_CURRENT_LIST_DIR}/logs_metrics_test.cpp)
+  SOURCES ${CMAKE_CURRENT_LIST_DIR}/logs_metrics_test.cpp ${CMAKE_CURRENT_LIST_DIR}/logs_faults_test.cpp)
 chase_test(logs_report_test
   LIBS report
   SOURCES ${CMAKE_CURRENT_LIST_DIR}/logs_report_test.cpp ${CMAKE_CURRENT_LIST_DIR}/logs_moments_test.cpp)
@@ -37,10 +37,8 @@ target_include_directories(logs_migrate_test PRIVATE ${CMAKE_CURRENT_BINARY_DIR}
 # The tools as a user calls them, where there is a program that flies.
 if(TARGET chase-flight)
   find_package(Python3 REQUIRED COMPONENTS Interpreter)
-  add_test(NAME logs_cli
-    COMMAND ${Python3_EXECUTABLE} -B ${CMAKE_CURRENT_LIST_DIR}/logs_cli_test.py ${CMAKE_BINARY_DIR}/bin)
-  add_test(NAME logs_python
-    COMMAND ${Python3_EXECUTABLE} -B ${CMAKE_CURRENT_LIST_DIR}/logs_python_test.py ${CMAKE_BINARY_DIR}/bin)
+  chase_script_test(logs_cli ${CMAKE_CURRENT_LIST_DIR}/logs_cli_test.py ${CMAKE_BINARY_DIR}/bin)
+  chase_script_test(logs_python ${CMAKE_CURRENT_LIST_DIR}/logs_python_test.py ${CMAKE_BINARY_DIR}/bin)
   add_test(NAME logs_mcap
     COMMAND ${Python3_EXECUTABLE} -B ${CMAKE_CURRENT_LIST_DIR}/mcap_size_test.py ${CMAKE_BINARY_DIR}/bin
             ${CMAKE_BINARY_DIR}/test/flight.lcm)

@@ -293,7 +293,7 @@ TEST(Metrics, CriteriaFollowTheScenario) {
   record.real_time_factor = 0.99;
   Metrics m = Compute(record);
   EXPECT_TRUE(m.Passed());
-  EXPECT_EQ(m.criteria.size(), 7u);
+  EXPECT_EQ(m.criteria.size(), 8u);
   record.real_time_factor = 0.9;
   EXPECT_FALSE(Compute(record).criteria.at("real_time_factor"));
   record.scenario.criteria.real_time_factor = -1.0;
@@ -318,6 +318,15 @@ TEST(Metrics, AFlightWhoseLogLostAHundredthFails) {
   record.log.damage = {{1000, 10, true}};
   EXPECT_FALSE(Compute(record).Passed());
   EXPECT_EQ(Compute(record).losses.size(), 1u);
+}
+
+TEST(Metrics, AFlightWithASetpointThatIsNoNumberFails) {
+  FlightRecord record = Standing({3, 0, 1.5}, {5.5, 0, 1.5});
+  EXPECT_TRUE(Compute(record).criteria.at("finite_setpoints"));
+  record.nonfinite_setpoints = 1;
+  EXPECT_EQ(Compute(record).nonfinite_setpoints, 1);
+  EXPECT_FALSE(Compute(record).criteria.at("finite_setpoints"));
+  EXPECT_FALSE(Compute(record).Passed());
 }
 
 TEST(Metrics, AFlightThatStopsEarlyFails) {
@@ -364,7 +373,11 @@ TEST(Metrics, JsonHasTheAgreedKeys) {
                           "fault_time_s",
                           "flown_s",
                           "collision_s",
-                          "collided_with"})
+                          "collided_with",
+                          "faults",
+                          "reaction_s",
+                          "recovery_s",
+                          "nonfinite_setpoints"})
     EXPECT_TRUE(json.contains(key)) << key;
 }
 

@@ -91,6 +91,18 @@ TEST(KeyMoments, HaveTheNextImageWithTheBoxFoundInIt) {
   std::filesystem::remove(log);
 }
 
+TEST(Lane, AStretchHasTheReasonThatItBeganWith) {
+  Lane lane;
+  lane.Add(0.0, "CHASE");
+  lane.Add(0.5, "HOLD", "asked for");
+  lane.Add(1.0, "HOLD", "something else");
+  auto spans = nlohmann::ordered_json::array();
+  lane.AddTo("flight", &spans);
+  ASSERT_EQ(spans.size(), 2u);
+  EXPECT_FALSE(spans[0].contains("reason"));
+  EXPECT_EQ(spans[1]["reason"], "asked for");
+}
+
 TEST(Lane, AMessageStandsForASecondAtMost) {
   Lane lane;
   for (const auto& [t, name] : std::vector<std::pair<double, std::string>>{

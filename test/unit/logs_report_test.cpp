@@ -1,11 +1,17 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "chase/attitude_setpoint_t.hpp"
+#include "chase/flight_state_t.hpp"
+#include "chase/tracking_t.hpp"
 #include "logs/src/metrics.h"
 #include "logs/src/read_flight.h"
+#include "logs/src/report_data.h"
 #include "logs/src/report_page.h"
 #include "logs_synthetic_flight.h"
 
@@ -79,12 +85,102 @@ TEST(ReadFlight, FaultsAreThoseThatBegan) {
     event.phase = event_t::ENDS;
     out.Write(3, "FAULT", event);
   }
+  event.name = "lidar-dead";  // does not end
+  event.utime = 6000000;
+  event.phase = event_t::BEGINS;
+  out.Write(4, "FAULT", event);
+  truth.utime = 10000000;
+  truth.mission_time = 7.0;
+  out.Write(5, "TRUTH", truth);
   out.Close();
   const FlightRecord record = ReadFlight(log);
-  ASSERT_EQ(record.faults.size(), 2u);
+  ASSERT_EQ(record.faults.size(), 3u);
   EXPECT_EQ(record.faults[0].name, "kill-control");
   EXPECT_EQ(record.faults[0].t, 1.0);
+  EXPECT_EQ(record.faults[0].end, 1.5);
   EXPECT_EQ(record.faults[1].t, 2.0);
+  EXPECT_EQ(record.faults[1].end, 2.5);
+  EXPECT_FALSE(record.faults[2].end);
+  const auto spans = ToJson(PrepareReport(record, {}))["spans"];
+  ASSERT_EQ(spans.size(), 3u);
+  EXPECT_EQ(spans[0]["label"], "kill-control");
+  EXPECT_EQ(spans[0]["from"], 1.0);
+  EXPECT_EQ(spans[0]["to"], 1.5);
+  EXPECT_EQ(spans[2]["to"], 7.0) << "to the log's end";
+}
+
+/// Truth every 10 ms from 1 s of the flight's clock on; the log's stamps run twice as fast.
+void WriteTruth(OutputLog* out, int64_t utime) {
+  truth_t truth{};
+  truth.utime = utime;
+  truth.mission_time = 1e-6 * static_cast<double>(utime - 1000000);
+  truth.orientation[0] = 1.0;
+  out->Write(2 * utime, "TRUTH", truth);
+}
+
+TEST(ReadFlight, WhatIsHeardIsTimedByTheTruthsClock) {
+  const std::string log = Fresh("heard") + "/flight.lcm";
+  OutputLog out(log);
+  scenario_t scenario{};
+  scenario.yaml = kYaml;
+  out.Write(1, "SCENARIO", scenario);
+  for (int64_t t = 1000000; t <= 2000000; t += 10000) WriteTruth(&out, t);
+  obstacles_t obstacles{};
+  obstacles.utime = 1900000;
+  out.Write(2 * 2000000 + 5000, "OBSTACLES", obstacles);
+  flight_state_t state{};
+  state.utime = 2000000;
+  state.state = flight_state_t::HOLD;
+  state.reason = "asked for";
+  out.Write(2 * 2000000 + 6000, "FLIGHT_STATE", state);
+  tracking_t tracking{};
+  tracking.utime = 2000000;
+  tracking.following = tracking_t::STOP;
+  tracking.plan_seq = 7;
+  out.Write(2 * 2000000 + 7000, "TRACKING", tracking);
+  out.Close();
+  const FlightRecord record = ReadFlight(log);
+  const auto& heard = record.heard.at("OBSTACLES");
+  ASSERT_EQ(heard.size(), 1u);
+  EXPECT_NEAR(heard[0].t, 1.005, 1e-9);
+  EXPECT_NEAR(heard[0].stamp, 0.9, 1e-9);
+  ASSERT_EQ(record.tracking.size(), 1u);
+  EXPECT_NEAR(record.tracking[0].t, 1.007, 1e-9);
+  EXPECT_EQ(record.tracking[0].following, int{tracking_t::STOP});
+  EXPECT_EQ(record.tracking[0].plan_seq, 7);
+  ASSERT_EQ(record.states.size(), 1u);
+  EXPECT_EQ(record.states[0].reason, "asked for");
+  const auto page = ReportFlight(log, {}).page;
+  const auto& spans = page["data"]["spans"];
+  const bool told = std::any_of(spans.begin(), spans.end(), [](const auto& s) {
+    return s["lane"] == "flight" && s["label"] == "HOLD" && s.value("reason", "") == "asked for";
+  });
+  EXPECT_TRUE(told) << spans.dump();
+  EXPECT_EQ(page["metrics"]["flight_states"][0]["reason"], "asked for");
+  EXPECT_EQ(page["vehicle"]["flight_states"][0]["reason"], "asked for");
+}
+
+TEST(ReadFlight, SetpointsThatAreNoNumbersAreCountedThoughNobodyTakesThem) {
+  const std::string log = Fresh("setpoints") + "/flight.lcm";
+  OutputLog out(log);
+  scenario_t scenario{};
+  scenario.yaml = kYaml;
+  out.Write(1, "SCENARIO", scenario);
+  WriteTruth(&out, 1000000);
+  attitude_setpoint_t setpoint{};
+  setpoint.orientation[0] = 1.0;
+  out.Write(2100000, "ATTITUDE_SETPOINT", setpoint);
+  attitude_setpoint_t bad = setpoint;
+  bad.thrust = std::nan("");
+  out.Write(2200000, "ATTITUDE_SETPOINT", bad);
+  bad = setpoint;
+  bad.orientation[3] = std::nan("");
+  out.Write(2300000, "ATTITUDE_SETPOINT", bad);
+  bad = setpoint;
+  bad.body_rate[2] = INFINITY;
+  out.Write(2400000, "ATTITUDE_SETPOINT", bad);
+  out.Close();
+  EXPECT_EQ(ReadFlight(log).nonfinite_setpoints, 3);
 }
 
 TEST(ReadFlight, LogsWithoutTruthAreRefusedInOneLine) {
