@@ -9,6 +9,7 @@
 #include <map>
 #include <stdexcept>
 
+#include "deploy/campaign/judge.h"
 #include "deploy/campaign/process.h"
 #include "deploy/campaign/text_file.h"
 
@@ -18,6 +19,8 @@ namespace {
 namespace fs = std::filesystem;
 using Command = std::vector<std::string>;
 using Json = nlohmann::ordered_json;
+
+constexpr char kLog[] = "flight.lcm";
 
 std::string Number(double value) { return fmt::format("{}", value); }
 
@@ -139,13 +142,32 @@ Json Flown(const Flight& flight, const Setup& setup, const Workplace& work) {
   if (!problem.empty()) return {{"ended", problem}};
   Command command = FlightCommand(flight, setup, scenario);
   const std::string metrics = work.File("metrics.json");
-  command.insert(command.end(), {"--quiet", "--metrics", metrics});
+  command.insert(command.end(),
+                 {"--quiet", "--metrics", metrics, "--log", work.File(kLog), "--light"});
   problem = Problem(command);
   if (!problem.empty()) return {{"ended", problem}};
   if (!fs::is_regular_file(metrics)) return {{"ended", "chase-flight: wrote no metrics"}};
   const Json json = Json::parse(ReadText(metrics), nullptr, false);
   if (json.is_discarded()) return {{"ended", "chase-flight: metrics.json is no JSON"}};
   return {{"ended", ""}, {"metrics", json}};
+}
+
+/// Where the report of a flight that failed is, from the campaign's folder.
+fs::path ReportFolder(const Flight& flight) { return fs::path("reports") / flight.Name(); }
+
+/// Of a flight that failed; whole at any time. One that passes now leaves none of its last failure.
+/// Without a chase-report, or where that fails, the flight is a result all the same.
+void Report(const Flight& flight, const Setup& setup, const Json& result, const Workplace& work) {
+  const fs::path folder = setup.out / ReportFolder(flight);
+  fs::remove_all(folder);
+  const std::string program = (fs::path(setup.programs) / "chase-report").string();
+  const bool failed = Judge(flight, result, setup.duration)["outcome"] != outcome::kPassed;
+  if (!failed || !fs::is_regular_file(program) || !fs::is_regular_file(work.File(kLog))) return;
+  const std::string made = work.File("report");
+  Problem({program, work.File(kLog), "--out", made});
+  if (!fs::is_regular_file(fs::path(made) / "report.html")) return;
+  fs::create_directories(folder.parent_path());
+  fs::rename(made, folder);
 }
 
 /// As it is typed from here.
@@ -175,8 +197,14 @@ void Fly(const Flight& flight, const Job& job, const Setup& setup) {
     const Workplace work(job.file + ".work");
     setenv("TMPDIR", fs::absolute(work.File("")).c_str(), 1);
     result.update(Flown(flight, setup, work));
+    Report(flight, setup, result, work);
   }
   WriteText(job.file, result.dump() + "\n");
+}
+
+std::string ReportOf(const Flight& flight, const Setup& setup) {
+  const fs::path page = ReportFolder(flight) / "report.html";
+  return fs::is_regular_file(setup.out / page) ? page.string() : "";
 }
 
 std::string RepeatLine(const Flight& flight, const Setup& setup) {

@@ -6,9 +6,11 @@
 #include <algorithm>
 #include <filesystem>
 #include <map>
+#include <set>
 #include <thread>
 
 #include "common/config/version.h"
+#include "common/world/scenario.h"
 #include "deploy/campaign/comparison.h"
 #include "deploy/campaign/flight_job.h"
 #include "deploy/campaign/flight_list.h"
@@ -54,8 +56,23 @@ std::vector<Json> Gather(const std::vector<Flight>& flights, const std::vector<J
   for (size_t i = 0; i < flights.size(); ++i) {
     entries.push_back(Entry(flights[i], jobs[i], setup));
     entries.back()["command"] = RepeatLine(flights[i], setup);
+    if (const std::string report = ReportOf(flights[i], setup); !report.empty())
+      entries.back()["report"] = report;
   }
   return entries;
+}
+
+/// Scenarios whose map is drawn, but from a seed of their own, look like one random map per flight.
+void TellOfMaps(const std::vector<Flight>& flights) {
+  std::map<std::string, std::set<int64_t>> seeds;
+  for (const Flight& flight : flights)
+    if (flight.kind.empty()) seeds[flight.file].insert(flight.seed);
+  for (const auto& [file, flown] : seeds)
+    if (flown.size() > 1 && world::LoadScenario(file).world.forest.count > 0)
+      fmt::print(stderr,
+                 "chase-campaign: note: {} has the same map with every seed, which is of noise and "
+                 "gusts; --kinds forest is another forest for each\n",
+                 file);
 }
 
 /// What a later --compare needs, a line per flight.
@@ -85,6 +102,7 @@ int Execute(const Options& o) {
     Fly(flights.front(), jobs.front(), o.setup);
     return 0;
   }
+  TellOfMaps(flights);
   RunAll(flights, jobs, o);
   const std::vector<Json> entries = Gather(flights, jobs, o.setup);
   const std::string table = Table(entries);
@@ -110,13 +128,18 @@ void AddOptions(CLI::App* app, Options* o) {
   auto* scenarios = app->add_option("--scenarios", o->request.scenarios,
                                     "names from deploy/scenarios, files, or world:KIND (default: "
                                     "gym, unless there are kinds)");
-  auto* kinds = app->add_option("--kinds", o->request.kinds,
-                                "random worlds of these kinds, one per seed; all: every kind");
+  auto* kinds =
+      app->add_option("--kinds", o->request.kinds,
+                      "random worlds of these kinds, another map for every seed; all: every "
+                      "kind");
   auto* faults = app->add_option(
       "--faults", o->request.faults,
       "NAME or NAME@SECONDS; all: every one that can strike; none: no fault (default)");
   for (auto* option : {scenarios, kinds, faults}) option->delimiter(',');
-  auto* seeds = app->add_option("--seeds", o->request.seeds, "such as 1-20 or 1,5,9 (default 1)");
+  auto* seeds =
+      app->add_option("--seeds", o->request.seeds,
+                      "of noise and gusts, and of the maps of kinds; such as 1-20 or 1,5,9 "
+                      "(default 1)");
   app->add_option("--flights", o->request.flights_file,
                   "instead: a file with a line scenario,seed,fault per flight")
       ->excludes(scenarios, kinds, faults, seeds);
@@ -126,7 +149,7 @@ void AddOptions(CLI::App* app, Options* o) {
       ->check(CLI::Range(1, 1024));
   app->add_option("--out", o->setup.out, "folder of the results")->required();
   app->add_option("--programs", o->setup.programs,
-                  "folder of chase-flight and chase-world (default: this program's)");
+                  "folder of chase-flight, chase-world and chase-report (default: this program's)");
   auto* compare =
       app->add_option("--compare", o->compare,
                       "an earlier campaign's folder or flights.json: what got better and worse");

@@ -42,16 +42,58 @@ std::string Figure(const std::vector<double>& values, double figure) {
   return values.empty() ? "-" : fmt::format("{:.3f}", figure);
 }
 
+std::string Mean(const Row& row, const char* key) {
+  const auto values = Values(row, key);
+  return Figure(values, MeanOf(values).mean);
+}
+
+std::string Highest(const Row& row, const char* key) {
+  const auto values = Values(row, key);
+  return Figure(values, values.empty() ? 0.0 : *std::max_element(values.begin(), values.end()));
+}
+
+std::string Lowest(const Row& row, const char* key) {
+  const auto values = Values(row, key);
+  return Figure(values, values.empty() ? 0.0 : *std::min_element(values.begin(), values.end()));
+}
+
+/// A fault of it ended and the flight did not recover from it.
+bool NeverRecovered(const Json& flight) {
+  const Json faults = flight.value("faults", Json::array());
+  return std::any_of(faults.begin(), faults.end(), [](const Json& fault) {
+    return fault.is_object() && fault.value("end_s", Json()).is_number() &&
+           !fault.value("recovery_s", Json()).is_number();
+  });
+}
+
+std::string Recovery(const Row& row) {
+  const auto never = std::count_if(row.flights.begin(), row.flights.end(),
+                                   [](const Json* flight) { return NeverRecovered(*flight); });
+  return Highest(row, "recovery_s") + (never > 0 ? fmt::format(", {} never", never) : "");
+}
+
+std::string Sum(const Row& row, const char* key) {
+  const auto values = Values(row, key);
+  double sum = 0.0;
+  for (const double value : values) sum += value;
+  return values.empty() ? "-" : fmt::format("{:.0f}", sum);
+}
+
 Cells CellsOf(const Row& row) {
   Cells cells = {row.place, row.fault, std::to_string(row.flights.size())};
   for (const Column& column : kCounts) cells.push_back(Count(row, column.outcome));
-  const auto visible = Values(row, "visible_ratio"), clearance = Values(row, "min_clearance_m"),
-             odometry = Values(row, "odometry_ate_m"), distance = Values(row, "distance_ratio");
-  cells.push_back(Figure(visible, MeanOf(visible).mean));
-  cells.push_back(Figure(
-      clearance, clearance.empty() ? 0.0 : *std::min_element(clearance.begin(), clearance.end())));
+  const auto odometry = Values(row, "odometry_ate_m");
+  cells.push_back(Mean(row, "visible_ratio"));
+  cells.push_back(Lowest(row, "min_clearance_m"));
   cells.push_back(Figure(odometry, Quantile(odometry, 0.95).value_or(0.0)));
-  cells.push_back(Figure(distance, MeanOf(distance).mean));
+  cells.push_back(Mean(row, "distance_ratio"));
+  cells.push_back(Lowest(row, "visible_ratio"));
+  cells.push_back(Mean(row, "in_image_ratio"));
+  cells.push_back(Mean(row, "travel_ratio"));
+  cells.push_back(Mean(row, "certificate_kept_ratio"));
+  cells.push_back(Highest(row, "reaction_s"));
+  cells.push_back(Recovery(row));
+  cells.push_back(Sum(row, "nonfinite_setpoints"));
   return cells;
 }
 
@@ -75,9 +117,10 @@ std::string FailedFlights(const std::vector<Json>& flights) {
   std::string text;
   for (const Json& f : flights) {
     if (f["outcome"] == outcome::kPassed) continue;
-    const std::string fault = f["fault"];
-    text += fmt::format("- {}, seed {}{}: {}\n  `{}`\n", PlaceOf(f), f["seed"].get<int64_t>(),
+    const std::string fault = f["fault"], report = f.value("report", std::string());
+    text += fmt::format("- {}, seed {}{}: {}\n  {}`{}`\n", PlaceOf(f), f["seed"].get<int64_t>(),
                         fault.empty() ? "" : ", " + fault, f["why"].get<std::string>(),
+                        report.empty() ? "" : fmt::format("[report]({}), ", report),
                         f["command"].get<std::string>());
   }
   return text.empty() ? "No flight failed.\n" : "Failed flights:\n\n" + text;
@@ -111,7 +154,9 @@ std::string Table(const std::vector<Json>& flights) {
   std::vector<Cells> rows = {{"scenario", "fault", "flights"}};
   for (const Column& column : kCounts) rows[0].push_back(column.title);
   for (const char* title :
-       {"visible, mean", "clearance, worst [m]", "odometry error, p95 [m]", "distance ratio, mean"})
+       {"visible, mean", "clearance, worst [m]", "odometry error, p95 [m]", "distance ratio, mean",
+        "visible, worst", "in image, mean", "travel ratio, mean", "certificate kept, mean",
+        "reaction, worst [s]", "recovery, worst [s]", "non-finite setpoints"})
     rows[0].push_back(title);
   Row pooled{"all", "", {}};
   for (const Row& row : RowsOf(flights)) {
@@ -119,7 +164,11 @@ std::string Table(const std::vector<Json>& flights) {
     pooled.flights.insert(pooled.flights.end(), row.flights.begin(), row.flights.end());
   }
   rows.push_back(CellsOf(pooled));
-  return Markdown(rows) + "\nIn brackets: 95 % Wilson intervals of the share.\n\n" +
+  return Markdown(rows) +
+         "\nIn brackets: 95 % Wilson intervals of the share. Reaction counts from the age "
+         "limit of the input that a fault\nruns out, recovery from the fault's end; - where there "
+         "is "
+         "none.\n\n" +
          FailedFlights(flights);
 }
 

@@ -27,7 +27,7 @@ namespace {
 struct Arguments {
   FlightOptions options;
   std::string log, metrics, print_config;
-  bool end_on_collision = false, quiet = false;
+  bool end_on_collision = false, quiet = false, light = false;
 };
 
 constexpr double kStep = 0.1;            // s of the flight at a time
@@ -90,8 +90,9 @@ int PrintCriteria(const logs::Metrics& metrics, bool part) {
 /// Without --log a file of light messages is kept only as long as the metrics need it.
 class Recording {
  public:
-  explicit Recording(const std::string& log)
+  Recording(const std::string& log, bool light)
       : temporary_(log.empty()),
+        light_(temporary_ || light),
         file_(log.empty() ? (std::filesystem::temp_directory_path() /
                              fmt::format("chase-flight-{}.lcm", getpid()))
                                 .string()
@@ -105,7 +106,7 @@ class Recording {
   Recording& operator=(const Recording&) = delete;
 
   void Write(int64_t utime, const std::string& channel, const bus::Bus::Bytes& bytes) {
-    if (!temporary_ || !bus::IsHeavy(channel)) writer_->Write(utime, channel, bytes);
+    if (!light_ || !bus::IsHeavy(channel)) writer_->Write(utime, channel, bytes);
   }
   const std::string& Close() {
     writer_->Close();
@@ -113,7 +114,7 @@ class Recording {
   }
 
  private:
-  bool temporary_;
+  bool temporary_, light_;
   std::string file_;
   std::optional<bus::LogWriter> writer_;
 };
@@ -142,7 +143,7 @@ double FlyAll(const world::Scenario& scenario, const Arguments& arguments, const
 
 int Fly(const world::Scenario& scenario, const Arguments& arguments) {
   Flight flight(scenario, Configure(scenario, arguments.options));
-  Recording recording(arguments.log);
+  Recording recording(arguments.log, arguments.light);
   Progress progress;
   CollisionWatch watch(scenario);
   flight.lockstep().SetTap(
@@ -186,6 +187,7 @@ void AddOptions(CLI::App* app, Arguments* a) {
       ->check(CLI::IsMember({"raw", "truth"}));
   app->add_option("--planner", a->options.planner, "planning algorithm (default: chase)");
   auto* log = app->add_option("--log", a->log, "record every message into this LCM log");
+  app->add_flag("--light", a->light, "leave sweeps and images out of the log")->needs(log);
   auto* metrics = app->add_option("--metrics", a->metrics,
                                   "write the figures of the flight into this JSON file");
   app->add_option("--fault", a->options.faults,

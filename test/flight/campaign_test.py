@@ -43,7 +43,7 @@ class Campaign(unittest.TestCase):
     def stand_ins(self, name):
         folder = self.folder / name
         folder.mkdir()
-        for program in ("flight", "world"):
+        for program in ("flight", "world", "report"):
             shutil.copy(HERE / f"stand_in_{program}.py", folder / f"chase-{program}")
         return folder
 
@@ -106,6 +106,56 @@ class Campaign(unittest.TestCase):
                 self.assertEqual(again[key], flight[key], key)
         self.assertEqual((self.out / "worlds/hall-1.yaml").read_text(), "# hall 1 60\n")
         self.assertEqual(list((self.out / "flights").glob("*.work")), [])
+
+    def row(self, table, *cells):
+        """A row's cells by the titles of their columns."""
+        titles, _, *rows = [[cell.strip() for cell in line.split("|")[1:-1]]
+                            for line in table.splitlines() if line.startswith("|")]
+        found, = [row for row in rows if tuple(row[:len(cells)]) == cells]
+        return dict(zip(titles, found))
+
+    def test_table_of_faults(self):
+        self.fly("--scenarios", "gym", "--seeds", "3-5", "--faults", "none,kill-planning@5")
+        _, table = self.results()
+        none, killed = self.row(table, "gym", ""), self.row(table, "gym", "kill-planning@5")
+        self.assertEqual((none["reaction, worst [s]"], none["recovery, worst [s]"]), ("-", "-"))
+        self.assertEqual(none["non-finite setpoints"], "0")
+        self.assertEqual(killed["reaction, worst [s]"], "0.050")
+        self.assertEqual(killed["recovery, worst [s]"], "1.000, 1 never")
+        self.assertEqual(killed["non-finite setpoints"], "12")
+        for title, cell in (("certificate kept, mean", "0.980"), ("travel ratio, mean", "1.020"),
+                            ("in image, mean", "1.000"), ("visible, worst", "0.400")):
+            self.assertEqual(killed[title], cell, title)
+        self.assertEqual(self.row(table, "all", "")["non-finite setpoints"], "12")
+
+    def test_failed_flights_have_reports(self):
+        self.fly("--seeds", "1-4,12,14")
+        flights, table = self.results()
+        report = {f["seed"]: f.get("report") for f in flights}
+        self.assertEqual(report, {1: "reports/gym_1/report.html", 2: "reports/gym_2/report.html",
+                                  3: "reports/gym_3/report.html", 4: None, 12: None, 14: None},
+                         "4 passed, 12 has a report that fails, 14 died")
+        self.assertRegex(table, r"gym, seed 2: .*\n  \[report\]\(reports/gym_2/report.html\), `\S*chase-flight \S+ --seed 2 ")
+        self.assertEqual((self.out / report[2]).read_text(), "log of seed 2")
+        self.assertEqual(sorted(path.name for path in (self.out / "reports").iterdir()), ["gym_1", "gym_2", "gym_3"])
+        self.assertEqual(list(self.out.rglob("*.lcm")), [])
+        self.fly("--seeds", "1-4")
+        self.assertEqual(self.results()[0][1]["report"], report[2], "what is not flown again keeps its own")
+        path = self.programs / "chase-flight"
+        path.write_text(path.read_text().replace("seed % 10 == 2:", "seed % 10 == 4:"))
+        self.fly("--seeds", "1-4")
+        self.assertEqual([f.get("report") for f in self.results()[0]],
+                         [report[1], None, report[3], "reports/gym_4/report.html"])
+        (self.programs / "chase-report").unlink()
+        self.fly("--seeds", "1-4", out=self.folder / "bare")
+        self.assertNotIn("report", self.results(self.folder / "bare")[0][0])
+
+    def test_user_is_told_that_a_scenarios_map_is_one(self):
+        self.assertRegex(self.fly("--scenarios", "forest,gym", "--seeds", "4-5").stderr,
+                         r"^chase-campaign: note: \S*forest.yaml has the same map with every seed.*--kinds forest")
+        for what in (["--scenarios", "forest", "--seeds", "4"], ["--seeds", "4-5"],
+                     ["--kinds", "forest", "--seeds", "4-5"]):
+            self.assertNotIn("note", self.fly(*what).stderr)
 
     def test_only_what_is_not_done_is_flown(self):
         scenario = self.folder / "mine.yaml"
@@ -227,8 +277,10 @@ class Campaign(unittest.TestCase):
         self.assertTrue(all("--until 30" in line and "--end-on-collision" in line for line in lines))
         self.flown()
         self.fly("--seeds", "4", "--duration", 30, "--fly-on", "--kinds", "yard")
-        self.assertNotIn("--", self.calls.read_text().replace("--seed", "").replace("--quiet", "")
-                         .replace("--metrics", ""))
+        calls = self.calls.read_text()
+        for always in ("--seed", "--quiet", "--metrics", "--log", "--light"):
+            calls = calls.replace(always, "")
+        self.assertNotIn("--", calls)
         self.assertEqual((self.out / "worlds/yard-4.yaml").read_text(), "# yard 4 30\n")
 
     def worse(self):
@@ -327,7 +379,7 @@ class Campaign(unittest.TestCase):
         self.fly("--scenarios", "gym", "--duration", 1, "--fly-on", programs=BIN)
         (flight,), _ = self.results()
         self.assertEqual(flight["outcome"], "passed", flight["why"])
-        for key in ("safe_ratio", "min_clearance_m", "visible_ratio", "distance_ratio"):
+        for key in ("safe_ratio", "min_clearance_m", "visible_ratio", "distance_ratio", "travel_ratio", "in_image_ratio"):
             self.assertIsInstance(flight[key], float, key)
         self.assertRegex(flight["command"], r"chase-flight .*gym\.yaml --seed 1 --until 1$")
 
