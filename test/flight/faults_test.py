@@ -115,6 +115,20 @@ class Faults(unittest.TestCase):
             self.assertEqual(answer.stderr.count("\n"), 1)
             self.assertRegex(answer.stderr, f"{fault}.*{cure}")
 
+    def test_scenario_tells_what_a_live_flight_needs(self):
+        """deploy/fly's operator gives what the one in lockstep does, and says which faults it leaves out."""
+        scenario = self.folder / "told.yaml"
+        scenario.write_text(pathlib.Path(SCENARIO).read_text(encoding="utf-8") + """
+commands: [{command: select, at_px: [180, 119.5], at_s: -2}, {command: hold, at_s: 3}, {command: kill, at_s: 4.5}]
+faults: [{name: lidar-gap}, {name: kill-planning, at: 5}, {name: delay-PLAN}, {name: loss-20}, {name: gust}]
+""", encoding="utf-8")
+        answer = subprocess.run([BIN / "chase-scenario", scenario], capture_output=True, text=True, check=True, timeout=LIMIT)
+        told = json.loads(answer.stdout)
+        self.assertEqual((told["duration_s"], told["settle_s"]), (60.0, 8.0))
+        self.assertEqual(told["left_out_live"], ["kill-planning", "delay-PLAN", "loss-20"])
+        self.assertEqual([tuple(command.values()) for command in told["commands"]],
+                         [("select", -2, ["180", "119.5"]), ("hold", 3, []), ("kill", 4.5, ["--force"])])
+
     def test_collision_ends_the_flight(self):
         """A block comes down the hall and through the hovering drone; planning hangs meanwhile."""
         text = pathlib.Path(SCENARIO).read_text(encoding="utf-8")

@@ -270,6 +270,27 @@ class FlightTest(unittest.TestCase):
             self.assertIn(f"{name} ended (SIGKILL): restarted", err)
         self.assertLess(err.index("of control"), err.index("of planning"))
 
+    def test_commands_are_given_with_their_arguments(self):
+        commands = [{"command": "select", "at_s": 0.5, "arguments": ["180", "119.5"]},
+                    {"command": "hold", "at_s": 0.5, "arguments": []},
+                    {"command": "kill", "at_s": 1.0, "arguments": ["--force"]}]
+        told = json.dumps({"duration_s": 2, "settle_s": 1, "commands": commands})
+        self.program("chase-scenario", f"print({told!r})")
+        self.program("chase-command", "import sys; print(*sys.argv[1:], flush=True)")
+        code, _, err = self.fly()
+        self.assertEqual((code, err), (0, ""))
+        said = {log.stem: log.read_text(encoding="utf-8") for log in self.folder.glob("command-*.log")}
+        self.assertEqual(said, {"command-1-select": "select 180 119.5\n", "command-2-hold": "hold\n",
+                                "command-3-kill": "kill --force\n"})
+
+    def test_faults_that_are_left_out_are_named(self):
+        told = json.dumps({"duration_s": 2, "settle_s": 1, "left_out_live": ["kill-planning", "loss-20"]})
+        self.program("chase-scenario", f"print({told!r})")
+        code, _, err = self.fly()
+        self.assertEqual(code, 0, err)
+        self.assertRegex(err, r"^warning: .*left out of a live flight: kill-planning, loss-20; "
+                              r"cure: deploy/fly --kill planning@SECONDS, chase-flight")
+
     def test_sweeps_stay_on_the_host(self):
         os.environ["LCM_DEFAULT_URL"] = f"udpm://{GROUP}:{free_port()}?ttl=1"
         code, _, err = self.fly()
