@@ -55,13 +55,24 @@ endfunction()
 function(chase_test name)
   cmake_parse_arguments(ARG "" "TIMEOUT" "LIBS;SOURCES" ${ARGN})
   chase_program(${name} ${ARG_SOURCES})
-  target_link_libraries(${name} PRIVATE ${ARG_LIBS} GTest::gtest GTest::gtest_main)
+  target_link_libraries(${name} PRIVATE ${ARG_LIBS} test_main)
   set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/test)
   add_test(NAME ${name} COMMAND ${name} WORKING_DIRECTORY ${CMAKE_SOURCE_DIR})
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 120)
   endif()
-  set_tests_properties(${name} PROPERTIES TIMEOUT ${ARG_TIMEOUT})
+  set_tests_properties(${name} PROPERTIES TIMEOUT ${ARG_TIMEOUT} SKIP_RETURN_CODE 77)
+endfunction()
+
+# chase_script_test(NAME SCRIPT arguments...): a Python script of unittests, of which CTest hears when some are skipped.
+# `BEFORE command` stands before Python.
+function(chase_script_test name script)
+  cmake_parse_arguments(ARG "" "" "BEFORE" ${ARGN})
+  find_package(Python3 REQUIRED COMPONENTS Interpreter)
+  add_test(NAME ${name}
+    COMMAND ${ARG_BEFORE} ${Python3_EXECUTABLE} -B ${CMAKE_SOURCE_DIR}/test/unittest_run.py ${script} ${ARG_UNPARSED_ARGUMENTS}
+    WORKING_DIRECTORY ${CMAKE_SOURCE_DIR})
+  set_tests_properties(${name} PROPERTIES SKIP_RETURN_CODE 77)
 endfunction()
 
 # chase_benchmark(NAME LIBS... SOURCES...): a Google Benchmark program build/bin/bench_*.

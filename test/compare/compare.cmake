@@ -13,8 +13,5 @@ configure_file(${compare}/comparison.html ${CMAKE_BINARY_DIR}/share/chase/compar
 add_dependencies(chase-compare report_assets)
 
 chase_test(compare_test LIBS baselines compare SOURCES ${compare}/compare_test.cpp)
-find_package(Python3 REQUIRED COMPONENTS Interpreter)
-add_test(NAME compare_campaign
-  COMMAND ${Python3_EXECUTABLE} -B ${compare}/campaign_test.py ${CMAKE_BINARY_DIR}/bin
-  WORKING_DIRECTORY ${CMAKE_SOURCE_DIR})
+chase_script_test(compare_campaign ${compare}/campaign_test.py ${CMAKE_BINARY_DIR}/bin)
 set_tests_properties(compare_campaign PROPERTIES TIMEOUT 300)

@@ -11,8 +11,7 @@ add_test(NAME flight_verify
   COMMAND python3 -B ${CMAKE_SOURCE_DIR}/test/flight/verify_test.py ${bin} ${flight})
 set_tests_properties(flight_verify PROPERTIES TIMEOUT 120 FIXTURES_REQUIRED recorded_flight)
 
-add_test(NAME flight_faults
-  COMMAND python3 -B ${CMAKE_SOURCE_DIR}/test/flight/faults_test.py ${bin} ${scenario})
+chase_script_test(flight_faults ${CMAKE_CURRENT_LIST_DIR}/faults_test.py ${bin} ${scenario})
 set_tests_properties(flight_faults PROPERTIES TIMEOUT 300)
 
 # The whole flight among trees, and half a minute in the hall in which planning dies: criteria and bounds decide.
@@ -28,9 +27,8 @@ add_test(NAME flight_mission
 set_tests_properties(flight_mission PROPERTIES TIMEOUT 300)
 
 # Battery, geofence, kill, a blocked way up: each ends a mission with its reason.
-add_test(NAME flight_envelope
-  COMMAND python3 -B ${CMAKE_SOURCE_DIR}/test/flight/envelope_test.py ${bin}
-          ${CMAKE_SOURCE_DIR}/deploy/scenarios/mission.yaml)
+chase_script_test(flight_envelope ${CMAKE_CURRENT_LIST_DIR}/envelope_test.py ${bin}
+  ${CMAKE_SOURCE_DIR}/deploy/scenarios/mission.yaml)
 set_tests_properties(flight_envelope PROPERTIES TIMEOUT 300)
 
 foreach(row IN ITEMS "odometry:POSE;SCAN_REGISTERED" "mapping:OBSTACLES;MAP" "perception:TARGET"
@@ -50,10 +48,8 @@ add_test(NAME hostile_bus
   WORKING_DIRECTORY ${CMAKE_SOURCE_DIR})
 set_tests_properties(hostile_bus PROPERTIES TIMEOUT 200 FIXTURES_REQUIRED recorded_flight)
 
-add_test(NAME flight_command
-  COMMAND ${CMAKE_SOURCE_DIR}/test/flight/in_namespace.sh
-          python3 -B ${CMAKE_SOURCE_DIR}/test/flight/command_test.py ${bin}
-  WORKING_DIRECTORY ${CMAKE_SOURCE_DIR})
+chase_script_test(flight_command ${CMAKE_CURRENT_LIST_DIR}/command_test.py ${bin}
+  BEFORE ${CMAKE_SOURCE_DIR}/test/flight/in_namespace.sh)
 set_tests_properties(flight_command PROPERTIES TIMEOUT 60)
 
 add_test(NAME flight_live
@@ -70,7 +66,5 @@ set_tests_properties(flight_live_kill PROPERTIES TIMEOUT 300 RUN_SERIAL TRUE)
 # Campaigns: their statistics, and the program with stand-ins for the flights.
 chase_test(campaign_statistics_test LIBS statistics
   SOURCES ${CMAKE_CURRENT_LIST_DIR}/campaign_statistics_test.cpp)
-add_test(NAME flight_campaign
-  COMMAND python3 -B ${CMAKE_SOURCE_DIR}/test/flight/campaign_test.py ${bin}
-  WORKING_DIRECTORY ${CMAKE_SOURCE_DIR})
+chase_script_test(flight_campaign ${CMAKE_CURRENT_LIST_DIR}/campaign_test.py ${bin})
 set_tests_properties(flight_campaign PROPERTIES TIMEOUT 600)

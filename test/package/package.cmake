@@ -15,6 +15,6 @@ add_test(NAME scenes COMMAND python3 ${CMAKE_CURRENT_LIST_DIR}/scenes.py
 set_tests_properties(scenes PROPERTIES TIMEOUT 60)
 # The Debian package: made, judged, unpacked, flown.
 if(TARGET package_contents)
-  add_test(NAME package_deb COMMAND ${Python3_EXECUTABLE} -B ${CMAKE_CURRENT_LIST_DIR}/deb_test.py ${CMAKE_BINARY_DIR})
+  chase_script_test(package_deb ${CMAKE_CURRENT_LIST_DIR}/deb_test.py ${CMAKE_BINARY_DIR})
   set_tests_properties(package_deb PROPERTIES TIMEOUT 400)
 endif()
