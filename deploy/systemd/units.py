@@ -37,9 +37,9 @@ StartLimitIntervalSec=0
 # Ready when its bus works; gives a sign of life every second.
 Type=notify
 WatchdogSec=5
-Restart=on-failure
+Restart={systemd_restart}
 RestartSec=0.5
-Environment="LCM_DEFAULT_URL={url}"
+{back_off}Environment="LCM_DEFAULT_URL={url}"
 EnvironmentFile=-/etc/chase/environment
 ExecStart=/usr/bin/{binary} --config /etc/chase/{name}.yaml $CHASE_OPTIONS
 KillSignal=SIGINT
@@ -54,6 +54,16 @@ ProtectHome=true
 ProtectSystem=strict
 StateDirectory=chase
 WorkingDirectory=%S/chase
+"""
+
+
+# Of the table. A watchdog that barks, a signal and an end of its own accord alike: nothing in flight is done.
+RESTART = {"always": "always", "never": "no"}
+# systemd 252, Debian 12's, has no RestartSteps=; and StartLimitBurst= gives up. It is no reason not to start.
+BACK_OFF = """# Dies it soon after each start, it is started ever later.
+RuntimeDirectory=%N
+RuntimeDirectoryPreserve=restart
+ExecStartPre=-/usr/libexec/chase/back-off
 """
 
 
@@ -77,7 +87,9 @@ def main():
     shutil.rmtree(out, ignore_errors=True)  # units of rows that are gone
     out.mkdir(parents=True)
     for row in rows:
-        text = SERVICE.format(**row, url=bus.DEFAULT_URL, scheduling=scheduling(row))
+        text = SERVICE.format(**row, url=bus.DEFAULT_URL, scheduling=scheduling(row),
+                              systemd_restart=RESTART[row["restart"]],
+                              back_off=BACK_OFF if row["restart"] == "always" else "")
         (out / f"chase-{row['name']}.service").write_text(text, encoding="utf-8")
     services = " ".join(f"chase-{row['name']}.service" for row in rows)
     (out / "chase.target").write_text(TARGET.format(services=services), encoding="utf-8")

@@ -29,6 +29,11 @@ std::string Absence(const std::string& name, const std::optional<double>& heard,
   return t - *heard > most ? name + Age(t - *heard) : "";
 }
 
+/// It flies without them, and its own end is not its own to tell.
+bool LooksOn(const std::string& name) {
+  return name == "mission" || name == "viewer" || name == "link";
+}
+
 std::string ProcessProblem(const std::string& name, const Inputs& inputs, double t) {
   const auto found = inputs.processes.find(name);
   const bool heard = found != inputs.processes.end();
@@ -64,7 +69,8 @@ std::vector<std::string> Missing(const MissionConfig& config, const Inputs& inpu
     note("the battery is low: " + Percent(*inputs.battery));
   for (const std::string& name : config.needs) note(ProcessProblem(name, inputs, t));
   for (const auto& [name, report] : inputs.processes)
-    if (std::find(config.needs.begin(), config.needs.end(), name) == config.needs.end())
+    if (std::find(config.needs.begin(), config.needs.end(), name) == config.needs.end() &&
+        !LooksOn(name))
       note(ProcessProblem(name, inputs, t));
   return missing;
 }

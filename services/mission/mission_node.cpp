@@ -55,6 +55,9 @@ void MissionNode::SubscribeStatuses() {
   bus_.Subscribe<status_t>("FCU_STATUS", heard);
   bus_.Subscribe<status_t>("SIMULATOR_STATUS", heard);
   bus_.Subscribe<status_t>("RECORDER_STATUS", heard);
+  bus_.Subscribe<status_t>("MISSION_STATUS", heard);
+  bus_.Subscribe<status_t>("VIEWER_STATUS", heard);
+  bus_.Subscribe<status_t>("LINK_STATUS", heard);
 }
 
 void MissionNode::OnCommand(const command_t& message) {

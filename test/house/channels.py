@@ -18,7 +18,8 @@ LISTENS = {
     "mission": {"COMMAND", "POSE", "OBSTACLES", "TARGET", "PLAN", "TRACKING", "ATTITUDE_SETPOINT",
                 "HOME", "LIDAR_STATUS", "CAMERA_STATUS", "ODOMETRY_STATUS", "MAPPING_STATUS",
                 "PERCEPTION_STATUS", "PREDICTION_STATUS", "PLANNING_STATUS", "CONTROL_STATUS",
-                "FCU_STATUS", "SIMULATOR_STATUS", "RECORDER_STATUS"},
+                "FCU_STATUS", "SIMULATOR_STATUS", "RECORDER_STATUS", "MISSION_STATUS", "VIEWER_STATUS",
+                "LINK_STATUS"},
     "fcu": {"ATTITUDE_SETPOINT", "POSE", "COMMAND", "FLIGHT_STATE"},
     # Ground truth is not for it either: the page shows what the vehicle knows.
     "viewer": {"LIDAR_SCAN", "CAMERA_IMAGE", "IMU", "POSE", "SCAN_REGISTERED", "OBSTACLES", "UNSEEN", "MAP", "LINK_STATUS",

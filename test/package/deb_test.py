@@ -75,8 +75,10 @@ class Deb(unittest.TestCase):
         for row in ROWS:
             if row["vehicle"]:
                 text = self.unit(f"chase-{row['name']}.service")
-                for line in ("Type=notify", "WatchdogSec=5", "User=chase", "Restart=on-failure"):
+                for line in ("Type=notify", "WatchdogSec=5", "User=chase", {"always": "Restart=always", "never": "Restart=no"}[row["restart"]]):
                     self.assertIn(line + "\n", text)
+                waits = re.findall(r"^ExecStartPre=-(.*)$", text, re.MULTILINE)
+                self.assertEqual([os.access(f"{self.root}{path}", os.X_OK) for path in waits], [True], row["name"])
                 self.assertEqual("CPUSchedulingPolicy=fifo" in text, row["name"] in ("control", "fcu"), row["name"])
                 self.assertEqual(re.findall(r"^CPUAffinity=(.*)$", text, re.MULTILINE),
                                  [row["cores"]] if row["cores"] else [])
@@ -87,7 +89,7 @@ class Deb(unittest.TestCase):
         folder = self.root / "checked"  # the same, with the programs where they are now
         folder.mkdir()
         for unit in (self.root / "lib/systemd/system").iterdir():
-            text = unit.read_text(encoding="utf-8").replace("=/usr/bin/", f"={self.root}/usr/bin/")
+            text = unit.read_text(encoding="utf-8").replace("=/usr/", f"={self.root}/usr/").replace("=-/usr/", f"=-{self.root}/usr/")
             (folder / unit.name).write_text(text, encoding="utf-8")
         # The unit that it needs, and nothing of the machine's own.
         answer = run("systemd-analyze", "verify", "--man=no", *sorted(folder.iterdir()),

@@ -13,6 +13,7 @@
 #include "common/bus/convert.h"
 #include "common/bus/hand_over.h"
 #include "common/bus/lockstep.h"
+#include "common/world/ages.h"
 #include "services/fcu/handshake.h"
 
 namespace chase::mission {
@@ -230,7 +231,8 @@ TEST(MissionNode, HealthCountsTheLivesOfEveryProcess) {
       if (p.name == name) return p;
     return process_health_t{};
   };
-  EXPECT_EQ(bench.healths.back().n_processes, 3);
+  EXPECT_EQ(bench.healths.back().n_processes, 4);  // and mission itself
+  EXPECT_EQ(find("mission").name, "mission");
   EXPECT_EQ(find("planning").restarts, 0);
   EXPECT_LE(find("planning").age, 1.1);
   bench.lockstep_.Kill("planning");
@@ -242,6 +244,23 @@ TEST(MissionNode, HealthCountsTheLivesOfEveryProcess) {
   bench.Run(3.0);
   EXPECT_EQ(find("planning").restarts, 1);
   EXPECT_EQ(bench.states.back().state, +flight_state_t::READY);
+}
+
+TEST(MissionNode, WhoLooksOnIsInHealthAndNeededForNothing) {
+  Bench bench;
+  for (const char* name : {"viewer", "link", "recorder"})
+    bench.lockstep_.Add(name, 0, [](bus::Bus&) { return std::make_unique<Silent>(); });
+  bench.Run(2.5);
+  EXPECT_EQ(bench.healths.back().n_processes, 7);
+  EXPECT_EQ(bench.states.back().state, +flight_state_t::READY);
+  for (const char* name : {"viewer", "link"}) bench.lockstep_.Kill(name);
+  bench.Run(4.0);
+  EXPECT_EQ(bench.states.back().state, +flight_state_t::READY);
+  for (const process_health_t& p : bench.healths.back().processes)
+    EXPECT_EQ(p.age > world::kMostAge.status, p.name == "viewer" || p.name == "link") << p.name;
+  bench.lockstep_.Kill("recorder");
+  bench.Run(4.0);
+  EXPECT_EQ(bench.states.back().state, +flight_state_t::IDLE);
 }
 
 }  // namespace
