@@ -25,6 +25,9 @@ run('chase-log', 'filter', log, bare, '--drop', 'TRUTH,SCENARIO');
 run('chase-report', log, '--out', path.join(folder, 'one'));
 run('chase-report', bare, '--out', path.join(folder, 'vehicle'));
 run('chase-report', log, other, '--out', path.join(folder, 'two'));
+const struck = path.join(folder, 'struck.lcm');
+run('chase-flight', 'mission', '--quiet', '--fault', 'lidar-gap@0.5', '--fault', 'motor-80@1', '--until', '2', '--log', struck, '--light');
+run('chase-report', struck, '--out', path.join(folder, 'struck'));
 
 const browser = await chromium.launch({executablePath: CHROMIUM,
   args: ['--no-sandbox', '--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader']});
@@ -104,7 +107,21 @@ assert.deepStrictEqual(overlaid, [true, true, true, true]);
 await checkLinked(two);
 assert.ok(fs.existsSync(path.join(folder, 'two/comparison.txt')));
 
-for (const name of ['one', 'vehicle', 'two']) {
+// A fault is drawn from its beginning to its end, and the flight's states come with their reasons.
+const faulty = await open('struck', 1280, 900);
+const bars = await faulty.evaluate(() => document.getElementById('timeline').data.filter((t) => t.type === 'bar' && t.y.includes('fault'))
+  .map((t) => [t.name, t.base[0], t.base[0] + t.x[0]]));
+assert.deepStrictEqual(bars.map(([name, from, to]) => [name, from.toFixed(2), to.toFixed(1)]),
+  [['lidar-gap', '0.50', '1.5'], ['motor-80', '1.00', '2.0']]);
+const changes = await faulty.textContent('#changes');
+assert.match(changes, /0\.50 sfault: lidar-gap begins/);
+assert.match(changes, /1\.50 sfault: lidar-gap ends/);
+assert.doesNotMatch(changes, /motor-80 ends/);
+const {reason} = await faulty.evaluate(() => flights[0].metrics.flight_states.find((s) => s.state === 'TAKEOFF'));
+assert.ok(reason && changes.includes(`flight: TAKEOFF${reason}`), changes);
+assert.match(await faulty.textContent('#figures'), /Reaction after the age limit.*Setpoints that are no numbers/s);
+
+for (const name of ['one', 'vehicle', 'two', 'struck']) {
   const phone = await open(name, 390, 844);
   await phone.click('#playback button');
   await until('the recording on a phone', () => phone.evaluate(() => document.querySelector('iframe')?.contentWindow.chase?.model.play));
