@@ -124,6 +124,7 @@ assert.match(await faulty.textContent('#figures'), /Reaction after the age limit
 for (const name of ['one', 'vehicle', 'two', 'struck']) {
   const phone = await open(name, 390, 844);
   await phone.click('#playback button');
+  await phone.evaluate(() => document.querySelectorAll('details').forEach((d) => { d.open = true; }));
   await until('the recording on a phone', () => phone.evaluate(() => document.querySelector('iframe')?.contentWindow.chase?.model.play));
   const inside = await phone.evaluate(() => document.querySelector('iframe').contentDocument.documentElement.scrollWidth - document.querySelector('iframe').clientWidth);
   assert.ok(await phone.evaluate(() => document.documentElement.scrollWidth) <= 390 && inside <= 0, `${name} is wider than a phone`);
