@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 
-/// GoogleTest's main, whose exit code tells CTest of skipped tests too: 77 where some were, and none
-/// failed. A failure is never hidden by a skip.
+/// GoogleTest's main, whose exit code tells CTest of skipped tests too: 77 where some were, and
+/// none failed. A failure is never hidden by a skip.
 int main(int argc, char** argv) {
   constexpr int kSkipped = 77;
   testing::InitGoogleTest(&argc, argv);
