@@ -387,8 +387,90 @@ TEST(PlanCheck, AnEscapeComesNoNearerToWhatItLeaves) {
   EXPECT_EQ(Verdict(c), "obstacle " + std::to_string(id) + " is not left by the shortest way");
 }
 
+/// A plan that moves on over [1, 3], and the stop that leaves it at `at`, off by so much.
+Claim Leaving(double at, double off, double faster) {
+  Claim claim;
+  claim.last_resort = true;
+  claim.position = {1.0, 2.0, Eigen::MatrixXd::Zero(3, 3)};
+  claim.position.coefficients << 0.0, 0.0, 1.0, 2.0, 1.0, 0.0, 0.5, 0.0, 0.0;
+  claim.target = claim.position;
+  const Vector3d p = claim.position.Position(at), v = claim.position.Velocity(at);
+  const Vector3d begin = p + off * Vector3d(0.6, 0.0, 0.8);
+  const Vector3d speed = v + faster * Vector3d(0.0, 0.6, 0.8);
+  claim.stop = {at, 1.5, Eigen::MatrixXd::Zero(5, 3)};
+  const double powers[] = {1.0, -3.0, 3.0, -1.0};  // tau (1 - tau)^3: to rest where it begins
+  claim.stop->coefficients.row(0) = begin.transpose();
+  for (int k = 0; k < 4; ++k)
+    claim.stop->coefficients.row(k + 1) = powers[k] * 1.5 * speed.transpose();
+  return claim;
+}
+
+// Within the plan's time, a microsecond more or less, and at most a tenth of a millimetre, and of
+// a millimetre a second, off it.
+TEST(PlanCheck, AStopLeavesThePlanWhereItIsThen) {
+  const auto bad = [](double at, double off = 0.0, double faster = 0.0) {
+    return Refute(Leaving(at, off, faster), {0.3, 2.0}, {});
+  };
+  for (const double at : {1.0, 1.4, 3.0, 1.0 - 5e-7, 3.0 + 5e-7}) EXPECT_EQ(bad(at), "") << at;
+  for (const double at : {0.9, 3.1, 1.0 - 3e-6, 3.0 + 3e-6})
+    EXPECT_EQ(bad(at), "the stop begins at another time") << at;
+  EXPECT_EQ(bad(1.4, 0.9e-4), "");
+  EXPECT_EQ(bad(1.4, 0.0, 0.9e-4), "");
+  EXPECT_EQ(bad(1.4, 1.1e-4), "the stop begins elsewhere");
+  EXPECT_EQ(bad(1.4, 0.0, 1.1e-4), "the stop begins elsewhere");
+  Claim claim = Leaving(1.4, 0.0, 0.0);
+  claim.stop->duration = 0.0;
+  EXPECT_EQ(Refute(claim, {0.3, 2.0}, {}), "the stop is no curve");
+}
+
+// In an order of their own, twice, about others: each that is about what is listed has to hold.
+TEST(PlanCheck, TakesProofsInAnyOrder) {
+  Random g(9);
+  for (int i = 0; i < 60; ++i) {
+    Case c = Cases()[g() % Cases().size()];
+    for (auto* proofs : {&c.claim.proofs, &c.claim.stop_proofs}) {
+      proofs->push_back((*proofs)[g() % proofs->size()]);
+      proofs->push_back(proofs->front());
+      proofs->back().obstacle = 4711;  // of nothing that is listed
+      proofs->back().separations.clear();
+      std::shuffle(proofs->begin(), proofs->end(), g);
+    }
+    std::shuffle(c.obstacles.begin(), c.obstacles.end(), g);
+    EXPECT_EQ(Verdict(c), "") << i;
+    c.least.exact = i % 10 == 0;
+    EXPECT_TRUE(!c.least.exact || Verdict(c).empty()) << i;
+  }
+}
+
+TEST(PlanCheck, AsksForTheLeastSphereAndSigmas) {
+  Case c = Cases().front();
+  c.least.hard_radius = c.claim.hard_radius + 1e-9;
+  EXPECT_EQ(Verdict(c), "its sphere is too small");
+  c = Cases().front();
+  c.least.sigmas = c.claim.sigmas + 1e-9;
+  EXPECT_EQ(Verdict(c), "it takes obstacles for more certain than they are");
+  c = Cases().front();
+  c.claim.hard_radius = std::nan("");
+  EXPECT_NE(Verdict(c), "");
+}
+
 TEST(PlanCheck, RefusesWhatIsNoCurve) {
-  Case c = test::MakeCase(1);
+  for (const double duration : {0.0, -1.0, std::nan("")}) {
+    Case c = Cases().front();
+    c.claim.position.duration = duration;
+    EXPECT_EQ(Verdict(c), "it is no curve");
+    c = Cases().front();
+    c.claim.target.duration = duration;
+    EXPECT_EQ(Verdict(c), "it is no curve");
+    c = Cases().front();
+    c.obstacles[0].center.duration = duration;
+    EXPECT_EQ(Verdict(c).find("obstacle"), 0U);
+  }
+  Case c = Cases().front();
+  c.claim.target.coefficients.conservativeResize(17, 3);
+  c.claim.target.coefficients.bottomRows(17 - 2).setZero();
+  EXPECT_EQ(Verdict(c), "it is no curve");
+  c = test::MakeCase(1);
   c.claim.position.coefficients = Eigen::MatrixXd::Zero(17, 3);
   EXPECT_EQ(Verdict(c), "it is no curve");
   c = test::MakeCase(1);

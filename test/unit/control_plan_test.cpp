@@ -1,7 +1,10 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
+#include <random>
+#include <set>
 
 #include "services/control/plan_follower.h"
 
@@ -19,6 +22,26 @@ Plan Moving(double start, double duration, double x0, double speed) {
   plan.position.coefficients(2, 1) = 0.5 * duration * duration;
   plan.position.coefficients(3, 2) = 0.1 * duration * duration * duration;
   plan.yaw = Vector3d(0.3, 0.5 * duration, 0.2 * duration * duration);
+  return plan;
+}
+
+/// The plan with a way to rest that leaves it at `at`: position and velocity go on, b3 = b4 = b5.
+Plan WithStop(Plan plan, double at, double duration) {
+  const world::State s = plan.position.At(at);
+  Eigen::Matrix<double, 6, 3> b;  // in Bernstein form
+  b.row(0) = s.p.transpose();
+  b.row(1) = b.row(0) + 0.2 * duration * s.v.transpose();
+  b.row(2) = 2.0 * b.row(1) - b.row(0) + 0.05 * duration * duration * s.a.transpose();
+  b.row(3) = 3.0 * b.row(2) - 3.0 * b.row(1) + b.row(0) +
+             duration * duration * duration / 60.0 * s.j.transpose();
+  b.row(4) = b.row(5) = b.row(3);
+  const double choose[6][6] = {{1},          {1, 1},          {1, 2, 1},
+                               {1, 3, 3, 1}, {1, 4, 6, 4, 1}, {1, 5, 10, 10, 5, 1}};
+  plan.stop = {at, duration, Eigen::MatrixXd::Zero(6, 3)};
+  for (int k = 0; k < 6; ++k)
+    for (int i = 0; i <= k; ++i)
+      plan.stop->coefficients.row(k) +=
+          ((k - i) % 2 ? -1.0 : 1.0) * choose[5][k] * choose[k][i] * b.row(i);
   return plan;
 }
 
@@ -96,31 +119,86 @@ TEST(PlanFollower, RefusesLateAndUnusablePlans) {
   EXPECT_FALSE(follower.Add(plan));
 }
 
+// The newest is among them.
 TEST(PlanFollower, KeepsFewWaitingPlans) {
   PlanFollower follower;
-  for (int i = 0; i < 100000; ++i) follower.Add(Moving(i, 2.0, 0.0, 1.0));
+  for (int i = 0; i < 1000; ++i) EXPECT_TRUE(follower.Add(Moving(i, 2.0, 0.0, 1.0)));
+  std::set<const Plan*> kept;
+  for (int i = 0; i < 1000; ++i) kept.insert(follower.FlownAt(i + 0.5));
+  EXPECT_LE(kept.size(), 16u);
+  EXPECT_GE(kept.size(), 4u);
+  EXPECT_EQ(follower.FlownAt(999.0)->position.start, 999.0);
   follower.Advance(5.0);
-  EXPECT_TRUE(follower.At(5.0));
+  EXPECT_EQ(follower.FlownAt(5.0)->position.start, 5.0);
 }
 
-/// The plan with a way to rest that leaves it at `at`: position and velocity go on, b3 = b4 = b5.
-Plan WithStop(Plan plan, double at, double duration) {
-  const world::State s = plan.position.At(at);
-  Eigen::Matrix<double, 6, 3> b;  // in Bernstein form
-  b.row(0) = s.p.transpose();
-  b.row(1) = b.row(0) + 0.2 * duration * s.v.transpose();
-  b.row(2) = 2.0 * b.row(1) - b.row(0) + 0.05 * duration * duration * s.a.transpose();
-  b.row(3) = 3.0 * b.row(2) - 3.0 * b.row(1) + b.row(0) +
-             duration * duration * duration / 60.0 * s.j.transpose();
-  b.row(4) = b.row(5) = b.row(3);
-  const double choose[6][6] = {{1},          {1, 1},          {1, 2, 1},
-                               {1, 3, 3, 1}, {1, 4, 6, 4, 1}, {1, 5, 10, 10, 5, 1}};
-  plan.stop = {at, duration, Eigen::MatrixXd::Zero(6, 3)};
-  for (int k = 0; k < 6; ++k)
-    for (int i = 0; i <= k; ++i)
-      plan.stop->coefficients.row(k) +=
-          ((k - i) % 2 ? -1.0 : 1.0) * choose[5][k] * choose[k][i] * b.row(i);
-  return plan;
+// Against a list of all that came, of which each drops those before it that start no earlier.
+TEST(PlanFollower, FliesTheLastThatHasStartedAndWasNotReplaced) {
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> ahead(-0.3, 1.0);
+  int late = 0;
+  for (int flight = 0; flight < 50; ++flight) {
+    PlanFollower follower;
+    std::vector<Plan> all;
+    const Plan* flown = nullptr;
+    for (double t = 0.0; t < 5.0; t += 0.1) {
+      Plan plan = Moving(t + ahead(random), 2.0, 0.0, 1.0);
+      plan.seq = static_cast<int32_t>(1000.0 * t);
+      const bool in_time = !flown || plan.position.start >= flown->position.start;
+      EXPECT_EQ(follower.Add(plan), in_time);
+      late += !in_time;
+      const std::optional<Plan> kept = flown ? std::optional<Plan>(*flown) : std::nullopt;
+      if (in_time) {
+        all.erase(std::remove_if(all.begin(), all.end(),
+                                 [&](const Plan& other) {
+                                   return other.position.start >= plan.position.start &&
+                                          !(kept && other.seq == kept->seq);
+                                 }),
+                  all.end());
+        all.push_back(plan);
+      }
+      flown = nullptr;
+      for (const Plan& x : all)
+        if (x.position.start <= t && (!flown || x.position.start >= flown->position.start))
+          flown = &x;
+      const bool first =
+          flight % 2;  // it is asked before it is told that time has passed, or after
+      if (!first) follower.Advance(t);
+      const Plan* found = follower.FlownAt(t);
+      ASSERT_EQ(found == nullptr, flown == nullptr) << t;
+      EXPECT_TRUE(!found || found->seq == flown->seq) << t;
+      EXPECT_EQ(follower.At(t).has_value(), flown != nullptr);
+      if (first) follower.Advance(t);
+      ASSERT_TRUE(!flown || follower.FlownAt(t)->seq == flown->seq) << t;
+    }
+    follower.Clear();
+    EXPECT_FALSE(follower.FlownAt(100.0));
+  }
+  EXPECT_GT(late, 50);
+}
+
+TEST(PlanFollower, RefusesNumbersThatAreNone) {
+  const double none[] = {std::numeric_limits<double>::quiet_NaN(),
+                         std::numeric_limits<double>::infinity()};
+  for (const double x : none) {
+    std::vector<Plan> bad(7, WithStop(Moving(0.0, 2.0, 0.0, 3.0), 0.4, 1.0));
+    EXPECT_TRUE(PlanFollower().Add(bad[0]));
+    bad[0].position.start = x;
+    bad[1].position.duration = x;
+    bad[2].position.coefficients(1, 2) = x;
+    bad[3].stop->start = x;
+    bad[4].stop->duration = x;
+    bad[5].stop->coefficients(1, 2) = x;
+    bad[6].yaw[1] = x;
+    for (const Plan& plan : bad) EXPECT_FALSE(PlanFollower().Add(plan)) << &plan - bad.data();
+  }
+}
+
+TEST(PlanFollower, APlanIsLeftForItsStopOrEnds) {
+  Plan plan = WithStop(Moving(1.0, 2.0, 0.0, 3.0), 1.4, 1.0);
+  EXPECT_EQ(StopsAt(plan), 1.4);
+  plan.stop.reset();
+  EXPECT_EQ(StopsAt(plan), 3.0);
 }
 
 TEST(PlanFollower, FliesTheStopInItsOwnTimeAndHoldsItsEnd) {
