@@ -10,6 +10,7 @@ chase_test(planning_refinement_test
 chase_test(planning_test
   LIBS planning_core math_exact
   SOURCES ${CMAKE_CURRENT_LIST_DIR}/planning_ladder_test.cpp ${CMAKE_CURRENT_LIST_DIR}/planning_rungs_test.cpp
+          ${CMAKE_CURRENT_LIST_DIR}/planning_problem_test.cpp
           ${CMAKE_CURRENT_LIST_DIR}/planning_ground_test.cpp
           ${CMAKE_CURRENT_LIST_DIR}/planning_pilot_test.cpp ${CMAKE_CURRENT_LIST_DIR}/planning_ratchet_test.cpp
           ${CMAKE_CURRENT_LIST_DIR}/planning_safety_test.cpp ${CMAKE_CURRENT_LIST_DIR}/planning_limits_test.cpp

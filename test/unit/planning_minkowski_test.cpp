@@ -2,7 +2,9 @@
 
 #include <cstdlib>
 #include <map>
+#include <set>
 
+#include "services/planning/margins.h"
 #include "services/planning/planner.h"
 #include "services/planning/problem.h"
 #include "services/planning/separations.h"
@@ -258,6 +260,117 @@ TEST(Minkowski, ProofsAreTheSameFromMemory) {
   EXPECT_GT(with_less, 20);
 }
 
+Curve RandomCurve(Random* random, const Vector3d& from, int rows, double spread) {
+  Curve curve = Curve::Zero(rows, 3);
+  curve.row(0) = from.transpose();
+  for (int k = 1; k < rows; ++k)
+    curve.row(k) = world::RandomVector(random, spread, spread, 0.3 * spread).transpose();
+  return curve;
+}
+
+/// Least gap of what the problem asks of the plan about an obstacle.
+double LeastAsked(const PlanRequest& request, const Problem& problem, const Curve& plan,
+                  const Ellipsoid& e, const world::Obstacle& o, double sight_from) {
+  const world::Trajectory way{request.t0, request.horizon, plan};
+  double least = LeastGap(way, e.safety_radius, e.safety_from, nullptr, o, problem.sigmas);
+  const double from = std::max(sight_from, e.sight_from);
+  if (from >= 1.0) return least;
+  math::Polynomial radius = e.sight_share * problem.target_growth;
+  radius[0] += e.sight_share * problem.sight_radius;
+  const world::Ball target{problem.target, radius};
+  return std::min(
+      least, LeastGap(way, e.sight_share * problem.sight_radius, from, &target, o, problem.sigmas));
+}
+
+/// Of any degree, from any time on, of all obstacles or of those that are near: what is called off
+/// is, and what is off by a little is called so. No proof claims more room than there is.
+TEST(Minkowski, PlansStayOffWhereSamplesSaySo) {
+  PlannerConfig c;
+  constexpr double kBetween = 0.03;  // m: nearer between the samples
+  int off = 0, on = 0, refused = 0, high = 0;
+  for (unsigned seed = 1; seed <= 200; ++seed) {
+    Random random(seed, 81);
+    PlanRequest request = RandomRequest(c, seed);
+    request.obstacles.resize(std::min<size_t>(request.obstacles.size(), 1 + seed % 3));
+    const auto rows = [&](int most) { return 1 + static_cast<int>(random.Next() % 9) % most; };
+    const int n = random.Next() % 4 ? rows(7) : 9;
+    request.target.coefficients = RandomCurve(&random, request.target.Position(request.t0),
+                                              random.Next() % 4 ? rows(7) : 9, 1.0);
+    request.target.start = request.t0;
+    request.target.duration = request.horizon;
+    const Curve plan = RandomCurve(&random, request.start.p, n, 2.0);
+    request.start.v =
+        plan.rows() > 1 ? Vector3d(plan.row(1).transpose() / request.horizon) : Vector3d::Zero();
+    if (seed % 5 == 0) {
+      request.target_body = request.obstacles.back();
+      request.target_body->id = kTargetId;
+    }
+    Problem problem = MakeProblem(c, request, nullptr);
+    const double sight_from = 0.25 * static_cast<double>(random.Next() % 5);
+    double least = HUGE_VAL;
+    for (size_t i = 0; i < problem.obstacles.size(); ++i)
+      if (problem.obstacles[i].safety_from > 0.0)
+        least = std::min(least, -1.0);  // leaves it as well: another test
+      else
+        least = std::min(least, LeastAsked(request, problem, plan, problem.obstacles[i],
+                                           request.obstacles[i], sight_from));
+    if (least == -1.0) continue;
+    if (problem.target_body) {
+      if (problem.target_body->safety_from > 0.0) continue;
+      least = std::min(least, LeastAsked(request, problem, plan, *problem.target_body,
+                                         *request.target_body, 1.0));
+    }
+    int first = static_cast<int>(random.Next() % 3) - 1;
+    const int before = first;
+    const bool stays = StaysOff(plan, problem, sight_from, seed % 2 ? &first : nullptr);
+    const auto proofs = ProveOff(plan, problem, sight_from);
+    EXPECT_EQ(proofs.has_value(), stays) << seed;
+    EXPECT_FALSE(stays && least < -kTolerance) << seed << " " << least;
+    refused += !stays && least > kBetween;
+    EXPECT_TRUE(!stays || first == before);
+    if (!stays && seed % 2 && first != before) {
+      const size_t bad = static_cast<size_t>(first);
+      EXPECT_LT(LeastAsked(request, problem, plan, problem.obstacles[bad], request.obstacles[bad],
+                           sight_from),
+                kBetween)
+          << seed;
+    }
+    ++(stays ? off : on);
+    high += stays && (n > 7 || problem.target.rows() > 7);
+    if (!proofs) continue;
+    size_t asked = 0;
+    for (const Ellipsoid& e : problem.obstacles)
+      asked += std::max(sight_from, e.sight_from) < 1.0 ? 2 : 1;
+    EXPECT_EQ(proofs->size(), asked + problem.target_body.has_value());
+    const world::Trajectory way{request.t0, request.horizon, plan};
+    for (const Proof& p : *proofs) {
+      const world::Obstacle& o = p.obstacle == kTargetId
+                                     ? *request.target_body
+                                     : request.obstacles[static_cast<size_t>(p.obstacle)];
+      if (p.of_sight) continue;
+      EXPECT_GE(p.radius, c.hard_radius());
+      EXPECT_GE(LeastGap(way, p.radius + p.room, p.from, nullptr, o, c.sigmas), -kTolerance)
+          << seed;
+      EXPECT_GE(p.room, 0.0);
+    }
+    // Those that are far need not be asked about.
+    problem.reach = Box{Eigen::Array3d::Constant(-1e3), Eigen::Array3d::Constant(1e3)};
+    problem.near.clear();
+    if (n <= 7) {
+      EXPECT_TRUE(StaysOff(plan, problem, sight_from));
+      for (size_t i = 0; i < problem.obstacles.size(); ++i)
+        problem.near.push_back(static_cast<int>(i));
+      EXPECT_EQ(StaysOff(plan, problem, sight_from), stays);
+    }
+  }
+  std::printf("%d stay off, %d do not, %d for want of a proof; %d of a high degree\n", off, on,
+              refused, high);
+  EXPECT_GT(off, 50);
+  EXPECT_GT(on, 15);
+  EXPECT_GT(high, 10);
+  EXPECT_LE(refused, off / 20);
+}
+
 /// Gap of the way's ball, or of its hull with the target's, at tau.
 double Gap(const world::Ball& drone, const world::Ball* target, const world::Body& body,
            double tau) {
@@ -294,9 +407,46 @@ void ExpectBoxes(const PlannerConfig& c, const Problem& problem, const Ellipsoid
   }
 }
 
-/// Margins give way as far as they must, and the hard radius where the start is within it only.
+/// Clauses of the notes.
+std::set<std::string> Clauses(const std::string& notes) {
+  std::set<std::string> clauses;
+  for (size_t at = 0; at < notes.size();) {
+    const size_t end = std::min(notes.find("; ", at), notes.size());
+    EXPECT_TRUE(clauses.insert(notes.substr(at, end - at)).second) << notes;
+    at = end + 2;
+  }
+  return clauses;
+}
+
+/// What sorts out candidates: about the solid, grown along its axes.
+struct Sorting {
+  Matrix3d shape;
+  double now, mean;  ///< deviations, m
+
+  Sorting(const PlannerConfig& c, const PlanRequest& request, const world::Obstacle& o) {
+    const Matrix3d R = o.axes.toRotationMatrix();
+    const bool box = o.solid == world::Obstacle::Solid::kBox;
+    shape = o.shape;
+    if (box) shape = R * o.half.cwiseAbs2().cwiseInverse().asDiagonal() * R.transpose();
+    const auto deviations = [&](double t) {
+      const double age = t - o.center.start;
+      const Matrix3d S = o.position_covariance + age * age * o.velocity_covariance;
+      return c.sigmas * std::sqrt(S.diagonal().maxCoeff());
+    };
+    now = deviations(request.t0);
+    mean = 0.5 * (now + deviations(request.t0 + request.horizon));
+  }
+  Matrix3d Grown(double by) const { return by > 0.0 ? world::Inflated(shape, by) : shape; }
+  Matrix3d OfSight(const PlannerConfig& c, const Problem& problem, double share) const {
+    return Grown(share * (c.sight_margin + 0.5 * problem.target_growth.sum() + mean));
+  }
+};
+
+/// Margins give way as far as they must and no farther, the hard radius where the start is within
+/// it only, and it is said.
 void ExpectRelaxed(const PlannerConfig& c, const Problem& problem, const Ellipsoid& e,
-                   const world::Body& body) {
+                   const world::Body& body, const Sorting& sorting,
+                   const std::set<std::string>& notes) {
   constexpr double kNear = 2e-4;     // m: what is off has to be so by a little
   constexpr double kBetween = 0.02;  // m: nearer between the samples
   const auto at_start = [&](double radius) {
@@ -323,6 +473,53 @@ void ExpectRelaxed(const PlannerConfig& c, const Problem& problem, const Ellipso
   EXPECT_TRUE(then(at_start(most) > kNear, e.safety_radius == most));
   EXPECT_TRUE(then(!hidden, least_of_target(e.sight_share) >= -kTolerance));
   EXPECT_TRUE(then(hidden, least_of_target(0.0) <= kBetween));
+  constexpr double kQuarter = 0.25;
+  const bool within = !inside && e.safety_radius < most;
+  EXPECT_TRUE(then(within, at_start(e.safety_radius + kQuarter * c.safety_margin) <= kNear));
+  const auto first_sight = [&](double share) {
+    const world::Ball seen = target(share);
+    const double gap = Gap({problem.start, math::Polynomial::Constant(1, share * c.sight_margin)},
+                           &seen, body, 0.0);
+    const double outside = world::SegmentSquaredDistance(
+        problem.start.row(0).transpose(), problem.target.row(0).transpose(),
+        e.center.row(0).transpose(), sorting.OfSight(c, problem, share));
+    return outside <= kClear ? std::min(0.0, gap) : gap;
+  };
+  const bool less = !hidden && e.sight_share < 1.0;
+  const double more = e.sight_share + kQuarter;
+  const bool target_needs = less && least_of_target(more) <= kBetween;
+  const bool start_needs = less && first_sight(more) <= kNear;
+  EXPECT_TRUE(then(less, target_needs || start_needs)) << e.sight_share;
+  // A line of sight that no share frees costs none.
+  EXPECT_TRUE(then(less && first_sight(e.sight_share) < -kTolerance, target_needs));
+  EXPECT_TRUE(then(less && first_sight(e.sight_share) < -kTolerance, first_sight(0.0) <= kNear));
+  const auto noted = [&](const std::string& before, const std::string& after = "") {
+    return notes.count(before + "obstacle " + std::to_string(e.id) + after) > 0;
+  };
+  EXPECT_EQ(noted("starts inside "), inside);
+  EXPECT_EQ(noted("starts within the margin of "), within);
+  EXPECT_EQ(noted("", " holds the target, its shadow is ignored"), hidden);
+  const bool passes = noted("the target passes within the sight margin of ");
+  const bool starts = noted("sight starts within the margin of ");
+  EXPECT_EQ(passes + starts, less ? 1 : 0);
+  EXPECT_TRUE(then(passes, target_needs) && then(starts, start_needs));
+}
+
+/// It never holds the start, unless the body does.
+void ExpectSorted(const PlannerConfig& c, const Problem& problem, const Ellipsoid& e,
+                  const Sorting& sorting) {
+  EXPECT_TRUE(e.sight_from > 0.0 ||
+              e.sight.isApprox(sorting.OfSight(c, problem, e.sight_share), 1e-9));
+  if (e.safety_from > 0.0) return;
+  const Vector3d offset = (problem.start.row(0) - e.center.row(0)).transpose();
+  EXPECT_GT(offset.dot(e.safety * offset), 1.0);
+  const bool whole = e.safety_radius == c.hard_radius() + c.safety_margin;
+  const double grown = e.safety_radius + (whole ? sorting.mean : sorting.now);
+  for (const double share : {1.0, 0.5, 0.0}) {
+    const Matrix3d full = sorting.Grown(share * grown);
+    if (e.safety.isApprox(full, 1e-9)) return;
+    EXPECT_LE(offset.dot(full * offset), kClear + 1e-9) << "could be larger";
+  }
 }
 
 TEST(Minkowski, ProblemsAskForWhatTheBodiesAre) {
@@ -334,7 +531,9 @@ TEST(Minkowski, ProblemsAskForWhatTheBodiesAre) {
     const Eigen::MatrixXd target = request.target.coefficients;
     request.target.coefficients = Eigen::MatrixXd::Zero(seed % 20 == 0 ? 9 : target.rows(), 3);
     request.target.coefficients.topRows(target.rows()) = target;
-    const Problem problem = MakeProblem(c, request, nullptr);
+    std::string notes;
+    const Problem problem = MakeProblem(c, request, &notes);
+    const std::set<std::string> clauses = Clauses(notes);
     for (const double tau : {0.0, 0.4, 1.0}) {
       const double deviations = c.sigmas * TargetSigma(request, request.t0 + tau * request.horizon);
       EXPECT_GE(math::Evaluate(problem.target_growth, tau), deviations - 1e-12);
@@ -345,7 +544,9 @@ TEST(Minkowski, ProblemsAskForWhatTheBodiesAre) {
       const Ellipsoid& e = problem.obstacles[i];
       const world::Body body = Truth(request.obstacles[i], request.t0, request.horizon, c.sigmas);
       ExpectBoxes(c, problem, e, body);
-      ExpectRelaxed(c, problem, e, body);
+      const Sorting sorting(c, request, request.obstacles[i]);
+      ExpectRelaxed(c, problem, e, body, sorting, clauses);
+      ExpectSorted(c, problem, e, sorting);
       inside += e.safety_from > 0.0;
       within += e.safety_from == 0.0 && e.safety_radius < c.hard_radius() + c.safety_margin;
       holds_target += e.sight_from > 0.0;
