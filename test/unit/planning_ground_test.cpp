@@ -100,6 +100,46 @@ TEST(Ground, LimitsOfHeightAreThoseOfSamples) {
   EXPECT_GT(broken, 1000);
 }
 
+// Small slabs and large ones: no plane has less of a squared distance to their corners, by area.
+TEST(Ground, ItsPlaneIsTheNearestToWhatIsListed) {
+  std::mt19937 random(4);
+  std::uniform_real_distribution<double> within(-1.0, 1.0);
+  EXPECT_EQ(GroundOf({}).z0, 0.0);
+  EXPECT_EQ(GroundOf({}).Rise({1.0, 1.0, 2.0}), 2.0);
+  for (int i = 0; i < 100; ++i) {
+    std::vector<world::Obstacle> slabs;
+    const double size = std::pow(10.0, within(random) - 0.5);
+    for (int k = 0; k < 5; ++k) {
+      slabs.push_back(
+          Slab(size * Vector3d(3.0 * within(random), 3.0 * within(random), within(random)),
+               0.3 * Eigen::Vector2d(within(random), within(random))));
+      slabs.back().half = {size * (1.1 + within(random)), size * (1.1 + within(random)), 0.3};
+      slabs.back().ground = k < 4;  // the last is none
+    }
+    const auto squares = [&](const Ground& g) {
+      double sum = 0.0;
+      for (int k = 0; k < 4; ++k)
+        for (const double x : {-1.0, 1.0})
+          for (const double y : {-1.0, 1.0}) {
+            const world::Obstacle& o = slabs[static_cast<size_t>(k)];
+            const Vector3d corner =
+                o.center.Position(0.0) + o.axes * Vector3d(x * o.half.x(), y * o.half.y(), 0.0);
+            sum += o.half.x() * o.half.y() * g.Above(corner) * g.Above(corner);
+          }
+      return sum;
+    };
+    const Ground ground = GroundOf(slabs);
+    const double least = squares(ground);
+    for (int k = 0; k < 20; ++k) {
+      Ground other = ground;
+      other.slope_x += 0.01 * within(random);
+      other.slope_y += 0.01 * within(random);
+      other.z0 += 0.01 * size * within(random);
+      EXPECT_GE(squares(other), least) << i;
+    }
+  }
+}
+
 // A step in the ground that the plane through it does not show is kept off like an obstacle.
 TEST(Ground, WhatRisesAboveItsPlaneIsKeptOff) {
   const auto planner = MakePlanner("chase", PlannerConfig());

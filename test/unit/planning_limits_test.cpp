@@ -4,6 +4,7 @@
 #include <cmath>
 #include <random>
 
+#include "services/planning/field_of_view.h"
 #include "services/planning/limits.h"
 #include "services/planning/planner_config.h"
 
@@ -110,6 +111,74 @@ TEST(Limits, HoldWhereSamplesSaySoAndNowhereElse) {
   EXPECT_GT(broken, kPlans / 4);
 }
 
+/// Each limit that the plan may break alone, so far from what it does.
+void SetLimits(const Extremes& e, const double (&room)[6], Limits* limits) {
+  limits->speed = e.speed * (1.0 + room[0]) + 1e-6;
+  limits->acceleration = e.acceleration * (1.0 + room[1]) + 1e-6;
+  limits->min_distance = e.near / (1.0 + room[2]);
+  limits->tan_elevation = e.slope * (1.0 + room[3]) + 1e-6;
+  limits->height = true;
+  limits->z_min = e.low - room[4];
+  limits->z_max = e.high + room[5];
+}
+
+// All of them at once: one that is broken is enough, whatever the degree of plan and target.
+TEST(Limits, AllHoldTogetherOrThePlanDoesNot) {
+  Random g(14);
+  int kept = 0, broken[6] = {};
+  for (int i = 0; i < kPlans; ++i) {
+    Curve plan;
+    Problem problem = RandomProblem(g, &plan);
+    if (i % 3 == 0) plan = Curve(plan.topRows(1 + static_cast<int>(g() % 3)));
+    const Extremes e = Sampled(plan, problem);
+    if (e.slope > 50.0 || e.near < 0.1) continue;
+    double room[6];
+    for (double& x : room) x = Uniform(g, 0.03, 0.2);
+    SetLimits(e, room, &problem.limits);
+    EXPECT_TRUE(KeepsLimits(plan, problem)) << i;
+    ++kept;
+    for (int k = 0; k < 6; ++k) {
+      double less[6];
+      std::copy(room, room + 6, less);
+      less[k] = -Uniform(g, 0.02, 0.2);
+      if (k == 0 && e.speed < 1e-3) continue;
+      if (k == 1 && e.acceleration < 1e-3) continue;
+      if (k == 3 && e.slope < 1e-3) continue;
+      SetLimits(e, less, &problem.limits);
+      EXPECT_FALSE(KeepsLimits(plan, problem)) << i << " " << k;
+      ++broken[k];
+    }
+  }
+  EXPECT_GT(kept, kPlans / 2);
+  for (const int n : broken) EXPECT_GT(n, kPlans / 2);
+}
+
+// Far from the origin rounding grows: what is called kept is, to a tenth of a millimetre, and what
+// has room for a millimetre is kept.
+TEST(Limits, HoldFarFromTheOrigin) {
+  Random g(15);
+  int kept = 0, broken = 0;
+  for (int i = 0; i < 1000; ++i) {
+    Curve plan;
+    Problem problem = RandomProblem(g, &plan);
+    const Extremes e = Sampled(plan, problem);
+    const Vector3d far(1e6 * Uniform(g, -1, 1), 1e6 * Uniform(g, -1, 1), 1e4 * Uniform(g, -1, 1));
+    plan.row(0) += far.transpose();
+    problem.target.row(0) += far.transpose();
+    problem.limits.height = true;
+    const double above = Uniform(g, -5e-3, 5e-3), below = Uniform(g, -5e-3, 5e-3);
+    problem.limits.z_min = e.low + far.z() - below;
+    problem.limits.z_max = e.high + far.z() + above;
+    const double room = std::min(above, below);
+    const bool keeps = KeepsLimits(plan, problem);
+    EXPECT_FALSE(keeps && room < -1e-4) << i;
+    EXPECT_FALSE(!keeps && room > 1e-3) << i;
+    ++(keeps ? kept : broken);
+  }
+  EXPECT_GT(kept, 100);
+  EXPECT_GT(broken, 100);
+}
+
 TEST(Limits, NoneIsAskedThatIsNotSet) {
   Random g(12);
   for (int i = 0; i < 100; ++i) {
@@ -154,6 +223,8 @@ TEST(Limits, GiveWayToTheStartOnly) {
     world::State s;
     for (Vector3d* x : {&s.p, &s.v, &s.a})
       *x = {Uniform(g, -4, 4), Uniform(g, -4, 4), Uniform(g, -4, 4)};
+    if (i % 4 == 0)  // nearly over or under the target
+      s.p = Vector3d(5.0, 0.0, 1.0) + Vector3d(Uniform(g, -0.4, 0.4), 0.0, Uniform(g, -3, 3));
     const Limits l = MakeProblem(c, At(s), nullptr).limits;
     const double v = s.v.norm(), a = s.a.norm();
     EXPECT_GE(l.speed, std::max(c.max_speed, v));
@@ -171,6 +242,11 @@ TEST(Limits, GiveWayToTheStartOnly) {
                 std::min(unseen > 1.7 ? unseen : c.z_min, s.p.z() - reach(-s.v.z(), -s.a.z())),
                 1e-5);
     EXPECT_NEAR(l.z_max, std::max(c.z_max, s.p.z() + reach(s.v.z(), s.a.z())), 1e-5);
+    // By a little more, as a plan at its limit would be at the mercy of rounding.
+    EXPECT_LT(l.z_min, s.p.z() - reach(-s.v.z(), -s.a.z()));
+    EXPECT_GT(l.z_max, s.p.z() + reach(s.v.z(), s.a.z()));
+    EXPECT_TRUE(l.speed > v && l.acceleration > a);
+    EXPECT_TRUE(l.height && l.view);
     const Vector3d r = Vector3d(5.0, 0.0, 1.0) - s.p;
     EXPECT_NEAR(l.min_distance, std::min(c.min_distance, 0.9 * r.norm()), 1e-9);
     const double tangent = std::tan(c.max_elevation_deg * M_PI / 180.0);
@@ -181,7 +257,33 @@ TEST(Limits, GiveWayToTheStartOnly) {
     } else {
       EXPECT_EQ(l.tan_elevation, 0.0);
     }
+    // In the image from the start on, or soon.
+    const double down = std::tan(c.view_down_deg * M_PI / 180.0);
+    const double up = std::tan(c.view_up_deg * M_PI / 180.0);
+    const double below = SeenAt(r, s.a, nullptr).x();
+    EXPECT_EQ(l.view_from == 0.0, below < down && below > -up);
+    EXPECT_TRUE(l.view_from == 0.0 || l.view_from == 0.25);
   }
+}
+
+// What is not limited in the file is not limited, and braking then counts as 2 m/s^2.
+TEST(Limits, NoneThatTheFileDoesNotSet) {
+  PlannerConfig c;
+  c.max_speed = c.max_acceleration = c.max_elevation_deg = c.min_distance = 0.0;
+  c.view_down_deg = 0.0;
+  world::State s;
+  s.p = {0.0, 0.0, 0.5};
+  s.v = {1.0, 2.0, -1.0};
+  s.a = {3.0, 0.0, 0.0};
+  const Limits l = MakeProblem(c, At(s), nullptr).limits;
+  EXPECT_EQ(l.speed, 0.0);
+  EXPECT_EQ(l.acceleration, 0.0);
+  EXPECT_EQ(l.tan_elevation, 0.0);
+  EXPECT_EQ(l.min_distance, 0.0);
+  EXPECT_FALSE(l.view);
+  EXPECT_NEAR(l.z_min, 0.5 - 0.2 - 1.0 / 4.0, 1e-5);
+  c.z_max = c.z_min;
+  EXPECT_FALSE(MakeProblem(c, At(s), nullptr).limits.height);
 }
 
 }  // namespace
