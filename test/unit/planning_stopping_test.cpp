@@ -37,6 +37,7 @@ world::Obstacle RandomCylinder(Random* random, int id, const Vector3d& at) {
 
 double Distance(const world::Obstacle& o, const Vector3d& p, double t) {
   const Vector3d d = p - o.center.Position(t);
+  if (o.solid == world::Obstacle::Solid::kEllipsoid) return d.norm() - o.half.x();
   const double across = d.head<2>().norm() - o.half.x(), above = std::abs(d.z()) - o.half.z();
   return std::hypot(std::max(0.0, across), std::max(0.0, above)) +
          std::min(0.0, std::max(across, above));
@@ -51,7 +52,9 @@ PlanRequest RandomRequest(const PlannerConfig& c, unsigned seed) {
   request.start.p = {0.0, 0.0, random.Uniform(1.4, 1.6)};
   request.start.v = RandomVector(&random, 2.5, 2.5, 0.3);
   request.start.a = RandomVector(&random, 2.0, 2.0, 0.3);
-  request.target = world::Trajectory::Constant({0.0, 0.0, 50.0}, 0.0, 5.0);
+  // Near by, as often as not: to rest it need not keep off what is not listed, nor look at it.
+  const double height = seed % 2 ? 1.2 : 50.0;
+  request.target = world::Trajectory::Constant({0.3, 0.3, height}, 0.0, 5.0);
   const int n = 1 + static_cast<int>(random.Next() % 6);
   while (static_cast<int>(request.obstacles.size()) < n) {
     const int id = static_cast<int>(request.obstacles.size());
@@ -96,10 +99,11 @@ double Room(const PlannerConfig& c, const PlanRequest& request, const world::Tra
 // Of brakings that take 0.6 to 3 s one is found that takes at most 1.4 times as long as the
 // quickest, where they are free for that long; none where all touch or ask for too much.
 TEST(Brake, FindsAQuickOneWhereThereIsOneAndNoneElse) {
-  const PlannerConfig c;
+  PlannerConfig c;
   constexpr double kStep = 0.02, kLonger = 1.4;
   int found = 0, none = 0;
   for (unsigned seed = 0; seed < 600; ++seed) {
+    c.max_acceleration = seed % 2 ? 6.0 : 2.0;  // slow brakings
     const PlanRequest request = RandomRequest(c, seed);
     double free_since = HUGE_VAL, quick = HUGE_VAL;
     bool any = false;
@@ -260,6 +264,11 @@ TEST(Evade, TouchesNoEarlierThanABraking) {
       const Vector3d away(std::cos(angle), std::sin(angle), 0.0);
       world::Obstacle o = RandomCylinder(&random, i, 2.2 * away + Vector3d(0.0, 0.0, 1.5));
       o.half = {0.5, 0.5, 4.0};
+      if (seed % 3 == 0) {
+        o.solid = world::Obstacle::Solid::kEllipsoid;
+        o.half.z() = 0.5;
+        o.shape = o.half.cwiseAbs2().cwiseInverse().asDiagonal();
+      }
       o.center.start = request.t0;
       o.center.coefficients = Eigen::MatrixXd::Zero(2, 3);
       o.center.coefficients << 2.2 * away.transpose(), -speed * away.transpose();
@@ -267,14 +276,22 @@ TEST(Evade, TouchesNoEarlierThanABraking) {
       o.moving = true;
       request.obstacles.push_back(o);
     }
+    const PlanRequest walkers = request;
+    // What stands where the body is, and is left by going on, is not there.
+    world::Obstacle around = RandomCylinder(&random, 100, Vector3d::Zero());
+    around.moving = false;
+    around.half = {0.8, 0.8, 4.0};
+    around.center = world::Trajectory::Constant(
+        request.start.p - 0.4 * request.start.v.normalized(), request.t0, 1.0);
+    if (seed % 4 == 1) request.obstacles.push_back(around);
     const Stop stop = Evade(c, request);
     if (stop.certified) continue;
     ++weighed;
-    const double contact = FirstContact(c, request, stop.trajectory);
+    const double contact = FirstContact(c, walkers, stop.trajectory);
     double best = 0.0;
     for (const double T : {0.6, 1.0, 1.7}) {
       const world::Trajectory way = Braking(request, T);
-      if (Room(c, alone, way) > 0.01) best = std::max(best, FirstContact(c, request, way));
+      if (Room(c, alone, way) > 0.01) best = std::max(best, FirstContact(c, walkers, way));
     }
     EXPECT_GE(contact, best - 0.03) << seed;
     EXPECT_GE(Room(c, alone, stop.trajectory), -1e-6) << seed;
