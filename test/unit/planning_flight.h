@@ -1,5 +1,7 @@
 #pragma once
 
+#include <gtest/gtest.h>
+
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
@@ -32,9 +34,10 @@ class Flight {
   void Run(double seconds) {
     for (const double end = t + seconds; t < end; t += kPeriod) {
       pilot.SetFlying(flying_before || flown.has_value());
-      if (std::fmod(t, 0.1) < kPeriod) pilot.SetObstacles(t, obstacles);
+      if (hears && std::fmod(t, 0.1) < kPeriod) pilot.SetObstacles(t, obstacles);
       if (std::fmod(t, 0.3) < kPeriod && sees_target) pilot.SetForecast(Walking());
       if (const auto plan = pilot.Update(t, Body())) {
+        EXPECT_FALSE(plan->yaw.empty()) << plan->reason;
         plans.push_back(*plan);
         waiting_ = plan;
       }
@@ -73,7 +76,7 @@ class Flight {
 
   Pilot pilot{PlanningConfig()};
   double t = 0.0, nearest = 1e9;
-  bool flying_before = false, sees_target = false;
+  bool flying_before = false, sees_target = false, hears = true;  // the last: of obstacles
   std::vector<world::Obstacle> obstacles;
   std::vector<PlanResult> plans;
   std::optional<PlanResult> flown;

@@ -93,7 +93,8 @@ struct Counts {
 
 class Flown {
  public:
-  Flown(const Course& course, unsigned seed) : course_(course), seed_(seed) {}
+  Flown(const Course& course, unsigned seed, const Vector3d& home = {-2.5, 0.0, 0.1})
+      : course_(course), seed_(seed), home_(home) {}
 
   void Fly(Counts* counts) {
     double seen = -1.0, listed = -1.0;
@@ -107,11 +108,13 @@ class Flown {
     }
   }
 
+  const std::vector<PlanResult>& plans() const { return plans_; }
+
   // Flies each plan from its start on.
   BodyEstimate Body() const {
     const auto flown = std::find_if(plans_.rbegin(), plans_.rend(),
                                     [&](const PlanResult& p) { return p.trajectory.start <= t_; });
-    if (flown == plans_.rend()) return {{-2.5, 0.0, 0.1}, Vector3d::Zero(), 0.0};
+    if (flown == plans_.rend()) return {home_, Vector3d::Zero(), 0.0};
     const world::Trajectory& way = flown->trajectory;
     const double now = std::min(t_, way.end()), tau = (now - way.start) / way.duration;
     return {way.Position(now), t_ < way.end() ? way.Velocity(now) : Vector3d::Zero(),
@@ -149,6 +152,9 @@ class Flown {
     EXPECT_LE(gap, config_.replan_period + kPeriod + 1e-6) << t_;
     const double then = std::min(start, before.trajectory.end());
     EXPECT_LT((plan.trajectory.Position(start) - before.trajectory.Position(then)).norm(), 1e-6);
+    const double tau = (then - before.trajectory.start) / before.trajectory.duration;
+    const double yaw = YawAt(before.yaw, tau, before.trajectory.duration).yaw;
+    EXPECT_NEAR(YawAt(plan.yaw, 0.0, plan.trajectory.duration).yaw, yaw, 1e-6) << t_;
     if (start < before.trajectory.end()) {
       EXPECT_LT((plan.trajectory.Velocity(start) - before.trajectory.Velocity(start)).norm(), 1e-6);
     }
@@ -158,6 +164,7 @@ class Flown {
   Pilot pilot_{config_};
   Course course_;
   unsigned seed_;
+  Vector3d home_;
   double t_ = 0.0;
   Forecast forecast_;
   std::vector<PlanResult> plans_;
@@ -172,6 +179,49 @@ TEST(Flights, EachPlanFollowsFromTheOneBeforeAndHolds) {
   EXPECT_GE(counts.chases, 0.9 * counts.of);
   EXPECT_GT(counts.searches, 8);
   EXPECT_GE(counts.certified, 0.95 * counts.plans);
+}
+
+// Where the frame has its origin does not matter: the same flight elsewhere.
+TEST(Flights, AreTheSameElsewhere) {
+  const Vector3d away(32.0, -16.0, 8.0);
+  const auto forecast = [&](double t) {
+    Forecast f = GoingRound(t);
+    f.target.coefficients.row(0) += away.transpose();
+    return f;
+  };
+  // The ground is listed, so that heights count from there.
+  world::Obstacle ground;
+  ground.id = 99;
+  ground.ground = true;
+  ground.solid = world::Obstacle::Solid::kBox;
+  ground.half = {30.0, 30.0, 0.3};
+  ground.shape = (3.0 * ground.half.cwiseAbs2()).cwiseInverse().asDiagonal();
+  ground.center = world::Trajectory::Constant({0.0, 0.0, -0.3}, 0.0, 1.0);
+  Course here{GoingRound, RandomPillars(3), 8.0, 18.0, 19.0};
+  here.obstacles.push_back(ground);
+  Course there = here;
+  there.forecast = forecast;
+  for (world::Obstacle& o : there.obstacles) o.center.coefficients.row(0) += away.transpose();
+  const Vector3d home(-2.5, 0.0, 0.1);
+  Counts counts;
+  Flown a(here, 3, home), b(there, 3, home + away);
+  a.Fly(&counts);
+  b.Fly(&counts);
+  ASSERT_EQ(a.plans().size(), b.plans().size());
+  int searches = 0;
+  for (size_t i = 0; i < a.plans().size(); ++i) {
+    const PlanResult &x = a.plans()[i], &y = b.plans()[i];
+    ASSERT_EQ(x.reason, y.reason) << i;
+    ASSERT_EQ(x.verdict, y.verdict) << i;
+    for (double tau = 0.0; tau <= 1.0; tau += 0.1)
+      ASSERT_LT((x.trajectory.Position(x.trajectory.start + tau * x.trajectory.duration) + away -
+                 y.trajectory.Position(y.trajectory.start + tau * y.trajectory.duration))
+                    .norm(),
+                1e-3)
+          << i << x.reason;
+    searches += x.reason.find("to where it may be") != std::string::npos;
+  }
+  EXPECT_GT(searches, 0);
 }
 
 }  // namespace

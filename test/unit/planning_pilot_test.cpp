@@ -370,6 +370,81 @@ TEST(Pilot, TheForecastsUncertaintyAndBodyReachThePlan) {
   EXPECT_EQ(sights, 1);
 }
 
+// A forecast that is nearly over is worth a second; one that is no number is worth nothing.
+TEST(Pilot, ShortForecastsAreUsedAndBrokenOnesAreSurvived) {
+  for (const bool broken : {false, true}) {
+    Flight flight{PlanningConfig()};
+    flight.Run(4.0, false);
+    flight.Run(2.0, true);
+    Forecast forecast = Walking(flight.t);
+    forecast.target = forecast.target.Reparametrised(flight.t, 0.6);
+    if (broken) forecast.target.coefficients(1, 1) = std::nan("");
+    flight.pilot.SetForecast(forecast);
+    const size_t before = flight.plans.size();
+    flight.Run(0.1, false);
+    ASSERT_GT(flight.plans.size(), before);
+    for (size_t i = before; i < flight.plans.size(); ++i) {
+      const PlanResult& plan = flight.plans[i];
+      EXPECT_TRUE(plan.trajectory.coefficients.allFinite());
+      for (const double y : plan.yaw) EXPECT_TRUE(std::isfinite(y));
+      EXPECT_EQ(plan.verdict >= Verdict::kBrake, broken) << plan.reason;
+      EXPECT_TRUE(broken || std::abs(plan.trajectory.duration - 1.0) < 1e-9);
+    }
+  }
+}
+
+// Not asked for longer than its plan takes it is where that ends, at rest.
+TEST(Pilot, AfterItsPlanIsOverItGoesOnFromItsEnd) {
+  Flight flight{PlanningConfig()};
+  flight.Run(4.0, false);
+  flight.Run(4.0, true);
+  const PlanResult before = flight.pilot.running();
+  const double t = before.trajectory.end() + 0.5;
+  const Eigen::Vector3d end = before.trajectory.Position(before.trajectory.end());
+  for (const double off : {0.0, 0.6, 0.8}) {
+    Flight again{PlanningConfig()};
+    again.Run(4.0, false);
+    again.Run(4.0, true);
+    const BodyEstimate body{end + Eigen::Vector3d(0.0, off, 0.0), {0.0, 0.1, 0.0}, 0.3};
+    again.pilot.SetObstacles(t, {});
+    const auto plan = again.pilot.Update(t, body);
+    ASSERT_TRUE(plan);
+    const world::State s = plan->trajectory.At(plan->trajectory.start);
+    const bool far = off > PlanningConfig().reset_threshold;
+    EXPECT_LT((s.p - (far ? body.p : end)).norm(), 1e-6) << off;
+    EXPECT_LT((s.v - (far ? body.v : Eigen::Vector3d(0, 0, 0))).norm(), 1e-6) << off;
+    EXPECT_LT(s.a.norm() + s.j.norm(), 1e-6) << off;
+    const double yaw = YawAt(before.yaw, 1.0, before.trajectory.duration).yaw;
+    EXPECT_NEAR(YawAt(plan->yaw, 0.0, plan->trajectory.duration).yaw, far ? 0.3 : yaw, 1e-6);
+  }
+}
+
+// What stands is braked for though the list is old; what moves is anywhere by then.
+TEST(Pilot, WithoutObstaclesItStillKnowsWhatStands) {
+  const auto farthest = [](bool moves) {
+    Flight flight{PlanningConfig()};
+    flight.Run(4.0, false);
+    flight.Run(5.0, true);
+    const BodyEstimate body = flight.Body();
+    EXPECT_GT(body.v.norm(), 0.5);
+    world::Obstacle wall;
+    wall.moving = moves;
+    wall.solid = world::Obstacle::Solid::kBox;
+    wall.half = {0.1, 20.0, 20.0};
+    wall.shape = (3.0 * wall.half.cwiseAbs2()).cwiseInverse().asDiagonal();
+    wall.center =
+        world::Trajectory::Constant(body.p + Eigen::Vector3d(0.65, 0.0, 0.0), flight.t, 1.0);
+    flight.pilot.SetObstacles(flight.t, {wall});
+    const auto plan = flight.pilot.Update(flight.t + 0.31, body);
+    EXPECT_TRUE(plan && plan->reason.find("not heard") != std::string::npos);
+    double most = -HUGE_VAL;
+    for (double t = plan->trajectory.start; t <= plan->trajectory.end(); t += 0.02)
+      most = std::max(most, plan->trajectory.Position(t).x());
+    return most;
+  };
+  EXPECT_LT(farthest(false), farthest(true) - 0.05);
+}
+
 TEST(PlanningConfig, DefaultsAreFineAndBadValuesAreNamed) {
   PlanningConfig config;
   EXPECT_EQ(config.Problem(), "");

@@ -239,6 +239,144 @@ TEST(Trail, ThatClimbedSteeplyLeadsBackLevel) {
   EXPECT_LT((Walk(trail, home) - home).head<2>().norm(), 1e-6);
 }
 
+/// What both pilots are told from `t` on in a frame that is new to them: lists from the third tenth
+/// of a second on, a target that walks faster than any before, and is lost.
+void Tell(double since, const std::vector<world::Obstacle>& obstacles, double t, Pilot* pilot) {
+  pilot->SetFlying(true);
+  if (since > 0.25) pilot->SetObstacles(t, obstacles);
+  if (since < 2.0 || since > 4.0) return;
+  Forecast f;
+  f.t = t;
+  f.has_target = true;
+  f.target = {t, 2.5, Eigen::MatrixXd::Zero(2, 3)};
+  f.target.coefficients << 3.0 + 1.3 * since, 0.0, 0.5, 1.3 * 2.5, 0.0, 0.0;
+  pilot->SetForecast(f);
+}
+
+// In a new frame a pilot does what one does that has only just been started, bit for bit: nothing
+// that was said in the old one is left.
+TEST(Task, AfterAChangeOfFrameItIsAsIfItHadJustBeenStarted) {
+  for (const Task task : {Task::kChase, Task::kHold, Task::kReturn, Task::kLand}) {
+    Flight flight;
+    flight.Chase(9.0);
+    const Vector3d p = flight.Body().p;
+    flight.Run(3.0);  // the target is lost
+    flight.pilot.SetTask(task, flight.home());
+    flight.Run(0.5);
+    world::Obstacle everywhere = Pillar(9, p.x(), p.y() + 1.2);
+    everywhere.half = {1.0, 1.0, 3.0};
+    flight.pilot.SetUnseen(flight.t, {everywhere});
+    flight.pilot.SetObstacles(flight.t, {everywhere});
+    flight.pilot.ChangeFrame();
+    Pilot fresh{PlanningConfig()};
+    fresh.SetTask(task, std::nullopt);
+    // A wall between the body and its home, around which the old way led.
+    std::vector<world::Obstacle> obstacles;
+    for (int i = -2; i <= 2; ++i) obstacles.push_back(Pillar(20 + i, 2.0, 0.5 * i));
+    const BodyEstimate body{p, {0.1, 0.0, 0.0}, 0.2};
+    int plans = 0;
+    for (double since = 0.0; since < 9.0; since += 0.05) {
+      const double t = flight.t + since;
+      for (Pilot* pilot : {&flight.pilot, &fresh}) {
+        Tell(since, obstacles, t, pilot);
+        if (since > 1.0) pilot->SetTask(task, Vector3d(0.0, 0.0, 0.1));
+      }
+      const auto a = flight.pilot.Update(t, body), b = fresh.Update(t, body);
+      ASSERT_EQ(a.has_value(), b.has_value()) << since;
+      if (!a) continue;
+      ++plans;
+      ASSERT_EQ(a->verdict, b->verdict) << since << " " << a->reason << " / " << b->reason;
+      ASSERT_EQ(a->reason, b->reason) << since;
+      ASSERT_EQ(a->trajectory.coefficients, b->trajectory.coefficients) << since << a->reason;
+      ASSERT_EQ(a->yaw, b->yaw) << since;
+      ASSERT_EQ(a->stop.has_value(), b->stop.has_value()) << since;
+      if (a->stop) {
+        ASSERT_EQ(a->stop->coefficients, b->stop->coefficients) << since;
+      }
+    }
+    EXPECT_GT(plans, 40);
+  }
+}
+
+// Nobody climbs before control was heard, or might have been; at once after that.
+TEST(Task, ClimbsOnceControlIsHeardOrIsSilent) {
+  const PlanningConfig config;
+  for (const bool heard : {false, true})
+    for (const bool mission : {false, true}) {
+      Pilot pilot(config);
+      if (heard) pilot.SetFlying(false);
+      if (mission) pilot.SetTask(Task::kTakeoff, Vector3d::Zero());
+      double first = HUGE_VAL;
+      for (double t = 5.0; t < 6.0 && first == HUGE_VAL; t += kPeriod)
+        if (const auto plan = pilot.Update(t, {Vector3d(1.0, 2.0, 0.2), Vector3d::Zero(), 0.4})) {
+          first = t - 5.0;
+          const world::Trajectory& way = plan->trajectory;
+          EXPECT_EQ(plan->reason, "climbing");
+          EXPECT_EQ(way.duration, config.takeoff_time);
+          EXPECT_NEAR(way.start, t + config.latency, 1e-9);
+          EXPECT_LT((way.Position(way.start) - Vector3d(1.0, 2.0, 0.2)).norm(), 1e-9);
+          EXPECT_LT(
+              (way.Position(way.end()) - Vector3d(1.0, 2.0, 0.2 + config.takeoff_height)).norm(),
+              1e-9);
+          EXPECT_TRUE(world::EndsAtRest(way));
+          EXPECT_LT(way.Velocity(way.start).norm() + way.Acceleration(way.start).norm(), 1e-9);
+          EXPECT_EQ(plan->yaw, std::vector<double>{0.4});
+        }
+      if (heard)
+        EXPECT_EQ(first, 0.0);
+      else if (mission)
+        EXPECT_EQ(first, HUGE_VAL);
+      else
+        EXPECT_NEAR(first, 0.3, kPeriod + 1e-9);
+    }
+}
+
+// Told to go back twice, with a hold elsewhere between: the second way is a new one.
+TEST(Task, ATaskThatIsGivenAgainBeginsAnew) {
+  const auto plan_after = [](bool twice) {
+    Flight flight;
+    flight.Chase(9.0);
+    if (twice) {
+      flight.pilot.SetTask(Task::kReturn, flight.home());
+      flight.Run(0.5);
+      flight.pilot.SetTask(Task::kHold, flight.home());
+      flight.Run(2.0);
+    }
+    flight.pilot.SetTask(Task::kReturn, flight.home());
+    flight.Run(0.1);
+    return flight.plans.back();
+  };
+  for (const bool twice : {false, true}) {
+    const PlanResult plan = plan_after(twice);
+    EXPECT_EQ(plan.reason, "returning");
+    EXPECT_EQ(plan.verdict, Verdict::kSafeOnly);
+    const Vector3d end = plan.trajectory.Position(plan.trajectory.end());
+    EXPECT_LT((end - Vector3d(0.0, 0.0, 0.1 + PlanningConfig().takeoff_height)).norm(), 8.0);
+    EXPECT_TRUE(world::EndsAtRest(plan.trajectory));
+    EXPECT_GT((end - plan.trajectory.Position(plan.trajectory.start)).norm(), 1.0);
+  }
+}
+
+// Nobody looks: neither back nor aside is a way, whatever was seen before.
+TEST(Task, WithoutListsItNeitherReturnsNorIsLedAside) {
+  for (const Task task : {Task::kReturn, Task::kLand}) {
+    Flight flight;
+    flight.Chase(9.0);
+    const Vector3d p = flight.Body().p;
+    flight.hears = false;
+    flight.Run(0.4);
+    flight.pilot.SetTask(task, flight.home());
+    const size_t before = flight.plans.size();
+    flight.Run(4.0);
+    for (size_t i = before; i < flight.plans.size(); ++i) {
+      EXPECT_NE(flight.plans[i].reason.find("obstacles are not heard of"), std::string::npos);
+      EXPECT_LT(flight.plans[i].certified_clearance, 0.0);
+    }
+    EXPECT_LT((flight.Body().p - p).norm(), 1.5);
+    EXPECT_LT(flight.Body().v.norm(), 0.02);
+  }
+}
+
 TEST(Trail, LosesItsLoops) {
   Trail trail;
   const auto go = [&](const Vector3d& from, const Vector3d& to) {
