@@ -233,6 +233,29 @@ TEST(Rest, TheLeastHarmCanBeFlown) {
   EXPECT_GT(uncertified, 10);
 }
 
+// From within the hard radius of the ground it rises, out of it by when control wants it to be.
+TEST(Rest, OutOfTheGroundInTime) {
+  const PlannerConfig config;
+  for (const double slope : {0.0, 0.15}) {
+    PlanRequest request = Uphill(slope);
+    request.start.v.setZero();
+    request.start.p = {0.0, 0.0, 0.5};
+    const PlanResult plan = RestPlan(config, request);
+    EXPECT_EQ(plan.verdict, Verdict::kEscape) << plan.reason;
+    EXPECT_GE(plan.certified_clearance, 0.0);
+    ASSERT_FALSE(plan.proofs.empty());
+    for (const Proof& p : plan.proofs) EXPECT_TRUE(p.from > 0.0 && p.from <= 0.6);
+    double before = 0.0;
+    for (double tau = 0.0; tau <= 1.0; tau += 0.02) {
+      const Vector3d p =
+          plan.trajectory.Position(plan.trajectory.start + tau * plan.trajectory.duration);
+      const double above = (p.z() - slope * p.x()) / std::hypot(1.0, slope) - 0.3;
+      EXPECT_GE(above, tau < 0.6 ? before - 1e-9 : config.hard_radius() - 1e-6) << tau;
+      before = above;
+    }
+  }
+}
+
 // By the line to its centre a wide slab is far away until the body is in it.
 TEST(Rest, SinkingIntoAWideSlabItDoesNotFleeUp) {
   PlanRequest request;

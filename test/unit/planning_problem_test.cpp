@@ -210,6 +210,7 @@ TEST(Problem, MoreRoomIsTakenWhereThereIsSome) {
   const PlannerConfig c;
   Random g(7);
   int grown = 0, kept = 0;
+  Problem roomy;  // of the one before there is nothing left
   for (int i = 0; i < 100; ++i) {
     PlanRequest request = RandomRequest(g);
     request.target_body = request.obstacles.back();
@@ -220,7 +221,6 @@ TEST(Problem, MoreRoomIsTakenWhereThereIsSome) {
     }
     for (const double room : {0.0, 0.1}) {
       Enlargements memory;
-      Problem roomy;
       WithRoom(problem, room, &memory, &roomy);
       EXPECT_EQ(roomy.t0, problem.t0);
       EXPECT_EQ(roomy.duration, problem.duration);

@@ -207,6 +207,26 @@ TEST(Rungs, ThePlanSaysWhatItWasAskedForAndKeepsThat) {
   }
 }
 
+// What is said of margins is said of those that were asked for.
+TEST(Rungs, WhatGivesWayIsSaidWhereItDoes) {
+  PlannerConfig c = Config();
+  c.safety_margin = 0.1;
+  PlanRequest request = Walk();
+  const double off = c.hard_radius() + 0.6 * c.safety_margin;
+  world::Obstacle& pillar = request.obstacles.front();
+  pillar.center = world::Trajectory::Constant({-2.5, pillar.half.x() + off, 1.0}, request.t0, 1.0);
+  const size_t n = Ask(c, request, 1000).asked.size();
+  int said = 0, not_said = 0;
+  for (size_t i = 0; i < n; ++i) {
+    const auto [plan, asked] = Ask(c, request, i);
+    const bool half = asked.back().problem.sight_radius < c.sight_margin;
+    EXPECT_NEAR(Margin(c, asked.back()), 0.5 * c.safety_margin, 1e-12);
+    EXPECT_EQ(Says(plan, "starts within the margin of obstacle 5"), !half) << plan.reason;
+    ++(half ? not_said : said);
+  }
+  EXPECT_TRUE(said > 3 && not_said > 0);
+}
+
 // Where nothing is found it brakes, and says how much was looked at.
 TEST(Rungs, TheLastOneIsToBrake) {
   const PlannerConfig c = Config();
