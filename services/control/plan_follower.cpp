@@ -19,7 +19,7 @@ double YawDerivative(const Plan& plan, int order, double t) {
 
 /// Where t lies on the trajectory; at rest at its end.
 world::State OnWay(const world::Trajectory& way, double t) {
-  if (t < way.end()) return way.At(std::max(t, way.start));
+  if (t < way.end()) return way.At(t);
   world::State rest;
   rest.p = way.Position(way.end());
   return rest;
@@ -50,8 +50,8 @@ Reference Sample(const Plan& plan, double t) {
   }
   const world::Trajectory& way = plan.position;
   r.state = OnWay(way, t);
-  r.yaw = YawDerivative(plan, 0, std::clamp(t, way.start, way.end()));
-  r.yaw_rate = t < way.end() ? YawDerivative(plan, 1, std::max(t, way.start)) : 0.0;
+  r.yaw = YawDerivative(plan, 0, std::min(t, way.end()));
+  r.yaw_rate = t < way.end() ? YawDerivative(plan, 1, t) : 0.0;
   return r;
 }
 

@@ -46,7 +46,7 @@ class PlanFollower {
   std::vector<Plan> waiting_;  // by start
 };
 
-/// Reference of one plan at time t.
+/// Reference of one plan at time t, not before its start.
 Reference Sample(const Plan& plan, double t);
 
 /// When the plan is left for its stop, or ends at rest without one, s.
