@@ -211,7 +211,9 @@ TEST(PlanFollower, FliesTheStopInItsOwnTimeAndHoldsItsEnd) {
   for (const double t : {1.41, 2.0, 1000.0}) {
     const Reference r = Sample(plan, t);
     EXPECT_LT((r.state.p - plan.stop->Position(1.4)).norm(), 1e-12) << t;
-    EXPECT_LT(r.state.v.norm() + r.state.a.norm() + r.state.j.norm() + r.yaw_rate, 1e-12) << t;
+    EXPECT_LT(r.state.v.norm() + r.state.a.norm() + r.state.j.norm(), 1e-12) << t;
+    EXPECT_EQ(r.yaw_rate, 0.0) << t;
+    EXPECT_NEAR(r.yaw, Sample(plan, 1.4 - 1e-9).yaw, 1e-8) << t;
   }
 }
 
@@ -226,6 +228,7 @@ TEST(PlanFollower, ReferenceIsSmoothWhereThePlanIsLeft) {
     EXPECT_LT((at(t).state.a - a).norm(), 1e-3) << t;
     EXPECT_NEAR(at(t).yaw_rate, (at(t + h).yaw - at(t - h).yaw) / (2 * h), 1e-5) << t;
     EXPECT_LT((at(t + h).state.a - at(t - h).state.a).norm(), 0.01) << t;
+    EXPECT_LT(std::abs(at(t + 0.0101).yaw - at(t).yaw), 0.0101) << "no faster than the plan turns";
   }
 }
 
