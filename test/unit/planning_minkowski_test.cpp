@@ -289,6 +289,7 @@ TEST(Minkowski, PlansStayOffWhereSamplesSaySo) {
   constexpr double kBetween = 0.03;  // m: nearer between the samples
   int off = 0, on = 0, refused = 0, high = 0;
   for (unsigned seed = 1; seed <= 200; ++seed) {
+    c.safety_margin = seed % 2 ? 0.03 : 0.6;  // beyond what is kept of the line of sight
     Random random(seed, 81);
     PlanRequest request = RandomRequest(c, seed);
     request.obstacles.resize(std::min<size_t>(request.obstacles.size(), 1 + seed % 3));

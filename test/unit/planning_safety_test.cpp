@@ -127,6 +127,21 @@ TEST(Evasion, InsideOfWhatStandsItOnlyBrakes) {
   }
 }
 
+// As fast as is allowed and still faster soon: no way keeps the limit, and it brakes all the same.
+TEST(Evasion, WhereNoWayKeepsTheLimitsItGoesOnFromItsStart) {
+  const PlannerConfig config;
+  PlanRequest request = Hover();
+  request.start.v.x() = 0.99 * config.max_speed;
+  request.start.a.x() = 0.9 * config.max_acceleration;
+  ASSERT_FALSE(Brake(config, request));
+  const PlanResult plan = RestPlan(config, request);
+  EXPECT_EQ(plan.verdict, Verdict::kBrake) << plan.reason;
+  EXPECT_LT(plan.certified_clearance, 0.0);
+  EXPECT_LT((plan.trajectory.Velocity(request.t0) - request.start.v).norm(), 1e-9);
+  EXPECT_LT((plan.trajectory.Acceleration(request.t0) - request.start.a).norm(), 1e-9);
+  EXPECT_TRUE(world::EndsAtRest(plan.trajectory));
+}
+
 TEST(Evasion, AStartThatIsNotFiniteStaysWhereItIs) {
   PlanRequest request = Hover();
   request.t0 = 3.0;
