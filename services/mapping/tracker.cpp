@@ -224,7 +224,7 @@ std::vector<world::Obstacle> Tracker::Obstacles(double middle, double semi_heigh
   // that of the place: for kAhead s that is at most kAhead / 3 of the rate as a velocity's. With 1
   // s in its place walkers are beyond two deviations in 3.8 instead of 4.7 % after 1 s, and in
   // three crowds (1011 to 1013) 285 instead of 164 plans fall back.
-  constexpr double kAhead = 0.5;  // s
+  constexpr double kAhead = 1.0;  // s
   const double to_come =
       kAhead / 3.0 * config_.change_rate * config_.change_speed * config_.change_speed;
   const Eigen::Matrix3d level = Eigen::Vector3d(1.0, 1.0, 0.0).asDiagonal();

@@ -304,7 +304,7 @@ std::optional<PlanResult> Committed(const PlannerConfig& config, const PlanReque
   if (request.t0 >= request.stop->start) {
     auto stop = GoOn(config, request, *request.stop);
     if (!stop) return std::nullopt;
-    result.verdict = Verdict::kBrake;
+    result.verdict = LeavesObstacles(stop->proofs) ? Verdict::kEscape : Verdict::kBrake;
     result.reason = "on the stop of the plan before";
     result.trajectory = std::move(stop->trajectory);
     SetProofs(config, request, std::move(stop->proofs), &result);
@@ -319,7 +319,9 @@ std::optional<PlanResult> Committed(const PlannerConfig& config, const PlanReque
   auto stop = resting.Certified(ToCurve(*request.stop, request.stop->start, request.stop->duration),
                                 request.stop->duration);
   if (!stop) return std::nullopt;
-  result.verdict = Verdict::kSafeOnly;
+  result.verdict = LeavesObstacles(rest->proofs) || LeavesObstacles(stop->proofs)
+                       ? Verdict::kEscape
+                       : Verdict::kSafeOnly;
   result.reason = "the running plan until its stop";
   result.trajectory = std::move(rest->trajectory);
   SetProofs(config, request, std::move(rest->proofs), &result);

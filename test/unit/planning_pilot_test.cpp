@@ -393,29 +393,34 @@ TEST(Pilot, ShortForecastsAreUsedAndBrokenOnesAreSurvived) {
   }
 }
 
-// Not asked for longer than its plan takes it is where that ends, at rest.
-TEST(Pilot, AfterItsPlanIsOverItGoesOnFromItsEnd) {
-  Flight flight{PlanningConfig()};
+// Not asked for longer than the stop of its plan takes it is where that ends, at rest.
+TEST(Pilot, AfterItsPlanIsOverItGoesOnFromTheEndOfItsStop) {
+  const PlanningConfig config;
+  Flight flight{config};
   flight.Run(4.0, false);
   flight.Run(4.0, true);
   const PlanResult before = flight.pilot.running();
-  const double t = before.trajectory.end() + 0.5;
-  const Eigen::Vector3d end = before.trajectory.Position(before.trajectory.end());
-  for (const double off : {0.0, 0.6, 0.8}) {
-    Flight again{PlanningConfig()};
+  ASSERT_TRUE(before.stop);
+  const world::Trajectory &plan = before.trajectory, &stop = *before.stop;
+  const double t = std::max(stop.end(), plan.end()) + 0.5;
+  const Eigen::Vector3d end = stop.Position(stop.end());
+  const YawStart left = YawAt(before.yaw, (stop.start - plan.start) / plan.duration, plan.duration);
+  const double yaw = left.yaw + 0.5 * stop.duration * left.rate;
+  for (const double off : {0.0, 0.1, 0.15}) {
+    Flight again{config};
     again.Run(4.0, false);
     again.Run(4.0, true);
     const BodyEstimate body{end + Eigen::Vector3d(0.0, off, 0.0), {0.0, 0.1, 0.0}, 0.3};
     again.pilot.SetObstacles(t, {});
-    const auto plan = again.pilot.Update(t, body);
-    ASSERT_TRUE(plan);
-    const world::State s = plan->trajectory.At(plan->trajectory.start);
-    const bool far = off > PlanningConfig().reset_threshold;
-    EXPECT_LT((s.p - (far ? body.p : end)).norm(), 1e-6) << off;
+    const auto next = again.pilot.Update(t, body);
+    ASSERT_TRUE(next);
+    const world::State s = next->trajectory.At(next->trajectory.start);
+    const bool far = off > config.planner.tracking_tube;
+    const Eigen::Vector3d ahead = body.p + config.latency * body.v;
+    EXPECT_LT((s.p - (far ? ahead : end)).norm(), 1e-6) << off;
     EXPECT_LT((s.v - (far ? body.v : Eigen::Vector3d(0, 0, 0))).norm(), 1e-6) << off;
     EXPECT_LT(s.a.norm() + s.j.norm(), 1e-6) << off;
-    const double yaw = YawAt(before.yaw, 1.0, before.trajectory.duration).yaw;
-    EXPECT_NEAR(YawAt(plan->yaw, 0.0, plan->trajectory.duration).yaw, far ? 0.3 : yaw, 1e-6);
+    EXPECT_NEAR(YawAt(next->yaw, 0.0, next->trajectory.duration).yaw, far ? 0.3 : yaw, 1e-6);
   }
 }
 

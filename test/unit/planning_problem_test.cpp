@@ -281,7 +281,7 @@ TEST(Problem, NothingOfAnEarlierOneStays) {
     if (i % 5 == 0) request.obstacles.resize(g() % 5);
     used.reach = Box{Eigen::Array3d::Zero(), Eigen::Array3d::Zero()};
     used.skeletons = {{Vector3d::Zero()}};
-    MakeProblem(c, request, nullptr, &used);
+    MakeProblem(c, request, request, nullptr, &used);
     const Problem fresh = MakeProblem(c, request, nullptr);
     EXPECT_FALSE(used.reach);
     EXPECT_TRUE(used.skeletons.empty());
