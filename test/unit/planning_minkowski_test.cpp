@@ -372,6 +372,30 @@ TEST(Minkowski, PlansStayOffWhereSamplesSaySo) {
   EXPECT_LE(refused, off / 20);
 }
 
+/// What the highest power alone leads a plan into, or a target behind, is near.
+TEST(Minkowski, HighPowersAreNotLeftOut) {
+  const PlannerConfig c;
+  PlanRequest request;
+  request.start.p = {0.0, 0.0, 1.5};
+  request.target = world::Trajectory::Constant({0.0, 2.5, 1.5}, 0.0, request.horizon);
+  world::Obstacle pillar;
+  pillar.solid = world::Obstacle::Solid::kCylinder;
+  pillar.half = {0.3, 0.3, 2.0};
+  pillar.shape = (2.0 * pillar.half.cwiseAbs2()).cwiseInverse().asDiagonal();
+  pillar.center = world::Trajectory::Constant({5.0, 1.25, 1.0}, 0.0, 1.0);
+  request.obstacles = {pillar};
+  Curve still = Curve::Zero(9, 3), away = Curve::Zero(9, 3);
+  still.row(0) = request.start.p.transpose();
+  away.row(0) = request.start.p.transpose();
+  away.row(8) << 5.0, 1.25, 0.0;
+  EXPECT_TRUE(StaysOff(still, MakeProblem(c, request, nullptr), 0.0));
+  EXPECT_FALSE(StaysOff(away, MakeProblem(c, request, nullptr), 1.0));
+  request.target.coefficients = Eigen::MatrixXd::Zero(9, 3);
+  request.target.coefficients.row(0) << 0.0, 2.5, 1.5;
+  request.target.coefficients.row(8) << 10.0, 0.0, 0.0;
+  EXPECT_FALSE(StaysOff(still, MakeProblem(c, request, nullptr), 0.0));
+}
+
 /// Gap of the way's ball, or of its hull with the target's, at tau.
 double Gap(const world::Ball& drone, const world::Ball* target, const world::Body& body,
            double tau) {

@@ -39,9 +39,21 @@ world::Obstacle Wall(int id, double x, double speed) {
   return o;
 }
 
-/// From the cylinder's or the box's surface, negative inside.
+/// A ball so large that nearly it is the wall.
+world::Obstacle Ball(int id, double x, double speed) {
+  constexpr double kRadius = 30.0;
+  world::Obstacle o = Wall(id, x - std::copysign(kRadius, speed), speed);
+  o.center.coefficients(0, 2) = 1.4;
+  o.solid = world::Obstacle::Solid::kEllipsoid;
+  o.half.setConstant(kRadius);
+  o.shape = o.half.cwiseAbs2().cwiseInverse().asDiagonal();
+  return o;
+}
+
+/// From the surface, negative inside.
 double Distance(const world::Obstacle& o, const Vector3d& p, double t) {
   const Vector3d d = p - o.center.Position(t);
+  if (o.solid == world::Obstacle::Solid::kEllipsoid) return d.norm() - o.half.x();
   const bool box = o.solid == world::Obstacle::Solid::kBox;
   const Vector3d beyond =
       box ? Vector3d(d.cwiseAbs() - o.half)
@@ -97,9 +109,11 @@ TEST(Evasion, WhatCannotBeBrakedForIsEvadedAndCertified) {
 
 TEST(Evasion, WhereNothingCanBeCertifiedTheContactComesLaterThanAtRest) {
   const PlannerConfig config;
-  for (const double speed : {2.0, 4.0, -3.0}) {
+  for (int i = 0; i < 6; ++i) {
+    const double speed = std::vector<double>{2.0, 4.0, -3.0}[static_cast<size_t>(i % 3)];
     PlanRequest request = Hover();
-    request.obstacles = {Wall(1, request.start.p.x() - 0.5 * speed, speed)};
+    const double x = request.start.p.x() - 0.5 * speed;
+    request.obstacles = {i < 3 ? Wall(1, x, speed) : Ball(1, x, speed)};
     const PlanResult plan = RestPlan(config, request);
     EXPECT_EQ(plan.verdict, Verdict::kBrake) << plan.reason;
     EXPECT_LT(plan.certified_clearance, 0.0);
