@@ -315,59 +315,62 @@ TEST(Pilot, NoPlanReachesBeyondTheForecast) {
 
 // As far as the forecast is uncertain, plans keep off its body and sight allows for it.
 TEST(Pilot, TheForecastsUncertaintyAndBodyReachThePlan) {
-  PlanningConfig config;
-  config.planner.min_distance = 0.0;
-  config.planner.desired_distance = 0.5;
-  Flight flight{config};
-  flight.Run(4.0, false);
-  world::Obstacle pillar;
-  pillar.id = 4;
-  pillar.solid = world::Obstacle::Solid::kCylinder;
-  pillar.half = {0.2, 0.2, 3.0};
-  pillar.shape = (2.0 * pillar.half.cwiseAbs2()).cwiseInverse().asDiagonal();
-  pillar.center = world::Trajectory::Constant({flight.t + 2.5, 4.0, 1.0}, flight.t, 1.0);
-  flight.pilot.SetObstacles(flight.t, {pillar});
-  Forecast forecast = Walking(flight.t);
-  forecast.target.coefficients << 2.5, 0.0, 0.85, -2.5, 0.0, 0.0;
-  forecast.sigma = 0.1;
-  forecast.speed_sigma = 0.05;
-  forecast.radius = 0.3;
-  forecast.height = 1.7;
-  flight.pilot.SetForecast(forecast);
-  const auto plan = flight.pilot.Update(flight.t, flight.Body());
-  ASSERT_TRUE(plan);
-  ASSERT_GE(plan->certified_clearance, 0.0) << plan->reason;
-  const PlannerConfig& c = config.planner;
-  const auto distance = [&](const world::Trajectory& way, double t) {
-    const Eigen::Vector3d d = way.Position(t) - forecast.target.Position(t);
-    return std::hypot(std::max(0.0, d.head<2>().norm() - forecast.radius),
-                      std::max(0.0, std::abs(d.z()) - 0.5 * forecast.height));
-  };
-  for (double t = plan->trajectory.start; t <= plan->trajectory.end(); t += 0.02) {
-    const double since = t - forecast.t;
-    const double deviations = c.sigmas * std::hypot(forecast.sigma, since * forecast.speed_sigma);
-    EXPECT_GE(distance(plan->trajectory, t), c.hard_radius() + deviations - 1e-3) << since;
+  for (const double sigma : {0.1, 0.3}) {
+    PlanningConfig config;
+    config.planner.min_distance = 0.0;
+    config.planner.desired_distance = 0.5;
+    Flight flight{config};
+    flight.Run(4.0, false);
+    world::Obstacle pillar;
+    pillar.id = 4;
+    pillar.solid = world::Obstacle::Solid::kCylinder;
+    pillar.half = {0.2, 0.2, 3.0};
+    pillar.shape = (2.0 * pillar.half.cwiseAbs2()).cwiseInverse().asDiagonal();
+    pillar.center = world::Trajectory::Constant({flight.t + 2.5, 4.0, 1.0}, flight.t, 1.0);
+    flight.pilot.SetObstacles(flight.t, {pillar});
+    Forecast forecast = Walking(flight.t);
+    forecast.target.coefficients << 2.5, 0.0, 0.85, -2.5, 0.0, 0.0;
+    forecast.sigma = sigma;
+    forecast.speed_sigma = 0.05;
+    forecast.radius = 0.3;
+    forecast.height = 1.7;
+    flight.pilot.SetForecast(forecast);
+    const auto plan = flight.pilot.Update(flight.t, flight.Body());
+    ASSERT_TRUE(plan);
+    ASSERT_GE(plan->certified_clearance, 0.0) << plan->reason;
+    const PlannerConfig& c = config.planner;
+    const auto distance = [&](const world::Trajectory& way, double t) {
+      const Eigen::Vector3d d = way.Position(t) - forecast.target.Position(t);
+      return std::hypot(std::max(0.0, d.head<2>().norm() - forecast.radius),
+                        std::max(0.0, std::abs(d.z()) - 0.5 * forecast.height));
+    };
+    for (double t = plan->trajectory.start; t <= plan->trajectory.end(); t += 0.02) {
+      const double since = t - forecast.t;
+      const double deviations = c.sigmas * std::hypot(forecast.sigma, since * forecast.speed_sigma);
+      EXPECT_GE(distance(plan->trajectory, t), c.hard_radius() + deviations - 1e-3) << since;
+    }
+    // Until the stop begins, and along it, the target manoeuvres, too.
+    const world::Manoeuvre manoeuvre{config.target_acceleration, config.target_memory};
+    const auto deviation = [&](double since) {
+      const double v = since * forecast.speed_sigma;
+      return std::sqrt(forecast.sigma * forecast.sigma + v * v + manoeuvre.Variance(since));
+    };
+    ASSERT_TRUE(plan->stop);
+    for (double t = plan->trajectory.start; t <= plan->stop->end(); t += 0.02) {
+      const world::Trajectory& way = t < plan->stop->start ? plan->trajectory : *plan->stop;
+      EXPECT_GE(distance(way, t), c.hard_radius() + c.sigmas * deviation(t - forecast.t) - 1e-3)
+          << t;
+    }
+    int sights = 0;
+    for (const Proof& p : plan->proofs) {
+      if (!p.of_sight) continue;
+      ++sights;
+      EXPECT_GE(p.target_radius[0], c.sight_margin + c.sigmas * forecast.sigma - 1e-9);
+      EXPECT_GE(p.target_radius.sum(),
+                c.sight_margin + c.sigmas * deviation(plan->trajectory.duration) - 1e-9);
+    }
+    EXPECT_EQ(sights, 1) << sigma;
   }
-  // Until the stop begins, and along it, the target manoeuvres, too.
-  const world::Manoeuvre manoeuvre{config.target_acceleration, config.target_memory};
-  const auto sigma = [&](double since) {
-    const double v = since * forecast.speed_sigma;
-    return std::sqrt(forecast.sigma * forecast.sigma + v * v + manoeuvre.Variance(since));
-  };
-  ASSERT_TRUE(plan->stop);
-  for (double t = plan->trajectory.start; t <= plan->stop->end(); t += 0.02) {
-    const world::Trajectory& way = t < plan->stop->start ? plan->trajectory : *plan->stop;
-    EXPECT_GE(distance(way, t), c.hard_radius() + c.sigmas * sigma(t - forecast.t) - 1e-3) << t;
-  }
-  int sights = 0;
-  for (const Proof& p : plan->proofs) {
-    if (!p.of_sight) continue;
-    ++sights;
-    EXPECT_GE(p.target_radius[0], c.sight_margin + c.sigmas * forecast.sigma - 1e-9);
-    EXPECT_GE(p.target_radius.sum(),
-              c.sight_margin + c.sigmas * sigma(plan->trajectory.duration) - 1e-9);
-  }
-  EXPECT_EQ(sights, 1);
 }
 
 // A forecast that is nearly over is worth a second; one that is no number is worth nothing.
