@@ -360,16 +360,18 @@ PlanResult Pilot::Search(double t0, const Start& start, const BodyEstimate& body
 }
 
 // Braking while it moves; else where it is, for as long as that can be certified.
-// Without new lists moving obstacles are left out: their forecasts' uncertainty grows until it
-// covers every place, and fleeing from it leads into space that nobody observes.
+// Without new lists moving obstacles are left out and what stands is where it was listed:
+// uncertainty would grow until it covers every place, and fleeing from it leads into space that
+// nobody observes.
 PlanResult Pilot::Rest(double t0, const Start& start) const {
   const bool sees = SeesObstacles(t0 - config_.latency);
   PlanRequest request = Request(t0, start);
   std::vector<world::Obstacle>& listed = request.obstacles;
-  if (!sees)
-    listed.erase(
-        std::remove_if(listed.begin(), listed.end(), [](const auto& o) { return o.moving; }),
-        listed.end());
+  if (!sees) {
+    const auto moves = [](const world::Obstacle& o) { return o.moving; };
+    listed.erase(std::remove_if(listed.begin(), listed.end(), moves), listed.end());
+    for (world::Obstacle& o : listed) o.velocity_covariance.setZero();
+  }
   PlanResult plan = RestPlan(config_.planner, request);
   plan.yaw = {start.yaw.yaw};
   if (plan.reason.empty() && IsAtRest(start.state)) plan.verdict = Verdict::kWait;

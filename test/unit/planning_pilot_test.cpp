@@ -280,6 +280,27 @@ TEST(Pilot, WithoutObstaclesItBrakesAndFleesFromNobody) {
   EXPECT_LT(flight.plans.back().certified_clearance, 0.0);
 }
 
+// The list is outdated, and what stands is less and less certain as the pose is: that is nothing to
+// climb away from.
+TEST(Pilot, OldObstaclesAreNotFledFrom) {
+  Pilot pilot{PlanningConfig()};
+  pilot.SetFlying(true);
+  world::Obstacle wall;
+  wall.solid = world::Obstacle::Solid::kBox;
+  wall.half = {0.1, 3.0, 2.0};
+  wall.shape = (3.0 * wall.half.cwiseAbs2()).cwiseInverse().asDiagonal();
+  wall.center = world::Trajectory::Constant({0.6, 0.0, 1.0}, 0.0, 100.0);
+  BodyEstimate body{{0.0, 0.0, 1.0}, Eigen::Vector3d::Zero(), 0.0};
+  for (double t = 0.0; t < 5.0; t += kPeriod) {
+    if (t < 0.5) pilot.SetObstacles(t, {wall});
+    if (t > 1.0) body.velocity_covariance = 0.5 * t * Eigen::Matrix3d::Identity();
+    const auto plan = pilot.Update(t, body);
+    if (!plan || t < 0.9) continue;
+    EXPECT_LT((plan->trajectory.Position(plan->trajectory.end()) - body.p).norm(), 0.01)
+        << t << " " << plan->reason;
+  }
+}
+
 TEST(Pilot, NothingOfAnotherFrameIsPlannedWith) {
   Flight flight{PlanningConfig()};
   flight.Run(4.0, false);
