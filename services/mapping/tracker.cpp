@@ -221,9 +221,9 @@ bool Tracker::Moves(int id) const {
 std::vector<world::Obstacle> Tracker::Obstacles(double middle, double semi_height,
                                                 double grow) const {
   // Changes of velocity to come, `change_rate` a second, add rate t^3 / 3 times their variance to
-  // that of the place: for kAhead s that is at most kAhead / 3 of the rate as a velocity's. With 1
-  // s in its place walkers are beyond two deviations in 3.8 instead of 4.7 % after 1 s, and in
-  // three crowds (1011 to 1013) 285 instead of 164 plans fall back.
+  // that of the place: for kAhead s that is at most kAhead / 3 of the rate as a velocity's. With
+  // half a second walkers are beyond two deviations in 4.7 instead of 3.8 % after 1 s, and in three
+  // crowds (1011 to 1013) 164 instead of 285 plans fall back.
   constexpr double kAhead = 1.0;  // s
   const double to_come =
       kAhead / 3.0 * config_.change_rate * config_.change_speed * config_.change_speed;
