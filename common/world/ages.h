@@ -4,18 +4,23 @@ namespace chase::world {
 
 /// How old an input may be before whoever needs it does without, s, and what is done then.
 struct MostAge {
-  double obstacles = 0.3;  ///< planning: brakes and hovers, uncertified; mission: not ready
-  double pose = 0.1;       ///< control: brakes by dead reckoning, also when poses come later than
-                           ///< usual by this; silent after `velocity`; mission: not ready
-  double velocity = 2.0;   ///< control: since its deviation was 0.1 m/s; brakes until then, then
-                           ///< lands; mission: EMERGENCY
-  double target = 0.5;     ///< mission: not ready, in flight lost; ten frames of the camera
-  double status = 2.5;     ///< mission: not ready; two that are sent once a second may be lost
+  double sweeps = 0.19;     ///< odometry: since the last that matched; POSE is DEGRADED, without
+                            ///< LiDAR soon LOST; mapping falls silent with them
+  double obstacles = 0.3;   ///< UNSEEN too. planning: brakes and hovers, uncertified; mission: not
+                            ///< ready
+  double prediction = 1.4;  ///< planning: there is no target, it is looked for
+  double pose = 0.1;        ///< control: brakes by dead reckoning, also when poses come later than
+                            ///< usual by this; silent after `velocity`; mission: not ready
+  double velocity = 2.0;    ///< control: since its deviation was 0.1 m/s; brakes until then, then
+                            ///< lands; mission: EMERGENCY
+  double target = 0.5;      ///< mission: not ready, in flight lost; ten frames of the camera
+  double status = 2.5;      ///< mission: not ready; two that are sent once a second may be lost
   double flight_state = 2.0;  ///< planning: holds where it chased, searched or returned; a process
                               ///< that died is back within that
-  double landing_plan =
-      2.0;                ///< control: comes down where it is without a plan that was made to land
-  double command = 10.0;  ///< mission: refused; chase-command repeats for half of that
+  double setpoint = 0.5;      ///< fcu: leaves the vehicle to the autopilot, whose own limit is 1 s
+  double attitude = 0.5;  ///< fcu: of the autopilot; no position is sent to it, nothing is armed
+  double landing_plan = 2.0;  ///< control: comes down where it is without a plan made to land
+  double command = 10.0;      ///< mission: refused; chase-command repeats for half of that
 };
 inline constexpr MostAge kMostAge;
 

@@ -1,55 +1,36 @@
 #include "common/world/column.h"
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+
+#include "common/world/separation.h"
 
 namespace chase::world {
 namespace {
 
-/// Is the surface of a box or an upright cylinder nearer to x than `radius`, or x inside?
-bool IsNear(const Obstacle& o, const Eigen::Vector3d& x, double radius) {
-  const Eigen::Vector3d d = x - o.center.Position(o.center.start);
-  Eigen::Vector3d beyond;
-  if (o.solid == Obstacle::Solid::kBox)
-    beyond = (o.axes.conjugate() * d).cwiseAbs() - o.half;
-  else
-    beyond = {d.head<2>().norm() - o.half.x(), 0.0, std::abs(d.z()) - o.half.z()};
-  return beyond.cwiseMax(0.0).norm() < radius;
-}
-
 /// Half the sides of the level box around it, m.
-Eigen::Array3d Extent(const Obstacle& o) {
-  if (o.solid == Obstacle::Solid::kBox) return o.axes.toRotationMatrix().cwiseAbs() * o.half;
-  if (o.solid == Obstacle::Solid::kCylinder) return o.half;
-  return o.shape.inverse().diagonal().array().sqrt();
-}
-
-/// Do the boxes around solid and column overlap?
-bool MayReach(const Obstacle& o, const Eigen::Vector3d& p, double radius, double height) {
-  const Eigen::Array3d half = Extent(o) + radius;
-  const Eigen::Array3d d = p - o.center.Position(o.center.start);
-  return std::abs(d.x()) <= half.x() && std::abs(d.y()) <= half.y() && d.z() <= half.z() &&
-         d.z() + height >= -half.z();
+Eigen::Array3d Extent(const Body& body) {
+  Eigen::Array3d half;
+  for (int a = 0; a < 3; ++a) half[a] = std::abs(SupportPoint(body, Eigen::Vector3d::Unit(a))[a]);
+  return half;
 }
 
 }  // namespace
 
 bool IsColumnBlocked(const std::vector<Obstacle>& obstacles, const Eigen::Vector3d& p,
                      double radius, double height) {
-  constexpr double kStep = 0.05;  // m: a sphere of 0.25 m between two places misses 1 mm
-  const int steps = static_cast<int>(std::ceil(height / kStep));
+  Ball climb;
+  climb.center.resize(2, 3);
+  climb.center << p.transpose(), 0.0, 0.0, height;
+  climb.radius = math::Polynomial::Constant(1, radius);
   return std::any_of(obstacles.begin(), obstacles.end(), [&](const Obstacle& o) {
-    if (o.ground || !MayReach(o, p, radius, height)) return false;
-    const bool ellipsoid = o.solid == Obstacle::Solid::kEllipsoid;
-    Obstacle grown = o;
-    if (ellipsoid) grown.shape = Inflated(o.shape, radius);
-    for (int i = 1; i <= steps; ++i) {
-      const Eigen::Vector3d x = p + height * i / steps * Eigen::Vector3d::UnitZ();
-      if (ellipsoid ? grown.SquaredDistance(x, o.center.start) < 1.0 : IsNear(o, x, radius))
-        return true;
-    }
-    return false;
+    if (o.ground) return false;
+    const Body body = MakeBody(o, o.center.start, 0.0, 0.0);
+    const Eigen::Array3d half = Extent(body) + radius;
+    const Eigen::Array3d d = p.array() - body.center.row(0).transpose().array();
+    const bool beside =
+        (d.abs() > half).head<2>().any() || d.z() > half.z() || d.z() + height < -half.z();
+    return !beside && Separate(climb, nullptr, body).kept != Kept::kOff;
   });
 }
 

@@ -36,7 +36,8 @@ struct Obstacle {
 double SegmentSquaredDistance(const Eigen::Vector3d& p, const Eigen::Vector3d& q,
                               const Eigen::Vector3d& c, const Eigen::Matrix3d& R);
 
-/// The ellipsoid grown by `margin` m along each principal axis (encloses the Minkowski sum's axes).
+/// The ellipsoid grown by `margin` m along each principal axis: within the Minkowski sum with a
+/// ball, so it sorts out what is too near, and proves nothing.
 Eigen::Matrix3d Inflated(const Eigen::Matrix3d& R, double margin);
 
 /// The same for many margins: axes and radii are worked out once.

@@ -15,7 +15,6 @@ namespace {
 constexpr int64_t kHeartbeatPeriod = 1'000'000;  // us
 constexpr int64_t kTimesyncPeriod = 100'000;     // us: PX4's own rate
 constexpr std::size_t kTimeRequests = 20;        // on their way: 2 s
-constexpr double kAttitudeAge = 0.5;             // s; it comes at 50 Hz
 constexpr double kWarningAge = 10.0;             // s in which a text explains a refusal
 
 int64_t Period(double rate) { return static_cast<int64_t>(std::llround(1e6 / rate)); }
@@ -123,7 +122,7 @@ void Bridge::TakeFrame(int64_t now) {
   double turn = 0.0;
   if (autopilot_.armed() && !autopilot_.on_ground(now)) {
     const auto& attitude = autopilot_.attitude();
-    if (!attitude || Seconds(attitude->utime, now) > kAttitudeAge) return;
+    if (!attitude || Seconds(attitude->utime, now) > world::kMostAge.attitude) return;
     turn = math::Yaw(attitude->R_WB * pose_->R_WB.conjugate());
     // Whoever begins anew in flight cannot tell a turn from what the autopilot is off.
     if (!frame_ && std::abs(turn) <= config_.attitude_gate_deg * M_PI / 180.0) turn = 0.0;
@@ -162,7 +161,7 @@ std::string Bridge::PoseProblem(int64_t now) const {
 
 std::string Bridge::AttitudeProblem(int64_t now) const {
   const auto& attitude = autopilot_.attitude();
-  if (!attitude || Seconds(attitude->utime, now) > kAttitudeAge)
+  if (!attitude || Seconds(attitude->utime, now) > world::kMostAge.attitude)
     return "the autopilot does not tell its attitude";
   const double degrees = attitude->R_WB.angularDistance(pose_->R_WB) * 180.0 / M_PI;
   if (degrees <= config_.attitude_gate_deg) return "";

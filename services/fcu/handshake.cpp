@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include "common/world/ages.h"
+
 namespace chase::fcu {
 namespace {
 
@@ -9,7 +11,6 @@ using State = Handshake::State;
 
 // PX4 wants more than 2 Hz for a second before OFFBOARD (docs.px4.io, Offboard Mode).
 constexpr double kStreamBefore = 1.2;  // s
-constexpr double kSilent = 0.5;        // s without a setpoint in flight; PX4's COM_OF_LOSS_T is 1.0
 constexpr double kWithdrawn = 2.0;     // s without a setpoint: the next one is another flight's
 constexpr double kHeartbeat = 1.2;     // s in which the autopilot has told its state once more
 constexpr double kLateArming = 10.0;   // s after asking in which arming is still our doing
@@ -60,7 +61,7 @@ struct HandshakeTable {
   static bool Down(H h) { return h.facts_.motors_off && h.facts_.on_ground; }
   static bool OffInTheAir(H h) { return h.facts_.motors_off && !h.facts_.on_ground; }
   static bool Blind(H h) { return h.facts_.blind; }
-  static bool Ceased(H h) { return h.WithoutWish() >= kSilent; }
+  static bool Ceased(H h) { return h.WithoutWish() >= world::kMostAge.setpoint; }
   /// Not before an arming on its way would have been heard of.
   static bool Killed(H h) { return Disarmed(h) && h.InState() >= kHeartbeat; }
   static bool OnGround(H h) { return h.facts_.on_ground; }

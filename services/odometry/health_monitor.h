@@ -2,18 +2,19 @@
 
 #include <string>
 
+#include "common/world/ages.h"
 #include "services/odometry/scan_matcher.h"
 
 namespace chase::odometry {
 
 struct HealthConfig {
-  double degraded_after = 0.19;  ///< since the last good sweep, s
-  double imu_gap = 0.05;         ///< s
-  double late_sweep = 0.045;     ///< a sweep that ends this long away from the newest sample, s
-  double lost_sigma = 0.5;       ///< standard deviation of the position without sweeps, m
-  double lost_speed = 0.5;       ///< standard deviation of the velocity, m/s
-  double usual_nis = 4.0;        ///< running mean, per direction
-  double dropped_share = 0.2;    ///< of the usual number of returns
+  double degraded_after = world::kMostAge.sweeps;  ///< since the last good sweep, s
+  double imu_gap = 0.05;                           ///< s
+  double late_sweep = 0.045;   ///< a sweep that ends this long away from the newest sample, s
+  double lost_sigma = 0.5;     ///< standard deviation of the position without sweeps, m
+  double lost_speed = 0.5;     ///< standard deviation of the velocity, m/s
+  double usual_nis = 4.0;      ///< running mean, per direction
+  double dropped_share = 0.2;  ///< of the usual number of returns
 
   template <class V>
   void Visit(V& v) {

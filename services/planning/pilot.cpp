@@ -1,6 +1,5 @@
 #include "services/planning/pilot.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
@@ -62,15 +61,6 @@ std::optional<world::Obstacle> TargetBody(const Forecast& f) {
   return body;
 }
 
-// What stands seems to move when the frame drifts. The tube holds what adds up until a stop begins.
-Eigen::Matrix3d BeyondTube(const Eigen::Matrix3d& covariance, const PlannerConfig& c) {
-  if (!covariance.allFinite() || !(c.sigmas > 0.0)) return Eigen::Matrix3d::Zero();
-  const double held = c.tracking_tube / (c.sigmas * kOverdue);
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(covariance);
-  const Eigen::Vector3d rest = (eigen.eigenvalues().array() - held * held).max(0.0);
-  return eigen.eigenvectors() * rest.asDiagonal() * eigen.eigenvectors().transpose();
-}
-
 bool IsFinite(const PlanResult& plan) {
   if (!plan.trajectory.coefficients.allFinite()) return false;
   return std::all_of(plan.yaw.begin(), plan.yaw.end(), [](double y) { return std::isfinite(y); });
@@ -127,7 +117,7 @@ bool Pilot::SeesObstacles(double t) const {
 }
 
 bool Pilot::HasTarget(double t) const {
-  return forecast_ && forecast_->has_target && t - forecast_->t < config_.stale_prediction;
+  return forecast_ && forecast_->has_target && t - forecast_->t < world::kMostAge.prediction;
 }
 
 bool Pilot::IsDue(double t) const {
@@ -146,7 +136,7 @@ bool Pilot::MayPlan(double t) const {
 }
 
 std::optional<PlanResult> Pilot::Update(double t, const BodyEstimate& body) {
-  drift_ = BeyondTube(body.velocity_covariance, config_.planner);
+  drift_ = body.velocity_covariance;
   const double t0 = t + config_.latency;
   const Start start = StartAt(t, t0, body);
   if (!first_update_) first_update_ = t;
@@ -210,7 +200,8 @@ PlanRequest Pilot::Request(double t0, const Start& start) const {
   request.unseen = unseen_;
   if (start.follows && has_running_) request.stop = running_.stop;
   if (start.on_plan) request.running = running_.trajectory;  // off it, it is no way out
-  // What moves is measured, as the target is, in the frame that drifts.
+  // What stands seems to move when the frame drifts; what moves is measured in it, as the target
+  // is.
   for (world::Obstacle& o : request.obstacles)
     if (!o.moving) o.velocity_covariance += drift_;
   request.horizon = config_.horizon;

@@ -19,7 +19,6 @@ std::string PlanningConfig::Problem() const {
   if (!(min_period > 0.0)) below("min_period", min_period, "above 0 s");
   if (!(replan_period >= min_period)) below("replan_period", replan_period, "at least min_period");
   if (!(latency >= 0.0 && latency <= 0.5)) below("latency", latency, "0 to 0.5 s");
-  if (!(stale_prediction > 0.0)) below("stale_prediction", stale_prediction, "above 0 s");
   if (!(target_acceleration >= 0.0 && target_acceleration <= 20.0))
     below("target_acceleration", target_acceleration, "0 to 20 m/s^2");
   if (!(target_memory >= 0.05 && target_memory <= 60.0))

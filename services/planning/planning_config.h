@@ -13,7 +13,6 @@ struct PlanningConfig {
   double replan_period = 0.2;
   double min_period = 0.04;
   double latency = 0.04;
-  double stale_prediction = 1.4;
   double target_acceleration = 0.5;
   double target_memory = 0.5;
   double takeoff_height = 1.2;
@@ -31,7 +30,6 @@ struct PlanningConfig {
     v("replan_period", replan_period, "age at which a plan is renewed without other cause, s");
     v("min_period", min_period, "least time between plans, s");
     v("latency", latency, "a plan starts this long after the pose that triggered it, s");
-    v("stale_prediction", stale_prediction, "age at which a prediction counts as none, s");
     v("target_acceleration", target_acceleration,
       "standard deviation of what the forecast of the target does not foresee, per axis, m/s^2");
     v("target_memory", target_memory, "time constant of that acceleration, s");

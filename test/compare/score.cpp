@@ -3,7 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "services/planning/certificate.h"
+#include "common/world/separation.h"
+#include "services/planning/separations.h"
 
 namespace chase::compare {
 namespace {
@@ -146,20 +147,18 @@ void JudgeMotion(const Mission& mission, const Rollout& rollout, Score* score) {
 }
 
 bool IsProvedSafe(const Mission& mission, const Rollout& rollout) {
-  const auto shapes = mission.GrownShapes();
   for (size_t k = 0; k < rollout.replans.size(); ++k) {
     const double from = rollout.replans[k].t;
     const double to = k + 1 < rollout.replans.size() ? rollout.replans[k + 1].t : mission.duration;
     for (const world::Trajectory& piece : rollout.replans[k].flown) {
       const double a = std::max(from, piece.start), b = std::min(to, piece.end());
       if (b - a < 1e-9) continue;
-      const planning::Curve curve = planning::ToCurve(piece, a, b - a);
-      for (size_t j = 0; j < shapes.size(); ++j) {
-        planning::Ellipsoid e;
-        e.center = mission.obstacles[j].center.coefficients;
-        e.safety = e.sight = shapes[j];
-        if (!planning::IsSafe(curve, e, planning::Arithmetic::kCertified)) return false;
-      }
+      const world::Ball drone =
+          planning::DroneBall(planning::ToCurve(piece, a, b - a), mission.drone_radius);
+      for (const world::Obstacle& o : mission.obstacles)
+        if (world::Separate(drone, nullptr, world::MakeBody(o, a, b - a, 0.0)).kept !=
+            world::Kept::kOff)
+          return false;
     }
   }
   return true;

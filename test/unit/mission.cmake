@@ -1,4 +1,4 @@
-chase_test(mission_test LIBS mission_core
+chase_test(mission_test LIBS mission_core separation
   SOURCES ${CMAKE_CURRENT_LIST_DIR}/mission_states_test.cpp ${CMAKE_CURRENT_LIST_DIR}/mission_core_test.cpp
           ${CMAKE_CURRENT_LIST_DIR}/mission_commands_test.cpp ${CMAKE_CURRENT_LIST_DIR}/mission_envelope_test.cpp)
 chase_test(mission_node_test LIBS mission_node fcu_core

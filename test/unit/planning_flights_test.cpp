@@ -4,6 +4,7 @@
 #include <cmath>
 #include <functional>
 
+#include "common/world/ages.h"
 #include "common/world/plan_check.h"
 #include "common/world/random.h"
 #include "services/planning/pilot.h"
@@ -133,7 +134,7 @@ class Flown {
       counts->certified += plan.certified_clearance >= 0.0;
     }
     const bool sight = plan.verdict <= Verdict::kKept;
-    const double stale = course_.lost + config_.stale_prediction + kPeriod;
+    const double stale = course_.lost + world::kMostAge.prediction + kPeriod;
     const bool gone = t_ > stale && t_ < course_.found;
     EXPECT_FALSE(sight && gone) << t_;
     EXPECT_TRUE(sight || !plan.reason.empty()) << Name(plan.verdict);
