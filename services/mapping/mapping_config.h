@@ -2,6 +2,8 @@
 
 #include <string>
 
+#include "common/world/flight_volume.h"
+
 namespace chase::mapping {
 
 /// Local voxel grid: occupancy and free space around the drone.
@@ -44,9 +46,9 @@ struct GroundConfig {
 
 /// Decomposition of occupied columns into upright ellipsoids.
 struct StaticConfig {
-  double radius = 9.0;          ///< obstacles within this of the drone are listed, m
-  double band_low = 0.3;        ///< flight volume above the ground, m
-  double band_high = 3.9;       ///< the same, upper end: planner.z_max and its hard radius, m
+  double radius = 9.0;    ///< obstacles within this of the drone are listed, m
+  double band_low = 0.3;  ///< flight volume above the ground, m
+  double band_high = world::kFlightVolume.listed;  ///< the same, upper end, m
   double unseen = 3.0;          ///< unseen columns within this of the drone are listed, m
   double semi_height = 8.0;     ///< vertical semi-axis of the ellipsoids, m
   double max_length = 2.5;      ///< longest piece of a wall, m
@@ -58,7 +60,7 @@ struct StaticConfig {
   void Visit(V& v) {
     v("radius", radius, "obstacles within this of the drone are listed, m");
     v("band_low", band_low, "lower end of the flight volume above the ground, m");
-    v("band_high", band_high, "upper end of the flight volume above the ground, m");
+    v("band_high", band_high, "its upper end, m: z_max of planning and what of the body is above");
     v("unseen", unseen,
       "columns within this of the drone of which nothing was seen are listed, m: as far as it "
       "goes until it stands; 0: none");

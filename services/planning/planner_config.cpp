@@ -5,6 +5,10 @@
 #include <utility>
 
 namespace chase::planning {
+
+static_assert(PlannerConfig{}.z_max + PlannerConfig{}.drone_radius +
+                  PlannerConfig{}.tracking_tube <=
+              world::kFlightVolume.listed);
 namespace {
 
 std::string Say(const char* field, double value, const char* limit) {

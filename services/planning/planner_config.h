@@ -3,6 +3,8 @@
 #include <optional>
 #include <string>
 
+#include "common/world/flight_volume.h"
+
 namespace chase::planning {
 
 /// Edges of the image as tangents in the body's frame: below and above its level, and to either
@@ -39,8 +41,8 @@ struct PlannerConfig {
 
   double max_speed = 4.0;
   double max_acceleration = 6.0;
-  double z_min = 0.6;
-  double z_max = 3.5;
+  double z_min = world::kFlightVolume.low;
+  double z_max = world::kFlightVolume.high;
   double max_elevation_deg = 28.0;
   double view_down_deg = 37.5;
   double view_up_deg = 13.5;
@@ -84,7 +86,8 @@ struct PlannerConfig {
     v("max_speed", max_speed, "m/s; 0: no limit");
     v("max_acceleration", max_acceleration, "m/s^2; 0: no limit");
     v("z_min", z_min, "lowest height of a plan above the ground, m; z_min = z_max: no limits");
-    v("z_max", z_max, "greatest height of a plan above the ground, m");
+    v("z_max", z_max,
+      "greatest height of a plan above the ground, m; mapping lists up to statics.band_high");
     v("max_elevation_deg", max_elevation_deg, "of the target out of the level; 0: no limit");
     v("view_down_deg", view_down_deg,
       "the image's lower edge below the body's level, less what tilt and calibration may be off; "
