@@ -23,6 +23,7 @@ constexpr int kFewestEnds = 3;         // directions with an end in view that te
 constexpr double kRigid = 0.5;         // share of ends in view that move as those of one body
 constexpr double kSameSpeed = 0.5;     // m/s, difference of two tracks of one body
 constexpr double kDetected = 0.9;      // probability of a detection of what is in full view
+constexpr double kGlimpse = 1e-3;      // and of what seems hidden
 constexpr double kClutter = 0.005;  // 1/m^2 new clusters a sweep: five in the 18 m around the drone
 constexpr double kOwn = 20.0;       // likelihood ratio of what lies within a track's outline
 constexpr double kVague = 0.2;      // of returns there that show too few ends of a body
@@ -31,6 +32,11 @@ constexpr double kListed = 0.5;     // from which a track is listed
 constexpr double kDead = 0.25;      // below which a track ends
 constexpr double kLeast = 0.2;      // probability of an assignment
 constexpr size_t kMostTracks = 64;
+
+/// Of a detection.
+double Odds(double existence, double detection) {
+  return existence * detection / (1.0 - existence * detection);
+}
 
 void Shape(Track* track) {
   const Points2 corners = track->body.Outline();
@@ -145,12 +151,15 @@ void Tracker::Update(const Panorama& panorama, std::vector<Cluster>* clusters) {
   std::vector<track::Prior> priors;
   Eigen::MatrixXd ratio(tracks_.size(), clusters->size());
   for (size_t i = 0; i < tracks_.size(); ++i) {
-    priors.push_back({tracks_[i].existence, Detection(tracks_[i], panorama)});
+    const double r = tracks_[i].existence;
+    const double detection = std::max(kGlimpse, Detection(tracks_[i], panorama));
+    priors.push_back({r, detection});
     for (size_t j = 0; j < clusters->size(); ++j) {
       auto& entry = ratio(static_cast<int>(i), static_cast<int>(j));
       entry = Ratio(tracks_[i], (*clusters)[j]);
-      // What was seen could be seen, whatever else seems to hide the place.
-      if (entry > 1.0) priors[i].detection = kDetected;
+      // What is seen could be seen, whatever else seems to hide the place. Where it is another's
+      // that tells nothing of this track.
+      if (entry > 1.0) entry *= Odds(r, kDetected) / Odds(r, detection);
     }
   }
   const auto association = track::Associate(priors, ratio);
@@ -188,8 +197,8 @@ void Tracker::Unite() {
   for (size_t i = 0; i < tracks_.size(); ++i)
     for (size_t j = tracks_.size() - 1; j > i; --j) {
       if (!same(tracks_[i], tracks_[j]) && !same(tracks_[j], tracks_[i])) continue;
-      if (tracks_[j].seen > tracks_[i].seen) {  // the older id, the better place
-        if (tracks_[i].confirmed && !tracks_[j].confirmed) continue;
+      const bool known = tracks_[i].confirmed && !tracks_[j].confirmed;
+      if (!known && tracks_[j].seen > tracks_[i].seen) {  // the older id, the better place
         tracks_[j].id = tracks_[i].id;
         std::swap(tracks_[i], tracks_[j]);
       }

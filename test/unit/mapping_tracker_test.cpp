@@ -309,6 +309,23 @@ TEST(MappingTracker, WhatShowsNoEndIsNoSight) {
   }
 }
 
+/// One of two that walk side by side is hidden by a wall. The other one, near enough to be taken
+/// for it, is in view: that tells nothing of it.
+TEST(MappingTracker, WhatIsSeenOfAnotherTellsNothingOfWhatIsHidden) {
+  for (const double apart : {0.45, 0.5, 0.6}) {
+    Tracker tracker(MoverConfig{});
+    for (double t = 0.0; t < 3.0; t += 0.1) {
+      tracker.Predict(t);
+      const bool hidden = t > 1.45;
+      std::vector<Cluster> clusters = {BoxCluster({1.5 * t - 3.0, 0.0}, 0.2)};
+      if (!hidden) clusters.push_back(BoxCluster({1.5 * t - 3.0, apart}, 0.2));
+      tracker.Update(hidden ? Seen(-9.0) : Panorama(), &clusters);
+      if (t < 1.0) continue;
+      EXPECT_EQ(tracker.Obstacles(1.5, 8.0, 1.0).size(), 2u) << apart << " " << t;
+    }
+  }
+}
+
 TEST(MappingTracker, HalvesOfOneMoverAreOneTrack) {
   Tracker tracker(MoverConfig{});
   for (double t = 0.0; t < 3.0; t += 0.1) {
