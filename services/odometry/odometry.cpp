@@ -228,7 +228,7 @@ std::vector<Eigen::Vector3f> Odometry::Axes(const Prepared& prepared,
 
 Features Odometry::FeaturesIn(const Prepared& prepared,
                               const std::vector<Eigen::Vector3f>& points) const {
-  return {Picked(points, prepared.matched_planes), Axes(prepared, points)};
+  return {Picked(points, prepared.matched_planes), Axes(prepared, points), X_BL_.p.cast<float>()};
 }
 
 MatchResult Odometry::Match(Prepared* prepared) {
@@ -280,8 +280,9 @@ void Odometry::Learn(const Prepared& prepared, const Pose& X_WB) {
        i += static_cast<size_t>(config_.map_stride))
     planes.push_back(prepared.features.planes[i]);
   const FloatPose to_world(X_WB);
-  planes_.Add(Moved(to_world, Picked(prepared.at_end, planes)));
-  posts_.Add(Moved(to_world, Axes(prepared, prepared.at_end)));
+  const Eigen::Vector3f eye = to_world * Eigen::Vector3f(X_BL_.p.cast<float>());
+  planes_.Add(Moved(to_world, Picked(prepared.at_end, planes)), eye);
+  posts_.Add(Moved(to_world, Axes(prepared, prepared.at_end)), eye);
   planes_.Prune(X_WB.p.cast<float>());
   posts_.Prune(X_WB.p.cast<float>());
 }

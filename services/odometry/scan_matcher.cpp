@@ -39,8 +39,9 @@ struct ScanMatcher::System {
 /// stays within reach of the place where it was looked up keeps its surface.
 class ScanMatcher::Matched {
  public:
-  Matched(const std::vector<Eigen::Vector3f>& points, const SurfaceMap& map)
-      : points_(points), map_(map), queries_(points.size()) {}
+  Matched(const std::vector<Eigen::Vector3f>& points, const SurfaceMap& map,
+          const Eigen::Vector3f& eye)
+      : points_(points), map_(map), eye_(eye), queries_(points.size()) {}
 
   size_t size() const { return points_.size(); }
   Eigen::Vector3d p_B(size_t i) const { return points_[i].cast<double>(); }
@@ -54,12 +55,13 @@ class ScanMatcher::Matched {
       queries_[i].p = p_W;
       left.push_back(&queries_[i]);
     }
-    map_.Find(std::move(left));
+    map_.Find(std::move(left), eye_);
   }
 
  private:
   const std::vector<Eigen::Vector3f>& points_;
   const SurfaceMap& map_;
+  const Eigen::Vector3f eye_;  // frame W, m: as predicted
   std::vector<Query> queries_;
 };
 
@@ -163,7 +165,8 @@ MatchResult ScanMatcher::Match(const Features& features, const SurfaceMap& plane
   const double gate =
       std::clamp(config_.least_gate + 3.0 * uncertainty, config_.least_gate, config_.gate);
   double kernel = std::max(config_.kernel, gate);
-  Matched matched_planes(features.planes, planes), matched_posts(features.posts, posts);
+  const Eigen::Vector3f eye = (predicted * features.eye.cast<double>()).cast<float>();
+  Matched matched_planes(features.planes, planes, eye), matched_posts(features.posts, posts, eye);
   System system;
   std::vector<Row> rows;
   rows.reserve(features.planes.size() + features.posts.size());

@@ -34,7 +34,8 @@ struct MatchConfig {
 };
 
 struct Features {
-  std::vector<Eigen::Vector3f> planes, posts;  ///< frame B at the sweep's end, m
+  std::vector<Eigen::Vector3f> planes, posts;     ///< frame B at the sweep's end, m
+  Eigen::Vector3f eye = Eigen::Vector3f::Zero();  ///< where they were seen from, the same
 };
 
 struct MatchResult {

@@ -2,6 +2,7 @@
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <optional>
 
@@ -15,6 +16,10 @@ constexpr float kPlaneExtent = 0.20f;
 constexpr float kPlaneFlatness = 6.0f;  // variance along over variance across
 constexpr float kLineExtent = 0.15f;
 constexpr float kLineStraightness = 9.0f;
+
+// As CellKey leaves it free: of the face that is seen from behind a cell's first plane.
+constexpr uint64_t kBack = 1ull << 63;
+constexpr float kSigmas = 3.0f;
 
 // Floors and walls tend to lie at round distances from the origin. On the border of two cells, each
 // would learn the half of the noise that falls into it.
@@ -47,30 +52,49 @@ SurfaceMap::SurfaceMap(const MapConfig& config, SurfaceKind kind) : config_(conf
   }
 }
 
-size_t SurfaceMap::Level::CellOf(uint64_t key, const Eigen::Vector3f& p) {
+bool SurfaceMap::Fitted::IsHidden(const Eigen::Vector3f& eye) const {
+  const Eigen::Vector3f to_eye = eye - surface.center;
+  const float before = surface.direction.dot(to_eye);
+  return before < 0.0f && before * before > kSigmas * kSigmas * tilt * tilt * to_eye.squaredNorm();
+}
+
+size_t SurfaceMap::Level::FaceOf(uint64_t key, const Eigen::Vector3f& p) {
   bool added = false;
   const size_t cell = static_cast<size_t>(index.FindOrAdd(key, &added));
   if (added) {
     moments.emplace_back().origin = p;
+    moments.back().face = key & kBack;
     fitted.emplace_back();
   }
   return cell;
 }
 
-const Surface* SurfaceMap::Level::At(uint64_t key) const {
-  const int number = index.Find(key);
-  if (number == CellIndex::kNone) return nullptr;
-  const Fitted& cell = fitted[static_cast<size_t>(number)];
-  return cell.valid ? &cell.surface : nullptr;
+size_t SurfaceMap::Level::CellOf(uint64_t key, const Eigen::Vector3f& p,
+                                 const Eigen::Vector3f& eye) {
+  const size_t cell = FaceOf(key, p);
+  const Fitted& front = fitted[cell];
+  return front.valid() && front.IsHidden(eye) ? FaceOf(key | kBack, p) : cell;
 }
 
-void SurfaceMap::Add(const std::vector<Eigen::Vector3f>& points) {
-  for (Level& level : levels_) AddTo(points, &level);
+const Surface* SurfaceMap::Level::At(uint64_t key, const Eigen::Vector3f& eye) const {
+  for (const uint64_t face : {key, key | kBack}) {
+    const int number = index.Find(face);
+    if (number == CellIndex::kNone) return nullptr;
+    const Fitted& cell = fitted[static_cast<size_t>(number)];
+    if (!cell.valid()) return nullptr;
+    if (!cell.IsHidden(eye)) return &cell.surface;
+  }
+  return nullptr;
+}
+
+void SurfaceMap::Add(const std::vector<Eigen::Vector3f>& points, const Eigen::Vector3f& eye) {
+  for (Level& level : levels_) AddTo(points, eye, &level);
 }
 
 /// Neighbours along a ring mostly share a cell. A cell that is due for several fits is fitted once,
 /// to the points of the last.
-void SurfaceMap::AddTo(const std::vector<Eigen::Vector3f>& points, Level* level) {
+void SurfaceMap::AddTo(const std::vector<Eigen::Vector3f>& points, const Eigen::Vector3f& eye,
+                       Level* level) {
   auto& [keys, cells, due] = scratch_;
   keys.clear(), cells.clear(), due.clear();
   for (const Eigen::Vector3f& p : points) {
@@ -80,7 +104,7 @@ void SurfaceMap::AddTo(const std::vector<Eigen::Vector3f>& points, Level* level)
   for (size_t i = 0; i < points.size(); ++i) {
     if (static_cast<int>(level->moments.size()) >= config_.max_cells) break;
     const bool same = i > 0 && keys[i] == keys[i - 1];
-    cells.push_back(same ? cells.back() : level->CellOf(keys[i], points[i]));
+    cells.push_back(same ? cells.back() : level->CellOf(keys[i], points[i], eye));
     __builtin_prefetch(&level->moments[cells.back()]);
   }
   for (size_t i = 0; i < cells.size(); ++i) {
@@ -93,10 +117,11 @@ void SurfaceMap::AddTo(const std::vector<Eigen::Vector3f>& points, Level* level)
   }
   for (const auto& [cell, moments] : due)
     if (moments.next_fit == level->moments[cell].next_fit)
-      level->fitted[cell] = Fit(*level, moments);
+      level->fitted[cell] = Fit(*level, moments, eye);
 }
 
-SurfaceMap::Fitted SurfaceMap::Fit(const Level& level, const Moments& moments) const {
+SurfaceMap::Fitted SurfaceMap::Fit(const Level& level, const Moments& moments,
+                                   const Eigen::Vector3f& eye) const {
   const double n = moments.n;
   const Eigen::Vector3d mean = moments.sum.cast<double>() / n;
   const Eigen::Vector3f &s = moments.squares, &p = moments.products;
@@ -109,23 +134,29 @@ SurfaceMap::Fitted SurfaceMap::Fit(const Level& level, const Moments& moments) c
   const float thickness = static_cast<float>(config_.plane_thickness);
   const float extent = (kind_ == SurfaceKind::kPlane ? kPlaneExtent : kLineExtent) * level.size;
   const Eigen::Vector3f center = moments.origin + mean.cast<float>();
-  if (kind_ == SurfaceKind::kPlane)
-    return {{center, eigen.eigenvectors().col(0).cast<float>(), lambda[0]},
-            lambda[0] < thickness * thickness && lambda[1] > extent * extent &&
-                lambda[1] > kPlaneFlatness * lambda[0]};
+  constexpr float kNone = -1.0f, kAnySide = std::numeric_limits<float>::infinity();
+  if (kind_ == SurfaceKind::kPlane) {
+    const bool flat = lambda[0] < thickness * thickness && lambda[1] > extent * extent &&
+                      lambda[1] > kPlaneFlatness * lambda[0];
+    const Eigen::Vector3f normal = eigen.eigenvectors().col(0).cast<float>();
+    const float out = normal.dot(eye - center) < 0.0f ? -1.0f : 1.0f;
+    const float tilt = std::sqrt(lambda[0] / (lambda[1] * static_cast<float>(moments.n)));
+    return {{center, out * normal, lambda[0]}, flat ? tilt : kNone};
+  }
+  const bool straight = lambda[1] < 2.0f * thickness * thickness && lambda[2] > extent * extent &&
+                        lambda[2] > kLineStraightness * lambda[1];
   return {{center, eigen.eigenvectors().col(2).cast<float>(), 0.5f * (lambda[0] + lambda[1])},
-          lambda[1] < 2.0f * thickness * thickness && lambda[2] > extent * extent &&
-              lambda[2] > kLineStraightness * lambda[1]};
+          straight ? kAnySide : kNone};
 }
 
-const Surface* SurfaceMap::Find(const Eigen::Vector3f& p) const {
+const Surface* SurfaceMap::Find(const Eigen::Vector3f& p, const Eigen::Vector3f& eye) const {
   Query query;
   query.p = p;
-  Find({&query});
+  Find({&query}, eye);
   return query.surface;
 }
 
-void SurfaceMap::Find(std::vector<Query*> queries) const {
+void SurfaceMap::Find(std::vector<Query*> queries, const Eigen::Vector3f& eye) const {
   for (Query* query : queries) query->reach = std::numeric_limits<float>::max();
   std::vector<uint64_t> keys;
   for (const Level& level : levels_) {
@@ -138,7 +169,7 @@ void SurfaceMap::Find(std::vector<Query*> queries) const {
     }
     size_t open = 0;
     for (size_t i = 0; i < queries.size(); ++i) {
-      queries[i]->surface = level.At(keys[i]);
+      queries[i]->surface = level.At(keys[i], eye);
       if (!queries[i]->surface) queries[open++] = queries[i];
     }
     queries.resize(open);
@@ -168,7 +199,7 @@ void SurfaceMap::PruneLevel(const Eigen::Vector3f& center, Level* level) {
   level->index.Clear();
   bool added = false;
   for (const Moments& cell : level->moments)
-    level->index.FindOrAdd(CellKey(level->Scaled(cell.origin)), &added);
+    level->index.FindOrAdd(CellKey(level->Scaled(cell.origin)) | cell.face, &added);
 }
 
 void SurfaceMap::Clear() {

@@ -31,7 +31,7 @@ struct MapConfig {
 /// A plane or a line as the map knows it. Frame W.
 struct Surface {
   Eigen::Vector3f center = Eigen::Vector3f::Zero();     ///< m
-  Eigen::Vector3f direction = Eigen::Vector3f::Zero();  ///< plane: normal; line: along it
+  Eigen::Vector3f direction = Eigen::Vector3f::Zero();  ///< plane: normal out of it; line: along it
   float variance = 0.0f;                                ///< of the points across it, m^2
 };
 
@@ -48,19 +48,21 @@ struct Query {
 enum class SurfaceKind { kPlane, kLine };
 
 /// Hashed cells, each with the Gaussian of the points that fell into it, on several levels. A query
-/// takes the finest level whose cell is a plane (or a line). Bounded in memory.
+/// takes the finest level whose cell is a plane (or a line). A plane shows one face: a cell that is
+/// seen from behind its plane has a second Gaussian, of the other face of a wall. Bounded in
+/// memory.
 class SurfaceMap {
  public:
   SurfaceMap(const MapConfig& config, SurfaceKind kind);
 
-  /// Learns points in their order. Frame W, m.
-  void Add(const std::vector<Eigen::Vector3f>& points);
+  /// Learns points in their order, seen from `eye`. Frame W, m.
+  void Add(const std::vector<Eigen::Vector3f>& points, const Eigen::Vector3f& eye);
 
-  /// The surface at p, or null where the map knows none.
-  const Surface* Find(const Eigen::Vector3f& p) const;
+  /// The surface at p that is seen from `eye`, or null where the map knows none.
+  const Surface* Find(const Eigen::Vector3f& p, const Eigen::Vector3f& eye) const;
 
   /// The same for many places.
-  void Find(std::vector<Query*> queries) const;
+  void Find(std::vector<Query*> queries, const Eigen::Vector3f& eye) const;
 
   /// Forgets far cells of levels that are nearly full.
   void Prune(const Eigen::Vector3f& center);
@@ -85,17 +87,23 @@ class SurfaceMap {
     Eigen::Vector3f squares = Eigen::Vector3f::Zero();   // xx yy zz
     Eigen::Vector3f products = Eigen::Vector3f::Zero();  // xy yz zx
     int n = 0;
-    int next_fit = 5;  // points at which the surface is fitted again
+    int next_fit = 5;   // points at which the surface is fitted again
+    uint64_t face = 0;  // as CellKey's highest bit: the one seen from behind the other
   };
   struct alignas(32) Fitted {
+    bool valid() const { return tilt >= 0.0f; }
+    /// Seen from behind, by more than the noise of the normal explains.
+    bool IsHidden(const Eigen::Vector3f& eye) const;
+
     Surface surface;
-    bool valid = false;
+    float tilt = -1.0f;  // standard deviation of the normal, rad; negative: no surface
   };
   struct Level {
     /// A point in units of the cells.
     Eigen::Vector3f Scaled(const Eigen::Vector3f& p) const { return (p + shift) * inverse_size; }
-    size_t CellOf(uint64_t key, const Eigen::Vector3f& p);
-    const Surface* At(uint64_t key) const;
+    size_t CellOf(uint64_t key, const Eigen::Vector3f& p, const Eigen::Vector3f& eye);
+    size_t FaceOf(uint64_t key, const Eigen::Vector3f& p);
+    const Surface* At(uint64_t key, const Eigen::Vector3f& eye) const;
 
     float size = 1.0f, inverse_size = 1.0f;
     Eigen::Vector3f shift = Eigen::Vector3f::Zero();  // of the grid
@@ -113,8 +121,8 @@ class SurfaceMap {
     std::vector<std::pair<size_t, Moments>> due;  // cells to be fitted and to what
   };
 
-  void AddTo(const std::vector<Eigen::Vector3f>& points, Level* level);
-  Fitted Fit(const Level& level, const Moments& moments) const;
+  void AddTo(const std::vector<Eigen::Vector3f>& points, const Eigen::Vector3f& eye, Level* level);
+  Fitted Fit(const Level& level, const Moments& moments, const Eigen::Vector3f& eye) const;
   void PruneLevel(const Eigen::Vector3f& center, Level* level);
 
   MapConfig config_;

@@ -123,7 +123,7 @@ struct Problem {
     const FeatureSet set = ExtractFeatures(FeatureConfig{}, sweep.points);
     for (size_t i = 0; i < set.planes.size(); ++i) {
       const auto& p = sweep.points[static_cast<size_t>(set.planes[i])].p;
-      planes.Add({p + at.p.cast<float>()});
+      planes.Add({p + at.p.cast<float>()}, at.p.cast<float>());
       if (i % 10 == 0) features.planes.push_back(p);
     }
   }

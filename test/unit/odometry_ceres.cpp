@@ -44,7 +44,7 @@ Pose MatchWithCeres(const std::vector<Eigen::Vector3f>& planes, const SurfaceMap
   problem.AddParameterBlock(pose.p.data(), 3);
   for (const Eigen::Vector3f& point : planes) {
     const Eigen::Vector3d p_B = point.cast<double>();
-    const Surface* surface = map.Find((start * p_B).cast<float>());
+    const Surface* surface = map.Find((start * p_B).cast<float>(), start.p.cast<float>());
     if (!surface) continue;
     problem.AddResidualBlock(
         new ceres::AutoDiffCostFunction<PlaneDistance, 1, 4, 3>(new PlaneDistance{

@@ -22,15 +22,26 @@ struct Room {
   Features features;
   Pose truth{math::ExpSO3({0.05, -0.04, 0.6}), {0.4, 1.0, 1.4}};
 
-  explicit Room(const Hall& hall) {
+  explicit Room(const Hall& hall) : Room(std::vector<Hall>{hall}) {}
+
+  /// The drone comes through the other halls in their order to the last.
+  explicit Room(const std::vector<Hall>& halls) {
     Noise noise(1);
+    for (const Hall& hall : halls) Learn(hall, &noise);
+    features = FeaturesFrom(halls.back(), truth, 10, &noise);
+  }
+
+  void Learn(const Hall& hall, Noise* noise) {
+    const double middle = 0.5 * (hall.min.x() + hall.max.x());
     for (int i = 0; i < 5; ++i) {
-      const Pose at{math::FromYaw(0.3 * i), {0.3 * i - 0.6, 0.5 * i, 1.2 + 0.1 * i}};
-      const Features seen = FeaturesFrom(hall, at, 1, &noise);
-      for (const auto& point : seen.planes) planes.Add({(at * point.cast<double>()).cast<float>()});
-      for (const auto& point : seen.posts) posts.Add({(at * point.cast<double>()).cast<float>()});
+      const Pose at{math::FromYaw(0.3 * i), {middle + 0.3 * i - 0.6, 0.5 * i, 1.2 + 0.1 * i}};
+      const Features seen = FeaturesFrom(hall, at, 1, noise);
+      const Eigen::Vector3f eye = at.p.cast<float>();
+      for (const auto& point : seen.planes)
+        planes.Add({(at * point.cast<double>()).cast<float>()}, eye);
+      for (const auto& point : seen.posts)
+        posts.Add({(at * point.cast<double>()).cast<float>()}, eye);
     }
-    features = FeaturesFrom(hall, truth, 10, &noise);
   }
 
   static Features FeaturesFrom(const Hall& hall, const Pose& at, size_t stride, Noise* noise) {
@@ -117,6 +128,25 @@ TEST(ScanMatcher, CorridorLeavesItsAxisToThePrediction) {
   EXPECT_GT(std::abs(match.weakest[1]), 0.9);
   EXPECT_NEAR(match.X_WB.p.x(), room.truth.p.x(), 0.02);
   EXPECT_NEAR(match.X_WB.p.y(), start.p.y(), 0.05);
+}
+
+/// Seen from here, the wall shows another face than it showed in the room behind, wherever in the
+/// map's cells it stands.
+TEST(ScanMatcher, TheOtherFaceOfAThinWallDoesNotPull) {
+  constexpr double kThickness = 0.15;
+  Noise noise(6);
+  for (const double x : {4.0, 4.1, 4.2}) {
+    Hall hall, behind;
+    hall.max.x() = x, behind.min.x() = x + kThickness, behind.max.x() = x + 8.0;
+    behind.pillars.clear();
+    const Room room({behind, behind, behind, behind, hall});  // cells are full of the other face
+    const Pose start = Disturbed(room.truth, &noise, 0.02, 0.002);
+    const MatchResult match =
+        ScanMatcher(MatchConfig{}).Match(room.features, room.planes, room.posts, start, 0.05);
+    ASSERT_TRUE(match.valid) << "wall at " << x;
+    EXPECT_LT((match.X_WB.p - room.truth.p).norm(), 0.01) << "wall at " << x;
+    EXPECT_GT(match.fit, 0.95) << "wall at " << x;
+  }
 }
 
 /// What the map does not know yet says nothing against a match with what it knows.

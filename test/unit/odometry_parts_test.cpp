@@ -197,6 +197,8 @@ TEST(FeaturesOfARoom, UnusablePointsAreRemoved) {
   EXPECT_EQ(points.size(), 1u);
 }
 
+const Eigen::Vector3f kEye(0.0f, 0.0f, 3.0f);  // frame W, m
+
 TEST(SurfaceMap, FindsThePlaneThatItsPointsCameFrom) {
   Noise noise(3);
   SurfaceMap map(MapConfig{}, SurfaceKind::kPlane);
@@ -205,12 +207,45 @@ TEST(SurfaceMap, FindsThePlaneThatItsPointsCameFrom) {
   for (int i = 0; i < 20000; ++i)
     map.Add({(4.0 * (noise.Uniform() - 0.5) * u + 4.0 * (noise.Uniform() - 0.5) * v +
               noise.Gauss(0.01) * normal)
-                 .cast<float>()});
-  const Surface* surface = map.Find(Eigen::Vector3f::Zero());
+                 .cast<float>()},
+            kEye);
+  const Surface* surface = map.Find(Eigen::Vector3f::Zero(), kEye);
   ASSERT_NE(surface, nullptr);
   EXPECT_GT(std::abs(surface->direction.cast<double>().dot(normal)), 0.99);
   EXPECT_LT(std::abs(surface->center.cast<double>().dot(normal)), 0.01);
-  EXPECT_EQ(map.Find(Eigen::Vector3f(50.0f, 0.0f, 0.0f)), nullptr);
+  EXPECT_EQ(map.Find(Eigen::Vector3f(50.0f, 0.0f, 0.0f), kEye), nullptr);
+}
+
+/// A wall thinner than a cell: each room knows its own face of it, whichever was learnt first.
+TEST(SurfaceMap, TellsTheFacesOfAThinWallApart) {
+  constexpr float kThickness = 0.15f;
+  Noise noise(7);
+  SurfaceMap map(MapConfig{}, SurfaceKind::kPlane);
+  const auto learn = [&](float x, const Eigen::Vector3f& eye) {
+    std::vector<Eigen::Vector3f> points;
+    for (int i = 0; i < 20000; ++i)
+      points.push_back({x + static_cast<float>(noise.Gauss(0.01)),
+                        static_cast<float>(4.0 * noise.Uniform()),
+                        static_cast<float>(2.0 * noise.Uniform())});
+    map.Add(points, eye);
+  };
+  const Eigen::Vector3f west(-1.0f, 2.0f, 1.0f), east(1.0f, 2.0f, 1.0f);
+  learn(0.0f, west);
+  for (int i = 0; i < 200; ++i) {
+    const Eigen::Vector3f p(kThickness, static_cast<float>(4.0 * noise.Uniform()), 1.0f);
+    ASSERT_EQ(map.Find(p, east), nullptr);
+  }
+  learn(kThickness, east);
+  for (int i = 0; i < 200; ++i) {
+    const float y = static_cast<float>(0.2 + 3.6 * noise.Uniform());
+    for (const bool in_east : {false, true}) {
+      const float x = in_east ? kThickness : 0.0f;
+      const Surface* face = map.Find({x, y, 1.0f}, in_east ? east : west);
+      ASSERT_NE(face, nullptr) << "y " << y;
+      EXPECT_NEAR(face->center.x(), x, 0.005f);
+      EXPECT_NEAR(face->direction.x(), in_east ? 1.0f : -1.0f, 0.01f);
+    }
+  }
 }
 
 /// What a match relies on that does not look a feature up again.
@@ -222,20 +257,20 @@ TEST(SurfaceMap, AnswerHoldsWithinItsReach) {
   for (int i = 0; i < 20000; ++i)
     points.push_back(
         (noise.Vector(3.0).cwiseProduct(Eigen::Vector3d(1.0, 1.0, 0.01))).cast<float>());
-  map.Add(points);
+  map.Add(points, kEye);
   std::vector<Query> places(kPlaces);
   std::vector<Query*> all;
   for (Query& place : places) place.p = noise.Vector(3.0).cast<float>(), all.push_back(&place);
-  map.Find(all);
+  map.Find(all, kEye);
   int far = 0;
   for (const Query& place : places) {
-    EXPECT_EQ(map.Find(place.p), place.surface) << "seed " << kSeed;
+    EXPECT_EQ(map.Find(place.p, kEye), place.surface) << "seed " << kSeed;
     far += place.reach > 0.01f ? 1 : 0;
     for (int corner = 0; corner < 8; ++corner) {
       const Eigen::Vector3f to(corner & 1 ? 1.0f : -1.0f, corner & 2 ? 1.0f : -1.0f,
                                corner & 4 ? 1.0f : -1.0f);
       const Eigen::Vector3f p = place.p + 0.99999f * place.reach * to;
-      EXPECT_EQ(map.Find(p), place.surface) << "seed " << kSeed;
+      EXPECT_EQ(map.Find(p, kEye), place.surface) << "seed " << kSeed;
     }
   }
   EXPECT_GT(far, kPlaces / 2);
@@ -249,7 +284,7 @@ TEST(SurfaceMap, MemoryStaysBoundedOverALongWay) {
   size_t half_way = 0;
   for (int i = 0; i < 400000; ++i) {
     const Eigen::Vector3f at(0.005f * static_cast<float>(i), 0.0f, 0.0f);
-    map.Add({at + noise.Vector(10.0).cast<float>()});
+    map.Add({at + noise.Vector(10.0).cast<float>()}, at);
     if (i % 500 == 0) map.Prune(at);
     if (i == 200000) half_way = map.MemoryBytes();
   }
