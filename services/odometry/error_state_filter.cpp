@@ -104,30 +104,36 @@ UpdateResult Correct(const JacobianRows& H, const Eigen::VectorXd& innovation,
 }
 
 /// Opens the covariance where biases that jumped explain the innovation and are by far likelier
-/// than that nothing did, and likelier than a pose that is off at once, as by wrong stamps. A turn
-/// is felt at once, an acceleration by the sweep after.
-void OpenAfterJump(double usual_nis, const JacobianRows& H, const Eigen::VectorXd& innovation,
-                   const Eigen::MatrixXd& noise, double gap, NavState* state) {
-  constexpr double kOff = 0.02, kTurned = 0.005;  // m, rad: 20 ms at 1 m/s and 0.25 rad/s
+/// than that nothing did, and likelier than a match that is off at once: by wrong stamps, or by
+/// features that were matched with another surface within the gate. A turn is felt at once, an
+/// acceleration by the sweep after. Returns the odds of a jump with this match.
+double OpenAfterJump(double usual_nis, const JacobianRows& H, const Eigen::VectorXd& innovation,
+                     const Eigen::MatrixXd& noise, const JumpEvidence& jump, NavState* state) {
+  constexpr double kTurned = 0.005;  // rad: 20 ms at 0.25 rad/s
   const auto covariance = [&](const ErrorCovariance& P) -> Eigen::MatrixXd {
     return H * P * H.transpose() + noise;
   };
-  ErrorCovariance off = state->P;
-  AddDiagonal(kP, kOff * kOff, &off);
-  AddDiagonal(kTheta, kTurned * kTurned, &off);
-  double likeliest = std::max(LogLikelihood(innovation, covariance(state->P)) + kJumps,
-                              LogLikelihood(innovation, covariance(off)));
+  double otherwise = LogLikelihood(innovation, covariance(state->P)) + kJumps;
+  for (const double off : {0.02, 0.15}) {  // m: 20 ms at 1 m/s; MatchConfig's least gate
+    ErrorCovariance P = state->P;
+    AddDiagonal(kP, off * off, &P);
+    AddDiagonal(kTheta, kTurned * kTurned, &P);
+    otherwise = std::max(otherwise, LogLikelihood(innovation, covariance(P)));
+  }
   const NavState before = *state;
-  for (const double age : {gap, 2.0 * gap}) {
-    const ErrorCovariance jumped = AfterJump(before, gap, age);
+  double odds = -HUGE_VAL, best = 0.0;
+  for (const double age : {jump.gap, 2.0 * jump.gap}) {
+    const ErrorCovariance jumped = AfterJump(before, jump.gap, age);
     const Eigen::MatrixXd explained = covariance(jumped);
     const double nis = innovation.dot(explained.ldlt().solve(innovation));
-    const double likelihood = LogLikelihood(innovation, explained);
-    if (!(nis <= usual_nis * static_cast<double>(innovation.size())) || !(likelihood > likeliest))
+    const double likelihood = jump.odds + LogLikelihood(innovation, explained) - otherwise;
+    odds = std::max(odds, likelihood);
+    if (!(nis <= usual_nis * static_cast<double>(innovation.size())) || !(likelihood > best))
       continue;
-    likeliest = likelihood;
+    best = likelihood;
     state->P = jumped;
   }
+  return std::isfinite(odds) ? odds : jump.odds;
 }
 
 /// What the unknown directions U, left at the prediction, do to the known ones V of a match: an
@@ -215,7 +221,7 @@ void Inject(const ErrorVector& dx, NavState* state) {
   state->g += dx.segment<3>(kGravity);
 }
 
-UpdateResult Update(const FilterConfig& config, const PoseMeasurement& z, double gap,
+UpdateResult Update(const FilterConfig& config, const PoseMeasurement& z, const JumpEvidence& jump,
                     NavState* state) {
   const auto& V = z.known;
   const Eigen::Index k = V.cols();
@@ -239,8 +245,12 @@ UpdateResult Update(const FilterConfig& config, const PoseMeasurement& z, double
   H.middleCols<3>(kP) = onto.leftCols<3>();
   H.middleCols<3>(kTheta) = onto.rightCols<3>();
   const Eigen::VectorXd innovation = onto * e;
-  OpenAfterJump(config.usual_nis, H, innovation, noise, gap, state);
-  return Correct(H, innovation, noise, config.usual_nis, config.largest_nis, state);
+  const double odds = jump.gap > 0.0
+                          ? OpenAfterJump(config.usual_nis, H, innovation, noise, jump, state)
+                          : jump.odds;
+  UpdateResult result = Correct(H, innovation, noise, config.usual_nis, config.largest_nis, state);
+  result.odds = result.applied ? 0.0 : odds;
+  return result;
 }
 
 void HoldStill(const Eigen::Vector3d& gyro, NavState* state) {

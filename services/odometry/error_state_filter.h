@@ -106,17 +106,24 @@ struct PoseMeasurement {
 /// Update of a body that stands: no velocity, and what the gyroscope shows [rad/s] is its bias.
 void HoldStill(const Eigen::Vector3d& gyro, NavState* state);
 
+/// What speaks for biases that have jumped since the last update.
+struct JumpEvidence {
+  double gap = 0.0;   ///< s since that update; 0: they have not
+  double odds = 0.0;  ///< logarithm of the likelihood ratio, by the matches refused since
+};
+
 struct UpdateResult {
   bool applied = false;
-  double nis = 0.0;  ///< normalised innovation squared per known direction
+  double nis = 0.0;   ///< normalised innovation squared per known direction
+  double odds = 0.0;  ///< JumpEvidence's with this match
 };
 
 /// Kalman update; leaves the state as it is where the numbers do not allow one or the innovation is
 /// too large to be of noise. One that is larger than the covariances explain makes these larger: by
-/// as much of the correction as they do not explain; unless biases that have jumped in the last
-/// `gap` s, since the update before (0: they have not), explain it all and are by far likelier
-/// (generalised likelihood ratio, Willsky and Jones 1976): then these are open again.
-UpdateResult Update(const FilterConfig& config, const PoseMeasurement& z, double gap,
+/// as much of the correction as they do not explain; unless biases that have jumped since the
+/// update before explain it all and are by far likelier, by all matches since (generalised
+/// likelihood ratio, Willsky and Jones 1976): then these are open again.
+UpdateResult Update(const FilterConfig& config, const PoseMeasurement& z, const JumpEvidence& jump,
                     NavState* state);
 
 }  // namespace chase::odometry

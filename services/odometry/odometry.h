@@ -160,6 +160,7 @@ class Odometry {
   int epoch_ = 0;
   Matrix6d unknown_ = Matrix6d::Zero();  // projector on what the last sweep left to inertia
   double held_ = 0.0;                    // last time that a sweep or standing held the state, s
+  double odds_ = 0.0;                    // that biases have jumped since, JumpEvidence
   int sweeps_since_ = 0;                 // the newest inertial sample
   bool samples_late_ = false;            // behind the last sweep, by more than jitter
   double newest_sweep_ = -1e18;          // end of the sweep that came last, s
