@@ -1,14 +1,16 @@
 #include "common/bus/autopilot_state.h"
 
-#include <string>
+#include <algorithm>
+#include <array>
 
 #include "common/world/ages.h"
 
 namespace chase::bus {
 
-// The words are the bridge's: "flying: ...; mode OFFBOARD, armed, in air, ...". Texts of the
-// autopilot's own are quoted before the last mode.
+// What the bridge says: "flying: ...; mode OFFBOARD, armed, in air, ...". Texts of the autopilot's
+// own are quoted before the last mode.
 void AutopilotState::Hear(const status_t& message) {
+  static constexpr std::array kNotOurs = {"pilot", "failsafe", "landing", "done", "refused"};
   const size_t at = message.detail.rfind("; mode ");
   const bool tells = at != std::string::npos;
   if (message.name != "fcu" || (!tells && heard_ == 0)) return;
@@ -16,8 +18,11 @@ void AutopilotState::Hear(const status_t& message) {
     return tells && message.detail.find(words, at) != std::string::npos;
   };
   heard_ = message.utime;
-  obeys_ = message.detail.rfind("flying: ", 0) == 0 && says(", armed, ");
+  words_ = message.detail.substr(0, message.detail.find("; "));
+  const std::string state = words_.substr(0, words_.find(": "));
+  obeys_ = state == "flying" && says(", armed, ");
   on_ground_ = says(", on ground");
+  handed_over_ = std::find(kNotOurs.begin(), kNotOurs.end(), state) != kNotOurs.end();
 }
 
 bool AutopilotState::IsKnown(int64_t utime) const {

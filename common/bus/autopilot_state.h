@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 
 #include "chase/status_t.hpp"
 
@@ -16,12 +17,18 @@ class AutopilotState {
   bool Obeys(int64_t utime) const { return !IsKnown(utime) || obeys_; }
   /// Does it say that it stands on the ground?
   bool IsOnGround(int64_t utime) const { return IsKnown(utime) && on_ground_; }
+  /// Is the flight not ours although it has begun: a pilot has it, the autopilot lands or has
+  /// landed it, or never began it?
+  bool IsHandedOver() const { return handed_over_; }
+  /// The hand-shake's state and why it is in it: "pilot: the mode was changed"; empty: never heard.
+  const std::string& words() const { return words_; }
 
  private:
   bool IsKnown(int64_t utime) const;
 
   int64_t heard_ = 0;  // 0: never
-  bool obeys_ = false, on_ground_ = false;
+  bool obeys_ = false, on_ground_ = false, handed_over_ = false;
+  std::string words_;
 };
 
 }  // namespace chase::bus

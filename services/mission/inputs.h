@@ -44,8 +44,10 @@ struct Inputs {
   /// Places on the newest plan up to its stop and on to rest: where it flies if nothing more comes.
   std::vector<Eigen::Vector3d> way;  ///< frame W
   bool blocked = false;              ///< something reaches into the climb's column
-  std::string hand_over;  ///< why the flight is not ours any more, as fcu says; empty: it is
-  std::optional<double> battery;                   ///< share of its charge; nothing: nobody says
+  std::string autopilot;             ///< what fcu says of it: state and reason
+  bool handed_over = false;          ///< and that is why the flight is not ours any more
+  bool on_ground = false;            ///< the autopilot says that it stands there
+  std::optional<double> battery;     ///< share of its charge; nothing: nobody says
   std::map<std::string, ProcessReport> processes;  ///< by name
 
   void Heard(const std::string& process, ProcessReport report);

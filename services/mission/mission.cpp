@@ -6,6 +6,14 @@
 
 namespace chase::mission {
 
+namespace {
+
+bool Has(const std::vector<Event>& events, Event event) {
+  return std::find(events.begin(), events.end(), event) != events.end();
+}
+
+}  // namespace
+
 world::CommandAnswer Mission::Obey(double t, const Command& command) {
   const bool urgent = command.kind == Event::kStop || command.kind == Event::kKill;
   return window_.Take(
@@ -19,11 +27,13 @@ world::CommandAnswer Mission::Try(double t, const Command& command) {
   Step(t, command.kind);
   if (state_ == State::kReturn && !KnowsHome()) Step(t, Event::kHomeLost);
   leads_itself_ = false;
+  overruled_ = command.kind == Event::kStop ? Breached() : std::vector<Event>();
   return {true, std::string(Name(state_)) + ": " + reason_};
 }
 
 std::string Mission::Refused(Event command) const {
-  if (const Transition* row = Find(state_, command)) return Overridden(row->to);
+  if (const Transition* row = Find(state_, command))
+    return command == Event::kStop ? "" : Overridden(row->to);
   std::string reason = std::string(Name(command)) + " in " + Name(state_) + ": " + Refusal(state_);
   const char* separator = ": ";
   if (state_ != State::kIdle) return reason;
@@ -42,7 +52,7 @@ std::string Mission::Overridden(State to) const {
   if (IsLow()) return "the battery is low: it returns or lands";
   if (to == State::kTakeoff) return "";  // from there the fence counts anew
   if (const std::string outside = Outside(); !outside.empty())
-    return "it is " + outside + ": it returns or lands";
+    return "it is " + outside + ": it returns, lands or stops";
   const bool leads_about = to == State::kChase || to == State::kSearch;
   return leads_about && config_.geofence.Exists() && !KnowsHome()
              ? "the take-off place is not known, nor the geofence"
@@ -57,8 +67,15 @@ bool Mission::Step(double t, Event event, const std::string& detail) {
   if (row->to == State::kReturn) nearest_ = HUGE_VAL;
   state_ = row->to;
   reason_ = row->reason + (detail.empty() ? "" : ": " + detail);
-  if (event == Event::kTakeoff && inputs_.pose) home_ = Home{inputs_.pose->p, inputs_.pose->epoch};
+  if (event == Event::kNotFlown) refusal_ = inputs_.autopilot;
+  if (event == Event::kTakeoff) TakeOff(t);
   return true;
+}
+
+void Mission::TakeOff(double t) {
+  taken_off_ = t;
+  refusal_.clear();
+  if (inputs_.pose) home_ = Home{inputs_.pose->p, inputs_.pose->epoch};
 }
 
 void Mission::Update(double t) {
@@ -69,9 +86,14 @@ void Mission::Update(double t) {
   if (inputs_.pose && inputs_.pose->usable) last_usable_ = std::max(last_usable_, inputs_.pose->t);
   missing_ = Missing(config_, inputs_, t);
   NoteProgress(t);
+  const std::vector<Event> breached = Breached();
+  overruled_.erase(std::remove_if(overruled_.begin(), overruled_.end(),
+                                  [&](Event e) { return !Has(breached, e); }),
+                   overruled_.end());
   for (const Event event : Observed(t)) {
     const bool stepped = Step(t, event, Detail(event));
-    if (stepped && event == Event::kLeaving) leads_itself_ = false;  // it would lead out again
+    if (stepped && (event == Event::kLeaving || event == Event::kNotFlown))
+      leads_itself_ = false;  // it would come to the same again
     if (stepped && event == Event::kPoseBack) Resume(t);
   }
   if (leads_itself_) LeadItself(t);
@@ -107,18 +129,26 @@ std::vector<Event> Mission::Observed(double t) const {
   events.push_back(missing_.empty() ? Event::kComplete : Event::kMissing);
   events.push_back(SeesTarget(inputs_, t) ? Event::kSeen : Event::kLost);
   add(state_ == State::kTakeoff && IsUp(), Event::kUp);
+  add(IsNotFlown(t), Event::kNotFlown);
   add(state_ == State::kSearch && config_.give_up > 0.0 && t - since_ > config_.give_up,
       Event::kGaveUp);
   add(!Leaving().empty(), Event::kLeaving);
-  add(!Outside().empty(), Event::kOutside);
-  add(IsLow(), Event::kBatteryLow);
-  add(IsCritical(), Event::kBatteryCritical);
+  for (const Event breach : Breached()) add(!Has(overruled_, breach), breach);
   add(!KnowsHome(), Event::kHomeLost);
   add(IsHome(), Event::kHome);
   add(state_ == State::kReturn && config_.return_patience > 0.0 &&
           t - nearest_since_ > config_.return_patience,
       Event::kNoNearer);
   return events;
+}
+
+/// Limits of the envelope that it is beyond.
+std::vector<Event> Mission::Breached() const {
+  std::vector<Event> breached;
+  if (!Outside().empty()) breached.push_back(Event::kOutside);
+  if (IsLow()) breached.push_back(Event::kBatteryLow);
+  if (IsCritical()) breached.push_back(Event::kBatteryCritical);
+  return breached;
 }
 
 std::string Mission::Detail(Event event) const {
@@ -151,8 +181,10 @@ std::string Mission::Outside() const {
 
 std::string Mission::Words() const {
   const std::string words = reason_ + (ground_.empty() ? "" : "; " + ground_);
-  if (!IsAirborne(state_) || inputs_.hand_over.empty()) return words;
-  return words + "; fcu: " + inputs_.hand_over;
+  const std::string others = !IsAirborne(state_)   ? refusal_
+                             : inputs_.handed_over ? inputs_.autopilot
+                                                   : "";
+  return others.empty() ? words : words + "; fcu: " + others;
 }
 
 void Mission::HearOfGround() {
@@ -173,6 +205,14 @@ bool Mission::IsUp() const {
   return pose && inputs_.plan_heard > since_ && (pose->p - inputs_.plan_end).norm() < kAtEnd &&
          pose->v.norm() < config_.rest_speed &&
          (!KnowsHome() || pose->p.z() - home_->p.z() > 0.5 * config_.climb_height);
+}
+
+// What the bridge has given up lasts until setpoints cease; its status may be that old.
+bool Mission::IsNotFlown(double t) const {
+  if (!IsAirborne(state_) || inputs_.flying || !inputs_.on_ground) return false;
+  const double waited = t - taken_off_;
+  if (inputs_.handed_over) return waited > world::kMostAge.status;
+  return config_.takeoff_patience > 0.0 && waited > config_.takeoff_patience;
 }
 
 bool Mission::KnowsHome() const {

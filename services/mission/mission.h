@@ -62,9 +62,12 @@ class Mission {
   bool Step(double t, Event event, const std::string& detail = "");
   world::CommandAnswer Try(double t, const Command& command);
   std::string Refused(Event command) const;
+  std::vector<Event> Breached() const;
+  void TakeOff(double t);
   std::vector<Event> Observed(double t) const;
   bool PoseIsLost(double t) const;
   bool IsUp() const;
+  bool IsNotFlown(double t) const;
   bool IsHome() const;
   bool KnowsHome() const;
   std::string Overridden(State to) const;
@@ -84,8 +87,11 @@ class Mission {
   world::CommandWindow window_;
   State state_ = State::kIdle;
   std::string reason_ = "switched on";
-  std::string ground_;  // what planning said of it before control came down
+  std::string ground_;            // what planning said of it before control came down
+  std::string refusal_;           // what the autopilot said of a take-off that was called off
+  std::vector<Event> overruled_;  // breaches in which `stop` was commanded
   double since_ = 0.0;
+  double taken_off_ = 0.0;  // when that was commanded, s
   bool began_ = false;
   State before_ = State::kHold;  // the emergency
   double last_usable_ = -1e9;    // pose, s

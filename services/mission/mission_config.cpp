@@ -12,6 +12,8 @@ std::string MissionConfig::Problem() const {
     text << "home_radius is " << home_radius << ", must be from 0.05 to 5 m";
   else if (!(return_patience >= 0.0 && return_patience <= 3600.0))
     text << "return_patience is " << return_patience << ", must be from 0 to 3600 s";
+  else if (!(takeoff_patience >= 0.0 && takeoff_patience <= 3600.0))
+    text << "takeoff_patience is " << takeoff_patience << ", must be from 0 to 3600 s";
   else if (!(rest_speed >= 0.02 && rest_speed <= 1.0))
     text << "rest_speed is " << rest_speed << ", must be from 0.02 to 1 m/s";
   else if (!(battery_critical >= 0.0 && battery_critical <= battery_low))

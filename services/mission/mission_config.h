@@ -14,6 +14,7 @@ struct MissionConfig {
   double give_up = 60.0;
   double home_radius = 0.3;
   double return_patience = 60.0;
+  double takeoff_patience = 90.0;
   double rest_speed = 0.25;
   double battery_low = 0.25, battery_critical = 0.1;
   double climb_height = 2.0, body_radius = 0.25;
@@ -28,6 +29,8 @@ struct MissionConfig {
     v("home_radius", home_radius, "level distance at which it is back at the take-off place, m");
     v("return_patience", return_patience,
       "lands where it is after coming no nearer to the take-off place for so long, s; 0: never");
+    v("takeoff_patience", takeoff_patience,
+      "calls a take-off off that the autopilot has not begun after so long, s; 0: never");
     v("rest_speed", rest_speed, "below this the body is at rest, m/s");
     v("battery_low", battery_low, "share of the charge at which it returns; 0: never");
     v("battery_critical", battery_critical, "share at which it lands where it is; 0: never");

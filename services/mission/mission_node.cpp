@@ -10,7 +10,6 @@
 #include "common/bus/battery.h"
 #include "common/bus/command_call.h"
 #include "common/bus/convert.h"
-#include "common/bus/hand_over.h"
 #include "common/world/column.h"
 
 namespace chase::mission {
@@ -116,12 +115,16 @@ void MissionNode::OnStatus(const status_t& message) {
   report.failed = message.state == status_t::FAILED;
   report.start = message.sender_start;
   mission_.inputs().Heard(message.name, report);
-  if (message.name == "fcu") mission_.inputs().hand_over = bus::HandOverIn(message);
+  autopilot_.Hear(message);
   if (const std::optional<double> battery = bus::BatteryIn(message))
     mission_.inputs().battery = battery;
 }
 
 void MissionNode::Tick(int64_t /*utime*/) {
+  Inputs& inputs = mission_.inputs();
+  inputs.autopilot = autopilot_.words();
+  inputs.handed_over = autopilot_.IsHandedOver();
+  inputs.on_ground = autopilot_.IsOnGround(bus_.Now());
   mission_.Update(Now());
   SendState();
   if (ticks_++ % kHealthTicks == 0) SendHealth();

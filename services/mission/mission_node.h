@@ -11,6 +11,7 @@
 #include "chase/status_t.hpp"
 #include "chase/target_t.hpp"
 #include "chase/tracking_t.hpp"
+#include "common/bus/autopilot_state.h"
 #include "common/bus/bus.h"
 #include "common/bus/node.h"
 #include "services/mission/mission.h"
@@ -45,6 +46,7 @@ class MissionNode : public bus::Node {
   MissionConfig config_;
   int64_t origin_;  // utime that the core's seconds count from: the start of the process
   Mission mission_;
+  bus::AutopilotState autopilot_;
   int64_t ticks_ = 0;
 };
 

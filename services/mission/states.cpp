@@ -65,6 +65,12 @@ const std::vector<Transition>& Transitions() {
 
       {S::kEmergency, E::kPoseBack, S::kHold,    "there is a pose again"},
 
+      // On the ground all the while.
+      {S::kTakeoff,   E::kNotFlown, S::kReady,  "take-off called off"},
+      {S::kChase,     E::kNotFlown, S::kReady,  "take-off called off"},
+      {S::kHold,      E::kNotFlown, S::kReady,  "take-off called off"},
+      {S::kSearch,    E::kNotFlown, S::kReady,  "take-off called off"},
+
       // Without a pose nobody but control can fly, and motors that are off stay off.
       {S::kTakeoff,   E::kPoseLost, S::kEmergency, "no pose"},
       {S::kChase,     E::kPoseLost, S::kEmergency, "no pose"},

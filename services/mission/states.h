@@ -35,6 +35,7 @@ enum class Event {
   kFlying,    ///< control flies already
   kLanding,   ///< control comes down already
   kUp,        ///< the climb is over
+  kNotFlown,  ///< nobody has flown for too long since the take-off was commanded
   kSeen,      ///< the target is tracked
   kLost,      ///< it is not
   kGaveUp,    ///< it has been looked for long enough
@@ -49,7 +50,7 @@ enum class Event {
   kBatteryLow,       ///< time to return
   kBatteryCritical,  ///< time to land
 };
-inline constexpr int kEvents = 26;
+inline constexpr int kEvents = 27;
 
 struct Transition {
   State from;

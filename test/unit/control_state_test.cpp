@@ -154,6 +154,8 @@ TEST(ControlNode, IdlesOnTheGroundUntilTheAutopilotObeysAndAPlanBegins) {
   EXPECT_EQ(bench.out.back().motors, +attitude_setpoint_t::MOTORS_ON);
   EXPECT_NEAR(bench.out.back().thrust, ControlConfig().min_thrust, 1e-9);
   EXPECT_EQ(bench.tracking.back().following, +tracking_t::NONE);
+  EXPECT_EQ(run(kStands, flight_state_t::READY), 0u) << "called off";
+  EXPECT_EQ(bench.tracking.back().following, +tracking_t::NONE);
   bench.SendPlan(t, {0, 0, 1}, 60.0);
   EXPECT_EQ(run(kStands, flight_state_t::CHASE), 40u);
   EXPECT_EQ(bench.tracking.back().following, +tracking_t::NONE) << "it cannot climb";

@@ -234,12 +234,84 @@ TEST(Mission, AReturnWithoutEndIsAskedForByNoPatience) {
 TEST(Mission, SaysWhoElseFlies) {
   Bench bench;
   bench.Fly();
-  bench.mission.inputs().hand_over = "pilot: the mode was changed: the pilot has it";
+  bench.mission.inputs().autopilot = "pilot: the mode was changed: the pilot has it";
+  bench.mission.inputs().handed_over = true;
   bench.Run(0.1);
   EXPECT_EQ(bench.mission.Words(),
             "hold commanded; fcu: pilot: the mode was changed: the pilot has it");
-  bench.mission.inputs().hand_over.clear();
+  bench.mission.inputs().handed_over = false;
   EXPECT_EQ(bench.mission.Words(), "hold commanded");
+}
+
+TEST(Mission, ATakeOffThatTheAutopilotRefusesIsCalledOff) {
+  const auto refuse = [](Bench* bench, bool refused, bool on_ground, bool flying) {
+    bench->mission.inputs().autopilot = refused ? "refused: no GPS" : "standby: a PX4 is heard";
+    bench->mission.inputs().handed_over = refused;
+    bench->mission.inputs().on_ground = on_ground;
+    bench->mission.inputs().flying = flying;
+  };
+  for (const Event then : {Event::kTakeoff, Event::kHold, Event::kChase}) {
+    Bench bench;
+    bench.Run(0.2);
+    ASSERT_TRUE(bench.Command(Event::kTakeoff).accepted);
+    ASSERT_TRUE(then == Event::kTakeoff || bench.Command(then).accepted);
+    refuse(&bench, true, true, false);
+    bench.Run(2.4);
+    ASSERT_TRUE(IsAirborne(bench.mission.state())) << "what is heard may be of before";
+    bench.Run(0.3);
+    ASSERT_EQ(bench.mission.state(), State::kReady) << Name(then);
+    EXPECT_EQ(bench.mission.Words(), "take-off called off; fcu: refused: no GPS");
+    refuse(&bench, false, true, false);
+    bench.hears_target = false;
+    bench.Run(1.0);
+    ASSERT_EQ(bench.mission.state(), State::kIdle);
+    EXPECT_NE(bench.mission.Words().find("; fcu: refused: no GPS"), std::string::npos);
+    bench.hears_target = true;
+    bench.Run(0.2);
+    ASSERT_TRUE(bench.Command(Event::kTakeoff).accepted);
+    bench.mission.inputs().motors_off = true;
+    bench.Run(0.1);
+    EXPECT_EQ(bench.mission.Words(), "motors are off") << "that was another one";
+  }
+}
+
+TEST(Mission, ATakeOffThatNobodyBeginsIsCalledOffAfterAPatience) {
+  MissionConfig config;
+  config.takeoff_patience = 20.0;
+  for (const bool autostart : {false, true}) {
+    config.autostart = autostart;
+    Bench bench(config);
+    bench.mission.inputs().on_ground = true;
+    bench.mission.inputs().autopilot = "arming: in OFFBOARD";
+    bench.Run(0.2);
+    ASSERT_TRUE(autostart || bench.Command(Event::kTakeoff).accepted);
+    bench.Run(19.8);
+    ASSERT_EQ(bench.mission.state(), autostart ? State::kChase : State::kTakeoff);
+    bench.Run(30.0);
+    EXPECT_EQ(bench.mission.state(), State::kReady) << "and does not begin again by itself";
+    EXPECT_EQ(bench.mission.Words(), "take-off called off; fcu: arming: in OFFBOARD");
+  }
+}
+
+TEST(Mission, WhatFliesIsNotCalledOff) {
+  for (const bool on_ground : {false, true}) {
+    Bench bench;
+    bench.Run(0.2);
+    ASSERT_TRUE(bench.Command(Event::kTakeoff).accepted);
+    bench.mission.inputs().handed_over = true;
+    bench.mission.inputs().on_ground = on_ground;
+    bench.mission.inputs().flying = on_ground;  // in the air control may have begun anew
+    bench.Run(300.0);
+    EXPECT_EQ(bench.mission.state(), State::kTakeoff) << on_ground;
+  }
+  MissionConfig config;
+  config.takeoff_patience = 0.0;
+  Bench bench(config);
+  bench.Run(0.2);
+  ASSERT_TRUE(bench.Command(Event::kTakeoff).accepted);
+  bench.mission.inputs().on_ground = true;
+  bench.Run(300.0);
+  EXPECT_EQ(bench.mission.state(), State::kTakeoff) << "asked for by no patience";
 }
 
 TEST(Mission, StartedInFlightItHoldsAndDoesNotGoOnWithALanding) {

@@ -133,7 +133,7 @@ TEST(Envelope, WhoIsOutsideReturns) {
   }
 }
 
-TEST(Envelope, OutsideTheFenceOnlyReturnAndLandingAreObeyed) {
+TEST(Envelope, OutsideTheFenceNothingLeadsAbout) {
   MissionConfig config;
   config.geofence = Box(10.0);
   Bench bench(config);
@@ -141,10 +141,10 @@ TEST(Envelope, OutsideTheFenceOnlyReturnAndLandingAreObeyed) {
   bench.pose.p.x() = 10.1;
   bench.Run(0.2);
   ASSERT_EQ(bench.mission.state(), State::kReturn);
-  for (const Event command : {Event::kChase, Event::kSearch, Event::kHold, Event::kStop}) {
+  for (const Event command : {Event::kChase, Event::kSearch, Event::kHold}) {
     const world::CommandAnswer answer = bench.Command(command);
     EXPECT_FALSE(answer.accepted) << Name(command);
-    EXPECT_EQ(answer.reason, "it is outside the geofence: it returns or lands");
+    EXPECT_EQ(answer.reason, "it is outside the geofence: it returns, lands or stops");
     EXPECT_EQ(bench.mission.state(), State::kReturn);
   }
   EXPECT_TRUE(bench.Command(Event::kReturn).accepted);
@@ -156,6 +156,49 @@ TEST(Envelope, OutsideTheFenceOnlyReturnAndLandingAreObeyed) {
   const world::CommandAnswer answer = bench.Command(Event::kChase);
   EXPECT_FALSE(answer.accepted);
   EXPECT_EQ(answer.reason, "the take-off place is not known, nor the geofence");
+}
+
+TEST(Envelope, AStopHoldsWhereverItIsAndWhateverTheBatteryHas) {
+  MissionConfig config;
+  config.geofence = Box(10.0);
+  for (const double charge : {0.8, 0.2, 0.05}) {
+    Bench bench(config);
+    bench.Fly();
+    bench.mission.inputs().battery = charge;
+    bench.pose.p.x() = 10.1;
+    bench.Run(0.2);
+    ASSERT_EQ(bench.mission.state(), charge < 0.1 ? State::kLand : State::kReturn);
+    const world::CommandAnswer answer = bench.Command(Event::kStop);
+    EXPECT_TRUE(answer.accepted) << answer.reason;
+    bench.Run(5.0);
+    EXPECT_EQ(bench.mission.state(), State::kHold) << "nobody undoes it";
+    ASSERT_TRUE(bench.Command(Event::kLand).accepted);
+    EXPECT_FALSE(bench.Command(Event::kHold).accepted) << "the envelope leads again";
+  }
+}
+
+TEST(Envelope, WhatIsExceededAfterAStopCountsAndOnceMore) {
+  MissionConfig config;
+  config.geofence = Box(10.0);
+  Bench bench(config);
+  bench.Fly();
+  bench.pose.p.x() = 10.1;
+  bench.Run(0.2);
+  ASSERT_TRUE(bench.Command(Event::kStop).accepted);
+  bench.pose.p.x() = 9.9;
+  bench.Run(0.2);
+  ASSERT_EQ(bench.mission.state(), State::kHold);
+  bench.pose.p.x() = 10.1;
+  bench.Run(0.2);
+  EXPECT_EQ(bench.mission.state(), State::kReturn) << "outside for a second time";
+  ASSERT_TRUE(bench.Command(Event::kStop).accepted);
+  bench.mission.inputs().battery = 0.2;
+  bench.Run(0.2);
+  EXPECT_EQ(bench.mission.state(), State::kReturn);
+  ASSERT_TRUE(bench.Command(Event::kStop).accepted);
+  bench.mission.inputs().battery = 0.05;
+  bench.Run(0.2);
+  EXPECT_EQ(bench.mission.state(), State::kLand);
 }
 
 TEST(Envelope, InAnotherFrameTheFenceIsNotKnownAndNothingLeadsAbout) {

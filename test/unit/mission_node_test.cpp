@@ -9,9 +9,9 @@
 #include "chase/flight_state_t.hpp"
 #include "chase/geofence_t.hpp"
 #include "chase/health_t.hpp"
+#include "common/bus/autopilot_state.h"
 #include "common/bus/battery.h"
 #include "common/bus/convert.h"
-#include "common/bus/hand_over.h"
 #include "common/bus/lockstep.h"
 #include "common/world/ages.h"
 #include "services/fcu/handshake.h"
@@ -187,31 +187,39 @@ TEST(Battery, IsReadBehindTheAutopilotsOwnWords) {
   EXPECT_FALSE(bus::BatteryIn(status));
 }
 
-TEST(HandOver, IsReadInTheBridgesOwnWords) {
+TEST(AutopilotState, ReadsHandOversInTheBridgesOwnWords) {
   using fcu::Handshake;
   using Fcu = Handshake::State;
   status_t status{};
+  status.utime = kStart;
   status.name = "fcu";
+  bus::AutopilotState autopilot;
+  EXPECT_EQ(autopilot.words(), "");
   for (const Fcu state : {Fcu::kPilot, Fcu::kFailsafe, Fcu::kLanding, Fcu::kDone, Fcu::kRefused}) {
     const std::string head = Handshake::Name(state) + ": setpoints have ceased: it lands";
-    status.detail = head + "; POSCTL, armed, battery 70 %";
-    EXPECT_EQ(bus::HandOverIn(status), head);
+    status.detail = head + "; mode POSCTL, armed, in air, battery 70 %";
+    autopilot.Hear(status);
+    EXPECT_TRUE(autopilot.IsHandedOver());
+    EXPECT_EQ(autopilot.words(), head);
   }
   for (const char* ours :
-       {"flying: armed and in OFFBOARD; OFFBOARD, armed", "standby: the pilot may give it back",
-        "battery 80 %", "", "no autopilot: no heartbeat of a PX4 yet"}) {
-    status.detail = ours;
-    EXPECT_EQ(bus::HandOverIn(status), "") << ours;
+       {"flying: armed and in OFFBOARD", "standby: the pilot may give it back",
+        "no autopilot heard on udp", "no autopilot: no heartbeat of a PX4 yet"}) {
+    status.detail = std::string(ours) + "; mode OFFBOARD, armed, in air";
+    autopilot.Hear(status);
+    EXPECT_FALSE(autopilot.IsHandedOver()) << ours;
+    EXPECT_EQ(autopilot.words(), ours);
   }
   status.name = "planning";
-  status.detail = "done: landed";
-  EXPECT_EQ(bus::HandOverIn(status), "");
+  status.detail = "done: landed; mode OFFBOARD, disarmed, on ground";
+  autopilot.Hear(status);
+  EXPECT_FALSE(autopilot.IsHandedOver());
 }
 
 TEST(MissionNode, SaysWhoElseFlies) {
   struct Bridge : bus::Node {
     bus::NodeReport Report() const override {
-      return {bus::NodeReport::State::kOk, "pilot: the pilot has it; POSCTL, armed"};
+      return {bus::NodeReport::State::kOk, "pilot: the pilot has it; mode POSCTL, armed, in air"};
     }
   };
   Bench bench;
@@ -221,6 +229,24 @@ TEST(MissionNode, SaysWhoElseFlies) {
   bench.Command(command_t::TAKEOFF, 1);
   bench.Run(0.2);
   EXPECT_EQ(bench.states.back().reason, "take-off commanded; fcu: pilot: the pilot has it");
+}
+
+TEST(MissionNode, ATakeOffThatTheAutopilotRefusesEndsOnTheGroundInItsWords) {
+  struct Bridge : bus::Node {
+    bus::NodeReport Report() const override {
+      return {bus::NodeReport::State::kDegraded,
+              "refused: arming was refused; mode OFFBOARD, disarmed, on ground"};
+    }
+  };
+  Bench bench;
+  bench.lockstep_.Add("fcu", 0, [](bus::Bus&) { return std::make_unique<Bridge>(); });
+  bench.Run(2.0);
+  bench.Command(command_t::TAKEOFF, 1);
+  bench.Run(2.0);
+  EXPECT_EQ(bench.states.back().state, +flight_state_t::TAKEOFF);
+  bench.Run(1.0);
+  EXPECT_EQ(bench.states.back().state, +flight_state_t::READY);
+  EXPECT_EQ(bench.states.back().reason, "take-off called off; fcu: refused: arming was refused");
 }
 
 TEST(MissionNode, HealthCountsTheLivesOfEveryProcess) {

@@ -81,6 +81,10 @@ class Model {
   void Advance(Event e) {
     const std::pair<State, Event> now{task_, e};
     if (now == std::pair(State::kTakeoff, Event::kUp)) task_ = State::kHold;
+    if (e == Event::kNotFlown && task_ != State::kReturn && task_ != State::kLand) {
+      aloft_ = false;
+      complete_ = true;
+    }
     if (now == std::pair(State::kChase, Event::kLost)) task_ = State::kSearch;
     if (now == std::pair(State::kSearch, Event::kSeen)) task_ = State::kChase;
     if (now == std::pair(State::kSearch, Event::kGaveUp)) task_ = State::kReturn;
