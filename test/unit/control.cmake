@@ -10,4 +10,5 @@ if(TARGET planning_core)
 endif()
 chase_test(control_node_test LIBS control_node
   SOURCES ${CMAKE_CURRENT_LIST_DIR}/control_node_test.cpp
-          ${CMAKE_CURRENT_LIST_DIR}/control_state_test.cpp)
+          ${CMAKE_CURRENT_LIST_DIR}/control_state_test.cpp
+          ${CMAKE_CURRENT_LIST_DIR}/control_fence_test.cpp)

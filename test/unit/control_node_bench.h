@@ -61,6 +61,11 @@ class Bench {
     Send(Hover(utime, p, duration));
   }
   void Send(const plan_t& plan) { bus_->Publish("PLAN", plan); }
+  void Send(const obstacles_t& list) { bus_->Publish("OBSTACLES", list); }
+  void Send(const pose_t& pose) {
+    bus_->Publish("POSE", pose);
+    RunUntil(pose.utime);
+  }
 
   /// A hover that is certified off the wall that SendWall lists.
   static plan_t Certified(int64_t utime, const Eigen::Vector3d& p) {
@@ -91,7 +96,7 @@ class Bench {
     wall.shape = (3.0 * wall.half.cwiseAbs2()).cwiseInverse().asDiagonal();
     wall.center = world::Trajectory::Constant({2, 0, 0}, bus::Seconds(utime, kStart), 1.0);
     m.obstacles = {bus::ToMessage(wall, kStart)};
-    bus_->Publish("OBSTACLES", m);
+    Send(m);
   }
 
   void SendPose(int64_t utime, int8_t health = pose_t::HEALTH_OK, int32_t epoch = 0,
@@ -106,8 +111,7 @@ class Bench {
       m.local_covariance[10 * i] = sigma * sigma;
       m.local_covariance[10 * (i + 3)] = speed_sigma * speed_sigma;
     }
-    bus_->Publish("POSE", m);
-    RunUntil(utime);
+    Send(m);
   }
 
   void RunUntil(int64_t utime) {
