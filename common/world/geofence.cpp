@@ -56,11 +56,17 @@ std::string Geofence::Breach(const Eigen::Vector3d& p, double margin) const {
   return p.z() + margin > ceiling ? "above the geofence" : "";
 }
 
+double Geofence::Room(const Eigen::Vector3d& p) const {
+  const double level = ToEdges(polygon, p.head<2>());
+  return std::min(
+      {IsWithin(polygon, p.head<2>()) ? level : -level, p.z() - floor, ceiling - p.z()});
+}
+
 std::string Geofence::Refusal(const Eigen::Vector3d& p, const std::vector<Eigen::Vector3d>& places,
                               double margin) const {
   const bool near = !Breach(p, margin).empty() || !Breach(places.front(), margin).empty();
   const bool outside = !Breach(p).empty();
-  if (near && places.back().norm() >= p.norm()) return "it leads no way back into the geofence";
+  if (near && Room(places.back()) <= Room(p)) return "it leads no way back into the geofence";
   if (outside) return "";
   for (const Eigen::Vector3d& place : places)
     if (std::string breach = Breach(place, near ? 0.0 : margin); !breach.empty())

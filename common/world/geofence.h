@@ -29,10 +29,14 @@ struct Geofence {
   std::string Breach(const Eigen::Vector3d& p, double margin = 0.0) const;
   /// Why a body at `p` is not to be led along `places`, all counted from the take-off place, m;
   /// empty: it may be. Inside they keep `margin` m off the fence; one that is nearer to it, or
-  /// starts there, is led inside and nearer to the take-off place; one that is outside only nearer.
+  /// starts there, is led inside to where there is more room; one that is outside only nearer.
   std::string Refusal(const Eigen::Vector3d& p, const std::vector<Eigen::Vector3d>& places,
                       double margin) const;
   std::string Problem() const;
+
+ private:
+  /// Distance to the fence, m; outside it is negative.
+  double Room(const Eigen::Vector3d& p) const;
 };
 
 /// Places, frame W, m, on a plan up to its stop and along that to rest: where it is flown if

@@ -64,7 +64,7 @@ bool Mission::Step(double t, Event event, const std::string& detail) {
   if (row == nullptr) return false;
   if (row->to != state_) since_ = t;
   if (row->to == State::kEmergency) before_ = state_;
-  if (row->to == State::kReturn) nearest_ = HUGE_VAL;
+  if (row->to == State::kReturn) visited_.clear();
   state_ = row->to;
   reason_ = row->reason + (detail.empty() ? "" : ": " + detail);
   if (event == Event::kNotFlown) refusal_ = inputs_.autopilot;
@@ -107,13 +107,16 @@ void Mission::Resume(double t) {
   if (before_ == State::kReturn) Step(t, Event::kReturn, when);
 }
 
+// The way home may lead away from it first, around a corner of the geofence; to and fro it leads to
+// no end.
 void Mission::NoteProgress(double t) {
-  constexpr double kNearer = 0.3;  // m, beyond what the pose wavers by
-  if (state_ != State::kReturn || !KnowsHome()) return;
-  const double distance = (inputs_.pose->p - home_->p).head<2>().norm();
-  if (distance > nearest_ - kNearer) return;
-  nearest_ = distance;
-  nearest_since_ = t;
+  constexpr double kElsewhere = 0.3;  // m, beyond what the pose wavers by
+  if (state_ != State::kReturn || !inputs_.pose) return;
+  const Eigen::Vector3d& p = inputs_.pose->p;
+  for (const Eigen::Vector3d& place : visited_)
+    if ((place - p).norm() < kElsewhere) return;
+  visited_.push_back(p);
+  progressed_ = t;
 }
 
 // In the order in which they count; each moves the state that the one before has led to.
@@ -137,8 +140,8 @@ std::vector<Event> Mission::Observed(double t) const {
   add(!KnowsHome(), Event::kHomeLost);
   add(IsHome(), Event::kHome);
   add(state_ == State::kReturn && config_.return_patience > 0.0 &&
-          t - nearest_since_ > config_.return_patience,
-      Event::kNoNearer);
+          t - progressed_ > config_.return_patience,
+      Event::kStuck);
   return events;
 }
 

@@ -93,10 +93,10 @@ class Mission {
   double since_ = 0.0;
   double taken_off_ = 0.0;  // when that was commanded, s
   bool began_ = false;
-  State before_ = State::kHold;  // the emergency
-  double last_usable_ = -1e9;    // pose, s
-  double nearest_ = HUGE_VAL;    // to the take-off place in this RETURN, level, m
-  double nearest_since_ = 0.0;   // s
+  State before_ = State::kHold;           // the emergency
+  double last_usable_ = -1e9;             // pose, s
+  std::vector<Eigen::Vector3d> visited_;  // in this RETURN, frame W, m
+  double progressed_ = 0.0;               // when the last of them was new, s
   std::optional<Home> home_;
   std::vector<std::string> missing_;
 };

@@ -28,7 +28,7 @@ struct MissionConfig {
     v("give_up", give_up, "returns after looking for the target for so long, s; 0: never");
     v("home_radius", home_radius, "level distance at which it is back at the take-off place, m");
     v("return_patience", return_patience,
-      "lands where it is after coming no nearer to the take-off place for so long, s; 0: never");
+      "lands where it is after coming to no new place on its way back for so long, s; 0: never");
     v("takeoff_patience", takeoff_patience,
       "calls a take-off off that the autopilot has not begun after so long, s; 0: never");
     v("rest_speed", rest_speed, "below this the body is at rest, m/s");

@@ -51,7 +51,7 @@ const std::vector<Transition>& Transitions() {
 
       {S::kReturn,    E::kHome,     S::kLand,    "back at the take-off place"},
       {S::kReturn,    E::kHomeLost, S::kLand,    "the take-off place is not known: landing here"},
-      {S::kReturn,    E::kNoNearer, S::kLand,    "it gets no nearer to the take-off place: landing here"},
+      {S::kReturn,    E::kStuck,    S::kLand,    "it gets no farther on its way back: landing here"},
       {S::kReturn,    E::kChase,    S::kChase,   "chase commanded"},
       {S::kReturn,    E::kHold,     S::kHold,    "hold commanded"},
       {S::kReturn,    E::kStop,     S::kHold,    "stop commanded"},

@@ -41,7 +41,7 @@ enum class Event {
   kGaveUp,    ///< it has been looked for long enough
   kHome,      ///< over the take-off place, at rest
   kHomeLost,  ///< the take-off place is not known in the frame W of today
-  kNoNearer,  ///< to the take-off place for so long that it will not get there
+  kStuck,     ///< for too long it has come to no place where it had not been in this RETURN
   kPoseLost,  ///< for so long that control comes down by itself
   kPoseBack,
   kMotorsOff,

@@ -197,7 +197,7 @@ TEST(Mission, AReturnGoesOnOnceThereIsAPoseAgain) {
   EXPECT_EQ(bench.mission.state(), State::kLand) << "the take-off place is not known any more";
 }
 
-TEST(Mission, AReturnThatComesNoNearerLands) {
+TEST(Mission, AReturnThatGetsNoFartherLands) {
   MissionConfig config;
   config.return_patience = 10.0;
   Bench bench(config);
@@ -218,7 +218,7 @@ TEST(Mission, AReturnThatComesNoNearerLands) {
   EXPECT_EQ(bench.mission.state(), State::kReturn);
   bench.Run(1.0);
   EXPECT_EQ(bench.mission.state(), State::kLand);
-  EXPECT_EQ(bench.mission.reason(), "it gets no nearer to the take-off place: landing here");
+  EXPECT_EQ(bench.mission.reason(), "it gets no farther on its way back: landing here");
 }
 
 TEST(Mission, AReturnWithoutEndIsAskedForByNoPatience) {

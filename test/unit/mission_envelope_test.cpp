@@ -97,6 +97,26 @@ TEST(Geofence, RefusesWaysThatLeadOutOrTooNear) {
   EXPECT_EQ(refusal({1.87, 0.0, 1.0}, 1.89, 1.9), "it leads no way back into the geofence");
 }
 
+// Around the inner corner of an L the way home leads away from it first.
+TEST(Geofence, WhoIsTooNearIsLedToMoreRoomAlsoAwayFromHome) {
+  Geofence fence;
+  fence.polygon = {{-2, -2}, {2, -2}, {2, 10}, {8, 10}, {8, -2}, {12, -2}, {12, 14}, {-2, 14}};
+  const Vector3d near(8.1, 8.0, 1.0);
+  EXPECT_EQ(fence.Refusal(near, {near, {8.1, 12.0, 1.0}}, 0.12), "");
+  EXPECT_EQ(fence.Refusal(near, {near, {8.05, 7.0, 1.0}}, 0.12),
+            "it leads no way back into the geofence")
+      << "nearer home, and to the fence";
+  EXPECT_EQ(fence.Refusal(near, {near, {7.9, 8.0, 1.0}, {0.0, 8.0, 1.0}}, 0.12),
+            "it leads outside the geofence");
+  const Vector3d outside(7.9, 8.0, 1.0), below(1.0, 1.0, -1.5);
+  EXPECT_EQ(fence.Refusal(outside, {outside, {8.5, 8.0, 1.0}}, 0.12), "");
+  EXPECT_EQ(fence.Refusal(outside, {outside, {5.0, 8.0, 1.0}}, 0.12),
+            "it leads no way back into the geofence");
+  EXPECT_EQ(fence.Refusal(below, {below, {1.0, 1.0, 0.0}}, 0.12), "");
+  EXPECT_EQ(fence.Refusal(below, {below, {0.0, 0.0, -1.6}}, 0.12),
+            "it leads no way back into the geofence");
+}
+
 TEST(Envelope, AWayOutOfTheFenceIsHeldInsideWhateverTheState) {
   MissionConfig config;
   config.geofence = Box(10.0);

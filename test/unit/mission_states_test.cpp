@@ -90,7 +90,7 @@ class Model {
     if (now == std::pair(State::kSearch, Event::kGaveUp)) task_ = State::kReturn;
     if (now == std::pair(State::kReturn, Event::kHome)) task_ = State::kLand;
     if (now == std::pair(State::kReturn, Event::kHomeLost)) task_ = State::kLand;
-    if (now == std::pair(State::kReturn, Event::kNoNearer)) task_ = State::kLand;
+    if (now == std::pair(State::kReturn, Event::kStuck)) task_ = State::kLand;
     const bool leads =
         task_ == State::kTakeoff || task_ == State::kChase || task_ == State::kSearch;
     const bool stays_up = leads || task_ == State::kHold;
