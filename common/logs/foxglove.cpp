@@ -1,7 +1,9 @@
 #include "common/logs/foxglove.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <type_traits>
 
 #include "common/bus/convert.h"
 #include "common/bus/image_format.h"
@@ -9,7 +11,6 @@
 #include "common/logs/jpeg.h"
 #include "common/logs/message_types.h"
 #include "common/logs/protobuf.h"
-#include "common/world/rig.h"
 #include "lcmtypes/lcm_texts.h"
 
 namespace chase::logs {
@@ -77,13 +78,16 @@ Proto& Doubles(int field, const std::vector<double>& values, Proto* out) {
   return out->Bytes(field, bytes);
 }
 
-/// Of the rig that flies by default: a log does not hold another.
-std::string Calibration(int64_t utime) {
-  const world::Rig rig;
+/// Foxglove knows OpenCV's models by these names; a pinhole is a lens that bends nothing.
+std::string Calibration(int64_t utime, const world::Rig& rig) {
   const double f = rig.focal_px, u = rig.center_u_px, v = rig.center_v_px;
+  const bool fisheye = rig.lens == "fisheye", bends = fisheye || rig.lens == "plumb_bob";
+  std::vector<double> bend(fisheye ? 4 : 5, 0.0);
+  if (bends) std::copy_n(rig.lens_coefficients.data(), bend.size(), bend.begin());
   Proto out;
-  out.Put(1, Stamp(utime)).Int(2, rig.width_px).Int(3, rig.height_px).Bytes(4, "plumb_bob");
-  Doubles(5, {0, 0, 0, 0, 0}, &out);
+  out.Put(1, Stamp(utime)).Int(2, rig.width_px).Int(3, rig.height_px);
+  out.Bytes(4, fisheye ? "kannala_brandt" : "plumb_bob");
+  Doubles(5, bend, &out);
   Doubles(6, {f, 0, u, 0, f, v, 0, 0, 1}, &out);
   Doubles(7, {1, 0, 0, 0, 1, 0, 0, 0, 1}, &out);
   Doubles(8, {f, 0, u, 0, 0, f, v, 0, 0, 0, 1, 0}, &out);
@@ -104,8 +108,7 @@ Proto Transform(int64_t utime, const char* parent, const char* child, const Vect
       .Put(5, Rotation(q));
 }
 
-std::string Transforms(const pose_t& m) {
-  const world::Rig rig;
+std::string Transforms(const pose_t& m, const world::Rig& rig) {
   return Proto()
       .Put(1, Transform(m.utime, "world", "body", bus::ToVector(m.pos), ToRotation(m.orientation)))
       .Put(1, Transform(m.utime, "body", "lidar", rig.lidar_position, Quaterniond(rig.R_BL())))
@@ -126,52 +129,36 @@ std::string LogLine(const status_t& m) {
                  m.name);
 }
 
-/// What Foxglove draws of a message, besides its fields.
-template <class T>
-void AddDrawn(const T&, const std::string&, Messages*) {}
-void AddDrawn(const pose_t& m, const std::string& channel, Messages* out) {
-  out->push_back({channel + "/pose", "foxglove.PoseInFrame",
-                  PoseInWorld(m.utime, bus::ToVector(m.pos), ToRotation(m.orientation))});
-  out->push_back({"/tf", "foxglove.FrameTransforms", Transforms(m)});
-}
-void AddDrawn(const truth_t& m, const std::string& channel, Messages* out) {
-  out->push_back({channel + "/pose", "foxglove.PoseInFrame",
-                  PoseInWorld(m.utime, bus::ToVector(m.pos), ToRotation(m.orientation))});
-}
-void AddScene(const std::string& scene, const std::string& channel, Messages* out) {
-  out->push_back({channel + "/scene", "foxglove.SceneUpdate", scene});
-}
-void AddDrawn(const obstacles_t& m, const std::string& channel, Messages* out) {
-  AddScene(SceneOf(m), channel, out);
-}
-void AddDrawn(const target_t& m, const std::string& channel, Messages* out) {
-  AddScene(SceneOf(m), channel, out);
-}
-void AddDrawn(const plan_t& m, const std::string& channel, Messages* out) {
-  AddScene(SceneOf(m), channel, out);
-}
-void AddDrawn(const prediction_t& m, const std::string& channel, Messages* out) {
-  AddScene(SceneOf(m), channel, out);
-}
-void AddDrawn(const geofence_t& m, const std::string& channel, Messages* out) {
-  AddScene(SceneOf(m), channel, out);
-}
-void AddDrawn(const status_t& m, const std::string& channel, Messages* out) {
-  out->push_back({channel + "/log", "foxglove.Log", LogLine(m)});
-}
-void AddDrawn(const event_t& m, const std::string& channel, Messages* out) {
+std::string LogLine(const event_t& m) {
   constexpr int kWarning = 3;
   const std::string text = m.name + (m.phase == event_t::BEGINS ? " begins" : " ends");
-  out->push_back({channel + "/log", "foxglove.Log", LogLine(m.utime, kWarning, text, m.sender)});
+  return LogLine(m.utime, kWarning, text, m.sender);
+}
+
+template <class T, class... Any>
+constexpr bool kIs = (std::is_same_v<T, Any> || ...);
+
+/// What Foxglove draws of a message, besides its fields.
+template <class T>
+void AddDrawn(const T& m, const std::string& channel, const world::Rig& rig, Messages* out) {
+  if constexpr (kIs<T, pose_t, truth_t>)
+    out->push_back({channel + "/pose", "foxglove.PoseInFrame",
+                    PoseInWorld(m.utime, bus::ToVector(m.pos), ToRotation(m.orientation))});
+  if constexpr (kIs<T, pose_t>)
+    out->push_back({"/tf", "foxglove.FrameTransforms", Transforms(m, rig)});
+  if constexpr (kIs<T, obstacles_t, target_t, plan_t, prediction_t, geofence_t>)
+    out->push_back({channel + "/scene", "foxglove.SceneUpdate", SceneOf(m)});
+  if constexpr (kIs<T, status_t, event_t>)
+    out->push_back({channel + "/log", "foxglove.Log", LogLine(m)});
 }
 
 template <class T>
-void Add(const T& m, const LogEvent& e, const ViewerOptions&, Messages* out) {
+void Add(const T& m, const LogEvent& e, const ViewerOptions& options, Messages* out) {
   const Struct& type = *OurTypes().Find(T::getTypeName());
   const std::string body(e.bytes.begin() + 8, e.bytes.end());  // behind the fingerprint
   out->push_back({e.channel, std::string("chase.") + T::getTypeName(),
                   ToProto(OurTypes(), type, Decode(OurTypes(), type, body)).bytes()});
-  AddDrawn(m, e.channel, out);
+  AddDrawn(m, e.channel, options.rig, out);
 }
 void Add(const lidar_scan_t& m, const LogEvent& e, const ViewerOptions&, Messages* out) {
   out->push_back({e.channel, "foxglove.PointCloud", CloudBytes(m, "lidar")});
@@ -186,7 +173,8 @@ void Add(const camera_image_t& m, const LogEvent& e, const ViewerOptions& option
     out->push_back({e.channel, "foxglove.RawImage", RawImage(m)});
   else if (!jpeg.empty())
     out->push_back({e.channel, "foxglove.CompressedImage", CompressedImage(m, jpeg)});
-  out->push_back({e.channel + "/calibration", "foxglove.CameraCalibration", Calibration(m.utime)});
+  out->push_back({e.channel + "/calibration", "foxglove.CameraCalibration",
+                  Calibration(m.utime, options.rig)});
 }
 
 }  // namespace

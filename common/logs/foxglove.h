@@ -5,6 +5,7 @@
 
 #include "common/logs/log_reader.h"
 #include "common/logs/schema.h"
+#include "common/world/rig.h"
 
 namespace chase::logs {
 
@@ -20,6 +21,7 @@ struct ViewerMessage {
 
 struct ViewerOptions {
   bool jpeg = false;  ///< images lossy, at a twentieth of the size
+  world::Rig rig;     ///< that flew: no message tells it
 };
 
 /// What a viewer shows of a message. Clouds and images become Foxglove's own; every other message

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "common/bus/convert.h"
+#include "common/world/forecast.h"
 
 namespace chase::logs {
 namespace {
@@ -157,7 +158,8 @@ std::string SceneOf(const prediction_t& m) {
   const world::Trajectory path = bus::FromMessage(m.target, m.target.utime);
   for (int i = 1; i <= kSpreads; ++i) {
     const double t = path.duration * i / kSpreads;
-    const Matrix3d S = bus::ToMatrix(m.covariance) + t * t * bus::ToMatrix(m.velocity_covariance);
+    const Matrix3d S = world::ForecastCovariance(bus::ToMatrix(m.covariance),
+                                                 bus::ToMatrix(m.velocity_covariance), t);
     entity.Put(kSphere, Ellipsoid(path.Position(path.start + t),
                                   kForecastSigmas * kForecastSigmas * S, 0.5, kSpread));
   }

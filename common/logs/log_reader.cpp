@@ -35,9 +35,16 @@ struct LogReader::Header {
   int64_t utime = 0, channel_bytes = 0, data_bytes = 0, size = 0;
 };
 
+std::string LogOf(const std::string& flight) {
+  namespace fs = std::filesystem;
+  return fs::is_directory(flight) ? (fs::path(flight) / "flight.lcm").string() : flight;
+}
+
 LogReader::LogReader(const std::string& file, Watch watch) : file_(file), watch_(std::move(watch)) {
   if (!std::filesystem::is_regular_file(file))
-    throw std::runtime_error(file + ": no such file; check the path");
+    throw std::runtime_error(file + (std::filesystem::exists(file)
+                                         ? ": is no regular file; name a log"
+                                         : ": no such file; check the path"));
   const int fd = open(file.c_str(), O_RDONLY | O_CLOEXEC);
   if (fd < 0) throw std::runtime_error(file + ": cannot be opened; check its permissions");
   size_ = static_cast<int64_t>(std::filesystem::file_size(file));

@@ -19,6 +19,9 @@ struct LogEvent {
   std::vector<uint8_t> bytes;
 };
 
+/// The log of a flight's folder, or `flight` itself, which is a log.
+std::string LogOf(const std::string& flight);
+
 class LogReader;
 /// Hears of every event that was read and of the end: for progress and for what was damaged.
 using Watch = std::function<void(const LogReader&)>;

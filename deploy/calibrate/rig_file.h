@@ -4,18 +4,11 @@
 #include <string>
 
 #include "common/config/config.h"
-#include "common/world/rig.h"
+#include "common/world/rig_file.h"
 
 namespace chase::calibrate {
 
-/// The file that every service's --config loads: key `rig`.
-struct RigFile {
-  world::Rig rig;
-  template <class V>
-  void Visit(V& v) {
-    v("rig", rig, "where the sensors sit, and the camera");
-  }
-};
+using world::RigFile;
 
 /// Pose of the LiDAR in the camera by a rig, and the rig with another one. The camera's own place
 /// on the body stays: a ruler gives it.

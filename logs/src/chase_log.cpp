@@ -1,3 +1,4 @@
+#include <fmt/format.h>
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
@@ -7,7 +8,9 @@
 #include <filesystem>
 #include <stdexcept>
 
+#include "common/config/config.h"
 #include "common/config/version.h"
+#include "common/world/rig_file.h"
 #include "logs/src/copy.h"
 #include "logs/src/diff.h"
 #include "logs/src/export.h"
@@ -26,7 +29,7 @@ using namespace chase::logs;
 constexpr std::chrono::milliseconds kProgressPeriod(200);
 
 struct Arguments {
-  std::string in, out, other, format, channel, config;
+  std::string in, out, other, format, channel, config, rig;
   std::vector<std::string> ignore, files;
   Selection selection;
   double tolerance = 0.0;
@@ -73,9 +76,13 @@ void RefuseSame(const std::string& in, const std::string& out) {
       throw std::runtime_error(written + " is the file that is read; name another for the output");
 }
 
+void AddLog(CLI::App* sub, const char* name, std::string* log) {
+  sub->add_option(name, *log, "LCM log, or the folder of a flight")->required()->transform(LogOf);
+}
+
 void AddInfo(CLI::App* app, Arguments* a) {
   auto* sub = app->add_subcommand("info", "One line per channel: type, count, rate, bytes, times.");
-  sub->add_option("LOG", a->in, "LCM log")->required();
+  AddLog(sub, "LOG", &a->in);
   sub->callback([a] { std::fputs(Format(Describe(a->in)).c_str(), stdout); });
 }
 
@@ -96,20 +103,29 @@ void AddImport(CLI::App* app, Arguments* a) {
   sub->callback([a] { RunImport(*a); });
 }
 
+chase::world::Rig RigIn(const std::string& file) {
+  chase::world::RigFile rig;
+  if (!file.empty()) chase::config::Load(file, &rig);
+  return rig.rig;
+}
+
 void RunExport(const Arguments& a) {
   RefuseSame(a.in, a.out);
-  if (a.long_form && !a.csv)
-    throw BadOption(std::string("--long: does nothing with ") + (a.tum ? "--tum" : "--mcap") +
-                    "; leave it out, or export --csv");
-  if (a.jpeg && !a.mcap)
-    throw BadOption(std::string("--jpeg: does nothing with ") + (a.tum ? "--tum" : "--csv") +
-                    "; leave it out, or export --mcap");
+  const auto only_with = [&](bool given, const char* option, bool fits, const char* format) {
+    const char* chosen = a.tum ? "--tum" : a.csv ? "--csv" : "--mcap";
+    if (given && !fits)
+      throw BadOption(fmt::format("{}: does nothing with {}; leave it out, or export {}", option,
+                                  chosen, format));
+  };
+  only_with(a.long_form, "--long", a.csv, "--csv");
+  only_with(a.jpeg, "--jpeg", a.mcap, "--mcap");
+  only_with(!a.rig.empty(), "--rig", a.mcap, "--mcap");
   if (a.tum)
     std::printf("%s: %ld poses\n", a.out.c_str(),
                 ExportTum(a.in, a.out, a.channel.empty() ? "POSE" : a.channel, Progress()));
   else if (a.mcap)
     std::printf("%s: %ld messages\n", a.out.c_str(),
-                ExportMcap(a.in, a.out, a.channel, a.jpeg, Progress()));
+                ExportMcap(a.in, a.out, a.channel, {a.jpeg, RigIn(a.rig)}, Progress()));
   else
     std::printf("%s: %d files\n", a.out.c_str(),
                 ExportCsv(a.in, a.out, a.channel, a.long_form, Progress()));
@@ -125,11 +141,13 @@ void AddExport(CLI::App* app, Arguments* a) {
                    "protobuf for Foxglove: all fields, and its own schemas where they fit");
   format->require_option(1);
   sub->add_flag("--jpeg", a->jpeg, "--mcap: images as JPEG, with loss, at a twentieth of the size");
+  sub->add_option("--rig", a->rig,
+                  "--mcap: calibration file of the rig that flew (default: the default rig)");
   sub->add_flag("--long", a->long_form,
                 "--csv: a row for every element: event_utime, seq, field, index, value");
   sub->add_option("--channel", a->channel,
                   "this channel only; --csv leaves out clouds and images unless they are named");
-  sub->add_option("LOG", a->in, "LCM log")->required();
+  AddLog(sub, "LOG", &a->in);
   sub->add_option("OUT", a->out, "file or folder to write")->required();
   sub->callback([a] { RunExport(*a); });
 }
@@ -143,15 +161,15 @@ void RunCopy(const Arguments& a, const char* cure) {
   if (s.from == none.from && s.to == none.to && s.keep.empty() && s.drop.empty())
     throw BadOption(std::string("nothing is selected, this would copy the log; give ") + cure);
   if (s.to <= s.from)
-    throw BadOption("--to " + std::to_string(s.to) + ": is not after --from " +
-                    std::to_string(s.from) + "; give a later time");
+    throw BadOption(
+        fmt::format("--to {:g}: is not after --from {:g}; give a later time", s.to, s.from));
   RefuseSame(a.in, a.out);
   Say(a, CopySelected(a.in, a.out, s, Progress()));
 }
 
 CLI::App* AddInOut(CLI::App* app, Arguments* a, const char* name, const char* description) {
   auto* sub = app->add_subcommand(name, description);
-  sub->add_option("LOG", a->in, "LCM log")->required();
+  AddLog(sub, "LOG", &a->in);
   sub->add_option("OUT", a->out, "LCM log to write")->required();
   return sub;
 }
@@ -205,7 +223,7 @@ void RunMigrate(const Arguments& a) {
 void AddMigrate(CLI::App* app, Arguments* a) {
   auto* sub = app->add_subcommand(
       "migrate", "Brings a log that an older version recorded to today's messages.");
-  sub->add_option("OLD", a->in, "LCM log")->required();
+  AddLog(sub, "OLD", &a->in);
   sub->add_option("NEW", a->out, "LCM log to write")->required();
   sub->callback([a] { RunMigrate(*a); });
 }
@@ -213,8 +231,8 @@ void AddMigrate(CLI::App* app, Arguments* a) {
 void AddDiff(CLI::App* app, Arguments* a, int* exit_code) {
   auto* sub =
       app->add_subcommand("diff", "Compares two logs field by field; exit 1 if they differ.");
-  sub->add_option("A", a->in, "LCM log")->required();
-  sub->add_option("B", a->other, "LCM log")->required();
+  AddLog(sub, "A", &a->in);
+  AddLog(sub, "B", &a->other);
   sub->add_option("--tolerance", a->tolerance,
                   "numbers this close are the same: absolute below 1, relative above")
       ->check(ToleranceProblem);
@@ -227,14 +245,8 @@ void AddDiff(CLI::App* app, Arguments* a, int* exit_code) {
   });
 }
 
-/// The log of a flight's folder, or the log itself.
-std::string LogOf(const std::string& flight) {
-  namespace fs = std::filesystem;
-  return fs::is_directory(flight) ? (fs::path(flight) / "flight.lcm").string() : flight;
-}
-
 void RunIdentify(const Arguments& a) {
-  const std::string log = LogOf(a.in);
+  const std::string& log = a.in;
   RefuseSame(log, a.out);
   if (!a.config.empty() && a.out.empty())
     throw BadOption("--config: does nothing without --out; name the file to write");
@@ -254,7 +266,7 @@ void RunIdentify(const Arguments& a) {
 void AddIdentify(CLI::App* app, Arguments* a) {
   auto* sub = app->add_subcommand(
       "identify", "Drag, thrust curve and delays of a vehicle from a flight, with uncertainties.");
-  sub->add_option("FLIGHT", a->in, "LCM log, or the folder of a flight")->required();
+  AddLog(sub, "FLIGHT", &a->in);
   sub->add_option("--out", a->out,
                   "file to write for chase-control --config: what the flight shows");
   sub->add_option("--config", a->config,
@@ -266,9 +278,9 @@ void AddVerify(CLI::App* app, Arguments* a, int* exit_code) {
   auto* sub = app->add_subcommand(
       "verify",
       "Checks the proofs of every plan in exact arithmetic; exit 1 if one does not hold.");
-  sub->add_option("FLIGHT", a->in, "LCM log, or the folder of a flight")->required();
+  AddLog(sub, "FLIGHT", &a->in);
   sub->callback([a, exit_code] {
-    const Verification verification = Verify(LogOf(a->in));
+    const Verification verification = Verify(a->in);
     std::fputs(Format(verification).c_str(), stdout);
     *exit_code = verification.Holds() ? 0 : 1;
   });
@@ -303,7 +315,9 @@ int main(int argc, char** argv) {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
     if (e.get_exit_code() == 0) return app.exit(e);
-    std::fprintf(stderr, "chase-log: %s; see chase-log --help\n", e.what());
+    const auto chosen = app.get_subcommands();
+    std::fprintf(stderr, "chase-log: %s; see chase-log %s--help\n", e.what(),
+                 chosen.empty() ? "" : (chosen[0]->get_name() + " ").c_str());
     return 1;
   } catch (const std::exception& e) {
     std::fprintf(stderr, "chase-log: %s\n", e.what());

@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "common/config/version.h"
+#include "common/logs/log_reader.h"
 #include "logs/src/compare.h"
 #include "logs/src/output.h"
 #include "logs/src/page_template.h"
@@ -88,9 +89,9 @@ int main(int argc, char** argv) {
   app.name("chase-report");
   chase::config::AddVersion(&app);
   std::string log, other, out;
-  app.add_option("LOG", log, "LCM log of a flight")->required();
-  app.add_option("LOG2", other,
-                 "a second one: the two are compared, and what got worse is flagged");
+  app.add_option("LOG", log, "LCM log of a flight, or its folder")->required()->transform(LogOf);
+  app.add_option("LOG2", other, "a second one: the two are compared, and what got worse is flagged")
+      ->transform(LogOf);
   app.add_option("--out", out,
                  "folder for metrics.json, report.html and PNGs; default: the log's; of two "
                  "logs: for comparison.txt and report.html; default: neither is written");

@@ -13,6 +13,7 @@
 
 #include "common/bus/message_head.h"
 #include "common/logs/log_reader.h"
+#include "logs/src/export.h"
 #include "logs/src/message_fields.h"
 
 namespace chase::logs {
@@ -236,12 +237,24 @@ std::optional<std::pair<LogEvent, LogEvent>> Step(const std::map<std::string, Pa
   return pair;
 }
 
+/// `pattern`: CHANNEL or CHANNEL.field, either part a shell pattern.
+void RequireChannel(const std::string& pattern, const std::map<std::string, Pairing>& channels) {
+  const std::string name = pattern.substr(0, pattern.find('.'));
+  const bool fits = std::any_of(channels.begin(), channels.end(), [&](const auto& channel) {
+    return fnmatch(name.c_str(), channel.first.c_str(), 0) == 0;
+  });
+  if (!fits)
+    throw BadOption("--ignore " + pattern +
+                    ": neither log holds that; chase-log info lists channels");
+}
+
 }  // namespace
 
 std::map<std::string, ChannelDifference> Diff(const std::string& a, const std::string& b,
                                               const std::vector<std::string>& ignore,
                                               double tolerance) {
   const auto pairings = Pair(NamesIn(a), NamesIn(b));
+  for (const std::string& pattern : ignore) RequireChannel(pattern, pairings);
   Comparison comparison(ignore, tolerance, pairings);
   Side side_a(a), side_b(b);
   while (side_a.more || side_b.more) {

@@ -3,6 +3,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "common/logs/foxglove.h"
 #include "common/logs/log_reader.h"
 
 namespace chase::logs {
@@ -31,8 +32,8 @@ int ExportCsv(const std::string& log, const std::string& out, const std::string&
               bool long_form = false, const Watch& watch = {});
 
 /// Every message (or those of `channel`) as protobuf in an MCAP file for Foxglove and the like
-/// (foxglove.h), with `jpeg` the images compressed with loss. Returns the number of messages.
+/// (foxglove.h). Returns the number of messages.
 long ExportMcap(const std::string& log, const std::string& out, const std::string& channel = "",
-                bool jpeg = false, const Watch& watch = {});
+                const ViewerOptions& options = {}, const Watch& watch = {});
 
 }  // namespace chase::logs

@@ -120,7 +120,9 @@ int ExportCsv(const std::string& log, const std::string& out, const std::string&
     if (channel.empty() ? bus::IsHeavy(e.channel) : e.channel != channel) continue;
     const auto fields = FieldsOf(e.bytes);
     if (!fields) continue;
-    std::filesystem::create_directories(out);
+    std::error_code error;
+    std::filesystem::create_directories(out, error);
+    if (error) throw std::runtime_error(out + ": is no folder and cannot be made one");
     const std::string file = (std::filesystem::path(out) / (e.channel + ".csv")).string();
     tables.try_emplace(e.channel, file, long_form).first->second.Add(e.utime, *fields);
   }

@@ -1,4 +1,3 @@
-#include "common/logs/foxglove.h"
 #include "common/logs/log_reader.h"
 #include "logs/src/export.h"
 #include "logs/src/mcap_writer.h"
@@ -6,13 +5,13 @@
 namespace chase::logs {
 
 long ExportMcap(const std::string& log, const std::string& out, const std::string& channel,
-                bool jpeg, const Watch& watch) {
+                const ViewerOptions& options, const Watch& watch) {
   LogReader reader(log, watch);
   McapWriter writer(out);
   long count = 0;
   for (LogEvent e; reader.Next(&e);) {
     if (!channel.empty() && e.channel != channel) continue;
-    const auto messages = ToViewer(e, {jpeg});
+    const auto messages = ToViewer(e, options);
     for (const ViewerMessage& m : messages) {
       if (!writer.HasChannel(m.topic))
         writer.AddChannel(m.topic, m.schema, DescriptorsOf(m.schema));

@@ -2,6 +2,7 @@
 
 #include <string>
 
+#include "common/world/forecast.h"
 #include "services/planning/planner_config.h"
 
 namespace chase::planning {
@@ -13,8 +14,8 @@ struct PlanningConfig {
   double replan_period = 0.2;
   double min_period = 0.04;
   double latency = 0.04;
-  double target_acceleration = 0.5;
-  double target_memory = 0.5;
+  double target_acceleration = world::kTargetManoeuvre.acceleration;
+  double target_memory = world::kTargetManoeuvre.memory;
   double takeoff_height = 1.2;
   double takeoff_time = 3.0;
   double search_yaw_rate = 1.0;

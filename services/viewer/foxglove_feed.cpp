@@ -2,8 +2,6 @@
 
 #include <algorithm>
 
-#include "common/logs/foxglove.h"
-
 namespace chase::viewer {
 
 bool FoxgloveFeed::Needs(const std::string& channel) const {
@@ -24,10 +22,8 @@ uint32_t FoxgloveFeed::IdOf(const std::string& topic, const std::string& schema)
 }
 
 void FoxgloveFeed::Convert(const std::string& channel, int64_t utime, std::vector<uint8_t> bytes) {
-  logs::ViewerOptions options;
-  options.jpeg = true;
   std::vector<uint32_t> ids;
-  for (auto& message : logs::ToViewer({utime, channel, std::move(bytes)}, options)) {
+  for (auto& message : logs::ToViewer({utime, channel, std::move(bytes)}, options_)) {
     ids.push_back(IdOf(message.topic, message.schema));
     if (server_.Subscribed(ids.back()))
       server_.SendMessage(ids.back(), utime, std::move(message.bytes));

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "common/logs/foxglove.h"
 #include "services/viewer/server.h"
 
 namespace chase::viewer {
@@ -13,7 +14,7 @@ namespace chase::viewer {
 /// to. A channel is advertised with its first message.
 class FoxgloveFeed {
  public:
-  explicit FoxgloveFeed(Server& server) : server_(server) {}
+  FoxgloveFeed(Server& server, const world::Rig& rig) : server_(server), options_{true, rig} {}
 
   template <class T>
   void Offer(const std::string& channel, const T& message) {
@@ -29,6 +30,7 @@ class FoxgloveFeed {
   uint32_t IdOf(const std::string& topic, const std::string& schema);
 
   Server& server_;
+  const logs::ViewerOptions options_;
   std::map<std::string, uint32_t> ids_;                      // by topic
   std::map<std::string, std::vector<uint32_t>> of_channel_;  // what a channel's messages become
 };

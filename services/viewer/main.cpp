@@ -1,6 +1,7 @@
 #include <CLI/CLI.hpp>
 
 #include "common/bus/run_service.h"
+#include "common/logs/log_reader.h"
 #include "services/viewer/play.h"
 #include "services/viewer/token_file.h"
 #include "services/viewer/viewer_node.h"
@@ -20,7 +21,9 @@ int main(int argc, char** argv) {
     auto* token = app.add_option(
         "--token-file", token_file,
         "its first line is what commands must carry (default: no commands are taken)");
-    auto* play = app.add_option("--play", log, "LCM log to play instead of looking at the bus");
+    auto* play =
+        app.add_option("--play", log, "LCM log, or folder of a flight, to play instead of the bus")
+            ->transform(chase::logs::LogOf);
     for (const char* live : {"--lcm-url", "--channel-prefix", "--replay"})
       play->excludes(app.get_option(live));
     play->excludes(token);

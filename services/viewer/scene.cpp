@@ -3,6 +3,8 @@
 #include <Eigen/Eigenvalues>
 #include <cmath>
 
+#include "common/world/forecast.h"
+
 namespace chase::viewer {
 
 Axes AxesOf(const Eigen::Matrix3d& S) {
@@ -28,7 +30,8 @@ Solid SolidOf(const world::Obstacle& o, double t) {
 }
 
 double SpreadAt(const Forecast& forecast, double dt) {
-  return AxesOf(forecast.covariance + dt * dt * forecast.velocity_covariance).half.maxCoeff();
+  return AxesOf(world::ForecastCovariance(forecast.covariance, forecast.velocity_covariance, dt))
+      .half.maxCoeff();
 }
 
 }  // namespace chase::viewer

@@ -93,8 +93,8 @@ struct Solid {
 };
 Solid SolidOf(const world::Obstacle& obstacle, double t);
 
-/// Standard deviation [m] of the forecast `dt` seconds from its start, the largest over directions,
-/// for a velocity that errs as it does at the start: sqrt(eig(P + V dt^2)).
+/// Standard deviation [m] of the forecast `dt` seconds from its start, the largest over directions:
+/// of the place and the velocity it started with, and of the manoeuvres that planning expects.
 double SpreadAt(const Forecast& forecast, double dt);
 
 }  // namespace chase::viewer

@@ -24,7 +24,7 @@ std::string ViewerConfig::Problem() const {
   if (jpeg_quality < 1 || jpeg_quality > 100)
     return Outside("jpeg_quality", jpeg_quality, "1..100");
   if (!(trail >= 1.0 && trail <= 600.0)) return Outside("trail", trail, "[1, 600]");
-  return "";
+  return rig.LensProblem();
 }
 
 }  // namespace chase::viewer

@@ -2,6 +2,8 @@
 
 #include <string>
 
+#include "common/world/rig.h"
+
 namespace chase::viewer {
 
 /// Rates and sizes keep a client below 130 kB/s, so that a link of 200 kB/s carries one: states 10
@@ -16,6 +18,7 @@ struct ViewerConfig {
   double image_rate_hz = 4.0;
   int jpeg_quality = 60;  ///< of 100, on the page
   double trail = 60.0;    ///< s of history that a new page is told
+  world::Rig rig;         ///< whose calibration Foxglove is told
 
   template <class V>
   void Visit(V& v) {
@@ -29,6 +32,7 @@ struct ViewerConfig {
     v("image_rate_hz", image_rate_hz, "images a second on the page");
     v("jpeg_quality", jpeg_quality, "of the page's images, 1 to 100");
     v("trail", trail, "s of history that a new page is told");
+    v("rig", rig, "calibration: where the sensors sit, the camera and its lens");
   }
 
   /// Names the field, its value and the limit; empty when all is well.

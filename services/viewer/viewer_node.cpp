@@ -25,7 +25,7 @@ ServerConfig ServerConfigOf(const ViewerConfig& config, const std::string& sourc
 
 ViewerNode::ViewerNode(bus::Bus& bus, const ViewerConfig& config, const std::string& source)
     : server_(ServerConfigOf(config, source), LoadAssets(AssetFolder())),
-      foxglove_(server_),
+      foxglove_(server_, config.rig),
       feed_(bus, server_, config, source),
       commander_(bus, config.token, source.empty(),
                  [this](const auto&... answer) { server_.Answer(answer...); }) {

@@ -140,6 +140,11 @@ class LogTools(unittest.TestCase):
         self.assertEqual(run("chase-log", "diff", self.log, none).stdout,
                          f"IMU: {n} messages against 0; {n} of A are not in B\n")
 
+    def test_diff_refuses_to_ignore_what_neither_log_holds(self):
+        for pattern in ("NO_SUCH.seq", "NO_SUCH"):
+            self.assert_refused(run("chase-log", "diff", self.log, self.log, "--ignore", pattern), 2, pattern, "info")
+        self.good("diff", self.log, self.log, "--ignore", "*_STATUS.*", "--ignore", "POSE", "--ignore", "*.seq")
+
     def test_diff_of_a_replay_pairs_by_time(self):
         half = self.folder / "half.lcm"
         lcmlog.write(half, [e for e in self.events if e[0] >= 5_000_000])
@@ -267,11 +272,18 @@ class LogTools(unittest.TestCase):
                                  (("--from 5", "later"), ("cut", "--from", "5", "--to", "5")),
                                  (("lasts", "--from"), ("cut", "--from", "1000")),
                                  (("NO_SUCH", "info"), ("filter", "--keep", "NO_SUCH")),
-                                 (("--long", "--csv"), ("export", "--tum", "--long"))):
+                                 (("--long", "--csv"), ("export", "--tum", "--long")),
+                                 (("--rig", "--mcap"), ("export", "--csv", "--rig", self.log))):
             with self.subTest(arguments=arguments):
                 answer = run("chase-log", *arguments, self.log, out)
                 self.assert_refused(answer, 2, *words)
                 self.assertFalse(out.exists())
+
+    def test_csv_onto_a_file_is_refused(self):
+        self.assert_refused(run("chase-log", "export", "--csv", self.log, self.log), 1, "is read")
+        taken = self.folder / "taken.csv"
+        taken.write_text("")
+        self.assert_refused(run("chase-log", "export", "--csv", self.log, taken), 1, "taken.csv: is no folder")
 
     def test_long_csv_has_a_row_for_every_element(self):
         out = self.folder / "csv"
@@ -319,6 +331,32 @@ class LogTools(unittest.TestCase):
         self.assertEqual(set(topics), {"CAMERA_IMAGE", "CAMERA_IMAGE/calibration"})
         self.assertEqual(topics["CAMERA_IMAGE"]["schema"], "foxglove.CompressedImage")
         self.assertLess(topics["CAMERA_IMAGE"]["first"]["data"], 376 * 240 / 2)
+
+    def test_mcap_tells_the_lens_of_the_rig(self):
+        rig = self.folder / "rig.yaml"
+        rig.write_text("rig: {lens: fisheye, lens_coefficients: [0.1, 0.2, 0.3, 0.4, 0], focal_px: 250}\n")
+        lens = self.mcap("--channel", "CAMERA_IMAGE", "--jpeg", "--rig", rig)["CAMERA_IMAGE/calibration"]["first"]
+        self.assertEqual((lens["distortion_model"], lens["D"], lens["K"][0]), ("kannala_brandt", [0.1, 0.2, 0.3, 0.4], 250))
+        pinhole = self.mcap("--channel", "CAMERA_IMAGE", "--jpeg")["CAMERA_IMAGE/calibration"]["first"]
+        self.assertEqual((pinhole["distortion_model"], pinhole["D"]), ("plumb_bob", [0] * 5))
+
+    def test_a_flights_folder_stands_for_its_log(self):
+        for command in ("info", "verify"):
+            self.assertEqual(self.good(command, self.folder), self.good(command, self.log))
+        self.good("cut", self.folder, self.folder / "of_folder.lcm", "--to", "0.5")
+        self.assertEqual(self.good("diff", self.folder, self.log), "no difference\n")
+        self.assertEqual(run("chase-report", self.folder).returncode, 2)  # a second of it was flown
+        self.assertTrue((self.folder / "report.html").exists())
+        self.assert_refused(run("chase-log", "cut", self.folder, self.log, "--to", "1"), 1, "is read")
+        empty = self.folder / "empty"
+        empty.mkdir()
+        for program in (["chase-log", "info"], ["chase-report"], ["chase-viewer", "--port", "0", "--play"]):
+            self.assert_refused(run(*program, empty), 1, "empty/flight.lcm", "no such file")
+        self.assert_refused(run("chase-log", "info", "/dev/null"), 1, "no regular file")
+
+    def test_refusals_point_to_the_commands_own_help(self):
+        self.assert_refused(run("chase-log", "cut"), 1, "see chase-log cut --help")
+        self.assert_refused(run("chase-log", "no_such"), 1, "see chase-log --help")
 
     def test_identify_takes_a_flights_folder(self):
         text = self.good("identify", self.folder)

@@ -1,11 +1,13 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <map>
 #include <vector>
 
 #include "common/logs/foxglove_scene.h"
+#include "common/world/forecast.h"
 
 namespace chase::logs {
 namespace {
@@ -114,7 +116,8 @@ TEST(FoxgloveScene, AForecastWidens) {
   m.velocity_covariance[0] = 0.03;
   const auto spheres = Drawn(SceneOf(m))[kSpheres];
   const Parts last = PartsOf(PartsOf(spheres.back()).nested.at(kSize).at(0));
-  EXPECT_NEAR(std::max({last.doubles.at(1), last.doubles.at(2), last.doubles.at(3)}), 4 * 0.2,
+  const double deviation = std::sqrt(0.04 + world::kTargetManoeuvre.Variance(1.0));
+  EXPECT_NEAR(std::max({last.doubles.at(1), last.doubles.at(2), last.doubles.at(3)}), 4 * deviation,
               1e-9);
 }
 

@@ -104,7 +104,10 @@ TEST(ViewerScene, TheFanWidens) {
   f.covariance = 0.01 * Matrix3d::Identity();
   f.velocity_covariance = 0.04 * Matrix3d::Identity();
   EXPECT_NEAR(SpreadAt(f, 0.0), 0.1, 1e-12);
-  EXPECT_NEAR(SpreadAt(f, 2.0), std::sqrt(0.01 + 0.16), 1e-12);
+  // 0.5 m/s^2 that is forgotten within 0.5 s, over four times as long: 2/3 x^3 - x^2 + 2 - 2 (1 +
+  // x) exp(-x), times 0.5^2 0.5^4.
+  const double manoeuvre = (2.0 / 3.0 * 64 - 16 + 2 - 10 * std::exp(-4)) * 0.015625;
+  EXPECT_NEAR(SpreadAt(f, 2.0), std::sqrt(0.01 + 0.16 + manoeuvre), 1e-12);
 }
 
 Scene FullScene(double v) {

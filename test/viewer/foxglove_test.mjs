@@ -51,7 +51,7 @@ async function connect(port, protocols) {
   return seen;
 }
 
-const viewer = await play();
+const viewer = await play('rig: {lens: plumb_bob, lens_coefficients: [-0.3, 0.1, 0, 0, 0.02]}\n');
 const page = await pageClient(viewer.port);
 page.ask({speed: 5});
 const seen = await connect(viewer.port, [FoxgloveClient.SUPPORTED_SUBPROTOCOL]);
@@ -73,6 +73,9 @@ assert.strictEqual(cloud.data.length % cloud.point_stride, 0);
 assert.ok(cloud.data.length > 1000 * cloud.point_stride);
 assert.strictEqual(Buffer.from(seen.first.get('CAMERA_IMAGE').data).readUInt16BE(0), 0xffd8);
 assert.deepStrictEqual(seen.first.get('/tf').transforms.map((t) => t.child_frame_id), ['body', 'lidar', 'camera']);
+
+const lens = seen.first.get('CAMERA_IMAGE/calibration');
+assert.deepStrictEqual([lens.distortion_model, ...lens.D], ['plumb_bob', -0.3, 0.1, 0, 0, 0.02]);
 
 // The layout to import names nothing that is not there.
 const layout = JSON.parse(await (await fetch(`${viewer.url}foxglove-layout.json`)).text());
