@@ -83,6 +83,28 @@ const way = await page.evaluate(async () => {
 });
 assert.deepStrictEqual(way, [1, 1.5, 2, 7]);
 
+// What has not changed is not drawn anew, and strips change four times a second at most.
+await toggle();
+await until('a pause', paused);
+await sleep(3000);  // the camera comes to rest
+const idle = await page.evaluate(async () => {
+  const {scene, counts} = window.chase, before = [scene.frames, counts.lines, counts.state];
+  const changes = [], watch = new MutationObserver((records) => changes.push(...records.map((r) => r.target.id)));
+  for (const part of document.querySelectorAll('header, #view')) watch.observe(part, {subtree: true, childList: true, characterData: true, attributes: true});
+  await new Promise((done) => setTimeout(done, 1000));
+  watch.disconnect();
+  return {changes, frames: scene.frames - before[0], lines: counts.lines - before[1], states: counts.state - before[2]};
+});
+assert.ok(idle.states >= 5, `${idle.states} states`);
+assert.deepStrictEqual([idle.changes, idle.frames, idle.lines], [[], 0, 0]);
+await toggle();
+const running = await page.evaluate(async () => {
+  const {counts} = window.chase, before = counts.lines;
+  await new Promise((done) => setTimeout(done, 2000));
+  return counts.lines - before;
+});
+assert.ok(running >= 2 && running <= 9, `${running} times in 2 s`);
+
 // A process's row stays where it is while its figures change.
 await page.click('#health details summary');
 const health = after.counts.health;

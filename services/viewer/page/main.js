@@ -4,19 +4,26 @@ import {Scene3D} from './scene3d.js';
 import {drawTimeline, drawStrips, timeAt} from './strips.js';
 import {drawImage, showHealth, makeCommands, allowCommands} from './panels.js';
 import {T, DRONE, VERDICTS, VERDICT_COLORS, SCENE_COLORS, SCENE_WORDS, TARGET_STATES, HEALTHS, FOLLOWING, FLIGHT_STATES,
-  FLIGHT_COLORS, format} from './names.js';
+  FLIGHT_COLORS, format, setText} from './names.js';
 
 const WINDOW = 60;   // s of a live flight that the strips show
 const STALE = 0.5;   // s without a pose
+const LINES = 4;     // times a second
 const SILENT = 2;    // s without a flight state (common/world/ages.h)
 const page = Object.fromEntries([...document.querySelectorAll('[id]')].map((e) => [e.id, e]));
 const scene = new Scene3D(page.scene);
 const now = () => model.play ? model.play.t : model.rows.at(-1)?.[T] ?? 0;
 const model = {rows: [], generation: -1, play: null, duration: 0, seeking: false};
 // What a test looks at.
-window.chase = {model, scene, counts: {state: 0, cloud: 0, image: 0, health: 0, obstacles: 0, reply: 0}};
+window.chase = {model, scene, counts: {lines: 0, state: 0, cloud: 0, image: 0, health: 0, obstacles: 0, reply: 0}};
 
-const pill = (element, text, kind) => { element.textContent = text; element.className = `pill ${kind}`; };
+function pill(element, text, kind, color = '') {
+  const look = [text, kind, color].join();
+  if (element.look === look) return;
+  element.textContent = element.title = text;
+  Object.assign(element, {look, className: `pill ${kind}`});
+  Object.assign(element.style, {background: color, color: color && '#0c1116'});
+}
 
 function span() {
   if (model.play) return [0, model.duration];
@@ -30,37 +37,34 @@ function showFlight(flight) {
   const missing = on_ground && flight.missing.length ? `: ${flight.missing.join(', ')}` : '';
   const text = !flight ? '' : silent ? `flight state ${flight.age.toFixed(0)} s old`
     : `${FLIGHT_STATES[flight.state] ?? '?'}: ${flight.reason}${missing}`;
-  pill(page.flight, text, silent ? 'bad' : '');
-  page.flight.title = text;
-  page.flight.style.background = silent ? '' : FLIGHT_COLORS[flight?.state] ?? '';
-  page.flight.style.color = flight && !silent ? '#0c1116' : '';
+  pill(page.flight, text, silent ? 'bad' : '', silent ? '' : FLIGHT_COLORS[flight?.state]);
 }
 
 function showPills({drone, target, plan, following, flight}) {
   showFlight(flight);
   const verdict = plan?.verdict;
-  pill(page.verdict, plan ? `${VERDICTS[verdict] ?? '?'}${plan.reason ? ': ' + plan.reason : ''}` : 'no plan', '');
-  page.verdict.title = page.verdict.textContent;
-  page.verdict.style.background = VERDICT_COLORS[verdict] ?? '';
-  page.verdict.style.color = plan ? '#0c1116' : '';
+  pill(page.verdict, plan ? `${VERDICTS[verdict] ?? '?'}${plan.reason ? ': ' + plan.reason : ''}` : 'no plan', '', VERDICT_COLORS[verdict]);
   pill(page.targetstate, target ? `target ${TARGET_STATES[target.state]}` : 'no target', target?.state === 1 ? 'good' : 'warn');
   const stale = drone && drone.age > STALE;
   pill(page.pose, !drone ? 'no pose' : stale ? `pose ${drone.age.toFixed(1)} s old` : HEALTHS[drone.health],
     !drone || stale || drone.health === 2 ? 'bad' : drone.health === 0 ? 'good' : 'warn');
   page.scene.style.opacity = stale ? 0.5 : 1;
-  page.figures.textContent = drone
-    ? `height ${format(drone.p[2], 2, 'm')}\nfollows ${FOLLOWING[following] ?? '–'}` : '';
+  setText(page.figures, drone ? `height ${format(drone.p[2], 2, 'm')}\nfollows ${FOLLOWING[following] ?? '–'}` : '');
 }
 
 function showPlayer(play) {
   page.player.hidden = false;
-  page.playbutton.textContent = play.playing ? '\u2759\u2759' : '\u25b6';
-  page.scrubber.max = play.duration;
+  setText(page.playbutton, play.playing ? '\u2759\u2759' : '\u25b6');
+  if (Number(page.scrubber.max) !== play.duration) page.scrubber.max = play.duration;
   if (!model.seeking) page.scrubber.value = play.t;
   if (document.activeElement !== page.speed) page.speed.value = String(play.speed);
 }
 
+// What the lines show moves a pixel in a second and more: they are drawn anew LINES times a second at most.
 function drawLines() {
+  if (!model.lines) return;
+  model.lines = false;
+  window.chase.counts.lines++;
   const [from, to] = span();
   drawTimeline(page.timeline, model.rows, from, to, now());
   drawStrips(page.strips, model.rows, from, to, now());
@@ -72,10 +76,12 @@ const handlers = {
     page.source.textContent = message.source || 'live';
     model.rows = message.rows;
     model.duration = message.duration;
+    model.lines = true;
     allowCommands(page, message.commands);
   },
   state(message) {
     window.chase.counts.state++;
+    const {generation, play} = model, paused = play && message.generation === generation && message.play?.t === play.t;
     if (message.generation !== model.generation) {  // a seek, or another frame W
       scene.clear();
       if (!message.play) for (const row of model.rows) row.fill(null, DRONE);
@@ -90,11 +96,12 @@ const handlers = {
     } else {
       showPlayer(model.play);
     }
+    if (paused) return;
     scene.setState(message);
     scene.setTrail(model.rows, now());
     showPills(message);
-    page.clock.textContent = `${now().toFixed(1)} s${model.play ? ` / ${model.duration.toFixed(1)} s` : ''}`;
-    drawLines();
+    setText(page.clock, `${now().toFixed(1)} s${model.play ? ` / ${model.duration.toFixed(1)} s` : ''}`);
+    model.lines = true;
   },
   obstacles(message) { window.chase.counts.obstacles++; scene.setObstacles(message.rows); },
   health(message) {
@@ -146,4 +153,5 @@ page.legend.replaceChildren(legend('', Object.entries(SCENE_WORDS).map(([key, te
   legend('plan, wide: its stop ', VERDICTS.map((name, i) => [name, VERDICT_COLORS[i]])));
 page.colors.open = innerWidth > 800;  // a phone's scene has no room for them
 page.safety.onsubmit = (event) => event.preventDefault();
-window.addEventListener('resize', drawLines);
+setInterval(drawLines, 1000 / LINES);
+window.addEventListener('resize', () => { model.lines = true; });

@@ -1,5 +1,5 @@
 // Camera image, process health, commands.
-import {TARGET_STATES, TARGET_COLORS, STATE_COLORS, COMMANDS, format} from './names.js';
+import {TARGET_STATES, TARGET_COLORS, STATE_COLORS, COMMANDS, format, setText} from './names.js';
 
 const STALE = 3;  // s without a status
 
@@ -23,8 +23,8 @@ export async function drawImage(canvas, text, {about, jpeg}) {
     context.lineWidth = 2;
     context.strokeRect(u - w / 2, v - h / 2, w, h);
   }
-  text.textContent = about.state === undefined ? 'no target heard'
-    : `target ${TARGET_STATES[about.state] ?? '?'}, probability ${format(about.existence, 2, '')}`;
+  setText(text, about.state === undefined ? 'no target heard'
+    : `target ${TARGET_STATES[about.state] ?? '?'}, probability ${format(about.existence, 2, '')}`);
 }
 
 // A row per process. Rows stay while their texts change, so that a click meets what it was aimed at.
@@ -46,12 +46,12 @@ function updateProcess(details, row) {
   const [summary, text, table] = details.children, [dot, , share, losses] = summary.children;
   const stale = row.age > STALE;
   dot.style.background = stale ? '#d9534f' : STATE_COLORS[row.state] ?? '#7d8896';
-  share.textContent = stale ? `silent ${row.age.toFixed(0)} s` : row.cpu === null || row.cpu < 0 ? '' : `${row.cpu.toFixed(0)} %`;
+  setText(share, stale ? `silent ${row.age.toFixed(0)} s` : row.cpu === null || row.cpu < 0 ? '' : `${row.cpu.toFixed(0)} %`);
   const sum = (k) => row.channels.reduce((n, c) => n + c[k], 0);
   const lost = sum(2), malformed = sum(3);
-  losses.textContent = [row.restarts > 0 ? `${row.restarts} restarts` : '', lost + malformed > 0 ? `${lost} lost ${malformed} malformed` : '']
-    .filter((text) => text).join(', ');
-  text.textContent = `${row.detail}${row.error ? ` · last error: ${row.error}` : ''} · ${format(row.rss, 0, 'MiB')}`;
+  setText(losses, [row.restarts > 0 ? `${row.restarts} restarts` : '', lost + malformed > 0 ? `${lost} lost ${malformed} malformed` : '']
+    .filter((text) => text).join(', '));
+  setText(text, `${row.detail}${row.error ? ` · last error: ${row.error}` : ''} · ${format(row.rss, 0, 'MiB')}`);
   table.replaceChildren(...row.channels.map(([channel, rate, dropped, bad, foreign]) => {
     const line = element('tr');
     line.append(element('td', channel), element('td', format(rate, 1, 'Hz')), element('td', `${dropped} lost`),

@@ -86,7 +86,9 @@ export class Scene3D {
   constructor(canvas) {
     THREE.Object3D.DEFAULT_UP.set(0, 0, 1);
     this.canvas = canvas;
-    this.renderer = new THREE.WebGLRenderer({canvas, antialias: false, powerPreference: 'low-power'});
+    // Opaque: what is behind the canvas need not be drawn and blended.
+    const context = canvas.getContext('webgl2', {alpha: false, antialias: false, powerPreference: 'low-power'});
+    this.renderer = new THREE.WebGLRenderer({canvas, context});
     this.scene = new THREE.Scene();
     this.scene.background = new THREE.Color('#12161c');
     this.camera = new THREE.PerspectiveCamera(50, 1, 0.1, 500);

@@ -74,7 +74,7 @@ export function drawStrips(canvas, rows, from, to, now) {
     }
     context.stroke();
     context.fillStyle = DIM;
-    context.fillText(most.toPrecision(2), 8, top + 9);
+    context.fillText(shown.length > 0 ? most.toPrecision(2) : '–', 8, top + 9);
     context.fillText('0', 8, top + step - 8);
     const text = `${name}  ${format(current?.[column], digits, unit)}`;
     context.fillStyle = '#1a2028c0';  // the line goes on below
