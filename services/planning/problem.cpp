@@ -112,7 +112,8 @@ Limits MakeLimits(const PlannerConfig& c, const Stretch& over, const Eigen::Vect
   const double tangent = std::tan(c.max_elevation_deg * M_PI / 180.0);
   const double now = std::abs(r.z()) / std::max(r.head<2>().norm(), 1e-3);
   limits.tan_elevation = now < kOverhead ? at_least(tangent, now) : 0.0;
-  limits.min_distance = std::min(c.min_distance, 0.9 * r.norm());
+  limits.min_distance =
+      std::min(c.min_distance, std::max(0.0, (1.0 - kRounding) * r.norm() - kRounding));
   if (!over.asks_sight) return limits;
   limits.view = c.view();
   const double below = SeenAt(r, s.a, nullptr).x();
