@@ -369,6 +369,8 @@ TEST(PlanCheck, OnlyAnEscapeMayStartInside) {
   EXPECT_EQ(Verdict(c), later);
   left.ground = true;
   EXPECT_EQ(Verdict(c), "") << "the ground is left by a climb from rest";
+  begin(0.65, left.id);
+  EXPECT_EQ(Verdict(c), later);
 }
 
 TEST(PlanCheck, AnEscapeComesNoNearerToWhatItLeaves) {
@@ -388,7 +390,7 @@ TEST(PlanCheck, AnEscapeComesNoNearerToWhatItLeaves) {
 }
 
 /// A plan that moves on over [1, 3], and the stop that leaves it at `at`, off by so much.
-Claim Leaving(double at, double off, double faster) {
+Claim Leaving(double at, double off, double faster, double duration = 1.5) {
   Claim claim;
   claim.last_resort = true;
   claim.position = {1.0, 2.0, Eigen::MatrixXd::Zero(3, 3)};
@@ -397,11 +399,11 @@ Claim Leaving(double at, double off, double faster) {
   const Vector3d p = claim.position.Position(at), v = claim.position.Velocity(at);
   const Vector3d begin = p + off * Vector3d(0.6, 0.0, 0.8);
   const Vector3d speed = v + faster * Vector3d(0.0, 0.6, 0.8);
-  claim.stop = {at, 1.5, Eigen::MatrixXd::Zero(5, 3)};
+  claim.stop = {at, duration, Eigen::MatrixXd::Zero(5, 3)};
   const double powers[] = {1.0, -3.0, 3.0, -1.0};  // tau (1 - tau)^3: to rest where it begins
   claim.stop->coefficients.row(0) = begin.transpose();
   for (int k = 0; k < 4; ++k)
-    claim.stop->coefficients.row(k + 1) = powers[k] * 1.5 * speed.transpose();
+    claim.stop->coefficients.row(k + 1) = powers[k] * duration * speed.transpose();
   return claim;
 }
 
@@ -418,7 +420,8 @@ TEST(PlanCheck, AStopLeavesThePlanWhereItIsThen) {
   EXPECT_EQ(bad(1.4, 0.0, 0.9e-4), "");
   EXPECT_EQ(bad(1.4, 1.1e-4), "the stop begins elsewhere");
   EXPECT_EQ(bad(1.4, 0.0, 1.1e-4), "the stop begins elsewhere");
-  Claim claim = Leaving(1.4, 0.0, 0.0);
+  Claim claim = Leaving(1.4, 0.0, 0.0, 1e-3);
+  EXPECT_EQ(Refute(claim, {0.3, 2.0}, {}), "") << "however short";
   claim.stop->duration = 0.0;
   EXPECT_EQ(Refute(claim, {0.3, 2.0}, {}), "the stop is no curve");
 }

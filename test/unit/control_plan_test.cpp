@@ -194,6 +194,12 @@ TEST(PlanFollower, RefusesNumbersThatAreNone) {
   }
 }
 
+TEST(PlanFollower, TakesPlansAndStopsHoweverShort) {
+  PlanFollower follower;
+  EXPECT_TRUE(follower.Add(WithStop(Moving(0.0, 0.01, 0.0, 1.0), 0.005, 0.01)));
+  EXPECT_TRUE(follower.At(0.007));
+}
+
 TEST(PlanFollower, APlanIsLeftForItsStopOrEnds) {
   Plan plan = WithStop(Moving(1.0, 2.0, 0.0, 3.0), 1.4, 1.0);
   EXPECT_EQ(StopsAt(plan), 1.4);

@@ -212,7 +212,6 @@ TEST(Margins, GiveWayToTheHardRadiusAndNoFurther) {
   }
 }
 
-// Nothing but its body keeps the drone off the target: no least distance, and a wish to be in it.
 /// A target walks through a door of 1.4 m in a wall whose halves are boxes of 4 m.
 TEST(Doors, OfAWallOfLongBoxesAreFollowedThrough) {
   const auto planner = MakePlanner("chase", PlannerConfig{});
@@ -245,6 +244,29 @@ TEST(Doors, OfAWallOfLongBoxesAreFollowedThrough) {
   EXPECT_GT(request.start.p.x(), 3.5);
 }
 
+// Its manoeuvres count until a plan's stop begins, along a way to rest to its end, and no longer:
+// what they add by then, spread over the square of the time.
+TEST(TargetBody, ManoeuvresCountForAsLongAsAPlanIsFlown) {
+  const PlannerConfig config;
+  PlanRequest request = Hover();
+  request.t0 = 0.3;  // after its forecast was made
+  request.target_manoeuvre = {0.4, 1.0};
+  request.target_body = Cylinder(kTargetId, {3.0, 0.0, 0.85}, {0.0, 0.0, 0.0}, 0.3, 0.85);
+  request.target_body->velocity_covariance = 0.01 * Eigen::Matrix3d::Identity();
+  request.target_body->center.start = 0.0;
+  for (const bool rests : {false, true}) {
+    request.asks_sight = !rests;
+    const Problem problem = MakeProblem(config, request, nullptr);
+    const double T = request.horizon, age = 0.3 + (rests ? T : 0.4);
+    const double rate = 0.01 + request.target_manoeuvre.Variance(age) / (age * age);
+    ASSERT_TRUE(problem.target_body && problem.target_body->body);
+    const auto& S = problem.target_body->body->covariance;
+    EXPECT_NEAR(S[2](0, 0), T * T * rate, 1e-9) << rests;
+    EXPECT_NEAR(S[0](1, 1), 0.3 * 0.3 * rate, 1e-9) << rests;
+  }
+}
+
+// Nothing but its body keeps the drone off the target: no least distance, and a wish to be in it.
 TEST(TargetBody, IsKeptOffByPlansThatItDrivesAt) {
   PlannerConfig config;
   config.min_distance = 0.0;

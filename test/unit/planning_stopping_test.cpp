@@ -137,6 +137,11 @@ TEST(Brake, FindsAQuickOneWhereThereIsOneAndNoneElse) {
   EXPECT_GT(none, 20);
 }
 
+PlanRequest AtRest(PlanRequest request) {
+  request.start.v = request.start.a = request.start.j = Vector3d::Zero();
+  return request;
+}
+
 // What leads to a place is certified, leads there and rests there.
 TEST(GoTo, LeadsToThePlaceWhereTheWayIsFree) {
   const PlannerConfig c;
@@ -149,7 +154,10 @@ TEST(GoTo, LeadsToThePlaceWhereTheWayIsFree) {
     const Vector3d end = request.start.p + RandomVector(&random, 4.0, 4.0, 0.2);
     const auto way = GoTo(c, request, end);
     request.obstacles.clear();
-    EXPECT_TRUE(GoTo(c, request, end)) << seed;
+    ASSERT_TRUE(GoTo(c, request, end)) << seed;
+    // At a metre a second where nothing is in the way, and in no less than 1.5 s.
+    const auto quick = GoTo(c, AtRest(request), end);
+    EXPECT_NEAR(quick->trajectory.duration, std::max(1.5, (end - request.start.p).norm()), 1e-9);
     if (!way) continue;
     ++found;
     request = RandomRequest(c, seed);
@@ -179,8 +187,6 @@ double FirstContact(const PlannerConfig& c, const PlanRequest& request,
   return HUGE_VAL;
 }
 
-// Walkers close in from all sides: what is flown touches no earlier than any braking within the
-// limits would.
 // A plan that was certified with its stop is flown on where nothing else can be certified from
 // where the body is by now: until that stop begins, and along it.
 TEST(Rest, GoesOnWithTheStopThatWasCommittedTo) {
@@ -249,6 +255,8 @@ TEST(Brake, CountsOnNoForecastBeyondItsEnd) {
   EXPECT_TRUE(Brake(config, request)) << "forecast for as long as it takes";
 }
 
+// Walkers close in from all sides: what is flown touches no earlier than any braking within the
+// limits would.
 TEST(Evade, TouchesNoEarlierThanABraking) {
   const PlannerConfig c;
   int weighed = 0, later = 0;

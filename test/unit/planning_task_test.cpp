@@ -377,6 +377,30 @@ TEST(Task, WithoutListsItNeitherReturnsNorIsLedAside) {
   }
 }
 
+// Lists count for 0.3 s, by when they were heard and not by when the plan begins.
+TEST(Task, ListsCountUntilTheyAreOldWhateverItDoes) {
+  for (const double age : {0.235, 0.34})
+    for (const Task task : {Task::kHold, Task::kReturn, Task::kLand, Task::kChase}) {
+      Flight flight;
+      flight.Chase(9.0);
+      if (task == Task::kChase) flight.pilot.SetTask(Task::kHold, flight.home());
+      flight.sees_target = false;
+      flight.hears = false;
+      flight.pilot.SetObstacles(flight.t, {});
+      flight.Run(age);
+      flight.pilot.SetTask(task, flight.home());
+      const size_t before = flight.plans.size();
+      flight.Run(PlanningConfig().min_period + kPeriod);
+      ASSERT_GT(flight.plans.size(), before);
+      const PlanResult& plan = flight.plans[before];
+      const bool heard = plan.reason.find("not heard of") == std::string::npos;
+      EXPECT_EQ(heard, age < 0.3) << static_cast<int>(task) << " " << plan.reason;
+      EXPECT_EQ(plan.certified_clearance >= 0.0, age < 0.3) << plan.reason;
+      EXPECT_EQ(plan.reason == "returning", task == Task::kReturn && age < 0.3);
+      EXPECT_EQ(plan.reason.find("landing, ") == 0 && heard, task == Task::kLand && age < 0.3);
+    }
+}
+
 TEST(Trail, LosesItsLoops) {
   Trail trail;
   const auto go = [&](const Vector3d& from, const Vector3d& to) {
