@@ -23,4 +23,5 @@ chase_test(planning_node_test LIBS planning_node
 # CHASE_PLANS=10000 asks for as many plans.
 chase_test(planning_minkowski_test
   LIBS planning_core math_exact
-  SOURCES ${CMAKE_CURRENT_LIST_DIR}/planning_minkowski_test.cpp ${CMAKE_CURRENT_LIST_DIR}/separation_model.cpp)
+  SOURCES ${CMAKE_CURRENT_LIST_DIR}/planning_minkowski_test.cpp ${CMAKE_CURRENT_LIST_DIR}/planning_proofs_test.cpp
+          ${CMAKE_CURRENT_LIST_DIR}/planning_margins_test.cpp ${CMAKE_CURRENT_LIST_DIR}/separation_model.cpp)
