@@ -230,6 +230,44 @@ TEST(Rest, GoesOnWithTheStopThatWasCommittedTo) {
   std::printf("%d before a stop, %d along it\n", before, along);
 }
 
+// A plan that could be left for 0.4 s on end, within 1.1 s of its start, has a stop; one that can
+// be left in time is, and early.
+TEST(WayOut, IsFoundWhereThePlanCanBeLeftForAWhile) {
+  const PlannerConfig config;
+  PlannerConfig hard = config;
+  hard.safety_margin = 0.0;
+  int late = 0, none = 0;
+  for (unsigned seed = 0; seed < 2000; ++seed) {
+    PlanRequest request = RandomRequest(config, seed);
+    Random random(seed, 8);
+    world::Trajectory plan{request.t0, 2.0, Eigen::MatrixXd::Zero(3, 3)};  // that bends
+    plan.coefficients.row(0) = request.start.p.transpose();
+    plan.coefficients.row(1) = 2.0 * request.start.v.transpose();
+    plan.coefficients.row(2) = RandomVector(&random, 5.0, 5.0, 0.0).transpose();
+    const std::optional<Stop> stop = WayOut(config, request, plan);
+    PlanRequest later = request;
+    const auto is_free = [&](double after) {
+      later.t0 = request.t0 + after;
+      later.start = plan.At(later.t0);
+      return Brake(hard, later).has_value();
+    };
+    constexpr int kWindow = 8;  // of 0.05 s
+    int run = 0, longest = 0;
+    for (int i = 0; i <= 22; ++i) {
+      run = is_free(0.05 * i) ? run + 1 : 0;
+      longest = std::max(longest, run);
+    }
+    EXPECT_TRUE(stop || longest <= kWindow) << seed;
+    none += !stop;
+    if (!stop) continue;
+    const double after = stop->trajectory.start - plan.start;
+    EXPECT_TRUE(std::abs(after - kOverdue) < 1e-9 || !is_free(kOverdue)) << seed << " " << after;
+    late += after > kOverdue + 1e-9 && after < 1.2;
+  }
+  EXPECT_GT(late, 5);
+  EXPECT_GT(none, 20);
+}
+
 // A quartic that ends at rest before a wall says nothing of what comes after.
 TEST(Brake, CountsOnNoForecastBeyondItsEnd) {
   PlannerConfig config;
