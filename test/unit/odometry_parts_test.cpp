@@ -216,11 +216,14 @@ TEST(SurfaceMap, FindsThePlaneThatItsPointsCameFrom) {
   EXPECT_EQ(map.Find(Eigen::Vector3f(50.0f, 0.0f, 0.0f), kEye), nullptr);
 }
 
-/// A wall thinner than a cell: each room knows its own face of it, whichever was learnt first.
+/// A wall thinner than a cell: each room knows its own face of it, whichever was learnt first, and
+/// when the map has forgotten what is far.
 TEST(SurfaceMap, TellsTheFacesOfAThinWallApart) {
   constexpr float kThickness = 0.15f;
   Noise noise(7);
-  SurfaceMap map(MapConfig{}, SurfaceKind::kPlane);
+  MapConfig config;
+  config.max_cells = 1300;
+  SurfaceMap map(config, SurfaceKind::kPlane);
   const auto learn = [&](float x, const Eigen::Vector3f& eye) {
     std::vector<Eigen::Vector3f> points;
     for (int i = 0; i < 20000; ++i)
@@ -230,22 +233,31 @@ TEST(SurfaceMap, TellsTheFacesOfAThinWallApart) {
     map.Add(points, eye);
   };
   const Eigen::Vector3f west(-1.0f, 2.0f, 1.0f), east(1.0f, 2.0f, 1.0f);
+  const auto expect_faces = [&] {
+    for (int i = 0; i < 200; ++i) {
+      const float y = static_cast<float>(0.2 + 3.6 * noise.Uniform());
+      for (const bool in_east : {false, true}) {
+        const float x = in_east ? kThickness : 0.0f;
+        const Surface* face = map.Find({x, y, 1.0f}, in_east ? east : west);
+        ASSERT_NE(face, nullptr) << "y " << y;
+        EXPECT_NEAR(face->center.x(), x, 0.005f);
+        EXPECT_NEAR(face->direction.x(), in_east ? 1.0f : -1.0f, 0.01f);
+      }
+    }
+  };
   learn(0.0f, west);
   for (int i = 0; i < 200; ++i) {
     const Eigen::Vector3f p(kThickness, static_cast<float>(4.0 * noise.Uniform()), 1.0f);
     ASSERT_EQ(map.Find(p, east), nullptr);
   }
   learn(kThickness, east);
-  for (int i = 0; i < 200; ++i) {
-    const float y = static_cast<float>(0.2 + 3.6 * noise.Uniform());
-    for (const bool in_east : {false, true}) {
-      const float x = in_east ? kThickness : 0.0f;
-      const Surface* face = map.Find({x, y, 1.0f}, in_east ? east : west);
-      ASSERT_NE(face, nullptr) << "y " << y;
-      EXPECT_NEAR(face->center.x(), x, 0.005f);
-      EXPECT_NEAR(face->direction.x(), in_east ? 1.0f : -1.0f, 0.01f);
-    }
-  }
+  expect_faces();
+  for (int i = 0; i < 2000; ++i)
+    map.Add({Eigen::Vector3f(100.0f, 0.0f, 0.0f) + noise.Vector(10.0).cast<float>()}, east);
+  const size_t full = map.cells();
+  map.Prune(east);
+  EXPECT_LT(map.cells(), full / 2);
+  expect_faces();
 }
 
 /// What a match relies on that does not look a feature up again.
