@@ -108,7 +108,7 @@ const std::vector<world::Obstacle>* ControlNode::ListOf(const plan_t& message) c
 // Whoever plans or leads the flight may err: what leaves the fence, or comes nearer to it than the
 // body keeps to its plan, is not flown, and the plan before comes to rest inside. A last resort and
 // a way out of an obstacle's reach are flown, since what else there is touches or stops later; so
-// is what leads a body that is outside nearer to the take-off place, and to the ground where that
+// is what leads a body that is outside nearer to the fence, and to the ground where the take-off
 // place is not known.
 std::string ControlNode::Breach(const world::Claim& claim, bool to_land) const {
   if (!fence_.Exists() || claim.starts_inside) return "";  // a last resort may start inside
