@@ -74,7 +74,8 @@ function showFigures() {
   byId('figures_text').textContent = two ? 'Red rows: B has moved to its worse side by more than 1 %.'
     : flights[0].truth ? 'Sampled on the truth at 100 Hz over the mission.' : 'What the vehicle said of itself; nobody knows where it really was.';
   if (two) return compareFigures();
-  const {metrics} = flights[0], known = ROWS.filter(([key]) => at(metrics, key) !== undefined);
+  const {metrics} = flights[0], of_fault = (key) => key === 'reaction_s' || key === 'recovery_s';
+  const known = ROWS.filter(([key]) => at(metrics, key) !== undefined && (metrics.fault || !of_fault(key)));
   const rows = known.map(([key, words, unit, scale, digits]) => ({cells: [words, shown(at(metrics, key), digits, unit, scale)], mark: criterionOf(flights[0], key)}));
   for (const [name, words] of [['complete', 'Mission complete'], ['recorded', 'Log complete']])
     if (name in (metrics.criteria ?? {})) rows.unshift({cells: [words, metrics.criteria[name] ? 'yes' : 'no'], mark: criterionOf(flights[0], name)});

@@ -85,6 +85,7 @@ assert.ok(moments.length >= 3 && moments.some(([, box]) => box), JSON.stringify(
 assert.ok(await one.evaluate(() => [...document.querySelectorAll('#moments canvas')].every((c) => c.width > 100)));
 assert.match(await one.textContent('#subtitle'), /commit \w+/);
 assert.match(await one.textContent('#software'), /planning.*commit/);
+assert.doesNotMatch(await one.textContent('#figures'), /fault|Reaction/, 'no fault struck');
 await checkLinked(one);
 await checkPlayback(one);
 
