@@ -301,6 +301,17 @@ TEST(Pilot, OldObstaclesAreNotFledFrom) {
   }
 }
 
+TEST(Pilot, WaitsBelowFiveCentimetresASecondAndBrakesAbove) {
+  for (const double speed : {0.0, 0.04, 0.06, 0.2}) {
+    Pilot pilot{PlanningConfig()};
+    pilot.SetFlying(true);
+    pilot.SetObstacles(0.0, {});
+    const auto plan = pilot.Update(0.0, {{0.0, 0.0, 1.5}, {0.0, speed, 0.0}, 0.0});
+    ASSERT_TRUE(plan) << speed;
+    EXPECT_EQ(plan->verdict, speed < 0.05 ? Verdict::kWait : Verdict::kBrake) << speed;
+  }
+}
+
 TEST(Pilot, NothingOfAnotherFrameIsPlannedWith) {
   Flight flight{PlanningConfig()};
   flight.Run(4.0, false);
