@@ -42,6 +42,11 @@ TEST(Minkowski, ProofsAreTheSameFromMemory) {
       const auto again = ProveOff(curve, problem, sight_from, &memory);
       ASSERT_EQ(again.has_value(), proofs.has_value()) << seed;
       EXPECT_EQ(off, proofs.has_value()) << seed;
+      PlanRequest later = request;  // the same curve, when what moves is elsewhere
+      later.t0 += 1.0;
+      const Problem then = MakeProblem(c, later, nullptr);
+      EXPECT_EQ(StaysOff(curve, then, sight_from, nullptr, &memory),
+                StaysOff(curve, then, sight_from));
       if (!proofs) continue;
       EXPECT_TRUE(std::equal(again->begin(), again->end(), proofs->begin(), proofs->end(), IsSame));
       ++proven;
