@@ -30,7 +30,7 @@ void Candidate::Correct(const Sighting& sighting) {
   last = sighting;
   sweeps += sighting.fit.n_points > 0;
   const Detection& d = sighting.detection;
-  part = part && (d.Piece() || d.AnyCut());
+  part = part && (d.part || d.AnyCut());
   const auto spread = [](const TargetGaussian& g) {
     return g.covariance.topLeftCorner<2, 2>().trace();
   };
@@ -57,7 +57,7 @@ Candidate NewCandidate(const Sighting& sighting, const View& view) {
   const double sigma_px = sighting.detection.silhouette.sigma_px;
   c.edge = sigma_px * c.range / view.camera.rig.focal_px;
   c.range_error = 2.0 * sigma_px * sight.head<2>() / sighting.detection.box.height;
-  c.part = sighting.detection.Piece();
+  c.part = sighting.detection.part;
   c.sweeps = c.ranged;
   return c;
 }

@@ -44,9 +44,7 @@ struct Sighting {
   /// True when LiDAR points tell that it is one thing.
   bool SurelyHit() const { return fit.n_points >= kSurelyHit; }
   /// True when all of it is seen, on its own, and LiDAR points tell where it is.
-  bool Clear() const {
-    return fit.whole && SurelyHit() && !detection.Piece() && !detection.AnyCut();
-  }
+  bool Clear() const { return fit.whole && SurelyHit() && !detection.part && !detection.AnyCut(); }
 };
 
 /// Keeps poses and sweeps; finds a given thing, or a new one, in a frame.

@@ -19,10 +19,9 @@ constexpr double kPointed = 1.0;  // s that what is pointed at is looked for the
 
 void Perceiver::FollowCandidates(View* view) {
   for (auto& c : candidates_) {
-    const auto again = finder_.Find(
-        c.track, view, [&](const Sighting& s) { return s.detection.Piece() && !c.part; });
-    const bool partly =
-        c.track.partial || (again && (again->detection.edged || c.HiddenIn(*again)));
+    const auto again =
+        finder_.Find(c.track, view, [&](const Sighting& s) { return s.detection.part && !c.part; });
+    const bool partly = c.track.partial || (again && c.HiddenIn(*again));
     if (!again || !(again->fit.whole || partly)) {
       ++c.track.misses;
       continue;
@@ -41,7 +40,7 @@ void Perceiver::DropMissed() {
 }
 
 bool Perceiver::MayBeNew(const Detection& d) const {
-  return (d.edged || d.score >= config_.state.acquire_score) &&
+  return d.score >= config_.state.acquire_score &&
          d.box.width >= kLeastWidth * config_.fit.edge_sigma_px;
 }
 
@@ -50,7 +49,7 @@ void Perceiver::CountRefused(const Detection& d) {
   Refusal why = finder_.HasSweeps() ? Refusal::kContradicted : Refusal::kNoRange;
   if (d.box.width < kLeastWidth * config_.fit.edge_sigma_px)
     why = Refusal::kTooSmall;
-  else if (!d.edged && d.score < config_.state.acquire_score)
+  else if (d.score < config_.state.acquire_score)
     why = Refusal::kWrongShape;
   ++refused_[static_cast<size_t>(why)];
 }
@@ -93,9 +92,9 @@ void Perceiver::AddCandidates(View* view) {
     if (!found || !InGate(*found, view->t)) continue;
     // Part of something, of which no LiDAR point tells the range, is a thing of its own only where
     // the target may come back.
-    const bool piece = found->detection.Piece();
+    const bool piece = found->detection.part;
     if ((piece || !found->fit.whole) && found->fit.n_points == 0 && !comes_back) continue;
-    if (piece && found->fit.n_points == 0 && !found->detection.edged) continue;
+    if (piece && found->fit.n_points == 0) continue;
     if (Followed(*found)) continue;
     candidates_.push_back(NewCandidate(*found, *view));
   }

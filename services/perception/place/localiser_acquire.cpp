@@ -47,29 +47,21 @@ std::optional<FitResult> Localiser::AcquirePartial(FitInput* input,
   return std::nullopt;
 }
 
-/// Likewise where three sides are seen and two of them tell the range: what hides the fourth, or
-/// stands right above or below, must not keep it from being followed.
+/// Likewise where three sides are seen and its height tells the range: what hides the fourth must
+/// not keep it from being followed.
 std::optional<FitResult> Localiser::AcquirePartialBySize(FitInput* input) const {
   const auto& d = *input->detection;
   const auto seen = [&](Side side) { return !d.silhouette.samples[side].empty(); };
-  const auto by_size = [&](bool by_height) {
-    return RangeBySize(input->camera, d.box, input->shape, by_height);
-  };
-  std::vector<double> ranges;
-  if (seen(kTop) && seen(kBottom)) ranges.push_back(by_size(true));
-  if (d.edged && seen(kLeft) && seen(kRight)) ranges.push_back(by_size(false));
-  for (const double range : ranges) {
-    input->prior = NewTarget(input->camera, d.box, input->shape, range, kSizedRange);
-    input->points.clear();
-    input->reappears = true;
-    const auto fit = JoinedReading(input);
-    input->reappears = false;
-    if (!fit || fit->whole || fit->log_odds <= 0.0) continue;
-    if (std::count(fit->used.begin(), fit->used.end(), true) < kSidesOfNew) continue;
-    if (fit->joined && !(d.edged && fit->used[kLeft] && fit->used[kRight])) continue;
-    return fit;
-  }
-  return std::nullopt;
+  if (!seen(kTop) || !seen(kBottom)) return std::nullopt;
+  const double range = RangeBySize(input->camera, d.box, input->shape, true);
+  input->prior = NewTarget(input->camera, d.box, input->shape, range, kSizedRange);
+  input->points.clear();
+  input->reappears = true;
+  const auto fit = JoinedReading(input);
+  input->reappears = false;
+  if (!fit || fit->whole || fit->joined || fit->log_odds <= 0.0) return std::nullopt;
+  if (std::count(fit->used.begin(), fit->used.end(), true) < kSidesOfNew) return std::nullopt;
+  return fit;
 }
 
 std::optional<FitResult> Localiser::Acquire(const TargetShape& shape, const Camera& camera,

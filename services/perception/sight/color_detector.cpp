@@ -83,13 +83,10 @@ void ColorDetector::AddPieces(const cv::Mat& bgr, const cv::Mat& score,
   std::vector<Detection> pieces;
   for (const auto& whole : *found) {
     if (whole.score > kOneThing || cv::countNonZero(whole.mask) < kSplitArea) continue;
-    auto parts = Split(bgr, whole);
-    for (auto& piece : SplitAtEdges(bgr, whole)) parts.push_back(std::move(piece));
-    for (auto& piece : parts) {
+    for (auto& piece : Split(bgr, whole)) {
       Rate(score, &piece);
       piece.part = whole.score > kWellShaped;
-      // What another thing ends need not have the target's shape.
-      if (piece.edged || piece.score > kWellShaped) pieces.push_back(std::move(piece));
+      if (piece.score > kWellShaped) pieces.push_back(std::move(piece));
     }
   }
   std::stable_sort(pieces.begin(), pieces.end(),

@@ -25,8 +25,7 @@ class ColorDetector : public Detector {
   Detection Describe(const cv::Mat& bgr, const cv::Mat& score,
                      const std::vector<cv::Point>& contour) const;
   void Rate(const cv::Mat& score, Detection* d) const;
-  /// Adds the best pieces of large enough blobs that are not surely one thing: those that an edge
-  /// inside the blob ends, whatever their shape, and of the others the well shaped.
+  /// Adds the best shaped pieces of large enough blobs that are not surely one thing.
   void AddPieces(const cv::Mat& bgr, const cv::Mat& score, std::vector<Detection>* found) const;
   /// 0 to 1 from aspect, fill and straightness; aspect and fill say nothing where the image ends.
   double ShapeScore(const Detection& d, double area, double hull_area) const;

@@ -33,13 +33,10 @@ struct Detection {
   cv::Mat mask;                         ///< 8 bit, 255 on the target; may be empty
   double inset_px = 0.0;                ///< border of the mask that does not count, px
   bool part = false;                    ///< a piece of a blob that may well be one thing itself
-  bool edged = false;                   ///< a piece that an edge inside the blob ends
   std::optional<Eigen::Vector3d> p_CT;  ///< centre, frame C, m, if the detector knows it
   Eigen::Matrix3d p_CT_covariance = Eigen::Matrix3d::Identity();  ///< frame C, m^2
 
   bool AnyCut() const { return cut[kLeft] || cut[kRight] || cut[kTop] || cut[kBottom]; }
-  /// True for a piece of a larger blob.
-  bool Piece() const { return part || edged; }
   /// True when the image's border cuts it.
   bool LeavesImage() const {
     for (size_t side = 0; side < 4; ++side)

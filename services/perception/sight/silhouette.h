@@ -46,11 +46,6 @@ std::optional<Detection> CropTo(const cv::Mat& bgr, const Detection& detection,
 /// columns or of its rows jumps; none where none does.
 std::vector<Detection> Split(const cv::Mat& bgr, const Detection& detection);
 
-/// Pieces of a blob on either side of an upright edge inside it, where one thing stands before
-/// another of its colour in other light. Such a side has samples like an outline; beyond the rows
-/// of its edges a piece is cut. In inner_edges.cpp.
-std::vector<Detection> SplitAtEdges(const cv::Mat& bgr, const Detection& detection);
-
 /// One detection out of several pieces: the union of their masks. All must carry masks.
 Detection Merge(const cv::Mat& bgr, const std::vector<Detection>& pieces);
 

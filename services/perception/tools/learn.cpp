@@ -152,7 +152,7 @@ double AcquireScore(const std::vector<cv::Mat>& images, const std::vector<cv::Ma
     const auto found = detector.Detect(images[i]);
     if (const Detection* marked = MarkedBlob(found, masks[i])) target.push_back(marked->score);
     for (const auto& d : found)
-      if (!d.part && !d.edged && cv::countNonZero(d.mask & masks[i](d.mask_box)) == 0)
+      if (!d.part && cv::countNonZero(d.mask & masks[i](d.mask_box)) == 0)
         other = std::max(other, d.score);
   }
   return 0.5 * (Median(std::move(target)) + other);
@@ -163,7 +163,7 @@ double AcquireScore(const std::vector<cv::Mat>& images, const std::vector<cv::Ma
 const Detection* MostLikely(const std::vector<Detection>& found) {
   const Detection* best = nullptr;
   for (const auto& d : found) {
-    const bool candidate = !best || (!d.part && !d.edged && !d.AnyCut());
+    const bool candidate = !best || (!d.part && !d.AnyCut());
     if (candidate && (!best || d.score > best->score)) best = &d;
   }
   return best;
