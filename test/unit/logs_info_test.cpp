@@ -90,7 +90,7 @@ TEST(LogInfo, WhatIsNoLogIsRefusedInOneLine) {
   EXPECT_NE(ErrorOf([] { Describe(WriteText("t.lcm", "text")); }).find("no LCM log"),
             std::string::npos);
   EXPECT_NE(ErrorOf([] { Describe(WriteText("e.lcm", "")); }).find("empty"), std::string::npos);
-  EXPECT_NE(ErrorOf([] { Describe("/tmp"); }).find("no such file"), std::string::npos);
+  EXPECT_NE(ErrorOf([] { Describe("/tmp"); }).find("no regular file"), std::string::npos);
 }
 
 }  // namespace
