@@ -1,5 +1,6 @@
 #include "services/planning/pilot.h"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
@@ -59,6 +60,15 @@ std::optional<world::Obstacle> TargetBody(const Forecast& f) {
   body.position_covariance.diagonal().setConstant(f.sigma * f.sigma);
   body.velocity_covariance.diagonal().setConstant(f.speed_sigma * f.speed_sigma);
   return body;
+}
+
+// What stands seems to move when the frame drifts. The tube holds what adds up until a stop begins.
+Eigen::Matrix3d BeyondTube(const Eigen::Matrix3d& covariance, const PlannerConfig& c) {
+  if (!covariance.allFinite() || !(c.sigmas > 0.0)) return Eigen::Matrix3d::Zero();
+  const double held = c.tracking_tube / (c.sigmas * kOverdue);
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(covariance);
+  const Eigen::Vector3d rest = (eigen.eigenvalues().array() - held * held).max(0.0);
+  return eigen.eigenvectors() * rest.asDiagonal() * eigen.eigenvectors().transpose();
 }
 
 bool IsFinite(const PlanResult& plan) {
@@ -136,7 +146,7 @@ bool Pilot::MayPlan(double t) const {
 }
 
 std::optional<PlanResult> Pilot::Update(double t, const BodyEstimate& body) {
-  drift_ = body.velocity_covariance;
+  drift_ = BeyondTube(body.velocity_covariance, config_.planner);
   const double t0 = t + config_.latency;
   const Start start = StartAt(t, t0, body);
   if (!first_update_) first_update_ = t;
@@ -200,8 +210,7 @@ PlanRequest Pilot::Request(double t0, const Start& start) const {
   request.unseen = unseen_;
   if (start.follows && has_running_) request.stop = running_.stop;
   if (start.on_plan) request.running = running_.trajectory;  // off it, it is no way out
-  // What stands seems to move when the frame drifts; what moves is measured in it, as the target
-  // is.
+  // What moves is measured, as the target is, in the frame that drifts.
   for (world::Obstacle& o : request.obstacles)
     if (!o.moving) o.velocity_covariance += drift_;
   request.horizon = config_.horizon;

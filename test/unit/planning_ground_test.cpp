@@ -316,10 +316,15 @@ TEST(Pilot, AFrameThatDriftsKeepsOffWhatStands) {
     body.velocity_covariance.diagonal().setConstant(sigma * sigma);
     for (double t = 0.0; t < 1.0; t += 0.05)
       if (const auto plan = pilot.Update(t, body)) {
-        const world::Trajectory& way = plan->trajectory;
         double least = HUGE_VAL;
-        for (double s = 0.0; s <= way.duration; s += 0.05)
-          least = std::min(least, 1.9 - way.Position(way.start + s).y() - 2.0 * sigma * s);
+        for (double s = 0.0; s <= 1.0; s += 0.05)
+          least = std::min(
+              least,
+              1.9 -
+                  plan->trajectory.Position(plan->trajectory.start + s * plan->trajectory.duration)
+                      .y() -
+                  2.0 * std::max(0.0, std::sqrt(std::max(0.0, sigma * sigma - 0.0225))) * s *
+                      plan->trajectory.duration);
         return least;
       }
     return -HUGE_VAL;
