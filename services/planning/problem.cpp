@@ -75,11 +75,21 @@ void SetShapes(const PlannerConfig& config, const Stretch& over, const world::Ob
   e->grown_by[1] = growth.sight;
 }
 
-// How far a motion with speed v and acceleration a goes on that `brake` slows down after a moment.
-double Overshoot(double v, double a, double brake) {
+// How far a motion with speed v and acceleration a goes on that slows down after a moment, at half
+// of the greatest acceleration.
+double Overshoot(double v, double a, double most) {
   constexpr double kMoment = 0.2;  // s
   const double then = v + kMoment * std::max(0.0, a);
-  return then > 0.0 ? std::max(0.0, v) * kMoment + then * then / (2.0 * brake) : 0.0;
+  return then > 0.0 ? std::max(0.0, v) * kMoment + then * then / most : 0.0;
+}
+
+// A limit of x that gives way where the start cannot help it: not to what any plan within it goes
+// through, which at its greatest acceleration would still come to rest in time.
+double GivingWay(double limit, double x, double v, double a, double most) {
+  constexpr double kRounding = 1e-6;  // m
+  const double least = x + std::max(0.0, v) * v / (2.0 * most) + kRounding;
+  if (least <= limit + 2.0 * kRounding) return std::max(limit, least);
+  return std::max(limit, x + Overshoot(v, a, most) + kRounding);
 }
 
 // Limits that the start already breaks give way to what it has: no chain of plans gets worse.
@@ -88,11 +98,11 @@ double Overshoot(double v, double a, double brake) {
 // level with people.
 Limits MakeLimits(const PlannerConfig& c, const Stretch& over, const Eigen::Vector3d& target,
                   const Ground& ground) {
-  constexpr double kRounding = 1e-6, kBrake = 2.0;  // m; m/s^2 where no limit is set
-  constexpr double kOverhead = 10.0;                // tangent from which there is no side to be on
-  constexpr double kUnseenDrop = 0.15;              // m: replanned, half a metre a second
-  constexpr double kSightSlope = 0.2;               // 15 degrees, less a tilt of 4
-  constexpr double kPerson = 1.7;                   // m high
+  constexpr double kRounding = 1e-6, kPush = 4.0;  // m; m/s^2 where no limit is set
+  constexpr double kOverhead = 10.0;               // tangent from which there is no side to be on
+  constexpr double kUnseenDrop = 0.15;             // m: replanned, half a metre a second
+  constexpr double kSightSlope = 0.2;              // 15 degrees, less a tilt of 4
+  constexpr double kPerson = 1.7;                  // m high
   const auto at_least = [](double limit, double now) {
     return limit > 0.0 ? std::max(limit, (1.0 + kRounding) * now + kRounding) : 0.0;
   };
@@ -101,13 +111,14 @@ Limits MakeLimits(const PlannerConfig& c, const Stretch& over, const Eigen::Vect
   limits.speed = at_least(c.max_speed, s.v.norm());
   limits.acceleration = at_least(c.max_acceleration, s.a.norm());
   limits.height = c.z_max > c.z_min;
-  const double brake = c.max_acceleration > 0.0 ? 0.5 * c.max_acceleration : kBrake;
+  const double push = c.max_acceleration > 0.0 ? limits.acceleration : kPush;
   const double v = ground.Rise(s.v), a = ground.Rise(s.a), z = ground.Above(s.p);
   limits.ground = ground;
   const double seen_to = z - kUnseenDrop - kSightSlope * s.v.head<2>().norm() * over.horizon;
-  const double lowest = seen_to > kPerson ? std::max(c.z_min, seen_to) : c.z_min;
-  limits.z_min = std::min(lowest, z - Overshoot(-v, -a, brake) - kRounding);
-  limits.z_max = std::max(c.z_max, z + Overshoot(v, a, brake) + kRounding);
+  limits.z_min = -GivingWay(-c.z_min, -z, -v, -a, push);
+  limits.z_max = GivingWay(c.z_max, z, v, a, push);
+  if (seen_to > std::max(kPerson, limits.z_min))
+    limits.z_min = std::min(seen_to, z - Overshoot(-v, -a, push) - kRounding);
   const Eigen::Vector3d r = target - s.p;
   const double tangent = std::tan(c.max_elevation_deg * M_PI / 180.0);
   const double now = std::abs(r.z()) / std::max(r.head<2>().norm(), 1e-3);

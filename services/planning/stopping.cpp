@@ -85,7 +85,14 @@ class Resting {
     within_.reset();
   }
 
+  /// Within the heights, or else as far beyond as the quickest way must.
   std::optional<Stop> Brake() {
+    auto stop = BrakeWithin();
+    return stop || !goes_beyond_ ? stop : BrakeWithin(false);
+  }
+  std::optional<Stop> BrakeWithin(bool heights = true) {
+    beyond_ = !heights;
+    has_problem_ = false;
     for (const double T : kTimes)
       if (auto stop = Certified(BrakeCurve(over_.start, T), T)) return stop;
     return std::nullopt;
@@ -198,11 +205,14 @@ class Resting {
     l.tan_elevation = l.min_distance = 0.0;
     // Braking may leave the heights as far as the quickest way of it must.
     const Points points = ToPoints(heights_, 5);
+    const Limits within = l;
     for (int i = 0; i <= 5; ++i) {
       const double z = l.ground.Above(points.row(i).transpose());
       l.z_min = std::min(l.z_min, z - 1e-6);
       l.z_max = std::max(l.z_max, z + 1e-6);
     }
+    goes_beyond_ = l.z_min < within.z_min || l.z_max > within.z_max;
+    if (!beyond_) l = within;
   }
 
   const PlannerConfig& config_;
@@ -213,6 +223,7 @@ class Resting {
   Problem& problem_;
   Curve heights_;
   bool has_problem_ = false;
+  bool beyond_ = true, goes_beyond_ = false;  ///< the heights: may it, and would the quickest way
   std::optional<std::pair<double, double>> within_;
 };
 
@@ -393,10 +404,13 @@ bool LeavesObstacles(const std::vector<Proof>& proofs) {
 PlanResult RestPlan(const PlannerConfig& config, const PlanRequest& request) {
   const PlannerConfig hard = WithoutMargin(config);
   PlanResult result;
-  std::optional<Stop> stop = Brake(config, request);
-  if (!stop) stop = Brake(hard, request);
+  Resting wide(config, request), close(hard, request);
+  std::optional<Stop> stop = wide.BrakeWithin();
+  if (!stop) stop = close.BrakeWithin();
   if (!stop)
     if (auto committed = Committed(hard, request)) return *committed;
+  if (!stop) stop = wide.Brake();
+  if (!stop) stop = close.Brake();
   result.verdict = Verdict::kBrake;
   if (!stop) {
     stop = Evade(config, request);

@@ -75,6 +75,7 @@ Extremes Chain(const PlannerConfig& config, const std::vector<world::Obstacle>& 
     if (next >= plan.trajectory.end())
       request.start.v = request.start.a = request.start.j = Vector3d::Zero();
     request.running = plan.trajectory;
+    request.stop = plan.stop;
   }
   return e;
 }
@@ -136,6 +137,17 @@ TEST(Ratchet, APlaceBeyondALimitIsNotComeNearerToBitByBit) {
   c = {};
   Push("least height", c, 0.2, 1.2, -c.z_min, [](const Extremes& e) { return -e.low; });
   Push("greatest height", c, 3.3, 3.4, c.z_max, [](const Extremes& e) { return e.high; });
+}
+
+TEST(Ratchet, HeightsHoldAgainstADroneThatRisesOrSinksTowardsThem) {
+  const PlannerConfig c;
+  for (const Vector3d& v : {Vector3d(0, 0, 0), Vector3d(0.5, 0, 0), Vector3d(0.3, 0.6, 0)})
+    for (const double height : {0.2, 3.3}) {
+      const Extremes e = Chain(c, {}, {2.5, 0.0, height}, v, {0.0, 0.0, 2.0});
+      EXPECT_GE(e.low, c.z_min - 1e-6 * kReplans) << height << " " << v.transpose();
+      EXPECT_LE(e.high, c.z_max + 1e-6 * kReplans) << height << " " << v.transpose();
+      EXPECT_EQ(e.uncertified, 0) << height << " " << v.transpose();
+    }
 }
 
 TEST(Ratchet, AStartBeyondALimitOnlyComesBack) {
