@@ -214,7 +214,6 @@ class Ladder : public Planner {
       if (!TryOver(request, t.layout, t.share, t.tight, notes, result)) continue;
       const bool plain = t.layout == Layout::kNormal && t.share == 1.0 && !t.tight;
       result->verdict = plain ? Verdict::kChase : Verdict::kWider;
-      result->reason.clear();
       if (t.layout == Layout::kWide)
         result->reason = "no candidate of the normal skeletons is feasible";
       if (t.tight) result->reason = "with half of the margins";
@@ -297,7 +296,6 @@ class Ladder : public Planner {
     result->cost = Evaluate(config_, shorter_, curve);
     MakeProblem(tight_, request, rest, nullptr, &shorter_);
     used_ = &shorter_;
-    sight_from_ = 0.0;
     return true;
   }
 

@@ -9,7 +9,8 @@ import workshop
 
 # Sources, and the tests of planning and control that are quick, the quickest first.
 PLANNING = tuple(f"services/planning/{name}.cpp" for name in
-                 ("ladder", "pilot", "limits", "margins", "problem", "separations", "stopping"))
+                 ("ladder", "pilot", "limits", "margins", "problem", "resting", "separations",
+                  "stopping"))
 PLANNING_TESTS = ("planning_test", "planning_node_test", "planning_minkowski_test",
                   "control_plan_check_test", "planning_refinement_test", "planning_search_test")
 CONTROL = ("services/control/plan_follower.cpp", "common/world/plan_check.cpp")

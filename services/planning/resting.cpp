@@ -1,0 +1,196 @@
+#include "services/planning/resting.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/world/shapes.h"
+#include "services/planning/candidate_set.h"
+#include "services/planning/limits.h"
+#include "services/planning/separations.h"
+
+namespace chase::planning {
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr double kInTime = 0.05;  // s: contacts are sampled this often
+constexpr double kAlike = 0.01;   // m of clearance that make no difference
+// tau by which the ground is left: from rest to rest a climb of 0.5 m is 0.27 m up by then, and
+// slabs reach 0.3 m above what they stand for. The check allows as much: kLeaveGroundBy.
+constexpr double kOutBy = 0.6;
+
+// Coefficients in Bernstein form of degree n that continue position, velocity, acceleration and
+// jerk of s over T; the rest are zero.
+Points Continued(const world::State& s, double T, int n) {
+  Points b = Points::Zero();
+  const Vector3d d[4] = {s.p, T * s.v, T * T * s.a, T * T * T * s.j};
+  const double falling[4] = {1.0, 1.0 * n, n * (n - 1.0), n * (n - 1.0) * (n - 2.0)};
+  // Differences of order k at the start are d_k / falling_k.
+  Vector3d difference[4];
+  for (int k = 0; k < 4; ++k) difference[k] = d[k] / falling[k];
+  for (int i = 0; i < 4; ++i) {
+    Vector3d sum = Vector3d::Zero();
+    double binomial = 1.0;
+    for (int k = 0; k <= i; ++k) {
+      sum += binomial * difference[k];
+      binomial *= (i - k) / (k + 1.0);
+    }
+    b.row(i) = sum.transpose();
+  }
+  return b;
+}
+
+}  // namespace
+
+Curve BrakeCurve(const world::State& s, double T) {
+  Points b = Continued(s, T, 5);
+  b.row(4) = b.row(5) = b.row(3);
+  return ToPower(b, 5);
+}
+
+Curve CurveTo(const world::State& s, double T, const Vector3d& end) {
+  Points b = Continued(s, T, 6);
+  for (int i = 4; i <= 6; ++i) b.row(i) = end.transpose();
+  return ToPower(b, 6);
+}
+
+double DistanceTo(const world::Obstacle& o, const Vector3d& d) {
+  using Kind = world::Solid::Kind;
+  if (o.solid == world::Obstacle::Solid::kBox)
+    return world::SignedDistance({Kind::kBox, Vector3d::Zero(), o.half}, o.axes.conjugate() * d);
+  if (o.solid == world::Obstacle::Solid::kCylinder)
+    return world::SignedDistance({Kind::kCylinder, Vector3d::Zero(), o.half}, d);
+  const Vector3d outwards = o.shape * d;
+  const double scale = std::sqrt(d.dot(outwards));
+  // At the centre no farther in than the least semi-axis.
+  return scale > 0.0 ? (scale - 1.0) * scale / outwards.norm() : -1.0 / std::sqrt(o.shape.trace());
+}
+
+void Resting::From(const world::State& start, double t0) {
+  over_ = {t0, 0.0, start, false};
+  heights_ = BrakeCurve(start, kBrakeTimes[0]);
+  has_problem_ = false;
+  within_.reset();
+}
+
+std::optional<Stop> Resting::Brake() {
+  auto stop = BrakeWithin();
+  return stop || !goes_beyond_ ? stop : BrakeWithin(false);
+}
+
+std::optional<Stop> Resting::BrakeWithin(bool heights) {
+  beyond_ = !heights;
+  has_problem_ = false;
+  for (const double T : kBrakeTimes)
+    if (auto stop = Certified(BrakeCurve(over_.start, T), T)) return stop;
+  return std::nullopt;
+}
+
+std::optional<Stop> Resting::Certified(const Curve& curve, double T) {
+  SetProblem(T);
+  if (!curve.allFinite() || !KeepsLimits(curve, problem_) || !IsForecast(curve, T))
+    return std::nullopt;
+  auto proofs = ProveOff(curve, problem_, 1.0);
+  if (!proofs) return std::nullopt;
+  return Stop{{over_.t0, T, curve}, std::move(*proofs), true};
+}
+
+bool Resting::CanBeFlown(const Curve& curve, double T) {
+  SetProblem(T);
+  Problem motion;
+  motion.duration = T;
+  motion.limits.speed = problem_.limits.speed;
+  motion.limits.acceleration = problem_.limits.acceleration;
+  return curve.allFinite() && KeepsLimits(curve, motion);
+}
+
+std::pair<double, double> Resting::Harm(const Curve& curve, double T) {
+  const auto [within, gain] = Within();
+  SetProblem(T);
+  double contact = HUGE_VAL, least = gain, room_before = 0.0;
+  const int n = static_cast<int>(std::ceil(T / kInTime));
+  for (int i = 0; i <= n; ++i) {
+    const auto [standing, moving] = Clearances(curve, static_cast<double>(i) / n);
+    const double room = std::min(standing - within, moving - config_.drone_radius);
+    if (i > 0) least = std::min({least, standing, moving});
+    if (i > 0 && room < 0.0 && contact == HUGE_VAL)
+      contact = T / n * (i - 1 + std::max(0.0, room_before) / (std::max(0.0, room_before) - room));
+    room_before = room;
+  }
+  return {contact, least};
+}
+
+const world::Obstacle& Resting::Obstacle(size_t j) const {
+  const size_t listed = request_.obstacles.size();
+  return j < listed ? request_.obstacles[j] : besides_[j - listed];
+}
+
+// Is what moves in curves forecast for as long as it could come to the way? Beyond its end such
+// a curve is no forecast.
+bool Resting::IsForecast(const Curve& way, double T) const {
+  constexpr double kRounding = 1e-3, kFast = 2.0;  // s; m/s
+  const Box box = BoxOf(ToPoints(way, 6), 7, 0.0);
+  for (size_t j = 0; j < problem_.obstacles.size(); ++j) {
+    const world::Trajectory& center = Obstacle(j).center;
+    const double unknown = over_.t0 + T - center.end();
+    if (center.degree() < 2 || unknown < kRounding) continue;
+    const Curve last = center.Position(center.end()).transpose();
+    if (MayTouch(box, last, problem_.obstacles[j].safety_half + kFast * unknown, 1.0)) return false;
+  }
+  return true;
+}
+
+// Of what stands and of what moves.
+std::pair<double, double> Resting::Clearances(const Curve& curve, double tau) const {
+  const Vector3d p = planning::Evaluate(curve, tau);
+  const Limits& l = problem_.limits;
+  double standing = HUGE_VAL, moving = HUGE_VAL;
+  for (size_t j = 0; j < problem_.obstacles.size(); ++j) {
+    const Curve& center = problem_.obstacles[j].center;
+    double& least = center.bottomRows(center.rows() - 1).isZero() ? standing : moving;
+    least = std::min(least, DistanceTo(Obstacle(j), p - planning::Evaluate(center, tau)));
+  }
+  if (problem_.target_body)
+    moving =
+        std::min(moving, DistanceTo(*request_.target_body,
+                                    p - planning::Evaluate(problem_.target_body->center, tau)));
+  if (!l.height) return {standing, moving};
+  const double above = l.ground.Above(p);
+  return {std::min({standing, above, config_.drone_radius + l.z_max - above}), moving};
+}
+
+// Clearance of what stands below which it is a contact, and the most of it that counts.
+std::pair<double, double> Resting::Within() {
+  if (within_) return *within_;
+  SetProblem(kBrakeTimes[0]);
+  within_ = {config_.drone_radius, HUGE_VAL};
+  if (Clearances(heights_, 0.0).first >= config_.drone_radius) return *within_;
+  double least = HUGE_VAL;
+  for (double tau = 0.0; tau <= 1.0; tau += kInTime)
+    least = std::min(least, Clearances(heights_, tau).first);
+  within_ = {least - kAlike, least - kAlike};
+  return *within_;
+}
+
+void Resting::SetProblem(double T) {
+  if (problem_.duration == T && has_problem_) return;
+  has_problem_ = true;
+  over_.horizon = T;
+  MakeProblem(config_, request_, over_, nullptr, &problem_, besides_);
+  for (Ellipsoid& e : problem_.obstacles)
+    if (e.safety_from > 0.0 && e.ground) e.safety_from = kOutBy;
+  Limits& l = problem_.limits;
+  l.tan_elevation = l.min_distance = 0.0;
+  // Braking may leave the heights as far as the quickest way of it must.
+  const Points points = ToPoints(heights_, 5);
+  const Limits within = l;
+  for (int i = 0; i <= 5; ++i) {
+    const double z = l.ground.Above(points.row(i).transpose());
+    l.z_min = std::min(l.z_min, z - 1e-6);
+    l.z_max = std::max(l.z_max, z + 1e-6);
+  }
+  goes_beyond_ = l.z_min < within.z_min || l.z_max > within.z_max;
+  if (!beyond_) l = within;
+}
+
+}  // namespace chase::planning
