@@ -1,5 +1,7 @@
 #include "deploy/flight/flight_configs.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
@@ -58,6 +60,17 @@ void DeriveDrivers(FlightConfigs* configs) {
   configs->camera.exposure = simulated.camera.exposure;
 }
 
+/// Obstacles are listed as high as the body gets.
+void CheckHeights(const FlightConfigs& configs) {
+  const planning::PlannerConfig& planner = configs.planning.planner;
+  const double highest = planner.z_max + planner.drone_radius + planner.tracking_tube;
+  if (highest > configs.mapping.statics.band_high)
+    throw std::runtime_error(fmt::format(
+        "planning: planner.z_max is {:g} m, where mapping lists obstacles up to statics.band_high "
+        "{:g} m only: lower it, or raise that to {:g} m",
+        planner.z_max, configs.mapping.statics.band_high, highest));
+}
+
 /// The scenario's faults and the command line's, in this order.
 std::vector<world::FaultSpec> AllFaults(world::Scenario scenario, const FlightOptions& options) {
   for (const std::string& text : options.faults) try {
@@ -100,6 +113,7 @@ FlightConfigs Configure(const world::Scenario& scenario, const FlightOptions& op
   Override(scenario, "prediction", &configs.prediction);
   DeriveView(configs.perception.rig, &configs.planning.planner);
   Override(scenario, "planning", &configs.planning);
+  CheckHeights(configs);
   configs.control.tracking_tube = configs.planning.planner.tracking_tube;
   configs.control.sigmas = configs.planning.planner.sigmas;
   Override(scenario, "mission", &configs.mission);

@@ -62,6 +62,10 @@ class Envelope(unittest.TestCase):
         self.reasons = reasons(log)
         return [s["state"] for s in metrics["flight_states"]], metrics, log
 
+    def test_heights_in_which_nothing_is_listed_are_refused(self):
+        with self.assertRaisesRegex(AssertionError, r"z_max is \S+ m.*up to statics.band_high 2 m only.* to \S+ m"):
+            self.fly([], 1, services={"mapping": {"statics": {"band_high": 2.0}}})
+
     def truth(self, log, channel="TRUTH", *columns):
         """(t, x, z) of TRUTH, s and m, or other columns."""
         out = pathlib.Path(self.folder.name) / "truth.tum"
