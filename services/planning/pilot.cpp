@@ -21,7 +21,7 @@ constexpr double kEnoughInSight = 0.5, kKeepsPlace = 1.0;
 // distances.
 constexpr double kAhead = 0.5, kArrived = 1.5;
 constexpr double kLeg = 2.5;      // desired distances: the planner is led to nothing farther off
-constexpr double kGoes = 0.5;     // m: a plan without sight of the place is worth that at least
+constexpr double kGoes = 0.5;     // m: a plan that looks for it is worth that at least
 constexpr double kSettles = 0.3;  // s: a turn ends so
 
 // Rest to rest from a to b, minimum jerk.
@@ -36,16 +36,6 @@ world::Trajectory RestToRest(const Eigen::Vector3d& a, const Eigen::Vector3d& b,
 }
 
 bool IsAtRest(const world::State& s) { return s.v.norm() < 0.05 && s.a.norm() < 0.1; }
-
-PlanResult Waiting(const std::string& reason, const world::Trajectory& trajectory,
-                   const std::vector<double>& yaw) {
-  PlanResult result;
-  result.verdict = Verdict::kWait;
-  result.reason = reason;
-  result.trajectory = trajectory;
-  result.yaw = yaw;
-  return result;
-}
 
 // The target's upright cylinder where it is forecast to be.
 std::optional<world::Obstacle> TargetBody(const Forecast& f) {
@@ -160,7 +150,7 @@ std::optional<PlanResult> Pilot::Update(double t, const BodyEstimate& body) {
   PlanResult plan = !Chases()                                       ? Obey(t0, start, body)
                     : airborne_ && HasTarget(t) && SeesObstacles(t) ? Chase(t0, start)
                                                                     : Wait(t0, start, body);
-  if (!IsFinite(plan)) plan = Rest(t0, {{body.p}, {body.yaw, 0.0}});
+  if (!IsFinite(plan)) plan = Rest(t0, {{body.p}, {body.yaw}});
   running_ = plan;
   has_running_ = true;
   last_planned_ = t;
@@ -238,7 +228,7 @@ PlanResult Pilot::Chase(double t0, const Start& start) {
 PlanResult Pilot::Wait(double t0, const Start& start, const BodyEstimate& body) {
   if (!airborne_ && !has_running_) {
     climb_end_ = t0 + config_.takeoff_time;
-    return Climb(t0, {{body.p}, {body.yaw, 0.0}});
+    return Climb(t0, body);
   }
   if (!airborne_ && t0 < climb_end_) {
     PlanResult same = running_;  // still climbing
@@ -313,10 +303,14 @@ PlanResult Pilot::Land(double t0, const Start& start, const BodyEstimate& body) 
   return plan;
 }
 
-PlanResult Pilot::Climb(double t0, const Start& start) const {
-  const Eigen::Vector3d top = start.state.p + config_.takeoff_height * Eigen::Vector3d::UnitZ();
-  return Waiting("climbing", RestToRest(start.state.p, top, t0, config_.takeoff_time),
-                 {start.yaw.yaw});
+PlanResult Pilot::Climb(double t0, const BodyEstimate& body) const {
+  const Eigen::Vector3d top = body.p + config_.takeoff_height * Eigen::Vector3d::UnitZ();
+  PlanResult plan;
+  plan.verdict = Verdict::kWait;
+  plan.reason = "climbing";
+  plan.trajectory = RestToRest(body.p, top, t0, config_.takeoff_time);
+  plan.yaw = {body.yaw};
+  return plan;
 }
 
 // From here as long as enough of where it may be is in sight from here, unless what is worth
@@ -346,10 +340,9 @@ PlanResult Pilot::Search(double t0, const Start& start, const BodyEstimate& body
       request.horizon);
   request.target_body.reset();
   PlanResult plan = planner_->Plan(request);
-  const bool shows = plan.verdict < Verdict::kSafeOnly;
-  const bool goes =
-      (plan.trajectory.Position(plan.trajectory.end()) - start.state.p).norm() > kGoes;
-  if (plan.verdict >= Verdict::kBrake || !(shows || goes)) return BrakeAndLook(t0, start, gaze.yaw);
+  const Eigen::Vector3d end = plan.trajectory.Position(plan.trajectory.end());
+  if (plan.verdict >= Verdict::kBrake || (end - start.state.p).norm() < kGoes)
+    return BrakeAndLook(t0, start, gaze.yaw);
   // What it proves of sight is of that place, which whoever checks it takes for the target's.
   plan.proofs.erase(std::remove_if(plan.proofs.begin(), plan.proofs.end(),
                                    [](const Proof& proof) { return proof.of_sight; }),

@@ -102,7 +102,7 @@ class Pilot {
   PlanRequest Request(double t0, const Start& start) const;
   PlanResult Chase(double t0, const Start& start);
   PlanResult Wait(double t0, const Start& start, const BodyEstimate& body);
-  PlanResult Climb(double t0, const Start& start) const;
+  PlanResult Climb(double t0, const BodyEstimate& body) const;
   PlanResult Hover(double t0, const Start& start) const;
   PlanResult Rest(double t0, const Start& start) const;
   PlanResult Obey(double t0, const Start& start, const BodyEstimate& body);
