@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "services/planning/separations.h"
 
@@ -154,7 +155,7 @@ void RelaxSight(const world::Obstacle& o, const Growth& growth, const FirstSight
       return false;
     return !e->body || start->IsInSight(*e, share);
   };
-  double kept = -1.0;
+  std::optional<double> kept;  // share that the target keeps off
   const auto take = [&](double share) {
     e->sight_share = share;
     e->sight = Grown(o, *e, share * growth.sight);
@@ -163,18 +164,18 @@ void RelaxSight(const world::Obstacle& o, const Growth& growth, const FirstSight
   for (double share : kShares) {
     if (share < 1.0) take(share);
     if (!target_is_off(share)) continue;
-    if (kept < 0.0) kept = share;
+    if (!kept) kept = share;
     if (!begins_in_sight(share)) continue;
-    if (share < kept)
+    if (share < *kept)
       Note(notes, "sight starts within the margin of obstacle " + std::to_string(e->id));
     else if (share < 1.0)
       Note(notes, "the target passes within the sight margin of obstacle " + std::to_string(e->id));
     return;
   }
-  if (kept >= 0.0) {
-    if (kept < 1.0)
+  if (kept) {
+    if (*kept < 1.0)
       Note(notes, "the target passes within the sight margin of obstacle " + std::to_string(e->id));
-    return take(kept);
+    return take(*kept);
   }
   e->sight_from = 1.0;
   Note(notes, "obstacle " + std::to_string(e->id) + " holds the target, its shadow is ignored");
