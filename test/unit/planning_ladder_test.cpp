@@ -62,6 +62,21 @@ TEST(Ladder, OpenFieldIsAChaseInSight) {
   EXPECT_EQ(SampleFaults(plan.trajectory.coefficients, problem, 0.0, 500), "");
 }
 
+// With no running plan to improve on either.
+TEST(Ladder, WhatIsTakenIsRefined) {
+  PlannerConfig plain = Config();
+  plain.refine = false;
+  const auto refining = MakePlanner("chase", Config()), choosing = MakePlanner("chase", plain);
+  for (const double aside : {-1.2, -0.4, 0.3, 0.9}) {
+    PlanRequest request = Walk();
+    request.obstacles = {Pillar(1, 0.8, aside, 0.3)};
+    const PlanResult refined = refining->Plan(request), chosen = choosing->Plan(request);
+    EXPECT_EQ(refined.verdict, chosen.verdict) << aside;
+    EXPECT_LT(refined.cost.total, chosen.cost.total) << aside;
+    EXPECT_EQ(refined.winner, -1) << aside << ": no candidate any more";
+  }
+}
+
 TEST(Ladder, SameRequestSameBits) {
   const auto a = MakePlanner("chase", Config()), b = MakePlanner("chase", Config());
   PlanRequest request = Walk();
