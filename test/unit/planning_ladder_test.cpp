@@ -97,6 +97,19 @@ TEST(Ladder, StartInsideTheMarginStillPlans) {
   EXPECT_NE(plan.reason.find("margin of obstacle 1"), std::string::npos) << plan.reason;
 }
 
+// On its edge no plan could be proved to keep it: the start counts as within.
+TEST(Ladder, StartOnTheEdgeOfTheMarginStillPlans) {
+  const double off = Config().hard_radius() + Config().safety_margin;
+  for (const double beyond : {-1e-5, -1e-9, 0.0, 1e-9, 1e-5}) {
+    PlanRequest request = Walk();
+    request.obstacles = {Pillar(1, -2.5, 0.3 + off + beyond, 0.3)};
+    request.obstacles[0].center = world::Trajectory::Constant(
+        request.start.p + Eigen::Vector3d(0.0, 0.3 + off + beyond, 0.0), 0.0, 2.5);
+    const PlanResult plan = MakePlanner("chase", Config())->Plan(request);
+    EXPECT_EQ(plan.verdict, Verdict::kChase) << beyond << plan.reason;
+  }
+}
+
 TEST(Ladder, StartInsideTheHardRadiusIsAnEscapeThatOnlyMovesAway) {
   PlanRequest request = Walk();
   request.obstacles = {Pillar(1, -2.5, 0.55, 0.3)};  // 0.25 m from the drone's centre
