@@ -15,6 +15,9 @@ Forecast Walking(double t) {
   f.has_target = true;
   f.target = {t, 2.5, Eigen::MatrixXd::Zero(2, 3)};
   f.target.coefficients << 2.5 + 0.8 * t, 0.0, 0.5, 0.8 * 2.5, 0.0, 0.0;
+  f.radius = 0.3;
+  f.height = 1.0;
+  f.speed_sigma = 0.2;
   return f;
 }
 

@@ -135,6 +135,26 @@ TEST(Problem, MarginsOfEllipsoidsGiveWayByQuarters) {
   for (const int n : {given, inside, less, hidden, blocked}) EXPECT_GT(n, 20);
 }
 
+// Sight may be asked for without a margin, and safety with one.
+TEST(Problem, ShapesOfSafetyAndSightGrowEachByItsOwnMargin) {
+  Random g(5);
+  PlannerConfig c;
+  for (const double margin : {0.1, 0.0}) {
+    c.sight_margin = margin;
+    PlanRequest request = RandomRequest(g);
+    request.target_sigma = request.target_speed_sigma = 0.0;
+    request.target_manoeuvre = {};
+    request.obstacles.resize(1);
+    world::Obstacle& o = request.obstacles[0];
+    o.center = world::Trajectory::Constant({50.0, 0.0, 1.0}, 0.0, 1.0);  // where nothing gives way
+    o.position_covariance.setZero();
+    const Ellipsoid e = MakeProblem(c, request, nullptr).obstacles[0];
+    const auto grown = [&](double by) { return by > 0.0 ? world::Inflated(o.shape, by) : o.shape; };
+    EXPECT_LT((e.safety - grown(c.hard_radius() + c.safety_margin)).norm(), 1e-9);
+    EXPECT_LT((e.sight - grown(c.sight_margin)).norm(), 1e-9) << margin;
+  }
+}
+
 TEST(Problem, BoxesAboutACurveHoldItAndLittleMore) {
   Random g(4);
   for (int i = 0; i < 300; ++i) {
