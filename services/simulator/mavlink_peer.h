@@ -5,7 +5,6 @@
 #include "services/simulator/px4.h"
 #include "services/simulator/simulator.h"
 #include "services/simulator/udp_socket.h"
-#include "services/simulator/vision_frame.h"
 
 namespace chase::simulator {
 
@@ -24,10 +23,9 @@ class MavlinkPeer {
   std::string Words() const;
 
  private:
-  void FollowVision();
+  void FollowVision(Estimator* estimator);
 
   Px4 px4_;
-  VisionFrame frame_;
   UdpSocket socket_;
   int poses_ = 0;
 };

@@ -17,15 +17,11 @@ namespace mav = mavlink::mav;
 
 constexpr double kLatest = 1e17;       // us, 3000 years: stamps beyond are none
 constexpr int64_t kBoot = 12'345'678;  // us
-constexpr double kGravity = 9.81;
 constexpr double kStreamBefore = 1.0;  // s of setpoints before OFFBOARD
 constexpr double kSlowest = 0.5;       // s between setpoints of a stream: 2 Hz
 constexpr double kStill = 0.5;         // s after which it takes itself to have landed
-// MPC_XY_P, MPC_XY_VEL_P_ACC, MPC_Z_P, MPC_Z_VEL_P_ACC, MPC_LAND_SPEED, and bounds.
-constexpr double kPositionGain = 0.95, kVelocityGain = 1.8, kHeightGain = 1.0, kClimbGain = 4.0;
-constexpr double kLandSpeed = 0.7, kMostSpeed = 2.0, kMostPush = 3.0;
-constexpr float kForce = 21196.0f;    // param2 of arming and disarming
-constexpr int64_t kOffsetMemory = 8;  // answers of TIMESYNC over which the offset is averaged
+constexpr float kForce = 21196.0f;     // param2 of arming and disarming
+constexpr int64_t kOffsetMemory = 8;   // answers of TIMESYNC over which the offset is averaged
 
 /// The setpoint with no rates and no rotation where its mask leaves them out.
 mav::SetAttitudeTarget Heeded(mav::SetAttitudeTarget m) {
@@ -61,11 +57,6 @@ std::optional<Mode> ModeOf(float main, float sub) {
 
 double Seconds(int64_t from, int64_t to) { return 1e-6 * static_cast<double>(to - from); }
 uint8_t Code(mav::MavResult r) { return static_cast<uint8_t>(r); }
-
-/// No longer than `limit`.
-Vector3d Shortened(const Vector3d& v, double limit) {
-  return v.norm() > limit ? Vector3d(v * (limit / v.norm())) : v;
-}
 
 }  // namespace
 
@@ -215,8 +206,7 @@ uint8_t Px4::SetMode(std::optional<Mode> mode) {
 void Px4::Enter(Mode mode) {
   mode_ = intended_ = mode;
   failsafe_ = false;
-  hold_ = body_.p_WB;
-  hold_yaw_ = math::Yaw(body_.R_WB);
+  own_mode_ = OwnMode(body_);
 }
 
 // Disarming by force heeds nothing; from outside arming by force is arming.
@@ -291,6 +281,7 @@ void Px4::WatchLanding() {
 void Px4::Tick(int64_t utime, int64_t clock, const Px4Body& body) {
   now_ = std::max(now_, utime);
   body_ = body;
+  if (!own_mode_.Holds(body)) own_mode_ = OwnMode(body);
   WatchStream();
   WatchBattery();
   if (!armed_) failsafe_ = false;
@@ -298,48 +289,29 @@ void Px4::Tick(int64_t utime, int64_t clock, const Px4Body& body) {
   Stream(clock);
 }
 
-Px4Demand Px4::Demand(const Px4Body& body) const {
-  if (!armed_) return {};
-  return mode_ == mavlink::kOffboardMode && seen_.setpoint ? OffboardDemand(body) : OwnDemand(body);
+AttitudeSetpoint Px4::Demand(const Px4Body& body) const {
+  AttitudeSetpoint off;
+  off.motors = false;
+  if (!armed_) return off;
+  return mode_ == mavlink::kOffboardMode && seen_.setpoint
+             ? OffboardDemand(body)
+             : own_mode_.Demand(body, mode_ == mavlink::kLandMode);
 }
 
-Px4Demand Px4::OffboardDemand(const Px4Body& body) const {
+AttitudeSetpoint Px4::OffboardDemand(const Px4Body& body) const {
   const mav::SetAttitudeTarget& m = *seen_.setpoint;
-  Px4Demand demand;
-  demand.motors = true;
+  AttitudeSetpoint demand;
   demand.thrust = kGravity * std::clamp(static_cast<double>(m.thrust), 0.0, 1.0) / options_.hover;
   const auto ignored = static_cast<uint8_t>(mav::AttitudeTargetTypemask::ATTITUDE_IGNORE);
   if ((m.type_mask & ignored) != 0) {  // body rates: no attitude error is left to mend
-    demand.R_WB = body.R_WB;
-    demand.rate = mavlink::SwapBody({m.body_roll_rate, m.body_pitch_rate, m.body_yaw_rate});
+    demand.orientation = body.R_WB;
+    demand.body_rate = mavlink::SwapBody({m.body_roll_rate, m.body_pitch_rate, m.body_yaw_rate});
     return demand;
   }
-  demand.R_WB = mavlink::SwapFrames(Eigen::Quaterniond(m.q[0], m.q[1], m.q[2], m.q[3]));
+  demand.orientation = mavlink::SwapFrames(Eigen::Quaterniond(m.q[0], m.q[1], m.q[2], m.q[3]));
   // The rate of yaw counts about the vertical of the earth frame.
-  demand.rate = demand.R_WB.conjugate() * mavlink::SwapWorld({0.0, 0.0, m.body_yaw_rate});
-  return demand;
-}
-
-/// Its own modes: it stays where they began, or sinks. On the ground the motors idle.
-Px4Demand Px4::OwnDemand(const Px4Body& body) const {
-  Px4Demand demand;
-  demand.motors = true;
-  demand.R_WB = math::FromYaw(hold_yaw_);
-  if (body.touches) return demand;
-  Vector3d away = hold_ - body.p_WB;
-  const double height = away.z();
-  away.z() = 0.0;
-  Vector3d wanted = Shortened(kPositionGain * away, kMostSpeed);
-  wanted.z() = mode_ == mavlink::kLandMode
-                   ? -kLandSpeed
-                   : std::clamp(kHeightGain * height, -kLandSpeed, kLandSpeed);
-  Vector3d push = kVelocityGain * (wanted - body.v_WB);
-  push.z() = 0.0;
-  push = Shortened(push, kMostPush);
-  push.z() = body.hover_thrust + kClimbGain * (wanted.z() - body.v_WB.z());
-  push.z() = std::max(push.z(), 0.3 * kGravity);
-  demand.R_WB = math::FromZAxisAndYaw(push, hold_yaw_);
-  demand.thrust = push.norm();
+  demand.body_rate =
+      demand.orientation.conjugate() * mavlink::SwapWorld({0.0, 0.0, m.body_yaw_rate});
   return demand;
 }
 

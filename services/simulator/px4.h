@@ -1,6 +1,5 @@
 #pragma once
 
-#include <Eigen/Geometry>
 #include <cstdint>
 #include <map>
 #include <optional>
@@ -11,6 +10,7 @@
 #include "common/mavlink/framing.h"
 #include "common/mavlink/px4_mode.h"
 #include "common/world/random.h"
+#include "services/simulator/own_mode.h"
 
 namespace chase::simulator {
 
@@ -29,26 +29,6 @@ struct Px4Options {
   int autopilot = 12;                                     ///< MAV_AUTOPILOT of its heartbeat
 };
 
-/// What it knows of the body that it flies; W is its own world frame, with z up.
-struct Px4Body {
-  Eigen::Vector3d p_WB = Eigen::Vector3d::Zero(), v_WB = Eigen::Vector3d::Zero();  ///< m, m/s
-  Eigen::Quaterniond R_WB = Eigen::Quaterniond::Identity();
-  Eigen::Vector3d accel = {0.0, 0.0, 9.81};        ///< specific force measured, frame B, m/s^2
-  Eigen::Vector3d gyro = Eigen::Vector3d::Zero();  ///< measured, frame B, rad/s
-  bool touches = true;                             ///< the ground
-  double thrust = 0.0;                             ///< over mass, m/s^2
-  double hover_thrust = 9.81;                      ///< asked for, that balances gravity, m/s^2
-  double charge = 0.8;                             ///< of the battery, 0 to 1
-};
-
-/// What it asks of its inner loops.
-struct Px4Demand {
-  bool motors = false;
-  Eigen::Quaterniond R_WB = Eigen::Quaterniond::Identity();
-  Eigen::Vector3d rate = Eigen::Vector3d::Zero();  ///< feed-forward, in the wanted B, rad/s
-  double thrust = 0.0;                             ///< over mass, m/s^2
-};
-
 /// PX4 as its documents describe it and as a real one was measured: OFFBOARD, arming, refusals,
 /// failsafes, streams, clocks (docs.px4.io: Offboard Mode, Safety; mavlink.io: Command, Timesync).
 /// Knows no socket and no clock: times are the host's, microseconds; its own clock began kBoot
@@ -65,7 +45,8 @@ class Px4 {
   /// busy simulation's `utime` lags behind.
   void Tick(int64_t utime, int64_t clock, const Px4Body& body);
   std::vector<Bytes> TakeOutgoing();
-  Px4Demand Demand(const Px4Body& body) const;
+  /// What it asks of its inner loops.
+  AttitudeSetpoint Demand(const Px4Body& body) const;
 
   void PilotMode(mavlink::Mode mode) { Enter(mode); }
   void PilotArms(bool on) { armed_ = on; }
@@ -110,8 +91,7 @@ class Px4 {
   void WatchStream();
   void WatchBattery();
   void WatchLanding();
-  Px4Demand OffboardDemand(const Px4Body& body) const;
-  Px4Demand OwnDemand(const Px4Body& body) const;
+  AttitudeSetpoint OffboardDemand(const Px4Body& body) const;
   void Stream(int64_t clock);
   void StreamState();
   bool Due(uint32_t id);
@@ -139,8 +119,7 @@ class Px4 {
   bool armed_ = false, failsafe_ = false, landed_ = true, has_flown_ = false, drained_ = false;
   int64_t first_setpoint_ = 0, last_setpoint_ = 0, landed_since_ = 0, down_since_ = 0;
   Px4Body body_;
-  Eigen::Vector3d hold_ = Eigen::Vector3d::Zero();  // where its own modes stay
-  double hold_yaw_ = 0.0;
+  OwnMode own_mode_{body_};
   std::map<uint32_t, int64_t> next_;       // of each stream
   std::map<uint32_t, int64_t> intervals_;  // us; 0: none
   std::vector<Bytes> outgoing_;

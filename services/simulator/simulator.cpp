@@ -9,7 +9,6 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr double kStep = 1e-3;        // s
-constexpr double kDescentGain = 2.0;  // 1/s
 constexpr double kHoverMemory = 2.0;  // s: above the motors' 0.05 s, below a battery's minutes
 constexpr double kPi = 3.14159265358979323846;
 
@@ -21,13 +20,6 @@ BodyState StartState(const world::Scenario& scenario, const VehicleConfig& vehic
   state.p = {start.x(), start.y(), std::max(start.z(), ground + StandingHeight(vehicle))};
   state.q = Eigen::AngleAxisd(scenario.chaser.yaw_deg * kPi / 180.0, Vector3d::UnitZ());
   return state;
-}
-
-/// Upright with the heading kept.
-Eigen::Quaterniond Level(const Eigen::Quaterniond& q) {
-  const Vector3d forward = q * Vector3d::UnitX();
-  return Eigen::Quaterniond(
-      Eigen::AngleAxisd(std::atan2(forward.y(), forward.x()), Vector3d::UnitZ()));
 }
 
 /// s on the target's path; 0: no decoy in this flight.
@@ -47,7 +39,6 @@ std::string Named(const std::string& name, const std::string& problem) {
 
 std::string SimulatorConfig::Problem() const {
   if (!(setpoint_timeout > 0.0)) return "setpoint_timeout is not above 0 s";
-  if (!(descent_speed > 0.0)) return "descent_speed is not above 0 m/s";
   if (!sensors.empty() && sensors != "raw" && sensors != "truth")
     return "sensors is '" + sensors + "', not raw or truth";
   if (rig.width_px < 8 || rig.height_px < 8) return "rig: the image is below 8 x 8 px";
@@ -89,6 +80,7 @@ void Simulator::Disturb(const Disturbance& disturbance) {
 void Simulator::SetSetpoint(const AttitudeSetpoint& setpoint, double t) {
   if (!(setpoint.orientation.norm() > 0.1)) return;
   setpoint_ = setpoint;
+  setpoint_.orientation = estimator_.InWorld(setpoint.orientation);
   setpoint_time_ = t;
 }
 
@@ -103,17 +95,27 @@ void Simulator::LearnHoverThrust() {
   hover_thrust_ += kStep / kHoverMemory * (setpoint_.thrust / felt * kGravity - hover_thrust_);
 }
 
-/// The setpoint while it is fresh; without one, level descent in the air and rest on the ground.
-AttitudeSetpoint Simulator::ActiveSetpoint() const {
-  if (SetpointFresh()) return setpoint_;
-  const BodyState& body = quadrotor_.state();
-  AttitudeSetpoint descent;
-  descent.orientation = Level(body.q);
-  if (quadrotor_.on_ground() || steps_ == 0) return descent;
-  const double wanted = -config_.descent_speed - body.v.z();
-  descent.thrust =
-      std::clamp(hover_thrust_ + kDescentGain * wanted, 0.0, config_.vehicle.max_thrust);
-  return descent;
+Px4Body Simulator::Known() const {
+  Px4Body body = estimator_.Body(quadrotor_.state());
+  body.touches = on_ground();
+  body.thrust = quadrotor_.thrust() / config_.vehicle.TrueMass();
+  body.hover_thrust = hover_thrust_;
+  body.charge = battery_.charge();
+  return body;
+}
+
+/// The setpoint while it is fresh; without one it lands, as with COM_OBL_RC_ACT 4.
+AttitudeSetpoint Simulator::ActiveSetpoint() {
+  if (SetpointFresh()) {
+    own_mode_.reset();
+    return setpoint_;
+  }
+  Px4Body body = Known();
+  body.touches = body.touches || steps_ == 0;
+  if (!own_mode_ || !own_mode_->Holds(body)) own_mode_.emplace(body);
+  AttitudeSetpoint landing = own_mode_->Demand(body, true);
+  landing.orientation = estimator_.InWorld(landing.orientation);
+  return landing;
 }
 
 void Simulator::StepPhysics() {

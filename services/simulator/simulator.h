@@ -11,6 +11,7 @@
 #include "services/simulator/attitude_loop.h"
 #include "services/simulator/battery.h"
 #include "services/simulator/camera.h"
+#include "services/simulator/estimator.h"
 #include "services/simulator/hardware_config.h"
 #include "services/simulator/imu.h"
 #include "services/simulator/lidar.h"
@@ -26,7 +27,6 @@ struct SimulatorConfig {
   int64_t seed = 1;
   std::string sensors;
   double setpoint_timeout = 0.5;
-  double descent_speed = 0.5;
   world::Rig rig;
   VehicleConfig vehicle;
   BatteryConfig battery;
@@ -42,8 +42,7 @@ struct SimulatorConfig {
     v("scenario", scenario, "file that describes the world");
     v("seed", seed, "of all noise and gusts");
     v("sensors", sensors, "raw or truth; empty: as the scenario says");
-    v("setpoint_timeout", setpoint_timeout, "older setpoints give way to a level descent, s");
-    v("descent_speed", descent_speed, "of that descent, m/s");
+    v("setpoint_timeout", setpoint_timeout, "older setpoints give way to a landing, s");
     v("rig", rig, "where the sensors sit");
     v("vehicle", vehicle, "");
     v("battery", battery, "");
@@ -81,7 +80,7 @@ class Simulator {
  public:
   Simulator(const world::Scenario& scenario, const SimulatorConfig& config);
 
-  /// The flight controller's newest setpoint, received at t [s].
+  /// The flight controller's newest setpoint, in the frame of its estimator, received at t [s].
   void SetSetpoint(const AttitudeSetpoint& setpoint, double t);
 
   /// From the next step on.
@@ -92,10 +91,12 @@ class Simulator {
   const BodyState& body() const { return quadrotor_.state(); }
   /// True while a foot touches the ground.
   bool on_ground() const { return quadrotor_.on_ground(); }
-  /// Of the motors over mass, m/s^2.
-  double thrust() const { return quadrotor_.thrust() / config_.vehicle.TrueMass(); }
-  /// That the flight controller has learned, as asked for over mass, m/s^2.
-  double hover_thrust() const { return hover_thrust_; }
+  /// What the flight controller knows, but for what its IMU measures. It sinks level until its
+  /// estimator is told of vision.
+  Px4Body Known() const;
+  Estimator& estimator() { return estimator_; }
+  /// Does the flight controller land for want of setpoints?
+  bool lands() const { return own_mode_ && setpoint_time_ >= 0.0; }
 
   /// Advances to t [s] at 1 kHz, and measures there. Times must grow; the first is 0.
   Output Advance(double t);
@@ -106,7 +107,7 @@ class Simulator {
   std::optional<Image> TakeFrame(const Truth& truth);
   void StepPhysics();
   void LearnHoverThrust();
-  AttitudeSetpoint ActiveSetpoint() const;
+  AttitudeSetpoint ActiveSetpoint();
   bool SetpointFresh() const;
   double now() const { return static_cast<double>(steps_) * 1e-3; }
   TimedPose Pose() const;
@@ -125,7 +126,9 @@ class Simulator {
   long steps_ = 0;   // of physics, 1 ms each
   long frames_ = 0;  // of the camera
   double last_measurement_ = 0.0;
+  Estimator estimator_;
   AttitudeSetpoint setpoint_;
+  std::optional<OwnMode> own_mode_;                 // while setpoints are silent
   Eigen::Vector3d gust_ = Eigen::Vector3d::Zero();  // of a fault, m/s
   double setpoint_time_ = -1e9;
   double hover_thrust_ = kGravity;  // that the flight controller has learned, m/s^2

@@ -20,6 +20,7 @@
 #include "common/bus/convert.h"
 #include "common/config/version.h"
 #include "common/math/rotation.h"
+#include "common/world/ages.h"
 
 namespace chase::simulator {
 namespace {
@@ -63,18 +64,23 @@ void SimulatorNode::Subscribe() {
   if (!truth_feed_) bus_.Subscribe<pose_t>("POSE", [this](const auto& m) { OnPose(m); });
 }
 
+// As the bridge does: a frame that odometry begins anew by its first pose of whatever health, else
+// those that are good, and fresh.
 void SimulatorNode::OnPose(const pose_t& message) {
-  if (epoch_.Change(message.epoch)) changes_frame_ = true;
-  if (!changes_frame_ || message.health == pose_t::HEALTH_STARTING) return;
-  changes_frame_ = false;
-  frame_yaw_ = math::WrapAngle(math::Yaw(simulator_.body().q) -
-                               math::Yaw(bus::ToQuaternion(message.orientation)));
+  if (message.health == pose_t::HEALTH_STARTING) return;
+  const bool anew = epoch_.Change(message.epoch);
+  const bool good = message.health != pose_t::HEALTH_LOST &&
+                    bus::Seconds(bus_.Now(), message.utime) <= world::kMostAge.pose;
+  if (!anew && !good) return;
+  simulator_.estimator().Correct(
+      {message.utime, bus::ToVector(message.pos), bus::ToVector(message.vel),
+       math::Yaw(bus::ToQuaternion(message.orientation)), message.epoch});
 }
 
 void SimulatorNode::OnSetpoint(const attitude_setpoint_t& message) {
   if (!power_on_) return;
   AttitudeSetpoint setpoint;
-  setpoint.orientation = math::FromYaw(frame_yaw_) * bus::ToQuaternion(message.orientation);
+  setpoint.orientation = bus::ToQuaternion(message.orientation);
   setpoint.body_rate = bus::ToVector(message.body_rate);
   setpoint.thrust = std::max(0.0, message.thrust);
   setpoint.motors = message.motors != attitude_setpoint_t::MOTORS_OFF;
@@ -94,12 +100,15 @@ void SimulatorNode::Tick(int64_t utime) {
     output = simulator_.Advance(bus::Seconds(utime, *power_on_));
   }
   faults_.Strike(config_.imu, &output.imu);
+  const BodyState& body = output.truth.body;
+  simulator_.estimator().Predict(utime, body, output.imu.accel);
+  if (truth_feed_) simulator_.estimator().Correct({utime, body.p, body.v, math::Yaw(body.q), 0});
   PublishSensors(&output, utime);
   if (ticks_ % kTruthTicks == 0) PublishTruth(output.truth, utime);
-  if (ticks_ % kScenarioTicks == 0) {
-    PublishScenario(utime);
-    if (!config_.hardware.mavlink()) PublishAutopilot(utime);
-  }
+  if (ticks_ % kScenarioTicks == 0) PublishScenario(utime);
+  const bool told = ticks_ % kScenarioTicks != 0 && simulator_.lands() == lands_;
+  if (!told && !config_.hardware.mavlink()) PublishAutopilot(utime);
+  lands_ = simulator_.lands();
   if (truth_feed_) truth_feed_->Publish(output.truth, utime, ticks_);
   ++ticks_;
 }
@@ -214,7 +223,8 @@ void SimulatorNode::PublishAutopilot(int64_t utime) {
   message.utime = utime;
   message.name = "fcu";
   message.state = status_t::OK;
-  message.detail = "simulated, " + bus::BatteryWords(simulator_.charge());
+  message.detail = simulator_.lands() ? "landing: no setpoints; " : "";
+  message.detail += "simulated, " + bus::BatteryWords(simulator_.charge());
   message.version = config::Version();
   bus_.Publish("FCU_STATUS", message);
 }

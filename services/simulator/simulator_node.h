@@ -19,9 +19,8 @@ namespace chase::simulator {
 
 /// ATTITUDE_SETPOINT -> simulator -> IMU, LIDAR_SCAN, CAMERA_IMAGE, TRUTH, SCENARIO, FAULT,
 /// FCU_STATUS. The first tick is power-on. Where the scenario's sensors.mode is "truth", also POSE,
-/// TARGET and OBSTACLES. Else POSE is heard for its frame: like PX4 with its reset counter, the
-/// autopilot takes over the yaw of a frame that odometry begins anew. Devices that `hardware` gives
-/// to drivers are neither heard nor published here.
+/// TARGET and OBSTACLES. Else POSE is heard for the autopilot's estimator, as the bridge sends it.
+/// Devices that `hardware` gives to drivers are neither heard nor published here.
 class SimulatorNode : public bus::Node {
  public:
   SimulatorNode(bus::Bus& bus, const SimulatorConfig& config);
@@ -52,10 +51,9 @@ class SimulatorNode : public bus::Node {
   SensorFaults faults_;
   std::unique_ptr<TruthFeed> truth_feed_;
   bus::Epoch epoch_;
-  bool changes_frame_ = false;       // its first usable pose is awaited
-  double frame_yaw_ = 0.0;           // of odometry's frame W in the simulator's, rad
   std::optional<int64_t> power_on_;  // utime of the first tick
   int64_t last_tick_ = 0;
+  bool lands_ = false;  // as was told last
   int64_t ticks_ = 0;
 };
 

@@ -32,8 +32,8 @@ void StandIn::Turn(const Eigen::Quaterniond& wanted, double dt) {
 
 /// A point that is pushed along its own z axis.
 void StandIn::Move(double dt) {
-  const simulator::Px4Demand demand = px4_.Demand(body_);
-  Turn(demand.motors ? demand.R_WB : body_.R_WB, dt);
+  const simulator::AttitudeSetpoint demand = px4_.Demand(body_);
+  Turn(demand.motors ? demand.orientation : body_.R_WB, dt);
   body_.thrust = demand.motors ? demand.thrust : 0.0;
   const Eigen::Vector3d force =
       body_.R_WB * Eigen::Vector3d(0, 0, body_.thrust) - kDrag * body_.v_WB;

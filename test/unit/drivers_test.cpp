@@ -6,14 +6,15 @@
 
 #include "../fcu/firing_order.h"
 #include "common/bus/host_clock.h"
+#include "common/math/rotation.h"
 #include "common/world/scenario.h"
 #include "services/camera/capture_clock.h"
 #include "services/camera/frame_source.h"
 #include "services/camera/grabber.h"
 #include "services/lidar/sweep_assembler.h"
+#include "services/simulator/estimator.h"
 #include "services/simulator/mjpeg_server.h"
 #include "services/simulator/simulator.h"
-#include "services/simulator/vision_frame.h"
 
 namespace chase {
 namespace {
@@ -174,30 +175,50 @@ TEST(Drivers, OfFramesThatNobodyFetchedTheNewestIsKept) {
   EXPECT_EQ(grabber.dropped() - before, 4);
 }
 
-/// Vision's frame is turned and shifted against the simulator's, and drifts.
+/// Vision's frame is turned and shifted against the simulator's, and drifts; its velocity is told.
 TEST(Drivers, TheAutopilotLivesInVisionsFrame) {
-  simulator::VisionFrame frame;
+  simulator::Estimator estimator;
   simulator::BodyState body;
   const double yaw = 0.7, drift = 0.1;
-  const Eigen::Vector3d p_WO(3.0, -2.0, 0.5);
+  const Eigen::Vector3d p_WO(3.0, -2.0, 0.5), gravity(0.0, 0.0, 9.81);
   const Eigen::Quaterniond R_WO(Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()));
   const auto see = [&](int64_t utime, double turned, int resets) {
-    const Eigen::AngleAxisd turn(-turned, Eigen::Vector3d::UnitZ());
-    frame.AddVision(utime, turn * (R_WO.conjugate() * (body.p - p_WO)), 0.4 - yaw - turned, resets);
+    const Eigen::Quaterniond R_OW = math::FromYaw(-turned - yaw);
+    estimator.Correct({utime, R_OW * (body.p - p_WO), R_OW * body.v, 0.4 - yaw - turned, resets});
   };
+  const auto turn = [&] { return estimator.InWorld(Eigen::Quaterniond::Identity()); };
   body.q = Eigen::AngleAxisd(0.4, Eigen::Vector3d::UnitZ());
+  body.v = {2.0, 4.0, 0.0};
   for (int k = 0; k < 200; ++k) {
     body.p = {0.01 * k, 0.02 * k, 1.0};
-    frame.AddTruth(5'000 * k, body);
+    estimator.Predict(5'000 * k, body, gravity);
     if (k % 5 == 0) see(5'000 * k, 0.0, 1);
   }
-  EXPECT_LT((frame.InVision(body).p_WB - R_WO.conjugate() * (body.p - p_WO)).norm(), 1e-9);
-  EXPECT_LT(frame.InWorld(Eigen::Quaterniond::Identity()).angularDistance(R_WO), 1e-9);
-  see(995'000, drift, 1);  // one pose pulls a little
-  EXPECT_NEAR(frame.InWorld(Eigen::Quaterniond::Identity()).angularDistance(R_WO), 0.05 * drift,
-              1e-6);
+  const simulator::Px4Body known = estimator.Body(body);
+  EXPECT_LT((known.p_WB - R_WO.conjugate() * (body.p - p_WO)).norm(), 1e-9);
+  EXPECT_LT((known.v_WB - R_WO.conjugate() * body.v).norm(), 1e-9);
+  EXPECT_LT(turn().angularDistance(R_WO), 1e-9);
+  see(995'000, drift, 1);  // one pose pulls a little: 20 ms of 0.5 s
+  EXPECT_NEAR(turn().angularDistance(R_WO), 0.04 * drift, 1e-6);
   see(995'000, drift, 2);  // a reset is taken over at once
-  EXPECT_NEAR(frame.InWorld(Eigen::Quaterniond::Identity()).angularDistance(R_WO), drift, 1e-6);
+  EXPECT_NEAR(turn().angularDistance(R_WO), drift, 1e-6);
+  EXPECT_NE(estimator.Body(body).resets, known.resets);
+}
+
+/// Without vision it goes by what the accelerometer is off by, for 5 s.
+TEST(Drivers, TheAutopilotsVelocityIsWorthlessAfterVisionEnds) {
+  simulator::Estimator estimator;
+  const simulator::BodyState body;
+  const Eigen::Vector3d accel(0.05, 0.0, 9.9);
+  EXPECT_FALSE(estimator.Body(body).knows_velocity);
+  for (int k = 0; k <= 2000; ++k) {
+    estimator.Predict(5'000 * k, body, accel);
+    if (k <= 800) estimator.Correct({5'000 * k, body.p, body.v, 0.0, 0});
+    EXPECT_EQ(estimator.Body(body).knows_velocity, k <= 1800) << k;
+  }
+  const Eigen::Vector3d off = estimator.Body(body).v_WB;
+  EXPECT_NEAR(off.x(), 6.0 * 0.05 + 0.5 * 0.05, 0.01);  // and what vision had not taken away
+  EXPECT_EQ(off.z(), 0.0);
 }
 
 TEST(CaptureClock, AStampOfThisHostIsBelievedWhileItIsPossible) {

@@ -1,7 +1,10 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <functional>
 
+#include "common/math/rotation.h"
+#include "common/world/random.h"
 #include "services/simulator/simulator.h"
 
 namespace chase::simulator {
@@ -92,6 +95,65 @@ TEST(Simulator, DescendsAtItsSpeedWithMotorsThatGiveLess) {
     EXPECT_GT(output.truth.body.v.z(), t < 9.0 ? -1.0 : -0.65) << t;
   }
   EXPECT_NEAR(output.truth.body.v.z(), -0.5, 0.1);
+}
+
+/// Flies level at `v_WB` [m/s] until setpoints end at t = 2 s, and lands; vision's frame O is
+/// turned by `yaw` and tells the truth while `sees`. Returns the flight from the end of setpoints
+/// on.
+std::vector<BodyState> Landing(const Vector3d& v_WB, double yaw,
+                               const std::function<bool(double)>& sees) {
+  auto gym = Gym();
+  gym.chaser.start.z() = 4.0;
+  Simulator simulator(gym, Blind());
+  const Eigen::Quaterniond R_OW = math::FromYaw(-yaw);
+  std::vector<BodyState> flown;
+  for (int i = 0; i < 2400; ++i) {
+    const double t = 0.005 * i;
+    const BodyState body = simulator.body();
+    if (t < 2.0) {
+      AttitudeSetpoint setpoint =
+          Pilot(body, body.p + 1.25 * v_WB + Vector3d(0, 0, 4 - body.p.z()));
+      setpoint.orientation = R_OW * setpoint.orientation;
+      simulator.SetSetpoint(setpoint, t);
+    } else {
+      flown.push_back(body);
+    }
+    const Output output = simulator.Advance(t);
+    const BodyState& now = output.truth.body;
+    simulator.estimator().Predict(5'000 * i, now, output.imu.accel);
+    if (sees(t))
+      simulator.estimator().Correct(
+          {5'000 * i, R_OW * now.p, R_OW * now.v, math::Yaw(now.q) - yaw, 0});
+  }
+  return flown;
+}
+
+/// v^2 / 2a of the 3 m/s^2 that it brakes by, with the half second in which the last setpoint
+/// holds.
+TEST(Simulator, BrakesAndStaysByVisionWhenSetpointsStop) {
+  world::Random random(7);
+  for (int trial = 0; trial < 10; ++trial) {
+    const double heading = random.Uniform(-3.0, 3.0), speed = random.Uniform(0.0, 2.5);
+    const Vector3d v = speed * Vector3d(std::cos(heading), std::sin(heading), 0.0);
+    const auto flown = Landing(v, random.Uniform(-3.0, 3.0), [](double) { return true; });
+    const double start = flown.front().v.head<2>().norm();
+    const Vector3d& begun = flown[100].p;  // the setpoints are 0.5 s old
+    for (const BodyState& body : flown)
+      EXPECT_LT((body.p - flown.front().p).head<2>().norm(), 0.1 + 0.9 * start + start * start / 6)
+          << trial;
+    EXPECT_LT((flown.back().p - begun).head<2>().norm(), 0.15) << trial;
+    EXPECT_NEAR(flown.back().p.z(), 0.12, 0.02);
+  }
+}
+
+/// PX4 reckons 5 s by its accelerometer, from then on it sinks level.
+TEST(Simulator, StaysForAWhileAfterVisionEndsAndThenSinksLevel) {
+  const auto before = [](double end) { return [end](double t) { return t < end; }; };
+  const auto reckoned = Landing({2.0, 0.0, 0.0}, 1.0, before(2.0));
+  EXPECT_LT(reckoned[600].v.head<2>().norm(), 0.4);  // 3 s: a bias of 0.05 m/s^2 and more
+  EXPECT_GT((reckoned[600].p - reckoned[300].p).head<2>().norm(), 0.01) << "it knows the truth";
+  const auto blind = Landing({2.0, 0.0, 0.0}, 1.0, [](double) { return false; });
+  EXPECT_GT(blind[300].v.head<2>().norm(), 0.8) << "it brakes by a velocity that nobody told";
 }
 
 TEST(Simulator, RefusesAnOrientationOfNoLength) {

@@ -186,7 +186,7 @@ TEST(Px4, RotationsAreOfUnitLength) {
 }
 
 /// Its demand under OFFBOARD by a setpoint with this thrust.
-Px4Demand DemandFor(float thrust) {
+AttitudeSetpoint DemandFor(float thrust) {
   Link link;
   mav::SetAttitudeTarget m;
   m.q = {1.0f, 0.0f, 0.0f, 0.0f};
