@@ -3,10 +3,9 @@
 #include <cstdint>
 #include <optional>
 
-#include "chase/flight_state_t.hpp"
-#include "chase/tracking_t.hpp"
 #include "chase/truth_t.hpp"
 #include "logs/src/flight_record.h"
+#include "logs/src/landing_watch.h"
 #include "logs/src/score.h"
 
 namespace chase::flight {
@@ -19,8 +18,11 @@ class CollisionWatch {
   }
 
   void Add(const truth_t& truth);
-  void Add(const flight_state_t& state);
-  void Add(const tracking_t& tracking);
+  /// What tells of a landing: FLIGHT_STATE, TRACKING, FCU_STATUS.
+  template <class Message>
+  void Add(const Message& message) {
+    landing_.Hear(message);
+  }
 
   /// Mission time of the first contact, s.
   std::optional<double> time() const { return time_; }
@@ -29,8 +31,7 @@ class CollisionWatch {
   logs::Scorer score_;
   logs::FlightRecord record_;     // of the scenario alone; says when the mission lasts
   std::optional<int64_t> start_;  // mission time zero, microseconds
-  int8_t state_ = -1;             // of flight_state_t, once it is heard
-  bool descends_ = false;         // control does, by itself
+  logs::LandingWatch landing_;
   std::optional<double> time_;
 };
 

@@ -40,12 +40,13 @@ void Observe(const std::string& channel, const bus::Bus::Bytes& bytes, Progress*
   const int size = static_cast<int>(bytes.size());
   scenario_t scenario;
   truth_t truth;
-  flight_state_t state;
-  if (watch != nullptr && channel == "FLIGHT_STATE" && state.decode(bytes.data(), 0, size) > 0)
-    watch->Add(state);
-  tracking_t tracking;
-  if (watch != nullptr && channel == "TRACKING" && tracking.decode(bytes.data(), 0, size) > 0)
-    watch->Add(tracking);
+  const auto tell = [&](const char* of, auto message) {
+    if (watch != nullptr && channel == of && message.decode(bytes.data(), 0, size) > 0)
+      watch->Add(message);
+  };
+  tell("FLIGHT_STATE", flight_state_t());
+  tell("TRACKING", tracking_t());
+  tell("FCU_STATUS", status_t());
   if (progress != nullptr && channel == "SCENARIO" && scenario.decode(bytes.data(), 0, size) > 0)
     progress->SetScenario(scenario);
   if (progress == nullptr && watch == nullptr) return;

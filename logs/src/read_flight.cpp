@@ -20,6 +20,7 @@
 #include "chase/truth_t.hpp"
 #include "common/bus/convert.h"
 #include "logs/src/good_message.h"
+#include "logs/src/landing_watch.h"
 #include "logs/src/log_survey.h"
 
 namespace chase::logs {
@@ -50,7 +51,9 @@ class Gatherer {
     TakeLast(e, "SCENARIO", &scenario_);
     TakeLast(e, "OBSTACLES", &obstacles_);
     status_t status;
-    if (Good(e, "_STATUS", &status)) statuses_[status.name] = status;
+    if (!Good(e, "_STATUS", &status)) return;
+    statuses_[status.name] = status;
+    if (status.name == "fcu") autopilot_.push_back(status);
   }
 
   FlightRecord Record(const std::string& log) {
@@ -128,12 +131,17 @@ class Gatherer {
     for (const flight_state_t& m : states_)
       if (record->states.empty() || record->states.back().state != m.state)
         record->states.push_back({Time(m.utime), m.state, m.reason});
-    size_t state = 0, tracking = 0;
+    size_t state = 0, tracking = 0, status = 0;
+    LandingWatch landing;
+    const auto hear = [&](const auto& messages, size_t* next, double t) {
+      for (; *next < messages.size() && Time(messages[*next].utime) <= t; ++*next)
+        landing.Hear(messages[*next]);
+    };
     for (TruthSample& s : record->truth) {
-      while (state < record->states.size() && record->states[state].t <= s.t) ++state;
-      while (tracking < tracking_.size() && Time(tracking_[tracking].utime) <= s.t) ++tracking;
-      const bool descends = tracking > 0 && tracking_[tracking - 1].following == tracking_t::LAND;
-      s.may_stand = MayStand(state > 0 ? record->states[state - 1].state : -1, descends, s.speed);
+      hear(states_, &state, s.t);
+      hear(tracking_, &tracking, s.t);
+      hear(autopilot_, &status, s.t);
+      s.may_stand = landing.MayStand(s, record->scenario.world.ground);
     }
   }
 
@@ -222,20 +230,13 @@ class Gatherer {
   std::optional<scenario_t> scenario_;
   std::optional<obstacles_t> obstacles_;
   std::map<std::string, status_t> statuses_;
+  std::vector<status_t> autopilot_;  // of the bridge
 };
 
 }  // namespace
 
 int64_t MissionStart(const truth_t& truth) {
   return truth.utime - std::llround(truth.mission_time * 1e6);
-}
-
-bool MayStand(int state, bool descends, double speed) {
-  constexpr double kTouchdown = 0.75;  // m/s: as fast as control sinks without a velocity
-  if (descends && speed <= kTouchdown) return true;
-  return state == flight_state_t::IDLE || state == flight_state_t::READY ||
-         state == flight_state_t::TAKEOFF || state == flight_state_t::LAND ||
-         state == flight_state_t::DONE;
 }
 
 TruthSample ToSample(const truth_t& m, int64_t start) {

@@ -4,8 +4,8 @@
 #include <nlohmann/json.hpp>
 #include <random>
 
-#include "chase/flight_state_t.hpp"
 #include "logs/src/estimate_errors.h"
+#include "logs/src/landing_watch.h"
 #include "logs/src/metrics.h"
 #include "logs/src/read_flight.h"
 
@@ -100,12 +100,43 @@ TEST(Metrics, ALandingIsJudgedByItsSpeedAndTheGroundIsNoHarm) {
   EXPECT_FALSE(Compute(other).criteria.at("touchdown_speed")) << "it never was down";
 }
 
+void Tell(int8_t state, bool control, bool autopilot, LandingWatch* watch) {
+  flight_state_t mission{};
+  mission.state = state;
+  tracking_t tracking{};
+  tracking.following = control ? tracking_t::LAND : tracking_t::PLAN;
+  status_t status{};
+  status.name = "fcu";
+  status.detail = autopilot ? "landing: no setpoints; simulated" : "simulated";
+  watch->Hear(mission), watch->Hear(tracking), watch->Hear(status);
+}
+
 TEST(Metrics, ATouchOfTheGroundIsALandingByTheFlightsState) {
-  EXPECT_TRUE(MayStand(flight_state_t::LAND, false, 3.0));
-  EXPECT_TRUE(MayStand(flight_state_t::EMERGENCY, true, 0.7)) << "sinks without a velocity";
-  EXPECT_TRUE(MayStand(-1, true, 0.7)) << "no mission leads it";
-  EXPECT_FALSE(MayStand(-1, true, 0.8));
-  EXPECT_FALSE(MayStand(flight_state_t::CHASE, false, 0.1));
+  const auto at = [](double height, double speed) {
+    TruthSample sample{};
+    sample.p.z() = height;
+    sample.speed = speed;
+    return sample;
+  };
+  const auto touches = [&](int8_t state, bool control, bool autopilot, double speed) {
+    LandingWatch watch;
+    Tell(state, control, autopilot, &watch);
+    return watch.MayStand(at(0.2, speed), {});
+  };
+  EXPECT_TRUE(touches(flight_state_t::LAND, false, false, 3.0));
+  EXPECT_TRUE(touches(flight_state_t::EMERGENCY, true, false, 0.7)) << "sinks without a velocity";
+  EXPECT_TRUE(touches(-1, true, false, 0.7)) << "no mission leads it";
+  EXPECT_FALSE(touches(-1, true, false, 0.8));
+  EXPECT_FALSE(touches(flight_state_t::CHASE, false, false, 0.1));
+  EXPECT_TRUE(touches(flight_state_t::CHASE, false, true, 0.5)) << "the autopilot lands";
+  EXPECT_FALSE(touches(flight_state_t::CHASE, false, true, 0.8));
+  LandingWatch watch;
+  Tell(flight_state_t::CHASE, false, true, &watch);
+  watch.MayStand(at(0.4, 0.5), {});
+  Tell(flight_state_t::CHASE, false, false, &watch);
+  EXPECT_TRUE(watch.MayStand(at(0.2, 0.1), {})) << "broken off on the way down";
+  watch.MayStand(at(0.7, 0.5), {});
+  EXPECT_FALSE(watch.MayStand(at(0.2, 0.1), {})) << "it has been up since";
 }
 
 TEST(Metrics, ASegmentThroughThePillarIsBlind) {

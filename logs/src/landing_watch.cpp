@@ -1,0 +1,22 @@
+#include "logs/src/landing_watch.h"
+
+#include "common/world/flight_volume.h"
+
+namespace chase::logs {
+
+// The words of the bridge, and of the simulator in its stead.
+void LandingWatch::Hear(const status_t& message) {
+  if (message.name == "fcu") autopilot_ = message.detail.rfind("landing", 0) == 0;
+}
+
+bool LandingWatch::MayStand(const TruthSample& sample, const world::GroundSpec& ground) {
+  constexpr double kTouchdown = 0.75;  // m/s: as fast as control sinks without a velocity
+  const double height = sample.p.z() - world::GroundHeight(ground, sample.p.x(), sample.p.y());
+  came_down_ = control_ || autopilot_ || (came_down_ && height < world::kFlightVolume.low);
+  if (came_down_ && sample.speed <= kTouchdown) return true;
+  return state_ == flight_state_t::IDLE || state_ == flight_state_t::READY ||
+         state_ == flight_state_t::TAKEOFF || state_ == flight_state_t::LAND ||
+         state_ == flight_state_t::DONE;
+}
+
+}  // namespace chase::logs

@@ -1,0 +1,28 @@
+#pragma once
+
+#include "chase/flight_state_t.hpp"
+#include "chase/status_t.hpp"
+#include "chase/tracking_t.hpp"
+#include "common/world/scenario.h"
+#include "logs/src/flight_record.h"
+
+namespace chase::logs {
+
+/// Tells a landing from a contact with the ground: the flight's state is one of landing or
+/// standing, or control or the autopilot has come down by itself, gently, and is not yet back at
+/// the heights of plans.
+class LandingWatch {
+ public:
+  void Hear(const flight_state_t& message) { state_ = message.state; }
+  void Hear(const tracking_t& message) { control_ = message.following == tracking_t::LAND; }
+  void Hear(const status_t& message);
+
+  /// May the body touch the ground at that sample? They come in the order of time.
+  bool MayStand(const TruthSample& sample, const world::GroundSpec& ground);
+
+ private:
+  int8_t state_ = -1;  // of flight_state_t, once it is heard
+  bool control_ = false, autopilot_ = false, came_down_ = false;
+};
+
+}  // namespace chase::logs
