@@ -74,6 +74,9 @@ class Odometry {
     return fused_ && silence > kLongest && sweeps_since_ < silence / kRare;
   }
 
+  /// Does it move, or did when it was heard of last?
+  bool Flies() const { return fused_ && !standing_.holds(); }
+
   int64_t dropped_sweeps() const { return dropped_sweeps_; }
   int64_t dropped_samples() const { return dropped_samples_; }
   size_t MapBytes() const { return planes_.MemoryBytes() + posts_.MemoryBytes(); }

@@ -81,7 +81,10 @@ double OdometryNode::SecondsOf(int64_t utime) {
 void OdometryNode::BeginAnew() {
   first_epoch_ = epoch_ + 1;
   has_origin_ = false;
-  odometry_.emplace(config_);
+  // A body that flew when its sensors fell silent flies: it is not waited for to settle.
+  OdometryConfig config = config_;
+  if (odometry_->Flies()) config.alignment.patience = 0.0;
+  odometry_.emplace(config);
 }
 
 void OdometryNode::OnImu(const imu_t& m) {

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <functional>
 #include <memory>
 #include <vector>
 
@@ -34,16 +36,18 @@ class Bench {
     });
   }
 
-  void SendImu(int64_t utime) {
+  void SendImu(int64_t utime, double forward = 0.0) {
     imu_t m{};
     m.utime = utime;
-    bus::Set(m.accel, Eigen::Vector3d(0.0, 0.0, 9.81));
+    bus::Set(m.accel, Eigen::Vector3d(forward, 0.0, 9.81));
     bus_->Publish("IMU", m);
     lockstep_.RunUntil(std::max(utime, lockstep_.now()));
   }
 
-  void SendScan(int64_t utime, int64_t now) {
-    const auto X_WL = [](double) { return Pose{Eigen::Quaterniond::Identity(), {0, 0, 0.3}}; };
+  void SendScan(int64_t utime, int64_t now, const std::function<double(double)>& x = {}) {
+    const auto X_WL = [&](double t) {
+      return Pose{Eigen::Quaterniond::Identity(), {x ? x(t) : 0.0, 0, 0.3}};
+    };
     const Sweep sweep = test::Scan(test::Hall{}, X_WL, 0.0, test::SensorModel{}, &noise_);
     lidar_scan_t m{};
     m.utime = utime;
@@ -131,6 +135,31 @@ TEST(OdometryNode, BeginsAnewAfterASilenceOfAllSensorsWhicheverSpeaksFirst) {
     EXPECT_NE(bench.poses.back().epoch, epoch) << sweep_first;
     EXPECT_EQ(bench.poses.back().health, int{pose_t::HEALTH_OK}) << bench.poses.back().reason;
   }
+}
+
+/// To and fro, as smoothly as one that settles.
+TEST(OdometryNode, OneThatFlewWhenItsSensorsFellSilentIsNotWaitedFor) {
+  constexpr double kRate = 2.0, kAmplitude = 0.12;  // rad/s, m
+  Bench bench;
+  Stand(kStart, false, &bench);
+  const auto fly = [&](int64_t first, int ticks) {
+    for (int i = 1; i <= ticks; ++i) {
+      const int64_t now = first + 5000 * i;
+      const double t = 1e-6 * static_cast<double>(now - kStart - 1'500'000);
+      const double begun = t - 0.1;
+      bench.SendImu(now, kAmplitude * kRate * kRate * std::cos(kRate * t));
+      if (i % 20 == 0)
+        bench.SendScan(now - 100'000, now, [&](double since) {
+          return kAmplitude * (1.0 - std::cos(kRate * (begun + since)));
+        });
+    }
+  };
+  fly(kStart + 1'500'000, 400);
+  ASSERT_EQ(bench.poses.back().health, int{pose_t::HEALTH_OK}) << bench.poses.back().reason;
+  const int64_t after = kStart + 4'500'000;
+  fly(after, 130);
+  EXPECT_NE(bench.poses.back().epoch, bench.poses.front().epoch);
+  EXPECT_NE(bench.poses.back().health, int{pose_t::HEALTH_STARTING}) << bench.poses.back().reason;
 }
 
 TEST(OdometryNode, GoesOnThroughASilenceOfTheImuAlone) {
