@@ -34,6 +34,7 @@ Matrix3d InverseAbove(const Matrix3d& given) {
 Body MakeBody(const Obstacle& obstacle, double start, double duration, double sigmas) {
   Body body;
   body.kind = obstacle.solid;
+  body.ground = obstacle.ground && body.kind == Body::Kind::kBox;
   if (body.kind == Body::Kind::kEllipsoid)
     body.shape = InverseAbove(obstacle.shape);
   else
@@ -104,6 +105,7 @@ Vector3d LevelNormal(const Body& body, const Vector3d& offset) {
 }  // namespace
 
 Vector3d Outwards(const Body& body, const Vector3d& offset) {
+  if (body.ground) return body.shape.col(2);
   constexpr int kSteps = 64;
   constexpr double kTouch = 1e-6, kExact = 1e-9;  // m
   const Vector3d level = LevelNormal(body, offset);

@@ -16,6 +16,7 @@ using Curve = Eigen::Matrix<double, Eigen::Dynamic, 3, 0, 16, 3>;
 struct Body {
   using Kind = Obstacle::Solid;
   Kind kind = Kind::kEllipsoid;
+  bool ground = false;  ///< a box that goes on below: it is left by its top
   Curve center = Curve::Zero(1, 3);
   /// Ellipsoid: Q, m^2, of { x : x' Q^-1 x <= 1 }. Box: columns are its axes. Frame W. The entries
   /// as they are define the solid.

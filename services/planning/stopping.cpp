@@ -12,8 +12,8 @@ namespace {
 
 using Eigen::Vector3d;
 
-// Displacements of the place of rest by distance: none, then rings of directions, level, up and
-// down.
+// Displacements of the place of rest by distance: rings of directions, level, up and down; the
+// last leads from the ground to above its slab.
 std::vector<Vector3d> Displacements() {
   constexpr int kAround = 12;
   std::vector<Vector3d> all;
@@ -23,7 +23,7 @@ std::vector<Vector3d> Displacements() {
         const double angle = 2.0 * M_PI * i / kAround;
         all.emplace_back(r * std::cos(angle), r * std::sin(angle), rise * r);
       }
-  for (const double rise : {0.5, -0.5, 1.0, -1.0}) all.emplace_back(0.0, 0.0, rise);
+  for (const double rise : {0.5, -0.5, 1.0, -1.0, 1.5}) all.emplace_back(0.0, 0.0, rise);
   std::stable_sort(all.begin(), all.end(), [](const Vector3d& a, const Vector3d& b) {
     return a.squaredNorm() < b.squaredNorm();
   });

@@ -194,6 +194,25 @@ TEST(Escape, OnlyMovesOutAndIsOutInTime) {
   EXPECT_GE(out, 15);
 }
 
+/// As the autopilot leaves it that has begun to land; the slab reaches above the body.
+TEST(Escape, LeadsUpFromTheGround) {
+  const PlannerConfig config;
+  world::Obstacle slab;
+  slab.ground = true;
+  slab.solid = world::Obstacle::Solid::kBox;
+  slab.half = {8.5, 8.5, 0.3};
+  slab.shape = (3.0 * slab.half.cwiseAbs2()).cwiseInverse().asDiagonal();
+  slab.center = world::Trajectory::Constant({2.0, 3.0, 0.17}, 0.0, 1.0);
+  for (const double z : {0.12, 0.3, 0.5}) {
+    PlanRequest request = Hover();
+    request.start.p.z() = z;
+    request.obstacles = {slab};
+    const PlanResult plan = RestPlan(config, request);
+    EXPECT_EQ(plan.verdict, Verdict::kEscape) << z << " " << plan.reason;
+    EXPECT_GT(plan.trajectory.Position(plan.trajectory.end()).z(), 0.47 + config.hard_radius());
+  }
+}
+
 TEST(Margins, GiveWayToTheHardRadiusAndNoFurther) {
   const PlannerConfig config;
   const auto planner = MakePlanner("chase", config);

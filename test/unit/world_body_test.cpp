@@ -213,5 +213,23 @@ TEST(Leaves, NoWayThatComesNearer) {
   EXPECT_FALSE(Leaves(way, body, 0.25)) << "it comes after it";
 }
 
+/// However near the lower face of its slab is.
+TEST(Leaves, TheGroundByItsTop) {
+  Obstacle slab;
+  slab.ground = true;
+  slab.solid = Obstacle::Solid::kBox;
+  slab.half = {8.0, 8.0, 0.3};
+  slab.center = Trajectory::Constant(Vector3d::Zero(), 0.0, 1.0);
+  const Body body = MakeBody(slab, 0.0, 1.0, 2.0);
+  for (const double z : {-0.2, 0.1, 0.5}) {
+    Curve way = Curve::Zero(2, 3);
+    way.row(0) << 7.9, 0.0, z;
+    way.row(1) << 0.0, 0.3, 0.2;
+    EXPECT_TRUE(Leaves(way, body, 1.0)) << z;
+    way.row(1) << 0.3, 0.0, -0.2;
+    EXPECT_FALSE(Leaves(way, body, 1.0)) << z;
+  }
+}
+
 }  // namespace
 }  // namespace chase::world
