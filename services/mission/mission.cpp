@@ -107,14 +107,14 @@ void Mission::Resume(double t) {
   if (before_ == State::kReturn) Step(t, Event::kReturn, when);
 }
 
-// The way home may lead away from it first, around a corner of the geofence; to and fro it leads to
-// no end.
+// The way home may lead away from it first, around a corner of the geofence; to and fro, and down
+// or up, it leads to no end.
 void Mission::NoteProgress(double t) {
   constexpr double kElsewhere = 0.3;  // m, beyond what the pose wavers by
   if (state_ != State::kReturn || !inputs_.pose) return;
   const Eigen::Vector3d& p = inputs_.pose->p;
   for (const Eigen::Vector3d& place : visited_)
-    if ((place - p).norm() < kElsewhere) return;
+    if ((place - p).head<2>().norm() < kElsewhere) return;
   visited_.push_back(p);
   progressed_ = t;
 }

@@ -12,13 +12,15 @@ constexpr double kReach = 8.0;          // m of a leg: the map is surely known t
 constexpr std::size_t kMostTried = 12;  // goals of one leg, so that a plan takes its time at most
 constexpr double kAtHome = 1.0;         // m: the trail's first points, the climb among them
 constexpr double kStride = 1.0;         // m between places where there is no trail
-constexpr double kSteep = 0.1;          // m below: what is there may be out of the LiDAR's view
+constexpr double kSightSlope = 0.2;     // down: what is there the LiDAR sees on the way
+constexpr double kLevel = 0.1;          // m: another height
 
-/// The places that a leg may end at by their place on the way: home, then the trail.
+/// The places that a leg may end at, above or below, by their place on the way: home, then the
+/// trail.
 std::vector<std::size_t> InReach(const std::vector<Vector3d>& way, const Vector3d& p) {
   std::vector<std::size_t> near;
   for (std::size_t i = 0; i < way.size(); ++i)
-    if ((way[i] - p).norm() < kReach) near.push_back(i);
+    if ((way[i] - p).head<2>().norm() < kReach) near.push_back(i);
   const std::size_t every = near.size() / kMostTried + 1;
   std::vector<std::size_t> tried;
   for (std::size_t i = 0; i < near.size(); i += every) tried.push_back(near[i]);
@@ -61,11 +63,13 @@ std::optional<Stop> WayBack::Leg(const PlannerConfig& config, const PlanRequest&
     std::optional<Stop> leg = GoTo(config, request, p);
     return leg && may_fly(leg->trajectory) ? std::move(leg) : std::nullopt;
   };
-  // Where it may not come down so steeply: above that place.
+  // Level where it may come down, or climb above the heights of plans, no farther.
   const auto try_goal = [&](std::size_t i) {
-    std::optional<Stop> leg = to(way[i]);
-    const double z = request.start.p.z();
-    if (!leg && way[i].z() < z - kSteep) leg = to({way[i].x(), way[i].y(), z});
+    const Vector3d& p = request.start.p;
+    Vector3d end = way[i];
+    end.z() = std::max(end.z(), p.z() - kSightSlope * (end - p).head<2>().norm());
+    std::optional<Stop> leg = to(end);
+    if (!leg && std::abs(end.z() - p.z()) > kLevel) leg = to({end.x(), end.y(), p.z()});
     if (leg) goal_ = i;
     return leg;
   };

@@ -1,6 +1,7 @@
 // The ways home of planning's pilot under a mission that keeps a fence.
 #include <gtest/gtest.h>
 
+#include <random>
 #include <string>
 #include <vector>
 
@@ -95,12 +96,23 @@ TEST(Return, FromAboveHomeItLandsAtOnceHoweverHighItIs) {
   }
 }
 
-TEST(Return, FromHighAboveComesToAnEnd) {
-  for (const Vector3d& from :
-       {Vector3d(9.0, 2.0, 12.0), Vector3d(40.0, 0.0, 25.0), Vector3d(9.0, 2.0, 5.0)}) {
-    Return way({from}, {});
-    EXPECT_LT(way.Fly().second, MissionConfig().return_patience + 2.5 * from.norm())
-        << from.transpose();
+/// Of a planner that has been started there, and knows no trail.
+TEST(Return, FromAnywhereInsideTheFenceComesHome) {
+  world::Geofence hall;
+  hall.polygon = {{-20, -12}, {25, -12}, {25, 18}, {-20, 18}};
+  hall.floor = -1.0;
+  hall.ceiling = 30.0;
+  for (unsigned seed = 1; seed <= 200; ++seed) {
+    std::mt19937 random(seed);
+    const auto within = [&](double low, double high) {
+      return std::uniform_real_distribution(low, high)(random);
+    };
+    const double x = within(-19.0, 24.0), y = within(-11.0, 17.0), z = within(0.5, 29.0);
+    Return way({{x, y, z}}, hall);
+    const auto [reason, after] = way.Fly();
+    EXPECT_EQ(reason, "back at the take-off place") << seed << ": " << x << " " << y << " " << z;
+    EXPECT_LT(after, 20.0 + 2.5 * std::hypot(x, y)) << seed;
+    EXPECT_LT(way.place().head<2>().norm(), MissionConfig().home_radius) << seed;
   }
 }
 
