@@ -25,8 +25,8 @@ void AutopilotState::Hear(const status_t& message) {
   handed_over_ = std::find(kNotOurs.begin(), kNotOurs.end(), state) != kNotOurs.end();
 }
 
-bool AutopilotState::IsKnown(int64_t utime) const {
-  return heard_ != 0 && 1e-6 * static_cast<double>(utime - heard_) <= world::kMostAge.status;
+bool AutopilotState::IsOld(int64_t utime) const {
+  return 1e-6 * static_cast<double>(utime - heard_) > world::kMostAge.status;
 }
 
 }  // namespace chase::bus

@@ -13,10 +13,11 @@ class AutopilotState {
   void Hear(const status_t& message);
 
   /// Is it armed and ours to fly, as far as is known? Where nobody tells, as in a simulation
-  /// without an autopilot, or nobody has for a while, it is.
-  bool Obeys(int64_t utime) const { return !IsKnown(utime) || obeys_; }
-  /// Does it say that it stands on the ground?
-  bool IsOnGround(int64_t utime) const { return IsKnown(utime) && on_ground_; }
+  /// without an autopilot, it is; so it is in the air once nobody has told for a while.
+  bool Obeys(int64_t utime) const { return obeys_ || (!on_ground_ && IsOld(utime)); }
+  /// Did it say last that it stands on the ground? That holds until it says otherwise: without what
+  /// it is told by us it stays there.
+  bool IsOnGround() const { return on_ground_; }
   /// Is the flight not ours although it has begun: a pilot has it, the autopilot lands or has
   /// landed it, or never began it?
   bool IsHandedOver() const { return handed_over_; }
@@ -24,10 +25,10 @@ class AutopilotState {
   const std::string& words() const { return words_; }
 
  private:
-  bool IsKnown(int64_t utime) const;
+  bool IsOld(int64_t utime) const;
 
   int64_t heard_ = 0;  // 0: never
-  bool obeys_ = false, on_ground_ = false, handed_over_ = false;
+  bool obeys_ = true, on_ground_ = false, handed_over_ = false;
   std::string words_;
 };
 

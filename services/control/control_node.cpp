@@ -172,8 +172,7 @@ void ControlNode::OnPose(const pose_t& message) {
                  : message.reason.empty()  ? "uncertain"
                                            : message.reason;
   const bool asked = bus::Seconds(message.utime, asked_to_fly_) <= world::kMostAge.flight_state;
-  controller_.SetAutopilot(autopilot_.Obeys(message.utime),
-                           autopilot_.IsOnGround(message.utime) && asked);
+  controller_.SetAutopilot(autopilot_.Obeys(message.utime), autopilot_.IsOnGround() && asked);
   std::optional<Setpoint> setpoint;
   {
     auto timer = bus_.Time("control");

@@ -124,7 +124,7 @@ void MissionNode::Tick(int64_t /*utime*/) {
   Inputs& inputs = mission_.inputs();
   inputs.autopilot = autopilot_.words();
   inputs.handed_over = autopilot_.IsHandedOver();
-  inputs.on_ground = autopilot_.IsOnGround(bus_.Now());
+  inputs.on_ground = autopilot_.IsOnGround();
   mission_.Update(Now());
   SendState();
   if (ticks_++ % kHealthTicks == 0) SendHealth();

@@ -156,7 +156,7 @@ void PlanningNode::OnPose(const pose_t& message) {
     target_ = {};
   }
   CheckMission(message.utime);
-  pilot_.SetWaiting(autopilot_.IsOnGround(message.utime) && !autopilot_.Obeys(message.utime));
+  pilot_.SetWaiting(autopilot_.IsOnGround() && !autopilot_.Obeys(message.utime));
   const double t = bus::Seconds(message.utime, Origin(message.utime));
   std::optional<PlanResult> plan;
   {

@@ -484,11 +484,12 @@ TEST(FcuBridge, ItsWordsTellWhoFliesAndWhereItStands) {
     m.name = "fcu";
     m.detail = flight.bridge.Words();
     state.Hear(m);
-    return std::pair(state.Obeys(flight.now()), state.IsOnGround(flight.now()));
+    return std::pair(state.Obeys(flight.now()), state.IsOnGround());
   };
   EXPECT_EQ(hear(), std::pair(true, false)) << "nobody has told anything";
   ASSERT_TRUE(flight.RunUntil(State::kArming, 12.0));
   EXPECT_EQ(hear(), std::pair(false, true));
+  EXPECT_FALSE(state.Obeys(flight.now() + 30'000'000)) << "it stood there when it fell silent";
   ASSERT_TRUE(flight.RunUntil(State::kFlying, 12.0));
   EXPECT_TRUE(hear().first);
   flight.Run(5.0);
