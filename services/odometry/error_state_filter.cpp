@@ -108,13 +108,14 @@ UpdateResult Correct(const JacobianRows& H, const Eigen::VectorXd& innovation,
 /// features that were matched with another surface within the gate. A turn is felt at once, an
 /// acceleration by the sweep after. Returns the odds of a jump with this match.
 double OpenAfterJump(double usual_nis, const JacobianRows& H, const Eigen::VectorXd& innovation,
-                     const Eigen::MatrixXd& noise, const JumpEvidence& jump, NavState* state) {
+                     const Eigen::MatrixXd& noise, double gate, const JumpEvidence& jump,
+                     NavState* state) {
   constexpr double kTurned = 0.005;  // rad: 20 ms at 0.25 rad/s
   const auto covariance = [&](const ErrorCovariance& P) -> Eigen::MatrixXd {
     return H * P * H.transpose() + noise;
   };
   double otherwise = LogLikelihood(innovation, covariance(state->P)) + kJumps;
-  for (const double off : {0.02, 0.15}) {  // m: 20 ms at 1 m/s; MatchConfig's least gate
+  for (const double off : {0.02, gate}) {  // m: 20 ms at 1 m/s; another surface
     ErrorCovariance P = state->P;
     AddDiagonal(kP, off * off, &P);
     AddDiagonal(kTheta, kTurned * kTurned, &P);
@@ -245,9 +246,9 @@ UpdateResult Update(const FilterConfig& config, const PoseMeasurement& z, const 
   H.middleCols<3>(kP) = onto.leftCols<3>();
   H.middleCols<3>(kTheta) = onto.rightCols<3>();
   const Eigen::VectorXd innovation = onto * e;
-  const double odds = jump.gap > 0.0
-                          ? OpenAfterJump(config.usual_nis, H, innovation, noise, jump, state)
-                          : jump.odds;
+  const double odds =
+      jump.gap > 0.0 ? OpenAfterJump(config.usual_nis, H, innovation, noise, z.gate, jump, state)
+                     : jump.odds;
   UpdateResult result = Correct(H, innovation, noise, config.usual_nis, config.largest_nis, state);
   result.odds = result.applied ? 0.0 : odds;
   return result;

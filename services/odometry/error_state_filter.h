@@ -101,6 +101,7 @@ struct PoseMeasurement {
   Pose X_WB;
   Eigen::Matrix<double, 6, Eigen::Dynamic> known;
   Eigen::Matrix<double, 6, 6> information;  ///< of (p, rotation error in W)
+  double gate = 0.0;                        ///< how far off a feature was still matched, m
 };
 
 /// Update of a body that stands: no velocity, and what the gyroscope shows [rad/s] is its bias.

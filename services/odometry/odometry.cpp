@@ -248,7 +248,8 @@ bool Odometry::Apply(const Prepared& prepared, MatchResult* match) {
   // Stamps that are off look like biases that jumped.
   const double gap = health_.IsUsual(prepared.end) ? prepared.end - held_ : 0.0;
   const UpdateResult update =
-      Update(config_.filter, {match->X_WB, match->known, match->information}, {gap, odds_}, &state);
+      Update(config_.filter, {match->X_WB, match->known, match->information, match->gate},
+             {gap, odds_}, &state);
   odds_ = update.odds;
   match->nis = update.nis;
   match->misfit = update.nis > config_.filter.largest_nis;

@@ -162,16 +162,16 @@ MatchResult ScanMatcher::Match(const Features& features, const SurfaceMap& plane
                                const Matrix6d& unknown_before) const {
   MatchResult result;
   result.X_WB = predicted;
-  const double gate =
+  result.gate =
       std::clamp(config_.least_gate + 3.0 * uncertainty, config_.least_gate, config_.gate);
-  double kernel = std::max(config_.kernel, gate);
+  double kernel = std::max(config_.kernel, result.gate);
   const Eigen::Vector3f eye = (predicted * features.eye.cast<double>()).cast<float>();
   Matched matched_planes(features.planes, planes, eye), matched_posts(features.posts, posts, eye);
   System system;
   std::vector<Row> rows;
   rows.reserve(features.planes.size() + features.posts.size());
   for (int i = 0; i < config_.max_iterations; ++i) {
-    system = Linearise(result.X_WB, kernel, gate, &matched_planes, &matched_posts, &rows);
+    system = Linearise(result.X_WB, kernel, result.gate, &matched_planes, &matched_posts, &rows);
     result.iterations = i + 1;
     if (system.weight < 1e-6) return result;
     Analyse(system, rows, unknown_before, &result);

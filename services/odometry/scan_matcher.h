@@ -51,6 +51,7 @@ struct MatchResult {
   double nis = 0.0;                         ///< per direction, once a filter saw it
   double view = 0.0;                        ///< the features' usual distance, m
   double rms = 0.0;                         ///< of the inliers' residuals, m
+  double gate = 0.0;                        ///< how far off a feature was still matched, m
   int iterations = 0;
 
   /// The sweep contradicts the map. One that finds no map where it looks is not valid either.

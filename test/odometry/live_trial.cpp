@@ -29,6 +29,12 @@ struct Pair {
   double velocity_error;
 };
 
+/// By how much the estimate of up leans [deg].
+double Tilt(const Eigen::Quaterniond& estimate, const Eigen::Quaterniond& truth) {
+  const Vector3d up = estimate * (truth.conjugate() * Vector3d::UnitZ());
+  return std::atan2(up.head<2>().norm(), up.z()) * 180.0 / M_PI;
+}
+
 Sweep FromSimulator(const simulator::Sweep& from) {
   Sweep sweep;
   sweep.start = from.start;
@@ -132,7 +138,13 @@ class Live {
     figures_.lost += pose->health.health == Health::kLost ? 1 : 0;
     figures_.epochs = pose->epoch;
     if (pose->t < options_.judge_from) return;
-    figures_.degraded += pose->health.health != Health::kOk ? 1 : 0;
+    const bool ok = pose->health.health == Health::kOk;
+    figures_.degraded += ok ? 0 : 1;
+    const double tilt = Tilt(pose->X_WB.R, truth.body.q);
+    if (pose->t < options_.lidar_out_from)
+      tilt_before_ = tilt;
+    else if (ok && pose->t >= options_.lidar_out_to)
+      figures_.tilt = std::max(figures_.tilt, tilt - tilt_before_);
     pairs_.push_back({pose->t, pose->X_WB.p - truth.body.p,
                       pose->covariance.diagonal().head<3>().cwiseSqrt(), pose->X_WB.p, truth.body.p,
                       (pose->v - truth.body.v).norm()});
@@ -189,7 +201,8 @@ class Live {
   simulator::Simulator simulator_;
   Odometry odometry_;
   world::Random random_{3};
-  int burst_ = 0;  // samples that a spike still lasts
+  double tilt_before_ = 0.0;  // when the LiDAR went out, deg
+  int burst_ = 0;             // samples that a spike still lasts
   Vector3d spike_ = Vector3d::Zero();
   std::deque<ImuSample> waiting_;                          // that come late
   std::deque<std::pair<double, simulator::Truth>> truth_;  // of late
@@ -242,12 +255,13 @@ std::string Text(const LiveFigures& f) {
       "\"sweeps\":{},\"refused\":{},\"lost\":{},\"degraded\":{},\"epochs\":{},\"ate\":{:.4f},"
       "\"aligned\":{:.4f},"
       "\"worst\":{:.3f},\"end\":{:.3f},\"moved\":{:.4f},\"velocity_back\":{:.3f},"
+      "\"tilt\":{:.3f},"
       "\"covered\":[{:.3f},{:.3f},{:.3f}],\"sigma_mm\":[{:.1f},{:.1f},{:.1f}],\"rms_mm\":[{:.1f},{:"
       ".1f},"
       "{:.1f}]",
       f.sweeps, f.refused, f.lost, f.degraded, f.epochs, f.ate, f.aligned, f.worst, f.end, f.moved,
-      f.velocity_back, f.covered[0], f.covered[1], f.covered[2], 1e3 * f.sigma[0], 1e3 * f.sigma[1],
-      1e3 * f.sigma[2], 1e3 * f.rms[0], 1e3 * f.rms[1], 1e3 * f.rms[2]);
+      f.velocity_back, f.tilt, f.covered[0], f.covered[1], f.covered[2], 1e3 * f.sigma[0],
+      1e3 * f.sigma[1], 1e3 * f.sigma[2], 1e3 * f.rms[0], 1e3 * f.rms[1], 1e3 * f.rms[2]);
 }
 
 }  // namespace chase::odometry::trial

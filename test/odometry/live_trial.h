@@ -48,6 +48,8 @@ struct LiveFigures {
   double worst_velocity = 0.0;  ///< largest error of the velocity, m/s
   double velocity_back =
       -1.0;  ///< after the LiDAR's return, until the velocity is within 0.2 m/s, s
+  double tilt =
+      0.0;  ///< by how much up leans more than before the LiDAR was out, while POSE says ok, deg
   double covered[3] = {0, 0, 0};  ///< share of estimates within three standard deviations, by axis
   double sigma[3] = {0, 0, 0};    ///< median standard deviation, by axis, m
   double rms[3] = {0, 0, 0};      ///< of the error, by axis, m

@@ -434,7 +434,7 @@ TEST(ErrorStateFilter, AMatchThatIsOffIsNotLearntAsABias) {
                 &state);
       if (sample % 20 != 0 || sample <= 20 * missed) continue;
       PoseMeasurement z{Pose{}, Eigen::Matrix<double, 6, 6>::Identity(),
-                        1e6 * Eigen::Matrix<double, 6, 6>::Identity()};
+                        1e6 * Eigen::Matrix<double, 6, 6>::Identity(), MatchConfig{}.least_gate};
       z.X_WB.p.x() = 0.1 + 0.1 * state.t;
       jump.gap = state.t;
       const UpdateResult result = Update(FilterConfig{}, z, jump, &state);
