@@ -42,20 +42,20 @@ std::vector<Eigen::Vector3f> Moved(const FloatPose& X, std::vector<Eigen::Vector
   return points;
 }
 
-/// Standard deviation of where points at a usual distance are predicted [m].
-double UncertaintyOf(const NavState& state) {
-  constexpr double kUsualRange = 8.0;  // m
-  const double p2 = state.P.block<3, 3>(kP, kP).trace();
-  const double theta2 = state.P.block<3, 3>(kTheta, kTheta).trace();
-  return std::sqrt(std::max(0.0, p2 + kUsualRange * kUsualRange * theta2));
-}
-
 Matrix6d PosePart(const NavState& state) {
   Matrix6d P;
   P << state.P.block<3, 3>(kP, kP), state.P.block<3, 3>(kP, kTheta),
       state.P.block<3, 3>(kTheta, kP), state.P.block<3, 3>(kTheta, kTheta);
   return P;
 }
+
+/// Standard deviation of where points at a usual distance are, by the covariance of a pose [m].
+double UncertaintyOf(const Matrix6d& P) {
+  constexpr double kUsualRange = 8.0;  // m
+  const double p2 = P.topLeftCorner<3, 3>().trace(), theta2 = P.bottomRightCorner<3, 3>().trace();
+  return std::sqrt(std::max(0.0, p2 + kUsualRange * kUsualRange * theta2));
+}
+double UncertaintyOf(const NavState& state) { return UncertaintyOf(PosePart(state)); }
 
 /// Error of a body in (p, yaw).
 MapDrift::Covariance PlaceCovariance(const Matrix6d& P) {
@@ -241,7 +241,7 @@ MatchResult Odometry::Match(Prepared* prepared) {
 }
 
 bool Odometry::Apply(const Prepared& prepared, MatchResult* match) {
-  if (!match->valid) return false;
+  if (!match->valid || Astray(prepared, *match)) return false;
   NavState state = prepared.predicted;
   standing_.See(match->X_WB.p);
   if (standing_.holds()) HoldStill(standing_.gyro(), &state);
@@ -258,6 +258,15 @@ bool Odometry::Apply(const Prepared& prepared, MatchResult* match) {
   DoubtAcceleration(config_.filter, unknown_.topLeftCorner<3, 3>(), &state);
   base_ = state;
   return true;
+}
+
+/// A direction that the map held until now holds no longer, and the body may be farther off along
+/// it than a match reaches: it may be anywhere in the map, and what seemed to fit another place.
+bool Odometry::Astray(const Prepared& prepared, const MatchResult& match) const {
+  if (Blind(prepared.end)) return false;
+  const Matrix6d open = Matrix6d::Identity() - match.known * match.known.transpose();
+  const Matrix6d lost = open * (Matrix6d::Identity() - unknown_);
+  return UncertaintyOf(lost * PosePart(prepared.predicted) * lost.transpose()) > config_.match.gate;
 }
 
 /// What was seen while a direction was unknown has been mapped as far off along it as the body was.

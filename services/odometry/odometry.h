@@ -123,6 +123,7 @@ class Odometry {
   void PlaceFirst(const Pose& X_WB, const Eigen::Vector3d& v, const Eigen::Vector3d& w_B);
   void Bend(const Pose& X_WB, Prepared* prepared) const;
   bool Apply(const Prepared& prepared, MatchResult* match);
+  bool Astray(const Prepared& prepared, const MatchResult& match) const;
   bool Extends(const MatchResult& match) const;
   void Learn(const Prepared& prepared, const Pose& X_WB);
   void FollowDrift(const MatchResult& match);

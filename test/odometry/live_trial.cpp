@@ -137,6 +137,10 @@ class Live {
     const simulator::Truth& truth = at->second;
     figures_.lost += pose->health.health == Health::kLost ? 1 : 0;
     figures_.epochs = pose->epoch;
+    const double velocity_error = (pose->v - truth.body.v).norm();
+    if (figures_.velocity_back < 0.0 && pose->t >= options_.lidar_out_to &&
+        velocity_error < kUsableVelocity)
+      figures_.velocity_back = pose->t - options_.lidar_out_to;
     if (pose->t < options_.judge_from) return;
     const bool ok = pose->health.health == Health::kOk;
     figures_.degraded += ok ? 0 : 1;
@@ -147,7 +151,7 @@ class Live {
       figures_.tilt = std::max(figures_.tilt, tilt - tilt_before_);
     pairs_.push_back({pose->t, pose->X_WB.p - truth.body.p,
                       pose->covariance.diagonal().head<3>().cwiseSqrt(), pose->X_WB.p, truth.body.p,
-                      (pose->v - truth.body.v).norm()});
+                      velocity_error});
   }
 
   void Judge() {
@@ -166,9 +170,6 @@ class Live {
       figures_.moved = std::max(figures_.moved, (pair.error - pairs_[0].error).norm());
       for (int k = 0; k < 3; ++k)
         figures_.covered[k] += std::abs(pair.error[k]) <= 3.0 * pair.sigma[k] ? 1.0 / n : 0.0;
-      if (figures_.velocity_back < 0.0 && pair.t >= options_.lidar_out_to &&
-          pair.velocity_error < kUsableVelocity)
-        figures_.velocity_back = pair.t - options_.lidar_out_to;
     }
     const Eigen::Isometry3d fit(Eigen::umeyama(a, b, false));
     figures_.aligned = std::sqrt(((fit * a) - b).squaredNorm() / n);
