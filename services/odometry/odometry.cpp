@@ -143,20 +143,19 @@ SweepResult Odometry::ProcessSweep() {
   Pending pending = std::move(pending_.front());
   pending_.pop_front();
   if (!Prepare(std::move(pending), &prepared)) return result;
-  const bool blind = Blind(prepared.end);
+  const bool blind = Blind(prepared.end), lost = Estimate().health.health == Health::kLost;
   result.match = Match(&prepared);
   bool first = planes_.cells() == 0;
   if (first) result.match.valid = true;
   const bool applied = first || Apply(prepared, &result.match);
   if (!applied) base_ = prepared.inertial;
-  if ((first || !applied) && UncertaintyOf(prepared.predicted) > config_.match.gate) {
-    base_ = prepared.predicted;
-    RestartMap();
-    first = true;
-  }
-  if (first) base_ = prepared.predicted;
+  const bool beyond = (first || !applied) && UncertaintyOf(prepared.predicted) > config_.match.gate;
+  if (first || beyond) base_ = prepared.predicted;
+  if (beyond) RestartMap();
+  first |= beyond;
   result.applied = applied;
   if (applied) held_ = prepared.end;
+  if (applied && !first && !blind) Straighten(&prepared);
   health_.OnMatch(prepared.end, result.match, applied);
   if (blind && applied && !first)
     base_.w_B = math::LogSO3(prepared.track.front().R_WB.conjugate() * base_.R_WB) /
@@ -165,7 +164,7 @@ SweepResult Odometry::ProcessSweep() {
   if (extends) unknown_.setIdentity();
   if (applied || planes_.cells() == 0 || extends) Learn(prepared, base_.pose());
   if (applied && !first) FollowDrift(result.match);
-  Catchup();
+  Catchup(lost);
   result.registered = Registered(prepared);
   if (blind) result.pose = Estimate();
   result.registered->health = Estimate().health.health;
@@ -209,7 +208,7 @@ void Odometry::Extract(Sweep sweep, Prepared* prepared) {
 }
 
 void Odometry::Deskew(Prepared* prepared) const {
-  const double length = prepared->end - prepared->sweep.start;
+  const double length = Length(*prepared);
   const int steps = std::max(1, static_cast<int>(std::ceil(length / kKnotStep)));
   const double step = std::max(length / steps, 1e-6);
   const SweepMotion motion(PosesOver(prepared->track, prepared->sweep.start, step, steps + 1),
@@ -279,6 +278,19 @@ void Odometry::CarryUnknown(const MatchResult& match, const NavState& prior) {
   drift_.GoAstray(PlaceCovariance(found * PosePart(prior) * found.transpose()));
 }
 
+/// A sweep is deskewed by the velocity as predicted. Where the match corrects that by more than the
+/// noise of a range over a sweep, it is deskewed anew, and a map of one sweep, which was bent as
+/// much, begins again with this one.
+void Odometry::Straighten(Prepared* prepared) {
+  const Eigen::Vector3d dv = base_.v - prepared->predicted.v;
+  if (dv.norm() * Length(*prepared) < config_.match.range_noise) return;
+  for (NavState& state : prepared->track) state.p -= (prepared->end - state.t) * dv;
+  Deskew(prepared);
+  if (sweeps_learnt_ > 1) return;
+  PlaceMap(base_);
+  BeginMapHere();
+}
+
 /// A sweep over ground that the map does not know extends it while inertia still tells the pose
 /// within a cell.
 bool Odometry::Extends(const MatchResult& match) const {
@@ -290,6 +302,7 @@ void Odometry::Learn(const Prepared& prepared, const Pose& X_WB) {
   for (size_t i = 0; i < prepared.features.planes.size();
        i += static_cast<size_t>(config_.map_stride))
     planes.push_back(prepared.features.planes[i]);
+  ++sweeps_learnt_;
   const FloatPose to_world(X_WB);
   const Eigen::Vector3f eye = to_world * Eigen::Vector3f(X_BL_.p.cast<float>());
   planes_.Add(Moved(to_world, Picked(prepared.at_end, planes)), eye);
@@ -324,9 +337,14 @@ void Odometry::PlaceMap(const NavState& state) {
 
 void Odometry::BeginMapHere() {
   PutAtOrigin(&base_);
+  ClearMap();
+  unknown_.setZero();
+}
+
+void Odometry::ClearMap() {
   planes_.Clear();
   posts_.Clear();
-  unknown_.setZero();
+  sweeps_learnt_ = 0;
 }
 
 /// In a map that begins at the body it is by definition where it is believed to be.
@@ -354,8 +372,9 @@ NavState Odometry::Doubted(NavState state) const {
   return state;
 }
 
-/// Brings the newest state up from the last sweep; what is put out moves there smoothly.
-void Odometry::Catchup() {
+/// Brings the newest state up from the last sweep; what is put out moves there smoothly, or at once
+/// where it was lost: nobody flies by that, and whoever shall again needs the velocity.
+void Odometry::Catchup(bool at_once) {
   const double t = live_.t;
   NavState before = live_;
   live_ = base_;
@@ -366,7 +385,10 @@ void Odometry::Catchup() {
   const Pose shown = level_.ToWorld(before.pose());
   const Eigen::Vector3d shown_v = level_.R_WM() * before.v;
   level_.SetGravity(live_.g);
-  blend_.Absorb(shown, shown_v, level_.ToWorld(live_.pose()), level_.R_WM() * live_.v);
+  if (at_once)
+    blend_ = CorrectionBlend(config_.blend);
+  else
+    blend_.Absorb(shown, shown_v, level_.ToWorld(live_.pose()), level_.R_WM() * live_.v);
 }
 
 }  // namespace chase::odometry

@@ -124,17 +124,20 @@ class Odometry {
   void Bend(const Pose& X_WB, Prepared* prepared) const;
   bool Apply(const Prepared& prepared, MatchResult* match);
   bool Astray(const Prepared& prepared, const MatchResult& match) const;
+  void Straighten(Prepared* prepared);
+  static double Length(const Prepared& p) { return p.end - p.sweep.start; }  // s
   bool Extends(const MatchResult& match) const;
   void Learn(const Prepared& prepared, const Pose& X_WB);
   void FollowDrift(const MatchResult& match);
   void RestartMap();
   void PlaceMap(const NavState& state);
   void BeginMapHere();
+  void ClearMap();
   static void PutAtOrigin(NavState* state);
   void CarryUnknown(const MatchResult& match, const NavState& prior);
   void HoldBetweenSweeps(double t);
   NavState Doubted(NavState state) const;
-  void Catchup();
+  void Catchup(bool at_once = false);
   RegisteredSweep Registered(const Prepared& prepared) const;
   PoseEstimate Estimate() const;
   bool Blind(double end) const { return !fused_ || imu_.newest() < end - config_.health.imu_gap; }
@@ -162,6 +165,7 @@ class Odometry {
   std::optional<Prepared> first_;  // of a start without IMU, until the velocity is known
   Thinning thinning_;
   int epoch_ = 0;
+  int sweeps_learnt_ = 0;                // by the map
   Matrix6d unknown_ = Matrix6d::Zero();  // projector on what the last sweep left to inertia
   double held_ = 0.0;                    // last time that a sweep or standing held the state, s
   double odds_ = 0.0;                    // that biases have jumped since, JumpEvidence

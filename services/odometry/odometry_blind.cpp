@@ -69,8 +69,7 @@ void Odometry::PlaceFirst(const Pose& X_WB, const Eigen::Vector3d& v, const Eige
   first_->track.front().v = v;
   first_->track.front().w_B = w_B;
   Deskew(&*first_);
-  planes_.Clear();
-  posts_.Clear();
+  ClearMap();
   Learn(*first_, X_WB);
 }
 

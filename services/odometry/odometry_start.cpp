@@ -71,8 +71,7 @@ bool Odometry::SweepsShowMotion() {
   const Prepared last = still(pending_.back());
   const MatchResult match =
       matcher_.Match(FeaturesIn(last, last.at_end), planes_, posts_, Pose{}, config_.match.gate);
-  planes_.Clear();
-  posts_.Clear();
+  ClearMap();
   thinning_ = {};
   return match.misfit || match.X_WB.p.norm() > kMovesAtRest;
 }
@@ -90,8 +89,7 @@ void Odometry::StartInMotion(double t) {
   for (int pass = 0; pass < kMostPasses && change >= kConverged; ++pass) {
     base_ = start;
     held_ = base_.t;
-    planes_.Clear();
-    posts_.Clear();
+    ClearMap();
     unknown_.setZero();
     drift_ = MapDrift(config_.drift);
     for (const Pending& sweep : sweeps) Follow(sweep, placed);

@@ -81,7 +81,7 @@ class Live {
   void Step(double t) {
     simulator::Output out = simulator_.Advance(t);
     Steer(t, out.truth);
-    if (Out(t)) out.imu.accel.x() += options_.accel_fault;
+    if (Out(t)) out.imu.accel += options_.accel_fault;
     Strike(t, &out.imu);
     truth_.emplace_back(t, out.truth);
     if (truth_.size() > 400) truth_.pop_front();

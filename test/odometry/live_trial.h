@@ -16,8 +16,8 @@ struct LiveOptions {
   int64_t seed = 1;
   double duration = 20.0;
   bool imu = true;
-  double lidar_out_from = 1e9, lidar_out_to = 1e9;  ///< no sweep begins in this time
-  double accel_fault = 0.0;                         ///< of the IMU along x meanwhile, m/s^2
+  double lidar_out_from = 1e9, lidar_out_to = 1e9;        ///< no sweep begins in this time
+  Eigen::Vector3d accel_fault = Eigen::Vector3d::Zero();  ///< of the IMU meanwhile, m/s^2
   /// For two seconds this share of bursts of one to `spike_length` samples reads `spike_size` times
   /// full scale (16 g, 2000 deg/s) on an axis.
   double spikes_from = 1e9, spikes_share = 0.02, spike_size = 1.0;

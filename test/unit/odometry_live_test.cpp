@@ -180,23 +180,26 @@ TEST(OdometryLive, VelocityIsUsableSoonAfterASecondWithoutSweeps) {
   }
 }
 
-/// Ten seconds in the air on inertia alone: the map is given up, the error is not forgotten.
+/// Ten seconds in the air on inertia alone, off by as much as it is doubted for: the map is given
+/// up, the error is not forgotten.
 TEST(OdometryLive, WhatWasLostBeforeARestartIsNotForgotten) {
-  for (const int seed : Seeds(2)) {
+  std::vector<LiveFigures> flights;
+  for (const int seed : Seeds(4)) {
+    world::Random random(static_cast<uint64_t>(seed), 7);
     LiveOptions options;
     options.seed = seed;
-    options.accel_fault = seed % 2 == 0 ? 0.0 : 0.1;
+    for (double& a : options.accel_fault) a = FilterConfig{}.doubt_accel * random.Gaussian();
     options.lidar_out_from = 12.0;
     options.lidar_out_to = 22.0;
     options.judge_from = 22.5;
     options.duration = 32.0;
-    const LiveFigures figures =
-        Shown("air 10", FlyLive(trial::Meadow(60, 0.1, static_cast<uint64_t>(seed)), options));
-    for (int axis = 0; axis < 3; ++axis) EXPECT_GE(figures.covered[axis], 0.99) << axis;
-    EXPECT_GE(figures.velocity_back, 0.0);
-    EXPECT_LE(figures.velocity_back, 0.5);
-    EXPECT_LE(figures.tilt, 0.3);
+    flights.push_back(
+        Shown("air 10", FlyLive(trial::Meadow(60, 0.1, static_cast<uint64_t>(seed)), options)));
+    EXPECT_GE(flights.back().velocity_back, 0.0);
+    EXPECT_LE(flights.back().velocity_back, 0.5);
+    EXPECT_LE(flights.back().tilt, 0.6);
   }
+  ExpectHonest(flights, 0.99, 3.0);
 }
 
 }  // namespace
