@@ -372,9 +372,10 @@ NavState Odometry::Doubted(NavState state) const {
   return state;
 }
 
-/// Brings the newest state up from the last sweep; what is put out moves there smoothly, or at once
-/// where it was lost: nobody flies by that, and whoever shall again needs the velocity.
-void Odometry::Catchup(bool at_once) {
+/// Brings the newest state up from the last sweep; what is put out moves there smoothly. The
+/// velocity of a lost one does so at once: nobody flies by it, and whoever shall again needs the
+/// new one.
+void Odometry::Catchup(bool lost) {
   const double t = live_.t;
   NavState before = live_;
   live_ = base_;
@@ -385,10 +386,8 @@ void Odometry::Catchup(bool at_once) {
   const Pose shown = level_.ToWorld(before.pose());
   const Eigen::Vector3d shown_v = level_.R_WM() * before.v;
   level_.SetGravity(live_.g);
-  if (at_once)
-    blend_ = CorrectionBlend(config_.blend);
-  else
-    blend_.Absorb(shown, shown_v, level_.ToWorld(live_.pose()), level_.R_WM() * live_.v);
+  const Eigen::Vector3d v = level_.R_WM() * live_.v;
+  blend_.Absorb(shown, lost ? v : shown_v, level_.ToWorld(live_.pose()), v);
 }
 
 }  // namespace chase::odometry

@@ -137,7 +137,7 @@ class Odometry {
   void CarryUnknown(const MatchResult& match, const NavState& prior);
   void HoldBetweenSweeps(double t);
   NavState Doubted(NavState state) const;
-  void Catchup(bool at_once = false);
+  void Catchup(bool lost = false);
   RegisteredSweep Registered(const Prepared& prepared) const;
   PoseEstimate Estimate() const;
   bool Blind(double end) const { return !fused_ || imu_.newest() < end - config_.health.imu_gap; }
