@@ -24,6 +24,7 @@ struct ScanMatcher::System {
   double weight = 0.0;   // sum of the features' weights
   double squares = 0.0;  // weighted squares of the residuals
   double lever2 = 0.0;   // weighted squares of the distances to the body, m^2
+  Eigen::Matrix3d turns = Eigen::Matrix3d::Zero();  // H of the rotation, each feature per distance
   int matched = 0, inliers = 0, total = 0;
 
   void Add(double residual, double w, const Vector6d& J, double range2) {
@@ -89,7 +90,10 @@ ScanMatcher::System ScanMatcher::Linearise(const Pose& X_WB, double kernel, doub
       const double robust = k2 / (k2 + r * r);
       const double trust = noise2 / (noise2 + static_cast<double>(surface->variance));
       const double w = trust * robust * robust;
-      system.Add(r, w, J, rotated.squaredNorm());
+      const double range2 = std::max(rotated.squaredNorm(), 1e-6);
+      system.Add(r, w, J, range2);
+      J.tail<3>() /= std::sqrt(range2);
+      system.turns += w * J.tail<3>() * J.tail<3>().transpose();
       rows->push_back({J.cast<float>(), static_cast<float>(support * w)});
     }
   };
@@ -107,16 +111,15 @@ void ScanMatcher::Analyse(const System& system, const std::vector<Row>& rows,
   result->known.resize(6, 0);
   double least = std::numeric_limits<double>::max();
   for (const int block : {0, 3}) {
-    const double scale = block == 0 ? 1.0 : result->view;
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(system.H.block<3, 3>(block, block));
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(
+        block == 0 ? Eigen::Matrix3d(system.H.topLeftCorner<3, 3>()) : system.turns);
     Eigen::Matrix3d directions = eigen.eigenvectors();
     int unknown = 0;  // those of least support come first
     for (int i = 0; i < 3; ++i) {
       Vector6d direction = Vector6d::Zero();
-      direction.segment<3>(block) = directions.col(i) / scale;
-      const double squares = eigen.eigenvalues()[i] / (scale * scale);
-      const double support = Support(rows, direction, squares, system.weight);
-      if (support < least) least = support, result->weakest = direction * scale;
+      direction.segment<3>(block) = directions.col(i);
+      const double support = Support(rows, direction, eigen.eigenvalues()[i], system.weight);
+      if (support < least) least = support, result->weakest = direction;
       if (support < config_.min_support) directions.col(i).swap(directions.col(unknown++));
     }
     KeepUnknown(unknown_before.block<3, 3>(block, block), unknown, &directions);
@@ -141,8 +144,9 @@ void ScanMatcher::KeepUnknown(const Eigen::Matrix3d& before, int unknown,
 }
 
 /// Features that hold a direction, each counted by how squarely it does. A surface that is nearly
-/// parallel to the direction seems to hold it, but only by the noise of its normal. `squares`: what
-/// all rows of weight `weight` give along it; where that is plenty, a lower bound will do.
+/// parallel to the direction, or to the way on which a rotation takes it, seems to hold it, but
+/// only by the noise of its normal. `squares`: what all rows of weight `weight` give along it;
+/// where that is plenty, a lower bound will do.
 double ScanMatcher::Support(const std::vector<Row>& rows, const Vector6d& direction, double squares,
                             double weight) const {
   const double least = std::cos(config_.slant * M_PI / 180.0);

@@ -95,9 +95,9 @@ class ScanMatcher {
                     const Matrix6d& unknown_before = Matrix6d::Zero()) const;
 
  private:
-  struct Row {  // of the linearised problem
-    Eigen::Matrix<float, 6, 1> J;
-    float weight;  // as a support of the directions that it holds
+  struct Row {                     // of the linearised problem
+    Eigen::Matrix<float, 6, 1> J;  // the rotation's part per metre of distance
+    float weight;                  // as a support of the directions that it holds
   };
   struct System;
   class Matched;

@@ -251,6 +251,21 @@ world::Scenario BareStreet(bool posts) {
   return scenario;
 }
 
+world::Scenario Square(uint64_t seed) {
+  world::Random random(seed, 78);
+  world::Scenario scenario;
+  scenario.name = fmt::format("square-{}", seed);
+  const double x = random.Uniform(13.0, 19.0), y = random.Uniform(10.0, 14.0);
+  for (const double side : {-y, y})
+    scenario.world.walls.push_back({{-x, side}, {x, side}, 5.0, 0.2});
+  for (int i = 0; i < 4; ++i)
+    scenario.world.cylinders.push_back(
+        {{random.Uniform(-x, x), random.Uniform(2.0, y)}, random.Uniform(0.15, 0.4), 4.0, 0.0});
+  scenario.target.waypoints = {{-4.0, -4.0}, {4.0, -4.0}};
+  scenario.chaser.start = {-4.0, -6.0, kStanding};
+  return scenario;
+}
+
 std::string Text(const LiveFigures& f) {
   return fmt::format(
       "\"sweeps\":{},\"refused\":{},\"lost\":{},\"degraded\":{},\"epochs\":{},\"ate\":{:.4f},"

@@ -65,6 +65,9 @@ world::Scenario Meadow(int trees, double roughness, uint64_t seed);
 /// posts half-way on if there are any.
 world::Scenario BareStreet(bool posts);
 
+/// Two walls far apart and four pillars on even ground, laid out by `seed`.
+world::Scenario Square(uint64_t seed);
+
 std::string Text(const LiveFigures& figures);
 
 }  // namespace chase::odometry::trial

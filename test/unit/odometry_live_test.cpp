@@ -125,6 +125,21 @@ TEST(OdometryLive, FlatFieldIsSaidToHoldNothingAcross) {
   ExpectHonest(flights, 0.99, 3.0);
 }
 
+/// On its legs the body sees the ground near by and the rest far away: the one holds its tilt.
+TEST(OdometryLive, IsHealthyOnTheGroundBeforeTakeOff) {
+  for (const int seed : Seeds(3)) {
+    LiveOptions options;
+    options.seed = seed;
+    options.course = "rest";
+    options.duration = 8.0;
+    options.judge_from = 2.0;
+    const LiveFigures figures =
+        Shown("stands", FlyLive(trial::Square(static_cast<uint64_t>(seed)), options));
+    EXPECT_EQ(figures.degraded, 0) << seed;
+    EXPECT_LT(figures.worst, 0.02) << seed;
+  }
+}
+
 TEST(OdometryLive, StandingWithoutImuStaysWhereItIs) {
   std::vector<LiveFigures> flights;
   for (const int seed : Seeds(3)) {
