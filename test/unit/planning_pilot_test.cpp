@@ -28,7 +28,10 @@ class Flight {
 
   void Run(double seconds, bool with_target) {
     for (const double end = t + seconds; t < end; t += kPeriod) {
-      if (hears && std::fmod(t, 0.1) < kPeriod) pilot.SetObstacles(t, obstacles);
+      if (hears && std::fmod(t, 0.1) < kPeriod) {
+        pilot.SetObstacles(t, obstacles);
+        if (!unseen.empty()) pilot.SetUnseen(t, unseen);
+      }
       if (with_target && std::fmod(t, 0.3) < kPeriod) pilot.SetForecast(Walking(t));
       if (const auto plan = pilot.Update(t, Body())) {
         plans.push_back(*plan);
@@ -56,7 +59,7 @@ class Flight {
   Pilot pilot;
   double t = 0.0;
   bool hears = true;  // of obstacles
-  std::vector<world::Obstacle> obstacles;
+  std::vector<world::Obstacle> obstacles, unseen;
   double largest_step = 0.0, largest_kink = 0.0;
   std::vector<PlanResult> plans;
   std::optional<PlanResult> flown, waiting;
@@ -123,6 +126,22 @@ TEST(Pilot, ChasesFollowsAndHoversWhenTheTargetIsLost) {
   EXPECT_TRUE(went) << "to where the target may have gone";
   EXPECT_LT(flight.largest_kink, 1e-6) << "plans continue where the one before is left";
   EXPECT_LT(flight.largest_step, 0.05);
+}
+
+TEST(Pilot, FollowsNobodyToWhereNobodyHasLooked) {
+  for (const bool looked : {true, false}) {
+    Flight flight{PlanningConfig()};
+    world::Obstacle dark;
+    dark.id = 3;
+    dark.solid = world::Obstacle::Solid::kBox;
+    dark.center = world::Trajectory::Constant({9.0, 0.0, 2.0}, 0.0, 100.0);
+    dark.half = {0.5, 30.0, 2.0};
+    dark.shape = (std::sqrt(3.0) * dark.half).cwiseAbs2().cwiseInverse().asDiagonal();
+    if (!looked) flight.unseen = {dark};
+    flight.Run(3.0, false);
+    flight.Run(12.0, true);
+    EXPECT_EQ(flight.Body().p.x() > 8.5 - PlanningConfig().planner.hard_radius(), looked);
+  }
 }
 
 TEST(Pilot, NeverPlansFasterThanItsLeastPeriod) {
