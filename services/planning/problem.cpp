@@ -13,6 +13,7 @@
 namespace chase::planning {
 namespace {
 
+constexpr double kRounding = 1e-6;    // m, and of a limit: by which one gives way at least
 constexpr double kBackInView = 0.25;  // tau by which a plan sees a target that it starts without
 
 // Deviations of the obstacle's position along the worst axis, times sigmas.
@@ -86,7 +87,6 @@ double Overshoot(double v, double a, double most) {
 // A limit of x that gives way where the start cannot help it: not to what any plan within it goes
 // through, which at its greatest acceleration would still come to rest in time.
 double GivingWay(double limit, double x, double v, double a, double most) {
-  constexpr double kRounding = 1e-6;  // m
   const double least = x + std::max(0.0, v) * v / (2.0 * most) + kRounding;
   if (least <= limit + 2.0 * kRounding) return std::max(limit, least);
   return std::max(limit, x + Overshoot(v, a, most) + kRounding);
@@ -98,11 +98,10 @@ double GivingWay(double limit, double x, double v, double a, double most) {
 // level with people.
 Limits MakeLimits(const PlannerConfig& c, const Stretch& over, const Eigen::Vector3d& target,
                   const Ground& ground) {
-  constexpr double kRounding = 1e-6, kPush = 4.0;  // m; m/s^2 where no limit is set
-  constexpr double kOverhead = 10.0;               // tangent from which there is no side to be on
-  constexpr double kUnseenDrop = 0.15;             // m: replanned, half a metre a second
-  constexpr double kSightSlope = 0.2;              // 15 degrees, less a tilt of 4
-  constexpr double kPerson = 1.7;                  // m high
+  constexpr double kPush = 4.0;         // m/s^2 where no limit is set
+  constexpr double kOverhead = 10.0;    // tangent from which there is no side to be on
+  constexpr double kUnseenDrop = 0.15;  // m: replanned, half a metre a second
+  constexpr double kPerson = 1.7;       // m high
   const auto at_least = [](double limit, double now) {
     return limit > 0.0 ? std::max(limit, (1.0 + kRounding) * now + kRounding) : 0.0;
   };

@@ -13,6 +13,9 @@
 
 namespace chase::planning {
 
+/// What is below on the way down the LiDAR sees along this slope: 15 degrees, less a tilt of 4.
+inline constexpr double kSightSlope = 0.2;
+
 using world::Curve;
 
 /// An obstacle as the planner sees it: the true ellipsoid grown for the drone's safety and, less,

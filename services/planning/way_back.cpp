@@ -12,7 +12,6 @@ constexpr double kReach = 8.0;          // m of a leg: the map is surely known t
 constexpr std::size_t kMostTried = 12;  // goals of one leg, so that a plan takes its time at most
 constexpr double kAtHome = 1.0;         // m: the trail's first points, the climb among them
 constexpr double kStride = 1.0;         // m between places where there is no trail
-constexpr double kSightSlope = 0.2;     // down: what is there the LiDAR sees on the way
 constexpr double kLevel = 0.1;          // m: another height
 
 /// The places that a leg may end at, above or below, by their place on the way: home, then the
