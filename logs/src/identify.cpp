@@ -28,11 +28,18 @@ struct Row {
   const char* excited;  // by what motion
 };
 
+/// Control takes one drag for all headings: it is as uncertain as along the worse.
+Parameter LevelDrag(const Identification& i) {
+  const Parameter &mean = i.drag_horizontal, &a = i.drag_forward, &b = i.drag_sideways;
+  return {mean.value, std::max({mean.sigma, a.sigma, b.sigma}),
+          std::max({mean.systematic, a.systematic, b.systematic})};
+}
+
 std::vector<Row> Rows(const Identification& i) {
   const char* const level = "level flight to and fro at 1 m/s and more, on two courses";
   const char* const climbs = "climbs and descents at 1 m/s";
   const char* const agile = "quick turns and changes of speed";
-  return {{"drag, horizontal", "1/s", i.drag_horizontal, kDragEnough, level},
+  return {{"drag, horizontal", "1/s", LevelDrag(i), kDragEnough, level},
           {"  forward", "1/s", i.drag_forward, kDragEnough, "level flight nose first"},
           {"  sideways", "1/s", i.drag_sideways, kDragEnough, "level flight sideways"},
           {"drag, vertical", "1/s", i.drag_vertical, kDragEnough, climbs},
@@ -96,17 +103,18 @@ std::string Format(const Identification& i) {
 
 std::string ControlFile(const Identification& i, const std::string& origin,
                         const std::string& present) {
-  const bool level = Shown(i.drag_horizontal, kDragEnough);
+  const Parameter horizontal = LevelDrag(i);
+  const bool level = Shown(horizontal, kDragEnough);
   const bool vertical = Shown(i.drag_vertical, kDragEnough);
   control::ControlConfig config;
   if (!present.empty()) config::Load(present, &config);
   std::string text;
   if (present.empty() ? level && vertical : level || vertical) {
-    if (level) config.drag.head<2>().setConstant(Rounded(i.drag_horizontal.value, 0.0, 5.0));
+    if (level) config.drag.head<2>().setConstant(Rounded(horizontal.value, 0.0, 5.0));
     if (vertical) config.drag.z() = Rounded(i.drag_vertical.value, 0.01, 5.0);
     text += fmt::format("drag: [{}, {}, {}]  # 1/s; x and y {}; z {}; along B, taken for W\n",
                         config.drag.x(), config.drag.y(), config.drag.z(),
-                        level ? PlusMinus(i.drag_horizontal) : "as in " + present,
+                        level ? PlusMinus(horizontal) : "as in " + present,
                         vertical ? PlusMinus(i.drag_vertical) : "as in " + present);
   }
   if (Shown(i.lead, kTimeEnough))

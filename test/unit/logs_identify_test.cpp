@@ -145,7 +145,8 @@ TEST(Identify, WritesWhatControlReads) {
 
 TEST(Identify, LeavesControlsDragWhereItDoesNotKnowBetter) {
   Identification level;
-  level.drag_horizontal = {0.6, 0.01}, level.drag_vertical = {0.9, 0.3};
+  level.drag_horizontal = level.drag_forward = level.drag_sideways = {0.6, 0.01};
+  level.drag_vertical = {0.9, 0.3};
   level.lead = {-0.004, 0.002};
   const std::string part = ControlFile(level, "level.lcm");
   EXPECT_EQ(part.find("drag"), std::string::npos) << part;
@@ -157,6 +158,9 @@ TEST(Identify, LeavesControlsDragWhereItDoesNotKnowBetter) {
   const std::string text = ControlFile(level, "level.lcm", present);
   config::LoadText(text, "written", &config);
   EXPECT_EQ(config.drag, Vector3d(0.6, 0.6, 0.33)) << text;
+  level.drag_sideways.sigma = 0.2;  // flown nose first
+  EXPECT_EQ(ControlFile(level, "level.lcm", present).find("drag"), std::string::npos);
+  level.drag_sideways.sigma = 0.01;
   std::swap(level.drag_horizontal, level.drag_vertical);
   config::LoadText(ControlFile(level, "climb.lcm", present), "written", &config);
   EXPECT_EQ(config.drag, Vector3d(0.5, 0.4, 0.6));
