@@ -4,7 +4,9 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <boost/interprocess/sync/file_lock.hpp>
 #include <filesystem>
+#include <fstream>
 #include <map>
 #include <set>
 #include <thread>
@@ -37,8 +39,20 @@ Json Entry(const Flight& flight, const Job& job, const Setup& setup) {
   return Judge(flight, Json::parse(ReadText(job.file)), setup.duration);
 }
 
+/// Two campaigns would write into each other's flights. The lock ends with this process.
+boost::interprocess::file_lock Claimed(const std::string& folder) {
+  const std::string file = (fs::path(folder) / ".lock").string();
+  std::ofstream(file, std::ios::app).close();
+  boost::interprocess::file_lock lock(file.c_str());
+  if (!lock.try_lock())
+    throw std::runtime_error(
+        folder + " is another campaign's, which still flies: wait, or take another --out");
+  return lock;
+}
+
 void RunAll(const std::vector<Flight>& flights, const std::vector<Job>& jobs, const Options& o) {
   MakeFolder(o.setup.out);
+  const boost::interprocess::file_lock claimed = Claimed(o.setup.out);
   std::map<std::string, const Flight*> by_file;
   for (size_t i = 0; i < jobs.size(); ++i) by_file[jobs[i].file] = &flights[i];
   RunOptions run;

@@ -186,6 +186,7 @@ class Campaign(unittest.TestCase):
                                stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         while not self.calls.exists() or len(self.calls.read_text().splitlines()) < 4:
             time.sleep(0.01)
+        self.assertRegex(self.fly(*what, code=1).stderr, "^chase-campaign: .* another campaign's.*\n$")
         run.send_signal(signal.SIGKILL)
         run.wait()
         time.sleep(0.3)  # what was in the air ends with it
