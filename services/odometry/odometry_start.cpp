@@ -13,6 +13,7 @@ constexpr int kMostPasses = 8;       // through the sweeps since power-on
 constexpr double kConverged = 0.02;  // m/s: over a sweep, 2 mm
 // m; 36 slopes (of seeds 1 to 40) where it rests: 2 mm in the median, 11 at most while it settles.
 constexpr double kMovesAtRest = 0.02;
+constexpr double kBlindAtRest = 0.1;  // m/s: sweeps alone show a body at rest to move less
 
 }  // namespace
 
@@ -20,10 +21,11 @@ void Odometry::Align(const ImuSample& imu) {
   aligning_ = true;
   alignment_.Add(imu);
   if (!alignment_.Complete()) return;
-  if (started_)
-    Join(imu.t);
-  else if (alignment_.AtRest() && !SweepsShowMotion())
+  const bool moves = started_ ? base_.v.norm() > kBlindAtRest : SweepsShowMotion();
+  if (alignment_.AtRest() && !moves)
     StartAtRest(imu.t);
+  else if (started_)
+    Join(imu.t);
   else
     StartInMotion(imu.t);
 }
@@ -44,10 +46,20 @@ void Odometry::Join(double t) {
   blend_.Absorb(shown, base_.v, level_.ToWorld(base_.pose()), base_.v);
 }
 
+/// A map of sweeps that came before the IMU leans as the body stands: it begins anew.
 void Odometry::StartAtRest(double t) {
   dropped_sweeps_ += static_cast<int64_t>(pending_.size());
   pending_.clear();
-  base_ = alignment_.Result(config_.filter, config_.initial_position, InitialYaw());
+  Pose place{math::FromYaw(InitialYaw()), config_.initial_position};
+  if (started_) {
+    place = level_.ToWorld(base_.pose());
+    ClearMap();
+    first_.reset();
+    unknown_.setZero();
+    drift_ = MapDrift(config_.drift);
+    ++epoch_;
+  }
+  base_ = alignment_.Result(config_.filter, place.p, math::Yaw(place.R));
   health_.OnStarted(true, held_ = t);
   const ImuStatistics rest = alignment_.statistics();
   standing_.Begin(rest.mean, rest.accel_spread, rest.gyro_spread, base_.p);

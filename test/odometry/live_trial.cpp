@@ -85,7 +85,8 @@ class Live {
     Strike(t, &out.imu);
     truth_.emplace_back(t, out.truth);
     if (truth_.size() > 400) truth_.pop_front();
-    if (options_.imu) waiting_.push_back({t, out.imu.accel, out.imu.gyro});
+    if (options_.imu && t >= options_.imu_from)
+      waiting_.push_back({t, out.imu.accel, out.imu.gyro});
     const double delay = Within(options_.delay_from, t) ? options_.imu_delay : 0.0;
     for (; !waiting_.empty() && waiting_.front().t <= t - delay; waiting_.pop_front())
       See(odometry_.AddImu(waiting_.front()));
@@ -144,6 +145,8 @@ class Live {
     if (pose->t < options_.judge_from) return;
     const bool ok = pose->health.health == Health::kOk;
     figures_.degraded += ok ? 0 : 1;
+    figures_.turned =
+        std::max(figures_.turned, 180.0 / M_PI * pose->X_WB.R.angularDistance(truth.body.q));
     const double tilt = Tilt(pose->X_WB.R, truth.body.q);
     if (pose->t < options_.lidar_out_from)
       tilt_before_ = tilt;

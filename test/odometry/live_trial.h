@@ -16,7 +16,8 @@ struct LiveOptions {
   int64_t seed = 1;
   double duration = 20.0;
   bool imu = true;
-  double lidar_out_from = 1e9, lidar_out_to = 1e9;        ///< no sweep begins in this time
+  double imu_from = 0.0;                            ///< s: sweeps come from the first moment on
+  double lidar_out_from = 1e9, lidar_out_to = 1e9;  ///< no sweep begins in this time
   Eigen::Vector3d accel_fault = Eigen::Vector3d::Zero();  ///< of the IMU meanwhile, m/s^2
   /// For two seconds this share of bursts of one to `spike_length` samples reads `spike_size` times
   /// full scale (16 g, 2000 deg/s) on an axis.
@@ -45,6 +46,7 @@ struct LiveFigures {
   double worst = 0.0;           ///< m
   double end = 0.0;             ///< error at the end, m
   double moved = 0.0;           ///< how far the error went astray from `judge_from` on, m
+  double turned = 0.0;          ///< largest error of the attitude, deg
   double worst_velocity = 0.0;  ///< largest error of the velocity, m/s
   double velocity_back =
       -1.0;  ///< after the LiDAR's return, until the velocity is within 0.2 m/s, s
