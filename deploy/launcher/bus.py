@@ -119,6 +119,17 @@ def free_port(ports):
     return 0
 
 
+def await_listener(port, seconds):
+    """Returns when somebody takes connections on this TCP port, or after so long."""
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        try:
+            socket.create_connection(("127.0.0.1", port), 1.0).close()
+            return
+        except OSError:
+            time.sleep(0.05)
+
+
 def channel_of(packet):
     """Channel of an LCM packet; of a fragment after the first and of anything else ''."""
     if packet[:4] == b"LC02":

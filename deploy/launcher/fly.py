@@ -237,6 +237,7 @@ class Flight:
         """An onlooker: whatever becomes of it, the flight goes on."""
         port = bus.free_port(VIEW_PORTS)
         self.viewer = self.child("viewer", ["nice", "-n", "10", BIN / "chase-viewer", "--port", str(port)])
+        bus.await_listener(port, 5.0)
         print(f"look on at http://localhost:{port}", flush=True)
 
     def wait_ready(self):
