@@ -78,27 +78,37 @@ double LogLikelihood(const Eigen::VectorXd& innovation, const Eigen::MatrixXd& c
   return -0.5 * (innovation.dot(solver.solve(innovation)) + solver.vectorD().array().log().sum());
 }
 
+/// innovation = H dx + noise, linear in the error state.
+struct Observation {
+  JacobianRows H;
+  Eigen::VectorXd innovation;
+  Eigen::MatrixXd noise;  // its covariance
+
+  Eigen::MatrixXd InnovationCovariance(const ErrorCovariance& P) const {
+    return H * P * H.transpose() + noise;
+  }
+};
+
 /// Kalman update in Joseph's form; refused where the innovation's covariance is singular or the
 /// normalised innovation squared per direction exceeds `largest_nis`. Above `usual_nis` the noise
 /// is taken larger by as much: inertia tells a tenth of a second better than a match that is at
 /// odds with it, and doubt in the state instead would hand it over to such matches.
-UpdateResult Correct(const JacobianRows& H, const Eigen::VectorXd& innovation,
-                     Eigen::MatrixXd noise, double usual_nis, double largest_nis, NavState* state) {
-  Eigen::LDLT<Eigen::MatrixXd> solver(H * state->P * H.transpose() + noise);
+UpdateResult Correct(Observation y, double usual_nis, double largest_nis, NavState* state) {
+  Eigen::LDLT<Eigen::MatrixXd> solver(y.InnovationCovariance(state->P));
   if (solver.info() != Eigen::Success || !(solver.vectorD().minCoeff() > 0.0)) return {};
-  const double k = static_cast<double>(innovation.size());
-  const double nis = innovation.dot(solver.solve(innovation)) / k;
+  const double k = static_cast<double>(y.innovation.size());
+  const double nis = y.innovation.dot(solver.solve(y.innovation)) / k;
   if (!(nis <= largest_nis)) return {false, nis};
   if (nis > usual_nis) {
-    noise *= nis / usual_nis;
-    solver.compute(H * state->P * H.transpose() + noise);
+    y.noise *= nis / usual_nis;
+    solver.compute(y.InnovationCovariance(state->P));
   }
-  const Eigen::MatrixXd K = solver.solve(H * state->P).transpose();
-  const ErrorVector dx = K * innovation;
+  const Eigen::MatrixXd K = solver.solve(y.H * state->P).transpose();
+  const ErrorVector dx = K * y.innovation;
   if (!dx.allFinite()) return {};
   Inject(dx, state);
-  const ErrorCovariance I_KH = ErrorCovariance::Identity() - K * H;
-  state->P = (I_KH * state->P * I_KH.transpose() + K * noise * K.transpose()).eval();
+  const ErrorCovariance I_KH = ErrorCovariance::Identity() - K * y.H;
+  state->P = (I_KH * state->P * I_KH.transpose() + K * y.noise * K.transpose()).eval();
   Symmetrise(&state->P);
   return {true, nis};
 }
@@ -107,29 +117,25 @@ UpdateResult Correct(const JacobianRows& H, const Eigen::VectorXd& innovation,
 /// than that nothing did, and likelier than a match that is off at once: by wrong stamps, or by
 /// features that were matched with another surface within the gate. A turn is felt at once, an
 /// acceleration by the sweep after. Returns the odds of a jump with this match.
-double OpenAfterJump(double usual_nis, const JacobianRows& H, const Eigen::VectorXd& innovation,
-                     const Eigen::MatrixXd& noise, double gate, const JumpEvidence& jump,
+double OpenAfterJump(const Observation& y, double usual_nis, double gate, const JumpEvidence& jump,
                      NavState* state) {
   constexpr double kTurned = 0.005;  // rad: 20 ms at 0.25 rad/s
-  const auto covariance = [&](const ErrorCovariance& P) -> Eigen::MatrixXd {
-    return H * P * H.transpose() + noise;
-  };
-  double otherwise = LogLikelihood(innovation, covariance(state->P)) + kJumps;
+  double otherwise = LogLikelihood(y.innovation, y.InnovationCovariance(state->P)) + kJumps;
   for (const double off : {0.02, gate}) {  // m: 20 ms at 1 m/s; another surface
     ErrorCovariance P = state->P;
     AddDiagonal(kP, off * off, &P);
     AddDiagonal(kTheta, kTurned * kTurned, &P);
-    otherwise = std::max(otherwise, LogLikelihood(innovation, covariance(P)));
+    otherwise = std::max(otherwise, LogLikelihood(y.innovation, y.InnovationCovariance(P)));
   }
   const NavState before = *state;
   double odds = -HUGE_VAL, best = 0.0;
   for (const double age : {jump.gap, 2.0 * jump.gap}) {
     const ErrorCovariance jumped = AfterJump(before, jump.gap, age);
-    const Eigen::MatrixXd explained = covariance(jumped);
-    const double nis = innovation.dot(explained.ldlt().solve(innovation));
-    const double likelihood = jump.odds + LogLikelihood(innovation, explained) - otherwise;
+    const Eigen::MatrixXd explained = y.InnovationCovariance(jumped);
+    const double nis = y.innovation.dot(explained.ldlt().solve(y.innovation));
+    const double likelihood = jump.odds + LogLikelihood(y.innovation, explained) - otherwise;
     odds = std::max(odds, likelihood);
-    if (!(nis <= usual_nis * static_cast<double>(innovation.size())) || !(likelihood > best))
+    if (!(nis <= usual_nis * static_cast<double>(y.innovation.size())) || !(likelihood > best))
       continue;
     best = likelihood;
     state->P = jumped;
@@ -238,18 +244,15 @@ UpdateResult Update(const FilterConfig& config, const PoseMeasurement& z, const 
   const Eigen::LDLT<Eigen::MatrixXd> information(reduced);
   if (information.info() != Eigen::Success || !(information.vectorD().minCoeff() > 0.0)) return {};
   const Eigen::MatrixXd onto = (V.transpose() * V).ldlt().solve(V.transpose());  // V onto = proj.
-  const Eigen::MatrixXd noise = information.solve(Eigen::MatrixXd::Identity(k, k)) +
-                                onto * floor.cwiseAbs2().asDiagonal() * onto.transpose() +
-                                FromUnknown(z, information, *state);
-  JacobianRows H(k, kStates);
-  H.setZero();
-  H.middleCols<3>(kP) = onto.leftCols<3>();
-  H.middleCols<3>(kTheta) = onto.rightCols<3>();
-  const Eigen::VectorXd innovation = onto * e;
+  Observation y{JacobianRows::Zero(k, kStates), onto * e,
+                information.solve(Eigen::MatrixXd::Identity(k, k)) +
+                    onto * floor.cwiseAbs2().asDiagonal() * onto.transpose() +
+                    FromUnknown(z, information, *state)};
+  y.H.middleCols<3>(kP) = onto.leftCols<3>();
+  y.H.middleCols<3>(kTheta) = onto.rightCols<3>();
   const double odds =
-      jump.gap > 0.0 ? OpenAfterJump(config.usual_nis, H, innovation, noise, z.gate, jump, state)
-                     : jump.odds;
-  UpdateResult result = Correct(H, innovation, noise, config.usual_nis, config.largest_nis, state);
+      jump.gap > 0.0 ? OpenAfterJump(y, config.usual_nis, z.gate, jump, state) : jump.odds;
+  UpdateResult result = Correct(y, config.usual_nis, config.largest_nis, state);
   result.odds = result.applied ? 0.0 : odds;
   return result;
 }
@@ -263,7 +266,7 @@ void HoldStill(const Eigen::Vector3d& gyro, NavState* state) {
   innovation << -state->v, gyro - state->gyro_bias;
   sigma << Eigen::Vector3d::Constant(kSpeed), Eigen::Vector3d::Constant(kTurn);
   constexpr double kAny = std::numeric_limits<double>::infinity();
-  Correct(H, innovation, sigma.cwiseAbs2().asDiagonal(), kAny, kAny, state);
+  Correct({H, innovation, sigma.cwiseAbs2().asDiagonal()}, kAny, kAny, state);
 }
 
 }  // namespace chase::odometry

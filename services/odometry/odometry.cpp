@@ -150,9 +150,9 @@ SweepResult Odometry::ProcessSweep() {
   const bool applied = first || Apply(prepared, &result.match);
   if (!applied) base_ = prepared.inertial;
   const bool beyond = (first || !applied) && UncertaintyOf(prepared.predicted) > config_.match.gate;
-  if (first || beyond) base_ = prepared.predicted;
-  if (beyond) RestartMap();
   first |= beyond;
+  if (first) base_ = prepared.predicted;
+  if (beyond) RestartMap();
   result.applied = applied;
   if (applied) held_ = prepared.end;
   if (applied && !first && !blind) Straighten(&prepared);

@@ -46,7 +46,7 @@ void Odometry::Bootstrap(Prepared* prepared, MatchResult* match) {
   for (int i = 0; i < kBootstrapPasses && match->valid; ++i) {
     Bend(match->X_WB, prepared);
     const Eigen::Vector3d v = prepared->track.front().v, w_B = prepared->track.front().w_B;
-    const double half = 0.5 * (first_->end - first_->sweep.start);
+    const double half = 0.5 * Length(*first_);
     const Pose end{initial.R * math::ExpSO3(half * w_B), initial.p + half * v};
     PlaceFirst(end, v, w_B);
     const auto still = Deskewed(first_->sweep.points, X_BL_, SweepMotion::Still());
