@@ -29,7 +29,7 @@ struct Pair {
   double velocity_error;
 };
 
-/// By how much the estimate of up leans [deg].
+/// Angle between up as estimated and up [deg].
 double Tilt(const Eigen::Quaterniond& estimate, const Eigen::Quaterniond& truth) {
   const Vector3d up = estimate * (truth.conjugate() * Vector3d::UnitZ());
   return std::atan2(up.head<2>().norm(), up.z()) * 180.0 / M_PI;
@@ -139,19 +139,18 @@ class Live {
     figures_.lost += pose->health.health == Health::kLost ? 1 : 0;
     figures_.epochs = pose->epoch;
     const double velocity_error = (pose->v - truth.body.v).norm();
-    if (figures_.velocity_back < 0.0 && pose->t >= options_.lidar_out_to &&
-        velocity_error < kUsableVelocity)
+    const bool back = pose->t >= options_.lidar_out_to;
+    if (back && !figures_.velocity_back && velocity_error < kUsableVelocity)
       figures_.velocity_back = pose->t - options_.lidar_out_to;
-    if (pose->t < options_.judge_from) return;
     const bool ok = pose->health.health == Health::kOk;
+    const double tilt = Tilt(pose->X_WB.R, truth.body.q);
+    if (pose->t < options_.lidar_out_from) tilt_before_ = tilt;
+    if (ok && back)
+      figures_.tilt = std::max(figures_.tilt.value_or(-HUGE_VAL), tilt - tilt_before_);
+    if (pose->t < options_.judge_from) return;
     figures_.degraded += ok ? 0 : 1;
     figures_.turned =
         std::max(figures_.turned, 180.0 / M_PI * pose->X_WB.R.angularDistance(truth.body.q));
-    const double tilt = Tilt(pose->X_WB.R, truth.body.q);
-    if (pose->t < options_.lidar_out_from)
-      tilt_before_ = tilt;
-    else if (ok && pose->t >= options_.lidar_out_to)
-      figures_.tilt = std::max(figures_.tilt, tilt - tilt_before_);
     pairs_.push_back({pose->t, pose->X_WB.p - truth.body.p,
                       pose->covariance.diagonal().head<3>().cwiseSqrt(), pose->X_WB.p, truth.body.p,
                       velocity_error});
@@ -279,8 +278,9 @@ std::string Text(const LiveFigures& f) {
       ".1f},"
       "{:.1f}]",
       f.sweeps, f.refused, f.lost, f.degraded, f.epochs, f.ate, f.aligned, f.worst, f.end, f.moved,
-      f.velocity_back, f.tilt, f.covered[0], f.covered[1], f.covered[2], 1e3 * f.sigma[0],
-      1e3 * f.sigma[1], 1e3 * f.sigma[2], 1e3 * f.rms[0], 1e3 * f.rms[1], 1e3 * f.rms[2]);
+      f.velocity_back.value_or(-1.0), f.tilt.value_or(-1.0), f.covered[0], f.covered[1],
+      f.covered[2], 1e3 * f.sigma[0], 1e3 * f.sigma[1], 1e3 * f.sigma[2], 1e3 * f.rms[0],
+      1e3 * f.rms[1], 1e3 * f.rms[2]);
 }
 
 }  // namespace chase::odometry::trial

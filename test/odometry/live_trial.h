@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -48,10 +49,11 @@ struct LiveFigures {
   double moved = 0.0;           ///< how far the error went astray from `judge_from` on, m
   double turned = 0.0;          ///< largest error of the attitude, deg
   double worst_velocity = 0.0;  ///< largest error of the velocity, m/s
-  double velocity_back =
-      -1.0;  ///< after the LiDAR's return, until the velocity is within 0.2 m/s, s
-  double tilt =
-      0.0;  ///< by how much up leans more than before the LiDAR was out, while POSE says ok, deg
+  /// From the LiDAR's return until the velocity is within 0.2 m/s, s; none: never.
+  std::optional<double> velocity_back;
+  /// Largest growth of the tilt's error since before the LiDAR was out while POSE says ok, deg;
+  /// none: it never does.
+  std::optional<double> tilt;
   double covered[3] = {0, 0, 0};  ///< share of estimates within three standard deviations, by axis
   double sigma[3] = {0, 0, 0};    ///< median standard deviation, by axis, m
   double rms[3] = {0, 0, 0};      ///< of the error, by axis, m
