@@ -15,8 +15,8 @@ class AutopilotState {
   /// Is it armed and ours to fly, as far as is known? Where nobody tells, as in a simulation
   /// without an autopilot, it is; so it is in the air once nobody has told for a while.
   bool Obeys(int64_t utime) const { return obeys_ || (!on_ground_ && IsOld(utime)); }
-  /// Did it say last that it stands on the ground? That holds until it says otherwise: without what
-  /// it is told by us it stays there.
+  /// Did it say last that it stands on the ground? That holds until it says otherwise: one that
+  /// hears nothing from us stays there.
   bool IsOnGround() const { return on_ground_; }
   /// Is the flight not ours although it has begun: a pilot has it, the autopilot lands or has
   /// landed it, or never began it?

@@ -30,8 +30,8 @@ class Estimator {
   /// A velocity that is not finite is not known.
   void Correct(const Vision& vision);
 
-  Px4Body Body(const BodyState& body) const;  ///< in O; the state and what is known of it only
-  /// R_WB of one relative to O.
+  Px4Body Body(const BodyState& body) const;  ///< the state in O, and which of it is known; no more
+  /// R_WB of R_OB.
   Eigen::Quaterniond InWorld(const Eigen::Quaterniond& R_OB) const;
 
  private:

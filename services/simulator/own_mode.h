@@ -10,7 +10,7 @@ namespace chase::simulator {
 struct Px4Body {
   Eigen::Vector3d p_WB = Eigen::Vector3d::Zero(), v_WB = Eigen::Vector3d::Zero();  ///< m, m/s
   Eigen::Quaterniond R_WB = Eigen::Quaterniond::Identity();
-  bool knows_velocity = true;                      ///< level; without it neither the position
+  bool knows_velocity = true;                      ///< the level one, and so the position
   int resets = 0;                                  ///< times that W was begun anew
   Eigen::Vector3d accel = {0.0, 0.0, 9.81};        ///< specific force measured, frame B, m/s^2
   Eigen::Vector3d gyro = Eigen::Vector3d::Zero();  ///< measured, frame B, rad/s

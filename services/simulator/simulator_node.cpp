@@ -105,9 +105,9 @@ void SimulatorNode::Tick(int64_t utime) {
   if (truth_feed_) simulator_.estimator().Correct({utime, body.p, body.v, math::Yaw(body.q), 0});
   PublishSensors(&output, utime);
   if (ticks_ % kTruthTicks == 0) PublishTruth(output.truth, utime);
-  if (ticks_ % kScenarioTicks == 0) PublishScenario(utime);
-  const bool told = ticks_ % kScenarioTicks != 0 && simulator_.lands() == lands_;
-  if (!told && !config_.hardware.mavlink()) PublishAutopilot(utime);
+  const bool due = ticks_ % kScenarioTicks == 0;
+  if (due) PublishScenario(utime);
+  if ((due || simulator_.lands() != lands_) && !config_.hardware.mavlink()) PublishAutopilot(utime);
   lands_ = simulator_.lands();
   if (truth_feed_) truth_feed_->Publish(output.truth, utime, ticks_);
   ++ticks_;
