@@ -84,8 +84,8 @@ double Overshoot(double v, double a, double most) {
   return then > 0.0 ? std::max(0.0, v) * kMoment + then * then / most : 0.0;
 }
 
-// A limit of x that gives way where the start cannot help it: not to what any plan within it goes
-// through, which at its greatest acceleration would still come to rest in time.
+// The limit of x, widened for a start that cannot keep it: not for one that braking at once at the
+// greatest acceleration brings to rest within it.
 double GivingWay(double limit, double x, double v, double a, double most) {
   const double least = x + std::max(0.0, v) * v / (2.0 * most) + kRounding;
   if (least <= limit + 2.0 * kRounding) return std::max(limit, least);

@@ -13,7 +13,7 @@
 
 namespace chase::planning {
 
-/// What is below on the way down the LiDAR sees along this slope: 15 degrees, less a tilt of 4.
+/// The LiDAR sees what is below along this slope: 15 degrees, less a tilt of 4.
 inline constexpr double kSightSlope = 0.2;
 
 using world::Curve;

@@ -12,10 +12,9 @@ constexpr double kReach = 8.0;          // m of a leg: the map is surely known t
 constexpr std::size_t kMostTried = 12;  // goals of one leg, so that a plan takes its time at most
 constexpr double kAtHome = 1.0;         // m: the trail's first points, the climb among them
 constexpr double kStride = 1.0;         // m between places where there is no trail
-constexpr double kLevel = 0.1;          // m: another height
+constexpr double kLevel = 0.1;          // m between heights that differ
 
-/// The places that a leg may end at, above or below, by their place on the way: home, then the
-/// trail.
+/// Where a leg may end, at whatever height, by the order on the way: home, then the trail.
 std::vector<std::size_t> InReach(const std::vector<Vector3d>& way, const Vector3d& p) {
   std::vector<std::size_t> near;
   for (std::size_t i = 0; i < way.size(); ++i)
@@ -62,7 +61,7 @@ std::optional<Stop> WayBack::Leg(const PlannerConfig& config, const PlanRequest&
     std::optional<Stop> leg = GoTo(config, request, p);
     return leg && may_fly(leg->trajectory) ? std::move(leg) : std::nullopt;
   };
-  // Level where it may come down, or climb above the heights of plans, no farther.
+  // Down no steeper than the LiDAR sees; level where neither that nor a climb can be certified.
   const auto try_goal = [&](std::size_t i) {
     const Vector3d& p = request.start.p;
     Vector3d end = way[i];
