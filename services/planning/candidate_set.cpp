@@ -212,6 +212,15 @@ Points ToPoints(const Curve& power, int degree) {
   return b;
 }
 
+Points Halve(Points* points) {
+  Points right = *points;
+  for (int k = 1; k < 7; ++k) {
+    for (int i = 0; i + k < 7; ++i) right.row(i) = 0.5 * (right.row(i) + right.row(i + 1));
+    points->row(k) = right.row(0);
+  }
+  return right;
+}
+
 Curve ToPower(const Points& points, int degree) {
   // Forward differences: row k is C(degree,k) times the k-th difference at 0.
   Curve power(degree + 1, 3);

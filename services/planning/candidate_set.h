@@ -79,5 +79,7 @@ void LimitToReach(const PlannerConfig& config, const CandidateTables& tables, do
 /// Control points of the curve at degree 5 or 6.
 Points ToPoints(const Curve& power, int degree);
 Curve ToPower(const Points& points, int degree);
+/// Of degree 6: leaves those of the first half and returns those of the second (de Casteljau).
+Points Halve(Points* points);
 
 }  // namespace chase::planning

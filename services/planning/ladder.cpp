@@ -104,9 +104,8 @@ class Ladder : public Planner {
            std::any_of(problem.obstacles.begin(), problem.obstacles.end(), inside);
   }
   static bool WeakensSight(const Problem& problem) {
-    return std::any_of(problem.obstacles.begin(), problem.obstacles.end(), [](const Ellipsoid& e) {
-      return (e.sight_from > 0.0 && !e.ground) || e.safety_from > 0.0;
-    });
+    return std::any_of(problem.obstacles.begin(), problem.obstacles.end(),
+                       [](const Ellipsoid& e) { return e.sight_from > 0.0 && !e.ground; });
   }
 
   // The search takes the yaw for pointing at the target, and a start as it is; the yaw that is
@@ -333,7 +332,6 @@ class Ladder : public Planner {
     rest.checked = result->checked;
     rest.feasible = result->feasible;
     *result = std::move(rest);
-    used_ = &problem_;
     Stretch part = request;
     part.horizon = result->trajectory.duration;
     MakeProblem(config_, request, part, nullptr, &shorter_);

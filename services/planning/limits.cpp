@@ -30,55 +30,41 @@ constexpr double kSlack = 1e-11;
 
 /// Control points at degree 6, and how far they may be off.
 struct Net {
-  double b[kDegree + 1][3];
+  Points b;
   double error;
 };
 
 Net MakeNet(const Curve& curve) {
-  const Points points = ToPoints(curve, kDegree);
-  Net net{};
-  double size = 0.0;
-  for (int a = 0; a < 3; ++a) {
-    size = std::max(size, curve.col(a).cwiseAbs().sum());
-    for (int i = 0; i <= kDegree; ++i) net.b[i][a] = points(i, a);
-  }
-  net.error = kSlack * (1.0 + size);
-  return net;
+  return {ToPoints(curve, kDegree), kSlack * (1.0 + curve.cwiseAbs().sum())};
 }
+
+/// The heights above a ground are those of points along this.
+Eigen::Vector3d UpNormal(const Ground& g) { return {-g.slope_x, -g.slope_y, 1.0}; }
 
 enum class Answer { kKept, kBroken, kOpen };
 
 /// `order` 1 or 2: no control point of the derivative longer than `limit`; broken at an end.
 Answer KeepsNorm(const Net& net, int order, double limit, double duration) {
-  double d[kDegree][3];
-  double scale = kDegree / duration;
-  int n = kDegree;
-  for (int i = 0; i < n; ++i)
-    for (int a = 0; a < 3; ++a) d[i][a] = net.b[i + 1][a] - net.b[i][a];
-  if (order == 2) {
-    scale *= (kDegree - 1) / duration;
-    --n;
-    for (int i = 0; i < n; ++i)
-      for (int a = 0; a < 3; ++a) d[i][a] = d[i + 1][a] - d[i][a];
-  }
-  double longest2 = 0.0, ends2 = 0.0;
-  for (int i = 0; i < n; ++i) {
-    const double length2 = d[i][0] * d[i][0] + d[i][1] * d[i][1] + d[i][2] * d[i][2];
-    longest2 = std::max(longest2, length2);
-    if (i == 0 || i == n - 1) ends2 = std::max(ends2, length2);
+  Points d = net.b;
+  double scale = 1.0;
+  const int n = kDegree - order;  // the last point of the derivative
+  for (int k = kDegree; k > n; --k) {
+    for (int i = 0; i < k; ++i) d.row(i) = d.row(i + 1) - d.row(i);
+    scale *= k / duration;
   }
   const double most = limit / scale;
-  if (longest2 < std::pow(std::max(0.0, most - net.error), 2)) return Answer::kKept;
-  return ends2 > std::pow(most + net.error, 2) ? Answer::kBroken : Answer::kOpen;
+  const double longest = std::sqrt(d.topRows(n + 1).rowwise().squaredNorm().maxCoeff());
+  if (longest < most - net.error) return Answer::kKept;
+  const double at_end = std::max(d.row(0).norm(), d.row(n).norm());
+  return at_end > most + net.error ? Answer::kBroken : Answer::kOpen;
 }
 
 Answer KeepsHeight(const Net& net, const Limits& l) {
   const Ground& g = l.ground;
   double z[kDegree + 1];
-  for (int i = 0; i <= kDegree; ++i) z[i] = g.Above({net.b[i][0], net.b[i][1], net.b[i][2]});
+  for (int i = 0; i <= kDegree; ++i) z[i] = g.Above(net.b.row(i).transpose());
   const auto [low, high] = std::minmax_element(z, z + kDegree + 1);
-  const double error =
-      net.error * (1.0 + std::abs(g.slope_x) + std::abs(g.slope_y)) + kSlack * std::abs(g.z0);
+  const double error = net.error * UpNormal(g).lpNorm<1>();
   if (*low - error > l.z_min && *high + error < l.z_max) return Answer::kKept;
   for (const double end : {z[0], z[kDegree]})
     if (end < l.z_min - error || end > l.z_max + error) return Answer::kBroken;
@@ -88,24 +74,13 @@ Answer KeepsHeight(const Net& net, const Limits& l) {
 /// The plan seen from the target: farther than `distance`, lower than tangent `elevation` where
 /// that is above 0. Beyond a vertical plane at h, all of the piece is at least h away.
 bool KeepsAway(const Net& net, double elevation, double distance, int halvings) {
-  double m[2] = {}, rise = 0.0;
-  for (int i = 0; i <= kDegree; ++i) {
-    for (int a = 0; a < 2; ++a) m[a] += net.b[i][a];
-    rise = std::max(rise, std::abs(net.b[i][2]));
-  }
-  const double length = std::sqrt(m[0] * m[0] + m[1] * m[1]);
-  double h = HUGE_VAL;
-  for (int i = 0; i <= kDegree; ++i) h = std::min(h, m[0] * net.b[i][0] + m[1] * net.b[i][1]);
-  h = h / std::max(length, 1e-300) * (1.0 - kSlack) - 2.0 * net.error;
-  if (h > distance && (elevation <= 0.0 || elevation * h > rise + net.error)) return true;
+  const Eigen::Vector2d m = net.b.leftCols<2>().colwise().sum().transpose().normalized();
+  const double rise = net.b.col(2).cwiseAbs().maxCoeff() + net.error;
+  const double h = (net.b.leftCols<2>() * m).minCoeff() - 2.0 * net.error;
+  if (h > distance && (elevation <= 0.0 || elevation * h > rise)) return true;
   if (halvings == 0) return false;
   Net left = net, right = net;
-  left.error = right.error = 1.01 * net.error;
-  for (int k = 1; k <= kDegree; ++k) {
-    for (int i = 0; i <= kDegree - k; ++i)
-      for (int a = 0; a < 3; ++a) right.b[i][a] = 0.5 * (right.b[i][a] + right.b[i + 1][a]);
-    for (int a = 0; a < 3; ++a) left.b[k][a] = right.b[0][a];
-  }
+  right.b = Halve(&left.b);
   return KeepsAway(left, elevation, distance, halvings - 1) &&
          KeepsAway(right, elevation, distance, halvings - 1);
 }
@@ -143,14 +118,12 @@ bool KeepsNorm(const Curve& plan, int order, double limit, double duration) {
 
 bool KeepsHeight(const Curve& plan, const Limits& l) {
   const Ground& g = l.ground;
-  Polynomial z = plan.col(2) - g.slope_x * plan.col(0) - g.slope_y * plan.col(1);
+  Polynomial z = plan * UpNormal(g);
   z[0] -= g.z0;
-  const double terms = plan.cwiseAbs().colwise().sum().dot(
-      Eigen::RowVector3d(std::abs(g.slope_x), std::abs(g.slope_y), 1.0));
+  const double terms = (plan * UpNormal(g).asDiagonal()).lpNorm<1>();
   const Polynomial b = math::PowerToBernstein(z);
-  const double error =
-      math::PowerToBernsteinError(z) +
-      4.0 * kRounding * (terms + std::abs(g.z0) + std::abs(l.z_min) + std::abs(l.z_max));
+  const double error = math::PowerToBernsteinError(z) +
+                       4.0 * kRounding * Eigen::Vector4d(terms, g.z0, l.z_min, l.z_max).lpNorm<1>();
   const Polynomial above = b.array() - l.z_min, below = l.z_max - b.array();
   return IsPositive(above, error) && IsPositive(below, error);
 }
@@ -198,8 +171,7 @@ bool KeepsLimits(const Curve& plan, const Problem& problem) {
   if (!(l.tan_elevation > 0.0) && !(l.min_distance > 0.0)) return true;
   if (small) {
     const Net seen = MakeNet(target);
-    for (int i = 0; i <= kDegree; ++i)
-      for (int a = 0; a < 3; ++a) net.b[i][a] -= seen.b[i][a];
+    net.b -= seen.b;
     net.error += seen.error;
     if (KeepsAway(net, l.tan_elevation, l.min_distance, kHalvings)) return true;
   }

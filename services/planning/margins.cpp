@@ -20,17 +20,6 @@ Eigen::Matrix3d Grown(const world::Obstacle& o, const Ellipsoid& e, double margi
   return margin > 0.0 ? world::Inflated(shape, margin) : shape;
 }
 
-// Leaves the first half and returns the second.
-Points Halve(Points* points) {
-  Points right = *points;
-  for (int a = 0; a < 3; ++a)
-    for (int k = 1; k < 7; ++k) {
-      for (int i = 0; i + k < 7; ++i) right(i, a) = 0.5 * (right(i, a) + right(i + 1, a));
-      (*points)(k, a) = right(0, a);
-    }
-  return right;
-}
-
 }  // namespace
 
 Hull::Hull(const Curve& curve_) : curve(curve_), has_boxes(curve.rows() <= 7) {
@@ -162,7 +151,7 @@ void RelaxSight(const world::Obstacle& o, const Growth& growth, const FirstSight
     e->grown_by[1] = -1.0;
   };
   for (double share : kShares) {
-    if (share < 1.0) take(share);
+    take(share);
     if (!target_is_off(share)) continue;
     if (!kept) kept = share;
     if (!begins_in_sight(share)) continue;

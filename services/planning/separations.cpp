@@ -123,7 +123,7 @@ class Prover {
     if (e.sight_share != share_) {
       share_ = e.sight_share;
       eye_.radius[0] = SightRadius(e);
-      target_.radius = TargetRadius(problem_, share_);
+      target_.radius = TargetRadius(problem_, e.sight_share);
       sight_.TakeRadii();
     }
     if (SightFrom(e) > 0.0) return world::Separate(eye_, &target_, *e.body, SightFrom(e));
@@ -143,7 +143,7 @@ class Prover {
   const Problem& problem_;
   double sight_from_;
   world::Ball drone_, eye_, target_;  ///< the last two: ends of the line of sight
-  double share_ = -1.0;               ///< of the margins of sight that their radii are
+  std::optional<double> share_;       ///< of the margins of sight that their radii are
   world::Separator safety_, sight_;
   double least_ = HUGE_VAL;  ///< distance to the obstacles of the proofs so far, m
 };
