@@ -128,6 +128,63 @@ TEST(Pilot, ChasesFollowsAndHoversWhenTheTargetIsLost) {
   EXPECT_LT(flight.largest_step, 0.05);
 }
 
+/// What is planned at the origin, looking along `yaw`, once a target at that bearing is lost, which
+/// stood when it was seen last, and moved at `speed` before.
+std::vector<PlanResult> AfterTheLastSight(double yaw, double bearing, double speed, double radius) {
+  Pilot pilot{PlanningConfig()};
+  pilot.SetFlying(true);
+  BodyEstimate body{{0.0, 0.0, 1.3}, Eigen::Vector3d::Zero(), yaw};
+  std::vector<PlanResult> plans;
+  for (int i = 0; i < 80; ++i) {
+    const double t = 0.1 * i;
+    pilot.SetObstacles(t, {});
+    if (i < 7) {
+      Forecast f = Walking(t);
+      f.radius = radius;
+      f.target.coefficients.row(0) << 2.5 * std::cos(bearing), 2.5 * std::sin(bearing), 0.5;
+      f.target.coefficients.row(1) << (i < 4 ? 2.5 * speed : 0.0), 0.0, 0.0;
+      pilot.SetForecast(f);
+    } else {
+      body.p.y() = 0.5 * (i % 2);  // off each plan: the next one starts here
+    }
+    const auto plan = pilot.Update(t, body);
+    if (plan && plan->reason.find("target lost") == 0) plans.push_back(*plan);
+  }
+  return plans;
+}
+
+bool Goes(const PlanResult& plan) {
+  return plan.reason.find("target lost, to where it may be") == 0;
+}
+
+TEST(Pilot, SearchesFartherForWhoWasFast) {
+  const auto goes = [](double speed) {
+    const auto plans = AfterTheLastSight(0.0, 0.0, speed, 0.3);
+    return std::count_if(plans.begin(), plans.end(), Goes);
+  };
+  EXPECT_GT(goes(3.0), goes(0.0));
+}
+
+// Where it would be by its last forecast there is nobody to keep off.
+TEST(Pilot, ALostTargetsBodyIsInNobodysWay) {
+  const auto plans = AfterTheLastSight(0.0, 0.0, 3.0, 0.3);
+  const auto free = AfterTheLastSight(0.0, 0.0, 3.0, 0.0);
+  ASSERT_EQ(plans.size(), free.size());
+  for (size_t i = 0; i < plans.size(); ++i) {
+    EXPECT_EQ(Goes(plans[i]), Goes(free[i])) << i;
+    if (!Goes(free[i])) continue;
+    EXPECT_EQ(plans[i].trajectory.coefficients, free[i].trajectory.coefficients) << i;
+  }
+}
+
+TEST(Pilot, TurnsToALostTargetTheShorterWay) {
+  for (const double side : {1.0, -1.0}) {
+    const auto plans = AfterTheLastSight(side * 3.0, side * -3.0, 0.0, 0.3);
+    ASSERT_FALSE(plans.empty());
+    EXPECT_GT(side * YawAt(plans[0].yaw, 0.0, plans[0].trajectory.duration).rate, 0.0);
+  }
+}
+
 TEST(Pilot, FollowsNobodyToWhereNobodyHasLooked) {
   for (const bool looked : {true, false}) {
     Flight flight{PlanningConfig()};

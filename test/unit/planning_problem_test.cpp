@@ -16,7 +16,7 @@ using Eigen::Matrix3d;
 using Eigen::Vector3d;
 using Random = std::mt19937;
 
-constexpr int kInstants = 100;
+constexpr int kInstants = 96;
 
 double Uniform(Random& g, double low, double high) {
   return std::uniform_real_distribution<double>(low, high)(g);
@@ -84,7 +84,7 @@ TEST(Problem, MarginsOfEllipsoidsGiveWayByQuarters) {
   constexpr double kOff = 1.03;  // what is that far out counts as out
   Random g(3);
   int given = 0, inside = 0, less = 0, hidden = 0, blocked = 0;
-  for (int i = 0; i < 300; ++i) {
+  for (int i = 0; i < 600; ++i) {
     const PlanRequest request = RandomRequest(g);
     const Problem problem = MakeProblem(c, request, nullptr);
     for (const Ellipsoid& e : problem.obstacles) {
@@ -117,12 +117,12 @@ TEST(Problem, MarginsOfEllipsoidsGiveWayByQuarters) {
         return world::SegmentSquaredDistance(p, q, center, shape(by));
       };
       if (e.sight_from > 0.0) {
-        EXPECT_LE(target(0.0), kOff);
+        EXPECT_LE(target(0.0), 1.0);
         ++hidden;
         continue;
       }
       EXPECT_TRUE(e.sight.isApprox(shape(e.sight_share), 1e-9));
-      EXPECT_GT(target(e.sight_share), 0.99);
+      EXPECT_GT(target(e.sight_share), e.sight_share > 0.0 ? 1.005 : 0.99);
       const bool block = sight(e.sight_share) < 1.0;
       blocked += block;
       EXPECT_TRUE(!block || sight(0.0) <= kOff);
@@ -169,10 +169,23 @@ TEST(Problem, BoxesAboutACurveHoldItAndLittleMore) {
       EXPECT_TRUE((quarter.low >= hull.whole.low - 1e-9).all());
       EXPECT_TRUE((quarter.high <= hull.whole.high + 1e-9).all());
     }
-    // A quarter's control points leave it by no more than its bend.
-    for (const Box& quarter : hull.quarters)
-      EXPECT_LE((quarter.high - quarter.low).maxCoeff(),
-                (hull.whole.high - hull.whole.low).maxCoeff() + 1e-9);
+    // Nairn, Peters & Lutterkort 1999: by no more than 3/4 of the second differences, which a
+    // quarter has a sixteenth of.
+    const Points b = ToPoints(curve, 6);
+    const Eigen::Array3d bend = (b.bottomRows<5>() - 2.0 * b.middleRows<5>(1) + b.topRows<5>())
+                                    .cwiseAbs()
+                                    .colwise()
+                                    .maxCoeff();
+    for (int k = 0; k < 4; ++k) {
+      Eigen::Array3d low = Eigen::Array3d::Constant(HUGE_VAL), high = -low;
+      for (int j = 0; j <= kInstants; ++j) {
+        const Eigen::Array3d x = Evaluate(curve, (k + 1.0 * j / kInstants) / 4.0).array();
+        low = low.min(x), high = high.max(x);
+      }
+      const Eigen::Array3d beyond = 0.75 / 16.0 * bend + 1e-3;
+      EXPECT_TRUE((hull.quarters[k].low >= low - beyond).all());
+      EXPECT_TRUE((hull.quarters[k].high <= high + beyond).all());
+    }
   }
   EXPECT_FALSE(Hull(RandomCurve(g, 8)).has_boxes);
 }
@@ -291,14 +304,19 @@ TEST(Problem, MoreRoomIsTakenWhereThereIsSome) {
 }
 
 TEST(Problem, NothingOfAnEarlierOneStays) {
-  const PlannerConfig c;
+  PlannerConfig c;
   Random g(8);
   Problem used;
-  for (int i = 0; i < 100; ++i) {
-    PlanRequest request = RandomRequest(g);
-    if (i % 3 == 0) request.target_body = request.obstacles.back();
-    if (i % 4 == 0) request.asks_sight = false;
-    if (i % 5 == 0) request.obstacles.resize(g() % 5);
+  PlanRequest request;
+  for (int i = 0; i < 200; ++i) {
+    if (i % 4 == 0) {
+      request = RandomRequest(g);
+      if (i % 3 == 0) request.target_body = request.obstacles.back();
+      if (i % 16 == 0) request.asks_sight = false;
+      if (i % 5 == 0) request.obstacles.resize(g() % 5);
+    }
+    c.safety_margin = i % 4 > 0 ? 0.2 : 0.1;  // the same with other margins
+    c.sight_margin = i % 4 > 1 ? 0.2 : 0.1;
     used.reach = Box{Eigen::Array3d::Zero(), Eigen::Array3d::Zero()};
     used.skeletons = {{Vector3d::Zero()}};
     MakeProblem(c, request, request, nullptr, &used);

@@ -201,6 +201,7 @@ TEST(Rungs, ThePlanSaysWhatItWasAskedForAndKeepsThat) {
     EXPECT_TRUE(plan.in_field);
     EXPECT_TRUE(plan.stop && !plan.stop_proofs.empty());
     EXPECT_GE(plan.certified_clearance, Margin(c, q) - 1e-9);
+    EXPECT_LE(plan.certified_clearance, request.start.p.z() - c.hard_radius()) << "the ground";
     ASSERT_EQ(plan.proofs.size(), q.sight_from < 1.0 ? 2u : 1u) << i;
     for (const Proof& p : plan.proofs)
       EXPECT_EQ(p.from, p.of_sight ? q.sight_from : 0.0) << plan.reason;
@@ -222,6 +223,7 @@ TEST(Rungs, WhatGivesWayIsSaidWhereItDoes) {
     const bool half = asked.back().problem.sight_radius < c.sight_margin;
     EXPECT_NEAR(Margin(c, asked.back()), 0.5 * c.safety_margin, 1e-12);
     EXPECT_EQ(Says(plan, "starts within the margin of obstacle 5"), !half) << plan.reason;
+    EXPECT_LT(plan.certified_clearance, 0.7 * c.safety_margin);
     ++(half ? not_said : said);
   }
   EXPECT_TRUE(said > 3 && not_said > 0);
@@ -280,7 +282,7 @@ TEST(Rungs, TheRestOfTheRunningPlanComesBeforeShorterOnes) {
   PlannerConfig c;
   c.max_speed = 0.1;  // no way around the corner
   for (const double rest : {2.0, 1.5, 1.0, 0.4, 0.33, 0.27}) {
-    const PlanRequest request = BeforeACorner(rest);
+    PlanRequest request = BeforeACorner(rest);
     const auto [plan, asked] = Ask(c, request, 1000);
     EXPECT_EQ(plan.verdict, rest > 0.3 ? Verdict::kKept : Verdict::kBrake) << plan.reason;
     if (plan.verdict != Verdict::kKept) continue;
@@ -293,6 +295,10 @@ TEST(Rungs, TheRestOfTheRunningPlanComesBeforeShorterOnes) {
     EXPECT_EQ(Says(plan, "the rest of the running plan is"), rest > 0.9) << plan.reason;
     EXPECT_FALSE(Says(plan, "led around"));
     for (const Proof& p : plan.proofs) EXPECT_EQ(p.from, 0.0);
+    request.horizon = rest;
+    const double cost =
+        Evaluate(c, MakeProblem(c, request, nullptr), plan.trajectory.coefficients).total;
+    EXPECT_NEAR(plan.cost.total, cost, 1e-9 * cost);
   }
 }
 

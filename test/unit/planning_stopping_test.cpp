@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include "common/world/random.h"
-#include "services/planning/stopping.h"
+#include "services/planning/resting.h"
 
 // Ways to rest, against brakings written anew and judged by sampled distances.
 
@@ -291,6 +291,42 @@ TEST(Brake, CountsOnNoForecastBeyondItsEnd) {
   walker.center.coefficients.row(0) << 0.0, 1.5, 0.9;
   request.obstacles = {walker};
   EXPECT_TRUE(Brake(config, request)) << "forecast for as long as it takes";
+}
+
+// With whatever is struck first: what stands, what walks, the target, the ground.
+TEST(Harm, IsTheFirstContactAndTheLeastDistance) {
+  const PlannerConfig c;
+  constexpr double T = 1.7, kStep = 0.05, kFar = 0.2;  // s, m: samples, and between them
+  int with_target = 0, with_ground = 0, with_others = 0, none = 0;
+  for (unsigned seed = 0; seed < 600; ++seed) {
+    PlanRequest request = RandomRequest(c, seed);
+    if (seed % 3 == 0) request.start.v.z() = -2.0;
+    Random random(seed, 9);
+    const world::Obstacle body =
+        RandomCylinder(&random, kTargetId, RandomVector(&random, 2.0, 2.0, 0.5) + request.start.p);
+    if (Distance(body, request.start.p, request.t0) > c.hard_radius()) request.target_body = body;
+    const auto [contact, least] = Resting(c, request).Harm(BrakeCurve(request.start, T), T);
+    const world::Trajectory way = Braking(request, T);
+    double first = HUGE_VAL, deep = HUGE_VAL, nearest = HUGE_VAL;
+    int by = 3;
+    for (double t = way.start; t <= way.end(); t += 0.01) {
+      const Vector3d p = way.Position(t);
+      double distance[] = {HUGE_VAL, p.z(), HUGE_VAL};
+      if (request.target_body) distance[0] = Distance(body, p, t);
+      for (const world::Obstacle& o : request.obstacles)
+        distance[2] = std::min(distance[2], Distance(o, p, t));
+      const double* d = std::min_element(distance, distance + 3);
+      if (*d < nearest) by = static_cast<int>(d - distance);
+      nearest = std::min(nearest, *d);
+      if (*d < c.drone_radius) first = std::min(first, t - way.start);
+      if (*d < c.drone_radius - kFar) deep = std::min(deep, t - way.start);
+    }
+    EXPECT_NEAR(least, nearest, kFar) << seed;
+    EXPECT_GE(contact, std::min(first - kStep, 1e9)) << seed;
+    EXPECT_TRUE(contact <= deep + kStep) << seed;
+    ++(first == HUGE_VAL ? none : by == 0 ? with_target : by == 1 ? with_ground : with_others);
+  }
+  for (const int n : {with_target, with_ground, with_others, none}) EXPECT_GT(n, 10);
 }
 
 // Walkers close in from all sides: what is flown touches no earlier than any braking within the
