@@ -43,7 +43,13 @@ Eigen::Vector3d UpNormal(const Ground& g) { return {-g.slope_x, -g.slope_y, 1.0}
 
 enum class Answer { kKept, kBroken, kOpen };
 
-/// `order` 1 or 2: no control point of the derivative longer than `limit`; broken at an end.
+/// By the least room that control points have, and those at the ends, which the curve goes through.
+Answer Judge(double least, double at_ends, double error) {
+  if (least > error) return Answer::kKept;
+  return at_ends < -error ? Answer::kBroken : Answer::kOpen;
+}
+
+/// `order` 1 or 2: the derivative is no longer than `limit`.
 Answer KeepsNorm(const Net& net, int order, double limit, double duration) {
   Points d = net.b;
   double scale = 1.0;
@@ -54,21 +60,15 @@ Answer KeepsNorm(const Net& net, int order, double limit, double duration) {
   }
   const double most = limit / scale;
   const double longest = std::sqrt(d.topRows(n + 1).rowwise().squaredNorm().maxCoeff());
-  if (longest < most - net.error) return Answer::kKept;
-  const double at_end = std::max(d.row(0).norm(), d.row(n).norm());
-  return at_end > most + net.error ? Answer::kBroken : Answer::kOpen;
+  const double at_ends = std::max(d.row(0).norm(), d.row(n).norm());
+  return Judge(most - longest, most - at_ends, net.error);
 }
 
 Answer KeepsHeight(const Net& net, const Limits& l) {
-  const Ground& g = l.ground;
-  double z[kDegree + 1];
-  for (int i = 0; i <= kDegree; ++i) z[i] = g.Above(net.b.row(i).transpose());
-  const auto [low, high] = std::minmax_element(z, z + kDegree + 1);
-  const double error = net.error * UpNormal(g).lpNorm<1>();
-  if (*low - error > l.z_min && *high + error < l.z_max) return Answer::kKept;
-  for (const double end : {z[0], z[kDegree]})
-    if (end < l.z_min - error || end > l.z_max + error) return Answer::kBroken;
-  return Answer::kOpen;
+  const Eigen::Vector3d up = UpNormal(l.ground);
+  const Eigen::Array<double, kDegree + 1, 1> z = (net.b * up).array() - l.ground.z0;
+  const Eigen::Array<double, kDegree + 1, 1> room = (z - l.z_min).min(l.z_max - z);
+  return Judge(room.minCoeff(), std::min(room[0], room[kDegree]), net.error * up.lpNorm<1>());
 }
 
 /// The plan seen from the target: farther than `distance`, lower than tangent `elevation` where
