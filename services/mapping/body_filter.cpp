@@ -143,6 +143,16 @@ BodyFilter::Row BodyFilter::Model(int k, double age) {
   return row;
 }
 
+/// Of the outline's reach from p, wherever p is: after a while unseen neither place nor reaches are
+/// known in W, but their sums are as soon as they are seen again.
+double BodyFilter::ReachVariance(int k) const {
+  const auto& P = all_.P;
+  const Eigen::Matrix2d place =
+      P.topLeftCorner<2, 2>() + 1e-9 * Eigen::Matrix2d::Identity();  // known exactly at first
+  const Eigen::Vector2d with = P.block<2, 1>(0, 4 + k);
+  return P(4 + k, 4 + k) - with.dot(place.inverse() * with);
+}
+
 /// Ends that moved otherwise than the rest did, by a robust fit (Geman and McClure), tell of
 /// another outline, not of another motion: their reaches are doubted. Returns how many of those
 /// known before did move as the rest.
@@ -156,7 +166,7 @@ int BodyFilter::Reshape(const Reaches& seen, const std::array<double, kDirection
       if (!seen[i].edge) continue;
       const Eigen::Vector2d d = Direction(k);
       const double rest = (innovation[i] - d.dot(shift)) / kOutlier;
-      const double doubt = all_.P(4 + k, 4 + k) / (kOutlier * kOutlier);
+      const double doubt = ReachVariance(k) / (kOutlier * kOutlier);
       const double weight = 1.0 / (std::pow(1.0 + rest * rest, 2) * (1.0 + doubt));
       a += weight * d * d.transpose();
       b += weight * innovation[i] * d;
@@ -169,7 +179,7 @@ int BodyFilter::Reshape(const Reaches& seen, const std::array<double, kDirection
     if (!seen[i].edge) continue;
     const double rest = innovation[i] - Direction(k).dot(shift);
     if (std::abs(rest) <= kOutlier)
-      rigid += all_.P(4 + k, 4 + k) < kKnown * kKnown;
+      rigid += ReachVariance(k) < kKnown * kKnown;
     else
       for (auto& way : ways_) way.P(4 + k, 4 + k) += rest * rest;
   }
@@ -191,7 +201,7 @@ void BodyFilter::Uncover(const Reaches& seen, double unseen) {
     double beyond = reach.along - Model(k, reach.age).dot(all_.x);
     if (end.points >= kSure)
       beyond = std::min(beyond, std::max(0.0, end.place + kStretch - all_.x[4 + k]));
-    const bool known = all_.P(4 + k, 4 + k) < kKnown * kKnown;
+    const bool known = ReachVariance(k) < kKnown * kKnown;
     for (auto& way : ways_) {
       if (beyond <= 0.0 && known) {  // hidden, or never was: doubted first, then forgotten slowly
         way.P(4 + k, 4 + k) += kDoubt * kDoubt;

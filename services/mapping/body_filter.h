@@ -100,6 +100,7 @@ class BodyFilter {
   Hypothesis Changed(const Hypothesis& before, double from) const;
   double ChangeSince(double from) const;
   void Uncover(const Reaches& seen, double unseen);
+  double ReachVariance(int k) const;
   int Reshape(const Reaches& seen, const std::array<double, kDirections>& innovation);
 
   /// Where an end was last in view, m from p, and how sure that is: it grows while the end is seen.

@@ -130,6 +130,25 @@ TEST(MappingBody, WhatWasHiddenAndIsBackIsNoMotion) {
   }
 }
 
+/// Found again from another side its place is as uncertain as its reaches are; that its ends move
+/// together shows all the same.
+TEST(MappingBody, EndsFoundAgainMoveAsOneBody) {
+  BodyFilter body;
+  for (int i = 0; i < 30; ++i) {
+    Reaches seen = Box({0.08 * i, 0.0}, {0.3, 0.3});
+    for (int k = 0; k < kDirections; ++k)
+      seen[static_cast<size_t>(k)].edge = (i < 4 ? 1.0 : -1.0) * Direction(k).y() > 0.5;
+    if (i == 0) body = BodyFilter({0.0, 0.0}, seen, 2.5, kUnseen);
+    if (i == 0) continue;
+    body.Predict(kStep, {0.4, 0.2, 1.0});
+    if (i >= 4 && i < 14) continue;  // out of sight
+    const Sight sight = body.Correct(seen, kSigma, kUnseen);
+    if (i > 14) {
+      EXPECT_EQ(sight.rigid, sight.ends) << i;
+    }
+  }
+}
+
 TEST(MappingBody, AnEndThatJumpsIsAnotherOutline) {
   BodyFilter body({0.0, 0.0}, Box({0.0, 0.0}, {1.0, 0.5}), 2.5, kUnseen);
   for (int i = 1; i < 40; ++i) {
