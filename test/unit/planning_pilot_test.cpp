@@ -440,11 +440,11 @@ TEST(Pilot, TheForecastsUncertaintyAndBodyReachThePlan) {
     pillar.center = world::Trajectory::Constant({flight.t + 2.5, 4.0, 1.0}, flight.t, 1.0);
     flight.pilot.SetObstacles(flight.t, {pillar});
     Forecast forecast = Walking(flight.t);
-    forecast.target.coefficients << 2.5, 0.0, 0.85, -2.5, 0.0, 0.0;
+    forecast.target.coefficients << 2.5, 0.0, 0.5, -2.5, 0.0, 0.0;
     forecast.sigma = sigma;
     forecast.speed_sigma = 0.05;
     forecast.radius = 0.3;
-    forecast.height = 1.7;
+    forecast.height = 2.0;
     flight.pilot.SetForecast(forecast);
     const auto plan = flight.pilot.Update(flight.t, flight.Body());
     ASSERT_TRUE(plan);

@@ -317,6 +317,10 @@ TEST(Problem, NothingOfAnEarlierOneStays) {
     }
     c.safety_margin = i % 4 > 0 ? 0.2 : 0.1;  // the same with other margins
     c.sight_margin = i % 4 > 1 ? 0.2 : 0.1;
+    if (i % 4 == 3) {  // and from where nothing gives way
+      request.start.p.y() += 20.0;
+      request.target.coefficients(0, 1) += 20.0;
+    }
     used.reach = Box{Eigen::Array3d::Zero(), Eigen::Array3d::Zero()};
     used.skeletons = {{Vector3d::Zero()}};
     MakeProblem(c, request, request, nullptr, &used);

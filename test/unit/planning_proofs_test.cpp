@@ -47,6 +47,7 @@ TEST(Minkowski, ProofsAreTheSameFromMemory) {
       const Problem then = MakeProblem(c, later, nullptr);
       EXPECT_EQ(StaysOff(curve, then, sight_from, nullptr, &memory),
                 StaysOff(curve, then, sight_from));
+      EXPECT_EQ(StaysOff(curve, problem, sight_from, nullptr, &memory), off) << "as before";
       if (!proofs) continue;
       EXPECT_TRUE(std::equal(again->begin(), again->end(), proofs->begin(), proofs->end(), IsSame));
       ++proven;
