@@ -167,15 +167,15 @@ TEST(PerceptionAlike, ALongStopBehindAWallIsEndedByTheTargetAndNotByItsTwin) {
 }
 
 /// Half as large as the target, it looks like one twice as far away, which would drive. What drives
-/// and is as large is tracked from the same rails.
+/// and is as large, as LiDAR tells, is tracked from the same rails.
 TEST(PerceptionAlike, WhatIsSmallAndStandsDoesNotDriveAsTheDroneDoes) {
   World w;
   w.body = [](double t) { return Body{{0.0, 0.9 * t - 0.6, 1.0}}; };
   FlyOptions options;
   options.duration = 1.4;
-  options.lidar = false;
   w.target = [](double t) { return Vector3d(4.0, 0.5 * t, 0.6); };
   EXPECT_TRUE(Detected(Fly(w, {}, options).back()));
+  options.lidar = false;
   w.target = [](double) { return Vector3d(-8.0, 0.0, 0.55); };  // behind the drone
   w.things.push_back({Thing::Kind::kCylinder, {4.0, 0.0, 0.6}, {0.075, 0.075, 0.125}, kOrange});
   for (const auto& o : Fly(w, {}, options)) EXPECT_NE(o.estimate.state, TargetState::kTracking);

@@ -8,27 +8,24 @@ namespace chase::perception {
 
 namespace {
 
-constexpr double kMoved = 0.04, kMovedEdges = 5.0;  // m and sigmas that an edge may seem to move
-constexpr double kMovedUnclear = 0.06, kMovedUnclearEdges = 8.0;  // where something may hide it
-constexpr double kMovedAcross = 0.03, kMovedAcrossEdges = 4.0;    // where all of it is seen sharply
-constexpr double kMovedGate = 11.8;   // squared distance, 2 dof, that chance does not reach
-constexpr double kSlow = 0.1;         // m/s, what is slower stands, as far as errors go
-constexpr double kFast = 0.3;         // m/s that LiDAR points of two sweeps tell from standing,
-constexpr double kFastGate = 30.0;    // and its squared distance from it, 2 dof
-constexpr int kShownHits = 2;         // sightings before something may hide a side
-constexpr double kFastAge = 0.08;     // s since the last such points, at most
-constexpr double kKnownSigmas = 1.5;  // from which a way along the line of sight counts
+// Errors that stay alike from frame to frame (Schmidt 1966): of the drone's place, m, and of the
+// size of what LiDAR never hit, a share of the target's.
+constexpr double kPlace = 0.01, kOtherSize = 0.6;
+constexpr double kPlaces = 70.0;  // of its size in view, where a first prediction may lie
+constexpr double kSure = 0.9;     // probability with which it is taken to drive
+constexpr int kShownHits = 2;     // sightings before something may hide a side
 constexpr double kAstray = 0.1, kAstrayShare = 0.5;  // m and share of its way, off what is told
 constexpr double kAnew = 2.0;     // s that it stood, after which its way is counted anew
 constexpr double kBetter = 0.25;  // share of the first variance from which a start is taken anew
 
 }  // namespace
 
-void Candidate::Correct(const Sighting& sighting) {
+void Candidate::Correct(const Sighting& sighting, const Eigen::Vector3d& camera) {
   const bool was_partial = track.partial, was_part = part;
   track.Correct(sighting.fit);
   last = sighting;
-  sweeps += sighting.fit.n_points > 0;
+  p_WC = camera;
+  sweeps += sighting.SurelyHit();
   const Detection& d = sighting.detection;
   part = part && (d.part || d.AnyCut());
   const auto spread = [](const TargetGaussian& g) {
@@ -37,11 +34,13 @@ void Candidate::Correct(const Sighting& sighting) {
   // Before, what hid it, or what a small one seemed a piece of, may have seemed its edge.
   const bool out = was_partial && !track.partial && !SurelyDrives(kSureWay);
   const bool alone = was_part && !part && d.box.width < kSharpSigmas * d.silhouette.sigma_px;
-  const bool stands = !Drives() && track.t - known > kAnew;
-  if (!out && !alone && !stands && (Drives() || spread(track.state) > kBetter * spread(first)))
+  const bool stands = LogDrives() < 0.0;
+  if (!out && !alone && !(stands && track.t - known > kAnew) &&
+      (!stands || spread(track.state) > kBetter * spread(first)))
     return;
   first = track.state;
-  ranged = sighting.fit.n_points > 0;
+  p_WC_first = camera;
+  ranged = sighting.SurelyHit();
   known = track.t;
 }
 
@@ -51,12 +50,9 @@ Candidate NewCandidate(const Sighting& sighting, const View& view) {
   c.first = sighting.fit.posterior;
   c.since = c.known = view.t;
   c.last = sighting;
-  c.ranged = sighting.fit.n_points > 0;
-  const Eigen::Vector3d sight = c.track.state.position() - view.camera.p_WC;
-  c.range = sight.norm();
-  const double sigma_px = sighting.detection.silhouette.sigma_px;
-  c.edge = sigma_px * c.range / view.camera.rig.focal_px;
-  c.range_error = 2.0 * sigma_px * sight.head<2>() / sighting.detection.box.height;
+  c.ranged = sighting.SurelyHit();
+  c.p_WC = c.p_WC_first = view.camera.p_WC;
+  c.edge = sighting.detection.silhouette.sigma_px * c.Range() / view.camera.rig.focal_px;
   c.part = sighting.detection.part;
   c.sweeps = c.ranged;
   return c;
@@ -67,45 +63,46 @@ bool Candidate::HiddenIn(const Sighting& s) const {
          s.LeftOut() == 1;
 }
 
-bool Candidate::Fast() const {
-  if (track.t - track.ranged > kFastAge) return false;
-  const Eigen::Vector2d v = track.state.velocity().head<2>();
-  return v.norm() > kFast &&
-         v.dot(track.state.covariance.block<2, 2>(3, 3).ldlt().solve(v)) > kFastGate;
-}
-
 bool Candidate::Steady() const {
   const Eigen::Vector2d way = (track.state.position() - first.position()).head<2>();
   const Eigen::Vector2d told = (track.t - known) * track.state.velocity().head<2>();
   return (way - told).norm() < kAstray + kAstrayShare * way.norm();
 }
 
+bool Candidate::Told() const { return ranged && last.SurelyHit(); }
+
 bool Candidate::SurelyDrives(double way) const {
   Eigen::Vector2d d = (track.state.position() - first.position()).head<2>();
-  const Eigen::Vector2d n = range_error.normalized();
-  if (!ranged || last.fit.n_points == 0) d -= n.dot(d) * n;  // what shows of it may grow
+  const Eigen::Vector2d n = (track.state.position() - p_WC).head<2>().normalized();
+  if (!Told()) d -= n.dot(d) * n;  // what shows of it may grow
   return Drives() && Steady() && d.norm() > way;
 }
 
-bool Candidate::Drives() const {
-  // A side that was never seen, and is not now, does not seem to move it.
-  const bool clear = !last.detection.AnyCut() && (last.fit.whole || track.partial);
-  // Taken from its size, its range may be wrong, and so may be its speed; one sweep tells none.
-  const bool told = ranged && last.fit.n_points > 0 && track.t > known;
-  if (clear && told && Fast()) return true;
-  Eigen::Vector2d d = (track.state.position() - first.position()).head<2>();
+/// Its way, as far as it drives at all, has the variance of a new target's speed. If it stands,
+/// what errs alike in all frames makes it: edges, which tell its range where LiDAR does not, and
+/// another size, by which it stands nearer or farther than it seems and goes along with the camera.
+double Candidate::LogDrives() const {
+  const auto log_density = [](const Eigen::Vector2d& d, const Eigen::Matrix2d& P) {
+    return -0.5 * (d.dot(P.inverse() * d) + std::log(P.determinant()));
+  };
+  const Eigen::Vector2d way = (track.state.position() - first.position()).head<2>();
+  const Eigen::Vector2d sight = (track.state.position() - p_WC).head<2>();
+  const Eigen::Vector2d flown = (p_WC - p_WC_first).head<2>();
+  const Detection& d = last.detection;
+  const double share = 2.0 * d.silhouette.sigma_px / std::max(1.0, d.box.height);
+  const double size = sweeps > 0 || d.p_CT ? share : kOtherSize, speed = kNewSpeed * (track.t - known);
   Eigen::Matrix2d P =
       track.state.covariance.topLeftCorner<2, 2>() + first.covariance.topLeftCorner<2, 2>();
-  if (!ranged) P += range_error * range_error.transpose();  // edges err alike from frame to frame
-  if (d.dot(P.ldlt().solve(d)) < kMovedGate || d.norm() < kSlow * (track.t - known)) return false;
-  const Eigen::Vector2d n = range_error.normalized();
-  const double along = n.dot(d), sigma = std::sqrt(n.dot(P * n));
-  if (clear && last.detection.box.width > kSharpSigmas * last.detection.silhouette.sigma_px &&
-      (d - along * n).norm() > std::max(kMovedAcross, kMovedAcrossEdges * edge))
-    return true;
-  if (std::abs(along) < kKnownSigmas * sigma) d -= along * n;  // may be no way at all
-  return d.norm() > (ranged && clear ? std::max(kMoved, kMovedEdges * edge)
-                                     : std::max(kMovedUnclear, kMovedUnclearEdges * edge));
+  P.diagonal().array() += edge * edge + kPlace * kPlace;
+  if (!Told()) P += share * share * sight * sight.transpose();
+  return log_density(way, P + speed * speed * Eigen::Matrix2d::Identity()) -
+         log_density(way, P + size * size * flown * flown.transpose());
 }
+
+double Candidate::Probability() const {
+  return 1.0 / (1.0 + kPlaces * std::exp(-last.fit.log_odds) + std::exp(-LogDrives()));
+}
+
+bool Candidate::Drives() const { return Probability() > kSure; }
 
 }  // namespace chase::perception

@@ -16,24 +16,32 @@ struct Candidate {
   TargetGaussian first;  ///< as it was first known well
   double since = 0.0;    ///< when it was first seen, s
   Sighting last;         ///< the last one
-  double range = 0.0;    ///< from the camera when it was last seen, m
   double edge = 0.0;     ///< standard deviation of an edge of it at first, across, m
   bool ranged = false;   ///< `first` has its range from LiDAR points, not from the size alone
-  /// Along the line of sight, as far as both ends of its height may err alike; frame W, m.
-  Eigen::Vector2d range_error = Eigen::Vector2d::UnitX();
+  /// The camera at the time of `first` and when it was last seen, frame W, m.
+  Eigen::Vector3d p_WC_first = Eigen::Vector3d::Zero(), p_WC = Eigen::Vector3d::Zero();
 
   bool part = false;   ///< a piece of something larger, always so far: it must drive
   double known = 0.0;  ///< time of `first`, s
   int sweeps = 0;      ///< sightings with LiDAR points
 
-  /// Takes over a sighting at the track's time.
-  void Correct(const Sighting& sighting);
+  /// Takes over a sighting at the track's time by a camera at p_WC.
+  void Correct(const Sighting& sighting, const Eigen::Vector3d& camera);
+  /// From the camera when it was last seen, m.
+  double Range() const { return (track.state.position() - p_WC).norm(); }
 
+  /// True when LiDAR points tell the range at both ends of its way.
+  bool Told() const;
   /// True when something has come before a side of what was all in view, and LiDAR still tells
   /// where it is.
   bool HiddenIn(const Sighting& sighting) const;
 
-  /// True when it has surely moved from where it was first seen.
+  /// Logarithm of how much likelier its way is if it drives than if it stands.
+  double LogDrives() const;
+  /// That it is the target and drives, rather than something of another shape or its like that
+  /// stands.
+  double Probability() const;
+  /// True when it has surely moved from where it was first known.
   bool Drives() const;
   /// True when it has gone the way that its velocity tells, as a thing does and pieces of one do
   /// not.
@@ -41,8 +49,6 @@ struct Candidate {
   /// True when it has also gone this way [m], further than what is seen of a standing thing may
   /// seem to.
   bool SurelyDrives(double way) const;
-  /// True when its speed is no chance, with LiDAR points on it just now.
-  bool Fast() const;
 };
 
 /// Something seen for the first time.

@@ -75,7 +75,6 @@ class Perceiver {
   bool Ready(const Candidate& candidate, double t) const;
   bool PieceIsReady(const Candidate& candidate) const;
   bool StandsLongEnough(const Candidate& candidate, double t) const;
-  bool SizedBadly(const Candidate& candidate) const;
   bool InGate(const Sighting& s, double t) const;
   bool IsRatherDecoy(const Sighting& s, const View& view) const;
   void SwapIfTheOtherDrives(const Sighting& s, Decoy* other, double t);

@@ -82,20 +82,12 @@ bool Perceiver::Sure(const Sighting& s) const {
   return near || squared < kExpectedGate;
 }
 
-/// True when it is too small for its size to tell the range, and LiDAR never did. A standing thing
-/// of another size would then seem to drive as the drone does.
-bool Perceiver::SizedBadly(const Candidate& c) const {
-  const Detection& d = c.last.detection;
-  return !track_ && c.sweeps == 0 && !d.p_CT &&
-         d.box.width < kSharpSigmas * config_.fit.edge_sigma_px;
-}
-
 /// Of a piece of something larger, or what is hidden or cut off in part, once it has driven further
 /// than what shows of it may seem to, or has come out wholly and LiDAR tells that it drives.
 bool Perceiver::PieceIsReady(const Candidate& c) const {
   const bool hasty = !track_ && (c.last.detection.LeavesImage() || !c.last.SurelyHit());
   if (c.track.hits < (hasty ? kNewPieceHits : kPieceHits)) return false;
-  const bool came_out = !hasty && c.last.AllSeen() && c.sweeps >= kPieceSweeps && c.Fast();
+  const bool came_out = !hasty && c.last.AllSeen() && c.sweeps >= kPieceSweeps && c.Drives();
   return came_out || c.SurelyDrives(hasty ? kNewPieceWay : Candidate::kSureWay);
 }
 
@@ -105,8 +97,8 @@ bool Perceiver::StandsLongEnough(const Candidate& c, double t) const {
   const bool stood_here = track_ && last_v_.norm() < kStandingSpeed &&
                           (c.track.state.position() - last_p_).norm() < config_.state.decoy_radius;
   const bool may_stand = !c.last.detection.AnyCut() && (!track_ || t - track_->seen > kHiddenTime);
-  const double wait = config_.state.standing_after * std::max(1.0, std::pow(c.range / kFar, 2));
-  return stood_here || (may_stand && c.range < kStandingRange && t - c.since >= wait);
+  const double wait = config_.state.standing_after * std::max(1.0, std::pow(c.Range() / kFar, 2));
+  return stood_here || (may_stand && c.Range() < kStandingRange && t - c.since >= wait);
 }
 
 /// What drives is taken at once.
@@ -117,7 +109,7 @@ bool Perceiver::Ready(const Candidate& c, double t) const {
   const Detection& d = c.last.detection;
   const bool unclear = d.AnyCut() && !c.last.SurelyHit();
   const bool piece = c.part || c.track.partial || d.LeavesImage() || unclear;
-  if (!SizedBadly(c) && (piece ? PieceIsReady(c) : c.Drives())) return true;
+  if (piece ? PieceIsReady(c) : c.Drives()) return true;
   return !piece && !sighting_ && StandsLongEnough(c, t);
 }
 

@@ -26,8 +26,7 @@ void Perceiver::FollowCandidates(View* view) {
       ++c.track.misses;
       continue;
     }
-    c.Correct(*again);
-    c.range = (c.track.state.position() - view->camera.p_WC).norm();
+    c.Correct(*again, view->camera.p_WC);
   }
   DropMissed();
 }
