@@ -125,8 +125,7 @@ target_t ToMessage(const TargetEstimate& target, int64_t utime) {
   std::copy(box, box + 4, m.box_px);
   m.score = target.score;
   m.n_points = target.n_points;
-  const bool there = m.state == target_t::TRACKING || m.state == target_t::OCCLUDED;
-  m.existence = there ? std::exp(-target.unseen / kHiddenTime) : 0.0;
+  m.existence = target.Existence();
   m.reason = Reason(target);
   return m;
 }

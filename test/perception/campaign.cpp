@@ -35,6 +35,16 @@ void Print(const std::string& name, const Score& s) {
   std::fflush(stdout);
 }
 
+/// Reliability of the published existence: of the frames in each tenth, what was said and what was.
+void PrintReliability(const Score& s) {
+  fmt::print(
+      "existence: frames, mean said, share within 0.5 m; expected calibration error {:.4f}\n",
+      s.calibration_error());
+  for (const auto& b : s.reliability())
+    if (b.frames > 0.0)
+      fmt::print("{:11.0f} {:6.3f} {:6.3f}\n", b.frames, b.expected / b.frames, b.there / b.frames);
+}
+
 void Trace(const std::string& file, const std::vector<Outcome>& flight) {
   std::ofstream out(file);
   out << "t,visible,range,state,error,nees,box,score,points,ex,ey,ez,sx,sy,sz,x,y,z,note\n";
@@ -80,6 +90,7 @@ void Run(const Arguments& a) {
       Print(fmt::format("{}-{}", name, seed), one);
     }
     Print(name, all);
+    PrintReliability(all);
   }
 }
 

@@ -37,6 +37,11 @@ double Nees(const Outcome& o) {
 
 void Score::AddFrame(const Outcome& o) {
   ms_.push_back(o.milliseconds);
+  const double existence = o.estimate.Existence();
+  Bin& bin = reliability_[std::min<size_t>(9, static_cast<size_t>(10.0 * existence))];
+  bin.frames += 1.0;
+  bin.expected += existence;
+  bin.there += Error(o) < kWrong;
   lost_ += o.estimate.state == TargetState::kLost;
   if (o.t > kSettle && o.visible_share >= kHalf && o.range >= 2.0 && o.range <= 8.0) {
     ++visible_;
@@ -99,6 +104,11 @@ double Score::nees() const { return Share(nees_, static_cast<double>(errors_.siz
 double Score::coverage() const { return Share(inside_, static_cast<double>(errors_.size())); }
 double Score::hidden_nees() const { return Share(hidden_nees_, hidden_); }
 double Score::hidden_coverage() const { return Share(hidden_inside_, hidden_); }
+double Score::calibration_error() const {
+  double sum = 0.0;
+  for (const Bin& b : reliability_) sum += std::abs(b.expected - b.there);
+  return Share(sum, frames());
+}
 double Score::ms_p50() const { return Quantile(ms_, 0.5); }
 double Score::ms_p99() const { return Quantile(ms_, 0.99); }
 double Score::said_max() const { return Quantile(said_, 1.0); }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <vector>
 
 #include "stage.h"
@@ -21,6 +22,12 @@ class Score {
   double ms_p50() const, ms_p99() const;
   double said_max() const, found_max() const;  ///< s, after full occlusions
   double said_quantile(double share) const, found_quantile(double share) const;
+  /// Frames by the published existence, in tenths.
+  struct Bin {
+    double frames = 0.0, expected = 0.0, there = 0.0;
+  };
+  const std::array<Bin, 10>& reliability() const { return reliability_; }
+  double calibration_error() const;  ///< expected, of the existence
   int occlusions() const { return static_cast<int>(said_.size()); }
   int returns() const { return static_cast<int>(found_.size()); }
   int wrong_after() const { return wrong_after_; }  ///< returns that took another thing
@@ -35,6 +42,7 @@ class Score {
       hidden_inside_ = 0;
   int wrong_after_ = 0, lost_ = 0;
   double nees_ = 0.0, hidden_nees_ = 0.0;
+  std::array<Bin, 10> reliability_;
   std::vector<double> errors_, ms_, said_, found_;
 };
 

@@ -1,8 +1,12 @@
 // When something that may be the target has surely driven.
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <random>
+
 #include "services/perception/belief/candidate.h"
 #include "services/perception/belief/decoys.h"
+#include "services/perception/belief/perceiver.h"
 
 namespace chase::perception {
 namespace {
@@ -12,16 +16,16 @@ using Eigen::Vector3d;
 /// Seen from the origin and surely of the target's shape, 0.3 s after it was first known.
 Candidate CandidateAt(const Vector3d& first, const Vector3d& now, double sigma) {
   Candidate c;
-  c.first.mean << first, Vector3d::Zero();
-  c.first.covariance = sigma * sigma * Matrix6d::Identity();
-  c.track.state = c.first;
-  c.track.state.mean.head<3>() = now;
-  c.track.t = 0.3;
+  c.track.state.mean << first, Vector3d::Zero();
+  c.track.state.covariance = sigma * sigma * Matrix6d::Identity();
   c.edge = 0.5 * first.norm() / 220.0;
   c.last.fit.log_odds = 20.0;
   c.last.detection.silhouette.sigma_px = 0.5;
   c.last.detection.box.height = 0.5 * 220.0 / first.norm();
   c.last.detection.box.width = 0.6 * c.last.detection.box.height;
+  c.first = c.Now();
+  c.track.state.mean.head<3>() = now;
+  c.track.t = 0.3;
   return c;
 }
 
@@ -46,7 +50,7 @@ TEST(PerceptionCandidate, WhatOnlyTheSizeTellsOfItsRangeIsNoWay) {
   const Vector3d p(20.0, 0.0, 0.55);  // six pixels high: one pixel is three metres of range
   Candidate c = CandidateAt(p, p + Vector3d(-4.0, 0.0, 0.0), 0.03);
   EXPECT_FALSE(c.Drives());
-  c.ranged = true;
+  c.first.ranged = true;
   c.last.fit.n_points = 12;
   EXPECT_TRUE(c.Drives()) << "LiDAR tells both ends";
   c.last.fit.n_points = 4;
@@ -102,7 +106,7 @@ TEST(PerceptionCandidate, WhatComesOutFromBehindSomethingMustDriveFromThere) {
   c.Correct(s, Vector3d::Zero());
   EXPECT_FALSE(c.track.partial);
   EXPECT_FALSE(c.Drives()) << "the edge of what hid it may have gone, not the thing";
-  EXPECT_LT((c.first.position() - q).norm(), 1e-9);
+  EXPECT_LT((c.first.state.position() - q).norm(), 1e-9);
 }
 
 TEST(PerceptionCandidate, ADriftOfSecondsIsNoWay) {
@@ -144,7 +148,7 @@ TEST(PerceptionCandidate, HowLongItStoodBeforeDoesNotCount) {
 
 TEST(PerceptionCandidate, IsFollowedWhereASideIsHiddenAndLidarTellsWhereItIs) {
   Candidate c = CandidateAt({3.0, 0.0, 0.55}, {3.0, 0.0, 0.55}, 0.01);
-  c.ranged = true;
+  c.first.ranged = true;
   c.track.hits = 2;
   Sighting hidden;
   hidden.fit.n_points = 20;
@@ -184,6 +188,20 @@ TEST(PerceptionCandidate, CountsSightingsThatLidarSurelyHit) {
   }
   EXPECT_EQ(c.sweeps, 2);
   EXPECT_DOUBLE_EQ(c.track.ranged, c.track.t);
+}
+
+TEST(PerceptionEstimate, ExistsWhereItIsSaidToBeAsFarAsItsCovarianceTells) {
+  TargetEstimate e;
+  EXPECT_LT((e.covariance *= 1e4, e.Existence()), 1e-4) << "nothing is known";
+  std::mt19937 random(7);
+  std::normal_distribution<double> normal;
+  for (const double sigma : {0.05, 0.3, 0.5, 1.0}) {
+    e.covariance = Eigen::Vector3d(sigma, 1.3 * sigma, 0.1).cwiseAbs2().asDiagonal();
+    int within = 0;
+    for (int i = 0; i < 20000; ++i)
+      within += std::hypot(sigma * normal(random), 1.3 * sigma * normal(random)) < 0.5;
+    EXPECT_NEAR(e.Existence(), within / 20000.0, 0.02) << sigma;
+  }
 }
 
 TEST(PerceptionDecoys, TwoThatStandCloseTogetherAreNotOneThatDrives) {

@@ -12,13 +12,19 @@ namespace {
 // size of what LiDAR never hit, a share of the target's.
 constexpr double kPlace = 0.01, kOtherSize = 0.6;
 constexpr double kPlaces = 70.0;  // of its size in view, where a first prediction may lie
-constexpr double kSure = 0.9;     // probability with which it is taken to drive
+constexpr double kSure = 0.95;    // probability with which it is taken to drive
 constexpr int kShownHits = 2;     // sightings before something may hide a side
 constexpr double kAstray = 0.1, kAstrayShare = 0.5;  // m and share of its way, off what is told
 constexpr double kAnew = 2.0;     // s that it stood, after which its way is counted anew
 constexpr double kBetter = 0.25;  // share of the first variance from which a start is taken anew
 
 }  // namespace
+
+Placed Candidate::Now() const {
+  const Detection& d = last.detection;
+  const double share = 2.0 * d.silhouette.sigma_px / std::max(1.0, d.box.height);
+  return {track.t, track.state, p_WC, last.SurelyHit(), share};
+}
 
 void Candidate::Correct(const Sighting& sighting, const Eigen::Vector3d& camera) {
   const bool was_partial = track.partial, was_part = part;
@@ -34,47 +40,38 @@ void Candidate::Correct(const Sighting& sighting, const Eigen::Vector3d& camera)
   // Before, what hid it, or what a small one seemed a piece of, may have seemed its edge.
   const bool out = was_partial && !track.partial && !SurelyDrives(kSureWay);
   const bool alone = was_part && !part && d.box.width < kSharpSigmas * d.silhouette.sigma_px;
-  const bool stands = LogDrives() < 0.0;
-  if (!out && !alone && !(stands && track.t - known > kAnew) &&
-      (!stands || spread(track.state) > kBetter * spread(first)))
-    return;
-  first = track.state;
-  p_WC_first = camera;
-  ranged = sighting.SurelyHit();
-  known = track.t;
+  const bool better =
+      track.t - first.t > kAnew || spread(track.state) <= kBetter * spread(first.state);
+  if (out || alone || (better && LogDrives() < 0.0)) first = Now();
 }
 
 Candidate NewCandidate(const Sighting& sighting, const View& view) {
   Candidate c;
   c.track = StartTrack(sighting.fit, view.t);
-  c.first = sighting.fit.posterior;
-  c.since = c.known = view.t;
+  c.since = view.t;
   c.last = sighting;
-  c.ranged = sighting.SurelyHit();
-  c.p_WC = c.p_WC_first = view.camera.p_WC;
+  c.p_WC = view.camera.p_WC;
+  c.first = c.Now();
   c.edge = sighting.detection.silhouette.sigma_px * c.Range() / view.camera.rig.focal_px;
   c.part = sighting.detection.part;
-  c.sweeps = c.ranged;
+  c.sweeps = sighting.SurelyHit();
   return c;
 }
 
 bool Candidate::HiddenIn(const Sighting& s) const {
-  return ranged && !part && track.hits >= kShownHits && s.SurelyHit() && !s.detection.AnyCut() &&
-         s.LeftOut() == 1;
+  return first.ranged && !part && track.hits >= kShownHits && s.SurelyHit() &&
+         !s.detection.AnyCut() && s.LeftOut() == 1;
 }
 
 bool Candidate::Steady() const {
-  const Eigen::Vector2d way = (track.state.position() - first.position()).head<2>();
-  const Eigen::Vector2d told = (track.t - known) * track.state.velocity().head<2>();
-  return (way - told).norm() < kAstray + kAstrayShare * way.norm();
+  const Eigen::Vector2d told = (track.t - first.t) * track.state.velocity().head<2>();
+  return (Way() - told).norm() < kAstray + kAstrayShare * Way().norm();
 }
 
-bool Candidate::Told() const { return ranged && last.SurelyHit(); }
-
 bool Candidate::SurelyDrives(double way) const {
-  Eigen::Vector2d d = (track.state.position() - first.position()).head<2>();
+  Eigen::Vector2d d = Way();
   const Eigen::Vector2d n = (track.state.position() - p_WC).head<2>().normalized();
-  if (!Told()) d -= n.dot(d) * n;  // what shows of it may grow
+  if (!first.ranged || !last.SurelyHit()) d -= n.dot(d) * n;  // what shows of it may grow
   return Drives() && Steady() && d.norm() > way;
 }
 
@@ -85,18 +82,18 @@ double Candidate::LogDrives() const {
   const auto log_density = [](const Eigen::Vector2d& d, const Eigen::Matrix2d& P) {
     return -0.5 * (d.dot(P.inverse() * d) + std::log(P.determinant()));
   };
-  const Eigen::Vector2d way = (track.state.position() - first.position()).head<2>();
-  const Eigen::Vector2d sight = (track.state.position() - p_WC).head<2>();
-  const Eigen::Vector2d flown = (p_WC - p_WC_first).head<2>();
-  const Detection& d = last.detection;
-  const double share = 2.0 * d.silhouette.sigma_px / std::max(1.0, d.box.height);
-  const double size = sweeps > 0 || d.p_CT ? share : kOtherSize, speed = kNewSpeed * (track.t - known);
-  Eigen::Matrix2d P =
-      track.state.covariance.topLeftCorner<2, 2>() + first.covariance.topLeftCorner<2, 2>();
-  P.diagonal().array() += edge * edge + kPlace * kPlace;
-  if (!Told()) P += share * share * sight * sight.transpose();
-  return log_density(way, P + speed * speed * Eigen::Matrix2d::Identity()) -
-         log_density(way, P + size * size * flown * flown.transpose());
+  const Placed now = Now();
+  const bool sized = sweeps > 0 || last.detection.p_CT;
+  const Eigen::Vector2d flown = (now.p_WC - first.p_WC).head<2>();
+  const double size = sized ? now.edge_share : kOtherSize, speed = kNewSpeed * (now.t - first.t);
+  Eigen::Matrix2d P = (edge * edge + kPlace * kPlace) * Eigen::Matrix2d::Identity();
+  for (const Placed& end : {first, now}) {
+    const double share = end.ranged ? 0.0 : end.edge_share;
+    const Eigen::Vector2d off = share * (end.state.position() - end.p_WC).head<2>();
+    P += end.state.covariance.topLeftCorner<2, 2>() + off * off.transpose();
+  }
+  return log_density(Way(), P + speed * speed * Eigen::Matrix2d::Identity()) -
+         log_density(Way(), P + size * size * flown * flown.transpose());
 }
 
 double Candidate::Probability() const {

@@ -7,31 +7,40 @@ namespace chase::perception {
 /// Sigmas of an edge from which a width tells a range, and a place across is known.
 inline constexpr double kSharpSigmas = 24.0;
 
+/// How something was known at one time.
+struct Placed {
+  double t = 0.0;  ///< s
+  TargetGaussian state;
+  Eigen::Vector3d p_WC = Eigen::Vector3d::Zero();  ///< the camera, frame W, m
+  bool ranged = false;      ///< LiDAR points tell its range, not the size alone
+  double edge_share = 0.0;  ///< of its range or size that its edges may err by
+};
+
 /// Something that may be the target, followed until it is known whether it drives or stands.
 struct Candidate {
   static constexpr double kSureWay = 0.15;  ///< m, further than what shows of it may seem to go
   static constexpr int kConfirmFrames = 2;  ///< that must agree before it is believed
 
   TargetTrack track;
-  TargetGaussian first;  ///< as it was first known well
-  double since = 0.0;    ///< when it was first seen, s
-  Sighting last;         ///< the last one
-  double edge = 0.0;     ///< standard deviation of an edge of it at first, across, m
-  bool ranged = false;   ///< `first` has its range from LiDAR points, not from the size alone
-  /// The camera at the time of `first` and when it was last seen, frame W, m.
-  Eigen::Vector3d p_WC_first = Eigen::Vector3d::Zero(), p_WC = Eigen::Vector3d::Zero();
+  Placed first;        ///< as it was first known well
+  double since = 0.0;  ///< when it was first seen, s
+  Sighting last;       ///< the last one
+  double edge = 0.0;   ///< standard deviation of an edge of it at first, across, m
+  Eigen::Vector3d p_WC = Eigen::Vector3d::Zero();  ///< the camera then, frame W, m
 
-  bool part = false;   ///< a piece of something larger, always so far: it must drive
-  double known = 0.0;  ///< time of `first`, s
-  int sweeps = 0;      ///< sightings with LiDAR points
+  bool part = false;  ///< a piece of something larger, always so far: it must drive
+  int sweeps = 0;     ///< sightings that LiDAR surely hit
 
   /// Takes over a sighting at the track's time by a camera at p_WC.
   void Correct(const Sighting& sighting, const Eigen::Vector3d& camera);
   /// From the camera when it was last seen, m.
   double Range() const { return (track.state.position() - p_WC).norm(); }
 
-  /// True when LiDAR points tell the range at both ends of its way.
-  bool Told() const;
+  Placed Now() const;
+  /// From where it was first known, m.
+  Eigen::Vector2d Way() const {
+    return (track.state.position() - first.state.position()).head<2>();
+  }
   /// True when something has come before a side of what was all in view, and LiDAR still tells
   /// where it is.
   bool HiddenIn(const Sighting& sighting) const;

@@ -13,10 +13,17 @@ constexpr double kUnknownVariance = 1e4;  // m^2, while nothing is known
 constexpr double kGap = 0.25;             // s between frames in which a target may do anything
 constexpr int kSureHits = 5;              // corrections after which the track is trusted
 constexpr double kDrivenSigma = 0.1;      // m, how well that must be known
+constexpr double kThere = 0.5;            // m, within which a target is where it is said to be
 constexpr double kStood = 0.2;            // m, within which a target stands
 constexpr double kStoodFor = 0.6;         // s, likewise
 
 }  // namespace
+
+/// As of a circle in the plan view, with the ellipse's area.
+double TargetEstimate::Existence() const {
+  const double variance = std::sqrt(covariance.topLeftCorner<2, 2>().determinant());
+  return 1.0 - std::exp(-0.5 * kThere * kThere / variance);
+}
 
 Perceiver::Perceiver(const PerceptionConfig& config)
     : config_(config), finder_(config), decoys_(config.state) {}

@@ -37,6 +37,9 @@ struct TargetEstimate {
   double unseen = 0.0;                                                ///< since it was seen last, s
   std::string note;      ///< what was missing; else empty
   Refused refused = {};  ///< detections of this frame that no track was started from
+
+  /// Probability that the target stands within half a metre of p_WT, as the covariance tells.
+  double Existence() const;
 };
 
 /// Finds the target, follows it and says how sure it is. Feed it poses and sweeps as they come and
