@@ -19,7 +19,7 @@ Candidate CandidateAt(const Vector3d& first, const Vector3d& now, double sigma) 
   c.track.state.mean << first, Vector3d::Zero();
   c.track.state.covariance = sigma * sigma * Matrix6d::Identity();
   c.edge = 0.5 * first.norm() / 220.0;
-  c.last.fit.log_odds = 20.0;
+  c.odds = c.last.fit.log_odds = 20.0;
   c.last.detection.silhouette.sigma_px = 0.5;
   c.last.detection.box.height = 0.5 * 220.0 / first.norm();
   c.last.detection.box.width = 0.6 * c.last.detection.box.height;
@@ -44,13 +44,16 @@ TEST(PerceptionCandidate, WhatIsOfAnotherShapeIsNotTakenHoweverFarItGoes) {
   EXPECT_TRUE(c.Drives());
   c.last.fit.log_odds = 4.0;
   EXPECT_FALSE(c.Drives());
+  c.last.fit.log_odds = 20.0;
+  c.odds = 6.0;
+  EXPECT_FALSE(c.Drives()) << "one good sighting among bad ones";
 }
 
 TEST(PerceptionCandidate, WhatOnlyTheSizeTellsOfItsRangeIsNoWay) {
   const Vector3d p(20.0, 0.0, 0.55);  // six pixels high: one pixel is three metres of range
   Candidate c = CandidateAt(p, p + Vector3d(-4.0, 0.0, 0.0), 0.03);
   EXPECT_FALSE(c.Drives());
-  c.first.ranged = true;
+  c.first.covariance = 1e-3 * Eigen::Matrix3d::Identity();
   c.last.fit.n_points = 12;
   EXPECT_TRUE(c.Drives()) << "LiDAR tells both ends";
   c.last.fit.n_points = 4;
@@ -106,12 +109,12 @@ TEST(PerceptionCandidate, WhatComesOutFromBehindSomethingMustDriveFromThere) {
   c.Correct(s, Vector3d::Zero());
   EXPECT_FALSE(c.track.partial);
   EXPECT_FALSE(c.Drives()) << "the edge of what hid it may have gone, not the thing";
-  EXPECT_LT((c.first.state.position() - q).norm(), 1e-9);
+  EXPECT_LT((c.first.p_WT - q).norm(), 1e-9);
 }
 
 TEST(PerceptionCandidate, ADriftOfSecondsIsNoWay) {
   const Vector3d p(3.0, 0.0, 0.55);
-  Candidate c = CandidateAt(p, p + Vector3d(0.0, 0.085, 0.0), 0.01);
+  Candidate c = CandidateAt(p, p + Vector3d(0.0, 0.075, 0.0), 0.01);
   c.track.t = 0.5;
   EXPECT_TRUE(c.Drives());
   c.track.t = 3.0;
@@ -177,7 +180,7 @@ TEST(PerceptionCandidate, PointsOfTheFirstSightingRangeItsTrack) {
   EXPECT_EQ(NewCandidate(s, view).track.ranged, 2.5);
 }
 
-TEST(PerceptionCandidate, CountsSightingsThatLidarSurelyHit) {
+TEST(PerceptionCandidate, CountsSightingsOfAllOfItThatLidarSurelyHit) {
   Candidate c = CandidateAt({3.0, 0.0, 0.55}, {3.0, 0.0, 0.55}, 0.01);
   Sighting s = c.last;
   s.fit.posterior = c.track.state;
@@ -188,6 +191,9 @@ TEST(PerceptionCandidate, CountsSightingsThatLidarSurelyHit) {
   }
   EXPECT_EQ(c.sweeps, 2);
   EXPECT_DOUBLE_EQ(c.track.ranged, c.track.t);
+  s.fit.whole = false;
+  c.Correct(s, Vector3d::Zero());
+  EXPECT_EQ(c.sweeps, 2) << "half of it tells no size";
 }
 
 TEST(PerceptionEstimate, ExistsWhereItIsSaidToBeAsFarAsItsCovarianceTells) {

@@ -145,13 +145,15 @@ TEST(PerceptionAcquire, HalfOfATargetIsPlacedByItsHeightUnlessPointsTellAnotherR
 TEST(PerceptionCandidate, WithoutPointsAWayAlongTheLineOfSightIsNotSure) {
   const auto gone = [](const Vector3d& way) {
     Candidate c;
-    c.first.mean << kTarget, Vector3d::Zero();
-    c.first.covariance = 1e-4 * Matrix6d::Identity();
-    c.track.state = c.first;
+    c.track.state.mean << kTarget, Vector3d::Zero();
+    c.track.state.covariance = 1e-4 * Matrix6d::Identity();
+    c.odds = c.last.fit.log_odds = 20.0;
+    c.last.detection.silhouette.sigma_px = 0.5;
+    c.last.detection.box.height = 40.0;
+    c.first = c.Now();
     c.track.state.mean << kTarget + way, way;
     c.track.t = 1.0;
     c.edge = 0.5 * 3.0 / 220.0;
-    c.range_error = {0.05, 0.0};
     return c;
   };
   Candidate along = gone({0.4, 0.0, 0.0}), across = gone({0.0, 0.4, 0.0});
@@ -159,7 +161,7 @@ TEST(PerceptionCandidate, WithoutPointsAWayAlongTheLineOfSightIsNotSure) {
   EXPECT_FALSE(along.SurelyDrives(0.15));
   EXPECT_TRUE(across.SurelyDrives(0.15));
   EXPECT_FALSE(across.SurelyDrives(0.5));
-  along.ranged = true;
+  along.first.ranged = true;
   EXPECT_FALSE(along.SurelyDrives(0.15)) << "points of the first time alone";
   along.last.fit.n_points = 20;
   EXPECT_TRUE(along.SurelyDrives(0.15));

@@ -9,11 +9,12 @@ namespace chase::perception {
 namespace {
 
 // Errors that stay alike from frame to frame (Schmidt 1966): of the drone's place, m, and of the
-// size of what LiDAR never hit, a share of the target's.
-constexpr double kPlace = 0.01, kOtherSize = 0.6;
-constexpr double kPlaces = 70.0;  // of its size in view, where a first prediction may lie
-constexpr double kSure = 0.95;    // probability with which it is taken to drive
-constexpr int kShownHits = 2;     // sightings before something may hide a side
+// size of what LiDAR never hit wholly, a share of the target's.
+constexpr double kPlace = 0.005, kOtherSize = 0.6;
+constexpr double kSizeEdges = 2.0;  // deviations of an edge that a size may err by unnoticed
+constexpr double kPlaces = 70.0;    // of its size in view, where a first prediction may lie
+constexpr double kSure = 0.98;      // probability with which it is taken to drive
+constexpr int kShownHits = 2;       // sightings before something may hide a side
 constexpr double kAstray = 0.1, kAstrayShare = 0.5;  // m and share of its way, off what is told
 constexpr double kAnew = 2.0;     // s that it stood, after which its way is counted anew
 constexpr double kBetter = 0.25;  // share of the first variance from which a start is taken anew
@@ -21,9 +22,14 @@ constexpr double kBetter = 0.25;  // share of the first variance from which a st
 }  // namespace
 
 Placed Candidate::Now() const {
+  Placed now{track.t, p_WC, track.state.position(), track.state.covariance.topLeftCorner<3, 3>()};
+  now.ranged = last.SurelyHit();
   const Detection& d = last.detection;
-  const double share = 2.0 * d.silhouette.sigma_px / std::max(1.0, d.box.height);
-  return {track.t, track.state, p_WC, last.SurelyHit(), share};
+  now.edge_share = d.silhouette.sigma_px / std::max(1.0, d.box.height);
+  if (now.ranged) return now;
+  const Eigen::Vector3d off = std::sqrt(2.0 / kEdgeWeight) * now.edge_share * (now.p_WT - p_WC);
+  now.covariance += off * off.transpose();
+  return now;
 }
 
 void Candidate::Correct(const Sighting& sighting, const Eigen::Vector3d& camera) {
@@ -31,17 +37,15 @@ void Candidate::Correct(const Sighting& sighting, const Eigen::Vector3d& camera)
   track.Correct(sighting.fit);
   last = sighting;
   p_WC = camera;
-  sweeps += sighting.SurelyHit();
   const Detection& d = sighting.detection;
+  sweeps += sighting.SurelyHit() && sighting.fit.whole && !d.AnyCut();
+  odds += (sighting.fit.log_odds - odds) / std::max(1, track.hits - 1);
   part = part && (d.part || d.AnyCut());
-  const auto spread = [](const TargetGaussian& g) {
-    return g.covariance.topLeftCorner<2, 2>().trace();
-  };
+  const auto spread = [](const Placed& at) { return at.covariance.topLeftCorner<2, 2>().trace(); };
   // Before, what hid it, or what a small one seemed a piece of, may have seemed its edge.
   const bool out = was_partial && !track.partial && !SurelyDrives(kSureWay);
   const bool alone = was_part && !part && d.box.width < kSharpSigmas * d.silhouette.sigma_px;
-  const bool better =
-      track.t - first.t > kAnew || spread(track.state) <= kBetter * spread(first.state);
+  const bool better = track.t - first.t > kAnew || spread(Now()) < kBetter * spread(first);
   if (out || alone || (better && LogDrives() < 0.0)) first = Now();
 }
 
@@ -52,9 +56,10 @@ Candidate NewCandidate(const Sighting& sighting, const View& view) {
   c.last = sighting;
   c.p_WC = view.camera.p_WC;
   c.first = c.Now();
-  c.edge = sighting.detection.silhouette.sigma_px * c.Range() / view.camera.rig.focal_px;
+  c.edge = sighting.detection.silhouette.sigma_px / std::sqrt(kEdgeWeight) * c.Range() /
+           view.camera.rig.focal_px;
   c.part = sighting.detection.part;
-  c.sweeps = sighting.SurelyHit();
+  c.sweeps = sighting.Clear();
   return c;
 }
 
@@ -85,19 +90,17 @@ double Candidate::LogDrives() const {
   const Placed now = Now();
   const bool sized = sweeps > 0 || last.detection.p_CT;
   const Eigen::Vector2d flown = (now.p_WC - first.p_WC).head<2>();
-  const double size = sized ? now.edge_share : kOtherSize, speed = kNewSpeed * (now.t - first.t);
-  Eigen::Matrix2d P = (edge * edge + kPlace * kPlace) * Eigen::Matrix2d::Identity();
-  for (const Placed& end : {first, now}) {
-    const double share = end.ranged ? 0.0 : end.edge_share;
-    const Eigen::Vector2d off = share * (end.state.position() - end.p_WC).head<2>();
-    P += end.state.covariance.topLeftCorner<2, 2>() + off * off.transpose();
-  }
+  const double size = sized ? kSizeEdges * now.edge_share : kOtherSize,
+               speed = kNewSpeed * (now.t - first.t);
+  Eigen::Matrix2d P = (first.covariance + now.covariance).topLeftCorner<2, 2>();
+  P.diagonal().array() += edge * edge + kPlace * kPlace;
   return log_density(Way(), P + speed * speed * Eigen::Matrix2d::Identity()) -
          log_density(Way(), P + size * size * flown * flown.transpose());
 }
 
 double Candidate::Probability() const {
-  return 1.0 / (1.0 + kPlaces * std::exp(-last.fit.log_odds) + std::exp(-LogDrives()));
+  return 1.0 /
+         (1.0 + kPlaces * std::exp(-std::min(odds, last.fit.log_odds)) + std::exp(-LogDrives()));
 }
 
 bool Candidate::Drives() const { return Probability() > kSure; }

@@ -7,13 +7,14 @@ namespace chase::perception {
 /// Sigmas of an edge from which a width tells a range, and a place across is known.
 inline constexpr double kSharpSigmas = 24.0;
 
-/// How something was known at one time.
+/// Where something was known to be at one time; frame W.
 struct Placed {
-  double t = 0.0;  ///< s
-  TargetGaussian state;
-  Eigen::Vector3d p_WC = Eigen::Vector3d::Zero();  ///< the camera, frame W, m
+  double t = 0.0;                                        ///< s
+  Eigen::Vector3d p_WC = Eigen::Vector3d::Zero();        ///< the camera, m
+  Eigen::Vector3d p_WT = Eigen::Vector3d::Zero();        ///< m
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< with what all edges err by alike, m^2
   bool ranged = false;      ///< LiDAR points tell its range, not the size alone
-  double edge_share = 0.0;  ///< of its range or size that its edges may err by
+  double edge_share = 0.0;  ///< standard deviation of an edge, share of its height
 };
 
 /// Something that may be the target, followed until it is known whether it drives or stands.
@@ -29,7 +30,9 @@ struct Candidate {
   Eigen::Vector3d p_WC = Eigen::Vector3d::Zero();  ///< the camera then, frame W, m
 
   bool part = false;  ///< a piece of something larger, always so far: it must drive
-  int sweeps = 0;     ///< sightings that LiDAR surely hit
+  int sweeps = 0;     ///< sightings of all of it that LiDAR surely hit
+  double odds =
+      0.0;  ///< mean of its sightings' log odds, but for the first, which it was placed on
 
   /// Takes over a sighting at the track's time by a camera at p_WC.
   void Correct(const Sighting& sighting, const Eigen::Vector3d& camera);
@@ -38,9 +41,7 @@ struct Candidate {
 
   Placed Now() const;
   /// From where it was first known, m.
-  Eigen::Vector2d Way() const {
-    return (track.state.position() - first.state.position()).head<2>();
-  }
+  Eigen::Vector2d Way() const { return (track.state.position() - first.p_WT).head<2>(); }
   /// True when something has come before a side of what was all in view, and LiDAR still tells
   /// where it is.
   bool HiddenIn(const Sighting& sighting) const;
