@@ -198,6 +198,7 @@ TEST(PerceptionCandidate, CountsSightingsOfAllOfItThatLidarSurelyHit) {
 
 TEST(PerceptionEstimate, ExistsWhereItIsSaidToBeAsFarAsItsCovarianceTells) {
   TargetEstimate e;
+  e.state = TargetState::kOccluded;
   EXPECT_LT((e.covariance *= 1e4, e.Existence()), 1e-4) << "nothing is known";
   std::mt19937 random(7);
   std::normal_distribution<double> normal;

@@ -167,9 +167,11 @@ TEST(PerceptionMessages, ATargetNotSeenExistsTheLessTheLongerAndSaysWhy) {
   for (const TargetState state :
        {TargetState::kTracking, TargetState::kOccluded, TargetState::kOccluded}) {
     target.state = state;
+    target.covariance.setIdentity();
+    target.covariance *= std::pow(0.05 + 0.3 * target.unseen, 2);
     const target_t m = ToMessage(target, 0);
     EXPECT_EQ(m.reason.empty(), state == TargetState::kTracking);
-    EXPECT_TRUE(target.unseen == 0.0 ? m.existence == 1.0 : m.existence < before);
+    EXPECT_TRUE(target.unseen == 0.0 ? m.existence > 0.999 : m.existence < before);
     EXPECT_GT(m.existence, 0.0);
     before = m.existence;
     target.unseen += 1.0;

@@ -21,6 +21,7 @@ constexpr double kStoodFor = 0.6;         // s, likewise
 
 /// As of a circle in the plan view, with the ellipse's area.
 double TargetEstimate::Existence() const {
+  if (state != TargetState::kTracking && state != TargetState::kOccluded) return 0.0;
   const double variance = std::sqrt(covariance.topLeftCorner<2, 2>().determinant());
   return 1.0 - std::exp(-0.5 * kThere * kThere / variance);
 }
