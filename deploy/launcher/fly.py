@@ -70,7 +70,7 @@ def parse(arguments):
 
 def find_scenario(name):
     scenarios = places.SHARE / "scenarios"
-    for path in (scenarios / f"{name}.yaml", pathlib.Path(name)):
+    for path in (scenarios / f"{name}.yaml", scenarios / "twelve" / f"{name}.yaml", pathlib.Path(name)):
         if path.is_file():
             return path.resolve()
     # Scenes and planners' parameters lie there as well; only scenarios have a name.
