@@ -442,7 +442,7 @@ TEST(Pilot, TheForecastsUncertaintyAndBodyReachThePlan) {
     Forecast forecast = Walking(flight.t);
     forecast.target.coefficients << 2.5, 0.0, 0.5, -2.5, 0.0, 0.0;
     forecast.sigma = sigma;
-    forecast.speed_sigma = 0.05;
+    forecast.speed_sigma = 0.5 * sigma;
     forecast.radius = 0.3;
     forecast.height = 2.0;
     flight.pilot.SetForecast(forecast);

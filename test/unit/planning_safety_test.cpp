@@ -171,7 +171,7 @@ TEST(Evasion, AStartThatIsNotFiniteStaysWhereItIs) {
 TEST(Escape, OnlyMovesOutAndIsOutInTime) {
   const PlannerConfig config;
   const auto planner = MakePlanner("chase", config);
-  int out = 0;
+  int out = 0, on = 0;
   for (const double gap : {0.2, 0.33, 0.365})
     for (const double inwards : {-0.8, -0.4, 0.0, 0.02, 0.1})
       for (const double drift : {0.0, 0.3, -0.3}) {  // of both
@@ -190,8 +190,16 @@ TEST(Escape, OnlyMovesOutAndIsOutInTime) {
         EXPECT_NEAR(LeastDistance(request.obstacles[0], plan.trajectory), gap, 1e-6);
         for (const Proof& p : plan.proofs) EXPECT_LE(p.from, 0.25);
         ++out;
+        request.stop = plan.trajectory;  // flown on
+        request.t0 = plan.trajectory.start + 0.05;
+        request.start = plan.trajectory.At(request.t0);
+        const PlanResult next = RestPlan(config, request);
+        if (next.reason != "on the stop of the plan before") continue;
+        EXPECT_EQ(next.verdict, Verdict::kEscape) << gap << " " << inwards << " " << drift;
+        ++on;
       }
   EXPECT_GE(out, 15);
+  EXPECT_GT(on, 0);
 }
 
 /// As the autopilot leaves it that has begun to land; the slab reaches above the body.
