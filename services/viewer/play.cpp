@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <thread>
+#include <utility>
 
 #include "services/viewer/log_player.h"
 #include "services/viewer/play_clock.h"
@@ -45,6 +46,7 @@ class Playback {
   void Tell() {
     node_.feed().SetPlay({clock_.t(), clock_.duration(), clock_.speed(), clock_.playing()});
     node_.Tick(Utime());
+    if (std::exchange(looked_at_, false) && !clock_.playing()) Jump();
   }
 
   /// The scene as it was at the clock's time.
@@ -60,11 +62,13 @@ class Playback {
     if (request.seek) clock_.Seek(*request.seek);
     if (request.play) clock_.Play(*request.play);
     if (clock_.t() != before) Jump();
+    if (request.looks) looked_at_ = true;
   }
 
   LogPlayer player_;
   ViewerNode node_;
   PlayClock clock_;
+  bool looked_at_ = false;  ///< anew: by who lacks the moment at which the clock stands still
 };
 
 }  // namespace

@@ -11,6 +11,7 @@ namespace chase::viewer {
 struct Request {
   int64_t acknowledged = 0;                       ///< frames taken since the last request
   std::optional<std::vector<std::string>> wants;  ///< heavy parts: "cloud", "image"
+  bool looks = false;  ///< at more than before: it lacks what others have been sent
   std::optional<bool> play;
   std::optional<double> speed, seek;  ///< seek: s from the log's beginning
   std::string command, token;         ///< command: empty where there is none

@@ -122,8 +122,10 @@ class WebSocket : public Client, public std::enable_shared_from_this<WebSocket> 
 
   void Hear(const std::string& text) {
     if (foxglove_) {
+      const size_t before = foxglove_->channels().size();
       const std::string answer = foxglove_->Hear(text);
       hub_.Recount();
+      if (foxglove_->channels().size() > before) Look();
       if (!answer.empty()) PushText(kAnswer, answer);
       return;
     }
@@ -160,6 +162,12 @@ class WebSocket : public Client, public std::enable_shared_from_this<WebSocket> 
     wants_cloud_ = std::find(parts.begin(), parts.end(), "cloud") != parts.end();
     wants_image_ = std::find(parts.begin(), parts.end(), "image") != parts.end();
     hub_.Recount();
+    if (!parts.empty()) Look();
+  }
+  void Look() {
+    Request request;
+    request.looks = true;
+    hub_.Ask(request);
   }
 
   void PushText(int key, const std::string& text) {

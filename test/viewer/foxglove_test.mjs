@@ -111,8 +111,17 @@ await until('messages for the second', () => {
   if (!page.newest.state.play.playing) page.ask({play: true});
   return other.counts.has('POSE') && other.counts.has('CAMERA_IMAGE');
 });
-seen.client.close();
-other.client.close();
+
+// Who comes while a log stands still is shown that moment.
+page.ask({play: false});
+await until('a pause', () => !page.newest.state.play.playing);
+await sleep(500);
+const late = await connect(viewer.port, ['foxglove.sdk.v1']);
+await until('the moment for Foxglove', () => late.counts.has('POSE') && late.counts.has('CAMERA_IMAGE') && late.counts.has('SCAN_REGISTERED'), 10000);
+const latePage = await pageClient(viewer.port);
+latePage.ask({want: ['cloud', 'image']});
+await until('sweep and image for a page', () => latePage.binary >= 2, 10000);
+for (const {client} of [seen, other, late]) client.close();
 await sleep(100);
 await viewer.stop();
 const total = [...seen.counts.values()].reduce((a, b) => a + b, 0);
