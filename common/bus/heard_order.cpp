@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <lcm/lcm-cpp.hpp>
+#include <limits>
 #include <optional>
 #include <stdexcept>
 
@@ -21,6 +22,7 @@ struct Input {
   std::string channel;
   int32_t seq;
   int64_t position;
+  int64_t utime;  // the log's stamp
 };
 
 /// A message that the process sent.
@@ -62,7 +64,7 @@ Recorded Read(const std::string& log, const std::string& process,
     }
     if (channels.count(event->channel) == 0) continue;
     same_life(event->channel, head->sender_start);
-    recorded.inputs.push_back({event->channel, head->seq, at});
+    recorded.inputs.push_back({event->channel, head->seq, at, event->timestamp});
   }
   return recorded;
 }
@@ -103,32 +105,35 @@ std::vector<std::vector<const Input*>> Intervals(const Recorded& recorded, const
   return intervals;
 }
 
-/// By channel of outputs the channel of inputs that they answer; where there is none: not named.
+/// By channel of outputs the channel of inputs that they answer; where there is none: not named. It
+/// is heard before each of them and, being what each waits for, the latest on average.
 std::map<std::string, std::string> Triggers(
     const std::vector<Output>& outputs, const std::vector<std::vector<const Input*>>& intervals) {
   struct Count {
-    int64_t outputs = 0, messages = 0;
+    int64_t outputs = 0;
+    double lag = 0.0;  // us, summed
   };
   std::map<std::string, std::map<std::string, Count>> counts;
   std::map<std::string, int64_t> totals;
   for (size_t k = 0; k < outputs.size(); ++k) {
     if (intervals[k].empty()) continue;  // a second answer to the same message
     ++totals[outputs[k].channel];
-    std::map<std::string, int64_t> here;
-    for (const Input* input : intervals[k]) ++here[input->channel];
-    for (const auto& [channel, messages] : here) {
+    std::map<std::string, int64_t> newest;
+    for (const Input* input : intervals[k]) newest[input->channel] = input->utime;
+    for (const auto& [channel, utime] : newest) {
       Count& count = counts[outputs[k].channel][channel];
       ++count.outputs;
-      count.messages += messages;
+      count.lag += static_cast<double>(outputs[k].utime - utime);
     }
   }
   std::map<std::string, std::string> triggers;
   for (const auto& [output, by_input] : counts) {
     const double least = (1.0 - kMostSilent) * static_cast<double>(totals[output]);
-    int64_t rarest = INT64_MAX;
+    double shortest = std::numeric_limits<double>::infinity();
     for (const auto& [input, count] : by_input) {
-      if (static_cast<double>(count.outputs) < least || count.messages >= rarest) continue;
-      rarest = count.messages;
+      const double lag = count.lag / static_cast<double>(count.outputs);
+      if (static_cast<double>(count.outputs) < least || lag >= shortest) continue;
+      shortest = lag;
       triggers[output] = input;
     }
   }

@@ -25,9 +25,10 @@ struct HeardOrder {
 /// The order in which `process` heard the messages of `channels`. In a log of a live flight every
 /// message that it sent names the `seq` heard last of each channel: what it had heard by then comes
 /// before, the rest after. Of several messages heard between two of its own the one that it answers
-/// comes last: the rarest channel of which there is one before each message of that channel. A log
-/// in lockstep is in the right order already, and so is taken one in which a process of these
-/// began twice. Throws std::runtime_error when the log cannot be read.
+/// comes last: of the channels of which there is one before each message of that channel the one
+/// whose newest is, on average, the latest. A log in lockstep is in the right order already, and so
+/// is taken one in which a process of these began twice. Throws std::runtime_error when the log
+/// cannot be read.
 HeardOrder OrderHeard(const std::string& log, const std::string& process,
                       const std::set<std::string>& channels);
 

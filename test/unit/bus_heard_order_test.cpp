@@ -25,10 +25,12 @@ struct Sent {
   imu_t message;
 };
 
-/// A process "worker" that answers each SLOW with OUT and hears FAST and OTHER beside it.
+/// A process "worker" that answers each SLOW, or each `every`-th, with OUT and hears FAST and OTHER
+/// beside it.
 class Flight {
  public:
-  Flight(uint32_t seed, int64_t start) : random_(seed), start_(start) {}
+  Flight(uint32_t seed, int64_t start, int every = 1)
+      : random_(seed), start_(start), every_(every) {}
 
   /// Runs for `seconds`; every message reaches the worker and the recorder up to 8 ms later, each
   /// by itself, in the order of its channel.
@@ -44,7 +46,7 @@ class Flight {
     std::map<std::string, int32_t> newest;
     for (const Sent& m : heard) {
       newest[m.channel] = m.message.seq;
-      if (m.channel == "SLOW") Answer(m.stamp, newest);
+      if (m.channel == "SLOW" && m.message.seq % every_ == 0) Answer(m.stamp, newest);
     }
     std::stable_sort(log_.begin(), log_.end(),
                      [](const Sent& a, const Sent& b) { return a.stamp < b.stamp; });
@@ -92,6 +94,7 @@ class Flight {
 
   std::mt19937 random_;
   int64_t start_;
+  int every_;
   std::map<std::string, int64_t> last_;
   std::map<std::string, int32_t> seqs_;
   std::vector<Sent> log_;
@@ -128,6 +131,17 @@ TEST(HeardOrder, IsTheProcessesAndNotTheRecorders) {
     EXPECT_EQ(std::unique(sorted.begin(), sorted.end()), sorted.end()) << "handed over twice";
     EXPECT_EQ(sorted.size(), 4000u + 500u + 286u);
     EXPECT_NE(Replayed(file, sorted), flight.truth) << "the file's order would have done";
+  }
+}
+
+TEST(HeardOrder, ARarerChannelBesideTheOneThatIsAnswered) {
+  for (uint32_t seed = 1; seed <= 20; ++seed) {
+    Flight flight(seed, kStart, 4);  // two or three OTHER beside four SLOW
+    flight.Run(20.0);
+    const std::string file = flight.Write();
+    auto replayed = Replayed(file, OrderHeard(file, "worker", kInputs).positions);
+    for (const auto& [slow, newest] : flight.truth)
+      EXPECT_EQ(replayed[slow], newest) << "seed " << seed << ", SLOW " << slow;
   }
 }
 
