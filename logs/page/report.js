@@ -56,7 +56,8 @@ const criterionOf = ({metrics}, key) => {
 };
 
 function showHeader() {
-  byId('title').textContent = two ? `${flights[0].title}: two flights` : flights[0].title;
+  const titles = [...new Set(flights.map(({title}) => title))];
+  byId('title').textContent = two ? `${titles.join(' and ')}: two flights` : titles[0];
   flights.forEach((flight, i) => {
     if ('passed' in flight.metrics)
       byId('title').append(make('span', `${two ? `${'AB'[i]} ` : ''}${flight.metrics.passed ? 'passed' : 'failed'}`, `badge ${flight.metrics.passed ? 'good' : 'bad'}`));

@@ -28,6 +28,7 @@ run('chase-report', log, other, '--out', path.join(folder, 'two'));
 const struck = path.join(folder, 'struck.lcm');
 run('chase-flight', 'mission', '--quiet', '--fault', 'lidar-gap@0.5', '--fault', 'motor-80@1', '--until', '2', '--log', struck, '--light');
 run('chase-report', struck, '--out', path.join(folder, 'struck'));
+run('chase-report', log, struck, '--out', path.join(folder, 'unlike'));
 
 const browser = await chromium.launch({executablePath: CHROMIUM,
   args: ['--no-sandbox', '--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader']});
@@ -107,6 +108,9 @@ const overlaid = await two.evaluate(() => ['strip_distance', 'strip_speed', 'map
 assert.deepStrictEqual(overlaid, [true, true, true, true]);
 await checkLinked(two);
 assert.ok(fs.existsSync(path.join(folder, 'two/comparison.txt')));
+const unlike = await open('unlike', 1280, 900);
+assert.match(await unlike.textContent('#title'), /^gym, seed \d+ and mission, seed \d+: two flights/);
+await unlike.close();
 
 // A fault is drawn from its beginning to its end, and the flight's states come with their reasons.
 const faulty = await open('struck', 1280, 900);
