@@ -13,7 +13,7 @@ constexpr int kMostPasses = 8;       // through the sweeps since power-on
 constexpr double kConverged = 0.02;  // m/s: over a sweep, 2 mm
 // m; 36 slopes (of seeds 1 to 40) where it rests: 2 mm in the median, 11 at most while it settles.
 constexpr double kMovesAtRest = 0.02;
-constexpr double kBlindAtRest = 0.1;  // m/s: sweeps alone show a body at rest to move less
+constexpr double kBlindAtRest = 0.1;  // m/s: a sweep matched 1 cm off, in its 0.1 s
 
 }  // namespace
 
