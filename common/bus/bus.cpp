@@ -65,6 +65,7 @@ std::vector<input_t> Bus::Inputs() const {
   std::vector<input_t> inputs;
   for (const auto& [channel, c] : counters_)
     if (c.last_seq >= 0) inputs.push_back({channel, c.last_seq});
+  if (ticks_ > 0) inputs.push_back({kTick, ticks_});
   return inputs;
 }
 

@@ -76,6 +76,11 @@ class Bus {
     PublishRaw(channel, std::move(bytes));
   }
 
+  /// Before each tick of a process whose log may be replayed: what it sends from then on names the
+  /// tick beside the messages that it has heard, as channel kTick.
+  void CountTick() { ++ticks_; }
+  static constexpr char kTick[] = "TICK";
+
   /// Sends a message that another process has encoded, as it is.
   void Forward(const std::string& channel, Bytes bytes) { PublishRaw(channel, std::move(bytes)); }
 
@@ -133,6 +138,7 @@ class Bus {
 
   Identity identity_;
   std::map<std::string, ChannelCounters> counters_;
+  int32_t ticks_ = 0;
   std::map<std::string, int32_t> next_seq_;
   std::map<std::tuple<std::string, std::string, int64_t>, int32_t> last_seq_;  // of each sender
   StageClock stages_;

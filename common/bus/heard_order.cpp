@@ -7,8 +7,10 @@
 #include <limits>
 #include <optional>
 #include <stdexcept>
+#include <tuple>
 
 #include "chase/status_t.hpp"
+#include "common/bus/bus.h"
 #include "common/bus/channels.h"
 #include "common/bus/message_head.h"
 
@@ -21,8 +23,9 @@ constexpr double kMostSilent = 0.01;                  // share of outputs withou
 struct Input {
   std::string channel;
   int32_t seq;
-  int64_t position;
-  int64_t utime;  // the log's stamp
+  int64_t position;  // in the file; of a tick: -1
+  int64_t utime;     // the log's stamp
+  int64_t order;     // the latest stamp so far: never goes back in the file
 };
 
 /// A message that the process sent.
@@ -36,7 +39,7 @@ struct Recorded {
   std::vector<Input> inputs;    // in the file's order
   std::vector<Output> outputs;  // the process's, in the file's order
   std::map<std::string, int64_t> lost;
-  bool live = false, one_life = true;
+  bool live = false, one_life = true, has_ticks = false;
 };
 
 Recorded Read(const std::string& log, const std::string& process,
@@ -45,6 +48,7 @@ Recorded Read(const std::string& log, const std::string& process,
   if (!file.good()) throw std::runtime_error(log + ": cannot be read; --replay needs an LCM log");
   Recorded recorded;
   std::map<std::string, int64_t> starts;  // by channel, and the process's own
+  int64_t latest = 0;
   const auto same_life = [&](const std::string& of, int64_t start) {
     recorded.one_life &= starts.try_emplace(of, start).first->second == start;
   };
@@ -53,6 +57,7 @@ Recorded Read(const std::string& log, const std::string& process,
     if (event == nullptr) break;
     const auto head = HeadOf(event->data, static_cast<size_t>(std::max(0, event->datalen)));
     if (!head) continue;
+    latest = std::max(latest, event->timestamp);
     if (head->sender == process) {
       recorded.live |= event->timestamp >= kYear2000;
       same_life("", head->sender_start);
@@ -64,9 +69,32 @@ Recorded Read(const std::string& log, const std::string& process,
     }
     if (channels.count(event->channel) == 0) continue;
     same_life(event->channel, head->sender_start);
-    recorded.inputs.push_back({event->channel, head->seq, at, event->timestamp});
+    recorded.inputs.push_back({event->channel, head->seq, at, event->timestamp, latest});
   }
   return recorded;
+}
+
+/// Between two outputs the ticks are evenly spread, the last at the second one.
+void AddTicks(Recorded* recorded) {
+  int64_t before = 0;
+  int32_t last = -1;
+  for (const Output& output : recorded->outputs) {
+    for (const MessageHead::Input& input : output.inputs) {
+      if (input.channel != Bus::kTick) continue;
+      if (!recorded->has_ticks) {
+        last = input.seq - 1;
+        before = output.utime;
+      }
+      recorded->has_ticks = true;
+      const int32_t n = input.seq - last;
+      for (int32_t i = 1; i <= n; ++i) {
+        const int64_t utime = before + (output.utime - before) * i / n;
+        recorded->inputs.push_back({Bus::kTick, last + i, -1, utime, utime});
+      }
+      last = std::max(last, input.seq);
+    }
+    before = output.utime;
+  }
 }
 
 /// Of each channel the inputs in the order of their `seq`.
@@ -79,6 +107,12 @@ Queues QueuesOf(const std::vector<Input>& inputs) {
     std::stable_sort(queue.begin(), queue.end(),
                      [](const Input* a, const Input* b) { return a->seq < b->seq; });
   return queues;
+}
+
+void SortByTime(std::vector<const Input*>* inputs) {
+  std::sort(inputs->begin(), inputs->end(), [](const Input* a, const Input* b) {
+    return std::tie(a->order, a->position, a->seq) < std::tie(b->order, b->position, b->seq);
+  });
 }
 
 /// What was heard between one output and the next, in the file's order.
@@ -94,14 +128,12 @@ std::vector<std::vector<const Input*>> Intervals(const Recorded& recorded, const
       for (; i < queue->second.size() && queue->second[i]->seq <= heard.seq; ++i)
         interval.push_back(queue->second[i]);
     }
-    std::sort(interval.begin(), interval.end(),
-              [](const Input* a, const Input* b) { return a->position < b->position; });
+    SortByTime(&interval);
   }
   auto& rest = intervals.emplace_back();
   for (const auto& [channel, queue] : queues)
     rest.insert(rest.end(), queue.begin() + static_cast<long>(next[channel]), queue.end());
-  std::sort(rest.begin(), rest.end(),
-            [](const Input* a, const Input* b) { return a->position < b->position; });
+  SortByTime(&rest);
   return intervals;
 }
 
@@ -190,12 +222,14 @@ std::vector<std::string> HeardOrder::Sentences() const {
 
 HeardOrder OrderHeard(const std::string& log, const std::string& process,
                       const std::set<std::string>& channels) {
-  const Recorded recorded = Read(log, process, channels);
+  Recorded recorded = Read(log, process, channels);
+  AddTicks(&recorded);
   const Queues queues = QueuesOf(recorded.inputs);
   HeardOrder order;
   if (!recorded.one_life || recorded.outputs.empty()) return order;
   NoteMissing(recorded, queues, &order);
   if (!recorded.live) return order;
+  order.has_ticks = recorded.has_ticks;
   auto intervals = Intervals(recorded, queues);
   const auto triggers = Triggers(recorded.outputs, intervals);
   for (size_t k = 0; k < intervals.size(); ++k) {
@@ -208,7 +242,7 @@ HeardOrder OrderHeard(const std::string& log, const std::string& process,
       });
       if (last != interval.rend()) std::rotate(last.base() - 1, last.base(), interval.end());
     }
-    for (const Input* input : interval) order.positions.push_back(input->position);
+    for (const Input* input : interval) order.events.push_back({input->position, input->utime});
   }
   return order;
 }

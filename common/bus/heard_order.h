@@ -8,14 +8,19 @@
 
 namespace chase::bus {
 
-/// What a process heard in a recorded flight, in its order, as far as the log can tell.
+/// What moved a process in a recorded flight, in its order, as far as the log can tell.
 struct HeardOrder {
   struct Missing {
     int64_t count = 0, of = 0;  ///< messages that are not in the log, of those that it heard
     int64_t first_utime = 0;  ///< of its first output after one, by the log's stamps, microseconds
     int64_t lost = 0;         ///< messages that the process itself has lost: the log may hold them
   };
-  std::vector<int64_t> positions;  ///< of the events in the file; empty: in the file's order
+  struct Event {
+    int64_t position;  ///< in the file; -1: a tick
+    int64_t utime;     ///< the log's stamp, of a tick by the outputs around it, microseconds
+  };
+  std::vector<Event> events;               ///< empty: in the file's order
+  bool has_ticks = false;                  ///< the process has named its ticks
   std::map<std::string, Missing> missing;  ///< by channel; none where nothing is
 
   /// A line for each channel, for people.
@@ -23,12 +28,12 @@ struct HeardOrder {
 };
 
 /// The order in which `process` heard the messages of `channels`. In a log of a live flight every
-/// message that it sent names the `seq` heard last of each channel: what it had heard by then comes
-/// before, the rest after. Of several messages heard between two of its own the one that it answers
-/// comes last: of the channels of which there is one before each message of that channel the one
-/// whose newest is, on average, the latest. A log in lockstep is in the right order already, and so
-/// is taken one in which a process of these began twice. Throws std::runtime_error when the log
-/// cannot be read.
+/// message that it sent names the `seq` heard last of each channel, and its newest tick: what it
+/// had heard by then comes before, the rest after. Of several messages heard between two of its own
+/// the one that it answers comes last: of the channels of which there is one before each message of
+/// that channel the one whose newest is, on average, the latest. A log in lockstep is in the right
+/// order already, and so is taken one in which a process of these began twice. Throws
+/// std::runtime_error when the log cannot be read.
 HeardOrder OrderHeard(const std::string& log, const std::string& process,
                       const std::set<std::string>& channels);
 

@@ -34,11 +34,17 @@ std::string LogBus::Handled() const {
   return names;
 }
 
-/// The clock stands still for an event that was logged late.
+/// The clock stands still for what was logged late.
+void LogBus::TickAt(int64_t utime, Node* node) {
+  now_ = std::max(now_, utime);
+  CountTick();
+  node->Tick(now_);
+}
+
 void LogBus::Hand(const lcm::LogEvent& event, Node* node, const After& after) {
   ++events_;
   const int64_t period = node->TickPeriod(), t = std::max(event.timestamp, reorders_ ? now_ : 0);
-  if (period > 0) {
+  if (period > 0 && !has_ticks_) {
     if (next_tick_ < 0) next_tick_ = t;
     for (; next_tick_ <= t; next_tick_ += period) node->Tick(now_ = next_tick_);
   }
@@ -56,12 +62,17 @@ void LogBus::Run(Node* node, const After& after) {
   for (const auto& [channel, handler] : handlers_) channels.insert(channel);
   const HeardOrder order = OrderHeard(in_, identity().process, channels);
   shortfalls_ = order.Sentences();
-  reorders_ = !order.positions.empty();
+  reorders_ = !order.events.empty();
+  has_ticks_ = order.has_ticks;
   lcm::LogFile log(in_, "r");
   heard_ = handlers_.empty();
   if (!reorders_)
     while (const lcm::LogEvent* event = log.readNextEvent()) Hand(*event, node, after);
-  for (const int64_t position : order.positions) {
+  for (const auto& [position, utime] : order.events) {
+    if (position < 0) {
+      TickAt(utime, node);
+      continue;
+    }
     fseeko(log.getFilePtr(), position, SEEK_SET);
     if (const lcm::LogEvent* event = log.readNextEvent()) Hand(*event, node, after);
   }

@@ -24,9 +24,10 @@ class LogBus : public Bus {
   /// Throws std::runtime_error when a file cannot be opened.
   LogBus(const std::string& in, const std::string& out);
 
-  /// Drives `node` through the whole log; ticks it at multiples of its period in between. After
-  /// each event `after` is called with its time, microseconds, where given. Throws
-  /// std::runtime_error when the log cannot be read or holds nothing for the node.
+  /// Drives `node` through the whole log; ticks it where it was ticked in flight, or at multiples
+  /// of its period where the log does not tell. After each event `after` is called with its time,
+  /// microseconds, where given. Throws std::runtime_error when the log cannot be read or holds
+  /// nothing for the node.
   void Run(Node* node, const std::function<void(int64_t utime)>& after = nullptr);
 
   int64_t Now() const override { return now_; }
@@ -42,13 +43,14 @@ class LogBus : public Bus {
   std::string Handled() const;
   using After = std::function<void(int64_t utime)>;
   void Hand(const lcm::LogEvent& event, Node* node, const After& after);
+  void TickAt(int64_t utime, Node* node);
 
   std::string in_;
   LogWriter out_;
   std::map<std::string, RawHandler> handlers_;
   int64_t now_ = 0, next_tick_ = -1;
   int64_t events_ = 0;
-  bool heard_ = false, reorders_ = false;
+  bool heard_ = false, reorders_ = false, has_ticks_ = false;
   std::vector<std::string> shortfalls_;
 };
 

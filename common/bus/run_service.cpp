@@ -75,7 +75,10 @@ void RunLive(const ServiceSpec& spec, const Flags& flags) {
   int64_t next_status = now, next_look = now;
   while (stop_requested == 0 && !node->Done()) {
     now = bus.Now();
-    if (ticks.Due(now)) node->Tick(ticks.Take(now));
+    if (ticks.Due(now)) {
+      bus.CountTick();
+      node->Tick(ticks.Take(now));
+    }
     if (now >= next_status) {
       report(now);
       sd_notify(0, "WATCHDOG=1");

@@ -229,8 +229,8 @@ void AddMigrate(CLI::App* app, Arguments* a) {
 }
 
 void AddDiff(CLI::App* app, Arguments* a, int* exit_code) {
-  auto* sub =
-      app->add_subcommand("diff", "Compares two logs field by field; exit 1 if they differ.");
+  auto* sub = app->add_subcommand(
+      "diff", "Compares two logs field by field; exit 1 if they differ, 2 if that cannot be told.");
   AddLog(sub, "A", &a->in);
   AddLog(sub, "B", &a->other);
   sub->add_option("--tolerance", a->tolerance,
@@ -277,7 +277,8 @@ void AddIdentify(CLI::App* app, Arguments* a) {
 void AddVerify(CLI::App* app, Arguments* a, int* exit_code) {
   auto* sub = app->add_subcommand(
       "verify",
-      "Checks the proofs of every plan in exact arithmetic; exit 1 if one does not hold.");
+      "Checks the proofs of every plan in exact arithmetic; exit 1 if one does not hold, 2 if "
+      "that cannot be told.");
   AddLog(sub, "FLIGHT", &a->in);
   sub->callback([a, exit_code] {
     const Verification verification = Verify(a->in);
@@ -286,10 +287,15 @@ void AddVerify(CLI::App* app, Arguments* a, int* exit_code) {
   });
 }
 
+/// The exit code where there is no answer; `otherwise` where 1 is none.
+int Trouble(const CLI::App& app, int otherwise) {
+  return app.got_subcommand("diff") || app.got_subcommand("verify") ? 2 : otherwise;
+}
+
 }  // namespace
 
-/// Exit codes: 0 done; 1 bad use or a file that cannot be read or written, diff and verify: they
-/// differ, one does not hold; 2 an option that would do nothing.
+/// Exit codes: 0 done; 1 bad use or a file that cannot be read or written; 2 an option that would
+/// do nothing. Of diff and verify 1 is an answer, so that what keeps them from one is 2.
 int main(int argc, char** argv) {
   CLI::App app{
       "Shows, imports, exports, compares, cuts, merges, repairs, migrates and verifies LCM logs, "
@@ -318,10 +324,10 @@ int main(int argc, char** argv) {
     const auto chosen = app.get_subcommands();
     std::fprintf(stderr, "chase-log: %s; see chase-log %s--help\n", e.what(),
                  chosen.empty() ? "" : (chosen[0]->get_name() + " ").c_str());
-    return 1;
+    return Trouble(app, 1);
   } catch (const std::exception& e) {
     std::fprintf(stderr, "chase-log: %s\n", e.what());
-    return dynamic_cast<const BadOption*>(&e) != nullptr ? 2 : 1;
+    return Trouble(app, dynamic_cast<const BadOption*>(&e) != nullptr ? 2 : 1);
   }
   return exit_code;
 }

@@ -9,6 +9,7 @@
 #include <set>
 
 #include "chase/imu_t.hpp"
+#include "common/bus/bus.h"
 #include "common/bus/heard_order.h"
 #include "common/bus/log_writer.h"
 #include "common/bus/message_head.h"
@@ -26,11 +27,11 @@ struct Sent {
 };
 
 /// A process "worker" that answers each SLOW, or each `every`-th, with OUT and hears FAST and OTHER
-/// beside it.
+/// beside it; or, when it is ticked, with OUT at each tick.
 class Flight {
  public:
-  Flight(uint32_t seed, int64_t start, int every = 1)
-      : random_(seed), start_(start), every_(every) {}
+  Flight(uint32_t seed, int64_t start, int every = 1, int tick_ms = 0)
+      : random_(seed), start_(start), every_(every), tick_(tick_ms * int64_t{1000}) {}
 
   /// Runs for `seconds`; every message reaches the worker and the recorder up to 8 ms later, each
   /// by itself, in the order of its channel.
@@ -45,8 +46,13 @@ class Flight {
                      [](const Sent& a, const Sent& b) { return a.stamp < b.stamp; });
     std::map<std::string, int32_t> newest;
     for (const Sent& m : heard) {
+      for (; tick_ > 0 && m.stamp > start_ + (newest[Bus::kTick] + 1) * tick_;) {
+        const int32_t n = ++newest[Bus::kTick];
+        Answer(start_ + n * tick_, newest, n);
+      }
       newest[m.channel] = m.message.seq;
-      if (m.channel == "SLOW" && m.message.seq % every_ == 0) Answer(m.stamp, newest);
+      if (tick_ == 0 && m.channel == "SLOW" && m.message.seq % every_ == 0)
+        Answer(m.stamp, newest, m.message.seq);
     }
     std::stable_sort(log_.begin(), log_.end(),
                      [](const Sent& a, const Sent& b) { return a.stamp < b.stamp; });
@@ -65,7 +71,7 @@ class Flight {
     return file;
   }
 
-  /// What the worker had heard by each SLOW: by its seq.
+  /// What the worker had heard by each SLOW, by its seq; or by each tick.
   std::map<int32_t, std::map<std::string, int32_t>> truth;
 
  private:
@@ -81,20 +87,21 @@ class Flight {
     heard->push_back({Delayed("to worker: " + channel, t), channel, m});
     log_.push_back({Delayed("to recorder: " + channel, t), channel, m});
   }
-  void Answer(int64_t t, const std::map<std::string, int32_t>& newest) {
+  void Answer(int64_t t, const std::map<std::string, int32_t>& newest, int32_t to) {
     imu_t m{};
     m.utime = t;
     m.seq = seqs_["OUT"]++;
     m.sender = "worker";
     for (const auto& [channel, seq] : newest) m.inputs.push_back({channel, seq});
     m.n_inputs = static_cast<int32_t>(m.inputs.size());
-    truth[newest.at("SLOW")] = newest;
+    truth[to] = newest;
     log_.push_back({Delayed("to recorder: OUT", t - start_), "OUT", m});
   }
 
   std::mt19937 random_;
   int64_t start_;
   int every_;
+  int64_t tick_;  // us; 0: never
   std::map<std::string, int64_t> last_;
   std::map<std::string, int32_t> seqs_;
   std::vector<Sent> log_;
@@ -116,6 +123,12 @@ std::map<int32_t, std::map<std::string, int32_t>> Replayed(const std::string& fi
   return out;
 }
 
+std::vector<int64_t> Positions(const HeardOrder& order) {
+  std::vector<int64_t> positions;
+  for (const HeardOrder::Event& event : order.events) positions.push_back(event.position);
+  return positions;
+}
+
 const std::set<std::string> kInputs = {"FAST", "SLOW", "OTHER"};
 
 TEST(HeardOrder, IsTheProcessesAndNotTheRecorders) {
@@ -125,8 +138,8 @@ TEST(HeardOrder, IsTheProcessesAndNotTheRecorders) {
     const std::string file = flight.Write();
     const HeardOrder order = OrderHeard(file, "worker", kInputs);
     EXPECT_TRUE(order.Sentences().empty()) << order.Sentences().front();
-    EXPECT_EQ(Replayed(file, order.positions), flight.truth) << "seed " << seed;
-    std::vector<int64_t> sorted = order.positions;
+    std::vector<int64_t> sorted = Positions(order);
+    EXPECT_EQ(Replayed(file, sorted), flight.truth) << "seed " << seed;
     std::sort(sorted.begin(), sorted.end());
     EXPECT_EQ(std::unique(sorted.begin(), sorted.end()), sorted.end()) << "handed over twice";
     EXPECT_EQ(sorted.size(), 4000u + 500u + 286u);
@@ -139,9 +152,35 @@ TEST(HeardOrder, ARarerChannelBesideTheOneThatIsAnswered) {
     Flight flight(seed, kStart, 4);  // two or three OTHER beside four SLOW
     flight.Run(20.0);
     const std::string file = flight.Write();
-    auto replayed = Replayed(file, OrderHeard(file, "worker", kInputs).positions);
+    auto replayed = Replayed(file, Positions(OrderHeard(file, "worker", kInputs)));
     for (const auto& [slow, newest] : flight.truth)
       EXPECT_EQ(replayed[slow], newest) << "seed " << seed << ", SLOW " << slow;
+  }
+}
+
+/// Of a process that is ticked every 100 ms and sends OUT then, not when it hears SLOW.
+TEST(HeardOrder, TicksStandWhereTheyWere) {
+  for (uint32_t seed = 1; seed <= 20; ++seed) {
+    Flight flight(seed, kStart, 1, 100);
+    flight.Run(20.0);
+    const std::string file = flight.Write();
+    const HeardOrder order = OrderHeard(file, "worker", kInputs);
+    ASSERT_TRUE(order.has_ticks);
+    lcm::LogFile log(file, "r");
+    std::map<std::string, int32_t> newest;
+    int32_t ticks = 0;
+    for (const auto& [position, utime] : order.events) {
+      if (position >= 0) {
+        fseeko(log.getFilePtr(), position, SEEK_SET);
+        const lcm::LogEvent* event = log.readNextEvent();
+        newest[event->channel] = HeadOf(event->data, static_cast<size_t>(event->datalen))->seq;
+        continue;
+      }
+      newest[Bus::kTick] = ++ticks;
+      EXPECT_EQ(newest, flight.truth.at(ticks)) << "seed " << seed << ", tick " << ticks;
+      EXPECT_NEAR(1e-6 * static_cast<double>(utime - kStart), 0.1 * ticks, 0.009);
+    }
+    EXPECT_EQ(ticks, 199);
   }
 }
 
@@ -164,9 +203,9 @@ TEST(HeardOrder, LogicalTimeOtherProcessesAndTwoLivesAreTakenAsTheyStand) {
   Flight lockstep(1, 1'000'000), live(1, kStart);
   lockstep.Run(2.0);
   live.Run(2.0);
-  EXPECT_TRUE(OrderHeard(lockstep.Write(), "worker", kInputs).positions.empty());
-  EXPECT_TRUE(OrderHeard(live.Write(), "nobody", kInputs).positions.empty());
-  EXPECT_FALSE(OrderHeard(live.Write(), "worker", kInputs).positions.empty());
+  EXPECT_TRUE(OrderHeard(lockstep.Write(), "worker", kInputs).events.empty());
+  EXPECT_TRUE(OrderHeard(live.Write(), "nobody", kInputs).events.empty());
+  EXPECT_FALSE(OrderHeard(live.Write(), "worker", kInputs).events.empty());
   EXPECT_THROW(OrderHeard("no/such.lcm", "worker", kInputs), std::runtime_error);
 }
 

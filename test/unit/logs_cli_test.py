@@ -145,6 +145,10 @@ class LogTools(unittest.TestCase):
             self.assert_refused(run("chase-log", "diff", self.log, self.log, "--ignore", pattern), 2, pattern, "info")
         self.good("diff", self.log, self.log, "--ignore", "*_STATUS.*", "--ignore", "POSE", "--ignore", "*.seq")
 
+    def test_no_answer_is_not_a_difference(self):
+        for program in (("diff", self.log, "no.lcm"), ("diff", self.log), ("verify", "no.lcm"), ("verify",)):
+            self.assert_refused(run("chase-log", *program), 2)
+
     def test_diff_of_a_replay_pairs_by_time(self):
         half = self.folder / "half.lcm"
         lcmlog.write(half, [e for e in self.events if e[0] >= 5_000_000])
