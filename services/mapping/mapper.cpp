@@ -128,8 +128,12 @@ void Mapper::MarkTarget(const std::vector<Footprint>& movers) {
   }
 }
 
-void Mapper::TrackMovers(const Eigen::Vector3d& origin, const std::vector<Footprint>& expected) {
-  auto clusters = detector_.Detect(origin, returns_, &grid_, expected);
+void Mapper::TrackMovers(const Sweep& sweep, const std::vector<Footprint>& expected) {
+  LowestRays rays;
+  rays.axis = sweep.axis;
+  rays.height = sweep.origin.z() - ground_.Height(sweep.origin.x(), sweep.origin.y());
+  rays.range = config_.grid.range;
+  auto clusters = detector_.Detect(sweep.origin, rays, returns_, &grid_, expected);
   tracker_.Update(detector_.panorama(), &clusters);
   for (const auto& cluster : clusters) {
     if (!tracker_.Moves(cluster.track)) continue;
@@ -318,7 +322,7 @@ ObstacleList Mapper::Insert(const Sweep& sweep) {
   if (zone_.active()) tracker_.Forget(zone_.center(), zone_.keep_out(), zone_.outer());
   const auto expected = tracker_.Expected();
   MarkTarget(expected);
-  TrackMovers(sweep.origin, expected);
+  TrackMovers(sweep, expected);
   integrator_.Insert(sweep.origin, returns_);
   ClearGhosts(sweep.t);
   t_ = sweep.t;

@@ -59,7 +59,7 @@ class Mapper {
   void Prepare(const Sweep& sweep);
   bool Shorten(const Eigen::Vector3d& origin, Eigen::Vector3d* end) const;
   void MarkTarget(const std::vector<Footprint>& movers);
-  void TrackMovers(const Eigen::Vector3d& origin, const std::vector<Footprint>& expected);
+  void TrackMovers(const Sweep& sweep, const std::vector<Footprint>& expected);
   void ClearGhosts(double t);
   bool IsUnseen(const Key& key, const Eigen::Vector3d& origin);
   std::vector<Cell> OccupiedColumns(const Eigen::Vector3d& origin, std::set<int>* partial);

@@ -18,10 +18,11 @@ bool Write(const std::string& file, const std::string& bytes) {
 }
 
 Sweep ToSweep(const scan_registered_t& m, double t, double period) {
-  Sweep sweep{t, bus::ToVector(m.pos), {}, {}};
+  const Eigen::Quaterniond R_WL = bus::ToQuaternion(m.orientation);
+  Sweep sweep{t, bus::ToVector(m.pos), {}, {}, R_WL * Eigen::Vector3d::UnitZ()};
   sweep.points.reserve(m.x.size());
   for (size_t i = 0; i < m.x.size(); ++i) sweep.points.emplace_back(m.x[i], m.y[i], m.z[i]);
-  sweep.ages = FiringAges(sweep.origin, bus::ToQuaternion(m.orientation), sweep.points, period);
+  sweep.ages = FiringAges(sweep.origin, R_WL, sweep.points, period);
   return sweep;
 }
 

@@ -141,13 +141,13 @@ std::vector<Cluster> MotionDetector::Connected(const std::vector<Candidate>& can
   return clusters;
 }
 
-std::vector<int> MotionDetector::Look(const Eigen::Vector3d& origin,
+std::vector<int> MotionDetector::Look(const Eigen::Vector3d& origin, const LowestRays& rays,
                                       const std::vector<Return>& returns,
                                       const std::vector<Cluster>& clusters) {
   std::vector<int> owner(returns.size(), -1);
   for (size_t c = 0; c < clusters.size(); ++c)
     for (const int i : clusters[c].members) owner[static_cast<size_t>(i)] = static_cast<int>(c);
-  panorama_.Take(origin, returns, owner);
+  panorama_.Take(origin, rays, returns, owner);
   return owner;
 }
 
@@ -247,7 +247,7 @@ bool MotionDetector::Finish(const std::vector<Return>& returns, const std::vecto
   return true;
 }
 
-std::vector<Cluster> MotionDetector::Detect(const Eigen::Vector3d& origin,
+std::vector<Cluster> MotionDetector::Detect(const Eigen::Vector3d& origin, const LowestRays& rays,
                                             const std::vector<Return>& returns, VoxelGrid* grid,
                                             const std::vector<Footprint>& expected) {
   const auto candidates = Candidates(returns, grid, expected);
@@ -257,8 +257,8 @@ std::vector<Cluster> MotionDetector::Detect(const Eigen::Vector3d& origin,
       if (body >= 0) cluster.track = expected[static_cast<size_t>(body)].track;
       clusters.push_back(std::move(cluster));
     }
-  auto owner = Look(origin, returns, clusters);
-  if (Join(returns, &clusters)) owner = Look(origin, returns, clusters);
+  auto owner = Look(origin, rays, returns, clusters);
+  if (Join(returns, &clusters)) owner = Look(origin, rays, returns, clusters);
   std::vector<Cluster> finished;
   for (size_t c = 0; c < clusters.size(); ++c)
     if (!clusters[c].members.empty() && Finish(returns, owner, static_cast<int>(c), &clusters[c]))

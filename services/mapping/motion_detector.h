@@ -31,8 +31,9 @@ class MotionDetector {
   /// Looks at returns labelled kStatic, seen from `origin`. `expected`: where movers should be now;
   /// returns there count as moving unless a settled cell holds them, and are divided among these
   /// movers by likelihood. The others are clusters by their connection.
-  std::vector<Cluster> Detect(const Eigen::Vector3d& origin, const std::vector<Return>& returns,
-                              VoxelGrid* grid, const std::vector<Footprint>& expected);
+  std::vector<Cluster> Detect(const Eigen::Vector3d& origin, const LowestRays& rays,
+                              const std::vector<Return>& returns, VoxelGrid* grid,
+                              const std::vector<Footprint>& expected);
   /// What hid what in that sweep.
   const Panorama& panorama() const { return panorama_; }
 
@@ -47,8 +48,8 @@ class MotionDetector {
                                     const std::vector<Footprint>& expected) const;
   bool InEverFree(const Key& key, VoxelGrid* grid) const;
   std::vector<Cluster> Connected(const std::vector<Candidate>& candidates, int body) const;
-  std::vector<int> Look(const Eigen::Vector3d& origin, const std::vector<Return>& returns,
-                        const std::vector<Cluster>& clusters);
+  std::vector<int> Look(const Eigen::Vector3d& origin, const LowestRays& rays,
+                        const std::vector<Return>& returns, const std::vector<Cluster>& clusters);
   bool Join(const std::vector<Return>& returns, std::vector<Cluster>* clusters) const;
   bool Finish(const std::vector<Return>& returns, const std::vector<int>& owner, int self,
               Cluster* cluster) const;

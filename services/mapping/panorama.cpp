@@ -20,10 +20,21 @@ double Diamond(double x, double y) {
   return x < 0.0 ? 2.0 - q : (y < 0.0 ? 4.0 + q : q);
 }
 
+/// The unit direction of that.
+Eigen::Vector2d FromDiamond(double q) {
+  const double x = q < 2.0 ? 1.0 - q : q - 3.0, y = q < 1.0 ? q : (q < 3.0 ? 2.0 - q : q - 4.0);
+  return Eigen::Vector2d(x, y).normalized();
+}
+
 }  // namespace
 
-void Panorama::Take(const Eigen::Vector3d& origin, const std::vector<Return>& returns,
-                    const std::vector<int>& owner) {
+bool LowestRays::MeetGround(const Eigen::Vector2d& d) const {
+  const double tilt = std::atan2(-d.dot(axis.head<2>()), axis.z());  // of that plane towards d
+  return std::tan(elevation + tilt) * range < -height;
+}
+
+void Panorama::Take(const Eigen::Vector3d& origin, const LowestRays& rays,
+                    const std::vector<Return>& returns, const std::vector<int>& owner) {
   origin_ = origin.head<2>();
   height_ = origin.z();
   bins_.assign(kBins * kRises, {INFINITY, INFINITY, kNobody});
@@ -51,7 +62,8 @@ void Panorama::Take(const Eigen::Vector3d& origin, const std::vector<Return>& re
   }
   const auto empty = [this](size_t b) { return !(farthest_[b % kBins] > 0.0f); };
   for (size_t b = 0; b < kBins; ++b)
-    if (empty(b + kBins - 1) && empty(b) && empty(b + 1))
+    if (empty(b + kBins - 1) && empty(b) && empty(b + 1) &&
+        rays.MeetGround(FromDiamond(4.0 * (static_cast<double>(b) + 0.5) / kBins)))
       std::fill_n(&bins_[b * kRises], kRises, Bin{0.0f, 0.0f, kNobody});
   for (size_t i = lowest_.size() - 1; i-- > 0;)
     if (i % kBands != kBands - 1) lowest_[i] = std::min(lowest_[i], lowest_[i + 1]);

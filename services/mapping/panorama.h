@@ -1,20 +1,33 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cmath>
 #include <vector>
 
 #include "services/mapping/sweep.h"
 
 namespace chase::mapping {
 
+/// Where a sweep's lowest rays meet level ground.
+struct LowestRays {
+  Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();  ///< of the scanner, frame W
+  double elevation = -M_PI / 12.0;  ///< above the plane across it, rad; VLP-16's, by its manual
+  double height = 1.0;              ///< of the sensor above the ground, m
+  double range = 20.0;              ///< m, that returns from the ground are sure to come from
+
+  /// In the unit direction d in plan.
+  bool MeetGround(const Eigen::Vector2d& d) const;
+};
+
 /// The nearest returns of a sweep by their direction from the sensor, the ground's left out: what
-/// hides what. Where no ray had a return, neither from the ground, something is too near for the
-/// sensor. And how low rays passed that went farther: what would have been seen.
+/// hides what. Where the ground should have returned a ray and nothing did, something is too near
+/// for the sensor; where all rays rise into the sky that tells of nothing. And how low rays passed
+/// that went farther: what would have been seen.
 class Panorama {
  public:
   /// `owner[i]`: cluster of return i, or -1.
-  void Take(const Eigen::Vector3d& origin, const std::vector<Return>& returns,
-            const std::vector<int>& owner);
+  void Take(const Eigen::Vector3d& origin, const LowestRays& rays,
+            const std::vector<Return>& returns, const std::vector<int>& owner);
   /// True where something that is not `owner`'s stands in front of p, or beside the ray to it, by
   /// more than `depth` m.
   bool Hides(const Eigen::Vector3d& p, int owner, double depth = 0.0) const;

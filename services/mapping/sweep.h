@@ -15,6 +15,7 @@ struct Sweep {
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();  ///< p_WL, m
   std::vector<Eigen::Vector3f> points;               ///< m; some may not be finite
   std::vector<float> ages;                           ///< s before t that each was fired, or empty
+  Eigen::Vector3d axis = Eigen::Vector3d::UnitZ();   ///< about which the scanner turns: z of L
 };
 
 /// Ages of a turning scanner's returns, from their order and azimuth in frame L: the last of the

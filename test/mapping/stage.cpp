@@ -141,6 +141,7 @@ std::optional<Shot> Stage::Next() {
     if ((point - end.p).norm() < 20.0) Classify(point, pose.t, &shot.hits);
   }
   const Eigen::Quaterniond heading(turn * end.q);
+  shot.sweep.axis = heading * Vector3d::UnitZ();
   shot.sweep.ages = mapping::FiringAges(shot.sweep.origin, heading, shot.sweep.points, kSweep);
   Observe(&shot);
   return shot;

@@ -247,7 +247,7 @@ TEST(MappingPanorama, HidesWhatIsBehindAndNotWhatIsBeside) {
   owner[1] = 2;
   Panorama panorama;
   EXPECT_FALSE(panorama.Hides({8.0, 0.0, 0.5}, -3));  // before the first sweep
-  panorama.Take({0.0, 0.0, 1.5}, returns, owner);
+  panorama.Take({0.0, 0.0, 1.5}, {}, returns, owner);
   EXPECT_TRUE(panorama.Hides({8.0, 0.0, 0.5}, 0));
   EXPECT_TRUE(panorama.Hides({8.0, 0.1, 0.5}, 0));
   EXPECT_FALSE(panorama.Hides({8.0, 0.0, 1.6}, 0));  // looks over it

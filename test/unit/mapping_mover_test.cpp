@@ -99,6 +99,33 @@ TEST(MappingForecast, StopsWhereItsWayEndsAndKeepsItsVelocityUntilThen) {
   }
 }
 
+/// On the side that a drone's tilt raises all rays rise into the sky, and return where a walker is
+/// only: that he ends there is seen, and that he turns back.
+TEST(MappingMover, WalkersAreSeenBeforeTheSky) {
+  for (const double range : {2.0, 3.0, 4.0}) {
+    std::mt19937 random(3);
+    Mapper mapper(MappingConfig{});
+    const auto walked = [](double t) { return t < 3.5 ? t - 2.5 : 4.5 - t; };
+    int judged = 0;
+    for (double t = 0.0; t < 5.5; t += 0.1) {
+      testing::World world;
+      world.boxes = {{{-range, walked(t), 0.9}, {0.25, 0.25, 0.9}}};
+      const Eigen::Quaterniond R_WL(
+          Eigen::AngleAxisd(t < 2.0 ? 0.0 : 0.32, Eigen::Vector3d::UnitY()));
+      const auto list =
+          mapper.Insert(testing::Scan(world, {0, 0, 1.2}, t, {0.02, 0.01}, &random, nullptr, R_WL));
+      if (t < 2.5) continue;
+      ASSERT_EQ(list.n_moving, 1) << range << " m, " << t;
+      const world::Obstacle& o = list.obstacles.front();
+      EXPECT_NEAR(o.center.Position(t).y(), walked(t), 0.2) << range << " m, " << t;
+      if (std::abs(t - 3.5) < 0.1 || (t > 3.5 && t < 3.85)) continue;
+      ++judged;
+      EXPECT_NEAR(o.center.Velocity(t).y(), t < 3.5 ? 1.0 : -1.0, 0.35) << range << " m, " << t;
+    }
+    EXPECT_GE(judged, 20);
+  }
+}
+
 /// A mover on its way to a wall that has long been there is not forecast to go through it.
 TEST(MappingMover, ForecastEndsAtAWall) {
   std::mt19937 random(3);

@@ -63,7 +63,7 @@ Panorama Seen(double gap) {
     returns.push_back(r);
   }
   Panorama panorama;
-  panorama.Take({0.0, -4.0, 1.0}, returns, std::vector<int>(returns.size(), -1));
+  panorama.Take({0.0, -4.0, 1.0}, {}, returns, std::vector<int>(returns.size(), -1));
   return panorama;
 }
 
@@ -80,7 +80,7 @@ Panorama SeenFrom(double height, double low) {
       returns.push_back(r);
     }
   Panorama panorama;
-  panorama.Take({0.0, -2.0, height}, returns, std::vector<int>(returns.size(), -1));
+  panorama.Take({0.0, -2.0, height}, {}, returns, std::vector<int>(returns.size(), -1));
   return panorama;
 }
 
@@ -144,7 +144,7 @@ Panorama TooNear() {
     returns.push_back(r);
   }
   Panorama panorama;
-  panorama.Take({0.0, -0.6, 1.2}, returns, std::vector<int>(returns.size(), -1));
+  panorama.Take({0.0, -0.6, 1.2}, {}, returns, std::vector<int>(returns.size(), -1));
   return panorama;
 }
 
@@ -253,7 +253,7 @@ TEST(MappingDetector, ConnectedReturnsAreDividedBetweenTheExpectedBodies) {
     returns.push_back({p.cast<float>(), grid.ToKey(p), Label::kGround});
   }
   MotionDetector detector(MoverConfig{}, GridConfig{});
-  auto clusters = detector.Detect({0.0, 0.0, 1.0}, returns, &grid, expected);
+  auto clusters = detector.Detect({0.0, 0.0, 1.0}, {}, returns, &grid, expected);
   ASSERT_EQ(clusters.size(), 2u);
   for (const auto& cluster : clusters) {
     EXPECT_EQ(cluster.members.size(), 40u);
@@ -266,7 +266,7 @@ TEST(MappingDetector, ConnectedReturnsAreDividedBetweenTheExpectedBodies) {
   expected[0].p.y() = 0.5;
   expected[0].reach.fill(1.0);
   expected[0].radius = 2.0;
-  clusters = detector.Detect({0.0, 0.0, 1.0}, returns, &grid, expected);
+  clusters = detector.Detect({0.0, 0.0, 1.0}, {}, returns, &grid, expected);
   EXPECT_EQ(clusters.size(), 2u);
 }
 
@@ -288,7 +288,7 @@ TEST(MappingDetector, WhatLiesBesideAnExpectedPlaceDoesNotJoin) {
   expected.sigma.fill(0.01);
   expected.radius = 1.0;
   MotionDetector detector(MoverConfig{}, GridConfig{});
-  const auto clusters = detector.Detect({0.0, 0.0, 1.0}, returns, &grid, {expected});
+  const auto clusters = detector.Detect({0.0, 0.0, 1.0}, {}, returns, &grid, {expected});
   ASSERT_EQ(clusters.size(), 1u);
   EXPECT_EQ(clusters[0].members.size(), 12u);
 }

@@ -120,10 +120,11 @@ World Forest(double side, int trunks, unsigned seed) {
 }
 
 Sweep Scan(const World& world, const Eigen::Vector3d& at, double t, const SensorNoise& noise,
-           std::mt19937* random, Truth* truth) {
+           std::mt19937* random, Truth* truth, const Eigen::Quaterniond& R_WL) {
   std::normal_distribution<double> normal;
   Sweep sweep;
   sweep.t = t;
+  sweep.axis = R_WL * Eigen::Vector3d::UnitZ();
   Eigen::Vector3d error;
   for (int i = 0; i < 3; ++i) error[i] = noise.pose * normal(*random);
   const double yaw = noise.yaw * normal(*random);
@@ -131,12 +132,12 @@ Sweep Scan(const World& world, const Eigen::Vector3d& at, double t, const Sensor
   for (int azimuth = 0; azimuth < 1800; ++azimuth) {
     for (int ring = 0; ring < 16; ++ring) {
       const double a = 2.0 * M_PI * azimuth / 1800.0, e = (2.0 * ring - 15.0) * M_PI / 180.0;
-      const Eigen::Vector3d d(std::cos(e) * std::cos(a), std::cos(e) * std::sin(a), std::sin(e));
+      const Eigen::Vector3d d =
+          R_WL * Eigen::Vector3d(std::cos(e) * std::cos(a), std::cos(e) * std::sin(a), std::sin(e));
       int object = -1;
       const double range = world.Cast(at, d, &object);
       if (!(range < 100.0)) continue;
-      const Eigen::Vector3d seen(std::cos(e) * std::cos(a + yaw), std::cos(e) * std::sin(a + yaw),
-                                 std::sin(e));
+      const Eigen::Vector3d seen = Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()) * d;
       const double measured = range + noise.range * normal(*random);
       sweep.points.push_back((sweep.origin + measured * seen).cast<float>());
       if (!truth) continue;

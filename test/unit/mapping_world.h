@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <random>
 #include <vector>
 
@@ -60,6 +61,7 @@ struct Truth {
 /// 16 rings from -15 to 15 degrees, 1800 azimuths; returns within 100 m, registered with an
 /// erroneous pose.
 Sweep Scan(const World& world, const Eigen::Vector3d& at, double t, const SensorNoise& noise,
-           std::mt19937* random, Truth* truth = nullptr);
+           std::mt19937* random, Truth* truth = nullptr,
+           const Eigen::Quaterniond& R_WL = Eigen::Quaterniond::Identity());
 
 }  // namespace chase::mapping::testing
