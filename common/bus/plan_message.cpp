@@ -30,7 +30,8 @@ world::Claim ClaimOf(const plan_t& m, int64_t origin) {
   claim.hard_radius = m.hard_radius;
   claim.sigmas = m.sigmas;
   claim.certified = m.certified_clearance >= 0.0;
-  claim.last_resort = m.verdict == plan_t::BRAKE || m.verdict == plan_t::WAIT;
+  claim.last_resort =
+      m.verdict == plan_t::BRAKE || m.verdict == plan_t::WAIT || m.verdict == plan_t::MITIGATE;
   claim.starts_inside = claim.last_resort || m.verdict == plan_t::ESCAPE;
   return claim;
 }

@@ -198,7 +198,7 @@ std::string Problem(const obstacles_t& m) {
 std::string Problem(const plan_t& m) {
   return Check()
       .Time(m.utime)
-      .Code("verdict", m.verdict, 6)
+      .Code("verdict", m.verdict, plan_t::MITIGATE)
       .Polynomial("position", m.position)
       .That(m.n_yaw >= 1 && m.n_yaw <= 16, "n_yaw", "is not 1 to 16")
       .Number("yaw", m.yaw)

@@ -1,6 +1,6 @@
 // Charts over time share one range and one cursor; a map; bars.
 const COLORS = {chaser: '#1f5fa8', target: '#e8710a', grey: '#8a8f98', good: '#1d7f4b', bad: '#c62828'};
-const LABELS = {chase: '#3fa66b', wider: '#8ccf90', kept: '#4c9be8', safe_only: '#d9a33a', brake: '#d9534f', wait: '#9aa3ae', escape: '#b455c9',
+const LABELS = {chase: '#3fa66b', wider: '#8ccf90', kept: '#4c9be8', safe_only: '#d9a33a', brake: '#d9534f', wait: '#9aa3ae', escape: '#b455c9', mitigate: '#991a1a',
   tracking: '#3fa66b', searching: '#9aa3ae', occluded: '#d9a33a', ok: '#3fa66b', degraded: '#d9a33a', starting: '#9aa3ae', lost: '#d9534f',
   IDLE: '#9aa3ae', READY: '#a9c7b4', TAKEOFF: '#6fbf73', CHASE: '#3fa66b', HOLD: '#4c9be8', SEARCH: '#d9a33a', RETURN: '#b455c9',
   LAND: '#8a6fd1', DONE: '#5b6675', EMERGENCY: '#d9534f'};

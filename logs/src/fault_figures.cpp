@@ -36,7 +36,8 @@ class Steps {
 struct Outputs {
   explicit Outputs(const FlightRecord& record) {
     for (const PlanSample& p : record.plans)
-      brakes.Add(p.heard, p.verdict == plan_t::BRAKE || p.verdict == plan_t::WAIT);
+      brakes.Add(p.heard, p.verdict == plan_t::BRAKE || p.verdict == plan_t::WAIT ||
+                              p.verdict == plan_t::MITIGATE);
     for (const TrackingSample& s : record.tracking) stops.Add(s.t, s.following != tracking_t::PLAN);
     for (const StateSample& s : record.states) leaves.Add(s.t, s.state != flight_state_t::CHASE);
   }

@@ -18,8 +18,8 @@ Eigen::Vector3d Wanted(const PlanSample& plan, double t) {
 }  // namespace
 
 const char* VerdictName(int verdict) {
-  constexpr const char* kNames[] = {"chase", "wider", "kept",  "safe_only",
-                                    "brake", "wait",  "escape"};
+  constexpr const char* kNames[] = {"chase", "wider", "kept",   "safe_only",
+                                    "brake", "wait",  "escape", "mitigate"};
   return kNames[verdict];
 }
 

@@ -57,7 +57,7 @@ class Ladder : public Planner {
     if (!notes.empty()) {
       if (IsInSightVerdict(result.verdict) && WeakensSight(*used_))
         result.verdict = Verdict::kSafeOnly;
-      if (result.verdict != Verdict::kBrake && StartsInside(*used_))
+      if (result.verdict < Verdict::kBrake && StartsInside(*used_))
         result.verdict = Verdict::kEscape;
       result.reason += (result.reason.empty() ? "" : "; ") + notes;
     }

@@ -9,8 +9,8 @@
 namespace chase::planning {
 
 const char* Name(Verdict verdict) {
-  constexpr const char* kNames[] = {"CHASE", "WIDER", "KEPT",  "SAFE_ONLY",
-                                    "BRAKE", "WAIT",  "ESCAPE"};
+  constexpr const char* kNames[] = {"CHASE", "WIDER", "KEPT",   "SAFE_ONLY",
+                                    "BRAKE", "WAIT",  "ESCAPE", "MITIGATE"};
   return kNames[static_cast<int>(verdict)];
 }
 

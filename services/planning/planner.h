@@ -25,6 +25,7 @@ enum class Verdict {
   kBrake = 4,
   kWait = 5,
   kEscape = 6,
+  kMitigate = 7,
 };
 const char* Name(Verdict verdict);
 

@@ -137,18 +137,19 @@ Stop Evade(const PlannerConfig& config, const PlanRequest& request) {
   std::optional<Stop> blind;  // certified but for what nobody has looked into
   Stop best;
   std::pair<double, double> least{-HUGE_VAL, -HUGE_VAL};
-  const auto weigh = [&](Resting* way, const Curve& curve, double T) {
+  const auto weigh = [&](Resting* way, const Curve& curve, double T, bool aside) {
     if (!curve.allFinite()) return;
     const std::pair<double, double> harm = way->Harm(curve, T);
     if (harm <= least) return;
     least = harm;
     best.trajectory = {request.t0, T, curve};
+    best.aside = aside;
   };
   constexpr double kLongest = kBrakeTimes[4];
   Resting braking(config, request);
   for (const double T : {kBrakeTimes[0], kBrakeTimes[2], kLongest}) {
     const Curve curve = BrakeCurve(request.start, T);
-    if (braking.CanBeFlown(curve, T)) weigh(&braking, curve, T);
+    if (braking.CanBeFlown(curve, T)) weigh(&braking, curve, T, false);
   }
   for (const Vector3d& d : displacements)
     for (int i = 0; i < 2; ++i) {
@@ -160,11 +161,11 @@ Stop Evade(const PlannerConfig& config, const PlanRequest& request) {
         if (!blind) blind = std::move(stop);
         continue;
       }
-      if (!blind && resting[i].CanBeFlown(curve, T)) weigh(&resting[i], curve, T);
+      if (!blind && resting[i].CanBeFlown(curve, T)) weigh(&resting[i], curve, T, true);
     }
   if (blind) return *blind;
   if (least.first < 0.0)  // none can be flown
-    weigh(&braking, BrakeCurve(request.start, kLongest), kLongest);
+    weigh(&braking, BrakeCurve(request.start, kLongest), kLongest, false);
   if (least.first < 0.0)  // none is finite
     best.trajectory = world::Trajectory::Constant(request.start.p, request.t0, 1.0);
   return best;
@@ -200,6 +201,7 @@ PlanResult RestPlan(const PlannerConfig& config, const PlanRequest& request) {
   if (!stop) {
     stop = Evade(config, request);
     if (stop->certified) result.verdict = Verdict::kEscape;
+    if (stop->aside) result.verdict = Verdict::kMitigate;
     result.reason = stop->certified ? "nor is braking" : "nor is braking, nor any way aside";
   }
   if (LeavesObstacles(stop->proofs)) result.verdict = Verdict::kEscape;

@@ -14,6 +14,7 @@ struct Stop {
   world::Trajectory trajectory;
   std::vector<Proof> proofs;
   bool certified = false;
+  bool aside = false;  ///< leads elsewhere than braking does
 };
 
 /// Would control fly that leg? It keeps to the geofence.

@@ -55,8 +55,9 @@ inline Case MakeCase(unsigned seed, int n_obstacles = 12) {
   c.claim.hard_radius = config.hard_radius();
   c.claim.sigmas = config.sigmas;
   c.claim.certified = plan.certified_clearance >= 0.0;
-  c.claim.last_resort =
-      plan.verdict == planning::Verdict::kBrake || plan.verdict == planning::Verdict::kWait;
+  c.claim.last_resort = plan.verdict == planning::Verdict::kBrake ||
+                        plan.verdict == planning::Verdict::kWait ||
+                        plan.verdict == planning::Verdict::kMitigate;
   c.claim.starts_inside = c.claim.last_resort || plan.verdict == planning::Verdict::kEscape;
   return c;
 }

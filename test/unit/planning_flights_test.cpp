@@ -83,7 +83,8 @@ world::Claim ClaimOf(const PlanResult& plan, const world::Trajectory& target,
   claim.hard_radius = c.hard_radius();
   claim.sigmas = c.sigmas;
   claim.certified = plan.certified_clearance >= 0.0;
-  claim.last_resort = plan.verdict == Verdict::kBrake || plan.verdict == Verdict::kWait;
+  claim.last_resort = plan.verdict == Verdict::kBrake || plan.verdict == Verdict::kWait ||
+                      plan.verdict == Verdict::kMitigate;
   claim.starts_inside = claim.last_resort || plan.verdict == Verdict::kEscape;
   return claim;
 }
