@@ -49,13 +49,7 @@ Matrix6d PosePart(const NavState& state) {
   return P;
 }
 
-/// Standard deviation of where points at a usual distance are, by the covariance of a pose [m].
-double UncertaintyOf(const Matrix6d& P) {
-  constexpr double kUsualRange = 8.0;  // m
-  const double p2 = P.topLeftCorner<3, 3>().trace(), theta2 = P.bottomRightCorner<3, 3>().trace();
-  return std::sqrt(std::max(0.0, p2 + kUsualRange * kUsualRange * theta2));
-}
-double UncertaintyOf(const NavState& state) { return UncertaintyOf(PosePart(state)); }
+double UncertaintyOf(const NavState& state) { return odometry::UncertaintyOf(PosePart(state)); }
 
 /// Error of a body in (p, yaw).
 MapDrift::Covariance PlaceCovariance(const Matrix6d& P) {
@@ -234,7 +228,7 @@ MatchResult Odometry::Match(Prepared* prepared) {
   if (planes_.cells() == 0) return {};
   MatchResult match =
       matcher_.Match(FeaturesIn(*prepared, prepared->at_end), planes_, posts_,
-                     prepared->predicted.pose(), UncertaintyOf(prepared->predicted), unknown_);
+                     prepared->predicted.pose(), PosePart(prepared->predicted), unknown_);
   if (Blind(prepared->end)) MatchBlind(prepared, &match);
   return match;
 }

@@ -10,7 +10,7 @@ namespace chase::odometry {
 namespace {
 
 constexpr int kBootstrapPasses = 3;
-constexpr double kUnknown = 1e3;  // m, an uncertainty that leaves the gate wide
+const Matrix6d kUnknown = 1e6 * Matrix6d::Identity();  // m, rad: leaves the gate wide
 
 }  // namespace
 

@@ -81,8 +81,9 @@ bool Odometry::SweepsShowMotion() {
   };
   Learn(still(pending_[i]), Pose{});
   const Prepared last = still(pending_.back());
-  const MatchResult match =
-      matcher_.Match(FeaturesIn(last, last.at_end), planes_, posts_, Pose{}, config_.match.gate);
+  const double gate = config_.match.gate;
+  const MatchResult match = matcher_.Match(FeaturesIn(last, last.at_end), planes_, posts_, Pose{},
+                                           gate * gate * Matrix6d::Identity());
   ClearMap();
   thinning_ = {};
   return match.misfit || match.X_WB.p.norm() > kMovesAtRest;

@@ -15,7 +15,18 @@ namespace {
 // A few rings on a post hold a direction squarely; that many planes may do so by their noise alone.
 constexpr double kPostSupport = 4.0;
 
+Pose Moved(const Pose& X, const Vector6d& step) {
+  return {(math::ExpSO3(step.tail<3>()) * X.R).normalized(), X.p + step.head<3>()};
+}
+
 }  // namespace
+
+double UncertaintyOf(const Matrix6d& covariance) {
+  constexpr double kUsualRange = 8.0;  // m
+  const double p2 = covariance.topLeftCorner<3, 3>().trace();
+  const double theta2 = covariance.bottomRightCorner<3, 3>().trace();
+  return std::sqrt(std::max(0.0, p2 + kUsualRange * kUsualRange * theta2));
+}
 
 /// Normal equations of one linearisation.
 struct ScanMatcher::System {
@@ -161,17 +172,23 @@ double ScanMatcher::Support(const std::vector<Row>& rows, const Vector6d& direct
   return support;
 }
 
+/// Variance of a residual of weight 1 [m^2].
+double ScanMatcher::Sigma2(const System& system) const {
+  return std::max(system.squares / system.weight, std::pow(config_.range_noise, 2));
+}
+
 MatchResult ScanMatcher::Match(const Features& features, const SurfaceMap& planes,
-                               const SurfaceMap& posts, const Pose& predicted, double uncertainty,
-                               const Matrix6d& unknown_before) const {
+                               const SurfaceMap& posts, const Pose& predicted,
+                               const Matrix6d& covariance, const Matrix6d& unknown_before) const {
   MatchResult result;
   result.X_WB = predicted;
-  result.gate =
-      std::clamp(config_.least_gate + 3.0 * uncertainty, config_.least_gate, config_.gate);
+  result.gate = std::clamp(config_.least_gate + 3.0 * UncertaintyOf(covariance), config_.least_gate,
+                           config_.gate);
   double kernel = std::max(config_.kernel, result.gate);
   const Eigen::Vector3f eye = (predicted * features.eye.cast<double>()).cast<float>();
   Matched matched_planes(features.planes, planes, eye), matched_posts(features.posts, posts, eye);
   System system;
+  Pose alone;  // by the sweep alone
   std::vector<Row> rows;
   rows.reserve(features.planes.size() + features.posts.size());
   for (int i = 0; i < config_.max_iterations; ++i) {
@@ -182,21 +199,25 @@ MatchResult ScanMatcher::Match(const Features& features, const SurfaceMap& plane
     // The step within the span of the known directions.
     const auto& V = result.known;
     if (V.cols() == 0) return result;
-    const Eigen::MatrixXd reduced = V.transpose() * system.H * V;
-    const Eigen::LDLT<Eigen::MatrixXd> solver(reduced);
-    const Vector6d step = V * solver.solve(V.transpose() * system.b);
+    const Eigen::MatrixXd H = V.transpose() * system.H * V;
+    const Eigen::VectorXd b = V.transpose() * system.b;
+    alone = Moved(result.X_WB, V * H.ldlt().solve(b));
+    Vector6d off;
+    off << result.X_WB.p - predicted.p, math::LogSO3(result.X_WB.R * predicted.R.conjugate());
+    const Eigen::MatrixXd prior = Sigma2(system) * (V.transpose() * covariance * V).inverse();
+    const Vector6d step = V * (H + prior).ldlt().solve(b - prior * (V.transpose() * off));
     if (!step.allFinite()) return result;
-    result.X_WB.p += step.head<3>();
-    result.X_WB.R = (math::ExpSO3(step.tail<3>()) * result.X_WB.R).normalized();
+    result.X_WB = Moved(result.X_WB, step);
     const bool settled = step.head<3>().norm() < 1e-3 && step.tail<3>().norm() < 1e-4;
     if (settled && kernel <= config_.kernel) break;
     kernel = std::max(config_.kernel, 0.5 * kernel);
   }
+  if (!alone.p.allFinite()) return result;
+  result.X_WB = alone;
   result.rms = std::sqrt(system.squares / system.weight);
   result.fit = static_cast<double>(system.inliers) / std::max(system.matched, 1);
   result.unmapped = 1.0 - static_cast<double>(system.matched) / std::max(system.total, 1);
-  const double sigma2 = std::max(system.squares / system.weight, std::pow(config_.range_noise, 2));
-  result.information = system.H / sigma2;
+  result.information = system.H / Sigma2(system);
   result.misfit = result.fit < config_.min_fit;
   result.valid = !result.misfit;
   return result;

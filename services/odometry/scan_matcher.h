@@ -60,6 +60,9 @@ struct MatchResult {
   bool degenerate() const { return valid && known.cols() < 6; }
 };
 
+/// Standard deviation of where points at a usual distance are, by the covariance of a pose [m].
+double UncertaintyOf(const Matrix6d& covariance);
+
 /// Residual of a feature against a surface and its derivative with respect to (p, rotation error in
 /// W) where R_WB <- Exp(d_theta) R_WB. `rotated` is R_WB p_B.
 inline double PlaneResidual(const Eigen::Vector3d& p_W, const Eigen::Vector3d& rotated,
@@ -83,15 +86,18 @@ inline double PostResidual(const Eigen::Vector3d& p_W, const Eigen::Vector3d& ro
 /// Sweep against map: Gauss-Newton on the manifold over point-to-plane and point-to-line distances
 /// with a Geman-McClure kernel that narrows. Zhang & Singh 2014 (LOAM), eqs. (2) to (4). Directions
 /// are told known from unknown by what supports each, translation and rotation apart, after Tuna et
-/// al. 2023 (X-ICP), section IV; the unknown ones are left at the prediction.
+/// al. 2023 (X-ICP), section IV; the unknown ones are left at the prediction. What fits is judged
+/// where sweep and prediction agree best: a few far features that lie within the gate of a surface
+/// which is not theirs would by their lever turn the sweep alone until they seem to fit.
 class ScanMatcher {
  public:
   explicit ScanMatcher(const MatchConfig& config) : config_(config) {}
 
-  /// `uncertainty`: standard deviation of the features' predicted places, m; narrows the gate.
-  /// `unknown_before`: projector on the directions that the sweep before did not determine.
+  /// `covariance`: of `predicted`, in (p, rotation error in W); narrows the gate. The result is
+  /// what the sweep alone says. `unknown_before`: projector on the directions that the sweep before
+  /// did not determine.
   MatchResult Match(const Features& features, const SurfaceMap& planes, const SurfaceMap& posts,
-                    const Pose& predicted, double uncertainty,
+                    const Pose& predicted, const Matrix6d& covariance,
                     const Matrix6d& unknown_before = Matrix6d::Zero()) const;
 
  private:
@@ -106,6 +112,7 @@ class ScanMatcher {
   void Analyse(const System& system, const std::vector<Row>& rows, const Matrix6d& unknown_before,
                MatchResult* result) const;
   void KeepUnknown(const Eigen::Matrix3d& before, int unknown, Eigen::Matrix3d* directions) const;
+  double Sigma2(const System& system) const;
   double Support(const std::vector<Row>& rows, const Vector6d& direction, double squares,
                  double weight) const;
 

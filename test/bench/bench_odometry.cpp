@@ -133,16 +133,16 @@ void GaussNewton(benchmark::State& state) {
   const Problem problem;
   const ScanMatcher matcher(MatchConfig{});
   for (auto _ : state)
-    benchmark::DoNotOptimize(
-        matcher.Match(problem.features, problem.planes, problem.posts, problem.start, 0.1));
+    benchmark::DoNotOptimize(matcher.Match(problem.features, problem.planes, problem.posts,
+                                           problem.start, 5e-5 * Matrix6d::Identity()));
 }
 BENCHMARK(GaussNewton)->Name("solver/gauss_newton")->Unit(benchmark::kMillisecond);
 
 void Ceres(benchmark::State& state) {
   const Problem problem;
   for (auto _ : state)
-    benchmark::DoNotOptimize(
-        test::MatchWithCeres(problem.features.planes, problem.planes, problem.start, 0.1));
+    benchmark::DoNotOptimize(test::MatchWithCeres(problem.features.planes, problem.planes,
+                                                  problem.start, 5e-5 * Matrix6d::Identity()));
 }
 BENCHMARK(Ceres)->Name("solver/ceres")->Unit(benchmark::kMillisecond);
 

@@ -268,6 +268,38 @@ world::Scenario Square(uint64_t seed) {
   return scenario;
 }
 
+world::Scenario Passage(uint64_t seed) {
+  world::Random random(seed, 79);
+  world::Scenario scenario;
+  scenario.name = fmt::format("passage-{}", seed);
+  const double length = random.Uniform(10.0, 30.0), height = random.Uniform(2.5, 3.5);
+  const auto wall = [&](double x0, double y0, double x1, double y1) {
+    scenario.world.walls.push_back({{x0, y0}, {x1, y1}, height, 0.15});
+  };
+  for (const double side : {-1.0, 1.0}) {
+    const double y = side * random.Uniform(1.0, 2.0), depth = side * random.Uniform(4.0, 7.0);
+    double from = 0.0;
+    for (double door = random.Uniform(2.0, 8.0); door < length - 2.0;
+         from = door + 1.4, door += random.Uniform(3.0, 9.0)) {
+      wall(from, y, door, y);
+      const double between = door - 0.5;
+      if (random.Uniform() < 0.5) wall(between, y, between, depth);
+    }
+    wall(from, y, length, y);
+    wall(0.0, depth, length, depth);
+  }
+  for (const double end : {0.0, length}) wall(end, -8.0, end, 8.0);
+  for (int i = 0; i < 6; ++i)
+    scenario.world.boxes.push_back(
+        {{random.Uniform(0.5, length), random.Uniform(2.5, 4.0) * (i % 2 ? 1.0 : -1.0), 0.4},
+         {random.Uniform(0.4, 1.4), random.Uniform(0.4, 1.4), 0.8}});
+  scenario.chaser.start = {random.Uniform(0.8, 3.0), random.Uniform(-0.4, 0.4), kStanding};
+  scenario.chaser.yaw_deg = random.Uniform(-180.0, 180.0);
+  scenario.chaser.takeoff_height = random.Uniform(0.8, 1.5);
+  scenario.target.waypoints = {{4.0, 0.0}, {6.0, 0.0}};
+  return scenario;
+}
+
 std::string Text(const LiveFigures& f) {
   return fmt::format(
       "\"sweeps\":{},\"refused\":{},\"lost\":{},\"degraded\":{},\"epochs\":{},\"ate\":{:.4f},"

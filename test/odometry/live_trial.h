@@ -72,6 +72,9 @@ world::Scenario BareStreet(bool posts);
 /// Two walls far apart and four pillars on even ground, laid out by `seed`.
 world::Scenario Square(uint64_t seed);
 
+/// A corridor with doors to rooms on both sides, laid out by `seed`; it starts near one end.
+world::Scenario Passage(uint64_t seed);
+
 std::string Text(const LiveFigures& figures);
 
 }  // namespace chase::odometry::trial

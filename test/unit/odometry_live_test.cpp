@@ -84,6 +84,22 @@ TEST(OdometryLive, StartsAnywhere) {
   }
 }
 
+/// From the ground a corridor shows the feet of its walls; the climb shows the rest of it.
+TEST(OdometryLive, ClimbsBetweenWalls) {
+  for (const int seed : Seeds(3, 9)) {
+    LiveOptions options;
+    options.seed = seed;
+    options.course = "hover";
+    options.duration = 10.0;
+    const LiveFigures figures =
+        Shown(fmt::format("passage, seed {}", seed),
+              FlyLive(trial::Passage(static_cast<uint64_t>(seed)), options));
+    EXPECT_EQ(figures.refused, 0) << seed;
+    EXPECT_EQ(figures.epochs, 0) << seed;
+    EXPECT_LT(figures.worst, 0.05) << seed;
+  }
+}
+
 /// On ground this steep a leg of the level body is in the ground at power-on: it is thrown off and
 /// coasts while the alignment runs.
 TEST(OdometryLive, StartsOnGroundThatThrowsItOff) {
