@@ -37,6 +37,11 @@ world::Trajectory RestToRest(const Eigen::Vector3d& a, const Eigen::Vector3d& b,
 
 bool IsAtRest(const world::State& s) { return s.v.norm() < 0.05 && s.a.norm() < 0.1; }
 
+double LargestSigma(const Eigen::Matrix3d& covariance) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(covariance, Eigen::EigenvaluesOnly);
+  return std::sqrt(std::max(0.0, eigen.eigenvalues().maxCoeff()));
+}
+
 // The target's upright cylinder where it is forecast to be.
 std::optional<world::Obstacle> TargetBody(const Forecast& f) {
   if (!(f.radius > 0.0 && f.height > 0.0)) return std::nullopt;
@@ -47,8 +52,8 @@ std::optional<world::Obstacle> TargetBody(const Forecast& f) {
   body.solid = world::Obstacle::Solid::kCylinder;
   body.half = {f.radius, f.radius, 0.5 * f.height};
   body.shape = body.half.cwiseAbs2().cwiseInverse().asDiagonal();
-  body.position_covariance.diagonal().setConstant(f.sigma * f.sigma);
-  body.velocity_covariance.diagonal().setConstant(f.speed_sigma * f.speed_sigma);
+  body.position_covariance = f.covariance;
+  body.velocity_covariance = f.velocity_covariance;
   return body;
 }
 
@@ -207,8 +212,8 @@ PlanRequest Pilot::Request(double t0, const Start& start) const {
   request.target = world::Trajectory::Constant(start.state.p, t0, config_.horizon);
   if (!forecast_ || !forecast_->has_target) return request;
   request.target = forecast_->target;
-  request.target_sigma = forecast_->sigma;
-  request.target_speed_sigma = forecast_->speed_sigma;
+  request.target_sigma = LargestSigma(forecast_->covariance);
+  request.target_speed_sigma = LargestSigma(forecast_->velocity_covariance);
   // One that is lost could be anywhere soon, and there is no way to rest from that.
   if (HasTarget(t0 - config_.latency))
     request.target_manoeuvre = {config_.target_acceleration, config_.target_memory};

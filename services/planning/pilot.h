@@ -18,11 +18,11 @@ namespace chase::planning {
 
 /// The newest forecast of the target. Times in seconds from the pilot's origin.
 struct Forecast {
-  double t = 0.0;                     ///< made for this instant, s
-  bool has_target = false;            ///< false: nothing to chase
-  world::Trajectory target;           ///< p_WT(t)
-  double sigma = 0.0;                 ///< largest standard deviation of the position at t, m
-  double speed_sigma = 0.0;           ///< and of the velocity, m/s
+  double t = 0.0;                                                 ///< made for this instant, s
+  bool has_target = false;                                        ///< false: nothing to chase
+  world::Trajectory target;                                       ///< p_WT(t)
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();           ///< of the position at t, m^2
+  Eigen::Matrix3d velocity_covariance = Eigen::Matrix3d::Zero();  ///< and velocity, m^2/s^2
   double radius = 0.0, height = 0.0;  ///< of the target's upright cylinder, m; 0: not known
 };
 

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Eigenvalues>
 #include <cmath>
 
 #include "common/bus/convert.h"
@@ -15,11 +14,6 @@ namespace {
 
 constexpr int kMaxCoefficients = 3 * 9;  // degree 8
 constexpr size_t kMaxObstacles = 1000;
-
-double LargestSigma(const Eigen::Matrix3d& covariance) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(covariance, Eigen::EigenvaluesOnly);
-  return std::sqrt(std::max(0.0, eigen.eigenvalues().maxCoeff()));
-}
 
 BodyEstimate FromMessage(const pose_t& m) {
   const Eigen::Map<const Eigen::Matrix<double, 9, 9, Eigen::RowMajor>> P(m.local_covariance);
@@ -113,8 +107,8 @@ void PlanningNode::OnPrediction(const prediction_t& message) {
                         message.target.n_coefficients <= kMaxCoefficients;
   if (forecast.has_target) {
     forecast.target = bus::FromMessage(message.target, origin);
-    forecast.sigma = LargestSigma(bus::ToMatrix(message.covariance));
-    forecast.speed_sigma = LargestSigma(bus::ToMatrix(message.velocity_covariance));
+    forecast.covariance = bus::ToMatrix(message.covariance);
+    forecast.velocity_covariance = bus::ToMatrix(message.velocity_covariance);
     forecast.radius = message.radius;
     forecast.height = message.height;
     target_ = message.target;

@@ -148,13 +148,22 @@ double ManoeuvreRate(const world::Manoeuvre& manoeuvre, double ahead) {
   return ahead > 0.0 ? manoeuvre.Variance(ahead) / (ahead * ahead) : 0.0;
 }
 
-// The target's own body, to which no margin is kept. Its manoeuvres count for `flown` s; they add
-// to its velocity's variance, so that they go on to count after that, but for less than they may.
+// Of a motion along the ground, where that of its level part is 1 along each axis.
+Eigen::Matrix3d AlongGround(const Ground& ground) {
+  Eigen::Matrix<double, 3, 2> along;
+  along << 1.0, 0.0, 0.0, 1.0, ground.slope_x, ground.slope_y;
+  return along * along.transpose();
+}
+
+// The target's own body, to which no margin is kept. Its manoeuvres, which lead along the ground,
+// count for `flown` s; they add to its velocity's variance, so that they go on to count after that,
+// but for less than they may.
 void SetTargetBody(const PlanRequest& request, double flown, double hard, StartCheck* start,
                    Problem* problem, std::string* notes) {
   world::Obstacle o = *request.target_body;
   const double ahead = problem->t0 + std::min(flown, problem->duration) - o.center.start;
-  o.velocity_covariance.diagonal().array() += ManoeuvreRate(request.target_manoeuvre, ahead);
+  o.velocity_covariance +=
+      ManoeuvreRate(request.target_manoeuvre, ahead) * AlongGround(problem->limits.ground);
   Ellipsoid e;
   e.id = kTargetId;
   e.body = world::MakeBody(o, problem->t0, problem->duration, problem->sigmas);

@@ -15,6 +15,7 @@ using Eigen::Vector3d;
 
 constexpr double kInTime = 0.05;  // s: contacts are sampled this often
 constexpr double kAlike = 0.01;   // m of clearance that make no difference
+constexpr double kAbove = 0.05;   // m, left to what the target's height is off
 // tau by which the ground is left: from rest to rest a climb of 0.5 m is 0.27 m up by then, and
 // slabs reach 0.3 m above what they stand for. The check allows as much: kLeaveGroundBy.
 constexpr double kOutBy = 0.6;
@@ -86,6 +87,23 @@ std::optional<Stop> Resting::BrakeWithin(bool heights) {
   return std::nullopt;
 }
 
+std::optional<Stop> Resting::RiseOrBrake() {
+  // To rest 0.5 m higher takes 2.9 and 1.0 m/s^2 at most.
+  constexpr double kTimes[] = {1.0, 1.7};  // s
+  if (!request_.target_body) return Brake();
+  const world::Obstacle& target = *request_.target_body;
+  beyond_ = false;
+  has_problem_ = false;
+  for (const double T : kTimes) {
+    Vector3d end = ToPoints(BrakeCurve(over_.start, T), 5).row(5).transpose();
+    const double top = target.center.Position(over_.t0 + T).z() + target.half.z() + kAbove;
+    if (end.z() >= top + config_.hard_radius()) break;
+    end.z() = top + config_.hard_radius();
+    if (auto stop = Certified(CurveTo(over_.start, T, end), T)) return stop;
+  }
+  return Brake();
+}
+
 std::optional<Stop> Resting::Certified(const Curve& curve, double T) {
   SetProblem(T);
   if (!curve.allFinite() || !KeepsLimits(curve, problem_) || !IsForecast(curve, T))
@@ -93,6 +111,16 @@ std::optional<Stop> Resting::Certified(const Curve& curve, double T) {
   auto proofs = ProveOff(curve, problem_, 1.0);
   if (!proofs) return std::nullopt;
   return Stop{{over_.t0, T, curve}, std::move(*proofs), true};
+}
+
+bool Resting::Lasts(const Stop& stop, double t) {
+  const world::Trajectory& way = stop.trajectory;
+  const double T = t - way.end();
+  if (!(T > 0.0)) return true;
+  world::State rest;
+  rest.p = way.Position(way.end());
+  From(rest, way.end());
+  return Certified(CurveTo(rest, T, rest.p), T).has_value();
 }
 
 bool Resting::CanBeFlown(const Curve& curve, double T) {

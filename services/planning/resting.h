@@ -42,8 +42,15 @@ class Resting {
   std::optional<Stop> Brake();
   std::optional<Stop> BrakeWithin(bool heights = true);
 
+  /// The quickest that is certified and ends above the target's body, so that it passes below;
+  /// where there is none, or braking does, Brake().
+  std::optional<Stop> RiseOrBrake();
+
   /// A certified way over T, if the curve is one.
   std::optional<Stop> Certified(const Curve& curve, double T);
+
+  /// Is whoever stays at the end of `stop` certified clear until t, s? Another start after that.
+  bool Lasts(const Stop& stop, double t);
 
   /// Within the limits of speed and acceleration.
   bool CanBeFlown(const Curve& curve, double T);

@@ -128,13 +128,19 @@ std::optional<PlanResult> Committed(const PlannerConfig& config, const PlanReque
 
 }  // namespace
 
+constexpr double kOver[] = {0.7, 1.0, 1.6};  // s, that ways aside take
+// s from now on that a place of rest should be clear: there is a way aside until then.
+constexpr double kLasts = kOver[2] + kOverdue;
+
 Stop Evade(const PlannerConfig& config, const PlanRequest& request) {
   static const std::vector<Vector3d> displacements = Displacements();
-  constexpr double kOver[] = {1.0, 1.6};
   const std::vector<world::Obstacle> unseen = UnseenAround(config, request);
-  Resting resting[] = {{config, request}, {config, request}};
-  Resting seen[] = {{config, request, unseen}, {config, request, unseen}};
-  std::optional<Stop> blind;  // certified but for what nobody has looked into
+  Resting resting[] = {{config, request}, {config, request}, {config, request}};
+  Resting seen[] = {
+      {config, request, unseen}, {config, request, unseen}, {config, request, unseen}};
+  Resting after(config, request);
+  // Certified, but nobody has looked into it, or somebody comes there soon.
+  std::optional<Stop> blind, brief;
   Stop best;
   std::pair<double, double> least{-HUGE_VAL, -HUGE_VAL};
   const auto weigh = [&](Resting* way, const Curve& curve, double T, bool aside) {
@@ -152,17 +158,21 @@ Stop Evade(const PlannerConfig& config, const PlanRequest& request) {
     if (braking.CanBeFlown(curve, T)) weigh(&braking, curve, T, false);
   }
   for (const Vector3d& d : displacements)
-    for (int i = 0; i < 2; ++i) {
+    for (int i = 0; i < 3; ++i) {
       const double T = kOver[i];
       const Vector3d end = ToPoints(BrakeCurve(request.start, T), 5).row(5).transpose() + d;
       const Curve curve = CurveTo(request.start, T, end);
       if (auto stop = resting[i].Certified(curve, T)) {
-        if (unseen.empty() || seen[i].Certified(curve, T)) return *stop;
-        if (!blind) blind = std::move(stop);
+        const bool is_seen = unseen.empty() || seen[i].Certified(curve, T);
+        stop->lasts = after.Lasts(*stop, request.t0 + kLasts);
+        if (is_seen && stop->lasts) return *stop;
+        std::optional<Stop>& second = is_seen ? brief : blind;
+        if (!second || (stop->lasts && !second->lasts)) second = std::move(stop);
         continue;
       }
-      if (!blind && resting[i].CanBeFlown(curve, T)) weigh(&resting[i], curve, T, true);
+      if (!blind && !brief && resting[i].CanBeFlown(curve, T)) weigh(&resting[i], curve, T, true);
     }
+  if (brief) return *brief;
   if (blind) return *blind;
   if (least.first < 0.0)  // none can be flown
     weigh(&braking, BrakeCurve(request.start, kLongest), kLongest, false);
@@ -193,13 +203,23 @@ PlanResult RestPlan(const PlannerConfig& config, const PlanRequest& request) {
   Resting wide(config, request), close(hard, request);
   std::optional<Stop> stop = wide.BrakeWithin();
   if (!stop) stop = close.BrakeWithin();
+  if (stop && !Resting(hard, request).Lasts(*stop, request.t0 + kLasts)) {
+    Stop aside = Evade(hard, request);
+    if (aside.certified && aside.lasts) {
+      result.verdict = Verdict::kEscape;
+      result.reason = "somebody comes where braking leads";
+      result.trajectory = std::move(aside.trajectory);
+      SetProofs(config, request, std::move(aside.proofs), &result);
+      return result;
+    }
+  }
   if (!stop)
     if (auto committed = Committed(hard, request)) return *committed;
   if (!stop) stop = wide.Brake();
   if (!stop) stop = close.Brake();
   result.verdict = Verdict::kBrake;
   if (!stop) {
-    stop = Evade(config, request);
+    stop = Evade(hard, request);
     if (stop->certified) result.verdict = Verdict::kEscape;
     if (stop->aside) result.verdict = Verdict::kMitigate;
     result.reason = stop->certified ? "nor is braking" : "nor is braking, nor any way aside";
@@ -223,7 +243,7 @@ std::optional<Stop> WayOut(const PlannerConfig& config, const PlanRequest& reque
     const double t = std::min(plan.start + after, plan.end());
     resting.From(plan.At(t), t);
     std::optional<Stop> stop;
-    if (KeepsOff(hard, request, unseen, plan, t)) stop = resting.Brake();
+    if (KeepsOff(hard, request, unseen, plan, t)) stop = resting.RiseOrBrake();
     if (stop) {  // whoever checks it hears of obstacles only
       auto& proofs = stop->proofs;
       proofs.erase(std::remove_if(proofs.begin(), proofs.end(), is_unseen), proofs.end());

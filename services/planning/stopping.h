@@ -15,6 +15,8 @@ struct Stop {
   std::vector<Proof> proofs;
   bool certified = false;
   bool aside = false;  ///< leads elsewhere than braking does
+  bool lasts = false;  ///< whoever stays at its end is certified clear for as long as stepping
+                       ///< aside takes
 };
 
 /// Would control fly that leg? It keeps to the geofence.
@@ -34,8 +36,8 @@ std::optional<Stop> GoOn(const PlannerConfig& config, const PlanRequest& request
                          const world::Trajectory& way);
 
 /// Out of the way: comes to rest near where braking would, of all places tried the nearest that can
-/// be certified, also up and down. Where none can: the one whose first contact is the latest, then
-/// the one that stays farthest off; not certified.
+/// be certified, also up and down, those first that last. Where none can: the one whose first
+/// contact is the latest, then the one that stays farthest off; not certified.
 Stop Evade(const PlannerConfig& config, const PlanRequest& request);
 
 /// When the certified stop of a plan begins, s after its start: several periods of planning.

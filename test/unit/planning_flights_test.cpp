@@ -37,8 +37,8 @@ Forecast ForecastOf(double t, const Vector3d& p, const Vector3d& v, const Vector
   f.target.coefficients.row(0) = p.transpose();
   f.target.coefficients.row(1) = kHorizon * v.transpose();
   f.target.coefficients.row(2) = 0.5 * kHorizon * kHorizon * a.transpose();
-  f.sigma = 0.03;
-  f.speed_sigma = 0.05;
+  f.covariance = 0.03 * 0.03 * Eigen::Matrix3d::Identity();
+  f.velocity_covariance = 0.05 * 0.05 * Eigen::Matrix3d::Identity();
   f.radius = 0.3;
   f.height = 1.7;
   return f;

@@ -17,7 +17,7 @@ Forecast Walking(double t) {
   f.target.coefficients << 2.5 + 0.8 * t, 0.0, 0.5, 0.8 * 2.5, 0.0, 0.0;
   f.radius = 0.3;
   f.height = 1.0;
-  f.speed_sigma = 0.2;
+  f.velocity_covariance = 0.04 * Eigen::Matrix3d::Identity();
   return f;
 }
 
@@ -441,8 +441,9 @@ TEST(Pilot, TheForecastsUncertaintyAndBodyReachThePlan) {
     flight.pilot.SetObstacles(flight.t, {pillar});
     Forecast forecast = Walking(flight.t);
     forecast.target.coefficients << 2.5, 0.0, 0.5, -2.5, 0.0, 0.0;
-    forecast.sigma = sigma;
-    forecast.speed_sigma = 0.5 * sigma;
+    const double speed_sigma = 0.5 * sigma;
+    forecast.covariance = sigma * sigma * Eigen::Matrix3d::Identity();
+    forecast.velocity_covariance = 0.25 * forecast.covariance;
     forecast.radius = 0.3;
     forecast.height = 2.0;
     flight.pilot.SetForecast(forecast);
@@ -457,26 +458,33 @@ TEST(Pilot, TheForecastsUncertaintyAndBodyReachThePlan) {
     };
     for (double t = plan->trajectory.start; t <= plan->trajectory.end(); t += 0.02) {
       const double since = t - forecast.t;
-      const double deviations = c.sigmas * std::hypot(forecast.sigma, since * forecast.speed_sigma);
+      const double deviations = c.sigmas * std::hypot(sigma, since * speed_sigma);
       EXPECT_GE(distance(plan->trajectory, t), c.hard_radius() + deviations - 1e-3) << since;
     }
-    // Until the stop begins, and along it, the target manoeuvres, too.
+    // Until the stop begins, and along it, the target manoeuvres, too: along the ground.
     const world::Manoeuvre manoeuvre{config.target_acceleration, config.target_memory};
     const auto deviation = [&](double since) {
-      const double v = since * forecast.speed_sigma;
-      return std::sqrt(forecast.sigma * forecast.sigma + v * v + manoeuvre.Variance(since));
+      const double v = since * speed_sigma;
+      return std::sqrt(sigma * sigma + v * v + manoeuvre.Variance(since));
     };
     ASSERT_TRUE(plan->stop);
     for (double t = plan->trajectory.start; t <= plan->stop->end(); t += 0.02) {
       const world::Trajectory& way = t < plan->stop->start ? plan->trajectory : *plan->stop;
-      EXPECT_GE(distance(way, t), c.hard_radius() + c.sigmas * deviation(t - forecast.t) - 1e-3)
-          << t;
+      const Eigen::Vector3d d = way.Position(t) - forecast.target.Position(t);
+      const double since = t - forecast.t, level = c.sigmas * deviation(since);
+      const double up = c.sigmas * std::hypot(sigma, since * speed_sigma);
+      for (double off = 0.0; off < 1.6; off += 0.1)
+        EXPECT_GE(
+            std::hypot(std::max(0.0, d.head<2>().norm() - forecast.radius - level * std::cos(off)),
+                       std::max(0.0, std::abs(d.z()) - 0.5 * forecast.height - up * std::sin(off))),
+            c.hard_radius() - 1e-3)
+            << t << " " << off;
     }
     int sights = 0;
     for (const Proof& p : plan->proofs) {
       if (!p.of_sight) continue;
       ++sights;
-      EXPECT_GE(p.target_radius[0], c.sight_margin + c.sigmas * forecast.sigma - 1e-9);
+      EXPECT_GE(p.target_radius[0], c.sight_margin + c.sigmas * sigma - 1e-9);
       EXPECT_GE(p.target_radius.sum(),
                 c.sight_margin + c.sigmas * deviation(plan->trajectory.duration) - 1e-9);
     }

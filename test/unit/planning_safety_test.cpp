@@ -107,6 +107,26 @@ TEST(Evasion, WhatCannotBeBrakedForIsEvadedAndCertified) {
   EXPECT_EQ(aside, 4);
 }
 
+// Braking is certified for as long as it takes; where somebody comes soon after that it is too late
+// for a way aside then.
+TEST(Evasion, StepsAsideWhileThereIsAWay) {
+  const PlannerConfig config;
+  for (const double beside : {0.0, 0.2, 3.0}) {
+    PlanRequest request = Hover();
+    const Vector3d at = request.start.p + Vector3d(-2.2, beside, 0.0);
+    request.obstacles = {Cylinder(1, at, {1.2, 0.0, 0.0}, 0.3, 3.0)};
+    ASSERT_TRUE(Brake(config, request));
+    const PlanResult plan = RestPlan(config, request);
+    EXPECT_GE(plan.certified_clearance, 0.0) << beside;
+    EXPECT_EQ(plan.verdict, beside < 1.0 ? Verdict::kEscape : Verdict::kBrake) << plan.reason;
+    const Vector3d end = plan.trajectory.Position(plan.trajectory.end());
+    const double from = plan.trajectory.end();
+    EXPECT_GE(LeastDistance(request.obstacles[0],
+                            world::Trajectory::Constant(end, from, request.t0 + 2.0 - from)),
+              config.hard_radius() - 1e-6);
+  }
+}
+
 TEST(Evasion, WhereNothingCanBeCertifiedTheContactComesLaterThanAtRest) {
   const PlannerConfig config;
   for (int i = 0; i < 6; ++i) {
@@ -121,6 +141,7 @@ TEST(Evasion, WhereNothingCanBeCertifiedTheContactComesLaterThanAtRest) {
     EXPECT_LT((plan.trajectory.Position(0.0) - request.start.p).norm(), 1e-9);
     const world::Trajectory stays =
         world::Trajectory::Constant(request.start.p, 0.0, plan.trajectory.duration);
+    EXPECT_GT((plan.trajectory.Position(plan.trajectory.end()) - request.start.p).norm(), 0.3);
     EXPECT_GT(FirstContact(request.obstacles[0], plan.trajectory, config.drone_radius),
               FirstContact(request.obstacles[0], stays, config.drone_radius))
         << speed;
@@ -291,6 +312,50 @@ TEST(TargetBody, ManoeuvresCountForAsLongAsAPlanIsFlown) {
     const auto& S = problem.target_body->body->covariance;
     EXPECT_NEAR(S[2](0, 0), T * T * rate, 1e-9) << rests;
     EXPECT_NEAR(S[0](1, 1), 0.3 * 0.3 * rate, 1e-9) << rests;
+    EXPECT_NEAR(S[2](2, 2), T * T * 0.01, 1e-9) << "it stays on the ground";
+  }
+}
+
+// On a slope it leads up and down as the ground does.
+TEST(TargetBody, ManoeuvresLeadAlongTheGround) {
+  PlanRequest request = Hover();
+  request.target_manoeuvre = {0.4, 1.0};
+  request.target_body = Cylinder(kTargetId, {3.0, 0.0, 0.85}, {0.0, 0.0, 0.0}, 0.3, 0.85);
+  world::Obstacle slab = Wall(3, 0.0, 0.0);
+  slab.ground = true;
+  slab.moving = false;
+  slab.half = {20.0, 20.0, 0.1};
+  slab.axes = Eigen::AngleAxisd(-std::atan(0.2), Vector3d::UnitY());
+  request.obstacles = {slab};
+  const Problem problem = MakeProblem(PlannerConfig(), request, nullptr);
+  const Eigen::Matrix3d& S = problem.target_body->body->covariance[2];
+  EXPECT_GT(S(0, 0), 0.0);
+  EXPECT_NEAR(S(2, 2), 0.04 * S(0, 0), 1e-9);
+  EXPECT_NEAR(S(0, 2), 0.2 * S(0, 0), 1e-9);
+  EXPECT_NEAR(S(1, 2), 0.0, 1e-9);
+}
+
+// Whoever stands at the end of a stop, with no planner any more, is not walked into by a target
+// that turns back: it passes below.
+TEST(TargetBody, AStopEndsAboveIt) {
+  const PlannerConfig config;
+  const auto planner = MakePlanner("chase", config);
+  for (const double z : {1.0, 1.2, 1.4}) {
+    PlanRequest request = Hover();
+    request.start.p.z() = z;
+    request.start.v.x() = 0.8;
+    request.target_manoeuvre = {0.5, 0.5};
+    request.target_body = Cylinder(kTargetId, {0.0, 0.0, 0.6}, {0.6, 0.0, 0.0}, 0.15, 0.25);
+    request.target.coefficients << 0.0, 0.0, 0.6, 1.5, 0.0, 0.0;
+    const PlanResult plan = planner->Plan(request);
+    ASSERT_TRUE(plan.stop) << plan.reason;
+    const Vector3d end = plan.stop->Position(plan.stop->end());
+    EXPECT_GE(end.z(), 0.85 + config.hard_radius()) << z;
+    world::Obstacle back = *request.target_body;
+    back.center = {plan.stop->end(), 10.0, Eigen::MatrixXd::Zero(2, 3)};
+    back.center.coefficients << 4.0, 0.0, 0.6, -8.0, 0.0, 0.0;
+    EXPECT_GE(LeastDistance(back, world::Trajectory::Constant(end, plan.stop->end(), 10.0)),
+              config.hard_radius());
   }
 }
 
