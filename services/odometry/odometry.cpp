@@ -224,11 +224,20 @@ Features Odometry::FeaturesIn(const Prepared& prepared,
   return {Picked(points, prepared.matched_planes), Axes(prepared, points), X_BL_.p.cast<float>()};
 }
 
+/// A sweep whose stamps are not as usual may be of a while earlier or later.
+Matrix6d Odometry::PriorOf(const Prepared& prepared) const {
+  Matrix6d P = PosePart(prepared.predicted);
+  if (health_.IsUsual(prepared.end)) return P;
+  Vector6d motion;
+  motion << prepared.predicted.v, prepared.predicted.R_WB * prepared.predicted.w_B;
+  motion *= config_.health.late_sweep;
+  return P + motion * motion.transpose();
+}
+
 MatchResult Odometry::Match(Prepared* prepared) {
   if (planes_.cells() == 0) return {};
-  MatchResult match =
-      matcher_.Match(FeaturesIn(*prepared, prepared->at_end), planes_, posts_,
-                     prepared->predicted.pose(), PosePart(prepared->predicted), unknown_);
+  MatchResult match = matcher_.Match(FeaturesIn(*prepared, prepared->at_end), planes_, posts_,
+                                     prepared->predicted.pose(), PriorOf(*prepared), unknown_);
   if (Blind(prepared->end)) MatchBlind(prepared, &match);
   return match;
 }

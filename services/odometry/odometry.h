@@ -117,6 +117,7 @@ class Odometry {
   Features FeaturesIn(const Prepared& prepared, const std::vector<Eigen::Vector3f>& points) const;
   std::vector<Eigen::Vector3f> Axes(const Prepared& prepared,
                                     const std::vector<Eigen::Vector3f>& points) const;
+  Matrix6d PriorOf(const Prepared& prepared) const;
   MatchResult Match(Prepared* prepared);
   void MatchBlind(Prepared* prepared, MatchResult* match);
   void Bootstrap(Prepared* prepared, MatchResult* match);
