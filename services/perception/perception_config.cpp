@@ -6,13 +6,6 @@ namespace chase::perception {
 
 namespace {
 
-template <class Config>
-std::string OutOfLimits(Config config) {
-  LimitCheck check;
-  config.Visit(check);
-  return check.problem;
-}
-
 std::string RigProblem(const world::Rig& rig) {
   LimitCheck check;
   check.Limit("rig.width_px", rig.width_px, 16, 16384);
@@ -37,14 +30,6 @@ std::string RigProblem(const world::Rig& rig) {
 
 }  // namespace
 
-std::string ColorConfig::Problem() const { return OutOfLimits(*this); }
-std::string ShapeConfig::Problem() const { return OutOfLimits(*this); }
-std::string MarkerConfig::Problem() const { return OutOfLimits(*this); }
-std::string NetworkConfig::Problem() const { return OutOfLimits(*this); }
-std::string FitConfig::Problem() const { return OutOfLimits(*this); }
-std::string MotionConfig::Problem() const { return OutOfLimits(*this); }
-std::string StateConfig::Problem() const { return OutOfLimits(*this); }
-
 std::string DetectorConfig::Problem() const {
   if (kind != "color" && kind != "marker" && kind != "network")
     return "kind is '" + kind + "', must be color, marker or network";
@@ -56,7 +41,7 @@ std::string DetectorConfig::Problem() const {
 std::string PerceptionConfig::Problem() const {
   if (target_shape != "cylinder" && target_shape != "box" && target_shape != "sphere")
     return "target_shape is '" + target_shape + "', must be cylinder, box or sphere";
-  const std::string problem = OutOfLimits(*this);
+  const std::string problem = Limits::Problem();
   return problem.empty() ? RigProblem(rig) : problem;
 }
 

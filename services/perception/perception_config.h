@@ -32,8 +32,18 @@ void Limited(V& v, const char* name, T& field, double low, double high, const ch
     v(name, field, doc);
 }
 
+/// What a config's Problem() says of the fields that lie outside their limits.
+template <class Config>
+struct Limits {
+  std::string Problem() const {
+    LimitCheck check;
+    Config(static_cast<const Config&>(*this)).Visit(check);
+    return check.problem;
+  }
+};
+
 /// The target's colour. A soft score: 1 inside the range, falling to 0 outside it.
-struct ColorConfig {
+struct ColorConfig : Limits<ColorConfig> {
   double hue_min_deg = 10.0, hue_max_deg = 42.0;  ///< may wrap: 350 to 20
   double saturation_min = 0.6, value_min = 0.16;
   bool white_balance = true;
@@ -48,11 +58,10 @@ struct ColorConfig {
             "brightest channel as a share of the light on the scene, 0 to 1");
     v("white_balance", white_balance, "undo the tint of the light, estimated on greyish pixels");
   }
-  std::string Problem() const;
 };
 
 /// What the target's blob looks like in the image.
-struct ShapeConfig {
+struct ShapeConfig : Limits<ShapeConfig> {
   double aspect = 0.57, fill = 0.93;
   double inset = 0.0, outline_sigma = 0.0;
 
@@ -66,10 +75,9 @@ struct ShapeConfig {
             "its sides depart so far from the model's, as a cone's from a cylinder's, in every "
             "frame alike: one standard deviation, share of its width");
   }
-  std::string Problem() const;
 };
 
-struct MarkerConfig {
+struct MarkerConfig : Limits<MarkerConfig> {
   std::string dictionary = "DICT_4X4_50";
   int id = 0;
   double side = 0.2, depth = 0.15;
@@ -84,10 +92,9 @@ struct MarkerConfig {
     Limited(v, "depth", depth, -1, 5,
             "from the marker along the line of sight to the target's centre, m");
   }
-  std::string Problem() const;
 };
 
-struct NetworkConfig {
+struct NetworkConfig : Limits<NetworkConfig> {
   std::string file;
   int input_width_px = 320, input_height_px = 320;
   int class_id = 0;
@@ -101,7 +108,6 @@ struct NetworkConfig {
     Limited(v, "class_id", class_id, 0, 10000, "which score is the target's");
     Limited(v, "min_score", min_score, 0, 1, "boxes below are left out, 0 to 1");
   }
-  std::string Problem() const;
 };
 
 struct DetectorConfig {
@@ -123,7 +129,7 @@ struct DetectorConfig {
 };
 
 /// Standard deviations of what is measured.
-struct FitConfig {
+struct FitConfig : Limits<FitConfig> {
   double edge_sigma_px = 0.5, lidar_sigma = 0.025;
 
   template <class V>
@@ -132,11 +138,10 @@ struct FitConfig {
             "of one edge of the silhouette where the image is sharp; more where it is blurred");
     Limited(v, "lidar_sigma", lidar_sigma, 1e-3, 1, "of one LiDAR point, m");
   }
-  std::string Problem() const;
 };
 
 /// Constant velocity with white acceleration, and the honesty of what is published.
-struct MotionConfig {
+struct MotionConfig : Limits<MotionConfig> {
   double acceleration_density = 0.12, max_speed = 5.0;
   double pose_sigma = 0.005, tilt_sigma_deg = 0.35, heading_sigma_deg = 0.12;
 
@@ -153,11 +158,10 @@ struct MotionConfig {
     Limited(v, "heading_sigma_deg", heading_sigma_deg, 0, 20,
             "least standard deviation of its heading");
   }
-  std::string Problem() const;
 };
 
 /// When the target counts as found and lost.
-struct StateConfig {
+struct StateConfig : Limits<StateConfig> {
   double acquire_score = 0.35, lost_after = 5.0, standing_after = 3.0, decoy_radius = 0.5;
 
   template <class V>
@@ -171,10 +175,9 @@ struct StateConfig {
             "what is seen nearer than this to a look-alike, a candidate, the target in view or "
             "where a hidden one is expected or stood, is taken for that, m");
   }
-  std::string Problem() const;
 };
 
-struct PerceptionConfig {
+struct PerceptionConfig : Limits<PerceptionConfig> {
   world::Rig rig;
   std::string target_shape = "cylinder";
   double target_radius = 0.15, target_height = 0.5;

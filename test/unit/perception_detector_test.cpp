@@ -28,23 +28,22 @@ cv::Mat Grey(int level = 120) { return {240, 376, CV_8UC3, cv::Scalar(level, lev
 const cv::Scalar kOrangeBgr(12, 105, 235);
 
 TEST(PerceptionColor, ScoresOrangeAndNotItsNeighbours) {
-  const ColorModel model{ColorConfig{}};
-  EXPECT_GT(model.Score(0.05, 0.45, 1.0), 0.99);
-  EXPECT_GT(model.Score(0.02, 0.18, 0.4), 0.99) << "in shade";
-  EXPECT_LT(model.Score(0.5, 0.5, 0.5), 0.01) << "grey";
-  EXPECT_LT(model.Score(0.05, 0.05, 0.9), 0.5) << "red";
-  EXPECT_LT(model.Score(0.1, 0.9, 0.9), 0.5) << "yellow";
-  EXPECT_LT(model.Score(0.21, 0.28, 0.36), 0.5) << "bark";
+  const ColorConfig config;
+  EXPECT_GT(Score(config, ToHsv(0.05, 0.45, 1.0)), 0.99);
+  EXPECT_GT(Score(config, ToHsv(0.02, 0.18, 0.4)), 0.99) << "in shade";
+  EXPECT_LT(Score(config, ToHsv(0.5, 0.5, 0.5)), 0.01) << "grey";
+  EXPECT_LT(Score(config, ToHsv(0.05, 0.05, 0.9)), 0.5) << "red";
+  EXPECT_LT(Score(config, ToHsv(0.1, 0.9, 0.9)), 0.5) << "yellow";
+  EXPECT_LT(Score(config, ToHsv(0.21, 0.28, 0.36)), 0.5) << "bark";
 }
 
 TEST(PerceptionColor, RangeOfHueMayWrap) {
   ColorConfig config;
   config.hue_min_deg = 350;
   config.hue_max_deg = 10;
-  const ColorModel model(config);
-  EXPECT_GT(model.Score(0.05, 0.0, 1.0), 0.99);
-  EXPECT_GT(model.Score(0.0, 0.05, 1.0), 0.99);
-  EXPECT_LT(model.Score(0.05, 0.45, 1.0), 0.01);
+  EXPECT_GT(Score(config, ToHsv(0.05, 0.0, 1.0)), 0.99);
+  EXPECT_GT(Score(config, ToHsv(0.0, 0.05, 1.0)), 0.99);
+  EXPECT_LT(Score(config, ToHsv(0.05, 0.45, 1.0)), 0.01);
 }
 
 TEST(PerceptionColor, AFullCircleLetsEveryHuePass) {
@@ -52,11 +51,10 @@ TEST(PerceptionColor, AFullCircleLetsEveryHuePass) {
   config.hue_min_deg = 0;
   config.hue_max_deg = 360;
   ASSERT_EQ(config.Problem(), "");
-  const ColorModel model(config);
-  EXPECT_GT(model.Score(0.0, 0.0, 1.0), 0.99) << "red";
-  EXPECT_GT(model.Score(0.0, 1.0, 0.5), 0.99) << "green";
-  EXPECT_GT(model.Score(1.0, 1.0, 0.0), 0.99) << "cyan";
-  EXPECT_GT(model.Score(1.0, 0.0, 0.5), 0.99) << "violet";
+  EXPECT_GT(Score(config, ToHsv(0.0, 0.0, 1.0)), 0.99) << "red";
+  EXPECT_GT(Score(config, ToHsv(0.0, 1.0, 0.5)), 0.99) << "green";
+  EXPECT_GT(Score(config, ToHsv(1.0, 1.0, 0.0)), 0.99) << "cyan";
+  EXPECT_GT(Score(config, ToHsv(1.0, 0.0, 0.5)), 0.99) << "violet";
 }
 
 TEST(PerceptionColor, AnyHueIsLearnedAsANarrowRange) {

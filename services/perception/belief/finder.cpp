@@ -52,13 +52,13 @@ void Finder::SetDetector(const DetectorConfig& detector) {
 }
 
 void Finder::AddSweep(const Sweep& sweep) {
-  if (!sweeps_.empty() && sweep.t < sweeps_.back().sweep.t() - PoseHistory::kSpan) sweeps_.clear();
-  sweeps_.push_back({RangedSweep(sweep), false});
+  if (!sweeps_.empty() && sweep.t < sweeps_.back().sweep.t - PoseHistory::kSpan) sweeps_.clear();
+  sweeps_.push_back({sweep, false});
   if (sweeps_.size() > kMaxSweeps) sweeps_.pop_front();
 }
 
 void Finder::MarkSweepsUsed(double t) {
-  for (auto& s : sweeps_) s.used = s.used || s.sweep.t() <= t;
+  for (auto& s : sweeps_) s.used = s.used || s.sweep.t <= t;
 }
 
 std::optional<View> Finder::Look(const Frame& frame, std::string* note) const {
@@ -79,8 +79,8 @@ Clusters Finder::Points(const View& view, const Detection& detection, const Eige
                         bool fresh_only) const {
   Clusters all;
   for (auto it = sweeps_.rbegin(); it != sweeps_.rend(); ++it) {
-    if ((fresh_only && it->used) || view.t - it->sweep.t() > kMaxSweepAge) continue;
-    if (it->sweep.t() > view.t) continue;
+    if ((fresh_only && it->used) || view.t - it->sweep.t > kMaxSweepAge) continue;
+    if (it->sweep.t > view.t) continue;
     Clusters clusters = SelectPoints(it->sweep, poses_, view.camera, view.t, detection, v_WT);
     for (auto& c : clusters) all.push_back(std::move(c));
     if (!fresh_only) break;  // only the newest

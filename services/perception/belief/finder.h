@@ -78,7 +78,7 @@ class Finder {
 
  private:
   struct KeptSweep {
-    RangedSweep sweep;
+    Sweep sweep;
     bool used = false;
   };
 

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "services/perception/sight/silhouette.h"
+
 namespace chase::perception {
 
 namespace {
@@ -42,13 +44,6 @@ double Share(size_t samples, double weight) {
   return std::min(1.0, weight / static_cast<double>(std::max<size_t>(1, samples)));
 }
 
-double Median(std::vector<double> values) {
-  if (values.empty()) return 0.0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 /// Half the sum of squares of samples that count for at most `weight` together.
 double BoundedCost(const std::vector<double>& residuals, double sigma, double weight) {
   if (residuals.empty()) return 0.0;
@@ -58,30 +53,21 @@ double BoundedCost(const std::vector<double>& residuals, double sigma, double we
 }
 
 /// Cauchy's loss rho(s) = b^2 log(1 + s / b^2) of samples with the squares s, which count for
-/// `share` each. One logarithm is taken of a product.
+/// `share` each.
 class Cauchy {
  public:
   explicit Cauchy(double share) : share_(share) {}
   /// Adds a sample; slope of its loss.
   double Weight(double s) {
     const double u = 1.0 + s / (kOutlier * kOutlier);
-    product_ *= u;
-    if (product_ > kLargest) TakeLogarithm();
+    cost_ += 0.5 * share_ * kOutlier * kOutlier * std::log(u);
     return share_ / u;
   }
   /// Half the sum of the losses.
-  double Cost() {
-    TakeLogarithm();
-    return 0.5 * share_ * kOutlier * kOutlier * log_;
-  }
+  double cost() const { return cost_; }
 
  private:
-  static constexpr double kLargest = 1e100;
-  void TakeLogarithm() {
-    log_ += std::log(product_);
-    product_ = 1.0;
-  }
-  double share_, product_ = 1.0, log_ = 0.0;
+  double share_, cost_ = 0.0;
 };
 
 }  // namespace
@@ -157,20 +143,20 @@ NormalEquations FitProblem::Linearised(const Vector7d& y) const {
       const Residual r = EdgeResidual(side, edge, y).Scaled(scale);
       sum.Add(loss.Weight(r.value * r.value), r);
     }
-    sum.cost += loss.Cost();
+    sum.cost += loss.cost();
   }
   Cauchy loss(Share(input_.points.size(), kLidarWeight));
   for (const auto& p : input_.points) {
     const Residual r = SurfaceDistance(input_.shape, p, y).Scaled(1.0 / config_.lidar_sigma);
     sum.Add(loss.Weight(r.value * r.value), r);
   }
-  sum.cost += loss.Cost();
+  sum.cost += loss.cost();
   if (!position_information_) return sum;
   const Eigen::Vector3d beside = y.head<3>() - position_;
   const Eigen::Vector3d gradient = *position_information_ * beside;
   Cauchy stray(1.0);
   const double weight = stray.Weight(beside.dot(gradient));
-  sum.cost += stray.Cost();
+  sum.cost += stray.cost();
   sum.gradient.head<3>() += weight * gradient;
   sum.information.topLeftCorner<3, 3>() += weight * *position_information_;
   return sum;

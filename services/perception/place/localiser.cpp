@@ -60,15 +60,11 @@ bool Localiser::EdgesAgree(const FitResult& fit, const FitInput& input) const {
   return true;
 }
 
-const Localiser::Hypothesis& Localiser::Best(const std::vector<Hypothesis>& all) {
-  return *std::max_element(all.begin(), all.end(), [](const Hypothesis& a, const Hypothesis& b) {
-    return a.log_weight < b.log_weight;
-  });
-}
-
 /// One Gaussian with the mean and covariance of the mixture; all else from the likeliest.
 FitResult Localiser::Joined(const std::vector<Hypothesis>& all) {
-  const Hypothesis& best = Best(all);
+  const Hypothesis& best = *std::max_element(
+      all.begin(), all.end(),
+      [](const Hypothesis& a, const Hypothesis& b) { return a.log_weight < b.log_weight; });
   const auto weight = [&](const Hypothesis& h) { return std::exp(h.log_weight - best.log_weight); };
   FitResult out = best.fit;
   double total = 0.0;

@@ -36,9 +36,9 @@ class Localiser {
   /// Where the prediction erred along the line of sight, as the points of a cluster tell.
   std::optional<FitResult> DisplacedReading(const FitInput& input,
                                             const std::vector<TargetPoint>& cluster) const;
+  std::optional<FitResult> PartialReading(FitInput input) const;
   std::optional<FitResult> AcquirePartial(FitInput* input, const Clusters& clusters) const;
   std::optional<FitResult> AcquirePartialBySize(FitInput* input) const;
-  static const Hypothesis& Best(const std::vector<Hypothesis>& all);
   static FitResult Joined(const std::vector<Hypothesis>& all);
   void Weigh(const FitInput& input, double log_prior, size_t readings, bool all,
              std::vector<Hypothesis>* out) const;

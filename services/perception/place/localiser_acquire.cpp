@@ -29,6 +29,13 @@ bool LargerThanTarget(const FitInput& input, double range) {
 
 }  // namespace
 
+/// What is more likely part of a target than anything else.
+std::optional<FitResult> Localiser::PartialReading(FitInput input) const {
+  input.reappears = true;
+  const auto fit = JoinedReading(&input);
+  return fit && !fit->whole && !fit->joined && fit->log_odds > 0.0 ? fit : std::nullopt;
+}
+
 /// Half of a target whose range the points tell; what goes on beyond it is a larger thing.
 std::optional<FitResult> Localiser::AcquirePartial(FitInput* input,
                                                    const Clusters& clusters) const {
@@ -39,10 +46,7 @@ std::optional<FitResult> Localiser::AcquirePartial(FitInput* input,
     input->prior = NewTarget(input->camera, input->detection->box, input->shape, range, kHitRange);
     input->points = PointsOnTarget(*input, cluster, 2.0 * kLidarGate);
     if (input->points.size() < kSurelyHit) continue;
-    input->reappears = true;
-    const auto fit = JoinedReading(input);
-    input->reappears = false;
-    if (fit && !fit->joined && !fit->whole && fit->log_odds > 0.0) return fit;
+    if (const auto fit = PartialReading(*input)) return fit;
   }
   return std::nullopt;
 }
@@ -56,12 +60,9 @@ std::optional<FitResult> Localiser::AcquirePartialBySize(FitInput* input) const 
   const double range = RangeBySize(input->camera, d.box, input->shape, true);
   input->prior = NewTarget(input->camera, d.box, input->shape, range, kSizedRange);
   input->points.clear();
-  input->reappears = true;
-  const auto fit = JoinedReading(input);
-  input->reappears = false;
-  if (!fit || fit->whole || fit->joined || fit->log_odds <= 0.0) return std::nullopt;
-  if (std::count(fit->used.begin(), fit->used.end(), true) < kSidesOfNew) return std::nullopt;
-  return fit;
+  const auto fit = PartialReading(*input);
+  const auto used = fit ? std::count(fit->used.begin(), fit->used.end(), true) : 0;
+  return used < kSidesOfNew ? std::nullopt : fit;
 }
 
 std::optional<FitResult> Localiser::Acquire(const TargetShape& shape, const Camera& camera,

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <array>
 #include <vector>
 
 #include "services/perception/sensors/camera.h"
@@ -17,28 +16,6 @@ struct Sweep {
   std::vector<float> times;             ///< after t, s; as many as points
 };
 
-/// The usable points of a sweep, laid out to be looked through quickly.
-class RangedSweep {
- public:
-  explicit RangedSweep(const Sweep& sweep);
-
-  double t() const { return t_; }  ///< start, s
-  size_t size() const { return times_.size(); }
-  Eigen::Vector3f Point(size_t i) const;            ///< frame L, m
-  float Time(size_t i) const { return times_[i]; }  ///< after t(), s
-  /// All points, in the order they were fired, whose direction lies within the angle of this
-  /// cosine from `sight_L`, a unit vector.
-  std::vector<size_t> Near(const Eigen::Vector3f& sight_L, float cosine) const;
-
- private:
-  static constexpr Eigen::Index kBlock = 32;
-  using Block = Eigen::Array<float, kBlock, 1>;
-
-  double t_;
-  std::vector<float> times_;
-  std::array<Eigen::ArrayXf, 4> columns_;  // x, y, z, range [m], filled up to whole blocks
-};
-
 /// One LiDAR point placed in the world.
 struct TargetPoint {
   Eigen::Vector3d p_W;   ///< frame W, m
@@ -52,7 +29,7 @@ using Clusters = std::vector<std::vector<TargetPoint>>;
 
 /// The points of `sweep` that, carried on by the target's velocity v_WT to the frame's time, fall
 /// on the detection (its mask, or its box where it has none); split where the range jumps.
-Clusters SelectPoints(const RangedSweep& sweep, const PoseHistory& poses, const Camera& camera,
+Clusters SelectPoints(const Sweep& sweep, const PoseHistory& poses, const Camera& camera,
                       double t_frame, const Detection& detection, const Eigen::Vector3d& v_WT);
 
 }  // namespace chase::perception

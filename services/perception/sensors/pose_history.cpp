@@ -21,8 +21,7 @@ PoseSample Between(const PoseSample& a, const PoseSample& b, double t) {
   return out;
 }
 
-}  // namespace
-
+/// `sample` carried to time t, later or earlier, by its velocity, acceleration and rates.
 PoseSample Extrapolated(const PoseSample& sample, double t) {
   const double dt = t - sample.t;
   PoseSample out = sample;
@@ -32,6 +31,8 @@ PoseSample Extrapolated(const PoseSample& sample, double t) {
   out.R_WB = (sample.R_WB * math::ExpSO3(dt * sample.w_WB_B)).normalized();
   return out;
 }
+
+}  // namespace
 
 void PoseHistory::Add(const PoseSample& sample) {
   if (!samples_.empty() && sample.t < samples_.back().t - kSpan) samples_.clear();

@@ -39,7 +39,4 @@ class PoseHistory {
   std::deque<PoseSample> samples_;
 };
 
-/// `sample` carried to time t, later or earlier, by its velocity, acceleration and rates.
-PoseSample Extrapolated(const PoseSample& sample, double t);
-
 }  // namespace chase::perception

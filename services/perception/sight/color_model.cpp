@@ -34,6 +34,12 @@ double HueOutside(double hue, double low, double high) {
 /// 1 at or above the limit, falling to 0 over kSoftness below it.
 double Ramp(double x, double limit) { return std::clamp(1.0 + (x - limit) / kSoftness, 0.0, 1.0); }
 
+/// The share of daylight in an image, up to 1, from its mean brightness.
+double Light(const cv::Mat& bgr) {
+  const cv::Scalar mean = cv::mean(bgr);
+  return std::clamp((mean[0] + mean[1] + mean[2]) / (3.0 * kDim), kDarkest, 1.0);
+}
+
 }  // namespace
 
 Hsv ToHsv(double b, double g, double r) {
@@ -55,11 +61,6 @@ double Score(const ColorConfig& config, const Hsv& c) {
          Ramp(c.value, config.value_min);
 }
 
-double Light(const cv::Mat& bgr) {
-  const cv::Scalar mean = cv::mean(bgr);
-  return std::clamp((mean[0] + mean[1] + mean[2]) / (3.0 * kDim), kDarkest, 1.0);
-}
-
 ColorModel::ColorModel(const ColorConfig& config) : config_(config) {
   table_.resize(static_cast<size_t>(kLevels) * kLevels * kLevels);
   const auto center = [](uint32_t level) { return (level + 0.5) / kLevels; };
@@ -71,10 +72,6 @@ ColorModel::ColorModel(const ColorConfig& config) : config_(config) {
       for (uint32_t r = 0; r < kLevels; ++r)
         table_[i++] = static_cast<uint8_t>(std::lround(
             255.0 * chase::perception::Score(any, ToHsv(center(b), center(g), center(r)))));
-}
-
-double ColorModel::Score(double blue, double green, double red) const {
-  return chase::perception::Score(config_, ToHsv(blue, green, red));
 }
 
 Eigen::Vector3d ColorModel::Gains(const cv::Mat& bgr) const {

@@ -19,9 +19,6 @@ Hsv ToHsv(double blue, double green, double red);
 /// How much a colour looks like the target's, 0 to 1.
 double Score(const ColorConfig& config, const Hsv& color);
 
-/// The share of daylight in an image, up to 1, from its mean brightness. `bgr`: 8 bit 3 channels.
-double Light(const cv::Mat& bgr);
-
 /// How much each pixel looks like the target's colour.
 class ColorModel {
  public:
@@ -29,9 +26,6 @@ class ColorModel {
 
   /// 8 bit score per pixel, 0 to 255, after the light's tint is taken out. `bgr`: 8 bit 3 channels.
   cv::Mat Score(const cv::Mat& bgr) const;
-
-  /// Score of one colour, 0 to 1; channels 0 to 1.
-  double Score(double blue, double green, double red) const;
 
   /// Gains of blue, green and red that take the warmth off greyish pixels; ones where there are too
   /// few.

@@ -11,7 +11,7 @@ namespace chase::perception {
 
 namespace {
 
-constexpr double kSameBox = 0.45;   // overlap above which two boxes are one
+constexpr float kSameBox = 0.45f;   // overlap above which two boxes are one
 constexpr double kEdgeSigma = 2.5;  // px, standard deviation of a box's edge
 constexpr int kBoxFields = 4;
 constexpr float kMostScore = 1.001f;  // what is above is no score, as in a transposed output
@@ -26,11 +26,6 @@ Silhouette FromBox(const cv::Rect2d& box, const std::array<bool, 4>& cut, double
   if (!cut[kTop]) s.samples[kTop].emplace_back(u, box.y);
   if (!cut[kBottom]) s.samples[kBottom].emplace_back(u, box.y + box.height);
   return s;
-}
-
-double Overlap(const cv::Rect2d& a, const cv::Rect2d& b) {
-  const double both = (a & b).area();
-  return both / std::max(1e-9, a.area() + b.area() - both);
 }
 
 [[noreturn]] void Refuse(const NetworkConfig& config, const std::string& why) {
@@ -116,16 +111,20 @@ Detection NetworkDetector::Describe(const float* row, const cv::Size& image) con
 std::vector<Detection> NetworkDetector::Detect(const cv::Mat& bgr) const {
   const cv::Mat out = Forward(bgr);
   std::vector<Detection> all, kept;
+  std::vector<cv::Rect2d> boxes;
+  std::vector<float> scores;
   for (int i = 0; i < out.size[1]; ++i) {
     const float* row = out.ptr<float>(0, i);
-    if (Usable(row)) all.push_back(Describe(row, bgr.size()));
+    if (!Usable(row)) continue;
+    const Detection d = Describe(row, bgr.size());
+    if (d.box.area() <= 0.0) continue;
+    all.push_back(d);
+    boxes.push_back(d.box);
+    scores.push_back(static_cast<float>(d.score));
   }
-  std::stable_sort(all.begin(), all.end(),
-                   [](const Detection& a, const Detection& b) { return a.score > b.score; });
-  for (const auto& d : all) {
-    const auto same = [&](const Detection& k) { return Overlap(k.box, d.box) > kSameBox; };
-    if (d.box.area() > 0.0 && std::none_of(kept.begin(), kept.end(), same)) kept.push_back(d);
-  }
+  std::vector<int> order;
+  cv::dnn::NMSBoxes(boxes, scores, 0.0f, kSameBox, order);
+  for (const int i : order) kept.push_back(all[static_cast<size_t>(i)]);
   return kept;
 }
 

@@ -89,6 +89,13 @@ Eigen::Vector2d EdgeAt(const Line& line, int depth) {
 
 }  // namespace
 
+double Median(std::vector<double> values) {
+  if (values.empty()) return 0.0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
 std::pair<int, int> Extent(const cv::Mat& line) {
   int first = -1, last = -1;
   const int n = static_cast<int>(line.total());
@@ -119,10 +126,7 @@ double EdgeWidth(const cv::Mat& bgr, const cv::Mat& mask, const cv::Rect& roi) {
     for (const Line& line : {first, last})
       if (const auto width = WidthOn(line, depth)) widths.push_back(*width);
   });
-  if (widths.empty()) return 1.0;
-  const auto middle = widths.begin() + static_cast<std::ptrdiff_t>(widths.size() / 2);
-  std::nth_element(widths.begin(), middle, widths.end());
-  return *middle;
+  return std::max(1.0, Median(std::move(widths)));
 }
 
 cv::Mat Region(const Detection& detection) {

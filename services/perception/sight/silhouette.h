@@ -13,6 +13,9 @@ namespace chase::perception {
 inline constexpr int kMaxSamples = 8;  ///< of a side
 inline constexpr int kLeastPiece = 5;  ///< px, width of a piece
 
+/// The middle one, of an even number the higher; 0 of none.
+double Median(std::vector<double> values);
+
 /// First and last set pixel of a row or column, or (-1, -1).
 std::pair<int, int> Extent(const cv::Mat& line);
 

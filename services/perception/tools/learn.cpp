@@ -74,12 +74,6 @@ std::string WhyShapeless(const Detection* marked, const cv::Size& image) {
   throw std::invalid_argument(message + "give one with all of the target inside the picture");
 }
 
-double Median(std::vector<double> values) {
-  if (values.empty()) return 0.0;
-  std::sort(values.begin(), values.end());
-  return 0.5 * (values[(values.size() - 1) / 2] + values[values.size() / 2]);
-}
-
 /// How far the sides of a blob depart from those of an upright box or cylinder, or of a sphere,
 /// whichever is nearer: root of the mean square, share of its width, less what pixels make of it.
 double Departure(const Detection& d) {

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "services/perception/sight/color_detector.h"
+#include "services/perception/sight/silhouette.h"
 #include "services/perception/tools/learn.h"
 
 namespace chase::perception {
@@ -32,10 +33,6 @@ cv::Mat Grown(const cv::Mat& bgr, const cv::Mat& mask, const ColorConfig& base) 
   return grown;
 }
 
-bool TouchesBorder(const cv::Rect& box, const cv::Size& size) {
-  return box.x == 0 || box.y == 0 || box.br().x == size.width || box.br().y == size.height;
-}
-
 Selection Refused(std::string why) { return {std::move(why), {}, {}}; }
 
 std::string Percent(double share) {
@@ -52,7 +49,8 @@ std::string Unfit(const cv::Mat& mask) {
            " pixels of one colour are there: go nearer";
   if (share > kMostShare)
     return "that colour runs on over " + Percent(share) + " of the image: point at the target";
-  if (TouchesBorder(cv::boundingRect(mask), mask.size()))
+  const auto cut = CutSides(cv::boundingRect(mask), mask.size());
+  if (std::count(cut.begin(), cut.end(), true) > 0)
     return "the image cuts it: select it when all of it is in view";
   return "";
 }
