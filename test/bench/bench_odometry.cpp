@@ -141,8 +141,8 @@ BENCHMARK(GaussNewton)->Name("solver/gauss_newton")->Unit(benchmark::kMillisecon
 void Ceres(benchmark::State& state) {
   const Problem problem;
   for (auto _ : state)
-    benchmark::DoNotOptimize(test::MatchWithCeres(problem.features.planes, problem.planes,
-                                                  problem.start, 5e-5 * Matrix6d::Identity()));
+    benchmark::DoNotOptimize(
+        test::MatchWithCeres(problem.features.planes, problem.planes, problem.start, 0.1));
 }
 BENCHMARK(Ceres)->Name("solver/ceres")->Unit(benchmark::kMillisecond);
 

@@ -180,7 +180,7 @@ TEST(HeardOrder, TicksStandWhereTheyWere) {
       EXPECT_EQ(newest, flight.truth.at(ticks)) << "seed " << seed << ", tick " << ticks;
       EXPECT_NEAR(1e-6 * static_cast<double>(utime - kStart), 0.1 * ticks, 0.009);
     }
-    EXPECT_EQ(ticks, 199);
+    EXPECT_EQ(static_cast<size_t>(ticks), flight.truth.size());
   }
 }
 
