@@ -33,7 +33,8 @@ struct Claim {
   double hard_radius = 0.0;  ///< of sphere and tracking tube, m
   double sigmas = 0.0;       ///< that covariances are taken by
   bool certified = false;    ///< a clearance is claimed
-  bool last_resort = false;  ///< BRAKE, WAIT or MITIGATE: flown without a certificate if there is none
+  bool last_resort =
+      false;  ///< BRAKE, WAIT or MITIGATE: flown without a certificate if there is none
   bool starts_inside =
       false;  ///< ESCAPE, or a last resort: it may start in an obstacle and leave it
 };
