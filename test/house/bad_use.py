@@ -1,4 +1,5 @@
-"""Bad use of every program: one line on stderr that says what, where and how to mend it; exit 1.
+"""Bad use of every program: one line on stderr that says what, where and how to mend it; exit 1, or 2 where
+1 is an answer.
 
 bad_use.py BIN_DIR SERVICE..."""
 
@@ -59,9 +60,9 @@ class BadUse(unittest.TestCase):
         path.write_text(text, encoding="utf-8")
         return path
 
-    def assert_refused(self, answer, *words):
+    def assert_refused(self, answer, *words, code=1):
         line = answer.stderr
-        self.assertEqual(answer.returncode, 1, line)
+        self.assertEqual(answer.returncode, code, line)
         self.assertEqual(line.count("\n"), 1, f"not one line: {line!r}")
         self.assertEqual(answer.stdout, "", "an error belongs on stderr")
         for word in words:
@@ -228,7 +229,8 @@ class BadUse(unittest.TestCase):
                                  ("nan", -1, "inf", "x"))):
             for value in values:
                 with self.subTest(command=command, value=value):
-                    self.assert_refused(run(*command, value), command[-1], value)
+                    self.assert_refused(run(*command, value), command[-1], value,
+                                        code=2 if "diff" in command else 1)
 
     def test_tools_file_that_cannot_be_written(self):
         self.tools()
