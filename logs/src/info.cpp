@@ -7,6 +7,7 @@
 
 #include "chase/scenario_t.hpp"
 #include "chase/status_t.hpp"
+#include "common/bus/bus.h"
 #include "common/bus/channels.h"
 #include "common/bus/message_head.h"
 #include "common/logs/message_types.h"
@@ -157,6 +158,7 @@ void LogSurvey::AddHead(const LogEvent& e, Channel* channel) {
   ++count;
   seqs.Add(head->seq);
   for (const auto& [name, seq] : head->inputs) {
+    if (name == bus::Bus::kTick) continue;  // no message
     auto& heard = heard_.try_emplace(head->vehicle + name, Heard{seq, seq}).first->second;
     heard = {std::min(heard.first, seq), std::max(heard.last, seq)};
   }

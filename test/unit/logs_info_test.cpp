@@ -5,6 +5,7 @@
 #include <set>
 
 #include "chase/status_t.hpp"
+#include "common/bus/bus.h"
 #include "common/bus/log_writer.h"
 #include "logs/src/info.h"
 #include "logs/src/seq_count.h"
@@ -52,6 +53,22 @@ TEST(LogInfo, TellsVersionHostAndConfiguration) {
   EXPECT_EQ(software.at("configurations"), info.configurations);
   EXPECT_NE(Format(info).find("host       b (planning)\n"), std::string::npos);
   EXPECT_NE(Format(info).find("planning 930766865\n"), std::string::npos);
+}
+
+TEST(LogInfo, WhatOthersHeardAndTheLogLacksIsMissingButTicksAreNot) {
+  const std::string file = Temp("heard.lcm");
+  status_t status{};
+  bus::LogWriter out(file);
+  for (int k = 1; k <= 5; ++k) {
+    status.inputs = {{"IMU", 10 * k}, {bus::Bus::kTick, 2 * k}};
+    status.n_inputs = 2;
+    out.Write(k, "CONTROL_STATUS", Encoded(status));
+  }
+  out.Close();
+  const LogInfo info = Describe(file);
+  ASSERT_EQ(info.channels.size(), 2u);
+  EXPECT_EQ(info.channels[1].channel, "IMU");
+  EXPECT_EQ(info.channels[1].missing, 41);
 }
 
 TEST(LogInfo, ALogCutOffAnywhereIsReadAsFarAsItGoes) {
