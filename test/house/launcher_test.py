@@ -277,6 +277,19 @@ class FlightTest(unittest.TestCase):
         told = json.dumps({"duration_s": 2, "settle_s": 1, "commands": commands})
         self.program("chase-scenario", f"print({told!r})")
         self.program("chase-command", "import sys; print(*sys.argv[1:], flush=True)")
+        # It goes on until all have spoken, however long that takes.
+        self.program("chase-flight-monitor", f"""
+            import json, pathlib, signal, time
+            def say(t, done=False):
+                print(json.dumps(dict(mission_time=t, duration=2, distance=2.5, visible=1.0, rtf=0.0, done=done)), flush=True)
+            folder, end = pathlib.Path({str(self.bin / "flight")!r}), time.monotonic() + 20
+            say(1)
+            while time.monotonic() < end and sum(
+                    log.stat().st_size > 0 for log in folder.glob("command-*.log")) < 3:
+                time.sleep(0.1)
+            say(2, done=True)
+            signal.pause()
+            """)
         code, _, err = self.fly()
         self.assertEqual((code, err), (0, ""))
         said = {log.stem: log.read_text(encoding="utf-8") for log in self.folder.glob("command-*.log")}
