@@ -24,4 +24,8 @@ struct MostAge {
 };
 inline constexpr MostAge kMostAge;
 
+/// `age` [s] within `most`; what is stamped ahead by more than messages are late goes by another
+/// clock, and its age is not known.
+constexpr bool IsFresh(double age, double most) { return age <= most && age >= -kMostAge.pose; }
+
 }  // namespace chase::world

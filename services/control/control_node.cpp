@@ -17,7 +17,9 @@ namespace chase::control {
 namespace {
 
 constexpr auto kMostLate = static_cast<int64_t>(1e6 * world::kMostAge.pose);  // us
-constexpr size_t kLists = 8;  // 0.4 s at 20 Hz: plans name none older than 0.3 s
+constexpr size_t kLists = 8;                                                  // 0.8 s at 10 Hz
+// s from the list to the start of a plan made for it, which is a little ahead of when it is made.
+constexpr double kOldestList = world::kMostAge.obstacles + world::kMostAge.pose;
 
 double LargestSigma(const Eigen::Matrix3d& covariance) {
   return std::sqrt(
@@ -58,7 +60,8 @@ ControlNode::ControlNode(bus::Bus& bus, const ControlConfig& config)
 
 // Another mission process counts its messages anew. What is too old is not of this flight.
 void ControlNode::OnState(const flight_state_t& message) {
-  if (bus::Seconds(bus_.Now(), message.utime) > world::kMostAge.flight_state) return;
+  if (!world::IsFresh(bus::Seconds(bus_.Now(), message.utime), world::kMostAge.flight_state))
+    return;
   // One that began anew in flight knows none; the place has not moved.
   if (message.has_home != 0)
     home_.emplace(message.epoch, bus::ToVector(message.home));
@@ -94,14 +97,14 @@ void ControlNode::OnObstacles(const obstacles_t& message) {
   std::vector<world::Obstacle> list;
   for (const obstacle_t& o : message.obstacles) list.push_back(bus::FromMessage(o, origin));
   if (lists_.size() == kLists) lists_.pop_front();
-  lists_.emplace_back(message.seq, std::move(list));
+  lists_.push_back({message.seq, message.utime, std::move(list)});
 }
 
 // The list that the plan was made for; null where it was never heard.
-const std::vector<world::Obstacle>* ControlNode::ListOf(const plan_t& message) const {
+const ControlNode::List* ControlNode::ListOf(const plan_t& message) const {
   const int32_t seq = bus::InputOf(message, "OBSTACLES");
   for (auto list = lists_.rbegin(); list != lists_.rend(); ++list)
-    if (list->first == seq) return &list->second;
+    if (list->seq == seq) return &*list;
   return nullptr;
 }
 
@@ -121,12 +124,14 @@ std::string ControlNode::Breach(const world::Claim& claim, bool to_land) const {
 
 std::string ControlNode::Refusal(const plan_t& message) {
   const world::Claim claim = bus::ClaimOf(message, Origin(message.utime));
-  const std::vector<world::Obstacle>* list = ListOf(message);
+  const List* list = ListOf(message);
   if (claim.certified && !list) return "the obstacles that it was made for were not heard";
+  if (claim.certified && !world::IsFresh(bus::Seconds(message.utime, list->utime), kOldestList))
+    return "the obstacles that it was made for are of another time";
   const auto timer = bus_.Time("check");
   static const std::vector<world::Obstacle> none;
   std::string bad =
-      world::Refute(claim, {config_.hard_radius(), config_.sigmas}, list ? *list : none);
+      world::Refute(claim, {config_.hard_radius(), config_.sigmas}, list ? list->obstacles : none);
   Plan plan;
   plan.to_land = landing_ && bus::InputOf(message, "FLIGHT_STATE") >= landing_->second;
   if (bad.empty()) bad = Breach(claim, plan.to_land);

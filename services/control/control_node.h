@@ -33,6 +33,11 @@ class ControlNode : public bus::Node {
 
  private:
   static constexpr int64_t kTick = 50'000;  // us
+  struct List {
+    int32_t seq;
+    int64_t utime;  // of its sweep
+    std::vector<world::Obstacle> obstacles;
+  };
   void OnPlan(const plan_t& message);
   void OnObstacles(const obstacles_t& message);
   void OnPose(const pose_t& message);
@@ -41,7 +46,7 @@ class ControlNode : public bus::Node {
   void OnGeofence(const geofence_t& message);
   std::string Refusal(const plan_t& message);
   std::string Breach(const world::Claim& claim, bool to_land) const;
-  const std::vector<world::Obstacle>* ListOf(const plan_t& message) const;
+  const List* ListOf(const plan_t& message) const;
   void Send(int64_t utime, const Setpoint& setpoint);
   void SendTracking(int64_t utime);
   std::string Reason() const;
@@ -53,8 +58,8 @@ class ControlNode : public bus::Node {
   Controller controller_;
   bus::Epoch epoch_;
   bus::Epoch flown_;  // of the last pose that was aligned: the attitude loop goes by it
-  Eigen::Vector3d p_WB_ = Eigen::Vector3d::Zero();                      // of the last pose, m
-  std::deque<std::pair<int32_t, std::vector<world::Obstacle>>> lists_;  // by seq, newest last
+  Eigen::Vector3d p_WB_ = Eigen::Vector3d::Zero();  // of the last pose, m
+  std::deque<List> lists_;                          // newest last
   /// Where it took off, in the frame W of this epoch: the geofence counts from there.
   std::optional<std::pair<int32_t, Eigen::Vector3d>> home_;
   world::Geofence fence_;  // its own, else what mission told last

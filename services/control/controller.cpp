@@ -50,7 +50,7 @@ bool Controller::IsNear(const Plan& plan) const {
 }
 
 std::optional<Setpoint> Controller::Update(double t, const Estimate& estimate, Health health) {
-  RestartIfTimeJumpedBack(t);
+  FollowTimeBack(t);
   const double dt = StepTo(t);
   plans_.Advance(t);
   error_.setZero();
@@ -200,8 +200,15 @@ void Controller::TurnFrame(double yaw) {
   last_yaw_ = yaw;
 }
 
-void Controller::RestartIfTimeJumpedBack(double t) {
-  if (last_t_ && t < *last_t_ - kJumpBack) *this = Controller(config_);
+// Somebody set the clock: plans are of another time, and the body still flies.
+void Controller::FollowTimeBack(double t) {
+  if (!last_t_ || t >= *last_t_ - kJumpBack) return;
+  const double back = t - *last_t_;
+  for (double* time : {&last_usable_, &last_measured_, &asked_to_land_}) *time += back;
+  reckoning_.Shift(back);
+  plans_.Clear();
+  bound_ = {};
+  last_t_ = t;
 }
 
 double Controller::StepTo(double t) {

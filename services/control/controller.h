@@ -67,7 +67,8 @@ class Controller {
   /// Setpoint for time t [s] of the estimate, nothing while there is nothing to fly. Once flying:
   /// no plan, brake; no usable pose, brake until kMostAge.velocity after the velocity was measured,
   /// by dead reckoning where the estimate is not finite or starting; then land. Motors that have
-  /// been stopped on the ground stay so. Time that jumps back starts the controller anew.
+  /// been stopped on the ground stay so. Where time jumps back it brakes
+  /// until a plan of the new time comes.
   std::optional<Setpoint> Update(double t, const Estimate& estimate, Health health);
 
   /// Setpoint `silence` s after the last pose while none comes: by dead reckoning, as above;
@@ -96,7 +97,7 @@ class Controller {
   std::optional<Setpoint> Answer(double t, const Estimate& estimate, Health health, double dt);
   std::optional<Setpoint> Sent(std::optional<Setpoint> setpoint);
   std::optional<Setpoint> WithoutPose(double t, const Estimate& estimate, Health health, double dt);
-  void RestartIfTimeJumpedBack(double t);
+  void FollowTimeBack(double t);
   double StepTo(double t);
   bool IsNear(const Plan& plan) const;
   bool MayDescend(double t, const Estimate& estimate) const;

@@ -21,6 +21,8 @@ class DeadReckoning {
   /// Velocity and attitude at time t, s.
   const Estimate& At(double t);
   double yaw() const { return math::Yaw(estimate_.R_WB); }
+  /// The clock was set by `by`, s.
+  void Shift(double by) { t_ += by; }
   /// Frame W has turned by `yaw`, rad.
   void Turn(double yaw);
 

@@ -12,6 +12,7 @@ namespace chase::planning {
 namespace {
 
 constexpr double kShortestHorizon = 1.0;
+constexpr double kJumpBack = 1.0;  // s; less is jitter between publishers
 // s: control says 20 times a second whether it flies; nobody climbs before that was heard.
 constexpr double kHearControl = 0.3;
 // A lost target is looked for from here while that share of where it may be is in sight from here;
@@ -100,6 +101,7 @@ void Pilot::ChangeFrame() {
   unseen_.clear();
   unseen_time_.reset();
   obstacles_time_ = -1e9;
+  airborne_ = airborne_ || flies_;  // a climb is not begun anew
   has_running_ = false;
   home_.reset();
   trail_.Clear();
@@ -118,11 +120,14 @@ void Pilot::SetTask(Task task, const std::optional<Eigen::Vector3d>& home) {
 }
 
 bool Pilot::SeesObstacles(double t) const {
-  return t - std::min(obstacles_time_, unseen_time_.value_or(t)) <= world::kMostAge.obstacles;
+  const double most = world::kMostAge.obstacles;
+  return world::IsFresh(t - obstacles_time_, most) &&
+         world::IsFresh(t - unseen_time_.value_or(t), most);
 }
 
 bool Pilot::HasTarget(double t) const {
-  return forecast_ && forecast_->has_target && t - forecast_->t < world::kMostAge.prediction;
+  return forecast_ && forecast_->has_target &&
+         world::IsFresh(t - forecast_->t, world::kMostAge.prediction);
 }
 
 bool Pilot::IsDue(double t) const {
@@ -141,6 +146,7 @@ bool Pilot::MayPlan(double t) const {
 }
 
 std::optional<PlanResult> Pilot::Update(double t, const BodyEstimate& body) {
+  if (has_running_ && t < running_.trajectory.start - kJumpBack) ChangeFrame();  // of time
   drift_ = BeyondTube(body.velocity_covariance, config_.planner);
   const double t0 = t + config_.latency;
   const Start start = StartAt(t, t0, body);
@@ -374,8 +380,12 @@ PlanResult Pilot::Rest(double t0, const Start& start) const {
   plan.yaw = {start.yaw.yaw};
   if (plan.reason.empty() && IsAtRest(start.state)) plan.verdict = Verdict::kWait;
   if (sees) return plan;
-  plan.proofs.clear();  // of a world that nobody has seen for a while
+  plan.proofs
+      .clear();  // of a world that nobody has seen for a while: a last resort, whatever it is
+  plan.stop_proofs.clear();
   plan.certified_clearance = -1.0;
+  if (plan.verdict == Verdict::kEscape) plan.verdict = Verdict::kMitigate;
+  if (plan.verdict < Verdict::kBrake) plan.verdict = Verdict::kBrake;
   plan.reason = "obstacles are not heard of" + (plan.reason.empty() ? "" : "; " + plan.reason);
   return plan;
 }

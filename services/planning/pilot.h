@@ -59,6 +59,7 @@ class Pilot {
   /// Control says that it flies: a planner that has just been started must not take off again.
   void SetFlying(bool flying) {
     heard_control_ = true;
+    flies_ = flying;
     airborne_ = airborne_ || (flying && !has_running_);
   }
 
@@ -129,7 +130,7 @@ class Pilot {
   bool news_ = false;
   bool obstacles_changed_ = false;
   bool airborne_ = false;
-  bool heard_control_ = false, descending_ = false, waits_ = false;
+  bool heard_control_ = false, flies_ = false, descending_ = false, waits_ = false;
   std::optional<double> first_update_;  ///< s
   bool had_target_ = false;
   world::Trajectory last_seen_;  ///< forecast of the target that was chased last

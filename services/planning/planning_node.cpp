@@ -78,10 +78,7 @@ plan_t ToMessage(const PlanResult& plan, int64_t origin) {
 PlanningNode::PlanningNode(bus::Bus& bus, const PlanningConfig& config)
     : bus_(bus), config_(config), pilot_(config) {
   bus_.Subscribe<prediction_t>("PREDICTION", [this](const prediction_t& m) { OnPrediction(m); });
-  bus_.Subscribe<obstacles_t>("OBSTACLES", [this](const obstacles_t& m) {
-    if (auto list = Listed(m))
-      pilot_.SetObstacles(bus::Seconds(m.utime, *origin_), *std::move(list));
-  });
+  bus_.Subscribe<obstacles_t>("OBSTACLES", [this](const obstacles_t& m) { OnObstacles(m); });
   bus_.Subscribe<obstacles_t>("UNSEEN", [this](const obstacles_t& m) {
     if (auto list = Listed(m)) pilot_.SetUnseen(bus::Seconds(m.utime, *origin_), *std::move(list));
   });
@@ -114,6 +111,16 @@ void PlanningNode::OnPrediction(const prediction_t& message) {
     target_ = message.target;
   }
   pilot_.SetForecast(forecast);
+}
+
+// What a list leaves out is nowhere known to be free.
+void PlanningNode::OnObstacles(const obstacles_t& message) {
+  if (message.n_cut > 0)
+    return bus_.ReportError(fmt::format(
+        "OBSTACLES {} left out: {} more than the {} listed are near; raise mapping's max_obstacles",
+        message.seq, message.n_cut, message.n_obstacles));
+  if (auto list = Listed(message))
+    pilot_.SetObstacles(bus::Seconds(message.utime, *origin_), *std::move(list));
 }
 
 std::optional<std::vector<world::Obstacle>> PlanningNode::Listed(const obstacles_t& message) {

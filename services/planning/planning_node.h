@@ -27,6 +27,7 @@ class PlanningNode : public bus::Node {
 
  private:
   void OnPrediction(const prediction_t& message);
+  void OnObstacles(const obstacles_t& message);
   std::optional<std::vector<world::Obstacle>> Listed(const obstacles_t& message);
   void OnState(const flight_state_t& message);
   void OnPose(const pose_t& message);
@@ -45,7 +46,7 @@ class PlanningNode : public bus::Node {
   std::optional<Eigen::Vector3d> home_;  // that it tells: GEOFENCE counts from there, m
   polynomial_t target_{};                // as predicted; no coefficients: none yet
   int64_t n_plans_ = 0;
-  int64_t n_verdicts_[7] = {};
+  int64_t n_verdicts_[plan_t::MITIGATE + 1] = {};
 };
 
 }  // namespace chase::planning

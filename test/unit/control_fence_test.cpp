@@ -47,7 +47,6 @@ class Chase {
     body.p = kHome + Vector3d(0.0, 0.0, 1.0);
     way_ = stop_ = Trajectory::Constant(body.p, 0.0, 1e-3);
     bench_.SendState(flight_state_t::CHASE, "mission", kHome);
-    bench_.Send(obstacles_t{});
     Pose();
     bench_.SendPlan(kStart, body.p, 0.5);
   }
@@ -107,6 +106,10 @@ class Chase {
     m.position = bus::ToMessage(way, kStart);
     m.stop = bus::ToMessage(stop, kStart);
     const int before = refused();
+    obstacles_t none{};
+    none.utime = bus::Utime(t, kStart);
+    bench_.Send(none);
+    bench_.RunUntil(none.utime);
     bench_.Send(m);
     bench_.RunUntil(bus::Utime(t, kStart));
     ++plans;

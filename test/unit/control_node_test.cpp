@@ -138,6 +138,23 @@ TEST(ControlNode, RefusesAPlanForObstaclesOfLongAgo) {
   EXPECT_FALSE(flies(8));
 }
 
+// Whoever lists has fallen silent, or goes by another clock.
+TEST(ControlNode, RefusesAPlanForObstaclesOfAnotherTime) {
+  const auto flies = [](int64_t age) {
+    Bench bench;
+    bench.RunUntil(kStart + 495'000);
+    bench.SendWall(kStart + 500'000 - age);
+    bench.SendPose(kStart + 495'000);
+    bench.Send(Bench::Certified(kStart + 500'000, {0, 0, 0}));
+    bench.SendPose(kStart + 500'000);
+    return bench.out.size() == 1U;
+  };
+  EXPECT_TRUE(flies(0));
+  EXPECT_TRUE(flies(390'000));
+  EXPECT_FALSE(flies(410'000));
+  EXPECT_FALSE(flies(-200'000));
+}
+
 TEST(ControlNode, AnotherFrameVoidsPlansAndLists) {
   Bench bench;
   bench.SendWall(kStart);

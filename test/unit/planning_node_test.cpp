@@ -33,6 +33,7 @@ struct Events {
   int64_t frame_at = kNever;      // the frame of odometry changes, us
   int64_t obstacles_at = kNever;  // obstacles speak of the new one, us
   int64_t forecasts_at = kNever;  // forecasts do, us
+  int64_t cut_from = kNever;      // lists leave something out from then on, us
   bool returns = false;           // mission wants it back, 5 m along x
   bool is_fenced = false;         // inside a fence that has a notch across that way
 };
@@ -52,6 +53,7 @@ class Company : public bus::Node {
       obstacles_t none{};
       none.utime = utime;
       none.epoch = utime >= events_.obstacles_at;
+      none.n_cut = utime >= events_.cut_from;
       bus_.Publish("OBSTACLES", none);
     }
     if (events_.obeys_from > kStart && (utime - kStart) % 1000000 == 0) Autopilot(utime);
@@ -250,6 +252,18 @@ Chases ChasesInAnotherFrame(int64_t obstacles_at, int64_t forecasts_at) {
         << "among the obstacles of another frame";
   }
   return chases;
+}
+
+TEST(PlanningNode, AListThatIsCutCertifiesNothing) {
+  Events events;
+  events.cut_from = kStart + 6000000;
+  for (const plan_t& plan : Fly(kStart + 4000000, kNever, kStart + 8000000, events)) {
+    if (plan.utime < kStart + 5000000) continue;
+    const bool counts = plan.utime < events.cut_from + 200000;
+    if (counts || plan.utime > events.cut_from + 400000) {
+      EXPECT_EQ(plan.certified_clearance >= 0.0, counts) << plan.utime - kStart << plan.reason;
+    }
+  }
 }
 
 TEST(PlanningNode, AnotherFrameVoidsForecastAndObstacles) {

@@ -127,6 +127,74 @@ TEST(Pilot, NothingOfAnotherFrameIsPlannedWith) {
   EXPECT_LT(plan->certified_clearance, 0.0) << "no obstacles were listed in this frame yet";
 }
 
+// Control flies nothing else without a certificate.
+TEST(Pilot, WithoutObstaclesEveryPlanIsALastResortWhoeverComes) {
+  for (const double speed : {0.0, 0.8, 2.0}) {
+    Flight flight{PlanningConfig()};
+    flight.Run(4.0, false);
+    flight.Run(4.0, true);
+    flight.hears = false;
+    const size_t before = flight.plans.size();
+    for (int i = 0; i < 8; ++i) {
+      Forecast comes = Walking(flight.t);
+      const Eigen::Vector3d at = flight.Body().p;
+      comes.target.coefficients.row(0) << at.x() + 1.2 - 0.3 * speed * i, at.y(), 0.5;
+      comes.target.coefficients.row(1) << -2.5 * speed, 0.0, 0.0;
+      flight.pilot.SetForecast(comes);
+      flight.Run(0.3, false);
+    }
+    int unheard = 0;
+    for (size_t i = before; i < flight.plans.size(); ++i) {
+      const PlanResult& plan = flight.plans[i];
+      if (plan.certified_clearance >= 0.0) continue;
+      unheard++;
+      EXPECT_TRUE(plan.verdict == Verdict::kBrake || plan.verdict == Verdict::kWait ||
+                  plan.verdict == Verdict::kMitigate)
+          << Name(plan.verdict) << ": " << plan.reason;
+      EXPECT_TRUE(plan.proofs.empty() && plan.stop_proofs.empty());
+    }
+    EXPECT_GT(unheard, 5);
+  }
+}
+
+TEST(Pilot, AClimbIsNotBegunAnewInAnotherFrame) {
+  Flight flight{PlanningConfig()};
+  flight.Run(1.5, false);
+  ASSERT_EQ(flight.plans.back().reason, "climbing");
+  flight.pilot.SetFlying(true);
+  flight.pilot.ChangeFrame();
+  const BodyEstimate body = flight.Body();
+  const auto plan = flight.pilot.Update(flight.t, body);
+  ASSERT_TRUE(plan);
+  EXPECT_NE(plan->reason, "climbing");
+  EXPECT_LT(plan->trajectory.Position(plan->trajectory.end()).z(), body.p.z() + 0.5);
+}
+
+TEST(Pilot, WhenTimeJumpsBackItPlansAtOnceFromWhereTheBodyIs) {
+  Flight flight{PlanningConfig()};
+  flight.Run(4.0, false);
+  flight.Run(4.0, true);
+  flight.pilot.SetFlying(true);
+  const BodyEstimate body = flight.Body();
+  const auto plan = flight.pilot.Update(flight.t - 5.0, body);
+  ASSERT_TRUE(plan);
+  EXPECT_GE(plan->verdict, Verdict::kBrake) << "what was heard is of another time";
+  EXPECT_LT((plan->trajectory.Position(plan->trajectory.start) - body.p).norm(), 0.1);
+}
+
+// Stamped by a clock that was set forward: it would count for seconds after its sender died.
+TEST(Pilot, AListOfTheFutureCountsAsUnheard) {
+  for (const double ahead : {0.05, 1.0}) {
+    Flight flight{PlanningConfig()};
+    flight.Run(4.0, false);
+    flight.hears = false;
+    flight.pilot.SetObstacles(flight.t + ahead, {});
+    flight.Run(0.25, true);
+    EXPECT_EQ(flight.plans.back().reason.find("obstacles are not heard of") == 0, ahead > 0.1)
+        << flight.plans.back().reason;
+  }
+}
+
 TEST(Pilot, NoPlanReachesBeyondTheForecast) {
   Flight flight{PlanningConfig()};
   flight.Run(4.0, false);
