@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
 
 #include "services/planning/candidate_set.h"
 #include "services/planning/resting.h"
@@ -163,10 +164,10 @@ Stop Evade(const PlannerConfig& config, const PlanRequest& request) {
       const Vector3d end = ToPoints(BrakeCurve(request.start, T), 5).row(5).transpose() + d;
       const Curve curve = CurveTo(request.start, T, end);
       if (auto stop = resting[i].Certified(curve, T)) {
-        const bool is_seen = unseen.empty() || seen[i].Certified(curve, T);
+        stop->blind = !unseen.empty() && !seen[i].Certified(curve, T);
         stop->lasts = after.Lasts(*stop, request.t0 + kLasts);
-        if (is_seen && stop->lasts) return *stop;
-        std::optional<Stop>& second = is_seen ? brief : blind;
+        if (!stop->blind && stop->lasts) return *stop;
+        std::optional<Stop>& second = stop->blind ? blind : brief;
         if (!second || (stop->lasts && !second->lasts)) second = std::move(stop);
         continue;
       }
@@ -197,6 +198,14 @@ bool LeavesObstacles(const std::vector<Proof>& proofs) {
   return std::any_of(proofs.begin(), proofs.end(), [](const Proof& p) { return p.from > 0.0; });
 }
 
+namespace {
+
+std::string IntoTheUnseen(const Stop& stop) {
+  return stop.blind ? ", aside into what nobody has looked into" : "";
+}
+
+}  // namespace
+
 PlanResult RestPlan(const PlannerConfig& config, const PlanRequest& request) {
   const PlannerConfig hard = WithoutMargin(config);
   PlanResult result;
@@ -207,7 +216,7 @@ PlanResult RestPlan(const PlannerConfig& config, const PlanRequest& request) {
     Stop aside = Evade(hard, request);
     if (aside.certified && aside.lasts) {
       result.verdict = Verdict::kEscape;
-      result.reason = "somebody comes where braking leads";
+      result.reason = "somebody comes where braking leads" + IntoTheUnseen(aside);
       result.trajectory = std::move(aside.trajectory);
       SetProofs(config, request, std::move(aside.proofs), &result);
       return result;
@@ -222,7 +231,8 @@ PlanResult RestPlan(const PlannerConfig& config, const PlanRequest& request) {
     stop = Evade(hard, request);
     if (stop->certified) result.verdict = Verdict::kEscape;
     if (stop->aside) result.verdict = Verdict::kMitigate;
-    result.reason = stop->certified ? "nor is braking" : "nor is braking, nor any way aside";
+    result.reason = stop->certified ? "nor is braking" + IntoTheUnseen(*stop)
+                                    : "nor is braking, nor any way aside";
   }
   if (LeavesObstacles(stop->proofs)) result.verdict = Verdict::kEscape;
   result.trajectory = std::move(stop->trajectory);

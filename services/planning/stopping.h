@@ -15,6 +15,7 @@ struct Stop {
   std::vector<Proof> proofs;
   bool certified = false;
   bool aside = false;  ///< leads elsewhere than braking does
+  bool blind = false;  ///< leads into what nobody has looked into
   bool lasts = false;  ///< whoever stays at its end is certified clear for as long as stepping
                        ///< aside takes
 };

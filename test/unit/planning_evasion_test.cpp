@@ -70,6 +70,24 @@ TEST(Evasion, StepsAsideWhileThereIsAWay) {
   }
 }
 
+TEST(Evasion, SaysThatItLeadsIntoWhatNobodyHasLookedInto) {
+  PlanRequest request = Hover();
+  request.obstacles = {
+      Cylinder(1, request.start.p - Vector3d(1.3, 0.0, 0.0), {1.2, 0.0, 0.0}, 0.3, 3.0)};
+  for (const bool seen : {true, false}) {
+    request.unseen.clear();
+    for (int i = 0; !seen && i < 12; ++i) {
+      const double angle = M_PI / 6.0 * i;
+      const Vector3d away(std::cos(angle), std::sin(angle), 0.0);
+      request.unseen.push_back(
+          Cylinder(100 + i, request.start.p + 1.1 * away, Vector3d::Zero(), 0.4, 3.0));
+    }
+    const PlanResult plan = RestPlan(PlannerConfig(), request);
+    EXPECT_EQ(plan.verdict, Verdict::kEscape) << plan.reason;
+    EXPECT_EQ(plan.reason.find("nobody has looked") == std::string::npos, seen) << plan.reason;
+  }
+}
+
 TEST(Evasion, WhereNothingCanBeCertifiedTheContactComesLaterThanAtRest) {
   const PlannerConfig config;
   for (int i = 0; i < 6; ++i) {
