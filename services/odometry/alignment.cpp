@@ -89,6 +89,7 @@ bool Alignment::AtRest(const ImuStatistics& s) const {
 }
 
 void Alignment::SetBiases(const FilterConfig& filter, NavState* state) const {
+  SetBlock(kMount, filter.mount_sigma, &state->P);
   SetBlock(kAccelBias, filter.accel_bias_sigma, &state->P);
   if (AtRest()) {
     SetBlock(kGyroBias, filter.gyro_bias_sigma, &state->P);
@@ -98,9 +99,10 @@ void Alignment::SetBiases(const FilterConfig& filter, NavState* state) const {
   OpenInMotion(&state->P);
 }
 
-/// At rest only f = b - R^T g is known, and |g|. Along gravity that gives the bias; across it, an
-/// error of the bias is one of gravity: dg = R db, fully correlated. Whoever took the two for
-/// independent would call the tilt known as soon as the bias is.
+/// At rest only f = b - (R Exp(mount))^T g is known, and |g|. Along gravity that gives the bias;
+/// across it, an error of the bias or the mounting is one of gravity: dg = R db + R Hat(f) dmount,
+/// fully correlated. Whoever took them for independent would call the tilt known as soon as they
+/// are.
 void Alignment::CoupleTiltAndBias(const FilterConfig& filter, NavState* state) const {
   const Eigen::Vector3d f = statistics().mean.accel, up_B = f.normalized();
   state->accel_bias = (f.norm() - filter.gravity) * up_B;
@@ -111,10 +113,13 @@ void Alignment::CoupleTiltAndBias(const FilterConfig& filter, NavState* state) c
   const double noise2 = filter.accel_noise * filter.accel_noise / config_.duration;
   const double strength2 = kGravityStrength * kGravityStrength;
   state->P.block<3, 3>(kAccelBias, kAccelBias) = b2 * across + (noise2 + strength2) * along;
+  const Eigen::Matrix3d mount = filter.mount_sigma * math::Hat(f);
   state->P.block<3, 3>(kGravity, kGravity) =
-      R * ((b2 + noise2) * across + strength2 * along) * R.transpose();
+      R * ((b2 + noise2) * across + strength2 * along + mount * mount.transpose()) * R.transpose();
   state->P.block<3, 3>(kGravity, kAccelBias) = b2 * R * across;
   state->P.block<3, 3>(kAccelBias, kGravity) = b2 * across * R.transpose();
+  state->P.block<3, 3>(kGravity, kMount) = filter.mount_sigma * R * mount;
+  state->P.block<3, 3>(kMount, kGravity) = filter.mount_sigma * mount.transpose() * R.transpose();
 }
 
 NavState Alignment::Result(const FilterConfig& filter, const Eigen::Vector3d& p, double yaw) const {
@@ -170,6 +175,7 @@ NavState Alignment::Opened(const FilterConfig& filter, const Eigen::Vector3d& p,
   SetBlock(kV, kSpeedInMotion, &state.P);
   SetBlock(kTheta, kKnownTheta, &state.P);
   SetBlock(kAccelBias, filter.accel_bias_sigma, &state.P);
+  SetBlock(kMount, filter.mount_sigma, &state.P);
   OpenInMotion(&state.P);
   return state;
 }
@@ -188,8 +194,10 @@ NavState Alignment::ResultAt(const FilterConfig& filter, const NavState& known) 
   state.g = -filter.gravity * up.normalized();
   SetBiases(filter, &state);
   SetBlock(kGravity, 0.5, &state.P);
-  state.P.block<3, 3>(kGravity, kAccelBias).setZero();
-  state.P.block<3, 3>(kAccelBias, kGravity).setZero();
+  for (const int block : {kAccelBias, kMount}) {
+    state.P.block<3, 3>(kGravity, block).setZero();
+    state.P.block<3, 3>(block, kGravity).setZero();
+  }
   return state;
 }
 

@@ -18,15 +18,19 @@ using math::ExpSO3;
 using math::Hat;
 using math::LogSO3;
 
-/// P <- F P F' for F = I + dt A with A's only blocks (p,v), (v,theta), (v,ba), (v,g), (theta,bg).
-void PropagateCovariance(const Eigen::Matrix3d& R, const Eigen::Vector3d& force_W, double dt,
+/// P <- F P F' for F = I + dt A with A's only blocks (p,v), (v,theta), (v,ba), (v,g), (v,mount),
+/// (theta,bg), (theta,mount).
+void PropagateCovariance(const Eigen::Matrix3d& R_WB, const Eigen::Matrix3d& R_WI,
+                         const Eigen::Vector3d& force_W, const Eigen::Vector3d& w_B, double dt,
                          ErrorCovariance* P) {
   ErrorCovariance F = ErrorCovariance::Identity();
   F.block<3, 3>(kP, kV) = dt * Eigen::Matrix3d::Identity();
   F.block<3, 3>(kV, kTheta) = -dt * Hat(force_W);
-  F.block<3, 3>(kV, kAccelBias) = -dt * R;
+  F.block<3, 3>(kV, kAccelBias) = -dt * R_WI;
   F.block<3, 3>(kV, kGravity) = dt * Eigen::Matrix3d::Identity();
-  F.block<3, 3>(kTheta, kGyroBias) = -dt * R;
+  F.block<3, 3>(kV, kMount) = -dt * Hat(force_W) * R_WB;
+  F.block<3, 3>(kTheta, kGyroBias) = -dt * R_WI;
+  F.block<3, 3>(kTheta, kMount) = -dt * R_WB * Hat(w_B);
   const ErrorCovariance FP = F * *P;
   P->noalias() = FP * F.transpose();
 }
@@ -160,11 +164,13 @@ Eigen::MatrixXd FromUnknown(const PoseMeasurement& z, const Eigen::LDLT<Eigen::M
 void Propagate(const FilterConfig& config, const ImuSample& imu, NavState* state) {
   const double dt = imu.t - state->t, length = std::abs(dt);
   if (!(length > 0.0)) return;
-  const Eigen::Vector3d w = imu.gyro - state->gyro_bias;
+  const Eigen::Quaterniond R_BI = ExpSO3(state->mount);
+  const Eigen::Vector3d w = R_BI * (imu.gyro - state->gyro_bias);
   const Eigen::Quaterniond middle = state->R_WB * ExpSO3(0.5 * dt * w);
-  const Eigen::Vector3d force_W = middle * (imu.accel - state->accel_bias);
+  const Eigen::Vector3d force_W = middle * R_BI * (imu.accel - state->accel_bias);
   const Eigen::Vector3d a = force_W + state->g;
-  PropagateCovariance(middle.toRotationMatrix(), force_W, dt, &state->P);
+  PropagateCovariance(middle.toRotationMatrix(), (middle * R_BI).toRotationMatrix(), force_W, w, dt,
+                      &state->P);
   AddDiagonal(kV, config.accel_noise * config.accel_noise * length, &state->P);
   AddDiagonal(kTheta, config.gyro_noise * config.gyro_noise * length, &state->P);
   AddDiagonal(kGyroBias, config.gyro_bias_walk * config.gyro_bias_walk * length, &state->P);
@@ -213,6 +219,7 @@ void DoubtAcceleration(const FilterConfig& config, const Eigen::Matrix3d& unheld
   J.block<3, 3>(0, kTheta) = -Hat(state->a - state->g);
   J.block<3, 3>(0, kAccelBias) = -R;
   J.block<3, 3>(0, kGravity).setIdentity();
+  J.block<3, 3>(0, kMount) = -Hat(state->a - state->g) * R;
   const double known2 = (unheld * J * state->P * J.transpose() * unheld).trace() / unheld.trace();
   const double lacking2 = std::pow(config.map_tilt * config.gravity, 2) - known2;
   if (lacking2 > 0.0)
@@ -226,6 +233,7 @@ void Inject(const ErrorVector& dx, NavState* state) {
   state->gyro_bias += dx.segment<3>(kGyroBias);
   state->accel_bias += dx.segment<3>(kAccelBias);
   state->g += dx.segment<3>(kGravity);
+  state->mount += dx.segment<3>(kMount);
 }
 
 UpdateResult Update(const FilterConfig& config, const PoseMeasurement& z, const JumpEvidence& jump,

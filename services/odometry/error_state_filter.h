@@ -14,6 +14,7 @@ struct FilterConfig {
   double gravity = 9.81;                 ///< m/s^2
   double accel_bias_sigma = 0.05;        ///< at the start, m/s^2
   double gyro_bias_sigma = 0.0005;       ///< after an alignment at rest, rad/s
+  double mount_sigma = 0.00175;          ///< per axis: 0.1 deg, rad
   double doubt_accel = 0.1;              ///< error of the accelerometer beyond its noise, m/s^2
   double map_tilt = 1e-3;                ///< rad
   double blind_accel = 3.0;              ///< what a body without IMU may do, m/s^2
@@ -32,6 +33,7 @@ struct FilterConfig {
     v("gravity", gravity, "m/s^2");
     v("accel_bias_sigma", accel_bias_sigma, "at the start, m/s^2");
     v("gyro_bias_sigma", gyro_bias_sigma, "after an alignment at rest, rad/s");
+    v("mount_sigma", mount_sigma, "of the lidar's calibrated attitude, per axis, rad");
     v("doubt_accel", doubt_accel, "what the accelerometer may be off while no sweep comes, m/s^2");
     v("map_tilt", map_tilt,
       "how well a map is level; gravity pulls along it where nothing holds, rad");
@@ -45,20 +47,30 @@ struct FilterConfig {
 };
 
 /// Order of the error state: each block three wide.
-enum ErrorBlock { kP = 0, kV = 3, kTheta = 6, kGyroBias = 9, kAccelBias = 12, kGravity = 15 };
-constexpr int kStates = 18;
+enum ErrorBlock {
+  kP = 0,
+  kV = 3,
+  kTheta = 6,
+  kGyroBias = 9,
+  kAccelBias = 12,
+  kGravity = 15,
+  kMount = 18
+};
+constexpr int kStates = 21;
 using ErrorCovariance = Eigen::Matrix<double, kStates, kStates>;
 using ErrorVector = Eigen::Matrix<double, kStates, 1>;
 
 /// What the filter knows of the body. Frame W unless named otherwise. The rotation error is in W:
-/// R_WB(true) = Exp(d_theta) R_WB.
+/// R_WB(true) = Exp(d_theta) R_WB. B is the body as sweeps show it, by the calibrated attitude of
+/// the LiDAR; what that is off turns the IMU's frame I against B.
 struct NavState {
   double t = 0.0;  ///< s
   Eigen::Quaterniond R_WB = Eigen::Quaterniond::Identity();
   Eigen::Vector3d p = Eigen::Vector3d::Zero();           ///< m
   Eigen::Vector3d v = Eigen::Vector3d::Zero();           ///< m/s
-  Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero();   ///< frame B, rad/s
-  Eigen::Vector3d accel_bias = Eigen::Vector3d::Zero();  ///< frame B, m/s^2
+  Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero();   ///< frame I, rad/s
+  Eigen::Vector3d accel_bias = Eigen::Vector3d::Zero();  ///< frame I, m/s^2
+  Eigen::Vector3d mount = Eigen::Vector3d::Zero();       ///< R_BI = Exp(mount), rad
   Eigen::Vector3d g = {0.0, 0.0, -9.81};                 ///< gravity, m/s^2
   Eigen::Vector3d w_B = Eigen::Vector3d::Zero();         ///< last w_WB_B, rad/s
   Eigen::Vector3d a = Eigen::Vector3d::Zero();           ///< last a_WB, m/s^2

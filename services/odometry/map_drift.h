@@ -10,7 +10,7 @@ struct DriftConfig {
   double position = 0.0001;        ///< m per root m
   double slope = 6e-5;             ///< rad per root m
   double first_position = 0.0003;  ///< m
-  double first_yaw = 1e-3;         ///< rad
+  double first_yaw = 1e-4;         ///< rad
   double first_match = 0.7;        ///< 1
   double spacing = 3.0;            ///< m
   double sight = 9.0;              ///< m
@@ -21,7 +21,7 @@ struct DriftConfig {
     v("position", position, "the same of its place, m per root m");
     v("slope", slope, "and per metre of the usual distance of what is seen, rad per root m");
     v("first_position", first_position, "error of the map at the start, m");
-    v("first_yaw", first_yaw, "the same of its heading: how well the mounting is known, rad");
+    v("first_yaw", first_yaw, "the same of its heading, rad");
     v("first_match", first_match, "and share of the deviation of the first match in both");
     v("spacing", spacing, "of the places that are remembered, m");
     v("sight", sight, "a remembered place this near still holds the body, m");

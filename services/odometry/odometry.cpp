@@ -386,11 +386,11 @@ void Odometry::Catchup(bool lost) {
   imu_.DropBefore(base_.t);
   if (t > live_.t) imu_.Advance(t, &live_);
   if (live_.t > t) imu_.Advance(live_.t, &before);
-  const Pose shown = level_.ToWorld(before.pose());
+  const Pose shown = level_.ToWorld(before);
   const Eigen::Vector3d shown_v = level_.R_WM() * before.v;
-  level_.SetGravity(live_.g);
+  level_.Turn(live_);
   const Eigen::Vector3d v = level_.R_WM() * live_.v;
-  blend_.Absorb(shown, lost ? v : shown_v, level_.ToWorld(live_.pose()), v);
+  blend_.Absorb(shown, lost ? v : shown_v, level_.ToWorld(live_), v);
 }
 
 }  // namespace chase::odometry

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/math/rotation.h"
 #include "services/odometry/odometry.h"
 
 namespace chase::odometry {
@@ -27,9 +28,9 @@ RegisteredSweep Odometry::Registered(const Prepared& prepared) const {
 PoseEstimate Odometry::Estimate() const {
   PoseEstimate out;
   out.t = live_.t;
-  out.X_WB = blend_.Applied(level_.ToWorld(live_.pose()));
+  out.X_WB = blend_.Applied(level_.ToWorld(live_));
   out.v = blend_.AppliedVelocity(level_.R_WM() * live_.v);
-  out.w_B = live_.w_B;
+  out.w_B = math::ExpSO3(-live_.mount) * live_.w_B;
   out.a = level_.R_WM() * live_.a;
   out.gyro_bias = live_.gyro_bias;
   out.accel_bias = live_.accel_bias;

@@ -60,6 +60,7 @@ void Odometry::StartAtRest(double t) {
     ++epoch_;
   }
   base_ = alignment_.Result(config_.filter, place.p, math::Yaw(place.R));
+  level_.BeginAt(base_.R_WB);
   health_.OnStarted(true, held_ = t);
   const ImuStatistics rest = alignment_.statistics();
   standing_.Begin(rest.mean, rest.accel_spread, rest.gyro_spread, base_.p);
@@ -114,6 +115,7 @@ void Odometry::StartInMotion(double t) {
     placed.P = first.P;
     PutAtOrigin(&placed);
   }
+  level_.BeginAt(start.R_WB);
   health_.OnStarted(false, t);
   Begin(t);
 }
@@ -141,7 +143,7 @@ void Odometry::Follow(Pending pending, NavState placed) {
 void Odometry::Begin(double t) {
   live_ = base_;
   imu_.Advance(t, &live_);
-  level_.SetGravity(base_.g);
+  level_.Turn(base_);
   fused_ = started_ = true;
   imu_.DropBefore(base_.t);
 }

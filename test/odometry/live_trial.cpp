@@ -73,7 +73,7 @@ class Live {
   static OdometryConfig Start(const world::Scenario& scenario) {
     OdometryConfig config;
     config.initial_position = scenario.chaser.start;
-    config.drift.first_yaw = 1e-4;  // the mounting is exact here
+    config.filter.mount_sigma = 1e-4;  // the mounting is exact here
     config.initial_yaw_deg = scenario.chaser.yaw_deg;
     return config;
   }

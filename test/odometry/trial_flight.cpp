@@ -163,7 +163,7 @@ void Endure(const FlightOptions& options, double minutes) {
   AddFlight(scenario, options, scenario.duration_s, &lockstep);
   OdometryConfig config;
   config.initial_position = scenario.chaser.start;
-  config.drift.first_yaw = 1e-4;  // the mounting is exact here
+  config.filter.mount_sigma = 1e-4;  // the mounting is exact here
   config.initial_yaw_deg = scenario.chaser.yaw_deg;
   const OdometryNode* odometry = nullptr;
   lockstep.Add("odometry", 2000, [&](bus::Bus& bus) {

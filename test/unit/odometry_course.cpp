@@ -53,7 +53,8 @@ double Rms(const std::vector<Visit>& visits, double from, double Visit::*field) 
 CourseResult Fly(const Course& course, const OdometryConfig& config) {
   Odometry odometry(config);
   Noise noise(course.seed);
-  const Pose X_BL{Eigen::Quaterniond(config.rig.R_BL()), config.rig.lidar_position};
+  const Pose X_BL{math::ExpSO3(course.mount_error) * Eigen::Quaterniond(config.rig.R_BL()),
+                  config.rig.lidar_position};
   const auto X_WL = [&](double t) { return course.flight.X_WB(t) * X_BL; };
   CourseResult result;
   double total = 0.0;
@@ -79,7 +80,7 @@ CourseResult Fly(const Course& course, const OdometryConfig& config) {
 OdometryConfig ConfigFor(const Flight& flight) {
   OdometryConfig config;
   config.initial_position = flight.start;
-  config.drift.first_yaw = 1e-4;  // the mounting is exact here
+  config.filter.mount_sigma = 1e-4;  // the mounting is exact here
   return config;
 }
 

@@ -16,6 +16,7 @@ struct Course {
   double duration = 20.0;                         ///< s
   double corridor_from = 1e9, corridor_to = 1e9;  ///< the hall has no ends in this time, s
   unsigned seed = 1;
+  Eigen::Vector3d mount_error = Eigen::Vector3d::Zero();  ///< turns the LiDAR in B, rad
   /// May change or remove (by returning false) what the sensors give.
   std::function<bool(Sweep*)> on_sweep;
   std::function<bool(ImuSample*)> on_imu;

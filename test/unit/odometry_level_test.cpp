@@ -31,12 +31,18 @@ NavState Aligned(const Eigen::Vector3d& bias, unsigned seed) {
 
 TEST(Alignment, TiltAndBiasAreOneUnknownAtRest) {
   const NavState state = Aligned({0.08, -0.05, 0.03}, 1);
-  const auto P = state.P;
+  // Once the bias and the mounting are known, so is the tilt.
+  Eigen::Matrix<double, 6, 6> known;
+  known << state.P.block<3, 3>(kAccelBias, kAccelBias), state.P.block<3, 3>(kAccelBias, kMount),
+      state.P.block<3, 3>(kMount, kAccelBias), state.P.block<3, 3>(kMount, kMount);
   for (int axis : {0, 1}) {
-    const double correlation =
-        P(kGravity + axis, kAccelBias + axis) /
-        std::sqrt(P(kGravity + axis, kGravity + axis) * P(kAccelBias + axis, kAccelBias + axis));
+    Eigen::Matrix<double, 6, 1> shared;
+    shared << state.P.block<3, 1>(kAccelBias, kGravity + axis),
+        state.P.block<3, 1>(kMount, kGravity + axis);
+    const double correlation = std::sqrt(shared.dot(known.ldlt().solve(shared)) /
+                                         state.P(kGravity + axis, kGravity + axis));
     EXPECT_GT(correlation, 0.98) << "axis " << axis;
+    EXPECT_LT(correlation, 1.0) << "axis " << axis;
   }
   // What the accelerometer shows is explained whichever way the two are split.
   const Eigen::Vector3d felt = state.R_WB.conjugate() * (-state.g) + state.accel_bias;
@@ -98,9 +104,10 @@ TEST(LevelFrame, GravityIsDownAndTheStartStaysWhereItIs) {
   for (int trial = 0; trial < 50; ++trial) {
     const Eigen::Vector3d start = noise.Vector(5.0);
     LevelFrame level(start);
-    const Eigen::Vector3d g = Eigen::Vector3d(0.0, 0.0, -9.81) + noise.Vector(0.5);
-    level.SetGravity(g);
-    EXPECT_LT((level.R_WM() * g.normalized() + Eigen::Vector3d::UnitZ()).norm(), 1e-12);
+    NavState state;
+    state.g += noise.Vector(0.5);
+    level.Turn(state);
+    EXPECT_LT((level.R_WM() * state.g.normalized() + Eigen::Vector3d::UnitZ()).norm(), 1e-12);
     EXPECT_LT((level.ToWorld(start) - start).norm(), 1e-12);
     EXPECT_LT(std::abs(math::LogSO3(level.R_WM()).z()), 1e-9);  // no heading is changed
   }
@@ -113,16 +120,18 @@ TEST(LevelFrame, CovarianceIsThatOfTheNonlinearMap) {
     state.p = noise.Vector(20.0);
     state.v = noise.Vector(2.0);
     state.R_WB = math::ExpSO3(noise.Vector(0.5));
-    state.g = Eigen::Vector3d(0.0, 0.0, -9.81) + noise.Vector(0.05);
+    state.g += noise.Vector(0.05);
     ErrorVector dx;
     for (int i = 0; i < kStates; ++i) dx[i] = noise.Gauss(1e-6);
     NavState other = state;
     Inject(dx, &other);
     state.P = dx * dx.transpose();
-    LevelFrame level(noise.Vector(1.0)), moved = level;
-    level.SetGravity(state.g);
-    moved.SetGravity(other.g);
-    const Pose a = level.ToWorld(state.pose()), b = moved.ToWorld(other.pose());
+    LevelFrame level(noise.Vector(1.0));
+    level.BeginAt(math::ExpSO3(noise.Vector(0.3)));
+    LevelFrame moved = level;
+    level.Turn(state);
+    moved.Turn(other);
+    const Pose a = level.ToWorld(state), b = moved.ToWorld(other);
     Eigen::Matrix<double, 9, 1> e;
     e << b.p - a.p, moved.R_WM() * other.v - level.R_WM() * state.v,
         math::LogSO3(b.R * a.R.conjugate());
@@ -147,6 +156,28 @@ TEST(LevelFrame, FlightTellsTiltFromBias) {
   };
   EXPECT_GT(tilt_at(0.7), 0.008);
   EXPECT_LT(tilt_at(19.9), 0.003);
+}
+
+/// A LiDAR that sits other than its calibration says tilts the body, biases the accelerometer and
+/// turns W until turns and accelerations tell how it sits.
+TEST(LevelFrame, FlightTellsHowTheLidarIsMounted) {
+  Course course;
+  course.duration = 40.0;
+  course.sensors.azimuths = 900;
+  course.flight = test::Flight::Aggressive();
+  course.mount_error = {-0.004, 0.005, -0.006};
+  OdometryConfig config = test::ConfigFor(course.flight);
+  config.filter.mount_sigma = 0.005;
+  const CourseResult result = test::Fly(course, config);
+  const auto& last = result.visits.back().estimate;
+  const Pose truth = course.flight.X_WB(last.t);
+  EXPECT_LT(math::LogSO3(last.X_WB.R * truth.R.conjugate()).norm(), 0.001);
+  EXPECT_LT((last.accel_bias - course.sensors.accel_bias).norm(), 0.01);
+  // W turns about its vertical at the start: what is seen tells by how much.
+  const Pose lidar{math::ExpSO3(course.mount_error), config.rig.lidar_position};
+  const Eigen::Quaterniond seen = result.sweeps.back().X_WL.R;
+  const Eigen::Quaterniond there = course.flight.X_WB(result.sweeps.back().t).R * lidar.R;
+  EXPECT_LT(math::LogSO3(seen * there.conjugate()).norm(), 0.0015);
 }
 
 TEST(Standing, EndsWithTheFirstMotionAndOnlyThen) {
@@ -213,9 +244,7 @@ TEST(MapDrift, GrowsWithTheWayAndIsForgottenAtHome) {
 }
 
 TEST(MapDrift, BeginsAsTheFirstMatchDoes) {
-  DriftConfig config;
-  config.first_yaw = 1e-4;  // the mounting is exact here
-  MapDrift drift(config);
+  MapDrift drift(DriftConfig{});
   const double before = drift.covariance()(3, 3);
   MapDrift::Covariance match = MapDrift::Covariance::Identity();
   match.diagonal() << 4e-6, 1e-6, 1e-6, 9e-8;
