@@ -16,15 +16,10 @@ namespace {
 
 /// Bytes of a pixel, 0 when the format is unknown.
 int Channels(int32_t pixelformat) {
-  switch (pixelformat) {
-    case camera_image_t::PIXEL_FORMAT_GRAY:
-      return 1;
-    case camera_image_t::PIXEL_FORMAT_RGB:
-    case camera_image_t::PIXEL_FORMAT_BGR:
-      return 3;
-    default:
-      return 0;
-  }
+  if (pixelformat == camera_image_t::PIXEL_FORMAT_GRAY) return 1;
+  const bool color = pixelformat == camera_image_t::PIXEL_FORMAT_RGB ||
+                     pixelformat == camera_image_t::PIXEL_FORMAT_BGR;
+  return color ? 3 : 0;
 }
 
 cv::Mat ToBgr(const cv::Mat& image, int32_t pixelformat) {

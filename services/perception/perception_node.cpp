@@ -45,7 +45,9 @@ void PerceptionNode::OnImage(const camera_image_t& message) {
   for (size_t i = 0; i < kRefusals; ++i) refused_[i] += last_->refused[i];
   unused_frames_ += !last_->note.empty();
   if (!last_->note.empty()) bus_.ReportError("frame not used: " + last_->note);
-  Send(message.utime, *last_);
+  target_t target = ToMessage(*last_, message.utime);
+  target.epoch = epoch_.value();
+  bus_.Publish("TARGET", target);
 }
 
 // The other commands are mission's.
@@ -77,12 +79,6 @@ world::CommandAnswer PerceptionNode::Select(const command_t& message) {
   return {true,
           fmt::format("selected: {} x {} px, hue {:.0f} to {:.0f} degrees", selection.box.width,
                       selection.box.height, color.hue_min_deg, color.hue_max_deg)};
-}
-
-void PerceptionNode::Send(int64_t utime, const TargetEstimate& target) {
-  target_t m = ToMessage(target, utime);
-  m.epoch = epoch_.value();
-  bus_.Publish("TARGET", m);
 }
 
 int64_t PerceptionNode::Origin(int64_t utime) {

@@ -30,7 +30,6 @@ class PerceptionNode : public bus::Node {
   void OnPose(const pose_t& message);
   void OnCommand(const command_t& message);
   world::CommandAnswer Select(const command_t& message);
-  void Send(int64_t utime, const TargetEstimate& target);
   int64_t Origin(int64_t utime);
 
   bus::Bus& bus_;

@@ -139,7 +139,7 @@ TEST(PerceptionLearn, APictureInTheDarkDoesNotWidenTheColours) {
   }
 }
 
-TEST(PerceptionLearn, SaysHowWellItSeparatesAndWhichPictureWidens) {
+TEST(PerceptionLearn, SaysHowWellItSeparates) {
   const Marked a(40, 50, 0);
   Marked redder(200, 50, 0);
   redder.bgr(cv::Rect(200, 60, 50, 100)).setTo(cv::Scalar(20, 70, 240));
@@ -150,8 +150,6 @@ TEST(PerceptionLearn, SaysHowWellItSeparatesAndWhichPictureWidens) {
     EXPECT_GT(p.target, 0.99);
     EXPECT_LT(p.far, 0.01);
   }
-  EXPECT_EQ(learned.color.widest, 2);
-  EXPECT_GT(learned.color.narrower_deg, 5.0);
 }
 
 TEST(PerceptionLearn, TheShapeComesFromWholeBlobsThatAreMarked) {

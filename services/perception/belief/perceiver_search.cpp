@@ -89,12 +89,9 @@ void Perceiver::AddCandidates(View* view) {
     const auto found = finder_.Acquire(*view, view->detections[i]);
     if (!found) CountRefused(view->detections[i]);
     if (!found || !InGate(*found, view->t)) continue;
-    // Part of something, of which no LiDAR point tells the range, is a thing of its own only where
-    // the target may come back.
-    const bool piece = found->detection.part;
-    if ((piece || !found->fit.whole) && found->fit.n_points == 0 && !comes_back) continue;
-    if (piece && found->fit.n_points == 0) continue;
-    if (Followed(*found)) continue;
+    // A piece needs LiDAR points, and so does what shows in part unless the target may come back.
+    const bool needs_points = found->detection.part || (!found->fit.whole && !comes_back);
+    if ((needs_points && found->fit.n_points == 0) || Followed(*found)) continue;
     candidates_.push_back(NewCandidate(*found, *view));
   }
 }

@@ -37,6 +37,29 @@ bool GoesOn(const Detection& d) {
   return std::any_of(d.goes_on.begin(), d.goes_on.end(), [](bool on) { return on; });
 }
 
+/// One Gaussian with the mean and covariance of the mixture; all else from the likeliest.
+FitResult Joined(const std::vector<Hypothesis>& all) {
+  const Hypothesis& best = *std::max_element(
+      all.begin(), all.end(),
+      [](const Hypothesis& a, const Hypothesis& b) { return a.log_weight < b.log_weight; });
+  FitResult out = best.fit;
+  double total = 0.0;
+  Vector6d mean = Vector6d::Zero();
+  Matrix6d square = Matrix6d::Zero();
+  for (const auto& h : all) {
+    const double weight = std::exp(h.log_weight - best.log_weight);
+    const Vector6d off = h.fit.posterior.mean - best.fit.posterior.mean;
+    total += weight;
+    mean += weight * off;
+    square += weight * (h.fit.posterior.covariance + off * off.transpose());
+  }
+  mean /= total;
+  out.posterior.mean += mean;
+  out.posterior.covariance = square / total - mean * mean.transpose();
+  out.log_odds = best.log_weight + std::log(total);
+  return out;
+}
+
 }  // namespace
 
 bool Localiser::Agrees(const FitResult& fit, double prior_gate) const {
@@ -58,31 +81,6 @@ bool Localiser::EdgesAgree(const FitResult& fit, const FitInput& input) const {
     if (left_out && fit.edge_px[side] > 0.0 && !RangeIsKnown(input)) return false;
   }
   return true;
-}
-
-/// One Gaussian with the mean and covariance of the mixture; all else from the likeliest.
-FitResult Localiser::Joined(const std::vector<Hypothesis>& all) {
-  const Hypothesis& best = *std::max_element(
-      all.begin(), all.end(),
-      [](const Hypothesis& a, const Hypothesis& b) { return a.log_weight < b.log_weight; });
-  const auto weight = [&](const Hypothesis& h) { return std::exp(h.log_weight - best.log_weight); };
-  FitResult out = best.fit;
-  double total = 0.0;
-  Vector6d mean = Vector6d::Zero();
-  for (const auto& h : all) {
-    total += weight(h);
-    mean += weight(h) * h.fit.posterior.mean;
-  }
-  mean /= total;
-  Matrix6d covariance = Matrix6d::Zero();
-  for (const auto& h : all) {
-    const Vector6d d = h.fit.posterior.mean - mean;
-    covariance += weight(h) / total * (h.fit.posterior.covariance + d * d.transpose());
-  }
-  out.posterior.mean = mean;
-  out.posterior.covariance = covariance;
-  out.log_odds = best.log_weight + std::log(total);
-  return out;
 }
 
 std::optional<FitResult> Localiser::WholeReading(FitInput* input) const {

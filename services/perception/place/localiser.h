@@ -7,6 +7,12 @@
 
 namespace chase::perception {
 
+/// One way to explain a detection: which sides are seen, whether the target turned sharply.
+struct Hypothesis {
+  FitResult fit;
+  double log_weight = 0.0;
+};
+
 /// Turns one detection and the LiDAR points on it into a position, or refuses it: what hides part
 /// of the target, or only looks like it, must not bend the estimate.
 class Localiser {
@@ -23,12 +29,6 @@ class Localiser {
                                    const Detection& detection, const Clusters& clusters) const;
 
  private:
-  /// One way to explain a detection: which sides are seen, whether the target turned sharply.
-  struct Hypothesis {
-    FitResult fit;
-    double log_weight = 0.0;
-  };
-
   /// The fit to all sides, if it agrees with all of them.
   std::optional<FitResult> WholeReading(FitInput* input) const;
   /// All hypotheses that agree with the prediction, weighed and joined into one Gaussian.
@@ -39,7 +39,6 @@ class Localiser {
   std::optional<FitResult> PartialReading(FitInput input) const;
   std::optional<FitResult> AcquirePartial(FitInput* input, const Clusters& clusters) const;
   std::optional<FitResult> AcquirePartialBySize(FitInput* input) const;
-  static FitResult Joined(const std::vector<Hypothesis>& all);
   void Weigh(const FitInput& input, double log_prior, size_t readings, bool all,
              std::vector<Hypothesis>* out) const;
   bool EdgesAgree(const FitResult& fit, const FitInput& input) const;

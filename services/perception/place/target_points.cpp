@@ -16,9 +16,8 @@ constexpr double kCore = 0.6;       // share of the target that such a ray goes 
 constexpr double kMostOfIt = 0.8;   // likewise of a target that is placed well
 constexpr double kBehind = 0.25;    // m behind the target where such a ray ends at least
 
-/// True when the lidar looked through this share of where the target should be, and hit something
-/// behind it.
-bool SawThrough(const TargetPoint& point, const FitInput& input, const TargetGaussian& target,
+/// True when the lidar looked through this share of the target, and hit something behind it.
+bool SawThrough(const TargetPoint& point, const TargetShape& shape, const TargetGaussian& target,
                 double core, double range_sigma) {
   const Eigen::Vector3d center = target.position() - point.age * target.velocity();
   const Eigen::Vector3d ray = point.p_W - point.p_WL, to_center = center - point.p_WL;
@@ -26,9 +25,16 @@ bool SawThrough(const TargetPoint& point, const FitInput& input, const TargetGau
   const double along = ray.head<2>().dot(to_center.head<2>()) / length;
   const double beside = std::abs(ray.x() * to_center.y() - ray.y() * to_center.x()) / length;
   const double above = point.p_WL.z() + along / length * ray.z() - center.z();
-  return beside < core * input.shape.size[0] &&
-         std::abs(above) < core * 0.5 * input.shape.size[1] &&
-         length > along + input.shape.MostHalfWidth() + kBehind + 2.0 * range_sigma;
+  return beside < core * shape.size[0] && std::abs(above) < core * 0.5 * shape.size[1] &&
+         length > along + shape.MostHalfWidth() + kBehind + 2.0 * range_sigma;
+}
+
+int CountThrough(const Clusters& clusters, const TargetShape& shape, const TargetGaussian& target,
+                 double core, double range_sigma) {
+  int count = 0;
+  for (const auto& cluster : clusters)
+    for (const auto& p : cluster) count += SawThrough(p, shape, target, core, range_sigma);
+  return count;
 }
 
 }  // namespace
@@ -52,19 +58,12 @@ std::vector<TargetPoint> PointsOnTarget(const FitInput& input,
 }
 
 bool SeenThrough(const FitInput& input, const Clusters& clusters) {
-  int count = 0;
-  for (const auto& cluster : clusters)
-    for (const auto& p : cluster)
-      count += SawThrough(p, input, input.prior, kCore, RangeSigma(input.prior, input.camera));
-  return count >= kManyPoints;
+  const double sigma = RangeSigma(input.prior, input.camera);
+  return CountThrough(clusters, input.shape, input.prior, kCore, sigma) >= kManyPoints;
 }
 
 int RaysThrough(const FitInput& input, const TargetGaussian& target) {
-  int count = 0;
-  if (!input.hits) return count;
-  for (const auto& cluster : *input.hits)
-    for (const auto& p : cluster) count += SawThrough(p, input, target, kMostOfIt, 0.0);
-  return count;
+  return input.hits ? CountThrough(*input.hits, input.shape, target, kMostOfIt, 0.0) : 0;
 }
 
 bool HitElsewhere(const FitInput& input, const Clusters& clusters) {

@@ -43,14 +43,14 @@ void PoseHistory::Add(const PoseSample& sample) {
 
 std::optional<PoseSample> PoseHistory::At(double t, double max_extrapolation) const {
   if (samples_.empty()) return std::nullopt;
-  const PoseSample& last = samples_.back();
-  if (t >= last.t)
-    return t - last.t <= max_extrapolation ? std::optional(Extrapolated(last, t)) : std::nullopt;
+  const PoseSample &first = samples_.front(), &last = samples_.back();
+  if (t < first.t || t >= last.t) {
+    const PoseSample& end = t < first.t ? first : last;
+    if (std::abs(t - end.t) > max_extrapolation) return std::nullopt;
+    return Extrapolated(end, t);
+  }
   const auto after = std::upper_bound(samples_.begin(), samples_.end(), t,
                                       [](double time, const PoseSample& s) { return time < s.t; });
-  if (after == samples_.begin())
-    return after->t - t <= max_extrapolation ? std::optional(Extrapolated(*after, t))
-                                             : std::nullopt;
   const auto before = std::prev(after);
   if (after->t - before->t > kMaxGap) return std::nullopt;
   return Between(*before, *after, t);

@@ -43,57 +43,63 @@ std::vector<cv::Point> RowEnds(const cv::Mat& mask) {
   return ends;
 }
 
-}  // namespace
-
-double ColorDetector::ShapeScore(const Detection& d, double area, double hull_area) const {
+/// 0 to 1 from aspect, fill and straightness; aspect and fill say nothing where the image ends.
+double ShapeScore(const ShapeConfig& shape, const Detection& d, double area, double hull_area) {
   const double solid = std::min(1.0, area / std::max(hull_area, 1.0));
   if (d.AnyCut()) return 0.6 * solid;
   const double aspect = d.box.width / d.box.height, fill = area / d.box.area();
-  return solid * Bell(std::log(aspect / shape_.aspect), kAspectTolerance) *
-         Bell(fill - shape_.fill, kFillTolerance);
+  return solid * Bell(std::log(aspect / shape.aspect), kAspectTolerance) *
+         Bell(fill - shape.fill, kFillTolerance);
 }
 
-Detection ColorDetector::Describe(const cv::Mat& bgr, const cv::Mat& score,
-                                  const std::vector<cv::Point>& contour) const {
+/// Of the detection's box, mask and cuts.
+double ScoreOf(const ShapeConfig& shape, const cv::Mat& score, const Detection& d) {
+  std::vector<cv::Point> hull;
+  cv::convexHull(RowEnds(d.mask), hull);
+  const double half_border = 0.5 * static_cast<double>(hull.size());  // hulls run through
+  const double area = cv::countNonZero(d.mask);                       // pixel centres
+  const double hull_area =
+      cv::contourArea(hull) + std::max(half_border, 0.5 * cv::arcLength(hull, true));
+  return cv::mean(score(d.mask_box), d.mask)[0] / 255.0 * ShapeScore(shape, d, area, hull_area);
+}
+
+Detection Describe(const ShapeConfig& shape, const cv::Mat& bgr, const cv::Mat& score,
+                   const std::vector<cv::Point>& contour) {
   Detection d;
   d.mask_box = cv::boundingRect(contour);
   d.box = EdgeBox(d.mask_box);
   d.mask = cv::Mat::zeros(d.mask_box.size(), CV_8U);
   cv::drawContours(d.mask, std::vector<std::vector<cv::Point>>{contour}, 0, 255, cv::FILLED,
                    cv::LINE_8, cv::noArray(), INT_MAX, -d.mask_box.tl());
-  d.inset_px = shape_.inset * d.box.width;
+  d.inset_px = shape.inset * d.box.width;
   d.cut = CutSides(d.mask_box, bgr.size());
-  Rate(score, &d);
+  d.score = ScoreOf(shape, score, d);
   return d;
 }
 
-void ColorDetector::Rate(const cv::Mat& score, Detection* d) const {
-  std::vector<cv::Point> hull;
-  cv::convexHull(RowEnds(d->mask), hull);
-  const double half_border = 0.5 * static_cast<double>(hull.size());  // hulls run through
-  const double area = cv::countNonZero(d->mask);                      // pixel centres
-  const double hull_area =
-      cv::contourArea(hull) + std::max(half_border, 0.5 * cv::arcLength(hull, true));
-  const double color = cv::mean(score(d->mask_box), d->mask)[0] / 255.0;
-  d->score = color * ShapeScore(*d, area, hull_area);
+void KeepBest(size_t most, std::vector<Detection>* found) {
+  std::stable_sort(found->begin(), found->end(),
+                   [](const Detection& a, const Detection& b) { return a.score > b.score; });
+  if (found->size() > most) found->resize(most);
 }
 
-void ColorDetector::AddPieces(const cv::Mat& bgr, const cv::Mat& score,
-                              std::vector<Detection>* found) const {
+/// Adds the best shaped pieces of large enough blobs that are not surely one thing.
+void AddPieces(const ShapeConfig& shape, const cv::Mat& bgr, const cv::Mat& score,
+               std::vector<Detection>* found) {
   std::vector<Detection> pieces;
   for (const auto& whole : *found) {
     if (whole.score > kOneThing || cv::countNonZero(whole.mask) < kSplitArea) continue;
     for (auto& piece : Split(bgr, whole)) {
-      Rate(score, &piece);
+      piece.score = ScoreOf(shape, score, piece);
       piece.part = whole.score > kWellShaped;
       if (piece.score > kWellShaped) pieces.push_back(std::move(piece));
     }
   }
-  std::stable_sort(pieces.begin(), pieces.end(),
-                   [](const Detection& a, const Detection& b) { return a.score > b.score; });
-  if (pieces.size() > kMostPieces) pieces.resize(kMostPieces);
+  KeepBest(kMostPieces, &pieces);
   for (auto& piece : pieces) found->push_back(std::move(piece));
 }
+
+}  // namespace
 
 std::vector<Detection> ColorDetector::Detect(const cv::Mat& bgr) const {
   const cv::Mat score = color_.Score(bgr);
@@ -103,19 +109,17 @@ std::vector<Detection> ColorDetector::Detect(const cv::Mat& bgr) const {
   for (const auto& contour : contours) {
     const cv::Rect box = cv::boundingRect(contour);
     if (box.area() < kLeastArea) continue;
-    Detection d = Describe(bgr, score, contour);
+    Detection d = Describe(shape_, bgr, score, contour);
     if (cv::countNonZero(d.mask) >= kLeastArea) found.push_back(std::move(d));
   }
-  std::stable_sort(found.begin(), found.end(),
-                   [](const Detection& a, const Detection& b) { return a.score > b.score; });
-  if (found.size() > kMaxBlobs) found.resize(kMaxBlobs);
+  KeepBest(kMaxBlobs, &found);
   for (auto& d : found) {
     d.silhouette = TraceSilhouette(bgr, d.mask, d.mask_box, d.cut);
     const double blur = std::max(1.0, EdgeWidth(bgr, d.mask, d.mask_box) / kSharp);
     d.silhouette.departure_px = shape_.outline_sigma * d.box.width;
     d.silhouette.sigma_px = std::hypot(blur * edge_sigma_px_, d.silhouette.departure_px);
   }
-  AddPieces(bgr, score, &found);
+  AddPieces(shape_, bgr, score, &found);
   return found;
 }
 

@@ -22,14 +22,6 @@ class ColorDetector : public Detector {
   std::vector<Detection> Detect(const cv::Mat& bgr) const override;
 
  private:
-  Detection Describe(const cv::Mat& bgr, const cv::Mat& score,
-                     const std::vector<cv::Point>& contour) const;
-  void Rate(const cv::Mat& score, Detection* d) const;
-  /// Adds the best shaped pieces of large enough blobs that are not surely one thing.
-  void AddPieces(const cv::Mat& bgr, const cv::Mat& score, std::vector<Detection>* found) const;
-  /// 0 to 1 from aspect, fill and straightness; aspect and fill say nothing where the image ends.
-  double ShapeScore(const Detection& d, double area, double hull_area) const;
-
   ShapeConfig shape_;
   ColorModel color_;
   double edge_sigma_px_;

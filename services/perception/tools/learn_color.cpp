@@ -4,7 +4,6 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 #include <optional>
-#include <utility>
 
 #include "services/perception/sight/color_model.h"
 
@@ -27,13 +26,13 @@ struct Samples {
   double near_ratio, far_ratio;  ///< pixels of the background over those of the target
 };
 
+/// Colours of kSamples of the pixels, some of them more than once where there are fewer.
 std::vector<Hsv> Pick(const cv::Mat& bgr, const cv::Mat& where) {
   std::vector<cv::Point> at;
   cv::findNonZero(where, at);
   std::vector<Hsv> picked;
-  const size_t step = 1 + at.size() / kSamples;
-  for (size_t i = 0; i < at.size(); i += step) {
-    const auto& p = bgr.at<cv::Vec3b>(at[i]);
+  for (size_t i = 0; i < kSamples && !at.empty(); ++i) {
+    const auto& p = bgr.at<cv::Vec3b>(at[i * at.size() / kSamples]);
     picked.push_back(ToHsv(p[0] / 255.0, p[1] / 255.0, p[2] / 255.0));
   }
   return picked;
@@ -62,57 +61,39 @@ double Share(const ColorConfig& range, const std::vector<Hsv>& of) {
 }
 
 /// Circular mean of the hues, degrees. What is grey or dark has no hue: each weighs by its chroma.
-double MeanHue(const std::vector<Samples>& all, const std::vector<bool>& used) {
+double MeanHue(const std::vector<Hsv>& colors) {
   double x = 0.0, y = 0.0;
-  for (size_t i = 0; i < all.size(); ++i)
-    for (const auto& c : all[i].target) {
-      if (!used[i]) continue;
-      const double weight = c.saturation * c.value / static_cast<double>(all[i].target.size());
-      x += weight * std::cos(c.hue_deg * M_PI / 180.0);
-      y += weight * std::sin(c.hue_deg * M_PI / 180.0);
-    }
+  for (const auto& c : colors) {
+    x += c.saturation * c.value * std::cos(c.hue_deg * M_PI / 180.0);
+    y += c.saturation * c.value * std::sin(c.hue_deg * M_PI / 180.0);
+  }
   return std::atan2(y, x) * 180.0 / M_PI;
 }
 
-/// A value and what it counts for.
-using Weighed = std::pair<double, double>;
-
-/// The value below which `share` of the weight lies.
-double Percentile(std::vector<Weighed> values, double share) {
-  std::sort(values.begin(), values.end());
-  double total = 0.0, sum = 0.0;
-  for (const auto& v : values) total += v.second;
-  for (const auto& v : values)
-    if ((sum += v.second) >= share * total) return v.first;
-  return values.back().first;
-}
-
-struct Range {
-  ColorConfig config;
-  double width_deg;  ///< of the hue
-};
-
-Range RangeOf(const std::vector<Samples>& all, const std::vector<bool>& used,
-              const ColorConfig& base) {
-  std::vector<Weighed> hue, saturation, value;
-  const double middle = MeanHue(all, used);
+ColorConfig RangeOf(const std::vector<Samples>& all, const std::vector<bool>& used,
+                    const ColorConfig& base) {
+  std::vector<Hsv> colors;
   for (size_t i = 0; i < all.size(); ++i)
-    for (const auto& c : all[i].target) {
-      if (!used[i]) continue;
-      const double weight = 1.0 / static_cast<double>(all[i].target.size());
-      hue.emplace_back(std::remainder(c.hue_deg - middle, 360.0), weight);
-      saturation.emplace_back(c.saturation, weight);
-      value.emplace_back(c.value, weight);
-    }
-  const double low = Percentile(hue, kTail) - kOtherLight;
-  const double high = Percentile(hue, 1.0 - kTail) + kOtherLight;
+    if (used[i]) colors.insert(colors.end(), all[i].target.begin(), all[i].target.end());
+  /// The value that `share` of the colours do not exceed.
+  const auto percentile = [&](double share, const auto& value_of) {
+    std::vector<double> values;
+    for (const auto& c : colors) values.push_back(value_of(c));
+    const auto at = values.begin() + std::lround(share * static_cast<double>(values.size() - 1));
+    std::nth_element(values.begin(), at, values.end());
+    return *at;
+  };
+  const double middle = MeanHue(colors);
+  const auto off = [&](const Hsv& c) { return std::remainder(c.hue_deg - middle, 360.0); };
+  const double low = percentile(kTail, off) - kOtherLight;
+  const double high = percentile(1.0 - kTail, off) + kOtherLight;
   ColorConfig config = base;
   config.hue_min_deg = std::fmod(middle + low + 720.0, 360.0);
   config.hue_max_deg = std::fmod(middle + high + 720.0, 360.0);
   if (high - low >= 360.0) config.hue_min_deg = 0.0, config.hue_max_deg = 360.0;
-  config.saturation_min = kGlare * Percentile(saturation, kTail);
-  config.value_min = kShade * Percentile(value, kTail);
-  return {config, high - low};
+  config.saturation_min = kGlare * percentile(kTail, [](const Hsv& c) { return c.saturation; });
+  config.value_min = kShade * percentile(kTail, [](const Hsv& c) { return c.value; });
+  return config;
 }
 
 std::vector<Separation> Separations(const std::vector<Samples>& all, const ColorConfig& range) {
@@ -128,30 +109,23 @@ std::vector<Separation> Separations(const std::vector<Samples>& all, const Color
   return out;
 }
 
-double Sum(const std::vector<Separation>& all) {
-  double sum = 0.0;
-  for (const auto& s : all) sum += s.index;
-  return sum;
-}
-
-std::vector<bool> Without(std::vector<bool> used, size_t i) {
-  used[i] = false;
-  return used;
-}
-
 /// The pictures to learn from: as long as the others separate all pictures better without one, the
 /// worst such one goes. What a picture can lose or win is bounded by 1.
 std::vector<bool> Consensus(const std::vector<Samples>& all, const ColorConfig& base) {
   std::vector<bool> used(all.size(), true);
-  const auto quality = [&](const std::vector<bool>& of) {
-    return Sum(Separations(all, RangeOf(all, of, base).config));
+  const auto quality = [&] {
+    double sum = 0.0;
+    for (const auto& s : Separations(all, RangeOf(all, used, base))) sum += s.index;
+    return sum;
   };
-  double best = quality(used);
+  double best = quality();
   for (size_t left = all.size(); left > 1; --left) {
     std::optional<size_t> worst;
     for (size_t i = 0; i < all.size(); ++i) {
       if (!used[i]) continue;
-      const double without = quality(Without(used, i));
+      used[i] = false;
+      const double without = quality();
+      used[i] = true;
       if (without <= (worst ? best : best + kWorthIt)) continue;
       best = without;
       worst = i;
@@ -169,17 +143,9 @@ LearnedColor LearnColor(const std::vector<cv::Mat>& images, const std::vector<cv
   std::vector<Samples> all;
   for (size_t i = 0; i < images.size(); ++i) all.push_back(SamplesOf(images[i], masks[i]));
   const std::vector<bool> used = Consensus(all, base);
-  const Range range = RangeOf(all, used, base);
-  LearnedColor out{range.config, Separations(all, range.config)};
-  const auto count = std::count(used.begin(), used.end(), true);
-  for (size_t i = 0; i < all.size(); ++i) {
-    out.pictures[i].used = used[i];
-    if (!used[i] || count < 2) continue;
-    const double narrower = range.width_deg - RangeOf(all, Without(used, i), base).width_deg;
-    if (out.widest >= 0 && narrower <= out.narrower_deg) continue;
-    out.widest = static_cast<int>(i);
-    out.narrower_deg = narrower;
-  }
+  const ColorConfig range = RangeOf(all, used, base);
+  LearnedColor out{range, Separations(all, range)};
+  for (size_t i = 0; i < all.size(); ++i) out.pictures[i].used = used[i];
   return out;
 }
 

@@ -21,8 +21,6 @@ struct Separation {
 struct LearnedColor {
   ColorConfig config;
   std::vector<Separation> pictures;
-  int widest = -1;  ///< the used picture without which the hue would be narrowest; -1: only one
-  double narrower_deg = 0.0;  ///< and by how much
 };
 
 /// The range of hue, saturation and value that holds the marked pixels of some pictures but for

@@ -49,9 +49,6 @@ std::string Quality(const std::vector<std::string>& files, const Learned& learne
         << p.far << ", separation " << p.index
         << (p.used ? "" : "; left out of the colours: with it they separate worse") << "\n";
   }
-  if (learned.color.widest >= 0)
-    out << "# Widest: without " << files[2 * static_cast<size_t>(learned.color.widest)]
-        << " the hue would be narrower by " << learned.color.narrower_deg << " degrees.\n";
   out << "# Mean overlap with the masks: " << learned.overlap << "\n";
   return out.str();
 }
