@@ -53,6 +53,35 @@ TEST(PerceptionAlike, WhatStandsIsTakenAfterAWhile) {
   }
 }
 
+/// A trunk hides a part of it, so that its outline is another.
+TEST(PerceptionAlike, WhatStandsHalfHiddenIsTakenWhereLidarTellsItsRange) {
+  for (const double aside : {0.159, 0.202}) {
+    World w = StillWorld(3.5);
+    w.things.push_back(
+        {Thing::Kind::kCylinder, {2.0, aside, 1.0}, {0.15, 0.15, 1.0}, {0.36, 0.28, 0.21}});
+    FlyOptions options;
+    options.duration = 2.0;
+    for (const auto& o : Fly(w, TakenAfterASecond(), options)) {
+      EXPECT_GT(o.visible_share, 0.45) << "else this shows nothing";
+      EXPECT_LT(o.visible_share, 0.9) << "else this shows nothing";
+      if (o.t > 1.5) {
+        EXPECT_TRUE(Detected(o) && Error(o) < 0.1) << "aside " << aside << ", t " << o.t;
+      }
+    }
+  }
+}
+
+/// LiDAR rays beside it see the ground behind it, where the rest of a target would be.
+TEST(PerceptionAlike, WhatIsHalfAsWideAndNothingHidesIsNotTaken) {
+  World w = StillWorld(3.5);
+  w.target = [](double) { return Vector3d(-8.0, 0.0, 0.55); };  // behind the drone
+  w.things.push_back({Thing::Kind::kBox, {3.5, 0.0, 0.55}, {0.08, 0.08, 0.25}, kOrange});
+  FlyOptions options;
+  options.duration = 2.5;
+  for (const auto& o : Fly(w, TakenAfterASecond(), options))
+    EXPECT_NE(o.estimate.state, TargetState::kTracking) << o.t;
+}
+
 TEST(PerceptionAlike, WhatDrivesIsTakenAtOnce) {
   for (const double heading : {0.0, 0.8, 1.6, 2.4, 3.1}) {
     World w = StillWorld(3.0);

@@ -98,9 +98,14 @@ double Candidate::LogDrives() const {
          log_density(Way(), P + size * size * flown * flown.transpose());
 }
 
+double Candidate::OddsAgainst() const {
+  return kPlaces * std::exp(-std::min(odds, last.fit.log_odds));
+}
+
+bool Candidate::Alike() const { return 1.0 / (1.0 + OddsAgainst()) > kSure; }
+
 double Candidate::Probability() const {
-  return 1.0 /
-         (1.0 + kPlaces * std::exp(-std::min(odds, last.fit.log_odds)) + std::exp(-LogDrives()));
+  return 1.0 / (1.0 + OddsAgainst() + std::exp(-LogDrives()));
 }
 
 bool Candidate::Drives() const { return Probability() > kSure; }

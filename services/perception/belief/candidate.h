@@ -48,6 +48,10 @@ struct Candidate {
 
   /// Logarithm of how much likelier its way is if it drives than if it stands.
   double LogDrives() const;
+  /// Of anything else in its place, by its shape.
+  double OddsAgainst() const;
+  /// True when it is surely of the target's shape.
+  bool Alike() const;
   /// That it is the target and drives, rather than something of another shape or its like that
   /// stands.
   double Probability() const;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "services/perception/place/hypotheses.h"
 #include "services/perception/sensors/image_check.h"
 #include "services/perception/sight/silhouette.h"
 
@@ -90,6 +91,17 @@ Clusters Finder::Points(const View& view, const Detection& detection, const Eige
   return all;
 }
 
+/// What is hidden has something before it: rays that see free space there tell against it.
+void Finder::WeighHidden(const View& view, FitInput input, FitResult* fit) const {
+  const auto box = ProjectTarget(view.camera, fit->posterior.position(), fit->shape);
+  if (fit->whole || !box) return;
+  Detection expected;
+  expected.box = *box;
+  const Clusters hits = Points(view, expected, fit->posterior.velocity(), false);
+  input.hits = &hits;
+  fit->log_odds += LogSeenThrough(input, fit->posterior);
+}
+
 std::optional<Sighting> Finder::Try(const TargetTrack& track, const View& view,
                                     const Detection& detection, bool fresh_sweeps_only) const {
   FitInput input;
@@ -99,8 +111,9 @@ std::optional<Sighting> Finder::Try(const TargetTrack& track, const View& view,
   input.detection = &detection;
   input.reappears = track.misses > 0 || track.partial;
   input.joined = track.joined && track.misses <= kStillJoined;
-  const auto fit =
+  auto fit =
       localiser_.Correct(input, Points(view, detection, track.state.velocity(), fresh_sweeps_only));
+  if (fit) WeighHidden(view, input, &*fit);
   if (!fit || fit->log_odds < kOdds) return std::nullopt;
   // What is hardly known has its range from the size alone; a sweep that was used still tells.
   if (fit->n_points == 0 && fresh_sweeps_only && (track.hits < kKnownHits || track.partial)) {
@@ -176,9 +189,14 @@ std::optional<Sighting> Finder::Find(const TargetTrack& track, View* view,
 }
 
 std::optional<Sighting> Finder::Acquire(const View& view, const Detection& detection) const {
-  const auto fit = localiser_.Acquire(shape_, view.camera, detection,
-                                      Points(view, detection, Eigen::Vector3d::Zero(), false));
+  auto fit = localiser_.Acquire(shape_, view.camera, detection,
+                                Points(view, detection, Eigen::Vector3d::Zero(), false));
   if (!fit) return std::nullopt;
+  FitInput input;
+  input.shape = shape_;
+  input.camera = view.camera;
+  WeighHidden(view, input, &*fit);
+  if (!fit->whole && fit->log_odds < kOdds) return std::nullopt;
   return Sighting{*fit, detection};
 }
 

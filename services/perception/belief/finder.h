@@ -88,6 +88,7 @@ class Finder {
   std::optional<Sighting> FindPieces(const TargetTrack& track, const View& view,
                                      const std::vector<size_t>& inside, const Refuses& refuses,
                                      const SearchBoxes& boxes) const;
+  void WeighHidden(const View& view, FitInput input, FitResult* fit) const;
   Clusters Points(const View& view, const Detection& detection, const Eigen::Vector3d& v_WT,
                   bool fresh_only) const;
 

@@ -110,7 +110,8 @@ bool Perceiver::Ready(const Candidate& c, double t) const {
   const bool unclear = d.AnyCut() && !c.last.SurelyHit();
   const bool piece = c.part || c.track.partial || d.LeavesImage() || unclear;
   if (piece ? PieceIsReady(c) : c.Drives()) return true;
-  return !piece && !sighting_ && StandsLongEnough(c, t);
+  const bool hidden = c.track.partial && !c.part && !d.LeavesImage() && c.last.SurelyHit();
+  return (!piece || (hidden && c.Alike())) && !sighting_ && StandsLongEnough(c, t);
 }
 
 }  // namespace chase::perception

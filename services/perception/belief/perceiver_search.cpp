@@ -39,7 +39,7 @@ void Perceiver::DropMissed() {
 }
 
 bool Perceiver::MayBeNew(const Detection& d) const {
-  return d.score >= config_.state.acquire_score &&
+  return std::max(d.score, d.solidity) >= config_.state.acquire_score &&
          d.box.width >= kLeastWidth * config_.fit.edge_sigma_px;
 }
 
@@ -87,8 +87,11 @@ void Perceiver::AddCandidates(View* view) {
   for (const size_t i : order) {
     if (candidates_.size() >= kMaxCandidates) return;
     const auto found = finder_.Acquire(*view, view->detections[i]);
-    if (!found) CountRefused(view->detections[i]);
-    if (!found || !InGate(*found, view->t)) continue;
+    // A part of it has another outline: LiDAR must tell its range, and so how much is hidden.
+    const bool fits = found && (found->detection.score >= config_.state.acquire_score ||
+                                (!found->fit.whole && found->SurelyHit()));
+    if (!fits) CountRefused(view->detections[i]);
+    if (!fits || !InGate(*found, view->t)) continue;
     // A piece needs LiDAR points, and so does what shows in part unless the target may come back.
     const bool needs_points = found->detection.part || (!found->fit.whole && !comes_back);
     if ((needs_points && found->fit.n_points == 0) || Followed(*found)) continue;

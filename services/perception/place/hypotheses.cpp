@@ -159,9 +159,13 @@ double LogTarget(const FitResult& fit, const FitInput& input, const FitConfig& c
   if (fit.n_points > 0) {
     const double n = std::min(kLidarWeight, static_cast<double>(fit.n_points));
     sum -= std::log(config.lidar_sigma / std::sqrt(n) * std::sqrt(2.0 * M_PI));
-    sum -= std::min(kMostThrough, kThrough * RaysThrough(input, fit.posterior));
+    sum += LogSeenThrough(input, fit.posterior);
   }
   return sum;
+}
+
+double LogSeenThrough(const FitInput& input, const TargetGaussian& target) {
+  return -std::min(kMostThrough, kThrough * RaysThrough(input, target));
 }
 
 double LogClutter(const FitInput& input) {

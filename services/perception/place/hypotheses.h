@@ -58,6 +58,9 @@ std::optional<FitInput> AtRangeOf(const std::vector<TargetPoint>& cluster, const
 /// with sides that are hidden, or run into a like colour, anywhere, and likewise a stray position.
 double LogTarget(const FitResult& fit, const FitInput& input, const FitConfig& config);
 
+/// Added where `target` stands: for LiDAR rays (`input.hits`) that see what lies behind it.
+double LogSeenThrough(const FitInput& input, const TargetGaussian& target);
+
 /// Where they belong to something else of the target's colour.
 double LogClutter(const FitInput& input);
 

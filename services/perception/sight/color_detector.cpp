@@ -44,23 +44,25 @@ std::vector<cv::Point> RowEnds(const cv::Mat& mask) {
 }
 
 /// 0 to 1 from aspect, fill and straightness; aspect and fill say nothing where the image ends.
-double ShapeScore(const ShapeConfig& shape, const Detection& d, double area, double hull_area) {
-  const double solid = std::min(1.0, area / std::max(hull_area, 1.0));
+double ShapeScore(const ShapeConfig& shape, const Detection& d, double area, double solid) {
   if (d.AnyCut()) return 0.6 * solid;
   const double aspect = d.box.width / d.box.height, fill = area / d.box.area();
   return solid * Bell(std::log(aspect / shape.aspect), kAspectTolerance) *
          Bell(fill - shape.fill, kFillTolerance);
 }
 
-/// Of the detection's box, mask and cuts.
-double ScoreOf(const ShapeConfig& shape, const cv::Mat& score, const Detection& d) {
+/// Scores of the detection's box, mask and cuts.
+void Rate(const ShapeConfig& shape, const cv::Mat& score, Detection* d) {
   std::vector<cv::Point> hull;
-  cv::convexHull(RowEnds(d.mask), hull);
+  cv::convexHull(RowEnds(d->mask), hull);
   const double half_border = 0.5 * static_cast<double>(hull.size());  // hulls run through
-  const double area = cv::countNonZero(d.mask);                       // pixel centres
+  const double area = cv::countNonZero(d->mask);                      // pixel centres
   const double hull_area =
       cv::contourArea(hull) + std::max(half_border, 0.5 * cv::arcLength(hull, true));
-  return cv::mean(score(d.mask_box), d.mask)[0] / 255.0 * ShapeScore(shape, d, area, hull_area);
+  const double color = cv::mean(score(d->mask_box), d->mask)[0] / 255.0;
+  const double solid = std::min(1.0, area / std::max(hull_area, 1.0));
+  d->solidity = color * solid;
+  d->score = color * ShapeScore(shape, *d, area, solid);
 }
 
 Detection Describe(const ShapeConfig& shape, const cv::Mat& bgr, const cv::Mat& score,
@@ -73,7 +75,7 @@ Detection Describe(const ShapeConfig& shape, const cv::Mat& bgr, const cv::Mat& 
                    cv::LINE_8, cv::noArray(), INT_MAX, -d.mask_box.tl());
   d.inset_px = shape.inset * d.box.width;
   d.cut = CutSides(d.mask_box, bgr.size());
-  d.score = ScoreOf(shape, score, d);
+  Rate(shape, score, &d);
   return d;
 }
 
@@ -90,7 +92,7 @@ void AddPieces(const ShapeConfig& shape, const cv::Mat& bgr, const cv::Mat& scor
   for (const auto& whole : *found) {
     if (whole.score > kOneThing || cv::countNonZero(whole.mask) < kSplitArea) continue;
     for (auto& piece : Split(bgr, whole)) {
-      piece.score = ScoreOf(shape, score, piece);
+      Rate(shape, score, &piece);
       piece.part = whole.score > kWellShaped;
       if (piece.score > kWellShaped) pieces.push_back(std::move(piece));
     }

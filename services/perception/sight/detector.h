@@ -25,6 +25,7 @@ struct Silhouette {
 struct Detection {
   cv::Rect2d box;                       ///< px, edges between pixels
   double score = 0.0;                   ///< 0 to 1
+  double solidity = 0.0;                ///< score of a part of the target, by colour and convexity
   std::array<bool, 4> cut = {};         ///< by Side: it goes on where the image, or the piece, ends
   std::array<bool, 4> goes_on = {};     ///< by Side: a like colour does so, all along the side
   std::array<bool, 4> parted = {};      ///< by Side: likewise, and the blob's outline jumps there
