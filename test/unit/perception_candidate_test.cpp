@@ -211,17 +211,5 @@ TEST(PerceptionEstimate, ExistsWhereItIsSaidToBeAsFarAsItsCovarianceTells) {
   }
 }
 
-TEST(PerceptionDecoys, TwoThatStandCloseTogetherAreNotOneThatDrives) {
-  const StateConfig config;
-  Decoys decoys(config);
-  const Vector3d a(3.0, 0.0, 0.55), b = a + Vector3d(0.0, 0.9 * config.decoy_radius, 0.0);
-  Decoy* decoy = nullptr;
-  for (int k = 0; k < 10; ++k) decoy = decoys.Note(k % 2 ? b : a, 0.1 * k);
-  ASSERT_TRUE(decoy && decoy->known());
-  EXPECT_FALSE(decoy->Driven(config.decoy_radius));
-  for (int k = 1; k <= 10; ++k) decoy = decoys.Note(b + Vector3d(0.1 * k, 0.0, 0.0), 1.0 + 0.1 * k);
-  EXPECT_TRUE(decoy->Driven(config.decoy_radius));
-}
-
 }  // namespace
 }  // namespace chase::perception

@@ -11,11 +11,8 @@ constexpr double kHiddenAfter = 0.08;     // s unseen: occluded
 constexpr double kLostSigma = 3.0;        // m, horizontal standard deviation of what is lost
 constexpr double kUnknownVariance = 1e4;  // m^2, while nothing is known
 constexpr double kGap = 0.25;             // s between frames in which a target may do anything
-constexpr int kSureHits = 5;              // corrections after which the track is trusted
-constexpr double kDrivenSigma = 0.1;      // m, how well that must be known
 constexpr double kThere = 0.5;            // m, within which a target is where it is said to be
 constexpr double kStood = 0.2;            // m, within which a target stands
-constexpr double kStoodFor = 0.6;         // s, likewise
 
 }  // namespace
 
@@ -26,14 +23,12 @@ double TargetEstimate::Existence() const {
   return 1.0 - std::exp(-0.5 * kThere * kThere / variance);
 }
 
-Perceiver::Perceiver(const PerceptionConfig& config)
-    : config_(config), finder_(config), decoys_(config.state) {}
+Perceiver::Perceiver(const PerceptionConfig& config) : config_(config), finder_(config) {}
 
 void Perceiver::Follow(View* view) {
   if (!track_) return;
-  const auto refuses = [&](const Sighting& s) { return IsRatherDecoy(s, *view); };
   auto taken = view->taken;
-  const auto found = finder_.Find(*track_, view, refuses);
+  const auto found = finder_.Find(*track_, view, [](const Sighting&) { return false; });
   if (!found || !Sure(*found)) {
     view->taken = taken;
     ++track_->misses;
@@ -49,7 +44,6 @@ void Perceiver::Start(const TargetTrack& track, const Sighting& sighting) {
   track_ = track;
   tentative_ = false;
   stood_ = track.state.position();
-  stood_since_ = track.t;
   sighting_ = sighting;
   state_ = TargetState::kTracking;
 }
@@ -69,38 +63,6 @@ void Perceiver::Judge(double t) {
   if ((last_p_ - stood_).norm() < kStood) return;
   tentative_ = false;
   stood_ = last_p_;
-  stood_since_ = t;
-}
-
-/// While the target is surely in view, what else looks just like it is not the target. One of them
-/// a frame is placed.
-void Perceiver::NoteDecoys(const View& view) {
-  if (!track_ || tentative_ || track_->seen < view.t || track_->hits < kSureHits) return;
-  decoys_.Forget(view.t, track_->state.position());
-  const size_t n = view.detections.size();
-  for (size_t k = 0; k < n; ++k) {
-    const size_t i = (k + turn_) % n;
-    if (view.taken[i] || view.detections[i].part || !MayBeNew(view.detections[i])) continue;
-    turn_ = i + 1;
-    const auto found = finder_.Acquire(view, view.detections[i]);
-    if (!found || !found->fit.whole) return;
-    const Eigen::Vector3d p = found->fit.posterior.position();
-    if ((p - track_->state.position()).norm() < config_.state.decoy_radius) return;
-    Decoy* decoy = decoys_.Note(p, view.t);
-    if (decoy) SwapIfTheOtherDrives(*found, decoy, view.t);
-    return;
-  }
-}
-
-/// The one that drives is the target, and the one that stands is not.
-void Perceiver::SwapIfTheOtherDrives(const Sighting& s, Decoy* other, double t) {
-  const double sigma = std::sqrt(s.fit.posterior.covariance.topLeftCorner<3, 3>().trace());
-  const bool stands =
-      t - stood_since_ > kStoodFor && (track_->state.position() - stood_).norm() < kStood;
-  if (!stands || !other->Driven(config_.state.decoy_radius) || sigma > kDrivenSigma) return;
-  const Eigen::Vector3d stood = track_->state.position();
-  *other = {stood, stood, t, other->hits};
-  Start(StartTrack(s.fit, t), s);
 }
 
 /// True when the frame is newer than the last one, or starts a recording anew.
@@ -115,7 +77,7 @@ bool Perceiver::ForgetIfTimeRanBack(double t) {
 void Perceiver::Forget() {
   track_.reset();
   candidates_.clear();
-  decoys_.Clear();
+  look_alikes_.clear();
   selected_.reset();
   state_ = TargetState::kSearching;
 }
@@ -172,7 +134,6 @@ TargetEstimate Perceiver::See(const Frame& frame) {
     if (state_ != TargetState::kLost) Follow(&*view);
     Seek(&*view);
     if (sighting_ || !candidates_.empty()) finder_.MarkSweepsUsed(frame.t);
-    NoteDecoys(*view);
   } else if (newer) {
     if (track_) ++track_->misses;
     for (auto& c : candidates_) ++c.track.misses;

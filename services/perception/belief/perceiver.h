@@ -2,12 +2,12 @@
 
 #include <array>
 #include <cstdint>
+#include <deque>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "services/perception/belief/candidate.h"
-#include "services/perception/belief/decoys.h"
 #include "services/perception/belief/finder.h"
 
 namespace chase::perception {
@@ -42,6 +42,12 @@ struct TargetEstimate {
   double Existence() const;
 };
 
+/// What stood where it was seen when something else was taken for the target.
+struct LookAlike {
+  Eigen::Vector3d p_W;  ///< frame W, m
+  double t;             ///< when, s
+};
+
 /// Finds the target, follows it and says how sure it is. Feed it poses and sweeps as they come and
 /// ask with each frame.
 class Perceiver {
@@ -66,7 +72,6 @@ class Perceiver {
   void AddCandidates(View* view);
   void DropMissed();
   void Confirm(const View& view);
-  void NoteDecoys(const View& view);
   void Judge(double t);
   TargetEstimate Report(double t, const std::optional<View>& view, std::string note) const;
 
@@ -79,8 +84,7 @@ class Perceiver {
   bool PieceIsReady(const Candidate& candidate) const;
   bool StandsLongEnough(const Candidate& candidate, double t) const;
   bool InGate(const Sighting& s, double t) const;
-  bool IsRatherDecoy(const Sighting& s, const View& view) const;
-  void SwapIfTheOtherDrives(const Sighting& s, Decoy* other, double t);
+  bool IsLookAlike(const Eigen::Vector3d& p_W, double t) const;
   void Start(const TargetTrack& track, const Sighting& sighting);
   bool ForgetIfTimeRanBack(double t);
   void Forget();
@@ -93,12 +97,10 @@ class Perceiver {
   std::optional<Sighting> sighting_;  ///< of the last frame
   bool tentative_ = false;            ///< it stood when it was taken, and has stood since
   std::optional<Sighting> unsure_;    ///< in the last frame: may be the target, as far as it shows
-  Decoys decoys_;
+  std::deque<LookAlike> look_alikes_;
   std::optional<Eigen::Vector2d> selected_;           ///< px, not taken yet
   Refused refused_ = {};                              ///< in this frame
-  size_t turn_ = 0;                                   ///< detection that is looked at next
   Eigen::Vector3d stood_ = Eigen::Vector3d::Zero();   ///< where the target stood or was, frame W, m
-  double stood_since_ = 0.0;                          ///< s
   Eigen::Vector3d last_v_ = Eigen::Vector3d::Zero();  ///< when last seen, frame W, m/s
   Eigen::Vector3d last_p_ = Eigen::Vector3d::Zero();  ///< likewise, m
   double last_t_ = -1e18, selected_at_ = 0.0;         ///< s

@@ -23,32 +23,23 @@ constexpr int kPieceHits = 4;           // sightings of a piece or a half before
 constexpr int kPieceSweeps = 2;         // of them with LiDAR points, for what has come out wholly,
 constexpr int kNewPieceHits = 10;       // and where none was ever seen, nor LiDAR tells much
 constexpr double kNewPieceWay = 0.3;    // m, likewise
-constexpr double kDecoySigma = 0.1;     // m, how well its place is known
+constexpr double kMemory = 60.0;        // s that a look-alike is remembered
 constexpr double kFar = 5.0;            // m, from where fewer pixels tell what stands there
 constexpr double kTrusted = 0.3;        // s that a track not seen is preferred to anything new
 constexpr double kStandingSpeed = 0.2;  // m/s
 
 }  // namespace
 
-/// True when a look-alike known to stand there explains a sighting better than the target does.
-bool Perceiver::IsRatherDecoy(const Sighting& s, const View& view) const {
-  const Decoy* decoy = decoys_.At(s.fit.posterior.position());
-  if (!decoy) return false;
-  TargetTrack standing = StartTrack(s.fit, view.t);
-  standing.partial = standing.joined = false;
-  standing.state.mean << decoy->p_W, Eigen::Vector3d::Zero();
-  standing.state.covariance = Matrix6d::Identity() * kDecoySigma * kDecoySigma;
-  if (track_) {  // on the same terms
-    standing.misses = track_->misses;
-    standing.joined = track_->joined;
-  }
-  const auto other = finder_.Try(standing, view, s.detection, false);
-  return other && other->fit.log_odds > s.fit.log_odds;
+/// True where a look-alike is remembered.
+bool Perceiver::IsLookAlike(const Eigen::Vector3d& p_W, double t) const {
+  return std::any_of(look_alikes_.begin(), look_alikes_.end(), [&](const LookAlike& other) {
+    return t - other.t < kMemory && (other.p_W - p_W).norm() < config_.state.decoy_radius;
+  });
 }
 
 bool Perceiver::InGate(const Sighting& s, double t) const {
   const Eigen::Vector3d p_WT = s.fit.posterior.position();
-  if (decoys_.At(p_WT)) return false;
+  if (IsLookAlike(p_WT, t)) return false;
   if (!track_ || tentative_ || !track_->Proven()) return true;
   const double way = (p_WT - last_p_).norm(), unseen = t - track_->seen;
   if (state_ != TargetState::kLost) {

@@ -10,10 +10,9 @@ namespace chase::perception {
 namespace {
 
 constexpr int kCandidateMisses = 2;  // frames without it that end a candidate
-constexpr size_t kMaxCandidates = 6;
+constexpr size_t kMaxCandidates = 6, kMostLookAlikes = 32;
 constexpr double kLeastWidth = 12.0;  // standard deviations of a sharp edge; less may be a slit
-constexpr int kDecoyHits = 3;     // sightings that what stands beside one that drives counts for
-constexpr double kPointed = 1.0;  // s that what is pointed at is looked for there
+constexpr double kPointed = 1.0;      // s that what is pointed at is looked for there
 
 }  // namespace
 
@@ -120,8 +119,9 @@ void Perceiver::Confirm(const View& view) {
   const bool drives = chosen.Drives() || PieceIsReady(chosen);
   for (const auto& c : candidates_)
     if (&c != best && drives && !c.Drives() && !c.part && c.track.hits >= Candidate::kConfirmFrames)
-      decoys_.Note(c.track.state.position(), view.t, kDecoyHits);
-  if (sighting_) decoys_.Note(track_->state.position(), view.t, kDecoyHits);
+      look_alikes_.push_back({c.track.state.position(), view.t});
+  if (sighting_) look_alikes_.push_back({track_->state.position(), view.t});
+  while (look_alikes_.size() > kMostLookAlikes) look_alikes_.pop_front();
   Start(chosen.track, chosen.last);
   tentative_ = !drives;
   candidates_.clear();
