@@ -118,24 +118,6 @@ TEST(PerceptionRange, BySizeHoldsFarOffTheAxisAndBehindAnyLens) {
       }
 }
 
-TEST(PerceptionRange, PointsOnATargetOffTheAxisMoveItsPrediction) {
-  for (const Vector3d& sight : kSights) {
-    FitInput input;
-    input.camera = LookingAlongX(WideRig("pinhole", {}));
-    Detection d;
-    d.box = *ProjectTarget(input.camera, 4.0 * sight.normalized(), {});
-    input.detection = &d;
-    input.prior.mean.head<3>() = 5.0 * sight.normalized();
-    const std::vector<TargetPoint> hits(12,
-                                        TargetPoint{Vector3d::Zero(), Vector3d::Zero(), 0.0, 3.85});
-    const auto moved = AtRangeOf(hits, input);
-    ASSERT_TRUE(moved) << "too wide or narrow for it there: " << sight.transpose();
-    EXPECT_NEAR(moved->prior.position().norm(), 4.0, 1e-9);
-    d.box.width *= 1.5;
-    EXPECT_FALSE(AtRangeOf(hits, input));
-  }
-}
-
 TEST(PerceptionRange, OfANewTargetIsAsSureAsWhatToldIt) {
   const Camera camera = LookingAlongX(WideRig("pinhole", {}));
   for (const Vector3d& sight : kSights) {

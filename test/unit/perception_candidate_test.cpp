@@ -5,7 +5,6 @@
 #include <random>
 
 #include "services/perception/belief/candidate.h"
-#include "services/perception/belief/decoys.h"
 #include "services/perception/belief/perceiver.h"
 
 namespace chase::perception {

@@ -16,7 +16,6 @@ constexpr double kTurnShift = 0.12;   // m, and of the place
 constexpr double kKnownShare = 0.03;  // of the range, standard deviation of the prediction
 constexpr double kKnownRange = 0.25;  // m, likewise
 constexpr double kAside = 0.1;        // share of the range that a new target may lie beside its box
-constexpr double kSizeError = 0.1;    // share of the width that the outline may err by
 
 constexpr double kHidden = 0.02;      // how often a given side is hidden,
 constexpr double kStillHidden = 0.3;  // and of what comes back from behind something
@@ -113,28 +112,6 @@ TargetGaussian NewTarget(const Camera& camera, const cv::Rect2d& box, const Targ
       beside * beside * (Eigen::Matrix3d::Identity() - along) + range_sigma * range_sigma * along;
   g.ForgetVelocity();
   return g;
-}
-
-std::optional<FitInput> AtRangeOf(const std::vector<TargetPoint>& cluster, const FitInput& input) {
-  if (!GivesRange(cluster)) return std::nullopt;
-  const double range = MedianRange(cluster) + input.shape.size[0];
-  const auto& seen = input.detection->box;
-  const auto width = [&](double half) {
-    const auto box = BoxAtRange(input.camera, seen, range, Round(input.shape, half));
-    return box ? box->width : 0.0;
-  };
-  if (seen.width < (1.0 - kSizeError) * width(input.shape.size[0]) ||
-      seen.width > (1.0 + kSizeError) * width(input.shape.MostHalfWidth()))
-    return std::nullopt;
-  const Eigen::Vector3d to_prior = input.prior.position() - input.camera.p_WC;
-  const Eigen::Vector3d sight = to_prior.normalized();
-  const double shift = range - to_prior.norm();
-  FitInput moved = input;
-  moved.prior.mean.head<3>() += shift * sight;
-  moved.prior.covariance.topLeftCorner<3, 3>() += shift * shift * sight * sight.transpose();
-  moved.prior.covariance.block<2, 2>(3, 3) += kTurnSpeed * kTurnSpeed * Eigen::Matrix2d::Identity();
-  moved.shape.yaw_variance = TargetShape::kAnyYaw;
-  return moved;
 }
 
 std::function<bool(const Sides&)> Sensible(const FitInput& input) {

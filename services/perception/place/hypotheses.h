@@ -47,11 +47,6 @@ FitInput AfterASharpTurn(const FitInput& input);
 TargetGaussian NewTarget(const Camera& camera, const cv::Rect2d& box, const TargetShape& shape,
                          double range, double range_sigma);
 
-/// The same with the prediction moved along the line of sight to the range of these points, its
-/// heading unknown: a box may turn while its width alone tells its range. Nothing where the
-/// detection is too wide or too narrow for the target there.
-std::optional<FitInput> AtRangeOf(const std::vector<TargetPoint>& cluster, const FitInput& input);
-
 // Logarithms of probability densities of what was measured in one detection.
 
 /// Where sides and points are the target's: the fit's evidence and the measurements' own densities,

@@ -134,17 +134,6 @@ std::optional<FitResult> Localiser::JoinedReading(FitInput* input) const {
   return fit;
 }
 
-std::optional<FitResult> Localiser::DisplacedReading(
-    const FitInput& input, const std::vector<TargetPoint>& cluster) const {
-  auto moved = AtRangeOf(cluster, input);
-  if (!moved) return std::nullopt;
-  moved->points = PointsOnTarget(*moved, cluster, kLidarGate);
-  if (moved->points.size() < kSurelyHit) return std::nullopt;
-  auto fit = JoinedReading(&*moved);
-  if (fit) fit->log_odds += std::log(kSharpTurn);
-  return fit;
-}
-
 std::optional<FitResult> Localiser::Correct(const FitInput& predicted,
                                             const Clusters& clusters) const {
   if (!Visible(predicted)) return std::nullopt;
@@ -159,12 +148,9 @@ std::optional<FitResult> Localiser::Correct(const FitInput& predicted,
   int tried = 0;
   for (const auto& cluster : clusters) {
     input.points = PointsOnTarget(predicted, cluster, gate);
-    std::optional<FitResult> fit;
-    if (!input.points.empty()) {
-      if (++tried > kMostClusters) break;
-      fit = JoinedReading(&input);
-    }
-    if (!fit || fit->log_odds < 0.0) fit = DisplacedReading(input, cluster);
+    if (input.points.empty()) continue;
+    if (++tried > kMostClusters) break;
+    const auto fit = JoinedReading(&input);
     if (!fit) continue;
     const double score = fit->log_odds - LogUnexplained(all - static_cast<double>(cluster.size()));
     if (best && score <= best_score) continue;

@@ -33,9 +33,6 @@ class Localiser {
   std::optional<FitResult> WholeReading(FitInput* input) const;
   /// All hypotheses that agree with the prediction, weighed and joined into one Gaussian.
   std::optional<FitResult> JoinedReading(FitInput* input) const;
-  /// Where the prediction erred along the line of sight, as the points of a cluster tell.
-  std::optional<FitResult> DisplacedReading(const FitInput& input,
-                                            const std::vector<TargetPoint>& cluster) const;
   std::optional<FitResult> PartialReading(FitInput input) const;
   std::optional<FitResult> AcquirePartial(FitInput* input, const Clusters& clusters) const;
   std::optional<FitResult> AcquirePartialBySize(FitInput* input) const;
