@@ -113,35 +113,6 @@ TEST(PerceptionPieces, WhatGoesWithTheWidthIsThePiecesOwn) {
 }
 
 /// Something grey hides the left half of the target.
-TEST(PerceptionAcquire, HalfOfATargetIsPlacedByItsHeightUnlessPointsTellAnotherRange) {
-  const Localiser localiser(PerceptionConfig{});
-  const ColorDetector detector(DetectorConfig{}, 0.45);
-  for (const double distance : {3.0, 3.5, 4.0}) {
-    auto world = StillWorld(distance);
-    world.things.push_back(
-        {Thing::Kind::kBox, {2.0, 0.5, 1.0}, {0.05, 0.5, 1.0}, {0.55, 0.6, 0.7}});
-    const auto shot = Renderer(world).Image(0.0);
-    ASSERT_NEAR(shot.visible_share, 0.5, 0.15);
-    const auto found = detector.Detect(shot.bgr);
-    ASSERT_FALSE(found.empty());
-    PoseSample pose;
-    pose.p_WB = world.body(0.0).p;
-    pose.R_WB = world.body(0.0).R;
-    const Camera camera = CameraAt(pose, world.rig);
-    const auto fit = localiser.Acquire({}, camera, found[0], {});
-    ASSERT_TRUE(fit) << distance;
-    EXPECT_FALSE(fit->whole);
-    EXPECT_FALSE(fit->used[kLeft]);
-    EXPECT_LT((fit->posterior.position() - world.target(0.0)).norm(), 0.15) << distance;
-    const Vector3d sight = (fit->posterior.position() - camera.p_WC).normalized();
-    std::vector<TargetPoint> nearer;
-    for (int i = 0; i < 12; ++i)
-      nearer.push_back(
-          {camera.p_WC + 1.5 * sight + Vector3d(0.0, 0.004 * i, 0.0), camera.p_WC, 0.0, 1.5});
-    EXPECT_FALSE(localiser.Acquire({}, camera, found[0], {nearer})) << distance;
-  }
-}
-
 TEST(PerceptionCandidate, WithoutPointsAWayAlongTheLineOfSightIsNotSure) {
   const auto gone = [](const Vector3d& way) {
     Candidate c;

@@ -35,7 +35,6 @@ class Localiser {
   std::optional<FitResult> JoinedReading(FitInput* input) const;
   std::optional<FitResult> PartialReading(FitInput input) const;
   std::optional<FitResult> AcquirePartial(FitInput* input, const Clusters& clusters) const;
-  std::optional<FitResult> AcquirePartialBySize(FitInput* input) const;
   void Weigh(const FitInput& input, double log_prior, size_t readings, bool all,
              std::vector<Hypothesis>* out) const;
   bool EdgesAgree(const FitResult& fit, const FitInput& input) const;

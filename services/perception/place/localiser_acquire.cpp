@@ -13,7 +13,6 @@ namespace {
 constexpr int kSidesOfNew = 3;           // of what nothing is known of yet
 constexpr double kHitRange = 0.3;        // m, standard deviation of a range from points
 constexpr double kSizedShare = 0.4;      // of the range, likewise from the width alone
-constexpr double kSizedRange = 0.24;     // m, standard deviation of a range from one size alone
 constexpr double kMaxRangeError = 0.15;  // share of the range; a worse first fix is none
 constexpr double kLarger = 1.15, kLargerSigmas = 6.0;  // times its size, and of an edge more
 
@@ -51,20 +50,6 @@ std::optional<FitResult> Localiser::AcquirePartial(FitInput* input,
   return std::nullopt;
 }
 
-/// Likewise where three sides are seen and its height tells the range: what hides the fourth must
-/// not keep it from being followed.
-std::optional<FitResult> Localiser::AcquirePartialBySize(FitInput* input) const {
-  const auto& d = *input->detection;
-  const auto seen = [&](Side side) { return !d.silhouette.samples[side].empty(); };
-  if (!seen(kTop) || !seen(kBottom)) return std::nullopt;
-  const double range = RangeBySize(input->camera, d.box, input->shape, true);
-  input->prior = NewTarget(input->camera, d.box, input->shape, range, kSizedRange);
-  input->points.clear();
-  const auto fit = PartialReading(*input);
-  const auto used = fit ? std::count(fit->used.begin(), fit->used.end(), true) : 0;
-  return used < kSidesOfNew ? std::nullopt : fit;
-}
-
 std::optional<FitResult> Localiser::Acquire(const TargetShape& shape, const Camera& camera,
                                             const Detection& detection,
                                             const Clusters& clusters) const {
@@ -88,26 +73,16 @@ std::optional<FitResult> Localiser::Acquire(const TargetShape& shape, const Came
     if (good(fit)) return fit;
   }
   if (const auto hit = AcquirePartial(&input, clusters)) return hit;
-  const auto not_through = [&](const std::optional<FitResult>& fit) {
-    if (!fit) return fit;
-    input.prior = fit->posterior;
-    return SeenThrough(input, clusters) ? std::nullopt : fit;
-  };
   // From the size alone: every side must be seen, since nothing tells what is hidden.
-  const auto partial = [&]() -> std::optional<FitResult> {
-    if (detection.p_CT) return std::nullopt;
-    const auto fit = not_through(AcquirePartialBySize(&input));
-    if (fit && HitElsewhere(input, clusters)) return std::nullopt;
-    return fit;
-  };
-  if (!detection.p_CT && detection.AnyCut()) return partial();
+  if (!detection.p_CT && detection.AnyCut()) return std::nullopt;
   const double range =
-      detection.p_CT ? detection.p_CT->norm() : RangeBySize(camera, detection.box, shape, false);
+      detection.p_CT ? detection.p_CT->norm() : RangeBySize(camera, detection.box, shape);
   input.prior = NewTarget(camera, detection.box, shape, range, kSizedShare * range);
   input.points.clear();
   const auto fit = WholeReading(&input);
-  if (!good(fit)) return partial();
-  return not_through(fit);
+  if (!good(fit)) return std::nullopt;
+  input.prior = fit->posterior;
+  return SeenThrough(input, clusters) ? std::nullopt : fit;
 }
 
 }  // namespace chase::perception

@@ -104,17 +104,15 @@ std::optional<cv::Rect2d> BoxAtRange(const Camera& camera, const cv::Rect2d& see
   return ProjectTarget(camera, camera.p_WC + range * camera.Sight(seen), shape);
 }
 
-double RangeBySize(const Camera& camera, const cv::Rect2d& seen, const TargetShape& shape,
-                   bool by_height) {
+double RangeBySize(const Camera& camera, const cv::Rect2d& seen, const TargetShape& shape) {
   const TargetShape round = Round(shape, shape.MeanHalfWidth());
-  const auto size = [&](const cv::Rect2d& box) { return by_height ? box.height : box.width; };
-  const double wanted = std::max(1.0, size(seen));
-  double range = camera.rig.focal_px * (by_height ? shape.size[1] : 2.0 * round.size[0]) / wanted;
+  const double wanted = std::max(1.0, seen.width);
+  double range = camera.rig.focal_px * 2.0 * round.size[0] / wanted;
   cv::Rect2d aim = seen;
   for (int i = 0; i < kRangeSteps; ++i) {
     const auto box = BoxAtRange(camera, aim, range, round);
     if (!box) break;  // nearer than it is large
-    range *= size(*box) / wanted;
+    range *= box->width / wanted;
     aim += 0.5 * (seen.tl() + seen.br() - box->tl() - box->br());  // its centre lies beside
   }
   return range;

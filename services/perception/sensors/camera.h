@@ -69,9 +69,8 @@ std::optional<cv::Rect2d> ProjectTarget(const Camera& camera, const Eigen::Vecto
 std::optional<cv::Rect2d> BoxAtRange(const Camera& camera, const cv::Rect2d& seen, double range,
                                      const TargetShape& shape);
 
-/// Range [m] at which the target shows as wide, or as high, as `seen` [px], in its middle; its
-/// heading is not known.
-double RangeBySize(const Camera& camera, const cv::Rect2d& seen, const TargetShape& shape,
-                   bool by_height);
+/// Range [m] at which the target shows as wide as `seen` [px], in its middle; its heading is not
+/// known.
+double RangeBySize(const Camera& camera, const cv::Rect2d& seen, const TargetShape& shape);
 
 }  // namespace chase::perception
