@@ -26,8 +26,7 @@ constexpr double kRunsOnToo = 0.5;    // and beyond another one then
 // apart (shares of its width), as far away as may be.
 constexpr double kClutter = 0.3, kClutterSide = 0.16, kClutterDepth = 10.0;
 constexpr double kStray = 0.02;  // how often a measured position is not the target's
-constexpr double kUnexplained = 0.5, kMostUnexplained = 6.0;  // for points at other ranges
-constexpr double kThrough = 1.0, kMostThrough = 20.0;         // for rays that went through it
+constexpr double kThrough = 1.0, kMostThrough = 20.0;  // for rays that went through it
 
 /// Density of the sides as they were seen, hidden ones anywhere inside.
 double LogSides(const FitResult& fit, const FitInput& input) {
@@ -159,10 +158,6 @@ double LogClutter(const FitInput& input) {
   if (!input.points.empty()) sum -= std::log(kClutterDepth);
   if (input.detection->p_CT) sum += LogAnywhere(input);
   return sum;
-}
-
-double LogUnexplained(double unexplained) {
-  return std::min(kMostUnexplained, kUnexplained * unexplained);
 }
 
 }  // namespace chase::perception

@@ -59,7 +59,4 @@ double LogSeenThrough(const FitInput& input, const TargetGaussian& target);
 /// Where they belong to something else of the target's colour.
 double LogClutter(const FitInput& input);
 
-/// Taken off for `unexplained` LiDAR points of the detection that lie at other ranges.
-double LogUnexplained(double unexplained);
-
 }  // namespace chase::perception

@@ -140,29 +140,21 @@ std::optional<FitResult> Localiser::Correct(const FitInput& predicted,
   FitInput input = predicted;
   input.hits = &clusters;
   const double gate = kLidarGate + 2.0 * RangeSigma(predicted.prior, predicted.camera);
-  const auto all = static_cast<double>(CountPoints(clusters));
   // What stands before the target may lend the blob's edge a few points, and what stands behind it
-  // too: the fit that explains most of them is taken.
+  // too: the likeliest fit is taken.
   std::optional<FitResult> best;
-  double best_score = 0.0;
   int tried = 0;
   for (const auto& cluster : clusters) {
     input.points = PointsOnTarget(predicted, cluster, gate);
     if (input.points.empty()) continue;
     if (++tried > kMostClusters) break;
     const auto fit = JoinedReading(&input);
-    if (!fit) continue;
-    const double score = fit->log_odds - LogUnexplained(all - static_cast<double>(cluster.size()));
-    if (best && score <= best_score) continue;
-    best = fit;
-    best_score = score;
+    if (fit && (!best || fit->log_odds > best->log_odds)) best = fit;
   }
   if (best) return best;
   input.points.clear();
   if (SeenThrough(predicted, clusters)) return std::nullopt;
-  best = JoinedReading(&input);
-  if (best) best->log_odds -= LogUnexplained(all);
-  return best;
+  return JoinedReading(&input);
 }
 
 }  // namespace chase::perception
