@@ -13,8 +13,7 @@ namespace {
 constexpr double kHiddenBy = 2.0;     // standard deviations of an edge
 constexpr double kTurnSpeed = 1.0;    // m/s, standard deviation of the speed a sharp turn adds
 constexpr double kTurnShift = 0.12;   // m, and of the place
-constexpr double kKnownShare = 0.03;  // of the range, standard deviation of the prediction
-constexpr double kKnownRange = 0.25;  // m, likewise
+constexpr double kKnownRange = 0.25;  // m, standard deviation of the prediction
 constexpr double kAside = 0.1;        // share of the range that a new target may lie beside its box
 
 constexpr double kHidden = 0.02;      // how often a given side is hidden,
@@ -111,22 +110,6 @@ TargetGaussian NewTarget(const Camera& camera, const cv::Rect2d& box, const Targ
       beside * beside * (Eigen::Matrix3d::Identity() - along) + range_sigma * range_sigma * along;
   g.ForgetVelocity();
   return g;
-}
-
-std::function<bool(const Sides&)> Sensible(const FitInput& input) {
-  const auto expected = ProjectTarget(input.camera, input.prior.position(), input.shape);
-  const double range = (input.prior.position() - input.camera.p_WC).norm();
-  const double share = RangeSigma(input.prior, input.camera) / range;
-  if (!expected || share > kKnownShare) return [](const Sides&) { return true; };
-  const auto fits = [share, by = HiddenBy(input)](double seen, double wanted) {
-    return std::abs(seen - wanted) < by + 3.0 * share * wanted;
-  };
-  const bool wide = fits(input.detection->box.width, expected->width);
-  const bool high = fits(input.detection->box.height, expected->height);
-  return [wide, high](const Sides& use) {
-    const bool sides = use[kLeft] && use[kRight], caps = use[kTop] && use[kBottom];
-    return (sides || !wide) && (caps || !high);
-  };
 }
 
 double LogTarget(const FitResult& fit, const FitInput& input, const FitConfig& config) {

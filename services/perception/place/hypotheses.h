@@ -1,7 +1,6 @@
 #pragma once
 
 #include <array>
-#include <functional>
 #include <optional>
 #include <vector>
 
@@ -34,13 +33,9 @@ double HiddenBy(const FitInput& input);
 /// True when the prediction or the LiDAR tells how far away it is.
 bool RangeIsKnown(const FitInput& input);
 
-/// Tells which readings may hold: sides are left out only where the blob is smaller or larger than
-/// expected. All may hold while the range is not known.
-std::function<bool(const Sides&)> Sensible(const FitInput& input);
-
-/// The same with the prediction of a target that has just braked, turned or been pushed; across the
-/// line of sight only unless points tell the range, since the apparent size alone would take every
-/// pixel that is hidden for a leap.
+/// The input with the prediction of a target that has just braked, turned or been pushed; across
+/// the line of sight only unless points tell the range, since the apparent size alone would take
+/// every pixel that is hidden for a leap.
 FitInput AfterASharpTurn(const FitInput& input);
 
 /// A target of which nothing is known but its range [m] and that it shows in this box.

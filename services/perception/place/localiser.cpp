@@ -90,17 +90,15 @@ std::optional<FitResult> Localiser::WholeReading(FitInput* input) const {
   return fit;
 }
 
-void Localiser::Weigh(const FitInput& given, double log_prior, size_t readings, bool all,
+void Localiser::Weigh(const FitInput& given, double log_prior, size_t readings,
                       std::vector<Hypothesis>* out) const {
   FitInput input = given;
-  const auto sensible = Sensible(input);
   // Where a like colour goes on, both sides may be another thing's, as the points tell.
   const bool joined = !input.points.empty() && (input.joined || GoesOn(*input.detection));
   std::vector<Sides> tried;
   bool explained = !joined && !out->empty();
   for (size_t k = 0; k < readings; ++k) {
     if (k >= kOneHidden && explained) return;
-    if (!all && !sensible(kReadings[k])) continue;
     const Sides seen = Seen(kReadings[k], *input.detection);
     if (std::count(tried.begin(), tried.end(), seen) > 0) continue;
     tried.push_back(seen);
@@ -126,8 +124,8 @@ std::optional<FitResult> Localiser::JoinedReading(FitInput* input) const {
   std::vector<Hypothesis> all;
   // Where the range is not known, two opposite sides must give it.
   const bool known = RangeIsKnown(*input);
-  Weigh(*input, std::log(1.0 - kSharpTurn), known ? kReadings.size() : kOneHidden, !whole, &all);
-  Weigh(AfterASharpTurn(*input), std::log(kSharpTurn), kOneHidden, !whole, &all);
+  Weigh(*input, std::log(1.0 - kSharpTurn), known ? kReadings.size() : kOneHidden, &all);
+  Weigh(AfterASharpTurn(*input), std::log(kSharpTurn), kOneHidden, &all);
   if (all.empty()) return std::nullopt;
   FitResult fit = Joined(all);
   fit.log_odds -= log_clutter;
