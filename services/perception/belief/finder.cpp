@@ -15,7 +15,6 @@ constexpr size_t kMaxSweeps = 4;
 constexpr double kOdds = 0.0;      // logarithm of the odds that a sighting needs,
 constexpr int kStillJoined = 2;    // frames without it after which a like colour may have gone
 constexpr double kSureOdds = 8.0;  // and with which no other is tried
-constexpr double kRival = 6.0;     // less, of something else that makes a sighting contested
 constexpr size_t kMostTried = 4;   // detections a track and frame
 constexpr int kKnownHits = 10;     // sightings after which a track's range is trusted
 constexpr double kLargest = 1.4;   // of pieces together, times what is expected
@@ -141,13 +140,9 @@ std::optional<Sighting> Finder::FindWhole(const TargetTrack& track, const View& 
     if (track.misses == 0 && s->fit.whole && s->fit.log_odds > kSureOdds) break;
   }
   if (found.empty()) return std::nullopt;
-  auto best = *std::max_element(found.begin(), found.end(), [](const auto& a, const auto& b) {
+  return *std::max_element(found.begin(), found.end(), [](const auto& a, const auto& b) {
     return a.fit.log_odds < b.fit.log_odds;
   });
-  best.contested = std::any_of(found.begin(), found.end(), [&](const Sighting& s) {
-    return s.fit.log_odds > best.fit.log_odds - kRival && !Overlap(s.detection, best.detection);
-  });
-  return best;
 }
 
 /// Pieces of one thing, parted by what hides it.

@@ -35,7 +35,6 @@ struct View {
 struct Sighting {
   FitResult fit;
   Detection detection;
-  bool contested = false;  ///< something else explains the prediction nearly as well
 
   /// Sides that the detection shows and the reading does not take for the target's.
   long LeftOut() const;

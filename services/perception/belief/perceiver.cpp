@@ -32,7 +32,6 @@ void Perceiver::Follow(View* view) {
   if (!found || !Sure(*found)) {
     view->taken = taken;
     ++track_->misses;
-    unsure_ = found;
     return;
   }
   sighting_ = found;
@@ -125,7 +124,6 @@ TargetEstimate Perceiver::See(const Frame& frame) {
     note = "the frame is not newer than the last one";
   }
   sighting_.reset();
-  unsure_.reset();
   refused_ = {};
   if (track_ && frame.t - track_->seen > kGap) track_->misses = std::max(1, track_->misses);
   if (track_ && state_ != TargetState::kLost) track_->Predict(frame.t, config_.motion);

@@ -68,7 +68,6 @@ class Perceiver {
   void Seek(View* view);
   void TakeSelected(View* view);
   void FollowCandidates(View* view);
-  void AddPartial(const View& view);
   void AddCandidates(View* view);
   void DropMissed();
   void Confirm(const View& view);
@@ -96,7 +95,6 @@ class Perceiver {
   std::vector<Candidate> candidates_;
   std::optional<Sighting> sighting_;  ///< of the last frame
   bool tentative_ = false;            ///< it stood when it was taken, and has stood since
-  std::optional<Sighting> unsure_;    ///< in the last frame: may be the target, as far as it shows
   std::deque<LookAlike> look_alikes_;
   std::optional<Eigen::Vector2d> selected_;           ///< px, not taken yet
   Refused refused_ = {};                              ///< in this frame

@@ -25,7 +25,6 @@ constexpr int kNewPieceHits = 10;       // and where none was ever seen, nor LiD
 constexpr double kNewPieceWay = 0.3;    // m, likewise
 constexpr double kMemory = 60.0;        // s that a look-alike is remembered
 constexpr double kFar = 5.0;            // m, from where fewer pixels tell what stands there
-constexpr double kTrusted = 0.3;        // s that a track not seen is preferred to anything new
 constexpr double kStandingSpeed = 0.2;  // m/s
 
 }  // namespace
@@ -62,7 +61,6 @@ bool Perceiver::Vague() const {
 /// expected, and nothing else that could be it.
 bool Perceiver::Sure(const Sighting& s) const {
   if (track_->misses == 0) return true;
-  if (s.contested) return false;
   const Eigen::Vector2d off = (s.fit.posterior.position() - track_->state.position()).head<2>();
   const Eigen::Matrix2d P = track_->state.covariance.topLeftCorner<2, 2>();
   const double squared = off.dot(P.ldlt().solve(off));
@@ -95,8 +93,6 @@ bool Perceiver::StandsLongEnough(const Candidate& c, double t) const {
 /// What drives is taken at once.
 bool Perceiver::Ready(const Candidate& c, double t) const {
   if (c.track.misses > 0 || c.track.hits < Candidate::kConfirmFrames) return false;
-  const bool trusted = !tentative_ && !(unsure_ && unsure_->contested) && !Vague();
-  if (track_ && trusted && t - track_->seen < kTrusted) return false;
   const Detection& d = c.last.detection;
   const bool unclear = d.AnyCut() && !c.last.SurelyHit();
   const bool piece = c.part || c.track.partial || d.LeavesImage() || unclear;

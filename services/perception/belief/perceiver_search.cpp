@@ -60,15 +60,6 @@ bool Perceiver::Followed(const Sighting& s) const {
   });
 }
 
-/// What may be the hidden target, half of it seen, is followed on its own to see whether it drives.
-void Perceiver::AddPartial(const View& view) {
-  if (!unsure_ || unsure_->fit.whole || unsure_->fit.n_points == 0) return;
-  if (Followed(*unsure_) || candidates_.size() >= kMaxCandidates) return;
-  if (!InGate(*unsure_, view.t)) return;
-  candidates_.push_back(NewCandidate(*unsure_, view));
-  candidates_.back().track.state.ForgetVelocity();
-}
-
 void Perceiver::AddCandidates(View* view) {
   std::vector<size_t> order;  // near before far, the middle before the border
   for (size_t i = 0; i < view->detections.size(); ++i) {
@@ -102,7 +93,6 @@ void Perceiver::Seek(View* view) {
   if (selected_) return TakeSelected(view);
   if (sighting_ && !tentative_) return;
   FollowCandidates(view);
-  AddPartial(*view);
   AddCandidates(view);
   Confirm(*view);
 }
