@@ -77,7 +77,6 @@ class Perceiver {
   bool MayBeNew(const Detection& d) const;
   void CountRefused(const Detection& d);
   bool Followed(const Sighting& s) const;
-  bool Vague() const;
   bool Sure(const Sighting& s) const;
   bool Ready(const Candidate& candidate, double t) const;
   bool PieceIsReady(const Candidate& candidate) const;

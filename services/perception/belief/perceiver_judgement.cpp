@@ -9,15 +9,11 @@ namespace chase::perception {
 
 namespace {
 
-constexpr double kSureSigma = 0.6;  // m of a hidden target above which what is found must drive
 constexpr double kStandingRange = 10.0;  // m, what stands further off is not taken
 constexpr double kGateSigmas = 3.0;
 constexpr double kReachMargin = 0.5;    // m
 constexpr double kUsualSpeed = 1.5;     // m/s
-constexpr int kSoonBack = 6;            // frames hidden after which one side at most may be
 constexpr double kReachGate = 11.3;     // squared distance from a hidden target's prediction, 3 dof
-constexpr double kWellInside = 2.3;     // likewise of what is alone, where it may be elsewhere,
-constexpr double kFarFromSure = 1.0;    // m, within this standard deviation
 constexpr double kExpectedGate = 4.6;   // likewise of what need not drive, 2 dof
 constexpr int kPieceHits = 4;           // sightings of a piece or a half before it is taken,
 constexpr int kPieceSweeps = 2;         // of them with LiDAR points, for what has come out wholly,
@@ -52,23 +48,12 @@ bool Perceiver::InGate(const Sighting& s, double t) const {
   return way < kReachMargin + config_.motion.max_speed * unseen;
 }
 
-/// Hidden for so long that a look-alike may lie where the target may be as well.
-bool Perceiver::Vague() const {
-  return track_ && track_->misses > 0 && track_->HorizontalSigma() > kSureSigma;
-}
-
-/// True for a sighting after which nothing need be asked: all of the target, close to where it was
-/// expected, and nothing else that could be it.
+/// True for a sighting after which nothing need be asked: close to where the target was expected.
 bool Perceiver::Sure(const Sighting& s) const {
   if (track_->misses == 0) return true;
   const Eigen::Vector2d off = (s.fit.posterior.position() - track_->state.position()).head<2>();
   const Eigen::Matrix2d P = track_->state.covariance.topLeftCorner<2, 2>();
-  const double squared = off.dot(P.ldlt().solve(off));
-  const bool near = off.norm() < config_.state.decoy_radius;
-  const bool alone = candidates_.empty() && track_->HorizontalSigma() < kFarFromSure;
-  if (Vague()) return s.AllSeen() && (near || (alone && squared < kWellInside));
-  if (s.LeftOut() > 1 && track_->misses > kSoonBack) return false;
-  return near || squared < kExpectedGate;
+  return off.norm() < config_.state.decoy_radius || off.dot(P.ldlt().solve(off)) < kExpectedGate;
 }
 
 /// Of a piece of something larger, or what is hidden or cut off in part, once it has driven further
