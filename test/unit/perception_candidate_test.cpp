@@ -148,28 +148,6 @@ TEST(PerceptionCandidate, HowLongItStoodBeforeDoesNotCount) {
   EXPECT_TRUE(c.Drives());
 }
 
-TEST(PerceptionCandidate, IsFollowedWhereASideIsHiddenAndLidarTellsWhereItIs) {
-  Candidate c = CandidateAt({3.0, 0.0, 0.55}, {3.0, 0.0, 0.55}, 0.01);
-  c.first.ranged = true;
-  c.track.hits = 2;
-  Sighting hidden;
-  hidden.fit.n_points = 20;
-  hidden.fit.used = {false, true, true, true};
-  for (auto& samples : hidden.detection.silhouette.samples) samples.resize(3);
-  ASSERT_TRUE(c.HiddenIn(hidden));
-  Sighting s = hidden;
-  s.fit.n_points = 5;
-  EXPECT_FALSE(c.HiddenIn(s)) << "the range is a guess";
-  s = hidden;
-  s.fit.used[kTop] = false;
-  EXPECT_FALSE(c.HiddenIn(s)) << "two sides";
-  s = hidden;
-  s.detection.cut[kBottom] = true;
-  EXPECT_FALSE(c.HiddenIn(s)) << "it may belong to what goes on there";
-  c.track.hits = 1;
-  EXPECT_FALSE(c.HiddenIn(hidden)) << "never yet in view for long enough";
-}
-
 TEST(PerceptionCandidate, PointsOfTheFirstSightingRangeItsTrack) {
   Sighting s;
   s.detection.box = {0, 0, 20, 40};

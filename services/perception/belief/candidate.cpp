@@ -14,7 +14,6 @@ constexpr double kPlace = 0.005, kOtherSize = 0.6;
 constexpr double kSizeEdges = 2.0;  // deviations of an edge that a size may err by unnoticed
 constexpr double kPlaces = 70.0;    // of its size in view, where a first prediction may lie
 constexpr double kSure = 0.98;      // probability with which it is taken to drive
-constexpr int kShownHits = 2;       // sightings before something may hide a side
 constexpr double kAstray = 0.1, kAstrayShare = 0.5;  // m and share of its way, off what is told
 constexpr double kAnew = 2.0;     // s that it stood, after which its way is counted anew
 constexpr double kBetter = 0.25;  // share of the first variance from which a start is taken anew
@@ -61,11 +60,6 @@ Candidate NewCandidate(const Sighting& sighting, const View& view) {
   c.part = sighting.detection.part;
   c.sweeps = sighting.Clear();
   return c;
-}
-
-bool Candidate::HiddenIn(const Sighting& s) const {
-  return first.ranged && !part && track.hits >= kShownHits && s.SurelyHit() &&
-         !s.detection.AnyCut() && s.LeftOut() == 1;
 }
 
 bool Candidate::Steady() const {

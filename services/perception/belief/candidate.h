@@ -42,9 +42,6 @@ struct Candidate {
   Placed Now() const;
   /// From where it was first known, m.
   Eigen::Vector2d Way() const { return (track.state.position() - first.p_WT).head<2>(); }
-  /// True when something has come before a side of what was all in view, and LiDAR still tells
-  /// where it is.
-  bool HiddenIn(const Sighting& sighting) const;
 
   /// Logarithm of how much likelier its way is if it drives than if it stands.
   double LogDrives() const;

@@ -26,13 +26,6 @@ bool Overlap(const Detection& a, const Detection& b) { return (a.box & b.box).ar
 
 }  // namespace
 
-long Sighting::LeftOut() const {
-  long count = 0;
-  for (size_t side = 0; side < 4; ++side)
-    count += !fit.used[side] && !detection.silhouette.samples[side].empty();
-  return count;
-}
-
 bool Sighting::AllSeen() const {
   const auto& used = fit.used;
   const bool all = std::all_of(used.begin(), used.end(), [](bool side) { return side; });

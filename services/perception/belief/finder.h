@@ -36,8 +36,6 @@ struct Sighting {
   FitResult fit;
   Detection detection;
 
-  /// Sides that the detection shows and the reading does not take for the target's.
-  long LeftOut() const;
   /// True when nothing of it is left out, nor cut off.
   bool AllSeen() const;
   /// True when LiDAR points tell that it is one thing.

@@ -20,8 +20,7 @@ void Perceiver::FollowCandidates(View* view) {
   for (auto& c : candidates_) {
     const auto again =
         finder_.Find(c.track, view, [&](const Sighting& s) { return s.detection.part && !c.part; });
-    const bool partly = c.track.partial || (again && c.HiddenIn(*again));
-    if (!again || !(again->fit.whole || partly)) {
+    if (!again || !(again->fit.whole || c.track.partial)) {
       ++c.track.misses;
       continue;
     }
