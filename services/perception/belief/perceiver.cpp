@@ -57,7 +57,6 @@ void Perceiver::Judge(double t) {
                  ? TargetState::kLost
                  : TargetState::kOccluded;
   if (unseen > 0.0) return;
-  last_v_ = track_->state.velocity();
   last_p_ = track_->state.position();
   if ((last_p_ - stood_).norm() < kStood) return;
   tentative_ = false;

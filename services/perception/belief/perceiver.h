@@ -98,8 +98,7 @@ class Perceiver {
   std::optional<Eigen::Vector2d> selected_;           ///< px, not taken yet
   Refused refused_ = {};                              ///< in this frame
   Eigen::Vector3d stood_ = Eigen::Vector3d::Zero();   ///< where the target stood or was, frame W, m
-  Eigen::Vector3d last_v_ = Eigen::Vector3d::Zero();  ///< when last seen, frame W, m/s
-  Eigen::Vector3d last_p_ = Eigen::Vector3d::Zero();  ///< likewise, m
+  Eigen::Vector3d last_p_ = Eigen::Vector3d::Zero();  ///< when last seen, frame W, m
   double last_t_ = -1e18, selected_at_ = 0.0;         ///< s
 };
 

@@ -11,17 +11,15 @@ namespace {
 
 constexpr double kStandingRange = 10.0;  // m, what stands further off is not taken
 constexpr double kGateSigmas = 3.0;
-constexpr double kReachMargin = 0.5;    // m
-constexpr double kUsualSpeed = 1.5;     // m/s
-constexpr double kReachGate = 11.3;     // squared distance from a hidden target's prediction, 3 dof
-constexpr double kExpectedGate = 4.6;   // likewise of what need not drive, 2 dof
-constexpr int kPieceHits = 4;           // sightings of a piece or a half before it is taken,
-constexpr int kPieceSweeps = 2;         // of them with LiDAR points, for what has come out wholly,
-constexpr int kNewPieceHits = 10;       // and where none was ever seen, nor LiDAR tells much
-constexpr double kNewPieceWay = 0.3;    // m, likewise
-constexpr double kMemory = 60.0;        // s that a look-alike is remembered
-constexpr double kFar = 5.0;            // m, from where fewer pixels tell what stands there
-constexpr double kStandingSpeed = 0.2;  // m/s
+constexpr double kReachMargin = 0.5;   // m
+constexpr double kReachGate = 11.3;    // squared distance from a hidden target's prediction, 3 dof
+constexpr double kExpectedGate = 4.6;  // likewise of what need not drive, 2 dof
+constexpr int kPieceHits = 4;          // sightings of a piece or a half before it is taken,
+constexpr int kPieceSweeps = 2;        // of them with LiDAR points, for what has come out wholly,
+constexpr int kNewPieceHits = 10;      // and where none was ever seen, nor LiDAR tells much
+constexpr double kNewPieceWay = 0.3;   // m, likewise
+constexpr double kMemory = 60.0;       // s that a look-alike is remembered
+constexpr double kFar = 5.0;           // m, from where fewer pixels tell what stands there
 
 }  // namespace
 
@@ -36,15 +34,13 @@ bool Perceiver::InGate(const Sighting& s, double t) const {
   const Eigen::Vector3d p_WT = s.fit.posterior.position();
   if (IsLookAlike(p_WT, t)) return false;
   if (!track_ || tentative_ || !track_->Proven()) return true;
-  const double way = (p_WT - last_p_).norm(), unseen = t - track_->seen;
   if (state_ != TargetState::kLost) {
     const Eigen::Vector3d d = p_WT - track_->state.position();
     if (std::abs(d.z()) >= kGateSigmas * kGroundSigma) return false;
     const Eigen::Matrix3d P = track_->state.covariance.topLeftCorner<3, 3>();
-    if (d.dot(P.ldlt().solve(d)) < kReachGate) return true;
-    // The prediction may err by more than it claims, where the fit slipped to what stood behind.
-    return s.Clear() && way < kReachMargin + kUsualSpeed * unseen;
+    return d.dot(P.ldlt().solve(d)) < kReachGate;
   }
+  const double way = (p_WT - last_p_).norm(), unseen = t - track_->seen;
   return way < kReachMargin + config_.motion.max_speed * unseen;
 }
 
@@ -65,14 +61,11 @@ bool Perceiver::PieceIsReady(const Candidate& c) const {
   return came_out || c.SurelyDrives(hasty ? kNewPieceWay : Candidate::kSureWay);
 }
 
-/// Of what stands: after a while, unless the target stood there. A target that drove when it was
-/// last seen must have had the time to stop.
+/// Of what stands: after a while. A target that was seen must have had the time to stop.
 bool Perceiver::StandsLongEnough(const Candidate& c, double t) const {
-  const bool stood_here = track_ && last_v_.norm() < kStandingSpeed &&
-                          (c.track.state.position() - last_p_).norm() < config_.state.decoy_radius;
   const bool may_stand = !c.last.detection.AnyCut() && (!track_ || t - track_->seen > kHiddenTime);
   const double wait = config_.state.standing_after * std::max(1.0, std::pow(c.Range() / kFar, 2));
-  return stood_here || (may_stand && c.Range() < kStandingRange && t - c.since >= wait);
+  return may_stand && c.Range() < kStandingRange && t - c.since >= wait;
 }
 
 /// What drives is taken at once.
