@@ -231,7 +231,7 @@ TEST(PerceptionSilhouette, SidesAtTheImagesBorderAreCut) {
   EXPECT_FALSE(found[0].silhouette.samples[kRight].empty());
 }
 
-TEST(PerceptionSilhouette, CropAndMergeAreInverse) {
+TEST(PerceptionSilhouette, ACropIsCutWhereTheWindowEnds) {
   cv::Mat image = Grey();
   cv::rectangle(image, {100, 60}, {140, 130}, kOrangeBgr, cv::FILLED);
   const auto whole = ColorDetector(DetectorConfig{}, 0.45).Detect(image).at(0);
@@ -241,10 +241,6 @@ TEST(PerceptionSilhouette, CropAndMergeAreInverse) {
   EXPECT_TRUE(left->cut[kRight]);
   EXPECT_FALSE(left->cut[kLeft]);
   EXPECT_FALSE(CropTo(image, whole, {200, 0, 50, 240}));
-  const auto merged = Merge(image, {*left, *right});
-  EXPECT_EQ(merged.mask_box, whole.mask_box);
-  EXPECT_EQ(merged.goes_on, (std::array<bool, 4>{}));
-  EXPECT_EQ(cv::countNonZero(merged.mask != whole.mask), 0);
 }
 
 TEST(PerceptionShape, ACylinderBeatsABallAndABoard) {

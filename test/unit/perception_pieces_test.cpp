@@ -107,9 +107,6 @@ TEST(PerceptionPieces, WhatGoesWithTheWidthIsThePiecesOwn) {
   EXPECT_DOUBLE_EQ(left->silhouette.departure_px, 1.0);
   EXPECT_NEAR(std::pow(whole.silhouette.sigma_px, 2) - std::pow(left->silhouette.sigma_px, 2),
               4.0 * 4.0 - 1.0 * 1.0, 1e-9);
-  const auto merged = Merge(bgr, {*left, *right});
-  EXPECT_DOUBLE_EQ(merged.inset_px, whole.inset_px);
-  EXPECT_NEAR(merged.silhouette.sigma_px, whole.silhouette.sigma_px, 1e-9);
 }
 
 /// Something grey hides the left half of the target.

@@ -17,7 +17,6 @@ constexpr int kStillJoined = 2;    // frames without it after which a like colou
 constexpr double kSureOdds = 8.0;  // and with which no other is tried
 constexpr size_t kMostTried = 4;   // detections a track and frame
 constexpr int kKnownHits = 10;     // sightings after which a track's range is trusted
-constexpr double kLargest = 1.4;   // of pieces together, times what is expected
 constexpr double kMaxExtrapolation = 0.05;  // s that the nearest pose is carried to a frame
 constexpr double kMaxPoseAge = 0.2;   // s; with a pose this near it is too old, else there is none
 constexpr double kMaxSweepAge = 0.3;  // s; older points are not used
@@ -118,9 +117,9 @@ std::optional<Sighting> Finder::Try(const TargetTrack& track, const View& view,
   return Sighting{*fit, detection};
 }
 
-std::optional<Sighting> Finder::FindWhole(const TargetTrack& track, const View& view,
-                                          const std::vector<size_t>& inside, const Refuses& refuses,
-                                          const SearchBoxes& boxes) const {
+std::optional<Sighting> Finder::Best(const TargetTrack& track, const View& view,
+                                     const std::vector<size_t>& inside, const Refuses& refuses,
+                                     const SearchBoxes& boxes) const {
   std::vector<Sighting> found;
   std::vector<cv::Rect> tried;
   for (const size_t i : inside) {
@@ -138,23 +137,6 @@ std::optional<Sighting> Finder::FindWhole(const TargetTrack& track, const View& 
   });
 }
 
-/// Pieces of one thing, parted by what hides it.
-std::optional<Sighting> Finder::FindPieces(const TargetTrack& track, const View& view,
-                                           const std::vector<size_t>& inside,
-                                           const Refuses& refuses, const SearchBoxes& boxes) const {
-  std::vector<Detection> pieces;
-  for (const size_t i : inside)
-    if (!view.detections[i].mask.empty()) pieces.push_back(view.detections[i]);
-  if (pieces.size() < 2) return std::nullopt;
-  const Detection merged = Merge(view.bgr, pieces);
-  const auto too_large = [](double seen, double wanted) { return seen > kLargest * wanted; };
-  if (too_large(merged.box.width, boxes.expected.width) ||
-      too_large(merged.box.height, boxes.expected.height))
-    return std::nullopt;
-  const auto s = Try(track, view, merged, true);
-  return s && !refuses(*s) ? s : std::nullopt;
-}
-
 std::optional<Sighting> Finder::Find(const TargetTrack& track, View* view,
                                      const Refuses& refuses) const {
   const auto boxes = WhereToLook(track.state, track.shape, view->camera,
@@ -168,8 +150,7 @@ std::optional<Sighting> Finder::Find(const TargetTrack& track, View* view,
     return Likeness(view->detections[a].box, *boxes) > Likeness(view->detections[b].box, *boxes);
   });
   if (inside.size() > kMostTried) inside.resize(kMostTried);
-  auto best = FindWhole(track, *view, inside, refuses, *boxes);
-  if (!best) best = FindPieces(track, *view, inside, refuses, *boxes);
+  const auto best = Best(track, *view, inside, refuses, *boxes);
   if (best)
     for (const size_t i : inside)
       view->taken[i] = view->taken[i] || Overlap(view->detections[i], best->detection);

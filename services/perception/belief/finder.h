@@ -62,7 +62,7 @@ class Finder {
 
   /// True for a sighting that belongs to something else.
   using Refuses = std::function<bool(const Sighting&)>;
-  /// The detection, or the pieces of one, that the track explains best; it is marked as taken.
+  /// The detection that the track explains best; it is marked as taken.
   std::optional<Sighting> Find(const TargetTrack& track, View* view, const Refuses& refuses) const;
   /// One detection as the thing of a track. Points already used may be asked for again.
   std::optional<Sighting> Try(const TargetTrack& track, const View& view,
@@ -79,12 +79,9 @@ class Finder {
     bool used = false;
   };
 
-  std::optional<Sighting> FindWhole(const TargetTrack& track, const View& view,
-                                    const std::vector<size_t>& inside, const Refuses& refuses,
-                                    const SearchBoxes& boxes) const;
-  std::optional<Sighting> FindPieces(const TargetTrack& track, const View& view,
-                                     const std::vector<size_t>& inside, const Refuses& refuses,
-                                     const SearchBoxes& boxes) const;
+  std::optional<Sighting> Best(const TargetTrack& track, const View& view,
+                               const std::vector<size_t>& inside, const Refuses& refuses,
+                               const SearchBoxes& boxes) const;
   void WeighHidden(const View& view, FitInput input, FitResult* fit) const;
   Clusters Points(const View& view, const Detection& detection, const Eigen::Vector3d& v_WT,
                   bool fresh_only) const;

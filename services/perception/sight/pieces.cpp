@@ -163,18 +163,4 @@ std::vector<Detection> Split(const cv::Mat& bgr, const Detection& detection) {
   return pieces;
 }
 
-Detection Merge(const cv::Mat& bgr, const std::vector<Detection>& pieces) {
-  Detection out = pieces.front();
-  for (const auto& piece : pieces) out.mask_box |= piece.mask_box;
-  out.mask = cv::Mat::zeros(out.mask_box.size(), CV_8U);
-  for (const auto& piece : pieces) {
-    cv::Mat place = out.mask(piece.mask_box - out.mask_box.tl());
-    cv::max(place, piece.mask, place);
-    out.score = std::max(out.score, piece.score);
-  }
-  Describe(bgr, &out);
-  for (const auto& piece : pieces) KeepCut(piece, &out);
-  return out;
-}
-
 }  // namespace chase::perception

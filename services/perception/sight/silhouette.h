@@ -49,7 +49,4 @@ std::optional<Detection> CropTo(const cv::Mat& bgr, const Detection& detection,
 /// columns or of its rows jumps; none where none does.
 std::vector<Detection> Split(const cv::Mat& bgr, const Detection& detection);
 
-/// One detection out of several pieces: the union of their masks. All must carry masks.
-Detection Merge(const cv::Mat& bgr, const std::vector<Detection>& pieces);
-
 }  // namespace chase::perception
