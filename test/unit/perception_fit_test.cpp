@@ -209,11 +209,7 @@ TEST(PerceptionLocaliser, ALikeColourBeyondAWindowCostsUnlessItWasThereBefore) {
   EXPECT_TRUE(localiser.Correct(input, {})->joined);
   const double beyond_window = odds();
   input.joined = true;
-  const double as_before = odds();
-  input.joined = false;
-  outline.parted[kTop] = true;
-  EXPECT_GT(as_before, beyond_window + 1.0);
-  EXPECT_GT(odds(), as_before);
+  EXPECT_GT(odds(), beyond_window + 1.0);
 }
 
 TEST(PerceptionLocaliser, NearestSurfaceInTheBoxIsTakenNotTheWallBehind) {

@@ -117,28 +117,7 @@ std::optional<Sighting> Finder::Try(const TargetTrack& track, const View& view,
   return Sighting{*fit, detection};
 }
 
-std::optional<Sighting> Finder::Best(const TargetTrack& track, const View& view,
-                                     const std::vector<size_t>& inside, const Refuses& refuses,
-                                     const SearchBoxes& boxes) const {
-  std::vector<Sighting> found;
-  std::vector<cv::Rect> tried;
-  for (const size_t i : inside) {
-    const auto piece = Within(boxes, view.bgr, view.detections[i]);
-    if (!piece || std::count(tried.begin(), tried.end(), piece->mask_box) > 0) continue;
-    tried.push_back(piece->mask_box);
-    const auto s = Try(track, view, *piece, true);
-    if (!s || refuses(*s)) continue;
-    found.push_back(*s);
-    if (track.misses == 0 && s->fit.whole && s->fit.log_odds > kSureOdds) break;
-  }
-  if (found.empty()) return std::nullopt;
-  return *std::max_element(found.begin(), found.end(), [](const auto& a, const auto& b) {
-    return a.fit.log_odds < b.fit.log_odds;
-  });
-}
-
-std::optional<Sighting> Finder::Find(const TargetTrack& track, View* view,
-                                     const Refuses& refuses) const {
+std::optional<Sighting> Finder::Find(const TargetTrack& track, View* view) const {
   const auto boxes = WhereToLook(track.state, track.shape, view->camera,
                                  config_.motion.tilt_sigma_deg * M_PI / 180.0);
   if (!boxes) return std::nullopt;
@@ -150,7 +129,14 @@ std::optional<Sighting> Finder::Find(const TargetTrack& track, View* view,
     return Likeness(view->detections[a].box, *boxes) > Likeness(view->detections[b].box, *boxes);
   });
   if (inside.size() > kMostTried) inside.resize(kMostTried);
-  const auto best = Best(track, *view, inside, refuses, *boxes);
+  std::optional<Sighting> best;
+  for (const size_t i : inside) {
+    const auto piece = Within(*boxes, view->bgr, view->detections[i]);
+    const auto s = piece ? Try(track, *view, *piece, true) : std::nullopt;
+    if (!s || (best && s->fit.log_odds <= best->fit.log_odds)) continue;
+    best = s;
+    if (track.misses == 0 && s->fit.whole && s->fit.log_odds > kSureOdds) break;
+  }
   if (best)
     for (const size_t i : inside)
       view->taken[i] = view->taken[i] || Overlap(view->detections[i], best->detection);

@@ -18,8 +18,7 @@ constexpr double kPointed = 1.0;      // s that what is pointed at is looked for
 
 void Perceiver::FollowCandidates(View* view) {
   for (auto& c : candidates_) {
-    const auto again =
-        finder_.Find(c.track, view, [&](const Sighting& s) { return s.detection.part && !c.part; });
+    const auto again = finder_.Find(c.track, view);
     if (!again || !(again->fit.whole || c.track.partial)) {
       ++c.track.misses;
       continue;
@@ -81,9 +80,9 @@ void Perceiver::AddCandidates(View* view) {
                                 (!found->fit.whole && found->SurelyHit()));
     if (!fits) CountRefused(view->detections[i]);
     if (!fits || !InGate(*found, view->t)) continue;
-    // A piece needs LiDAR points, and so does what shows in part unless the target may come back.
-    const bool needs_points = found->detection.part || (!found->fit.whole && !comes_back);
-    if ((needs_points && found->fit.n_points == 0) || Followed(*found)) continue;
+    // What shows in part needs LiDAR points, unless the target may come back.
+    if (!found->fit.whole && found->fit.n_points == 0 && !comes_back) continue;
+    if (Followed(*found)) continue;
     candidates_.push_back(NewCandidate(*found, *view));
   }
 }
@@ -107,7 +106,7 @@ void Perceiver::Confirm(const View& view) {
   const Candidate chosen = *best;
   const bool drives = chosen.Drives() || PieceIsReady(chosen);
   for (const auto& c : candidates_)
-    if (&c != best && drives && !c.Drives() && !c.part && c.track.hits >= Candidate::kConfirmFrames)
+    if (&c != best && drives && !c.Drives() && c.track.hits >= Candidate::kConfirmFrames)
       look_alikes_.push_back({c.track.state.position(), view.t});
   if (sighting_) look_alikes_.push_back({track_->state.position(), view.t});
   while (look_alikes_.size() > kMostLookAlikes) look_alikes_.pop_front();
@@ -126,7 +125,7 @@ void Perceiver::TakeSelected(View* view) {
   };
   const Detection* nearest = nullptr;
   for (const Detection& d : view->detections)
-    if (!d.part && off(d) <= d.box.width && (!nearest || off(d) < off(*nearest))) nearest = &d;
+    if (off(d) <= d.box.width && (!nearest || off(d) < off(*nearest))) nearest = &d;
   if (!nearest) return;
   const auto found = finder_.Acquire(*view, *nearest);
   if (!found) return;

@@ -36,7 +36,7 @@ double LogSides(const FitResult& fit, const FitInput& input) {
   double runs_on = input.joined ? kRunsOnToo : kRunsOn;
   bool still_hidden = input.reappears;
   for (size_t side = 0; side < 4; ++side) {
-    if (input.detection->goes_on[side] && !input.detection->parted[side]) {
+    if (input.detection->goes_on[side]) {
       sum += std::log(runs_on);
       runs_on = kRunsOnToo;
     }

@@ -8,8 +8,7 @@
 
 namespace chase::perception {
 
-/// Blobs of the target's colour, ranked by their shape, and after them pieces of those that
-/// may be several things, ranked likewise.
+/// Blobs of the target's colour, ranked by their shape.
 class ColorDetector : public Detector {
  public:
   static constexpr double kLeastArea = 20.0;  ///< px^2; smaller blobs are noise
