@@ -125,9 +125,6 @@ std::optional<Sighting> Finder::Find(const TargetTrack& track, View* view) const
   for (size_t i = 0; i < view->detections.size(); ++i)
     if (!view->taken[i] && (view->detections[i].box & boxes->search).area() > 0.0)
       inside.push_back(i);
-  std::stable_sort(inside.begin(), inside.end(), [&](size_t a, size_t b) {
-    return Likeness(view->detections[a].box, *boxes) > Likeness(view->detections[b].box, *boxes);
-  });
   if (inside.size() > kMostTried) inside.resize(kMostTried);
   std::optional<Sighting> best;
   for (const size_t i : inside) {

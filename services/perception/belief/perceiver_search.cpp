@@ -59,31 +59,19 @@ bool Perceiver::Followed(const Sighting& s) const {
 }
 
 void Perceiver::AddCandidates(View* view) {
-  std::vector<size_t> order;  // near before far, the middle before the border
-  for (size_t i = 0; i < view->detections.size(); ++i) {
-    if (view->taken[i]) continue;
-    if (MayBeNew(view->detections[i]))
-      order.push_back(i);
-    else
-      CountRefused(view->detections[i]);
-  }
-  std::stable_sort(order.begin(), order.end(), [&](size_t a, size_t b) {
-    return Prominence(view->detections[a], config_.rig) >
-           Prominence(view->detections[b], config_.rig);
-  });
   const bool comes_back = track_ && !tentative_ && track_->Proven();
-  for (const size_t i : order) {
-    if (candidates_.size() >= kMaxCandidates) return;
-    const auto found = finder_.Acquire(*view, view->detections[i]);
+  for (size_t i = 0; i < view->detections.size() && candidates_.size() < kMaxCandidates; ++i) {
+    if (view->taken[i]) continue;
+    const Detection& d = view->detections[i];
+    const auto found = MayBeNew(d) ? finder_.Acquire(*view, d) : std::nullopt;
     // A part of it has another outline: LiDAR must tell its range, and so how much is hidden.
-    const bool fits = found && (found->detection.score >= config_.state.acquire_score ||
+    const bool fits = found && (d.score >= config_.state.acquire_score ||
                                 (!found->fit.whole && found->SurelyHit()));
-    if (!fits) CountRefused(view->detections[i]);
-    if (!fits || !InGate(*found, view->t)) continue;
+    if (!fits) CountRefused(d);
+    if (!fits || !InGate(*found, view->t) || Followed(*found)) continue;
     // What shows in part needs LiDAR points, unless the target may come back.
-    if (!found->fit.whole && found->fit.n_points == 0 && !comes_back) continue;
-    if (Followed(*found)) continue;
-    candidates_.push_back(NewCandidate(*found, *view));
+    if (found->fit.whole || found->fit.n_points > 0 || comes_back)
+      candidates_.push_back(NewCandidate(*found, *view));
   }
 }
 
