@@ -110,9 +110,8 @@ std::optional<Sighting> Finder::Try(const TargetTrack& track, const View& view,
   if (fit->n_points == 0 && fresh_sweeps_only && (track.hits < kKnownHits || track.partial)) {
     FitInput placed = input;
     placed.prior = fit->posterior;
-    const auto points = [&](const Eigen::Vector3d& v) { return Points(view, detection, v, false); };
-    if (SeenThrough(placed, points(track.state.velocity()))) return std::nullopt;
-    if (track.partial && HitElsewhere(placed, points(Eigen::Vector3d::Zero()))) return std::nullopt;
+    if (SeenThrough(placed, Points(view, detection, track.state.velocity(), false)))
+      return std::nullopt;
   }
   return Sighting{*fit, detection};
 }

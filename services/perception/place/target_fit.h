@@ -61,7 +61,6 @@ struct FitResult {
   bool whole = true;                   ///< no side that the detection shows is left out
   bool joined = false;                 ///< a like colour goes on beyond a side
   int n_points = 0;                    ///< LiDAR points in the fit
-  double point_rms = 0.0;              ///< distance of the points from the surface, m
   double prior_distance = 0.0;         ///< squared Mahalanobis distance from the prior
   double cost = 0.0;                   ///< half the robust sum of squares, prior included
   /// Logarithm of the prediction's density of these measurements, but for what the measurements'
