@@ -196,22 +196,6 @@ TEST(PerceptionLocaliser, WhatComesBackIsRatherHalfHidden) {
   EXPECT_GT(half_again->log_odds, half->log_odds + 1.0);
 }
 
-TEST(PerceptionLocaliser, ALikeColourBeyondAWindowCostsUnlessItWasThereBefore) {
-  const Localiser localiser(PerceptionConfig{});
-  const Vector3d target(3.0, 0.2, 0.55);
-  auto input = InputFor(BodyAt({0, 0, 1.2}, 0, 0, 0), target + Vector3d(0.02, 0.01, 0.0), 0.06);
-  auto outline = DenseOutline(input.camera, target);
-  outline.silhouette.samples[kTop].clear();
-  outline.cut[kTop] = outline.goes_on[kTop] = true;
-  input.detection = &outline;
-  const auto odds = [&] { return localiser.Correct(input, {})->log_odds; };
-  ASSERT_TRUE(localiser.Correct(input, {}));
-  EXPECT_TRUE(localiser.Correct(input, {})->joined);
-  const double beyond_window = odds();
-  input.joined = true;
-  EXPECT_GT(odds(), beyond_window + 1.0);
-}
-
 TEST(PerceptionLocaliser, NearestSurfaceInTheBoxIsTakenNotTheWallBehind) {
   std::mt19937 random(2);
   const PerceptionConfig config;

@@ -12,11 +12,10 @@ namespace chase::perception {
 namespace {
 
 constexpr size_t kMaxSweeps = 4;
-constexpr double kOdds = 0.0;      // logarithm of the odds that a sighting needs,
-constexpr int kStillJoined = 2;    // frames without it after which a like colour may have gone
-constexpr double kSureOdds = 8.0;  // and with which no other is tried
-constexpr size_t kMostTried = 4;   // detections a track and frame
-constexpr int kKnownHits = 10;     // sightings after which a track's range is trusted
+constexpr double kOdds = 0.0;               // logarithm of the odds that a sighting needs,
+constexpr double kSureOdds = 8.0;           // and with which no other is tried
+constexpr size_t kMostTried = 4;            // detections a track and frame
+constexpr int kKnownHits = 10;              // sightings after which a track's range is trusted
 constexpr double kMaxExtrapolation = 0.05;  // s that the nearest pose is carried to a frame
 constexpr double kMaxPoseAge = 0.2;   // s; with a pose this near it is too old, else there is none
 constexpr double kMaxSweepAge = 0.3;  // s; older points are not used
@@ -101,7 +100,6 @@ std::optional<Sighting> Finder::Try(const TargetTrack& track, const View& view,
   input.camera = view.camera;
   input.detection = &detection;
   input.reappears = track.misses > 0 || track.partial;
-  input.joined = track.joined && track.misses <= kStillJoined;
   auto fit =
       localiser_.Correct(input, Points(view, detection, track.state.velocity(), fresh_sweeps_only));
   if (fit) WeighHidden(view, input, &*fit);

@@ -31,7 +31,7 @@ double LogSides(const FitResult& fit, const FitInput& input) {
   const double range = (fit.posterior.position() - input.camera.p_WC).norm();
   const double px = input.camera.rig.focal_px / std::max(kNearest, range);
   double sum = 0.0;
-  double runs_on = input.joined ? kRunsOnToo : kRunsOn;
+  double runs_on = kRunsOn;
   bool still_hidden = input.reappears;
   for (size_t side = 0; side < 4; ++side) {
     if (input.detection->goes_on[side]) {

@@ -25,10 +25,6 @@ Sides Seen(Sides sides, const Detection& d) {
   return sides;
 }
 
-bool GoesOn(const Detection& d) {
-  return std::any_of(d.goes_on.begin(), d.goes_on.end(), [](bool on) { return on; });
-}
-
 /// One Gaussian with the mean and covariance of the mixture; all else from the likeliest.
 FitResult Joined(const std::vector<Hypothesis>& all) {
   const Hypothesis& best = *std::max_element(
@@ -76,10 +72,8 @@ std::optional<FitResult> Localiser::WholeReading(FitInput* input) const {
 void Localiser::Weigh(const FitInput& given, double log_prior, size_t readings,
                       std::vector<Hypothesis>* out) const {
   FitInput input = given;
-  // Where a like colour goes on, both sides may be another thing's, as the points tell.
-  const bool joined = !input.points.empty() && (input.joined || GoesOn(*input.detection));
   std::vector<Sides> tried;
-  bool explained = !joined && !out->empty();
+  bool explained = !out->empty();
   for (size_t k = 0; k < readings; ++k) {
     if (k >= kOneHidden && explained) return;
     const Sides seen = Seen(kReadings[k], *input.detection);
@@ -89,7 +83,7 @@ void Localiser::Weigh(const FitInput& given, double log_prior, size_t readings,
     const FitResult fit = FitTarget(input, config_.fit);
     if (!Agrees(fit, input)) continue;
     out->push_back({fit, log_prior + LogTarget(fit, input, config_.fit)});
-    explained = explained || (!joined && RaysThrough(input, fit.posterior) < kFewRays);
+    explained = explained || RaysThrough(input, fit.posterior) < kFewRays;
   }
 }
 
