@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <array>
 #include <opencv2/core.hpp>
 #include <string>
 

@@ -176,7 +176,8 @@ TEST(PerceptionLocaliser, HiddenHalfDoesNotBendTheEstimate) {
 }
 
 TEST(PerceptionLocaliser, WhatComesBackIsRatherHalfHidden) {
-  const Localiser localiser(PerceptionConfig{});
+  const PerceptionConfig config;
+  const Localiser localiser(config);
   const Vector3d target(3.0, 0.2, 0.55);
   auto input = InputFor(BodyAt({0, 0, 1.2}, 0, 0, 0), target + Vector3d(0.02, 0.01, 0.0), 0.1);
   auto outline = DenseOutline(input.camera, target);

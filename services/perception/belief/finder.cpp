@@ -93,19 +93,18 @@ void Finder::WeighHidden(const View& view, FitInput input, FitResult* fit) const
 }
 
 std::optional<Sighting> Finder::Try(const TargetTrack& track, const View& view,
-                                    const Detection& detection, bool fresh_sweeps_only) const {
+                                    const Detection& detection) const {
   FitInput input;
   input.prior = track.state;
   input.shape = track.shape;
   input.camera = view.camera;
   input.detection = &detection;
   input.reappears = track.misses > 0 || track.partial;
-  auto fit =
-      localiser_.Correct(input, Points(view, detection, track.state.velocity(), fresh_sweeps_only));
+  auto fit = localiser_.Correct(input, Points(view, detection, track.state.velocity(), true));
   if (fit) WeighHidden(view, input, &*fit);
   if (!fit || fit->log_odds < kOdds) return std::nullopt;
   // What is hardly known has its range from the size alone; a sweep that was used still tells.
-  if (fit->n_points == 0 && fresh_sweeps_only && (track.hits < kKnownHits || track.partial)) {
+  if (fit->n_points == 0 && (track.hits < kKnownHits || track.partial)) {
     FitInput placed = input;
     placed.prior = fit->posterior;
     if (SeenThrough(placed, Points(view, detection, track.state.velocity(), false)))
@@ -126,7 +125,7 @@ std::optional<Sighting> Finder::Find(const TargetTrack& track, View* view) const
   std::optional<Sighting> best;
   for (const size_t i : inside) {
     const auto piece = Within(*boxes, view->bgr, view->detections[i]);
-    const auto s = piece ? Try(track, *view, *piece, true) : std::nullopt;
+    const auto s = piece ? Try(track, *view, *piece) : std::nullopt;
     if (!s || (best && s->fit.log_odds <= best->fit.log_odds)) continue;
     best = s;
     if (track.misses == 0 && s->fit.whole && s->fit.log_odds > kSureOdds) break;

@@ -61,9 +61,9 @@ class Finder {
 
   /// The detection that the track explains best; it is marked as taken.
   std::optional<Sighting> Find(const TargetTrack& track, View* view) const;
-  /// One detection as the thing of a track. Points already used may be asked for again.
+  /// One detection as the thing of a track.
   std::optional<Sighting> Try(const TargetTrack& track, const View& view,
-                              const Detection& detection, bool fresh_sweeps_only) const;
+                              const Detection& detection) const;
   /// One detection as a target of which nothing is known.
   std::optional<Sighting> Acquire(const View& view, const Detection& detection) const;
   bool HasSweeps() const { return !sweeps_.empty(); }

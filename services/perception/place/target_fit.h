@@ -2,7 +2,6 @@
 
 #include <Eigen/Core>
 #include <array>
-#include <optional>
 #include <vector>
 
 #include "services/perception/perception_config.h"
