@@ -21,10 +21,12 @@ foreach(name IN ITEMS forest gym)
   set_tests_properties(flight_${name} PROPERTIES TIMEOUT 400)
 endforeach()
 
-# From take-off to the motors' end on command; its criteria decide.
-add_test(NAME flight_mission
-  COMMAND ${bin}/chase-flight ${CMAKE_SOURCE_DIR}/deploy/scenarios/mission.yaml --seed 1 --quiet)
-set_tests_properties(flight_mission PROPERTIES TIMEOUT 300)
+# From take-off to the motors' end: on command, and by itself where the target is gone for good; criteria decide.
+foreach(name IN ITEMS mission lost)
+  add_test(NAME flight_${name}
+    COMMAND ${bin}/chase-flight ${CMAKE_SOURCE_DIR}/deploy/scenarios/${name}.yaml --seed 1 --quiet)
+  set_tests_properties(flight_${name} PROPERTIES TIMEOUT 300)
+endforeach()
 
 # Battery, geofence, kill, a blocked way up: each ends a mission with its reason.
 chase_script_test(flight_envelope ${CMAKE_CURRENT_LIST_DIR}/envelope_test.py ${bin}

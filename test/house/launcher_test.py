@@ -209,7 +209,7 @@ class FlightTest(unittest.TestCase):
             fly.find_scenario("gmy")
         names = str(refusal.exception).split("there are: ")[1].split(", ")
         self.assertEqual(sorted(names), sorted(
-            ["corridor", "crossing", "forest", "gym", "long", "mission", "night"]
+            ["corridor", "crossing", "forest", "gym", "long", "lost", "mission", "night"]
             + [f"twelve/S{number}" for number in range(1, 13)]))
 
     def test_criterion_that_fails(self):
