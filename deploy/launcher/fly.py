@@ -35,9 +35,6 @@ class FlightError(Exception):
 def kill_wish(text):
     """(process, mission time in s) of P@SECONDS."""
     name, _, seconds = text.partition("@")
-    killable = [row["name"] for row in flight_processes() if row["restart"] == "always"]
-    if name not in killable:
-        raise argparse.ArgumentTypeError(f"{text}: no process '{name}' to kill; there are: {', '.join(killable)}")
     if not re.fullmatch(r"\d+(\.\d+)?", seconds):
         raise argparse.ArgumentTypeError(f"{text}: '{seconds}' is no mission time in s; give {name}@SECONDS, 0 or more")
     return name, float(seconds)
@@ -64,8 +61,13 @@ def parse(arguments):
                         help="through the drivers: MAVLink, VLP-16 packets and a video stream in LCM's place")
     parser.add_argument("--view", action="store_true", help="look on in a browser, at http://localhost:8080")
     parser.add_argument("--kill", type=kill_wish, action="append", default=[], metavar="P@SECONDS",
-                        help="kill -9 of process P at that mission time; it is started anew (may be repeated)")
-    return parser.parse_args(arguments)
+                        help="kill -9 of process P at that mission time; it is started anew, but for the viewer (may be repeated)")
+    options = parser.parse_args(arguments)
+    there = killable(options.hardware, options.view)
+    for name, seconds in options.kill:
+        if name not in there:
+            parser.error(f"argument --kill: {name}@{seconds:g}: no process '{name}' to kill; there are: {', '.join(there)}")
+    return options
 
 
 def find_scenario(name):
@@ -94,6 +96,12 @@ def flight_processes():
 
 def driver_processes(hardware):
     return [row for row in process_table() if hardware and row["name"] in DRIVERS]
+
+
+def killable(hardware, view):
+    """What such a flight starts and goes on without."""
+    rows = flight_processes() + driver_processes(hardware)
+    return [row["name"] for row in rows if row["restart"] == "always"] + ["recorder"] + ["viewer"] * view
 
 
 def set_up():
@@ -216,7 +224,7 @@ class Flight:
         self.logger = self.child("recorder", [
             BIN / "chase-recorder", "--folder", self.folder, "--name", "flight", "--heavy-minutes", "-1",
             "--rotate-mb", "0", "--rotate-minutes", "0", "--keep-free", str(KEEP_FREE)],
-            notifies=True)
+            notifies=True, restarts=True)
         self.monitor = self.child("monitor", [BIN / "chase-flight-monitor"], stdout=subprocess.PIPE)
         os.set_blocking(self.monitor.process.stdout.fileno(), False)
         if view:
@@ -267,7 +275,7 @@ class Flight:
         """Kills whose time has come."""
         while self.kills and self.kills[0][1] <= mission_time:
             name, _ = self.kills.pop(0)
-            child = next(c for c in self.services if c.name == name)
+            child = next(c for c in (*self.services, self.logger, self.viewer) if c and c.name == name)
             print(f"\nt {mission_time:6.1f} s: kill -9 of {name}", file=sys.stderr, flush=True)
             child.process.kill()
             child.process.wait()
@@ -313,8 +321,21 @@ def show(progress):
         print(text, flush=True)
 
 
+def join_logs(folder):
+    """A recorder that was started anew went on in another log."""
+    logs = sorted(folder.glob("flight*.lcm"))
+    if len(logs) < 2:
+        return
+    whole = folder / "whole.lcm"
+    ask("chase-log", "merge", *logs, whole)
+    for log in logs:
+        log.unlink()
+    whole.rename(folder / "flight.lcm")
+
+
 def report(folder):
     """Runs chase-report; prints the criteria. True when all hold."""
+    join_logs(folder)
     command = [BIN / "chase-report", folder / "flight.lcm", "--out", folder]
     with open(folder / "report.log", "wb") as log:
         code = subprocess.run(command, stdout=log, stderr=log, check=False).returncode
@@ -330,6 +351,8 @@ def report(folder):
 def fly(options):
     scenario = find_scenario(options.scenario)
     seconds, told = build_and_check(scenario, options.view, options.hardware)
+    if late := [f"{name}@{t:g}" for name, t in options.kill if t >= told["duration_s"]]:
+        raise FlightError(f"--kill {', '.join(late)}: the mission ends at {told['duration_s']:g} s; give an earlier time")
     warn_of_faults(told.get("left_out_live"))
     warn_of_disk(seconds)
     raise_receive_buffers()
@@ -344,7 +367,10 @@ def fly(options):
         flight.complain()
     finally:
         flight.stop()
-    return 0 if report(flight.folder) else 1
+    passed = report(flight.folder)
+    if flight.kills:
+        raise FlightError("the mission ended before the kill of " + ", ".join(f"{name}@{t:g}" for name, t in flight.kills))
+    return 0 if passed else 1
 
 
 def main():

@@ -236,10 +236,17 @@ class FlightTest(unittest.TestCase):
         self.patch(fly, "flight_processes", lambda: [
             dict(row, restart="always" if row["name"] == "mapping" else "never") for row in rows])
         mark = self.bin / "died"
-        once = f"open({str(mark)!r}, 'x'); time.sleep(1.5); sys.exit(3)"
+        last = str(self.bin / "flight" / "simulator.log")  # of those that come up
+        up = f"[time.sleep(0.1) for _ in range(200) if not (os.path.exists({last!r}) and os.path.getsize({last!r}))]"
+        once = f"open({str(mark)!r}, 'x'); {up}; time.sleep(0.3); sys.exit(3)"
         self.program("chase-mapping", SERVICE.format(
             behaviour=f"if not os.path.exists({str(mark)!r}): {once}"))
-        self.program("chase-flight-monitor", "import time; time.sleep(2)\n" + textwrap.dedent(MONITOR))
+        self.program("chase-flight-monitor", textwrap.dedent(f"""
+            import pathlib, time
+            log, end = pathlib.Path({str(self.bin / "flight/mapping.log")!r}), time.monotonic() + 20
+            while time.monotonic() < end and not (log.exists() and log.read_text().count("working") == 2):
+                time.sleep(0.1)
+            """) + textwrap.dedent(MONITOR))
         code, _, err = self.fly()
         self.assertEqual(code, 0, err)
         self.assertIn("mapping ended (exit code 3): restarted", err)
@@ -254,8 +261,9 @@ class FlightTest(unittest.TestCase):
             folder, end = pathlib.Path({str(self.bin / "flight")!r}), time.monotonic() + 20
             for t in (0, 0.5, 1):
                 say(t)
+            logs = [folder / "planning.log", folder / "control.log"]
             while time.monotonic() < end and any(
-                    (folder / f"{{name}}.log").read_text().count("working") < 2 for name in ("planning", "control")):
+                    not log.exists() or log.read_text().count("working") < 2 for log in logs):
                 time.sleep(0.1)
             say(2, done=True)
             signal.pause()
@@ -269,6 +277,52 @@ class FlightTest(unittest.TestCase):
             self.assertRegex(err, rf"t +[01]\.\d s: kill -9 of {name}\n")
             self.assertIn(f"{name} ended (SIGKILL): restarted", err)
         self.assertLess(err.index("of control"), err.index("of planning"))
+
+    def test_whatever_was_started_can_be_killed(self):
+        self.assertEqual(fly.killable(False, False), ["odometry", "mapping", "perception", "prediction", "planning",
+                                                      "control", "mission", "recorder"])
+        self.assertEqual(fly.killable(True, True)[7:], ["lidar", "fcu", "camera", "recorder", "viewer"])
+        for arguments in (["--kill", "fcu@1"], ["--kill", "viewer@1"], ["--kill", "simulator@1", "--hardware"]):
+            code, _, err = self.fly(*arguments)
+            self.assertEqual(code, 1)
+            self.assertRegex(err, r"no process '\w+' to kill; there are: odometry, .*recorder")
+
+    def test_recorder_is_started_anew_and_its_logs_are_joined(self):
+        self.program("chase-recorder", SERVICE.format(behaviour="""
+    folder = sys.argv[sys.argv.index("--folder") + 1]
+    name = "flight-001" if os.path.exists(os.path.join(folder, "flight.lcm")) else "flight"
+    open(os.path.join(folder, name + ".lcm"), "w").write(name + "\\n")
+    """))
+        self.program("chase-log", """
+            import pathlib, sys
+            *logs, whole = sys.argv[2:]
+            pathlib.Path(whole).write_text("".join(pathlib.Path(log).read_text() for log in logs))
+            """)
+        self.program("chase-flight-monitor", f"""
+            import json, pathlib, signal, time
+            def say(t, done=False):
+                print(json.dumps(dict(mission_time=t, duration=2, distance=2.5, visible=1.0, rtf=0.0, done=done)), flush=True)
+            end = time.monotonic() + 20
+            say(1)
+            while time.monotonic() < end and not pathlib.Path({str(self.bin / "flight/flight-001.lcm")!r}).exists():
+                time.sleep(0.1)
+            say(1.5, done=True)
+            signal.pause()
+            """)
+        code, _, err = self.fly("--kill", "recorder@1")
+        self.assertEqual(code, 0, err)
+        self.assertIn("recorder ended (SIGKILL): restarted", err)
+        self.assertEqual((self.folder / "flight.lcm").read_text(encoding="utf-8"), "flight-001\nflight\n")
+        self.assertEqual([log.name for log in self.folder.glob("*.lcm")], ["flight.lcm"])
+
+    def test_kill_that_comes_too_late_is_an_error(self):
+        code, out, err = self.fly("--kill", "planning@2")
+        self.assertEqual((code, out), (1, ""))
+        self.assertIn("--kill planning@2: the mission ends at 2 s", err)
+        self.program("chase-scenario", LENGTH.format(duration=3))  # the monitor ends it at 2 s
+        code, _, err = self.fly("--kill", "planning@2.9")
+        self.assertEqual(code, 1)
+        self.assertIn("the mission ended before the kill of planning@2.9", err)
 
     def test_commands_are_given_with_their_arguments(self):
         commands = [{"command": "select", "at_s": 0.5, "arguments": ["180", "119.5"]},
