@@ -358,6 +358,12 @@ class FlightTest(unittest.TestCase):
         self.assertRegex(err, r"^warning: .*left out of a live flight: kill-planning, loss-20; "
                               r"cure: deploy/fly --kill planning@SECONDS, chase-flight")
 
+    def test_a_full_disk_is_no_fault_of_a_flight_in_lockstep(self):
+        err = io.StringIO()
+        with contextlib.redirect_stderr(err):
+            fly.warn_of_faults(["disk-full"])
+        self.assertRegex(err.getvalue(), r"cure: a full disk under \S+/logs for disk-full\n$")
+
     def test_sweeps_stay_on_the_host(self):
         os.environ["LCM_DEFAULT_URL"] = f"udpm://{GROUP}:{free_port()}?ttl=1"
         code, _, err = self.fly()
