@@ -47,8 +47,9 @@ endforeach()
 add_test(NAME hostile_bus
   COMMAND ${CMAKE_SOURCE_DIR}/test/flight/in_namespace.sh
           python3 ${CMAKE_SOURCE_DIR}/test/flight/hostile_bus.py ${bin} ${flight}
+          ${CMAKE_SOURCE_DIR}/deploy/scenarios/mission.yaml
   WORKING_DIRECTORY ${CMAKE_SOURCE_DIR})
-set_tests_properties(hostile_bus PROPERTIES TIMEOUT 200 FIXTURES_REQUIRED recorded_flight)
+set_tests_properties(hostile_bus PROPERTIES TIMEOUT 300 FIXTURES_REQUIRED recorded_flight)
 
 chase_script_test(flight_command ${CMAKE_CURRENT_LIST_DIR}/command_test.py ${bin}
   BEFORE ${CMAKE_SOURCE_DIR}/test/flight/in_namespace.sh)

@@ -1,14 +1,15 @@
 #!/usr/bin/env python3
-"""Sends damaged messages to every live service on every channel that it listens to: nothing may crash,
-each must be counted in the status, and the next good message must be handled.
+"""Sends damaged messages to every live process: nothing may crash, on every channel that it decodes each
+must be counted in the status, and the next good message must be handled.
 
-Usage: hostile_bus.py BIN_DIR FLIGHT.lcm   (run it in a network namespace of its own)
+Usage: hostile_bus.py BIN_DIR FLIGHT.lcm MISSION.yaml   (run it in a network namespace of its own)
 """
 import pathlib
 import socket
 import struct
 import subprocess
 import sys
+import tempfile
 import time
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "replay"))
@@ -19,12 +20,18 @@ NAN = struct.pack(">d", float("nan"))
 LISTENS = {
     "odometry": ["LIDAR_SCAN", "IMU"],
     "mapping": ["SCAN_REGISTERED", "TARGET"],
-    "perception": ["CAMERA_IMAGE", "LIDAR_SCAN", "POSE"],
+    "perception": ["CAMERA_IMAGE", "LIDAR_SCAN", "POSE", "COMMAND"],
     "prediction": ["TARGET", "OBSTACLES"],
-    "planning": ["PREDICTION", "OBSTACLES", "POSE"],
-    "control": ["PLAN", "OBSTACLES", "POSE"],
-    "simulator": ["ATTITUDE_SETPOINT"],
+    "planning": ["PREDICTION", "OBSTACLES", "POSE", "UNSEEN", "TRACKING", "FLIGHT_STATE", "GEOFENCE", "FCU_STATUS"],
+    "control": ["PLAN", "OBSTACLES", "POSE", "FLIGHT_STATE", "GEOFENCE", "FCU_STATUS"],
+    "simulator": ["ATTITUDE_SETPOINT", "POSE"],
+    "mission": ["COMMAND", "POSE", "OBSTACLES", "TARGET", "PLAN", "TRACKING", "ATTITUDE_SETPOINT", "FCU_STATUS"],
+    "fcu": ["POSE", "ATTITUDE_SETPOINT", "FLIGHT_STATE", "COMMAND"],
+    "viewer": ["POSE", "PLAN", "FLIGHT_STATE", "GEOFENCE"],
 }
+# These carry what comes and decode nothing.
+CARRIES = {"recorder": ["--folder", "{folder}"], "link": []}
+FENCE = "  - {name: mission, config: 'geofence: {polygon: [[-99, -99], [99, -99], [99, 99], [-99, 99]]}'}\n"
 # Where the first double of a message stands behind what all begin with.
 FIRST_DOUBLE = {"IMU": 0, "POSE": 4, "TARGET": 5, "ATTITUDE_SETPOINT": 0, "SCAN_REGISTERED": 4}
 # Where an array's length stands.
@@ -57,10 +64,10 @@ class Bus:
             self.out.sendto(packet, (GROUP, PORT))
             time.sleep(0.001)
 
-    def status(self, name, seconds):
-        """The newest status within the time: {channel: (received, malformed)}."""
+    def status(self, name, seconds, enough=lambda status: True):
+        """The first status within the time that is enough, or the last: {channel: (received, malformed)}."""
         newest, end = None, time.monotonic() + seconds
-        while (left := end - time.monotonic()) > 0:
+        while not (newest and enough(newest)) and (left := end - time.monotonic()) > 0:
             self.into.settimeout(left)
             try:
                 packet = self.into.recv(65536)
@@ -122,7 +129,7 @@ def check(bus, bin_dir, service, samples):
             for data in bad:
                 bus.send(channel, data)
             bus.send(channel, good)
-            received, malformed = bus.status(service, 2.5)[channel]
+            received, malformed = bus.status(service, 2.5, lambda s: s[channel][0] > 0)[channel]
             if process.poll() is not None:
                 sys.exit(f"{service}: died of {channel}")
             if malformed != len(bad):
@@ -135,13 +142,44 @@ def check(bus, bin_dir, service, samples):
         process.wait(timeout=10)
 
 
-def main(bin_dir, flight):
+def check_carrier(bus, bin_dir, service, arguments, samples):
+    process = subprocess.Popen([f"{bin_dir}/chase-{service}", *arguments])
+    try:
+        if bus.status(service, 6.0) is None:
+            sys.exit(f"{service}: no status")
+        for channel, good in samples.items():
+            for data in attacks(channel, good):
+                bus.send(channel, data)
+        if process.poll() is not None or bus.status(service, 3.0) is None:
+            sys.exit(f"{service}: died")
+        print(f"{service}: lives on")
+    finally:
+        process.terminate()
+        process.wait(timeout=10)
+
+
+def led_flight(bin_dir, mission, folder):
+    """The log of a few seconds with a mission process, an operator and a geofence."""
+    scenario, log = folder / "led.yaml", folder / "led.lcm"
+    scenario.write_text(pathlib.Path(mission).read_text(encoding="utf-8") + FENCE, encoding="utf-8")
+    subprocess.run([f"{bin_dir}/chase-flight", scenario, "--quiet", "--until", "1", "--log", log],
+                   check=True, stdout=subprocess.DEVNULL)
+    return log
+
+
+def main(bin_dir, flight, mission):
     samples = {}
-    for _, channel, data in lcmlog.read(flight):
-        samples.setdefault(channel, data)
-    bus = Bus()
-    for service in LISTENS:
-        check(bus, bin_dir, service, samples)
+    with tempfile.TemporaryDirectory() as name:
+        folder = pathlib.Path(name)
+        for log in (flight, led_flight(bin_dir, mission, folder)):
+            for _, channel, data in lcmlog.read(log):
+                samples.setdefault(channel, data)
+        bus = Bus()
+        for service in LISTENS:
+            check(bus, bin_dir, service, samples)
+        light = {channel: data for channel, data in samples.items() if len(data) < 60000}
+        for service, arguments in CARRIES.items():
+            check_carrier(bus, bin_dir, service, [a.format(folder=folder) for a in arguments], light)
 
 
 main(*sys.argv[1:])
