@@ -205,6 +205,7 @@ void Bridge::Tick(int64_t now) {
   handshake_.Update(Gather(now));
   const bool flies = handshake_.state() == Handshake::State::kFlying;
   disagreement_ = flies && pose_ && frame_ == pose_->epoch ? AttitudeProblem(now) : "";
+  if (!flies) flown_by_.reset();
   if (handshake_.ended()) asked_ = false;
   if (Due(now, kHeartbeatPeriod, &next_heartbeat_)) SendHeartbeat(now);
   if (!autopilot_.known()) return;
@@ -231,6 +232,8 @@ void Bridge::SendSetpoint(int64_t now) {
   m.target_component = static_cast<uint8_t>(mav::MavComponent::AUTOPILOT1);
   Send(now, m);
   ++setpoints_sent_;
+  if (flown_by_) longest_setpoint_gap_ = std::max(longest_setpoint_gap_, Seconds(*flown_by_, now));
+  flown_by_ = now;
 }
 
 void Bridge::SendCommands(int64_t now) {
@@ -260,8 +263,9 @@ std::string Bridge::Words() const {
   words += fmt::format("; clock +-{:.2f} ms, round trip {:.1f} ms", 1e3 * clock_.jitter(),
                        1e3 * clock_.round_trip());
   words += fmt::format("; {} {:.0f} Hz", imu_.source(), rates_.rate(mav::HighresImu::kId));
-  words += fmt::format("; {} setpoints, {} odometry sent, {} frames lost", setpoints_sent_,
-                       odometry_sent_, reader_.counters().lost);
+  words += fmt::format(
+      "; {} setpoints sent, in flight at most {:.0f} ms apart; {} odometry sent, {} frames lost",
+      setpoints_sent_, 1e3 * longest_setpoint_gap_, odometry_sent_, reader_.counters().lost);
   if (autopilot_.position() && pose_)
     words += fmt::format("; its position is {:.2f} m off POSE",
                          (*autopilot_.position() - pose_->p_WB).norm());

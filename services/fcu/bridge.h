@@ -117,6 +117,8 @@ class Bridge {
   bool led_ = false, asked_ = false;  // is a mission heard, and Facts::asked
   std::string missing_ = "no PX4 is heard", disagreement_;
   int64_t setpoints_sent_ = 0, odometry_sent_ = 0;
+  std::optional<int64_t> flown_by_;    // when the newest setpoint of this flight was sent
+  double longest_setpoint_gap_ = 0.0;  // s between two of a flight
   std::vector<Bytes> outgoing_;
   std::vector<ImuSample> samples_;
 };

@@ -1,5 +1,7 @@
 #include "services/simulator/mavlink_peer.h"
 
+#include <fmt/format.h>
+
 #include "common/math/rotation.h"
 #include "common/mavlink/frames.h"
 
@@ -33,8 +35,8 @@ void MavlinkPeer::FollowVision(Estimator* estimator) {
 }
 
 void MavlinkPeer::Steer(int64_t clock, double t, Simulator* simulator) {
-  for (const auto& bytes : socket_.Take(clock)) {
-    px4_.Receive(clock, bytes);
+  for (const Datagram& datagram : socket_.Take(clock)) {
+    px4_.Receive(clock - datagram.age, clock, datagram.bytes);
     FollowVision(&simulator->estimator());
   }
   simulator->SetSetpoint(px4_.Demand(simulator->Known()), t);
@@ -50,7 +52,8 @@ void MavlinkPeer::Tell(int64_t utime, int64_t clock, const Simulator& simulator,
 }
 
 std::string MavlinkPeer::Words() const {
-  return px4_.mode().name() + (px4_.armed() ? ", armed" : ", disarmed");
+  return fmt::format("{}, {}, setpoints at most {:.0f} ms apart", px4_.mode().name(),
+                     px4_.armed() ? "armed" : "disarmed", 1e3 * px4_.seen().longest_setpoint_gap);
 }
 
 }  // namespace chase::simulator

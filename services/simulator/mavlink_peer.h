@@ -19,7 +19,7 @@ class MavlinkPeer {
   /// Tells of the vehicle after a step.
   void Tell(int64_t utime, int64_t clock, const Simulator& simulator, const ImuSample& imu);
 
-  /// Mode and arming in words.
+  /// Mode, arming and the longest gap between setpoints in words.
   std::string Words() const;
 
  private:

@@ -109,19 +109,19 @@ void Px4::Say(const std::string& text, uint8_t severity) {
   }
 }
 
-void Px4::Receive(int64_t clock, const Bytes& bytes) {
+void Px4::Receive(int64_t arrival, int64_t clock, const Bytes& bytes) {
   reader_.Add(clock, bytes.data(), bytes.size(),
-              [&](const mavlink::Frame& frame) { OnFrame(frame, clock); });
+              [&](const mavlink::Frame& frame) { OnFrame(frame, arrival, clock); });
   reader_.Reset();
 }
 
-void Px4::OnFrame(const mavlink::Frame& frame, int64_t clock) {
+void Px4::OnFrame(const mavlink::Frame& frame, int64_t arrival, int64_t clock) {
   if (frame.version == 2) version_2_ = true;
   if (mavlink::As<mav::Heartbeat>(frame)) ++seen_.heartbeats;
   if (const auto m = mavlink::As<mav::CommandLong>(frame)) OnCommand(*m, frame);
   if (const auto m = mavlink::As<mav::Odometry>(frame)) OnOdometry(*m, SenderOf(frame));
   if (const auto m = mavlink::As<mav::Timesync>(frame)) OnTimesync(*m, SenderOf(frame), clock);
-  if (const auto m = mavlink::As<mav::SetAttitudeTarget>(frame)) OnSetpoint(*m);
+  if (const auto m = mavlink::As<mav::SetAttitudeTarget>(frame)) OnSetpoint(*m, arrival);
 }
 
 // Velocities and covariances may be NaN, which says that they are not known.
@@ -133,7 +133,7 @@ void Px4::OnOdometry(mav::Odometry m, Sender sender) {
   if (m.estimator_type == 7) Say("ODOMETRY: estimator_type 7 unsupported", 2);
 }
 
-void Px4::OnSetpoint(const mav::SetAttitudeTarget& message) {
+void Px4::OnSetpoint(const mav::SetAttitudeTarget& message, int64_t arrival) {
   if (message.target_system != 1 && message.target_system != 0) return;
   mav::SetAttitudeTarget m = Heeded(message);
   if (!Normalise(&m.q) || !Finite(m.body_roll_rate, m.body_pitch_rate, m.body_yaw_rate, m.thrust))
@@ -142,6 +142,9 @@ void Px4::OnSetpoint(const mav::SetAttitudeTarget& message) {
   if (!(mode_ == mavlink::kOffboardMode)) ++seen_.setpoints_while_not_offboard;
   if (Seconds(last_setpoint_, now_) > kSlowest) first_setpoint_ = now_;
   last_setpoint_ = now_;
+  if (flown_by_)
+    seen_.longest_setpoint_gap = std::max(seen_.longest_setpoint_gap, Seconds(*flown_by_, arrival));
+  if (IsLed()) flown_by_ = arrival;
   seen_.setpoint = m;
 }
 
@@ -241,6 +244,7 @@ void Px4::Reboot(int64_t utime) {
   mode_ = intended_ = mavlink::kPositionMode;
   armed_ = failsafe_ = false;
   first_setpoint_ = last_setpoint_ = 0;
+  flown_by_.reset();
   version_2_ = !options_.starts_in_version_1;
   writer_ = mavlink::FrameWriter(1, 1);
   next_.clear();
@@ -286,6 +290,7 @@ void Px4::Tick(int64_t utime, int64_t clock, const Px4Body& body) {
   WatchBattery();
   if (!armed_) failsafe_ = false;
   WatchLanding();
+  if (!IsLed()) flown_by_.reset();
   Stream(clock);
 }
 

@@ -39,8 +39,8 @@ class Px4 {
 
   Px4(const Px4Options& options, int64_t utime, uint64_t seed);
 
-  /// A datagram looked at when the host's clock says `clock`.
-  void Receive(int64_t clock, const Bytes& bytes);
+  /// A datagram that arrived at `arrival` and is looked at when the host's clock says `clock`.
+  void Receive(int64_t arrival, int64_t clock, const Bytes& bytes);
   /// Applies the rules and sends what is due; times must not fall. `clock`: the host's, which a
   /// busy simulation's `utime` lags behind.
   void Tick(int64_t utime, int64_t clock, const Px4Body& body);
@@ -66,6 +66,7 @@ class Px4 {
     int heartbeats = 0, setpoints = 0, odometry = 0, commands = 0, timesync = 0;
     int setpoints_while_not_offboard = 0;
     int times_armed = 0, offboard_commands = 0;
+    double longest_setpoint_gap = 0.0;  ///< s between arrivals, armed and meant to fly OFFBOARD
     std::optional<mavlink::mav::SetAttitudeTarget> setpoint;
     std::optional<mavlink::mav::Odometry> vision;
     std::vector<double> clock_errors;  ///< s, of the host's clock as this side of TIMESYNC sees it
@@ -74,8 +75,8 @@ class Px4 {
   const Seen& seen() const { return seen_; }
 
  private:
-  void OnFrame(const mavlink::Frame& frame, int64_t clock);
-  void OnSetpoint(const mavlink::mav::SetAttitudeTarget& message);
+  void OnFrame(const mavlink::Frame& frame, int64_t arrival, int64_t clock);
+  void OnSetpoint(const mavlink::mav::SetAttitudeTarget& message, int64_t arrival);
   using Sender = std::pair<uint8_t, uint8_t>;  // system, component
   static Sender SenderOf(const mavlink::Frame& frame) { return {frame.system, frame.component}; }
   void OnOdometry(mavlink::mav::Odometry m, Sender sender);
@@ -88,6 +89,8 @@ class Px4 {
   void Enter(mavlink::Mode mode);
   bool Streamed() const;
   bool StreamAlive() const;
+  /// Should it fly by setpoints? In the failsafe for their silence, too.
+  bool IsLed() const { return armed_ && intended_ == mavlink::kOffboardMode; }
   void WatchStream();
   void WatchBattery();
   void WatchLanding();
@@ -118,6 +121,7 @@ class Px4 {
   mavlink::Mode mode_, intended_;
   bool armed_ = false, failsafe_ = false, landed_ = true, has_flown_ = false, drained_ = false;
   int64_t first_setpoint_ = 0, last_setpoint_ = 0, landed_since_ = 0, down_since_ = 0;
+  std::optional<int64_t> flown_by_;  // arrival of the newest setpoint that it flew by
   Px4Body body_;
   OwnMode own_mode_{body_};
   std::map<uint32_t, int64_t> next_;       // of each stream

@@ -1,12 +1,17 @@
 #include "services/simulator/udp_socket.h"
 
 #include <arpa/inet.h>
+#include <linux/sockios.h>
+#include <sys/ioctl.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <ctime>
 #include <stdexcept>
 #include <utility>
 
+#include "common/bus/host_clock.h"
 #include "common/bus/udp_port.h"
 
 namespace chase::simulator {
@@ -22,6 +27,14 @@ uint64_t Key(const sockaddr_in& address) {
   return static_cast<uint64_t>(address.sin_addr.s_addr) << 16 | address.sin_port;
 }
 
+/// Microseconds since the kernel took in the datagram that was read last.
+int64_t AgeOfLast(int fd) {
+  timespec at{};
+  if (ioctl(fd, SIOCGSTAMPNS, &at) != 0) return 0;
+  const int64_t arrived = int64_t{at.tv_sec} * 1'000'000 + at.tv_nsec / 1000;
+  return std::max<int64_t>(0, bus::WallMicroseconds() - arrived);
+}
+
 }  // namespace
 
 // Whoever sends to the loopback hears the loopback alone.
@@ -34,6 +47,7 @@ UdpSocket::UdpSocket(const std::string& host, int port, int own_port) {
   to_.sin_addr.s_addr = ip;
   const bool local = ntohl(ip) >> IN_CLASSA_NSHIFT == IN_LOOPBACKNET;
   fd_ = bus::OpenUdpPort(own_port, local ? INADDR_LOOPBACK : INADDR_ANY);
+  AgeOfLast(fd_);  // the kernel keeps stamps from the first question on
 }
 
 UdpSocket::~UdpSocket() { close(fd_); }
@@ -44,11 +58,11 @@ void UdpSocket::Send(const uint8_t* data, std::size_t size) {
     if (key != Key(to_)) sendto(fd_, data, size, 0, Raw(peer.address), sizeof peer.address);
 }
 
-std::vector<std::vector<uint8_t>> UdpSocket::Take(int64_t utime) {
-  std::vector<std::vector<uint8_t>> taken;
+std::vector<Datagram> UdpSocket::Take(int64_t utime) {
+  std::vector<Datagram> taken;
   sockaddr_in from{};
   while (auto datagram = bus::NextDatagram(fd_, &from)) {
-    taken.push_back(std::move(*datagram));
+    taken.push_back({std::move(*datagram), AgeOfLast(fd_)});
     others_[Key(from)] = {from, utime};
   }
   for (auto peer = others_.begin(); peer != others_.end();)

@@ -9,6 +9,11 @@
 
 namespace chase::simulator {
 
+struct Datagram {
+  std::vector<uint8_t> bytes;
+  int64_t age = 0;  ///< microseconds since it arrived
+};
+
 /// Datagrams to one address and to whoever has written lately.
 class UdpSocket {
  public:
@@ -21,7 +26,7 @@ class UdpSocket {
 
   void Send(const uint8_t* data, std::size_t size);
   /// What has come in, each datagram as a whole; `utime`: now.
-  std::vector<std::vector<uint8_t>> Take(int64_t utime);
+  std::vector<Datagram> Take(int64_t utime);
 
  private:
   struct Peer {

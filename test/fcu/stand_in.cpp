@@ -14,7 +14,7 @@ constexpr double kTouches = 0.01;      // m
 
 void StandIn::Receive(int64_t utime, const Bytes& bytes) {
   now_ = std::max(now_, utime);
-  px4_.Receive(now_, bytes);
+  px4_.Receive(utime, now_, bytes);
 }
 
 void StandIn::Reboot(int64_t utime) {

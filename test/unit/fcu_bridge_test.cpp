@@ -46,6 +46,25 @@ TEST(FcuBridge, SendsItsStreamsAtTheirRates) {
   EXPECT_EQ(flight.bridge.rates().missing(), "");
 }
 
+TEST(FcuBridge, BothSidesKnowTheLongestGapOfTheStream) {
+  Flight flight;
+  ASSERT_TRUE(flight.RunUntil(State::kFlying, 12.0));
+  flight.Run(10.0);
+  const auto said = [&](const char* gap) {
+    return flight.bridge.Words().find(std::string("at most ") + gap + " ms apart") !=
+           std::string::npos;
+  };
+  EXPECT_TRUE(said("10")) << flight.bridge.Words();
+  EXPECT_LT(flight.px4.seen().longest_setpoint_gap, 0.012);
+  flight.setpoints = false;  // for longer than setpoint_age
+  flight.Run(0.3);
+  flight.setpoints = true;
+  flight.Run(1.0);
+  ASSERT_EQ(flight.bridge.handshake().state(), State::kFlying);
+  EXPECT_NEAR(flight.px4.seen().longest_setpoint_gap, 0.2, 0.06) << flight.bridge.Words();
+  EXPECT_FALSE(said("10")) << flight.bridge.Words();
+}
+
 TEST(FcuBridge, ClocksMeetOnBothSides) {
   Flight flight;
   flight.setpoints = false;

@@ -31,7 +31,21 @@ class Link {
   template <class M>
   void Send(const M& message, uint8_t system = 1, uint8_t component = 191) {
     mavlink::FrameWriter writer(system, component);
-    px4_.Receive(now_, writer.Write(now_, message));
+    px4_.Receive(now_, now_, writer.Write(now_, message));
+  }
+
+  /// Setpoints that arrive every `period` us and are looked at every 20 ms.
+  void Setpoints(int count, int64_t period) {
+    mav::SetAttitudeTarget m;
+    m.q = {1.0f, 0.0f, 0.0f, 0.0f};
+    m.target_system = 1;
+    mavlink::FrameWriter writer(1, 191);
+    for (int i = 0; i < count; ++i) {
+      const int64_t arrival = now_ += period;
+      const int64_t clock = (arrival / 20'000 + 1) * 20'000;
+      px4_.Tick(clock, clock, {});
+      px4_.Receive(arrival, clock, writer.Write(now_, m));
+    }
   }
 
   /// Messages of each type that it sends in a second.
@@ -222,6 +236,27 @@ TEST(Px4, TakesNoSetpointThatIsNotFinite) {
   }
 }
 
+TEST(Px4, KnowsTheLongestGapBetweenTheSetpointsThatItFliesBy) {
+  Link link;
+  const auto gap = [&] { return link.px4().seen().longest_setpoint_gap; };
+  link.Setpoints(5, 300'000);
+  EXPECT_EQ(gap(), 0.0) << "nobody flies by them";
+  link.px4().PilotMode(mavlink::kOffboardMode);
+  link.px4().PilotArms(true);
+  link.Setpoints(50, 10'000);
+  EXPECT_NEAR(gap(), 0.010, 1e-9) << "by their arrivals, however late they are looked at";
+  link.Setpoints(1, 70'000);
+  link.Setpoints(50, 10'000);
+  EXPECT_NEAR(gap(), 0.070, 1e-9);
+  link.px4().PilotMode(mavlink::kPositionMode);
+  link.Setpoints(1, 500'000);
+  link.px4().PilotMode(mavlink::kOffboardMode);
+  link.Setpoints(50, 10'000);
+  EXPECT_NEAR(gap(), 0.070, 1e-9) << "the pilot had it";
+  link.Setpoints(1, 1'500'000);
+  EXPECT_NEAR(gap(), 1.5, 1e-9) << "of the failsafe for their silence, too";
+}
+
 // A ground station answers as well, by a clock of its own.
 TEST(Px4, TimesOfVisionAreOfTheClockOfItsSender) {
   Link link;
@@ -282,6 +317,20 @@ TEST(UdpSocket, LeavesNoFileOpenWhenItFails) {
     EXPECT_THROW(UdpSocket("127.0.0.1", 14540, taken), std::runtime_error);
   }
   EXPECT_EQ(OpenFiles(), before);
+}
+
+TEST(UdpSocket, KnowsHowOldADatagramIs) {
+  const int file = NextFile();
+  UdpSocket socket("127.0.0.1", 14540, 0);
+  const sockaddr_in own = Bound(file);
+  const int sender = ::socket(AF_INET, SOCK_DGRAM, 0);
+  for (int i = 0; i < 2; ++i)
+    sendto(sender, "x", 1, 0, reinterpret_cast<const sockaddr*>(&own), sizeof own);
+  close(sender);
+  usleep(30'000);
+  const auto datagrams = socket.Take(kStart);
+  ASSERT_EQ(datagrams.size(), 2u);
+  for (const Datagram& datagram : datagrams) EXPECT_GE(datagram.age, 30'000);
 }
 
 TEST(UdpSocket, HearsTheLoopbackAloneWhereItSendsThere) {
