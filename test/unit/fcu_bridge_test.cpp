@@ -1,5 +1,8 @@
 #include <gtest/gtest.h>
 
+#include <cstdio>
+#include <functional>
+
 #include "common/bus/autopilot_state.h"
 #include "fcu_flight.h"
 #include "services/fcu/bridge.h"
@@ -8,6 +11,20 @@ namespace chase::fcu::testing {
 namespace {
 
 using State = Handshake::State;
+
+/// Flies on until it holds, `most` s at most; prints and returns how long that took, s.
+double Took(Flight* flight, const char* what, double most, const std::function<bool()>& holds) {
+  const int64_t begin = flight->now();
+  flight->Run(most, holds);
+  EXPECT_TRUE(holds()) << what << ": " << flight->bridge.Words();
+  const double seconds = 1e-6 * static_cast<double>(flight->now() - begin);
+  std::printf("%s: %.2f s\n", what, seconds);
+  return seconds;
+}
+
+double Took(Flight* flight, const char* what, double most, State state) {
+  return Took(flight, what, most, [&] { return flight->bridge.handshake().state() == state; });
+}
 
 TEST(FcuBridge, TakesOffHoversLandsAndDisarms) {
   Flight flight;
@@ -103,9 +120,9 @@ TEST(FcuBridge, NeverSendsAStaleSetpoint) {
   flight.setpoints = false;
   flight.Run(0.12);
   const int sent = flight.px4.seen().setpoints;
-  flight.Run(1.0);
+  EXPECT_LT(Took(&flight, "setpoints silent for 0.12 s, it lands", 1.0, State::kLanding), 0.5);
+  flight.Run(0.5);
   EXPECT_EQ(flight.px4.seen().setpoints, sent);
-  EXPECT_EQ(flight.bridge.handshake().state(), State::kLanding) << flight.bridge.Words();
   EXPECT_FALSE(flight.px4.failsafe()) << "we asked before the autopilot had to";
   EXPECT_TRUE(flight.px4.mode() == kLandMode);
   EXPECT_TRUE(flight.RunUntil(State::kDone, 20.0));
@@ -199,8 +216,7 @@ TEST(FcuBridge, LandsWhenThePoseHasBeenSilentForTooLong) {
   const int odometry = flight.px4.seen().odometry;
   flight.Run(1.5);
   EXPECT_EQ(flight.bridge.handshake().state(), State::kFlying) << "control has its two seconds";
-  flight.Run(0.5);
-  EXPECT_EQ(flight.bridge.handshake().state(), State::kLanding);
+  Took(&flight, "estimate stale for 1.8 s, it lands", 0.5, State::kLanding);
   EXPECT_EQ(flight.px4.seen().odometry, odometry);
 }
 
@@ -235,8 +251,7 @@ TEST(FcuBridge, ThePilotTakesItAtOnceAndForGood) {
   ASSERT_TRUE(flight.RunUntil(State::kFlying, 12.0));
   flight.Run(5.0);
   flight.px4.PilotMode({3, 0});
-  flight.Run(1.1);  // the next heartbeat
-  EXPECT_EQ(flight.bridge.handshake().state(), State::kPilot);
+  Took(&flight, "the pilot takes over, no stream any more", 1.1, State::kPilot);  // a heartbeat
   const auto before = flight.px4.seen();
   flight.Run(20.0);
   EXPECT_EQ(flight.px4.seen().setpoints, before.setpoints);
@@ -275,7 +290,9 @@ TEST(FcuBridge, LinkLossEndsInALatchedFailsafe) {
   ASSERT_TRUE(flight.RunUntil(State::kFlying, 12.0));
   flight.Run(5.0);
   flight.link = false;
-  flight.Run(3.0);
+  const auto fails_safe = [&] { return flight.px4.failsafe(); };
+  EXPECT_NEAR(Took(&flight, "link cut, the autopilot lands", 3.0, fails_safe), 1.0, 0.1);
+  flight.Run(2.0);
   EXPECT_TRUE(flight.px4.failsafe());
   // Back, but only their words: ours would bring OFFBOARD back by itself.
   flight.link = true;
@@ -326,7 +343,7 @@ TEST(FcuBridge, RefusalsAreSaidInWordsAndGivenUp) {
   FcuConfig config;
   config.give_up_after = 8.0;
   Flight b(preflight, config);
-  ASSERT_TRUE(b.RunUntil(State::kRefused, 25.0)) << b.bridge.Words();
+  Took(&b, "arming refused for 8 s and given up, from the start", 25.0, State::kRefused);
   EXPECT_NE(
       b.bridge.Words().find("arming did not come (not now): Arming denied: " + preflight.preflight),
       std::string::npos)
@@ -345,7 +362,7 @@ TEST(FcuBridge, AnEmptyBatteryLandsAndIsNoFlightAfterwards) {
   ASSERT_TRUE(flight.RunUntil(State::kFlying, 12.0));
   flight.Run(5.0);
   flight.px4.SetCharge(0.04);
-  ASSERT_TRUE(flight.RunUntil(State::kFailsafe, 3.0)) << flight.bridge.Words();
+  Took(&flight, "battery empty, the autopilot lands and the bridge lets it", 3.0, State::kFailsafe);
   EXPECT_NE(flight.bridge.Words().find("Emergency battery level"), std::string::npos)
       << flight.bridge.Words();
   EXPECT_TRUE(flight.px4.mode() == kLandMode);
@@ -399,7 +416,11 @@ TEST(FcuBridge, GoesOnWhereItBeganAnewInMidFlight) {
   flight.Run(5.0);
   StandInOptions options;
   flight.bridge = Bridge(FcuConfig{});
-  flight.Run(2.5);
+  Took(&flight, "bridge killed and restarted, it knows who flies", 2.5, [&] {
+    const State state = flight.bridge.handshake().state();
+    return state == State::kFlying || state == State::kFailsafe || state == State::kPilot;
+  });
+  flight.Run(0.5);
   // The clock takes half a second and the heartbeat one: longer than COM_OF_LOSS_T may bear, so
   // either is right, but never a second arming.
   EXPECT_EQ(flight.px4.seen().times_armed, 1);
