@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <climits>
+#include <fstream>
 
 #include "common/config/checksum.h"
 #include "common/config/version.h"
@@ -17,11 +18,18 @@ double Seconds(const timeval& t) {
   return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
 }
 
+/// Of this process now, MiB: proc(5), statm; ru_maxrss is the peak.
+double ResidentMb() {
+  long total = 0, resident = 0;  // pages
+  std::ifstream("/proc/self/statm") >> total >> resident;
+  return static_cast<double>(resident) * static_cast<double>(sysconf(_SC_PAGESIZE)) / 1048576.0;
+}
+
 void AddUsage(status_t* status) {
   rusage usage{};
   getrusage(RUSAGE_SELF, &usage);
   status->cpu = Seconds(usage.ru_utime) + Seconds(usage.ru_stime);
-  status->rss_mb = static_cast<double>(usage.ru_maxrss) / 1024.0;
+  status->rss_mb = ResidentMb();
 }
 
 void AddStages(const StageClock& clock, status_t* status) {

@@ -236,6 +236,7 @@ struct CriteriaSpec {
   double distance_ratio_max = -1.0, real_time_factor = -1.0;
   std::vector<std::string> flight_states;
   double touchdown_speed = -1.0, motors_off = -1.0;
+  double sweep_to_setpoint = -1.0, memory_growth = -1.0;
   template <class V>
   void Visit(V& v) {
     v("safe_ratio", safe_ratio, "at least");
@@ -246,6 +247,9 @@ struct CriteriaSpec {
     v("flight_states", flight_states, "that the flight is in, in this order, others between them");
     v("touchdown_speed", touchdown_speed, "at most, m/s");
     v("motors_off", motors_off, "after touchdown, at most, s");
+    v("sweep_to_setpoint", sweep_to_setpoint, "99th percentile, at most, s; logs with sweeps only");
+    v("memory_growth", memory_growth,
+      "of any process after its first minute, at most; live flights only");
   }
 };
 

@@ -33,6 +33,7 @@ const ROWS = [
   ['acceleration_cost', 'Acceleration cost', 'm²/s⁴', 1, 2], ['jerk_cost', 'Jerk cost', 'm²/s⁶', 1, 1], ['yaw_rate_rms', 'Yaw rate, RMS', 'rad/s', 1, 2],
   ['plan_ms.p50', 'Planning, median', 'ms', 1, 1], ['plan_ms.p99', 'Planning, 99th percentile', 'ms', 1, 1],
   ['predict_ms.p50', 'Prediction, median', 'ms', 1, 1], ['predict_ms.p99', 'Prediction, 99th percentile', 'ms', 1, 1],
+  ['sweep_to_setpoint_ms.p50', 'Sweep to setpoint, median', 'ms', 1, 1], ['sweep_to_setpoint_ms.p99', 'Sweep to setpoint, 99th percentile', 'ms', 1, 1],
   ['replans', 'Plans', '', 1, 0], ['fallbacks', 'Fallbacks', '', 1, 0],
   ['odometry_ate_m', 'Odometry, RMSE', 'm', 1, 3], ['odometry_ate_aligned_m', 'Odometry, RMSE after alignment', 'm', 1, 3],
   ['pose_sigma_max_m', 'Pose, largest standard deviation', 'm', 1, 3], ['frame_changes', 'Changes of the frame W', '', 1, 0],

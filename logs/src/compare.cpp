@@ -31,6 +31,8 @@ const std::vector<std::pair<const char*, Better>>& Keys() {
       {"plan_ms.p99", Better::kLower},
       {"predict_ms.p50", Better::kLower},
       {"predict_ms.p99", Better::kLower},
+      {"sweep_to_setpoint_ms.p50", Better::kLower},
+      {"sweep_to_setpoint_ms.p99", Better::kLower},
       {"fallbacks", Better::kLower},
       {"certified_clearance_m", Better::kHigher},
       {"certificate_kept_ratio", Better::kHigher},

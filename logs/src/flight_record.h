@@ -5,6 +5,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "common/world/scenario.h"
@@ -93,6 +94,12 @@ struct StageFigures {
   double mean_ms = 0.0, p50_ms = 0.0, p99_ms = 0.0, max_ms = 0.0;
 };
 
+/// What a process occupies.
+struct MemorySample {
+  double uptime = 0.0;  ///< s; less than before: another process of that name
+  double resident_mb = 0.0;
+};
+
 /// An obstacle as the chaser believed it to be at the end of the flight, for pictures.
 struct PerceivedObstacle {
   Eigen::Vector3d center = Eigen::Vector3d::Zero();
@@ -117,9 +124,11 @@ struct FlightRecord {
   std::vector<StateSample> states;  ///< one for every change; none: no mission process was there
   std::vector<StageFigures> stages;
   std::vector<PerceivedObstacle> obstacles;
-  LogInfo log;                             ///< what it was read from, and what is missing there
-  std::map<std::string, double> cpu_s;     ///< by process
-  std::optional<double> real_time_factor;  ///< logical over wall time
+  LogInfo log;                          ///< what it was read from, and what is missing there
+  std::map<std::string, double> cpu_s;  ///< by process
+  std::map<std::string, std::vector<MemorySample>> memory;      ///< by process
+  std::vector<std::pair<double, double>> sweep_to_setpoint_ms;  ///< of a sweep at t
+  std::optional<double> real_time_factor;                       ///< logical over wall time
 
   /// True while the mission lasts: 0 <= t <= duration_s, give or take a microsecond.
   bool InMission(double t) const { return t >= -1e-6 && t <= scenario.duration_s + 1e-6; }

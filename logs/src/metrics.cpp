@@ -98,6 +98,35 @@ void AddPlans(const FlightRecord& record, Metrics* m) {
   m->predict_ms = Stage(record, "prediction", "predict");
 }
 
+void AddSweepLatency(const FlightRecord& record, Metrics* m) {
+  std::vector<double> ms;
+  for (const auto& [t, latency] : record.sweep_to_setpoint_ms)
+    if (record.InMission(t)) ms.push_back(latency);
+  if (ms.empty()) return;
+  std::sort(ms.begin(), ms.end());
+  const auto at = [&](double share) {
+    return ms[static_cast<size_t>(share * static_cast<double>(ms.size() - 1))];
+  };
+  m->sweep_to_setpoint_ms = {*Mean(ms, [](double v) { return v; }), at(0.5), at(0.99), ms.back()};
+}
+
+/// By how much each process has come to exceed what it occupied when it was a minute old.
+void AddMemoryGrowth(const FlightRecord& record, Metrics* m) {
+  constexpr double kSettled = 60.0;  // s
+  for (const auto& [process, samples] : record.memory) {
+    Figure settled;
+    double uptime = 0.0;
+    for (const MemorySample& s : samples) {
+      if (s.uptime < uptime) settled.reset();
+      uptime = s.uptime;
+      if (uptime < kSettled) continue;
+      if (!settled) settled = s.resident_mb;
+      double& growth = m->memory_growth.emplace(process, 0.0).first->second;
+      growth = std::max(growth, s.resident_mb / *settled - 1.0);
+    }
+  }
+}
+
 void AddEstimates(const FlightRecord& record, Metrics* m) {
   const auto ate = OdometryError(record);
   m->odometry_ate_m = ate.raw;
@@ -147,6 +176,12 @@ void AddCriteria(const FlightRecord& record, Metrics* m) {
     m->criteria["distance_ratio_max"] = AtMost(m->distance_ratio, c.distance_ratio_max);
   if (c.real_time_factor >= 0.0 && m->real_time_factor)
     m->criteria["real_time_factor"] = AtLeast(m->real_time_factor, c.real_time_factor);
+  if (c.sweep_to_setpoint >= 0.0 && m->sweep_to_setpoint_ms)
+    m->criteria["sweep_to_setpoint"] = m->sweep_to_setpoint_ms->p99 <= 1e3 * c.sweep_to_setpoint;
+  if (c.memory_growth >= 0.0 && !m->memory_growth.empty())
+    m->criteria["memory_growth"] =
+        std::all_of(m->memory_growth.begin(), m->memory_growth.end(),
+                    [&](const auto& process) { return process.second <= c.memory_growth; });
   if (!c.flight_states.empty())
     m->criteria["flight_states"] = InOrder(c.flight_states, m->flight_states);
   if (c.touchdown_speed >= 0.0)
@@ -174,6 +209,8 @@ Metrics Compute(const FlightRecord& record, const std::vector<SampleScore>& scor
   AddRatios(record, scores, &m);
   AddMotion(MissionTruth(record), &m);
   AddPlans(record, &m);
+  AddSweepLatency(record, &m);
+  AddMemoryGrowth(record, &m);
   AddCertificates(record, scores, &m);
   AddEstimates(record, &m);
   AddLosses(record.log, &m);

@@ -39,13 +39,14 @@ struct Metrics {
   Figure safe_ratio, min_clearance_m, visible_ratio, in_image_ratio;
   Figure distance_ratio, distance_error, travel_ratio;
   Figure acceleration_cost, jerk_cost, yaw_rate_rms;
-  std::optional<TimeFigures> plan_ms, predict_ms;
+  std::optional<TimeFigures> plan_ms, predict_ms, sweep_to_setpoint_ms;
   long replans = 0, fallbacks = 0;
   Figure odometry_ate_m, odometry_ate_aligned_m, target_rmse_m, prediction_error_m;
   std::map<double, double> prediction_error_by_horizon_m;  ///< horizon in s
   Figure certified_clearance_m, certificate_kept_ratio, tube_exceeded_ratio, tracking_error_p99_m;
-  std::map<int, double> verdict_s;      ///< time under each of plan_t's verdicts
-  std::map<std::string, double> cpu_s;  ///< by process
+  std::map<int, double> verdict_s;              ///< time under each of plan_t's verdicts
+  std::map<std::string, double> cpu_s;          ///< by process
+  std::map<std::string, double> memory_growth;  ///< by process that ran longer than a minute
   Figure real_time_factor;
   std::string fault;                 ///< names of those that struck, joined by +
   double fault_time_s = -1.0;        ///< mission time of the first; -1: none

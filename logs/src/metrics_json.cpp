@@ -78,6 +78,7 @@ std::string MetricsJson(const FlightRecord& record, const Metrics& m) {
   j["yaw_rate_rms"] = Number(m.yaw_rate_rms);
   j["plan_ms"] = Times(m.plan_ms);
   j["predict_ms"] = Times(m.predict_ms);
+  j["sweep_to_setpoint_ms"] = Times(m.sweep_to_setpoint_ms);
   j["replans"] = m.replans;
   j["fallbacks"] = m.fallbacks;
   j["certified_clearance_m"] = Number(m.certified_clearance_m);
@@ -91,6 +92,7 @@ std::string MetricsJson(const FlightRecord& record, const Metrics& m) {
   j["prediction_error_m"] = Number(m.prediction_error_m);
   j["prediction_error_by_horizon_m"] = ByHorizon(m.prediction_error_by_horizon_m);
   j["cpu_s"] = Json(m.cpu_s);
+  j["memory_growth"] = Json(m.memory_growth);
   j["real_time_factor"] = Number(m.real_time_factor);
   j["lost_messages"] = Json(m.lost_messages);
   j["longest_gap_s"] = Json(m.longest_gap_s);

@@ -22,6 +22,7 @@
 #include "logs/src/good_message.h"
 #include "logs/src/landing_watch.h"
 #include "logs/src/log_survey.h"
+#include "logs/src/sweep_latency.h"
 
 namespace chase::logs {
 namespace {
@@ -48,11 +49,13 @@ class Gatherer {
     if (obstacles_t message; Good(e, "OBSTACLES", &message))
       heard_["OBSTACLES"].emplace_back(Heard(e), message.utime);
     AddSetpoint(e);
+    sweeps_.Add(Heard(e), e);
     TakeLast(e, "SCENARIO", &scenario_);
     TakeLast(e, "OBSTACLES", &obstacles_);
     status_t status;
     if (!Good(e, "_STATUS", &status)) return;
     statuses_[status.name] = status;
+    if (status.rss_mb > 0.0) memory_[status.name].push_back({status.uptime, status.rss_mb});
     if (status.name == "fcu") autopilot_.push_back(status);
   }
 
@@ -72,6 +75,9 @@ class Gatherer {
     AddPlans(&record);
     AddFaults(&record);
     AddStatuses(&record);
+    record.memory = memory_;
+    for (const auto& [sweep, latency] : sweeps_.samples())
+      record.sweep_to_setpoint_ms.emplace_back(Time(sweep), 1e-3 * static_cast<double>(latency));
     AddObstacles(&record);
     AddRealTimeFactor(&record);
     return record;
@@ -231,6 +237,8 @@ class Gatherer {
   std::optional<obstacles_t> obstacles_;
   std::map<std::string, status_t> statuses_;
   std::vector<status_t> autopilot_;  // of the bridge
+  std::map<std::string, std::vector<MemorySample>> memory_;
+  SweepLatency sweeps_;
 };
 
 }  // namespace

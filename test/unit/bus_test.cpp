@@ -1,10 +1,12 @@
 #include "common/bus/bus.h"
 
 #include <gtest/gtest.h>
+#include <sys/mman.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include <cstdio>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -68,6 +70,27 @@ TEST(Status, ALiveVersionTellsHostAndConfiguration) {
   ASSERT_EQ(gethostname(host, sizeof host), 0);
   const std::string version = LiveVersion("123456789");
   EXPECT_EQ(version, config::Version() + ", host " + host + ", configuration 930766865");
+}
+
+TEST(Status, ResidentMemoryIsThatOfNow) {
+  Lockstep lockstep(1000000);
+  double before = 0.0, with = 0.0, after = 0.0;
+  lockstep.Add("source", 0, [&](Bus& bus) {
+    auto node = std::make_unique<Source>(bus);
+    StatusReporter reporter("source");
+    const auto resident = [&] { return reporter.Make(bus, *node, 1000000, true).rss_mb; };
+    before = resident();
+    constexpr size_t kSize = 64 << 20;
+    void* block = mmap(nullptr, kSize, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+    std::memset(block, 1, kSize);
+    with = resident();
+    munmap(block, kSize);
+    after = resident();
+    return node;
+  });
+  EXPECT_GT(before, 1.0);
+  EXPECT_NEAR(with - before, 64.0, 4.0);
+  EXPECT_NEAR(after - before, 0.0, 4.0) << "not the peak";
 }
 
 TEST(Lockstep, DeliversAfterEachProcessLatency) {

@@ -13,7 +13,8 @@ chase_test(logs_identify_test
           ${CMAKE_CURRENT_LIST_DIR}/logs_regression_test.cpp)
 chase_test(logs_metrics_test
   LIBS metrics nlohmann_json::nlohmann_json
-  SOURCES ${CMAKE_CURRENT_LIST_DIR}/logs_metrics_test.cpp ${CMAKE_CURRENT_LIST_DIR}/logs_faults_test.cpp)
+  SOURCES ${CMAKE_CURRENT_LIST_DIR}/logs_metrics_test.cpp ${CMAKE_CURRENT_LIST_DIR}/logs_faults_test.cpp
+          ${CMAKE_CURRENT_LIST_DIR}/logs_latency_test.cpp)
 chase_test(logs_report_test
   LIBS report
   SOURCES ${CMAKE_CURRENT_LIST_DIR}/logs_report_test.cpp ${CMAKE_CURRENT_LIST_DIR}/logs_moments_test.cpp)

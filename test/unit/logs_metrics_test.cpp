@@ -318,9 +318,43 @@ TEST(Metrics, PlansAndStagesAreCounted) {
   EXPECT_FALSE(m.predict_ms);
 }
 
+TEST(Metrics, SweepsOfTheMissionAreTimedToTheirSetpoint) {
+  FlightRecord record = Standing({3, 0, 1.5}, {5.5, 0, 1.5});
+  EXPECT_FALSE(Compute(record).sweep_to_setpoint_ms);
+  record.scenario.criteria.sweep_to_setpoint = 0.12;
+  EXPECT_TRUE(Compute(record).Passed()) << "a log without sweeps";
+  record.sweep_to_setpoint_ms = {{-0.5, 900.0}};
+  for (int i = 0; i < 100; ++i) record.sweep_to_setpoint_ms.push_back({0.1 * i, 50.0 + 0.5 * i});
+  const Metrics m = Compute(record);
+  EXPECT_NEAR(m.sweep_to_setpoint_ms->p50, 74.5, 1e-9);
+  EXPECT_NEAR(m.sweep_to_setpoint_ms->p99, 99.0, 1e-9);
+  EXPECT_NEAR(m.sweep_to_setpoint_ms->max, 99.5, 1e-9);
+  EXPECT_TRUE(m.criteria.at("sweep_to_setpoint"));
+  for (auto& [t, ms] : record.sweep_to_setpoint_ms) ms += 30.0;
+  EXPECT_FALSE(Compute(record).criteria.at("sweep_to_setpoint"));
+}
+
+TEST(Metrics, MemoryIsComparedWithThatOfAProcessAMinuteOld) {
+  FlightRecord record = Standing({3, 0, 1.5}, {5.5, 0, 1.5});
+  record.scenario.criteria.memory_growth = 0.05;
+  record.memory["mapping"] = {
+      {1.0, 50.0}, {59.0, 90.0}, {60.5, 100.0}, {70.0, 104.0}, {80.0, 102.0}};
+  record.memory["planning"] = {{1.0, 50.0}, {59.0, 90.0}};
+  Metrics m = Compute(record);
+  EXPECT_EQ(m.memory_growth.count("planning"), 0u) << "younger than a minute";
+  EXPECT_NEAR(m.memory_growth.at("mapping"), 0.04, 1e-9);
+  EXPECT_TRUE(m.criteria.at("memory_growth"));
+  record.memory["mapping"].insert(record.memory["mapping"].end(),
+                                  {{1.0, 70.0}, {61.0, 150.0}, {62.0, 156.0}});
+  m = Compute(record);
+  EXPECT_NEAR(m.memory_growth.at("mapping"), 0.04, 1e-9) << "another process";
+  record.memory["mapping"].push_back({63.0, 159.0});
+  EXPECT_FALSE(Compute(record).criteria.at("memory_growth"));
+}
+
 TEST(Metrics, CriteriaFollowTheScenario) {
   FlightRecord record = Standing({3, 0, 1.5}, {5.5, 0, 1.5});
-  record.scenario.criteria = {1.0, 0.95, 0.9, 1.2, 0.95, {}, -1.0, -1.0};
+  record.scenario.criteria = {1.0, 0.95, 0.9, 1.2, 0.95, {}, -1.0, -1.0, -1.0, -1.0};
   record.real_time_factor = 0.99;
   Metrics m = Compute(record);
   EXPECT_TRUE(m.Passed());
