@@ -40,8 +40,9 @@ struct Outputs {
                               p.verdict == plan_t::MITIGATE);
     for (const TrackingSample& s : record.tracking) stops.Add(s.t, s.following != tracking_t::PLAN);
     for (const StateSample& s : record.states) leaves.Add(s.t, s.state != flight_state_t::CHASE);
+    for (const AutopilotSample& s : record.autopilot) lands.Add(s.t, s.lands);
   }
-  Steps brakes, stops, leaves;
+  Steps brakes, stops, leaves, lands;
 };
 
 /// A time in which an input is too old.
@@ -95,7 +96,10 @@ std::vector<WatchedInput> WatchedInputs(const FlightRecord& record, const Output
   std::vector<WatchedInput> watches = {
       {"OBSTACLES", OverduesOf(record, "OBSTACLES", age.obstacles, end), {&out.brakes, &out.stops}},
       {"POSE", OverduesOf(record, "POSE", age.pose, end), {&out.stops}},
-      {"PLAN", OverduePlans(record, end), {&out.stops}}};
+      {"PLAN", OverduePlans(record, end), {&out.stops}},
+      {"ATTITUDE_SETPOINT",
+       OverduesOf(record, "ATTITUDE_SETPOINT", age.setpoint, end),
+       {&out.lands}}};
   if (record.states.empty()) return watches;  // nobody leads the flight
   watches.push_back({"TARGET", OverduesOf(record, "TARGET", age.target, end), {&out.leaves}});
   watches.push_back({"FLIGHT_STATE",

@@ -52,6 +52,12 @@ struct TrackingSample {
   int32_t plan_seq = -1;  ///< of the plan that is followed
 };
 
+/// Does the autopilot come down by itself from then on, as FCU_STATUS says?
+struct AutopilotSample {
+  double t = 0.0;
+  bool lands = false;
+};
+
 struct PoseSample {
   double t = 0.0;
   Eigen::Vector3d p = Eigen::Vector3d::Zero();  ///< p_WB as estimated
@@ -120,6 +126,7 @@ struct FlightRecord {
   std::map<std::string, std::vector<HeardSample>>
       heard;  ///< by channel, of those with an age limit
   std::vector<TrackingSample> tracking;
+  std::vector<AutopilotSample> autopilot;
   long nonfinite_setpoints = 0;     ///< ATTITUDE_SETPOINTs that hold a number which is none
   std::vector<StateSample> states;  ///< one for every change; none: no mission process was there
   std::vector<StageFigures> stages;

@@ -5,8 +5,12 @@
 namespace chase::logs {
 
 // The words of the bridge, and of the simulator in its stead.
+bool LandingWatch::Lands(const status_t& message) {
+  return message.detail.rfind("landing", 0) == 0;
+}
+
 void LandingWatch::Hear(const status_t& message) {
-  if (message.name == "fcu") autopilot_ = message.detail.rfind("landing", 0) == 0;
+  if (message.name == "fcu") autopilot_ = Lands(message);
 }
 
 bool LandingWatch::MayStand(const TruthSample& sample, const world::GroundSpec& ground) {

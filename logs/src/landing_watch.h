@@ -16,6 +16,8 @@ class LandingWatch {
   void Hear(const flight_state_t& message) { state_ = message.state; }
   void Hear(const tracking_t& message) { control_ = message.following == tracking_t::LAND; }
   void Hear(const status_t& message);
+  /// Does FCU_STATUS say that the autopilot comes down by itself?
+  static bool Lands(const status_t& message);
 
   /// May the body touch the ground at that sample? They come in the order of time.
   bool MayStand(const TruthSample& sample, const world::GroundSpec& ground);

@@ -111,6 +111,7 @@ class Gatherer {
     attitude_setpoint_t m;
     if (!IsOn(e, "ATTITUDE_SETPOINT") || !DecodeBytes(e.bytes, &m)) return;
     const auto finite = [](double v) { return std::isfinite(v); };
+    if (bus::Problem(m).empty()) heard_["ATTITUDE_SETPOINT"].emplace_back(Heard(e), m.utime);
     nonfinite_setpoints_ += !std::all_of(m.orientation, m.orientation + 4, finite) ||
                             !std::all_of(m.body_rate, m.body_rate + 3, finite) || !finite(m.thrust);
   }
@@ -130,6 +131,8 @@ class Gatherer {
     for (size_t i = 0; i < tracking_.size(); ++i)
       record->tracking.push_back(
           {Time(tracking_heard_[i]), tracking_[i].following, tracking_[i].plan_seq});
+    for (const status_t& m : autopilot_)
+      record->autopilot.push_back({Time(m.utime), LandingWatch::Lands(m)});
     record->nonfinite_setpoints = nonfinite_setpoints_;
   }
 

@@ -128,6 +128,18 @@ TEST(Faults, AnInputThatIsLateAllAlongIsOverdueOnce) {
   EXPECT_NEAR(f.reaction_s.value(), 4.52 - 4.1, 1e-9);
 }
 
+TEST(Faults, SilentSetpointsAreTheAutopilots) {
+  Flown flown;
+  for (int k = 0; k <= 2000; ++k) flown.Hear("ATTITUDE_SETPOINT", 0.005 * k, 0.001);
+  flown.Silence("ATTITUDE_SETPOINT", 4.001, 5.999);
+  FaultFigures f = flown.Figures("freeze-control", 4.0, 6.0);
+  EXPECT_EQ(f.input, "ATTITUDE_SETPOINT");
+  EXPECT_NEAR(f.reaction_s.value(), 6.0 - (3.999 + world::kMostAge.setpoint), 1e-9);
+  flown.record.autopilot = {{1.0, false}, {4.505, true}, {6.0, false}};
+  f = flown.Figures("freeze-control", 4.0, 6.0);
+  EXPECT_NEAR(f.reaction_s.value(), 4.505 - (3.999 + world::kMostAge.setpoint), 1e-9);
+}
+
 TEST(Faults, PosesAndPlansAreControls) {
   Flown flown;
   flown.Silence("POSE", 5.001, 5.999);
