@@ -34,6 +34,14 @@ bool LooksOn(const std::string& name) {
   return name == "mission" || name == "viewer" || name == "link";
 }
 
+/// In the air the charge that was heard last counts: whoever told it may have died.
+std::string BatteryProblem(const MissionConfig& config, const Inputs& inputs, double t) {
+  if (!inputs.battery || t - inputs.battery_heard > world::kMostAge.status)
+    return "the battery's charge is not known: FCU_STATUS does not tell it";
+  return *inputs.battery <= config.battery_low ? "the battery is low: " + Percent(*inputs.battery)
+                                               : "";
+}
+
 std::string ProcessProblem(const std::string& name, const Inputs& inputs, double t) {
   const auto found = inputs.processes.find(name);
   const bool heard = found != inputs.processes.end();
@@ -65,8 +73,7 @@ std::vector<std::string> Missing(const MissionConfig& config, const Inputs& inpu
   note(Absence("OBSTACLES", inputs.obstacles, world::kMostAge.obstacles, t));
   note(Absence("TARGET", inputs.target, world::kMostAge.target, t));
   if (inputs.blocked) note("the way up is not free: something is above the take-off place");
-  if (inputs.battery && *inputs.battery <= config.battery_low)
-    note("the battery is low: " + Percent(*inputs.battery));
+  if (config.battery_low > 0.0) note(BatteryProblem(config, inputs, t));
   for (const std::string& name : config.needs) note(ProcessProblem(name, inputs, t));
   for (const auto& [name, report] : inputs.processes)
     if (std::find(config.needs.begin(), config.needs.end(), name) == config.needs.end() &&

@@ -116,8 +116,10 @@ void MissionNode::OnStatus(const status_t& message) {
   report.start = message.sender_start;
   mission_.inputs().Heard(message.name, report);
   autopilot_.Hear(message);
-  if (const std::optional<double> battery = bus::BatteryIn(message))
+  if (const std::optional<double> battery = bus::BatteryIn(message)) {
     mission_.inputs().battery = battery;
+    mission_.inputs().battery_heard = report.t;
+  }
 }
 
 void MissionNode::Tick(int64_t /*utime*/) {

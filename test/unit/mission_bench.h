@@ -17,6 +17,7 @@ class Bench {
   explicit Bench(const MissionConfig& config = {}, double start = 0.0) : mission(config, start) {
     pose.usable = pose.healthy = true;
     pose.epoch = 3;
+    mission.inputs().battery = 1.0;
   }
 
   void Run(double seconds) {
@@ -43,6 +44,7 @@ class Bench {
   Mission mission;
   PoseReport pose;
   bool hears_pose = true, hears_obstacles = true, hears_target = true, tracked = true;
+  bool hears_battery = true;
   std::map<std::string, bool> failed = {
       {"prediction", false}, {"planning", false}, {"control", false}};
   double t = 10.0;
@@ -56,6 +58,7 @@ class Bench {
     if (hears_obstacles) in.obstacles = t;
     if (hears_target) in.target = t;
     in.target_tracked = tracked;
+    if (hears_battery) in.battery_heard = t;
     for (const auto& [name, has_failed] : failed) {
       ProcessReport report;
       report.t = t;

@@ -273,6 +273,25 @@ TEST(Envelope, ALowBatteryRefusesWhatLeadsAway) {
   EXPECT_TRUE(bench.Command(Event::kLand).accepted);
 }
 
+TEST(Envelope, IsNotReadyWithABatteryThatNobodyTellsOf) {
+  for (const bool never : {true, false}) {
+    Bench bench;
+    if (never) bench.mission.inputs().battery.reset();
+    bench.Run(0.2);
+    bench.hears_battery = false;
+    bench.Run(10.0);
+    EXPECT_EQ(bench.mission.state(), State::kIdle);
+    EXPECT_NE(bench.Command(Event::kTakeoff).reason.find("the battery's charge is not known"),
+              std::string::npos);
+  }
+  MissionConfig config;
+  config.battery_low = config.battery_critical = 0.0;  // a vehicle that cannot tell
+  Bench bench(config);
+  bench.mission.inputs().battery.reset();
+  bench.Run(0.2);
+  EXPECT_TRUE(bench.Command(Event::kTakeoff).accepted);
+}
+
 TEST(Envelope, IsNotReadyWithALowBatteryOrABlockedWayUp) {
   Bench bench;
   bench.mission.inputs().battery = 0.2;

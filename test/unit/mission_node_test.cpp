@@ -27,7 +27,9 @@ class Silent : public bus::Node {};
 /// The node on an in-memory bus among stand-ins.
 class Bench {
  public:
-  explicit Bench(const MissionConfig& config = {}) {
+  /// `battery`: does the mission want to be told of one?
+  explicit Bench(MissionConfig config = {}, bool battery = false) {
+    if (!battery) config.battery_low = config.battery_critical = 0.0;
     for (const char* name : {"prediction", "planning", "control"})
       lockstep_.Add(name, 0, [](bus::Bus&) { return std::make_unique<Silent>(); });
     lockstep_.Add("mission", 0,
@@ -247,6 +249,26 @@ TEST(MissionNode, ATakeOffThatTheAutopilotRefusesEndsOnTheGroundInItsWords) {
   bench.Run(1.0);
   EXPECT_EQ(bench.states.back().state, +flight_state_t::READY);
   EXPECT_EQ(bench.states.back().reason, "take-off called off; fcu: refused: arming was refused");
+}
+
+TEST(MissionNode, IsReadyOnceABatteryIsToldOf) {
+  struct Bridge : bus::Node {
+    explicit Bridge(const char* said) : detail(said) {}
+    bus::NodeReport Report() const override { return {bus::NodeReport::State::kOk, detail}; }
+    const char* detail;
+  };
+  for (const char* words : {"standby: ready; battery 80 %", "standby: ready", ""}) {
+    Bench bench({}, true);
+    if (*words != '\0')
+      bench.lockstep_.Add("fcu", 0, [words](bus::Bus&) { return std::make_unique<Bridge>(words); });
+    bench.Run(2.0);
+    const bool told = std::string(words).find("battery") != std::string::npos;
+    EXPECT_EQ(bench.states.back().state, told ? +flight_state_t::READY : +flight_state_t::IDLE);
+    if (!told) {
+      EXPECT_EQ(bench.states.back().missing.at(0),
+                "the battery's charge is not known: FCU_STATUS does not tell it");
+    }
+  }
 }
 
 TEST(MissionNode, HealthCountsTheLivesOfEveryProcess) {
