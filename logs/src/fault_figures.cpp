@@ -7,6 +7,7 @@
 #include "chase/plan_t.hpp"
 #include "chase/tracking_t.hpp"
 #include "common/world/ages.h"
+#include "logs/src/flown_plans.h"
 
 namespace chase::logs {
 namespace {
@@ -119,13 +120,6 @@ void AddReaction(const std::vector<WatchedInput>& watches, FaultFigures* fault) 
       fault->reaction_s = until - o.from;
       fault->input = watch.input;
     }
-}
-
-/// The newest plan of this number that was heard by t.
-const PlanSample* Followed(const FlightRecord& record, const TrackingSample& tracking) {
-  for (auto plan = record.plans.rbegin(); plan != record.plans.rend(); ++plan)
-    if (plan->heard <= tracking.t && plan->seq == tracking.plan_seq) return &*plan;
-  return nullptr;
 }
 
 bool FliesOn(const FlightRecord& record, const TrackingSample& tracking) {

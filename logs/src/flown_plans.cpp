@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "chase/tracking_t.hpp"
 #include "logs/src/landing_figures.h"
 
 namespace chase::logs {
@@ -23,14 +24,42 @@ const char* VerdictName(int verdict) {
   return kNames[verdict];
 }
 
+const PlanSample* Followed(const FlightRecord& record, const TrackingSample& tracking) {
+  for (auto plan = record.plans.rbegin(); plan != record.plans.rend(); ++plan)
+    if (plan->heard <= tracking.t && plan->seq == tracking.plan_seq) return &*plan;
+  return nullptr;
+}
+
+FlownPlans::FlownPlans(const FlightRecord& record) {
+  const auto names = [](const TrackingSample& s) { return s.plan_seq >= 0; };
+  if (std::none_of(record.tracking.begin(), record.tracking.end(), names)) {
+    for (const PlanSample& plan : record.plans)
+      steps_.push_back({plan.t, ComesDown(record, plan.t) ? nullptr : &plan});
+    for (const StateSample& s : record.states)
+      if (ComesDown(record, s.t)) steps_.push_back({s.t, nullptr});
+    std::stable_sort(steps_.begin(), steps_.end(),
+                     [](const Step& a, const Step& b) { return a.t < b.t; });
+    return;
+  }
+  double before = -HUGE_VAL;
+  for (const TrackingSample& s : record.tracking) {
+    const bool follows = s.following == tracking_t::PLAN || s.following == tracking_t::STOP;
+    const PlanSample* plan = follows ? Followed(record, s) : nullptr;
+    const bool took_over = plan && !steps_.empty() && steps_.back().plan;
+    const double from = took_over ? std::clamp(plan->t, before, s.t) : s.t;
+    if (steps_.empty() || steps_.back().plan != plan) steps_.push_back({from, plan});
+    before = s.t;
+  }
+}
+
 void AddCertificates(const FlightRecord& record, const std::vector<SampleScore>& scores,
                      Metrics* m) {
   FlownPlans flown(record), followed(record);
   long kept = 0, asked = 0;
   for (size_t i = 0; i < scores.size(); ++i) {
-    if (ComesDown(record, scores[i].t)) continue;
-    ++asked;
     const PlanSample* plan = flown.At(scores[i].t);
+    if (!plan && ComesDown(record, scores[i].t)) continue;
+    ++asked;
     if (!plan) continue;
     const double step = i + 1 < scores.size() ? scores[i + 1].t - scores[i].t : 0.0;
     m->verdict_s[plan->verdict] += step;
@@ -42,11 +71,10 @@ void AddCertificates(const FlightRecord& record, const std::vector<SampleScore>&
   if (asked > 0) m->certificate_kept_ratio = static_cast<double>(kept) / static_cast<double>(asked);
   std::vector<double> errors;
   long exceeded = 0;
-  for (const PoseSample& pose : record.poses) {
-    if (!record.InMission(pose.t) || ComesDown(record, pose.t)) continue;
-    const PlanSample* plan = followed.At(pose.t);
+  for (const TruthSample& s : record.truth) {
+    const PlanSample* plan = record.InMission(s.t) ? followed.At(s.t) : nullptr;
     if (!plan) continue;
-    errors.push_back((pose.p - Wanted(*plan, pose.t)).norm());
+    errors.push_back((s.p - Wanted(*plan, s.t)).norm());
     exceeded += errors.back() > plan->hard_radius - record.scenario.chaser.radius;
   }
   if (errors.empty()) return;

@@ -7,19 +7,28 @@ namespace chase::logs {
 /// Of one of plan_t's verdicts.
 const char* VerdictName(int verdict);
 
-/// Walks along with time through the plans as they take over.
+/// Of that number, the newest that was heard by then; null: none.
+const PlanSample* Followed(const FlightRecord& record, const TrackingSample& tracking);
+
+/// Walks along with time through the plans that control followed: TRACKING names them, and each is
+/// followed from its start. Of a log whose TRACKING names none, through all plans from their
+/// starts until the vehicle comes down.
 class FlownPlans {
  public:
-  explicit FlownPlans(const FlightRecord& record) : plans_(record.plans) {}
+  explicit FlownPlans(const FlightRecord& record);
 
-  /// The newest plan that has begun by t [s], null before the first; times must not go back.
+  /// The plan that is flown at t [s], its stop included; null: none; times must not go back.
   const PlanSample* At(double t) {
-    while (next_ < plans_.size() && plans_[next_].t <= t) ++next_;
-    return next_ > 0 ? &plans_[next_ - 1] : nullptr;
+    while (next_ < steps_.size() && steps_[next_].t <= t) ++next_;
+    return next_ > 0 ? steps_[next_ - 1].plan : nullptr;
   }
 
  private:
-  const std::vector<PlanSample>& plans_;
+  struct Step {
+    double t;
+    const PlanSample* plan;  // from then on
+  };
+  std::vector<Step> steps_;
   size_t next_ = 0;
 };
 

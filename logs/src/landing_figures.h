@@ -11,7 +11,7 @@ std::string StateName(int state);
 /// body is as low as it stands in the end, give or take 2 cm of springy legs.
 void AddLanding(const FlightRecord& record, Metrics* metrics);
 
-/// Does the body come down at t, or stand there again: beside the plan, which hovers?
+/// Is the flight in LAND or DONE at t?
 bool ComesDown(const FlightRecord& record, double t);
 
 /// Were these states there in this order, whatever was between them?

@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "logs/src/flown_plans.h"
-#include "logs/src/landing_figures.h"
 
 namespace chase::logs {
 namespace {
@@ -128,7 +127,7 @@ void AddCertified(const FlightRecord& record, const std::vector<SampleScore>& sc
   FlownPlans flown(record);
   for (const SampleScore& s : scores) {
     const PlanSample* plan = flown.At(s.t);
-    const bool certifies = plan && plan->certified_clearance >= 0.0 && !ComesDown(record, s.t);
+    const bool certifies = plan && plan->certified_clearance >= 0.0;
     if (certifies && score.Pass(s.t)) Add(s.t, plan->certified_clearance, &data->certified);
   }
 }

@@ -72,7 +72,6 @@ FlightRecord Landing(double speed) {
   hover.hard_radius = 0.37;
   hover.position = world::Trajectory::Constant({5, 0, 1.5}, -1.0, 2.0);
   record.plans = {hover};
-  record.poses = {{1.0, {5, 0, 1.5}}, {6.0, {5, 0, 0.12}}};
   record.scenario.criteria.flight_states = {"CHASE", "LAND", "DONE"};
   record.scenario.criteria.touchdown_speed = 0.5;
   record.scenario.criteria.motors_off = 1.0;
@@ -98,6 +97,55 @@ TEST(Metrics, ALandingIsJudgedByItsSpeedAndTheGroundIsNoHarm) {
   EXPECT_FALSE(Compute(other).criteria.at("flight_states")) << "not in that order";
   other.states.pop_back();
   EXPECT_FALSE(Compute(other).criteria.at("touchdown_speed")) << "it never was down";
+}
+
+/// A plan that hovers at x from t on, heard half a second before.
+PlanSample Hover(int32_t seq, double t, double x, double clearance) {
+  PlanSample plan;
+  plan.seq = seq;
+  plan.t = t, plan.heard = t - 0.5;
+  plan.certified_clearance = clearance;
+  plan.hard_radius = 0.37;
+  plan.position = world::Trajectory::Constant({x, 0, 1.5}, t, 20.0);
+  return plan;
+}
+
+TEST(Metrics, OnlyPlansThatControlFollowsAreFlown) {
+  FlightRecord record = Standing({5, 0, 1.5}, {8, 0, 0.5});
+  record.plans = {Hover(0, -2.0, 5.0, 1.0), Hover(1, 1.0, 9.0, 99.0), Hover(2, 5.02, 5.5, 1.0)};
+  for (int k = -20; k <= 200; ++k)  // 1 is refused, 2 takes over between two messages
+    record.tracking.push_back({0.05 * k, tracking_t::PLAN, 0.05 * k < 5.02 ? 0 : 2});
+  Metrics m = Compute(record);
+  EXPECT_EQ(*m.certificate_kept_ratio, 1.0);
+  EXPECT_EQ(*m.certified_clearance_m, 1.0);
+  EXPECT_NEAR(*m.tube_exceeded_ratio, 499.0 / 1001.0, 1e-9);
+  EXPECT_NEAR(*m.tracking_error_p99_m, 0.5, 1e-9);
+  for (TrackingSample& s : record.tracking)
+    if (s.t > 7.0) s.following = tracking_t::BRAKE;
+  m = Compute(record);
+  EXPECT_NEAR(*m.certificate_kept_ratio, 0.7, 0.01) << "without a certificate";
+  EXPECT_NEAR(*m.tube_exceeded_ratio, 2.0 / 7.0, 0.01) << "of the time under a plan";
+  for (TrackingSample& s : record.tracking) s.plan_seq = -1;
+  EXPECT_EQ(*Compute(record).certified_clearance_m, 1.0);
+  EXPECT_NEAR(*Compute(record).certificate_kept_ratio, 1.0 - 4.02 / 10.0, 0.01)
+      << "an older log tells of all plans only";
+}
+
+TEST(Metrics, AWayDownByAPlanIsHeldAgainstIt) {
+  FlightRecord record = Standing({5, 0, 1.5}, {8, 0, 0.5});
+  record.plans = {Hover(0, -2.0, 5.0, 99.0)};
+  record.states = {{-1.0, 3}, {4.0, 7}};  // CHASE, LAND
+  for (int k = -20; k <= 200; ++k)
+    record.tracking.push_back({0.05 * k, k < 120 ? tracking_t::PLAN : tracking_t::LAND, 0});
+  for (TruthSample& s : record.truth)
+    if (s.t >= 6.0) s.p.z() = 0.12;
+  const Metrics m = Compute(record);
+  EXPECT_EQ(*m.certificate_kept_ratio, 0.0);
+  EXPECT_EQ(*m.tube_exceeded_ratio, 0.0) << "nobody flies the plan any more";
+  EXPECT_NEAR(m.verdict_s.at(0), 6.0, 0.02);
+  record.states.pop_back();
+  record.plans[0].certified_clearance = 0.1;
+  EXPECT_NEAR(*Compute(record).certificate_kept_ratio, 0.6, 0.01) << "nobody asked it to land";
 }
 
 void Tell(int8_t state, bool control, bool autopilot, LandingWatch* watch) {
