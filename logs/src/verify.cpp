@@ -4,56 +4,79 @@
 
 #include <algorithm>
 #include <deque>
+#include <map>
 #include <stdexcept>
 
-#include "common/bus/convert.h"
 #include "common/bus/plan_message.h"
 #include "common/logs/log_reader.h"
 #include "common/logs/message_types.h"
+#include "logs/src/proof_check.h"
 
 namespace chase::logs {
 namespace {
 
-constexpr size_t kLists = 100;  // 10 s: plans name none older than 0.3 s
+constexpr size_t kKept = 100;  // 10 s of OBSTACLES, and of PREDICTION at least
+
+/// The newest messages of a channel.
+template <class T>
+class Heard {
+ public:
+  void Take(const T& m) {
+    if (kept_.size() == kKept) kept_.pop_front();
+    kept_.push_back(m);
+  }
+  /// The one that the plan was made from; null: it is not in the log.
+  const T* Of(const plan_t& plan, const std::string& channel) const {
+    const int32_t seq = bus::InputOf(plan, channel);
+    const auto at = std::find_if(kept_.rbegin(), kept_.rend(),
+                                 [&](const T& m) { return m.seq == seq && m.epoch == plan.epoch; });
+    return at == kept_.rend() ? nullptr : &*at;
+  }
+
+ private:
+  std::deque<T> kept_;
+};
 
 class Verifier {
  public:
-  void Take(const obstacles_t& m) {
-    if (lists_.size() == kLists) lists_.pop_front();
-    lists_.push_back(m);
-  }
+  void Take(const obstacles_t& m) { lists_.Take(m); }
+  void Take(const prediction_t& m) { forecasts_.Take(m); }
   void Take(const plan_t& m) {
     ++result_.plans;
-    if (m.certified_clearance < 0.0) return;
-    const bool first = result_.certified++ == 0;
-    result_.hard_radius = first ? m.hard_radius : std::min(result_.hard_radius, m.hard_radius);
-    result_.sigmas = first ? m.sigmas : std::min(result_.sigmas, m.sigmas);
-    result_.proofs += m.n_proofs + m.n_stop_proofs;
-    const obstacles_t* list = ListOf(m);
-    if (!list) {
-      ++result_.unheard;
-      return;
+    Grounds grounds;
+    const bool certified = m.certified_clearance >= 0.0;
+    if (certified) {
+      AddClaim(m);
+      grounds = GroundsOf(m);
+      if (!grounds.list) return void(++result_.unheard);
     }
-    std::vector<world::Obstacle> obstacles;
-    for (const obstacle_t& o : list->obstacles) obstacles.push_back(bus::FromMessage(o, m.utime));
-    const std::string bad = world::Refute(bus::ClaimOf(m, m.utime), {0.0, 0.0, true}, obstacles);
-    if (bad.empty())
-      ++result_.proven;
+    const Examination found = Examine(m, grounds);
+    result_.unverified += found.unverified;
+    if (!found.fault.empty())
+      result_.refuted.push_back(fmt::format("plan {}: {}", m.seq, found.fault));
     else
-      result_.refuted.push_back(fmt::format("plan {}: {}", m.seq, bad));
+      result_.proven += certified;
   }
   const Verification& result() const { return result_; }
 
  private:
-  const obstacles_t* ListOf(const plan_t& m) const {
-    const int32_t seq = bus::InputOf(m, "OBSTACLES");
-    const auto at = std::find_if(lists_.rbegin(), lists_.rend(), [&](const obstacles_t& list) {
-      return list.seq == seq && list.epoch == m.epoch;
-    });
-    return at == lists_.rend() ? nullptr : &*at;
+  void AddClaim(const plan_t& m) {
+    const bool first = result_.certified++ == 0;
+    result_.hard_radius = first ? m.hard_radius : std::min(result_.hard_radius, m.hard_radius);
+    result_.sigmas = first ? m.sigmas : std::min(result_.sigmas, m.sigmas);
+    result_.proofs += m.n_proofs + m.n_stop_proofs;
   }
 
-  std::deque<obstacles_t> lists_;
+  /// A process is configured once: what its first plan claims, the others have to.
+  Grounds GroundsOf(const plan_t& m) {
+    const auto claim = claims_.emplace(m.sender_start, std::pair(m.hard_radius, m.sigmas)).first;
+    return {lists_.Of(m, "OBSTACLES"), forecasts_.Of(m, "PREDICTION"), claim->second.first,
+            claim->second.second};
+  }
+
+  Heard<obstacles_t> lists_;
+  Heard<prediction_t> forecasts_;
+  std::map<int64_t, std::pair<double, double>> claims_;  // by sender_start: hard radius, sigmas
   Verification result_;
 };
 
@@ -65,9 +88,12 @@ Verification Verify(const std::string& file) {
   LogEvent event;
   plan_t plan;
   obstacles_t obstacles;
+  prediction_t forecast;
   while (log.Next(&event)) {
     if (event.channel == "OBSTACLES" && DecodeBytes(event.bytes, &obstacles))
       verifier.Take(obstacles);
+    if (event.channel == "PREDICTION" && DecodeBytes(event.bytes, &forecast))
+      verifier.Take(forecast);
     if (event.channel == "PLAN" && DecodeBytes(event.bytes, &plan)) verifier.Take(plan);
   }
   if (verifier.result().plans == 0)
@@ -80,9 +106,10 @@ std::string Format(const Verification& v) {
   std::string text = fmt::format(
       "{} plans, {} of them certified: {} proven, {} refuted, {} whose OBSTACLES are not in the "
       "log\n"
-      "{} proofs; radius {:.3f} m and {:.1f} deviations at least\n",
-      v.plans, v.certified, v.proven, v.refuted.size(), v.unheard, v.proofs, v.hard_radius,
-      v.sigmas);
+      "{} proofs, {} of them not verified: the log lacks what they are about; radius {:.3f} m and "
+      "{:.1f} deviations at least\n",
+      v.plans, v.certified, v.proven, v.refuted.size(), v.unheard, v.proofs, v.unverified,
+      v.hard_radius, v.sigmas);
   for (const std::string& line : v.refuted) text += line + "\n";
   return text;
 }

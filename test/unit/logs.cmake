@@ -19,6 +19,11 @@ chase_test(logs_report_test
   LIBS report
   SOURCES ${CMAKE_CURRENT_LIST_DIR}/logs_report_test.cpp ${CMAKE_CURRENT_LIST_DIR}/logs_moments_test.cpp)
 
+if(TARGET planning_core)
+  chase_test(logs_verify_test LIBS log_tools planning_core
+    SOURCES ${CMAKE_CURRENT_LIST_DIR}/logs_verify_test.cpp)
+endif()
+
 # Every message's name and the fingerprint that lcm-gen gave it.
 get_directory_property(types DIRECTORY ${CMAKE_SOURCE_DIR}/lcmtypes DEFINITION types)
 set(includes "")
