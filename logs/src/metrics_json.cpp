@@ -1,6 +1,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "chase/plan_t.hpp"
 #include "logs/src/flown_plans.h"
 #include "logs/src/metrics.h"
 #include "logs/src/output.h"
@@ -42,7 +43,7 @@ Json Faults(const std::vector<FaultFigures>& faults) {
 
 Json Verdicts(const std::map<int, double>& seconds) {
   Json out = Json::object();
-  for (int v = 0; v < 7; ++v) {
+  for (int v = 0; v <= plan_t::MITIGATE; ++v) {
     const auto found = seconds.find(v);
     out[VerdictName(v)] = found == seconds.end() ? 0.0 : found->second;
   }
