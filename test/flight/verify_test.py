@@ -13,7 +13,7 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "replay"))
 import lcmlog
 
 BIN, FLIGHT = sys.argv[1:]
-SEQ = slice(16, 20)
+HEAD = 20  # bytes: fingerprint, utime, seq
 
 
 def verify(log):
@@ -25,12 +25,12 @@ def verify(log):
 
 
 def exchanged(events):
-    """Every list of obstacles says what the one before the last second's said, under its own number."""
+    """Every list says what the one of a second before said, under its own time and number."""
     lists = [data for _, channel, data in events if channel == "OBSTACLES"]
     number = 0
     for utime, channel, data in events:
         if channel == "OBSTACLES":
-            data, number = lists[number - 10][:16] + data[SEQ] + lists[number - 10][20:], number + 1
+            data, number = data[:HEAD] + lists[number - 10][HEAD:], number + 1
         yield utime, channel, data
 
 
