@@ -471,6 +471,54 @@ TEST(Verify, AgreesWithTheCheckThatControlFliesBy) {
   EXPECT_GE(neither, 50);
 }
 
+/// From (x, 0, 0) by `by`, from rest to rest in 2 s; off the solid of half size 1 about the origin
+/// along n, from tau on.
+Wire Escape(int8_t solid, double x, const Vector3d& by, const Vector3d& n, double tau) {
+  Wire w;
+  w.plan.verdict = plan_t::ESCAPE;
+  w.plan.hard_radius = kRadius, w.plan.sigmas = kSigmas;
+  Eigen::Matrix<double, Eigen::Dynamic, 3> c = Eigen::MatrixXd::Zero(6, 3);
+  c(0, 0) = x;
+  c.row(3) = 10.0 * by.transpose(), c.row(4) = -15.0 * by.transpose();
+  c.row(5) = 6.0 * by.transpose();
+  w.plan.position = bus::ToMessage({0.0, 2.0, c}, 0);
+  w.plan.target = bus::ToMessage(world::Trajectory::Constant({9, 9, 9}, 0.0, 2.0), 0);
+  proof_t proof{};
+  proof.from = tau;
+  proof.radius = kRadius;
+  proof.separations = {{tau, 1.0, {n.x(), n.y(), n.z()}}};
+  w.plan.proofs = {proof};
+  world::Obstacle o;
+  o.solid = static_cast<world::Obstacle::Solid>(solid);
+  o.half = Vector3d::Ones();
+  w.list.obstacles = {bus::ToMessage(o, 0)};
+  w.forecast.verdict = prediction_t::NO_TARGET;
+  return w;
+}
+
+TEST(Verify, AnEscapeLeavesByTheShortestWayAndSoon) {
+  const Vector3d X = Vector3d::UnitX(), Z = Vector3d::UnitZ();
+  const std::string back = "obstacle 0 is not left by the shortest way";
+  const std::string later = "obstacle 0 is kept off only later";
+  for (const int8_t solid : {obstacle_t::ELLIPSOID, obstacle_t::BOX, obstacle_t::CYLINDER})
+    for (const double x : {1.2, 0.95}) {  // near it and inside
+      EXPECT_EQ(Fault(Escape(solid, x, 5.0 * X, X, 0.25)), "") << int{solid} << x;
+      EXPECT_EQ(Fault(Escape(solid, x, 14.0 * Z - 0.1 * X, Z, 0.25)), back) << int{solid} << x;
+      EXPECT_EQ(Fault(Escape(solid, x, 5.0 * X, X, 0.26)), later);
+      Wire w = Escape(solid, x, 5.0 * X, X, 0.25);
+      w.plan.verdict = plan_t::SAFE_ONLY;
+      EXPECT_EQ(Fault(w), later);
+    }
+  for (const double tau : {0.25, 0.6}) {
+    Wire w = Escape(obstacle_t::BOX, 0.2, 14.0 * Z, Z, tau);
+    w.list.obstacles[0].kind = obstacle_t::GROUND;
+    EXPECT_EQ(Fault(w), "");
+    w = Escape(obstacle_t::BOX, 0.9, 5.0 * X - 0.1 * Z, X, tau);
+    w.list.obstacles[0].kind = obstacle_t::GROUND;
+    EXPECT_EQ(Fault(w), back) << "the ground is left by its top";
+  }
+}
+
 TEST(Verify, CountsWhatItCannotVerify) {
   Wire w = Wires().front();
   const auto bodies = [](const std::vector<proof_t>& proofs) {
