@@ -172,27 +172,31 @@ std::map<std::string, std::string> Triggers(
   return triggers;
 }
 
-void NoteMissing(const Recorded& recorded, const Queues& queues, HeardOrder* order) {
+/// Of channels that the log lacks altogether, too: what was heard of them since the first output.
+void NoteMissing(const Recorded& recorded, const std::set<std::string>& channels,
+                 const Queues& queues, HeardOrder* order) {
   for (const auto& [channel, lost] : recorded.lost)
     if (lost > 0 && queues.count(channel) > 0) order->missing[channel].lost = lost;
   std::map<std::string, int32_t> before;  // the highest `seq` that was asked for
   std::map<std::string, size_t> next;
   std::map<std::string, HeardOrder::Missing> found;
+  const std::vector<const Input*> nothing;
   for (const Output& output : recorded.outputs) {
     for (const MessageHead::Input& heard : output.inputs) {
-      const auto queue = queues.find(heard.channel);
-      if (queue == queues.end()) continue;
-      const auto [last, first_time] =
-          before.try_emplace(heard.channel, std::min(heard.seq, queue->second.front()->seq) - 1);
+      if (channels.count(heard.channel) == 0) continue;
+      const auto found_queue = queues.find(heard.channel);
+      const auto& queue = found_queue == queues.end() ? nothing : found_queue->second;
+      const int32_t first = queue.empty() ? heard.seq : std::min(heard.seq, queue.front()->seq);
+      int32_t& last = before.try_emplace(heard.channel, first - 1).first->second;
       HeardOrder::Missing& m = found[heard.channel];
       size_t& i = next[heard.channel];
       int64_t here = 0;
-      for (; i < queue->second.size() && queue->second[i]->seq <= heard.seq; ++i) ++here;
-      const int64_t asked = std::max(0, heard.seq - last->second);
+      for (; i < queue.size() && queue[i]->seq <= heard.seq; ++i) ++here;
+      const int64_t asked = std::max(0, heard.seq - last);
       m.of += asked;
       if (asked > here && m.count == 0) m.first_utime = output.utime;
       m.count += std::max<int64_t>(0, asked - here);
-      last->second = std::max(last->second, heard.seq);
+      last = std::max(last, heard.seq);
     }
   }
   for (const auto& [channel, m] : found) {
@@ -227,7 +231,7 @@ HeardOrder OrderHeard(const std::string& log, const std::string& process,
   const Queues queues = QueuesOf(recorded.inputs);
   HeardOrder order;
   if (!recorded.one_life || recorded.outputs.empty()) return order;
-  NoteMissing(recorded, queues, &order);
+  NoteMissing(recorded, channels, queues, &order);
   if (!recorded.live) return order;
   order.has_ticks = recorded.has_ticks;
   auto intervals = Intervals(recorded, queues);

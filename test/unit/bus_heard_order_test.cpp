@@ -199,6 +199,21 @@ TEST(HeardOrder, TellsWhatTheLogLacks) {
   EXPECT_NE(order.Sentences().front().find("FAST: 30 of"), std::string::npos);
 }
 
+TEST(HeardOrder, TellsOfAChannelThatTheLogLacksAltogether) {
+  for (const int64_t start : {kStart, int64_t{1'000'000}}) {  // live, and in lockstep
+    Flight flight(7, start);
+    flight.Run(20.0);
+    const std::string file = flight.Write([](const Sent& m) { return m.channel != "OTHER"; });
+    const HeardOrder order = OrderHeard(file, "worker", kInputs);
+    ASSERT_EQ(order.missing.size(), 1u);
+    const auto& other = order.missing.at("OTHER");
+    EXPECT_NEAR(static_cast<double>(other.of), 286.0, 2.0);
+    EXPECT_EQ(other.count, other.of);
+    EXPECT_LT(1e-6 * static_cast<double>(other.first_utime - start), 0.2);
+    EXPECT_TRUE(OrderHeard(file, "worker", {"FAST", "SLOW"}).missing.empty()) << "nobody asks";
+  }
+}
+
 TEST(HeardOrder, LogicalTimeOtherProcessesAndTwoLivesAreTakenAsTheyStand) {
   Flight lockstep(1, 1'000'000), live(1, kStart);
   lockstep.Run(2.0);
