@@ -93,7 +93,9 @@ Cells CellsOf(const Row& row) {
   cells.push_back(Mean(row, "certificate_kept_ratio"));
   cells.push_back(Highest(row, "reaction_s"));
   cells.push_back(Recovery(row));
-  cells.push_back(Sum(row, "nonfinite_setpoints"));
+  for (const char* key :
+       {"nonfinite_setpoints", "plans_in_air", "uncertified_brakes", "accelerating_brakes"})
+    cells.push_back(Sum(row, key));
   return cells;
 }
 
@@ -156,7 +158,8 @@ std::string Table(const std::vector<Json>& flights) {
   for (const char* title :
        {"visible, mean", "clearance, worst [m]", "odometry error, p95 [m]", "distance ratio, mean",
         "visible, worst", "in image, mean", "travel ratio, mean", "certificate kept, mean",
-        "reaction, worst [s]", "recovery, worst [s]", "non-finite setpoints"})
+        "reaction, worst [s]", "recovery, worst [s]", "non-finite setpoints", "plans in the air",
+        "uncertified brakes", "accelerating brakes"})
     rows[0].push_back(title);
   Row pooled{"all", "", {}};
   for (const Row& row : RowsOf(flights)) {

@@ -35,6 +35,7 @@ const ROWS = [
   ['predict_ms.p50', 'Prediction, median', 'ms', 1, 1], ['predict_ms.p99', 'Prediction, 99th percentile', 'ms', 1, 1],
   ['sweep_to_setpoint_ms.p50', 'Sweep to setpoint, median', 'ms', 1, 1], ['sweep_to_setpoint_ms.p99', 'Sweep to setpoint, 99th percentile', 'ms', 1, 1],
   ['replans', 'Plans', '', 1, 0], ['fallbacks', 'Fallbacks', '', 1, 0],
+  ['uncertified_brakes', 'Last resorts without certificate', '', 1, 0], ['accelerating_brakes', 'Braking that speeds up', '', 1, 0],
   ['odometry_ate_m', 'Odometry, RMSE', 'm', 1, 3], ['odometry_ate_aligned_m', 'Odometry, RMSE after alignment', 'm', 1, 3],
   ['pose_sigma_max_m', 'Pose, largest standard deviation', 'm', 1, 3], ['frame_changes', 'Changes of the frame W', '', 1, 0],
   ['target_rmse_m', 'Target, RMSE', 'm', 1, 3], ['target_known_ratio', 'Target known', '%', 100, 1],

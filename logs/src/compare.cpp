@@ -56,6 +56,8 @@ const std::vector<std::pair<const char*, Better>>& Keys() {
       {"nonfinite_setpoints", Better::kLower},
       {"touchdown_speed_mps", Better::kLower},
       {"motors_off_s", Better::kLower},
+      {"uncertified_brakes", Better::kLower},
+      {"accelerating_brakes", Better::kLower},
   };
   return keys;
 }

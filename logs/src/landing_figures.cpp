@@ -36,11 +36,15 @@ void AddLanding(const FlightRecord& record, Metrics* metrics) {
   metrics->motors_off_s = off - above->t;
 }
 
-bool ComesDown(const FlightRecord& record, double t) {
+std::optional<int> StateAt(const FlightRecord& record, double t) {
   const auto next = std::upper_bound(record.states.begin(), record.states.end(), t,
                                      [](double at, const StateSample& s) { return at < s.t; });
-  if (next == record.states.begin()) return false;
-  const int state = std::prev(next)->state;
+  if (next == record.states.begin()) return std::nullopt;
+  return std::prev(next)->state;
+}
+
+bool ComesDown(const FlightRecord& record, double t) {
+  const auto state = StateAt(record, t);
   return state == flight_state_t::LAND || state == flight_state_t::DONE;
 }
 

@@ -11,6 +11,9 @@ std::string StateName(int state);
 /// body is as low as it stands in the end, give or take 2 cm of springy legs.
 void AddLanding(const FlightRecord& record, Metrics* metrics);
 
+/// The flight's state at t; none before its first, or without a mission process.
+std::optional<int> StateAt(const FlightRecord& record, double t);
+
 /// Is the flight in LAND or DONE at t?
 bool ComesDown(const FlightRecord& record, double t);
 

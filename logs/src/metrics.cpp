@@ -8,6 +8,7 @@
 #include "logs/src/fault_figures.h"
 #include "logs/src/flown_plans.h"
 #include "logs/src/landing_figures.h"
+#include "logs/src/last_resorts.h"
 
 namespace chase::logs {
 namespace {
@@ -215,6 +216,7 @@ Metrics Compute(const FlightRecord& record, const std::vector<SampleScore>& scor
   AddEstimates(record, &m);
   AddLosses(record.log, &m);
   AddLanding(record, &m);
+  AddLastResorts(record, &m);
   AddCriteria(record, &m);
   return m;
 }

@@ -65,6 +65,9 @@ struct Metrics {
   std::vector<StateFigures> flight_states;  ///< in their order; none without a mission process
   Figure touchdown_speed_mps;               ///< of the landing that ended the flight
   Figure motors_off_s;                      ///< after touchdown
+  /// Plans while the flight is up, of those BRAKE without a certificate or MITIGATE, and BRAKE that
+  /// speeds up.
+  long plans_in_air = 0, uncertified_brakes = 0, accelerating_brakes = 0;
   std::map<std::string, bool> criteria;
 
   bool Passed() const;

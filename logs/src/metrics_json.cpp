@@ -106,6 +106,9 @@ std::string MetricsJson(const FlightRecord& record, const Metrics& m) {
     j["touchdown_speed_mps"] = Number(m.touchdown_speed_mps);
     j["motors_off_s"] = Number(m.motors_off_s);
   }
+  j["plans_in_air"] = m.plans_in_air;
+  j["uncertified_brakes"] = m.uncertified_brakes;
+  j["accelerating_brakes"] = m.accelerating_brakes;
   j["criteria"] = Json(m.criteria);
   return j.dump(2) + "\n";
 }

@@ -123,6 +123,8 @@ class Campaign(unittest.TestCase):
         self.assertEqual(killed["reaction, worst [s]"], "0.050")
         self.assertEqual(killed["recovery, worst [s]"], "1.000, 1 never")
         self.assertEqual(killed["non-finite setpoints"], "12")
+        self.assertEqual([killed[of] for of in ("plans in the air", "uncertified brakes", "accelerating brakes")],
+                         ["3000", "12", "0"])
         for title, cell in (("certificate kept, mean", "0.980"), ("travel ratio, mean", "1.020"),
                             ("in image, mean", "1.000"), ("visible, worst", "0.400")):
             self.assertEqual(killed[title], cell, title)

@@ -21,6 +21,7 @@ def metrics(seed, fault):
          "flown_s": min(60.0, float(option("--until", 60))), "passed": True, "safe_ratio": 1.0,
          "min_clearance_m": 0.2 + 0.1 * rng.random(), "visible_ratio": 0.99, "in_image_ratio": 1.0,
          "travel_ratio": 1.02, "certificate_kept_ratio": 0.98, "nonfinite_setpoints": 0,
+         "plans_in_air": 1000, "uncertified_brakes": seed, "accelerating_brakes": 0,
          "reaction_s": None, "recovery_s": None, "faults": [],
          "distance_ratio": 1.0 + 0.1 * rng.random(), "distance_error": 0.05 + 0.01 * rng.random(),
          "odometry_ate_m": 0.01 * rng.random(), "collision_s": -1.0, "collided_with": "",

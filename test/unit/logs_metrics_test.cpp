@@ -4,6 +4,8 @@
 #include <nlohmann/json.hpp>
 #include <random>
 
+#include "chase/flight_state_t.hpp"
+#include "chase/plan_t.hpp"
 #include "logs/src/estimate_errors.h"
 #include "logs/src/landing_watch.h"
 #include "logs/src/metrics.h"
@@ -398,6 +400,40 @@ TEST(Metrics, MemoryIsComparedWithThatOfAProcessAMinuteOld) {
   EXPECT_NEAR(m.memory_growth.at("mapping"), 0.04, 1e-9) << "another process";
   record.memory["mapping"].push_back({63.0, 159.0});
   EXPECT_FALSE(Compute(record).criteria.at("memory_growth"));
+}
+
+/// Starts at 1 m/s along x, and accelerates by `a` for the second that it lasts.
+PlanSample Along(double t, int verdict, double certified, double a) {
+  PlanSample plan{t, verdict, {}, {}, certified};
+  plan.position = {t, 1.0, Eigen::MatrixXd::Zero(3, 3)};
+  plan.position.coefficients(1, 0) = 1.0;
+  plan.position.coefficients(2, 0) = 0.5 * a;
+  return plan;
+}
+
+TEST(Metrics, LastResortsWithoutACertificateAreCounted) {
+  FlightRecord record = Standing({3, 0, 1.5}, {5.5, 0, 1.5});
+  record.plans = {Along(0.0, plan_t::CHASE, 0.1, 1.0),   Along(1.0, plan_t::BRAKE, 0.1, -1.0),
+                  Along(2.0, plan_t::BRAKE, -1.0, -1.0), Along(3.0, plan_t::MITIGATE, -1.0, 1.0),
+                  Along(4.0, plan_t::WAIT, -1.0, 0.0),   Along(5.0, plan_t::BRAKE, 0.1, 0.04),
+                  Along(6.0, plan_t::BRAKE, 0.1, 0.06),  Along(-1.0, plan_t::BRAKE, -1.0, 1.0),
+                  Along(10.5, plan_t::BRAKE, -1.0, 1.0)};
+  Metrics m = Compute(record);
+  EXPECT_EQ(m.plans_in_air, 7);
+  EXPECT_EQ(m.uncertified_brakes, 2);
+  EXPECT_EQ(m.accelerating_brakes, 1);
+  record.plans[1].stop = record.plans[1].position.Reparametrised(1.5, 1.0);
+  record.plans[1].stop->coefficients(2, 0) = 0.5;  // ends at 1.5 m/s
+  EXPECT_EQ(Compute(record).accelerating_brakes, 2);
+  record.states = {
+      {-2.0, flight_state_t::TAKEOFF}, {1.5, flight_state_t::CHASE}, {5.5, flight_state_t::LAND}};
+  m = Compute(record);
+  EXPECT_EQ(m.plans_in_air, 4) << "neither in the climb nor on the way down";
+  EXPECT_EQ(m.accelerating_brakes, 0);
+  const auto json = nlohmann::json::parse(MetricsJson(record, m));
+  EXPECT_EQ(json.at("plans_in_air"), 4);
+  EXPECT_EQ(json.at("uncertified_brakes"), 2);
+  EXPECT_EQ(json.at("accelerating_brakes"), 0);
 }
 
 TEST(Metrics, CriteriaFollowTheScenario) {
