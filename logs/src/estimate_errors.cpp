@@ -29,6 +29,33 @@ struct Pairs {
   }
 };
 
+const TargetSample* NewestTarget(const std::vector<TargetSample>& targets, double t) {
+  const auto after =
+      std::upper_bound(targets.begin(), targets.end(), t + kTimeTolerance,
+                       [](double time, const TargetSample& s) { return time < s.t; });
+  const auto newest = std::find_if(std::make_reverse_iterator(after), targets.rend(),
+                                   [](const TargetSample& s) { return s.known; });
+  return newest == targets.rend() ? nullptr : &*newest;
+}
+
+/// Mean distance from the true target, `horizon` s after the predictions' start, to where
+/// position(prediction, time) has it, m.
+template <class F>
+std::optional<double> MeanError(const FlightRecord& record, double horizon, F position) {
+  double sum = 0.0;
+  long count = 0;
+  for (const PredictionSample& p : record.predictions) {
+    const double t = p.t + horizon;
+    if (!p.usable || !record.InMission(p.t) || t > p.target.end() + kTimeTolerance) continue;
+    const auto truth = TruthAt(record.truth, t);
+    const std::optional<Vector3d> expected = position(p, t);
+    if (!truth || !expected) continue;
+    sum += (*expected - truth->target).norm();
+    ++count;
+  }
+  return count > 0 ? std::optional<double>(sum / static_cast<double>(count)) : std::nullopt;
+}
+
 }  // namespace
 
 std::optional<TruePositions> TruthAt(const std::vector<TruthSample>& truth, double t) {
@@ -72,17 +99,16 @@ std::optional<double> TargetRmse(const FlightRecord& record) {
 }
 
 std::optional<double> PredictionError(const FlightRecord& record, double horizon) {
-  double sum = 0.0;
-  long count = 0;
-  for (const PredictionSample& p : record.predictions) {
-    const double t = p.t + horizon;
-    if (!p.usable || !record.InMission(p.t) || t > p.target.end() + kTimeTolerance) continue;
-    const auto truth = TruthAt(record.truth, t);
-    if (!truth) continue;
-    sum += (p.target.Position(t) - truth->target).norm();
-    ++count;
-  }
-  return count > 0 ? std::optional<double>(sum / static_cast<double>(count)) : std::nullopt;
+  return MeanError(record, horizon,
+                   [](const PredictionSample& p, double t) { return p.target.Position(t); });
+}
+
+std::optional<double> ConstantVelocityError(const FlightRecord& record, double horizon) {
+  return MeanError(record, horizon, [&](const PredictionSample& p, double t) {
+    const TargetSample* target = NewestTarget(record.targets, p.t);
+    return target ? std::optional<Vector3d>(target->mean + (t - target->t) * target->velocity)
+                  : std::nullopt;
+  });
 }
 
 }  // namespace chase::logs

@@ -26,4 +26,8 @@ std::optional<double> TargetRmse(const FlightRecord& record);
 /// start, over the mission's predictions that reach so far, m.
 std::optional<double> PredictionError(const FlightRecord& record, double horizon);
 
+/// The same of a straight line in place of each of them: from the newest TARGET up to the
+/// prediction's start on with that one's velocity.
+std::optional<double> ConstantVelocityError(const FlightRecord& record, double horizon);
+
 }  // namespace chase::logs

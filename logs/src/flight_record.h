@@ -66,7 +66,9 @@ struct PoseSample {
 struct TargetSample {
   double t = 0.0;
   bool tracking = false;
-  Eigen::Vector3d mean = Eigen::Vector3d::Zero();  ///< p_WT as perceived
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();      ///< p_WT as perceived
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< v_WT as perceived, m/s
+  bool known = false;                                  ///< tracked or occluded
 };
 
 struct PredictionSample {

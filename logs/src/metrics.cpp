@@ -133,9 +133,12 @@ void AddEstimates(const FlightRecord& record, Metrics* m) {
   m->odometry_ate_m = ate.raw;
   m->odometry_ate_aligned_m = ate.aligned;
   m->target_rmse_m = TargetRmse(record);
-  for (const double horizon : {0.5, 1.0, 1.5, 2.0, 2.5})
+  for (const double horizon : {0.5, 1.0, 1.5, 2.0, 2.5}) {
     if (const Figure e = PredictionError(record, horizon))
       m->prediction_error_by_horizon_m[horizon] = *e;
+    if (const Figure e = ConstantVelocityError(record, horizon))
+      m->prediction_error_constant_velocity_by_horizon_m[horizon] = *e;
+  }
   m->prediction_error_m = PredictionError(record, 1.0);
 }
 

@@ -42,7 +42,8 @@ struct Metrics {
   std::optional<TimeFigures> plan_ms, predict_ms, sweep_to_setpoint_ms;
   long replans = 0, fallbacks = 0;
   Figure odometry_ate_m, odometry_ate_aligned_m, target_rmse_m, prediction_error_m;
-  std::map<double, double> prediction_error_by_horizon_m;  ///< horizon in s
+  std::map<double, double> prediction_error_by_horizon_m;                    ///< horizon in s
+  std::map<double, double> prediction_error_constant_velocity_by_horizon_m;  ///< the same
   Figure certified_clearance_m, certificate_kept_ratio, tube_exceeded_ratio, tracking_error_p99_m;
   std::map<int, double> verdict_s;              ///< time under each of plan_t's verdicts
   std::map<std::string, double> cpu_s;          ///< by process

@@ -92,6 +92,9 @@ std::string MetricsJson(const FlightRecord& record, const Metrics& m) {
   j["target_rmse_m"] = Number(m.target_rmse_m);
   j["prediction_error_m"] = Number(m.prediction_error_m);
   j["prediction_error_by_horizon_m"] = ByHorizon(m.prediction_error_by_horizon_m);
+  const auto& straight = m.prediction_error_constant_velocity_by_horizon_m;
+  j["prediction_error_constant_velocity_by_horizon_m"] =
+      straight.empty() ? Json() : ByHorizon(straight);
   j["cpu_s"] = Json(m.cpu_s);
   j["memory_growth"] = Json(m.memory_growth);
   j["real_time_factor"] = Number(m.real_time_factor);

@@ -159,8 +159,9 @@ class Gatherer {
       if (m.health != pose_t::HEALTH_STARTING)
         record->poses.push_back({Time(m.utime), bus::ToVector(m.pos)});
     for (const target_t& m : targets_)
-      record->targets.push_back(
-          {Time(m.utime), m.state == target_t::TRACKING, bus::ToVector(m.mean)});
+      record->targets.push_back({Time(m.utime), m.state == target_t::TRACKING,
+                                 bus::ToVector(m.mean), bus::ToVector(m.velocity),
+                                 m.state == target_t::TRACKING || m.state == target_t::OCCLUDED});
   }
 
   void AddPlans(FlightRecord* record) const {

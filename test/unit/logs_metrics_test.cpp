@@ -355,6 +355,27 @@ TEST(Metrics, PredictionsAreJudgedAtTheirHorizon) {
   EXPECT_EQ(m.prediction_error_by_horizon_m.count(2.5), 0u);
 }
 
+TEST(Metrics, AStraightLineIsJudgedBesideThePredictions) {
+  FlightRecord record = Standing({0, 0, 0}, {0, 0, 0});
+  for (TruthSample& s : record.truth) s.target = {0.5 * s.t * s.t, 0, 0};  // accelerates at 1
+  for (int k = 0; k < 8; ++k)
+    record.predictions.push_back({k * 1.0, true, {k * 1.0, 2.0, Eigen::MatrixXd::Zero(1, 3)}});
+  EXPECT_TRUE(Compute(record).prediction_error_constant_velocity_by_horizon_m.empty());
+  const std::string key = "prediction_error_constant_velocity_by_horizon_m";
+  EXPECT_TRUE(nlohmann::json::parse(MetricsJson(record, Compute(record))).at(key).is_null());
+  for (int k = 0; k < 100; ++k) {
+    const double t = 0.1 * k - 0.05;  // the newest is 0.05 s older than the prediction
+    record.targets.push_back({t, false, {0.5 * t * t, 0.3, 0}, {t, 0, 0}, true});
+    record.targets.push_back({t, false, {99, 99, 99}, Vector3d::Zero(), false});  // lost
+  }
+  const auto errors = Compute(record).prediction_error_constant_velocity_by_horizon_m;
+  for (const double horizon : {0.5, 1.0, 1.5, 2.0})
+    EXPECT_NEAR(errors.at(horizon), std::hypot(0.5 * std::pow(horizon + 0.05, 2), 0.3), 1e-6);
+  EXPECT_EQ(errors.count(2.5), 0u) << "no prediction reaches that far";
+  const auto json = nlohmann::json::parse(MetricsJson(record, Compute(record)));
+  EXPECT_NEAR(json.at(key).at("1.0"), errors.at(1.0), 1e-5);
+}
+
 TEST(Metrics, PlansAndStagesAreCounted) {
   FlightRecord record = Standing({3, 0, 1.5}, {5.5, 0, 1.5});
   const std::vector<std::pair<double, int>> plans = {{-0.5, 5}, {0.0, 0}, {1.0, 1},
