@@ -7,7 +7,8 @@ live_flights.py alone alone alone alone alone      (do logs lose messages?)
 alone: nobody looks; page: a scripted page that wants everything; chromium: the page itself, its processor time on the same machine;
 hostile: thousands of connections, garbage, readers that read nothing, commands with wrong tokens. Each flight, the n-th with seed
 --seed + n of its kind, takes 90 s on a machine that does nothing else. Exit 1 when a flight fails its criteria or lost a message, the
-viewer takes more than 15 % of a core or was made to command, or an onlooker saw too little.
+viewer takes more than 15 % of a core or was made to command, or an onlooker saw too little. With --judge, for such a machine,
+also when a flight's real-time factor is not 1.00, or the page shows less than 30 frames a second while it plays the last flight.
 """
 
 import argparse
@@ -23,13 +24,14 @@ sys.dont_write_bytecode = True
 import lcmlog  # noqa: E402
 
 VIEWER_SHARE = 0.15  # of a core
+REAL_TIME = 0.995  # factor: 1.00 as it is shown
+MODULES = ROOT / "services/viewer/node_modules"
 KINDS = ("alone", "page", "chromium", "hostile")
 
 
 def onlooker(kind, port):
     return subprocess.Popen(["nice", "-n", "10", "node", ROOT / "test/viewer/onlooker.mjs", "none", "none",
-                             ROOT / "services/viewer/node_modules", port, kind],
-                            stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+                             MODULES, port, kind], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
 
 
 def fly(kind, scenario, seed):
@@ -62,16 +64,23 @@ def row_of(kind, scenario, seed):
     cpu = metrics.get("cpu_s", {})
     row = {"kind": kind, "seed": seed, "passed": code == 0 and metrics.get("passed", False),
            "real_time_factor": metrics.get("real_time_factor"), "plan_p99_ms": (metrics.get("plan_ms") or {}).get("p99"),
-           "lost": sum(metrics.get("lost_messages", {}).values()), "onboard_cpu_s": round(sum(cpu.values()) - cpu.get("viewer", 0), 1)}
+           "log": str(folder and folder / "flight.lcm"), "lost": sum(metrics.get("lost_messages", {}).values()),
+           "onboard_cpu_s": round(sum(cpu.values()) - cpu.get("viewer", 0), 1)}
     if kind != "alone":
         row.update(viewer_share=round(cpu.get("viewer", 0) / metrics["flown_s"], 3) if metrics else None, seen=seen,
                    commands=commands_of_viewer(folder / "flight.lcm"))
     return row
 
 
-def is_good(row):
+def plays_smoothly(log):
+    test = ["node", ROOT / "test/viewer/page_test.mjs", ROOT / "build/bin", log, MODULES, "--judge"]
+    return subprocess.run(test, check=False).returncode == 0
+
+
+def is_good(row, judge):
     cheap = row["kind"] in ("alone", "hostile") or (row["viewer_share"] or 0) <= VIEWER_SHARE
-    return row["passed"] and row["lost"] == 0 and cheap and row.get("commands", 0) == 0
+    return row["passed"] and row["lost"] == 0 and cheap and row.get("commands", 0) == 0 \
+        and (not judge or (row["real_time_factor"] or 0) >= REAL_TIME)
 
 
 def main():
@@ -79,6 +88,7 @@ def main():
     parser.add_argument("kinds", nargs="+", choices=KINDS)
     parser.add_argument("--scenario", default="gym")
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--judge", action="store_true", help="the real-time factor and the page's frames a second, too")
     options = parser.parse_args()
     rows, flown = [], {}
     for kind in options.kinds:
@@ -86,8 +96,9 @@ def main():
         flown[kind] = flown.get(kind, 0) + 1
         rows.append(row_of(kind, options.scenario, seed))
         print(json.dumps(rows[-1]), flush=True)
-    print("\n" + "\n".join(json.dumps({**row, "good": is_good(row)}) for row in rows))
-    return 0 if all(map(is_good, rows)) else 1
+    print("\n" + "\n".join(json.dumps({**row, "good": is_good(row, options.judge)}) for row in rows))
+    good = all(is_good(row, options.judge) for row in rows) and (not options.judge or plays_smoothly(rows[-1]["log"]))
+    return 0 if good else 1
 
 
 if __name__ == "__main__":
