@@ -24,33 +24,9 @@ function table(parent, head, rows) {
 }
 
 // [key of metrics.json, words, unit, scale, digits]
-const ROWS = [
-  ['safe_ratio', 'Safe', '%', 100, 2], ['visible_ratio', 'Target in line of sight', '%', 100, 2], ['in_image_ratio', 'Target in the image', '%', 100, 2],
-  ['min_clearance_m', 'Smallest clearance', 'm', 1, 2], ['certified_clearance_m', 'Smallest certified clearance', 'm', 1, 2],
-  ['certificate_kept_ratio', 'Certificate kept', '%', 100, 2], ['tube_exceeded_ratio', 'Outside the tube', '%', 100, 2], ['certified_ratio', 'Plans that are certified', '%', 100, 1],
-  ['distance_ratio', 'Distance over the desired one', '', 1, 3], ['distance_error', 'Its mean absolute error', '', 1, 3],
-  ['travel_ratio', 'Path length, chaser over target', '', 1, 2], ['path_m', 'Path length', 'm', 1, 1], ['speed_max_mps', 'Highest speed', 'm/s', 1, 2],
-  ['acceleration_cost', 'Acceleration cost', 'm²/s⁴', 1, 2], ['jerk_cost', 'Jerk cost', 'm²/s⁶', 1, 1], ['yaw_rate_rms', 'Yaw rate, RMS', 'rad/s', 1, 2],
-  ['plan_ms.p50', 'Planning, median', 'ms', 1, 1], ['plan_ms.p99', 'Planning, 99th percentile', 'ms', 1, 1],
-  ['predict_ms.p50', 'Prediction, median', 'ms', 1, 1], ['predict_ms.p99', 'Prediction, 99th percentile', 'ms', 1, 1],
-  ['sweep_to_setpoint_ms.p50', 'Sweep to setpoint, median', 'ms', 1, 1], ['sweep_to_setpoint_ms.p99', 'Sweep to setpoint, 99th percentile', 'ms', 1, 1],
-  ['replans', 'Plans', '', 1, 0], ['fallbacks', 'Fallbacks', '', 1, 0],
-  ['uncertified_brakes', 'Last resorts without certificate', '', 1, 0], ['accelerating_brakes', 'Braking that speeds up', '', 1, 0],
-  ['odometry_ate_m', 'Odometry, RMSE', 'm', 1, 3], ['odometry_ate_aligned_m', 'Odometry, RMSE after alignment', 'm', 1, 3],
-  ['pose_sigma_max_m', 'Pose, largest standard deviation', 'm', 1, 3], ['frame_changes', 'Changes of the frame W', '', 1, 0],
-  ['target_rmse_m', 'Target, RMSE', 'm', 1, 3], ['target_known_ratio', 'Target known', '%', 100, 1],
-  ['prediction_error_m', 'Prediction 1 s ahead, mean error', 'm', 1, 3],
-  ['tracking_error_m.p50', 'Distance from the plan, median', 'm', 1, 3], ['tracking_error_m.p99', 'Distance from the plan, 99th percentile', 'm', 1, 3],
-  ['tracking_error_p99_m', 'Distance from the plan, 99th percentile', 'm', 1, 3],
-  ['latency_ms.POSE.p99', 'Age of POSE, 99th percentile', 'ms', 1, 1], ['latency_ms.TARGET.p99', 'Age of TARGET, 99th percentile', 'ms', 1, 1],
-  ['latency_ms.OBSTACLES.p99', 'Age of OBSTACLES, 99th percentile', 'ms', 1, 1], ['stages_ms.planning plan.p99', 'Planning, 99th percentile', 'ms', 1, 1],
-  ['reaction_s', 'Reaction after the age limit', 's', 1, 2], ['recovery_s', "Recovered after the fault's end", 's', 1, 2],
-  ['nonfinite_setpoints', 'Setpoints that are no numbers', '', 1, 0],
-  ['touchdown_speed_mps', 'Speed at touchdown', 'm/s', 1, 2], ['motors_off_s', 'Motors off after', 's', 1, 1],
-  ['real_time_factor', 'Real-time factor', '', 1, 2], ['flown_s', 'Flown', 's', 1, 1],
-];
+const ROWS = page.rows;
 const MOST_CHANGES = 200;
-const rowOf = (key) => ROWS.find(([name]) => name === key) ?? [key, key.replace('criteria.', 'criterion '), '', 1, 3];
+const wordsOf = (key) => ROWS.find(([name]) => name === key)?.[1] ?? key.replace('criteria.', 'criterion ');
 
 const criterionOf = ({metrics}, key) => {
   const name = [key, `${key}_max`].find((n) => n in (metrics.criteria ?? {}));
@@ -74,7 +50,7 @@ function showHeader() {
 }
 
 function showFigures() {
-  byId('figures_text').textContent = two ? 'Red rows: B has moved to its worse side by more than 1 %.'
+  byId('figures_text').textContent = two ? 'Red rows: B has moved to its worse side by more than 1 % and half of the last digit.'
     : flights[0].truth ? 'Sampled on the truth at 100 Hz over the mission.' : 'What the vehicle said of itself; nobody knows where it really was.';
   if (two) return compareFigures();
   const {metrics} = flights[0], of_fault = (key) => key === 'reaction_s' || key === 'recovery_s';
@@ -89,12 +65,8 @@ function showFigures() {
 
 function compareFigures() {
   byId('figures').className = '';
-  const value = (key, side) => {
-    const [, , unit, scale, digits] = rowOf(key), number = at(flights[side].metrics, key);
-    return typeof number === 'number' ? shown(number, digits, unit, scale) : page.compared.find((f) => f.key === key)['ab'[side]] || UNKNOWN;
-  };
-  const rows = page.compared.filter(({a, b}) => a || b).map(({key, worse}) =>
-    ({cells: [rowOf(key)[1], value(key, 0), value(key, 1), worse ? 'WORSE' : ''], worse}));
+  const rows = page.compared.filter(({a, b}) => a || b).map(({key, a, b, worse}) =>
+    ({cells: [wordsOf(key), a || UNKNOWN, b || UNKNOWN, worse ? 'WORSE' : ''], worse}));
   table(byId('figures'), ['', 'A', 'B', ''], rows);
 }
 

@@ -70,8 +70,9 @@ int Compare(const std::vector<std::string>& logs, const std::string& out) {
     code = std::max(code, Judge(flights.back()));
   }
   const auto figures = CompareMetrics(flights[0].metrics, flights[1].metrics, kTolerance);
-  const std::string table = Format(figures);
-  std::printf("A: %s\nB: %s\n%s", logs[0].c_str(), logs[1].c_str(), table.c_str());
+  const std::string table =
+      "A: " + Heading(flights[0]) + "B: " + Heading(flights[1]) + Format(figures);
+  std::printf("%s", table.c_str());
   if (out.empty()) return code;
   const fs::path folder = OutputFolder(logs[1], out);
   WriteFile((folder / "comparison.txt").string(), table);

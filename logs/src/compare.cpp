@@ -7,60 +7,12 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "logs/src/figure_table.h"
+
 namespace chase::logs {
 namespace {
 
 using Json = nlohmann::ordered_json;
-
-enum class Better { kHigher, kLower, kNearOne };
-
-/// Those with a better side; numbers that only describe a flight, such as replans, have none.
-const std::vector<std::pair<const char*, Better>>& Keys() {
-  static const std::vector<std::pair<const char*, Better>> keys = {
-      {"flown_s", Better::kHigher},
-      {"safe_ratio", Better::kHigher},
-      {"min_clearance_m", Better::kHigher},
-      {"visible_ratio", Better::kHigher},
-      {"in_image_ratio", Better::kHigher},
-      {"distance_ratio", Better::kNearOne},
-      {"distance_error", Better::kLower},
-      {"acceleration_cost", Better::kLower},
-      {"jerk_cost", Better::kLower},
-      {"yaw_rate_rms", Better::kLower},
-      {"plan_ms.p50", Better::kLower},
-      {"plan_ms.p99", Better::kLower},
-      {"predict_ms.p50", Better::kLower},
-      {"predict_ms.p99", Better::kLower},
-      {"sweep_to_setpoint_ms.p50", Better::kLower},
-      {"sweep_to_setpoint_ms.p99", Better::kLower},
-      {"fallbacks", Better::kLower},
-      {"certified_clearance_m", Better::kHigher},
-      {"certificate_kept_ratio", Better::kHigher},
-      {"tube_exceeded_ratio", Better::kLower},
-      {"tracking_error_p99_m", Better::kLower},
-      {"odometry_ate_m", Better::kLower},
-      {"target_rmse_m", Better::kLower},
-      {"prediction_error_m", Better::kLower},
-      {"real_time_factor", Better::kHigher},
-      {"pose_sigma_max_m", Better::kLower},
-      {"target_known_ratio", Better::kHigher},
-      {"certified_ratio", Better::kHigher},
-      {"tracking_error_m.p50", Better::kLower},
-      {"tracking_error_m.p99", Better::kLower},
-      {"latency_ms.POSE.p99", Better::kLower},
-      {"latency_ms.TARGET.p99", Better::kLower},
-      {"latency_ms.OBSTACLES.p99", Better::kLower},
-      {"stages_ms.planning plan.p99", Better::kLower},
-      {"reaction_s", Better::kLower},
-      {"recovery_s", Better::kLower},
-      {"nonfinite_setpoints", Better::kLower},
-      {"touchdown_speed_mps", Better::kLower},
-      {"motors_off_s", Better::kLower},
-      {"uncertified_brakes", Better::kLower},
-      {"accelerating_brakes", Better::kLower},
-  };
-  return keys;
-}
 
 /// The value under a key with points; null where there is none.
 Json At(const Json& metrics, const std::string& key) {
@@ -77,16 +29,16 @@ double Badness(double value, Better better) {
   return better == Better::kLower ? value : std::abs(value - 1.0);
 }
 
-ComparedFigure Figure(const std::string& key, const Json& a, const Json& b, Better better,
-                      double tolerance) {
-  const auto text = [](const Json& v) {
-    return v.is_number() ? fmt::format("{:.4g}", v.get<double>()) : std::string();
+ComparedFigure Figure(const ShownFigure& shown, const Json& a, const Json& b, double tolerance) {
+  const auto text = [&](const Json& v) {
+    return v.is_number() ? shown.Text(v.get<double>()) : std::string();
   };
-  ComparedFigure figure{key, text(a), text(b), a.is_number() && !b.is_number()};
+  ComparedFigure figure{shown.key, text(a), text(b), a.is_number() && !b.is_number()};
   if (!a.is_number() || !b.is_number()) return figure;
   const double before = a.get<double>(), after = b.get<double>();
-  const double moved = Badness(after, better) - Badness(before, better);
-  figure.worse = moved > tolerance * std::max(std::abs(before), std::abs(after));
+  const double moved = Badness(after, *shown.better) - Badness(before, *shown.better);
+  const double share = tolerance * std::max(std::abs(before), std::abs(after));
+  figure.worse = moved > std::max(share, shown.HalfDigit());
   return figure;
 }
 
@@ -96,8 +48,9 @@ std::vector<ComparedFigure> CompareMetrics(const std::string& a, const std::stri
                                            double tolerance) {
   const Json before = Json::parse(a), after = Json::parse(b);
   std::vector<ComparedFigure> figures;
-  for (const auto& [key, better] : Keys())
-    figures.push_back(Figure(key, At(before, key), At(after, key), better, tolerance));
+  for (const ShownFigure& shown : FigureTable())
+    if (shown.better)
+      figures.push_back(Figure(shown, At(before, shown.key), At(after, shown.key), tolerance));
   std::map<std::string, std::pair<std::string, std::string>> criteria;
   const auto word = [](const Json& passed) { return passed.get<bool>() ? "passed" : "FAILED"; };
   const Json held_before = At(before, "criteria"), held_after = At(after, "criteria");
@@ -111,10 +64,10 @@ std::vector<ComparedFigure> CompareMetrics(const std::string& a, const std::stri
 
 std::string Format(const std::vector<ComparedFigure>& figures) {
   const auto shown = [](const std::string& text) { return text.empty() ? "not known" : text; };
-  std::string out = fmt::format("{:<30} {:>12} {:>12}\n", "", "A", "B");
+  std::string out = fmt::format("{:<30} {:>14} {:>14}\n", "", "A", "B");
   for (const ComparedFigure& f : figures)
     if (!f.a.empty() || !f.b.empty())
-      out += fmt::format("{:<30} {:>12} {:>12}{}\n", f.key, shown(f.a), shown(f.b),
+      out += fmt::format("{:<30} {:>14} {:>14}{}\n", f.key, shown(f.a), shown(f.b),
                          f.worse ? "  WORSE" : "");
   const auto worse = std::count_if(figures.begin(), figures.end(),
                                    [](const ComparedFigure& f) { return f.worse; });

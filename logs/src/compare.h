@@ -12,8 +12,9 @@ struct ComparedFigure {
 };
 
 /// The figures of two flights' metrics.json that have a better side, and the criteria. A figure is
-/// worse where it has moved to its worse side by more than `tolerance` of the larger of the two; a
-/// criterion where it held and does not any more.
+/// worse where it has moved to its worse side by more than `tolerance` of the larger of the two and
+/// by more than half of the last digit that is shown; a criterion where it held and does not any
+/// more.
 std::vector<ComparedFigure> CompareMetrics(const std::string& a, const std::string& b,
                                            double tolerance);
 

@@ -5,6 +5,7 @@
 #include "logs/src/flown_plans.h"
 #include "logs/src/metrics.h"
 #include "logs/src/output.h"
+#include "logs/src/round_numbers.h"
 
 namespace chase::logs {
 namespace {
@@ -113,6 +114,7 @@ std::string MetricsJson(const FlightRecord& record, const Metrics& m) {
   j["uncertified_brakes"] = m.uncertified_brakes;
   j["accelerating_brakes"] = m.accelerating_brakes;
   j["criteria"] = Json(m.criteria);
+  RoundNumbers(&j);
   return j.dump(2) + "\n";
 }
 

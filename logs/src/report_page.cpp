@@ -1,5 +1,6 @@
 #include "logs/src/report_page.h"
 
+#include "logs/src/figure_table.h"
 #include "logs/src/output.h"
 #include "logs/src/page_template.h"
 #include "logs/src/playback.h"
@@ -14,6 +15,9 @@ Json DataOf(const std::vector<ReportedFlight>& flights,
   Json data;
   data["flights"] = Json::array();
   for (const ReportedFlight& flight : flights) data["flights"].push_back(flight.page);
+  data["rows"] = Json::array();
+  for (const ShownFigure& f : FigureTable())
+    data["rows"].push_back({f.key, f.words, f.unit, f.scale, f.digits});
   data["compared"] = Json::array();
   for (const ComparedFigure& f : compared)
     data["compared"].push_back({{"key", f.key}, {"a", f.a}, {"b", f.b}, {"worse", f.worse}});

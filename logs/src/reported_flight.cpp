@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <set>
 #include <stdexcept>
 
 #include "logs/src/key_moments.h"
@@ -94,10 +95,32 @@ ReportedFlight ByVehicle(const std::string& log, const ReportOptions& options) {
   return flight;
 }
 
+/// "planning 123, control 456", or each text once.
+std::string Listed(const TextByProcess& texts, bool with_process) {
+  std::set<std::string> items;
+  for (const auto& [process, text] : texts)
+    items.insert(with_process ? process + " " + text : text);
+  return fmt::format("{}", fmt::join(items, ", "));
+}
+
 }  // namespace
 
 ReportedFlight ReportFlight(const std::string& log, const ReportOptions& options) {
   return options.truth ? ByTruth(log, options) : ByVehicle(log, options);
+}
+
+std::string Heading(const ReportedFlight& flight) {
+  const Json& metrics = flight.page["metrics"];
+  const auto software = metrics["software"].get<std::map<std::string, TextByProcess>>();
+  std::string text =
+      fmt::format("{}\n  {}, {:.1f} s flown\n", flight.log, flight.page["title"].get<std::string>(),
+                  metrics["flown_s"].get<double>());
+  text += fmt::format("  {}\n", Listed(software.at("versions"), false));
+  if (const auto& sums = software.at("configurations"); !sums.empty())
+    text += fmt::format("  configurations: {}\n", Listed(sums, true));
+  for (const Json& loss : metrics["losses"]) text += fmt::format("  {}\n", loss.get<std::string>());
+  if (!flight.shortfall.empty()) text += fmt::format("  {}\n", flight.shortfall);
+  return text;
 }
 
 std::string Summary(const ReportedFlight& flight) {

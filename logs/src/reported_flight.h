@@ -23,6 +23,10 @@ struct ReportOptions {
 /// Throws std::runtime_error with one line when the log holds nothing to report.
 ReportedFlight ReportFlight(const std::string& log, const ReportOptions& options);
 
+/// Which flight it is, and of which software: log, scenario and seed, how much was flown, versions,
+/// configurations; what its log lost. Lines for people.
+std::string Heading(const ReportedFlight& flight);
+
 /// The criteria and the losses, a line each, for people.
 std::string Summary(const ReportedFlight& flight);
 

@@ -22,6 +22,7 @@
 #include "logs/src/landing_figures.h"
 #include "logs/src/lane.h"
 #include "logs/src/log_survey.h"
+#include "logs/src/round_numbers.h"
 
 namespace chase::logs {
 namespace {
@@ -97,6 +98,7 @@ class Gatherer {
     report.metrics["software"] = Json(info.SoftwareByKind());
     report.metrics["losses"] = info.Losses();
     report.metrics["log_whole"] = info.Whole();
+    RoundNumbers(&report.metrics);
     AddSeries(&report.series);
     return report;
   }

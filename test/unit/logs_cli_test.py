@@ -173,7 +173,9 @@ class LogTools(unittest.TestCase):
         self.assertEqual(answer.returncode, 2, answer.stderr)
         self.assertIn("cut off", answer.stderr)
         self.assertIn("IMU: ", answer.stdout)
-        metrics = json.loads((out / "metrics.json").read_text())
+        text = (out / "metrics.json").read_text()
+        self.assertNotRegex(text, r"\.\d{12}", "six significant digits")
+        metrics = json.loads(text)
         self.assertFalse(metrics["passed"])
         self.assertFalse(metrics["criteria"]["recorded"])
         self.assertGreater(metrics["lost_messages"]["IMU"], 0.6 * self.count("IMU"))
@@ -186,19 +188,24 @@ class LogTools(unittest.TestCase):
         same = run("chase-report", self.log, self.log, "--out", out)
         self.assertEqual(same.returncode, 2, "both end after a second of a minute")
         self.assertIn("B is worse in nothing", same.stdout)
-        self.assertIn("safe_ratio", (out / "comparison.txt").read_text())
-        self.assertIn('"compared":[{"key":"flown_s"', (out / "report.html").read_text())
+        text = (out / "comparison.txt").read_text()
+        self.assertIn(text, same.stdout)
+        for side in "AB":
+            self.assertRegex(text, rf"(?m)^{side}: {self.log}\n  gym, seed \d+, 1\.0 s flown\n  .*commit \w+"
+                             r".*\n  the log ends at 1\.0 s of ")
+        self.assertRegex(text, r"safe_ratio +100\.00 % +100\.00 %\n")
+        self.assertIn('"compared":[{"key":"safe_ratio"', (out / "report.html").read_text())
         own = run("chase-report", self.log, self.log, "--out", self.folder)
         self.assert_refused(own, 1, "own report", "another folder")
         bare = self.without("bare_b.lcm", lambda channel, k: channel in ("TRUTH", "SCENARIO"))
         mixed = run("chase-report", self.log, bare)  # by what both vehicles said
         self.assertEqual(mixed.returncode, 0, mixed.stderr)
-        self.assertRegex(mixed.stdout, r"pose_sigma_max_m +[\d.]+ +[\d.]+\n")
+        self.assertRegex(mixed.stdout, r"pose_sigma_max_m +[\d.]+ m +[\d.]+ m\n")
         blind = self.without("blind.lcm", lambda channel, k: channel == "POSE")
         worse = run("chase-report", self.log, blind).stdout
-        self.assertRegex(worse, r"odometry_ate_m +[\d.]+ +not known  WORSE")
+        self.assertRegex(worse, r"odometry_ate_m +[\d.]+ m +not known  WORSE")
         better = run("chase-report", blind, self.log).stdout
-        self.assertRegex(better, r"odometry_ate_m +not known +[\d.]+\n")
+        self.assertRegex(better, r"odometry_ate_m +not known +[\d.]+ m\n")
 
     def test_report_has_a_time_line_and_what_was_certified(self):
         out = self.folder / "lines"

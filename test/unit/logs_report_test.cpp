@@ -13,6 +13,7 @@
 #include "logs/src/read_flight.h"
 #include "logs/src/report_data.h"
 #include "logs/src/report_page.h"
+#include "logs/src/round_numbers.h"
 #include "logs_synthetic_flight.h"
 
 namespace chase::logs {
@@ -277,6 +278,29 @@ TEST(Compare, FlightsWithoutTruthByWhatTheySaid) {
     if (!f.a.empty()) worse[f.key] = f.worse;
   EXPECT_EQ(worse, (std::map<std::string, bool>{{"target_known_ratio", true},
                                                 {"latency_ms.POSE.p99", false}}));
+}
+
+TEST(Compare, FiguresHaveTheDigitsOfTheReportAndLessThanHalfOfOneIsNotWorse) {
+  const auto compared = [](double a, double b) {
+    const auto json = [](double ate) {
+      return R"({"visible_ratio": 0.98768, "odometry_ate_m": )" + std::to_string(ate) + "}";
+    };
+    std::map<std::string, ComparedFigure> figures;
+    for (const auto& f : CompareMetrics(json(a), json(b), 0.01)) figures[f.key] = f;
+    EXPECT_EQ(figures.at("visible_ratio").a, "98.77 %");
+    return figures.at("odometry_ate_m");
+  };
+  EXPECT_EQ(compared(0.0002022, 0.01).a, "0.000 m");
+  EXPECT_FALSE(compared(0.0100, 0.0104).worse) << "4 %, but 0.4 mm";
+  EXPECT_TRUE(compared(0.0100, 0.0106).worse);
+  EXPECT_FALSE(compared(0.1000, 0.1009).worse) << "0.9 mm, but 0.9 %";
+}
+
+TEST(RoundNumbers, ToSixDigitsInListsAndObjectsToo) {
+  auto json = nlohmann::ordered_json::parse(
+      R"({"a": 1.5499999999999998, "b": [1234567, 0.12345678], "c": {"d": 1e-9}, "e": "0.12345678"})");
+  RoundNumbers(&json);
+  EXPECT_EQ(json.dump(), R"({"a":1.55,"b":[1234567,0.123457],"c":{"d":1e-09},"e":"0.12345678"})");
 }
 
 }  // namespace
