@@ -56,6 +56,7 @@ await until('twenty states, two images, a sweep, and a drone and a plan that mov
 });
 assert.notStrictEqual(after.image, before.image, 'the image stands still');
 assert.ok(after.obstacles > 0 && after.health >= 5 && after.verdict.length > 0);
+assert.match(await page.textContent('#legend'), /chase.*wider.*kept.*safe only.*brake.*wait.*escape.*mitigate/);
 const fps = (after.frames - before.frames) / (Date.now() - since) * 1000;
 
 // Few calls into software GL draw the whole scene, and a machine that is slow at it draws less finely.
