@@ -20,6 +20,11 @@ TOOLS = [["chase-flight"], ["chase-plan"], ["chase-predict"], ["chase-report"],
          ["chase-campaign", "--out", "no/such", "--scenarios"]]
 TOOL_SERVICES = {"lidar", "camera", "odometry", "mapping", "perception", "prediction", "planning",
                  "control", "mission", "simulator"}
+CAMPAIGNS = ["perception_campaign", "perception_photos", "../test/mapping_campaign", "../test/mapping_walkers",
+             "../test/odometry_trial"]  # each flies one service
+SCRIPTS = ["deploy/build", "deploy/doctor", "deploy/fly", "deploy/setup", "deploy/slurm/submit", "deploy/spy", "test/run",
+           "test/flight/live_kills", "test/fuzz/make_corpus", "test/fuzz/run", "test/package/clean_root", "test/safety/run",
+           "test/sanitize/run", "test/viewer/live_flights.py"]
 LIMIT = 20  # s
 
 
@@ -28,6 +33,10 @@ def run(program, *arguments):
     name, *rest = [program] if isinstance(program, str) else program
     return subprocess.run([BIN / name, *rest, *map(str, arguments)], capture_output=True, text=True,
                           timeout=LIMIT, check=False)
+
+
+def programs():
+    return sorted(path.name for path in BIN.glob("chase-*")) + [name for name in CAMPAIGNS if (BIN / name).exists()]
 
 
 def first_scalar(dump):
@@ -92,26 +101,25 @@ class BadUse(unittest.TestCase):
             answer = run(program, "--version")
             self.assertEqual((answer.returncode, answer.stderr), (0, ""))
             self.assertRegex(answer.stdout, r"^\d+\.\d+\.\d+ \(commit [0-9a-z-]+\)\n$")
-        self.for_each(sorted(path.name for path in BIN.glob("chase-*")), check)
+        self.for_each(programs(), check)
 
     def test_every_program_refuses_what_it_does_not_know(self):
-        programs = sorted(path.name for path in BIN.glob("chase-*"))
-        self.for_each(programs, lambda program: self.assert_refused(
-            run(program, "--no-such-flag"), program))
+        self.for_each(programs(), lambda program: self.assert_refused(
+            run(program, "--no-such-flag"), pathlib.Path(program).name))
 
     def test_scripts_name_their_commit(self):
-        for script in ("build", "doctor", "fly", "setup", "slurm/submit", "spy"):
+        for script in SCRIPTS:
             with self.subTest(script=script):
-                answer = subprocess.run([TESTS.parent / "deploy" / script, "--version"], check=False,
+                answer = subprocess.run([TESTS.parent / script, "--version"], check=False,
                                         capture_output=True, text=True, timeout=LIMIT)
                 self.assertEqual((answer.returncode, answer.stderr), (0, ""))
                 self.assertRegex(answer.stdout, r"^\d+\.\d+\.\d+ \(commit [0-9a-z-]+\)\n$")
 
     def test_scripts_have_help(self):
-        for script in ("build", "doctor", "fly", "setup", "slurm/submit", "spy"):
+        for script in SCRIPTS:
             for flag in ("-h", "--help"):
                 with self.subTest(script=script, flag=flag):
-                    answer = subprocess.run([TESTS.parent / "deploy" / script, flag], check=False,
+                    answer = subprocess.run([TESTS.parent / script, flag], check=False,
                                             capture_output=True, text=True, timeout=LIMIT)
                     self.assertEqual((answer.returncode, answer.stderr), (0, ""))
                     self.assertGreater(len(answer.stdout), 40)

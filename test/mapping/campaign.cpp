@@ -163,12 +163,16 @@ int main(int argc, char** argv) {
   app.add_option("--config", arguments.config, "file with mapping's config");
   app.add_option("--length", arguments.length, "of the long flight, m");
   app.add_flag("--trace", arguments.trace, "print every listed mover");
-  CLI11_PARSE(app, argc, argv);
   try {
+    app.parse(argc, argv);
     chase::mapping_stage::Run(arguments);
+    return 0;
+  } catch (const CLI::Success& e) {
+    return app.exit(e);
+  } catch (const CLI::ParseError& e) {
+    fmt::print(stderr, "mapping_campaign: {}; see mapping_campaign --help\n", e.what());
   } catch (const std::exception& e) {
-    fmt::print(stderr, "{}\n", e.what());
-    return 1;
+    fmt::print(stderr, "mapping_campaign: {}\n", e.what());
   }
-  return 0;
+  return 1;
 }

@@ -121,12 +121,16 @@ int main(int argc, char** argv) {
   app.add_option("--seeds", arguments.count, "worlds of each kind");
   app.add_option("--config", arguments.config, "file with mapping's config");
   app.add_flag("--trace", arguments.trace, "print every walker that is judged");
-  CLI11_PARSE(app, argc, argv);
   try {
+    app.parse(argc, argv);
     chase::mapping_stage::Run(arguments);
+    return 0;
+  } catch (const CLI::Success& e) {
+    return app.exit(e);
+  } catch (const CLI::ParseError& e) {
+    fmt::print(stderr, "mapping_walkers: {}; see mapping_walkers --help\n", e.what());
   } catch (const std::exception& e) {
-    fmt::print(stderr, "{}\n", e.what());
-    return 1;
+    fmt::print(stderr, "mapping_walkers: {}\n", e.what());
   }
-  return 0;
+  return 1;
 }

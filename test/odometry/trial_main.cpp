@@ -48,7 +48,11 @@ int Run(int argc, char** argv) {
   CLI::App* endure = app.add_subcommand("endure", "memory over a long flight with odometry");
   AddFlightOptions(endure, &a);
   endure->add_option("--minutes", a.minutes, "simulated");
-  CLI11_PARSE(app, argc, argv);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::Success& e) {
+    return app.exit(e);
+  }
   if (*record) Record(a.flight, a.log);
   if (*judge) fmt::print("{}\n", Judge(a.judge));
   if (*endure) Endure(a.flight, a.minutes);
@@ -61,8 +65,10 @@ int Run(int argc, char** argv) {
 int main(int argc, char** argv) {
   try {
     return chase::odometry::trial::Run(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    fmt::print(stderr, "odometry_trial: {}; see odometry_trial --help\n", e.what());
   } catch (const std::exception& e) {
     fmt::print(stderr, "odometry_trial: {}\n", e.what());
-    return 1;
   }
+  return 1;
 }

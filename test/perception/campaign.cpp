@@ -114,12 +114,16 @@ int main(int argc, char** argv) {
   app.add_flag("--absent", a.stage.absent, "no target, nor a thing just like it: only look-alikes");
   app.add_flag("!--no-distractors", a.stage.distractors);
   app.add_flag("!--no-screens", a.stage.screens);
-  CLI11_PARSE(app, argc, argv);
   try {
+    app.parse(argc, argv);
     chase::perception_stage::Run(a);
+    return 0;
+  } catch (const CLI::Success& e) {
+    return app.exit(e);
+  } catch (const CLI::ParseError& e) {
+    fmt::print(stderr, "perception_campaign: {}; see perception_campaign --help\n", e.what());
   } catch (const std::exception& e) {
-    fmt::print(stderr, "{}\n", e.what());
-    return 1;
+    fmt::print(stderr, "perception_campaign: {}\n", e.what());
   }
-  return 0;
+  return 1;
 }

@@ -296,12 +296,16 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(5.0, 160.0));
   app.add_option("--seconds", a.seconds, "that the service is shown each photo");
   app.add_flag("--each", a.each, "a line for every draw and photo");
-  CLI11_PARSE(app, argc, argv);
   try {
+    app.parse(argc, argv);
     chase::perception::Run(a);
+    return 0;
+  } catch (const CLI::Success& e) {
+    return app.exit(e);
+  } catch (const CLI::ParseError& e) {
+    fmt::print(stderr, "perception_photos: {}; see perception_photos --help\n", e.what());
   } catch (const std::exception& e) {
     fmt::print(stderr, "perception_photos: {}\n", e.what());
-    return 1;
   }
-  return 0;
+  return 1;
 }

@@ -19,9 +19,10 @@ import subprocess
 import sys
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "test/replay"))
+sys.path += [str(ROOT / "test/replay"), str(ROOT / "deploy/launcher")]
 sys.dont_write_bytecode = True
 import lcmlog  # noqa: E402
+import version  # noqa: E402
 
 VIEWER_SHARE = 0.15  # of a core
 REAL_TIME = 0.995  # factor: 1.00 as it is shown
@@ -85,6 +86,7 @@ def is_good(row, judge):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--version", action="version", version=version.text())
     parser.add_argument("kinds", nargs="+", choices=KINDS)
     parser.add_argument("--scenario", default="gym")
     parser.add_argument("--seed", type=int, default=1)
