@@ -457,6 +457,17 @@ TEST(Metrics, LastResortsWithoutACertificateAreCounted) {
   EXPECT_EQ(json.at("accelerating_brakes"), 0);
 }
 
+TEST(Metrics, TheTimeUnderEveryVerdictIsTold) {
+  FlightRecord record = Standing({3, 0, 1.5}, {5.5, 0, 1.5});
+  for (int v = plan_t::CHASE; v <= plan_t::MITIGATE; ++v)
+    record.plans.push_back({v * 1.0, v, {}, {}});
+  const auto seconds = nlohmann::json::parse(MetricsJson(record, Compute(record))).at("verdict_s");
+  EXPECT_EQ(seconds.size(), 8u);
+  for (const char* name : {"chase", "wider", "kept", "safe_only", "brake", "wait", "escape"})
+    EXPECT_NEAR(seconds.at(name), 1.0, 0.011) << name;
+  EXPECT_NEAR(seconds.at("mitigate"), 3.0, 0.011) << "from 7 s to the end of 10 s";
+}
+
 TEST(Metrics, CriteriaFollowTheScenario) {
   FlightRecord record = Standing({3, 0, 1.5}, {5.5, 0, 1.5});
   record.scenario.criteria = {1.0, 0.95, 0.9, 1.2, 0.95, {}, -1.0, -1.0, -1.0, -1.0};
