@@ -40,11 +40,12 @@ std::optional<PictureTarget> PictureDetector::Find(const cv::Mat& bgr) {
         MakeDetector(config_.detector, config_.fit.edge_sigma_px, rig.value_or(config_.rig));
   size_ = bgr.size();
   const auto found = detector_->Detect(bgr);
-  if (found.empty() || found.front().score < config_.state.acquire_score) return std::nullopt;
-  PictureTarget target{found.front(), {}, {}};
+  const Detection* best = MostLikely(found);
+  if (!best || best->score < config_.state.acquire_score) return std::nullopt;
+  PictureTarget target{*best, {}, {}};
   if (!rig) return target;
   const Camera camera = CameraAt({}, *rig);
-  const auto fit = Localiser(config_).Acquire(ShapeOf(config_), camera, target.detection, {});
+  const auto fit = Localiser(config_).Acquire(ShapeOf(config_), camera, *best, {});
   if (!fit) return target;
   target.range = (fit->posterior.position() - camera.p_WC).norm();
   target.range_sigma = std::hypot(RangeSigma(fit->posterior, camera),

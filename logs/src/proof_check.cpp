@@ -22,7 +22,6 @@ class Way {
   Way(const plan_t& plan, const polynomial_t& way, const std::vector<proof_t>& proofs,
       double clearance)
       : plan_(plan),
-        way_(way),
         proofs_(proofs),
         radius_(Exact(plan.hard_radius) + Exact(clearance)),
         sigmas_(Exact(plan.sigmas)),
@@ -138,7 +137,6 @@ class Way {
   static constexpr double kLeaveBy = 0.25, kLeaveGroundBy = 0.6;  // tau
 
   const plan_t& plan_;
-  const polynomial_t& way_;
   const std::vector<proof_t>& proofs_;
   Rational radius_, sigmas_;
   Curve curve_, target_;
@@ -187,7 +185,8 @@ void Check(const plan_t& plan, const Grounds& grounds, Examination* result) {
   CheckRest(plan);
   if (!certified) return;
   Ask(plan.hard_radius >= grounds.hard_radius, "its sphere is too small");
-  Ask(plan.sigmas >= std::max(0.0, grounds.sigmas), "takes obstacles for more certain than they are");
+  Ask(plan.sigmas >= std::max(0.0, grounds.sigmas),
+      "takes obstacles for more certain than they are");
   Ask(Seconds(plan.utime) - Seconds(grounds.list->utime) <= Exact(kOldest),
       "was made for a list that was too old");
   const bool chases = plan.verdict <= plan_t::KEPT;

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <array>
 #include <opencv2/core.hpp>
 #include <string>
 

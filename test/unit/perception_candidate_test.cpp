@@ -83,6 +83,20 @@ TEST(PerceptionCandidate, PiecesOfOneThingDoNotGoTheWayThatTheyTell) {
   EXPECT_FALSE(c.Steady());
 }
 
+TEST(PerceptionCandidate, APieceStaysOneUntilAllOfItIsSeen) {
+  const Vector3d p(3.0, 0.0, 0.55);
+  Candidate c = CandidateAt(p, p, 0.01);
+  c.part = true;
+  Sighting s = c.last;
+  s.fit.posterior = c.track.state;
+  s.detection.cut[kLeft] = true;
+  c.Correct(s, Vector3d::Zero());
+  EXPECT_TRUE(c.part) << "the image's border may hide what it belongs to";
+  s.detection.cut[kLeft] = false;
+  c.Correct(s, Vector3d::Zero());
+  EXPECT_FALSE(c.part);
+}
+
 TEST(PerceptionCandidate, WhatComesOutFromBehindSomethingMustDriveFromThere) {
   const Vector3d p(3.0, 0.0, 0.55), q = p + Vector3d(0.0, 0.08, 0.0);
   Candidate c = CandidateAt(p, p, 0.01);
@@ -104,6 +118,21 @@ TEST(PerceptionCandidate, ADriftOfSecondsIsNoWay) {
   EXPECT_TRUE(c.Drives());
   c.track.t = 3.0;
   EXPECT_FALSE(c.Drives()) << "0.03 m/s";
+}
+
+TEST(PerceptionCandidate, ASmallOneThatWasAPieceMustDriveFromWhereItIsAlone) {
+  const Vector3d p(9.0, 0.0, 0.55);
+  for (const double width : {8.0, 30.0}) {
+    Candidate c = CandidateAt(p, p, 0.01);
+    c.part = true;
+    Sighting s = c.last;
+    s.fit.posterior = c.track.state;
+    s.fit.posterior.mean[1] = 0.3;
+    s.detection.box = {100.0, 80.0, width, 1.6 * width};
+    c.Correct(s, Vector3d::Zero());
+    EXPECT_FALSE(c.part);
+    EXPECT_EQ(c.Drives(), width > 20.0) << width;
+  }
 }
 
 TEST(PerceptionCandidate, HowLongItStoodBeforeDoesNotCount) {

@@ -160,6 +160,67 @@ TEST(PerceptionSilhouette, AnotherShadeBehindTheEdgeDoesNotMoveIt) {
   for (const auto& s : found[0].silhouette.samples[kBottom]) EXPECT_NEAR(s.y(), 150.5, 0.05);
 }
 
+TEST(PerceptionColor, TwoThingsJoinedByThreadsAreParted) {
+  cv::Mat image = Grey();  // the lower one before the other, its side leaning
+  for (int y = 86; y < 140; ++y) cv::line(image, {124 + (y - 86) / 18, y}, {155, y}, kOrangeBgr);
+  cv::rectangle(image, {158, 80}, {176, 112}, kOrangeBgr, cv::FILLED);
+  cv::rectangle(image, {155, 87}, {159, 92}, kOrangeBgr, cv::FILLED);
+  const auto found = ColorDetector(DetectorConfig{}, 0.45).Detect(image);
+  EXPECT_TRUE(std::any_of(found.begin(), found.end(), [](const Detection& d) {
+    return std::abs(d.box.x - 157.0) < 3.0 && std::abs(d.box.width - 19.0) < 4.0;
+  }));
+}
+
+TEST(PerceptionColor, WhatShowsAboveTheTargetIsPartedFromIt) {
+  cv::Mat image = Grey();  // a ball behind the upper end of a cylinder
+  cv::circle(image, {166, 116}, 18, kOrangeBgr, cv::FILLED);
+  cv::rectangle(image, {144, 130}, {186, 205}, kOrangeBgr, cv::FILLED);
+  const auto found = ColorDetector(DetectorConfig{}, 0.45).Detect(image);
+  const auto piece = std::find_if(found.begin(), found.end(), [](const Detection& d) {
+    return std::abs(d.box.y - 130.0) < 4.0 && d.box.height > 70.0 && d.box.width > 40.0 &&
+           std::abs(d.box.x - 143.5) < 1.0;
+  });
+  ASSERT_NE(piece, found.end());
+  EXPECT_TRUE(piece->parted[kTop]) << "a like colour goes on there, and the outline jumps";
+  EXPECT_TRUE(piece->cut[kTop] && piece->silhouette.samples[kTop].empty());
+  EXPECT_FALSE(piece->cut[kLeft] || piece->cut[kBottom]);
+}
+
+TEST(PerceptionSilhouette, APieceHasNoSliverOfALeaningThingBesideIt) {
+  cv::Mat bgr(240, 200, CV_8UC3, cv::Scalar(90, 90, 90));
+  const cv::Scalar orange(0, 115, 255);
+  cv::rectangle(bgr, cv::Rect(20, 30, 69, 201), orange, cv::FILLED);
+  cv::rectangle(bgr, cv::Rect(89, 135, 3, 26), orange, cv::FILLED);  // leans out below the target
+  cv::rectangle(bgr, cv::Rect(80, 90, 28, 45), orange, cv::FILLED);
+  Detection joined;
+  joined.mask_box = {20, 30, 88, 201};
+  cv::inRange(bgr(joined.mask_box), orange, orange, joined.mask);
+  bool found = false;
+  for (const auto& piece : Split(bgr, joined))
+    found = found || (piece.mask_box.y == 90 && piece.mask_box.height == 45 &&
+                      piece.mask_box.br().x == 108 && piece.cut[kLeft]);
+  EXPECT_TRUE(found);
+}
+
+TEST(PerceptionSilhouette, APartedSideStaysOneInASmallerPiece) {
+  cv::Mat image = Grey();
+  cv::rectangle(image, {100, 60}, {140, 130}, kOrangeBgr, cv::FILLED);
+  const auto whole = ColorDetector(DetectorConfig{}, 0.45).Detect(image).at(0);
+  auto left = CropTo(image, whole, {0, 0, 120, 240});
+  ASSERT_TRUE(left && left->goes_on[kRight]);
+  left->parted[kRight] = true;
+  const auto lower = CropTo(image, *left, {0, 90, 376, 150});
+  ASSERT_TRUE(lower);
+  EXPECT_TRUE(lower->goes_on[kRight] && lower->parted[kRight] && lower->cut[kRight]);
+  EXPECT_TRUE(lower->silhouette.samples[kRight].empty());
+  EXPECT_TRUE(lower->goes_on[kTop]);
+  EXPECT_FALSE(lower->parted[kTop] || lower->goes_on[kLeft] || lower->goes_on[kBottom]);
+  const auto narrower = CropTo(image, *left, {0, 0, 110, 240});
+  ASSERT_TRUE(narrower);
+  EXPECT_TRUE(narrower->goes_on[kRight]);
+  EXPECT_FALSE(narrower->parted[kRight]) << "cut anew, where nothing parts it";
+}
+
 TEST(PerceptionSilhouette, SidesAtTheImagesBorderAreCut) {
   cv::Mat image = Grey();
   cv::rectangle(image, {0, 80}, {25, 150}, kOrangeBgr, cv::FILLED);

@@ -176,8 +176,7 @@ TEST(PerceptionLocaliser, HiddenHalfDoesNotBendTheEstimate) {
 }
 
 TEST(PerceptionLocaliser, WhatComesBackIsRatherHalfHidden) {
-  const PerceptionConfig config;
-  const Localiser localiser(config);
+  const Localiser localiser(PerceptionConfig{});
   const Vector3d target(3.0, 0.2, 0.55);
   auto input = InputFor(BodyAt({0, 0, 1.2}, 0, 0, 0), target + Vector3d(0.02, 0.01, 0.0), 0.1);
   auto outline = DenseOutline(input.camera, target);
@@ -195,6 +194,26 @@ TEST(PerceptionLocaliser, WhatComesBackIsRatherHalfHidden) {
   ASSERT_TRUE(half && half_again);
   EXPECT_LT(half->log_odds, whole->log_odds);
   EXPECT_GT(half_again->log_odds, half->log_odds + 1.0);
+}
+
+TEST(PerceptionLocaliser, ALikeColourBeyondAWindowCostsUnlessItWasThereBefore) {
+  const Localiser localiser(PerceptionConfig{});
+  const Vector3d target(3.0, 0.2, 0.55);
+  auto input = InputFor(BodyAt({0, 0, 1.2}, 0, 0, 0), target + Vector3d(0.02, 0.01, 0.0), 0.06);
+  auto outline = DenseOutline(input.camera, target);
+  outline.silhouette.samples[kTop].clear();
+  outline.cut[kTop] = outline.goes_on[kTop] = true;
+  input.detection = &outline;
+  const auto odds = [&] { return localiser.Correct(input, {})->log_odds; };
+  ASSERT_TRUE(localiser.Correct(input, {}));
+  EXPECT_TRUE(localiser.Correct(input, {})->joined);
+  const double beyond_window = odds();
+  input.joined = true;
+  const double as_before = odds();
+  input.joined = false;
+  outline.parted[kTop] = true;
+  EXPECT_GT(as_before, beyond_window + 1.0);
+  EXPECT_GT(odds(), as_before);
 }
 
 TEST(PerceptionLocaliser, NearestSurfaceInTheBoxIsTakenNotTheWallBehind) {

@@ -76,6 +76,21 @@ TEST(PerceptionRays, OnlyThoseThroughThePlacedTargetCount) {
   EXPECT_EQ(RaysThrough(input, placed), 0) << "they end on it";
 }
 
+TEST(PerceptionRays, ManyPointsAndNoneOfThemOnTheTargetHitAnotherThing) {
+  const FitInput input = Predicted();
+  std::vector<TargetPoint> behind, on;
+  for (int i = 0; i < 10; ++i) behind.push_back(PointAt({4.0, 0.02 * i, 0.5}));
+  for (int i = 0; i < 3; ++i) on.push_back(PointAt({2.85, 0.0, 0.45 + 0.1 * i}));
+  const std::vector<TargetPoint> seven(behind.begin(), behind.begin() + 7);
+  std::vector<TargetPoint> mixed = on;
+  mixed.insert(mixed.end(), seven.begin(), seven.end());
+  EXPECT_TRUE(HitElsewhere(input, {behind}));
+  EXPECT_FALSE(HitElsewhere(input, {on, seven}));
+  EXPECT_FALSE(HitElsewhere(input, {mixed}));
+  behind.pop_back();
+  EXPECT_FALSE(HitElsewhere(input, {behind}));
+}
+
 TEST(PerceptionPieces, WhatGoesWithTheWidthIsThePiecesOwn) {
   cv::Mat bgr(240, 376, CV_8UC3, cv::Scalar::all(120));
   bgr(cv::Rect(100, 60, 80, 90)).setTo(cv::Scalar(12, 105, 235));

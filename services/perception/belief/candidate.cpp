@@ -32,18 +32,20 @@ Placed Candidate::Now() const {
 }
 
 void Candidate::Correct(const Sighting& sighting, const Eigen::Vector3d& camera) {
-  const bool was_partial = track.partial;
+  const bool was_partial = track.partial, was_part = part;
   track.Correct(sighting.fit);
   last = sighting;
   p_WC = camera;
   const Detection& d = sighting.detection;
   sweeps += sighting.SurelyHit() && sighting.fit.whole && !d.AnyCut();
   odds += (sighting.fit.log_odds - odds) / std::max(1, track.hits - 1);
+  part = part && (d.part || d.AnyCut());
   const auto spread = [](const Placed& at) { return at.covariance.topLeftCorner<2, 2>().trace(); };
-  // Before, what hid it may have seemed its edge.
+  // Before, what hid it, or what a small one seemed a piece of, may have seemed its edge.
   const bool out = was_partial && !track.partial && !SurelyDrives(kSureWay);
+  const bool alone = was_part && !part && d.box.width < kSharpSigmas * d.silhouette.sigma_px;
   const bool better = track.t - first.t > kAnew || spread(Now()) < kBetter * spread(first);
-  if (out || (better && LogDrives() < 0.0)) first = Now();
+  if (out || alone || (better && LogDrives() < 0.0)) first = Now();
 }
 
 Candidate NewCandidate(const Sighting& sighting, const View& view) {
@@ -55,6 +57,7 @@ Candidate NewCandidate(const Sighting& sighting, const View& view) {
   c.first = c.Now();
   c.edge = sighting.detection.silhouette.sigma_px / std::sqrt(kEdgeWeight) * c.Range() /
            view.camera.rig.focal_px;
+  c.part = sighting.detection.part;
   c.sweeps = sighting.Clear();
   return c;
 }

@@ -4,6 +4,9 @@
 
 namespace chase::perception {
 
+/// Sigmas of an edge from which a width tells a range, and a place across is known.
+inline constexpr double kSharpSigmas = 24.0;
+
 /// Where something was known to be at one time; frame W.
 struct Placed {
   double t = 0.0;                                        ///< s
@@ -26,7 +29,8 @@ struct Candidate {
   double edge = 0.0;   ///< standard deviation of an edge of it at first, across, m
   Eigen::Vector3d p_WC = Eigen::Vector3d::Zero();  ///< the camera then, frame W, m
 
-  int sweeps = 0;  ///< sightings of all of it that LiDAR surely hit
+  bool part = false;  ///< a piece of something larger, always so far: it must drive
+  int sweeps = 0;     ///< sightings of all of it that LiDAR surely hit
   double odds =
       0.0;  ///< mean of its sightings' log odds, but for the first, which it was placed on
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <deque>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -40,7 +41,7 @@ struct Sighting {
   /// True when LiDAR points tell that it is one thing.
   bool SurelyHit() const { return fit.n_points >= kSurelyHit; }
   /// True when all of it is seen, on its own, and LiDAR points tell where it is.
-  bool Clear() const { return fit.whole && SurelyHit() && !detection.AnyCut(); }
+  bool Clear() const { return fit.whole && SurelyHit() && !detection.part && !detection.AnyCut(); }
 };
 
 /// Keeps poses and sweeps; finds a given thing, or a new one, in a frame.
@@ -59,11 +60,13 @@ class Finder {
   /// The frame's detections, or nothing with `note` saying why.
   std::optional<View> Look(const Frame& frame, std::string* note) const;
 
+  /// True for a sighting that belongs to something else.
+  using Refuses = std::function<bool(const Sighting&)>;
   /// The detection that the track explains best; it is marked as taken.
-  std::optional<Sighting> Find(const TargetTrack& track, View* view) const;
-  /// One detection as the thing of a track.
+  std::optional<Sighting> Find(const TargetTrack& track, View* view, const Refuses& refuses) const;
+  /// One detection as the thing of a track. Points already used may be asked for again.
   std::optional<Sighting> Try(const TargetTrack& track, const View& view,
-                              const Detection& detection) const;
+                              const Detection& detection, bool fresh_sweeps_only) const;
   /// One detection as a target of which nothing is known.
   std::optional<Sighting> Acquire(const View& view, const Detection& detection) const;
   bool HasSweeps() const { return !sweeps_.empty(); }
@@ -76,6 +79,9 @@ class Finder {
     bool used = false;
   };
 
+  std::optional<Sighting> Best(const TargetTrack& track, const View& view,
+                               const std::vector<size_t>& inside, const Refuses& refuses,
+                               const SearchBoxes& boxes) const;
   void WeighHidden(const View& view, FitInput input, FitResult* fit) const;
   Clusters Points(const View& view, const Detection& detection, const Eigen::Vector3d& v_WT,
                   bool fresh_only) const;

@@ -28,7 +28,7 @@ Perceiver::Perceiver(const PerceptionConfig& config) : config_(config), finder_(
 void Perceiver::Follow(View* view) {
   if (!track_) return;
   auto taken = view->taken;
-  const auto found = finder_.Find(*track_, view);
+  const auto found = finder_.Find(*track_, view, [](const Sighting&) { return false; });
   if (!found || !Sure(*found)) {
     view->taken = taken;
     ++track_->misses;

@@ -73,9 +73,9 @@ bool Perceiver::Ready(const Candidate& c, double t) const {
   if (c.track.misses > 0 || c.track.hits < Candidate::kConfirmFrames) return false;
   const Detection& d = c.last.detection;
   const bool unclear = d.AnyCut() && !c.last.SurelyHit();
-  const bool piece = c.track.partial || d.LeavesImage() || unclear;
+  const bool piece = c.part || c.track.partial || d.LeavesImage() || unclear;
   if (piece ? PieceIsReady(c) : c.Drives()) return true;
-  const bool hidden = c.track.partial && !d.LeavesImage() && c.last.SurelyHit();
+  const bool hidden = c.track.partial && !c.part && !d.LeavesImage() && c.last.SurelyHit();
   return (!piece || (hidden && c.Alike())) && !sighting_ && StandsLongEnough(c, t);
 }
 

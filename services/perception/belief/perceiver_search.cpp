@@ -18,7 +18,8 @@ constexpr double kPointed = 1.0;      // s that what is pointed at is looked for
 
 void Perceiver::FollowCandidates(View* view) {
   for (auto& c : candidates_) {
-    const auto again = finder_.Find(c.track, view);
+    const auto again =
+        finder_.Find(c.track, view, [&](const Sighting& s) { return s.detection.part && !c.part; });
     if (!again || !(again->fit.whole || c.track.partial)) {
       ++c.track.misses;
       continue;
@@ -59,19 +60,31 @@ bool Perceiver::Followed(const Sighting& s) const {
 }
 
 void Perceiver::AddCandidates(View* view) {
-  const bool comes_back = track_ && !tentative_ && track_->Proven();
-  for (size_t i = 0; i < view->detections.size() && candidates_.size() < kMaxCandidates; ++i) {
+  std::vector<size_t> order;  // near before far, the middle before the border
+  for (size_t i = 0; i < view->detections.size(); ++i) {
     if (view->taken[i]) continue;
-    const Detection& d = view->detections[i];
-    const auto found = MayBeNew(d) ? finder_.Acquire(*view, d) : std::nullopt;
+    if (MayBeNew(view->detections[i]))
+      order.push_back(i);
+    else
+      CountRefused(view->detections[i]);
+  }
+  std::stable_sort(order.begin(), order.end(), [&](size_t a, size_t b) {
+    return Prominence(view->detections[a], config_.rig) >
+           Prominence(view->detections[b], config_.rig);
+  });
+  const bool comes_back = track_ && !tentative_ && track_->Proven();
+  for (const size_t i : order) {
+    if (candidates_.size() >= kMaxCandidates) return;
+    const auto found = finder_.Acquire(*view, view->detections[i]);
     // A part of it has another outline: LiDAR must tell its range, and so how much is hidden.
-    const bool fits = found && (d.score >= config_.state.acquire_score ||
+    const bool fits = found && (found->detection.score >= config_.state.acquire_score ||
                                 (!found->fit.whole && found->SurelyHit()));
-    if (!fits) CountRefused(d);
-    if (!fits || !InGate(*found, view->t) || Followed(*found)) continue;
-    // What shows in part needs LiDAR points, unless the target may come back.
-    if (found->fit.whole || found->fit.n_points > 0 || comes_back)
-      candidates_.push_back(NewCandidate(*found, *view));
+    if (!fits) CountRefused(view->detections[i]);
+    if (!fits || !InGate(*found, view->t)) continue;
+    // A piece needs LiDAR points, and so does what shows in part unless the target may come back.
+    const bool needs_points = found->detection.part || (!found->fit.whole && !comes_back);
+    if ((needs_points && found->fit.n_points == 0) || Followed(*found)) continue;
+    candidates_.push_back(NewCandidate(*found, *view));
   }
 }
 
@@ -94,7 +107,7 @@ void Perceiver::Confirm(const View& view) {
   const Candidate chosen = *best;
   const bool drives = chosen.Drives() || PieceIsReady(chosen);
   for (const auto& c : candidates_)
-    if (&c != best && drives && !c.Drives() && c.track.hits >= Candidate::kConfirmFrames)
+    if (&c != best && drives && !c.Drives() && !c.part && c.track.hits >= Candidate::kConfirmFrames)
       look_alikes_.push_back({c.track.state.position(), view.t});
   if (sighting_) look_alikes_.push_back({track_->state.position(), view.t});
   while (look_alikes_.size() > kMostLookAlikes) look_alikes_.pop_front();
@@ -113,7 +126,7 @@ void Perceiver::TakeSelected(View* view) {
   };
   const Detection* nearest = nullptr;
   for (const Detection& d : view->detections)
-    if (off(d) <= d.box.width && (!nearest || off(d) < off(*nearest))) nearest = &d;
+    if (!d.part && off(d) <= d.box.width && (!nearest || off(d) < off(*nearest))) nearest = &d;
   if (!nearest) return;
   const auto found = finder_.Acquire(*view, *nearest);
   if (!found) return;

@@ -49,6 +49,7 @@ void TargetTrack::Correct(const FitResult& fit) {
   shape = fit.shape;
   seen = t;
   if (fit.n_points > 0) ranged = t;
+  joined = fit.joined;
   partial = partial && !fit.whole;
   misses = 0;
   ++hits;

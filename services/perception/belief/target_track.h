@@ -16,6 +16,7 @@ struct TargetTrack {
   double t = 0.0;     ///< s
   double seen = 0.0;  ///< time of the last correction, s
   int hits = 0, misses = 0;
+  bool joined = false;   ///< a like colour went on beyond a side of it when it was last seen
   bool partial = false;  ///< something hid part of it whenever it was seen
   double ranged = -std::numeric_limits<double>::infinity();  ///< when LiDAR last hit it, s
 

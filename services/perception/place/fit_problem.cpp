@@ -208,8 +208,12 @@ FitResult FitProblem::Read(const Vector7d& y, const Matrix7d& covariance, double
       edges[side].push_back(EdgeResidual(side, edge, y).value / Range(y));
   ReadSides(edges, &out);
   std::vector<double> points;
-  for (const auto& p : input_.points) points.push_back(SurfaceDistance(input_.shape, p, y).value);
+  for (const auto& p : input_.points) {
+    points.push_back(SurfaceDistance(input_.shape, p, y).value);
+    out.point_rms += points.back() * points.back();
+  }
   out.n_points = static_cast<int>(points.size());
+  out.point_rms = std::sqrt(out.point_rms / std::max(1, out.n_points));
   out.ok = out.posterior.covariance.allFinite() && ReadEvidence(edges, points, &out);
   return out;
 }

@@ -10,9 +10,11 @@ namespace chase::perception {
 
 namespace {
 
-constexpr double kTurnSpeed = 1.0;   // m/s, standard deviation of the speed a sharp turn adds
-constexpr double kTurnShift = 0.12;  // m, and of the place
-constexpr double kAside = 0.1;       // share of the range that a new target may lie beside its box
+constexpr double kHiddenBy = 2.0;     // standard deviations of an edge
+constexpr double kTurnSpeed = 1.0;    // m/s, standard deviation of the speed a sharp turn adds
+constexpr double kTurnShift = 0.12;   // m, and of the place
+constexpr double kKnownRange = 0.25;  // m, standard deviation of the prediction
+constexpr double kAside = 0.1;        // share of the range that a new target may lie beside its box
 
 constexpr double kHidden = 0.02;      // how often a given side is hidden,
 constexpr double kStillHidden = 0.3;  // and of what comes back from behind something
@@ -31,10 +33,10 @@ double LogSides(const FitResult& fit, const FitInput& input) {
   const double range = (fit.posterior.position() - input.camera.p_WC).norm();
   const double px = input.camera.rig.focal_px / std::max(kNearest, range);
   double sum = 0.0;
-  double runs_on = kRunsOn;
+  double runs_on = input.joined ? kRunsOnToo : kRunsOn;
   bool still_hidden = input.reappears;
   for (size_t side = 0; side < 4; ++side) {
-    if (input.detection->goes_on[side]) {
+    if (input.detection->goes_on[side] && !input.detection->parted[side]) {
       sum += std::log(runs_on);
       runs_on = kRunsOnToo;
     }
@@ -79,6 +81,12 @@ double LogPosition(const FitResult& fit, const FitInput& input) {
 }
 
 }  // namespace
+
+double HiddenBy(const FitInput& input) { return kHiddenBy * input.detection->silhouette.sigma_px; }
+
+bool RangeIsKnown(const FitInput& input) {
+  return !input.points.empty() || RangeSigma(input.prior, input.camera) < kKnownRange;
+}
 
 FitInput AfterASharpTurn(const FitInput& input) {
   Eigen::Vector2d sight = (input.prior.position() - input.camera.p_WC).head<2>().normalized();

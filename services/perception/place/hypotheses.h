@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <vector>
 
 #include "services/perception/place/target_fit.h"
 
@@ -24,6 +25,12 @@ inline constexpr std::array<Sides, 12> kReadings = {{{true, true, true, true},
                                                      {false, false, true, true},
                                                      {false, false, false, true}}};
 inline constexpr size_t kOneHidden = 5;  ///< of them, with at most one side left out
+
+/// Least distance of a hidden side from the fitted outline, px.
+double HiddenBy(const FitInput& input);
+
+/// True when the prediction or the LiDAR tells how far away it is.
+bool RangeIsKnown(const FitInput& input);
 
 /// The input with the prediction of a target that has just braked, turned or been pushed; across
 /// the line of sight only unless points tell the range, since the apparent size alone would take

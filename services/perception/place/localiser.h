@@ -37,6 +37,8 @@ class Localiser {
   std::optional<FitResult> AcquirePartial(FitInput* input, const Clusters& clusters) const;
   void Weigh(const FitInput& input, double log_prior, size_t readings,
              std::vector<Hypothesis>* out) const;
+  bool EdgesAgree(const FitResult& fit, const FitInput& input) const;
+  bool Agrees(const FitResult& fit, double prior_gate) const;
 
   PerceptionConfig config_;
 };

@@ -46,4 +46,21 @@ std::optional<Detection> Within(const SearchBoxes& boxes, const cv::Mat& bgr,
   return CropTo(bgr, detection, window);
 }
 
+double Likeness(const cv::Rect2d& box, const SearchBoxes& boxes) {
+  const auto alike = [](double a, double b) { return std::min(a, b) / std::max({a, b, 1.0}); };
+  const auto beside = [](double a, double width, double b, double wanted, double reach) {
+    return std::abs(a + 0.5 * width - b - 0.5 * wanted) / std::max(1.0, reach);
+  };
+  const cv::Rect2d &e = boxes.expected, &s = boxes.search;
+  const double off = std::hypot(beside(box.x, box.width, e.x, e.width, s.width),
+                                beside(box.y, box.height, e.y, e.height, s.height));
+  return alike(box.width, e.width) * alike(box.height, e.height) / (1.0 + off);
+}
+
+double Prominence(const Detection& detection, const world::Rig& rig) {
+  const auto& box = detection.box;
+  const double aside = (box.x + 0.5 * box.width - rig.center_u_px) / (0.5 * rig.width_px);
+  return box.height * std::exp(-aside * aside);
+}
+
 }  // namespace chase::perception

@@ -22,4 +22,10 @@ std::optional<SearchBoxes> WhereToLook(const TargetGaussian& thing, const Target
 std::optional<Detection> Within(const SearchBoxes& boxes, const cv::Mat& bgr,
                                 const Detection& detection);
 
+/// 1 for the size that is expected in the middle of where it is expected, less for all else.
+double Likeness(const cv::Rect2d& box, const SearchBoxes& boxes);
+
+/// Height in the image [px], counted less towards the sides.
+double Prominence(const Detection& detection, const world::Rig& rig);
+
 }  // namespace chase::perception

@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <optional>
 #include <vector>
 
 #include "services/perception/perception_config.h"
@@ -47,7 +48,8 @@ struct FitInput {
   std::array<bool, 4> use_side = {true, true, true, true};  ///< by Side
   std::vector<TargetPoint> points;
   const Clusters* hits = nullptr;  ///< all points on the detection, the target's or not; or null
-  bool reappears = false;          ///< all or part of it was hidden before, and part may still be
+  bool joined = false;     ///< a like colour went on beyond a side of it in the frame before
+  bool reappears = false;  ///< all or part of it was hidden before, and part may still be
 };
 
 struct FitResult {
@@ -59,6 +61,7 @@ struct FitResult {
   bool whole = true;                   ///< no side that the detection shows is left out
   bool joined = false;                 ///< a like colour goes on beyond a side
   int n_points = 0;                    ///< LiDAR points in the fit
+  double point_rms = 0.0;              ///< distance of the points from the surface, m
   double prior_distance = 0.0;         ///< squared Mahalanobis distance from the prior
   double cost = 0.0;                   ///< half the robust sum of squares, prior included
   /// Logarithm of the prediction's density of these measurements, but for what the measurements'
@@ -68,15 +71,9 @@ struct FitResult {
   double log_odds = 0.0;  ///< of being the target rather than anything else of its colour
 };
 
-/// When the solver ends: iterations, and change of the cost, as a share.
-struct Effort {
-  int iterations = 8;
-  double tolerance = 1e-5;
-};
-
 /// The most likely position and velocity of the target (of a box its heading, too) from silhouette,
 /// LiDAR points, each at its own time, and prediction, with the covariance: one step of an iterated
 /// extended Kalman filter, by Ceres' TinySolver from the prediction on.
-FitResult FitTarget(const FitInput& input, const FitConfig& config, const Effort& effort = {});
+FitResult FitTarget(const FitInput& input, const FitConfig& config);
 
 }  // namespace chase::perception

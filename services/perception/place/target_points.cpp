@@ -9,11 +9,12 @@ namespace chase::perception {
 
 namespace {
 
-constexpr size_t kMinPoints = 3;   // of a cluster that gives a range
-constexpr int kManyPoints = 5;     // that went through it: the target is not there
-constexpr double kCore = 0.6;      // share of the target that such a ray goes through
-constexpr double kMostOfIt = 0.8;  // likewise of a target that is placed well
-constexpr double kBehind = 0.25;   // m behind the target where such a ray ends at least
+constexpr size_t kMinPoints = 3;    // of a cluster that gives a range
+constexpr size_t kMostPoints = 40;  // in a fit
+constexpr int kManyPoints = 5;      // that went through it: the target is not there
+constexpr double kCore = 0.6;       // share of the target that such a ray goes through
+constexpr double kMostOfIt = 0.8;   // likewise of a target that is placed well
+constexpr double kBehind = 0.25;    // m behind the target where such a ray ends at least
 
 /// True when the lidar looked through this share of the target, and hit something behind it.
 bool SawThrough(const TargetPoint& point, const TargetShape& shape, const TargetGaussian& target,
@@ -50,7 +51,10 @@ std::vector<TargetPoint> PointsOnTarget(const FitInput& input,
   for (const auto& p : cluster)
     if (std::abs(SurfaceDistance(input.shape, p, y).value) < gate) kept.push_back(p);
   if (!GivesRange(kept)) return {};
-  return kept;
+  const size_t step = 1 + kept.size() / kMostPoints;  // more would not tell more
+  std::vector<TargetPoint> some;
+  for (size_t i = 0; i < kept.size(); i += step) some.push_back(kept[i]);
+  return some;
 }
 
 bool SeenThrough(const FitInput& input, const Clusters& clusters) {
@@ -60,6 +64,19 @@ bool SeenThrough(const FitInput& input, const Clusters& clusters) {
 
 int RaysThrough(const FitInput& input, const TargetGaussian& target) {
   return input.hits ? CountThrough(*input.hits, input.shape, target, kMostOfIt, 0.0) : 0;
+}
+
+bool HitElsewhere(const FitInput& input, const Clusters& clusters) {
+  if (CountPoints(clusters) < kSurelyHit) return false;
+  return std::all_of(clusters.begin(), clusters.end(), [&](const auto& cluster) {
+    return PointsOnTarget(input, cluster, kLidarGate).empty();
+  });
+}
+
+size_t CountPoints(const Clusters& clusters) {
+  size_t count = 0;
+  for (const auto& cluster : clusters) count += cluster.size();
+  return count;
 }
 
 double MedianRange(const std::vector<TargetPoint>& cluster) {

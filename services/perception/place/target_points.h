@@ -15,8 +15,8 @@ inline constexpr int kSurelyHit = 10;
 /// Standard deviation of the target's position along the line of sight [m].
 double RangeSigma(const TargetGaussian& target, const Camera& camera);
 
-/// The points of a cluster that lie within `gate` m of the predicted surface; none when they are
-/// too few to give a range.
+/// The points of a cluster that lie within `gate` m of the predicted surface, thinned; none when
+/// they are too few to give a range.
 std::vector<TargetPoint> PointsOnTarget(const FitInput& input,
                                         const std::vector<TargetPoint>& cluster, double gate);
 
@@ -26,6 +26,12 @@ bool SeenThrough(const FitInput& input, const Clusters& clusters);
 
 /// Rays to the points on the detection that go through a target placed there, and end behind it.
 int RaysThrough(const FitInput& input, const TargetGaussian& target);
+
+/// True when many points hit the detection, and none of them the target as predicted.
+bool HitElsewhere(const FitInput& input, const Clusters& clusters);
+
+/// Points in all clusters.
+size_t CountPoints(const Clusters& clusters);
 
 /// From the camera [m]; the cluster must hold enough points to give a range.
 double MedianRange(const std::vector<TargetPoint>& cluster);

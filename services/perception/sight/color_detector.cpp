@@ -14,7 +14,11 @@ constexpr double kAspectTolerance = 0.35;  // one standard deviation of its loga
 constexpr double kFillTolerance = 0.2;     // one standard deviation
 constexpr size_t kMaxBlobs = 16;           // the best so many are looked at
 constexpr double kMaskScore = 127.0;       // half of full score: the blob's pixels
+constexpr double kOneThing = 0.85;         // score of a blob that is surely not several
+constexpr double kWellShaped = 0.35;       // of a piece of one that may be
 constexpr double kSharp = 2.0;             // px, width of an edge between two pixels or on one
+constexpr int kSplitArea = 60;             // px^2 of a blob that may be several
+constexpr size_t kMostPieces = 10;
 
 double Bell(double x, double sigma) { return std::exp(-0.5 * (x / sigma) * (x / sigma)); }
 
@@ -75,6 +79,28 @@ Detection Describe(const ShapeConfig& shape, const cv::Mat& bgr, const cv::Mat& 
   return d;
 }
 
+void KeepBest(size_t most, std::vector<Detection>* found) {
+  std::stable_sort(found->begin(), found->end(),
+                   [](const Detection& a, const Detection& b) { return a.score > b.score; });
+  if (found->size() > most) found->resize(most);
+}
+
+/// Adds the best shaped pieces of large enough blobs that are not surely one thing.
+void AddPieces(const ShapeConfig& shape, const cv::Mat& bgr, const cv::Mat& score,
+               std::vector<Detection>* found) {
+  std::vector<Detection> pieces;
+  for (const auto& whole : *found) {
+    if (whole.score > kOneThing || cv::countNonZero(whole.mask) < kSplitArea) continue;
+    for (auto& piece : Split(bgr, whole)) {
+      Rate(shape, score, &piece);
+      piece.part = whole.score > kWellShaped;
+      if (piece.score > kWellShaped) pieces.push_back(std::move(piece));
+    }
+  }
+  KeepBest(kMostPieces, &pieces);
+  for (auto& piece : pieces) found->push_back(std::move(piece));
+}
+
 }  // namespace
 
 std::vector<Detection> ColorDetector::Detect(const cv::Mat& bgr) const {
@@ -88,15 +114,14 @@ std::vector<Detection> ColorDetector::Detect(const cv::Mat& bgr) const {
     Detection d = Describe(shape_, bgr, score, contour);
     if (cv::countNonZero(d.mask) >= kLeastArea) found.push_back(std::move(d));
   }
-  std::stable_sort(found.begin(), found.end(),
-                   [](const Detection& a, const Detection& b) { return a.score > b.score; });
-  if (found.size() > kMaxBlobs) found.resize(kMaxBlobs);
+  KeepBest(kMaxBlobs, &found);
   for (auto& d : found) {
     d.silhouette = TraceSilhouette(bgr, d.mask, d.mask_box, d.cut);
     const double blur = std::max(1.0, EdgeWidth(bgr, d.mask, d.mask_box) / kSharp);
     d.silhouette.departure_px = shape_.outline_sigma * d.box.width;
     d.silhouette.sigma_px = std::hypot(blur * edge_sigma_px_, d.silhouette.departure_px);
   }
+  AddPieces(shape_, bgr, score, &found);
   return found;
 }
 

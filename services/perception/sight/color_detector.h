@@ -8,7 +8,8 @@
 
 namespace chase::perception {
 
-/// Blobs of the target's colour, ranked by their shape.
+/// Blobs of the target's colour, ranked by their shape, and after them pieces of those that
+/// may be several things, ranked likewise.
 class ColorDetector : public Detector {
  public:
   static constexpr double kLeastArea = 20.0;  ///< px^2; smaller blobs are noise

@@ -28,10 +28,12 @@ struct Detection {
   double solidity = 0.0;                ///< score of a part of the target, by colour and convexity
   std::array<bool, 4> cut = {};         ///< by Side: it goes on where the image, or the piece, ends
   std::array<bool, 4> goes_on = {};     ///< by Side: a like colour does so, all along the side
+  std::array<bool, 4> parted = {};      ///< by Side: likewise, and the blob's outline jumps there
   Silhouette silhouette;                ///< sides that are cut hold no samples
   cv::Rect mask_box;                    ///< where `mask` lies in the image
   cv::Mat mask;                         ///< 8 bit, 255 on the target; may be empty
   double inset_px = 0.0;                ///< border of the mask that does not count, px
+  bool part = false;                    ///< a piece of a blob that may well be one thing itself
   std::optional<Eigen::Vector3d> p_CT;  ///< centre, frame C, m, if the detector knows it
   Eigen::Matrix3d p_CT_covariance = Eigen::Matrix3d::Identity();  ///< frame C, m^2
 

@@ -11,6 +11,7 @@
 namespace chase::perception {
 
 inline constexpr int kMaxSamples = 8;  ///< of a side
+inline constexpr int kLeastPiece = 5;  ///< px, width of a piece
 
 /// The middle one, of an even number the higher; 0 of none.
 double Median(std::vector<double> values);
@@ -43,5 +44,9 @@ std::array<bool, 4> CutSides(const cv::Rect& roi, const cv::Size& image);
 /// without any are cut. The detection must carry a mask; nothing when no part of it lies inside.
 std::optional<Detection> CropTo(const cv::Mat& bgr, const Detection& detection,
                                 const cv::Rect& window);
+
+/// Pieces of a blob that several things of one colour make up together, split where an end of its
+/// columns or of its rows jumps; none where none does.
+std::vector<Detection> Split(const cv::Mat& bgr, const Detection& detection);
 
 }  // namespace chase::perception

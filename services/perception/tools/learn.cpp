@@ -46,7 +46,8 @@ void Check(const std::vector<cv::Mat>& images, const std::vector<cv::Mat>& masks
   }
 }
 
-/// The blob that covers most of the mask; null where none does.
+/// The blob that covers most of the mask; null where none does. Pieces of a blob come after it and
+/// cover less: masks are drawn inside the outline, which pieces suit better than the whole.
 const Detection* MarkedBlob(const std::vector<Detection>& found, const cv::Mat& mask) {
   const Detection* marked = nullptr;
   int most = 0;
@@ -60,9 +61,11 @@ const Detection* MarkedBlob(const std::vector<Detection>& found, const cv::Mat& 
 }
 
 /// Why a marked blob does not tell the target's shape; empty when it does.
-std::string WhyShapeless(const Detection* marked) {
+std::string WhyShapeless(const Detection* marked, const cv::Size& image) {
   if (!marked) return "no blob of the learned colour lies where the mask marks the target";
-  return marked->AnyCut() ? "the image cuts the marked blob" : "";
+  // A piece's own cuts do not count: where another thing begins, the target ends.
+  const auto cut = CutSides(marked->mask_box, image);
+  return std::count(cut.begin(), cut.end(), true) ? "the image cuts the marked blob" : "";
 }
 
 [[noreturn]] void RefuseAll(const std::vector<std::string>& shapeless) {
@@ -100,7 +103,8 @@ std::vector<std::string> LearnShape(const std::vector<cv::Mat>& images,
   for (size_t i = 0; i < images.size(); ++i) {
     const auto found = detector.Detect(images[i]);
     const Detection* marked = MarkedBlob(found, masks[i]);
-    const std::string why = pictures[i].used ? WhyShapeless(marked) : "its colours are left out";
+    const std::string why =
+        pictures[i].used ? WhyShapeless(marked, images[i].size()) : "its colours are left out";
     if (!why.empty()) {
       shapeless.push_back("pair " + std::to_string(i + 1) + ": " + why);
       continue;
@@ -118,7 +122,8 @@ std::vector<std::string> LearnShape(const std::vector<cv::Mat>& images,
 
 double BestOverlap(const ColorDetector& detector, const cv::Mat& bgr, const cv::Mat& mask) {
   const auto found = detector.Detect(bgr);
-  return found.empty() ? 0.0 : Overlap(found.front(), mask);
+  const Detection* best = MostLikely(found);
+  return best ? Overlap(*best, mask) : 0.0;
 }
 
 /// Over the pictures that the colour is from, a share of all.
@@ -141,12 +146,22 @@ double AcquireScore(const std::vector<cv::Mat>& images, const std::vector<cv::Ma
     const auto found = detector.Detect(images[i]);
     if (const Detection* marked = MarkedBlob(found, masks[i])) target.push_back(marked->score);
     for (const auto& d : found)
-      if (cv::countNonZero(d.mask & masks[i](d.mask_box)) == 0) other = std::max(other, d.score);
+      if (!d.part && cv::countNonZero(d.mask & masks[i](d.mask_box)) == 0)
+        other = std::max(other, d.score);
   }
   return 0.5 * (Median(std::move(target)) + other);
 }
 
 }  // namespace
+
+const Detection* MostLikely(const std::vector<Detection>& found) {
+  const Detection* best = nullptr;
+  for (const auto& d : found) {
+    const bool candidate = !best || (!d.part && !d.AnyCut());
+    if (candidate && (!best || d.score > best->score)) best = &d;
+  }
+  return best;
+}
 
 double Overlap(const Detection& detection, const cv::Mat& mask) {
   cv::Mat whole = cv::Mat::zeros(mask.size(), CV_8U);

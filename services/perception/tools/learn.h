@@ -26,6 +26,10 @@ struct Learned {
 Learned LearnDetector(const std::vector<cv::Mat>& images, const std::vector<cv::Mat>& masks,
                       const DetectorConfig& base);
 
+/// Of several detections of one picture the target's: the best whole, or a piece that scores more,
+/// is not cut anywhere and is no piece of a good whole. Null where there is none.
+const Detection* MostLikely(const std::vector<Detection>& found);
+
 /// Intersection over union of a detection's region with a mask of the whole picture (8 bit, not 0
 /// on the target); of its box where it has no region.
 double Overlap(const Detection& detection, const cv::Mat& mask);
