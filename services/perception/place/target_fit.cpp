@@ -13,8 +13,6 @@ namespace chase::perception {
 
 namespace {
 
-constexpr int kIterations = 8;
-constexpr double kTolerance = 2e-5;       // change of the cost that ends it, a share
 constexpr double kVagueYaw = M_PI / 8.0;  // rad, standard deviation: half of what one start covers
 
 /// The problem as a least squares solver asks for it: residuals and their Jacobian, by columns,
@@ -61,11 +59,11 @@ class ReducedProblem {
   mutable NormalEquations normal_;  // at it
 };
 
-FitResult Solve(const FitProblem& problem, double turn) {
+FitResult Solve(const FitProblem& problem, const Effort& effort, double turn) {
   const ReducedProblem reduced(problem);
   ceres::TinySolver<ReducedProblem> solver;
-  solver.options.max_num_iterations = kIterations + 1;  // it counts the start
-  solver.options.function_tolerance = kTolerance;
+  solver.options.max_num_iterations = effort.iterations + 1;  // it counts the start
+  solver.options.function_tolerance = 2.0 * effort.tolerance;
   Vector7d y = problem.Start();
   y[kYawAt] += turn;
   const double cost = solver.Solve(reduced, &y).final_cost;
@@ -77,15 +75,15 @@ FitResult Solve(const FitProblem& problem, double turn) {
 
 }  // namespace
 
-FitResult FitTarget(const FitInput& input, const FitConfig& config) {
+FitResult FitTarget(const FitInput& input, const FitConfig& config, const Effort& effort) {
   const FitProblem problem(input, config);
   if (!problem.ok()) return {};
-  FitResult best = Solve(problem, 0.0);
+  FitResult best = Solve(problem, effort, 0.0);
   if (!input.shape.box() || input.shape.yaw_variance < kVagueYaw * kVagueYaw) return best;
   // Of a heading hardly known every eighth of a turn is tried: a face seen at one angle may look
   // like one at another.
   for (const double turn : {-M_PI / 8.0, M_PI / 8.0, M_PI / 4.0}) {
-    const FitResult other = Solve(problem, turn);
+    const FitResult other = Solve(problem, effort, turn);
     if (other.ok && (!best.ok || other.cost < best.cost)) best = other;
   }
   return best;

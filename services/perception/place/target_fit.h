@@ -71,9 +71,15 @@ struct FitResult {
   double log_odds = 0.0;  ///< of being the target rather than anything else of its colour
 };
 
+/// When the solver ends: iterations, and change of the cost, as a share.
+struct Effort {
+  int iterations = 8;
+  double tolerance = 1e-5;
+};
+
 /// The most likely position and velocity of the target (of a box its heading, too) from silhouette,
 /// LiDAR points, each at its own time, and prediction, with the covariance: one step of an iterated
 /// extended Kalman filter, by Ceres' TinySolver from the prediction on.
-FitResult FitTarget(const FitInput& input, const FitConfig& config);
+FitResult FitTarget(const FitInput& input, const FitConfig& config, const Effort& effort = {});
 
 }  // namespace chase::perception
