@@ -146,7 +146,7 @@ bool Pilot::MayPlan(double t) const {
 }
 
 std::optional<PlanResult> Pilot::Update(double t, const BodyEstimate& body) {
-  if (has_running_ && t < running_.trajectory.start - kJumpBack) ChangeFrame();  // of time
+  if (has_running_ && t < running_.trajectory.start - kJumpBack) ChangeFrame();  // of the clock
   drift_ = BeyondTube(body.velocity_covariance, config_.planner);
   const double t0 = t + config_.latency;
   const Start start = StartAt(t, t0, body);
