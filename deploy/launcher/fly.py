@@ -287,6 +287,7 @@ class Flight:
         """Shows progress until the mission's end."""
         last_time, moved, speed = None, time.monotonic(), 0.0
         while True:
+            ended = self.monitor.process.poll() is not None  # asked before its last line is read
             line = self.monitor.process.stdout.readline()
             if line:
                 progress = json.loads(line)
@@ -299,7 +300,7 @@ class Flight:
                     speed = progress["rtf"]
             if last_time is not None:  # progress comes once a second
                 self.kill(last_time + speed * (time.monotonic() - moved))
-            self.complain(self.monitor)
+            self.complain(*([self.monitor] if ended and not line else []))
             if time.monotonic() - moved > SILENCE_LIMIT:
                 raise FlightError(f"the mission's time has not moved for {SILENCE_LIMIT:.0f} s; "
                                   f"the logs are in {self.folder}")

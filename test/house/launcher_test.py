@@ -231,6 +231,11 @@ class FlightTest(unittest.TestCase):
         self.assertIn("simulator ended (exit code 3)", err)
         self.assertIn("broken wing", err)
 
+    def test_monitor_may_end_before_it_is_read(self):
+        self.program("chase-flight-monitor", MONITOR.replace("time.sleep(0.2)", "pass").replace("signal.pause()", ""))
+        code, _, err = self.fly()
+        self.assertEqual((code, err), (0, ""))
+
     def test_process_that_may_be_restarted(self):
         rows = fly.flight_processes()
         self.patch(fly, "flight_processes", lambda: [
