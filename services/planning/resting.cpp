@@ -20,9 +20,12 @@ constexpr double kAbove = 0.05;   // m, left to what the target's height is off
 // slabs reach 0.3 m above what they stand for. The check allows as much: kLeaveGroundBy.
 constexpr double kOutBy = 0.6;
 
-// Coefficients in Bernstein form of degree n that continue position, velocity, acceleration and
-// jerk of s over T; the rest are zero.
-Points Continued(const world::State& s, double T, int n) {
+constexpr int kDegree = 6;  // of ways to a place
+
+// Coefficients in Bernstein form that continue position, velocity, acceleration and jerk of s over
+// T; the rest are zero.
+Points Continued(const world::State& s, double T) {
+  constexpr int n = kDegree;
   Points b = Points::Zero();
   const Vector3d d[4] = {s.p, T * s.v, T * T * s.a, T * T * T * s.j};
   const double falling[4] = {1.0, 1.0 * n, n * (n - 1.0), n * (n - 1.0) * (n - 2.0)};
@@ -44,15 +47,19 @@ Points Continued(const world::State& s, double T, int n) {
 }  // namespace
 
 Curve BrakeCurve(const world::State& s, double T) {
-  Points b = Continued(s, T, 5);
-  b.row(4) = b.row(5) = b.row(3);
-  return ToPower(b, 5);
+  Points b = Points::Zero();
+  const Vector3d way = T * s.v, bend = T * T * s.a;
+  b.row(0) = s.p.transpose();
+  b.row(1) = (s.p + way / 4.0).transpose();
+  b.row(2) = (s.p + way / 2.0 + bend / 12.0).transpose();
+  b.row(3) = b.row(4) = b.row(2);
+  return ToPower(b, 4);
 }
 
 Curve CurveTo(const world::State& s, double T, const Vector3d& end) {
-  Points b = Continued(s, T, 6);
-  for (int i = 4; i <= 6; ++i) b.row(i) = end.transpose();
-  return ToPower(b, 6);
+  Points b = Continued(s, T);
+  for (int i = 4; i <= kDegree; ++i) b.row(i) = end.transpose();
+  return ToPower(b, kDegree);
 }
 
 double DistanceTo(const world::Obstacle& o, const Vector3d& d) {

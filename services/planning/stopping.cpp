@@ -200,6 +200,20 @@ bool LeavesObstacles(const std::vector<Proof>& proofs) {
 
 namespace {
 
+// A BRAKE only slows down. Whose acceleration must first be taken back is faster for a moment.
+void NameFaster(bool certified, PlanResult* plan) {
+  constexpr double kFaster = 0.05;  // m/s
+  constexpr int kSamples = 50;
+  const world::Trajectory& way = plan->trajectory;
+  const double limit = way.Velocity(way.start).norm() + kFaster;
+  bool faster = false;
+  for (int i = 1; i <= kSamples && !faster; ++i)
+    faster = way.Velocity(way.start + i * way.duration / kSamples).norm() > limit;
+  if (plan->verdict != Verdict::kBrake || !faster) return;
+  plan->verdict = certified ? Verdict::kEscape : Verdict::kMitigate;
+  plan->reason += plan->reason.empty() ? "to rest, faster at first" : "; faster at first";
+}
+
 std::string IntoTheUnseen(const Stop& stop) {
   return stop.blind ? ", aside into what nobody has looked into" : "";
 }
@@ -223,7 +237,10 @@ PlanResult RestPlan(const PlannerConfig& config, const PlanRequest& request) {
     }
   }
   if (!stop)
-    if (auto committed = Committed(hard, request)) return *committed;
+    if (auto committed = Committed(hard, request)) {
+      NameFaster(true, &*committed);
+      return *committed;
+    }
   if (!stop) stop = wide.Brake();
   if (!stop) stop = close.Brake();
   result.verdict = Verdict::kBrake;
@@ -237,6 +254,7 @@ PlanResult RestPlan(const PlannerConfig& config, const PlanRequest& request) {
   if (LeavesObstacles(stop->proofs)) result.verdict = Verdict::kEscape;
   result.trajectory = std::move(stop->trajectory);
   if (stop->certified) SetProofs(config, request, std::move(stop->proofs), &result);
+  NameFaster(stop->certified, &result);
   return result;
 }
 

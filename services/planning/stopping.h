@@ -23,8 +23,7 @@ struct Stop {
 /// Would control fly that leg? It keeps to the geofence.
 using MayFly = std::function<bool(const world::Trajectory& leg)>;
 
-/// Comes to rest: b3 = b4 = b5 in Bernstein form, which continues position, velocity, acceleration
-/// and jerk and ends with none. Of several durations the shortest that is certified clear of
+/// Comes to rest along BrakeCurve(). Of several durations the shortest that is certified clear of
 /// obstacles and of the target's body within the limits. Sight is not asked for.
 std::optional<Stop> Brake(const PlannerConfig& config, const PlanRequest& request);
 

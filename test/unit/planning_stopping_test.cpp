@@ -66,17 +66,16 @@ PlanRequest RandomRequest(const PlannerConfig& c, unsigned seed) {
   return request;
 }
 
-/// The curve of degree 5 that continues the start and comes to rest at T without acceleration.
+/// The curve of degree 4 that continues the start and comes to rest at T without acceleration.
 world::Trajectory Braking(const PlanRequest& request, double T) {
   const world::State& s = request.start;
-  world::Trajectory way{request.t0, T, Eigen::MatrixXd::Zero(6, 3)};
+  world::Trajectory way{request.t0, T, Eigen::MatrixXd::Zero(5, 3)};
   auto& c = way.coefficients;
   c.row(0) = s.p.transpose();
   c.row(1) = T * s.v.transpose();
   c.row(2) = T * T / 2.0 * s.a.transpose();
-  c.row(3) = T * T * T / 6.0 * s.j.transpose();
-  c.row(4) = -(c.row(1) + 1.5 * c.row(2) + 1.5 * c.row(3));
-  c.row(5) = -(2.0 * c.row(2) + 6.0 * c.row(3) + 12.0 * c.row(4)) / 20.0;
+  c.row(3) = -c.row(1) - 4.0 / 3.0 * c.row(2);
+  c.row(4) = (c.row(1) + c.row(2)) / 2.0;
   return way;
 }
 
@@ -230,6 +229,33 @@ TEST(Rest, GoesOnWithTheStopThatWasCommittedTo) {
   std::printf("%d before a stop, %d along it\n", before, along);
 }
 
+// The plan that only slows down is called so; the one that must be faster first, until its
+// acceleration is taken back, is not.
+TEST(Rest, BrakesOnlyWhereItSlowsDown) {
+  const PlannerConfig c;
+  int brakes = 0, faster = 0;
+  for (unsigned seed = 0; seed < 600; ++seed) {
+    const PlanRequest request = RandomRequest(c, seed);
+    const PlanResult plan = RestPlan(c, request);
+    double top = 0.0;
+    const world::Trajectory& way = plan.trajectory;
+    for (int i = 0; i <= kInstants; ++i)
+      top = std::max(top, way.Velocity(way.start + way.duration * i / kInstants).norm());
+    const double gain = top - request.start.v.norm();
+    const bool brake = plan.verdict == Verdict::kBrake;
+    EXPECT_TRUE(!brake || gain < 0.051) << seed;
+    brakes += brake;
+    if (plan.reason.find("faster at first") == std::string::npos) continue;
+    EXPECT_GT(gain, 0.05) << seed;
+    EXPECT_EQ(plan.verdict,
+              plan.certified_clearance < 0.0 ? Verdict::kMitigate : Verdict::kEscape)
+        << seed;
+    ++faster;
+  }
+  EXPECT_GT(brakes, 100);
+  EXPECT_GT(faster, 10);
+}
+
 // A plan that could be left for 0.4 s on end, within 1.1 s of its start, has a stop; one that can
 // be left in time is, and early.
 TEST(WayOut, IsFoundWhereThePlanCanBeLeftForAWhile) {
@@ -334,10 +360,10 @@ TEST(Harm, IsTheFirstContactAndTheLeastDistance) {
 TEST(Evade, TouchesNoEarlierThanABraking) {
   const PlannerConfig c;
   int weighed = 0, later = 0;
-  for (unsigned seed = 0; seed < 40; ++seed) {
+  for (unsigned seed = 0; seed < 200; ++seed) {
     Random random(seed, 7);
     PlanRequest request = RandomRequest(c, seed);
-    request.start.v *= 0.5;
+    request.start.v *= 0.7;
     request.obstacles.clear();
     const PlanRequest alone = request;
     const double speed = random.Uniform(2.6, 3.5);
@@ -377,10 +403,11 @@ TEST(Evade, TouchesNoEarlierThanABraking) {
     }
     EXPECT_GE(contact, best - 0.03) << seed;
     EXPECT_GE(Room(c, alone, stop.trajectory), -1e-6) << seed;
-    later += contact > best + 0.05;
+    later += contact > best + 0.02;
   }
   EXPECT_GT(weighed, 10);
   EXPECT_GT(later, 0);
+  std::printf("%d weighed, %d later\n", weighed, later);
 }
 
 }  // namespace
