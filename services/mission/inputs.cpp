@@ -1,5 +1,7 @@
 #include "services/mission/inputs.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cstdio>
 #include <utility>
@@ -71,6 +73,9 @@ std::vector<std::string> Missing(const MissionConfig& config, const Inputs& inpu
   if (pose && !pose->healthy)
     note("odometry is not healthy" + (pose->reason.empty() ? "" : ": " + pose->reason));
   note(Absence("OBSTACLES", inputs.obstacles, world::kMostAge.obstacles, t));
+  if (!inputs.sweeps.IsEnough())
+    note(fmt::format("{} of {} good sweeps in a row", inputs.sweeps.count(),
+                     world::SweepRun::kEnough));
   note(Absence("TARGET", inputs.target, world::kMostAge.target, t));
   if (inputs.blocked) note("the way up is not free: something is above the take-off place");
   if (config.battery_low > 0.0) note(BatteryProblem(config, inputs, t));

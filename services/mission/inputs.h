@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "common/world/sweep_run.h"
 #include "services/mission/mission_config.h"
 
 namespace chase::mission {
@@ -34,6 +35,7 @@ struct ProcessReport {
 struct Inputs {
   std::optional<PoseReport> pose;
   std::optional<double> obstacles;  ///< when they were valid, s
+  world::SweepRun sweeps;           ///< that they were listed of
   std::optional<double> target;
   bool target_tracked = false;
   double plan_heard = -1e9;                            ///< s

@@ -84,6 +84,7 @@ void MissionNode::OnPose(const pose_t& message) {
 void MissionNode::OnObstacles(const obstacles_t& message) {
   Inputs& inputs = mission_.inputs();
   inputs.obstacles = Seconds(message.utime);
+  inputs.sweeps.Add(*inputs.obstacles, inputs.pose && inputs.pose->healthy);
   if (IsAirborne(mission_.state()) || !inputs.pose || inputs.pose->epoch != message.epoch) return;
   std::vector<world::Obstacle> obstacles;
   for (const obstacle_t& o : message.obstacles) obstacles.push_back(bus::FromMessage(o, origin_));

@@ -136,13 +136,14 @@ bool Pilot::IsDue(double t) const {
   return news_ && age >= config_.min_period - 1e-6;
 }
 
-// Nobody climbs before control has been heard; under a mission nobody who is not told to.
+// Nobody climbs who waits, or before control has been heard; under a mission nobody who is not told
+// to.
 bool Pilot::MayPlan(double t) const {
   if (task_ == Task::kDone) return false;
-  if (has_running_) return true;
+  if (has_running_ || airborne_) return true;
+  if (waits_) return false;
   if (!task_) return heard_control_ || t >= *first_update_ + kHearControl;
-  return airborne_ ||
-         (heard_control_ && !waits_ && (task_ == Task::kTakeoff || task_ == Task::kChase));
+  return heard_control_ && (task_ == Task::kTakeoff || task_ == Task::kChase);
 }
 
 std::optional<PlanResult> Pilot::Update(double t, const BodyEstimate& body) {

@@ -63,7 +63,7 @@ class Pilot {
     airborne_ = airborne_ || (flying && !has_running_);
   }
 
-  /// It stands on the ground and the autopilot does not obey yet: a mission's climb waits.
+  /// What it knows is not enough to take off yet, or the autopilot does not obey: a climb waits.
   void SetWaiting(bool waiting) { waits_ = waiting; }
 
   /// Control says that it comes down: nothing leads it aside any more.

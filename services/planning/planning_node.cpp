@@ -119,8 +119,11 @@ void PlanningNode::OnObstacles(const obstacles_t& message) {
     return bus_.ReportError(fmt::format(
         "OBSTACLES {} left out: {} more than the {} listed are near; raise mapping's max_obstacles",
         message.seq, message.n_cut, message.n_obstacles));
-  if (auto list = Listed(message))
-    pilot_.SetObstacles(bus::Seconds(message.utime, *origin_), *std::move(list));
+  auto list = Listed(message);
+  if (!list) return;
+  const double t = bus::Seconds(message.utime, *origin_);
+  sweeps_.Add(t, is_usable_);
+  pilot_.SetObstacles(t, *std::move(list));
 }
 
 std::optional<std::vector<world::Obstacle>> PlanningNode::Listed(const obstacles_t& message) {
@@ -150,14 +153,16 @@ void PlanningNode::CheckMission(int64_t utime) {
 }
 
 void PlanningNode::OnPose(const pose_t& message) {
-  if (message.health != pose_t::HEALTH_OK && message.health != pose_t::HEALTH_DEGRADED) return;
+  is_usable_ = message.health == pose_t::HEALTH_OK || message.health == pose_t::HEALTH_DEGRADED;
+  if (!is_usable_) return;
   if (epoch_.Change(message.epoch)) {
     pilot_.ChangeFrame();
     home_.reset();
     target_ = {};
   }
   CheckMission(message.utime);
-  pilot_.SetWaiting(autopilot_.IsOnGround() && !autopilot_.Obeys(message.utime));
+  pilot_.SetWaiting(!sweeps_.IsEnough() ||
+                    (autopilot_.IsOnGround() && !autopilot_.Obeys(message.utime)));
   const double t = bus::Seconds(message.utime, Origin(message.utime));
   std::optional<PlanResult> plan;
   {

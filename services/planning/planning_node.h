@@ -14,6 +14,7 @@
 #include "common/bus/bus.h"
 #include "common/bus/epoch.h"
 #include "common/bus/node.h"
+#include "common/world/sweep_run.h"
 #include "services/planning/pilot.h"
 
 namespace chase::planning {
@@ -40,6 +41,8 @@ class PlanningNode : public bus::Node {
   Pilot pilot_;
   bus::Epoch epoch_;
   bus::AutopilotState autopilot_;
+  world::SweepRun sweeps_;
+  bool is_usable_ = false;               ///< the newest POSE
   std::optional<int64_t> origin_;        // utime that the core's seconds count from
   int64_t state_utime_ = 0;              // of the newest FLIGHT_STATE; 0: none
   Task task_ = Task::kGround;            // that it asked for

@@ -12,8 +12,8 @@ namespace chase::planning {
 inline constexpr double kBrakeTimes[] = {0.6, 0.8, 1.0, 1.3, 1.7, 2.2, 3.0};
 
 /// To rest over T, wherever that leads: of all ways that continue position, velocity and
-/// acceleration of s the one of least squared jerk. Mueller, Hehn and D'Andrea 2015, appendix A, the
-/// end's velocity and acceleration fixed.
+/// acceleration of s the one of least squared jerk. Mueller, Hehn and D'Andrea 2015, appendix A,
+/// the end's velocity and acceleration fixed.
 Curve BrakeCurve(const world::State& s, double T);
 
 /// To rest at `end` over T, from position, velocity, acceleration and jerk of s on.

@@ -18,6 +18,7 @@ class Bench {
     pose.usable = pose.healthy = true;
     pose.epoch = 3;
     mission.inputs().battery = 1.0;
+    HearSweeps(world::SweepRun::kEnough);
   }
 
   void Run(double seconds) {
@@ -26,6 +27,12 @@ class Bench {
       Hear();
       mission.Update(t);
     }
+  }
+
+  /// Good ones up to now, and none before.
+  void HearSweeps(int n) {
+    mission.inputs().sweeps = {};
+    for (int i = n - 1; i >= 0; --i) mission.inputs().sweeps.Add(t - 0.1 * i, true);
   }
 
   world::CommandAnswer Command(Event kind, int64_t id = 0) {

@@ -23,6 +23,7 @@ TEST(Mission, IsReadyOnlyWhenNothingIsMissing) {
        },
        0.1},
       {"OBSTACLES is", [](Bench* b) { b->hears_obstacles = false; }, 0.4},
+      {"9 of 10 good sweeps in a row", [](Bench* b) { b->HearSweeps(9); }, 0.1},
       {"TARGET is", [](Bench* b) { b->hears_target = false; }, 0.6},
       {"planning is", [](Bench* b) { b->failed.erase("planning"); }, 2.6},
       {"control has failed", [](Bench* b) { b->failed["control"] = true; }, 0.1},

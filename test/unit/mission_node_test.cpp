@@ -53,6 +53,7 @@ class Bench {
       pose_t pose{};
       pose.utime = t;
       pose.orientation[0] = 1.0;
+      pose.health = health;
       bus::Set(pose.pos, place);
       sensors_->Publish("POSE", pose);
       obstacles_t obstacles{};
@@ -77,6 +78,7 @@ class Bench {
   }
 
   Eigen::Vector3d place = Eigen::Vector3d::Zero();  // where it stands, frame W
+  int8_t health = pose_t::HEALTH_OK;
   bus::Lockstep lockstep_{kStart};
   std::vector<flight_state_t> states;
   std::vector<command_ack_t> acks;
@@ -100,6 +102,20 @@ TEST(MissionNode, SaysTenTimesASecondWhereTheFlightIsAndWhatIsMissing) {
   EXPECT_NEAR(static_cast<double>(bench.states.size()), 20.0, 1.0);
   EXPECT_GT(bench.states.back().since, kStart + 1'000'000);
   EXPECT_EQ(bench.states.back().n_missing, 0);
+}
+
+TEST(MissionNode, IsReadyAfterTenSweepsInARowForWhichOdometryWasWell) {
+  Bench bench;
+  bench.Run(2.0);
+  ASSERT_EQ(bench.states.back().state, +flight_state_t::READY);
+  bench.health = pose_t::HEALTH_DEGRADED;
+  bench.Run(0.2);
+  bench.health = pose_t::HEALTH_OK;
+  bench.Run(0.12);
+  ASSERT_EQ(bench.states.back().n_missing, 1);
+  EXPECT_NE(bench.states.back().missing[0].find("of 10 good sweeps in a row"), std::string::npos);
+  bench.Run(0.2);
+  EXPECT_EQ(bench.states.back().state, +flight_state_t::READY);
 }
 
 TEST(MissionNode, AnswersACommandAndSaysTheNewStateAtOnce) {

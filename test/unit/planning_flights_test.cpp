@@ -199,7 +199,7 @@ TEST(Flights, AreTheSameElsewhere) {
   ground.half = {30.0, 30.0, 0.3};
   ground.shape = (3.0 * ground.half.cwiseAbs2()).cwiseInverse().asDiagonal();
   ground.center = world::Trajectory::Constant({0.0, 0.0, -0.3}, 0.0, 1.0);
-  Course here{GoingRound, RandomPillars(3), 8.0, 18.0, 19.0};
+  Course here{GoingRound, RandomPillars(3), 10.0, 20.0, 21.0};
   here.obstacles.push_back(ground);
   Course there = here;
   there.forecast = forecast;

@@ -34,6 +34,7 @@ struct Events {
   int64_t obstacles_at = kNever;  // obstacles speak of the new one, us
   int64_t forecasts_at = kNever;  // forecasts do, us
   int64_t cut_from = kNever;      // lists leave something out from then on, us
+  int64_t well_from = kStart;     // odometry is lost until then, us
   bool returns = false;           // mission wants it back, 5 m along x
   bool is_fenced = false;         // inside a fence that has a notch across that way
 };
@@ -68,6 +69,7 @@ class Company : public bus::Node {
     pose.utime = utime;
     pose.epoch = utime >= events_.frame_at;
     pose.orientation[0] = 1.0;
+    pose.health = utime >= events_.well_from ? pose_t::HEALTH_DEGRADED : pose_t::HEALTH_LOST;
     bus::Set(pose.pos, Position(utime));
     bus_.Publish("POSE", pose);
   }
@@ -171,6 +173,15 @@ TEST(PlanningNode, ClimbsOnceTheAutopilotObeys) {
   ASSERT_FALSE(plans.empty());
   EXPECT_GE(plans.front().utime, events.obeys_from);
   EXPECT_EQ(plans.front().reason, "climbing");
+}
+
+TEST(PlanningNode, ClimbsAfterTenSweepsInARowOfWhichThePlaceWasKnown) {
+  Events events;
+  events.well_from = kStart + 3000000;
+  const auto plans = Fly(kNever, kNever, kStart + 6000000, events);
+  ASSERT_FALSE(plans.empty());
+  EXPECT_GE(plans.front().utime, events.well_from + 900000);
+  EXPECT_LE(plans.front().utime, events.well_from + 1100000);
 }
 
 TEST(PlanningNode, ChasesAForecastWithoutJumpsFromPlanToPlan) {

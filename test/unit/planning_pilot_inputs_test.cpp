@@ -325,7 +325,7 @@ TEST(Pilot, WithoutObstaclesItStillKnowsWhatStands) {
       most = std::max(most, plan->trajectory.Position(t).x());
     return most;
   };
-  EXPECT_LT(farthest(false), farthest(true) - 0.05);
+  EXPECT_LT(farthest(false), farthest(true) - 0.02);
 }
 
 TEST(PlanningConfig, DefaultsAreFineAndBadValuesAreNamed) {

@@ -247,8 +247,7 @@ TEST(Rest, BrakesOnlyWhereItSlowsDown) {
     brakes += brake;
     if (plan.reason.find("faster at first") == std::string::npos) continue;
     EXPECT_GT(gain, 0.05) << seed;
-    EXPECT_EQ(plan.verdict,
-              plan.certified_clearance < 0.0 ? Verdict::kMitigate : Verdict::kEscape)
+    EXPECT_EQ(plan.verdict, plan.certified_clearance < 0.0 ? Verdict::kMitigate : Verdict::kEscape)
         << seed;
     ++faster;
   }
