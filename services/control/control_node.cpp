@@ -91,8 +91,9 @@ void ControlNode::OnGeofence(const geofence_t& message) {
   fence_ = bus::FromMessage(message, home_->second);
 }
 
+// No plan stands on a list that leaves some out.
 void ControlNode::OnObstacles(const obstacles_t& message) {
-  if (!epoch_.Is(message.epoch)) return;
+  if (!epoch_.Is(message.epoch) || message.n_cut > 0) return;
   const int64_t origin = Origin(message.utime);
   std::vector<world::Obstacle> list;
   for (const obstacle_t& o : message.obstacles) list.push_back(bus::FromMessage(o, origin));

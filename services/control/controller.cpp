@@ -35,17 +35,19 @@ bool Finite(const Setpoint& s) {
 }  // namespace
 
 std::string Controller::AddPlan(const Plan& plan) {
+  if (last_t_ && *last_t_ > StopsAt(plan)) return "it comes after its time";
   if (flying_ && !IsNear(plan)) return "it starts where neither the reference nor the body is";
   return plans_.Add(plan) ? "" : "it starts before the one being flown, or is empty";
 }
 
 // The reference may be far from the body, which follows it; a new plan does not add to that.
 bool Controller::IsNear(const Plan& plan) const {
-  const double start = plan.position.start;
-  const Eigen::Vector3d p = plan.position.Position(start);
-  const std::optional<Reference> reference = plans_.At(start);
+  const double start = plan.position.start, now = last_t_.value_or(start);
+  const double t = std::max(start, now);  // from when on it would be flown
+  const Eigen::Vector3d p = Sample(plan, t).state.p;
+  const std::optional<Reference> reference = plans_.At(t);
   if (reference && (reference->state.p - p).norm() <= config_.reset_distance) return true;
-  const double ahead = std::clamp(start - last_t_.value_or(start), 0.0, 0.2);
+  const double ahead = std::min(t - now, 0.2);
   return (last_estimate_.p_WB + ahead * last_estimate_.v_WB - p).norm() <= config_.reset_distance;
 }
 

@@ -242,15 +242,22 @@ PlanResult Pilot::Wait(double t0, const Start& start, const BodyEstimate& body) 
     climb_end_ = t0 + config_.takeoff_time;
     return Climb(t0, body);
   }
-  if (!airborne_ && t0 < climb_end_) {
-    PlanResult same = running_;  // still climbing
-    return same;
-  }
+  if (!airborne_ && t0 < climb_end_ && IsClimbFree(t0, start))
+    return PlanResult(running_);  // still climbing
   airborne_ = true;
   if (task_ == Task::kTakeoff) return Hold(t0, start, "climbed");
   if (!SeesObstacles(t0 - config_.latency)) return Rest(t0, start);
   if (HasTarget(t0 - config_.latency)) return Chase(t0, start);
   return had_target_ ? Search(t0, start, body) : Hover(t0, start);
+}
+
+// For as long as stopping takes, and somebody else needs to be seen.
+bool Pilot::IsClimbFree(double t0, const Start& start) const {
+  constexpr double kAhead = 1.5;  // s
+  if (!SeesObstacles(t0 - config_.latency)) return false;
+  PlanRequest request = Request(t0, start);
+  request.horizon = kAhead;
+  return KeepsOffMovers(config_.planner, request, running_.trajectory);
 }
 
 PlanResult Pilot::Obey(double t0, const Start& start, const BodyEstimate& body) {
@@ -295,6 +302,10 @@ PlanResult Pilot::Along(const PlanRequest& request, const Start& start, Stop leg
   plan.trajectory = std::move(leg.trajectory);
   plan.yaw = {start.yaw.yaw};
   SetProofs(config_.planner, request, std::move(leg.proofs), &plan);
+  if (auto stop = WayOut(config_.planner, request, plan.trajectory)) {
+    plan.stop = std::move(stop->trajectory);
+    plan.stop_proofs = std::move(stop->proofs);
+  }
   return plan;
 }
 

@@ -104,6 +104,7 @@ class Pilot {
   PlanResult Chase(double t0, const Start& start);
   PlanResult Wait(double t0, const Start& start, const BodyEstimate& body);
   PlanResult Climb(double t0, const BodyEstimate& body) const;
+  bool IsClimbFree(double t0, const Start& start) const;
   PlanResult Hover(double t0, const Start& start) const;
   PlanResult Rest(double t0, const Start& start) const;
   PlanResult Obey(double t0, const Start& start, const BodyEstimate& body);

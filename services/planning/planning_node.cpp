@@ -157,6 +157,7 @@ void PlanningNode::OnPose(const pose_t& message) {
   if (!is_usable_) return;
   if (epoch_.Change(message.epoch)) {
     pilot_.ChangeFrame();
+    sweeps_ = {};
     home_.reset();
     target_ = {};
   }

@@ -91,6 +91,20 @@ std::optional<Stop> GoOn(const PlannerConfig& config, const PlanRequest& request
   return resting.Certified(ToCurve(way, request.t0, T), T);
 }
 
+bool KeepsOffMovers(const PlannerConfig& config, const PlanRequest& request,
+                    const world::Trajectory& way) {
+  PlanRequest moving = request;
+  moving.horizon = std::min(request.horizon, way.end() - request.t0);
+  moving.asks_sight = false;
+  moving.target_body.reset();
+  moving.obstacles.clear();
+  for (const world::Obstacle& o : request.obstacles)
+    if (o.moving) moving.obstacles.push_back(o);
+  return !(moving.horizon > 0.0) ||
+         StaysOff(ToCurve(way, moving.t0, moving.horizon),
+                  MakeProblem(WithoutMargin(config), moving, nullptr), 1.0);
+}
+
 namespace {
 
 // The way that was committed to with the running plan: what is left of that plan until its stop,

@@ -35,6 +35,10 @@ std::optional<Stop> GoTo(const PlannerConfig& config, const PlanRequest& request
 std::optional<Stop> GoOn(const PlannerConfig& config, const PlanRequest& request,
                          const world::Trajectory& way);
 
+/// Does the way keep off what moves, but for the target, over the request's horizon?
+bool KeepsOffMovers(const PlannerConfig& config, const PlanRequest& request,
+                    const world::Trajectory& way);
+
 /// Out of the way: comes to rest near where braking would, of all places tried the nearest that can
 /// be certified, also up and down, those first that last. Where none can: the one whose first
 /// contact is the latest, then the one that stays farthest off; not certified.

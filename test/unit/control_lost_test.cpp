@@ -285,6 +285,25 @@ TEST(LostPose, KnowsTheTrueHoverThrust) {
   EXPECT_NEAR(flight.setpoint.thrust / 1.03, 9.81, 0.05);
 }
 
+// Its sender hung: the reference has gone on along the stop of the plan before.
+TEST(NewPlans, AreJudgedWhereTheyWouldBeByNow) {
+  const auto line = [](double start, double speed) {
+    Plan plan = LinePlan({0, 0, 2}, speed);
+    plan.position = {start, 2.0, Eigen::MatrixXd::Zero(2, 3)};
+    plan.position.coefficients << speed * start, 0.0, 2.0, 2.0 * speed, 0.0, 0.0;
+    return plan;
+  };
+  Flight flight({0, 0, 2});
+  flight.controller.AddPlan(line(0.0, 0.5));
+  flight.Fly(1.5, Health::kUsable);
+  EXPECT_EQ(flight.controller.AddPlan(line(0.1, 0.5)), "") << "late, and the same way";
+  EXPECT_NE(flight.controller.AddPlan(line(0.2, 1.5)), "") << "1.5 m ahead by now";
+  Plan over = line(0.3, 0.5);
+  over.stop = PointPlan({0.6, 0, 2}, 1.2).position;
+  over.stop->start = 1.2;
+  EXPECT_NE(flight.controller.AddPlan(over), "") << "on its stop by now";
+}
+
 TEST(NewPlans, MoveTheReferenceNoFurtherThanAResetUnlessToTheBody) {
   const ControlConfig config;
   Flight flight({0, 0, 2});

@@ -84,10 +84,11 @@ class Bench {
   }
 
   /// A wall 2 m ahead.
-  void SendWall(int64_t utime, int32_t epoch = 0) {
+  void SendWall(int64_t utime, int32_t epoch = 0, int32_t n_cut = 0) {
     obstacles_t m{};
     m.utime = utime;
     m.epoch = epoch;
+    m.n_cut = n_cut;
     m.n_obstacles = 1;
     world::Obstacle wall;
     wall.id = 7;

@@ -97,6 +97,17 @@ TEST(ControlNode, FliesWhatIsCertifiedAgainstTheListThatItHeard) {
       << bench.node().Report().detail;
 }
 
+TEST(ControlNode, RefusesAPlanForAListThatLeavesSomeOut) {
+  for (const int n_cut : {0, 1}) {
+    Bench bench;
+    bench.SendWall(kStart, 0, n_cut);
+    bench.SendPose(kStart);
+    bench.Send(Bench::Certified(kStart + 5000, {0, 0, 0}));
+    bench.SendPose(kStart + 5000);
+    EXPECT_EQ(bench.out.empty(), n_cut > 0);
+  }
+}
+
 TEST(ControlNode, RefusesWhatIsNotCertified) {
   const auto answers = [](auto change, bool names_list = true, bool heard = true) {
     Bench bench(names_list);

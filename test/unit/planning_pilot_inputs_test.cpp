@@ -61,12 +61,13 @@ TEST(Pilot, AnObstacleOnTheRunningPlanIsAnsweredAtOnce) {
   }
 }
 
-// A climb ends where nobody looks on its way up, too.
-TEST(Pilot, WithoutObstaclesItDoesNotChaseAfterTheClimbEither) {
+TEST(Pilot, WithoutObstaclesItNeitherClimbsNorChases) {
   Flight flight{PlanningConfig()};
   flight.hears = false;
   flight.Run(6.0, true);
-  for (const PlanResult& plan : flight.plans) EXPECT_EQ(plan.verdict, Verdict::kWait);
+  for (const PlanResult& plan : flight.plans)
+    EXPECT_TRUE(plan.verdict == Verdict::kBrake || plan.verdict == Verdict::kWait) << plan.reason;
+  EXPECT_LT(flight.Body().p.z(), 0.2);
   EXPECT_LT(flight.plans.back().certified_clearance, 0.0);
 }
 
@@ -155,6 +156,29 @@ TEST(Pilot, WithoutObstaclesEveryPlanIsALastResortWhoeverComes) {
     }
     EXPECT_GT(unheard, 5);
   }
+}
+
+// Somebody walks under it, or nobody can be seen any more: the climb is not flown to its end.
+TEST(Pilot, AClimbIsBrokenOffWhereSomebodyComes) {
+  const auto top = [](double y, bool hears) {
+    Flight flight{PlanningConfig()};
+    world::Obstacle walker;
+    walker.moving = true;
+    walker.solid = world::Obstacle::Solid::kCylinder;
+    walker.half = {0.3, 0.3, 0.9};
+    walker.shape = (2.0 * walker.half.cwiseAbs2()).cwiseInverse().asDiagonal();
+    walker.center = {0.0, 10.0, Eigen::MatrixXd::Zero(2, 3)};
+    walker.center.coefficients << 3.0, y, 0.9, -15.0, 0.0, 0.0;
+    flight.obstacles = {walker};
+    flight.Run(1.0, false);
+    flight.hears = hears;
+    flight.Run(2.0, false);
+    return flight.Body().p.z();
+  };
+  const double whole = top(4.0, true);
+  EXPECT_GT(whole, 1.0);
+  EXPECT_LT(top(0.0, true), 0.7 * whole);
+  EXPECT_LT(top(4.0, false), 0.7 * whole);
 }
 
 TEST(Pilot, AClimbIsNotBegunAnewInAnotherFrame) {

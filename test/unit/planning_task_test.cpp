@@ -105,8 +105,15 @@ TEST(Task, ReturnGoesBackAroundWhatStandsBetween) {
   flight.pilot.SetTask(Task::kReturn, flight.home());
   const size_t chased = flight.plans.size();
   flight.Run(30.0);
-  for (size_t i = chased; i < flight.plans.size(); ++i)
+  int legs = 0, with_stop = 0;
+  for (size_t i = chased; i < flight.plans.size(); ++i) {
     EXPECT_GE(flight.plans[i].certified_clearance, 0.0) << flight.plans[i].reason;
+    const bool leg = flight.plans[i].reason == "returning";
+    legs += leg;
+    with_stop += leg && flight.plans[i].stop;
+  }
+  EXPECT_GT(legs, 20);
+  EXPECT_GT(with_stop, 0.9 * legs);
   EXPECT_GT(flight.nearest, PlanningConfig().planner.drone_radius);
   flight.obstacles.pop_back();
   flight.Run(30.0);
