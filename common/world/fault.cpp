@@ -97,11 +97,9 @@ const std::vector<FaultKind>& FaultKinds() {
   return kinds;
 }
 
-std::string Misfit(const FaultKind& kind, bool sensors, bool mission) {
+std::string Misfit(const FaultKind& kind, bool sensors) {
   if (kind.needs == Needs::kSensors && !sensors)
     return "strikes nothing where sensors is truth; fly with --sensors raw";
-  if (kind.needs == Needs::kMission && !mission)
-    return "strikes nothing without a mission process; give the scenario commands";
   if (kind.needs == Needs::kRecorder)
     return "strikes chase-recorder, which a flight in lockstep does not have; fly live with a full "
            "disk under the log's folder";

@@ -53,8 +53,8 @@ struct FaultKind {
 };
 
 /// Why the fault cannot strike a flight in lockstep, with the cure; empty: it can. `sensors`: the
-/// simulator's are used, not the truth; `mission`: a mission process flies.
-std::string Misfit(const FaultKind& kind, bool sensors, bool mission);
+/// simulator's are used, not the truth.
+std::string Misfit(const FaultKind& kind, bool sensors);
 
 /// Every fault. deploy/scenarios/README.md lists the names.
 const std::vector<FaultKind>& FaultKinds();

@@ -147,15 +147,12 @@ std::vector<std::string> Expanded(const std::vector<std::string>& given,
 
 /// Those that can strike a flight of the place.
 std::vector<std::string> FaultNames(const std::string& place) {
-  bool sensors = true, mission = false;  // of a random world
-  if (place.rfind(kWorld, 0) != 0) {
-    const world::Scenario scenario = world::LoadScenario(flight::ScenarioFile(place));
-    sensors = scenario.sensors.mode != "truth";
-    mission = !scenario.commands.empty();
-  }
+  const bool sensors =  // a random world's are used
+      place.rfind(kWorld, 0) == 0 ||
+      world::LoadScenario(flight::ScenarioFile(place)).sensors.mode != "truth";
   std::vector<std::string> names;
   for (const world::FaultKind& kind : world::FaultKinds())
-    if (world::Misfit(kind, sensors, mission).empty()) names.push_back(kind.name);
+    if (world::Misfit(kind, sensors).empty()) names.push_back(kind.name);
   return names;
 }
 

@@ -44,7 +44,7 @@ Flight::Flight(const world::Scenario& scenario, const FlightConfigs& configs)
   Add<prediction::PredictionNode>(&lockstep_, "prediction", configs.prediction);
   Add<planning::PlanningNode>(&lockstep_, "planning", configs.planning);
   Add<control::ControlNode>(&lockstep_, "control", configs.control);
-  if (scenario.commands.empty()) return;  // takes off and chases by itself, without a mission
+  if (!configs.has_mission) return;  // takes off and chases by itself
   Add<mission::MissionNode>(&lockstep_, "mission", configs.mission);
   lockstep_.Add("command", 0, [commands = scenario.commands, this](bus::Bus& bus) {
     return std::make_unique<Operator>(bus, commands, MissionUtime(settle_, 0.0));

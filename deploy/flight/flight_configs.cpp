@@ -92,9 +92,10 @@ void AddFaults(const world::Scenario& scenario, const FlightOptions& options,
   int number = 0;
   for (const world::FaultSpec& fault : AllFaults(scenario, options)) {
     const world::FaultKind& kind = world::KindOf(fault);
-    const std::string misfit = world::Misfit(kind, !truth, !scenario.commands.empty());
+    const std::string misfit = world::Misfit(kind, !truth);
     if (!misfit.empty()) throw std::runtime_error("fault " + fault.name + " " + misfit);
     configs->faults.push_back(world::Settled(fault, flown, options.seed, number++));
+    configs->has_mission |= kind.needs == world::FaultKind::Needs::kMission;
     if (kind.victim == "simulator") configs->simulator.faults.push_back(configs->faults.back());
   }
 }
@@ -105,6 +106,7 @@ FlightConfigs Configure(const world::Scenario& scenario, const FlightOptions& op
   FlightConfigs configs;
   configs.simulator.scenario = std::filesystem::absolute(options.scenario_file).string();
   configs.simulator.seed = options.seed;
+  configs.has_mission = !scenario.commands.empty();
   Derive(scenario, &configs);
   Override(scenario, "simulator", &configs.simulator);
   Override(scenario, "odometry", &configs.odometry);

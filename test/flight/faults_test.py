@@ -108,12 +108,21 @@ class Faults(unittest.TestCase):
         self.assertRegex(answer.stderr, "lidar-gap.*truth.*--sensors raw")
 
     def test_fault_that_strikes_nothing_is_refused(self):
-        for fault, cure in (("disk-full", "fly live"), ("kill-mission", "commands"),
-                            ("disk-ful", "cpu-load, disk-full")):
+        for fault, cure in (("disk-full", "fly live"), ("disk-ful", "cpu-load, disk-full")):
             answer = flight("--fault", fault)
             self.assertEqual((answer.returncode, answer.stdout), (1, ""))
             self.assertEqual(answer.stderr.count("\n"), 1)
             self.assertRegex(answer.stderr, f"{fault}.*{cure}")
+
+    def test_mission_flies_where_its_fault_strikes(self):
+        """Killed and back 0.5 s later; the state it finds is the flight's."""
+        log = self.folder / "mission.lcm"
+        answer = flight("--fault", "kill-mission@1", "--until", "3", "--log", log, "--light")
+        self.assertEqual(answer.returncode, 0, answer.stderr)
+        told = [t for t, _ in stamps(log, "FLIGHT_STATE")]
+        self.assertGreater(max(b - a for a, b in zip(told, told[1:])), 0.4)
+        self.assertLess(told[0], -7.0)
+        self.assertGreater(told[-1], 2.8)
 
     def test_scenario_tells_what_a_live_flight_needs(self):
         """deploy/fly's operator gives what the one in lockstep does, and says which faults it leaves out."""
