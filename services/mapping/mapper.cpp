@@ -146,7 +146,8 @@ void Mapper::ClearGhosts(double t) {
   if (zone_.active()) {
     const double bottom = ground_.Height(zone_.center().x(), zone_.center().y());
     integrator_.ClearDisc(zone_.center(), zone_.outer(), bottom, zone_.top(), kSettledHits, false);
-    integrator_.ClearDisc(zone_.center(), zone_.core(), bottom, zone_.top(), 255, true);
+    if (zone_.in_view())
+      integrator_.ClearDisc(zone_.center(), zone_.core(), bottom, zone_.top(), 255, true);
   }
   for (const auto& track : tracker_.tracks()) {
     if (!track.confirmed || !tracker_.Moves(track.id)) continue;
@@ -188,7 +189,7 @@ bool Mapper::IsUnseen(const Key& key, const Eigen::Vector3d& origin) {
   const Eigen::Vector2d center = grid_.Center(key).head<2>();
   const double distance = (center - origin.head<2>()).norm();
   if (distance > config_.statics.unseen || distance < kOwnPlace) return false;
-  if (zone_.active() && (center - zone_.center()).norm() < zone_.outer()) return false;
+  if (zone_.in_view() && (center - zone_.center()).norm() < zone_.outer()) return false;
   const VoxelGrid::Column* column = grid_.Find(key.x, key.y);
   if (!column) return true;
   if (column->occupied > 0) return false;
@@ -236,7 +237,7 @@ std::vector<world::Obstacle> Mapper::Statics(const Eigen::Vector3d& origin, doub
   auto cells = OccupiedColumns(origin, &partial);
   const Eigen::Vector2d target = zone_.center();
   const auto pieces =
-      decomposition_.Update(&cells, partial, zone_.active() ? &target : nullptr, zone_.keep_out());
+      decomposition_.Update(&cells, partial, zone_.in_view() ? &target : nullptr, zone_.keep_out());
   *dropped = decomposition_.dropped();
   for (const auto& cell : cells) grid_.Touch(cell.x, cell.y).piece = cell.piece;
   std::vector<world::Obstacle> obstacles;

@@ -28,9 +28,11 @@ class TargetZone {
   void MoveTo(double t);
 
   bool active() const { return active_; }
+  /// It was seen of late: it is where it is believed to be, and nothing else is.
+  bool in_view() const { return in_view_; }
   const Eigen::Vector2d& center() const { return center_; }
   /// Radius within which returns are left out, and the one within which cells are always cleared:
-  /// smaller, but for the first second that the target is known.
+  /// smaller, but for the first second that the target is known; 0 m while it is not in view.
   double outer() const { return outer_; }
   double core() const { return core_; }
   /// No outline of an obstacle may come nearer than this to the centre.
@@ -47,7 +49,7 @@ class TargetZone {
   TargetEstimate last_;
   double first_seen_ = 0.0;  ///< s, of the first estimate
   double last_seen_ = 0.0;   ///< s, of the newest estimate that was not a prediction
-  bool seen_ = false, active_ = false;
+  bool seen_ = false, active_ = false, in_view_ = false;
   Eigen::Vector2d center_ = Eigen::Vector2d::Zero();
   double outer_ = 0.0, core_ = 0.0, top_ = 0.0;
 };

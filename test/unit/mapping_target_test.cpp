@@ -84,6 +84,30 @@ TEST(MappingTarget, StaysOutForAWhileAfterALoss) {
   }
 }
 
+/// Lost on its way to a pillar, it may have turned aside: its prediction runs through the pillar,
+/// which is listed all the same, and so is what the pillar hides.
+TEST(MappingTarget, WhatStandsWhereItIsOnlyPredictedStaysListed) {
+  std::mt19937 random(6);
+  Mapper mapper(MappingConfig{});
+  const Eigen::Vector2d pillar = testing::GymPillars()[2], velocity(0.0, 1.0);
+  const Eigen::Vector3d drone(pillar.x(), pillar.y() - 1.5, 1.3);
+  const Eigen::Vector2d hidden(pillar.x(), pillar.y() + 0.8);
+  constexpr double kLost = 3.0;
+  for (int i = 0; i < 48; ++i) {
+    const double t = 0.1 * i;
+    const Eigen::Vector2d predicted = pillar + (t - kLost - 0.7) * velocity;
+    TargetEstimate estimate = Estimate(predicted, velocity, t, &random);
+    estimate.seen = t < kLost;
+    if (t > 2.0) mapper.ObserveTarget(estimate);
+    const testing::World world =
+        t > 2.0 && estimate.seen ? GymWithTarget(predicted) : testing::Gym();
+    const auto list = mapper.Insert(testing::Scan(world, drone, t, {}, &random));
+    if (t <= kLost) continue;
+    EXPECT_TRUE(Blocked(list, pillar, t)) << t;
+    EXPECT_NE(testing::Holding(list.unseen, {hidden.x(), hidden.y(), 1.3}, t), nullptr) << t;
+  }
+}
+
 TEST(MappingTarget, PassingNextToAPillarLeavesItWhole) {
   std::mt19937 random(6);
   Mapper mapper(MappingConfig{});
