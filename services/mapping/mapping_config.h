@@ -2,6 +2,7 @@
 
 #include <string>
 
+#include "common/world/ages.h"
 #include "common/world/flight_volume.h"
 
 namespace chase::mapping {
@@ -116,13 +117,14 @@ struct MoverConfig {
 struct TargetConfig {
   double margin = 0.25;  ///< around the target's cylinder points are left out, m
   double core = 0.12;    ///< around the target's cylinder even settled cells are cleared, m
-  double hold = 3.0;     ///< the place is kept clear for this after a loss, s
+  /// The place is kept clear for this after it was last seen, s: as long as planning has a target.
+  double hold = world::kMostAge.prediction;
 
   template <class V>
   void Visit(V& v) {
     v("margin", margin, "around the target's cylinder within which points are left out, m");
     v("core", core, "around the target's cylinder within which settled cells are cleared, m");
-    v("hold", hold, "the predicted place is kept clear for this after a loss, s");
+    v("hold", hold, "the predicted place is kept clear for this after it was last seen, s");
   }
   std::string Problem() const;
 };

@@ -19,7 +19,7 @@ constexpr double kHalfSweep = 0.05;  // s; returns were fired up to a sweep befo
 
 void TargetZone::Observe(const TargetEstimate& estimate) {
   if (seen_ && estimate.t < last_.t) return;
-  if (!estimate.seen && (!seen_ || estimate.t - last_seen_ > config_.hold)) return;
+  if (!seen_ && !estimate.seen) return;
   if (!seen_) first_seen_ = estimate.t;
   if (estimate.seen) last_seen_ = estimate.t;
   last_ = estimate;
@@ -28,7 +28,7 @@ void TargetZone::Observe(const TargetEstimate& estimate) {
 
 void TargetZone::MoveTo(double t) {
   const double age = t - last_.t;
-  active_ = seen_ && age <= config_.hold && age >= -config_.hold;
+  active_ = seen_ && t - last_seen_ <= config_.hold && age >= -config_.hold;
   in_view_ = active_ && last_.seen && age <= kInView;
   if (!active_) return;
   const double lead = age > 0.0 ? kSlowDown * (1.0 - std::exp(-age / kSlowDown)) : age;

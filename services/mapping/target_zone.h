@@ -17,14 +17,15 @@ struct TargetEstimate {
 };
 
 /// The upright cylinder that belongs to the target at the time of a sweep, from the ground (its
-/// carrier) to a little above its top. Extrapolated by the last velocity for a while after a loss.
+/// carrier) to a little above its top. After a loss it follows perception's predictions, then the
+/// last velocity, until the target was seen last `hold` ago.
 class TargetZone {
  public:
   explicit TargetZone(const TargetConfig& config) : config_(config) {}
 
-  /// The newest usable estimate. Predicted ones count for a while only.
+  /// The newest estimate. Predicted ones move the zone, but do not make it last.
   void Observe(const TargetEstimate& estimate);
-  /// Moves the zone to time t [s]; inactive when nothing was observed for too long.
+  /// Moves the zone to time t [s]; inactive when the target was not seen for too long.
   void MoveTo(double t);
 
   bool active() const { return active_; }

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <random>
 
+#include "common/world/ages.h"
 #include "mapping_metrics.h"
 #include "mapping_world.h"
 #include "services/mapping/mapper.h"
@@ -78,8 +79,10 @@ TEST(MappingTarget, StaysOutForAWhileAfterALoss) {
     if (t <= 3.0) mapper.ObserveTarget(Estimate(place(t), {t < 3.0 ? 0.5 : 0.0, 0}, t, &random));
     const auto list =
         mapper.Insert(testing::Scan(GymWithTarget(place(t)), {3.5, 2.5, 1.2}, t, {}, &random));
-    if (t < 5.5) {
+    if (t < 3.0 + TargetConfig{}.hold) {
       EXPECT_FALSE(Blocked(list, place(t), t)) << t;
+    } else if (t > 5.5) {
+      EXPECT_TRUE(Blocked(list, place(t), t)) << t;
     }
   }
 }
@@ -126,20 +129,24 @@ TEST(MappingTarget, PassingNextToAPillarLeavesItWhole) {
   }
 }
 
+/// As long as planning flies after it: then it is an obstacle like all else.
 TEST(MappingTarget, PerceptionsOwnPredictionsCountForAWhileOnly) {
-  TargetZone zone(TargetConfig{});
+  const TargetConfig config;
+  EXPECT_EQ(config.hold, world::kMostAge.prediction);
+  TargetZone zone(config);
   TargetEstimate estimate;
   zone.Observe(estimate);
   estimate.seen = false;
-  for (double t = 0.1; t < 10.0; t += 0.1) {
+  for (double t = 0.05; t < 10.0; t += 0.1) {
     estimate.t = t;
     zone.Observe(estimate);
     zone.MoveTo(t);
-    if (t < 2.9) {
-      EXPECT_TRUE(zone.active());
-    }
+    EXPECT_EQ(zone.active(), t < config.hold) << t;
   }
-  EXPECT_FALSE(zone.active());
+  estimate.seen = true;
+  zone.Observe(estimate);
+  zone.MoveTo(estimate.t);
+  EXPECT_TRUE(zone.active());
 }
 
 }  // namespace
