@@ -183,8 +183,8 @@ bool Mapper::ColumnExtent(const VoxelGrid::Column& column, Extent* extent) {
   return !extent->empty();
 }
 
-/// A column of which nothing was seen at the drone's own height. The drone's own place is known to
-/// be free.
+/// A column of which nothing was seen at the drone's own height and nothing is listed. The drone's
+/// own place is known to be free.
 bool Mapper::IsUnseen(const Key& key, const Eigen::Vector3d& origin) {
   const Eigen::Vector2d center = grid_.Center(key).head<2>();
   const double distance = (center - origin.head<2>()).norm();
@@ -192,7 +192,7 @@ bool Mapper::IsUnseen(const Key& key, const Eigen::Vector3d& origin) {
   if (zone_.in_view() && (center - zone_.center()).norm() < zone_.outer()) return false;
   const VoxelGrid::Column* column = grid_.Find(key.x, key.y);
   if (!column) return true;
-  if (column->occupied > 0) return false;
+  if (Extent e; column->occupied > 0 && ColumnExtent(*column, &e)) return false;  // listed
   for (int z = key.z - kOwnLevels; z <= key.z + kOwnLevels; ++z)
     if (grid_.ContainsLevel(z) && column->voxels[VoxelGrid::Level(z)].sweep > 0) return false;
   return true;

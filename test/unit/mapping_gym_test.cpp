@@ -177,6 +177,26 @@ TEST(MappingGym, ListsWhatIsUnseenUntilItIsSeen) {
   }
 }
 
+/// A ceiling above the flight volume does not tell what is behind a shelf at the drone's height.
+TEST(MappingGym, WhatHangsAboveTheFlightVolumeLeavesAColumnUnseen) {
+  testing::World world;
+  world.boxes = {{{2.0, 0.0, 0.8}, {0.2, 1.5, 0.8}}, {{0.0, 0.0, 4.4}, {30.0, 30.0, 0.1}}};
+  Mapper mapper(MappingConfig{});
+  std::mt19937 random(1);
+  ObstacleList list;
+  // Looks up as well, as it does while it brakes or accelerates.
+  for (int i = 0; i < 40; ++i) {
+    const Eigen::Quaterniond R_WL(
+        Eigen::AngleAxisd(i % 2 == 0 ? 0.0 : -1.0, Eigen::Vector3d::UnitY()));
+    list =
+        mapper.Insert(testing::Scan(world, {0.0, 0.0, 1.3}, 0.1 * i, {}, &random, nullptr, R_WL));
+  }
+  const VoxelGrid::Column* column = mapper.grid().Find(13, 0);
+  ASSERT_TRUE(column && column->occupied > 0);  // the ceiling
+  EXPECT_NE(testing::Holding(list.unseen, {2.7, 0.1, 1.3}, 4.0), nullptr);
+  EXPECT_EQ(testing::Holding(list.unseen, {1.4, 0.1, 1.3}, 4.0), nullptr);
+}
+
 TEST(MappingGym, SameInputGivesSameBytes) {
   std::vector<double> first, second;
   for (auto* sink : {&first, &second})
