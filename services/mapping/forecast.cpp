@@ -12,10 +12,15 @@ namespace {
 constexpr int kSettledHits = 15;  // sweeps after which a cell is not doubted
 constexpr int kDegree = 4;        // of a forecast that stops
 
-bool Stands(const VoxelGrid::Column& column, int low, int high) {
-  for (int z = low; z <= high; ++z) {
+/// Something settled between two heights in a column, m.
+bool Stands(const VoxelGrid& grid, const VoxelGrid::Column& column, double low, double high) {
+  for (int z = column.z0; z < column.z0 + VoxelGrid::kLevels; ++z) {
     const Voxel& voxel = column.voxels[VoxelGrid::Level(z)];
-    if (voxel.occupied && voxel.hits >= kSettledHits && !voxel.extent.empty()) return true;
+    if (!voxel.occupied || voxel.hits < kSettledHits || voxel.extent.empty()) continue;
+    const double middle = grid.Center({column.x, column.y, z}).z();
+    if (middle + grid.step() * voxel.extent.high[4] >= low &&
+        middle + grid.step() * voxel.extent.low[4] <= high)
+      return true;
   }
   return false;
 }
@@ -27,13 +32,23 @@ double FreeWay(const Eigen::Vector2d& p, const Eigen::Vector2d& d, double most, 
   const double step = 0.5 * grid->resolution();
   for (double s = 0.0; s < most; s += step) {
     const Eigen::Vector2d q = p + s * d;
-    const Key from = grid->ToKey({q.x(), q.y(), low}), to = grid->ToKey({q.x(), q.y(), high});
-    const auto* column = grid->Find(from.x, from.y);
-    const int bottom = std::max(from.z, grid->z0());
-    const int top = std::min(to.z, grid->z0() + VoxelGrid::kLevels - 1);
-    if (column && Stands(*column, bottom, top)) return s;
+    const Key key = grid->ToKey({q.x(), q.y(), low});
+    const auto* column = grid->Find(key.x, key.y);
+    if (column && Stands(*grid, *column, low, high)) return s;
   }
   return most;
+}
+
+double FreeWay(const Ellipse& outline, const Eigen::Vector2d& d, double most, double low,
+               double high, VoxelGrid* grid) {
+  const Eigen::Matrix2d inverse = outline.shape.inverse();
+  const Eigen::Vector2d aside(-d.y(), d.x());
+  const Eigen::Vector2d front = outline.center + std::sqrt(d.dot(inverse * d)) * d;
+  const Eigen::Vector2d edge = std::sqrt(aside.dot(inverse * aside)) * aside;
+  double way = 0.0;
+  for (const double side : {-1.0, 0.0, 1.0})
+    way = std::max(way, FreeWay(front + side * edge, d, most, low, high, grid));
+  return way;
 }
 
 void StopAfter(double way, world::Obstacle* mover) {

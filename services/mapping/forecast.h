@@ -1,6 +1,7 @@
 #pragma once
 
 #include "common/world/obstacle.h"
+#include "services/mapping/enclosing.h"
 #include "services/mapping/voxel_grid.h"
 
 namespace chase::mapping {
@@ -8,6 +9,11 @@ namespace chase::mapping {
 /// Distance in plan from p along the unit vector d, at most `most` m, until a column with something
 /// settled between the heights `low` and `high` (frame W, m).
 double FreeWay(const Eigen::Vector2d& p, const Eigen::Vector2d& d, double most, double low,
+               double high, VoxelGrid* grid);
+
+/// The same for a body of this outline: the farthest of the ways of its front's middle and of both
+/// of its sides, since one that only brushes against something goes on beside it.
+double FreeWay(const Ellipse& outline, const Eigen::Vector2d& d, double most, double low,
                double high, VoxelGrid* grid);
 
 /// A mover that goes on at its velocity until it has gone `way` m and stands from then on: the

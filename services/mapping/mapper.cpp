@@ -15,6 +15,7 @@ constexpr int kSettledHits = 15;       // sweeps after which a cell outside the 
 constexpr double kGhostMargin = 0.2;   // m around a mover within which doubtful cells are cleared
 constexpr double kLookBack = 2.0;      // s after a mover became known that its way is cleared
 constexpr double kPassedTime = 6.0;    // s of its way
+constexpr double kStep = 0.2;          // m, over which a mover steps
 constexpr double kOwnPlace = 0.6;      // m around the drone that are free since it is there
 constexpr int kOwnLevels = 1;          // cells above and below it that count as its height
 constexpr double kWindowMargin = 1.0;  // m beyond the list's radius that the decomposition sees
@@ -297,18 +298,18 @@ std::vector<world::Obstacle> Mapper::Unseen(const Eigen::Vector3d& origin, doubl
   return unseen;
 }
 
-/// Nothing walks through what stands: a mover's forecast ends where its front meets it.
+/// Nothing walks through what stands: a mover's forecast ends where its whole front meets it. What
+/// is above or below what is seen of the mover is not in its way.
 void Mapper::StopAtWalls(world::Obstacle* mover) {
+  const Track* track = tracker_.Find(mover->id);
   const Eigen::Vector2d p = mover->center.coefficients.row(0).head<2>();
   const Eigen::Vector2d way = mover->center.coefficients.row(1).head<2>();
   const double length = way.norm();
-  if (!(length > 0.0)) return;
-  const Eigen::Vector2d d = way / length;
-  const Eigen::Matrix2d outline = mover->shape.topLeftCorner<2, 2>().inverse();
-  const double front = std::sqrt(d.dot(outline * d));
-  const double ground = ground_.Height(p.x(), p.y());
-  StopAfter(FreeWay(p + front * d, d, length, ground + config_.statics.band_low,
-                    ground + config_.statics.band_high, &grid_),
+  if (!track || !(length > 0.0)) return;
+  const double low = std::max(ground_.Height(p.x(), p.y()) + config_.statics.band_low,
+                              track->z - track->half_height + kStep);
+  StopAfter(FreeWay(Ellipse{p, mover->shape.topLeftCorner<2, 2>()}, way / length, length, low,
+                    track->z + track->half_height, &grid_),
             mover);
 }
 

@@ -244,6 +244,7 @@ bool MotionDetector::Finish(const std::vector<Return>& returns, const std::vecto
     box.center += 0.5 * missing * away;
   }
   cluster->center << box.center, 0.5 * (low + high);
+  cluster->half_height = 0.5 * (high - low);
   return true;
 }
 

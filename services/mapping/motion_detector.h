@@ -15,6 +15,7 @@ struct Cluster {
   std::vector<int> members;                          ///< indices into the sweep's returns
   Reaches reaches;                                   ///< of the returns; where hidden, as supposed
   Eigen::Vector3d center = Eigen::Vector3d::Zero();  ///< of the box around all that, m
+  double half_height = 0.0;                          ///< of that box, m
   int track = -1;                                    ///< id of the track that it belongs to
 };
 

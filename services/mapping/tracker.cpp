@@ -112,6 +112,7 @@ void Tracker::Correct(const Cluster& cluster, Track* track) const {
   ++track->detections;
   ++track->row;
   track->z += 0.3 * (cluster.center.z() - track->z);
+  track->half_height += 0.3 * (cluster.half_height - track->half_height);
   Shape(track);
 }
 
@@ -138,6 +139,7 @@ void Tracker::Birth(Cluster* cluster) {
   track.birth = cluster->center.head<2>();
   track.body = BodyFilter(track.birth, cluster->reaches, kFirstSpeed, kUnseen);
   track.z = cluster->center.z();
+  track.half_height = cluster->half_height;
   track.born = track.seen = track.moved = t_;
   track.existence = kBorn;
   track.detections = track.row = 1;
@@ -221,10 +223,15 @@ void Tracker::Forget(const Eigen::Vector2d& center, double radius, double around
   tracks_.erase(std::remove_if(tracks_.begin(), tracks_.end(), within), tracks_.end());
 }
 
-bool Tracker::Moves(int id) const {
+const Track* Tracker::Find(int id) const {
   for (const auto& track : tracks_)
-    if (track.id == id) return track.confirmed ? !Rests(track) : t_ - track.born < kTentativeAge;
-  return false;
+    if (track.id == id) return &track;
+  return nullptr;
+}
+
+bool Tracker::Moves(int id) const {
+  const Track* track = Find(id);
+  return track && (track->confirmed ? !Rests(*track) : t_ - track->born < kTentativeAge);
 }
 
 std::vector<world::Obstacle> Tracker::Obstacles(double middle, double semi_height,

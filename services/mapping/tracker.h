@@ -14,9 +14,10 @@ namespace chase::mapping {
 struct Track {
   int id = 0;
   BodyFilter body;
-  double z = 0.0;      ///< of the centre, m
-  Ellipse outline;     ///< in plan, about body.p()
-  double reach = 0.0;  ///< of the outline's corners from body.p(), m
+  double z = 0.0;            ///< of the centre of what is seen of it, m
+  double half_height = 0.0;  ///< of that, m
+  Ellipse outline;           ///< in plan, about body.p()
+  double reach = 0.0;        ///< of the outline's corners from body.p(), m
   Eigen::Vector2d birth = Eigen::Vector2d::Zero();
   double born = 0.0, seen = 0.0, moved = 0.0;  ///< s: first, last detection; last time not at rest
   double known = 0.0;                          ///< s, when it was confirmed
@@ -50,6 +51,8 @@ class Tracker {
 
   /// True while returns of this track are to be kept out of the static map.
   bool Moves(int id) const;
+  /// Null if there is none.
+  const Track* Find(int id) const;
   const std::vector<Track>& tracks() const { return tracks_; }
   /// Confirmed tracks that are more likely there than not and that the static map does not hold, as
   /// upright ellipsoids with a linear centre.

@@ -146,6 +146,48 @@ TEST(MappingMover, ForecastEndsAtAWall) {
   EXPECT_GE(judged, 8);
 }
 
+/// A door lets a walker through, also where he will brush its post, and so does one with a lintel
+/// above his head; a wall does not.
+TEST(MappingMover, ForecastGoesThroughADoor) {
+  struct Case {
+    const char* name;
+    double left, right, lintel;  ///< posts, y; m
+    bool free;
+  };
+  constexpr double kWall = 6.5, kTall = 4.0, kSpeed = 1.2;
+  for (const Case& c :
+       {Case{"door", 2.5, 1.5, kTall, true}, Case{"lintel", 2.5, 1.5, 2.1, true},
+        Case{"post ahead", 3.1, 2.05, kTall, true}, Case{"wall", 2.0, 2.0, 0.0, false}}) {
+    std::mt19937 random(3);
+    Mapper mapper(MappingConfig{});
+    int judged = 0;
+    for (double t = 0.0; t < 5.0; t += 0.1) {
+      const auto wall = [&](double right, double left, double bottom) {
+        return testing::Box{{kWall, 0.5 * (left + right), 0.5 * (bottom + kTall)},
+                            {0.1, 0.5 * (left - right), 0.5 * (kTall - bottom)}};
+      };
+      testing::World world;
+      world.boxes = {wall(-6.0, c.right, 0.0), wall(c.left, 8.0, 0.0),
+                     wall(c.right, c.left, c.lintel)};
+      if (t > 2.5) world.boxes.push_back({{1.5 + kSpeed * (t - 2.5), 2.0, 0.9}, {0.25, 0.25, 0.9}});
+      const auto list = mapper.Insert(testing::Scan(world, {0, 0, 1.2}, t, {0.02, 0.01}, &random));
+      for (const auto& o : list.obstacles) {
+        if (!o.moving || t < 4.0) continue;
+        ++judged;
+        const double end = o.center.Position(t + 3.0).x();
+        const double way = end - o.center.Position(t).x();
+        if (c.free) {
+          EXPECT_GT(way, 3.0 * kSpeed - 0.6) << c.name << " " << t;
+        } else {
+          EXPECT_LT(end, kWall) << c.name << " " << t;
+          EXPECT_GT(end, kWall - 1.2) << c.name << " " << t;
+        }
+      }
+    }
+    EXPECT_GE(judged, 8) << c.name;
+  }
+}
+
 TEST(MappingMover, WhatStopsBecomesStatic) {
   std::mt19937 random(3);
   Mapper mapper(MappingConfig{});
