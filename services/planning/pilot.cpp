@@ -85,7 +85,7 @@ void Pilot::SetForecast(const Forecast& forecast) {
 void Pilot::SetObstacles(double t, std::vector<world::Obstacle> obstacles) {
   obstacles_time_ = t;
   obstacles_ = std::move(obstacles);
-  obstacles_changed_ = true;
+  news_ = true;
 }
 
 void Pilot::SetUnseen(double t, std::vector<world::Obstacle> unseen) {
@@ -153,10 +153,6 @@ std::optional<PlanResult> Pilot::Update(double t, const BodyEstimate& body) {
   const Start start = StartAt(t, t0, body);
   if (!first_update_) first_update_ = t;
   news_ = news_ || !start.follows;
-  if (obstacles_changed_ && has_running_ && HasTarget(t)) {
-    obstacles_changed_ = false;
-    news_ = news_ || !planner_->IsCertified(Request(t0, start), running_.trajectory);
-  }
   if (task_ && airborne_) trail_.Add(body.p);
   if (!IsDue(t) || !MayPlan(t)) return std::nullopt;
   PlanResult plan = !Chases()                                       ? Obey(t0, start, body)

@@ -129,7 +129,6 @@ class Pilot {
   bool has_running_ = false;
   double last_planned_ = -1e9;
   bool news_ = false;
-  bool obstacles_changed_ = false;
   bool airborne_ = false;
   bool heard_control_ = false, flies_ = false, descending_ = false, waits_ = false;
   std::optional<double> first_update_;  ///< s

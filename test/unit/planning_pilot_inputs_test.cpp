@@ -39,9 +39,9 @@ TEST(Pilot, WithoutObstaclesItBrakesAndCertifiesNothing) {
   EXPECT_LT(flight.Body().v.norm(), 0.05);
 }
 
-TEST(Pilot, AnObstacleOnTheRunningPlanIsAnsweredAtOnce) {
+TEST(Pilot, AListOfObstaclesIsAnsweredAtOnce) {
   const PlanningConfig config;
-  for (const bool in_the_way : {true, false}) {
+  for (const bool comes : {true, false}) {
     Flight flight{config};
     flight.Run(4.0, false);
     flight.Run(4.0, true);
@@ -53,11 +53,10 @@ TEST(Pilot, AnObstacleOnTheRunningPlanIsAnsweredAtOnce) {
     pillar.solid = world::Obstacle::Solid::kCylinder;
     pillar.half = {0.2, 0.2, 3.0};
     pillar.shape = pillar.half.cwiseAbs2().cwiseInverse().asDiagonal();
-    const Eigen::Vector3d aside(0.0, in_the_way ? 0.0 : 5.0, 0.0);
-    pillar.center = world::Trajectory::Constant(plan.Position(plan.end()) + aside, flight.t, 1.0);
-    flight.pilot.SetObstacles(flight.t, {pillar});
+    pillar.center = world::Trajectory::Constant(plan.Position(plan.end()), flight.t, 1.0);
+    if (comes) flight.pilot.SetObstacles(flight.t, {pillar});
     const auto answer = flight.pilot.Update(flight.t, flight.Body());
-    EXPECT_EQ(answer.has_value(), in_the_way);
+    EXPECT_EQ(answer.has_value(), comes);
   }
 }
 
