@@ -16,51 +16,28 @@ using Eigen::Vector3d;
 constexpr double kInTime = 0.05;  // s: contacts are sampled this often
 constexpr double kAlike = 0.01;   // m of clearance that make no difference
 constexpr double kAbove = 0.05;   // m, left to what the target's height is off
-// tau by which the ground is left: from rest to rest a climb of 0.5 m is 0.27 m up by then, and
+// tau by which the ground is left: from rest to rest a climb of 0.5 m is 0.34 m up by then, and
 // slabs reach 0.3 m above what they stand for. The check allows as much: kLeaveGroundBy.
 constexpr double kOutBy = 0.6;
 
-constexpr int kDegree = 6;  // of ways to a place
-
-// Coefficients in Bernstein form that continue position, velocity, acceleration and jerk of s over
-// T; the rest are zero.
-Points Continued(const world::State& s, double T) {
-  constexpr int n = kDegree;
-  Points b = Points::Zero();
-  const Vector3d d[4] = {s.p, T * s.v, T * T * s.a, T * T * T * s.j};
-  const double falling[4] = {1.0, 1.0 * n, n * (n - 1.0), n * (n - 1.0) * (n - 2.0)};
-  // Differences of order k at the start are d_k / falling_k.
-  Vector3d difference[4];
-  for (int k = 0; k < 4; ++k) difference[k] = d[k] / falling[k];
-  for (int i = 0; i < 4; ++i) {
-    Vector3d sum = Vector3d::Zero();
-    double binomial = 1.0;
-    for (int k = 0; k <= i; ++k) {
-      sum += binomial * difference[k];
-      binomial *= (i - k) / (k + 1.0);
-    }
-    b.row(i) = sum.transpose();
-  }
-  return b;
+// Of least squared jerk, from position, velocity and acceleration of s to rest over T: the first
+// three coefficients in Bernstein form of degree n, and `end` for the others.
+Curve ToRest(const world::State& s, double T, int n, const Vector3d& end) {
+  Points b = end.transpose().replicate<7, 1>();
+  const Vector3d way = T / n * s.v, bend = T * T / (n * (n - 1.0)) * s.a;
+  b.row(0) = s.p.transpose();
+  b.row(1) = (s.p + way).transpose();
+  b.row(2) = (s.p + 2.0 * way + bend).transpose();
+  return ToPower(b, n);
 }
 
 }  // namespace
 
 Curve BrakeCurve(const world::State& s, double T) {
-  Points b = Points::Zero();
-  const Vector3d way = T * s.v, bend = T * T * s.a;
-  b.row(0) = s.p.transpose();
-  b.row(1) = (s.p + way / 4.0).transpose();
-  b.row(2) = (s.p + way / 2.0 + bend / 12.0).transpose();
-  b.row(3) = b.row(4) = b.row(2);
-  return ToPower(b, 4);
+  return ToRest(s, T, 4, s.p + T / 2.0 * s.v + T * T / 12.0 * s.a);
 }
 
-Curve CurveTo(const world::State& s, double T, const Vector3d& end) {
-  Points b = Continued(s, T);
-  for (int i = 4; i <= kDegree; ++i) b.row(i) = end.transpose();
-  return ToPower(b, kDegree);
-}
+Curve CurveTo(const world::State& s, double T, const Vector3d& end) { return ToRest(s, T, 5, end); }
 
 double DistanceTo(const world::Obstacle& o, const Vector3d& d) {
   using Kind = world::Solid::Kind;

@@ -11,12 +11,10 @@ namespace chase::planning {
 /// Durations of a braking that are tried, s.
 inline constexpr double kBrakeTimes[] = {0.6, 0.8, 1.0, 1.3, 1.7, 2.2, 3.0};
 
-/// To rest over T, wherever that leads: of all ways that continue position, velocity and
-/// acceleration of s the one of least squared jerk. Mueller, Hehn and D'Andrea 2015, appendix A,
-/// the end's velocity and acceleration fixed.
+/// To rest over T, wherever that leads or at `end`: of all ways that continue position, velocity
+/// and acceleration of s the one of least squared jerk. Mueller, Hehn and D'Andrea 2015, section
+/// III and appendix A (the end's position free).
 Curve BrakeCurve(const world::State& s, double T);
-
-/// To rest at `end` over T, from position, velocity, acceleration and jerk of s on.
 Curve CurveTo(const world::State& s, double T, const Eigen::Vector3d& end);
 
 /// Distance of a point, `d` from its centre, to the solid; of an ellipsoid to first order (Taubin

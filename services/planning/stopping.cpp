@@ -70,8 +70,8 @@ std::optional<Stop> Brake(const PlannerConfig& config, const PlanRequest& reques
 
 std::optional<Stop> GoTo(const PlannerConfig& config, const PlanRequest& request,
                          const Vector3d& end) {
-  // Rest to rest the speed peaks at 2.2 times the mean, which stays below 4 m/s of max_speed, and
-  // the acceleration of the shortest way at 5 m/s^2.
+  // Rest to rest the speed peaks at 1.9 times the mean, which stays below 4 m/s of max_speed, and
+  // the acceleration of the shortest way at 4 m/s^2.
   constexpr double kPace = 1.0, kLeast = 1.5;  // m/s, s
   const double quickest = std::max(kLeast, (end - request.start.p).norm() / kPace);
   Resting resting(config, request);

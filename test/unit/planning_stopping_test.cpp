@@ -359,10 +359,10 @@ TEST(Harm, IsTheFirstContactAndTheLeastDistance) {
 TEST(Evade, TouchesNoEarlierThanABraking) {
   const PlannerConfig c;
   int weighed = 0, later = 0;
-  for (unsigned seed = 0; seed < 200; ++seed) {
+  for (unsigned seed = 0; seed < 40; ++seed) {
     Random random(seed, 7);
     PlanRequest request = RandomRequest(c, seed);
-    request.start.v *= 0.7;
+    request.start.v *= 0.5;
     request.obstacles.clear();
     const PlanRequest alone = request;
     const double speed = random.Uniform(2.6, 3.5);
@@ -402,11 +402,10 @@ TEST(Evade, TouchesNoEarlierThanABraking) {
     }
     EXPECT_GE(contact, best - 0.03) << seed;
     EXPECT_GE(Room(c, alone, stop.trajectory), -1e-6) << seed;
-    later += contact > best + 0.02;
+    later += contact > best + 0.05;
   }
   EXPECT_GT(weighed, 10);
   EXPECT_GT(later, 0);
-  std::printf("%d weighed, %d later\n", weighed, later);
 }
 
 }  // namespace
