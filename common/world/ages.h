@@ -13,11 +13,12 @@ struct MostAge {
                             ///< usual by this; silent after `velocity`; mission: not ready
   double velocity = 2.0;    ///< control: since its deviation was 0.1 m/s; brakes until then, then
                             ///< lands; mission: EMERGENCY
-  double target = 0.5;      ///< mission: not ready, in flight lost; ten frames of the camera
-  double status = 2.5;      ///< mission: not ready; two that are sent once a second may be lost
-  double flight_state = 2.0;  ///< planning: holds where it chased, searched or returned; a process
-                              ///< that died is back within that
-  double setpoint = 0.5;      ///< fcu: leaves the vehicle to the autopilot, whose own limit is 1 s
+  double target_unseen = 1.5;  ///< prediction: since it was seen; mapping: it is an obstacle then
+  double target = 0.5;         ///< mission: not ready, in flight lost; ten frames of the camera
+  double status = 2.5;         ///< mission: not ready; two that are sent once a second may be lost
+  double flight_state = 2.0;   ///< planning: holds where it chased, searched or returned; a process
+                               ///< that died is back within that
+  double setpoint = 0.5;       ///< fcu: leaves the vehicle to the autopilot, whose own limit is 1 s
   double attitude = 0.5;  ///< fcu: of the autopilot; no position is sent to it, nothing is armed
   double landing_plan = 2.0;  ///< control: comes down where it is without a plan made to land
   double command = 10.0;      ///< mission: refused; chase-command repeats for half of that

@@ -300,7 +300,8 @@ class Flight:
                     speed = progress["rtf"]
             if last_time is not None:  # progress comes once a second
                 self.kill(last_time + speed * (time.monotonic() - moved))
-            self.complain(*([self.monitor] if ended and not line else []))
+            watched = [self.monitor] if ended and not line else []
+            self.complain(*watched)
             if time.monotonic() - moved > SILENCE_LIMIT:
                 raise FlightError(f"the mission's time has not moved for {SILENCE_LIMIT:.0f} s; "
                                   f"the logs are in {self.folder}")

@@ -36,7 +36,7 @@ bool Finite(const Setpoint& s) {
 
 std::string Controller::AddPlan(const Plan& plan) {
   if (last_t_ && *last_t_ > StopsAt(plan)) return "it comes after its time";
-  if (flying_ && !IsNear(plan)) return "it starts where neither the reference nor the body is";
+  if (flying_ && !IsNear(plan)) return "it is where neither the reference nor the body is";
   return plans_.Add(plan) ? "" : "it starts before the one being flown, or is empty";
 }
 
@@ -122,8 +122,9 @@ bool Controller::MayDescend(double t, const Estimate& estimate) const {
   if (estimate.v_WB.norm() > kAtRest) return false;
   const Plan* plan = plans_.FlownAt(t);
   if (plan == nullptr || !plan->to_land) return t - asked_to_land_ > world::kMostAge.landing_plan;
-  const bool stops = plan->stop && t >= plan->stop->start;
-  const world::Trajectory& way = stops ? *plan->stop : plan->position;
+  if (plan->stop && t >= plan->stop->start)  // whoever leads it there has fallen silent
+    return t - std::max(asked_to_land_, plan->stop->start) > world::kMostAge.landing_plan;
+  const world::Trajectory& way = plan->position;
   return (way.Position(way.end()) - estimate.p_WB).head<2>().norm() < kAtEnd;
 }
 

@@ -308,8 +308,9 @@ void Mapper::StopAtWalls(world::Obstacle* mover) {
   if (!track || !(length > 0.0)) return;
   const double low = std::max(ground_.Height(p.x(), p.y()) + config_.statics.band_low,
                               track->z - track->half_height + kStep);
-  StopAfter(FreeWay(Ellipse{p, mover->shape.topLeftCorner<2, 2>()}, way / length, length, low,
-                    track->z + track->half_height, &grid_),
+  const double high = std::max(low, track->z + track->half_height);
+  StopAfter(FreeWay(Ellipse{p, mover->shape.topLeftCorner<2, 2>()}, way / length, length, low, high,
+                    &grid_),
             mover);
 }
 

@@ -116,14 +116,16 @@ struct MoverConfig {
 /// The target's own points are no obstacle.
 struct TargetConfig {
   double margin = 0.25;  ///< around the target's cylinder points are left out, m
-  double core = 0.12;    ///< around the target's cylinder even settled cells are cleared, m
-  /// The place is kept clear for this after it was last seen, s: as long as planning has a target.
-  double hold = world::kMostAge.prediction;
+  double core = 0.12;    ///< around its cylinder, while it is in view, settled cells are cleared, m
+  /// The place is kept clear for this after it was last seen, s: as long as prediction forecasts
+  /// it.
+  double hold = world::kMostAge.target_unseen;
 
   template <class V>
   void Visit(V& v) {
     v("margin", margin, "around the target's cylinder within which points are left out, m");
-    v("core", core, "around the target's cylinder within which settled cells are cleared, m");
+    v("core", core,
+      "around the target's cylinder, while it is in view, settled cells are cleared, m");
     v("hold", hold, "the predicted place is kept clear for this after it was last seen, s");
   }
   std::string Problem() const;

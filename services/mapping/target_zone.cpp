@@ -11,7 +11,7 @@ constexpr double kSlowDown = 1.0;    // s, time constant with which an unseen ta
 constexpr double kMostSigma = 0.15;  // m, of the estimate that widens the zone
 constexpr double kSpread = 0.15;     // m/s, growth of the zone while unseen
 constexpr double kMostSpread = 0.3;  // m
-constexpr double kInView = 0.3;      // s since it was seen, six frames of the camera
+constexpr double kInView = 0.3;      // s, age of an estimate of it as seen; six frames
 constexpr double kArrival = 1.0;     // s, after the first sighting
 constexpr double kHalfSweep = 0.05;  // s; returns were fired up to a sweep before its time
 

@@ -35,7 +35,7 @@ struct ProcessReport {
 struct Inputs {
   std::optional<PoseReport> pose;
   std::optional<double> obstacles;  ///< when they were valid, s
-  world::SweepRun sweeps;           ///< that they were listed of
+  world::SweepRun sweeps;           ///< in a row, listed while odometry was OK
   std::optional<double> target;
   bool target_tracked = false;
   double plan_heard = -1e9;                            ///< s

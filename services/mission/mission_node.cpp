@@ -77,15 +77,18 @@ void MissionNode::OnPose(const pose_t& message) {
   pose.healthy = message.health == pose_t::HEALTH_OK;
   pose.usable = pose.healthy || message.health == pose_t::HEALTH_DEGRADED;
   pose.reason = message.reason;
-  mission_.inputs().pose = std::move(pose);
+  Inputs& inputs = mission_.inputs();
+  if (inputs.pose && inputs.pose->epoch != pose.epoch) inputs.sweeps = {};
+  inputs.pose = std::move(pose);
 }
 
 // In the air nobody asks for the column.
 void MissionNode::OnObstacles(const obstacles_t& message) {
   Inputs& inputs = mission_.inputs();
+  if (message.n_cut > 0 || (inputs.pose && inputs.pose->epoch != message.epoch)) return;
   inputs.obstacles = Seconds(message.utime);
   inputs.sweeps.Add(*inputs.obstacles, inputs.pose && inputs.pose->healthy);
-  if (IsAirborne(mission_.state()) || !inputs.pose || inputs.pose->epoch != message.epoch) return;
+  if (IsAirborne(mission_.state()) || !inputs.pose) return;
   std::vector<world::Obstacle> obstacles;
   for (const obstacle_t& o : message.obstacles) obstacles.push_back(bus::FromMessage(o, origin_));
   inputs.blocked =

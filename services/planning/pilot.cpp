@@ -102,6 +102,7 @@ void Pilot::ChangeFrame() {
   unseen_time_.reset();
   obstacles_time_ = -1e9;
   airborne_ = airborne_ || flies_;  // a climb is not begun anew
+  climb_top_.reset();
   has_running_ = false;
   home_.reset();
   trail_.Clear();
@@ -141,7 +142,7 @@ bool Pilot::IsDue(double t) const {
 bool Pilot::MayPlan(double t) const {
   if (task_ == Task::kDone) return false;
   if (has_running_ || airborne_) return true;
-  if (waits_) return false;
+  if (waits_ || !SeesObstacles(t)) return false;
   if (!task_) return heard_control_ || t >= *first_update_ + kHearControl;
   return heard_control_ && (task_ == Task::kTakeoff || task_ == Task::kChase);
 }
@@ -155,6 +156,8 @@ std::optional<PlanResult> Pilot::Update(double t, const BodyEstimate& body) {
   news_ = news_ || !start.follows;
   if (task_ && airborne_) trail_.Add(body.p);
   if (!IsDue(t) || !MayPlan(t)) return std::nullopt;
+  const bool stands = !airborne_ && !has_running_;
+  if (stands && !IsFree(t0, start, Climb(t0, body).trajectory)) return std::nullopt;
   PlanResult plan = !Chases()                                       ? Obey(t0, start, body)
                     : airborne_ && HasTarget(t) && SeesObstacles(t) ? Chase(t0, start)
                                                                     : Wait(t0, start, body);
@@ -235,25 +238,47 @@ PlanResult Pilot::Chase(double t0, const Start& start) {
 
 PlanResult Pilot::Wait(double t0, const Start& start, const BodyEstimate& body) {
   if (!airborne_ && !has_running_) {
-    climb_end_ = t0 + config_.takeoff_time;
-    return Climb(t0, body);
+    PlanResult climb = Climb(t0, body);
+    climb_end_ = climb.trajectory.end();
+    climb_top_ = climb.trajectory.Position(climb_end_);
+    return climb;
   }
-  if (!airborne_ && t0 < climb_end_ && IsClimbFree(t0, start))
+  if (!airborne_ && t0 < climb_end_ && IsFree(t0, start, running_.trajectory))
     return PlanResult(running_);  // still climbing
   airborne_ = true;
-  if (task_ == Task::kTakeoff) return Hold(t0, start, "climbed");
+  if (task_ == Task::kTakeoff) return ClimbOn(t0, start, body);
   if (!SeesObstacles(t0 - config_.latency)) return Rest(t0, start);
   if (HasTarget(t0 - config_.latency)) return Chase(t0, start);
   return had_target_ ? Search(t0, start, body) : Hover(t0, start);
 }
 
-// For as long as stopping takes, and somebody else needs to be seen.
-bool Pilot::IsClimbFree(double t0, const Start& start) const {
-  constexpr double kAhead = 1.5;  // s
+// No mover comes to the climb for as long as a stop takes.
+bool Pilot::IsFree(double t0, const Start& start, const world::Trajectory& climb) const {
+  constexpr double kStopTakes = 1.5;  // s: from the climb's 0.75 m/s, and to be seen
   if (!SeesObstacles(t0 - config_.latency)) return false;
   PlanRequest request = Request(t0, start);
-  request.horizon = kAhead;
-  return KeepsOffMovers(config_.planner, request, running_.trajectory);
+  request.horizon = kStopTakes;
+  return KeepsOffMovers(config_.planner, request, climb);
+}
+
+// A climb that was broken off goes on, certified, once it can.
+PlanResult Pilot::ClimbOn(double t0, const Start& start, const BodyEstimate& body) {
+  constexpr double kThere = 0.05;  // m
+  if (!climb_top_ || (*climb_top_ - start.state.p).norm() < kThere)
+    return Hold(t0, start, "climbed");
+  const PlanRequest request = Request(t0, start);
+  std::optional<Stop> leg;
+  if (SeesObstacles(t0 - config_.latency)) {
+    const world::Trajectory& way = running_.trajectory;
+    if (start.on_plan && (way.Position(way.end()) - *climb_top_).norm() < kThere)
+      leg = GoOn(config_.planner, request, way);
+    if (!leg) leg = GoTo(config_.planner, request, *climb_top_);
+  }
+  if (!leg)
+    return Hold(t0, start, "climb broken off: somebody comes, or obstacles are not heard of");
+  PlanResult plan = Along(request, start, std::move(*leg), InFence(body.p));
+  plan.reason = "climbing";
+  return plan;
 }
 
 PlanResult Pilot::Obey(double t0, const Start& start, const BodyEstimate& body) {
@@ -287,18 +312,20 @@ PlanResult Pilot::Return(double t0, const Start& start, const BodyEstimate& body
       way_back_.Leg(config_.planner, request, trail_, above,
                     start.on_plan ? &running_.trajectory : nullptr, InFence(body.p));
   if (!leg || !SeesObstacles(t0 - config_.latency)) return Hold(t0, start, "no way back");
-  PlanResult plan = Along(request, start, std::move(*leg));
+  PlanResult plan = Along(request, start, std::move(*leg), InFence(body.p));
   plan.reason = "returning";
   return plan;
 }
 
-PlanResult Pilot::Along(const PlanRequest& request, const Start& start, Stop leg) const {
+PlanResult Pilot::Along(const PlanRequest& request, const Start& start, Stop leg,
+                        const MayFly& may_fly) const {
   PlanResult plan;
   plan.verdict = LeavesObstacles(leg.proofs) ? Verdict::kEscape : Verdict::kSafeOnly;
   plan.trajectory = std::move(leg.trajectory);
   plan.yaw = {start.yaw.yaw};
   SetProofs(config_.planner, request, std::move(leg.proofs), &plan);
-  if (auto stop = WayOut(config_.planner, request, plan.trajectory)) {
+  auto stop = WayOut(config_.planner, request, plan.trajectory);
+  if (stop && may_fly(stop->trajectory)) {
     plan.stop = std::move(stop->trajectory);
     plan.stop_proofs = std::move(stop->proofs);
   }
@@ -317,7 +344,8 @@ PlanResult Pilot::Land(double t0, const Start& start, const BodyEstimate& body) 
   WayDown::Answer answer = way_down_.Lead(
       config_.planner, request, needs, here.trajectory.Position(here.trajectory.end()), home_,
       start.on_plan ? &running_.trajectory : nullptr, InFence(body.p));
-  PlanResult plan = answer.leg ? Along(request, start, std::move(*answer.leg)) : std::move(here);
+  PlanResult plan =
+      answer.leg ? Along(request, start, std::move(*answer.leg), InFence(body.p)) : std::move(here);
   plan.reason = "landing, " + answer.reason;
   return plan;
 }

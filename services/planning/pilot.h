@@ -104,7 +104,8 @@ class Pilot {
   PlanResult Chase(double t0, const Start& start);
   PlanResult Wait(double t0, const Start& start, const BodyEstimate& body);
   PlanResult Climb(double t0, const BodyEstimate& body) const;
-  bool IsClimbFree(double t0, const Start& start) const;
+  bool IsFree(double t0, const Start& start, const world::Trajectory& climb) const;
+  PlanResult ClimbOn(double t0, const Start& start, const BodyEstimate& body);
   PlanResult Hover(double t0, const Start& start) const;
   PlanResult Rest(double t0, const Start& start) const;
   PlanResult Obey(double t0, const Start& start, const BodyEstimate& body);
@@ -112,7 +113,8 @@ class Pilot {
   PlanResult Return(double t0, const Start& start, const BodyEstimate& body);
   PlanResult Land(double t0, const Start& start, const BodyEstimate& body);
   MayFly InFence(const Eigen::Vector3d& p_WB) const;
-  PlanResult Along(const PlanRequest& request, const Start& start, Stop leg) const;
+  PlanResult Along(const PlanRequest& request, const Start& start, Stop leg,
+                   const MayFly& may_fly) const;
   bool SeesObstacles(double t) const;
   PlanResult Search(double t0, const Start& start, const BodyEstimate& body);
   PlanResult BrakeAndLook(double t0, const Start& start, double yaw) const;
@@ -135,6 +137,7 @@ class Pilot {
   bool had_target_ = false;
   world::Trajectory last_seen_;  ///< forecast of the target that was chased last
   double climb_end_ = 0.0;
+  std::optional<Eigen::Vector3d> climb_top_;  ///< p_WB, m
   std::optional<Task> task_;
   std::optional<Eigen::Vector3d> home_;  // m
   world::Geofence fence_;

@@ -11,6 +11,7 @@
 #include "common/bus/bus.h"
 #include "common/bus/epoch.h"
 #include "common/bus/node.h"
+#include "common/world/ages.h"
 #include "services/prediction/observation_window.h"
 #include "services/prediction/predictor.h"
 #include "services/prediction/replan_trigger.h"
@@ -22,7 +23,7 @@ struct PredictionConfig {
   WindowConfig window;
   TriggerConfig trigger;
   int min_observations = 3;
-  double max_blind = 1.5;
+  double max_blind = world::kMostAge.target_unseen;
   double max_obstacle_age = 1.0;
   double no_target_period = 0.5;
 

@@ -201,12 +201,10 @@ class Campaign(unittest.TestCase):
         self.assertEqual(list((self.out / "flights").glob("*.work")), [])
 
     def test_all_faults_are_those_that_can_strike_the_place(self):
-        lines = self.fly("--list", "--scenarios", "gym,mission", "--faults", "all").stdout
-        for scenario, mission in (("gym", 0), ("mission", 1)):
-            of_place = [line for line in lines.splitlines() if f"/{scenario}.yaml" in line]
-            for fault, times in (("decoy", 1), ("loss-20", 1), ("delay-PLAN", 1), ("cpu-load", 1), ("disk-full", 0),
-                                 ("kill-mission", mission)):
-                self.assertEqual(sum(f"--faults {fault} " in line for line in of_place), times, fault)
+        lines = self.fly("--list", "--scenarios", "gym", "--faults", "all").stdout.splitlines()
+        for fault, times in (("decoy", 1), ("loss-20", 1), ("delay-PLAN", 1), ("cpu-load", 1), ("disk-full", 0),
+                             ("kill-mission", 1)):
+            self.assertEqual(sum(f"--faults {fault} " in line for line in lines), times, fault)
 
     def test_list_through_a_shell_is_the_same(self):
         what = ["--kinds", "hall", "--scenarios", "gym", "--seeds", "1,4,14,19", "--faults",

@@ -123,6 +123,10 @@ class Faults(unittest.TestCase):
         self.assertGreater(max(b - a for a, b in zip(told, told[1:])), 0.4)
         self.assertLess(told[0], -7.0)
         self.assertGreater(told[-1], 2.8)
+        states = [data[lcmlog.after_head(data) + 4] for _, name, data in lcmlog.read(log)
+                  if name == "FLIGHT_STATE"]
+        back = next(i for i, (a, b) in enumerate(zip(told, told[1:]), 1) if b - a > 0.4)
+        self.assertEqual({states[back - 1], *states[back + 5:]}, {3}, "CHASE")
 
     def test_scenario_tells_what_a_live_flight_needs(self):
         """deploy/fly's operator gives what the one in lockstep does, and says which faults it leaves out."""

@@ -43,6 +43,28 @@ TEST(AskedToLand, ComesDownOnTheSpotAndStopsTheMotors) {
     }
 }
 
+// Whoever leads it to level ground hangs: it stops short of that, and comes down there only when
+// nobody leads it on.
+TEST(AskedToLand, OnAStopItWaitsForWhoeverLeadsIt) {
+  for (const bool led : {false, true}) {
+    Flight flight({0, 0, 2});
+    Plan plan = LinePlan({0, 0, 2}, 0.5);
+    plan.stop = world::Trajectory::Constant({0.2, 0, 2}, 0.4, 1.0);
+    plan.to_land = true;
+    flight.controller.AddPlan(plan);
+    flight.Fly(0.1, Health::kUsable);
+    flight.controller.SetLanding(true);
+    flight.Fly(2.2, Health::kUsable);
+    EXPECT_EQ(flight.controller.following(), Following::kStop);
+    Plan on = LinePlan({0.2, 0, 2}, 0.4, 2.3);
+    on.to_land = true;
+    if (led) flight.controller.AddPlan(on);
+    flight.Fly(25.0, Health::kUsable);
+    ASSERT_GT(flight.down_at, 0.0);
+    EXPECT_NEAR(flight.body.p.x(), led ? 2.2 : 0.2, 0.3);
+  }
+}
+
 TEST(AskedToLand, StopsBeforeItComesDown) {
   Flight flight({0, 0, 2});
   flight.body.v = {2, 0, 0};

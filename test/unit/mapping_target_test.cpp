@@ -132,7 +132,7 @@ TEST(MappingTarget, PassingNextToAPillarLeavesItWhole) {
 /// As long as planning flies after it: then it is an obstacle like all else.
 TEST(MappingTarget, PerceptionsOwnPredictionsCountForAWhileOnly) {
   const TargetConfig config;
-  EXPECT_EQ(config.hold, world::kMostAge.prediction);
+  EXPECT_EQ(config.hold, world::kMostAge.target_unseen);
   TargetZone zone(config);
   TargetEstimate estimate;
   zone.Observe(estimate);

@@ -58,6 +58,7 @@ class Bench {
       sensors_->Publish("POSE", pose);
       obstacles_t obstacles{};
       obstacles.utime = t;
+      obstacles.n_cut = n_cut;
       sensors_->Publish("OBSTACLES", obstacles);
       target_t target{};
       target.utime = t;
@@ -79,6 +80,7 @@ class Bench {
 
   Eigen::Vector3d place = Eigen::Vector3d::Zero();  // where it stands, frame W
   int8_t health = pose_t::HEALTH_OK;
+  int32_t n_cut = 0;  // of every list
   bus::Lockstep lockstep_{kStart};
   std::vector<flight_state_t> states;
   std::vector<command_ack_t> acks;
@@ -116,6 +118,10 @@ TEST(MissionNode, IsReadyAfterTenSweepsInARowForWhichOdometryWasWell) {
   EXPECT_NE(bench.states.back().missing[0].find("of 10 good sweeps in a row"), std::string::npos);
   bench.Run(0.2);
   EXPECT_EQ(bench.states.back().state, +flight_state_t::READY);
+  bench.n_cut = 1;
+  bench.Run(0.5);
+  ASSERT_EQ(bench.states.back().n_missing, 1);
+  EXPECT_NE(bench.states.back().missing[0].find("OBSTACLES"), std::string::npos);
 }
 
 TEST(MissionNode, AnswersACommandAndSaysTheNewStateAtOnce) {

@@ -142,8 +142,11 @@ TEST(Pilot, NeverPlansFasterThanItsLeastPeriod) {
 TEST(Pilot, LargeTrackingErrorRestartsFromTheEstimate) {
   Pilot pilot{PlanningConfig()};
   const Eigen::Vector3d zero = Eigen::Vector3d::Zero();
+  pilot.SetFlying(false);
+  pilot.SetObstacles(0.0, {});
   pilot.Update(0.0, {zero, zero, 0.0});
   for (double t = 0.005; t < 5.0; t += kPeriod) {
+    if (std::fmod(t, 0.1) < kPeriod) pilot.SetObstacles(t, {});
     const world::Trajectory& plan = pilot.running().trajectory;
     const double now = plan.degree() ? std::min(t, plan.end()) : t;
     pilot.Update(t, {plan.Position(now), zero, 0.0});

@@ -315,7 +315,8 @@ TEST(Task, ClimbsOnceControlIsHeardOrIsSilent) {
       if (heard) pilot.SetFlying(false);
       if (mission) pilot.SetTask(Task::kTakeoff, Vector3d::Zero());
       double first = HUGE_VAL;
-      for (double t = 5.0; t < 6.0 && first == HUGE_VAL; t += kPeriod)
+      for (double t = 5.0; t < 6.0 && first == HUGE_VAL; t += kPeriod) {
+        pilot.SetObstacles(t, {});
         if (const auto plan = pilot.Update(t, {Vector3d(1.0, 2.0, 0.2), Vector3d::Zero(), 0.4})) {
           first = t - 5.0;
           const world::Trajectory& way = plan->trajectory;
@@ -330,6 +331,7 @@ TEST(Task, ClimbsOnceControlIsHeardOrIsSilent) {
           EXPECT_LT(way.Velocity(way.start).norm() + way.Acceleration(way.start).norm(), 1e-9);
           EXPECT_EQ(plan->yaw, std::vector<double>{0.4});
         }
+      }
       if (heard)
         EXPECT_EQ(first, 0.0);
       else if (mission)
