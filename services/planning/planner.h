@@ -97,7 +97,7 @@ class Planner {
   virtual PlanResult Plan(const PlanRequest& request) = 0;
 
   /// True when `plan` is still certified against the request's obstacles, target and limits from
-  /// t0 on; what to do with a plan being flown when the world changes.
+  /// t0 on.
   virtual bool IsCertified(const PlanRequest& request, const world::Trajectory& plan) = 0;
 };
 
