@@ -170,6 +170,7 @@ NavState Alignment::Opened(const FilterConfig& filter, const Eigen::Vector3d& p,
   state.v = turn * state.v;
   state.p = p;
   state.g = {0.0, 0.0, -filter.gravity};
+  state.accel_bias.setZero(), state.gyro_bias.setZero();  // what they may be is said about nought
   state.P.setZero();
   SetBlock(kP, kKnownPlace, &state.P);
   SetBlock(kV, kSpeedInMotion, &state.P);

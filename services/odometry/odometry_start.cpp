@@ -94,6 +94,11 @@ bool Odometry::SweepsShowMotion() {
 /// and the first sweep's place need the velocity: what the filter found is taken back to power-on,
 /// and it begins there again.
 void Odometry::StartInMotion(double t) {
+  // How it moved before the first sample nobody knows: a sweep begun then would bend the map.
+  while (pending_.size() > 1 && pending_.front().sweep.start < alignment_.samples().front().t) {
+    pending_.pop_front();
+    ++dropped_sweeps_;
+  }
   const std::deque<Pending> sweeps = std::move(pending_);
   pending_.clear();
   const Eigen::Vector3d& p = config_.initial_position;

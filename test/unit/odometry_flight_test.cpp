@@ -101,6 +101,33 @@ TEST(OdometryFlight, StartInMotionIsSaidAndSurvived) {
   EXPECT_LT(result.VelocityRms(5.0), 0.6);
 }
 
+/// Switched on amid turns: the first sweep began before the inertial unit was heard.
+TEST(OdometryFlight, BegunAmidTurnsItKnowsItsVelocityAndItsBiases) {
+  constexpr double kFirst = 0.09;  // s
+  for (int i = 0; i < 12; ++i) {
+    Course course = ShortCourse();
+    course.duration = 1.5;
+    course.seed = 40 + static_cast<unsigned>(i);
+    course.flight = Flight::Aggressive();
+    course.flight.rest = -4.0 - 0.45 * i;
+    course.on_imu = [](ImuSample* s) { return s->t >= kFirst; };
+    const CourseResult result = FlyDefault(course);
+    EXPECT_TRUE(result.Finite());
+    double worst = 0.0, bias = 0.0;
+    for (const test::Visit& visit : result.visits) {
+      const PoseEstimate& e = visit.estimate;
+      if (e.t < 0.7) continue;
+      const Eigen::Vector3d v_B = e.X_WB.R.conjugate() * e.v,
+                            truth =
+                                course.flight.X_WB(e.t).R.conjugate() * course.flight.Velocity(e.t);
+      worst = std::max(worst, (v_B - truth).norm());
+      bias = std::max(bias, (e.accel_bias - course.sensors.accel_bias).norm());
+    }
+    EXPECT_LT(worst, 0.15) << i;
+    EXPECT_LT(bias, 0.25) << i;
+  }
+}
+
 TEST(OdometryFaults, OneSecondWithoutSweeps) {
   Course course = ShortCourse();
   course.on_sweep = [](Sweep* s) { return s->start < kFault - 0.1 || s->start > kFault + 0.9; };
