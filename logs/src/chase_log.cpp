@@ -33,6 +33,7 @@ struct Arguments {
   std::vector<std::string> ignore, files;
   Selection selection;
   double tolerance = 0.0;
+  double radius = 0.37, sigmas = 2.0;  // of planning's defaults
   bool tum = false, csv = false, mcap = false, long_form = false, jpeg = false;
 };
 
@@ -280,8 +281,14 @@ void AddVerify(CLI::App* app, Arguments* a, int* exit_code) {
       "Checks the proofs of every plan in exact arithmetic; exit 1 if one does not hold, 2 if "
       "that cannot be told.");
   AddLog(sub, "FLIGHT", &a->in);
+  sub->add_option("--radius", a->radius, "least that a plan must claim: sphere and tube, m")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  sub->add_option("--sigmas", a->sigmas, "least deviations that a plan must claim")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
   sub->callback([a, exit_code] {
-    const Verification verification = Verify(a->in);
+    const Verification verification = Verify(a->in, a->radius, a->sigmas);
     std::fputs(Format(verification).c_str(), stdout);
     *exit_code = verification.Holds() ? 0 : 1;
   });

@@ -184,7 +184,7 @@ void Check(const plan_t& plan, const Grounds& grounds, Examination* result) {
   Ask(plan.utime == plan.position.utime, "begins at another time than its way");
   CheckRest(plan);
   if (!certified) return;
-  Ask(plan.hard_radius >= grounds.hard_radius, "its sphere is too small");
+  Ask(plan.hard_radius >= grounds.hard_radius, "its sphere is smaller than --radius says");
   Ask(plan.sigmas >= std::max(0.0, grounds.sigmas),
       "takes obstacles for more certain than they are");
   Ask(Seconds(plan.utime) - Seconds(grounds.list->utime) <= Exact(kOldest),
@@ -197,6 +197,8 @@ void Check(const plan_t& plan, const Grounds& grounds, Examination* result) {
            x.coefficients == plan.target.coefficients;
   };
   Ask(!chases || !forecast || is_that(forecast->target), "chases what was not forecast");
+  const bool is_fresh = forecast && Seconds(plan.utime) - Seconds(forecast->utime) <=
+                                        Exact(world::kMostAge.prediction);
   const bool stops = plan.stop.n_coefficients > 0;
   for (const bool of_stop : {false, true}) {
     if (of_stop && !stops) break;
@@ -220,7 +222,7 @@ void Check(const plan_t& plan, const Grounds& grounds, Examination* result) {
     const auto about_target = [](const proof_t& p) { return p.obstacle == kTarget; };
     const bool told = std::any_of(proofs.begin(), proofs.end(), about_target);
     const bool has_body = forecast && forecast->radius > 0.0 && forecast->height > 0.0;
-    if (has_body && (told || chases)) keep_off(SolidOf(*forecast, course), kTarget, false);
+    if (has_body && (told || is_fresh)) keep_off(SolidOf(*forecast, course), kTarget, false);
     for (const proof_t& proof : proofs) result->unverified += known.count(proof.obstacle) == 0;
   }
 }

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <deque>
-#include <map>
 #include <stdexcept>
 
 #include "common/bus/plan_message.h"
@@ -39,6 +38,7 @@ class Heard {
 
 class Verifier {
  public:
+  Verifier(double hard_radius, double sigmas) : hard_radius_(hard_radius), sigmas_(sigmas) {}
   void Take(const obstacles_t& m) { lists_.Take(m); }
   void Take(const prediction_t& m) { forecasts_.Take(m); }
   void Take(const plan_t& m) {
@@ -67,24 +67,21 @@ class Verifier {
     result_.proofs += m.n_proofs + m.n_stop_proofs;
   }
 
-  /// A process is configured once: what its first plan claims, the others have to.
-  Grounds GroundsOf(const plan_t& m) {
-    const auto claim = claims_.emplace(m.sender_start, std::pair(m.hard_radius, m.sigmas)).first;
-    return {lists_.Of(m, "OBSTACLES"), forecasts_.Of(m, "PREDICTION"), claim->second.first,
-            claim->second.second};
+  Grounds GroundsOf(const plan_t& m) const {
+    return {lists_.Of(m, "OBSTACLES"), forecasts_.Of(m, "PREDICTION"), hard_radius_, sigmas_};
   }
 
   Heard<obstacles_t> lists_;
   Heard<prediction_t> forecasts_;
-  std::map<int64_t, std::pair<double, double>> claims_;  // by sender_start: hard radius, sigmas
+  double hard_radius_, sigmas_;
   Verification result_;
 };
 
 }  // namespace
 
-Verification Verify(const std::string& file) {
+Verification Verify(const std::string& file, double hard_radius, double sigmas) {
   LogReader log(file);
-  Verifier verifier;
+  Verifier verifier(hard_radius, sigmas);
   LogEvent event;
   plan_t plan;
   obstacles_t obstacles;

@@ -12,7 +12,8 @@ namespace chase::planning {
 namespace {
 
 constexpr double kShortestHorizon = 1.0;
-constexpr double kJumpBack = 1.0;  // s; less is jitter between publishers
+constexpr double kWidestTube = 0.3;  // m; from farther off it plans anew from the estimate at once
+constexpr double kJumpBack = 1.0;    // s; less is jitter between publishers
 // s: control says 20 times a second whether it flies; nobody climbs before that was heard.
 constexpr double kHearControl = 0.3;
 // A lost target is looked for from here while that share of where it may be is in sight from here;
@@ -75,7 +76,14 @@ bool IsFinite(const PlanResult& plan) {
 }  // namespace
 
 Pilot::Pilot(const PlanningConfig& config)
-    : config_(config), planner_(MakePlanner(config.planner_name, config.planner)) {}
+    : config_(config),
+      planner_(MakePlanner(config.planner_name, config.planner)),
+      tube_(config.planner.tracking_tube) {}
+
+void Pilot::SetTrackingBound(double bound) {
+  const double least = config_.planner.tracking_tube;
+  tube_ = std::isfinite(bound) ? std::clamp(bound, least, std::max(least, kWidestTube)) : least;
+}
 
 void Pilot::SetForecast(const Forecast& forecast) {
   forecast_ = forecast;
@@ -207,6 +215,7 @@ PlanRequest Pilot::Request(double t0, const Start& start) const {
   request.t0 = t0;
   request.start = start.state;
   request.yaw = start.yaw;
+  request.tube = tube_;
   request.obstacles = obstacles_;
   request.unseen = unseen_;
   if (start.follows && has_running_) request.stop = running_.stop;
@@ -300,7 +309,7 @@ MayFly Pilot::InFence(const Eigen::Vector3d& p_WB) const {
     if (!fence_.Exists() || !home_) return true;
     std::vector<Eigen::Vector3d> places = world::PlacesOn(leg, std::nullopt);
     for (Eigen::Vector3d& p : places) p -= *home_;
-    return fence_.Refusal(p_WB - *home_, places, config_.planner.tracking_tube).empty();
+    return fence_.Refusal(p_WB - *home_, places, tube_).empty();
   };
 }
 

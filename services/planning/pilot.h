@@ -63,6 +63,11 @@ class Pilot {
     airborne_ = airborne_ || (flying && !has_running_);
   }
 
+  /// How far control says the body strays from what it follows, m: the tube about plans is as wide.
+  void SetTrackingBound(double bound);
+  /// Of the drone's sphere and the tube about the newest plan, m.
+  double hard_radius() const { return config_.planner.drone_radius + tube_; }
+
   /// What it knows is not enough to take off yet, or the autopilot does not obey: a climb waits.
   void SetWaiting(bool waiting) { waits_ = waiting; }
 
@@ -129,6 +134,7 @@ class Pilot {
   std::optional<double> unseen_time_;  ///< s
   PlanResult running_;
   bool has_running_ = false;
+  double tube_;  ///< m
   double last_planned_ = -1e9;
   bool news_ = false;
   bool airborne_ = false;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <memory>
 #include <optional>
 #include <string>
@@ -43,6 +44,7 @@ struct Stretch {
 
 struct PlanRequest : Stretch {
   std::optional<YawStart> yaw;                  ///< at t0; none: towards the target
+  double tube = 0.0;                            ///< about the plan, where it is the wider one, m
   world::Trajectory target;                     ///< p_WT(t)
   double target_sigma = 0.0;                    ///< largest deviation of p_WT at target.start, m
   double target_speed_sigma = 0.0;              ///< and of its velocity, m/s
@@ -54,6 +56,11 @@ struct PlanRequest : Stretch {
   std::optional<world::Trajectory> stop;        ///< of that plan; from its start on, flown
   std::vector<world::Trajectory> running_rest;  ///< its further pieces, in order, if it has any
 };
+
+/// Of the drone's sphere and the tube about the plan that it stays in, m: never relaxed.
+inline double HardRadius(const PlannerConfig& config, const PlanRequest& request) {
+  return config.drone_radius + std::max(config.tracking_tube, request.tube);
+}
 
 /// Terms of the objective of Problem 2, unweighted, and the weighted total.
 struct Cost {

@@ -85,6 +85,7 @@ PlanningNode::PlanningNode(bus::Bus& bus, const PlanningConfig& config)
   bus_.Subscribe<tracking_t>("TRACKING", [this](const tracking_t& m) {
     pilot_.SetFlying(m.following != tracking_t::NONE);
     pilot_.SetDescending(m.following == tracking_t::LAND);
+    pilot_.SetTrackingBound(m.following == tracking_t::NONE ? 0.0 : m.bound);
   });
   bus_.Subscribe<flight_state_t>("FLIGHT_STATE", [this](const flight_state_t& m) { OnState(m); });
   bus_.Subscribe<status_t>("FCU_STATUS", [this](const status_t& m) { autopilot_.Hear(m); });
@@ -177,7 +178,7 @@ void PlanningNode::OnPose(const pose_t& message) {
 void PlanningNode::Send(const PlanResult& plan) {
   plan_t m = ToMessage(plan, *origin_);
   m.epoch = epoch_.value();
-  m.hard_radius = config_.planner.hard_radius();
+  m.hard_radius = pilot_.hard_radius();
   m.sigmas = config_.planner.sigmas;
   m.n_obstacles = pilot_.n_obstacles();
   m.target = target_.n_coefficients > 0

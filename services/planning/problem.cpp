@@ -241,7 +241,9 @@ void MakeProblem(const PlannerConfig& config, const PlanRequest& request, const 
   problem->target_growth.setZero(2);
   if (over.asks_sight) problem->target_growth = TargetGrowth(config, request, over);
   const double sight = config.sight_margin + 0.5 * problem->target_growth.sum();
-  const double hard = config.hard_radius(), margin = config.safety_margin;
+  const double hard = HardRadius(config, request);
+  // The margin holds what a wider tube takes of it.
+  const double margin = std::max(0.0, config.safety_margin - (hard - config.hard_radius()));
   const FirstSight first(*problem);
   StartCheck start(*problem);
   const Box at_start{first.p.array(), first.p.array()};

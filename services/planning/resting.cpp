@@ -81,8 +81,9 @@ std::optional<Stop> Resting::RiseOrBrake() {
   for (const double T : kTimes) {
     Vector3d end = ToPoints(BrakeCurve(over_.start, T), 5).row(5).transpose();
     const double top = target.center.Position(over_.t0 + T).z() + target.half.z() + kAbove;
-    if (end.z() >= top + config_.hard_radius()) break;
-    end.z() = top + config_.hard_radius();
+    const double over = top + HardRadius(config_, request_);
+    if (end.z() >= over) break;
+    end.z() = over;
     if (auto stop = Certified(CurveTo(over_.start, T, end), T)) return stop;
   }
   return Brake();
@@ -137,19 +138,20 @@ const world::Obstacle& Resting::Obstacle(size_t j) const {
   return j < listed ? request_.obstacles[j] : besides_[j - listed];
 }
 
-// Is what moves in curves forecast for as long as it could come to the way? Beyond its end such
-// a curve is no forecast.
+// Is what moves in curves, the target too, forecast for as long as it could come to the way? Beyond
+// its end such a curve is no forecast.
 bool Resting::IsForecast(const Curve& way, double T) const {
   constexpr double kRounding = 1e-3, kFast = 2.0;  // s; m/s
   const Box box = BoxOf(ToPoints(way, 6), 7, 0.0);
-  for (size_t j = 0; j < problem_.obstacles.size(); ++j) {
-    const world::Trajectory& center = Obstacle(j).center;
+  const auto is_forecast = [&](const world::Trajectory& center, const Ellipsoid& e) {
     const double unknown = over_.t0 + T - center.end();
-    if (center.degree() < 2 || unknown < kRounding) continue;
+    if (center.degree() < 2 || unknown < kRounding) return true;
     const Curve last = center.Position(center.end()).transpose();
-    if (MayTouch(box, last, problem_.obstacles[j].safety_half + kFast * unknown, 1.0)) return false;
-  }
-  return true;
+    return !MayTouch(box, last, e.safety_half + kFast * unknown, 1.0);
+  };
+  for (size_t j = 0; j < problem_.obstacles.size(); ++j)
+    if (!is_forecast(Obstacle(j).center, problem_.obstacles[j])) return false;
+  return !problem_.target_body || is_forecast(request_.target_body->center, *problem_.target_body);
 }
 
 // Of what stands and of what moves.

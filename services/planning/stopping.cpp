@@ -40,7 +40,8 @@ PlannerConfig WithoutMargin(PlannerConfig config) {
 std::vector<world::Obstacle> UnseenAround(const PlannerConfig& config, const PlanRequest& request) {
   std::vector<world::Obstacle> unseen;
   for (const world::Obstacle& o : request.unseen)
-    if (DistanceTo(o, request.start.p - o.center.Position(request.t0)) > config.hard_radius())
+    if (DistanceTo(o, request.start.p - o.center.Position(request.t0)) >
+        HardRadius(config, request))
       unseen.push_back(o);
   return unseen;
 }
@@ -204,7 +205,7 @@ void SetProofs(const PlannerConfig& config, const PlanRequest& request, std::vec
   for (int i = 0; i <= 6; ++i) least = std::min(least, ground.Above(points.row(i).transpose()));
   for (const Proof& p : proofs)
     if (!p.of_sight) least = std::min(least, p.from > 0.0 ? 0.0 : p.radius + p.room);
-  result->certified_clearance = std::max(0.0, least - config.hard_radius());
+  result->certified_clearance = std::max(0.0, least - HardRadius(config, request));
   result->proofs = std::move(proofs);
 }
 

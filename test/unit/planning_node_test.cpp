@@ -30,6 +30,7 @@ struct Events {
   int64_t obeys_from =
       kStart;  // the autopilot does from then on, and stands on the ground until then
   int64_t flying_from = kNever;   // control says from then on that it flies, us
+  double bound = 0.0;             // that control says of its error, m
   int64_t frame_at = kNever;      // the frame of odometry changes, us
   int64_t obstacles_at = kNever;  // obstacles speak of the new one, us
   int64_t forecasts_at = kNever;  // forecasts do, us
@@ -62,6 +63,7 @@ class Company : public bus::Node {
       tracking_t tracking{};
       tracking.utime = utime;
       tracking.following = tracking_t::PLAN;
+      tracking.bound = events_.bound;
       bus_.Publish("TRACKING", tracking);
     }
     if (events_.returns && (utime - kStart) % 100000 == 0) Lead(utime);
@@ -221,6 +223,20 @@ TEST(PlanningNode, APlannerStartedInFlightDoesNotClimb) {
   for (const plan_t& plan : plans) {
     const auto way = bus::FromMessage(plan.position, kStart);
     EXPECT_NEAR(way.Position(way.end()).z(), events.height, 0.01) << plan.reason;
+  }
+}
+
+TEST(PlanningNode, TheTubeIsAsWideAsControlSaysThatItStrays) {
+  const PlannerConfig config;
+  for (const auto& [bound, tube] :
+       {std::pair(0.05, config.tracking_tube), {0.2, 0.2}, {9.0, 0.3}}) {
+    Events events;
+    events.height = 1.5;
+    events.flying_from = kStart;
+    events.bound = bound;
+    const auto plans = Fly(kStart + 500000, kNever, kStart + 2000000, events);
+    ASSERT_FALSE(plans.empty());
+    EXPECT_NEAR(plans.back().hard_radius, config.drone_radius + tube, 1e-12) << bound;
   }
 }
 

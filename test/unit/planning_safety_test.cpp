@@ -228,15 +228,19 @@ TEST(CertifiedPlan, DoesNotTakeTheSearchAtItsWord) {
   EXPECT_GE(LeastDistance(request.obstacles[0], plan.trajectory), config.hard_radius() - 1e-6);
 }
 
+// The tube of the file, or the one that control says, where that is wider.
 TEST(CertifiedPlan, KeepsSphereAndTubeOff) {
-  PlannerConfig config;
-  config.tracking_tube = 0.3;
   PlanRequest request = Hover();
   request.obstacles = {Cylinder(1, {-1.0, 0.9, 1.0}, {0.0, 0.0, 0.0}, 0.1, 2.0)};
-  const PlanResult plan = MakePlanner("chase", config)->Plan(request);
-  ASSERT_GE(plan.certified_clearance, 0.0) << plan.reason;
-  EXPECT_GE(LeastDistance(request.obstacles[0], plan.trajectory), 0.25 + 0.3 - 1e-6);
-  for (const Proof& p : plan.proofs) EXPECT_TRUE(p.of_sight || p.radius >= 0.25 + 0.3);
+  for (const bool said : {false, true}) {
+    PlannerConfig config;
+    (said ? request.tube : config.tracking_tube) = 0.3;
+    const PlanResult plan = MakePlanner("chase", config)->Plan(request);
+    ASSERT_GE(plan.certified_clearance, 0.0) << plan.reason;
+    const double least = LeastDistance(request.obstacles[0], plan.trajectory);
+    EXPECT_GE(least, 0.25 + 0.3 + plan.certified_clearance - 1e-6);
+    for (const Proof& p : plan.proofs) EXPECT_TRUE(p.of_sight || p.radius >= 0.25 + 0.3);
+  }
 }
 
 // The ground is an obstacle that nobody lists.

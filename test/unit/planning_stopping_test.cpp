@@ -316,6 +316,12 @@ TEST(Brake, CountsOnNoForecastBeyondItsEnd) {
   walker.center.coefficients.row(0) << 0.0, 1.5, 0.9;
   request.obstacles = {walker};
   EXPECT_TRUE(Brake(config, request)) << "forecast for as long as it takes";
+  request.obstacles.clear();
+  for (const double lasts : {0.1, 3.0}) {
+    walker.center.duration = lasts;
+    request.target_body = walker;
+    EXPECT_EQ(Brake(config, request).has_value(), lasts > 1.0) << "the target";
+  }
 }
 
 // With whatever is struck first: what stands, what walks, the target, the ground.
