@@ -64,6 +64,22 @@ TEST(OdometryFlight, StandingStillDoesNotDrift) {
   EXPECT_LT(FlyDefault(course).WorstPosition(), 0.005);
 }
 
+/// Sweeps are refused for as long as dust or a hand covers the LiDAR; inertia knows that it stands.
+TEST(OdometryFlight, StandingWhileSweepsShowNothingDoesNotDrift) {
+  Course course = ShortCourse();
+  course.duration = 30.0;
+  course.flight = Flight::AtRest();
+  test::Noise noise(5);
+  course.on_sweep = [&noise](Sweep* s) {
+    if (s->start < 3.0) return true;
+    for (auto& point : s->points) point.p *= static_cast<float>(0.3 + noise.Uniform());
+    return true;
+  };
+  const CourseResult result = FlyDefault(course);
+  EXPECT_LT(result.WorstPosition(), 0.01);
+  EXPECT_EQ(result.visits.back().estimate.epoch, 0);
+}
+
 /// To the inertial unit a body that slides evenly is one at rest; the sweeps tell.
 TEST(OdometryFlight, OneThatSlidesWhileItAlignsIsNotTakenForOneAtRest) {
   for (const double speed : {0.1, 0.6, 1.5}) {
