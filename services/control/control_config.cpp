@@ -35,7 +35,6 @@ std::string ControlConfig::Problem() const {
                                {"sigmas", sigmas, 0.0, 10.0},
                                {"reset_distance", reset_distance, 0.1, 10.0},
                                {"land_speed", land_speed, 0.1, 2.0},
-                               {"descent_speed", descent_speed, 0.1, 2.0},
                                {"lost_descent", lost_descent, 0.01, 2.0}};
   for (int i = 0; i < 3; ++i) {
     bounds.push_back({"position_gain", position_gain[i], 0.1, 50.0});

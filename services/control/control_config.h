@@ -25,8 +25,7 @@ struct ControlConfig {
   double tracking_tube = 0.12;  ///< m
   double sigmas = 2.0;
   double reset_distance = 0.3;  ///< m
-  double land_speed = 0.5;      ///< m/s
-  double descent_speed = 0.4;   ///< m/s
+  double land_speed = 0.45;     ///< m/s
   double lost_descent = 0.1;    ///< m/s^2
   world::Geofence geofence;
 
@@ -49,9 +48,9 @@ struct ControlConfig {
     v("sigmas", sigmas, "plans have to take the obstacles' covariances by so many deviations");
     v("reset_distance", reset_distance,
       "a new plan starts this near to the reference or to the body, m");
-    v("land_speed", land_speed, "of sinking by the inertial velocity once the pose is lost, m/s");
-    v("descent_speed", descent_speed,
-      "of a landing that was asked for, m/s; its loop goes a tenth beyond");
+    v("land_speed", land_speed,
+      "of sinking to land, asked for or by the inertial velocity once the pose is lost, m/s; its "
+      "loop goes a tenth beyond");
     v("lost_descent", lost_descent, "thrust short of hovering where there is no velocity, m/s^2");
     v("geofence", geofence, "plans that leave it are not flown; none: mission's");
   }

@@ -77,7 +77,7 @@ std::optional<Setpoint> Controller::Answer(double t, const Estimate& estimate, H
   last_estimate_ = estimate;
   reckoning_.Begin(t, estimate);
   last_yaw_ = math::Yaw(estimate.R_WB);
-  if (!spot_) landing_ = Landing(config_, config_.land_speed);
+  if (!spot_) landing_ = Landing(config_);
   if (Waits(t)) return Idle();
   return Follow(t, estimate, dt);
 }
@@ -85,7 +85,7 @@ std::optional<Setpoint> Controller::Answer(double t, const Estimate& estimate, H
 void Controller::SetLanding(bool wanted) {
   if (lands_ && !wanted && !is_down()) {
     spot_.reset();
-    landing_ = Landing(config_, config_.land_speed);
+    landing_ = Landing(config_);
   }
   if (wanted && !lands_) asked_to_land_ = last_t_.value_or(0.0);
   lands_ = wanted;
@@ -133,7 +133,7 @@ std::optional<Setpoint> Controller::Descend(double t, const Estimate& estimate, 
   if (!flying_ || !lands_ || (!spot_ && !MayDescend(t, estimate))) return std::nullopt;
   if (!spot_) {
     spot_ = estimate.p_WB;
-    landing_ = Landing(config_, config_.descent_speed);
+    landing_ = Landing(config_);
     yaw_on_spot_ = last_yaw_;
   }
   Reference down;

@@ -33,7 +33,7 @@ enum class Following {
 class Controller {
  public:
   explicit Controller(const ControlConfig& config)
-      : config_(config), law_(config), landing_(config, config.land_speed), reckoning_(config) {}
+      : config_(config), law_(config), landing_(config), reckoning_(config) {}
 
   /// Nothing, or why the plan is left out: it is late or unusable, or starts where neither the
   /// reference nor the body is by then.

@@ -9,8 +9,10 @@ namespace {
 // In the air what thrust and weight leave unexplained is the error of the thrust's gain (0.4 m/s^2,
 // 4 % of it, when the battery sags under the motors) and drag (0.15 1/s of 0.5 m/s, and of a gust
 // of 3 m/s upwards): together below 1. On the ground the loop takes `land_speed` times its gain off
-// the thrust, which is 2.
+// the thrust, which is 1.8, and its integral besides.
 constexpr double kSupport = 1.0;       // m/s^2
+constexpr double kPush = -1.6;         // m/s^2, for
+constexpr double kPushFor = 0.8;       // s: longer than it takes to be felt
 constexpr double kSmoothing = 0.1;     // s: motors lag 0.05 s, and an accelerometer is noisy
 constexpr double kSupportFor = 0.5;    // s: longer than a bump or a bounce
 constexpr double kLeastLift = -3.0;    // m/s^2: leaves 70 % of the weight to steer with
@@ -37,11 +39,13 @@ double Landing::LiftFor(const Estimate& estimate, double dt) {
   const double most = doubt > 1.0 ? std::max(kLeastLift, blind_lift_ * doubt * doubt) : kMostLift;
   const double error = -speed_ - estimate.v_WB.z();
   integral_ = std::clamp(integral_ + kIntegralGain * error * dt, -kMostIntegral, kMostIntegral);
-  return std::clamp(gain_ * error + integral_, kLeastLift, most);
+  return std::clamp(gain_ * error + integral_, kLeastLift,
+                    pushes_ > 0.0 ? std::min(kPush, most) : most);
 }
 
 void Landing::Feel(double support, double dt) {
   support_ += std::min(1.0, dt / kSmoothing) * (support - support_);
+  pushes_ = support_ > kSupport ? kPushFor : std::max(0.0, pushes_ - dt);
   supported_ = support_ > kSupport ? supported_ + dt : 0.0;
   is_down_ = is_down_ || supported_ > kSupportFor;
 }

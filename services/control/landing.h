@@ -8,13 +8,13 @@ namespace chase::control {
 /// Down to the ground by the vertical velocity, which needs no position.
 /// The ground is what bears a part of the weight for a while: in the air the vertical acceleration
 /// is what thrust and weight make of it. After PX4's land detector (little thrust and no vertical
-/// motion for a time).
+/// motion for a time). What strikes the body from below is pushed down upon, to tell: by a velocity
+/// that says it sinks already it would hardly be borne at all.
 class Landing {
  public:
-  /// Sinks at `speed`, m/s.
-  Landing(const ControlConfig& config, double speed)
+  explicit Landing(const ControlConfig& config)
       : gain_(config.velocity_gain.z()),
-        speed_(speed),
+        speed_(config.land_speed),
         blind_lift_(-config.lost_descent),
         usable_sigma_(config.UsableVelocitySigma()) {}
 
@@ -33,6 +33,7 @@ class Landing {
   double lift_ = 0.0, integral_ = 0.0;  // m/s^2
   double support_ = 0.0;                // felt of late, over mass, m/s^2
   double supported_ = 0.0;              // for this long, s
+  double pushes_ = 0.0;                 // for this long yet, s
   bool is_down_ = false;
 };
 
