@@ -298,28 +298,32 @@ class Ladder : public Planner {
     return true;
   }
 
-  // Sight asked from ever later on, then not at all.
+  // Sight asked from ever later on, then not at all, then over half of the horizon.
   bool TrySafeOnly(const PlanRequest& request, PlanResult* result) {
     result->verdict = Verdict::kSafeOnly;
-    problem_.limits.tan_elevation = 0.0;
-    if (problem_.target_body) problem_.limits.min_distance = 0.0;
-    placer_.Place(Layout::kCautious, &problem_);
-    problem_.reach.reset();
     struct Try {
-      double sight_from;
+      double share, sight_from;
       bool view;
     };
-    for (const auto& [sight_from, view] : {Try{0.25, true}, Try{0.5, true}, Try{0.25, false},
-                                           Try{0.5, false}, Try{0.75, false}, Try{1.0, false}}) {
-      problem_.limits.view = view ? config_.view() : std::nullopt;
-      problem_.limits.view_from = sight_from;
-      if (!TrySearch(problem_, sight_from, std::nullopt, result)) continue;
-      Take(request, problem_, result);
+    for (const auto& [share, sight_from, view] :
+         {Try{1.0, 0.25, true}, Try{1.0, 0.5, true}, Try{1.0, 0.25, false}, Try{1.0, 0.5, false},
+          Try{1.0, 0.75, false}, Try{1.0, 1.0, false}, Try{0.5, 0.5, false},
+          Try{0.5, 1.0, false}}) {
+      Problem* problem = Over(request, share * request.horizon, false, nullptr);
+      problem->limits.tan_elevation = 0.0;
+      if (problem->target_body) problem->limits.min_distance = 0.0;
+      placer_.Place(Layout::kCautious, problem);
+      problem->reach.reset();
+      problem->limits.view = view ? config_.view() : std::nullopt;
+      problem->limits.view_from = sight_from;
+      if (!TrySearch(*problem, sight_from, std::nullopt, result)) continue;
+      Take(request, *problem, result);
       sight_from_ = sight_from;
       result->reason = sight_from < 1.0 ? "no candidate keeps sight; this one has it from " +
                                               std::to_string(static_cast<int>(100 * sight_from)) +
                                               " % of the horizon on"
                                         : "no candidate keeps or regains sight";
+      if (share < 1.0) result->reason += ", over half of the horizon";
       return true;
     }
     return false;
