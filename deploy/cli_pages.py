@@ -12,6 +12,7 @@ import sys
 OPTION = re.compile(r"^\s+(-[-\w]*(?:,-[-\w]*)*)(?:\{\w+\})?( \S.*?)?(?:\s{2,}(\S.*))?$")
 ENTRY = re.compile(r"^\s{2,4}(\S+)(?: (\S.*?))?(?:\s{2,}(\S.*))?$")
 CHOICES = re.compile(r"\{([^}]*)\}")
+NUMBER = re.compile(r"(U?INT|FLOAT)\b")
 EMPTY = {"options": [], "positionals": [], "subcommands": []}
 
 
@@ -48,7 +49,8 @@ def parsed(text):
 
 def words_of(page):
     names = [name for row in page["options"] for name in row[0].split(",")]
-    return " ".join(names + [row[0] for row in page["subcommands"]])
+    choices = [word for row in page["positionals"] for found in CHOICES.findall(row[1]) for word in found.split(",")]
+    return " ".join(names + [row[0] for row in page["subcommands"]] + choices)
 
 
 def values_of(page):
@@ -56,6 +58,8 @@ def values_of(page):
     for name, argument, _ in page["options"]:
         if choices := CHOICES.search(argument):
             yield f"    {name.replace(',', '|')}) COMPREPLY=($(compgen -W '{choices[1].replace(',', ' ')}' -- \"$now\")); return ;;"
+        elif NUMBER.match(argument):
+            yield f"    {name.replace(',', '|')}) COMPREPLY=(); return ;;"
         elif argument:
             yield f"    {name.replace(',', '|')}) COMPREPLY=($(compgen -f -- \"$now\")); return ;;"
 
@@ -71,9 +75,6 @@ def completion(program, page, subpages):
     values = list(dict.fromkeys(v for p in (page, *subpages.values()) for v in values_of(p)))
     if values:
         lines += ['  case $before in', *values, "  esac"]
-    positional = next((CHOICES.search(row[1]) for row in page["positionals"] if CHOICES.search(row[1])), None)
-    if positional:
-        lines.append(f"  words+=' {positional[1].replace(',', ' ')}'")
     lines += ['  COMPREPLY=($(compgen -W "$words" -- "$now"))',
               '  [ ${#COMPREPLY[@]} -gt 0 ] || COMPREPLY=($(compgen -f -- "$now"))', "}",
               f"complete -o filenames -F {function} {program}"]

@@ -36,7 +36,7 @@ class Pages(unittest.TestCase):
         """What is offered for the last word."""
         script = f"source {self.completion(words[0])}; COMP_WORDS=({' '.join(words[:-1])} '{words[-1]}'); " \
                  f"COMP_CWORD={len(words) - 1}; _{words[0].replace('-', '_')}; echo ${{COMPREPLY[@]}}"
-        return run("bash", "-c", script).stdout.split()
+        return run("bash", "-c", script, cwd=self.out).stdout.split()
 
     def test_every_option_is_there(self):
         self.assertGreater(len(self.programs), 5)
@@ -61,6 +61,14 @@ class Pages(unittest.TestCase):
         self.assertIn("--tum", self.complete("chase-log", "export", "--"))
         self.assertIn("takeoff", self.complete("chase-command", "ta"))
         self.assertEqual(self.complete("chase-flight", "--sensors", "tr"), ["truth"])
+        self.assertEqual(self.complete("chase-log", "import", "vl"), ["vlp16"])
+
+    def test_numbers_are_no_files(self):
+        (self.out / "1.lcm").touch()
+        for words in (("chase-log", "cut", "--from"), ("chase-flight", "--seed")):
+            self.assertEqual(self.complete(*words, "1"), [], words)
+        self.assertEqual(self.complete("chase-log", "info", "1"), ["1.lcm"])
+        self.assertEqual(self.complete("chase-flight", "--log", "1"), ["1.lcm"])
 
 
 if __name__ == "__main__":
