@@ -14,6 +14,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "deploy" / "launcher"))
 
 import processes  # noqa: E402
+import version  # noqa: E402
 
 WORDS = ["null", "true", "-1", "1e999", "NaN", '""', "[]", "{}", '"name"', '"\\ud800"', "[" * 2000, "9" * 5000]
 
@@ -46,6 +47,7 @@ def mutated(data, draw):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--version", action="version", version=version.text())
     parser.add_argument("corpus", type=pathlib.Path)
     parser.add_argument("--seconds", type=float, default=0.0)
     parser.add_argument("--seed", type=int, default=1)

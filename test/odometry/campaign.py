@@ -17,6 +17,10 @@ import sys
 import tempfile
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path.append(str(ROOT / "deploy/launcher"))
+sys.dont_write_bytecode = True
+import version  # noqa: E402
+
 SCENARIOS = ROOT / "deploy" / "scenarios"
 FAULT_AT = 20.0  # mission time, s
 FAULTS = {"no_sweeps": 1.0, "no_imu": 0.3, "corridor": 3.0, "dropped": 3.0, "nan": 0.1,
@@ -153,6 +157,7 @@ class Campaign:
 def main():
     parts = ["gym", "flight", "forest", "aggressive", "faults", "still", "consistency", "memory"]
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--version", action="version", version=version.text())
     parser.add_argument("build", type=pathlib.Path)
     parser.add_argument("--only", nargs="+", choices=parts, default=parts)
     parser.add_argument("--first", type=int, default=1, help="seed; five or ten from it are flown")

@@ -13,6 +13,10 @@ import math
 import pathlib
 import sys
 
+sys.path.append(str(pathlib.Path(__file__).resolve().parents[2] / "launcher"))
+sys.dont_write_bytecode = True
+import version  # noqa: E402
+
 WIDTH, HEIGHT = 40.0, 30.0  # of the field, m
 DURATION, MARGIN_TIME, SPEED = 50.0, 5.0, 1.0  # s, s (the last horizon), m/s
 STEP = 0.05  # of a path, m
@@ -393,6 +397,7 @@ def write_map(folder, name, obstacles):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
+    parser.add_argument("--version", action="version", version=version.text())
     parser.add_argument("--out", type=pathlib.Path, required=True, help="folder for the files")
     parser.add_argument("--seed", type=int, default=1, help="1: the twelve of the comparison")
     parser.add_argument("--only", default="", help="scenarios, such as S5,S12 (default: all)")
