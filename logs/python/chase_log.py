@@ -4,7 +4,9 @@ Beside this file stands the package `chase`, one class per message type, as lcm-
 """
 
 import collections
+import mmap
 import pathlib
+import re
 import struct
 import sys
 
@@ -14,8 +16,9 @@ import chase  # noqa: E402
 Event = collections.namedtuple("Event", "utime channel message")
 
 _SYNC = struct.pack(">I", 0xEDA1DA01)
-_HEADER = struct.Struct(">4sqqII")  # sync word, number, utime, bytes of the channel, of the message
-_LONGEST_CHANNEL = 256  # bytes; more is damage
+_HEADER = struct.Struct(">4sqqii")  # sync word, number, utime, bytes of the channel, of the message
+_CHANNEL = re.compile(rb"[!-~]{1,63}")  # all else is damage
+_LATEST = 1 << 61  # us: what is later, or earlier than minus that, is damage
 _TYPES = {kind._get_packed_fingerprint(): kind for name, kind in vars(chase).items()
           if name.endswith("_t") and isinstance(kind, type)}
 
@@ -32,39 +35,51 @@ def decode(data):
 def read(path, *channels):
     """Yields Event(utime [us], channel, message) in file order; of the channels named, or of all.
 
-    What is damaged is left out, and a log that is cut off ends where it does.
+    What is damaged is left out, as chase-log does, and a log that is cut off ends where it does.
     """
-    wanted = {name.encode() for name in channels}
     with open(path, "rb") as file:
-        while len(header := file.read(_HEADER.size)) == _HEADER.size:
-            sync, _, utime, n_channel, n_data = _HEADER.unpack(header)
-            if sync != _SYNC or n_channel > _LONGEST_CHANNEL:
-                if not _resume(file, header):
-                    return
-                continue
-            channel = file.read(n_channel)
-            if wanted and channel not in wanted:
-                file.seek(n_data, 1)
-                continue
-            data = file.read(n_data)
-            if len(data) < n_data:
-                return
-            yield Event(utime, channel.decode(errors="replace"), decode(data))
+        if file.seek(0, 2) == 0:
+            return
+        with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as log:
+            for utime, channel, data in _events(log, {name.encode() for name in channels}):
+                yield Event(utime, channel.decode(), decode(data))
 
 
-def _resume(file, header):
-    """Goes on to the next event after damage; False: there is none."""
-    at = file.tell() - len(header) + 1
-    file.seek(at)
-    while chunk := file.read(1 << 20):
-        if (found := chunk.find(_SYNC)) >= 0:
-            file.seek(at + found)
-            return True
-        if len(chunk) < len(_SYNC):
-            return False
-        at += len(chunk) - len(_SYNC) + 1
-        file.seek(at)
-    return False
+def _events(log, wanted):
+    at = 0
+    while at < len(log):
+        utime, name, end = _event(log, at)
+        # What no event follows may have a wrong length, and then holds events itself.
+        following = end if _begins(log, end) else _find(log, at + 1, end or len(log))
+        if following == end and (not wanted or log[name] in wanted):
+            yield utime, log[name], log[name.stop:end]
+        at = following
+
+
+def _begins(log, at):
+    """A sync word, or as much of one as the file still holds; its end is a beginning, too."""
+    return at > 0 and _SYNC.startswith(log[at:at + 4])
+
+
+def _event(log, at):
+    """Stamp, place of the channel's name and end of the event there; the end is 0 where none can be."""
+    if len(log) - at < _HEADER.size:
+        return 0, None, 0
+    sync, _, utime, n_channel, n_data = _HEADER.unpack_from(log, at)
+    name = slice(at + _HEADER.size, at + _HEADER.size + max(0, n_channel))
+    end = name.stop + n_data
+    good = (sync == _SYNC and n_data >= 0 and end <= len(log) and abs(utime) <= _LATEST
+            and _CHANNEL.fullmatch(log[name]))
+    return utime, name, end if good else 0
+
+
+def _find(log, at, to):
+    """The first event from there on that another, or the end of the file, follows; `to`: there is none."""
+    while (at := log.find(_SYNC, at, to)) >= 0:
+        if _begins(log, _event(log, at)[2]):
+            return at
+        at += 1
+    return to
 
 
 def fields(message, prefix=""):

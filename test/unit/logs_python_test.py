@@ -3,10 +3,12 @@
 
 logs_python_test.py BIN_DIR"""
 
+import collections
 import csv
 import importlib.util
 import os
 import pathlib
+import random
 import re
 import subprocess
 import sys
@@ -60,6 +62,23 @@ class Python(unittest.TestCase):
                            (data[:middle] + data[middle + 1000:], whole - 40), (b"", 0), (b"no log at all" * 9, 0)):
             damaged.write_bytes(bad)
             self.assertGreaterEqual(sum(1 for _ in chase_log.read(damaged)), least)
+
+    def test_damage_costs_what_it_costs_chase_log(self):
+        data, draw = self.log.read_bytes(), random.Random(5)
+        starts = [found.start() for found in re.finditer(rb"\xed\xa1\xda\x01", data)]
+        damaged = self.folder / "drawn.lcm"
+        for round_ in range(25):
+            bad = bytearray(data)
+            for at in draw.sample(starts, 3):
+                at += draw.choice((0, 12, 20, 23, 24, 25, 26, 27, 30))  # sync, stamp, lengths, name
+                bad[at] ^= 1 << draw.randrange(8)
+            damaged.write_bytes(bad[:draw.choice((None, draw.randrange(len(bad))))])
+            info = subprocess.run([BIN / "chase-log", "info", damaged], check=True, capture_output=True, text=True).stdout
+            counts = {words[0]: int(words[2]) for line in info.splitlines() if " Hz " in line for words in [line.split()]}
+            with self.subTest(round=round_):
+                self.assertEqual(collections.Counter(event.channel for event in chase_log.read(damaged)), counts)
+                some = max(counts, key=counts.get)
+                self.assertEqual(sum(1 for _ in chase_log.read(damaged, some)), counts[some])
 
     @staticmethod
     def python_for(text):
