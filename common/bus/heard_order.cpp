@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <lcm/lcm-cpp.hpp>
 #include <limits>
 #include <optional>
 #include <stdexcept>
@@ -39,38 +38,38 @@ struct Recorded {
   std::vector<Input> inputs;    // in the file's order
   std::vector<Output> outputs;  // the process's, in the file's order
   std::map<std::string, int64_t> lost;
+  std::vector<Damage> damage;
   bool live = false, one_life = true, has_ticks = false;
 };
 
 Recorded Read(const std::string& log, const std::string& process,
               const std::set<std::string>& channels) {
-  lcm::LogFile file(log, "r");
-  if (!file.good()) throw std::runtime_error(log + ": cannot be read; --replay needs an LCM log");
+  LogReader reader(log);
   Recorded recorded;
   std::map<std::string, int64_t> starts;  // by channel, and the process's own
   int64_t latest = 0;
   const auto same_life = [&](const std::string& of, int64_t start) {
     recorded.one_life &= starts.try_emplace(of, start).first->second == start;
   };
-  for (int64_t at = 0;; at = ftello(file.getFilePtr())) {
-    const lcm::LogEvent* event = file.readNextEvent();
-    if (event == nullptr) break;
-    const auto head = HeadOf(event->data, static_cast<size_t>(std::max(0, event->datalen)));
+  int64_t at = 0;
+  for (LogEvent event; reader.Next(&event); at = reader.position()) {
+    const auto head = HeadOf(event.bytes.data(), event.bytes.size());
     if (!head) continue;
-    latest = std::max(latest, event->timestamp);
+    latest = std::max(latest, event.utime);
     if (head->sender == process) {
-      recorded.live |= event->timestamp >= kYear2000;
+      recorded.live |= event.utime >= kYear2000;
       same_life("", head->sender_start);
       status_t status;
-      if (event->channel != StatusChannel(process))
-        recorded.outputs.push_back({event->channel, event->timestamp, head->inputs});
-      else if (status.decode(event->data, 0, event->datalen) > 0)
+      if (event.channel != StatusChannel(process))
+        recorded.outputs.push_back({event.channel, event.utime, head->inputs});
+      else if (status.decode(event.bytes.data(), 0, static_cast<int>(event.bytes.size())) > 0)
         for (const channel_status_t& c : status.channels) recorded.lost[c.channel] = c.dropped;
     }
-    if (channels.count(event->channel) == 0) continue;
-    same_life(event->channel, head->sender_start);
-    recorded.inputs.push_back({event->channel, head->seq, at, event->timestamp, latest});
+    if (channels.count(event.channel) == 0) continue;
+    same_life(event.channel, head->sender_start);
+    recorded.inputs.push_back({event.channel, head->seq, at, event.utime, latest});
   }
+  recorded.damage = reader.damage();
   return recorded;
 }
 
@@ -221,6 +220,7 @@ std::vector<std::string> HeardOrder::Sentences() const {
           "{}: in the flight it lost {} messages; the replay hears those that the log holds",
           channel, m.lost));
   }
+  for (const Damage& d : damage) lines.push_back(Format(d));
   return lines;
 }
 
@@ -230,6 +230,7 @@ HeardOrder OrderHeard(const std::string& log, const std::string& process,
   AddTicks(&recorded);
   const Queues queues = QueuesOf(recorded.inputs);
   HeardOrder order;
+  order.damage = recorded.damage;
   if (!recorded.one_life || recorded.outputs.empty()) return order;
   NoteMissing(recorded, channels, queues, &order);
   if (!recorded.live) return order;

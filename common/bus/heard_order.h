@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "common/bus/log_reader.h"
+
 namespace chase::bus {
 
 /// What moved a process in a recorded flight, in its order, as far as the log can tell.
@@ -22,8 +24,9 @@ struct HeardOrder {
   std::vector<Event> events;               ///< empty: in the file's order
   bool has_ticks = false;                  ///< the process has named its ticks
   std::map<std::string, Missing> missing;  ///< by channel; none where nothing is
+  std::vector<Damage> damage;              ///< of the log
 
-  /// A line for each channel, for people.
+  /// A line for each channel and each damage, for people.
   std::vector<std::string> Sentences() const;
 };
 

@@ -1,13 +1,14 @@
 #pragma once
 
 #include <functional>
-#include <lcm/lcm-cpp.hpp>
 #include <map>
 #include <memory>
+#include <set>
 #include <string>
 #include <vector>
 
 #include "common/bus/bus.h"
+#include "common/bus/log_reader.h"
 #include "common/bus/log_writer.h"
 #include "common/bus/node.h"
 
@@ -27,12 +28,13 @@ class LogBus : public Bus {
   /// Drives `node` through the whole log; ticks it where it was ticked in flight, or at multiples
   /// of its period where the log does not tell. After each event `after` is called with its time,
   /// microseconds, where given. Throws std::runtime_error when the log cannot be read or holds
-  /// nothing for the node.
+  /// nothing for the node, and when the node hears nothing.
   void Run(Node* node, const std::function<void(int64_t utime)>& after = nullptr);
 
   int64_t Now() const override { return now_; }
   int64_t events() const { return events_; }
-  /// After Run: a line for each channel of which the log lacks what was heard, or the reverse.
+  /// After Run: a line for each channel of which the log lacks what was heard, or the reverse; for
+  /// what is damaged; and for the channels of which it holds nothing.
   const std::vector<std::string>& shortfalls() const { return shortfalls_; }
 
  protected:
@@ -40,9 +42,8 @@ class LogBus : public Bus {
   void PublishRaw(const std::string& channel, Bytes bytes) override;
 
  private:
-  std::string Handled() const;
   using After = std::function<void(int64_t utime)>;
-  void Hand(const lcm::LogEvent& event, Node* node, const After& after);
+  void Hand(const LogEvent& event, Node* node, const After& after);
   void TickAt(int64_t utime, Node* node);
 
   std::string in_;
@@ -50,7 +51,8 @@ class LogBus : public Bus {
   std::map<std::string, RawHandler> handlers_;
   int64_t now_ = 0, next_tick_ = -1;
   int64_t events_ = 0;
-  bool heard_ = false, reorders_ = false, has_ticks_ = false;
+  std::set<std::string> heard_;
+  bool reorders_ = false, has_ticks_ = false;
   std::vector<std::string> shortfalls_;
 };
 

@@ -1,6 +1,7 @@
-#include "common/logs/log_reader.h"
+#include "common/bus/log_reader.h"
 
 #include <fcntl.h>
+#include <fmt/format.h>
 #include <sys/mman.h>
 #include <unistd.h>
 
@@ -12,7 +13,7 @@
 
 #include "common/bus/loopback.h"
 
-namespace chase::logs {
+namespace chase::bus {
 namespace {
 
 constexpr uint8_t kSync[4] = {0xED, 0xA1, 0xDA, 0x01};
@@ -38,6 +39,12 @@ struct LogReader::Header {
 std::string LogOf(const std::string& flight) {
   namespace fs = std::filesystem;
   return fs::is_directory(flight) ? (fs::path(flight) / "flight.lcm").string() : flight;
+}
+
+std::string Format(const Damage& d) {
+  if (d.at_end)
+    return fmt::format("the last {} bytes are no whole event: the log was cut off", d.bytes);
+  return fmt::format("{} bytes at {} are no whole event: the log is damaged", d.bytes, d.at);
 }
 
 LogReader::LogReader(const std::string& file, Watch watch) : file_(file), watch_(std::move(watch)) {
@@ -126,9 +133,9 @@ bool LogReader::Find(LogEvent* event) {
     event->channel.assign(name, name + h.channel_bytes);
     event->bytes.assign(name + h.channel_bytes, data_ + end);
     at_ = end;
-    if (!bus::IsLoopback(event->channel)) return true;
+    if (!IsLoopback(event->channel)) return true;
   }
   return false;
 }
 
-}  // namespace chase::logs
+}  // namespace chase::bus

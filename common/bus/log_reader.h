@@ -5,13 +5,15 @@
 #include <string>
 #include <vector>
 
-namespace chase::logs {
+namespace chase::bus {
 
 /// A stretch of a log that holds no whole event.
 struct Damage {
   int64_t at = 0, bytes = 0;
   bool at_end = false;  ///< the log was cut off while being written
 };
+/// For people.
+std::string Format(const Damage& damage);
 
 struct LogEvent {
   int64_t utime = 0;  ///< when it was logged, microseconds
@@ -27,7 +29,7 @@ class LogReader;
 using Watch = std::function<void(const LogReader&)>;
 
 /// Reads an LCM log from its beginning, in file order. Goes on behind what is damaged; leaves out
-/// the bus's own packets (bus::IsLoopback).
+/// the bus's own packets (IsLoopback).
 class LogReader {
  public:
   /// Throws std::runtime_error with one line when the file is missing or no LCM log.
@@ -64,4 +66,4 @@ class LogReader {
   std::vector<Damage> damage_;
 };
 
-}  // namespace chase::logs
+}  // namespace chase::bus

@@ -221,12 +221,6 @@ LogInfo Describe(const std::string& file) {
   return survey.Take(log);
 }
 
-std::string Format(const Damage& d) {
-  if (d.at_end)
-    return fmt::format("the last {} bytes are no whole event: the log was cut off", d.bytes);
-  return fmt::format("{} bytes at {} are no whole event: the log is damaged", d.bytes, d.at);
-}
-
 std::string Format(const LogInfo& info) {
   std::string text =
       Head(info) + fmt::format("{:<20} {:<20} {:>8} {:>11} {:>12} {:>18} {:>18} {:>8} {:>9}\n",

@@ -58,6 +58,5 @@ LogInfo Describe(const std::string& file);
 
 /// What the log is and a table of one line per channel, for people.
 std::string Format(const LogInfo& info);
-std::string Format(const Damage& damage);
 
 }  // namespace chase::logs

@@ -160,6 +160,38 @@ class LogTools(unittest.TestCase):
         unpaired = re.search(r"(\d+) of B are not in A", plan)
         self.assertLess(int(unpaired.group(1)) if unpaired else 0, ours / 2, plan)
 
+    def test_a_damaged_log_is_replayed_behind_the_damage(self):
+        def plans(log):
+            answer = run("chase-planning", "--replay", log, "--out", self.folder / "replayed.lcm")
+            self.assertEqual(answer.returncode, 0, answer.stderr)
+            return self.counts(self.folder / "replayed.lcm")["PLAN"], answer.stderr
+        data = self.log.read_bytes()
+        whole, words = plans(self.log)
+        self.assertNotIn("damaged", words)
+        sync = lcmlog.SYNC.to_bytes(4, "big")
+        at = data.index(sync + (len(self.events) // 2).to_bytes(8, "big"))
+        damaged = self.folder / "replay_damaged.lcm"
+        damaged.write_bytes(data[:at + 24] + b"\x00\x7f\0\0" + data[at + 28:])
+        count, words = plans(damaged)
+        self.assertGreater(count, whole - 2)
+        self.assertIn(f"at {at} are no whole event: the log is damaged", words)
+        damaged.write_bytes(data[:-100])
+        self.assertIn("cut off", plans(damaged)[1])
+
+    def test_a_replay_says_its_configuration(self):
+        out = self.folder / "configured.lcm"
+        self.assertEqual(run("chase-prediction", "--replay", self.log, "--out", out).returncode, 0)
+        dumped = subprocess.run([BIN / "chase-prediction", "--dump-config"], check=True, capture_output=True).stdout
+        cksum = subprocess.run(["cksum"], input=dumped, check=True, capture_output=True).stdout.split()[0].decode()
+        self.assertIn(f"configuration (cksum of --dump-config)  prediction {cksum}\n", self.good("info", out))
+
+    def test_a_replay_says_which_channels_it_lacks(self):
+        out = self.folder / "of_imu.lcm"
+        imu = self.without("imu.lcm", lambda channel, k: channel != "IMU")
+        answer = run("chase-odometry", "--replay", imu, "--out", out)
+        self.assertEqual(answer.stderr, "chase-odometry: the log holds nothing of LIDAR_SCAN\n")
+        self.assert_refused(run("chase-lidar", "--replay", self.log, "--out", self.folder / "none.lcm"), 1, "hears no channel")
+
     def test_packets_of_the_bus_stay_out(self):
         log = self.folder / "loopback.lcm"
         lcmlog.write(log, [(self.events[0][0], "LOOPBACK_4711", b""), *self.events])
