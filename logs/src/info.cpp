@@ -141,6 +141,7 @@ void LogSurvey::Add(const LogEvent& e) {
     c.first_utime = c.last_utime = channel.previous = e.utime;
   }
   first_utime_ = std::min(first_utime_, e.utime);
+  last_utime_ = std::max(last_utime_, e.utime);
   c.bytes += static_cast<int64_t>(e.bytes.size());
   c.first_utime = std::min(c.first_utime, e.utime);  // live logs may step back by a millisecond
   c.last_utime = std::max(c.last_utime, e.utime);
@@ -155,7 +156,7 @@ void LogSurvey::AddHead(const LogEvent& e, Channel* channel) {
   const auto head = bus::HeadOf(e.bytes.data(), e.bytes.size());
   if (!head) return;
   auto& [count, seqs] = channel->senders[{head->sender, head->vehicle, head->sender_start}];
-  ++count;
+  if (count++ == 0) heard_.erase(e.channel);  // that was of an earlier life
   seqs.Add(head->seq);
   for (const auto& [name, seq] : head->inputs) {
     if (name == bus::Bus::kTick) continue;  // no message
@@ -178,15 +179,24 @@ void LogSurvey::AddContent(const LogEvent& e, const std::string& type) {
     info_.scenario = fmt::format("{}, seed {}", scenario.name, scenario.seed);
 }
 
-/// A process that started while the log was written counts from 0 (Bus::Publish).
+/// A process that started while the log was written counts from 0 (Bus::Publish); what others heard
+/// behind its last message was sent, too.
 void LogSurvey::Settle(Channel* channel) const {
+  ChannelInfo& info = channel->info;
+  const auto heard = heard_.find(info.channel);
+  const bool told = heard != heard_.end() && channel->senders.size() == 1;
+  if (info.count > 1)
+    info.longest_gap = std::max(info.longest_gap, last_utime_ - channel->previous);
   for (const auto& [key, value] : channel->senders) {
     const auto& [name, vehicle, start] = key;
     const auto& [count, seqs] = value;
     const int64_t before = start >= first_utime_ ? std::max(0, seqs.first()) : 0;
+    const int64_t behind = told && !HeavyUnderAnyPrefix(info.channel)
+                               ? std::max<int64_t>(0, int64_t{heard->second.last} - seqs.last())
+                               : 0;
     const std::string shown = name.empty() ? "an unnamed sender" : name;
-    channel->info.senders.push_back({shown, count, seqs.missing() + before});
-    channel->info.missing += channel->info.senders.back().missing;
+    info.senders.push_back({shown, count, before + seqs.missing() + behind});
+    info.missing += info.senders.back().missing;
   }
 }
 

@@ -21,7 +21,7 @@ struct ChannelInfo {
   long count = 0;
   int64_t bytes = 0;
   int64_t first_utime = 0, last_utime = 0;  ///< of the events, microseconds
-  int64_t longest_gap = 0;                  ///< from event to event, microseconds
+  int64_t longest_gap = 0;                  ///< without one until the log ends, microseconds
   std::vector<SenderInfo> senders;
   int64_t missing = 0;  ///< by `seq`; where count is 0: what others heard of the channel
 

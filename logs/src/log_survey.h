@@ -33,7 +33,7 @@ class LogSurvey {
   void Settle(Channel* channel) const;
   void AddUnrecorded(LogInfo* info) const;
 
-  int64_t first_utime_ = INT64_MAX;
+  int64_t first_utime_ = INT64_MAX, last_utime_ = INT64_MIN;
   std::map<std::string, Channel> channels_;
   std::map<std::string, Heard> heard_;  ///< lowest and highest `seq` that others heard
   LogInfo info_;

@@ -115,6 +115,14 @@ class LogTools(unittest.TestCase):
         for channel in ("IMU", "POSE"):
             self.assertIn(f"{channel}: others heard", text)
 
+    def test_what_is_lost_at_a_channels_end_counts(self):
+        kept = self.count("POSE") // 2
+        log = self.without("tail.lcm", lambda channel, k: channel == "POSE" and k >= kept)
+        pose = next(line for line in self.good("info", log).splitlines() if line.startswith("POSE")).split()
+        self.assertAlmostEqual(int(pose[-2]), self.count("POSE") - kept, delta=2)  # the last is heard by nobody any more
+        self.assertAlmostEqual(float(pose[-1]), (self.count("POSE") - kept) / 200, delta=0.02)
+        self.assertRegex(run("chase-report", log, "--out", self.folder / "tail").stdout, r"recorded +FAILED")
+
     def test_cut_and_damaged_logs_are_read_as_far_as_they_go(self):
         data = self.log.read_bytes()
         cut = self.folder / "cut.lcm"

@@ -71,6 +71,29 @@ TEST(LogInfo, WhatOthersHeardAndTheLogLacksIsMissingButTicksAreNot) {
   EXPECT_EQ(info.channels[1].missing, 41);
 }
 
+TEST(LogInfo, WhatOthersHeardBehindTheLastMessageIsMissing) {
+  const std::string file = Temp("behind.lcm");
+  bus::LogWriter out(file);
+  const auto hear = [&](int64_t utime, int32_t seq) {
+    status_t status{};
+    status.inputs = {{"IMU", seq}};
+    status.n_inputs = 1;
+    out.Write(utime, "CONTROL_STATUS", Encoded(status));
+  };
+  hear(1, 5000);  // of the process that sent IMU before
+  for (int k = 0; k < 10; ++k) {
+    imu_t imu = testing::Imu(k);
+    imu.sender_start = 2;
+    out.Write(10 + k, "IMU", Encoded(imu));
+  }
+  hear(30, 12);
+  out.Close();
+  const LogInfo info = Describe(file);
+  ASSERT_EQ(info.channels.size(), 2u);
+  EXPECT_EQ(info.channels[1].missing, 3);
+  EXPECT_EQ(info.channels[1].longest_gap, 11);
+}
+
 TEST(LogInfo, ALogCutOffAnywhereIsReadAsFarAsItGoes) {
   const std::string whole = ReadText(WriteLog("whole.lcm"));
   for (size_t n = 4; n < whole.size(); n += 101) {
