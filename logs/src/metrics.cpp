@@ -13,7 +13,7 @@
 namespace chase::logs {
 namespace {
 
-constexpr double kEndTolerance = 0.1;  // s of the mission that may be missing at its end
+constexpr double kEndTolerance = 0.1;  // s of the mission that may be missing at either end
 
 using Figure = Metrics::Figure;
 
@@ -170,7 +170,8 @@ void AddCriteria(const FlightRecord& record, Metrics* m) {
   const world::CriteriaSpec& c = scenario.criteria;
   m->criteria["finite_setpoints"] = m->nonfinite_setpoints == 0;
   m->criteria["recorded"] = record.log.Recorded();
-  m->criteria["complete"] = m->flown_s >= scenario.duration_s - kEndTolerance;
+  m->criteria["complete"] =
+      m->HoldsBeginning() && m->flown_s >= scenario.duration_s - kEndTolerance;
   if (c.safe_ratio >= 0.0) m->criteria["safe_ratio"] = AtLeast(m->safe_ratio, c.safe_ratio);
   if (c.visible_ratio >= 0.0)
     m->criteria["visible_ratio"] = AtLeast(m->visible_ratio, c.visible_ratio);
@@ -195,6 +196,8 @@ void AddCriteria(const FlightRecord& record, Metrics* m) {
 
 }  // namespace
 
+bool Metrics::HoldsBeginning() const { return begins_s <= kEndTolerance; }
+
 bool Metrics::Passed() const {
   return !criteria.empty() &&
          std::all_of(criteria.begin(), criteria.end(), [](const auto& c) { return c.second; });
@@ -204,6 +207,7 @@ Metrics Compute(const FlightRecord& record) { return Compute(record, Score(recor
 
 Metrics Compute(const FlightRecord& record, const std::vector<SampleScore>& scores) {
   Metrics m;
+  m.begins_s = scores.empty() ? 0.0 : scores.front().t;
   m.flown_s = scores.empty() ? 0.0 : scores.back().t;
   m.cpu_s = record.cpu_s;
   m.real_time_factor = record.real_time_factor;

@@ -71,6 +71,7 @@ struct Metrics {
   long plans_in_air = 0, uncertified_brakes = 0, accelerating_brakes = 0;
   std::map<std::string, bool> criteria;
 
+  bool HoldsBeginning() const;  ///< of the mission
   bool Passed() const;
 };
 

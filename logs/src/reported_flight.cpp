@@ -18,14 +18,32 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// The flight's end is in the log: that of its mission, or the collision that it was ended by.
-bool HoldsTheEnd(const Metrics& m) { return m.criteria.at("complete") || m.collision_s >= 0.0; }
+/// `lacks`: phrases of what the log is or does, in place of holding the whole flight.
+std::string Shortfall(std::vector<std::string> lacks, bool log_whole) {
+  if (!log_whole) lacks.insert(lacks.begin(), "is cut off or damaged");
+  return lacks.empty()
+             ? ""
+             : fmt::format("the log {}; the figures are of that part", fmt::join(lacks, " and "));
+}
 
-std::string Shortfall(const FlightRecord& record, const Metrics& metrics) {
-  if (metrics.log_whole && HoldsTheEnd(metrics)) return "";
-  return fmt::format("the log {} at {:.1f} s of {:.1f} s; the figures are of that part",
-                     metrics.log_whole ? "ends" : "is cut off or damaged and ends", metrics.flown_s,
-                     record.scenario.duration_s);
+std::string Shortfall(const FlightRecord& record, const Metrics& m) {
+  std::vector<std::string> lacks;
+  if (!m.HoldsBeginning()) lacks.push_back(fmt::format("begins at {:.1f} s", m.begins_s));
+  // A flight ends with its mission, or with the collision that it was ended by.
+  if (!m.log_whole || !m.HoldsBeginning() || !(m.criteria.at("complete") || m.collision_s >= 0.0))
+    lacks.push_back(
+        fmt::format("ends at {:.1f} s of {:.1f} s", m.flown_s, record.scenario.duration_s));
+  return Shortfall(lacks, m.log_whole);
+}
+
+/// Without FLIGHT_STATE nobody can tell.
+std::string Shortfall(const VehicleReport& vehicle) {
+  std::vector<std::string> lacks;
+  if (!vehicle.begins_in.empty()) lacks.push_back("begins in " + vehicle.begins_in);
+  if (!vehicle.ends_in.empty())
+    lacks.push_back(fmt::format("ends in {} at {:.1f} s", vehicle.ends_in,
+                                vehicle.metrics["flown_s"].get<double>()));
+  return Shortfall(lacks, vehicle.whole);
 }
 
 /// What the truth knows of moments.
@@ -86,9 +104,7 @@ ReportedFlight ByVehicle(const std::string& log, const ReportOptions& options) {
   const VehicleReport vehicle = ReportVehicle(log);
   if (!vehicle.flew)
     throw std::runtime_error(log + ": holds neither TRUTH nor POSE nor PLAN: no flight to report");
-  ReportedFlight flight{log, vehicle.metrics.dump(2) + "\n", {}, ""};
-  if (!vehicle.whole)
-    flight.shortfall = "the log is cut off or damaged; the figures are of its rest";
+  ReportedFlight flight{log, vehicle.metrics.dump(2) + "\n", {}, Shortfall(vehicle)};
   flight.page = PageOf(log, "Flight without truth", vehicle, vehicle.series, {}, options.images);
   flight.page["truth"] = false;
   flight.page["metrics"] = vehicle.metrics;

@@ -11,7 +11,7 @@ struct ReportedFlight {
   std::string metrics;          ///< metrics.json
   nlohmann::ordered_json page;  ///< what report.js draws: title, truth, metrics, vehicle, data,
                                 ///< moments, playback
-  std::string shortfall;        ///< how the log ends before the flight does; empty: it does not
+  std::string shortfall;        ///< what the log lacks of the flight; empty: nothing
 };
 
 struct ReportOptions {

@@ -89,6 +89,8 @@ class Gatherer {
     VehicleReport report;
     report.flew = poses_ > 0 || plans_ > 0;
     report.whole = info.Whole();
+    report.begins_in = InAir(first_state_);
+    report.ends_in = InAir(state_);
     report.origin = origin_.value_or(0);
     report.log_begin = log_begin_;
     AddFigures(&report.metrics);
@@ -170,9 +172,17 @@ class Gatherer {
 
   void OnState(const flight_state_t& m) {
     flight_.Add(Time(m.utime), StateName(m.state), m.reason);
+    if (states_.empty()) first_state_ = m.state;
+    state_ = m.state;
     if (states_.empty() || states_.back()["state"] != StateName(m.state))
       states_.push_back(
           {{"state", StateName(m.state)}, {"at_s", Time(m.utime)}, {"reason", m.reason}});
+  }
+
+  static std::string InAir(int state) {
+    const bool stands = state == flight_state_t::IDLE || state == flight_state_t::READY ||
+                        state == flight_state_t::DONE;
+    return stands ? "" : StateName(state);
   }
 
   static Json Share(long part, long all) {
@@ -258,6 +268,7 @@ class Gatherer {
   std::vector<double> errors_, fence_;
   std::map<std::string, std::vector<double>> latencies_;
   std::map<std::string, status_t> statuses_;
+  int first_state_ = flight_state_t::IDLE, state_ = flight_state_t::IDLE;
   Json states_ = Json::array();
 };
 

@@ -18,6 +18,8 @@ struct VehicleReport {
   int64_t origin = 0;              ///< utime of the report's time zero
   bool whole = true;               ///< the log is neither cut off nor damaged
   bool flew = false;               ///< there is a POSE or a PLAN
+  /// The states that the log begins and ends in, where they are none of standing on the ground.
+  std::string begins_in, ends_in;
 };
 
 /// `origin`: utime of time zero; none: of the first message. Throws std::runtime_error with one

@@ -14,9 +14,13 @@ import unittest
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "test/replay"))
 sys.dont_write_bytecode = True
+import every_channel  # noqa: E402
 import lcmlog  # noqa: E402
 
 BIN = pathlib.Path(sys.argv[1]).resolve()
+sys.path.insert(0, str(BIN.parent / "share/chase/python"))
+import chase  # noqa: E402
+
 LIMIT = 240  # s: a loaded machine is slow to write
 HEAVY = ("LIDAR_SCAN", "CAMERA_IMAGE", "SCAN_REGISTERED", "MAP")
 
@@ -246,6 +250,37 @@ class LogTools(unittest.TestCase):
         self.assertRegex(worse, r"odometry_ate_m +[\d.]+ m +not known  WORSE")
         better = run("chase-report", blind, self.log).stdout
         self.assertRegex(better, r"odometry_ate_m +not known +[\d.]+ m\n")
+
+    def test_a_log_that_begins_late_is_not_the_whole_flight(self):
+        late = self.folder / "late.lcm"
+        self.good("cut", self.log, late, "--from", "8.5")
+        answer = run("chase-report", late, "--out", self.folder / "late")
+        self.assert_refused(answer, 2, "begins at 0.5 s and ends at 1.0 s of 60.0 s")
+        self.assertRegex(answer.stdout, r"complete +FAILED")
+
+    def with_states(self, name, *states):
+        """A log without truth in which mission says these, evenly spread."""
+        events = [e for e in self.events if e[1] not in ("TRUTH", "SCENARIO")]
+        for k, state in enumerate(states):
+            message = chase.flight_state_t()
+            message.utime = events[len(events) * k // len(states)][0]
+            message.state = state
+            events.append((message.utime, "FLIGHT_STATE", message.encode()))
+        lcmlog.write(self.folder / name, sorted(events, key=lambda event: event[0]))
+        return self.folder / name
+
+    def test_a_flight_without_truth_ends_and_begins_on_the_ground(self):
+        state = chase.flight_state_t
+        for words, states in (([], (state.IDLE, state.CHASE, state.DONE)),
+                              (["the log ends in CHASE at "], (state.READY, state.CHASE)),
+                              (["the log begins in HOLD and ends in LAND at "], (state.HOLD, state.LAND)),
+                              (["the log begins in CHASE;"], (state.CHASE, state.DONE))):
+            answer = run("chase-report", self.with_states("states.lcm", *states), "--out", self.folder / "states")
+            with self.subTest(words=words):
+                if words:
+                    self.assert_refused(answer, 2, *words)
+                else:
+                    self.assertEqual(answer.returncode, 0, answer.stderr)
 
     def test_report_has_a_time_line_and_what_was_certified(self):
         out = self.folder / "lines"

@@ -519,6 +519,14 @@ TEST(Metrics, AFlightThatStopsEarlyFails) {
   EXPECT_FALSE(m.Passed());
 }
 
+TEST(Metrics, AFlightWhoseBeginningIsNotThereFails) {
+  FlightRecord record = Standing({3, 0, 1.5}, {5.5, 0, 1.5});
+  record.truth.erase(record.truth.begin(), record.truth.begin() + 109);  // up to 0.08 s
+  EXPECT_TRUE(Compute(record).criteria.at("complete"));
+  record.truth.erase(record.truth.begin(), record.truth.begin() + 9);
+  EXPECT_FALSE(Compute(record).criteria.at("complete"));
+}
+
 TEST(Metrics, AnEmptyFlightHasNoFiguresAndFails) {
   FlightRecord record;
   const Metrics m = Compute(record);
