@@ -231,7 +231,9 @@ void AddMigrate(CLI::App* app, Arguments* a) {
 
 void AddDiff(CLI::App* app, Arguments* a, int* exit_code) {
   auto* sub = app->add_subcommand(
-      "diff", "Compares two logs field by field; exit 1 if they differ, 2 if that cannot be told.");
+      "diff",
+      "Compares the channels that two logs have in common field by field; exit 1 if they differ, 2 "
+      "if that cannot be told.");
   AddLog(sub, "A", &a->in);
   AddLog(sub, "B", &a->other);
   sub->add_option("--tolerance", a->tolerance,
@@ -241,8 +243,8 @@ void AddDiff(CLI::App* app, Arguments* a, int* exit_code) {
                   "CHANNEL.field left out, shell patterns allowed; CHANNEL alone: all of it");
   sub->callback([a, exit_code] {
     const auto differences = Diff(a->in, a->other, a->ignore, a->tolerance);
-    std::fputs(differences.empty() ? "no difference\n" : Format(differences).c_str(), stdout);
-    *exit_code = differences.empty() ? 0 : 1;
+    std::fputs(Format(differences).c_str(), stdout);
+    *exit_code = differences.channels.empty() ? 0 : 1;
   });
 }
 

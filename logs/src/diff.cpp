@@ -9,6 +9,7 @@
 #include <iterator>
 #include <optional>
 #include <set>
+#include <stdexcept>
 #include <tuple>
 
 #include "common/bus/message_head.h"
@@ -116,20 +117,38 @@ struct Pairing {
   long count_a = 0, count_b = 0;
 };
 
-std::map<std::string, Pairing> Pair(Names a, Names b) {
+std::map<std::string, Pairing> Pair(const Names& a, const Names& b) {
   std::map<std::string, Pairing> pairings;
-  for (const auto& names : {a, b})
-    for (const auto& [channel, keys] : names) pairings[channel];
-  for (auto& [channel, p] : pairings) {
-    p.count_a = static_cast<long>(a[channel][kBySeq].size());
-    p.count_b = static_cast<long>(b[channel][kBySeq].size());
-    p.pairs = Common(a[channel][kBySeq], b[channel][kBySeq]);
-    std::set<Key> by_utime = Common(a[channel][kByUtime], b[channel][kByUtime]);
+  for (const auto& [channel, of_a] : a) {
+    const auto of_b = b.find(channel);
+    if (of_b == b.end()) continue;
+    Pairing& p = pairings[channel];
+    p.count_a = static_cast<long>(of_a[kBySeq].size());
+    p.count_b = static_cast<long>(of_b->second[kBySeq].size());
+    p.pairs = Common(of_a[kBySeq], of_b->second[kBySeq]);
+    std::set<Key> by_utime = Common(of_a[kByUtime], of_b->second[kByUtime]);
     if (by_utime.size() <= p.pairs.size()) continue;
     p.rule = kByUtime;
     p.pairs = std::move(by_utime);
   }
   return pairings;
+}
+
+bool Ignored(const std::vector<std::string>& ignore, const std::string& channel,
+             const std::string& path) {
+  const std::string name = channel + "." + path;
+  return std::any_of(ignore.begin(), ignore.end(), [&](const std::string& pattern) {
+    return fnmatch(pattern.c_str(), name.c_str(), 0) == 0 || pattern == channel;
+  });
+}
+
+/// Channels of A that B lacks.
+std::vector<std::string> OnlyIn(const Names& a, const Names& b,
+                                const std::vector<std::string>& ignore) {
+  std::vector<std::string> only;
+  for (const auto& [channel, keys] : a)
+    if (b.count(channel) == 0 && !Ignored(ignore, channel, "count")) only.push_back(channel);
+  return only;
 }
 
 class Comparison {
@@ -140,7 +159,7 @@ class Comparison {
     for (const auto& [channel, p] : pairings) {
       const auto pairs = static_cast<long>(p.pairs.size());
       const bool lost = p.count_a > pairs || p.count_b > pairs;
-      if (lost && !Ignored(channel, "count")) result_[channel];
+      if (lost && !Ignored(ignore_, channel, "count")) result_[channel];
     }
   }
 
@@ -183,15 +202,8 @@ class Comparison {
     for (const auto& [path, field] : in_b) Note(path, SizeChange({path, {}, {}, true}, *field));
   }
 
-  bool Ignored(const std::string& channel, const std::string& path) const {
-    const std::string name = channel + "." + path;
-    return std::any_of(ignore_.begin(), ignore_.end(), [&](const std::string& pattern) {
-      return fnmatch(pattern.c_str(), name.c_str(), 0) == 0 || pattern == channel;
-    });
-  }
-
   void Note(const std::string& path, const Change& change) {
-    if (Ignored(channel_, path)) return;
+    if (Ignored(ignore_, channel_, path)) return;
     FieldDifference& d = result_[channel_].fields[path];
     if (d.messages++ == 0) {
       d.first = index_;
@@ -223,9 +235,10 @@ std::optional<std::pair<LogEvent, LogEvent>> Step(const std::map<std::string, Pa
                                                   Side* own, Side* other) {
   LogEvent e;
   if (!own->more || !(own->more = own->log.Next(&e))) return std::nullopt;
-  const Pairing& pairing = pairings.at(e.channel);
-  const Key key = own->namers[e.channel].Next(e)[pairing.rule];
-  if (pairing.pairs.count(key) == 0) return std::nullopt;
+  const auto pairing = pairings.find(e.channel);
+  if (pairing == pairings.end()) return std::nullopt;
+  const Key key = own->namers[e.channel].Next(e)[pairing->second.rule];
+  if (pairing->second.pairs.count(key) == 0) return std::nullopt;
   auto& partners = other->waiting[e.channel];
   const auto partner = partners.find(key);
   if (partner == partners.end()) {
@@ -238,23 +251,25 @@ std::optional<std::pair<LogEvent, LogEvent>> Step(const std::map<std::string, Pa
 }
 
 /// `pattern`: CHANNEL or CHANNEL.field, either part a shell pattern.
-void RequireChannel(const std::string& pattern, const std::map<std::string, Pairing>& channels) {
+void RequireChannel(const std::string& pattern, const Names& a, const Names& b) {
   const std::string name = pattern.substr(0, pattern.find('.'));
-  const bool fits = std::any_of(channels.begin(), channels.end(), [&](const auto& channel) {
+  const auto fits = [&](const auto& channel) {
     return fnmatch(name.c_str(), channel.first.c_str(), 0) == 0;
-  });
-  if (!fits)
+  };
+  if (std::none_of(a.begin(), a.end(), fits) && std::none_of(b.begin(), b.end(), fits))
     throw BadOption("--ignore " + pattern +
                     ": neither log holds that; chase-log info lists channels");
 }
 
 }  // namespace
 
-std::map<std::string, ChannelDifference> Diff(const std::string& a, const std::string& b,
-                                              const std::vector<std::string>& ignore,
-                                              double tolerance) {
-  const auto pairings = Pair(NamesIn(a), NamesIn(b));
-  for (const std::string& pattern : ignore) RequireChannel(pattern, pairings);
+Differences Diff(const std::string& a, const std::string& b, const std::vector<std::string>& ignore,
+                 double tolerance) {
+  const Names names_a = NamesIn(a), names_b = NamesIn(b);
+  for (const std::string& pattern : ignore) RequireChannel(pattern, names_a, names_b);
+  const auto pairings = Pair(names_a, names_b);
+  if (pairings.empty())
+    throw std::runtime_error(a + " and " + b + ": have no channel in common; compare others");
   Comparison comparison(ignore, tolerance, pairings);
   Side side_a(a), side_b(b);
   while (side_a.more || side_b.more) {
@@ -263,12 +278,15 @@ std::map<std::string, ChannelDifference> Diff(const std::string& a, const std::s
     if (const auto pair = Step(pairings, &side_b, &side_a))
       comparison.AddPair(pair->second, pair->first);
   }
-  return comparison.Take();
+  return {comparison.Take(), OnlyIn(names_a, names_b, ignore), OnlyIn(names_b, names_a, ignore)};
 }
 
-std::string Format(const std::map<std::string, ChannelDifference>& differences) {
+std::string Format(const Differences& differences) {
   std::string text;
-  for (const auto& [channel, d] : differences) {
+  for (const auto& [side, only] : {std::pair("A", &differences.only_a), {"B", &differences.only_b}})
+    if (!only->empty()) text += fmt::format("only in {}: {}\n", side, fmt::join(*only, ", "));
+  if (differences.channels.empty()) return text + "no difference\n";
+  for (const auto& [channel, d] : differences.channels) {
     text += fmt::format("{}: {} messages against {}", channel, d.count_a, d.count_b);
     if (d.only_a > 0) text += fmt::format("; {} of A are not in B", d.only_a);
     if (d.only_b > 0) text += fmt::format("; {} of B are not in A", d.only_b);

@@ -69,6 +69,11 @@ class Golden(unittest.TestCase):
         self.assertEqual(self.held(), [slice_, [(t, d[::-1]) for t, d in slice_]])
         self.assertEqual(self.run_it("check", "planning_x"), "")
 
+    def test_a_channel_that_is_gone_is_a_difference(self):
+        self.run_it("record", str(self.folder / "first"), "planning_x")
+        self.program("chase-log", "#!/bin/sh\necho only in A: MAP\necho no difference\n")
+        self.assertIn("only in A: MAP", self.run_it("check", "planning_x"))
+
     def test_input_is_frozen(self):
         self.run_it("record", str(self.folder / "first"), "planning_x")
         before = self.held()

@@ -148,9 +148,13 @@ class LogTools(unittest.TestCase):
         self.assertEqual(answer.returncode, 1, answer.stderr)
         n = self.count("IMU")
         self.assertEqual(answer.stdout, f"IMU: {n} messages against {n - 1}; 1 of A are not in B\n")
-        none = self.without("none.lcm", lambda channel, k: channel == "IMU")
-        self.assertEqual(run("chase-log", "diff", self.log, none).stdout,
-                         f"IMU: {n} messages against 0; {n} of A are not in B\n")
+
+    def test_diff_lists_channels_of_one_log_alone(self):
+        none = self.without("none.lcm", lambda channel, k: channel in ("IMU", "POSE"))
+        self.assertEqual(self.good("diff", self.log, none), "only in A: IMU, POSE\nno difference\n")
+        self.assertEqual(self.good("diff", none, self.log, "--ignore", "IMU"), "only in B: POSE\nno difference\n")
+        imu = self.without("imu_alone.lcm", lambda channel, k: channel != "IMU")
+        self.assert_refused(run("chase-log", "diff", none, imu), 2, "no channel in common")
 
     def test_diff_refuses_to_ignore_what_neither_log_holds(self):
         for pattern in ("NO_SUCH.seq", "NO_SUCH"):

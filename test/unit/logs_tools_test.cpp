@@ -85,7 +85,7 @@ TEST(FieldTables, ListEveryFieldOfEveryTypeInWireOrder) {
 }
 
 TEST(LogDiff, EqualLogsDoNotDiffer) {
-  EXPECT_TRUE(Diff(WriteLog("a.lcm"), WriteLog("b.lcm"), {}).empty());
+  EXPECT_TRUE(Diff(WriteLog("a.lcm"), WriteLog("b.lcm"), {}).channels.empty());
 }
 
 TEST(LogDiff, OneChangedFieldIsFoundAndCanBeIgnored) {
@@ -93,35 +93,35 @@ TEST(LogDiff, OneChangedFieldIsFoundAndCanBeIgnored) {
   const std::string b = WriteLog("b.lcm", [](int k, imu_t* m) {
     if (k == 7) m->gyro[1] += 0.25;
   });
-  const auto d = Diff(a, b, {});
+  const auto d = Diff(a, b, {}).channels;
   ASSERT_EQ(d.size(), 1u);
   const auto& field = d.at("IMU").fields.at("gyro");
   EXPECT_EQ(d.at("IMU").fields.size(), 1u);
   EXPECT_EQ(field.messages, 1);
   EXPECT_EQ(field.first, 7);
   EXPECT_DOUBLE_EQ(field.greatest, 0.25);
-  EXPECT_NE(Format(d).find("gyro"), std::string::npos);
-  EXPECT_TRUE(Diff(a, b, {"IMU.gyro"}).empty());
-  EXPECT_TRUE(Diff(a, b, {"IMU"}).empty());
-  EXPECT_TRUE(Diff(a, b, {"I*.g*"}).empty());
-  EXPECT_FALSE(Diff(a, b, {"IMU.accel"}).empty());
+  EXPECT_NE(Format({d, {}, {}}).find("gyro"), std::string::npos);
+  EXPECT_TRUE(Diff(a, b, {"IMU.gyro"}).channels.empty());
+  EXPECT_TRUE(Diff(a, b, {"IMU"}).channels.empty());
+  EXPECT_TRUE(Diff(a, b, {"I*.g*"}).channels.empty());
+  EXPECT_FALSE(Diff(a, b, {"IMU.accel"}).channels.empty());
 }
 
 TEST(LogDiff, MissingMessagesAndShiftedStampsAreFound) {
-  const auto fewer = Diff(WriteLog("a.lcm"), WriteLog("b.lcm", {}, 18), {});
+  const auto fewer = Diff(WriteLog("a.lcm"), WriteLog("b.lcm", {}, 18), {}).channels;
   ASSERT_EQ(fewer.size(), 1u);
   EXPECT_EQ(fewer.at("IMU").count_a, 20);
   EXPECT_EQ(fewer.at("IMU").count_b, 18);
   const auto later =
-      Diff(WriteLog("a.lcm"), WriteLog("b.lcm", [](int, imu_t* m) { m->utime++; }), {});
+      Diff(WriteLog("a.lcm"), WriteLog("b.lcm", [](int, imu_t* m) { m->utime++; }), {}).channels;
   EXPECT_EQ(later.at("IMU").fields.at("event_time").messages, 20);
   EXPECT_EQ(later.at("IMU").fields.at("utime").messages, 20);
 }
 
 TEST(LogDiff, NotANumberEqualsItself) {
   const auto nan = [](int, imu_t* m) { m->gyro[2] = NAN; };
-  EXPECT_TRUE(Diff(WriteLog("a.lcm", nan), WriteLog("b.lcm", nan), {}).empty());
-  const auto d = Diff(WriteLog("a.lcm", nan), WriteLog("b.lcm"), {});
+  EXPECT_TRUE(Diff(WriteLog("a.lcm", nan), WriteLog("b.lcm", nan), {}).channels.empty());
+  const auto d = Diff(WriteLog("a.lcm", nan), WriteLog("b.lcm"), {}).channels;
   EXPECT_TRUE(std::isinf(d.at("IMU").fields.at("gyro").greatest));
 }
 
