@@ -205,13 +205,14 @@ void AddRepair(CLI::App* app, Arguments* a) {
 void AddMerge(CLI::App* app, Arguments* a) {
   auto* sub = app->add_subcommand(
       "merge", "Joins logs in the order of their stamps; what several hold is written once.");
-  sub->add_option("FILES", a->files, "LOG LOG... OUT: two logs or more, and the one to write")
+  sub->add_option("FILES", a->files,
+                  "LOG LOG... OUT: two logs or more, or folders of flights, and the log to write")
       ->required()
       ->expected(3, 1000);
   sub->callback([a] {
     a->out = a->files.back();
     a->files.pop_back();
-    for (const std::string& in : a->files) RefuseSame(in, a->out);
+    for (std::string& in : a->files) RefuseSame(in = LogOf(in), a->out);
     Say(*a, Merge(a->files, a->out, Progress()));
   });
 }

@@ -435,6 +435,8 @@ class LogTools(unittest.TestCase):
             self.assertEqual(self.good(command, self.folder), self.good(command, self.log))
         self.good("cut", self.folder, self.folder / "of_folder.lcm", "--to", "0.5")
         self.assertEqual(self.good("diff", self.folder, self.log), "no difference\n")
+        self.good("merge", self.folder, self.log, self.folder / "of_folders.lcm")
+        self.assertIn("folders of flights", self.good("merge", "--help"))
         self.assertEqual(run("chase-report", self.folder).returncode, 2)  # a second of it was flown
         self.assertTrue((self.folder / "report.html").exists())
         self.assert_refused(run("chase-log", "cut", self.folder, self.log, "--to", "1"), 1, "is read")
