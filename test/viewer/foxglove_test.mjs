@@ -1,6 +1,10 @@
 // Foxglove's published client subscribes to every channel; every schema must resolve and every message decode.
 import assert from 'node:assert';
-import {load, pageClient, play, sleep, until} from './viewer.mjs';
+import {execFileSync} from 'node:child_process';
+import fs from 'node:fs';
+import os from 'node:os';
+import path from 'node:path';
+import {bin, load, log, pageClient, play, sleep, until} from './viewer.mjs';
 
 const {FoxgloveClient} = load('@foxglove/ws-protocol');
 const {WebSocket} = load('ws');
@@ -51,7 +55,14 @@ async function connect(port, protocols) {
   return seen;
 }
 
-const viewer = await play('rig: {lens: plumb_bob, lens_coefficients: [-0.3, 0.1, 0, 0, 0.02]}\n');
+// A log of every channel: the flight's, and those that it lacks.
+const folder = fs.mkdtempSync(path.join(os.tmpdir(), 'foxglove-')), every = path.join(folder, 'every.lcm');
+process.on('exit', () => fs.rmSync(folder, {recursive: true}));
+const added = execFileSync('python3', ['-B', path.join(import.meta.dirname, '../replay/every_channel.py'),
+  path.join(bin, '../share/chase/python'), log, every], {encoding: 'utf8'});
+for (const line of added.trim().split('\n')) EXPECTED[line.split(' ')[0]] = `chase.${line.split(' ')[1]}`;
+
+const viewer = await play('rig: {lens: plumb_bob, lens_coefficients: [-0.3, 0.1, 0, 0, 0.02]}\n', every);
 const page = await pageClient(viewer.port);
 page.ask({speed: 5});
 const seen = await connect(viewer.port, [FoxgloveClient.SUPPORTED_SUBPROTOCOL]);
@@ -87,7 +98,7 @@ for (const {topics, imageMode, paths} of Object.values(layout.configById)) {
     assert.ok(seen.types.get(topic)?.fields[field], value);
   }
 }
-for (const topic of named) assert.ok(seen.channels.has(topic) || topic === 'GEOFENCE/scene', `the layout shows ${topic}`);  // the gym has none
+for (const topic of named) assert.ok(seen.channels.has(topic), `the layout shows ${topic}`);
 assert.ok(named.size >= 8);
 
 // What is drawn, once the target is tracked: with its uncertainty, the plan with its stop, the forecast with its spread.

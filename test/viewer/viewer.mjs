@@ -16,11 +16,11 @@ export async function until(what, condition, limit = 30000) {
 }
 
 // Starts chase-viewer on a free port; resolves with {url, port, process, stop}.
-export async function play(config = '') {
+export async function play(config = '', played = log) {
   const folder = fs.mkdtempSync(path.join(os.tmpdir(), 'viewer-'));
   const file = path.join(folder, 'viewer.yaml');
   fs.writeFileSync(file, `address: 127.0.0.1\n${config}`);
-  const child = spawn(path.join(bin, 'chase-viewer'), ['--port', '0', '--play', log, '--config', file],
+  const child = spawn(path.join(bin, 'chase-viewer'), ['--port', '0', '--play', played, '--config', file],
     {stdio: ['ignore', 'pipe', 'inherit']});
   process.on('exit', () => child.kill('SIGKILL'));
   let text = '';

@@ -1,0 +1,45 @@
+#!/usr/bin/env python3
+"""Adds to a log a message a second of every channel of the table that it lacks, and prints those channels with
+their types: every_channel.py PYTHON_TYPES IN.lcm OUT.lcm"""
+
+import pathlib
+import re
+import sys
+
+import lcmlog
+
+ROW = re.compile(r'^ *\{"(\w+)", "(\w+_t)", "', re.MULTILINE)
+TABLE = pathlib.Path(__file__).resolve().parents[2] / "common/bus/channels.cpp"
+
+
+def filled(kind, utime):
+    message = kind()
+    message.utime = utime
+    for name, value in {"corners": [0.0, 0.0, 9.0, 0.0, 9.0, 9.0], "n_corners": 6, "ceiling": 5.0,
+                        "missing": ["a battery"], "n_missing": 1, "name": "lidar_gap"}.items():
+        if hasattr(message, name):
+            setattr(message, name, value)
+    return message.encode()
+
+
+def added(types, events):
+    """`events` with what they lack; {channel: type} of that. `types`: the package that lcm-gen writes."""
+    there = {channel for _, channel, _ in events}
+    lacking = {channel: kind for channel, kind in ROW.findall(TABLE.read_text(encoding="utf-8")) if channel not in there}
+    first, last = events[0][0], events[-1][0]
+    more = [(utime, channel, filled(getattr(types, kind), utime))
+            for utime in range(first, last, 1_000_000) for channel, kind in lacking.items()]
+    return sorted(events + more, key=lambda event: event[0]), lacking
+
+
+def main(types, log, out):
+    sys.path.insert(0, types)
+    import chase  # noqa: PLC0415
+    events, lacking = added(chase, list(lcmlog.read(log)))
+    lcmlog.write(out, events)
+    for channel, kind in lacking.items():
+        print(channel, kind)
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
