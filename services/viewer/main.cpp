@@ -24,7 +24,7 @@ int main(int argc, char** argv) {
     auto* play =
         app.add_option("--play", log, "LCM log, or folder of a flight, to play instead of the bus")
             ->transform(chase::logs::LogOf);
-    for (const char* live : {"--lcm-url", "--channel-prefix", "--replay"})
+    for (const char* live : {"--lcm-url", "--channel-prefix", "--key-file", "--replay"})
       play->excludes(app.get_option(live));
     play->excludes(token);
   };

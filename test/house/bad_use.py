@@ -192,7 +192,8 @@ class BadUse(unittest.TestCase):
                 self.assert_refused(run(program, "--replay", "a.lcm", "--out", "b.lcm", *words), words[0], "--replay")
         self.for_each(self.replayable(), check)
         for program, *words in (("chase-viewer", "--play", "--lcm-url"), ("chase-viewer", "--play", "--token-file"),
-                                ("chase-viewer", "--play", "--channel-prefix"), ("chase-viewer", "--play", "--replay")):
+                                ("chase-viewer", "--play", "--channel-prefix"), ("chase-viewer", "--play", "--key-file"),
+                                ("chase-viewer", "--play", "--replay")):
             with self.subTest(program=program, words=words):
                 self.assert_refused(run(program, *[w for word in words for w in (word, "a.file")]), *words)
         self.assert_refused(run("chase-command", "land", "--timeout", "5"), "--timeout", "--wait")
