@@ -19,13 +19,20 @@ LogPlayer::LogPlayer(const std::string& file) : reader_(file) {
   }
   if (index_.empty()) throw std::runtime_error(file + ": holds no event; is it an LCM log?");
   handlers_.resize(channels_.size());
-  for (const std::string& channel : channels_) heavy_.push_back(bus::IsHeavy(channel));
+  heavy_.resize(channels_.size());
   now_ = begin();
 }
 
+/// A vehicle's prefix may stand before the channel's name, as for the tools that read logs.
 void LogPlayer::SubscribeRaw(const std::string& channel, RawHandler handler) {
-  for (size_t i = 0; i < channels_.size(); ++i)
-    if (channels_[i] == channel) handlers_[i] = handler;
+  for (size_t i = 0; i < channels_.size(); ++i) {
+    const std::string& name = channels_[i];
+    if (name.size() < channel.size() ||
+        name.compare(name.size() - channel.size(), channel.size(), channel) != 0)
+      continue;
+    handlers_[i] = handler;
+    heavy_[i] = bus::IsHeavy(channel);
+  }
 }
 
 void LogPlayer::HandOver(const Entry& entry) {
@@ -48,6 +55,8 @@ std::vector<size_t> LogPlayer::LastOfEach(size_t from, size_t to) const {
 }
 
 void LogPlayer::Survey(int64_t period, const std::function<void(int64_t utime)>& every) {
+  if (std::none_of(handlers_.begin(), handlers_.end(), [](const auto& h) { return bool(h); }))
+    throw std::runtime_error(reader_.file() + ": holds none of the channels that are shown");
   int64_t next = begin() + period;
   for (const Entry& entry : index_) {
     for (; next <= entry.utime; next += period) every(next);

@@ -22,7 +22,8 @@ class LogPlayer : public bus::Bus {
   int64_t end() const { return index_.back().utime; }
   int64_t Now() const override { return now_; }
 
-  /// Hands over all light messages and calls `every` at multiples of `period` microseconds.
+  /// Hands over all light messages (throws std::runtime_error if nobody listens to any channel of
+  /// the log) and calls `every` at multiples of `period` microseconds.
   void Survey(int64_t period, const std::function<void(int64_t utime)>& every);
   /// Hands over, of each channel, the last message up to `utime`, in file order.
   void Seek(int64_t utime);

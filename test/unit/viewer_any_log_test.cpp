@@ -76,6 +76,16 @@ TEST(ViewerAnyLog, MoversAreWhereTheirOwnTimeSays) {
   }
 }
 
+TEST(ViewerAnyLog, AVehiclesPrefixMayStandBeforeTheChannels) {
+  const auto sweep = [](int64_t utime) {
+    lidar_scan_t m{};
+    m.utime = utime;
+    return m;
+  };
+  EXPECT_GE(CountOf(Recorded("eagleLIDAR_SCAN", sweep), Part::kCloud), 3);
+  EXPECT_THROW(Recorded("LIDAR_SCAN_OF_OTHERS", sweep), std::runtime_error);
+}
+
 TEST(ViewerAnyLog, EveryChannelIsShownButTheTruth) {
   class ListeningBus : public MemoryBus {
    public:
