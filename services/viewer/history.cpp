@@ -33,6 +33,7 @@ Sample SampleOf(const Scene& scene, double t) {
   if (scene.flight && scene.flight->age <= world::kMostAge.flight_state)
     s.flight = scene.flight->state;
   s.processes = scene.processes;
+  for (const std::string& fault : scene.faults) s.faults += (s.faults.empty() ? "" : " + ") + fault;
   if (scene.plan_ms >= 0.0) s.plan_ms = scene.plan_ms;
   return s;
 }

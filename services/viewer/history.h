@@ -1,6 +1,7 @@
 #pragma once
 
 #include <deque>
+#include <string>
 
 #include "services/viewer/scene.h"
 
@@ -13,6 +14,7 @@ struct Sample {
   Eigen::Vector3d p_WB, p_WT;                  ///< m
   double distance, clearance, speed, plan_ms;  ///< m, m, m/s, ms
   int verdict = -1, target_state = -1, health = -1, flight = -1, processes = -1;
+  std::string faults;  ///< names of those that last
 };
 
 Sample SampleOf(const Scene& scene, double t);

@@ -110,6 +110,13 @@ void PageFeed::Take(const status_t& m) {
   statuses_[m.name] = m;
 }
 
+void PageFeed::Take(const event_t& m) {
+  if (m.phase == event_t::BEGINS)
+    scene_.faults.insert(m.name);
+  else
+    scene_.faults.erase(m.name);
+}
+
 void PageFeed::Remember(int64_t utime) {
   scene_.processes = WorstState(Processes());
   if (origin_ != 0) history_.Add(SampleOf(scene_, Elapsed(utime)));

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "chase/camera_image_t.hpp"
+#include "chase/event_t.hpp"
 #include "chase/health_t.hpp"
 #include "chase/lidar_scan_t.hpp"
 #include "chase/scan_registered_t.hpp"
@@ -40,6 +41,8 @@ class PageFeed {
   void Take(const geofence_t& m) { scene_.fence = FromMessage(m); }
   void Take(const health_t& m) { mission_health_ = m; }
   void Take(const status_t& m);
+  /// Faults that a test flight did to itself; they last until the log says that they ended.
+  void Take(const event_t& m);
   /// What no page shows.
   template <class T>
   void Take(const T&) {}

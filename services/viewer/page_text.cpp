@@ -102,6 +102,7 @@ json RowOf(const Sample& s) {
     for (const double v : {p->x(), p->y(), p->z()}) row.push_back(Number(v));
   row.push_back(s.flight);
   row.push_back(s.processes);
+  row.push_back(s.faults);
   return row;
 }
 

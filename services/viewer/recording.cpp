@@ -43,9 +43,11 @@ Recording RecordLog(const std::string& log) {
   const double duration = std::max(1e-6 * static_cast<double>(player.end() - player.begin()), 1.0);
   RecordingSink sink;
   PageFeed feed(player, sink, ConfigFor(duration), std::filesystem::path(log).filename().string());
-  SubscribeShown(player, [&feed](const char* channel, const auto& m) {
+  const auto hear = [&feed](const char* channel, const auto& m) {
     if (IsOnPage(channel)) feed.Take(m);
-  });
+  };
+  SubscribeShown(player, hear);
+  SubscribeFaults(player, hear);
   const auto step = static_cast<int64_t>(1e6 * std::max(kShortest, duration / kMostStates));
   feed.SetStart(player.begin());
   player.Survey(step, [&feed](int64_t utime) { feed.Remember(utime); });

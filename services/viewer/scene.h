@@ -2,6 +2,7 @@
 
 #include <Eigen/Geometry>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -74,7 +75,8 @@ struct Scene {
   int following = -1;     ///< tracking_t's constants; -1: not heard
   double plan_ms = -1.0;  ///< mean time per plan of the last second; negative: not known
   int processes = -1;     ///< worst state of a process, status_t's constants; -1: none is heard
-  std::string scenario;   ///< its name; empty: none
+  std::set<std::string> faults;  ///< that a test flight does to itself, by name
+  std::string scenario;          ///< its name; empty: none
 };
 
 /// Semi-axes and orientation of the ellipsoid { x : x' S^-1 x <= 1 }, S symmetric; zeros where S is

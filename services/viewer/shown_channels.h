@@ -7,6 +7,7 @@
 #include "chase/camera_image_t.hpp"
 #include "chase/command_ack_t.hpp"
 #include "chase/command_t.hpp"
+#include "chase/event_t.hpp"
 #include "chase/flight_state_t.hpp"
 #include "chase/geofence_t.hpp"
 #include "chase/health_t.hpp"
@@ -70,6 +71,12 @@ void SubscribeShown(bus::Bus& bus, const Hear& hear) {
   bus.Subscribe<status_t>("SIMULATOR_STATUS", on("SIMULATOR_STATUS"));
   bus.Subscribe<status_t>("RECORDER_STATUS", on("RECORDER_STATUS"));
   bus.Subscribe<status_t>("LINK_STATUS", on("LINK_STATUS"));
+}
+
+/// The same of the faults that a test flight did to itself; for logs.
+template <class Hear>
+void SubscribeFaults(bus::Bus& bus, const Hear& hear) {
+  bus.Subscribe<event_t>("FAULT", [hear](const event_t& m) { hear("FAULT", m); });
 }
 
 }  // namespace chase::viewer

@@ -29,11 +29,13 @@ ViewerNode::ViewerNode(bus::Bus& bus, const ViewerConfig& config, const std::str
       feed_(bus, server_, config, source),
       commander_(bus, config.token, source.empty(),
                  [this](const auto&... answer) { server_.Answer(answer...); }) {
-  SubscribeShown(bus, [this](const char* channel, const auto& m) {
+  const auto hear = [this](const char* channel, const auto& m) {
     if (IsOnPage(channel)) feed_.Take(m);
     if constexpr (std::is_same_v<std::decay_t<decltype(m)>, command_ack_t>) commander_.Hear(m);
     foxglove_.Offer(channel, m);
-  });
+  };
+  SubscribeShown(bus, hear);
+  if (!source.empty()) SubscribeFaults(bus, hear);
 }
 
 void ViewerNode::Tick(int64_t utime) {

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "chase/event_t.hpp"
 #include "chase/lidar_scan_t.hpp"
 #include "chase/obstacles_t.hpp"
 #include "common/bus/channels.h"
@@ -76,6 +77,25 @@ TEST(ViewerAnyLog, MoversAreWhereTheirOwnTimeSays) {
   }
 }
 
+TEST(ViewerAnyLog, InjectedFaultsLastUntilTheyEnd) {
+  const Recording recording = Recorded("FAULT", [](int64_t utime) {
+    event_t m{};
+    m.utime = utime;
+    m.name = "lidar_gap";
+    m.phase = utime < 2 * kSecond ? event_t::BEGINS : event_t::ENDS;
+    return m;
+  });
+  int struck = 0, calm = 0;
+  for (const Recording::Frame& frame : recording.frames) {
+    if (frame.part != Part::kState) continue;
+    const std::string faults = json::parse(frame.bytes)["row"][16];
+    EXPECT_EQ(faults, frame.t < 0.99 ? "lidar_gap" : "") << frame.t;
+    ++(faults.empty() ? calm : struck);
+  }
+  EXPECT_GE(struck, 9);
+  EXPECT_GE(calm, 9);
+}
+
 TEST(ViewerAnyLog, AVehiclesPrefixMayStandBeforeTheChannels) {
   const auto sweep = [](int64_t utime) {
     lidar_scan_t m{};
@@ -99,6 +119,8 @@ TEST(ViewerAnyLog, EveryChannelIsShownButTheTruth) {
     EXPECT_EQ(listener.heard.count(row.channel),
               row.channel == "TRUTH" || row.channel == "FAULT" ? 0U : 1U)
         << row.channel;
+  SubscribeFaults(listener, [](const char*, const auto&) {});
+  EXPECT_EQ(listener.heard.count("FAULT"), 1U);
 }
 
 }  // namespace

@@ -56,6 +56,13 @@ ViewerConfig AnyPort() {
   return config;
 }
 
+TEST(ViewerNode, InjectedFaultsAreHeardOfLogsOnly) {
+  MemoryBus live, log;
+  ViewerNode looks(live, AnyPort()), plays(log, AnyPort(), "flight.lcm");
+  EXPECT_EQ(live.counters().count("FAULT"), 0U);
+  EXPECT_EQ(log.counters().count("FAULT"), 1U);
+}
+
 TEST(ViewerNode, MalformedMessagesAreCountedAndLeftOut) {
   MemoryBus bus;
   ViewerNode node(bus, AnyPort());

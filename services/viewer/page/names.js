@@ -21,7 +21,7 @@ export const FLIGHT_COLORS = ['#7d8896', '#a9c7b4', '#6fbf73', '#3fa66b', '#4c9b
 
 // Columns of a row of samples (services/viewer/page_text.cpp, RowOf).
 export const T = 0, DISTANCE = 1, CLEARANCE = 2, SPEED = 3, PLAN_MS = 4, VERDICT = 5, TARGET_STATE = 6, HEALTH = 7,
-  DRONE = 8, TARGET = 11, FLIGHT = 14, PROCESSES = 15;
+  DRONE = 8, TARGET = 11, FLIGHT = 14, PROCESSES = 15, INJECTED = 16;
 
 // Of an element: written only where they change, so that nothing is laid out and painted in vain.
 export const setText = (element, text) => { if (element.textContent !== text) element.textContent = text; };

@@ -1,11 +1,13 @@
 // Time line and strips: plain 2D canvases over the rows of samples.
 import {T, DISTANCE, CLEARANCE, SPEED, PLAN_MS, VERDICT, TARGET_STATE, HEALTH, FLIGHT, PROCESSES, VERDICTS, VERDICT_COLORS,
-  TARGET_STATES, TARGET_COLORS, HEALTHS, HEALTH_COLORS, FLIGHT_STATES, FLIGHT_COLORS, FAULTS, FAULT_COLORS, format} from './names.js';
+  TARGET_STATES, TARGET_COLORS, HEALTHS, HEALTH_COLORS, FLIGHT_STATES, FLIGHT_COLORS, FAULTS, FAULT_COLORS, INJECTED,
+  format} from './names.js';
 
 const STRIPS = [['distance', DISTANCE, 'm', 2, '#4c9be8'], ['certified clearance', CLEARANCE, 'm', 2, '#3fa66b'],
   ['speed', SPEED, 'm/s', 2, '#d9a33a'], ['plan time', PLAN_MS, 'ms', 2, '#b455c9']];
 const LANES = [['flight', FLIGHT, FLIGHT_STATES, FLIGHT_COLORS], ['verdict', VERDICT, VERDICTS, VERDICT_COLORS],
-  ['target', TARGET_STATE, TARGET_STATES, TARGET_COLORS], ['pose', HEALTH, HEALTHS, HEALTH_COLORS], ['faults', PROCESSES, FAULTS, FAULT_COLORS]];
+  ['target', TARGET_STATE, TARGET_STATES, TARGET_COLORS], ['pose', HEALTH, HEALTHS, HEALTH_COLORS], ['faults', PROCESSES, FAULTS, FAULT_COLORS],
+  ['injected', INJECTED]];  // by name; where a log holds any
 const LEFT = 60, DIM = '#93a0b0', DARK = '#0c1116';
 
 function prepare(canvas) {
@@ -30,8 +32,9 @@ function cursor(context, x, height) {
 export function drawTimeline(canvas, rows, from, to, now) {
   const {context, width, height} = prepare(canvas);
   const x = (t) => LEFT + (width - LEFT - 8) * (t - from) / Math.max(to - from, 1e-6);
-  const step = height / LANES.length;
-  LANES.forEach(([name, column, words, colors], lane) => {
+  const lanes = LANES.filter(([, column]) => column !== INJECTED || rows.some((row) => row[INJECTED]));
+  const step = height / lanes.length;
+  lanes.forEach(([name, column, words, colors], lane) => {
     const top = lane * step + 2;
     context.fillStyle = DIM;
     context.fillText(name, 8, top + step / 2 - 1);
@@ -39,12 +42,12 @@ export function drawTimeline(canvas, rows, from, to, now) {
     context.fillRect(LEFT, top, width - LEFT - 8, step - 4);
     for (let i = 0, j; i < rows.length; i = j) {  // runs of the same code
       for (j = i + 1; j < rows.length && rows[j][column] === rows[i][column]; ++j);
-      const color = colors[rows[i][column]];
+      const code = rows[i][column], color = colors ? colors[code] : code && '#d9534f';
       const a = Math.max(x(rows[i][T]), LEFT), b = x((rows[j] ?? rows[rows.length - 1])[T]);
       if (!color || b < LEFT) continue;
       context.fillStyle = color;
       context.fillRect(a, top, Math.max(b - a, 1), step - 4);
-      const word = words[rows[i][column]];
+      const word = words ? words[code] : code;
       if (context.measureText(word).width + 8 > b - a) continue;
       context.fillStyle = DARK;
       context.fillText(word, a + 4, top + step / 2 - 1);
