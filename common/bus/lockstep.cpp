@@ -64,7 +64,7 @@ struct Lockstep::Life {
 };
 
 struct Lockstep::Process {
-  std::string name;
+  std::string name, version;
   int64_t latency;
   MakeNode make;
   std::unique_ptr<Life> life;       // none: dead
@@ -99,14 +99,16 @@ struct Lockstep::Process {
 
 Lockstep::Life::Life(Lockstep* lockstep, const Process& process)
     : port(lockstep, process.name, process.latency),
-      reporter(process.name),
+      reporter(process.name, process.version),
       node(process.make(port)),
       ticks(node->TickPeriod(), lockstep->now_),
       next_status(lockstep->now_ + kStatusPeriod) {}
 
-void Lockstep::Add(const std::string& name, int64_t latency_us, const MakeNode& make) {
+void Lockstep::Add(const std::string& name, int64_t latency_us, const MakeNode& make,
+                   const std::string& configuration) {
   auto process = std::make_shared<Process>();
   process->name = name;
+  if (!configuration.empty()) process->version = ConfiguredVersion(configuration);
   process->latency = latency_us;
   process->make = make;
   Begin(process.get());

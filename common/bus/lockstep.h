@@ -28,8 +28,10 @@ class Lockstep {
   explicit Lockstep(int64_t start_utime) : now_(start_utime) {}
 
   /// Adds a process whose messages take `latency_us` from the event that it answers. `make` is
-  /// called again when it is started anew.
-  void Add(const std::string& name, int64_t latency_us, const MakeNode& make);
+  /// called again when it is started anew. `configuration`: what --dump-config of the process
+  /// prints, for its status; empty: that tells none.
+  void Add(const std::string& name, int64_t latency_us, const MakeNode& make,
+           const std::string& configuration = "");
 
   /// Sees every message when it is delivered, before the processes do.
   void SetTap(Tap tap) { tap_ = std::move(tap); }

@@ -16,7 +16,6 @@
 #include "common/bus/log_bus.h"
 #include "common/bus/status.h"
 #include "common/bus/udp_bus.h"
-#include "common/config/checksum.h"
 #include "common/config/version.h"
 
 namespace chase::bus {
@@ -106,8 +105,7 @@ void RunReplay(const ServiceSpec& spec, const Flags& flags) {
   LogBus bus(flags.replay, flags.out);
   bus.SetIdentity(IdentityIn(flags.replay, spec.name));
   const auto node = spec.make_node(bus);
-  StatusReporter reporter(spec.name, fmt::format("{}, configuration {}", config::Version(),
-                                                 config::Checksum(spec.dump_config())));
+  StatusReporter reporter(spec.name, ConfiguredVersion(spec.dump_config()));
   int64_t next_status = -1;
   bus.Run(node.get(), [&](int64_t now) {
     if (now < next_status) return;

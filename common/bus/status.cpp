@@ -62,6 +62,10 @@ int8_t StateCode(NodeReport::State state) {
 
 }  // namespace
 
+std::string ConfiguredVersion(const std::string& configuration) {
+  return fmt::format("{}, configuration {}", config::Version(), config::Checksum(configuration));
+}
+
 std::string LiveVersion(const std::string& configuration) {
   char host[HOST_NAME_MAX + 1] = "";
   if (gethostname(host, sizeof host - 1) != 0) host[0] = '\0';

@@ -9,8 +9,12 @@
 
 namespace chase::bus {
 
-/// The version of a live process, with where it runs and as what: "0.1.0 (commit 1a2b3c4d5e), host
-/// onboard, configuration 930766865". The last is `cksum` of what --dump-config prints.
+/// "0.1.0 (commit 1a2b3c4d5e), configuration 930766865": the last is `cksum` of what --dump-config
+/// prints.
+std::string ConfiguredVersion(const std::string& configuration);
+
+/// The same of a live process, with where it runs and as what: "0.1.0 (commit 1a2b3c4d5e), host
+/// onboard, configuration 930766865".
 std::string LiveVersion(const std::string& configuration);
 
 /// Builds the status messages of one process.

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <memory>
 
+#include "common/config/config.h"
 #include "deploy/flight/operator.h"
 
 namespace chase::flight {
@@ -11,8 +12,10 @@ namespace {
 
 template <class Node, class Config>
 void Add(bus::Lockstep* lockstep, const std::string& name, const Config& config) {
-  lockstep->Add(name, Latencies().at(name),
-                [config](bus::Bus& bus) { return std::make_unique<Node>(bus, config); });
+  lockstep->Add(
+      name, Latencies().at(name),
+      [config](bus::Bus& bus) { return std::make_unique<Node>(bus, config); },
+      config::Dump(config));
 }
 
 int64_t MissionUtime(double settle, double t) {

@@ -101,7 +101,7 @@ std::vector<std::string> LogInfo::Software() const {
   if (!sums.empty())
     lines.push_back("configuration (cksum of --dump-config)  " + sums);
   else if (!versions.empty())
-    lines.push_back("host, configuration  not told: flown in lockstep, or by an older version");
+    lines.push_back("configuration  not told: by an older version");
   return lines;
 }
 

@@ -194,12 +194,16 @@ class LogTools(unittest.TestCase):
         damaged.write_bytes(data[:-100])
         self.assertIn("cut off", plans(damaged)[1])
 
-    def test_a_replay_says_its_configuration(self):
+    def test_lockstep_and_replay_tell_the_configuration(self):
+        def cksum(*command):
+            return subprocess.run(["cksum"], input=run(*command).stdout, check=True, capture_output=True, text=True).stdout.split()[0]
         out = self.folder / "configured.lcm"
         self.assertEqual(run("chase-prediction", "--replay", self.log, "--out", out).returncode, 0)
-        dumped = subprocess.run([BIN / "chase-prediction", "--dump-config"], check=True, capture_output=True).stdout
-        cksum = subprocess.run(["cksum"], input=dumped, check=True, capture_output=True).stdout.split()[0].decode()
-        self.assertIn(f"configuration (cksum of --dump-config)  prediction {cksum}\n", self.good("info", out))
+        replayed = cksum("chase-prediction", "--dump-config")
+        self.assertIn(f"configuration (cksum of --dump-config)  prediction {replayed}\n", self.good("info", out))
+        for process in ("control", "planning", "simulator"):
+            flown = cksum("chase-flight", ROOT / "deploy/scenarios/gym.yaml", "--print-config", process)
+            self.assertRegex(self.good("info", self.log), rf"configuration .*\b{process} {flown}\b")
 
     def test_a_replay_says_which_channels_it_lacks(self):
         out = self.folder / "of_imu.lcm"
