@@ -12,7 +12,8 @@ const ENUMS = [
   'MavAutopilot', 'MavType', 'MavState', 'MavModeFlag', 'MavResult', 'MavLandedState',
   'MavEstimatorType', 'MavFrame', 'MavSeverity', 'MavComponent', 'AttitudeTargetTypemask',
 ]
-const COMMANDS = ['DO_SET_MODE', 'COMPONENT_ARM_DISARM', 'SET_MESSAGE_INTERVAL']
+const COMMANDS = ['DO_SET_MODE', 'COMPONENT_ARM_DISARM', 'SET_MESSAGE_INTERVAL', 'REQUEST_MESSAGE',
+  'NAV_LAND', 'RUN_PREARM_CHECKS']
 
 let mappings
 try {

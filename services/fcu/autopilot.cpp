@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 namespace chase::fcu {
@@ -21,6 +22,7 @@ bool Autopilot::Take(const Frame& frame, int64_t utime) {
   if (frame.component != kComponent) return false;
   if (frame.id == mav::Heartbeat::kId && !TakeHeartbeat(frame, utime)) return false;
   if (!known() || frame.system != system_) return false;
+  frame_utime_ = std::max(frame_utime_, utime);
   TakeState(frame, utime);
   return true;
 }

@@ -24,6 +24,9 @@ class Autopilot {
   uint8_t system() const { return system_; }
   /// Seconds since the last heartbeat.
   double silence(int64_t utime) const;
+  int64_t heartbeat_utime() const { return heartbeat_utime_; }
+  /// When the last frame of any kind came.
+  int64_t frame_utime() const { return frame_utime_; }
   bool armed() const;
   /// CRITICAL, EMERGENCY or FLIGHT_TERMINATION.
   bool failsafe() const;
@@ -56,7 +59,7 @@ class Autopilot {
 
   uint8_t system_;
   mav::Heartbeat heartbeat_;
-  int64_t heartbeat_utime_ = 0;
+  int64_t heartbeat_utime_ = 0, frame_utime_ = 0;
   uint8_t landed_ = 0;
   int64_t landed_utime_ = 0;  // when it said so
   std::optional<Attitude> attitude_;

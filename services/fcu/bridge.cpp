@@ -14,8 +14,13 @@ namespace {
 
 constexpr int64_t kHeartbeatPeriod = 1'000'000;  // us
 constexpr int64_t kTimesyncPeriod = 100'000;     // us: PX4's own rate
-constexpr std::size_t kTimeRequests = 20;        // on their way: 2 s
-constexpr double kWarningAge = 10.0;             // s in which a text explains a refusal
+constexpr int64_t kWordPeriod = 100'000;         // us between requests for a heartbeat
+// PX4, Timesync.hpp, CONVERGENCE_WINDOW: until then it takes a pose's arrival for its time.
+constexpr int kTimeAnswers = 500;
+constexpr std::size_t kTimeRequests = 20;  // on their way: 2 s
+constexpr double kWarningAge = 10.0;       // s in which a text explains a refusal
+// s: of a pose that an attitude loop is closed on. At max_rate (3.8 rad/s) it is 11 degrees old.
+constexpr double kLoopAge = 0.05;
 
 int64_t Period(double rate) { return static_cast<int64_t>(std::llround(1e6 / rate)); }
 
@@ -56,7 +61,7 @@ void Bridge::Receive(int64_t arrival, int64_t now, const uint8_t* data, std::siz
 
 void Bridge::OnFrame(const Frame& frame, const Heard& when) {
   const bool beats = frame.id == mav::Heartbeat::kId;
-  if ((when.from != peer_ && !beats) || !autopilot_.Take(frame, when.now)) return;
+  if ((when.from != peer_ && !beats) || !autopilot_.Take(frame, when.arrival)) return;
   if (beats) peer_ = when.from;
   if (config_.system == 0) writer_.SetSystem(autopilot_.system());
   rates_.OnMessage(frame.id);
@@ -182,6 +187,8 @@ Facts Bridge::Gather(int64_t now) const {
   Facts f;
   f.utime = now;
   f.heard = heard_;
+  f.told = autopilot_.heartbeat_utime();
+  f.gap = Seconds(std::min(autopilot_.frame_utime(), flown_by_.value_or(now)), now);
   f.armed = autopilot_.armed();
   f.failsafe = autopilot_.failsafe();
   f.mode = autopilot_.mode();
@@ -239,6 +246,12 @@ void Bridge::SendSetpoint(int64_t now) {
 void Bridge::SendCommands(int64_t now) {
   if (const auto command = handshake_.NextCommand(now)) Send(now, *command);
   if (!heard_) return;
+  if (handshake_.needs_word() && Due(now, kWordPeriod, &next_word_)) {
+    mav::CommandLong request;
+    request.command = static_cast<uint16_t>(mav::MavCmd::REQUEST_MESSAGE);
+    request.param1 = static_cast<float>(mav::Heartbeat::kId);
+    Send(now, request);
+  }
   if (const auto request = rates_.Tick(now)) Send(now, *request);
 }
 

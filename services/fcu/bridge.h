@@ -108,7 +108,7 @@ class Bridge {
   bool framed_ = false;           // no other W has come that is not taken yet
   std::optional<Setpoint> setpoint_;
   int64_t setpoint_arrival_ = 0, setpoint_utime_ = 0, next_setpoint_ = 0;
-  int64_t next_heartbeat_ = 0, next_timesync_ = 0;
+  int64_t next_heartbeat_ = 0, next_timesync_ = 0, next_word_ = 0;
   std::deque<int64_t> time_requests_;  // sent, ns
   uint64_t peer_ = 0;
   bool heard_ = false;

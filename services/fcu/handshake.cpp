@@ -14,6 +14,10 @@ constexpr double kStreamBefore = 1.2;  // s
 constexpr double kWithdrawn = 2.0;     // s without a setpoint: the next one is another flight's
 constexpr double kHeartbeat = 1.2;     // s in which the autopilot has told its state once more
 constexpr double kLateArming = 10.0;   // s after asking in which arming is still our doing
+// A stream brings OFFBOARD back by itself after the failsafe that COM_OF_LOSS_T (1 s) of silence
+// begin: before that much may have passed, it has to be known that there was none.
+constexpr double kGap = 0.4;         // s: eighty samples of the IMU
+constexpr double kLongestGap = 0.8;  // s until the autopilot has said that it still flies by us
 
 }  // namespace
 
@@ -65,8 +69,9 @@ struct HandshakeTable {
   /// Not before an arming on its way would have been heard of.
   static bool Killed(H h) { return Disarmed(h) && h.InState() >= kHeartbeat; }
   static bool OnGround(H h) { return h.facts_.on_ground; }
+  static bool Cut(H h) { return h.facts_.gap >= kLongestGap; }
   static bool PilotLands(H h) {
-    const bool left = h.landing_heard_ && !(h.facts_.mode == kLandMode) && !InOffboard(h);
+    const bool left = h.Told(h.since_) && !(h.facts_.mode == kLandMode) && !InOffboard(h);
     return (left && !h.facts_.failsafe) || PilotHasIt(h);
   }
   static bool Released(H h) { return h.Withdrawn() && !h.facts_.armed; }
@@ -110,6 +115,7 @@ const HandshakeTable::Row HandshakeTable::kRows[] = {
     {State::kFlying, Disarmed, State::kFailsafe, "the autopilot has disarmed or begun anew"},
     {State::kFlying, Failsafe, State::kFailsafe, "a failsafe of the autopilot"},
     {State::kFlying, LeftOffboard, State::kPilot, "the mode was changed: the pilot has it"},
+    {State::kFlying, Cut, State::kFailsafe, "the link was cut"},
     {State::kFlying, Down, State::kDisarming, "on the ground, motors no longer wanted"},
     {State::kFlying, OffInTheAir, State::kLanding, "motors no longer wanted, the autopilot lands"},
     {State::kFlying, Blind, State::kLanding, "no estimate of the pose: the autopilot lands"},
@@ -141,25 +147,37 @@ bool Handshake::AskedToArm() const {
 
 bool Handshake::streams() const {
   return state_ == State::kStreaming || state_ == State::kOffboard || state_ == State::kArming ||
-         state_ == State::kFlying;
+         (state_ == State::kFlying && gap_found_ == 0);
+}
+
+bool Handshake::needs_word() const {
+  return gap_found_ != 0 || (state_ == State::kLanding && !Told(since_));
+}
+
+void Handshake::WatchGap() {
+  if (state_ != State::kFlying || (gap_found_ != 0 && Told(gap_found_)))
+    gap_found_ = 0;
+  else if (gap_found_ == 0 && facts_.gap > kGap)
+    gap_found_ = facts_.utime;
 }
 
 void Handshake::Update(const Facts& facts) {
   facts_ = facts;
   if (facts.wish) wished_ = facts.utime;
   if (state_ == State::kArming) asked_to_arm_ = facts.utime;
-  if (state_ == State::kLanding && facts.mode == kLandMode) landing_heard_ = true;
   // Landing and disarming have no alternative: what is refused is asked for again.
   if ((state_ == State::kLanding || state_ == State::kDisarming || state_ == State::kKilling) &&
       command_.answer() == Command::Answer::kRefused)
     command_.Begin(command_.ask(), facts.utime + 1'000'000);
+  WatchGap();
   for (const HandshakeTable::Row& row : HandshakeTable::kRows)
     if (row.from == state_ && row.when(*this)) return Enter(row.to, row.why);
 }
 
-/// Once it lands nothing is asked again: whoever takes it out of that mode is the pilot.
+/// Once it lands nothing is asked again: whoever takes it out of that mode is the pilot. He may
+/// have taken it since the last heartbeat, too.
 std::optional<mav::CommandLong> Handshake::NextCommand(int64_t utime) {
-  if (state_ == State::kLanding && facts_.mode == kLandMode) return std::nullopt;
+  if (state_ == State::kLanding && (facts_.mode == kLandMode || !Told(since_))) return std::nullopt;
   return command_.Tick(utime);
 }
 
@@ -178,7 +196,6 @@ void Handshake::Enter(State state, const std::string& why) {
   if ((state == State::kRefused || state == State::kFailsafe) && !facts_.said.empty())
     reason_ += fmt::format(": {}", facts_.said);
   if (state == State::kFlying || state == State::kDone) asked_to_arm_ = 0;
-  landing_heard_ = false;
   state_ = state;
   since_ = facts_.utime;
   switch (state) {

@@ -11,6 +11,8 @@ namespace chase::fcu {
 struct Facts {
   int64_t utime = 0;
   bool heard = false;  ///< heartbeats of the autopilot come
+  int64_t told = 0;    ///< when the last of them came, which mode and arming are from
+  double gap = 0.0;    ///< s since it was last heard at all or, in flight, was last sent a setpoint
   bool armed = false;
   bool failsafe = false;  ///< the autopilot's state is CRITICAL or worse
   Mode mode;
@@ -66,6 +68,8 @@ class Handshake {
   }
   /// May setpoints be sent?
   bool streams() const;
+  /// Is the autopilot's own word needed sooner than its next heartbeat is due?
+  bool needs_word() const;
   /// Why the state is what it is.
   const std::string& reason() const { return reason_; }
   static std::string Name(State state);
@@ -77,6 +81,9 @@ class Handshake {
   double WithoutWish() const { return 1e-6 * static_cast<double>(facts_.utime - wished_); }
   bool Withdrawn() const;
   bool AskedToArm() const;
+  /// Has the autopilot told its mode since?
+  bool Told(int64_t since) const { return facts_.told > since; }
+  void WatchGap();
   void Enter(State state, const std::string& why);
 
   bool engages_;
@@ -85,10 +92,10 @@ class Handshake {
   std::string reason_ = "no heartbeat of a PX4 yet";
   Facts facts_;
   Command command_;
-  int64_t since_ = 0;           // in this state
-  int64_t wished_ = 0;          // when a setpoint last wanted the motors
-  int64_t asked_to_arm_ = 0;    // when; 0: not yet
-  bool landing_heard_ = false;  // the autopilot has been in AUTO.LAND since we asked
+  int64_t since_ = 0;         // in this state
+  int64_t wished_ = 0;        // when a setpoint last wanted the motors
+  int64_t asked_to_arm_ = 0;  // when; 0: not yet
+  int64_t gap_found_ = 0;     // when the link had been silent for too long to stream; 0: it is not
 };
 
 }  // namespace chase::fcu

@@ -187,6 +187,8 @@ uint8_t Px4::Handle(const mav::CommandLong& m) {
       return Arm(m.param1 > 0.5f, m.param2 == kForce);
     case mav::MavCmd::SET_MESSAGE_INTERVAL:
       return SetInterval(m);
+    case mav::MavCmd::REQUEST_MESSAGE:
+      return SendOnce(m.param1);
   }
   return Code(mav::MavResult::UNSUPPORTED);
 }

@@ -84,6 +84,7 @@ class Px4 {
   void OnCommand(const mavlink::mav::CommandLong& m, const mavlink::Frame& frame);
   uint8_t Handle(const mavlink::mav::CommandLong& m);
   uint8_t SetInterval(const mavlink::mav::CommandLong& m);
+  uint8_t SendOnce(float id);
   uint8_t SetMode(std::optional<mavlink::Mode> mode);
   uint8_t Arm(bool on, bool forced);
   void Enter(mavlink::Mode mode);

@@ -294,15 +294,71 @@ TEST(FcuBridge, LinkLossEndsInALatchedFailsafe) {
   EXPECT_NEAR(Took(&flight, "link cut, the autopilot lands", 3.0, fails_safe), 1.0, 0.1);
   flight.Run(2.0);
   EXPECT_TRUE(flight.px4.failsafe());
-  // Back, but only their words: ours would bring OFFBOARD back by itself.
+  // Back, with setpoints that come all the time: a stream would bring OFFBOARD back by itself.
   flight.link = true;
-  flight.setpoints = false;
-  flight.Run(1.2);
-  flight.setpoints = true;
   const int sent = flight.px4.seen().setpoints;
   flight.Run(10.0);
   EXPECT_EQ(flight.px4.seen().setpoints, sent);
   EXPECT_FALSE(flight.px4.mode() == kOffboardMode) << flight.bridge.Words();
+  EXPECT_NE(flight.bridge.Words().find("the link was cut"), std::string::npos);
+}
+
+// Either it never was in a failsafe, or no setpoint ended that.
+TEST(FcuBridge, ACutOfAnyLengthIsBornOrLatched) {
+  for (int ms = 100; ms <= 1600; ms += 50) {
+    Flight flight;
+    ASSERT_TRUE(flight.RunUntil(State::kFlying, 12.0));
+    flight.Run(3.0 + 0.037 * ms / 50.0);  // anywhere between two heartbeats
+    flight.link = false;
+    flight.Run(1e-3 * ms);
+    flight.link = true;
+    bool failed = flight.px4.failsafe();
+    for (int i = 0; i < 2000; ++i) {
+      flight.Run(0.0025);
+      failed = failed || flight.px4.failsafe();
+      EXPECT_FALSE(failed && flight.px4.mode() == kOffboardMode) << ms;
+      if (flight.px4.mode() == kOffboardMode && failed) break;
+    }
+    EXPECT_EQ(failed, ms > 750) << ms << flight.bridge.Words();
+    EXPECT_EQ(flight.bridge.handshake().state() == State::kFlying, !failed)
+        << ms << flight.bridge.Words();
+  }
+}
+
+// The same where the bridge itself stood still: what came in meanwhile is of before.
+TEST(FcuBridge, ABridgeThatStoodStillDoesNotEndAFailsafe) {
+  for (const double seconds : {0.3, 0.45, 0.6, 0.9, 1.2, 1.9}) {
+    Flight flight;
+    ASSERT_TRUE(flight.RunUntil(State::kFlying, 12.0));
+    flight.Run(5.0);
+    flight.bridge_runs = false;
+    flight.Run(seconds);
+    flight.bridge_runs = true;
+    bool failed = flight.px4.failsafe();
+    for (int i = 0; i < 2000; ++i) {
+      flight.Run(0.0025);
+      failed = failed || flight.px4.failsafe();
+      ASSERT_FALSE(failed && flight.px4.mode() == kOffboardMode) << seconds;
+    }
+    EXPECT_EQ(failed, seconds > 0.75) << seconds << flight.bridge.Words();
+  }
+}
+
+// A heartbeat is up to a second old: AUTO.LAND would take it from him.
+TEST(FcuBridge, ALandingIsNotAskedOfAPilotWhoHasJustTakenIt) {
+  for (const double before : {0.02, 0.3, 0.8}) {
+    Flight flight;
+    ASSERT_TRUE(flight.RunUntil(State::kFlying, 12.0));
+    flight.Run(5.0);
+    const int beats = flight.heartbeats;
+    flight.Run(1.5, [&] { return flight.heartbeats > beats; });
+    flight.px4.PilotMode({3, 0});
+    flight.Run(before);
+    flight.motors = false;
+    flight.Run(5.0);
+    EXPECT_TRUE(flight.px4.mode() == (Mode{3, 0})) << before;
+    EXPECT_EQ(flight.bridge.handshake().state(), State::kPilot) << flight.bridge.Words();
+  }
 }
 
 TEST(FcuBridge, ABridgeThatBeginsAnewDoesNotStreamIntoAFailsafe) {

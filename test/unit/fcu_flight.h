@@ -24,6 +24,9 @@ class Flight {
   Bridge bridge;
   StandIn px4;
   bool setpoints = true, motors = true, poses = true, link = true;
+  bool bridge_runs = true;
+  bool usable = true;  ///< the poses
+  int heartbeats = 0;  ///< of the autopilot
   double height = 1.5;
   int32_t epoch = 0;    ///< of odometry's frame W
   double turned = 0.0;  ///< yaw of the autopilot's frame in W, rad
@@ -52,15 +55,22 @@ class Flight {
   void Step() {
     now_ += 2'500;
     px4.Tick(now_);
-    Carry(px4.TakeOutgoing(), &to_us_);
+    auto sent = px4.TakeOutgoing();
+    for (const auto& bytes : sent)
+      heartbeats += bytes[0] == 0xFD && bytes[7] + bytes[8] + bytes[9] == 0;
+    Carry(std::move(sent), &to_us_);
+    if (bridge_runs) RunBridge();
+    for (; !to_px4_.empty() && to_px4_.front().arrival <= now_; to_px4_.pop_front())
+      px4.Receive(to_px4_.front().arrival, to_px4_.front().bytes);
+  }
+
+  void RunBridge() {
     for (; !to_us_.empty() && to_us_.front().arrival <= now_; to_us_.pop_front())
       bridge.Receive(to_us_.front().arrival, now_, to_us_.front().bytes.data(),
                      to_us_.front().bytes.size(), true);
     if (now_ % 5'000 == 0) Feed();
     bridge.Tick(now_);
     Carry(bridge.TakeOutgoing(), &to_px4_);
-    for (; !to_px4_.empty() && to_px4_.front().arrival <= now_; to_px4_.pop_front())
-      px4.Receive(to_px4_.front().arrival, to_px4_.front().bytes);
     for (const ImuSample& sample : bridge.TakeImu()) imu.push_back(sample);
     const std::string name = Handshake::Name(bridge.handshake().state());
     if (states.empty() || states.back() != name) states.push_back(name);

@@ -32,7 +32,8 @@ class Chaos {
   const Facts& Next() {
     facts_.utime += kTick;
     if (random_.Next() % 50 != 0) return facts_;
-    switch (random_.Next() % 9) {
+    facts_.told = facts_.utime;
+    switch (random_.Next() % 10) {
       case 0:
         facts_.heard = random_.Next() % 4 != 0;
         break;
@@ -57,6 +58,9 @@ class Chaos {
         break;
       case 7:
         facts_.blind = random_.Next() % 4 == 0;
+        break;
+      case 8:
+        facts_.gap = random_.Next() % 2 == 0 ? 0.0 : random_.Uniform();
         break;
       default:
         facts_.missing = random_.Next() % 4 == 0 ? "something" : "";
@@ -206,8 +210,10 @@ struct Engaged {
     EXPECT_EQ(handshake.state(), flies ? State::kFlying : State::kArming);
   }
   void Run(double seconds) {
-    for (int i = 0; i < static_cast<int>(seconds * 1e6) / kTick; ++i, facts.utime += kTick)
+    for (int i = 0; i < static_cast<int>(seconds * 1e6) / kTick; ++i, facts.utime += kTick) {
+      facts.told = facts.utime;
       handshake.Update(facts);
+    }
   }
 };
 
@@ -237,6 +243,7 @@ TEST(FcuHandshake, APilotMayTakeItFromALandingAtAnyMoment) {
       flight.facts.wish = false;
       flight.Run(0.7);
       ASSERT_EQ(flight.handshake.state(), State::kLanding);
+      flight.Run(0.01);
       ASSERT_TRUE(flight.handshake.NextCommand(flight.facts.utime));
       flight.handshake.OnAck(176, 0, flight.facts.utime);
       if (heard) flight.facts.mode = kLandMode;
