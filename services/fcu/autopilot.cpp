@@ -8,8 +8,9 @@
 namespace chase::fcu {
 namespace {
 
-constexpr uint8_t kComponent = 1;   // MAV_COMP_ID_AUTOPILOT1
-constexpr double kLandedAge = 2.5;  // s: it comes once a second where it has not been asked for
+constexpr uint8_t kComponent = 1;       // MAV_COMP_ID_AUTOPILOT1
+constexpr std::size_t kMostChecks = 4;  // that are remembered
+constexpr double kLandedAge = 2.5;      // s: it comes once a second where it has not been asked for
 
 template <class E>
 bool Has(uint8_t bits, E flag) {
@@ -36,6 +37,7 @@ bool Autopilot::TakeHeartbeat(const Frame& frame, int64_t utime) {
   }
   system_ = frame.system;
   heartbeat_ = m;
+  if (armed()) failed_checks_.clear();
   heartbeat_utime_ = utime;
   return true;
 }
@@ -59,10 +61,23 @@ void Autopilot::TakeState(const Frame& frame, int64_t utime) {
     channels_ = r->chancount;
   } else if (const auto t = As<mav::Statustext>(frame)) {
     const auto whole = texts_.Add(utime, *t);
-    if (!whole || whole->severity > static_cast<uint8_t>(mav::MavSeverity::WARNING)) return;
-    warning_ = *whole;
-    warning_utime_ = utime;
+    if (whole && whole->severity <= static_cast<uint8_t>(mav::MavSeverity::WARNING))
+      TakeText(*whole, utime);
   }
+}
+
+/// PX4 says once which check fails, when it does; a refusal much later is "resolve system health
+/// failures first".
+void Autopilot::TakeText(const StatusText& text, int64_t utime) {
+  if (armed() || text.text.rfind("Preflight Fail", 0) != 0) {
+    warning_ = text;
+    warning_utime_ = utime;
+    return;
+  }
+  auto& checks = failed_checks_;
+  checks.erase(std::remove(checks.begin(), checks.end(), text.text), checks.end());
+  checks.push_back(text.text);
+  if (checks.size() > kMostChecks) checks.pop_front();
 }
 
 double Autopilot::silence(int64_t utime) const {
@@ -113,7 +128,9 @@ std::string Autopilot::Unfit() const {
 
 std::string Autopilot::Warning(int64_t utime, double seconds) const {
   const bool recent = 1e-6 * static_cast<double>(utime - warning_utime_) <= seconds;
-  return warning_utime_ != 0 && recent ? warning_.text : "";
+  std::string words = warning_utime_ != 0 && recent ? warning_.text : "";
+  for (const std::string& check : failed_checks_) words += (words.empty() ? "" : ", ") + check;
+  return words;
 }
 
 std::string Autopilot::Words(int64_t utime) const {

@@ -2,6 +2,7 @@
 
 #include <Eigen/Geometry>
 #include <cstdint>
+#include <deque>
 #include <optional>
 #include <string>
 
@@ -47,7 +48,8 @@ class Autopilot {
   /// p_WB by its own estimate, m.
   const std::optional<Eigen::Vector3d>& position() const { return position_; }
 
-  /// The last text of severity warning or worse that is no older than `seconds`.
+  /// The last text of severity warning or worse that is no older than `seconds`, and the checks of
+  /// which it has said that they fail since it was last armed, of whatever age.
   std::string Warning(int64_t utime, double seconds) const;
   /// Mode, battery, landed state, receiver in a few words, which bus::FcuState reads.
   std::string Words(int64_t utime) const;
@@ -56,6 +58,7 @@ class Autopilot {
   mav::MavLandedState Landed(int64_t utime) const;
   bool TakeHeartbeat(const Frame& frame, int64_t utime);
   void TakeState(const Frame& frame, int64_t utime);
+  void TakeText(const StatusText& text, int64_t utime);
 
   uint8_t system_;
   mav::Heartbeat heartbeat_;
@@ -69,6 +72,7 @@ class Autopilot {
   StatusTexts texts_;
   StatusText warning_;
   int64_t warning_utime_ = 0;
+  std::deque<std::string> failed_checks_;  // the last said is last
   std::string stranger_;
 };
 

@@ -74,6 +74,9 @@ void Bridge::OnFrame(const Frame& frame, const Heard& when) {
       rates_.OnAnswer(m->result);
     else
       handshake_.OnAck(m->command, m->result, when.now);
+    if (m->command == static_cast<uint16_t>(mav::MavCmd::COMPONENT_ARM_DISARM) &&
+        m->result != static_cast<uint8_t>(mav::MavResult::ACCEPTED))
+      AskForChecks(when.now);
   }
   if (const auto sample = imu_.Take(frame, clock_, when.now)) samples_.push_back(*sample);
 }
@@ -91,6 +94,13 @@ void Bridge::OnTimesync(const mav::Timesync& m, const Heard& when) {
   if (request == time_requests_.end()) return;  // another's
   time_requests_.erase(request);
   clock_.Add(m.ts1 / 1000, m.tc1 / 1000, when.arrival);
+}
+
+/// It says again which of them fail: an arming was refused.
+void Bridge::AskForChecks(int64_t now) {
+  mav::CommandLong request;
+  request.command = static_cast<uint16_t>(mav::MavCmd::RUN_PREARM_CHECKS);
+  Send(now, request);
 }
 
 void Bridge::AskTime(int64_t now) {

@@ -70,6 +70,7 @@ class Bridge {
   };
   void OnFrame(const Frame& frame, const Heard& when);
   void OnTimesync(const mav::Timesync& m, const Heard& when);
+  void AskForChecks(int64_t now);
   void AskTime(int64_t now);
   void SendSetpoint(int64_t now);
   void SendCommands(int64_t now);

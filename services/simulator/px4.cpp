@@ -183,6 +183,11 @@ uint8_t Px4::Handle(const mav::CommandLong& m) {
   switch (static_cast<mav::MavCmd>(m.command)) {
     case mav::MavCmd::DO_SET_MODE:
       return SetMode(ModeOf(m.param2, m.param3));
+    case mav::MavCmd::RUN_PREARM_CHECKS:
+      said_.clear();
+      return Code(mav::MavResult::ACCEPTED);
+    case mav::MavCmd::NAV_LAND:
+      return SetMode(mavlink::kLandMode);
     case mav::MavCmd::COMPONENT_ARM_DISARM:
       return Arm(m.param1 > 0.5f, m.param2 == kForce);
     case mav::MavCmd::SET_MESSAGE_INTERVAL:
@@ -226,13 +231,8 @@ uint8_t Px4::Arm(bool on, bool forced) {
     return Code(mav::MavResult::ACCEPTED);
   }
   if (options_.refuses_to_arm) return Code(mav::MavResult::DENIED);
-  const bool streams = !(mode_ == mavlink::kOffboardMode) || Streamed();
-  const std::string problem = !options_.preflight.empty()                ? options_.preflight
-                              : body_.charge <= options_.bat_emergen_thr ? "low battery"
-                              : !streams                                 ? "no offboard signal"
-                                                                         : "";
-  if (!problem.empty()) {
-    Say("Arming denied: " + problem, 2);
+  if (!Health().empty()) {
+    Say("Arming denied: Resolve system health failures first", 2);
     return Code(mav::MavResult::TEMPORARILY_REJECTED);
   }
   armed_ = true;
@@ -254,6 +254,20 @@ void Px4::Reboot(int64_t utime) {
   seen_.rates.clear();
   offsets_.clear();
   vision_sender_ = {};
+}
+
+/// What keeps it from arming; empty: nothing.
+std::string Px4::Health() const {
+  if (!options_.preflight.empty()) return options_.preflight;
+  if (body_.charge <= options_.bat_emergen_thr) return "low battery";
+  return mode_ == mavlink::kOffboardMode && !Streamed() ? "No offboard signal" : "";
+}
+
+/// Which check fails is said when it changes; a refusal does not repeat it.
+void Px4::WatchHealth() {
+  const std::string problem = armed_ ? "" : Health();
+  if (!problem.empty() && problem != said_) Say("Preflight Fail: " + problem, 2);
+  said_ = problem;
 }
 
 void Px4::WatchStream() {
@@ -288,6 +302,7 @@ void Px4::Tick(int64_t utime, int64_t clock, const Px4Body& body) {
   now_ = std::max(now_, utime);
   body_ = body;
   if (!own_mode_.Holds(body)) own_mode_ = OwnMode(body);
+  WatchHealth();
   WatchStream();
   WatchBattery();
   if (!armed_) failsafe_ = false;

@@ -92,6 +92,8 @@ class Px4 {
   bool StreamAlive() const;
   /// Should it fly by setpoints? In the failsafe for their silence, too.
   bool IsLed() const { return armed_ && intended_ == mavlink::kOffboardMode; }
+  void WatchHealth();
+  std::string Health() const;
   void WatchStream();
   void WatchBattery();
   void WatchLanding();
@@ -123,6 +125,7 @@ class Px4 {
   bool armed_ = false, failsafe_ = false, landed_ = true, has_flown_ = false, drained_ = false;
   int64_t first_setpoint_ = 0, last_setpoint_ = 0, landed_since_ = 0, down_since_ = 0;
   std::optional<int64_t> flown_by_;  // arrival of the newest setpoint that it flew by
+  std::string said_;                 // the check that fails, as last said
   Px4Body body_;
   OwnMode own_mode_{body_};
   std::map<uint32_t, int64_t> next_;       // of each stream

@@ -395,13 +395,15 @@ TEST(FcuBridge, RefusalsAreSaidInWordsAndGivenUp) {
   EXPECT_EQ(a.px4.seen().offboard_commands, 1);
 
   StandInOptions preflight;
-  preflight.preflight = "Preflight Fail: ekf2 missing data and a sentence of more than fifty bytes";
+  preflight.preflight = "ekf2 missing data and a sentence of more than fifty bytes";
   FcuConfig config;
   config.give_up_after = 8.0;
   Flight b(preflight, config);
   Took(&b, "arming refused for 8 s and given up, from the start", 25.0, State::kRefused);
   EXPECT_NE(
-      b.bridge.Words().find("arming did not come (not now): Arming denied: " + preflight.preflight),
+      b.bridge.Words().find("arming did not come (not now): Arming denied: Resolve system health "
+                            "failures first, Preflight Fail: " +
+                            preflight.preflight),
       std::string::npos)
       << b.bridge.Words();
   b.px4.options().preflight.clear();

@@ -176,6 +176,28 @@ TEST(FcuAutopilot, ListensToOnePx4Only) {
   EXPECT_TRUE(autopilot.armed());
 }
 
+TEST(FcuAutopilot, RemembersTheLastChecksThatFailedUntilItIsArmed) {
+  Autopilot autopilot(0);
+  mav::Heartbeat m;
+  m.autopilot = 12;
+  autopilot.Take(FrameOf(m), kStart);
+  const auto say = [&](const std::string& text, int64_t utime) {
+    mav::Statustext t;
+    t.severity = 2;
+    std::copy(text.begin(), text.end(), t.text.begin());
+    autopilot.Take(FrameOf(t), utime);
+  };
+  for (const char* check : {"a", "b", "c", "d", "b", "e"})
+    say(std::string("Preflight Fail: ") + check + "\t", kStart);
+  say("Arming denied: Resolve system health failures", kStart + 60'000'000);
+  EXPECT_EQ(autopilot.Warning(kStart + 61'000'000, 10.0),
+            "Arming denied: Resolve system health failures, Preflight Fail: c, "
+            "Preflight Fail: d, Preflight Fail: b, Preflight Fail: e");
+  m.base_mode = 0x80;
+  autopilot.Take(FrameOf(m), kStart + 62'000'000);
+  EXPECT_EQ(autopilot.Warning(kStart + 90'000'000, 10.0), "");
+}
+
 TEST(FcuAutopilot, StandsNoLongerThanItSaysSo) {
   Autopilot autopilot(0);
   mav::Heartbeat heartbeat;
