@@ -11,10 +11,11 @@ constexpr float kCustomModeEnabled = 1.0f;  // MAV_MODE_FLAG
 // mavlink.io, MAV_CMD_COMPONENT_ARM_DISARM: without it a PX4 that has not landed does not disarm.
 constexpr float kForce = 21196.0f;
 
+/// An answer names the command alone: modes asked for by the same one would share their answers.
 uint16_t Number(Ask ask) {
-  return static_cast<uint16_t>(ask == Ask::kOffboard || ask == Ask::kLand
-                                   ? mav::MavCmd::DO_SET_MODE
-                                   : mav::MavCmd::COMPONENT_ARM_DISARM);
+  return static_cast<uint16_t>(ask == Ask::kOffboard ? mav::MavCmd::DO_SET_MODE
+                               : ask == Ask::kLand   ? mav::MavCmd::NAV_LAND
+                                                     : mav::MavCmd::COMPONENT_ARM_DISARM);
 }
 
 mav::CommandLong Message(Ask ask) {
@@ -22,11 +23,9 @@ mav::CommandLong Message(Ask ask) {
   m.command = Number(ask);
   if (ask == Ask::kArm) m.param1 = 1.0f;
   if (ask == Ask::kKill) m.param2 = kForce;
-  if (ask == Ask::kOffboard || ask == Ask::kLand) {
-    const Mode mode = ask == Ask::kOffboard ? kOffboardMode : kLandMode;
+  if (ask == Ask::kOffboard) {
     m.param1 = kCustomModeEnabled;
-    m.param2 = mode.main;
-    m.param3 = mode.sub;
+    m.param2 = kOffboardMode.main;
   }
   return m;
 }

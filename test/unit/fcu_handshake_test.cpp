@@ -110,7 +110,7 @@ TEST(FcuHandshake, KeepsItsPromisesInAnyOrderOfInputs) {
       EXPECT_FALSE((Latched(state) || state == State::kLanding || state == State::kKilling) &&
                    handshake.streams());
       if (const auto command = handshake.NextCommand(facts.utime)) {
-        EXPECT_TRUE(engages || command->param1 == 0.0f || command->param2 == 4.0f)
+        EXPECT_TRUE(engages || command->param1 == 0.0f)
             << "only lands and disarms where the pilot engages";
         EXPECT_EQ(command->param2 == 21196.0f, state == State::kKilling)
             << "by force: a kill alone";
@@ -196,6 +196,21 @@ TEST(FcuHandshake, UnansweredCommandsAreSentAgainAndCounted) {
   EXPECT_FALSE(command.Tick(kStart + 60'000'000));
 }
 
+// OFFBOARD was asked for several times; answers are slow.
+TEST(FcuHandshake, ALateAnswerToOffboardIsNoneToLanding) {
+  for (const uint8_t late : {uint8_t{0}, uint8_t{2}}) {
+    Command command;
+    command.Begin(Ask::kOffboard, kStart);
+    const auto offboard = command.Tick(kStart);
+    ASSERT_TRUE(offboard);
+    command.Begin(Ask::kLand, kStart);
+    ASSERT_TRUE(command.Tick(kStart));
+    command.OnAck(offboard->command, late, kStart);
+    EXPECT_EQ(command.answer(), Command::Answer::kWaiting);
+    EXPECT_TRUE(command.Tick(kStart + 500'000)) << "as if nothing had been answered";
+  }
+}
+
 /// In OFFBOARD: armed and in flight, or on the ground and asking to arm.
 struct Engaged {
   Handshake handshake{true, kGiveUp};
@@ -245,7 +260,7 @@ TEST(FcuHandshake, APilotMayTakeItFromALandingAtAnyMoment) {
       ASSERT_EQ(flight.handshake.state(), State::kLanding);
       flight.Run(0.01);
       ASSERT_TRUE(flight.handshake.NextCommand(flight.facts.utime));
-      flight.handshake.OnAck(176, 0, flight.facts.utime);
+      flight.handshake.OnAck(21, 0, flight.facts.utime);
       if (heard) flight.facts.mode = kLandMode;
       int asked = 0;
       for (int i = 0; i < static_cast<int>(after * 100); ++i) {
