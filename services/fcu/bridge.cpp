@@ -160,7 +160,9 @@ void Bridge::OnSetpoint(const Setpoint& setpoint, int64_t utime, int64_t now) {
 }
 
 bool Bridge::IsFresh(int64_t now) const {
-  return setpoint_ && framed_ && Seconds(setpoint_arrival_, now) <= config_.setpoint_age;
+  // Stamped with the pose that it answers, which control takes no older; in a queue it ages on.
+  return setpoint_ && framed_ && Seconds(setpoint_arrival_, now) <= config_.setpoint_age &&
+         world::IsFresh(Seconds(setpoint_utime_, now), config_.setpoint_age + world::kMostAge.pose);
 }
 
 double Bridge::PoseAge(int64_t now) const {
@@ -243,7 +245,9 @@ void Bridge::SendHeartbeat(int64_t now) {
 }
 
 void Bridge::SendSetpoint(int64_t now) {
-  mav::SetAttitudeTarget m = AttitudeTarget(Turned(*setpoint_, turn_), pose_->R_WB, config_);
+  const bool known = pose_->usable && PoseAge(now) <= kLoopAge;
+  mav::SetAttitudeTarget m = AttitudeTarget(
+      Turned(*setpoint_, turn_), known ? std::optional(pose_->R_WB) : std::nullopt, config_);
   m.time_boot_ms = static_cast<uint32_t>(now / 1000);
   m.target_system = autopilot_.system();
   m.target_component = static_cast<uint8_t>(mav::MavComponent::AUTOPILOT1);

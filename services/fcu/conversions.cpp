@@ -85,21 +85,22 @@ double ThrustShare(double thrust, double hover, double curve) {
   return std::clamp(u, 0.0, 1.0);
 }
 
-mav::SetAttitudeTarget AttitudeTarget(const Setpoint& setpoint, const Eigen::Quaterniond& R_WB,
+mav::SetAttitudeTarget AttitudeTarget(const Setpoint& setpoint,
+                                      const std::optional<Eigen::Quaterniond>& R_WB,
                                       const FcuConfig& config) {
   mav::SetAttitudeTarget m;
   Set(SwapFrames(setpoint.R_WB), &m.q);
   m.thrust = static_cast<float>(
       setpoint.motors ? ThrustShare(setpoint.thrust, config.hover_thrust, config.motor_curve)
                       : 0.0);
-  if (!config.body_rates) {
+  if (!config.body_rates || !R_WB) {
     // PX4 takes the rate as that about the vertical of the earth frame.
     const Eigen::Vector3d w_ned = SwapWorld(setpoint.R_WB * setpoint.w_WB_B);
     m.type_mask = Bits(Mask::BODY_ROLL_RATE_IGNORE, Mask::BODY_PITCH_RATE_IGNORE);
     m.body_yaw_rate = static_cast<float>(w_ned.z());
     return m;
   }
-  Eigen::Vector3d w = setpoint.w_WB_B + RateTowards(R_WB, setpoint.R_WB, config);
+  Eigen::Vector3d w = setpoint.w_WB_B + RateTowards(*R_WB, setpoint.R_WB, config);
   w = SwapBody(w.cwiseMax(-config.max_rate).cwiseMin(config.max_rate));
   m.type_mask = static_cast<uint8_t>(Mask::ATTITUDE_IGNORE);
   m.body_roll_rate = static_cast<float>(w.x());

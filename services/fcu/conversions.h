@@ -46,8 +46,10 @@ struct ImuSample {
 double ThrustShare(double thrust, double hover, double curve);
 
 /// SET_ATTITUDE_TARGET for PX4. With config.body_rates the attitude loop is closed here, on R_WB as
-/// estimated; otherwise PX4 closes it and takes the rate about the vertical as feed-forward.
-mav::SetAttitudeTarget AttitudeTarget(const Setpoint& setpoint, const Eigen::Quaterniond& R_WB,
+/// estimated; otherwise, and without an estimate, PX4 closes it and takes the rate about the
+/// vertical as feed-forward.
+mav::SetAttitudeTarget AttitudeTarget(const Setpoint& setpoint,
+                                      const std::optional<Eigen::Quaterniond>& R_WB,
                                       const FcuConfig& config);
 
 /// ODOMETRY as external vision; `resets` counts the changes of the frame W.

@@ -207,6 +207,52 @@ TEST(FcuBridge, ARepeatedSetpointIsNoFreshOne) {
   EXPECT_EQ(flight.bridge.handshake().state(), State::kLanding);
 }
 
+// A stalled process finds them one after another, each as if it had just come.
+TEST(FcuBridge, ASetpointThatWaitedInAQueueIsNotSent) {
+  Flight flight;
+  ASSERT_TRUE(flight.RunUntil(State::kFlying, 12.0));
+  flight.Run(3.0);
+  flight.setpoints = false;
+  flight.Run(0.3);
+  const int sent = flight.px4.seen().setpoints;
+  Setpoint setpoint;
+  setpoint.motors = true;
+  setpoint.thrust = 9.81;
+  for (int i = 0; i < 20; ++i) {
+    flight.bridge.OnSetpoint(setpoint, flight.now() - 250'000, flight.now());
+    flight.Run(0.005);
+  }
+  EXPECT_EQ(flight.px4.seen().setpoints, sent);
+  flight.bridge.OnSetpoint(setpoint, flight.now() - 50'000, flight.now());
+  flight.Run(0.005);
+  EXPECT_EQ(flight.px4.seen().setpoints, sent + 1);
+}
+
+// The autopilot's own attitude is the better one then.
+TEST(FcuBridge, ClosesNoAttitudeLoopOnAPoseThatIsOldOrBad) {
+  FcuConfig config;
+  config.body_rates = true;
+  Flight flight({}, config);
+  ASSERT_TRUE(flight.RunUntil(State::kFlying, 12.0));
+  flight.Run(3.0);
+  const auto mask = [&] { return flight.px4.seen().setpoint->type_mask; };
+  EXPECT_EQ(mask(), 128) << "rates";
+  flight.poses = false;
+  flight.Run(0.04);
+  EXPECT_EQ(mask(), 128);
+  flight.Run(0.03);
+  EXPECT_EQ(mask(), 3) << "the attitude";
+  flight.Run(0.5);
+  EXPECT_EQ(mask(), 3);
+  flight.poses = true;
+  flight.Run(0.02);
+  EXPECT_EQ(mask(), 128);
+  flight.usable = false;
+  flight.Run(0.02);
+  EXPECT_EQ(mask(), 3);
+  EXPECT_EQ(flight.bridge.handshake().state(), State::kFlying);
+}
+
 TEST(FcuBridge, LandsWhenThePoseHasBeenSilentForTooLong) {
   Flight flight;
   ASSERT_TRUE(flight.RunUntil(State::kFlying, 12.0));

@@ -95,7 +95,7 @@ class Flight {
       pose.R_WB = px4.R_WB();
       pose = Turned(pose, turned);
       pose.covariance = Matrix9d::Identity() * 1e-4;
-      pose.usable = true;
+      pose.usable = usable;
       bridge.OnPose(pose, now_);
     }
     if (!setpoints) return;
