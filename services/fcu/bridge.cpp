@@ -88,6 +88,7 @@ void Bridge::OnTimesync(const mav::Timesync& m, const Heard& when) {
     mav::Timesync answer;
     answer.tc1 = 1000 * (when.arrival + (when.now - when.arrival) / 2);
     answer.ts1 = m.ts1;
+    ++time_answers_;
     return Send(when.now, answer);
   }
   const auto request = std::find(time_requests_.begin(), time_requests_.end(), m.ts1);
@@ -191,6 +192,10 @@ std::string Bridge::AttitudeProblem(int64_t now) const {
 std::string Bridge::Missing(int64_t now) const {
   if (std::string unfit = autopilot_.Unfit(); !unfit.empty()) return unfit;
   if (!clock_.synced()) return "the autopilot's clock is not known yet";
+  // In flight its estimate of our clock is as old as the flight, whoever flew it until now.
+  if (time_answers_ < kTimeAnswers && !autopilot_.armed())
+    return fmt::format("the autopilot learns our clock: {} of {} answers", time_answers_,
+                       kTimeAnswers);
   if (std::string problem = PoseProblem(now); !problem.empty()) return problem;
   return AttitudeProblem(now);
 }
@@ -219,6 +224,7 @@ void Bridge::Tick(int64_t now) {
   const bool was_heard = heard_;
   heard_ = Hears(now);
   if ((heard_ && !was_heard) || clock_.restarts() != restarts_) rates_.Restart();
+  if (clock_.restarts() != restarts_) time_answers_ = 0;
   restarts_ = clock_.restarts();
   missing_ = heard_ ? Missing(now) : "no PX4 is heard";
   handshake_.Update(Gather(now));
@@ -289,7 +295,7 @@ std::string Bridge::Words() const {
   words += "; " + autopilot_.Words(ticked_);
   words += fmt::format("; clock +-{:.2f} ms, round trip {:.1f} ms", 1e3 * clock_.jitter(),
                        1e3 * clock_.round_trip());
-  words += fmt::format("; {} {:.0f} Hz", imu_.source(), rates_.rate(mav::HighresImu::kId));
+  words += fmt::format("; {} {:.0f} Hz", imu_.source(), rates_.imu_rate());
   words += fmt::format(
       "; {} setpoints sent, in flight at most {:.0f} ms apart; {} odometry sent, {} frames lost",
       setpoints_sent_, 1e3 * longest_setpoint_gap_, odometry_sent_, reader_.counters().lost);

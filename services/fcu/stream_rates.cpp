@@ -18,8 +18,12 @@ constexpr uint32_t Id() {
 }  // namespace
 
 // What the bridge needs of each. PX4's own rates for a companion are lower or depend on the link.
+// TIMESYNC: it counts 500 answers before it believes our stamps, 50 s at its own 10 Hz.
 StreamRates::StreamRates(double imu_rate)
     : rows_{{Id<mav::HighresImu>(), "HIGHRES_IMU", imu_rate, true},
+            {Id<mav::RawImu>(), "RAW_IMU", imu_rate, true},
+            {Id<mav::ScaledImu>(), "SCALED_IMU", imu_rate, true},
+            {Id<mav::Timesync>(), "TIMESYNC", 100.0, false},
             {Id<mav::AttitudeQuaternion>(), "ATTITUDE_QUATERNION", 50.0, true},
             {Id<mav::LocalPositionNed>(), "LOCAL_POSITION_NED", 20.0, false},
             {Id<mav::ExtendedSysState>(), "EXTENDED_SYS_STATE", 5.0, true},
@@ -56,7 +60,7 @@ std::optional<mav::CommandLong> StreamRates::Tick(int64_t utime) {
   for (std::size_t k = 0; k < rows_.size(); ++k) {
     const std::size_t i = (next_ + k) % rows_.size();
     Row& row = rows_[i];
-    if (!row.lacking || row.refusals >= kMostRefusals) continue;
+    if (!row.lacking || row.refusals >= kMostRefusals || !IsAskedFor(i)) continue;
     row.lacking = false;  // until it has been measured again
     next_ = i + 1;
     asked_ = i;
@@ -75,16 +79,16 @@ void StreamRates::Restart() {
   asked_.reset();
 }
 
-double StreamRates::rate(uint32_t id) const {
-  for (const Row& row : rows_)
-    if (row.id == id) return row.rate;
-  return 0.0;
+std::size_t StreamRates::Imu() const {
+  std::size_t row = 0;
+  while (row + 1 < kImus && rows_[row].refusals >= kMostRefusals) ++row;
+  return row;
 }
 
 std::string StreamRates::missing() const {
   std::string words;
-  for (const Row& row : rows_)
-    if (row.needed && row.rate < kEnough * row.wanted)
+  for (std::size_t i = 0; i < rows_.size(); ++i)
+    if (const Row& row = rows_[i]; row.needed && IsAskedFor(i) && row.rate < kEnough * row.wanted)
       words += fmt::format("{}{} at {:.1f} of {:.0f} Hz", words.empty() ? "" : ", ", row.name,
                            row.rate, row.wanted);
   return words;

@@ -22,8 +22,8 @@ class StreamRates {
   /// The autopilot began anew: ask again.
   void Restart();
 
-  /// Measured, Hz.
-  double rate(uint32_t id) const;
+  /// Of the IMU's samples, measured, Hz.
+  double imu_rate() const { return rows_[Imu()].rate; }
   /// What does not come, in words; empty: all does.
   std::string missing() const;
 
@@ -39,6 +39,11 @@ class StreamRates {
     bool lacking = true;
   };
   void Measure(int64_t utime);
+  /// The row of the best IMU that is not refused.
+  std::size_t Imu() const;
+  bool IsAskedFor(std::size_t row) const { return row >= kImus || row == Imu(); }
+
+  static constexpr std::size_t kImus = 3;  // the first rows, the best one first
 
   std::vector<Row> rows_;
   std::size_t next_ = 0;              // row to look at

@@ -15,13 +15,15 @@ using Eigen::Vector3d;
 using mavlink::Mode;
 namespace mav = mavlink::mav;
 
-constexpr double kLatest = 1e17;       // us, 3000 years: stamps beyond are none
-constexpr int64_t kBoot = 12'345'678;  // us
-constexpr double kStreamBefore = 1.0;  // s of setpoints before OFFBOARD
-constexpr double kSlowest = 0.5;       // s between setpoints of a stream: 2 Hz
-constexpr double kStill = 0.5;         // s after which it takes itself to have landed
-constexpr float kForce = 21196.0f;     // param2 of arming and disarming
-constexpr int64_t kOffsetMemory = 8;   // answers of TIMESYNC over which the offset is averaged
+constexpr double kLatest = 1e17;          // us, 3000 years: stamps beyond are none
+constexpr int64_t kBoot = 12'345'678;     // us
+constexpr double kStreamBefore = 1.0;     // s of setpoints before OFFBOARD
+constexpr double kSlowest = 0.5;          // s between setpoints of a stream: 2 Hz
+constexpr double kStill = 0.5;            // s after which it takes itself to have landed
+constexpr float kForce = 21196.0f;        // param2 of arming and disarming
+constexpr int64_t kOffsetMemory = 8;      // answers of TIMESYNC over which the offset is averaged
+constexpr int64_t kLongestTrip = 10'000;  // us; answers that took longer are no measure
+constexpr int kSettled = 500;             // answers until a stamp is believed
 
 /// The setpoint with no rates and no rotation where its mask leaves them out.
 mav::SetAttitudeTarget Heeded(mav::SetAttitudeTarget m) {
@@ -78,7 +80,8 @@ int64_t Px4::Clock(int64_t utime) const {
 std::optional<int64_t> Px4::HostTime(uint64_t companion_us) const {
   const auto offset = offsets_.find(vision_sender_);
   if (offset == offsets_.end() || static_cast<double>(companion_us) > kLatest) return std::nullopt;
-  const auto own = static_cast<double>(static_cast<int64_t>(companion_us) - offset->second);
+  if (offset->second.answers < kSettled) return now_;
+  const auto own = static_cast<double>(static_cast<int64_t>(companion_us) - offset->second.us);
   return boot_ + static_cast<int64_t>(own / (1.0 + 1e-6 * options_.drift_ppm));
 }
 
@@ -120,7 +123,8 @@ void Px4::OnFrame(const mavlink::Frame& frame, int64_t arrival, int64_t clock) {
   if (mavlink::As<mav::Heartbeat>(frame)) ++seen_.heartbeats;
   if (const auto m = mavlink::As<mav::CommandLong>(frame)) OnCommand(*m, frame);
   if (const auto m = mavlink::As<mav::Odometry>(frame)) OnOdometry(*m, SenderOf(frame));
-  if (const auto m = mavlink::As<mav::Timesync>(frame)) OnTimesync(*m, SenderOf(frame), clock);
+  if (const auto m = mavlink::As<mav::Timesync>(frame))
+    OnTimesync(*m, SenderOf(frame), arrival, clock);
   if (const auto m = mavlink::As<mav::SetAttitudeTarget>(frame)) OnSetpoint(*m, arrival);
 }
 
@@ -149,15 +153,17 @@ void Px4::OnSetpoint(const mav::SetAttitudeTarget& message, int64_t arrival) {
 }
 
 // Each peer has a clock of its own: vision's stamps are of the one that sends it.
-void Px4::OnTimesync(const mav::Timesync& m, Sender sender, int64_t clock) {
+void Px4::OnTimesync(const mav::Timesync& m, Sender sender, int64_t arrival, int64_t clock) {
   ++seen_.timesync;
-  const int64_t own = Clock(clock);
-  if (m.tc1 == 0) return Send(mav::Timesync{1000 * own, m.ts1, 0, 0});
+  if (m.tc1 == 0) return Send(mav::Timesync{1000 * Clock(clock), m.ts1, 0, 0});
+  const int64_t own = Clock(arrival);
+  if (own - m.ts1 / 1000 >= kLongestTrip) return;
   const int64_t offset = m.tc1 / 1000 - (m.ts1 / 1000 + own) / 2;
-  seen_.clock_errors.push_back(1e-6 * static_cast<double>((clock - own) - offset));
-  int64_t& known = offsets_.emplace(sender, offset).first->second;
-  if (std::llabs(offset - known) > 100'000) known = offset;
-  known += (offset - known) / kOffsetMemory;
+  seen_.clock_errors.push_back(1e-6 * static_cast<double>((arrival - own) - offset));
+  Offset& known = offsets_.emplace(sender, Offset{offset}).first->second;
+  if (std::llabs(offset - known.us) > 100'000) known = {offset};
+  known.us += (offset - known.us) / kOffsetMemory;
+  ++known.answers;
 }
 
 bool Px4::StreamAlive() const {

@@ -80,7 +80,7 @@ class Px4 {
   using Sender = std::pair<uint8_t, uint8_t>;  // system, component
   static Sender SenderOf(const mavlink::Frame& frame) { return {frame.system, frame.component}; }
   void OnOdometry(mavlink::mav::Odometry m, Sender sender);
-  void OnTimesync(const mavlink::mav::Timesync& m, Sender sender, int64_t clock);
+  void OnTimesync(const mavlink::mav::Timesync& m, Sender sender, int64_t arrival, int64_t clock);
   void OnCommand(const mavlink::mav::CommandLong& m, const mavlink::Frame& frame);
   uint8_t Handle(const mavlink::mav::CommandLong& m);
   uint8_t SetInterval(const mavlink::mav::CommandLong& m);
@@ -119,8 +119,12 @@ class Px4 {
   uint8_t sequence_1_ = 0;
   bool version_2_;
   int64_t boot_, now_;
-  std::map<Sender, int64_t> offsets_;  // clocks of those who answer TIMESYNC minus ours, us
-  Sender vision_sender_{};             // of the last ODOMETRY
+  struct Offset {
+    int64_t us;       // their clock minus ours
+    int answers = 0;  // that it is from
+  };
+  std::map<Sender, Offset> offsets_;  // of those who answer TIMESYNC
+  Sender vision_sender_{};            // of the last ODOMETRY
   mavlink::Mode mode_, intended_;
   bool armed_ = false, failsafe_ = false, landed_ = true, has_flown_ = false, drained_ = false;
   int64_t first_setpoint_ = 0, last_setpoint_ = 0, landed_since_ = 0, down_since_ = 0;

@@ -2,6 +2,7 @@
 
 #include <Eigen/Geometry>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "services/fcu/mavlink.h"
@@ -39,6 +40,7 @@ class StandIn {
   const Eigen::Vector3d& v_WB() const { return body_.v_WB; }
   const Eigen::Quaterniond& R_WB() const { return body_.R_WB; }
   int64_t Clock(int64_t utime) const { return px4_.Clock(utime); }
+  std::optional<int64_t> HostTime(uint64_t stamp) const { return px4_.HostTime(stamp); }
   const simulator::Px4::Seen& seen() const { return px4_.seen(); }
 
  private:

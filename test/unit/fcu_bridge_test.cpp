@@ -82,6 +82,21 @@ TEST(FcuBridge, BothSidesKnowTheLongestGapOfTheStream) {
   EXPECT_FALSE(said("10")) << flight.bridge.Words();
 }
 
+// Until then a pose would count as measured when it arrives.
+TEST(FcuBridge, NoFlightBeginsBeforeTheAutopilotKnowsOurClock) {
+  Flight flight;
+  flight.Run(3.0);
+  EXPECT_EQ(flight.bridge.handshake().state(), State::kStandby);
+  EXPECT_NE(flight.bridge.missing().find("learns our clock"), std::string::npos)
+      << flight.bridge.missing();
+  ASSERT_TRUE(flight.RunUntil(State::kStreaming, 4.0)) << flight.bridge.missing();
+  flight.Run(0.1);  // the last answers are on their way
+  const int64_t stamp = flight.now() - 100'000;
+  const auto host = flight.px4.HostTime(static_cast<uint64_t>(stamp));
+  ASSERT_TRUE(host);
+  EXPECT_NEAR(static_cast<double>(*host - stamp), 0.0, 2000.0);
+}
+
 TEST(FcuBridge, ClocksMeetOnBothSides) {
   Flight flight;
   flight.setpoints = false;

@@ -1,5 +1,8 @@
 #include <gtest/gtest.h>
 
+#include <map>
+#include <set>
+
 #include "common/world/random.h"
 #include "services/fcu/autopilot.h"
 #include "services/fcu/clock_sync.h"
@@ -93,11 +96,34 @@ TEST(FcuStreamRates, AsksUntilMessagesComeAndNoLonger) {
     for (const auto& [id, interval] : granted)
       if (t % static_cast<int64_t>(interval) < 5'000) rates.OnMessage(id);
   }
-  EXPECT_EQ(granted.size(), 6u);
+  EXPECT_EQ(granted.size(), 7u);
   EXPECT_NEAR(granted.at(mav::HighresImu::kId), 5000.0, 1.0);
   EXPECT_EQ(rates.missing().find("HIGHRES_IMU"), std::string::npos) << rates.missing();
   EXPECT_LT(last, 30) << "asked on though all comes";
   EXPECT_GT(asked, 20);
+}
+
+TEST(FcuStreamRates, AsksForAnotherImuWhereTheBestIsRefused) {
+  for (const uint32_t last : {mav::RawImu::kId, mav::ScaledImu::kId, mav::HighresImu::kId}) {
+    StreamRates rates(200.0);
+    std::set<uint32_t> asked;
+    for (int64_t t = 1'000'000; t < 40'000'000; t += 5'000) {
+      if (const auto request = rates.Tick(t)) {
+        const auto id = static_cast<uint32_t>(request->param1);
+        asked.insert(id);
+        const bool imu =
+            id == mav::RawImu::kId || id == mav::ScaledImu::kId || id == mav::HighresImu::kId;
+        rates.OnAnswer(!imu || id == last ? 0 : 4);
+      }
+      if (asked.count(last) != 0) rates.OnMessage(last);
+      rates.OnMessage(mav::AttitudeQuaternion::kId);
+      rates.OnMessage(mav::ExtendedSysState::kId);
+    }
+    EXPECT_NEAR(rates.imu_rate(), 200.0, 2.0) << last;
+    EXPECT_EQ(rates.missing(), "") << last;
+    EXPECT_EQ(asked.count(mav::RawImu::kId), last == mav::HighresImu::kId ? 0u : 1u);
+    EXPECT_EQ(asked.count(mav::ScaledImu::kId), last == mav::ScaledImu::kId ? 1u : 0u);
+  }
 }
 
 mav::Statustext Chunk(const std::string& text, uint16_t id, uint8_t seq) {

@@ -80,8 +80,8 @@ class Link {
   }
 
   /// A companion whose clock is `ahead` us of the host's answers to TIMESYNC.
-  void Answer(uint8_t system, uint8_t component, int64_t ahead) {
-    for (int i = 0; i < 50; ++i)
+  void Answer(uint8_t system, uint8_t component, int64_t ahead, int answers = 500) {
+    for (int i = 0; i < answers; ++i)
       Send(mav::Timesync{1000 * (now_ + ahead), 1000 * px4_.Clock(now_), 0, 0}, system, component);
   }
 
@@ -255,6 +255,17 @@ TEST(Px4, KnowsTheLongestGapBetweenTheSetpointsThatItFliesBy) {
   EXPECT_NEAR(gap(), 0.070, 1e-9) << "the pilot had it";
   link.Setpoints(1, 1'500'000);
   EXPECT_NEAR(gap(), 1.5, 1e-9) << "of the failsafe for their silence, too";
+}
+
+// PX4's Timesync: it takes what comes for stamped when it comes until 500 answers have come.
+TEST(Px4, BelievesNoStampBeforeItsEstimateOfTheClockHasSettled) {
+  Link link;
+  link.Answer(1, 191, 5'000'000, 499);
+  link.Send(Vision());
+  const auto stamp = static_cast<uint64_t>(link.now() + 4'900'000);  // 0.1 s old
+  EXPECT_EQ(link.px4().HostTime(stamp), link.now());
+  link.Answer(1, 191, 5'000'000, 1);
+  EXPECT_NEAR(static_cast<double>(*link.px4().HostTime(stamp) - link.now()), -1e5, 1000.0);
 }
 
 // A ground station answers as well, by a clock of its own.
