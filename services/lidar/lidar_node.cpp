@@ -11,12 +11,14 @@ namespace {
 
 constexpr int64_t kOldest = 1'000'000;  // us that a packet may wait in the socket
 constexpr double kSilent = 0.2;         // s without a packet: 150 are missing
+constexpr double kPatience = 2.0;       // s without one since the start
 constexpr double kFlawed = 5.0;         // s after a loss in which the sensor is called degraded
 
 }  // namespace
 
 LidarNode::LidarNode(bus::Bus& bus, const LidarConfig& config)
     : bus_(bus),
+      port_(config.port),
       assembler_(config),
       clock_(config),
       source_(OpenPacketSource(config.source, config.port)) {
@@ -34,12 +36,14 @@ void LidarNode::Tick(int64_t utime) {
 }
 
 void LidarNode::TickDevice() {
+  if (!first_tick_) first_tick_ = bus_.Now();
   while (const auto packet = source_->Next()) {
     const uint8_t* data = packet->bytes.data();
-    heard_ = bus_.Now();
     // The stamp is of the first firing; the packet leaves after its last.
-    if (PacketProblem(data, packet->bytes.size()).empty())
+    if (PacketProblem(data, packet->bytes.size()).empty()) {
+      heard_ = bus_.Now();
       alignment_.Add(clock_.Unwrap(PacketStamp(data)) + PacketDuration(data), Arrival(*packet));
+    }
     Take(*packet);
   }
   const long flaws = assembler_.lost() + assembler_.malformed();
@@ -65,8 +69,10 @@ int64_t LidarNode::Arrival(const RawPacket& packet) const {
   return bus_.Now() - (packet.capture_utime > 0 && age >= 0 && age < kOldest ? age : 0);
 }
 
-/// s since the last packet.
-double LidarNode::Silence() const { return bus::Seconds(bus_.Now(), heard_); }
+/// s since the last packet that is one, or since the start.
+double LidarNode::Silence() const {
+  return bus::Seconds(bus_.Now(), heard_ != 0 ? heard_ : first_tick_.value_or(bus_.Now()));
+}
 
 void LidarNode::TickRecording(int64_t utime) {
   if (!first_tick_) first_tick_ = utime;
@@ -111,9 +117,11 @@ bus::NodeReport LidarNode::Report() const {
   if (assembler_.model().verdict() == ModelCheck::Verdict::kOther)
     return {State::kFailed, assembler_.model().reason()};
   const bool device = !source_->IsRecording();
-  if (device && heard_ != 0 && Silence() > kSilent)
+  if (device && Silence() > (heard_ != 0 ? kSilent : kPatience))
     return {State::kFailed,
-            fmt::format("no packet for {:.1f} s; check the sensor's power and cable", Silence())};
+            fmt::format("no packet for {:.1f} s, {} malformed; check the sensor's power and cable, "
+                        "and its page: it sends to this computer's address, port {}",
+                        Silence(), assembler_.malformed(), port_)};
   if (sweeps_ == 0) return {State::kStarting, "no whole sweep yet"};
   const bool flawed = device ? flawed_ != 0 && bus::Seconds(bus_.Now(), flawed_) < kFlawed
                              : assembler_.lost() + assembler_.malformed() > 0;

@@ -34,6 +34,7 @@ class LidarNode : public bus::Node {
   void StopIfRefused();
 
   bus::Bus& bus_;
+  int port_;
   SweepAssembler assembler_;
   SweepAssembler clock_;  // only unwraps the stamps of packets that wait for their time
   std::unique_ptr<PacketSource> source_;
@@ -43,7 +44,7 @@ class LidarNode : public bus::Node {
   math::ClockAlignment alignment_;
   std::optional<RawPacket> next_;
   std::optional<int64_t> first_tick_, first_device_us_;
-  int64_t heard_ = 0;   // when the last packet came, bus's clock; 0: none yet
+  int64_t heard_ = 0;   // when the last packet came that is one, bus's clock; 0: none yet
   int64_t flawed_ = 0;  // when one was last lost or malformed
   long flaws_ = 0;      // lost and malformed until then
   long sweeps_ = 0;

@@ -1,6 +1,9 @@
 #include "services/lidar/lidar_node.h"
 
+#include <arpa/inet.h>
 #include <gtest/gtest.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
 #include <filesystem>
 #include <fstream>
@@ -82,6 +85,64 @@ TEST(LidarNode, AnotherSensorIsReportedAndPublishesNothing) {
   EXPECT_TRUE(flown.done);
   EXPECT_EQ(flown.report.state, bus::NodeReport::State::kFailed);
   EXPECT_NE(flown.report.detail.find("Hi-Res"), std::string::npos);
+}
+
+/// A sensor on UDP. The node's clock is the lockstep's.
+class Live {
+ public:
+  Live() : socket_(socket(AF_INET, SOCK_DGRAM, 0)) {
+    LidarConfig config;
+    config.port = 42369;
+    to_.sin_family = AF_INET;
+    to_.sin_port = htons(static_cast<uint16_t>(config.port));
+    to_.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    lockstep_.Add("lidar", 0, [&, config](bus::Bus& bus) {
+      auto made = std::make_unique<LidarNode>(bus, config);
+      node_ = made.get();
+      return made;
+    });
+  }
+  ~Live() { close(socket_); }
+  template <class Bytes>
+  void Send(const Bytes& bytes) {
+    sendto(socket_, bytes.data(), bytes.size(), 0, reinterpret_cast<sockaddr*>(&to_), sizeof to_);
+  }
+  void Run(int64_t us) { lockstep_.RunUntil(now_ += us); }
+  /// 10 ms of packets.
+  void Sweep() {
+    for (int i = 0; i < 8; ++i) Send(testing::StreamPacket(packets_++, 150.0, 777000));
+    Run(10'000);
+  }
+  bus::NodeReport::State state() const { return node_->Report().state; }
+
+ private:
+  int socket_;
+  sockaddr_in to_{};
+  int64_t now_ = kStart;
+  int packets_ = 0;
+  bus::Lockstep lockstep_{kStart};
+  const bus::Node* node_ = nullptr;
+};
+
+TEST(LidarNode, ASensorThatNeverSpokeHasFailedAfterTwoSeconds) {
+  Live live;
+  live.Run(1'900'000);
+  EXPECT_EQ(live.state(), bus::NodeReport::State::kStarting);
+  live.Run(300'000);
+  EXPECT_EQ(live.state(), bus::NodeReport::State::kFailed);
+  for (int i = 0; i < 40; ++i) live.Sweep();
+  EXPECT_EQ(live.state(), bus::NodeReport::State::kOk) << "late";
+}
+
+TEST(LidarNode, BytesThatAreNoPacketKeepNoSensorAlive) {
+  Live live;
+  for (int i = 0; i < 40; ++i) live.Sweep();
+  ASSERT_EQ(live.state(), bus::NodeReport::State::kOk);
+  for (int i = 0; i < 30; ++i) {
+    live.Send(std::string(1206, 'x'));
+    live.Run(10'000);
+  }
+  EXPECT_EQ(live.state(), bus::NodeReport::State::kFailed);
 }
 
 }  // namespace
