@@ -13,14 +13,15 @@
 namespace chase::camera {
 namespace {
 
-constexpr int64_t kPoll = 5'000;   // us
-constexpr double kSilent = 0.3;    // s without a frame, or three of its periods
-constexpr double kSurplus = 0.75;  // of the period: what comes sooner after its predecessor is one
+constexpr int64_t kPoll = 5'000;          // us
+constexpr int64_t kRateOver = 5'000'000;  // us over which the published rate is measured
+constexpr double kSilent = 0.3;           // s without a frame, or three of its periods
 
 }  // namespace
 
-CameraNode::CameraNode(bus::Bus& bus, const CameraConfig& config) : bus_(bus), config_(config) {
-  auto source = OpenFrameSource(config.source, config.rate_hz);
+CameraNode::CameraNode(bus::Bus& bus, const CameraConfig& config)
+    : bus_(bus), config_(config), pace_(std::llround(1e6 / config.rate_hz)) {
+  auto source = OpenFrameSource(config);
   if (source->IsRecording())
     recording_ = std::move(source);
   else
@@ -55,17 +56,16 @@ void CameraNode::TickDevice() {
 
 void CameraNode::TakeFrame(const Grabber::Grabbed& grabbed) {
   const int64_t utime = CaptureTime(grabbed);
-  const auto period = static_cast<int64_t>(1e6 / config_.rate_hz);
   if (frames_ > 0 && utime <= last_utime_) {
     ++backwards_;
     // A source that began anew, perhaps on another clock.
     if (last_utime_ - utime < 1'000'000) return;
-  } else if (frames_ > 0 &&
-             static_cast<double>(utime - last_utime_) < kSurplus * static_cast<double>(period)) {
-    ++surplus_;
-    return;
+    pace_.Restart();
   }
-  Publish(grabbed.frame, utime);
+  if (pace_.Take(utime))
+    Publish(grabbed.frame, utime);
+  else
+    ++surplus_;
 }
 
 /// The middle of the exposure, on the bus's clock.
@@ -116,6 +116,15 @@ void CameraNode::Publish(const Frame& frame, int64_t utime) {
   last_picture_ = bus_.Now();
   age_ = bus::Seconds(last_picture_, utime);
   ++frames_;
+  Measure();
+}
+
+void CameraNode::Measure() {
+  if (const double s = bus::Seconds(last_picture_, rated_); s >= 1e-6 * kRateOver) {
+    rate_ = rated_ == 0 ? 0.0 : static_cast<double>(frames_ - rated_frames_) / s;
+    rated_ = last_picture_;
+    rated_frames_ = frames_;
+  }
 }
 
 /// s since the last picture was published.
@@ -154,11 +163,13 @@ bus::NodeReport CameraNode::Report() const {
                         config_.source, silence, why.empty() ? "" : " (" + why + ")", undecodable)};
   const bool off =
       stamps_ != StampClock::kStream && stamps_ != StampClock::kNone && !clock_.believed();
-  return {off ? State::kDegraded : State::kOk,
-          fmt::format("{} frames, {} dropped, {} undecodable, {} beyond the rate, {} out of order, "
-                      "{:.0f} ms old; {}",
-                      frames_, grabber_->dropped(), undecodable, surplus_, backwards_, 1e3 * age_,
-                      StampWords())};
+  return {
+      off ? State::kDegraded : State::kOk,
+      fmt::format(
+          "{} frames, {:.1f} Hz, {} dropped, {} undecodable, {} beyond the rate, {} out of order, "
+          "{:.0f} ms old; {}",
+          frames_, rate_, grabber_->dropped(), undecodable, surplus_, backwards_, 1e3 * age_,
+          StampWords())};
 }
 
 }  // namespace chase::camera

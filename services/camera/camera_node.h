@@ -9,6 +9,7 @@
 #include "services/camera/config.h"
 #include "services/camera/frame_source.h"
 #include "services/camera/grabber.h"
+#include "services/camera/pace.h"
 
 namespace chase::camera {
 
@@ -29,6 +30,7 @@ class CameraNode : public bus::Node {
   void TakeFrame(const Grabber::Grabbed& grabbed);
   int64_t CaptureTime(const Grabber::Grabbed& grabbed);
   void Publish(const Frame& frame, int64_t utime);
+  void Measure();
   double Silence() const;
   std::string StampWords() const;
 
@@ -37,9 +39,13 @@ class CameraNode : public bus::Node {
   std::unique_ptr<FrameSource> recording_;  // or
   std::unique_ptr<Grabber> grabber_;
   CaptureClock clock_;
+  Pace pace_;
   StampClock stamps_ = StampClock::kNone;
   int64_t last_utime_ = 0, last_picture_ = 0;  // bus's clock
   double age_ = 0.0;                           // of the last frame when published, s
+  double rate_ = 0.0;                          // published, Hz; 0: not measured yet
+  int64_t rated_ = 0;                          // when it was measured
+  long rated_frames_ = 0;                      // published until then
   long frames_ = 0, unusable_ = 0, surplus_ = 0, backwards_ = 0;
   bool done_ = false;
 };

@@ -92,7 +92,10 @@ std::unique_ptr<FrameSource> OpenFolder(const std::string& folder) {
   return std::make_unique<FolderSource>(std::move(files));
 }
 
-cv::VideoCapture OpenDevice(const std::string& device, double rate_hz) {
+/// At a rate and a size that are not below what is published. A driver takes what it has nearest:
+/// asked for 20 Hz, that may be 15.
+cv::VideoCapture OpenDevice(const CameraConfig& config) {
+  const std::string& device = config.source;
   setenv("OPENCV_VIDEOIO_V4L_SELECT_TIMEOUT", "1", 0);  // s that a read may wait
   cv::VideoCapture capture(device, cv::CAP_V4L2);
   if (!capture.isOpened())
@@ -100,7 +103,11 @@ cv::VideoCapture OpenDevice(const std::string& device, double rate_hz) {
                              ": camera cannot be opened; check that it is plugged in, that no "
                              "other program holds it and that you are in the group video");
   capture.set(cv::CAP_PROP_BUFFERSIZE, 1);
-  capture.set(cv::CAP_PROP_FPS, rate_hz);
+  // Raw frames of more than 640 x 480 do not pass USB 2 at 30 Hz.
+  capture.set(cv::CAP_PROP_FOURCC, cv::VideoWriter::fourcc('M', 'J', 'P', 'G'));
+  capture.set(cv::CAP_PROP_FRAME_WIDTH, std::max(config.width_px, 640));
+  capture.set(cv::CAP_PROP_FRAME_HEIGHT, std::max(config.height_px, 480));
+  capture.set(cv::CAP_PROP_FPS, std::max(config.rate_hz, 30.0));
   return capture;
 }
 
@@ -133,7 +140,8 @@ bool BeginsWith(const std::string& text, const char* head) { return text.rfind(h
 
 }  // namespace
 
-std::unique_ptr<FrameSource> OpenFrameSource(const std::string& source, double rate_hz) {
+std::unique_ptr<FrameSource> OpenFrameSource(const CameraConfig& config) {
+  const std::string& source = config.source;
   if (BeginsWith(source, "http://")) return OpenMjpegSource(source);
   const auto live = [](VideoSource::Open open, StampClock clock) {
     return std::make_unique<VideoSource>(std::move(open), false, clock);
@@ -147,7 +155,7 @@ std::unique_ptr<FrameSource> OpenFrameSource(const std::string& source, double r
     throw std::runtime_error(source + ": no such device, file or folder; set source");
   if (fs::is_directory(status)) return OpenFolder(source);
   if (fs::is_character_file(status))
-    return live([source, rate_hz] { return OpenDevice(source, rate_hz); }, StampClock::kMonotonic);
+    return live([config] { return OpenDevice(config); }, StampClock::kMonotonic);
   return std::make_unique<VideoSource>([source] { return OpenFile(source); }, true,
                                        StampClock::kNone);
 }

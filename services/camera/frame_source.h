@@ -6,6 +6,8 @@
 #include <optional>
 #include <string>
 
+#include "services/camera/config.h"
+
 namespace chase::camera {
 
 /// Which clock a stamp is of.
@@ -36,10 +38,10 @@ class FrameSource {
   virtual std::string Problem() const { return ""; }
 };
 
-/// `source`: a device (/dev/video0), a video file, a folder of images in the order of their names,
-/// http://HOST:PORT/PATH (MJPEG), another URL that FFmpeg reads (rtsp://, udp://), or gst: and a
-/// GStreamer pipeline up to its appsink. Throws std::runtime_error with one line that says what,
-/// where and how to mend it.
-std::unique_ptr<FrameSource> OpenFrameSource(const std::string& source, double rate_hz);
+/// `config.source`: a device (/dev/video0), a video file, a folder of images in the order of their
+/// names, http://HOST:PORT/PATH (MJPEG), another URL that FFmpeg reads (rtsp://, udp://), or gst:
+/// and a GStreamer pipeline up to its appsink. Throws std::runtime_error with one line that says
+/// what, where and how to mend it.
+std::unique_ptr<FrameSource> OpenFrameSource(const CameraConfig& config);
 
 }  // namespace chase::camera

@@ -149,7 +149,7 @@ TEST(Grabber, ASourceThatGivesNothingIsAskedAgainInPeace) {
 TEST(MjpegSource, EmptyBodiesAndAbsurdPicturesDoNoHarm) {
   for (const std::string& bad : {std::string(), std::string("no jpeg"), AbsurdJpeg()}) {
     const Server server(kStream + Part(bad) + Part(Jpeg()), false);
-    Grabber grabber(OpenFrameSource(server.Url(), 20.0));
+    Grabber grabber(OpenFrameSource({server.Url()}));
     EXPECT_TRUE(Within(milliseconds(3000), [&] { return grabber.Take().has_value(); }));
     EXPECT_EQ(grabber.undecodable(), 1);
   }
@@ -157,7 +157,7 @@ TEST(MjpegSource, EmptyBodiesAndAbsurdPicturesDoNoHarm) {
 
 TEST(MjpegSource, AServerThatRefusesIsNotBesieged) {
   const Server server("HTTP/1.0 404 Not Found\r\n\r\n", true);
-  const Grabber grabber(OpenFrameSource(server.Url(), 20.0));
+  const Grabber grabber(OpenFrameSource({server.Url()}));
   EXPECT_TRUE(Within(milliseconds(3000), [&] { return server.connections() >= 2; }));
   const int before = server.connections();
   std::this_thread::sleep_for(milliseconds(600));
@@ -166,7 +166,7 @@ TEST(MjpegSource, AServerThatRefusesIsNotBesieged) {
 
 TEST(MjpegSource, AServerThatFallsSilentIsConnectedAgain) {
   const Server server(kStream + Part(Jpeg()), false);
-  Grabber grabber(OpenFrameSource(server.Url(), 20.0));
+  Grabber grabber(OpenFrameSource({server.Url()}));
   int pictures = 0;
   EXPECT_TRUE(Within(milliseconds(5000), [&] {
     pictures += grabber.Take().has_value();
@@ -202,7 +202,7 @@ TEST(MjpegSource, ARefusedConnectionSaysWhy) {
     const Server server("", true);
     url = server.Url();
   }
-  const auto source = OpenFrameSource(url, 20.0);
+  const auto source = OpenFrameSource({url});
   EXPECT_FALSE(source->Next());
   EXPECT_NE(source->Problem().find("Connection refused"), std::string::npos) << source->Problem();
 }
@@ -215,7 +215,7 @@ TEST(VideoSource, AStreamThatEndedIsOpenedAgain) {
     ASSERT_TRUE(writer.isOpened());
     for (int k = 0; k < 3; ++k) writer.write(cv::Mat(48, 64, CV_8UC3, cv::Scalar::all(50)));
   }
-  const auto source = OpenFrameSource("file://" + file.string(), 20.0);
+  const auto source = OpenFrameSource({"file://" + file.string()});
   ASSERT_FALSE(source->IsRecording());
   for (int k = 0; k < 3; ++k) ASSERT_TRUE(source->Next()) << k;
   EXPECT_FALSE(source->Next());

@@ -10,6 +10,7 @@
 #include "services/camera/frame_source.h"
 #include "services/camera/image.h"
 #include "services/camera/multipart.h"
+#include "services/camera/pace.h"
 
 namespace chase::camera {
 namespace {
@@ -25,11 +26,42 @@ fs::path FreshFolder(const std::string& name) {
 
 std::string ErrorOf(const std::string& source) {
   try {
-    OpenFrameSource(source, 20.0);
+    OpenFrameSource({source});
   } catch (const std::runtime_error& e) {
     return e.what();
   }
   return "";
+}
+
+// Half of a camera's 30 Hz would be 15.
+TEST(CameraPace, PublishesTheRateWhateverTheCamerasIs) {
+  for (const double camera : {10.0, 20.0, 25.0, 30.0, 59.0, 60.0, 120.0}) {
+    Pace pace(50'000);
+    int taken = 0;
+    int64_t last = 0, longest = 0;
+    for (int k = 0; k < static_cast<int>(60.0 * camera); ++k) {
+      const int64_t utime = 1'700'000'000'000'000 + static_cast<int64_t>(1e6 * k / camera) +
+                            (k * 7919) % 4000;  // of jitter
+      if (!pace.Take(utime)) continue;
+      if (++taken > 1) longest = std::max(longest, utime - last);
+      last = utime;
+    }
+    EXPECT_NEAR(taken / 60.0, std::min(camera, 20.0), 0.1) << camera;
+    EXPECT_LE(longest, static_cast<int64_t>(1e6 * std::max(0.1, 1.0 / camera)) + 4000) << camera;
+  }
+}
+
+TEST(CameraPace, GoesOnAfterAPauseAndOnAnotherClock) {
+  Pace pace(50'000);
+  int64_t t = 1'700'000'000'000'000;
+  EXPECT_TRUE(pace.Take(t));
+  EXPECT_FALSE(pace.Take(t + 33'000));
+  t += 9'000'000;
+  int taken = 0;
+  for (int k = 0; k < 30; ++k) taken += pace.Take(t + 33'333 * k);
+  EXPECT_NEAR(taken, 21, 1) << "what was missed is not caught up with";
+  pace.Restart();
+  EXPECT_TRUE(pace.Take(1'000'000));
 }
 
 TEST(CameraImage, ChannelsComeOutAsRgb) {
@@ -66,7 +98,7 @@ TEST(CameraSource, AFolderGivesItsImagesByName) {
                 cv::Mat(8, 8, CV_8UC3, cv::Scalar::all(50 * k)));
   std::ofstream(folder / "notes.txt") << "not an image";
   std::ofstream(folder / "frame_1b.png") << "broken";
-  const auto source = OpenFrameSource(folder.string(), 20.0);
+  const auto source = OpenFrameSource({folder.string()});
   EXPECT_TRUE(source->IsRecording());
   for (int k = 0; k < 3; ++k) {
     const auto frame = source->Next();
@@ -82,7 +114,7 @@ TEST(CameraSource, AVideoGivesAllItsFrames) {
   ASSERT_TRUE(writer.isOpened());
   for (int k = 0; k < 5; ++k) writer.write(cv::Mat(48, 64, CV_8UC3, cv::Scalar::all(40 * k)));
   writer.release();
-  const auto source = OpenFrameSource(file, 20.0);
+  const auto source = OpenFrameSource({file});
   for (int k = 0; k < 5; ++k) {
     const auto frame = source->Next();
     ASSERT_TRUE(frame);

@@ -116,7 +116,7 @@ std::optional<camera::Grabber::Grabbed> Wait(camera::Grabber* grabber,
 
 TEST(Drivers, AStreamedFrameCarriesItsCaptureTime) {
   simulator::MjpegServer server(kPort, 95);
-  camera::Grabber grabber(camera::OpenFrameSource("http://127.0.0.1:38090/stream", 20.0));
+  camera::Grabber grabber(camera::OpenFrameSource({"http://127.0.0.1:38090/stream"}));
   for (int k = 1; k <= 5; ++k) {
     const int64_t captured = bus::WallMicroseconds() - 30'000 - k;
     std::optional<camera::Grabber::Grabbed> taken;
@@ -137,7 +137,7 @@ TEST(Drivers, AStreamedFrameCarriesItsCaptureTime) {
 
 TEST(Drivers, ACameraThatIsUnpluggedIsFoundAgain) {
   auto server = std::make_unique<simulator::MjpegServer>(kPort, 95);
-  camera::Grabber grabber(camera::OpenFrameSource("http://127.0.0.1:38090/stream", 20.0));
+  camera::Grabber grabber(camera::OpenFrameSource({"http://127.0.0.1:38090/stream"}));
   const auto see = [&] {
     for (int i = 0; i < 100; ++i) {
       server->Send(Grey(100), bus::WallMicroseconds());
@@ -157,7 +157,7 @@ TEST(Drivers, ACameraThatIsUnpluggedIsFoundAgain) {
 
 TEST(Drivers, OfFramesThatNobodyFetchedTheNewestIsKept) {
   simulator::MjpegServer server(kPort, 95);
-  camera::Grabber grabber(camera::OpenFrameSource("http://127.0.0.1:38090/stream", 20.0));
+  camera::Grabber grabber(camera::OpenFrameSource({"http://127.0.0.1:38090/stream"}));
   server.Send(Grey(10), bus::WallMicroseconds());
   for (int i = 0; i < 200 && !Wait(&grabber, &server); ++i)
     server.Send(Grey(10), bus::WallMicroseconds());
