@@ -7,11 +7,12 @@ import subprocess
 import sys
 
 import bus
+import devices
 import places
 import vehicle
 import version
+from devices import FAILURE, OK, WARNING
 
-OK, WARNING, FAILURE = "ok", "warning", "FAILURE"
 FREE_SPACE = 5e9  # bytes: a build and a few minutes of flight
 
 
@@ -123,8 +124,8 @@ def judged(check):
     return (FAILURE, problem) if problem else (OK, text)
 
 
-HERE = ([(name, lambda check=check: judged(check)) for name, check in vehicle.CHECKS] if places.INSTALLED
-        else [("packages", packages)])
+HERE = ([(name, lambda check=check: judged(check)) for name, check in vehicle.CHECKS] + devices.CHECKS
+        if places.INSTALLED else [("packages", packages)])
 CHECKS = [*HERE, ("receive buffer", receive_buffer),
           ("default buffer", default_buffer), ("multicast", multicast),
           ("cross talk", cross_talk), ("clock source", clock_source), ("time", time_service),

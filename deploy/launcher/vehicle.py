@@ -28,6 +28,10 @@ def flies():
     return booted() and run("systemctl", "is-active", "chase.target").stdout.strip() == "active"
 
 
+def runs(name):
+    return booted() and run("systemctl", "is-active", f"chase-{name}").stdout.strip() in ("active", "activating")
+
+
 def user():
     try:
         pwd.getpwnam("chase")
@@ -45,12 +49,20 @@ def programs():
     return "", f"{len(rows())} start, {answer.stdout.strip()}"
 
 
+def file_of(name):
+    return CONFIGURATION / f"{name}.yaml"
+
+
+def dumped(name):
+    """What the process would go by."""
+    return run(places.BIN / f"chase-{name}", "--config", file_of(name), "--dump-config")
+
+
 def configuration():
     for row in rows():
-        file = CONFIGURATION / f"{row['name']}.yaml"
-        answer = run(places.BIN / row["binary"], "--config", file, "--dump-config")
+        answer = dumped(row["name"])
         if answer.returncode:
-            return f"{answer.stderr.strip()}; cure: mend {file}", ""
+            return f"{answer.stderr.strip()}; cure: mend {file_of(row['name'])}", ""
     return "", f"the {len(rows())} files of {CONFIGURATION} are read"
 
 

@@ -15,11 +15,13 @@ import tempfile
 import textwrap
 import time
 import unittest
+import unittest.mock
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "deploy" / "launcher"))
 
 import bus  # noqa: E402
+import devices  # noqa: E402
 import doctor  # noqa: E402
 import fly  # noqa: E402
 import places  # noqa: E402
@@ -543,6 +545,49 @@ class Bus(unittest.TestCase):
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
             taken.bind(("", 0))
             self.assertIn("taken", bus.loopback_problem(GROUP, taken.getsockname()[1]))
+
+
+class Devices(unittest.TestCase):
+    """The doctor on what the drivers are told to open."""
+
+    def told(self, name, **values):
+        with unittest.mock.patch.object(devices, "parameters", lambda _: values):
+            return dict(devices.CHECKS)[name]()
+
+    def test_a_port_that_another_program_holds(self):
+        for name, kind, more in (("lidar", socket.SOCK_DGRAM, {"source": "udp"}), ("fcu", socket.SOCK_DGRAM, {"link": "udp"}),
+                                 ("link", socket.SOCK_DGRAM, {}), ("viewer", socket.SOCK_STREAM, {})):
+            with socket.socket(socket.AF_INET, kind) as other, unittest.mock.patch.object(devices.vehicle, "runs", lambda _: False):
+                other.bind(("", 0))
+                if kind == socket.SOCK_STREAM:
+                    other.listen()
+                port = str(other.getsockname()[1])
+                verdict, words = self.told(name, port=port, **more)
+                self.assertEqual(verdict, "FAILURE", name)
+                self.assertRegex(words, f"port {port} is held by another program; cure: ")
+                with unittest.mock.patch.object(devices.vehicle, "runs", lambda _: True):
+                    self.assertEqual(self.told(name, port=port, **more)[0], "ok", name)
+            self.assertEqual(self.told(name, port=port, **more)[0], "ok", name)
+
+    def test_a_device_that_is_not_there_or_not_for_the_units(self):
+        for name, key in (("fcu", "link"), ("camera", "source")):
+            verdict, words = self.told(name, **{key: "/dev/no_such"})
+            self.assertEqual(verdict, devices.WARNING)
+            self.assertIn("/dev/no_such is not there; cure: plug it in", words)
+            self.assertEqual(self.told(name, **{key: "/dev/null"})[0], "ok")
+        with tempfile.NamedTemporaryFile() as file:  # for its owner alone
+            verdict, words = devices.device(file.name)
+            self.assertEqual(verdict, devices.WARNING)
+            self.assertRegex(words, "the units have video and dialout; cure: ")
+        self.assertEqual(self.told("camera", source="http://camera/stream")[0], "ok")
+        self.assertEqual(self.told("camera", source="no_such.mp4")[0], devices.WARNING)
+
+    def test_parameters_are_the_files(self):
+        answer = unittest.mock.Mock(stdout='link: "/dev/ttyAMA0"  # udp, or\nport: 14540  # UDP\nrig:  # a\n  x: 1  # m\n')
+        with unittest.mock.patch.object(devices.vehicle, "dumped", lambda _: answer):
+            self.assertEqual(devices.parameters("fcu"), {"link": "/dev/ttyAMA0", "port": "14540"})
+        with unittest.mock.patch.object(devices.vehicle, "dumped", lambda _: unittest.mock.Mock(stdout="")):
+            self.assertRegex(devices.checked(devices.fcu)[1], "fcu.yaml is not read; see configuration")
 
 
 class Results(unittest.TestCase):
