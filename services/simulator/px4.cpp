@@ -19,7 +19,6 @@ constexpr double kLatest = 1e17;          // us, 3000 years: stamps beyond are n
 constexpr int64_t kBoot = 12'345'678;     // us
 constexpr double kStreamBefore = 1.0;     // s of setpoints before OFFBOARD
 constexpr double kSlowest = 0.5;          // s between setpoints of a stream: 2 Hz
-constexpr double kStill = 0.5;            // s after which it takes itself to have landed
 constexpr float kForce = 21196.0f;        // param2 of arming and disarming
 constexpr int64_t kOffsetMemory = 8;      // answers of TIMESYNC over which the offset is averaged
 constexpr int64_t kLongestTrip = 10'000;  // us; answers that took longer are no measure
@@ -242,7 +241,7 @@ uint8_t Px4::Arm(bool on, bool forced) {
     return Code(mav::MavResult::TEMPORARILY_REJECTED);
   }
   armed_ = true;
-  has_flown_ = drained_ = false;
+  has_flown_ = drained_ = unmanned_ = false;
   ++seen_.times_armed;
   return Code(mav::MavResult::ACCEPTED);
 }
@@ -262,54 +261,13 @@ void Px4::Reboot(int64_t utime) {
   vision_sender_ = {};
 }
 
-/// What keeps it from arming; empty: nothing.
-std::string Px4::Health() const {
-  if (!options_.preflight.empty()) return options_.preflight;
-  if (body_.charge <= options_.bat_emergen_thr) return "low battery";
-  return mode_ == mavlink::kOffboardMode && !Streamed() ? "No offboard signal" : "";
-}
-
-/// Which check fails is said when it changes; a refusal does not repeat it.
-void Px4::WatchHealth() {
-  const std::string problem = armed_ ? "" : Health();
-  if (!problem.empty() && problem != said_) Say("Preflight Fail: " + problem, 2);
-  said_ = problem;
-}
-
-void Px4::WatchStream() {
-  if (!armed_ || drained_ || !(intended_ == mavlink::kOffboardMode)) return;
-  const bool lost = !StreamAlive();
-  if (lost && !failsafe_) {
-    Enter(options_.loss_lands ? mavlink::kLandMode : mavlink::kHoldMode);
-    intended_ = mavlink::kOffboardMode;  // it returns by itself when the stream does
-    Say("No offboard signal, failsafe", 1);
-  }
-  if (!lost) mode_ = mavlink::kOffboardMode;
-  failsafe_ = lost;
-}
-
-void Px4::WatchBattery() {
-  if (!armed_ || drained_ || body_.charge > options_.bat_emergen_thr) return;
-  Enter(mavlink::kLandMode);
-  drained_ = failsafe_ = true;
-  Say("Emergency battery level, land immediately", 0);
-}
-
-void Px4::WatchLanding() {
-  const bool still = body_.touches && body_.thrust < kGravity;
-  if (!still) down_since_ = now_;
-  landed_ = !armed_ || Seconds(down_since_, now_) > kStill;
-  if (!landed_) landed_since_ = now_, has_flown_ = has_flown_ || !body_.touches;
-  if (armed_ && landed_ && has_flown_ && Seconds(landed_since_, now_) > options_.com_disarm_land)
-    armed_ = false;
-}
-
 void Px4::Tick(int64_t utime, int64_t clock, const Px4Body& body) {
   now_ = std::max(now_, utime);
   body_ = body;
   if (!own_mode_.Holds(body)) own_mode_ = OwnMode(body);
   WatchHealth();
   WatchStream();
+  WatchTransmitter();
   WatchBattery();
   if (!armed_) failsafe_ = false;
   WatchLanding();

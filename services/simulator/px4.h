@@ -17,6 +17,9 @@ namespace chase::simulator {
 /// Parameters of PX4 by their own names, and what a test may break.
 struct Px4Options {
   double com_of_loss_t = 1.0;       ///< s without setpoints until OFFBOARD is left
+  double com_fail_act_t = 0.0;      ///< s in Hold before it does what a lost stream asks for
+  double com_rc_loss_t = 0.5;       ///< s without a transmitter after which it lands
+  bool transmitter = false;         ///< a receiver hears one
   double com_disarm_land = 2.0;     ///< s on the ground after landing until it disarms
   bool loss_lands = true;           ///< COM_OBL_RC_ACT: land, otherwise hold
   double hover = 0.5;               ///< share of full thrust that balances gravity
@@ -50,6 +53,7 @@ class Px4 {
 
   void PilotMode(mavlink::Mode mode) { Enter(mode); }
   void PilotArms(bool on) { armed_ = on; }
+  void PilotSticks(double deflection);  ///< of the farthest, 0 to 1
   void Reboot(int64_t utime);
   Px4Options& options() { return options_; }
 
@@ -95,6 +99,7 @@ class Px4 {
   void WatchHealth();
   std::string Health() const;
   void WatchStream();
+  void WatchTransmitter();
   void WatchBattery();
   void WatchLanding();
   AttitudeSetpoint OffboardDemand(const Px4Body& body) const;
@@ -127,6 +132,9 @@ class Px4 {
   Sender vision_sender_{};            // of the last ODOMETRY
   mavlink::Mode mode_, intended_;
   bool armed_ = false, failsafe_ = false, landed_ = true, has_flown_ = false, drained_ = false;
+  bool unmanned_ = false;  // it lands for want of a transmitter
+  std::optional<int64_t> transmitter_heard_;
+  int64_t failsafe_since_ = 0;
   int64_t first_setpoint_ = 0, last_setpoint_ = 0, landed_since_ = 0, down_since_ = 0;
   std::optional<int64_t> flown_by_;  // arrival of the newest setpoint that it flew by
   std::string said_;                 // the check that fails, as last said

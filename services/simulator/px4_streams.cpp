@@ -19,11 +19,15 @@ uint8_t Code(mav::MavResult r) { return static_cast<uint8_t>(r); }
 
 /// All that it can send: on a companion link before anything is asked for, us.
 const std::map<uint32_t, int64_t>& Px4::DefaultIntervals() {
-  static const std::map<uint32_t, int64_t> intervals = {
-      {mav::Heartbeat::kId, 1'000'000},        {mav::HighresImu::kId, 20'000},
-      {mav::AttitudeQuaternion::kId, 20'000},  {mav::LocalPositionNed::kId, 100'000},
-      {mav::ExtendedSysState::kId, 1'000'000}, {mav::SysStatus::kId, 1'000'000},
-      {mav::BatteryStatus::kId, kNone},        {mav::Timesync::kId, 100'000}};
+  static const std::map<uint32_t, int64_t> intervals = {{mav::Heartbeat::kId, 1'000'000},
+                                                        {mav::HighresImu::kId, 20'000},
+                                                        {mav::AttitudeQuaternion::kId, 20'000},
+                                                        {mav::LocalPositionNed::kId, 100'000},
+                                                        {mav::ExtendedSysState::kId, 1'000'000},
+                                                        {mav::SysStatus::kId, 1'000'000},
+                                                        {mav::BatteryStatus::kId, kNone},
+                                                        {mav::Timesync::kId, 100'000},
+                                                        {mav::RcChannels::kId, kNone}};
   return intervals;
 }
 
@@ -35,7 +39,8 @@ uint8_t Px4::SetInterval(const mav::CommandLong& m) {
                      (interval >= 0.0 || interval == -1.0);  // all false for NaN
   if (!sound) return Code(mav::MavResult::DENIED);
   const auto usual = DefaultIntervals().find(static_cast<uint32_t>(number));
-  if (usual == DefaultIntervals().end() || usual->first == mav::Heartbeat::kId)
+  if (usual == DefaultIntervals().end() || usual->first == mav::Heartbeat::kId ||
+      (usual->first == mav::RcChannels::kId && !options_.transmitter))
     return Code(mav::MavResult::FAILED);
   int64_t& now = intervals_[usual->first];
   now = interval < 0.0    ? kNone
@@ -114,6 +119,13 @@ void Px4::StreamState() {
     mav::SysStatus m;
     m.voltage_battery = static_cast<uint16_t>(14'000.0 + 2'800.0 * body_.charge);  // four cells
     m.battery_remaining = percent;
+    Send(m);
+  }
+  if (options_.transmitter && Due(mav::RcChannels::kId)) {
+    mav::RcChannels m;
+    m.chancount = 8;
+    m.chan1_raw = m.chan2_raw = m.chan3_raw = m.chan4_raw = 1500;
+    m.rssi = 100;
     Send(m);
   }
   if (Due(mav::BatteryStatus::kId)) {

@@ -364,6 +364,54 @@ TEST(FcuBridge, LinkLossEndsInALatchedFailsafe) {
   EXPECT_NE(flight.bridge.Words().find("the link was cut"), std::string::npos);
 }
 
+TEST(FcuBridge, TheSticksTakeItAndALostTransmitterLands) {
+  StandInOptions options;
+  options.transmitter = true;
+  Flight sticks(options);
+  ASSERT_TRUE(sticks.RunUntil(State::kFlying, 12.0));
+  sticks.Run(3.0);
+  EXPECT_NE(sticks.bridge.Words().find("receiver heard"), std::string::npos);
+  sticks.px4.PilotSticks(0.2);
+  sticks.Run(1.5);
+  EXPECT_EQ(sticks.bridge.handshake().state(), State::kFlying) << "not far enough";
+  sticks.px4.PilotSticks(0.6);
+  EXPECT_TRUE(sticks.RunUntil(State::kPilot, 1.1)) << sticks.bridge.Words();
+  const int sent = sticks.px4.seen().setpoints;
+  sticks.Run(10.0);
+  EXPECT_EQ(sticks.px4.seen().setpoints, sent);
+  EXPECT_TRUE(sticks.px4.mode() == (Mode{3, 0}));
+
+  Flight lost(options);
+  ASSERT_TRUE(lost.RunUntil(State::kFlying, 12.0));
+  lost.Run(3.0);
+  lost.px4.options().transmitter = false;
+  EXPECT_TRUE(lost.RunUntil(State::kFailsafe, 2.0)) << lost.bridge.Words();
+  EXPECT_NE(lost.bridge.Words().find("Manual control lost"), std::string::npos);
+  lost.Run(10.0);
+  EXPECT_FALSE(lost.px4.armed()) << "landed, though setpoints come";
+}
+
+// COM_FAIL_ACT_T as PX4 has it: it holds, then lands; no stream ends either.
+TEST(FcuBridge, AHoldBeforeTheLandingIsAFailsafeToo) {
+  StandInOptions options;
+  options.com_fail_act_t = 5.0;
+  Flight flight(options);
+  ASSERT_TRUE(flight.RunUntil(State::kFlying, 12.0));
+  flight.Run(5.0);
+  flight.link = false;
+  flight.Run(2.0);
+  EXPECT_TRUE(flight.px4.mode() == mavlink::kHoldMode);
+  flight.link = true;
+  const int sent = flight.px4.seen().setpoints;
+  flight.Run(3.0);
+  EXPECT_TRUE(flight.px4.mode() == mavlink::kHoldMode) << flight.bridge.Words();
+  flight.Run(3.0);
+  EXPECT_TRUE(flight.px4.mode() == kLandMode) << flight.bridge.Words();
+  flight.Run(10.0);
+  EXPECT_FALSE(flight.px4.armed());
+  EXPECT_EQ(flight.px4.seen().setpoints, sent);
+}
+
 // Either it never was in a failsafe, or no setpoint ended that.
 TEST(FcuBridge, ACutOfAnyLengthIsBornOrLatched) {
   for (int ms = 100; ms <= 1600; ms += 50) {

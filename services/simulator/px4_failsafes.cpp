@@ -1,0 +1,78 @@
+// What the autopilot does of its own accord: checks before arming, failsafes, landing.
+#include "common/mavlink/px4_mode.h"
+#include "services/simulator/px4.h"
+
+namespace chase::simulator {
+namespace {
+
+constexpr double kStill = 0.5;          // s after which it takes itself to have landed
+constexpr double kStickOverride = 0.3;  // COM_RC_STICK_OV, of full deflection
+
+double Seconds(int64_t from, int64_t to) { return 1e-6 * static_cast<double>(to - from); }
+
+}  // namespace
+
+/// What keeps it from arming; empty: nothing.
+std::string Px4::Health() const {
+  if (!options_.preflight.empty()) return options_.preflight;
+  if (body_.charge <= options_.bat_emergen_thr) return "low battery";
+  return mode_ == mavlink::kOffboardMode && !Streamed() ? "No offboard signal" : "";
+}
+
+/// Which check fails is said when it changes; a refusal does not repeat it.
+void Px4::WatchHealth() {
+  const std::string problem = armed_ ? "" : Health();
+  if (!problem.empty() && problem != said_) Say("Preflight Fail: " + problem, 2);
+  said_ = problem;
+}
+
+void Px4::WatchStream() {
+  if (!armed_ || drained_ || !(intended_ == mavlink::kOffboardMode)) return;
+  const bool lost = !StreamAlive();
+  if (lost && !failsafe_) {
+    Enter(mavlink::kHoldMode);
+    intended_ = mavlink::kOffboardMode;  // it returns by itself when the stream does
+    failsafe_since_ = now_;
+    Say("No offboard signal, failsafe", 1);
+  }
+  if (lost && options_.loss_lands && Seconds(failsafe_since_, now_) >= options_.com_fail_act_t)
+    mode_ = mavlink::kLandMode;
+  if (!lost) mode_ = mavlink::kOffboardMode;
+  failsafe_ = lost;
+}
+
+/// NAV_RCL_ACT 3. Where a receiver never heard one, none is missed (COM_RC_IN_MODE 4).
+void Px4::WatchTransmitter() {
+  const bool lost =
+      transmitter_heard_ && Seconds(*transmitter_heard_, now_) > options_.com_rc_loss_t;
+  if (options_.transmitter) transmitter_heard_ = now_;
+  if (!armed_ || unmanned_ || drained_ || !lost) return;
+  Enter(mavlink::kLandMode);
+  unmanned_ = failsafe_ = true;
+  Say("Manual control lost, failsafe", 1);
+}
+
+/// COM_RC_OVERRIDE, bit 1: not in a failsafe.
+void Px4::PilotSticks(double deflection) {
+  if (options_.transmitter && deflection > kStickOverride && !failsafe_ &&
+      mode_ == mavlink::kOffboardMode)
+    Enter(mavlink::kPositionMode);
+}
+
+void Px4::WatchBattery() {
+  if (!armed_ || drained_ || body_.charge > options_.bat_emergen_thr) return;
+  Enter(mavlink::kLandMode);
+  drained_ = failsafe_ = true;
+  Say("Emergency battery level, land immediately", 0);
+}
+
+void Px4::WatchLanding() {
+  const bool still = body_.touches && body_.thrust < kGravity;
+  if (!still) down_since_ = now_;
+  landed_ = !armed_ || Seconds(down_since_, now_) > kStill;
+  if (!landed_) landed_since_ = now_, has_flown_ = has_flown_ || !body_.touches;
+  if (armed_ && landed_ && has_flown_ && Seconds(landed_since_, now_) > options_.com_disarm_land)
+    armed_ = false;
+}
+
+}  // namespace chase::simulator
