@@ -151,7 +151,8 @@ bool Handshake::streams() const {
 }
 
 bool Handshake::needs_word() const {
-  return gap_found_ != 0 || (state_ == State::kLanding && !Told(since_));
+  return gap_found_ != 0 || state_ == State::kOffboard || state_ == State::kArming ||
+         (state_ == State::kLanding && !Told(since_));
 }
 
 void Handshake::WatchGap() {

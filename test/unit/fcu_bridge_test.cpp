@@ -49,6 +49,17 @@ TEST(FcuBridge, TakesOffHoversLandsAndDisarms) {
   EXPECT_EQ(flight.px4.seen().times_armed, 1);
 }
 
+// Heartbeats come once a second, the mode and the arming would be known by them.
+TEST(FcuBridge, EngagesWithinAMomentOfTheStream) {
+  for (uint64_t seed = 1; seed <= 5; ++seed) {
+    Flight flight({}, {}, seed);
+    flight.setpoints = false;
+    flight.Run(7.0 + 0.2 * static_cast<double>(seed));
+    flight.setpoints = true;
+    EXPECT_LT(Took(&flight, "from the first setpoint to flight", 5.0, State::kFlying), 1.6);
+  }
+}
+
 TEST(FcuBridge, SendsItsStreamsAtTheirRates) {
   Flight flight;
   ASSERT_TRUE(flight.RunUntil(State::kFlying, 12.0));
