@@ -243,29 +243,34 @@ std::vector<world::Obstacle> Mapper::Statics(const Eigen::Vector3d& origin, doub
   for (const auto& cell : cells) grid_.Touch(cell.x, cell.y).piece = cell.piece;
   std::vector<world::Obstacle> obstacles;
   for (const auto& piece : pieces) {
-    world::Obstacle o = Upright(piece, t);
+    world::Obstacle o = Upright(piece.id, piece.outline, t);
+    SetSolid(piece, config_.statics.semi_height, &o);
     if (PlanDistance(o, origin) <= config_.statics.radius && o.shape.allFinite())
       obstacles.push_back(std::move(o));
+  }
+  // Until it is known how they move they are listed where they are.
+  for (const Track* track : tracker_.Unconfirmed()) {
+    world::Obstacle o = Upright(track->id, track->Outline(), t);
+    if (PlanDistance(o, origin) <= config_.statics.radius) obstacles.push_back(std::move(o));
   }
   return obstacles;
 }
 
 /// Through the flight volume.
-world::Obstacle Mapper::Upright(const Piece& piece, double t) {
+world::Obstacle Mapper::Upright(int id, const Ellipse& outline, double t) {
   const StaticConfig& c = config_.statics;
   const double half_band = 0.5 * (c.band_high - c.band_low);
   // The ellipsoid's section must hold the outline at both ends of the flight volume.
   const double grow = 1.0 / std::sqrt(1.0 - std::pow(half_band / c.semi_height, 2));
   world::Obstacle o;
-  o.id = piece.id;
+  o.id = id;
   Eigen::Vector3d center;
-  center << piece.outline.center,
-      ground_.Height(piece.outline.center.x(), piece.outline.center.y()) + c.band_low + half_band;
+  center << outline.center,
+      ground_.Height(outline.center.x(), outline.center.y()) + c.band_low + half_band;
   o.center = world::Trajectory::Constant(center, t, config_.movers.horizon);
   o.shape.setZero();
-  o.shape.topLeftCorner<2, 2>() = piece.outline.Scaled(grow).shape;
+  o.shape.topLeftCorner<2, 2>() = outline.Scaled(grow).shape;
   o.shape(2, 2) = 1.0 / (c.semi_height * c.semi_height);
-  SetSolid(piece, c.semi_height, &o);
   return o;
 }
 
@@ -291,8 +296,8 @@ std::vector<world::Obstacle> Mapper::Unseen(const Eigen::Vector3d& origin, doubl
   for (const auto& cell : cells) unseen_pieces_[{cell.x, cell.y}] = cell.piece;
   std::vector<world::Obstacle> unseen;
   for (const auto& piece : pieces) {
-    world::Obstacle o = Upright(piece, t);
-    o.id += kFirstUnseen;
+    world::Obstacle o = Upright(kFirstUnseen + piece.id, piece.outline, t);
+    SetSolid(piece, config_.statics.semi_height, &o);
     if (o.shape.allFinite()) unseen.push_back(std::move(o));
   }
   return unseen;

@@ -66,7 +66,7 @@ class Mapper {
   bool ColumnExtent(const VoxelGrid::Column& column, Extent* extent);
   std::vector<world::Obstacle> Statics(const Eigen::Vector3d& origin, double t, int* dropped);
   std::vector<world::Obstacle> Unseen(const Eigen::Vector3d& origin, double t);
-  world::Obstacle Upright(const Piece& piece, double t);
+  world::Obstacle Upright(int id, const Ellipse& outline, double t);
   void StopAtWalls(world::Obstacle* mover);
   void SetTree(int most);
 

@@ -16,7 +16,7 @@ constexpr double kReach = 0.125;     // m, the same where returns are divided: f
 constexpr double kPlace = 0.25;      // m, of a place where they are: two are within four of these
 constexpr double kTentativeAge = 0.8;  // s after which an unconfirmed track does not count
 constexpr double kRestSpeed = 0.25;    // m/s
-constexpr double kHandOver = 0.3;      // s, at rest, until the static map holds it for sure
+constexpr double kHandOver = 0.3;      // s, from then on, until the static map holds it for sure
 constexpr double kSure = 2.5;          // standard deviations of a speed that is one
 constexpr double kLeastSpread = 0.12;  // m, of a reach when clusters are assigned
 constexpr int kFewestEnds = 3;         // directions with an end in view that tell of a body
@@ -232,6 +232,15 @@ const Track* Tracker::Find(int id) const {
 bool Tracker::Moves(int id) const {
   const Track* track = Find(id);
   return track && (track->confirmed ? !Rests(*track) : t_ - track->born < kTentativeAge);
+}
+
+std::vector<const Track*> Tracker::Unconfirmed() const {
+  std::vector<const Track*> unconfirmed;
+  for (const auto& track : tracks_)
+    if (!track.confirmed && track.existence >= kListed &&
+        t_ - track.born < kTentativeAge + kHandOver)
+      unconfirmed.push_back(&track);
+  return unconfirmed;
 }
 
 std::vector<world::Obstacle> Tracker::Obstacles(double middle, double semi_height,

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <tuple>
+#include <utility>
 
 namespace chase::mapping_stage {
 
@@ -21,6 +22,7 @@ constexpr double kForgotten = 2.0;   // s out of view after which it is judged a
 constexpr double kMatch = 0.5;       // m, and two deviations, from a walker to what stands for it
 constexpr double kBar = 0.3;         // m/s, m and s: velocity error, extent, reversal
 constexpr double kGap = 0.2;         // s
+constexpr double kHeld = 0.1;        // m beyond an obstacle: noise of a sweep
 constexpr double kSweep = 0.1;       // s
 constexpr double kBeside = 2.0;      // m from the target's centre to the walker's
 constexpr double kBlindRange = 0.5;  // m, of the sensor
@@ -44,6 +46,7 @@ double LongestSemiAxis(const Obstacle& o) {
 void WalkerFigures::Add(const WalkerFigures& o) {
   for (const auto& [to, from] : {std::pair{&listed, &o.listed},
                                  {&any_time, &o.any_time},
+                                 {&held, &o.held},
                                  {&fast, &o.fast},
                                  {&slim, &o.slim},
                                  {&one_id, &o.one_id},
@@ -59,6 +62,7 @@ void WalkerFigures::Add(const WalkerFigures& o) {
   Append(o.velocity, &velocity);
   Append(o.axis, &axis);
   Append(o.acquired, &acquired);
+  Append(o.bare, &bare);
   Append(o.ms, &ms);
   phantoms += o.phantoms, sweeps += o.sweeps, target_blocked += o.target_blocked;
 }
@@ -105,6 +109,34 @@ void WalkerJudge::EndSighting(Walker* w) {
   w->ids.clear();
   w->seen_near = false;
   w->began = w->listed = -1.0;
+}
+
+/// Held: the middle of its returns is within or next to an obstacle of any kind.
+void WalkerJudge::JudgeHeld(const Shot& shot, const mapping::ObstacleList& list, size_t k) {
+  const double t = shot.sweep.t;
+  const auto& truth = shot.movers[k];
+  Eigen::Vector3d seen = Eigen::Vector3d::Zero();
+  double age = 0.0;
+  int hits = 0;
+  for (const auto& hit : shot.hits)
+    if (hit.mover == static_cast<int>(k)) seen += hit.point, age += t - hit.t, ++hits;
+  Walker& w = walkers_[k];
+  const bool judged =
+      hits >= kViewHits && (truth.solid.center - shot.place).head<2>().norm() <= kNear;
+  if (judged) seen /= hits, age /= hits;
+  const bool held =
+      judged && std::any_of(list.obstacles.begin(), list.obstacles.end(), [&](const Obstacle& o) {
+        const Eigen::Vector3d d =
+            seen + (o.moving ? age : 0.0) * truth.velocity - o.center.Position(t);
+        return !o.ground && d.dot(world::Inflated(o.shape, kHeld) * d) <= 1.0;
+      });
+  if (judged) figures.held.Add(held);
+  if (judged && !held) w.bare += kSweep;
+  if (trace_ && judged && !held)
+    fmt::print("{:7.2f} walker {} BARE range {:.1f} hits {} speed {:.2f} beside {:.1f}\n", t, k + 1,
+               (truth.solid.center - shot.place).head<2>().norm(), hits, truth.velocity.norm(),
+               (truth.solid.center - shot.true_target.center).head<2>().norm());
+  if (w.bare > 0.0 && (!judged || held)) figures.bare.push_back(std::exchange(w.bare, 0.0));
 }
 
 /// An interval counts when the walker was listed in the sweep before it; what follows within
@@ -235,7 +267,10 @@ void WalkerJudge::Add(const Shot& shot, const mapping::ObstacleList& list) {
   for (const auto& hit : shot.hits)
     if (hit.mover >= 0) ++hits[static_cast<size_t>(hit.mover)];
   const auto of = Match(shot, list);
-  for (size_t k = 0; k < shot.movers.size(); ++k) Follow(shot, k, hits[k], of[k]);
+  for (size_t k = 0; k < shot.movers.size(); ++k) {
+    Follow(shot, k, hits[k], of[k]);
+    JudgeHeld(shot, list, k);
+  }
 }
 
 void WalkerJudge::Close() {

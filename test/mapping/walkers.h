@@ -20,6 +20,7 @@ struct Share {
 struct WalkerFigures {
   Share listed;    ///< sweeps in view, from 1 s after it was first in view and walked
   Share any_time;  ///< the same from the first such sweep on
+  Share held;      ///< sweeps in view, walking or standing, with what is seen of it in any obstacle
   Share fast;      ///< velocity error of at most 0.3 m/s, from 0.3 s after each change of velocity
   Share slim;      ///< longest semi-axis at most 0.3 m more than the true one
   Share one_id;    ///< sightings with one id
@@ -32,6 +33,7 @@ struct WalkerFigures {
   Share velocity_honest, center_honest;  ///< errors within the published 95 %, in view
   std::vector<double> velocity, axis;    ///< errors, m/s and m
   std::vector<double> acquired;          ///< s from first in view to first listed
+  std::vector<double> bare;              ///< s in view without being held, one after the other
   long phantoms = 0, sweeps = 0;         ///< sweeps that list a mover farther than 1 m from any
   long target_blocked = 0;               ///< sweeps with the target's centre inside a mover
   std::vector<double> ms;                ///< of a sweep
@@ -63,6 +65,7 @@ class WalkerJudge {
     double listed = -1.0;     ///< s, first listed since it began
     bool was_listed = false;  ///< in the sweep before
     bool seen_near = false;   ///< within 6 m since it began
+    double bare = 0.0;        ///< s in view within 6 m without being held, until now
     std::set<int> ids;        ///< in view within 6 m, since it began
     Eigen::Vector2d v = Eigen::Vector2d::Zero(), before = Eigen::Vector2d::Zero();
     double changed = -1e9;  ///< s, of the last change of velocity
@@ -72,6 +75,7 @@ class WalkerJudge {
 
   std::vector<const world::Obstacle*> Match(const Shot& shot, const mapping::ObstacleList& list);
   void Follow(const Shot& shot, size_t k, int hits, const world::Obstacle* o);
+  void JudgeHeld(const Shot& shot, const mapping::ObstacleList& list, size_t k);
   void JudgeMotion(double t, const world::MoverState& truth, const world::Obstacle& o, Walker* w);
   void JudgeChange(double t, const world::MoverState& truth, const world::Obstacle* o, bool judged,
                    Walker* w);

@@ -53,6 +53,8 @@ void Print(const std::string& name, const WalkerFigures& f) {
   fmt::print("\n{}: walkers within 6 m, 95 % Wilson intervals\n", name);
   Print("listed, sweeps in view from 1 s on (bar 97 %)", f.listed);
   Print("listed, all sweeps in view", f.any_time);
+  Print("in an obstacle of any kind, all sweeps in view", f.held);
+  Print("in none, for", f.bare, "s");
   Print("first listed after", f.acquired, "s");
   Print("velocity error <= 0.3 m/s, 0.3 s after a change of it", f.fast);
   Print("velocity error", f.velocity, "m/s");

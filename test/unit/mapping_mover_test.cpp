@@ -188,6 +188,45 @@ TEST(MappingMover, ForecastGoesThroughADoor) {
   }
 }
 
+/// Who stood and begins to walk is held by something listed in every sweep: by what the map holds
+/// of him, then by what stands there as far as is known, then by one mover, which he is for sure
+/// once he has left his place.
+TEST(MappingMover, WhoBeginsToWalkIsListedAllTheTime) {
+  constexpr double kBegins = 3.0, kRadius = 0.25, kLeft = 0.9;  // s, m, m
+  for (const double speed : {0.5, 1.0, 1.2})
+    for (const double range : {1.5, 3.0, 6.0})
+      for (const double wall : {range + 0.8, 12.0}) {
+        SCOPED_TRACE(::testing::Message()
+                     << speed << " m/s, " << range << " m, wall at " << wall << " m");
+        std::mt19937 random(3);
+        Mapper mapper(MappingConfig{});
+        std::set<int> ids;
+        for (double t = 0.0; t < kBegins + 2.5; t += 0.1) {
+          const Eigen::Vector2d p(range, speed * std::max(0.0, t - kBegins) - 0.5);
+          testing::World world;
+          world.boxes = {{{wall, 0.0, 2.0}, {0.1, 9.0, 2.0}}, {{-9.0, 0.0, 2.0}, {0.1, 9.0, 2.0}}};
+          world.cylinders = {{p, kRadius, 0.0, 1.75}};
+          testing::Truth truth;
+          const auto list =
+              mapper.Insert(testing::Scan(world, {0, 0, 1.2}, t, {0.02, 0.01}, &random, &truth));
+          Eigen::Vector3d seen = Eigen::Vector3d::Zero();
+          int n = 0;
+          for (size_t i = 0; i < truth.points.size(); ++i)
+            if (truth.objects[i] == 3) seen += truth.points[i], ++n;
+          EXPECT_NE(testing::Holding(list.obstacles, seen / n, t), nullptr) << t;
+          for (const auto& o : list.obstacles) {
+            if (!o.moving || t < kBegins + kLeft / speed) continue;
+            ids.insert(o.id);
+            const Eigen::Vector2d v = o.center.Velocity(t).head<2>();
+            EXPECT_LT((v - Eigen::Vector2d(0.0, speed)).norm(), 0.3) << t;
+            EXPECT_LT(testing::SectionRadius(o, 1.0), kRadius + 0.3) << t;
+          }
+          EXPECT_TRUE(t < kBegins + kLeft / speed || list.n_moving == 1) << t;
+        }
+        EXPECT_EQ(ids.size(), 1u);
+      }
+}
+
 TEST(MappingMover, WhatStopsBecomesStatic) {
   std::mt19937 random(3);
   Mapper mapper(MappingConfig{});
