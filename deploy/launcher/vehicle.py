@@ -29,7 +29,7 @@ def flies():
 
 
 def runs(name):
-    return booted() and run("systemctl", "is-active", f"chase-{name}").stdout.strip() in ("active", "activating")
+    return booted() and run("systemctl", "is-active", f"chase-{name}").stdout.strip() == "active"
 
 
 def user():

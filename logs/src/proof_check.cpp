@@ -222,7 +222,8 @@ void Check(const plan_t& plan, const Grounds& grounds, Examination* result) {
     const auto about_target = [](const proof_t& p) { return p.obstacle == kTarget; };
     const bool told = std::any_of(proofs.begin(), proofs.end(), about_target);
     const bool has_body = forecast && forecast->radius > 0.0 && forecast->height > 0.0;
-    if (has_body && (told || is_fresh)) keep_off(SolidOf(*forecast, course), kTarget, false);
+    if (has_body && (told || chases || is_fresh))
+      keep_off(SolidOf(*forecast, course), kTarget, false);
     for (const proof_t& proof : proofs) result->unverified += known.count(proof.obstacle) == 0;
   }
 }

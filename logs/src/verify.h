@@ -17,7 +17,8 @@ struct Verification {
 };
 
 /// Checks the proofs of every plan against the obstacles that it was made from, in exact
-/// arithmetic. Of each one it asks `hard_radius` m and `sigmas` deviations at least. Throws std::runtime_error where the file is no log or holds no PLAN.
+/// arithmetic. Of each one it asks `hard_radius` m and `sigmas` deviations at least. Throws
+/// std::runtime_error where the file is no log or holds no PLAN.
 Verification Verify(const std::string& file, double hard_radius, double sigmas);
 
 std::string Format(const Verification& verification);

@@ -163,13 +163,12 @@ bus::NodeReport CameraNode::Report() const {
                         config_.source, silence, why.empty() ? "" : " (" + why + ")", undecodable)};
   const bool off =
       stamps_ != StampClock::kStream && stamps_ != StampClock::kNone && !clock_.believed();
-  return {
-      off ? State::kDegraded : State::kOk,
-      fmt::format(
-          "{} frames, {:.1f} Hz, {} dropped, {} undecodable, {} beyond the rate, {} out of order, "
-          "{:.0f} ms old; {}",
-          frames_, rate_, grabber_->dropped(), undecodable, surplus_, backwards_, 1e3 * age_,
-          StampWords())};
+  return {off ? State::kDegraded : State::kOk,
+          fmt::format(
+              "{} frames{}, {} dropped, {} undecodable, {} beyond the rate, {} out of order, "
+              "{:.0f} ms old; {}",
+              frames_, rate_ > 0.0 ? fmt::format(", {:.1f} Hz", rate_) : "", grabber_->dropped(),
+              undecodable, surplus_, backwards_, 1e3 * age_, StampWords())};
 }
 
 }  // namespace chase::camera

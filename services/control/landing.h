@@ -8,8 +8,9 @@ namespace chase::control {
 /// Down to the ground by the vertical velocity, which needs no position.
 /// The ground is what bears a part of the weight for a while: in the air the vertical acceleration
 /// is what thrust and weight make of it. After PX4's land detector (little thrust and no vertical
-/// motion for a time). What strikes the body from below is pushed down upon, to tell: by a velocity
-/// that says it sinks already it would hardly be borne at all.
+/// motion for a time). Once something strikes the body from below thrust is cut for a
+/// moment: where the velocity says wrongly that it sinks, the ground would else bear too little to
+/// be felt.
 class Landing {
  public:
   explicit Landing(const ControlConfig& config)

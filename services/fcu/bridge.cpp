@@ -161,7 +161,8 @@ void Bridge::OnSetpoint(const Setpoint& setpoint, int64_t utime, int64_t now) {
 }
 
 bool Bridge::IsFresh(int64_t now) const {
-  // Stamped with the pose that it answers, which control takes no older; in a queue it ages on.
+  // Stamped with the pose that it answers; in a queue it ages on, and poses that always come later
+  // than that are none to fly by.
   return setpoint_ && framed_ && Seconds(setpoint_arrival_, now) <= config_.setpoint_age &&
          world::IsFresh(Seconds(setpoint_utime_, now), config_.setpoint_age + world::kMostAge.pose);
 }

@@ -115,7 +115,7 @@ const HandshakeTable::Row HandshakeTable::kRows[] = {
     {State::kFlying, Disarmed, State::kFailsafe, "the autopilot has disarmed or begun anew"},
     {State::kFlying, Failsafe, State::kFailsafe, "a failsafe of the autopilot"},
     {State::kFlying, LeftOffboard, State::kPilot, "the mode was changed: the pilot has it"},
-    {State::kFlying, Cut, State::kFailsafe, "the link was cut"},
+    {State::kFlying, Cut, State::kFailsafe, "the link was cut, or this bridge stood still"},
     {State::kFlying, Down, State::kDisarming, "on the ground, motors no longer wanted"},
     {State::kFlying, OffInTheAir, State::kLanding, "motors no longer wanted, the autopilot lands"},
     {State::kFlying, Blind, State::kLanding, "no estimate of the pose: the autopilot lands"},

@@ -251,7 +251,8 @@ std::vector<world::Obstacle> Mapper::Statics(const Eigen::Vector3d& origin, doub
   // Until it is known how they move they are listed where they are.
   for (const Track* track : tracker_.Unconfirmed()) {
     world::Obstacle o = Upright(track->id, track->Outline(), t);
-    if (PlanDistance(o, origin) <= config_.statics.radius) obstacles.push_back(std::move(o));
+    if (PlanDistance(o, origin) <= config_.statics.radius && o.shape.allFinite())
+      obstacles.push_back(std::move(o));
   }
   return obstacles;
 }

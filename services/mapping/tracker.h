@@ -57,8 +57,8 @@ class Tracker {
   /// Confirmed tracks that are more likely there than not and that the static map does not hold, as
   /// upright ellipsoids with a linear centre.
   std::vector<world::Obstacle> Obstacles(double middle, double semi_height, double grow) const;
-  /// Tracks that are likelier there than not, not yet known as movers, and whose returns the static
-  /// map does not hold.
+  /// Tracks that are likelier there than not, not yet known as movers, and too young for the static
+  /// map to hold their returns.
   std::vector<const Track*> Unconfirmed() const;
 
  private:

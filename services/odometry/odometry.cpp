@@ -143,13 +143,13 @@ SweepResult Odometry::ProcessSweep() {
   if (first) result.match.valid = true;
   const bool applied = first || Apply(prepared, &result.match);
   if (!applied) base_ = prepared.inertial;
-  if (!applied && standing_.holds()) {
-    HoldStill(standing_.gyro(), &base_);
-    held_ = prepared.end;
-  }
   const bool beyond = (first || !applied) && UncertaintyOf(prepared.predicted) > config_.match.gate;
   first |= beyond;
   if (first) base_ = prepared.predicted;
+  if (!first && !applied && standing_.holds()) {
+    HoldStill(standing_.gyro(), &base_);
+    held_ = prepared.end;
+  }
   if (beyond) RestartMap();
   result.applied = applied;
   if (applied) held_ = prepared.end;

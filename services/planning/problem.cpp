@@ -95,9 +95,9 @@ double GivingWay(double limit, double x, double v, double a, double most) {
 // Limits that the start already breaks give way to what it has: no chain of plans gets worse.
 // Heights give way to what the start cannot help only, so that none sinks. What is below the drone
 // its LiDAR sees on the way there only: it comes down along that slope, or slowly, until it is
-// level with people.
+// level with people. A tube that is `wider` than the file's, m, reaches no higher than that.
 Limits MakeLimits(const PlannerConfig& c, const Stretch& over, const Eigen::Vector3d& target,
-                  const Ground& ground) {
+                  const Ground& ground, double wider) {
   constexpr double kPush = 4.0;         // m/s^2 where no limit is set
   constexpr double kOverhead = 10.0;    // tangent from which there is no side to be on
   constexpr double kUnseenDrop = 0.15;  // m: replanned, half a metre a second
@@ -115,7 +115,7 @@ Limits MakeLimits(const PlannerConfig& c, const Stretch& over, const Eigen::Vect
   limits.ground = ground;
   const double seen_to = z - kUnseenDrop - kSightSlope * s.v.head<2>().norm() * over.horizon;
   limits.z_min = -GivingWay(-c.z_min, -z, -v, -a, push);
-  limits.z_max = GivingWay(c.z_max, z, v, a, push);
+  limits.z_max = GivingWay(c.z_max - wider, z, v, a, push);
   if (seen_to > std::max(kPerson, limits.z_min))
     limits.z_min = std::min(seen_to, z - Overshoot(-v, -a, push) - kRounding);
   const Eigen::Vector3d r = target - s.p;
@@ -231,7 +231,8 @@ void MakeProblem(const PlannerConfig& config, const PlanRequest& request, const 
   problem->start = StartCurve(over.start, over.horizon);
   problem->target = ToCurve(request.target, over.t0, over.horizon);
   problem->limits =
-      MakeLimits(config, over, problem->target.row(0).transpose(), GroundOf(request.obstacles));
+      MakeLimits(config, over, problem->target.row(0).transpose(), GroundOf(request.obstacles),
+                 HardRadius(config, request) - config.hard_radius());
   problem->skeletons.clear();
   problem->reach.reset();
   const size_t listed = request.obstacles.size();

@@ -23,11 +23,13 @@ LogPlayer::LogPlayer(const std::string& file) : reader_(file) {
   now_ = begin();
 }
 
-/// A vehicle's prefix may stand before the channel's name, as for the tools that read logs.
+/// A vehicle's prefix may stand before the channel's name, as for the tools that read logs, where
+/// none has the name itself.
 void LogPlayer::SubscribeRaw(const std::string& channel, RawHandler handler) {
+  const bool plain = std::find(channels_.begin(), channels_.end(), channel) != channels_.end();
   for (size_t i = 0; i < channels_.size(); ++i) {
     const std::string& name = channels_[i];
-    if (name.size() < channel.size() ||
+    if (name.size() < channel.size() || (plain && name != channel) ||
         name.compare(name.size() - channel.size(), channel.size(), channel) != 0)
       continue;
     handlers_[i] = handler;

@@ -46,7 +46,9 @@ void PageFeed::Take(const pose_t& m) {
   Time(newest_ = m.utime);
   if (m.epoch != epoch_ && epoch_ >= 0) {  // what was drawn in the old frame W is nowhere now
     history_.ForgetPositions();
+    auto faults = std::move(scene_.faults);
     Forget();
+    scene_.faults = std::move(faults);
   }
   epoch_ = m.epoch;
   scene_.drone = FromMessage(m);

@@ -372,7 +372,8 @@ TEST(FcuBridge, LinkLossEndsInALatchedFailsafe) {
   flight.Run(10.0);
   EXPECT_EQ(flight.px4.seen().setpoints, sent);
   EXPECT_FALSE(flight.px4.mode() == kOffboardMode) << flight.bridge.Words();
-  EXPECT_NE(flight.bridge.Words().find("the link was cut"), std::string::npos);
+  EXPECT_NE(flight.bridge.Words().find("the link was cut, or this bridge stood still"),
+            std::string::npos);
 }
 
 TEST(FcuBridge, TheSticksTakeItAndALostTransmitterLands) {
@@ -424,7 +425,7 @@ TEST(FcuBridge, AHoldBeforeTheLandingIsAFailsafeToo) {
 }
 
 // Either it never was in a failsafe, or no setpoint ended that.
-TEST(FcuBridge, ACutOfAnyLengthIsBornOrLatched) {
+TEST(FcuBridge, ACutOfAnyLengthIsBorneOrLatched) {
   for (int ms = 100; ms <= 1600; ms += 50) {
     Flight flight;
     ASSERT_TRUE(flight.RunUntil(State::kFlying, 12.0));

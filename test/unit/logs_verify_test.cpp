@@ -37,7 +37,8 @@ struct Wire {
   prediction_t forecast{};
 };
 
-constexpr double kRadius = 0.37, kSigmas = 2.0;  // that planning is configured with
+const double kRadius = planning::PlannerConfig{}.hard_radius(),
+             kSigmas = planning::PlannerConfig{}.sigmas;
 constexpr int32_t kTarget = -1;
 
 std::string Fault(const Wire& w) {

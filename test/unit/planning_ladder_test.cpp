@@ -258,6 +258,10 @@ TEST(Problem, HeightGivesWayToTheStartOnly) {
   PlanRequest request = Walk();
   request.start.p.z() = config.z_min + 0.01;
   EXPECT_EQ(MakeProblem(config, request, nullptr).limits.z_min, config.z_min);
+  EXPECT_EQ(MakeProblem(config, request, nullptr).limits.z_max, config.z_max);
+  request.tube = config.tracking_tube + 0.1;  // nothing is listed above what the file's reaches
+  EXPECT_NEAR(MakeProblem(config, request, nullptr).limits.z_max, config.z_max - 0.1, 1e-9);
+  request.tube = 0.0;
   request.start.p.z() = config.z_min - 0.2;
   EXPECT_NEAR(MakeProblem(config, request, nullptr).limits.z_min, request.start.p.z(), 1e-5);
   request.start.v.z() = -0.5;
