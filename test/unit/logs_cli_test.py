@@ -244,7 +244,7 @@ class LogTools(unittest.TestCase):
         self.assertIn(text, same.stdout)
         for side in "AB":
             self.assertRegex(text, rf"(?m)^{side}: {self.log}\n  gym, seed \d+, 1\.0 s flown\n  .*commit \w+"
-                             r".*\n  the log ends at 1\.0 s of ")
+                             r".*\n  configurations: .*\bcontrol \d+.*\n  the log ends at 1\.0 s of ")
         self.assertRegex(text, r"safe_ratio +100\.00 % +100\.00 %\n")
         self.assertIn('"compared":[{"key":"safe_ratio"', (out / "report.html").read_text())
         own = run("chase-report", self.log, self.log, "--out", self.folder)
