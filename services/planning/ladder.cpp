@@ -52,8 +52,9 @@ class Ladder : public Planner {
     PlanResult result;
     const auto finish = [&] { return Certify(request, &result); };
     if (!(TryChase(request, &notes, &result) && finish()) &&
-        !(TryKeep(request, &result) && finish()) && !(TrySafeOnly(request, &result) && finish()))
-      Rest(request, &result);
+        !(TryKeep(request, &result) && finish()) &&
+        !(TrySafeOnly(request, 1.0, &result) && finish()))
+      RestOrBrief(request, &result);
     if (!notes.empty()) {
       if (IsInSightVerdict(result.verdict) && WeakensSight(*used_))
         result.verdict = Verdict::kSafeOnly;
@@ -298,22 +299,20 @@ class Ladder : public Planner {
     return true;
   }
 
-  // Sight asked from ever later on, then not at all, then over half of the horizon.
-  bool TrySafeOnly(const PlanRequest& request, PlanResult* result) {
+  // Sight asked from ever later on, then not at all, over a share of the horizon.
+  bool TrySafeOnly(const PlanRequest& request, double share, PlanResult* result) {
     result->verdict = Verdict::kSafeOnly;
+    Problem* problem = Over(request, share * request.horizon, false, nullptr);
+    problem->limits.tan_elevation = 0.0;
+    if (problem->target_body) problem->limits.min_distance = 0.0;
+    placer_.Place(Layout::kCautious, problem);
+    problem->reach.reset();
     struct Try {
-      double share, sight_from;
+      double sight_from;
       bool view;
     };
-    for (const auto& [share, sight_from, view] :
-         {Try{1.0, 0.25, true}, Try{1.0, 0.5, true}, Try{1.0, 0.25, false}, Try{1.0, 0.5, false},
-          Try{1.0, 0.75, false}, Try{1.0, 1.0, false}, Try{0.5, 0.5, false},
-          Try{0.5, 1.0, false}}) {
-      Problem* problem = Over(request, share * request.horizon, false, nullptr);
-      problem->limits.tan_elevation = 0.0;
-      if (problem->target_body) problem->limits.min_distance = 0.0;
-      placer_.Place(Layout::kCautious, problem);
-      problem->reach.reset();
+    for (const auto& [sight_from, view] : {Try{0.25, true}, Try{0.5, true}, Try{0.25, false},
+                                           Try{0.5, false}, Try{0.75, false}, Try{1.0, false}}) {
       problem->limits.view = view ? config_.view() : std::nullopt;
       problem->limits.view_from = sight_from;
       if (!TrySearch(*problem, sight_from, std::nullopt, result)) continue;
@@ -329,8 +328,14 @@ class Ladder : public Planner {
     return false;
   }
 
-  void Rest(const PlanRequest& request, PlanResult* result) {
+  // Braking, or the committed way; before any other, and before harm, what is safe for half of the
+  // horizon.
+  void RestOrBrief(const PlanRequest& request, PlanResult* result) {
     PlanResult rest = RestPlan(config_, request);
+    const bool slows = rest.verdict == Verdict::kBrake || rest.verdict == Verdict::kSafeOnly;
+    if ((!slows || rest.certified_clearance < 0.0) && TrySafeOnly(request, 0.5, result) &&
+        Certify(request, result))
+      return;
     rest.reason = "no candidate is safe" + (rest.reason.empty() ? "" : ", " + rest.reason);
     rest.generated = result->generated;
     rest.checked = result->checked;

@@ -152,7 +152,7 @@ TEST(Ladder, NothingFeasibleBrakesToRest) {
   for (int i = 0; i < 16; ++i) {  // a cage around the drone
     const double angle = 2.0 * M_PI * i / 16;
     request.obstacles.push_back(
-        Pillar(i, -2.5 + 1.1 * std::cos(angle), 1.1 * std::sin(angle), 0.4));
+        Pillar(i, -2.5 + 1.3 * std::cos(angle), 1.3 * std::sin(angle), 0.4));
   }
   const PlanResult plan = MakePlanner("chase", Config())->Plan(request);
   EXPECT_EQ(plan.verdict, Verdict::kBrake) << plan.reason;
