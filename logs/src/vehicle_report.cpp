@@ -179,7 +179,7 @@ class Gatherer {
           {{"state", StateName(m.state)}, {"at_s", Time(m.utime)}, {"reason", m.reason}});
   }
 
-  static std::string InAir(int state) {
+  static std::string InAir(int8_t state) {
     const bool stands = state == flight_state_t::IDLE || state == flight_state_t::READY ||
                         state == flight_state_t::DONE;
     return stands ? "" : StateName(state);
@@ -268,7 +268,7 @@ class Gatherer {
   std::vector<double> errors_, fence_;
   std::map<std::string, std::vector<double>> latencies_;
   std::map<std::string, status_t> statuses_;
-  int first_state_ = flight_state_t::IDLE, state_ = flight_state_t::IDLE;
+  int8_t first_state_ = flight_state_t::IDLE, state_ = flight_state_t::IDLE;
   Json states_ = Json::array();
 };
 
