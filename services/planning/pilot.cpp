@@ -12,7 +12,7 @@ namespace chase::planning {
 namespace {
 
 constexpr double kShortestHorizon = 1.0;
-constexpr double kWidestTube = 0.3;  // m; from farther off it plans anew from the estimate at once
+constexpr double kWidestTube = 0.3;  // m: from farther off control follows no plan (reset_distance)
 constexpr double kJumpBack = 1.0;    // s; less is jitter between publishers
 // s: control says 20 times a second whether it flies; nobody climbs before that was heard.
 constexpr double kHearControl = 0.3;
