@@ -8,10 +8,13 @@
 #include <stdexcept>
 
 #include "common/config/config.h"
+#include "common/world/random.h"
 
 namespace chase::flight {
 
 namespace {
+
+constexpr uint64_t kVehicleStream = 0x7E81C1E;  // of random numbers
 
 template <class Config>
 void Override(const world::Scenario& scenario, const std::string& service, Config* config) {
@@ -36,6 +39,27 @@ void Derive(const world::Scenario& scenario, FlightConfigs* configs) {
   if (!scenario.commands.empty()) return;
   configs->mission.autostart = true;
   configs->mission.give_up = 0.0;
+}
+
+/// 5 to 10 % away, with a random sign, from what control and fcu believe, and a battery that sags:
+/// nothing is known by accident. What the scenario names of it holds.
+void DrawVehicle(int64_t seed, const control::ControlConfig& believed,
+                 simulator::SimulatorConfig* config) {
+  world::Random random(static_cast<uint64_t>(seed), kVehicleStream);
+  const auto off = [&random] {
+    const double most = random.Uniform(0.05, 0.10);
+    return random.Uniform() < 0.5 ? -most : most;
+  };
+  simulator::VehicleConfig& vehicle = config->vehicle;
+  vehicle.mass_error = off();
+  // So much at the hover.
+  vehicle.thrust_curve = off() / (1.0 - simulator::kGravity / vehicle.max_thrust);
+  for (int i = 0; i < 3; ++i) vehicle.drag[i] = believed.drag[i] * (1.0 + off());
+  config->battery.sags = true;
+}
+
+bool FedWithTruth(const world::Scenario& scenario, const FlightOptions& options) {
+  return (options.sensors.empty() ? scenario.sensors.mode : options.sensors) == "truth";
 }
 
 /// The image's edges less a margin: what calibration, drag and control tilt the body by.
@@ -108,6 +132,8 @@ FlightConfigs Configure(const world::Scenario& scenario, const FlightOptions& op
   configs.simulator.seed = options.seed;
   configs.has_mission = !scenario.commands.empty();
   Derive(scenario, &configs);
+  if (!FedWithTruth(scenario, options))
+    DrawVehicle(options.seed, configs.control, &configs.simulator);
   Override(scenario, "simulator", &configs.simulator);
   Override(scenario, "odometry", &configs.odometry);
   Override(scenario, "mapping", &configs.mapping);

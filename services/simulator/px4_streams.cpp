@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "common/mavlink/frames.h"
+#include "services/simulator/battery.h"
 #include "services/simulator/px4.h"
 
 namespace chase::simulator {
@@ -117,7 +118,7 @@ void Px4::StreamState() {
   const auto percent = static_cast<int8_t>(std::floor(100.0 * body_.charge + 1e-9));
   if (Due(mav::SysStatus::kId)) {
     mav::SysStatus m;
-    m.voltage_battery = static_cast<uint16_t>(14'000.0 + 2'800.0 * body_.charge);  // four cells
+    m.voltage_battery = static_cast<uint16_t>(1e3 * RestVolts(body_.charge));
     m.battery_remaining = percent;
     Send(m);
   }

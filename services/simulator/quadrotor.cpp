@@ -80,7 +80,7 @@ Vector4d Quadrotor::Mix(const Wrench& wanted) const {
 
 Quadrotor::Load Quadrotor::MotorLoad() const {
   const Vector4d healthy = (1.0 + config_.thrust_error) * TrueThrusts(config_, motors_);
-  const Vector4d f = healthy.cwiseProduct(motor_shares_);
+  const Vector4d f = supply_ * healthy.cwiseProduct(motor_shares_);
   const double distance = config_.arm / std::sqrt(2.0);
   return {state_.q * Vector3d(0.0, 0.0, f.sum()),
           Vector3d(distance * kLeft.dot(f), -distance * kFront.dot(f),

@@ -68,6 +68,8 @@ class Quadrotor {
 
   /// Shares of the thrusts that the motors give from now on.
   void SetMotorShares(const Eigen::Vector4d& shares) { motor_shares_ = shares; }
+  /// The battery's share of all of them.
+  void SetSupply(double share) { supply_ = share; }
 
   const BodyState& state() const { return state_; }
   /// True while a foot touches the ground.
@@ -89,6 +91,7 @@ class Quadrotor {
   Ground ground_;
   Eigen::Vector4d motors_ = Eigen::Vector4d::Zero();
   Eigen::Vector4d motor_shares_ = Eigen::Vector4d::Ones();
+  double supply_ = 1.0;
   bool on_ground_ = false;
 };
 

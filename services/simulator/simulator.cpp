@@ -124,6 +124,7 @@ void Simulator::StepPhysics() {
   const Wrench wrench =
       attitude_loop_.Step(ActiveSetpoint(), quadrotor_.state(), quadrotor_.on_ground(), kStep);
   quadrotor_.Step(resting ? Wrench{} : wrench, wind_.velocity() + gust_, kStep);
+  quadrotor_.SetSupply(battery_.ThrustShare());
   LearnHoverThrust();
   battery_.Draw(quadrotor_.motor_thrusts().sum() / (config_.vehicle.TrueMass() * kGravity), kStep);
   ++steps_;

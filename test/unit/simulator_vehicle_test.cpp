@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "services/simulator/attitude_loop.h"
+#include "services/simulator/battery.h"
 #include "services/simulator/imu.h"
 #include "services/simulator/quadrotor.h"
 #include "services/simulator/wind.h"
@@ -96,6 +97,27 @@ TEST(Quadrotor, AHeavierBodySinksAndABentCurveGivesLess) {
   EXPECT_NEAR(sinking.state().a.z(), kGravity / 1.1 - kGravity, 1e-6);
   EXPECT_NEAR(weak.state().a.z(), 0.9 * 0.5 * bent.max_thrust - kGravity, 1e-6);
   EXPECT_NEAR(full.state().a.z(), bent.max_thrust - kGravity, 1e-6);
+}
+
+TEST(Battery, ItsMotorsWeakenWithChargeAndLoad) {
+  BatteryConfig config;
+  EXPECT_EQ(Battery(config).ThrustShare(), 1.0) << "it does not sag by itself";
+  config.sags = true;
+  Battery full(config);
+  full.Draw(1.0, kDt);
+  EXPECT_NEAR(full.ThrustShare(), 1.0, 1e-6) << "at the hover";
+  full.Draw(2.0, kDt);
+  EXPECT_LT(full.ThrustShare(), 0.93);
+  full.Draw(0.0, kDt);
+  EXPECT_GT(full.ThrustShare(), 1.0);
+  config.charge = 0.5;
+  Battery half(config);
+  half.Draw(1.0, kDt);
+  EXPECT_NEAR(half.ThrustShare(), std::pow(15.0 / 16.4, 2), 1e-3);
+  Quadrotor weak(Ideal(), At(100.0), Abyss);
+  weak.SetSupply(half.ThrustShare());
+  for (int i = 0; i < 1000; ++i) weak.Step({kGravity, kStill}, kStill, kDt);
+  EXPECT_NEAR(weak.state().a.z(), (half.ThrustShare() - 1.0) * kGravity, 1e-6);
 }
 
 TEST(Quadrotor, TorqueTurnsAboutItsOwnAxis) {

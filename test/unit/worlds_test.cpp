@@ -267,6 +267,39 @@ TEST_P(EachKind, MayHideTheTargetAtTheStart) {
 INSTANTIATE_TEST_SUITE_P(Worlds, EachKind, ::testing::ValuesIn(Kinds()),
                          [](const auto& kind) { return kind.param.name; });
 
+// Nothing is known by accident: what control and fcu go by is 5 to 10 % away from what flies.
+TEST(Vehicle, IsDrawnFromTheSeedWhereverSensorsAreFlown) {
+  world::Scenario scenario = MakeWorld("hall", 1, {});
+  scenario.services.clear();
+  scenario.sensors.mode = "raw";
+  flight::FlightOptions options;
+  options.scenario_file = "world.yaml";
+  std::set<double> masses;
+  for (options.seed = 1; options.seed <= 20; ++options.seed) {
+    const auto configs = flight::Configure(scenario, options);
+    const auto& vehicle = configs.simulator.vehicle;
+    masses.insert(vehicle.mass_error);
+    const double curve = vehicle.thrust_curve * (1.0 - simulator::kGravity / vehicle.max_thrust);
+    std::vector<double> off = {vehicle.mass_error, curve};
+    for (int i = 0; i < 3; ++i) off.push_back(vehicle.drag[i] / configs.control.drag[i] - 1.0);
+    for (const double share : off)
+      EXPECT_TRUE(std::abs(share) >= 0.0499 && std::abs(share) <= 0.1001) << share;
+    EXPECT_EQ(configs.fcu.hover_thrust, simulator::kGravity / vehicle.max_thrust) << "the nominal";
+    EXPECT_TRUE(configs.simulator.battery.sags);
+  }
+  EXPECT_EQ(masses.size(), 20u);
+  const auto named = [&](const std::string& text) {
+    world::Scenario told = scenario;
+    told.services.push_back({"simulator", text});
+    return flight::Configure(told, options).simulator;
+  };
+  EXPECT_EQ(named("vehicle: {mass_error: 0.01}").vehicle.mass_error, 0.01) << "what it names holds";
+  options.sensors = "truth";
+  const auto truth = named("seed: 1");
+  EXPECT_EQ(truth.vehicle.mass_error, 0.0);
+  EXPECT_FALSE(truth.battery.sags);
+}
+
 TEST(Worlds, UnknownKindIsRefusedWithTheKnownOnes) {
   try {
     MakeWorld("swamp", 1, {});
