@@ -84,8 +84,8 @@ void DeriveDrivers(FlightConfigs* configs) {
   configs->camera.exposure = simulated.camera.exposure;
 }
 
-/// Obstacles are listed as high as the body gets.
-void CheckHeights(const FlightConfigs& configs) {
+/// Obstacles are listed as high and as far as plans lead.
+void CheckVolume(const FlightConfigs& configs) {
   const planning::PlannerConfig& planner = configs.planning.planner;
   const double highest = planner.z_max + planner.drone_radius + planner.tracking_tube;
   if (highest > configs.mapping.statics.band_high)
@@ -93,6 +93,11 @@ void CheckHeights(const FlightConfigs& configs) {
         "planning: planner.z_max is {:g} m, where mapping lists obstacles up to statics.band_high "
         "{:g} m only: lower it, or raise that to {:g} m",
         planner.z_max, configs.mapping.statics.band_high, highest));
+  if (configs.planning.listed_within > configs.mapping.statics.radius)
+    throw std::runtime_error(fmt::format(
+        "planning: listed_within is {:g} m, where mapping lists obstacles within statics.radius "
+        "{:g} m only: lower it, or raise that",
+        configs.planning.listed_within, configs.mapping.statics.radius));
 }
 
 /// The scenario's faults and the command line's, in this order.
@@ -141,7 +146,7 @@ FlightConfigs Configure(const world::Scenario& scenario, const FlightOptions& op
   Override(scenario, "prediction", &configs.prediction);
   DeriveView(configs.perception.rig, &configs.planning.planner);
   Override(scenario, "planning", &configs.planning);
-  CheckHeights(configs);
+  CheckVolume(configs);
   configs.control.tracking_tube = configs.planning.planner.tracking_tube;
   configs.control.sigmas = configs.planning.planner.sigmas;
   Override(scenario, "mission", &configs.mission);

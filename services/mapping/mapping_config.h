@@ -47,8 +47,8 @@ struct GroundConfig {
 
 /// Decomposition of occupied columns into upright ellipsoids.
 struct StaticConfig {
-  double radius = 9.0;    ///< obstacles within this of the drone are listed, m
-  double band_low = 0.3;  ///< flight volume above the ground, m
+  double radius = world::kFlightVolume.around;  ///< obstacles within it of the drone are listed, m
+  double band_low = 0.3;                        ///< flight volume above the ground, m
   double band_high = world::kFlightVolume.listed;  ///< the same, upper end, m
   double unseen = 3.0;          ///< unseen columns within this of the drone are listed, m
   double semi_height = 8.0;     ///< vertical semi-axis of the ellipsoids, m

@@ -76,7 +76,7 @@ class FastSearch : public Search {
   bool KeepsLimitsOf(int id) const {
     const Limits& l = problem_->limits;
     const bool any = l.speed > 0.0 || l.acceleration > 0.0 || l.height || l.tan_elevation > 0.0 ||
-                     l.min_distance > 0.0 || l.view;
+                     l.min_distance > 0.0 || l.view || std::isfinite(l.listed_within);
     return !any || KeepsLimits(fast_.PlanOf(id), *problem_);
   }
   // The row that is open decides most of them.

@@ -153,6 +153,21 @@ bool KeepsHeight(const Net* net, const Curve& plan, const Limits& l) {
   return answer == Answer::kKept || (answer == Answer::kOpen && KeepsHeight(plan, l));
 }
 
+bool KeepsWithin(const Net* net, const Curve& plan, const Limits& l) {
+  if (net &&
+      (net->b.leftCols<2>().rowwise() - l.listed_about.transpose()).rowwise().norm().maxCoeff() +
+              2.0 * net->error <
+          l.listed_within)
+    return true;
+  SquareSum sum(static_cast<int>(plan.rows()) - 1, l.listed_within * l.listed_within);
+  for (int a = 0; a < 2; ++a) {
+    Polynomial r = plan.col(a);
+    r[0] -= l.listed_about[a];
+    sum.Add(-1.0, r);
+  }
+  return sum.IsPositive();
+}
+
 }  // namespace
 
 bool KeepsLimits(const Curve& plan, const Problem& problem) {
@@ -166,6 +181,7 @@ bool KeepsLimits(const Curve& plan, const Problem& problem) {
   if (l.speed > 0.0 && !KeepsNorm(quick, plan, 1, l.speed, problem.duration)) return false;
   if (l.acceleration > 0.0 && !KeepsNorm(quick, plan, 2, l.acceleration, problem.duration))
     return false;
+  if (std::isfinite(l.listed_within) && !KeepsWithin(quick, plan, l)) return false;
   if (l.view && !KeepsView(plan, target, problem.duration, nullptr, *l.view, l.view_from))
     return false;
   if (!(l.tan_elevation > 0.0) && !(l.min_distance > 0.0)) return true;

@@ -218,6 +218,9 @@ PlanRequest Pilot::Request(double t0, const Start& start) const {
   request.tube = tube_;
   request.obstacles = obstacles_;
   request.unseen = unseen_;
+  const double since = std::clamp(t0 - obstacles_time_, 0.0, world::kMostAge.obstacles);
+  request.listed_within = config_.listed_within - HardRadius(config_.planner, request) -
+                          since * start.state.v.head<2>().norm();
   if (start.follows && has_running_) request.stop = running_.stop;
   if (start.on_plan) request.running = running_.trajectory;  // off it, it is no way out
   // What moves is measured, as the target is, in the frame that drifts.

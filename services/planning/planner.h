@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <algorithm>
+#include <cmath>
 #include <memory>
 #include <optional>
 #include <string>
@@ -43,14 +44,15 @@ struct Stretch {
 };
 
 struct PlanRequest : Stretch {
-  std::optional<YawStart> yaw;                  ///< at t0; none: towards the target
-  double tube = 0.0;                            ///< about the plan, where it is the wider one, m
-  world::Trajectory target;                     ///< p_WT(t)
-  double target_sigma = 0.0;                    ///< largest deviation of p_WT at target.start, m
-  double target_speed_sigma = 0.0;              ///< and of its velocity, m/s
-  world::Manoeuvre target_manoeuvre;            ///< that it does not foresee
-  std::vector<world::Obstacle> obstacles;       ///< at their true size
-  std::vector<world::Obstacle> unseen;          ///< places that nobody has looked into
+  std::optional<YawStart> yaw;             ///< at t0; none: towards the target
+  double tube = 0.0;                       ///< about the plan, where it is the wider one, m
+  world::Trajectory target;                ///< p_WT(t)
+  double target_sigma = 0.0;               ///< largest deviation of p_WT at target.start, m
+  double target_speed_sigma = 0.0;         ///< and of its velocity, m/s
+  world::Manoeuvre target_manoeuvre;       ///< that it does not foresee
+  std::vector<world::Obstacle> obstacles;  ///< at their true size
+  double listed_within = HUGE_VAL;         ///< of the start, plan view; what is farther is not, m
+  std::vector<world::Obstacle> unseen;     ///< places that nobody has looked into
   std::optional<world::Obstacle> target_body;   ///< what the drone must not touch of the target
   std::optional<world::Trajectory> running;     ///< the plan being flown, if any
   std::optional<world::Trajectory> stop;        ///< of that plan; from its start on, flown

@@ -25,6 +25,8 @@ std::string PlanningConfig::Problem() const {
     below("target_memory", target_memory, "0.05 to 60 s");
   if (!(takeoff_height >= 0.0)) below("takeoff_height", takeoff_height, "at least 0 m");
   if (!(takeoff_time > 0.5)) below("takeoff_time", takeoff_time, "above 0.5 s");
+  if (!(listed_within >= 3.0))
+    below("listed_within", listed_within, "at least 3 m, in which it comes to rest");
   if (!(landing_room >= 0.0 && landing_room <= 5.0))
     below("landing_room", landing_room, "0 to 5 m");
   if (!(landing_slope_deg > 0.0 && landing_slope_deg <= 45.0))

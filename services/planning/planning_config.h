@@ -19,6 +19,7 @@ struct PlanningConfig {
   double takeoff_height = 1.2;
   double takeoff_time = 3.0;
   double search_yaw_rate = 1.0;
+  double listed_within = world::kFlightVolume.around;
   double landing_room = 0.3;
   double landing_slope_deg = 10.0;
   double landing_reach = 6.0;
@@ -37,6 +38,9 @@ struct PlanningConfig {
     v("takeoff_height", takeoff_height, "climb before the chase, above the start, m");
     v("takeoff_time", takeoff_time, "duration of that climb, s");
     v("search_yaw_rate", search_yaw_rate, "turning while the target is lost, rad/s");
+    v("listed_within", listed_within,
+      "of the drone, plan view: obstacles that are farther are in no list (mapping's "
+      "statics.radius), m; no plan leads there");
     v("landing_room", landing_room,
       "that has to be level and free around the body's sphere where it comes down, m");
     v("landing_slope_deg", landing_slope_deg, "of the ground that counts as level, at most");

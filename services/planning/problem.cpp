@@ -233,6 +233,8 @@ void MakeProblem(const PlannerConfig& config, const PlanRequest& request, const 
   problem->limits =
       MakeLimits(config, over, problem->target.row(0).transpose(), GroundOf(request.obstacles),
                  HardRadius(config, request) - config.hard_radius());
+  problem->limits.listed_about = request.start.p.head<2>();
+  problem->limits.listed_within = request.listed_within;
   problem->skeletons.clear();
   problem->reach.reset();
   const size_t listed = request.obstacles.size();

@@ -63,6 +63,8 @@ struct Limits {
   double min_distance = 0.0;   ///< m; 0: none
   std::optional<View> view;    ///< that the target stays in, from above and below
   double view_from = 0.0;      ///< from this tau on
+  Eigen::Vector2d listed_about = Eigen::Vector2d::Zero();
+  double listed_within = HUGE_VAL;  ///< of it obstacles are listed, m
 };
 
 /// A box, frame W, m.

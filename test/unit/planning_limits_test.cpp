@@ -45,7 +45,7 @@ Problem RandomProblem(Random& g, Curve* plan) {
 
 struct Extremes {
   double speed = 0.0, acceleration = 0.0, low = HUGE_VAL, high = -HUGE_VAL, near = HUGE_VAL,
-         slope = 0.0;  // the last: tangent of the elevation
+         slope = 0.0, far = 0.0;  // tangent of the elevation; from the start, plan view
 };
 
 Extremes Sampled(const Curve& plan, const Problem& problem) {
@@ -56,6 +56,7 @@ Extremes Sampled(const Curve& plan, const Problem& problem) {
     const Vector3d p = Evaluate(plan, tau), r = Evaluate(problem.target, tau) - p;
     e.speed = std::max(e.speed, Evaluate(plan, tau, 1).norm() / T);
     e.acceleration = std::max(e.acceleration, Evaluate(plan, tau, 2).norm() / (T * T));
+    e.far = std::max(e.far, (p - Evaluate(plan, 0.0)).head<2>().norm());
     e.low = std::min(e.low, p.z());
     e.high = std::max(e.high, p.z());
     e.near = std::min(e.near, r.norm());
@@ -64,10 +65,10 @@ Extremes Sampled(const Curve& plan, const Problem& problem) {
   return e;
 }
 
-/// `room`: by how much less than the limit the sampled value is, as a share; one limit of six.
-double SetLimit(Random& g, const Extremes& e, Limits* limits) {
+/// `room`: by how much less than the limit the sampled value is, as a share; one limit of seven.
+double SetLimit(Random& g, const Curve& plan, const Extremes& e, Limits* limits) {
   const double room = Uniform(g, -0.2, 0.2), by = 1.0 / (1.0 - room);
-  switch (g() % 6) {
+  switch (g() % 7) {
     case 0:
       limits->speed = by * e.speed;
       break;
@@ -85,6 +86,10 @@ double SetLimit(Random& g, const Extremes& e, Limits* limits) {
       limits->z_min = e.low - room;
       limits->z_max = e.high + 1.0;
       break;
+    case 5:
+      limits->listed_about = plan.row(0).head<2>();
+      limits->listed_within = by * e.far;
+      break;
     default:
       limits->height = true;
       limits->z_min = e.low - 1.0;
@@ -100,7 +105,7 @@ TEST(Limits, HoldWhereSamplesSaySoAndNowhereElse) {
     Curve plan;
     Problem problem = RandomProblem(g, &plan);
     const Extremes e = Sampled(plan, problem);
-    const double room = SetLimit(g, e, &problem.limits);
+    const double room = SetLimit(g, plan, e, &problem.limits);
     if (e.slope > 50.0 || e.near < 0.1) continue;
     const bool keeps = KeepsLimits(plan, problem);
     EXPECT_FALSE(keeps && room < 0.0) << i;
@@ -112,7 +117,7 @@ TEST(Limits, HoldWhereSamplesSaySoAndNowhereElse) {
 }
 
 /// Each limit that the plan may break alone, so far from what it does.
-void SetLimits(const Extremes& e, const double (&room)[6], Limits* limits) {
+void SetLimits(const Extremes& e, const double (&room)[7], Limits* limits) {
   limits->speed = e.speed * (1.0 + room[0]) + 1e-6;
   limits->acceleration = e.acceleration * (1.0 + room[1]) + 1e-6;
   limits->min_distance = e.near / (1.0 + room[2]);
@@ -120,30 +125,33 @@ void SetLimits(const Extremes& e, const double (&room)[6], Limits* limits) {
   limits->height = true;
   limits->z_min = e.low - room[4];
   limits->z_max = e.high + room[5];
+  limits->listed_within = e.far * (1.0 + room[6]) + 1e-6;
 }
 
 // All of them at once: one that is broken is enough, whatever the degree of plan and target.
 TEST(Limits, AllHoldTogetherOrThePlanDoesNot) {
   Random g(14);
-  int kept = 0, broken[6] = {};
+  int kept = 0, broken[7] = {};
   for (int i = 0; i < kPlans; ++i) {
     Curve plan;
     Problem problem = RandomProblem(g, &plan);
     if (i % 3 == 0) plan = Curve(plan.topRows(1 + static_cast<int>(g() % 3)));
     const Extremes e = Sampled(plan, problem);
     if (e.slope > 50.0 || e.near < 0.1) continue;
-    double room[6];
+    double room[7];
+    problem.limits.listed_about = plan.row(0).head<2>();
     for (double& x : room) x = Uniform(g, 0.03, 0.2);
     SetLimits(e, room, &problem.limits);
     EXPECT_TRUE(KeepsLimits(plan, problem)) << i;
     ++kept;
-    for (int k = 0; k < 6; ++k) {
-      double less[6];
-      std::copy(room, room + 6, less);
+    for (int k = 0; k < 7; ++k) {
+      double less[7];
+      std::copy(room, room + 7, less);
       less[k] = -Uniform(g, 0.02, 0.2);
       if (k == 0 && e.speed < 1e-3) continue;
       if (k == 1 && e.acceleration < 1e-3) continue;
       if (k == 3 && e.slope < 1e-3) continue;
+      if (k == 6 && e.far < 1e-3) continue;
       SetLimits(e, less, &problem.limits);
       EXPECT_FALSE(KeepsLimits(plan, problem)) << i << " " << k;
       ++broken[k];

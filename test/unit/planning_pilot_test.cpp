@@ -129,6 +129,26 @@ TEST(Pilot, FollowsNobodyToWhereNobodyHasLooked) {
   }
 }
 
+// But for what it moves until the plan begins no part of one is farther than what was listed.
+TEST(Pilot, LeadsToNowhereThatNoListReaches) {
+  for (const double within : {2.0, 9.0}) {
+    PlanningConfig config;
+    config.listed_within = within;
+    Flight flight(config);
+    flight.Run(12.0, true);
+    double farthest = 0.0;
+    for (const PlanResult& plan : flight.plans)
+      for (const double tau : {0.25, 0.5, 0.75, 1.0}) {
+        const world::Trajectory& way = plan.trajectory;
+        const Eigen::Vector3d d =
+            way.Position(way.start + tau * way.duration) - way.Position(way.start);
+        farthest = std::max(farthest, d.head<2>().norm());
+      }
+    EXPECT_EQ(farthest < 2.0 - config.planner.hard_radius(), within == 2.0) << farthest;
+    EXPECT_GT(flight.Body().p.x(), 3.0) << "it chases";
+  }
+}
+
 TEST(Pilot, NeverPlansFasterThanItsLeastPeriod) {
   PlanningConfig config;
   Flight flight(config);
