@@ -64,9 +64,9 @@ void ControlNode::OnState(const flight_state_t& message) {
     return;
   // One that began anew in flight knows none; the place has not moved.
   if (message.has_home != 0)
-    home_.emplace(message.epoch, bus::ToVector(message.home));
-  else if (home_)
-    TellHome(message);
+    led_ = message;
+  else if (led_)
+    TellHome();
   asked_to_fly_ = AsksToFly(message.state) ? message.utime : 0;
   const bool lands = message.state == flight_state_t::LAND;
   if (!lands)
@@ -77,18 +77,18 @@ void ControlNode::OnState(const flight_state_t& message) {
   if (message.state == flight_state_t::DONE) controller_.Cut();
 }
 
-// What mission says, with the place that it has forgotten.
-void ControlNode::TellHome(flight_state_t heard) {
-  heard.utime = bus_.Now();
-  heard.epoch = home_->first;
-  heard.has_home = 1;
-  bus::Set(heard.home, home_->second);
-  bus_.Publish("HOME", heard);
+Eigen::Vector3d ControlNode::Home() const { return bus::ToVector(led_->home); }
+
+// What mission said before it began anew.
+void ControlNode::TellHome() {
+  flight_state_t message = *led_;
+  message.utime = bus_.Now();
+  bus_.Publish("HOME", message);
 }
 
 void ControlNode::OnGeofence(const geofence_t& message) {
-  if (config_.geofence.Exists() || !home_ || home_->first != message.epoch) return;
-  fence_ = bus::FromMessage(message, home_->second);
+  if (config_.geofence.Exists() || !led_ || led_->epoch != message.epoch) return;
+  fence_ = bus::FromMessage(message, Home());
 }
 
 // No plan stands on a list that leaves some out.
@@ -116,11 +116,11 @@ const ControlNode::List* ControlNode::ListOf(const plan_t& message) const {
 // place is not known.
 std::string ControlNode::Breach(const world::Claim& claim, bool to_land) const {
   if (!fence_.Exists() || claim.starts_inside) return "";  // a last resort may start inside
-  if (!home_ || !epoch_.Is(home_->first))
+  if (!led_ || !epoch_.Is(led_->epoch))
     return to_land ? "" : "the take-off place is not known, nor the geofence";
   std::vector<Eigen::Vector3d> places = world::PlacesOn(claim.position, claim.stop);
-  for (Eigen::Vector3d& p : places) p -= home_->second;
-  return fence_.Refusal(p_WB_ - home_->second, places, config_.tracking_tube);
+  for (Eigen::Vector3d& p : places) p -= Home();
+  return fence_.Refusal(p_WB_ - Home(), places, config_.tracking_tube);
 }
 
 std::string ControlNode::Refusal(const plan_t& message) {

@@ -42,7 +42,8 @@ class ControlNode : public bus::Node {
   void OnObstacles(const obstacles_t& message);
   void OnPose(const pose_t& message);
   void OnState(const flight_state_t& message);
-  void TellHome(flight_state_t heard);
+  Eigen::Vector3d Home() const;
+  void TellHome();
   void OnGeofence(const geofence_t& message);
   std::string Refusal(const plan_t& message);
   std::string Breach(const world::Claim& claim, bool to_land) const;
@@ -60,8 +61,8 @@ class ControlNode : public bus::Node {
   bus::Epoch flown_;  // of the last pose that was aligned: the attitude loop goes by it
   Eigen::Vector3d p_WB_ = Eigen::Vector3d::Zero();  // of the last pose, m
   std::deque<List> lists_;                          // newest last
-  /// Where it took off, in the frame W of this epoch: the geofence counts from there.
-  std::optional<std::pair<int32_t, Eigen::Vector3d>> home_;
+  /// The last FLIGHT_STATE that knew where it took off: the geofence counts from there.
+  std::optional<flight_state_t> led_;
   world::Geofence fence_;  // its own, else what mission told last
   /// The first FLIGHT_STATE of a mission process that asks for the landing: its `seq`, and when
   /// that process started.

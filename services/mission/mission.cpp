@@ -26,7 +26,7 @@ world::CommandAnswer Mission::Try(double t, const Command& command) {
     return {false, "kill cuts the motors wherever it is, and it falls: say so with --force"};
   Step(t, command.kind);
   if (state_ == State::kReturn && !KnowsHome()) Step(t, Event::kHomeLost);
-  leads_itself_ = false;
+  uncommanded_ = false;
   overruled_ = command.kind == Event::kStop ? Breached() : std::vector<Event>();
   return {true, std::string(Name(state_)) + ": " + reason_};
 }
@@ -93,18 +93,23 @@ void Mission::Update(double t) {
   for (const Event event : Observed(t)) {
     const bool stepped = Step(t, event, Detail(event));
     if (stepped && (event == Event::kLeaving || event == Event::kNotFlown))
-      leads_itself_ = false;  // it would come to the same again
-    if (stepped && event == Event::kPoseBack) Resume(t);
+      uncommanded_ = false;  // it would come to the same again
+    if (stepped && event == Event::kPoseBack) Resume(t, before_, "before the pose was lost");
   }
-  if (leads_itself_) LeadItself(t);
+  if (uncommanded_ && config_.autostart) LeadItself(t);
   HearOfGround();
 }
 
+void Mission::Remember(double t, const Home& home, State state) {
+  if (home_ || !IsAirborne(state_)) return;
+  home_ = home;
+  if (uncommanded_) Resume(t, state, "before this process started");
+}
+
 /// What was on its way down or back goes on so.
-void Mission::Resume(double t) {
-  const char* when = "before the pose was lost";
-  if (before_ == State::kLand) Step(t, Event::kLand, when);
-  if (before_ == State::kReturn) Step(t, Event::kReturn, when);
+void Mission::Resume(double t, State before, const char* when) {
+  if (before == State::kLand) Step(t, Event::kLand, when);
+  if (before == State::kReturn) Step(t, Event::kReturn, when);
 }
 
 // The way home may lead away from it first, around a corner of the geofence; to and fro, and down

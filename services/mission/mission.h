@@ -30,8 +30,7 @@ struct Command : world::CommandKey {
 class Mission {
  public:
   /// Commands from before `start` [s] are refused: whoever led the flight then has had them.
-  Mission(const MissionConfig& config, double start)
-      : config_(config), leads_itself_(config.autostart), window_("mission", start) {}
+  Mission(const MissionConfig& config, double start) : config_(config), window_("mission", start) {}
 
   /// Written to as messages come.
   Inputs& inputs() { return inputs_; }
@@ -40,10 +39,8 @@ class Mission {
   /// answer and changes nothing.
   world::CommandAnswer Obey(double t, const Command& command);
 
-  /// Who outlived the mission process before this one says where that took off.
-  void Remember(const Home& home) {
-    if (!home_ && IsAirborne(state_)) home_ = home;
-  }
+  /// Who outlived the mission process before this one says where that took off and where it was.
+  void Remember(double t, const Home& home, State state);
 
   /// Moves on by what is observed at time `t` [s], which never goes back.
   void Update(double t);
@@ -78,11 +75,11 @@ class Mission {
   std::string Detail(Event event) const;
   void LeadItself(double t);
   void HearOfGround();
-  void Resume(double t);
+  void Resume(double t, State before, const char* when);
   void NoteProgress(double t);
 
   MissionConfig config_;
-  bool leads_itself_;  // nobody has commanded anything yet
+  bool uncommanded_ = true;  // nobody has commanded anything yet
   Inputs inputs_;
   world::CommandWindow window_;
   State state_ = State::kIdle;

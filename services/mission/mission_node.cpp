@@ -36,7 +36,7 @@ MissionNode::MissionNode(bus::Bus& bus, const MissionConfig& config)
     mission_.inputs().motors_off = m.motors == attitude_setpoint_t::MOTORS_OFF;
   });
   bus_.Subscribe<flight_state_t>("HOME", [this](const flight_state_t& m) {
-    mission_.Remember({bus::ToVector(m.home), m.epoch});
+    mission_.Remember(Now(), {bus::ToVector(m.home), m.epoch}, static_cast<State>(m.state));
   });
   SubscribeStatuses();
 }

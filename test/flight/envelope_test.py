@@ -19,7 +19,7 @@ TAKEOFF_X = 1.7  # m: the scenario's start
 
 
 def fly(folder, commands, duration, **changes):
-    """Flies the mission changed: services by name, boxes, movers; returns metrics and the log's path."""
+    """Flies the mission changed: services by name, boxes, movers, faults; returns metrics and the log's path."""
     blocks = dict(re.findall(r"^(\w+):(.*?)(?=^\w+:|\Z)", MISSION.read_text(encoding="utf-8"), re.M | re.S))
     blocks["commands"] = json.dumps([{"command": name, "at_s": t} for name, t in commands])
     blocks["duration_s"] = str(duration)
@@ -27,7 +27,7 @@ def fly(folder, commands, duration, **changes):
     for name, config in changes.get("services", {}).items():
         blocks["services"] += f"  - {{name: {name}, config: '{json.dumps(config)}'}}\n"
     blocks["world"] = f"\n  boxes: {json.dumps(changes.get('boxes', []))}{blocks['world']}"
-    blocks["movers"] = json.dumps(changes.get("movers", []))
+    blocks["movers"], blocks["faults"] = (json.dumps(changes.get(key, [])) for key in ("movers", "faults"))
     text = "".join(f"{key}: {block.rstrip()}\n" for key, block in blocks.items())
     file, log = folder / "mission.yaml", folder / "flight.lcm"
     file.write_text(text, encoding="utf-8")
@@ -116,6 +116,14 @@ class Envelope(unittest.TestCase):
         farthest = max(x for _, x, _ in self.truth(log)) - TAKEOFF_X
         self.assertLess(farthest, reach)
         self.assertGreater(farthest, 0.6 * reach, "it did not even go near")
+
+    def test_return_and_landing_go_on_when_mission_dies(self):
+        for command, dies in (("return", 9.5), ("land", 8.2)):
+            states, metrics, _ = self.fly([("takeoff", -7), ("chase", -2), (command, 8)], 30,
+                                          faults=[{"name": "kill-mission", "at": dies}])
+            self.assert_in_order(states, "CHASE", command.upper(), "HOLD", command.upper(), "DONE")
+            self.assertTrue(any("before this process started" in reason for reason in self.reasons), self.reasons)
+            self.assertEqual(metrics["safe_ratio"], 1.0)
 
     def test_lands_beside_what_has_come_below(self):
         states, metrics, log = self.fly([("takeoff", -7), ("land", 8)], 22, movers=[

@@ -118,16 +118,18 @@ TEST(ControlNode, RemembersPlaceAndFenceWhenMissionDies) {
       << bench.node().Report().detail;
 }
 
-TEST(ControlNode, TellsAMissionThatBeganAnewWhereItTookOff) {
+TEST(ControlNode, TellsAMissionThatBeganAnewWhereItTookOffAndWhatItSaidLast) {
   Bench bench;
   bench.SendState(flight_state_t::READY);
   bench.SendState(flight_state_t::TAKEOFF, "mission", Eigen::Vector3d(1, 2, 3));
+  bench.SendState(flight_state_t::RETURN, "mission", Eigen::Vector3d(1, 2, 3));
   bench.RunUntil(kStart + 5000);
   EXPECT_TRUE(bench.homes.empty()) << "nobody has forgotten anything";
   bench.SendState(flight_state_t::HOLD);
   bench.RunUntil(kStart + 10000);
   ASSERT_EQ(bench.homes.size(), 1u);
   EXPECT_EQ(bench.homes[0].has_home, 1);
+  EXPECT_EQ(bench.homes[0].state, +flight_state_t::RETURN);
   EXPECT_EQ(bus::ToVector(bench.homes[0].home), Eigen::Vector3d(1, 2, 3));
 }
 

@@ -315,7 +315,7 @@ TEST(Mission, WhatFliesIsNotCalledOff) {
   EXPECT_EQ(bench.mission.state(), State::kTakeoff) << "asked for by no patience";
 }
 
-TEST(Mission, StartedInFlightItHoldsAndDoesNotGoOnWithALanding) {
+TEST(Mission, StartedInFlightItHoldsOrGoesOnWithALanding) {
   Bench flying;
   flying.mission.inputs().flying = true;
   flying.Run(0.1);
@@ -324,12 +324,12 @@ TEST(Mission, StartedInFlightItHoldsAndDoesNotGoOnWithALanding) {
   EXPECT_EQ((flying.Command(Event::kReturn), flying.mission.state()), State::kLand);
 
   Bench told;
-  told.mission.Remember({{1.0, 2.0, 0.0}, told.pose.epoch});
+  told.mission.Remember(told.t, {{1.0, 2.0, 0.0}, told.pose.epoch}, State::kChase);
   told.mission.inputs().flying = true;
   told.Run(0.1);
   EXPECT_FALSE(told.mission.home().has_value()) << "of another flight, for all that is known";
-  told.mission.Remember({{1.0, 2.0, 0.0}, told.pose.epoch});
-  told.mission.Remember({{3.0, 4.0, 0.0}, told.pose.epoch});
+  told.mission.Remember(told.t, {{1.0, 2.0, 0.0}, told.pose.epoch}, State::kChase);
+  told.mission.Remember(told.t, {{3.0, 4.0, 0.0}, told.pose.epoch}, State::kChase);
   EXPECT_EQ(told.mission.home()->p, Eigen::Vector3d(1.0, 2.0, 0.0));
   EXPECT_EQ((told.Command(Event::kReturn), told.mission.state()), State::kReturn);
 
@@ -342,6 +342,27 @@ TEST(Mission, StartedInFlightItHoldsAndDoesNotGoOnWithALanding) {
   down.mission.inputs().motors_off = down.mission.inputs().flying = true;
   down.Run(0.1);
   EXPECT_EQ(down.mission.state(), State::kDone);
+}
+
+TEST(Mission, StartedInFlightItGoesOnWithWhatLedDownUnlessSomebodyHasCommanded) {
+  for (const State before : {State::kReturn, State::kLand, State::kChase, State::kSearch}) {
+    for (const bool commanded : {false, true}) {
+      for (const int frames : {0, 1}) {
+        Bench bench;
+        bench.mission.inputs().flying = true;
+        bench.pose.p = {5.0, 0.0, 1.0};
+        bench.Run(0.1);
+        if (commanded) bench.Command(Event::kStop);
+        bench.mission.Remember(bench.t, {{1.0, 2.0, 0.0}, bench.pose.epoch - frames}, before);
+        bench.Run(0.2);
+        const bool leads_down = before == State::kReturn || before == State::kLand;
+        EXPECT_EQ(bench.mission.state(), commanded || !leads_down ? State::kHold
+                                         : frames > 0             ? State::kLand
+                                                                  : before)
+            << Name(before) << (commanded ? ", stopped" : "") << ", frame " << frames;
+      }
+    }
+  }
 }
 
 TEST(Mission, GivesUpTheSearchInTime) {
