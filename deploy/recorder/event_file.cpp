@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <chrono>
 #include <cstring>
 #include <stdexcept>
 
@@ -19,6 +20,12 @@ EventFile::EventFile(const std::string& name)
   if (!log_)
     throw std::runtime_error(name + ": cannot be written (" + std::strerror(errno) +
                              "); check the folder, its rights and the disk");
+}
+
+EventFile::~EventFile() {
+  if (!Flush() || !syncing_.valid()) return;
+  syncing_.wait();
+  Sync();
 }
 
 bool EventFile::Write(int64_t utime, const std::string& channel, const uint8_t* data, size_t size) {
@@ -40,7 +47,20 @@ bool EventFile::Flush() {
   if (std::fflush(log_->f) != 0) return GiveUp();
   flushed_ = written_;
   waiting_ = 0;
+  Sync();
   return true;
+}
+
+/// Until then a loss of power takes what the system keeps in memory: half a minute.
+void EventFile::Sync() {
+  const bool busy =
+      syncing_.valid() && syncing_.wait_for(std::chrono::seconds(0)) != std::future_status::ready;
+  if (busy || synced_ == flushed_) return;
+  synced_ = flushed_;
+  syncing_ = std::async(std::launch::async, [own = dup(fileno(log_->f))] {
+    fdatasync(own);
+    close(own);
+  });
 }
 
 bool EventFile::GiveUp() {

@@ -3,21 +3,25 @@
 #include <lcm/eventlog.h>
 
 #include <cstdint>
+#include <future>
 #include <memory>
 #include <string>
 
 namespace chase::recorder {
 
 /// An LCM log that is read as far as it goes while it grows. What the disk refuses leaves no half
-/// event behind: the file is cut back to what was flushed last.
+/// event behind: the file is cut back to what was flushed last. The end waits for the disk.
 class EventFile {
  public:
   /// Throws std::runtime_error, one line, when the file cannot be made.
   explicit EventFile(const std::string& name);
+  ~EventFile();
 
   /// False: the disk refused; the events since the last Flush() are gone, and nothing more can be
   /// written into this file.
   bool Write(int64_t utime, const std::string& channel, const uint8_t* data, size_t size);
+  /// Hands what was written to the system, which puts it on the disk meanwhile: a slow disk makes
+  /// nobody wait, and takes the next flush with it.
   bool Flush();
 
   const std::string& name() const { return name_; }
@@ -27,6 +31,7 @@ class EventFile {
 
  private:
   bool GiveUp();
+  void Sync();
 
   struct Closer {
     void operator()(lcm_eventlog_t* log) const { lcm_eventlog_destroy(log); }
@@ -35,6 +40,8 @@ class EventFile {
   std::unique_ptr<lcm_eventlog_t, Closer> log_;
   int64_t written_ = 0, flushed_ = 0;  // bytes
   int64_t waiting_ = 0, lost_ = 0;     // events
+  int64_t synced_ = 0;                 // bytes, once `syncing_` is over
+  std::future<void> syncing_;
 };
 
 }  // namespace chase::recorder

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -9,9 +10,27 @@
 #include <csignal>
 #include <filesystem>
 #include <map>
+#include <mutex>
 #include <set>
+#include <thread>
 
 #include "common/logs/log_reader.h"
+
+namespace {
+
+std::mutex disk;
+std::map<ino_t, int64_t> on_disk;  // bytes of each file
+
+}  // namespace
+
+/// In place of the system's: what it would have put on the disk.
+extern "C" int fdatasync(int fd) {
+  struct stat file {};
+  if (fstat(fd, &file) != 0) return -1;
+  const std::lock_guard lock(disk);
+  on_disk[file.st_ino] = file.st_size;
+  return 0;
+}
 
 namespace chase::recorder {
 namespace {
@@ -31,6 +50,7 @@ class RecorderTest : public testing::Test {
     std::filesystem::create_directory(folder_);
     config_.folder = folder_;
     config_.keep_free_mb = 1.0;
+    on_disk.clear();
   }
   void TearDown() override { std::filesystem::remove_all(folder_); }
 
@@ -52,6 +72,15 @@ class RecorderTest : public testing::Test {
     }
     std::sort(stamps.begin(), stamps.end());
     return stamps;
+  }
+
+  /// Those of a log that a loss of power would leave.
+  int64_t OnDisk(const std::string& name) const {
+    struct stat file {};
+    stat((folder_ / name).c_str(), &file);
+    const std::lock_guard lock(disk);
+    const auto at = on_disk.find(file.st_ino);
+    return at == on_disk.end() ? 0 : at->second;
   }
 
   /// Light and heavy messages, 10 of each a second, over [from, to) seconds.
@@ -158,6 +187,27 @@ TEST_F(RecorderTest, AFileThatMayNotGrowIsFollowedByAnother) {
   const auto stamps = Stamps("POSE");
   EXPECT_EQ(static_cast<int64_t>(stamps.size()) + unrecorded, 600);
   EXPECT_GT(stamps.size(), 560u);  // each limit costs what came in the second of the retry
+}
+
+TEST_F(RecorderTest, WhatCameIsOnTheDiskSoonAndAllOfALogThatHasEnded) {
+  config_.heavy_minutes = 0.5;
+  const auto all_on_disk = [&] {
+    const auto names = Names();
+    return std::all_of(names.begin(), names.end(), [&](const std::string& name) {
+      return OnDisk(name) == static_cast<int64_t>(std::filesystem::file_size(folder_ / name));
+    });
+  };
+  {
+    Recorder recorder(config_, "a", kStart);
+    Feed(&recorder, 0, 20);
+    for (int i = 0; i < 500 && !all_on_disk(); ++i) {
+      recorder.Tick(kStart + 20 * kSecond + i, kPlenty);
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
+    EXPECT_TRUE(all_on_disk());
+    Feed(&recorder, 20, 21);
+  }
+  EXPECT_TRUE(all_on_disk());
 }
 
 TEST_F(RecorderTest, AKilledRecorderLeavesAllButItsLastMoment) {
