@@ -30,6 +30,21 @@ std::string PlaceOf(const Json& flight) {
                                  : flight["scenario"].get<std::string>();
 }
 
+/// The rows that flights belong to, in the order of their first flight.
+template <class RowOf>
+std::vector<Row> Grouped(const std::vector<Json>& flights, const RowOf& row_of) {
+  std::vector<Row> rows;
+  for (const Json& flight : flights) {
+    const Row of = row_of(flight);
+    auto row = std::find_if(rows.begin(), rows.end(), [&](const Row& r) {
+      return r.place == of.place && r.fault == of.fault;
+    });
+    if (row == rows.end()) row = rows.insert(rows.end(), of);
+    row->flights.push_back(&flight);
+  }
+  return rows;
+}
+
 std::string Count(const Row& row, const char* what) {
   const auto n = static_cast<long>(row.flights.size());
   const long k = std::count_if(row.flights.begin(), row.flights.end(),
@@ -115,6 +130,18 @@ std::string Markdown(const std::vector<Cells>& rows) {
   return text;
 }
 
+/// The faults of any process, or any channel, are one kind.
+std::string KindOf(const std::string& fault) {
+  const std::string effect = fault.substr(0, fault.find('-') + 1);
+  if (effect == "kill-" || effect == "freeze-") return effect + "P";
+  return effect == "delay-" ? effect + "C" : fault;
+}
+
+/// Each kind of fault over all places.
+std::vector<Row> FaultsOf(const std::vector<Json>& flights) {
+  return Grouped(flights, [](const Json& f) { return Row{"all", KindOf(f["fault"]), {}}; });
+}
+
 std::string FailedFlights(const std::vector<Json>& flights) {
   std::string text;
   for (const Json& f : flights) {
@@ -131,15 +158,7 @@ std::string FailedFlights(const std::vector<Json>& flights) {
 }  // namespace
 
 std::vector<Row> RowsOf(const std::vector<Json>& flights) {
-  std::vector<Row> rows;
-  for (const Json& flight : flights) {
-    const std::string place = PlaceOf(flight), fault = flight["fault"];
-    auto row = std::find_if(rows.begin(), rows.end(),
-                            [&](const Row& r) { return r.place == place && r.fault == fault; });
-    if (row == rows.end()) row = rows.insert(rows.end(), {place, fault, {}});
-    row->flights.push_back(&flight);
-  }
-  return rows;
+  return Grouped(flights, [](const Json& f) { return Row{PlaceOf(f), f["fault"], {}}; });
 }
 
 std::vector<double> Values(const Row& row, const std::string& key) {
@@ -161,12 +180,14 @@ std::string Table(const std::vector<Json>& flights) {
         "reaction, worst [s]", "recovery, worst [s]", "non-finite setpoints", "plans in the air",
         "uncertified brakes", "accelerating brakes"})
     rows[0].push_back(title);
-  Row pooled{"all", "", {}};
-  for (const Row& row : RowsOf(flights)) {
-    rows.push_back(CellsOf(row));
-    pooled.flights.insert(pooled.flights.end(), row.flights.begin(), row.flights.end());
-  }
-  rows.push_back(CellsOf(pooled));
+  Row all{"all", "", {}};
+  for (const Json& flight : flights) all.flights.push_back(&flight);
+  const std::vector<Row> places = RowsOf(flights), faults = FaultsOf(flights);
+  for (const Row& row : places) rows.push_back(CellsOf(row));
+  if (faults.size() < places.size())
+    for (const Row& row : faults)
+      if (!row.fault.empty()) rows.push_back(CellsOf(row));
+  rows.push_back(CellsOf(all));
   return Markdown(rows) +
          "\nIn brackets: 95 % Wilson intervals of the share. Reaction counts from the age "
          "limit of the input that a fault\nruns out, recovery from the fault's end; - where there "

@@ -129,6 +129,11 @@ class Campaign(unittest.TestCase):
                             ("in image, mean", "1.000"), ("visible, worst", "0.400")):
             self.assertEqual(killed[title], cell, title)
         self.assertEqual(self.row(table, "all", "")["non-finite setpoints"], "12")
+        self.fly("--scenarios", "gym,forest", "--seeds", "3-5", "--faults", "none,kill-planning@5,kill-control,gust@5")
+        _, table = self.results()
+        self.assertEqual(self.row(table, "all", "kill-P")["flights"], "12")
+        self.assertEqual(self.row(table, "all", "gust@5")["non-finite setpoints"], "24")
+        self.assertEqual(self.row(table, "all", "")["flights"], "24")
 
     def test_failed_flights_have_reports(self):
         self.fly("--seeds", "1-4,12,14")
