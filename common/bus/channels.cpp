@@ -28,7 +28,7 @@ const std::vector<ChannelRow>& ChannelTable() {
       {"GEOFENCE", "geofence_t", "mission", false, true},
       {"TRUTH", "truth_t", "simulator", false},
       {"SCENARIO", "scenario_t", "simulator", false},
-      {"FAULT", "event_t", "simulator, chase-flight", false},
+      {"FAULT", "event_t", "simulator, chase-flight, flight-monitor", false},
   };
   return table;
 }

@@ -22,13 +22,23 @@ Json CommandOf(const chase::world::CommandSpec& command) {
   return {{"command", command.command}, {"at_s", command.at_s}, {"arguments", words}};
 }
 
-Json Told(const chase::world::Scenario& scenario) {
+/// In a live flight the simulator strikes with its own faults, and the launcher's part are
+/// processes.
+Json Told(const chase::world::Scenario& scenario, int64_t seed) {
+  using Effect = chase::world::FaultKind::Effect;
   Json told = {{"duration_s", scenario.duration_s}, {"settle_s", scenario.settle_s}};
-  told["commands"] = told["left_out_live"] = Json::array();
+  told["commands"] = told["faults"] = told["left_out_live"] = Json::array();
   for (const auto& command : scenario.commands) told["commands"].push_back(CommandOf(command));
-  for (const auto& fault : scenario.faults)  // only the simulator strikes in a live flight
-    if (chase::world::KindOf(fault).victim != "simulator")
+  int number = 0;
+  for (const auto& spec : scenario.faults) {
+    const auto fault = chase::world::Settled(spec, scenario.duration_s, seed, number++);
+    const auto& kind = chase::world::KindOf(fault);
+    if (kind.effect == Effect::kKill || kind.effect == Effect::kFreeze)
+      told["faults"].push_back(
+          {{"name", fault.name}, {"at_s", fault.at}, {"for_s", fault.duration}});
+    else if (kind.victim != "simulator")
       told["left_out_live"].push_back(fault.name);
+  }
   return told;
 }
 
@@ -37,18 +47,21 @@ Json Told(const chase::world::Scenario& scenario) {
 /// Checks a scenario file without the services, so that it is the first program that is built.
 int main(int argc, char** argv) {
   CLI::App app(
-      "Checks a scenario file; prints its length, its commands and the faults that a live flight "
-      "leaves out as one line of JSON.",
+      "Checks a scenario file; prints its length, its commands, its faults of processes and those "
+      "that a live flight leaves out as one line of JSON.",
       "chase-scenario");
   chase::config::AddVersion(&app);
   std::string file;
+  int64_t seed = 1;
   app.add_option("scenario", file, "name in deploy/scenarios, or a file")->required();
+  app.add_option("--seed", seed, "that times of faults are drawn from (default 1)")
+      ->check(CLI::Range(int64_t{0}, int64_t{2147483647}));
   try {
     app.parse(argc, argv);
     const chase::world::Scenario scenario =
         chase::world::LoadScenario(chase::flight::ScenarioFile(file));
     chase::world::TargetMotion(scenario);  // reads its path_file
-    fmt::print("{}\n", Told(scenario).dump());
+    fmt::print("{}\n", Told(scenario, seed).dump());
     return 0;
   } catch (const CLI::Success& e) {
     return app.exit(e);

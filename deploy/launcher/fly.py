@@ -25,6 +25,7 @@ KEEP_FREE = 200  # MB of disk below which sweeps and images are no longer record
 LOG_RATE = 15e6  # bytes/s of a recording, sweeps and images included
 LARGEST_SEED = 2**31 - 1
 DRIVERS = ("lidar", "fcu", "camera")  # stand between the simulator and the rest with --hardware
+STRIKES = {"kill": signal.SIGKILL, "freeze": signal.SIGSTOP, "thaw": signal.SIGCONT}  # faults of processes
 VIEW_PORTS = range(8080, 8100)  # of --view: the first that nobody listens on
 
 
@@ -61,7 +62,7 @@ def parse(arguments):
                         help="through the drivers: MAVLink, VLP-16 packets and a video stream in LCM's place")
     parser.add_argument("--view", action="store_true", help="look on in a browser, at http://localhost:8080")
     parser.add_argument("--kill", type=kill_wish, action="append", default=[], metavar="P@SECONDS",
-                        help="kill -9 of process P at that mission time; it is started anew, but for the viewer (may be repeated)")
+                        help="kill -9 of process P at that mission time; it is started anew (may be repeated)")
     options = parser.parse_args(arguments)
     there = killable(options.hardware, options.view)
     for name, seconds in options.kill:
@@ -125,12 +126,12 @@ def ask(program, *arguments):
     return answer.stdout
 
 
-def build_and_check(scenario, view=False, hardware=False):
+def build_and_check(scenario, seed, view=False, hardware=False):
     """Builds what flies. The scenario is read as soon as there is a program that can, long before
     the rest is built. Returns its length [s], take-off included, and what it tells of itself."""
     set_up()
     build("chase-scenario")
-    told = json.loads(ask("chase-scenario", scenario))
+    told = json.loads(ask("chase-scenario", scenario, "--seed", seed))
     build(*(row["binary"] for row in flight_processes() + driver_processes(hardware)), "chase-flight", "chase-flight-monitor",
           "chase-recorder", "chase-report", "chase-command", "chase-log", "chase-lidar",
           *(["chase-viewer"] if view else []))
@@ -142,12 +143,12 @@ def warn_of_faults(names):
     """Those that a live flight does not bring about by itself."""
     if not names:
         return
-    cures = [f"{places.command('fly')} --kill {name.removeprefix('kill-')}@SECONDS" for name in names if name.startswith("kill-")]
+    cures = []
     if "disk-full" in names:  # chase-flight has no recorder
         cures.append(f"a full disk under {ROOT / 'logs'} for disk-full")
     if set(names) != {"disk-full"}:
         cures.append("chase-flight, where they strike")
-    print(f"warning: faults of processes, channels and the bus are left out of a live flight: {', '.join(names)}; "
+    print(f"warning: faults of channels, the bus and the disk are left out of a live flight: {', '.join(names)}; "
           f"cure: {', '.join(cures)}", file=sys.stderr, flush=True)
 
 
@@ -208,13 +209,13 @@ def write_config(folder, scenario, seed, name):
 class Flight:
     """The processes of one flight and the folder that they leave."""
 
-    def __init__(self, scenario, seed, url, commands=(), kills=(), hardware=False):
+    def __init__(self, scenario, seed, url, commands=(), strikes=(), hardware=False):
         self.folder = flight_folder(scenario)
         self.scenario, self.seed, self.hardware = scenario, seed, hardware
         self.env = {"LCM_DEFAULT_URL": url}
         self.services, self.logger, self.monitor, self.viewer = [], None, None, None
         self.commands, self.given = list(commands), []
-        self.kills = sorted(kills, key=lambda kill: kill[1])
+        self.strikes, self.killed = sorted(strikes), []
 
     def child(self, name, command, **options):
         return processes.Child(name, command, self.folder / f"{name}.log", self.env, **options)
@@ -228,7 +229,8 @@ class Flight:
             BIN / "chase-recorder", "--folder", self.folder, "--name", "flight", "--heavy-minutes", "-1",
             "--rotate-mb", "0", "--rotate-minutes", "0", "--keep-free", str(KEEP_FREE)],
             notifies=True, restarts=True)
-        self.monitor = self.child("monitor", [BIN / "chase-flight-monitor"], stdout=subprocess.PIPE)
+        self.monitor = self.child("monitor", [BIN / "chase-flight-monitor", "--faults"], stdin=subprocess.PIPE,
+                                  stdout=subprocess.PIPE)
         os.set_blocking(self.monitor.process.stdout.fileno(), False)
         if view:
             self.start_viewer()
@@ -247,7 +249,8 @@ class Flight:
     def start_viewer(self):
         """An onlooker: whatever becomes of it, the flight goes on."""
         port = bus.free_port(VIEW_PORTS)
-        self.viewer = self.child("viewer", ["nice", "-n", "10", BIN / "chase-viewer", "--port", str(port)])
+        self.viewer = self.child("viewer", ["nice", "-n", "10", BIN / "chase-viewer", "--port", str(port)],
+                                 restarts=True)
         bus.await_listener(port, 5.0)
         print(f"look on at http://localhost:{port}", flush=True)
 
@@ -260,7 +263,8 @@ class Flight:
 
     def complain(self, *watchers, mend=True):
         """Restarts what may be restarted; else raises when a process has ended or hangs."""
-        for child, sentence in processes.problems(self.services + [self.logger, *watchers]):
+        onlookers = [self.viewer] if self.viewer and mend else []
+        for child, sentence in processes.problems(self.services + [self.logger, *onlookers, *watchers]):
             if not (child.restarts and mend):
                 raise FlightError(f"{sentence}; the end of {child.log}:\n{child.log_tail()}")
             if child.mend():
@@ -274,14 +278,28 @@ class Flight:
             self.given.append(self.child(f"command-{len(self.given) + 1}-{name}",
                                          [BIN / "chase-command", name, *command["arguments"]]))
 
-    def kill(self, mission_time):
-        """Kills whose time has come."""
-        while self.kills and self.kills[0][1] <= mission_time:
-            name, _ = self.kills.pop(0)
+    def strike(self, mission_time):
+        """Faults of processes whose time has come, and ends of those before."""
+        for child in [c for c in self.killed if c.process.poll() is None and c.ready()]:
+            self.killed.remove(child)
+            self.tell("-", f"kill-{child.name}")
+        while self.strikes and self.strikes[0][0] <= mission_time:
+            _, effect, name = self.strikes.pop(0)
             child = next(c for c in (*self.services, self.logger, self.viewer) if c and c.name == name)
-            print(f"\nt {mission_time:6.1f} s: kill -9 of {name}", file=sys.stderr, flush=True)
-            child.process.kill()
-            child.process.wait()
+            print(f"\nt {mission_time:6.1f} s: {effect} {'-9 of ' if effect == 'kill' else ''}{name}", file=sys.stderr, flush=True)
+            self.tell(*(("-", f"freeze-{name}") if effect == "thaw" else ("+", f"{effect}-{name}")))
+            child.process.send_signal(STRIKES[effect])
+            if effect == "kill":
+                child.process.wait()
+                self.killed.append(child)
+
+    def tell(self, sign, fault):
+        """The monitor has it logged, for the report."""
+        try:
+            self.monitor.process.stdin.write(f"{sign}{fault}\n".encode())
+            self.monitor.process.stdin.flush()
+        except BrokenPipeError:
+            pass  # watch() says that the monitor has ended
 
     def watch(self):
         """Shows progress until the mission's end."""
@@ -299,7 +317,7 @@ class Flight:
                     last_time, moved = progress["mission_time"], time.monotonic()
                     speed = progress["rtf"]
             if last_time is not None:  # progress comes once a second
-                self.kill(last_time + speed * (time.monotonic() - moved))
+                self.strike(last_time + speed * (time.monotonic() - moved))
             watched = [self.monitor] if ended and not line else []
             self.complain(*watched)
             if time.monotonic() - moved > SILENCE_LIMIT:
@@ -353,9 +371,20 @@ def report(folder):
     return results.passed(metrics)
 
 
+def strikes_of(faults, kills):
+    """(mission time in s, effect, process) of a scenario's faults of processes and the command line's kills."""
+    strikes = [(t, "kill", name) for name, t in kills]
+    for fault in faults:
+        effect, _, name = fault["name"].partition("-")
+        strikes.append((fault["at_s"], effect, name))
+        if effect == "freeze":
+            strikes.append((fault["at_s"] + fault["for_s"], "thaw", name))
+    return strikes
+
+
 def fly(options):
     scenario = find_scenario(options.scenario)
-    seconds, told = build_and_check(scenario, options.view, options.hardware)
+    seconds, told = build_and_check(scenario, options.seed, options.view, options.hardware)
     if late := [f"{name}@{t:g}" for name, t in options.kill if t >= told["duration_s"]]:
         raise FlightError(f"--kill {', '.join(late)}: the mission ends at {told['duration_s']:g} s; give an earlier time")
     warn_of_faults(told.get("left_out_live"))
@@ -363,7 +392,8 @@ def fly(options):
     raise_receive_buffers()
     url = bus.url()
     check_bus(url)
-    flight = Flight(scenario, options.seed, url, told.get("commands", ()), options.kill, options.hardware)
+    flight = Flight(scenario, options.seed, url, told.get("commands", ()),
+                    strikes_of(told.get("faults", ()), options.kill), options.hardware)
     print(f"flying {scenario.stem}, seed {options.seed}, into {flight.folder}", flush=True)
     try:
         flight.start(options.view)
@@ -373,8 +403,8 @@ def fly(options):
     finally:
         flight.stop()
     passed = report(flight.folder)
-    if flight.kills:
-        raise FlightError("the mission ended before the kill of " + ", ".join(f"{name}@{t:g}" for name, t in flight.kills))
+    if late := [f"{effect} of {name}@{t:g}" for t, effect, name in flight.strikes if effect != "thaw"]:
+        raise FlightError("the mission ended before the " + ", ".join(late))
     return 0 if passed else 1
 
 

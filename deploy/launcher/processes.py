@@ -89,9 +89,9 @@ class Child:
     """One process whose output goes to a file. With `notifies` it speaks sd_notify's protocol; with
     `restarts` its end is mended by restart()."""
 
-    def __init__(self, name, command, log, env=None, notifies=False, restarts=False, stdout=None):
+    def __init__(self, name, command, log, env=None, notifies=False, restarts=False, stdin=subprocess.DEVNULL, stdout=None):
         self.name, self.log, self.restarts = name, log, restarts
-        self._command, self._stdout, self._retried = command, stdout, False
+        self._command, self._stdin, self._stdout, self._retried = command, stdin, stdout, False
         self._deaths, self._restart_at = 0, None  # in a row, each soon after a start
         self._environment = dict(os.environ, **(env or {}))
         self._environment.pop("NOTIFY_SOCKET", None)
@@ -104,7 +104,7 @@ class Child:
         self._restart_at = None
         with open(self.log, "ab") as file:
             self.process = subprocess.Popen(
-                self._command, stdin=subprocess.DEVNULL, stdout=self._stdout or file, stderr=file,
+                self._command, stdin=self._stdin, stdout=self._stdout or file, stderr=file,
                 env=self._environment, start_new_session=True, preexec_fn=_die_with_parent)
 
     def mend(self):
@@ -180,7 +180,7 @@ class Child:
         except subprocess.TimeoutExpired:
             self.process.kill()
             self.process.wait()
-        for opened in (self._socket, self.process.stdout):
+        for opened in (self._socket, self.process.stdin, self.process.stdout):
             if opened:
                 opened.close()
 
