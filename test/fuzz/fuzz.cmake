@@ -46,3 +46,5 @@ set_target_properties(fuzz_corpus PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BI
 # The process table is read in Python.
 add_test(NAME fuzz_processes
   COMMAND ${Python3_EXECUTABLE} -B ${fuzz}/fuzz_processes.py ${fuzz}/corpus/processes)
+
+chase_script_test(fuzz_corpus_accepted ${fuzz}/corpus_test.py ${CMAKE_BINARY_DIR}/bin)
