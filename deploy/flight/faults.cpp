@@ -1,6 +1,7 @@
 #include "deploy/flight/faults.h"
 
 #include <cmath>
+#include <stdexcept>
 #include <utility>
 
 #include "chase/event_t.hpp"
@@ -26,6 +27,9 @@ Faults::Faults(const std::vector<world::FaultSpec>& faults, int64_t mission_star
   for (const world::FaultSpec& fault : faults) {
     const world::FaultKind& kind = world::KindOf(fault);
     const std::string process = kind.victim;
+    if (kind.effect ==
+        Effect::kDiskFull)  // deploy/fly asks for the configurations of such a flight
+      throw std::runtime_error("fault " + fault.name + " " + world::Misfit(kind, true));
     if (kind.effect == Effect::kKill)
       Plan(
           fault, [=] { lockstep->Kill(process); }, [=] { lockstep->Start(process); });

@@ -106,6 +106,9 @@ std::vector<world::FaultSpec> AllFaults(world::Scenario scenario, const FlightOp
       scenario.faults.push_back(world::ParseFault(text));
       const std::string problem = scenario.Problem();
       if (!problem.empty()) throw std::runtime_error(problem);
+      if (options.until > 0.0 && scenario.faults.back().at >= options.until)
+        throw std::runtime_error(
+            fmt::format("the flight ends at {:g} s, before it", options.until));
     } catch (const std::runtime_error& e) {
       throw std::runtime_error("--fault " + text + ": " + e.what());
     }
@@ -122,7 +125,8 @@ void AddFaults(const world::Scenario& scenario, const FlightOptions& options,
   for (const world::FaultSpec& fault : AllFaults(scenario, options)) {
     const world::FaultKind& kind = world::KindOf(fault);
     const std::string misfit = world::Misfit(kind, !truth);
-    if (!misfit.empty()) throw std::runtime_error("fault " + fault.name + " " + misfit);
+    if (!misfit.empty() && kind.needs != world::FaultKind::Needs::kRecorder)
+      throw std::runtime_error("fault " + fault.name + " " + misfit);
     configs->faults.push_back(world::Settled(fault, flown, options.seed, number++));
     configs->has_mission |= kind.needs == world::FaultKind::Needs::kMission;
     if (kind.victim == "simulator") configs->simulator.faults.push_back(configs->faults.back());

@@ -113,6 +113,18 @@ class Faults(unittest.TestCase):
             self.assertEqual((answer.returncode, answer.stdout), (1, ""))
             self.assertEqual(answer.stderr.count("\n"), 1)
             self.assertRegex(answer.stderr, f"{fault}.*{cure}")
+        answer = flight("--fault", "gust@12", "--until", "12")
+        self.assertEqual((answer.returncode, answer.stdout), (1, ""))
+        self.assertEqual(answer.stderr, "chase-flight: --fault gust@12: the flight ends at 12 s, before it\n")
+
+    def test_a_scenario_with_a_full_disk_flies_live(self):
+        """deploy/fly asks for the configurations of its processes; it says itself what it leaves out."""
+        scenario = self.folder / "full.yaml"
+        scenario.write_text(pathlib.Path(SCENARIO).read_text(encoding="utf-8") + "\nfaults: [{name: disk-full}]\n",
+                            encoding="utf-8")
+        answer = flight("--print-config", "planning", scenario=scenario)
+        self.assertEqual((answer.returncode, answer.stderr), (0, ""))
+        self.assertRegex(flight(scenario=scenario).stderr, "disk-full.*fly live")
 
     def test_mission_flies_where_its_fault_strikes(self):
         """Killed and back 0.5 s later; the state it finds is the flight's."""
@@ -129,16 +141,23 @@ class Faults(unittest.TestCase):
         self.assertEqual({states[back - 1], *states[back + 5:]}, {3}, "CHASE")
 
     def test_scenario_tells_what_a_live_flight_needs(self):
-        """deploy/fly's operator gives what the one in lockstep does, and says which faults it leaves out."""
+        """deploy/fly's operator gives what the one in lockstep does, processes fail when they do there, and it
+        says which faults it leaves out."""
         scenario = self.folder / "told.yaml"
         scenario.write_text(pathlib.Path(SCENARIO).read_text(encoding="utf-8") + """
 commands: [{command: select, at_px: [180, 119.5], at_s: -2}, {command: hold, at_s: 3}, {command: kill, at_s: 4.5}]
-faults: [{name: lidar-gap}, {name: kill-planning, at: 5}, {name: delay-PLAN}, {name: loss-20}, {name: gust}]
+faults: [{name: lidar-gap}, {name: kill-planning, at: 5}, {name: delay-PLAN}, {name: loss-20}, {name: freeze-mapping}]
 """, encoding="utf-8")
         answer = subprocess.run([BIN / "chase-scenario", scenario], capture_output=True, text=True, check=True, timeout=LIMIT)
         told = json.loads(answer.stdout)
         self.assertEqual((told["duration_s"], told["settle_s"]), (60.0, 8.0))
-        self.assertEqual(told["left_out_live"], ["kill-planning", "delay-PLAN", "loss-20"])
+        self.assertEqual(told["left_out_live"], ["delay-PLAN", "loss-20"])
+        kill, freeze = told["faults"]
+        self.assertEqual(kill, {"name": "kill-planning", "at_s": 5.0, "for_s": 0.5})
+        self.assertEqual((freeze["name"], freeze["for_s"]), ("freeze-mapping", 2.0))
+        answer = flight("--until", freeze["at_s"] + 0.1, "--sensors", "raw", "--log", self.folder / "a.lcm", scenario=scenario)
+        self.assertEqual(answer.returncode, 0, answer.stderr)
+        self.assertIn(("freeze-mapping", 1, freeze["at_s"]), faults(self.folder / "a.lcm"))
         self.assertEqual([tuple(command.values()) for command in told["commands"]],
                          [("select", -2, ["180", "119.5"]), ("hold", 3, []), ("kill", 4.5, ["--force"])])
 
