@@ -32,5 +32,3 @@ BENCHMARK(CheckPlan)->Unit(benchmark::kMicrosecond);
 
 }  // namespace
 }  // namespace chase::control
-
-BENCHMARK_MAIN();

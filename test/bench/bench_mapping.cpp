@@ -139,5 +139,3 @@ BENCHMARK(BM_GymNoisy)->Iterations(1)->Unit(benchmark::kMillisecond);
 BENCHMARK(BM_Forest)->Iterations(1)->Unit(benchmark::kMillisecond);
 
 }  // namespace
-
-BENCHMARK_MAIN();

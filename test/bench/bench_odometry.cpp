@@ -148,5 +148,3 @@ BENCHMARK(Ceres)->Name("solver/ceres")->Unit(benchmark::kMillisecond);
 
 }  // namespace
 }  // namespace chase::odometry
-
-BENCHMARK_MAIN();

@@ -97,5 +97,3 @@ BENCHMARK_CAPTURE(Flights, forest, "forest")
     ->Unit(benchmark::kSecond);
 
 }  // namespace
-
-BENCHMARK_MAIN();

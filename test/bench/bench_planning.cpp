@@ -339,7 +339,7 @@ void Growth(benchmark::State& state) {
   state.counters["exponent_obstacles"] = Exponent(o, o_us);
 }
 
-void Register() {
+const bool kRegistered = [] {
   const auto row = [](const char* name, auto&& f) {
     benchmark::RegisterBenchmark(name, f)->Iterations(1)->Unit(benchmark::kMillisecond);
   };
@@ -357,15 +357,8 @@ void Register() {
   row("check_all/1728x50", CheckAll);
   row("refinement/1728x50", Refinement);
   row("growth", Growth);
-}
+  return true;
+}();
 
 }  // namespace
 }  // namespace chase::planning
-
-int main(int argc, char** argv) {
-  chase::planning::Register();
-  benchmark::Initialize(&argc, argv);
-  if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 1;
-  benchmark::RunSpecifiedBenchmarks();
-  return 0;
-}

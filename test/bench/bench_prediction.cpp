@@ -72,5 +72,3 @@ ACCURACY(worlds_1001_to_1004_chosen_on, Worlds(1001, 1004));
 
 }  // namespace
 }  // namespace chase::prediction
-
-BENCHMARK_MAIN();

@@ -98,5 +98,3 @@ BENCHMARK(ProvePlan)->Unit(benchmark::kMicrosecond);
 
 }  // namespace
 }  // namespace chase::world
-
-BENCHMARK_MAIN();

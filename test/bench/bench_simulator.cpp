@@ -46,5 +46,3 @@ BENCHMARK(ForestAll)->Unit(benchmark::kMillisecond);
 
 }  // namespace
 }  // namespace chase::simulator
-
-BENCHMARK_MAIN();

@@ -37,7 +37,8 @@ def run(program, *arguments):
 
 
 def programs():
-    return sorted(path.name for path in BIN.glob("chase-*")) + [name for name in CAMPAIGNS if (BIN / name).exists()]
+    built = [path.name for pattern in ("chase-*", "bench_*") for path in sorted(BIN.glob(pattern))]
+    return built + [name for name in CAMPAIGNS if (BIN / name).exists()]
 
 
 def first_scalar(dump):
