@@ -105,6 +105,14 @@ class BadUse(unittest.TestCase):
             self.assertRegex(answer.stdout, r"^\d+\.\d+\.\d+ \(commit [0-9a-z-]+\)\n$")
         self.for_each(programs(), check)
 
+    def test_the_command_beside_a_service_has_help(self):
+        if "perception" not in SERVICES:
+            self.skipTest("skipped: this build has no perception")
+        answer = run("chase-perception", "--learn-colour", "--help")
+        self.assertEqual((answer.returncode, answer.stderr), (0, ""))
+        self.assertIn("IMAGE MASK", answer.stdout)
+        self.assert_refused(run("chase-perception", "--learn-colour"), "pairs of IMAGE MASK")
+
     def test_every_program_refuses_what_it_does_not_know(self):
         self.for_each(programs(), lambda program: self.assert_refused(
             run(program, "--no-such-flag"), pathlib.Path(program).name))

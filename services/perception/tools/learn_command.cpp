@@ -54,9 +54,8 @@ std::string Quality(const std::vector<std::string>& files, const Learned& learne
 }
 
 void Learn(const std::vector<std::string>& files, const std::string& base, const std::string& out) {
-  if (files.size() % 2 != 0)
-    throw std::invalid_argument("--learn-colour: " + std::to_string(files.size()) +
-                                " files; give pairs of IMAGE MASK");
+  if (files.size() % 2 != 0)  // one empty name where none is given
+    throw std::invalid_argument("--learn-colour: give pairs of IMAGE MASK");
   PerceptionConfig config;
   if (!base.empty()) config::Load(base, &config);
   std::vector<cv::Mat> images, masks;
@@ -89,7 +88,8 @@ int LearnColour(int argc, char** argv) {
   std::vector<std::string> files;
   std::string base, out = "perception.yaml";
   app.add_option("--learn-colour", files, "IMAGE MASK [IMAGE MASK ...]; masks not 0 on the target")
-      ->required();
+      // With one at least it takes --help for a file.
+      ->expected(0, CLI::detail::expected_max_vector_size);
   app.add_option("--config", base, "YAML file that all else is taken from");
   app.add_option("--out", out, "config to write, for --config of the service");
   try {
@@ -99,7 +99,7 @@ int LearnColour(int argc, char** argv) {
   } catch (const CLI::Success& e) {  // --help
     return app.exit(e);
   } catch (const CLI::ParseError& e) {
-    std::fprintf(stderr, "chase-perception: %s; see --learn-colour IMAGE MASK --out YAML\n",
+    std::fprintf(stderr, "chase-perception: %s; see chase-perception --learn-colour --help\n",
                  e.what());
   } catch (const std::exception& e) {
     std::fprintf(stderr, "chase-perception: %s\n", e.what());
