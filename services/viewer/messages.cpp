@@ -10,6 +10,10 @@ namespace {
 
 Eigen::Matrix3d RowMajor(const double (&m)[9]) { return bus::ToMatrix(m); }
 
+Body Upright(const double (&p)[3], double yaw) {
+  return {bus::ToVector(p), Eigen::Quaterniond(Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()))};
+}
+
 const stage_status_t* StageOf(const status_t& m, const std::string& name) {
   const auto it = std::find_if(m.stages.begin(), m.stages.end(),
                                [&](const stage_status_t& s) { return s.name == name; });
@@ -73,6 +77,13 @@ std::vector<world::Obstacle> FromMessage(const obstacles_t& m, int64_t origin) {
   std::vector<world::Obstacle> out;
   for (const obstacle_t& o : m.obstacles) out.push_back(bus::FromMessage(o, origin));
   return out;
+}
+
+std::vector<Body> FromMessage(const truth_t& m) {
+  std::vector<Body> bodies{{bus::ToVector(m.pos), bus::ToQuaternion(m.orientation)},
+                           Upright(m.target_pos, m.target_yaw)};
+  for (const mover_t& mover : m.movers) bodies.push_back(Upright(mover.pos, mover.yaw));
+  return bodies;
 }
 
 ProcessHealth FromMessage(const status_t& m, const status_t* before) {

@@ -13,6 +13,7 @@
 #include "chase/prediction_t.hpp"
 #include "chase/status_t.hpp"
 #include "chase/target_t.hpp"
+#include "chase/truth_t.hpp"
 #include "services/viewer/page_text.h"
 #include "services/viewer/scene.h"
 
@@ -29,6 +30,8 @@ Forecast FromMessage(const prediction_t& m, int64_t origin);
 Flight FromMessage(const flight_state_t& m, int64_t origin);
 Fence FromMessage(const geofence_t& m);
 std::vector<world::Obstacle> FromMessage(const obstacles_t& m, int64_t origin);
+/// Drone, target, movers.
+std::vector<Body> FromMessage(const truth_t& m);
 
 /// `before`: the process's last status, for its share of a core; nullptr: none.
 ProcessHealth FromMessage(const status_t& m, const status_t* before);

@@ -51,6 +51,7 @@ void PageFeed::Take(const pose_t& m) {
     scene_.faults = std::move(faults);
   }
   epoch_ = m.epoch;
+  if (first_epoch_ < 0) first_epoch_ = epoch_;
   scene_.drone = FromMessage(m);
   pose_heard_ = bus_.Now();
 }
@@ -155,6 +156,7 @@ void PageFeed::Tick(int64_t utime, const std::string& self) {
   if (!play_ && second) SendHello();
   if (!sink_.Wanted(Part::kState) || (origin_ == 0 && !play_)) return;
   auto timer = bus_.Time("tick");
+  if (epoch_ >= 0 && epoch_ != first_epoch_) scene_.truth.clear();
   if (scene_.drone) scene_.drone->age = bus::Seconds(bus_.Now(), pose_heard_);
   sink_.Send(Part::kState, StateText(scene_, Elapsed(utime), generation_, play_), false);
   if (!obstacles_sent_ && ticks_ % kTicksPerObstacles == 0) {

@@ -11,6 +11,7 @@
 #include "chase/lidar_scan_t.hpp"
 #include "chase/scan_registered_t.hpp"
 #include "chase/tracking_t.hpp"
+#include "chase/truth_t.hpp"
 #include "common/bus/bus.h"
 #include "services/viewer/history.h"
 #include "services/viewer/messages.h"
@@ -43,6 +44,8 @@ class PageFeed {
   void Take(const status_t& m);
   /// Faults that a test flight did to itself; they last until the log says that they ended.
   void Take(const event_t& m);
+  /// Of simulations; in their frame W, which is that of the first poses.
+  void Take(const truth_t& m) { scene_.truth = FromMessage(m); }
   /// What no page shows.
   template <class T>
   void Take(const T&) {}
@@ -82,6 +85,7 @@ class PageFeed {
   std::map<std::string, int64_t> status_heard_;
   int generation_ = 0;  // of what a page has drawn and must clear
   int epoch_ = -1;      // of the frame W
+  int first_epoch_ = -1;
   Scene scene_;
   std::vector<world::Obstacle> obstacles_;
   bool obstacles_sent_ = true;

@@ -95,6 +95,12 @@ json FenceOf(const Fence& f) {
   return {{"corners", corners}, {"floor", Number(f.floor)}, {"ceiling", Number(f.ceiling)}};
 }
 
+json TruthOf(const std::vector<Body>& bodies) {
+  json rows = json::array();
+  for (const Body& b : bodies) rows.push_back({{"p", Numbers(b.p)}, {"q", Rotation(b.R)}});
+  return rows;
+}
+
 json RowOf(const Sample& s) {
   json row = {Number(s.t),       Number(s.distance), Number(s.clearance), Number(s.speed),
               Number(s.plan_ms), s.verdict,          s.target_state,      s.health};
@@ -134,6 +140,7 @@ std::string StateText(const Scene& scene, double t, int generation,
   if (scene.forecast) out["forecast"] = ForecastOf(*scene.forecast);
   if (scene.flight) out["flight"] = FlightOf(*scene.flight);
   if (scene.fence) out["fence"] = FenceOf(*scene.fence);
+  if (!scene.truth.empty()) out["truth"] = TruthOf(scene.truth);
   if (play) out["play"] = PlayOf(*play);
   return Text(out);
 }

@@ -47,7 +47,7 @@ Recording RecordLog(const std::string& log) {
     if (IsOnPage(channel)) feed.Take(m);
   };
   SubscribeShown(player, hear);
-  SubscribeFaults(player, hear);
+  SubscribeUnknown(player, hear);
   const auto step = static_cast<int64_t>(1e6 * std::max(kShortest, duration / kMostStates));
   feed.SetStart(player.begin());
   player.Survey(step, [&feed](int64_t utime) { feed.Remember(utime); });

@@ -64,6 +64,12 @@ struct Fence {
   double floor = 0.0, ceiling = 0.0;     ///< z, m
 };
 
+/// Where a simulation had somebody.
+struct Body {
+  Eigen::Vector3d p;     ///< of its centre, m
+  Eigen::Quaterniond R;  ///< from its own axes, x forward
+};
+
 /// The newest of everything.
 struct Scene {
   std::optional<Drone> drone;
@@ -72,9 +78,10 @@ struct Scene {
   std::optional<Forecast> forecast;
   std::optional<Flight> flight;
   std::optional<Fence> fence;
-  int following = -1;     ///< tracking_t's constants; -1: not heard
-  double plan_ms = -1.0;  ///< mean time per plan of the last second; negative: not known
-  int processes = -1;     ///< worst state of a process, status_t's constants; -1: none is heard
+  std::vector<Body> truth;  ///< drone, target, movers; empty: not known
+  int following = -1;       ///< tracking_t's constants; -1: not heard
+  double plan_ms = -1.0;    ///< mean time per plan of the last second; negative: not known
+  int processes = -1;       ///< worst state of a process, status_t's constants; -1: none is heard
   std::set<std::string> faults;  ///< that a test flight does to itself, by name
   std::string scenario;          ///< its name; empty: none
 };

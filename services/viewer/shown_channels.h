@@ -23,6 +23,7 @@
 #include "chase/status_t.hpp"
 #include "chase/target_t.hpp"
 #include "chase/tracking_t.hpp"
+#include "chase/truth_t.hpp"
 #include "common/bus/bus.h"
 
 namespace chase::viewer {
@@ -73,10 +74,12 @@ void SubscribeShown(bus::Bus& bus, const Hear& hear) {
   bus.Subscribe<status_t>("LINK_STATUS", on("LINK_STATUS"));
 }
 
-/// The same of the faults that a test flight did to itself; for logs.
+/// The same of what no vehicle knows: the faults that a test flight did to itself, and where the
+/// simulator had everybody; for logs.
 template <class Hear>
-void SubscribeFaults(bus::Bus& bus, const Hear& hear) {
+void SubscribeUnknown(bus::Bus& bus, const Hear& hear) {
   bus.Subscribe<event_t>("FAULT", [hear](const event_t& m) { hear("FAULT", m); });
+  bus.Subscribe<truth_t>("TRUTH", [hear](const truth_t& m) { hear("TRUTH", m); });
 }
 
 }  // namespace chase::viewer

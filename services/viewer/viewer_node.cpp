@@ -35,7 +35,7 @@ ViewerNode::ViewerNode(bus::Bus& bus, const ViewerConfig& config, const std::str
     foxglove_.Offer(channel, m);
   };
   SubscribeShown(bus, hear);
-  if (!source.empty()) SubscribeFaults(bus, hear);
+  if (!source.empty()) SubscribeUnknown(bus, hear);
 }
 
 void ViewerNode::Tick(int64_t utime) {

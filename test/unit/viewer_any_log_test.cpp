@@ -10,8 +10,10 @@
 #include "chase/event_t.hpp"
 #include "chase/lidar_scan_t.hpp"
 #include "chase/obstacles_t.hpp"
+#include "chase/truth_t.hpp"
 #include "common/bus/channels.h"
 #include "common/bus/log_writer.h"
+#include "services/viewer/page_feed.h"
 #include "services/viewer/recording.h"
 #include "services/viewer/shown_channels.h"
 #include "test/unit/viewer_memory_bus.h"
@@ -96,6 +98,59 @@ TEST(ViewerAnyLog, InjectedFaultsLastUntilTheyEnd) {
   EXPECT_GE(calm, 9);
 }
 
+TEST(ViewerAnyLog, TheTruthOfASimulationIsTold) {
+  const Recording recording = Recorded("TRUTH", [](int64_t utime) {
+    truth_t m{};
+    m.utime = utime;
+    m.pos[0] = 1e-6 * static_cast<double>(utime);
+    m.orientation[0] = 1.0;
+    m.target_pos[1] = 4.0;
+    m.target_yaw = m.n_movers = 2;
+    m.movers.resize(2);
+    m.movers[1].pos[2] = 0.9;
+    return m;
+  });
+  ASSERT_GT(CountOf(recording, Part::kState), 2);
+  for (const Recording::Frame& frame : recording.frames) {
+    if (frame.part != Part::kState) continue;
+    const json bodies = json::parse(frame.bytes)["truth"];
+    ASSERT_EQ(bodies.size(), 4U);
+    EXPECT_NEAR(bodies[0]["p"][0], 1.0 + frame.t, 0.11);
+    EXPECT_EQ(bodies[1]["p"], json({0.0, 4.0, 0.0}));
+    EXPECT_NEAR(bodies[1]["q"][3], std::sin(1.0), 1e-4);
+    EXPECT_EQ(bodies[3]["p"][2], 0.9);
+  }
+}
+
+TEST(ViewerAnyLog, TheTruthIsTheFirstFramesOnly) {
+  class Sink : public PageSink {
+   public:
+    void Send(Part part, std::string bytes, bool /*binary*/) override {
+      if (part == Part::kState) state = json::parse(bytes);
+    }
+    void Retain(Part, std::string) override {}
+    bool Wanted(Part) const override { return true; }
+    json state;
+  } sink;
+  MemoryBus bus;
+  PageFeed feed(bus, sink, ViewerConfig(), "flight.lcm");
+  feed.SetPlay({});
+  const auto tells_truth = [&](int epoch) {
+    pose_t pose{};
+    pose.utime = bus.now;
+    pose.epoch = epoch;
+    truth_t truth{};
+    truth.orientation[0] = 1.0;
+    feed.Take(pose);
+    feed.Take(truth);
+    feed.Tick(bus.now, "");
+    return sink.state.contains("truth");
+  };
+  EXPECT_TRUE(tells_truth(3));
+  EXPECT_FALSE(tells_truth(4)) << "POSE is in another frame than TRUTH now";
+  EXPECT_TRUE(tells_truth(3)) << "after a seek";
+}
+
 TEST(ViewerAnyLog, AVehiclesPrefixMayStandBeforeTheChannels) {
   const auto sweep = [](int64_t utime) {
     lidar_scan_t m{};
@@ -119,8 +174,8 @@ TEST(ViewerAnyLog, EveryChannelIsShownButTheTruth) {
     EXPECT_EQ(listener.heard.count(row.channel),
               row.channel == "TRUTH" || row.channel == "FAULT" ? 0U : 1U)
         << row.channel;
-  SubscribeFaults(listener, [](const char*, const auto&) {});
-  EXPECT_EQ(listener.heard.count("FAULT"), 1U);
+  SubscribeUnknown(listener, [](const char*, const auto&) {});
+  EXPECT_EQ(listener.heard.count("FAULT") + listener.heard.count("TRUTH"), 2U);
 }
 
 }  // namespace

@@ -169,6 +169,23 @@ const told = await page.evaluate(async () => {
 });
 assert.deepStrictEqual(told, {grown: [1.4, 2.4], sigma: [0.3, 0.6, 0.9], fan: 1, stop: true, hidden: true});
 
+// A simulation's truth is a layer: drone and target, for the gym has no movers, and nothing of it where a log has none.
+const truth = await page.evaluate(() => {
+  const {scene, model} = window.chase, drawn = () => scene.truth.filter((cross) => cross.visible).length;
+  const box = document.getElementById('showtruth'), label = document.getElementById('truth');
+  const log = {movers: model.state.truth.length - 2, offered: !label.hidden};
+  const body = (x) => ({p: [x, 2, 3], q: [0, 0, 0, 1]}), state = {generation: 0, row: [], truth: [body(1), body(4)]};
+  scene.setState(state);
+  const seen = [drawn(), scene.truth[1].position.toArray(), scene.truth[1].quaternion.toArray()];
+  box.click();
+  scene.setState(state);
+  const off = drawn();
+  box.click();
+  scene.setState({generation: 0, row: []});
+  return {log, seen, off, none: drawn()};
+});
+assert.deepStrictEqual(truth, {log: {movers: 0, offered: true}, seen: [2, [4, 2, 3], [0, 0, 1, 0]], off: 0, none: 0});
+
 // The geofence stands where it is told, and who is silent is seen on the time line.
 const lines = await page.evaluate(async () => {
   const {scene, model} = window.chase, corners = [[0, 0], [4, 0], [4, 3]];

@@ -40,8 +40,9 @@ function showFlight(flight) {
   pill(page.flight, text, silent ? 'bad' : '', silent ? '' : FLIGHT_COLORS[flight?.state]);
 }
 
-function showPills({drone, target, plan, following, flight}) {
+function showPills({drone, target, plan, following, flight, truth}) {
   showFlight(flight);
+  page.truth.hidden = !truth;
   const verdict = plan?.verdict;
   pill(page.verdict, plan ? `${VERDICTS[verdict] ?? '?'}${plan.reason ? ': ' + plan.reason : ''}` : 'no plan', '', VERDICT_COLORS[verdict]);
   pill(page.targetstate, target ? `target ${TARGET_STATES[target.state]}` : 'no target', target?.state === 1 ? 'good' : 'warn');
@@ -129,6 +130,7 @@ page.wantcloud.onchange = page.wantimage.onchange = () => { want(); if (!page.wa
 page.follow.onchange = () => { scene.follow = page.follow.checked; };
 const redraw = () => scene.setObstacles(scene.rows);
 page.showground.onchange = () => { scene.showGround = page.showground.checked; redraw(); };
+page.showtruth.onchange = () => { scene.showTruth = page.showtruth.checked; if (model.state) scene.setState(model.state); };
 page.showgrown.onchange = () => { scene.showGrown = page.showgrown.checked; redraw(); };
 
 page.playbutton.onclick = () => link.ask({play: !model.play?.playing});
@@ -149,6 +151,7 @@ const legend = (name, entries) => {
   line.append(name, ...made);
   return line;
 };
+page.truth.style.color = SCENE_COLORS.truth;
 page.legend.replaceChildren(legend('', Object.entries(SCENE_WORDS).map(([key, text]) => [text, SCENE_COLORS[key]])),
   legend('plan, wide: its stop ', VERDICTS.map((name, i) => [name, VERDICT_COLORS[i]])));
 page.colors.open = innerWidth > 800;  // a phone's scene has no room for them

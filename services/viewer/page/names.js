@@ -3,7 +3,7 @@ export const VERDICTS = ['chase', 'wider', 'kept', 'safe only', 'brake', 'wait',
 export const VERDICT_COLORS = ['#3fa66b', '#6fbf73', '#4c9be8', '#d9a33a', '#d9534f', '#7d8896', '#b455c9', '#991a1a'];
 // What stands in the scene, in the order of its legend.
 export const SCENE_COLORS = {drone: '#4c9be8', target: '#e8702a', sigma: '#fff2b0', forecast: '#ffd24d', still: '#8d97a5', grown: '#c98a8a',
-  moving: '#d9534f', velocity: '#ff8a80', ground: '#6b5f4a', fence: '#e05bd0'};
+  moving: '#d9534f', velocity: '#ff8a80', ground: '#6b5f4a', fence: '#e05bd0', truth: '#5ff0f0'};
 export const SCENE_WORDS = {drone: 'drone', target: 'target', sigma: 'its 3 sigma', forecast: 'forecast, 2 sigma', still: 'obstacle',
   grown: "grown by the drone's radius", moving: 'mover', velocity: 'its way in 1 s', fence: 'geofence'};
 export const TARGET_STATES = ['searching', 'tracking', 'occluded', 'lost'];

@@ -162,6 +162,19 @@ export class Scene3D {
     this.shaft = new THREE.CylinderGeometry(0.02, 0.02, 1, 6).translate(0, 0.5, 0);
     this.head = new THREE.ConeGeometry(0.075, 0.25, 8);
     this.setObstacles([]);
+    this.truth = [];
+    this.showTruth = true;
+    this.cross = new THREE.BufferGeometry().setAttribute('position',
+      new THREE.Float32BufferAttribute([-0.25, 0, 0, 0.5, 0, 0, 0, -0.25, 0, 0, 0.25, 0, 0, 0, -0.25, 0, 0, 0.25], 3));
+    this.crossLines = new THREE.LineBasicMaterial({color: SCENE_COLORS.truth, depthTest: false});  // seen through what stands there
+  }
+
+  // Where a simulation had drone, target or a mover: lines along its axes, the longest forward.
+  addCross() {
+    const cross = new THREE.LineSegments(this.cross, this.crossLines);
+    cross.frustumCulled = false;
+    this.truth.push(cross);
+    this.scene.add(cross);
   }
 
   clear() {
@@ -177,8 +190,11 @@ export class Scene3D {
 
   setState(state) {
     const {drone, target, plan, forecast} = state;
-    const moving = [[this.drone, drone], [this.target, target]].filter(([object, at]) => place(object, at?.p));
-    turn(this.drone, drone?.q);
+    const truth = this.showTruth && state.truth || [];
+    while (this.truth.length < truth.length) this.addCross();
+    const crosses = this.truth.map((cross, i) => [cross, truth[i]]);
+    const moving = [[this.drone, drone], [this.target, target], ...crosses].filter(([object, at]) => place(object, at?.p));
+    for (const [object, at] of [[this.drone, drone], ...crosses]) turn(object, at?.q);
     this.motion.aim(seconds(), state.generation, moving.map(([object]) => object));
     if (this.target.visible) {
       this.target.scale.set(target.radius, target.radius, target.height);
