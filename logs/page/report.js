@@ -39,7 +39,7 @@ function showHeader() {
   flights.forEach((flight, i) => {
     if ('passed' in flight.metrics)
       byId('title').append(make('span', `${two ? `${'AB'[i]} ` : ''}${flight.metrics.passed ? 'passed' : 'failed'}`, `badge ${flight.metrics.passed ? 'good' : 'bad'}`));
-    const {metrics, vehicle} = flight, commits = [...new Set(Object.values(vehicle.software.versions).map((v) => v.match(/commit \w+/)?.[0] ?? v))];
+    const {metrics, vehicle} = flight, commits = [...new Set(Object.values(vehicle.software.versions).map((v) => v.match(/commit [\w-]+/)?.[0] ?? v))];
     const of = metrics.duration_s ? ` of ${metrics.duration_s} s` : '';
     const factor = metrics.real_time_factor ? `, real-time factor ${metrics.real_time_factor.toFixed(2)}` : '';
     byId('subtitle').append(make('div', `${two ? `${'AB'[i]}: ${flight.log}, ` : ''}${metrics.flown_s.toFixed(1)} s${of} flown${factor}; ${commits.join(', ')}`));

@@ -108,7 +108,6 @@ function showTimeLine(flights) {
   if (marks.length) traces.push({name: 'fault begins', x: marks.map((s) => s.from), y: marks.map((s) => s.row), mode: 'markers+text', showlegend: false,
     text: marks.map((s) => s.label), textposition: 'top right', marker: {symbol: 'x', size: 10, color: COLORS.bad}, hoverinfo: 'skip'});
   drawOverTime('timeline', traces, {height: 110 + 34 * rows.length, barmode: 'overlay', bargap: 0.25, margin: {...MARGIN, t: 20},
-    legend: {orientation: 'h', y: -0.25, yanchor: 'top', x: 0, font: {size: 11}},
     yaxis: {categoryorder: 'array', categoryarray: rows, fixedrange: true}});
 }
 

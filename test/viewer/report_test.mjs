@@ -133,6 +133,15 @@ for (const name of ['one', 'vehicle', 'two', 'struck']) {
   await until('the recording on a phone', () => phone.evaluate(() => document.querySelector('iframe')?.contentWindow.chase?.model.play));
   const inside = await phone.evaluate(() => document.querySelector('iframe').contentDocument.documentElement.scrollWidth - document.querySelector('iframe').clientWidth);
   assert.ok(await phone.evaluate(() => document.documentElement.scrollWidth) <= 390 && inside <= 0, `${name} is wider than a phone`);
+  const unreadable = await phone.evaluate(() => {
+    const lines = (cell) => { const text = document.createRange(); text.selectNodeContents(cell); return text.getClientRects().length; };
+    const boxes = (chart, parts) => [...chart.querySelectorAll(parts)].map((text) => text.getBoundingClientRect());
+    const meet = (a, b) => a.left < b.right && b.left < a.right && a.top < b.bottom - 1 && b.top < a.bottom - 1;
+    return [...[...document.querySelectorAll('#software td:first-child')].filter((cell) => lines(cell) > 1).map((cell) => cell.innerText),
+      ...[...document.querySelectorAll('.time')].filter((chart) => boxes(chart, '.xtitle').some((title) =>
+        boxes(chart, '.xtick text, .legendtext').some((text) => meet(title, text)))).map(({id}) => id)];
+  });
+  assert.deepStrictEqual(unreadable, [], `${name}: names on two lines, or an axis' title upon other words`);
   await phone.close();
 }
 assert.deepStrictEqual(problems, []);
