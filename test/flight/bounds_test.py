@@ -1,7 +1,8 @@
-"""A whole flight within the bounds of bounds.json, not only without a collision: bounds_test.py BIN_DIR NAME
+"""Whole flights within the bounds of bounds.json, not only without a collision: bounds_test.py BIN_DIR NAME
 
-A bound is what the flight had when it was recorded, with room: twice an error (1 cm at least), twice a
-count and two more, half of a distance, and a hundredth of a share. Nobody widens one to let a change pass."""
+A bound is on each of its seeds, and has room over the worst when it was recorded: twice an error (1 cm at least), half of
+a distance, a hundredth of a share. The share of plans that are fallbacks is of all seeds together, and a third more is its
+bound. What an older bound asked for stays asked for: nobody widens one to let a change pass."""
 
 import json
 import pathlib
@@ -13,37 +14,44 @@ FOLDER = pathlib.Path(__file__).resolve().parent
 SCENARIOS = FOLDER.parents[1] / "deploy" / "scenarios"
 
 
-def fly(bin_dir, flight):
+def fly(bin_dir, flight, seed):
     """The metrics of a flight; its criteria are for the caller to judge."""
     with tempfile.TemporaryDirectory() as folder:
         metrics = pathlib.Path(folder) / "metrics.json"
-        command = [f"{bin_dir}/chase-flight", SCENARIOS / f"{flight['scenario']}.yaml", "--quiet", "--metrics",
-                   metrics, *flight["options"]]
+        command = [f"{bin_dir}/chase-flight", SCENARIOS / f"{flight['scenario']}.yaml", "--seed", str(seed), "--quiet",
+                   "--metrics", metrics, *flight["options"]]
         run = subprocess.run(command, capture_output=True, text=True, check=False)
         if not metrics.exists():
             sys.exit(f"{' '.join(map(str, command))}: {run.stderr.strip()}")
         return json.loads(metrics.read_text(encoding="utf-8"))
 
 
-def excesses(metrics, flight):
-    """A line for each figure beyond its bound."""
+def failed_criteria(metrics, flight):
     part = "--until" in flight["options"]
-    lines = [f"criterion {name} failed" for name, kept in metrics["criteria"].items()
-             if not kept and not (part and name == "complete")]
-    for side, worse in (("at_most", lambda a, b: a > b), ("at_least", lambda a, b: a < b)):
+    return [f"seed {metrics['seed']}: criterion {name} failed" for name, kept in metrics["criteria"].items()
+            if not kept and not (part and name == "complete")]
+
+
+def excesses(flights, flight):
+    """A line for each figure of a flight beyond its bound; prints the figures."""
+    lines = []
+    for side, sign in (("at_most", 1), ("at_least", -1)):
         for name, bound in flight[side].items():
-            if not isinstance(metrics[name], (int, float)) or worse(metrics[name], bound):
-                lines.append(f"{name} is {metrics[name]}, bound {side.replace('_', ' ')} {bound}")
+            words = f"bound {side.replace('_', ' ')} {bound}"
+            print(f"{name:<24} {[m[name] for m in flights]}, {words}")
+            lines += [f"seed {m['seed']}: {name} is {m[name]}, {words}" for m in flights
+                      if not isinstance(m[name], (int, float)) or not sign * m[name] <= sign * bound]
     return lines
 
 
 def main(bin_dir, name):
     flight = json.loads((FOLDER / "bounds.json").read_text(encoding="utf-8"))[name]
-    metrics = fly(bin_dir, flight)
-    for bounds in (flight["at_most"], flight["at_least"]):
-        for figure in bounds:
-            print(f"{figure:<24} {metrics[figure]:.4g}")
-    if lines := excesses(metrics, flight):
+    flights = [fly(bin_dir, flight, seed) for seed in flight["seeds"]]
+    lines = [line for metrics in flights for line in failed_criteria(metrics, flight)]
+    share = sum(m["fallbacks"] for m in flights) / sum(m["replans"] for m in flights)
+    for metrics in flights:
+        metrics["fallback_share"] = share
+    if lines := lines + excesses(flights, flight):
         sys.exit("\n".join(lines))
 
 

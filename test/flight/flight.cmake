@@ -14,11 +14,11 @@ set_tests_properties(flight_verify PROPERTIES TIMEOUT 120 FIXTURES_REQUIRED reco
 chase_script_test(flight_faults ${CMAKE_CURRENT_LIST_DIR}/faults_test.py ${bin} ${scenario})
 set_tests_properties(flight_faults PROPERTIES TIMEOUT 300)
 
-# The whole flight among trees, and half a minute in the hall in which planning dies: criteria and bounds decide.
+# Whole flights among trees, and half minutes in the hall in which planning dies: criteria and bounds decide.
 foreach(name IN ITEMS forest gym)
   add_test(NAME flight_${name}
     COMMAND python3 -B ${CMAKE_SOURCE_DIR}/test/flight/bounds_test.py ${bin} ${name})
-  set_tests_properties(flight_${name} PROPERTIES TIMEOUT 400)
+  set_tests_properties(flight_${name} PROPERTIES TIMEOUT 900)
 endforeach()
 
 # From take-off to the motors' end: on command, and by itself where the target is gone for good; criteria decide.
