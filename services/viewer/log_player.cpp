@@ -70,8 +70,9 @@ void LogPlayer::Seek(int64_t utime) {
   next_ = After(utime);
   std::vector<size_t> last = LastOfEach(0, next_);
   std::sort(last.begin(), last.end());
-  for (const size_t i : last)
-    if (i != SIZE_MAX) HandOver(index_[i]);
+  for (const bool heavy : {false, true})
+    for (const size_t i : last)
+      if (i != SIZE_MAX && heavy_[index_[i].channel] == heavy) HandOver(index_[i]);
   now_ = utime;
 }
 

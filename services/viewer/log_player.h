@@ -25,7 +25,8 @@ class LogPlayer : public bus::Bus {
   /// Hands over all light messages (throws std::runtime_error if nobody listens to any channel of
   /// the log) and calls `every` at multiples of `period` microseconds.
   void Survey(int64_t period, const std::function<void(int64_t utime)>& every);
-  /// Hands over, of each channel, the last message up to `utime`, in file order.
+  /// Hands over, of each channel, the last message up to `utime`, in file order; heavy ones last,
+  /// so that an image finds the target that is drawn into it.
   void Seek(int64_t utime);
   /// Hands over what follows up to `utime`; of each heavy channel only the last.
   void PlayTo(int64_t utime);

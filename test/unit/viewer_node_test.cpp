@@ -207,13 +207,16 @@ class ViewerPlayer : public ::testing::Test {
   }
   void Listen(LogPlayer* player) {
     player->Subscribe<pose_t>("POSE", [this](const pose_t& m) { poses_.push_back(m.pos[0]); });
-    player->Subscribe<scan_registered_t>("SCAN_REGISTERED",
-                                         [this](const scan_registered_t&) { ++scans_; });
+    player->Subscribe<scan_registered_t>("SCAN_REGISTERED", [this](const scan_registered_t&) {
+      ++scans_;
+      pose_first_ = !poses_.empty();
+    });
   }
 
   std::filesystem::path file_;
   std::vector<double> poses_;
   int scans_ = 0;
+  bool pose_first_ = false;  ///< before the last scan
 };
 
 TEST_F(ViewerPlayer, SeeksToTheStateAtThatTime) {
@@ -230,6 +233,7 @@ TEST_F(ViewerPlayer, SeeksToTheStateAtThatTime) {
     ASSERT_EQ(poses_.size(), 1U);
     EXPECT_EQ(poses_[0], std::floor(static_cast<double>(t - kSecond) / (0.1 * kSecond)));
     EXPECT_EQ(scans_, 1);
+    EXPECT_TRUE(pose_first_);
     EXPECT_EQ(player.Now(), t);
   }
   for (int i = 0; i <= 50; ++i) {  // at an event's own time it counts
