@@ -14,8 +14,6 @@ namespace {
 constexpr double kShortestHorizon = 1.0;
 constexpr double kWidestTube = 0.3;  // m: from farther off control follows no plan (reset_distance)
 constexpr double kJumpBack = 1.0;    // s; less is jitter between publishers
-// s: control says 20 times a second whether it flies; nobody climbs before that was heard.
-constexpr double kHearControl = 0.3;
 // A lost target is looked for from here while that share of where it may be is in sight from here;
 // else a place is gone to, for so long, s.
 constexpr double kEnoughInSight = 0.5, kKeepsPlace = 1.0;
@@ -145,14 +143,13 @@ bool Pilot::IsDue(double t) const {
   return news_ && age >= config_.min_period - 1e-6;
 }
 
-// Nobody climbs who waits, or before control has been heard; under a mission nobody who is not told
+// Nobody climbs who waits; under a mission nobody before control has been heard, or who is not told
 // to.
 bool Pilot::MayPlan(double t) const {
   if (task_ == Task::kDone) return false;
   if (has_running_ || airborne_) return true;
   if (waits_ || !SeesObstacles(t)) return false;
-  if (!task_) return heard_control_ || t >= *first_update_ + kHearControl;
-  return heard_control_ && (task_ == Task::kTakeoff || task_ == Task::kChase);
+  return !task_ || (heard_control_ && (task_ == Task::kTakeoff || task_ == Task::kChase));
 }
 
 std::optional<PlanResult> Pilot::Update(double t, const BodyEstimate& body) {
@@ -160,7 +157,6 @@ std::optional<PlanResult> Pilot::Update(double t, const BodyEstimate& body) {
   drift_ = BeyondTube(body.velocity_covariance, config_.planner);
   const double t0 = t + config_.latency;
   const Start start = StartAt(t, t0, body);
-  if (!first_update_) first_update_ = t;
   news_ = news_ || !start.follows;
   if (task_ && airborne_) trail_.Add(body.p);
   if (!IsDue(t) || !MayPlan(t)) return std::nullopt;

@@ -139,7 +139,6 @@ class Pilot {
   bool news_ = false;
   bool airborne_ = false;
   bool heard_control_ = false, flies_ = false, descending_ = false, waits_ = false;
-  std::optional<double> first_update_;  ///< s
   bool had_target_ = false;
   world::Trajectory last_seen_;  ///< forecast of the target that was chased last
   double climb_end_ = 0.0;
