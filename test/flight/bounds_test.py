@@ -2,7 +2,7 @@
 
 A bound is on each of its seeds, and has room over the worst when it was recorded: twice an error (1 cm at least), half of
 a distance, a hundredth of a share. The share of plans that are fallbacks is of all seeds together, and a third more is its
-bound. What an older bound asked for stays asked for: nobody widens one to let a change pass."""
+bound. Nobody widens one to let a change pass."""
 
 import json
 import pathlib
