@@ -311,8 +311,9 @@ class Ladder : public Planner {
       double sight_from;
       bool view;
     };
-    for (const auto& [sight_from, view] : {Try{0.25, true}, Try{0.5, true}, Try{0.25, false},
-                                           Try{0.5, false}, Try{0.75, false}, Try{1.0, false}}) {
+    for (const auto& [sight_from, view] :
+         {Try{0.25, true}, Try{0.5, true}, Try{0.75, true}, Try{0.25, false}, Try{0.5, false},
+          Try{0.75, false}, Try{1.0, false}}) {
       problem->limits.view = view ? config_.view() : std::nullopt;
       problem->limits.view_from = sight_from;
       if (!TrySearch(*problem, sight_from, std::nullopt, result)) continue;

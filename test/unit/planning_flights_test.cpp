@@ -5,9 +5,9 @@
 #include <functional>
 
 #include "common/world/ages.h"
-#include "common/world/plan_check.h"
 #include "common/world/random.h"
 #include "services/planning/pilot.h"
+#include "test/unit/planning_claim.h"
 
 // Whole flights of the pilot behind a target that goes round among pillars, is lost for a while and
 // found again: each plan follows from the one before, in time, and holds for whoever checks it.
@@ -69,24 +69,6 @@ std::vector<world::Obstacle> RandomPillars(unsigned seed) {
     pillars.push_back(o);
   }
   return pillars;
-}
-
-/// What control is told of a plan.
-world::Claim ClaimOf(const PlanResult& plan, const world::Trajectory& target,
-                     const PlannerConfig& c) {
-  world::Claim claim;
-  claim.position = plan.trajectory;
-  claim.target = target;
-  claim.stop = plan.stop;
-  claim.proofs = plan.proofs;
-  claim.stop_proofs = plan.stop_proofs;
-  claim.hard_radius = c.hard_radius();
-  claim.sigmas = c.sigmas;
-  claim.certified = plan.certified_clearance >= 0.0;
-  claim.last_resort = plan.verdict == Verdict::kBrake || plan.verdict == Verdict::kWait ||
-                      plan.verdict == Verdict::kMitigate;
-  claim.starts_inside = claim.last_resort || plan.verdict == Verdict::kEscape;
-  return claim;
 }
 
 struct Counts {

@@ -39,6 +39,33 @@ TEST(Pilot, WithoutObstaclesItBrakesAndCertifiesNothing) {
   EXPECT_LT(flight.Body().v.norm(), 0.05);
 }
 
+TEST(Pilot, SightIsKeptOverTheForecastsWorstAxis) {
+  const PlanningConfig config;
+  constexpr double kWorst = 0.2;  // m
+  for (int axis = 0; axis < 3; ++axis) {
+    Flight flight{config};
+    world::Obstacle pillar;
+    pillar.solid = world::Obstacle::Solid::kCylinder;
+    pillar.half = {0.2, 0.2, 3.0};
+    pillar.shape = pillar.half.cwiseAbs2().cwiseInverse().asDiagonal();
+    pillar.center = world::Trajectory::Constant({4.0, 2.0, 1.0}, 0.0, 1.0);
+    flight.obstacles = {pillar};
+    flight.Run(4.0, false);
+    Forecast forecast = Walking(flight.t);
+    forecast.covariance(axis, axis) = kWorst * kWorst;
+    flight.pilot.SetForecast(forecast);
+    const auto plan = flight.pilot.Update(flight.t, flight.Body());
+    ASSERT_TRUE(plan);
+    int of_sight = 0;
+    for (const Proof& proof : plan->proofs) {
+      if (!proof.of_sight) continue;
+      ++of_sight;
+      EXPECT_GT(proof.target_radius[0], config.planner.sigmas * kWorst) << axis;
+    }
+    EXPECT_GT(of_sight, 0);
+  }
+}
+
 TEST(Pilot, AListOfObstaclesIsAnsweredAtOnce) {
   const PlanningConfig config;
   for (const bool comes : {true, false}) {

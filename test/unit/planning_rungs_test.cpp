@@ -161,6 +161,9 @@ TEST(Rungs, EachAsksForLessThanTheOnesBefore) {
       const bool viewed = (q - 1)->problem.limits.view.has_value();
       EXPECT_LE(l.view.has_value(), viewed);
       EXPECT_TRUE(viewed != l.view.has_value() || q->sight_from > (q - 1)->sight_from);
+      if (q->sight_from < 1.0) {
+        EXPECT_TRUE(seen.count({q->sight_from, 1.0})) << "in the image first";
+      }
     }
     EXPECT_TRUE(later->problem.limits.view && later->sight_from == 0.25);
     EXPECT_TRUE(!asked.back().problem.limits.view && asked.back().sight_from == 1.0);

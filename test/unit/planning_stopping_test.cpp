@@ -4,6 +4,7 @@
 
 #include "common/world/random.h"
 #include "services/planning/resting.h"
+#include "test/unit/planning_claim.h"
 
 // Ways to rest, against brakings written anew and judged by sampled distances.
 
@@ -214,6 +215,10 @@ TEST(Rest, GoesOnWithTheStopThatWasCommittedTo) {
       }
       ++(t < way.start ? before : along);
       EXPECT_GE(rest.certified_clearance, 0.0);
+      EXPECT_EQ(world::Refute(ClaimOf(rest, request.target, config),
+                              {config.hard_radius(), config.sigmas}, request.obstacles),
+                "")
+          << seed;
       const world::Trajectory& last = t < way.start ? *rest.stop : rest.trajectory;
       EXPECT_LT((last.Position(last.end()) - way.Position(way.end())).norm(), 1e-6);
       for (double at = t; at < way.end(); at += 0.02) {
@@ -227,6 +232,29 @@ TEST(Rest, GoesOnWithTheStopThatWasCommittedTo) {
   EXPECT_GT(before, 0);
   EXPECT_GT(along, 0);
   std::printf("%d before a stop, %d along it\n", before, along);
+}
+
+// Who comes to where braking leads within two seconds is got out of the way of; who comes later is
+// planned for later.
+TEST(Rest, MindsWhoComesSoon) {
+  for (const auto& [comes_after, verdict] :
+       {std::pair{1.9, Verdict::kEscape}, std::pair{5.0, Verdict::kBrake}}) {
+    PlanRequest request;
+    request.t0 = 10.0;
+    request.start.p = {0.0, 0.0, 1.2};
+    request.start.v = {0.2, 0.0, 0.0};
+    request.target = world::Trajectory::Constant({0.0, 0.0, 50.0}, request.t0, 5.0);
+    Random random(1, 7);
+    world::Obstacle walker = RandomCylinder(&random, 4, Vector3d::Zero());
+    walker.moving = true;
+    walker.half = {0.3, 0.3, 1.0};
+    walker.shape = (2.0 * walker.half.cwiseAbs2()).cwiseInverse().asDiagonal();
+    walker.center = {request.t0, 1.0, Eigen::MatrixXd::Zero(2, 3)};
+    walker.center.coefficients.row(0) << 0.0, 1.2 * comes_after, 1.0;
+    walker.center.coefficients.row(1) << 0.0, -1.2, 0.0;
+    request.obstacles = {walker};
+    EXPECT_EQ(RestPlan(PlannerConfig(), request).verdict, verdict) << comes_after;
+  }
 }
 
 // The plan that only slows down is called so; the one that must be faster first, until its
