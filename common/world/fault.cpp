@@ -130,7 +130,9 @@ std::string FaultSpec::Problem() const {
 
 FaultSpec Settled(FaultSpec fault, double mission, int64_t seed, int number) {
   if (fault.at < 0.0) {
-    Random random(static_cast<uint64_t>(seed), kStream + static_cast<uint64_t>(number));
+    uint64_t stream = kStream + static_cast<uint64_t>(number);
+    for (const char letter : fault.name) stream = 31 * stream + static_cast<unsigned char>(letter);
+    Random random(static_cast<uint64_t>(seed), stream);
     const double drawn = random.Uniform(0.2 * mission, 0.7 * mission);
     fault.at = std::round(100.0 * drawn) / 100.0;  // so that NAME@SECONDS repeats it
   }

@@ -63,7 +63,8 @@ const std::vector<FaultKind>& FaultKinds();
 const FaultKind& KindOf(const FaultSpec& fault);
 
 /// Puts figures for what is left open: its duration, and a time that is drawn from the flight's
-/// seed, uniform from 20 to 70 % of the mission [s]. `number` tells the flight's faults apart.
+/// seed, the fault's name and its `number` in the flight, uniform from 20 to 70 % of the mission
+/// [s].
 FaultSpec Settled(FaultSpec fault, double mission, int64_t seed, int number);
 
 /// "kill-planning" or "kill-planning@12.5". Throws std::runtime_error, one line.

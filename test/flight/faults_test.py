@@ -93,13 +93,13 @@ class Faults(unittest.TestCase):
         self.assertEqual(before + after, list(range(len(before))) +
                          list(range(first, first + len(after))))
 
-    def test_time_is_drawn_from_the_seed(self):
-        def drawn(seed):
-            answer = flight("--fault", "lidar-dead", "--seed", seed, "--print-config", "simulator")
-            return float(re.search(r"lidar-dead.*\n\s+at: ([\d.]+)", answer.stdout).group(1))
-        times = [drawn(seed) for seed in (1, 1, 2, 3)]
+    def test_time_is_drawn_from_seed_and_name(self):
+        def drawn(seed, fault="lidar-dead"):
+            answer = flight("--fault", fault, "--seed", seed, "--print-config", "simulator")
+            return float(re.search(fault + r".*\n\s+at: ([\d.]+)", answer.stdout).group(1))
+        times = [drawn(seed) for seed in (1, 1, 2, 3)] + [drawn(1, "gust")]
         self.assertEqual(times[0], times[1])
-        self.assertEqual(len(set(times)), 3)
+        self.assertEqual(len(set(times)), 4)
         self.assertTrue(all(12.0 <= t <= 42.0 for t in times), times)  # of 60 s
 
     def test_sensor_fault_needs_sensors(self):
