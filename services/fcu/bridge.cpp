@@ -194,7 +194,8 @@ std::string Bridge::Missing(int64_t now) const {
   if (std::string unfit = autopilot_.Unfit(); !unfit.empty()) return unfit;
   if (!clock_.synced()) return "the autopilot's clock is not known yet";
   // In flight its estimate of our clock is as old as the flight, whoever flew it until now.
-  if (time_answers_ < kTimeAnswers && !autopilot_.armed())
+  const bool in_flight = autopilot_.armed() && !autopilot_.on_ground(now);
+  if (time_answers_ < kTimeAnswers && !in_flight)
     return fmt::format("the autopilot learns our clock: {} of {} answers", time_answers_,
                        kTimeAnswers);
   if (std::string problem = PoseProblem(now); !problem.empty()) return problem;

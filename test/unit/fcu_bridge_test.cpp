@@ -108,6 +108,18 @@ TEST(FcuBridge, NoFlightBeginsBeforeTheAutopilotKnowsOurClock) {
   EXPECT_NEAR(static_cast<double>(*host - stamp), 0.0, 2000.0);
 }
 
+TEST(FcuBridge, NorWhereThePilotHasArmedOnTheGround) {
+  FcuConfig config;
+  config.engage = "pilot";
+  Flight flight({}, config);
+  flight.px4.PilotArms(true);
+  flight.Run(3.0);
+  EXPECT_EQ(flight.px4.seen().setpoints, 0);
+  EXPECT_NE(flight.bridge.missing().find("learns our clock"), std::string::npos)
+      << flight.bridge.missing();
+  EXPECT_TRUE(flight.RunUntil(State::kStreaming, 4.0)) << flight.bridge.missing();
+}
+
 TEST(FcuBridge, ClocksMeetOnBothSides) {
   Flight flight;
   flight.setpoints = false;
