@@ -38,10 +38,11 @@ class Way {
     for (const proof_t& proof : proofs_) {
       if (proof.obstacle != id) continue;
       Check(proof);
-      (proof.of == proof_t::SIGHT ? seen : safe) = true;
+      if (proof.of == proof_t::SAFETY) safe = true;
+      seen = seen || (proof.of == proof_t::SIGHT && proof.from <= 0.0);
     }
     Ask(safe, "has no proof of safety");
-    Ask(seen, "has no proof of sight");
+    Ask(seen, "has no proof of sight over the whole plan");
   }
 
  private:

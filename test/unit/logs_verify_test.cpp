@@ -255,6 +255,12 @@ const std::map<std::string, Forgery>& Forgeries() {
          proofs.erase(proofs.begin() + static_cast<long>(i));
          return needed;
        }},
+      {"sight later",
+       [](Wire* w, Random& g) {
+         proof_t& proof = w->plan.proofs[g() % w->plan.proofs.size()];
+         proof.from = Uniform(g, 1e-6, 0.999);
+         return proof.of == proof_t::SIGHT && w->plan.verdict <= plan_t::KEPT;
+       }},
       {"planes missing",
        [](Wire* w, Random& g) {
          AnyProof(w, g).separations.clear();
