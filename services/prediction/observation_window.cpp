@@ -93,11 +93,6 @@ ObservationWindow::Outcome ObservationWindow::Add(const Observation& o) {
   for (const auto* list : {&kept_, &outliers_})
     for (const Observation& k : *list)
       if (std::abs(k.t - o.t) < kSameStamp) return Outcome::kDuplicate;
-  if (!kept_.empty() && o.t < newest() - 2.0 * config_.length) {  // the clock was set back
-    Clear();
-    Insert(o);
-    return Outcome::kRestarted;
-  }
   if (!kept_.empty() && o.t < newest() - config_.length) return Outcome::kTooOld;
   if (IsOutlier(o)) return TakeOutlier(o);
   outliers_.clear();

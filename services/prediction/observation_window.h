@@ -35,7 +35,7 @@ class ObservationWindow {
  public:
   enum class Outcome {
     kTaken,
-    kRestarted,  ///< after outliers in a row, or a stamp far in the past: the old ones are dropped
+    kRestarted,  ///< after outliers in a row: the old ones are dropped
     kOutlier,
     kDuplicate,  ///< an observation with this stamp is there already
     kTooOld,

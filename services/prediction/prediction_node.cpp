@@ -56,7 +56,8 @@ void PredictionNode::OnObstacles(const obstacles_t& message) {
 
 void PredictionNode::OnTarget(const target_t& message) {
   const double now = Time(message.utime);
-  if (epoch_.Change(message.epoch)) {
+  const bool set_back = order_.Take(message.utime) == bus::StampOrder::Verdict::kSetBack;
+  if (epoch_.Change(message.epoch) || set_back) {
     window_.Clear();
     obstacles_.clear();
     trigger_.Lost();

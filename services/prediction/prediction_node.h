@@ -11,6 +11,7 @@
 #include "common/bus/bus.h"
 #include "common/bus/epoch.h"
 #include "common/bus/node.h"
+#include "common/bus/stamp_order.h"
 #include "common/world/ages.h"
 #include "services/prediction/observation_window.h"
 #include "services/prediction/predictor.h"
@@ -61,6 +62,7 @@ class PredictionNode : public bus::Node {
   ObservationWindow window_;
   ReplanTrigger trigger_;
   bus::Epoch epoch_;
+  bus::StampOrder order_;
   std::vector<world::Obstacle> obstacles_;
   double obstacles_time_ = 0.0;             // s since origin
   std::optional<int64_t> origin_;           // utime that the core's seconds count from

@@ -159,6 +159,20 @@ TEST_F(PredictionNodeTest, SurvivesDuplicatesAndStampsOutOfOrder) {
   EXPECT_EQ(last().verdict, kOk);
 }
 
+TEST_F(PredictionNodeTest, StartsAnewWhenTheClockIsSetBack) {
+  for (const double by : {0.5, 3.0, 60.0}) {
+    PredictionNodeTest::SetUp();
+    PredictionNode again{bus, PredictionConfig{}};
+    bus.sent.clear();
+    Drive(100.0, 103.0);
+    ASSERT_EQ(last().verdict, kOk);
+    Drive(103.0 - by, 103.5 - by);
+    EXPECT_EQ(last().verdict, kOk) << by;
+    EXPECT_LE(last().utime, kStart + static_cast<int64_t>((103.5 - by) * 1e6)) << by;
+    EXPECT_LT(last().target.coefficients[0] - 0.8 * (103.5 - by), 0.2) << by;
+  }
+}
+
 TEST_F(PredictionNodeTest, SameInputSameOutput) {
   Drive(0.0, 1.5);
   MemoryBus other_bus;

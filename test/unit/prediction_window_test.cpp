@@ -105,12 +105,6 @@ TEST(ObservationWindow, RecoversWhenTheTargetReallyJumped) {
   for (const Observation& o : window.Merged()) EXPECT_LT((o.mean - Walk(2.0) - jump).norm(), 1e-9);
 }
 
-TEST(ObservationWindow, StartsAnewWhenTheClockIsSetBack) {
-  ObservationWindow window = Filled(10.0);
-  EXPECT_EQ(window.Add(At(0.0, Walk(0.0))), Outcome::kRestarted);
-  EXPECT_EQ(window.size(), 1);
-}
-
 TEST(ObservationWindow, TakesTurnsAndStopsForWhatTheyAre) {
   // 1 m/s round a corner of radius 0.8 m after a straight, then a stop at 1.5 m/s^2, with noise.
   InstanceGenerator noise(7);
