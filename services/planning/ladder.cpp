@@ -290,7 +290,8 @@ class Ladder : public Planner {
     const Stretch rest = RestOf(*request.running, request);
     const Curve curve = ToCurve(*request.running, rest.t0, rest.horizon);
     result->verdict = Verdict::kKept;
-    result->reason = "no candidate is feasible, the running plan still is";
+    result->reason =
+        "no candidate is feasible, the running plan still is, with half of the margins";
     result->trajectory = ToTrajectory(curve, rest.t0, rest.horizon);
     MakeProblem(config_, request, rest, nullptr, &shorter_);
     result->cost = Evaluate(config_, shorter_, curve);

@@ -150,20 +150,22 @@ void RelaxSight(const world::Obstacle& o, const Growth& growth, const FirstSight
     e->sight = Grown(o, *e, share * growth.sight);
     e->grown_by[1] = -1.0;
   };
+  const auto note = [&](double share, const std::string& where) {
+    if (share == 1.0) return;
+    Note(notes, where + "obstacle " + std::to_string(e->id) + ", " +
+                    std::to_string(static_cast<int>(100.0 * share)) +
+                    " % of the target's margin and uncertainty kept");
+  };
   for (double share : kShares) {
     take(share);
     if (!target_is_off(share)) continue;
     if (!kept) kept = share;
     if (!begins_in_sight(share)) continue;
-    if (share < *kept)
-      Note(notes, "sight starts within the margin of obstacle " + std::to_string(e->id));
-    else if (share < 1.0)
-      Note(notes, "the target passes within the sight margin of obstacle " + std::to_string(e->id));
-    return;
+    return note(share, share < *kept ? "sight starts within the margin of "
+                                     : "the target passes within the sight margin of ");
   }
   if (kept) {
-    if (*kept < 1.0)
-      Note(notes, "the target passes within the sight margin of obstacle " + std::to_string(e->id));
+    note(*kept, "the target passes within the sight margin of ");
     return take(*kept);
   }
   e->sight_from = 1.0;

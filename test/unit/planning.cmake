@@ -21,7 +21,7 @@ chase_test(planning_test
           ${CMAKE_CURRENT_LIST_DIR}/planning_whereabouts_test.cpp)
 chase_test(planning_node_test LIBS planning_node
   SOURCES ${CMAKE_CURRENT_LIST_DIR}/planning_node_test.cpp)
-# CHASE_PLANS=10000 asks for as many plans.
+# CHASE_PLANS=5000: of so many seeds, two plans each.
 chase_test(planning_minkowski_test
   LIBS planning_core math_exact
   SOURCES ${CMAKE_CURRENT_LIST_DIR}/planning_minkowski_test.cpp ${CMAKE_CURRENT_LIST_DIR}/planning_proofs_test.cpp

@@ -109,8 +109,10 @@ void ExpectRelaxed(const PlannerConfig& c, const Problem& problem, const Ellipso
   EXPECT_EQ(noted("starts inside "), inside);
   EXPECT_EQ(noted("starts within the margin of "), within);
   EXPECT_EQ(noted("", " holds the target, its shadow is ignored"), hidden);
-  const bool passes = noted("the target passes within the sight margin of ");
-  const bool starts = noted("sight starts within the margin of ");
+  const std::string kept = ", " + std::to_string(static_cast<int>(100.0 * e.sight_share)) +
+                           " % of the target's margin and uncertainty kept";
+  const bool passes = noted("the target passes within the sight margin of ", kept);
+  const bool starts = noted("sight starts within the margin of ", kept);
   EXPECT_EQ(passes + starts, less ? 1 : 0);
   EXPECT_TRUE(then(passes, target_needs) && then(starts, start_needs));
 }
