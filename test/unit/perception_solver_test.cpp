@@ -81,14 +81,15 @@ Vector7d Differences(const Function& f, const Vector7d& y) {
   return out;
 }
 
-using ResidualAt = std::function<Residual(const Vector7d& y)>;
-
-void ExpectGradient(const ResidualAt& residual, const Vector7d& y) {
-  const Vector7d gradient = residual(y).by_y;
-  const auto f = [&](const Vector7d& at) { return residual(at).value; };
-  EXPECT_LT((gradient - Differences(f, y)).norm(), 1e-5 * (1.0 + gradient.norm()))
+/// `residual` of y as numbers and as jets.
+template <class Function>
+void ExpectGradient(const Function& residual, const Vector7d& y) {
+  Unknown<Jet> jets;
+  for (int i = 0; i < kUnknowns; ++i) jets[i] = Jet(y[i], i);
+  const Vector7d gradient = residual(jets).v;
+  EXPECT_LT((gradient - Differences(residual, y)).norm(), 1e-5 * (1.0 + gradient.norm()))
       << gradient.transpose() << "\n"
-      << Differences(f, y).transpose();
+      << Differences(residual, y).transpose();
 }
 
 TEST(PerceptionSolver, GradientsOfTheResidualsAreTheirDifferences) {
@@ -106,19 +107,14 @@ TEST(PerceptionSolver, GradientsOfTheResidualsAreTheirDifferences) {
       const Solid solid{square, half, 0.5 + 0.02 * scene.Uniform()};
       Vector7d turned = y;
       turned[kYawAt] = 3.0 * scene.Uniform();
-      const auto expect = [&](auto residual) {
-        ExpectGradient([&](const Vector7d& at) { return residual(ray, solid, sign, at).Scaled(7); },
-                       turned);
-      };
-      expect(SideResidual);
-      expect(CapResidual);
-      ExpectGradient([&](const Vector7d& at) { return PointResidual(p_W, age, solid, at); },
-                     turned);
+      ExpectGradient([&](const auto& at) { return SideResidual(ray, solid, sign, at); }, turned);
+      ExpectGradient([&](const auto& at) { return CapResidual(ray, solid, sign, at); }, turned);
+      ExpectGradient([&](const auto& at) { return PointResidual(p_W, age, solid, at); }, turned);
     }
     const Solid ball{false, half, 2.0 * half};
     ExpectGradient(
-        [&](const Vector7d& at) { return TangentResidual(ray, ball, i % 4 < 2, sign, at); }, y);
-    ExpectGradient([&](const Vector7d& at) { return SpherePointResidual(p_W, age, ball, at); }, y);
+        [&](const auto& at) { return TangentResidual(ray, ball, i % 4 < 2, sign, at); }, y);
+    ExpectGradient([&](const auto& at) { return SpherePointResidual(p_W, age, ball, at); }, y);
   }
 }
 
@@ -254,10 +250,10 @@ TEST(PerceptionSolver, GradientOfTheProblemIsItsDifference) {
 }
 
 struct OverY {
-  ResidualAt residual;
+  std::function<double(const Vector7d& y)> residual;
   double scale;
   bool operator()(const double* y, double* r) const {
-    *r = scale * residual(Eigen::Map<const Vector7d>(y)).value;
+    *r = scale * residual(Eigen::Map<const Vector7d>(y));
     return true;
   }
 };
@@ -313,7 +309,7 @@ class Reference {
         new ceres::NumericDiffCostFunction<Prior, ceres::CENTRAL, 7, 7>(new Prior{y, root}),
         nullptr, y.data());
   }
-  void Add(const ResidualAt& residual, double scale, double weight, size_t samples) {
+  void Add(const std::function<double(const Vector7d& y)>& residual, double scale, double weight, size_t samples) {
     const double share = std::min(1.0, weight / static_cast<double>(samples));
     problem_.AddResidualBlock(
         new ceres::NumericDiffCostFunction<OverY, ceres::CENTRAL, 1, 7>(new OverY{residual, scale}),
@@ -336,7 +332,7 @@ class Reference {
     const double span = upright ? turn : b.slope - a.slope;
     Add(
         [this, sign, upright, ray = Ray(px)](const Vector7d& at) {
-          return (upright ? SideResidual : CapResidual)(ray, solid_, sign, at);
+          return upright ? SideResidual(ray, solid_, sign, at) : CapResidual(ray, solid_, sign, at);
         },
         scale / std::abs(span), kEdgeWeight, 8);
   }

@@ -37,8 +37,6 @@ double PerPixel(const Camera& camera, const Eigen::Vector2d& px, bool upright) {
   return std::max(kLeastPerPx, std::abs(span));
 }
 
-Solid SolidOf(const TargetShape& shape) { return {shape.box(), shape.size[0], shape.size[1]}; }
-
 /// Of one of `samples` that count for `weight` independent ones together.
 double Share(size_t samples, double weight) {
   return std::min(1.0, weight / static_cast<double>(std::max<size_t>(1, samples)));
@@ -78,13 +76,8 @@ Vector7d Unknowns(const TargetGaussian& target, const TargetShape& shape) {
   return y;
 }
 
-Residual SurfaceDistance(const TargetShape& shape, const TargetPoint& point, const Vector7d& y) {
-  return (shape.sphere() ? SpherePointResidual : PointResidual)(point.p_W, point.age,
-                                                                SolidOf(shape), y);
-}
-
 FitProblem::FitProblem(const FitInput& input, const FitConfig& config)
-    : input_(input), config_(config), solid_(SolidOf(input.shape)) {
+    : input_(input), config_(config), solid_{input.shape.box(), input.shape.size[0], input.shape.size[1]} {
   const Eigen::LLT<Matrix6d> llt(input.prior.covariance);
   if (llt.info() != Eigen::Success) return;
   root_ = llt.matrixL().solve(Matrix6d::Identity());
@@ -122,16 +115,20 @@ void FitProblem::AddPosition() {
   position_ = input_.camera.p_WC + R * *input_.detection->p_CT;
 }
 
-Residual FitProblem::EdgeResidual(size_t side, const Edge& edge, const Vector7d& y) const {
+template <class T>
+T FitProblem::EdgeResidual(size_t side, const Edge& edge, const Unknown<T>& y) const {
   const double sign = Sign(side);
   if (input_.shape.sphere())
-    return TangentResidual(edge.ray, solid_, Upright(side), sign, y).Scaled(edge.px);
-  return (Upright(side) ? SideResidual : CapResidual)(edge.ray, solid_, sign, y).Scaled(edge.px);
+    return edge.px * TangentResidual(edge.ray, solid_, Upright(side), sign, y);
+  return edge.px * (Upright(side) ? SideResidual(edge.ray, solid_, sign, y)
+                                  : CapResidual(edge.ray, solid_, sign, y));
 }
 
 NormalEquations FitProblem::Linearised(const Vector7d& y) const {
   NormalEquations sum;
   const Vector7d off = y - Start();
+  Unknown<Jet> at;
+  for (int i = 0; i < kUnknowns; ++i) at[i] = Jet(y[i], i);
   sum.information = information_;
   sum.gradient = information_ * off;
   sum.cost = 0.5 * off.dot(sum.gradient);
@@ -140,15 +137,15 @@ NormalEquations FitProblem::Linearised(const Vector7d& y) const {
     Cauchy loss(Share(edges_[side].size(), kEdgeWeight));
     const double scale = 1.0 / (input_.detection->silhouette.sigma_px * prior_range_);
     for (const auto& edge : edges_[side]) {
-      const Residual r = EdgeResidual(side, edge, y).Scaled(scale);
-      sum.Add(loss.Weight(r.value * r.value), r);
+      const Jet r = scale * EdgeResidual(side, edge, at);
+      sum.Add(loss.Weight(r.a * r.a), r);
     }
     sum.cost += loss.cost();
   }
   Cauchy loss(Share(input_.points.size(), kLidarWeight));
   for (const auto& p : input_.points) {
-    const Residual r = SurfaceDistance(input_.shape, p, y).Scaled(1.0 / config_.lidar_sigma);
-    sum.Add(loss.Weight(r.value * r.value), r);
+    const Jet r = SurfaceDistance(input_.shape, p, at) / config_.lidar_sigma;
+    sum.Add(loss.Weight(r.a * r.a), r);
   }
   sum.cost += loss.cost();
   if (!position_information_) return sum;
@@ -205,11 +202,11 @@ FitResult FitProblem::Read(const Vector7d& y, const Matrix7d& covariance, double
   std::array<std::vector<double>, 4> edges;
   for (size_t side = 0; side < 4; ++side)
     for (const auto& edge : edges_[side])
-      edges[side].push_back(EdgeResidual(side, edge, y).value / Range(y));
+      edges[side].push_back(EdgeResidual(side, edge, y) / Range(y));
   ReadSides(edges, &out);
   std::vector<double> points;
   for (const auto& p : input_.points) {
-    points.push_back(SurfaceDistance(input_.shape, p, y).value);
+    points.push_back(SurfaceDistance(input_.shape, p, y));
     out.point_rms += points.back() * points.back();
   }
   out.n_points = static_cast<int>(points.size());

@@ -17,10 +17,10 @@ struct NormalEquations {
   /// J' J with each row weighed by its loss's slope, as where the weights are held.
   Matrix7d information = Matrix7d::Zero();
 
-  void Add(double weight, const Residual& r) {
-    const Vector7d weighed = weight * r.by_y;
-    gradient += r.value * weighed;
-    information.noalias() += weighed * r.by_y.transpose();
+  void Add(double weight, const Jet& r) {
+    const Vector7d weighed = weight * r.v;
+    gradient += r.a * weighed;
+    information.noalias() += weighed * r.v.transpose();
   }
 };
 
@@ -29,7 +29,12 @@ Vector7d Unknowns(const TargetGaussian& target, const TargetShape& shape);
 
 /// Signed distance of a point [m] from the surface of the target y where it was at the point's
 /// time.
-Residual SurfaceDistance(const TargetShape& shape, const TargetPoint& point, const Vector7d& y);
+template <class T>
+T SurfaceDistance(const TargetShape& shape, const TargetPoint& point, const Unknown<T>& y) {
+  const Solid solid{shape.box(), shape.size[0], shape.size[1]};
+  return shape.sphere() ? SpherePointResidual(point.p_W, point.age, solid, y)
+                        : PointResidual(point.p_W, point.age, solid, y);
+}
 
 /// The least squares problem of one FitInput over y (fit_residuals.h): prediction, edges, points,
 /// and a position where one is measured. Single samples have Cauchy's loss, the prediction has
@@ -58,7 +63,8 @@ class FitProblem {
   void AddPosition();
   double Range(const Vector7d& y) const;
   /// In px, at a range of 1 m.
-  Residual EdgeResidual(size_t side, const Edge& edge, const Vector7d& y) const;
+  template <class T>
+  T EdgeResidual(size_t side, const Edge& edge, const Unknown<T>& y) const;
   void ReadSides(const std::array<std::vector<double>, 4>& edges, FitResult* out) const;
   bool ReadEvidence(const std::array<std::vector<double>, 4>& edges,
                     const std::vector<double>& points, FitResult* out) const;

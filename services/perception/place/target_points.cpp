@@ -49,7 +49,7 @@ std::vector<TargetPoint> PointsOnTarget(const FitInput& input,
   const Vector7d y = Unknowns(input.prior, input.shape);
   std::vector<TargetPoint> kept;
   for (const auto& p : cluster)
-    if (std::abs(SurfaceDistance(input.shape, p, y).value) < gate) kept.push_back(p);
+    if (std::abs(SurfaceDistance(input.shape, p, y)) < gate) kept.push_back(p);
   if (!GivesRange(kept)) return {};
   const size_t step = 1 + kept.size() / kMostPoints;  // more would not tell more
   std::vector<TargetPoint> some;
