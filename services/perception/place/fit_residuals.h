@@ -17,6 +17,12 @@ using Vector7d = Unknown<double>;
 using Matrix7d = Eigen::Matrix<double, kUnknowns, kUnknowns>;
 using Jet = ceres::Jet<double, kUnknowns>;  ///< value `a`, derivatives `v`
 
+inline Unknown<Jet> Jets(const Vector7d& y) {
+  Unknown<Jet> jets;
+  for (int i = 0; i < kUnknowns; ++i) jets[i] = Jet(y[i], i);
+  return jets;
+}
+
 /// The target's solid by its size [m]: upright, round or on a square; of a sphere the radius
 /// counts.
 struct Solid {
