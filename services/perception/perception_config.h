@@ -1,5 +1,7 @@
 #pragma once
 
+#include <Eigen/Core>
+#include <cmath>
 #include <sstream>
 #include <string>
 #include <type_traits>
@@ -8,13 +10,18 @@
 
 namespace chase::perception {
 
-/// Visits a config's fields for the first one that lies outside its limits, as Limited() gives
-/// them.
+/// Visits a config's fields for the first one that is no number, or lies outside its limits as
+/// Limited() gives them.
 struct LimitCheck {
   std::string problem;
 
   template <class T>
-  void operator()(const char*, T&, const char*) {}
+  void operator()(const char* name, T& field, const char*) {
+    bool number = true;
+    if constexpr (std::is_floating_point_v<T>) number = std::isfinite(field);
+    if constexpr (std::is_base_of_v<Eigen::MatrixBase<T>, T>) number = field.allFinite();
+    if (problem.empty() && !number) problem = std::string(name) + " is no finite number";
+  }
   void Limit(const char* name, double value, double low, double high) {
     if (!problem.empty() || (value >= low && value <= high)) return;
     std::ostringstream out;
