@@ -7,7 +7,7 @@
 #include <random>
 
 #include "perception_world.h"
-#include "services/perception/belief/candidate.h"
+#include "services/perception/belief/track.h"
 #include "services/perception/place/localiser.h"
 #include "services/perception/place/target_points.h"
 #include "services/perception/sight/color_detector.h"
@@ -76,21 +76,6 @@ TEST(PerceptionRays, OnlyThoseThroughThePlacedTargetCount) {
   EXPECT_EQ(RaysThrough(input, placed), 0) << "they end on it";
 }
 
-TEST(PerceptionRays, ManyPointsAndNoneOfThemOnTheTargetHitAnotherThing) {
-  const FitInput input = Predicted();
-  std::vector<TargetPoint> behind, on;
-  for (int i = 0; i < 10; ++i) behind.push_back(PointAt({4.0, 0.02 * i, 0.5}));
-  for (int i = 0; i < 3; ++i) on.push_back(PointAt({2.85, 0.0, 0.45 + 0.1 * i}));
-  const std::vector<TargetPoint> seven(behind.begin(), behind.begin() + 7);
-  std::vector<TargetPoint> mixed = on;
-  mixed.insert(mixed.end(), seven.begin(), seven.end());
-  EXPECT_TRUE(HitElsewhere(input, {behind}));
-  EXPECT_FALSE(HitElsewhere(input, {on, seven}));
-  EXPECT_FALSE(HitElsewhere(input, {mixed}));
-  behind.pop_back();
-  EXPECT_FALSE(HitElsewhere(input, {behind}));
-}
-
 TEST(PerceptionPieces, WhatGoesWithTheWidthIsThePiecesOwn) {
   cv::Mat bgr(240, 376, CV_8UC3, cv::Scalar::all(120));
   bgr(cv::Rect(100, 60, 80, 90)).setTo(cv::Scalar(12, 105, 235));
@@ -109,30 +94,28 @@ TEST(PerceptionPieces, WhatGoesWithTheWidthIsThePiecesOwn) {
               4.0 * 4.0 - 1.0 * 1.0, 1e-9);
 }
 
-/// Something grey hides the left half of the target.
-TEST(PerceptionCandidate, WithoutPointsAWayAlongTheLineOfSightIsNotSure) {
-  const auto gone = [](const Vector3d& way) {
-    Candidate c;
-    c.track.state.mean << kTarget, Vector3d::Zero();
-    c.track.state.covariance = 1e-4 * Matrix6d::Identity();
+TEST(PerceptionCandidate, OfAPieceWithoutPointsAWayAlongTheLineOfSightIsNotSure) {
+  const auto gone = [](const Vector3d& way, int points) {
+    Track c;
+    c.state.mean << kTarget, Vector3d::Zero();
+    c.state.covariance = 1e-4 * Matrix6d::Identity();
     c.odds = c.last.fit.log_odds = 20.0;
+    c.last.fit.n_points = points;
     c.last.detection.silhouette.sigma_px = 0.5;
     c.last.detection.box.height = 40.0;
+    c.partial = true;
     c.first = c.Now();
-    c.track.state.mean << kTarget + way, way;
-    c.track.t = 1.0;
-    c.edge = 0.5 * 3.0 / 220.0;
+    c.state.mean << kTarget + way, way;
+    c.t = 1.0;
     return c;
   };
-  Candidate along = gone({0.4, 0.0, 0.0}), across = gone({0.0, 0.4, 0.0});
-  ASSERT_TRUE(along.Drives() && along.Steady() && across.Drives() && across.Steady());
-  EXPECT_FALSE(along.SurelyDrives(0.15));
-  EXPECT_TRUE(across.SurelyDrives(0.15));
-  EXPECT_FALSE(across.SurelyDrives(0.5));
-  along.first.ranged = true;
-  EXPECT_FALSE(along.SurelyDrives(0.15)) << "points of the first time alone";
-  along.last.fit.n_points = 20;
-  EXPECT_TRUE(along.SurelyDrives(0.15));
+  const Vector3d along(0.4, 0.0, 0.0), across(0.0, 0.4, 0.0);
+  EXPECT_FALSE(gone(along, 0).Drives());
+  EXPECT_TRUE(gone(across, 0).Drives());
+  EXPECT_TRUE(gone(along, 20).Drives());
+  Track half = gone(along, 20);
+  half.last.fit.n_points = 0;
+  EXPECT_FALSE(half.Drives()) << "points of the first time alone";
 }
 
 }  // namespace
