@@ -17,10 +17,14 @@ struct LimitCheck {
 
   template <class T>
   void operator()(const char* name, T& field, const char*) {
-    bool number = true;
-    if constexpr (std::is_floating_point_v<T>) number = std::isfinite(field);
-    if constexpr (std::is_base_of_v<Eigen::MatrixBase<T>, T>) number = field.allFinite();
-    if (problem.empty() && !number) problem = std::string(name) + " is no finite number";
+    if constexpr (std::is_floating_point_v<T>) Finite(name, field);
+    if constexpr (std::is_base_of_v<Eigen::MatrixBase<T>, T>)
+      for (Eigen::Index i = 0; i < field.size(); ++i)
+        Finite(std::string(name) + "[" + std::to_string(i) + "]", field[i]);
+  }
+  void Finite(const std::string& name, double value) {
+    if (problem.empty() && !std::isfinite(value))
+      problem = name + " is " + std::to_string(value) + ", must be a finite number";
   }
   void Limit(const char* name, double value, double low, double high) {
     if (!problem.empty() || (value >= low && value <= high)) return;
