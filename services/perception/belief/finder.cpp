@@ -20,7 +20,6 @@ constexpr double kMaxPoseAge = 0.2;   // s; with a pose this near it is too old,
 constexpr double kMaxSweepAge = 0.3;  // s; older points are not used
 
 constexpr double kBoxMargin = 0.25;  // share of the expected box in which a piece may lie
-constexpr double kLarger = 1.1;      // times the expected size: more than the target
 constexpr double kGateSigmas = 3.0;
 
 bool Overlap(const Detection& a, const Detection& b) { return (a.box & b.box).area() > 0.0; }
@@ -55,10 +54,7 @@ std::optional<SearchBoxes> WhereToLook(const TargetGaussian& thing, const Target
 /// behind goes on outside. Nothing where no part of it lies inside.
 std::optional<Detection> Within(const SearchBoxes& boxes, const cv::Mat& bgr,
                                 const Detection& detection) {
-  const double more = 4.0 * detection.silhouette.sigma_px;
-  const bool larger = detection.box.width > kLarger * boxes.expected.width + more ||
-                      detection.box.height > kLarger * boxes.expected.height + more;
-  if (detection.mask.empty() || !larger) return detection;
+  if (detection.mask.empty() || !detection.LargerThan(boxes.expected)) return detection;
   const cv::Rect2d& trim = boxes.trim;
   const cv::Rect window(static_cast<int>(std::floor(trim.x)), static_cast<int>(std::floor(trim.y)),
                         static_cast<int>(std::ceil(trim.width)),

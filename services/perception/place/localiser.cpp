@@ -134,6 +134,8 @@ std::optional<FitResult> Localiser::Acquire(const TargetShape& shape, const Came
   for (const auto& cluster : clusters) {
     if (!GivesRange(cluster)) continue;
     const double range = MedianRange(cluster) + shape.size[0];
+    const auto most = BoxAtRange(camera, detection.box, range, Round(shape, shape.MostHalfWidth()));
+    if (most && detection.LargerThan(*most)) continue;
     input.prior = NewTarget(camera, detection.box, shape, range, kHitRange);
     input.points = PointsOnTarget(input, cluster, 2.0 * kLidarGate);
     if (const auto fit = NewReading(&input)) return fit;
