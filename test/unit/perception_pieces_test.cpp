@@ -7,9 +7,10 @@
 #include <random>
 
 #include "perception_world.h"
-#include "services/perception/belief/track.h"
+#include "services/perception/belief/finder.h"
 #include "services/perception/place/localiser.h"
 #include "services/perception/place/target_points.h"
+#include "services/perception/sensors/camera.h"
 #include "services/perception/sight/color_detector.h"
 #include "services/perception/sight/silhouette.h"
 
@@ -92,6 +93,58 @@ TEST(PerceptionPieces, WhatGoesWithTheWidthIsThePiecesOwn) {
   EXPECT_DOUBLE_EQ(left->silhouette.departure_px, 1.0);
   EXPECT_NEAR(std::pow(whole.silhouette.sigma_px, 2) - std::pow(left->silhouette.sigma_px, 2),
               4.0 * 4.0 - 1.0 * 1.0, 1e-9);
+}
+
+/// A blob whose outline lies at these edges of the box, 7 samples a side; sides that are cut have
+/// none.
+Detection Outlined(const cv::Rect2d& box, const std::array<bool, 4>& cut) {
+  Detection d;
+  d.box = box;
+  d.cut = d.goes_on = d.parted = cut;
+  d.silhouette.sigma_px = 5.0;
+  for (int i = 1; i <= 7; ++i) {
+    const double u = box.x + i * box.width / 8.0, v = box.y + i * box.height / 8.0;
+    const std::array<Eigen::Vector2d, 4> at = {
+        {{box.x, v}, {box.br().x, v}, {u, box.y}, {u, box.br().y}}};
+    for (size_t side = 0; side < 4; ++side)
+      if (!cut[side]) d.silhouette.samples[side].push_back(at[side]);
+  }
+  return d;
+}
+
+TEST(PerceptionPieces, OfWhatIsTheThingAsAWholeAreNotTried) {
+  const PerceptionConfig config;
+  const Finder finder(config);
+  PoseSample pose;
+  pose.p_WB = kLidar;
+  View view{0.0, pose, CameraAt(pose, config.rig), {}, {}, {}};
+  Track track;
+  track.state = Predicted().prior;
+  const auto box = ProjectTarget(view.camera, kTarget, track.shape);
+  ASSERT_TRUE(box);
+  // As a cone's: its sides depart from the model's, so that its middle alone fits better.
+  const double in = 0.35 * box->width;
+  const cv::Rect2d narrow(box->x + in, box->y, box->width - 2.0 * in, box->height);
+  const cv::Rect2d middle(box->x + 0.4 * box->width, box->y, 0.2 * box->width, box->height);
+  Detection piece = Outlined(middle, {true, true, false, false});
+  piece.part = true;
+  const auto found = [&](const std::vector<Detection>& detections) {
+    view.detections = detections;
+    view.taken.assign(detections.size(), false);
+    return finder.Find(track, &view);
+  };
+  const Detection whole = Outlined(narrow, {});
+  const auto alone = found({whole}), part = found({piece}), both = found({whole, piece});
+  ASSERT_TRUE(alone && part && both);
+  ASSERT_TRUE(alone->fit.whole);
+  ASSERT_GT(part->fit.log_odds, alone->fit.log_odds) << "by less that is explained";
+  EXPECT_FALSE(both->detection.part);
+  EXPECT_TRUE(view.taken[1]);
+  Detection other =
+      Outlined(cv::Rect2d(box->x - 2.0 * box->width, box->y, 4.0 * box->width, box->height), {});
+  const auto joined = found({other, piece});
+  ASSERT_TRUE(joined);
+  EXPECT_TRUE(joined->detection.part) << "the blob is more than the thing";
 }
 
 TEST(PerceptionCandidate, OfAPieceWithoutPointsAWayAlongTheLineOfSightIsNotSure) {

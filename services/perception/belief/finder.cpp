@@ -62,6 +62,11 @@ std::optional<Detection> Within(const SearchBoxes& boxes, const cv::Mat& bgr,
   return CropTo(bgr, detection, window);
 }
 
+/// True for a piece of what is the thing as a whole: no other thing beside it need be assumed.
+bool PieceOf(const Sighting& s, const Detection& d) {
+  return d.part && !s.detection.part && s.fit.whole && Overlap(d, s.detection);
+}
+
 }  // namespace
 
 Finder::Finder(const PerceptionConfig& config)
@@ -152,6 +157,7 @@ std::optional<Sighting> Finder::Find(const Track& track, View* view) const {
   if (inside.size() > kMostTried) inside.resize(kMostTried);
   std::optional<Sighting> best;
   for (const size_t i : inside) {
+    if (best && PieceOf(*best, view->detections[i])) continue;
     const auto piece = Within(*boxes, view->bgr, view->detections[i]);
     const auto s = piece ? Try(track, *view, *piece) : std::nullopt;
     if (s && (!best || s->fit.log_odds > best->fit.log_odds)) best = s;
