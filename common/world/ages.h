@@ -7,7 +7,7 @@ struct MostAge {
   double sweeps = 0.19;     ///< odometry: since the last that matched; POSE is DEGRADED, without
                             ///< LiDAR soon LOST; mapping falls silent with them
   double obstacles = 0.3;   ///< UNSEEN too. planning: brakes and hovers, uncertified; mission: not
-                            ///< ready
+                            ///< ready; prediction: nobody else moves
   double prediction = 1.4;  ///< planning: there is no target, it is looked for
   double pose = 0.1;        ///< control: brakes by dead reckoning, also when poses come later than
                             ///< usual by this; silent after `velocity`; mission: not ready

@@ -10,7 +10,7 @@ namespace chase::control {
 
 namespace {
 
-constexpr double kJumpBack = 1.0;  // s; less is jitter between publishers
+constexpr double kJumpBack = 0.3;  // s; messages are late by less
 constexpr double kAtRest = 0.3;    // m/s: gusts about a wind of 3 m/s stir a hovering body by less
 constexpr double kAtEnd = 0.3;     // m: planning asks for as much free ground beside the body
 constexpr double kLongestWay = 45.0;  // s to above the ground that planning chose, at 2.2 s a metre

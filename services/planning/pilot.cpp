@@ -3,9 +3,11 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include "common/math/rotation.h"
 #include "common/world/ages.h"
+#include "services/planning/resting.h"
 #include "services/planning/stopping.h"
 
 namespace chase::planning {
@@ -13,7 +15,7 @@ namespace {
 
 constexpr double kShortestHorizon = 1.0;
 constexpr double kWidestTube = 0.3;  // m: from farther off control follows no plan (reset_distance)
-constexpr double kJumpBack = 1.0;    // s; less is jitter between publishers
+constexpr double kJumpBack = 0.3;    // s; messages are late by less
 // A lost target is looked for from here while that share of where it may be is in sight from here;
 // else a place is gone to, for so long, s.
 constexpr double kEnoughInSight = 0.5, kKeepsPlace = 1.0;
@@ -57,10 +59,12 @@ std::optional<world::Obstacle> TargetBody(const Forecast& f) {
   return body;
 }
 
-// What stands seems to move when the frame drifts. The tube holds what adds up until a stop begins.
-Eigen::Matrix3d BeyondTube(const Eigen::Matrix3d& covariance, const PlannerConfig& c) {
-  if (!covariance.allFinite() || !(c.sigmas > 0.0)) return Eigen::Matrix3d::Zero();
-  const double held = c.tracking_tube / (c.sigmas * kOverdue);
+// What stands seems to move when the frame drifts. What the tube has left beside the tracking error
+// holds as much of that as adds up while a plan and its stop are flown.
+Eigen::Matrix3d BeyondTube(const Eigen::Matrix3d& covariance, double left, double duration,
+                           double sigmas) {
+  if (!covariance.allFinite() || !(sigmas > 0.0)) return Eigen::Matrix3d::Zero();
+  const double held = left / (sigmas * duration);
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(covariance);
   const Eigen::Vector3d rest = (eigen.eigenvalues().array() - held * held).max(0.0);
   return eigen.eigenvectors() * rest.asDiagonal() * eigen.eigenvectors().transpose();
@@ -80,7 +84,8 @@ Pilot::Pilot(const PlanningConfig& config)
 
 void Pilot::SetTrackingBound(double bound) {
   const double least = config_.planner.tracking_tube;
-  tube_ = std::isfinite(bound) ? std::clamp(bound, least, std::max(least, kWidestTube)) : least;
+  tracking_bound_ = std::isfinite(bound) ? std::clamp(bound, 0.0, std::max(least, kWidestTube)) : 0;
+  tube_ = std::max(least, tracking_bound_);
 }
 
 void Pilot::SetForecast(const Forecast& forecast) {
@@ -154,7 +159,8 @@ bool Pilot::MayPlan(double t) const {
 
 std::optional<PlanResult> Pilot::Update(double t, const BodyEstimate& body) {
   if (has_running_ && t < running_.trajectory.start - kJumpBack) ChangeFrame();  // of the clock
-  drift_ = BeyondTube(body.velocity_covariance, config_.planner);
+  drift_ = BeyondTube(body.velocity_covariance, tube_ - tracking_bound_,
+                      config_.horizon + std::end(kBrakeTimes)[-1], config_.planner.sigmas);
   const double t0 = t + config_.latency;
   const Start start = StartAt(t, t0, body);
   news_ = news_ || !start.follows;

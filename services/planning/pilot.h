@@ -134,7 +134,7 @@ class Pilot {
   std::optional<double> unseen_time_;  ///< s
   PlanResult running_;
   bool has_running_ = false;
-  double tube_;  ///< m
+  double tube_, tracking_bound_ = 0.0;  ///< m
   double last_planned_ = -1e9;
   bool news_ = false;
   bool airborne_ = false;

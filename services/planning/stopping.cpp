@@ -36,26 +36,16 @@ PlannerConfig WithoutMargin(PlannerConfig config) {
   return config;
 }
 
-// What is unseen but for the places that the start is in: the body is there.
-std::vector<world::Obstacle> UnseenAround(const PlannerConfig& config, const PlanRequest& request) {
-  std::vector<world::Obstacle> unseen;
-  for (const world::Obstacle& o : request.unseen)
-    if (DistanceTo(o, request.start.p - o.center.Position(request.t0)) >
-        HardRadius(config, request))
-      unseen.push_back(o);
-  return unseen;
-}
-
-// Does the plan keep off all of them until t, and off the target's body where its own proof counts
-// on its being left before that?
+// Does the plan keep off all that is unseen until t, and off the target's body where its own proof
+// counts on its being left before that?
 bool KeepsOff(const PlannerConfig& config, const PlanRequest& request,
-              const std::vector<world::Obstacle>& unseen, const world::Trajectory& plan, double t) {
+              const world::Trajectory& plan, double t) {
   const bool late = request.target_body && t > plan.start + kOverdue;
-  if ((unseen.empty() && !late) || t <= plan.start) return true;
+  if ((request.unseen.empty() && !late) || t <= plan.start) return true;
   PlanRequest part;
   static_cast<Stretch&>(part) = {plan.start, t - plan.start, request.start, false};
   part.target = request.target;
-  part.obstacles = unseen;
+  part.obstacles = request.unseen;
   if (late) {
     part.target_body = request.target_body;
     part.target_manoeuvre = request.target_manoeuvre;
@@ -150,7 +140,7 @@ constexpr double kLasts = kOver[2] + kOverdue;
 
 Stop Evade(const PlannerConfig& config, const PlanRequest& request) {
   static const std::vector<Vector3d> displacements = Displacements();
-  const std::vector<world::Obstacle> unseen = UnseenAround(config, request);
+  const std::vector<world::Obstacle>& unseen = request.unseen;
   Resting resting[] = {{config, request}, {config, request}, {config, request}};
   Resting seen[] = {
       {config, request, unseen}, {config, request, unseen}, {config, request, unseen}};
@@ -276,17 +266,16 @@ PlanResult RestPlan(const PlannerConfig& config, const PlanRequest& request) {
 std::optional<Stop> WayOut(const PlannerConfig& config, const PlanRequest& request,
                            const world::Trajectory& plan, Problem* memory) {
   const PlannerConfig hard = WithoutMargin(config);
-  const std::vector<world::Obstacle> unseen = UnseenAround(hard, request);
   const auto is_unseen = [&](const Proof& proof) {
-    return std::any_of(unseen.begin(), unseen.end(),
+    return std::any_of(request.unseen.begin(), request.unseen.end(),
                        [&](const auto& o) { return o.id == proof.obstacle; });
   };
-  Resting resting(hard, request, unseen, memory);
+  Resting resting(hard, request, request.unseen, memory);
   for (const double after : {kOverdue, 0.2, 0.7, 1.1, HUGE_VAL}) {
     const double t = std::min(plan.start + after, plan.end());
     resting.From(plan.At(t), t);
     std::optional<Stop> stop;
-    if (KeepsOff(hard, request, unseen, plan, t)) stop = resting.RiseOrBrake();
+    if (KeepsOff(hard, request, plan, t)) stop = resting.RiseOrBrake();
     if (stop) {  // whoever checks it hears of obstacles only
       auto& proofs = stop->proofs;
       proofs.erase(std::remove_if(proofs.begin(), proofs.end(), is_unseen), proofs.end());

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "common/bus/convert.h"
+#include "common/world/ages.h"
 
 namespace chase::prediction {
 namespace {
@@ -30,8 +31,6 @@ std::string PredictionConfig::Problem() const {
     return fmt::format("min_observations: {} is not within 2 to 100", min_observations);
   if (!(max_blind >= 0.0 && max_blind <= 60.0))
     return fmt::format("max_blind: {} is not within 0 to 60", max_blind);
-  if (!(max_obstacle_age > 0.0 && max_obstacle_age <= 60.0))
-    return fmt::format("max_obstacle_age: {} is not within 0 to 60", max_obstacle_age);
   if (!(no_target_period > 0.0 && no_target_period <= 60.0))
     return fmt::format("no_target_period: {} is not within 0 to 60", no_target_period);
   return "";
@@ -105,7 +104,7 @@ PredictRequest PredictionNode::MakeRequest(const target_t& message) const {
   request.now = bus::Seconds(message.utime, *origin_);
   request.observations = window_.Merged();
   request.target_radius = message.radius;
-  const bool fresh = request.now - obstacles_time_ <= config_.max_obstacle_age;
+  const bool fresh = request.now - obstacles_time_ <= world::kMostAge.obstacles;
   for (const world::Obstacle& o : obstacles_)
     if (!o.ground && (fresh || !o.moving)) request.obstacles.push_back(o);
   return request;

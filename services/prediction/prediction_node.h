@@ -25,7 +25,6 @@ struct PredictionConfig {
   TriggerConfig trigger;
   int min_observations = 3;
   double max_blind = world::kMostAge.target_unseen;
-  double max_obstacle_age = 1.0;
   double no_target_period = 0.5;
 
   template <class V>
@@ -35,7 +34,6 @@ struct PredictionConfig {
     v("trigger", trigger, "");
     v("min_observations", min_observations, "fewer are nothing to predict from");
     v("max_blind", max_blind, "an occluded target is predicted for this long, s");
-    v("max_obstacle_age", max_obstacle_age, "moving obstacles older than this are forgotten, s");
     v("no_target_period", no_target_period, "between two messages that there is no target, s");
   }
   std::string Problem() const;

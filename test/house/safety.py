@@ -22,7 +22,8 @@ def registered(build):
 
 def main():
     lines = table.lines()
-    found = table.problems(registered(pathlib.Path(sys.argv[1])), lines) + table.unguarded(lines)
+    found = table.problems(registered(pathlib.Path(sys.argv[1])), lines)
+    found += table.unguarded(lines)
     if len(lines) < LEAST:
         found.append(f"{table.LINES.name} holds {len(lines)} lines; there were {LEAST}")
     return tree.report(found)

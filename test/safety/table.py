@@ -4,6 +4,7 @@ A block of lines.txt is `key: value` a line and ends at an empty one: hazard (fi
 SAFETY.md), file, text (found once in the file, or taken where it first follows the line `after`),
 by (what it is replaced by; empty: taken out) and test (name, and a GoogleTest's case)."""
 
+import collections
 import dataclasses
 import pathlib
 import re
@@ -126,6 +127,10 @@ def problems(registered, table):
 
 
 def unguarded(table):
-    """Hazards that no line stands for."""
-    return [f"{LINES.name} has no line for '{hazard}'"
-            for hazard in hazards() if hazard not in {line.hazard for line in table}]
+    """Names of the case that no line stands for: as many for a hazard and a file as it names there."""
+    held = collections.Counter((line.hazard, pathlib.Path(line.file)) for line in table)
+    for hazard, (where, _) in hazards().items():
+        for name, words in SHORT.findall(where):
+            least, path = max(1, len(re.findall(r"\w+", words))), path_of(name)
+            if held[hazard, path] < least:
+                yield f"{LINES.name} has {held[hazard, path]} of {least} lines for '{hazard}', {path}"

@@ -295,13 +295,15 @@ TEST(Rest, OutOfTheGroundItClimbsWithinTheLimits) {
   }
 }
 
-// Two metres a second sideways past a wall, in a frame that drifts towards it.
+// Past a wall in a frame that drifts towards it: the body strays from plan and stop, and the wall
+// comes nearer, by as much as either may; the clearance that is certified is left.
 TEST(Pilot, AFrameThatDriftsKeepsOffWhatStands) {
   PlanningConfig config;
   config.takeoff_time = 0.1;
-  const auto nearest = [&](double sigma) {
+  const auto room = [&](double bound, double sigma) {
     Pilot pilot(config);
     pilot.SetFlying(true);
+    pilot.SetTrackingBound(bound);
     world::Obstacle wall = Slab({0.0, 2.0, 1.5}, {0.0, 0.0});
     wall.ground = false;
     wall.half = {5.0, 0.1, 3.0};
@@ -314,23 +316,27 @@ TEST(Pilot, AFrameThatDriftsKeepsOffWhatStands) {
     pilot.SetForecast(forecast);
     BodyEstimate body{{0.0, 0.6, 1.2}, Vector3d::Zero(), 0.0};
     body.velocity_covariance.diagonal().setConstant(sigma * sigma);
-    for (double t = 0.0; t < 1.0; t += 0.05)
+    double least = -HUGE_VAL;
+    for (double t = 0.0; std::isinf(least) && t < 1.0; t += 0.05)
       if (const auto plan = pilot.Update(t, body)) {
-        double least = HUGE_VAL;
-        for (double s = 0.0; s <= 1.0; s += 0.05)
-          least = std::min(
-              least,
-              1.9 -
-                  plan->trajectory.Position(plan->trajectory.start + s * plan->trajectory.duration)
-                      .y() -
-                  2.0 * std::max(0.0, std::sqrt(std::max(0.0, sigma * sigma - 0.0225))) * s *
-                      plan->trajectory.duration);
-        return least;
+        const auto left = [&](const world::Trajectory& way) {
+          double most = 0.0;  // of the wall's way and the body's
+          for (double s = 0.0; s <= 1.0; s += 0.05) {
+            const double at = way.start + s * way.duration;
+            const double drift = 2.0 * sigma * (at - plan->trajectory.start);
+            most = std::max(most, way.Position(at).y() + drift + bound);
+          }
+          return 1.9 - most - config.planner.drone_radius;
+        };
+        EXPECT_GE(plan->certified_clearance, 0.0);
+        least = left(plan->trajectory) - plan->certified_clearance;
+        if (plan->stop) least = std::min(least, left(*plan->stop));
       }
-    return -HUGE_VAL;
+    return least;
   };
-  for (const double sigma : {0.0, 0.05, 0.2, 0.3})
-    EXPECT_GE(nearest(sigma), config.planner.hard_radius() - 1e-6) << sigma;
+  for (const double bound : {0.0, 0.06, 0.115, 0.2})
+    for (const double sigma : {0.0, 0.003, 0.01, 0.05, 0.1, 0.2})
+      EXPECT_GE(room(bound, sigma), -1e-6) << bound << " " << sigma;
 }
 
 }  // namespace

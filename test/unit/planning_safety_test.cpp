@@ -172,8 +172,8 @@ TEST(CertifiedPlan, IsLeftForAStopBeforeAPlannerThatFellSilentIsMissed) {
   EXPECT_LT((plan.stop->Velocity(t) - plan.trajectory.Velocity(t)).norm(), 1e-6);
 }
 
-// A wall that may be there: left in time, where braking later would end in it. A place that the
-// body is in has been seen by touching nothing.
+// A wall that may be there: left in time, where braking later would end in it. One that the body
+// touches is only left: what of it is ahead has been seen by nobody.
 TEST(CertifiedPlan, IsLeftForAStopInSpaceThatWasSeen) {
   const PlannerConfig config;
   PlanRequest request = Hover();
@@ -191,9 +191,10 @@ TEST(CertifiedPlan, IsLeftForAStopInSpaceThatWasSeen) {
   EXPECT_TRUE(stop->proofs.empty());  // nobody else hears of it
   request.unseen = {Wall(7, 1.0, 0.0)};
   EXPECT_FALSE(WayOut(config, request, plan));
-  plan.coefficients.row(1).setZero();
-  request.start = plan.At(request.t0);
   request.unseen = {Wall(7, 0.2, 0.0)};
+  EXPECT_FALSE(WayOut(config, request, plan));
+  plan.coefficients.row(1) *= -1.0;
+  request.start = plan.At(request.t0);
   EXPECT_TRUE(WayOut(config, request, plan));
 }
 

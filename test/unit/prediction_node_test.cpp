@@ -117,7 +117,7 @@ TEST_F(PredictionNodeTest, ObstacleInTheWayTriggersAndIsAvoided) {
 
 TEST_F(PredictionNodeTest, OldMovingObstaclesAreForgotten) {
   Obstacle(0.0, 2.9, 0.25, obstacle_t::MOVING);
-  Drive(0.0, 2.05);
+  Drive(0.0, 0.95);
   EXPECT_EQ(last().verdict, kOk);
   EXPECT_EQ(last().checked, 1);  // the first one passes: no obstacle is known
 }
