@@ -1,31 +1,16 @@
 #include "services/perception/perception_config.h"
 
-#include <cmath>
-
 namespace chase::perception {
 
 namespace {
 
-std::string RigProblem(const world::Rig& rig) {
+std::string RigProblem(world::Rig rig) {
   LimitCheck check;
-  check.Limit("rig.width_px", rig.width_px, 16, 16384);
-  check.Limit("rig.height_px", rig.height_px, 16, 16384);
-  check.Limit("rig.focal_px", rig.focal_px, 10, 20000);
-  if (check.problem.empty()) check.problem = rig.LensProblem();
-  const auto finite = [&](const std::string& field, double value) {
-    if (check.problem.empty() && !std::isfinite(value))
-      check.problem = field + " is " + std::to_string(value) + ", must be a finite number";
-  };
-  finite("rig.center_u_px", rig.center_u_px);
-  finite("rig.center_v_px", rig.center_v_px);
-  finite("rig.camera_pitch_deg", rig.camera_pitch_deg);
-  for (int i = 0; i < 3; ++i) {
-    const std::string at = "[" + std::to_string(i) + "]";
-    finite("rig.camera_position" + at, rig.camera_position[i]);
-    finite("rig.lidar_position" + at, rig.lidar_position[i]);
-    finite("rig.lidar_rpy_deg" + at, rig.lidar_rpy_deg[i]);
-  }
-  return check.problem;
+  check.Limit("width_px", rig.width_px, 16, 16384);
+  check.Limit("height_px", rig.height_px, 16, 16384);
+  check.Limit("focal_px", rig.focal_px, 10, 20000);
+  rig.Visit(check);
+  return check.problem.empty() ? rig.LensProblem() : "rig." + check.problem;
 }
 
 }  // namespace

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <Eigen/Core>
+#include <cmath>
 #include <sstream>
 #include <string>
 #include <type_traits>
@@ -8,13 +10,22 @@
 
 namespace chase::perception {
 
-/// Visits a config's fields for the first one that lies outside its limits, as Limited() gives
-/// them.
+/// Visits a config's fields for the first one that is no number, or lies outside its limits as
+/// Limited() gives them.
 struct LimitCheck {
   std::string problem;
 
   template <class T>
-  void operator()(const char*, T&, const char*) {}
+  void operator()(const char* name, T& field, const char*) {
+    if constexpr (std::is_floating_point_v<T>) Finite(name, field);
+    if constexpr (std::is_base_of_v<Eigen::MatrixBase<T>, T>)
+      for (Eigen::Index i = 0; i < field.size(); ++i)
+        Finite(std::string(name) + "[" + std::to_string(i) + "]", field[i]);
+  }
+  void Finite(const std::string& name, double value) {
+    if (problem.empty() && !std::isfinite(value))
+      problem = name + " is " + std::to_string(value) + ", must be a finite number";
+  }
   void Limit(const char* name, double value, double low, double high) {
     if (!problem.empty() || (value >= low && value <= high)) return;
     std::ostringstream out;

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <random>
 
-#include "services/perception/belief/candidate.h"
 #include "services/perception/belief/perceiver.h"
+#include "services/perception/belief/track.h"
 
 namespace chase::perception {
 namespace {
@@ -13,18 +13,17 @@ namespace {
 using Eigen::Vector3d;
 
 /// Seen from the origin and surely of the target's shape, 0.3 s after it was first known.
-Candidate CandidateAt(const Vector3d& first, const Vector3d& now, double sigma) {
-  Candidate c;
-  c.track.state.mean << first, Vector3d::Zero();
-  c.track.state.covariance = sigma * sigma * Matrix6d::Identity();
-  c.edge = 0.5 * first.norm() / 220.0;
+Track CandidateAt(const Vector3d& first, const Vector3d& now, double sigma) {
+  Track c;
+  c.state.mean << first, Vector3d::Zero();
+  c.state.covariance = sigma * sigma * Matrix6d::Identity();
   c.odds = c.last.fit.log_odds = 20.0;
   c.last.detection.silhouette.sigma_px = 0.5;
   c.last.detection.box.height = 0.5 * 220.0 / first.norm();
   c.last.detection.box.width = 0.6 * c.last.detection.box.height;
   c.first = c.Now();
-  c.track.state.mean.head<3>() = now;
-  c.track.t = 0.3;
+  c.state.mean.head<3>() = now;
+  c.t = 0.3;
   return c;
 }
 
@@ -39,7 +38,7 @@ TEST(PerceptionCandidate, DrivesOnceItsWayIsMoreThanItsErrorsAndItsEdges) {
 
 TEST(PerceptionCandidate, WhatIsOfAnotherShapeIsNotTakenHoweverFarItGoes) {
   const Vector3d p(3.0, 0.0, 0.55);
-  Candidate c = CandidateAt(p, p + Vector3d(0.0, 1.0, 0.0), 0.01);
+  Track c = CandidateAt(p, p + Vector3d(0.0, 1.0, 0.0), 0.01);
   EXPECT_TRUE(c.Drives());
   c.last.fit.log_odds = 4.0;
   EXPECT_FALSE(c.Drives());
@@ -50,7 +49,7 @@ TEST(PerceptionCandidate, WhatIsOfAnotherShapeIsNotTakenHoweverFarItGoes) {
 
 TEST(PerceptionCandidate, WhatOnlyTheSizeTellsOfItsRangeIsNoWay) {
   const Vector3d p(20.0, 0.0, 0.55);  // six pixels high: one pixel is three metres of range
-  Candidate c = CandidateAt(p, p + Vector3d(-4.0, 0.0, 0.0), 0.03);
+  Track c = CandidateAt(p, p + Vector3d(-4.0, 0.0, 0.0), 0.03);
   EXPECT_FALSE(c.Drives());
   c.first.covariance = 1e-3 * Eigen::Matrix3d::Identity();
   c.last.fit.n_points = 12;
@@ -61,34 +60,37 @@ TEST(PerceptionCandidate, WhatOnlyTheSizeTellsOfItsRangeIsNoWay) {
 
 TEST(PerceptionCandidate, OfAnotherSizeItSeemsToGoAsTheDroneDoes) {
   const Vector3d p(3.0, 0.0, 0.55), way(0.0, 0.2, 0.0);
-  Candidate c = CandidateAt(p, p + way, 0.01);
+  Track c = CandidateAt(p, p + way, 0.01);
   EXPECT_TRUE(c.Drives());
   c.p_WC = way;
   EXPECT_FALSE(c.Drives());
-  c.sweeps = 1;
+  c.sized = true;
   EXPECT_TRUE(c.Drives()) << "LiDAR has told its size";
-  c.sweeps = 0;
-  c.track.state.mean[1] = -0.6;
+  c.sized = false;
+  c.state.mean[1] = -0.6;
   EXPECT_TRUE(c.Drives()) << "it would have to be larger than things are";
 }
 
-TEST(PerceptionCandidate, PiecesOfOneThingDoNotGoTheWayThatTheyTell) {
+TEST(PerceptionCandidate, APieceMustGoFurtherThanItsMiddleMayShift) {
   const Vector3d p(3.0, 0.0, 0.55);
-  Candidate c = CandidateAt(p, p + Vector3d(0.0, 0.24, 0.0), 0.01);
-  c.track.state.mean[4] = 0.8;
-  EXPECT_TRUE(c.Steady());
-  c.track.state.mean[4] = 2.5;
-  EXPECT_FALSE(c.Steady());
-  c.track.state.mean[4] = -0.4;
-  EXPECT_FALSE(c.Steady());
+  for (const double way : {0.1, 0.3})
+    for (const bool piece : {false, true}) {
+      Track c = CandidateAt(p, p, 0.01);
+      c.last.fit.n_points = 20;
+      c.partial = piece;
+      c.first = c.Now();
+      c.t = 1.0;
+      c.state.mean[1] = way;
+      EXPECT_EQ(c.Drives(), !piece || way > 0.2) << way;
+    }
 }
 
 TEST(PerceptionCandidate, APieceStaysOneUntilAllOfItIsSeen) {
   const Vector3d p(3.0, 0.0, 0.55);
-  Candidate c = CandidateAt(p, p, 0.01);
+  Track c = CandidateAt(p, p, 0.01);
   c.part = true;
   Sighting s = c.last;
-  s.fit.posterior = c.track.state;
+  s.fit.posterior = c.state;
   s.detection.cut[kLeft] = true;
   c.Correct(s, Vector3d::Zero());
   EXPECT_TRUE(c.part) << "the image's border may hide what it belongs to";
@@ -99,51 +101,37 @@ TEST(PerceptionCandidate, APieceStaysOneUntilAllOfItIsSeen) {
 
 TEST(PerceptionCandidate, WhatComesOutFromBehindSomethingMustDriveFromThere) {
   const Vector3d p(3.0, 0.0, 0.55), q = p + Vector3d(0.0, 0.08, 0.0);
-  Candidate c = CandidateAt(p, p, 0.01);
-  c.track.partial = true;
+  Track c = CandidateAt(p, p, 0.01);
+  c.partial = true;
+  c.first = c.Now();
+  c.t = 0.6;
   Sighting s = c.last;
-  s.fit.posterior = c.track.state;
+  s.fit.posterior = c.state;
   s.fit.posterior.mean.head<3>() = q;
   s.fit.whole = true;
   c.Correct(s, Vector3d::Zero());
-  EXPECT_FALSE(c.track.partial);
+  EXPECT_FALSE(c.partial);
   EXPECT_FALSE(c.Drives()) << "the edge of what hid it may have gone, not the thing";
-  EXPECT_LT((c.first.p_WT - q).norm(), 1e-9);
 }
 
 TEST(PerceptionCandidate, ADriftOfSecondsIsNoWay) {
   const Vector3d p(3.0, 0.0, 0.55);
-  Candidate c = CandidateAt(p, p + Vector3d(0.0, 0.075, 0.0), 0.01);
-  c.track.t = 0.5;
+  Track c = CandidateAt(p, p + Vector3d(0.0, 0.075, 0.0), 0.01);
+  c.t = 0.5;
   EXPECT_TRUE(c.Drives());
-  c.track.t = 3.0;
+  c.t = 3.0;
   EXPECT_FALSE(c.Drives()) << "0.03 m/s";
-}
-
-TEST(PerceptionCandidate, ASmallOneThatWasAPieceMustDriveFromWhereItIsAlone) {
-  const Vector3d p(9.0, 0.0, 0.55);
-  for (const double width : {8.0, 30.0}) {
-    Candidate c = CandidateAt(p, p, 0.01);
-    c.part = true;
-    Sighting s = c.last;
-    s.fit.posterior = c.track.state;
-    s.fit.posterior.mean[1] = 0.3;
-    s.detection.box = {100.0, 80.0, width, 1.6 * width};
-    c.Correct(s, Vector3d::Zero());
-    EXPECT_FALSE(c.part);
-    EXPECT_EQ(c.Drives(), width > 20.0) << width;
-  }
 }
 
 TEST(PerceptionCandidate, HowLongItStoodBeforeDoesNotCount) {
   const Vector3d p(3.0, 0.0, 0.55);
-  Candidate c = CandidateAt(p, p, 0.01);
+  Track c = CandidateAt(p, p, 0.01);
   Sighting s = c.last;
-  s.fit.posterior = c.track.state;
-  for (; c.track.t < 20.0; c.track.t += 0.05) c.Correct(s, Vector3d::Zero());
+  s.fit.posterior = c.state;
+  for (; c.t < 20.0; c.t += 0.05) c.Correct(s, Vector3d::Zero());
   ASSERT_FALSE(c.Drives());
   s.fit.posterior.mean[1] = 0.25;
-  c.track.t += 0.3;
+  c.t += 0.3;
   c.Correct(s, Vector3d::Zero());
   EXPECT_TRUE(c.Drives());
 }
@@ -151,26 +139,28 @@ TEST(PerceptionCandidate, HowLongItStoodBeforeDoesNotCount) {
 TEST(PerceptionCandidate, PointsOfTheFirstSightingRangeItsTrack) {
   Sighting s;
   s.detection.box = {0, 0, 20, 40};
-  const View view{2.5, {}, {}, {}, {}, {}};
-  EXPECT_LT(NewCandidate(s, view).track.ranged, 0.0);
+  EXPECT_LT(StartTrack(s, 2.5, {}).ranged, 0.0);
   s.fit.n_points = 12;
-  EXPECT_EQ(NewCandidate(s, view).track.ranged, 2.5);
+  EXPECT_EQ(StartTrack(s, 2.5, {}).ranged, 2.5);
 }
 
-TEST(PerceptionCandidate, CountsSightingsOfAllOfItThatLidarSurelyHit) {
-  Candidate c = CandidateAt({3.0, 0.0, 0.55}, {3.0, 0.0, 0.55}, 0.01);
+TEST(PerceptionCandidate, IsSizedWhereLidarSurelyHitAllOfIt) {
+  Track c = CandidateAt({3.0, 0.0, 0.55}, {3.0, 0.0, 0.55}, 0.01);
   Sighting s = c.last;
-  s.fit.posterior = c.track.state;
-  for (const int points : {0, 12, 9, 15}) {
-    c.track.t += 0.05;
+  s.fit.posterior = c.state;
+  const auto correct = [&](int points, bool whole) {
+    c.t += 0.05;
     s.fit.n_points = points;
+    s.fit.whole = whole;
     c.Correct(s, Vector3d::Zero());
-  }
-  EXPECT_EQ(c.sweeps, 2);
-  EXPECT_DOUBLE_EQ(c.track.ranged, c.track.t);
-  s.fit.whole = false;
-  c.Correct(s, Vector3d::Zero());
-  EXPECT_EQ(c.sweeps, 2) << "half of it tells no size";
+    return c.sized;
+  };
+  EXPECT_FALSE(correct(0, true));
+  EXPECT_FALSE(correct(9, true));
+  EXPECT_DOUBLE_EQ(c.ranged, c.t);
+  EXPECT_FALSE(correct(12, false)) << "half of it tells no size";
+  EXPECT_TRUE(correct(12, true));
+  EXPECT_TRUE(correct(0, true)) << "and it stays so";
 }
 
 TEST(PerceptionEstimate, ExistsWhereItIsSaidToBeAsFarAsItsCovarianceTells) {

@@ -7,9 +7,10 @@
 #include <random>
 
 #include "perception_world.h"
-#include "services/perception/belief/candidate.h"
+#include "services/perception/belief/finder.h"
 #include "services/perception/place/localiser.h"
 #include "services/perception/place/target_points.h"
+#include "services/perception/sensors/camera.h"
 #include "services/perception/sight/color_detector.h"
 #include "services/perception/sight/silhouette.h"
 
@@ -76,21 +77,6 @@ TEST(PerceptionRays, OnlyThoseThroughThePlacedTargetCount) {
   EXPECT_EQ(RaysThrough(input, placed), 0) << "they end on it";
 }
 
-TEST(PerceptionRays, ManyPointsAndNoneOfThemOnTheTargetHitAnotherThing) {
-  const FitInput input = Predicted();
-  std::vector<TargetPoint> behind, on;
-  for (int i = 0; i < 10; ++i) behind.push_back(PointAt({4.0, 0.02 * i, 0.5}));
-  for (int i = 0; i < 3; ++i) on.push_back(PointAt({2.85, 0.0, 0.45 + 0.1 * i}));
-  const std::vector<TargetPoint> seven(behind.begin(), behind.begin() + 7);
-  std::vector<TargetPoint> mixed = on;
-  mixed.insert(mixed.end(), seven.begin(), seven.end());
-  EXPECT_TRUE(HitElsewhere(input, {behind}));
-  EXPECT_FALSE(HitElsewhere(input, {on, seven}));
-  EXPECT_FALSE(HitElsewhere(input, {mixed}));
-  behind.pop_back();
-  EXPECT_FALSE(HitElsewhere(input, {behind}));
-}
-
 TEST(PerceptionPieces, WhatGoesWithTheWidthIsThePiecesOwn) {
   cv::Mat bgr(240, 376, CV_8UC3, cv::Scalar::all(120));
   bgr(cv::Rect(100, 60, 80, 90)).setTo(cv::Scalar(12, 105, 235));
@@ -109,30 +95,80 @@ TEST(PerceptionPieces, WhatGoesWithTheWidthIsThePiecesOwn) {
               4.0 * 4.0 - 1.0 * 1.0, 1e-9);
 }
 
-/// Something grey hides the left half of the target.
-TEST(PerceptionCandidate, WithoutPointsAWayAlongTheLineOfSightIsNotSure) {
-  const auto gone = [](const Vector3d& way) {
-    Candidate c;
-    c.track.state.mean << kTarget, Vector3d::Zero();
-    c.track.state.covariance = 1e-4 * Matrix6d::Identity();
+/// A blob whose outline lies at these edges of the box, 7 samples a side; sides that are cut have
+/// none.
+Detection Outlined(const cv::Rect2d& box, const std::array<bool, 4>& cut) {
+  Detection d;
+  d.box = box;
+  d.cut = d.goes_on = d.parted = cut;
+  d.silhouette.sigma_px = 5.0;
+  for (int i = 1; i <= 7; ++i) {
+    const double u = box.x + i * box.width / 8.0, v = box.y + i * box.height / 8.0;
+    const std::array<Eigen::Vector2d, 4> at = {
+        {{box.x, v}, {box.br().x, v}, {u, box.y}, {u, box.br().y}}};
+    for (size_t side = 0; side < 4; ++side)
+      if (!cut[side]) d.silhouette.samples[side].push_back(at[side]);
+  }
+  return d;
+}
+
+TEST(PerceptionPieces, OfWhatIsTheThingAsAWholeAreNotTried) {
+  const PerceptionConfig config;
+  const Finder finder(config);
+  PoseSample pose;
+  pose.p_WB = kLidar;
+  View view{0.0, pose, CameraAt(pose, config.rig), {}, {}, {}};
+  Track track;
+  track.state = Predicted().prior;
+  const auto box = ProjectTarget(view.camera, kTarget, track.shape);
+  ASSERT_TRUE(box);
+  // As a cone's: its sides depart from the model's, so that its middle alone fits better.
+  const double in = 0.35 * box->width;
+  const cv::Rect2d narrow(box->x + in, box->y, box->width - 2.0 * in, box->height);
+  const cv::Rect2d middle(box->x + 0.4 * box->width, box->y, 0.2 * box->width, box->height);
+  Detection piece = Outlined(middle, {true, true, false, false});
+  piece.part = true;
+  const auto found = [&](const std::vector<Detection>& detections) {
+    view.detections = detections;
+    view.taken.assign(detections.size(), false);
+    return finder.Find(track, &view);
+  };
+  const Detection whole = Outlined(narrow, {});
+  const auto alone = found({whole}), part = found({piece}), both = found({whole, piece});
+  ASSERT_TRUE(alone && part && both);
+  ASSERT_TRUE(alone->fit.whole);
+  ASSERT_GT(part->fit.log_odds, alone->fit.log_odds) << "by less that is explained";
+  EXPECT_FALSE(both->detection.part);
+  EXPECT_TRUE(view.taken[1]);
+  Detection other =
+      Outlined(cv::Rect2d(box->x - 2.0 * box->width, box->y, 4.0 * box->width, box->height), {});
+  const auto joined = found({other, piece});
+  ASSERT_TRUE(joined);
+  EXPECT_TRUE(joined->detection.part) << "the blob is more than the thing";
+}
+
+TEST(PerceptionCandidate, OfAPieceWithoutPointsAWayAlongTheLineOfSightIsNotSure) {
+  const auto gone = [](const Vector3d& way, int points) {
+    Track c;
+    c.state.mean << kTarget, Vector3d::Zero();
+    c.state.covariance = 1e-4 * Matrix6d::Identity();
     c.odds = c.last.fit.log_odds = 20.0;
+    c.last.fit.n_points = points;
     c.last.detection.silhouette.sigma_px = 0.5;
     c.last.detection.box.height = 40.0;
+    c.partial = true;
     c.first = c.Now();
-    c.track.state.mean << kTarget + way, way;
-    c.track.t = 1.0;
-    c.edge = 0.5 * 3.0 / 220.0;
+    c.state.mean << kTarget + way, way;
+    c.t = 1.0;
     return c;
   };
-  Candidate along = gone({0.4, 0.0, 0.0}), across = gone({0.0, 0.4, 0.0});
-  ASSERT_TRUE(along.Drives() && along.Steady() && across.Drives() && across.Steady());
-  EXPECT_FALSE(along.SurelyDrives(0.15));
-  EXPECT_TRUE(across.SurelyDrives(0.15));
-  EXPECT_FALSE(across.SurelyDrives(0.5));
-  along.first.ranged = true;
-  EXPECT_FALSE(along.SurelyDrives(0.15)) << "points of the first time alone";
-  along.last.fit.n_points = 20;
-  EXPECT_TRUE(along.SurelyDrives(0.15));
+  const Vector3d along(0.4, 0.0, 0.0), across(0.0, 0.4, 0.0);
+  EXPECT_FALSE(gone(along, 0).Drives());
+  EXPECT_TRUE(gone(across, 0).Drives());
+  EXPECT_TRUE(gone(along, 20).Drives());
+  Track half = gone(along, 20);
+  half.last.fit.n_points = 0;
+  EXPECT_FALSE(half.Drives()) << "points of the first time alone";
 }
 
 }  // namespace

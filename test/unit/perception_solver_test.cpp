@@ -5,7 +5,9 @@
 #include <cmath>
 #include <functional>
 #include <memory>
+#include <numeric>
 #include <random>
+#include <vector>
 
 #include "services/perception/place/fit_problem.h"
 
@@ -76,19 +78,18 @@ Vector7d Differences(const Function& f, const Vector7d& y) {
   Vector7d out;
   for (int i = 0; i < 7; ++i) {
     const Vector7d step = kStep * Vector7d::Unit(i);
-    out[i] = (f(y + step) - f(y - step)) / (2.0 * kStep);
+    out[i] = (f(Vector7d(y + step)) - f(Vector7d(y - step))) / (2.0 * kStep);
   }
   return out;
 }
 
-using ResidualAt = std::function<Residual(const Vector7d& y)>;
-
-void ExpectGradient(const ResidualAt& residual, const Vector7d& y) {
-  const Vector7d gradient = residual(y).by_y;
-  const auto f = [&](const Vector7d& at) { return residual(at).value; };
-  EXPECT_LT((gradient - Differences(f, y)).norm(), 1e-5 * (1.0 + gradient.norm()))
+/// `residual` of y as numbers and as jets.
+template <class Function>
+void ExpectGradient(const Function& residual, const Vector7d& y) {
+  const Vector7d gradient = residual(Jets(y)).v;
+  EXPECT_LT((gradient - Differences(residual, y)).norm(), 1e-5 * (1.0 + gradient.norm()))
       << gradient.transpose() << "\n"
-      << Differences(f, y).transpose();
+      << Differences(residual, y).transpose();
 }
 
 TEST(PerceptionSolver, GradientsOfTheResidualsAreTheirDifferences) {
@@ -106,19 +107,14 @@ TEST(PerceptionSolver, GradientsOfTheResidualsAreTheirDifferences) {
       const Solid solid{square, half, 0.5 + 0.02 * scene.Uniform()};
       Vector7d turned = y;
       turned[kYawAt] = 3.0 * scene.Uniform();
-      const auto expect = [&](auto residual) {
-        ExpectGradient([&](const Vector7d& at) { return residual(ray, solid, sign, at).Scaled(7); },
-                       turned);
-      };
-      expect(SideResidual);
-      expect(CapResidual);
-      ExpectGradient([&](const Vector7d& at) { return PointResidual(p_W, age, solid, at); },
-                     turned);
+      ExpectGradient([&](const auto& at) { return SideResidual(ray, solid, sign, at); }, turned);
+      ExpectGradient([&](const auto& at) { return CapResidual(ray, solid, sign, at); }, turned);
+      ExpectGradient([&](const auto& at) { return PointResidual(p_W, age, solid, at); }, turned);
     }
     const Solid ball{false, half, 2.0 * half};
-    ExpectGradient(
-        [&](const Vector7d& at) { return TangentResidual(ray, ball, i % 4 < 2, sign, at); }, y);
-    ExpectGradient([&](const Vector7d& at) { return SpherePointResidual(p_W, age, ball, at); }, y);
+    ExpectGradient([&](const auto& at) { return TangentResidual(ray, ball, i % 4 < 2, sign, at); },
+                   y);
+    ExpectGradient([&](const auto& at) { return SpherePointResidual(p_W, age, ball, at); }, y);
   }
 }
 
@@ -246,18 +242,26 @@ TEST(PerceptionSolver, GradientOfTheProblemIsItsDifference) {
     const FitProblem problem(scene.input, config);
     ASSERT_TRUE(problem.ok());
     const Vector7d y = scene.Near();
-    const auto normal = problem.Linearised(y);
-    const Vector7d d =
-        Differences([&](const Vector7d& at) { return problem.Linearised(at).cost; }, y);
-    EXPECT_LT((normal.gradient - d).norm(), 1e-5 * (1.0 + d.norm())) << "seed " << seed;
+    const auto n = static_cast<size_t>(problem.NumResiduals());
+    const auto cost = [&](const Vector7d& at) {
+      std::vector<double> r(n);
+      problem(at.data(), r.data());
+      return 0.5 * std::inner_product(r.begin(), r.end(), r.begin(), 0.0);
+    };
+    std::vector<Jet> r(n);
+    problem(Jets(y).data(), r.data());
+    Vector7d gradient = Vector7d::Zero();
+    for (const Jet& sample : r) gradient += sample.a * sample.v;
+    const Vector7d d = Differences(cost, y);
+    EXPECT_LT((gradient - d).norm(), 1e-5 * (1.0 + d.norm())) << "seed " << seed;
   }
 }
 
 struct OverY {
-  ResidualAt residual;
+  std::function<double(const Vector7d& y)> residual;
   double scale;
   bool operator()(const double* y, double* r) const {
-    *r = scale * residual(Eigen::Map<const Vector7d>(y)).value;
+    *r = scale * residual(Eigen::Map<const Vector7d>(y));
     return true;
   }
 };
@@ -313,7 +317,8 @@ class Reference {
         new ceres::NumericDiffCostFunction<Prior, ceres::CENTRAL, 7, 7>(new Prior{y, root}),
         nullptr, y.data());
   }
-  void Add(const ResidualAt& residual, double scale, double weight, size_t samples) {
+  void Add(const std::function<double(const Vector7d& y)>& residual, double scale, double weight,
+           size_t samples) {
     const double share = std::min(1.0, weight / static_cast<double>(samples));
     problem_.AddResidualBlock(
         new ceres::NumericDiffCostFunction<OverY, ceres::CENTRAL, 1, 7>(new OverY{residual, scale}),
@@ -336,7 +341,7 @@ class Reference {
     const double span = upright ? turn : b.slope - a.slope;
     Add(
         [this, sign, upright, ray = Ray(px)](const Vector7d& at) {
-          return (upright ? SideResidual : CapResidual)(ray, solid_, sign, at);
+          return upright ? SideResidual(ray, solid_, sign, at) : CapResidual(ray, solid_, sign, at);
         },
         scale / std::abs(span), kEdgeWeight, 8);
   }

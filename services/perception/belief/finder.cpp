@@ -12,24 +12,62 @@ namespace chase::perception {
 namespace {
 
 constexpr size_t kMaxSweeps = 4;
-constexpr double kOdds = 0.0;      // logarithm of the odds that a sighting needs,
-constexpr int kStillJoined = 2;    // frames without it after which a like colour may have gone
-constexpr double kSureOdds = 8.0;  // and with which no other is tried
-constexpr size_t kMostTried = 4;   // detections a track and frame
-constexpr int kKnownHits = 10;     // sightings after which a track's range is trusted
+constexpr double kOdds = 0.0;               // logarithm of the odds that a sighting needs,
+constexpr double kSureOdds = 8.0;           // and with which no other is tried
+constexpr size_t kMostTried = 4;            // detections a track and frame
 constexpr double kMaxExtrapolation = 0.05;  // s that the nearest pose is carried to a frame
 constexpr double kMaxPoseAge = 0.2;   // s; with a pose this near it is too old, else there is none
 constexpr double kMaxSweepAge = 0.3;  // s; older points are not used
 
+constexpr double kBoxMargin = 0.25;  // share of the expected box in which a piece may lie
+constexpr double kGateSigmas = 3.0;
+
 bool Overlap(const Detection& a, const Detection& b) { return (a.box & b.box).area() > 0.0; }
 
-}  // namespace
-
-bool Sighting::AllSeen() const {
-  const auto& used = fit.used;
-  const bool all = std::all_of(used.begin(), used.end(), [](bool side) { return side; });
-  return fit.whole && (all || detection.p_CT);
+cv::Rect2d Grown(const cv::Rect2d& box, double dx, double dy) {
+  return {box.x - dx, box.y - dy, box.width + 2 * dx, box.height + 2 * dy};
 }
+
+/// Where in the image a thing may be seen, given how well it is known.
+struct SearchBoxes {
+  cv::Rect2d expected;  ///< its own, px
+  cv::Rect2d search;    ///< pieces of it may lie here
+  cv::Rect2d trim;      ///< all of it lies here
+};
+
+/// Nothing where it lies behind the camera. `tilt`: standard deviation of the camera's, rad.
+std::optional<SearchBoxes> WhereToLook(const TargetGaussian& thing, const TargetShape& shape,
+                                       const Camera& camera, double tilt) {
+  const auto box = ProjectTarget(camera, thing.position(), shape);
+  if (!box) return std::nullopt;
+  const double range = (thing.position() - camera.p_WC).norm();
+  const double sigma = std::sqrt(thing.covariance.topLeftCorner<3, 3>().diagonal().maxCoeff());
+  const double px = camera.PixelsPerRadian({box->x + 0.5 * box->width, box->y + 0.5 * box->height});
+  const double spread = kGateSigmas * sigma / range * px, tilted = kGateSigmas * tilt * px;
+  const double margin = tilted + spread, trim = 0.5 * tilted + spread;
+  return SearchBoxes{
+      *box, Grown(*box, margin + kBoxMargin * box->width, margin + kBoxMargin * box->height),
+      Grown(*box, trim, trim)};
+}
+
+/// The part of a detection that may be the thing: where the detection is larger, a like colour
+/// behind goes on outside. Nothing where no part of it lies inside.
+std::optional<Detection> Within(const SearchBoxes& boxes, const cv::Mat& bgr,
+                                const Detection& detection) {
+  if (detection.mask.empty() || !detection.LargerThan(boxes.expected)) return detection;
+  const cv::Rect2d& trim = boxes.trim;
+  const cv::Rect window(static_cast<int>(std::floor(trim.x)), static_cast<int>(std::floor(trim.y)),
+                        static_cast<int>(std::ceil(trim.width)),
+                        static_cast<int>(std::ceil(trim.height)));
+  return CropTo(bgr, detection, window);
+}
+
+/// True for a piece of what is the thing as a whole: no other thing beside it need be assumed.
+bool PieceOf(const Sighting& s, const Detection& d) {
+  return d.part && !s.detection.part && s.fit.whole && Overlap(d, s.detection);
+}
+
+}  // namespace
 
 Finder::Finder(const PerceptionConfig& config)
     : config_(config),
@@ -93,52 +131,22 @@ void Finder::WeighHidden(const View& view, FitInput input, FitResult* fit) const
   fit->log_odds += LogSeenThrough(input, fit->posterior);
 }
 
-std::optional<Sighting> Finder::Try(const TargetTrack& track, const View& view,
-                                    const Detection& detection, bool fresh_sweeps_only) const {
+/// One detection as the thing of a track, by the sweeps that it has not seen yet.
+std::optional<Sighting> Finder::Try(const Track& track, const View& view,
+                                    const Detection& detection) const {
   FitInput input;
   input.prior = track.state;
   input.shape = track.shape;
   input.camera = view.camera;
   input.detection = &detection;
   input.reappears = track.misses > 0 || track.partial;
-  input.joined = track.joined && track.misses <= kStillJoined;
-  auto fit =
-      localiser_.Correct(input, Points(view, detection, track.state.velocity(), fresh_sweeps_only));
+  auto fit = localiser_.Correct(input, Points(view, detection, track.state.velocity(), true));
   if (fit) WeighHidden(view, input, &*fit);
   if (!fit || fit->log_odds < kOdds) return std::nullopt;
-  // What is hardly known has its range from the size alone; a sweep that was used still tells.
-  if (fit->n_points == 0 && fresh_sweeps_only && (track.hits < kKnownHits || track.partial)) {
-    FitInput placed = input;
-    placed.prior = fit->posterior;
-    const auto points = [&](const Eigen::Vector3d& v) { return Points(view, detection, v, false); };
-    if (SeenThrough(placed, points(track.state.velocity()))) return std::nullopt;
-    if (track.partial && HitElsewhere(placed, points(Eigen::Vector3d::Zero()))) return std::nullopt;
-  }
   return Sighting{*fit, detection};
 }
 
-std::optional<Sighting> Finder::Best(const TargetTrack& track, const View& view,
-                                     const std::vector<size_t>& inside, const Refuses& refuses,
-                                     const SearchBoxes& boxes) const {
-  std::vector<Sighting> found;
-  std::vector<cv::Rect> tried;
-  for (const size_t i : inside) {
-    const auto piece = Within(boxes, view.bgr, view.detections[i]);
-    if (!piece || std::count(tried.begin(), tried.end(), piece->mask_box) > 0) continue;
-    tried.push_back(piece->mask_box);
-    const auto s = Try(track, view, *piece, true);
-    if (!s || refuses(*s)) continue;
-    found.push_back(*s);
-    if (track.misses == 0 && s->fit.whole && s->fit.log_odds > kSureOdds) break;
-  }
-  if (found.empty()) return std::nullopt;
-  return *std::max_element(found.begin(), found.end(), [](const auto& a, const auto& b) {
-    return a.fit.log_odds < b.fit.log_odds;
-  });
-}
-
-std::optional<Sighting> Finder::Find(const TargetTrack& track, View* view,
-                                     const Refuses& refuses) const {
+std::optional<Sighting> Finder::Find(const Track& track, View* view) const {
   const auto boxes = WhereToLook(track.state, track.shape, view->camera,
                                  config_.motion.tilt_sigma_deg * M_PI / 180.0);
   if (!boxes) return std::nullopt;
@@ -146,14 +154,17 @@ std::optional<Sighting> Finder::Find(const TargetTrack& track, View* view,
   for (size_t i = 0; i < view->detections.size(); ++i)
     if (!view->taken[i] && (view->detections[i].box & boxes->search).area() > 0.0)
       inside.push_back(i);
-  std::stable_sort(inside.begin(), inside.end(), [&](size_t a, size_t b) {
-    return Likeness(view->detections[a].box, *boxes) > Likeness(view->detections[b].box, *boxes);
-  });
   if (inside.size() > kMostTried) inside.resize(kMostTried);
-  const auto best = Best(track, *view, inside, refuses, *boxes);
-  if (best)
-    for (const size_t i : inside)
-      view->taken[i] = view->taken[i] || Overlap(view->detections[i], best->detection);
+  std::optional<Sighting> best;
+  for (const size_t i : inside) {
+    if (best && PieceOf(*best, view->detections[i])) continue;
+    const auto piece = Within(*boxes, view->bgr, view->detections[i]);
+    const auto s = piece ? Try(track, *view, *piece) : std::nullopt;
+    if (s && (!best || s->fit.log_odds > best->fit.log_odds)) best = s;
+    if (best && track.misses == 0 && best->fit.whole && best->fit.log_odds > kSureOdds) break;
+  }
+  for (const size_t i : inside)
+    view->taken[i] = view->taken[i] || (best && Overlap(view->detections[i], best->detection));
   return best;
 }
 

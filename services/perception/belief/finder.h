@@ -1,16 +1,13 @@
 #pragma once
 
 #include <deque>
-#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "services/perception/belief/target_track.h"
+#include "services/perception/belief/track.h"
 #include "services/perception/place/localiser.h"
-#include "services/perception/place/search_boxes.h"
-#include "services/perception/place/target_points.h"
 
 namespace chase::perception {
 
@@ -31,19 +28,6 @@ struct View {
   std::vector<bool> taken;  ///< by detection: belongs to something found already
 };
 
-/// One thing found in one frame.
-struct Sighting {
-  FitResult fit;
-  Detection detection;
-
-  /// True when nothing of it is left out, nor cut off.
-  bool AllSeen() const;
-  /// True when LiDAR points tell that it is one thing.
-  bool SurelyHit() const { return fit.n_points >= kSurelyHit; }
-  /// True when all of it is seen, on its own, and LiDAR points tell where it is.
-  bool Clear() const { return fit.whole && SurelyHit() && !detection.part && !detection.AnyCut(); }
-};
-
 /// Keeps poses and sweeps; finds a given thing, or a new one, in a frame.
 class Finder {
  public:
@@ -60,13 +44,8 @@ class Finder {
   /// The frame's detections, or nothing with `note` saying why.
   std::optional<View> Look(const Frame& frame, std::string* note) const;
 
-  /// True for a sighting that belongs to something else.
-  using Refuses = std::function<bool(const Sighting&)>;
   /// The detection that the track explains best; it is marked as taken.
-  std::optional<Sighting> Find(const TargetTrack& track, View* view, const Refuses& refuses) const;
-  /// One detection as the thing of a track. Points already used may be asked for again.
-  std::optional<Sighting> Try(const TargetTrack& track, const View& view,
-                              const Detection& detection, bool fresh_sweeps_only) const;
+  std::optional<Sighting> Find(const Track& track, View* view) const;
   /// One detection as a target of which nothing is known.
   std::optional<Sighting> Acquire(const View& view, const Detection& detection) const;
   bool HasSweeps() const { return !sweeps_.empty(); }
@@ -79,9 +58,8 @@ class Finder {
     bool used = false;
   };
 
-  std::optional<Sighting> Best(const TargetTrack& track, const View& view,
-                               const std::vector<size_t>& inside, const Refuses& refuses,
-                               const SearchBoxes& boxes) const;
+  std::optional<Sighting> Try(const Track& track, const View& view,
+                              const Detection& detection) const;
   void WeighHidden(const View& view, FitInput input, FitResult* fit) const;
   Clusters Points(const View& view, const Detection& detection, const Eigen::Vector3d& v_WT,
                   bool fresh_only) const;

@@ -1,5 +1,6 @@
 #include "services/perception/belief/perceiver.h"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
@@ -10,9 +11,8 @@ namespace {
 constexpr double kHiddenAfter = 0.08;     // s unseen: occluded
 constexpr double kLostSigma = 3.0;        // m, horizontal standard deviation of what is lost
 constexpr double kUnknownVariance = 1e4;  // m^2, while nothing is known
-constexpr double kGap = 0.25;             // s between frames in which a target may do anything
+constexpr double kExpectedGate = 4.6;     // squared distance from a hidden target's prediction
 constexpr double kThere = 0.5;            // m, within which a target is where it is said to be
-constexpr double kStood = 0.2;            // m, within which a target stands
 
 }  // namespace
 
@@ -25,26 +25,33 @@ double TargetEstimate::Existence() const {
 
 Perceiver::Perceiver(const PerceptionConfig& config) : config_(config), finder_(config) {}
 
+/// True where the target was expected; what is not hidden is asked for by its fit alone.
+bool Perceiver::Expected(const Sighting& s) const {
+  if (track_->misses == 0) return true;
+  const Eigen::Vector2d off = (s.fit.posterior.position() - track_->state.position()).head<2>();
+  const Eigen::Matrix2d P = track_->state.covariance.topLeftCorner<2, 2>();
+  return off.norm() < config_.state.decoy_radius || off.dot(P.ldlt().solve(off)) < kExpectedGate;
+}
+
 void Perceiver::Follow(View* view) {
-  if (!track_) return;
-  auto taken = view->taken;
-  const auto found = finder_.Find(*track_, view, [](const Sighting&) { return false; });
-  if (!found || !Sure(*found)) {
+  if (!track_ || state_ == TargetState::kLost) return;
+  const auto taken = view->taken;
+  const auto found = finder_.Find(*track_, view);
+  sighted_ = found && Expected(*found);
+  if (!sighted_) {
     view->taken = taken;
     ++track_->misses;
     return;
   }
-  sighting_ = found;
-  track_->Correct(found->fit);
-  if (!tentative_) candidates_.clear();
+  track_->Correct(*found, view->camera.p_WC);
+  if (track_->driven) candidates_.clear();
 }
 
-void Perceiver::Start(const TargetTrack& track, const Sighting& sighting) {
+void Perceiver::Start(const Track& track) {
   track_ = track;
-  tentative_ = false;
-  stood_ = track.state.position();
-  sighting_ = sighting;
+  sighted_ = true;
   state_ = TargetState::kTracking;
+  candidates_.clear();
 }
 
 void Perceiver::Judge(double t) {
@@ -56,11 +63,6 @@ void Perceiver::Judge(double t) {
     state_ = unseen > config_.state.lost_after || track_->HorizontalSigma() > kLostSigma
                  ? TargetState::kLost
                  : TargetState::kOccluded;
-  if (unseen > 0.0) return;
-  last_p_ = track_->state.position();
-  if ((last_p_ - stood_).norm() < kStood) return;
-  tentative_ = false;
-  stood_ = last_p_;
 }
 
 /// True when the frame is newer than the last one, or starts a recording anew.
@@ -92,17 +94,16 @@ TargetEstimate Perceiver::Report(double t, const std::optional<View>& view,
                                  std::string note) const {
   TargetEstimate out;
   out.state = state_;
-  out.size =
-      track_ ? track_->shape.size : Eigen::Vector2d(config_.target_radius, config_.target_height);
+  out.size = {config_.target_radius, config_.target_height};
   out.note = std::move(note);
   out.refused = refused_;
-  if (sighting_) {
-    out.box = sighting_->detection.box;
-    out.score = sighting_->detection.score;
-    out.n_points = sighting_->fit.n_points;
-  }
   out.covariance = out.velocity_covariance = kUnknownVariance * Eigen::Matrix3d::Identity();
   if (!track_) return out;
+  if (sighted_) {
+    out.box = track_->last.detection.box;
+    out.score = track_->last.detection.score;
+    out.n_points = track_->last.fit.n_points;
+  }
   out.p_WT = track_->state.position();
   out.v_WT = track_->state.velocity();
   out.unseen = std::max(0.0, t - track_->seen);
@@ -122,18 +123,17 @@ TargetEstimate Perceiver::See(const Frame& frame) {
     view.reset();
     note = "the frame is not newer than the last one";
   }
-  sighting_.reset();
+  sighted_ = false;
   refused_ = {};
-  if (track_ && frame.t - track_->seen > kGap) track_->misses = std::max(1, track_->misses);
   if (track_ && state_ != TargetState::kLost) track_->Predict(frame.t, config_.motion);
-  for (auto& c : candidates_) c.track.Predict(frame.t, config_.motion);
+  for (auto& c : candidates_) c.Predict(frame.t, config_.motion);
   if (view) {
-    if (state_ != TargetState::kLost) Follow(&*view);
+    Follow(&*view);
     Seek(&*view);
-    if (sighting_ || !candidates_.empty()) finder_.MarkSweepsUsed(frame.t);
+    if (sighted_ || !candidates_.empty()) finder_.MarkSweepsUsed(frame.t);
   } else if (newer) {
     if (track_) ++track_->misses;
-    for (auto& c : candidates_) ++c.track.misses;
+    for (auto& c : candidates_) ++c.misses;
     DropMissed();
   }
   if (newer) Judge(frame.t);

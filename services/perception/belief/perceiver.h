@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "services/perception/belief/candidate.h"
 #include "services/perception/belief/finder.h"
+#include "services/perception/belief/track.h"
 
 namespace chase::perception {
 
@@ -74,32 +74,24 @@ class Perceiver {
   void Judge(double t);
   TargetEstimate Report(double t, const std::optional<View>& view, std::string note) const;
 
-  bool MayBeNew(const Detection& d) const;
   void CountRefused(const Detection& d);
-  bool Followed(const Sighting& s) const;
-  bool Sure(const Sighting& s) const;
-  bool Ready(const Candidate& candidate, double t) const;
-  bool PieceIsReady(const Candidate& candidate) const;
-  bool StandsLongEnough(const Candidate& candidate, double t) const;
-  bool InGate(const Sighting& s, double t) const;
-  bool IsLookAlike(const Eigen::Vector3d& p_W, double t) const;
-  void Start(const TargetTrack& track, const Sighting& sighting);
+  bool Expected(const Sighting& s) const;
+  bool Ready(const Track& candidate, double t) const;
+  bool MayBeTarget(const Sighting& s, double t) const;
+  void Start(const Track& track);
   bool ForgetIfTimeRanBack(double t);
   void Forget();
 
   PerceptionConfig config_;
   Finder finder_;
   TargetState state_ = TargetState::kSearching;
-  std::optional<TargetTrack> track_;
-  std::vector<Candidate> candidates_;
-  std::optional<Sighting> sighting_;  ///< of the last frame
-  bool tentative_ = false;            ///< it stood when it was taken, and has stood since
+  std::optional<Track> track_;     ///< the target
+  std::vector<Track> candidates_;  ///< what else may be it
+  bool sighted_ = false;           ///< in the last frame
   std::deque<LookAlike> look_alikes_;
-  std::optional<Eigen::Vector2d> selected_;           ///< px, not taken yet
-  Refused refused_ = {};                              ///< in this frame
-  Eigen::Vector3d stood_ = Eigen::Vector3d::Zero();   ///< where the target stood or was, frame W, m
-  Eigen::Vector3d last_p_ = Eigen::Vector3d::Zero();  ///< when last seen, frame W, m
-  double last_t_ = -1e18, selected_at_ = 0.0;         ///< s
+  std::optional<Eigen::Vector2d> selected_;    ///< px, not taken yet
+  Refused refused_ = {};                       ///< in this frame
+  double last_t_ = -1e18, selected_at_ = 0.0;  ///< s
 };
 
 }  // namespace chase::perception

@@ -37,8 +37,6 @@ double PerPixel(const Camera& camera, const Eigen::Vector2d& px, bool upright) {
   return std::max(kLeastPerPx, std::abs(span));
 }
 
-Solid SolidOf(const TargetShape& shape) { return {shape.box(), shape.size[0], shape.size[1]}; }
-
 /// Of one of `samples` that count for `weight` independent ones together.
 double Share(size_t samples, double weight) {
   return std::min(1.0, weight / static_cast<double>(std::max<size_t>(1, samples)));
@@ -52,23 +50,8 @@ double BoundedCost(const std::vector<double>& residuals, double sigma, double we
   return sum * Share(residuals.size(), weight);
 }
 
-/// Cauchy's loss rho(s) = b^2 log(1 + s / b^2) of samples with the squares s, which count for
-/// `share` each.
-class Cauchy {
- public:
-  explicit Cauchy(double share) : share_(share) {}
-  /// Adds a sample; slope of its loss.
-  double Weight(double s) {
-    const double u = 1.0 + s / (kOutlier * kOutlier);
-    cost_ += 0.5 * share_ * kOutlier * kOutlier * std::log(u);
-    return share_ / u;
-  }
-  /// Half the sum of the losses.
-  double cost() const { return cost_; }
-
- private:
-  double share_, cost_ = 0.0;
-};
+double Value(double r) { return r; }
+double Value(const Jet& r) { return r.a; }
 
 }  // namespace
 
@@ -78,23 +61,21 @@ Vector7d Unknowns(const TargetGaussian& target, const TargetShape& shape) {
   return y;
 }
 
-Residual SurfaceDistance(const TargetShape& shape, const TargetPoint& point, const Vector7d& y) {
-  return (shape.sphere() ? SpherePointResidual : PointResidual)(point.p_W, point.age,
-                                                                SolidOf(shape), y);
-}
-
 FitProblem::FitProblem(const FitInput& input, const FitConfig& config)
-    : input_(input), config_(config), solid_(SolidOf(input.shape)) {
+    : input_(input),
+      config_(config),
+      solid_{input.shape.box(), input.shape.size[0], input.shape.size[1]} {
   const Eigen::LLT<Matrix6d> llt(input.prior.covariance);
   if (llt.info() != Eigen::Success) return;
-  root_ = llt.matrixL().solve(Matrix6d::Identity());
+  root_.topLeftCorner<6, 6>() = llt.matrixL().solve(Matrix6d::Identity());
+  root_(kYawAt, kYawAt) = 1.0 / std::sqrt(std::max(kYawFloor, input.shape.yaw_variance));
   if (!root_.allFinite()) return;
   ok_ = true;
-  information_.topLeftCorner<6, 6>() = root_.transpose() * root_;
-  information_(kYawAt, kYawAt) = 1.0 / std::max(kYawFloor, input.shape.yaw_variance);
   prior_range_ = Range(Start());
   AddEdges();
   AddPosition();
+  n_residuals_ = kUnknowns;
+  ForEachSample(Start(), [&](double, double) { n_residuals_ += 2; });
 }
 
 double FitProblem::Range(const Vector7d& y) const {
@@ -118,47 +99,56 @@ void FitProblem::AddPosition() {
   const Eigen::Matrix3d& R = input_.camera.R_WC;
   const Eigen::LLT<Eigen::Matrix3d> llt(R * input_.detection->p_CT_covariance * R.transpose());
   if (llt.info() != Eigen::Success) return;
-  position_information_ = llt.solve(Eigen::Matrix3d::Identity());
+  position_root_ = llt.matrixL().solve(Eigen::Matrix3d::Identity());
   position_ = input_.camera.p_WC + R * *input_.detection->p_CT;
 }
 
-Residual FitProblem::EdgeResidual(size_t side, const Edge& edge, const Vector7d& y) const {
+template <class T>
+T FitProblem::EdgeResidual(size_t side, const Edge& edge, const Unknown<T>& y) const {
   const double sign = Sign(side);
   if (input_.shape.sphere())
-    return TangentResidual(edge.ray, solid_, Upright(side), sign, y).Scaled(edge.px);
-  return (Upright(side) ? SideResidual : CapResidual)(edge.ray, solid_, sign, y).Scaled(edge.px);
+    return edge.px * TangentResidual(edge.ray, solid_, Upright(side), sign, y);
+  return edge.px * (Upright(side) ? SideResidual(edge.ray, solid_, sign, y)
+                                  : CapResidual(edge.ray, solid_, sign, y));
 }
 
-NormalEquations FitProblem::Linearised(const Vector7d& y) const {
-  NormalEquations sum;
-  const Vector7d off = y - Start();
-  sum.information = information_;
-  sum.gradient = information_ * off;
-  sum.cost = 0.5 * off.dot(sum.gradient);
-  for (size_t side = 0; side < 4; ++side) {
-    if (!input_.use_side[side] || edges_[side].empty()) continue;
-    Cauchy loss(Share(edges_[side].size(), kEdgeWeight));
-    const double scale = 1.0 / (input_.detection->silhouette.sigma_px * prior_range_);
-    for (const auto& edge : edges_[side]) {
-      const Residual r = EdgeResidual(side, edge, y).Scaled(scale);
-      sum.Add(loss.Weight(r.value * r.value), r);
-    }
-    sum.cost += loss.cost();
-  }
-  Cauchy loss(Share(input_.points.size(), kLidarWeight));
-  for (const auto& p : input_.points) {
-    const Residual r = SurfaceDistance(input_.shape, p, y).Scaled(1.0 / config_.lidar_sigma);
-    sum.Add(loss.Weight(r.value * r.value), r);
-  }
-  sum.cost += loss.cost();
-  if (!position_information_) return sum;
-  const Eigen::Vector3d beside = y.head<3>() - position_;
-  const Eigen::Vector3d gradient = *position_information_ * beside;
-  Cauchy stray(1.0);
-  const double weight = stray.Weight(beside.dot(gradient));
-  sum.cost += stray.cost();
-  sum.gradient.head<3>() += weight * gradient;
-  sum.information.topLeftCorner<3, 3>() += weight * *position_information_;
+template <class T, class Show>
+void FitProblem::ForEachSample(const Unknown<T>& y, const Show& show) const {
+  for (size_t side = 0; side < 4; ++side)
+    for (const Edge& edge : edges_[side])
+      if (input_.use_side[side])
+        show(EdgeResidual(side, edge, y) / (input_.detection->silhouette.sigma_px * prior_range_),
+             Share(edges_[side].size(), kEdgeWeight));
+  for (const TargetPoint& p : input_.points)
+    show(SurfaceDistance(input_.shape, p, y) / config_.lidar_sigma,
+         Share(input_.points.size(), kLidarWeight));
+  if (!position_root_) return;
+  const Eigen::Matrix<T, 3, 1> off =
+      position_root_->cast<T>() * (y.template head<3>() - position_.cast<T>());
+  for (int i = 0; i < 3; ++i) show(off[i], 1.0);
+}
+
+template <class T>
+bool FitProblem::operator()(const T* y, T* residuals) const {
+  const Unknown<T> at = Eigen::Map<const Unknown<T>>(y);
+  Eigen::Map<Unknown<T>>{residuals} = root_.cast<T>() * (at - Start().cast<T>());
+  T* next = residuals + kUnknowns;
+  ForEachSample(at, [&](const T& r, double share) {
+    const double s = std::pow(Value(r) / kOutlier, 2), square = share * kOutlier * kOutlier;
+    *next++ = std::sqrt(share / (1.0 + s)) * r;
+    *next++ = T(std::sqrt(square * std::max(0.0, std::log1p(s) - s / (1.0 + s))));
+  });
+  return true;
+}
+
+template bool FitProblem::operator()(const double* y, double* residuals) const;
+template bool FitProblem::operator()(const Jet* y, Jet* residuals) const;
+
+Matrix7d FitProblem::Information(const Vector7d& y) const {
+  std::vector<Jet> residuals(static_cast<size_t>(n_residuals_));
+  (*this)(Jets(y).data(), residuals.data());
+  Matrix7d sum = Matrix7d::Zero();
+  for (const Jet& r : residuals) sum += r.v * r.v.transpose();
   return sum;
 }
 
@@ -180,8 +170,9 @@ bool FitProblem::ReadEvidence(const std::array<std::vector<double>, 4>& edges,
   const Eigen::LLT<Matrix6d> posterior(out->posterior.covariance);
   if (posterior.info() != Eigen::Success) return false;
   const double log_posterior = posterior.matrixLLT().diagonal().array().log().sum();
-  const double log_prior = -root_.diagonal().array().log().sum() -
-                           0.5 * std::log(information_(kYawAt, kYawAt) * out->shape.yaw_variance);
+  const double yaw_variance = out->shape.yaw_variance * std::pow(root_(kYawAt, kYawAt), 2);
+  const double log_prior =
+      -root_.diagonal().head<6>().array().log().sum() - 0.5 * std::log(yaw_variance);
   double cost = 0.5 * out->prior_distance;
   for (size_t side = 0; side < 4; ++side)
     if (out->used[side])
@@ -191,25 +182,26 @@ bool FitProblem::ReadEvidence(const std::array<std::vector<double>, 4>& edges,
   return std::isfinite(out->log_evidence);
 }
 
-FitResult FitProblem::Read(const Vector7d& y, const Matrix7d& covariance, double cost) const {
+FitResult FitProblem::Read(const Vector7d& y, double cost) const {
   FitResult out;
+  const Eigen::LLT<Matrix7d> llt(Information(y));
+  if (llt.info() != Eigen::Success) return out;
+  const Matrix7d covariance = llt.solve(Matrix7d::Identity());
   out.posterior.mean = y.head<6>();
   out.posterior.covariance = covariance.topLeftCorner<6, 6>();
   out.shape = input_.shape;
   out.shape.yaw = y[kYawAt];
   out.shape.yaw_variance = covariance(kYawAt, kYawAt);
   out.cost = cost;
-  const double turn = y[kYawAt] - input_.shape.yaw;
-  out.prior_distance = (root_ * (out.posterior.mean - input_.prior.mean)).squaredNorm() +
-                       information_(kYawAt, kYawAt) * turn * turn;
+  out.prior_distance = (root_ * (y - Start())).squaredNorm();
   std::array<std::vector<double>, 4> edges;
   for (size_t side = 0; side < 4; ++side)
     for (const auto& edge : edges_[side])
-      edges[side].push_back(EdgeResidual(side, edge, y).value / Range(y));
+      edges[side].push_back(EdgeResidual(side, edge, y) / Range(y));
   ReadSides(edges, &out);
   std::vector<double> points;
   for (const auto& p : input_.points) {
-    points.push_back(SurfaceDistance(input_.shape, p, y).value);
+    points.push_back(SurfaceDistance(input_.shape, p, y));
     out.point_rms += points.back() * points.back();
   }
   out.n_points = static_cast<int>(points.size());

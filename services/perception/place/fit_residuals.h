@@ -1,116 +1,33 @@
 #pragma once
 
+#include <ceres/jet.h>
+
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace chase::perception {
 
-// Residuals over y = (p_WT, v_WT, yaw) [m, m/s, rad] and their derivatives by y.
+// Residuals over y = (p_WT, v_WT, yaw) [m, m/s, rad]; of T = Jet with their derivatives by y.
 
-using Vector7d = Eigen::Matrix<double, 7, 1>;
-using Matrix7d = Eigen::Matrix<double, 7, 7>;
-inline constexpr int kYawAt = 6;  ///< in y
+inline constexpr int kUnknowns = 7, kYawAt = 6;
+template <class T>
+using Unknown = Eigen::Matrix<T, kUnknowns, 1>;
+using Vector7d = Unknown<double>;
+using Matrix7d = Eigen::Matrix<double, kUnknowns, kUnknowns>;
+using Jet = ceres::Jet<double, kUnknowns>;  ///< value `a`, derivatives `v`
 
-struct Residual {
-  double value = 0.0;
-  Vector7d by_y = Vector7d::Zero();
+inline Unknown<Jet> Jets(const Vector7d& y) {
+  Unknown<Jet> jets;
+  for (int i = 0; i < kUnknowns; ++i) jets[i] = Jet(y[i], i);
+  return jets;
+}
 
-  Residual Scaled(double scale) const { return {scale * value, scale * by_y}; }
-};
-
-/// A length in the plan view and its derivatives by how far the line passes the centre and by yaw.
-struct PlanLength {
-  double value, by_place = 0.0, by_yaw = 0.0;
-};
-
-/// Cross section of an upright cylinder or of an upright box with a square base, from its centre.
-class Footprint {
- public:
-  /// `half`: of its width [m]; `yaw` [rad] of a square.
-  Footprint(bool square, double half, double yaw)
-      : square_(square),
-        half_(half),
-        cos_(square ? std::cos(yaw) : 1.0),
-        sin_(square ? std::sin(yaw) : 0.0) {}
-
-  /// Its support function: how far it reaches along the unit vector n [m].
-  PlanLength Reach(const Eigen::Vector2d& n) const {
-    if (!square_) return {half_};
-    const Eigen::Vector2d m = Turned(n), side = Signs(m);
-    return {half_ * m.lpNorm<1>(), 0.0, half_ * (side.x() * m.y() - side.y() * m.x())};
-  }
-
-  /// Where a line along the unit vector d leaves it (far: +1) or enters it (-1), along d from the
-  /// foot of the centre, which stands `across` to the left of the line. A line that passes beside
-  /// it, or nearly, counts as the outermost that still crosses it well.
-  PlanLength Chord(const Eigen::Vector2d& d, double across, double far) const {
-    const PlanLength reach = Reach({-d.y(), d.x()});
-    const auto chord = [&](double at) {
-      return square_ ? SquareChord(d, at, far) : RoundChord(at, far);
-    };
-    if (std::abs(across) < kMostAcross * reach.value) return chord(across);
-    const double most = std::copysign(kMostAcross, across);
-    PlanLength end = chord(most * reach.value);
-    end.by_yaw += most * end.by_place * reach.by_yaw;
-    end.by_place = 0.0;
-    return end;
-  }
-
-  /// Signed distance of q from it [m], negative inside; `by_q` the derivative.
-  PlanLength Distance(const Eigen::Vector2d& q, Eigen::Vector2d* by_q) const {
-    if (!square_) {
-      const double from_axis = std::sqrt(q.squaredNorm() + 1e-12);
-      *by_q = q / from_axis;
-      return {from_axis - half_};
-    }
-    const Eigen::Vector2d m = Turned(q), side = Signs(m), off = (m.cwiseAbs().array() - half_);
-    Eigen::Vector2d by_m =
-        off.x() > off.y() ? Eigen::Vector2d(side.x(), 0.0) : Eigen::Vector2d(0.0, side.y());
-    double distance = off.maxCoeff();
-    if (off.minCoeff() > 0.0) {
-      distance = off.norm();
-      by_m = off.cwiseProduct(side) / distance;
-    }
-    *by_q = {cos_ * by_m.x() - sin_ * by_m.y(), sin_ * by_m.x() + cos_ * by_m.y()};
-    return {distance, 0.0, by_m.x() * m.y() - by_m.y() * m.x()};
-  }
-
- private:
-  static constexpr double kMostAcross = 0.975;  ///< of the reach: beyond it the rim is steep
-  static constexpr double kParallel = 1e-9;     ///< cosine to a face that the line never meets
-
-  /// In the square's own axes; turning on by da changes it by da * (y, -x).
-  Eigen::Vector2d Turned(const Eigen::Vector2d& v) const {
-    return {cos_ * v.x() + sin_ * v.y(), cos_ * v.y() - sin_ * v.x()};
-  }
-  static Eigen::Vector2d Signs(const Eigen::Vector2d& m) {
-    return {std::copysign(1.0, m.x()), std::copysign(1.0, m.y())};
-  }
-
-  PlanLength RoundChord(double across, double far) const {
-    const double chord = std::sqrt(half_ * half_ - across * across);
-    return {far * chord, -far * across / chord};
-  }
-
-  /// The nearer of the two faces ahead, or the farther of those behind.
-  PlanLength SquareChord(const Eigen::Vector2d& d, double across, double far) const {
-    const Eigen::Vector2d along = Turned(d), left = Turned({-d.y(), d.x()});
-    PlanLength best{far * std::numeric_limits<double>::infinity()};
-    for (int i = 0; i < 2; ++i) {
-      const double turn = i == 0 ? 1.0 : -1.0;  // d(along[i])/d(yaw) = turn * along[1 - i]
-      if (std::abs(along[i]) < kParallel) continue;
-      const double face = far * std::copysign(1.0, along[i]);
-      const double t = (face * half_ + across * left[i]) / along[i];
-      if (far * (t - best.value) >= 0.0) continue;
-      best = {t, left[i] / along[i], turn * (across * left[1 - i] - t * along[1 - i]) / along[i]};
-    }
-    return best;
-  }
-
-  bool square_;
-  double half_, cos_, sin_;
+/// The target's solid by its size [m]: upright, round or on a square; of a sphere the radius
+/// counts.
+struct Solid {
+  bool square;
+  double half, height;
 };
 
 /// A line of sight in the plan view: it leaves the camera at c_xy towards the unit vector d_xy and
@@ -120,91 +37,124 @@ struct PlanRay {
   Eigen::Vector2d direction;  ///< unit, frame W
   double slope = 0.0;
 
-  double Along(const Vector7d& y) const { return direction.dot(y.head<2>() - c.head<2>()); }
+  Eigen::Vector2d Left() const { return {-direction.y(), direction.x()}; }
+  template <class T>
+  T Along(const Unknown<T>& y) const {
+    return direction.x() * (y[0] - c.x()) + direction.y() * (y[1] - c.y());
+  }
   /// Positive where the axis stands to the left of the line of sight.
-  double Across(const Vector7d& y) const {
+  template <class T>
+  T Across(const Unknown<T>& y) const {
     return direction.x() * (y[1] - c.y()) - direction.y() * (y[0] - c.x());
   }
-  Eigen::Vector2d AcrossGradient() const { return {-direction.y(), direction.x()}; }
 };
 
-/// The target's solid by its size [m]: of a sphere the radius counts.
-struct Solid {
-  bool square;
-  double half, height;
+/// A horizontal vector in the axes of a base turned by `yaw`.
+template <class T, class V>
+Eigen::Matrix<T, 2, 1> InBase(const T& yaw, const V& v) {
+  using std::cos;
+  using std::sin;
+  const T c = cos(yaw), s = sin(yaw);
+  return {c * v[0] + s * v[1], c * v[1] - s * v[0]};
+}
 
-  Footprint At(const Vector7d& y) const { return {square, half, y[kYawAt]}; }
-};
+/// How far the base reaches along the unit vector n [m]: its support function.
+template <class T>
+T Reach(const Solid& solid, const T& yaw, const Eigen::Vector2d& n) {
+  using std::abs;
+  if (!solid.square) return T(solid.half);
+  const auto m = InBase(yaw, n);
+  return solid.half * (abs(m[0]) + abs(m[1]));
+}
+
+/// Where a line of sight leaves the base (far: +1) or enters it (-1), along it from the foot of the
+/// centre [m]. A line that passes beside it, or nearly, counts as the outermost that still crosses
+/// it well: beyond, the rim is steep.
+template <class T>
+T ChordEnd(const PlanRay& ray, const Solid& solid, const Unknown<T>& y, double far) {
+  using std::abs;
+  using std::max;
+  using std::min;
+  using std::sqrt;
+  constexpr double kMostAcross = 0.975;  // of the reach
+  const T most = kMostAcross * Reach(solid, y[kYawAt], ray.Left());
+  const T across = min(max(ray.Across(y), T(-most)), most);
+  if (!solid.square) return far * sqrt(solid.half * solid.half - across * across);
+  const auto d = InBase(y[kYawAt], ray.direction), left = InBase(y[kYawAt], ray.Left());
+  const auto face = [&](int i) {  // of the two that lie that way, how far; one may be parallel
+    return abs(d[i]) < 1e-9 ? T(1e9) : T(solid.half / abs(d[i]) + far * across * left[i] / d[i]);
+  };
+  return far * min(face(0), face(1));
+}
 
 /// The line of sight touches the side of the target [m]: in the plan view the axis passes it at the
-/// footprint's reach, to the right of a left edge (sign -1), to the left of a right edge (+1).
-inline Residual SideResidual(const PlanRay& ray, const Solid& solid, double sign,
-                             const Vector7d& y) {
-  const Eigen::Vector2d left = ray.AcrossGradient();
-  const PlanLength reach = solid.At(y).Reach(left);
-  Residual r{sign * ray.Across(y) - reach.value};
-  r.by_y.head<2>() = sign * left;
-  r.by_y[kYawAt] = -reach.by_yaw;
-  return r;
+/// base's reach, to the right of a left edge (sign -1), to the left of a right edge (+1).
+template <class T>
+T SideResidual(const PlanRay& ray, const Solid& solid, double sign, const Unknown<T>& y) {
+  return sign * ray.Across(y) - Reach(solid, y[kYawAt], ray.Left());
 }
 
 /// The line of sight touches the rim of the top (sign +1) or bottom (-1) [m]. Seen from above, the
 /// top's outline is its far rim and the bottom's its near rim; seen from below the other way round.
-inline Residual CapResidual(const PlanRay& ray, const Solid& solid, double sign,
-                            const Vector7d& y) {
-  const double rim = y[2] + sign * 0.5 * solid.height;
+template <class T>
+T CapResidual(const PlanRay& ray, const Solid& solid, double sign, const Unknown<T>& y) {
+  const T rim = y[2] + sign * 0.5 * solid.height;
   const double far = (ray.c.z() > rim) == (sign > 0.0) ? 1.0 : -1.0;
-  const PlanLength end = solid.At(y).Chord(ray.direction, ray.Across(y), far);
-  Residual r{ray.c.z() + ray.slope * (ray.Along(y) + end.value) - rim};
-  r.by_y.head<2>() = ray.slope * (ray.direction + end.by_place * ray.AcrossGradient());
-  r.by_y[2] = -1.0;
-  r.by_y[kYawAt] = ray.slope * end.by_yaw;
-  return r.Scaled(sign);
+  const T along = ray.Along(y) + ChordEnd(ray, solid, y, far);
+  return sign * (ray.c.z() + ray.slope * along - rim);
+}
+
+/// Root of a sum of squares that has a derivative at 0.
+template <class T>
+T Length(const T& squares) {
+  using std::sqrt;
+  return sqrt(squares + 1e-12);
 }
 
 /// The line of sight touches a sphere [m]: its centre passes it at one radius, on the inner side of
 /// the edge: left or right (`upright`, -1 or +1), bottom or top (-1 or +1).
-inline Residual TangentResidual(const PlanRay& ray, const Solid& solid, bool upright, double sign,
-                                const Vector7d& y) {
+template <class T>
+T TangentResidual(const PlanRay& ray, const Solid& solid, bool upright, double sign,
+                  const Unknown<T>& y) {
   const Eigen::Vector3d sight =
       Eigen::Vector3d(ray.direction.x(), ray.direction.y(), ray.slope).normalized();
-  const Eigen::Vector3d to_center = y.head<3>() - ray.c;
-  const Eigen::Vector3d off = to_center - to_center.dot(sight) * sight;
-  const double side = upright ? ray.Across(y) : ray.c.z() + ray.slope * ray.Along(y) - y[2];
-  const double inner = sign * side < 0.0 ? -1.0 : 1.0;
-  const double distance = std::sqrt(off.squaredNorm() + 1e-12);
-  Residual r{inner * distance - solid.half};
-  r.by_y.head<3>() = inner / distance * off;
-  return r;
+  const Eigen::Matrix<T, 3, 1> to = y.template head<3>() - ray.c.cast<T>();
+  const T along = to[0] * sight.x() + to[1] * sight.y() + to[2] * sight.z();
+  const T side = upright ? ray.Across(y) : ray.c.z() + ray.slope * ray.Along(y) - y[2];
+  const Eigen::Matrix<T, 3, 1> off = to - along * sight.cast<T>();
+  return (sign * side < 0.0 ? -1.0 : 1.0) * Length(T(off.squaredNorm())) - solid.half;
 }
 
-/// Distance of a LiDAR point [m] from a sphere's surface where it was `age` s before.
-inline Residual SpherePointResidual(const Eigen::Vector3d& p_W, double age, const Solid& solid,
-                                    const Vector7d& y) {
-  const Eigen::Vector3d q = p_W - (y.head<3>() - age * y.segment<3>(3));
-  const double distance = std::sqrt(q.squaredNorm() + 1e-12);
-  Residual r{distance - solid.half};
-  r.by_y << -q / distance, age * q / distance, 0.0;
-  return r;
+/// From the centre of the target where it was `age` s before to a LiDAR point [m].
+template <class T>
+Eigen::Matrix<T, 3, 1> FromCentre(const Eigen::Vector3d& p_W, double age, const Unknown<T>& y) {
+  return p_W.cast<T>() - y.template head<3>() + T(age) * y.template segment<3>(3);
 }
 
-/// Distance of a LiDAR point [m] from the target's surface where it stood `age` s before.
-inline Residual PointResidual(const Eigen::Vector3d& p_W, double age, const Solid& solid,
-                              const Vector7d& y) {
-  const Eigen::Vector3d q = p_W - (y.head<3>() - age * y.segment<3>(3));
-  Eigen::Vector2d by_place;
-  const PlanLength side = solid.At(y).Distance(q.head<2>(), &by_place);
-  const double cap = std::abs(q.z()) - 0.5 * solid.height;
-  const bool corner = side.value > 0.0 && cap > 0.0;
-  const double distance =
-      corner ? std::sqrt(side.value * side.value + cap * cap) : std::max(side.value, cap);
-  const double by_side = corner ? side.value / distance : side.value > cap ? 1.0 : 0.0;
-  const double by_cap = corner ? cap / distance : side.value > cap ? 0.0 : 1.0;
-  Eigen::Vector3d by_q;
-  by_q << by_side * by_place, by_cap * (q.z() < 0.0 ? -1.0 : 1.0);
-  Residual r{distance};
-  r.by_y << -by_q, age * by_q, by_side * side.by_yaw;
-  return r;
+/// Signed distance of a LiDAR point [m] from the sphere's surface.
+template <class T>
+T SpherePointResidual(const Eigen::Vector3d& p_W, double age, const Solid& solid,
+                      const Unknown<T>& y) {
+  return Length(T(FromCentre(p_W, age, y).squaredNorm())) - solid.half;
+}
+
+/// Signed distance from what lies within both of two limits, by the excess over either [m].
+template <class T>
+T Beyond(const T& a, const T& b) {
+  using std::max;
+  using std::sqrt;
+  return a > 0.0 && b > 0.0 ? sqrt(a * a + b * b) : max(a, b);
+}
+
+/// Signed distance of a LiDAR point [m] from the target's surface.
+template <class T>
+T PointResidual(const Eigen::Vector3d& p_W, double age, const Solid& solid, const Unknown<T>& y) {
+  using std::abs;
+  const auto q = FromCentre(p_W, age, y);
+  const auto m = InBase(y[kYawAt], q);
+  const T side = solid.square ? Beyond(T(abs(m[0]) - solid.half), T(abs(m[1]) - solid.half))
+                              : Length(T(q[0] * q[0] + q[1] * q[1])) - solid.half;
+  return Beyond(side, T(abs(q[2]) - 0.5 * solid.height));
 }
 
 }  // namespace chase::perception

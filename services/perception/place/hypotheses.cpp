@@ -10,9 +10,6 @@ namespace chase::perception {
 
 namespace {
 
-constexpr double kHiddenBy = 2.0;     // standard deviations of an edge
-constexpr double kTurnSpeed = 1.0;    // m/s, standard deviation of the speed a sharp turn adds
-constexpr double kTurnShift = 0.12;   // m, and of the place
 constexpr double kKnownRange = 0.25;  // m, standard deviation of the prediction
 constexpr double kAside = 0.1;        // share of the range that a new target may lie beside its box
 
@@ -33,7 +30,7 @@ double LogSides(const FitResult& fit, const FitInput& input) {
   const double range = (fit.posterior.position() - input.camera.p_WC).norm();
   const double px = input.camera.rig.focal_px / std::max(kNearest, range);
   double sum = 0.0;
-  double runs_on = input.joined ? kRunsOnToo : kRunsOn;
+  double runs_on = kRunsOn;
   bool still_hidden = input.reappears;
   for (size_t side = 0; side < 4; ++side) {
     if (input.detection->goes_on[side] && !input.detection->parted[side]) {
@@ -82,21 +79,8 @@ double LogPosition(const FitResult& fit, const FitInput& input) {
 
 }  // namespace
 
-double HiddenBy(const FitInput& input) { return kHiddenBy * input.detection->silhouette.sigma_px; }
-
 bool RangeIsKnown(const FitInput& input) {
   return !input.points.empty() || RangeSigma(input.prior, input.camera) < kKnownRange;
-}
-
-FitInput AfterASharpTurn(const FitInput& input) {
-  Eigen::Vector2d sight = (input.prior.position() - input.camera.p_WC).head<2>().normalized();
-  Eigen::Matrix2d across = Eigen::Matrix2d::Identity();
-  if (input.points.empty()) across -= sight * sight.transpose();
-  FitInput turned = input;
-  turned.prior.covariance.topLeftCorner<2, 2>() += kTurnShift * kTurnShift * across;
-  turned.prior.covariance.block<2, 2>(3, 3) += kTurnSpeed * kTurnSpeed * across;
-  if (!input.points.empty()) turned.shape.yaw_variance = TargetShape::kAnyYaw;
-  return turned;
 }
 
 TargetGaussian NewTarget(const Camera& camera, const cv::Rect2d& box, const TargetShape& shape,

@@ -7,7 +7,7 @@
 
 namespace chase::perception {
 
-// Ways to read a silhouette: which sides are the target's, and whether it has just turned sharply.
+// Ways to read a silhouette: which sides are the target's.
 
 using Sides = std::array<bool, 4>;  ///< by Side: seen
 
@@ -26,16 +26,8 @@ inline constexpr std::array<Sides, 12> kReadings = {{{true, true, true, true},
                                                      {false, false, false, true}}};
 inline constexpr size_t kOneHidden = 5;  ///< of them, with at most one side left out
 
-/// Least distance of a hidden side from the fitted outline, px.
-double HiddenBy(const FitInput& input);
-
 /// True when the prediction or the LiDAR tells how far away it is.
 bool RangeIsKnown(const FitInput& input);
-
-/// The input with the prediction of a target that has just braked, turned or been pushed; across
-/// the line of sight only unless points tell the range, since the apparent size alone would take
-/// every pixel that is hidden for a leap.
-FitInput AfterASharpTurn(const FitInput& input);
 
 /// A target of which nothing is known but its range [m] and that it shows in this box.
 TargetGaussian NewTarget(const Camera& camera, const cv::Rect2d& box, const TargetShape& shape,

@@ -7,12 +7,6 @@
 
 namespace chase::perception {
 
-/// One way to explain a detection: which sides are seen, whether the target turned sharply.
-struct Hypothesis {
-  FitResult fit;
-  double log_weight = 0.0;
-};
-
 /// Turns one detection and the LiDAR points on it into a position, or refuses it: what hides part
 /// of the target, or only looks like it, must not bend the estimate.
 class Localiser {
@@ -29,16 +23,13 @@ class Localiser {
                                    const Detection& detection, const Clusters& clusters) const;
 
  private:
-  /// The fit to all sides, if it agrees with all of them.
-  std::optional<FitResult> WholeReading(FitInput* input) const;
-  /// All hypotheses that agree with the prediction, weighed and joined into one Gaussian.
+  /// All readings that agree with the prediction, weighed by their evidence and joined into one
+  /// Gaussian; the first alone where it leaves nothing to ask.
   std::optional<FitResult> JoinedReading(FitInput* input) const;
+  /// The fit to all sides, if it agrees with all of them and they are enough to tell its range.
+  std::optional<FitResult> NewReading(FitInput* input) const;
   std::optional<FitResult> PartialReading(FitInput input) const;
-  std::optional<FitResult> AcquirePartial(FitInput* input, const Clusters& clusters) const;
-  void Weigh(const FitInput& input, double log_prior, size_t readings,
-             std::vector<Hypothesis>* out) const;
-  bool EdgesAgree(const FitResult& fit, const FitInput& input) const;
-  bool Agrees(const FitResult& fit, double prior_gate) const;
+  bool Agrees(const FitResult& fit, const FitInput& input) const;
 
   PerceptionConfig config_;
 };

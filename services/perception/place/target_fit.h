@@ -48,8 +48,7 @@ struct FitInput {
   std::array<bool, 4> use_side = {true, true, true, true};  ///< by Side
   std::vector<TargetPoint> points;
   const Clusters* hits = nullptr;  ///< all points on the detection, the target's or not; or null
-  bool joined = false;     ///< a like colour went on beyond a side of it in the frame before
-  bool reappears = false;  ///< all or part of it was hidden before, and part may still be
+  bool reappears = false;          ///< all or part of it was hidden before, and part may still be
 };
 
 struct FitResult {

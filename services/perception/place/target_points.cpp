@@ -11,30 +11,20 @@ namespace {
 
 constexpr size_t kMinPoints = 3;    // of a cluster that gives a range
 constexpr size_t kMostPoints = 40;  // in a fit
-constexpr int kManyPoints = 5;      // that went through it: the target is not there
-constexpr double kCore = 0.6;       // share of the target that such a ray goes through
-constexpr double kMostOfIt = 0.8;   // likewise of a target that is placed well
+constexpr double kMostOfIt = 0.8;   // share of the target that a ray goes through
 constexpr double kBehind = 0.25;    // m behind the target where such a ray ends at least
 
-/// True when the lidar looked through this share of the target, and hit something behind it.
+/// True when the lidar looked well through the target, and hit something behind it.
 bool SawThrough(const TargetPoint& point, const TargetShape& shape, const TargetGaussian& target,
-                double core, double range_sigma) {
+                double range_sigma) {
   const Eigen::Vector3d center = target.position() - point.age * target.velocity();
   const Eigen::Vector3d ray = point.p_W - point.p_WL, to_center = center - point.p_WL;
   const double length = std::max(1e-6, ray.head<2>().norm());
   const double along = ray.head<2>().dot(to_center.head<2>()) / length;
   const double beside = std::abs(ray.x() * to_center.y() - ray.y() * to_center.x()) / length;
   const double above = point.p_WL.z() + along / length * ray.z() - center.z();
-  return beside < core * shape.size[0] && std::abs(above) < core * 0.5 * shape.size[1] &&
+  return beside < kMostOfIt * shape.size[0] && std::abs(above) < kMostOfIt * 0.5 * shape.size[1] &&
          length > along + shape.MostHalfWidth() + kBehind + 2.0 * range_sigma;
-}
-
-int CountThrough(const Clusters& clusters, const TargetShape& shape, const TargetGaussian& target,
-                 double core, double range_sigma) {
-  int count = 0;
-  for (const auto& cluster : clusters)
-    for (const auto& p : cluster) count += SawThrough(p, shape, target, core, range_sigma);
-  return count;
 }
 
 }  // namespace
@@ -49,7 +39,7 @@ std::vector<TargetPoint> PointsOnTarget(const FitInput& input,
   const Vector7d y = Unknowns(input.prior, input.shape);
   std::vector<TargetPoint> kept;
   for (const auto& p : cluster)
-    if (std::abs(SurfaceDistance(input.shape, p, y).value) < gate) kept.push_back(p);
+    if (std::abs(SurfaceDistance(input.shape, p, y)) < gate) kept.push_back(p);
   if (!GivesRange(kept)) return {};
   const size_t step = 1 + kept.size() / kMostPoints;  // more would not tell more
   std::vector<TargetPoint> some;
@@ -57,25 +47,11 @@ std::vector<TargetPoint> PointsOnTarget(const FitInput& input,
   return some;
 }
 
-bool SeenThrough(const FitInput& input, const Clusters& clusters) {
-  const double sigma = RangeSigma(input.prior, input.camera);
-  return CountThrough(clusters, input.shape, input.prior, kCore, sigma) >= kManyPoints;
-}
-
 int RaysThrough(const FitInput& input, const TargetGaussian& target) {
-  return input.hits ? CountThrough(*input.hits, input.shape, target, kMostOfIt, 0.0) : 0;
-}
-
-bool HitElsewhere(const FitInput& input, const Clusters& clusters) {
-  if (CountPoints(clusters) < kSurelyHit) return false;
-  return std::all_of(clusters.begin(), clusters.end(), [&](const auto& cluster) {
-    return PointsOnTarget(input, cluster, kLidarGate).empty();
-  });
-}
-
-size_t CountPoints(const Clusters& clusters) {
-  size_t count = 0;
-  for (const auto& cluster : clusters) count += cluster.size();
+  const double sigma = RangeSigma(target, input.camera);
+  int count = 0;
+  for (size_t i = 0; input.hits && i < input.hits->size(); ++i)
+    for (const auto& p : (*input.hits)[i]) count += SawThrough(p, input.shape, target, sigma);
   return count;
 }
 

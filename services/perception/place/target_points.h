@@ -20,18 +20,8 @@ double RangeSigma(const TargetGaussian& target, const Camera& camera);
 std::vector<TargetPoint> PointsOnTarget(const FitInput& input,
                                         const std::vector<TargetPoint>& cluster, double gate);
 
-/// True when the lidar looked well through where the target should be, and hit something behind it
-/// several times: the target is not there.
-bool SeenThrough(const FitInput& input, const Clusters& clusters);
-
 /// Rays to the points on the detection that go through a target placed there, and end behind it.
 int RaysThrough(const FitInput& input, const TargetGaussian& target);
-
-/// True when many points hit the detection, and none of them the target as predicted.
-bool HitElsewhere(const FitInput& input, const Clusters& clusters);
-
-/// Points in all clusters.
-size_t CountPoints(const Clusters& clusters);
 
 /// From the camera [m]; the cluster must hold enough points to give a range.
 double MedianRange(const std::vector<TargetPoint>& cluster);

@@ -6,6 +6,13 @@
 
 namespace chase::perception {
 
+bool Detection::LargerThan(const cv::Rect2d& expected) const {
+  constexpr double kLarger = 1.1, kSigmas = 4.0;  // times its size, and of an edge more
+  const double more = kSigmas * silhouette.sigma_px;
+  return box.width > kLarger * expected.width + more ||
+         box.height > kLarger * expected.height + more;
+}
+
 std::unique_ptr<Detector> MakeDetector(const DetectorConfig& config, double edge_sigma_px,
                                        const world::Rig& rig) {
   if (config.kind == "marker") return std::make_unique<MarkerDetector>(config.marker, rig);

@@ -38,6 +38,8 @@ struct Detection {
   Eigen::Matrix3d p_CT_covariance = Eigen::Matrix3d::Identity();  ///< frame C, m^2
 
   bool AnyCut() const { return cut[kLeft] || cut[kRight] || cut[kTop] || cut[kBottom]; }
+  /// True when it is more than a target that shows in `expected` [px].
+  bool LargerThan(const cv::Rect2d& expected) const;
   /// True when the image's border cuts it.
   bool LeavesImage() const {
     for (size_t side = 0; side < 4; ++side)
