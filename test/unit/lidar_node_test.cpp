@@ -87,24 +87,12 @@ TEST(LidarNode, AnotherSensorIsReportedAndPublishesNothing) {
   EXPECT_NE(flown.report.detail.find("Hi-Res"), std::string::npos);
 }
 
-/// A port of UDP that nobody listens on.
-int FreePort() {
-  const int probe = socket(AF_INET, SOCK_DGRAM, 0);
-  sockaddr_in at{};
-  at.sin_family = AF_INET;
-  socklen_t size = sizeof at;
-  auto* address = reinterpret_cast<sockaddr*>(&at);
-  const bool got = bind(probe, address, size) == 0 && getsockname(probe, address, &size) == 0;
-  close(probe);
-  return got ? ntohs(at.sin_port) : 0;
-}
-
 /// A sensor on UDP. The node's clock is the lockstep's.
 class Live {
  public:
   Live() : socket_(socket(AF_INET, SOCK_DGRAM, 0)) {
     LidarConfig config;
-    config.port = FreePort();
+    config.port = testing::FreePort();
     to_.sin_family = AF_INET;
     to_.sin_port = htons(static_cast<uint16_t>(config.port));
     to_.sin_addr.s_addr = htonl(INADDR_LOOPBACK);

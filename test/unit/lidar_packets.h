@@ -1,5 +1,9 @@
 #pragma once
 
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -55,6 +59,18 @@ inline Bytes StreamPacket(int k, double first_azimuth_deg, uint32_t first_stamp_
   spec.stamp_us = static_cast<uint32_t>(
       (first_stamp_us + static_cast<uint64_t>(std::llround(elapsed_us))) % 3600000000ull);
   return MakePacket(spec);
+}
+
+/// A port of UDP that nobody listens on.
+inline int FreePort() {
+  const int probe = socket(AF_INET, SOCK_DGRAM, 0);
+  sockaddr_in at{};
+  at.sin_family = AF_INET;
+  socklen_t size = sizeof at;
+  auto* address = reinterpret_cast<sockaddr*>(&at);
+  const bool got = bind(probe, address, size) == 0 && getsockname(probe, address, &size) == 0;
+  close(probe);
+  return got ? ntohs(at.sin_port) : 0;
 }
 
 }  // namespace chase::lidar::testing
