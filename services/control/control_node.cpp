@@ -140,6 +140,7 @@ std::string ControlNode::Refusal(const plan_t& message) {
   plan.position = claim.position;
   plan.yaw = Eigen::Map<const Eigen::VectorXd>(message.yaw.data(), message.n_yaw);
   plan.stop = claim.stop;
+  if (claim.certified) plan.tube = claim.hard_radius - config_.drone_radius;
   plan.seq = message.seq;
   return controller_.AddPlan(plan);
 }

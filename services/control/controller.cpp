@@ -11,6 +11,7 @@ namespace chase::control {
 namespace {
 
 constexpr double kJumpBack = 0.3;  // s; messages are late by less
+constexpr double kSame = 0.01;     // m
 constexpr double kAtRest = 0.3;    // m/s: gusts about a wind of 3 m/s stir a hovering body by less
 constexpr double kAtEnd = 0.3;     // m: planning asks for as much free ground beside the body
 constexpr double kLongestWay = 45.0;  // s to above the ground that planning chose, at 2.2 s a metre
@@ -40,15 +41,18 @@ std::string Controller::AddPlan(const Plan& plan) {
   return plans_.Add(plan) ? "" : "it starts before the one being flown, or is empty";
 }
 
-// The reference may be far from the body, which follows it; a new plan does not add to that.
+// The reference may be far from the body, which follows it; a new plan does not add to that. What
+// is certified holds for a body in its tube, or goes on along the reference.
 bool Controller::IsNear(const Plan& plan) const {
   const double start = plan.position.start, now = last_t_.value_or(start);
   const double t = std::max(start, now);  // from when on it would be flown
   const Eigen::Vector3d p = Sample(plan, t).state.p;
   const std::optional<Reference> reference = plans_.At(t);
-  if (reference && (reference->state.p - p).norm() <= config_.reset_distance) return true;
+  const double from_reference = plan.tube ? kSame : config_.reset_distance;
+  if (reference && (reference->state.p - p).norm() <= from_reference) return true;
   const double ahead = std::min(t - now, 0.2);
-  return (last_estimate_.p_WB + ahead * last_estimate_.v_WB - p).norm() <= config_.reset_distance;
+  return (last_estimate_.p_WB + ahead * last_estimate_.v_WB - p).norm() <=
+         plan.tube.value_or(config_.reset_distance);
 }
 
 std::optional<Setpoint> Controller::Update(double t, const Estimate& estimate, Health health) {
@@ -210,7 +214,7 @@ void Controller::FollowTimeBack(double t) {
   for (double* time : {&last_usable_, &last_measured_, &asked_to_land_}) *time += back;
   reckoning_.Shift(back);
   plans_.Clear();
-  bound_ = {};
+  bound_ = ErrorBound(config_.tracking_tube);
   last_t_ = t;
 }
 

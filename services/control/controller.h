@@ -107,7 +107,7 @@ class Controller {
   TrackingLaw law_;
   Landing landing_;
   DeadReckoning reckoning_;
-  ErrorBound bound_;
+  ErrorBound bound_{config_.tracking_tube};
   std::optional<double> last_t_;
   Estimate last_estimate_;
   double last_usable_ = 0.0, last_measured_ = 0.0;  // of the pose, the velocity; s

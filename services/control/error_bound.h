@@ -12,9 +12,14 @@ namespace chase::control {
 /// m/s 94 % with the centimetre, 99.7 % with the quarter too (control_test).
 class ErrorBound {
  public:
+  /// `unknown`: the bound that counts for what has not been measured, m.
+  explicit ErrorBound(double unknown) : unknown_((unknown - kMargin) / kGrowth) {
+    std::fill(most_, most_ + kSlots, unknown_);
+  }
   void Add(double t, double error) {
     const double slot = std::floor(t / kSlot);
-    for (double s = std::max(last_ + 1.0, slot - kSlots + 1.0); s <= slot; s += 1.0) At(s) = 0.0;
+    for (double s = std::max(last_ + 1.0, slot - kSlots + 1.0); s <= slot; s += 1.0)
+      At(s) = s < slot ? unknown_ : 0.0;
     last_ = std::max(last_, slot);
     At(last_) = std::max(At(last_), error);
   }
@@ -29,7 +34,7 @@ class ErrorBound {
     return most_[static_cast<int>(slot - kSlots * std::floor(slot / kSlots))];
   }
   double last_ = -1e18;
-  double most_[kSlots] = {};
+  double unknown_, most_[kSlots];  // m
 };
 
 }  // namespace chase::control

@@ -3,7 +3,6 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 
 #include "common/math/rotation.h"
 #include "common/world/ages.h"
@@ -59,12 +58,13 @@ std::optional<world::Obstacle> TargetBody(const Forecast& f) {
   return body;
 }
 
-// What stands seems to move when the frame drifts. What the tube has left beside the tracking error
-// holds as much of that as adds up while a plan and its stop are flown.
-Eigen::Matrix3d BeyondTube(const Eigen::Matrix3d& covariance, double left, double duration,
+// Static obstacles seem to move when the frame drifts. The share `spare` of the tube that tracking
+// does not need holds deviations up to spare / duration in each direction, n; beyond that, since
+// n' C n <= held^2 + n' rest n, they are the obstacles'.
+Eigen::Matrix3d BeyondTube(const Eigen::Matrix3d& covariance, double spare, double duration,
                            double sigmas) {
   if (!covariance.allFinite() || !(sigmas > 0.0)) return Eigen::Matrix3d::Zero();
-  const double held = left / (sigmas * duration);
+  const double held = spare / (sigmas * duration);
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(covariance);
   const Eigen::Vector3d rest = (eigen.eigenvalues().array() - held * held).max(0.0);
   return eigen.eigenvectors() * rest.asDiagonal() * eigen.eigenvectors().transpose();
@@ -80,12 +80,23 @@ bool IsFinite(const PlanResult& plan) {
 Pilot::Pilot(const PlanningConfig& config)
     : config_(config),
       planner_(MakePlanner(config.planner_name, config.planner)),
-      tube_(config.planner.tracking_tube) {}
+      tube_(config.planner.tracking_tube),
+      tracking_bound_(tube_) {}
 
 void Pilot::SetTrackingBound(double bound) {
-  const double least = config_.planner.tracking_tube;
-  tracking_bound_ = std::isfinite(bound) ? std::clamp(bound, 0.0, std::max(least, kWidestTube)) : 0;
-  tube_ = std::max(least, tracking_bound_);
+  tracking_bound_ = std::isfinite(bound) ? std::max(bound, 0.0) : kWidestTube;
+}
+
+// The body strays from its plan by the tracking error, and the estimate from the body.
+void Pilot::SetTube(const BodyEstimate& body) {
+  const double sigmas = config_.planner.sigmas, least = config_.planner.tracking_tube;
+  const double strays = tracking_bound_ + sigmas * LargestSigma(body.position_covariance);
+  tube_ = std::clamp(strays, least, std::max(least, kWidestTube));
+  // Ways that are not to the target may take a quarter of a minute.
+  const double spare = Chases() ? std::max(0.0, tube_ - strays) : 0.0;
+  const double duration =
+      world::kMostAge.obstacles + config_.latency + config_.horizon + kLongestBrake;
+  drift_ = BeyondTube(body.velocity_covariance, spare, duration, sigmas);
 }
 
 void Pilot::SetForecast(const Forecast& forecast) {
@@ -159,8 +170,7 @@ bool Pilot::MayPlan(double t) const {
 
 std::optional<PlanResult> Pilot::Update(double t, const BodyEstimate& body) {
   if (has_running_ && t < running_.trajectory.start - kJumpBack) ChangeFrame();  // of the clock
-  drift_ = BeyondTube(body.velocity_covariance, tube_ - tracking_bound_,
-                      config_.horizon + std::end(kBrakeTimes)[-1], config_.planner.sigmas);
+  SetTube(body);
   const double t0 = t + config_.latency;
   const Start start = StartAt(t, t0, body);
   news_ = news_ || !start.follows;
@@ -228,6 +238,7 @@ PlanRequest Pilot::Request(double t0, const Start& start) const {
   // What moves is measured, as the target is, in the frame that drifts.
   for (world::Obstacle& o : request.obstacles)
     if (!o.moving) o.velocity_covariance += drift_;
+  for (world::Obstacle& o : request.unseen) o.velocity_covariance += drift_;
   request.horizon = config_.horizon;
   request.target = world::Trajectory::Constant(start.state.p, t0, config_.horizon);
   if (!forecast_ || !forecast_->has_target) return request;

@@ -31,7 +31,8 @@ struct BodyEstimate {
   Eigen::Vector3d p = Eigen::Vector3d::Zero();  ///< p_WB, m
   Eigen::Vector3d v = Eigen::Vector3d::Zero();  ///< v_WB, m/s
   double yaw = 0.0;                             ///< rad
-  /// Of v against the map around, m^2/s^2.
+  /// Against the map around: of p, m^2, and of v, m^2/s^2.
+  Eigen::Matrix3d position_covariance = Eigen::Matrix3d::Zero();
   Eigen::Matrix3d velocity_covariance = Eigen::Matrix3d::Zero();
 };
 
@@ -99,6 +100,7 @@ class Pilot {
     bool follows = true;   ///< the body was within the tube about what is flown
   };
 
+  void SetTube(const BodyEstimate& body);
   bool IsDue(double t) const;
   bool MayPlan(double t) const;
   bool Chases() const { return !task_ || *task_ == Task::kChase; }
@@ -134,7 +136,7 @@ class Pilot {
   std::optional<double> unseen_time_;  ///< s
   PlanResult running_;
   bool has_running_ = false;
-  double tube_, tracking_bound_ = 0.0;  ///< m
+  double tube_, tracking_bound_;  ///< m
   double last_planned_ = -1e9;
   bool news_ = false;
   bool airborne_ = false;

@@ -18,7 +18,7 @@ constexpr size_t kMaxObstacles = 1000;
 BodyEstimate FromMessage(const pose_t& m) {
   const Eigen::Map<const Eigen::Matrix<double, 9, 9, Eigen::RowMajor>> P(m.local_covariance);
   return {bus::ToVector(m.pos), bus::ToVector(m.vel), math::Yaw(bus::ToQuaternion(m.orientation)),
-          P.block<3, 3>(3, 3)};
+          P.block<3, 3>(0, 0), P.block<3, 3>(3, 3)};
 }
 
 Task TaskOf(int8_t state) {
@@ -85,7 +85,7 @@ PlanningNode::PlanningNode(bus::Bus& bus, const PlanningConfig& config)
   bus_.Subscribe<tracking_t>("TRACKING", [this](const tracking_t& m) {
     pilot_.SetFlying(m.following != tracking_t::NONE);
     pilot_.SetDescending(m.following == tracking_t::LAND);
-    pilot_.SetTrackingBound(m.following == tracking_t::NONE ? 0.0 : m.bound);
+    pilot_.SetTrackingBound(m.bound);
   });
   bus_.Subscribe<flight_state_t>("FLIGHT_STATE", [this](const flight_state_t& m) { OnState(m); });
   bus_.Subscribe<status_t>("FCU_STATUS", [this](const status_t& m) { autopilot_.Hear(m); });

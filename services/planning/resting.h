@@ -9,7 +9,8 @@
 namespace chase::planning {
 
 /// Durations of a braking that are tried, s.
-inline constexpr double kBrakeTimes[] = {0.6, 0.8, 1.0, 1.3, 1.7, 2.2, 3.0};
+inline constexpr double kLongestBrake = 3.0;  // s
+inline constexpr double kBrakeTimes[] = {0.6, 0.8, 1.0, 1.3, 1.7, 2.2, kLongestBrake};
 
 /// To rest over T, wherever that leads or at `end`: of all ways that continue position, velocity
 /// and acceleration of s the one of least squared jerk. Mueller, Hehn and D'Andrea 2015, section

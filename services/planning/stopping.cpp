@@ -44,6 +44,7 @@ bool KeepsOff(const PlannerConfig& config, const PlanRequest& request,
   if ((request.unseen.empty() && !late) || t <= plan.start) return true;
   PlanRequest part;
   static_cast<Stretch&>(part) = {plan.start, t - plan.start, request.start, false};
+  part.tube = request.tube;
   part.target = request.target;
   part.obstacles = request.unseen;
   if (late) {

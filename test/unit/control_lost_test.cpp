@@ -317,5 +317,39 @@ TEST(NewPlans, MoveTheReferenceNoFurtherThanAResetUnlessToTheBody) {
   EXPECT_EQ(flight.controller.AddPlan(PointPlan({3, 0, 2}, 1.2)), "");
 }
 
+TEST(NewPlans, HoldForABodyInTheirTubeWhereTheyAreCertified) {
+  Flight flight({0, 0, 2});
+  flight.controller.AddPlan(PointPlan({0, 0, 2}));
+  flight.Fly(1.0, Health::kUsable);
+  const auto certified = [](double x, double tube) {
+    Plan plan = PointPlan({x, 0, 2}, 1.1);
+    plan.tube = tube;
+    return plan;
+  };
+  EXPECT_NE(flight.controller.AddPlan(certified(0.2, 0.12)), "") << "near the reference";
+  EXPECT_EQ(flight.controller.AddPlan(certified(0.2, 0.25)), "");
+  EXPECT_EQ(flight.controller.AddPlan(certified(0.1, 0.12)), "");
+  flight.body.p.x() += 0.25;
+  flight.Fly(1.005, Health::kUsable);
+  EXPECT_EQ(flight.controller.AddPlan(certified(0.3, 0.12)), "") << "from the body";
+  EXPECT_EQ(flight.controller.AddPlan(certified(0.3, 0.01)), "") << "goes on along the last one";
+}
+
+TEST(ErrorBound, IsTheTubesWhereNothingWasMeasured) {
+  ErrorBound bound(0.12);
+  EXPECT_NEAR(bound.value(), 0.12, 1e-12);
+  double t = 0.0;
+  const auto fly = [&](double s) {
+    for (const double end = t + s; t < end; t += kStep) bound.Add(t, 0.02);
+  };
+  fly(1.0);
+  EXPECT_NEAR(bound.value(), 0.12, 1e-12);
+  fly(1.2);
+  EXPECT_LT(bound.value(), 0.04);
+  t += 1.0;
+  fly(0.1);
+  EXPECT_NEAR(bound.value(), 0.12, 1e-12);
+}
+
 }  // namespace
 }  // namespace chase::control

@@ -296,11 +296,12 @@ TEST(Rest, OutOfTheGroundItClimbsWithinTheLimits) {
 }
 
 // Past a wall in a frame that drifts towards it: the body strays from plan and stop, and the wall
-// comes nearer, by as much as either may; the clearance that is certified is left.
+// comes nearer, by as much as either may; the clearance that is certified is left. One that nobody
+// has seen is kept off by the stop, and until it begins.
 TEST(Pilot, AFrameThatDriftsKeepsOffWhatStands) {
   PlanningConfig config;
   config.takeoff_time = 0.1;
-  const auto room = [&](double bound, double sigma) {
+  const auto room = [&](double bound, double sigma, bool seen) {
     Pilot pilot(config);
     pilot.SetFlying(true);
     pilot.SetTrackingBound(bound);
@@ -309,34 +310,37 @@ TEST(Pilot, AFrameThatDriftsKeepsOffWhatStands) {
     wall.half = {5.0, 0.1, 3.0};
     wall.axes.setIdentity();
     wall.shape = (3.0 * wall.half.cwiseAbs2()).cwiseInverse().asDiagonal();
-    pilot.SetObstacles(0.0, {wall});
+    pilot.SetObstacles(0.0, seen ? std::vector{wall} : std::vector<world::Obstacle>());
+    pilot.SetUnseen(0.0, seen ? std::vector<world::Obstacle>() : std::vector{wall});
     Forecast forecast;
     forecast.has_target = true;
     forecast.target = world::Trajectory::Constant({2.5, 1.5, 0.7}, 0.0, 2.5);
     pilot.SetForecast(forecast);
-    BodyEstimate body{{0.0, 0.6, 1.2}, Vector3d::Zero(), 0.0};
+    BodyEstimate body{{0.0, 0.6, 1.2}, {0.0, seen ? 0.0 : 1.0, 0.0}, 0.0};
     body.velocity_covariance.diagonal().setConstant(sigma * sigma);
     double least = -HUGE_VAL;
     for (double t = 0.0; std::isinf(least) && t < 1.0; t += 0.05)
       if (const auto plan = pilot.Update(t, body)) {
-        const auto left = [&](const world::Trajectory& way) {
+        const auto left = [&](const world::Trajectory& way, double until) {
           double most = 0.0;  // of the wall's way and the body's
-          for (double s = 0.0; s <= 1.0; s += 0.05) {
-            const double at = way.start + s * way.duration;
+          for (double at = way.start; at <= until; at += 0.02 * way.duration) {
             const double drift = 2.0 * sigma * (at - plan->trajectory.start);
             most = std::max(most, way.Position(at).y() + drift + bound);
           }
           return 1.9 - most - config.planner.drone_radius;
         };
         EXPECT_GE(plan->certified_clearance, 0.0);
-        least = left(plan->trajectory) - plan->certified_clearance;
-        if (plan->stop) least = std::min(least, left(*plan->stop));
+        least = seen ? left(plan->trajectory, plan->trajectory.end()) - plan->certified_clearance
+                     : left(plan->trajectory, plan->stop ? plan->stop->start : 0.0);
+        if (plan->stop) least = std::min(least, left(*plan->stop, plan->stop->end()));
+        EXPECT_TRUE(seen || plan->stop || sigma > 0.05);  // it brakes, whatever is there
       }
     return least;
   };
   for (const double bound : {0.0, 0.06, 0.115, 0.2})
     for (const double sigma : {0.0, 0.003, 0.01, 0.05, 0.1, 0.2})
-      EXPECT_GE(room(bound, sigma), -1e-6) << bound << " " << sigma;
+      for (const bool seen : {true, false})
+        EXPECT_GE(room(bound, sigma, seen), -1e-6) << bound << " " << sigma << " " << seen;
 }
 
 }  // namespace

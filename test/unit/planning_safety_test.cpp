@@ -198,6 +198,17 @@ TEST(CertifiedPlan, IsLeftForAStopInSpaceThatWasSeen) {
   EXPECT_TRUE(WayOut(config, request, plan));
 }
 
+TEST(CertifiedPlan, KeepsAsWideATubeOffWhatIsUnseenUntilItsStop) {
+  PlanRequest request = Hover();
+  world::Trajectory plan{request.t0, 2.0, Eigen::MatrixXd::Zero(2, 3)};
+  plan.coefficients << 0.0, 0.0, 1.5, 3.0, 0.0, 0.0;
+  request.start = plan.At(request.t0);
+  request.unseen = {Cylinder(7, {0.6, 0.55, 1.5}, Vector3d::Zero(), 0.1, 3.0)};  // 0.45 m aside
+  EXPECT_TRUE(WayOut(PlannerConfig(), request, plan));
+  request.tube = 0.3;
+  EXPECT_FALSE(WayOut(PlannerConfig(), request, plan));
+}
+
 /// Calls a plan feasible that goes straight on.
 class Liar : public Search {
  public:
