@@ -21,6 +21,8 @@ constexpr double kEnoughInSight = 0.5, kKeepsPlace = 1.0;
 // Gone to while looking that way: a place so far from the gaze, rad, and from here, desired
 // distances.
 constexpr double kAhead = 0.5, kArrived = 1.5;
+// Deviation of a target that is in sight, m, and how much more it is from one forecast to the next.
+constexpr double kKnown = 0.1, kAsKnown = 1.3;
 constexpr double kLeg = 2.5;      // desired distances: the planner is led to nothing farther off
 constexpr double kGoes = 0.5;     // m: a plan that looks for it is worth that at least
 constexpr double kSettles = 0.3;  // s: a turn ends so
@@ -254,9 +256,15 @@ PlanRequest Pilot::Request(double t0, const Start& start) const {
 }
 
 PlanResult Pilot::Chase(double t0, const Start& start) {
+  // Those of a target that is out of sight grow uncertain, until there are none.
+  const double sigma = LargestSigma(forecast_->covariance);
+  const bool late = forecast_->t > last_seen_.start + world::kMostAge.target_unseen;
+  if (!had_target_ || late || sigma <= std::max(kKnown, kAsKnown * last_seen_sigma_)) {
+    last_seen_ = forecast_->target;
+    last_seen_sigma_ = sigma;
+    fastest_ = std::max(fastest_, last_seen_.Velocity(last_seen_.start).norm());
+  }
   had_target_ = true;
-  last_seen_ = forecast_->target;
-  fastest_ = std::max(fastest_, last_seen_.Velocity(last_seen_.start).norm());
   whereabouts_.Clear();
   return planner_->Plan(Request(t0, start));
 }

@@ -142,7 +142,8 @@ class Pilot {
   bool airborne_ = false;
   bool heard_control_ = false, flies_ = false, descending_ = false, waits_ = false;
   bool had_target_ = false;
-  world::Trajectory last_seen_;  ///< forecast of the target that was chased last
+  world::Trajectory last_seen_;   ///< forecast of the target from when it was in sight last
+  double last_seen_sigma_ = 0.0;  ///< of its place, m
   double climb_end_ = 0.0;
   std::optional<Eigen::Vector3d> climb_top_;  ///< p_WB, m
   std::optional<Task> task_;

@@ -1,8 +1,11 @@
 #include "services/planning/whereabouts.h"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
+
+#include "common/world/shapes.h"
 
 namespace chase::planning {
 namespace {
@@ -30,22 +33,37 @@ double Uniform(uint32_t i, uint32_t k) {
   return x - std::floor(x);
 }
 
-/// What stands or walks, at one instant.
+/// An obstacle at one instant, in axes of its own.
 struct Solid {
   Eigen::Vector3d center;
-  Eigen::Matrix3d shape;
+  Eigen::Matrix3d axes;  // columns, frame W
+  world::Solid shape;
 };
+
+Solid SolidAt(double t, const world::Obstacle& o) {
+  using Kind = world::Solid::Kind;
+  const Eigen::Vector3d center = o.center.Position(t), origin = Eigen::Vector3d::Zero();
+  if (o.solid == world::Obstacle::Solid::kBox)
+    return {center, o.axes.toRotationMatrix(), {Kind::kBox, origin, o.half}};
+  if (o.solid == world::Obstacle::Solid::kCylinder)
+    return {center, Eigen::Matrix3d::Identity(), {Kind::kCylinder, origin, o.half}};
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(o.shape);
+  return {center,
+          eigen.eigenvectors(),
+          {Kind::kEllipsoid, origin, eigen.eigenvalues().cwiseSqrt().cwiseInverse()}};
+}
 
 std::vector<Solid> SolidsAt(double t, const std::vector<world::Obstacle>& obstacles) {
   std::vector<Solid> solids;
   for (const world::Obstacle& o : obstacles)
-    if (!o.ground) solids.push_back({o.center.Position(t), o.shape});
+    if (!o.ground) solids.push_back(SolidAt(t, o));
   return solids;
 }
 
 bool Cuts(const std::vector<Solid>& solids, const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   return std::any_of(solids.begin(), solids.end(), [&](const Solid& s) {
-    return world::SegmentSquaredDistance(a, b, s.center, s.shape) < 1.0;
+    return world::SegmentHits(s.shape, s.axes.transpose() * (a - s.center),
+                              s.axes.transpose() * (b - s.center));
   });
 }
 

@@ -85,6 +85,38 @@ bool Goes(const PlanResult& plan) {
   return plan.reason.find("target lost, to where it may be") == 0;
 }
 
+/// How the first plan turns that looks for a target which drove past: coefficients of its yaw from
+/// the first power on. While the target was out of sight forecasts of a turn came, or none.
+std::vector<double> LooksFor(bool misled) {
+  Pilot pilot{PlanningConfig()};
+  pilot.SetFlying(true);
+  const BodyEstimate body{{0.0, 0.0, 1.0}, Eigen::Vector3d::Zero(), 0.0};
+  for (double t = 0.0; t < 5.0; t += 0.1) {
+    const double blind = t - 2.05;
+    pilot.SetObstacles(t, {});
+    Forecast f = Walking(t);
+    f.target.coefficients.row(0) << 5.0 - 2.0 * t, 0.8, 0.5;
+    f.target.coefficients.row(1) << -2.0 * 2.5, 0.0, 0.0;
+    f.covariance = 1e-4 * Eigen::Matrix3d::Identity();
+    if (blind > 0.0) {
+      f.covariance *= 400.0;
+      f.target.coefficients.row(0) << 1.0 + blind, 0.8 + 1.2 * blind, 0.5;
+      f.target.coefficients.row(1) << 2.5, 3.0, 0.0;
+    }
+    if (blind < (misled ? 1.4 : 0.0)) pilot.SetForecast(f);
+    const auto plan = pilot.Update(t, body);
+    if (plan && t > 3.6 && plan->reason.find("target lost") == 0)
+      return {plan->yaw.begin() + 1, plan->yaw.end()};
+  }
+  return {};
+}
+
+TEST(Pilot, LooksFromWhereTheTargetWasSeenLastNotFromWhereItWasForecast) {
+  const std::vector<double> turn = LooksFor(true);
+  EXPECT_FALSE(turn.empty());
+  EXPECT_EQ(turn, LooksFor(false));
+}
+
 TEST(Pilot, SearchesFartherForWhoWasFast) {
   const auto goes = [](double speed) {
     const auto plans = AfterTheLastSight(0.0, 0.0, speed, 0.3);

@@ -62,6 +62,25 @@ TEST(Whereabouts, GoThroughNoWallAndHideBehindIt) {
   EXPECT_GT(where.Likeliest(1.5).x(), 4.0);
 }
 
+// The ellipsoid about a long wall bulges far beyond it.
+TEST(Whereabouts, AreSeenBesideALongWall) {
+  world::Obstacle wall;
+  wall.solid = world::Obstacle::Solid::kBox;
+  wall.half = {0.1, 8.0, 2.0};
+  wall.center = world::Trajectory::Constant({0.6, 0.0, 1.0}, 0.0, 100.0);
+  wall.shape = Eigen::Vector3d(1.0, 9.0, 3.0).cwiseAbs2().cwiseInverse().asDiagonal();
+  for (const bool beyond : {false, true}) {
+    Whereabouts where;
+    where.Begin(0.0, {beyond ? 4.0 : -4.0, 3.0, 0.5}, {0.0, 0.3, 0.0}, 0.3);
+    for (double t = 0.0; t < 1.0; t += kStep) where.Advance(t, {wall}, kEye, 0.0, kCamera);
+    const Whereabouts::Gaze gaze = where.BestGaze(0.0, 1.5, kCamera);
+    EXPECT_NEAR(gaze.share, beyond ? 0.0 : 1.0, 0.05);
+    if (!beyond) {
+      EXPECT_NEAR(gaze.yaw, std::atan2(3.3, -4.0), 0.4);
+    }
+  }
+}
+
 /// Processor time of an update at t, s, of a search that was begun at 0 and had come to `before`.
 double UpdateTime(double before, double t) {
   const auto walls = Wall({20.0, -20.0}, {20.0, 20.0});
