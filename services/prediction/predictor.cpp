@@ -97,6 +97,24 @@ void SearchAndRelax(const PredictorConfig& config, const CandidateSet& candidate
   SetOutcome(candidates, found, now, result);
 }
 
+// The height is held: on a slope, and where the ground is rough, it departs from that as a line
+// through the observations does.
+void SetHeight(const std::vector<Observation>& observations, double now, double floor,
+               PredictResult* result) {
+  double n = 0.0, t = 0.0, z = 0.0, tt = 0.0, tz = 0.0;  // weighted sums
+  for (const Observation& o : observations) {
+    const double w = 1.0 / std::max(o.covariance(2, 2), floor * floor), at = o.t - now;
+    n += w, t += w * at, z += w * o.mean.z(), tt += w * at * at, tz += w * at * o.mean.z();
+  }
+  const double spread = std::max(tt - t * t / n, 1e-9), rate = (tz - t * z / n) / spread;
+  const double height = (z - rate * t) / n, off = height - result->trajectory.Position(now).z();
+  Eigen::Matrix3d &p = result->position_covariance, &v = result->velocity_covariance;
+  const double most[] = {p(2, 2), v(2, 2)};  // with a rate as free as along the ground
+  for (Eigen::Matrix3d* m : {&p, &v}) m->row(2).setZero(), m->col(2).setZero();
+  p(2, 2) = off * off + std::min(1.0 / n + t * t / (n * n * spread), most[0]);
+  v(2, 2) = rate * rate + std::min(1.0 / spread, most[1]);
+}
+
 }  // namespace
 
 PredictResult Predictor::Predict(const PredictRequest& request) const {
@@ -118,6 +136,7 @@ PredictResult Predictor::Predict(const PredictRequest& request) const {
   result.position_covariance = candidates.PositionCovariance();
   result.velocity_covariance = candidates.VelocityCovariance();
   SearchAndRelax(config_, candidates, obstacles, request.now, &result);
+  if (config_.planar) SetHeight(observations, request.now, config_.sigma_floor, &result);
   return result;
 }
 

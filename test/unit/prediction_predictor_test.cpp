@@ -55,6 +55,27 @@ TEST(Predictor, FollowsAStraightLine) {
   EXPECT_NEAR(Predictor({}).Predict(Straight(0.8)).trajectory.Position(7.5).x(), 2.0, 0.07);
 }
 
+// Its height is held, and how far that may be off is told: little on level ground.
+TEST(Predictor, TellsHowTheHeightDepartsFromTheOneThatIsHeld) {
+  for (const double slope : {0.0, 0.1, -0.3, 0.5}) {
+    PredictRequest request = Straight(1.2);
+    const auto height = [&](double t) { return 0.5 + slope * 1.2 * (t - 5.0); };
+    for (Observation& o : request.observations) o.mean.z() = height(o.t);
+    const PredictResult result = Predictor({}).Predict(request);
+    const auto sigma = [&](double ahead) {
+      return std::sqrt(result.position_covariance(2, 2) +
+                       ahead * ahead * result.velocity_covariance(2, 2));
+    };
+    for (double t = 5.0; t <= 7.5; t += 0.25)
+      EXPECT_LE(std::abs(result.trajectory.Position(t).z() - height(t)), 2.0 * sigma(t - 5.0))
+          << slope << " " << t;
+    if (slope == 0.0) {
+      EXPECT_LT(sigma(1.0), 0.1);
+    }
+    EXPECT_GT(sigma(1.0), 0.01);
+  }
+}
+
 TEST(Predictor, OkMeansClearOfEveryObstacleAtEveryTime) {
   int ok = 0;
   for (uint64_t seed = 0; seed < 60; ++seed) {
