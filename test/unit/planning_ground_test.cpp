@@ -338,7 +338,7 @@ TEST(Pilot, AFrameThatDriftsKeepsOffWhatStands) {
     return least;
   };
   for (const double bound : {0.0, 0.06, 0.115, 0.2})
-    for (const double sigma : {0.0, 0.003, 0.01, 0.05, 0.1, 0.2})
+    for (const double sigma : {0.0, 0.003, 0.01, 0.02, 0.05, 0.1, 0.2})
       for (const bool seen : {true, false})
         EXPECT_GE(room(bound, sigma, seen), -1e-6) << bound << " " << sigma << " " << seen;
 }
