@@ -11,7 +11,7 @@ namespace chase::control {
 namespace {
 
 constexpr double kJumpBack = 0.3;  // s; messages are late by less
-constexpr double kSame = 0.01;     // m
+constexpr double kSame = 0.01;     // m: planning takes the start from the plan that is flown
 constexpr double kAtRest = 0.3;    // m/s: gusts about a wind of 3 m/s stir a hovering body by less
 constexpr double kAtEnd = 0.3;     // m: planning asks for as much free ground beside the body
 constexpr double kLongestWay = 45.0;  // s to above the ground that planning chose, at 2.2 s a metre
@@ -41,8 +41,9 @@ std::string Controller::AddPlan(const Plan& plan) {
   return plans_.Add(plan) ? "" : "it starts before the one being flown, or is empty";
 }
 
-// The reference may be far from the body, which follows it; a new plan does not add to that. What
-// is certified holds for a body in its tube, or goes on along the reference.
+// The reference may be far from the body, which follows it; a new plan does not add to that. A
+// certified plan is proven for a body in its tube; one that goes on along the reference adds
+// nothing.
 bool Controller::IsNear(const Plan& plan) const {
   const double start = plan.position.start, now = last_t_.value_or(start);
   const double t = std::max(start, now);  // from when on it would be flown
@@ -52,7 +53,7 @@ bool Controller::IsNear(const Plan& plan) const {
   if (reference && (reference->state.p - p).norm() <= from_reference) return true;
   const double ahead = std::min(t - now, 0.2);
   return (last_estimate_.p_WB + ahead * last_estimate_.v_WB - p).norm() <=
-         plan.tube.value_or(config_.reset_distance);
+         std::min(plan.tube.value_or(HUGE_VAL), config_.reset_distance);
 }
 
 std::optional<Setpoint> Controller::Update(double t, const Estimate& estimate, Health health) {

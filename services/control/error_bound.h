@@ -12,7 +12,7 @@ namespace chase::control {
 /// m/s 94 % with the centimetre, 99.7 % with the quarter too (control_test).
 class ErrorBound {
  public:
-  /// `unknown`: the bound that counts for what has not been measured, m.
+  /// `unknown`: the bound while the error has not been measured, m.
   explicit ErrorBound(double unknown) : unknown_((unknown - kMargin) / kGrowth) {
     std::fill(most_, most_ + kSlots, unknown_);
   }
@@ -34,7 +34,8 @@ class ErrorBound {
     return most_[static_cast<int>(slot - kSlots * std::floor(slot / kSlots))];
   }
   double last_ = -1e18;
-  double unknown_, most_[kSlots];  // m
+  double unknown_;  // error whose bound that is, m
+  double most_[kSlots];
 };
 
 }  // namespace chase::control

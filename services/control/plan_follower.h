@@ -19,7 +19,8 @@ struct Plan {
   int32_t seq = 0;                                 ///< of the message
   bool to_land = false;  ///< made when a landing had been asked for: its end is above the ground to
                          ///< come down to
-  std::optional<double> tube = std::nullopt;  ///< about it, that it is certified for, m
+  std::optional<double> tube =
+      std::nullopt;  ///< radius about it that its certificate allows the body, m
 };
 
 /// Turns a stream of plans into one reference. A plan takes over at its own start; until then the

@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kShortestHorizon = 1.0;
 constexpr double kWidestTube = 0.3;  // m: from farther off control follows no plan (reset_distance)
-constexpr double kJumpBack = 0.3;    // s; messages are late by less
+constexpr double kJumpBack = 0.3;    // s: by more a clock was set back, messages are late by less
 // A lost target is looked for from here while that share of where it may be is in sight from here;
 // else a place is gone to, for so long, s.
 constexpr double kEnoughInSight = 0.5, kKeepsPlace = 1.0;
@@ -23,6 +23,7 @@ constexpr double kEnoughInSight = 0.5, kKeepsPlace = 1.0;
 constexpr double kAhead = 0.5, kArrived = 1.5;
 // Deviation of a target that is in sight, m, and how much more it is from one forecast to the next.
 constexpr double kKnown = 0.1, kAsKnown = 1.3;
+constexpr double kPeriod = 0.25;  // s: forecasts are renewed more often
 constexpr double kLeg = 2.5;      // desired distances: the planner is led to nothing farther off
 constexpr double kGoes = 0.5;     // m: a plan that looks for it is worth that at least
 constexpr double kSettles = 0.3;  // s: a turn ends so
@@ -60,9 +61,9 @@ std::optional<world::Obstacle> TargetBody(const Forecast& f) {
   return body;
 }
 
-// Static obstacles seem to move when the frame drifts. The share `spare` of the tube that tracking
-// does not need holds deviations up to spare / duration in each direction, n; beyond that, since
-// n' C n <= held^2 + n' rest n, they are the obstacles'.
+// Static obstacles seem to move when the frame drifts. What the tube has to spare for that, m, over
+// `duration`, s, holds deviations of the velocity up to `held`. The rest is added to the obstacles'
+// covariance: n' C n <= held^2 + n' rest n for each direction n.
 Eigen::Matrix3d BeyondTube(const Eigen::Matrix3d& covariance, double spare, double duration,
                            double sigmas) {
   if (!covariance.allFinite() || !(sigmas > 0.0)) return Eigen::Matrix3d::Zero();
@@ -92,9 +93,11 @@ void Pilot::SetTrackingBound(double bound) {
 // The body strays from its plan by the tracking error, and the estimate from the body.
 void Pilot::SetTube(const BodyEstimate& body) {
   const double sigmas = config_.planner.sigmas, least = config_.planner.tracking_tube;
-  const double strays = tracking_bound_ + sigmas * LargestSigma(body.position_covariance);
+  const bool known = body.position_covariance.allFinite() && body.velocity_covariance.allFinite();
+  const double strays =
+      known ? tracking_bound_ + sigmas * LargestSigma(body.position_covariance) : kWidestTube;
   tube_ = std::clamp(strays, least, std::max(least, kWidestTube));
-  // Ways that are not to the target may take a quarter of a minute.
+  // Ways home and down are not limited to the horizon: they may take 17 s.
   const double spare = Chases() ? std::max(0.0, tube_ - strays) : 0.0;
   const double duration =
       world::kMostAge.obstacles + config_.latency + config_.horizon + kLongestBrake;
@@ -171,7 +174,7 @@ bool Pilot::MayPlan(double t) const {
 }
 
 std::optional<PlanResult> Pilot::Update(double t, const BodyEstimate& body) {
-  if (has_running_ && t < running_.trajectory.start - kJumpBack) ChangeFrame();  // of the clock
+  if (has_running_ && t < last_planned_ - kJumpBack) ChangeFrame();  // of the clock
   SetTube(body);
   const double t0 = t + config_.latency;
   const Start start = StartAt(t, t0, body);
@@ -256,9 +259,11 @@ PlanRequest Pilot::Request(double t0, const Start& start) const {
 }
 
 PlanResult Pilot::Chase(double t0, const Start& start) {
-  // Those of a target that is out of sight grow uncertain, until there are none.
+  // The covariance grows while the target is hidden: such a forecast is no sighting. There are none
+  // after `target_unseen`, counted from a sighting up to a forecast's period after the last of
+  // them.
   const double sigma = LargestSigma(forecast_->covariance);
-  const bool late = forecast_->t > last_seen_.start + world::kMostAge.target_unseen;
+  const bool late = forecast_->t > last_seen_.start + world::kMostAge.target_unseen + kPeriod;
   if (!had_target_ || late || sigma <= std::max(kKnown, kAsKnown * last_seen_sigma_)) {
     last_seen_ = forecast_->target;
     last_seen_sigma_ = sigma;

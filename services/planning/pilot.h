@@ -64,7 +64,8 @@ class Pilot {
     airborne_ = airborne_ || (flying && !has_running_);
   }
 
-  /// How far control says the body strays from what it follows, m: the tube about plans is as wide.
+  /// How far control says the body strays from what it follows, m: the tube about plans holds that
+  /// and the deviation of the estimate's place.
   void SetTrackingBound(double bound);
   /// Of the drone's sphere and the tube about the newest plan, m.
   double hard_radius() const { return config_.planner.drone_radius + tube_; }

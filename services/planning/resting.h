@@ -8,8 +8,9 @@
 
 namespace chase::planning {
 
+inline constexpr double kLongestBrake = 3.0;  ///< s
+
 /// Durations of a braking that are tried, s.
-inline constexpr double kLongestBrake = 3.0;  // s
 inline constexpr double kBrakeTimes[] = {0.6, 0.8, 1.0, 1.3, 1.7, 2.2, kLongestBrake};
 
 /// To rest over T, wherever that leads or at `end`: of all ways that continue position, velocity

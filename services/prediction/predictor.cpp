@@ -97,22 +97,23 @@ void SearchAndRelax(const PredictorConfig& config, const CandidateSet& candidate
   SetOutcome(candidates, found, now, result);
 }
 
-// The height is held: on a slope, and where the ground is rough, it departs from that as a line
-// through the observations does.
-void SetHeight(const std::vector<Observation>& observations, double now, double floor,
-               PredictResult* result) {
-  double n = 0.0, t = 0.0, z = 0.0, tt = 0.0, tz = 0.0;  // weighted sums
+// `planar` holds the height. Its variances: the squared departure of a line through the observed
+// heights from the held one, and the line's own, whose rate is 0 by all that is known before, with
+// the variance of the other axes. Errors of the observations are taken as independent.
+void SetHeightVariances(const std::vector<Observation>& observations, double now, double floor,
+                        PredictResult* result) {
+  double n = 0.0, t = 0.0, z = 0.0, tt = 0.0, tz = 0.0;  // sums, weighted by 1/m^2
   for (const Observation& o : observations) {
     const double w = 1.0 / std::max(o.covariance(2, 2), floor * floor), at = o.t - now;
     n += w, t += w * at, z += w * o.mean.z(), tt += w * at * at, tz += w * at * o.mean.z();
   }
-  const double spread = std::max(tt - t * t / n, 1e-9), rate = (tz - t * z / n) / spread;
-  const double height = (z - rate * t) / n, off = height - result->trajectory.Position(now).z();
   Eigen::Matrix3d &p = result->position_covariance, &v = result->velocity_covariance;
-  const double most[] = {p(2, 2), v(2, 2)};  // with a rate as free as along the ground
+  const double variance = 1.0 / (tt - t * t / n + 1.0 / std::max(v(2, 2), 1e-9));
+  const double rate = variance * (tz - t * z / n), height = (z - rate * t) / n;
+  const double off = height - result->trajectory.Position(now).z();
   for (Eigen::Matrix3d* m : {&p, &v}) m->row(2).setZero(), m->col(2).setZero();
-  p(2, 2) = off * off + std::min(1.0 / n + t * t / (n * n * spread), most[0]);
-  v(2, 2) = rate * rate + std::min(1.0 / spread, most[1]);
+  p(2, 2) = off * off + 1.0 / n + t * t / (n * n) * variance;
+  v(2, 2) = rate * rate + variance;
 }
 
 }  // namespace
@@ -136,7 +137,7 @@ PredictResult Predictor::Predict(const PredictRequest& request) const {
   result.position_covariance = candidates.PositionCovariance();
   result.velocity_covariance = candidates.VelocityCovariance();
   SearchAndRelax(config_, candidates, obstacles, request.now, &result);
-  if (config_.planar) SetHeight(observations, request.now, config_.sigma_floor, &result);
+  if (config_.planar) SetHeightVariances(observations, request.now, config_.sigma_floor, &result);
   return result;
 }
 

@@ -127,10 +127,11 @@ def problems(registered, table):
 
 
 def unguarded(table):
-    """Names of the case that no line stands for: as many for a hazard and a file as it names there."""
+    """Hazards with fewer lines for a file than SAFETY.md names functions of it."""
     held = collections.Counter((line.hazard, pathlib.Path(line.file)) for line in table)
     for hazard, (where, _) in hazards().items():
         for name, words in SHORT.findall(where):
             least, path = max(1, len(re.findall(r"\w+", words))), path_of(name)
             if held[hazard, path] < least:
-                yield f"{LINES.name} has {held[hazard, path]} of {least} lines for '{hazard}', {path}"
+                yield (f"{LINES.name} has {held[hazard, path]} of {least} lines for"
+                       f" '{hazard}', {path}")

@@ -335,21 +335,5 @@ TEST(NewPlans, HoldForABodyInTheirTubeWhereTheyAreCertified) {
   EXPECT_EQ(flight.controller.AddPlan(certified(0.3, 0.01)), "") << "goes on along the last one";
 }
 
-TEST(ErrorBound, IsTheTubesWhereNothingWasMeasured) {
-  ErrorBound bound(0.12);
-  EXPECT_NEAR(bound.value(), 0.12, 1e-12);
-  double t = 0.0;
-  const auto fly = [&](double s) {
-    for (const double end = t + s; t < end; t += kStep) bound.Add(t, 0.02);
-  };
-  fly(1.0);
-  EXPECT_NEAR(bound.value(), 0.12, 1e-12);
-  fly(1.2);
-  EXPECT_LT(bound.value(), 0.04);
-  t += 1.0;
-  fly(0.1);
-  EXPECT_NEAR(bound.value(), 0.12, 1e-12);
-}
-
 }  // namespace
 }  // namespace chase::control

@@ -208,7 +208,7 @@ TEST(LidarSource, UdpPacketsArriveAndAPortInUseIsRefused) {
   const auto got = source->Next();
   ASSERT_TRUE(got);
   EXPECT_GE(got->capture_utime, before);
-  EXPECT_LE(got->capture_utime, after) << "it came when it came";
+  EXPECT_LE(got->capture_utime, after) << "stamped on arrival, not when fetched";
   EXPECT_TRUE(std::equal(sent.begin(), sent.end(), got->bytes.begin(), got->bytes.end()));
   try {
     OpenPacketSource("udp", port);

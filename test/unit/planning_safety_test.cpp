@@ -172,8 +172,8 @@ TEST(CertifiedPlan, IsLeftForAStopBeforeAPlannerThatFellSilentIsMissed) {
   EXPECT_LT((plan.stop->Velocity(t) - plan.trajectory.Velocity(t)).norm(), 1e-6);
 }
 
-// A wall that may be there: left in time, where braking later would end in it. One that the body
-// touches is only left: what of it is ahead has been seen by nobody.
+// A wall that may be there: the stop begins in time, where braking later would end in it. A plan
+// that starts within one may only lead out: the rest of it may be solid.
 TEST(CertifiedPlan, IsLeftForAStopInSpaceThatWasSeen) {
   const PlannerConfig config;
   PlanRequest request = Hover();
