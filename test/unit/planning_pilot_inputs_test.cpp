@@ -257,6 +257,25 @@ TEST(Pilot, WhenTimeJumpsBackItPlansAtOnceFromWhereTheBodyIs) {
   }
 }
 
+// With the LiDAR dead the estimate grows unsure of its place: fleeing from what was listed would
+// lead into space that nobody observes.
+TEST(Pilot, WithoutListsItStaysWhereItIs) {
+  Pilot pilot{PlanningConfig()};
+  pilot.SetFlying(true);
+  world::Obstacle pillar;
+  pillar.solid = world::Obstacle::Solid::kCylinder;
+  pillar.half = {0.3, 0.3, 2.0};
+  pillar.shape = (2.0 * pillar.half.cwiseAbs2()).cwiseInverse().asDiagonal();
+  pillar.center = world::Trajectory::Constant({0.8, 0.0, 1.0}, 0.0, 1.0);
+  pilot.SetObstacles(0.0, {pillar});
+  BodyEstimate body{{0.0, 0.0, 1.3}, Eigen::Vector3d::Zero(), 0.0};
+  body.position_covariance.diagonal().setConstant(0.1 * 0.1);
+  const auto plan = pilot.Update(1.0, body);
+  ASSERT_TRUE(plan);
+  EXPECT_EQ(plan->verdict, Verdict::kWait) << plan->reason;
+  EXPECT_LT((plan->trajectory.Position(plan->trajectory.end()) - body.p).norm(), 0.01);
+}
+
 // Stamped by a clock that was set forward: it would count for seconds after its sender died.
 TEST(Pilot, AListOfTheFutureCountsAsUnheard) {
   for (const double ahead : {0.05, 1.0}) {
