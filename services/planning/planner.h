@@ -34,7 +34,6 @@ const char* Name(Verdict verdict);
 using world::Proof;
 inline constexpr int kTargetId = world::kTargetBody;
 
-/// One chasing problem (Jeon 2021, Problem 2). Frame W; times in seconds from a common origin.
 /// The stretch of time that a plan is made for, and how it begins.
 struct Stretch {
   double t0 = 0.0;         ///< start of the horizon, s
@@ -43,6 +42,7 @@ struct Stretch {
   bool asks_sight = true;  ///< of the target
 };
 
+/// One chasing problem (Jeon 2021, Problem 2). Frame W; times in seconds from a common origin.
 struct PlanRequest : Stretch {
   std::optional<YawStart> yaw;             ///< at t0; none: towards the target
   double tube = 0.0;                       ///< about the plan, where it is the wider one, m
