@@ -333,6 +333,9 @@ TEST(NewPlans, HoldForABodyInTheirTubeWhereTheyAreCertified) {
   flight.Fly(1.005, Health::kUsable);
   EXPECT_EQ(flight.controller.AddPlan(certified(0.3, 0.12)), "") << "from the body";
   EXPECT_EQ(flight.controller.AddPlan(certified(0.3, 0.01)), "") << "goes on along the last one";
+  const double reset = ControlConfig().reset_distance;
+  EXPECT_NE(flight.controller.AddPlan(certified(0.25 + 1.1 * reset, 1.2 * reset)), "")
+      << "a tube leads no farther than a reset";
 }
 
 }  // namespace

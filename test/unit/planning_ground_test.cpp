@@ -307,6 +307,16 @@ TEST(Pilot, TheTubeHoldsTheDeviationOfTheEstimate) {
   EXPECT_NEAR(pilot.hard_radius(), 0.25 + 0.3, 1e-9);
 }
 
+/// Along x, its face at y = 1.9 m.
+world::Obstacle Wall() {
+  world::Obstacle wall = Slab({0.0, 2.0, 1.5}, {0.0, 0.0});
+  wall.ground = false;
+  wall.half = {12.0, 0.1, 3.0};
+  wall.axes.setIdentity();
+  wall.shape = (3.0 * wall.half.cwiseAbs2()).cwiseInverse().asDiagonal();
+  return wall;
+}
+
 // Past a wall in a frame that drifts towards it: the body strays from plan and stop, and the wall
 // comes nearer, by as much as either may; the clearance that is certified is left. One that nobody
 // has seen is kept off by the stop, and until it begins.
@@ -317,11 +327,7 @@ TEST(Pilot, AFrameThatDriftsKeepsOffStaticObstacles) {
     Pilot pilot(config);
     pilot.SetFlying(true);
     pilot.SetTrackingBound(bound);
-    world::Obstacle wall = Slab({0.0, 2.0, 1.5}, {0.0, 0.0});
-    wall.ground = false;
-    wall.half = {5.0, 0.1, 3.0};
-    wall.axes.setIdentity();
-    wall.shape = (3.0 * wall.half.cwiseAbs2()).cwiseInverse().asDiagonal();
+    const world::Obstacle wall = Wall();
     pilot.SetObstacles(0.0, seen ? std::vector{wall} : std::vector<world::Obstacle>());
     pilot.SetUnseen(0.0, seen ? std::vector<world::Obstacle>() : std::vector{wall});
     Forecast forecast;
@@ -355,6 +361,32 @@ TEST(Pilot, AFrameThatDriftsKeepsOffStaticObstacles) {
     for (const double sigma : {0.0, 0.003, 0.01, 0.02, 0.05, 0.1, 0.2})
       for (const bool seen : {true, false})
         EXPECT_GE(room(bound, sigma, seen), -1e-6) << bound << " " << sigma << " " << seen;
+}
+
+// A way back takes longer than the tube is spared for.
+TEST(Pilot, OnTheWayBackTheTubeHoldsNoDrift) {
+  const PlanningConfig config;
+  const double sigma = 0.01;
+  int certified = 0;
+  for (double y = 1.0; y < 1.5; y += 0.05) {
+    Pilot pilot(config);
+    pilot.SetFlying(true);
+    pilot.SetTrackingBound(0.0);
+    pilot.SetObstacles(0.0, {Wall()});
+    pilot.SetTask(Task::kReturn, Vector3d(7.9, y, 0.0));
+    BodyEstimate body{{0.0, y, config.takeoff_height}, Vector3d::Zero(), 0.0};
+    body.velocity_covariance.diagonal().setConstant(sigma * sigma);
+    const auto plan = pilot.Update(0.0, body);
+    ASSERT_TRUE(plan);
+    if (plan->reason != "returning") continue;
+    ++certified;
+    const world::Trajectory& way = plan->trajectory;
+    for (double t = way.start; t <= way.end(); t += 0.02 * way.duration)
+      EXPECT_GE(1.9 - way.Position(t).y() - 2.0 * sigma * t - config.planner.drone_radius,
+                plan->certified_clearance - 1e-6)
+          << y << " " << t;
+  }
+  EXPECT_GT(certified, 3);
 }
 
 }  // namespace

@@ -257,6 +257,16 @@ TEST(Pilot, WhenTimeJumpsBackItPlansAtOnceFromWhereTheBodyIs) {
   }
 }
 
+// Plans that begin long after they are made are none of another time.
+TEST(Pilot, WithTheLongestLatencyItChases) {
+  PlanningConfig config;
+  config.latency = 0.5;
+  Flight flight(config);
+  flight.Run(4.0, false);
+  flight.Run(4.0, true);
+  EXPECT_LT(flight.plans.back().verdict, Verdict::kBrake) << flight.plans.back().reason;
+}
+
 // With the LiDAR dead the estimate grows unsure of its place: fleeing from what was listed would
 // lead into space that nobody observes.
 TEST(Pilot, WithoutListsItStaysWhereItIs) {
