@@ -2,6 +2,7 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -35,6 +36,11 @@ std::vector<Eigen::Vector3d> ContourPoints(const Gaussian3& g, double sigmas, in
     points.push_back(g.mean + sigmas * Eigen::Vector3d(offset.x(), offset.y(), 0.0));
   }
   return points;
+}
+
+double LargestSigma(const Eigen::Matrix3d& covariance) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(covariance, Eigen::EigenvaluesOnly);
+  return std::sqrt(std::max(0.0, eigen.eigenvalues().maxCoeff()));
 }
 
 Eigen::Matrix3d MadePositiveDefinite(const Eigen::Matrix3d& m, double floor) {

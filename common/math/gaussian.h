@@ -21,6 +21,9 @@ double LogDensity(const Gaussian3& g, const Eigen::Vector3d& x);
 /// first is the mean itself. Jeon 2021, section III-A. Evenly spread in the whitened x-y plane.
 std::vector<Eigen::Vector3d> ContourPoints(const Gaussian3& g, double sigmas, int count);
 
+/// Standard deviation along the worst direction of a symmetric matrix; 0 where none is positive.
+double LargestSigma(const Eigen::Matrix3d& covariance);
+
 /// The nearest symmetric matrix whose eigenvalues are at least `floor` (> 0).
 Eigen::Matrix3d MadePositiveDefinite(const Eigen::Matrix3d& m, double floor);
 

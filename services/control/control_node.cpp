@@ -2,13 +2,14 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Eigenvalues>
+#include <Eigen/Core>
 #include <algorithm>
 
 #include "chase/attitude_setpoint_t.hpp"
 #include "chase/tracking_t.hpp"
 #include "common/bus/convert.h"
 #include "common/bus/plan_message.h"
+#include "common/math/gaussian.h"
 #include "common/math/rotation.h"
 #include "common/world/ages.h"
 
@@ -21,15 +22,10 @@ constexpr size_t kLists = 8;                                                  //
 // s from the list to the start of a plan made for it, which is a little ahead of when it is made.
 constexpr double kOldestList = world::kMostAge.obstacles + world::kMostAge.pose;
 
-double LargestSigma(const Eigen::Matrix3d& covariance) {
-  return std::sqrt(
-      std::max(0.0, covariance.selfadjointView<Eigen::Lower>().eigenvalues().maxCoeff()));
-}
-
 Estimate FromMessage(const pose_t& m) {
   const Eigen::Map<const Eigen::Matrix<double, 9, 9, Eigen::RowMajor>> P(m.local_covariance);
   return {bus::ToVector(m.pos), bus::ToVector(m.vel), bus::ToQuaternion(m.orientation),
-          bus::ToVector(m.accel), LargestSigma(P.block<3, 3>(3, 3))};
+          bus::ToVector(m.accel), math::LargestSigma(P.block<3, 3>(3, 3))};
 }
 
 // A pose that odometry stands for is good for plans while its velocity is: planning allows for a

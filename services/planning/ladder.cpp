@@ -91,7 +91,7 @@ class Ladder : public Planner {
     auto proofs =
         ProveOff(Curve(result->trajectory.coefficients), *used_, sight_from_, &separations_);
     if (!proofs) return false;
-    auto stop = WayOut(config_, request, result->trajectory, &stopping_);
+    auto stop = WayOut(config_, request, result->trajectory, StartsInside(*used_), &stopping_);
     if (!stop) return false;
     SetProofs(config_, request, std::move(*proofs), result);
     result->stop = std::move(stop->trajectory);

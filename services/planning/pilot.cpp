@@ -1,9 +1,9 @@
 #include "services/planning/pilot.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
+#include "common/math/gaussian.h"
 #include "common/math/rotation.h"
 #include "common/world/ages.h"
 #include "services/planning/resting.h"
@@ -13,20 +13,10 @@ namespace chase::planning {
 namespace {
 
 constexpr double kShortestHorizon = 1.0;
-constexpr double kWidestTube = 0.3;  // m: from farther off control follows no plan (reset_distance)
-constexpr double kJumpBack = 0.3;    // s: by more a clock was set back, messages are late by less
-// A lost target is looked for from here while that share of where it may be is in sight from here;
-// else a place is gone to, for so long, s.
-constexpr double kEnoughInSight = 0.5, kKeepsPlace = 1.0;
-// Gone to while looking that way: a place so far from the gaze, rad, and from here, desired
-// distances.
-constexpr double kAhead = 0.5, kArrived = 1.5;
-// Deviation of a target that is in sight, m, and how much more it is from one forecast to the next.
-constexpr double kKnown = 0.1, kAsKnown = 1.3;
-constexpr double kPeriod = 0.25;  // s: forecasts are renewed more often
-constexpr double kLeg = 2.5;      // desired distances: the planner is led to nothing farther off
-constexpr double kGoes = 0.5;     // m: a plan that looks for it is worth that at least
-constexpr double kSettles = 0.3;  // s: a turn ends so
+constexpr double kJumpBack = 0.3;  // s: by more a clock was set back, messages are late by less
+constexpr double kLeg = 2.5;       // desired distances: the planner is led to nothing farther off
+constexpr double kGoes = 0.5;      // m: a plan that looks for it is worth that at least
+constexpr double kSettles = 0.3;   // s: a turn ends so
 
 // Rest to rest from a to b, minimum jerk.
 world::Trajectory RestToRest(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double start,
@@ -40,11 +30,6 @@ world::Trajectory RestToRest(const Eigen::Vector3d& a, const Eigen::Vector3d& b,
 }
 
 bool IsAtRest(const world::State& s) { return s.v.norm() < 0.05 && s.a.norm() < 0.1; }
-
-double LargestSigma(const Eigen::Matrix3d& covariance) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(covariance, Eigen::EigenvaluesOnly);
-  return std::sqrt(std::max(0.0, eigen.eigenvalues().maxCoeff()));
-}
 
 // The target's upright cylinder where it is forecast to be.
 std::optional<world::Obstacle> TargetBody(const Forecast& f) {
@@ -61,18 +46,6 @@ std::optional<world::Obstacle> TargetBody(const Forecast& f) {
   return body;
 }
 
-// Static obstacles seem to move when the frame drifts. What the tube has to spare for that, m, over
-// `duration`, s, holds deviations of the velocity up to `held`. The rest is added to the obstacles'
-// covariance: n' C n <= held^2 + n' rest n for each direction n.
-Eigen::Matrix3d BeyondTube(const Eigen::Matrix3d& covariance, double spare, double duration,
-                           double sigmas) {
-  if (!covariance.allFinite() || !(sigmas > 0.0)) return Eigen::Matrix3d::Zero();
-  const double held = spare / (sigmas * duration);
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(covariance);
-  const Eigen::Vector3d rest = (eigen.eigenvalues().array() - held * held).max(0.0);
-  return eigen.eigenvectors() * rest.asDiagonal() * eigen.eigenvectors().transpose();
-}
-
 bool IsFinite(const PlanResult& plan) {
   if (!plan.trajectory.coefficients.allFinite()) return false;
   return std::all_of(plan.yaw.begin(), plan.yaw.end(), [](double y) { return std::isfinite(y); });
@@ -83,25 +56,12 @@ bool IsFinite(const PlanResult& plan) {
 Pilot::Pilot(const PlanningConfig& config)
     : config_(config),
       planner_(MakePlanner(config.planner_name, config.planner)),
-      tube_(config.planner.tracking_tube),
-      tracking_bound_(tube_) {}
+      tube_{config.planner.tracking_tube},
+      tracking_bound_(tube_.radius),
+      search_(config) {}
 
 void Pilot::SetTrackingBound(double bound) {
   tracking_bound_ = std::isfinite(bound) ? std::max(bound, 0.0) : kWidestTube;
-}
-
-// The body strays from its plan by the tracking error, and the estimate from the body.
-void Pilot::SetTube(const BodyEstimate& body) {
-  const double sigmas = config_.planner.sigmas, least = config_.planner.tracking_tube;
-  const bool known = body.position_covariance.allFinite() && body.velocity_covariance.allFinite();
-  const double strays =
-      known ? tracking_bound_ + sigmas * LargestSigma(body.position_covariance) : kWidestTube;
-  tube_ = std::clamp(strays, least, std::max(least, kWidestTube));
-  // Ways home and down are not limited to the horizon: they may take 17 s.
-  const double spare = Chases() ? std::max(0.0, tube_ - strays) : 0.0;
-  const double duration =
-      world::kMostAge.obstacles + config_.latency + config_.horizon + kLongestBrake;
-  drift_ = BeyondTube(body.velocity_covariance, spare, duration, sigmas);
 }
 
 void Pilot::SetForecast(const Forecast& forecast) {
@@ -122,8 +82,7 @@ void Pilot::SetUnseen(double t, std::vector<world::Obstacle> unseen) {
 
 void Pilot::ChangeFrame() {
   forecast_.reset();
-  had_target_ = false;
-  whereabouts_.Clear();
+  search_.Clear();
   obstacles_.clear();
   unseen_.clear();
   unseen_time_.reset();
@@ -175,7 +134,7 @@ bool Pilot::MayPlan(double t) const {
 
 std::optional<PlanResult> Pilot::Update(double t, const BodyEstimate& body) {
   if (has_running_ && t < last_planned_ - kJumpBack) ChangeFrame();  // of the clock
-  SetTube(body);
+  tube_ = MakeTube(config_, body, tracking_bound_, Chases());
   const double t0 = t + config_.latency;
   const Start start = StartAt(t, t0, body);
   news_ = news_ || !start.follows;
@@ -232,7 +191,7 @@ PlanRequest Pilot::Request(double t0, const Start& start) const {
   request.t0 = t0;
   request.start = start.state;
   request.yaw = start.yaw;
-  request.tube = tube_;
+  request.tube = tube_.radius;
   request.obstacles = obstacles_;
   request.unseen = unseen_;
   const double since = std::clamp(t0 - obstacles_time_, 0.0, world::kMostAge.obstacles);
@@ -242,14 +201,14 @@ PlanRequest Pilot::Request(double t0, const Start& start) const {
   if (start.on_plan) request.running = running_.trajectory;  // off it, it is no way out
   // What moves is measured, as the target is, in the frame that drifts.
   for (world::Obstacle& o : request.obstacles)
-    if (!o.moving) o.velocity_covariance += drift_;
-  for (world::Obstacle& o : request.unseen) o.velocity_covariance += drift_;
+    if (!o.moving) o.velocity_covariance += tube_.drift;
+  for (world::Obstacle& o : request.unseen) o.velocity_covariance += tube_.drift;
   request.horizon = config_.horizon;
   request.target = world::Trajectory::Constant(start.state.p, t0, config_.horizon);
   if (!forecast_ || !forecast_->has_target) return request;
   request.target = forecast_->target;
-  request.target_sigma = LargestSigma(forecast_->covariance);
-  request.target_speed_sigma = LargestSigma(forecast_->velocity_covariance);
+  request.target_sigma = math::LargestSigma(forecast_->covariance);
+  request.target_speed_sigma = math::LargestSigma(forecast_->velocity_covariance);
   // One that is lost could be anywhere soon, and there is no way to rest from that.
   if (HasTarget(t0 - config_.latency))
     request.target_manoeuvre = {config_.target_acceleration, config_.target_memory};
@@ -259,18 +218,7 @@ PlanRequest Pilot::Request(double t0, const Start& start) const {
 }
 
 PlanResult Pilot::Chase(double t0, const Start& start) {
-  // The covariance grows while the target is hidden: such a forecast is no sighting. There are none
-  // after `target_unseen`, counted from a sighting up to a forecast's period after the last of
-  // them.
-  const double sigma = LargestSigma(forecast_->covariance);
-  const bool late = forecast_->t > last_seen_.start + world::kMostAge.target_unseen + kPeriod;
-  if (!had_target_ || late || sigma <= std::max(kKnown, kAsKnown * last_seen_sigma_)) {
-    last_seen_ = forecast_->target;
-    last_seen_sigma_ = sigma;
-    fastest_ = std::max(fastest_, last_seen_.Velocity(last_seen_.start).norm());
-  }
-  had_target_ = true;
-  whereabouts_.Clear();
+  search_.Saw(*forecast_);
   return planner_->Plan(Request(t0, start));
 }
 
@@ -287,7 +235,7 @@ PlanResult Pilot::Wait(double t0, const Start& start, const BodyEstimate& body) 
   if (task_ == Task::kTakeoff) return ClimbOn(t0, start, body);
   if (!SeesObstacles(t0 - config_.latency)) return Rest(t0, start);
   if (HasTarget(t0 - config_.latency)) return Chase(t0, start);
-  return had_target_ ? Search(t0, start, body) : Hover(t0, start);
+  return search_.has_seen() ? Search(t0, start, body) : Hover(t0, start);
 }
 
 // No mover comes to the climb for as long as a stop takes.
@@ -338,7 +286,7 @@ MayFly Pilot::InFence(const Eigen::Vector3d& p_WB) const {
     if (!fence_.Exists() || !home_) return true;
     std::vector<Eigen::Vector3d> places = world::PlacesOn(leg, std::nullopt);
     for (Eigen::Vector3d& p : places) p -= *home_;
-    return fence_.Refusal(p_WB - *home_, places, tube_).empty();
+    return fence_.Refusal(p_WB - *home_, places, tube_.radius).empty();
   };
 }
 
@@ -357,12 +305,13 @@ PlanResult Pilot::Return(double t0, const Start& start, const BodyEstimate& body
 
 PlanResult Pilot::Along(const PlanRequest& request, const Start& start, Stop leg,
                         const MayFly& may_fly) const {
+  const bool leaves = LeavesObstacles(leg.proofs);
   PlanResult plan;
-  plan.verdict = LeavesObstacles(leg.proofs) ? Verdict::kEscape : Verdict::kSafeOnly;
+  plan.verdict = leaves ? Verdict::kEscape : Verdict::kSafeOnly;
   plan.trajectory = std::move(leg.trajectory);
   plan.yaw = {start.yaw.yaw};
   SetProofs(config_.planner, request, std::move(leg.proofs), &plan);
-  auto stop = WayOut(config_.planner, request, plan.trajectory);
+  auto stop = WayOut(config_.planner, request, plan.trajectory, leaves);
   if (stop && may_fly(stop->trajectory)) {
     plan.stop = std::move(stop->trajectory);
     plan.stop_proofs = std::move(stop->proofs);
@@ -398,36 +347,21 @@ PlanResult Pilot::Climb(double t0, const BodyEstimate& body) const {
   return plan;
 }
 
-// From here as long as enough of where it may be is in sight from here, unless what is worth
-// looking at is far ahead; else from where most is.
 PlanResult Pilot::Search(double t0, const Start& start, const BodyEstimate& body) {
-  const View view = config_.planner.view().value_or(View{});
-  if (!whereabouts_.begun()) {
-    const double known = last_seen_.start;
-    whereabouts_.Begin(known, last_seen_.Position(known), last_seen_.Velocity(known), fastest_);
-    place_chosen_ = -1e9;
-  }
-  whereabouts_.Advance(t0 - config_.latency, obstacles_, body.p, body.yaw, view);
-  const auto gaze = whereabouts_.BestGaze(start.yaw.yaw, config_.search_yaw_rate, view);
-  if (t0 - place_chosen_ > kKeepsPlace) {
-    place_ = whereabouts_.Likeliest(0.5 * config_.planner.desired_distance);
-    place_chosen_ = t0;
-  }
-  const Eigen::Vector2d way = (place_ - start.state.p).head<2>();
-  const double off = std::remainder(std::atan2(way.y(), way.x()) - gaze.yaw, 2.0 * M_PI);
-  const bool ahead =
-      std::abs(off) < kAhead && way.norm() > kArrived * config_.planner.desired_distance;
-  if (gaze.share > kEnoughInSight && !ahead) return BrakeAndLook(t0, start, gaze.yaw);
+  const TargetSearch::Lead lead =
+      search_.Advance(t0 - config_.latency, obstacles_, body, start.state.p, start.yaw.yaw);
+  if (!lead.place) return BrakeAndLook(t0, start, lead.yaw);
+  const Eigen::Vector2d way = (*lead.place - start.state.p).head<2>();
   PlanRequest request = Request(t0, start);
   const double near = std::min(1.0, kLeg * config_.planner.desired_distance / way.norm());
   request.target = world::Trajectory::Constant(
-      {start.state.p.x() + near * way.x(), start.state.p.y() + near * way.y(), place_.z()}, t0,
+      {start.state.p.x() + near * way.x(), start.state.p.y() + near * way.y(), lead.place->z()}, t0,
       request.horizon);
   request.target_body.reset();
   PlanResult plan = planner_->Plan(request);
   const Eigen::Vector3d end = plan.trajectory.Position(plan.trajectory.end());
   if (plan.verdict >= Verdict::kBrake || (end - start.state.p).norm() < kGoes)
-    return BrakeAndLook(t0, start, gaze.yaw);
+    return BrakeAndLook(t0, start, lead.yaw);
   // What it proves of sight is of that place, which whoever checks it takes for the target's.
   plan.proofs.erase(std::remove_if(plan.proofs.begin(), plan.proofs.end(),
                                    [](const Proof& proof) { return proof.of_sight; }),

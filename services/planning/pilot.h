@@ -8,33 +8,15 @@
 #include <vector>
 
 #include "common/world/geofence.h"
+#include "services/planning/pilot_inputs.h"
 #include "services/planning/planner.h"
 #include "services/planning/planning_config.h"
+#include "services/planning/target_search.h"
+#include "services/planning/tube.h"
 #include "services/planning/way_back.h"
 #include "services/planning/way_down.h"
-#include "services/planning/whereabouts.h"
 
 namespace chase::planning {
-
-/// The newest forecast of the target. Times in seconds from the pilot's origin.
-struct Forecast {
-  double t = 0.0;                                                 ///< made for this instant, s
-  bool has_target = false;                                        ///< false: nothing to chase
-  world::Trajectory target;                                       ///< p_WT(t)
-  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();           ///< of the position at t, m^2
-  Eigen::Matrix3d velocity_covariance = Eigen::Matrix3d::Zero();  ///< and velocity, m^2/s^2
-  double radius = 0.0, height = 0.0;  ///< of the target's upright cylinder, m; 0: not known
-};
-
-/// The body as estimated, frame W.
-struct BodyEstimate {
-  Eigen::Vector3d p = Eigen::Vector3d::Zero();  ///< p_WB, m
-  Eigen::Vector3d v = Eigen::Vector3d::Zero();  ///< v_WB, m/s
-  double yaw = 0.0;                             ///< rad
-  /// Against the map around: of p, m^2, and of v, m^2/s^2.
-  Eigen::Matrix3d position_covariance = Eigen::Matrix3d::Zero();
-  Eigen::Matrix3d velocity_covariance = Eigen::Matrix3d::Zero();
-};
 
 /// What a mission process wants.
 enum class Task {
@@ -68,7 +50,7 @@ class Pilot {
   /// and the deviation of the estimate's place.
   void SetTrackingBound(double bound);
   /// Of the drone's sphere and the tube about the newest plan, m.
-  double hard_radius() const { return config_.planner.drone_radius + tube_; }
+  double hard_radius() const { return config_.planner.drone_radius + tube_.radius; }
 
   /// What it knows is not enough to take off yet, or the autopilot does not obey: a climb waits.
   void SetWaiting(bool waiting) { waits_ = waiting; }
@@ -101,7 +83,6 @@ class Pilot {
     bool follows = true;   ///< the body was within the tube about what is flown
   };
 
-  void SetTube(const BodyEstimate& body);
   bool IsDue(double t) const;
   bool MayPlan(double t) const;
   bool Chases() const { return !task_ || *task_ == Task::kChase; }
@@ -131,20 +112,16 @@ class Pilot {
   std::unique_ptr<Planner> planner_;
   std::optional<Forecast> forecast_;
   std::vector<world::Obstacle> obstacles_, unseen_;
-  Eigen::Matrix3d drift_ =
-      Eigen::Matrix3d::Zero();         ///< covariance of the frame's velocity, m^2/s^2
   double obstacles_time_ = -1e9;       ///< s
   std::optional<double> unseen_time_;  ///< s
   PlanResult running_;
   bool has_running_ = false;
-  double tube_, tracking_bound_;  ///< m
+  Tube tube_;
+  double tracking_bound_;  ///< m
   double last_planned_ = -1e9;
   bool news_ = false;
   bool airborne_ = false;
   bool heard_control_ = false, flies_ = false, descending_ = false, waits_ = false;
-  bool had_target_ = false;
-  world::Trajectory last_seen_;   ///< forecast of the target from when it was in sight last
-  double last_seen_sigma_ = 0.0;  ///< of its place, m
   double climb_end_ = 0.0;
   std::optional<Eigen::Vector3d> climb_top_;  ///< p_WB, m
   std::optional<Task> task_;
@@ -153,10 +130,7 @@ class Pilot {
   Trail trail_;
   WayBack way_back_;
   WayDown way_down_;
-  Whereabouts whereabouts_;                          ///< of a target that is lost
-  Eigen::Vector3d place_ = Eigen::Vector3d::Zero();  ///< from which it is looked for, m
-  double fastest_ = 0.0;                             ///< that the target was seen to move, m/s
-  double place_chosen_ = -1e9;                       ///< s
+  TargetSearch search_;
 };
 
 }  // namespace chase::planning

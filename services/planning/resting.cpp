@@ -94,8 +94,15 @@ std::optional<Stop> Resting::Certified(const Curve& curve, double T) {
   if (!curve.allFinite() || !KeepsLimits(curve, problem_) || !IsForecast(curve, T))
     return std::nullopt;
   auto proofs = ProveOff(curve, problem_, 1.0);
-  if (!proofs) return std::nullopt;
+  if (!proofs || (!leaves_ && LeavesListed(*proofs))) return std::nullopt;
   return Stop{{over_.t0, T, curve}, std::move(*proofs), true};
+}
+
+bool Resting::LeavesListed(const std::vector<Proof>& proofs) const {
+  return std::any_of(proofs.begin(), proofs.end(), [&](const Proof& proof) {
+    const auto is_it = [&](const world::Obstacle& o) { return o.id == proof.obstacle; };
+    return proof.from > 0.0 && std::none_of(besides_.begin(), besides_.end(), is_it);
+  });
 }
 
 bool Resting::Lasts(const Stop& stop, double t) {

@@ -39,6 +39,8 @@ class Resting {
   Resting(const Resting&) = delete;  // problem_ may be its own
 
   void From(const world::State& start, double t0);
+  /// What the start is in, of what is listed, is no obstacle to leave, but one in the way.
+  void KeepOff() { leaves_ = false; }
 
   /// The quickest that is certified, within the heights, or else as far beyond as the quickest way
   /// must.
@@ -69,6 +71,7 @@ class Resting {
   bool IsForecast(const Curve& way, double T) const;
   std::pair<double, double> Clearances(const Curve& curve, double tau) const;
   std::pair<double, double> Within();
+  bool LeavesListed(const std::vector<Proof>& proofs) const;
   void SetProblem(double T);
 
   const PlannerConfig& config_;
@@ -78,7 +81,7 @@ class Resting {
   Problem own_;
   Problem& problem_;
   Curve heights_;
-  bool has_problem_ = false;
+  bool has_problem_ = false, leaves_ = true;
   bool beyond_ = true, goes_beyond_ = false;  ///< the heights: may it, and would the quickest way
   std::optional<std::pair<double, double>> within_;
 };

@@ -265,13 +265,14 @@ PlanResult RestPlan(const PlannerConfig& config, const PlanRequest& request) {
 }
 
 std::optional<Stop> WayOut(const PlannerConfig& config, const PlanRequest& request,
-                           const world::Trajectory& plan, Problem* memory) {
+                           const world::Trajectory& plan, bool leaves, Problem* memory) {
   const PlannerConfig hard = WithoutMargin(config);
   const auto is_unseen = [&](const Proof& proof) {
     return std::any_of(request.unseen.begin(), request.unseen.end(),
                        [&](const auto& o) { return o.id == proof.obstacle; });
   };
   Resting resting(hard, request, request.unseen, memory);
+  if (!leaves) resting.KeepOff();
   for (const double after : {kOverdue, 0.2, 0.7, 1.1, HUGE_VAL}) {
     const double t = std::min(plan.start + after, plan.end());
     resting.From(plan.At(t), t);

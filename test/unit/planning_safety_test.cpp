@@ -131,6 +131,31 @@ TEST(TargetBody, AStopEndsAboveIt) {
   }
 }
 
+// The target may do more over a stop than until it begins: one that starts within that reach would
+// leave it later only, and such a plan would say less than its verdict.
+TEST(TargetBody, StopsKeepOffItFromTheirStartsOn) {
+  const auto planner = MakePlanner("chase", PlannerConfig());
+  int plans = 0, late = 0;
+  for (double distance = 1.6; distance > 0.7; distance -= 0.06)
+    for (const double speed : {0.0, 0.4, 0.8, 1.2}) {
+      PlanRequest request = Hover();
+      request.start.p = {-distance, 0.0, 0.9};
+      request.target_manoeuvre = {0.5, 0.5};
+      request.target_sigma = 0.05;
+      request.target_speed_sigma = 0.2;
+      request.target.coefficients << 0.0, 0.0, 0.85, -2.5 * speed, 0.0, 0.0;
+      request.target_body = Cylinder(kTargetId, {0.0, 0.0, 0.85}, {-speed, 0.0, 0.0}, 0.3, 0.85);
+      request.target_body->position_covariance = 0.0025 * Eigen::Matrix3d::Identity();
+      request.target_body->velocity_covariance = 0.04 * Eigen::Matrix3d::Identity();
+      const PlanResult plan = planner->Plan(request);
+      if (plan.verdict >= Verdict::kBrake || !plan.stop) continue;
+      ++plans;
+      for (const Proof& proof : plan.stop_proofs) late += proof.from > 0.0;
+    }
+  EXPECT_GT(plans, 15);
+  EXPECT_EQ(late, 0);
+}
+
 // Nothing but its body keeps the drone off the target: no least distance, and a wish to be in it.
 TEST(TargetBody, IsKeptOffByPlansThatItDrivesAt) {
   PlannerConfig config;

@@ -197,7 +197,7 @@ TEST(Rest, GoesOnWithTheStopThatWasCommittedTo) {
   for (unsigned seed = 1; seed <= 3000; ++seed) {
     PlanRequest request = RandomRequest(config, seed);
     const world::Trajectory plan = Braking(request, 2.2);
-    const std::optional<Stop> stop = WayOut(config, request, plan);
+    const std::optional<Stop> stop = WayOut(config, request, plan, true);
     if (!stop) continue;
     const world::Trajectory& way = stop->trajectory;
     request.running = plan;
@@ -297,7 +297,7 @@ TEST(WayOut, IsFoundWhereThePlanCanBeLeftForAWhile) {
     plan.coefficients.row(0) = request.start.p.transpose();
     plan.coefficients.row(1) = 2.0 * request.start.v.transpose();
     plan.coefficients.row(2) = RandomVector(&random, 5.0, 5.0, 0.0).transpose();
-    const std::optional<Stop> stop = WayOut(config, request, plan);
+    const std::optional<Stop> stop = WayOut(config, request, plan, true);
     PlanRequest later = request;
     const auto is_free = [&](double after) {
       later.t0 = request.t0 + after;
