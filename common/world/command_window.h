@@ -33,8 +33,8 @@ struct CommandAnswer {
 /// harm when obeyed twice, have room of their own and are always taken: the oldest is forgotten.
 class CommandWindow {
  public:
-  /// Commands from before `start` [s] are refused: whoever was there then has had them. `process`
-  /// is named in that refusal.
+  /// Commands from before `start` [s] are refused: whoever was there then has had them, but for
+  /// urgent ones, which nobody may have had. `process` is named in that refusal.
   CommandWindow(std::string process, double start) : process_(std::move(process)), start_(start) {}
 
   /// The answer at time `t` [s]: the one that it got before, a refusal, or that of `obey`, which is
@@ -48,7 +48,7 @@ class CommandWindow {
         if (before.Key() == command.Key()) return answer;
     }
     // What is refused here is not remembered: it is refused again, or has had no effect.
-    if (std::string untimely = Untimely(t, command.t); !untimely.empty())
+    if (std::string untimely = Untimely(t, command.t, urgent); !untimely.empty())
       return {false, std::move(untimely)};
     if (!urgent && answers_.size() >= kMost) return {false, "too many commands came of late"};
     if (urgent && urgent_.size() >= kMost) urgent_.pop_front();
@@ -60,8 +60,9 @@ class CommandWindow {
  private:
   using Answers = std::deque<std::pair<CommandKey, CommandAnswer>>;
 
-  std::string Untimely(double t, double given) const {
-    if (given < start_) return "it was given before the " + process_ + " process started";
+  std::string Untimely(double t, double given, bool urgent) const {
+    if (!urgent && given < start_)
+      return "it was given before the " + process_ + " process started";
     if (t - given > kMostAge.command) return "it is old: given more than 10 s ago";
     return given - t > kMostAge.command ? "it is given in the future: compare the clocks" : "";
   }

@@ -94,7 +94,7 @@ void Mission::Update(double t) {
     const bool stepped = Step(t, event, Detail(event));
     if (stepped && (event == Event::kLeaving || event == Event::kNotFlown))
       uncommanded_ = false;  // it would come to the same again
-    if (stepped && event == Event::kPoseBack) Resume(t, before_, "before the pose was lost");
+    if (stepped && event == Event::kPoseBack) ComeDown(t, before_, "before the pose was lost");
   }
   if (uncommanded_ && config_.autostart) LeadItself(t);
   HearOfGround();
@@ -103,11 +103,18 @@ void Mission::Update(double t) {
 void Mission::Remember(double t, const Home& home, State state) {
   if (home_ || !IsAirborne(state_)) return;
   home_ = home;
-  if (uncommanded_) Resume(t, state, "before this process started");
+  if (!uncommanded_) return;
+  const char* const when = "before this process started";
+  ComeDown(t, state, when);
+  if (state == State::kChase) Step(t, Event::kChase, when);
+  if (state == State::kSearch) Step(t, Event::kSearch, when);
+  if (state != State::kHold) return;
+  Step(t, Event::kHold, when);
+  uncommanded_ = false;  // whoever told it to hold leads
 }
 
 /// What was on its way down or back goes on so.
-void Mission::Resume(double t, State before, const char* when) {
+void Mission::ComeDown(double t, State before, const char* when) {
   if (before == State::kLand) Step(t, Event::kLand, when);
   if (before == State::kReturn) Step(t, Event::kReturn, when);
 }

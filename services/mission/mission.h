@@ -39,7 +39,8 @@ class Mission {
   /// answer and changes nothing.
   world::CommandAnswer Obey(double t, const Command& command);
 
-  /// Who outlived the mission process before this one says where that took off and where it was.
+  /// Who outlived the mission process before this one says where that took off and where it was:
+  /// unless somebody has commanded since, it goes on so.
   void Remember(double t, const Home& home, State state);
 
   /// Moves on by what is observed at time `t` [s], which never goes back.
@@ -75,7 +76,7 @@ class Mission {
   std::string Detail(Event event) const;
   void LeadItself(double t);
   void HearOfGround();
-  void Resume(double t, State before, const char* when);
+  void ComeDown(double t, State before, const char* when);
   void NoteProgress(double t);
 
   MissionConfig config_;

@@ -103,6 +103,21 @@ TEST(Commands, StopAndKillAreTakenHoweverManyCame) {
   }
 }
 
+// Its operator stopped it while nobody listened, and `chase-command` says so again and again.
+TEST(Commands, StopAndKillThatWereGivenBeforeTheProcessStartedAreObeyed) {
+  for (const Event urgent : {Event::kStop, Event::kKill, Event::kLand}) {
+    Bench bench;
+    bench.Fly();
+    Mission anew(MissionConfig(), bench.t);
+    anew.inputs() = bench.mission.inputs();
+    anew.inputs().flying = true;
+    anew.Update(bench.t);
+    const Command command{{"command", 1, 77, bench.t - 3.0}, urgent, true};
+    EXPECT_EQ(anew.Obey(bench.t, command).accepted, urgent != Event::kLand);
+    EXPECT_EQ(anew.state(), urgent == Event::kKill ? State::kDone : State::kHold);
+  }
+}
+
 /// What is under way on a bus that loses, doubles and delays.
 template <class T>
 class BadLine {

@@ -344,22 +344,30 @@ TEST(Mission, StartedInFlightItHoldsOrGoesOnWithALanding) {
   EXPECT_EQ(down.mission.state(), State::kDone);
 }
 
-TEST(Mission, StartedInFlightItGoesOnWithWhatLedDownUnlessSomebodyHasCommanded) {
-  for (const State before : {State::kReturn, State::kLand, State::kChase, State::kSearch}) {
+TEST(Mission, StartedInFlightItGoesOnAsItWasLedUnlessSomebodyHasCommanded) {
+  MissionConfig config;
+  for (const State before :
+       {State::kReturn, State::kLand, State::kChase, State::kSearch, State::kHold}) {
     for (const bool commanded : {false, true}) {
       for (const int frames : {0, 1}) {
-        Bench bench;
-        bench.mission.inputs().flying = true;
-        bench.pose.p = {5.0, 0.0, 1.0};
-        bench.Run(0.1);
-        if (commanded) bench.Command(Event::kStop);
-        bench.mission.Remember(bench.t, {{1.0, 2.0, 0.0}, bench.pose.epoch - frames}, before);
-        bench.Run(0.2);
-        const bool leads_down = before == State::kReturn || before == State::kLand;
-        EXPECT_EQ(bench.mission.state(), commanded || !leads_down ? State::kHold
-                                         : frames > 0             ? State::kLand
-                                                                  : before)
-            << Name(before) << (commanded ? ", stopped" : "") << ", frame " << frames;
+        for (const bool autostart : {false, true}) {
+          config.autostart = autostart;
+          Bench bench(config);
+          bench.mission.inputs().flying = true;
+          bench.tracked = false;
+          bench.pose.p = {5.0, 0.0, 1.0};
+          bench.Run(0.1);
+          if (commanded) bench.Command(Event::kStop);
+          bench.mission.Remember(bench.t, {{1.0, 2.0, 0.0}, bench.pose.epoch - frames}, before);
+          bench.Run(0.2);
+          const State expected = commanded                                ? State::kHold
+                                 : before == State::kReturn && frames > 0 ? State::kLand
+                                 : before == State::kChase                ? State::kSearch
+                                                                          : before;
+          EXPECT_EQ(bench.mission.state(), expected)
+              << Name(before) << (commanded ? ", stopped" : "") << ", frame " << frames
+              << (autostart ? ", by itself" : "");
+        }
       }
     }
   }
