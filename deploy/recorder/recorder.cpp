@@ -5,6 +5,9 @@
 #include <algorithm>
 #include <filesystem>
 #include <stdexcept>
+#include <system_error>
+#include <utility>
+#include <vector>
 
 namespace chase::recorder {
 namespace {
@@ -13,13 +16,15 @@ constexpr double kMega = 1e6, kMinute = 60e6;  // bytes; us
 constexpr int64_t kRetry = 1'000'000;          // us between two tries on a disk that refuses
 constexpr double kPieces = 5.0;                // logs that the heavy minutes are made of
 constexpr double kEnough = 1.2;                // of keep_free_mb, before heavy ones are taken again
+constexpr char kHeavy[] = "-heavy";            // in the names of logs of sweeps and images
 
 }  // namespace
 
 Recorder::Recorder(const RecorderConfig& config, const std::string& name, int64_t utime)
     : config_(config) {
   light_.name = config.folder + "/" + name;
-  heavy_.name = light_.name + "-heavy";
+  heavy_.name = light_.name + kHeavy;
+  FindEarlierHeavy();
   if (!Open(utime, &light_))
     throw std::runtime_error(light_.name +
                              ".lcm: cannot be written; check the folder, its rights "
@@ -29,6 +34,25 @@ Recorder::Recorder(const RecorderConfig& config, const std::string& name, int64_
 Recorder::~Recorder() {
   Retire(&heavy_);
   Retire(&light_);
+}
+
+/// Those of recorders before this one, which are not there to drop them any more.
+void Recorder::FindEarlierHeavy() {
+  namespace fs = std::filesystem;
+  std::vector<std::pair<fs::file_time_type, Old>> found;
+  std::error_code ignored;
+  for (const fs::directory_entry& file : fs::directory_iterator(config_.folder, ignored)) {
+    const std::string name = file.path().stem().string();
+    const size_t at = name.rfind(kHeavy), end = at + sizeof kHeavy - 1;
+    const bool numbered = at != std::string::npos && (end == name.size() || name[end] == '-');
+    if (numbered && file.path().extension() == ".lcm")
+      found.emplace_back(
+          file.last_write_time(ignored),
+          Old{file.path().string(), static_cast<int64_t>(file.file_size(ignored)), 0});
+  }
+  std::sort(found.begin(), found.end(),
+            [](const auto& a, const auto& b) { return a.first < b.first; });
+  for (auto& [time, old] : found) earlier_heavy_.push_back(std::move(old));
 }
 
 /// NAME.lcm, then NAME-001.lcm and so on; a log that is there already is left alone.
@@ -117,10 +141,14 @@ int64_t Recorder::heavy_bytes() const {
 
 /// Bytes that became free; 0: there are no heavy logs any more.
 int64_t Recorder::DropOldestHeavy() {
+  if (!earlier_heavy_.empty()) return DropFirst(&earlier_heavy_);
   if (old_heavy_.empty()) Retire(&heavy_);
-  if (old_heavy_.empty()) return 0;
-  const Old old = old_heavy_.front();
-  old_heavy_.pop_front();
+  return old_heavy_.empty() ? 0 : DropFirst(&old_heavy_);
+}
+
+int64_t Recorder::DropFirst(std::deque<Old>* logs) {
+  const Old old = logs->front();
+  logs->pop_front();
   std::error_code ignored;
   std::filesystem::remove(old.name, ignored);
   return old.bytes;
@@ -128,12 +156,13 @@ int64_t Recorder::DropOldestHeavy() {
 
 void Recorder::DropOldHeavy(int64_t utime) {
   const auto age = static_cast<int64_t>(config_.heavy_minutes * kMinute);
-  while (!old_heavy_.empty() && utime - old_heavy_.front().last_utime > age) DropOldestHeavy();
+  while (!old_heavy_.empty() && utime - old_heavy_.front().last_utime > age) DropFirst(&old_heavy_);
 }
 
 void Recorder::MindTheDisk() {
   const double keep = config_.keep_free_mb * kMega;
-  while (static_cast<double>(room_) < keep && !old_heavy_.empty()) room_ += DropOldestHeavy();
+  while (static_cast<double>(room_) < keep && !(earlier_heavy_.empty() && old_heavy_.empty()))
+    room_ += DropOldestHeavy();
   if (static_cast<double>(room_) < keep)
     heavy_given_up_ = true;
   else if (static_cast<double>(room_) >= kEnough * keep && !refused_)

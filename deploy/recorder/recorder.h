@@ -54,14 +54,17 @@ class Recorder {
   void Retire(Series* series);
   bool IsFull(int64_t utime, const Series& series, double minutes) const;
   void DropOldHeavy(int64_t utime);
+  void FindEarlierHeavy();
   int64_t DropOldestHeavy();
+  static int64_t DropFirst(std::deque<Old>* logs);
   void MindTheDisk();
   void FlushAll(int64_t utime);
   void Refused(int64_t utime, Series* series);
 
   RecorderConfig config_;
   Series light_, heavy_;
-  std::deque<Old> old_heavy_;
+  std::deque<Old> old_heavy_;      // of this recorder: dropped once they are old
+  std::deque<Old> earlier_heavy_;  // of those before it: dropped, first, where there is no room
   int64_t light_bytes_ = 0;
   int64_t room_ = INT64_MAX;  // bytes free on the disk, as far as is known
   bool heavy_given_up_ = false, refused_ = false;

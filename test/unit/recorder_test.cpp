@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <csignal>
 #include <filesystem>
+#include <fstream>
 #include <map>
 #include <mutex>
 #include <set>
@@ -166,6 +167,27 @@ TEST_F(RecorderTest, OnANearlyFullDiskHeavyMakesRoomForLight) {
   const auto heavy = Stamps("LIDAR_SCAN");
   EXPECT_EQ(heavy.back(), Expected(0, 50).back());
   EXPECT_GT(heavy.front(), Expected(0, 12).back());  // the oldest went first
+}
+
+TEST_F(RecorderTest, HeavyLogsOfEarlierRecordersMakeRoomFirst) {
+  config_.heavy_minutes = 0.5;
+  for (const char* name : {"a", "b"}) {
+    Recorder recorder(config_, name, kStart);
+    Feed(&recorder, 0, 10);
+  }
+  std::ofstream(folder_ / "a-heavyweights.lcm") << "somebody's";
+  {
+    Recorder recorder(config_, "b", kStart);
+    Feed(&recorder, 10, 20);
+    EXPECT_EQ(Names().count("a-heavy.lcm"), 1u) << "there is room";
+    recorder.Tick(kStart + 20 * kSecond, 950'000);  // 50 kB too few
+    EXPECT_EQ(Names().count("a-heavy.lcm"), 0u);
+    EXPECT_EQ(Names().count("b-heavy.lcm"), 1u) << "one is enough, the oldest";
+    EXPECT_FALSE(recorder.heavy_given_up());
+  }
+  EXPECT_EQ(Names().count("a-heavyweights.lcm"), 1u);
+  std::filesystem::remove(folder_ / "a-heavyweights.lcm");
+  EXPECT_EQ(Stamps("POSE").size(), 300u);
 }
 
 /// As a file system's or a user's limit on a file does: the next log takes what comes.
