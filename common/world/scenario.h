@@ -237,6 +237,7 @@ struct CriteriaSpec {
   std::vector<std::string> flight_states;
   double touchdown_speed = -1.0, motors_off = -1.0;
   double sweep_to_setpoint = -1.0, memory_growth = -1.0;
+  int restarts = -1;
   template <class V>
   void Visit(V& v) {
     v("safe_ratio", safe_ratio, "at least");
@@ -250,6 +251,7 @@ struct CriteriaSpec {
     v("sweep_to_setpoint", sweep_to_setpoint, "99th percentile, at most, s; logs with sweeps only");
     v("memory_growth", memory_growth,
       "of any process after its first minute, at most; live flights only");
+    v("restarts", restarts, "of any process, at most, besides those that faults kill or freeze");
   }
 };
 

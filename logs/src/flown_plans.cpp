@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include "chase/tracking_t.hpp"
+#include "logs/src/estimate_errors.h"
 #include "logs/src/landing_figures.h"
 
 namespace chase::logs {
@@ -14,6 +16,17 @@ Eigen::Vector3d Wanted(const PlanSample& plan, double t) {
   const bool stops = plan.stop && t > plan.stop->start;
   const world::Trajectory& way = stops ? *plan.stop : plan.position;
   return way.Position(std::min(t, way.end()));
+}
+
+/// By how much the frame W was off when the plan was heard. What the plan keeps off had been listed
+/// in that frame, and was off alike: that it drifted before, or is tilted, is no error of tracking.
+Eigen::Vector3d FrameError(const FlightRecord& record, const PlanSample& plan) {
+  const auto next = std::upper_bound(record.poses.begin(), record.poses.end(), plan.heard,
+                                     [](double t, const PoseSample& pose) { return t < pose.t; });
+  if (next == record.poses.begin()) return Eigen::Vector3d::Zero();
+  const PoseSample& pose = *std::prev(next);
+  const auto truth = TruthAt(record.truth, pose.t);
+  return truth ? Eigen::Vector3d(pose.p - truth->body) : Eigen::Vector3d::Zero();
 }
 
 }  // namespace
@@ -71,10 +84,14 @@ void AddCertificates(const FlightRecord& record, const std::vector<SampleScore>&
   if (asked > 0) m->certificate_kept_ratio = static_cast<double>(kept) / static_cast<double>(asked);
   std::vector<double> errors;
   long exceeded = 0;
+  const PlanSample* before = nullptr;
+  Eigen::Vector3d frame = Eigen::Vector3d::Zero();
   for (const TruthSample& s : record.truth) {
     const PlanSample* plan = record.InMission(s.t) ? followed.At(s.t) : nullptr;
     if (!plan) continue;
-    errors.push_back((s.p - Wanted(*plan, s.t)).norm());
+    if (plan != before) frame = FrameError(record, *plan);
+    before = plan;
+    errors.push_back((s.p + frame - Wanted(*plan, s.t)).norm());
     exceeded += errors.back() > plan->hard_radius - record.scenario.chaser.radius;
   }
   if (errors.empty()) return;

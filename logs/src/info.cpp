@@ -128,6 +128,9 @@ std::vector<std::string> LogInfo::Losses() const {
             s.missing + s.count, s.name,
             100.0 * static_cast<double>(s.missing) / static_cast<double>(s.missing + s.count)));
   }
+  for (const auto& [process, count] : restarts)
+    lines.push_back(fmt::format("{}: started anew, {}", process,
+                                count == 1 ? "once" : fmt::format("{} times", count)));
   for (const Damage& d : damage) lines.push_back(Format(d));
   return lines;
 }
@@ -174,6 +177,7 @@ void LogSurvey::AddContent(const LogEvent& e, const std::string& type) {
     if (!configuration.empty()) info_.configurations[status.name] = configuration;
     if (!host.empty()) info_.hosts[status.name] = host;
     info_.versions[status.name] = status.version;
+    starts_[status.vehicle + status.name].insert(status.sender_start);
   }
   if (type == "scenario_t" && info_.scenario.empty() && DecodeBytes(e.bytes, &scenario))
     info_.scenario = fmt::format("{}, seed {}", scenario.name, scenario.seed);
@@ -215,6 +219,8 @@ LogInfo LogSurvey::Take(const LogReader& log) {
     Settle(&channel);
     info_.channels.push_back(std::move(channel.info));
   }
+  for (const auto& [process, starts] : starts_)
+    if (starts.size() > 1) info_.restarts[process] = static_cast<int>(starts.size()) - 1;
   AddUnrecorded(&info_);
   std::sort(info_.channels.begin(), info_.channels.end(),
             [](const ChannelInfo& a, const ChannelInfo& b) { return a.channel < b.channel; });

@@ -39,7 +39,8 @@ struct LogInfo {
   /// By process, of its status messages; hosts and configurations (`cksum` of what --dump-config
   /// prints) of live ones only.
   TextByProcess versions, hosts, configurations;
-  std::string scenario;  ///< name and seed; empty: there is none
+  std::string scenario;                 ///< name and seed; empty: there is none
+  std::map<std::string, int> restarts;  ///< of processes that were started anew, by name
   std::vector<Damage> damage;
 
   /// Lines of versions, hosts and configurations.
@@ -50,7 +51,7 @@ struct LogInfo {
   /// Whole, and no channel that figures are computed from has lost more than a hundredth: beyond
   /// that a 99th percentile says nothing. What is too heavy to be always recorded does not count.
   bool Recorded() const;
-  /// A line for everything that is not there.
+  /// A line for everything that is not there, and for whoever was started anew.
   std::vector<std::string> Losses() const;
 };
 

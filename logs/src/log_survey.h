@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <map>
+#include <set>
 #include <string>
 #include <tuple>
 #include <utility>
@@ -35,7 +36,8 @@ class LogSurvey {
 
   int64_t first_utime_ = INT64_MAX, last_utime_ = INT64_MIN;
   std::map<std::string, Channel> channels_;
-  std::map<std::string, Heard> heard_;  ///< lowest and highest `seq` that others heard
+  std::map<std::string, Heard> heard_;               ///< lowest and highest `seq` that others heard
+  std::map<std::string, std::set<int64_t>> starts_;  ///< of processes, by name
   LogInfo info_;
 };
 

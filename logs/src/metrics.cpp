@@ -163,6 +163,17 @@ void AddLosses(const LogInfo& log, Metrics* m) {
   m->software = log.SoftwareByKind();
   m->losses = log.Losses();
   m->log_whole = log.Whole();
+  m->restarts = log.restarts;
+}
+
+/// Of any process, more often than by faults that kill it, or freeze it until its watchdog does.
+bool RestartsAtMost(int most, const Metrics& m) {
+  return std::all_of(m.restarts.begin(), m.restarts.end(), [&](const auto& process) {
+    const auto meant = [&](const FaultFigures& fault) {
+      return fault.name == "kill-" + process.first || fault.name == "freeze-" + process.first;
+    };
+    return process.second - std::count_if(m.faults.begin(), m.faults.end(), meant) <= most;
+  });
 }
 
 void AddCriteria(const FlightRecord& record, Metrics* m) {
@@ -187,6 +198,7 @@ void AddCriteria(const FlightRecord& record, Metrics* m) {
     m->criteria["memory_growth"] =
         std::all_of(m->memory_growth.begin(), m->memory_growth.end(),
                     [&](const auto& process) { return process.second <= c.memory_growth; });
+  if (c.restarts >= 0) m->criteria["restarts"] = RestartsAtMost(c.restarts, *m);
   if (!c.flight_states.empty())
     m->criteria["flight_states"] = InOrder(c.flight_states, m->flight_states);
   if (c.touchdown_speed >= 0.0)

@@ -48,6 +48,7 @@ struct Metrics {
   std::map<int, double> verdict_s;              ///< time under each of plan_t's verdicts
   std::map<std::string, double> cpu_s;          ///< by process
   std::map<std::string, double> memory_growth;  ///< by process that ran longer than a minute
+  std::map<std::string, int> restarts;          ///< by process that was started anew
   Figure real_time_factor;
   std::string fault;                 ///< names of those that struck, joined by +
   double fault_time_s = -1.0;        ///< mission time of the first; -1: none

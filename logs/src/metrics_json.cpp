@@ -98,6 +98,7 @@ std::string MetricsJson(const FlightRecord& record, const Metrics& m) {
       straight.empty() ? Json() : ByHorizon(straight);
   j["cpu_s"] = Json(m.cpu_s);
   j["memory_growth"] = Json(m.memory_growth);
+  j["restarts"] = Json(m.restarts);
   j["real_time_factor"] = Number(m.real_time_factor);
   j["lost_messages"] = Json(m.lost_messages);
   j["longest_gap_s"] = Json(m.longest_gap_s);

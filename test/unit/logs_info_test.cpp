@@ -55,6 +55,23 @@ TEST(LogInfo, TellsVersionHostAndConfiguration) {
   EXPECT_NE(Format(info).find("planning 930766865\n"), std::string::npos);
 }
 
+TEST(LogInfo, ProcessesThatWereStartedAnewAreTold) {
+  const std::string file = Temp("restarts.lcm");
+  bus::LogWriter out(file);
+  int64_t utime = 0;
+  for (const auto& [name, start] : std::vector<std::pair<std::string, int64_t>>{
+           {"planning", 1}, {"control", 1}, {"planning", 1}, {"planning", 5}, {"planning", 9}}) {
+    status_t status{};
+    status.name = status.sender = name;
+    status.sender_start = start;
+    out.Write(++utime, name == "control" ? "CONTROL_STATUS" : "PLANNING_STATUS", Encoded(status));
+  }
+  out.Close();
+  const LogInfo info = Describe(file);
+  EXPECT_EQ(info.restarts, (std::map<std::string, int>{{"planning", 2}}));
+  EXPECT_NE(Format(info).find("planning: started anew, 2 times"), std::string::npos);
+}
+
 TEST(LogInfo, WhatOthersHeardAndTheLogLacksIsMissingButTicksAreNot) {
   const std::string file = Temp("heard.lcm");
   status_t status{};

@@ -133,6 +133,30 @@ TEST(Metrics, OnlyPlansThatControlFollowsAreFlown) {
       << "an older log tells of all plans only";
 }
 
+TEST(Metrics, TheTubeIsAboutThePlanInTheFrameThatItWasMadeIn) {
+  FlightRecord record = Standing({5, 0, 1.5}, {8, 0, 0.5});
+  record.plans = {Hover(0, -0.5, 5.3, 1.0)};  // the frame is off by 0.3 m
+  record.tracking = {{-0.4, tracking_t::PLAN, 0}};
+  const auto drift = [&](double rate) {
+    record.poses.clear();
+    for (int k = -150; k <= 1000; ++k) {
+      const double t = 0.01 * k;
+      record.poses.push_back({t, {5.3 + rate * std::max(0.0, t), 0.0, 1.5}});
+    }
+  };
+  drift(0.0);
+  EXPECT_NEAR(*Compute(record).tracking_error_p99_m, 0.0, 1e-9);
+  EXPECT_EQ(*Compute(record).tube_exceeded_ratio, 0.0);
+  for (TruthSample& s : record.truth) s.p.x() -= 0.03 * std::max(0.0, s.t);
+  drift(-0.03);  // control does not follow
+  EXPECT_NEAR(*Compute(record).tracking_error_p99_m, 0.3, 0.01);
+  drift(0.0);  // the estimate drifts
+  EXPECT_NEAR(*Compute(record).tracking_error_p99_m, 0.3, 0.01);
+  record.plans.push_back(Hover(1, 5.5, 5.3, 1.0));  // heard at 5.0, off by 0.45 m by then
+  record.tracking.push_back({5.5, tracking_t::PLAN, 1});
+  EXPECT_NEAR(*Compute(record).tracking_error_p99_m, 0.165, 0.01);
+}
+
 TEST(Metrics, AWayDownByAPlanIsHeldAgainstIt) {
   FlightRecord record = Standing({5, 0, 1.5}, {8, 0, 0.5});
   record.plans = {Hover(0, -2.0, 5.0, 99.0)};
@@ -499,6 +523,18 @@ TEST(Metrics, AFlightWhoseLogLostAHundredthFails) {
   record.log.damage = {{1000, 10, true}};
   EXPECT_FALSE(Compute(record).Passed());
   EXPECT_EQ(Compute(record).losses.size(), 1u);
+}
+
+TEST(Metrics, WhoStartsAnewWithoutAFaultFailsWhereThatIsAsked) {
+  FlightRecord record = Standing({3, 0, 1.5}, {5.5, 0, 1.5});
+  record.log.restarts = {{"mapping", 1}, {"planning", 2}};
+  EXPECT_TRUE(Compute(record).Passed()) << "not asked";
+  EXPECT_EQ(Compute(record).restarts.at("planning"), 2);
+  record.scenario.criteria.restarts = 0;
+  record.faults = {{1.0, "kill-planning"}, {2.0, "freeze-mapping"}, {3.0, "kill-mapping"}};
+  EXPECT_FALSE(Compute(record).criteria.at("restarts")) << "planning once more";
+  record.faults.push_back({4.0, "kill-planning"});
+  EXPECT_TRUE(Compute(record).criteria.at("restarts"));
 }
 
 TEST(Metrics, AFlightWithASetpointThatIsNoNumberFails) {
