@@ -14,6 +14,9 @@ set_tests_properties(flight_verify PROPERTIES TIMEOUT 120 FIXTURES_REQUIRED reco
 chase_script_test(flight_faults ${CMAKE_CURRENT_LIST_DIR}/faults_test.py ${bin} ${scenario})
 set_tests_properties(flight_faults PROPERTIES TIMEOUT 300)
 
+chase_script_test(flight_bars ${CMAKE_CURRENT_LIST_DIR}/bars_test.py)
+set_tests_properties(flight_bars PROPERTIES TIMEOUT 30)
+
 # Whole flights among trees, and half minutes in the hall in which planning dies: criteria and bounds decide.
 foreach(name IN ITEMS forest gym)
   add_test(NAME flight_${name}
