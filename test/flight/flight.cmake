@@ -17,8 +17,8 @@ set_tests_properties(flight_faults PROPERTIES TIMEOUT 300)
 chase_script_test(flight_bars ${CMAKE_CURRENT_LIST_DIR}/bars_test.py)
 set_tests_properties(flight_bars PROPERTIES TIMEOUT 30)
 
-# Whole flights among trees, and half minutes in the hall in which planning dies: criteria and bounds decide.
-foreach(name IN ITEMS forest gym)
+# Whole flights among trees, half minutes among people, and in the hall in which planning dies: criteria and bounds decide.
+foreach(name IN ITEMS forest gym corridor crossing night)
   add_test(NAME flight_${name}
     COMMAND python3 -B ${CMAKE_SOURCE_DIR}/test/flight/bounds_test.py ${bin} ${name})
   set_tests_properties(flight_${name} PROPERTIES TIMEOUT 900)
