@@ -25,6 +25,9 @@ class StampOrder {
     return Verdict::kSetBack;
   }
 
+  /// Takes it: was something newer there before? Messages of one instant follow each other.
+  bool IsOvertaken(int64_t utime) { return Take(utime) == Verdict::kLate && utime < newest_; }
+
   int64_t newest() const { return newest_; }
 
  private:

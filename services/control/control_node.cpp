@@ -56,6 +56,7 @@ ControlNode::ControlNode(bus::Bus& bus, const ControlConfig& config)
 
 // Another mission process counts its messages anew. What is too old is not of this flight.
 void ControlNode::OnState(const flight_state_t& message) {
+  if (state_order_.IsOvertaken(message.utime)) return;
   if (!world::IsFresh(bus::Seconds(bus_.Now(), message.utime), world::kMostAge.flight_state))
     return;
   // One that began anew in flight knows none; the place has not moved.

@@ -16,6 +16,7 @@
 #include "common/bus/bus.h"
 #include "common/bus/epoch.h"
 #include "common/bus/node.h"
+#include "common/bus/stamp_order.h"
 #include "common/world/plan_check.h"
 #include "services/control/controller.h"
 #include "services/control/pose_age.h"
@@ -68,6 +69,7 @@ class ControlNode : public bus::Node {
   /// that process started.
   std::optional<std::pair<int64_t, int32_t>> landing_;
   bus::AutopilotState autopilot_;
+  bus::StampOrder state_order_;
   int64_t asked_to_fly_ = 0;       // utime of the last FLIGHT_STATE that asks for a flight
   std::optional<int64_t> origin_;  // utime that the core's seconds count from
   int64_t last_tracking_ = 0;

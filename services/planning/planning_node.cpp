@@ -138,6 +138,7 @@ std::optional<std::vector<world::Obstacle>> PlanningNode::Listed(const obstacles
 }
 
 void PlanningNode::OnState(const flight_state_t& message) {
+  if (state_order_.IsOvertaken(message.utime)) return;
   state_utime_ = message.utime;
   task_ = TaskOf(message.state);
   const bool knows_home = message.has_home != 0 && epoch_.Is(message.epoch);

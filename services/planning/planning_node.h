@@ -14,6 +14,7 @@
 #include "common/bus/bus.h"
 #include "common/bus/epoch.h"
 #include "common/bus/node.h"
+#include "common/bus/stamp_order.h"
 #include "common/world/sweep_run.h"
 #include "services/planning/pilot.h"
 
@@ -42,8 +43,9 @@ class PlanningNode : public bus::Node {
   bus::Epoch epoch_;
   bus::AutopilotState autopilot_;
   world::SweepRun sweeps_;
-  bool is_usable_ = false;               ///< the newest POSE
-  std::optional<int64_t> origin_;        // utime that the core's seconds count from
+  bool is_usable_ = false;         ///< the newest POSE
+  std::optional<int64_t> origin_;  // utime that the core's seconds count from
+  bus::StampOrder state_order_;
   int64_t state_utime_ = 0;              // of the newest FLIGHT_STATE; 0: none
   Task task_ = Task::kGround;            // that it asked for
   std::optional<Eigen::Vector3d> home_;  // that it tells: GEOFENCE counts from there, m

@@ -31,6 +31,22 @@ TEST(ControlNode, LandsWhenTheMissionSaysSoAndNobodyElse) {
   EXPECT_EQ(following_after(flight_state_t::HOLD, "mission"), int{tracking_t::PLAN});
 }
 
+TEST(ControlNode, AStateThatWasOvertakenChangesNothing) {
+  Bench bench;
+  int64_t t = kStart;
+  const auto following_after = [&](int8_t state, int64_t age) {
+    bench.SendState(state, "mission", {}, age);
+    bench.RunUntil(t);
+    bench.SendPlan(t, {0, 0, 0});
+    for (int i = 0; i < 20; ++i) bench.SendPose(t += 5000);
+    return int{bench.tracking.back().following};
+  };
+  EXPECT_EQ(following_after(flight_state_t::HOLD, 0), int{tracking_t::PLAN});
+  EXPECT_EQ(following_after(flight_state_t::LAND, 0), int{tracking_t::LAND});
+  EXPECT_EQ(following_after(flight_state_t::HOLD, 150000), int{tracking_t::LAND});
+  EXPECT_EQ(following_after(flight_state_t::HOLD, 0), int{tracking_t::PLAN});
+}
+
 TEST(ControlNode, ComesDownOnlyByAPlanThatWasMadeToLand) {
   Bench bench;
   int64_t t = kStart;

@@ -112,6 +112,9 @@ class Company : public bus::Node {
     state.home[0] = 5.0;
     bus_.SetIdentity({"mission", "", kStart});
     bus_.Publish("FLIGHT_STATE", state);
+    state.utime -= 50000;  // one of before, that was overtaken
+    state.state = flight_state_t::HOLD;
+    bus_.Publish("FLIGHT_STATE", state);
     if (!events_.is_fenced) return;
     geofence_t fence{};
     fence.corners = {-1, -1, 2, -1, 2, 3, 4, 3, 4, -1, 6, -1, 6, 4, -1, 4};
