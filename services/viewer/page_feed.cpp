@@ -154,7 +154,7 @@ void PageFeed::Tick(int64_t utime, const std::string& self) {
   if (!play_) Remember(utime);
   const bool second = ticks_++ % kTicksPerSecond == 0;
   if (!play_ && second) SendHello();
-  if (!sink_.Wanted(Part::kState) || (origin_ == 0 && !play_)) return;
+  if (!sink_.Wanted(Part::kState)) return;
   auto timer = bus_.Time("tick");
   if (epoch_ >= 0 && epoch_ != first_epoch_) scene_.truth.clear();
   if (scene_.drone) scene_.drone->age = bus::Seconds(bus_.Now(), pose_heard_);

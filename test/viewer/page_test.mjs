@@ -204,6 +204,25 @@ const lines = await page.evaluate(async () => {
 });
 assert.deepStrictEqual(lines, {ends: 18, low: -1, high: 5, shown: true, after: false, seen: [[35, 43, 54], [217, 83, 79]]});
 
+// A viewer that says nothing is told from one that is well within two seconds; then the connection is made anew until it answers.
+const linked = () => page.evaluate(() => {
+  const link = document.getElementById('link'), {opacity} = getComputedStyle(document.getElementById('view'));
+  return {text: link.textContent, bad: link.classList.contains('bad'), dim: opacity < 1};
+});
+await page.evaluate(() => { const arm = document.getElementById('arm'); arm.disabled = false; arm.checked = true; });
+viewer.process.kill('SIGSTOP');
+try {
+  await until('silence is told', async () => (await linked()).text !== 'linked', 2500);
+  const silent = await linked();
+  assert.match(silent.text, /^silent [1-3] s$/);
+  assert.ok(silent.bad && silent.dim && !await page.isChecked('#arm'), JSON.stringify(silent));
+  await until('the connection is given up', async () => /^no link [4-9] s$/.test((await linked()).text), 8000);
+} finally {
+  viewer.process.kill('SIGCONT');
+}
+await until('a link again', async () => (await linked()).text === 'linked', 10000);
+assert.ok(!(await linked()).dim);
+
 // Commands stay off without a token, and a phone needs no scrolling sideways.
 assert.ok(await page.isDisabled('#arm'));
 assert.ok(await page.isDisabled('#buttons button'));

@@ -2,7 +2,7 @@ import {Link} from './link.js';
 import {Recording} from './recording.js';
 import {Scene3D} from './scene3d.js';
 import {drawTimeline, drawStrips, timeAt} from './strips.js';
-import {drawImage, showHealth, makeCommands, allowCommands} from './panels.js';
+import {drawImage, showHealth, makeCommands, allowCommands, disarm} from './panels.js';
 import {T, DRONE, VERDICTS, VERDICT_COLORS, SCENE_COLORS, SCENE_WORDS, TARGET_STATES, HEALTHS, FOLLOWING, FLIGHT_STATES,
   FLIGHT_COLORS, format, setText} from './names.js';
 
@@ -72,7 +72,12 @@ function drawLines() {
 }
 
 const handlers = {
-  link(up) { pill(page.link, up ? 'linked' : 'no link', up ? 'good' : 'bad'); },
+  link(up, silence = 0) {
+    const well = up && !silence, words = up ? 'silent' : 'no link';
+    pill(page.link, well ? 'linked' : silence ? `${words} ${silence.toFixed(0)} s` : words, well ? 'good' : 'bad');
+    document.body.classList.toggle('silent', !well);
+    if (!well) disarm(page);
+  },
   hello(message) {
     page.source.textContent = message.source || 'live';
     model.rows = message.rows;
