@@ -158,6 +158,7 @@ void PageFeed::Tick(int64_t utime, const std::string& self) {
   auto timer = bus_.Time("tick");
   if (epoch_ >= 0 && epoch_ != first_epoch_) scene_.truth.clear();
   if (scene_.drone) scene_.drone->age = bus::Seconds(bus_.Now(), pose_heard_);
+  scene_.utime = bus_.Now();
   sink_.Send(Part::kState, StateText(scene_, Elapsed(utime), generation_, play_), false);
   if (!obstacles_sent_ && ticks_ % kTicksPerObstacles == 0) {
     obstacles_sent_ = true;

@@ -132,6 +132,7 @@ std::string StateText(const Scene& scene, double t, int generation,
                       const std::optional<PlayState>& play) {
   json out = {{"type", "state"},
               {"generation", generation},
+              {"utime", scene.utime},
               {"following", scene.following},
               {"row", RowOf(SampleOf(scene, t))}};
   if (scene.drone) out["drone"] = DroneOf(*scene.drone);

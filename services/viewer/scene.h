@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <cstdint>
 #include <optional>
 #include <set>
 #include <string>
@@ -72,6 +73,7 @@ struct Body {
 
 /// The newest of everything.
 struct Scene {
+  int64_t utime = 0;  ///< when it is told, by the bus's clock, us
   std::optional<Drone> drone;
   std::optional<Target> target;
   std::optional<Plan> plan;

@@ -145,7 +145,8 @@ page.scrubber.onchange = () => { model.seeking = false; };
 for (const canvas of [page.timeline, page.strips])
   canvas.onclick = (event) => { if (model.play) link.ask({seek: timeAt(canvas, event, ...span())}); };
 
-makeCommands(page, (request) => link.ask(request));
+// A command that waits in a link that stalls tells by the newest state how old it has become.
+makeCommands(page, (request) => link.ask({...request, utime: model.state?.utime}));
 const legend = (name, entries) => {
   const line = document.createElement('div'), made = entries.map(([text, color]) => {
     const entry = document.createElement('span'), box = document.createElement('i');
