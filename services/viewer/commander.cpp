@@ -1,7 +1,10 @@
 #include "services/viewer/commander.h"
 
+#include <cstdio>
 #include <utility>
 
+#include "common/bus/convert.h"
+#include "common/world/ages.h"
 #include "common/world/commands.h"
 
 namespace chase::viewer {
@@ -16,8 +19,18 @@ void Commander::Hear(const command_ack_t& ack) {
 std::string Commander::RefusalHere(const Request& request) const {
   std::string refusal = RefusalOf(request, token_);
   if (refusal.empty() && !live_) refusal = "a log is played: nobody flies";
+  if (refusal.empty() && request.caller == 0) refusal = LateRefusal(request);
   if (refusal.empty() && given_.size() >= kMost) refusal = "too many commands are not answered yet";
   return refusal;
+}
+
+std::string Commander::LateRefusal(const Request& request) const {
+  if (!request.utime) return "does not say when it was given";
+  const double age = bus::Seconds(bus_.Now(), *request.utime);
+  if (world::IsFresh(age, kLatest)) return "";
+  char words[48];
+  std::snprintf(words, sizeof(words), "given %.1f s ago", age);
+  return words;
 }
 
 void Commander::Take(const Request& request) {

@@ -2,12 +2,16 @@
 
 #include <limits>
 
-#include "common/world/ages.h"
-
 namespace chase::viewer {
 namespace {
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+
+/// The input while it may be shown as what is, else nullptr.
+template <class T>
+const T* Current(const std::optional<T>& input, double most) {
+  return input && world::IsFresh(input->age, most) ? &*input : nullptr;
+}
 
 }  // namespace
 
@@ -16,25 +20,24 @@ Sample SampleOf(const Scene& scene, double t) {
   s.t = t;
   s.p_WB = s.p_WT = Eigen::Vector3d::Constant(kNone);
   s.distance = s.clearance = s.speed = s.plan_ms = kNone;
-  if (scene.drone) {
-    s.p_WB = scene.drone->p_WB;
-    s.speed = scene.drone->v_WB.norm();
-    s.health = scene.drone->health;
+  if (const Drone* drone = Current(scene.drone, kMostShownAge.pose)) {
+    s.p_WB = drone->p_WB;
+    s.speed = drone->v_WB.norm();
+    s.health = drone->health;
   }
-  if (scene.target) {
-    s.target_state = scene.target->state;
-    if (scene.target->Known()) s.p_WT = scene.target->p_WT;
+  if (const Target* target = Current(scene.target, kMostShownAge.target)) {
+    s.target_state = target->state;
+    if (target->Known()) s.p_WT = target->p_WT;
     s.distance = (s.p_WB - s.p_WT).norm();
   }
-  if (scene.plan) {
-    s.verdict = scene.plan->verdict;
-    if (scene.plan->clearance >= 0.0) s.clearance = scene.plan->clearance;
+  if (const Plan* plan = Current(scene.plan, kMostShownAge.plan)) {
+    s.verdict = plan->verdict;
+    if (plan->clearance >= 0.0) s.clearance = plan->clearance;
+    if (scene.plan_ms >= 0.0) s.plan_ms = scene.plan_ms;
   }
-  if (scene.flight && scene.flight->age <= world::kMostAge.flight_state)
-    s.flight = scene.flight->state;
+  if (const Flight* flight = Current(scene.flight, kMostShownAge.flight)) s.flight = flight->state;
   s.processes = scene.processes;
   for (const std::string& fault : scene.faults) s.faults += (s.faults.empty() ? "" : " + ") + fault;
-  if (scene.plan_ms >= 0.0) s.plan_ms = scene.plan_ms;
   return s;
 }
 

@@ -7,8 +7,8 @@
 
 namespace chase::viewer {
 
-/// One instant of a flight, as strips, time line and trail show it. Unknown figures are NaN,
-/// unknown codes -1.
+/// One instant of a flight, as strips, time line and trail show it. Figures that are unknown, or
+/// too old to be shown, are NaN, such codes -1.
 struct Sample {
   double t = 0.0;                              ///< s
   Eigen::Vector3d p_WB, p_WT;                  ///< m

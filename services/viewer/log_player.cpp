@@ -1,26 +1,48 @@
 #include "services/viewer/log_player.h"
 
 #include <algorithm>
+#include <filesystem>
 #include <stdexcept>
 
 #include "common/bus/channels.h"
+#include "common/bus/stamp_order.h"
 
 namespace chase::viewer {
+namespace {
+
+constexpr int64_t kLongest = 60000000;  // us between events; more is a clock that was set
+constexpr int64_t kJump = 100000;       // us that a jump lasts: a tick
+
+}  // namespace
 
 LogPlayer::LogPlayer(const std::string& file) : reader_(file) {
   std::map<std::string, size_t> numbers;
-  int64_t utime = 0;
   for (int64_t position = reader_.position(); reader_.Next(&event_);
        position = reader_.position()) {
     const auto [number, is_new] = numbers.emplace(event_.channel, channels_.size());
     if (is_new) channels_.push_back(event_.channel);
-    utime = index_.empty() ? event_.utime : std::max(utime, event_.utime);
-    index_.push_back({utime, position, number->second});
+    index_.push_back({PlayingTime(event_.utime), position, number->second});
   }
   if (index_.empty()) throw std::runtime_error(file + ": holds no event; is it an LCM log?");
   handlers_.resize(channels_.size());
   heavy_.resize(channels_.size());
   now_ = begin();
+}
+
+int64_t LogPlayer::PlayingTime(int64_t stamp) {
+  if (index_.empty()) return stamp;
+  const int64_t last = index_.back().utime, utime = stamp - left_out_;
+  if (utime >= last - bus::StampOrder::kLatest && utime <= last + kLongest)
+    return std::max(utime, last);  // those that are late count as the one before
+  ++jumps_;
+  left_out_ = stamp - (last + kJump);
+  return last + kJump;
+}
+
+std::string LogPlayer::Title() const {
+  const std::string name = std::filesystem::path(reader_.file()).filename().string();
+  if (jumps_ == 0) return name;
+  return name + ", without " + std::to_string(jumps_) + " jumps of its clock";
 }
 
 /// A vehicle's prefix may stand before the channel's name, as for the tools that read logs, where
@@ -56,12 +78,15 @@ std::vector<size_t> LogPlayer::LastOfEach(size_t from, size_t to) const {
   return last;
 }
 
-void LogPlayer::Survey(int64_t period, const std::function<void(int64_t utime)>& every) {
+void LogPlayer::Survey(int64_t period, const std::function<bool(int64_t utime)>& every) {
   if (std::none_of(handlers_.begin(), handlers_.end(), [](const auto& h) { return bool(h); }))
     throw std::runtime_error(reader_.file() + ": holds none of the channels that are shown");
   int64_t next = begin() + period;
   for (const Entry& entry : index_) {
-    for (; next <= entry.utime; next += period) every(next);
+    for (; next <= entry.utime; next += period) {
+      now_ = next;
+      if (!every(next)) return;
+    }
     if (!heavy_[entry.channel]) HandOver(entry);
   }
 }

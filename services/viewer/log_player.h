@@ -12,19 +12,22 @@
 namespace chase::viewer {
 
 /// A bus that hands over what a flight log holds, from any moment on. What is published is lost.
+/// Its time is the log's, but for jumps of the log's clock: each lasts one tick.
 class LogPlayer : public bus::Bus {
  public:
   /// Reads the whole log once to know where its events are. Throws std::runtime_error with one
   /// line.
   explicit LogPlayer(const std::string& file);
 
-  int64_t begin() const { return index_.front().utime; }  ///< microseconds, by the log's stamps
+  int64_t begin() const { return index_.front().utime; }  ///< us, the log's first stamp
   int64_t end() const { return index_.back().utime; }
   int64_t Now() const override { return now_; }
+  /// The file's name for those who look on, with the count of jumps that are not played.
+  std::string Title() const;
 
   /// Hands over all light messages (throws std::runtime_error if nobody listens to any channel of
-  /// the log) and calls `every` at multiples of `period` microseconds.
-  void Survey(int64_t period, const std::function<void(int64_t utime)>& every);
+  /// the log) and calls `every` at multiples of `period` microseconds, until it returns false.
+  void Survey(int64_t period, const std::function<bool(int64_t utime)>& every);
   /// Hands over, of each channel, the last message up to `utime`, in file order; heavy ones last,
   /// so that an image finds the target that is drawn into it.
   void Seek(int64_t utime);
@@ -37,9 +40,11 @@ class LogPlayer : public bus::Bus {
 
  private:
   struct Entry {
-    int64_t utime, position;  // utime never goes back: a stamp that does counts as the one before
+    int64_t utime, position;  // utime never goes back
     size_t channel;
   };
+  /// The time at which what has this stamp is played, after all that is in the index.
+  int64_t PlayingTime(int64_t stamp);
   void HandOver(const Entry& entry);
   /// Per channel the last of the entries [from, to); SIZE_MAX: none.
   std::vector<size_t> LastOfEach(size_t from, size_t to) const;
@@ -53,6 +58,8 @@ class LogPlayer : public bus::Bus {
   std::vector<Entry> index_;
   size_t next_ = 0;
   int64_t now_ = 0;
+  int64_t left_out_ = 0;  // us of the log's clock up to the end of the index
+  int jumps_ = 0;
 };
 
 }  // namespace chase::viewer

@@ -59,7 +59,7 @@ Plan FromMessage(const plan_t& m, int64_t origin) {
 
 Forecast FromMessage(const prediction_t& m, int64_t origin) {
   return {Code(m.verdict), bus::FromMessage(m.target, origin), RowMajor(m.covariance),
-          RowMajor(m.velocity_covariance)};
+          RowMajor(m.velocity_covariance), 0.0};
 }
 
 Flight FromMessage(const flight_state_t& m, int64_t origin) {

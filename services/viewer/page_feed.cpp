@@ -53,30 +53,39 @@ void PageFeed::Take(const pose_t& m) {
   epoch_ = m.epoch;
   if (first_epoch_ < 0) first_epoch_ = epoch_;
   scene_.drone = FromMessage(m);
-  pose_heard_ = bus_.Now();
+  heard_.pose = bus_.Now();
+}
+
+void PageFeed::Take(const target_t& m) {
+  scene_.target = FromMessage(m);
+  heard_.target = bus_.Now();
 }
 
 void PageFeed::Take(const plan_t& m) {
   Time(m.utime);
   scene_.plan = FromMessage(m, origin_);
+  heard_.plan = bus_.Now();
 }
 
 void PageFeed::Take(const prediction_t& m) {
   Time(m.utime);
   scene_.forecast.reset();
   if (m.verdict != prediction_t::NO_TARGET) scene_.forecast = FromMessage(m, origin_);
+  heard_.forecast = bus_.Now();
 }
 
 void PageFeed::Take(const obstacles_t& m) {
   Time(newest_ = m.utime);
   obstacles_ = FromMessage(m, origin_);
   obstacles_sent_ = false;
+  scene_.obstacles_age = 0.0;
+  heard_.obstacles = bus_.Now();
 }
 
 void PageFeed::Take(const flight_state_t& m) {
   Time(m.utime);
   scene_.flight = FromMessage(m, start_ < 0 ? origin_ : start_);
-  flight_heard_ = bus_.Now();
+  heard_.flight = bus_.Now();
 }
 
 template <class Sweep>
@@ -96,6 +105,8 @@ void PageFeed::Take(const lidar_scan_t& m) {
 }
 
 void PageFeed::Take(const camera_image_t& m) {
+  scene_.image_age = 0.0;
+  heard_.image = bus_.Now();
   if (!Due(Part::kImage, m.utime, config_.image_rate_hz)) return;
   auto timer = bus_.Time("image");
   const std::string jpeg = logs::Jpeg(m, config_.jpeg_quality);
@@ -120,7 +131,19 @@ void PageFeed::Take(const event_t& m) {
     scene_.faults.erase(m.name);
 }
 
+void PageFeed::Age() {
+  const auto since = [this](int64_t heard) { return bus::Seconds(bus_.Now(), heard); };
+  if (scene_.drone) scene_.drone->age = since(heard_.pose);
+  if (scene_.target) scene_.target->age = since(heard_.target);
+  if (scene_.plan) scene_.plan->age = since(heard_.plan);
+  if (scene_.forecast) scene_.forecast->age = since(heard_.forecast);
+  if (scene_.flight) scene_.flight->age = since(heard_.flight);
+  if (scene_.obstacles_age) scene_.obstacles_age = since(heard_.obstacles);
+  if (scene_.image_age) scene_.image_age = since(heard_.image);
+}
+
 void PageFeed::Remember(int64_t utime) {
+  Age();
   scene_.processes = WorstState(Processes());
   if (origin_ != 0) history_.Add(SampleOf(scene_, Elapsed(utime)));
 }
@@ -149,19 +172,19 @@ std::vector<ProcessHealth> PageFeed::Processes() {
 }
 
 void PageFeed::Tick(int64_t utime, const std::string& self) {
-  if (scene_.flight) scene_.flight->age = bus::Seconds(bus_.Now(), flight_heard_);
+  Age();
   scene_.processes = WorstState(Processes());
   if (!play_) Remember(utime);
   const bool second = ticks_++ % kTicksPerSecond == 0;
   if (!play_ && second) SendHello();
-  if (!sink_.Wanted(Part::kState) || (origin_ == 0 && !play_)) return;
+  if (!sink_.Wanted(Part::kState)) return;
   auto timer = bus_.Time("tick");
   if (epoch_ >= 0 && epoch_ != first_epoch_) scene_.truth.clear();
-  if (scene_.drone) scene_.drone->age = bus::Seconds(bus_.Now(), pose_heard_);
+  scene_.utime = bus_.Now();
   sink_.Send(Part::kState, StateText(scene_, Elapsed(utime), generation_, play_), false);
   if (!obstacles_sent_ && ticks_ % kTicksPerObstacles == 0) {
     obstacles_sent_ = true;
-    sink_.Send(Part::kObstacles, ObstaclesText(obstacles_, Time(newest_)), false);
+    sink_.Send(Part::kObstacles, ObstaclesText(obstacles_, Time(newest_), Elapsed(utime)), false);
   }
   if (second) sink_.Send(Part::kHealth, HealthText(Processes(), self), false);
 }

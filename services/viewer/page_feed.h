@@ -29,7 +29,7 @@ class PageFeed {
   PageFeed(bus::Bus& bus, PageSink& sink, const ViewerConfig& config, const std::string& source);
 
   void Take(const pose_t& m);
-  void Take(const target_t& m) { scene_.target = FromMessage(m); }
+  void Take(const target_t& m);
   void Take(const plan_t& m);
   void Take(const prediction_t& m);
   void Take(const obstacles_t& m);
@@ -67,6 +67,8 @@ class PageFeed {
   template <class Sweep>
   void SendCloud(const Sweep& m, const Eigen::Vector3d& centre);
   std::vector<ProcessHealth> Processes();
+  /// Writes into the scene how old its inputs are now.
+  void Age();
   /// Of a message: s from the first one's time.
   double Time(int64_t utime);
   /// Of a tick: s from the first one's, or from the log's beginning.
@@ -78,10 +80,12 @@ class PageFeed {
   std::string source_;
   std::optional<PlayState> play_;
 
-  int64_t origin_ = 0;                         // utime of the first message; 0: none yet
-  int64_t newest_ = 0;                         // utime of the newest pose or obstacles
-  int64_t start_ = -1;                         // of the first tick
-  int64_t pose_heard_ = 0, flight_heard_ = 0;  // when, by the bus's clock
+  int64_t origin_ = 0;  // utime of the first message; 0: none yet
+  int64_t newest_ = 0;  // utime of the newest pose or obstacles
+  int64_t start_ = -1;  // of the first tick
+  struct {
+    int64_t pose, target, plan, forecast, obstacles, flight, image;
+  } heard_{};  // when, by the bus's clock
   std::map<std::string, int64_t> status_heard_;
   int generation_ = 0;  // of what a page has drawn and must clear
   int epoch_ = -1;      // of the frame W

@@ -46,9 +46,22 @@ json Path(const world::Trajectory& path, int points) {
   return out;
 }
 
+json AgeOf(double age, double most) {
+  return {{"age", Number(age)}, {"stale", !world::IsFresh(age, most)}};
+}
+
+/// With `age` [s], and whether it is beyond `most`.
+json Aged(json part, double age, double most) {
+  part.update(AgeOf(age, most));
+  return part;
+}
+
 json DroneOf(const Drone& d) {
-  return {{"p", Numbers(d.p_WB)}, {"v", Numbers(d.v_WB)}, {"q", Rotation(d.R_WB)},
-          {"health", d.health},   {"age", Number(d.age)}, {"reason", d.reason}};
+  return {{"p", Numbers(d.p_WB)},
+          {"v", Numbers(d.v_WB)},
+          {"q", Rotation(d.R_WB)},
+          {"health", d.health},
+          {"reason", d.reason}};
 }
 
 json TargetOf(const Target& t) {
@@ -82,11 +95,8 @@ json ForecastOf(const Forecast& f) {
 }
 
 json FlightOf(const Flight& f) {
-  return {{"state", f.state},
-          {"reason", f.reason},
-          {"since", Number(f.since)},
-          {"age", Number(f.age)},
-          {"missing", f.missing}};
+  return {
+      {"state", f.state}, {"reason", f.reason}, {"since", Number(f.since)}, {"missing", f.missing}};
 }
 
 json FenceOf(const Fence& f) {
@@ -132,20 +142,26 @@ std::string StateText(const Scene& scene, double t, int generation,
                       const std::optional<PlayState>& play) {
   json out = {{"type", "state"},
               {"generation", generation},
+              {"utime", scene.utime},
               {"following", scene.following},
               {"row", RowOf(SampleOf(scene, t))}};
-  if (scene.drone) out["drone"] = DroneOf(*scene.drone);
-  if (scene.target) out["target"] = TargetOf(*scene.target);
-  if (scene.plan) out["plan"] = PlanOf(*scene.plan);
-  if (scene.forecast) out["forecast"] = ForecastOf(*scene.forecast);
-  if (scene.flight) out["flight"] = FlightOf(*scene.flight);
+  const auto add = [&out](const char* name, const auto& part, double most, auto of) {
+    if (part) out[name] = Aged(of(*part), part->age, most);
+  };
+  add("drone", scene.drone, kMostShownAge.pose, DroneOf);
+  add("target", scene.target, kMostShownAge.target, TargetOf);
+  add("plan", scene.plan, kMostShownAge.plan, PlanOf);
+  add("forecast", scene.forecast, kMostShownAge.forecast, ForecastOf);
+  add("flight", scene.flight, kMostShownAge.flight, FlightOf);
+  if (scene.obstacles_age) out["obstacles"] = AgeOf(*scene.obstacles_age, kMostShownAge.obstacles);
+  if (scene.image_age) out["image"] = AgeOf(*scene.image_age, kMostShownAge.image);
   if (scene.fence) out["fence"] = FenceOf(*scene.fence);
   if (!scene.truth.empty()) out["truth"] = TruthOf(scene.truth);
   if (play) out["play"] = PlayOf(*play);
   return Text(out);
 }
 
-std::string ObstaclesText(const std::vector<world::Obstacle>& obstacles, double t) {
+std::string ObstaclesText(const std::vector<world::Obstacle>& obstacles, double t, double told) {
   json rows = json::array();
   for (const world::Obstacle& o : obstacles) {
     const Solid solid = SolidOf(o, t);
@@ -159,7 +175,7 @@ std::string ObstaclesText(const std::vector<world::Obstacle>& obstacles, double 
                     {"q", Rotation(solid.R)}});
     if (o.moving) rows.back()["v"] = Numbers(solid.velocity);
   }
-  return Text({{"type", "obstacles"}, {"rows", rows}});
+  return Text({{"type", "obstacles"}, {"t", Number(told)}, {"rows", rows}});
 }
 
 std::string HealthText(const std::vector<ProcessHealth>& processes, const std::string& self) {

@@ -18,12 +18,12 @@ struct PlayState {
 };
 
 /// "state": the scene, t seconds from the beginning, drawn anew where `generation` differs from the
-/// last one's.
+/// last one's. Its inputs have their age and, beyond kMostShownAge, are stale.
 std::string StateText(const Scene& scene, double t, int generation,
                       const std::optional<PlayState>& play);
 
-/// "obstacles" at t.
-std::string ObstaclesText(const std::vector<world::Obstacle>& obstacles, double t);
+/// "obstacles" at t, told with the state of the time `told`, s from the beginning.
+std::string ObstaclesText(const std::vector<world::Obstacle>& obstacles, double t, double told);
 
 /// One process as its status message tells, and HEALTH.
 struct ChannelHealth {

@@ -4,7 +4,6 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
-#include <filesystem>
 #include <thread>
 #include <utility>
 
@@ -22,12 +21,15 @@ constexpr auto kTick = std::chrono::milliseconds(100);
 
 class Playback {
  public:
-  Playback(const std::string& file, const ViewerConfig& config)
+  Playback(const std::string& file, const ViewerConfig& config, const std::function<bool()>& stop)
       : player_(file),
-        node_(player_, config, std::filesystem::path(file).filename().string()),
+        node_(player_, config, player_.Title()),
         clock_(static_cast<double>(player_.end() - player_.begin()) * 1e-6) {
     node_.feed().SetStart(player_.begin());
-    player_.Survey(node_.TickPeriod(), [this](int64_t utime) { node_.feed().Remember(utime); });
+    player_.Survey(node_.TickPeriod(), [&](int64_t utime) {
+      node_.feed().Remember(utime);
+      return !stop();
+    });
     node_.OnPlayRequest([this](const Request& request) { Hear(request); });
     Jump();
     node_.feed().SendHello();
@@ -75,7 +77,7 @@ class Playback {
 
 void PlayLog(const std::string& file, const ViewerConfig& config,
              const std::function<bool()>& stop) {
-  Playback playback(file, config);
+  Playback playback(file, config, stop);
   std::printf("http://localhost:%d plays %s\n", playback.port(), file.c_str());
   std::fflush(stdout);
   auto last = Clock::now(), tick = last;

@@ -1,7 +1,6 @@
 #include "services/viewer/recording.h"
 
 #include <algorithm>
-#include <filesystem>
 
 #include "services/viewer/log_player.h"
 #include "services/viewer/page_feed.h"
@@ -42,7 +41,7 @@ Recording RecordLog(const std::string& log) {
   LogPlayer player(log);
   const double duration = std::max(1e-6 * static_cast<double>(player.end() - player.begin()), 1.0);
   RecordingSink sink;
-  PageFeed feed(player, sink, ConfigFor(duration), std::filesystem::path(log).filename().string());
+  PageFeed feed(player, sink, ConfigFor(duration), player.Title());
   const auto hear = [&feed](const char* channel, const auto& m) {
     if (IsOnPage(channel)) feed.Take(m);
   };
@@ -50,7 +49,10 @@ Recording RecordLog(const std::string& log) {
   SubscribeUnknown(player, hear);
   const auto step = static_cast<int64_t>(1e6 * std::max(kShortest, duration / kMostStates));
   feed.SetStart(player.begin());
-  player.Survey(step, [&feed](int64_t utime) { feed.Remember(utime); });
+  player.Survey(step, [&feed](int64_t utime) {
+    feed.Remember(utime);
+    return true;
+  });
   feed.Forget();
   player.Seek(player.begin() - 1);
   sink.recorded = true;

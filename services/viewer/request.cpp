@@ -63,7 +63,8 @@ std::optional<Request> ParseRequest(const std::string& text) {
                     Read(object, "speed", &json::is_number, &request.speed) &&
                     Read(object, "seek", &json::is_number, &request.seek) &&
                     Read(object, "command", &json::is_string, &request.command) &&
-                    Read(object, "token", &json::is_string, &request.token);
+                    Read(object, "token", &json::is_string, &request.token) &&
+                    Read(object, "utime", &json::is_number_integer, &request.utime);
   if (!read) return std::nullopt;
   request.acknowledged = std::clamp<int64_t>(request.acknowledged, 0, kMostAcknowledged);
   return request;

@@ -1,16 +1,30 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <cstdint>
 #include <optional>
 #include <set>
 #include <string>
 #include <vector>
 
+#include "common/world/ages.h"
 #include "common/world/obstacle.h"
 #include "common/world/trajectory.h"
 
 /// What the page draws. Times are seconds from one origin, everything else is in frame W, SI.
 namespace chase::viewer {
+
+/// How old an input may be and still be shown as what is, s: as old as those who need it let it be.
+struct MostShownAge {
+  double pose = 0.5;  ///< logs from elsewhere have ten a second, and jitter
+  double target = world::kMostAge.target;
+  double plan = 0.5;  ///< nobody has a limit: 0.4 s after its start control goes over to its stop
+  double forecast = world::kMostAge.prediction;
+  double obstacles = world::kMostAge.obstacles;
+  double flight = world::kMostAge.flight_state;
+  double image = 1.0;  ///< twenty frames of the camera
+};
+inline constexpr MostShownAge kMostShownAge;
 
 struct Drone {
   Eigen::Vector3d p_WB = Eigen::Vector3d::Zero(), v_WB = Eigen::Vector3d::Zero();
@@ -28,6 +42,7 @@ struct Target {
   Eigen::Vector4d box_px = Eigen::Vector4d::Zero();      ///< centre u v, width, height
   double existence = 0.0;                                ///< probability, 0 to 1
   std::string reason;
+  double age = 0.0;  ///< since it was heard, s
 
   /// Are mean and covariance usable?
   bool Known() const { return state == 1 || state == 2; }
@@ -40,6 +55,7 @@ struct Plan {
   std::optional<world::Trajectory> stop;  ///< certified, leaves `path` at its start
   double clearance = -1.0;                ///< certified, m; negative: not certified
   double radius = 0.0;                    ///< of the sphere that is kept free at least, m
+  double age = 0.0;                       ///< since it was heard, s
 };
 
 struct Forecast {
@@ -47,6 +63,7 @@ struct Forecast {
   world::Trajectory path;
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();           ///< at its start, m^2
   Eigen::Matrix3d velocity_covariance = Eigen::Matrix3d::Zero();  ///< m^2/s^2
+  double age = 0.0;                                               ///< since it was heard, s
 };
 
 /// Where the flight is, as the mission process says.
@@ -72,16 +89,18 @@ struct Body {
 
 /// The newest of everything.
 struct Scene {
+  int64_t utime = 0;  ///< when it is told, by the bus's clock, us
   std::optional<Drone> drone;
   std::optional<Target> target;
   std::optional<Plan> plan;
   std::optional<Forecast> forecast;
   std::optional<Flight> flight;
   std::optional<Fence> fence;
-  std::vector<Body> truth;  ///< drone, target, movers; empty: not known
-  int following = -1;       ///< tracking_t's constants; -1: not heard
-  double plan_ms = -1.0;    ///< mean time per plan of the last second; negative: not known
-  int processes = -1;       ///< worst state of a process, status_t's constants; -1: none is heard
+  std::optional<double> obstacles_age, image_age;  ///< since they were heard, s; none: never
+  std::vector<Body> truth;                         ///< drone, target, movers; empty: not known
+  int following = -1;                              ///< tracking_t's constants; -1: not heard
+  double plan_ms = -1.0;  ///< mean time per plan of the last second; negative: not known
+  int processes = -1;     ///< worst state of a process, status_t's constants; -1: none is heard
   std::set<std::string> faults;  ///< that a test flight does to itself, by name
   std::string scenario;          ///< its name; empty: none
 };

@@ -26,13 +26,15 @@ struct Desk {
             }) {
     bus.SetIdentity({"viewer", "", 7});
   }
-  void Ask(const std::string& text) {
+  void Ask(const std::string& text, double run = 0.2) {
     if (const auto request = ParseRequest(text); request && !request->command.empty())
       commander.Take(*request);
-    Run(0.2);
+    Run(run);
   }
-  void Ask(const std::string& command, const std::string& token) {
-    Ask(R"({"command": ")" + command + R"(", "token": ")" + token + "\"}");
+  void Ask(const std::string& command, const std::string& token, double run = 0.2) {
+    Ask(R"({"command": ")" + command + R"(", "token": ")" + token + R"(", "utime": )" +
+            std::to_string(bus.now) + "}",
+        run);
   }
   void Run(double seconds) {
     for (const int64_t end = bus.now + std::llround(seconds * 1e6); bus.now < end;) {
@@ -72,7 +74,8 @@ TEST(ViewerCommands, WithoutTheTokenNothingIsSent) {
   on.Ask("Land", kToken);
   playing.Ask("land", kToken);
   std::mt19937 random(3);
-  const std::string good = R"({"command": "land", "token": "a token of the tesT"})";
+  const std::string good =
+      R"({"command": "land", "token": "a token of the tesT", "utime": 100000000})";
   for (int i = 0; i < 2000; ++i) {
     std::string text = good;
     for (int k = 0; k < 3; ++k) text[random() % text.size()] = static_cast<char>(random() % 256);
@@ -84,6 +87,35 @@ TEST(ViewerCommands, WithoutTheTokenNothingIsSent) {
   }
   EXPECT_EQ(off.replies.size(), 2U);
   EXPECT_EQ(playing.replies, std::vector<std::string>{"land|a log is played: nobody flies|"});
+}
+
+TEST(ViewerCommands, WhatWasGivenLongAgoIsRefused) {
+  Desk desk;
+  Request request = *ParseRequest(R"({"command": "takeoff", "token": "a token of the test"})");
+  desk.commander.Take(request);
+  for (const double age : {30.0, 2.1, -5.0}) {
+    request.utime = desk.bus.now - std::llround(age * 1e6);
+    desk.commander.Take(request);
+  }
+  desk.Run(0.2);
+  EXPECT_TRUE(desk.bus.sent.empty());
+  EXPECT_EQ(desk.replies,
+            (std::vector<std::string>{"takeoff|does not say when it was given|",
+                                      "takeoff|given 30.0 s ago|", "takeoff|given 2.1 s ago|",
+                                      "takeoff|given -5.0 s ago|"}));
+  request.utime = desk.bus.now - 2 * kSecond;
+  desk.commander.Take(request);
+  desk.Run(0.2);
+  EXPECT_FALSE(desk.bus.sent.empty());
+}
+
+TEST(ViewerCommands, ServicesOfFoxgloveCarryNoTime) {
+  Desk desk;
+  Request request = *ParseRequest(R"({"command": "takeoff", "token": "a token of the test"})");
+  request.caller = 1;
+  desk.commander.Take(request);
+  desk.Run(0.2);
+  EXPECT_FALSE(desk.bus.sent.empty());
 }
 
 TEST(ViewerCommands, IsSentUntilItIsAnsweredAndAnsweredOnce) {
@@ -128,8 +160,7 @@ TEST(ViewerCommands, EachGetsItsOwnAnswer) {
   desk.Run(6.0);
   ASSERT_EQ(desk.replies.size(), 2U);
   EXPECT_EQ(desk.replies[1], "takeoff|no answer; does chase-mission run?|");
-  for (int i = 0; i < 20; ++i)
-    desk.commander.Take(*ParseRequest(R"({"command": "stop", "token": "a token of the test"})"));
+  for (int i = 0; i < 20; ++i) desk.Ask("stop", kToken, 0.0);
   EXPECT_EQ(desk.commander.refused(), 2 + 12) << "of twenty at once eight are under way";
 }
 

@@ -112,7 +112,7 @@ TEST(ViewerScene, TheFanWidens) {
 
 Scene FullScene(double v) {
   Scene scene;
-  scene.drone = Drone{Vector3d::Constant(v), Vector3d::Constant(v), {v, v, v, v}, 0, "", v};
+  scene.drone = Drone{Vector3d::Constant(v), Vector3d::Constant(v), {v, v, v, v}, 0, "", 0.0};
   scene.target = Target();
   scene.target->state = 1;
   scene.target->p_WT.setConstant(v);
@@ -170,7 +170,7 @@ TEST(ViewerText, NothingHeardYet) {
   EXPECT_FALSE(state.contains("play"));
   EXPECT_TRUE(state["row"][1].is_null());
   EXPECT_EQ(state["row"][5], -1);
-  EXPECT_EQ(json::parse(ObstaclesText({}, 0.0))["rows"].size(), 0U);
+  EXPECT_EQ(json::parse(ObstaclesText({}, 0.0, 0.0))["rows"].size(), 0U);
   EXPECT_EQ(json::parse(HealthText({}, ""))["rows"].size(), 0U);
 }
 

@@ -262,11 +262,39 @@ TEST_F(ViewerPlayer, SurveysLightChannelsAtEvenTimes) {
   LogPlayer player(file_);
   Listen(&player);
   std::vector<int64_t> times;
-  player.Survey(kSecond, [&](int64_t t) { times.push_back(t); });
+  player.Survey(kSecond, [&](int64_t t) {
+    times.push_back(t);
+    return true;
+  });
   EXPECT_EQ(times, (std::vector<int64_t>{2 * kSecond, 3 * kSecond, 4 * kSecond, 5 * kSecond,
                                          6 * kSecond}));
   EXPECT_EQ(poses_.size(), 51U);
   EXPECT_EQ(scans_, 0);
+}
+
+/// A stamp a thousand years ahead, and half an hour that the recorder slept.
+TEST_F(ViewerPlayer, JumpsOfTheClockAreNotPlayed) {
+  bus::LogWriter log(file_);
+  for (int i = 0; i <= 50; ++i) {
+    const int64_t utime = kSecond + i * kSecond / 10 + (i > 30 ? 1800 * kSecond : 0);
+    log.Write(utime + (i == 20 ? 31557600000 * kSecond : 0), "POSE", BytesOf(PoseAt(utime, i)));
+  }
+  log.Close();
+  LogPlayer player(file_);
+  Listen(&player);
+  size_t ticks = 0;
+  const auto count = [&](int64_t) {
+    if (++ticks > 1000) throw std::runtime_error("hangs");
+    return true;
+  };
+  EXPECT_NO_THROW(player.Survey(kSecond / 10, count));
+  EXPECT_EQ(ticks, 50U);
+  EXPECT_EQ(poses_.size(), 51U);
+  EXPECT_EQ(player.end(), player.begin() + 5 * kSecond);
+  EXPECT_EQ(player.Title(), file_.filename().string() + ", without 3 jumps of its clock");
+  ticks = 0;
+  player.Survey(kSecond / 10, [&](int64_t) { return ++ticks < 7; });
+  EXPECT_EQ(ticks, 7U) << "stops when it is told to";
 }
 
 TEST_F(ViewerPlayer, ALogIsRecordedForAReport) {

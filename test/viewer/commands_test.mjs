@@ -3,7 +3,7 @@
 import assert from 'node:assert';
 import crypto from 'node:crypto';
 import fs from 'node:fs';
-import {live, load, pageClient, until} from './viewer.mjs';
+import {live, load, pageClient, sleep, until} from './viewer.mjs';
 
 const TOKEN = crypto.randomBytes(16).toString('hex');
 const viewer = await live(TOKEN);
@@ -25,7 +25,7 @@ assert.strictEqual(client.newest.state.row[14], 0);
 
 async function ask(request) {
   const heard = replies.length;
-  client.ask(request);
+  client.ask({utime: client.newest.state.utime, ...request});
   await until('a reply', () => replies.length > heard, 8000);
   return replies.at(-1);
 }
@@ -41,6 +41,17 @@ const heard = replies.length;
 await statuses();
 assert.strictEqual(replies.length, heard, 'answered more than once');
 assert.ok(commands > 0);
+
+// What waited in a link that stalled is refused when it arrives, and so is what does not say when it was given.
+const given = commands;
+viewer.process.kill('SIGSTOP');
+const stalled = ask({command: 'takeoff', token: TOKEN});
+await sleep(3000);
+viewer.process.kill('SIGCONT');
+assert.match((await stalled).refusal, /^given [3-9]\.\d s ago$/);
+assert.strictEqual((await ask({command: 'takeoff', token: TOKEN, utime: undefined})).refusal, 'does not say when it was given');
+await statuses();
+assert.strictEqual(commands, given, 'an old command was sent');
 
 // By Foxglove's service: offered because there is a token, and bound to it.
 const {FoxgloveClient} = load('@foxglove/ws-protocol'), {WebSocket} = load('ws');

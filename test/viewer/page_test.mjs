@@ -153,6 +153,36 @@ const drawn = await page.evaluate(() => {
 });
 assert.deepStrictEqual(drawn, {solids: 2, arrows: 1, grown: 0, drone: false, plan: false});
 
+// A mover goes on by its velocity between two lists, a second at most; and one without a velocity stays.
+const moved = await page.evaluate(() => {
+  const {scene} = window.chase, mover = {kind: 1, solid: 0, half: [1, 1, 1], q: [1, 0, 0, 0], p: [1, 0, 1]};
+  const told = (t) => { scene.setState({generation: 0, row: [t]}); scene.motion.move(1e9); return [...scene.movers.values()].map((m) => Number(m.position.x.toFixed(3))); };
+  scene.setObstacles([{...mover, id: 1, v: [1, 0, 0]}, {...mover, id: 2}], 5);
+  const seen = [told(5), told(5.4), told(5.4), told(9)];
+  scene.setObstacles([{...mover, id: 2}], 9);
+  return [...seen, told(9)];
+});
+assert.deepStrictEqual(moved, [[1, 1], [1.4, 1], [1.4, 1], [2, 1], [1]]);
+
+// What is too old is not shown as what is.
+const past = await page.evaluate(async () => {
+  const {scene} = window.chase, path = [0, 0, 1, 1, 0, 1, 2, 0, 1], age = {age: 5.1, stale: true}, shown = (id) => document.getElementById(id);
+  const state = {...window.chase.model.state, generation: 'old', following: 1, row: [0],
+    drone: {p: [0, 0, 1], q: [1, 0, 0, 0], health: 0}, plan: {verdict: 0, radius: 0.4, path, stop: path, ...age},
+    forecast: {path, spread: [0.5, 0.5], ...age}, obstacles: age, image: age,
+    target: {state: 1, p: [0, 0, 0], axes: [0.1, 0.2, 0.3], q: [1, 0, 0, 0], radius: 0.2, height: 1, ...age}};
+  window.chase.link.handlers.state(state);
+  const seen = {words: ['verdict', 'targetstate', 'imagetext'].map((id) => shown(id).textContent), figures: shown('figures').textContent,
+    bad: ['verdict', 'targetstate'].map((id) => shown(id).className), image: shown('image').style.opacity,
+    hidden: ['plan', 'stop', 'forecast', 'fan', 'covariance', 'sight'].map((part) => scene[part].visible),
+    colors: ['target', 'solid'].map((part) => scene[part].material.color.getHexString())};
+  window.chase.link.handlers.state({...state, generation: 'new', obstacles: null, image: null, target: {...state.target, stale: false}});
+  return {...seen, again: ['target', 'solid'].map((part) => scene[part].material.color.getHexString())};
+});
+assert.deepStrictEqual(past, {words: ['plan 5.1 s old', 'target 5.1 s old', 'image 5.1 s old'],
+  figures: 'height 1.00 m\nfollows plan\nobstacles 5.1 s old', bad: ['pill bad', 'pill bad'], image: '0.4',
+  hidden: [false, false, false, false, false, false], colors: ['4a525c', '4a525c'], again: ['e8702a', 'ffffff']});
+
 // Obstacles are grown by what plans keep free, the target has its 3 sigma, the forecast its 2, and the stop its verdict's colour.
 const told = await page.evaluate(async () => {
   const {scene} = window.chase, {VERDICT_COLORS} = await import('./names.js');
@@ -203,6 +233,25 @@ const lines = await page.evaluate(async () => {
   return {ends: array.length / 3, low: Math.min(...array), high: Math.max(...array), shown, after: scene.fence.visible, seen};
 });
 assert.deepStrictEqual(lines, {ends: 18, low: -1, high: 5, shown: true, after: false, seen: [[35, 43, 54], [217, 83, 79]]});
+
+// A viewer that says nothing is told from one that is well within two seconds; then the connection is made anew until it answers.
+const linked = () => page.evaluate(() => {
+  const link = document.getElementById('link'), {opacity} = getComputedStyle(document.getElementById('view'));
+  return {text: link.textContent, bad: link.classList.contains('bad'), dim: opacity < 1};
+});
+await page.evaluate(() => { const arm = document.getElementById('arm'); arm.disabled = false; arm.checked = true; });
+viewer.process.kill('SIGSTOP');
+try {
+  await until('silence is told', async () => (await linked()).text !== 'linked', 2500);
+  const silent = await linked();
+  assert.match(silent.text, /^silent [1-3] s$/);
+  assert.ok(silent.bad && silent.dim && !await page.isChecked('#arm'), JSON.stringify(silent));
+  await until('the connection is given up', async () => /^no link [4-9] s$/.test((await linked()).text), 8000);
+} finally {
+  viewer.process.kill('SIGCONT');
+}
+await until('a link again', async () => (await linked()).text === 'linked', 10000);
+assert.ok(!(await linked()).dim);
 
 // Commands stay off without a token, and a phone needs no scrolling sideways.
 assert.ok(await page.isDisabled('#arm'));

@@ -1,20 +1,50 @@
 // The connection to the viewer: texts and binary parts in, requests out. It comes back by itself, and acknowledges
 // every frame, so that what is under way on a slow link stays small.
+const SILENT = 1;    // s without a message: ten states are missing
+const DEAD = 5;      // s without one: the connection is made anew
+const LOOK = 250;    // ms from one look at the silence to the next
+const RETRY = 1000;  // ms
+
+const seconds = () => performance.now() / 1000;
+
 export class Link {
   constructor(handlers) {
     this.handlers = handlers;
     this.wants = ['cloud', 'image'];
     this.bytes = 0;
+    this.heard = seconds();
     this.connect();
+    setInterval(() => this.look(), LOOK);
   }
 
   connect() {
     const scheme = location.protocol === 'https:' ? 'wss' : 'ws';
     const socket = new WebSocket(`${scheme}://${location.host}/ws`);
     socket.binaryType = 'arraybuffer';
-    socket.onopen = () => { this.socket = socket; this.ask({want: this.wants}); this.handlers.link(true); };
-    socket.onclose = () => { this.socket = null; this.handlers.link(false); setTimeout(() => this.connect(), 1000); };
+    [this.socket, this.begun] = [socket, seconds()];
+    socket.onopen = () => this.ask({want: this.wants});
+    socket.onclose = () => this.leave();
     socket.onmessage = (event) => this.hear(event.data);
+  }
+
+  // Whoever is dead does not answer a close either: what may still come of this connection is not waited for.
+  leave() {
+    Object.assign(this.socket, {onopen: null, onclose: null, onmessage: null});
+    this.socket.close();
+    this.socket = null;
+    this.tell();
+    setTimeout(() => this.connect(), RETRY);
+  }
+
+  look() {
+    if (this.socket && seconds() - Math.max(this.heard, this.begun) > DEAD) this.leave();
+    else this.tell();
+  }
+
+  // Is it up, and for how long has nothing come? 0 s as long as nothing is amiss.
+  tell() {
+    const silence = seconds() - this.heard;
+    this.handlers.link(this.socket?.readyState === WebSocket.OPEN, silence > SILENT ? silence : 0);
   }
 
   ask(request) {
@@ -27,6 +57,7 @@ export class Link {
   }
 
   hear(data) {
+    this.heard = seconds();
     this.ask({ack: 1});
     this.bytes += data.length ?? data.byteLength;
     if (typeof data !== 'string') return hearBinary(data, this.handlers);

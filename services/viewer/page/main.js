@@ -2,14 +2,12 @@ import {Link} from './link.js';
 import {Recording} from './recording.js';
 import {Scene3D} from './scene3d.js';
 import {drawTimeline, drawStrips, timeAt} from './strips.js';
-import {drawImage, showHealth, makeCommands, allowCommands} from './panels.js';
+import {drawImage, showHealth, makeCommands, allowCommands, disarm} from './panels.js';
 import {T, DRONE, VERDICTS, VERDICT_COLORS, SCENE_COLORS, SCENE_WORDS, TARGET_STATES, HEALTHS, FOLLOWING, FLIGHT_STATES,
   FLIGHT_COLORS, format, setText} from './names.js';
 
 const WINDOW = 60;   // s of a live flight that the strips show
-const STALE = 0.5;   // s without a pose
 const LINES = 4;     // times a second
-const SILENT = 2;    // s without a flight state (common/world/ages.h)
 const page = Object.fromEntries([...document.querySelectorAll('[id]')].map((e) => [e.id, e]));
 const scene = new Scene3D(page.scene);
 const now = () => model.play ? model.play.t : model.rows.at(-1)?.[T] ?? 0;
@@ -33,24 +31,31 @@ function span() {
 
 // Where the flight is, why, and what it still waits for.
 function showFlight(flight) {
-  const silent = flight?.age > SILENT, on_ground = flight?.state === 0;
+  const silent = flight?.stale, on_ground = flight?.state === 0;
   const missing = on_ground && flight.missing.length ? `: ${flight.missing.join(', ')}` : '';
   const text = !flight ? '' : silent ? `flight state ${flight.age.toFixed(0)} s old`
     : `${FLIGHT_STATES[flight.state] ?? '?'}: ${flight.reason}${missing}`;
   pill(page.flight, text, silent ? 'bad' : '', silent ? '' : FLIGHT_COLORS[flight?.state]);
 }
 
-function showPills({drone, target, plan, following, flight, truth}) {
+// What is too old to be shown as what is (`stale`: services/viewer/scene.h), in words.
+const old = (name, part) => part?.stale ? `${name} ${part.age.toFixed(part.age < 10 ? 1 : 0)} s old` : '';
+
+function showPills({drone, target, plan, obstacles, image, following, flight, truth}) {
   showFlight(flight);
   page.truth.hidden = !truth;
   const verdict = plan?.verdict;
-  pill(page.verdict, plan ? `${VERDICTS[verdict] ?? '?'}${plan.reason ? ': ' + plan.reason : ''}` : 'no plan', '', VERDICT_COLORS[verdict]);
-  pill(page.targetstate, target ? `target ${TARGET_STATES[target.state]}` : 'no target', target?.state === 1 ? 'good' : 'warn');
-  const stale = drone && drone.age > STALE;
-  pill(page.pose, !drone ? 'no pose' : stale ? `pose ${drone.age.toFixed(1)} s old` : HEALTHS[drone.health],
-    !drone || stale || drone.health === 2 ? 'bad' : drone.health === 0 ? 'good' : 'warn');
-  page.scene.style.opacity = stale ? 0.5 : 1;
-  setText(page.figures, drone ? `height ${format(drone.p[2], 2, 'm')}\nfollows ${FOLLOWING[following] ?? '–'}` : '');
+  pill(page.verdict, old('plan', plan) || (plan ? `${VERDICTS[verdict] ?? '?'}${plan.reason ? ': ' + plan.reason : ''}` : 'no plan'),
+    plan?.stale ? 'bad' : '', plan?.stale ? '' : VERDICT_COLORS[verdict]);
+  pill(page.targetstate, old('target', target) || (target ? `target ${TARGET_STATES[target.state]}` : 'no target'),
+    target?.stale ? 'bad' : target?.state === 1 ? 'good' : 'warn');
+  pill(page.pose, old('pose', drone) || (drone ? HEALTHS[drone.health] : 'no pose'),
+    !drone || drone.stale || drone.health === 2 ? 'bad' : drone.health === 0 ? 'good' : 'warn');
+  page.scene.style.opacity = drone?.stale ? 0.5 : 1;
+  page.image.style.opacity = image?.stale ? 0.4 : 1;
+  if (image?.stale) setText(page.imagetext, old('image', image));
+  setText(page.figures, [drone && `height ${format(drone.p[2], 2, 'm')}`, drone && `follows ${FOLLOWING[following] ?? '–'}`,
+    old('obstacles', obstacles)].filter((text) => text).join('\n'));
 }
 
 function showPlayer(play) {
@@ -72,7 +77,12 @@ function drawLines() {
 }
 
 const handlers = {
-  link(up) { pill(page.link, up ? 'linked' : 'no link', up ? 'good' : 'bad'); },
+  link(up, silence = 0) {
+    const well = up && !silence, words = up ? 'silent' : 'no link';
+    pill(page.link, well ? 'linked' : silence ? `${words} ${silence.toFixed(0)} s` : words, well ? 'good' : 'bad');
+    document.body.classList.toggle('silent', !well);
+    if (!well) disarm(page);
+  },
   hello(message) {
     page.source.textContent = message.source || 'live';
     model.rows = message.rows;
@@ -104,7 +114,7 @@ const handlers = {
     setText(page.clock, `${now().toFixed(1)} s${model.play ? ` / ${model.duration.toFixed(1)} s` : ''}`);
     model.lines = true;
   },
-  obstacles(message) { window.chase.counts.obstacles++; scene.setObstacles(message.rows); },
+  obstacles(message) { window.chase.counts.obstacles++; scene.setObstacles(message.rows, message.t); },
   health(message) {
     window.chase.counts.health++;
     showHealth(page.health, message.rows);
@@ -140,7 +150,8 @@ page.scrubber.onchange = () => { model.seeking = false; };
 for (const canvas of [page.timeline, page.strips])
   canvas.onclick = (event) => { if (model.play) link.ask({seek: timeAt(canvas, event, ...span())}); };
 
-makeCommands(page, (request) => link.ask(request));
+// A command that waits in a link that stalls tells by the newest state how old it has become.
+makeCommands(page, (request) => link.ask({...request, utime: model.state?.utime}));
 const legend = (name, entries) => {
   const line = document.createElement('div'), made = entries.map(([text, color]) => {
     const entry = document.createElement('span'), box = document.createElement('i');

@@ -61,7 +61,7 @@ function updateProcess(details, row) {
   return details;
 }
 
-// Buttons work only while armed, and only with the token that the viewer was started with. The vehicle's
+// Buttons work only while armed and linked, and only with the token that the viewer was started with. The vehicle's
 // answer comes through "reply".
 export function makeCommands(page, ask) {
   const buttons = COMMANDS.map((name) => {
@@ -75,8 +75,16 @@ export function makeCommands(page, ask) {
     return button;
   });
   page.buttons.replaceChildren(...buttons);
-  const update = () => { for (const b of buttons) b.disabled = !page.arm.checked || !page.token.value; };
+  const update = () => {
+    const silent = document.body.classList.contains('silent');
+    for (const b of buttons) b.disabled = silent || !page.arm.checked || !page.token.value;
+  };
   page.arm.onchange = page.token.oninput = update;
+}
+
+export function disarm(page) {
+  page.arm.checked = false;
+  page.arm.onchange();
 }
 
 export function allowCommands(page, allowed) {

@@ -13,6 +13,8 @@ const KINDS = ['still', 'moving', 'ground'].map((kind) => SCENE_COLORS[kind]);
 const SIGMAS = 3;        // of the target's ellipsoid; it is small beside the target
 const FOLLOW = 0.3;      // s: time constant of the camera
 const SLACK = 0.008;     // s by which a picture may come early: half a period of a screen of 60 Hz
+const AHEAD = 1;        // s that movers go on by their velocity without being heard
+const STALE = '#4a525c';  // of what is too old to be shown as what is
 const LARGE = 1.5;       // m: half an edge from which on a box would hide what is behind it
 
 const seconds = () => performance.now() / 1000;
@@ -57,6 +59,11 @@ const setLine = (object, points) => {
   object.visible = !!points && points.length >= 6 && points.every((v) => v !== null);
   if (!object.visible) return;
   object.geometry.setAttribute('position', new THREE.BufferAttribute(new Float32Array(points), 3));
+};
+
+const grey = (object, stale) => {
+  object.own ??= object.material.color.getHex();
+  object.material.color.set(stale ? STALE : object.own);
 };
 
 // The unit sphere's three circles, as ends of lines.
@@ -139,6 +146,7 @@ export class Scene3D {
     this.edges = new THREE.LineSegments(new THREE.BufferGeometry(), new THREE.LineBasicMaterial({color: '#6d7886'}));
     this.grown = new THREE.LineSegments(new THREE.BufferGeometry(), new THREE.LineBasicMaterial({color: SCENE_COLORS.grown, transparent: true, opacity: 0.45}));
     this.obstacles = [this.solid, this.ground, this.walls, this.edges, this.grown];
+    this.movers = new Map();  // by id: their solid, arrow and grown shape in a mesh each, for they move
     for (const thing of this.obstacles) thing.frustumCulled = false;
     this.cloud = new THREE.Points(new THREE.BufferGeometry(), new THREE.PointsMaterial({size: 2, sizeAttenuation: false, vertexColors: true}));
     this.cloud.geometry.setAttribute('position', new THREE.BufferAttribute(new Float32Array(3 * MOST_POINTS), 3));
@@ -189,11 +197,11 @@ export class Scene3D {
   }
 
   setState(state) {
-    const {drone, target, plan, forecast} = state;
+    const {drone, target} = state, [plan, forecast] = [state.plan, state.forecast].map((part) => part?.stale ? null : part);
     const truth = this.showTruth && state.truth || [];
     while (this.truth.length < truth.length) this.addCross();
     const crosses = this.truth.map((cross, i) => [cross, truth[i]]);
-    const moving = [[this.drone, drone], [this.target, target], ...crosses].filter(([object, at]) => place(object, at?.p));
+    const moving = [[this.drone, drone], [this.target, target], ...crosses, ...this.moversAt(state.row[T] ?? this.told)].filter(([object, at]) => place(object, at?.p));
     for (const [object, at] of [[this.drone, drone], ...crosses]) turn(object, at?.q);
     this.motion.aim(seconds(), state.generation, moving.map(([object]) => object));
     if (this.target.visible) {
@@ -201,16 +209,18 @@ export class Scene3D {
       this.covariance.scale.set(...target.axes.map((v) => Math.max(SIGMAS * (v ?? 0), 0.005)));
       turn(this.covariance, target.q);
     }
-    this.covariance.visible = this.target.visible;
+    this.covariance.visible = this.target.visible && !target.stale;
+    grey(this.target, target?.stale);
+    for (const object of this.obstacles) grey(object, state.obstacles?.stale);
     const color = VERDICT_COLORS[plan?.verdict] ?? '#ffffff';
     for (const part of [this.plan, this.stop]) part.material.color.set(color);
     setTube(this.plan, plan?.path);
     setTube(this.stop, plan?.stop);
     setTube(this.forecast, forecast?.path);
     this.setFan(forecast);
-    this.grow(plan?.radius ?? 0);
+    this.grow(state.plan?.radius ?? 0);
     this.setFence(state.fence);
-    setLine(this.sight, this.drone.visible && this.target.visible ? [...drone.p, ...target.p] : null);
+    setLine(this.sight, this.drone.visible && this.covariance.visible ? [...drone.p, ...target.p] : null);
     this.dirty = true;
   }
 
@@ -271,19 +281,53 @@ export class Scene3D {
       part(this.outlines[row.solid] ?? this.outlines[0], null, poseOf({...row, half: row.half.map((v) => v + this.radius)})));
   }
 
-  setObstacles(rows) {
+  // Movers and where they are at t: on their way by their velocity since they were told.
+  moversAt(t) {
+    const ahead = Math.min(Math.max(t - this.told, 0), AHEAD);
+    return [...this.movers.values()].map((mover) => [mover, {p: mover.row.p.map((x, i) => x + ahead * (mover.row.v?.[i] ?? 0))}]);
+  }
+
+  setMovers(rows) {
+    for (const [id, mover] of this.movers) {
+      if (rows.some((row) => row.id === id)) continue;
+      this.scene.remove(mover);
+      mover.geometry.dispose();
+      mover.children[0].geometry.dispose();
+      this.movers.delete(id);
+    }
+    for (const row of rows) {
+      const known = this.movers.get(row.id), mover = known ?? new THREE.Mesh(new THREE.BufferGeometry(), this.solid.material);
+      if (!known) {
+        mover.add(new THREE.LineSegments(new THREE.BufferGeometry(), this.grown.material));
+        for (const object of [mover, mover.children[0]]) object.frustumCulled = false;
+        this.movers.set(row.id, mover);
+        this.scene.add(mover);
+      }
+      const own = {...row, p: [0, 0, 0]};
+      mover.row = row;
+      setMerged(mover, [part(this.solids[row.solid] ?? this.solids[0], KINDS[1], poseOf(own)), ...this.arrow(own)]);
+      setMerged(mover.children[0], this.grownOf([own]));
+      if (!known) place(mover, row.p);
+    }
+  }
+
+  // `t`: of the state that they were told with, s.
+  setObstacles(rows, t = this.told ?? 0) {
     this.rows = rows;
+    this.told = t;
     const known = rows.filter((row) => [...row.p, ...row.half].every((v) => v !== null));
-    const arrows = known.flatMap((row) => this.arrow(row)), solid = [...arrows], ground = [], walls = [], edges = [];
-    for (const row of known) {
+    const solid = [], ground = [], walls = [], edges = [];
+    const movers = known.filter((row) => row.kind === 1), rest = known.filter((row) => row.kind !== 1);
+    for (const row of rest) {
       const wall = row.kind === 0 && row.solid === 1 && Math.max(...row.half) > LARGE;
       const made = part(this.solids[row.solid] ?? this.solids[0], KINDS[row.kind] ?? KINDS[0], poseOf(row));
       (wall ? walls : row.kind === 2 ? ground : solid).push(made);
       if (wall) edges.push(part(this.boxEdges, null, made.matrix));
     }
-    const grown = this.grownOf(known);
+    const grown = this.grownOf(rest);
+    this.setMovers(movers);
     [solid, this.showGround ? ground : [], walls, edges, grown].forEach((parts, i) => setMerged(this.obstacles[i], parts));
-    this.shown = {solids: known.length, arrows: arrows.length / 2, grown: grown.length};
+    this.shown = {solids: known.length, arrows: movers.filter((row) => this.arrow(row).length > 0).length, grown: grown.length};
     this.dirty = true;
   }
 
