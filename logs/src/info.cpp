@@ -10,6 +10,7 @@
 #include "common/bus/bus.h"
 #include "common/bus/channels.h"
 #include "common/bus/message_head.h"
+#include "common/bus/status.h"
 #include "common/logs/message_types.h"
 #include "logs/src/log_survey.h"
 #include "logs/src/message_fields.h"
@@ -54,16 +55,6 @@ std::string ByValue(const std::map<std::string, std::string>& values) {
   for (const auto& [value, names] : processes)
     text += fmt::format("{}{} ({})", text.empty() ? "" : "; ", value, names);
   return text;
-}
-
-/// Takes off `text` what follows `key`, its last; empty where it is not there
-/// (common/bus/status.h).
-std::string CutBehind(const std::string& key, std::string* text) {
-  const size_t at = text->rfind(key);
-  if (at == std::string::npos) return "";
-  const std::string value = text->substr(at + key.size());
-  text->resize(at);
-  return value;
 }
 
 std::string Head(const LogInfo& info) {
@@ -172,11 +163,10 @@ void LogSurvey::AddContent(const LogEvent& e, const std::string& type) {
   status_t status;
   scenario_t scenario;
   if (type == "status_t" && DecodeBytes(e.bytes, &status)) {
-    const std::string configuration = CutBehind(", configuration ", &status.version);
-    const std::string host = CutBehind(", host ", &status.version);
-    if (!configuration.empty()) info_.configurations[status.name] = configuration;
-    if (!host.empty()) info_.hosts[status.name] = host;
-    info_.versions[status.name] = status.version;
+    const bus::Software software = bus::SoftwareOf(status.version);
+    if (!software.configuration.empty()) info_.configurations[status.name] = software.configuration;
+    if (!software.host.empty()) info_.hosts[status.name] = software.host;
+    info_.versions[status.name] = software.version;
     starts_[status.vehicle + status.name].insert(status.sender_start);
   }
   if (type == "scenario_t" && info_.scenario.empty() && DecodeBytes(e.bytes, &scenario))
