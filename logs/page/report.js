@@ -45,8 +45,8 @@ function showHeader() {
     byId('subtitle').append(make('div', `${two ? `${'AB'[i]}: ${flight.log}, ` : ''}${metrics.flown_s.toFixed(1)} s${of} flown${factor}; ${commits.join(', ')}`));
     for (const loss of metrics.losses) byId('losses').append(make('p', `${two ? `${'AB'[i]}: ` : ''}${loss}`, 'failed'));
   });
-  byId('map_text').textContent = flights[0].truth ? 'Paths over the mission. Thin lines: predictions and plans of every half second (switch them in the legend).'
-    : 'Paths as estimated.';
+  byId('map_text').textContent = `${flights[0].truth ? 'Paths over the mission.' : 'Paths as estimated.'} `
+    + 'Thin lines: predictions and plans of every half second (switch them in the legend).';
 }
 
 function showFigures() {

@@ -13,6 +13,7 @@
 #include "chase/obstacles_t.hpp"
 #include "chase/plan_t.hpp"
 #include "chase/pose_t.hpp"
+#include "chase/prediction_t.hpp"
 #include "chase/status_t.hpp"
 #include "chase/target_t.hpp"
 #include "chase/tracking_t.hpp"
@@ -22,6 +23,8 @@
 #include "logs/src/landing_figures.h"
 #include "logs/src/lane.h"
 #include "logs/src/log_survey.h"
+#include "logs/src/outlines.h"
+#include "logs/src/read_flight.h"
 #include "logs/src/round_numbers.h"
 
 namespace chase::logs {
@@ -78,9 +81,12 @@ class Gatherer {
     Take<plan_t>(e, "PLAN", [this](const plan_t& m) { OnPlan(m); });
     Take<tracking_t>(e, "TRACKING", [this](const tracking_t& m) { OnTracking(m); });
     Take<attitude_setpoint_t>(e, "ATTITUDE_SETPOINT", [](const auto&) {});
-    Take<obstacles_t>(e, "OBSTACLES", [](const auto&) {});
+    Take<obstacles_t>(e, "OBSTACLES", [this](const obstacles_t& m) { obstacles_ = m; });
     Take<flight_state_t>(e, "FLIGHT_STATE", [this](const flight_state_t& m) { OnState(m); });
     Take<geofence_t>(e, "GEOFENCE", [this](const geofence_t& m) { fence_ = m.corners; });
+    if (prediction_t m;
+        origin_ && Good(e, "PREDICTION", &m) && m.verdict != prediction_t::NO_TARGET)
+      predictions_.Add(Time(m.utime), bus::FromMessage(m.target, *origin_));
     status_t status;
     if (Good(e, "_STATUS", &status)) statuses_[status.name] = status;
   }
@@ -164,6 +170,7 @@ class Gatherer {
     ++plans_;
     fallbacks_ += m.verdict > plan_t::WIDER;
     verdict_.Add(Time(m.utime), VerdictName(m.verdict), m.reason);
+    paths_.Add(Time(m.utime), bus::FromMessage(m.position, *origin_));
     if (m.certified_clearance < 0.0) return;
     ++certified_;
     least_clearance_ = std::min(least_clearance_.value_or(1e9), m.certified_clearance);
@@ -220,19 +227,13 @@ class Gatherer {
     }
   }
 
-  static Json Points(const std::vector<std::pair<double, double>>& points) {
-    Json x = Json::array(), y = Json::array();
-    for (const auto& [a, b] : points) {
-      x.push_back(Rounded(a));
-      y.push_back(Rounded(b));
-    }
-    return {{"x", x}, {"y", y}};
-  }
-
   void AddSeries(Json* series) const {
     Json& j = *series;
-    j["chaser"] = Points(chaser_);
-    j["target"] = Points(seen_);
+    j["chaser"] = Points(chaser_, false);
+    j["target"] = Points(seen_, false);
+    j["perceived"] = Points(Shadows(PerceivedIn(obstacles_)), true);
+    j["predictions"] = Points(predictions_.outlines(), false);
+    j["plans"] = Points(paths_.outlines(), false);
     for (const auto& [name, values] : {std::pair("distance", &distances_),
                                        {"certified", &clearances_},
                                        {"speed", &speeds_},
@@ -261,7 +262,9 @@ class Gatherer {
   long frame_changes_ = 0;
   Eigen::Vector3d last_p_ = Eigen::Vector3d::Zero();
   double path_ = 0.0, speed_ = 0.0, sigma_ = 0.0;
-  std::vector<std::pair<double, double>> chaser_, seen_;
+  Outline chaser_, seen_;
+  Fan predictions_, paths_;  // of the target; of the plans
+  obstacles_t obstacles_{};  // the last
   std::optional<double> least_clearance_;
   Series distances_, clearances_, speeds_, sigmas_, target_sigmas_, error_series_;
   std::map<std::string, Series> latency_series_;

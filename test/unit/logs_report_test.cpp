@@ -250,6 +250,20 @@ TEST(Report, WithoutTruthItTellsWhatTheVehicleSaid) {
   EXPECT_GT(page["playback"]["frames"].size(), 100u);
 }
 
+TEST(Report, TheMapHasWhatTheVehicleBelievedWithTruthOrWithout) {
+  const std::string log = Fresh("believed") + "/flight.lcm";
+  testing::WriteSyntheticLog(log, kYaml);
+  const auto with = ReportFlight(log, {true, false, ""}).page["data"];
+  const auto without = ReportFlight(log, {false, false, ""}).page["data"];
+  for (const char* key : {"perceived", "plans", "predictions"}) {
+    ASSERT_FALSE(with.at(key).empty()) << key;
+    ASSERT_EQ(without.at(key).size(), with.at(key).size()) << key;
+    const std::vector<double> x = with.at(key).back()["x"], same = without.at(key).back()["x"];
+    ASSERT_EQ(same.size(), x.size()) << key;
+    for (size_t i = 0; i < x.size(); ++i) EXPECT_NEAR(same[i], x[i], 1.1e-3) << key;  // rounded
+  }
+}
+
 TEST(Report, AMissingLibraryIsNamedWithTheCure) {
   const std::string folder = Fresh("missing"), share = Share(folder);
   fs::remove(share + "/plotly.min.js");
