@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "chase/scenario_t.hpp"
 #include "chase/status_t.hpp"
@@ -40,12 +41,6 @@ std::string Line(const ChannelInfo& c) {
                      c.senders.empty() ? "-" : std::to_string(c.missing), Seconds(c.longest_gap));
 }
 
-std::string Recorded(int64_t first, int64_t last) {
-  const std::string length = fmt::format("{:.1f} s", Seconds(last - first));
-  if (first < kYear2000) return length + " of logical time (flown in lockstep, or imported)";
-  return fmt::format("{:%Y-%m-%d %H:%M:%S} UTC, {}", fmt::gmtime(first / 1000000), length);
-}
-
 /// Processes of the same value in one place.
 std::string ByValue(const std::map<std::string, std::string>& values) {
   std::map<std::string, std::string> processes;
@@ -57,15 +52,28 @@ std::string ByValue(const std::map<std::string, std::string>& values) {
   return text;
 }
 
-std::string Head(const LogInfo& info) {
+/// Of the log's events, microseconds; the first is the later one where there are none.
+std::pair<int64_t, int64_t> Span(const LogInfo& info) {
   int64_t first = INT64_MAX, last = 0;
   for (const ChannelInfo& c : info.channels) {
     if (c.count == 0) continue;
     first = std::min(first, c.first_utime);
     last = std::max(last, c.last_utime);
   }
+  return {first, last};
+}
+
+std::string Recorded(const LogInfo& info) {
+  const auto [first, last] = Span(info);
+  const std::string length = fmt::format("{:.1f} s", Seconds(last - first)), utc = info.Utc();
+  return utc.empty() ? length + " of logical time (flown in lockstep, or imported)"
+                     : utc + " UTC, " + length;
+}
+
+std::string Head(const LogInfo& info) {
+  const auto [first, last] = Span(info);
   std::string text = fmt::format("log        {}, {} bytes\n", info.file, info.bytes);
-  if (first <= last) text += "recorded   " + Recorded(first, last) + "\n";
+  if (first <= last) text += "recorded   " + Recorded(info) + "\n";
   if (!info.scenario.empty()) text += "scenario   " + info.scenario + "\n";
   for (const std::string& line : info.Software()) text += line + "\n";
   return text + "\n";
@@ -80,6 +88,12 @@ double ChannelInfo::RateHz() const {
 
 double ChannelInfo::MissingShare() const {
   return missing > 0 ? static_cast<double>(missing) / static_cast<double>(missing + count) : 0.0;
+}
+
+std::string LogInfo::Utc() const {
+  const auto [first, last] = Span(*this);
+  if (first < kYear2000 || first > last) return "";
+  return fmt::format("{:%Y-%m-%d %H:%M:%S}", fmt::gmtime(first / 1000000));
 }
 
 std::vector<std::string> LogInfo::Software() const {

@@ -43,6 +43,8 @@ struct LogInfo {
   std::map<std::string, int> restarts;  ///< of processes that were started anew, by name
   std::vector<Damage> damage;
 
+  /// When it begins, "2026-05-01 12:00:00"; empty: in logical time, or it holds nothing.
+  std::string Utc() const;
   /// Lines of versions, hosts and configurations.
   std::vector<std::string> Software() const;
   /// The same for programs: "versions", "hosts", "configurations".

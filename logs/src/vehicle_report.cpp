@@ -4,6 +4,7 @@
 #include <cmath>
 #include <map>
 #include <optional>
+#include <set>
 #include <utility>
 #include <vector>
 
@@ -26,6 +27,7 @@
 #include "logs/src/outlines.h"
 #include "logs/src/read_flight.h"
 #include "logs/src/round_numbers.h"
+#include "logs/src/sweep_latency.h"
 
 namespace chase::logs {
 namespace {
@@ -76,6 +78,8 @@ class Gatherer {
 
   void Add(const LogEvent& e) {
     if (first_event_ == 0) first_event_ = e.utime;
+    last_event_ = std::max(last_event_, e.utime);
+    if (follows_ || !IsOn(e, "LIDAR_SCAN")) sweeps_.Add(last_event_, e);
     Take<pose_t>(e, "POSE", [this](const pose_t& m) { OnPose(m); });
     Take<target_t>(e, "TARGET", [this](const target_t& m) { OnTarget(m); });
     Take<plan_t>(e, "PLAN", [this](const plan_t& m) { OnPlan(m); });
@@ -88,7 +92,9 @@ class Gatherer {
         origin_ && Good(e, "PREDICTION", &m) && m.verdict != prediction_t::NO_TARGET)
       predictions_.Add(Time(m.utime), bus::FromMessage(m.target, *origin_));
     status_t status;
-    if (Good(e, "_STATUS", &status)) statuses_[status.name] = status;
+    if (!Good(e, "_STATUS", &status)) return;
+    statuses_[status.name] = status;
+    if (!status.vehicle.empty()) vehicles_.insert(status.vehicle);
   }
 
   VehicleReport Report(const LogInfo& info) const {
@@ -99,6 +105,7 @@ class Gatherer {
     report.ends_in = InAir(state_);
     report.origin = origin_.value_or(0);
     report.log_begin = log_begin_;
+    if (const std::string utc = info.Utc(); !utc.empty()) report.metrics["recorded_utc"] = utc;
     AddFigures(&report.metrics);
     AddStages(&report.metrics);
     for (const ChannelInfo& c : info.channels)
@@ -162,6 +169,7 @@ class Gatherer {
   }
 
   void OnTracking(const tracking_t& m) {
+    follows_ = m.following == tracking_t::PLAN || m.following == tracking_t::STOP;
     errors_.push_back(bus::ToVector(m.error).norm());
     error_series_.Add(Time(m.utime), errors_.back());
   }
@@ -196,6 +204,13 @@ class Gatherer {
     return all > 0 ? Json(static_cast<double>(part) / static_cast<double>(all)) : Json();
   }
 
+  Json SweepsToSetpoints() const {
+    std::vector<double> ms;
+    for (const auto& [heard, latency] : sweeps_.samples())
+      ms.push_back(1e-3 * static_cast<double>(latency));
+    return Quantiles(ms);
+  }
+
   void AddFigures(Json* m) const {
     Json& j = *m;
     j["truth"] = false;
@@ -213,6 +228,8 @@ class Gatherer {
     j["certified_ratio"] = Share(certified_, plans_);
     j["certified_clearance_m"] = least_clearance_ ? Json(*least_clearance_) : Json();
     j["tracking_error_m"] = Quantiles(errors_);
+    j["sweep_to_setpoint_ms"] = SweepsToSetpoints();
+    if (!vehicles_.empty()) j["vehicles"] = vehicles_;
     for (const auto& [channel, latencies] : latencies_)
       j["latency_ms"][channel] = Quantiles(latencies);
     if (!states_.empty()) j["flight_states"] = states_;
@@ -254,7 +271,10 @@ class Gatherer {
   }
 
   std::optional<int64_t> origin_;
-  int64_t first_event_ = 0;                                 // by the log's stamps, us
+  int64_t first_event_ = 0, last_event_ = 0;  // by the log's stamps, us
+  SweepLatency sweeps_;                       // of those while control follows a plan or its stop
+  bool follows_ = false;
+  std::set<std::string> vehicles_;
   double log_begin_ = 0.0, end_ = 0.0, next_shown_ = -1e9;  // s
   Lane health_, target_, verdict_, flight_;
   long poses_ = 0, targets_ = 0, tracked_ = 0, plans_ = 0, fallbacks_ = 0, certified_ = 0;
