@@ -115,9 +115,12 @@ std::map<std::string, TextByProcess> LogInfo::SoftwareByKind() const {
 }
 
 bool LogInfo::Recorded() const {
-  return Whole() && std::all_of(channels.begin(), channels.end(), [](const ChannelInfo& c) {
-           return c.MissingShare() <= kTolerableShare || HeavyUnderAnyPrefix(c.channel);
-         });
+  const auto tolerable = [this](ChannelInfo c) {
+    const bool heavy = HeavyUnderAnyPrefix(c.channel);
+    if (heavy) c.missing -= c.missing_first;
+    return c.MissingShare() <= kTolerableShare || (heavy && heavy_left_out);
+  };
+  return Whole() && std::all_of(channels.begin(), channels.end(), tolerable);
 }
 
 std::vector<std::string> LogInfo::Losses() const {
@@ -181,6 +184,7 @@ void LogSurvey::AddContent(const LogEvent& e, const std::string& type) {
     if (!software.configuration.empty()) info_.configurations[status.name] = software.configuration;
     if (!software.host.empty()) info_.hosts[status.name] = software.host;
     info_.versions[status.name] = software.version;
+    info_.heavy_left_out |= status.name == "recorder" && status.state == status_t::DEGRADED;
     starts_[status.vehicle + status.name].insert(status.sender_start);
   }
   if (type == "scenario_t" && info_.scenario.empty() && DecodeBytes(e.bytes, &scenario))
@@ -205,6 +209,7 @@ void LogSurvey::Settle(Channel* channel) const {
     const std::string shown = name.empty() ? "an unnamed sender" : name;
     info.senders.push_back({shown, count, before + seqs.missing() + behind});
     info.missing += info.senders.back().missing;
+    info.missing_first += before;
   }
 }
 
