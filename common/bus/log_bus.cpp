@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "chase/status_t.hpp"
 #include "common/bus/heard_order.h"
 #include "common/bus/message_head.h"
 
@@ -17,6 +18,18 @@ Identity IdentityIn(const std::string& log, const std::string& process) {
     if (head && head->sender == process) return {head->sender, head->vehicle, head->sender_start};
   }
   return {process, "", 0};
+}
+
+std::string VersionIn(const std::string& log, const std::string& process) {
+  LogReader reader(log);
+  for (LogEvent event; reader.Next(&event);) {
+    const auto head = HeadOf(event.bytes.data(), event.bytes.size());
+    status_t status;
+    if (head && head->sender == process &&
+        status.decode(event.bytes.data(), 0, static_cast<int>(event.bytes.size())) > 0)
+      return status.version;
+  }
+  return "";
 }
 
 LogBus::LogBus(const std::string& in, const std::string& out) : in_(in), out_(out) {}

@@ -18,6 +18,9 @@ namespace chase::bus {
 /// log holds none: of no vehicle, started at 0.
 Identity IdentityIn(const std::string& log, const std::string& process);
 
+/// `version` of the first status of `process` in the log; empty where it holds none.
+std::string VersionIn(const std::string& log, const std::string& process);
+
 /// Replays a log file to one node in the order in which it heard the messages (heard_order.h); what
 /// the node sends goes to another log file with the stamp of the event that it answers.
 class LogBus : public Bus {

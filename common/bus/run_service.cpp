@@ -96,6 +96,21 @@ void RunLive(const ServiceSpec& spec, const Flags& flags) {
   sd_notify(0, "STOPPING=1");
 }
 
+/// How the configuration or the commit that is replayed with differs from what the log was flown
+/// with; empty where it does not, or the log does not tell.
+std::string Departure(const ServiceSpec& spec, const std::string& log) {
+  const Software flown = SoftwareOf(VersionIn(log, spec.name));
+  const Software here = SoftwareOf(ConfiguredVersion(spec.dump_config()));
+  const bool configured = !flown.configuration.empty() && flown.configuration != here.configuration;
+  if (!configured && (flown.version.empty() || flown.version == here.version)) return "";
+  const auto words = [](const Software& s) {
+    return (s.configuration.empty() ? "" : "configuration " + s.configuration + ", ") + s.version;
+  };
+  const auto file = std::filesystem::path(log).parent_path() / (spec.name + ".yaml");
+  return fmt::format("flown with {}; this is {}{}", words(flown), words(here),
+                     configured ? "; use --config " + file.string() : "");
+}
+
 void RunReplay(const ServiceSpec& spec, const Flags& flags) {
   if (flags.out.empty())
     throw std::runtime_error("--replay needs --out FILE, where the outputs go");
@@ -104,6 +119,8 @@ void RunReplay(const ServiceSpec& spec, const Flags& flags) {
     throw std::runtime_error("--out " + flags.out + " is the log that is replayed; name another");
   LogBus bus(flags.replay, flags.out);
   bus.SetIdentity(IdentityIn(flags.replay, spec.name));
+  if (const std::string line = Departure(spec, flags.replay); !line.empty())
+    fmt::print(stderr, "chase-{}: {}\n", spec.name, line);
   const auto node = spec.make_node(bus);
   StatusReporter reporter(spec.name, ConfiguredVersion(spec.dump_config()));
   int64_t next_status = -1;

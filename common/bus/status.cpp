@@ -46,6 +46,15 @@ void AddStages(const StageClock& clock, status_t* status) {
   status->n_stages = static_cast<int32_t>(status->stages.size());
 }
 
+/// Takes off `text` what follows `key`, its last; empty where it is not there.
+std::string CutBehind(const std::string& key, std::string* text) {
+  const size_t at = text->rfind(key);
+  if (at == std::string::npos) return "";
+  const std::string value = text->substr(at + key.size());
+  text->resize(at);
+  return value;
+}
+
 int8_t StateCode(NodeReport::State state) {
   switch (state) {
     case NodeReport::State::kStarting:
@@ -71,6 +80,13 @@ std::string LiveVersion(const std::string& configuration) {
   if (gethostname(host, sizeof host - 1) != 0) host[0] = '\0';
   return fmt::format("{}, host {}, configuration {}", config::Version(),
                      host[0] != '\0' ? host : "unknown", config::Checksum(configuration));
+}
+
+Software SoftwareOf(const std::string& version) {
+  Software software{version, "", ""};
+  software.configuration = CutBehind(", configuration ", &software.version);
+  software.host = CutBehind(", host ", &software.version);
+  return software;
 }
 
 StatusReporter::StatusReporter(std::string name, std::string version)

@@ -17,6 +17,12 @@ std::string ConfiguredVersion(const std::string& configuration);
 /// onboard, configuration 930766865".
 std::string LiveVersion(const std::string& configuration);
 
+/// The parts of such a version; host and configuration are empty where it does not tell them.
+struct Software {
+  std::string version, host, configuration;
+};
+Software SoftwareOf(const std::string& version);
+
 /// Builds the status messages of one process.
 class StatusReporter {
  public:

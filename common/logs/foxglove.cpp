@@ -138,16 +138,24 @@ std::string LogLine(const event_t& m) {
 template <class T, class... Any>
 constexpr bool kIs = (std::is_same_v<T, Any> || ...);
 
+double HardRadius(const ViewerOptions& options, const std::string& vehicle) {
+  const auto known = options.hard_radius.find(vehicle);
+  return known == options.hard_radius.end() ? 0.0 : known->second;
+}
+
 /// What Foxglove draws of a message, besides its fields.
 template <class T>
-void AddDrawn(const T& m, const std::string& channel, const world::Rig& rig, Messages* out) {
+void AddDrawn(const T& m, const std::string& channel, const ViewerOptions& options, Messages* out) {
   if constexpr (kIs<T, pose_t, truth_t>)
     out->push_back({channel + "/pose", "foxglove.PoseInFrame",
                     PoseInWorld(m.utime, bus::ToVector(m.pos), ToRotation(m.orientation))});
   if constexpr (kIs<T, pose_t>)
-    out->push_back({"/tf", "foxglove.FrameTransforms", Transforms(m, rig)});
+    out->push_back({"/tf", "foxglove.FrameTransforms", Transforms(m, options.rig)});
   if constexpr (kIs<T, obstacles_t, target_t, plan_t, prediction_t, geofence_t>)
     out->push_back({channel + "/scene", "foxglove.SceneUpdate", SceneOf(m)});
+  if constexpr (kIs<T, obstacles_t>)
+    out->push_back({channel + "/grown", "foxglove.SceneUpdate",
+                    GrownSceneOf(m, HardRadius(options, m.vehicle))});
   if constexpr (kIs<T, status_t, event_t>)
     out->push_back({channel + "/log", "foxglove.Log", LogLine(m)});
 }
@@ -158,7 +166,7 @@ void Add(const T& m, const LogEvent& e, const ViewerOptions& options, Messages* 
   const std::string body(e.bytes.begin() + 8, e.bytes.end());  // behind the fingerprint
   out->push_back({e.channel, std::string("chase.") + T::getTypeName(),
                   ToProto(OurTypes(), type, Decode(OurTypes(), type, body)).bytes()});
-  AddDrawn(m, e.channel, options.rig, out);
+  AddDrawn(m, e.channel, options, out);
 }
 void Add(const lidar_scan_t& m, const LogEvent& e, const ViewerOptions&, Messages* out) {
   out->push_back({e.channel, "foxglove.PointCloud", CloudBytes(m, "lidar")});

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <map>
 #include <string>
 #include <vector>
 
@@ -20,13 +21,15 @@ struct ViewerMessage {
 };
 
 struct ViewerOptions {
-  bool jpeg = false;  ///< images lossy, at a twentieth of the size
-  world::Rig rig;     ///< that flew: no message tells it
+  bool jpeg = false;                            ///< images lossy, at a twentieth of the size
+  world::Rig rig;                               ///< that flew: no message tells it
+  std::map<std::string, double> hard_radius{};  ///< of each vehicle's last PLAN, m
 };
 
 /// What a viewer shows of a message. Clouds and images become Foxglove's own; every other message
-/// keeps its fields, and beside it, on topics CHANNEL/pose, CHANNEL/scene, /tf and so on, there is
-/// what Foxglove draws. Nothing when the type is not ours or the bytes do not decode.
+/// keeps its fields, and beside it, on topics CHANNEL/pose, CHANNEL/scene, OBSTACLES/grown, /tf and
+/// so on, there is what Foxglove draws. Nothing when the type is not ours or the bytes do not
+/// decode.
 std::vector<ViewerMessage> ToViewer(const LogEvent& event, const ViewerOptions& options);
 
 /// What describes a message of that name, as a FileDescriptorSet.

@@ -26,7 +26,8 @@ struct Tint {
 constexpr Tint kStill = {0.55, 0.57, 0.6, 0.5}, kMoving = {0.8, 0.2, 0.2, 0.6},
                kGround = {0.5, 0.45, 0.35, 0.3}, kTarget = {0.91, 0.44, 0.04, 0.9},
                kVelocity = {1.0, 0.54, 0.5, 1.0}, kSpread = {1.0, 0.82, 0.3, 0.15},
-               kForecast = {1.0, 0.82, 0.3, 1.0}, kFence = {0.88, 0.36, 0.82, 1.0};
+               kForecast = {1.0, 0.82, 0.3, 1.0}, kFence = {0.88, 0.36, 0.82, 1.0},
+               kGrown = {0.79, 0.54, 0.54, 0.15};
 /// By plan_t's verdicts, as on chase-viewer's page.
 constexpr Tint kVerdicts[] = {{0.25, 0.65, 0.42, 1.0}, {0.44, 0.75, 0.45, 1.0},
                               {0.3, 0.61, 0.91, 1.0},  {0.85, 0.64, 0.23, 1.0},
@@ -56,12 +57,13 @@ Proto Solid(Primitive kind, const Proto& pose, const Vector3d& size, const Tint&
 }
 
 /// Half its axes are the eigenvalues of M, symmetric, to this power: 0.5 for a covariance, -0.5 for
-/// { x : x' M x <= 1 }.
-Proto Ellipsoid(const Vector3d& center, const Matrix3d& M, double power, const Tint& tint) {
+/// { x : x' M x <= 1 }; then they are `longer`, m.
+Proto Ellipsoid(const Vector3d& center, const Matrix3d& M, double power, const Tint& tint,
+                double longer = 0.0) {
   const Eigen::SelfAdjointEigenSolver<Matrix3d> axes(M);
   Matrix3d R = axes.eigenvectors();
   if (R.determinant() < 0.0) R.col(0) *= -1.0;
-  const Vector3d size = 2.0 * axes.eigenvalues().array().max(1e-9).pow(power).matrix();
+  const Vector3d size = 2.0 * (axes.eigenvalues().array().max(1e-9).pow(power) + longer);
   return Solid(kSphere, Pose(center, Quaterniond(R)), size, tint);
 }
 
@@ -93,19 +95,26 @@ Proto Curve(const polynomial_t& m, double thickness, const Tint& tint) {
   return Line(kLineStrip, thickness, points, tint);
 }
 
-void Add(const obstacle_t& o, int64_t utime, Proto* entity) {
-  const Tint& tint = o.kind == obstacle_t::MOVING   ? kMoving
-                     : o.kind == obstacle_t::GROUND ? kGround
-                                                    : kStill;
-  const world::Obstacle obstacle = bus::FromMessage(o, utime);
-  const Vector3d center = obstacle.center.Position(0.0), v = obstacle.center.Velocity(0.0);
-  const Vector3d size = 2.0 * bus::ToVector(o.half);
+/// Its solid with half its sizes larger by `radius`, m.
+void AddSolid(const obstacle_t& o, const world::Obstacle& obstacle, double radius, const Tint& tint,
+              Proto* entity) {
+  const Vector3d center = obstacle.center.Position(0.0);
+  const Vector3d size = 2.0 * (bus::ToVector(o.half).array() + radius);
   if (o.solid == obstacle_t::BOX)
     entity->Put(kCube, Solid(kCube, Pose(center, ToRotation(o.orientation)), size, tint));
   else if (o.solid == obstacle_t::CYLINDER)
     entity->Put(kCylinder, Solid(kCylinder, Pose(center, Quaterniond::Identity()), size, tint));
   else
-    entity->Put(kSphere, Ellipsoid(center, obstacle.shape, -0.5, tint));
+    entity->Put(kSphere, Ellipsoid(center, obstacle.shape, -0.5, tint, radius));
+}
+
+void Add(const obstacle_t& o, int64_t utime, Proto* entity) {
+  const Tint& tint = o.kind == obstacle_t::MOVING   ? kMoving
+                     : o.kind == obstacle_t::GROUND ? kGround
+                                                    : kStill;
+  const world::Obstacle obstacle = bus::FromMessage(o, utime);
+  AddSolid(o, obstacle, 0.0, tint, entity);
+  const Vector3d center = obstacle.center.Position(0.0), v = obstacle.center.Velocity(0.0);
   if (o.kind == obstacle_t::MOVING && v.norm() > 0.0) entity->Put(kArrow, Arrow(center, v));
 }
 
@@ -127,6 +136,15 @@ Proto Pose(const Vector3d& p, const Quaterniond& q) {
 std::string SceneOf(const obstacles_t& m) {
   Proto entity = Entity(m.utime, "obstacles");
   for (const obstacle_t& o : m.obstacles) Add(o, m.utime, &entity);
+  return Scene(entity);
+}
+
+std::string GrownSceneOf(const obstacles_t& m, double radius) {
+  Proto entity = Entity(m.utime, "grown");
+  if (radius <= 0.0) return Scene(entity);
+  for (const obstacle_t& o : m.obstacles)
+    if (o.kind != obstacle_t::GROUND)
+      AddSolid(o, bus::FromMessage(o, m.utime), radius, kGrown, &entity);
   return Scene(entity);
 }
 

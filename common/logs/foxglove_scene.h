@@ -29,4 +29,8 @@ std::string SceneOf(const plan_t& m);
 std::string SceneOf(const prediction_t& m);
 std::string SceneOf(const geofence_t& m);
 
+/// The solids but the ground with half their sizes larger by `radius`, m, as on chase-viewer's
+/// page; an empty entity where that is 0.
+std::string GrownSceneOf(const obstacles_t& m, double radius);
+
 }  // namespace chase::logs

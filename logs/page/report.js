@@ -42,11 +42,13 @@ function showHeader() {
     const {metrics, vehicle} = flight, commits = [...new Set(Object.values(vehicle.software.versions).map((v) => v.match(/commit [\w-]+/)?.[0] ?? v))];
     const of = metrics.duration_s ? ` of ${metrics.duration_s} s` : '';
     const factor = metrics.real_time_factor ? `, real-time factor ${metrics.real_time_factor.toFixed(2)}` : '';
-    byId('subtitle').append(make('div', `${two ? `${'AB'[i]}: ${flight.log}, ` : ''}${metrics.flown_s.toFixed(1)} s${of} flown${factor}; ${commits.join(', ')}`));
+    const hosts = [...new Set(Object.values(vehicle.software.hosts))], named = (word, names) => (names?.length ? `, ${word} ${names.join(', ')}` : '');
+    const where = `${vehicle.recorded_utc ? `, ${vehicle.recorded_utc} UTC` : ''}${named('vehicle', vehicle.vehicles)}${named('host', hosts)}`;
+    byId('subtitle').append(make('div', `${two ? `${'AB'[i]}: ` : ''}${flight.log}${where}, ${metrics.flown_s.toFixed(1)} s${of} flown${factor}; ${commits.join(', ')}`));
     for (const loss of metrics.losses) byId('losses').append(make('p', `${two ? `${'AB'[i]}: ` : ''}${loss}`, 'failed'));
   });
-  byId('map_text').textContent = flights[0].truth ? 'Paths over the mission. Thin lines: predictions and plans of every half second (switch them in the legend).'
-    : 'Paths as estimated.';
+  byId('map_text').textContent = `${flights[0].truth ? 'Paths over the mission.' : 'Paths as estimated.'} `
+    + 'Thin lines: predictions and plans of every half second (switch them in the legend).';
 }
 
 function showFigures() {

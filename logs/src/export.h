@@ -34,6 +34,6 @@ int ExportCsv(const std::string& log, const std::string& out, const std::string&
 /// Every message (or those of `channel`) as protobuf in an MCAP file for Foxglove and the like
 /// (foxglove.h). Returns the number of messages.
 long ExportMcap(const std::string& log, const std::string& out, const std::string& channel = "",
-                const ViewerOptions& options = {}, const Watch& watch = {});
+                ViewerOptions options = {}, const Watch& watch = {});
 
 }  // namespace chase::logs

@@ -4,12 +4,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "chase/scenario_t.hpp"
 #include "chase/status_t.hpp"
 #include "common/bus/bus.h"
 #include "common/bus/channels.h"
 #include "common/bus/message_head.h"
+#include "common/bus/status.h"
 #include "common/logs/message_types.h"
 #include "logs/src/log_survey.h"
 #include "logs/src/message_fields.h"
@@ -39,12 +41,6 @@ std::string Line(const ChannelInfo& c) {
                      c.senders.empty() ? "-" : std::to_string(c.missing), Seconds(c.longest_gap));
 }
 
-std::string Recorded(int64_t first, int64_t last) {
-  const std::string length = fmt::format("{:.1f} s", Seconds(last - first));
-  if (first < kYear2000) return length + " of logical time (flown in lockstep, or imported)";
-  return fmt::format("{:%Y-%m-%d %H:%M:%S} UTC, {}", fmt::gmtime(first / 1000000), length);
-}
-
 /// Processes of the same value in one place.
 std::string ByValue(const std::map<std::string, std::string>& values) {
   std::map<std::string, std::string> processes;
@@ -56,25 +52,28 @@ std::string ByValue(const std::map<std::string, std::string>& values) {
   return text;
 }
 
-/// Takes off `text` what follows `key`, its last; empty where it is not there
-/// (common/bus/status.h).
-std::string CutBehind(const std::string& key, std::string* text) {
-  const size_t at = text->rfind(key);
-  if (at == std::string::npos) return "";
-  const std::string value = text->substr(at + key.size());
-  text->resize(at);
-  return value;
-}
-
-std::string Head(const LogInfo& info) {
+/// Of the log's events, microseconds; the first is the later one where there are none.
+std::pair<int64_t, int64_t> Span(const LogInfo& info) {
   int64_t first = INT64_MAX, last = 0;
   for (const ChannelInfo& c : info.channels) {
     if (c.count == 0) continue;
     first = std::min(first, c.first_utime);
     last = std::max(last, c.last_utime);
   }
+  return {first, last};
+}
+
+std::string Recorded(const LogInfo& info) {
+  const auto [first, last] = Span(info);
+  const std::string length = fmt::format("{:.1f} s", Seconds(last - first)), utc = info.Utc();
+  return utc.empty() ? length + " of logical time (flown in lockstep, or imported)"
+                     : utc + " UTC, " + length;
+}
+
+std::string Head(const LogInfo& info) {
+  const auto [first, last] = Span(info);
   std::string text = fmt::format("log        {}, {} bytes\n", info.file, info.bytes);
-  if (first <= last) text += "recorded   " + Recorded(first, last) + "\n";
+  if (first <= last) text += "recorded   " + Recorded(info) + "\n";
   if (!info.scenario.empty()) text += "scenario   " + info.scenario + "\n";
   for (const std::string& line : info.Software()) text += line + "\n";
   return text + "\n";
@@ -89,6 +88,12 @@ double ChannelInfo::RateHz() const {
 
 double ChannelInfo::MissingShare() const {
   return missing > 0 ? static_cast<double>(missing) / static_cast<double>(missing + count) : 0.0;
+}
+
+std::string LogInfo::Utc() const {
+  const auto [first, last] = Span(*this);
+  if (first < kYear2000 || first > last) return "";
+  return fmt::format("{:%Y-%m-%d %H:%M:%S}", fmt::gmtime(first / 1000000));
 }
 
 std::vector<std::string> LogInfo::Software() const {
@@ -110,9 +115,12 @@ std::map<std::string, TextByProcess> LogInfo::SoftwareByKind() const {
 }
 
 bool LogInfo::Recorded() const {
-  return Whole() && std::all_of(channels.begin(), channels.end(), [](const ChannelInfo& c) {
-           return c.MissingShare() <= kTolerableShare || HeavyUnderAnyPrefix(c.channel);
-         });
+  const auto tolerable = [this](ChannelInfo c) {
+    const bool heavy = HeavyUnderAnyPrefix(c.channel);
+    if (heavy) c.missing -= c.missing_first;
+    return c.MissingShare() <= kTolerableShare || (heavy && heavy_left_out);
+  };
+  return Whole() && std::all_of(channels.begin(), channels.end(), tolerable);
 }
 
 std::vector<std::string> LogInfo::Losses() const {
@@ -172,11 +180,11 @@ void LogSurvey::AddContent(const LogEvent& e, const std::string& type) {
   status_t status;
   scenario_t scenario;
   if (type == "status_t" && DecodeBytes(e.bytes, &status)) {
-    const std::string configuration = CutBehind(", configuration ", &status.version);
-    const std::string host = CutBehind(", host ", &status.version);
-    if (!configuration.empty()) info_.configurations[status.name] = configuration;
-    if (!host.empty()) info_.hosts[status.name] = host;
-    info_.versions[status.name] = status.version;
+    const bus::Software software = bus::SoftwareOf(status.version);
+    if (!software.configuration.empty()) info_.configurations[status.name] = software.configuration;
+    if (!software.host.empty()) info_.hosts[status.name] = software.host;
+    info_.versions[status.name] = software.version;
+    info_.heavy_left_out |= status.name == "recorder" && status.state == status_t::DEGRADED;
     starts_[status.vehicle + status.name].insert(status.sender_start);
   }
   if (type == "scenario_t" && info_.scenario.empty() && DecodeBytes(e.bytes, &scenario))
@@ -201,6 +209,7 @@ void LogSurvey::Settle(Channel* channel) const {
     const std::string shown = name.empty() ? "an unnamed sender" : name;
     info.senders.push_back({shown, count, before + seqs.missing() + behind});
     info.missing += info.senders.back().missing;
+    info.missing_first += before;
   }
 }
 

@@ -23,7 +23,8 @@ struct ChannelInfo {
   int64_t first_utime = 0, last_utime = 0;  ///< of the events, microseconds
   int64_t longest_gap = 0;                  ///< without one until the log ends, microseconds
   std::vector<SenderInfo> senders;
-  int64_t missing = 0;  ///< by `seq`; where count is 0: what others heard of the channel
+  int64_t missing = 0;        ///< by `seq`; where count is 0: what others heard of the channel
+  int64_t missing_first = 0;  ///< of them: before the first message of a sender
 
   /// Messages a second between the first and the last; 0 for a single one.
   double RateHz() const;
@@ -41,15 +42,19 @@ struct LogInfo {
   TextByProcess versions, hosts, configurations;
   std::string scenario;                 ///< name and seed; empty: there is none
   std::map<std::string, int> restarts;  ///< of processes that were started anew, by name
+  bool heavy_left_out = false;          ///< a recorder told that its disk was nearly full
   std::vector<Damage> damage;
 
+  /// When it begins, "2026-05-01 12:00:00"; empty: in logical time, or it holds nothing.
+  std::string Utc() const;
   /// Lines of versions, hosts and configurations.
   std::vector<std::string> Software() const;
   /// The same for programs: "versions", "hosts", "configurations".
   std::map<std::string, TextByProcess> SoftwareByKind() const;
   bool Whole() const { return damage.empty(); }
-  /// Whole, and no channel that figures are computed from has lost more than a hundredth: beyond
-  /// that a 99th percentile says nothing. What is too heavy to be always recorded does not count.
+  /// Whole, and no channel that the log holds has lost more than a hundredth: beyond that a 99th
+  /// percentile says nothing. Of sweeps, images and maps a recorder drops the oldest on purpose,
+  /// and leaves them out where its disk is nearly full: neither counts.
   bool Recorded() const;
   /// A line for everything that is not there, and for whoever was started anew.
   std::vector<std::string> Losses() const;

@@ -57,6 +57,7 @@ std::string MetricsJson(const FlightRecord& record, const Metrics& m) {
   Json j;
   j["scenario"] = record.scenario.name;
   j["seed"] = record.seed;
+  if (const std::string utc = record.log.Utc(); !utc.empty()) j["recorded_utc"] = utc;
   j["duration_s"] = record.scenario.duration_s;
   j["fault"] = m.fault;
   j["fault_time_s"] = m.fault_time_s;

@@ -78,7 +78,7 @@ class Gatherer {
     record.memory = memory_;
     for (const auto& [sweep, latency] : sweeps_.samples())
       record.sweep_to_setpoint_ms.emplace_back(Time(sweep), 1e-3 * static_cast<double>(latency));
-    AddObstacles(&record);
+    if (obstacles_) record.obstacles = PerceivedIn(*obstacles_);
     AddRealTimeFactor(&record);
     return record;
   }
@@ -206,15 +206,6 @@ class Gatherer {
     }
   }
 
-  void AddObstacles(FlightRecord* record) const {
-    if (!obstacles_) return;
-    for (const obstacle_t& m : obstacles_->obstacles) {
-      if (m.kind == obstacle_t::GROUND) continue;
-      const world::Obstacle o = bus::FromMessage(m, origin_);
-      record->obstacles.push_back({o.center.Position(Time(obstacles_->utime)), o.shape, o.moving});
-    }
-  }
-
   /// Logical time over the log's own stamps; a lockstep log's stamps are logical too, so it has
   /// none worth the name.
   void AddRealTimeFactor(FlightRecord* record) const {
@@ -264,6 +255,16 @@ TruthSample ToSample(const truth_t& m, int64_t start) {
   s.target_in_image = m.target_in_image != 0;
   s.visible_share = m.visible_share;
   return s;
+}
+
+std::vector<PerceivedObstacle> PerceivedIn(const obstacles_t& m) {
+  std::vector<PerceivedObstacle> perceived;
+  for (const obstacle_t& o : m.obstacles) {
+    if (o.kind == obstacle_t::GROUND) continue;
+    const world::Obstacle obstacle = bus::FromMessage(o, m.utime);
+    perceived.push_back({obstacle.center.Position(0.0), obstacle.shape, obstacle.moving});
+  }
+  return perceived;
 }
 
 FlightRecord ReadFlight(const std::string& log) {

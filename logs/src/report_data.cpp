@@ -15,34 +15,7 @@ using world::Solid;
 
 constexpr double kPathStep = 0.1;     // s
 constexpr double kSeriesStep = 0.05;  // s
-constexpr double kFanStep = 0.5;      // s from fan to fan
 constexpr double kMoverStep = 5.0;    // s from outline to outline
-constexpr int kFanPoints = 16;
-constexpr int kCirclePoints = 48;
-
-/// Passes the first item and then each that is at least `step` later than the last passed.
-class Thinner {
- public:
-  explicit Thinner(double step) : step_(step) {}
-  bool Pass(double t) {
-    if (t < next_) return false;
-    next_ = t + step_ - 1e-6;
-    return true;
-  }
-
- private:
-  double step_, next_ = -1e300;
-};
-
-/// The unit circle under the linear map A, about c.
-Outline Ellipse(const Vector2d& c, const Eigen::Matrix2d& A) {
-  Outline out;
-  for (int i = 0; i < kCirclePoints; ++i) {
-    const double a = 2 * M_PI * i / kCirclePoints;
-    out.push_back(c + A * Vector2d(std::cos(a), std::sin(a)));
-  }
-  return out;
-}
 
 Outline Footprint(const Solid& s) {
   const Eigen::Matrix2d turn = Eigen::Rotation2Dd(s.yaw).toRotationMatrix();
@@ -52,20 +25,6 @@ Outline Footprint(const Solid& s) {
   for (const Vector2d& corner :
        {Vector2d(1, 1), Vector2d(-1, 1), Vector2d(-1, -1), Vector2d(1, -1)})
     out.push_back(c + turn * corner.cwiseProduct(h));
-  return out;
-}
-
-/// Shadow of an ellipsoid on the ground: the xy block of the inverse of R.
-Outline Shadow(const PerceivedObstacle& o) {
-  const Eigen::Matrix2d cov = o.shape.inverse().topLeftCorner<2, 2>();
-  return Ellipse(o.center.head<2>(), cov.llt().matrixL());
-}
-
-Outline Sampled(const world::Trajectory& trajectory) {
-  Outline out;
-  for (int i = 0; i <= kFanPoints; ++i)
-    out.push_back(
-        trajectory.Position(trajectory.start + trajectory.duration * i / kFanPoints).head<2>());
   return out;
 }
 
@@ -79,11 +38,12 @@ void AddWorld(const FlightRecord& record, ReportData* data) {
   for (const auto& mover : record.scenario.movers)
     for (double t = 0.0; t <= record.scenario.duration_s; t += kMoverStep)
       data->movers.push_back(Footprint(world::MoverAt(mover, t).solid));
-  for (const PerceivedObstacle& o : record.obstacles) data->perceived.push_back(Shadow(o));
+  data->perceived = Shadows(record.obstacles);
 }
 
 void AddPaths(const FlightRecord& record, ReportData* data) {
-  Thinner truth(kPathStep), pose(kPathStep), prediction(kFanStep), plan(kFanStep);
+  Thinner truth(kPathStep), pose(kPathStep);
+  Fan predictions, plans;
   for (const TruthSample& s : record.truth) {
     if (!record.InMission(s.t) || !truth.Pass(s.t)) continue;
     data->chaser.push_back(s.p.head<2>());
@@ -92,10 +52,11 @@ void AddPaths(const FlightRecord& record, ReportData* data) {
   for (const PoseSample& s : record.poses)
     if (record.InMission(s.t) && pose.Pass(s.t)) data->estimated.push_back(s.p.head<2>());
   for (const PredictionSample& s : record.predictions)
-    if (s.usable && record.InMission(s.t) && prediction.Pass(s.t))
-      data->predictions.push_back(Sampled(s.target));
+    if (s.usable && record.InMission(s.t)) predictions.Add(s.t, s.target);
   for (const PlanSample& s : record.plans)
-    if (record.InMission(s.t) && plan.Pass(s.t)) data->plans.push_back(Sampled(s.position));
+    if (record.InMission(s.t)) plans.Add(s.t, s.position);
+  data->predictions = predictions.outlines();
+  data->plans = plans.outlines();
 }
 
 void Add(double t, double value, ReportData::Series* series) {
@@ -146,23 +107,6 @@ void AddCosts(const FlightRecord& record, ReportData* data) {
   const double flown = record.truth.back().t - record.truth.front().t;
   for (const auto& [process, cpu] : record.cpu_s)
     if (flown > 0.0) data->cpu_share.push_back({process, 100.0 * cpu / flown});
-}
-
-nlohmann::ordered_json Points(const Outline& outline, bool closed) {
-  nlohmann::ordered_json x = nlohmann::ordered_json::array(), y = x;
-  const auto add = [&](const Vector2d& p) {
-    x.push_back(std::round(p.x() * 1e3) / 1e3);
-    y.push_back(std::round(p.y() * 1e3) / 1e3);
-  };
-  for (const Vector2d& p : outline) add(p);
-  if (closed && !outline.empty()) add(outline.front());
-  return {{"x", x}, {"y", y}};
-}
-
-nlohmann::ordered_json Points(const std::vector<Outline>& outlines, bool closed) {
-  auto out = nlohmann::ordered_json::array();
-  for (const Outline& o : outlines) out.push_back(Points(o, closed));
-  return out;
 }
 
 nlohmann::ordered_json ToJson(const ReportData::Series& s) {

@@ -3,10 +3,9 @@
 #include <nlohmann/json.hpp>
 
 #include "logs/src/metrics.h"
+#include "logs/src/outlines.h"
 
 namespace chase::logs {
-
-using Outline = std::vector<Eigen::Vector2d>;  ///< closed polygon seen from above, m
 
 struct NamedValue {
   std::string name;

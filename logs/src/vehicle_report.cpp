@@ -4,6 +4,7 @@
 #include <cmath>
 #include <map>
 #include <optional>
+#include <set>
 #include <utility>
 #include <vector>
 
@@ -13,6 +14,7 @@
 #include "chase/obstacles_t.hpp"
 #include "chase/plan_t.hpp"
 #include "chase/pose_t.hpp"
+#include "chase/prediction_t.hpp"
 #include "chase/status_t.hpp"
 #include "chase/target_t.hpp"
 #include "chase/tracking_t.hpp"
@@ -22,7 +24,10 @@
 #include "logs/src/landing_figures.h"
 #include "logs/src/lane.h"
 #include "logs/src/log_survey.h"
+#include "logs/src/outlines.h"
+#include "logs/src/read_flight.h"
 #include "logs/src/round_numbers.h"
+#include "logs/src/sweep_latency.h"
 
 namespace chase::logs {
 namespace {
@@ -73,16 +78,23 @@ class Gatherer {
 
   void Add(const LogEvent& e) {
     if (first_event_ == 0) first_event_ = e.utime;
+    last_event_ = std::max(last_event_, e.utime);
+    if (follows_ || !IsOn(e, "LIDAR_SCAN")) sweeps_.Add(last_event_, e);
     Take<pose_t>(e, "POSE", [this](const pose_t& m) { OnPose(m); });
     Take<target_t>(e, "TARGET", [this](const target_t& m) { OnTarget(m); });
     Take<plan_t>(e, "PLAN", [this](const plan_t& m) { OnPlan(m); });
     Take<tracking_t>(e, "TRACKING", [this](const tracking_t& m) { OnTracking(m); });
     Take<attitude_setpoint_t>(e, "ATTITUDE_SETPOINT", [](const auto&) {});
-    Take<obstacles_t>(e, "OBSTACLES", [](const auto&) {});
+    Take<obstacles_t>(e, "OBSTACLES", [this](const obstacles_t& m) { obstacles_ = m; });
     Take<flight_state_t>(e, "FLIGHT_STATE", [this](const flight_state_t& m) { OnState(m); });
     Take<geofence_t>(e, "GEOFENCE", [this](const geofence_t& m) { fence_ = m.corners; });
+    if (prediction_t m;
+        origin_ && Good(e, "PREDICTION", &m) && m.verdict != prediction_t::NO_TARGET)
+      predictions_.Add(Time(m.utime), bus::FromMessage(m.target, *origin_));
     status_t status;
-    if (Good(e, "_STATUS", &status)) statuses_[status.name] = status;
+    if (!Good(e, "_STATUS", &status)) return;
+    statuses_[status.name] = status;
+    if (!status.vehicle.empty()) vehicles_.insert(status.vehicle);
   }
 
   VehicleReport Report(const LogInfo& info) const {
@@ -93,6 +105,7 @@ class Gatherer {
     report.ends_in = InAir(state_);
     report.origin = origin_.value_or(0);
     report.log_begin = log_begin_;
+    if (const std::string utc = info.Utc(); !utc.empty()) report.metrics["recorded_utc"] = utc;
     AddFigures(&report.metrics);
     AddStages(&report.metrics);
     for (const ChannelInfo& c : info.channels)
@@ -156,6 +169,7 @@ class Gatherer {
   }
 
   void OnTracking(const tracking_t& m) {
+    follows_ = m.following == tracking_t::PLAN || m.following == tracking_t::STOP;
     errors_.push_back(bus::ToVector(m.error).norm());
     error_series_.Add(Time(m.utime), errors_.back());
   }
@@ -164,6 +178,7 @@ class Gatherer {
     ++plans_;
     fallbacks_ += m.verdict > plan_t::WIDER;
     verdict_.Add(Time(m.utime), VerdictName(m.verdict), m.reason);
+    paths_.Add(Time(m.utime), bus::FromMessage(m.position, *origin_));
     if (m.certified_clearance < 0.0) return;
     ++certified_;
     least_clearance_ = std::min(least_clearance_.value_or(1e9), m.certified_clearance);
@@ -189,6 +204,13 @@ class Gatherer {
     return all > 0 ? Json(static_cast<double>(part) / static_cast<double>(all)) : Json();
   }
 
+  Json SweepsToSetpoints() const {
+    std::vector<double> ms;
+    for (const auto& [heard, latency] : sweeps_.samples())
+      ms.push_back(1e-3 * static_cast<double>(latency));
+    return Quantiles(ms);
+  }
+
   void AddFigures(Json* m) const {
     Json& j = *m;
     j["truth"] = false;
@@ -206,6 +228,8 @@ class Gatherer {
     j["certified_ratio"] = Share(certified_, plans_);
     j["certified_clearance_m"] = least_clearance_ ? Json(*least_clearance_) : Json();
     j["tracking_error_m"] = Quantiles(errors_);
+    j["sweep_to_setpoint_ms"] = SweepsToSetpoints();
+    if (!vehicles_.empty()) j["vehicles"] = vehicles_;
     for (const auto& [channel, latencies] : latencies_)
       j["latency_ms"][channel] = Quantiles(latencies);
     if (!states_.empty()) j["flight_states"] = states_;
@@ -220,19 +244,13 @@ class Gatherer {
     }
   }
 
-  static Json Points(const std::vector<std::pair<double, double>>& points) {
-    Json x = Json::array(), y = Json::array();
-    for (const auto& [a, b] : points) {
-      x.push_back(Rounded(a));
-      y.push_back(Rounded(b));
-    }
-    return {{"x", x}, {"y", y}};
-  }
-
   void AddSeries(Json* series) const {
     Json& j = *series;
-    j["chaser"] = Points(chaser_);
-    j["target"] = Points(seen_);
+    j["chaser"] = Points(chaser_, false);
+    j["target"] = Points(seen_, false);
+    j["perceived"] = Points(Shadows(PerceivedIn(obstacles_)), true);
+    j["predictions"] = Points(predictions_.outlines(), false);
+    j["plans"] = Points(paths_.outlines(), false);
     for (const auto& [name, values] : {std::pair("distance", &distances_),
                                        {"certified", &clearances_},
                                        {"speed", &speeds_},
@@ -253,7 +271,10 @@ class Gatherer {
   }
 
   std::optional<int64_t> origin_;
-  int64_t first_event_ = 0;                                 // by the log's stamps, us
+  int64_t first_event_ = 0, last_event_ = 0;  // by the log's stamps, us
+  SweepLatency sweeps_;                       // of those while control follows a plan or its stop
+  bool follows_ = false;
+  std::set<std::string> vehicles_;
   double log_begin_ = 0.0, end_ = 0.0, next_shown_ = -1e9;  // s
   Lane health_, target_, verdict_, flight_;
   long poses_ = 0, targets_ = 0, tracked_ = 0, plans_ = 0, fallbacks_ = 0, certified_ = 0;
@@ -261,7 +282,9 @@ class Gatherer {
   long frame_changes_ = 0;
   Eigen::Vector3d last_p_ = Eigen::Vector3d::Zero();
   double path_ = 0.0, speed_ = 0.0, sigma_ = 0.0;
-  std::vector<std::pair<double, double>> chaser_, seen_;
+  Outline chaser_, seen_;
+  Fan predictions_, paths_;  // of the target; of the plans
+  obstacles_t obstacles_{};  // the last
   std::optional<double> least_clearance_;
   Series distances_, clearances_, speeds_, sigmas_, target_sigmas_, error_series_;
   std::map<std::string, Series> latency_series_;

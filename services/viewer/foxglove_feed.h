@@ -3,8 +3,10 @@
 #include <cstdint>
 #include <map>
 #include <string>
+#include <type_traits>
 #include <vector>
 
+#include "chase/plan_t.hpp"
 #include "common/logs/foxglove.h"
 #include "services/viewer/server.h"
 
@@ -18,6 +20,8 @@ class FoxgloveFeed {
 
   template <class T>
   void Offer(const std::string& channel, const T& message) {
+    if constexpr (std::is_same_v<T, plan_t>)
+      options_.hard_radius[message.vehicle] = message.hard_radius;
     if (!Needs(channel)) return;
     std::vector<uint8_t> bytes(static_cast<size_t>(message.getEncodedSize()));
     message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
@@ -30,7 +34,7 @@ class FoxgloveFeed {
   uint32_t IdOf(const std::string& topic, const std::string& schema);
 
   Server& server_;
-  const logs::ViewerOptions options_;
+  logs::ViewerOptions options_;
   std::map<std::string, uint32_t> ids_;                      // by topic
   std::map<std::string, std::vector<uint32_t>> of_channel_;  // what a channel's messages become
 };

@@ -16,6 +16,7 @@
 #include "common/bus/lockstep.h"
 #include "common/bus/log_bus.h"
 #include "common/bus/part_file.h"
+#include "common/bus/run_service.h"
 #include "common/bus/stamp_order.h"
 #include "common/bus/status.h"
 #include "common/config/version.h"
@@ -245,6 +246,50 @@ TEST(LogBus, TicksALiveProcessWhereItWasTicked) {
   replay.Run(&again);
   EXPECT_EQ(Messages(out, "COUNT"), Messages(in, "COUNT"));
   EXPECT_GT(Messages(out, "COUNT").size(), 100u);
+}
+
+template <class T>
+Bus::Bytes Encoded(const T& message) {
+  Bus::Bytes bytes(static_cast<size_t>(message.getEncodedSize()));
+  message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
+  return bytes;
+}
+
+/// What a replay with the configuration "123456789", whose cksum is 930766865, says on stderr of a
+/// log whose process told `flown` as its version.
+std::string ComplaintAbout(const std::string& flown) {
+  const std::string in = TempFile("flown"), out = TempFile("flown_out");
+  LogWriter log(in);
+  log.Write(1, "IMU", Encoded(imu_t{}));
+  status_t status{};
+  status.sender = status.name = "counter";
+  status.version = flown;
+  log.Write(2, "COUNTER_STATUS", Encoded(status));
+  log.Close();
+  ServiceSpec spec;
+  spec.name = "counter";
+  spec.dump_config = [] { return "123456789"; };
+  spec.make_node = [](Bus& bus) { return std::make_unique<Counter>(bus); };
+  std::string arguments[] = {"chase-counter", "--replay", in, "--out", out};
+  std::vector<char*> argv;
+  for (std::string& argument : arguments) argv.push_back(argument.data());
+  testing::internal::CaptureStderr();
+  EXPECT_EQ(RunService(spec, static_cast<int>(argv.size()), argv.data()), 0);
+  return testing::internal::GetCapturedStderr();
+}
+
+TEST(LogBus, AReplayTellsThatItIsNotOfWhatFlew) {
+  EXPECT_EQ(ComplaintAbout(LiveVersion("123456789")), "");
+  EXPECT_EQ(ComplaintAbout(config::Version()), "") << "an older version tells no configuration";
+  const std::string configured = ComplaintAbout(LiveVersion("other"));
+  EXPECT_NE(configured.find("flown with configuration 910063178"), std::string::npos) << configured;
+  EXPECT_NE(configured.find("this is configuration 930766865"), std::string::npos) << configured;
+  EXPECT_NE(configured.find("use --config"), std::string::npos) << configured;
+  const std::string commit = ComplaintAbout("0.0.1 (commit 1a2b), host b, configuration 930766865");
+  EXPECT_NE(commit.find("flown with configuration 930766865, 0.0.1 (commit 1a2b); this is"),
+            std::string::npos)
+      << commit;
+  EXPECT_EQ(commit.find("--config"), std::string::npos) << "it is the one that flew";
 }
 
 TEST(LogBus, MissingInputIsAnErrorAndLeavesNoOutput) {

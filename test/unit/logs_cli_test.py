@@ -416,7 +416,7 @@ class LogTools(unittest.TestCase):
         for topic, schema in (("LIDAR_SCAN", "PointCloud"), ("CAMERA_IMAGE", "RawImage"),
                               ("CAMERA_IMAGE/calibration", "CameraCalibration"),
                               ("POSE/pose", "PoseInFrame"), ("/tf", "FrameTransforms"),
-                              ("OBSTACLES/scene", "SceneUpdate"), ("PLAN/scene", "SceneUpdate"),
+                              ("OBSTACLES/scene", "SceneUpdate"), ("OBSTACLES/grown", "SceneUpdate"), ("PLAN/scene", "SceneUpdate"),
                               ("TARGET/scene", "SceneUpdate"), ("PLANNING_STATUS/log", "Log")):
             self.assertEqual(topics[topic]["schema"], f"foxglove.{schema}")
         pose = topics["POSE"]["first"]

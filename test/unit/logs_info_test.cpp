@@ -1,9 +1,12 @@
 #include <gtest/gtest.h>
 
 #include <map>
+#include <numeric>
+#include <optional>
 #include <random>
 #include <set>
 
+#include "chase/camera_image_t.hpp"
 #include "chase/status_t.hpp"
 #include "common/bus/bus.h"
 #include "common/bus/log_writer.h"
@@ -109,6 +112,38 @@ TEST(LogInfo, WhatOthersHeardBehindTheLastMessageIsMissing) {
   ASSERT_EQ(info.channels.size(), 2u);
   EXPECT_EQ(info.channels[1].missing, 3);
   EXPECT_EQ(info.channels[1].longest_gap, 11);
+}
+
+/// Images of those numbers, and a recorder in `state` where that is given.
+bool RecordedWith(const std::vector<int32_t>& seqs, std::optional<int8_t> state = {}) {
+  const std::string file = Temp("images.lcm");
+  bus::LogWriter out(file);
+  int64_t utime = 1;
+  for (const int32_t seq : seqs) {
+    camera_image_t image{};
+    image.seq = seq;
+    image.sender_start = 1;  // after the log's beginning: its first number is 0
+    out.Write(utime++, "v1/CAMERA_IMAGE", Encoded(image));
+  }
+  status_t status{};
+  status.name = "recorder";
+  status.state = state.value_or(status_t::OK);
+  if (state) out.Write(utime, "v1/RECORDER_STATUS", Encoded(status));
+  out.Close();
+  return Describe(file).Recorded();
+}
+
+TEST(LogInfo, HeavyChannelsLoseAsLittleUnlessTheRecorderLeftThemOut) {
+  std::vector<int32_t> whole(200), tail(whole.begin() + 100, whole.end());
+  std::iota(whole.begin(), whole.end(), 0);
+  std::iota(tail.begin(), tail.end(), 100);
+  EXPECT_TRUE(RecordedWith(whole));
+  EXPECT_TRUE(RecordedWith(tail)) << "a recorder drops its oldest heavy logs";
+  std::vector<int32_t> half;
+  for (int32_t seq = 0; seq < 200; seq += 2) half.push_back(seq);
+  EXPECT_FALSE(RecordedWith(half));
+  EXPECT_FALSE(RecordedWith(half, status_t::OK));
+  EXPECT_TRUE(RecordedWith(half, status_t::DEGRADED)) << "the disk was nearly full";
 }
 
 TEST(LogInfo, ALogCutOffAnywhereIsReadAsFarAsItGoes) {

@@ -518,7 +518,9 @@ TEST(Metrics, AFlightWhoseLogLostAHundredthFails) {
   EXPECT_EQ(Compute(record).lost_messages.at("IMU"), 10);
   record.log.channels[0].missing = 11;
   EXPECT_FALSE(Compute(record).criteria.at("recorded"));
-  record.log.channels[0].channel = "CAMERA_IMAGE";  // may be left out of a recording
+  record.log.channels[0].channel = "CAMERA_IMAGE";
+  EXPECT_FALSE(Compute(record).criteria.at("recorded"));
+  record.log.channels[0].missing_first = 1;  // a recorder drops the oldest
   EXPECT_TRUE(Compute(record).Passed());
   record.log.damage = {{1000, 10, true}};
   EXPECT_FALSE(Compute(record).Passed());

@@ -8,6 +8,8 @@
 
 #include "chase/attitude_setpoint_t.hpp"
 #include "chase/flight_state_t.hpp"
+#include "chase/lidar_scan_t.hpp"
+#include "chase/scan_registered_t.hpp"
 #include "chase/tracking_t.hpp"
 #include "logs/src/metrics.h"
 #include "logs/src/read_flight.h"
@@ -246,8 +248,83 @@ TEST(Report, WithoutTruthItTellsWhatTheVehicleSaid) {
   for (const char* key : {"distance", "certified", "speed", "pose_sigma", "target_sigma"})
     EXPECT_FALSE(page["data"][key]["t"].empty()) << key;
   EXPECT_FALSE(page["data"].contains("clearance"));  // only truth knows it
+  EXPECT_FALSE(page["metrics"].contains("recorded_utc")) << "logical time has no date";
   EXPECT_EQ(page["vehicle"], page["metrics"]);
   EXPECT_GT(page["playback"]["frames"].size(), 100u);
+}
+
+TEST(Report, TheMapHasWhatTheVehicleBelievedWithTruthOrWithout) {
+  const std::string log = Fresh("believed") + "/flight.lcm";
+  testing::WriteSyntheticLog(log, kYaml);
+  const auto with = ReportFlight(log, {true, false, ""}).page["data"];
+  const auto without = ReportFlight(log, {false, false, ""}).page["data"];
+  for (const char* key : {"perceived", "plans", "predictions"}) {
+    ASSERT_FALSE(with.at(key).empty()) << key;
+    ASSERT_EQ(without.at(key).size(), with.at(key).size()) << key;
+    const std::vector<double> x = with.at(key).back()["x"], same = without.at(key).back()["x"];
+    ASSERT_EQ(same.size(), x.size()) << key;
+    for (size_t i = 0; i < x.size(); ++i) EXPECT_NEAR(same[i], x[i], 1.1e-3) << key;  // rounded
+  }
+}
+
+/// Puts messages that say what they were made from into a live log.
+class LiveLog {
+ public:
+  explicit LiveLog(const std::string& file) : out_(file) {}
+  template <class T>
+  void Put(int64_t t, const std::string& channel, T m,  // t: ms
+           const std::map<std::string, int32_t>& inputs = {}) {
+    m.utime = kBegin + 1000 * t;
+    m.vehicle = "v1/";
+    for (const auto& [name, seq] : inputs) m.inputs.push_back({name, seq});
+    m.n_inputs = static_cast<int32_t>(m.inputs.size());
+    out_.Write(m.utime, "v1/" + channel, m);
+  }
+  /// A sweep whose setpoint comes 45 ms later.
+  void PutSweep(int64_t t, int32_t seq) {
+    lidar_scan_t scan{};
+    scan.seq = seq;
+    Put(t, "LIDAR_SCAN", scan);
+    if (seq == 0) return;  // nobody registers the first
+    scan_registered_t registered{};
+    registered.seq = seq;
+    Put(t + 10, "SCAN_REGISTERED", registered, {{"LIDAR_SCAN", seq}});
+    obstacles_t obstacles{};
+    obstacles.seq = seq;
+    Put(t + 30, "OBSTACLES", obstacles, {{"SCAN_REGISTERED", seq}});
+    plan_t plan{};
+    plan.seq = seq;
+    Put(t + 40, "PLAN", plan, {{"OBSTACLES", seq}});
+    Put(t + 45, "ATTITUDE_SETPOINT", attitude_setpoint_t{}, {{"PLAN", seq}});
+  }
+  void Close() { out_.Close(); }
+
+ private:
+  static constexpr int64_t kBegin = 1'700'000'000'000'000;  // 2023-11-14 22:13:20 UTC, us
+  OutputLog out_;
+};
+
+TEST(Report, WithoutTruthItTellsDateVehicleAndTheLatencyOfSweeps) {
+  const std::string log = Fresh("live") + "/flight.lcm";
+  LiveLog live(log);
+  pose_t pose{};
+  pose.orientation[0] = 1.0;
+  live.Put(0, "POSE", pose);
+  live.PutSweep(10, 0);  // while it stands
+  tracking_t tracking{};
+  tracking.following = tracking_t::PLAN;
+  live.Put(5000, "TRACKING", tracking);
+  for (int32_t seq = 1; seq <= 10; ++seq) live.PutSweep(5000 + 100 * seq, seq);
+  status_t status{};
+  status.name = "planning";
+  live.Put(6900, "PLANNING_STATUS", status);
+  live.Close();
+  const auto metrics = ReportFlight(log, {false, false, ""}).page["metrics"];
+  EXPECT_EQ(metrics.value("recorded_utc", ""), "2023-11-14 22:13:20");
+  EXPECT_EQ(metrics.value("vehicles", std::vector<std::string>()), std::vector<std::string>{"v1/"});
+  const auto latency = metrics.value("sweep_to_setpoint_ms", nlohmann::ordered_json());
+  EXPECT_EQ(latency.value("p50", -1.0), 45.0) << latency;
+  EXPECT_EQ(latency.value("max", -1.0), 45.0) << "a sweep that came before the plans counts";
 }
 
 TEST(Report, AMissingLibraryIsNamedWithTheCure) {

@@ -6,6 +6,7 @@
 #include <map>
 #include <vector>
 
+#include "common/logs/foxglove.h"
 #include "common/logs/foxglove_scene.h"
 #include "common/world/forecast.h"
 
@@ -78,6 +79,41 @@ TEST(FoxgloveScene, AMoverHasAnArrowAsLongAsItsWay) {
   ASSERT_EQ(drawn[kArrows].size(), 1U);
   const Parts arrow = PartsOf(drawn[kArrows][0]);
   EXPECT_DOUBLE_EQ(arrow.doubles.at(2) + arrow.doubles.at(4), 5.0);
+}
+
+TEST(FoxgloveScene, ObstaclesAreGrownByTheRadiusOfTheirVehiclesLastPlan) {
+  obstacle_t box{};
+  box.kind = obstacle_t::STATIC;
+  box.solid = obstacle_t::BOX;
+  box.half[0] = box.half[1] = box.half[2] = 0.5;
+  box.orientation[0] = 1.0;
+  box.shape[0] = box.shape[3] = box.shape[5] = 1.0;
+  box.center = Along(0, 0);
+  obstacle_t ground = box, ball = box;
+  ground.kind = obstacle_t::GROUND;
+  ball.solid = obstacle_t::ELLIPSOID;
+  obstacles_t m{};
+  m.obstacles = {box, ground, ball};
+  m.n_obstacles = 3;
+  m.vehicle = "v1/";
+  std::vector<uint8_t> bytes(static_cast<size_t>(m.getEncodedSize()));
+  m.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
+  const auto grown = [&](const ViewerOptions& options) {
+    for (const ViewerMessage& drawn : ToViewer({1, "v1/OBSTACLES", bytes}, options))
+      if (drawn.topic == "v1/OBSTACLES/grown") return Drawn(drawn.bytes);
+    return std::map<int, std::vector<std::string>>();
+  };
+  EXPECT_EQ(grown({}).count(kCubes), 0U) << "no plan was heard";
+  ViewerOptions options;
+  options.hard_radius = {{"v1/", 0.3}, {"v2/", 7.0}};
+  auto drawn = grown(options);
+  ASSERT_EQ(drawn[kCubes].size(), 1U) << "without the ground";
+  ASSERT_EQ(drawn[kSpheres].size(), 1U);
+  const auto width = [](const std::string& solid) {
+    return PartsOf(PartsOf(solid).nested.at(kSize).at(0)).doubles.at(1);
+  };
+  EXPECT_NEAR(width(drawn[kCubes][0]), 2 * (0.5 + 0.3), 1e-9);
+  EXPECT_NEAR(width(drawn[kSpheres][0]), 2 * (1.0 + 0.3), 1e-9);
 }
 
 TEST(FoxgloveScene, ATargetHasThreeSigmaAsLongAsItIsKnown) {
