@@ -181,9 +181,9 @@ TEST(LogExport, McapHoldsEveryMessageBetweenItsMagics) {
     if (bytes[at] == 11) counted = number(at + 9);
   }
   EXPECT_EQ(at, bytes.size() - 8);
-  EXPECT_EQ(counted, 28u);  // OBSTACLES has a scene beside it
-  const std::map<int, int> expected = {{1, 1}, {2, 1}, {3, 3},  {4, 3}, {6, 1},
-                                       {7, 3}, {8, 1}, {11, 1}, {15, 1}};
+  EXPECT_EQ(counted, 32u);  // OBSTACLES has a scene beside it, and one of grown shapes
+  const std::map<int, int> expected = {{1, 1}, {2, 1}, {3, 4},  {4, 4}, {6, 1},
+                                       {7, 4}, {8, 1}, {11, 1}, {15, 1}};
   EXPECT_EQ(records, expected);
 }
 
