@@ -19,13 +19,14 @@ void Commander::Hear(const command_ack_t& ack) {
 std::string Commander::RefusalHere(const Request& request) const {
   std::string refusal = RefusalOf(request, token_);
   if (refusal.empty() && !live_) refusal = "a log is played: nobody flies";
-  if (refusal.empty() && request.caller == 0) refusal = LateRefusal(request);
+  if (refusal.empty()) refusal = LateRefusal(request);
   if (refusal.empty() && given_.size() >= kMost) refusal = "too many commands are not answered yet";
   return refusal;
 }
 
 std::string Commander::LateRefusal(const Request& request) const {
-  if (!request.utime) return "does not say when it was given";
+  const bool rests = request.command == "stop" || request.command == "hold";
+  if (!request.utime || rests) return "";
   const double age = bus::Seconds(bus_.Now(), *request.utime);
   if (world::IsFresh(age, kLatest)) return "";
   char words[48];

@@ -36,6 +36,7 @@ class Commander {
   static constexpr double kLatest = 2.0;  // s; a link that is slower is none to command by
   std::string RefusalHere(const Request& request) const;
   /// Of what waited in a link that stalled: a page gives a command at the time of its newest state.
+  /// What brings the vehicle to rest is never late.
   std::string LateRefusal(const Request& request) const;
   void Settle(const Request& request, const std::string& refusal, const std::string& words);
 
