@@ -16,6 +16,7 @@ struct MostAge {
   double target_unseen = 1.5;  ///< prediction: since it was seen; mapping: it is an obstacle then
   double target = 0.5;         ///< mission: not ready, in flight lost; ten frames of the camera
   double status = 2.5;         ///< mission: not ready; two that are sent once a second may be lost
+  double tracking = 0.3;       ///< planning: how far the body strays is not known, tubes are widest
   double flight_state = 2.0;   ///< planning: holds where it chased, searched or returned; a process
                                ///< that died is back within that
   double setpoint = 0.5;       ///< fcu: leaves the vehicle to the autopilot, whose own limit is 1 s
@@ -24,6 +25,10 @@ struct MostAge {
   double command = 10.0;      ///< mission: refused; chase-command repeats for half of that
 };
 inline constexpr MostAge kMostAge;
+
+/// By more, s, somebody set a clock back: planning and control forget plans. Messages are late by
+/// less.
+inline constexpr double kSetBack = 0.3;
 
 /// `age` [s] within `most`; what is stamped ahead by more than messages are late goes by another
 /// clock, and its age is not known.

@@ -10,10 +10,9 @@ namespace chase::control {
 
 namespace {
 
-constexpr double kJumpBack = 0.3;  // s; messages are late by less
-constexpr double kSame = 0.01;     // m: planning takes the start from the plan that is flown
-constexpr double kAtRest = 0.3;    // m/s: gusts about a wind of 3 m/s stir a hovering body by less
-constexpr double kAtEnd = 0.3;     // m: planning asks for as much free ground beside the body
+constexpr double kSame = 0.01;   // m: planning takes the start from the plan that is flown
+constexpr double kAtRest = 0.3;  // m/s: gusts about a wind of 3 m/s stir a hovering body by less
+constexpr double kAtEnd = 0.3;   // m: planning asks for as much free ground beside the body
 constexpr double kLongestWay = 45.0;  // s to above the ground that planning chose, at 2.2 s a metre
 // m/s: POSE of the sentinels has 0.03, and a second without sweeps adds filter.doubt_accel's 0.1.
 constexpr double kMeasured = 0.1;
@@ -210,7 +209,7 @@ void Controller::TurnFrame(double yaw) {
 
 // Somebody set the clock: plans are of another time, and the body still flies.
 void Controller::FollowTimeBack(double t) {
-  if (!last_t_ || t >= *last_t_ - kJumpBack) return;
+  if (!last_t_ || t >= *last_t_ - world::kSetBack) return;
   const double back = t - *last_t_;
   for (double* time : {&last_usable_, &last_measured_, &asked_to_land_}) *time += back;
   reckoning_.Shift(back);

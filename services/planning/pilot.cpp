@@ -13,10 +13,9 @@ namespace chase::planning {
 namespace {
 
 constexpr double kShortestHorizon = 1.0;
-constexpr double kJumpBack = 0.3;  // s: by more a clock was set back, messages are late by less
-constexpr double kLeg = 2.5;       // desired distances: the planner is led to nothing farther off
-constexpr double kGoes = 0.5;      // m: a plan that looks for it is worth that at least
-constexpr double kSettles = 0.3;   // s: a turn ends so
+constexpr double kLeg = 2.5;      // desired distances: the planner is led to nothing farther off
+constexpr double kGoes = 0.5;     // m: a plan that looks for it is worth that at least
+constexpr double kSettles = 0.3;  // s: a turn ends so
 
 // Rest to rest from a to b, minimum jerk.
 world::Trajectory RestToRest(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double start,
@@ -57,11 +56,17 @@ Pilot::Pilot(const PlanningConfig& config)
     : config_(config),
       planner_(MakePlanner(config.planner_name, config.planner)),
       tube_{config.planner.tracking_tube},
-      tracking_bound_(tube_.radius),
       search_(config) {}
 
-void Pilot::SetTrackingBound(double bound) {
+void Pilot::SetTrackingBound(double t, double bound) {
+  tracking_time_ = t;
   tracking_bound_ = std::isfinite(bound) ? std::max(bound, 0.0) : kWidestTube;
+}
+
+double Pilot::TrackingBound(double t) const {
+  if (!tracking_time_) return config_.planner.tracking_tube;
+  return world::IsFresh(t - *tracking_time_, world::kMostAge.tracking) ? tracking_bound_
+                                                                       : kWidestTube;
 }
 
 void Pilot::SetForecast(const Forecast& forecast) {
@@ -133,8 +138,8 @@ bool Pilot::MayPlan(double t) const {
 }
 
 std::optional<PlanResult> Pilot::Update(double t, const BodyEstimate& body) {
-  if (has_running_ && t < last_planned_ - kJumpBack) ChangeFrame();  // of the clock
-  tube_ = MakeTube(config_, body, tracking_bound_, Chases());
+  if (has_running_ && t < last_planned_ - world::kSetBack) ChangeFrame();  // of the clock
+  tube_ = MakeTube(config_, body, TrackingBound(t), Chases());
   const double t0 = t + config_.latency;
   const Start start = StartAt(t, t0, body);
   news_ = news_ || !start.follows;

@@ -46,9 +46,9 @@ class Pilot {
     airborne_ = airborne_ || (flying && !has_running_);
   }
 
-  /// How far control says the body strays from what it follows, m: the tube about plans holds that
-  /// and the deviation of the estimate's place.
-  void SetTrackingBound(double bound);
+  /// How far control says at `t` [s] the body strays from what it follows, m: the tube about plans
+  /// holds that and the deviation of the estimate's place. Once heard it goes stale.
+  void SetTrackingBound(double t, double bound);
   /// Of the drone's sphere and the tube about the newest plan, m.
   double hard_radius() const { return config_.planner.drone_radius + tube_.radius; }
 
@@ -105,6 +105,7 @@ class Pilot {
   PlanResult Along(const PlanRequest& request, const Start& start, Stop leg,
                    const MayFly& may_fly) const;
   bool SeesObstacles(double t) const;
+  double TrackingBound(double t) const;
   PlanResult Search(double t0, const Start& start, const BodyEstimate& body);
   PlanResult BrakeAndLook(double t0, const Start& start, double yaw) const;
 
@@ -117,7 +118,8 @@ class Pilot {
   PlanResult running_;
   bool has_running_ = false;
   Tube tube_;
-  double tracking_bound_;  ///< m
+  std::optional<double> tracking_time_;  ///< s
+  double tracking_bound_ = 0.0;          ///< m
   double last_planned_ = -1e9;
   bool news_ = false;
   bool airborne_ = false;

@@ -85,7 +85,7 @@ PlanningNode::PlanningNode(bus::Bus& bus, const PlanningConfig& config)
   bus_.Subscribe<tracking_t>("TRACKING", [this](const tracking_t& m) {
     pilot_.SetFlying(m.following != tracking_t::NONE);
     pilot_.SetDescending(m.following == tracking_t::LAND);
-    pilot_.SetTrackingBound(m.bound);
+    pilot_.SetTrackingBound(bus::Seconds(m.utime, Origin(m.utime)), m.bound);
   });
   bus_.Subscribe<flight_state_t>("FLIGHT_STATE", [this](const flight_state_t& m) { OnState(m); });
   bus_.Subscribe<status_t>("FCU_STATUS", [this](const status_t& m) { autopilot_.Hear(m); });

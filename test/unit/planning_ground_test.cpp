@@ -297,7 +297,7 @@ TEST(Rest, OutOfTheGroundItClimbsWithinTheLimits) {
 
 TEST(Pilot, TheTubeHoldsTheDeviationOfTheEstimate) {
   Pilot pilot{PlanningConfig()};
-  pilot.SetTrackingBound(0.1);
+  pilot.SetTrackingBound(0.0, 0.1);
   BodyEstimate body;
   body.position_covariance.diagonal().setConstant(0.04 * 0.04);
   pilot.Update(0.0, body);
@@ -305,6 +305,20 @@ TEST(Pilot, TheTubeHoldsTheDeviationOfTheEstimate) {
   body.position_covariance(0, 0) = std::nan("");
   pilot.Update(0.1, body);
   EXPECT_NEAR(pilot.hard_radius(), 0.25 + 0.3, 1e-9);
+}
+
+TEST(Pilot, TheTubeIsTheWidestWhereControlFellSilent) {
+  Pilot pilot{PlanningConfig()};
+  const auto tube = [&](double t) {
+    pilot.Update(t, {});
+    return pilot.hard_radius() - PlannerConfig{}.drone_radius;
+  };
+  EXPECT_NEAR(tube(9.0), 0.12, 1e-9);  // not heard yet
+  pilot.SetTrackingBound(10.0, 0.15);
+  EXPECT_NEAR(tube(10.25), 0.15, 1e-9);
+  EXPECT_NEAR(tube(10.35), 0.3, 1e-9);
+  pilot.SetTrackingBound(10.36, 0.15);
+  EXPECT_NEAR(tube(10.4), 0.15, 1e-9);
 }
 
 /// Along x, its face at y = 1.9 m.
@@ -326,7 +340,7 @@ TEST(Pilot, AFrameThatDriftsKeepsOffStaticObstacles) {
   const auto room = [&](double bound, double sigma, bool seen) {
     Pilot pilot(config);
     pilot.SetFlying(true);
-    pilot.SetTrackingBound(bound);
+    pilot.SetTrackingBound(0.0, bound);
     const world::Obstacle wall = Wall();
     pilot.SetObstacles(0.0, seen ? std::vector{wall} : std::vector<world::Obstacle>());
     pilot.SetUnseen(0.0, seen ? std::vector<world::Obstacle>() : std::vector{wall});
@@ -371,7 +385,7 @@ TEST(Pilot, OnTheWayBackTheTubeHoldsNoDrift) {
   for (double y = 1.0; y < 1.5; y += 0.05) {
     Pilot pilot(config);
     pilot.SetFlying(true);
-    pilot.SetTrackingBound(0.0);
+    pilot.SetTrackingBound(0.0, 0.0);
     pilot.SetObstacles(0.0, {Wall()});
     pilot.SetTask(Task::kReturn, Vector3d(7.9, y, 0.0));
     BodyEstimate body{{0.0, y, config.takeoff_height}, Vector3d::Zero(), 0.0};
