@@ -119,8 +119,13 @@ void Tracker::Correct(const Cluster& cluster, Track* track) const {
 void Tracker::Confirm(Track* track) const {
   const double speed = track->body.v().norm();
   const double sigma = std::sqrt(track->body.VelocityVariance());
-  track->stood = speed > kRestSpeed ? 0 : track->stood + 1;
-  if (speed > kRestSpeed) track->moved = t_;
+  if (speed <= kRestSpeed) {
+    ++track->stood;
+    track->rest = track->body.p();
+  } else {
+    track->moved = t_;
+    if ((track->body.p() - track->rest).norm() > 2.0 * track->reach) track->stood = 0;
+  }
   if (track->confirmed) return;
   track->trail.push_back(track->body.p());
   const double travel = (track->body.p() - track->birth).norm();

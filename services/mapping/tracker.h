@@ -21,8 +21,9 @@ struct Track {
   Eigen::Vector2d birth = Eigen::Vector2d::Zero();
   double born = 0.0, seen = 0.0, moved = 0.0;  ///< s: first, last detection; last time not at rest
   double known = 0.0;                          ///< s, when it was confirmed
-  int stood = 0;                               ///< sweeps at rest since it last moved
-  double existence = 0.5;                      ///< probability
+  int stood = 0;                               ///< sweeps at rest, until it has left that place
+  Eigen::Vector2d rest = Eigen::Vector2d::Zero();  ///< where it rested last, m
+  double existence = 0.5;                          ///< probability
   int detections = 0;
   int row = 0;         ///< of them, without a sweep between them in which it was not seen
   double rigid = 0.5;  ///< share of ends in view that moved as those of one body, of late

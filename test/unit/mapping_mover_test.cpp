@@ -227,6 +227,34 @@ TEST(MappingMover, WhoBeginsToWalkIsListedAllTheTime) {
       }
 }
 
+/// Who stood for long and walks on is the one that he was: what the map holds where he stood is his
+/// own until he has left that place.
+TEST(MappingMover, WhoWalksOnKeepsHisId) {
+  constexpr double kStops = 3.0, kWalksOn = 9.0, kSeen = 1.0, kEnd = 13.0;  // s
+  for (const double speed : {0.3, 0.45})
+    for (const double turn : {0.0, 1.6}) {
+      SCOPED_TRACE(::testing::Message() << speed << " m/s, turned by " << turn);
+      std::mt19937 random(3);
+      Mapper mapper(MappingConfig{});
+      std::set<int> ids;
+      for (double t = 0.0; t < kEnd; t += 0.1) {
+        const Eigen::Vector2d stood(3.5, 1.0);
+        const Eigen::Vector2d p =
+            stood + Eigen::Vector2d(0.0, std::min(0.0, t - kStops)) +
+            std::max(0.0, t - kWalksOn) * speed * Eigen::Vector2d(-std::sin(turn), std::cos(turn));
+        testing::World world;
+        world.boxes = {{{12.0, 0.0, 2.0}, {0.1, 9.0, 2.0}}, {{-9.0, 0.0, 2.0}, {0.1, 9.0, 2.0}}};
+        world.cylinders = {{p, 0.25, 0.0, 1.75}};
+        const auto list =
+            mapper.Insert(testing::Scan(world, {0, 0, 1.2}, t, {0.02, 0.01}, &random));
+        for (const auto& o : list.obstacles)
+          if (o.moving) ids.insert(o.id);
+        EXPECT_TRUE(t < kWalksOn + kSeen || list.n_moving == 1) << t;
+      }
+      EXPECT_EQ(ids.size(), 1u);
+    }
+}
+
 TEST(MappingMover, WhatStopsBecomesStatic) {
   std::mt19937 random(3);
   Mapper mapper(MappingConfig{});
