@@ -34,7 +34,7 @@ std::vector<FaultKind> MakeKinds() {
       {"odometry", Needs::kSensors},   {"mapping", Needs::kSensors},
       {"perception", Needs::kSensors}, {"prediction", Needs::kNothing},
       {"planning", Needs::kNothing},   {"control", Needs::kNothing},
-      {"mission", Needs::kMission}};
+      {"mission", Needs::kNothing}};
   for (const auto& [process, needs] : processes) {
     kinds.push_back({"kill-" + process, Effect::kKill, process, kRestart, needs});
     kinds.push_back({"freeze-" + process, Effect::kFreeze, process, kFreeze, needs});
@@ -50,7 +50,7 @@ std::vector<FaultKind> MakeKinds() {
                                                     {"PREDICTION", Needs::kNothing},
                                                     {"PLAN", Needs::kNothing},
                                                     {"ATTITUDE_SETPOINT", Needs::kNothing},
-                                                    {"FLIGHT_STATE", Needs::kMission}};
+                                                    {"FLIGHT_STATE", Needs::kNothing}};
   for (const auto& [channel, needs] : channels)
     kinds.push_back({"delay-" + channel, Effect::kDelay, channel, kFreeze, needs, 0.3});
   const std::string s = "simulator";

@@ -43,7 +43,7 @@ struct FaultKind {
     kDiskFull,    ///< of the recorder
   };
   /// What a flight must have for the fault to strike anything.
-  enum class Needs { kNothing, kSensors, kMission, kRecorder };
+  enum class Needs { kNothing, kSensors, kRecorder };
   std::string name;
   Effect effect;
   std::string victim;  ///< the process or the channel that it strikes

@@ -128,9 +128,9 @@ void AddFaults(const world::Scenario& scenario, const FlightOptions& options,
     if (!misfit.empty() && kind.needs != world::FaultKind::Needs::kRecorder)
       throw std::runtime_error("fault " + fault.name + " " + misfit);
     configs->faults.push_back(world::Settled(fault, flown, options.seed, number++));
-    configs->has_mission |= kind.needs == world::FaultKind::Needs::kMission;
     if (kind.victim == "simulator") configs->simulator.faults.push_back(configs->faults.back());
   }
+  configs->has_mission |= !configs->faults.empty();  // they strike what is deployed
 }
 
 }  // namespace

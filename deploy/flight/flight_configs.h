@@ -43,7 +43,7 @@ struct FlightConfigs {
   lidar::LidarConfig lidar;
   camera::CameraConfig camera;
   std::vector<world::FaultSpec> faults;  ///< each with its time and duration
-  bool has_mission = false;              ///< in lockstep: somebody commands, or a fault strikes it
+  bool has_mission = false;              ///< in lockstep: somebody commands, or a fault strikes
 };
 
 /// Defaults, then what follows from the scenario (the start, sizes, the desired distance), then the

@@ -126,7 +126,19 @@ class Faults(unittest.TestCase):
         self.assertEqual((answer.returncode, answer.stderr), (0, ""))
         self.assertRegex(flight(scenario=scenario).stderr, "disk-full.*fly live")
 
-    def test_mission_flies_where_its_fault_strikes(self):
+    def test_mission_flies_where_a_fault_strikes(self):
+        """As live, whatever the fault; without one nobody tells a state."""
+        log = self.folder / "any.lcm"
+        answer = flight("--fault", "lidar-gap@0.2", "--until", "0.5", "--log", log, "--light")
+        self.assertEqual(answer.returncode, 0, answer.stderr)
+        self.assertEqual(self.states(log)[-1], 3, "CHASE")
+        answer = flight("--until", "0.5", "--log", log, "--light")
+        self.assertEqual((answer.returncode, self.states(log)), (0, []))
+
+    def states(self, log):
+        return [data[lcmlog.after_head(data) + 4] for _, name, data in lcmlog.read(log) if name == "FLIGHT_STATE"]
+
+    def test_mission_starts_anew_in_flight(self):
         """Killed and back 0.5 s later; the state it finds is the flight's."""
         log = self.folder / "mission.lcm"
         answer = flight("--fault", "kill-mission@1", "--until", "3", "--log", log, "--light")
@@ -135,8 +147,7 @@ class Faults(unittest.TestCase):
         self.assertGreater(max(b - a for a, b in zip(told, told[1:])), 0.4)
         self.assertLess(told[0], -7.0)
         self.assertGreater(told[-1], 2.8)
-        states = [data[lcmlog.after_head(data) + 4] for _, name, data in lcmlog.read(log)
-                  if name == "FLIGHT_STATE"]
+        states = self.states(log)
         back = next(i for i, (a, b) in enumerate(zip(told, told[1:]), 1) if b - a > 0.4)
         self.assertEqual({states[back - 1], *states[back + 5:]}, {3}, "CHASE")
 
