@@ -115,9 +115,9 @@ const FaultKind& KindOf(const FaultSpec& fault) {
 std::string FaultSpec::Problem() const {
   const FaultKind* kind = Find(name);
   if (kind == nullptr) return "name is '" + name + "'; it must be one of " + KnownNames();
-  if (!std::isfinite(at))
+  if (!std::isfinite(at) && at != kDrawn)
     return "at is " + config::detail::FormatNumber(at) +
-           "; it must be a mission time in s, or negative to be drawn from the seed";
+           "; it must be a mission time in s, or left out to be drawn from the seed";
   const bool endless = std::isinf(kind->duration);
   if (endless && !(duration < 0.0) && duration != kind->duration)
     return "for is " + config::detail::FormatNumber(duration) + "; " + name +
@@ -129,7 +129,7 @@ std::string FaultSpec::Problem() const {
 }
 
 FaultSpec Settled(FaultSpec fault, double mission, int64_t seed, int number) {
-  if (fault.at < 0.0) {
+  if (fault.at == FaultSpec::kDrawn) {
     uint64_t stream = kStream + static_cast<uint64_t>(number);
     for (const char letter : fault.name) stream = 31 * stream + static_cast<unsigned char>(letter);
     Random random(static_cast<uint64_t>(seed), stream);
@@ -151,10 +151,10 @@ FaultSpec ParseFault(const std::string& text) {
       fault.at = std::stod(number, &used);
     } catch (const std::exception&) {
     }
-    if (used == 0 || used != number.size() || !(fault.at >= 0.0))
+    if (used == 0 || used != number.size() || !std::isfinite(fault.at))
       throw std::runtime_error("'" + number +
-                               "' is no mission time; give NAME@SECONDS with 0 s or " +
-                               "more, or NAME alone for a time drawn from the seed");
+                               "' is no mission time in s; give NAME@SECONDS, or NAME alone for " +
+                               "a time drawn from the seed");
   }
   const std::string problem = fault.Problem();
   if (!problem.empty()) throw std::runtime_error(problem);

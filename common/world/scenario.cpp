@@ -169,10 +169,15 @@ std::string NamedTwice(const std::vector<ServiceOverride>& services) {
   return "";
 }
 
-std::string TooLate(const std::vector<FaultSpec>& faults, double duration_s) {
-  for (std::size_t i = 0; i < faults.size(); ++i) {
-    const std::string problem = Check(faults[i].at < duration_s, "at", Number(faults[i].at),
-                                      "below duration_s, " + Number(duration_s));
+/// A fault before power-on or after the end.
+std::string NeverStrikes(const Scenario& s) {
+  for (std::size_t i = 0; i < s.faults.size(); ++i) {
+    const double at = s.faults[i].at;
+    const bool flown = at == FaultSpec::kDrawn || (at >= -s.settle_s && at < s.duration_s);
+    const std::string problem = Check(flown, "at", Number(at),
+                                      "from -settle_s, " + Number(-s.settle_s) +
+                                          ", to below duration_s, " + Number(s.duration_s) +
+                                          ", or left out to be drawn from the seed");
     if (!problem.empty()) return "faults[" + std::to_string(i) + "]: " + problem;
   }
   return "";
@@ -203,7 +208,7 @@ std::string Scenario::Problem() const {
              "2 or more, or target.path_file be given"),
        Within("world", world), FirstOf("movers", movers), Within("target", target),
        Within("chaser", chaser), Within("sensors", sensors), Within("wind", wind),
-       FirstOf("faults", faults), TooLate(faults, duration_s), FirstOf("commands", commands),
+       FirstOf("faults", faults), NeverStrikes(*this), FirstOf("commands", commands),
        OutOfTime(*this), FirstOf("services", services), NamedTwice(services)});
 }
 

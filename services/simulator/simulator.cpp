@@ -50,7 +50,8 @@ std::string SimulatorConfig::Problem() const {
         Named("hardware", hardware.Problem())})
     if (!problem.empty()) return problem;
   for (const world::FaultSpec& fault : faults)
-    if (fault.at < 0.0) return "faults: " + fault.name + " has no time; give its key at, s";
+    if (fault.at == world::FaultSpec::kDrawn)
+      return "faults: " + fault.name + " has no time; give its key at, s";
   return "";
 }
 

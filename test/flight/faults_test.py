@@ -113,6 +113,9 @@ class Faults(unittest.TestCase):
             self.assertEqual((answer.returncode, answer.stdout), (1, ""))
             self.assertEqual(answer.stderr.count("\n"), 1)
             self.assertRegex(answer.stderr, f"{fault}.*{cure}")
+        answer = flight("--fault", "gust@-8.5")
+        self.assertEqual((answer.returncode, answer.stdout), (1, ""))
+        self.assertRegex(answer.stderr, r"--fault gust@-8.5: faults\[0\]: at is -8.5; it must be from -settle_s, -8, to below .*60")
         answer = flight("--fault", "gust@12", "--until", "12")
         self.assertEqual((answer.returncode, answer.stdout), (1, ""))
         self.assertEqual(answer.stderr, "chase-flight: --fault gust@12: the flight ends at 12 s, before it\n")
@@ -137,6 +140,15 @@ class Faults(unittest.TestCase):
 
     def states(self, log):
         return [data[lcmlog.after_head(data) + 4] for _, name, data in lcmlog.read(log) if name == "FLIGHT_STATE"]
+
+    def test_a_fault_strikes_in_take_off(self):
+        """Planning dies in the climb and goes on with it."""
+        log = self.folder / "climb.lcm"
+        answer = flight("--fault", "kill-planning@-4.5", "--fault", "lidar-gap@-8", "--until", 3, "--log", log, "--light")
+        self.assertEqual((answer.returncode, answer.stderr), (0, ""))
+        self.assertEqual(list(faults(log)), [("lidar-gap", 1, -8.0), ("lidar-gap", 0, -7.0),
+                                             ("kill-planning", 1, -4.5), ("kill-planning", 0, -4.0)])
+        self.assertEqual(self.states(log)[-1], 3, "CHASE")
 
     def test_mission_starts_anew_in_flight(self):
         """Killed and back 0.5 s later; the state it finds is the flight's."""

@@ -82,6 +82,9 @@ TEST(ScenarioFile, FaultsAreChecked) {
   EXPECT_CONTAINS(error, "kill-planning");
   EXPECT_CONTAINS(Refusal(with("{name: kill-simulator}")), "'kill-simulator'");
   EXPECT_CONTAINS(Refusal(with("{name: kill-planning, at: 60}")), "s.yaml:7: faults[0]: at is 60");
+  EXPECT_EQ(ParseScenario(with("{name: kill-planning, at: -8}"), "s.yaml").faults[0].at, -8.0);
+  EXPECT_CONTAINS(Refusal(with("{name: kill-planning, at: -8.1}")),
+                  "at is -8.1; it must be from -settle_s, -8");
   EXPECT_CONTAINS(Refusal(with("{name: kill-planning, at: .nan}")), "at is .nan");
   EXPECT_CONTAINS(Refusal(with("{name: kill-planning, for: 0}")), "for is 0");
   EXPECT_CONTAINS(Refusal(with("{name: kill-planning, for: .inf}")), "for is .inf");
@@ -109,9 +112,10 @@ TEST(ScenarioFile, CommandsAreChecked) {
 
 TEST(Fault, TextIsNameAndTime) {
   EXPECT_EQ(ParseFault("lidar-gap").name, "lidar-gap");
-  EXPECT_LT(ParseFault("lidar-gap").at, 0.0);
+  EXPECT_EQ(ParseFault("lidar-gap").at, FaultSpec::kDrawn);
+  EXPECT_EQ(ParseFault("kill-planning@-2").at, -2.0);
   EXPECT_EQ(ParseFault("kill-planning@12.5").at, 12.5);
-  for (const char* text : {"", "kill-", "kill-planning@", "kill-planning@x", "kill-planning@-1",
+  for (const char* text : {"", "kill-", "kill-planning@", "kill-planning@x", "kill-planning@-inf",
                            "kill-planning@1s", "kill-planning@nan", "kill-planning@inf", "@3"})
     EXPECT_THROW(ParseFault(text), std::runtime_error) << text;
 }
@@ -165,6 +169,7 @@ TEST(Fault, TimesAreDrawnFromSeedNameAndNumber) {
   EXPECT_GT(times.size(), 850u) << "of 1000 draws in steps of 0.01 s";
   EXPECT_NEAR(sum, 45.0, 3.0 * 50.0 / std::sqrt(12.0 * 1000.0));
   EXPECT_EQ(Settled({"kill-planning", 7.0}, 100.0, 3, 0).at, 7.0);
+  EXPECT_EQ(Settled({"kill-planning", -2.0}, 100.0, 3, 0).at, -2.0) << "before the target moves";
 }
 
 TEST(ScenarioFile, MotionsThatMakeNoSenseAreRefused) {
