@@ -88,6 +88,7 @@ void Pilot::SetUnseen(double t, std::vector<world::Obstacle> unseen) {
 void Pilot::ChangeFrame() {
   forecast_.reset();
   search_.Clear();
+  hovers_since_.reset();
   obstacles_.clear();
   unseen_.clear();
   unseen_time_.reset();
@@ -404,7 +405,11 @@ PlanResult Pilot::Rest(double t0, const Start& start) const {
   return plan;
 }
 
-PlanResult Pilot::Hover(double t0, const Start& start) const {
+// Who stands in view is soon seen; who is not may stand anywhere around.
+PlanResult Pilot::Hover(double t0, const Start& start) {
+  constexpr double kSoon = 2.0;  // s
+  if (!hovers_since_) hovers_since_ = t0;
+  if (t0 - *hovers_since_ > kSoon) return BrakeAndLook(t0, start, start.yaw.yaw + 0.5 * M_PI);
   PlanResult plan = Rest(t0, start);
   if (plan.verdict == Verdict::kWait) plan.reason = "nothing to chase yet";
   return plan;
@@ -416,7 +421,8 @@ PlanResult Pilot::BrakeAndLook(double t0, const Start& start, double yaw) const 
   const double rate =
       std::clamp(turn / kSettles, -config_.search_yaw_rate, config_.search_yaw_rate);
   plan.yaw = TurningYaw({start.yaw.yaw, rate}, plan.trajectory.duration);
-  plan.reason = (plan.verdict == Verdict::kWait ? "target lost, looking around" : "target lost") +
+  plan.reason = (search_.has_seen() ? "target lost" : "nothing to chase yet") +
+                std::string(plan.verdict == Verdict::kWait ? ", looking around" : "") +
                 (plan.reason.empty() ? "" : ", " + plan.reason);
   return plan;
 }

@@ -95,7 +95,7 @@ class Pilot {
   PlanResult Climb(double t0, const BodyEstimate& body) const;
   bool IsFree(double t0, const Start& start, const world::Trajectory& climb) const;
   PlanResult ClimbOn(double t0, const Start& start, const BodyEstimate& body);
-  PlanResult Hover(double t0, const Start& start) const;
+  PlanResult Hover(double t0, const Start& start);
   PlanResult Rest(double t0, const Start& start) const;
   PlanResult Obey(double t0, const Start& start, const BodyEstimate& body);
   PlanResult Hold(double t0, const Start& start, const std::string& reason);
@@ -125,6 +125,7 @@ class Pilot {
   bool airborne_ = false;
   bool heard_control_ = false, flies_ = false, descending_ = false, waits_ = false;
   double climb_end_ = 0.0;
+  std::optional<double> hovers_since_;        ///< s, with nobody seen in this frame
   std::optional<Eigen::Vector3d> climb_top_;  ///< p_WB, m
   std::optional<Task> task_;
   std::optional<Eigen::Vector3d> home_;  // m

@@ -304,5 +304,33 @@ TEST(Pilot, AfterItsPlanIsOverItGoesOnFromTheEndOfItsStop) {
   }
 }
 
+// Nobody was seen in this frame: whoever stands in view is soon seen, else the drone turns all the
+// way round.
+TEST(Pilot, LooksAroundForWhomItHasNotSeen) {
+  const PlanningConfig config;
+  Pilot pilot(config);
+  pilot.SetFlying(true);
+  BodyEstimate body{{0.0, 0.0, 1.2}, Eigen::Vector3d::Zero(), 0.5};
+  double turned = 0.0;
+  for (double t = 0.0; t < 12.0; t += 0.05) {
+    if (std::abs(t - 8.0) < 0.01) pilot.ChangeFrame();
+    pilot.SetObstacles(t, {});
+    const auto plan = pilot.Update(t, body);
+    if (plan) {
+      EXPECT_TRUE(plan->verdict == Verdict::kWait || plan->verdict == Verdict::kBrake);
+      EXPECT_EQ(plan->reason.substr(0, 20), "nothing to chase yet");
+    }
+    const world::Trajectory& way = pilot.running().trajectory;
+    const double tau = std::clamp((t - way.start) / way.duration, 0.0, 1.0);
+    const double yaw = YawAt(pilot.running().yaw, tau, way.duration).yaw;
+    turned += yaw - body.yaw;
+    body.yaw = yaw;
+    if (t < 2.0) {
+      EXPECT_NEAR(turned, 0.0, 1e-9) << t;
+    }
+  }
+  EXPECT_GT(turned, 2.0 * M_PI);
+}
+
 }  // namespace
 }  // namespace chase::planning
