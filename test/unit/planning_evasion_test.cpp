@@ -109,6 +109,22 @@ TEST(Evasion, WhereNothingCanBeCertifiedTheContactComesLaterThanAtRest) {
   }
 }
 
+// What comes at it can be passed over only above the ceiling, which counts as what stands there.
+TEST(Evasion, TheLeastHarmIsBelowTheCeiling) {
+  const PlannerConfig config;
+  for (const double above : {0.1, 0.3, 0.5}) {
+    PlanRequest request = Hover();
+    request.start.p.z() = config.z_max - 0.3;
+    world::Obstacle wall = Wall(1, request.start.p.x() - 1.0, 2.0);
+    wall.center.coefficients(0, 2) = request.start.p.z() + above - wall.half.z();
+    request.obstacles = {wall};
+    const PlanResult plan = RestPlan(config, request);
+    EXPECT_EQ(plan.verdict, Verdict::kMitigate) << plan.reason;
+    for (double t = 0.0; t < plan.trajectory.end(); t += 0.05)
+      EXPECT_LT(plan.trajectory.Position(t).z(), config.z_max + 1e-3) << above << " " << t;
+  }
+}
+
 // Where the drone is nothing stands; what the map has there it need not flee from.
 TEST(Evasion, InsideOfWhatStandsItOnlyBrakes) {
   for (const double speed : {0.0, 1.0, -1.0}) {  // farther in, and out

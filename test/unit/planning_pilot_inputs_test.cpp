@@ -231,16 +231,22 @@ TEST(Pilot, AClimbIsBrokenOffWhereSomebodyComes) {
 }
 
 TEST(Pilot, AClimbIsNotBegunAnewInAnotherFrame) {
-  Flight flight{PlanningConfig()};
-  flight.Run(1.5, false);
-  ASSERT_EQ(flight.plans.back().reason, "climbing");
-  flight.pilot.SetFlying(true);
-  flight.pilot.ChangeFrame();
-  const BodyEstimate body = flight.Body();
-  const auto plan = flight.pilot.Update(flight.t, body);
-  ASSERT_TRUE(plan);
-  EXPECT_NE(plan->reason, "climbing");
-  EXPECT_LT(plan->trajectory.Position(plan->trajectory.end()).z(), body.p.z() + 0.5);
+  for (const bool led : {false, true}) {
+    Flight flight{PlanningConfig()};
+    flight.Run(1.5, false);
+    ASSERT_EQ(flight.plans.back().reason, "climbing");
+    flight.pilot.SetFlying(true);
+    flight.pilot.ChangeFrame();
+    if (led) {
+      flight.pilot.SetTask(Task::kTakeoff, std::nullopt);
+      flight.pilot.SetObstacles(flight.t, {});
+    }
+    const BodyEstimate body = flight.Body();
+    const auto plan = flight.pilot.Update(flight.t, body);
+    ASSERT_TRUE(plan);
+    EXPECT_NE(plan->reason, "climbing");
+    EXPECT_LT(plan->trajectory.Position(plan->trajectory.end()).z(), body.p.z() + 0.5);
+  }
 }
 
 TEST(Pilot, WhenTimeJumpsBackItPlansAtOnceFromWhereTheBodyIs) {
