@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "common/bus/channels.h"
 #include "common/config/version.h"
 #include "common/world/fault.h"
 #include "common/world/scenario.h"
@@ -22,10 +23,22 @@ Json CommandOf(const chase::world::CommandSpec& command) {
   return {{"command", command.command}, {"at_s", command.at_s}, {"arguments", words}};
 }
 
-/// In a live flight the simulator strikes with its own faults, and the launcher's part are
-/// processes.
-Json Told(const chase::world::Scenario& scenario, int64_t seed) {
+/// What the launcher does of a fault; nothing: the simulator strikes by itself, or nobody does.
+Json Done(const chase::world::FaultSpec& fault, const chase::world::FaultKind& kind) {
   using Effect = chase::world::FaultKind::Effect;
+  Json done = {{"name", fault.name}, {"at_s", fault.at}, {"for_s", fault.duration}};
+  if (kind.effect == Effect::kKill || kind.effect == Effect::kFreeze) return done;
+  if (kind.effect == Effect::kLoad) {
+    done["times"] = kind.amount;
+    return done;
+  }
+  if (kind.effect != Effect::kFlood) return {};
+  done["rate_hz"] = kind.amount;
+  for (const auto& row : chase::bus::ChannelTable()) done["channels"].push_back(row.channel);
+  return done;
+}
+
+Json Told(const chase::world::Scenario& scenario, int64_t seed) {
   Json told = {{"duration_s", scenario.duration_s}, {"settle_s", scenario.settle_s}};
   told["commands"] = told["faults"] = told["left_out_live"] = Json::array();
   for (const auto& command : scenario.commands) told["commands"].push_back(CommandOf(command));
@@ -33,9 +46,8 @@ Json Told(const chase::world::Scenario& scenario, int64_t seed) {
   for (const auto& spec : scenario.faults) {
     const auto fault = chase::world::Settled(spec, scenario.duration_s, seed, number++);
     const auto& kind = chase::world::KindOf(fault);
-    if (kind.effect == Effect::kKill || kind.effect == Effect::kFreeze)
-      told["faults"].push_back(
-          {{"name", fault.name}, {"at_s", fault.at}, {"for_s", fault.duration}});
+    if (const Json done = Done(fault, kind); !done.is_null())
+      told["faults"].push_back(done);
     else if (kind.victim != "simulator")
       told["left_out_live"].push_back(fault.name);
   }
@@ -47,8 +59,8 @@ Json Told(const chase::world::Scenario& scenario, int64_t seed) {
 /// Checks a scenario file without the services, so that it is the first program that is built.
 int main(int argc, char** argv) {
   CLI::App app(
-      "Checks a scenario file; prints its length, its commands, its faults of processes and those "
-      "that a live flight leaves out as one line of JSON.",
+      "Checks a scenario file; prints its length, its commands, the faults that its launcher brings "
+      "about and those that a live flight leaves out as one line of JSON.",
       "chase-scenario");
   chase::config::AddVersion(&app);
   std::string file;

@@ -16,6 +16,7 @@ import bus
 import places
 import processes
 import results
+import strain
 import version
 
 ROOT, BIN = places.ROOT, places.BIN
@@ -148,7 +149,7 @@ def warn_of_faults(names):
         cures.append(f"a full disk under {ROOT / 'logs'} for disk-full")
     if set(names) != {"disk-full"}:
         cures.append("chase-flight, where they strike")
-    print(f"warning: faults of channels, the bus and the disk are left out of a live flight: {', '.join(names)}; "
+    print(f"warning: faults of channels, losses and the disk are left out of a live flight: {', '.join(names)}; "
           f"cure: {', '.join(cures)}", file=sys.stderr, flush=True)
 
 
@@ -209,13 +210,14 @@ def write_config(folder, scenario, seed, name):
 class Flight:
     """The processes of one flight and the folder that they leave."""
 
-    def __init__(self, scenario, seed, url, commands=(), strikes=(), hardware=False):
+    def __init__(self, scenario, seed, url, commands=(), faults=(), kills=(), hardware=False):
         self.folder = flight_folder(scenario)
         self.scenario, self.seed, self.hardware = scenario, seed, hardware
-        self.env = {"LCM_DEFAULT_URL": url}
+        self.url, self.env = url, {"LCM_DEFAULT_URL": url}
         self.services, self.logger, self.monitor, self.viewer = [], None, None, None
         self.commands, self.given = list(commands), []
-        self.strikes, self.killed = sorted(strikes), []
+        self.faults = {fault["name"]: fault for fault in faults}
+        self.strikes, self.killed, self.strained = sorted(strikes_of(faults, kills)), [], {}
 
     def child(self, name, command, **options):
         return processes.Child(name, command, self.folder / f"{name}.log", self.env, **options)
@@ -279,12 +281,16 @@ class Flight:
                                          [BIN / "chase-command", name, *command["arguments"]]))
 
     def strike(self, mission_time):
-        """Faults of processes whose time has come, and ends of those before."""
+        """Faults whose time has come, and ends of those before."""
         for child in [c for c in self.killed if c.process.poll() is None and c.ready()]:
             self.killed.remove(child)
             self.tell("-", f"kill-{child.name}")
         while self.strikes and self.strikes[0][0] <= mission_time:
             _, effect, name = self.strikes.pop(0)
+            if effect in ("begins", "ends"):
+                print(f"\nt {mission_time:6.1f} s: {name} {effect}", file=sys.stderr, flush=True)
+                self.strain(effect, name)
+                continue
             child = next(c for c in (*self.services, self.logger, self.viewer) if c and c.name == name)
             print(f"\nt {mission_time:6.1f} s: {effect} {'-9 of ' if effect == 'kill' else ''}{name}", file=sys.stderr, flush=True)
             self.tell(*(("-", f"freeze-{name}") if effect == "thaw" else ("+", f"{effect}-{name}")))
@@ -292,6 +298,17 @@ class Flight:
             if effect == "kill":
                 child.process.wait()
                 self.killed.append(child)
+
+    def strain(self, effect, fault):
+        """Begins or ends what strains all processes."""
+        self.tell("+" if effect == "begins" else "-", fault)
+        if effect == "begins":
+            for command in strain.commands(self.faults[fault], self.url):
+                self.strained.setdefault(fault, []).append(self.child(fault, command))
+            return
+        for child in self.strained.pop(fault, []):
+            child.process.kill()
+            child.process.wait()
 
     def tell(self, sign, fault):
         """The monitor has it logged, for the report."""
@@ -328,7 +345,8 @@ class Flight:
 
     def stop(self):
         """Services first, the logger last, so that the log holds their last words."""
-        extras = [c for c in (self.monitor, self.viewer, *self.given) if c]
+        strained = [c for children in self.strained.values() for c in children]
+        extras = [c for c in (self.monitor, self.viewer, *self.given, *strained) if c]
         processes.stop(self.services + extras)
         if self.logger:
             processes.stop([self.logger])
@@ -372,13 +390,17 @@ def report(folder):
 
 
 def strikes_of(faults, kills):
-    """(mission time in s, effect, process) of a scenario's faults of processes and the command line's kills."""
+    """(mission time in s, effect, process or fault) of a scenario's faults and the command line's kills."""
     strikes = [(t, "kill", name) for name, t in kills]
     for fault in faults:
         effect, _, name = fault["name"].partition("-")
+        end = fault["at_s"] + fault["for_s"]
+        if effect not in STRIKES:
+            strikes += [(fault["at_s"], "begins", fault["name"]), (end, "ends", fault["name"])]
+            continue
         strikes.append((fault["at_s"], effect, name))
         if effect == "freeze":
-            strikes.append((fault["at_s"] + fault["for_s"], "thaw", name))
+            strikes.append((end, "thaw", name))
     return strikes
 
 
@@ -393,7 +415,7 @@ def fly(options):
     url = bus.url()
     check_bus(url)
     flight = Flight(scenario, options.seed, url, told.get("commands", ()),
-                    strikes_of(told.get("faults", ()), options.kill), options.hardware)
+                    told.get("faults", ()), options.kill, options.hardware)
     print(f"flying {scenario.stem}, seed {options.seed}, into {flight.folder}", flush=True)
     try:
         flight.start(options.view)

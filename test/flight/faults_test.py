@@ -169,15 +169,18 @@ class Faults(unittest.TestCase):
         scenario = self.folder / "told.yaml"
         scenario.write_text(pathlib.Path(SCENARIO).read_text(encoding="utf-8").replace("duration_s: 60", "duration_s: 12") + """
 commands: [{command: select, at_px: [180, 119.5], at_s: -2}, {command: hold, at_s: 3}, {command: kill, at_s: 4.5}]
-faults: [{name: lidar-gap}, {name: kill-planning, at: 5}, {name: delay-PLAN}, {name: loss-20}, {name: freeze-mapping}]
+faults: [{name: lidar-gap}, {name: kill-planning, at: 5}, {name: delay-PLAN}, {name: loss-20}, {name: freeze-mapping}, {name: flood, at: -1}, {name: cpu-load}]
 """, encoding="utf-8")
         answer = subprocess.run([BIN / "chase-scenario", scenario], capture_output=True, text=True, check=True, timeout=LIMIT)
         told = json.loads(answer.stdout)
         self.assertEqual((told["duration_s"], told["settle_s"]), (12.0, 8.0))
         self.assertEqual(told["left_out_live"], ["delay-PLAN", "loss-20"])
-        kill, freeze = told["faults"]
+        kill, freeze, flood, load = told["faults"]
         self.assertEqual(kill, {"name": "kill-planning", "at_s": 5.0, "for_s": 0.5})
         self.assertEqual((freeze["name"], freeze["for_s"]), ("freeze-mapping", 2.0))
+        self.assertEqual((flood["at_s"], flood["for_s"], flood["rate_hz"]), (-1.0, 2.0, 1000.0))
+        self.assertLess({"PLAN", "LIDAR_SCAN", "COMMAND", "FAULT"}, set(flood["channels"]))
+        self.assertEqual((load["name"], load["for_s"], load["times"]), ("cpu-load", 10.0, 5.0))
         answer = flight("--sensors", "raw", "--log", self.folder / "a.lcm", "--light", scenario=scenario)
         self.assertEqual((answer.returncode, answer.stderr), (2, ""), "its motors are cut: criteria are missed")
         self.assertIn(("freeze-mapping", 1, freeze["at_s"]), faults(self.folder / "a.lcm"))

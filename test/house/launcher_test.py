@@ -27,6 +27,7 @@ import fly  # noqa: E402
 import places  # noqa: E402
 import processes  # noqa: E402
 import results  # noqa: E402
+import strain  # noqa: E402
 
 GROUP = "239.255.76.67"
 
@@ -309,6 +310,43 @@ class FlightTest(unittest.TestCase):
         self.assertEqual(lines[:2], ["+freeze-planning", "+kill-control"])
         self.assertEqual(set(lines[2:]), {"-freeze-planning", "-kill-control"})
         self.assertEqual((self.folder / "planning.log").read_text(encoding="utf-8").count("working"), 1)
+
+    def test_strains_come_and_go_and_are_told_to_the_log(self):
+        faults = [{"name": "flood", "at_s": -1, "for_s": 1.6, "rate_hz": 50, "channels": ["PLAN", "POSE"]},
+                  {"name": "cpu-load", "at_s": -1, "for_s": 1.5, "times": 1 + 2 / os.cpu_count()}]
+        told = json.dumps({"duration_s": 2, "settle_s": 1, "faults": faults})
+        self.program("chase-scenario", f"print({told!r})")
+        self.program("chase-flight-monitor", f"""
+            import json, os, pathlib, signal, sys, time
+            sys.path.insert(0, {str(ROOT / "deploy/launcher")!r})
+            import bus
+            def say(t, done=False):
+                print(json.dumps(dict(mission_time=t, duration=2, distance=2.5, visible=1.0, rtf=1.0, done=done)), flush=True)
+            def busy_ones():
+                siblings = pathlib.Path("/proc/%d/task/%d/children" % (os.getppid(), os.getppid())).read_text().split()
+                return sum(b"strain.py\\0work" in pathlib.Path("/proc/%s/cmdline" % pid).read_bytes() for pid in siblings)
+            say(-1)
+            lines = [sys.stdin.readline() for _ in range(2)]
+            time.sleep(0.3)  # until they have started
+            busy, heard = busy_ones(), bus.foreign_channels(*bus.endpoint(bus.url()), 0.5)
+            say(0.4)
+            lines += [sys.stdin.readline() for _ in range(2)]
+            time.sleep(0.2)
+            left, late = busy_ones(), bus.foreign_channels(*bus.endpoint(bus.url()), 0.5)
+            pathlib.Path({str(self.bin / "told")!r}).write_text(json.dumps([lines, busy, heard, left, late]))
+            say(2, done=True)
+            signal.pause()
+            """)
+        code, _, err = self.fly()
+        self.assertEqual(code, 0, err)
+        lines, *found = json.loads((self.bin / "told").read_text(encoding="utf-8"))
+        self.assertEqual(lines, ["+cpu-load\n", "+flood\n", "-cpu-load\n", "-flood\n"])
+        self.assertEqual(found, [2, ["PLAN", "POSE"], 0, []])
+        self.assertRegex(err, r"t +-\d\.\d s: cpu-load begins\n")
+
+    def test_a_load_is_as_many_times_as_in_lockstep(self):
+        load = strain.commands({"name": "cpu-load", "times": 5.0}, bus.url())
+        self.assertEqual(len(load), 4 * os.cpu_count())
 
     def test_whatever_was_started_can_be_killed(self):
         self.assertEqual(fly.killable(False, False), ["odometry", "mapping", "perception", "prediction", "planning",
