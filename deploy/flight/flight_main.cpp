@@ -191,9 +191,10 @@ void AddOptions(CLI::App* app, Arguments* a) {
   app->add_flag("--light", a->light, "leave sweeps and images out of the log")->needs(log);
   auto* metrics = app->add_option("--metrics", a->metrics,
                                   "write the figures of the flight into this JSON file");
-  app->add_option("--fault", a->options.faults,
-                  "NAME or NAME@SECONDS of mission time (negative: before the target moves), besides the "
-                  "scenario's; repeatable");
+  app->add_option(
+      "--fault", a->options.faults,
+      "NAME or NAME@SECONDS of mission time (negative: before the target moves), besides the "
+      "scenario's; repeatable");
   app->add_flag("--end-on-collision", a->end_on_collision,
                 "end the flight 0.2 s after the first contact");
   app->add_option("--until", a->options.until, "stop at this mission time, s")

@@ -59,8 +59,8 @@ Json Told(const chase::world::Scenario& scenario, int64_t seed) {
 /// Checks a scenario file without the services, so that it is the first program that is built.
 int main(int argc, char** argv) {
   CLI::App app(
-      "Checks a scenario file; prints its length, its commands, the faults that its launcher brings "
-      "about and those that a live flight leaves out as one line of JSON.",
+      "Checks a scenario file; prints its length, its commands, the faults that a live flight's "
+      "launcher brings about and those that it leaves out as one line of JSON.",
       "chase-scenario");
   chase::config::AddVersion(&app);
   std::string file;
