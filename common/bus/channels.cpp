@@ -16,6 +16,8 @@ const std::vector<ChannelRow>& ChannelTable() {
       {"UNSEEN", "obstacles_t", "mapping", false},
       {"MAP", "map_t", "mapping", true},
       {"TARGET", "target_t", "perception", false},
+      {"SELECTION", "selection_t", "perception", false, true},
+      {"SELECTION_KEPT", "selection_t", "mission", false, true},
       {"PREDICTION", "prediction_t", "prediction", false},
       {"PLAN", "plan_t", "planning", false, true},
       {"ATTITUDE_SETPOINT", "attitude_setpoint_t", "control", false, true},

@@ -255,6 +255,20 @@ std::string Problem(const scenario_t& m) {
   return Check().Time(m.utime).That(!m.yaml.empty(), "yaml", "is empty").Result();
 }
 
+std::string Problem(const selection_t& m) {
+  return Check()
+      .Time(m.utime)
+      .Number("hue_min", m.hue_min)
+      .Number("hue_max", m.hue_max)
+      .Number("saturation_min", m.saturation_min)
+      .Number("value_min", m.value_min)
+      .Number("aspect", m.aspect)
+      .Number("fill", m.fill)
+      .Number("inset", m.inset)
+      .Number("outline_sigma", m.outline_sigma)
+      .Result();
+}
+
 std::string Problem(const status_t& m) {
   return Check()
       .Time(m.utime)

@@ -19,6 +19,7 @@
 #include "chase/prediction_t.hpp"
 #include "chase/scan_registered_t.hpp"
 #include "chase/scenario_t.hpp"
+#include "chase/selection_t.hpp"
 #include "chase/status_t.hpp"
 #include "chase/target_t.hpp"
 #include "chase/tracking_t.hpp"
@@ -45,6 +46,7 @@ std::string Problem(const pose_t& m);
 std::string Problem(const prediction_t& m);
 std::string Problem(const scan_registered_t& m);
 std::string Problem(const scenario_t& m);
+std::string Problem(const selection_t& m);
 std::string Problem(const status_t& m);
 std::string Problem(const target_t& m);
 std::string Problem(const tracking_t& m);

@@ -24,6 +24,7 @@
 #include "chase/proof_t.hpp"
 #include "chase/scan_registered_t.hpp"
 #include "chase/scenario_t.hpp"
+#include "chase/selection_t.hpp"
 #include "chase/separation_t.hpp"
 #include "chase/stage_status_t.hpp"
 #include "chase/status_t.hpp"
@@ -324,6 +325,19 @@ void VisitFields(const flight_state_t& m, V& v) {
   v("home", m.home);
   v("n_missing", m.n_missing);
   v("missing", m.missing);
+}
+
+template <class V>
+void VisitFields(const selection_t& m, V& v) {
+  VisitHead(m, v);
+  v("hue_min", m.hue_min);
+  v("hue_max", m.hue_max);
+  v("saturation_min", m.saturation_min);
+  v("value_min", m.value_min);
+  v("aspect", m.aspect);
+  v("fill", m.fill);
+  v("inset", m.inset);
+  v("outline_sigma", m.outline_sigma);
 }
 
 template <class V>

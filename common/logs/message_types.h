@@ -15,7 +15,7 @@ using Bytes = std::vector<uint8_t>;
 using MessageTypes = std::tuple<attitude_setpoint_t, camera_image_t, command_ack_t, command_t,
                                 event_t, flight_state_t, geofence_t, health_t, imu_t, lidar_scan_t,
                                 map_t, obstacles_t, plan_t, pose_t, prediction_t, scan_registered_t,
-                                scenario_t, status_t, target_t, tracking_t, truth_t>;
+                                scenario_t, selection_t, status_t, target_t, tracking_t, truth_t>;
 
 /// First eight bytes of a message: what its type and fields are. 0 when there are fewer.
 inline int64_t Fingerprint(const Bytes& bytes) {

@@ -38,6 +38,7 @@ MissionNode::MissionNode(bus::Bus& bus, const MissionConfig& config)
   bus_.Subscribe<flight_state_t>("HOME", [this](const flight_state_t& m) {
     mission_.Remember(Now(), {bus::ToVector(m.home), m.epoch}, static_cast<State>(m.state));
   });
+  bus_.Subscribe<selection_t>("SELECTION", [this](const selection_t& m) { selection_ = m; });
   SubscribeStatuses();
 }
 
@@ -133,7 +134,9 @@ void MissionNode::Tick(int64_t /*utime*/) {
   inputs.on_ground = autopilot_.IsOnGround();
   mission_.Update(Now());
   SendState();
-  if (ticks_++ % kHealthTicks == 0) SendHealth();
+  if (ticks_++ % kHealthTicks != 0) return;
+  SendHealth();
+  SendSelection();
 }
 
 void MissionNode::SendState() {
@@ -163,6 +166,14 @@ void MissionNode::SendHealth() {
   }
   m.n_processes = static_cast<int32_t>(m.processes.size());
   bus_.Publish("HEALTH", m);
+}
+
+/// A perception process that was started anew knows nothing of it.
+void MissionNode::SendSelection() {
+  if (!selection_) return;
+  selection_t m = *selection_;
+  m.utime = bus_.Now();
+  bus_.Publish("SELECTION_KEPT", m);
 }
 
 /// Where it lies is known from take-off on.

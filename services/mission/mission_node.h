@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include "chase/attitude_setpoint_t.hpp"
@@ -8,6 +9,7 @@
 #include "chase/obstacles_t.hpp"
 #include "chase/plan_t.hpp"
 #include "chase/pose_t.hpp"
+#include "chase/selection_t.hpp"
 #include "chase/status_t.hpp"
 #include "chase/target_t.hpp"
 #include "chase/tracking_t.hpp"
@@ -18,8 +20,9 @@
 
 namespace chase::mission {
 
-/// COMMAND, POSE, OBSTACLES, TARGET, PLAN, TRACKING, ATTITUDE_SETPOINT, HOME and statuses in;
-/// FLIGHT_STATE, COMMAND_ACK, HEALTH and GEOFENCE out. Ticks are the clock.
+/// COMMAND, POSE, OBSTACLES, TARGET, PLAN, TRACKING, ATTITUDE_SETPOINT, HOME, SELECTION and
+/// statuses in; FLIGHT_STATE, COMMAND_ACK, HEALTH, GEOFENCE and SELECTION_KEPT out. Ticks are the
+/// clock.
 class MissionNode : public bus::Node {
  public:
   MissionNode(bus::Bus& bus, const MissionConfig& config);
@@ -38,6 +41,7 @@ class MissionNode : public bus::Node {
   void OnStatus(const status_t& message);
   void SendState();
   void SendHealth();
+  void SendSelection();
   void SendGeofence();
   double Now() const;
   double Seconds(int64_t utime) const;
@@ -47,6 +51,7 @@ class MissionNode : public bus::Node {
   int64_t origin_;  // utime that the core's seconds count from: the start of the process
   Mission mission_;
   bus::AutopilotState autopilot_;
+  std::optional<selection_t> selection_;  // perception's newest
   int64_t ticks_ = 0;
 };
 

@@ -125,4 +125,25 @@ target_t ToMessage(const TargetEstimate& target, int64_t utime) {
   return m;
 }
 
+selection_t ToMessage(const DetectorConfig& learned, int64_t utime) {
+  selection_t m{};
+  m.utime = utime;
+  m.hue_min = learned.color.hue_min_deg;
+  m.hue_max = learned.color.hue_max_deg;
+  m.saturation_min = learned.color.saturation_min;
+  m.value_min = learned.color.value_min;
+  m.aspect = learned.shape.aspect;
+  m.fill = learned.shape.fill;
+  m.inset = learned.shape.inset;
+  m.outline_sigma = learned.shape.outline_sigma;
+  return m;
+}
+
+DetectorConfig FromMessage(const selection_t& m, DetectorConfig base) {
+  base.kind = "color";
+  base.color = {{}, m.hue_min, m.hue_max, m.saturation_min, m.value_min, false};
+  base.shape = {{}, m.aspect, m.fill, m.inset, m.outline_sigma};
+  return base;
+}
+
 }  // namespace chase::perception

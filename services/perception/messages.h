@@ -5,6 +5,7 @@
 #include "chase/camera_image_t.hpp"
 #include "chase/lidar_scan_t.hpp"
 #include "chase/pose_t.hpp"
+#include "chase/selection_t.hpp"
 #include "chase/target_t.hpp"
 #include "services/perception/belief/perceiver.h"
 
@@ -22,5 +23,9 @@ PoseSample FromMessage(const pose_t& m, int64_t origin);
 bool Usable(const pose_t& m);
 /// The message for an estimate, stamped `utime`, microseconds: its frame's own.
 target_t ToMessage(const TargetEstimate& target, int64_t utime);
+/// What a detector of kind color has learned of the target.
+selection_t ToMessage(const DetectorConfig& learned, int64_t utime);
+/// The detector in a message; the rest comes from `base`. Numbers may be beyond their limits.
+DetectorConfig FromMessage(const selection_t& m, DetectorConfig base);
 
 }  // namespace chase::perception

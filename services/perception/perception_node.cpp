@@ -13,6 +13,12 @@
 
 namespace chase::perception {
 
+namespace {
+
+constexpr int64_t kTellPeriod = 1000000;  // us, of what was selected
+
+}  // namespace
+
 PerceptionNode::PerceptionNode(bus::Bus& bus, const PerceptionConfig& config)
     : bus_(bus),
       config_(config),
@@ -22,6 +28,7 @@ PerceptionNode::PerceptionNode(bus::Bus& bus, const PerceptionConfig& config)
   bus_.Subscribe<camera_image_t>("CAMERA_IMAGE", [this](const camera_image_t& m) { OnImage(m); });
   bus_.Subscribe<lidar_scan_t>("LIDAR_SCAN", [this](const lidar_scan_t& m) { OnScan(m); });
   bus_.Subscribe<command_t>("COMMAND", [this](const command_t& m) { OnCommand(m); });
+  bus_.Subscribe<selection_t>("SELECTION_KEPT", [this](const selection_t& m) { OnKept(m); });
   bus_.Subscribe<pose_t>("POSE", [this](const pose_t& m) { OnPose(m); });
 }
 
@@ -48,6 +55,7 @@ void PerceptionNode::OnImage(const camera_image_t& message) {
   target_t target = ToMessage(*last_, message.utime);
   target.epoch = epoch_.value();
   bus_.Publish("TARGET", target);
+  if (selected_ && bus_.Now() - selection_told_ >= kTellPeriod) TellSelection();
 }
 
 // The other commands are mission's.
@@ -74,11 +82,30 @@ world::CommandAnswer PerceptionNode::Select(const command_t& message) {
   const Selection selection = LearnAt(frame_.bgr, cv::Point2d(u, v), config_.detector);
   if (!selection.refusal.empty()) return {false, selection.refusal};
   config_.detector = selection.config;
+  TellSelection();
   perceiver_->Select(selection.config, {u, v});
   const ColorConfig& color = selection.config.color;
   return {true,
           fmt::format("selected: {} x {} px, hue {:.0f} to {:.0f} degrees", selection.box.width,
                       selection.box.height, color.hue_min_deg, color.hue_max_deg)};
+}
+
+// Mission keeps it for a process that is started anew, and may be started anew itself.
+void PerceptionNode::TellSelection() {
+  selected_ = true;
+  selection_told_ = bus_.Now();
+  bus_.Publish("SELECTION", ToMessage(config_.detector, selection_told_));
+}
+
+// What this process was told itself is newer.
+void PerceptionNode::OnKept(const selection_t& message) {
+  if (selected_) return;
+  const DetectorConfig kept = FromMessage(message, config_.detector);
+  for (const std::string& problem : {kept.color.Problem(), kept.shape.Problem()})
+    if (!problem.empty()) return bus_.ReportError("SELECTION_KEPT: " + problem);
+  config_.detector = kept;
+  perceiver_ = std::make_unique<Perceiver>(config_);
+  TellSelection();
 }
 
 int64_t PerceptionNode::Origin(int64_t utime) {

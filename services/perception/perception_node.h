@@ -9,6 +9,7 @@
 #include "chase/command_t.hpp"
 #include "chase/lidar_scan_t.hpp"
 #include "chase/pose_t.hpp"
+#include "chase/selection_t.hpp"
 #include "common/bus/bus.h"
 #include "common/bus/epoch.h"
 #include "common/bus/node.h"
@@ -17,8 +18,8 @@
 
 namespace chase::perception {
 
-/// CAMERA_IMAGE, LIDAR_SCAN, POSE and COMMAND in, TARGET and COMMAND_ACK out; every image triggers,
-/// and is answered for its own time.
+/// CAMERA_IMAGE, LIDAR_SCAN, POSE, COMMAND and SELECTION_KEPT in, TARGET, COMMAND_ACK and SELECTION
+/// out; every image triggers, and is answered for its own time.
 class PerceptionNode : public bus::Node {
  public:
   PerceptionNode(bus::Bus& bus, const PerceptionConfig& config);
@@ -29,6 +30,8 @@ class PerceptionNode : public bus::Node {
   void OnScan(const lidar_scan_t& message);
   void OnPose(const pose_t& message);
   void OnCommand(const command_t& message);
+  void OnKept(const selection_t& message);
+  void TellSelection();
   world::CommandAnswer Select(const command_t& message);
   int64_t Origin(int64_t utime);
 
@@ -44,6 +47,8 @@ class PerceptionNode : public bus::Node {
   Frame frame_;              ///< the last one
   int64_t frame_heard_ = 0;  ///< utime; 0: none yet
   world::CommandWindow window_;
+  bool selected_ = false;          ///< config_'s detector is what an operator selected
+  int64_t selection_told_ = 0;     ///< utime
   std::optional<int64_t> origin_;  ///< utime that the core's seconds count from
 };
 

@@ -20,6 +20,7 @@
 #include "chase/prediction_t.hpp"
 #include "chase/scan_registered_t.hpp"
 #include "chase/scenario_t.hpp"
+#include "chase/selection_t.hpp"
 #include "chase/status_t.hpp"
 #include "chase/target_t.hpp"
 #include "chase/tracking_t.hpp"
@@ -53,6 +54,8 @@ void SubscribeShown(bus::Bus& bus, const Hear& hear) {
   bus.Subscribe<command_ack_t>("COMMAND_ACK", on("COMMAND_ACK"));
   bus.Subscribe<geofence_t>("GEOFENCE", on("GEOFENCE"));
   bus.Subscribe<health_t>("HEALTH", on("HEALTH"));
+  bus.Subscribe<selection_t>("SELECTION", on("SELECTION"));
+  bus.Subscribe<selection_t>("SELECTION_KEPT", on("SELECTION_KEPT"));
   bus.Subscribe<imu_t>("IMU", on("IMU"));
   bus.Subscribe<lidar_scan_t>("LIDAR_SCAN", on("LIDAR_SCAN"));
   bus.Subscribe<map_t>("MAP", on("MAP"));

@@ -163,6 +163,20 @@ class Faults(unittest.TestCase):
         back = next(i for i, (a, b) in enumerate(zip(told, told[1:]), 1) if b - a > 0.4)
         self.assertEqual({states[back - 1], *states[back + 5:]}, {3}, "CHASE")
 
+    def test_what_was_selected_outlives_perception(self):
+        """The configured colour is nobody's: the target is known by what was selected alone."""
+        scenario, log = self.folder / "selected.yaml", self.folder / "selected.lcm"
+        scenario.write_text(pathlib.Path(SCENARIO).read_text(encoding="utf-8") + """
+  - {name: perception, config: 'detector: {color: {hue_min_deg: 200, hue_max_deg: 250}}'}
+commands: [{command: takeoff, at_s: -6}, {command: select, at_px: [188, 115], at_s: -1}, {command: chase, at_s: -0.5}]
+""", encoding="utf-8")
+        answer = flight("--fault", "kill-perception@1", "--until", "6", "--log", log, "--light", scenario=scenario)
+        self.assertEqual((answer.returncode, answer.stderr), (0, ""))
+        tracked = [(utime * 1e-6 - START, data[lcmlog.after_head(data) + 4] == 1)
+                   for utime, channel, data in lcmlog.read(log) if channel == "TARGET"]
+        for begin, end, seen in ((-8, -1, False), (-0.9, 1, True), (1.5, 1.6, False), (4, 6, True)):
+            self.assertEqual({tracks for t, tracks in tracked if begin < t < end}, {seen}, (begin, end))
+
     def test_scenario_tells_what_a_live_flight_needs(self):
         """deploy/fly's operator gives what the one in lockstep does, processes fail when they do there, and it
         says which faults it leaves out."""

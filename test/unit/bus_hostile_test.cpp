@@ -79,6 +79,7 @@ CHASE_SAMPLE(command_ack_t, m.reason = "not ready", m.verdict = 2)
 CHASE_SAMPLE(flight_state_t, m.n_missing = 1; m.missing = {"POSE"}, m.home[2] = kNan)
 CHASE_SAMPLE(geofence_t, m.ceiling = 1.0; m.n_corners = 6;
              m.corners.assign(6, 1.0), m.corners[3] = kNan)
+CHASE_SAMPLE(selection_t, m.hue_max = 20.0, m.hue_max = kNan)
 CHASE_SAMPLE(health_t, m.n_processes = 1; m.processes.resize(1), m.processes[0].age = kNan)
 CHASE_SAMPLE(event_t, m.name = "kill-planning", m.phase = 2)
 CHASE_SAMPLE(status_t, , m.cpu = kNan)
@@ -101,7 +102,7 @@ class HostileBus : public testing::Test {};
 using Types = testing::Types<imu_t, attitude_setpoint_t, lidar_scan_t, scan_registered_t,
                              camera_image_t, pose_t, target_t, map_t, prediction_t, scenario_t,
                              command_t, command_ack_t, flight_state_t, geofence_t, health_t,
-                             event_t, status_t, truth_t, plan_t, obstacles_t>;
+                             event_t, selection_t, status_t, truth_t, plan_t, obstacles_t>;
 TYPED_TEST_SUITE(HostileBus, Types);
 
 /// Every truncation, every single corrupted byte position (among them all lengths set negative or

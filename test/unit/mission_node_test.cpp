@@ -193,6 +193,32 @@ TEST(MissionNode, LeavesTheTargetsChoiceToPerception) {
   EXPECT_TRUE(bench.acks.empty());
 }
 
+TEST(MissionNode, KeepsWhatPerceptionWasTold) {
+  Bench bench;
+  std::vector<selection_t> kept;
+  const auto perception = bench.lockstep_.Connect();
+  bench.lockstep_.Add("reader", 0, [&kept](bus::Bus& bus) {
+    bus.Subscribe<selection_t>("SELECTION_KEPT", [&kept](const auto& m) { kept.push_back(m); });
+    return std::make_unique<Silent>();
+  });
+  selection_t selection{};
+  selection.utime = kStart;
+  selection.hue_max = 90.0;
+  perception->SetIdentity({"prediction", "", kStart});
+  perception->Publish("SELECTION", selection);
+  bench.Run(2.0);
+  EXPECT_TRUE(kept.empty()) << "not perception's";
+  for (const double hue : {100.0, 120.0}) {
+    selection.hue_max = hue;
+    perception->SetIdentity({"perception", "", kStart});
+    perception->Publish("SELECTION", selection);
+    bench.Run(3.0);
+    EXPECT_EQ(kept.back().hue_max, hue);
+  }
+  EXPECT_EQ(kept.size(), 6U) << "once a second";
+  EXPECT_GT(kept.back().utime, kStart + 7'000'000);
+}
+
 TEST(MissionNode, CommandsToOtherVehiclesAreNotItsOwn) {
   Bench bench;
   bench.Run(2.0);

@@ -6,6 +6,7 @@
 #include <opencv2/imgproc.hpp>
 #include <optional>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include "chase/command_ack_t.hpp"
@@ -35,8 +36,11 @@ class Bench {
       bus_ = &bus;
       bus.Subscribe<target_t>("TARGET", [this](const target_t& m) { out.push_back(m); });
       bus.Subscribe<command_ack_t>("COMMAND_ACK", [this](const auto& m) { acks.push_back(m); });
+      bus.Subscribe<selection_t>("SELECTION", [this](const auto& m) { selections.push_back(m); });
       return std::make_unique<Silent>();
     });
+    mission_ = lockstep_.Connect();
+    mission_->SetIdentity({"mission", "", kStart});
     lockstep_.Add("perception", 0, [](bus::Bus& bus) {
       return std::make_unique<PerceptionNode>(bus, PerceptionConfig{});
     });
@@ -71,6 +75,12 @@ class Bench {
     lockstep_.RunUntil(Utime());
     return acks.back();
   }
+  void StartAnew() {
+    lockstep_.Kill("perception");
+    lockstep_.Start("perception");
+  }
+  std::string Error() const { return lockstep_.bus("perception").last_error(); }
+  void Keep(const selection_t& selection) { mission_->Publish("SELECTION_KEPT", selection); }
   cv::Point2d TargetPixel() { return Middle(renderer_.Image(t_).box); }
   static cv::Point2d Middle(const cv::Rect2d& box) { return 0.5 * (box.tl() + box.br()); }
   double Off(const Eigen::Vector3d& p) const { return (bus::ToVector(out.back().mean) - p).norm(); }
@@ -78,6 +88,7 @@ class Bench {
 
   std::vector<target_t> out;
   std::vector<command_ack_t> acks;
+  std::vector<selection_t> selections;
 
  private:
   int64_t Utime() const { return kStart + std::llround(t_ * 1e6); }
@@ -125,6 +136,7 @@ class Bench {
   perception_test::Renderer renderer_;
   bus::Lockstep lockstep_{kStart};
   bus::Bus* bus_ = nullptr;
+  std::unique_ptr<bus::Bus> mission_;
   double t_ = 0.0;
   int step_ = 0;
 };
@@ -167,6 +179,55 @@ TEST(Select, TheSameCommandAgainIsAnsweredAndNotObeyed) {
   EXPECT_EQ(late.reason, first);
   bench.Run(0.5);
   EXPECT_LT(bench.Off(bench.target()), 0.1) << "where the second one led";
+}
+
+TEST(Select, OutlivesTheProcessWhereMissionKeepsIt) {
+  Bench bench;
+  bench.Run(0.5);
+  EXPECT_TRUE(bench.selections.empty());
+  const cv::Point2d at = bench.TargetPixel();
+  ASSERT_EQ(bench.Select(at.x, at.y, 1).verdict, +command_ack_t::ACCEPTED);
+  bench.Run(2.2);
+  ASSERT_EQ(bench.selections.size(), 3U) << "at once, then once a second";
+  const selection_t kept = bench.selections.back();
+  bench.StartAnew();
+  bench.Run(0.5);
+  bench.Keep(kept);
+  bench.Run(5.0);
+  EXPECT_EQ(bench.out.back().state, +target_t::TRACKING);
+  EXPECT_LT(bench.Off(bench.target()), 0.1);
+  const selection_t& told = bench.selections.back();
+  EXPECT_NE(told.sender_start, kept.sender_start) << "for a mission process started anew";
+  EXPECT_EQ(std::tie(told.hue_min, told.hue_max, told.saturation_min, told.value_min),
+            std::tie(kept.hue_min, kept.hue_max, kept.saturation_min, kept.value_min));
+  EXPECT_EQ(std::tie(told.aspect, told.fill, told.inset, told.outline_sigma),
+            std::tie(kept.aspect, kept.fill, kept.inset, kept.outline_sigma));
+}
+
+TEST(Select, WhatIsKeptYieldsToWhatThisProcessWasTold) {
+  Bench bench;
+  bench.Run(0.5);
+  const cv::Point2d at = bench.TargetPixel();
+  ASSERT_EQ(bench.Select(at.x, at.y, 1).verdict, +command_ack_t::ACCEPTED);
+  selection_t other = bench.selections.back();
+  other.hue_min = 10.0, other.hue_max = 42.0;  // of the orange post
+  bench.Keep(other);
+  bench.Run(1.0);
+  EXPECT_LT(bench.Off(bench.target()), 0.1);
+  EXPECT_EQ(bench.selections.back().hue_min, bench.selections.front().hue_min);
+}
+
+TEST(Select, WhatIsKeptBeyondItsLimitsIsRefused) {
+  Bench bench;
+  bench.Run(0.5);
+  selection_t kept{};
+  kept.hue_max = 42.0;
+  kept.aspect = kept.fill = 0.5;
+  kept.saturation_min = 1.5;
+  bench.Keep(kept);
+  bench.Run(0.1);
+  EXPECT_TRUE(bench.selections.empty());
+  EXPECT_NE(bench.Error().find("saturation_min is 1.5"), std::string::npos) << bench.Error();
 }
 
 TEST(Select, IsRefusedWithAReason) {
