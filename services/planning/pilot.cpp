@@ -225,6 +225,7 @@ PlanRequest Pilot::Request(double t0, const Start& start) const {
 
 PlanResult Pilot::Chase(double t0, const Start& start) {
   search_.Saw(*forecast_);
+  chased_ = true;
   return planner_->Plan(Request(t0, start));
 }
 
@@ -405,11 +406,13 @@ PlanResult Pilot::Rest(double t0, const Start& start) const {
   return plan;
 }
 
-// Who stands in view is soon seen; who is not may stand anywhere around.
+// Who was chased in the frame that was and is not soon seen in this one may be anywhere around. Who
+// never was is waited for: perception takes some time for one that stands.
 PlanResult Pilot::Hover(double t0, const Start& start) {
   constexpr double kSoon = 2.0;  // s
   if (!hovers_since_) hovers_since_ = t0;
-  if (t0 - *hovers_since_ > kSoon) return BrakeAndLook(t0, start, start.yaw.yaw + 0.5 * M_PI);
+  if (chased_ && t0 - *hovers_since_ > kSoon)
+    return BrakeAndLook(t0, start, start.yaw.yaw + 0.5 * M_PI);
   PlanResult plan = Rest(t0, start);
   if (plan.verdict == Verdict::kWait) plan.reason = "nothing to chase yet";
   return plan;
@@ -421,8 +424,7 @@ PlanResult Pilot::BrakeAndLook(double t0, const Start& start, double yaw) const 
   const double rate =
       std::clamp(turn / kSettles, -config_.search_yaw_rate, config_.search_yaw_rate);
   plan.yaw = TurningYaw({start.yaw.yaw, rate}, plan.trajectory.duration);
-  plan.reason = (search_.has_seen() ? "target lost" : "nothing to chase yet") +
-                std::string(plan.verdict == Verdict::kWait ? ", looking around" : "") +
+  plan.reason = (plan.verdict == Verdict::kWait ? "target lost, looking around" : "target lost") +
                 (plan.reason.empty() ? "" : ", " + plan.reason);
   return plan;
 }

@@ -125,7 +125,8 @@ class Pilot {
   bool airborne_ = false;
   bool heard_control_ = false, flies_ = false, descending_ = false, waits_ = false;
   double climb_end_ = 0.0;
-  std::optional<double> hovers_since_;        ///< s, with nobody seen in this frame
+  bool chased_ = false;                       ///< in any frame
+  std::optional<double> hovers_since_;        ///< s, with nobody seen in this one
   std::optional<Eigen::Vector3d> climb_top_;  ///< p_WB, m
   std::optional<Task> task_;
   std::optional<Eigen::Vector3d> home_;  // m

@@ -239,7 +239,7 @@ class BadUse(unittest.TestCase):
         for command, values in ((["chase-flight", gym, "--until"], ("nan", -20, 0, "inf", "1s")),
                                 (["chase-flight", gym, "--seed"], ("nan", -1, 1.5, 2**31, 10**20)),
                                 (["chase-flight", gym, "--fault"],
-                                 ("kill-simulator", "lidar-gap@60", "lidar-gap@-1", "kill-control@")),
+                                 ("kill-simulator", "lidar-gap@60", "lidar-gap@-9", "kill-control@")),
                                 (["chase-compare", "--jobs"], ("nan", 0, 1.5, 10**20)),
                                 (["chase-campaign", "--out", "no/such", "--jobs"], ("nan", 0, 1.5)),
                                 (["chase-campaign", "--out", "no/such", "--duration"],

@@ -304,32 +304,38 @@ TEST(Pilot, AfterItsPlanIsOverItGoesOnFromTheEndOfItsStop) {
   }
 }
 
-// Nobody was seen in this frame: whoever stands in view is soon seen, else the drone turns all the
-// way round.
-TEST(Pilot, LooksAroundForWhomItHasNotSeen) {
+// Who was chased before the frame changed, and is not soon seen after it, is looked for all around;
+// who has not been seen yet is waited for.
+TEST(Pilot, LooksAroundForWhomItLostWithTheFrame) {
   const PlanningConfig config;
-  Pilot pilot(config);
-  pilot.SetFlying(true);
-  BodyEstimate body{{0.0, 0.0, 1.2}, Eigen::Vector3d::Zero(), 0.5};
-  double turned = 0.0;
-  for (double t = 0.0; t < 12.0; t += 0.05) {
-    if (std::abs(t - 8.0) < 0.01) pilot.ChangeFrame();
-    pilot.SetObstacles(t, {});
-    const auto plan = pilot.Update(t, body);
-    if (plan) {
-      EXPECT_TRUE(plan->verdict == Verdict::kWait || plan->verdict == Verdict::kBrake);
-      EXPECT_EQ(plan->reason.substr(0, 20), "nothing to chase yet");
+  for (const bool chased : {false, true}) {
+    Pilot pilot(config);
+    pilot.SetFlying(true);
+    BodyEstimate body{{0.0, 0.0, 1.2}, Eigen::Vector3d::Zero(), 0.0};
+    double turned = 0.0;
+    for (double t = 0.0; t < 12.0; t += 0.05) {
+      if (std::abs(t - 1.0) < 0.01) pilot.ChangeFrame(), turned = 0.0;
+      pilot.SetObstacles(t, {});
+      Forecast forecast;
+      forecast.t = t;
+      forecast.has_target = chased && t < 0.99;
+      forecast.target = world::Trajectory::Constant({2.5, 0.0, 0.7}, t, 2.5);
+      pilot.SetForecast(forecast);
+      pilot.Update(t, body);
+      const PlanResult& plan = pilot.running();
+      const double tau =
+          std::clamp((t - plan.trajectory.start) / plan.trajectory.duration, 0.0, 1.0);
+      const double yaw = YawAt(plan.yaw, tau, plan.trajectory.duration).yaw;
+      turned += yaw - body.yaw;
+      body.yaw = yaw;
+      if (t > 1.0 && (t < 3.0 || !chased)) {
+        EXPECT_NEAR(turned, 0.0, 1e-3) << t;
+      }
     }
-    const world::Trajectory& way = pilot.running().trajectory;
-    const double tau = std::clamp((t - way.start) / way.duration, 0.0, 1.0);
-    const double yaw = YawAt(pilot.running().yaw, tau, way.duration).yaw;
-    turned += yaw - body.yaw;
-    body.yaw = yaw;
-    if (t < 2.0) {
-      EXPECT_NEAR(turned, 0.0, 1e-9) << t;
+    if (chased) {
+      EXPECT_GT(turned, 2.0 * M_PI);
     }
   }
-  EXPECT_GT(turned, 2.0 * M_PI);
 }
 
 }  // namespace
