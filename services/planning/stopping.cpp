@@ -133,6 +133,13 @@ std::optional<PlanResult> Committed(const PlannerConfig& config, const PlanReque
   return result;
 }
 
+// What stands does not come, however the frame may drift: the next plan knows where it is then.
+PlanRequest WithoutDrift(PlanRequest request) {
+  for (world::Obstacle& o : request.obstacles)
+    if (!o.moving) o.velocity_covariance.setZero();
+  return request;
+}
+
 }  // namespace
 
 constexpr double kOver[] = {0.7, 1.0, 1.6};  // s, that ways aside take
@@ -145,7 +152,8 @@ Stop Evade(const PlannerConfig& config, const PlanRequest& request) {
   Resting resting[] = {{config, request}, {config, request}, {config, request}};
   Resting seen[] = {
       {config, request, unseen}, {config, request, unseen}, {config, request, unseen}};
-  Resting after(config, request);
+  const PlanRequest later = WithoutDrift(request);
+  Resting after(config, later);
   // Certified, but nobody has looked into it, or somebody comes there soon.
   std::optional<Stop> blind, brief;
   Stop best;
@@ -232,7 +240,8 @@ PlanResult RestPlan(const PlannerConfig& config, const PlanRequest& request) {
   Resting wide(config, request), close(hard, request);
   std::optional<Stop> stop = wide.BrakeWithin();
   if (!stop) stop = close.BrakeWithin();
-  if (stop && !Resting(hard, request).Lasts(*stop, request.t0 + kLasts)) {
+  const PlanRequest later = WithoutDrift(request);
+  if (stop && !Resting(hard, later).Lasts(*stop, request.t0 + kLasts)) {
     Stop aside = Evade(hard, request);
     if (aside.certified && aside.lasts) {
       result.verdict = Verdict::kEscape;

@@ -213,6 +213,7 @@ TEST(MissionNode, KeepsWhatPerceptionWasTold) {
     perception->SetIdentity({"perception", "", kStart});
     perception->Publish("SELECTION", selection);
     bench.Run(3.0);
+    ASSERT_FALSE(kept.empty());
     EXPECT_EQ(kept.back().hue_max, hue);
   }
   EXPECT_EQ(kept.size(), 6U) << "once a second";

@@ -70,6 +70,19 @@ TEST(Evasion, StepsAsideWhileThereIsAWay) {
   }
 }
 
+TEST(Evasion, StaysBesideWhatStandsHoweverTheFrameDrifts) {
+  const PlannerConfig config;
+  PlanRequest request = Hover();
+  world::Obstacle wall = Wall(1, request.start.p.x() + config.hard_radius() + 0.25, 0.0);
+  wall.moving = false;
+  wall.velocity_covariance.diagonal().setConstant(0.05 * 0.05);
+  request.obstacles = {wall};
+  ASSERT_TRUE(Brake(config, request));
+  const PlanResult plan = RestPlan(config, request);
+  EXPECT_EQ(plan.verdict, Verdict::kBrake) << plan.reason;
+  EXPECT_GE(plan.certified_clearance, 0.0);
+}
+
 TEST(Evasion, SaysThatItLeadsIntoWhatNobodyHasLookedInto) {
   PlanRequest request = Hover();
   request.obstacles = {
