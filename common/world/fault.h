@@ -9,14 +9,16 @@ namespace chase::world {
 
 /// A failure during a flight: an entry of a scenario's `faults`.
 struct FaultSpec {
-  static constexpr double kDrawn = -std::numeric_limits<double>::infinity();
+  static constexpr double kDrawn =
+      -std::numeric_limits<double>::infinity();  ///< of `at`: drawn from the flight's seed
   std::string name;
   double at = kDrawn;
   double duration = -1.0;
   template <class V>
   void Visit(V& v) {
     v("name", name, "one of FaultKinds()");
-    v("at", at, "mission time, s; negative: before the target moves; -.inf: drawn from the flight's seed");
+    v("at", at,
+      "mission time, s; negative: before the target moves; -.inf: drawn from the flight's seed");
     v("for", duration, "s; negative: as long as that fault lasts by itself");
   }
   std::string Problem() const;

@@ -27,7 +27,7 @@ void Print(const chase::flight::Progress& progress, int64_t now) {
   std::fflush(stdout);
 }
 
-/// What the launcher does to processes: lines +NAME and -NAME where a fault begins and ends.
+/// Faults that the launcher brings about: lines +NAME and -NAME where one begins and ends.
 class Faults {
  public:
   explicit Faults(chase::bus::Bus* bus) : bus_(*bus) {}

@@ -23,19 +23,19 @@ Json CommandOf(const chase::world::CommandSpec& command) {
   return {{"command", command.command}, {"at_s", command.at_s}, {"arguments", words}};
 }
 
-/// What the launcher does of a fault; nothing: the simulator strikes by itself, or nobody does.
-Json Done(const chase::world::FaultSpec& fault, const chase::world::FaultKind& kind) {
+/// The launcher's part of a fault in a live flight; null: it has none.
+Json LaunchersPart(const chase::world::FaultSpec& fault, const chase::world::FaultKind& kind) {
   using Effect = chase::world::FaultKind::Effect;
-  Json done = {{"name", fault.name}, {"at_s", fault.at}, {"for_s", fault.duration}};
-  if (kind.effect == Effect::kKill || kind.effect == Effect::kFreeze) return done;
+  Json part = {{"name", fault.name}, {"at_s", fault.at}, {"for_s", fault.duration}};
+  if (kind.effect == Effect::kKill || kind.effect == Effect::kFreeze) return part;
   if (kind.effect == Effect::kLoad) {
-    done["times"] = kind.amount;
-    return done;
+    part["times"] = kind.amount;
+    return part;
   }
   if (kind.effect != Effect::kFlood) return {};
-  done["rate_hz"] = kind.amount;
-  for (const auto& row : chase::bus::ChannelTable()) done["channels"].push_back(row.channel);
-  return done;
+  part["rate_hz"] = kind.amount;
+  for (const auto& row : chase::bus::ChannelTable()) part["channels"].push_back(row.channel);
+  return part;
 }
 
 Json Told(const chase::world::Scenario& scenario, int64_t seed) {
@@ -46,8 +46,8 @@ Json Told(const chase::world::Scenario& scenario, int64_t seed) {
   for (const auto& spec : scenario.faults) {
     const auto fault = chase::world::Settled(spec, scenario.duration_s, seed, number++);
     const auto& kind = chase::world::KindOf(fault);
-    if (const Json done = Done(fault, kind); !done.is_null())
-      told["faults"].push_back(done);
+    if (const Json part = LaunchersPart(fault, kind); !part.is_null())
+      told["faults"].push_back(part);
     else if (kind.victim != "simulator")
       told["left_out_live"].push_back(fault.name);
   }

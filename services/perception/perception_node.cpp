@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <array>
+#include <cstdlib>
 #include <opencv2/core.hpp>
 #include <string>
 
@@ -55,7 +56,7 @@ void PerceptionNode::OnImage(const camera_image_t& message) {
   target_t target = ToMessage(*last_, message.utime);
   target.epoch = epoch_.value();
   bus_.Publish("TARGET", target);
-  if (selected_ && bus_.Now() - selection_told_ >= kTellPeriod) TellSelection();
+  if (selected_ && std::abs(bus_.Now() - selection_told_) >= kTellPeriod) TellSelection();
 }
 
 // The other commands are mission's.

@@ -406,10 +406,10 @@ PlanResult Pilot::Rest(double t0, const Start& start) const {
   return plan;
 }
 
-// Who was chased in the frame that was and is not soon seen in this one may be anywhere around. Who
-// never was is waited for: perception takes some time for one that stands.
+// A target that was chased before the frame changed, and is not seen soon after it, may be anywhere
+// around. One that was never seen is waited for: perception needs time for a target that stands.
 PlanResult Pilot::Hover(double t0, const Start& start) {
-  constexpr double kSoon = 2.0;  // s
+  constexpr double kSoon = 4.0;  // s: perception takes 3 for one that stands within 5 m
   if (!hovers_since_) hovers_since_ = t0;
   if (chased_ && t0 - *hovers_since_ > kSoon)
     return BrakeAndLook(t0, start, start.yaw.yaw + 0.5 * M_PI);

@@ -133,7 +133,8 @@ std::optional<PlanResult> Committed(const PlannerConfig& config, const PlanReque
   return result;
 }
 
-// What stands does not come, however the frame may drift: the next plan knows where it is then.
+// Static obstacles without the drift of the frame: over kLasts it would cover any place of rest,
+// and the next plan gets a new list.
 PlanRequest WithoutDrift(PlanRequest request) {
   for (world::Obstacle& o : request.obstacles)
     if (!o.moving) o.velocity_covariance.setZero();
@@ -152,8 +153,8 @@ Stop Evade(const PlannerConfig& config, const PlanRequest& request) {
   Resting resting[] = {{config, request}, {config, request}, {config, request}};
   Resting seen[] = {
       {config, request, unseen}, {config, request, unseen}, {config, request, unseen}};
-  const PlanRequest later = WithoutDrift(request);
-  Resting after(config, later);
+  const PlanRequest without_drift = WithoutDrift(request);
+  Resting after(config, without_drift);
   // Certified, but nobody has looked into it, or somebody comes there soon.
   std::optional<Stop> blind, brief;
   Stop best;
@@ -240,8 +241,11 @@ PlanResult RestPlan(const PlannerConfig& config, const PlanRequest& request) {
   Resting wide(config, request), close(hard, request);
   std::optional<Stop> stop = wide.BrakeWithin();
   if (!stop) stop = close.BrakeWithin();
-  const PlanRequest later = WithoutDrift(request);
-  if (stop && !Resting(hard, later).Lasts(*stop, request.t0 + kLasts)) {
+  const auto lasts = [&] {
+    const PlanRequest without_drift = WithoutDrift(request);
+    return Resting(hard, without_drift).Lasts(*stop, request.t0 + kLasts);
+  };
+  if (stop && !lasts()) {
     Stop aside = Evade(hard, request);
     if (aside.certified && aside.lasts) {
       result.verdict = Verdict::kEscape;

@@ -122,7 +122,7 @@ TEST(Evasion, WhereNothingCanBeCertifiedTheContactComesLaterThanAtRest) {
   }
 }
 
-// What comes at it can be passed over only above the ceiling, which counts as what stands there.
+// The ceiling counts as a static obstacle: what comes is not passed above it.
 TEST(Evasion, TheLeastHarmIsBelowTheCeiling) {
   const PlannerConfig config;
   for (const double above : {0.1, 0.3, 0.5}) {

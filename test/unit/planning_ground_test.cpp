@@ -317,6 +317,8 @@ TEST(Pilot, TheTubeIsTheWidestWhereControlFellSilent) {
   pilot.SetTrackingBound(10.0, 0.15);
   EXPECT_NEAR(tube(10.25), 0.15, 1e-9);
   EXPECT_NEAR(tube(10.35), 0.3, 1e-9);
+  pilot.SetTrackingBound(10.6, 0.15);
+  EXPECT_NEAR(tube(10.36), 0.3, 1e-9);  // of another clock
   pilot.SetTrackingBound(10.36, 0.15);
   EXPECT_NEAR(tube(10.4), 0.15, 1e-9);
 }

@@ -304,8 +304,8 @@ TEST(Pilot, AfterItsPlanIsOverItGoesOnFromTheEndOfItsStop) {
   }
 }
 
-// Who was chased before the frame changed, and is not soon seen after it, is looked for all around;
-// who has not been seen yet is waited for.
+// A target that was chased before the frame changed, and is not seen soon after it, is looked for
+// all around; one that was never seen is waited for.
 TEST(Pilot, LooksAroundForWhomItLostWithTheFrame) {
   const PlanningConfig config;
   for (const bool chased : {false, true}) {
@@ -313,7 +313,7 @@ TEST(Pilot, LooksAroundForWhomItLostWithTheFrame) {
     pilot.SetFlying(true);
     BodyEstimate body{{0.0, 0.0, 1.2}, Eigen::Vector3d::Zero(), 0.0};
     double turned = 0.0;
-    for (double t = 0.0; t < 12.0; t += 0.05) {
+    for (double t = 0.0; t < 14.0; t += 0.05) {
       if (std::abs(t - 1.0) < 0.01) pilot.ChangeFrame(), turned = 0.0;
       pilot.SetObstacles(t, {});
       Forecast forecast;
@@ -328,7 +328,7 @@ TEST(Pilot, LooksAroundForWhomItLostWithTheFrame) {
       const double yaw = YawAt(plan.yaw, tau, plan.trajectory.duration).yaw;
       turned += yaw - body.yaw;
       body.yaw = yaw;
-      if (t > 1.0 && (t < 3.0 || !chased)) {
+      if (t > 1.0 && (t < 5.0 || !chased)) {
         EXPECT_NEAR(turned, 0.0, 1e-3) << t;
       }
     }
