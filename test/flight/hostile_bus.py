@@ -20,13 +20,12 @@ NAN = struct.pack(">d", float("nan"))
 LISTENS = {
     "odometry": ["LIDAR_SCAN", "IMU"],
     "mapping": ["SCAN_REGISTERED", "TARGET"],
-    "perception": ["CAMERA_IMAGE", "LIDAR_SCAN", "POSE", "COMMAND", "SELECTION_KEPT"],
+    "perception": ["CAMERA_IMAGE", "LIDAR_SCAN", "POSE", "COMMAND"],
     "prediction": ["TARGET", "OBSTACLES"],
     "planning": ["PREDICTION", "OBSTACLES", "POSE", "UNSEEN", "TRACKING", "FLIGHT_STATE", "GEOFENCE", "FCU_STATUS"],
     "control": ["PLAN", "OBSTACLES", "POSE", "FLIGHT_STATE", "GEOFENCE", "FCU_STATUS"],
     "simulator": ["ATTITUDE_SETPOINT", "POSE"],
-    "mission": ["COMMAND", "POSE", "OBSTACLES", "TARGET", "PLAN", "TRACKING", "ATTITUDE_SETPOINT", "FCU_STATUS",
-                "SELECTION"],
+    "mission": ["COMMAND", "POSE", "OBSTACLES", "TARGET", "PLAN", "TRACKING", "ATTITUDE_SETPOINT", "FCU_STATUS"],
     "fcu": ["POSE", "ATTITUDE_SETPOINT", "FLIGHT_STATE", "COMMAND"],
     "viewer": ["POSE", "PLAN", "FLIGHT_STATE", "GEOFENCE"],
 }
