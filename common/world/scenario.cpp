@@ -174,10 +174,10 @@ std::string NeverStrikes(const Scenario& s) {
   for (std::size_t i = 0; i < s.faults.size(); ++i) {
     const double at = s.faults[i].at;
     const bool flown = at == FaultSpec::kDrawn || (at >= -s.settle_s && at < s.duration_s);
-    const std::string problem = Check(flown, "at", Number(at),
-                                      "from -settle_s, " + Number(-s.settle_s) +
-                                          ", to below duration_s, " + Number(s.duration_s) +
-                                          ", or left out to be drawn from the seed");
+    const std::string problem =
+        Check(flown, "at", Number(at),
+              "from -settle_s, " + Number(-s.settle_s) + ", to below duration_s, " +
+                  Number(s.duration_s) + ", or left out to be drawn from the seed");
     if (!problem.empty()) return "faults[" + std::to_string(i) + "]: " + problem;
   }
   return "";
