@@ -124,6 +124,7 @@ void Tracker::Confirm(Track* track) const {
     track->rest = track->body.p();
   } else {
     track->moved = t_;
+    // Its outline no longer overlaps that of the place where it stood.
     if ((track->body.p() - track->rest).norm() > 2.0 * track->reach) track->stood = 0;
   }
   if (track->confirmed) return;
