@@ -8,7 +8,7 @@ void CollisionWatch::Add(const truth_t& truth) {
   if (time_) return;
   if (!start_) start_ = logs::MissionStart(truth);
   logs::TruthSample sample = logs::ToSample(truth, *start_);
-  sample.may_stand = landing_.MayStand(sample, record_.scenario.world.ground);
+  landing_.Mark(record_.scenario.world.ground, &sample);
   if (record_.InMission(sample.t) && !score_(sample).Safe()) time_ = sample.t;
 }
 

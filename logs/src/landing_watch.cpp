@@ -13,14 +13,14 @@ void LandingWatch::Hear(const status_t& message) {
   if (message.name == "fcu") autopilot_ = Lands(message);
 }
 
-bool LandingWatch::MayStand(const TruthSample& sample, const world::GroundSpec& ground) {
+void LandingWatch::Mark(const world::GroundSpec& ground, TruthSample* sample) {
   constexpr double kTouchdown = 0.75;  // m/s: as fast as control sinks without a velocity
-  const double height = sample.p.z() - world::GroundHeight(ground, sample.p.x(), sample.p.y());
+  const double height = sample->p.z() - world::GroundHeight(ground, sample->p.x(), sample->p.y());
   came_down_ = control_ || autopilot_ || (came_down_ && height < world::kFlightVolume.low);
-  if (came_down_ && sample.speed <= kTouchdown) return true;
-  return state_ == flight_state_t::IDLE || state_ == flight_state_t::READY ||
-         state_ == flight_state_t::TAKEOFF || state_ == flight_state_t::LAND ||
-         state_ == flight_state_t::DONE;
+  sample->done = state_ == flight_state_t::DONE;
+  sample->may_stand = (came_down_ && sample->speed <= kTouchdown) || sample->done ||
+                      state_ == flight_state_t::IDLE || state_ == flight_state_t::READY ||
+                      state_ == flight_state_t::TAKEOFF || state_ == flight_state_t::LAND;
 }
 
 }  // namespace chase::logs

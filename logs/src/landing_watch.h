@@ -19,8 +19,8 @@ class LandingWatch {
   /// Does FCU_STATUS say that the autopilot comes down by itself?
   static bool Lands(const status_t& message);
 
-  /// May the body touch the ground at that sample? They come in the order of time.
-  bool MayStand(const TruthSample& sample, const world::GroundSpec& ground);
+  /// Fills in `may_stand` and `done`. Samples come in the order of time.
+  void Mark(const world::GroundSpec& ground, TruthSample* sample);
 
  private:
   int8_t state_ = -1;  // of flight_state_t, once it is heard

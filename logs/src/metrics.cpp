@@ -53,7 +53,8 @@ void AddRatios(const FlightRecord& record, const std::vector<SampleScore>& score
   m->safe_ratio = Mean(scores, [](const SampleScore& s) { return s.Safe() ? 1.0 : 0.0; });
   m->visible_ratio = Mean(scores, [](const SampleScore& s) { return s.visible ? 1.0 : 0.0; });
   for (const SampleScore& s : scores)
-    m->min_clearance_m = std::min(m->min_clearance_m.value_or(s.clearance), s.clearance);
+    if (!s.done)
+      m->min_clearance_m = std::min(m->min_clearance_m.value_or(s.clearance), s.clearance);
   if (desired <= 0.0) return;
   m->distance_ratio = Mean(scores, [&](const SampleScore& s) { return s.distance / desired; });
   m->distance_error =
@@ -143,6 +144,10 @@ void AddEstimates(const FlightRecord& record, Metrics* m) {
 }
 
 void AddCollision(const FlightRecord& record, const std::vector<SampleScore>& scores, Metrics* m) {
+  const auto struck = std::find_if(scores.begin(), scores.end(), [](const SampleScore& s) {
+    return s.done && s.clearance <= 0.0;
+  });
+  if (struck != scores.end()) m->struck_after_done_s = struck->t;
   const auto contact =
       std::find_if(scores.begin(), scores.end(), [](const SampleScore& s) { return !s.Safe(); });
   if (contact == scores.end()) return;

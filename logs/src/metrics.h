@@ -59,6 +59,7 @@ struct Metrics {
   double begins_s = 0.0, flown_s = 0.0;           ///< mission times of the first and last sample
   double collision_s = -1.0;                      ///< mission time of the first contact; -1: none
   std::string collided_with;                      ///< as Scorer::Nearest() names it; empty: nothing
+  double struck_after_done_s = -1.0;              ///< first contact where it lies, landed; -1: none
   std::map<std::string, int64_t> lost_messages;   ///< by channel, by `seq`
   std::map<std::string, double> longest_gap_s;    ///< by channel, without an event
   std::map<std::string, TextByProcess> software;  ///< versions, hosts, configurations

@@ -68,6 +68,7 @@ std::string MetricsJson(const FlightRecord& record, const Metrics& m) {
   j["flown_s"] = m.flown_s;
   j["collision_s"] = m.collision_s;
   j["collided_with"] = m.collided_with;
+  j["struck_after_done_s"] = m.struck_after_done_s;
   j["passed"] = m.Passed();
   j["safe_ratio"] = Number(m.safe_ratio);
   j["min_clearance_m"] = Number(m.min_clearance_m);

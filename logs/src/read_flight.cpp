@@ -150,7 +150,7 @@ class Gatherer {
       hear(states_, &state, s.t);
       hear(tracking_, &tracking, s.t);
       hear(autopilot_, &status, s.t);
-      s.may_stand = landing.MayStand(s, record->scenario.world.ground);
+      landing.Mark(record->scenario.world.ground, &s);
     }
   }
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <set>
 #include <stdexcept>
+#include <utility>
 
 #include "logs/src/key_moments.h"
 #include "logs/src/playback.h"
@@ -51,8 +52,9 @@ std::vector<Moment> MomentsOf(const std::vector<SampleScore>& scores, const Metr
   std::vector<Moment> moments;
   if (metrics.collision_s >= 0.0) moments.push_back({metrics.collision_s, "collision", 0});
   const auto least = std::min_element(
-      scores.begin(), scores.end(),
-      [](const SampleScore& a, const SampleScore& b) { return a.clearance < b.clearance; });
+      scores.begin(), scores.end(), [](const SampleScore& a, const SampleScore& b) {
+        return std::pair(a.done, a.clearance) < std::pair(b.done, b.clearance);
+      });
   if (least != scores.end()) moments.push_back({least->t, "smallest clearance", 1});
   return moments;
 }

@@ -39,6 +39,7 @@ SampleScore Scorer::operator()(const TruthSample& s) const {
   score.distance = (s.p - s.target).norm();
   score.clearance = Clearance(s, movers);
   score.visible = Visible(s, movers);
+  score.done = s.done;
   return score;
 }
 

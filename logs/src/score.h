@@ -14,8 +14,9 @@ struct SampleScore {
   double distance = 0.0;   ///< |p_WB - p_WT|, m
   double clearance = 0.0;  ///< from the drone's sphere to the nearest solid, m; negative: touching
   bool visible = false;    ///< the segment from drone to target's centre touches no obstacle
+  bool done = false;  ///< the flight is over: what touches the drone then is no collision of it
 
-  bool Safe() const { return clearance > 0.0; }
+  bool Safe() const { return done || clearance > 0.0; }
 };
 
 /// Scores samples against the scenario's own solids; the ground (except where the flight may stand)

@@ -185,6 +185,11 @@ void Tell(int8_t state, bool control, bool autopilot, LandingWatch* watch) {
   watch->Hear(mission), watch->Hear(tracking), watch->Hear(status);
 }
 
+TruthSample Marked(TruthSample sample, LandingWatch* watch) {
+  watch->Mark({}, &sample);
+  return sample;
+}
+
 TEST(Metrics, ATouchOfTheGroundIsALandingByTheFlightsState) {
   const auto at = [](double height, double speed) {
     TruthSample sample{};
@@ -195,7 +200,7 @@ TEST(Metrics, ATouchOfTheGroundIsALandingByTheFlightsState) {
   const auto touches = [&](int8_t state, bool control, bool autopilot, double speed) {
     LandingWatch watch;
     Tell(state, control, autopilot, &watch);
-    return watch.MayStand(at(0.2, speed), {});
+    return Marked(at(0.2, speed), &watch).may_stand;
   };
   EXPECT_TRUE(touches(flight_state_t::LAND, false, false, 3.0));
   EXPECT_TRUE(touches(flight_state_t::EMERGENCY, true, false, 0.7)) << "sinks without a velocity";
@@ -206,11 +211,11 @@ TEST(Metrics, ATouchOfTheGroundIsALandingByTheFlightsState) {
   EXPECT_FALSE(touches(flight_state_t::CHASE, false, true, 0.8));
   LandingWatch watch;
   Tell(flight_state_t::CHASE, false, true, &watch);
-  watch.MayStand(at(0.4, 0.5), {});
+  Marked(at(0.4, 0.5), &watch);
   Tell(flight_state_t::CHASE, false, false, &watch);
-  EXPECT_TRUE(watch.MayStand(at(0.2, 0.1), {})) << "broken off on the way down";
-  watch.MayStand(at(0.7, 0.5), {});
-  EXPECT_FALSE(watch.MayStand(at(0.2, 0.1), {})) << "it has been up since";
+  EXPECT_TRUE(Marked(at(0.2, 0.1), &watch).may_stand) << "broken off on the way down";
+  Marked(at(0.7, 0.5), &watch);
+  EXPECT_FALSE(Marked(at(0.2, 0.1), &watch).may_stand) << "it has been up since";
 }
 
 TEST(Metrics, ASegmentThroughThePillarIsBlind) {
@@ -239,6 +244,25 @@ TEST(Metrics, TheFirstContactIsToldWithItsTimeAndPartner) {
   EXPECT_EQ(Compute(record).collision_s, 0.0);
   EXPECT_EQ(Compute(Standing({5, 0, 0.2}, {8, 0, 0.5})).collided_with, "ground");
   EXPECT_EQ(Compute(Standing({5, 0, 1.5}, {5.3, 0, 1.5})).collided_with, "target");
+}
+
+TEST(Metrics, WhatTouchesTheDroneWhereItLiesAfterDoneIsNoCollision) {
+  FlightRecord record = Standing({5, 0, 0.12}, {8, 0, 0.5});
+  for (TruthSample& s : record.truth) {
+    LandingWatch watch;
+    Tell(s.t < 4.0 ? flight_state_t::LAND : flight_state_t::DONE, false, false, &watch);
+    watch.Mark({}, &s);
+    if (s.t > 5.994) s.target = {5, 0, 0.5};
+  }
+  Metrics m = Compute(record);
+  EXPECT_EQ(m.collision_s, -1.0);
+  EXPECT_EQ(*m.safe_ratio, 1.0);
+  EXPECT_NEAR(m.struck_after_done_s, 6.0, 1e-9);
+  EXPECT_GT(*m.min_clearance_m, 1.0);
+  for (TruthSample& s : record.truth) s.done = s.t >= 7.0;
+  m = Compute(record);
+  EXPECT_NEAR(m.collision_s, 6.0, 1e-9) << "the motors still run";
+  EXPECT_LT(*m.safe_ratio, 1.0);
 }
 
 /// The named partner alone leaves the clearance as it is; without it there is more.
@@ -601,6 +625,7 @@ TEST(Metrics, JsonHasTheAgreedKeys) {
                           "flown_s",
                           "collision_s",
                           "collided_with",
+                          "struck_after_done_s",
                           "faults",
                           "reaction_s",
                           "recovery_s",
