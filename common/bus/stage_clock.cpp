@@ -1,30 +1,35 @@
 #include "common/bus/stage_clock.h"
 
 #include <algorithm>
-#include <numeric>
+#include <cmath>
 
 namespace chase::bus {
 
-namespace {
-
-StageClock::Summary Summarise(std::vector<float> ms) {
-  StageClock::Summary s;
-  if (ms.empty()) return s;
-  std::sort(ms.begin(), ms.end());
-  const std::size_t n = ms.size();
-  s.count = static_cast<long>(n);
-  s.mean_ms = std::accumulate(ms.begin(), ms.end(), 0.0) / static_cast<double>(n);
-  s.p50_ms = ms[n / 2];
-  s.p99_ms = ms[std::min(n - 1, n * 99 / 100)];
-  s.max_ms = ms.back();
-  return s;
+void StageClock::Histogram::Add(double ms) {
+  const double bin = kPerOctave * std::log2(std::max(ms, kLeast) / kLeast);
+  ++counts_[std::min(static_cast<size_t>(bin), counts_.size() - 1)];
+  ++count_;
+  sum_ms_ += ms;
+  max_ms_ = std::max(max_ms_, ms);
 }
 
-}  // namespace
+// The middle of the bin that the sample of that rank fell into.
+double StageClock::Histogram::Percentile(double share) const {
+  const long rank = std::min(count_ - 1, static_cast<long>(share * static_cast<double>(count_)));
+  size_t bin = 0;
+  for (long passed = counts_[0]; passed <= rank; passed += counts_[bin]) ++bin;
+  return std::min(max_ms_, kLeast * std::exp2((static_cast<double>(bin) + 0.5) / kPerOctave));
+}
+
+StageClock::Summary StageClock::Histogram::Summarise() const {
+  if (count_ == 0) return {};
+  return {count_, sum_ms_ / static_cast<double>(count_), Percentile(0.5), Percentile(0.99),
+          max_ms_};
+}
 
 std::map<std::string, StageClock::Summary> StageClock::Summaries() const {
   std::map<std::string, Summary> all;
-  for (const auto& [name, samples] : samples_ms_) all[name] = Summarise(samples);
+  for (const auto& [name, histogram] : stages_) all[name] = histogram.Summarise();
   return all;
 }
 

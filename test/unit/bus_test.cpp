@@ -10,6 +10,7 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <random>
 
 #include "common/bus/convert.h"
 #include "common/bus/host_clock.h"
@@ -372,6 +373,27 @@ TEST(HostClock, IsTheSameForWhoeverAsksLater) {
   std::ofstream(file) << "torn";
   EXPECT_NEAR(static_cast<double>(HostClockOffset(file) - first), 0.0, 1e6);
   EXPECT_NEAR(static_cast<double>(HostClockOffset("/no/such/place") - first), 0.0, 1e6);
+}
+
+/// Durations over seven decades, against what sorting them says.
+TEST(StageClock, PercentilesOfAHistogramAreThoseOfTheSamples) {
+  std::mt19937 random(3);
+  for (const double spread : {0.0, 0.5, 3.0}) {
+    std::lognormal_distribution<double> ms(1.0, spread);
+    StageClock::Histogram histogram;
+    std::vector<double> samples;
+    for (int i = 0; i < 5000; ++i) histogram.Add(samples.emplace_back(ms(random)));
+    std::sort(samples.begin(), samples.end());
+    const StageClock::Summary s = histogram.Summarise();
+    EXPECT_EQ(s.count, 5000);
+    EXPECT_NEAR(s.p50_ms, samples[2500], 0.011 * samples[2500]);
+    EXPECT_NEAR(s.p99_ms, samples[4950], 0.011 * samples[4950]);
+    EXPECT_EQ(s.max_ms, samples.back());
+  }
+  StageClock::Histogram ends;
+  ends.Add(0.0), ends.Add(1e9);
+  EXPECT_EQ(ends.Summarise().max_ms, 1e9);
+  EXPECT_LT(ends.Summarise().p50_ms, 1e5);
 }
 
 }  // namespace
