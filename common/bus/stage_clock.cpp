@@ -6,8 +6,9 @@
 namespace chase::bus {
 
 void StageClock::Histogram::Add(double ms) {
-  const double bin = kPerOctave * std::log2(std::max(ms, kLeast) / kLeast);
-  ++counts_[std::min(static_cast<size_t>(bin), counts_.size() - 1)];
+  if (!std::isfinite(ms)) return;
+  const double bin = kBinsPerOctave * std::log2(std::max(ms, kLeastMs) / kLeastMs);
+  ++counts_[static_cast<size_t>(std::min(bin, static_cast<double>(counts_.size() - 1)))];
   ++count_;
   sum_ms_ += ms;
   max_ms_ = std::max(max_ms_, ms);
@@ -17,8 +18,8 @@ void StageClock::Histogram::Add(double ms) {
 double StageClock::Histogram::Percentile(double share) const {
   const long rank = std::min(count_ - 1, static_cast<long>(share * static_cast<double>(count_)));
   size_t bin = 0;
-  for (long passed = counts_[0]; passed <= rank; passed += counts_[bin]) ++bin;
-  return std::min(max_ms_, kLeast * std::exp2((static_cast<double>(bin) + 0.5) / kPerOctave));
+  for (int64_t passed = counts_[0]; passed <= rank; passed += counts_[bin]) ++bin;
+  return std::min(max_ms_, kLeastMs * std::exp2((static_cast<double>(bin) + 0.5) / kBinsPerOctave));
 }
 
 StageClock::Summary StageClock::Histogram::Summarise() const {

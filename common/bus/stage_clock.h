@@ -12,25 +12,26 @@ namespace chase::bus {
 /// messages and metrics, never into results.
 class StageClock {
  public:
-  /// Of all so far; percentiles within 1.1 %.
+  /// Of all durations so far; percentiles to within 1.1 % between 10 ns and 43 s.
   struct Summary {
     long count = 0;
     double mean_ms = 0, p50_ms = 0, p99_ms = 0, max_ms = 0;
   };
 
-  /// Counts of durations in bins of equal ratio.
+  /// Counts of durations in bins of equal ratio, 2^(1/32): a bin's middle is off by 2^(1/64) - 1 =
+  /// 1.1 % at most. What is shorter or longer counts in the first or last bin.
   class Histogram {
    public:
     void Add(double ms);
     Summary Summarise() const;
 
    private:
-    static constexpr int kPerOctave = 32, kOctaves = 32;
-    static constexpr double kLeast = 1e-5;  // ms; whatever is shorter counts as that
+    static constexpr int kBinsPerOctave = 32, kOctaves = 32;
+    static constexpr double kLeastMs = 1e-5;
 
     double Percentile(double share) const;
 
-    std::array<uint32_t, kPerOctave * kOctaves> counts_{};
+    std::array<int64_t, kBinsPerOctave * kOctaves> counts_{};
     long count_ = 0;
     double sum_ms_ = 0.0, max_ms_ = 0.0;
   };

@@ -30,7 +30,7 @@ struct TruthSample {
   /// The flight's state has it on the ground, or on the way from or to it, or control comes down by
   /// itself and slowly: touching that is no harm.
   bool may_stand = false;
-  bool done = false;  ///< the flight's state is DONE: it lies on the ground, motors off
+  bool done = false;  ///< it lies on the ground in DONE
 };
 
 /// The flight's state from then on.

@@ -56,12 +56,12 @@ struct Metrics {
   Figure reaction_s;  ///< the longest of the faults'; none: no input reached its limit
   Figure recovery_s;  ///< the same; none also where one was not recovered from
   long nonfinite_setpoints = 0;
-  double begins_s = 0.0, flown_s = 0.0;           ///< mission times of the first and last sample
-  double collision_s = -1.0;                      ///< mission time of the first contact; -1: none
-  std::string collided_with;                      ///< as Scorer::Nearest() names it; empty: nothing
-  double struck_after_done_s = -1.0;              ///< first contact where it lies, landed; -1: none
-  std::map<std::string, int64_t> lost_messages;   ///< by channel, by `seq`
-  std::map<std::string, double> longest_gap_s;    ///< by channel, without an event
+  double begins_s = 0.0, flown_s = 0.0;          ///< mission times of the first and last sample
+  double collision_s = -1.0;                     ///< mission time of the first contact; -1: none
+  std::string collided_with;                     ///< as Scorer::Nearest() names it; empty: nothing
+  double struck_after_done_s = -1.0;             ///< first sample after DONE that touches; -1: none
+  std::map<std::string, int64_t> lost_messages;  ///< by channel, by `seq`
+  std::map<std::string, double> longest_gap_s;   ///< by channel, without an event
   std::map<std::string, TextByProcess> software;  ///< versions, hosts, configurations
   std::vector<std::string> losses;                ///< a line for each, for people
   bool log_whole = true;                          ///< neither cut off nor damaged

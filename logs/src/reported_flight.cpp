@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <set>
 #include <stdexcept>
-#include <utility>
 
 #include "logs/src/key_moments.h"
 #include "logs/src/playback.h"
@@ -51,10 +50,9 @@ std::string Shortfall(const VehicleReport& vehicle) {
 std::vector<Moment> MomentsOf(const std::vector<SampleScore>& scores, const Metrics& metrics) {
   std::vector<Moment> moments;
   if (metrics.collision_s >= 0.0) moments.push_back({metrics.collision_s, "collision", 0});
-  const auto least = std::min_element(
-      scores.begin(), scores.end(), [](const SampleScore& a, const SampleScore& b) {
-        return std::pair(a.done, a.clearance) < std::pair(b.done, b.clearance);
-      });
+  const auto least = std::find_if(scores.begin(), scores.end(), [&](const SampleScore& s) {
+    return !s.done && s.clearance == metrics.min_clearance_m;
+  });
   if (least != scores.end()) moments.push_back({least->t, "smallest clearance", 1});
   return moments;
 }

@@ -14,7 +14,7 @@ struct SampleScore {
   double distance = 0.0;   ///< |p_WB - p_WT|, m
   double clearance = 0.0;  ///< from the drone's sphere to the nearest solid, m; negative: touching
   bool visible = false;    ///< the segment from drone to target's centre touches no obstacle
-  bool done = false;  ///< the flight is over: what touches the drone then is no collision of it
+  bool done = false;       ///< it has landed: a touch is no collision of the flight
 
   bool Safe() const { return done || clearance > 0.0; }
 };

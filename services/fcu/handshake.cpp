@@ -72,7 +72,7 @@ struct HandshakeTable {
   static bool Cut(H h) { return h.facts_.gap >= kLongestGap; }
   static bool PilotLands(H h) {
     const bool left = h.Told(h.since_) && !(h.facts_.mode == kLandMode) && !InOffboard(h);
-    return (left && !h.facts_.failsafe) || PilotHasIt(h);
+    return (left && (!h.facts_.failsafe || h.lands_)) || PilotHasIt(h);
   }
   static bool Released(H h) { return h.Withdrawn() && !h.facts_.armed; }
   static bool GivenBack(H h) { return !h.engages_ && !h.facts_.failsafe; }
@@ -166,6 +166,7 @@ void Handshake::Update(const Facts& facts) {
   facts_ = facts;
   if (facts.wish) wished_ = facts.utime;
   if (state_ == State::kArming) asked_to_arm_ = facts.utime;
+  lands_ = state_ == State::kLanding && (lands_ || (Told(since_) && facts.mode == kLandMode));
   // Landing and disarming have no alternative: what is refused is asked for again.
   if ((state_ == State::kLanding || state_ == State::kDisarming || state_ == State::kKilling) &&
       command_.answer() == Command::Answer::kRefused)
@@ -175,8 +176,9 @@ void Handshake::Update(const Facts& facts) {
     if (row.from == state_ && row.when(*this)) return Enter(row.to, row.why);
 }
 
-/// Once it lands nothing is asked again: whoever takes it out of that mode is the pilot. He may
-/// have taken it since the last heartbeat, too.
+/// Once it lands nothing is asked again: whoever takes it out of that mode is the pilot, also where
+/// the autopilot calls its state critical, as it does for a warning. He may have taken it since the
+/// last heartbeat, too.
 std::optional<mav::CommandLong> Handshake::NextCommand(int64_t utime) {
   if (state_ == State::kLanding && (facts_.mode == kLandMode || !Told(since_))) return std::nullopt;
   return command_.Tick(utime);

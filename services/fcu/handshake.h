@@ -95,6 +95,7 @@ class Handshake {
   int64_t since_ = 0;         // in this state
   int64_t wished_ = 0;        // when a setpoint last wanted the motors
   int64_t asked_to_arm_ = 0;  // when; 0: not yet
+  bool lands_ = false;        // in kLanding: the autopilot has told that mode
   int64_t gap_found_ = 0;     // when the link had been silent for too long to stream; 0: it is not
 };
 

@@ -251,6 +251,23 @@ TEST(FcuHandshake, AFlightThatIsOverIsNotGoneOnWith) {
   EXPECT_EQ(flight.handshake.state(), State::kStreaming) << "another flight";
 }
 
+TEST(FcuHandshake, APilotMayTakeItFromALandingThatIsCalledCritical) {
+  Engaged flight(true);
+  flight.facts.wish = false;
+  flight.Run(0.7);
+  ASSERT_EQ(flight.handshake.state(), State::kLanding);
+  flight.facts.mode = kLandMode;
+  flight.facts.failsafe = true;  // low battery, say
+  flight.Run(2.0);
+  ASSERT_EQ(flight.handshake.state(), State::kLanding);
+  flight.facts.mode = {2, 0};  // ALTCTL
+  for (int i = 0; i < 50; ++i) {
+    flight.Run(0.1);
+    EXPECT_FALSE(flight.handshake.NextCommand(flight.facts.utime));
+  }
+  EXPECT_EQ(flight.handshake.state(), State::kPilot);
+}
+
 TEST(FcuHandshake, APilotMayTakeItFromALandingAtAnyMoment) {
   for (const double after : {0.05, 0.3, 0.9, 1.7, 2.4}) {
     for (const bool heard : {false, true}) {

@@ -246,14 +246,20 @@ TEST(Metrics, TheFirstContactIsToldWithItsTimeAndPartner) {
   EXPECT_EQ(Compute(Standing({5, 0, 1.5}, {5.3, 0, 1.5})).collided_with, "target");
 }
 
-TEST(Metrics, WhatTouchesTheDroneWhereItLiesAfterDoneIsNoCollision) {
-  FlightRecord record = Standing({5, 0, 0.12}, {8, 0, 0.5});
-  for (TruthSample& s : record.truth) {
-    LandingWatch watch;
+/// Of a drone that is told to be in LAND until 4 s, and DONE from then on.
+void TellDone(FlightRecord* record) {
+  LandingWatch watch;
+  for (TruthSample& s : record->truth) {
     Tell(s.t < 4.0 ? flight_state_t::LAND : flight_state_t::DONE, false, false, &watch);
     watch.Mark({}, &s);
-    if (s.t > 5.994) s.target = {5, 0, 0.5};
   }
+}
+
+TEST(Metrics, WhatTouchesTheDroneWhereItLiesAfterDoneIsNoCollision) {
+  FlightRecord record = Standing({5, 0, 0.12}, {8, 0, 0.5});
+  for (TruthSample& s : record.truth)
+    if (s.t > 5.994) s.target = {5, 0, 0.5};
+  TellDone(&record);
   Metrics m = Compute(record);
   EXPECT_EQ(m.collision_s, -1.0);
   EXPECT_EQ(*m.safe_ratio, 1.0);
@@ -261,8 +267,25 @@ TEST(Metrics, WhatTouchesTheDroneWhereItLiesAfterDoneIsNoCollision) {
   EXPECT_GT(*m.min_clearance_m, 1.0);
   for (TruthSample& s : record.truth) s.done = s.t >= 7.0;
   m = Compute(record);
-  EXPECT_NEAR(m.collision_s, 6.0, 1e-9) << "the motors still run";
+  EXPECT_NEAR(m.collision_s, 6.0, 1e-9) << "not yet DONE";
+  EXPECT_NEAR(m.struck_after_done_s, 7.0, 1e-9);
   EXPECT_LT(*m.safe_ratio, 1.0);
+}
+
+TEST(Metrics, WhatFallsWithItsMotorsCutHasNotLanded) {
+  FlightRecord record = Standing({5, 0, 2.0}, {8, 0, 0.5});
+  for (TruthSample& s : record.truth) {
+    if (s.t < 4.0) continue;
+    s.speed = 9.81 * (s.t - 4.0);
+    s.p.z() = 2.0 - 0.5 * 9.81 * std::pow(s.t - 4.0, 2);
+    s.target = {5, 0, 0.6};
+    if (s.p.z() < 0.12) s.p.z() = 0.12, s.speed = 0.0;
+  }
+  TellDone(&record);
+  const Metrics m = Compute(record);
+  EXPECT_GT(m.collision_s, 4.2);
+  EXPECT_LT(m.collision_s, 4.6);
+  EXPECT_EQ(m.collided_with, "target");
 }
 
 /// The named partner alone leaves the clearance as it is; without it there is more.
