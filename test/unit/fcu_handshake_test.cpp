@@ -230,13 +230,17 @@ struct Engaged {
       handshake.Update(facts);
     }
   }
+  /// Control hangs in flight; LAND is not heard of yet.
+  void LosesControl() {
+    facts.wish = false;
+    Run(0.7);
+    EXPECT_EQ(handshake.state(), State::kLanding);
+  }
 };
 
 TEST(FcuHandshake, AFlightThatIsOverIsNotGoneOnWith) {
   Engaged flight(true);
-  flight.facts.wish = false;  // control hangs
-  flight.Run(0.7);
-  ASSERT_EQ(flight.handshake.state(), State::kLanding);
+  flight.LosesControl();
   flight.facts.mode = kLandMode;
   flight.Run(2.0);
   flight.facts.armed = false;
@@ -253,9 +257,7 @@ TEST(FcuHandshake, AFlightThatIsOverIsNotGoneOnWith) {
 
 TEST(FcuHandshake, APilotMayTakeItFromALandingThatIsCalledCritical) {
   Engaged flight(true);
-  flight.facts.wish = false;
-  flight.Run(0.7);
-  ASSERT_EQ(flight.handshake.state(), State::kLanding);
+  flight.LosesControl();
   flight.facts.mode = kLandMode;
   flight.facts.failsafe = true;  // low battery, say
   flight.Run(2.0);
@@ -272,9 +274,7 @@ TEST(FcuHandshake, APilotMayTakeItFromALandingAtAnyMoment) {
   for (const double after : {0.05, 0.3, 0.9, 1.7, 2.4}) {
     for (const bool heard : {false, true}) {
       Engaged flight(true);
-      flight.facts.wish = false;
-      flight.Run(0.7);
-      ASSERT_EQ(flight.handshake.state(), State::kLanding);
+      flight.LosesControl();
       flight.Run(0.01);
       ASSERT_TRUE(flight.handshake.NextCommand(flight.facts.utime));
       flight.handshake.OnAck(21, 0, flight.facts.utime);
