@@ -117,6 +117,13 @@ bool Integrator::PassesReturns(const Voxel& voxel, const Key& key) const {
   return squared < std::pow(kNearMiss * grid_.resolution(), 2);
 }
 
+/// Of the ray where it is nearest to the cell's centre, in steps above that.
+int8_t Integrator::PassingHeight(const Key& key) const {
+  const Eigen::Vector3d d = grid_.Center(key) - ray_origin_;
+  const double above = d.dot(ray_direction_) * ray_direction_.z() - d.z();
+  return static_cast<int8_t>(std::clamp(std::round(above / grid_.step()), -127.0, 127.0));
+}
+
 void Integrator::Miss(const Key& key) {
   VoxelGrid::Column& column = grid_.Touch(key.x, key.y);
   Voxel& voxel = column.voxels[VoxelGrid::Level(key.z)];
@@ -129,6 +136,8 @@ void Integrator::Miss(const Key& key) {
   voxel.log_odds = static_cast<int8_t>(std::max(least, voxel.log_odds + config_.miss));
   if (voxel.log_odds > 0) return;
   if (voxel.hits > 0) Reset(&column, &voxel, key);
+  const int8_t height = PassingHeight(key);
+  voxel.free_down_to = voxel.free_sweeps == 0 ? height : std::min(voxel.free_down_to, height);
   voxel.free_sweeps = Increment(voxel.free_sweeps);
   if (voxel.free_sweeps == kNewlyFree) Queue(&voxel, key);
   if (voxel.log_odds == least &&

@@ -48,6 +48,7 @@ class Integrator {
   void CastRays(const Eigen::Vector3d& origin, size_t first, size_t n);
   void Miss(const Key& key);
   bool PassesReturns(const Voxel& voxel, const Key& key) const;
+  int8_t PassingHeight(const Key& key) const;
   void Reset(VoxelGrid::Column* column, Voxel* voxel, const Key& key);
   void SetOccupied(VoxelGrid::Column* column, Voxel* voxel, const Key& key);
   void Queue(Voxel* voxel, const Key& key);

@@ -10,12 +10,19 @@ namespace {
 constexpr int kSettledHits = 15;       // sweeps after which an occupied cell is not doubted
 constexpr double kLeastDepth = 0.4;    // of a mover's width over its length
 constexpr double kFewestSeeds = 0.25;  // share of a cluster's returns in ever-free space
+constexpr float kFlat = 0.1f;          // m, of heights that a level surface's returns span at most
 constexpr double kGrazing = -0.35;     // cosine of the view on an end beyond which it is unseen
 constexpr float kTouch = 0.4f;         // m, so near to other returns nothing ends
 constexpr double kRim = 0.5;           // m, so near to the range nothing ends
 
 int64_t Code(int x, int y) {
   return (static_cast<int64_t>(x) << 32) + (static_cast<int64_t>(y) + (1LL << 31));
+}
+
+/// Rays have passed below a return in its own cell, or where it is.
+bool PassedBelow(const Return& r, VoxelGrid* grid) {
+  const double above = r.p.z() - grid->Center(r.key).z();
+  return above >= grid->step() * grid->At(r.key)->free_down_to;
 }
 
 /// A column of the sorted list, or one next to it.
@@ -90,6 +97,22 @@ std::vector<MotionDetector::Candidate> MotionDetector::Candidates(
     return a.cell != b.cell ? a.cell < b.cell : a.index < b.index;
   });
   return candidates;
+}
+
+/// A ring that moves over a table's top lies in space that was free, but for rays above the top
+/// only. Where all is at one height, it takes rays that passed below to tell a mover from that.
+bool MotionDetector::IsLevel(const Cluster& cluster, const std::vector<Return>& returns,
+                             VoxelGrid* grid) const {
+  float low = INFINITY, high = -INFINITY;
+  int below = 0;
+  for (const int i : cluster.members) {
+    const Return& r = returns[static_cast<size_t>(i)];
+    if (!InEverFree(r.key, grid)) continue;
+    low = std::min(low, r.p.z());
+    high = std::max(high, r.p.z());
+    below += PassedBelow(r, grid);
+  }
+  return high - low < kFlat && below < kFewestSeeds * static_cast<double>(cluster.members.size());
 }
 
 /// The connected parts of what is `body`'s, or of what no expected mover explains (-1). Of an
@@ -255,6 +278,7 @@ std::vector<Cluster> MotionDetector::Detect(const Eigen::Vector3d& origin, const
   std::vector<Cluster> clusters;
   for (int body = -1; body < static_cast<int>(expected.size()); ++body)
     for (auto& cluster : Connected(candidates, body)) {
+      if (body < 0 && IsLevel(cluster, returns, grid)) continue;
       if (body >= 0) cluster.track = expected[static_cast<size_t>(body)].track;
       clusters.push_back(std::move(cluster));
     }

@@ -48,6 +48,7 @@ class MotionDetector {
   std::vector<Candidate> Candidates(const std::vector<Return>& returns, VoxelGrid* grid,
                                     const std::vector<Footprint>& expected) const;
   bool InEverFree(const Key& key, VoxelGrid* grid) const;
+  bool IsLevel(const Cluster& cluster, const std::vector<Return>& returns, VoxelGrid* grid) const;
   std::vector<Cluster> Connected(const std::vector<Candidate>& candidates, int body) const;
   std::vector<int> Look(const Eigen::Vector3d& origin, const LowestRays& rays,
                         const std::vector<Return>& returns, const std::vector<Cluster>& clusters);

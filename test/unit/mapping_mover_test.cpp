@@ -126,6 +126,31 @@ TEST(MappingMover, WalkersAreSeenBeforeTheSky) {
   }
 }
 
+/// Rings that move over a table's top as the drone sinks or comes nearer are no movers.
+TEST(MappingMover, NothingMovesOverATable) {
+  for (const unsigned seed : {1u, 2u, 3u, 4u}) {
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> uniform(0.0, 1.0);
+    testing::World world;
+    world.boxes = {{{7.0, 0.0, 1.5}, {0.1, 6.0, 1.5}}, {{-7.0, 0.0, 1.5}, {0.1, 6.0, 1.5}}};
+    for (int i = 0; i < 8; ++i) {
+      const double top = 0.5 + 0.4 * uniform(random), across = i < 4 ? -2.5 : 2.5;
+      world.boxes.push_back({{3.0 * (i % 4) - 4.5, across, 0.5 * top},
+                             {0.7, 0.4, 0.5 * top},
+                             M_PI * uniform(random)});
+    }
+    Mapper mapper(MappingConfig{});
+    for (double t = 0.0; t < 16.0; t += 0.1) {
+      const Eigen::Vector3d at(-4.0 + 0.5 * t, 0.5 * std::sin(t), 1.15 + 0.15 * std::sin(0.8 * t));
+      const Eigen::Quaterniond R_WL(
+          Eigen::AngleAxisd(0.06 * std::sin(1.3 * t), Eigen::Vector3d::UnitY()));
+      const auto list =
+          mapper.Insert(testing::Scan(world, at, t, {0.02, 0.01}, &random, nullptr, R_WL));
+      EXPECT_EQ(list.n_moving, 0) << "seed " << seed << ", " << t;
+    }
+  }
+}
+
 /// A mover on its way to a wall that has long been there is not forecast to go through it.
 TEST(MappingMover, ForecastEndsAtAWall) {
   std::mt19937 random(3);
