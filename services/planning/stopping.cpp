@@ -241,6 +241,8 @@ PlanResult RestPlan(const PlannerConfig& config, const PlanRequest& request) {
   Resting wide(config, request), close(hard, request);
   std::optional<Stop> stop = wide.BrakeWithin();
   if (!stop) stop = close.BrakeWithin();
+  // A stop that turns back may begin where braking leads into the unseen.
+  const bool blind = stop && !KeepsOff(hard, request, stop->trajectory, stop->trajectory.end());
   const auto lasts = [&] {
     const PlanRequest without_drift = WithoutDrift(request);
     return Resting(hard, without_drift).Lasts(*stop, request.t0 + kLasts);
@@ -255,7 +257,7 @@ PlanResult RestPlan(const PlannerConfig& config, const PlanRequest& request) {
       return result;
     }
   }
-  if (!stop)
+  if (!stop || blind)
     if (auto committed = Committed(hard, request)) {
       NameFaster(true, &*committed);
       return *committed;
@@ -290,7 +292,7 @@ std::optional<Stop> WayOut(const PlannerConfig& config, const PlanRequest& reque
     const double t = std::min(plan.start + after, plan.end());
     resting.From(plan.At(t), t);
     std::optional<Stop> stop;
-    if (KeepsOff(hard, request, plan, t)) stop = resting.RiseOrBrake();
+    if (KeepsOff(hard, request, plan, t)) stop = resting.GiveWay();
     if (stop) {  // whoever checks it hears of obstacles only
       auto& proofs = stop->proofs;
       proofs.erase(std::remove_if(proofs.begin(), proofs.end(), is_unseen), proofs.end());

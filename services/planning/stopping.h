@@ -60,10 +60,10 @@ void SetProofs(const PlannerConfig& config, const PlanRequest& request, std::vec
                PlanResult* result);
 
 /// Where `plan` can be left for a certified rest: as soon as a new plan is overdue, else sooner or
-/// later. Braking keeps the hard radius and gives up the margin. After FASTER, Tordesillas et al.
-/// 2019: a plan is flown only with such a way out. What is unseen is kept off until then and after.
-/// `leaves`: the plan leaves obstacles that its start is in, and the stop may begin within them.
-/// `memory`: of an earlier call, if any.
+/// later; above the target, by braking, or off the target's way. It keeps the hard radius and gives
+/// up the margin. After FASTER, Tordesillas et al. 2019: a plan is flown only with such a way out.
+/// What is unseen is kept off until then and after. `leaves`: the plan leaves obstacles that its
+/// start is in, and the stop may begin within them. `memory`: of an earlier call, if any.
 std::optional<Stop> WayOut(const PlannerConfig& config, const PlanRequest& request,
                            const world::Trajectory& plan, bool leaves = false,
                            Problem* memory = nullptr);

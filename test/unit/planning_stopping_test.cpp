@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "common/world/forecast.h"
 #include "common/world/random.h"
 #include "services/planning/resting.h"
 #include "test/unit/planning_claim.h"
@@ -319,6 +320,46 @@ TEST(WayOut, IsFoundWhereThePlanCanBeLeftForAWhile) {
   }
   EXPECT_GT(late, 5);
   EXPECT_GT(none, 20);
+}
+
+// In the open a target of a person's height, which cannot be flown over, drives at the hovering
+// drone: its plan can be left for a place off the way, out of the reach of two deviations.
+TEST(WayOut, GivesWayToATargetThatComes) {
+  PlannerConfig config;
+  config.z_max = 1.5;
+  int found = 0;
+  for (unsigned seed = 0; seed < 200; ++seed) {
+    Random random(seed, 12);
+    PlanRequest request;
+    request.start.p = {0.0, 0.0, 1.0};
+    request.target_body.emplace();
+    world::Obstacle& target = *request.target_body;
+    target.id = kTargetId;
+    target.moving = true;
+    target.solid = world::Obstacle::Solid::kCylinder;
+    target.half = {0.25, 0.25, 0.85};
+    target.shape = target.half.cwiseAbs2().cwiseInverse().asDiagonal();
+    const double angle = random.Uniform(-M_PI, M_PI), distance = random.Uniform(1.4, 1.6);
+    const Vector3d off(std::cos(angle), std::sin(angle), 0.0);
+    target.center = {0.0, 2.5, Eigen::MatrixXd::Zero(2, 3)};
+    target.center.coefficients.row(0) = (distance * off + Vector3d(0.0, 0.0, 0.85)).transpose();
+    target.center.coefficients.row(1) = -2.5 * random.Uniform(0.9, 1.1) * off.transpose();
+    request.target_manoeuvre = world::kTargetManoeuvre;
+    request.target = target.center;
+    const auto plan = world::Trajectory::Constant(request.start.p, 0.0, 2.5);
+    const std::optional<Stop> stop = WayOut(config, request, plan);
+    found += stop.has_value();
+    if (!stop) continue;
+    const world::Trajectory& way = stop->trajectory;
+    EXPECT_LT(way.Velocity(way.end()).norm(), 1e-6) << seed;
+    for (int i = 0; i <= kInstants; ++i) {
+      const double t = way.start + way.duration * i / kInstants;
+      const double reach = config.sigmas * std::sqrt(request.target_manoeuvre.Variance(t));
+      EXPECT_GT(Distance(target, way.Position(t), t), config.hard_radius() + reach - 1e-6)
+          << seed << " at " << t;
+    }
+  }
+  EXPECT_GT(found, 160);
 }
 
 // A quartic that ends at rest before a wall says nothing of what comes after.
