@@ -117,7 +117,7 @@ bool Integrator::PassesReturns(const Voxel& voxel, const Key& key) const {
   return squared < std::pow(kNearMiss * grid_.resolution(), 2);
 }
 
-/// Of the ray where it is nearest to the cell's centre, in steps above that.
+/// Height of the ray above the cell's centre where it is nearest to it, in steps.
 int8_t Integrator::PassingHeight(const Key& key) const {
   const Eigen::Vector3d d = grid_.Center(key) - ray_origin_;
   const double above = d.dot(ray_direction_) * ray_direction_.z() - d.z();

@@ -10,19 +10,13 @@ namespace {
 constexpr int kSettledHits = 15;       // sweeps after which an occupied cell is not doubted
 constexpr double kLeastDepth = 0.4;    // of a mover's width over its length
 constexpr double kFewestSeeds = 0.25;  // share of a cluster's returns in ever-free space
-constexpr float kFlat = 0.1f;          // m, of heights that a level surface's returns span at most
+constexpr float kLevel = 0.1f;         // m, less than this a level surface's returns span
 constexpr double kGrazing = -0.35;     // cosine of the view on an end beyond which it is unseen
 constexpr float kTouch = 0.4f;         // m, so near to other returns nothing ends
 constexpr double kRim = 0.5;           // m, so near to the range nothing ends
 
 int64_t Code(int x, int y) {
   return (static_cast<int64_t>(x) << 32) + (static_cast<int64_t>(y) + (1LL << 31));
-}
-
-/// Rays have passed below a return in its own cell, or where it is.
-bool PassedBelow(const Return& r, VoxelGrid* grid) {
-  const double above = r.p.z() - grid->Center(r.key).z();
-  return above >= grid->step() * grid->At(r.key)->free_down_to;
 }
 
 /// A column of the sorted list, or one next to it.
@@ -68,10 +62,11 @@ std::vector<MotionDetector::Candidate> MotionDetector::Candidates(
   std::vector<Candidate> candidates;
   std::vector<int> doubtful;     // in occupied cells that are not settled
   std::vector<int64_t> columns;  // with a return in ever-free space
-  const auto add = [&](int i, bool strong, int body) {
+  const auto add = [&](int i, bool strong, bool passed, int body) {
     const Eigen::Vector3f& p = returns[static_cast<size_t>(i)].p;
     const double cell = config_.cluster_cell;
-    candidates.push_back({Code(Floor(p.x() / cell), Floor(p.y() / cell)), i, strong, body});
+    candidates.push_back(
+        {Code(Floor(p.x() / cell), Floor(p.y() / cell)), i, p.z(), strong, passed, body});
   };
   double excess = 0.0;
   for (size_t i = 0; i < returns.size(); ++i) {
@@ -87,50 +82,44 @@ std::vector<MotionDetector::Candidate> MotionDetector::Candidates(
       continue;
     }
     const bool strong = InEverFree(r.key, grid);
-    add(static_cast<int>(i), strong, body);
+    const bool passed =
+        strong && r.p.z() - grid->Center(r.key).z() >= grid->step() * voxel->free_down_to;
+    add(static_cast<int>(i), strong, passed, body);
     if (strong) columns.push_back(Code(r.key.x, r.key.y));
   }
   std::sort(columns.begin(), columns.end());
   for (const int i : doubtful)
-    if (Beside(columns, returns[static_cast<size_t>(i)].key)) add(i, false, -1);
+    if (Beside(columns, returns[static_cast<size_t>(i)].key)) add(i, false, false, -1);
   std::sort(candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) {
     return a.cell != b.cell ? a.cell < b.cell : a.index < b.index;
   });
   return candidates;
 }
 
-/// A ring that moves over a table's top lies in space that was free, but for rays above the top
-/// only. Where all is at one height, it takes rays that passed below to tell a mover from that.
-bool MotionDetector::IsLevel(const Cluster& cluster, const std::vector<Return>& returns,
-                             VoxelGrid* grid) const {
-  float low = INFINITY, high = -INFINITY;
-  int below = 0;
-  for (const int i : cluster.members) {
-    const Return& r = returns[static_cast<size_t>(i)];
-    if (!InEverFree(r.key, grid)) continue;
-    low = std::min(low, r.p.z());
-    high = std::max(high, r.p.z());
-    below += PassedBelow(r, grid);
-  }
-  return high - low < kFlat && below < kFewestSeeds * static_cast<double>(cluster.members.size());
-}
-
 /// The connected parts of what is `body`'s, or of what no expected mover explains (-1). Of an
-/// expected one half of the returns do that a new one takes.
+/// expected one half of the returns do that a new one takes. A ring that moves over a table's top
+/// lies in free space too, as rays passed above the top: where all is level, returns count that
+/// rays passed below. Everywhere this would cost movers half a second until they are found.
 std::vector<Cluster> MotionDetector::Connected(const std::vector<Candidate>& candidates,
                                                int body) const {
   struct Bin {
     int64_t cell;
     std::vector<int> members;
-    int strong;
+    int strong, passed;
+    float low, high;
     bool taken;
   };
   std::vector<Bin> bins;
   for (const auto& c : candidates) {
     if (c.body != body) continue;
-    if (bins.empty() || bins.back().cell != c.cell) bins.push_back({c.cell, {}, 0, false});
-    bins.back().members.push_back(c.index);
-    bins.back().strong += c.strong || body >= 0;
+    if (bins.empty() || bins.back().cell != c.cell)
+      bins.push_back({c.cell, {}, 0, 0, c.z, c.z, false});
+    Bin& bin = bins.back();
+    bin.members.push_back(c.index);
+    bin.strong += c.strong || body >= 0;
+    bin.passed += c.passed || body >= 0;
+    bin.low = std::min(bin.low, c.z);
+    bin.high = std::max(bin.high, c.z);
   }
   const auto find = [&](int64_t cell) {
     const auto it = std::lower_bound(bins.begin(), bins.end(), cell,
@@ -143,10 +132,14 @@ std::vector<Cluster> MotionDetector::Connected(const std::vector<Candidate>& can
     start.taken = true;
     std::vector<Bin*> front{&start};
     Cluster cluster;
-    int strong = 0;
+    int strong = 0, passed = 0;
+    float low = start.low, high = start.high;
     for (size_t head = 0; head < front.size(); ++head) {
       const Bin& at = *front[head];
       strong += at.strong;
+      passed += at.passed;
+      low = std::min(low, at.low);
+      high = std::max(high, at.high);
       cluster.members.insert(cluster.members.end(), at.members.begin(), at.members.end());
       if (at.strong == 0) continue;  // the rim grows no further
       for (int dx = -1; dx <= 1; ++dx)
@@ -158,7 +151,8 @@ std::vector<Cluster> MotionDetector::Connected(const std::vector<Candidate>& can
         }
     }
     const auto size = static_cast<int>(cluster.members.size());
-    if ((body >= 0 ? 2 : 1) * size >= config_.min_points && strong >= kFewestSeeds * size)
+    const int seeds = high - low < kLevel ? passed : strong;
+    if ((body >= 0 ? 2 : 1) * size >= config_.min_points && seeds >= kFewestSeeds * size)
       clusters.push_back(std::move(cluster));
   }
   return clusters;
@@ -278,7 +272,6 @@ std::vector<Cluster> MotionDetector::Detect(const Eigen::Vector3d& origin, const
   std::vector<Cluster> clusters;
   for (int body = -1; body < static_cast<int>(expected.size()); ++body)
     for (auto& cluster : Connected(candidates, body)) {
-      if (body < 0 && IsLevel(cluster, returns, grid)) continue;
       if (body >= 0) cluster.track = expected[static_cast<size_t>(body)].track;
       clusters.push_back(std::move(cluster));
     }

@@ -42,13 +42,14 @@ class MotionDetector {
   struct Candidate {
     int64_t cell;  ///< code of its cluster cell in plan
     int index;     ///< into the returns
+    float z;       ///< its height, m
     bool strong;   ///< lies in ever-free space
+    bool passed;   ///< and no lower than rays have passed there
     int body;      ///< index of the expected mover whose it is, or -1
   };
   std::vector<Candidate> Candidates(const std::vector<Return>& returns, VoxelGrid* grid,
                                     const std::vector<Footprint>& expected) const;
   bool InEverFree(const Key& key, VoxelGrid* grid) const;
-  bool IsLevel(const Cluster& cluster, const std::vector<Return>& returns, VoxelGrid* grid) const;
   std::vector<Cluster> Connected(const std::vector<Candidate>& candidates, int body) const;
   std::vector<int> Look(const Eigen::Vector3d& origin, const LowestRays& rays,
                         const std::vector<Return>& returns, const std::vector<Cluster>& clusters);

@@ -32,11 +32,11 @@ struct Extent {
 };
 
 struct Voxel {
-  int8_t log_odds = 0;                ///< tenths
-  uint8_t free_sweeps = 0;            ///< consecutive sweeps seen free; kept through the first hits
-  uint8_t hits = 0;                   ///< sweeps that hit it since it was last free
-  uint8_t moving_hits = 0;            ///< consecutive sweeps in which moving returns lay in it
-  int8_t free_down_to = 0;            ///< lowest of the rays that freed it, steps about the centre
+  int8_t log_odds = 0;      ///< tenths
+  uint8_t free_sweeps = 0;  ///< consecutive sweeps seen free; kept through the first hits
+  uint8_t hits = 0;         ///< sweeps that hit it since it was last free
+  uint8_t moving_hits = 0;  ///< consecutive sweeps in which moving returns lay in it
+  int8_t free_down_to = 0;  ///< lowest of the first rays that freed it, steps about the centre
   bool occupied : 1, queued : 1;      ///< queued: waits for being written to the octree
   Extent extent = Extent::Nothing();  ///< of its returns above the ground
   uint32_t sweep = 0;                 ///< last sweep that hit it, or freed it while not settled
@@ -45,6 +45,7 @@ struct Voxel {
 
   Voxel() : occupied(false), queued(false) {}
 };
+static_assert(sizeof(Voxel) == 28, "two million of them");
 
 /// Cells of the window by number: the levels of a column lie together, then columns along y.
 class CellSet {

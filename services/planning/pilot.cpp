@@ -390,6 +390,7 @@ PlanResult Pilot::Rest(double t0, const Start& start) const {
     const auto moves = [](const world::Obstacle& o) { return o.moving; };
     listed.erase(std::remove_if(listed.begin(), listed.end(), moves), listed.end());
     for (world::Obstacle& o : listed) o.velocity_covariance.setZero();
+    request.unseen.clear();
     request.tube = 0.0;
   }
   PlanResult plan = RestPlan(config_.planner, request);

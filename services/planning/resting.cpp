@@ -71,19 +71,12 @@ std::optional<Stop> Resting::BrakeWithin(bool heights) {
   return std::nullopt;
 }
 
-std::optional<Stop> Resting::GiveWay() {
-  if (!request_.target_body) return Brake();
-  beyond_ = false;
-  auto stop = Rise();
-  if (!stop) stop = Brake();
-  beyond_ = false;
-  return stop ? stop : StepAside();
-}
-
-std::optional<Stop> Resting::Rise() {
+std::optional<Stop> Resting::RiseOrBrake() {
   // To rest 0.5 m higher takes 2.9 and 1.0 m/s^2 at most.
   constexpr double kTimes[] = {1.0, 1.7};  // s
+  if (!request_.target_body) return Brake();
   const world::Obstacle& target = *request_.target_body;
+  beyond_ = false;
   has_problem_ = false;
   for (const double T : kTimes) {
     Vector3d end = ToPoints(BrakeCurve(over_.start, T), 5).row(5).transpose();
@@ -93,23 +86,27 @@ std::optional<Stop> Resting::Rise() {
     end.z() = over;
     if (auto stop = Certified(CurveTo(over_.start, T, end), T)) return stop;
   }
-  return std::nullopt;
+  return Brake();
 }
 
 std::optional<Stop> Resting::StepAside() {
+  constexpr double kSeen = 3.0;  // m around the start where unseen places are listed
   constexpr double kDistances[] = {0.7, 1.0, 1.4, 1.9, 2.5, 3.2};               // m
   constexpr double kTurns[] = {0.0, M_PI / 4, -M_PI / 4, M_PI / 2, -M_PI / 2};  // rad
-  constexpr double kShare = 0.8, kPush = 4.0;  // of the greatest acceleration; m/s^2 without
+  constexpr double kShare = 0.8, kPush = 4.0;  // of the greatest acceleration; m/s^2 without one
+  if (!request_.target_body) return std::nullopt;
   const double push = config_.max_acceleration > 0.0 ? kShare * config_.max_acceleration : kPush;
   const Vector3d from = over_.start.p - request_.target_body->center.Position(over_.t0);
   const double away = std::atan2(from.y(), from.x());
+  beyond_ = false;
+  has_problem_ = false;
   for (const double r : kDistances) {
-    const double T = std::sqrt(5.8 * r / push);  // from rest to rest
-    has_problem_ = false;
+    const double T = std::sqrt(10.0 / std::sqrt(3.0) * r / push);  // the quintic's greatest
     const Vector3d end = ToPoints(BrakeCurve(over_.start, T), 5).row(5).transpose();
     for (const double turn : kTurns) {
-      const Vector3d off(r * std::cos(away + turn), r * std::sin(away + turn), 0.0);
-      if (auto stop = Certified(CurveTo(over_.start, T, end + off), T)) return stop;
+      const Vector3d place = end + r * Vector3d(std::cos(away + turn), std::sin(away + turn), 0.0);
+      if ((place - request_.start.p).norm() > kSeen) continue;
+      if (auto stop = Certified(CurveTo(over_.start, T, place), T)) return stop;
     }
   }
   return std::nullopt;

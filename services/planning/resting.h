@@ -48,9 +48,11 @@ class Resting {
   std::optional<Stop> BrakeWithin(bool heights = true);
 
   /// The quickest that is certified and ends above the target's body, so that it passes below;
-  /// else, or where braking does, Brake(); else to the nearest place away from the target, or
-  /// beside its way.
-  std::optional<Stop> GiveWay();
+  /// where there is none, or braking does, Brake().
+  std::optional<Stop> RiseOrBrake();
+
+  /// To the nearest place that is certified, straight away from the target's body, aslant or aside.
+  std::optional<Stop> StepAside();
 
   /// A certified way over T, if the curve is one.
   std::optional<Stop> Certified(const Curve& curve, double T);
@@ -74,8 +76,6 @@ class Resting {
   std::pair<double, double> Within();
   bool LeavesListed(const std::vector<Proof>& proofs) const;
   void SetProblem(double T);
-  std::optional<Stop> Rise();
-  std::optional<Stop> StepAside();
 
   const PlannerConfig& config_;
   const PlanRequest& request_;

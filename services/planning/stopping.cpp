@@ -43,7 +43,7 @@ bool KeepsOff(const PlannerConfig& config, const PlanRequest& request,
   const bool late = request.target_body && t > plan.start + kOverdue;
   if ((request.unseen.empty() && !late) || t <= plan.start) return true;
   PlanRequest part;
-  static_cast<Stretch&>(part) = {plan.start, t - plan.start, request.start, false};
+  static_cast<Stretch&>(part) = {plan.start, t - plan.start, plan.At(plan.start), false};
   part.tube = request.tube;
   part.target = request.target;
   part.obstacles = request.unseen;
@@ -215,7 +215,8 @@ bool LeavesObstacles(const std::vector<Proof>& proofs) {
 
 namespace {
 
-// A BRAKE only slows down. Whose acceleration must first be taken back is faster for a moment.
+// A BRAKE only slows down. Whose acceleration must first be taken back, or who steps aside, is
+// faster for a moment.
 void NameFaster(bool certified, PlanResult* plan) {
   constexpr double kFaster = 0.05;  // m/s
   constexpr int kSamples = 50;
@@ -241,8 +242,11 @@ PlanResult RestPlan(const PlannerConfig& config, const PlanRequest& request) {
   Resting wide(config, request), close(hard, request);
   std::optional<Stop> stop = wide.BrakeWithin();
   if (!stop) stop = close.BrakeWithin();
-  // A stop that turns back may begin where braking leads into the unseen.
-  const bool blind = stop && !KeepsOff(hard, request, stop->trajectory, stop->trajectory.end());
+  // Braking may be, where what was committed to turns back.
+  const auto is_blind = [&](const world::Trajectory& way) {
+    return !KeepsOff(hard, request, way, way.end());
+  };
+  const bool blind = stop && is_blind(stop->trajectory);
   const auto lasts = [&] {
     const PlanRequest without_drift = WithoutDrift(request);
     return Resting(hard, without_drift).Lasts(*stop, request.t0 + kLasts);
@@ -257,11 +261,14 @@ PlanResult RestPlan(const PlannerConfig& config, const PlanRequest& request) {
       return result;
     }
   }
-  if (!stop || blind)
-    if (auto committed = Committed(hard, request)) {
+  if (!stop || blind) {
+    auto committed = Committed(hard, request);
+    if (committed && (!stop || !(is_blind(committed->trajectory) ||
+                                 (committed->stop && is_blind(*committed->stop))))) {
       NameFaster(true, &*committed);
       return *committed;
     }
+  }
   if (!stop) stop = wide.Brake();
   if (!stop) stop = close.Brake();
   result.verdict = Verdict::kBrake;
@@ -288,18 +295,19 @@ std::optional<Stop> WayOut(const PlannerConfig& config, const PlanRequest& reque
   };
   Resting resting(hard, request, request.unseen, memory);
   if (!leaves) resting.KeepOff();
-  for (const double after : {kOverdue, 0.2, 0.7, 1.1, HUGE_VAL}) {
-    const double t = std::min(plan.start + after, plan.end());
-    resting.From(plan.At(t), t);
-    std::optional<Stop> stop;
-    if (KeepsOff(hard, request, plan, t)) stop = resting.GiveWay();
-    if (stop) {  // whoever checks it hears of obstacles only
-      auto& proofs = stop->proofs;
-      proofs.erase(std::remove_if(proofs.begin(), proofs.end(), is_unseen), proofs.end());
-      return stop;
+  for (const auto way : {&Resting::RiseOrBrake, &Resting::StepAside})
+    for (const double after : {kOverdue, 0.2, 0.7, 1.1, HUGE_VAL}) {
+      const double t = std::min(plan.start + after, plan.end());
+      resting.From(plan.At(t), t);
+      std::optional<Stop> stop;
+      if (KeepsOff(hard, request, plan, t)) stop = (resting.*way)();
+      if (stop) {  // whoever checks it hears of obstacles only
+        auto& proofs = stop->proofs;
+        proofs.erase(std::remove_if(proofs.begin(), proofs.end(), is_unseen), proofs.end());
+        return stop;
+      }
+      if (t == plan.end()) break;
     }
-    if (t == plan.end()) break;
-  }
   return std::nullopt;
 }
 

@@ -14,7 +14,7 @@ struct Stop {
   world::Trajectory trajectory;
   std::vector<Proof> proofs;
   bool certified = false;
-  bool aside = false;  ///< leads elsewhere than braking does
+  bool aside = false;  ///< of Evade(): leads elsewhere than braking does
   bool blind = false;  ///< leads into what nobody has looked into
   bool lasts = false;  ///< whoever stays at its end is certified clear for as long as stepping
                        ///< aside takes
@@ -60,8 +60,8 @@ void SetProofs(const PlannerConfig& config, const PlanRequest& request, std::vec
                PlanResult* result);
 
 /// Where `plan` can be left for a certified rest: as soon as a new plan is overdue, else sooner or
-/// later; above the target, by braking, or off the target's way. It keeps the hard radius and gives
-/// up the margin. After FASTER, Tordesillas et al. 2019: a plan is flown only with such a way out.
+/// later; above the target or by braking, or else aside. It keeps the hard radius and gives up the
+/// margin. After FASTER, Tordesillas et al. 2019: a plan is flown only with such a way out.
 /// What is unseen is kept off until then and after. `leaves`: the plan leaves obstacles that its
 /// start is in, and the stop may begin within them. `memory`: of an earlier call, if any.
 std::optional<Stop> WayOut(const PlannerConfig& config, const PlanRequest& request,

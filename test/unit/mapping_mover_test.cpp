@@ -151,6 +151,22 @@ TEST(MappingMover, NothingMovesOverATable) {
   }
 }
 
+/// A low robot of which one ring sees all that is to be seen, from where rays passed below.
+TEST(MappingMover, ALowRobotIsFoundByOneRing) {
+  std::mt19937 random(3);
+  Mapper mapper(MappingConfig{});
+  int listed = 0;
+  for (double t = 0.0; t < 6.5; t += 0.1) {
+    testing::World world;
+    world.boxes = {{{9.0, 0.0, 1.5}, {0.1, 8.0, 1.5}}};
+    if (t > 2.5) world.boxes.push_back({{5.5, t - 4.5, 0.2}, {0.3, 0.3, 0.2}});
+    const double height = 1.1 - 0.2 * std::clamp(t - 1.0, 0.0, 1.0);
+    listed +=
+        mapper.Insert(testing::Scan(world, {0, 0, height}, t, {0.02, 0.01}, &random)).n_moving;
+  }
+  EXPECT_GT(listed, 5);
+}
+
 /// A mover on its way to a wall that has long been there is not forecast to go through it.
 TEST(MappingMover, ForecastEndsAtAWall) {
   std::mt19937 random(3);

@@ -145,20 +145,46 @@ TEST(Pilot, TurnsToALostTargetTheShorterWay) {
   }
 }
 
+// Places that nobody has looked into, from x = 8.5 m on.
+world::Obstacle Dark() {
+  world::Obstacle dark;
+  dark.id = 3;
+  dark.solid = world::Obstacle::Solid::kBox;
+  dark.center = world::Trajectory::Constant({9.0, 0.0, 2.0}, 0.0, 100.0);
+  dark.half = {0.5, 30.0, 2.0};
+  dark.shape = (std::sqrt(3.0) * dark.half).cwiseAbs2().cwiseInverse().asDiagonal();
+  return dark;
+}
+
 TEST(Pilot, FollowsNobodyToWhereNobodyHasLooked) {
   for (const bool looked : {true, false}) {
     Flight flight{PlanningConfig()};
-    world::Obstacle dark;
-    dark.id = 3;
-    dark.solid = world::Obstacle::Solid::kBox;
-    dark.center = world::Trajectory::Constant({9.0, 0.0, 2.0}, 0.0, 100.0);
-    dark.half = {0.5, 30.0, 2.0};
-    dark.shape = (std::sqrt(3.0) * dark.half).cwiseAbs2().cwiseInverse().asDiagonal();
-    if (!looked) flight.unseen = {dark};
+    if (!looked) flight.unseen = {Dark()};
     flight.Run(3.0, false);
     flight.Run(12.0, true);
     EXPECT_EQ(flight.Body().p.x() > 8.5 - PlanningConfig().planner.hard_radius(), looked);
   }
+}
+
+// Near what nobody has looked into it brakes at once, too, when mapping falls silent.
+TEST(Pilot, BrakesBesideTheUnseenWithoutLists) {
+  int braked = 0;
+  for (double silent = 11.5; silent < 13.5; silent += 0.1) {
+    Flight flight{PlanningConfig()};
+    flight.unseen = {Dark()};
+    flight.Run(3.0, false);
+    flight.Run(silent - 3.0, true);
+    flight.hears = false;
+    const size_t before = flight.plans.size();
+    flight.Run(1.0, true);
+    for (size_t i = before; i < flight.plans.size(); ++i) {
+      const std::string& reason = flight.plans[i].reason;
+      if (reason.find("not heard of") == std::string::npos) continue;
+      ++braked;
+      EXPECT_EQ(reason.find("until its stop"), std::string::npos) << silent;
+    }
+  }
+  EXPECT_GT(braked, 50);
 }
 
 // But for what it moves until the plan begins no part of one is farther than what was listed.
