@@ -48,10 +48,11 @@ bool Normalise(std::array<float, 4>* q) {
   return true;
 }
 
-/// One of those that it flies; none for anything else, NaN as well.
+/// One of those that it flies, a pilot's with the sticks let go; none for anything else, NaN as
+/// well.
 std::optional<Mode> ModeOf(float main, float sub) {
-  for (const Mode& mode :
-       {mavlink::kOffboardMode, mavlink::kLandMode, mavlink::kHoldMode, mavlink::kPositionMode})
+  for (const Mode& mode : {mavlink::kOffboardMode, mavlink::kLandMode, mavlink::kHoldMode,
+                           mavlink::kPositionMode, Mode{1, 0}, Mode{2, 0}, Mode{5, 0}, Mode{7, 0}})
     if (main == mode.main && sub == mode.sub) return mode;
   return std::nullopt;
 }
@@ -220,7 +221,6 @@ uint8_t Px4::SetMode(std::optional<Mode> mode) {
 
 void Px4::Enter(Mode mode) {
   mode_ = intended_ = mode;
-  failsafe_ = false;
   own_mode_ = OwnMode(body_);
 }
 
@@ -241,7 +241,7 @@ uint8_t Px4::Arm(bool on, bool forced) {
     return Code(mav::MavResult::TEMPORARILY_REJECTED);
   }
   armed_ = true;
-  has_flown_ = drained_ = unmanned_ = false;
+  has_flown_ = drained_ = false;
   ++seen_.times_armed;
   return Code(mav::MavResult::ACCEPTED);
 }
@@ -249,7 +249,7 @@ uint8_t Px4::Arm(bool on, bool forced) {
 void Px4::Reboot(int64_t utime) {
   boot_ = utime;
   mode_ = intended_ = mavlink::kPositionMode;
-  armed_ = failsafe_ = false;
+  armed_ = false;
   first_setpoint_ = last_setpoint_ = 0;
   flown_by_.reset();
   version_2_ = !options_.starts_in_version_1;
@@ -269,7 +269,6 @@ void Px4::Tick(int64_t utime, int64_t clock, const Px4Body& body) {
   WatchStream();
   WatchTransmitter();
   WatchBattery();
-  if (!armed_) failsafe_ = false;
   WatchLanding();
   if (!IsLed()) flown_by_.reset();
   Stream(clock);

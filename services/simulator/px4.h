@@ -23,6 +23,7 @@ struct Px4Options {
   double com_disarm_land = 2.0;     ///< s on the ground after landing until it disarms
   bool loss_lands = true;           ///< COM_OBL_RC_ACT: land, otherwise hold
   double hover = 0.5;               ///< share of full thrust that balances gravity
+  double bat_low_thr = 0.15;        ///< charge below which it warns
   double bat_emergen_thr = 0.05;    ///< charge at which it lands
   double lost_acks = 0.0;           ///< probability
   bool starts_in_version_1 = true;  ///< of the protocol, until it hears version 2
@@ -58,7 +59,9 @@ class Px4 {
   Px4Options& options() { return options_; }
 
   bool armed() const { return armed_; }
-  bool failsafe() const { return failsafe_; }
+  /// Does a cause of a failsafe last, whatever is done about it? PX4 1.14 counts a warning, and a
+  /// pilot who has taken over, too.
+  bool failsafe() const;
   mavlink::Mode mode() const { return mode_; }
   bool landed() const { return landed_; }
   int64_t Clock(int64_t utime) const;  ///< its own, microseconds
@@ -94,6 +97,9 @@ class Px4 {
   void Enter(mavlink::Mode mode);
   bool Streamed() const;
   bool StreamAlive() const;
+  /// One that does not hear its transmitter any more is told of still, without channels, as PX4IO
+  /// does.
+  bool HasReceiver() const { return options_.transmitter || transmitter_heard_; }
   /// Should it fly by setpoints? In the failsafe for their silence, too.
   bool IsLed() const { return armed_ && intended_ == mavlink::kOffboardMode; }
   void WatchHealth();
@@ -131,10 +137,11 @@ class Px4 {
   std::map<Sender, Offset> offsets_;  // of those who answer TIMESYNC
   Sender vision_sender_{};            // of the last ODOMETRY
   mavlink::Mode mode_, intended_;
-  bool armed_ = false, failsafe_ = false, landed_ = true, has_flown_ = false, drained_ = false;
-  bool unmanned_ = false;  // it lands for want of a transmitter
+  bool armed_ = false, landed_ = true, has_flown_ = false, drained_ = false;
+  bool silent_ = false;    // setpoints are, by which it is meant to fly
+  bool unmanned_ = false;  // it flies and its transmitter is not heard any more
   std::optional<int64_t> transmitter_heard_;
-  int64_t failsafe_since_ = 0;
+  int64_t silent_since_ = 0;
   int64_t first_setpoint_ = 0, last_setpoint_ = 0, landed_since_ = 0, down_since_ = 0;
   std::optional<int64_t> flown_by_;  // arrival of the newest setpoint that it flew by
   std::string said_;                 // the check that fails, as last said

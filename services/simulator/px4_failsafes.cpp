@@ -26,43 +26,47 @@ void Px4::WatchHealth() {
   said_ = problem;
 }
 
+bool Px4::failsafe() const {
+  return armed_ && (silent_ || unmanned_ || body_.charge <= options_.bat_low_thr);
+}
+
 void Px4::WatchStream() {
-  if (!armed_ || drained_ || !(intended_ == mavlink::kOffboardMode)) return;
-  const bool lost = !StreamAlive();
-  if (lost && !failsafe_) {
+  const bool led = IsLed() && !drained_, was_silent = silent_;
+  silent_ = led && !StreamAlive();
+  if (!led) return;
+  if (silent_ && !was_silent) {
     Enter(mavlink::kHoldMode);
     intended_ = mavlink::kOffboardMode;  // it returns by itself when the stream does
-    failsafe_since_ = now_;
+    silent_since_ = now_;
     Say("No offboard signal, failsafe", 1);
   }
-  if (lost && options_.loss_lands && Seconds(failsafe_since_, now_) >= options_.com_fail_act_t)
+  if (!silent_)
+    mode_ = mavlink::kOffboardMode;
+  else if (options_.loss_lands && Seconds(silent_since_, now_) >= options_.com_fail_act_t)
     mode_ = mavlink::kLandMode;
-  if (!lost) mode_ = mavlink::kOffboardMode;
-  failsafe_ = lost;
 }
 
 /// NAV_RCL_ACT 3. Where a receiver never heard one, none is missed (COM_RC_IN_MODE 4).
 void Px4::WatchTransmitter() {
-  const bool lost =
-      transmitter_heard_ && Seconds(*transmitter_heard_, now_) > options_.com_rc_loss_t;
   if (options_.transmitter) transmitter_heard_ = now_;
-  if (!armed_ || unmanned_ || drained_ || !lost) return;
+  const bool was_unmanned = unmanned_;
+  unmanned_ =
+      armed_ && transmitter_heard_ && Seconds(*transmitter_heard_, now_) > options_.com_rc_loss_t;
+  if (!unmanned_ || was_unmanned || drained_) return;
   Enter(mavlink::kLandMode);
-  unmanned_ = failsafe_ = true;
   Say("Manual control lost, failsafe", 1);
 }
 
-/// COM_RC_OVERRIDE, bit 1: not in a failsafe.
+/// COM_RC_OVERRIDE, bit 1.
 void Px4::PilotSticks(double deflection) {
-  if (options_.transmitter && deflection > kStickOverride && !failsafe_ &&
-      mode_ == mavlink::kOffboardMode)
+  if (options_.transmitter && deflection > kStickOverride && mode_ == mavlink::kOffboardMode)
     Enter(mavlink::kPositionMode);
 }
 
 void Px4::WatchBattery() {
   if (!armed_ || drained_ || body_.charge > options_.bat_emergen_thr) return;
   Enter(mavlink::kLandMode);
-  drained_ = failsafe_ = true;
+  drained_ = true;
   Say("Emergency battery level, land immediately", 0);
 }
 

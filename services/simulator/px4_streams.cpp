@@ -41,7 +41,7 @@ uint8_t Px4::SetInterval(const mav::CommandLong& m) {
   if (!sound) return Code(mav::MavResult::DENIED);
   const auto usual = DefaultIntervals().find(static_cast<uint32_t>(number));
   if (usual == DefaultIntervals().end() || usual->first == mav::Heartbeat::kId ||
-      (usual->first == mav::RcChannels::kId && !options_.transmitter))
+      (usual->first == mav::RcChannels::kId && !HasReceiver()))
     return Code(mav::MavResult::FAILED);
   int64_t& now = intervals_[usual->first];
   now = interval < 0.0    ? kNone
@@ -101,9 +101,9 @@ void Px4::Stream(int64_t clock) {
 
 void Px4::StreamState() {
   if (Due(mav::Heartbeat::kId)) {
-    const auto state = !armed_     ? mav::MavState::STANDBY
-                       : failsafe_ ? mav::MavState::CRITICAL
-                                   : mav::MavState::ACTIVE;
+    const auto state = !armed_      ? mav::MavState::STANDBY
+                       : failsafe() ? mav::MavState::CRITICAL
+                                    : mav::MavState::ACTIVE;
     mav::Heartbeat m;
     m.type = static_cast<uint8_t>(mav::MavType::QUADROTOR);
     m.autopilot = static_cast<uint8_t>(options_.autopilot);
@@ -122,11 +122,13 @@ void Px4::StreamState() {
     m.battery_remaining = percent;
     Send(m);
   }
-  if (options_.transmitter && Due(mav::RcChannels::kId)) {
+  if (HasReceiver() && Due(mav::RcChannels::kId)) {
     mav::RcChannels m;
-    m.chancount = 8;
-    m.chan1_raw = m.chan2_raw = m.chan3_raw = m.chan4_raw = 1500;
-    m.rssi = 100;
+    if (options_.transmitter) {
+      m.chancount = 8;
+      m.chan1_raw = m.chan2_raw = m.chan3_raw = m.chan4_raw = 1500;
+      m.rssi = 100;
+    }
     Send(m);
   }
   if (Due(mav::BatteryStatus::kId)) {

@@ -53,10 +53,13 @@ class Link {
     std::map<uint32_t, int> count;
     mavlink::FrameReader reader;
     for (int i = 0; i < 400; ++i, now_ += 2'500) {
-      px4_.Tick(now_, now_, {});
+      px4_.Tick(now_, now_, body);
       for (const auto& bytes : px4_.TakeOutgoing())
         reader.Add(now_, bytes.data(), bytes.size(), [&](const mavlink::Frame& f) {
           ++count[f.id];
+          if (const auto m = mavlink::As<mav::Heartbeat>(f))
+            status_ = static_cast<mav::MavState>(m->system_status);
+          if (const auto m = mavlink::As<mav::RcChannels>(f)) channels_ = m->chancount;
           if (const auto m = mavlink::As<mav::CommandAck>(f))
             result_ = static_cast<mav::MavResult>(m->result);
         });
@@ -85,8 +88,18 @@ class Link {
       Send(mav::Timesync{1000 * (now_ + ahead), 1000 * px4_.Clock(now_), 0, 0}, system, component);
   }
 
+  /// What its last heartbeat says of itself, a moment from now.
+  mav::MavState Status() {
+    Second();
+    return status_;
+  }
+  /// The channels of a receiver that it told last.
+  int channels() const { return channels_; }
+
   Px4& px4() { return px4_; }
   int64_t now() const { return now_; }
+
+  Px4Body body;
 
  private:
   static Px4Options Options() {
@@ -97,6 +110,8 @@ class Link {
 
   Px4 px4_;
   int64_t now_ = kStart;
+  int channels_ = -1;
+  mav::MavState status_{};
   std::optional<mav::MavResult> result_;
 };
 
@@ -147,6 +162,45 @@ TEST(Px4, DeniesModesThatItDoesNotKnow) {
   EXPECT_TRUE(link.px4().mode() == mavlink::kPositionMode);
   EXPECT_EQ(mode(4.0f, 6.0f), mav::MavResult::ACCEPTED);
   EXPECT_TRUE(link.px4().mode() == mavlink::kLandMode);
+}
+
+TEST(Px4, TakesTheModesThatAPilotFlies) {
+  Link link;
+  for (const float main : {1.0f, 2.0f, 5.0f, 7.0f, 3.0f}) {
+    EXPECT_EQ(link.Command(mav::MavCmd::DO_SET_MODE, 1.0f, main, 0.0f), mav::MavResult::ACCEPTED);
+    EXPECT_EQ(link.px4().mode().main, main);
+  }
+}
+
+// Commander publishes a failsafe for a warning, too, and until its cause has gone.
+TEST(Px4, CallsItselfCriticalWhileTheCauseOfAFailsafeLasts) {
+  Link link;
+  link.px4().PilotArms(true);
+  EXPECT_EQ(link.Status(), mav::MavState::ACTIVE);
+  link.body.charge = 0.1;
+  EXPECT_EQ(link.Status(), mav::MavState::CRITICAL) << "a warning";
+  EXPECT_TRUE(link.px4().mode() == mavlink::kPositionMode);
+  link.body.charge = 0.04;
+  EXPECT_EQ(link.Status(), mav::MavState::CRITICAL);
+  EXPECT_TRUE(link.px4().mode() == mavlink::kLandMode);
+  link.px4().PilotMode(mavlink::kPositionMode);
+  EXPECT_EQ(link.Status(), mav::MavState::CRITICAL) << "the pilot has it, the battery is empty";
+  EXPECT_TRUE(link.px4().mode() == mavlink::kPositionMode);
+  link.px4().PilotArms(false);
+  EXPECT_EQ(link.Status(), mav::MavState::STANDBY);
+}
+
+// As PX4IO does: it is told of still, without channels.
+TEST(Px4, TellsOfAReceiverThatHearsNobodyAnyMore) {
+  Link link;
+  link.px4().options().transmitter = true;
+  ASSERT_EQ(link.Ask(static_cast<float>(mav::RcChannels::kId), 100'000.0f),
+            mav::MavResult::ACCEPTED);
+  link.Second();
+  EXPECT_EQ(link.channels(), 8);
+  link.px4().options().transmitter = false;
+  EXPECT_NEAR(link.Second()[mav::RcChannels::kId], 10, 1);
+  EXPECT_EQ(link.channels(), 0);
 }
 
 mav::Odometry Vision() {
