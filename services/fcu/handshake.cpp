@@ -44,7 +44,8 @@ struct HandshakeTable {
   static bool InFailsafe(H h) {
     return h.facts_.armed && h.facts_.failsafe && !InOffboard(h) && !IsByStick(h.facts_.mode);
   }
-  static bool PilotHasIt(H h) { return IsByStick(h.facts_.mode) && !h.facts_.failsafe; }
+  /// PX4 1.14 calls itself critical for a warning and after he has taken it from a failsafe, too.
+  static bool PilotHasIt(H h) { return h.facts_.armed && IsByStick(h.facts_.mode); }
   static bool FoundInFailsafe(H h) { return h.engages_ && InFailsafe(h); }
   /// A process that comes back after an autopilot's landing goes on where it was: that is no
   /// flight.
@@ -57,10 +58,10 @@ struct HandshakeTable {
   static bool LeftOffboard(H h) { return !InOffboard(h); }
   static bool Disarmed(H h) { return !h.facts_.armed; }
   static bool DisarmedOnGround(H h) { return Disarmed(h) && h.facts_.on_ground; }
-  static bool Failsafe(H h) { return LeftOffboard(h) && h.facts_.failsafe; }
   /// An arming of ours that came through when it was no longer wanted.
   static bool ArmedLate(H h) {
-    return h.facts_.armed && h.facts_.on_ground && h.AskedToArm() && !h.facts_.failsafe;
+    return h.facts_.armed && h.facts_.on_ground && h.AskedToArm() && !h.facts_.failsafe &&
+           !PilotHasIt(h);
   }
   static bool Down(H h) { return h.facts_.motors_off && h.facts_.on_ground; }
   static bool OffInTheAir(H h) { return h.facts_.motors_off && !h.facts_.on_ground; }
@@ -113,7 +114,7 @@ const HandshakeTable::Row HandshakeTable::kRows[] = {
 
     {State::kFlying, DisarmedOnGround, State::kDone, "the autopilot has disarmed on the ground"},
     {State::kFlying, Disarmed, State::kFailsafe, "the autopilot has disarmed or begun anew"},
-    {State::kFlying, Failsafe, State::kFailsafe, "a failsafe of the autopilot"},
+    {State::kFlying, InFailsafe, State::kFailsafe, "a failsafe of the autopilot"},
     {State::kFlying, LeftOffboard, State::kPilot, "the mode was changed: the pilot has it"},
     {State::kFlying, Cut, State::kFailsafe, "the link was cut, or this bridge stood still"},
     {State::kFlying, Down, State::kDisarming, "on the ground, motors no longer wanted"},
@@ -126,8 +127,10 @@ const HandshakeTable::Row HandshakeTable::kRows[] = {
     {State::kLanding, OnGround, State::kDisarming, "landed"},
 
     {State::kDisarming, Disarmed, State::kDone, "landed and disarmed"},
+    {State::kDisarming, PilotHasIt, State::kPilot, "the mode was changed: the pilot has it"},
     {State::kDisarming, GivesUp, State::kRefused, "disarming did not come"},
 
+    {State::kKilling, PilotHasIt, State::kPilot, "the mode was changed: the pilot has it"},
     {State::kKilling, Killed, State::kDone, "killed by command: disarmed by force"},
 
     {State::kDone, Released, State::kStandby, "ready for another flight"},

@@ -229,6 +229,23 @@ TEST(FcuBridge, AKillIsNotForAPilotWhoHasItNorForTheFlightToCome) {
   EXPECT_TRUE(flight.px4.armed());
 }
 
+TEST(FcuBridge, AKillIsNotForAPilotOnALowBattery) {
+  Flight flight;
+  ASSERT_TRUE(flight.RunUntil(State::kFlying, 12.0)) << flight.bridge.Words();
+  flight.Run(5.0);
+  flight.px4.SetCharge(0.1);
+  flight.Run(2.0);
+  ASSERT_TRUE(flight.px4.failsafe()) << "a warning, which PX4 calls critical";
+  EXPECT_EQ(flight.bridge.handshake().state(), State::kFlying) << flight.bridge.Words();
+  flight.px4.PilotMode({3, 0});
+  flight.Run(1.1);
+  EXPECT_EQ(flight.bridge.handshake().state(), State::kPilot) << flight.bridge.Words();
+  flight.bridge.Kill();
+  flight.Run(3.0);
+  EXPECT_TRUE(flight.px4.armed());
+  EXPECT_TRUE(flight.px4.mode() == (Mode{3, 0}));
+}
+
 TEST(FcuBridge, ARepeatedSetpointIsNoFreshOne) {
   Flight flight;
   ASSERT_TRUE(flight.RunUntil(State::kFlying, 12.0));

@@ -349,6 +349,54 @@ TEST(FcuHandshake, AKillIsNotForAPilotWhoTookItFromAFailsafe) {
   EXPECT_EQ(flight.handshake.state(), State::kFailsafe);
 }
 
+constexpr Mode kByStick[] = {{1, 0}, {2, 0}, {3, 0}, {5, 0}, {7, 0}};
+
+// PX4 1.14 calls a low battery critical, and a pilot who has taken over from a failsafe as well.
+TEST(FcuHandshake, APilotWinsOverWhatIsCalledCritical) {
+  for (const Mode mode : kByStick) {
+    for (const bool failed_before : {false, true}) {
+      Engaged flight(true);
+      flight.facts.failsafe = true;
+      if (failed_before) flight.facts.mode = kLandMode;
+      flight.Run(0.1);
+      flight.facts.mode = mode;
+      flight.Run(0.1);
+      flight.handshake.Kill();
+      EXPECT_EQ(flight.handshake.state(), failed_before ? State::kFailsafe : State::kPilot);
+      for (int i = 0; i < 100; ++i) {
+        flight.Run(0.1);
+        EXPECT_FALSE(flight.handshake.NextCommand(flight.facts.utime)) << mode.name();
+        EXPECT_FALSE(flight.handshake.streams());
+      }
+    }
+  }
+}
+
+TEST(FcuHandshake, NothingThatWasAskedBeforeIsAskedOfAPilot) {
+  for (const Mode mode : kByStick) {
+    Engaged killed(true);
+    killed.handshake.Kill();
+    Engaged landed(true);
+    landed.facts.motors_off = landed.facts.on_ground = true;
+    landed.facts.wish = false;
+    landed.Run(0.02);
+    Engaged late(false);
+    late.facts.wish = false;
+    late.Run(0.02);
+    late.facts.on_ground = true;
+    EXPECT_EQ(killed.handshake.state(), State::kKilling);
+    EXPECT_EQ(landed.handshake.state(), State::kDisarming);
+    EXPECT_EQ(late.handshake.state(), State::kStandby);
+    for (Engaged* flight : {&killed, &landed, &late}) {
+      flight->facts.armed = true;
+      flight->facts.mode = mode;
+      flight->Run(0.02);
+      EXPECT_EQ(flight->handshake.state(), State::kPilot) << mode.name();
+      EXPECT_FALSE(flight->handshake.NextCommand(flight->facts.utime + 5'000'000));
+    }
+  }
+}
+
 TEST(FcuHandshake, AnArmingThatComesTooLateIsTakenBack) {
   Engaged arming(false);
   arming.facts.wish = false;
