@@ -150,19 +150,21 @@ bool Handshake::AskedToArm() const {
 
 bool Handshake::streams() const {
   return state_ == State::kStreaming || state_ == State::kOffboard || state_ == State::kArming ||
-         (state_ == State::kFlying && gap_found_ == 0);
+         (state_ == State::kFlying && doubted_ == 0);
 }
 
 bool Handshake::needs_word() const {
-  return gap_found_ != 0 || state_ == State::kOffboard || state_ == State::kArming ||
+  return doubted_ != 0 || state_ == State::kOffboard || state_ == State::kArming ||
          (state_ == State::kLanding && !Told(since_));
 }
 
-void Handshake::WatchGap() {
-  if (state_ != State::kFlying || (gap_found_ != 0 && Told(gap_found_)))
-    gap_found_ = 0;
-  else if (gap_found_ == 0 && facts_.gap > kGap)
-    gap_found_ = facts_.utime;
+/// Who flies may have changed while the link was silent, or since the heartbeat that a process
+/// which begins anew in flight has heard.
+void Handshake::WatchDoubt() {
+  if (state_ != State::kFlying || (doubted_ != 0 && Told(doubted_)))
+    doubted_ = 0;
+  else if (doubted_ == 0 && facts_.gap > kGap)
+    doubted_ = facts_.utime;
 }
 
 void Handshake::Update(const Facts& facts) {
@@ -174,7 +176,7 @@ void Handshake::Update(const Facts& facts) {
   if ((state_ == State::kLanding || state_ == State::kDisarming || state_ == State::kKilling) &&
       command_.answer() == Command::Answer::kRefused)
     command_.Begin(command_.ask(), facts.utime + 1'000'000);
-  WatchGap();
+  WatchDoubt();
   for (const HandshakeTable::Row& row : HandshakeTable::kRows)
     if (row.from == state_ && row.when(*this)) return Enter(row.to, row.why);
 }
@@ -202,6 +204,7 @@ void Handshake::Enter(State state, const std::string& why) {
   if ((state == State::kRefused || state == State::kFailsafe) && !facts_.said.empty())
     reason_ += fmt::format(": {}", facts_.said);
   if (state == State::kFlying || state == State::kDone) asked_to_arm_ = 0;
+  if (state == State::kFlying && state_ == State::kStandby) doubted_ = facts_.utime;
   state_ = state;
   since_ = facts_.utime;
   switch (state) {

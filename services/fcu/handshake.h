@@ -83,7 +83,7 @@ class Handshake {
   bool AskedToArm() const;
   /// Has the autopilot told its mode since?
   bool Told(int64_t since) const { return facts_.told > since; }
-  void WatchGap();
+  void WatchDoubt();
   void Enter(State state, const std::string& why);
 
   bool engages_;
@@ -96,7 +96,9 @@ class Handshake {
   int64_t wished_ = 0;        // when a setpoint last wanted the motors
   int64_t asked_to_arm_ = 0;  // when; 0: not yet
   bool lands_ = false;        // in kLanding: the autopilot has told that mode
-  int64_t gap_found_ = 0;     // when the link had been silent for too long to stream; 0: it is not
+  // In kFlying: what a word of the autopilot has to be newer than before the stream goes on; 0: it
+  // goes on.
+  int64_t doubted_ = 0;
 };
 
 }  // namespace chase::fcu

@@ -532,6 +532,39 @@ TEST(FcuBridge, ABridgeThatBeginsAnewDoesNotStreamIntoAFailsafe) {
   ASSERT_TRUE(flight.RunUntil(State::kStreaming, 3.0)) << "the pilot has ended it";
 }
 
+// It hears the last heartbeat of before long before it knows the clock; what came in between it
+// cannot know.
+TEST(FcuBridge, ABridgeThatBeganAnewTrustsNoHeartbeatOfBefore) {
+  int borne = 0;
+  for (uint64_t seed = 1; seed <= 20; ++seed) {
+    for (const bool pilot : {false, true}) {
+      Flight flight({}, {}, seed);
+      ASSERT_TRUE(flight.RunUntil(State::kFlying, 12.0));
+      flight.Run(3.0 + 0.09 * static_cast<double>(seed));
+      flight.bridge = Bridge(FcuConfig{});
+      flight.bridge_runs = false;
+      flight.Run(0.05 * static_cast<double>(seed));
+      flight.bridge_runs = true;
+      ASSERT_TRUE(flight.RunUntil(State::kStandby, 1.5)) << flight.bridge.Words();
+      flight.Run(0.01);
+      if (pilot) flight.px4.PilotMode({3, 0});
+      const int before = flight.px4.seen().setpoints_while_not_offboard;
+      bool failed = false;
+      for (int i = 0; i < 2000; ++i) {
+        flight.Run(0.0025);
+        failed = failed || flight.px4.failsafe();
+        ASSERT_FALSE(failed && flight.px4.mode() == kOffboardMode) << seed;
+      }
+      EXPECT_EQ(flight.px4.seen().setpoints_while_not_offboard, before) << seed << pilot;
+      if (!pilot) {
+        EXPECT_EQ(flight.bridge.handshake().state() == State::kFlying, !failed) << seed;
+      }
+      borne += !pilot && !failed;
+    }
+  }
+  EXPECT_GE(borne, 5) << "restarts that the flight outlives";
+}
+
 TEST(FcuBridge, RefusalsAreSaidInWordsAndGivenUp) {
   StandInOptions refuses;
   refuses.refuses_offboard = true;
