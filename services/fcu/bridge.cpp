@@ -14,7 +14,9 @@ namespace {
 
 constexpr int64_t kHeartbeatPeriod = 1'000'000;  // us
 constexpr int64_t kTimesyncPeriod = 100'000;     // us: PX4's own rate
-constexpr int64_t kWordPeriod = 100'000;         // us between requests for a heartbeat
+// us between requests for a heartbeat: PX4 sends it once a second and refuses another interval for
+// it (MavlinkReceiver::set_message_interval), but not a request.
+constexpr int64_t kWordPeriod = 100'000;
 // PX4, Timesync.hpp, CONVERGENCE_WINDOW: until then it takes a pose's arrival for its time.
 constexpr int kTimeAnswers = 500;
 constexpr std::size_t kTimeRequests = 20;  // on their way: 2 s

@@ -154,8 +154,8 @@ bool Handshake::streams() const {
 }
 
 bool Handshake::needs_word() const {
-  return doubted_ != 0 || state_ == State::kOffboard || state_ == State::kArming ||
-         (state_ == State::kLanding && !Told(since_));
+  return state_ == State::kOffboard || state_ == State::kArming ||
+         (facts_.armed && state_ != State::kPilot);
 }
 
 /// Who flies may have changed while the link was silent, or since the heartbeat that a process

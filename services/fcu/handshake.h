@@ -68,7 +68,8 @@ class Handshake {
   }
   /// May setpoints be sent?
   bool streams() const;
-  /// Is the autopilot's own word needed sooner than its next heartbeat is due?
+  /// Is the autopilot's own word needed sooner than its next heartbeat is due? Who flies an armed
+  /// vehicle may change at any moment.
   bool needs_word() const;
   /// Why the state is what it is.
   const std::string& reason() const { return reason_; }

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -148,6 +149,7 @@ class Px4 {
   Px4Body body_;
   OwnMode own_mode_{body_};
   std::map<uint32_t, int64_t> next_;       // of each stream
+  std::set<uint32_t> asked_for_;           // once, not sent yet
   std::map<uint32_t, int64_t> intervals_;  // us; 0: none
   std::vector<Bytes> outgoing_;
   Seen seen_;

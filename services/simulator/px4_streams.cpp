@@ -52,17 +52,19 @@ uint8_t Px4::SetInterval(const mav::CommandLong& m) {
   return Code(mav::MavResult::ACCEPTED);
 }
 
-// mavlink.io, MAV_CMD_REQUEST_MESSAGE: the heartbeat as well.
+// mavlink.io, MAV_CMD_REQUEST_MESSAGE: the heartbeat as well. What is sent by itself keeps its
+// times.
 uint8_t Px4::SendOnce(float id) {
   for (const auto& [known, interval] : intervals_)
     if (static_cast<float>(known) == id && interval != kNone) {
-      next_[known] = now_;
+      asked_for_.insert(known);
       return Code(mav::MavResult::ACCEPTED);
     }
   return Code(mav::MavResult::DENIED);
 }
 
 bool Px4::Due(uint32_t id) {
+  if (asked_for_.erase(id) > 0) return true;
   const int64_t interval = intervals_.at(id);
   int64_t& next = next_[id];
   if (interval == kNone || now_ < next) return false;

@@ -229,6 +229,23 @@ TEST(FcuBridge, AKillIsNotForAPilotWhoHasItNorForTheFlightToCome) {
   EXPECT_TRUE(flight.px4.armed());
 }
 
+// He took it from a failsafe a moment ago.
+TEST(FcuBridge, AKillIsNotForAPilotWhoHasJustTakenIt) {
+  for (int i = 0; i < 10; ++i) {
+    Flight flight;
+    ASSERT_TRUE(flight.RunUntil(State::kFlying, 12.0));
+    flight.Run(5.0 + 0.1 * i);
+    flight.px4.SetCharge(0.04);
+    ASSERT_TRUE(flight.RunUntil(State::kFailsafe, 2.0));
+    flight.Run(0.5);
+    flight.px4.PilotMode({3, 0});
+    flight.Run(0.2);
+    flight.bridge.Kill();
+    flight.Run(1.0);
+    EXPECT_TRUE(flight.px4.armed()) << flight.bridge.Words();
+  }
+}
+
 TEST(FcuBridge, AKillIsNotForAPilotOnALowBattery) {
   Flight flight;
   ASSERT_TRUE(flight.RunUntil(State::kFlying, 12.0)) << flight.bridge.Words();
@@ -352,7 +369,7 @@ TEST(FcuBridge, ThePilotTakesItAtOnceAndForGood) {
   ASSERT_TRUE(flight.RunUntil(State::kFlying, 12.0));
   flight.Run(5.0);
   flight.px4.PilotMode({3, 0});
-  Took(&flight, "the pilot takes over, no stream any more", 1.1, State::kPilot);  // a heartbeat
+  Took(&flight, "the pilot takes over, no stream any more", 0.2, State::kPilot);
   const auto before = flight.px4.seen();
   flight.Run(20.0);
   EXPECT_EQ(flight.px4.seen().setpoints, before.setpoints);
@@ -366,6 +383,28 @@ TEST(FcuBridge, ThePilotTakesItAtOnceAndForGood) {
   flight.px4.PilotMode({3, 0});
   flight.setpoints = true;
   EXPECT_TRUE(flight.RunUntil(State::kFlying, 12.0)) << "another flight";
+}
+
+// He may take it from a landing, too. The heartbeat of its own accord comes once a second.
+TEST(FcuBridge, IsToldWithinAMomentWhoFlies) {
+  for (const bool lands : {false, true}) {
+    for (int i = 0; i < 10; ++i) {
+      Flight flight;
+      ASSERT_TRUE(flight.RunUntil(State::kFlying, 12.0));
+      flight.Run(5.0 + 0.1 * i);
+      if (lands) {
+        flight.motors = false;
+        flight.Run(1.0, [&] { return flight.px4.mode() == kLandMode; });
+        flight.Run(0.5);
+        ASSERT_EQ(flight.bridge.handshake().state(), State::kLanding);
+      }
+      flight.px4.PilotMode({3, 0});
+      EXPECT_TRUE(flight.RunUntil(State::kPilot, 0.2)) << flight.bridge.Words();
+      const int beats = flight.heartbeats;
+      flight.Run(10.0);
+      EXPECT_NEAR(flight.heartbeats - beats, 10, 1) << "no more than it needs";
+    }
+  }
 }
 
 TEST(FcuBridge, AFailsafeIsLatchedThoughTheStreamCouldComeBack) {

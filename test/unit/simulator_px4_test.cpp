@@ -49,10 +49,11 @@ class Link {
   }
 
   /// Messages of each type that it sends in a second.
-  std::map<uint32_t, int> Second() {
+  std::map<uint32_t, int> Second() { return Seconds(1.0); }
+  std::map<uint32_t, int> Seconds(double seconds) {
     std::map<uint32_t, int> count;
     mavlink::FrameReader reader;
-    for (int i = 0; i < 400; ++i, now_ += 2'500) {
+    for (int i = 0; i < static_cast<int>(400.0 * seconds); ++i, now_ += 2'500) {
       px4_.Tick(now_, now_, body);
       for (const auto& bytes : px4_.TakeOutgoing())
         reader.Add(now_, bytes.data(), bytes.size(), [&](const mavlink::Frame& f) {
@@ -148,6 +149,21 @@ TEST(Px4, FailsForTheHeartbeatAndForWhatItHasNoStreamOf) {
     for (const float interval : {-1.0f, 0.0f, 10'000.0f})
       EXPECT_EQ(link.Ask(static_cast<float>(id), interval), mav::MavResult::FAILED) << id;
   EXPECT_NEAR(link.Second()[mav::Heartbeat::kId], 1, 1);
+}
+
+TEST(Px4, SendsOnceWhatIsAskedForAndItsOwnAsBefore) {
+  Link link;
+  link.Second();
+  int sent = 0;
+  for (int i = 0; i < 20; ++i) {
+    mav::CommandLong m;
+    m.command = static_cast<uint16_t>(mav::MavCmd::REQUEST_MESSAGE);
+    m.target_system = m.target_component = 1;
+    m.param1 = static_cast<float>(mav::Heartbeat::kId);
+    link.Send(m);
+    sent += link.Seconds(0.2)[mav::Heartbeat::kId];
+  }
+  EXPECT_EQ(sent, 24) << "twenty that were asked for, four of its own accord";
 }
 
 TEST(Px4, DeniesModesThatItDoesNotKnow) {
