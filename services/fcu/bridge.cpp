@@ -19,6 +19,7 @@ constexpr int64_t kTimesyncPeriod = 100'000;     // us: PX4's own rate
 constexpr int64_t kWordPeriod = 100'000;
 // PX4, Timesync.hpp, CONVERGENCE_WINDOW: until then it takes a pose's arrival for its time.
 constexpr int kTimeAnswers = 500;
+constexpr double kLongestTrip = 0.010;  // s, MAX_RTT_SAMPLE: answers that took longer do not count
 constexpr std::size_t kTimeRequests = 20;  // on their way: 2 s
 constexpr double kWarningAge = 10.0;       // s in which a text explains a refusal
 // s: of a pose that an attitude loop is closed on. At max_rate (3.8 rad/s) it is 11 degrees old.
@@ -84,17 +85,20 @@ void Bridge::OnFrame(const Frame& frame, const Heard& when) {
 }
 
 /// A request is answered with the middle of its stay here, so that the asker's halved round trip
-/// meets the time that we say.
+/// meets the time that we say. Which answers it has taken it does not tell: of those that are quick
+/// enough, the ones around a request of ours count where that one went there and back.
 void Bridge::OnTimesync(const mav::Timesync& m, const Heard& when) {
   if (m.tc1 == 0) {
     mav::Timesync answer;
     answer.tc1 = 1000 * (when.arrival + (when.now - when.arrival) / 2);
     answer.ts1 = m.ts1;
-    ++time_answers_;
+    const auto asked = clock_.HostTime(m.ts1 / 1000);
+    if (asked && Seconds(*asked, when.now) + 0.5 * clock_.round_trip() < kLongestTrip) ++answered_;
     return Send(when.now, answer);
   }
   const auto request = std::find(time_requests_.begin(), time_requests_.end(), m.ts1);
   if (request == time_requests_.end()) return;  // another's
+  if (m.ts1 == time_requests_.back()) time_answers_ += std::exchange(answered_before_, 0);
   time_requests_.erase(request);
   clock_.Add(m.ts1 / 1000, m.tc1 / 1000, when.arrival);
 }
@@ -109,6 +113,7 @@ void Bridge::AskForChecks(int64_t now) {
 void Bridge::AskTime(int64_t now) {
   mav::Timesync request;
   request.ts1 = 1000 * now;
+  answered_before_ = std::exchange(answered_, 0);
   time_requests_.push_back(request.ts1);
   if (time_requests_.size() > kTimeRequests) time_requests_.pop_front();
   Send(now, request);
@@ -198,8 +203,8 @@ std::string Bridge::Missing(int64_t now) const {
   // In flight its estimate of our clock is as old as the flight, whoever flew it until now.
   const bool in_flight = autopilot_.armed() && !autopilot_.on_ground(now);
   if (time_answers_ < kTimeAnswers && !in_flight)
-    return fmt::format("the autopilot learns our clock: {} of {} answers", time_answers_,
-                       kTimeAnswers);
+    return fmt::format("the autopilot learns our clock: {} of {} answers within {:.0f} ms",
+                       time_answers_, kTimeAnswers, 1e3 * kLongestTrip);
   if (std::string problem = PoseProblem(now); !problem.empty()) return problem;
   return AttitudeProblem(now);
 }
@@ -228,7 +233,7 @@ void Bridge::Tick(int64_t now) {
   const bool was_heard = heard_;
   heard_ = Hears(now);
   if ((heard_ && !was_heard) || clock_.restarts() != restarts_) rates_.Restart();
-  if (clock_.restarts() != restarts_) time_answers_ = 0;
+  if (clock_.restarts() != restarts_) time_answers_ = answered_before_ = answered_ = 0;
   restarts_ = clock_.restarts();
   missing_ = heard_ ? Missing(now) : "no PX4 is heard";
   handshake_.Update(Gather(now));

@@ -113,8 +113,9 @@ class Bridge {
   std::deque<int64_t> time_requests_;  // sent, ns
   uint64_t peer_ = 0;
   bool heard_ = false;
-  int restarts_ = 0;      // of the autopilot's clock
-  int time_answers_ = 0;  // given since
+  int restarts_ = 0;  // of the autopilot's clock
+  // Answers to its TIMESYNC: taken by it since, given between our last two requests, and after them
+  int time_answers_ = 0, answered_before_ = 0, answered_ = 0;
   int64_t ticked_ = 0;
   bool led_ = false, asked_ = false;  // is a mission heard, and Facts::asked
   std::string missing_ = "no PX4 is heard", disagreement_;

@@ -108,6 +108,28 @@ TEST(FcuBridge, NoFlightBeginsBeforeTheAutopilotKnowsOurClock) {
   EXPECT_NEAR(static_cast<double>(*host - stamp), 0.0, 2000.0);
 }
 
+// It counts what reaches it, and leaves out what takes longer than 10 ms there and back.
+TEST(FcuBridge, NorWhereAnswersToItAreLost) {
+  for (uint64_t seed = 1; seed <= 10; ++seed) {
+    Flight flight({}, {}, seed);
+    flight.loss = 0.3;
+    ASSERT_TRUE(flight.RunUntil(State::kStreaming, 30.0)) << flight.bridge.missing();
+    const int64_t stamp = flight.now() - 100'000;
+    const auto host = flight.px4.HostTime(static_cast<uint64_t>(stamp));
+    ASSERT_TRUE(host);
+    EXPECT_NEAR(static_cast<double>(*host - stamp), 0.0, 5000.0) << seed;
+  }
+}
+
+TEST(FcuBridge, NorWhereTheyTakeTooLong) {
+  Flight flight;
+  flight.delay = 6'000;
+  flight.Run(20.0);
+  EXPECT_EQ(flight.bridge.handshake().state(), State::kStandby);
+  EXPECT_NE(flight.bridge.missing().find("learns our clock: 0 of 500"), std::string::npos)
+      << flight.bridge.missing();
+}
+
 TEST(FcuBridge, NorWhereThePilotHasArmedOnTheGround) {
   FcuConfig config;
   config.engage = "pilot";

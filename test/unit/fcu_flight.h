@@ -31,6 +31,7 @@ class Flight {
   int32_t epoch = 0;    ///< of odometry's frame W
   double turned = 0.0;  ///< yaw of the autopilot's frame in W, rad
   double loss = 0.0;    ///< probability that a datagram is lost, each way
+  int64_t delay = 300;  ///< us, of each datagram, and up to 400 more
   std::vector<ImuSample> imu;
   std::vector<double> imu_errors;  ///< s: stamp against when it was measured
   std::vector<std::string> states;
@@ -80,7 +81,7 @@ class Flight {
     for (auto& bytes : from) {
       if (!link || random_.Uniform() < loss) continue;
       const int64_t queue = static_cast<int64_t>(400.0 * random_.Uniform());
-      const int64_t arrival = std::max(now_ + 300 + queue, to->empty() ? 0 : to->back().arrival);
+      const int64_t arrival = std::max(now_ + delay + queue, to->empty() ? 0 : to->back().arrival);
       to->push_back({arrival, std::move(bytes)});
     }
   }
