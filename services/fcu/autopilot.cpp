@@ -10,11 +10,16 @@ namespace {
 
 constexpr uint8_t kComponent = 1;       // MAV_COMP_ID_AUTOPILOT1
 constexpr std::size_t kMostChecks = 4;  // that are remembered
-constexpr double kLandedAge = 2.5;      // s: it comes once a second where it has not been asked for
+// s: of what comes once a second where it has not been asked for.
+constexpr double kStateAge = 2.5;
 
 template <class E>
 bool Has(uint8_t bits, E flag) {
   return (bits & static_cast<uint32_t>(flag)) != 0;
+}
+
+bool IsOld(int64_t heard, int64_t utime) {
+  return 1e-6 * static_cast<double>(utime - heard) > kStateAge;
 }
 
 }  // namespace
@@ -53,12 +58,11 @@ void Autopilot::TakeState(const Frame& frame, int64_t utime) {
     landed_ = e->landed_state;
     landed_utime_ = utime;
   } else if (const auto s = As<mav::SysStatus>(frame)) {
-    if (s->battery_remaining >= 0) battery_percent_ = s->battery_remaining;
-    if (s->voltage_battery != UINT16_MAX) volts_ = 1e-3 * s->voltage_battery;
-  } else if (const auto b = As<mav::BatteryStatus>(frame)) {
-    if (b->id == 0 && b->battery_remaining >= 0) battery_percent_ = b->battery_remaining;
+    status_ = *s;
+    status_utime_ = utime;
   } else if (const auto r = As<mav::RcChannels>(frame)) {
     channels_ = r->chancount;
+    channels_utime_ = utime;
   } else if (const auto t = As<mav::Statustext>(frame)) {
     const auto whole = texts_.Add(utime, *t);
     if (whole && whole->severity <= static_cast<uint8_t>(mav::MavSeverity::WARNING))
@@ -98,8 +102,8 @@ bool Autopilot::failsafe() const {
 }
 
 mav::MavLandedState Autopilot::Landed(int64_t utime) const {
-  const bool old = 1e-6 * static_cast<double>(utime - landed_utime_) > kLandedAge;
-  return old ? mav::MavLandedState::UNDEFINED : static_cast<mav::MavLandedState>(landed_);
+  return IsOld(landed_utime_, utime) ? mav::MavLandedState::UNDEFINED
+                                     : static_cast<mav::MavLandedState>(landed_);
 }
 
 bool Autopilot::on_ground(int64_t utime) const {
@@ -138,9 +142,13 @@ std::string Autopilot::Words(int64_t utime) const {
   const auto state = static_cast<std::size_t>(Landed(utime));
   std::string words = fmt::format("mode {}, {}, {}", mode().name(), armed() ? "armed" : "disarmed",
                                   state < std::size(landed) ? landed[state] : "unknown");
-  if (battery_percent_) words += fmt::format(", battery {} %", *battery_percent_);
-  if (volts_) words += fmt::format(" {:.1f} V", *volts_);
-  if (channels_) words += *channels_ > 0 ? ", receiver heard" : ", no receiver";
+  if (!IsOld(status_utime_, utime) && status_.battery_remaining >= 0) {
+    words += fmt::format(", battery {} %", status_.battery_remaining);
+    if (status_.voltage_battery != UINT16_MAX)
+      words += fmt::format(" {:.1f} V", 1e-3 * status_.voltage_battery);
+  }
+  if (channels_utime_ != 0)
+    words += channels_ > 0 && !IsOld(channels_utime_, utime) ? ", receiver heard" : ", no receiver";
   return words;
 }
 

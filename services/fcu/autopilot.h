@@ -67,8 +67,9 @@ class Autopilot {
   int64_t landed_utime_ = 0;  // when it said so
   std::optional<Attitude> attitude_;
   std::optional<Eigen::Vector3d> position_;
-  std::optional<int> battery_percent_, channels_;
-  std::optional<double> volts_;
+  mav::SysStatus status_;  // whose battery is the emptiest of those that are connected
+  int channels_ = 0;       // of its receiver
+  int64_t status_utime_ = 0, channels_utime_ = 0;
   StatusTexts texts_;
   StatusText warning_;
   int64_t warning_utime_ = 0;

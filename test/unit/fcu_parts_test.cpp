@@ -96,7 +96,7 @@ TEST(FcuStreamRates, AsksUntilMessagesComeAndNoLonger) {
     for (const auto& [id, interval] : granted)
       if (t % static_cast<int64_t>(interval) < 5'000) rates.OnMessage(id);
   }
-  EXPECT_EQ(granted.size(), 7u);
+  EXPECT_EQ(granted.size(), 6u);
   EXPECT_NEAR(granted.at(mav::HighresImu::kId), 5000.0, 1.0);
   EXPECT_EQ(rates.missing().find("HIGHRES_IMU"), std::string::npos) << rates.missing();
   EXPECT_LT(last, 30) << "asked on though all comes";
@@ -222,6 +222,58 @@ TEST(FcuAutopilot, RemembersTheLastChecksThatFailedUntilItIsArmed) {
   m.base_mode = 0x80;
   autopilot.Take(FrameOf(m), kStart + 62'000'000);
   EXPECT_EQ(autopilot.Warning(kStart + 90'000'000, 10.0), "");
+}
+
+/// One that is heard.
+Autopilot Heard() {
+  Autopilot autopilot(0);
+  mav::Heartbeat heartbeat;
+  heartbeat.autopilot = 12;
+  autopilot.Take(FrameOf(heartbeat), kStart);
+  return autopilot;
+}
+
+bool Says(const Autopilot& autopilot, double seconds, const char* what) {
+  return autopilot.Words(kStart + static_cast<int64_t>(1e6 * seconds)).find(what) !=
+         std::string::npos;
+}
+
+// SYS_STATUS is of the emptiest of all batteries, BATTERY_STATUS of each.
+TEST(FcuAutopilot, TheBatteryIsTheEmptiestOneAndNoOlderThanItSays) {
+  Autopilot autopilot = Heard();
+  EXPECT_FALSE(Says(autopilot, 0.0, "battery"));
+  mav::SysStatus all;
+  all.voltage_battery = 14'800;
+  all.battery_remaining = 30;
+  autopilot.Take(FrameOf(all), kStart);
+  mav::BatteryStatus first;
+  first.battery_remaining = 80;
+  autopilot.Take(FrameOf(first), kStart);
+  EXPECT_TRUE(Says(autopilot, 0.0, ", battery 30 % 14.8 V"));
+  EXPECT_TRUE(Says(autopilot, 2.0, ", battery 30 %"));
+  EXPECT_FALSE(Says(autopilot, 3.0, "battery")) << autopilot.Words(kStart + 3'000'000);
+  EXPECT_FALSE(Says(autopilot, 3.0, " V"));
+  autopilot.Take(FrameOf(all), kStart + 4'000'000);
+  EXPECT_TRUE(Says(autopilot, 4.0, ", battery 30 %"));
+  all.voltage_battery = UINT16_MAX;
+  all.battery_remaining = -1;
+  autopilot.Take(FrameOf(all), kStart + 4'500'000);
+  EXPECT_FALSE(Says(autopilot, 4.5, "battery")) << "none is connected";
+}
+
+TEST(FcuAutopilot, AReceiverIsHeardNoLongerThanItSpeaks) {
+  Autopilot autopilot = Heard();
+  EXPECT_FALSE(Says(autopilot, 0.0, "receiver"));
+  mav::RcChannels channels;
+  channels.chancount = 8;
+  autopilot.Take(FrameOf(channels), kStart);
+  EXPECT_TRUE(Says(autopilot, 2.0, ", receiver heard"));
+  EXPECT_TRUE(Says(autopilot, 3.0, ", no receiver")) << autopilot.Words(kStart + 3'000'000);
+  autopilot.Take(FrameOf(channels), kStart + 4'000'000);
+  EXPECT_TRUE(Says(autopilot, 4.0, ", receiver heard"));
+  channels.chancount = 0;
+  autopilot.Take(FrameOf(channels), kStart + 4'000'000);
+  EXPECT_TRUE(Says(autopilot, 4.0, ", no receiver"));
 }
 
 TEST(FcuAutopilot, StandsNoLongerThanItSaysSo) {
