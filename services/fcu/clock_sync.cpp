@@ -14,25 +14,22 @@ constexpr int64_t kLongestTrip = 1'000'000;
 // Farther off than the trip's own duration allows by this much: a clock that jumped (PX4's own
 // limit for its side of the same estimate is 100 ms).
 constexpr int64_t kJump = 20'000;
-constexpr int kOutliers = 5;  // in a row: it did
+constexpr std::size_t kOutliers = 5;  // in a row: it did
 
 }  // namespace
-
-void ClockSync::Clear() {
-  trips_.clear();
-  outliers_ = 0;
-}
 
 void ClockSync::Add(int64_t sent, int64_t remote, int64_t received) {
   const Trip trip{sent + (received - sent) / 2 - remote, received - sent, received};
   if (trip.duration < 0 || trip.duration > kLongestTrip) return;
   if (synced() && std::llabs(trip.offset - offset_) > kJump + trip.duration / 2) {
-    if (++outliers_ < kOutliers) return;
+    outliers_.push_back(trip);
+    if (outliers_.size() < kOutliers) return;
     ++restarts_;
-    Clear();
+    trips_.swap(outliers_);
+  } else {
+    trips_.push_back(trip);
   }
-  outliers_ = 0;
-  trips_.push_back(trip);
+  outliers_.clear();
   while (trips_.front().received < received - kWindow) trips_.pop_front();
   Settle();
 }

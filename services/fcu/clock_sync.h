@@ -26,7 +26,6 @@ class ClockSync {
   double round_trip() const { return round_trip_; }
   /// How often the autopilot's clock began anew.
   int restarts() const { return restarts_; }
-  void Clear();
 
  private:
   struct Trip {
@@ -35,9 +34,9 @@ class ClockSync {
   void Settle();
 
   static constexpr std::size_t kLeast = 5;
-  std::deque<Trip> trips_;  // of the window, oldest first
-  int outliers_ = 0;        // in a row
-  int64_t offset_ = 0;      // host minus autopilot
+  std::deque<Trip> trips_;     // of the window, oldest first
+  std::deque<Trip> outliers_;  // in a row since the last of them
+  int64_t offset_ = 0;         // host minus autopilot
   double jitter_ = 0, round_trip_ = 0;
   int restarts_ = 0;
 };

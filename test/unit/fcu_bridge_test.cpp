@@ -753,6 +753,22 @@ TEST(FcuBridge, AnAutopilotThatBeginsAnewIsAskedForItsStreamsAgain) {
   EXPECT_EQ(flight.px4.seen().times_armed, 1) << "not armed again by itself";
 }
 
+TEST(FcuBridge, AnAutopilotWhoseClockGoesBackIsTakenUpAgainWithinASecond) {
+  for (uint64_t seed = 1; seed <= 20; ++seed) {
+    Flight flight({}, {}, seed);
+    flight.setpoints = false;
+    flight.loss = 0.1;
+    flight.Run(10.0 + 0.05 * static_cast<double>(seed));
+    flight.px4.Reboot(flight.now());
+    const std::size_t samples = flight.imu.size();
+    const auto taken_up = [&] { return flight.imu.size() > samples + 20; };
+    EXPECT_LT(Took(&flight, "a clock that goes back, until its IMU is stamped", 2.0, taken_up),
+              1.0);
+    EXPECT_EQ(flight.bridge.clock().restarts(), 1);
+    EXPECT_NEAR(static_cast<double>(flight.imu.back().utime - flight.now()), 0.0, 10'000.0);
+  }
+}
+
 TEST(FcuBridge, AnotherMakesAutopilotIsLeftAlone) {
   StandInOptions options;
   options.autopilot = 3;
