@@ -1,6 +1,7 @@
 #include "deploy/calibrate/camera_fit.h"
 
 #include <algorithm>
+#include <cmath>
 #include <opencv2/calib3d.hpp>
 
 namespace chase::calibrate {
@@ -8,10 +9,15 @@ namespace {
 
 constexpr std::size_t kLeastViews = 5;
 constexpr double kLeastTilt = 0.25;  // rad between two views: the focal length needs perspective
+// The lens's two terms are taken where a likelihood ratio test asks for them: chi-square of two
+// degrees of freedom, one in a thousand.
+constexpr double kLensGain = 13.8;
+// What k2 errs grows with the fifth power of the distance: from here to the corner sixfold.
+constexpr double kLeastReach = 0.7;
 
 struct Solved {
   double rms;
-  cv::Mat matrix, deviations;
+  cv::Mat matrix, lens, deviations;
   std::vector<cv::Mat> rotations;
 };
 
@@ -20,8 +26,8 @@ Solved Solve(const std::vector<std::vector<cv::Point3f>>& at,
   Solved s;
   s.matrix = (cv::Mat_<double>(3, 3) << size.width, 0, 0.5 * (size.width - 1), 0, size.width,
               0.5 * (size.height - 1), 0, 0, 1);
-  cv::Mat distortion, shifts, extrinsic_deviations, errors;
-  s.rms = cv::calibrateCamera(at, px, size, s.matrix, distortion, s.rotations, shifts, s.deviations,
+  cv::Mat shifts, extrinsic_deviations, errors;
+  s.rms = cv::calibrateCamera(at, px, size, s.matrix, s.lens, s.rotations, shifts, s.deviations,
                               extrinsic_deviations, errors,
                               flags | cv::CALIB_FIX_ASPECT_RATIO | cv::CALIB_USE_INTRINSIC_GUESS |
                                   cv::CALIB_ZERO_TANGENT_DIST | cv::CALIB_FIX_K3);
@@ -41,18 +47,34 @@ double Tilt(const std::vector<cv::Mat>& rotations) {
   return most;
 }
 
+/// How far out corners were found, as a share of the way from the centre to the picture's corner.
+double Reach(const std::vector<std::vector<cv::Point2f>>& px, const CameraFit& fit, cv::Size size) {
+  const cv::Point2d center(fit.center_u_px, fit.center_v_px);
+  double farthest = 0.0;
+  for (const auto& view : px)
+    for (const cv::Point2d corner : view) farthest = std::max(farthest, cv::norm(corner - center));
+  return farthest / std::hypot(std::max(center.x, size.width - center.x),
+                               std::max(center.y, size.height - center.y));
+}
+
 }  // namespace
 
-cv::Mat CameraFit::matrix() const {
-  return (cv::Mat_<double>(3, 3) << focal_px, 0, center_u_px, 0, focal_px, center_v_px, 0, 0, 1);
+world::Rig CameraFit::In(world::Rig rig, cv::Size size) const {
+  rig.width_px = size.width, rig.height_px = size.height;
+  rig.focal_px = focal_px;
+  rig.center_u_px = center_u_px, rig.center_v_px = center_v_px;
+  rig.lens = k1 == 0.0 && k2 == 0.0 ? "pinhole" : "plumb_bob";
+  rig.lens_coefficients << k1, k2, 0.0, 0.0, 0.0;
+  return rig;
 }
 
 CameraFit FitCamera(const std::vector<View>& views, cv::Size size) {
   CameraFit fit;
   std::vector<std::vector<cv::Point3f>> at;
   std::vector<std::vector<cv::Point2f>> px;
+  std::size_t corners = 0;
   for (const View& view : views)
-    if (!view.empty()) at.push_back(view.at), px.push_back(view.px);
+    if (!view.empty()) at.push_back(view.at), px.push_back(view.px), corners += view.px.size();
   if (at.size() < kLeastViews) {
     fit.problem = "the board is found in " + std::to_string(at.size()) +
                   " pictures; show it in 5 or more, from all sides and near the edges";
@@ -63,21 +85,35 @@ CameraFit FitCamera(const std::vector<View>& views, cv::Size size) {
     fit.problem = "all views are parallel, which leaves the focal length open; tilt the board";
     return fit;
   }
-  fit.rms_px = plain.rms;
-  fit.distorted_rms_px = Solve(at, px, size, 0).rms;
-  fit.focal_px = plain.matrix.at<double>(0, 0);
-  fit.center_u_px = plain.matrix.at<double>(0, 2);
-  fit.center_v_px = plain.matrix.at<double>(1, 2);
-  fit.focal_sigma = std::max(plain.deviations.at<double>(0), plain.deviations.at<double>(1));
-  fit.center_sigma = std::max(plain.deviations.at<double>(2), plain.deviations.at<double>(3));
+  const Solved behind_lens = Solve(at, px, size, 0);
+  const double gain = 4.0 * static_cast<double>(corners) * std::log(plain.rms / behind_lens.rms);
+  const Solved& best = gain > kLensGain ? behind_lens : plain;
+  fit.pinhole_rms_px = plain.rms;
+  fit.rms_px = best.rms;
+  fit.focal_px = best.matrix.at<double>(0, 0);
+  fit.center_u_px = best.matrix.at<double>(0, 2);
+  fit.center_v_px = best.matrix.at<double>(1, 2);
+  fit.k1 = best.lens.at<double>(0);
+  fit.k2 = best.lens.at<double>(1);
+  fit.focal_sigma = std::max(best.deviations.at<double>(0), best.deviations.at<double>(1));
+  fit.center_sigma = std::max(best.deviations.at<double>(2), best.deviations.at<double>(3));
+  if (&best == &behind_lens && Reach(px, fit, size) < kLeastReach)
+    fit.problem = "the lens bends lines, and the board was not shown in the corners; show it there";
   return fit;
 }
 
-bool BoardPose(const View& view, const cv::Mat& matrix, cv::Vec3d* rotation, cv::Vec3d* position) {
-  return !view.empty() &&
-         cv::solvePnP(view.at, view.px, matrix, cv::noArray(), *rotation, *position, false,
+/// By the corners' rays, which are those of a pinhole with focal length 1.
+bool BoardPose(const View& view, const world::Rig& rig, cv::Vec3d* rotation, cv::Vec3d* position) {
+  if (view.empty()) return false;
+  std::vector<cv::Point2d> rays;
+  for (const cv::Point2f& px : view.px) {
+    const Eigen::Vector3d ray = rig.Ray({px.x, px.y});
+    rays.emplace_back(ray.x(), ray.y());
+  }
+  const cv::Matx33d pinhole = cv::Matx33d::eye();
+  return cv::solvePnP(view.at, rays, pinhole, cv::noArray(), *rotation, *position, false,
                       cv::SOLVEPNP_IPPE) &&
-         cv::solvePnP(view.at, view.px, matrix, cv::noArray(), *rotation, *position, true);
+         cv::solvePnP(view.at, rays, pinhole, cv::noArray(), *rotation, *position, true);
 }
 
 }  // namespace chase::calibrate

@@ -14,9 +14,8 @@
 namespace chase::calibrate {
 namespace {
 
-constexpr double kWorstRms = 1.0;        // px: above it the model or the board's sizes are wrong
-constexpr double kDistortionGain = 1.5;  // rms without distortion over with it
-constexpr int kPrintedPx = 120;          // a square
+constexpr double kWorstRms = 1.0;  // px: above it the model or the board's sizes are wrong
+constexpr int kPrintedPx = 120;    // a square
 
 struct Arguments {
   Board board;
@@ -73,24 +72,20 @@ int Camera(const Arguments& a) {
   }
   const CameraFit fit = FitCamera(views, size);
   Require(fit.problem);
-  rig.rig.width_px = size.width, rig.rig.height_px = size.height;
-  rig.rig.focal_px = fit.focal_px;
-  rig.rig.center_u_px = fit.center_u_px, rig.rig.center_v_px = fit.center_v_px;
-  WriteRig(a.out, rig);
-  WritePicture(a.check, CameraPicture(views, fit, size));
-  fmt::print(
-      "focal length {:.2f} +- {:.2f} px, centre {:.2f} {:.2f} +- {:.2f} px, corners {:.2f} px "
-      "off ({:.2f} px with distortion)\n{}\n{}\n",
-      fit.focal_px, fit.focal_sigma, fit.center_u_px, fit.center_v_px, fit.center_sigma, fit.rms_px,
-      fit.distorted_rms_px, a.out, a.check);
-  if (fit.rms_px > kDistortionGain * fit.distorted_rms_px && fit.rms_px > 0.3)
-    fmt::print(
-        "warning: the lens bends lines, and no process undistorts; take one that does not\n");
+  rig.rig = fit.In(rig.rig, size);
+  Require(rig.Problem());
+  WritePicture(a.check, CameraPicture(views, rig.rig));
   if (fit.rms_px > kWorstRms)
     throw std::runtime_error(fmt::format(
-        "the corners are {:.2f} px off, more than {:g}: check --square, --marker and the board's "
-        "flatness, and leave blurred pictures out",
-        fit.rms_px, kWorstRms));
+        "the corners are {:.2f} px off, more than {:g}, see {}: check --square, --marker and the "
+        "board's flatness, leave blurred pictures out, and take a lens that is no fisheye",
+        fit.rms_px, kWorstRms, a.check));
+  WriteRig(a.out, rig);
+  fmt::print(
+      "focal length {:.2f} +- {:.2f} px, centre {:.2f} {:.2f} +- {:.2f} px, lens {} {:.4f} {:.4f}, "
+      "corners {:.2f} px off ({:.2f} px by a pinhole)\n{}\n{}\n",
+      fit.focal_px, fit.focal_sigma, fit.center_u_px, fit.center_v_px, fit.center_sigma,
+      rig.rig.lens, fit.k1, fit.k2, fit.rms_px, fit.pinhole_rms_px, a.out, a.check);
   return 0;
 }
 
@@ -152,7 +147,8 @@ int Run(int argc, char** argv) {
   CLI::App* b = app.add_subcommand("board", "Writes the board to print.");
   AddBoard(b, &board.board);
   b->add_option("--out", board.out, "picture to write")->capture_default_str();
-  CLI::App* c = app.add_subcommand("camera", "Focal length and centre from pictures of the board.");
+  CLI::App* c =
+      app.add_subcommand("camera", "Focal length, centre and lens from pictures of the board.");
   c->add_option("pictures", camera.pictures, "of the size that chase-camera publishes")->required();
   AddBoard(c, &camera.board);
   AddOutputs(c, &camera);

@@ -27,15 +27,17 @@ void Draw(const Eigen::Vector3d& p_C, const world::Rig& rig, const cv::Scalar& c
 
 }  // namespace
 
-cv::Mat CameraPicture(const std::vector<View>& views, const CameraFit& fit, cv::Size size) {
-  cv::Mat picture(size * kScale, CV_8UC3, cv::Scalar::all(255));
+cv::Mat CameraPicture(const std::vector<View>& views, const world::Rig& rig) {
+  cv::Mat picture(cv::Size(rig.width_px, rig.height_px) * kScale, CV_8UC3, cv::Scalar::all(255));
   for (const View& view : views) {
     cv::Vec3d rotation, position;
-    if (!BoardPose(view, fit.matrix(), &rotation, &position)) continue;
-    std::vector<cv::Point2f> model;
-    cv::projectPoints(view.at, rotation, position, fit.matrix(), cv::noArray(), model);
-    for (std::size_t i = 0; i < model.size(); ++i) {
-      const cv::Point2d found = view.px[i], error = view.px[i] - model[i];
+    if (!BoardPose(view, rig, &rotation, &position)) continue;
+    cv::Matx33d R;
+    cv::Rodrigues(rotation, R);
+    for (std::size_t i = 0; i < view.px.size(); ++i) {
+      const cv::Vec3d p = R * cv::Vec3d(view.at[i].x, view.at[i].y, view.at[i].z) + position;
+      const Eigen::Vector2d model = rig.Project({p[0], p[1], p[2]});
+      const cv::Point2d found = view.px[i], error = found - cv::Point2d(model.x(), model.y());
       cv::circle(picture, Pixel(found), 2, kInk, cv::FILLED);
       cv::line(picture, Pixel(found), Pixel(found + kMagnified * error), kRed);
     }

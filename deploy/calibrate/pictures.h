@@ -11,8 +11,9 @@
 namespace chase::calibrate {
 
 /// Every corner of every view where it was found, with its error drawn 20 times: arrows that point
-/// alike in one part of the picture are distortion, empty parts were never looked at.
-cv::Mat CameraPicture(const std::vector<View>& views, const CameraFit& fit, cv::Size size);
+/// alike in one part of the picture are a lens that the fit does not have, empty parts were never
+/// looked at.
+cv::Mat CameraPicture(const std::vector<View>& views, const world::Rig& rig);
 
 /// Each frame with the points that the fit used, by the pose found (green) and by the one before
 /// (red): green has to lie on the board.

@@ -44,12 +44,9 @@ bool StandsStill(const std::vector<Seen>& seen, std::size_t i) {
 }
 
 Plane PlaneOf(const Seen& seen, const Swept& swept, const Board& board, const world::Rig& rig) {
-  CameraFit camera;
-  camera.focal_px = rig.focal_px;
-  camera.center_u_px = rig.center_u_px, camera.center_v_px = rig.center_v_px;
   cv::Vec3d rotation, position;
   Plane plane;
-  if (!BoardPose(seen.view, camera.matrix(), &rotation, &position)) return plane;
+  if (!BoardPose(seen.view, rig, &rotation, &position)) return plane;
   cv::Matx33d R;
   cv::Rodrigues(rotation, R);
   Eigen::Matrix3d R_CP;
