@@ -75,6 +75,7 @@ void LinkNode::TakeIn() {
       continue;
     }
     socket_.Trust();
+    packer_.Hear(unpacker_);
     last_heard_ = bus_.Now();
     for (Message& m : messages) {
       if (!Leaves(m.channel, !config_.is_vehicle())) {

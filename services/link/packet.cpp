@@ -6,8 +6,8 @@
 namespace chase::link {
 namespace {
 
-constexpr uint8_t kMagic[4] = {'C', 'H', 'L', '1'};
-constexpr size_t kHeadBytes = 16, kRecordBytes = 11;
+constexpr uint8_t kMagic[4] = {'C', 'H', 'L', '2'};
+constexpr size_t kHeadBytes = 24, kRecordBytes = 11;
 constexpr size_t kMostName = Packer::kMostName, kPartBytes = Packer::kPartBytes;
 static_assert(kPartBytes + 2 + kRecordBytes + kHeadBytes + kMostName == Packer::kMostBytes);
 constexpr size_t kMostOpen = 64;    // messages of which parts are missing
@@ -112,7 +112,13 @@ void Packer::AddPart(const std::string& channel, const uint8_t* data, size_t siz
 void Packer::Begin() {
   current_.assign(std::begin(kMagic), std::end(kMagic));
   Put(session_, &current_);
+  Put(heard_, &current_);
   Put(next_packet_++, &current_);
+}
+
+void Packer::Hear(const Unpacker& other) {
+  heard_ = other.session();
+  if (other.heard() > session_ && other.heard() < INT64_MAX) session_ = other.heard() + 1;
 }
 
 std::vector<Bytes> Packer::Take(bool idle) {
@@ -160,10 +166,10 @@ struct Unpacker::Record {
 bool Unpacker::Take(const uint8_t* data, size_t size, std::vector<Message>* messages) {
   Reader reader(data, size);
   const uint8_t* magic = reader.Skip(sizeof kMagic);
-  int64_t session = 0;
+  int64_t session = 0, heard = 0;
   uint32_t number = 0;
   if (magic == nullptr || !std::equal(std::begin(kMagic), std::end(kMagic), magic) ||
-      !reader.Get(&session) || !reader.Get(&number))
+      !reader.Get(&session) || !reader.Get(&heard) || !reader.Get(&number))
     return false;
   std::vector<Record> records;  // all or none of a packet
   while (reader.left() > 0) {
@@ -172,6 +178,7 @@ bool Unpacker::Take(const uint8_t* data, size_t size, std::vector<Message>* mess
     records.push_back(std::move(*record));
   }
   if (!Follows(session, number)) return false;
+  heard_ = heard;
   for (const Record& record : records) Accept(record, messages);
   return true;
 }

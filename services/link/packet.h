@@ -17,21 +17,28 @@ struct Message {
   Bytes bytes;
 };
 
+class Unpacker;
+
 /// Messages into datagrams that no radio has to cut: small ones share one, large ones take several
 /// parts and one of parity, from which any one that is lost is restored.
-/// Packet: "CHL1", session (8 bytes), number (4), records; all big-endian. Record: message (4),
-/// part and parts (2 each), length of the channel's name (1), of the bytes (2), the name, the
-/// bytes. Of n parts all but the last are of kPartBytes; number n is parity: the length of the last
-/// (2), and the exclusive or of all, the last filled up with zeros.
+/// Packet: "CHL2", session (8 bytes), the newest one heard of the other end (8), number (4),
+/// records; all big-endian. Record: message (4), part and parts (2 each), length of the channel's
+/// name (1), of the bytes (2), the name, the bytes. Of n parts all but the last are of kPartBytes;
+/// number n is parity: the length of the last (2), and the exclusive or of all, the last filled up
+/// with zeros.
 class Packer {
  public:
   static constexpr size_t kMostBytes = 1300;  ///< of a packet, with room for a seal below 1400
   static constexpr size_t kMostName = 64;     ///< of a channel
-  static constexpr size_t kPartBytes = kMostBytes - 16 - 11 - 2 - kMostName;
+  static constexpr size_t kPartBytes = kMostBytes - 24 - 11 - 2 - kMostName;
   static constexpr size_t kMostParts = 200;  ///< larger messages are left out
 
-  /// `session`: grows from start to start of this side.
+  /// `session`: grows from start to start of this side; where its clock went back, Hear mends it.
   explicit Packer(int64_t session) : session_(session) {}
+
+  /// What came from the other end: our packets say which of its sessions was heard, and one of ours
+  /// that it knows to be newer than this is outbid.
+  void Hear(const Unpacker& other);
 
   /// False where the message is too large, or its channel's name is.
   bool Add(const std::string& channel, const uint8_t* data, size_t size);
@@ -43,7 +50,7 @@ class Packer {
                size_t parts);
   void Begin();
 
-  int64_t session_;
+  int64_t session_, heard_ = 0;
   uint32_t next_packet_ = 0, next_message_ = 0;
   Bytes current_;
   std::vector<Bytes> full_;
@@ -56,6 +63,9 @@ class Unpacker {
   /// the session at hand.
   bool Take(const uint8_t* data, size_t size, std::vector<Message>* messages);
 
+  /// The newest session of the other end, and the newest of ours that it has heard; 0: none.
+  int64_t session() const { return session_; }
+  int64_t heard() const { return heard_; }
   int64_t packets() const { return packets_; }
   int64_t lost() const { return lost_; }
 
@@ -72,7 +82,7 @@ class Unpacker {
   bool IsDone(uint32_t message) const { return done_.count(message) > 0; }
   void Finish(uint32_t message);
 
-  int64_t session_ = 0;
+  int64_t session_ = 0, heard_ = 0;
   uint32_t next_ = 0;
   int64_t packets_ = 0, lost_ = 0;
   std::set<int64_t> missing_;  // that may still come

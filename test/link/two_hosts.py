@@ -107,7 +107,7 @@ class Path:
 
 def channels_in(packet, tag=wire.TAG):
     """Channels of a packet of the link, by its README."""
-    at, end = 16, len(packet) - tag
+    at, end = 24, len(packet) - tag
     while at + 11 <= end:
         _, _, _, name, size = struct.unpack_from(">IHHBH", packet, at)
         yield packet[at + 11:at + 11 + name].decode("ascii", "replace")
@@ -321,7 +321,7 @@ class TwoHosts(unittest.TestCase):
     def forge_link(self, samples):
         """To the link, from the peer's own address: without a seal, with another's, and recorded earlier."""
         def packet(session, channel, data):
-            return (b"CHL1" + struct.pack(">qI", session, 0) +
+            return (b"CHL2" + struct.pack(">qqI", session, 0, 0) +
                     struct.pack(">IHHBH", 0, 0, 1, len(channel), len(data)) + channel.encode() + data)
 
         for vehicle, host in self.hosts.items():

@@ -113,6 +113,40 @@ TEST(Packet, ARecordedSessionIsRefusedOnceANewerOneWasHeard) {
   EXPECT_EQ(came.size(), n);
 }
 
+/// One end of a link and what came to it.
+struct End {
+  explicit End(int64_t session) : packer(session) {}
+  Packer packer;
+  Unpacker unpacker;
+  std::vector<Message> came;
+};
+
+/// Says a word on the link; is it taken?
+bool Tell(End* from, End* to) {
+  const uint8_t word[] = {1, 2, 3};
+  from->packer.Add("COMMAND", word, sizeof word);
+  bool taken = true;
+  for (const Bytes& packet : from->packer.Take(true)) {
+    taken = to->unpacker.Take(packet.data(), packet.size(), &to->came) && taken;
+    to->packer.Hear(to->unpacker);
+  }
+  return taken;
+}
+
+TEST(Packet, AnEndThatBeginsAnewWithAnOlderClockIsHeardAgain) {
+  End vehicle(1000), ground(2000);
+  EXPECT_TRUE(Tell(&vehicle, &ground));
+  EXPECT_TRUE(Tell(&ground, &vehicle));
+  ground = End(500);
+  EXPECT_FALSE(Tell(&ground, &vehicle)) << "it might be a recording";
+  EXPECT_TRUE(Tell(&vehicle, &ground)) << "whose packets say what they have heard";
+  EXPECT_TRUE(Tell(&ground, &vehicle));
+  vehicle = End(10);
+  EXPECT_TRUE(Tell(&ground, &vehicle));
+  EXPECT_TRUE(Tell(&vehicle, &ground));
+  EXPECT_TRUE(Tell(&ground, &vehicle));
+}
+
 TEST(Packet, CutPacketsAreRefusedWhole) {
   Generator draw(5);
   const auto packets = Pack(RandomMessages(3, &draw), 7, &draw);
@@ -127,11 +161,12 @@ TEST(Packet, CutPacketsAreRefusedWhole) {
 /// A packet of one record, as packet.h has it.
 Bytes OneRecord(uint32_t number, uint32_t message, uint16_t part, uint16_t parts,
                 const Bytes& bytes) {
-  Bytes packet = {'C', 'H', 'L', '1'};
+  Bytes packet = {'C', 'H', 'L', '2'};
   const auto put = [&packet](uint64_t value, int size) {
     for (int i = size - 1; i >= 0; --i) packet.push_back(static_cast<uint8_t>(value >> (8 * i)));
   };
   put(7, 8);
+  put(0, 8);
   put(number, 4);
   put(message, 4);
   put(part, 2);
