@@ -1,6 +1,9 @@
 #pragma once
 
+#include <gtest/gtest.h>
+
 #include <algorithm>
+#include <cstdio>
 #include <deque>
 #include <functional>
 #include <string>
@@ -18,7 +21,8 @@ inline constexpr int64_t kFlightStart = 1'700'000'000'000'000;
 /// setpoints come from a hand-written controller: climb to `height`, or nothing.
 class Flight {
  public:
-  explicit Flight(const StandInOptions& options = {}, FcuConfig config = {}, uint64_t seed = 1)
+  explicit Flight(const StandInOptions& options = {}, const FcuConfig& config = {},
+                  uint64_t seed = 1)
       : bridge(config), px4(options, kFlightStart, seed), random_(seed) {}
 
   Bridge bridge;
@@ -114,5 +118,20 @@ class Flight {
   int64_t now_ = kFlightStart;
   std::deque<Datagram> to_us_, to_px4_;
 };
+
+/// Flies on until it holds, `most` s at most; prints and returns how long that took, s.
+inline double Took(Flight* flight, const char* what, double most,
+                   const std::function<bool()>& holds) {
+  const int64_t begin = flight->now();
+  flight->Run(most, holds);
+  EXPECT_TRUE(holds()) << what << ": " << flight->bridge.Words();
+  const double seconds = 1e-6 * static_cast<double>(flight->now() - begin);
+  std::printf("%s: %.2f s\n", what, seconds);
+  return seconds;
+}
+
+inline double Took(Flight* flight, const char* what, double most, Handshake::State state) {
+  return Took(flight, what, most, [&] { return flight->bridge.handshake().state() == state; });
+}
 
 }  // namespace chase::fcu::testing
