@@ -63,6 +63,12 @@ add_test(NAME flight_live
   WORKING_DIRECTORY ${CMAKE_SOURCE_DIR})
 set_tests_properties(flight_live PROPERTIES TIMEOUT 300 RUN_SERIAL TRUE)
 
+# The same through the drivers; more seeds: test/flight/hardware 2 3 4.
+if(TARGET simulator_hardware)
+  add_test(NAME flight_hardware COMMAND ${CMAKE_SOURCE_DIR}/test/flight/hardware)
+  set_tests_properties(flight_hardware PROPERTIES TIMEOUT 300 RUN_SERIAL TRUE)
+endif()
+
 # One process dies in it and comes back; every one at three times: test/flight/live_kills.
 add_test(NAME flight_live_kill
   COMMAND ${CMAKE_SOURCE_DIR}/test/flight/live_kills --at 20 planning
