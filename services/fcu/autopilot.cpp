@@ -33,6 +33,11 @@ bool Autopilot::Take(const Frame& frame, int64_t utime) {
   return true;
 }
 
+bool Autopilot::MayBe(const Frame& frame) const {
+  return frame.component == kComponent && stranger_.empty() &&
+         (system_ == 0 || frame.system == system_);
+}
+
 bool Autopilot::TakeHeartbeat(const Frame& frame, int64_t utime) {
   const auto m = *As<mav::Heartbeat>(frame);
   if (system_ != 0 && frame.system != system_) return false;

@@ -21,6 +21,8 @@ class Autopilot {
   /// Takes a frame; false where it is not the autopilot's.
   bool Take(const Frame& frame, int64_t utime);
 
+  /// Could the frame be its, which is not known yet?
+  bool MayBe(const Frame& frame) const;
   bool known() const { return heartbeat_utime_ != 0; }
   uint8_t system() const { return system_; }
   /// Seconds since the last heartbeat.

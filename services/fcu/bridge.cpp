@@ -14,6 +14,7 @@ namespace {
 
 constexpr int64_t kHeartbeatPeriod = 1'000'000;  // us
 constexpr int64_t kTimesyncPeriod = 100'000;     // us: PX4's own rate
+constexpr int64_t kSoonTimesync = 20'000;        // us, while the clock is not known or has jumped
 // us between requests for a heartbeat: PX4 sends it once a second and refuses another interval for
 // it (MavlinkReceiver::set_message_interval), but not a request.
 constexpr int64_t kWordPeriod = 100'000;
@@ -64,6 +65,7 @@ void Bridge::Receive(int64_t arrival, int64_t now, const uint8_t* data, std::siz
 
 void Bridge::OnFrame(const Frame& frame, const Heard& when) {
   const bool beats = frame.id == mav::Heartbeat::kId;
+  if (!autopilot_.known() && !beats) return AskWho(frame, when);
   if ((when.from != peer_ && !beats) || !autopilot_.Take(frame, when.arrival)) return;
   if (beats) peer_ = when.from;
   if (config_.system == 0) writer_.SetSystem(autopilot_.system());
@@ -82,6 +84,21 @@ void Bridge::OnFrame(const Frame& frame, const Heard& when) {
       AskForChecks(when.now);
   }
   if (const auto sample = imu_.Take(frame, clock_, when.now)) samples_.push_back(*sample);
+}
+
+/// Its next heartbeat is up to a second away, in which a flight without setpoints ends.
+void Bridge::AskWho(const Frame& frame, const Heard& when) {
+  if (!autopilot_.MayBe(frame)) return;
+  peer_ = when.from;
+  AskWord(when.now, frame.system);
+}
+
+void Bridge::AskWord(int64_t now, uint8_t system) {
+  if (!Due(now, kWordPeriod, &next_word_)) return;
+  mav::CommandLong request;
+  request.command = static_cast<uint16_t>(mav::MavCmd::REQUEST_MESSAGE);
+  request.param1 = static_cast<float>(mav::Heartbeat::kId);
+  Send(now, request, system);
 }
 
 /// A request is answered with the middle of its stay here, so that the asker's halved round trip
@@ -107,7 +124,7 @@ void Bridge::OnTimesync(const mav::Timesync& m, const Heard& when) {
 void Bridge::AskForChecks(int64_t now) {
   mav::CommandLong request;
   request.command = static_cast<uint16_t>(mav::MavCmd::RUN_PREARM_CHECKS);
-  Send(now, request);
+  Send(now, request, autopilot_.system());
 }
 
 void Bridge::AskTime(int64_t now) {
@@ -243,7 +260,7 @@ void Bridge::Tick(int64_t now) {
   if (handshake_.ended()) asked_ = false;
   if (Due(now, kHeartbeatPeriod, &next_heartbeat_)) SendHeartbeat(now);
   if (!autopilot_.known()) return;
-  if (Due(now, kTimesyncPeriod, &next_timesync_)) AskTime(now);
+  if (Due(now, clock_.settled() ? kTimesyncPeriod : kSoonTimesync, &next_timesync_)) AskTime(now);
   if (handshake_.streams() && IsFresh(now) && setpoint_->motors &&
       Due(now, Period(config_.setpoint_rate), &next_setpoint_))
     SendSetpoint(now);
@@ -273,19 +290,14 @@ void Bridge::SendSetpoint(int64_t now) {
 }
 
 void Bridge::SendCommands(int64_t now) {
-  if (const auto command = handshake_.NextCommand(now)) Send(now, *command);
+  if (const auto command = handshake_.NextCommand(now)) Send(now, *command, autopilot_.system());
   if (!heard_) return;
-  if (handshake_.needs_word() && Due(now, kWordPeriod, &next_word_)) {
-    mav::CommandLong request;
-    request.command = static_cast<uint16_t>(mav::MavCmd::REQUEST_MESSAGE);
-    request.param1 = static_cast<float>(mav::Heartbeat::kId);
-    Send(now, request);
-  }
-  if (const auto request = rates_.Tick(now)) Send(now, *request);
+  if (handshake_.needs_word()) AskWord(now, autopilot_.system());
+  if (const auto request = rates_.Tick(now)) Send(now, *request, autopilot_.system());
 }
 
-void Bridge::Send(int64_t now, mav::CommandLong command) {
-  command.target_system = autopilot_.system();
+void Bridge::Send(int64_t now, mav::CommandLong command, uint8_t system) {
+  command.target_system = system;
   command.target_component = static_cast<uint8_t>(mav::MavComponent::AUTOPILOT1);
   outgoing_.push_back(writer_.Write(now, command));
 }

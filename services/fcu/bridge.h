@@ -29,7 +29,8 @@ class Bridge {
   /// frame is left unfinished. `from`: its sender; while the autopilot is heard nobody else is.
   void Receive(int64_t arrival, int64_t now, const uint8_t* data, std::size_t size, bool whole,
                uint64_t from = 0);
-  /// Whom the autopilot's heartbeat came from: what goes out is for him. 0: nobody yet.
+  /// Whom the autopilot's heartbeat came from, before that whoever may be one: what goes out is for
+  /// him. 0: nobody yet.
   uint64_t peer() const { return peer_; }
   void OnPose(const Pose& pose, int64_t now);
   /// `utime`: the message's own stamp. One that does not rise is a repetition and left out.
@@ -88,7 +89,9 @@ class Bridge {
   void Send(int64_t now, const M& message) {
     outgoing_.push_back(writer_.Write(now, message));
   }
-  void Send(int64_t now, mav::CommandLong command);
+  void Send(int64_t now, mav::CommandLong command, uint8_t system);
+  void AskWho(const Frame& frame, const Heard& when);
+  void AskWord(int64_t now, uint8_t system);
 
   FcuConfig config_;
   std::unique_ptr<Signing> signing_;

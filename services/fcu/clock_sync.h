@@ -20,6 +20,8 @@ class ClockSync {
   std::optional<int64_t> HostTime(int64_t remote) const;
 
   bool synced() const { return trips_.size() >= kLeast; }
+  /// Synced, and the last trip agrees.
+  bool settled() const { return synced() && outliers_.empty(); }
   /// Root mean square of the quick half's offsets about the one in use, s.
   double jitter() const { return jitter_; }
   /// Of the quickest trip in the window, s.
