@@ -324,7 +324,7 @@ TEST(WayOut, IsFoundWhereThePlanCanBeLeftForAWhile) {
 
 // In the open a target of a person's height, which cannot be flown over, walks at the drone, or
 // past it, and neither braking nor rising is certified at any time of the plan: it can be left
-// aside, out of the reach of two deviations and no farther than what is seen around.
+// aside, out of the reach of two deviations.
 TEST(WayOut, StepsAsideFromATargetThatComes) {
   PlannerConfig config;
   config.z_max = 1.5;
@@ -368,7 +368,6 @@ TEST(WayOut, StepsAsideFromATargetThatComes) {
     ++found;
     const world::Trajectory& way = stop->trajectory;
     EXPECT_LT(way.Velocity(way.end()).norm(), 1e-6) << seed;
-    EXPECT_LT((way.Position(way.end()) - request.start.p).norm(), 3.0) << seed;
     for (int i = 0; i <= kInstants; ++i) {
       const double t = way.start + way.duration * i / kInstants;
       const double reach = config.sigmas * std::sqrt(request.target_manoeuvre.Variance(t));
