@@ -146,6 +146,7 @@ void RelaxSight(const world::Obstacle& o, const Growth& growth, const FirstSight
   };
   std::optional<double> kept;  // share that the target keeps off
   const auto take = [&](double share) {
+    if (share == e->sight_share) return;
     e->sight_share = share;
     e->sight = Grown(o, *e, share * growth.sight);
     e->grown_by[1] = -1.0;
