@@ -38,6 +38,7 @@ class FastSearch : public Search {
     Found found;
     found.generated = fast_.n_candidates();
     refused_.clear();
+    limits_.clear();
     checked_ = feasible_ = 0;
     int winner = -1;
     // The winner stands on single-precision tests until it is proven; when that fails, the next
@@ -60,6 +61,7 @@ class FastSearch : public Search {
 
  private:
   using Entry = std::pair<float, int>;  // lower bound or cost, candidate
+  enum class Answer : char { kUnknown, kKept, kBroken };
 
   int Run();
   bool PruneAll();
@@ -73,11 +75,17 @@ class FastSearch : public Search {
   bool IsRefused(int id) const {
     return std::find(refused_.begin(), refused_.end(), id) != refused_.end();
   }
-  bool KeepsLimitsOf(int id) const {
+  // Asked once of each, as every refused winner starts a run of its own.
+  bool KeepsLimitsOf(int id) {
     const Limits& l = problem_->limits;
     const bool any = l.speed > 0.0 || l.acceleration > 0.0 || l.height || l.tan_elevation > 0.0 ||
                      l.min_distance > 0.0 || l.view || std::isfinite(l.listed_within);
-    return !any || KeepsLimits(fast_.PlanOf(id), *problem_);
+    if (!any) return true;
+    limits_.resize(static_cast<size_t>(fast_.n_candidates()), Answer::kUnknown);
+    Answer& answer = limits_[static_cast<size_t>(id)];
+    if (answer == Answer::kUnknown)
+      answer = KeepsLimits(fast_.PlanOf(id), *problem_) ? Answer::kKept : Answer::kBroken;
+    return answer == Answer::kKept;
   }
   // The row that is open decides most of them.
   bool IsProven(int id, int row) {
@@ -96,6 +104,7 @@ class FastSearch : public Search {
   std::vector<int> ids_, groups_, refused_;
   std::vector<float> values_;
   std::vector<int> states_;
+  std::vector<Answer> limits_;  ///< of the candidates
   std::vector<Entry> heap_, accepted_;
   int checked_ = 0, feasible_ = 0;
   float bound_ = 0.0f, best_ = 0.0f;

@@ -158,13 +158,24 @@ bool IsInside(const Piece& piece, const View& view) {
   return (seen->left - side).high < -slack && (seen->left + side).low > slack;
 }
 
-bool Keeps(const Piece& piece, const View& view, int depth) {
-  if (!IsInside(piece.End(false), view) || !IsInside(piece.End(true), view)) return false;
-  if (IsInside(piece, view)) return true;
-  if (depth == 0) return false;
-  Piece left, right;
-  Split(piece, 0.5, &left, &right);
-  return Keeps(left, view, depth - 1) && Keeps(right, view, depth - 1);
+/// All pieces of a size before their halves: most of what leaves the view does so at an end.
+bool Keeps(const Piece& whole, const View& view) {
+  if (!IsInside(whole.End(false), view) || !IsInside(whole.End(true), view)) return false;
+  std::vector<Piece> open{whole}, halves;
+  for (int depth = 0; !open.empty(); ++depth) {
+    halves.clear();
+    for (const Piece& piece : open) {
+      if (IsInside(piece, view)) continue;
+      if (depth == kDepth) return false;
+      Piece left, right;
+      Split(piece, 0.5, &left, &right);
+      if (!IsInside(left.End(true), view)) return false;
+      halves.push_back(left);
+      halves.push_back(right);
+    }
+    open.swap(halves);
+  }
+  return true;
 }
 
 bool Set(const math::Polynomial& power, Coefficients* out) {
@@ -204,7 +215,7 @@ bool KeepsView(const Curve& plan, const Curve& target, double duration,
     Split(whole, from, &before, &after);
     whole = after;
   }
-  return Keeps(whole, view, kDepth);
+  return Keeps(whole, view);
 }
 
 Eigen::Vector2d SeenAt(const Eigen::Vector3d& to_target, const Eigen::Vector3d& acceleration,
