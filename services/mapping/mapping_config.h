@@ -50,9 +50,9 @@ struct StaticConfig {
   double radius = world::kFlightVolume.around;  ///< obstacles within it of the drone are listed, m
   double band_low = 0.3;                        ///< flight volume above the ground, m
   double band_high = world::kFlightVolume.listed;  ///< the same, upper end, m
-  double unseen = 3.0;          ///< unseen columns within this of the drone are listed, m
-  double semi_height = 8.0;     ///< vertical semi-axis of the ellipsoids, m
-  double max_length = 2.5;      ///< longest piece of a wall, m
+  double unseen = world::kFlightVolume.unseen;     ///< unseen columns within it are listed, m
+  double semi_height = 8.0;                        ///< vertical semi-axis of the ellipsoids, m
+  double max_length = 2.5;                         ///< longest piece of a wall, m
   double compact_radius = 0.5;  ///< pieces within such a circle count as round, m
   double waste = 0.2;           ///< blocked but not occupied area per length of a piece, m
   int tolerance_permille = 5;   ///< of the enclosing ellipses' area

@@ -98,7 +98,6 @@ double GivingWay(double limit, double x, double v, double a, double most) {
 // level with people. A tube that is `wider` than the file's, m, reaches no higher than that.
 Limits MakeLimits(const PlannerConfig& c, const Stretch& over, const Eigen::Vector3d& target,
                   const Ground& ground, double wider) {
-  constexpr double kPush = 4.0;         // m/s^2 where no limit is set
   constexpr double kOverhead = 10.0;    // tangent from which there is no side to be on
   constexpr double kUnseenDrop = 0.15;  // m: replanned, half a metre a second
   constexpr double kPerson = 1.7;       // m high

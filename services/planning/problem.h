@@ -15,6 +15,8 @@ namespace chase::planning {
 
 /// The LiDAR sees what is below along this slope: 15 degrees, less a tilt of 4.
 inline constexpr double kSightSlope = 0.2;
+/// Acceleration where no limit is set, m/s^2.
+inline constexpr double kPush = 4.0;
 
 using world::Curve;
 

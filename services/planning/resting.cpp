@@ -90,10 +90,9 @@ std::optional<Stop> Resting::RiseOrBrake() {
 }
 
 std::optional<Stop> Resting::StepAside() {
-  constexpr double kSeen = 3.0;  // m around the start where unseen places are listed
   constexpr double kDistances[] = {0.7, 1.0, 1.4, 1.9, 2.5, 3.2};               // m
   constexpr double kTurns[] = {0.0, M_PI / 4, -M_PI / 4, M_PI / 2, -M_PI / 2};  // rad
-  constexpr double kShare = 0.8, kPush = 4.0;  // of the greatest acceleration; m/s^2 without one
+  constexpr double kShare = 0.8;  // of the greatest acceleration
   if (!request_.target_body) return std::nullopt;
   const double push = config_.max_acceleration > 0.0 ? kShare * config_.max_acceleration : kPush;
   const Vector3d from = over_.start.p - request_.target_body->center.Position(over_.t0);
@@ -105,7 +104,7 @@ std::optional<Stop> Resting::StepAside() {
     const Vector3d end = ToPoints(BrakeCurve(over_.start, T), 5).row(5).transpose();
     for (const double turn : kTurns) {
       const Vector3d place = end + r * Vector3d(std::cos(away + turn), std::sin(away + turn), 0.0);
-      if ((place - request_.start.p).norm() > kSeen) continue;
+      if ((place - request_.start.p).norm() > world::kFlightVolume.unseen) continue;
       if (auto stop = Certified(CurveTo(over_.start, T, place), T)) return stop;
     }
   }

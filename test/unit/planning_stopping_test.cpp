@@ -379,6 +379,28 @@ TEST(WayOut, StepsAsideFromATargetThatComes) {
   EXPECT_GT(found, 0.5 * needed) << "of " << needed;
 }
 
+// At the edge of what is listed straight away from the target is not looked into.
+TEST(WayOut, StepsAsideNoFartherThanUnseenPlacesAreListed) {
+  const PlannerConfig config;
+  PlanRequest request;
+  request.start.p = {0.0, 0.0, 1.5};
+  request.target_body.emplace();
+  world::Obstacle& target = *request.target_body;
+  target.id = kTargetId;
+  target.solid = world::Obstacle::Solid::kCylinder;
+  target.half = {0.25, 0.25, 0.85};
+  target.center = world::Trajectory::Constant({1.4, 0.0, 0.85}, 0.0, 2.5);
+  world::State edge;
+  edge.p = {world::kFlightVolume.unseen - 0.1, 0.0, 1.5};
+  Resting resting(config, request);
+  resting.From(edge, 0.0);
+  const std::optional<Stop> stop = resting.StepAside();
+  ASSERT_TRUE(stop);
+  const Vector3d end = stop->trajectory.Position(stop->trajectory.end());
+  EXPECT_GT((end - edge.p).norm(), 0.5);
+  EXPECT_LE((end - request.start.p).norm(), world::kFlightVolume.unseen);
+}
+
 // A quartic that ends at rest before a wall says nothing of what comes after.
 TEST(Brake, CountsOnNoForecastBeyondItsEnd) {
   PlannerConfig config;
