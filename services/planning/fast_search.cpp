@@ -13,8 +13,8 @@ namespace {
 using kernels::kBatch;
 using kernels::kPad;
 
-// Winners that the ellipsoids let pass and the proof does not; 64 of them cost about 5 ms.
-constexpr size_t kMostRefused = 64;
+// Candidates that the ellipsoids let pass and the proof does not, until the search ends.
+constexpr int kMostRefused = 64;
 constexpr float kSlack = 1e-4f;  // relative: costs in single precision are that good
 
 class FastSearch : public Search {
@@ -37,17 +37,12 @@ class FastSearch : public Search {
     bound_ = static_cast<float>(bound - alike);
     Found found;
     found.generated = fast_.n_candidates();
-    refused_.clear();
-    limits_.clear();
-    checked_ = feasible_ = 0;
+    // First the winner alone is proven. When that fails, each candidate before it is the bound.
     int winner = -1;
-    // The winner stands on single-precision tests until it is proven; when that fails, the next
-    // best follows.
-    while (bound_ < HUGE_VALF || fast_.SetObstacles()) {
+    for (const bool all : {false, true}) {
+      proves_all_ = all;
       winner = Run();
-      if (winner < 0 || proof_->Holds(fast_.PlanOf(winner))) break;
-      refused_.push_back(winner);
-      if (refused_.size() >= kMostRefused) return found;
+      if (winner < 0 || all || proof_->Holds(fast_.PlanOf(winner))) break;
     }
     if (fast_.IsBeyondKernels()) return fallback_->Best(problem, sight_from, bound, proof);
     found.checked = checked_;
@@ -61,7 +56,6 @@ class FastSearch : public Search {
 
  private:
   using Entry = std::pair<float, int>;  // lower bound or cost, candidate
-  enum class Answer : char { kUnknown, kKept, kBroken };
 
   int Run();
   bool PruneAll();
@@ -72,27 +66,23 @@ class FastSearch : public Search {
   void Batch(int* ids, float* lower, int n);
   void CheckAll();
   int CheapestAccepted();
-  bool IsRefused(int id) const {
-    return std::find(refused_.begin(), refused_.end(), id) != refused_.end();
-  }
-  // Asked once of each, as every refused winner starts a run of its own.
-  bool KeepsLimitsOf(int id) {
+  bool KeepsLimitsOf(const Curve& plan) const {
     const Limits& l = problem_->limits;
     const bool any = l.speed > 0.0 || l.acceleration > 0.0 || l.height || l.tan_elevation > 0.0 ||
                      l.min_distance > 0.0 || l.view || std::isfinite(l.listed_within);
-    if (!any) return true;
-    limits_.resize(static_cast<size_t>(fast_.n_candidates()), Answer::kUnknown);
-    Answer& answer = limits_[static_cast<size_t>(id)];
-    if (answer == Answer::kUnknown)
-      answer = KeepsLimits(fast_.PlanOf(id), *problem_) ? Answer::kKept : Answer::kBroken;
-    return answer == Answer::kKept;
+    return !any || KeepsLimits(plan, *problem_);
   }
-  // The row that is open decides most of them.
-  bool IsProven(int id, int row) {
-    const Curve plan = fast_.PlanOf(id);
-    return proof_->RowHolds(row, plan) && proof_->Holds(plan);
+  // `open`: the row that single precision leaves open, which decides most; -1: none.
+  bool Passes(const Curve& plan, int open) {
+    if (!KeepsLimitsOf(plan) || (open >= 0 && !proof_->RowHolds(open, plan))) return false;
+    if (open < 0 && !proves_all_) return true;
+    const bool holds = proof_->Holds(plan);
+    n_refused_ += proves_all_ && !holds;
+    return holds;
   }
-  float Limit() const { return best_ * (1.0f + kSlack); }
+  // Of what is looked at.
+  float Limit() const { return n_refused_ < kMostRefused ? Near(best_) : -HUGE_VALF; }
+  static float Near(float best) { return best * (1.0f + kSlack); }
 
   PlannerConfig config_;
   const kernels::Table& kernels_;
@@ -101,19 +91,19 @@ class FastSearch : public Search {
   std::unique_ptr<Search> fallback_;
   const Problem* problem_ = nullptr;
 
-  std::vector<int> ids_, groups_, refused_;
+  std::vector<int> ids_, groups_;
   std::vector<float> values_;
   std::vector<int> states_;
-  std::vector<Answer> limits_;  ///< of the candidates
   std::vector<Entry> heap_, accepted_;
-  int checked_ = 0, feasible_ = 0;
+  int checked_ = 0, feasible_ = 0, n_refused_ = 0;
+  bool proves_all_ = false;
   float bound_ = 0.0f, best_ = 0.0f;
   Cost winner_cost_;
 };
 
 // Tests up to kBatch candidates with their lower bounds J1 + J3 + J4. J2 comes on top first where
 // there is a bound to prune by, else only for what is feasible; then they are taken in the order of
-// their costs, so that the certificate is asked for as few as possible.
+// their costs, so that limits and proofs are asked of as few as possible.
 void FastSearch::Batch(int* ids, float* lower, int n) {
   for (int i = n; i < kBatch + kPad; ++i) lower[i] = 0.0f;
   const bool prune = best_ < HUGE_VALF;
@@ -122,7 +112,7 @@ void FastSearch::Batch(int* ids, float* lower, int n) {
   float cost[kBatch + kPad];
   int count = 0;
   for (int i = 0; i < n; ++i) {
-    if (!(lower[i] < Limit()) || IsRefused(ids[i])) continue;
+    if (!(lower[i] < Limit())) continue;
     cost[count] = lower[i];
     left[count++] = ids[i];
   }
@@ -142,8 +132,8 @@ void FastSearch::Batch(int* ids, float* lower, int n) {
   std::sort(sorted, sorted + kept);
   for (int i = 0; i < kept; ++i) {
     if (!(sorted[i].first < Limit())) break;
-    const int id = left[sorted[i].second], open = states[sorted[i].second];
-    if (!KeepsLimitsOf(id) || (open >= 0 && !IsProven(id, open))) continue;
+    const int id = left[sorted[i].second];
+    if (!Passes(fast_.PlanOf(id), states[sorted[i].second])) continue;
     ++feasible_;
     accepted_.push_back({sorted[i].first, id});
     best_ = std::min(best_, sorted[i].first);
@@ -242,7 +232,7 @@ int FastSearch::CheapestAccepted() {
   std::sort(accepted_.begin(), accepted_.end(),
             [](const Entry& a, const Entry& b) { return a.second < b.second; });
   for (const auto& [bound, id] : accepted_) {
-    if (!(bound < Limit())) continue;
+    if (!(bound < Near(best_))) continue;
     const Cost cost = fast_.CostOf(id);
     if (winner >= 0 && !(cost.total < winner_cost_.total)) continue;
     winner = id;
@@ -268,7 +258,7 @@ int FastSearch::Run() {
   const kernels::Context& c = fast_.context();
   const int n = fast_.n_candidates();
   best_ = bound_;
-  checked_ = feasible_ = 0;
+  checked_ = feasible_ = n_refused_ = 0;
   accepted_.clear();
   heap_.clear();
   if (bound_ < HUGE_VALF && PruneAll()) return CheapestAccepted();
