@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
-"""Sends damaged messages to every live process: nothing may crash, on every channel that it decodes each
-must be counted in the status, and the next good message must be handled.
+"""Sends damaged messages to every live process: nothing may crash, on every channel that it says it hears each
+must be counted in the status, and the next good message must be handled. The channels must be those of the table
+in test/house/channels.py, which is checked against the code.
 
 Usage: hostile_bus.py BIN_DIR FLIGHT.lcm MISSION.yaml   (run it in a network namespace of its own)
 """
@@ -12,30 +13,29 @@ import sys
 import tempfile
 import time
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / "replay"))
+for folder in ("replay", "house"):
+    sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / folder))
+import channels
 import lcmlog
 
 GROUP, PORT = "239.255.76.67", 7667
 NAN = struct.pack(">d", float("nan"))
-LISTENS = {
-    "odometry": ["LIDAR_SCAN", "IMU"],
-    "mapping": ["SCAN_REGISTERED", "TARGET"],
-    "perception": ["CAMERA_IMAGE", "LIDAR_SCAN", "POSE", "COMMAND"],
-    "prediction": ["TARGET", "OBSTACLES"],
-    "planning": ["PREDICTION", "OBSTACLES", "POSE", "UNSEEN", "TRACKING", "FLIGHT_STATE", "GEOFENCE", "FCU_STATUS"],
-    "control": ["PLAN", "OBSTACLES", "POSE", "FLIGHT_STATE", "GEOFENCE", "FCU_STATUS"],
-    "simulator": ["ATTITUDE_SETPOINT", "POSE"],
-    "mission": ["COMMAND", "POSE", "OBSTACLES", "TARGET", "PLAN", "TRACKING", "ATTITUDE_SETPOINT", "FCU_STATUS"],
-    "fcu": ["POSE", "ATTITUDE_SETPOINT", "FLIGHT_STATE", "COMMAND"],
-    "viewer": ["POSE", "PLAN", "FLIGHT_STATE", "GEOFENCE"],
-}
 # These carry what comes and decode nothing.
 CARRIES = {"recorder": ["--folder", "{folder}"], "link": []}
+# Heard out of logs alone.
+OF_LOGS = {"FAULT", "TRUTH"}
+# The drivers hear their devices.
+TO_HEAR = [service for service, heard in channels.LISTENS.items() if heard]
 FENCE = "  - {name: mission, config: 'geofence: {polygon: [[-99, -99], [99, -99], [99, 99], [-99, 99]]}'}\n"
+# Learns the target's colour anew, and loses the mission process, so that control tells where home is.
+LED = {"  - {command: chase, at_s: -2}\n": "{}  - {{command: select, at_px: [188, 115], at_s: -1}}\n",
+       "\nservices:\n": "\nfaults: [{{name: kill-mission, at: 1}}]\n{}"}
 # Where the first double of a message stands behind what all begin with.
-FIRST_DOUBLE = {"IMU": 0, "POSE": 4, "TARGET": 5, "ATTITUDE_SETPOINT": 0, "SCAN_REGISTERED": 4}
+FIRST_DOUBLE = {"IMU": 0, "POSE": 4, "TARGET": 5, "ATTITUDE_SETPOINT": 0, "SCAN_REGISTERED": 4, "SELECTION": 0,
+                "SELECTION_KEPT": 0, "TRACKING": 9}
 # Where an array's length stands.
-LENGTH = {"LIDAR_SCAN": 0, "OBSTACLES": 4, "SCAN_REGISTERED": 61, "CAMERA_IMAGE": 32}
+LENGTH = {"LIDAR_SCAN": 0, "OBSTACLES": 4, "SCAN_REGISTERED": 61, "CAMERA_IMAGE": 32, "COMMAND": 9, "GEOFENCE": 4,
+          "HEALTH": 0}
 
 
 class Bus:
@@ -44,6 +44,7 @@ class Bus:
     def __init__(self):
         self.out = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.out.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, 0)
+        self.out.bind(("", 0))
         self.into = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.into.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         self.into.bind(("", PORT))
@@ -70,11 +71,12 @@ class Bus:
         while not (newest and enough(newest)) and (left := end - time.monotonic()) > 0:
             self.into.settimeout(left)
             try:
-                packet = self.into.recv(65536)
+                packet, (_, port) = self.into.recvfrom(65536)
             except socket.timeout:
                 break
             channel, _, data = packet[8:].partition(b"\0")
-            if packet[:4] == b"LC02" and channel.decode(errors="replace") == f"{name.upper()}_STATUS":
+            ours = port == self.out.getsockname()[1]
+            if not ours and packet[:4] == b"LC02" and channel.decode(errors="replace") == f"{name.upper()}_STATUS":
                 newest = parse_status(data)
         return newest
 
@@ -96,11 +98,11 @@ def parse_status(data):
         return value
 
     text(), take("b"), text(), text(), text(), take("d"), take("d"), take("d")
-    channels = {}
+    counts = {}
     for _ in range(take("i")):
         name, received, _, _, malformed, _ = text(), *(take("q") for _ in range(4)), take("d")
-        channels[name] = (received, malformed)
-    return channels
+        counts[name] = (received, malformed)
+    return counts
 
 
 def attacks(channel, good):
@@ -118,25 +120,43 @@ def attacks(channel, good):
             yield good[:at] + length + good[at + 4:]
 
 
+def attack(bus, channel, good):
+    """Sends what is bad, then what is good; how much was bad."""
+    bad = list(attacks(channel, good))
+    for data in bad:
+        bus.send(channel, data)
+    bus.send(channel, good)
+    return len(bad)
+
+
+def check_group(bus, process, service, samples):
+    sent = {}
+    for channel, good in samples.items():
+        sent[channel] = attack(bus, channel, good)
+        if process.poll() is not None:
+            sys.exit(f"{service}: died of {channel} or of what came before")
+    status = bus.status(service, 2.5, lambda s: all(s[channel][0] > 0 for channel in sent))
+    if process.poll() is not None or status is None:
+        sys.exit(f"{service}: died of one of {', '.join(sent)}")
+    for channel, bad in sent.items():
+        received, malformed = status[channel]
+        if malformed != bad:
+            sys.exit(f"{service}: {channel}: {malformed} of {bad} counted as malformed")
+        if received != 1 and channel != f"{service.upper()}_STATUS":  # which it may hear itself
+            sys.exit(f"{service}: {channel}: the good message was not handled")
+        print(f"{service}: {channel}: {malformed} refused, then 1 handled", flush=True)
+
+
 def check(bus, bin_dir, service, samples):
     process = subprocess.Popen([f"{bin_dir}/chase-{service}"])
     try:
-        if bus.status(service, 6.0) is None:
+        if (status := bus.status(service, 6.0)) is None:
             sys.exit(f"{service}: no status")
-        for channel in LISTENS[service]:
-            good = samples[channel]
-            bad = list(attacks(channel, good))
-            for data in bad:
-                bus.send(channel, data)
-            bus.send(channel, good)
-            received, malformed = bus.status(service, 2.5, lambda s: s[channel][0] > 0)[channel]
-            if process.poll() is not None:
-                sys.exit(f"{service}: died of {channel}")
-            if malformed != len(bad):
-                sys.exit(f"{service}: {channel}: {malformed} of {len(bad)} counted as malformed")
-            if received != 1:
-                sys.exit(f"{service}: {channel}: the good message was not handled")
-            print(f"{service}: {channel}: {malformed} refused, then 1 handled")
+        if heard := set(status) ^ (channels.LISTENS[service] - OF_LOGS):
+            sys.exit(f"{service}: {', '.join(sorted(heard))}: its status and test/house/channels.py do not agree")
+        light = [channel for channel in sorted(status) if len(samples[channel]) < 60000]
+        for group in [light] + [[channel] for channel in sorted(status.keys() - set(light))]:
+            check_group(bus, process, service, {channel: samples[channel] for channel in group})
     finally:
         process.terminate()
         process.wait(timeout=10)
@@ -161,8 +181,11 @@ def check_carrier(bus, bin_dir, service, arguments, samples):
 def led_flight(bin_dir, mission, folder):
     """The log of a few seconds with a mission process, an operator and a geofence."""
     scenario, log = folder / "led.yaml", folder / "led.lcm"
-    scenario.write_text(pathlib.Path(mission).read_text(encoding="utf-8") + FENCE, encoding="utf-8")
-    subprocess.run([f"{bin_dir}/chase-flight", scenario, "--quiet", "--until", "1", "--log", log],
+    text = pathlib.Path(mission).read_text(encoding="utf-8") + FENCE
+    for place, change in LED.items():
+        text = text.replace(place, change.format(place))
+    scenario.write_text(text, encoding="utf-8")
+    subprocess.run([f"{bin_dir}/chase-flight", scenario, "--quiet", "--until", "4", "--log", log],
                    check=True, stdout=subprocess.DEVNULL)
     return log
 
@@ -174,8 +197,13 @@ def main(bin_dir, flight, mission):
         for log in (flight, led_flight(bin_dir, mission, folder)):
             for _, channel, data in lcmlog.read(log):
                 samples.setdefault(channel, data)
+        status = samples["CONTROL_STATUS"]
+        for heard in channels.LISTENS.values():  # nobody flies along who would send some of them
+            samples.update({channel: status for channel in heard - samples.keys() if channel.endswith("_STATUS")})
+        if lacking := set().union(*channels.LISTENS.values()) - OF_LOGS - samples.keys():
+            sys.exit(f"{', '.join(sorted(lacking))}: nothing in the flights to damage")
         bus = Bus()
-        for service in LISTENS:
+        for service in TO_HEAR:
             check(bus, bin_dir, service, samples)
         light = {channel: data for channel, data in samples.items() if len(data) < 60000}
         for service, arguments in CARRIES.items():

@@ -51,8 +51,14 @@ def check(service):
         yield f"services/{service}: does not listen to {channel}"
 
 
+def services():
+    return sorted({path.parts[1] for path in tree.files("services/*.cpp")})
+
+
 def main():
     problems = [p for service in LISTENS for p in check(service)]
+    problems += [f"{path}: listens to {argument}, and LISTENS does not know {service}" for service in services()
+                 if service not in LISTENS for path, argument in subscriptions(service)]
     for path in tree.files("services/*.h", "services/*.cpp", "common/*.cpp"):
         if path.parts[1] not in ("simulator", "bus", "logs", "viewer"):  # logs: what any message looks like
             problems += [f"{path}: knows {kind}: it stays out of the loop"
