@@ -22,6 +22,7 @@ void AutopilotState::Hear(const status_t& message) {
   const std::string state = words_.substr(0, words_.find(": "));
   obeys_ = state == "flying" && says(", armed, ");
   on_ground_ = says(", on ground");
+  disarmed_ = says(", disarmed, on ground") ? std::optional(heard_) : std::nullopt;
   handed_over_ = std::find(kNotOurs.begin(), kNotOurs.end(), state) != kNotOurs.end();
 }
 

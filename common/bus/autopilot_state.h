@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include "chase/status_t.hpp"
@@ -18,6 +19,8 @@ class AutopilotState {
   /// Did it say last that it stands on the ground? That holds until it says otherwise: one that
   /// hears nothing from us stays there.
   bool IsOnGround() const { return on_ground_; }
+  /// Did it say last that it stands there disarmed? When, us.
+  std::optional<int64_t> disarmed() const { return disarmed_; }
   /// Is the flight not ours although it has begun: a pilot has it, the autopilot lands or has
   /// landed it, or never began it?
   bool IsHandedOver() const { return handed_over_; }
@@ -29,6 +32,7 @@ class AutopilotState {
 
   int64_t heard_ = 0;  // 0: never
   bool obeys_ = true, on_ground_ = false, handed_over_ = false;
+  std::optional<int64_t> disarmed_;
   std::string words_;
 };
 

@@ -74,6 +74,7 @@ bool Mission::Step(double t, Event event, const std::string& detail) {
 
 void Mission::TakeOff(double t) {
   taken_off_ = t;
+  flown_.reset();
   refusal_.clear();
   if (inputs_.pose) home_ = Home{inputs_.pose->p, inputs_.pose->epoch};
 }
@@ -85,6 +86,7 @@ void Mission::Update(double t) {
   }
   if (inputs_.pose && inputs_.pose->usable) last_usable_ = std::max(last_usable_, inputs_.pose->t);
   missing_ = Missing(config_, inputs_, t);
+  if (!flown_ && inputs_.flying && IsAirborne(state_)) flown_ = t;
   NoteProgress(t);
   const std::vector<Event> breached = Breached();
   overruled_.erase(std::remove_if(overruled_.begin(), overruled_.end(),
@@ -138,6 +140,7 @@ std::vector<Event> Mission::Observed(double t) const {
     if (holds) events.push_back(event);
   };
   add(inputs_.motors_off, Event::kMotorsOff);
+  add(IsLandedByAutopilot(), Event::kDisarmed);
   add(inputs_.landing, Event::kLanding);
   add(inputs_.flying, Event::kFlying);
   events.push_back(PoseIsLost(t) ? Event::kPoseLost : Event::kPoseBack);
@@ -168,6 +171,7 @@ std::vector<Event> Mission::Breached() const {
 
 std::string Mission::Detail(Event event) const {
   if (event == Event::kMissing) return missing_.front();
+  if (event == Event::kDisarmed) return inputs_.autopilot;
   if (event == Event::kLeaving) return Leaving();
   return event == Event::kOutside ? Outside() : "";
 }
@@ -224,10 +228,15 @@ bool Mission::IsUp() const {
 
 // What the bridge has given up lasts until setpoints cease; its status may be that old.
 bool Mission::IsNotFlown(double t) const {
-  if (!IsAirborne(state_) || inputs_.flying || !inputs_.on_ground) return false;
+  if (!IsAirborne(state_) || flown_ || !inputs_.on_ground) return false;
   const double waited = t - taken_off_;
   if (inputs_.handed_over) return waited > world::kMostAge.status;
   return config_.takeoff_patience > 0.0 && waited > config_.takeoff_patience;
+}
+
+// DONE cuts the motors: a word of before the flight, whose successors were lost, does not count.
+bool Mission::IsLandedByAutopilot() const {
+  return flown_ && inputs_.disarmed && *inputs_.disarmed - *flown_ > world::kMostAge.status;
 }
 
 bool Mission::KnowsHome() const {

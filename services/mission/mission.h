@@ -66,6 +66,7 @@ class Mission {
   bool PoseIsLost(double t) const;
   bool IsUp() const;
   bool IsNotFlown(double t) const;
+  bool IsLandedByAutopilot() const;
   bool IsHome() const;
   bool KnowsHome() const;
   std::string Overridden(State to) const;
@@ -89,7 +90,8 @@ class Mission {
   std::string refusal_;           // what the autopilot said of a take-off that was called off
   std::vector<Event> overruled_;  // breaches in which `stop` was commanded
   double since_ = 0.0;
-  double taken_off_ = 0.0;  // when that was commanded, s
+  double taken_off_ = 0.0;       // when that was commanded, s
+  std::optional<double> flown_;  // since when control has flown, s
   bool began_ = false;
   State before_ = State::kHold;           // the emergency
   double last_usable_ = -1e9;             // pose, s

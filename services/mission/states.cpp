@@ -52,6 +52,8 @@ std::vector<Row> Rows() {
       {ground,   E::kMotorsOff, S::kDone, "motors are off"},
       {above,    E::kMotorsOff, S::kDone, "motors are off"},
       {{S::kLand, S::kEmergency}, E::kMotorsOff, S::kDone, "landed: motors are off"},
+      {flies,           E::kDisarmed, S::kDone, "the autopilot has landed and disarmed"},
+      {{S::kEmergency}, E::kDisarmed, S::kDone, "the autopilot has landed and disarmed"},
 
       // The safety envelope.
       {leads,    E::kLeaving, S::kHold, "the way leads out of the geofence: holding inside"},

@@ -45,12 +45,13 @@ enum class Event {
   kPoseLost,  ///< for so long that control comes down by itself
   kPoseBack,
   kMotorsOff,
+  kDisarmed,         ///< the autopilot has landed and disarmed, whoever wanted it to
   kLeaving,          ///< what is planned leads out of the geofence
   kOutside,          ///< the body is outside
   kBatteryLow,       ///< time to return
   kBatteryCritical,  ///< time to land
 };
-inline constexpr int kEvents = 27;
+inline constexpr int kEvents = 28;
 
 struct Transition {
   State from;

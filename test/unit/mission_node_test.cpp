@@ -1,98 +1,16 @@
-#include "services/mission/mission_node.h"
-
 #include <gtest/gtest.h>
 
-#include <memory>
-#include <vector>
-
-#include "chase/command_ack_t.hpp"
-#include "chase/flight_state_t.hpp"
-#include "chase/geofence_t.hpp"
-#include "chase/health_t.hpp"
 #include "common/bus/autopilot_state.h"
 #include "common/bus/battery.h"
-#include "common/bus/convert.h"
-#include "common/bus/lockstep.h"
 #include "common/world/ages.h"
 #include "services/fcu/handshake.h"
+#include "test/unit/mission_node_bench.h"
 
 namespace chase::mission {
 namespace {
 
-constexpr int64_t kStart = 1'700'000'000'000'000;  // microseconds
-
-/// Stands in for a process: its status comes once a second by itself.
-class Silent : public bus::Node {};
-
-/// The node on an in-memory bus among stand-ins.
-class Bench {
- public:
-  /// `battery`: does the mission want to be told of one?
-  explicit Bench(MissionConfig config = {}, bool battery = false) {
-    if (!battery) config.battery_low = config.battery_critical = 0.0;
-    for (const char* name : {"prediction", "planning", "control"})
-      lockstep_.Add(name, 0, [](bus::Bus&) { return std::make_unique<Silent>(); });
-    lockstep_.Add("mission", 0,
-                  [config](bus::Bus& bus) { return std::make_unique<MissionNode>(bus, config); });
-    lockstep_.Add("listener", 0, [this](bus::Bus& bus) {
-      bus.Subscribe<flight_state_t>("FLIGHT_STATE", [this](const auto& m) { states.push_back(m); });
-      bus.Subscribe<command_ack_t>("COMMAND_ACK", [this](const auto& m) { acks.push_back(m); });
-      bus.Subscribe<health_t>("HEALTH", [this](const auto& m) { healths.push_back(m); });
-      bus.Subscribe<geofence_t>("GEOFENCE", [this](const auto& m) { fences.push_back(m); });
-      return std::make_unique<Silent>();
-    });
-    sensors_ = lockstep_.Connect();
-    operator_ = lockstep_.Connect();
-    operator_->SetIdentity({"command", "", kStart});
-  }
-
-  void Run(double seconds) {
-    for (const int64_t end = lockstep_.now() + std::llround(seconds * 1e6);
-         lockstep_.now() < end;) {
-      const int64_t t = lockstep_.now() + 20'000;
-      pose_t pose{};
-      pose.utime = t;
-      pose.orientation[0] = 1.0;
-      pose.health = health;
-      bus::Set(pose.pos, place);
-      sensors_->Publish("POSE", pose);
-      obstacles_t obstacles{};
-      obstacles.utime = t;
-      obstacles.n_cut = n_cut;
-      sensors_->Publish("OBSTACLES", obstacles);
-      target_t target{};
-      target.utime = t;
-      target.state = target_t::TRACKING;
-      sensors_->Publish("TARGET", target);
-      lockstep_.RunUntil(t);
-    }
-  }
-
-  void Command(int8_t kind, int64_t id, const std::string& vehicle = "") {
-    command_t m{};
-    m.utime = lockstep_.now();
-    m.id = id;
-    m.kind = kind;
-    operator_->SetIdentity({"command", vehicle, kStart});
-    operator_->Publish("COMMAND", m);
-    Run(0.02);
-  }
-
-  Eigen::Vector3d place = Eigen::Vector3d::Zero();  // where it stands, frame W
-  int8_t health = pose_t::HEALTH_OK;
-  int32_t n_cut = 0;  // of every list
-  bus::Lockstep lockstep_{kStart};
-  std::vector<flight_state_t> states;
-  std::vector<command_ack_t> acks;
-  std::vector<health_t> healths;
-  std::vector<geofence_t> fences;
-
- private:
-  std::unique_ptr<bus::Bus> sensors_, operator_;
-};
-
 TEST(MissionNode, SaysTenTimesASecondWhereTheFlightIsAndWhatIsMissing) {
-  Bench bench;
+  NodeBench bench;
   bench.Run(0.5);
   ASSERT_GE(bench.states.size(), 5u);
   EXPECT_EQ(bench.states.front().state, +flight_state_t::IDLE);
@@ -107,7 +25,7 @@ TEST(MissionNode, SaysTenTimesASecondWhereTheFlightIsAndWhatIsMissing) {
 }
 
 TEST(MissionNode, IsReadyAfterTenSweepsInARowForWhichOdometryWasWell) {
-  Bench bench;
+  NodeBench bench;
   bench.Run(2.0);
   ASSERT_EQ(bench.states.back().state, +flight_state_t::READY);
   bench.health = pose_t::HEALTH_DEGRADED;
@@ -125,7 +43,7 @@ TEST(MissionNode, IsReadyAfterTenSweepsInARowForWhichOdometryWasWell) {
 }
 
 TEST(MissionNode, AnswersACommandAndSaysTheNewStateAtOnce) {
-  Bench bench;
+  NodeBench bench;
   bench.Run(2.0);
   const size_t before = bench.states.size();
   bench.Command(command_t::CHASE, 1);
@@ -148,7 +66,7 @@ TEST(MissionNode, AnswersACommandAndSaysTheNewStateAtOnce) {
 TEST(MissionNode, TellsTheGeofenceInTheFrameWOnceItHasTakenOff) {
   MissionConfig config;
   config.geofence.polygon = {{-5, -5}, {5, -5}, {0, 5}};
-  Bench bench(config), free;
+  NodeBench bench(config), free;
   bench.place = {10, 20, 0.5};
   bench.Run(2.0);
   EXPECT_TRUE(bench.fences.empty());
@@ -166,7 +84,7 @@ TEST(MissionNode, TellsTheGeofenceInTheFrameWOnceItHasTakenOff) {
 }
 
 TEST(MissionNode, StartedInFlightItHearsFromControlWhereItTookOff) {
-  Bench bench;
+  NodeBench bench;
   const auto control = bench.lockstep_.Connect();
   control->SetIdentity({"control", "", kStart});
   tracking_t tracking{};
@@ -187,14 +105,14 @@ TEST(MissionNode, StartedInFlightItHearsFromControlWhereItTookOff) {
 }
 
 TEST(MissionNode, LeavesTheTargetsChoiceToPerception) {
-  Bench bench;
+  NodeBench bench;
   bench.Run(2.0);
   bench.Command(command_t::SELECT, 1);
   EXPECT_TRUE(bench.acks.empty());
 }
 
 TEST(MissionNode, KeepsWhatPerceptionWasTold) {
-  Bench bench;
+  NodeBench bench;
   std::vector<selection_t> kept;
   const auto perception = bench.lockstep_.Connect();
   bench.lockstep_.Add("reader", 0, [&kept](bus::Bus& bus) {
@@ -221,7 +139,7 @@ TEST(MissionNode, KeepsWhatPerceptionWasTold) {
 }
 
 TEST(MissionNode, CommandsToOtherVehiclesAreNotItsOwn) {
-  Bench bench;
+  NodeBench bench;
   bench.Run(2.0);
   bench.Command(command_t::TAKEOFF, 1, "eagle");
   EXPECT_TRUE(bench.acks.empty());
@@ -273,7 +191,7 @@ TEST(MissionNode, SaysWhoElseFlies) {
       return {bus::NodeReport::State::kOk, "pilot: the pilot has it; mode POSCTL, armed, in air"};
     }
   };
-  Bench bench;
+  NodeBench bench;
   bench.lockstep_.Add("fcu", 0, [](bus::Bus&) { return std::make_unique<Bridge>(); });
   bench.Run(2.0);
   EXPECT_EQ(bench.states.back().reason.find("pilot"), std::string::npos) << "on the ground";
@@ -289,7 +207,7 @@ TEST(MissionNode, ATakeOffThatTheAutopilotRefusesEndsOnTheGroundInItsWords) {
               "refused: arming was refused; mode OFFBOARD, disarmed, on ground"};
     }
   };
-  Bench bench;
+  NodeBench bench;
   bench.lockstep_.Add("fcu", 0, [](bus::Bus&) { return std::make_unique<Bridge>(); });
   bench.Run(2.0);
   bench.Command(command_t::TAKEOFF, 1);
@@ -307,7 +225,7 @@ TEST(MissionNode, IsReadyOnceABatteryIsToldOf) {
     const char* detail;
   };
   for (const char* words : {"standby: ready; battery 80 %", "standby: ready", ""}) {
-    Bench bench({}, true);
+    NodeBench bench({}, true);
     if (*words != '\0')
       bench.lockstep_.Add("fcu", 0, [words](bus::Bus&) { return std::make_unique<Bridge>(words); });
     bench.Run(2.0);
@@ -321,7 +239,7 @@ TEST(MissionNode, IsReadyOnceABatteryIsToldOf) {
 }
 
 TEST(MissionNode, HealthCountsTheLivesOfEveryProcess) {
-  Bench bench;
+  NodeBench bench;
   bench.Run(3.0);
   const auto find = [&](const std::string& name) {
     for (const process_health_t& p : bench.healths.back().processes)
@@ -344,7 +262,7 @@ TEST(MissionNode, HealthCountsTheLivesOfEveryProcess) {
 }
 
 TEST(MissionNode, WhoLooksOnIsInHealthAndNeededForNothing) {
-  Bench bench;
+  NodeBench bench;
   for (const char* name : {"viewer", "link", "recorder"})
     bench.lockstep_.Add(name, 0, [](bus::Bus&) { return std::make_unique<Silent>(); });
   bench.Run(2.5);

@@ -68,6 +68,7 @@ class Model {
       task_ = e == Event::kFlying ? State::kHold : State::kLand;
       return;
     }
+    if (e == Event::kDisarmed) off_ = true;
     if (e == Event::kPoseLost) blind_ = true;
     if (blind_) {
       if (e != Event::kPoseBack) return;
@@ -112,7 +113,9 @@ TEST(States, TheTableWalksAsTheRulesDo) {
     for (int i = 0; i < 80; ++i) {
       const auto event = static_cast<Event>(random() % kEvents);
       // Motors that are off end the walk: later steps see more of the table.
-      if ((event == Event::kMotorsOff || event == Event::kKill) && i < 10) continue;
+      const bool ends =
+          event == Event::kMotorsOff || event == Event::kDisarmed || event == Event::kKill;
+      if (ends && i < 10) continue;
       visited.emplace(state, event);
       const Transition* row = Find(state, event);
       const bool obeyed = model.Take(event);

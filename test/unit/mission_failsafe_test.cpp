@@ -1,0 +1,115 @@
+// The bridge, a stand-in for PX4 and the mission: who lands a flight that mission has not ended.
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <string>
+
+#include "test/unit/fcu_flight.h"
+#include "test/unit/mission_node_bench.h"
+
+namespace chase::mission {
+namespace {
+
+using Fcu = fcu::Handshake::State;
+
+/// The bridge with its autopilot.
+class BridgeNode : public bus::Node {
+ public:
+  BridgeNode(bus::Bus& bus, fcu::testing::Flight* flight) : bus_(bus), flight_(flight) {
+    bus.Subscribe<flight_state_t>("FLIGHT_STATE", [flight](const flight_state_t& m) {
+      flight->bridge.OnFlightState(m.state == flight_state_t::READY ||
+                                   m.state == flight_state_t::TAKEOFF);
+      flight->setpoints = m.state != flight_state_t::IDLE && m.state != flight_state_t::READY;
+      flight->motors = m.state != flight_state_t::DONE;  // as control cuts them
+    });
+  }
+  int64_t TickPeriod() const override { return 100'000; }
+  void Tick(int64_t /*utime*/) override {
+    flight_->Run(1e-6 * static_cast<double>(bus_.Now() - flight_->now()));
+  }
+  bus::NodeReport Report() const override {
+    return {bus::NodeReport::State::kOk, flight_->bridge.Words(), ""};
+  }
+
+ private:
+  bus::Bus& bus_;
+  fcu::testing::Flight* flight_;
+};
+
+/// In CHASE. Control follows its plan whoever else has the vehicle.
+class Chase {
+ public:
+  Chase() {
+    bench_.lockstep_.Add(
+        "fcu", 0, [this](bus::Bus& bus) { return std::make_unique<BridgeNode>(bus, &flight); });
+    control_ = bench_.lockstep_.Connect();
+    control_->SetIdentity({"control", "", kStart});
+    Run(2.0);
+    bench_.Command(command_t::TAKEOFF, 1);
+    Run(20.0);
+    EXPECT_EQ(flight.bridge.handshake().state(), Fcu::kFlying) << flight.bridge.Words();
+    bench_.Command(command_t::CHASE, 2);
+    Run(1.0);
+    EXPECT_EQ(state(), +flight_state_t::CHASE) << reason();
+    EXPECT_GT(flight.px4.p_WB().z(), 1.0);
+  }
+
+  void Run(double seconds) {
+    for (int i = 0; i < static_cast<int>(10.0 * seconds); ++i) {
+      tracking_t tracking{};
+      tracking.utime = bench_.lockstep_.now();
+      follows_ = follows_ || flight.bridge.handshake().state() == Fcu::kFlying;
+      tracking.following = follows_ ? tracking_t::PLAN : tracking_t::NONE;
+      control_->Publish("TRACKING", tracking);
+      bench_.place = flight.px4.p_WB();
+      bench_.Run(0.1);
+    }
+  }
+
+  int state() const { return bench_.states.back().state; }
+  std::string reason() const { return bench_.states.back().reason; }
+
+  fcu::testing::Flight flight;
+
+ private:
+  NodeBench bench_;
+  std::unique_ptr<bus::Bus> control_;
+  bool follows_ = false;
+};
+
+TEST(MissionFailsafe, AFlightThatTheAutopilotLandsEndsInDone) {
+  struct Case {
+    const char* what;
+    void (*begin)(fcu::testing::Flight*);
+    const char* words;
+  };
+  const Case cases[] = {
+      {"battery", [](fcu::testing::Flight* f) { f->px4.SetCharge(0.04); }, "failsafe: "},
+      {"link", [](fcu::testing::Flight* f) { f->link = false; }, "failsafe: the link was cut"},
+      {"poses", [](fcu::testing::Flight* f) { f->poses = false; }, "done: landed and disarmed"},
+      {"pilot", [](fcu::testing::Flight* f) { f->px4.PilotMode(fcu::kLandMode); }, "pilot: "},
+  };
+  for (const Case& c : cases) {
+    Chase chase;
+    c.begin(&chase.flight);
+    chase.Run(2.0);
+    chase.flight.link = true;
+    EXPECT_EQ(chase.state(), +flight_state_t::CHASE) << c.what << ": it is in the air";
+    chase.Run(15.0);
+    EXPECT_FALSE(chase.flight.px4.armed()) << c.what << ": " << chase.flight.bridge.Words();
+    EXPECT_EQ(chase.state(), +flight_state_t::DONE) << c.what << ": " << chase.reason();
+    EXPECT_EQ(chase.reason().find(std::string("the autopilot has landed and disarmed: ") + c.words),
+              0U)
+        << c.what << ": " << chase.reason();
+  }
+}
+
+TEST(MissionFailsafe, AFlightOfOursIsNotOverBeforeItsEnd) {
+  Chase chase;
+  chase.Run(60.0);
+  EXPECT_EQ(chase.state(), +flight_state_t::CHASE) << chase.reason();
+  EXPECT_TRUE(chase.flight.px4.armed());
+}
+
+}  // namespace
+}  // namespace chase::mission
