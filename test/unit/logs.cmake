@@ -15,6 +15,8 @@ chase_test(logs_metrics_test
   LIBS metrics nlohmann_json::nlohmann_json
   SOURCES ${CMAKE_CURRENT_LIST_DIR}/logs_metrics_test.cpp ${CMAKE_CURRENT_LIST_DIR}/logs_faults_test.cpp
           ${CMAKE_CURRENT_LIST_DIR}/logs_latency_test.cpp)
+chase_test(collision_watch_test LIBS collision_watch
+  SOURCES ${CMAKE_CURRENT_LIST_DIR}/collision_watch_test.cpp)
 chase_test(logs_report_test
   LIBS report
   SOURCES ${CMAKE_CURRENT_LIST_DIR}/logs_report_test.cpp ${CMAKE_CURRENT_LIST_DIR}/logs_moments_test.cpp)
