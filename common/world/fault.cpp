@@ -45,11 +45,13 @@ std::vector<FaultKind> MakeKinds() {
                                                     {"POSE", Needs::kNothing},
                                                     {"SCAN_REGISTERED", Needs::kSensors},
                                                     {"OBSTACLES", Needs::kNothing},
+                                                    {"UNSEEN", Needs::kSensors},
                                                     {"MAP", Needs::kSensors},
                                                     {"TARGET", Needs::kNothing},
                                                     {"PREDICTION", Needs::kNothing},
                                                     {"PLAN", Needs::kNothing},
                                                     {"ATTITUDE_SETPOINT", Needs::kNothing},
+                                                    {"TRACKING", Needs::kNothing},
                                                     {"FLIGHT_STATE", Needs::kNothing}};
   for (const auto& [channel, needs] : channels)
     kinds.push_back({"delay-" + channel, Effect::kDelay, channel, kFreeze, needs, 0.3});

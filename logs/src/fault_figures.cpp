@@ -96,6 +96,7 @@ std::vector<WatchedInput> WatchedInputs(const FlightRecord& record, const Output
   const world::MostAge& age = world::kMostAge;
   std::vector<WatchedInput> watches = {
       {"OBSTACLES", OverduesOf(record, "OBSTACLES", age.obstacles, end), {&out.brakes, &out.stops}},
+      {"UNSEEN", OverduesOf(record, "UNSEEN", age.obstacles, end), {&out.brakes, &out.stops}},
       {"POSE", OverduesOf(record, "POSE", age.pose, end), {&out.stops}},
       {"PLAN", OverduePlans(record, end), {&out.stops}},
       {"ATTITUDE_SETPOINT",

@@ -46,8 +46,9 @@ class Gatherer {
     Take(e, "FAULT", &faults_);
     Hear(e, "FLIGHT_STATE", &states_);
     if (Take(e, "TRACKING", &tracking_)) tracking_heard_.push_back(Heard(e));
-    if (obstacles_t message; Good(e, "OBSTACLES", &message))
-      heard_["OBSTACLES"].emplace_back(Heard(e), message.utime);
+    for (const char* list : {"OBSTACLES", "UNSEEN"})
+      if (obstacles_t message; Good(e, list, &message))
+        heard_[list].emplace_back(Heard(e), message.utime);
     AddSetpoint(e);
     sweeps_.Add(Heard(e), e);
     TakeLast(e, "SCENARIO", &scenario_);

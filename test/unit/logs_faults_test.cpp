@@ -128,6 +128,15 @@ TEST(Faults, AnInputThatIsLateAllAlongIsOverdueOnce) {
   EXPECT_NEAR(f.reaction_s.value(), 4.52 - 4.1, 1e-9);
 }
 
+TEST(Faults, WhatIsNotSeenMayBeTooOldWhileObstaclesAreFresh) {
+  Flown flown;
+  for (int k = 0; k <= 100; ++k) flown.Hear("UNSEEN", 0.1 * k, k > 40 && k < 70 ? 0.4 : 0.1);
+  flown.Verdict(plan_t::BRAKE, 4.5, 7.0);
+  const FaultFigures f = flown.Figures("delay-UNSEEN", 4.0, 7.0);
+  EXPECT_EQ(f.input, "UNSEEN");
+  EXPECT_NEAR(f.reaction_s.value(), 4.52 - 4.1, 1e-9);
+}
+
 TEST(Faults, SilentSetpointsAreTheAutopilots) {
   Flown flown;
   for (int k = 0; k <= 2000; ++k) flown.Hear("ATTITUDE_SETPOINT", 0.005 * k, 0.001);

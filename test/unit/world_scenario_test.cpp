@@ -131,11 +131,11 @@ TEST(Fault, EveryKindCanBeSettledAndLoadedAgain) {
 
 TEST(Fault, EveryPromisedNameIsThere) {
   for (const char* name :
-       {"kill-mission", "freeze-mission", "lidar-gap",  "lidar-dead",      "camera-blackout",
-        "camera-blur",  "exposure-jump",  "imu-spikes", "imu-bias",        "delay-LIDAR_SCAN",
-        "delay-PLAN",   "loss-5",         "loss-20",    "clock-forward",   "clock-back",
-        "gust",         "motor-80",       "hidden-4s",  "hidden-for-good", "decoy",
-        "flood",        "cpu-load",       "disk-full"})
+       {"kill-mission",    "freeze-mission", "lidar-gap",      "lidar-dead", "camera-blackout",
+        "camera-blur",     "exposure-jump",  "imu-spikes",     "imu-bias",   "delay-LIDAR_SCAN",
+        "delay-PLAN",      "delay-UNSEEN",   "delay-TRACKING", "loss-5",     "loss-20",
+        "clock-forward",   "clock-back",     "gust",           "motor-80",   "hidden-4s",
+        "hidden-for-good", "decoy",          "flood",          "cpu-load",   "disk-full"})
     EXPECT_EQ(ParseFault(name).name, name);
 }
 
