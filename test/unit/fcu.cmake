@@ -7,6 +7,7 @@ target_link_libraries(fcu_stand_in PUBLIC fcu_core simulator_px4 world)
 chase_test(fcu_test LIBS fcu_core fcu_stand_in fcu_transport bus math world
   SOURCES ${CMAKE_CURRENT_LIST_DIR}/fcu_conversions_test.cpp
           ${CMAKE_CURRENT_LIST_DIR}/fcu_parts_test.cpp ${CMAKE_CURRENT_LIST_DIR}/fcu_handshake_test.cpp
+          ${CMAKE_CURRENT_LIST_DIR}/fcu_handshake_hands_test.cpp
           ${CMAKE_CURRENT_LIST_DIR}/fcu_bridge_test.cpp ${CMAKE_CURRENT_LIST_DIR}/fcu_hands_test.cpp
           ${CMAKE_CURRENT_LIST_DIR}/fcu_failsafe_test.cpp
           ${CMAKE_CURRENT_LIST_DIR}/fcu_frame_test.cpp ${CMAKE_CURRENT_LIST_DIR}/fcu_transport_test.cpp)

@@ -17,6 +17,18 @@ namespace chase::fcu::testing {
 
 inline constexpr int64_t kFlightStart = 1'700'000'000'000'000;
 
+inline ::testing::AssertionResult Holds(const std::string& text, const std::string& part) {
+  return ::testing::AssertionResult(text.find(part) != std::string::npos) << text;
+}
+
+/// One that hovers.
+inline Setpoint Hover() {
+  Setpoint setpoint;
+  setpoint.motors = true;
+  setpoint.thrust = 9.81;
+  return setpoint;
+}
+
 /// The bridge and the stand-in on a link with a delay, in logical time; POSE is the truth, and
 /// setpoints come from a hand-written controller: climb to `height`, or nothing.
 class Flight {
@@ -45,9 +57,18 @@ class Flight {
     const int64_t end = now_ + static_cast<int64_t>(1e6 * seconds);
     while (now_ < end && !until()) Step();
   }
-  bool RunUntil(Handshake::State state, double seconds) {
-    Run(seconds, [&] { return bridge.handshake().state() == state; });
-    return bridge.handshake().state() == state;
+  bool RunUntil(Handshake::State wanted, double seconds) {
+    Run(seconds, [&] { return state() == wanted; });
+    return state() == wanted;
+  }
+  /// Until it flies, and on for `seconds`.
+  void TakeOff(double seconds) {
+    EXPECT_TRUE(RunUntil(Handshake::State::kFlying, 12.0)) << bridge.Words();
+    Run(seconds);
+  }
+  Handshake::State state() const { return bridge.handshake().state(); }
+  ::testing::AssertionResult Says(const std::string& words) const {
+    return Holds(bridge.Words(), words);
   }
   int64_t now() const { return now_; }
 
@@ -131,7 +152,7 @@ inline double Took(Flight* flight, const char* what, double most,
 }
 
 inline double Took(Flight* flight, const char* what, double most, Handshake::State state) {
-  return Took(flight, what, most, [&] { return flight->bridge.handshake().state() == state; });
+  return Took(flight, what, most, [&] { return flight->state() == state; });
 }
 
 }  // namespace chase::fcu::testing

@@ -16,8 +16,7 @@ using State = Handshake::State;
 // Odometry that begins anew in flight has another heading: the body must not turn to it.
 TEST(FcuFrame, AFrameThatTurnsInFlightTurnsNoBody) {
   Flight flight;
-  ASSERT_TRUE(flight.RunUntil(State::kFlying, 12.0));
-  flight.Run(6.0);
+  flight.TakeOff(6.0);
   double worst = 0.0, farthest = 0.0;
   const auto watch = [&] {
     worst = std::max(worst, std::abs(math::Yaw(flight.px4.R_WB())));
@@ -28,7 +27,7 @@ TEST(FcuFrame, AFrameThatTurnsInFlightTurnsNoBody) {
     ++flight.epoch;
     flight.turned = turned;
     flight.Run(5.0, watch);
-    EXPECT_EQ(flight.bridge.handshake().state(), State::kFlying) << flight.bridge.Words();
+    EXPECT_EQ(flight.state(), State::kFlying) << flight.bridge.Words();
     const auto& q = flight.px4.seen().vision->q;
     const Eigen::Quaterniond told = SwapFrames(Eigen::Quaterniond(q[0], q[1], q[2], q[3]));
     EXPECT_LT(told.angularDistance(flight.px4.R_WB()), 0.02) << "ODOMETRY turns as little";
@@ -46,8 +45,7 @@ TEST(FcuFrame, AFrameThatTurnsInFlightTurnsNoBody) {
 
 TEST(FcuFrame, NothingOfAFrameGoesOutThatCannotBeCompared) {
   Flight flight;
-  ASSERT_TRUE(flight.RunUntil(State::kFlying, 12.0));
-  flight.Run(6.0);
+  flight.TakeOff(6.0);
   const auto sent = [&] {
     const std::string words = flight.bridge.Words();
     return words.substr(words.find(" ms; "));  // how many of each
@@ -63,25 +61,22 @@ TEST(FcuFrame, NothingOfAFrameGoesOutThatCannotBeCompared) {
   flight.link = true;
   flight.Run(0.1);
   EXPECT_NE(sent(), before);
-  EXPECT_EQ(flight.bridge.handshake().state(), State::kFlying);
+  EXPECT_EQ(flight.state(), State::kFlying);
   EXPECT_EQ(flight.bridge.disagreement(), "");
 }
 
 TEST(FcuFrame, ASetpointOfTheFrameBeforeIsNotSentInTheNewOne) {
   Flight flight;
-  ASSERT_TRUE(flight.RunUntil(State::kFlying, 12.0));
-  flight.Run(5.0);
+  flight.TakeOff(5.0);
   flight.setpoints = false;
   flight.epoch = 1;
   flight.turned = 1.0;
   flight.Run(0.02);
   const int sent = flight.px4.seen().setpoints;
-  Setpoint late;
-  late.motors = true;
-  flight.bridge.OnSetpoint(late, flight.now() - 50'000, flight.now());
+  flight.bridge.OnSetpoint(Hover(), flight.now() - 50'000, flight.now());
   flight.Run(0.05);
   EXPECT_EQ(flight.px4.seen().setpoints, sent);
-  flight.bridge.OnSetpoint(late, flight.now(), flight.now());
+  flight.bridge.OnSetpoint(Hover(), flight.now(), flight.now());
   flight.Run(0.05);
   EXPECT_GT(flight.px4.seen().setpoints, sent);
 }
@@ -99,12 +94,11 @@ TEST(FcuFrame, OnTheGroundTheAutopilotTakesTheNewFrame) {
 
 TEST(FcuFrame, SaysInFlightThatTheAttitudesDiffer) {
   Flight flight;
-  ASSERT_TRUE(flight.RunUntil(State::kFlying, 12.0));
-  flight.Run(5.0);
+  flight.TakeOff(5.0);
   EXPECT_EQ(flight.bridge.disagreement(), "");
   flight.turned = 0.5;  // in the same frame
   flight.Run(0.2);
-  EXPECT_NE(flight.bridge.disagreement().find("degrees off"), std::string::npos);
+  EXPECT_TRUE(Holds(flight.bridge.disagreement(), "degrees off"));
   EXPECT_NE(flight.bridge.Words().find(flight.bridge.disagreement()), std::string::npos);
 }
 

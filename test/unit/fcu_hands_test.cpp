@@ -12,26 +12,24 @@ using State = Handshake::State;
 // PX4 refuses a plain disarming in the air.
 TEST(FcuHands, OnlyAKillCutsTheMotorsInTheAir) {
   Flight flight;
-  ASSERT_TRUE(flight.RunUntil(State::kFlying, 12.0));
-  flight.Run(5.0);
+  flight.TakeOff(5.0);
   flight.motors = false;
   flight.Run(0.5);
-  EXPECT_EQ(flight.bridge.handshake().state(), State::kLanding) << flight.bridge.Words();
+  EXPECT_EQ(flight.state(), State::kLanding) << flight.bridge.Words();
   EXPECT_TRUE(flight.px4.armed());
   ASSERT_GT(flight.px4.p_WB().z(), 0.5);
   flight.bridge.Kill();
   flight.Run(0.1);
   EXPECT_FALSE(flight.px4.armed());
   EXPECT_TRUE(flight.RunUntil(State::kDone, 1.5)) << flight.bridge.Words();
-  EXPECT_NE(flight.bridge.Words().find("killed by command"), std::string::npos);
+  EXPECT_TRUE(flight.Says("killed by command"));
 }
 
 TEST(FcuHands, AKillIsSentUntilItIsObeyed) {
   StandInOptions options;
   options.lost_acks = 1.0;
   Flight flight(options);
-  ASSERT_TRUE(flight.RunUntil(State::kFlying, 12.0));
-  flight.Run(5.0);
+  flight.TakeOff(5.0);
   flight.link = false;
   flight.bridge.Kill();
   flight.Run(0.7);
@@ -47,8 +45,7 @@ TEST(FcuHands, AKillIsNotForAPilotWhoHasItNorForTheFlightToCome) {
   flight.Run(3.0);
   flight.bridge.Kill();
   flight.setpoints = true;
-  ASSERT_TRUE(flight.RunUntil(State::kFlying, 12.0)) << flight.bridge.Words();
-  flight.Run(5.0);
+  flight.TakeOff(5.0);
   flight.px4.PilotMode({3, 0});
   ASSERT_TRUE(flight.RunUntil(State::kPilot, 2.0));
   flight.bridge.Kill();
@@ -60,8 +57,7 @@ TEST(FcuHands, AKillIsNotForAPilotWhoHasItNorForTheFlightToCome) {
 TEST(FcuHands, AKillIsNotForAPilotWhoHasJustTakenIt) {
   for (int i = 0; i < 10; ++i) {
     Flight flight;
-    ASSERT_TRUE(flight.RunUntil(State::kFlying, 12.0));
-    flight.Run(5.0 + 0.1 * i);
+    flight.TakeOff(5.0 + 0.1 * i);
     flight.px4.SetCharge(0.04);
     ASSERT_TRUE(flight.RunUntil(State::kFailsafe, 2.0));
     flight.Run(0.5);
@@ -75,15 +71,14 @@ TEST(FcuHands, AKillIsNotForAPilotWhoHasJustTakenIt) {
 
 TEST(FcuHands, AKillIsNotForAPilotOnALowBattery) {
   Flight flight;
-  ASSERT_TRUE(flight.RunUntil(State::kFlying, 12.0)) << flight.bridge.Words();
-  flight.Run(5.0);
+  flight.TakeOff(5.0);
   flight.px4.SetCharge(0.1);
   flight.Run(2.0);
   ASSERT_TRUE(flight.px4.failsafe()) << "a warning, which PX4 calls critical";
-  EXPECT_EQ(flight.bridge.handshake().state(), State::kFlying) << flight.bridge.Words();
+  EXPECT_EQ(flight.state(), State::kFlying) << flight.bridge.Words();
   flight.px4.PilotMode({3, 0});
   flight.Run(1.1);
-  EXPECT_EQ(flight.bridge.handshake().state(), State::kPilot) << flight.bridge.Words();
+  EXPECT_EQ(flight.state(), State::kPilot) << flight.bridge.Words();
   flight.bridge.Kill();
   flight.Run(3.0);
   EXPECT_TRUE(flight.px4.armed());
@@ -92,18 +87,17 @@ TEST(FcuHands, AKillIsNotForAPilotOnALowBattery) {
 
 TEST(FcuHands, ThePilotTakesItAtOnceAndForGood) {
   Flight flight;
-  ASSERT_TRUE(flight.RunUntil(State::kFlying, 12.0));
-  flight.Run(5.0);
+  flight.TakeOff(5.0);
   flight.px4.PilotMode({3, 0});
   Took(&flight, "the pilot takes over, no stream any more", 0.2, State::kPilot);
   const auto before = flight.px4.seen();
   flight.Run(20.0);
   EXPECT_EQ(flight.px4.seen().setpoints, before.setpoints);
   EXPECT_EQ(flight.px4.seen().offboard_commands, before.offboard_commands);
-  EXPECT_EQ(flight.bridge.handshake().state(), State::kPilot) << "setpoints still come";
+  EXPECT_EQ(flight.state(), State::kPilot) << "setpoints still come";
   flight.setpoints = false;
   flight.Run(5.0);
-  EXPECT_EQ(flight.bridge.handshake().state(), State::kPilot) << "still armed";
+  EXPECT_EQ(flight.state(), State::kPilot) << "still armed";
   flight.px4.PilotArms(false);
   EXPECT_TRUE(flight.RunUntil(State::kStandby, 5.0));
   flight.px4.PilotMode({3, 0});
@@ -116,13 +110,12 @@ TEST(FcuHands, IsToldWithinAMomentWhoFlies) {
   for (const bool lands : {false, true}) {
     for (int i = 0; i < 10; ++i) {
       Flight flight;
-      ASSERT_TRUE(flight.RunUntil(State::kFlying, 12.0));
-      flight.Run(5.0 + 0.1 * i);
+      flight.TakeOff(5.0 + 0.1 * i);
       if (lands) {
         flight.motors = false;
         flight.Run(1.0, [&] { return flight.px4.mode() == kLandMode; });
         flight.Run(0.5);
-        ASSERT_EQ(flight.bridge.handshake().state(), State::kLanding);
+        ASSERT_EQ(flight.state(), State::kLanding);
       }
       flight.px4.PilotMode({3, 0});
       EXPECT_TRUE(flight.RunUntil(State::kPilot, 0.2)) << flight.bridge.Words();
@@ -137,12 +130,11 @@ TEST(FcuHands, TheSticksTakeItAndALostTransmitterLands) {
   StandInOptions options;
   options.transmitter = true;
   Flight sticks(options);
-  ASSERT_TRUE(sticks.RunUntil(State::kFlying, 12.0));
-  sticks.Run(3.0);
-  EXPECT_NE(sticks.bridge.Words().find("receiver heard"), std::string::npos);
+  sticks.TakeOff(3.0);
+  EXPECT_TRUE(sticks.Says("receiver heard"));
   sticks.px4.PilotSticks(0.2);
   sticks.Run(1.5);
-  EXPECT_EQ(sticks.bridge.handshake().state(), State::kFlying) << "not far enough";
+  EXPECT_EQ(sticks.state(), State::kFlying) << "not far enough";
   sticks.px4.PilotSticks(0.6);
   EXPECT_TRUE(sticks.RunUntil(State::kPilot, 1.1)) << sticks.bridge.Words();
   const int sent = sticks.px4.seen().setpoints;
@@ -151,11 +143,10 @@ TEST(FcuHands, TheSticksTakeItAndALostTransmitterLands) {
   EXPECT_TRUE(sticks.px4.mode() == (Mode{3, 0}));
 
   Flight lost(options);
-  ASSERT_TRUE(lost.RunUntil(State::kFlying, 12.0));
-  lost.Run(3.0);
+  lost.TakeOff(3.0);
   lost.px4.options().transmitter = false;
   EXPECT_TRUE(lost.RunUntil(State::kFailsafe, 2.0)) << lost.bridge.Words();
-  EXPECT_NE(lost.bridge.Words().find("Manual control lost"), std::string::npos);
+  EXPECT_TRUE(lost.Says("Manual control lost"));
   lost.Run(10.0);
   EXPECT_FALSE(lost.px4.armed()) << "landed, though setpoints come";
 }
@@ -164,8 +155,7 @@ TEST(FcuHands, TheSticksTakeItAndALostTransmitterLands) {
 TEST(FcuHands, ALandingIsNotAskedOfAPilotWhoHasJustTakenIt) {
   for (const double before : {0.02, 0.3, 0.8}) {
     Flight flight;
-    ASSERT_TRUE(flight.RunUntil(State::kFlying, 12.0));
-    flight.Run(5.0);
+    flight.TakeOff(5.0);
     const int beats = flight.heartbeats;
     flight.Run(1.5, [&] { return flight.heartbeats > beats; });
     flight.px4.PilotMode({3, 0});
@@ -173,7 +163,7 @@ TEST(FcuHands, ALandingIsNotAskedOfAPilotWhoHasJustTakenIt) {
     flight.motors = false;
     flight.Run(5.0);
     EXPECT_TRUE(flight.px4.mode() == (Mode{3, 0})) << before;
-    EXPECT_EQ(flight.bridge.handshake().state(), State::kPilot) << flight.bridge.Words();
+    EXPECT_EQ(flight.state(), State::kPilot) << flight.bridge.Words();
   }
 }
 
@@ -183,7 +173,7 @@ TEST(FcuHands, ThePilotMayBeTheOneWhoEngages) {
   Flight flight({}, config);
   ASSERT_TRUE(flight.RunUntil(State::kStreaming, 12.0));
   flight.Run(10.0);
-  EXPECT_EQ(flight.bridge.handshake().state(), State::kStreaming);
+  EXPECT_EQ(flight.state(), State::kStreaming);
   EXPECT_EQ(flight.px4.seen().offboard_commands, 0);
   flight.px4.PilotMode(kOffboardMode);
   flight.px4.PilotArms(true);
