@@ -24,8 +24,10 @@ struct Px4Options {
   double com_disarm_land = 2.0;     ///< s on the ground after landing until it disarms
   bool loss_lands = true;           ///< COM_OBL_RC_ACT: land, otherwise hold
   double hover = 0.5;               ///< share of full thrust that balances gravity
+  int com_low_bat_act = 2;          ///< 0: warns; 2: lands below bat_crit_thr; 3: as 2 here
   double bat_low_thr = 0.15;        ///< charge below which it warns
-  double bat_emergen_thr = 0.05;    ///< charge at which it lands
+  double bat_crit_thr = 0.07;       ///< charge below which it does what com_low_bat_act says
+  double bat_emergen_thr = 0.05;    ///< charge below which it does so again
   double lost_acks = 0.0;           ///< probability
   bool starts_in_version_1 = true;  ///< of the protocol, until it hears version 2
   double drift_ppm = 30.0;          ///< of its clock
@@ -107,6 +109,8 @@ class Px4 {
   std::string Health() const;
   void WatchStream();
   void WatchTransmitter();
+  enum class Warning { kNone, kLow, kCritical, kEmergency };  // of battery_status
+  Warning WarningAt(double charge) const;
   void WatchBattery();
   void WatchLanding();
   AttitudeSetpoint OffboardDemand(const Px4Body& body) const;
@@ -138,7 +142,9 @@ class Px4 {
   std::map<Sender, Offset> offsets_;  // of those who answer TIMESYNC
   Sender vision_sender_{};            // of the last ODOMETRY
   mavlink::Mode mode_, intended_;
-  bool armed_ = false, landed_ = true, has_flown_ = false, drained_ = false;
+  bool armed_ = false, landed_ = true, has_flown_ = false;
+  Warning battery_warning_ = Warning::kNone;
+  bool drained_ = false;   // it lands for its battery, or a pilot has taken over from that
   bool silent_ = false;    // setpoints are, by which it is meant to fly
   bool unmanned_ = false;  // it flies and its transmitter is not heard any more
   std::optional<int64_t> transmitter_heard_;

@@ -1,4 +1,6 @@
 // What the autopilot does of its own accord: checks before arming, failsafes, landing.
+#include <algorithm>
+
 #include "common/mavlink/px4_mode.h"
 #include "services/simulator/px4.h"
 
@@ -15,7 +17,7 @@ double Seconds(int64_t from, int64_t to) { return 1e-6 * static_cast<double>(to 
 /// What keeps it from arming; empty: nothing.
 std::string Px4::Health() const {
   if (!options_.preflight.empty()) return options_.preflight;
-  if (body_.charge <= options_.bat_emergen_thr) return "low battery";
+  if (battery_warning_ >= Warning::kCritical) return "low battery";
   return mode_ == mavlink::kOffboardMode && !Streamed() ? "No offboard signal" : "";
 }
 
@@ -27,7 +29,7 @@ void Px4::WatchHealth() {
 }
 
 bool Px4::failsafe() const {
-  return armed_ && (silent_ || unmanned_ || body_.charge <= options_.bat_low_thr);
+  return armed_ && (silent_ || unmanned_ || battery_warning_ > Warning::kNone);
 }
 
 void Px4::WatchStream() {
@@ -63,11 +65,25 @@ void Px4::PilotSticks(double deflection) {
     Enter(mavlink::kPositionMode);
 }
 
+Px4::Warning Px4::WarningAt(double charge) const {
+  return charge < options_.bat_emergen_thr ? Warning::kEmergency
+         : charge < options_.bat_crit_thr  ? Warning::kCritical
+         : charge < options_.bat_low_thr   ? Warning::kLow
+                                           : Warning::kNone;
+}
+
+/// While it is armed the warning only grows; each that is worse than before acts anew, also where a
+/// pilot has taken over since. A return wants a position on the globe, which it has not: it lands.
 void Px4::WatchBattery() {
-  if (!armed_ || drained_ || body_.charge > options_.bat_emergen_thr) return;
+  const Warning now = WarningAt(body_.charge), before = battery_warning_;
+  battery_warning_ = armed_ ? std::max(now, before) : now;
+  if (!armed_ || battery_warning_ <= before) return;
+  static const char* const words[] = {"", "Low battery", "Critical battery",
+                                      "Emergency battery level"};
+  Say(words[static_cast<int>(battery_warning_)], battery_warning_ == Warning::kEmergency ? 0 : 2);
+  if (battery_warning_ < Warning::kCritical || options_.com_low_bat_act == 0) return;
   Enter(mavlink::kLandMode);
   drained_ = true;
-  Say("Emergency battery level, land immediately", 0);
 }
 
 void Px4::WatchLanding() {

@@ -1,6 +1,8 @@
 if(TARGET simulator_hardware)
   chase_test(simulator_px4_test LIBS simulator_hardware
-    SOURCES ${CMAKE_CURRENT_LIST_DIR}/simulator_px4_test.cpp)
+    SOURCES ${CMAKE_CURRENT_LIST_DIR}/simulator_px4_test.cpp
+            ${CMAKE_CURRENT_LIST_DIR}/simulator_px4_battery_test.cpp
+            ${CMAKE_CURRENT_LIST_DIR}/simulator_udp_test.cpp)
 endif()
 
 # The simulator's devices and the drivers that read them.

@@ -1,120 +1,16 @@
-#include <arpa/inet.h>
 #include <gtest/gtest.h>
-#include <sys/socket.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <limits>
-#include <map>
-#include <optional>
 
-#include "common/mavlink/framing.h"
-#include "services/simulator/px4.h"
-#include "services/simulator/udp_socket.h"
+#include "simulator_px4_link.h"
 
-namespace chase::simulator {
+namespace chase::simulator::testing {
 namespace {
 
-namespace mav = mavlink::mav;
-
-constexpr int64_t kStart = 1'700'000'000'000'000;  // us
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
-
-/// The autopilot and those who write to it.
-class Link {
- public:
-  Link() : px4_(Options(), kStart, 1) {}
-
-  template <class M>
-  void Send(const M& message, uint8_t system = 1, uint8_t component = 191) {
-    mavlink::FrameWriter writer(system, component);
-    px4_.Receive(now_, now_, writer.Write(now_, message));
-  }
-
-  /// Setpoints that arrive every `period` us and are looked at every 20 ms.
-  void Setpoints(int count, int64_t period) {
-    mav::SetAttitudeTarget m;
-    m.q = {1.0f, 0.0f, 0.0f, 0.0f};
-    m.target_system = 1;
-    mavlink::FrameWriter writer(1, 191);
-    for (int i = 0; i < count; ++i) {
-      const int64_t arrival = now_ += period;
-      const int64_t clock = (arrival / 20'000 + 1) * 20'000;
-      px4_.Tick(clock, clock, {});
-      px4_.Receive(arrival, clock, writer.Write(now_, m));
-    }
-  }
-
-  /// Messages of each type that it sends in a second.
-  std::map<uint32_t, int> Second() { return Seconds(1.0); }
-  std::map<uint32_t, int> Seconds(double seconds) {
-    std::map<uint32_t, int> count;
-    mavlink::FrameReader reader;
-    for (int i = 0; i < static_cast<int>(400.0 * seconds); ++i, now_ += 2'500) {
-      px4_.Tick(now_, now_, body);
-      for (const auto& bytes : px4_.TakeOutgoing())
-        reader.Add(now_, bytes.data(), bytes.size(), [&](const mavlink::Frame& f) {
-          ++count[f.id];
-          if (const auto m = mavlink::As<mav::Heartbeat>(f))
-            status_ = static_cast<mav::MavState>(m->system_status);
-          if (const auto m = mavlink::As<mav::RcChannels>(f)) channels_ = m->chancount;
-          if (const auto m = mavlink::As<mav::CommandAck>(f))
-            result_ = static_cast<mav::MavResult>(m->result);
-        });
-    }
-    return count;
-  }
-
-  /// The answer to a command; none: there was none.
-  std::optional<mav::MavResult> Command(mav::MavCmd command, float p1, float p2, float p3 = 0.0f) {
-    mav::CommandLong m;
-    m.command = static_cast<uint16_t>(command);
-    m.target_system = m.target_component = 1;
-    m.param1 = p1, m.param2 = p2, m.param3 = p3;
-    result_.reset();
-    Send(m);
-    Second();
-    return result_;
-  }
-  std::optional<mav::MavResult> Ask(float id, float interval) {
-    return Command(mav::MavCmd::SET_MESSAGE_INTERVAL, id, interval);
-  }
-
-  /// A companion whose clock is `ahead` us of the host's answers to TIMESYNC.
-  void Answer(uint8_t system, uint8_t component, int64_t ahead, int answers = 500) {
-    for (int i = 0; i < answers; ++i)
-      Send(mav::Timesync{1000 * (now_ + ahead), 1000 * px4_.Clock(now_), 0, 0}, system, component);
-  }
-
-  /// What its last heartbeat says of itself, a moment from now.
-  mav::MavState Status() {
-    Second();
-    return status_;
-  }
-  /// The channels of a receiver that it told last.
-  int channels() const { return channels_; }
-
-  Px4& px4() { return px4_; }
-  int64_t now() const { return now_; }
-
-  Px4Body body;
-
- private:
-  static Px4Options Options() {
-    Px4Options options;
-    options.starts_in_version_1 = false;
-    return options;
-  }
-
-  Px4 px4_;
-  int64_t now_ = kStart;
-  int channels_ = -1;
-  mav::MavState status_{};
-  std::optional<mav::MavResult> result_;
-};
 
 const auto kImu = static_cast<float>(mav::HighresImu::kId);
 
@@ -186,24 +82,6 @@ TEST(Px4, TakesTheModesThatAPilotFlies) {
     EXPECT_EQ(link.Command(mav::MavCmd::DO_SET_MODE, 1.0f, main, 0.0f), mav::MavResult::ACCEPTED);
     EXPECT_EQ(link.px4().mode().main, main);
   }
-}
-
-// Commander publishes a failsafe for a warning, too, and until its cause has gone.
-TEST(Px4, CallsItselfCriticalWhileTheCauseOfAFailsafeLasts) {
-  Link link;
-  link.px4().PilotArms(true);
-  EXPECT_EQ(link.Status(), mav::MavState::ACTIVE);
-  link.body.charge = 0.1;
-  EXPECT_EQ(link.Status(), mav::MavState::CRITICAL) << "a warning";
-  EXPECT_TRUE(link.px4().mode() == mavlink::kPositionMode);
-  link.body.charge = 0.04;
-  EXPECT_EQ(link.Status(), mav::MavState::CRITICAL);
-  EXPECT_TRUE(link.px4().mode() == mavlink::kLandMode);
-  link.px4().PilotMode(mavlink::kPositionMode);
-  EXPECT_EQ(link.Status(), mav::MavState::CRITICAL) << "the pilot has it, the battery is empty";
-  EXPECT_TRUE(link.px4().mode() == mavlink::kPositionMode);
-  link.px4().PilotArms(false);
-  EXPECT_EQ(link.Status(), mav::MavState::STANDBY);
 }
 
 // As PX4IO does: it is told of still, without channels.
@@ -369,59 +247,5 @@ TEST(Px4, BeginsAnewWithItsOwnStreamsAndNobodysClock) {
   EXPECT_FALSE(link.px4().HostTime(kStart));
 }
 
-long OpenFiles() {
-  const std::filesystem::directory_iterator files("/proc/self/fd");
-  return std::distance(begin(files), end(files));
-}
-
-/// The number of the file that is opened next.
-int NextFile() {
-  const int file = dup(STDIN_FILENO);
-  close(file);
-  return file;
-}
-
-sockaddr_in Bound(int file) {
-  sockaddr_in address{};
-  socklen_t length = sizeof address;
-  EXPECT_EQ(getsockname(file, reinterpret_cast<sockaddr*>(&address), &length), 0);
-  return address;
-}
-
-TEST(UdpSocket, LeavesNoFileOpenWhenItFails) {
-  const long before = OpenFiles();
-  EXPECT_THROW(UdpSocket("nowhere", 14540, 0), std::runtime_error);
-  {
-    const int file = NextFile();
-    const UdpSocket first("127.0.0.1", 14540, 0);
-    const int taken = ntohs(Bound(file).sin_port);
-    EXPECT_THROW(UdpSocket("127.0.0.1", 14540, taken), std::runtime_error);
-  }
-  EXPECT_EQ(OpenFiles(), before);
-}
-
-TEST(UdpSocket, KnowsHowOldADatagramIs) {
-  const int file = NextFile();
-  UdpSocket socket("127.0.0.1", 14540, 0);
-  const sockaddr_in own = Bound(file);
-  const int sender = ::socket(AF_INET, SOCK_DGRAM, 0);
-  for (int i = 0; i < 2; ++i)
-    sendto(sender, "x", 1, 0, reinterpret_cast<const sockaddr*>(&own), sizeof own);
-  close(sender);
-  usleep(30'000);
-  const auto datagrams = socket.Take(kStart);
-  ASSERT_EQ(datagrams.size(), 2u);
-  for (const Datagram& datagram : datagrams) EXPECT_GE(datagram.age, 30'000);
-}
-
-TEST(UdpSocket, HearsTheLoopbackAloneWhereItSendsThere) {
-  const int file = NextFile();
-  for (const auto& [host, own] : std::map<const char*, in_addr_t>{{"127.0.0.1", INADDR_LOOPBACK},
-                                                                  {"192.0.2.1", INADDR_ANY}}) {
-    const UdpSocket socket(host, 14540, 0);
-    EXPECT_EQ(ntohl(Bound(file).sin_addr.s_addr), own) << host;
-  }
-}
-
 }  // namespace
-}  // namespace chase::simulator
+}  // namespace chase::simulator::testing
