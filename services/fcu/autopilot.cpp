@@ -8,8 +8,10 @@
 namespace chase::fcu {
 namespace {
 
-constexpr uint8_t kComponent = 1;       // MAV_COMP_ID_AUTOPILOT1
-constexpr std::size_t kMostChecks = 4;  // that are remembered
+constexpr uint8_t kComponent = 1;  // MAV_COMP_ID_AUTOPILOT1
+// That are remembered: checks that fail, and what was said together.
+constexpr std::size_t kMostChecks = 4, kMostWarnings = 3;
+constexpr int64_t kTogether = 1'000'000;  // us between one and the next
 // s: of what comes once a second where it has not been asked for.
 constexpr double kStateAge = 2.5;
 
@@ -20,6 +22,12 @@ bool Has(uint8_t bits, E flag) {
 
 bool IsOld(int64_t heard, int64_t utime) {
   return 1e-6 * static_cast<double>(utime - heard) > kStateAge;
+}
+
+void AddLast(const std::string& text, std::size_t most, std::deque<std::string>* texts) {
+  texts->erase(std::remove(texts->begin(), texts->end(), text), texts->end());
+  texts->push_back(text);
+  if (texts->size() > most) texts->pop_front();
 }
 
 }  // namespace
@@ -76,17 +84,13 @@ void Autopilot::TakeState(const Frame& frame, int64_t utime) {
 }
 
 /// PX4 says once which check fails, when it does; a refusal much later is "resolve system health
-/// failures first".
+/// failures first". In flight it says the cause first, then "Failsafe activated".
 void Autopilot::TakeText(const StatusText& text, int64_t utime) {
-  if (armed() || text.text.rfind("Preflight Fail", 0) != 0) {
-    warning_ = text;
-    warning_utime_ = utime;
-    return;
-  }
-  auto& checks = failed_checks_;
-  checks.erase(std::remove(checks.begin(), checks.end(), text.text), checks.end());
-  checks.push_back(text.text);
-  if (checks.size() > kMostChecks) checks.pop_front();
+  if (!armed() && text.text.rfind("Preflight Fail", 0) == 0)
+    return AddLast(text.text, kMostChecks, &failed_checks_);
+  if (utime - warning_utime_ > kTogether) warnings_.clear();
+  AddLast(text.text, kMostWarnings, &warnings_);
+  warning_utime_ = utime;
 }
 
 double Autopilot::silence(int64_t utime) const {
@@ -137,8 +141,10 @@ std::string Autopilot::Unfit() const {
 
 std::string Autopilot::Warning(int64_t utime, double seconds) const {
   const bool recent = 1e-6 * static_cast<double>(utime - warning_utime_) <= seconds;
-  std::string words = warning_utime_ != 0 && recent ? warning_.text : "";
-  for (const std::string& check : failed_checks_) words += (words.empty() ? "" : ", ") + check;
+  std::string words;
+  const auto add = [&](const std::string& text) { words += (words.empty() ? "" : ", ") + text; };
+  if (recent) std::for_each(warnings_.begin(), warnings_.end(), add);
+  std::for_each(failed_checks_.begin(), failed_checks_.end(), add);
   return words;
 }
 

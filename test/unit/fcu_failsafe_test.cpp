@@ -148,12 +148,13 @@ TEST(FcuFailsafe, ABridgeThatBeganAnewTrustsNoHeartbeatOfBefore) {
   EXPECT_GE(borne, 5) << "restarts that the flight outlives";
 }
 
-TEST(FcuFailsafe, AnEmptyBatteryLandsAndIsNoFlightAfterwards) {
+TEST(FcuFailsafe, ACriticalBatteryLandsAndIsNoFlightAfterwards) {
   Flight flight;
   flight.TakeOff(5.0);
-  flight.px4.SetCharge(0.04);
-  Took(&flight, "battery empty, the autopilot lands and the bridge lets it", 3.0, State::kFailsafe);
-  EXPECT_TRUE(flight.Says("Emergency battery level"));
+  flight.px4.SetCharge(0.06);
+  Took(&flight, "battery critical, the autopilot lands and the bridge lets it", 3.0,
+       State::kFailsafe);
+  EXPECT_TRUE(flight.Says("Critical battery"));
   EXPECT_TRUE(flight.px4.mode() == kLandMode);
   flight.Run(12.0);
   EXPECT_FALSE(flight.px4.armed()) << "landed and disarmed, with the setpoints still coming";

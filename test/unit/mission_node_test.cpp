@@ -150,7 +150,7 @@ TEST(MissionNode, CommandsToOtherVehiclesAreNotItsOwn) {
 TEST(Battery, IsReadBehindTheAutopilotsOwnWords) {
   status_t status{};
   status.name = "fcu";
-  status.detail = "failsafe: Emergency battery level, land immediately; POSCTL, armed, battery 7 %";
+  status.detail = "failsafe: Critical battery, Failsafe activated; POSCTL, armed, battery 7 %";
   EXPECT_EQ(bus::BatteryIn(status), 0.07);
   status.detail = "failsafe: low battery level";
   EXPECT_FALSE(bus::BatteryIn(status));
