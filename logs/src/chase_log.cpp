@@ -15,6 +15,7 @@
 #include "logs/src/diff.h"
 #include "logs/src/export.h"
 #include "logs/src/flight_samples.h"
+#include "logs/src/identified_files.h"
 #include "logs/src/identify.h"
 #include "logs/src/import.h"
 #include "logs/src/info.h"
@@ -29,7 +30,7 @@ using namespace chase::logs;
 constexpr std::chrono::milliseconds kProgressPeriod(200);
 
 struct Arguments {
-  std::string in, out, other, format, channel, config, rig;
+  std::string in, out, other, format, channel, config, rig, folder;
   std::vector<std::string> ignore, files;
   Selection selection;
   double tolerance = 0.0;
@@ -257,8 +258,16 @@ void RunIdentify(const Arguments& a) {
   if (!a.out.empty()) RequireWritable(a.out);
   const auto identified = Identify(ReadSamples(log, Progress()));
   if (!identified)
-    throw std::runtime_error(log + ": less than 5 s of it are flight by plans with a good pose");
+    throw std::runtime_error(log +
+                             ": less than 5 s of it are flight by plans with a good pose, "
+                             "half a second after each beginning left out; fly for longer");
   std::fputs(Format(*identified).c_str(), stdout);
+  if (!a.folder.empty()) {
+    const auto flown_by = Describe(log).configurations;
+    const auto fcu = flown_by.find("fcu");
+    std::fputs(UpdateFiles(*identified, fcu == flown_by.end() ? "" : fcu->second, a.folder).c_str(),
+               stdout);
+  }
   if (a.out.empty()) return;
   const std::string text = ControlFile(*identified, log, a.config);
   if (text.empty())
@@ -275,6 +284,9 @@ void AddIdentify(CLI::App* app, Arguments* a) {
                   "file to write for chase-control --config: what the flight shows");
   sub->add_option("--config", a->config,
                   "control's file today: an axis whose drag the flight does not show is kept");
+  sub->add_option("--update", a->folder,
+                  "folder of control.yaml and fcu.yaml, such as /etc/chase: sets there what the "
+                  "flight shows, all else stays");
   sub->callback([a] { RunIdentify(*a); });
 }
 

@@ -6,11 +6,14 @@
 #include <cmath>
 #include <vector>
 
-#include "common/config/config.h"
-#include "services/control/control_config.h"
+#include "services/fcu/conversions.h"
 
 namespace chase::logs {
 namespace {
+
+using config::Change;
+
+constexpr char kBy[] = "by chase-log identify";
 
 // Twice the uncertainty may cost control 0.03 m, a quarter of its tracking tube: by its
 // position_gain of 6 1/s^2 that is an acceleration of 0.18 m/s^2.
@@ -101,30 +104,60 @@ std::string Format(const Identification& i) {
   return text;
 }
 
-std::string ControlFile(const Identification& i, const std::string& origin,
-                        const std::string& present) {
+std::vector<Change> SetInControl(const Identification& i, bool keeps,
+                                 control::ControlConfig* config) {
   const Parameter horizontal = LevelDrag(i);
   const bool level = Shown(horizontal, kDragEnough);
   const bool vertical = Shown(i.drag_vertical, kDragEnough);
+  std::vector<Change> changes;
+  if (keeps ? level || vertical : level && vertical) {
+    if (level) config->drag.head<2>().setConstant(Rounded(horizontal.value, 0.0, 5.0));
+    if (vertical) config->drag.z() = Rounded(i.drag_vertical.value, 0.01, 5.0);
+    changes.push_back(
+        {"drag", fmt::format("[{}, {}, {}]", config->drag.x(), config->drag.y(), config->drag.z()),
+         fmt::format("{}: 1/s, x and y {}, z {}; along B, taken for W", kBy,
+                     level ? PlusMinus(horizontal) : "as before",
+                     vertical ? PlusMinus(i.drag_vertical) : "as before")});
+  }
+  if (Shown(i.lead, kTimeEnough)) {
+    config->lead = Rounded(i.lead.value, 0.0, 0.3);
+    changes.push_back({"lead", fmt::format("{}", config->lead),
+                       fmt::format("{}: s, {}", kBy, PlusMinus(i.lead))});
+  }
+  return changes;
+}
+
+// With f(u) = c u^2 + (1 - c) u (fcu::ThrustShare): at the hover h f(h) gives gravity, and
+// u f'(u) / f(u) = 1 + c u / (1 - c + c u) is the relative change of thrust per relative change of
+// command. The vehicle's share adds its own curvature to 1; the new h and c give both.
+std::vector<Change> SetInFcu(const Identification& i, fcu::FcuConfig* config) {
+  if (!Shown(i.thrust_scale, kScaleEnough)) return {};
+  const double c = config->motor_curve;
+  const double h = fcu::ThrustShare(i.hover_thrust.value, config->hover_thrust, c);
+  config->hover_thrust = Rounded(h, 0.0, 1.0);
+  std::vector<Change> changes = {
+      {"hover_thrust", fmt::format("{}", config->hover_thrust),
+       fmt::format("{}: {}", kBy, PlusMinus({h, h * i.thrust_scale.sigma}))}};
+  if (!Shown(i.thrust_curvature, kCurvatureEnough)) return changes;
+  const double slope = 1.0 + c * h / (1.0 - c + c * h);
+  const double beyond = (1.0 + i.thrust_curvature.value) * slope - 1.0;
+  config->motor_curve = beyond > 0.0 ? Rounded(beyond / (h + beyond * (1.0 - h)), 0.0, 1.0) : 0.0;
+  changes.push_back(
+      {"motor_curve", fmt::format("{}", config->motor_curve), fmt::format("{}", kBy)});
+  return changes;
+}
+
+std::string ControlFile(const Identification& i, const std::string& origin,
+                        const std::string& present) {
   control::ControlConfig config;
   if (!present.empty()) config::Load(present, &config);
-  std::string text;
-  if (present.empty() ? level && vertical : level || vertical) {
-    if (level) config.drag.head<2>().setConstant(Rounded(horizontal.value, 0.0, 5.0));
-    if (vertical) config.drag.z() = Rounded(i.drag_vertical.value, 0.01, 5.0);
-    text += fmt::format("drag: [{}, {}, {}]  # 1/s; x and y {}; z {}; along B, taken for W\n",
-                        config.drag.x(), config.drag.y(), config.drag.z(),
-                        level ? PlusMinus(horizontal) : "as in " + present,
-                        vertical ? PlusMinus(i.drag_vertical) : "as in " + present);
-  }
-  if (Shown(i.lead, kTimeEnough))
-    text += fmt::format("lead: {}  # s; {}\n", Rounded(i.lead.value, 0.0, 0.3), PlusMinus(i.lead));
-  if (text.empty()) return text;
+  const auto changes = SetInControl(i, !present.empty(), &config);
+  if (changes.empty()) return "";
+  std::string text =
+      fmt::format("# From {}, {:.1f} s of flight; standard uncertainties.\n", origin, i.seconds);
+  for (const Change& c : changes) text += fmt::format("{}: {}  # {}\n", c.key, c.value, c.comment);
   config::LoadText(text, origin, &config);  // as control will read it
-  return fmt::format(
-             "# By chase-log identify from {}, {:.1f} s of flight; standard uncertainties.\n",
-             origin, i.seconds) +
-         text;
+  return text;
 }
 
 }  // namespace chase::logs

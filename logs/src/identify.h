@@ -1,8 +1,12 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
+#include "common/config/edit.h"
 #include "logs/src/identification.h"
+#include "services/control/control_config.h"
+#include "services/fcu/fcu_config.h"
 
 namespace chase::logs {
 
@@ -10,11 +14,20 @@ namespace chase::logs {
 /// flight would show it.
 std::string Format(const Identification& identified);
 
-/// What control has a parameter for and the flight shows, as a file for chase-control --config;
-/// `origin` is said in its first line. Empty: nothing. Control's drag is along the axes of W; that
-/// along B is taken for it, since a body in flight leans little. `present`: control's file today,
-/// of which the drag along an axis is kept that the flight does not show; empty: without both there
-/// is no drag. Throws what loading it throws.
+/// Sets what control has a parameter for and the flight shows. Control's drag is along the axes of
+/// W; that along B is taken for it, since a body in flight leans little. `keeps`: an axis whose
+/// drag the flight does not show keeps its own; otherwise no drag is set then.
+std::vector<config::Change> SetInControl(const Identification& identified, bool keeps,
+                                         control::ControlConfig* config);
+
+/// Sets the thrust curve of `config`, by which the flight was flown, so that chase-fcu's command
+/// gives the thrust that is asked for, and the slope at the hover. Nothing where the flight does
+/// not show the thrust; the curve stays where it does not show that.
+std::vector<config::Change> SetInFcu(const Identification& identified, fcu::FcuConfig* config);
+
+/// What SetInControl sets, as a file for chase-control --config;
+/// `origin` is said in its first line. Empty: nothing. `present`: control's file today, which keeps
+/// its drag along an axis. Throws what loading it throws.
 std::string ControlFile(const Identification& identified, const std::string& origin,
                         const std::string& present = "");
 

@@ -4,6 +4,7 @@
 
 #include "common/config/changes.h"
 #include "common/config/checksum.h"
+#include "common/config/edit.h"
 
 namespace chase::config {
 namespace {
@@ -195,6 +196,39 @@ TEST(Changes, HoldOnlyWhatDiffersAndLoadBack) {
   Outer over = base;
   over.on = false;
   EXPECT_EQ(DumpChanges(over, base), "on: false\n");
+}
+
+TEST(Config, AFileIsChangedLineByLine) {
+  const std::string file =
+      "# Ours.\n\nspeed: 2  # m/s, as measured in May\n#on: true\n#offset: [1, 2, 3]  # m\n"
+      "inner:\n  count: 4  # speed: and on: too\n";
+  Outer wanted;
+  LoadText(file, "file.yaml", &wanted);
+  wanted.speed = 2.5, wanted.on = false, wanted.gains = {0.1};
+  const std::vector<Change> changes = {{"speed", "2.5", "by a test: m/s"},
+                                       {"on", "false", "by a test: of May"},
+                                       {"gains", "[0.1]", ""}};
+  const std::string text = Edited(file, "file.yaml", wanted, changes);
+  EXPECT_EQ(
+      text,
+      "# Ours.\n\nspeed: 2.5  # m/s, as measured in May\n#on: true\non: false  # by a test: of "
+      "May\n#offset: [1, 2, 3]  # m\ninner:\n  count: 4  # speed: and on: too\ngains: [0.1]\n");
+  wanted.on = true;
+  EXPECT_NE(Edited(text, "file.yaml", wanted, {{"on", "true", "by a test: of June"}})
+                .find("\non: true  # by a test: of June\n"),
+            std::string::npos)
+      << "its own comment is written anew";
+}
+
+TEST(Config, AFileThatCannotBeChangedLineByLineIsRefused) {
+  Outer wanted;
+  wanted.speed = 2.5;
+  const std::vector<Change> changes = {{"speed", "2.5", ""}};
+  for (const std::string file : {"speed:\n  2\n", "{speed: 2}\n", "'speed': 2\n", "speed : 2\n"})
+    EXPECT_THROW(Edited(file, "file.yaml", wanted, changes), std::runtime_error) << file;
+  EXPECT_THROW(Edited("on: false\n", "file.yaml", wanted, changes), std::runtime_error)
+      << "not what is wanted";
+  EXPECT_EQ(Edited("", "file.yaml", wanted, changes), "speed: 2.5\n");
 }
 
 }  // namespace

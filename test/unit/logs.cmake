@@ -9,7 +9,8 @@ chase_test(logs_info_test
   SOURCES ${CMAKE_CURRENT_LIST_DIR}/logs_info_test.cpp)
 chase_test(logs_identify_test
   LIBS log_tools control_core config
-  SOURCES ${CMAKE_CURRENT_LIST_DIR}/logs_identify_test.cpp ${CMAKE_CURRENT_LIST_DIR}/logs_samples_test.cpp
+  SOURCES ${CMAKE_CURRENT_LIST_DIR}/logs_identify_test.cpp ${CMAKE_CURRENT_LIST_DIR}/logs_identified_files_test.cpp
+          ${CMAKE_CURRENT_LIST_DIR}/logs_samples_test.cpp
           ${CMAKE_CURRENT_LIST_DIR}/logs_regression_test.cpp)
 chase_test(logs_metrics_test
   LIBS metrics nlohmann_json::nlohmann_json

@@ -53,6 +53,12 @@ class LogTools(unittest.TestCase):
                 kept.append(event)
         return kept
 
+    @staticmethod
+    def cksum(*service):
+        dump = run(*service, "--dump-config")
+        assert dump.returncode == 0, dump.stderr
+        return subprocess.run(["cksum"], input=dump.stdout, capture_output=True, text=True, check=True).stdout.split()[0]
+
     def good(self, *arguments):
         answer = run("chase-log", *arguments)
         self.assertEqual(answer.returncode, 0, answer.stderr)
@@ -472,6 +478,37 @@ class LogTools(unittest.TestCase):
         self.assertRegex(out.read_text(), r"drag: \[0\.5, 0\.4, 0\.1\d*\]")
         answer = run("chase-control", "--config", out, "--dump-config")
         self.assertEqual(answer.returncode, 0, answer.stderr)
+
+    def test_identify_updates_what_the_services_read(self):
+        etc = self.folder / "etc"
+        etc.mkdir()
+        (etc / "control.yaml").write_text("# Ours.\n#drag: [0.25, 0.25, 0.25]  # 1/s\nposition_gain: [5, 5, 6]\n")
+        text = self.good("identify", self.log, "--update", etc)
+        self.assertIn("control.yaml: drag: [", text)
+        self.assertIn("fcu.yaml: stays", text)
+        self.assertRegex((etc / "control.yaml").read_text(),
+                         r"^# Ours\.\n#drag: .*\ndrag: \[.*\]  # by chase-log identify: .*\nposition_gain: \[5, 5, 6\]\n")
+        answer = run("chase-control", "--config", etc / "control.yaml", "--dump-config")
+        self.assertEqual(answer.returncode, 0, answer.stderr)
+        self.assertFalse((etc / "fcu.yaml").exists())
+
+        fcu = etc / "fcu.yaml"
+        fcu.write_text("link: udp  # a simulator\n")
+        status = chase.status_t()
+        status.utime, status.name = self.events[-1][0], "fcu"
+        status.version = f"0.1.0, host here, configuration {self.cksum('chase-fcu', '--config', fcu)}"
+        flown = self.folder / "by_fcu.lcm"
+        lcmlog.write(flown, [*self.events, (status.utime, "FCU_STATUS", status.encode())])
+        self.assertIn("fcu.yaml: hover_thrust: 0.5", self.good("identify", flown, "--update", etc))
+        self.assertRegex(fcu.read_text(), r"^link: udp  # a simulator\nhover_thrust: 0\.5\d*  # by chase-log identify: ")
+        self.assert_refused(run("chase-log", "identify", flown, "--update", etc), 1, "put back the file that flew")
+
+        short = self.folder / "too_short.lcm"
+        self.good("cut", self.log, short, "--to", "3")
+        before = (etc / "control.yaml").read_text()
+        self.assert_refused(run("chase-log", "identify", short, "--update", etc), 1, "less than 5 s")
+        self.assert_refused(run("chase-log", "identify", self.log, "--update", self.folder / "no"), 1, "no folder")
+        self.assertEqual((etc / "control.yaml").read_text(), before)
 
     def test_identify_says_what_it_lacks(self):
         out = self.folder / "none.yaml"
