@@ -27,7 +27,10 @@ Eigen::Matrix3d Rig::R_BC() const {
   R.col(0) = Eigen::Vector3d(0.0, -1.0, 0.0);
   R.col(2) = Eigen::Vector3d(std::cos(a), 0.0, -std::sin(a));
   R.col(1) = R.col(2).cross(R.col(0));
-  return R;
+  if (camera_roll_deg == 0.0 && camera_yaw_deg == 0.0) return R;
+  const Eigen::AngleAxisd yaw(camera_yaw_deg * M_PI / 180.0, Eigen::Vector3d::UnitZ());
+  const Eigen::AngleAxisd roll(camera_roll_deg * M_PI / 180.0, Eigen::Vector3d::UnitZ());
+  return yaw.toRotationMatrix() * R * roll.toRotationMatrix();
 }
 
 /// Where the lens shows what a pinhole shows at x, both at distance 1.

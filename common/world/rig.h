@@ -12,6 +12,7 @@ struct Rig {
   Eigen::Vector3d lidar_rpy_deg = {0.0, 0.0, 0.0};     ///< R_BL = Rz(yaw) Ry(pitch) Rx(roll)
   Eigen::Vector3d camera_position = {0.12, 0.0, 0.0};  ///< p_BC, frame B, m
   double camera_pitch_deg = 12.0;                      ///< optical axis below x_B
+  double camera_roll_deg = 0.0, camera_yaw_deg = 0.0;  ///< about that axis; then about z_B
   int width_px = 376, height_px = 240;
   double focal_px = 220.0;                          ///< fx = fy
   double center_u_px = 187.5, center_v_px = 119.5;  ///< principal point
@@ -25,6 +26,8 @@ struct Rig {
     v("lidar_rpy_deg", lidar_rpy_deg, "roll pitch yaw of the lidar in the body");
     v("camera_position", camera_position, "p_BC, m");
     v("camera_pitch_deg", camera_pitch_deg, "optical axis below the body's x");
+    v("camera_roll_deg", camera_roll_deg, "about the optical axis, clockwise");
+    v("camera_yaw_deg", camera_yaw_deg, "of the optical axis to the left of the body's x");
     v("width_px", width_px, "of the image");
     v("height_px", height_px, "of the image");
     v("focal_px", focal_px, "fx = fy");

@@ -10,6 +10,7 @@
 #include "deploy/calibrate/pictures.h"
 #include "deploy/calibrate/rig_file.h"
 #include "deploy/calibrate/sweep_picture.h"
+#include "deploy/calibrate/turns.h"
 
 namespace chase::calibrate {
 namespace {
@@ -111,6 +112,32 @@ int Lidar(const Arguments& a) {
   return 0;
 }
 
+int Imu(const Arguments& a) {
+  Require(a.board.Problem());
+  RigFile rig = LoadRig(a.rig);
+  const Turns turns = ReadTurns(a.log, a.board, rig.rig);
+  fmt::print("{} images, {} show the board, {} samples of the IMU\n", turns.images,
+             turns.seen.size(), turns.gyro.size());
+  const ImuFit fit = FitImu(turns.seen, turns.gyro);
+  Require(fit.problem);
+  constexpr double kDegree = M_PI / 180.0, kWorst = 1.0 * kDegree;
+  if (fit.rms > kWorst)
+    throw std::runtime_error(fmt::format(
+        "the camera's turns are {:.1f} degrees off the IMU's: check --square, --marker and --rig, "
+        "and that the board stood still",
+        fit.rms / kDegree));
+  rig.rig = WithCamera(rig.rig, fit.R_BC.toRotationMatrix());
+  WriteRig(a.out, rig);
+  fmt::print(
+      "camera's roll, pitch, yaw {:.2f} {:.2f} {:.2f} +- {:.2f} degrees, by {} turns that are "
+      "{:.2f} degrees off; its stamps are {:.1f} +- {:.1f} ms late: add {:.4f} to camera.yaml's "
+      "stamp_delay\n{}\n",
+      rig.rig.camera_roll_deg, rig.rig.camera_pitch_deg, rig.rig.camera_yaw_deg,
+      fit.rotation_sigma.maxCoeff() / kDegree, fit.turns, fit.rms / kDegree, 1e3 * fit.delay,
+      1e3 * fit.delay_sigma, fit.delay, a.out);
+  return 0;
+}
+
 int Check(const Arguments& a) {
   WritePicture(a.check, SweepPicture(a.log, LoadRig(a.rig).rig, a.at));
   fmt::print("{}\n", a.check);
@@ -126,10 +153,14 @@ void AddBoard(CLI::App* app, Board* board) {
       ->capture_default_str();
 }
 
-void AddOutputs(CLI::App* app, Arguments* a) {
+void AddRigs(CLI::App* app, Arguments* a) {
   app->add_option("--rig", a->rig, "YAML file with the rig so far (default: built in)");
   app->add_option("--out", a->out, "YAML file to write, for every service's --config")
       ->capture_default_str();
+}
+
+void AddOutputs(CLI::App* app, Arguments* a) {
+  AddRigs(app, a);
   app->add_option("--check", a->check, "picture to look at")->capture_default_str();
 }
 
@@ -138,9 +169,9 @@ int Run(int argc, char** argv) {
                "chase-calibrate");
   chase::config::AddVersion(&app);
   app.require_subcommand(1);
-  Arguments board, camera, lidar, check;
+  Arguments board, camera, lidar, imu, check;
   board.out = "board.png";
-  camera.out = lidar.out = "rig.yaml";
+  camera.out = lidar.out = imu.out = "rig.yaml";
   camera.check = "check-camera.png";
   check.check = "calibration.png";
   lidar.check = "check-lidar.png";
@@ -156,6 +187,13 @@ int Run(int argc, char** argv) {
   l->add_option("log", lidar.log, "LCM log with CAMERA_IMAGE and LIDAR_SCAN")->required();
   AddBoard(l, &lidar.board);
   AddOutputs(l, &lidar);
+  CLI::App* i =
+      app.add_subcommand("imu", "Rotation of the camera and delay of its stamps by the IMU.");
+  i->add_option("log", imu.log,
+                "LCM log with CAMERA_IMAGE and IMU, turned before a board that stands")
+      ->required();
+  AddBoard(i, &imu.board);
+  AddRigs(i, &imu);
   CLI::App* k = app.add_subcommand("check", "Draws a sweep's points into a frame of a log.");
   k->add_option("log", check.log, "LCM log with CAMERA_IMAGE, LIDAR_SCAN and POSE")->required();
   k->add_option("--rig", check.rig, "YAML file with the rig (default: built in)");
@@ -164,6 +202,7 @@ int Run(int argc, char** argv) {
   try {
     app.parse(argc, argv);
     if (k->parsed()) return Check(check);
+    if (i->parsed()) return Imu(imu);
     return b->parsed() ? WriteBoard(board) : c->parsed() ? Camera(camera) : Lidar(lidar);
   } catch (const CLI::Success& e) {  // --help
     return app.exit(e);

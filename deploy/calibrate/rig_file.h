@@ -15,4 +15,8 @@ using world::RigFile;
 Eigen::Isometry3d LidarInCamera(const world::Rig& rig);
 world::Rig WithLidar(world::Rig rig, const Eigen::Isometry3d& X_CL);
 
+/// The rig with the camera turned to R_BC where it is; the LiDAR moves with it, since its pose is
+/// known to the camera.
+world::Rig WithCamera(const world::Rig& rig, const Eigen::Matrix3d& R_BC);
+
 }  // namespace chase::calibrate

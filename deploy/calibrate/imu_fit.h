@@ -1,0 +1,36 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <string>
+#include <vector>
+
+namespace chase::calibrate {
+
+/// The board, which stands still, as the camera sees it at a stamp.
+struct Turned {
+  double t = 0.0;  ///< of the image, s
+  Eigen::Quaterniond R_CP = Eigen::Quaterniond::Identity();
+};
+
+struct Gyro {
+  double t = 0.0;                                    ///< s
+  Eigen::Vector3d w_WB_B = Eigen::Vector3d::Zero();  ///< as measured, rad/s
+};
+
+struct ImuFit {
+  std::string problem;  ///< why there is none; empty: there is one
+  Eigen::Quaterniond R_BC = Eigen::Quaterniond::Identity();
+  double delay = 0.0;                              ///< stamps of images after the gyro's, s
+  Eigen::Vector3d bias = Eigen::Vector3d::Zero();  ///< of the gyro, rad/s
+  double rms = 0.0;                                ///< of the turns per axis, rad
+  Eigen::Vector3d rotation_sigma = Eigen::Vector3d::Zero();  ///< about the axes of C, rad
+  double delay_sigma = 0.0;                                  ///< standard deviations
+  int turns = 0;                                             ///< that both measured
+};
+
+/// Rotation of the camera in the body and the delay of its stamps, within 0.2 s, from turns before
+/// a board that both camera and gyroscope measure: R_C = R_BC' R_B R_BC (Tsai and Lenz 1989), with
+/// the gyro's constant bias. Needs no guess; needs turns about two axes. Both in the order of time.
+ImuFit FitImu(const std::vector<Turned>& seen, const std::vector<Gyro>& gyro);
+
+}  // namespace chase::calibrate
