@@ -206,7 +206,10 @@ SeparationResult Prover::Prove(const Separation& s) {
 
 Separator::Separator(const Ball& drone, const Ball* target, double from, double to)
     : from_(from), to_(to), drone_(MakeParty(drone)) {
-  if (target) target_.emplace(MakeParty(*target));
+  if (!target) return;
+  target_.emplace(MakeParty(*target));
+  along_ = target_->mean - drone_.mean;
+  length_ = along_.squaredNorm();
 }
 
 Separator::Party Separator::MakeParty(const Ball& ball) const {
@@ -228,11 +231,7 @@ void Separator::Raise(Party* party, const Body& body) const {
 Vector3d Separator::Between(const Body& body) const {
   const Vector3d center = MeanOf(body.center, from_, to_);
   Vector3d n = drone_.mean - center;
-  if (target_) {
-    const Vector3d along = target_->mean - drone_.mean;
-    const double length = along.squaredNorm();
-    if (length > 0.0) n -= std::clamp(along.dot(n) / length, -1.0, 0.0) * along;
-  }
+  if (length_ > 0.0) n -= std::clamp(along_.dot(n) / length_, -1.0, 0.0) * along_;
   const double distance = n.norm();
   return distance > 0.0 ? Vector3d(n / distance) : Vector3d::UnitX();
 }

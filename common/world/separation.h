@@ -47,6 +47,8 @@ class Separator {
   double from_, to_;
   Party drone_;
   std::optional<Party> target_;
+  Eigen::Vector3d along_;  ///< from the drone's mean to the target's, where there is one, m
+  double length_ = 0.0;    ///< its square
 };
 
 /// The same for one body.

@@ -120,8 +120,8 @@ void ToBernstein(double* f, int terms, int n, double from, double to, double* b)
   }
 }
 
-/// A lower bound of n' p - |n| r plus the form over the sweep's interval, from its Bernstein
-/// coefficients there.
+/// A lower bound of n' p - |n| r plus the form over the sweep's interval, from Bernstein
+/// coefficients there; `b` are those of the form.
 ///
 /// Rounding: with absolute values in place of all terms, f(from + w s) has coefficients of sum at
 /// most `size`, because from + w <= 1, and the weights of the Bernstein form are at most 1; so
@@ -129,18 +129,15 @@ void ToBernstein(double* f, int terms, int n, double from, double to, double* b)
 /// `from` takes 2 n + 1 roundings, the powers of w 2 n + 1, the weights and their sum n + 3; before
 /// that a coefficient of the form takes at most 20, after it a product and four sums are left:
 /// below 105 for n <= 15. Numbers below 1e-300 may vanish.
-double RoomOf(const Vector3d& n, double length, const Sweep& sweep, const Form& form) {
-  if (sweep.degree + 1 < form.terms) return kNothing;
-  double f[kTerms], b[kTerms];
-  std::copy(form.f, form.f + form.terms, f);
-  ToBernstein(f, form.terms, sweep.degree, sweep.from, sweep.to, b);
+double RoomOf(const Vector3d& n, double length, const Sweep& sweep, double size_of_form,
+              const double* b) {
   double lowest = HUGE_VAL;
   for (int i = 0; i <= sweep.degree; ++i) {
     const double at = n.x() * sweep.points[0][i] + n.y() * sweep.points[1][i] +
                       n.z() * sweep.points[2][i] - length * sweep.points[3][i] + b[i];
     lowest = at < lowest ? at : lowest;
   }
-  const double size = form.size + std::abs(n.x()) * sweep.size[0] +
+  const double size = size_of_form + std::abs(n.x()) * sweep.size[0] +
                       std::abs(n.y()) * sweep.size[1] + std::abs(n.z()) * sweep.size[2] +
                       length * sweep.size[3];
   return size < 1e300 ? lowest - 128.0 * kRounding * size - 1e-300 : kNothing;
@@ -197,8 +194,17 @@ Rooms ProvenRooms(const Vector3d& n, const Sweep& drone, const Sweep* target, co
   AddUncertainty(n, 0.5 * (drone.from + drone.to), body, &form);
   if (!AddCurve(body.center, n, &form)) return kNone;
   const double length = n.norm();
+  double b[kTerms];
+  int degree = -1;  // of b
   const auto room_of = [&](const Sweep& sweep) {
-    const double room = RoomOf(n, length, sweep, form);
+    if (sweep.degree + 1 < form.terms) return kNothing;
+    if (sweep.degree != degree) {
+      degree = sweep.degree;
+      double f[kTerms];
+      std::copy(form.f, form.f + form.terms, f);
+      ToBernstein(f, form.terms, degree, sweep.from, sweep.to, b);
+    }
+    const double room = RoomOf(n, length, sweep, form.size, b);
     return room / length - 8.0 * kRounding * std::abs(room);  // |n| and the quotient are rounded
   };
   return {room_of(drone), target ? room_of(*target) : HUGE_VAL};

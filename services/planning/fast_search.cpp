@@ -191,7 +191,7 @@ void FastSearch::SearchGroups(const float* levels, int n_levels) {
 }
 
 void FastSearch::Drain(int max_batches) {
-  const auto later = [](const Entry& a, const Entry& b) { return a > b; };
+  const auto later = [](const Entry& a, const Entry& b) { return a.first > b.first; };
   std::make_heap(heap_.begin(), heap_.end(), later);
   for (int batch = 0; batch < max_batches && !heap_.empty(); ++batch) {
     int ids[kBatch + kPad];
