@@ -120,8 +120,8 @@ void ToBernstein(double* f, int terms, int n, double from, double to, double* b)
   }
 }
 
-/// A lower bound of n' p - |n| r plus the form over the sweep's interval, from Bernstein
-/// coefficients there; `b` are those of the form.
+/// A lower bound of n' p - |n| r plus the form over the sweep's interval; `b`: the form's Bernstein
+/// coefficients there.
 ///
 /// Rounding: with absolute values in place of all terms, f(from + w s) has coefficients of sum at
 /// most `size`, because from + w <= 1, and the weights of the Bernstein form are at most 1; so
@@ -189,6 +189,7 @@ int DegreeOf(const Ball& ball, const Body& body) {
 Rooms ProvenRooms(const Vector3d& n, const Sweep& drone, const Sweep* target, const Body& body) {
   constexpr Rooms kNone{kNothing, kNothing};
   if (!IsNormal(n) || !(body.half.minCoeff() >= 0.0) || !(body.sigmas >= 0.0)) return kNone;
+  if (target && (target->from != drone.from || target->to != drone.to)) return kNone;
   Form form;
   AddSolid(body, n, &form);
   AddUncertainty(n, 0.5 * (drone.from + drone.to), body, &form);

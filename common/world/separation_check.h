@@ -41,9 +41,9 @@ struct Rooms {
 
 /// What a separation by a plane with this normal proves about the sweeps' interval beyond the
 /// balls' radii: a lower bound of n' (p - c) - h(n) - |n| r, over |n|; negative infinity where the
-/// input is no input (a sweep that is none or of too low a degree, a normal of another length,
-/// NaN). `target`: null, then its room is infinite, or the second ball, over the same interval. In
-/// floating point with a bound on all rounding, in about 0.1 us.
+/// input is no input (a sweep that is none, of too low a degree or over another interval than the
+/// drone's, a normal of another length, NaN). `target`: null, then its room is infinite, or the
+/// second ball. In floating point with a bound on all rounding, in about 0.1 us.
 Rooms ProvenRooms(const Eigen::Vector3d& normal, const Sweep& drone, const Sweep* target,
                   const Body& body);
 /// The least of them, for balls that are not asked of other bodies.

@@ -98,6 +98,12 @@ void CheckVolume(const FlightConfigs& configs) {
         "planning: listed_within is {:g} m, where mapping lists obstacles within statics.radius "
         "{:g} m only: lower it, or raise that",
         configs.planning.listed_within, configs.mapping.statics.radius));
+  const double unseen = configs.mapping.statics.unseen;
+  if (unseen > 0.0 && unseen < world::kFlightVolume.unseen)
+    throw std::runtime_error(fmt::format(
+        "mapping: statics.unseen is {:g} m, where planning steps aside up to {:g} m and counts on "
+        "unseen places being listed there: raise it to that, or set 0 for none",
+        unseen, world::kFlightVolume.unseen));
 }
 
 /// The scenario's faults and the command line's, in this order.

@@ -13,7 +13,8 @@ namespace {
 using kernels::kBatch;
 using kernels::kPad;
 
-// Candidates that the ellipsoids let pass and the proof does not, until the search ends.
+// Candidates that the ellipsoids let pass and the proof does not, until the search gives up. With
+// 256 the longest plan of a flight in an office took 88 ms, with 64 it took 11.
 constexpr int kMostRefused = 64;
 constexpr float kSlack = 1e-4f;  // relative: costs in single precision are that good
 
@@ -37,7 +38,8 @@ class FastSearch : public Search {
     bound_ = static_cast<float>(bound - alike);
     Found found;
     found.generated = fast_.n_candidates();
-    // First the winner alone is proven. When that fails, each candidate before it is the bound.
+    // First the winner alone is proven. Where that fails, each candidate before it becomes the
+    // bound.
     int winner = -1;
     for (const bool all : {false, true}) {
       proves_all_ = all;

@@ -13,7 +13,8 @@ namespace chase::planning {
 /// 5. per batch J2, then feasibility in 8 lanes by subdivision, single precision with a margin;
 /// 6. whatever is still open is certified in double, and exactly where that does not do;
 /// 7. the bound prunes the rest; when nothing is feasible early, all are tested side by side.
-/// The winner is compared in double and certified before it is returned.
+/// The winner is compared in double and certified before it is returned. Once 64 candidates have
+/// been refused by the proof it is the best of those proven by then, -1 where there is none.
 std::unique_ptr<Search> MakeFastSearch(const PlannerConfig& config);
 std::unique_ptr<Search> MakeFastSearch(const PlannerConfig& config, const kernels::Table& table);
 

@@ -10,7 +10,7 @@
 namespace chase::planning {
 
 struct Found {
-  int index = -1;  ///< of the winner, -1: none is feasible
+  int index = -1;  ///< of the winner, -1: none is feasible, or the search gave up (fast_search.h)
   Curve plan;      ///< in power basis, as published
   Cost cost;
   int generated = 0, checked = 0, feasible = 0;

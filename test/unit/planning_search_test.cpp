@@ -70,8 +70,8 @@ TEST(FastSearch, FindsTheCertifiedWinnerWithExactVisibility) {
   ExpectSameWinner(Literal(6, 3, 5, true), Spec(5.0, 50, true), Arithmetic::kCertified, 700, 15);
 }
 
-// The ellipsoids let candidates pass that come too near to the solid's sum with the balls. Of those
-// that it refuses the search asks so many only.
+// The ellipsoids let candidates pass that come too near to the solid's sum with the balls. The
+// search gives up after 64 of them.
 TEST(FastSearch, FindsTheWinnerBeyondThoseThatTheProofRefuses) {
   PlannerConfig config = Literal(5, 3, 6, true);
   config.minkowski_sums = true;

@@ -100,6 +100,18 @@ TEST(Separation, ManyBodiesGetTheAnswersOfOne) {
   EXPECT_GT(kept, 500);
 }
 
+/// What a plane proves of a ball over one interval says nothing of the other ball over another.
+TEST(Separation, NothingIsProvenOfBallsOverTwoIntervals) {
+  const Ball ball{Eigen::RowVector3d(0.0, 0.0, 9.0), math::Polynomial::Constant(1, 0.5)};
+  Body body;
+  body.center = Eigen::RowVector3d::Zero();
+  body.half.setOnes();
+  body.kind = Body::Kind::kCylinder;
+  const Sweep early(ball, 0.0, 0.5, 0), late(ball, 0.5, 1.0, 0);
+  EXPECT_GT(ProvenRooms(Eigen::Vector3d::UnitZ(), early, &early, body).Least(), 7.0);
+  EXPECT_LT(ProvenRooms(Eigen::Vector3d::UnitZ(), early, &late, body).Least(), -1e300);
+}
+
 /// --gtest_also_run_disabled_tests --gtest_filter=*HundredThousand*: about ten minutes.
 TEST(Separation, DISABLED_HundredThousandPairs) { Expect(ProveRandomPairs(2, 100000)); }
 

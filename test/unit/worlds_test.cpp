@@ -300,6 +300,28 @@ TEST(Vehicle, IsDrawnFromTheSeedWhereverSensorsAreFlown) {
   EXPECT_FALSE(truth.battery.sags);
 }
 
+TEST(Configure, RefusesPlansThatLeadToWhereNothingIsListed) {
+  const auto problem = [](const std::string& service, const std::string& text) -> std::string {
+    world::Scenario scenario = MakeWorld("hall", 1, {});
+    scenario.services.push_back({service, text});
+    flight::FlightOptions options;
+    options.scenario_file = "world.yaml";
+    try {
+      flight::Configure(scenario, options);
+    } catch (const std::runtime_error& e) {
+      return e.what();
+    }
+    return "";
+  };
+  EXPECT_NE(problem("mapping", "statics: {band_high: 2.0}").find("band_high 2 m"),
+            std::string::npos);
+  EXPECT_NE(problem("mapping", "statics: {radius: 5.0}").find("statics.radius 5 m"),
+            std::string::npos);
+  EXPECT_NE(problem("mapping", "statics: {unseen: 2.0}").find("statics.unseen is 2 m"),
+            std::string::npos);
+  EXPECT_EQ(problem("mapping", "statics: {unseen: 0.0}"), "");
+}
+
 TEST(Worlds, UnknownKindIsRefusedWithTheKnownOnes) {
   try {
     MakeWorld("swamp", 1, {});
