@@ -152,8 +152,8 @@ def check(bus, bin_dir, service, samples):
     try:
         if (status := bus.status(service, 6.0)) is None:
             sys.exit(f"{service}: no status")
-        if heard := set(status) ^ (channels.LISTENS[service] - OF_LOGS):
-            sys.exit(f"{service}: {', '.join(sorted(heard))}: its status and test/house/channels.py do not agree")
+        if differing := set(status) ^ (channels.LISTENS[service] - OF_LOGS):
+            sys.exit(f"{service}: {', '.join(sorted(differing))}: its status and test/house/channels.py do not agree")
         light = [channel for channel in sorted(status) if len(samples[channel]) < 60000]
         for group in [light] + [[channel] for channel in sorted(status.keys() - set(light))]:
             check_group(bus, process, service, {channel: samples[channel] for channel in group})

@@ -40,9 +40,9 @@ class BridgeNode : public bus::Node {
 class Chase {
  public:
   Chase() {
-    bench_.lockstep_.Add(
+    bench_.lockstep.Add(
         "fcu", 0, [this](bus::Bus& bus) { return std::make_unique<BridgeNode>(bus, &flight); });
-    control_ = bench_.lockstep_.Connect();
+    control_ = bench_.lockstep.Connect();
     control_->SetIdentity({"control", "", kStart});
     Run(2.0);
     bench_.Command(command_t::TAKEOFF, 1);
@@ -57,7 +57,7 @@ class Chase {
   void Run(double seconds) {
     for (int i = 0; i < static_cast<int>(10.0 * seconds); ++i) {
       tracking_t tracking{};
-      tracking.utime = bench_.lockstep_.now();
+      tracking.utime = bench_.lockstep.now();
       follows_ = follows_ || flight.bridge.handshake().state() == Fcu::kFlying;
       tracking.following = follows_ ? tracking_t::PLAN : tracking_t::NONE;
       control_->Publish("TRACKING", tracking);

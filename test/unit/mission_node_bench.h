@@ -28,25 +28,24 @@ class NodeBench {
   explicit NodeBench(MissionConfig config = {}, bool battery = false) {
     if (!battery) config.battery_low = config.battery_critical = 0.0;
     for (const char* name : {"prediction", "planning", "control"})
-      lockstep_.Add(name, 0, [](bus::Bus&) { return std::make_unique<Silent>(); });
-    lockstep_.Add("mission", 0,
-                  [config](bus::Bus& bus) { return std::make_unique<MissionNode>(bus, config); });
-    lockstep_.Add("listener", 0, [this](bus::Bus& bus) {
+      lockstep.Add(name, 0, [](bus::Bus&) { return std::make_unique<Silent>(); });
+    lockstep.Add("mission", 0,
+                 [config](bus::Bus& bus) { return std::make_unique<MissionNode>(bus, config); });
+    lockstep.Add("listener", 0, [this](bus::Bus& bus) {
       bus.Subscribe<flight_state_t>("FLIGHT_STATE", [this](const auto& m) { states.push_back(m); });
       bus.Subscribe<command_ack_t>("COMMAND_ACK", [this](const auto& m) { acks.push_back(m); });
       bus.Subscribe<health_t>("HEALTH", [this](const auto& m) { healths.push_back(m); });
       bus.Subscribe<geofence_t>("GEOFENCE", [this](const auto& m) { fences.push_back(m); });
       return std::make_unique<Silent>();
     });
-    sensors_ = lockstep_.Connect();
-    operator_ = lockstep_.Connect();
+    sensors_ = lockstep.Connect();
+    operator_ = lockstep.Connect();
     operator_->SetIdentity({"command", "", kStart});
   }
 
   void Run(double seconds) {
-    for (const int64_t end = lockstep_.now() + std::llround(seconds * 1e6);
-         lockstep_.now() < end;) {
-      const int64_t t = lockstep_.now() + 20'000;
+    for (const int64_t end = lockstep.now() + std::llround(seconds * 1e6); lockstep.now() < end;) {
+      const int64_t t = lockstep.now() + 20'000;
       pose_t pose{};
       pose.utime = t;
       pose.orientation[0] = 1.0;
@@ -61,13 +60,13 @@ class NodeBench {
       target.utime = t;
       target.state = target_t::TRACKING;
       sensors_->Publish("TARGET", target);
-      lockstep_.RunUntil(t);
+      lockstep.RunUntil(t);
     }
   }
 
   void Command(int8_t kind, int64_t id, const std::string& vehicle = "") {
     command_t m{};
-    m.utime = lockstep_.now();
+    m.utime = lockstep.now();
     m.id = id;
     m.kind = kind;
     operator_->SetIdentity({"command", vehicle, kStart});
@@ -78,7 +77,7 @@ class NodeBench {
   Eigen::Vector3d place = Eigen::Vector3d::Zero();  // where it stands, frame W
   int8_t health = pose_t::HEALTH_OK;
   int32_t n_cut = 0;  // of every list
-  bus::Lockstep lockstep_{kStart};
+  bus::Lockstep lockstep{kStart};
   std::vector<flight_state_t> states;
   std::vector<command_ack_t> acks;
   std::vector<health_t> healths;

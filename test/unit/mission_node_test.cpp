@@ -85,7 +85,7 @@ TEST(MissionNode, TellsTheGeofenceInTheFrameWOnceItHasTakenOff) {
 
 TEST(MissionNode, StartedInFlightItHearsFromControlWhereItTookOff) {
   NodeBench bench;
-  const auto control = bench.lockstep_.Connect();
+  const auto control = bench.lockstep.Connect();
   control->SetIdentity({"control", "", kStart});
   tracking_t tracking{};
   tracking.utime = kStart;
@@ -114,8 +114,8 @@ TEST(MissionNode, LeavesTheTargetsChoiceToPerception) {
 TEST(MissionNode, KeepsWhatPerceptionWasTold) {
   NodeBench bench;
   std::vector<selection_t> kept;
-  const auto perception = bench.lockstep_.Connect();
-  bench.lockstep_.Add("reader", 0, [&kept](bus::Bus& bus) {
+  const auto perception = bench.lockstep.Connect();
+  bench.lockstep.Add("reader", 0, [&kept](bus::Bus& bus) {
     bus.Subscribe<selection_t>("SELECTION_KEPT", [&kept](const auto& m) { kept.push_back(m); });
     return std::make_unique<Silent>();
   });
@@ -144,7 +144,7 @@ TEST(MissionNode, CommandsToOtherVehiclesAreNotItsOwn) {
   bench.Command(command_t::TAKEOFF, 1, "eagle");
   EXPECT_TRUE(bench.acks.empty());
   EXPECT_EQ(bench.states.back().state, +flight_state_t::READY);
-  EXPECT_EQ(bench.lockstep_.bus("mission").counters().at("COMMAND").foreign, 1);
+  EXPECT_EQ(bench.lockstep.bus("mission").counters().at("COMMAND").foreign, 1);
 }
 
 TEST(Battery, IsReadBehindTheAutopilotsOwnWords) {
@@ -192,7 +192,7 @@ TEST(MissionNode, SaysWhoElseFlies) {
     }
   };
   NodeBench bench;
-  bench.lockstep_.Add("fcu", 0, [](bus::Bus&) { return std::make_unique<Bridge>(); });
+  bench.lockstep.Add("fcu", 0, [](bus::Bus&) { return std::make_unique<Bridge>(); });
   bench.Run(2.0);
   EXPECT_EQ(bench.states.back().reason.find("pilot"), std::string::npos) << "on the ground";
   bench.Command(command_t::TAKEOFF, 1);
@@ -208,7 +208,7 @@ TEST(MissionNode, ATakeOffThatTheAutopilotRefusesEndsOnTheGroundInItsWords) {
     }
   };
   NodeBench bench;
-  bench.lockstep_.Add("fcu", 0, [](bus::Bus&) { return std::make_unique<Bridge>(); });
+  bench.lockstep.Add("fcu", 0, [](bus::Bus&) { return std::make_unique<Bridge>(); });
   bench.Run(2.0);
   bench.Command(command_t::TAKEOFF, 1);
   bench.Run(2.0);
@@ -227,7 +227,7 @@ TEST(MissionNode, IsReadyOnceABatteryIsToldOf) {
   for (const char* words : {"standby: ready; battery 80 %", "standby: ready", ""}) {
     NodeBench bench({}, true);
     if (*words != '\0')
-      bench.lockstep_.Add("fcu", 0, [words](bus::Bus&) { return std::make_unique<Bridge>(words); });
+      bench.lockstep.Add("fcu", 0, [words](bus::Bus&) { return std::make_unique<Bridge>(words); });
     bench.Run(2.0);
     const bool told = std::string(words).find("battery") != std::string::npos;
     EXPECT_EQ(bench.states.back().state, told ? +flight_state_t::READY : +flight_state_t::IDLE);
@@ -250,12 +250,12 @@ TEST(MissionNode, HealthCountsTheLivesOfEveryProcess) {
   EXPECT_EQ(find("mission").name, "mission");
   EXPECT_EQ(find("planning").restarts, 0);
   EXPECT_LE(find("planning").age, 1.1);
-  bench.lockstep_.Kill("planning");
+  bench.lockstep.Kill("planning");
   bench.Run(3.0);
   EXPECT_GT(find("planning").age, 2.0);
   EXPECT_EQ(bench.states.back().state, +flight_state_t::IDLE);
   EXPECT_EQ(bench.states.back().missing.at(0).rfind("planning is", 0), 0u);
-  bench.lockstep_.Start("planning");
+  bench.lockstep.Start("planning");
   bench.Run(3.0);
   EXPECT_EQ(find("planning").restarts, 1);
   EXPECT_EQ(bench.states.back().state, +flight_state_t::READY);
@@ -264,16 +264,16 @@ TEST(MissionNode, HealthCountsTheLivesOfEveryProcess) {
 TEST(MissionNode, WhoLooksOnIsInHealthAndNeededForNothing) {
   NodeBench bench;
   for (const char* name : {"viewer", "link", "recorder"})
-    bench.lockstep_.Add(name, 0, [](bus::Bus&) { return std::make_unique<Silent>(); });
+    bench.lockstep.Add(name, 0, [](bus::Bus&) { return std::make_unique<Silent>(); });
   bench.Run(2.5);
   EXPECT_EQ(bench.healths.back().n_processes, 7);
   EXPECT_EQ(bench.states.back().state, +flight_state_t::READY);
-  for (const char* name : {"viewer", "link"}) bench.lockstep_.Kill(name);
+  for (const char* name : {"viewer", "link"}) bench.lockstep.Kill(name);
   bench.Run(4.0);
   EXPECT_EQ(bench.states.back().state, +flight_state_t::READY);
   for (const process_health_t& p : bench.healths.back().processes)
     EXPECT_EQ(p.age > world::kMostAge.status, p.name == "viewer" || p.name == "link") << p.name;
-  bench.lockstep_.Kill("recorder");
+  bench.lockstep.Kill("recorder");
   bench.Run(4.0);
   EXPECT_EQ(bench.states.back().state, +flight_state_t::IDLE);
 }
