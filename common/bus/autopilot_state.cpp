@@ -20,7 +20,8 @@ void AutopilotState::Hear(const status_t& message) {
   heard_ = message.utime;
   words_ = message.detail.substr(0, message.detail.find("; "));
   const std::string state = words_.substr(0, words_.find(": "));
-  obeys_ = state == "flying" && says(", armed, ");
+  armed_ = says(", armed, ");
+  obeys_ = state == "flying" && armed_;
   on_ground_ = says(", on ground");
   disarmed_ = says(", disarmed, on ground") ? std::optional(heard_) : std::nullopt;
   handed_over_ = std::find(kNotOurs.begin(), kNotOurs.end(), state) != kNotOurs.end();

@@ -19,6 +19,8 @@ class AutopilotState {
   /// Did it say last that it stands on the ground? That holds until it says otherwise: one that
   /// hears nothing from us stays there.
   bool IsOnGround() const { return on_ground_; }
+  /// Did it say last that it is armed, whoever flies it?
+  bool IsArmed() const { return armed_; }
   /// Did it say last that it stands there disarmed? When, us.
   std::optional<int64_t> disarmed() const { return disarmed_; }
   /// Is the flight not ours although it has begun: a pilot has it, the autopilot lands or has
@@ -31,7 +33,7 @@ class AutopilotState {
   bool IsOld(int64_t utime) const;
 
   int64_t heard_ = 0;  // 0: never
-  bool obeys_ = true, on_ground_ = false, handed_over_ = false;
+  bool obeys_ = true, on_ground_ = false, armed_ = false, handed_over_ = false;
   std::optional<int64_t> disarmed_;
   std::string words_;
 };

@@ -49,6 +49,7 @@ struct Inputs {
   std::string autopilot;             ///< what fcu says of it: state and reason
   bool handed_over = false;          ///< and that is why the flight is not ours any more
   bool on_ground = false;            ///< the autopilot says that it stands there
+  bool armed = false;                ///< the autopilot says that it is, whoever flies it
   std::optional<double> disarmed;    ///< when it said last that it stands there disarmed, s
   std::optional<double> battery;     ///< share of its charge; nothing: nobody has said
   double battery_heard = -1e9;       ///< when, s

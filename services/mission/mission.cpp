@@ -86,7 +86,7 @@ void Mission::Update(double t) {
   }
   if (inputs_.pose && inputs_.pose->usable) last_usable_ = std::max(last_usable_, inputs_.pose->t);
   missing_ = Missing(config_, inputs_, t);
-  if (!flown_ && inputs_.flying && IsAirborne(state_)) flown_ = t;
+  if (!flown_ && IsAirborne(state_) && Flies()) flown_ = t;
   NoteProgress(t);
   const std::vector<Event> breached = Breached();
   overruled_.erase(std::remove_if(overruled_.begin(), overruled_.end(),
@@ -142,7 +142,7 @@ std::vector<Event> Mission::Observed(double t) const {
   add(inputs_.motors_off, Event::kMotorsOff);
   add(IsLandedByAutopilot(), Event::kDisarmed);
   add(inputs_.landing, Event::kLanding);
-  add(inputs_.flying, Event::kFlying);
+  add(Flies(), Event::kFlying);
   events.push_back(PoseIsLost(t) ? Event::kPoseLost : Event::kPoseBack);
   events.push_back(missing_.empty() ? Event::kComplete : Event::kMissing);
   events.push_back(SeesTarget(inputs_, t) ? Event::kSeen : Event::kLost);
@@ -226,15 +226,21 @@ bool Mission::IsUp() const {
          (!KnowsHome() || pose->p.z() - home_->p.z() > 0.5 * config_.climb_height);
 }
 
+// While the autopilot is silent control follows its plan on the ground, too: a take-off that was
+// commanded here is flown once the autopilot says that it is armed. A mission that was started in
+// flight has commanded none and goes by control alone.
+bool Mission::Flies() const { return inputs_.flying && (flown_ || !taken_off_ || inputs_.armed); }
+
 // What the bridge has given up lasts until setpoints cease; its status may be that old.
 bool Mission::IsNotFlown(double t) const {
   if (!IsAirborne(state_) || flown_ || !inputs_.on_ground) return false;
-  const double waited = t - taken_off_;
+  const double waited = t - taken_off_.value_or(0.0);
   if (inputs_.handed_over) return waited > world::kMostAge.status;
   return config_.takeoff_patience > 0.0 && waited > config_.takeoff_patience;
 }
 
-// DONE cuts the motors: a word of before the flight, whose successors were lost, does not count.
+// DONE cuts the motors: "disarmed" must not count in a status that was sent before the flight, and
+// that may be the newest for as long as those after it are lost.
 bool Mission::IsLandedByAutopilot() const {
   return flown_ && inputs_.disarmed && *inputs_.disarmed - *flown_ > world::kMostAge.status;
 }

@@ -65,6 +65,7 @@ class Mission {
   std::vector<Event> Observed(double t) const;
   bool PoseIsLost(double t) const;
   bool IsUp() const;
+  bool Flies() const;
   bool IsNotFlown(double t) const;
   bool IsLandedByAutopilot() const;
   bool IsHome() const;
@@ -90,8 +91,8 @@ class Mission {
   std::string refusal_;           // what the autopilot said of a take-off that was called off
   std::vector<Event> overruled_;  // breaches in which `stop` was commanded
   double since_ = 0.0;
-  double taken_off_ = 0.0;       // when that was commanded, s
-  std::optional<double> flown_;  // since when control has flown, s
+  std::optional<double> taken_off_;  // when that was commanded, s
+  std::optional<double> flown_;      // since when control has flown, s
   bool began_ = false;
   State before_ = State::kHold;           // the emergency
   double last_usable_ = -1e9;             // pose, s

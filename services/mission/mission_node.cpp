@@ -132,6 +132,7 @@ void MissionNode::Tick(int64_t /*utime*/) {
   inputs.autopilot = autopilot_.words();
   inputs.handed_over = autopilot_.IsHandedOver();
   inputs.on_ground = autopilot_.IsOnGround();
+  inputs.armed = autopilot_.IsArmed();
   inputs.disarmed.reset();
   if (const auto said = autopilot_.disarmed()) inputs.disarmed = Seconds(*said);
   mission_.Update(Now());

@@ -77,6 +77,7 @@ TEST(Mission, WhatFliesIsNotCalledOff) {
     bench.mission.inputs().handed_over = true;
     bench.mission.inputs().on_ground = on_ground;
     bench.mission.inputs().flying = on_ground;  // in the air control may have begun anew
+    bench.mission.inputs().armed = on_ground;
     bench.Run(300.0);
     EXPECT_EQ(bench.mission.state(), State::kTakeoff) << on_ground;
   }
@@ -94,7 +95,7 @@ TEST(Mission, WhatFliesIsNotCalledOff) {
 Bench Flying() {
   Bench bench;
   bench.Fly();
-  bench.mission.inputs().flying = true;
+  bench.mission.inputs().flying = bench.mission.inputs().armed = true;
   bench.Run(3.0);
   EXPECT_TRUE(bench.Command(Event::kChase).accepted);
   bench.Run(0.2);
@@ -147,16 +148,42 @@ TEST(Mission, IsOverInEveryStateThatFliesWhereTheAutopilotHasLandedIt) {
 
 /// The motors are cut then: what PX4 has said before, and a status that is lost, must not do it.
 TEST(Mission, IsNotOverByWhatTheAutopilotSaidBeforeItFlew) {
+  for (const bool commanded : {false, true}) {  // otherwise found in flight
+    Bench bench;
+    bench.mission.inputs().disarmed = bench.t;
+    bench.mission.inputs().on_ground = true;
+    bench.Run(0.2);
+    ASSERT_TRUE(!commanded || bench.Command(Event::kTakeoff).accepted);
+    bench.Run(5.0);
+    bench.mission.inputs().disarmed = bench.t;
+    bench.mission.inputs().flying = bench.mission.inputs().armed = true;
+    bench.Run(30.0);
+    EXPECT_EQ(bench.mission.state(), commanded ? State::kTakeoff : State::kHold);
+    bench.mission.inputs().disarmed = bench.t;
+    bench.Run(0.1);
+    EXPECT_EQ(bench.mission.state(), State::kDone);
+  }
+}
+
+/// Control follows its plan also where the autopilot is not heard.
+TEST(Mission, ATakeOffIsNotFlownBeforeTheAutopilotHasArmed) {
   Bench bench;
-  bench.mission.inputs().disarmed = bench.t;
-  bench.mission.inputs().on_ground = true;
   bench.Run(0.2);
   ASSERT_TRUE(bench.Command(Event::kTakeoff).accepted);
+  bench.mission.inputs().flying = true;
   bench.Run(5.0);
   bench.mission.inputs().disarmed = bench.t;
-  bench.mission.inputs().flying = true;
-  bench.Run(30.0);
+  bench.mission.inputs().on_ground = true;
+  bench.Run(5.0);
   EXPECT_EQ(bench.mission.state(), State::kTakeoff);
+  bench.mission.inputs().handed_over = true;
+  bench.Run(5.0);
+  EXPECT_EQ(bench.mission.state(), State::kReady) << "called off";
+  bench.mission.inputs().disarmed.reset();
+  bench.mission.inputs().armed = true;
+  bench.Run(0.1);
+  EXPECT_EQ(bench.mission.state(), State::kHold) << "found in flight";
+  bench.Run(3.0);
   bench.mission.inputs().disarmed = bench.t;
   bench.Run(0.1);
   EXPECT_EQ(bench.mission.state(), State::kDone);

@@ -1,9 +1,11 @@
 // The bridge, a stand-in for PX4 and the mission: who lands a flight that mission has not ended.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <functional>
 #include <string>
 
+#include "common/bus/autopilot_state.h"
 #include "test/unit/fcu_flight.h"
 #include "test/unit/mission_node_bench.h"
 
@@ -36,29 +38,28 @@ class BridgeNode : public bus::Node {
   fcu::testing::Flight* flight_;
 };
 
-/// In CHASE. Control follows its plan whoever else has the vehicle.
-class Chase {
+/// The three of them. Control follows a plan once it is asked to fly and PX4 obeys, or does not say
+/// that it stands; and from then on whoever else has the vehicle.
+class Flown {
  public:
-  Chase() {
+  Flown() {
     bench_.lockstep.Add(
         "fcu", 0, [this](bus::Bus& bus) { return std::make_unique<BridgeNode>(bus, &flight); });
     control_ = bench_.lockstep.Connect();
     control_->SetIdentity({"control", "", kStart});
-    Run(2.0);
-    bench_.Command(command_t::TAKEOFF, 1);
-    Run(20.0);
-    EXPECT_EQ(flight.bridge.handshake().state(), Fcu::kFlying) << flight.bridge.Words();
-    bench_.Command(command_t::CHASE, 2);
-    Run(1.0);
-    EXPECT_EQ(state(), +flight_state_t::CHASE) << reason();
-    EXPECT_GT(flight.px4.p_WB().z(), 1.0);
+    bench_.lockstep.Add("reader", 0, [this](bus::Bus& bus) {
+      bus.Subscribe<status_t>("FCU_STATUS", [this](const auto& m) { autopilot_.Hear(m); });
+      return std::make_unique<Silent>();
+    });
   }
 
   void Run(double seconds) {
     for (int i = 0; i < static_cast<int>(10.0 * seconds); ++i) {
       tracking_t tracking{};
       tracking.utime = bench_.lockstep.now();
-      follows_ = follows_ || flight.bridge.handshake().state() == Fcu::kFlying;
+      const bool asked = !bench_.states.empty() && IsAirborne(static_cast<State>(state()));
+      follows_ =
+          follows_ || (asked && (autopilot_.Obeys(tracking.utime) || !autopilot_.IsOnGround()));
       tracking.following = follows_ ? tracking_t::PLAN : tracking_t::NONE;
       control_->Publish("TRACKING", tracking);
       bench_.place = flight.px4.p_WB();
@@ -66,15 +67,38 @@ class Chase {
     }
   }
 
+  void Command(int8_t kind, int64_t id) { bench_.Command(kind, id); }
   int state() const { return bench_.states.back().state; }
   std::string reason() const { return bench_.states.back().reason; }
+  bool follows() const { return follows_; }
+  /// How often FLIGHT_STATE has told that state.
+  int64_t Times(int8_t state) const {
+    return std::count_if(bench_.states.begin(), bench_.states.end(),
+                         [state](const flight_state_t& m) { return m.state == state; });
+  }
 
   fcu::testing::Flight flight;
 
  private:
   NodeBench bench_;
   std::unique_ptr<bus::Bus> control_;
+  bus::AutopilotState autopilot_;
   bool follows_ = false;
+};
+
+/// In CHASE.
+class Chase : public Flown {
+ public:
+  Chase() {
+    Run(2.0);
+    Command(command_t::TAKEOFF, 1);
+    Run(20.0);
+    EXPECT_EQ(flight.bridge.handshake().state(), Fcu::kFlying) << flight.bridge.Words();
+    Command(command_t::CHASE, 2);
+    Run(1.0);
+    EXPECT_EQ(state(), +flight_state_t::CHASE) << reason();
+    EXPECT_GT(flight.px4.p_WB().z(), 1.0);
+  }
 };
 
 TEST(MissionFailsafe, AFlightThatTheAutopilotLandsEndsInDone) {
@@ -101,6 +125,32 @@ TEST(MissionFailsafe, AFlightThatTheAutopilotLandsEndsInDone) {
     EXPECT_EQ(chase.reason().find(std::string("the autopilot has landed and disarmed: ") + c.words),
               0U)
         << c.what << ": " << chase.reason();
+  }
+}
+
+TEST(MissionFailsafe, ATakeOffThatNeverLeftTheGroundIsNotOver) {
+  for (const double silence : {3.5, 6.0}) {
+    for (const bool arms : {true, false}) {
+      Flown flown;
+      flown.flight.px4.options().preflight = "compass";
+      flown.Run(2.0);
+      flown.Command(command_t::TAKEOFF, 1);
+      for (int i = 0; i < 100 && flown.flight.bridge.handshake().state() != Fcu::kArming; ++i)
+        flown.Run(0.1);
+      ASSERT_EQ(flown.flight.bridge.handshake().state(), Fcu::kArming);
+      flown.flight.link = false;
+      flown.Run(silence);
+      EXPECT_TRUE(flown.follows()) << "control takes it to be in the air";
+      flown.flight.link = true;
+      flown.Run(3.0);
+      if (arms) flown.flight.px4.options().preflight.clear();
+      flown.Run(40.0);
+      EXPECT_EQ(flown.flight.px4.armed(), arms) << flown.flight.bridge.Words();
+      EXPECT_EQ(flown.state(), arms ? +flight_state_t::TAKEOFF : +flight_state_t::READY)
+          << silence << " s: " << flown.reason();
+      EXPECT_EQ(flown.Times(flight_state_t::DONE), 0) << silence << " s";
+      EXPECT_EQ(flown.Times(flight_state_t::HOLD), 0) << silence << " s";
+    }
   }
 }
 

@@ -185,6 +185,44 @@ TEST(AutopilotState, ReadsHandOversInTheBridgesOwnWords) {
   EXPECT_FALSE(autopilot.IsHandedOver());
 }
 
+TEST(AutopilotState, TellsWhetherItStandsDisarmed) {
+  struct Case {
+    const char* words;
+    bool disarmed, armed;
+  };
+  const Case cases[] = {
+      {"flying: armed; mode OFFBOARD, armed, on ground, battery 70 %", false, true},
+      {"pilot: the pilot has it; mode POSCTL, armed, in air", false, true},
+      {"standby: a PX4 is heard; mode POSCTL, disarmed, on ground, battery 70 %", true, false},
+      {"done: landed and disarmed; mode AUTO.LAND, disarmed, on ground", true, false},
+      {"failsafe: it has disarmed; mode AUTO.LAND, disarmed, in air", false, false},
+      {"standby: a PX4 is heard; mode POSCTL, disarmed, unknown", false, false},
+      {"no autopilot: the autopilot's heartbeat has ceased", false, false},
+      {"failsafe: it said Landed, disarmed, on ground", false, false},
+      {"failsafe: it said Landed; mode X, disarmed, on ground; mode OFFBOARD, armed, in air", false,
+       true},
+      {"failsafe: it said Up; mode X, armed, in air; mode OFFBOARD, disarmed, on ground", true,
+       false},
+  };
+  status_t status{};
+  status.utime = kStart;
+  status.name = "fcu";
+  bus::AutopilotState autopilot;
+  EXPECT_FALSE(autopilot.disarmed()) << "nobody has told";
+  for (const bool disarmed_before : {false, true}) {
+    for (const Case& c : cases) {
+      status.detail = disarmed_before ? cases[2].words : cases[0].words;
+      autopilot.Hear(status);
+      status.utime += 1'000'000;
+      status.detail = c.words;
+      autopilot.Hear(status);
+      EXPECT_EQ(autopilot.disarmed(), c.disarmed ? std::optional(status.utime) : std::nullopt)
+          << c.words;
+      EXPECT_EQ(autopilot.IsArmed(), c.armed) << c.words;
+    }
+  }
+}
+
 TEST(MissionNode, SaysWhoElseFlies) {
   struct Bridge : bus::Node {
     bus::NodeReport Report() const override {
