@@ -11,7 +11,7 @@ namespace {
 constexpr uint8_t kComponent = 1;  // MAV_COMP_ID_AUTOPILOT1
 // That are remembered: checks that fail, and what was said together.
 constexpr std::size_t kMostChecks = 4, kMostWarnings = 3;
-constexpr int64_t kTogether = 1'000'000;  // us between one and the next
+constexpr int64_t kTogether = 1'000'000;  // us after the first of them
 // s: of what comes once a second where it has not been asked for.
 constexpr double kStateAge = 2.5;
 
@@ -88,9 +88,12 @@ void Autopilot::TakeState(const Frame& frame, int64_t utime) {
 void Autopilot::TakeText(const StatusText& text, int64_t utime) {
   if (!armed() && text.text.rfind("Preflight Fail", 0) == 0)
     return AddLast(text.text, kMostChecks, &failed_checks_);
-  if (utime - warning_utime_ > kTogether) warnings_.clear();
-  AddLast(text.text, kMostWarnings, &warnings_);
-  warning_utime_ = utime;
+  if (warnings_.empty() || utime - warned_utime_ > kTogether) {
+    warnings_.clear();
+    warned_utime_ = utime;
+  }
+  const bool said = std::find(warnings_.begin(), warnings_.end(), text.text) != warnings_.end();
+  if (!said && warnings_.size() < kMostWarnings) warnings_.push_back(text.text);
 }
 
 double Autopilot::silence(int64_t utime) const {
@@ -140,7 +143,7 @@ std::string Autopilot::Unfit() const {
 }
 
 std::string Autopilot::Warning(int64_t utime, double seconds) const {
-  const bool recent = 1e-6 * static_cast<double>(utime - warning_utime_) <= seconds;
+  const bool recent = 1e-6 * static_cast<double>(utime - warned_utime_) <= seconds;
   std::string words;
   const auto add = [&](const std::string& text) { words += (words.empty() ? "" : ", ") + text; };
   if (recent) std::for_each(warnings_.begin(), warnings_.end(), add);

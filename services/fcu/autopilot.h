@@ -50,8 +50,9 @@ class Autopilot {
   /// p_WB by its own estimate, m.
   const std::optional<Eigen::Vector3d>& position() const { return position_; }
 
-  /// The last texts of severity warning or worse that were said together, no older than `seconds`,
-  /// and the checks of which it has said that they fail since it was last armed, of whatever age.
+  /// The first texts of severity warning or worse that were last said together, the first of them
+  /// no longer than `seconds` ago, and the checks of which it has said that they fail since it was
+  /// last armed, of whatever age.
   std::string Warning(int64_t utime, double seconds) const;
   /// Mode, battery, landed state, receiver in a few words, which bus::FcuState reads.
   std::string Words(int64_t utime) const;
@@ -73,8 +74,8 @@ class Autopilot {
   int channels_ = 0;       // of its receiver
   int64_t status_utime_ = 0, channels_utime_ = 0;
   StatusTexts texts_;
-  std::deque<std::string> warnings_;  // that were said together, the last said is last
-  int64_t warning_utime_ = 0;
+  std::deque<std::string> warnings_;       // that were said together, the first said is first
+  int64_t warned_utime_ = 0;               // when the first of them was said
   std::deque<std::string> failed_checks_;  // the last said is last
   std::string stranger_;
 };

@@ -224,6 +224,28 @@ TEST(FcuAutopilot, RemembersTheLastChecksThatFailedUntilItIsArmed) {
   EXPECT_EQ(autopilot.Warning(kStart + 90'000'000, 10.0), "");
 }
 
+TEST(FcuAutopilot, RemembersTheFirstTextsOfThoseSaidTogether) {
+  Autopilot autopilot(0);
+  mav::Heartbeat m;
+  m.autopilot = 12, m.base_mode = 0x80;
+  autopilot.Take(FrameOf(m), kStart);
+  const auto say = [&](const std::string& text, int64_t utime) {
+    mav::Statustext t;
+    t.severity = 2;
+    std::copy(text.begin(), text.end(), t.text.begin());
+    autopilot.Take(FrameOf(t), utime);
+  };
+  const auto said = [&](int64_t utime) { return autopilot.Warning(utime, 10.0); };
+  int64_t t = kStart;
+  for (const char* text : {"Low battery", "Failsafe activated", "Low battery", "RTL", "Landing"})
+    say(text, t += 200'000);
+  EXPECT_EQ(said(t), "Low battery, Failsafe activated, RTL") << "the cause comes first";
+  for (const char* text : {"a", "b", "c", "d"}) say(text, t += 900'000);
+  EXPECT_EQ(said(t), "c, d") << "what is said later is of another cause";
+  EXPECT_EQ(said(t + 9'000'000), "c, d");
+  EXPECT_EQ(said(t + 11'000'000), "");
+}
+
 /// One that is heard.
 Autopilot Heard() {
   Autopilot autopilot(0);
