@@ -23,10 +23,10 @@ struct Px4Options {
   bool transmitter = false;         ///< a receiver hears one
   double com_disarm_land = 2.0;     ///< s on the ground after landing until it disarms
   bool loss_lands = true;           ///< COM_OBL_RC_ACT: land, otherwise hold
+  bool low_battery_lands = true;    ///< COM_LOW_BAT_ACT 2 or 3: land, otherwise only warn
   double hover = 0.5;               ///< share of full thrust that balances gravity
-  int com_low_bat_act = 2;          ///< 0: warns; 2: lands below bat_crit_thr; 3: as 2 here
   double bat_low_thr = 0.15;        ///< charge below which it warns
-  double bat_crit_thr = 0.07;       ///< charge below which it does what com_low_bat_act says
+  double bat_crit_thr = 0.07;       ///< charge below which it lands, where it does
   double bat_emergen_thr = 0.05;    ///< charge below which it does so again
   double lost_acks = 0.0;           ///< probability
   bool starts_in_version_1 = true;  ///< of the protocol, until it hears version 2

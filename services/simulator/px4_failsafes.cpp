@@ -82,7 +82,7 @@ void Px4::WatchBattery() {
                                       "Emergency battery level"};
   Say(words[static_cast<int>(battery_warning_)], battery_warning_ == Warning::kEmergency ? 0 : 2);
   Say("Failsafe activated", 2);  // for a warning, too
-  if (battery_warning_ < Warning::kCritical || options_.com_low_bat_act == 0) return;
+  if (battery_warning_ < Warning::kCritical || !options_.low_battery_lands) return;
   Enter(mavlink::kLandMode);
   drained_ = true;
 }

@@ -32,25 +32,22 @@ mavlink::Mode ModeAt(double charge, Link* link) {
 
 // COM_LOW_BAT_ACT 3 returns at BAT_CRIT_THR; without a position on the globe it lands there.
 TEST(Px4, LandsAtTheChargeThatItsParametersSay) {
-  for (const int act : {2, 3}) {
-    for (const double critical : {0.07, 0.12}) {
-      Link link;
-      link.px4().options().com_low_bat_act = act;
-      link.px4().options().bat_crit_thr = critical;
-      link.px4().PilotArms(true);
-      EXPECT_TRUE(ModeAt(critical + 0.01, &link) == mavlink::kPositionMode) << act << critical;
-      EXPECT_TRUE(ModeAt(critical - 0.01, &link) == mavlink::kLandMode) << act << critical;
-      link.px4().PilotMode(mavlink::kPositionMode);
-      EXPECT_TRUE(ModeAt(0.055, &link) == mavlink::kPositionMode) << "the pilot has it";
-      EXPECT_TRUE(ModeAt(0.04, &link) == mavlink::kLandMode) << "worse than when he took it";
-    }
+  for (const double critical : {0.07, 0.12}) {
+    Link link;
+    link.px4().options().bat_crit_thr = critical;
+    link.px4().PilotArms(true);
+    EXPECT_TRUE(ModeAt(critical + 0.01, &link) == mavlink::kPositionMode) << critical;
+    EXPECT_TRUE(ModeAt(critical - 0.01, &link) == mavlink::kLandMode) << critical;
+    link.px4().PilotMode(mavlink::kPositionMode);
+    EXPECT_TRUE(ModeAt(0.055, &link) == mavlink::kPositionMode) << "the pilot has it";
+    EXPECT_TRUE(ModeAt(0.04, &link) == mavlink::kLandMode) << "worse than when he took it";
   }
 }
 
 // COM_LOW_BAT_ACT 0, as PX4 has it.
 TEST(Px4, OnlyWarnsOfAnEmptyBatteryWhereItsParametersSaySo) {
   Link link;
-  link.px4().options().com_low_bat_act = 0;
+  link.px4().options().low_battery_lands = false;
   link.px4().PilotArms(true);
   EXPECT_TRUE(ModeAt(0.01, &link) == mavlink::kPositionMode);
   EXPECT_EQ(link.Status(), mav::MavState::CRITICAL);
