@@ -25,7 +25,8 @@ std::size_t Find(const Lines& lines, const std::string& head) {
 
 std::string CommentOf(const std::string& line) {
   const std::size_t at = line.find(" #");
-  return at == std::string::npos ? "" : line.substr(line.find_first_not_of(" #", at));
+  const std::size_t first = at == std::string::npos ? at : line.find_first_not_of(" #", at);
+  return first == std::string::npos ? "" : line.substr(first);
 }
 
 std::string LineOf(const Change& change, const std::string& comment) {
@@ -39,7 +40,8 @@ std::string Edited(std::string text, const Change& change) {
   if (const std::size_t at = Find(lines, change.key + ":"); at < lines.size()) {
     const std::string own = change.comment.substr(0, change.comment.find(':'));
     const std::string old = CommentOf(lines[at]);
-    lines[at] = LineOf(change, old.empty() || Begins(old, own) ? change.comment : old);
+    const bool anew = old.empty() || (!own.empty() && Begins(old, own));
+    lines[at] = LineOf(change, anew ? change.comment : old);
   } else {
     std::size_t below = Find(lines, "#" + change.key + ":");
     if (below == lines.size()) below = Find(lines, "# " + change.key + ":");

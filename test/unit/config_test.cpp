@@ -220,6 +220,19 @@ TEST(Config, AFileIsChangedLineByLine) {
       << "its own comment is written anew";
 }
 
+TEST(Config, ALinesCommentStaysUnlessItIsTheChangesOwn) {
+  Outer wanted;
+  wanted.speed = 2.5;
+  const auto edited = [&](const std::string& file, const std::string& comment) {
+    return Edited(file, "file.yaml", wanted, {{"speed", "2.5", comment}});
+  };
+  for (const std::string file : {"speed: 2  #\n", "speed: 2 # \n", "speed: 2  ##\n"}) {
+    EXPECT_EQ(edited(file, ""), "speed: 2.5\n") << file;
+    EXPECT_EQ(edited(file, "by a test: m/s"), "speed: 2.5  # by a test: m/s\n") << file;
+  }
+  EXPECT_EQ(edited("speed: 2  # as measured\n", ""), "speed: 2.5  # as measured\n");
+}
+
 TEST(Config, AFileThatCannotBeChangedLineByLineIsRefused) {
   Outer wanted;
   wanted.speed = 2.5;
