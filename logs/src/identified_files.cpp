@@ -77,6 +77,8 @@ std::string UpdateFiles(const Identification& i, const std::string& flown_by,
     throw std::runtime_error("the flight shows nothing that control or fcu has; " + folder +
                              " stays as it was");
   if (flown_by.empty()) return said + bridge.file() + ": stays, chase-fcu did not fly it\n";
+  if (of_fcu.empty())
+    return said + bridge.file() + ": stays, the flight does not show the thrust\n";
   return said;
 }
 

@@ -7,11 +7,27 @@
 #include <stdexcept>
 
 namespace chase::logs {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// The file that `file` links to.
+std::string Linked(const std::string& file) {
+  std::error_code ignored;
+  if (!fs::is_regular_file(file, ignored)) return file;
+  const fs::path linked = fs::canonical(file, ignored);
+  return linked.empty() ? file : linked.string();
+}
+
+}  // namespace
 
 OutputFile::OutputFile(const std::string& file)
-    : file_(file), part_(file), out_(part_.name(), std::ios::binary) {
+    : file_(file), part_(Linked(file)), out_(part_.name(), std::ios::binary) {
   if (!out_)
     throw std::runtime_error(file + ": cannot be written; check the folder and its rights");
+  std::error_code ignored;  // of a file system that has none
+  const fs::file_status before = fs::status(file, ignored);
+  if (fs::is_regular_file(before)) fs::permissions(part_.name(), before.permissions(), ignored);
 }
 
 void OutputFile::Close() {
@@ -27,8 +43,8 @@ void WriteFile(const std::string& file, const std::string& text) {
 }
 
 void RequireWritable(const std::string& file) {
-  const bus::PartFile part(file);
-  if (std::filesystem::is_directory(file) || !std::ofstream(part.name()).is_open())
+  const bus::PartFile part(Linked(file));
+  if (fs::is_directory(file) || !std::ofstream(part.name()).is_open())
     throw std::runtime_error(file + ": cannot be written; check the folder and its rights");
 }
 

@@ -7,8 +7,8 @@
 
 namespace chase::logs {
 
-/// A file that is written beside its name and appears under it when closed. Throws
-/// std::runtime_error with one line.
+/// A file that is written beside its name and appears under it when closed; where there is one, its
+/// permissions stay, and a link to it stays a link. Throws std::runtime_error with one line.
 class OutputFile {
  public:
   explicit OutputFile(const std::string& file);
@@ -21,8 +21,8 @@ class OutputFile {
   std::ofstream out_;
 };
 
-/// Writes `text` beside `file` and renames it, so that nobody ever sees half a file. Throws
-/// std::runtime_error with one line.
+/// Writes `text` as an OutputFile, so that nobody ever sees half a file. Throws std::runtime_error
+/// with one line.
 void WriteFile(const std::string& file, const std::string& text);
 
 /// Bytes as text (RFC 4648, section 4).

@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "common/config/checksum.h"
 #include "logs/src/identified_files.h"
 #include "logs/src/identify.h"
@@ -83,6 +85,42 @@ TEST(IdentifiedFiles, TheServicesReadWhatTheFlightShowsAndAllElseStays) {
       << ReadText(fcu);
   EXPECT_NE(ErrorOf([&] { UpdateFiles(found, sum, folder); }).find("has cksum"), std::string::npos)
       << "its thrust would be counted twice";
+}
+
+TEST(IdentifiedFiles, AFlightThatDoesNotShowTheThrustLeavesTheBridgesFile) {
+  Identification found = Flown(Body());
+  found.thrust_scale.sigma = INFINITY;
+  const std::string folder = Temp("no_thrust");
+  fs::create_directory(folder);
+  const std::string sum = std::to_string(config::Checksum(config::Dump(fcu::FcuConfig())));
+  const std::string said = UpdateFiles(found, sum, folder);
+  EXPECT_NE(said.find(folder + "/fcu.yaml: stays, the flight does not show the thrust\n"),
+            std::string::npos)
+      << said;
+  EXPECT_TRUE(fs::exists(folder + "/control.yaml"));
+  EXPECT_FALSE(fs::exists(folder + "/fcu.yaml"));
+}
+
+TEST(IdentifiedFiles, AFileKeepsItsPermissionsAndALinkStaysOne) {
+  const Identification found = Flown(Body());
+  const std::string folder = Temp("linked"), kept = Temp("kept");
+  fs::create_directory(folder);
+  fs::create_directory(kept);
+  const std::string control = folder + "/control.yaml", fcu = folder + "/fcu.yaml";
+  std::ofstream(kept + "/control.yaml") << "lead: 0\n";
+  fs::create_symlink(kept + "/control.yaml", control);
+  std::ofstream(fcu) << "link: /dev/ttyAMA0\n";
+  fcu::FcuConfig flown;
+  config::Load(fcu, &flown);
+  const auto ours = fs::perms::owner_read | fs::perms::owner_write;
+  fs::permissions(fcu, ours);
+  fs::permissions(kept + "/control.yaml", ours | fs::perms::group_read);
+  UpdateFiles(found, std::to_string(config::Checksum(config::Dump(flown))), folder);
+  EXPECT_EQ(fs::status(fcu).permissions(), ours);
+  EXPECT_NE(ReadText(fcu).find("hover_thrust: "), std::string::npos);
+  EXPECT_TRUE(fs::is_symlink(control));
+  EXPECT_EQ(fs::status(control).permissions(), ours | fs::perms::group_read);
+  EXPECT_NE(ReadText(kept + "/control.yaml").find("drag: "), std::string::npos);
 }
 
 TEST(IdentifiedFiles, WithoutTheBridgeItsFileStays) {
