@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "common/config/version.h"
+#include "common/world/view_angles.h"
 #include "deploy/calibrate/pictures.h"
 #include "deploy/calibrate/rig_file.h"
 #include "deploy/calibrate/sweep_picture.h"
@@ -44,6 +45,15 @@ void WriteRig(const std::string& file, const RigFile& rig) {
   std::ofstream out(file);
   if (!(out << config::Dump(rig)))
     throw std::runtime_error(file + ": cannot be written; name a .yaml in an existing folder");
+}
+
+/// What planning's file says of the rig, which planning itself does not read.
+void PrintView(const world::Rig& rig) {
+  const world::ViewAngles view = world::ViewOf(rig);
+  fmt::print(
+      "for planning's --config:\n"
+      "planner: {{view_down_deg: {:.1f}, view_up_deg: {:.1f}, max_bearing_deg: {:.1f}}}\n",
+      view.down, view.up, view.bearing);
 }
 
 int WriteBoard(const Arguments& a) {
@@ -87,6 +97,7 @@ int Camera(const Arguments& a) {
       "corners {:.2f} px off ({:.2f} px by a pinhole)\n{}\n{}\n",
       fit.focal_px, fit.focal_sigma, fit.center_u_px, fit.center_v_px, fit.center_sigma,
       rig.rig.lens, fit.k1, fit.k2, fit.rms_px, fit.pinhole_rms_px, a.out, a.check);
+  PrintView(rig.rig);
   return 0;
 }
 
@@ -135,6 +146,7 @@ int Imu(const Arguments& a) {
       rig.rig.camera_roll_deg, rig.rig.camera_pitch_deg, rig.rig.camera_yaw_deg,
       fit.rotation_sigma.maxCoeff() / kDegree, fit.turns, fit.rms / kDegree, 1e3 * fit.delay,
       1e3 * fit.delay_sigma, fit.delay, a.out);
+  PrintView(rig.rig);
   return 0;
 }
 
@@ -155,7 +167,8 @@ void AddBoard(CLI::App* app, Board* board) {
 
 void AddRigs(CLI::App* app, Arguments* a) {
   app->add_option("--rig", a->rig, "YAML file with the rig so far (default: built in)");
-  app->add_option("--out", a->out, "YAML file to write, for every service's --config")
+  app->add_option("--out", a->out,
+                  "YAML file to write, for --config of odometry, perception, viewer and simulator")
       ->capture_default_str();
 }
 

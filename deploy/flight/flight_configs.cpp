@@ -2,13 +2,12 @@
 
 #include <fmt/core.h>
 
-#include <algorithm>
-#include <cmath>
 #include <filesystem>
 #include <stdexcept>
 
 #include "common/config/config.h"
 #include "common/world/random.h"
+#include "common/world/view_angles.h"
 
 namespace chase::flight {
 
@@ -62,13 +61,11 @@ bool FedWithTruth(const world::Scenario& scenario, const FlightOptions& options)
   return (options.sensors.empty() ? scenario.sensors.mode : options.sensors) == "truth";
 }
 
-/// The image's edges less a margin: what calibration, drag and control tilt the body by.
 void DeriveView(const world::Rig& rig, planning::PlannerConfig* planner) {
-  constexpr double kMargin = 3.0, deg = 180.0 / M_PI;
-  const auto angle = [&](double px) { return std::atan(px / rig.focal_px) * deg - kMargin; };
-  planner->view_down_deg = angle(rig.height_px - 1 - rig.center_v_px) + rig.camera_pitch_deg;
-  planner->view_up_deg = angle(rig.center_v_px) - rig.camera_pitch_deg;
-  planner->max_bearing_deg = angle(std::min(rig.center_u_px, rig.width_px - 1 - rig.center_u_px));
+  const world::ViewAngles view = world::ViewOf(rig);
+  planner->view_down_deg = view.down;
+  planner->view_up_deg = view.up;
+  planner->max_bearing_deg = view.bearing;
 }
 
 /// The drivers' data sheets: what the simulator's devices are.

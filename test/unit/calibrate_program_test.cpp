@@ -1,3 +1,4 @@
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <cstdlib>
@@ -10,6 +11,7 @@
 #include "chase/camera_image_t.hpp"
 #include "chase/imu_t.hpp"
 #include "chase/lidar_scan_t.hpp"
+#include "common/world/view_angles.h"
 #include "deploy/calibrate/rig_file.h"
 #include "test/unit/calibrate_scene.h"
 
@@ -217,6 +219,12 @@ TEST(CalibrateProgram, FromALogOfTurnsToTheCamerasRotation) {
   const std::size_t at = text.find(before);
   ASSERT_NE(at, std::string::npos) << text;
   EXPECT_NEAR(std::stod(text.substr(at + before.size())), 40.0, 3.0) << text;
+  const world::ViewAngles view = world::ViewOf(found.rig);
+  EXPECT_NE(text.find(fmt::format("planner: {{view_down_deg: {:.1f}, view_up_deg: {:.1f}, "
+                                  "max_bearing_deg: {:.1f}}}\n",
+                                  view.down, view.up, view.bearing)),
+            std::string::npos)
+      << text;
   WriteLog(folder + "no_imu.lcm", board, LidarInCamera(rig.rig));
   EXPECT_NE(Call("imu " + folder + "no_imu.lcm"), 0);
 }

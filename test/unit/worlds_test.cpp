@@ -267,6 +267,19 @@ TEST_P(EachKind, MayHideTheTargetAtTheStart) {
 INSTANTIATE_TEST_SUITE_P(Worlds, EachKind, ::testing::ValuesIn(Kinds()),
                          [](const auto& kind) { return kind.param.name; });
 
+TEST(View, IsThatOfTheRigThatPerceptionHas) {
+  world::Scenario scenario = MakeWorld("hall", 1, {});
+  scenario.services.clear();
+  flight::FlightOptions options;
+  options.scenario_file = "world.yaml";
+  const auto straight = flight::Configure(scenario, options).planning.planner;
+  scenario.services.push_back({"perception", "rig: {camera_roll_deg: -2, camera_yaw_deg: 3}"});
+  const auto askew = flight::Configure(scenario, options).planning.planner;
+  EXPECT_NEAR(askew.view_down_deg, straight.view_down_deg - 5.0, 1e-9);
+  EXPECT_NEAR(askew.view_up_deg, straight.view_up_deg - 5.0, 1e-9);
+  EXPECT_NEAR(askew.max_bearing_deg, straight.max_bearing_deg - 5.0, 1e-9);
+}
+
 // Nothing is known by accident: what control and fcu go by is 5 to 10 % away from what flies.
 TEST(Vehicle, IsDrawnFromTheSeedWhereverSensorsAreFlown) {
   world::Scenario scenario = MakeWorld("hall", 1, {});
