@@ -1,8 +1,11 @@
 #include "deploy/calibrate/imu_fit.h"
 
+#include <fmt/format.h>
+
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <optional>
 
 #include "common/math/rotation.h"
@@ -23,10 +26,12 @@ constexpr double kMostGap = 0.05;  // s between samples of the gyro
 constexpr double kMostDelay = 0.2, kDelayStep = 0.01;
 constexpr std::size_t kLeastTurns = 120;
 constexpr double kLeastTurn = 0.05;  // rad rms about the second axis
+constexpr double kAdvised = 20.0;    // s of recording, and degrees to turn by: more than is needed
 constexpr int kSteps = 15;
-constexpr double kHuber = 2.5;    // of the median's deviation
-constexpr double kBump = 1e-5;    // of differences: rad, s, rad/s
-constexpr double kOverlap = 6.0;  // turns that an image belongs to, all of one error at the worst
+constexpr double kLastStep = 1e-4;  // rad, s, rad/s: below the sigmas
+constexpr double kHuber = 2.5;      // of the median's deviation
+constexpr double kBump = 1e-5;      // of differences: rad, s, rad/s
+constexpr double kOverlap = 6.0;    // turns that an image belongs to, all of one error at the worst
 
 struct Turn {
   double from, to;  // s
@@ -132,18 +137,36 @@ Quaterniond CoarseRotation(const std::vector<Turn>& turns, const Integral& integ
 
 std::string Problem(const std::vector<Turn>& turns) {
   if (turns.size() < kLeastTurns)
-    return "the board is seen in " + std::to_string(turns.size()) +
-           " turns of 0.4 to 1.4 s, and 120 are needed; keep it in view for 20 s";
+    return fmt::format(
+        "the board is seen in {} turns of {:g} to {:g} s, and {} are needed; keep it in view for "
+        "{:g} s",
+        turns.size(), *std::begin(kSpans), *std::rbegin(kSpans) + kLate, kLeastTurns, kAdvised);
   Matrix3d squares = Matrix3d::Zero();
   for (const Turn& turn : turns) {
     const Vector3d v = math::LogSO3(turn.R_C);
     squares += v * v.transpose() / static_cast<double>(turns.size());
   }
   const double second = Eigen::SelfAdjointEigenSolver<Matrix3d>(squares).eigenvalues()[1];
-  return second < kLeastTurn * kLeastTurn ? "it turns about one axis at the most; roll, pitch and "
-                                            "yaw it by 20 degrees and more, "
-                                            "once a second"
-                                          : "";
+  if (second >= kLeastTurn * kLeastTurn) return "";
+  return fmt::format(
+      "it turns about one axis at the most; roll, pitch and yaw it by {:g} degrees and more, once "
+      "a second",
+      kAdvised);
+}
+
+/// Why the steps' result is none: `last` of them.
+std::string Problem(const Unknowns& x, const Vector7d& last) {
+  if (!(last.array().abs() < kLastStep).all())
+    return fmt::format(
+        "rotation and delay do not settle: the last of {} steps turns by {:.2g} degrees and shifts "
+        "by {:.2g} ms; turn more, with the board still and in view",
+        kSteps, last.head<3>().norm() * 180.0 / M_PI, 1e3 * last[3]);
+  if (std::abs(x.delay) > kMostDelay)
+    return fmt::format(
+        "the stamps of images would be {:.0f} ms late, and {:.0f} ms either way are searched: "
+        "check both clocks, bring camera.yaml's stamp_delay nearer and record again",
+        1e3 * x.delay, 1e3 * kMostDelay);
+  return "";
 }
 
 struct Normal {
@@ -190,14 +213,18 @@ ImuFit FitImu(const std::vector<Turned>& seen, const std::vector<Gyro>& gyro) {
   x.delay = CoarseDelay(turns, integral);
   x.R_BC = CoarseRotation(turns, integral, x.delay);
   Normal sum;
+  Vector7d last = Vector7d::Zero();
   for (int step = 0; step < kSteps; ++step) {
     sum = Linearised(turns, gyro, x);
     if (sum.n < static_cast<double>(kLeastTurns)) {
       fit.problem = "IMU covers few of the turns; record IMU and CAMERA_IMAGE together";
       return fit;
     }
-    x = x.Changed(-sum.H.ldlt().solve(sum.g));
+    last = -sum.H.ldlt().solve(sum.g);
+    x = x.Changed(last);
   }
+  fit.problem = Problem(x, last);
+  if (!fit.problem.empty()) return fit;
   sum = Linearised(turns, gyro, x);
   const double variance = sum.squares / (3.0 * sum.n - 7.0);
   const Vector7d sigmas = (kOverlap * variance * sum.H.inverse()).diagonal().cwiseSqrt();

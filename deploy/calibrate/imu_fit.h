@@ -31,6 +31,7 @@ struct ImuFit {
 /// Rotation of the camera in the body and the delay of its stamps, within 0.2 s, from turns before
 /// a board that both camera and gyroscope measure: R_C = R_BC' R_B R_BC (Tsai and Lenz 1989), with
 /// the gyro's constant bias. Needs no guess; needs turns about two axes. Both in the order of time.
+/// A problem where the delay is beyond that or the steps do not settle.
 ImuFit FitImu(const std::vector<Turned>& seen, const std::vector<Gyro>& gyro);
 
 }  // namespace chase::calibrate

@@ -117,6 +117,25 @@ TEST(CalibrateImu, TurnsAboutOneAxisAndShortRecordingsAreRefused) {
   EXPECT_NE(FitImu({}, {}).problem, "");
 }
 
+TEST(CalibrateImu, ADelayBeyondWhatIsSearchedIsRefused) {
+  for (const double delay : {-0.23, 0.23, 0.35}) {
+    const Recording r = Record(Hands(), Askew(), delay, 1);
+    const ImuFit fit = FitImu(r.seen, r.gyro);
+    EXPECT_NE(fit.problem.find("200 ms"), std::string::npos)
+        << delay << ": " << fit.delay << " s, " << fit.rms << " rad off; " << fit.problem;
+  }
+}
+
+TEST(CalibrateImu, StepsThatDoNotEndAreRefused) {
+  Recording r = Record(Hands(), Askew(), 0.0, 1);
+  world::Random random(3);
+  for (Turned& turned : r.seen)  // nothing that both measure
+    turned.R_CP =
+        math::ExpSO3(Vector3d(random.Uniform(-3, 3), random.Uniform(-3, 3), random.Uniform(-3, 3)));
+  const std::string problem = FitImu(r.seen, r.gyro).problem;
+  EXPECT_NE(problem.find("do not settle"), std::string::npos) << problem;
+}
+
 TEST(CalibrateImu, AFewWrongPosesOfTheBoardDoNotMoveIt) {
   Recording r = Record(Hands(), Askew(), 0.03, 3);
   for (std::size_t i = 5; i < r.seen.size(); i += 40)
