@@ -202,20 +202,21 @@ TEST(FcuAutopilot, ListensToOnePx4Only) {
   EXPECT_TRUE(autopilot.armed());
 }
 
+void Say(Autopilot* autopilot, const std::string& text, int64_t utime) {
+  mav::Statustext t;
+  t.severity = 2;
+  std::copy(text.begin(), text.end(), t.text.begin());
+  autopilot->Take(FrameOf(t), utime);
+}
+
 TEST(FcuAutopilot, RemembersTheLastChecksThatFailedUntilItIsArmed) {
   Autopilot autopilot(0);
   mav::Heartbeat m;
   m.autopilot = 12;
   autopilot.Take(FrameOf(m), kStart);
-  const auto say = [&](const std::string& text, int64_t utime) {
-    mav::Statustext t;
-    t.severity = 2;
-    std::copy(text.begin(), text.end(), t.text.begin());
-    autopilot.Take(FrameOf(t), utime);
-  };
   for (const char* check : {"a", "b", "c", "d", "b", "e"})
-    say(std::string("Preflight Fail: ") + check + "\t", kStart);
-  say("Arming denied: Resolve system health failures", kStart + 60'000'000);
+    Say(&autopilot, std::string("Preflight Fail: ") + check + "\t", kStart);
+  Say(&autopilot, "Arming denied: Resolve system health failures", kStart + 60'000'000);
   EXPECT_EQ(autopilot.Warning(kStart + 61'000'000, 10.0),
             "Arming denied: Resolve system health failures, Preflight Fail: c, "
             "Preflight Fail: d, Preflight Fail: b, Preflight Fail: e");
@@ -229,18 +230,12 @@ TEST(FcuAutopilot, RemembersTheFirstTextsOfThoseSaidTogether) {
   mav::Heartbeat m;
   m.autopilot = 12, m.base_mode = 0x80;
   autopilot.Take(FrameOf(m), kStart);
-  const auto say = [&](const std::string& text, int64_t utime) {
-    mav::Statustext t;
-    t.severity = 2;
-    std::copy(text.begin(), text.end(), t.text.begin());
-    autopilot.Take(FrameOf(t), utime);
-  };
   const auto said = [&](int64_t utime) { return autopilot.Warning(utime, 10.0); };
   int64_t t = kStart;
   for (const char* text : {"Low battery", "Failsafe activated", "Low battery", "RTL", "Landing"})
-    say(text, t += 200'000);
+    Say(&autopilot, text, t += 200'000);
   EXPECT_EQ(said(t), "Low battery, Failsafe activated, RTL") << "the cause comes first";
-  for (const char* text : {"a", "b", "c", "d"}) say(text, t += 900'000);
+  for (const char* text : {"a", "b", "c", "d"}) Say(&autopilot, text, t += 900'000);
   EXPECT_EQ(said(t), "c, d") << "what is said later is of another cause";
   EXPECT_EQ(said(t + 9'000'000), "c, d");
   EXPECT_EQ(said(t + 11'000'000), "");
