@@ -71,15 +71,19 @@ class Prover {
 
   /// `s`: the interval, and the normal to start from.
   SeparationResult Prove(const Separation& s);
+  bool TouchesAt(double tau) const;
 
  private:
   enum class Answer { kPlane, kOverlap, kOpen };
 
   int Columns() const;
-  Controls MakeControls(int columns) const;
+  Controls Powers() const;
+  double Spread(const Controls& c, Eigen::Index i, const Vector3d& n) const;
   Vector3d Lowest(const Controls& c, double radius, const Vector3d& n) const;
   double LeastRadius(const Controls& c) const;
   Answer FindPlane(const Controls& c, double tolerance, Separation* s) const;
+  void RaiseTo(const Vector3d& n, const Controls& c, int samples, double* gaps) const;
+  bool Touches(const Controls& c, Separation s);
   bool Keeps(const Separation& s);
   bool Descend(const Controls& c, Separation s, int depth);
   bool Stop(Kept kept, double tau);
@@ -97,7 +101,10 @@ int Prover::Columns() const {
   return static_cast<int>(n);
 }
 
-Controls Prover::MakeControls(int columns) const {
+/// Of degree 16 at most; else, or where there is a NaN, not finite.
+Controls Prover::Powers() const {
+  const int columns = Columns();
+  if (columns > Sweep::kTerms) return Controls::Constant(17, 1, NAN);
   Controls power = Controls::Zero(17, columns);
   PutBall(drone_, body_.center, 0, &power);
   if (target_) PutBall(*target_, body_.center, 4, &power);
@@ -105,7 +112,7 @@ Controls Prover::MakeControls(int columns) const {
     for (int k = 0; k < 3; ++k)
       power.col(k).tail<9>() =
           Eigen::Map<const Eigen::Matrix<double, 9, 1>>(body_.covariance[k].data());
-  return ToBernstein(power);
+  return power;
 }
 
 double Prover::LeastRadius(const Controls& c) const {
@@ -113,27 +120,34 @@ double Prover::LeastRadius(const Controls& c) const {
   return std::max(0.0, target_ ? std::min(drone, c.row(7).minCoeff()) : drone);
 }
 
+/// Standard deviations of the body's place along n, of unit length, in one column.
+double Prover::Spread(const Controls& c, Eigen::Index i, const Vector3d& n) const {
+  if (!(body_.sigmas > 0.0)) return 0.0;
+  const double variance = n.dot(Eigen::Map<const Eigen::Matrix3d>(&c(8, i)) * n);
+  return variance > 0.0 ? body_.sigmas * std::sqrt(variance) : 0.0;
+}
+
 /// The point z of the set { balls of their radius less `radius` - body } with the least n' z.
 Vector3d Prover::Lowest(const Controls& c, double radius, const Vector3d& n) const {
-  double least = HUGE_VAL;
-  Vector3d z = Vector3d::Zero();
+  double least = HUGE_VAL, spread = 0.0;
+  Eigen::Index column = 0;
+  int row = 0;
   for (Eigen::Index i = 0; i < c.cols(); ++i) {
-    Vector3d spread = Vector3d::Zero();
-    if (body_.sigmas > 0.0) {
-      const Eigen::Map<const Eigen::Matrix3d> S(&c(8, i));
-      const Vector3d Sn = S * n;
-      const double variance = n.dot(Sn);
-      if (variance > 0.0) spread = body_.sigmas / std::sqrt(variance) * Sn;
-    }
-    for (int row = 0; row <= (target_ ? 4 : 0); row += 4) {
-      const double more = std::max(0.0, c(row + 3, i) - radius);
-      const Vector3d point = c.block<3, 1>(row, i) - more * n - spread;
-      const double value = n.dot(point);
+    const double here = Spread(c, i, n);
+    for (int ball = 0; ball <= (target_ ? 4 : 0); ball += 4) {
+      const double value =
+          n.dot(c.block<3, 1>(ball, i)) - std::max(0.0, c(ball + 3, i) - radius) - here;
       if (value >= least) continue;
       least = value;
-      z = point;
+      spread = here;
+      column = i;
+      row = ball;
     }
   }
+  Vector3d z = c.block<3, 1>(row, column) - std::max(0.0, c(row + 3, column) - radius) * n;
+  if (spread > 0.0)
+    z -= body_.sigmas * body_.sigmas / spread *
+         (Eigen::Map<const Eigen::Matrix3d>(&c(8, column)) * n);
   return z - SupportPoint(body_, n);
 }
 
@@ -153,6 +167,63 @@ Prover::Answer Prover::FindPlane(const Controls& c, double tolerance, Separation
     s->normal = simplex.nearest() / distance;
   }
   return Answer::kOpen;
+}
+
+/// Raises `gaps`, at samples + 1 instants, to what a plane with normal n leaves between the body
+/// and the balls.
+void Prover::RaiseTo(const Vector3d& n, const Controls& c, int samples, double* gaps) const {
+  const auto degree = static_cast<int>(c.cols()) - 1;
+  const double body = n.dot(SupportPoint(body_, n));
+  double weighted[2][Sweep::kTerms];
+  for (int i = 0; i <= degree; ++i) {
+    const double spread = Spread(c, i, n), weight = math::Binomial(degree, i);
+    for (int ball = 0; ball <= (target_ ? 1 : 0); ++ball)
+      weighted[ball][i] =
+          weight * (n.dot(c.block<3, 1>(4 * ball, i)) - c(4 * ball + 3, i) - spread - body);
+  }
+  for (int k = 0; k <= samples; ++k) {
+    const double t = k / static_cast<double>(samples), rest = 1.0 - t;
+    double least = HUGE_VAL;
+    for (int ball = 0; ball <= (target_ ? 1 : 0); ++ball) {
+      double power = 1.0, value = weighted[ball][0];
+      for (int i = 1; i <= degree; ++i) {
+        power *= t;
+        value = value * rest + power * weighted[ball][i];
+      }
+      least = std::min(least, value);
+    }
+    gaps[k] = std::max(gaps[k], least);
+  }
+}
+
+/// Looks for an instant at which the body is touched. Each normal bounds the gap from below at
+/// every instant; the next is the one between body and balls where that leaves the least.
+bool Prover::Touches(const Controls& c, Separation s) {
+  constexpr int kTurns = 5, kSamples = 16;
+  double gaps[kSamples + 1];
+  std::fill(gaps, gaps + kSamples + 1, -HUGE_VAL);
+  for (int turn = 0; turn < kTurns; ++turn) {
+    RaiseTo(s.normal, c, kSamples, gaps);
+    const auto least = static_cast<int>(std::min_element(gaps, gaps + kSamples + 1) - gaps);
+    double gap = gaps[least], t = least;
+    if (least > 0 && least < kSamples) {  // the parabola through the neighbours
+      const double slope = 0.5 * (gaps[least + 1] - gaps[least - 1]);
+      const double bend = gaps[least + 1] - 2.0 * gap + gaps[least - 1];
+      if (bend > 0.0) {
+        t -= slope / bend;
+        gap -= 0.5 * slope * slope / bend;
+      }
+    }
+    if (gap > 0.0) return false;
+    t /= kSamples;
+    Controls right = c, point(17, 1);
+    CutOff(t, &right);
+    point.col(0) = right.col(0);
+    if (FindPlane(point, -kSlack, &s) != Answer::kOverlap) continue;
+    Stop(Kept::kTouches, s.from + t * (s.to - s.from));
+    return true;
+  }
+  return false;
 }
 
 bool Prover::Stop(Kept kept, double tau) {
@@ -179,7 +250,9 @@ bool Prover::Keeps(const Separation& s) {
 
 /// `s`: the interval, and the normal to start from.
 bool Prover::Descend(const Controls& c, Separation s, int depth) {
+  const Vector3d start = s.normal;
   if (FindPlane(c, kSlack, &s) == Answer::kPlane && Keeps(s)) return true;
+  if (depth == kDepth && Touches(c, {s.from, s.to, start})) return false;
   const double middle = 0.5 * (s.from + s.to);
   Controls right = c, point(17, 1);
   const Controls left = CutOff(0.5, &right);
@@ -192,14 +265,22 @@ bool Prover::Descend(const Controls& c, Separation s, int depth) {
 }
 
 SeparationResult Prover::Prove(const Separation& s) {
-  const int columns = Columns();
-  if (columns > Sweep::kTerms || !(body_.sigmas >= 0.0)) return result_;
-  Controls c = MakeControls(columns);
+  if (!(body_.sigmas >= 0.0)) return result_;
+  Controls c = ToBernstein(Powers());
   if (!c.allFinite()) return result_;
   if (s.to < 1.0) c = CutOff(s.to, &c);
   if (s.from > 0.0) CutOff(s.from / s.to, &c);
   if (Descend(c, s, kDepth)) result_.kept = Kept::kOff;
   return result_;
+}
+
+bool Prover::TouchesAt(double tau) const {
+  const Controls power = Powers();
+  Controls at(17, 1);
+  at.col(0) = power.col(power.cols() - 1);
+  for (Eigen::Index k = power.cols() - 1; k-- > 0;) at.col(0) = tau * at.col(0) + power.col(k);
+  Separation s{tau, tau};
+  return body_.sigmas >= 0.0 && FindPlane(at, -kSlack, &s) == Answer::kOverlap;
 }
 
 }  // namespace
@@ -249,6 +330,10 @@ SeparationResult Separator::From(const Body& body) {
 SeparationResult Separate(const Ball& drone, const Ball* target, const Body& body, double from,
                           double to) {
   return Separator(drone, target, from, to).From(body);
+}
+
+bool Touch(const Ball& drone, const Ball* target, const Body& body, double tau) {
+  return Prover(drone, target, body).TouchesAt(tau);
 }
 
 }  // namespace chase::world

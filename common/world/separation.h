@@ -55,4 +55,7 @@ class Separator {
 SeparationResult Separate(const Ball& drone, const Ball* target, const Body& body,
                           double from = 0.0, double to = 1.0);
 
+/// Is at `tau` a point of the segment nearer to the body than the radius, by a nanometre at least?
+bool Touch(const Ball& drone, const Ball* target, const Body& body, double tau);
+
 }  // namespace chase::world

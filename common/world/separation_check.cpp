@@ -34,10 +34,10 @@ bool IsNormal(const Vector3d& n) {
 }
 bool IsUsable(const Separation& s) { return IsInterval(s.from, s.to) && IsNormal(s.normal); }
 
-/// n' M n and the sum of the absolute values of its terms.
+/// n' M n and a bound of the sum of the absolute values of its terms, for a squared normal of 2 at
+/// most.
 double Quadratic(const Eigen::Matrix3d& M, const Vector3d& n, double* magnitude) {
-  const Vector3d absolute = n.cwiseAbs();
-  *magnitude = absolute.dot(M.cwiseAbs() * absolute);
+  *magnitude = 2.0 * M.cwiseAbs().sum();
   return n.dot(M * n);
 }
 

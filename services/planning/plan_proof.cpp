@@ -30,7 +30,7 @@ void PlanProof::Reset(const Problem& problem, double sight_from, bool exact) {
   sight_from_ = sight_from;
   origin_ = problem.target.row(0).transpose();
   laid_out_ = false;
-  first_ = -1;
+  last_ = {};
 }
 
 void PlanProof::AddRows(int obstacle) {
@@ -169,7 +169,7 @@ bool PlanProof::RowHolds(const Row& row, const Curve& plan, const Local* p, bool
 bool PlanProof::RowHolds(int row, const Curve& plan) {
   if (!IsUsable()) return false;
   const Row& r = rows_[static_cast<size_t>(row)];
-  first_ = r.obstacle;
+  if (last_.obstacle != r.obstacle) last_ = {r.obstacle, -1.0};
   if (!r.decides) return true;
   Local p{};
   const bool small = small_ && MakeLocal(plan, degree_, &p);
@@ -196,7 +196,7 @@ bool PlanProof::Holds(const Curve& plan, bool exactly) {
     if (!rows_[j].decides || (bounds && cleared_[j])) continue;
     if (!RowHolds(rows_[j], plan, small ? &p : nullptr, exactly)) return false;
   }
-  return StaysOff(plan, *problem_, sight_from_, &first_, memory_);
+  return StaysOff(plan, *problem_, sight_from_, &last_, memory_);
 }
 
 }  // namespace chase::planning

@@ -78,7 +78,7 @@ class PlanProof {
   bool exact_sight_ = true, usable_ = false, small_ = false, linear_ = true, all_ = true,
        laid_out_ = false, decides_ = false;
   int degree_ = 5, n_exact_ = 0;
-  int first_ = -1;  ///< obstacle that the last plan failed at
+  Refusal last_;  ///< of the last plan that touched something
   double sight_from_ = 0.0;
   Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();
   Local target_{};

@@ -77,13 +77,17 @@ class Prover {
     return true;
   }
 
+  // Of an obstacle that is not off: when it was touched, if that is known.
+  double tau() const { return tau_; }
+
   // How many proofs: of safety, and of sight.
   int Asks(const Ellipsoid& e) const { return SightFrom(e) < 1.0 ? 2 : 1; }
 
  private:
   static constexpr double kSlack = 1e-9;  // m; more than the rounding of a room
 
-  static bool IsKept(const world::SeparationResult& result) {
+  bool IsKept(const world::SeparationResult& result) {
+    tau_ = result.kept == world::Kept::kTouches ? result.tau : -1.0;
     return result.kept == world::Kept::kOff;
   }
   double SightFrom(const Ellipsoid& e) const { return std::max(sight_from_, e.sight_from); }
@@ -96,7 +100,7 @@ class Prover {
     if (!memory || question.obstacle < 0) return answer();
     if (const world::SeparationResult* known = memory->Find(question)) return *known;
     const world::SeparationResult result = answer();
-    if (IsKept(result)) memory->Add(question, result);
+    if (result.kept == world::Kept::kOff) memory->Add(question, result);
     return result;
   }
 
@@ -145,8 +149,21 @@ class Prover {
   world::Ball drone_, eye_, target_;  ///< the last two: ends of the line of sight
   std::optional<double> share_;       ///< of the margins of sight that their radii are
   world::Separator safety_, sight_;
+  double tau_ = -1.0;
   double least_ = HUGE_VAL;  ///< distance to the obstacles of the proofs so far, m
 };
+
+// Whether the plan, or its line of sight, touches there what the last one did.
+bool IsTouched(const Curve& plan, const Problem& problem, double sight_from, const Refusal& last) {
+  const Ellipsoid& e = problem.obstacles[static_cast<size_t>(last.obstacle)];
+  if (!e.body || last.tau < e.safety_from) return false;
+  const double from = std::max(sight_from, e.sight_from);
+  if (from >= 1.0 || last.tau < from)
+    return world::Touch(DroneBall(plan, e.safety_radius), nullptr, *e.body, last.tau);
+  const world::Ball target = TargetBall(problem, e.sight_share);
+  return world::Touch(DroneBall(plan, e.sight_share * problem.sight_radius), &target, *e.body,
+                      last.tau);
+}
 
 }  // namespace
 
@@ -180,21 +197,23 @@ world::Ball TargetBall(const Problem& problem, double share) {
   return {problem.target, TargetRadius(problem, share)};
 }
 
-bool StaysOff(const Curve& plan, const Problem& problem, double sight_from, int* first,
+bool StaysOff(const Curve& plan, const Problem& problem, double sight_from, Refusal* last,
               SeparationMemory* memory) {
+  const int n = static_cast<int>(problem.obstacles.size());
+  const bool known = last && last->obstacle >= 0 && last->obstacle < n;
+  if (known && IsTouched(plan, problem, sight_from, *last)) return false;
   Prover prover(plan, problem, sight_from);
   const Sieve sieve(plan, problem, sight_from);
   if (memory) memory->About(plan, problem);
   const auto is_off = [&](const Ellipsoid& e) {
     return !sieve.IsNear(e) || prover.IsOff(e, nullptr, memory);
   };
-  const int n = static_cast<int>(problem.obstacles.size());
   const auto is_off_at = [&](int j) {
     const bool off = is_off(problem.obstacles[static_cast<size_t>(j)]);
-    if (!off && first) *first = j;
+    if (!off && last) *last = {j, prover.tau()};
     return off;
   };
-  if (first && *first >= 0 && *first < n && !is_off_at(*first)) return false;
+  if (known && !is_off_at(last->obstacle)) return false;
   if (problem.target_body && !is_off(*problem.target_body)) return false;
   if (problem.reach && Contains(*problem.reach, plan))
     return std::all_of(problem.near.begin(), problem.near.end(), is_off_at);

@@ -40,12 +40,18 @@ class SeparationMemory {
   std::vector<std::pair<Question, world::SeparationResult>> answers_;
 };
 
+/// Where a plan was refused.
+struct Refusal {
+  int obstacle = -1;  ///< index in the problem's list; -1: nowhere yet
+  double tau = -1.0;  ///< instant at which it was touched; -1: not known
+};
+
 /// Does the plan stay off the obstacles, and its line of sight from `sight_from` on? Obstacles that
 /// stand for no solid are not asked about; where the problem has a reach that holds the plan, nor
 /// are those that are not near.
-/// `first`, if given: index of the obstacle to be asked first, and then of the one that is not kept
-/// off, because one plan after the other tends to fail at the same.
-bool StaysOff(const Curve& plan, const Problem& problem, double sight_from, int* first = nullptr,
+/// `last`, if given, is asked first, and then tells of this plan, because one after the other tends
+/// to fail at the same place.
+bool StaysOff(const Curve& plan, const Problem& problem, double sight_from, Refusal* last = nullptr,
               SeparationMemory* memory = nullptr);
 
 /// The proofs of that for all obstacles; nothing where it does not.

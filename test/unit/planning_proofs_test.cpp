@@ -116,18 +116,23 @@ TEST(Minkowski, PlansStayOffWhereSamplesSaySo) {
       asked += std::max(sight_from, e.sight_from) < 1.0 ? 2 : 1;
     }
     if (latest > 0.0) continue;  // leaves it as well: another test
-    int first = static_cast<int>(random.Next() % 3) - 1;
-    const int before = first;
-    const bool stays = StaysOff(plan, problem, sight_from, seed % 2 ? &first : nullptr);
+    Refusal last{static_cast<int>(random.Next() % 3) - 1, -1.0};
+    const int before = last.obstacle;
+    const bool stays = StaysOff(plan, problem, sight_from, seed % 2 ? &last : nullptr);
     const auto proofs = ProveOff(plan, problem, sight_from);
     EXPECT_EQ(proofs.has_value(), stays) << seed;
     EXPECT_FALSE(stays && least < -kTolerance) << seed << " " << least;
     refused += !stays && least > kBetween;
-    EXPECT_TRUE(!stays || first == before);
-    if (!stays && seed % 2 && first != before) {
-      const auto& [e, o] = all[static_cast<size_t>(first)];
+    EXPECT_TRUE(!stays || last.obstacle == before);
+    if (!stays && seed % 2 && last.obstacle != before) {
+      const auto& [e, o] = all[static_cast<size_t>(last.obstacle)];
       EXPECT_LT(LeastAsked(request, problem, plan, e, o, sight_from), kBetween) << seed;
     }
+    for (int j = 0; j < static_cast<int>(problem.obstacles.size()); ++j)
+      for (const double tau : {0.0, 0.5, 1.0}) {
+        Refusal asked_first{j, tau};
+        EXPECT_EQ(StaysOff(plan, problem, sight_from, &asked_first), stays) << seed;
+      }
     ++(stays ? off : on);
     high += stays && (n > 7 || problem.target.rows() > 7);
     if (!proofs) continue;

@@ -45,6 +45,11 @@ Tally ProveRandomPairs(uint64_t seed, int n) {
     t.kept_of_kind[static_cast<size_t>(pair.body.kind)] += kept;
     t.false_kept += kept && gap < -1e-7;
     t.false_touching += touches && GapAt(pair, result.tau) > 1e-7;
+    for (const double tau : {0.0, random.Uniform(0.0, 1.0), 1.0}) {
+      const double now = GapAt(pair, tau);
+      t.false_touching +=
+          Touch(pair.drone, pair.second(), pair.body, tau) ? now > 1e-7 : now < -1e-7;
+    }
     t.missed += !kept && gap > 0.005;
     if ((kept && gap < -1e-7) || (!kept && gap > 0.005))
       ADD_FAILURE() << "seed " << seed << " pair " << i << " gap " << gap << " kept " << kept;
