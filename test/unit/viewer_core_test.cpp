@@ -293,6 +293,7 @@ TEST(ViewerRequest, RefusesGarbage) {
         R"({"seek":null})", R"({"play":1})", R"({"command":{}})", "\xff\xfe"})
     EXPECT_FALSE(ParseRequest(text).has_value()) << text;
   EXPECT_FALSE(ParseRequest(std::string(60000, '[')).has_value());
+  EXPECT_FALSE(ParseRequest(R"({"token":")" + std::string(1025, 'x') + "\"}").has_value());
   EXPECT_EQ(ParseRequest(R"({"ack":-9})")->acknowledged, 0);
   EXPECT_EQ(ParseRequest(R"({"ack":18446744073709551615})")->acknowledged >= 0, true);
 }
