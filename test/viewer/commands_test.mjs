@@ -23,6 +23,7 @@ await until('the state of the flight and of chase-mission',
   () => client.newest.state?.flight && client.newest.health?.rows.some((row) => row.name === 'mission'));
 assert.match(client.newest.state.flight.missing.join(), /POSE is not heard/);
 assert.strictEqual(client.newest.state.row[14], 0);
+await until('a row of the viewer', () => client.newest.health.rows.some((row) => row.name === 'viewer' && row.channels.length));
 
 async function ask(request) {
   const heard = replies.length;
