@@ -66,8 +66,8 @@ export async function flood(port) {
   const texts = ['{"command":"land","token":"wrong"}', '{"command":"stop"}', '{"want":["cloud"]}', '{"op":"unsubscribe","subscriptionIds":[]}'];
   const timer = setInterval(() => {
     for (const socket of sockets)
-      for (let i = 0; i < 100 && socket.bufferedAmount < 100000; ++i) socket.send(texts[i % texts.length]);
-  }, 5);
+      for (let i = 0; i < 10 && socket.bufferedAmount < 100000; ++i) socket.send(texts[i % texts.length]);
+  }, 20);
   return () => {
     clearInterval(timer);
     for (const socket of sockets) socket.terminate();
