@@ -62,9 +62,15 @@ def parse(arguments):
     parser.add_argument("--hardware", action="store_true",
                         help="through the drivers: MAVLink, VLP-16 packets and a video stream in LCM's place")
     parser.add_argument("--view", action="store_true", help="look on in a browser, at http://localhost:8080")
+    parser.add_argument("--token-file", type=pathlib.Path, metavar="FILE",
+                        help="with --view: its first line is the token by which pages command (default: they cannot)")
     parser.add_argument("--kill", type=kill_wish, action="append", default=[], metavar="P@SECONDS",
                         help="kill -9 of process P at that mission time; it is started anew (may be repeated)")
     options = parser.parse_args(arguments)
+    if options.token_file and not options.view:
+        parser.error(f"argument --token-file: {options.token_file} needs --view")
+    if options.token_file and not options.token_file.is_file():
+        parser.error(f"argument --token-file: no file {options.token_file}; cure: openssl rand -hex 16 > {options.token_file}")
     there = killable(options.hardware, options.view)
     for name, seconds in options.kill:
         if name not in there:
@@ -207,6 +213,12 @@ def write_config(folder, scenario, seed, name):
     return path
 
 
+def rig_in(config):
+    """The calibration in a service's YAML, as other services' files have it; empty where there is none."""
+    block = re.search(r"^rig:.*\n(?:[ \t].*\n?)*", config, re.MULTILINE)
+    return block.group() if block else ""
+
+
 class Flight:
     """The processes of one flight and the folder that they leave."""
 
@@ -222,7 +234,7 @@ class Flight:
     def child(self, name, command, **options):
         return processes.Child(name, command, self.folder / f"{name}.log", self.env, **options)
 
-    def start(self, view):
+    def start(self, view, token_file=None):
         rows = flight_processes() + driver_processes(self.hardware)
         configs = {row["name"]: write_config(self.folder, self.scenario, self.seed, row["name"])
                    for row in rows}
@@ -235,7 +247,7 @@ class Flight:
                                   stdout=subprocess.PIPE)
         os.set_blocking(self.monitor.process.stdout.fileno(), False)
         if view:
-            self.start_viewer()
+            self.start_viewer(rig_in(configs["perception"].read_text(encoding="utf-8")), token_file)
         # The simulator comes last: its clock starts when everybody listens.
         for row in sorted(rows, key=lambda r: r["name"] == "simulator"):
             if row["name"] == "simulator":
@@ -248,10 +260,13 @@ class Flight:
                                             restarts=row["restart"] == "always"))
         self.wait_ready()
 
-    def start_viewer(self):
+    def start_viewer(self, rig, token_file):
         """An onlooker: whatever becomes of it, the flight goes on."""
         port = bus.free_port(VIEW_PORTS)
-        self.viewer = self.child("viewer", ["nice", "-n", "10", BIN / "chase-viewer", "--port", str(port)],
+        config = self.folder / "viewer.yaml"
+        config.write_text(rig, encoding="utf-8")
+        token = ["--token-file", token_file.resolve()] if token_file else []
+        self.viewer = self.child("viewer", ["nice", "-n", "10", BIN / "chase-viewer", "--port", str(port), "--config", config, *token],
                                  restarts=True)
         bus.await_listener(port, 5.0)
         print(f"look on at http://localhost:{port}", flush=True)
@@ -418,7 +433,7 @@ def fly(options):
                     told.get("faults", ()), options.kill, options.hardware)
     print(f"flying {scenario.stem}, seed {options.seed}, into {flight.folder}", flush=True)
     try:
-        flight.start(options.view)
+        flight.start(options.view, options.token_file)
         flight.watch()
         time.sleep(TAIL)
         flight.complain()

@@ -22,8 +22,9 @@ struct PlayState {
 std::string StateText(const Scene& scene, double t, int generation,
                       const std::optional<PlayState>& play);
 
-/// "obstacles" at t, told with the state of the time `told`, s from the beginning.
-std::string ObstaclesText(const std::vector<world::Obstacle>& obstacles, double t, double told);
+/// "obstacles" at t, told with the state of the time `told`, s from the beginning, of that scene.
+std::string ObstaclesText(const std::vector<world::Obstacle>& obstacles, double t, double told,
+                          int generation);
 
 /// One process as its status message tells, and HEALTH.
 struct ChannelHealth {

@@ -152,7 +152,20 @@ class FlightTest(unittest.TestCase):
         self.assertIn("chase-viewer", self.built[-1])
         port = re.search(r"look on at http://localhost:(\d+)", out).group(1)
         said = (self.folder / "viewer.log").read_text(encoding="utf-8")
-        self.assertEqual(said.splitlines()[0], f"--port {port}")
+        self.assertEqual(said.splitlines()[0], f"--port {port} --config {self.folder}/viewer.yaml")
+        self.assertEqual((self.folder / "viewer.yaml").read_text(encoding="utf-8"), "")
+
+    def test_view_knows_the_scenarios_rig_and_takes_commands_with_a_token(self):
+        self.program("chase-viewer", "import sys; print(*sys.argv[1:], flush=True)")
+        self.program("chase-flight", r"print('size: 1\nrig:  # where\n  focal_px: 300\n  lens: \"fisheye\"\ndetector:\n  kind: 1')")
+        token = self.bin / "token"
+        token.write_text("12345678\n", encoding="utf-8")
+        code, _, err = self.fly("--view", "--token-file", str(token))
+        self.assertEqual(code, 0, err)
+        said = (self.folder / "viewer.log").read_text(encoding="utf-8")
+        self.assertTrue(said.splitlines()[0].endswith(f" --token-file {token.resolve()}"), said)
+        self.assertEqual((self.folder / "viewer.yaml").read_text(encoding="utf-8"),
+                         'rig:  # where\n  focal_px: 300\n  lens: "fisheye"\n')
 
     def test_hardware_flies_through_the_drivers(self):
         for row in fly.flight_processes() + fly.driver_processes(True):
@@ -199,7 +212,8 @@ class FlightTest(unittest.TestCase):
     def test_bad_use_is_told_before_anything_is_built(self):
         for arguments in (["gmy"], ["--seed", "-1"], ["--seed", "1.5"], ["--seed", str(2**31)],
                           ["--seed", "nan"], ["--no-such"], ["--kill", "simulator@3"],
-                          ["--kill", "planning"], ["--kill", "planning@-1"], ["--kill", "planning@nan"]):
+                          ["--kill", "planning"], ["--kill", "planning@-1"], ["--kill", "planning@nan"],
+                          ["--token-file", __file__], ["--view", "--token-file", "no-such"]):
             with self.subTest(arguments=arguments):
                 self.patch(sys, "argv", ["fly", *arguments])
                 err = io.StringIO()

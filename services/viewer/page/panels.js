@@ -23,7 +23,7 @@ export async function drawImage(canvas, text, {about, jpeg}) {
     context.lineWidth = 2;
     context.strokeRect(u - w / 2, v - h / 2, w, h);
   }
-  setText(text, about.state === undefined ? 'no target heard'
+  setText(text, about.state === undefined ? 'no target told of this image'
     : `target ${TARGET_STATES[about.state] ?? '?'}, probability ${format(about.existence, 2, '')}`);
 }
 
