@@ -13,6 +13,7 @@ import sys
 import time
 
 import bus
+import commands
 import places
 import processes
 import results
@@ -210,12 +211,13 @@ def write_config(folder, scenario, seed, name):
 class Flight:
     """The processes of one flight and the folder that they leave."""
 
-    def __init__(self, scenario, seed, url, commands=(), faults=(), kills=(), hardware=False):
+    def __init__(self, scenario, seed, url, told, kills=(), hardware=False):
         self.folder = flight_folder(scenario)
         self.scenario, self.seed, self.hardware = scenario, seed, hardware
         self.url, self.env = url, {"LCM_DEFAULT_URL": url}
         self.services, self.logger, self.monitor, self.viewer = [], None, None, None
-        self.commands, self.given = list(commands), []
+        self.commands = commands.Commands(told.get("commands", ()), self.start_command)
+        faults = told.get("faults", ())
         self.faults = {fault["name"]: fault for fault in faults}
         self.strikes, self.killed, self.strained = sorted(strikes_of(faults, kills)), [], {}
 
@@ -272,13 +274,8 @@ class Flight:
             if child.mend():
                 print(f"\n{sentence}: restarted", file=sys.stderr, flush=True)
 
-    def command(self, mission_time):
-        """Gives the operator's commands that are due."""
-        while self.commands and self.commands[0]["at_s"] <= mission_time:
-            command = self.commands.pop(0)
-            name = command["command"]
-            self.given.append(self.child(f"command-{len(self.given) + 1}-{name}",
-                                         [BIN / "chase-command", name, *command["arguments"]]))
+    def start_command(self, name, arguments):
+        return self.child(name, [BIN / "chase-command", *arguments])
 
     def strike(self, mission_time):
         """Faults whose time has come, and ends of those before."""
@@ -327,14 +324,15 @@ class Flight:
             if line:
                 progress = json.loads(line)
                 show(progress)
-                self.command(progress["mission_time"])
                 if progress["done"]:
                     return
                 if progress["mission_time"] != last_time:
                     last_time, moved = progress["mission_time"], time.monotonic()
                     speed = progress["rtf"]
             if last_time is not None:  # progress comes once a second
-                self.strike(last_time + speed * (time.monotonic() - moved))
+                now = last_time + speed * (time.monotonic() - moved)
+                self.commands.turn(now)
+                self.strike(now)
             watched = [self.monitor] if ended and not line else []
             self.complain(*watched)
             if time.monotonic() - moved > SILENCE_LIMIT:
@@ -346,7 +344,7 @@ class Flight:
     def stop(self):
         """Services first, the logger last, so that the log holds their last words."""
         strained = [c for children in self.strained.values() for c in children]
-        extras = [c for c in (self.monitor, self.viewer, *self.given, *strained) if c]
+        extras = [c for c in (self.monitor, self.viewer, *self.commands.given, *strained) if c]
         processes.stop(self.services + extras)
         if self.logger:
             processes.stop([self.logger])
@@ -414,18 +412,22 @@ def fly(options):
     raise_receive_buffers()
     url = bus.url()
     check_bus(url)
-    flight = Flight(scenario, options.seed, url, told.get("commands", ()),
-                    told.get("faults", ()), options.kill, options.hardware)
+    flight = Flight(scenario, options.seed, url, told, options.kill, options.hardware)
     print(f"flying {scenario.stem}, seed {options.seed}, into {flight.folder}", flush=True)
     try:
         flight.start(options.view)
         flight.watch()
+        flight.commands.finish()
         time.sleep(TAIL)
         flight.complain()
     finally:
         flight.stop()
     passed = report(flight.folder)
-    if late := [f"{effect} of {name}@{t:g}" for t, effect, name in flight.strikes if effect != "thaw"]:
+    if flight.commands.failed:
+        raise FlightError("the scenario's commands were not all obeyed: " + "; ".join(flight.commands.failed))
+    late = [f"{effect} of {name}@{t:g}" for t, effect, name in flight.strikes if effect != "thaw"]
+    late += flight.commands.left()
+    if late:
         raise FlightError("the mission ended before the " + ", ".join(late))
     return 0 if passed else 1
 

@@ -420,6 +420,49 @@ class FlightTest(unittest.TestCase):
         self.assertEqual(said, {"command-1-select": "select 180 119.5\n", "command-2-hold": "hold\n",
                                 "command-3-kill": "kill --force\n"})
 
+    def give(self, commands, answers):
+        """A flight that gives them, all due at once; it ends when so many answered. chase-command is that program."""
+        told = json.dumps({"duration_s": 2, "settle_s": 1, "commands": [
+            {"command": name, "at_s": at, "arguments": []} for name, at in commands]})
+        self.program("chase-scenario", f"print({told!r})")
+        self.program("chase-command", f"""
+            import pathlib, sys, time
+            name, book = sys.argv[1], pathlib.Path({str(self.bin / "book")!r})
+            def note(word):
+                with book.open("a") as file: file.write(word + chr(10))
+            if name == "takeoff": time.sleep(0.3)
+            note(name)
+            if name == "chase": sys.exit("chase-command: refused: chase in IDLE: POSE is not heard")
+            if name == "land": time.sleep(0.5)
+            """)
+        self.program("chase-flight-monitor", f"""
+            import json, pathlib, signal, time
+            def say(t, done=False):
+                print(json.dumps(dict(mission_time=t, duration=2, distance=2.5, visible=1.0, rtf=0.0, done=done)), flush=True)
+            book, end = pathlib.Path({str(self.bin / "book")!r}), time.monotonic() + 20
+            say(1)
+            while time.monotonic() < end and (not book.exists() or len(book.read_text().split()) < {answers}):
+                time.sleep(0.1)
+            say(2, done=True)
+            signal.pause()
+            """)
+        code, _, err = self.fly()
+        return code, err, (self.bin / "book").read_text(encoding="utf-8").split()
+
+    def test_commands_come_in_order(self):
+        names = ["takeoff", "hold", "stop"]
+        self.assertEqual(self.give([(name, 0.5) for name in names], 3), (0, "", names))
+
+    def test_refused_commands_are_said_and_fail_the_flight(self):
+        code, err, _ = self.give([("chase", -2), ("hold", 0.5), ("land", 0.5)], 3)
+        self.assertEqual(code, 1)
+        refusal = "chase@-2: refused: chase in IDLE: POSE is not heard\n"
+        self.assertEqual(err, f"\n{refusal}deploy/fly: the scenario's commands were not all obeyed: {refusal}")
+
+    def test_commands_whose_time_never_came_fail_the_flight(self):
+        code, err, _ = self.give([("hold", 0.5), ("land", 1.9)], 1)
+        self.assertEqual((code, err), (1, "deploy/fly: the mission ended before the land@1.9\n"))
+
     def test_faults_that_are_left_out_are_named(self):
         told = json.dumps({"duration_s": 2, "settle_s": 1, "left_out_live": ["delay-PLAN", "loss-20"]})
         self.program("chase-scenario", f"print({told!r})")
