@@ -28,6 +28,7 @@ LOG_RATE = 15e6  # bytes/s of a recording, sweeps and images included
 LARGEST_SEED = 2**31 - 1
 DRIVERS = ("lidar", "fcu", "camera")  # stand between the simulator and the rest with --hardware
 STRIKES = {"kill": signal.SIGKILL, "freeze": signal.SIGSTOP, "thaw": signal.SIGCONT}  # faults of processes
+FREEZE = 2.0  # s of --kill freeze-P, as in lockstep
 VIEW_PORTS = range(8080, 8100)  # of --view: the first that nobody listens on
 
 
@@ -36,7 +37,7 @@ class FlightError(Exception):
 
 
 def kill_wish(text):
-    """(process, mission time in s) of P@SECONDS."""
+    """(process or effect-process, mission time in s) of P@SECONDS, kill-P@SECONDS or freeze-P@SECONDS."""
     name, _, seconds = text.partition("@")
     if not re.fullmatch(r"\d+(\.\d+)?", seconds):
         raise argparse.ArgumentTypeError(f"{text}: '{seconds}' is no mission time in s; give {name}@SECONDS, 0 or more")
@@ -63,13 +64,16 @@ def parse(arguments):
     parser.add_argument("--hardware", action="store_true",
                         help="through the drivers: MAVLink, VLP-16 packets and a video stream in LCM's place")
     parser.add_argument("--view", action="store_true", help="look on in a browser, at http://localhost:8080")
+    parser.add_argument("--link", action="store_true", help="with chase-link, as on a vehicle whose ground station is not there")
     parser.add_argument("--kill", type=kill_wish, action="append", default=[], metavar="P@SECONDS",
-                        help="kill -9 of process P at that mission time; it is started anew (may be repeated)")
+                        help="kill -9 of process P at that mission time; it is started anew. freeze-P: it stands still for "
+                             f"{FREEZE:g} s (may be repeated)")
     options = parser.parse_args(arguments)
-    there = killable(options.hardware, options.view)
-    for name, seconds in options.kill:
+    there = killable(options.hardware, options.view, options.link)
+    for wish, seconds in options.kill:
+        name = wish.removeprefix("kill-").removeprefix("freeze-")
         if name not in there:
-            parser.error(f"argument --kill: {name}@{seconds:g}: no process '{name}' to kill; there are: {', '.join(there)}")
+            parser.error(f"argument --kill: {wish}@{seconds:g}: no process '{name}' to kill; there are: {', '.join(there)}")
     return options
 
 
@@ -101,10 +105,10 @@ def driver_processes(hardware):
     return [row for row in process_table() if hardware and row["name"] in DRIVERS]
 
 
-def killable(hardware, view):
+def killable(hardware, view, link=False):
     """What such a flight starts and goes on without."""
     rows = flight_processes() + driver_processes(hardware)
-    return [row["name"] for row in rows if row["restart"] == "always"] + ["recorder"] + ["viewer"] * view
+    return [row["name"] for row in rows if row["restart"] == "always"] + ["recorder"] + ["viewer"] * view + ["link"] * link
 
 
 def set_up():
@@ -128,7 +132,7 @@ def ask(program, *arguments):
     return answer.stdout
 
 
-def build_and_check(scenario, seed, view=False, hardware=False):
+def build_and_check(scenario, seed, view=False, hardware=False, link=False):
     """Builds what flies. The scenario is read as soon as there is a program that can, long before
     the rest is built. Returns its length [s], take-off included, and what it tells of itself."""
     set_up()
@@ -136,7 +140,7 @@ def build_and_check(scenario, seed, view=False, hardware=False):
     told = json.loads(ask("chase-scenario", scenario, "--seed", seed))
     build(*(row["binary"] for row in flight_processes() + driver_processes(hardware)), "chase-flight", "chase-flight-monitor",
           "chase-recorder", "chase-report", "chase-command", "chase-log", "chase-lidar",
-          *(["chase-viewer"] if view else []))
+          *["chase-viewer"] * view, *["chase-link"] * link)
     ask("chase-flight", scenario, "--print-config", "simulator")  # reads the services' overrides
     return told["duration_s"] + told["settle_s"], told
 
@@ -224,7 +228,7 @@ class Flight:
     def child(self, name, command, **options):
         return processes.Child(name, command, self.folder / f"{name}.log", self.env, **options)
 
-    def start(self, view):
+    def start(self, view, link=False):
         rows = flight_processes() + driver_processes(self.hardware)
         configs = {row["name"]: write_config(self.folder, self.scenario, self.seed, row["name"])
                    for row in rows}
@@ -238,6 +242,8 @@ class Flight:
         os.set_blocking(self.monitor.process.stdout.fileno(), False)
         if view:
             self.start_viewer()
+        if link:
+            self.services.append(self.child("link", ["nice", "-n", "5", BIN / "chase-link"], notifies=True, restarts=True))
         # The simulator comes last: its clock starts when everybody listens.
         for row in sorted(rows, key=lambda r: r["name"] == "simulator"):
             if row["name"] == "simulator":
@@ -389,8 +395,10 @@ def report(folder):
 
 def strikes_of(faults, kills):
     """(mission time in s, effect, process or fault) of a scenario's faults and the command line's kills."""
-    strikes = [(t, "kill", name) for name, t in kills]
-    for fault in faults:
+    wishes = [{"name": name if name.startswith(("kill-", "freeze-")) else f"kill-{name}", "at_s": t, "for_s": FREEZE}
+              for name, t in kills]
+    strikes = []
+    for fault in [*wishes, *faults]:
         effect, _, name = fault["name"].partition("-")
         end = fault["at_s"] + fault["for_s"]
         if effect not in STRIKES:
@@ -404,7 +412,7 @@ def strikes_of(faults, kills):
 
 def fly(options):
     scenario = find_scenario(options.scenario)
-    seconds, told = build_and_check(scenario, options.seed, options.view, options.hardware)
+    seconds, told = build_and_check(scenario, options.seed, options.view, options.hardware, options.link)
     if late := [f"{name}@{t:g}" for name, t in options.kill if t >= told["duration_s"]]:
         raise FlightError(f"--kill {', '.join(late)}: the mission ends at {told['duration_s']:g} s; give an earlier time")
     warn_of_faults(told.get("left_out_live"))
@@ -415,7 +423,7 @@ def fly(options):
     flight = Flight(scenario, options.seed, url, told, options.kill, options.hardware)
     print(f"flying {scenario.stem}, seed {options.seed}, into {flight.folder}", flush=True)
     try:
-        flight.start(options.view)
+        flight.start(options.view, options.link)
         flight.watch()
         flight.commands.finish()
         time.sleep(TAIL)

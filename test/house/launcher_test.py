@@ -154,6 +154,24 @@ class FlightTest(unittest.TestCase):
         said = (self.folder / "viewer.log").read_text(encoding="utf-8")
         self.assertEqual(said.splitlines()[0], f"--port {port}")
 
+    def test_link_flies_along_and_is_started_anew(self):
+        self.program("chase-link", SERVICE.format(behaviour=""))
+        self.program("chase-flight-monitor", f"""
+            import json, pathlib, signal, time
+            def say(t, done=False):
+                print(json.dumps(dict(mission_time=t, duration=2, distance=2.5, visible=1.0, rtf=0.0, done=done)), flush=True)
+            log, end = pathlib.Path({str(self.bin / "flight/link.log")!r}), time.monotonic() + 20
+            say(1)
+            while time.monotonic() < end and log.read_text().count("working") < 2:
+                time.sleep(0.1)
+            say(2, done=True)
+            signal.pause()
+            """)
+        code, _, err = self.fly("--link", "--kill", "link@1")
+        self.assertEqual(code, 0, err)
+        self.assertIn("chase-link", self.built[-1])
+        self.assertIn("link ended (SIGKILL): restarted", err)
+
     def test_hardware_flies_through_the_drivers(self):
         for row in fly.flight_processes() + fly.driver_processes(True):
             self.program(row["binary"], SERVICE.format(behaviour="print(*sys.argv[1:], flush=True)"))
@@ -351,7 +369,15 @@ class FlightTest(unittest.TestCase):
     def test_whatever_was_started_can_be_killed(self):
         self.assertEqual(fly.killable(False, False), ["odometry", "mapping", "perception", "prediction", "planning",
                                                       "control", "mission", "recorder"])
-        self.assertEqual(fly.killable(True, True)[7:], ["lidar", "fcu", "camera", "recorder", "viewer"])
+        self.assertEqual(fly.killable(True, True, True)[7:], ["lidar", "fcu", "camera", "recorder", "viewer", "link"])
+        for wish, *options in (["recorder@1"], ["kill-recorder@1"], ["freeze-recorder@1"], ["freeze-viewer@1", "--view"],
+                               ["kill-link@1", "--link"], ["freeze-link@1", "--link"], ["freeze-planning@1"]):
+            self.assertEqual(fly.parse(["--kill", wish, *options]).kill, [(wish.removesuffix("@1"), 1.0)])
+        for wish in ("link@1", "freeze-viewer@1", "melt-recorder@1"):
+            with self.assertRaises(fly.FlightError):
+                fly.parse(["--kill", wish])
+        self.assertEqual(fly.strikes_of([], [("link", 1.0), ("freeze-recorder", 2.0)]),
+                         [(1.0, "kill", "link"), (2.0, "freeze", "recorder"), (4.0, "thaw", "recorder")])
         for arguments in (["--kill", "fcu@1"], ["--kill", "viewer@1"], ["--kill", "simulator@1", "--hardware"]):
             code, _, err = self.fly(*arguments)
             self.assertEqual(code, 1)
