@@ -162,7 +162,7 @@ class FlightTest(unittest.TestCase):
                 print(json.dumps(dict(mission_time=t, duration=2, distance=2.5, visible=1.0, rtf=0.0, done=done)), flush=True)
             log, end = pathlib.Path({str(self.bin / "flight/link.log")!r}), time.monotonic() + 20
             say(1)
-            while time.monotonic() < end and log.read_text().count("working") < 2:
+            while time.monotonic() < end and not (log.exists() and log.read_text().count("working") == 2):
                 time.sleep(0.1)
             say(2, done=True)
             signal.pause()
