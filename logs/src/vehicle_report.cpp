@@ -276,7 +276,7 @@ class Gatherer {
   bool follows_ = false;
   std::set<std::string> vehicles_;
   double log_begin_ = 0.0, end_ = 0.0, next_shown_ = -1e9;  // s
-  Lane health_, target_, verdict_, flight_;
+  Lane health_, target_, verdict_, flight_{true};
   long poses_ = 0, targets_ = 0, tracked_ = 0, plans_ = 0, fallbacks_ = 0, certified_ = 0;
   int32_t epoch_ = 0;
   long frame_changes_ = 0;

@@ -35,7 +35,7 @@ struct ChannelHealth {
 struct ProcessHealth {
   std::string name, detail, last_error;
   int state = 0;             ///< status_t's constants
-  double age = 0.0;          ///< since the status was heard, s
+  double age = 0.0;          ///< since the status was heard, s; negative: never
   double cpu_percent = 0.0;  ///< of one core since the status before; negative: not known
   double rss_mb = 0.0;
   int restarts = -1;  ///< as the mission process counts; negative: not known

@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <chrono>
 #include <csignal>
 #include <filesystem>
 #include <fstream>
@@ -188,6 +189,29 @@ TEST_F(RecorderTest, HeavyLogsOfEarlierRecordersMakeRoomFirst) {
   EXPECT_EQ(Names().count("a-heavyweights.lcm"), 1u);
   std::filesystem::remove(folder_ / "a-heavyweights.lcm");
   EXPECT_EQ(Stamps("POSE").size(), 300u);
+}
+
+TEST_F(RecorderTest, HeavyLogsOfEarlierRecordersAreKeptForTheirMinutesToo) {
+  using std::filesystem::file_time_type;
+  for (const char* name : {"a", "b"}) {
+    Recorder recorder(config_, name, kStart);
+    Feed(&recorder, 0, 1);
+  }
+  const int64_t age = std::chrono::duration_cast<std::chrono::microseconds>(
+                          std::chrono::system_clock::now().time_since_epoch())
+                          .count();
+  const file_time_type now = file_time_type::clock::now();
+  using std::chrono::seconds;
+  last_write_time(folder_ / "a-heavy.lcm", now - seconds(40));
+  last_write_time(folder_ / "a.lcm", now - seconds(40));
+  last_write_time(folder_ / "b-heavy.lcm", now - seconds(20));
+  for (const double minutes : {-1.0, 0.0, 0.5}) {
+    config_.heavy_minutes = minutes;
+    Recorder recorder(config_, "c", age);
+    recorder.Tick(age, kPlenty);
+    EXPECT_EQ(Names().count("a-heavy.lcm"), minutes > 0.0 ? 0u : 1u) << minutes;
+  }
+  for (const char* name : {"a.lcm", "b.lcm", "b-heavy.lcm"}) EXPECT_EQ(Names().count(name), 1u);
 }
 
 /// As a file system's or a user's limit on a file does: the next log takes what comes.
