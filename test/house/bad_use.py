@@ -197,7 +197,7 @@ class BadUse(unittest.TestCase):
 
     def test_options_that_would_do_nothing(self):
         def check(program):
-            for words in (("--lcm-url", "udpm://239.255.76.67:7667"), ("--channel-prefix", "eagle")):
+            for words in (("--lcm-url", "udpm://239.255.76.67:7667"), ("--key-file", "a.key")):
                 self.assert_refused(run(program, "--replay", "a.lcm", "--out", "b.lcm", *words), words[0], "--replay")
         self.for_each(self.replayable(), check)
         for program, *words in (("chase-viewer", "--play", "--lcm-url"), ("chase-viewer", "--play", "--token-file"),
