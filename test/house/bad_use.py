@@ -23,7 +23,7 @@ TOOL_SERVICES = {"lidar", "camera", "odometry", "mapping", "perception", "predic
 CAMPAIGNS = ["perception_campaign", "perception_photos", "../test/mapping_campaign", "../test/mapping_walkers",
              "../test/odometry_trial"]  # each flies one service
 SCRIPTS = [".ci/run", "deploy/build", "deploy/doctor", "deploy/fly", "deploy/scenarios/twelve/generate.py", "deploy/setup",
-           "deploy/slurm/submit", "deploy/spy", "test/run", "test/flight/calibration", "test/flight/live_kills", "test/flight/sentinels",
+           "deploy/slurm/submit", "deploy/spy", "test/run", "test/flight/bars", "test/flight/calibration", "test/flight/live_kills", "test/flight/sentinels",
            "test/fuzz/fuzz_processes.py", "test/fuzz/make_corpus", "test/fuzz/run", "test/odometry/campaign.py", "test/package/clean_root", "test/safety/run",
            "test/sanitize/run", "test/viewer/live_flights.py"]
 LIMIT = 20  # s
