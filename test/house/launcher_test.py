@@ -539,12 +539,13 @@ class FlightTest(unittest.TestCase):
         self.assertIsNone(bus.configured(file))
         file.write_text('LCM_DEFAULT_URL="udpm://239.1.2.3:7000?ttl=0"\n')
         self.assertEqual(bus.configured(file), "udpm://239.1.2.3:7000?ttl=0")
-        # The doctor looks at the units' bus; what a user flies there is no business of theirs.
-        os.environ.pop("LCM_DEFAULT_URL")
-        self.patch(places, "INSTALLED", True)
         self.patch(places, "ENVIRONMENT", file)
-        self.assertEqual(bus.url(), bus.DEFAULT_URL)
-        self.assertTrue(doctor.url().startswith("udpm://239.1.2.3:7000?"))
+        os.environ.pop("LCM_DEFAULT_URL")
+        self.assertEqual(bus.url(), bus.DEFAULT_URL, "the source tree's own")
+        self.patch(places, "INSTALLED", True)
+        self.assertTrue(bus.url().startswith("udpm://239.1.2.3:7000?"), "doctor, fly and spy")
+        os.environ["LCM_DEFAULT_URL"] = "udpm://239.1.2.3:7001?ttl=0&recv_buf_size=1"
+        self.assertEqual(bus.url(), os.environ["LCM_DEFAULT_URL"])
 
     def test_process_that_refuses_to_start(self):
         self.program("chase-planning", "import sys; sys.exit('planning.yaml:1: no_such: unknown')")
