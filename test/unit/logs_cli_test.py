@@ -321,7 +321,8 @@ class LogTools(unittest.TestCase):
 
     def test_a_log_without_truth_is_reported_by_what_the_vehicle_said(self):
         out = self.folder / "vehicle"
-        log = self.without("vehicle.lcm", lambda channel, k: channel in ("TRUTH", "SCENARIO"))
+        log = self.without("vehicle.lcm", lambda channel, k: channel in ("TRUTH", "SCENARIO") or
+                           channel == "IMU" and 100 <= k < 150)
         answer = run("chase-report", log, "--out", out)
         self.assertEqual(answer.returncode, 0, answer.stderr)
         self.assertIn("no TRUTH", answer.stdout)
@@ -330,6 +331,10 @@ class LogTools(unittest.TestCase):
         self.assertAlmostEqual(sum(metrics["pose_health_s"].values()), metrics["flown_s"], delta=1.0)
         self.assertGreater(metrics["latency_ms"]["TARGET"]["p50"], 0.0)
         self.assertIn("certified_clearance_m", metrics)
+        self.assertAlmostEqual(metrics["longest_gap_s"]["IMU"], 0.255)  # 51 periods
+        self.assertAlmostEqual(metrics["gap_begins_s"]["IMU"], 0.495, delta=0.011)
+        self.assertRegex((out / "report.html").read_text(), r"IMU: longest gap 0\.2[56] s, from 0\.5 s of the log on")
+        self.assertRegex(answer.stdout, "IMU: longest gap")
         self.assertIn('"lane":"pose"', (out / "report.html").read_text())
         log.write_bytes(log.read_bytes()[:-50])
         self.assert_refused(run("chase-report", log, "--out", out), 2, "cut off")

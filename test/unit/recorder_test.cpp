@@ -56,6 +56,14 @@ class RecorderTest : public testing::Test {
   }
   void TearDown() override { std::filesystem::remove_all(folder_); }
 
+  /// The log was written last at that time, us.
+  void SetAge(const std::string& name, int64_t utime) const {
+    const auto ago =
+        std::chrono::system_clock::now().time_since_epoch() - std::chrono::microseconds(utime);
+    last_write_time(folder_ / name, std::filesystem::file_time_type::clock::now() -
+                                        std::chrono::duration_cast<std::chrono::seconds>(ago));
+  }
+
   std::set<std::string> Names() const {
     std::set<std::string> names;
     for (const auto& entry : std::filesystem::directory_iterator(folder_))
@@ -171,11 +179,13 @@ TEST_F(RecorderTest, OnANearlyFullDiskHeavyMakesRoomForLight) {
 }
 
 TEST_F(RecorderTest, HeavyLogsOfEarlierRecordersMakeRoomFirst) {
-  config_.heavy_minutes = 0.5;
+  config_.heavy_minutes = 1e6;
   for (const char* name : {"a", "b"}) {
     Recorder recorder(config_, name, kStart);
     Feed(&recorder, 0, 10);
   }
+  for (const char* name : {"a-heavy.lcm", "b-heavy.lcm"}) SetAge(name, kStart + 10 * kSecond);
+  config_.heavy_minutes = 0.5;
   std::ofstream(folder_ / "a-heavyweights.lcm") << "somebody's";
   {
     Recorder recorder(config_, "b", kStart);
@@ -193,6 +203,7 @@ TEST_F(RecorderTest, HeavyLogsOfEarlierRecordersMakeRoomFirst) {
 
 TEST_F(RecorderTest, HeavyLogsOfEarlierRecordersAreKeptForTheirMinutesToo) {
   using std::filesystem::file_time_type;
+  config_.heavy_minutes = 1e6;
   for (const char* name : {"a", "b"}) {
     Recorder recorder(config_, name, kStart);
     Feed(&recorder, 0, 1);

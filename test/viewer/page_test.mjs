@@ -180,8 +180,8 @@ assert.deepStrictEqual(moved, [[1, 1], [1.4, 1], [1.4, 1], [2, 1], [1]]);
 
 // What is too old is not shown as what is.
 const past = await page.evaluate(async () => {
-  const {scene} = window.chase, path = [0, 0, 1, 1, 0, 1, 2, 0, 1], age = {age: 5.1, stale: true}, shown = (id) => document.getElementById(id);
-  const state = {...window.chase.model.state, generation: 'old', tracking: {following: 1, ...age}, row: [0],
+  const {scene} = window.chase, path = [0, 0, 1, 1, 0, 1, 2, 0, 1], age = {age: 5.1, stale: true}, shown = (id) => document.getElementById(id), {generation} = scene;
+  const state = {...window.chase.model.state, generation: generation + 0.1, tracking: {following: 1, ...age}, row: [0],
     drone: {p: [0, 0, 1], q: [1, 0, 0, 0], health: 0}, plan: {verdict: 0, radius: 0.4, path, stop: path, ...age},
     forecast: {path, spread: [0.5, 0.5], ...age}, obstacles: age, image: age,
     target: {state: 1, p: [0, 0, 0], axes: [0.1, 0.2, 0.3], q: [1, 0, 0, 0], radius: 0.2, height: 1, ...age}};
@@ -190,9 +190,12 @@ const past = await page.evaluate(async () => {
     bad: ['verdict', 'targetstate'].map((id) => shown(id).className), image: shown('image').style.opacity,
     hidden: ['plan', 'stop', 'forecast', 'fan', 'covariance', 'sight'].map((part) => scene[part].visible),
     colors: ['target', 'solid'].map((part) => scene[part].material.color.getHexString())};
-  window.chase.link.handlers.state({...state, generation: 'new', obstacles: null, image: null, target: {...state.target, stale: false}});
-  window.chase.link.handlers.state({...state, generation: 'newer', tracking: {following: 1}});
-  return {...seen, follows: shown('figures').textContent, again: ['target', 'solid'].map((part) => scene[part].material.color.getHexString())};
+  window.chase.link.handlers.state({...state, generation: generation + 0.2, obstacles: null, image: null, target: {...state.target, stale: false}});
+  const again = ['target', 'solid'].map((part) => scene[part].material.color.getHexString());
+  window.chase.link.handlers.state({...state, generation: generation + 0.3, tracking: {following: 1}});
+  const follows = shown('figures').textContent;
+  scene.begin(generation);
+  return {...seen, follows, again};
 });
 assert.deepStrictEqual(past, {words: ['plan 5.1 s old', 'target 5.1 s old', 'image 5.1 s old'],
   figures: 'height 1.00 m\ntracking 5.1 s old\nobstacles 5.1 s old', bad: ['pill bad', 'pill bad'], image: '0.4',
