@@ -181,7 +181,8 @@ TEST(ViewerAnyLog, EveryChannelIsShownButTruthAndFault) {
               row.channel == "TRUTH" || row.channel == "FAULT" ? 0U : 1U)
         << row.channel;
   std::ifstream file("deploy/processes.json");
-  for (const json& row : json::parse(file)["processes"])
+  const json processes = json::parse(file)["processes"];
+  for (const json& row : processes)
     EXPECT_EQ(listener.heard.count(bus::StatusChannel(row["name"])), 1U) << row["name"];
   SubscribeUnknown(listener, [](const char*, const auto&) {});
   EXPECT_EQ(listener.heard.count("FAULT") + listener.heard.count("TRUTH"), 2U);
