@@ -418,7 +418,7 @@ PlanResult Pilot::Rest(double t0, const Start& start) const {
 // stands.
 PlanResult Pilot::Hover(double t0, const Start& start) {
   constexpr double kSoon = 4.0;   // s: perception takes 3 for one that stands within 5 m
-  constexpr double kLong = 10.0;  // s
+  constexpr double kLong = 10.0;  // s: chosen; so that whoever is in view is not turned away from
   if (!hovers_since_) hovers_since_ = t0;
   if (t0 - *hovers_since_ > (chased_ ? kSoon : kLong))
     return BrakeAndLook(t0, start, start.yaw.yaw + 0.5 * M_PI);
