@@ -89,6 +89,7 @@ struct Context {
   float rel[kQuadratureNodes][3], rel_rate[kQuadratureNodes][2];
   float target[kQuadratureNodes][3];
   float weight3[kQuadratureNodes], weight4[kQuadratureNodes];
+  int nodes[kQuadratureNodes];  ///< in the order in which they are asked
   float desired_distance, desired_height, rho_height, yaw_floor;
   float cost_range;
   const NearNode* near;
@@ -203,7 +204,9 @@ struct Table {
   void (*spread)(Context& c, float* x);
   /// Indices i with low < j1[i] <= high, ascending; `ids` needs room for stride + kPad.
   int (*select)(const Context& c, float low, float high, int* ids);
-  /// Adds quadrature nodes [begin, end) of the node order to value[i] of ids[i] and keeps those
+  /// Sets `nodes` by what they cost the candidates ids[0], ids[stride] ... of kPad, the most first.
+  void (*order_nodes)(Context& c, const int* ids, int stride);
+  /// Adds quadrature nodes [begin, end) of `nodes` to value[i] of ids[i] and keeps those
   /// below `limit`; returns how many.
   int (*distance_and_yaw)(const Context& c, int* ids, float* value, int n, float limit, int begin,
                           int end);

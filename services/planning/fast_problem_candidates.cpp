@@ -176,6 +176,7 @@ void FastProblem::SetNodes() {
       c.phi[k][f] = static_cast<float>(tables_->phi[k][4 + f]);
       c.slope[k][f] = static_cast<float>(tables_->slope[k][4 + f]);
     }
+    c.nodes[k] = k;
     c.weight3[k] = static_cast<float>(config_.weight_distance * T * GaussNodes().weight[k]);
     c.weight4[k] = static_cast<float>(config_.weight_yaw * T * GaussNodes().weight[k]);
   }

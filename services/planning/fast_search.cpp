@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
+#include <functional>
 
 #include "services/planning/fast_problem.h"
 #include "services/planning/limits.h"
@@ -57,7 +59,25 @@ class FastSearch : public Search {
   }
 
  private:
-  using Entry = std::pair<float, int>;  // lower bound or cost, candidate
+  /// A candidate and its lower bound or cost, which is not negative: sorted as one number.
+  struct Entry {
+    uint64_t key;
+    Entry() = default;
+    Entry(float cost, int id) {
+      uint32_t bits;
+      std::memcpy(&bits, &cost, sizeof bits);
+      key = uint64_t{bits} << 32 | static_cast<uint32_t>(id);
+    }
+    float cost() const {
+      const auto bits = static_cast<uint32_t>(key >> 32);
+      float cost;
+      std::memcpy(&cost, &bits, sizeof cost);
+      return cost;
+    }
+    int id() const { return static_cast<int>(key & 0xffffffff); }
+    bool operator<(const Entry& e) const { return key < e.key; }
+    bool operator>(const Entry& e) const { return key > e.key; }
+  };
 
   int Run();
   bool PruneAll();
@@ -65,6 +85,7 @@ class FastSearch : public Search {
   void WeighListed(int n);
   void SearchGroups(const float* levels, int n_levels);
   void Drain(int max_batches);
+  static void Sort(Entry* entries, int n);
   void Batch(int* ids, float* lower, int n);
   void CheckAll();
   int CheapestAccepted();
@@ -129,16 +150,16 @@ void FastSearch::Batch(int* ids, float* lower, int n) {
     cost[i] = cost[at];
   }
   if (!prune) kernels_.obstacles(fast_.context(), left, cost, kept);
-  std::pair<float, int> sorted[kBatch];
+  Entry sorted[kBatch];
   for (int i = 0; i < kept; ++i) sorted[i] = {cost[i], i};
-  std::sort(sorted, sorted + kept);
+  Sort(sorted, kept);
   for (int i = 0; i < kept; ++i) {
-    if (!(sorted[i].first < Limit())) break;
-    const int id = left[sorted[i].second];
-    if (!Passes(fast_.PlanOf(id), states[sorted[i].second])) continue;
+    if (!(sorted[i].cost() < Limit())) break;
+    const int id = left[sorted[i].id()];
+    if (!Passes(fast_.PlanOf(id), states[sorted[i].id()])) continue;
     ++feasible_;
-    accepted_.push_back({sorted[i].first, id});
-    best_ = std::min(best_, sorted[i].first);
+    accepted_.push_back({sorted[i].cost(), id});
+    best_ = std::min(best_, sorted[i].cost());
   }
 }
 
@@ -154,10 +175,11 @@ void FastSearch::Weigh(float low, float high) {
 void FastSearch::WeighListed(int n) {
   if (n == 0) return;
   fast_.SetCosts();
-  const kernels::Context& c = fast_.context();
+  kernels::Context& c = fast_.context();
   values_.resize(static_cast<size_t>(n + kPad));
   for (int i = 0; i < n; ++i) values_[static_cast<size_t>(i)] = c.j1[ids_[static_cast<size_t>(i)]];
   constexpr int kFirst = 4;  // of the nodes: most candidates end there
+  if (Limit() < HUGE_VALF && n >= 4 * kPad) kernels_.order_nodes(c, ids_.data(), n / kPad);
   n = kernels_.distance_and_yaw(c, ids_.data(), values_.data(), n, Limit(), 0, kFirst);
   n = kernels_.distance_and_yaw(c, ids_.data(), values_.data(), n, Limit(), kFirst, kNodes);
   for (int i = 0; i < n; ++i)
@@ -172,7 +194,7 @@ void FastSearch::SearchGroups(const float* levels, int n_levels) {
   fast_.AliveGroups(&groups_);
   fast_.Spread();
   const auto is_ruled_out = [&](const Entry& e) {
-    return !std::binary_search(groups_.begin(), groups_.end(), e.second / size);
+    return !std::binary_search(groups_.begin(), groups_.end(), e.id() / size);
   };
   heap_.erase(std::remove_if(heap_.begin(), heap_.end(), is_ruled_out), heap_.end());
   for (int level = 0; level < n_levels; ++level) {
@@ -192,37 +214,59 @@ void FastSearch::SearchGroups(const float* levels, int n_levels) {
   }
 }
 
+// By counting what is before each, as branches that nobody can foretell take longer.
+void FastSearch::Sort(Entry* entries, int n) {
+  constexpr int kMost = 4 * kBatch;
+  float cost[kMost];
+  Entry sorted[kMost];
+  for (int i = 0; i < n; ++i) cost[i] = entries[i].cost();
+  for (int i = 0; i < n; ++i) {
+    int before = 0;
+    for (int j = 0; j < i; ++j) before += cost[j] <= cost[i];
+    for (int j = i + 1; j < n; ++j) before += cost[j] < cost[i];
+    sorted[before] = entries[i];
+  }
+  std::copy(sorted, sorted + n, entries);
+}
+
+// The cheapest of what is listed, batch by batch.
 void FastSearch::Drain(int max_batches) {
-  const auto later = [](const Entry& a, const Entry& b) { return a.first > b.first; };
-  std::make_heap(heap_.begin(), heap_.end(), later);
-  for (int batch = 0; batch < max_batches && !heap_.empty(); ++batch) {
+  constexpr size_t kSorted = 4 * kBatch;  // at a time
+  size_t at = 0;
+  for (int batch = 0; batch < max_batches && at < heap_.size(); ++batch) {
+    if (batch % 4 == 0) {
+      const auto from = heap_.begin() + static_cast<std::ptrdiff_t>(at);
+      const size_t n = std::min(kSorted, heap_.size() - at);
+      if (at + n < heap_.size())
+        std::nth_element(from, from + static_cast<std::ptrdiff_t>(n), heap_.end());
+      Sort(&heap_[at], static_cast<int>(n));
+    }
     int ids[kBatch + kPad];
     float lower[kBatch + kPad];
     int n = 0;
-    while (n < kBatch && !heap_.empty() && heap_.front().first < Limit()) {
-      std::pop_heap(heap_.begin(), heap_.end(), later);
-      lower[n] = heap_.back().first;
-      ids[n++] = heap_.back().second;
-      heap_.pop_back();
+    for (; n < kBatch && at < heap_.size() && heap_[at].cost() < Limit(); ++at, ++n) {
+      lower[n] = heap_[at].cost();
+      ids[n] = heap_[at].id();
     }
     if (n == 0) return heap_.clear();
     Batch(ids, lower, n);
   }
+  heap_.erase(heap_.begin(), heap_.begin() + static_cast<std::ptrdiff_t>(at));
 }
 
 // Nothing found among the cheapest: test what is left side by side in memory.
 void FastSearch::CheckAll() {
   int n = static_cast<int>(heap_.size());
   std::sort(heap_.begin(), heap_.end(),
-            [](const Entry& a, const Entry& b) { return a.second < b.second; });
+            [](const Entry& a, const Entry& b) { return a.id() < b.id(); });
   ids_.resize(static_cast<size_t>(n + kPad));
   states_.resize(static_cast<size_t>(n + kPad));
-  for (int i = 0; i < n; ++i) ids_[static_cast<size_t>(i)] = heap_[static_cast<size_t>(i)].second;
+  for (int i = 0; i < n; ++i) ids_[static_cast<size_t>(i)] = heap_[static_cast<size_t>(i)].id();
   checked_ += n;
   n = kernels_.check(fast_.context(), ids_.data(), states_.data(), n);
   size_t at = 0;
   for (int i = 0; i < n; ++i) {
-    while (heap_[at].second != ids_[static_cast<size_t>(i)]) ++at;
+    while (heap_[at].id() != ids_[static_cast<size_t>(i)]) ++at;
     heap_[static_cast<size_t>(i)] = heap_[at++];
   }
   heap_.resize(static_cast<size_t>(n));
@@ -232,12 +276,12 @@ void FastSearch::CheckAll() {
 int FastSearch::CheapestAccepted() {
   int winner = -1;
   std::sort(accepted_.begin(), accepted_.end(),
-            [](const Entry& a, const Entry& b) { return a.second < b.second; });
-  for (const auto& [bound, id] : accepted_) {
-    if (!(bound < Near(best_))) continue;
-    const Cost cost = fast_.CostOf(id);
+            [](const Entry& a, const Entry& b) { return a.id() < b.id(); });
+  for (const Entry& e : accepted_) {
+    if (!(e.cost() < Near(best_))) continue;
+    const Cost cost = fast_.CostOf(e.id());
     if (winner >= 0 && !(cost.total < winner_cost_.total)) continue;
-    winner = id;
+    winner = e.id();
     winner_cost_ = cost;
   }
   return winner;

@@ -56,6 +56,7 @@ void Resting::From(const world::State& start, double t0) {
   heights_ = BrakeCurve(start, kBrakeTimes[0]);
   has_problem_ = false;
   within_.reset();
+  touched_.reset();
 }
 
 std::optional<Stop> Resting::Brake() {
@@ -112,12 +113,25 @@ std::optional<Stop> Resting::StepAside() {
 }
 
 std::optional<Stop> Resting::Certified(const Curve& curve, double T) {
+  if (!curve.allFinite() || IsTouched(curve, T)) return std::nullopt;
   SetProblem(T);
-  if (!curve.allFinite() || !KeepsLimits(curve, problem_) || !IsForecast(curve, T))
-    return std::nullopt;
-  auto proofs = ProveOff(curve, problem_, 1.0);
+  if (!KeepsLimits(curve, problem_) || !IsForecast(curve, T)) return std::nullopt;
+  Refusal refusal;
+  auto proofs = ProveOff(curve, problem_, 1.0, nullptr, &refusal);
+  if (!proofs && refusal.tau >= 0.0) {
+    const Ellipsoid& e = problem_.obstacles[static_cast<size_t>(refusal.obstacle)];
+    if (e.safety_from == 0.0) touched_ = {e.index, refusal.tau, e.safety_radius};
+  }
   if (!proofs || (!leaves_ && LeavesListed(*proofs))) return std::nullopt;
   return Stop{{over_.t0, T, curve}, std::move(*proofs), true};
+}
+
+// Whether it comes too near to what the last way touched, when that was.
+bool Resting::IsTouched(const Curve& curve, double T) const {
+  if (!touched_) return false;
+  const world::Obstacle& o = Obstacle(static_cast<size_t>(touched_->obstacle));
+  return world::Touch(DroneBall(curve, touched_->radius), nullptr,
+                      world::MakeBody(o, over_.t0, T, config_.sigmas), touched_->tau);
 }
 
 bool Resting::LeavesListed(const std::vector<Proof>& proofs) const {

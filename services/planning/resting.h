@@ -74,6 +74,7 @@ class Resting {
   bool IsForecast(const Curve& way, double T) const;
   std::pair<double, double> Clearances(const Curve& curve, double tau) const;
   std::pair<double, double> Within();
+  bool IsTouched(const Curve& curve, double T) const;
   bool LeavesListed(const std::vector<Proof>& proofs) const;
   void SetProblem(double T);
 
@@ -87,6 +88,12 @@ class Resting {
   bool has_problem_ = false, leaves_ = true;
   bool beyond_ = true, goes_beyond_ = false;  ///< the heights: may it, and would the quickest way
   std::optional<std::pair<double, double>> within_;
+  struct Touched {
+    int obstacle;  ///< index of Obstacle()
+    double tau;
+    double radius;  ///< m, that is kept to it
+  };
+  std::optional<Touched> touched_;  ///< by the last way from this start that was refused
 };
 
 }  // namespace chase::planning

@@ -224,13 +224,18 @@ bool StaysOff(const Curve& plan, const Problem& problem, double sight_from, Refu
 
 // Where a plan fails it fails at what is near: that is asked first.
 std::optional<std::vector<Proof>> ProveOff(const Curve& plan, const Problem& problem,
-                                           double sight_from, SeparationMemory* memory) {
+                                           double sight_from, SeparationMemory* memory,
+                                           Refusal* at) {
   Prover prover(plan, problem, sight_from);
   const Sieve sieve(plan, problem, sight_from);
   if (memory) memory->About(plan, problem);
   std::vector<Proof> near, proofs;
-  for (const Ellipsoid& e : problem.obstacles)
-    if (sieve.IsNear(e) && !prover.IsOff(e, &near, memory)) return std::nullopt;
+  for (size_t j = 0; j < problem.obstacles.size(); ++j) {
+    const Ellipsoid& e = problem.obstacles[j];
+    if (!sieve.IsNear(e) || prover.IsOff(e, &near, memory)) continue;
+    if (at) *at = {static_cast<int>(j), prover.tau()};
+    return std::nullopt;
+  }
   proofs.reserve(2 * problem.obstacles.size() + 1);
   auto next = near.begin();
   for (const Ellipsoid& e : problem.obstacles) {

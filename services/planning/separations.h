@@ -54,9 +54,10 @@ struct Refusal {
 bool StaysOff(const Curve& plan, const Problem& problem, double sight_from, Refusal* last = nullptr,
               SeparationMemory* memory = nullptr);
 
-/// The proofs of that for all obstacles; nothing where it does not.
+/// The proofs of that for all obstacles; nothing where it does not, and then `at` tells where.
 std::optional<std::vector<Proof>> ProveOff(const Curve& plan, const Problem& problem,
-                                           double sight_from, SeparationMemory* memory = nullptr);
+                                           double sight_from, SeparationMemory* memory = nullptr,
+                                           Refusal* at = nullptr);
 
 /// The drone's ball, and the target's end of the line of sight with its uncertainty; `share` of the
 /// latter.

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include "services/planning/resting.h"
 #include "test/unit/planning_ways.h"
 
 // Ways to rest, against brakings written anew and judged by sampled distances.
@@ -46,6 +47,28 @@ TEST(Brake, FindsAQuickOneWhereThereIsOneAndNoneElse) {
   }
   EXPECT_GT(found, 100);
   EXPECT_GT(none, 20);
+}
+
+// What refused one braking is asked about the next before all else: that refuses none that is free.
+TEST(Brake, IsTheFirstThatIsCertifiedWithoutTheOthers) {
+  const PlannerConfig c;
+  int later = 0;
+  for (unsigned seed = 0; seed < 3000; ++seed) {
+    const PlanRequest request = RandomRequest(c, seed);
+    std::optional<Stop> first;
+    int refused = 0;
+    for (const double T : kBrakeTimes) {
+      first = Resting(c, request).Certified(BrakeCurve(request.start, T), T);
+      if (first) break;
+      ++refused;
+    }
+    const auto stop = Resting(c, request).BrakeWithin(false);
+    ASSERT_EQ(stop.has_value(), first.has_value()) << seed;
+    if (!stop) continue;
+    EXPECT_EQ(stop->trajectory.duration, first->trajectory.duration) << seed;
+    later += refused > 1;
+  }
+  EXPECT_GT(later, 20);
 }
 
 PlanRequest AtRest(PlanRequest request) {
