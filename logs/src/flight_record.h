@@ -27,8 +27,8 @@ struct TruthSample {
   Eigen::Vector2d target_px = Eigen::Vector2d::Zero();
   bool target_in_image = false;
   double visible_share = 0.0;  ///< of the target's pixels in the last image
-  /// The flight's state has it on the ground, or on the way from or to it, or control comes down by
-  /// itself and slowly: touching that is no harm.
+  /// It has not been up yet, or the flight's state has it on the ground, or on the way from or to
+  /// it, or control comes down by itself and slowly: touching that is no harm.
   bool may_stand = false;
   bool done = false;  ///< it lies on the ground in DONE
 };

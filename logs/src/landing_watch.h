@@ -8,9 +8,10 @@
 
 namespace chase::logs {
 
-/// Tells a landing from a contact with the ground: the flight's state is one of landing or
-/// standing, or control or the autopilot has come down by itself, gently, and is not yet back at
-/// the heights of plans. Also tells when the flight is over: in DONE, on the ground.
+/// Tells a landing from a contact with the ground: the body has not been up yet, the flight's state
+/// is one of landing or standing, or control or the autopilot has come down by itself, gently, and
+/// is not yet back at the heights of plans. Also tells when the flight is over: in DONE, on the
+/// ground.
 class LandingWatch {
  public:
   void Hear(const flight_state_t& message) { state_ = message.state; }
@@ -24,7 +25,7 @@ class LandingWatch {
 
  private:
   int8_t state_ = -1;  // of flight_state_t, once it is heard
-  bool control_ = false, autopilot_ = false, came_down_ = false, lies_ = false;
+  bool control_ = false, autopilot_ = false, stands_ = true, came_down_ = false, lies_ = false;
 };
 
 }  // namespace chase::logs

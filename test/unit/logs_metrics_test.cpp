@@ -199,6 +199,7 @@ TEST(Metrics, ATouchOfTheGroundIsALandingByTheFlightsState) {
   };
   const auto touches = [&](int8_t state, bool control, bool autopilot, double speed) {
     LandingWatch watch;
+    Marked(at(1.5, 0.0), &watch);
     Tell(state, control, autopilot, &watch);
     return Marked(at(0.2, speed), &watch).may_stand;
   };
@@ -210,6 +211,10 @@ TEST(Metrics, ATouchOfTheGroundIsALandingByTheFlightsState) {
   EXPECT_TRUE(touches(flight_state_t::CHASE, false, true, 0.5)) << "the autopilot lands";
   EXPECT_FALSE(touches(flight_state_t::CHASE, false, true, 0.8));
   LandingWatch watch;
+  Tell(flight_state_t::EMERGENCY, false, false, &watch);
+  EXPECT_TRUE(Marked(at(0.1, 0.0), &watch).may_stand) << "has not been up";
+  Marked(at(1.5, 0.5), &watch);
+  EXPECT_FALSE(Marked(at(0.1, 0.0), &watch).may_stand);
   Tell(flight_state_t::CHASE, false, true, &watch);
   Marked(at(0.4, 0.5), &watch);
   Tell(flight_state_t::CHASE, false, false, &watch);
