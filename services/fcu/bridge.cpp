@@ -59,7 +59,10 @@ bool Bridge::Hears(int64_t now) const {
 void Bridge::Receive(int64_t arrival, int64_t now, const uint8_t* data, std::size_t size,
                      bool whole, uint64_t from) {
   if (from != peer_ && Hears(now)) return;
+  const int64_t late = reader_.counters().late;
   reader_.Add(now, data, size, [&](const Frame& frame) { OnFrame(frame, {arrival, now, from}); });
+  // A PX4 without a clock begins at the time that it stored, and takes ours from our heartbeat.
+  if (reader_.counters().late > late && !Hears(now)) peer_ = from;
   if (whole) reader_.Reset();
 }
 
