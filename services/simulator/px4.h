@@ -28,6 +28,7 @@ struct Px4Options {
   double bat_low_thr = 0.15;        ///< charge below which it warns
   double bat_crit_thr = 0.07;       ///< charge below which it lands, where it does
   double bat_emergen_thr = 0.05;    ///< charge below which it does so again
+  int ekf2_ev_qmin = 0;             ///< quality of ODOMETRY below which it is left out; 0: none
   double lost_acks = 0.0;           ///< probability
   bool starts_in_version_1 = true;  ///< of the protocol, until it hears version 2
   double drift_ppm = 30.0;          ///< of its clock
