@@ -108,6 +108,10 @@ double Autopilot::silence(int64_t utime) const {
 
 bool Autopilot::armed() const { return Has(heartbeat_.base_mode, mav::MavModeFlag::SAFETY_ARMED); }
 
+bool Autopilot::terminated() const {
+  return heartbeat_.system_status == static_cast<uint8_t>(mav::MavState::FLIGHT_TERMINATION);
+}
+
 bool Autopilot::failsafe() const {
   switch (static_cast<mav::MavState>(heartbeat_.system_status)) {
     case mav::MavState::CRITICAL:

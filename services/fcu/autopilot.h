@@ -32,6 +32,8 @@ class Autopilot {
   /// When the last frame of any kind came.
   int64_t frame_utime() const { return frame_utime_; }
   bool armed() const;
+  /// A kill switch or a termination has stopped the motors, whatever the mode.
+  bool terminated() const;
   /// CRITICAL, EMERGENCY or FLIGHT_TERMINATION.
   bool failsafe() const;
   Mode mode() const { return Mode::Of(heartbeat_.custom_mode); }

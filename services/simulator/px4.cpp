@@ -323,6 +323,7 @@ void Px4::Tick(int64_t utime, int64_t clock, const Px4Body& body) {
   WatchStream();
   WatchTransmitter();
   WatchBattery();
+  WatchKill();
   WatchLanding();
   if (!IsLed()) flown_by_.reset();
   Stream(clock);
@@ -331,7 +332,7 @@ void Px4::Tick(int64_t utime, int64_t clock, const Px4Body& body) {
 AttitudeSetpoint Px4::Demand(const Px4Body& body) const {
   AttitudeSetpoint off;
   off.motors = false;
-  if (!armed_) return off;
+  if (!armed_ || killed_) return off;
   return mode_ == mavlink::kOffboardMode && seen_.setpoint
              ? OffboardDemand(body)
              : own_mode_.Demand(body, mode_ == mavlink::kLandMode);
