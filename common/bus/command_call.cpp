@@ -18,7 +18,8 @@ void CommandCall::Turn() {
 void CommandCall::Hear(const command_ack_t& ack) {
   const Identity& self = bus_->identity();
   if (ack.command_sender == self.process && ack.command_start == self.start && ack.id == id_)
-    client_.OnAnswer(ack.verdict == command_ack_t::ACCEPTED, ack.reason);
+    client_.OnAnswer(ack.verdict == command_ack_t::ACCEPTED, ack.reason,
+                     ack.verdict == command_ack_t::UNKNOWN);
 }
 
 double CommandCall::Elapsed() const { return Seconds(bus_->Now(), given_); }
@@ -37,7 +38,9 @@ command_ack_t Acknowledgement(const command_t& m, const world::CommandAnswer& an
   ack.command_start = m.sender_start;
   ack.id = m.id;
   ack.kind = m.kind;
-  ack.verdict = answer.accepted ? command_ack_t::ACCEPTED : command_ack_t::REFUSED;
+  ack.verdict = answer.accepted  ? command_ack_t::ACCEPTED
+                : answer.unknown ? command_ack_t::UNKNOWN
+                                 : command_ack_t::REFUSED;
   ack.reason = answer.reason;
   return ack;
 }

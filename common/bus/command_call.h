@@ -32,6 +32,7 @@ class CommandCall {
   bool answered() const { return client_.answered(); }
   bool GaveUp() const { return client_.GaveUp(Elapsed()); }
   bool accepted() const { return client_.accepted(); }
+  bool unknown() const { return client_.unknown(); }  ///< whether it took effect
   const std::string& reason() const { return client_.reason(); }
   int kind() const { return client_.command(); }
 

@@ -39,35 +39,39 @@ struct Recorded {
   std::vector<Output> outputs;  // the process's, in the file's order
   std::map<std::string, int64_t> lost;
   std::vector<Damage> damage;
-  bool live = false, one_life = true, has_ticks = false;
+  std::string anew;  // who was started anew: "planning", "the sender of IMU"; empty: nobody
+  bool live = false, has_ticks = false;
 };
 
 Recorded Read(const std::string& log, const std::string& process,
-              const std::set<std::string>& channels) {
+              const std::set<std::string>& channels, const std::string& vehicle) {
   LogReader reader(log);
   Recorded recorded;
-  std::map<std::string, int64_t> starts;  // by channel, and the process's own
+  std::map<std::string, int64_t> starts;  // by who sends
   int64_t latest = 0;
-  const auto same_life = [&](const std::string& of, int64_t start) {
-    recorded.one_life &= starts.try_emplace(of, start).first->second == start;
+  const auto note_start = [&](const std::string& of, int64_t start) {
+    if (starts.try_emplace(of, start).first->second != start && recorded.anew.empty())
+      recorded.anew = of;
   };
   int64_t at = 0;
   for (LogEvent event; reader.Next(&event); at = reader.position()) {
     const auto head = HeadOf(event.bytes.data(), event.bytes.size());
-    if (!head) continue;
+    if (!head || event.channel.rfind(vehicle, 0) != 0) continue;
+    const std::string channel = event.channel.substr(vehicle.size());
     latest = std::max(latest, event.utime);
-    if (head->sender == process) {
+    if (head->sender == process && head->vehicle == vehicle) {
       recorded.live |= event.utime >= kYear2000;
-      same_life("", head->sender_start);
+      note_start(process, head->sender_start);
       status_t status;
-      if (event.channel != StatusChannel(process))
-        recorded.outputs.push_back({event.channel, event.utime, head->inputs});
+      if (channel != StatusChannel(process))
+        recorded.outputs.push_back({channel, event.utime, head->inputs});
       else if (status.decode(event.bytes.data(), 0, static_cast<int>(event.bytes.size())) > 0)
         for (const channel_status_t& c : status.channels) recorded.lost[c.channel] = c.dropped;
     }
-    if (channels.count(event.channel) == 0) continue;
-    same_life(event.channel, head->sender_start);
-    recorded.inputs.push_back({event.channel, head->seq, at, event.utime, latest});
+    if (channels.count(channel) == 0) continue;
+    recorded.live |= event.utime >= kYear2000;
+    note_start("the sender of " + channel, head->sender_start);
+    recorded.inputs.push_back({channel, head->seq, at, event.utime, latest});
   }
   recorded.damage = reader.damage();
   return recorded;
@@ -205,10 +209,23 @@ void NoteMissing(const Recorded& recorded, const std::set<std::string>& channels
   }
 }
 
+/// Empty where the outputs tell in which order the inputs were heard.
+std::string WhyInFileOrder(const Recorded& recorded, const std::string& process) {
+  if (recorded.anew.empty() && !recorded.outputs.empty()) return "";
+  return fmt::format(
+      "{}, so that the log does not tell in which order {} heard its inputs; they "
+      "are replayed in the order in which they were recorded",
+      recorded.anew.empty() ? "the log holds nothing that " + process + " sent"
+                            : recorded.anew + " was started anew in this log",
+      process);
+}
+
 }  // namespace
 
 std::vector<std::string> HeardOrder::Sentences() const {
   std::vector<std::string> lines;
+  if (!in_file_order.empty())
+    lines.push_back(in_file_order + "; the replay's answers may differ from the flight's");
   for (const auto& [channel, m] : missing) {
     if (m.count > 0)
       lines.push_back(fmt::format(
@@ -225,13 +242,16 @@ std::vector<std::string> HeardOrder::Sentences() const {
 }
 
 HeardOrder OrderHeard(const std::string& log, const std::string& process,
-                      const std::set<std::string>& channels) {
-  Recorded recorded = Read(log, process, channels);
+                      const std::set<std::string>& channels, const std::string& vehicle) {
+  Recorded recorded = Read(log, process, channels, vehicle);
   AddTicks(&recorded);
   const Queues queues = QueuesOf(recorded.inputs);
   HeardOrder order;
   order.damage = recorded.damage;
-  if (!recorded.one_life || recorded.outputs.empty()) return order;
+  if (const std::string why = WhyInFileOrder(recorded, process); !why.empty()) {
+    if (recorded.live) order.in_file_order = why;
+    return order;
+  }
   NoteMissing(recorded, channels, queues, &order);
   if (!recorded.live) return order;
   order.has_ticks = recorded.has_ticks;

@@ -6,26 +6,46 @@
 #include <stdexcept>
 
 #include "chase/status_t.hpp"
+#include "common/bus/channels.h"
 #include "common/bus/heard_order.h"
 #include "common/bus/message_head.h"
 
 namespace chase::bus {
 
-Identity IdentityIn(const std::string& log, const std::string& process) {
+std::string VehicleIn(const std::string& log) {
+  LogReader reader(log);
+  std::set<std::string> vehicles;
+  for (LogEvent event; reader.Next(&event);) {
+    const auto head = HeadOf(event.bytes.data(), event.bytes.size());
+    if (!head) continue;
+    for (const ChannelRow& row : ChannelTable())
+      if (event.channel == head->vehicle + row.channel) vehicles.insert(head->vehicle);
+  }
+  if (vehicles.size() > 1)
+    throw std::runtime_error(
+        fmt::format("{}: is of several vehicles, '{}'; name one with --channel-prefix", log,
+                    fmt::join(vehicles, "', '")));
+  return vehicles.empty() ? "" : *vehicles.begin();
+}
+
+Identity IdentityIn(const std::string& log, const std::string& process,
+                    const std::string& vehicle) {
   LogReader reader(log);
   for (LogEvent event; reader.Next(&event);) {
     const auto head = HeadOf(event.bytes.data(), event.bytes.size());
-    if (head && head->sender == process) return {head->sender, head->vehicle, head->sender_start};
+    if (head && head->sender == process && head->vehicle == vehicle)
+      return {process, vehicle, head->sender_start};
   }
-  return {process, "", 0};
+  return {process, vehicle, 0};
 }
 
-std::string VersionIn(const std::string& log, const std::string& process) {
+std::string VersionIn(const std::string& log, const std::string& process,
+                      const std::string& vehicle) {
   LogReader reader(log);
   for (LogEvent event; reader.Next(&event);) {
     const auto head = HeadOf(event.bytes.data(), event.bytes.size());
     status_t status;
-    if (head && head->sender == process &&
+    if (head && head->sender == process && head->vehicle == vehicle &&
         status.decode(event.bytes.data(), 0, static_cast<int>(event.bytes.size())) > 0)
       return status.version;
   }
@@ -39,7 +59,7 @@ void LogBus::SubscribeRaw(const std::string& channel, RawHandler handler) {
 }
 
 void LogBus::PublishRaw(const std::string& channel, Bytes bytes) {
-  out_.Write(now_, channel, bytes);
+  out_.Write(now_, identity().vehicle + channel, bytes);
 }
 
 /// The clock stands still for what was logged late.
@@ -57,9 +77,12 @@ void LogBus::Hand(const LogEvent& event, Node* node, const After& after) {
     for (; next_tick_ <= t; next_tick_ += period) node->Tick(now_ = next_tick_);
   }
   now_ = t;
-  const auto handler = handlers_.find(event.channel);
+  const std::string& prefix = identity().vehicle;
+  const auto handler = event.channel.rfind(prefix, 0) == 0
+                           ? handlers_.find(event.channel.substr(prefix.size()))
+                           : handlers_.end();
   if (handler != handlers_.end()) {
-    heard_.insert(event.channel);
+    heard_.insert(handler->first);
     handler->second(event.bytes.data(), event.bytes.size());
   }
   if (after) after(now_);
@@ -70,7 +93,7 @@ void LogBus::Run(Node* node, const After& after) {
     throw std::runtime_error("--replay: this process hears no channel, so that no log moves it");
   std::set<std::string> channels;
   for (const auto& [channel, handler] : handlers_) channels.insert(channel);
-  const HeardOrder order = OrderHeard(in_, identity().process, channels);
+  const HeardOrder order = OrderHeard(in_, identity().process, channels, identity().vehicle);
   shortfalls_ = order.Sentences();
   reorders_ = !order.events.empty();
   has_ticks_ = order.has_ticks;

@@ -14,15 +14,22 @@
 
 namespace chase::bus {
 
-/// Who `process` was when the log was recorded, read off the first message that it sent; where the
-/// log holds none: of no vehicle, started at 0.
-Identity IdentityIn(const std::string& log, const std::string& process);
+/// The vehicle whose messages the log holds, which is the prefix of their channels. Throws
+/// std::runtime_error with one line where there are several.
+std::string VehicleIn(const std::string& log);
 
-/// `version` of the first status of `process` in the log; empty where it holds none.
-std::string VersionIn(const std::string& log, const std::string& process);
+/// Who `process` of `vehicle` was when the log was recorded, read off the first message that it
+/// sent; where the log holds none: started at 0.
+Identity IdentityIn(const std::string& log, const std::string& process,
+                    const std::string& vehicle = "");
+
+/// `version` of the first status of that process in the log; empty where it holds none.
+std::string VersionIn(const std::string& log, const std::string& process,
+                      const std::string& vehicle = "");
 
 /// Replays a log file to one node in the order in which it heard the messages (heard_order.h); what
-/// the node sends goes to another log file with the stamp of the event that it answers.
+/// the node sends goes to another log file with the stamp of the event that it answers. In both the
+/// vehicle of its identity, the prefix, stands before the channels' names.
 class LogBus : public Bus {
  public:
   /// Throws std::runtime_error when a file cannot be opened.

@@ -10,6 +10,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
+#include <optional>
 
 #include "common/bus/channels.h"
 #include "common/bus/live_loop.h"
@@ -30,7 +31,8 @@ volatile std::sig_atomic_t stop_requested = 0;
 void RequestStop(int) { stop_requested = 1; }
 
 struct Flags {
-  std::string config, url, prefix, key_file, replay, out;
+  std::string config, url, key_file, replay, out;
+  std::optional<std::string> prefix;  // none: live none, of a log its own
   bool dump_config = false;
 };
 
@@ -45,21 +47,23 @@ void AddFlags(CLI::App* app, Flags* flags) {
   app->add_flag("--dump-config", flags->dump_config, "print the complete configuration and exit");
   auto* url = app->add_option("--lcm-url", flags->url,
                               "LCM provider (default: $LCM_DEFAULT_URL, else built in)");
-  auto* prefix = app->add_option("--channel-prefix", flags->prefix,
-                                 "the vehicle: in front of every channel's name");
+  app->add_option("--channel-prefix", flags->prefix,
+                  "the vehicle: in front of every channel's name (default: none; of --replay: what "
+                  "the log has)");
   auto* key = app->add_option(
       "--key-file", flags->key_file,
       "64 hexadecimal digits that seal the vehicle's messages (default: not sealed)");
   app->add_option("--replay", flags->replay, "drive the service by this LCM log, in logical time")
-      ->excludes(url, prefix, key);  // what would do nothing is refused
+      ->excludes(url, key);  // what would do nothing is refused
   app->add_option("--out", flags->out, "LCM log that --replay writes");
   config::AddVersion(app);
 }
 
 /// Live processing until a signal comes or the node is done.
 void RunLive(const ServiceSpec& spec, const Flags& flags) {
-  UdpBus bus(flags.url, flags.prefix, LoadSeal(flags.key_file));
-  bus.SetIdentity({spec.name, flags.prefix, bus.Now()});
+  const std::string vehicle = flags.prefix.value_or("");
+  UdpBus bus(flags.url, vehicle, LoadSeal(flags.key_file));
+  bus.SetIdentity({spec.name, vehicle, bus.Now()});
   const auto node = spec.make_node(bus);
   StatusReporter reporter(spec.name, LiveVersion(spec.dump_config()));
   const std::string channel = StatusChannel(spec.name);
@@ -98,8 +102,8 @@ void RunLive(const ServiceSpec& spec, const Flags& flags) {
 
 /// How the configuration or the commit that is replayed with differs from what the log was flown
 /// with; empty where it does not, or the log does not tell.
-std::string Departure(const ServiceSpec& spec, const std::string& log) {
-  const Software flown = SoftwareOf(VersionIn(log, spec.name));
+std::string Departure(const ServiceSpec& spec, const std::string& log, const std::string& vehicle) {
+  const Software flown = SoftwareOf(VersionIn(log, spec.name, vehicle));
   const Software here = SoftwareOf(ConfiguredVersion(spec.dump_config()));
   const bool configured = !flown.configuration.empty() && flown.configuration != here.configuration;
   if (!configured && (flown.version.empty() || flown.version == here.version)) return "";
@@ -118,8 +122,9 @@ void RunReplay(const ServiceSpec& spec, const Flags& flags) {
   if (std::filesystem::equivalent(flags.out, flags.replay, none))
     throw std::runtime_error("--out " + flags.out + " is the log that is replayed; name another");
   LogBus bus(flags.replay, flags.out);
-  bus.SetIdentity(IdentityIn(flags.replay, spec.name));
-  if (const std::string line = Departure(spec, flags.replay); !line.empty())
+  const std::string vehicle = flags.prefix ? *flags.prefix : VehicleIn(flags.replay);
+  bus.SetIdentity(IdentityIn(flags.replay, spec.name, vehicle));
+  if (const std::string line = Departure(spec, flags.replay, vehicle); !line.empty())
     fmt::print(stderr, "chase-{}: {}\n", spec.name, line);
   const auto node = spec.make_node(bus);
   StatusReporter reporter(spec.name, ConfiguredVersion(spec.dump_config()));

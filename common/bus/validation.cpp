@@ -118,7 +118,7 @@ std::string Problem(const command_ack_t& m) {
   return Check()
       .Time(m.utime)
       .Code("kind", m.kind, world::kSelectCommand)
-      .Code("verdict", m.verdict, command_ack_t::REFUSED)
+      .Code("verdict", m.verdict, command_ack_t::UNKNOWN)
       .Result();
 }
 

@@ -21,6 +21,7 @@ struct MostAge {
                                ///< that died is back within that
   double setpoint = 0.5;       ///< fcu: leaves the vehicle to the autopilot, whose own limit is 1 s
   double attitude = 0.5;  ///< fcu: of the autopilot; no position is sent to it, nothing is armed
+  double plan = 10.0;     ///< mission: lands; chosen: a planner that died is back within 5
   double landing_plan = 2.0;  ///< control: comes down where it is without a plan made to land
   double command = 10.0;      ///< mission: refused; chase-command repeats for half of that
 };

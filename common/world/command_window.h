@@ -25,6 +25,7 @@ struct CommandKey {
 struct CommandAnswer {
   bool accepted = false;
   std::string reason;
+  bool unknown = false;  ///< it may have taken effect all the same: see the reason
 };
 
 /// Answers given of late, so that a command that comes again is answered and not obeyed again. A
@@ -33,8 +34,8 @@ struct CommandAnswer {
 /// harm when obeyed twice, have room of their own and are always taken: the oldest is forgotten.
 class CommandWindow {
  public:
-  /// Commands from before `start` [s] are refused: whoever was there then has had them, but for
-  /// urgent ones, which nobody may have had. `process` is named in that refusal.
+  /// Commands from before `start` [s] are not obeyed: whoever was there then may have done so, and
+  /// the answer says that. Urgent ones are, which nobody may have had. `process` is named in it.
   CommandWindow(std::string process, double start) : process_(std::move(process)), start_(start) {}
 
   /// The answer at time `t` [s]: the one that it got before, a refusal, or that of `obey`, which is
@@ -47,8 +48,12 @@ class CommandWindow {
       for (const auto& [before, answer] : *answers)
         if (before.Key() == command.Key()) return answer;
     }
+    if (!urgent && command.t < start_)
+      return {false,
+              "not known whether it took effect: given before the " + process_ + " process started",
+              true};
     // What is refused here is not remembered: it is refused again, or has had no effect.
-    if (std::string untimely = Untimely(t, command.t, urgent); !untimely.empty())
+    if (std::string untimely = Untimely(t, command.t); !untimely.empty())
       return {false, std::move(untimely)};
     if (!urgent && answers_.size() >= kMost) return {false, "too many commands came of late"};
     if (urgent && urgent_.size() >= kMost) urgent_.pop_front();
@@ -60,9 +65,7 @@ class CommandWindow {
  private:
   using Answers = std::deque<std::pair<CommandKey, CommandAnswer>>;
 
-  std::string Untimely(double t, double given, bool urgent) const {
-    if (!urgent && given < start_)
-      return "it was given before the " + process_ + " process started";
+  static std::string Untimely(double t, double given) {
     if (t - given > kMostAge.command) return "it is old: given more than 10 s ago";
     return given - t > kMostAge.command ? "it is given in the future: compare the clocks" : "";
   }

@@ -31,10 +31,12 @@ class CommandClient {
     next_ = t + kPeriod;
     return true;
   }
-  void OnAnswer(bool accepted, const std::string& reason) {
+  /// `unknown`: nobody can say whether it took effect.
+  void OnAnswer(bool accepted, const std::string& reason, bool unknown = false) {
     if (answered_) return;
     answered_ = true;
     accepted_ = accepted;
+    unknown_ = unknown;
     reason_ = reason;
   }
   /// Nobody has answered for so long that nobody will.
@@ -43,6 +45,7 @@ class CommandClient {
   int command() const { return command_; }  ///< one of command_t's constants
   bool answered() const { return answered_; }
   bool accepted() const { return accepted_; }
+  bool unknown() const { return unknown_; }
   const std::string& reason() const { return reason_; }
 
  private:
@@ -50,7 +53,7 @@ class CommandClient {
   static constexpr double kPatience = 5.0;  // s: half of kMostAge.command
   int command_;
   double start_, next_;
-  bool answered_ = false, accepted_ = false;
+  bool answered_ = false, accepted_ = false, unknown_ = false;
   std::string reason_;
 };
 

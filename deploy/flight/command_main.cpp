@@ -17,7 +17,14 @@ namespace chase::mission {
 namespace {
 
 constexpr int64_t kWait = 20'000;  // us at a time for messages
-enum Exit { kAccepted = 0, kBadUse = 1, kRefused = 2, kNoAnswer = 3, kNotReached = 4 };
+enum Exit {
+  kAccepted = 0,
+  kBadUse = 1,
+  kRefused = 2,
+  kNoAnswer = 3,
+  kNotReached = 4,
+  kUnknown = 5
+};
 
 struct Arguments {
   std::string command, vehicle, url, key_file;
@@ -71,6 +78,7 @@ int AwaitAnswer(const Arguments& a, Session* session) {
                             session->state().empty() ? "" : ", though FLIGHT_STATE is heard",
                             a.command == "select" ? "perception" : "mission",
                             a.vehicle.empty() ? "" : " on vehicle '" + a.vehicle + "'"));
+  if (call.unknown()) return Fail(kUnknown, a.command + ": " + call.reason());
   if (!call.accepted()) return Fail(kRefused, "refused: " + call.reason());
   fmt::print("{}\n", call.reason());
   std::fflush(stdout);
@@ -137,7 +145,10 @@ void AddOptions(CLI::App* app, Arguments* a) {
   app->add_option("--lcm-url", a->url, "LCM provider (default: $LCM_DEFAULT_URL, else built in)");
   app->footer(
       "Exit codes: 0 accepted (with --wait: and reached), 1 bad use, 2 refused, 3 no answer "
-      "within 5 s, 4 not reached.");
+      "within 5 s, 4 not reached, 5 not known whether it took effect: it was given before the "
+      "mission process started.\n"
+      "takeoff: what hangs steeply above is seen by no sensor; whoever gives it vouches that the "
+      "column above the vehicle is free.");
 }
 
 }  // namespace

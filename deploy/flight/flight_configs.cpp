@@ -34,7 +34,7 @@ void Derive(const world::Scenario& scenario, FlightConfigs* configs) {
   configs->planning.planner.drone_radius = chaser.radius;
   configs->control.drone_radius = chaser.radius;
   configs->mission.climb_height = chaser.takeoff_height + chaser.radius;
-  configs->mission.body_radius = chaser.radius;
+  configs->mission.body_radius = configs->planning.planner.hard_radius();
   if (!scenario.commands.empty()) return;
   configs->mission.autostart = true;
   configs->mission.give_up = 0.0;

@@ -89,7 +89,7 @@ int main(int argc, char** argv) {
   CLI::App app("Prints one JSON line a second about the flight on the bus; exits 0 at its end.");
   chase::config::AddVersion(&app);
   const char* env = std::getenv("LCM_DEFAULT_URL");
-  std::string url = env != nullptr ? env : chase::bus::kDefaultUrl, prefix;
+  std::string url = env != nullptr && *env != '\0' ? env : chase::bus::kDefaultUrl, prefix;
   bool faults = false;
   app.add_option("--lcm-url", url, "LCM provider (default: $LCM_DEFAULT_URL, else built in)");
   app.add_option("--channel-prefix", prefix, "put in front of every channel's name");

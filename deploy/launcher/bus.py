@@ -8,6 +8,8 @@ import socket
 import struct
 import time
 
+import places
+
 DEFAULT_URL = "udpm://239.255.76.67:7667?ttl=0&recv_buf_size=2097152"
 RECEIVE_BUFFER = 2097152  # bytes; a cloud of 400 kB needs several
 
@@ -22,9 +24,11 @@ def configured(file):
     return told[-1] if told else None
 
 
-def url(otherwise=None):
-    """Where everything speaks; with room for sweeps and images where the user names none."""
-    told = os.environ.get("LCM_DEFAULT_URL") or otherwise or DEFAULT_URL
+def url():
+    """Where everything speaks: the environment's, an installed vehicle's, the default; with room for sweeps and images
+    where the user names none."""
+    units = configured(places.ENVIRONMENT) if places.INSTALLED else None
+    told = os.environ.get("LCM_DEFAULT_URL") or units or DEFAULT_URL
     if "recv_buf_size=" in told:
         return told
     return f"{told}{'&' if '?' in told else '?'}recv_buf_size={RECEIVE_BUFFER}"
@@ -156,3 +160,7 @@ def kernel(name):
             return int(file.read().split()[0])
     except (OSError, ValueError):
         return None
+
+
+if __name__ == "__main__":
+    print(url())

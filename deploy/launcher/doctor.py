@@ -42,18 +42,13 @@ def default_buffer():
     return OK, f"net.core.rmem_default is {size}"
 
 
-def url():
-    """Where the units of an installed vehicle speak; in the source tree, where a flight does."""
-    return bus.url(bus.configured(places.ENVIRONMENT) if places.INSTALLED else None)
-
-
 def where():
-    return bus.endpoint(url())
+    return bus.endpoint(bus.url())
 
 
 def multicast():
     if not where():
-        return FAILURE, f"LCM_DEFAULT_URL={url()}: not of the form udpm://ADDRESS:PORT?ttl=0"
+        return FAILURE, f"LCM_DEFAULT_URL={bus.url()}: not of the form udpm://ADDRESS:PORT?ttl=0"
     problem = bus.loopback_problem(*where())
     return (FAILURE, problem) if problem else (OK, "own messages come back on %s:%d" % where())
 

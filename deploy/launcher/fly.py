@@ -13,6 +13,7 @@ import sys
 import time
 
 import bus
+import commands
 import places
 import processes
 import results
@@ -27,6 +28,7 @@ LOG_RATE = 15e6  # bytes/s of a recording, sweeps and images included
 LARGEST_SEED = 2**31 - 1
 DRIVERS = ("lidar", "fcu", "camera")  # stand between the simulator and the rest with --hardware
 STRIKES = {"kill": signal.SIGKILL, "freeze": signal.SIGSTOP, "thaw": signal.SIGCONT}  # faults of processes
+FREEZE = 2.0  # s of --kill freeze-P, as in lockstep
 VIEW_PORTS = range(8080, 8100)  # of --view: the first that nobody listens on
 
 
@@ -35,7 +37,7 @@ class FlightError(Exception):
 
 
 def kill_wish(text):
-    """(process, mission time in s) of P@SECONDS."""
+    """(process or effect-process, mission time in s) of P@SECONDS, kill-P@SECONDS or freeze-P@SECONDS."""
     name, _, seconds = text.partition("@")
     if not re.fullmatch(r"\d+(\.\d+)?", seconds):
         raise argparse.ArgumentTypeError(f"{text}: '{seconds}' is no mission time in s; give {name}@SECONDS, 0 or more")
@@ -62,13 +64,22 @@ def parse(arguments):
     parser.add_argument("--hardware", action="store_true",
                         help="through the drivers: MAVLink, VLP-16 packets and a video stream in LCM's place")
     parser.add_argument("--view", action="store_true", help="look on in a browser, at http://localhost:8080")
+    parser.add_argument("--token-file", type=pathlib.Path, metavar="FILE",
+                        help="with --view: its first line is the token by which pages command (default: they cannot)")
+    parser.add_argument("--link", action="store_true", help="with chase-link, as on a vehicle whose ground station is not there")
     parser.add_argument("--kill", type=kill_wish, action="append", default=[], metavar="P@SECONDS",
-                        help="kill -9 of process P at that mission time; it is started anew (may be repeated)")
+                        help="kill -9 of process P at that mission time; it is started anew. freeze-P: it stands still for "
+                             f"{FREEZE:g} s (may be repeated)")
     options = parser.parse_args(arguments)
-    there = killable(options.hardware, options.view)
-    for name, seconds in options.kill:
+    if options.token_file and not options.view:
+        parser.error(f"argument --token-file: {options.token_file} needs --view")
+    if options.token_file and not options.token_file.is_file():
+        parser.error(f"argument --token-file: no file {options.token_file}; cure: openssl rand -hex 16 > {options.token_file}")
+    there = killable(options.hardware, options.view, options.link)
+    for wish, seconds in options.kill:
+        name = wish.removeprefix("kill-").removeprefix("freeze-")
         if name not in there:
-            parser.error(f"argument --kill: {name}@{seconds:g}: no process '{name}' to kill; there are: {', '.join(there)}")
+            parser.error(f"argument --kill: {wish}@{seconds:g}: no process '{name}' to kill; there are: {', '.join(there)}")
     return options
 
 
@@ -100,10 +111,10 @@ def driver_processes(hardware):
     return [row for row in process_table() if hardware and row["name"] in DRIVERS]
 
 
-def killable(hardware, view):
+def killable(hardware, view, link=False):
     """What such a flight starts and goes on without."""
     rows = flight_processes() + driver_processes(hardware)
-    return [row["name"] for row in rows if row["restart"] == "always"] + ["recorder"] + ["viewer"] * view
+    return [row["name"] for row in rows if row["restart"] == "always"] + ["recorder"] + ["viewer"] * view + ["link"] * link
 
 
 def set_up():
@@ -127,7 +138,7 @@ def ask(program, *arguments):
     return answer.stdout
 
 
-def build_and_check(scenario, seed, view=False, hardware=False):
+def build_and_check(scenario, seed, view=False, hardware=False, link=False):
     """Builds what flies. The scenario is read as soon as there is a program that can, long before
     the rest is built. Returns its length [s], take-off included, and what it tells of itself."""
     set_up()
@@ -135,7 +146,7 @@ def build_and_check(scenario, seed, view=False, hardware=False):
     told = json.loads(ask("chase-scenario", scenario, "--seed", seed))
     build(*(row["binary"] for row in flight_processes() + driver_processes(hardware)), "chase-flight", "chase-flight-monitor",
           "chase-recorder", "chase-report", "chase-command", "chase-log", "chase-lidar",
-          *(["chase-viewer"] if view else []))
+          *["chase-viewer"] * view, *["chase-link"] * link)
     ask("chase-flight", scenario, "--print-config", "simulator")  # reads the services' overrides
     return told["duration_s"] + told["settle_s"], told
 
@@ -207,22 +218,29 @@ def write_config(folder, scenario, seed, name):
     return path
 
 
+def rig_in(config):
+    """The calibration in a service's YAML, as other services' files have it; empty where there is none."""
+    block = re.search(r"^rig:.*\n(?:[ \t].*\n?)*", config, re.MULTILINE)
+    return block.group() if block else ""
+
+
 class Flight:
     """The processes of one flight and the folder that they leave."""
 
-    def __init__(self, scenario, seed, url, commands=(), faults=(), kills=(), hardware=False):
+    def __init__(self, scenario, seed, url, told, kills=(), hardware=False):
         self.folder = flight_folder(scenario)
         self.scenario, self.seed, self.hardware = scenario, seed, hardware
         self.url, self.env = url, {"LCM_DEFAULT_URL": url}
         self.services, self.logger, self.monitor, self.viewer = [], None, None, None
-        self.commands, self.given = list(commands), []
+        self.commands = commands.Commands(told.get("commands", ()), self.start_command)
+        faults = told.get("faults", ())
         self.faults = {fault["name"]: fault for fault in faults}
         self.strikes, self.killed, self.strained = sorted(strikes_of(faults, kills)), [], {}
 
     def child(self, name, command, **options):
         return processes.Child(name, command, self.folder / f"{name}.log", self.env, **options)
 
-    def start(self, view):
+    def start(self, view, token_file=None, link=False):
         rows = flight_processes() + driver_processes(self.hardware)
         configs = {row["name"]: write_config(self.folder, self.scenario, self.seed, row["name"])
                    for row in rows}
@@ -235,7 +253,9 @@ class Flight:
                                   stdout=subprocess.PIPE)
         os.set_blocking(self.monitor.process.stdout.fileno(), False)
         if view:
-            self.start_viewer()
+            self.start_viewer(rig_in(configs["perception"].read_text(encoding="utf-8")), token_file)
+        if link:
+            self.services.append(self.child("link", ["nice", "-n", "5", BIN / "chase-link"], notifies=True, restarts=True))
         # The simulator comes last: its clock starts when everybody listens.
         for row in sorted(rows, key=lambda r: r["name"] == "simulator"):
             if row["name"] == "simulator":
@@ -248,10 +268,13 @@ class Flight:
                                             restarts=row["restart"] == "always"))
         self.wait_ready()
 
-    def start_viewer(self):
+    def start_viewer(self, rig, token_file):
         """An onlooker: whatever becomes of it, the flight goes on."""
         port = bus.free_port(VIEW_PORTS)
-        self.viewer = self.child("viewer", ["nice", "-n", "10", BIN / "chase-viewer", "--port", str(port)],
+        config = self.folder / "viewer.yaml"
+        config.write_text(rig, encoding="utf-8")
+        token = ["--token-file", token_file.resolve()] if token_file else []
+        self.viewer = self.child("viewer", ["nice", "-n", "10", BIN / "chase-viewer", "--port", str(port), "--config", config, *token],
                                  restarts=True)
         bus.await_listener(port, 5.0)
         print(f"look on at http://localhost:{port}", flush=True)
@@ -272,13 +295,8 @@ class Flight:
             if child.mend():
                 print(f"\n{sentence}: restarted", file=sys.stderr, flush=True)
 
-    def command(self, mission_time):
-        """Gives the operator's commands that are due."""
-        while self.commands and self.commands[0]["at_s"] <= mission_time:
-            command = self.commands.pop(0)
-            name = command["command"]
-            self.given.append(self.child(f"command-{len(self.given) + 1}-{name}",
-                                         [BIN / "chase-command", name, *command["arguments"]]))
+    def start_command(self, name, arguments):
+        return self.child(name, [BIN / "chase-command", *arguments])
 
     def strike(self, mission_time):
         """Faults whose time has come, and ends of those before."""
@@ -327,14 +345,15 @@ class Flight:
             if line:
                 progress = json.loads(line)
                 show(progress)
-                self.command(progress["mission_time"])
                 if progress["done"]:
                     return
                 if progress["mission_time"] != last_time:
                     last_time, moved = progress["mission_time"], time.monotonic()
                     speed = progress["rtf"]
             if last_time is not None:  # progress comes once a second
-                self.strike(last_time + speed * (time.monotonic() - moved))
+                now = last_time + speed * (time.monotonic() - moved)
+                self.commands.turn(now)
+                self.strike(now)
             watched = [self.monitor] if ended and not line else []
             self.complain(*watched)
             if time.monotonic() - moved > SILENCE_LIMIT:
@@ -346,7 +365,7 @@ class Flight:
     def stop(self):
         """Services first, the logger last, so that the log holds their last words."""
         strained = [c for children in self.strained.values() for c in children]
-        extras = [c for c in (self.monitor, self.viewer, *self.given, *strained) if c]
+        extras = [c for c in (self.monitor, self.viewer, *self.commands.given, *strained) if c]
         processes.stop(self.services + extras)
         if self.logger:
             processes.stop([self.logger])
@@ -391,8 +410,10 @@ def report(folder):
 
 def strikes_of(faults, kills):
     """(mission time in s, effect, process or fault) of a scenario's faults and the command line's kills."""
-    strikes = [(t, "kill", name) for name, t in kills]
-    for fault in faults:
+    wishes = [{"name": name if name.startswith(("kill-", "freeze-")) else f"kill-{name}", "at_s": t, "for_s": FREEZE}
+              for name, t in kills]
+    strikes = []
+    for fault in [*wishes, *faults]:
         effect, _, name = fault["name"].partition("-")
         end = fault["at_s"] + fault["for_s"]
         if effect not in STRIKES:
@@ -406,7 +427,7 @@ def strikes_of(faults, kills):
 
 def fly(options):
     scenario = find_scenario(options.scenario)
-    seconds, told = build_and_check(scenario, options.seed, options.view, options.hardware)
+    seconds, told = build_and_check(scenario, options.seed, options.view, options.hardware, options.link)
     if late := [f"{name}@{t:g}" for name, t in options.kill if t >= told["duration_s"]]:
         raise FlightError(f"--kill {', '.join(late)}: the mission ends at {told['duration_s']:g} s; give an earlier time")
     warn_of_faults(told.get("left_out_live"))
@@ -414,18 +435,22 @@ def fly(options):
     raise_receive_buffers()
     url = bus.url()
     check_bus(url)
-    flight = Flight(scenario, options.seed, url, told.get("commands", ()),
-                    told.get("faults", ()), options.kill, options.hardware)
+    flight = Flight(scenario, options.seed, url, told, options.kill, options.hardware)
     print(f"flying {scenario.stem}, seed {options.seed}, into {flight.folder}", flush=True)
     try:
-        flight.start(options.view)
+        flight.start(options.view, options.token_file, options.link)
         flight.watch()
+        flight.commands.finish()
         time.sleep(TAIL)
         flight.complain()
     finally:
         flight.stop()
     passed = report(flight.folder)
-    if late := [f"{effect} of {name}@{t:g}" for t, effect, name in flight.strikes if effect != "thaw"]:
+    if flight.commands.failed:
+        raise FlightError("the scenario's commands were not all obeyed: " + "; ".join(flight.commands.failed))
+    late = [f"{effect} of {name}@{t:g}" for t, effect, name in flight.strikes if effect != "thaw"]
+    late += flight.commands.left()
+    if late:
         raise FlightError("the mission ended before the " + ", ".join(late))
     return 0 if passed else 1
 

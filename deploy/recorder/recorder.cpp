@@ -1,13 +1,12 @@
 #include "deploy/recorder/recorder.h"
 
 #include <fmt/format.h>
+#include <sys/stat.h>
 
 #include <algorithm>
 #include <filesystem>
 #include <stdexcept>
 #include <system_error>
-#include <utility>
-#include <vector>
 
 namespace chase::recorder {
 namespace {
@@ -17,6 +16,13 @@ constexpr int64_t kRetry = 1'000'000;          // us between two tries on a disk
 constexpr double kPieces = 5.0;                // logs that the heavy minutes are made of
 constexpr double kEnough = 1.2;                // of keep_free_mb, before heavy ones are taken again
 constexpr char kHeavy[] = "-heavy";            // in the names of logs of sweeps and images
+
+/// When a file was written last, us since 1970; far ahead where nobody can say: it is kept.
+int64_t WriteTime(const std::string& file) {
+  struct stat found {};
+  if (stat(file.c_str(), &found) != 0) return INT64_MAX;
+  return found.st_mtim.tv_sec * int64_t{1'000'000} + found.st_mtim.tv_nsec / 1000;
+}
 
 }  // namespace
 
@@ -39,20 +45,17 @@ Recorder::~Recorder() {
 /// Those of recorders before this one, which are not there to drop them any more.
 void Recorder::FindEarlierHeavy() {
   namespace fs = std::filesystem;
-  std::vector<std::pair<fs::file_time_type, Old>> found;
   std::error_code ignored;
   for (const fs::directory_entry& file : fs::directory_iterator(config_.folder, ignored)) {
     const std::string name = file.path().stem().string();
     const size_t at = name.rfind(kHeavy), end = at + sizeof kHeavy - 1;
     const bool numbered = at != std::string::npos && (end == name.size() || name[end] == '-');
     if (numbered && file.path().extension() == ".lcm")
-      found.emplace_back(
-          file.last_write_time(ignored),
-          Old{file.path().string(), static_cast<int64_t>(file.file_size(ignored)), 0});
+      earlier_heavy_.push_back({file.path().string(), static_cast<int64_t>(file.file_size(ignored)),
+                                WriteTime(file.path())});
   }
-  std::sort(found.begin(), found.end(),
-            [](const auto& a, const auto& b) { return a.first < b.first; });
-  for (auto& [time, old] : found) earlier_heavy_.push_back(std::move(old));
+  std::sort(earlier_heavy_.begin(), earlier_heavy_.end(),
+            [](const Old& a, const Old& b) { return a.last_utime < b.last_utime; });
 }
 
 /// NAME.lcm, then NAME-001.lcm and so on; a log that is there already is left alone.
@@ -154,9 +157,12 @@ int64_t Recorder::DropFirst(std::deque<Old>* logs) {
   return old.bytes;
 }
 
+/// Without a limit, or where none are recorded, those of earlier recorders are left alone.
 void Recorder::DropOldHeavy(int64_t utime) {
+  if (config_.heavy_minutes <= 0.0) return;
   const auto age = static_cast<int64_t>(config_.heavy_minutes * kMinute);
-  while (!old_heavy_.empty() && utime - old_heavy_.front().last_utime > age) DropFirst(&old_heavy_);
+  for (std::deque<Old>* logs : {&earlier_heavy_, &old_heavy_})
+    while (!logs->empty() && utime - logs->front().last_utime > age) DropFirst(logs);
 }
 
 void Recorder::MindTheDisk() {

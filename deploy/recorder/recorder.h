@@ -63,8 +63,9 @@ class Recorder {
 
   RecorderConfig config_;
   Series light_, heavy_;
-  std::deque<Old> old_heavy_;      // of this recorder: dropped once they are old
-  std::deque<Old> earlier_heavy_;  // of those before it: dropped, first, where there is no room
+  std::deque<Old> old_heavy_;  // of this recorder: dropped once they are old
+  std::deque<Old>
+      earlier_heavy_;  // of those before it, by file time: the same, and first where room is short
   int64_t light_bytes_ = 0;
   int64_t room_ = INT64_MAX;  // bytes free on the disk, as far as is known
   bool heavy_given_up_ = false, refused_ = false;

@@ -32,20 +32,22 @@ def decode(data):
         return data
 
 
-def read(path, *channels):
+def read(path, *channels, damage=None):
     """Yields Event(utime [us], channel, message) in file order; of the channels named, or of all.
 
-    What is damaged is left out, as chase-log does, and a log that is cut off ends where it does.
+    `path`: a log, or a flight's folder, which stands for its flight.lcm. What is damaged is left out, as chase-log
+    does, and a log that is cut off ends where it does; (place, bytes) of each such stretch goes into the list `damage`.
     """
-    with open(path, "rb") as file:
+    path = pathlib.Path(path)
+    with open(path / "flight.lcm" if path.is_dir() else path, "rb") as file:
         if file.seek(0, 2) == 0:
             return
         with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as log:
-            for utime, channel, data in _events(log, {name.encode() for name in channels}):
+            for utime, channel, data in _events(log, {name.encode() for name in channels}, [] if damage is None else damage):
                 yield Event(utime, channel.decode(), decode(data))
 
 
-def _events(log, wanted):
+def _events(log, wanted, damage):
     at = 0
     while at < len(log):
         utime, name, end = _event(log, at)
@@ -53,6 +55,8 @@ def _events(log, wanted):
         following = end if _begins(log, end) else _find(log, at + 1, end or len(log))
         if following == end and (not wanted or log[name] in wanted):
             yield utime, log[name], log[name.stop:end]
+        elif following != end:
+            damage.append((at, following - at))
         at = following
 
 

@@ -105,10 +105,29 @@ void AddImport(CLI::App* app, Arguments* a) {
   sub->callback([a] { RunImport(*a); });
 }
 
-chase::world::Rig RigIn(const std::string& file) {
+/// What a calibration file, or one of perception, says of the rig.
+chase::world::Rig RigIn(const std::string& file, bool named) {
+  const YAML::Node all = chase::config::detail::ParseFile(file);
+  YAML::Node part;
+  if (all.IsMap() && all["rig"].IsDefined())
+    part["rig"] = all["rig"];
+  else if (named)
+    throw std::runtime_error(file +
+                             ": has no key rig; name a calibration file or a perception.yaml");
   chase::world::RigFile rig;
-  if (!file.empty()) chase::config::Load(file, &rig);
+  chase::config::LoadText(YAML::Dump(part), file, &rig);
   return rig.rig;
+}
+
+void RunMcap(const Arguments& a) {
+  namespace fs = std::filesystem;
+  const fs::path flown = fs::path(a.in).parent_path() / "perception.yaml";
+  const std::string file = !a.rig.empty() ? a.rig : fs::exists(flown) ? flown.string() : "";
+  const chase::world::Rig rig = file.empty() ? chase::world::Rig() : RigIn(file, !a.rig.empty());
+  const long messages =
+      ExportMcap(a.in, a.out, a.channel, {a.jpeg, rig}, !a.rig.empty(), Progress());
+  std::printf("%s: %ld messages, with %s\n", a.out.c_str(), messages,
+              file.empty() ? "the default rig" : ("the rig of " + file).c_str());
 }
 
 void RunExport(const Arguments& a) {
@@ -126,8 +145,7 @@ void RunExport(const Arguments& a) {
     std::printf("%s: %ld poses\n", a.out.c_str(),
                 ExportTum(a.in, a.out, a.channel.empty() ? "POSE" : a.channel, Progress()));
   else if (a.mcap)
-    std::printf("%s: %ld messages\n", a.out.c_str(),
-                ExportMcap(a.in, a.out, a.channel, {a.jpeg, RigIn(a.rig)}, Progress()));
+    RunMcap(a);
   else
     std::printf("%s: %d files\n", a.out.c_str(),
                 ExportCsv(a.in, a.out, a.channel, a.long_form, Progress()));
@@ -144,7 +162,8 @@ void AddExport(CLI::App* app, Arguments* a) {
   format->require_option(1);
   sub->add_flag("--jpeg", a->jpeg, "--mcap: images as JPEG, with loss, at a twentieth of the size");
   sub->add_option("--rig", a->rig,
-                  "--mcap: calibration file of the rig that flew (default: the default rig)");
+                  "--mcap: calibration file of the rig that flew, or perception's (default: the "
+                  "perception.yaml beside the log, else the default rig)");
   sub->add_flag("--long", a->long_form,
                 "--csv: a row for every element: event_utime, seq, field, index, value");
   sub->add_option("--channel", a->channel,

@@ -17,10 +17,11 @@ struct BadOption : std::runtime_error {
 /// there.
 [[noreturn]] void RefuseEmpty(const std::string& log, const std::string& channel);
 
-/// A channel's trajectory `t x y z qx qy qz qw` (s, m, frame W), one line per message: the estimate
+/// A trajectory `t x y z qx qy qz qw` (s, m, frame W), one line per message: the estimate
 /// (POSE), the true body (TRUTH), or the target as perceived (TARGET, where its mean is usable; no
-/// rotation). Returns the number of lines. Throws BadOption for other channels,
-/// std::runtime_error with one line when there is no such message.
+/// rotation); a vehicle's prefix may stand before the channel's name. Returns the number of lines.
+/// Throws BadOption for other channels, std::runtime_error with one line when there is no such
+/// message, or several vehicles' are.
 long ExportTum(const std::string& log, const std::string& out, const std::string& channel = "POSE",
                const Watch& watch = {});
 
@@ -32,8 +33,10 @@ int ExportCsv(const std::string& log, const std::string& out, const std::string&
               bool long_form = false, const Watch& watch = {});
 
 /// Every message (or those of `channel`) as protobuf in an MCAP file for Foxglove and the like
-/// (foxglove.h). Returns the number of messages.
+/// (foxglove.h). Returns the number of messages. Throws BadOption where no image is there for
+/// `options.jpeg`, or nothing for a rig that was named; std::runtime_error with one line where a
+/// channel is there of several vehicles.
 long ExportMcap(const std::string& log, const std::string& out, const std::string& channel = "",
-                ViewerOptions options = {}, const Watch& watch = {});
+                ViewerOptions options = {}, bool rig_named = false, const Watch& watch = {});
 
 }  // namespace chase::logs

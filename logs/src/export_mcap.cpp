@@ -1,21 +1,27 @@
 #include "common/logs/log_reader.h"
 #include "common/logs/message_types.h"
 #include "logs/src/export.h"
+#include "logs/src/good_message.h"
 #include "logs/src/mcap_writer.h"
 
 namespace chase::logs {
 
 long ExportMcap(const std::string& log, const std::string& out, const std::string& channel,
-                ViewerOptions options, const Watch& watch) {
+                ViewerOptions options, bool rig_named, const Watch& watch) {
   LogReader reader(log, watch);
   McapWriter writer(out);
+  OneVehicle vehicle(log);  // there is one /tf
   long count = 0;
+  bool images = false, frames = false;
   for (LogEvent e; reader.Next(&e);) {
     if (plan_t plan; DecodeBytes(e.bytes, &plan))
       options.hard_radius[plan.vehicle] = plan.hard_radius;
     if (!channel.empty() && e.channel != channel) continue;
+    vehicle.Hear(e.channel);
     const auto messages = ToViewer(e, options);
     for (const ViewerMessage& m : messages) {
+      images |= m.schema == "foxglove.CameraCalibration";
+      frames |= m.schema == "foxglove.FrameTransforms";
       if (!writer.HasChannel(m.topic))
         writer.AddChannel(m.topic, m.schema, DescriptorsOf(m.schema));
       writer.Write(m.topic, e.utime, m.bytes);
@@ -23,6 +29,10 @@ long ExportMcap(const std::string& log, const std::string& out, const std::strin
     count += !messages.empty();
   }
   if (count == 0) RefuseEmpty(log, channel);
+  if (options.jpeg && !images)
+    throw BadOption("--jpeg: does nothing, as no image is exported; leave it out");
+  if (rig_named && !images && !frames)
+    throw BadOption("--rig: does nothing, as neither POSE nor an image is exported; leave it out");
   writer.Close();
   return count;
 }

@@ -9,6 +9,7 @@
 #include "common/logs/log_reader.h"
 #include "common/logs/message_types.h"
 #include "logs/src/export.h"
+#include "logs/src/good_message.h"
 #include "logs/src/output.h"
 
 namespace chase::logs {
@@ -38,9 +39,9 @@ std::string LineOf(const Bytes& bytes) {
 using Liner = std::string (*)(const Bytes&);
 
 Liner LinerOf(const std::string& channel) {
-  if (channel == "POSE") return LineOf<pose_t>;
-  if (channel == "TRUTH") return LineOf<truth_t>;
-  if (channel == "TARGET") return LineOf<target_t>;
+  if (IsOn(channel, "POSE")) return LineOf<pose_t>;
+  if (IsOn(channel, "TRUTH")) return LineOf<truth_t>;
+  if (IsOn(channel, "TARGET")) return LineOf<target_t>;
   throw BadOption("--channel " + channel +
                   ": is no trajectory for --tum; name POSE (the default), TRUTH or TARGET");
 }
@@ -51,10 +52,12 @@ long ExportTum(const std::string& log, const std::string& out, const std::string
                const Watch& watch) {
   const Liner line_of = LinerOf(channel);
   LogReader reader(log, watch);
-  std::string text;
+  std::string text, found;
   long count = 0;
   for (LogEvent e; reader.Next(&e);) {
-    if (e.channel != channel) continue;
+    if (!IsOn(e, channel)) continue;
+    if (found.empty()) found = e.channel;
+    if (found != e.channel) RefuseSeveralVehicles(log, channel);
     const std::string line = line_of(e.bytes);
     text += line;
     count += !line.empty();

@@ -45,9 +45,7 @@ class Channel {
     if (messages_.empty())
       throw std::runtime_error(log + ": holds no " + name_ +
                                "; identify needs IMU, POSE, ATTITUDE_SETPOINT and TRACKING");
-    if (several_)
-      throw std::runtime_error(log + ": holds " + name_ +
-                               " of several vehicles; keep one with chase-log filter");
+    if (several_) RefuseSeveralVehicles(log, name_);
     std::stable_sort(messages_.begin(), messages_.end(),
                      [](const T& a, const T& b) { return a.utime < b.utime; });
     return messages_;

@@ -13,14 +13,17 @@
 #include "common/bus/message_head.h"
 #include "common/bus/status.h"
 #include "common/logs/message_types.h"
+#include "logs/src/good_message.h"
 #include "logs/src/log_survey.h"
 #include "logs/src/message_fields.h"
 
 namespace chase::logs {
 namespace {
 
-constexpr double kTolerableShare = 0.01;              // of messages: see LogInfo::Recorded
-constexpr int64_t kYear2000 = 946684800LL * 1000000;  // us; before it: logical time
+constexpr double kTolerableShare = 0.01;                     // of messages: see LogInfo::Recorded
+constexpr int64_t kGapPeriods = 10, kShortestGap = 100'000;  // us; a shorter gap is not told
+constexpr size_t kFewest = 20;                               // of a channel to have a period
+constexpr int64_t kYear2000 = 946684800LL * 1000000;         // us; before it: logical time
 
 double Seconds(int64_t utime) { return static_cast<double>(utime) * 1e-6; }
 
@@ -28,9 +31,7 @@ double Seconds(int64_t utime) { return static_cast<double>(utime) * 1e-6; }
 bool HeavyUnderAnyPrefix(const std::string& channel) {
   const auto& table = bus::ChannelTable();
   return std::any_of(table.begin(), table.end(), [&](const bus::ChannelRow& row) {
-    const size_t n = row.channel.size();
-    return row.heavy && channel.size() >= n &&
-           channel.compare(channel.size() - n, n, row.channel) == 0;
+    return row.heavy && IsOn(channel, row.channel);
   });
 }
 
@@ -114,11 +115,17 @@ std::map<std::string, TextByProcess> LogInfo::SoftwareByKind() const {
   return {{"versions", versions}, {"hosts", hosts}, {"configurations", configurations}};
 }
 
+void LogInfo::RequireOneVehicle() const {
+  OneVehicle vehicle(file);
+  for (const ChannelInfo& c : channels)
+    if (c.count > 0) vehicle.Hear(c.channel);
+}
+
 bool LogInfo::Recorded() const {
   const auto tolerable = [this](ChannelInfo c) {
-    const bool heavy = HeavyUnderAnyPrefix(c.channel);
-    if (heavy) c.missing -= c.missing_first;
-    return c.MissingShare() <= kTolerableShare || (heavy && heavy_left_out);
+    if (!HeavyUnderAnyPrefix(c.channel)) return c.missing == 0;
+    c.missing -= c.missing_first;
+    return c.MissingShare() <= kTolerableShare || heavy_left_out;
   };
   return Whole() && std::all_of(channels.begin(), channels.end(), tolerable);
 }
@@ -135,6 +142,11 @@ std::vector<std::string> LogInfo::Losses() const {
             "{}: {} of {} messages of {} are missing ({:.1f} %)", c.channel, s.missing,
             s.missing + s.count, s.name,
             100.0 * static_cast<double>(s.missing) / static_cast<double>(s.missing + s.count)));
+    if (c.missing > 0 && c.period > 0 &&
+        c.longest_gap >= std::max(kShortestGap, kGapPeriods * c.period))
+      lines.push_back(fmt::format(
+          "{}: longest gap {:.2f} s, from {:.1f} s of the log on; its period is {:.3f} s",
+          c.channel, Seconds(c.longest_gap), Seconds(c.gap_begins), Seconds(c.period)));
   }
   for (const auto& [process, count] : restarts)
     lines.push_back(fmt::format("{}: started anew, {}", process,
@@ -156,11 +168,20 @@ void LogSurvey::Add(const LogEvent& e) {
   c.bytes += static_cast<int64_t>(e.bytes.size());
   c.first_utime = std::min(c.first_utime, e.utime);  // live logs may step back by a millisecond
   c.last_utime = std::max(c.last_utime, e.utime);
-  c.longest_gap = std::max(c.longest_gap, e.utime - channel.previous);
+  NoteGap(e.utime, &channel);
+  if (c.count > 1) channel.periods.push_back(e.utime - channel.previous);
   channel.previous = e.utime;
   if (c.type.empty()) return;
   AddHead(e, &channel);
   AddContent(e, c.type);
+}
+
+void LogSurvey::NoteGap(int64_t until, Channel* channel) const {
+  ChannelInfo& c = channel->info;
+  const int64_t gap = until - channel->previous;
+  if (gap <= c.longest_gap) return;
+  c.longest_gap = gap;
+  c.gap_begins = channel->previous - first_utime_;
 }
 
 void LogSurvey::AddHead(const LogEvent& e, Channel* channel) {
@@ -197,8 +218,11 @@ void LogSurvey::Settle(Channel* channel) const {
   ChannelInfo& info = channel->info;
   const auto heard = heard_.find(info.channel);
   const bool told = heard != heard_.end() && channel->senders.size() == 1;
-  if (info.count > 1)
-    info.longest_gap = std::max(info.longest_gap, last_utime_ - channel->previous);
+  if (info.count > 1) NoteGap(last_utime_, channel);
+  if (auto& p = channel->periods; p.size() >= kFewest) {
+    std::nth_element(p.begin(), p.begin() + static_cast<long>(p.size() / 2), p.end());
+    info.period = p[p.size() / 2];
+  }
   for (const auto& [key, value] : channel->senders) {
     const auto& [name, vehicle, start] = key;
     const auto& [count, seqs] = value;

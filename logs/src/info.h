@@ -22,6 +22,8 @@ struct ChannelInfo {
   int64_t bytes = 0;
   int64_t first_utime = 0, last_utime = 0;  ///< of the events, microseconds
   int64_t longest_gap = 0;                  ///< without one until the log ends, microseconds
+  int64_t gap_begins = 0;                   ///< after the log's first event, microseconds
+  int64_t period = 0;  ///< the median between two of them, microseconds; 0: too few to tell
   std::vector<SenderInfo> senders;
   int64_t missing = 0;        ///< by `seq`; where count is 0: what others heard of the channel
   int64_t missing_first = 0;  ///< of them: before the first message of a sender
@@ -51,12 +53,15 @@ struct LogInfo {
   std::vector<std::string> Software() const;
   /// The same for programs: "versions", "hosts", "configurations".
   std::map<std::string, TextByProcess> SoftwareByKind() const;
+  /// Throws std::runtime_error with one line when it holds a channel of several vehicles.
+  void RequireOneVehicle() const;
   bool Whole() const { return damage.empty(); }
-  /// Whole, and no channel that the log holds has lost more than a hundredth: beyond that a 99th
-  /// percentile says nothing. Of sweeps, images and maps a recorder drops the oldest on purpose,
-  /// and leaves them out where its disk is nearly full: neither counts.
+  /// Whole, and nothing is missing but of sweeps, images and maps a hundredth: beyond that a 99th
+  /// percentile says nothing. A recorder drops their oldest on purpose, and leaves them out where
+  /// its disk is nearly full: neither counts.
   bool Recorded() const;
-  /// A line for everything that is not there, and for whoever was started anew.
+  /// A line for everything that is not there, for a gap of ten of its channel's periods and a
+  /// tenth of a second where messages are missing, and for whoever was started anew.
   std::vector<std::string> Losses() const;
 };
 

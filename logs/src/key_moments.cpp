@@ -90,11 +90,15 @@ class ImageFinder {
 
 std::vector<Moment> KeyMoments(const Json& spans, std::vector<Moment> others) {
   double first = 1e300, last = -1e300;
+  std::map<std::string, std::string> labels;  // the last of each lane
   for (const Json& span : spans) {
     first = std::min(first, span["from"].get<double>());
     last = std::max(last, span["to"].get<double>());
     const Moment moment = MomentOf(span);
-    if (!moment.label.empty()) others.push_back(moment);
+    const std::string lane = span["lane"], label = span["label"];
+    const bool same = lane == "flight" && labels[lane] == label;  // for another reason
+    labels[lane] = label;
+    if (!moment.label.empty() && !same) others.push_back(moment);
   }
   if (first <= last) {
     others.push_back({0.5 * (std::max(first, 0.0) + last), "midway", kMiddle});

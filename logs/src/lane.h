@@ -10,6 +10,8 @@ namespace chase::logs {
 /// Seconds under each name, and stretches of time with the same one.
 class Lane {
  public:
+  /// `by_reason`: a stretch ends where the words of its reason change, too; numbers may.
+  explicit Lane(bool by_reason = false) : by_reason_(by_reason) {}
   /// From `t` [s] on, until the next name or a second at most. Times that go back count as none. A
   /// stretch has the reason that it began with.
   void Add(double t, const std::string& name, const std::string& reason = "");
@@ -22,6 +24,9 @@ class Lane {
     std::string name, reason;
     double from, to;  // s
   };
+  bool Continues(double t, const std::string& name, const std::string& reason) const;
+
+  bool by_reason_;
   std::vector<Span> spans_;
   std::map<std::string, double> seconds_;
   double last_ = 0.0;

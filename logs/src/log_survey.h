@@ -6,6 +6,7 @@
 #include <string>
 #include <tuple>
 #include <utility>
+#include <vector>
 
 #include "common/logs/log_reader.h"
 #include "logs/src/info.h"
@@ -24,6 +25,7 @@ class LogSurvey {
   struct Channel {
     ChannelInfo info;
     int64_t previous = 0;
+    std::vector<int64_t> periods;  ///< between two events, microseconds
     std::map<std::tuple<std::string, std::string, int64_t>, std::pair<long, SeqCount>> senders;
   };
   struct Heard {
@@ -31,6 +33,7 @@ class LogSurvey {
   };
   void AddHead(const LogEvent& event, Channel* channel);
   void AddContent(const LogEvent& event, const std::string& type);
+  void NoteGap(int64_t until, Channel* channel) const;
   void Settle(Channel* channel) const;
   void AddUnrecorded(LogInfo* info) const;
 

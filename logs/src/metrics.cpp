@@ -164,6 +164,7 @@ void AddLosses(const LogInfo& log, Metrics* m) {
   for (const ChannelInfo& c : log.channels) {
     m->lost_messages[c.channel] = c.missing;
     m->longest_gap_s[c.channel] = 1e-6 * static_cast<double>(c.longest_gap);
+    m->gap_begins_s[c.channel] = 1e-6 * static_cast<double>(c.gap_begins);
   }
   m->software = log.SoftwareByKind();
   m->losses = log.Losses();

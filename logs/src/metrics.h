@@ -62,6 +62,7 @@ struct Metrics {
   double struck_after_done_s = -1.0;             ///< first sample after DONE that touches; -1: none
   std::map<std::string, int64_t> lost_messages;  ///< by channel, by `seq`
   std::map<std::string, double> longest_gap_s;   ///< by channel, without an event
+  std::map<std::string, double> gap_begins_s;    ///< that one's, after the log's first event
   std::map<std::string, TextByProcess> software;  ///< versions, hosts, configurations
   std::vector<std::string> losses;                ///< a line for each, for people
   bool log_whole = true;                          ///< neither cut off nor damaged

@@ -104,6 +104,7 @@ std::string MetricsJson(const FlightRecord& record, const Metrics& m) {
   j["real_time_factor"] = Number(m.real_time_factor);
   j["lost_messages"] = Json(m.lost_messages);
   j["longest_gap_s"] = Json(m.longest_gap_s);
+  j["gap_begins_s"] = Json(m.gap_begins_s);
   j["software"] = Json(m.software);
   j["losses"] = Json(m.losses);
   j["log_whole"] = m.log_whole;

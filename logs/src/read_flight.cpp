@@ -276,8 +276,10 @@ FlightRecord ReadFlight(const std::string& log) {
     gatherer.Add(e);
     survey.Add(e);
   }
+  LogInfo info = survey.Take(reader);
+  info.RequireOneVehicle();
   FlightRecord record = gatherer.Record(log);
-  record.log = survey.Take(reader);
+  record.log = std::move(info);
   return record;
 }
 

@@ -108,8 +108,11 @@ class Gatherer {
     if (const std::string utc = info.Utc(); !utc.empty()) report.metrics["recorded_utc"] = utc;
     AddFigures(&report.metrics);
     AddStages(&report.metrics);
-    for (const ChannelInfo& c : info.channels)
+    for (const ChannelInfo& c : info.channels) {
       report.metrics["lost_messages"][c.channel] = c.missing;
+      report.metrics["longest_gap_s"][c.channel] = 1e-6 * static_cast<double>(c.longest_gap);
+      report.metrics["gap_begins_s"][c.channel] = 1e-6 * static_cast<double>(c.gap_begins);
+    }
     report.metrics["software"] = Json(info.SoftwareByKind());
     report.metrics["losses"] = info.Losses();
     report.metrics["log_whole"] = info.Whole();
@@ -276,7 +279,7 @@ class Gatherer {
   bool follows_ = false;
   std::set<std::string> vehicles_;
   double log_begin_ = 0.0, end_ = 0.0, next_shown_ = -1e9;  // s
-  Lane health_, target_, verdict_, flight_;
+  Lane health_, target_, verdict_, flight_{true};
   long poses_ = 0, targets_ = 0, tracked_ = 0, plans_ = 0, fallbacks_ = 0, certified_ = 0;
   int32_t epoch_ = 0;
   long frame_changes_ = 0;
@@ -312,7 +315,9 @@ VehicleReport ReportVehicle(const std::string& log, std::optional<int64_t> origi
     gatherer.Add(e);
     survey.Add(e);
   }
-  return gatherer.Report(survey.Take(reader));
+  const LogInfo info = survey.Take(reader);
+  info.RequireOneVehicle();
+  return gatherer.Report(info);
 }
 
 }  // namespace chase::logs

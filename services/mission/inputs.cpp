@@ -56,8 +56,10 @@ std::string ProcessProblem(const std::string& name, const Inputs& inputs, double
 }  // namespace
 
 void Inputs::Heard(const std::string& process, ProcessReport report) {
+  report.first = report.start;
   const auto [at, fresh] = processes.emplace(process, report);
   if (fresh) return;
+  report.first = at->second.first;
   report.restarts = at->second.restarts + (at->second.start != report.start ? 1 : 0);
   at->second = report;
 }

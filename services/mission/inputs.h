@@ -28,6 +28,7 @@ struct ProcessReport {
   int8_t state = 0;  ///< one of status_t's constants
   bool failed = false;
   int64_t start = 0;  ///< when it started; another number is another process
+  int64_t first = 0;  ///< the start of the one that was heard first
   int restarts = 0;
 };
 

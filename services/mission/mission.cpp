@@ -150,6 +150,7 @@ std::vector<Event> Mission::Observed(double t) const {
   add(IsNotFlown(t), Event::kNotFlown);
   add(state_ == State::kSearch && config_.give_up > 0.0 && t - since_ > config_.give_up,
       Event::kGaveUp);
+  add(IsUnplanned(t), Event::kUnplanned);
   add(!Leaving().empty(), Event::kLeaving);
   for (const Event breach : Breached()) add(!Has(overruled_, breach), breach);
   add(!KnowsHome(), Event::kHomeLost);
@@ -237,6 +238,12 @@ bool Mission::IsNotFlown(double t) const {
   const double waited = t - taken_off_.value_or(0.0);
   if (inputs_.handed_over) return waited > world::kMostAge.status;
   return config_.takeoff_patience > 0.0 && waited > config_.takeoff_patience;
+}
+
+// Control hovers at the end of the last stop then, and comes down without a plan once it is told
+// to.
+bool Mission::IsUnplanned(double t) const {
+  return flown_ && t - std::max(inputs_.plan_heard, *flown_) > world::kMostAge.plan;
 }
 
 // DONE cuts the motors: "disarmed" must not count in a status that was sent before the flight, and

@@ -67,6 +67,7 @@ class Mission {
   bool IsUp() const;
   bool Flies() const;
   bool IsNotFlown(double t) const;
+  bool IsUnplanned(double t) const;
   bool IsLandedByAutopilot() const;
   bool IsHome() const;
   bool KnowsHome() const;

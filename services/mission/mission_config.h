@@ -17,7 +17,7 @@ struct MissionConfig {
   double takeoff_patience = 90.0;
   double rest_speed = 0.25;
   double battery_low = 0.25, battery_critical = 0.1;
-  double climb_height = 2.0, body_radius = 0.25;
+  double climb_height = 2.0, body_radius = 0.37;
   world::Geofence geofence;
   std::vector<std::string> needs = {"prediction", "planning", "control"};
 
@@ -36,7 +36,8 @@ struct MissionConfig {
     v("battery_critical", battery_critical, "share at which it lands where it is; 0: never");
     v("climb_height", climb_height,
       "above the take-off place that has to be free of obstacles, m; half of it is a climb");
-    v("body_radius", body_radius, "of the column that is looked at for that, m");
+    v("body_radius", body_radius,
+      "of the column that is looked at for that, with planning's tracking_tube, m");
     v("geofence", geofence, "that it stays in");
     v("needs", needs, "processes without whose status it does not take off");
   }

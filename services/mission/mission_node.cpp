@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <map>
 
 #include "chase/flight_state_t.hpp"
 #include "chase/geofence_t.hpp"
@@ -17,6 +18,7 @@ namespace chase::mission {
 namespace {
 
 constexpr int64_t kHealthTicks = 10;  // 1 Hz, as the statuses that it sums up
+constexpr double kNeverHeard = -1.0;  // process_health_t's age
 
 }  // namespace
 
@@ -36,6 +38,7 @@ MissionNode::MissionNode(bus::Bus& bus, const MissionConfig& config)
     mission_.inputs().motors_off = m.motors == attitude_setpoint_t::MOTORS_OFF;
   });
   bus_.Subscribe<flight_state_t>("HOME", [this](const flight_state_t& m) {
+    if (!led_before_ && m.since < origin_) led_before_ = m.since;
     mission_.Remember(Now(), {bus::ToVector(m.home), m.epoch}, static_cast<State>(m.state));
   });
   bus_.Subscribe<selection_t>("SELECTION", [this](const selection_t& m) { selection_ = m; });
@@ -62,9 +65,11 @@ void MissionNode::SubscribeStatuses() {
 
 void MissionNode::OnCommand(const command_t& message) {
   if (message.kind == command_t::SELECT) return;  // perception's
-  const world::CommandAnswer answer = mission_.Obey(
+  world::CommandAnswer answer = mission_.Obey(
       Now(),
       {bus::KeyOf(message, origin_), static_cast<Event>(message.kind), bus::IsForced(message)});
+  if (answer.unknown)
+    answer.reason += fmt::format(", now {}: {}", Name(mission_.state()), mission_.Words());
   bus_.Publish("COMMAND_ACK", bus::Acknowledgement(message, answer, bus_.Now()));
   if (answer.accepted) SendState();
 }
@@ -158,17 +163,25 @@ void MissionNode::SendState() {
 }
 
 void MissionNode::SendHealth() {
+  std::map<std::string, process_health_t> rows;
+  for (const std::string& name : config_.needs)
+    rows[name] = {name, status_t::FAILED, kNeverHeard, 0};
+  for (const auto& [name, report] : mission_.inputs().processes)
+    rows[name] = {name, report.state, std::max(0.0, Now() - report.t),
+                  report.restarts + (CameBackBefore(name, report) ? 1 : 0)};
   health_t m{};
   m.utime = bus_.Now();
-  for (const auto& [name, report] : mission_.inputs().processes) {
-    process_health_t& process = m.processes.emplace_back();
-    process.name = name;
-    process.state = report.state;
-    process.age = std::max(0.0, Now() - report.t);
-    process.restarts = report.restarts;
-  }
+  for (const auto& [name, row] : rows) m.processes.push_back(row);
   m.n_processes = static_cast<int32_t>(m.processes.size());
   bus_.Publish("HEALTH", m);
+}
+
+/// A mission process before this one led a flight, for which all that it needs was there: what
+/// started later had come back when this one heard it first. Once at least.
+bool MissionNode::CameBackBefore(const std::string& name, const ProcessReport& report) const {
+  const bool was_there = name == "mission" || std::find(config_.needs.begin(), config_.needs.end(),
+                                                        name) != config_.needs.end();
+  return was_there && led_before_ && report.first > *led_before_;
 }
 
 /// A perception process that was started anew knows nothing of it.

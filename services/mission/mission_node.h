@@ -41,6 +41,7 @@ class MissionNode : public bus::Node {
   void OnStatus(const status_t& message);
   void SendState();
   void SendHealth();
+  bool CameBackBefore(const std::string& name, const ProcessReport& report) const;
   void SendSelection();
   void SendGeofence();
   double Now() const;
@@ -52,6 +53,8 @@ class MissionNode : public bus::Node {
   Mission mission_;
   bus::AutopilotState autopilot_;
   std::optional<selection_t> selection_;  // perception's newest
+  /// Since when a mission process before this one led the flight as it did last, us.
+  std::optional<int64_t> led_before_;
   int64_t ticks_ = 0;
 };
 

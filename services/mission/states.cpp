@@ -39,6 +39,7 @@ std::vector<Row> Rows() {
 
       {{S::kTakeoff}, E::kUp,       S::kHold,   "climbed"},
       {stays_up,      E::kNotFlown, S::kReady,  "take-off called off"},
+      {{S::kEmergency}, E::kNotFlown, S::kReady, "take-off called off"},
       {{S::kChase},   E::kLost,     S::kSearch, "target lost"},
       {{S::kSearch},  E::kSeen,     S::kChase,  "target seen"},
       {{S::kSearch},  E::kGaveUp,   S::kReturn, "target not found in time"},
@@ -60,6 +61,7 @@ std::vector<Row> Rows() {
       {stays_up, E::kOutside, S::kReturn, "geofence breached: returning"},
       {stays_up, E::kBatteryLow, S::kReturn, "battery low"},
       {above,    E::kBatteryCritical, S::kLand, "battery critical: landing here"},
+      {above,    E::kUnplanned, S::kLand, "planning is silent: landing here"},
       {ground,   E::kKill, S::kDone, "killed: motors cut by command"},
       {flies,    E::kKill, S::kDone, "killed: motors cut by command"},
       {{S::kEmergency}, E::kKill, S::kDone, "killed: motors cut by command"},

@@ -48,10 +48,11 @@ enum class Event {
   kDisarmed,         ///< the autopilot has landed and disarmed, whoever wanted it to
   kLeaving,          ///< what is planned leads out of the geofence
   kOutside,          ///< the body is outside
+  kUnplanned,        ///< planning has been silent for long
   kBatteryLow,       ///< time to return
   kBatteryCritical,  ///< time to land
 };
-inline constexpr int kEvents = 28;
+inline constexpr int kEvents = 29;
 
 struct Transition {
   State from;

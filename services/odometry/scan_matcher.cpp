@@ -77,9 +77,21 @@ class ScanMatcher::Matched {
   std::vector<Query> queries_;
 };
 
+/// The normal without its small parts along the axes. What is nearly parallel to an axis tells
+/// nothing of it but by the noise of its normal, and a thousand such tell more than a few that face
+/// it: a wall whose normals lean by 2 % turns each millimetre of its residuals into 5 cm of height.
+Eigen::Vector3d ScanMatcher::Squarely(const Eigen::Vector3d& normal,
+                                      const Eigen::Matrix3d& axes) const {
+  const double least = std::cos(config_.slant * M_PI / 180.0);
+  Eigen::Vector3d along = axes.transpose() * normal;
+  for (int i = 0; i < 3; ++i)
+    if (std::abs(along[i]) < least) along[i] = 0.0;
+  return axes * along;
+}
+
 ScanMatcher::System ScanMatcher::Linearise(const Pose& X_WB, double kernel, double gate,
-                                           Matched* planes, Matched* posts,
-                                           std::vector<Row>* rows) const {
+                                           const Eigen::Matrix3d& axes, Matched* planes,
+                                           Matched* posts, std::vector<Row>* rows) const {
   System system;
   const Eigen::Matrix3d R = X_WB.R.toRotationMatrix();
   const double k2 = kernel * kernel;
@@ -96,6 +108,8 @@ ScanMatcher::System ScanMatcher::Linearise(const Pose& X_WB, double kernel, doub
       Vector6d J;
       const double r = residual_of(p_W, rotated, *surface, &J);
       if (std::abs(r) > gate) continue;
+      const Eigen::Vector3d n = Squarely(J.head<3>(), axes);
+      J << n, rotated.cross(n);
       ++system.matched;
       if (std::abs(r) < kernel) ++system.inliers;
       const double robust = k2 / (k2 + r * r);
@@ -189,10 +203,15 @@ MatchResult ScanMatcher::Match(const Features& features, const SurfaceMap& plane
   Matched matched_planes(features.planes, planes, eye), matched_posts(features.posts, posts, eye);
   System system;
   Pose alone;  // by the sweep alone
+  Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();
   std::vector<Row> rows;
   rows.reserve(features.planes.size() + features.posts.size());
   for (int i = 0; i < config_.max_iterations; ++i) {
-    system = Linearise(result.X_WB, kernel, result.gate, &matched_planes, &matched_posts, &rows);
+    system =
+        Linearise(result.X_WB, kernel, result.gate, axes, &matched_planes, &matched_posts, &rows);
+    axes = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(
+               Eigen::Matrix3d(system.H.topLeftCorner<3, 3>()))
+               .eigenvectors();
     result.iterations = i + 1;
     if (system.weight < 1e-6) return result;
     Analyse(system, rows, unknown_before, &result);

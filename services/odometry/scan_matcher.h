@@ -107,8 +107,9 @@ class ScanMatcher {
   };
   struct System;
   class Matched;
-  System Linearise(const Pose& X_WB, double kernel, double gate, Matched* planes, Matched* posts,
-                   std::vector<Row>* rows) const;
+  System Linearise(const Pose& X_WB, double kernel, double gate, const Eigen::Matrix3d& axes,
+                   Matched* planes, Matched* posts, std::vector<Row>* rows) const;
+  Eigen::Vector3d Squarely(const Eigen::Vector3d& normal, const Eigen::Matrix3d& axes) const;
   void Analyse(const System& system, const std::vector<Row>& rows, const Matrix6d& unknown_before,
                MatchResult* result) const;
   void KeepUnknown(const Eigen::Matrix3d& before, int unknown, Eigen::Matrix3d* directions) const;

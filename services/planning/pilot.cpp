@@ -6,6 +6,7 @@
 #include "common/math/gaussian.h"
 #include "common/math/rotation.h"
 #include "common/world/ages.h"
+#include "common/world/column.h"
 #include "services/planning/resting.h"
 #include "services/planning/stopping.h"
 
@@ -146,6 +147,7 @@ std::optional<PlanResult> Pilot::Update(double t, const BodyEstimate& body) {
   news_ = news_ || !start.follows;
   if (task_ && airborne_) trail_.Add(body.p);
   if (!IsDue(t) || !MayPlan(t)) return std::nullopt;
+  if (HasTarget(t)) search_.Saw(*forecast_);
   const bool stands = !airborne_ && !has_running_;
   if (stands && !IsFree(t0, start, Climb(t0, body).trajectory)) return std::nullopt;
   PlanResult plan = !Chases()                                       ? Obey(t0, start, body)
@@ -224,7 +226,6 @@ PlanRequest Pilot::Request(double t0, const Start& start) const {
 }
 
 PlanResult Pilot::Chase(double t0, const Start& start) {
-  search_.Saw(*forecast_);
   chased_ = true;
   return planner_->Plan(Request(t0, start));
 }
@@ -245,10 +246,13 @@ PlanResult Pilot::Wait(double t0, const Start& start, const BodyEstimate& body) 
   return search_.has_seen() ? Search(t0, start, body) : Hover(t0, start);
 }
 
-// No mover comes to the climb for as long as a stop takes.
+// Nothing reaches into the rest of the climb, and no mover comes to it for as long as a stop takes.
 bool Pilot::IsFree(double t0, const Start& start, const world::Trajectory& climb) const {
   constexpr double kStopTakes = 1.5;  // s: from the climb's 0.75 m/s, and to be seen
   if (!SeesObstacles(t0 - config_.latency)) return false;
+  const Eigen::Vector3d& p = start.state.p;
+  const double rest = climb.Position(climb.end()).z() - p.z();
+  if (world::IsColumnBlocked(obstacles_, p, config_.planner.hard_radius(), rest)) return false;
   PlanRequest request = Request(t0, start);
   request.horizon = kStopTakes;
   return KeepsOffMovers(config_.planner, request, climb);
@@ -257,6 +261,8 @@ bool Pilot::IsFree(double t0, const Start& start, const world::Trajectory& climb
 // A climb that was broken off goes on, certified, once it can.
 PlanResult Pilot::ClimbOn(double t0, const Start& start, const BodyEstimate& body) {
   constexpr double kThere = 0.05;  // m
+  if (!climb_top_ && home_)        // whoever began the climb has died
+    climb_top_ = *home_ + config_.takeoff_height * Eigen::Vector3d::UnitZ();
   if (!climb_top_ || (*climb_top_ - start.state.p).norm() < kThere)
     return Hold(t0, start, "climbed");
   const PlanRequest request = Request(t0, start);
@@ -408,11 +414,13 @@ PlanResult Pilot::Rest(double t0, const Start& start) const {
 }
 
 // A target that was chased before the frame changed, and is not seen soon after it, may be anywhere
-// around. One that was never seen is waited for: perception needs time for a target that stands.
+// around. One that was never seen is waited for longer: perception needs time for a target that
+// stands.
 PlanResult Pilot::Hover(double t0, const Start& start) {
-  constexpr double kSoon = 4.0;  // s: perception takes 3 for one that stands within 5 m
+  constexpr double kSoon = 4.0;   // s: perception takes 3 for one that stands within 5 m
+  constexpr double kLong = 10.0;  // s: chosen; so that whoever is in view is not turned away from
   if (!hovers_since_) hovers_since_ = t0;
-  if (chased_ && t0 - *hovers_since_ > kSoon)
+  if (t0 - *hovers_since_ > (chased_ ? kSoon : kLong))
     return BrakeAndLook(t0, start, start.yaw.yaw + 0.5 * M_PI);
   PlanResult plan = Rest(t0, start);
   if (plan.verdict == Verdict::kWait) plan.reason = "nothing to chase yet";

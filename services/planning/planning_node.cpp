@@ -164,8 +164,8 @@ void PlanningNode::OnPose(const pose_t& message) {
     target_ = {};
   }
   CheckMission(message.utime);
-  pilot_.SetWaiting(!sweeps_.IsEnough() ||
-                    (autopilot_.IsOnGround() && !autopilot_.Obeys(message.utime)));
+  waits_for_autopilot_ = autopilot_.IsOnGround() && !autopilot_.Obeys(message.utime);
+  pilot_.SetWaiting(!sweeps_.IsEnough() || waits_for_autopilot_);
   const double t = bus::Seconds(message.utime, Origin(message.utime));
   std::optional<PlanResult> plan;
   {
@@ -195,9 +195,16 @@ int64_t PlanningNode::Origin(int64_t utime) {
   return *origin_;
 }
 
+const char* PlanningNode::WaitsFor() const {
+  if (!is_usable_) return "waiting for a pose";
+  if (!sweeps_.IsEnough()) return "waiting for ten lists in a row";
+  if (waits_for_autopilot_) return "waiting for the autopilot";
+  return "on the ground: not told to fly, or the way up is not free";
+}
+
 bus::NodeReport PlanningNode::Report() const {
   using State = bus::NodeReport::State;
-  if (n_plans_ == 0) return {State::kStarting, "waiting for a pose"};
+  if (n_plans_ == 0) return {State::kStarting, WaitsFor()};
   const PlanResult& plan = pilot_.running();
   const bool well = plan.verdict == Verdict::kChase || plan.verdict == Verdict::kWait;
   return {

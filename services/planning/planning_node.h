@@ -35,6 +35,7 @@ class PlanningNode : public bus::Node {
   void OnPose(const pose_t& message);
   void CheckMission(int64_t utime);
   void Send(const PlanResult& plan);
+  const char* WaitsFor() const;  ///< before the first plan
   int64_t Origin(int64_t utime);
 
   bus::Bus& bus_;
@@ -43,7 +44,8 @@ class PlanningNode : public bus::Node {
   bus::Epoch epoch_;
   bus::AutopilotState autopilot_;
   world::SweepRun sweeps_;
-  bool is_usable_ = false;         ///< the newest POSE
+  bool is_usable_ = false;  ///< the newest POSE
+  bool waits_for_autopilot_ = false;
   std::optional<int64_t> origin_;  // utime that the core's seconds count from
   bus::StampOrder state_order_;
   int64_t state_utime_ = 0;              // of the newest FLIGHT_STATE; 0: none

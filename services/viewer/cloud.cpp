@@ -55,11 +55,13 @@ std::vector<size_t> Thinned(const std::vector<float>& x, const std::vector<float
   return kept;
 }
 
-std::string EncodeCloud(double t, const Eigen::Vector3d& centre, const std::vector<float>& x,
-                        const std::vector<float>& y, const std::vector<float>& z, size_t most) {
+std::string EncodeCloud(double t, int generation, const Eigen::Vector3d& centre,
+                        const std::vector<float>& x, const std::vector<float>& y,
+                        const std::vector<float>& z, size_t most) {
   const std::vector<size_t> kept = Thinned(x, y, z, most);
   const Eigen::Vector3d origin = centre.allFinite() ? centre : Eigen::Vector3d::Zero();
-  std::string out("\1\0\0\0", 4);
+  std::string out;
+  Append(static_cast<uint32_t>(generation) << 8 | 1U, &out);
   Append(static_cast<uint32_t>(kept.size()), &out);
   Append(t, &out);
   for (int k = 0; k < 3; ++k) Append(origin[k], &out);

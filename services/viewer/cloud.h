@@ -13,10 +13,11 @@ namespace chase::viewer {
 std::vector<size_t> Thinned(const std::vector<float>& x, const std::vector<float>& y,
                             const std::vector<float>& z, size_t most);
 
-/// These points for the page: byte 1, three zeros, uint32 count, float64 time [s], float64 x y z of
-/// `centre`, then int16 x y z per point in centimetres from it; all little endian. Points farther
-/// than 327 m from the origin are moved there.
-std::string EncodeCloud(double t, const Eigen::Vector3d& centre, const std::vector<float>& x,
-                        const std::vector<float>& y, const std::vector<float>& z, size_t most);
+/// These points for the page: byte 1, three bytes of the scene's `generation`, uint32 count,
+/// float64 time [s], float64 x y z of `centre`, then int16 x y z per point in centimetres from it;
+/// all little endian. Points farther than 327 m from the origin are moved there.
+std::string EncodeCloud(double t, int generation, const Eigen::Vector3d& centre,
+                        const std::vector<float>& x, const std::vector<float>& y,
+                        const std::vector<float>& z, size_t most);
 
 }  // namespace chase::viewer

@@ -1,5 +1,6 @@
 #include "services/viewer/commander.h"
 
+#include <algorithm>
 #include <cstdio>
 #include <utility>
 
@@ -20,7 +21,9 @@ std::string Commander::RefusalHere(const Request& request) const {
   std::string refusal = RefusalOf(request, token_);
   if (refusal.empty() && !live_) refusal = "a log is played: nobody flies";
   if (refusal.empty()) refusal = LateRefusal(request);
-  if (refusal.empty() && given_.size() >= kMost) refusal = "too many commands are not answered yet";
+  const auto own = [&](const Given& g) { return g.request.caller == request.caller; };
+  if (refusal.empty() && std::count_if(given_.begin(), given_.end(), own) >= kMost)
+    refusal = "too many commands are not answered yet";
   return refusal;
 }
 

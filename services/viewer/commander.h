@@ -32,7 +32,7 @@ class Commander {
     Request request;
     bus::CommandCall call;
   };
-  static constexpr size_t kMost = 8;      // under way: a finger is no faster than their answers
+  static constexpr int kMost = 8;  // a client's under way: a finger is no faster than their answers
   static constexpr double kLatest = 2.0;  // s; a link that is slower is none to command by
   std::string RefusalHere(const Request& request) const;
   /// Of what waited in a link that stalled: a page gives a command at the time of its newest state.

@@ -104,11 +104,13 @@ std::string AdvertiseText(const std::vector<FoxgloveChannel>& channels) {
 
 std::string AdvertiseServiceText() {
   const json text = {{"type", "string"}}, truth = {{"type", "boolean"}};
-  const json service = {{"id", kService},
-                        {"name", "command"},
-                        {"type", "chase.command"},
-                        {"request", ObjectOf({{"command", text}, {"token", text}})},
-                        {"response", ObjectOf({{"accepted", truth}, {"words", text}})}};
+  const json number = {{"type", "integer"}};
+  const json service = {
+      {"id", kService},
+      {"name", "command"},
+      {"type", "chase.command"},
+      {"request", ObjectOf({{"command", text}, {"token", text}, {"utime", number}})},
+      {"response", ObjectOf({{"accepted", truth}, {"words", text}})}};
   return Text({{"op", "advertiseServices"}, {"services", json::array({service})}});
 }
 

@@ -27,7 +27,8 @@ std::string AdvertiseText(const std::vector<FoxgloveChannel>& channels);
 /// endian.
 std::string MessageData(uint32_t subscription, int64_t utime, const std::string& payload);
 
-/// The one service, "command": JSON {command, token} in, {accepted, words} out.
+/// The one service, "command": JSON {command, token, utime} in, {accepted, words} out. `utime`, of
+/// the newest message that the caller has seen [us], may be left out.
 std::string AdvertiseServiceText();
 /// A client's binary message: opcode 2, uint32 service, uint32 call, uint32 length of the
 /// encoding's name, that name, payload; little endian. Nothing when it is no call of ours in JSON.

@@ -56,6 +56,8 @@ void LogPlayer::SubscribeRaw(const std::string& channel, RawHandler handler) {
       continue;
     handlers_[i] = handler;
     heavy_[i] = bus::IsHeavy(channel);
+    if (channel == "CAMERA_IMAGE") image_ = i;
+    if (channel == "TARGET") target_ = i;
   }
 }
 
@@ -94,7 +96,10 @@ void LogPlayer::Survey(int64_t period, const std::function<bool(int64_t utime)>&
 void LogPlayer::Seek(int64_t utime) {
   next_ = After(utime);
   std::vector<size_t> last = LastOfEach(0, next_);
+  if (image_ != SIZE_MAX && target_ != SIZE_MAX && last[target_] != SIZE_MAX)
+    last.push_back(LastOfEach(0, last[target_])[image_]);
   std::sort(last.begin(), last.end());
+  last.erase(std::unique(last.begin(), last.end()), last.end());
   for (const bool heavy : {false, true})
     for (const size_t i : last)
       if (i != SIZE_MAX && heavy_[index_[i].channel] == heavy) HandOver(index_[i]);

@@ -29,7 +29,8 @@ class LogPlayer : public bus::Bus {
   /// the log) and calls `every` at multiples of `period` microseconds, until it returns false.
   void Survey(int64_t period, const std::function<bool(int64_t utime)>& every);
   /// Hands over, of each channel, the last message up to `utime`, in file order; heavy ones last,
-  /// so that an image finds the target that is drawn into it.
+  /// so that an image finds the target that is drawn into it. Of images also the last before
+  /// TARGET, for the newest may not have its own yet.
   void Seek(int64_t utime);
   /// Hands over what follows up to `utime`; of each heavy channel only the last.
   void PlayTo(int64_t utime);
@@ -55,6 +56,7 @@ class LogPlayer : public bus::Bus {
   std::vector<std::string> channels_;
   std::vector<RawHandler> handlers_;  // by channel; empty: nobody listens
   std::vector<bool> heavy_;
+  size_t image_ = SIZE_MAX, target_ = SIZE_MAX;  // CAMERA_IMAGE and TARGET among the channels
   std::vector<Entry> index_;
   size_t next_ = 0;
   int64_t now_ = 0;

@@ -109,9 +109,9 @@ std::vector<ProcessHealth> Joined(const std::map<std::string, ProcessHealth>& he
     if (!only_there) continue;
     row->second.name = p.name;
     row->second.state = Code(p.state);
-    row->second.age = p.age + bus::Seconds(now, mission.utime);
+    row->second.age = p.age < 0.0 ? p.age : p.age + bus::Seconds(now, mission.utime);
     row->second.cpu_percent = -1.0;
-    row->second.detail = "heard by the mission process only";
+    row->second.detail = p.age < 0.0 ? "never heard" : "heard by the mission process only";
   }
   std::vector<ProcessHealth> rows;
   for (const auto& [name, row] : all) rows.push_back(row);

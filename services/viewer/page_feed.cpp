@@ -59,6 +59,8 @@ void PageFeed::Take(const pose_t& m) {
 void PageFeed::Take(const target_t& m) {
   scene_.target = FromMessage(m);
   heard_.target = bus_.Now();
+  target_utime_ = m.utime;
+  if (image_ && target_utime_ >= image_->utime) SendImage();
 }
 
 void PageFeed::Take(const plan_t& m) {
@@ -88,14 +90,19 @@ void PageFeed::Take(const flight_state_t& m) {
   heard_.flight = bus_.Now();
 }
 
+void PageFeed::Take(const tracking_t& m) {
+  scene_.tracking = Tracking{Code(m.following), 0.0};
+  heard_.tracking = bus_.Now();
+}
+
 template <class Sweep>
 void PageFeed::SendCloud(const Sweep& m, const Eigen::Vector3d& centre) {
   if (!Due(Part::kCloud, m.utime, config_.cloud_rate_hz)) return;
   auto timer = bus_.Time("cloud");
-  sink_.Send(
-      Part::kCloud,
-      EncodeCloud(Time(m.utime), centre, m.x, m.y, m.z, static_cast<size_t>(config_.cloud_points)),
-      true);
+  sink_.Send(Part::kCloud,
+             EncodeCloud(Time(m.utime), generation_, centre, m.x, m.y, m.z,
+                         static_cast<size_t>(config_.cloud_points)),
+             true);
 }
 
 void PageFeed::Take(const scan_registered_t& m) { SendCloud(m, bus::ToVector(m.pos)); }
@@ -109,10 +116,20 @@ void PageFeed::Take(const camera_image_t& m) {
   heard_.image = bus_.Now();
   if (!Due(Part::kImage, m.utime, config_.image_rate_hz)) return;
   auto timer = bus_.Time("image");
-  const std::string jpeg = logs::Jpeg(m, config_.jpeg_quality);
+  std::string jpeg = logs::Jpeg(m, config_.jpeg_quality);
   if (jpeg.empty()) return;
-  sink_.Send(Part::kImage, EncodeImage(Time(m.utime), m.width, m.height, scene_.target, jpeg),
+  SendImage();  // the one before
+  image_ = Image{m.utime, m.width, m.height, std::move(jpeg)};
+  if (target_utime_ >= m.utime) SendImage();
+}
+
+void PageFeed::SendImage() {
+  if (!image_) return;
+  const auto target = target_utime_ == image_->utime ? scene_.target : std::nullopt;
+  sink_.Send(Part::kImage,
+             EncodeImage(Time(image_->utime), image_->width, image_->height, target, image_->jpeg),
              true);
+  image_.reset();
 }
 
 void PageFeed::Take(const status_t& m) {
@@ -138,6 +155,7 @@ void PageFeed::Age() {
   if (scene_.plan) scene_.plan->age = since(heard_.plan);
   if (scene_.forecast) scene_.forecast->age = since(heard_.forecast);
   if (scene_.flight) scene_.flight->age = since(heard_.flight);
+  if (scene_.tracking) scene_.tracking->age = since(heard_.tracking);
   if (scene_.obstacles_age) scene_.obstacles_age = since(heard_.obstacles);
   if (scene_.image_age) scene_.image_age = since(heard_.image);
 }
@@ -156,6 +174,8 @@ void PageFeed::Forget() {
   health_.clear();
   mission_health_.reset();
   sent_.clear();
+  image_.reset();
+  target_utime_ = -1;
   epoch_ = -1;
   ++generation_;
 }
@@ -177,6 +197,9 @@ void PageFeed::Tick(int64_t utime, const std::string& self) {
   if (!play_) Remember(utime);
   const bool second = ticks_++ % kTicksPerSecond == 0;
   if (!play_ && second) SendHello();
+  const bool paused = play_ && !play_->playing;
+  if (image_ && (paused || bus::Seconds(bus_.Now(), image_->utime) > kMostShownAge.target))
+    SendImage();
   if (!sink_.Wanted(Part::kState)) return;
   auto timer = bus_.Time("tick");
   if (epoch_ >= 0 && epoch_ != first_epoch_) scene_.truth.clear();
@@ -184,7 +207,8 @@ void PageFeed::Tick(int64_t utime, const std::string& self) {
   sink_.Send(Part::kState, StateText(scene_, Elapsed(utime), generation_, play_), false);
   if (!obstacles_sent_ && ticks_ % kTicksPerObstacles == 0) {
     obstacles_sent_ = true;
-    sink_.Send(Part::kObstacles, ObstaclesText(obstacles_, Time(newest_), Elapsed(utime)), false);
+    sink_.Send(Part::kObstacles,
+               ObstaclesText(obstacles_, Time(newest_), Elapsed(utime), generation_), false);
   }
   if (second) sink_.Send(Part::kHealth, HealthText(Processes(), self), false);
 }

@@ -33,10 +33,12 @@ class PageFeed {
   void Take(const plan_t& m);
   void Take(const prediction_t& m);
   void Take(const obstacles_t& m);
-  void Take(const tracking_t& m) { scene_.following = Code(m.following); }
+  void Take(const tracking_t& m);
   void Take(const scan_registered_t& m);
   /// Shown where it was measured, in frame L, as long as no pose says where that is.
   void Take(const lidar_scan_t& m);
+  /// Held back until the TARGET of its time, or a later one, is there; until the next image is due
+  /// or kMostShownAge.target has passed at most, and then shown without.
   void Take(const camera_image_t& m);
   void Take(const flight_state_t& m);
   void Take(const geofence_t& m) { scene_.fence = FromMessage(m); }
@@ -66,6 +68,8 @@ class PageFeed {
   bool Due(Part part, int64_t utime, double rate_hz);
   template <class Sweep>
   void SendCloud(const Sweep& m, const Eigen::Vector3d& centre);
+  /// Sends the image that waits, with the target where TARGET is of its time.
+  void SendImage();
   std::vector<ProcessHealth> Processes();
   /// Writes into the scene how old its inputs are now.
   void Age();
@@ -84,7 +88,7 @@ class PageFeed {
   int64_t newest_ = 0;  // utime of the newest pose or obstacles
   int64_t start_ = -1;  // of the first tick
   struct {
-    int64_t pose, target, plan, forecast, obstacles, flight, image;
+    int64_t pose, target, plan, forecast, obstacles, flight, tracking, image;
   } heard_{};  // when, by the bus's clock
   std::map<std::string, int64_t> status_heard_;
   int generation_ = 0;  // of what a page has drawn and must clear
@@ -98,6 +102,13 @@ class PageFeed {
   std::map<std::string, ProcessHealth> health_;
   std::optional<health_t> mission_health_;
   std::map<Part, int64_t> sent_;  // utime of the last one
+  struct Image {
+    int64_t utime;
+    int width, height;
+    std::string jpeg;
+  };
+  std::optional<Image> image_;  // waits for the TARGET of its time
+  int64_t target_utime_ = -1;   // of the newest TARGET
   int64_t ticks_ = 0;
 };
 

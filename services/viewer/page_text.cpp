@@ -99,6 +99,8 @@ json FlightOf(const Flight& f) {
       {"state", f.state}, {"reason", f.reason}, {"since", Number(f.since)}, {"missing", f.missing}};
 }
 
+json TrackingOf(const Tracking& t) { return {{"following", t.following}}; }
+
 json FenceOf(const Fence& f) {
   json corners = json::array();
   for (const Eigen::Vector2d& p : f.corners) corners.push_back(Numbers(p));
@@ -143,7 +145,6 @@ std::string StateText(const Scene& scene, double t, int generation,
   json out = {{"type", "state"},
               {"generation", generation},
               {"utime", scene.utime},
-              {"following", scene.following},
               {"row", RowOf(SampleOf(scene, t))}};
   const auto add = [&out](const char* name, const auto& part, double most, auto of) {
     if (part) out[name] = Aged(of(*part), part->age, most);
@@ -152,6 +153,7 @@ std::string StateText(const Scene& scene, double t, int generation,
   add("target", scene.target, kMostShownAge.target, TargetOf);
   add("plan", scene.plan, kMostShownAge.plan, PlanOf);
   add("forecast", scene.forecast, kMostShownAge.forecast, ForecastOf);
+  add("tracking", scene.tracking, kMostShownAge.tracking, TrackingOf);
   add("flight", scene.flight, kMostShownAge.flight, FlightOf);
   if (scene.obstacles_age) out["obstacles"] = AgeOf(*scene.obstacles_age, kMostShownAge.obstacles);
   if (scene.image_age) out["image"] = AgeOf(*scene.image_age, kMostShownAge.image);
@@ -161,7 +163,8 @@ std::string StateText(const Scene& scene, double t, int generation,
   return Text(out);
 }
 
-std::string ObstaclesText(const std::vector<world::Obstacle>& obstacles, double t, double told) {
+std::string ObstaclesText(const std::vector<world::Obstacle>& obstacles, double t, double told,
+                          int generation) {
   json rows = json::array();
   for (const world::Obstacle& o : obstacles) {
     const Solid solid = SolidOf(o, t);
@@ -175,7 +178,8 @@ std::string ObstaclesText(const std::vector<world::Obstacle>& obstacles, double 
                     {"q", Rotation(solid.R)}});
     if (o.moving) rows.back()["v"] = Numbers(solid.velocity);
   }
-  return Text({{"type", "obstacles"}, {"t", Number(told)}, {"rows", rows}});
+  return Text(
+      {{"type", "obstacles"}, {"generation", generation}, {"t", Number(told)}, {"rows", rows}});
 }
 
 std::string HealthText(const std::vector<ProcessHealth>& processes, const std::string& self) {

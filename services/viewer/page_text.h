@@ -22,8 +22,9 @@ struct PlayState {
 std::string StateText(const Scene& scene, double t, int generation,
                       const std::optional<PlayState>& play);
 
-/// "obstacles" at t, told with the state of the time `told`, s from the beginning.
-std::string ObstaclesText(const std::vector<world::Obstacle>& obstacles, double t, double told);
+/// "obstacles" at t, told with the state of the time `told`, s from the beginning, of that scene.
+std::string ObstaclesText(const std::vector<world::Obstacle>& obstacles, double t, double told,
+                          int generation);
 
 /// One process as its status message tells, and HEALTH.
 struct ChannelHealth {
@@ -34,7 +35,7 @@ struct ChannelHealth {
 struct ProcessHealth {
   std::string name, detail, last_error;
   int state = 0;             ///< status_t's constants
-  double age = 0.0;          ///< since the status was heard, s
+  double age = 0.0;          ///< since the status was heard, s; negative: never
   double cpu_percent = 0.0;  ///< of one core since the status before; negative: not known
   double rss_mb = 0.0;
   int restarts = -1;  ///< as the mission process counts; negative: not known

@@ -30,7 +30,7 @@ class Playback {
       node_.feed().Remember(utime);
       return !stop();
     });
-    node_.OnPlayRequest([this](const Request& request) { Hear(request); });
+    node_.OnPlayRequests([this](const std::vector<Request>& requests) { Hear(requests); });
     Jump();
     node_.feed().SendHello();
   }
@@ -58,13 +58,15 @@ class Playback {
     node_.feed().SetPlay({clock_.t(), clock_.duration(), clock_.speed(), clock_.playing()});
   }
 
-  void Hear(const Request& request) {
+  void Hear(const std::vector<Request>& requests) {
     const double before = clock_.t();
-    if (request.speed) clock_.SetSpeed(*request.speed);
-    if (request.seek) clock_.Seek(*request.seek);
-    if (request.play) clock_.Play(*request.play);
+    for (const Request& request : requests) {
+      if (request.speed) clock_.SetSpeed(*request.speed);
+      if (request.seek) clock_.Seek(*request.seek);
+      if (request.play) clock_.Play(*request.play);
+      if (request.looks) looked_at_ = true;
+    }
     if (clock_.t() != before) Jump();
-    if (request.looks) looked_at_ = true;
   }
 
   LogPlayer player_;

@@ -11,6 +11,7 @@ namespace {
 using nlohmann::json;
 
 constexpr int64_t kMostAcknowledged = 1000000;
+constexpr size_t kMostText = 1024;  // bytes of command and token
 
 /// False when the value is there and is not what it should be.
 template <class T>
@@ -65,7 +66,7 @@ std::optional<Request> ParseRequest(const std::string& text) {
                     Read(object, "command", &json::is_string, &request.command) &&
                     Read(object, "token", &json::is_string, &request.token) &&
                     Read(object, "utime", &json::is_number_integer, &request.utime);
-  if (!read) return std::nullopt;
+  if (!read || request.command.size() + request.token.size() > kMostText) return std::nullopt;
   request.acknowledged = std::clamp<int64_t>(request.acknowledged, 0, kMostAcknowledged);
   return request;
 }

@@ -16,8 +16,8 @@ struct Request {
   std::optional<double> speed, seek;  ///< seek: s from the log's beginning
   std::string command, token;         ///< command: empty where there is none
   std::optional<int64_t> utime;       ///< of the newest state that who commands has seen
-  uint64_t caller = 0;  ///< who alone is answered, by a service of Foxglove's; 0: all pages are
-  uint32_t call = 0;    ///< the caller's number of it
+  uint64_t caller = 0;                ///< number of the client that asks
+  uint32_t call = 0;                  ///< its number of the call, by a service of Foxglove's
 };
 
 /// Nothing when the text is no request: other JSON, none at all, or values of other types.

@@ -22,6 +22,7 @@ struct MostShownAge {
   double forecast = world::kMostAge.prediction;
   double obstacles = world::kMostAge.obstacles;
   double flight = world::kMostAge.flight_state;
+  double tracking = world::kMostAge.tracking;
   double image = 1.0;  ///< twenty frames of the camera
 };
 inline constexpr MostShownAge kMostShownAge;
@@ -75,6 +76,12 @@ struct Flight {
   double age = 0.0;                  ///< since it was heard, s
 };
 
+/// What the controller follows.
+struct Tracking {
+  int following = 0;  ///< tracking_t's constants
+  double age = 0.0;   ///< since it was heard, s
+};
+
 /// Where it may fly: a polygon seen from above, between two heights.
 struct Fence {
   std::vector<Eigen::Vector2d> corners;  ///< m
@@ -95,10 +102,10 @@ struct Scene {
   std::optional<Plan> plan;
   std::optional<Forecast> forecast;
   std::optional<Flight> flight;
+  std::optional<Tracking> tracking;
   std::optional<Fence> fence;
   std::optional<double> obstacles_age, image_age;  ///< since they were heard, s; none: never
   std::vector<Body> truth;                         ///< drone, target, movers; empty: not known
-  int following = -1;                              ///< tracking_t's constants; -1: not heard
   double plan_ms = -1.0;  ///< mean time per plan of the last second; negative: not known
   int processes = -1;     ///< worst state of a process, status_t's constants; -1: none is heard
   std::set<std::string> faults;  ///< that a test flight does to itself, by name

@@ -4,7 +4,6 @@
 #include <chrono>
 #include <stdexcept>
 
-#include "services/viewer/page_text.h"
 #include "services/viewer/web.h"
 
 namespace chase::viewer {
@@ -13,8 +12,7 @@ namespace {
 namespace net = boost::asio;
 using net::ip::tcp;
 
-constexpr int kMostPending = 512;     // pieces handed to the server's thread and not yet dealt out
-constexpr size_t kMostRequests = 64;  // of pages between two ticks
+constexpr int kMostPending = 512;  // pieces handed to the server's thread and not yet dealt out
 constexpr auto kPause = std::chrono::milliseconds(100);  // when the host has no sockets left
 
 void Accept(Server::Hub& hub);
@@ -106,7 +104,10 @@ void Server::Hub::Recount() {
 
 void Server::Hub::Ask(const Request& request) {
   const std::lock_guard lock(inbox_mutex);
-  if (inbox.size() < kMostRequests) inbox.push_back(request);
+  if (asked[request.caller]++ < kMostRequests)
+    inbox.push_back(request);
+  else
+    ++unheard;
 }
 
 Server::Server(const ServerConfig& config, Assets assets)
@@ -147,14 +148,13 @@ bool Server::Wanted(Part part) const {
 
 std::vector<Request> Server::TakeRequests() {
   const std::lock_guard lock(hub_->inbox_mutex);
+  hub_->asked.clear();
   return std::exchange(hub_->inbox, {});
 }
 
 void Server::Answer(const Request& request, const std::string& refusal, const std::string& words) {
-  if (request.caller == 0)
-    return Send(Part::kReply, ReplyText(request.command, refusal, words), false);
-  Post(*hub_, [hub = hub_.get(), request, bytes = CommandAnswer(request.call, refusal, words)] {
-    for (Client* client : hub->clients) client->OfferAnswer(request.caller, bytes);
+  net::post(hub_->io, [hub = hub_.get(), request, refusal, words] {  // few, and never left out
+    for (Client* client : hub->clients) client->OfferAnswer(request, refusal, words);
   });
 }
 
@@ -177,7 +177,8 @@ void Server::SendMessage(uint32_t channel, int64_t utime, std::string payload) {
 }
 
 Server::Counters Server::counters() const {
-  return {hub_->accepted, hub_->refused, hub_->malformed, hub_->dropped, hub_->connected};
+  return {hub_->accepted, hub_->refused,   hub_->malformed,
+          hub_->dropped,  hub_->connected, hub_->unheard};
 }
 
 }  // namespace chase::viewer

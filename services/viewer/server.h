@@ -37,9 +37,12 @@ class Server : public PageSink {
   void Retain(Part part, std::string bytes) override;
   bool Wanted(Part part) const override;
   int pages() const;
-  /// What clients asked for since the last call; of more than 64 the first.
+  /// What clients asked for since the last call; of more than kMostRequests of one client the
+  /// first.
+  static constexpr int kMostRequests = 16;  ///< a scrubber asks six times between two ticks
   std::vector<Request> TakeRequests();
-  /// To a command: to who called the service, or to all pages. As ReplyText has it.
+  /// To a command: to who gave it; what the vehicle has taken also to all pages. As ReplyText has
+  /// it.
   void Answer(const Request& request, const std::string& refusal, const std::string& words);
 
   /// A channel for Foxglove; ids count from 1 and stay below kMostChannels.
@@ -51,6 +54,7 @@ class Server : public PageSink {
   struct Counters {
     int64_t accepted = 0, refused = 0, malformed = 0, dropped = 0;
     int connected = 0;
+    int64_t unheard = 0;  ///< requests beyond kMostRequests
   };
   Counters counters() const;
 

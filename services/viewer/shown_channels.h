@@ -75,6 +75,7 @@ void SubscribeShown(bus::Bus& bus, const Hear& hear) {
   bus.Subscribe<status_t>("SIMULATOR_STATUS", on("SIMULATOR_STATUS"));
   bus.Subscribe<status_t>("RECORDER_STATUS", on("RECORDER_STATUS"));
   bus.Subscribe<status_t>("LINK_STATUS", on("LINK_STATUS"));
+  bus.Subscribe<status_t>("VIEWER_STATUS", on("VIEWER_STATUS"));
 }
 
 /// The same of what no vehicle knows: the faults that a test flight did to itself, and where the

@@ -39,14 +39,15 @@ ViewerNode::ViewerNode(bus::Bus& bus, const ViewerConfig& config, const std::str
 }
 
 void ViewerNode::Tick(int64_t utime) {
-  for (const Request& request : server_.TakeRequests()) {
+  const std::vector<Request> requests = server_.TakeRequests();
+  for (const Request& request : requests)
     if (!request.command.empty()) commander_.Take(request);
-    if (on_play_) on_play_(request);
-  }
+  if (on_play_) on_play_(requests);
   commander_.Turn();
   const Server::Counters c = server_.counters();
   feed_.Tick(utime, std::to_string(c.connected) + " connected, " + std::to_string(c.refused) +
-                        " refused, " + std::to_string(c.dropped) + " frames dropped");
+                        " refused, " + std::to_string(c.dropped) + " frames and " +
+                        std::to_string(c.unheard) + " requests dropped");
 }
 
 bus::NodeReport ViewerNode::Report() const {
@@ -54,8 +55,9 @@ bus::NodeReport ViewerNode::Report() const {
   return {bus::NodeReport::State::kOk,
           "port " + std::to_string(server_.port()) + ", " + std::to_string(c.connected) +
               " connected, " + std::to_string(c.refused) + " refused, " +
-              std::to_string(c.malformed) + " malformed, " + std::to_string(commander_.taken()) +
-              " commands taken, " + std::to_string(commander_.refused()) + " refused"};
+              std::to_string(c.malformed) + " malformed, " + std::to_string(c.unheard) +
+              " requests dropped, " + std::to_string(commander_.taken()) + " commands taken, " +
+              std::to_string(commander_.refused()) + " refused"};
 }
 
 }  // namespace chase::viewer

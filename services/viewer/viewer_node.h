@@ -24,8 +24,9 @@ class ViewerNode : public bus::Node {
   void Tick(int64_t utime) override;
   bus::NodeReport Report() const override;
 
-  /// For a player: hears what pages ask of it.
-  void OnPlayRequest(std::function<void(const Request&)> handler) { on_play_ = std::move(handler); }
+  /// For a player: hears what pages have asked of it, once a tick.
+  using PlayHandler = std::function<void(const std::vector<Request>&)>;
+  void OnPlayRequests(PlayHandler handler) { on_play_ = std::move(handler); }
   PageFeed& feed() { return feed_; }
   int port() const { return server_.port(); }
 
@@ -34,7 +35,7 @@ class ViewerNode : public bus::Node {
   FoxgloveFeed foxglove_;
   PageFeed feed_;
   Commander commander_;
-  std::function<void(const Request&)> on_play_;
+  PlayHandler on_play_;
 };
 
 }  // namespace chase::viewer

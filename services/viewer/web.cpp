@@ -8,6 +8,8 @@
 #include <optional>
 #include <utility>
 
+#include "services/viewer/page_text.h"
+
 namespace chase::viewer {
 namespace {
 
@@ -29,6 +31,10 @@ constexpr OutboxLimits kFoxgloveLimits = {64, 8000000, 0};
 constexpr int kAnswer = -1, kAdvertisement = -2;  // keys of frames
 
 using Slot = std::shared_ptr<void>;  ///< a place among the connections
+
+std::shared_ptr<const std::string> Shared(std::string bytes) {
+  return std::make_shared<const std::string>(std::move(bytes));
+}
 
 std::string ProtocolOf(const HttpRequest& request) {
   const beast::string_view offered = request[http::field::sec_websocket_protocol];
@@ -76,12 +82,16 @@ class WebSocket : public Client, public std::enable_shared_from_this<WebSocket> 
     if (!foxglove_ || choked_) return;
     for (const auto& [subscription, id] : foxglove_->channels())
       if (id == channel)
-        Push({static_cast<int>(channel),
-              std::make_shared<const std::string>(MessageData(subscription, utime, payload)),
-              true});
+        Push({static_cast<int>(channel), Shared(MessageData(subscription, utime, payload)), true});
   }
-  void OfferAnswer(uint64_t caller, const std::string& bytes) override {
-    if (caller == number_) Push({kAnswer, std::make_shared<const std::string>(bytes), true});
+  void OfferAnswer(const Request& request, const std::string& refusal,
+                   const std::string& words) override {
+    const bool own = request.caller == number_;
+    if (foxglove_ && own)
+      Push({kAnswer, Shared(CommandAnswer(request.call, refusal, words)), true});
+    if (!foxglove_ && (own || refusal.empty()))
+      Push({static_cast<int>(Part::kReply), Shared(ReplyText(request.command, refusal, words)),
+            false});
   }
   bool Wants(Part part) const override {
     return (part == Part::kCloud && wants_cloud_) || (part == Part::kImage && wants_image_);
@@ -129,13 +139,15 @@ class WebSocket : public Client, public std::enable_shared_from_this<WebSocket> 
       if (!answer.empty()) PushText(kAnswer, answer);
       return;
     }
-    const auto request = ParseRequest(text);
+    auto request = ParseRequest(text);
     if (!request) {
       ++hub_.malformed;
       return;
     }
     outbox_.Acknowledge(request->acknowledged);
     if (request->wants) Want(*request->wants);
+    request->wants.reset();  // nothing long waits in the inbox
+    request->caller = number_;
     if (request->play || request->speed || request->seek || !request->command.empty())
       hub_.Ask(*request);
     Flush();
@@ -153,6 +165,7 @@ class WebSocket : public Client, public std::enable_shared_from_this<WebSocket> 
     Request command;
     command.command = request->command;
     command.token = request->token;
+    command.utime = request->utime;
     command.caller = number_;
     command.call = call->call;
     hub_.Ask(command);
@@ -166,13 +179,12 @@ class WebSocket : public Client, public std::enable_shared_from_this<WebSocket> 
   }
   void Look() {
     Request request;
+    request.caller = number_;
     request.looks = true;
     hub_.Ask(request);
   }
 
-  void PushText(int key, const std::string& text) {
-    Push({key, std::make_shared<const std::string>(text), false});
-  }
+  void PushText(int key, const std::string& text) { Push({key, Shared(text), false}); }
   void Push(Frame frame) {
     outbox_.Push(std::move(frame));
     Flush();

@@ -25,8 +25,9 @@ class Client {
   virtual void OfferPart(Part part, const Frame& frame) = 0;
   virtual void OfferChannels(const std::string& advertisement) = 0;
   virtual void OfferMessage(uint32_t channel, int64_t utime, const std::string& payload) = 0;
-  /// To a call of the service, if `caller` is this client.
-  virtual void OfferAnswer(uint64_t caller, const std::string& bytes) = 0;
+  /// To a command, for who gave it; what the vehicle has taken also for all pages.
+  virtual void OfferAnswer(const Request& request, const std::string& refusal,
+                           const std::string& words) = 0;
   virtual bool Wants(Part part) const = 0;
   /// Sets true what it has subscribed to.
   virtual void MarkSubscribed(std::array<bool, Server::kMostChannels>* channels) const = 0;
@@ -41,6 +42,7 @@ struct Server::Hub {
 
   /// After clients came, went or asked for something else.
   void Recount();
+  /// Of more than kMostRequests of one client between two ticks the first are heard.
   void Ask(const Request& request);
 
   ServerConfig config;
@@ -54,10 +56,11 @@ struct Server::Hub {
 
   std::mutex inbox_mutex;
   std::vector<Request> inbox;
+  std::map<uint64_t, int> asked;  ///< how many of a client's requests are in the inbox
   std::atomic<int> connected{0}, pages{0}, pending{0};
   std::atomic<bool> wants_cloud{false}, wants_image{false};
   std::array<std::atomic<bool>, kMostChannels> subscribed{};
-  std::atomic<int64_t> accepted{0}, refused{0}, malformed{0}, dropped{0};
+  std::atomic<int64_t> accepted{0}, refused{0}, malformed{0}, dropped{0}, unheard{0};
 
   boost::asio::io_context io{1};  // goes first: its handlers know what stands above
   boost::asio::ip::tcp::acceptor acceptor;

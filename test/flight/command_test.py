@@ -42,6 +42,19 @@ class Command(unittest.TestCase):
             mission.terminate()
             mission.wait(timeout=10)
 
+    def test_a_command_from_before_the_start_may_have_taken_effect(self):
+        given = subprocess.Popen([BIN / "chase-command", "chase"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        time.sleep(0.5)
+        mission = subprocess.Popen([BIN / "chase-mission"])
+        try:
+            out, err = given.communicate(timeout=20)
+            self.assertEqual((given.returncode, out), (5, ""), err)
+            self.assertIn("chase: not known whether it took effect: given before the mission process started, now IDLE: ", err)
+            self.assertNotIn("refused", err)
+        finally:
+            mission.terminate()
+            mission.wait(timeout=10)
+
     def test_bad_use(self):
         for words in ((), ("fly",), ("stop", "now"), ("land", "--force"), ("stop", "--timeout", "nan"),
                       ("stop", "--timeout", "0"), ("stop", "--lcm-url", "udpm://nonsense"), ("select",),

@@ -5,6 +5,7 @@
 #include <fstream>
 #include <map>
 
+#include "chase/flight_state_t.hpp"
 #include "common/bus/log_writer.h"
 #include "common/config/config.h"
 #include "common/logs/log_reader.h"
@@ -82,19 +83,36 @@ void WriteMessages(const std::map<std::string, logs::LogEvent>& smallest) {
   }
 }
 
-/// Every command, and a few of what comes between.
-void WriteMission(const Events& events) {
+/// FLIGHT_STATE as control tells it on HOME.
+Bytes AsHome(const Bytes& state) {
+  flight_state_t home{};
+  home.decode(state.data(), 0, static_cast<int>(state.size()));
+  home.sender = "control";
+  Bytes bytes(static_cast<size_t>(home.getEncodedSize()));
+  home.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
+  return bytes;
+}
+
+/// A record of fuzz_mission: five ticks, then the message.
+void Append(const Bytes& message, Bytes* records) {
+  const size_t size = message.size();
+  const Bytes head = {5, static_cast<uint8_t>(size & 0xFF), static_cast<uint8_t>(size >> 8)};
+  records->insert(records->end(), head.begin(), head.end());
+  records->insert(records->end(), message.begin(), message.end());
+}
+
+/// Every command, and a few of what comes between; with `home` where that is, too.
+void WriteMission(const std::string& name, const Events& events, bool home) {
   Bytes bytes;
   std::map<std::string, int> since;
   for (const auto& event : events) {
-    if (std::count(kMissionHears.begin(), kMissionHears.end(), event.channel) == 0) continue;
-    if (event.channel != "COMMAND" && since[event.channel]++ % 1000 != 0) continue;
-    const auto size = static_cast<uint16_t>(event.bytes.size());
-    const Bytes head = {5, static_cast<uint8_t>(size & 0xFF), static_cast<uint8_t>(size >> 8)};
-    bytes.insert(bytes.end(), head.begin(), head.end());
-    bytes.insert(bytes.end(), event.bytes.begin(), event.bytes.end());
+    const bool is_home = home && event.channel == "FLIGHT_STATE";
+    if (!is_home && std::count(kMissionHears.begin(), kMissionHears.end(), event.channel) == 0)
+      continue;
+    if (event.channel != "COMMAND" && since[event.channel]++ % (is_home ? 50 : 1000) != 0) continue;
+    Append(is_home ? AsHome(event.bytes) : event.bytes, &bytes);
   }
-  Write("mission", "flight", bytes);
+  Write("mission", name, bytes);
 }
 
 void WriteMavlink() {
@@ -195,7 +213,9 @@ int main(int argc, char** argv) {
   const Events events = ReadLog(argv[1]);
   const auto smallest = Smallest(events);
   WriteMessages(smallest);
-  WriteMission(events);
+  WriteMission("flight", events, false);
+  WriteMission("begun_in_flight",
+               {events.begin() + static_cast<long>(events.size() / 2), events.end()}, true);
   WriteMavlink();
   WriteVlp16();
   WritePcap();

@@ -6,7 +6,8 @@ set(fuzz ${CMAKE_CURRENT_LIST_DIR})
 # Only what the configurations themselves are made of, where that is a file of its own.
 set(services ${CMAKE_SOURCE_DIR}/services)
 chase_library(service_configs ${services}/camera/config.cpp ${services}/control/control_config.cpp
-  ${services}/fcu/fcu_config.cpp ${services}/lidar/config.cpp ${services}/mapping/mapping_config.cpp
+  ${services}/fcu/fcu_config.cpp ${services}/lidar/config.cpp ${services}/link/link_config.cpp
+  ${services}/mapping/mapping_config.cpp ${CMAKE_SOURCE_DIR}/deploy/recorder/recorder_config.cpp
   ${services}/mission/mission_config.cpp ${services}/odometry/odometry_config.cpp
   ${services}/perception/perception_config.cpp ${services}/viewer/viewer_config.cpp)
 target_link_libraries(service_configs PUBLIC planning_core prediction_node simulator_core

@@ -1,9 +1,11 @@
 #pragma once
 
+#include "deploy/recorder/recorder_config.h"
 #include "services/camera/config.h"
 #include "services/control/control_config.h"
 #include "services/fcu/fcu_config.h"
 #include "services/lidar/config.h"
+#include "services/link/link_config.h"
 #include "services/mapping/mapping_config.h"
 #include "services/mission/mission_config.h"
 #include "services/odometry/odometry_config.h"
@@ -22,12 +24,14 @@ void ForEachConfig(F&& f) {
   f("control", control::ControlConfig{});
   f("fcu", fcu::FcuConfig{});
   f("lidar", lidar::LidarConfig{});
+  f("link", link::LinkConfig{});
   f("mapping", mapping::MappingConfig{});
   f("mission", mission::MissionConfig{});
   f("odometry", odometry::OdometryConfig{});
   f("perception", perception::PerceptionConfig{});
   f("planning", planning::PlanningConfig{});
   f("prediction", prediction::PredictionConfig{});
+  f("recorder", recorder::RecorderConfig{});
   f("simulator", simulator::SimulatorConfig{});
   f("viewer", viewer::ViewerConfig{});
 }

@@ -23,7 +23,7 @@ TOOL_SERVICES = {"lidar", "camera", "odometry", "mapping", "perception", "predic
 CAMPAIGNS = ["perception_campaign", "perception_photos", "../test/mapping_campaign", "../test/mapping_walkers",
              "../test/odometry_trial"]  # each flies one service
 SCRIPTS = [".ci/run", "deploy/build", "deploy/doctor", "deploy/fly", "deploy/scenarios/twelve/generate.py", "deploy/setup",
-           "deploy/slurm/submit", "deploy/spy", "test/run", "test/flight/calibration", "test/flight/live_kills", "test/flight/sentinels",
+           "deploy/slurm/submit", "deploy/spy", "test/run", "test/flight/bars", "test/flight/calibration", "test/flight/live_kills", "test/flight/sentinels",
            "test/fuzz/fuzz_processes.py", "test/fuzz/make_corpus", "test/fuzz/run", "test/odometry/campaign.py", "test/package/clean_root", "test/safety/run",
            "test/sanitize/run", "test/viewer/live_flights.py"]
 LIMIT = 20  # s
@@ -197,7 +197,7 @@ class BadUse(unittest.TestCase):
 
     def test_options_that_would_do_nothing(self):
         def check(program):
-            for words in (("--lcm-url", "udpm://239.255.76.67:7667"), ("--channel-prefix", "eagle")):
+            for words in (("--lcm-url", "udpm://239.255.76.67:7667"), ("--key-file", "a.key")):
                 self.assert_refused(run(program, "--replay", "a.lcm", "--out", "b.lcm", *words), words[0], "--replay")
         self.for_each(self.replayable(), check)
         for program, *words in (("chase-viewer", "--play", "--lcm-url"), ("chase-viewer", "--play", "--token-file"),

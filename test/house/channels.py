@@ -27,7 +27,8 @@ LISTENS = {
                "TARGET", "PREDICTION", "PLAN", "ATTITUDE_SETPOINT", "TRACKING", "SCENARIO",
                "FLIGHT_STATE", "HOME", "HEALTH", "GEOFENCE", "SELECTION", "SELECTION_KEPT", "COMMAND", "COMMAND_ACK", "MISSION_STATUS", "LIDAR_STATUS", "CAMERA_STATUS", "ODOMETRY_STATUS", "MAPPING_STATUS",
                "PERCEPTION_STATUS", "PREDICTION_STATUS", "PLANNING_STATUS", "CONTROL_STATUS",
-               "FCU_STATUS", "SIMULATOR_STATUS", "RECORDER_STATUS"},
+               "FCU_STATUS", "SIMULATOR_STATUS", "RECORDER_STATUS",
+               "VIEWER_STATUS"},
     "simulator": {"ATTITUDE_SETPOINT", "POSE"},  # in place of fcu
 }
 # What a flight in lockstep hears hardly ever, or as it was before: nothing of it is late by 300 ms.

@@ -44,6 +44,7 @@ class Pages(unittest.TestCase):
             options = set(re.findall(r"^\s+(?:-\w,)?(--[\w-]+)", run(BIN / program, "--help").stdout.split("Usage:")[1], re.M))
             self.assertIn("--version", options, program)
             page = (self.out / f"share/man/man1/{program}.1").read_text(encoding="utf-8").replace("\\-", "-")
+            self.assertNotIn(" --", page.split(".SH SYNOPSIS")[0], f"{program}: an option in its NAME")
             for option in options:
                 self.assertIn(option, self.complete(program, "--"), program)
                 self.assertIn(option, page, program)

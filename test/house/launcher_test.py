@@ -152,7 +152,38 @@ class FlightTest(unittest.TestCase):
         self.assertIn("chase-viewer", self.built[-1])
         port = re.search(r"look on at http://localhost:(\d+)", out).group(1)
         said = (self.folder / "viewer.log").read_text(encoding="utf-8")
-        self.assertEqual(said.splitlines()[0], f"--port {port}")
+        self.assertEqual(said.splitlines()[0], f"--port {port} --config {self.folder}/viewer.yaml")
+        self.assertEqual((self.folder / "viewer.yaml").read_text(encoding="utf-8"), "")
+
+    def test_view_knows_the_scenarios_rig_and_takes_commands_with_a_token(self):
+        self.program("chase-viewer", "import sys; print(*sys.argv[1:], flush=True)")
+        self.program("chase-flight", r"print('size: 1\nrig:  # where\n  focal_px: 300\n  lens: \"fisheye\"\ndetector:\n  kind: 1')")
+        token = self.bin / "token"
+        token.write_text("12345678\n", encoding="utf-8")
+        code, _, err = self.fly("--view", "--token-file", str(token))
+        self.assertEqual(code, 0, err)
+        said = (self.folder / "viewer.log").read_text(encoding="utf-8")
+        self.assertTrue(said.splitlines()[0].endswith(f" --token-file {token.resolve()}"), said)
+        self.assertEqual((self.folder / "viewer.yaml").read_text(encoding="utf-8"),
+                         'rig:  # where\n  focal_px: 300\n  lens: "fisheye"\n')
+
+    def test_link_flies_along_and_is_started_anew(self):
+        self.program("chase-link", SERVICE.format(behaviour=""))
+        self.program("chase-flight-monitor", f"""
+            import json, pathlib, signal, time
+            def say(t, done=False):
+                print(json.dumps(dict(mission_time=t, duration=2, distance=2.5, visible=1.0, rtf=0.0, done=done)), flush=True)
+            log, end = pathlib.Path({str(self.bin / "flight/link.log")!r}), time.monotonic() + 20
+            say(1)
+            while time.monotonic() < end and not (log.exists() and log.read_text().count("working") == 2):
+                time.sleep(0.1)
+            say(2, done=True)
+            signal.pause()
+            """)
+        code, _, err = self.fly("--link", "--kill", "link@1")
+        self.assertEqual(code, 0, err)
+        self.assertIn("chase-link", self.built[-1])
+        self.assertIn("link ended (SIGKILL): restarted", err)
 
     def test_hardware_flies_through_the_drivers(self):
         for row in fly.flight_processes() + fly.driver_processes(True):
@@ -199,7 +230,8 @@ class FlightTest(unittest.TestCase):
     def test_bad_use_is_told_before_anything_is_built(self):
         for arguments in (["gmy"], ["--seed", "-1"], ["--seed", "1.5"], ["--seed", str(2**31)],
                           ["--seed", "nan"], ["--no-such"], ["--kill", "simulator@3"],
-                          ["--kill", "planning"], ["--kill", "planning@-1"], ["--kill", "planning@nan"]):
+                          ["--kill", "planning"], ["--kill", "planning@-1"], ["--kill", "planning@nan"],
+                          ["--token-file", __file__], ["--view", "--token-file", "no-such"]):
             with self.subTest(arguments=arguments):
                 self.patch(sys, "argv", ["fly", *arguments])
                 err = io.StringIO()
@@ -351,7 +383,15 @@ class FlightTest(unittest.TestCase):
     def test_whatever_was_started_can_be_killed(self):
         self.assertEqual(fly.killable(False, False), ["odometry", "mapping", "perception", "prediction", "planning",
                                                       "control", "mission", "recorder"])
-        self.assertEqual(fly.killable(True, True)[7:], ["lidar", "fcu", "camera", "recorder", "viewer"])
+        self.assertEqual(fly.killable(True, True, True)[7:], ["lidar", "fcu", "camera", "recorder", "viewer", "link"])
+        for wish, *options in (["recorder@1"], ["kill-recorder@1"], ["freeze-recorder@1"], ["freeze-viewer@1", "--view"],
+                               ["kill-link@1", "--link"], ["freeze-link@1", "--link"], ["freeze-planning@1"]):
+            self.assertEqual(fly.parse(["--kill", wish, *options]).kill, [(wish.removesuffix("@1"), 1.0)])
+        for wish in ("link@1", "freeze-viewer@1", "melt-recorder@1"):
+            with self.assertRaises(fly.FlightError):
+                fly.parse(["--kill", wish])
+        self.assertEqual(fly.strikes_of([], [("link", 1.0), ("freeze-recorder", 2.0)]),
+                         [(1.0, "kill", "link"), (2.0, "freeze", "recorder"), (4.0, "thaw", "recorder")])
         for arguments in (["--kill", "fcu@1"], ["--kill", "viewer@1"], ["--kill", "simulator@1", "--hardware"]):
             code, _, err = self.fly(*arguments)
             self.assertEqual(code, 1)
@@ -420,6 +460,49 @@ class FlightTest(unittest.TestCase):
         self.assertEqual(said, {"command-1-select": "select 180 119.5\n", "command-2-hold": "hold\n",
                                 "command-3-kill": "kill --force\n"})
 
+    def give(self, commands, answers):
+        """A flight that gives them, all due at once; it ends when so many answered. chase-command is that program."""
+        told = json.dumps({"duration_s": 2, "settle_s": 1, "commands": [
+            {"command": name, "at_s": at, "arguments": []} for name, at in commands]})
+        self.program("chase-scenario", f"print({told!r})")
+        self.program("chase-command", f"""
+            import pathlib, sys, time
+            name, book = sys.argv[1], pathlib.Path({str(self.bin / "book")!r})
+            def note(word):
+                with book.open("a") as file: file.write(word + chr(10))
+            if name == "takeoff": time.sleep(0.3)
+            note(name)
+            if name == "chase": sys.exit("chase-command: refused: chase in IDLE: POSE is not heard")
+            if name == "land": time.sleep(0.5)
+            """)
+        self.program("chase-flight-monitor", f"""
+            import json, pathlib, signal, time
+            def say(t, done=False):
+                print(json.dumps(dict(mission_time=t, duration=2, distance=2.5, visible=1.0, rtf=0.0, done=done)), flush=True)
+            book, end = pathlib.Path({str(self.bin / "book")!r}), time.monotonic() + 20
+            say(1)
+            while time.monotonic() < end and (not book.exists() or len(book.read_text().split()) < {answers}):
+                time.sleep(0.1)
+            say(2, done=True)
+            signal.pause()
+            """)
+        code, _, err = self.fly()
+        return code, err, (self.bin / "book").read_text(encoding="utf-8").split()
+
+    def test_commands_come_in_order(self):
+        names = ["takeoff", "hold", "stop"]
+        self.assertEqual(self.give([(name, 0.5) for name in names], 3), (0, "", names))
+
+    def test_refused_commands_are_said_and_fail_the_flight(self):
+        code, err, _ = self.give([("chase", -2), ("hold", 0.5), ("land", 0.5)], 3)
+        self.assertEqual(code, 1)
+        refusal = "chase@-2: refused: chase in IDLE: POSE is not heard\n"
+        self.assertEqual(err, f"\n{refusal}deploy/fly: the scenario's commands were not all obeyed: {refusal}")
+
+    def test_commands_whose_time_never_came_fail_the_flight(self):
+        code, err, _ = self.give([("hold", 0.5), ("land", 1.9)], 1)
+        self.assertEqual((code, err), (1, "deploy/fly: the mission ended before the land@1.9\n"))
+
     def test_faults_that_are_left_out_are_named(self):
         told = json.dumps({"duration_s": 2, "settle_s": 1, "left_out_live": ["delay-PLAN", "loss-20"]})
         self.program("chase-scenario", f"print({told!r})")
@@ -456,12 +539,13 @@ class FlightTest(unittest.TestCase):
         self.assertIsNone(bus.configured(file))
         file.write_text('LCM_DEFAULT_URL="udpm://239.1.2.3:7000?ttl=0"\n')
         self.assertEqual(bus.configured(file), "udpm://239.1.2.3:7000?ttl=0")
-        # The doctor looks at the units' bus; what a user flies there is no business of theirs.
-        os.environ.pop("LCM_DEFAULT_URL")
-        self.patch(places, "INSTALLED", True)
         self.patch(places, "ENVIRONMENT", file)
-        self.assertEqual(bus.url(), bus.DEFAULT_URL)
-        self.assertTrue(doctor.url().startswith("udpm://239.1.2.3:7000?"))
+        os.environ.pop("LCM_DEFAULT_URL")
+        self.assertEqual(bus.url(), bus.DEFAULT_URL, "the source tree's own")
+        self.patch(places, "INSTALLED", True)
+        self.assertTrue(bus.url().startswith("udpm://239.1.2.3:7000?"), "doctor, fly and spy")
+        os.environ["LCM_DEFAULT_URL"] = "udpm://239.1.2.3:7001?ttl=0&recv_buf_size=1"
+        self.assertEqual(bus.url(), os.environ["LCM_DEFAULT_URL"])
 
     def test_process_that_refuses_to_start(self):
         self.program("chase-planning", "import sys; sys.exit('planning.yaml:1: no_such: unknown')")

@@ -58,14 +58,19 @@ class Flight {
                      [](const Sent& a, const Sent& b) { return a.stamp < b.stamp; });
   }
 
-  std::string Write(const std::function<bool(const Sent&)>& kept = {}) const {
+  /// Messages that are `kept`, changed, on channels that begin with the vehicle.
+  std::string Write(const std::function<bool(const Sent&)>& kept = {},
+                    const std::function<void(imu_t*)>& change = {},
+                    const std::string& vehicle = "") const {
     const auto file = std::filesystem::temp_directory_path() / "chase_heard_order.lcm";
     LogWriter log(file);
-    for (const Sent& m : log_) {
+    for (Sent m : log_) {
       if (kept && !kept(m)) continue;
+      if (change) change(&m.message);
+      m.message.vehicle = vehicle;
       std::vector<uint8_t> bytes(static_cast<size_t>(m.message.getEncodedSize()));
       m.message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
-      log.Write(m.stamp, m.channel, bytes);
+      log.Write(m.stamp, vehicle + m.channel, bytes);
     }
     log.Close();
     return file;
@@ -212,6 +217,42 @@ TEST(HeardOrder, TellsOfAChannelThatTheLogLacksAltogether) {
     EXPECT_LT(1e-6 * static_cast<double>(other.first_utime - start), 0.2);
     EXPECT_TRUE(OrderHeard(file, "worker", {"FAST", "SLOW"}).missing.empty()) << "nobody asks";
   }
+}
+
+TEST(HeardOrder, OfAVehicleWithAPrefixIsTheSame) {
+  Flight flight(3, kStart);
+  flight.Run(20.0);
+  const std::string file = flight.Write({}, {}, "falcon_");
+  EXPECT_TRUE(OrderHeard(file, "worker", kInputs, "eagle_").events.empty());
+  EXPECT_EQ(Positions(OrderHeard(file, "worker", kInputs, "falcon_")).size(), 4000u + 500u + 286u);
+}
+
+/// The one sentence about a log whose messages are `kept` and changed; "worker" is replayed.
+std::string SentenceOf(const Flight& flight, const std::function<bool(const Sent&)>& kept,
+                       const std::function<void(imu_t*)>& change) {
+  const HeardOrder order = OrderHeard(flight.Write(kept, change), "worker", kInputs);
+  EXPECT_TRUE(order.events.empty());
+  const auto lines = order.Sentences();
+  EXPECT_LE(lines.size(), 1u);
+  return lines.empty() ? "" : lines.front();
+}
+
+TEST(HeardOrder, ALiveLogThatDoesNotTellItIsHeardAsRecordedAndThatIsSaid) {
+  const auto anew = [](const std::string& who) {
+    return [who](imu_t* m) { m->sender_start = m->sender == who && m->seq >= 100 ? 2 : 1; };
+  };
+  const auto no_outputs = [](const Sent& m) { return m.channel != "OUT"; };
+  const std::string follows =
+      ", so that the log does not tell in which order worker heard its inputs; they are replayed "
+      "in the order in which they were recorded; the replay's answers may differ from the flight's";
+  Flight live(1, kStart), lockstep(1, 1'000'000);
+  live.Run(20.0);
+  lockstep.Run(20.0);
+  EXPECT_EQ(SentenceOf(live, {}, anew("worker")), "worker was started anew in this log" + follows);
+  EXPECT_EQ(SentenceOf(live, {}, anew("sensor")),
+            "the sender of FAST was started anew in this log" + follows);
+  EXPECT_EQ(SentenceOf(live, no_outputs, {}), "the log holds nothing that worker sent" + follows);
+  EXPECT_EQ(SentenceOf(lockstep, {}, anew("worker")), "") << "in the right order already";
 }
 
 TEST(HeardOrder, LogicalTimeOtherProcessesAndTwoLivesAreTakenAsTheyStand) {

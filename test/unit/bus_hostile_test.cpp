@@ -75,7 +75,7 @@ CHASE_SAMPLE(map_t, m.resolution = 0.1; m.size = 1; m.data = {1}, m.resolution =
 CHASE_SAMPLE(prediction_t, m.target = GoodPolynomial(), m.target.coefficients[1] = kNan)
 CHASE_SAMPLE(scenario_t, m.yaml = "name: x", m.yaml.clear())
 CHASE_SAMPLE(command_t, m.n_arguments = 1; m.arguments = {1.0}, m.arguments[0] = kNan)
-CHASE_SAMPLE(command_ack_t, m.reason = "not ready", m.verdict = 2)
+CHASE_SAMPLE(command_ack_t, m.reason = "not ready", m.verdict = 3)
 CHASE_SAMPLE(flight_state_t, m.n_missing = 1; m.missing = {"POSE"}, m.home[2] = kNan)
 CHASE_SAMPLE(geofence_t, m.ceiling = 1.0; m.n_corners = 6;
              m.corners.assign(6, 1.0), m.corners[3] = kNan)

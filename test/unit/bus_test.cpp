@@ -255,6 +255,48 @@ Bus::Bytes Encoded(const T& message) {
   return bytes;
 }
 
+/// Runs a service and returns its exit code.
+int Called(const ServiceSpec& spec, std::vector<std::string> arguments) {
+  std::vector<char*> argv;
+  for (std::string& argument : arguments) argv.push_back(argument.data());
+  return RunService(spec, static_cast<int>(argv.size()), argv.data());
+}
+
+TEST(LogBus, AVehiclesLogIsReplayedUnderItsPrefix) {
+  const std::string one = TempFile("one"), two = TempFile("two"), out = TempFile("vehicle_out");
+  LogWriter of_one(one), of_two(two);
+  imu_t imu{};
+  for (int k = 0; k < 30; ++k) {
+    imu.seq = k;
+    imu.vehicle = "falcon_";
+    of_one.Write(1000 * k, "falcon_IMU", Encoded(imu));
+    of_two.Write(1000 * k, "falcon_IMU", Encoded(imu));
+    imu.vehicle = "eagle_";
+    if (k < 10) of_two.Write(1000 * k, "eagle_IMU", Encoded(imu));
+  }
+  of_one.Close();
+  of_two.Close();
+  ServiceSpec spec;
+  spec.name = "control";
+  spec.dump_config = [] { return ""; };
+  spec.make_node = [](Bus& bus) { return std::make_unique<Echo>(bus); };
+  EXPECT_EQ(Called(spec, {"chase-control", "--replay", one, "--out", out}), 0);
+  EXPECT_EQ(Messages(out, "falcon_ATTITUDE_SETPOINT").size(), 30u);
+  EXPECT_EQ(
+      Called(spec, {"chase-control", "--replay", two, "--out", out, "--channel-prefix", "eagle_"}),
+      0);
+  EXPECT_EQ(Messages(out, "eagle_ATTITUDE_SETPOINT").size(), 10u);
+  attitude_setpoint_t answer;
+  const auto first = Messages(out, "eagle_ATTITUDE_SETPOINT").front();
+  ASSERT_GT(answer.decode(first.data(), 0, static_cast<int>(first.size())), 0);
+  EXPECT_EQ(answer.vehicle, "eagle_");
+  testing::internal::CaptureStderr();
+  EXPECT_EQ(Called(spec, {"chase-control", "--replay", two, "--out", out}), 1);
+  EXPECT_EQ(testing::internal::GetCapturedStderr(),
+            "chase-control: " + two +
+                ": is of several vehicles, 'eagle_', 'falcon_'; name one with --channel-prefix\n");
+}
+
 /// What a replay with the configuration "123456789", whose cksum is 930766865, says on stderr of a
 /// log whose process told `flown` as its version.
 std::string ComplaintAbout(const std::string& flown) {
@@ -270,11 +312,8 @@ std::string ComplaintAbout(const std::string& flown) {
   spec.name = "counter";
   spec.dump_config = [] { return "123456789"; };
   spec.make_node = [](Bus& bus) { return std::make_unique<Counter>(bus); };
-  std::string arguments[] = {"chase-counter", "--replay", in, "--out", out};
-  std::vector<char*> argv;
-  for (std::string& argument : arguments) argv.push_back(argument.data());
   testing::internal::CaptureStderr();
-  EXPECT_EQ(RunService(spec, static_cast<int>(argv.size()), argv.data()), 0);
+  EXPECT_EQ(Called(spec, {"chase-counter", "--replay", in, "--out", out}), 0);
   return testing::internal::GetCapturedStderr();
 }
 

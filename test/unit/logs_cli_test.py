@@ -90,11 +90,27 @@ class LogTools(unittest.TestCase):
         for words, arguments in (
                 (("--channel", "IMU", "POSE"), ("--tum", "--channel", "IMU")),
                 (("--channel", "NO_SUCH", "info"), ("--csv", "--channel", "NO_SUCH")),
-                (("--channel", "NO_SUCH", "info"), ("--mcap", "--channel", "NO_SUCH"))):
+                (("--channel", "NO_SUCH", "info"), ("--mcap", "--channel", "NO_SUCH")),
+                (("--jpeg", "no image"), ("--mcap", "--jpeg", "--channel", "POSE")),
+                (("--rig", "neither POSE nor an image"), ("--mcap", "--rig", self.rig(), "--channel", "IMU"))):
             with self.subTest(arguments=arguments):
                 answer = run("chase-log", "export", *arguments, self.log, out)
                 self.assert_refused(answer, 2, *words)
                 self.assertFalse(out.exists())
+
+    def test_two_vehicles_are_no_flight(self):
+        log, one = self.folder / "two.lcm", self.folder / "one.lcm"
+        for lost in ((), ("TRUTH", "SCENARIO")):
+            lcmlog.write(log, [(utime, prefix + channel, data) for utime, channel, data in self.events
+                               if channel not in lost for prefix in ("", "eagle_")])
+            for program in (["chase-report"], ["chase-log", "identify"]):
+                self.assert_refused(run(*program, log), 1, "two.lcm: holds ", " of several vehicles; keep one with chase-log filter")
+            out = self.folder / "two.mcap"
+            self.assert_refused(run("chase-log", "export", "--mcap", log, out), 1, "of several vehicles; keep one")
+            self.assertFalse(out.exists())
+        self.good("export", "--mcap", "--channel", "eagle_POSE", log, self.folder / "eagle.mcap")
+        self.good("filter", log, one, "--keep", "eagle_*")
+        self.assertEqual(run("chase-report", one, "--out", self.folder / "one").returncode, 0)
 
     def without(self, name, lost):
         """A log that lacks the messages of which lost(channel, k) is true for the channel's k-th."""
@@ -305,7 +321,8 @@ class LogTools(unittest.TestCase):
 
     def test_a_log_without_truth_is_reported_by_what_the_vehicle_said(self):
         out = self.folder / "vehicle"
-        log = self.without("vehicle.lcm", lambda channel, k: channel in ("TRUTH", "SCENARIO"))
+        log = self.without("vehicle.lcm", lambda channel, k: channel in ("TRUTH", "SCENARIO") or
+                           channel == "IMU" and 100 <= k < 150)
         answer = run("chase-report", log, "--out", out)
         self.assertEqual(answer.returncode, 0, answer.stderr)
         self.assertIn("no TRUTH", answer.stdout)
@@ -314,6 +331,10 @@ class LogTools(unittest.TestCase):
         self.assertAlmostEqual(sum(metrics["pose_health_s"].values()), metrics["flown_s"], delta=1.0)
         self.assertGreater(metrics["latency_ms"]["TARGET"]["p50"], 0.0)
         self.assertIn("certified_clearance_m", metrics)
+        self.assertAlmostEqual(metrics["longest_gap_s"]["IMU"], 0.255)  # 51 periods
+        self.assertAlmostEqual(metrics["gap_begins_s"]["IMU"], 0.495, delta=0.011)
+        self.assertRegex((out / "report.html").read_text(), r"IMU: longest gap 0\.2[56] s, from 0\.5 s of the log on")
+        self.assertRegex(answer.stdout, "IMU: longest gap")
         self.assertIn('"lane":"pose"', (out / "report.html").read_text())
         log.write_bytes(log.read_bytes()[:-50])
         self.assert_refused(run("chase-report", log, "--out", out), 2, "cut off")
@@ -436,9 +457,30 @@ class LogTools(unittest.TestCase):
         self.assertEqual(topics["CAMERA_IMAGE"]["schema"], "foxglove.CompressedImage")
         self.assertLess(topics["CAMERA_IMAGE"]["first"]["data"], 376 * 240 / 2)
 
+    def rig(self, name="rig.yaml", more=""):
+        file = self.folder / name
+        file.write_text(f"rig: {{lens: fisheye, lens_coefficients: [0.1, 0.2, 0.3, 0.4, 0], focal_px: 250}}\n{more}")
+        return file
+
+    def test_mcap_takes_the_rig_that_flew(self):
+        flight = self.folder / "with_rig"
+        flight.mkdir()
+        lcmlog.write(flight / "flight.lcm", [e for e in self.events if e[1] == "CAMERA_IMAGE"])
+        out = self.folder / "rig.mcap"
+        self.assertIn(" messages, with the default rig\n", self.good("export", "--mcap", flight, out))
+        file = self.rig("with_rig/perception.yaml", "target_shape: {radius: 0.2}\n")
+        self.assertIn(f" messages, with the rig of {file}\n", self.good("export", "--mcap", flight, out))
+        flown = out.read_bytes()
+        self.assertIn(f"with the rig of {file}\n", self.good("export", "--mcap", "--rig", file, self.log, self.folder / "of.mcap"))
+        self.good("export", "--mcap", "--rig", self.rig(), flight, out)
+        self.assertEqual(out.read_bytes(), flown)
+        file.write_text("target_shape: {radius: 0.2}\n")
+        self.assert_refused(run("chase-log", "export", "--mcap", "--rig", file, flight, out), 1, "perception.yaml", "no key rig")
+        self.rig("with_rig/perception.yaml").write_text("rig: {lens: round}\n")
+        self.assert_refused(run("chase-log", "export", "--mcap", flight, out), 1, "perception.yaml", "lens")
+
     def test_mcap_tells_the_lens_of_the_rig(self):
-        rig = self.folder / "rig.yaml"
-        rig.write_text("rig: {lens: fisheye, lens_coefficients: [0.1, 0.2, 0.3, 0.4, 0], focal_px: 250}\n")
+        rig = self.rig()
         lens = self.mcap("--channel", "CAMERA_IMAGE", "--jpeg", "--rig", rig)["CAMERA_IMAGE/calibration"]["first"]
         self.assertEqual((lens["distortion_model"], lens["D"], lens["K"][0]), ("kannala_brandt", [0.1, 0.2, 0.3, 0.4], 250))
         pinhole = self.mcap("--channel", "CAMERA_IMAGE", "--jpeg")["CAMERA_IMAGE/calibration"]["first"]

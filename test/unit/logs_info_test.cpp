@@ -146,6 +146,33 @@ TEST(LogInfo, HeavyChannelsLoseAsLittleUnlessTheRecorderLeftThemOut) {
   EXPECT_TRUE(RecordedWith(half, status_t::DEGRADED)) << "the disk was nearly full";
 }
 
+TEST(LogInfo, LightChannelsLoseNothing) {
+  for (const int32_t lost : {-1, 500}) {
+    const std::string file = Temp("light.lcm");
+    bus::LogWriter out(file);
+    for (int k = 0; k < 1000; ++k)
+      if (k != lost) out.Write(5000 * k, "IMU", Encoded(testing::Imu(k)));
+    out.Close();
+    const LogInfo info = Describe(file);
+    EXPECT_EQ(info.Recorded(), lost < 0);
+    EXPECT_EQ(info.Losses().size(), lost < 0 ? 0u : 1u);
+  }
+}
+
+TEST(LogInfo, TellsTheLongestGapAndWhenItBegan) {
+  const std::string file = Temp("gap.lcm");
+  bus::LogWriter out(file);
+  for (int k = 0; k < 1000; ++k)
+    if (k <= 500 || k > 530) out.Write(7'000'000 + 5000 * k, "IMU", Encoded(testing::Imu(k)));
+  out.Close();
+  const LogInfo info = Describe(file);
+  EXPECT_EQ(info.channels.at(0).longest_gap, 31 * 5000);
+  EXPECT_EQ(info.channels.at(0).gap_begins, 500 * 5000);
+  ASSERT_EQ(info.Losses().size(), 2u);
+  EXPECT_EQ(info.Losses()[1],
+            "IMU: longest gap 0.15 s, from 2.5 s of the log on; its period is 0.005 s");
+}
+
 TEST(LogInfo, ALogCutOffAnywhereIsReadAsFarAsItGoes) {
   const std::string whole = ReadText(WriteLog("whole.lcm"));
   for (size_t n = 4; n < whole.size(); n += 101) {

@@ -103,6 +103,24 @@ TEST(Lane, AStretchHasTheReasonThatItBeganWith) {
   EXPECT_EQ(spans[1]["reason"], "asked for");
 }
 
+TEST(Lane, AStretchEndsWhereItsReasonsWordsChange) {
+  Lane lane(true);
+  double t = 0.0;
+  for (const char* reason : {"hold", "hold", "stop", "the battery is low: 24 %",
+                             "the battery is low: 9.5 %", "fcu: a pilot flies"})
+    lane.Add(t += 0.5, "HOLD", reason);
+  auto spans = nlohmann::ordered_json::array();
+  lane.AddTo("flight", &spans);
+  ASSERT_EQ(spans.size(), 4u);
+  EXPECT_EQ(spans[1]["reason"], "stop");
+  EXPECT_EQ(spans[1]["from"], 1.5);
+  EXPECT_EQ(spans[0]["to"], 1.5);
+  EXPECT_EQ(spans[2]["reason"], "the battery is low: 24 %") << "only its number changes";
+  EXPECT_NEAR(lane.seconds().at("HOLD"), 2.5, 1e-9);
+  EXPECT_EQ(KeyMoments(spans, {}).front().label, "HOLD");
+  for (const Moment& m : KeyMoments(spans, {})) EXPECT_TRUE(m.t < 0.6 || m.label != "HOLD") << m.t;
+}
+
 TEST(Lane, AMessageStandsForASecondAtMost) {
   Lane lane;
   for (const auto& [t, name] : std::vector<std::pair<double, std::string>>{

@@ -53,6 +53,23 @@ class Python(unittest.TestCase):
         unknown = {e.channel for e in chase_log.read(self.log) if isinstance(e.message, bytes)}
         self.assertEqual(unknown, set())
 
+    def test_a_flights_folder_stands_for_its_log(self):
+        self.assertEqual(list(chase_log.table(self.folder, "POSE")), list(chase_log.table(self.log, "POSE")))
+        self.assertRaises(FileNotFoundError, lambda: next(chase_log.read(self.folder / "no")))
+
+    def test_damage_is_told_as_chase_log_does(self):
+        data, damage = self.log.read_bytes(), []
+        at = data.index(b"\xed\xa1\xda\x01", len(data) // 2)
+        bad = self.folder / "told.lcm"
+        bad.write_bytes(data[:at] + b"none" + data[at + 4:-10])
+        counts = [sum(1 for _ in chase_log.read(bad, *channels, damage=damage)) for channels in ((), ("POSE",))]
+        self.assertLess(counts[1], counts[0])
+        self.assertEqual(damage[:2], damage[2:])
+        (first, size), (_, end) = damage[:2]
+        info = subprocess.run([BIN / "chase-log", "info", bad], check=True, capture_output=True, text=True).stdout
+        self.assertIn(f"{size} bytes at {first} are no whole event", info)
+        self.assertIn(f"the last {end} bytes are no whole event", info)
+
     def test_damage_costs_what_is_damaged(self):
         data = self.log.read_bytes()
         whole = sum(1 for _ in chase_log.read(self.log))

@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "chase/pose_t.hpp"
+#include "chase/target_t.hpp"
 #include "common/logs/log_reader.h"
 #include "logs/src/diff.h"
 #include "logs/src/export.h"
@@ -142,6 +143,23 @@ TEST(LogExport, TumHasOneLinePerPose) {
             "0.600000000\n");
   EXPECT_NE(ErrorOf([] { ExportTum(WriteLog("n.lcm"), Temp("n.tum")); }).find("no usable POSE"),
             std::string::npos);
+}
+
+TEST(LogExport, TumTakesTheVehicleThatTheLogHas) {
+  const std::string log = Temp("vehicles.lcm"), out = Temp("vehicles.tum");
+  OutputLog writer(log);
+  pose_t pose{};
+  writer.Write(1, "falcon_POSE", pose);
+  writer.Write(2, "falcon_POSE", pose);
+  target_t target{};
+  target.state = target_t::TRACKING;
+  writer.Write(3, "falcon_TARGET", target);
+  writer.Write(4, "eagle_TARGET", target);
+  writer.Close();
+  EXPECT_EQ(ExportTum(log, out), 2);
+  EXPECT_EQ(ExportTum(log, out, "falcon_TARGET"), 1);
+  EXPECT_EQ(ErrorOf([&] { ExportTum(log, out, "TARGET"); }),
+            log + ": holds TARGET of several vehicles; keep one with chase-log filter");
 }
 
 TEST(LogExport, CsvRowsLineUpWithTheHeader) {

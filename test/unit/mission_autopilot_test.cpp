@@ -69,6 +69,23 @@ TEST(Mission, ATakeOffThatNobodyBeginsIsCalledOffAfterAPatience) {
   }
 }
 
+TEST(Mission, ATakeOffWhosePoseIsLostOnTheGroundIsCalledOff) {
+  MissionConfig config;
+  config.takeoff_patience = 20.0;
+  for (const bool comes_back : {false, true}) {
+    Bench bench(config);
+    bench.mission.inputs().on_ground = true;
+    bench.Run(0.2);
+    ASSERT_TRUE(bench.Command(Event::kTakeoff).accepted);
+    bench.hears_pose = false;
+    bench.Run(10.0);
+    ASSERT_EQ(bench.mission.state(), State::kEmergency);
+    bench.hears_pose = comes_back;
+    bench.Run(11.0);
+    EXPECT_EQ(bench.mission.state(), comes_back ? State::kReady : State::kIdle);
+  }
+}
+
 TEST(Mission, WhatFliesIsNotCalledOff) {
   for (const bool on_ground : {false, true}) {
     Bench bench;

@@ -51,7 +51,7 @@ class Bench {
   Mission mission;
   PoseReport pose;
   bool hears_pose = true, hears_obstacles = true, hears_target = true, tracked = true;
-  bool hears_battery = true;
+  bool hears_battery = true, hears_plans = true;  ///< the latter once it flies
   std::map<std::string, bool> failed = {
       {"prediction", false}, {"planning", false}, {"control", false}};
   double t = 10.0;
@@ -66,6 +66,7 @@ class Bench {
     if (hears_target) in.target = t;
     in.target_tracked = tracked;
     if (hears_battery) in.battery_heard = t;
+    if (hears_plans && in.flying) in.plan_heard = t;
     for (const auto& [name, has_failed] : failed) {
       ProcessReport report;
       report.t = t;

@@ -19,7 +19,9 @@ TEST(Commands, OfAnotherTimeAreRefused) {
   const auto given = [&](double t, int64_t id) {
     return bench.mission.Obey(bench.t, {{"command", 1, id, t}, Event::kChase});
   };
-  EXPECT_FALSE(given(8.9, 100).accepted) << "before the process started";
+  EXPECT_TRUE(given(8.9, 100).unknown) << "a process before this one may have obeyed it";
+  EXPECT_FALSE(given(8.9, 100).accepted);
+  EXPECT_FALSE(given(bench.t + 11.0, 102).unknown);
   EXPECT_FALSE(given(bench.t + 11.0, 102).accepted) << "from the future";
   bench.Run(20.0);
   EXPECT_FALSE(given(bench.t - 11.0, 101).accepted) << "old";

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include "common/world/ages.h"
 #include "test/unit/mission_bench.h"
 
 namespace chase::mission {
@@ -196,6 +197,24 @@ TEST(Mission, AReturnGoesOnOnceThereIsAPoseAgain) {
   ++bench.pose.epoch;
   bench.Run(0.1);
   EXPECT_EQ(bench.mission.state(), State::kLand) << "the take-off place is not known any more";
+}
+
+TEST(Mission, LandsWithoutAPlannerThatStaysAway) {
+  for (const Event led : {Event::kHold, Event::kChase, Event::kReturn}) {
+    Bench bench;
+    bench.Fly({3.0, 0.0, 1.0});
+    bench.mission.inputs().flying = bench.mission.inputs().armed = true;
+    bench.Run(20.0);
+    ASSERT_TRUE(bench.Command(led).accepted);
+    bench.Run(0.2);
+    const State before = bench.mission.state();
+    bench.hears_plans = false;
+    bench.Run(world::kMostAge.plan - 0.2);
+    EXPECT_EQ(bench.mission.state(), before) << "it may come back";
+    bench.Run(0.4);
+    EXPECT_EQ(bench.mission.state(), State::kLand);
+    EXPECT_EQ(bench.mission.reason(), "planning is silent: landing here");
+  }
 }
 
 TEST(Mission, AReturnThatGetsNoFartherLands) {

@@ -47,6 +47,8 @@ class Flown {
         "fcu", 0, [this](bus::Bus& bus) { return std::make_unique<BridgeNode>(bus, &flight); });
     control_ = bench_.lockstep.Connect();
     control_->SetIdentity({"control", "", kStart});
+    planning_ = bench_.lockstep.Connect();
+    planning_->SetIdentity({"planning", "", kStart});
     bench_.lockstep.Add("reader", 0, [this](bus::Bus& bus) {
       bus.Subscribe<status_t>("FCU_STATUS", [this](const auto& m) { autopilot_.Hear(m); });
       return std::make_unique<Silent>();
@@ -63,6 +65,7 @@ class Flown {
       tracking.following = follows_ ? tracking_t::PLAN : tracking_t::NONE;
       control_->Publish("TRACKING", tracking);
       bench_.place = flight.px4.p_WB();
+      if (follows_) Plan();
       bench_.Run(0.1);
     }
   }
@@ -80,8 +83,20 @@ class Flown {
   fcu::testing::Flight flight;
 
  private:
+  void Plan() {
+    plan_t plan{};
+    plan.utime = plan.position.utime = bench_.lockstep.now();
+    plan.position.duration = 1.0;
+    plan.position.n_coefficients = 3;
+    plan.position.coefficients = {bench_.place.x() + 5.0, bench_.place.y(), bench_.place.z()};
+    plan.target = plan.position;
+    plan.yaw = {0.0};
+    plan.n_yaw = 1;
+    planning_->Publish("PLAN", plan);
+  }
+
   NodeBench bench_;
-  std::unique_ptr<bus::Bus> control_;
+  std::unique_ptr<bus::Bus> control_, planning_;
   bus::AutopilotState autopilot_;
   bool follows_ = false;
 };

@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "common/bus/autopilot_state.h"
 #include "common/bus/battery.h"
 #include "common/world/ages.h"
@@ -102,6 +104,28 @@ TEST(MissionNode, StartedInFlightItHearsFromControlWhereItTookOff) {
   bench.Run(0.5);
   EXPECT_EQ(bench.states.back().has_home, 1);
   EXPECT_EQ(bus::ToVector(bench.states.back().home), Eigen::Vector3d(1, 2, 3));
+}
+
+TEST(MissionNode, AnswersWhatItWasGivenBeforeItsStartWithoutKnowing) {
+  NodeBench bench;
+  bench.Run(2.0);
+  bench.lockstep.Kill("mission");
+  bench.Run(0.5);
+  command_t m{};
+  m.utime = bench.lockstep.now();
+  m.kind = command_t::TAKEOFF;
+  bench.Run(0.5);
+  bench.lockstep.Start("mission");
+  bench.Run(0.5);
+  const auto chase_command = bench.lockstep.Connect();
+  chase_command->SetIdentity({"command", "", kStart});
+  chase_command->Publish("COMMAND", m);
+  bench.Run(0.1);
+  ASSERT_EQ(bench.acks.size(), 1u);
+  EXPECT_EQ(bench.acks[0].verdict, +command_ack_t::UNKNOWN);
+  EXPECT_NE(bench.acks[0].reason.find("given before the mission process started, now "),
+            std::string::npos)
+      << bench.acks[0].reason;
 }
 
 TEST(MissionNode, LeavesTheTargetsChoiceToPerception) {
@@ -297,6 +321,40 @@ TEST(MissionNode, HealthCountsTheLivesOfEveryProcess) {
   bench.Run(3.0);
   EXPECT_EQ(find("planning").restarts, 1);
   EXPECT_EQ(bench.states.back().state, +flight_state_t::READY);
+}
+
+TEST(MissionNode, WhoIsNeededAndWasNeverHeardIsInHealth) {
+  NodeBench bench;
+  bench.lockstep.Kill("control");
+  bench.Run(3.0);
+  const auto& rows = bench.healths.back().processes;
+  ASSERT_EQ(rows.size(), 4u);
+  EXPECT_EQ(rows[0].name, "control");
+  EXPECT_EQ(rows[0].age, -1.0);
+  EXPECT_EQ(rows[0].state, +status_t::FAILED);
+  EXPECT_TRUE(std::is_sorted(rows.begin(), rows.end(),
+                             [](const auto& a, const auto& b) { return a.name < b.name; }));
+}
+
+TEST(MissionNode, ThatBeganAnewInFlightCountsItsOwnReturnAndThoseSince) {
+  NodeBench bench;
+  bench.Run(2.0);
+  const int64_t since = bench.lockstep.now();  // another mission process led from here on
+  bench.Run(1.0);
+  for (const char* name : {"mission", "planning"}) bench.lockstep.Kill(name);
+  bench.Run(0.5);
+  for (const char* name : {"mission", "planning"}) bench.lockstep.Start(name);
+  bench.Run(0.5);
+  const auto control = bench.lockstep.Connect();
+  control->SetIdentity({"control", "", kStart});
+  flight_state_t home{};
+  home.utime = bench.lockstep.now();
+  home.since = since;
+  home.has_home = 1;
+  control->Publish("HOME", home);
+  bench.Run(2.5);
+  for (const process_health_t& p : bench.healths.back().processes)
+    EXPECT_EQ(p.restarts, p.name == "mission" || p.name == "planning" ? 1 : 0) << p.name;
 }
 
 TEST(MissionNode, WhoLooksOnIsInHealthAndNeededForNothing) {

@@ -71,6 +71,10 @@ class Model {
     if (e == Event::kDisarmed) off_ = true;
     if (e == Event::kPoseLost) blind_ = true;
     if (blind_) {
+      if (e == Event::kNotFlown) {
+        aloft_ = blind_ = false;
+        complete_ = true;
+      }
       if (e != Event::kPoseBack) return;
       blind_ = false;
       task_ = State::kHold;
@@ -97,7 +101,7 @@ class Model {
     const bool stays_up = leads || task_ == State::kHold;
     if (e == Event::kLeaving && leads) task_ = State::kHold;
     if ((e == Event::kOutside || e == Event::kBatteryLow) && stays_up) task_ = State::kReturn;
-    if (e == Event::kBatteryCritical) task_ = State::kLand;
+    if (e == Event::kBatteryCritical || e == Event::kUnplanned) task_ = State::kLand;
   }
 
   bool off_ = false, aloft_ = false, complete_ = false, blind_ = false;

@@ -29,15 +29,16 @@ struct Events {
   double height = 0.1;  // where the body is before there is a plan, m
   int64_t obeys_from =
       kStart;  // the autopilot does from then on, and stands on the ground until then
-  int64_t flying_from = kNever;   // control says from then on that it flies, us
-  double bound = 0.0;             // that control says of its error, m
-  int64_t frame_at = kNever;      // the frame of odometry changes, us
-  int64_t obstacles_at = kNever;  // obstacles speak of the new one, us
-  int64_t forecasts_at = kNever;  // forecasts do, us
-  int64_t cut_from = kNever;      // lists leave something out from then on, us
-  int64_t well_from = kStart;     // odometry is lost until then, us
-  bool returns = false;           // mission wants it back, 5 m along x
-  bool is_fenced = false;         // inside a fence that has a notch across that way
+  int64_t flying_from = kNever;              // control says from then on that it flies, us
+  double bound = 0.0;                        // that control says of its error, m
+  int64_t frame_at = kNever;                 // the frame of odometry changes, us
+  int64_t obstacles_at = kNever;             // obstacles speak of the new one, us
+  int64_t forecasts_at = kNever;             // forecasts do, us
+  int64_t cut_from = kNever;                 // lists leave something out from then on, us
+  int64_t well_from = kStart;                // odometry is lost until then, us
+  bool returns = false;                      // mission wants it back, 5 m along x
+  bool is_fenced = false;                    // inside a fence that has a notch across that way
+  std::vector<std::string>* said = nullptr;  // by planning's status
 };
 
 /// Plays the drone and the target: hovers where the newest plan wants it, forecasts a straight
@@ -47,6 +48,9 @@ class Company : public bus::Node {
   Company(bus::Bus& bus, int64_t forecast_from, int64_t forecast_until, const Events& events)
       : bus_(bus), from_(forecast_from), until_(forecast_until), events_(events) {
     bus.Subscribe<plan_t>("PLAN", [this](const plan_t& m) { plans.push_back(m); });
+    bus.Subscribe<status_t>("PLANNING_STATUS", [this](const status_t& m) {
+      if (events_.said) events_.said->push_back(m.detail);
+    });
   }
   int64_t TickPeriod() const override { return kPeriod; }
   void Tick(int64_t utime) override {
@@ -178,6 +182,19 @@ TEST(PlanningNode, ClimbsOnceTheAutopilotObeys) {
   ASSERT_FALSE(plans.empty());
   EXPECT_GE(plans.front().utime, events.obeys_from);
   EXPECT_EQ(plans.front().reason, "climbing");
+}
+
+TEST(PlanningNode, SaysWhatAClimbWaitsFor) {
+  std::vector<std::string> said;
+  Events events;
+  events.said = &said;
+  events.obeys_from = kStart + 8000000;
+  events.well_from = kStart + 3500000;
+  Fly(kNever, kNever, kStart + 7000000, events);
+  const std::vector<std::string> wanted = {"waiting for a pose", "waiting for ten lists in a row",
+                                           "waiting for the autopilot"};
+  said.erase(std::unique(said.begin(), said.end()), said.end());
+  EXPECT_EQ(said, wanted);
 }
 
 TEST(PlanningNode, ClimbsAfterTenSweepsInARowOfWhichThePlaceWasKnown) {

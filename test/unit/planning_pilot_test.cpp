@@ -354,7 +354,7 @@ TEST(Pilot, LooksAroundForWhomItLostWithTheFrame) {
       const double yaw = YawAt(plan.yaw, tau, plan.trajectory.duration).yaw;
       turned += yaw - body.yaw;
       body.yaw = yaw;
-      if (t > 1.0 && (t < 5.0 || !chased)) {
+      if (t > 1.0 && t < (chased ? 5.0 : 11.0)) {
         EXPECT_NEAR(turned, 0.0, 1e-3) << t;
       }
     }

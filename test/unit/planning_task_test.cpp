@@ -65,6 +65,60 @@ TEST(Task, StartedInFlightItBrakesAndNeverClimbs) {
   }
 }
 
+TEST(Task, AClimbGoesOnCertifiedWithAPlannerThatIsStartedInIt) {
+  for (const bool blocked : {false, true}) {
+    Flight flight({0.0, 0.0, 0.6});
+    flight.flying_before = true;
+    if (blocked) {
+      flight.obstacles = {Pillar(1, 0.0, 0.0)};
+      flight.obstacles[0].half.z() = 0.1;
+      flight.obstacles[0].center = world::Trajectory::Constant({0.0, 0.0, 1.3}, 0.0, 1.0);
+    }
+    flight.pilot.SetTask(Task::kTakeoff, Vector3d(0.0, 0.0, 0.1));
+    flight.Run(8.0);
+    for (const PlanResult& plan : flight.plans) EXPECT_GE(plan.certified_clearance, 0.0);
+    if (blocked)
+      EXPECT_LT(flight.Body().p.z(), 0.9);
+    else
+      EXPECT_NEAR(flight.Body().p.z(), 0.1 + PlanningConfig().takeoff_height, 0.05);
+  }
+}
+
+// The sphere would pass, the sphere with its tube does not.
+TEST(Task, NobodyClimbsBesideWhatTheTubeTouches) {
+  for (const double gap : {0.31, 0.45}) {
+    Flight flight;
+    flight.obstacles = {Pillar(1, 0.3 + gap, 0.0)};
+    flight.pilot.SetTask(Task::kTakeoff, flight.home());
+    flight.Run(1.0);
+    EXPECT_EQ(flight.plans.empty(), gap < PlanningConfig().planner.hard_radius()) << gap;
+  }
+}
+
+TEST(Task, WhomItSawWhileItHeldIsLookedForWhereItWas) {
+  Flight flight;
+  flight.pilot.SetTask(Task::kTakeoff, flight.home());
+  flight.sees_target = true;
+  flight.Run(6.0);
+  flight.pilot.SetTask(Task::kHold, flight.home());
+  flight.Run(2.0);
+  flight.sees_target = false;
+  flight.Run(2.0);
+  flight.pilot.SetTask(Task::kChase, flight.home());
+  flight.Run(1.0);
+  EXPECT_EQ(flight.plans.back().reason.rfind("target lost", 0), 0u) << flight.plans.back().reason;
+}
+
+TEST(Task, WhoWasNeverSeenIsWaitedForThenLookedFor) {
+  Flight flight({0.0, 0.0, 1.5});
+  flight.flying_before = true;
+  flight.pilot.SetTask(Task::kChase, flight.home());
+  flight.Run(9.0);
+  EXPECT_EQ(flight.plans.back().reason, "nothing to chase yet");
+  flight.Run(3.0);
+  EXPECT_EQ(flight.plans.back().reason.rfind("target lost, looking around", 0), 0u);
+}
+
 TEST(Task, HoldBrakesAtOnceWithCertificates) {
   Flight flight;
   flight.Chase(8.0);

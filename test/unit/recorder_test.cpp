@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <chrono>
 #include <csignal>
 #include <filesystem>
 #include <fstream>
@@ -54,6 +55,14 @@ class RecorderTest : public testing::Test {
     on_disk.clear();
   }
   void TearDown() override { std::filesystem::remove_all(folder_); }
+
+  /// The log was written last at that time, us.
+  void SetAge(const std::string& name, int64_t utime) const {
+    const auto ago =
+        std::chrono::system_clock::now().time_since_epoch() - std::chrono::microseconds(utime);
+    last_write_time(folder_ / name, std::filesystem::file_time_type::clock::now() -
+                                        std::chrono::duration_cast<std::chrono::seconds>(ago));
+  }
 
   std::set<std::string> Names() const {
     std::set<std::string> names;
@@ -170,11 +179,13 @@ TEST_F(RecorderTest, OnANearlyFullDiskHeavyMakesRoomForLight) {
 }
 
 TEST_F(RecorderTest, HeavyLogsOfEarlierRecordersMakeRoomFirst) {
-  config_.heavy_minutes = 0.5;
+  config_.heavy_minutes = 1e6;
   for (const char* name : {"a", "b"}) {
     Recorder recorder(config_, name, kStart);
     Feed(&recorder, 0, 10);
   }
+  for (const char* name : {"a-heavy.lcm", "b-heavy.lcm"}) SetAge(name, kStart + 10 * kSecond);
+  config_.heavy_minutes = 0.5;
   std::ofstream(folder_ / "a-heavyweights.lcm") << "somebody's";
   {
     Recorder recorder(config_, "b", kStart);
@@ -188,6 +199,30 @@ TEST_F(RecorderTest, HeavyLogsOfEarlierRecordersMakeRoomFirst) {
   EXPECT_EQ(Names().count("a-heavyweights.lcm"), 1u);
   std::filesystem::remove(folder_ / "a-heavyweights.lcm");
   EXPECT_EQ(Stamps("POSE").size(), 300u);
+}
+
+TEST_F(RecorderTest, HeavyLogsOfEarlierRecordersAreKeptForTheirMinutesToo) {
+  using std::filesystem::file_time_type;
+  config_.heavy_minutes = 1e6;
+  for (const char* name : {"a", "b"}) {
+    Recorder recorder(config_, name, kStart);
+    Feed(&recorder, 0, 1);
+  }
+  const int64_t age = std::chrono::duration_cast<std::chrono::microseconds>(
+                          std::chrono::system_clock::now().time_since_epoch())
+                          .count();
+  const file_time_type now = file_time_type::clock::now();
+  using std::chrono::seconds;
+  last_write_time(folder_ / "a-heavy.lcm", now - seconds(40));
+  last_write_time(folder_ / "a.lcm", now - seconds(40));
+  last_write_time(folder_ / "b-heavy.lcm", now - seconds(20));
+  for (const double minutes : {-1.0, 0.0, 0.5}) {
+    config_.heavy_minutes = minutes;
+    Recorder recorder(config_, "c", age);
+    recorder.Tick(age, kPlenty);
+    EXPECT_EQ(Names().count("a-heavy.lcm"), minutes > 0.0 ? 0u : 1u) << minutes;
+  }
+  for (const char* name : {"a.lcm", "b.lcm", "b-heavy.lcm"}) EXPECT_EQ(Names().count(name), 1u);
 }
 
 /// As a file system's or a user's limit on a file does: the next log takes what comes.

@@ -5,7 +5,8 @@ chase_test(viewer_node_test
   LIBS viewer_node nlohmann_json::nlohmann_json
   SOURCES ${CMAKE_CURRENT_LIST_DIR}/viewer_node_test.cpp ${CMAKE_CURRENT_LIST_DIR}/viewer_commander_test.cpp
           ${CMAKE_CURRENT_LIST_DIR}/viewer_any_log_test.cpp
-          ${CMAKE_CURRENT_LIST_DIR}/viewer_age_test.cpp)
+          ${CMAKE_CURRENT_LIST_DIR}/viewer_age_test.cpp
+          ${CMAKE_CURRENT_LIST_DIR}/viewer_image_test.cpp)
 add_dependencies(viewer_node_test viewer_page)
 
 add_test(NAME viewer_commands

@@ -60,9 +60,11 @@ TEST(ViewerAge, WhatIsNotHeardAnyMoreIsStale) {
   feed.Take(prediction);
   feed.Take(obstacles_t{});
   feed.Take(flight_state_t{});
+  feed.Take(tracking_t{});
   feed.Take(camera_image_t{});
   const json fresh = state(0.1), old = state(5.0);
-  for (const char* part : {"drone", "target", "plan", "forecast", "obstacles", "flight", "image"}) {
+  for (const char* part :
+       {"drone", "target", "plan", "forecast", "obstacles", "flight", "tracking", "image"}) {
     EXPECT_EQ(fresh[part]["stale"], false) << part;
     EXPECT_EQ(old[part]["stale"], true) << part;
     EXPECT_EQ(old[part]["age"], 5.1) << part;

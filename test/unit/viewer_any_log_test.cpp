@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <fstream>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <set>
 
@@ -23,18 +25,21 @@ namespace {
 
 using nlohmann::json;
 
+std::filesystem::path FileOf(const std::string& channel) {
+  return std::filesystem::temp_directory_path() /
+         ("viewer_" + channel + std::to_string(::getpid()) + ".lcm");
+}
+
 /// A log of two seconds with one message of `make(utime)` each 0.1 s, as the page gets it.
 template <class Make>
 Recording Recorded(const std::string& channel, const Make& make) {
-  const auto file = std::filesystem::temp_directory_path() /
-                    ("viewer_" + channel + std::to_string(::getpid()) + ".lcm");
+  const auto file = FileOf(channel);
   bus::LogWriter log(file);
   for (int64_t utime = kSecond; utime <= 3 * kSecond; utime += kSecond / 10)
     log.Write(utime, channel, BytesOf(make(utime)));
   log.Close();
-  const Recording recording = RecordLog(file);
-  std::filesystem::remove(file);
-  return recording;
+  const std::shared_ptr<void> litter(nullptr, [&](void*) { std::filesystem::remove(file); });
+  return RecordLog(file);
 }
 
 int CountOf(const Recording& recording, Part part) {
@@ -159,9 +164,10 @@ TEST(ViewerAnyLog, AVehiclesPrefixMayStandBeforeTheChannels) {
   };
   EXPECT_GE(CountOf(Recorded("eagleLIDAR_SCAN", sweep), Part::kCloud), 3);
   EXPECT_THROW(Recorded("LIDAR_SCAN_OF_OTHERS", sweep), std::runtime_error);
+  EXPECT_FALSE(std::filesystem::exists(FileOf("LIDAR_SCAN_OF_OTHERS"))) << "litter";
 }
 
-TEST(ViewerAnyLog, EveryChannelIsShownButTheTruth) {
+TEST(ViewerAnyLog, EveryChannelIsShownButTruthAndFault) {
   class ListeningBus : public MemoryBus {
    public:
     std::set<std::string> heard;
@@ -174,6 +180,10 @@ TEST(ViewerAnyLog, EveryChannelIsShownButTheTruth) {
     EXPECT_EQ(listener.heard.count(row.channel),
               row.channel == "TRUTH" || row.channel == "FAULT" ? 0U : 1U)
         << row.channel;
+  std::ifstream file("deploy/processes.json");
+  const json processes = json::parse(file)["processes"];
+  for (const json& row : processes)
+    EXPECT_EQ(listener.heard.count(bus::StatusChannel(row["name"])), 1U) << row["name"];
   SubscribeUnknown(listener, [](const char*, const auto&) {});
   EXPECT_EQ(listener.heard.count("FAULT") + listener.heard.count("TRUTH"), 2U);
 }

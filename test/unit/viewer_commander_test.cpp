@@ -163,6 +163,10 @@ TEST(ViewerCommands, EachGetsItsOwnAnswer) {
   EXPECT_EQ(desk.replies[1], "takeoff|no answer; does chase-mission run?|");
   for (int i = 0; i < 20; ++i) desk.Ask("stop", kToken, 0.0);
   EXPECT_EQ(desk.commander.refused(), 2 + 12) << "of twenty at once eight are under way";
+  Request other = *ParseRequest(R"({"command": "stop", "token": "a token of the test"})");
+  other.caller = 2;
+  desk.commander.Take(other);
+  EXPECT_EQ(desk.commander.refused(), 2 + 12) << "another client's is none of them";
 }
 
 TEST(ViewerCommands, TokenFile) {

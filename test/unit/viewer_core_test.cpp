@@ -63,10 +63,11 @@ TEST(ViewerCloud, IsEncodedToTheCentimetre) {
   const auto x = Coordinates(&random, 200, 50), y = Coordinates(&random, 200, 50),
              z = Coordinates(&random, 200, 50);
   const Vector3d origin(10, -5, 2);
-  const std::string bytes = EncodeCloud(1.5, origin, x, y, z, 1000);
+  const std::string bytes = EncodeCloud(1.5, 0x010203, origin, x, y, z, 1000);
   uint32_t count = 0;
   std::memcpy(&count, bytes.data() + 4, 4);
   ASSERT_EQ(count, 200U);
+  EXPECT_EQ(bytes.substr(0, 4), "\1\3\2\1") << "a sweep, of that generation";
   ASSERT_EQ(bytes.size(), 40U + 6U * count);
   for (size_t i = 0; i < count; ++i) {
     int16_t xyz[3];
@@ -74,7 +75,7 @@ TEST(ViewerCloud, IsEncodedToTheCentimetre) {
     EXPECT_NEAR(origin.x() + 0.01 * xyz[0], x[i], 0.0051);
     EXPECT_NEAR(origin.z() + 0.01 * xyz[2], z[i], 0.0051);
   }
-  const std::string lost = EncodeCloud(0, Vector3d::Constant(kNan), x, y, z, 10);
+  const std::string lost = EncodeCloud(0, 0, Vector3d::Constant(kNan), x, y, z, 10);
   EXPECT_EQ(lost.substr(16, 24), std::string(24, '\0'));  // about the world's origin then
 }
 
@@ -170,7 +171,8 @@ TEST(ViewerText, NothingHeardYet) {
   EXPECT_FALSE(state.contains("play"));
   EXPECT_TRUE(state["row"][1].is_null());
   EXPECT_EQ(state["row"][5], -1);
-  EXPECT_EQ(json::parse(ObstaclesText({}, 0.0, 0.0))["rows"].size(), 0U);
+  EXPECT_EQ(json::parse(ObstaclesText({}, 0.0, 0.0, 7))["rows"].size(), 0U);
+  EXPECT_EQ(json::parse(ObstaclesText({}, 0.0, 0.0, 7))["generation"], 7);
   EXPECT_EQ(json::parse(HealthText({}, ""))["rows"].size(), 0U);
 }
 
@@ -291,6 +293,7 @@ TEST(ViewerRequest, RefusesGarbage) {
         R"({"seek":null})", R"({"play":1})", R"({"command":{}})", "\xff\xfe"})
     EXPECT_FALSE(ParseRequest(text).has_value()) << text;
   EXPECT_FALSE(ParseRequest(std::string(60000, '[')).has_value());
+  EXPECT_FALSE(ParseRequest(R"({"token":")" + std::string(1025, 'x') + "\"}").has_value());
   EXPECT_EQ(ParseRequest(R"({"ack":-9})")->acknowledged, 0);
   EXPECT_EQ(ParseRequest(R"({"ack":18446744073709551615})")->acknowledged >= 0, true);
 }

@@ -169,6 +169,10 @@ TEST(ViewerNode, ProcessesThatOnlyTheMissionHears) {
   EXPECT_EQ(rows[1].restarts, 2);
   EXPECT_EQ(rows[1].rss_mb, 12.0);
   EXPECT_EQ(Joined({{"planning", own}}, {}, 0)[0].restarts, -1);
+  m.processes = {{"control", status_t::FAILED, -1.0, 0}};
+  const ProcessHealth never = Joined({}, m, 60 * kSecond)[0];
+  EXPECT_EQ(never.age, -1.0);
+  EXPECT_EQ(never.detail, "never heard");
 }
 
 TEST(ViewerNode, TheWorstProcessIsTheSilentOne) {

@@ -60,6 +60,20 @@ export async function connectOften(port) {
   await sleep(300);
 }
 
+// More requests than one may have, from many at once, until stop() is called; without a token, or with a wrong one.
+export async function flood(port) {
+  const sockets = (await Promise.all([...Array(20)].map((_, i) => open(port, i % 4 ? [] : ['foxglove.websocket.v1'])))).filter((socket) => socket);
+  const texts = ['{"command":"land","token":"wrong"}', '{"command":"stop"}', '{"want":["cloud"]}', '{"op":"unsubscribe","subscriptionIds":[]}'];
+  const timer = setInterval(() => {
+    for (const socket of sockets)
+      for (let i = 0; i < 10 && socket.bufferedAmount < 100000; ++i) socket.send(texts[i % texts.length]);
+  }, 20);
+  return () => {
+    clearInterval(timer);
+    for (const socket of sockets) socket.terminate();
+  };
+}
+
 // Readers that read nothing: pages, and Foxglove clients that want every channel, images included.
 export async function openDeaf(port) {
   const deaf = [];

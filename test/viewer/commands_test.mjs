@@ -3,6 +3,7 @@
 import assert from 'node:assert';
 import crypto from 'node:crypto';
 import fs from 'node:fs';
+import {flood} from './attacks.mjs';
 import {live, load, pageClient, sleep, until} from './viewer.mjs';
 
 const TOKEN = crypto.randomBytes(16).toString('hex');
@@ -22,6 +23,7 @@ await until('the state of the flight and of chase-mission',
   () => client.newest.state?.flight && client.newest.health?.rows.some((row) => row.name === 'mission'));
 assert.match(client.newest.state.flight.missing.join(), /POSE is not heard/);
 assert.strictEqual(client.newest.state.row[14], 0);
+await until('a row of the viewer', () => client.newest.health.rows.some((row) => row.name === 'viewer' && row.channels.length));
 
 async function ask(request) {
   const heard = replies.length;
@@ -52,6 +54,13 @@ assert.match((await stalled).refusal, /^given [3-9]\.\d s ago$/);
 await statuses();
 assert.strictEqual(commands, given, 'an old command was sent');
 
+// While others flood the viewer with wrong tokens, each command reaches chase-mission and is answered, and theirs do not.
+const stopFlood = await flood(viewer.port);
+await until('requests that are dropped', () => / [1-9]\d* requests dropped/.test(client.newest.health.self));
+for (const command of ['stop', 'hold', 'stop'])
+  assert.match((await ask({command, token: TOKEN})).refusal, new RegExp(`^${command} in IDLE: `));
+stopFlood();
+
 // By Foxglove's service: offered because there is a token, and bound to it.
 const {FoxgloveClient} = load('@foxglove/ws-protocol'), {WebSocket} = load('ws');
 const foxglove = new FoxgloveClient({ws: new WebSocket(`ws://127.0.0.1:${viewer.port}/`, [FoxgloveClient.SUPPORTED_SUBPROTOCOL])});
@@ -76,6 +85,8 @@ assert.deepStrictEqual(await call(5, {command: 'kill', token: TOKEN}), {accepted
 const toPages = replies.length;
 assert.match((await call(6, {command: 'takeoff', token: TOKEN})).words, /^takeoff in IDLE: .*POSE is not heard/);
 assert.strictEqual(replies.length, toPages, 'pages heard the answer');
+assert.match((await call(7, {command: 'takeoff', token: TOKEN, utime: client.newest.state.utime - 3e6})).words, /^given 3\.\d s ago$/);
+assert.match((await call(8, {command: 'takeoff', token: TOKEN, utime: client.newest.state.utime})).words, /^takeoff in IDLE: /);
 foxglove.close();
 
 // The same by hand in a browser: the buttons wait for the arm switch and a token.

@@ -90,16 +90,25 @@ assert.deepStrictEqual([lens.distortion_model, ...lens.D], ['plumb_bob', -0.3, 0
 
 // The layout to import names nothing that is not there.
 const layout = JSON.parse(await (await fetch(`${viewer.url}foxglove-layout.json`)).text());
-const named = new Set();
+const named = new Set(), plotted = new Set();
 for (const {topics, imageMode, paths} of Object.values(layout.configById)) {
   for (const topic of [...Object.keys(topics ?? {}), ...Object.values(imageMode ?? {})]) named.add(topic);
   for (const {value} of paths ?? []) {
-    const [topic, field] = /^([A-Z_]+)\.(\w+)/.exec(value).slice(1);
-    assert.ok(seen.types.get(topic)?.fields[field], value);
+    // TOPIC.field, TOPIC.field[0], or TOPIC.list[:]{name=="row"}.field
+    const [topic, field, row, part] = /^([A-Z_]+)\.(\w+)(?:\[\d\]|\[:\]\{name=="(\w+)"\}\.(\w+))?$/.exec(value).slice(1);
+    const found = seen.types.get(topic)?.fields[field];
+    assert.ok(found, value);
+    if (row) assert.ok(found.resolvedType.fields.name && found.resolvedType.fields[part], value);
+    plotted.add(topic);
   }
 }
 for (const topic of named) assert.ok(seen.channels.has(topic), `the layout shows ${topic}`);
 assert.ok(named.size >= 8);
+for (const topic of ['FLIGHT_STATE', 'PLAN', 'TARGET', 'POSE', 'PLANNING_STATUS']) assert.ok(plotted.has(topic), `no panel of ${topic}`);
+// Every process tells how it is, the viewer included.
+const {processes} = JSON.parse(fs.readFileSync(path.join(import.meta.dirname, '../../deploy/processes.json')));
+for (const {name} of processes) assert.ok(seen.counts.has(`${name.toUpperCase()}_STATUS`), `nothing of ${name}`);
+await until('a row of each process', () => processes.every(({name}) => page.newest.health?.rows.some((row) => row.name === name)));
 
 // What is drawn, once the target is tracked: with its uncertainty, the plan with its stop, the forecast with its spread.
 for (const [topic, part, least] of [['TARGET/scene', 'spheres', 1], ['PLAN/scene', 'lines', 2], ['PREDICTION/scene', 'spheres', 5]])

@@ -2,7 +2,7 @@
 import assert from 'node:assert';
 import fs from 'node:fs';
 import http from 'node:http';
-import {connectOften, openDeaf, raw, sendGarbage} from './attacks.mjs';
+import {connectOften, flood, openDeaf, raw, sendGarbage} from './attacks.mjs';
 import {pageClient, play, sleep, until} from './viewer.mjs';
 
 const TOKEN = 'right-token-of-the-test';
@@ -47,6 +47,18 @@ for (const request of [{command: 'land', token: TOKEN.replace('right', 'wrong')}
   await until('a reply', () => replies.length > heard);
 }
 assert.deepStrictEqual(replies, ['wrong token', 'wrong token', 'wrong token', 'no such command', 'a log is played: nobody flies']);
+
+// While others ask more than anybody may, and are refused by themselves, each command and each seek is heard.
+const stopFlood = await flood(viewer.port);
+await until('requests that are dropped', () => / [1-9]\d* requests dropped/.test(good.newest.health.self));
+replies.length = 0;
+for (let i = 1; i <= 5; ++i) {
+  good.ask({command: 'stop', token: TOKEN});
+  good.ask({seek: i, play: false});
+  await until(`answer ${i} in a flood`, () => replies.length === i && good.newest.state.play.t === i, 10000);
+}
+assert.deepStrictEqual(new Set(replies), new Set(['a log is played: nobody flies']), 'the refusal of another was heard');
+stopFlood();
 
 const attacked = mean(quiet);
 const longest = Math.max(...good.states.slice(quiet + 1).map((t, i) => t - good.states[quiet + i]));

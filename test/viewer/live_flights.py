@@ -15,8 +15,10 @@ import argparse
 import json
 import pathlib
 import re
+import secrets
 import subprocess
 import sys
+import tempfile
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path += [str(ROOT / "test/replay"), str(ROOT / "deploy/launcher")]
@@ -37,7 +39,14 @@ def onlooker(kind, port):
 
 def fly(kind, scenario, seed):
     """Flies in a network namespace of its own; (exit code, folder of the flight, what the onlooker saw)."""
-    command = [ROOT / "deploy/fly", scenario, "--seed", str(seed), *(["--view"] if kind != "alone" else [])]
+    with tempfile.NamedTemporaryFile("w", prefix="token-") as token:  # there is something to guess
+        token.write(secrets.token_hex(16))
+        token.flush()
+        view = ["--view", "--token-file", token.name] if kind != "alone" else []
+        return look_on(kind, [ROOT / "deploy/fly", scenario, "--seed", str(seed), *view])
+
+
+def look_on(kind, command):
     flight = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     folder, looking = None, None
     for line in flight.stdout:

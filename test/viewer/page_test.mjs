@@ -43,6 +43,13 @@ const seek = async (t) => {
   }, t);
   await until(`the state at ${t} s`, async () => { const s = await look(); return s.t >= t - 0.1 && s.t < t + 3; });
 };
+// A sweep and obstacles, while the log stands still, that stay.
+async function shown(look, where) {
+  const all = async () => { const s = await look(); return s.points > 100 && s.obstacles > 0; };
+  await until(`a sweep and obstacles ${where}`, all, 5000);
+  await sleep(500);
+  assert.ok(await all(), `sweep or obstacles have gone ${where}`);
+}
 const toggle = () => page.click('#playbutton');
 const paused = async () => !(await page.evaluate(() => window.chase.model.play.playing));
 // On a slow machine the log may have ended by itself: toggles only what plays.
@@ -125,7 +132,14 @@ for (const share of [0.9, 0.3, 0.7]) {
     return Math.hypot(...[0, 1, 2].map((k) => row[8 + k] - scene.drone.position.getComponent(k)));
   });
   assert.ok(error < 0.3, `the drone is ${error} m from where it was at ${share} of the log`);
+  await shown(look, `at ${share} of the log`);
 }
+// So does a page that is opened while the log stands still.
+const late = await browser.newPage({viewport: {width: 640, height: 480}});
+await late.goto(viewer.url);
+await late.waitForFunction(() => window.chase?.model.state);
+await shown(() => late.evaluate(() => ({points: window.chase.scene.points, obstacles: window.chase.scene.shown.solids})), 'on a page that comes late');
+await late.close();
 await page.selectOption('#speed', '10');
 await seek(0);
 await toggle();
@@ -166,8 +180,8 @@ assert.deepStrictEqual(moved, [[1, 1], [1.4, 1], [1.4, 1], [2, 1], [1]]);
 
 // What is too old is not shown as what is.
 const past = await page.evaluate(async () => {
-  const {scene} = window.chase, path = [0, 0, 1, 1, 0, 1, 2, 0, 1], age = {age: 5.1, stale: true}, shown = (id) => document.getElementById(id);
-  const state = {...window.chase.model.state, generation: 'old', following: 1, row: [0],
+  const {scene} = window.chase, path = [0, 0, 1, 1, 0, 1, 2, 0, 1], age = {age: 5.1, stale: true}, shown = (id) => document.getElementById(id), {generation} = scene;
+  const state = {...window.chase.model.state, generation: generation + 0.1, tracking: {following: 1, ...age}, row: [0],
     drone: {p: [0, 0, 1], q: [1, 0, 0, 0], health: 0}, plan: {verdict: 0, radius: 0.4, path, stop: path, ...age},
     forecast: {path, spread: [0.5, 0.5], ...age}, obstacles: age, image: age,
     target: {state: 1, p: [0, 0, 0], axes: [0.1, 0.2, 0.3], q: [1, 0, 0, 0], radius: 0.2, height: 1, ...age}};
@@ -176,12 +190,16 @@ const past = await page.evaluate(async () => {
     bad: ['verdict', 'targetstate'].map((id) => shown(id).className), image: shown('image').style.opacity,
     hidden: ['plan', 'stop', 'forecast', 'fan', 'covariance', 'sight'].map((part) => scene[part].visible),
     colors: ['target', 'solid'].map((part) => scene[part].material.color.getHexString())};
-  window.chase.link.handlers.state({...state, generation: 'new', obstacles: null, image: null, target: {...state.target, stale: false}});
-  return {...seen, again: ['target', 'solid'].map((part) => scene[part].material.color.getHexString())};
+  window.chase.link.handlers.state({...state, generation: generation + 0.2, obstacles: null, image: null, target: {...state.target, stale: false}});
+  const again = ['target', 'solid'].map((part) => scene[part].material.color.getHexString());
+  window.chase.link.handlers.state({...state, generation: generation + 0.3, tracking: {following: 1}});
+  const follows = shown('figures').textContent;
+  scene.begin(generation);
+  return {...seen, follows, again};
 });
 assert.deepStrictEqual(past, {words: ['plan 5.1 s old', 'target 5.1 s old', 'image 5.1 s old'],
-  figures: 'height 1.00 m\nfollows plan\nobstacles 5.1 s old', bad: ['pill bad', 'pill bad'], image: '0.4',
-  hidden: [false, false, false, false, false, false], colors: ['4a525c', '4a525c'], again: ['e8702a', 'ffffff']});
+  figures: 'height 1.00 m\ntracking 5.1 s old\nobstacles 5.1 s old', bad: ['pill bad', 'pill bad'], image: '0.4',
+  hidden: [false, false, false, false, false, false], colors: ['4a525c', '4a525c'], follows: 'height 1.00 m\nfollows plan\nobstacles 5.1 s old', again: ['e8702a', 'ffffff']});
 
 // Obstacles are grown by what plans keep free, the target has its 3 sigma, the forecast its 2, and the stop its verdict's colour.
 const told = await page.evaluate(async () => {

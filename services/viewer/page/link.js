@@ -22,7 +22,10 @@ export class Link {
     const socket = new WebSocket(`${scheme}://${location.host}/ws`);
     socket.binaryType = 'arraybuffer';
     [this.socket, this.begun] = [socket, seconds()];
-    socket.onopen = () => this.ask({want: this.wants});
+    socket.onopen = () => {
+      this.handlers.connected();
+      this.ask({want: this.wants});
+    };
     socket.onclose = () => this.leave();
     socket.onmessage = (event) => this.hear(event.data);
   }
@@ -75,11 +78,11 @@ export function hearBinary(data, handlers) {
 // services/viewer/cloud.h says what stands where.
 function cloudOf(data) {
   const view = new DataView(data);
-  const count = view.getUint32(4, true);
+  const count = view.getUint32(4, true), generation = view.getUint32(0, true) >>> 8;
   const origin = [16, 24, 32].map((at) => view.getFloat64(at, true));
   const points = new Float32Array(3 * count);
   for (let i = 0; i < 3 * count; ++i) points[i] = origin[i % 3] + 0.01 * view.getInt16(40 + 2 * i, true);
-  return {t: view.getFloat64(8, true), points};
+  return {t: view.getFloat64(8, true), generation, points};
 }
 
 function imageOf(data) {

@@ -41,7 +41,7 @@ function showFlight(flight) {
 // What is too old to be shown as what is (`stale`: services/viewer/scene.h), in words.
 const old = (name, part) => part?.stale ? `${name} ${part.age.toFixed(part.age < 10 ? 1 : 0)} s old` : '';
 
-function showPills({drone, target, plan, obstacles, image, following, flight, truth}) {
+function showPills({drone, target, plan, obstacles, image, tracking, flight, truth}) {
   showFlight(flight);
   page.truth.hidden = !truth;
   const verdict = plan?.verdict;
@@ -54,7 +54,7 @@ function showPills({drone, target, plan, obstacles, image, following, flight, tr
   page.scene.style.opacity = drone?.stale ? 0.5 : 1;
   page.image.style.opacity = image?.stale ? 0.4 : 1;
   if (image?.stale) setText(page.imagetext, old('image', image));
-  setText(page.figures, [drone && `height ${format(drone.p[2], 2, 'm')}`, drone && `follows ${FOLLOWING[following] ?? '–'}`,
+  setText(page.figures, [drone && `height ${format(drone.p[2], 2, 'm')}`, drone && old('tracking', tracking) || `follows ${FOLLOWING[tracking?.following] ?? '–'}`,
     old('obstacles', obstacles)].filter((text) => text).join('\n'));
 }
 
@@ -76,6 +76,13 @@ function drawLines() {
   drawStrips(page.strips, model.rows, from, to, now());
 }
 
+// Parts may overtake each other: the first of a new generation clears the scene, one of an old generation is not shown.
+function isNow({generation}) {
+  if (generation < scene.generation) return false;
+  scene.begin(generation);
+  return true;
+}
+
 const handlers = {
   link(up, silence = 0) {
     const well = up && !silence, words = up ? 'silent' : 'no link';
@@ -83,6 +90,7 @@ const handlers = {
     document.body.classList.toggle('silent', !well);
     if (!well) disarm(page);
   },
+  connected() { scene.begin(-1); },  // to a viewer that may count anew
   hello(message) {
     page.source.textContent = message.source || 'live';
     model.rows = message.rows;
@@ -92,11 +100,9 @@ const handlers = {
   },
   state(message) {
     window.chase.counts.state++;
+    if (!isNow(message)) return;
     const {generation, play} = model, paused = play && message.generation === generation && message.play?.t === play.t;
-    if (message.generation !== model.generation) {  // a seek, or another frame W
-      scene.clear();
-      if (!message.play) for (const row of model.rows) row.fill(null, DRONE);
-    }
+    if (message.generation !== generation && !message.play) for (const row of model.rows) row.fill(null, DRONE);
     model.generation = message.generation;
     model.play = message.play ?? null;
     model.state = message;
@@ -114,7 +120,10 @@ const handlers = {
     setText(page.clock, `${now().toFixed(1)} s${model.play ? ` / ${model.duration.toFixed(1)} s` : ''}`);
     model.lines = true;
   },
-  obstacles(message) { window.chase.counts.obstacles++; scene.setObstacles(message.rows, message.t); },
+  obstacles(message) {
+    window.chase.counts.obstacles++;
+    if (isNow(message)) scene.setObstacles(message.rows, message.t);
+  },
   health(message) {
     window.chase.counts.health++;
     showHealth(page.health, message.rows);
@@ -126,7 +135,10 @@ const handlers = {
     page.reply.textContent = `${message.command}: ${message.refusal ? `refused: ${message.refusal}` : `taken: ${message.words}`}`;
     page.reply.className = message.refusal ? 'refused' : 'taken';
   },
-  cloud(cloud) { window.chase.counts.cloud++; scene.addSweep(cloud.points); },
+  cloud(cloud) {
+    window.chase.counts.cloud++;
+    if (isNow(cloud)) scene.addSweep(cloud.points);
+  },
   image(image) { window.chase.counts.image++; drawImage(page.image, page.imagetext, image).catch(() => {}); },
 };
 // A report hands the flight over with the page.

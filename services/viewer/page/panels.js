@@ -23,7 +23,7 @@ export async function drawImage(canvas, text, {about, jpeg}) {
     context.lineWidth = 2;
     context.strokeRect(u - w / 2, v - h / 2, w, h);
   }
-  setText(text, about.state === undefined ? 'no target heard'
+  setText(text, about.state === undefined ? 'no target told of this image'
     : `target ${TARGET_STATES[about.state] ?? '?'}, probability ${format(about.existence, 2, '')}`);
 }
 
@@ -46,7 +46,7 @@ function updateProcess(details, row) {
   const [summary, text, table] = details.children, [dot, , share, losses] = summary.children;
   const stale = row.age > STALE;
   dot.style.background = stale ? '#d9534f' : STATE_COLORS[row.state] ?? '#7d8896';
-  setText(share, stale ? `silent ${row.age.toFixed(0)} s` : row.cpu === null || row.cpu < 0 ? '' : `${row.cpu.toFixed(0)} %`);
+  setText(share, row.age < 0 ? 'never heard' : stale ? `silent ${row.age.toFixed(0)} s` : row.cpu === null || row.cpu < 0 ? '' : `${row.cpu.toFixed(0)} %`);
   const sum = (k) => row.channels.reduce((n, c) => n + c[k], 0);
   const lost = sum(2), malformed = sum(3);
   setText(losses, [row.restarts > 0 ? `${row.restarts} restarts` : '', lost + malformed > 0 ? `${lost} lost ${malformed} malformed` : '']

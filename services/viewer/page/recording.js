@@ -2,6 +2,7 @@
 import {hearBinary} from './link.js';
 
 const PERIOD = 0.1;                      // s between states
+const MOST = 1 << 24;                    // generations that a sweep can tell
 const HEAVY = {cloud: true, image: true};
 
 const bytesOf = (base64) => Uint8Array.from(atob(base64), (c) => c.charCodeAt(0)).buffer;
@@ -54,14 +55,16 @@ export class Recording {
     this.state = newest.state ?? this.state;
     this.tell();
     for (const [kind, message] of Object.entries(newest)) {
-      if (HEAVY[kind] && this.wants.includes(kind)) hearBinary(bytesOf(message), this.handlers);
-      if (!HEAVY[kind] && kind !== 'state') this.handlers[kind](message);
+      if (HEAVY[kind] && this.wants.includes(kind)) hearBinary(bytesOf(message), {...this.handlers, cloud: (cloud) => this.handlers.cloud(this.anew(cloud))});
+      if (!HEAVY[kind] && kind !== 'state') this.handlers[kind](this.anew(message));
     }
   }
 
+  // Each seek is a generation after all before.
+  anew(message) { return {...message, generation: this.seeks * MOST + message.generation}; }
+
   tell() {
     if (!this.state) return;
-    this.handlers.state({...this.state, generation: `${this.seeks}.${this.state.generation}`,
-      play: {t: this.t, duration: this.recorded.duration, speed: this.speed, playing: this.playing}});
+    this.handlers.state({...this.anew(this.state), play: {t: this.t, duration: this.recorded.duration, speed: this.speed, playing: this.playing}});
   }
 }
