@@ -121,6 +121,9 @@ Px4::Px4(const Px4Options& options, int64_t utime, uint64_t seed)
       now_(utime),
       mode_(mavlink::kPositionMode),
       intended_(mavlink::kPositionMode),
+      landed_since_(utime),
+      armed_since_(utime),
+      killed_since_(utime),
       intervals_(DefaultIntervals()) {}
 
 int64_t Px4::Clock(int64_t utime) const {
@@ -304,6 +307,7 @@ void Px4::Reboot(int64_t utime) {
   boot_ = utime;
   mode_ = intended_ = mavlink::kPositionMode;
   armed_ = false;
+  land_detector_ = {};
   first_setpoint_ = last_setpoint_ = 0;
   flown_by_.reset();
   version_2_ = !options_.starts_in_version_1;

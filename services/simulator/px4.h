@@ -155,8 +155,8 @@ class Px4 {
   bool unmanned_ = false;  // it flies and its transmitter is not heard any more
   std::optional<int64_t> transmitter_heard_;
   int64_t silent_since_ = 0;
-  int64_t first_setpoint_ = 0, last_setpoint_ = 0, landed_since_ = 0, armed_since_ = 0,
-          killed_since_ = 0;
+  int64_t first_setpoint_ = 0, last_setpoint_ = 0;
+  int64_t landed_since_, armed_since_, killed_since_;
   LandDetector land_detector_;
   std::optional<int64_t> flown_by_;  // arrival of the newest setpoint that it flew by
   std::string said_;                 // the check that fails, as last said

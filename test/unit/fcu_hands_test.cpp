@@ -210,13 +210,24 @@ TEST(FcuHands, ThePilotMayBeTheOneWhoEngages) {
 }
 
 TEST(FcuHands, APilotInTheAirIsNotInterfered) {
-  StandInOptions options;
-  options.com_disarm_prflt = 1e9;  // he sits on the ground, where nobody may take it either
-  Flight flight(options);
-  flight.px4.PilotArms(true);
+  Flight flight;
+  flight.px4.PilotLifts(2.0);
   flight.Run(15.0);
+  EXPECT_NEAR(flight.px4.p_WB().z(), 2.0, 0.1);
   EXPECT_EQ(flight.px4.seen().setpoints, 0);
   EXPECT_EQ(flight.px4.seen().offboard_commands, 0);
+}
+
+// He has COM_DISARM_PRFLT to take off.
+TEST(FcuHands, NorIsAPilotWhoHasArmedOnTheGround) {
+  Flight flight;
+  flight.px4.PilotArms(true);
+  flight.Run(9.5);
+  EXPECT_TRUE(flight.px4.armed());
+  EXPECT_EQ(flight.px4.seen().setpoints, 0);
+  EXPECT_EQ(flight.px4.seen().offboard_commands, 0);
+  flight.Run(1.0);
+  EXPECT_FALSE(flight.px4.armed());
 }
 
 TEST(FcuHands, ItsWordsTellWhoFliesAndWhereItStands) {

@@ -82,6 +82,14 @@ class Link {
     Second();
     return status_;
   }
+  /// A pilot flies it, hovering at rest.
+  void Fly() {
+    body.p_WB.z() = 1.0;
+    body.touches = false;
+    body.thrust = body.hover_thrust;
+    px4_.PilotMode(mavlink::kPositionMode);
+    px4_.PilotArms(true);
+  }
   /// The channels of a receiver that it told last.
   int channels() const { return channels_; }
 
