@@ -6,7 +6,7 @@ namespace chase::simulator {
 namespace {
 
 constexpr int64_t kStage = 333'333;         // us, LNDMC_TRIG_TIME / 3
-constexpr double kClimbs = 0.25;            // m/s, LNDMC_Z_VEL_MAX
+constexpr double kClimbs = 0.25;            // m/s, LNDMC_Z_VEL_MAX; 0.5 before 1.14
 constexpr double kMoves = 1.5;              // m/s, LNDMC_XY_VEL_MAX
 constexpr double kRotates = 0.35;           // rad/s, LNDMC_ROT_MAX
 constexpr double kWider = 2.5;              // the limits, once it may have landed
