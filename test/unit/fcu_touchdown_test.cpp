@@ -65,6 +65,20 @@ TEST(FcuTouchdown, IsNoneInTheAir) {
   }
 }
 
+// AUTO.LAND waits for a heartbeat that says who has it, and may be lost.
+TEST(FcuTouchdown, HoversUntilTheAutopilotLands) {
+  Flight flight;
+  flight.TakeOff(8.0);
+  flight.motors = false;
+  ASSERT_TRUE(flight.RunUntil(State::kLanding, 0.5)) << flight.bridge.Words();
+  flight.Run(0.005);
+  ASSERT_TRUE(flight.px4.mode() == kOffboardMode);
+  flight.link = false;
+  flight.Run(0.9);
+  EXPECT_TRUE(flight.px4.mode() == kOffboardMode) << "COM_OF_LOSS_T has not passed";
+  EXPECT_GT(flight.px4.v_WB().z(), -0.5);
+}
+
 TEST(FcuTouchdown, PilotAndKillReachIt) {
   for (const bool kill : {false, true}) {
     Flight flight;
