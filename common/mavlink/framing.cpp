@@ -116,8 +116,11 @@ std::size_t FrameReader::TakeOne(int64_t utime, const uint8_t* data, std::size_t
 /// `size` is that of a signed frame, else 0.
 bool FrameReader::IsGenuine(int64_t utime, const Frame& frame, const uint8_t* data,
                             std::size_t size) {
-  return signing_ == nullptr ||
-         (size > 0 && signing_->Accepts(utime, frame.system, frame.component, data, size));
+  if (signing_ == nullptr) return true;
+  if (size == 0) return false;
+  const auto verdict = signing_->Judge(utime, frame.system, frame.component, data, size);
+  counters_.late += verdict == Signing::Verdict::kLate;
+  return verdict == Signing::Verdict::kGenuine;
 }
 
 void FrameReader::CountGap(const Frame& frame) {

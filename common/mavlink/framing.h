@@ -38,7 +38,8 @@ class FrameReader {
     int64_t frames = 0;        ///< handed over
     int64_t unknown = 0;       ///< of no definition, left out by their length
     int64_t bad_checksum = 0;  ///< what began like a frame of a known message
-    int64_t refused = 0;       ///< unsigned, forged or replayed
+    int64_t refused = 0;       ///< unsigned, forged, replayed or late
+    int64_t late = 0;          ///< of those: by our key, but of a clock that lags
     int64_t lost = 0;          ///< by the gaps of all senders
   };
 

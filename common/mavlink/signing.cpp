@@ -42,19 +42,21 @@ void Signing::Sign(int64_t utime, std::vector<uint8_t>* frame) {
   frame->insert(frame->end(), digest.begin(), digest.end());
 }
 
-bool Signing::Accepts(int64_t utime, uint8_t system, uint8_t component, const uint8_t* frame,
-                      std::size_t size) {
-  if (size < kSignatureBytes) return false;
+Signing::Verdict Signing::Judge(int64_t utime, uint8_t system, uint8_t component,
+                                const uint8_t* frame, std::size_t size) {
+  if (size < kSignatureBytes) return Verdict::kRefused;
   const uint8_t* signature = frame + size - kSignatureBytes;
   const int64_t time = ReadTime(signature + 1);
   const auto stream = std::make_tuple(system, component, signature[0]);
   const auto last = heard_.find(stream);
-  if (last == heard_.end() ? time < Now(utime) - kMinute : time <= last->second) return false;
+  if (last != heard_.end() && time <= last->second) return Verdict::kRefused;
   const auto digest = Digest(frame, size - kDigestBytes);
-  if (!std::equal(digest.begin(), digest.end(), frame + size - kDigestBytes)) return false;
+  if (!std::equal(digest.begin(), digest.end(), frame + size - kDigestBytes))
+    return Verdict::kRefused;
+  if (last == heard_.end() && time < Now(utime) - kMinute) return Verdict::kLate;
   heard_[stream] = time;
   newest_ = std::max(newest_, time);
-  return true;
+  return Verdict::kGenuine;
 }
 
 }  // namespace chase::mavlink

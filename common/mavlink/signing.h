@@ -27,10 +27,16 @@ class Signing {
   /// Appends the signature to a whole frame whose flags say that it is signed.
   void Sign(int64_t utime, std::vector<uint8_t>* frame);
 
+  enum class Verdict {
+    kGenuine,
+    kLate,  ///< by our key, but the first one of its link is more than a minute behind our clock
+    kRefused,
+  };
   /// Is a whole signed frame genuine and newer than all before it of its system, component and
-  /// link? The first one of a link may be a minute older than our own clock.
-  bool Accepts(int64_t utime, uint8_t system, uint8_t component, const uint8_t* frame,
-               std::size_t size);
+  /// link? A late one may be a recording, or of a sender that does not know the time yet: what we
+  /// send sets its clock.
+  Verdict Judge(int64_t utime, uint8_t system, uint8_t component, const uint8_t* frame,
+                std::size_t size);
 
  private:
   std::array<uint8_t, 6> Digest(const uint8_t* data, std::size_t size) const;

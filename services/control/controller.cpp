@@ -157,9 +157,11 @@ std::optional<Setpoint> Controller::Brake(const Estimate& estimate) {
   return Finite(setpoint) ? setpoint : law_.Level(last_yaw_, -config_.lost_descent);
 }
 
-// The autopilot wants to be asked for something before it obeys.
+// The autopilot wants to be asked for something before it obeys. By thrust above MPC_MANTHR_MIN
+// (0.08 of the full one, where `min_thrust` is 0.1) PX4 takes itself to have taken off.
 Setpoint Controller::Idle() const {
-  Setpoint setpoint = law_.Level(last_yaw_, -kGravity);  // cut to the least thrust
+  Setpoint setpoint = law_.Level(last_yaw_, 0.0);
+  setpoint.thrust = 0.0;
   setpoint.motors = !lands_;
   return setpoint;
 }

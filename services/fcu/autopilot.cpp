@@ -24,6 +24,9 @@ bool IsOld(int64_t heard, int64_t utime) {
   return 1e-6 * static_cast<double>(utime - heard) > kStateAge;
 }
 
+/// Of mV; 0: not known.
+double Volts(uint16_t millivolts) { return millivolts == UINT16_MAX ? 0.0 : 1e-3 * millivolts; }
+
 void AddLast(const std::string& text, std::size_t most, std::deque<std::string>* texts) {
   texts->erase(std::remove(texts->begin(), texts->end(), text), texts->end());
   texts->push_back(text);
@@ -71,8 +74,11 @@ void Autopilot::TakeState(const Frame& frame, int64_t utime) {
     landed_ = e->landed_state;
     landed_utime_ = utime;
   } else if (const auto s = As<mav::SysStatus>(frame)) {
-    status_ = *s;
-    status_utime_ = utime;
+    battery_ = {s->battery_remaining, Volts(s->voltage_battery), utime};
+  } else if (const auto b = As<mav::BatteryStatus>(frame)) {
+    double volts = 0.0;
+    for (const uint16_t cell : b->voltages) volts += Volts(cell);
+    batteries_[b->id] = {b->battery_remaining, volts, utime};
   } else if (const auto r = As<mav::RcChannels>(frame)) {
     channels_ = r->chancount;
     channels_utime_ = utime;
@@ -102,6 +108,10 @@ double Autopilot::silence(int64_t utime) const {
 
 bool Autopilot::armed() const { return Has(heartbeat_.base_mode, mav::MavModeFlag::SAFETY_ARMED); }
 
+bool Autopilot::terminated() const {
+  return heartbeat_.system_status == static_cast<uint8_t>(mav::MavState::FLIGHT_TERMINATION);
+}
+
 bool Autopilot::failsafe() const {
   switch (static_cast<mav::MavState>(heartbeat_.system_status)) {
     case mav::MavState::CRITICAL:
@@ -120,6 +130,18 @@ mav::MavLandedState Autopilot::Landed(int64_t utime) const {
 
 bool Autopilot::on_ground(int64_t utime) const {
   return Landed(utime) == mav::MavLandedState::ON_GROUND;
+}
+
+/// Of those whose charge has been told of late; null: none.
+const Autopilot::Battery* Autopilot::Emptiest(int64_t utime) const {
+  const Battery* emptiest = nullptr;
+  const auto see = [&](const Battery& b) {
+    if (b.percent < 0 || IsOld(b.utime, utime)) return;
+    if (emptiest == nullptr || b.percent < emptiest->percent) emptiest = &b;
+  };
+  see(battery_);
+  for (const auto& [id, battery] : batteries_) see(battery);
+  return emptiest;
 }
 
 std::string Autopilot::Unfit() const {
@@ -156,10 +178,9 @@ std::string Autopilot::Words(int64_t utime) const {
   const auto state = static_cast<std::size_t>(Landed(utime));
   std::string words = fmt::format("mode {}, {}, {}", mode().name(), armed() ? "armed" : "disarmed",
                                   state < std::size(landed) ? landed[state] : "unknown");
-  if (!IsOld(status_utime_, utime) && status_.battery_remaining >= 0) {
-    words += fmt::format(", battery {} %", status_.battery_remaining);
-    if (status_.voltage_battery != UINT16_MAX)
-      words += fmt::format(" {:.1f} V", 1e-3 * status_.voltage_battery);
+  if (const Battery* battery = Emptiest(utime)) {
+    words += fmt::format(", battery {} %", battery->percent);
+    if (battery->volts > 0.0) words += fmt::format(" {:.1f} V", battery->volts);
   }
   if (channels_utime_ != 0)
     words += channels_ > 0 && !IsOld(channels_utime_, utime) ? ", receiver heard" : ", no receiver";

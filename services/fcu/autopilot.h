@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <cstdint>
 #include <deque>
+#include <map>
 #include <optional>
 #include <string>
 
@@ -31,6 +32,8 @@ class Autopilot {
   /// When the last frame of any kind came.
   int64_t frame_utime() const { return frame_utime_; }
   bool armed() const;
+  /// A kill switch or a termination has stopped the motors, whatever the mode.
+  bool terminated() const;
   /// CRITICAL, EMERGENCY or FLIGHT_TERMINATION.
   bool failsafe() const;
   Mode mode() const { return Mode::Of(heartbeat_.custom_mode); }
@@ -58,7 +61,13 @@ class Autopilot {
   std::string Words(int64_t utime) const;
 
  private:
+  struct Battery {
+    int percent = -1;    // unknown
+    double volts = 0.0;  // 0: unknown
+    int64_t utime = 0;   // when it was told
+  };
   mav::MavLandedState Landed(int64_t utime) const;
+  const Battery* Emptiest(int64_t utime) const;
   bool TakeHeartbeat(const Frame& frame, int64_t utime);
   void TakeState(const Frame& frame, int64_t utime);
   void TakeText(const StatusText& text, int64_t utime);
@@ -70,9 +79,10 @@ class Autopilot {
   int64_t landed_utime_ = 0;  // when it said so
   std::optional<Attitude> attitude_;
   std::optional<Eigen::Vector3d> position_;
-  mav::SysStatus status_;  // whose battery is the emptiest of those that are connected
-  int channels_ = 0;       // of its receiver
-  int64_t status_utime_ = 0, channels_utime_ = 0;
+  Battery battery_;                       // of SYS_STATUS: the emptiest of those that are connected
+  std::map<uint8_t, Battery> batteries_;  // of BATTERY_STATUS
+  int channels_ = 0;                      // of its receiver
+  int64_t channels_utime_ = 0;
   StatusTexts texts_;
   std::deque<std::string> warnings_;       // that were said together, the first said is first
   int64_t warned_utime_ = 0;               // when the first of them was said

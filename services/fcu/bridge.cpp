@@ -59,7 +59,10 @@ bool Bridge::Hears(int64_t now) const {
 void Bridge::Receive(int64_t arrival, int64_t now, const uint8_t* data, std::size_t size,
                      bool whole, uint64_t from) {
   if (from != peer_ && Hears(now)) return;
+  const int64_t late = reader_.counters().late;
   reader_.Add(now, data, size, [&](const Frame& frame) { OnFrame(frame, {arrival, now, from}); });
+  // A PX4 without a clock begins at the time that it stored, and takes ours from our heartbeat.
+  if (reader_.counters().late > late && !Hears(now)) peer_ = from;
   if (whole) reader_.Reset();
 }
 
@@ -83,7 +86,10 @@ void Bridge::OnFrame(const Frame& frame, const Heard& when) {
         m->result != static_cast<uint8_t>(mav::MavResult::ACCEPTED))
       AskForChecks(when.now);
   }
-  if (const auto sample = imu_.Take(frame, clock_, when.now)) samples_.push_back(*sample);
+  if (const auto sample = imu_.Take(frame, clock_, when.now)) {
+    touchdown_.Feel(*sample);
+    samples_.push_back(*sample);
+  }
 }
 
 /// Its next heartbeat is up to a second away, in which a flight without setpoints ends.
@@ -234,10 +240,12 @@ Facts Bridge::Gather(int64_t now) const {
   f.gap = Seconds(std::min(autopilot_.frame_utime(), flown_by_.value_or(now)), now);
   f.armed = autopilot_.armed();
   f.failsafe = autopilot_.failsafe();
+  f.terminated = autopilot_.terminated();
   f.mode = autopilot_.mode();
   f.on_ground = autopilot_.on_ground(now);
   f.wish = IsFresh(now) && setpoint_->motors;
   f.motors_off = IsFresh(now) && !setpoint_->motors;
+  f.borne = touchdown_.IsBorne(now);
   f.blind = !pose_ || PoseAge(now) > world::kMostAge.velocity;
   f.missing = missing_;
   f.asked = !led_ || asked_;
@@ -253,15 +261,18 @@ void Bridge::Tick(int64_t now) {
   if (clock_.restarts() != restarts_) time_answers_ = answered_before_ = answered_ = 0;
   restarts_ = clock_.restarts();
   missing_ = heard_ ? Missing(now) : "no PX4 is heard";
+  const bool touched_down = handshake_.state() == Handshake::State::kTouchdown;
   handshake_.Update(Gather(now));
-  const bool flies = handshake_.state() == Handshake::State::kFlying;
+  if (touched_down && handshake_.state() == Handshake::State::kLanding) Catch(now);
+  const bool touches_down = handshake_.state() == Handshake::State::kTouchdown;
+  const bool flies = touches_down || handshake_.state() == Handshake::State::kFlying;
   disagreement_ = flies && pose_ && frame_ == pose_->epoch ? AttitudeProblem(now) : "";
   if (!flies) flown_by_.reset();
   if (handshake_.ended()) asked_ = false;
   if (Due(now, kHeartbeatPeriod, &next_heartbeat_)) SendHeartbeat(now);
   if (!autopilot_.known()) return;
   if (Due(now, clock_.settled() ? kTimesyncPeriod : kSoonTimesync, &next_timesync_)) AskTime(now);
-  if (handshake_.streams() && IsFresh(now) && setpoint_->motors &&
+  if (handshake_.streams() && IsFresh(now) && (setpoint_->motors || touches_down) &&
       Due(now, Period(config_.setpoint_rate), &next_setpoint_))
     SendSetpoint(now);
   SendCommands(now);
@@ -276,10 +287,21 @@ void Bridge::SendHeartbeat(int64_t now) {
   Send(now, m);
 }
 
+/// It was not the ground: it hovers until the autopilot has it.
+void Bridge::Catch(int64_t now) {
+  if (touchdown_.IsBorne(now) || !setpoint_) return;
+  touchdown_.Flies(config_.hover_thrust, now);
+  SendSetpoint(now);
+}
+
 void Bridge::SendSetpoint(int64_t now) {
   const bool known = pose_->usable && PoseAge(now) <= kLoopAge;
   mav::SetAttitudeTarget m = AttitudeTarget(
       Turned(*setpoint_, turn_), known ? std::optional(pose_->R_WB) : std::nullopt, config_);
+  if (setpoint_->motors)
+    touchdown_.Flies(m.thrust, now);
+  else
+    m.thrust = static_cast<float>(touchdown_.Lower(config_.hover_thrust, now));
   m.time_boot_ms = static_cast<uint32_t>(now / 1000);
   m.target_system = autopilot_.system();
   m.target_component = static_cast<uint8_t>(mav::MavComponent::AUTOPILOT1);

@@ -14,6 +14,7 @@
 #include "services/fcu/handshake.h"
 #include "services/fcu/imu_stream.h"
 #include "services/fcu/stream_rates.h"
+#include "services/fcu/touchdown.h"
 
 namespace chase::fcu {
 
@@ -74,6 +75,7 @@ class Bridge {
   void AskForChecks(int64_t now);
   void AskTime(int64_t now);
   void SendSetpoint(int64_t now);
+  void Catch(int64_t now);
   void SendCommands(int64_t now);
   void SendHeartbeat(int64_t now);
   Facts Gather(int64_t now) const;
@@ -101,6 +103,7 @@ class Bridge {
   ClockSync clock_;
   ImuStream imu_;
   StreamRates rates_;
+  Touchdown touchdown_;
   Handshake handshake_;
 
   std::optional<Pose> pose_;

@@ -130,6 +130,8 @@ std::string FcuNode::Silence() const {
   if (const auto& stranger = bridge_.autopilot().stranger(); !stranger.empty())
     return where + ": " + stranger + "; this bridge speaks to PX4 only";
   const auto& counters = bridge_.reader().counters();
+  if (counters.late > 0 && counters.frames == 0)
+    return where + ": the clock of its signatures lags; it is told ours";
   if (counters.refused > 0 && counters.frames == 0)
     return where + ": frames come, but none is signed with our key";
   if (counters.frames > 0) return where + ": frames come, but no heartbeat of the PX4 asked for";

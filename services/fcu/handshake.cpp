@@ -14,6 +14,7 @@ constexpr double kStreamBefore = 1.2;  // s
 constexpr double kWithdrawn = 2.0;     // s without a setpoint: the next one is another flight's
 constexpr double kHeartbeat = 1.2;     // s in which the autopilot has told its state once more
 constexpr double kLateArming = 10.0;   // s after asking in which arming is still our doing
+constexpr double kLandedAfter = 4.0;   // s: the motors stand after 0.5, PX4 has landed 1.0 later
 // A stream brings OFFBOARD back by itself after the failsafe that COM_OF_LOSS_T (1 s) of silence
 // begin: before that much may have passed, it has to be known that there was none.
 constexpr double kGap = 0.4;         // s: eighty samples of the IMU
@@ -44,6 +45,7 @@ struct HandshakeTable {
   static bool InFailsafe(H h) {
     return h.facts_.armed && h.facts_.failsafe && !InOffboard(h) && !IsByStick(h.facts_.mode);
   }
+  static bool Terminated(H h) { return h.facts_.terminated; }
   /// PX4 1.14 calls itself critical for a warning and after he has taken it from a failsafe, too.
   static bool PilotHasIt(H h) { return h.facts_.armed && IsByStick(h.facts_.mode); }
   static bool FoundInFailsafe(H h) { return h.engages_ && InFailsafe(h); }
@@ -65,6 +67,10 @@ struct HandshakeTable {
   }
   static bool Down(H h) { return h.facts_.motors_off && h.facts_.on_ground; }
   static bool OffInTheAir(H h) { return h.facts_.motors_off && !h.facts_.on_ground; }
+  static bool Falls(H h) { return !h.facts_.borne; }
+  static bool Undecided(H h) { return h.InState() >= kLandedAfter; }
+  static bool Unled(H h) { return !h.facts_.wish && !h.facts_.motors_off; }
+  static bool Wishes(H h) { return h.facts_.wish; }
   static bool Blind(H h) { return h.facts_.blind; }
   static bool Ceased(H h) { return h.WithoutWish() >= world::kMostAge.setpoint; }
   /// Not before an arming on its way would have been heard of.
@@ -80,6 +86,8 @@ struct HandshakeTable {
 
   static const Row kRows[];
 };
+
+constexpr const char* kTerminated = "the kill switch or a termination has stopped the motors";
 
 const HandshakeTable::Row HandshakeTable::kRows[] = {
     {State::kNoAutopilot, Heard, State::kStandby, "a PX4 is heard"},
@@ -112,16 +120,30 @@ const HandshakeTable::Row HandshakeTable::kRows[] = {
     {State::kArming, Refused, State::kRefused, "arming was refused"},
     {State::kArming, GivesUp, State::kRefused, "arming did not come"},
 
+    {State::kFlying, Terminated, State::kFailsafe, kTerminated},
     {State::kFlying, DisarmedOnGround, State::kDone, "the autopilot has disarmed on the ground"},
     {State::kFlying, Disarmed, State::kFailsafe, "the autopilot has disarmed or begun anew"},
     {State::kFlying, InFailsafe, State::kFailsafe, "a failsafe of the autopilot"},
     {State::kFlying, LeftOffboard, State::kPilot, "the mode was changed: the pilot has it"},
     {State::kFlying, Cut, State::kFailsafe, "the link was cut, or this bridge stood still"},
     {State::kFlying, Down, State::kDisarming, "on the ground, motors no longer wanted"},
-    {State::kFlying, OffInTheAir, State::kLanding, "motors no longer wanted, the autopilot lands"},
+    {State::kFlying, OffInTheAir, State::kTouchdown, "motors no longer wanted: less thrust"},
     {State::kFlying, Blind, State::kLanding, "no estimate of the pose: the autopilot lands"},
     {State::kFlying, Ceased, State::kLanding, "setpoints have ceased: the autopilot lands"},
 
+    {State::kTouchdown, Terminated, State::kFailsafe, kTerminated},
+    {State::kTouchdown, DisarmedOnGround, State::kDone, "landed and disarmed"},
+    {State::kTouchdown, Disarmed, State::kFailsafe, "the autopilot has disarmed or begun anew"},
+    {State::kTouchdown, InFailsafe, State::kFailsafe, "a failsafe of the autopilot"},
+    {State::kTouchdown, LeftOffboard, State::kPilot, "the mode was changed: the pilot has it"},
+    {State::kTouchdown, Cut, State::kFailsafe, "the link was cut, or this bridge stood still"},
+    {State::kTouchdown, OnGround, State::kDisarming, "landed"},
+    {State::kTouchdown, Wishes, State::kFlying, "motors are wanted again"},
+    {State::kTouchdown, Falls, State::kLanding, "it is in the air: the autopilot lands"},
+    {State::kTouchdown, Unled, State::kLanding, "setpoints have ceased: the autopilot lands"},
+    {State::kTouchdown, Undecided, State::kLanding, "not landed by its own word: it lands"},
+
+    {State::kLanding, Terminated, State::kFailsafe, kTerminated},
     {State::kLanding, Disarmed, State::kDone, "landed and disarmed"},
     {State::kLanding, PilotLands, State::kPilot, "the mode was changed: the pilot has it"},
     {State::kLanding, OnGround, State::kDisarming, "landed"},
@@ -150,7 +172,7 @@ bool Handshake::AskedToArm() const {
 
 bool Handshake::streams() const {
   return state_ == State::kStreaming || state_ == State::kOffboard || state_ == State::kArming ||
-         (state_ == State::kFlying && doubted_ == 0);
+         (Steers() && doubted_ == 0);
 }
 
 bool Handshake::needs_word() const {
@@ -161,7 +183,7 @@ bool Handshake::needs_word() const {
 /// Who flies may have changed while the link was silent, or since the heartbeat that a process
 /// which begins anew in flight has heard.
 void Handshake::WatchDoubt() {
-  if (state_ != State::kFlying || (doubted_ != 0 && Told(doubted_)))
+  if (!Steers() || (doubted_ != 0 && Told(doubted_)))
     doubted_ = 0;
   else if (doubted_ == 0 && facts_.gap > kGap)
     doubted_ = facts_.utime;
@@ -190,8 +212,8 @@ std::optional<mav::CommandLong> Handshake::NextCommand(int64_t utime) {
 }
 
 void Handshake::Kill() {
-  const bool ours = state_ == State::kArming || state_ == State::kFlying ||
-                    state_ == State::kLanding || state_ == State::kDisarming ||
+  const bool ours = state_ == State::kArming || Steers() || state_ == State::kLanding ||
+                    state_ == State::kDisarming ||
                     (state_ == State::kFailsafe && !HandshakeTable::PilotHasIt(*this)) ||
                     (state_ == State::kStandby && HandshakeTable::InFailsafe(*this));
   if (ours) Enter(State::kKilling, "killed by command");
@@ -225,9 +247,9 @@ void Handshake::Enter(State state, const std::string& why) {
 
 std::string Handshake::Name(State state) {
   static const char* const names[] = {"no autopilot", "standby", "streaming", "asking for OFFBOARD",
-                                      "arming",       "flying",  "landing",   "disarming",
-                                      "killing",      "done",    "pilot",     "failsafe",
-                                      "refused"};
+                                      "arming",       "flying",  "touchdown", "landing",
+                                      "disarming",    "killing", "done",      "pilot",
+                                      "failsafe",     "refused"};
   return names[static_cast<std::size_t>(state)];
 }
 

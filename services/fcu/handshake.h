@@ -14,11 +14,13 @@ struct Facts {
   int64_t told = 0;    ///< when the last of them came, which mode and arming are from
   double gap = 0.0;    ///< s since it was last heard at all or, in flight, was last sent a setpoint
   bool armed = false;
-  bool failsafe = false;  ///< the autopilot's state is CRITICAL or worse
+  bool failsafe = false;    ///< the autopilot's state is CRITICAL or worse
+  bool terminated = false;  ///< its motors are stopped for good, whatever the mode
   Mode mode;
   bool on_ground = false;   ///< as the autopilot says
   bool wish = false;        ///< a fresh setpoint wants the motors on
   bool motors_off = false;  ///< a fresh setpoint wants them off
+  bool borne = false;       ///< the accelerometer shows the weight
   bool blind = false;       ///< the estimate is older than a flight may go on with
   std::string missing;      ///< what a flight must not begin without; empty: nothing
   std::string said;         ///< the autopilot's last warning
@@ -37,7 +39,8 @@ class Handshake {
     kOffboard,   ///< asks for OFFBOARD
     kArming,
     kFlying,
-    kLanding,  ///< asks for AUTO.LAND
+    kTouchdown,  ///< control has felt the ground: thrust goes down until the autopilot feels it too
+    kLanding,    ///< asks for AUTO.LAND
     kDisarming,
     kKilling,  ///< disarms by force, wherever it is
     kDone,     ///< these three and kRefused last until the setpoints have ceased and it is disarmed
@@ -80,6 +83,8 @@ class Handshake {
 
   double InState() const { return 1e-6 * static_cast<double>(facts_.utime - since_); }
   double WithoutWish() const { return 1e-6 * static_cast<double>(facts_.utime - wished_); }
+  /// Is the vehicle ours to steer?
+  bool Steers() const { return state_ == State::kFlying || state_ == State::kTouchdown; }
   bool Withdrawn() const;
   bool AskedToArm() const;
   /// Has the autopilot told its mode since?
@@ -97,8 +102,8 @@ class Handshake {
   int64_t wished_ = 0;        // when a setpoint last wanted the motors
   int64_t asked_to_arm_ = 0;  // when; 0: not yet
   bool lands_ = false;        // in kLanding: the autopilot has told that mode
-  // In kFlying: what a word of the autopilot has to be newer than before the stream goes on; 0: it
-  // goes on.
+  // While it steers: what a word of the autopilot has to be newer than before the stream goes on;
+  // 0: it goes on.
   int64_t doubted_ = 0;
 };
 

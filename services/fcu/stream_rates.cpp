@@ -28,6 +28,7 @@ StreamRates::StreamRates(double imu_rate)
             {Id<mav::LocalPositionNed>(), "LOCAL_POSITION_NED", 20.0, false},
             {Id<mav::ExtendedSysState>(), "EXTENDED_SYS_STATE", 5.0, true},
             {Id<mav::SysStatus>(), "SYS_STATUS", 1.0, false},
+            {Id<mav::BatteryStatus>(), "BATTERY_STATUS", 1.0, false},
             {Id<mav::RcChannels>(), "RC_CHANNELS", 5.0, false}} {}
 
 void StreamRates::OnMessage(uint32_t id) {

@@ -57,6 +57,57 @@ std::optional<Mode> ModeOf(float main, float sub) {
   return std::nullopt;
 }
 
+/// mavlink_receiver.cpp, handle_message_odometry.
+bool TakesEstimator(uint8_t type) {
+  using Type = mav::MavEstimatorType;
+  switch (static_cast<Type>(type)) {
+    case Type::UNKNOWN:
+    case Type::NAIVE:
+    case Type::VISION:
+    case Type::VIO:
+    case Type::MOCAP:
+      return true;
+    default:
+      return false;
+  }
+}
+
+/// Along a frame's own axes to those of one with z down; none: PX4 does not know the frame.
+std::optional<Eigen::Vector3f> Downwards(uint8_t frame, const Eigen::Vector3f& v) {
+  switch (static_cast<mav::MavFrame>(frame)) {
+    case mav::MavFrame::LOCAL_NED:
+    case mav::MavFrame::LOCAL_FRD:
+      return v;
+    case mav::MavFrame::LOCAL_ENU:
+      return Eigen::Vector3f(v.y(), v.x(), -v.z());
+    case mav::MavFrame::LOCAL_FLU:
+      return Eigen::Vector3f(v.x(), -v.y(), -v.z());
+    default:
+      return std::nullopt;
+  }
+}
+
+bool IsOfBody(uint8_t frame) {
+  using Frame = mav::MavFrame;
+  const auto f = static_cast<Frame>(frame);
+  return f == Frame::BODY_FRD || f == Frame::BODY_NED || f == Frame::BODY_OFFSET_NED;
+}
+
+/// Position in LOCAL_FRD and velocity in BODY_FRD, NaN where PX4 does not know the velocity's
+/// frame; false without a position. As PX4 does it: the rotation stays what it is in any frame.
+bool ToNed(mav::Odometry* m) {
+  const auto p = Downwards(m->frame_id, {m->x, m->y, m->z});
+  if (!p || !p->allFinite()) return false;
+  m->x = p->x(), m->y = p->y(), m->z = p->z();
+  if (IsOfBody(m->child_frame_id)) return true;
+  const auto v = Downwards(m->child_frame_id, {m->vx, m->vy, m->vz});
+  const Eigen::Quaternionf q(m->q[0], m->q[1], m->q[2], m->q[3]);
+  const Eigen::Vector3f in_body =
+      v ? q.conjugate() * *v : Eigen::Vector3f(Eigen::Vector3f::Constant(NAN));
+  m->vx = in_body.x(), m->vy = in_body.y(), m->vz = in_body.z();
+  return true;
+}
+
 double Seconds(int64_t from, int64_t to) { return 1e-6 * static_cast<double>(to - from); }
 uint8_t Code(mav::MavResult r) { return static_cast<uint8_t>(r); }
 
@@ -70,6 +121,9 @@ Px4::Px4(const Px4Options& options, int64_t utime, uint64_t seed)
       now_(utime),
       mode_(mavlink::kPositionMode),
       intended_(mavlink::kPositionMode),
+      landed_since_(utime),
+      armed_since_(utime),
+      killed_since_(utime),
       intervals_(DefaultIntervals()) {}
 
 int64_t Px4::Clock(int64_t utime) const {
@@ -128,13 +182,16 @@ void Px4::OnFrame(const mavlink::Frame& frame, int64_t arrival, int64_t clock) {
   if (const auto m = mavlink::As<mav::SetAttitudeTarget>(frame)) OnSetpoint(*m, arrival);
 }
 
-// Velocities and covariances may be NaN, which says that they are not known.
+// Velocities and covariances may be NaN, which says that they are not known. A frame that PX4 does
+// not know leaves the position or the velocity out.
 void Px4::OnOdometry(mav::Odometry m, Sender sender) {
-  if (!Finite(m.x, m.y, m.z) || !Normalise(&m.q)) return;
+  if (!TakesEstimator(m.estimator_type))
+    return Say("ODOMETRY: estimator_type " + std::to_string(m.estimator_type) + " unsupported", 2);
+  if (options_.ekf2_ev_qmin > 0 && m.quality < options_.ekf2_ev_qmin) return;
+  if (!Normalise(&m.q) || !ToNed(&m)) return;
   ++seen_.odometry;
   seen_.vision = m;
   vision_sender_ = sender;
-  if (m.estimator_type == 7) Say("ODOMETRY: estimator_type 7 unsupported", 2);
 }
 
 void Px4::OnSetpoint(const mav::SetAttitudeTarget& message, int64_t arrival) {
@@ -250,6 +307,7 @@ void Px4::Reboot(int64_t utime) {
   boot_ = utime;
   mode_ = intended_ = mavlink::kPositionMode;
   armed_ = false;
+  land_detector_ = {};
   first_setpoint_ = last_setpoint_ = 0;
   flown_by_.reset();
   version_2_ = !options_.starts_in_version_1;
@@ -269,6 +327,7 @@ void Px4::Tick(int64_t utime, int64_t clock, const Px4Body& body) {
   WatchStream();
   WatchTransmitter();
   WatchBattery();
+  WatchKill();
   WatchLanding();
   if (!IsLed()) flown_by_.reset();
   Stream(clock);
@@ -277,7 +336,7 @@ void Px4::Tick(int64_t utime, int64_t clock, const Px4Body& body) {
 AttitudeSetpoint Px4::Demand(const Px4Body& body) const {
   AttitudeSetpoint off;
   off.motors = false;
-  if (!armed_) return off;
+  if (!armed_ || killed_) return off;
   return mode_ == mavlink::kOffboardMode && seen_.setpoint
              ? OffboardDemand(body)
              : own_mode_.Demand(body, mode_ == mavlink::kLandMode);

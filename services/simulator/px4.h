@@ -12,6 +12,7 @@
 #include "common/mavlink/px4_mode.h"
 #include "common/world/random.h"
 #include "services/simulator/own_mode.h"
+#include "services/simulator/px4_land_detector.h"
 
 namespace chase::simulator {
 
@@ -22,12 +23,14 @@ struct Px4Options {
   double com_rc_loss_t = 0.5;       ///< s without a transmitter after which it lands
   bool transmitter = false;         ///< a receiver hears one
   double com_disarm_land = 2.0;     ///< s on the ground after landing until it disarms
+  double com_disarm_prflt = 10.0;   ///< s armed without a take-off until it disarms
   bool loss_lands = true;           ///< COM_OBL_RC_ACT: land, otherwise hold
   bool low_battery_lands = true;    ///< COM_LOW_BAT_ACT 2 or 3: land, otherwise only warn
   double hover = 0.5;               ///< share of full thrust that balances gravity
   double bat_low_thr = 0.15;        ///< charge below which it warns
   double bat_crit_thr = 0.07;       ///< charge below which it lands, where it does
   double bat_emergen_thr = 0.05;    ///< charge below which it does so again
+  int ekf2_ev_qmin = 0;             ///< quality of ODOMETRY below which it is left out; 0: none
   double lost_acks = 0.0;           ///< probability
   bool starts_in_version_1 = true;  ///< of the protocol, until it hears version 2
   double drift_ppm = 30.0;          ///< of its clock
@@ -57,7 +60,8 @@ class Px4 {
 
   void PilotMode(mavlink::Mode mode) { Enter(mode); }
   void PilotArms(bool on) { armed_ = on; }
-  void PilotSticks(double deflection);  ///< of the farthest, 0 to 1
+  void PilotKills(bool on) { killed_ = on; }  ///< the kill switch
+  void PilotSticks(double deflection);        ///< of the farthest, 0 to 1
   void Reboot(int64_t utime);
   Px4Options& options() { return options_; }
 
@@ -112,6 +116,7 @@ class Px4 {
   enum class Warning { kNone, kLow, kCritical, kEmergency };  // of battery_status
   Warning WarningAt(double charge) const;
   void WatchBattery();
+  void WatchKill();
   void WatchLanding();
   AttitudeSetpoint OffboardDemand(const Px4Body& body) const;
   void Stream(int64_t clock);
@@ -146,10 +151,13 @@ class Px4 {
   Warning battery_warning_ = Warning::kNone;
   bool drained_ = false;   // it lands for its battery, or a pilot has taken over from that
   bool silent_ = false;    // setpoints are, by which it is meant to fly
+  bool killed_ = false;    // by the switch: the motors stand still in any mode
   bool unmanned_ = false;  // it flies and its transmitter is not heard any more
   std::optional<int64_t> transmitter_heard_;
   int64_t silent_since_ = 0;
-  int64_t first_setpoint_ = 0, last_setpoint_ = 0, landed_since_ = 0, down_since_ = 0;
+  int64_t first_setpoint_ = 0, last_setpoint_ = 0;
+  int64_t landed_since_, armed_since_, killed_since_;
+  LandDetector land_detector_;
   std::optional<int64_t> flown_by_;  // arrival of the newest setpoint that it flew by
   std::string said_;                 // the check that fails, as last said
   Px4Body body_;

@@ -7,7 +7,7 @@
 namespace chase::simulator {
 namespace {
 
-constexpr double kStill = 0.5;          // s after which it takes itself to have landed
+constexpr double kKilled = 5.0;         // s of the kill switch after which it disarms
 constexpr double kStickOverride = 0.3;  // COM_RC_STICK_OV, of full deflection
 
 double Seconds(int64_t from, int64_t to) { return 1e-6 * static_cast<double>(to - from); }
@@ -17,6 +17,7 @@ double Seconds(int64_t from, int64_t to) { return 1e-6 * static_cast<double>(to 
 /// What keeps it from arming; empty: nothing.
 std::string Px4::Health() const {
   if (!options_.preflight.empty()) return options_.preflight;
+  if (killed_) return "Kill switch engaged";
   if (battery_warning_ >= Warning::kCritical) return "low battery";
   return mode_ == mavlink::kOffboardMode && !Streamed() ? "No offboard signal" : "";
 }
@@ -87,12 +88,21 @@ void Px4::WatchBattery() {
   drained_ = true;
 }
 
+void Px4::WatchKill() {
+  if (!killed_) killed_since_ = now_;
+  if (Seconds(killed_since_, now_) > kKilled) armed_ = false;
+}
+
 void Px4::WatchLanding() {
-  const bool still = body_.touches && body_.thrust < kGravity;
-  if (!still) down_since_ = now_;
-  landed_ = !armed_ || Seconds(down_since_, now_) > kStill;
-  if (!landed_) landed_since_ = now_, has_flown_ = has_flown_ || !body_.touches;
-  if (armed_ && landed_ && has_flown_ && Seconds(landed_since_, now_) > options_.com_disarm_land)
+  const AttitudeSetpoint demand = Demand(body_);
+  const double throttle = demand.motors ? demand.thrust / kGravity * options_.hover : 0.0;
+  landed_ = land_detector_.Update({now_, armed_, !(mode_ == mavlink::kOffboardMode),
+                                   mode_ == mavlink::kLandMode, throttle, options_.hover,
+                                   body_.v_WB, body_.gyro});
+  if (!landed_) landed_since_ = now_, has_flown_ = true;  // "Takeoff detected"
+  if (!armed_) landed_since_ = armed_since_ = now_, has_flown_ = false;
+  const double waited = Seconds(has_flown_ ? landed_since_ : armed_since_, now_);
+  if (armed_ && waited > (has_flown_ ? options_.com_disarm_land : options_.com_disarm_prflt))
     armed_ = false;
 }
 

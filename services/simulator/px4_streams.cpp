@@ -103,7 +103,8 @@ void Px4::Stream(int64_t clock) {
 
 void Px4::StreamState() {
   if (Due(mav::Heartbeat::kId)) {
-    const auto state = !armed_      ? mav::MavState::STANDBY
+    const auto state = killed_      ? mav::MavState::FLIGHT_TERMINATION
+                       : !armed_    ? mav::MavState::STANDBY
                        : failsafe() ? mav::MavState::CRITICAL
                                     : mav::MavState::ACTIVE;
     mav::Heartbeat m;

@@ -41,7 +41,7 @@ struct Stream {
   }
 };
 
-/// Odometry (the truth) and control (to a height of 1.5 m); the drivers' outputs are watched.
+/// Odometry (the truth) and control (to a height, or motors off); the drivers' outputs are watched.
 class World {
  public:
   World()
@@ -96,14 +96,14 @@ class World {
     for (int i = 0; i < 9; ++i) pose.local_covariance[10 * i] = 1e-4;
     bus_.Publish("POSE", pose);
     if (!start) start = p_WB;
-    const Eigen::Vector3d goal(start->x(), start->y(), 1.5);
+    const Eigen::Vector3d goal(start->x(), start->y(), height);
     const Eigen::Vector3d a = 1.5 * (goal - p_WB) - 2.0 * bus::ToVector(truth.vel);
     const Eigen::Vector3d force = a.cwiseMax(-2.0).cwiseMin(2.0) + Eigen::Vector3d(0, 0, 9.81);
     attitude_setpoint_t m{};
     m.utime = truth.utime;
     bus::Set(m.orientation, math::FromZAxisAndYaw(force, 0.0));
     m.thrust = force.norm();
-    m.motors = attitude_setpoint_t::MOTORS_ON;
+    m.motors = motors ? attitude_setpoint_t::MOTORS_ON : attitude_setpoint_t::MOTORS_OFF;
     bus_.Publish("ATTITUDE_SETPOINT", m);
   }
 
@@ -113,6 +113,8 @@ class World {
   Process fcu, lidar, camera, simulator;
   Stream imu, scans, images;
   int points = 0, width = 0;
+  double height = 1.5;  // m
+  bool motors = true;
   status_t fcu_status{}, lidar_status{}, camera_status{};
   Eigen::Vector3d p_WB = Eigen::Vector3d::Zero();
   std::optional<Eigen::Vector3d> start;
@@ -167,6 +169,24 @@ TEST(DriversLive, TheSimulatedVehicleFliesThroughItsDrivers) {
       << world.lidar_status.detail;
   std::printf("fcu: %s\nlidar: %s\ncamera: %s\n", world.fcu_status.detail.c_str(),
               world.lidar_status.detail.c_str(), world.camera_status.detail.c_str());
+}
+
+// PX4 calls itself landed by the thrust that goes to none, and is disarmed; it is not asked to
+// land.
+TEST(DriversLive, ItLandsAndIsDisarmedWithoutALandingOfTheAutopilots) {
+  World world;
+  ASSERT_TRUE(world.Flies(40.0)) << world.fcu_status.detail;
+  world.Run(5.0);
+  world.height = -0.7;
+  ASSERT_TRUE(world.Run(10.0, [&] { return world.p_WB.z() < world.start->z() + 0.02; }));
+  world.Run(1.0);
+  EXPECT_EQ(world.fcu_status.detail.find("flying"), 0u) << world.fcu_status.detail;
+  world.motors = false;
+  const int64_t begin = world.now();
+  EXPECT_TRUE(world.Run(4.0, [&] { return world.fcu_status.detail.find("done") == 0; }));
+  std::printf("motors off to disarmed: %.2f s\n", 1e-6 * static_cast<double>(world.now() - begin));
+  EXPECT_NE(world.fcu_status.detail.find("mode OFFBOARD, disarmed, on ground"), std::string::npos)
+      << world.fcu_status.detail;
 }
 
 TEST(DriversLive, APilotTakesOverAndTheAutopilotHolds) {

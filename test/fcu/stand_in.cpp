@@ -23,6 +23,15 @@ void StandIn::Reboot(int64_t utime) {
   body_.v_WB.setZero();
 }
 
+void StandIn::PilotLifts(double height) {
+  body_.p_WB.z() = height;
+  body_.v_WB.setZero();
+  body_.touches = false;
+  px4_.Tick(now_, now_, body_);
+  px4_.PilotMode(mavlink::kPositionMode);
+  px4_.PilotArms(true);
+}
+
 void StandIn::Turn(const Eigen::Quaterniond& wanted, double dt) {
   const Eigen::Quaterniond before = body_.R_WB;
   body_.R_WB = before.slerp(std::min(1.0, dt / kAttitudeLag), wanted);

@@ -28,6 +28,8 @@ class StandIn {
 
   void PilotMode(Mode mode) { px4_.PilotMode(mode); }
   void PilotArms(bool on) { px4_.PilotArms(on); }
+  void PilotLifts(double height);  ///< from now on it hovers there, m
+  void PilotKills(bool on) { px4_.PilotKills(on); }
   void PilotSticks(double deflection) { px4_.PilotSticks(deflection); }
   void Reboot(int64_t utime);
   StandInOptions& options() { return px4_.options(); }

@@ -2,6 +2,7 @@ if(TARGET simulator_hardware)
   chase_test(simulator_px4_test LIBS simulator_hardware
     SOURCES ${CMAKE_CURRENT_LIST_DIR}/simulator_px4_test.cpp
             ${CMAKE_CURRENT_LIST_DIR}/simulator_px4_battery_test.cpp
+            ${CMAKE_CURRENT_LIST_DIR}/simulator_px4_landing_test.cpp
             ${CMAKE_CURRENT_LIST_DIR}/simulator_udp_test.cpp)
 endif()
 

@@ -10,6 +10,7 @@ chase_test(fcu_test LIBS fcu_core fcu_stand_in fcu_transport bus math world
           ${CMAKE_CURRENT_LIST_DIR}/fcu_handshake_hands_test.cpp
           ${CMAKE_CURRENT_LIST_DIR}/fcu_bridge_test.cpp ${CMAKE_CURRENT_LIST_DIR}/fcu_hands_test.cpp
           ${CMAKE_CURRENT_LIST_DIR}/fcu_failsafe_test.cpp
+          ${CMAKE_CURRENT_LIST_DIR}/fcu_touchdown_test.cpp
           ${CMAKE_CURRENT_LIST_DIR}/fcu_frame_test.cpp ${CMAKE_CURRENT_LIST_DIR}/fcu_transport_test.cpp)
 
 # Byte for byte against node-mavlink, both ways. On demand more: node fcu_exchange.mjs PROGRAM 100000

@@ -41,6 +41,7 @@ class Flight {
   StandIn px4;
   bool setpoints = true, motors = true, poses = true, link = true;
   bool bridge_runs = true;
+  bool idle = false;   ///< level without thrust, as control asks for before a plan begins
   bool usable = true;  ///< the poses
   int heartbeats = 0;  ///< of the autopilot
   double height = 1.5;
@@ -131,6 +132,7 @@ class Flight {
     const Eigen::Vector3d force = a.cwiseMax(-3.0).cwiseMin(3.0) + Eigen::Vector3d(0, 0, 9.81);
     setpoint.R_WB = math::FromYaw(turned) * math::FromZAxisAndYaw(force, 0.0);
     setpoint.thrust = force.norm();
+    if (idle) setpoint.R_WB = math::FromYaw(turned), setpoint.thrust = 0.0;
     setpoint.motors = motors;
     bridge.OnSetpoint(setpoint, now_, now_);
   }

@@ -167,6 +167,31 @@ TEST(FcuHands, ALandingIsNotAskedOfAPilotWhoHasJustTakenIt) {
   }
 }
 
+// The mode stays OFFBOARD, and the motors would start again with the switch.
+TEST(FcuHands, TheKillSwitchTakesItForGood) {
+  for (const bool lands : {false, true}) {
+    Flight flight;
+    flight.TakeOff(5.0);
+    if (lands) {
+      flight.motors = false;
+      ASSERT_TRUE(flight.RunUntil(State::kLanding, 1.0)) << flight.bridge.Words();
+      flight.Run(0.3);
+    }
+    flight.px4.PilotKills(true);
+    Took(&flight, "kill switch, no stream any more", 0.2, State::kFailsafe);
+    EXPECT_EQ(flight.px4.mode() == kOffboardMode, !lands);
+    EXPECT_TRUE(flight.Says("kill switch"));
+    const int sent = flight.px4.seen().setpoints;
+    flight.Run(0.5);
+    EXPECT_TRUE(flight.px4.armed());
+    flight.px4.PilotKills(false);
+    flight.motors = true;
+    flight.Run(10.0);
+    EXPECT_EQ(flight.px4.seen().setpoints, sent);
+    EXPECT_EQ(flight.state(), State::kFailsafe) << flight.bridge.Words();
+  }
+}
+
 TEST(FcuHands, ThePilotMayBeTheOneWhoEngages) {
   FcuConfig config;
   config.engage = "pilot";
@@ -186,10 +211,23 @@ TEST(FcuHands, ThePilotMayBeTheOneWhoEngages) {
 
 TEST(FcuHands, APilotInTheAirIsNotInterfered) {
   Flight flight;
-  flight.px4.PilotArms(true);
+  flight.px4.PilotLifts(2.0);
   flight.Run(15.0);
+  EXPECT_NEAR(flight.px4.p_WB().z(), 2.0, 0.1);
   EXPECT_EQ(flight.px4.seen().setpoints, 0);
   EXPECT_EQ(flight.px4.seen().offboard_commands, 0);
+}
+
+// He has COM_DISARM_PRFLT to take off.
+TEST(FcuHands, NorIsAPilotWhoHasArmedOnTheGround) {
+  Flight flight;
+  flight.px4.PilotArms(true);
+  flight.Run(9.5);
+  EXPECT_TRUE(flight.px4.armed());
+  EXPECT_EQ(flight.px4.seen().setpoints, 0);
+  EXPECT_EQ(flight.px4.seen().offboard_commands, 0);
+  flight.Run(1.0);
+  EXPECT_FALSE(flight.px4.armed());
 }
 
 TEST(FcuHands, ItsWordsTellWhoFliesAndWhereItStands) {

@@ -53,6 +53,8 @@ class Chaos {
         break;
       case 7:
         facts_.blind = random_.Next() % 4 == 0;
+        facts_.borne = random_.Next() % 4 != 0;
+        facts_.terminated = random_.Next() % 8 == 0;
         break;
       case 8:
         facts_.gap = random_.Next() % 2 == 0 ? 0.0 : random_.Uniform();
@@ -121,7 +123,7 @@ TEST(FcuHandshake, KeepsItsPromisesInAnyOrderOfInputs) {
       last = state;
     }
   }
-  EXPECT_EQ(reached.size(), 13u) << "states that were visited";
+  EXPECT_EQ(reached.size(), 14u) << "states that were visited";
   EXPECT_GT(armings, 50);
 }
 

@@ -96,7 +96,8 @@ TEST(FcuStreamRates, AsksUntilMessagesComeAndNoLonger) {
     for (const auto& [id, interval] : granted)
       if (t % static_cast<int64_t>(interval) < 5'000) rates.OnMessage(id);
   }
-  EXPECT_EQ(granted.size(), 6u);
+  EXPECT_EQ(granted.size(), 7u);
+  EXPECT_EQ(granted.count(mav::BatteryStatus::kId), 1u);
   EXPECT_NEAR(granted.at(mav::HighresImu::kId), 5000.0, 1.0);
   EXPECT_EQ(rates.missing().find("HIGHRES_IMU"), std::string::npos) << rates.missing();
   EXPECT_LT(last, 30) << "asked on though all comes";
@@ -276,6 +277,29 @@ TEST(FcuAutopilot, TheBatteryIsTheEmptiestOneAndNoOlderThanItSays) {
   all.battery_remaining = -1;
   autopilot.Take(FrameOf(all), kStart + 4'500'000);
   EXPECT_FALSE(Says(autopilot, 4.5, "battery")) << "none is connected";
+}
+
+TEST(FcuAutopilot, TheBatteryIsKnownByItsOwnMessageToo) {
+  Autopilot autopilot = Heard();
+  mav::SysStatus all;
+  all.battery_remaining = -1;
+  autopilot.Take(FrameOf(all), kStart);
+  mav::BatteryStatus battery;
+  battery.battery_remaining = -1;
+  autopilot.Take(FrameOf(battery), kStart);
+  EXPECT_FALSE(Says(autopilot, 0.0, "battery"));
+  battery.battery_remaining = 60;
+  battery.voltages.fill(UINT16_MAX);
+  battery.voltages[0] = battery.voltages[1] = 3'850;
+  autopilot.Take(FrameOf(battery), kStart + 1'000'000);
+  EXPECT_TRUE(Says(autopilot, 1.0, ", battery 60 % 7.7 V"));
+  battery.id = 1;
+  battery.battery_remaining = 50;
+  autopilot.Take(FrameOf(battery), kStart + 2'000'000);
+  EXPECT_TRUE(Says(autopilot, 2.0, ", battery 50 %")) << "the emptier of two";
+  autopilot.Take(FrameOf(all), kStart + 3'000'000);
+  EXPECT_TRUE(Says(autopilot, 3.0, ", battery 50 %")) << "SYS_STATUS does not know";
+  EXPECT_FALSE(Says(autopilot, 5.0, "battery"));
 }
 
 TEST(FcuAutopilot, AReceiverIsHeardNoLongerThanItSpeaks) {

@@ -3,6 +3,7 @@
 #include "common/mavlink/framing.h"
 #include "common/mavlink/signing.h"
 #include "common/world/random.h"
+#include "services/fcu/bridge.h"
 
 namespace chase::mavlink {
 namespace {
@@ -86,6 +87,32 @@ TEST(FcuSigning, LinksAreCountedApart) {
   const Bytes early = a.Send(kUtime);
   EXPECT_TRUE(receiver.Hears(b.Send(kUtime + kSecond)));
   EXPECT_TRUE(receiver.Hears(early));
+}
+
+// It has no clock: it begins at the time that it stored last.
+TEST(FcuSigning, ASignedLinkComesAboutWithAPx4ThatDoesNotKnowTheTime) {
+  const Key key = KeyOf(1);
+  fcu::Bridge bridge(fcu::FcuConfig{}, key);
+  Signing signing(key, 3);
+  FrameReader reader(&signing);
+  FrameWriter writer(1, 1, &signing);
+  mav::Heartbeat beat;
+  beat.autopilot = 12;
+  int64_t now = kUtime, stored = now - 86'400'000'000;
+  int heard = 0;
+  for (int i = 0; i < 500; ++i, now += 10'000, stored += 10'000) {
+    if (i % 100 == 50) {
+      const auto bytes = writer.Write(stored, beat);
+      bridge.Receive(now, now, bytes.data(), bytes.size(), true, 7);
+      EXPECT_EQ(bridge.autopilot().known(), i > 50) << "not believed before it knows the time";
+    }
+    bridge.Tick(now);
+    for (const auto& bytes : bridge.TakeOutgoing())
+      if (bridge.peer() == 7)
+        reader.Add(stored, bytes.data(), bytes.size(), [&](const Frame&) { ++heard; });
+  }
+  EXPECT_GT(heard, 10);
+  EXPECT_TRUE(bridge.heard());
 }
 
 }  // namespace

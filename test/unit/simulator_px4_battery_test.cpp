@@ -8,7 +8,7 @@ namespace {
 // Commander publishes a failsafe for a warning, too, and until its cause has gone.
 TEST(Px4, CallsItselfCriticalWhileTheCauseOfAFailsafeLasts) {
   Link link;
-  link.px4().PilotArms(true);
+  link.Fly();
   EXPECT_EQ(link.Status(), mav::MavState::ACTIVE);
   link.body.charge = 0.1;
   EXPECT_EQ(link.Status(), mav::MavState::CRITICAL) << "a warning";
@@ -35,7 +35,7 @@ TEST(Px4, LandsAtTheChargeThatItsParametersSay) {
   for (const double critical : {0.07, 0.12}) {
     Link link;
     link.px4().options().bat_crit_thr = critical;
-    link.px4().PilotArms(true);
+    link.Fly();
     EXPECT_TRUE(ModeAt(critical + 0.01, &link) == mavlink::kPositionMode) << critical;
     EXPECT_TRUE(ModeAt(critical - 0.01, &link) == mavlink::kLandMode) << critical;
     link.px4().PilotMode(mavlink::kPositionMode);
@@ -48,7 +48,7 @@ TEST(Px4, LandsAtTheChargeThatItsParametersSay) {
 TEST(Px4, OnlyWarnsOfAnEmptyBatteryWhereItsParametersSaySo) {
   Link link;
   link.px4().options().low_battery_lands = false;
-  link.px4().PilotArms(true);
+  link.Fly();
   EXPECT_TRUE(ModeAt(0.01, &link) == mavlink::kPositionMode);
   EXPECT_EQ(link.Status(), mav::MavState::CRITICAL);
   link.px4().PilotArms(false);

@@ -25,10 +25,11 @@ class Link {
   }
 
   /// Setpoints that arrive every `period` us and are looked at every 20 ms.
-  void Setpoints(int count, int64_t period) {
+  void Setpoints(int count, int64_t period, float thrust = 0.0f) {
     mav::SetAttitudeTarget m;
     m.q = {1.0f, 0.0f, 0.0f, 0.0f};
     m.target_system = 1;
+    m.thrust = thrust;
     mavlink::FrameWriter writer(1, 191);
     for (int i = 0; i < count; ++i) {
       const int64_t arrival = now_ += period;
@@ -60,14 +61,11 @@ class Link {
 
   /// The answer to a command; none: there was none.
   std::optional<mav::MavResult> Command(mav::MavCmd command, float p1, float p2, float p3 = 0.0f) {
-    mav::CommandLong m;
-    m.command = static_cast<uint16_t>(command);
-    m.target_system = m.target_component = 1;
-    m.param1 = p1, m.param2 = p2, m.param3 = p3;
-    result_.reset();
-    Send(m);
-    Second();
-    return result_;
+    return Ordered(command, p1, p2, p3, 1.0);
+  }
+  /// The same at once, between two setpoints.
+  std::optional<mav::MavResult> Order(mav::MavCmd command, float p1, float p2) {
+    return Ordered(command, p1, p2, 0.0f, 0.01);
   }
   std::optional<mav::MavResult> Ask(float id, float interval) {
     return Command(mav::MavCmd::SET_MESSAGE_INTERVAL, id, interval);
@@ -84,6 +82,14 @@ class Link {
     Second();
     return status_;
   }
+  /// A pilot flies it, hovering at rest.
+  void Fly() {
+    body.p_WB.z() = 1.0;
+    body.touches = false;
+    body.thrust = body.hover_thrust;
+    px4_.PilotMode(mavlink::kPositionMode);
+    px4_.PilotArms(true);
+  }
   /// The channels of a receiver that it told last.
   int channels() const { return channels_; }
 
@@ -93,6 +99,17 @@ class Link {
   Px4Body body;
 
  private:
+  std::optional<mav::MavResult> Ordered(mav::MavCmd command, float p1, float p2, float p3,
+                                        double seconds) {
+    mav::CommandLong m;
+    m.command = static_cast<uint16_t>(command);
+    m.target_system = m.target_component = 1;
+    m.param1 = p1, m.param2 = p2, m.param3 = p3;
+    result_.reset();
+    Send(m);
+    Seconds(seconds);
+    return result_;
+  }
   static Px4Options Options() {
     Px4Options options;
     options.starts_in_version_1 = false;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <set>
 
 #include "simulator_px4_link.h"
 
@@ -101,6 +102,9 @@ mav::Odometry Vision() {
   mav::Odometry m;
   m.q = {1.0f, 0.0f, 0.0f, 0.0f};
   m.x = 3.0f;
+  m.frame_id = static_cast<uint8_t>(mav::MavFrame::LOCAL_FRD);
+  m.child_frame_id = static_cast<uint8_t>(mav::MavFrame::BODY_FRD);
+  m.estimator_type = static_cast<uint8_t>(mav::MavEstimatorType::VIO);
   return m;
 }
 
@@ -123,6 +127,50 @@ TEST(Px4, TakesNoPoseThatIsNotFinite) {
   m.vx = m.pose_covariance[0] = kNaN;  // not known, which is no fault
   link.Send(m);
   EXPECT_EQ(link.px4().seen().odometry, 2);
+}
+
+TEST(Px4, TakesThePosesOfTheEstimatorsAndFramesThatPx4Knows) {
+  std::set<int> types, frames;
+  for (int number = 0; number < 256; ++number) {
+    Link link;
+    mav::Odometry m = Vision();
+    m.estimator_type = static_cast<uint8_t>(number);
+    link.Send(m);
+    if (link.px4().seen().odometry == 1) types.insert(number);
+    m = Vision();
+    m.frame_id = static_cast<uint8_t>(number);
+    const int before = link.px4().seen().odometry;
+    link.Send(m);
+    if (link.px4().seen().odometry > before) frames.insert(number);
+  }
+  EXPECT_EQ(types, (std::set<int>{0, 1, 2, 3, 6})) << "unknown, naive, vision, VIO, MOCAP";
+  EXPECT_EQ(frames, (std::set<int>{1, 4, 20, 21})) << "local: NED, ENU, FRD, FLU";
+}
+
+TEST(Px4, TakesPosesInTheFramesThatTheyName) {
+  Link link;
+  const auto seen = [&] { return *link.px4().seen().vision; };
+  mav::Odometry m = Vision();
+  m.y = 2.0f, m.z = 1.0f;
+  m.q = {std::sqrt(0.5f), 0.0f, 0.0f, std::sqrt(0.5f)};  // heads east
+  m.vx = 5.0f;
+  link.Send(m);
+  EXPECT_EQ(seen().vx, 5.0f);
+  m.frame_id = static_cast<uint8_t>(mav::MavFrame::LOCAL_ENU);
+  m.child_frame_id = static_cast<uint8_t>(mav::MavFrame::LOCAL_FRD);
+  link.Send(m);
+  EXPECT_EQ(seen().x, 2.0f);
+  EXPECT_EQ(seen().y, 3.0f);
+  EXPECT_EQ(seen().z, -1.0f);
+  EXPECT_NEAR(seen().vy, -5.0f, 1e-5) << "northward is to the left";
+  m.child_frame_id = 0;
+  link.Send(m);
+  EXPECT_TRUE(std::isnan(seen().vx)) << "a frame that PX4 does not know";
+  link.px4().options().ekf2_ev_qmin = 1;
+  const int before = link.px4().seen().odometry;
+  m.quality = -1;
+  link.Send(m);
+  EXPECT_EQ(link.px4().seen().odometry, before) << "it says that it has failed";
 }
 
 TEST(Px4, RotationsAreOfUnitLength) {
