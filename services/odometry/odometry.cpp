@@ -82,9 +82,11 @@ std::optional<PoseEstimate> Odometry::AddImu(const ImuSample& imu) {
   heard_ = imu.t;
   if (sweeps_since_ > 0) samples_late_ = imu.t < newest_sweep_ - kWaitForImu;
   sweeps_since_ = 0;
+  while (!ends_.empty() && ends_.front() <= heard_) ends_.pop_front();
   for (const ImuSample& sample : spikes_.Take(imu)) Take(sample);
   if (!fused_) return started_ ? std::nullopt : std::optional(AtPowerOn(imu.t));
   const double dt = imu.t - live_.t;
+  if (dt < 0.0) return std::nullopt;  // sweeps have led beyond a sample that comes late
   imu_.Advance(imu.t, &live_);
   blend_.Decay(dt);
   HoldBetweenSweeps(imu.t);
@@ -119,6 +121,7 @@ void Odometry::AddSweep(Sweep sweep) {
     sweep.start += correction, end += correction;
   }
   newest_sweep_ = end;
+  if (fused_ && end > heard_) ends_.push_back(end);
   pending_.push_back({std::move(sweep), imu_.newest(), end});
 }
 

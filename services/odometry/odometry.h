@@ -58,7 +58,8 @@ class Odometry {
  public:
   explicit Odometry(const OdometryConfig& config);
 
-  /// The pose at the sample's time; none for a sample that is out of order or not finite.
+  /// The pose at the sample's time; none for a sample that is out of order or not finite, nor for
+  /// one that sweeps have led beyond.
   std::optional<PoseEstimate> AddImu(const ImuSample& imu);
 
   /// Queues a sweep. It waits until the IMU's samples reach its end, or until they stay away.
@@ -71,7 +72,7 @@ class Odometry {
   bool Outdated(double t) const {
     constexpr double kLongest = 0.3, kRare = 0.2;  // s; at 1 rad/s and 4 m/s^2 17 degrees, 0.2 m
     const double silence = t - heard_;
-    return fused_ && silence > kLongest && sweeps_since_ < silence / kRare;
+    return fused_ && silence > kLongest && static_cast<double>(ends_.size()) < silence / kRare;
   }
 
   /// Does it move, or did when it was heard of last?
@@ -170,7 +171,8 @@ class Odometry {
   Matrix6d unknown_ = Matrix6d::Zero();  // projector on what the last sweep left to inertia
   double held_ = 0.0;                    // last time that a sweep or standing held the state, s
   double odds_ = 0.0;                    // that biases have jumped since, JumpEvidence
-  int sweeps_since_ = 0;                 // the newest inertial sample
+  int sweeps_since_ = 0;                 // the newest inertial sample came
+  std::deque<double> ends_;              // of the sweeps beyond that sample, s
   bool samples_late_ = false;            // behind the last sweep, by more than jitter
   double newest_sweep_ = -1e18;          // end of the sweep that came last, s
   double heard_ = -1e18;                 // of the newest inertial sample, used or not, s

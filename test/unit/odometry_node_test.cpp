@@ -172,6 +172,26 @@ TEST(OdometryNode, GoesOnThroughASilenceOfTheImuAlone) {
   EXPECT_EQ(bench.poses.back().epoch, epoch);
 }
 
+/// Standing; from 1.5 s on samples come 0.3 s late for a while, sweeps do not; then what is new
+/// overtakes what is late.
+TEST(OdometryNode, GoesOnWithSamplesThatWereLateAndAreOvertaken) {
+  constexpr int64_t kDelay = 300'000;
+  Bench bench;
+  Stand(kStart, false, &bench);
+  const int64_t late = kStart + 1'500'000, end = late + 1'000'000;
+  for (int64_t now = late + 5000; now <= end + 500'000; now += 5000) {
+    const bool scan = (now - late) % 100'000 == 0;
+    if (now > end) bench.SendImu(now);
+    if (now > late + kDelay && now <= end + kDelay) bench.SendImu(now - kDelay);
+    if (scan) bench.SendScan(now - 100'000, now);
+  }
+  for (size_t i = 1; i < bench.poses.size(); ++i) {
+    EXPECT_GT(bench.poses[i].utime, bench.poses[i - 1].utime) << "a state that was told already";
+    EXPECT_EQ(bench.poses[i].epoch, bench.poses[0].epoch) << "sweeps told how the body went on";
+  }
+  EXPECT_EQ(bench.poses.back().health, int{pose_t::HEALTH_OK}) << bench.poses.back().reason;
+}
+
 TEST(OdometryNode, BeginsAnewWithoutImuAsWell) {
   Bench bench;
   for (int i = 0; i < 5; ++i) bench.SendScan(kStart + 100000 * i, kStart + 100000 * (i + 1));
