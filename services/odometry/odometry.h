@@ -84,6 +84,8 @@ class Odometry {
   size_t map_cells() const { return planes_.cells() + posts_.cells(); }
 
  private:
+  static constexpr double kWaitForImu = 0.08;  ///< s that a sweep may be ahead of the IMU
+  static constexpr size_t kMostWaiting = 5;    ///< sweeps that wait for late samples: 0.5 s
   struct Pending {
     Sweep sweep;
     double imu_t;  // of the newest sample when the sweep came
@@ -100,7 +102,22 @@ class Odometry {
     std::vector<Eigen::Vector3f> at_end;  // the points deskewed by the track: frame B at the end
   };
 
+  /// The state before the sweeps of which inertia has told nothing, and these.
+  struct Unheard {
+    NavState base;
+    LevelFrame level;
+    MapDrift drift;
+    CorrectionBlend blend;
+    Matrix6d unknown;
+    double held, odds;
+    std::vector<Pending> sweeps;
+    bool lapsed = false;  ///< its samples are not waited for any more
+  };
+
   void Take(const ImuSample& imu);
+  void Keep(const Pending& pending);
+  void Rewind();
+  bool IsProvisional() const { return unheard_ && !unheard_->lapsed; }
   void Align(const ImuSample& imu);
   PoseEstimate AtPowerOn(double t);
   void Join(double t);
@@ -164,6 +181,8 @@ class Odometry {
   NavState base_;  // at the end of the last sweep
   NavState live_;  // at the newest sample
   std::deque<Pending> pending_;
+  std::optional<Unheard> unheard_;
+  double told_ = -1e18;            // until when poses were told before the state went back, s
   std::optional<Prepared> first_;  // of a start without IMU, until the velocity is known
   Thinning thinning_;
   int epoch_ = 0;
