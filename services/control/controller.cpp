@@ -61,12 +61,12 @@ std::optional<Setpoint> Controller::Update(double t, const Estimate& estimate, H
   plans_.Advance(t);
   error_.setZero();
   if (cut_) return Off();
-  return Sent(Answer(t, estimate, health, dt));
+  return Sent(t, Answer(t, estimate, health, dt));
 }
 
 // What is sent is what the body does until it is told otherwise.
-std::optional<Setpoint> Controller::Sent(std::optional<Setpoint> setpoint) {
-  if (setpoint) reckoning_.Ask(*setpoint, law_.thrust_gain(), law_.trim());
+std::optional<Setpoint> Controller::Sent(double t, std::optional<Setpoint> setpoint) {
+  if (setpoint) reckoning_.Ask(t, *setpoint, law_.thrust_gain(), law_.trim());
   return setpoint;
 }
 
@@ -198,7 +198,15 @@ std::optional<Setpoint> Controller::WithoutPose(double t, const Estimate& estima
 std::optional<Setpoint> Controller::Blind(double silence) {
   if (!flying_) return std::nullopt;
   if (cut_) return Off();
-  return Sent(WithoutPose(last_t_.value_or(0.0) + silence, {}, Health::kStarting, 0.0));
+  const double t = last_t_.value_or(0.0) + silence;
+  return Sent(t, WithoutPose(t, {}, Health::kStarting, 0.0));
+}
+
+void Controller::Recall(double t, const Estimate& estimate, Health health) {
+  if (health != Health::kUsable || !Usable(estimate) || t <= last_usable_) return;
+  last_usable_ = t;
+  if (estimate.velocity_sigma <= kMeasured) last_measured_ = t;
+  reckoning_.Begin(t, estimate);
 }
 
 void Controller::TurnFrame(double yaw) {

@@ -71,8 +71,11 @@ class Controller {
   /// until a plan of the new time comes.
   std::optional<Setpoint> Update(double t, const Estimate& estimate, Health health);
 
-  /// Setpoint `silence` s after the last pose while none comes: by dead reckoning, as above;
-  /// nothing while there is nothing to fly.
+  /// A pose of time t [s] that comes too late to be flown by: dead reckoning goes on from there.
+  void Recall(double t, const Estimate& estimate, Health health);
+
+  /// Setpoint `silence` s after the last pose while none comes in time: by dead reckoning, as
+  /// above; nothing while there is nothing to fly.
   std::optional<Setpoint> Blind(double silence);
 
   Following following() const { return following_; }
@@ -95,7 +98,7 @@ class Controller {
   /// What a landing that somebody else flies feels is not the ground.
   double Felt(double dt) const { return obeys_ || stands_ ? dt : 0.0; }
   std::optional<Setpoint> Answer(double t, const Estimate& estimate, Health health, double dt);
-  std::optional<Setpoint> Sent(std::optional<Setpoint> setpoint);
+  std::optional<Setpoint> Sent(double t, std::optional<Setpoint> setpoint);
   std::optional<Setpoint> WithoutPose(double t, const Estimate& estimate, Health health, double dt);
   void FollowTimeBack(double t);
   double StepTo(double t);

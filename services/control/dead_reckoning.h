@@ -1,5 +1,7 @@
 #pragma once
 
+#include <deque>
+
 #include "common/math/rotation.h"
 #include "services/control/tracking_law.h"
 
@@ -12,25 +14,31 @@ class DeadReckoning {
  public:
   explicit DeadReckoning(const ControlConfig& config) : drag_(config.drag) {}
 
-  void Begin(double t, const Estimate& estimate) { t_ = t, estimate_ = estimate; }
-  /// From here on the body does as `asked`, its motors give `gain` times that thrust, and a wind
+  /// Goes on from `estimate`, of time t, s, by what has been asked for since: a pose may come late.
+  void Begin(double t, const Estimate& estimate);
+  /// From time t on the body does as `asked`, its motors give `gain` times that thrust, and a wind
   /// takes `trim`, m/s^2, to stand against.
-  void Ask(const Setpoint& asked, double gain, const Eigen::Vector3d& trim) {
-    asked_ = asked, thrust_ = gain * asked.thrust, trim_ = trim;
-  }
+  void Ask(double t, const Setpoint& asked, double gain, const Eigen::Vector3d& trim);
   /// Velocity and attitude at time t, s.
   const Estimate& At(double t);
   double yaw() const { return math::Yaw(estimate_.R_WB); }
   /// The clock was set by `by`, s.
-  void Shift(double by) { t_ += by; }
+  void Shift(double by);
   /// Frame W has turned by `yaw`, rad.
   void Turn(double yaw);
 
  private:
+  struct Asked {
+    double t;  // s
+    Setpoint setpoint;
+    double thrust;  // as the motors give it, m/s^2
+    Eigen::Vector3d trim;
+  };
+  void Follow(const Asked& asked, double until);
+
   Eigen::Vector3d drag_;  // 1/s
-  double t_ = 0.0, thrust_ = kGravity;
-  Eigen::Vector3d trim_ = Eigen::Vector3d::Zero();
-  Setpoint asked_;
+  double t_ = 0.0;
+  std::deque<Asked> asked_;  // in order of time
   Estimate estimate_;
 };
 

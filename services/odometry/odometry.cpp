@@ -11,8 +11,6 @@ namespace {
 
 constexpr double kKnotStep = 0.005;     // s, of the motion over a sweep
 constexpr double kLongestReplay = 3.0;  // s of inertial samples kept for late sweeps
-constexpr double kWaitForImu = 0.08;    // s that a sweep may be ahead of the IMU
-constexpr size_t kMostWaiting = 5;      // sweeps that wait for samples that come late: 0.5 s
 constexpr double kUsualGap = 0.25;      // s between sweeps that were of use
 constexpr double kHoldLag = 0.15;       // s for which a sweep may still come while it stands
 constexpr double kLeastTurn = 1e-2;     // of known directions that is one found
@@ -82,9 +80,13 @@ std::optional<PoseEstimate> Odometry::AddImu(const ImuSample& imu) {
   heard_ = imu.t;
   if (sweeps_since_ > 0) samples_late_ = imu.t < newest_sweep_ - kWaitForImu;
   sweeps_since_ = 0;
+  while (!ends_.empty() && ends_.front() <= heard_) ends_.pop_front();
+  if (IsProvisional() && imu.t < base_.t) Rewind();
+  unheard_.reset();
   for (const ImuSample& sample : spikes_.Take(imu)) Take(sample);
   if (!fused_) return started_ ? std::nullopt : std::optional(AtPowerOn(imu.t));
   const double dt = imu.t - live_.t;
+  if (dt < 0.0) return std::nullopt;  // sweeps have led beyond a sample that comes late
   imu_.Advance(imu.t, &live_);
   blend_.Decay(dt);
   HoldBetweenSweeps(imu.t);
@@ -92,6 +94,7 @@ std::optional<PoseEstimate> Odometry::AddImu(const ImuSample& imu) {
     imu_.Advance(imu.t - 0.5 * kLongestReplay, &base_);
     imu_.DropBefore(base_.t);
   }
+  if (imu.t < told_) return std::nullopt;
   return Estimate();
 }
 
@@ -119,6 +122,7 @@ void Odometry::AddSweep(Sweep sweep) {
     sweep.start += correction, end += correction;
   }
   newest_sweep_ = end;
+  if (fused_ && end > heard_) ends_.push_back(end);
   pending_.push_back({std::move(sweep), imu_.newest(), end});
 }
 
@@ -136,6 +140,7 @@ SweepResult Odometry::ProcessSweep() {
   Prepared prepared;
   Pending pending = std::move(pending_.front());
   pending_.pop_front();
+  Keep(pending);
   if (!Prepare(std::move(pending), &prepared)) return result;
   const bool blind = Blind(prepared.end), lost = Estimate().health.health == Health::kLost;
   result.match = Match(&prepared);
@@ -151,6 +156,7 @@ SweepResult Odometry::ProcessSweep() {
     held_ = prepared.end;
   }
   if (beyond) RestartMap();
+  if (first) unheard_.reset();
   result.applied = applied;
   if (applied) held_ = prepared.end;
   if (applied && !first && !blind) Straighten(&prepared);
@@ -160,12 +166,15 @@ SweepResult Odometry::ProcessSweep() {
                 std::max(1e-3, prepared.end - prepared.track.front().t);
   const bool extends = !first && Extends(result.match);
   if (extends) unknown_.setIdentity();
-  if (applied || planes_.cells() == 0 || extends) Learn(prepared, base_.pose());
+  const bool learns = applied || planes_.cells() == 0 || extends;
+  if (learns && !IsProvisional()) Learn(prepared, base_.pose());
   if (applied && !first) FollowDrift(result.match);
   Catchup(lost);
-  result.registered = Registered(prepared);
   if (blind) result.pose = Estimate();
-  result.registered->health = Estimate().health.health;
+  if (prepared.end > told_) {
+    result.registered = Registered(prepared);
+    result.registered->health = Estimate().health.health;
+  }
   if (first && !fused_) first_ = std::move(prepared);
   return result;
 }
@@ -387,7 +396,7 @@ void Odometry::Catchup(bool lost) {
   NavState before = live_;
   live_ = base_;
   if (!fused_) return;
-  imu_.DropBefore(base_.t);
+  imu_.DropBefore(IsProvisional() ? unheard_->base.t : base_.t);
   if (t > live_.t) imu_.Advance(t, &live_);
   if (live_.t > t) imu_.Advance(live_.t, &before);
   const Pose shown = level_.ToWorld(before);

@@ -58,7 +58,8 @@ class Odometry {
  public:
   explicit Odometry(const OdometryConfig& config);
 
-  /// The pose at the sample's time; none for a sample that is out of order or not finite.
+  /// The pose at the sample's time; none for a sample that is out of order or not finite, nor for
+  /// one that sweeps have led beyond.
   std::optional<PoseEstimate> AddImu(const ImuSample& imu);
 
   /// Queues a sweep. It waits until the IMU's samples reach its end, or until they stay away.
@@ -71,7 +72,7 @@ class Odometry {
   bool Outdated(double t) const {
     constexpr double kLongest = 0.3, kRare = 0.2;  // s; at 1 rad/s and 4 m/s^2 17 degrees, 0.2 m
     const double silence = t - heard_;
-    return fused_ && silence > kLongest && sweeps_since_ < silence / kRare;
+    return fused_ && silence > kLongest && static_cast<double>(ends_.size()) < silence / kRare;
   }
 
   /// Does it move, or did when it was heard of last?
@@ -83,6 +84,8 @@ class Odometry {
   size_t map_cells() const { return planes_.cells() + posts_.cells(); }
 
  private:
+  static constexpr double kWaitForImu = 0.08;  ///< s that a sweep may be ahead of the IMU
+  static constexpr size_t kMostWaiting = 5;    ///< sweeps that wait for late samples: 0.5 s
   struct Pending {
     Sweep sweep;
     double imu_t;  // of the newest sample when the sweep came
@@ -99,7 +102,22 @@ class Odometry {
     std::vector<Eigen::Vector3f> at_end;  // the points deskewed by the track: frame B at the end
   };
 
+  /// The state before the sweeps of which inertia has told nothing, and these.
+  struct Unheard {
+    NavState base;
+    LevelFrame level;
+    MapDrift drift;
+    CorrectionBlend blend;
+    Matrix6d unknown;
+    double held, odds;
+    std::vector<Pending> sweeps;
+    bool lapsed = false;  ///< its samples are not waited for any more
+  };
+
   void Take(const ImuSample& imu);
+  void Keep(const Pending& pending);
+  void Rewind();
+  bool IsProvisional() const { return unheard_ && !unheard_->lapsed; }
   void Align(const ImuSample& imu);
   PoseEstimate AtPowerOn(double t);
   void Join(double t);
@@ -163,6 +181,8 @@ class Odometry {
   NavState base_;  // at the end of the last sweep
   NavState live_;  // at the newest sample
   std::deque<Pending> pending_;
+  std::optional<Unheard> unheard_;
+  double told_ = -1e18;            // until when poses were told before the state went back, s
   std::optional<Prepared> first_;  // of a start without IMU, until the velocity is known
   Thinning thinning_;
   int epoch_ = 0;
@@ -170,7 +190,8 @@ class Odometry {
   Matrix6d unknown_ = Matrix6d::Zero();  // projector on what the last sweep left to inertia
   double held_ = 0.0;                    // last time that a sweep or standing held the state, s
   double odds_ = 0.0;                    // that biases have jumped since, JumpEvidence
-  int sweeps_since_ = 0;                 // the newest inertial sample
+  int sweeps_since_ = 0;                 // the newest inertial sample came
+  std::deque<double> ends_;              // of the sweeps beyond that sample, s
   bool samples_late_ = false;            // behind the last sweep, by more than jitter
   double newest_sweep_ = -1e18;          // end of the sweep that came last, s
   double heard_ = -1e18;                 // of the newest inertial sample, used or not, s

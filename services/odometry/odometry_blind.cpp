@@ -27,6 +27,30 @@ void Odometry::StartBlind(double t) {
   health_.OnStarted(true, held_ = t);
 }
 
+/// Sweeps alone tell no motion that changes within one of them. A silent IMU may be a late one:
+/// what they tell is put out, but neither learnt nor built upon where the samples come after all.
+void Odometry::Keep(const Pending& pending) {
+  if (!fused_ || planes_.cells() == 0 || imu_.newest() >= pending.end - kWaitForImu) return;
+  if (!unheard_) unheard_ = Unheard{base_, level_, drift_, blend_, unknown_, held_, odds_, {}};
+  unheard_->lapsed |= unheard_->sweeps.size() == kMostWaiting;
+  if (unheard_->lapsed) return unheard_->sweeps.clear();
+  unheard_->sweeps.push_back(pending);
+}
+
+/// Does these sweeps anew, with inertia. What was put out until then is not called back.
+void Odometry::Rewind() {
+  told_ = std::max(told_, live_.t);
+  base_ = unheard_->base;
+  level_ = unheard_->level;
+  drift_ = unheard_->drift;
+  blend_ = unheard_->blend;
+  unknown_ = unheard_->unknown;
+  held_ = unheard_->held;
+  odds_ = unheard_->odds;
+  live_ = base_;
+  pending_.insert(pending_.begin(), unheard_->sweeps.begin(), unheard_->sweeps.end());
+}
+
 /// Without IMU the motion over the sweep is what the match makes of it: deskew and match again.
 void Odometry::MatchBlind(Prepared* prepared, MatchResult* match) {
   if (!match->valid) return;

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <vector>
 
 #include "common/math/rotation.h"
 #include "common/world/ages.h"
@@ -252,6 +253,30 @@ TEST(LostPose, BrakesByDeadReckoningWhileNoVelocityIsKnown) {
         EXPECT_GT(way.z(), -0.9);
         EXPECT_LT(way.z(), 0.1);
       }
+}
+
+/// Flies at 2 m/s until t = 2 s, into a gust; from then on poses come `late` s late, for 2 s.
+TEST(LostPose, BrakesByPosesThatComeLateAndWhatItAskedForSince) {
+  for (const double late : {0.1, 0.3}) {
+    Flight flight({0, 0, 2});
+    flight.body.v = {2, 0, 0};
+    flight.controller.AddPlan(LinePlan({0, 0, 2}, 2.0));
+    flight.Fly(2.0, Health::kUsable);
+    flight.body.wind = {0, 4, 0};
+    std::vector<Estimate> poses;
+    Setpoint setpoint = flight.setpoint;
+    for (int i = 1; i <= 400; ++i) {
+      poses.push_back(flight.body.Measured());
+      const int then = i - static_cast<int>(std::lround(late / kStep));
+      if (then >= 0) flight.controller.Recall(2.0 + kStep * then, poses[then], Health::kUsable);
+      if (i >= 30 && i % 10 == 0) setpoint = *flight.controller.Blind(i * kStep);
+      flight.body.Step(setpoint);
+    }
+    // The gust takes 1 m/s^2 and a velocity of 0.25 m/s to lean against it, besides what it adds
+    // while it is not known of; 1.5 m/s by dead reckoning alone.
+    EXPECT_LT(std::abs(flight.body.v.x()), 0.1) << late;
+    EXPECT_LT(flight.body.v.head<2>().norm(), 0.25 + late + 0.1) << late;
+  }
 }
 
 TEST(LostPose, SinksNoFasterThanDragAllows) {

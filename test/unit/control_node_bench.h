@@ -105,6 +105,7 @@ class Bench {
     pose_t m{};
     m.utime = utime;
     m.pos[2] = height;
+    bus::Set(m.vel, velocity);
     m.epoch = epoch;
     m.orientation[0] = 1.0;
     m.health = health;
@@ -156,7 +157,8 @@ class Bench {
     mission_->Publish("GEOFENCE", m);
   }
 
-  double height = 0.0;  ///< of the body by its poses, m
+  double height = 0.0;                                 ///< of the body by its poses, m
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< the same, m/s
   const ControlNode& node() const { return *node_; }
   std::vector<attitude_setpoint_t> out;
   std::vector<tracking_t> tracking;

@@ -242,6 +242,21 @@ TEST(ControlNode, GoesByPosesThatAreAlwaysLateForWantOfOthers) {
   EXPECT_EQ(late(300, 450), +tracking_t::STOP) << "which is worth no more";
 }
 
+// Told to drift at 1 m/s all the same, it brakes against that, less what it has asked for since.
+TEST(ControlNode, BrakesByWhatLatePosesSayThatTheBodyDid) {
+  Bench bench;
+  bench.SendPlan(kStart, {0, 0, 0});
+  bench.SendPose(kStart);
+  bench.velocity = {1, 0, 0};
+  for (int i = 0; i < 200; ++i) {
+    bench.RunUntil(kStart + 300'000 + 5000 * i);
+    bench.SendPose(kStart + 5000 * i);
+  }
+  ASSERT_EQ(bench.tracking.back().following, +tracking_t::BRAKE);
+  EXPECT_LT(bench.out.back().orientation[2], -0.05);  // nose up
+  EXPECT_GT(bench.out.back().orientation[2], -0.15);  // -0.2 against 1 m/s
+}
+
 TEST(ControlNode, SaysTwentyTimesASecondHowWellItFollows) {
   Bench bench;
   bench.SendPose(kStart);

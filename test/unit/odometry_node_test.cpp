@@ -172,6 +172,57 @@ TEST(OdometryNode, GoesOnThroughASilenceOfTheImuAlone) {
   EXPECT_EQ(bench.poses.back().epoch, epoch);
 }
 
+/// Standing; from 1.5 s on samples come 0.3 s late for a while, sweeps do not; then what is new
+/// overtakes what is late.
+TEST(OdometryNode, GoesOnWithSamplesThatWereLateAndAreOvertaken) {
+  constexpr int64_t kDelay = 300'000;
+  Bench bench;
+  Stand(kStart, false, &bench);
+  const int64_t late = kStart + 1'500'000, end = late + 1'000'000;
+  for (int64_t now = late + 5000; now <= end + 500'000; now += 5000) {
+    const bool scan = (now - late) % 100'000 == 0;
+    if (now > end) bench.SendImu(now);
+    if (now > late + kDelay && now <= end + kDelay) bench.SendImu(now - kDelay);
+    if (scan) bench.SendScan(now - 100'000, now);
+  }
+  for (size_t i = 1; i < bench.poses.size(); ++i) {
+    EXPECT_GT(bench.poses[i].utime, bench.poses[i - 1].utime) << "a state that was told already";
+    EXPECT_EQ(bench.poses[i].epoch, bench.poses[0].epoch) << "sweeps told how the body went on";
+  }
+  EXPECT_EQ(bench.poses.back().health, int{pose_t::HEALTH_OK}) << bench.poses.back().reason;
+}
+
+/// Thrown to and fro while samples come 0.3 s late: what sweeps alone made of it is not built upon.
+TEST(OdometryNode, DoesSweepsAnewOnceTheirSamplesCome) {
+  constexpr double kRate = 12.0, kAmplitude = 0.1;  // rad/s, m: 1.2 m/s, 14 m/s^2
+  constexpr int64_t kDelay = 300'000, kMoves = kStart + 1'500'000;
+  Bench bench;
+  Stand(kStart, false, &bench);
+  const size_t before = bench.poses.size();
+  const auto since = [&](int64_t utime) { return 1e-6 * static_cast<double>(utime - kMoves); };
+  const auto x = [&](double t) { return t < 0.0 ? 0.0 : kAmplitude * (1.0 - std::cos(kRate * t)); };
+  const auto send = [&](int64_t utime) {
+    bench.SendImu(utime, kAmplitude * kRate * kRate * std::cos(kRate * since(utime)));
+  };
+  for (int64_t now = kMoves + 5000; now <= kMoves + 1'000'000; now += 5000) {
+    if (now > kMoves + kDelay) send(now - kDelay);
+    const double begun = since(now - 100'000);
+    if ((now - kMoves) % 100'000 == 0)
+      bench.SendScan(now - 100'000, now, [&](double t) { return x(begun + t); });
+  }
+  ASSERT_GT(bench.poses.size(), before + 50);
+  for (size_t i = before; i < bench.poses.size(); ++i) {
+    const pose_t& pose = bench.poses[i];
+    EXPECT_GT(pose.utime, bench.poses[i - 1].utime);
+    if (pose.utime <= kMoves + kDelay) continue;  // by sweeps alone
+    const double t = since(pose.utime);
+    EXPECT_NEAR(pose.pos[0], x(t), 0.03) << t;
+    EXPECT_NEAR(pose.vel[0], kAmplitude * kRate * std::sin(kRate * t), 0.1) << t;
+  }
+  for (size_t i = 1; i < bench.sweeps.size(); ++i)
+    EXPECT_GT(bench.sweeps[i].utime, bench.sweeps[i - 1].utime);
+}
+
 TEST(OdometryNode, BeginsAnewWithoutImuAsWell) {
   Bench bench;
   for (int i = 0; i < 5; ++i) bench.SendScan(kStart + 100000 * i, kStart + 100000 * (i + 1));
