@@ -229,17 +229,20 @@ std::optional<std::vector<Proof>> ProveOff(const Curve& plan, const Problem& pro
   Prover prover(plan, problem, sight_from);
   const Sieve sieve(plan, problem, sight_from);
   if (memory) memory->About(plan, problem);
+  const size_t n = problem.obstacles.size();
   std::vector<Proof> near, proofs;
-  for (size_t j = 0; j < problem.obstacles.size(); ++j) {
-    const Ellipsoid& e = problem.obstacles[j];
-    if (!sieve.IsNear(e) || prover.IsOff(e, &near, memory)) continue;
+  std::vector<char> is_near(n);
+  for (size_t j = 0; j < n; ++j) {
+    is_near[j] = sieve.IsNear(problem.obstacles[j]);
+    if (!is_near[j] || prover.IsOff(problem.obstacles[j], &near, memory)) continue;
     if (at) *at = {static_cast<int>(j), prover.tau()};
     return std::nullopt;
   }
-  proofs.reserve(2 * problem.obstacles.size() + 1);
+  proofs.reserve(2 * n + 1);
   auto next = near.begin();
-  for (const Ellipsoid& e : problem.obstacles) {
-    if (sieve.IsNear(e)) {
+  for (size_t j = 0; j < n; ++j) {
+    const Ellipsoid& e = problem.obstacles[j];
+    if (is_near[j]) {
       for (int i = prover.Asks(e); i > 0; --i) proofs.push_back(std::move(*next++));
     } else if (e.body && !prover.IsOff(e, &proofs, nullptr)) {
       return std::nullopt;
