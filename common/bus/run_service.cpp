@@ -8,7 +8,6 @@
 #include <atomic>
 #include <csignal>
 #include <cstdio>
-#include <cstdlib>
 #include <filesystem>
 #include <optional>
 
@@ -36,17 +35,13 @@ struct Flags {
   bool dump_config = false;
 };
 
-std::string DefaultUrl() {
-  const char* url = std::getenv("LCM_DEFAULT_URL");
-  return url != nullptr && *url != '\0' ? url : kDefaultUrl;
-}
-
 void AddFlags(CLI::App* app, Flags* flags) {
   flags->url = DefaultUrl();
   app->add_option("--config", flags->config, "YAML file that overrides the defaults");
   app->add_flag("--dump-config", flags->dump_config, "print the complete configuration and exit");
-  auto* url = app->add_option("--lcm-url", flags->url,
-                              "LCM provider (default: $LCM_DEFAULT_URL, else built in)");
+  auto* url = app->add_option(
+      "--lcm-url", flags->url,
+      "LCM provider (default: $LCM_DEFAULT_URL, else that of the installed units, else built in)");
   app->add_option("--channel-prefix", flags->prefix,
                   "the vehicle: in front of every channel's name (default: none; of --replay: what "
                   "the log has)");

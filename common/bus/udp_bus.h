@@ -6,12 +6,10 @@
 #include <string>
 
 #include "common/bus/bus.h"
+#include "common/bus/default_url.h"
 #include "common/bus/seal.h"
 
 namespace chase::bus {
-
-/// UDP multicast that stays on this host, with room for a few sweeps and frames.
-inline constexpr char kDefaultUrl[] = "udpm://239.255.76.67:7667?ttl=0&recv_buf_size=2097152";
 
 /// Messages over LCM's UDP multicast. Every channel name gets `prefix` in front. With a key light
 /// messages are sealed, and those that are not are refused as a stranger's; heavy ones, which stay

@@ -2,7 +2,6 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
-#include <cstdlib>
 #include <string>
 #include <vector>
 
@@ -123,8 +122,7 @@ std::string TimeoutProblem(const std::string& text) {
 }
 
 void AddOptions(CLI::App* app, Arguments* a) {
-  const char* env = std::getenv("LCM_DEFAULT_URL");
-  a->url = env != nullptr && *env != '\0' ? env : bus::kDefaultUrl;
+  a->url = bus::DefaultUrl();
   app->add_option("command", a->command,
                   "takeoff, chase, hold, search, return, land, stop, kill or select")
       ->required()
@@ -142,7 +140,9 @@ void AddOptions(CLI::App* app, Arguments* a) {
   app->add_option("--timeout", a->timeout, "of --wait, s (default 120)")
       ->check(TimeoutProblem)
       ->needs(wait);
-  app->add_option("--lcm-url", a->url, "LCM provider (default: $LCM_DEFAULT_URL, else built in)");
+  app->add_option(
+      "--lcm-url", a->url,
+      "LCM provider (default: $LCM_DEFAULT_URL, else that of the installed units, else built in)");
   app->footer(
       "Exit codes: 0 accepted (with --wait: and reached), 1 bad use, 2 refused, 3 no answer "
       "within 5 s, 4 not reached, 5 not known whether it took effect: it was given before the "

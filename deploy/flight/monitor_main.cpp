@@ -5,7 +5,6 @@
 #include <CLI/CLI.hpp>
 #include <csignal>
 #include <cstdio>
-#include <cstdlib>
 #include <string>
 
 #include "chase/event_t.hpp"
@@ -88,10 +87,11 @@ int Watch(const std::string& url, const std::string& prefix, bool with_faults) {
 int main(int argc, char** argv) {
   CLI::App app("Prints one JSON line a second about the flight on the bus; exits 0 at its end.");
   chase::config::AddVersion(&app);
-  const char* env = std::getenv("LCM_DEFAULT_URL");
-  std::string url = env != nullptr && *env != '\0' ? env : chase::bus::kDefaultUrl, prefix;
+  std::string url = chase::bus::DefaultUrl(), prefix;
   bool faults = false;
-  app.add_option("--lcm-url", url, "LCM provider (default: $LCM_DEFAULT_URL, else built in)");
+  app.add_option(
+      "--lcm-url", url,
+      "LCM provider (default: $LCM_DEFAULT_URL, else that of the installed units, else built in)");
   app.add_option("--channel-prefix", prefix, "put in front of every channel's name");
   app.add_flag("--faults", faults,
                "publish FAULT for each line of the standard input: +NAME begins, -NAME ends");
