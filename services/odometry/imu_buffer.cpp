@@ -16,6 +16,11 @@ void ImuBuffer::DropBefore(double t) {
   while (samples_.size() > 1 && samples_[1].t <= t) samples_.pop_front();
 }
 
+double ImuBuffer::NewestUntil(double t) const {
+  const auto after = std::upper_bound(samples_.begin(), samples_.end(), t, EarlierThan);
+  return after == samples_.begin() ? -1e18 : (after - 1)->t;
+}
+
 ImuSample ImuBuffer::At(double t) const {
   const auto after = std::upper_bound(samples_.begin(), samples_.end(), t, EarlierThan);
   if (after == samples_.begin()) return samples_.front();

@@ -17,6 +17,8 @@ class ImuBuffer {
   void Add(const ImuSample& imu) { samples_.push_back(imu); }
   bool empty() const { return samples_.empty(); }
   double newest() const { return samples_.empty() ? -1e18 : samples_.back().t; }
+  /// Of the samples until t.
+  double NewestUntil(double t) const;
 
   /// Forgets what motion from `t` on does not need.
   void DropBefore(double t);

@@ -80,10 +80,13 @@ std::optional<PoseEstimate> Odometry::AddImu(const ImuSample& imu) {
   heard_ = imu.t;
   if (sweeps_since_ > 0) samples_late_ = imu.t < newest_sweep_ - kWaitForImu;
   sweeps_since_ = 0;
-  while (!ends_.empty() && ends_.front() <= heard_) ends_.pop_front();
-  if (IsProvisional() && imu.t < base_.t) Rewind();
-  unheard_.reset();
-  for (const ImuSample& sample : spikes_.Take(imu)) Take(sample);
+  const auto is_reached = [this](double end) { return end <= heard_; };
+  ends_beyond_imu_.erase(
+      std::remove_if(ends_beyond_imu_.begin(), ends_beyond_imu_.end(), is_reached),
+      ends_beyond_imu_.end());
+  const std::vector<ImuSample> samples = spikes_.Take(imu);
+  if (!samples.empty()) CloseCheckpoint(samples.front().t);
+  for (const ImuSample& sample : samples) Take(sample);
   if (!fused_) return started_ ? std::nullopt : std::optional(AtPowerOn(imu.t));
   const double dt = imu.t - live_.t;
   if (dt < 0.0) return std::nullopt;  // sweeps have led beyond a sample that comes late
@@ -94,8 +97,7 @@ std::optional<PoseEstimate> Odometry::AddImu(const ImuSample& imu) {
     imu_.Advance(imu.t - 0.5 * kLongestReplay, &base_);
     imu_.DropBefore(base_.t);
   }
-  if (imu.t < told_) return std::nullopt;
-  return Estimate();
+  return NewEstimate();
 }
 
 void Odometry::Take(const ImuSample& imu) {
@@ -122,15 +124,14 @@ void Odometry::AddSweep(Sweep sweep) {
     sweep.start += correction, end += correction;
   }
   newest_sweep_ = end;
-  if (fused_ && end > heard_) ends_.push_back(end);
+  if (fused_ && end > heard_) ends_beyond_imu_.push_back(end);
   pending_.push_back({std::move(sweep), imu_.newest(), end});
 }
 
 bool Odometry::SweepReady() const {
   if (pending_.empty() || Aligns()) return false;
   const double end = pending_.front().end;
-  const bool late = fused_ && samples_late_ && sweeps_since_ < 2;
-  if (late && pending_.size() <= kMostWaiting) return imu_.newest() >= end;
+  if (SamplesAreLate() && pending_.size() <= kMostWaiting) return imu_.newest() >= end;
   if (!fused_ || pending_.size() > 1) return true;
   return imu_.newest() >= end || imu_.newest() < end - kWaitForImu;
 }
@@ -140,7 +141,7 @@ SweepResult Odometry::ProcessSweep() {
   Prepared prepared;
   Pending pending = std::move(pending_.front());
   pending_.pop_front();
-  Keep(pending);
+  SaveCheckpoint(pending);
   if (!Prepare(std::move(pending), &prepared)) return result;
   const bool blind = Blind(prepared.end), lost = Estimate().health.health == Health::kLost;
   result.match = Match(&prepared);
@@ -156,7 +157,7 @@ SweepResult Odometry::ProcessSweep() {
     held_ = prepared.end;
   }
   if (beyond) RestartMap();
-  if (first) unheard_.reset();
+  if (first) checkpoint_.reset();
   result.applied = applied;
   if (applied) held_ = prepared.end;
   if (applied && !first && !blind) Straighten(&prepared);
@@ -170,8 +171,9 @@ SweepResult Odometry::ProcessSweep() {
   if (learns && !IsProvisional()) Learn(prepared, base_.pose());
   if (applied && !first) FollowDrift(result.match);
   Catchup(lost);
-  if (blind) result.pose = Estimate();
-  if (prepared.end > told_) {
+  if (blind) result.pose = NewEstimate();
+  if (prepared.end > newest_registered_) {
+    newest_registered_ = prepared.end;
     result.registered = Registered(prepared);
     result.registered->health = Estimate().health.health;
   }
@@ -396,7 +398,7 @@ void Odometry::Catchup(bool lost) {
   NavState before = live_;
   live_ = base_;
   if (!fused_) return;
-  imu_.DropBefore(IsProvisional() ? unheard_->base.t : base_.t);
+  imu_.DropBefore(IsProvisional() ? checkpoint_->base.t : base_.t);
   if (t > live_.t) imu_.Advance(t, &live_);
   if (live_.t > t) imu_.Advance(live_.t, &before);
   const Pose shown = level_.ToWorld(before);

@@ -72,7 +72,8 @@ class Odometry {
   bool Outdated(double t) const {
     constexpr double kLongest = 0.3, kRare = 0.2;  // s; at 1 rad/s and 4 m/s^2 17 degrees, 0.2 m
     const double silence = t - heard_;
-    return fused_ && silence > kLongest && static_cast<double>(ends_.size()) < silence / kRare;
+    return fused_ && silence > kLongest &&
+           static_cast<double>(ends_beyond_imu_.size()) < silence / kRare;
   }
 
   /// Does it move, or did when it was heard of last?
@@ -102,22 +103,25 @@ class Odometry {
     std::vector<Eigen::Vector3f> at_end;  // the points deskewed by the track: frame B at the end
   };
 
-  /// The state before the sweeps of which inertia has told nothing, and these.
-  struct Unheard {
+  /// The state before the first sweep that was processed without its samples, and those sweeps.
+  struct Checkpoint {
     NavState base;
+    Standing standing;
     LevelFrame level;
     MapDrift drift;
     CorrectionBlend blend;
     Matrix6d unknown;
     double held, odds;
     std::vector<Pending> sweeps;
-    bool lapsed = false;  ///< its samples are not waited for any more
+    bool given_up = false;  ///< the samples: they are not waited for any more
   };
 
   void Take(const ImuSample& imu);
-  void Keep(const Pending& pending);
-  void Rewind();
-  bool IsProvisional() const { return unheard_ && !unheard_->lapsed; }
+  bool SamplesAreLate() const { return fused_ && samples_late_ && sweeps_since_ < 2; }
+  void SaveCheckpoint(const Pending& pending);
+  void CloseCheckpoint(double t);
+  void RollBack();
+  bool IsProvisional() const { return checkpoint_ && !checkpoint_->given_up; }
   void Align(const ImuSample& imu);
   PoseEstimate AtPowerOn(double t);
   void Join(double t);
@@ -159,7 +163,10 @@ class Odometry {
   void Catchup(bool lost = false);
   RegisteredSweep Registered(const Prepared& prepared) const;
   PoseEstimate Estimate() const;
-  bool Blind(double end) const { return !fused_ || imu_.newest() < end - config_.health.imu_gap; }
+  std::optional<PoseEstimate> NewEstimate();
+  bool Blind(double end) const {
+    return !fused_ || imu_.NewestUntil(end) < end - config_.health.imu_gap;
+  }
 
   OdometryConfig config_;
   Pose X_BL_;
@@ -181,8 +188,8 @@ class Odometry {
   NavState base_;  // at the end of the last sweep
   NavState live_;  // at the newest sample
   std::deque<Pending> pending_;
-  std::optional<Unheard> unheard_;
-  double told_ = -1e18;            // until when poses were told before the state went back, s
+  std::optional<Checkpoint> checkpoint_;
+  double newest_pose_ = -1e18, newest_registered_ = -1e18;  // that were published, s
   std::optional<Prepared> first_;  // of a start without IMU, until the velocity is known
   Thinning thinning_;
   int epoch_ = 0;
@@ -191,7 +198,7 @@ class Odometry {
   double held_ = 0.0;                    // last time that a sweep or standing held the state, s
   double odds_ = 0.0;                    // that biases have jumped since, JumpEvidence
   int sweeps_since_ = 0;                 // the newest inertial sample came
-  std::deque<double> ends_;              // of the sweeps beyond that sample, s
+  std::vector<double> ends_beyond_imu_;  // of the sweeps that end after that sample, s
   bool samples_late_ = false;            // behind the last sweep, by more than jitter
   double newest_sweep_ = -1e18;          // end of the sweep that came last, s
   double heard_ = -1e18;                 // of the newest inertial sample, used or not, s

@@ -27,28 +27,40 @@ void Odometry::StartBlind(double t) {
   health_.OnStarted(true, held_ = t);
 }
 
-/// Sweeps alone tell no motion that changes within one of them. A silent IMU may be a late one:
-/// what they tell is put out, but neither learnt nor built upon where the samples come after all.
-void Odometry::Keep(const Pending& pending) {
-  if (!fused_ || planes_.cells() == 0 || imu_.newest() >= pending.end - kWaitForImu) return;
-  if (!unheard_) unheard_ = Unheard{base_, level_, drift_, blend_, unknown_, held_, odds_, {}};
-  unheard_->lapsed |= unheard_->sweeps.size() == kMostWaiting;
-  if (unheard_->lapsed) return unheard_->sweeps.clear();
-  unheard_->sweeps.push_back(pending);
+/// Sweeps alone tell no motion that changes within one of them. A silent IMU may be late: such
+/// sweeps are published, but not learnt, until their samples come and they are processed again.
+/// Not so those that have waited for samples that are known to be late: more wait behind them.
+void Odometry::SaveCheckpoint(const Pending& pending) {
+  if (!fused_ || planes_.cells() == 0 || SamplesAreLate() ||
+      imu_.newest() >= pending.end - kWaitForImu)
+    return;
+  if (!checkpoint_)
+    checkpoint_ = Checkpoint{base_, standing_, level_, drift_, blend_, unknown_, held_, odds_, {}};
+  checkpoint_->given_up |= checkpoint_->sweeps.size() == kMostWaiting;
+  if (checkpoint_->given_up) return checkpoint_->sweeps.clear();
+  checkpoint_->sweeps.push_back(pending);
 }
 
-/// Does these sweeps anew, with inertia. What was put out until then is not called back.
-void Odometry::Rewind() {
-  told_ = std::max(told_, live_.t);
-  base_ = unheard_->base;
-  level_ = unheard_->level;
-  drift_ = unheard_->drift;
-  blend_ = unheard_->blend;
-  unknown_ = unheard_->unknown;
-  held_ = unheard_->held;
-  odds_ = unheard_->odds;
+/// Samples come again, from `t` on. To the state before the sweeps, which are processed again, if
+/// those samples were late; where some were lost the sweeps stay as they were matched. What was
+/// published stays.
+void Odometry::CloseCheckpoint(double t) {
+  const bool goes_on = t <= imu_.newest() + config_.health.imu_gap;
+  if (IsProvisional() && goes_on && t < base_.t) RollBack();
+  checkpoint_.reset();
+}
+
+void Odometry::RollBack() {
+  base_ = checkpoint_->base;
+  standing_ = checkpoint_->standing;
+  level_ = checkpoint_->level;
+  drift_ = checkpoint_->drift;
+  blend_ = checkpoint_->blend;
+  unknown_ = checkpoint_->unknown;
+  held_ = checkpoint_->held;
+  odds_ = checkpoint_->odds;
   live_ = base_;
-  pending_.insert(pending_.begin(), unheard_->sweeps.begin(), unheard_->sweeps.end());
+  pending_.insert(pending_.begin(), checkpoint_->sweeps.begin(), checkpoint_->sweeps.end());
 }
 
 /// Without IMU the motion over the sweep is what the match makes of it: deskew and match again.

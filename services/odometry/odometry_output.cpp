@@ -25,6 +25,13 @@ RegisteredSweep Odometry::Registered(const Prepared& prepared) const {
   return out;
 }
 
+/// None for an instant whose pose was published before.
+std::optional<PoseEstimate> Odometry::NewEstimate() {
+  if (live_.t <= newest_pose_) return std::nullopt;
+  newest_pose_ = live_.t;
+  return Estimate();
+}
+
 PoseEstimate Odometry::Estimate() const {
   PoseEstimate out;
   out.t = live_.t;

@@ -10,7 +10,7 @@ chase_test(odometry_level_test LIBS odometry_test_support
 chase_test(odometry_match_test LIBS odometry_test_support Ceres::ceres
   SOURCES ${ODOMETRY_TEST_DIR}/odometry_match_test.cpp ${ODOMETRY_TEST_DIR}/odometry_ceres.cpp)
 chase_test(odometry_flight_test LIBS odometry_test_support
-  SOURCES ${ODOMETRY_TEST_DIR}/odometry_flight_test.cpp)
+  SOURCES ${ODOMETRY_TEST_DIR}/odometry_flight_test.cpp ${ODOMETRY_TEST_DIR}/odometry_late_test.cpp)
 chase_test(odometry_kitti_test LIBS odometry_test_support
   SOURCES ${ODOMETRY_TEST_DIR}/odometry_kitti_test.cpp)
 chase_test(odometry_node_test LIBS odometry_test_support odometry_node
