@@ -287,15 +287,16 @@ void Bridge::SendHeartbeat(int64_t now) {
   Send(now, m);
 }
 
-/// It was not the ground: it hovers until the autopilot has it.
+/// It was not the ground: it hovers until the autopilot has it, by an attitude, as nobody closes
+/// the loop on rates meanwhile.
 void Bridge::Catch(int64_t now) {
-  if (touchdown_.IsBorne(now) || !setpoint_) return;
+  if (!touchdown_.Falls(now) || !setpoint_) return;
   touchdown_.Flies(config_.hover_thrust, now);
-  SendSetpoint(now);
+  SendSetpoint(now, false);
 }
 
-void Bridge::SendSetpoint(int64_t now) {
-  const bool known = pose_->usable && PoseAge(now) <= kLoopAge;
+void Bridge::SendSetpoint(int64_t now, bool by_rates) {
+  const bool known = by_rates && pose_->usable && PoseAge(now) <= kLoopAge;
   mav::SetAttitudeTarget m = AttitudeTarget(
       Turned(*setpoint_, turn_), known ? std::optional(pose_->R_WB) : std::nullopt, config_);
   if (setpoint_->motors)

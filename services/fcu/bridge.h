@@ -74,7 +74,7 @@ class Bridge {
   void OnTimesync(const mav::Timesync& m, const Heard& when);
   void AskForChecks(int64_t now);
   void AskTime(int64_t now);
-  void SendSetpoint(int64_t now);
+  void SendSetpoint(int64_t now, bool by_rates = true);
   void Catch(int64_t now);
   void SendCommands(int64_t now);
   void SendHeartbeat(int64_t now);

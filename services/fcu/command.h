@@ -22,7 +22,10 @@ class Command {
   /// Takes the place of the one before; its late answers are no longer heard where it was of
   /// another kind.
   void Begin(Ask ask, int64_t utime);
-  void Drop() { ask_ = Ask::kNothing; }
+  void Drop() {
+    ask_ = Ask::kNothing;
+    words_.clear();
+  }
   void OnAck(uint16_t command, uint8_t result, int64_t utime);
   /// The message where it is due to be sent; its target is the caller's to fill in.
   std::optional<mav::CommandLong> Tick(int64_t utime);

@@ -14,7 +14,9 @@ constexpr double kStreamBefore = 1.2;  // s
 constexpr double kWithdrawn = 2.0;     // s without a setpoint: the next one is another flight's
 constexpr double kHeartbeat = 1.2;     // s in which the autopilot has told its state once more
 constexpr double kLateArming = 10.0;   // s after asking in which arming is still our doing
-constexpr double kLandedAfter = 4.0;   // s: the motors stand after 0.5, PX4 has landed 1.0 later
+// s: the motors stand after 0.5, PX4 has landed 1.0 later, 3.0 with a range finder that does not
+// see the ground.
+constexpr double kLandedAfter = 5.0;
 // A stream brings OFFBOARD back by itself after the failsafe that COM_OF_LOSS_T (1 s) of silence
 // begin: before that much may have passed, it has to be known that there was none.
 constexpr double kGap = 0.4;         // s: eighty samples of the IMU
@@ -60,6 +62,7 @@ struct HandshakeTable {
   static bool LeftOffboard(H h) { return !InOffboard(h); }
   static bool Disarmed(H h) { return !h.facts_.armed; }
   static bool DisarmedOnGround(H h) { return Disarmed(h) && h.facts_.on_ground; }
+  static bool NeverLeft(H h) { return DisarmedOnGround(h) && !h.left_; }
   /// An arming of ours that came through when it was no longer wanted.
   static bool ArmedLate(H h) {
     return h.facts_.armed && h.facts_.on_ground && h.AskedToArm() && !h.facts_.failsafe &&
@@ -121,6 +124,7 @@ const HandshakeTable::Row HandshakeTable::kRows[] = {
     {State::kArming, GivesUp, State::kRefused, "arming did not come"},
 
     {State::kFlying, Terminated, State::kFailsafe, kTerminated},
+    {State::kFlying, NeverLeft, State::kRefused, "the autopilot has disarmed before a take-off"},
     {State::kFlying, DisarmedOnGround, State::kDone, "the autopilot has disarmed on the ground"},
     {State::kFlying, Disarmed, State::kFailsafe, "the autopilot has disarmed or begun anew"},
     {State::kFlying, InFailsafe, State::kFailsafe, "a failsafe of the autopilot"},
@@ -199,6 +203,7 @@ void Handshake::Update(const Facts& facts) {
       command_.answer() == Command::Answer::kRefused)
     command_.Begin(command_.ask(), facts.utime + 1'000'000);
   WatchDoubt();
+  left_ = Steers() && (left_ || (facts.armed && !facts.on_ground));
   for (const HandshakeTable::Row& row : HandshakeTable::kRows)
     if (row.from == state_ && row.when(*this)) return Enter(row.to, row.why);
 }

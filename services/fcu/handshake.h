@@ -15,7 +15,7 @@ struct Facts {
   double gap = 0.0;    ///< s since it was last heard at all or, in flight, was last sent a setpoint
   bool armed = false;
   bool failsafe = false;    ///< the autopilot's state is CRITICAL or worse
-  bool terminated = false;  ///< its motors are stopped for good, whatever the mode
+  bool terminated = false;  ///< motors stopped by a kill switch or a termination, whatever the mode
   Mode mode;
   bool on_ground = false;   ///< as the autopilot says
   bool wish = false;        ///< a fresh setpoint wants the motors on
@@ -102,6 +102,7 @@ class Handshake {
   int64_t wished_ = 0;        // when a setpoint last wanted the motors
   int64_t asked_to_arm_ = 0;  // when; 0: not yet
   bool lands_ = false;        // in kLanding: the autopilot has told that mode
+  bool left_ = false;         // the ground, since it is ours to steer
   // While it steers: what a word of the autopilot has to be newer than before the stream goes on;
   // 0: it goes on.
   int64_t doubted_ = 0;

@@ -8,8 +8,9 @@ namespace chase::simulator {
 /// PX4's land detector for multicopters (MulticopterLandDetector.cpp of 1.14, parameters at their
 /// defaults): ground contact, maybe landed, landed, each after a third of LNDMC_TRIG_TIME in which
 /// its conditions hold; one that fails ends it at once. The throttle, not the ground, is what it
-/// goes by: on the ground with more than MPC_MANTHR_MIN it flies. Left out: its estimate of the
-/// hover thrust, which takes more throttle for ground contact and so lands 0.3 s sooner at most.
+/// goes by: on the ground with more than MPC_MANTHR_MIN it flies. Left out: free fall, the times
+/// for a velocity that is not valid (8 s) and for a range finder that does not see the ground (3
+/// s), and its estimate of the hover thrust, by which it lands 0.3 s sooner at most.
 class LandDetector {
  public:
   struct Inputs {

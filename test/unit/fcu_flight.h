@@ -41,10 +41,11 @@ class Flight {
   StandIn px4;
   bool setpoints = true, motors = true, poses = true, link = true;
   bool bridge_runs = true;
+  bool deaf = false;   ///< the bridge hears nothing
   bool idle = false;   ///< level without thrust, as control asks for before a plan begins
   bool usable = true;  ///< the poses
   int heartbeats = 0;  ///< of the autopilot
-  double height = 1.5;
+  double height = 1.5, aside = 0.0;
   int32_t epoch = 0;    ///< of odometry's frame W
   double turned = 0.0;  ///< yaw of the autopilot's frame in W, rad
   double loss = 0.0;    ///< probability that a datagram is lost, each way
@@ -105,7 +106,7 @@ class Flight {
 
   void Carry(std::vector<std::vector<uint8_t>> from, std::deque<Datagram>* to) {
     for (auto& bytes : from) {
-      if (!link || random_.Uniform() < loss) continue;
+      if (!link || (deaf && to == &to_us_) || random_.Uniform() < loss) continue;
       const int64_t queue = static_cast<int64_t>(400.0 * random_.Uniform());
       const int64_t arrival = std::max(now_ + delay + queue, to->empty() ? 0 : to->back().arrival);
       to->push_back({arrival, std::move(bytes)});
@@ -127,7 +128,7 @@ class Flight {
     }
     if (!setpoints) return;
     Setpoint setpoint;
-    const Eigen::Vector3d goal(0, 0, height);
+    const Eigen::Vector3d goal(aside, 0, height);
     const Eigen::Vector3d a = 2.0 * (goal - px4.p_WB()) - 2.5 * px4.v_WB();
     const Eigen::Vector3d force = a.cwiseMax(-3.0).cwiseMin(3.0) + Eigen::Vector3d(0, 0, 9.81);
     setpoint.R_WB = math::FromYaw(turned) * math::FromZAxisAndYaw(force, 0.0);

@@ -41,7 +41,21 @@ TEST(FcuTouchdown, ThrustGoesDownUntilPx4HasLanded) {
   EXPECT_EQ(flight.px4.p_WB().z(), 0.0);
 }
 
-// Whoever takes the motors away in the air takes no more than a third of the thrust for a moment.
+TEST(FcuTouchdown, AnImuThatFallsSilentOnTheGroundDoesNotBringTheThrustBack) {
+  Flight flight;
+  Press(&flight);
+  flight.motors = false;
+  flight.Run(0.6);
+  ASSERT_EQ(flight.state(), State::kTouchdown);
+  flight.deaf = true;
+  flight.Run(0.3);
+  EXPECT_EQ(flight.state(), State::kLanding) << flight.bridge.Words();
+  EXPECT_LT(flight.px4.seen().setpoint->thrust, 0.1f);
+  flight.deaf = false;
+  EXPECT_TRUE(flight.RunUntil(State::kDone, 10.0)) << flight.bridge.Words();
+}
+
+// Whoever takes the motors away in the air takes no more than half of the thrust for a moment.
 TEST(FcuTouchdown, IsNoneInTheAir) {
   for (const bool body_rates : {false, true}) {
     FcuConfig config;
@@ -50,6 +64,7 @@ TEST(FcuTouchdown, IsNoneInTheAir) {
     flight.TakeOff(8.0);
     const double height = flight.px4.p_WB().z();
     flight.motors = false;
+    flight.aside = 3.0;
     float least = 1.0f;
     Took(&flight, "motors off in the air, the autopilot lands", 1.0, [&] {
       least = std::min(least, flight.px4.seen().setpoint->thrust);
@@ -59,6 +74,8 @@ TEST(FcuTouchdown, IsNoneInTheAir) {
     flight.Run(0.5);
     EXPECT_EQ(flight.state(), State::kLanding) << flight.bridge.Words();
     EXPECT_TRUE(flight.Says("it is in the air"));
+    EXPECT_EQ(flight.px4.seen().setpoint->type_mask & 128, 0)
+        << "an attitude: nobody closes the loop";
     EXPECT_GT(flight.px4.p_WB().z(), height - 0.5);
     EXPECT_GT(flight.px4.v_WB().z(), -0.7);
     EXPECT_TRUE(flight.RunUntil(State::kDone, 15.0)) << flight.bridge.Words();
@@ -111,14 +128,16 @@ TEST(FcuTouchdown, ATakeOffIsCalledOffWhileTheMotorsIdle) {
   waits.idle = true;
   waits.TakeOff(11.0);
   EXPECT_FALSE(waits.px4.armed());
-  EXPECT_EQ(waits.state(), State::kDone) << waits.bridge.Words();
+  EXPECT_EQ(waits.state(), State::kRefused) << waits.bridge.Words();
+  EXPECT_TRUE(waits.Says("refused: the autopilot has disarmed before a take-off;"))
+      << "no answer's words";
 }
 
 TEST(FcuTouchdown, LandsByTheAutopilotWhereThatDoesNotCallItselfLanded) {
   Engaged flight(true);
   flight.facts.wish = false;
   flight.facts.motors_off = flight.facts.borne = true;
-  flight.Run(3.5);
+  flight.Run(4.5);
   EXPECT_EQ(flight.handshake.state(), State::kTouchdown);
   EXPECT_TRUE(flight.handshake.streams());
   flight.Run(1.0);
@@ -132,6 +151,14 @@ TEST(FcuTouchdown, AnAccelerometerThatIsSilentShowsNoWeight) {
     touchdown.Feel({kStart + 5'000 * i, Eigen::Vector3d(0.0, 3.0, 9.34), Eigen::Vector3d::Zero()});
   EXPECT_TRUE(touchdown.IsBorne(kStart + 500'000));
   EXPECT_FALSE(touchdown.IsBorne(kStart + 700'000));
+}
+
+TEST(FcuTouchdown, ThrustIsLoweredFromTheHoverWithoutAJump) {
+  Touchdown begun_anew;
+  EXPECT_GT(begun_anew.Lower(0.5, kStart), 0.4) << "nothing was sent before";
+  Touchdown paused;
+  paused.Flies(0.35, kStart);
+  EXPECT_GT(paused.Lower(0.5, kStart + 700'000), 0.25);
 }
 
 }  // namespace

@@ -60,8 +60,8 @@ class Flown {
       tracking_t tracking{};
       tracking.utime = bench_.lockstep.now();
       const bool asked = !bench_.states.empty() && IsAirborne(static_cast<State>(state()));
-      follows_ =
-          follows_ || (asked && (autopilot_.Obeys(tracking.utime) || !autopilot_.IsOnGround()));
+      follows_ = follows_ || (asked && !blocked &&
+                              (autopilot_.Obeys(tracking.utime) || !autopilot_.IsOnGround()));
       tracking.following = follows_ ? tracking_t::PLAN : tracking_t::NONE;
       control_->Publish("TRACKING", tracking);
       bench_.place = flight.px4.p_WB();
@@ -81,6 +81,7 @@ class Flown {
   }
 
   fcu::testing::Flight flight;
+  bool blocked = false;  ///< the way up: no plan begins
 
  private:
   void Plan() {
@@ -167,6 +168,18 @@ TEST(MissionFailsafe, ATakeOffThatNeverLeftTheGroundIsNotOver) {
       EXPECT_EQ(flown.Times(flight_state_t::HOLD), 0) << silence << " s";
     }
   }
+}
+
+// The motors idle until COM_DISARM_PRFLT stops them.
+TEST(MissionFailsafe, ATakeOffThatTheAutopilotDisarmsOnTheGroundIsCalledOff) {
+  Flown flown;
+  flown.blocked = flown.flight.idle = true;
+  flown.Run(2.0);
+  flown.Command(command_t::TAKEOFF, 1);
+  flown.Run(30.0);  // a third of takeoff_patience
+  EXPECT_FALSE(flown.flight.px4.armed());
+  EXPECT_EQ(flown.state(), +flight_state_t::READY) << flown.reason();
+  EXPECT_NE(flown.reason().find("refused: "), std::string::npos) << flown.reason();
 }
 
 TEST(MissionFailsafe, AFlightOfOursIsNotOverBeforeItsEnd) {
