@@ -151,13 +151,13 @@ void ControlNode::OnPlan(const plan_t& message) {
   bus_.ReportError(fmt::format("PLAN {} left out: {}", message.seq, bad));
 }
 
-// Late poses are not flown by while dead reckoning is good, which goes on from them: with these
-// gains the loop is unstable at 0.3 s of delay, and an acceleration that old is not that of the
-// thrust asked for last. After 2 s they are used, for want of better. Judged by the bus's clock,
+// For 2 s late poses only correct dead reckoning: with these gains the loop is unstable at 0.3 s of
+// delay, and an acceleration that old is not that of the thrust asked for last. Then they are flown
+// by, for want of better. Judged by the bus's clock,
 // because a queue shows in no stamp: a replay sees the times at which the recorder heard them.
 void ControlNode::OnPose(const pose_t& message) {
   if (pose_age_.IsLate(message.utime, bus_.Now(), kMostLate)) {
-    if (Silence() <= world::kMostAge.velocity) return Recall(message);
+    if (Silence() <= world::kMostAge.velocity) return UpdateLate(message);
     pose_age_.Reset();
   }
   pose_age_.Take(message.utime, bus_.Now());
@@ -168,7 +168,7 @@ void ControlNode::OnPose(const pose_t& message) {
     lists_.clear();
   }
   if (message.health != pose_t::HEALTH_STARTING && flown_.Change(message.epoch))
-    controller_.TurnFrame(math::Yaw(bus::ToQuaternion(message.orientation)));
+    controller_.TurnFrame(t, math::Yaw(bus::ToQuaternion(message.orientation)));
   const Estimate estimate = FromMessage(message);
   if (estimate.p_WB.allFinite()) p_WB_ = estimate.p_WB;
   const Health health = HealthOf(message, estimate.velocity_sigma, config_);
@@ -186,11 +186,11 @@ void ControlNode::OnPose(const pose_t& message) {
   if (std::abs(message.utime - last_tracking_) >= kTick) SendTracking(message.utime);
 }
 
-void ControlNode::Recall(const pose_t& message) {
+void ControlNode::UpdateLate(const pose_t& message) {
   if (!flown_.Is(message.epoch)) return;
   const Estimate estimate = FromMessage(message);
-  controller_.Recall(bus::Seconds(message.utime, Origin(message.utime)), estimate,
-                     HealthOf(message, estimate.velocity_sigma, config_));
+  controller_.UpdateLate(bus::Seconds(message.utime, Origin(message.utime)), estimate,
+                         HealthOf(message, estimate.velocity_sigma, config_));
 }
 
 // Without poses: by dead reckoning, until the autopilot's own limit on silence may act. Ticks are

@@ -42,7 +42,7 @@ class ControlNode : public bus::Node {
   void OnPlan(const plan_t& message);
   void OnObstacles(const obstacles_t& message);
   void OnPose(const pose_t& message);
-  void Recall(const pose_t& message);
+  void UpdateLate(const pose_t& message);
   void OnState(const flight_state_t& message);
   Eigen::Vector3d Home() const;
   void TellHome();

@@ -157,8 +157,8 @@ std::optional<Setpoint> Controller::Brake(const Estimate& estimate) {
   return Finite(setpoint) ? setpoint : law_.Level(last_yaw_, -config_.lost_descent);
 }
 
-// The autopilot wants to be asked for something before it obeys. By thrust above MPC_MANTHR_MIN
-// (0.08 of the full one, where `min_thrust` is 0.1) PX4 takes itself to have taken off.
+// The autopilot wants to be asked for something before it obeys. By thrust above MPC_MANTHR_MIN,
+// 0.08 of the full one, PX4 takes itself to have taken off; `min_thrust` is 0.1 at a hover of 0.5.
 Setpoint Controller::Idle() const {
   Setpoint setpoint = law_.Level(last_yaw_, 0.0);
   setpoint.thrust = 0.0;
@@ -202,16 +202,16 @@ std::optional<Setpoint> Controller::Blind(double silence) {
   return Sent(t, WithoutPose(t, {}, Health::kStarting, 0.0));
 }
 
-void Controller::Recall(double t, const Estimate& estimate, Health health) {
+void Controller::UpdateLate(double t, const Estimate& estimate, Health health) {
   if (health != Health::kUsable || !Usable(estimate) || t <= last_usable_) return;
   last_usable_ = t;
   if (estimate.velocity_sigma <= kMeasured) last_measured_ = t;
   reckoning_.Begin(t, estimate);
 }
 
-void Controller::TurnFrame(double yaw) {
+void Controller::TurnFrame(double t, double yaw) {
   if (!std::isfinite(yaw)) return;
-  const double turn = yaw - reckoning_.yaw();
+  const double turn = yaw - math::Yaw(reckoning_.At(t).R_WB);
   reckoning_.Turn(turn);
   law_.Turn(turn);
   last_yaw_ = yaw;

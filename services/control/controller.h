@@ -45,9 +45,9 @@ class Controller {
     spot_.reset();
   }
 
-  /// The attitude loop goes by the new frame from now on, in which the body's heading is `yaw`,
-  /// rad.
-  void TurnFrame(double yaw);
+  /// The attitude loop goes by the new frame from time t, s, on, when the body's heading is `yaw`,
+  /// rad, in it.
+  void TurnFrame(double t, double yaw);
 
   /// A landing is asked for, or no more: it begins once the body is at rest where a plan to land
   /// ends; without such a plan after kMostAge.landing_plan, where it is at rest.
@@ -71,8 +71,8 @@ class Controller {
   /// until a plan of the new time comes.
   std::optional<Setpoint> Update(double t, const Estimate& estimate, Health health);
 
-  /// A pose of time t [s] that comes too late to be flown by: dead reckoning goes on from there.
-  void Recall(double t, const Estimate& estimate, Health health);
+  /// A usable pose of time t [s] that comes too late to be flown by: dead reckoning begins there.
+  void UpdateLate(double t, const Estimate& estimate, Health health);
 
   /// Setpoint `silence` s after the last pose while none comes in time: by dead reckoning, as
   /// above; nothing while there is nothing to fly.

@@ -21,7 +21,7 @@ void DeadReckoning::Begin(double t, const Estimate& estimate) {
 }
 
 void DeadReckoning::Ask(double t, const Setpoint& asked, double gain, const Eigen::Vector3d& trim) {
-  if (!asked_.empty()) t = std::max(t, asked_.back().t);
+  while (!asked_.empty() && asked_.back().t >= t) asked_.pop_back();
   asked_.push_back({t, asked, gain * asked.thrust, trim});
   while (asked_[0].t < t - world::kMostAge.velocity) asked_.pop_front();
 }

@@ -21,7 +21,6 @@ class DeadReckoning {
   void Ask(double t, const Setpoint& asked, double gain, const Eigen::Vector3d& trim);
   /// Velocity and attitude at time t, s.
   const Estimate& At(double t);
-  double yaw() const { return math::Yaw(estimate_.R_WB); }
   /// The clock was set by `by`, s.
   void Shift(double by);
   /// Frame W has turned by `yaw`, rad.

@@ -231,8 +231,9 @@ Vector3d WayWithoutPose(double silent, double turn, double wind, Body* body) {
   for (int i = 0; i < 200; ++i) {
     Estimate estimate = flight.body.Measured();
     estimate.R_WB = frame * estimate.R_WB;
-    if (i == 100) flight.controller.TurnFrame(math::Yaw(estimate.R_WB));
-    setpoint = *flight.controller.Update(2.0 + silent + i * kStep, estimate, Health::kStarting);
+    const double t = 2.0 + silent + i * kStep;
+    if (i == 100) flight.controller.TurnFrame(t, math::Yaw(estimate.R_WB));
+    setpoint = *flight.controller.Update(t, estimate, Health::kStarting);
     if (i >= 100) setpoint.R_WB = frame.conjugate() * setpoint.R_WB;
     flight.body.Step(setpoint);
   }
@@ -268,7 +269,7 @@ TEST(LostPose, BrakesByPosesThatComeLateAndWhatItAskedForSince) {
     for (int i = 1; i <= 400; ++i) {
       poses.push_back(flight.body.Measured());
       const int then = i - static_cast<int>(std::lround(late / kStep));
-      if (then >= 0) flight.controller.Recall(2.0 + kStep * then, poses[then], Health::kUsable);
+      if (then >= 0) flight.controller.UpdateLate(2.0 + kStep * then, poses[then], Health::kUsable);
       if (i >= 30 && i % 10 == 0) setpoint = *flight.controller.Blind(i * kStep);
       flight.body.Step(setpoint);
     }
