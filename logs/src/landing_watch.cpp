@@ -18,11 +18,11 @@ void LandingWatch::Mark(const world::GroundSpec& ground, TruthSample* sample) {
   const double height = sample->p.z() - world::GroundHeight(ground, sample->p.x(), sample->p.y());
   came_down_ = control_ || autopilot_ || (came_down_ && height < world::kFlightVolume.low);
   const bool slow = sample->speed <= kTouchdown;
-  stands_ = stands_ && slow && height < world::kFlightVolume.low;
+  stands_ = stands_ && height < world::kFlightVolume.low;
   // Motors that are cut in the air end no flight: it falls first.
   lies_ = state_ == flight_state_t::DONE && (lies_ || (height < world::kFlightVolume.low && slow));
   sample->done = lies_;
-  sample->may_stand = stands_ || (came_down_ && slow) || state_ == flight_state_t::IDLE ||
+  sample->may_stand = ((stands_ || came_down_) && slow) || state_ == flight_state_t::IDLE ||
                       state_ == flight_state_t::READY || state_ == flight_state_t::TAKEOFF ||
                       state_ == flight_state_t::LAND || state_ == flight_state_t::DONE;
 }

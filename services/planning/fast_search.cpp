@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <functional>
 
 #include "services/planning/fast_problem.h"
 #include "services/planning/limits.h"
@@ -18,7 +17,8 @@ using kernels::kPad;
 // Candidates that the ellipsoids let pass and the proof does not, until the search gives up. With
 // 256 the longest plan of a flight in an office took 88 ms, with 64 it took 11.
 constexpr int kMostRefused = 64;
-constexpr float kSlack = 1e-4f;  // relative: costs in single precision are that good
+constexpr int kSorted = 4 * kBatch;  // candidates at a time
+constexpr float kSlack = 1e-4f;      // relative: costs in single precision are that good
 
 class FastSearch : public Search {
  public:
@@ -76,7 +76,6 @@ class FastSearch : public Search {
     }
     int id() const { return static_cast<int>(key & 0xffffffff); }
     bool operator<(const Entry& e) const { return key < e.key; }
-    bool operator>(const Entry& e) const { return key > e.key; }
   };
 
   int Run();
@@ -117,7 +116,7 @@ class FastSearch : public Search {
   std::vector<int> ids_, groups_;
   std::vector<float> values_;
   std::vector<int> states_;
-  std::vector<Entry> heap_, accepted_;
+  std::vector<Entry> open_, accepted_;
   int checked_ = 0, feasible_ = 0, n_refused_ = 0;
   bool proves_all_ = false;
   float bound_ = 0.0f, best_ = 0.0f;
@@ -164,7 +163,7 @@ void FastSearch::Batch(int* ids, float* lower, int n) {
 }
 
 // Adds J3 + J4 to J1 of the candidates with low < J1 <= high, drops those above the limit, puts the
-// rest on the heap.
+// rest on the list.
 void FastSearch::Weigh(float low, float high) {
   const kernels::Context& c = fast_.context();
   ids_.resize(static_cast<size_t>(c.stride + kPad));
@@ -183,7 +182,7 @@ void FastSearch::WeighListed(int n) {
   n = kernels_.distance_and_yaw(c, ids_.data(), values_.data(), n, Limit(), 0, kFirst);
   n = kernels_.distance_and_yaw(c, ids_.data(), values_.data(), n, Limit(), kFirst, kNodes);
   for (int i = 0; i < n; ++i)
-    heap_.push_back({values_[static_cast<size_t>(i)], ids_[static_cast<size_t>(i)]});
+    open_.push_back({values_[static_cast<size_t>(i)], ids_[static_cast<size_t>(i)]});
 }
 
 // Nothing found among the cheapest: whole groups of candidates are ruled out by one test each, and
@@ -196,7 +195,7 @@ void FastSearch::SearchGroups(const float* levels, int n_levels) {
   const auto is_ruled_out = [&](const Entry& e) {
     return !std::binary_search(groups_.begin(), groups_.end(), e.id() / size);
   };
-  heap_.erase(std::remove_if(heap_.begin(), heap_.end(), is_ruled_out), heap_.end());
+  open_.erase(std::remove_if(open_.begin(), open_.end(), is_ruled_out), open_.end());
   for (int level = 0; level < n_levels; ++level) {
     const float low = levels[level];
     const float high = std::min(Limit(), level + 1 < n_levels ? levels[level + 1] : HUGE_VALF);
@@ -214,11 +213,11 @@ void FastSearch::SearchGroups(const float* levels, int n_levels) {
   }
 }
 
-// By counting what is before each, as branches that nobody can foretell take longer.
+// Rank sort: no branch to mispredict.
 void FastSearch::Sort(Entry* entries, int n) {
-  constexpr int kMost = 4 * kBatch;
-  float cost[kMost];
-  Entry sorted[kMost];
+  float cost[kSorted];
+  Entry sorted[kSorted];
+  std::copy(entries, entries + n, sorted);
   for (int i = 0; i < n; ++i) cost[i] = entries[i].cost();
   for (int i = 0; i < n; ++i) {
     int before = 0;
@@ -231,45 +230,44 @@ void FastSearch::Sort(Entry* entries, int n) {
 
 // The cheapest of what is listed, batch by batch.
 void FastSearch::Drain(int max_batches) {
-  constexpr size_t kSorted = 4 * kBatch;  // at a time
   size_t at = 0;
-  for (int batch = 0; batch < max_batches && at < heap_.size(); ++batch) {
-    if (batch % 4 == 0) {
-      const auto from = heap_.begin() + static_cast<std::ptrdiff_t>(at);
-      const size_t n = std::min(kSorted, heap_.size() - at);
-      if (at + n < heap_.size())
-        std::nth_element(from, from + static_cast<std::ptrdiff_t>(n), heap_.end());
-      Sort(&heap_[at], static_cast<int>(n));
+  for (int batch = 0; batch < max_batches && at < open_.size(); ++batch) {
+    if (batch % (kSorted / kBatch) == 0) {
+      const auto from = open_.begin() + static_cast<std::ptrdiff_t>(at);
+      const size_t n = std::min(size_t{kSorted}, open_.size() - at);
+      if (at + n < open_.size())
+        std::nth_element(from, from + static_cast<std::ptrdiff_t>(n), open_.end());
+      Sort(&open_[at], static_cast<int>(n));
     }
     int ids[kBatch + kPad];
     float lower[kBatch + kPad];
     int n = 0;
-    for (; n < kBatch && at < heap_.size() && heap_[at].cost() < Limit(); ++at, ++n) {
-      lower[n] = heap_[at].cost();
-      ids[n] = heap_[at].id();
+    for (; n < kBatch && at < open_.size() && open_[at].cost() < Limit(); ++at, ++n) {
+      lower[n] = open_[at].cost();
+      ids[n] = open_[at].id();
     }
-    if (n == 0) return heap_.clear();
+    if (n == 0) return open_.clear();
     Batch(ids, lower, n);
   }
-  heap_.erase(heap_.begin(), heap_.begin() + static_cast<std::ptrdiff_t>(at));
+  open_.erase(open_.begin(), open_.begin() + static_cast<std::ptrdiff_t>(at));
 }
 
 // Nothing found among the cheapest: test what is left side by side in memory.
 void FastSearch::CheckAll() {
-  int n = static_cast<int>(heap_.size());
-  std::sort(heap_.begin(), heap_.end(),
+  int n = static_cast<int>(open_.size());
+  std::sort(open_.begin(), open_.end(),
             [](const Entry& a, const Entry& b) { return a.id() < b.id(); });
   ids_.resize(static_cast<size_t>(n + kPad));
   states_.resize(static_cast<size_t>(n + kPad));
-  for (int i = 0; i < n; ++i) ids_[static_cast<size_t>(i)] = heap_[static_cast<size_t>(i)].id();
+  for (int i = 0; i < n; ++i) ids_[static_cast<size_t>(i)] = open_[static_cast<size_t>(i)].id();
   checked_ += n;
   n = kernels_.check(fast_.context(), ids_.data(), states_.data(), n);
   size_t at = 0;
   for (int i = 0; i < n; ++i) {
-    while (heap_[at].id() != ids_[static_cast<size_t>(i)]) ++at;
-    heap_[static_cast<size_t>(i)] = heap_[at++];
+    while (open_[at].id() != ids_[static_cast<size_t>(i)]) ++at;
+    open_[static_cast<size_t>(i)] = open_[at++];
   }
-  heap_.resize(static_cast<size_t>(n));
+  open_.resize(static_cast<size_t>(n));
 }
 
 // Single precision leaves a few that could be the best: double decides, the lower index on ties.
@@ -291,12 +289,12 @@ int FastSearch::CheapestAccepted() {
 bool FastSearch::PruneAll() {
   constexpr size_t kFew = 512;
   Weigh(-1.0f, Limit());
-  if (heap_.size() > kFew) {
-    heap_.clear();
+  if (open_.size() > kFew) {
+    open_.clear();
     fast_.SetAllCosts();
     return false;
   }
-  if (!heap_.empty() && fast_.SetObstacles()) Drain(1 << 30);
+  if (!open_.empty() && fast_.SetObstacles()) Drain(1 << 30);
   return true;
 }
 
@@ -306,7 +304,7 @@ int FastSearch::Run() {
   best_ = bound_;
   checked_ = feasible_ = n_refused_ = 0;
   accepted_.clear();
-  heap_.clear();
+  open_.clear();
   if (bound_ < HUGE_VALF && PruneAll()) return CheapestAccepted();
   if (!fast_.SetObstacles()) return -1;
   // Most promising by J1: a sample of 256 tells the value that about 1 in 32 stays below.

@@ -9,7 +9,7 @@ namespace chase::planning {
 /// 1. time normalised, origin at the target, Bernstein form: of a quintic only b4 and b5 are free;
 /// 2. a candidate is a sum of table entries, its J1 a sum of squares;
 /// 3. obstacles that a plane separates from all candidates and the target are left out;
-/// 4. the cheapest by J1 first, J3 and J4 on top, then a heap of lower bounds in batches of 16;
+/// 4. the cheapest by J1 first, J3 and J4 on top, then by lower bounds in batches of 16;
 /// 5. per batch J2, then feasibility in 8 lanes by subdivision, single precision with a margin;
 /// 6. whatever is still open is certified in double, and exactly where that does not do;
 /// 7. the bound prunes the rest; when nothing is feasible early, all are tested side by side.

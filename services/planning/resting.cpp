@@ -60,8 +60,9 @@ void Resting::From(const world::State& start, double t0) {
 }
 
 std::optional<Stop> Resting::Brake() {
-  auto stop = BrakeWithin();
-  return stop || !goes_beyond_ ? stop : BrakeWithin(false);
+  if (auto stop = BrakeWithin()) return stop;
+  SetProblem(kLongestBrake);
+  return goes_beyond_ ? BrakeWithin(false) : std::nullopt;
 }
 
 std::optional<Stop> Resting::BrakeWithin(bool heights) {
@@ -113,7 +114,7 @@ std::optional<Stop> Resting::StepAside() {
 }
 
 std::optional<Stop> Resting::Certified(const Curve& curve, double T) {
-  if (!curve.allFinite() || IsTouched(curve, T)) return std::nullopt;
+  if (!curve.allFinite() || TouchesAgain(curve, T)) return std::nullopt;
   SetProblem(T);
   if (!KeepsLimits(curve, problem_) || !IsForecast(curve, T)) return std::nullopt;
   Refusal refusal;
@@ -126,8 +127,7 @@ std::optional<Stop> Resting::Certified(const Curve& curve, double T) {
   return Stop{{over_.t0, T, curve}, std::move(*proofs), true};
 }
 
-// Whether it comes too near to what the last way touched, when that was.
-bool Resting::IsTouched(const Curve& curve, double T) const {
+bool Resting::TouchesAgain(const Curve& curve, double T) const {
   if (!touched_) return false;
   const world::Obstacle& o = Obstacle(static_cast<size_t>(touched_->obstacle));
   return world::Touch(DroneBall(curve, touched_->radius), nullptr,

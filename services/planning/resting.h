@@ -74,7 +74,8 @@ class Resting {
   bool IsForecast(const Curve& way, double T) const;
   std::pair<double, double> Clearances(const Curve& curve, double tau) const;
   std::pair<double, double> Within();
-  bool IsTouched(const Curve& curve, double T) const;
+  /// What the last way touched, when that was.
+  bool TouchesAgain(const Curve& curve, double T) const;
   bool LeavesListed(const std::vector<Proof>& proofs) const;
   void SetProblem(double T);
 
@@ -93,7 +94,7 @@ class Resting {
     double tau;
     double radius;  ///< m, that is kept to it
   };
-  std::optional<Touched> touched_;  ///< by the last way from this start that was refused
+  std::optional<Touched> touched_;  ///< by the newest way from this start that touched anything
 };
 
 }  // namespace chase::planning

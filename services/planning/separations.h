@@ -54,7 +54,8 @@ struct Refusal {
 bool StaysOff(const Curve& plan, const Problem& problem, double sight_from, Refusal* last = nullptr,
               SeparationMemory* memory = nullptr);
 
-/// The proofs of that for all obstacles; nothing where it does not, and then `at` tells where.
+/// The proofs of that for all obstacles; nothing where it does not: `at` then tells where, if that
+/// is one of the list near the plan.
 std::optional<std::vector<Proof>> ProveOff(const Curve& plan, const Problem& problem,
                                            double sight_from, SeparationMemory* memory = nullptr,
                                            Refusal* at = nullptr);

@@ -213,6 +213,8 @@ TEST(Metrics, ATouchOfTheGroundIsALandingByTheFlightsState) {
   LandingWatch watch;
   Tell(flight_state_t::EMERGENCY, false, false, &watch);
   EXPECT_TRUE(Marked(at(0.1, 0.0), &watch).may_stand) << "has not been up";
+  EXPECT_FALSE(Marked(at(0.1, 2.0), &watch).may_stand) << "falls over";
+  EXPECT_TRUE(Marked(at(0.1, 0.0), &watch).may_stand);
   Marked(at(1.5, 0.5), &watch);
   EXPECT_FALSE(Marked(at(0.1, 0.0), &watch).may_stand);
   Tell(flight_state_t::CHASE, false, true, &watch);
