@@ -280,6 +280,33 @@ TEST(LostPose, BrakesByPosesThatComeLateAndWhatItAskedForSince) {
   }
 }
 
+// Poses that are older than what was heard, uncertain or not finite.
+TEST(LostPose, LatePosesOfNoUseChangeNothing) {
+  std::vector<Setpoint> asked[2];
+  for (const bool told : {false, true}) {
+    Flight flight({0, 0, 2});
+    flight.body.v = {2, 0, 0};
+    flight.controller.AddPlan(LinePlan({0, 0, 2}, 2.0));
+    flight.Fly(2.0, Health::kUsable);
+    Estimate wild = flight.body.Measured();
+    wild.v_WB = {-3, 4, 1};
+    Estimate none = wild;
+    none.v_WB.x() = NAN;
+    for (int i = 30; i <= 100; i += 10) {
+      if (told) {
+        flight.controller.UpdateLate(1.9, wild, Health::kUsable);
+        flight.controller.UpdateLate(2.0 + kStep * i, wild, Health::kStarting);
+        flight.controller.UpdateLate(2.0 + kStep * i, none, Health::kUsable);
+      }
+      asked[told].push_back(*flight.controller.Blind(i * kStep));
+    }
+  }
+  for (size_t i = 0; i < asked[0].size(); ++i) {
+    EXPECT_EQ(asked[0][i].R_WB.coeffs(), asked[1][i].R_WB.coeffs()) << i;
+    EXPECT_EQ(asked[0][i].thrust, asked[1][i].thrust) << i;
+  }
+}
+
 TEST(LostPose, SinksNoFasterThanDragAllows) {
   Flight flight({0, 0, 10});
   flight.controller.AddPlan(PointPlan({0, 0, 10}));
