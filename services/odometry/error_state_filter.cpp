@@ -10,9 +10,11 @@ namespace chase::odometry {
 
 namespace {
 
-/// Logarithm of how much likelier a jump must make an innovation: one in a day of ten sweeps a
-/// second.
-constexpr double kJumps = 14.0;
+// Of a rival, logarithms of likelihood ratios.
+constexpr double kOff = 7.0;     // against a match that is off: one in a minute or two
+constexpr double kBegins = 2.0;  // over what nothing unusual explains
+constexpr double kGoes = -10.0, kWins = 7.0;
+constexpr int kLongest = 4;  // matches
 
 using math::ExpSO3;
 using math::Hat;
@@ -117,34 +119,55 @@ UpdateResult Correct(Observation y, double usual_nis, double largest_nis, NavSta
   return {true, nis};
 }
 
-/// Opens the covariance where biases that jumped explain the innovation and are by far likelier
-/// than that nothing did, and likelier than a match that is off at once: by wrong stamps, or by
-/// features that were matched with another surface within the gate. A turn is felt at once, an
-/// acceleration by the sweep after. Returns the odds of a jump with this match.
-double OpenAfterJump(const Observation& y, double usual_nis, double gate, const JumpEvidence& jump,
-                     NavState* state) {
+/// LogLikelihood of an innovation if no bias has jumped: of noise alone, or of a match that is off
+/// by wrong stamps, or by features that were matched with another surface within the gate; along
+/// any one direction of place and of attitude, or along all.
+double WithoutJump(const Observation& y, const ErrorCovariance& P, double gate) {
   constexpr double kTurned = 0.005;  // rad: 20 ms at 0.25 rad/s
-  double otherwise = LogLikelihood(y.innovation, y.InnovationCovariance(state->P)) + kJumps;
-  for (const double off : {0.02, gate}) {  // m: 20 ms at 1 m/s; another surface
-    ErrorCovariance P = state->P;
-    AddDiagonal(kP, off * off, &P);
-    AddDiagonal(kTheta, kTurned * kTurned, &P);
-    otherwise = std::max(otherwise, LogLikelihood(y.innovation, y.InnovationCovariance(P)));
-  }
-  const NavState before = *state;
-  double odds = -HUGE_VAL, best = 0.0;
-  for (const double age : {jump.gap, 2.0 * jump.gap}) {
-    const ErrorCovariance jumped = AfterJump(before, jump.gap, age);
-    const Eigen::MatrixXd explained = y.InnovationCovariance(jumped);
-    const double nis = y.innovation.dot(explained.ldlt().solve(y.innovation));
-    const double likelihood = jump.odds + LogLikelihood(y.innovation, explained) - otherwise;
-    odds = std::max(odds, likelihood);
-    if (!(nis <= usual_nis * static_cast<double>(y.innovation.size())) || !(likelihood > best))
+  const Eigen::MatrixXd S = y.InnovationCovariance(P);
+  const Eigen::Index k = S.rows();
+  Eigen::Index places = 0;  // directions that are more of place than of attitude; they come first
+  while (places < k && y.H.row(places).segment<3>(kP).squaredNorm() > 0.5) ++places;
+  const auto off_along = [&](Eigen::Index i, Eigen::Index first, Eigen::Index n, double sigma,
+                             Eigen::VectorXd* added) {
+    added->segment(first, n).setConstant(i == n ? sigma * sigma : 0.0);
+    if (i >= 0 && i < n) (*added)[first + i] = sigma * sigma;
+  };
+  double best = LogLikelihood(y.innovation, S);
+  Eigen::VectorXd added(k);
+  for (const double off : {0.02, gate})          // m: 20 ms at 1 m/s; another surface
+    for (Eigen::Index i = -1; i <= places; ++i)  // none, each, all
+      for (Eigen::Index j = -1; j <= k - places; ++j) {
+        off_along(i, 0, places, off, &added);
+        off_along(j, places, k - places, kTurned, &added);
+        const Eigen::MatrixXd wider = S + Eigen::MatrixXd(added.asDiagonal());
+        best = std::max(best, LogLikelihood(y.innovation, wider) - kOff);
+      }
+  return best;
+}
+
+/// Begins a rival where a jump explains the match far better than noise does, and not much worse
+/// than that the match is off. A turn is felt at once, an acceleration by the sweep after.
+std::optional<Rival> Begun(const FilterConfig& config, const Observation& y, double gap,
+                           double otherwise, const NavState& before) {
+  const double noise = LogLikelihood(y.innovation, y.InnovationCovariance(before.P));
+  double best = std::max(noise + kBegins, otherwise + kGoes);
+  std::optional<Rival> rival;
+  for (const double age : {gap, 2.0 * gap}) {
+    NavState jumped = before;
+    jumped.P = AfterJump(before, gap, age);
+    const Eigen::MatrixXd S = y.InnovationCovariance(jumped.P);
+    const double likelihood = LogLikelihood(y.innovation, S);
+    const double nis = y.innovation.dot(S.ldlt().solve(y.innovation));
+    if (!(likelihood > best) ||
+        !(nis <= config.usual_nis * static_cast<double>(y.innovation.size())))
       continue;
     best = likelihood;
-    state->P = jumped;
+    rival = Rival{jumped, likelihood - otherwise, 1};
   }
-  return std::isfinite(odds) ? odds : jump.odds;
+  if (rival && !Correct(y, config.usual_nis, config.largest_nis, &rival->state).applied)
+    rival.reset();
+  return rival;
 }
 
 /// What the unknown directions U, left at the prediction, do to the known ones V of a match: an
@@ -236,13 +259,11 @@ void Inject(const ErrorVector& dx, NavState* state) {
   state->mount += dx.segment<3>(kMount);
 }
 
-UpdateResult Update(const FilterConfig& config, const PoseMeasurement& z, const JumpEvidence& jump,
-                    NavState* state) {
+UpdateResult Update(const FilterConfig& config, const PoseMeasurement& z, double gap,
+                    NavState* state, std::optional<Rival>* rival) {
   const auto& V = z.known;
   const Eigen::Index k = V.cols();
   if (k == 0) return {};
-  Eigen::Matrix<double, 6, 1> e;
-  e << z.X_WB.p - state->p, LogSO3(z.X_WB.R * state->R_WB.conjugate());
   // The floor is for what features have in common. Where the map itself is wrong no update can
   // tell: MapDrift adds that to what is put out.
   const Eigen::MatrixXd reduced = V.transpose() * z.information * V;
@@ -252,17 +273,37 @@ UpdateResult Update(const FilterConfig& config, const PoseMeasurement& z, const 
   const Eigen::LDLT<Eigen::MatrixXd> information(reduced);
   if (information.info() != Eigen::Success || !(information.vectorD().minCoeff() > 0.0)) return {};
   const Eigen::MatrixXd onto = (V.transpose() * V).ldlt().solve(V.transpose());  // V onto = proj.
-  Observation y{JacobianRows::Zero(k, kStates), onto * e,
+  const auto innovation = [&](const NavState& from) {
+    Eigen::Matrix<double, 6, 1> e;
+    e << z.X_WB.p - from.p, LogSO3(z.X_WB.R * from.R_WB.conjugate());
+    return Eigen::VectorXd(onto * e);
+  };
+  Observation y{JacobianRows::Zero(k, kStates), innovation(*state),
                 information.solve(Eigen::MatrixXd::Identity(k, k)) +
                     onto * floor.cwiseAbs2().asDiagonal() * onto.transpose() +
                     FromUnknown(z, information, *state)};
   y.H.middleCols<3>(kP) = onto.leftCols<3>();
   y.H.middleCols<3>(kTheta) = onto.rightCols<3>();
-  const double odds =
-      jump.gap > 0.0 ? OpenAfterJump(y, config.usual_nis, z.gate, jump, state) : jump.odds;
-  UpdateResult result = Correct(y, config.usual_nis, config.largest_nis, state);
-  result.odds = result.applied ? 0.0 : odds;
-  return result;
+  if (!rival) return Correct(y, config.usual_nis, config.largest_nis, state);
+
+  const double otherwise = WithoutJump(y, state->P, z.gate);
+  if (*rival) {
+    Rival& other = **rival;
+    Observation of_other = y;
+    of_other.innovation = innovation(other.state);
+    other.odds += WithoutJump(of_other, other.state.P, z.gate) - otherwise;
+    ++other.matches;
+    const UpdateResult result =
+        Correct(of_other, config.usual_nis, config.largest_nis, &other.state);
+    if (other.odds > kWins && result.applied && result.nis <= config.usual_nis) {
+      *state = other.state;
+      rival->reset();
+      return result;
+    }
+    if (other.odds < kGoes || other.matches >= kLongest || !result.applied) rival->reset();
+  }
+  if (!*rival && gap > 0.0) *rival = Begun(config, y, gap, otherwise, *state);
+  return Correct(y, config.usual_nis, config.largest_nis, state);
 }
 
 void HoldStill(const Eigen::Vector3d& gyro, NavState* state) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 
 #include "services/odometry/sweep.h"
 
@@ -119,24 +120,26 @@ struct PoseMeasurement {
 /// Update of a body that stands: no velocity, and what the gyroscope shows [rad/s] is its bias.
 void HoldStill(const Eigen::Vector3d& gyro, NavState* state);
 
-/// What speaks for biases that have jumped since the last update.
-struct JumpEvidence {
-  double gap = 0.0;   ///< s since that update; 0: they have not
-  double odds = 0.0;  ///< logarithm of the likelihood ratio, by the matches refused since
-};
-
 struct UpdateResult {
   bool applied = false;
-  double nis = 0.0;   ///< normalised innovation squared per known direction
-  double odds = 0.0;  ///< JumpEvidence's with this match
+  double nis = 0.0;  ///< normalised innovation squared per known direction
+};
+
+/// The state as it is if the biases jumped at the first of `matches`: one match that is a
+/// centimetre off and a jump look alike, so that those which follow have to tell.
+struct Rival {
+  NavState state;
+  double odds = 0.0;  ///< logarithm of how much likelier it makes these matches
+  int matches = 0;
 };
 
 /// Kalman update; leaves the state as it is where the numbers do not allow one or the innovation is
 /// too large to be of noise. One that is larger than the covariances explain makes these larger: by
-/// as much of the correction as they do not explain; unless biases that have jumped since the
-/// update before explain it all and are by far likelier, by all matches since (generalised
-/// likelihood ratio, Willsky and Jones 1976): then these are open again.
-UpdateResult Update(const FilterConfig& config, const PoseMeasurement& z, const JumpEvidence& jump,
-                    NavState* state);
+/// as much of the correction as they do not explain. `gap`: s since the update before, in which the
+/// biases may have jumped; 0: they have not. Where that explains the match far better, a `rival`
+/// begins, if given; an earlier one, which has been brought up to this time, is weighed by the
+/// match and becomes the state or goes (generalised likelihood ratio, Willsky and Jones 1976).
+UpdateResult Update(const FilterConfig& config, const PoseMeasurement& z, double gap,
+                    NavState* state, std::optional<Rival>* rival = nullptr);
 
 }  // namespace chase::odometry

@@ -11,6 +11,7 @@ namespace {
 
 constexpr double kKnotStep = 0.005;     // s, of the motion over a sweep
 constexpr double kLongestReplay = 3.0;  // s of inertial samples kept for late sweeps
+constexpr double kSettles = 2.0;        // s from the filter's beginning
 constexpr double kUsualGap = 0.25;      // s between sweeps that were of use
 constexpr double kHoldLag = 0.15;       // s for which a sweep may still come while it stands
 constexpr double kLeastTurn = 1e-2;     // of known directions that is one found
@@ -168,7 +169,7 @@ SweepResult Odometry::ProcessSweep() {
   const bool extends = !first && Extends(result.match);
   if (extends) unknown_.setIdentity();
   const bool learns = applied || planes_.cells() == 0 || extends;
-  if (learns && !IsProvisional()) Learn(prepared, base_.pose());
+  if (learns && !IsProvisional() && !rival_) Learn(prepared, base_.pose());
   if (applied && !first) FollowDrift(result.match);
   Catchup(lost);
   if (blind) result.pose = NewEstimate();
@@ -258,16 +259,22 @@ MatchResult Odometry::Match(Prepared* prepared) {
 }
 
 bool Odometry::Apply(const Prepared& prepared, MatchResult* match) {
-  if (!match->valid || Astray(prepared, *match)) return false;
+  if (rival_ && (rival_->state.t != base_.t || prepared.end - base_.t > kUsualGap)) rival_.reset();
+  if (!match->valid || Astray(prepared, *match)) {
+    rival_.reset();
+    return false;
+  }
+  if (rival_) imu_.Advance(prepared.end, &rival_->state);
   NavState state = prepared.predicted;
   standing_.See(match->X_WB.p);
   if (standing_.holds()) HoldStill(standing_.gyro(), &state);
   // Stamps that are off look like biases that jumped.
   const double gap = health_.IsUsual(prepared.end) ? prepared.end - held_ : 0.0;
+  // Before the filter has settled everything explains everything.
+  const bool settled = prepared.end - began_ > kSettles && !Blind(prepared.end);
   const UpdateResult update =
-      Update(config_.filter, {match->X_WB, match->known, match->information, match->gate},
-             {gap, odds_}, &state);
-  odds_ = update.odds;
+      Update(config_.filter, {match->X_WB, match->known, match->information, match->gate}, gap,
+             &state, settled ? &rival_ : nullptr);
   match->nis = update.nis;
   match->misfit = update.nis > config_.filter.largest_nis;
   if (!update.applied) return false;
@@ -355,6 +362,7 @@ void Odometry::PlaceMap(const NavState& state) {
 
 void Odometry::BeginMapHere() {
   PutAtOrigin(&base_);
+  rival_.reset();
   ClearMap();
   unknown_.setZero();
 }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <deque>
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -111,7 +112,8 @@ class Odometry {
     MapDrift drift;
     CorrectionBlend blend;
     Matrix6d unknown;
-    double held, odds;
+    double held;
+    std::optional<Rival> rival;
     std::vector<Pending> sweeps;
     bool given_up = false;  ///< the samples: they are not waited for any more
   };
@@ -195,8 +197,9 @@ class Odometry {
   int epoch_ = 0;
   int sweeps_learnt_ = 0;                // by the map
   Matrix6d unknown_ = Matrix6d::Zero();  // projector on what the last sweep left to inertia
+  double began_ = std::numeric_limits<double>::infinity();  // the filter, s
   double held_ = 0.0;                    // last time that a sweep or standing held the state, s
-  double odds_ = 0.0;                    // that biases have jumped since, JumpEvidence
+  std::optional<Rival> rival_;           // biases may have jumped: nothing is learnt
   int sweeps_since_ = 0;                 // the newest inertial sample came
   std::vector<double> ends_beyond_imu_;  // of the sweeps that end after that sample, s
   bool samples_late_ = false;            // behind the last sweep, by more than jitter

@@ -149,6 +149,7 @@ void Odometry::Begin(double t) {
   live_ = base_;
   imu_.Advance(t, &live_);
   level_.Turn(base_);
+  began_ = t;
   fused_ = started_ = true;
   imu_.DropBefore(base_.t);
 }

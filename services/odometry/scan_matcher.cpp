@@ -89,12 +89,21 @@ Eigen::Vector3d ScanMatcher::Squarely(const Eigen::Vector3d& normal,
   return axes * along;
 }
 
+/// Of the kernel, for a surface that a ray meets at this cosine to its normal: what leaves a thin
+/// one at a flat angle by more than noise can is of another, as the foot of a wall is that shares a
+/// cell with the ground. A few dozen such take centimetres of height where little else holds it.
+double ScanMatcher::Scale(double incidence, const Surface& surface) const {
+  constexpr double kSigmas = 3.0, kLeast = 0.025;  // m: a cell is no better known
+  const double along = config_.range_noise * incidence;
+  const double noise = std::sqrt(along * along + static_cast<double>(surface.variance));
+  return std::min(1.0, std::max(kLeast, kSigmas * noise) / config_.kernel);
+}
+
 ScanMatcher::System ScanMatcher::Linearise(const Pose& X_WB, double kernel, double gate,
                                            const Eigen::Matrix3d& axes, Matched* planes,
                                            Matched* posts, std::vector<Row>* rows) const {
   System system;
   const Eigen::Matrix3d R = X_WB.R.toRotationMatrix();
-  const double k2 = kernel * kernel;
   const double noise2 = config_.range_noise * config_.range_noise;
   rows->clear();
   const auto add = [&](Matched* features, auto&& residual_of, double support) {
@@ -108,10 +117,12 @@ ScanMatcher::System ScanMatcher::Linearise(const Pose& X_WB, double kernel, doub
       Vector6d J;
       const double r = residual_of(p_W, rotated, *surface, &J);
       if (std::abs(r) > gate) continue;
+      const double incidence = J.head<3>().dot(rotated) / std::max(1e-3, rotated.norm());
       const Eigen::Vector3d n = Squarely(J.head<3>(), axes);
       J << n, rotated.cross(n);
       ++system.matched;
       if (std::abs(r) < kernel) ++system.inliers;
+      const double own = Scale(incidence, *surface) * kernel, k2 = own * own;
       const double robust = k2 / (k2 + r * r);
       const double trust = noise2 / (noise2 + static_cast<double>(surface->variance));
       const double w = trust * robust * robust;

@@ -25,7 +25,7 @@ struct MatchConfig {
     v("max_iterations", max_iterations, "of Gauss-Newton");
     v("gate", gate, "features farther from their surface are left out, m");
     v("least_gate", least_gate, "the same where the prediction is certain, m");
-    v("kernel", kernel, "scale of the robust kernel at the end, m");
+    v("kernel", kernel, "largest scale of the robust kernel at the end, m");
     v("range_noise", range_noise, "smallest standard deviation of a residual, m");
     v("slant", slant, "a surface turned farther from a direction says nothing of it, deg");
     v("min_support", min_support, "features, at least, that must hold a direction");
@@ -84,11 +84,12 @@ inline double PostResidual(const Eigen::Vector3d& p_W, const Eigen::Vector3d& ro
 }
 
 /// Sweep against map: Gauss-Newton on the manifold over point-to-plane and point-to-line distances
-/// with a Geman-McClure kernel that narrows. Zhang & Singh 2014 (LOAM), eqs. (2) to (4). Directions
-/// are told known from unknown by what supports each, translation and rotation apart, after Tuna et
-/// al. 2023 (X-ICP), section IV; the unknown ones are left at the prediction. What fits is judged
-/// where sweep and prediction agree best: a few far features that lie within the gate of a surface
-/// which is not theirs would by their lever turn the sweep alone until they seem to fit.
+/// with a Geman-McClure kernel that narrows, the more so the less noise explains. Zhang & Singh
+/// 2014 (LOAM), eqs. (2) to (4). Directions are told known from unknown by what supports each,
+/// translation and rotation apart, after Tuna et al. 2023 (X-ICP), section IV; the unknown ones are
+/// left at the prediction. What fits is judged where sweep and prediction agree best: a few far
+/// features that lie within the gate of a surface which is not theirs would by their lever turn the
+/// sweep alone until they seem to fit.
 class ScanMatcher {
  public:
   explicit ScanMatcher(const MatchConfig& config) : config_(config) {}
@@ -109,6 +110,7 @@ class ScanMatcher {
   class Matched;
   System Linearise(const Pose& X_WB, double kernel, double gate, const Eigen::Matrix3d& axes,
                    Matched* planes, Matched* posts, std::vector<Row>* rows) const;
+  double Scale(double incidence, const Surface& surface) const;
   Eigen::Vector3d Squarely(const Eigen::Vector3d& normal, const Eigen::Matrix3d& axes) const;
   void Analyse(const System& system, const std::vector<Row>& rows, const Matrix6d& unknown_before,
                MatchResult* result) const;

@@ -4,7 +4,7 @@ add_library(odometry_test_support STATIC ${ODOMETRY_TEST_DIR}/odometry_synthetic
 target_link_libraries(odometry_test_support PUBLIC odometry_core PRIVATE PkgConfig::LZMA)
 
 chase_test(odometry_parts_test LIBS odometry_test_support
-  SOURCES ${ODOMETRY_TEST_DIR}/odometry_parts_test.cpp)
+  SOURCES ${ODOMETRY_TEST_DIR}/odometry_parts_test.cpp ${ODOMETRY_TEST_DIR}/odometry_filter_test.cpp)
 chase_test(odometry_level_test LIBS odometry_test_support
   SOURCES ${ODOMETRY_TEST_DIR}/odometry_level_test.cpp)
 chase_test(odometry_match_test LIBS odometry_test_support Ceres::ceres

@@ -142,8 +142,6 @@ TEST(ScanMatcher, CorridorLeavesItsAxisToThePrediction) {
   EXPECT_NEAR(match.X_WB.p.y(), start.p.y(), 0.05);
 }
 
-/// Seen from here, the wall shows another face than it showed in the room behind, wherever in the
-/// map's cells it stands.
 /// Normals of cells that few rings have crossed lean, each its own way; ranges to walls beside the
 /// body are off by millimetres. A few returns from the floor ahead tell the height all the same.
 TEST(ScanMatcher, WallsThatLeanDoNotPullTheHeight) {
@@ -173,6 +171,49 @@ TEST(ScanMatcher, WallsThatLeanDoNotPullTheHeight) {
   EXPECT_LT(std::abs(match.X_WB.p.z() - height), 0.01);
 }
 
+/// In a climb between walls returns from their feet, where nothing is mapped yet, fall into the
+/// coarse cells of a floor that few returns still show.
+TEST(ScanMatcher, TheFootOfAWallIsNoFloor) {
+  for (unsigned seed = 1; seed <= 10; ++seed) {
+    Noise noise(seed);
+    const Pose truth{Eigen::Quaterniond::Identity(), {0.0, 0.0, 0.35}};
+    const Eigen::Vector3f eye = truth.p.cast<float>();
+    SurfaceMap planes(MapConfig{}, SurfaceKind::kPlane), posts(MapConfig{}, SurfaceKind::kLine);
+    Features features;
+    const auto between = [&](double a, double b) { return a + (b - a) * noise.Uniform(); };
+    const auto learn = [&](int n, const std::function<Eigen::Vector3d()>& point) {
+      for (int i = 0; i < n; ++i) planes.Add({point().cast<float>()}, eye);
+    };
+    const auto see = [&](int n, const std::function<Eigen::Vector3d()>& point) {
+      for (int i = 0; i < n; ++i) {
+        const Eigen::Vector3d ray = point() - truth.p;
+        features.planes.push_back(((1.0 + noise.Gauss(0.02) / ray.norm()) * ray).cast<float>());
+      }
+    };
+    const auto floor = [&] {
+      return Eigen::Vector3d(between(0.3, 3.0), between(-1.24, 1.24), noise.Gauss(0.004));
+    };
+    learn(3000, floor);
+    see(20, [&] { return Eigen::Vector3d(between(2.3, 2.8), between(-1.0, 1.0), 0.0); });
+    for (const double y : {-1.24, 1.24}) {
+      const auto wall = [&] { return Eigen::Vector3d(between(-3.0, 3.0), y, between(0.5, 1.2)); };
+      learn(3000, wall);
+      see(600, wall);
+    }
+    see(300, [&] { return Eigen::Vector3d(3.5, between(-1.2, 1.2), between(0.5, 1.2)); });
+    learn(3000, [&] { return Eigen::Vector3d(3.5, between(-1.2, 1.2), between(0.5, 1.2)); });
+    see(40, [&] { return Eigen::Vector3d(between(0.4, 2.2), -1.24, between(0.03, 0.13)); });
+    const MatchResult match =
+        ScanMatcher(MatchConfig{}).Match(features, planes, posts, truth, Uncertain(0.003));
+    ASSERT_TRUE(match.valid) << seed;
+    const double off = std::abs(match.X_WB.p.z() - truth.p.z());
+    EXPECT_LT(off, 0.04) << seed;
+    EXPECT_LT(off, 3.5 * std::sqrt(match.information.inverse()(2, 2))) << seed;
+  }
+}
+
+/// Seen from here, the wall shows another face than it showed in the room behind, wherever in the
+/// map's cells it stands.
 TEST(ScanMatcher, TheOtherFaceOfAThinWallDoesNotPull) {
   constexpr double kThickness = 0.15;
   Noise noise(6);
