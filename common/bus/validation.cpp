@@ -4,7 +4,9 @@
 #include <string>
 #include <vector>
 
+#include "common/bus/convert.h"
 #include "common/bus/image_format.h"
+#include "common/math/gaussian.h"
 #include "common/world/commands.h"
 
 namespace chase::bus {
@@ -66,6 +68,16 @@ class Check {
         Number(field, s.from).Number(field, s.to).Number(field, s.normal);
     }
     return *this;
+  }
+  Check& Covariance(const char* field, const double (&upper)[6]) {
+    return Number(field, upper).Covariance(field, ToSymmetric(upper));
+  }
+  Check& Covariance(const char* field, const double (&rows)[9]) {
+    return Number(field, rows)
+        .Covariance(field, Eigen::Matrix3d(Eigen::Map<const Eigen::Matrix3d>(rows)));
+  }
+  Check& Covariance(const char* field, const Eigen::Matrix3d& m) {
+    return That(math::IsCovariance(m), field, "is no covariance");
   }
   Check& Code(const char* field, int value, int last) {
     return That(value >= 0 && value <= last, field, "is not one of the constants");
@@ -188,8 +200,8 @@ std::string Problem(const obstacles_t& m) {
     if (o.solid != obstacle_t::ELLIPSOID)
       check.That(o.half[0] > 0.0 && o.half[1] > 0.0 && o.half[2] > 0.0, "half", "is not positive")
           .Quaternion(o.orientation);
-    check.Number("position_covariance", o.position_covariance)
-        .Number("velocity_covariance", o.velocity_covariance)
+    check.Covariance("position_covariance", o.position_covariance)
+        .Covariance("velocity_covariance", o.velocity_covariance)
         .Probability("existence", o.existence);
   }
   return check.Result();
@@ -233,8 +245,8 @@ std::string Problem(const prediction_t& m) {
       .Time(m.utime)
       .Code("verdict", m.verdict, 2)
       .Polynomial("target", m.target)
-      .Number("covariance", m.covariance)
-      .Number("velocity_covariance", m.velocity_covariance)
+      .Covariance("covariance", m.covariance)
+      .Covariance("velocity_covariance", m.velocity_covariance)
       .Number("radius", m.radius)
       .Number("height", m.height)
       .Probability("existence", m.existence)

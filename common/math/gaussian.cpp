@@ -43,6 +43,15 @@ double LargestSigma(const Eigen::Matrix3d& covariance) {
   return std::sqrt(std::max(0.0, eigen.eigenvalues().maxCoeff()));
 }
 
+bool IsCovariance(const Eigen::Matrix3d& m) {
+  constexpr double kRounding = 1e-12;  // of the trace
+  if (m.isZero(0.0)) return true;
+  const double slack = kRounding * m.trace();
+  if (!m.allFinite() || !((m - m.transpose()).cwiseAbs().maxCoeff() <= slack)) return false;
+  const Eigen::LLT<Eigen::Matrix3d> llt(m + slack * Eigen::Matrix3d::Identity());
+  return llt.info() == Eigen::Success;
+}
+
 Eigen::Matrix3d MadePositiveDefinite(const Eigen::Matrix3d& m, double floor) {
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(0.5 * (m + m.transpose()));
   const Eigen::Vector3d values = eigen.eigenvalues().cwiseMax(floor);

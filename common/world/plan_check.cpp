@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "common/math/gaussian.h"
+
 namespace chase::world {
 
 namespace {
@@ -66,6 +68,9 @@ class Examiner {
       return "is kept off a smaller sphere";
     const Obstacle& obstacle = obstacles_[at_];
     if (!IsCurve(obstacle.center)) return "moves in no way that can be checked";
+    if (!body_ && !(math::IsCovariance(obstacle.position_covariance) &&
+                    math::IsCovariance(obstacle.velocity_covariance)))
+      return "has a covariance that is none";
     if (!body_) body_.emplace(MakeBody(obstacle, of_.start, of_.duration, claim_.sigmas));
     drone_.radius = math::Polynomial::Constant(1, proof.radius);
     if (proof.of_sight) target_.radius = proof.target_radius;

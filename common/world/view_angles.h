@@ -4,7 +4,7 @@
 
 namespace chase::world {
 
-/// The image's edges as planning asks about them, degrees, less a margin for what calibration, drag
+/// The image's edges as planning asks about them, degrees, less a margin for what calibration, wind
 /// and control tilt the body by.
 struct ViewAngles {
   double down = 0.0;     ///< the lower edge below the body's level

@@ -152,6 +152,7 @@ FlightConfigs Configure(const world::Scenario& scenario, const FlightOptions& op
   Override(scenario, "perception", &configs.perception);
   Override(scenario, "prediction", &configs.prediction);
   DeriveView(configs.perception.rig, &configs.planning.planner);
+  configs.planning.planner.drag = configs.control.drag.head<2>().mean();
   Override(scenario, "planning", &configs.planning);
   CheckVolume(configs);
   configs.control.tracking_tube = configs.planning.planner.tracking_tube;

@@ -1,5 +1,6 @@
 #include "services/mapping/mapper.h"
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <utility>
@@ -22,11 +23,12 @@ constexpr double kWindowMargin = 1.0;  // m beyond the list's radius that the de
 constexpr int kFirstUnseen = 1 << 29;  // ids beyond those of pieces and of the ground
 constexpr double kMostCoordinate = 6000.0;  // m, what the octree's keys can hold at 0.2 m
 
-/// Distance from p to the surface of an upright ellipse about c, roughly: along the line between.
-double PlanDistance(const world::Obstacle& o, const Eigen::Vector3d& p) {
+/// p is no nearer to the outline of an upright solid: the line across the way to its centre that
+/// touches the ellipse is as far away.
+double LeastPlanDistance(const world::Obstacle& o, const Eigen::Vector3d& p) {
   const Eigen::Vector2d d = (p - o.center.coefficients.row(0).transpose()).head<2>();
-  const double level = std::sqrt(d.dot(o.shape.topLeftCorner<2, 2>() * d));
-  return level > 1.0 ? d.norm() * (1.0 - 1.0 / level) : 0.0;
+  const Eigen::Matrix2d Q = o.shape.topLeftCorner<2, 2>().inverse();
+  return d.norm() - std::sqrt(d.dot(Q * d)) / std::max(1e-9, d.norm());
 }
 
 /// What lies about as near to a mover as a cell is wide may be its own.
@@ -53,7 +55,7 @@ void SetSolid(const Piece& piece, double semi_height, world::Obstacle* o) {
 int KeepNearest(const Eigen::Vector3d& origin, int most, std::vector<world::Obstacle>* obstacles) {
   std::stable_sort(obstacles->begin(), obstacles->end(),
                    [&](const world::Obstacle& a, const world::Obstacle& b) {
-                     return PlanDistance(a, origin) < PlanDistance(b, origin);
+                     return LeastPlanDistance(a, origin) < LeastPlanDistance(b, origin);
                    });
   const int cut = std::max(0, static_cast<int>(obstacles->size()) - most);
   obstacles->resize(obstacles->size() - static_cast<size_t>(cut));
@@ -245,13 +247,13 @@ std::vector<world::Obstacle> Mapper::Statics(const Eigen::Vector3d& origin, doub
   for (const auto& piece : pieces) {
     world::Obstacle o = Upright(piece.id, piece.outline, t);
     SetSolid(piece, config_.statics.semi_height, &o);
-    if (PlanDistance(o, origin) <= config_.statics.radius && o.shape.allFinite())
+    if (LeastPlanDistance(o, origin) <= config_.statics.radius && o.shape.allFinite())
       obstacles.push_back(std::move(o));
   }
   // Until it is known how they move they are listed where they are.
   for (const Track* track : tracker_.Unconfirmed()) {
     world::Obstacle o = Upright(track->id, track->Outline(), t);
-    if (PlanDistance(o, origin) <= config_.statics.radius && o.shape.allFinite())
+    if (LeastPlanDistance(o, origin) <= config_.statics.radius && o.shape.allFinite())
       obstacles.push_back(std::move(o));
   }
   return obstacles;
@@ -342,7 +344,7 @@ ObstacleList Mapper::Insert(const Sweep& sweep) {
   const double middle =
       ground_.Height(sweep.origin.x(), sweep.origin.y()) + 0.5 * (c.band_low + c.band_high);
   for (auto& o : tracker_.Obstacles(middle, c.semi_height, 1.02)) {
-    if (PlanDistance(o, sweep.origin) > config_.grid.range) continue;
+    if (LeastPlanDistance(o, sweep.origin) > config_.grid.range) continue;
     ++list.n_moving;
     StopAtWalls(&o);
     list.obstacles.push_back(std::move(o));

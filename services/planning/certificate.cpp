@@ -241,8 +241,10 @@ std::string SampleFaults(const Curve& plan, const Problem& problem, double sight
         std::abs(p.z() - q.z()) > l.tan_elevation * (p - q).head<2>().norm() + 1e-9)
       return "elevation";
     if (l.view && tau >= l.view_from) {
-      const double T2 = problem.duration * problem.duration;
-      const double below = SeenAt(q - p, Evaluate(plan, tau, 2) / T2, nullptr).x();
+      const double T = problem.duration;
+      const double below = SeenAt(q - p, Evaluate(plan, tau, 1) / T,
+                                  Evaluate(plan, tau, 2) / (T * T), l.view->drag, nullptr)
+                               .x();
       if (!(below < l.view->down + 1e-9) || !(below > -l.view->up - 1e-9)) return "image";
     }
   }

@@ -54,7 +54,7 @@ void Split(const Coefficients& whole, double at, Coefficients* left, Coefficient
   }
 }
 
-/// Of a plan: target - plan, acceleration plus gravity, and the yaw where there is one.
+/// Of a plan: target - plan, the thrust over mass that it takes, and the yaw where there is one.
 struct Piece {
   Coefficients r[3], f[3], yaw;
   bool has_yaw = false;
@@ -187,13 +187,15 @@ bool Set(const math::Polynomial& power, Coefficients* out) {
 }
 
 bool Set(const Curve& plan, const Curve& target, double duration, const std::vector<double>* yaw,
-         Piece* piece) {
+         double drag, Piece* piece) {
   const Eigen::Index n = std::max(plan.rows(), target.rows());
   for (int a = 0; a < 3; ++a) {
     math::Polynomial r = math::Polynomial::Zero(n);
     r.head(target.rows()) = target.col(a);
     r.head(plan.rows()) -= plan.col(a);
-    math::Polynomial f = math::Derivative(math::Derivative(plan.col(a))) / (duration * duration);
+    const math::Polynomial rate = math::Derivative(plan.col(a)) / duration;
+    math::Polynomial f = math::Derivative(rate) / duration;
+    if (a < 2) f = math::Sum(f, rate, drag);
     if (a == 2) f[0] += kGravity;
     if (!Set(r, &piece->r[a]) || !Set(f, &piece->f[a])) return false;
   }
@@ -208,7 +210,7 @@ bool Set(const Curve& plan, const Curve& target, double duration, const std::vec
 bool KeepsView(const Curve& plan, const Curve& target, double duration,
                const std::vector<double>* yaw, const View& view, double from) {
   Piece whole;
-  if (!Set(plan, target, duration, yaw, &whole)) return false;
+  if (!Set(plan, target, duration, yaw, view.drag, &whole)) return false;
   if (from >= 1.0) return true;
   if (from > 0.0) {
     Piece before, after;
@@ -218,10 +220,11 @@ bool KeepsView(const Curve& plan, const Curve& target, double duration,
   return Keeps(whole, view);
 }
 
-Eigen::Vector2d SeenAt(const Eigen::Vector3d& to_target, const Eigen::Vector3d& acceleration,
-                       const double* yaw) {
+Eigen::Vector2d SeenAt(const Eigen::Vector3d& to_target, const Eigen::Vector3d& v,
+                       const Eigen::Vector3d& a, double drag, const double* yaw) {
   Piece piece;
-  for (int a = 0; a < 3; ++a) piece.r[a].c[0] = to_target[a], piece.f[a].c[0] = acceleration[a];
+  const Eigen::Vector3d f = a + drag * Eigen::Vector3d(v.x(), v.y(), 0.0);
+  for (int i = 0; i < 3; ++i) piece.r[i].c[0] = to_target[i], piece.f[i].c[0] = f[i];
   piece.f[2].c[0] += kGravity;
   if (yaw) piece.yaw.c[0] = *yaw;
   piece.has_yaw = yaw != nullptr;

@@ -46,6 +46,27 @@ std::optional<world::Obstacle> TargetBody(const Forecast& f) {
   return body;
 }
 
+// A climb goes on only while somebody looks whether it may; not certified, as it is not.
+PlanResult StoppingSoon(double t0, PlanResult climb) {
+  constexpr double kOver = kBrakeTimes[2];
+  const double t = t0 + kOverdue;
+  climb.stop.reset();
+  if (t < climb.trajectory.end())
+    climb.stop = {t, kOver, BrakeCurve(climb.trajectory.At(t), kOver)};
+  return climb;
+}
+
+// What it proves does not hold.
+PlanResult AsLastResort(const std::string& why, PlanResult plan) {
+  plan.proofs.clear();
+  plan.stop_proofs.clear();
+  plan.certified_clearance = -1.0;
+  if (plan.verdict == Verdict::kEscape) plan.verdict = Verdict::kMitigate;
+  if (plan.verdict < Verdict::kBrake) plan.verdict = Verdict::kBrake;
+  plan.reason = why + (plan.reason.empty() ? "" : "; " + plan.reason);
+  return plan;
+}
+
 bool IsFinite(const PlanResult& plan) {
   if (!plan.trajectory.coefficients.allFinite()) return false;
   return std::all_of(plan.yaw.begin(), plan.yaw.end(), [](double y) { return std::isfinite(y); });
@@ -153,6 +174,10 @@ std::optional<PlanResult> Pilot::Update(double t, const BodyEstimate& body) {
   PlanResult plan = !Chases()                                       ? Obey(t0, start, body)
                     : airborne_ && HasTarget(t) && SeesObstacles(t) ? Chase(t0, start)
                                                                     : Wait(t0, start, body);
+  if (plan.certified_clearance >= 0.0 && plan.certified_clearance < tube_.beyond)
+    plan = AsLastResort("the body strays farther than any tube", Rest(t0, start));
+  else if (plan.certified_clearance >= 0.0)
+    plan.certified_clearance -= tube_.beyond;
   if (!IsFinite(plan)) plan = Rest(t0, {{body.p}, {body.yaw}});
   running_ = plan;
   has_running_ = true;
@@ -232,13 +257,13 @@ PlanResult Pilot::Chase(double t0, const Start& start) {
 
 PlanResult Pilot::Wait(double t0, const Start& start, const BodyEstimate& body) {
   if (!airborne_ && !has_running_) {
-    PlanResult climb = Climb(t0, body);
+    PlanResult climb = StoppingSoon(t0, Climb(t0, body));
     climb_end_ = climb.trajectory.end();
     climb_top_ = climb.trajectory.Position(climb_end_);
     return climb;
   }
   if (!airborne_ && t0 < climb_end_ && IsFree(t0, start, running_.trajectory))
-    return PlanResult(running_);  // still climbing
+    return StoppingSoon(t0, running_);  // still climbing
   airborne_ = true;
   if (task_ == Task::kTakeoff) return ClimbOn(t0, start, body);
   if (!SeesObstacles(t0 - config_.latency)) return Rest(t0, start);
@@ -275,9 +300,7 @@ PlanResult Pilot::ClimbOn(double t0, const Start& start, const BodyEstimate& bod
   }
   if (!leg)
     return Hold(t0, start, "climb broken off: somebody comes, or obstacles are not heard of");
-  PlanResult plan = Along(request, start, std::move(*leg), InFence(body.p));
-  plan.reason = "climbing";
-  return plan;
+  return Along(request, start, std::move(*leg), InFence(body.p), "climbing");
 }
 
 PlanResult Pilot::Obey(double t0, const Start& start, const BodyEstimate& body) {
@@ -287,7 +310,7 @@ PlanResult Pilot::Obey(double t0, const Start& start, const BodyEstimate& body) 
   return task_ == Task::kReturn ? Return(t0, start, body) : Hold(t0, start, "holding");
 }
 
-PlanResult Pilot::Hold(double t0, const Start& start, const std::string& reason) {
+PlanResult Pilot::Hold(double t0, const Start& start, const std::string& reason) const {
   PlanResult plan = Rest(t0, start);
   plan.reason = reason + (plan.reason.empty() ? "" : ", " + plan.reason);
   return plan;
@@ -311,13 +334,12 @@ PlanResult Pilot::Return(double t0, const Start& start, const BodyEstimate& body
       way_back_.Leg(config_.planner, request, trail_, above,
                     start.on_plan ? &running_.trajectory : nullptr, InFence(body.p));
   if (!leg || !SeesObstacles(t0 - config_.latency)) return Hold(t0, start, "no way back");
-  PlanResult plan = Along(request, start, std::move(*leg), InFence(body.p));
-  plan.reason = "returning";
-  return plan;
+  return Along(request, start, std::move(*leg), InFence(body.p), "returning");
 }
 
+// A long leg that nobody could stop soon is not flown.
 PlanResult Pilot::Along(const PlanRequest& request, const Start& start, Stop leg,
-                        const MayFly& may_fly) const {
+                        const MayFly& may_fly, const std::string& reason) const {
   const bool leaves = LeavesObstacles(leg.proofs);
   PlanResult plan;
   plan.verdict = leaves ? Verdict::kEscape : Verdict::kSafeOnly;
@@ -329,6 +351,10 @@ PlanResult Pilot::Along(const PlanRequest& request, const Start& start, Stop leg
     plan.stop = std::move(stop->trajectory);
     plan.stop_proofs = std::move(stop->proofs);
   }
+  const double left = plan.stop ? plan.stop->start : plan.trajectory.end();
+  if (left - request.t0 > kLongestBrake)
+    return Hold(request.t0, start, reason + " would have no stop");
+  plan.reason = reason;
   return plan;
 }
 
@@ -344,10 +370,10 @@ PlanResult Pilot::Land(double t0, const Start& start, const BodyEstimate& body) 
   WayDown::Answer answer = way_down_.Lead(
       config_.planner, request, needs, here.trajectory.Position(here.trajectory.end()), home_,
       start.on_plan ? &running_.trajectory : nullptr, InFence(body.p));
-  PlanResult plan =
-      answer.leg ? Along(request, start, std::move(*answer.leg), InFence(body.p)) : std::move(here);
-  plan.reason = "landing, " + answer.reason;
-  return plan;
+  const std::string reason = "landing, " + answer.reason;
+  if (answer.leg) return Along(request, start, std::move(*answer.leg), InFence(body.p), reason);
+  here.reason = reason;
+  return here;
 }
 
 PlanResult Pilot::Climb(double t0, const BodyEstimate& body) const {
@@ -385,32 +411,30 @@ PlanResult Pilot::Search(double t0, const Start& start, const BodyEstimate& body
 }
 
 // Braking while it moves; else where it is, for as long as that can be certified.
-// Without new lists moving obstacles are left out and what stands is where it was listed:
-// uncertainty would grow until it covers every place, and fleeing from it leads into space that
-// nobody observes.
 PlanResult Pilot::Rest(double t0, const Start& start) const {
   const bool sees = SeesObstacles(t0 - config_.latency);
   PlanRequest request = Request(t0, start);
-  std::vector<world::Obstacle>& listed = request.obstacles;
-  if (!sees) {
-    const auto moves = [](const world::Obstacle& o) { return o.moving; };
-    listed.erase(std::remove_if(listed.begin(), listed.end(), moves), listed.end());
-    for (world::Obstacle& o : listed) o.velocity_covariance.setZero();
-    request.unseen.clear();
-    request.tube = 0.0;
-  }
-  PlanResult plan = RestPlan(config_.planner, request);
+  PlanResult plan = sees ? RestPlan(config_.planner, request) : RestUnseeing(std::move(request));
   plan.yaw = {start.yaw.yaw};
   if (plan.reason.empty() && IsAtRest(start.state)) plan.verdict = Verdict::kWait;
-  if (sees) return plan;
-  plan.proofs
-      .clear();  // of a world that nobody has seen for a while: a last resort, whatever it is
-  plan.stop_proofs.clear();
-  plan.certified_clearance = -1.0;
-  if (plan.verdict == Verdict::kEscape) plan.verdict = Verdict::kMitigate;
-  if (plan.verdict < Verdict::kBrake) plan.verdict = Verdict::kBrake;
-  plan.reason = "obstacles are not heard of" + (plan.reason.empty() ? "" : "; " + plan.reason);
-  return plan;
+  return sees ? plan : AsLastResort("obstacles are not heard of", std::move(plan));
+}
+
+// Without new lists. What was committed to was certified against where movers would go, which no
+// braking knows any more. After it, or where nobody moved, it brakes: moving obstacles are left out
+// and what stands is where it was listed: uncertainty would grow until it covers every place, and
+// fleeing from it leads into space that nobody observes.
+PlanResult Pilot::RestUnseeing(PlanRequest request) const {
+  std::vector<world::Obstacle>& listed = request.obstacles;
+  const auto moves = [](const world::Obstacle& o) { return o.moving; };
+  const auto moving = std::remove_if(listed.begin(), listed.end(), moves);
+  if (moving != listed.end() && running_.verdict != Verdict::kWait)
+    if (auto plan = AsCommitted(request)) return *plan;
+  listed.erase(moving, listed.end());
+  for (world::Obstacle& o : listed) o.velocity_covariance.setZero();
+  request.unseen.clear();
+  request.tube = 0.0;
+  return RestPlan(config_.planner, request);
 }
 
 // A target that was chased before the frame changed, and is not seen soon after it, may be anywhere

@@ -97,13 +97,14 @@ class Pilot {
   PlanResult ClimbOn(double t0, const Start& start, const BodyEstimate& body);
   PlanResult Hover(double t0, const Start& start);
   PlanResult Rest(double t0, const Start& start) const;
+  PlanResult RestUnseeing(PlanRequest request) const;
   PlanResult Obey(double t0, const Start& start, const BodyEstimate& body);
-  PlanResult Hold(double t0, const Start& start, const std::string& reason);
+  PlanResult Hold(double t0, const Start& start, const std::string& reason) const;
   PlanResult Return(double t0, const Start& start, const BodyEstimate& body);
   PlanResult Land(double t0, const Start& start, const BodyEstimate& body);
   MayFly InFence(const Eigen::Vector3d& p_WB) const;
-  PlanResult Along(const PlanRequest& request, const Start& start, Stop leg,
-                   const MayFly& may_fly) const;
+  PlanResult Along(const PlanRequest& request, const Start& start, Stop leg, const MayFly& may_fly,
+                   const std::string& reason) const;
   bool SeesObstacles(double t) const;
   double TrackingBound(double t) const;
   PlanResult Search(double t0, const Start& start, const BodyEstimate& body);

@@ -44,6 +44,7 @@ std::string PlannerConfig::Problem() const {
                                                          {"sight_margin", sight_margin},
                                                          {"refine_room", refine_room},
                                                          {"sigmas", sigmas},
+                                                         {"drag", drag},
                                                          {"max_speed", max_speed},
                                                          {"max_acceleration", max_acceleration},
                                                          {"min_distance", min_distance}};
@@ -73,7 +74,7 @@ std::optional<View> PlannerConfig::view() const {
   if (view_down_deg <= 0.0) return std::nullopt;
   constexpr double deg = M_PI / 180.0;
   return View{std::tan(view_down_deg * deg), std::tan(view_up_deg * deg),
-              std::tan(max_bearing_deg * deg)};
+              std::tan(max_bearing_deg * deg), drag};
 }
 
 PlannerConfig PlannerConfig::Literal() {

@@ -8,9 +8,9 @@
 namespace chase::planning {
 
 /// Edges of the image as tangents in the body's frame: below and above its level, and to either
-/// side of the optical axis.
+/// side of the optical axis; and the drag [1/s] that the body leans against as it flies.
 struct View {
-  double down = 0.0, up = 0.0, side = 0.0;
+  double down = 0.0, up = 0.0, side = 0.0, drag = 0.0;
 };
 
 /// Parameters of the planner. Symbols of Jeon 2021 in brackets.
@@ -46,7 +46,8 @@ struct PlannerConfig {
   double max_elevation_deg = 28.0;
   double view_down_deg = 37.5;
   double view_up_deg = 13.5;
-  double max_bearing_deg = 38.0;
+  double max_bearing_deg = 37.4;
+  double drag = 0.25;
   double min_distance = 0.8;
   double max_yaw_rate = 2.5;
 
@@ -94,6 +95,7 @@ struct PlannerConfig {
       "0: the image is not asked about");
     v("view_up_deg", view_up_deg, "its upper edge above the body's level, the same way");
     v("max_bearing_deg", max_bearing_deg, "its sides off the optical axis, the same way");
+    v("drag", drag, "linear drag over mass along the ground, as control's: it tilts the body, 1/s");
     v("min_distance", min_distance, "from the drone to the target's centre, m; 0: no limit");
     v("max_yaw_rate", max_yaw_rate, "of the plan's yaw, rad/s");
   }

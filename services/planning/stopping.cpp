@@ -99,37 +99,68 @@ bool KeepsOffMovers(const PlannerConfig& config, const PlanRequest& request,
 
 namespace {
 
-// The way that was committed to with the running plan: what is left of that plan until its stop,
-// and the stop, where they still hold without a margin.
-std::optional<PlanResult> Committed(const PlannerConfig& config, const PlanRequest& request) {
-  if (!request.stop) return std::nullopt;
+// A BRAKE only slows down. Whose acceleration must first be taken back, or who steps aside, is
+// faster for a moment.
+void NameFaster(bool certified, PlanResult* plan) {
+  constexpr double kFaster = 0.05;  // m/s
+  constexpr int kSamples = 50;
+  const world::Trajectory& way = plan->trajectory;
+  const double limit = way.Velocity(way.start).norm() + kFaster;
+  bool faster = false;
+  for (int i = 1; i <= kSamples && !faster; ++i)
+    faster = way.Velocity(way.start + i * way.duration / kSamples).norm() > limit;
+  if (plan->verdict != Verdict::kBrake || !faster) return;
+  plan->verdict = certified ? Verdict::kEscape : Verdict::kMitigate;
+  plan->reason += plan->reason.empty() ? "to rest, faster at first" : "; faster at first";
+}
+
+// The rest of a way to rest.
+std::optional<PlanResult> Left(const PlanRequest& request, const world::Trajectory& way) {
+  constexpr double kLeast = 0.1;  // s
+  const double T = way.end() - request.t0;
+  if (T < kLeast) return std::nullopt;
   PlanResult result;
-  if (request.t0 >= request.stop->start) {
-    auto stop = GoOn(config, request, *request.stop);
-    if (!stop) return std::nullopt;
-    result.verdict = LeavesObstacles(stop->proofs) ? Verdict::kEscape : Verdict::kBrake;
-    result.reason = "on the stop of the plan before";
-    result.trajectory = std::move(stop->trajectory);
-    SetProofs(config, request, std::move(stop->proofs), &result);
-    return result;
-  }
-  if (!request.running || request.stop->start > request.running->end()) return std::nullopt;
-  const double T = request.stop->start - request.t0;
-  Resting resting(config, request);
-  auto rest = resting.Certified(ToCurve(*request.running, request.t0, T), T);
-  if (!rest) return std::nullopt;
-  resting.From(request.running->At(request.stop->start), request.stop->start);
-  auto stop = resting.Certified(ToCurve(*request.stop, request.stop->start, request.stop->duration),
-                                request.stop->duration);
-  if (!stop) return std::nullopt;
-  result.verdict = LeavesObstacles(rest->proofs) || LeavesObstacles(stop->proofs)
-                       ? Verdict::kEscape
-                       : Verdict::kSafeOnly;
+  result.verdict = Verdict::kBrake;
+  result.reason = "on the stop of the plan before";
+  result.trajectory = {request.t0, T, ToCurve(way, request.t0, T)};
+  return result;
+}
+
+// What is left of the running plan until its stop, and that stop.
+std::optional<PlanResult> Left(const PlanRequest& request) {
+  if (!request.stop) return std::nullopt;
+  const world::Trajectory& stop = *request.stop;
+  if (request.t0 >= stop.start) return Left(request, stop);
+  PlanResult result;
+  result.verdict = Verdict::kBrake;
+  if (!request.running || stop.start > request.running->end()) return std::nullopt;
+  const double T = stop.start - request.t0;
   result.reason = "the running plan until its stop";
-  result.trajectory = std::move(rest->trajectory);
-  SetProofs(config, request, std::move(rest->proofs), &result);
-  result.stop = std::move(stop->trajectory);
-  result.stop_proofs = std::move(stop->proofs);
+  result.trajectory = {request.t0, T, ToCurve(*request.running, request.t0, T)};
+  result.stop = stop;
+  return result;
+}
+
+// What was committed to, where it still holds without a margin.
+std::optional<PlanResult> Committed(const PlannerConfig& config, const PlanRequest& request) {
+  auto result = Left(request);
+  if (!result) return std::nullopt;
+  const world::Trajectory& way = result->trajectory;
+  Resting resting(config, request);
+  auto rest = resting.Certified(Curve(way.coefficients), way.duration);
+  if (!rest) return std::nullopt;
+  bool leaves = LeavesObstacles(rest->proofs);
+  if (result->stop) {
+    const world::Trajectory& after = *result->stop;
+    resting.From(request.running->At(after.start), after.start);
+    auto stop = resting.Certified(Curve(after.coefficients), after.duration);
+    if (!stop) return std::nullopt;
+    leaves = leaves || LeavesObstacles(stop->proofs);
+    result->stop_proofs = std::move(stop->proofs);
+    result->verdict = Verdict::kSafeOnly;
+  }
+  if (leaves) result->verdict = Verdict::kEscape;
+  SetProofs(config, request, std::move(rest->proofs), &*result);
   return result;
 }
 
@@ -142,6 +173,15 @@ PlanRequest WithoutDrift(PlanRequest request) {
 }
 
 }  // namespace
+
+std::optional<PlanResult> AsCommitted(const PlanRequest& request) {
+  const auto& running = request.running;  // without a stop it is on its way to rest already
+  auto result = request.stop                             ? Left(request)
+                : running && world::EndsAtRest(*running) ? Left(request, *running)
+                                                         : std::nullopt;
+  if (result) NameFaster(false, &*result);
+  return result;
+}
 
 constexpr double kOver[] = {0.7, 1.0, 1.6};  // s, that ways aside take
 // s from now on that a place of rest should be clear: there is a way aside until then.
@@ -214,21 +254,6 @@ bool LeavesObstacles(const std::vector<Proof>& proofs) {
 }
 
 namespace {
-
-// A BRAKE only slows down. Whose acceleration must first be taken back, or who steps aside, is
-// faster for a moment.
-void NameFaster(bool certified, PlanResult* plan) {
-  constexpr double kFaster = 0.05;  // m/s
-  constexpr int kSamples = 50;
-  const world::Trajectory& way = plan->trajectory;
-  const double limit = way.Velocity(way.start).norm() + kFaster;
-  bool faster = false;
-  for (int i = 1; i <= kSamples && !faster; ++i)
-    faster = way.Velocity(way.start + i * way.duration / kSamples).norm() > limit;
-  if (plan->verdict != Verdict::kBrake || !faster) return;
-  plan->verdict = certified ? Verdict::kEscape : Verdict::kMitigate;
-  plan->reason += plan->reason.empty() ? "to rest, faster at first" : "; faster at first";
-}
 
 std::string IntoTheUnseen(const Stop& stop) {
   return stop.blind ? ", aside into what nobody has looked into" : "";

@@ -50,6 +50,10 @@ inline constexpr double kOverdue = 0.4;
 /// Do the proofs hold only once an obstacle is left that the start is in? Such a plan is an ESCAPE.
 bool LeavesObstacles(const std::vector<Proof>& proofs);
 
+/// What was committed to with the running plan, not certified: what is left of it until its stop,
+/// and the stop.
+std::optional<PlanResult> AsCommitted(const PlanRequest& request);
+
 /// Brake, the rest of the running plan until its stop and that stop, or else Evade, as a plan; the
 /// reason says what it is not.
 PlanResult RestPlan(const PlannerConfig& config, const PlanRequest& request);

@@ -33,7 +33,8 @@ Tube MakeTube(const PlanningConfig& config, const BodyEstimate& body, double bou
   const double spare = chased ? std::max(0.0, radius - strays) : 0.0;
   const double duration =
       world::kMostAge.obstacles + config.latency + config.horizon + kLongestBrake;
-  return {radius, BeyondTube(body.velocity_covariance, spare, duration, sigmas)};
+  return {radius, std::max(0.0, strays - radius),
+          BeyondTube(body.velocity_covariance, spare, duration, sigmas)};
 }
 
 }  // namespace chase::planning

@@ -7,12 +7,13 @@
 
 namespace chase::planning {
 
-/// m: from farther off control follows no plan (its reset_distance).
+/// m: wider, hardly a door is passed.
 inline constexpr double kWidestTube = 0.3;
 
 /// About a plan: the body strays from it by the tracking error, and the estimate from the body.
 struct Tube {
   double radius = 0.0;  ///< m
+  double beyond = 0.0;  ///< m by which the body may leave it all the same: the widest is too tight
   /// Covariance of the frame's velocity beyond what the tube has to spare for it, m^2/s^2.
   Eigen::Matrix3d drift = Eigen::Matrix3d::Zero();
 };

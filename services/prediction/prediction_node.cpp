@@ -104,7 +104,7 @@ PredictRequest PredictionNode::MakeRequest(const target_t& message) const {
   request.now = bus::Seconds(message.utime, *origin_);
   request.observations = window_.Merged();
   request.target_radius = message.radius;
-  const bool fresh = request.now - obstacles_time_ <= world::kMostAge.obstacles;
+  const bool fresh = world::IsFresh(request.now - obstacles_time_, world::kMostAge.obstacles);
   for (const world::Obstacle& o : obstacles_)
     if (!o.ground && (fresh || !o.moving)) request.obstacles.push_back(o);
   return request;

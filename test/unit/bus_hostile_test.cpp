@@ -170,6 +170,27 @@ TEST(HostileBus, ATextThatDoesNotEndAtItsOnlyZeroIsRefused) {
   }
 }
 
+/// Uncertainty that is negative would make room for a plan.
+TEST(HostileBus, WhatIsNoCovarianceIsRefused) {
+  const auto listed = [](double xx, double xy, double yy, double rate) {
+    obstacles_t m = Sample<obstacles_t>::Good();
+    obstacle_t& o = m.obstacles.at(0);
+    const double entries[6] = {xx, xy, 0.0, yy, 0.0, 0.0};
+    std::copy(entries, entries + 6, o.position_covariance);
+    o.velocity_covariance[5] = rate;
+    return Problem(m);
+  };
+  EXPECT_EQ(listed(0.0, 0.0, 0.0, 0.0), "");
+  EXPECT_EQ(listed(0.01, 0.02, 0.04, 0.0), "") << "along one line";
+  EXPECT_EQ(listed(-1e-4, 0.0, 0.01, 0.0), "field position_covariance is no covariance");
+  EXPECT_EQ(listed(0.01, 0.0201, 0.04, 0.0), "field position_covariance is no covariance");
+  EXPECT_EQ(listed(0.01, 0.0, 0.0, -1e-9), "field velocity_covariance is no covariance");
+  prediction_t forecast = Sample<prediction_t>::Good();
+  EXPECT_EQ(Problem(forecast), "");
+  forecast.covariance[8] = -1e-3;
+  EXPECT_EQ(Problem(forecast), "field covariance is no covariance");
+}
+
 TEST(HostileBus, ATextOfTheLeastLengthIsRefused) {
   Bus::Bytes bytes = Encode(event_t{});
   bytes[8 + 8 + 4] = 0x80;  // of the sender's name

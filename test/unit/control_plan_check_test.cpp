@@ -233,6 +233,15 @@ bool SpeakLater(Case* c, Random& g) {
   return true;
 }
 
+/// What would make room of uncertainty, where it is taken for one.
+bool NegateVariance(Case* c, Random& g) {
+  world::Obstacle& o = c->obstacles[g() % c->obstacles.size()];
+  Eigen::Matrix3d& S = g() % 2 ? o.position_covariance : o.velocity_covariance;
+  const Vector3d n = Somewhere(g);
+  S -= (n.dot(S * n) + std::pow(10.0, Uniform(g, -9.0, 1.0))) * n * n.transpose();
+  return true;
+}
+
 bool TakeCertificateBack(Case* c, Random& /*g*/) {
   c->claim.certified = false;
   return true;
@@ -251,6 +260,7 @@ const std::map<std::string, Forgery>& Forgeries() {
       {"planes missing", DropPlanes},
       {"obstacle moved", MoveObstacle},
       {"obstacle grown", GrowObstacle},
+      {"variance negative", NegateVariance},
       {"obstacle added", AddObstacle},
       {"proofs exchanged", ExchangeProofs},
       {"plan moved", MovePlan},

@@ -13,6 +13,7 @@ chase_test(planning_test
           ${CMAKE_CURRENT_LIST_DIR}/planning_problem_test.cpp
           ${CMAKE_CURRENT_LIST_DIR}/planning_ground_test.cpp
           ${CMAKE_CURRENT_LIST_DIR}/planning_pilot_test.cpp ${CMAKE_CURRENT_LIST_DIR}/planning_pilot_inputs_test.cpp
+          ${CMAKE_CURRENT_LIST_DIR}/planning_last_resort_test.cpp
           ${CMAKE_CURRENT_LIST_DIR}/planning_evasion_test.cpp ${CMAKE_CURRENT_LIST_DIR}/planning_ratchet_test.cpp
           ${CMAKE_CURRENT_LIST_DIR}/planning_safety_test.cpp ${CMAKE_CURRENT_LIST_DIR}/planning_limits_test.cpp
           ${CMAKE_CURRENT_LIST_DIR}/planning_stopping_test.cpp ${CMAKE_CURRENT_LIST_DIR}/planning_way_out_test.cpp ${CMAKE_CURRENT_LIST_DIR}/planning_flights_test.cpp

@@ -62,6 +62,37 @@ inline PlanRequest RandomRequest(const PlannerConfig& config, unsigned seed) {
   return request;
 }
 
+/// What surrounds a flight besides what is listed: a wider tube, the target's body, places that
+/// nobody has looked into.
+inline void Surround(unsigned seed, PlanRequest* request) {
+  Random random(seed, 79);
+  if (random.Uniform() < 0.5) request->tube = random.Uniform(0.12, 0.3);
+  if (random.Uniform() < 0.7) {
+    world::Obstacle& body = request->target_body.emplace();
+    body.id = kTargetId;
+    body.moving = true;
+    body.solid = world::Obstacle::Solid::kCylinder;
+    const double radius = random.Uniform(0.15, 0.4), height = random.Uniform(0.5, 1.8);
+    body.half = {radius, radius, 0.5 * height};
+    body.shape = body.half.cwiseAbs2().cwiseInverse().asDiagonal();
+    body.center = request->target;
+    const auto level = [&random](double most) {
+      const double deviation = random.Uniform(0.0, most);
+      return Matrix3d(deviation * deviation * Vector3d(1.0, 1.0, 0.0).asDiagonal());
+    };
+    body.position_covariance = level(0.05);
+    body.velocity_covariance = level(0.1);
+  }
+  for (int k = static_cast<int>(random.Next() % 4); k > 0; --k) {
+    world::Obstacle o = RandomObstacle(&random, *request, 1000 + k);
+    o.moving = false;
+    o.center.coefficients.conservativeResize(1, 3);
+    o.position_covariance.setZero();
+    o.velocity_covariance.setZero();
+    request->unseen.push_back(o);
+  }
+}
+
 /// The obstacle over [start, start + duration], written anew.
 inline world::Body Truth(const world::Obstacle& o, double start, double duration, double sigmas) {
   world::Body body;
@@ -99,6 +130,29 @@ inline double LeastGap(const world::Trajectory& way, double radius, double from,
                        const world::Ball* target, const world::Obstacle& o, double sigmas) {
   return LeastGap({way.coefficients, math::Polynomial::Constant(1, radius)}, target,
                   Truth(o, way.start, way.duration, sigmas), from);
+}
+
+/// Least gap of a ball of `radius` on its way from the target's body, until `until`, s, with all
+/// that its forecast does not know, instant by instant.
+inline double LeastGapFromTarget(const PlanRequest& request, const world::Trajectory& way,
+                                 double radius, double until, double sigmas) {
+  const world::Obstacle& o = *request.target_body;
+  double least = HUGE_VAL;
+  for (int i = 0; i <= kInstants; ++i) {
+    const double t = way.start + (until - way.start) * i / kInstants;
+    const double age = t - o.center.start;
+    world::Body body;
+    body.kind = o.solid;
+    body.half = o.half;
+    body.center = o.center.Position(t).transpose();
+    body.sigmas = sigmas;
+    body.covariance[0] = o.position_covariance + age * age * o.velocity_covariance;
+    for (int a = 0; a < 2; ++a) body.covariance[0](a, a) += request.target_manoeuvre.Variance(age);
+    const world::Ball drone{Curve(way.Position(t).transpose()),
+                            math::Polynomial::Constant(1, radius)};
+    least = std::min(least, Gap(drone, nullptr, body, 0.0));
+  }
+  return least;
 }
 
 /// The target's ball with a share of its margins of sight.

@@ -21,8 +21,17 @@ std::vector<std::string> BrokenPromises(const PlannerConfig& c, const PlanReques
   const auto check = [&](const char* what, double gap, int id) {
     if (gap < -kTolerance) broken.push_back(std::string(what) + std::to_string(id));
   };
+  const double hard = HardRadius(c, request);
+  const double soft = std::max(hard, c.hard_radius() + c.safety_margin);  // a wider tube takes it
+  const double left = plan.stop ? plan.stop->start : plan.trajectory.end();
   for (const Proof& p : plan.proofs) {
     const world::Trajectory& way = plan.trajectory;
+    if (p.obstacle == kTargetId) {
+      if (p.from == 0.0)
+        check("the target ", LeastGapFromTarget(request, way, p.radius, left, c.sigmas),
+              p.obstacle);
+      continue;
+    }
     const world::Obstacle& o = request.obstacles[static_cast<size_t>(p.obstacle)];
     const auto gap = [&](double radius, const world::Ball* target = nullptr) {
       return LeastGap(way, radius, p.from, target, o, c.sigmas);
@@ -42,11 +51,11 @@ std::vector<std::string> BrokenPromises(const PlannerConfig& c, const PlanReques
     safe.insert(o.id);
     check("safety from ", gap(p.radius), o.id);
     if (p.from == 0.0)
-      check("clearance from ", gap(c.hard_radius() + plan.certified_clearance), o.id);
+      check("clearance from ", gap(hard + plan.certified_clearance), o.id);
     else if (plan.verdict != Verdict::kEscape)
       broken.push_back("late, and no escape");
-    if (p.radius < c.hard_radius()) broken.push_back("less than the hard radius");
-    if (plan.reason.empty() && p.radius < c.hard_radius() + c.safety_margin - 1e-12)
+    if (p.radius < hard) broken.push_back("less than the hard radius");
+    if (plan.reason.empty() && p.radius < soft - 1e-12)
       broken.push_back("less than the margin, unsaid");
   }
   if (safe.size() != request.obstacles.size()) broken.push_back("an obstacle without a proof");
@@ -59,11 +68,29 @@ std::vector<std::string> BrokenPromises(const PlannerConfig& c, const PlanReques
     broken.push_back("a chase over a part of the horizon");
   if (plan.verdict <= Verdict::kSafeOnly && plan.trajectory.duration > request.horizon + 1e-9)
     broken.push_back("beyond the horizon");
+  const bool chases = plan.verdict <= Verdict::kSafeOnly;
+  for (const world::Obstacle& o : request.unseen) {
+    // From within they lead out.
+    const double start =
+        LeastGap({plan.trajectory.coefficients.row(0), math::Polynomial::Constant(1, hard)},
+                 nullptr, Truth(o, plan.trajectory.start, 1.0, c.sigmas), 1.0);
+    if (!chases || !plan.stop || start < 0.01) continue;
+    const world::Trajectory until =
+        plan.trajectory.Reparametrised(plan.trajectory.start, left - plan.trajectory.start);
+    check("into the unseen ", LeastGap(until, hard, 0.0, nullptr, o, c.sigmas), o.id);
+    check("stop in the unseen ", LeastGap(*plan.stop, hard, 0.0, nullptr, o, c.sigmas), o.id);
+  }
   if (plan.stop)
     for (const Proof& p : plan.stop_proofs) {
+      if (p.obstacle == kTargetId) {
+        if (p.from == 0.0)
+          check("stop from the target ",
+                LeastGapFromTarget(request, *plan.stop, hard, plan.stop->end(), c.sigmas),
+                p.obstacle);
+        continue;
+      }
       const world::Obstacle& o = request.obstacles[static_cast<size_t>(p.obstacle)];
-      check("stop from ", LeastGap(*plan.stop, c.hard_radius(), p.from, nullptr, o, c.sigmas),
-            o.id);
+      check("stop from ", LeastGap(*plan.stop, hard, p.from, nullptr, o, c.sigmas), o.id);
       if (p.from > 0.0 && plan.verdict != Verdict::kEscape)
         broken.push_back("late stop, no escape");
     }
@@ -92,6 +119,7 @@ TEST(Minkowski, CertifiedPlansKeepOffWhatTheySayTheyDo) {
   std::map<Verdict, int> verdicts;
   for (unsigned seed = 1; seed <= n; ++seed) {
     PlanRequest request = RandomRequest(config, seed);
+    if (seed % 2 == 0) Surround(seed, &request);
     // Each plan, and the one that follows it.
     for (const double later : {0.0, 0.3}) {
       if (later > 0.0) GoOn(later, planner->Plan(request), &request);

@@ -45,7 +45,7 @@ struct Extremes {
     const Vector3d r = target - s.p;
     near = std::min(near, r.norm());
     slope = std::max(slope, std::abs(r.z()) / r.head<2>().norm());
-    const double seen = SeenAt(r, s.a, nullptr).x();
+    const double seen = SeenAt(r, s.v, s.a, PlannerConfig().drag, nullptr).x();
     below = std::max(below, seen);
     above = std::max(above, -seen);
   }
@@ -126,7 +126,7 @@ TEST(Ratchet, APlaceBeyondALimitIsNotComeNearerToBitByBit) {
        [](const Extremes& e) { return e.slope; });
   c = {};
   c.view_down_deg = 12.0;
-  Push("lower edge", c, 0.6, 0.8, std::tan(12.0 * kDegree),
+  Push("lower edge", c, 0.6, 0.75, std::tan(12.0 * kDegree),
        [](const Extremes& e) { return e.below; });
   c = {};
   c.elevation_low_deg = -14.0;

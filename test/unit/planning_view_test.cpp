@@ -14,7 +14,7 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-constexpr double kGravity = 9.80665;
+constexpr double kGravity = 9.80665, kDrag = 0.4;  // m/s^2, 1/s
 
 double Evaluated(const std::vector<double>& c, double tau) {
   double y = 0.0;
@@ -57,8 +57,10 @@ struct Scene {
   /// the target, and only the upper and lower edge count.
   double Inside(const world::Rig& rig, double tau, bool follow) const {
     const Vector3d r = Evaluated(target, tau) - Evaluated(plan, tau);
-    const Vector3d z =
-        (Evaluated(plan, tau, 2) / (duration * duration) + Vector3d(0, 0, kGravity)).normalized();
+    const Vector3d v = Evaluated(plan, tau, 1) / duration;
+    const Vector3d z = (Evaluated(plan, tau, 2) / (duration * duration) +
+                        kDrag * Vector3d(v.x(), v.y(), 0.0) + Vector3d(0, 0, kGravity))
+                           .normalized();
     const double psi = follow ? std::atan2(r.y(), r.x()) : Evaluated(yaw, tau);
     const Vector3d y = z.cross(Vector3d(std::cos(psi), std::sin(psi), 0.0)).normalized();
     Matrix3d R_WB;
@@ -80,7 +82,7 @@ struct Scene {
 View ViewOf(const world::Rig& rig) {
   const double pitch = rig.camera_pitch_deg * M_PI / 180.0;
   const double half = std::atan(rig.center_v_px / rig.focal_px);
-  return {std::tan(half + pitch), std::tan(half - pitch), rig.center_u_px / rig.focal_px};
+  return {std::tan(half + pitch), std::tan(half - pitch), rig.center_u_px / rig.focal_px, kDrag};
 }
 
 void Compare(bool follow, double from) {
@@ -110,7 +112,9 @@ TEST(FieldOfView, OneInstantIsSeenAsTheCameraSeesIt) {
     const Scene scene(seed);
     const Vector3d r = Evaluated(scene.target, 0.3) - Evaluated(scene.plan, 0.3);
     const Vector3d a = Evaluated(scene.plan, 0.3, 2) / (scene.duration * scene.duration);
-    const double below = SeenAt(r, a, nullptr).x(), pitch = rig.camera_pitch_deg * M_PI / 180.0;
+    const Vector3d rate = Evaluated(scene.plan, 0.3, 1) / scene.duration;
+    const double below = SeenAt(r, rate, a, kDrag, nullptr).x(),
+                 pitch = rig.camera_pitch_deg * M_PI / 180.0;
     if (!std::isfinite(below)) continue;
     const double v = rig.focal_px * std::tan(std::atan(below) - pitch) + rig.center_v_px;
     EXPECT_NEAR(std::min(v, 2.0 * rig.center_v_px - v), scene.Inside(rig, 0.3, true), 1e-6);

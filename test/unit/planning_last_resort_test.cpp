@@ -1,0 +1,101 @@
+// Ways that whoever hears no plan any more, or plans without lists, goes on by; and what is said
+// where no tube is wide enough.
+#include <gtest/gtest.h>
+
+#include "services/planning/stopping.h"
+#include "test/unit/planning_pilot_flight.h"
+
+namespace chase::planning {
+namespace {
+
+TEST(LastResort, AClimbThatNobodyWatchesAnyMoreEndsWhereItIs) {
+  const PlanningConfig config;
+  constexpr double kSlack = 0.03;  // m, of a braking that begins where the climb slows down
+  Flight flight{config};
+  flight.Run(2.0, false);
+  ASSERT_GT(flight.plans.size(), 10u);
+  for (const PlanResult& plan : flight.plans) {
+    ASSERT_EQ(plan.reason, "climbing");
+    ASSERT_TRUE(plan.stop);
+    EXPECT_LT(plan.certified_clearance, 0.0);
+    const world::Trajectory& stop = *plan.stop;
+    EXPECT_LE(stop.start, plan.trajectory.start + config.takeoff_time);
+    EXPECT_LT((stop.Position(stop.start) - plan.trajectory.Position(stop.start)).norm(), 1e-9);
+    EXPECT_LT((stop.Velocity(stop.start) - plan.trajectory.Velocity(stop.start)).norm(), 1e-9);
+    EXPECT_LT(stop.Velocity(stop.end()).norm(), 1e-9);
+    EXPECT_LT((stop.Position(stop.end()) - plan.trajectory.Position(0.0)).head<2>().norm(), 1e-9);
+    EXPECT_LT(stop.Position(stop.end()).z(), 0.1 + config.takeoff_height + kSlack);
+  }
+  // The planner hangs 0.1 s into the climb.
+  Flight hangs{config};
+  hangs.Run(0.1, false);
+  for (hangs.hears = false; hangs.t < 3.0; hangs.t += 0.1)
+    EXPECT_LT(hangs.Body().p.z(), 0.3) << hangs.t;
+}
+
+/// A pillar beside a chase.
+world::Obstacle Pillar(const Eigen::Vector3d& p) {
+  world::Obstacle pillar;
+  pillar.id = 7;
+  pillar.solid = world::Obstacle::Solid::kCylinder;
+  pillar.half = {0.2, 0.2, 3.0};
+  pillar.shape = (2.0 * pillar.half.cwiseAbs2()).cwiseInverse().asDiagonal();
+  pillar.center = world::Trajectory::Constant(p, 0.0, 1.0);
+  return pillar;
+}
+
+TEST(LastResort, WithoutListsItGoesOnAsCommitted) {
+  Flight flight{PlanningConfig()};
+  world::Obstacle walker = Pillar({-6.0, 4.0, 1.0});
+  walker.moving = true;
+  walker.half.head<2>().setConstant(0.3);
+  flight.obstacles = {walker};
+  flight.Run(4.0, false);
+  flight.Run(4.0, true);
+  flight.hears = false;
+  const size_t seen = flight.plans.size();
+  PlanResult committed;
+  while (flight.plans.back().reason.find("not heard of") == std::string::npos) {
+    committed = flight.plans.back();
+    flight.Run(kPeriod, true);
+    ASSERT_LT(flight.plans.size(), seen + 20);
+  }
+  ASSERT_TRUE(committed.stop);
+  const double end = committed.stop->end();
+  while (flight.plans.back().trajectory.start < end - 0.2) {
+    const PlanResult& plan = flight.plans.back();
+    EXPECT_LT(plan.certified_clearance, 0.0);
+    EXPECT_TRUE(plan.verdict == Verdict::kBrake || plan.verdict == Verdict::kMitigate);
+    for (double t = plan.trajectory.start; t < plan.trajectory.end(); t += 0.1) {
+      const world::Trajectory& way =
+          t < committed.stop->start ? committed.trajectory : *committed.stop;
+      EXPECT_LT((plan.trajectory.Position(t) - way.Position(t)).norm(), 1e-6) << t;
+    }
+    flight.Run(0.1, true);
+  }
+  flight.Run(3.0, true);
+  EXPECT_LT((flight.Body().p - committed.stop->Position(end)).norm(), 0.1);
+}
+
+TEST(LastResort, WhatTheBodyStraysByBeyondAnyTubeIsTakenOffTheClaim) {
+  const auto planned = [](double bound) {
+    Pilot pilot{PlanningConfig()};
+    pilot.SetFlying(true);
+    pilot.SetTrackingBound(0.0, bound);
+    pilot.SetObstacles(0.0, {Pillar({0.0, 1.3, 1.0})});
+    pilot.SetForecast(Walking(0.0));
+    return *pilot.Update(0.0, {{0.0, 0.0, 1.3}, {0.0, 0.0, 0.0}, 0.0});
+  };
+  const PlanResult widest = planned(kWidestTube), beyond = planned(kWidestTube + 0.05);
+  ASSERT_GT(widest.certified_clearance, 0.05);
+  EXPECT_NEAR(beyond.certified_clearance, widest.certified_clearance - 0.05, 1e-12);
+  EXPECT_EQ(beyond.verdict, widest.verdict);
+  const PlanResult far = planned(3.0);
+  EXPECT_LT(far.certified_clearance, 0.0);
+  EXPECT_GE(far.verdict, Verdict::kBrake);
+  EXPECT_EQ(far.reason.find("the body strays farther than any tube"), 0u) << far.reason;
+  EXPECT_TRUE(far.proofs.empty());
+}
+
+}  // namespace
+}  // namespace chase::planning
