@@ -30,6 +30,7 @@ class CommandCall {
   void Hear(const command_ack_t& ack);
 
   bool answered() const { return client_.answered(); }
+  bool IsDone() const { return client_.IsDone(Elapsed()); }
   bool GaveUp() const { return client_.GaveUp(Elapsed()); }
   bool accepted() const { return client_.accepted(); }
   bool unknown() const { return client_.unknown(); }  ///< whether it took effect

@@ -19,7 +19,8 @@ inline std::optional<int> CommandNamed(const std::string& name) {
   return std::nullopt;
 }
 
-/// One command from giving it to its answer: sent again until it is answered.
+/// One command from giving it to its answer: sent again until it is answered; a kill for a while
+/// longer, as mission answers it and the bridge to the autopilot obeys it, too.
 class CommandClient {
  public:
   /// Given at time `t` [s].
@@ -27,7 +28,7 @@ class CommandClient {
 
   /// True when it is to be sent now.
   bool Due(double t) {
-    if (answered_ || t < next_) return false;
+    if (IsDone(t) || t < next_) return false;
     next_ = t + kPeriod;
     return true;
   }
@@ -38,6 +39,10 @@ class CommandClient {
     accepted_ = accepted;
     unknown_ = unknown;
     reason_ = reason;
+  }
+  /// It has been answered, and need not be sent any more.
+  bool IsDone(double t) const {
+    return answered_ && (command_ != kKillCommand || !accepted_ || t - start_ > kInsists);
   }
   /// Nobody has answered for so long that nobody will.
   bool GaveUp(double t) const { return !answered_ && t - start_ > kPatience; }
@@ -51,6 +56,7 @@ class CommandClient {
  private:
   static constexpr double kPeriod = 0.1;    // s
   static constexpr double kPatience = 5.0;  // s: half of kMostAge.command
+  static constexpr double kInsists = 2.0;   // s: a bridge that died is back
   int command_;
   double start_, next_;
   bool answered_ = false, accepted_ = false, unknown_ = false;

@@ -46,7 +46,6 @@ std::vector<FaultKind> MakeKinds() {
                                                     {"SCAN_REGISTERED", Needs::kSensors},
                                                     {"OBSTACLES", Needs::kNothing},
                                                     {"UNSEEN", Needs::kSensors},
-                                                    {"MAP", Needs::kSensors},
                                                     {"TARGET", Needs::kNothing},
                                                     {"PREDICTION", Needs::kNothing},
                                                     {"PLAN", Needs::kNothing},

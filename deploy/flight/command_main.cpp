@@ -81,6 +81,7 @@ int AwaitAnswer(const Arguments& a, Session* session) {
   if (!call.accepted()) return Fail(kRefused, "refused: " + call.reason());
   fmt::print("{}\n", call.reason());
   std::fflush(stdout);
+  while (!call.IsDone()) session->Turn();
   return kAccepted;
 }
 

@@ -20,7 +20,7 @@ void Operator::Tick(int64_t utime) {
                   next.command == "kill" ? std::vector<double>{1.0} : next.at_px);
   if (!call_) return;
   call_->Turn();
-  if (!call_->answered() && !call_->GaveUp()) return;
+  if (!call_->IsDone() && !call_->GaveUp()) return;
   if (!call_->accepted())
     bus_.ReportError(next.command + (call_->answered() ? ": " + call_->reason() : ": no answer"));
   call_.reset();

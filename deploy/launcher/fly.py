@@ -448,7 +448,8 @@ def fly(options):
     passed = report(flight.folder)
     if flight.commands.failed:
         raise FlightError("the scenario's commands were not all obeyed: " + "; ".join(flight.commands.failed))
-    late = [f"{effect} of {name}@{t:g}" for t, effect, name in flight.strikes if effect != "thaw"]
+    late = [f"{effect} of {name}@{t:g}" for t, effect, name in flight.strikes
+            if effect not in ("thaw", "ends")]
     late += flight.commands.left()
     if late:
         raise FlightError("the mission ended before the " + ", ".join(late))

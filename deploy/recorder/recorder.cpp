@@ -157,12 +157,11 @@ int64_t Recorder::DropFirst(std::deque<Old>* logs) {
   return old.bytes;
 }
 
-/// Without a limit, or where none are recorded, those of earlier recorders are left alone.
+/// Those of earlier recorders may be what is left of a crash: they only go for room.
 void Recorder::DropOldHeavy(int64_t utime) {
   if (config_.heavy_minutes <= 0.0) return;
   const auto age = static_cast<int64_t>(config_.heavy_minutes * kMinute);
-  for (std::deque<Old>* logs : {&earlier_heavy_, &old_heavy_})
-    while (!logs->empty() && utime - logs->front().last_utime > age) DropFirst(logs);
+  while (!old_heavy_.empty() && utime - old_heavy_.front().last_utime > age) DropFirst(&old_heavy_);
 }
 
 void Recorder::MindTheDisk() {

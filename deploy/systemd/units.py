@@ -38,7 +38,8 @@ StartLimitIntervalSec=0
 Type=notify
 WatchdogSec=5
 Restart={systemd_restart}
-RestartSec=0.5
+# The autopilot is left to itself 0.6 s after the last setpoint; what waits longer is below.
+RestartSec=50ms
 {back_off}Environment="LCM_DEFAULT_URL={url}"
 EnvironmentFile=-/etc/chase/environment
 ExecStart=/usr/bin/{binary} --config /etc/chase/{name}.yaml $CHASE_OPTIONS

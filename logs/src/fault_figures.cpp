@@ -36,14 +36,16 @@ class Steps {
 /// The outputs that differ in kind.
 struct Outputs {
   explicit Outputs(const FlightRecord& record) {
-    for (const PlanSample& p : record.plans)
+    for (const PlanSample& p : record.plans) {
       brakes.Add(p.heard, p.verdict == plan_t::BRAKE || p.verdict == plan_t::WAIT ||
                               p.verdict == plan_t::MITIGATE);
+      gives_up.Add(p.heard, p.verdict > plan_t::KEPT);
+    }
     for (const TrackingSample& s : record.tracking) stops.Add(s.t, s.following != tracking_t::PLAN);
     for (const StateSample& s : record.states) leaves.Add(s.t, s.state != flight_state_t::CHASE);
     for (const AutopilotSample& s : record.autopilot) lands.Add(s.t, s.lands);
   }
-  Steps brakes, stops, leaves, lands;
+  Steps brakes, gives_up, stops, leaves, lands;
 };
 
 /// A time in which an input is too old.
@@ -98,6 +100,9 @@ std::vector<WatchedInput> WatchedInputs(const FlightRecord& record, const Output
       {"OBSTACLES", OverduesOf(record, "OBSTACLES", age.obstacles, end), {&out.brakes, &out.stops}},
       {"UNSEEN", OverduesOf(record, "UNSEEN", age.obstacles, end), {&out.brakes, &out.stops}},
       {"POSE", OverduesOf(record, "POSE", age.pose, end), {&out.stops}},
+      {"PREDICTION",
+       OverduesOf(record, "PREDICTION", age.prediction, end),
+       {&out.gives_up, &out.stops}},
       {"PLAN", OverduePlans(record, end), {&out.stops}},
       {"ATTITUDE_SETPOINT",
        OverduesOf(record, "ATTITUDE_SETPOINT", age.setpoint, end),

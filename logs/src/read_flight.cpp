@@ -41,7 +41,7 @@ class Gatherer {
     }
     Hear(e, "POSE", &poses_);
     Hear(e, "TARGET", &targets_);
-    Take(e, "PREDICTION", &predictions_);
+    Hear(e, "PREDICTION", &predictions_);
     if (Take(e, "PLAN", &plans_)) plans_heard_.push_back(Heard(e));
     Take(e, "FAULT", &faults_);
     Hear(e, "FLIGHT_STATE", &states_);

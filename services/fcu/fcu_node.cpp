@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
 #include <fstream>
 #include <stdexcept>
 
@@ -9,6 +10,7 @@
 #include "chase/imu_t.hpp"
 #include "common/bus/command_call.h"
 #include "common/bus/convert.h"
+#include "common/world/ages.h"
 
 namespace chase::fcu {
 namespace {
@@ -61,8 +63,7 @@ FcuNode::FcuNode(bus::Bus& bus, const FcuConfig& config)
     : bus_(bus),
       config_(config),
       bridge_(config, LoadKey(config.signing_key_file)),
-      transport_(OpenTransport(config.link, config.port, config.baud)),
-      window_("fcu", 0.0) {
+      transport_(OpenTransport(config.link, config.port, config.baud)) {
   bus_.Subscribe<pose_t>("POSE", [this](const pose_t& m) { OnPose(m); });
   bus_.Subscribe<attitude_setpoint_t>("ATTITUDE_SETPOINT",
                                       [this](const attitude_setpoint_t& m) { OnSetpoint(m); });
@@ -79,14 +80,13 @@ void FcuNode::OnSetpoint(const attitude_setpoint_t& message) {
   bridge_.OnSetpoint(FromMessage(message), message.utime, bus_.Now());
 }
 
-/// Mission answers; where it or control hangs the motors are cut all the same.
+/// Mission answers; where it or control hangs the motors are cut all the same. It is sent for a
+/// while: obeyed twice it does no harm, and whoever has just begun knows the autopilot soon.
 void FcuNode::OnCommand(const command_t& message) {
-  if (message.kind != command_t::KILL || !bus::IsForced(message)) return;
-  const int64_t start = bus_.identity().start;
-  window_.Take(bus::Seconds(bus_.Now(), start), bus::KeyOf(message, start), [this] {
+  const double age = bus::Seconds(bus_.Now(), message.utime);
+  if (message.kind == command_t::KILL && bus::IsForced(message) &&
+      std::abs(age) <= world::kMostAge.command)
     bridge_.Kill();
-    return world::CommandAnswer{true, ""};
-  });
 }
 
 /// The tick's own time may lag behind; what happens here is measured on the bus's clock.

@@ -8,7 +8,6 @@
 #include "chase/pose_t.hpp"
 #include "common/bus/bus.h"
 #include "common/bus/node.h"
-#include "common/world/command_window.h"
 #include "services/fcu/bridge.h"
 #include "services/fcu/transport.h"
 
@@ -38,7 +37,6 @@ class FcuNode : public bus::Node {
   FcuConfig config_;
   Bridge bridge_;
   std::unique_ptr<Transport> transport_;
-  world::CommandWindow window_;
   std::optional<int64_t> first_tick_;
   int64_t now_ = 0;
   Handshake::State noticed_ = Handshake::State::kNoAutopilot;

@@ -39,6 +39,16 @@ class Bars(unittest.TestCase):
         self.assertEqual(self.judged("faults", flights(3)).returncode, 0)
         self.assertEqual(self.judged("faults", flights(3) + flights(1, reaction_s=0.21)).returncode, 3)
 
+    def test_each_fault_counts_for_itself(self):
+        own = [dict(flight, fault=f"{fault}@{k}") for fault in ("gust", "decoy") for k, flight in enumerate(flights(3))]
+        self.assertEqual(self.judged("faults", own).returncode, 0)
+        self.assertEqual(self.judged("faults", own[:-1]).returncode, 3, "two of a kind")
+
+    def test_a_flight_that_ended_in_an_error_is_none(self):
+        own = flights(20)
+        own.append({"scenario": "forest-20", "seed": 20, "outcome": "error"})
+        self.assertEqual(self.judged("kept", own).returncode, 3)
+
     def test_a_campaign_that_has_not_ended_is_named(self):
         answer = subprocess.run([sys.executable, BARS, "kept", "/nowhere"], capture_output=True, text=True, check=False)
         self.assertEqual(answer.returncode, 2)

@@ -149,6 +149,27 @@ TEST(ControlNode, TellsAMissionThatBeganAnewWhereItTookOffAndWhatItSaidLast) {
   EXPECT_EQ(bus::ToVector(bench.homes[0].home), Eigen::Vector3d(1, 2, 3));
 }
 
+TEST(ControlNode, ADescentGoesOnWhileAMissionThatBeganAnewFindsOut) {
+  Bench bench;
+  int64_t t = kStart;
+  const auto following_after = [&](int8_t state, const std::optional<Eigen::Vector3d>& home,
+                                   int64_t silent = 0) {
+    bench.RunUntil(t += silent);
+    bench.SendState(state, "mission", home);
+    bench.RunUntil(t);
+    bench.SendPlan(t, {0, 0, 0});
+    for (int i = 0; i < 20; ++i) bench.SendPose(t += 5000);
+    return int{bench.tracking.back().following};
+  };
+  const Eigen::Vector3d home(1, 2, 3);
+  EXPECT_EQ(following_after(flight_state_t::LAND, home), int{tracking_t::LAND});
+  EXPECT_EQ(following_after(flight_state_t::IDLE, {}), int{tracking_t::LAND});
+  EXPECT_EQ(following_after(flight_state_t::HOLD, home), int{tracking_t::PLAN});
+  EXPECT_EQ(following_after(flight_state_t::LAND, home), int{tracking_t::LAND});
+  EXPECT_EQ(following_after(flight_state_t::HOLD, {}, 2'100'000), int{tracking_t::PLAN})
+      << "it knows of no place, and leads all the same";
+}
+
 constexpr const char* kStands =
     "arming: in OFFBOARD; mode OFFBOARD, disarmed, on ground, battery 80 %";
 constexpr const char* kArmed = "flying: armed and in OFFBOARD; mode OFFBOARD, armed, on ground";

@@ -137,6 +137,16 @@ TEST(Faults, WhatIsNotSeenMayBeTooOldWhileObstaclesAreFresh) {
   EXPECT_NEAR(f.reaction_s.value(), 4.52 - 4.1, 1e-9);
 }
 
+TEST(Faults, AForecastThatIsTooOldIsChasedNoLonger) {
+  Flown flown;
+  for (int k = 0; k <= 100; ++k) flown.Hear("PREDICTION", 0.1 * k, 0.05);
+  flown.Silence("PREDICTION", 4.01, 6.99);
+  flown.Verdict(plan_t::SAFE_ONLY, 5.51, 7.2);
+  const FaultFigures f = flown.Figures("freeze-prediction", 4.0, 6.0);
+  EXPECT_EQ(f.input, "PREDICTION");
+  EXPECT_NEAR(f.reaction_s.value(), 5.52 - (3.95 + world::kMostAge.prediction), 1e-9);
+}
+
 TEST(Faults, SilentSetpointsAreTheAutopilots) {
   Flown flown;
   for (int k = 0; k <= 2000; ++k) flown.Hear("ATTITUDE_SETPOINT", 0.005 * k, 0.001);

@@ -220,6 +220,23 @@ TEST(CommandClient, RepeatsUntilAnsweredAndGivesUp) {
   EXPECT_FALSE(client.GaveUp(9.0));
 }
 
+// One of two who hear it has answered: the other may not have heard it yet.
+TEST(CommandClient, AKillIsSentForAWhileAfterItsAnswer) {
+  world::CommandClient kill(world::kKillCommand, 1.0), refused(world::kKillCommand, 1.0);
+  for (world::CommandClient* client : {&kill, &refused}) EXPECT_TRUE(client->Due(1.0));
+  kill.OnAnswer(true, "killed");
+  refused.OnAnswer(false, "say so with --force");
+  int sent = 0;
+  for (double t = 1.0; t < 6.0; t += 0.02) {
+    sent += kill.Due(t);
+    EXPECT_FALSE(refused.Due(t));
+  }
+  EXPECT_NEAR(sent, 18, 2);
+  EXPECT_FALSE(kill.IsDone(2.9));
+  EXPECT_TRUE(kill.IsDone(3.1));
+  EXPECT_FALSE(kill.GaveUp(9.0));
+}
+
 TEST(CommandClient, KnowsWhenTheFlightIsThere) {
   EXPECT_EQ(ProgressOf(Event::kTakeoff, State::kTakeoff), Progress::kUnderWay);
   EXPECT_EQ(ProgressOf(Event::kTakeoff, State::kHold), Progress::kReached);
