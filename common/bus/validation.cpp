@@ -77,7 +77,7 @@ class Check {
         .Covariance(field, Eigen::Matrix3d(Eigen::Map<const Eigen::Matrix3d>(rows)));
   }
   Check& Covariance(const char* field, const Eigen::Matrix3d& m) {
-    return That(math::IsCovariance(m), field, "is no covariance");
+    return That(math::IsCovariance(m), field, "is not positive semidefinite");
   }
   Check& Code(const char* field, int value, int last) {
     return That(value >= 0 && value <= last, field, "is not one of the constants");

@@ -24,7 +24,7 @@ std::vector<Eigen::Vector3d> ContourPoints(const Gaussian3& g, double sigmas, in
 /// Standard deviation along the worst direction of a symmetric matrix; 0 where none is positive.
 double LargestSigma(const Eigen::Matrix3d& covariance);
 
-/// Is it the covariance of anything: symmetric and positive semidefinite, give or take rounding?
+/// Is m symmetric and positive semidefinite, up to rounding?
 bool IsCovariance(const Eigen::Matrix3d& m);
 
 /// The nearest symmetric matrix whose eigenvalues are at least `floor` (> 0).

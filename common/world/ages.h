@@ -4,10 +4,11 @@ namespace chase::world {
 
 /// How old an input may be before whoever needs it does without, s, and what is done then.
 struct MostAge {
-  double sweeps = 0.19;     ///< odometry: since the last that matched; POSE is DEGRADED, without
-                            ///< LiDAR soon LOST; mapping falls silent with them
-  double obstacles = 0.3;   ///< UNSEEN too. planning: brakes and hovers, uncertified; mission: not
-                            ///< ready; prediction: nobody else moves
+  double sweeps = 0.19;    ///< odometry: since the last that matched; POSE is DEGRADED, without
+                           ///< LiDAR soon LOST; mapping falls silent with them
+  double obstacles = 0.3;  ///< UNSEEN too. planning: goes on to the committed stop where movers
+                           ///< were listed, else brakes, uncertified; mission: not ready;
+                           ///< prediction: nobody else moves
   double prediction = 1.4;  ///< planning: there is no target, it is looked for
   double pose = 0.1;        ///< control: brakes by dead reckoning, also when poses come later than
                             ///< usual by this; silent after `velocity`; mission: not ready
@@ -23,7 +24,8 @@ struct MostAge {
   double attitude = 0.5;  ///< fcu: of the autopilot; no position is sent to it, nothing is armed
   double plan = 10.0;     ///< mission: lands; chosen: a planner that died is back within 5
   double landing_plan = 2.0;  ///< control: comes down where it is without a plan made to land
-  double command = 10.0;      ///< mission: refused; chase-command repeats for half of that
+  double command =
+      10.0;  ///< mission: refused, and fcu, a kill; chase-command repeats for half of that
 };
 inline constexpr MostAge kMostAge;
 

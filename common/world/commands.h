@@ -42,7 +42,7 @@ class CommandClient {
   }
   /// It has been answered, and need not be sent any more.
   bool IsDone(double t) const {
-    return answered_ && (command_ != kKillCommand || !accepted_ || t - start_ > kInsists);
+    return answered_ && (command_ != kKillCommand || t - start_ > kInsists);
   }
   /// Nobody has answered for so long that nobody will.
   bool GaveUp(double t) const { return !answered_ && t - start_ > kPatience; }

@@ -70,7 +70,7 @@ class Examiner {
     if (!IsCurve(obstacle.center)) return "moves in no way that can be checked";
     if (!body_ && !(math::IsCovariance(obstacle.position_covariance) &&
                     math::IsCovariance(obstacle.velocity_covariance)))
-      return "has a covariance that is none";
+      return "has a covariance that is not positive semidefinite";
     if (!body_) body_.emplace(MakeBody(obstacle, of_.start, of_.duration, claim_.sigmas));
     drone_.radius = math::Polynomial::Constant(1, proof.radius);
     if (proof.of_sight) target_.radius = proof.target_radius;

@@ -77,11 +77,11 @@ int AwaitAnswer(const Arguments& a, Session* session) {
                             session->state().empty() ? "" : ", though FLIGHT_STATE is heard",
                             a.command == "select" ? "perception" : "mission",
                             a.vehicle.empty() ? "" : " on vehicle '" + a.vehicle + "'"));
+  while (a.force && !call.IsDone()) session->Turn();
   if (call.unknown()) return Fail(kUnknown, a.command + ": " + call.reason());
   if (!call.accepted()) return Fail(kRefused, "refused: " + call.reason());
   fmt::print("{}\n", call.reason());
   std::fflush(stdout);
-  while (!call.IsDone()) session->Turn();
   return kAccepted;
 }
 

@@ -38,7 +38,7 @@ StartLimitIntervalSec=0
 Type=notify
 WatchdogSec=5
 Restart={systemd_restart}
-# The autopilot is left to itself 0.6 s after the last setpoint; what waits longer is below.
+# chase-fcu hands over 0.5 s after the last setpoint; back-off, below, delays what keeps dying.
 RestartSec=50ms
 {back_off}Environment="LCM_DEFAULT_URL={url}"
 EnvironmentFile=-/etc/chase/environment

@@ -39,13 +39,13 @@ struct Outputs {
     for (const PlanSample& p : record.plans) {
       brakes.Add(p.heard, p.verdict == plan_t::BRAKE || p.verdict == plan_t::WAIT ||
                               p.verdict == plan_t::MITIGATE);
-      gives_up.Add(p.heard, p.verdict > plan_t::KEPT);
+      leaves_sight.Add(p.heard, p.verdict > plan_t::KEPT);
     }
     for (const TrackingSample& s : record.tracking) stops.Add(s.t, s.following != tracking_t::PLAN);
     for (const StateSample& s : record.states) leaves.Add(s.t, s.state != flight_state_t::CHASE);
     for (const AutopilotSample& s : record.autopilot) lands.Add(s.t, s.lands);
   }
-  Steps brakes, gives_up, stops, leaves, lands;
+  Steps brakes, leaves_sight, stops, leaves, lands;
 };
 
 /// A time in which an input is too old.
@@ -102,7 +102,7 @@ std::vector<WatchedInput> WatchedInputs(const FlightRecord& record, const Output
       {"POSE", OverduesOf(record, "POSE", age.pose, end), {&out.stops}},
       {"PREDICTION",
        OverduesOf(record, "PREDICTION", age.prediction, end),
-       {&out.gives_up, &out.stops}},
+       {&out.leaves_sight, &out.stops}},
       {"PLAN", OverduePlans(record, end), {&out.stops}},
       {"ATTITUDE_SETPOINT",
        OverduesOf(record, "ATTITUDE_SETPOINT", age.setpoint, end),

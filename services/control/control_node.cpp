@@ -59,14 +59,15 @@ void ControlNode::OnState(const flight_state_t& message) {
   if (state_order_.IsOvertaken(message.utime)) return;
   if (!world::IsFresh(bus::Seconds(bus_.Now(), message.utime), world::kMostAge.flight_state))
     return;
-  // One that began anew in flight knows none; the place has not moved. Until it has been told it
-  // does not know what it leads either: what it said before holds, but for the motors' end.
+  // One that began anew in flight knows none; the place has not moved. Until it has heard HOME,
+  // what was led before holds, for 2 s; DONE is obeyed at once.
   if (message.has_home != 0) {
     led_ = message;
   } else if (led_) {
     TellHome();
     const double ago = bus::Seconds(message.utime, led_->utime);
-    if (ago <= world::kMostAge.flight_state && message.state != flight_state_t::DONE) return;
+    if (world::IsFresh(ago, world::kMostAge.flight_state) && message.state != flight_state_t::DONE)
+      return;
   }
   asked_to_fly_ = AsksToFly(message.state) ? message.utime : 0;
   const bool lands = message.state == flight_state_t::LAND;

@@ -23,8 +23,8 @@ constexpr double kWindowMargin = 1.0;  // m beyond the list's radius that the de
 constexpr int kFirstUnseen = 1 << 29;  // ids beyond those of pieces and of the ground
 constexpr double kMostCoordinate = 6000.0;  // m, what the octree's keys can hold at 0.2 m
 
-/// p is no nearer to the outline of an upright solid: the line across the way to its centre that
-/// touches the ellipse is as far away.
+/// Lower bound of the horizontal distance [m] from p to an upright solid, by the ellipse's support
+/// function; negative within.
 double LeastPlanDistance(const world::Obstacle& o, const Eigen::Vector3d& p) {
   const Eigen::Vector2d d = (p - o.center.coefficients.row(0).transpose()).head<2>();
   const Eigen::Matrix2d Q = o.shape.topLeftCorner<2, 2>().inverse();

@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <cmath>
 #include <limits>
+#include <vector>
 
 #include "common/math/rotation.h"
 
@@ -10,11 +11,11 @@ namespace chase::odometry {
 
 namespace {
 
-// Of a rival, logarithms of likelihood ratios.
-constexpr double kOff = 7.0;     // against a match that is off: one in a minute or two
-constexpr double kBegins = 2.0;  // over what nothing unusual explains
-constexpr double kGoes = -10.0, kWins = 7.0;
-constexpr int kLongest = 4;  // matches
+// Logarithms of likelihood ratios. Chosen: a match is off once in a minute or two, a jump is taken
+// for one with a probability of 1e-3, and one for a match that is off with 5e-5 (Wald's bounds).
+constexpr double kOff = 7.0, kAccept = 7.0, kReject = -10.0;
+constexpr double kOpen = 2.0;    // over what noise alone explains
+constexpr int kMostMatches = 4;  // until it is decided
 
 using math::ExpSO3;
 using math::Hat;
@@ -119,40 +120,41 @@ UpdateResult Correct(Observation y, double usual_nis, double largest_nis, NavSta
   return {true, nis};
 }
 
-/// LogLikelihood of an innovation if no bias has jumped: of noise alone, or of a match that is off
-/// by wrong stamps, or by features that were matched with another surface within the gate; along
-/// any one direction of place and of attitude, or along all.
-double WithoutJump(const Observation& y, const ErrorCovariance& P, double gate) {
+/// The largest log-likelihood of an innovation over the hypotheses without a jump: noise alone, or
+/// a match that is off by wrong stamps, or by features that were matched with another surface
+/// within the gate; along any one direction of place and of attitude, or along all.
+double LogLikelihoodWithoutJump(const Observation& y, const ErrorCovariance& P, double gate) {
   constexpr double kTurned = 0.005;  // rad: 20 ms at 0.25 rad/s
   const Eigen::MatrixXd S = y.InnovationCovariance(P);
   const Eigen::Index k = S.rows();
   Eigen::Index places = 0;  // directions that are more of place than of attitude; they come first
   while (places < k && y.H.row(places).segment<3>(kP).squaredNorm() > 0.5) ++places;
-  const auto off_along = [&](Eigen::Index i, Eigen::Index first, Eigen::Index n, double sigma,
-                             Eigen::VectorXd* added) {
-    added->segment(first, n).setConstant(i == n ? sigma * sigma : 0.0);
-    if (i >= 0 && i < n) (*added)[first + i] = sigma * sigma;
+  // Variances to be added to the directions [first, first + n): of none, of each, of all.
+  const auto offs = [k](Eigen::Index first, Eigen::Index n, double sigma) {
+    std::vector<Eigen::VectorXd> all(1, Eigen::VectorXd::Zero(k));
+    for (Eigen::Index i = 0; i < n; ++i)
+      all.emplace_back(sigma * sigma * Eigen::VectorXd::Unit(k, first + i));
+    all.push_back(all.front());
+    all.back().segment(first, n).setConstant(sigma * sigma);
+    return all;
   };
   double best = LogLikelihood(y.innovation, S);
-  Eigen::VectorXd added(k);
-  for (const double off : {0.02, gate})          // m: 20 ms at 1 m/s; another surface
-    for (Eigen::Index i = -1; i <= places; ++i)  // none, each, all
-      for (Eigen::Index j = -1; j <= k - places; ++j) {
-        off_along(i, 0, places, off, &added);
-        off_along(j, places, k - places, kTurned, &added);
-        const Eigen::MatrixXd wider = S + Eigen::MatrixXd(added.asDiagonal());
+  for (const double off : {0.02, gate})  // m: 20 ms at 1 m/s; another surface
+    for (const Eigen::VectorXd& place : offs(0, places, off))
+      for (const Eigen::VectorXd& attitude : offs(places, k - places, kTurned)) {
+        const Eigen::MatrixXd wider = S + Eigen::MatrixXd((place + attitude).asDiagonal());
         best = std::max(best, LogLikelihood(y.innovation, wider) - kOff);
       }
   return best;
 }
 
-/// Begins a rival where a jump explains the match far better than noise does, and not much worse
-/// than that the match is off. A turn is felt at once, an acceleration by the sweep after.
-std::optional<Rival> Begun(const FilterConfig& config, const Observation& y, double gap,
-                           double otherwise, const NavState& before) {
+/// Where a jump explains the match far better than noise does, and not much worse than that the
+/// match is off. A turn is felt at once, an acceleration by the sweep after.
+std::optional<JumpHypothesis> OpenHypothesis(const FilterConfig& config, const Observation& y,
+                                             double gap, double otherwise, const NavState& before) {
   const double noise = LogLikelihood(y.innovation, y.InnovationCovariance(before.P));
-  double best = std::max(noise + kBegins, otherwise + kGoes);
-  std::optional<Rival> rival;
+  double best = std::max(noise + kOpen, otherwise + kReject);
+  std::optional<JumpHypothesis> jump;
   for (const double age : {gap, 2.0 * gap}) {
     NavState jumped = before;
     jumped.P = AfterJump(before, gap, age);
@@ -163,11 +165,25 @@ std::optional<Rival> Begun(const FilterConfig& config, const Observation& y, dou
         !(nis <= config.usual_nis * static_cast<double>(y.innovation.size())))
       continue;
     best = likelihood;
-    rival = Rival{jumped, likelihood - otherwise, 1};
+    jump = JumpHypothesis{jumped, likelihood - otherwise, 1};
   }
-  if (rival && !Correct(y, config.usual_nis, config.largest_nis, &rival->state).applied)
-    rival.reset();
-  return rival;
+  if (jump && !Correct(y, config.usual_nis, config.largest_nis, &jump->state).applied) jump.reset();
+  return jump;
+}
+
+/// An open hypothesis by one more match, whose innovation to it is that of `y`: the update where it
+/// is accepted; dropped where it is not likely, not decided in time or refuses the match.
+std::optional<UpdateResult> Weigh(const FilterConfig& config, const Observation& y, double gate,
+                                  double otherwise, std::optional<JumpHypothesis>* jump) {
+  JumpHypothesis& h = **jump;
+  h.log_likelihood_ratio += LogLikelihoodWithoutJump(y, h.state.P, gate) - otherwise;
+  ++h.matches;
+  const UpdateResult result = Correct(y, config.usual_nis, config.largest_nis, &h.state);
+  if (h.log_likelihood_ratio > kAccept && result.applied && result.nis <= config.usual_nis)
+    return result;
+  if (h.log_likelihood_ratio < kReject || h.matches >= kMostMatches || !result.applied)
+    jump->reset();
+  return std::nullopt;
 }
 
 /// What the unknown directions U, left at the prediction, do to the known ones V of a match: an
@@ -260,7 +276,7 @@ void Inject(const ErrorVector& dx, NavState* state) {
 }
 
 UpdateResult Update(const FilterConfig& config, const PoseMeasurement& z, double gap,
-                    NavState* state, std::optional<Rival>* rival) {
+                    NavState* state, std::optional<JumpHypothesis>* jump) {
   const auto& V = z.known;
   const Eigen::Index k = V.cols();
   if (k == 0) return {};
@@ -284,25 +300,20 @@ UpdateResult Update(const FilterConfig& config, const PoseMeasurement& z, double
                     FromUnknown(z, information, *state)};
   y.H.middleCols<3>(kP) = onto.leftCols<3>();
   y.H.middleCols<3>(kTheta) = onto.rightCols<3>();
-  if (!rival) return Correct(y, config.usual_nis, config.largest_nis, state);
+  if (!jump) return Correct(y, config.usual_nis, config.largest_nis, state);
 
-  const double otherwise = WithoutJump(y, state->P, z.gate);
-  if (*rival) {
-    Rival& other = **rival;
-    Observation of_other = y;
-    of_other.innovation = innovation(other.state);
-    other.odds += WithoutJump(of_other, other.state.P, z.gate) - otherwise;
-    ++other.matches;
-    const UpdateResult result =
-        Correct(of_other, config.usual_nis, config.largest_nis, &other.state);
-    if (other.odds > kWins && result.applied && result.nis <= config.usual_nis) {
-      *state = other.state;
-      rival->reset();
-      return result;
+  const double otherwise = LogLikelihoodWithoutJump(y, state->P, z.gate);
+  const bool weighed = jump->has_value();
+  if (weighed) {
+    Observation of_jump = y;
+    of_jump.innovation = innovation((*jump)->state);
+    if (const auto accepted = Weigh(config, of_jump, z.gate, otherwise, jump)) {
+      *state = (*jump)->state;
+      jump->reset();
+      return *accepted;
     }
-    if (other.odds < kGoes || other.matches >= kLongest || !result.applied) rival->reset();
   }
-  if (!*rival && gap > 0.0) *rival = Begun(config, y, gap, otherwise, *state);
+  if (!weighed && gap > 0.0) *jump = OpenHypothesis(config, y, gap, otherwise, *state);
   return Correct(y, config.usual_nis, config.largest_nis, state);
 }
 

@@ -125,21 +125,22 @@ struct UpdateResult {
   double nis = 0.0;  ///< normalised innovation squared per known direction
 };
 
-/// The state as it is if the biases jumped at the first of `matches`: one match that is a
-/// centimetre off and a jump look alike, so that those which follow have to tell.
-struct Rival {
+/// State under the hypothesis that the biases jumped before the first of `matches`. One match that
+/// is a centimetre off and a jump look alike: those that follow have to tell.
+struct JumpHypothesis {
   NavState state;
-  double odds = 0.0;  ///< logarithm of how much likelier it makes these matches
+  double log_likelihood_ratio = 0.0;  ///< of these matches, to that nothing jumped
   int matches = 0;
 };
 
 /// Kalman update; leaves the state as it is where the numbers do not allow one or the innovation is
 /// too large to be of noise. One that is larger than the covariances explain makes these larger: by
 /// as much of the correction as they do not explain. `gap`: s since the update before, in which the
-/// biases may have jumped; 0: they have not. Where that explains the match far better, a `rival`
-/// begins, if given; an earlier one, which has been brought up to this time, is weighed by the
-/// match and becomes the state or goes (generalised likelihood ratio, Willsky and Jones 1976).
+/// biases may have jumped; 0: they have not. Where that explains the match far better, the
+/// hypothesis `jump` is opened, if given; an earlier one, brought up to this time, is weighed by
+/// the match, and becomes the state or is dropped (generalised likelihood ratio, Willsky and Jones
+/// 1976; sequential, Wald 1945).
 UpdateResult Update(const FilterConfig& config, const PoseMeasurement& z, double gap,
-                    NavState* state, std::optional<Rival>* rival = nullptr);
+                    NavState* state, std::optional<JumpHypothesis>* jump = nullptr);
 
 }  // namespace chase::odometry

@@ -169,7 +169,7 @@ SweepResult Odometry::ProcessSweep() {
   const bool extends = !first && Extends(result.match);
   if (extends) unknown_.setIdentity();
   const bool learns = applied || planes_.cells() == 0 || extends;
-  if (learns && !IsProvisional() && !rival_) Learn(prepared, base_.pose());
+  if (learns && !IsProvisional() && !jump_) Learn(prepared, base_.pose());
   if (applied && !first) FollowDrift(result.match);
   Catchup(lost);
   if (blind) result.pose = NewEstimate();
@@ -259,22 +259,24 @@ MatchResult Odometry::Match(Prepared* prepared) {
 }
 
 bool Odometry::Apply(const Prepared& prepared, MatchResult* match) {
-  if (rival_ && (rival_->state.t != base_.t || prepared.end - base_.t > kUsualGap)) rival_.reset();
+  const bool blind = Blind(prepared.end);
+  if (jump_ && (blind || jump_->state.t != base_.t || prepared.end - base_.t > kUsualGap))
+    jump_.reset();
   if (!match->valid || Astray(prepared, *match)) {
-    rival_.reset();
+    jump_.reset();
     return false;
   }
-  if (rival_) imu_.Advance(prepared.end, &rival_->state);
+  if (jump_) imu_.Advance(prepared.end, &jump_->state);
   NavState state = prepared.predicted;
   standing_.See(match->X_WB.p);
   if (standing_.holds()) HoldStill(standing_.gyro(), &state);
   // Stamps that are off look like biases that jumped.
   const double gap = health_.IsUsual(prepared.end) ? prepared.end - held_ : 0.0;
   // Before the filter has settled everything explains everything.
-  const bool settled = prepared.end - began_ > kSettles && !Blind(prepared.end);
+  const bool settled = prepared.end - began_ > kSettles && !blind;
   const UpdateResult update =
       Update(config_.filter, {match->X_WB, match->known, match->information, match->gate}, gap,
-             &state, settled ? &rival_ : nullptr);
+             &state, settled ? &jump_ : nullptr);
   match->nis = update.nis;
   match->misfit = update.nis > config_.filter.largest_nis;
   if (!update.applied) return false;
@@ -362,7 +364,7 @@ void Odometry::PlaceMap(const NavState& state) {
 
 void Odometry::BeginMapHere() {
   PutAtOrigin(&base_);
-  rival_.reset();
+  jump_.reset();
   ClearMap();
   unknown_.setZero();
 }

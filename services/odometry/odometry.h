@@ -113,7 +113,7 @@ class Odometry {
     CorrectionBlend blend;
     Matrix6d unknown;
     double held;
-    std::optional<Rival> rival;
+    std::optional<JumpHypothesis> jump;
     std::vector<Pending> sweeps;
     bool given_up = false;  ///< the samples: they are not waited for any more
   };
@@ -199,7 +199,7 @@ class Odometry {
   Matrix6d unknown_ = Matrix6d::Zero();  // projector on what the last sweep left to inertia
   double began_ = std::numeric_limits<double>::infinity();  // the filter, s
   double held_ = 0.0;                    // last time that a sweep or standing held the state, s
-  std::optional<Rival> rival_;           // biases may have jumped: nothing is learnt
+  std::optional<JumpHypothesis> jump_;   // biases may have jumped: nothing is learnt
   int sweeps_since_ = 0;                 // the newest inertial sample came
   std::vector<double> ends_beyond_imu_;  // of the sweeps that end after that sample, s
   bool samples_late_ = false;            // behind the last sweep, by more than jitter

@@ -35,7 +35,7 @@ void Odometry::SaveCheckpoint(const Pending& pending) {
       imu_.newest() >= pending.end - kWaitForImu)
     return;
   if (!checkpoint_)
-    checkpoint_ = Checkpoint{base_, standing_, level_, drift_, blend_, unknown_, held_, rival_, {}};
+    checkpoint_ = Checkpoint{base_, standing_, level_, drift_, blend_, unknown_, held_, jump_, {}};
   checkpoint_->given_up |= checkpoint_->sweeps.size() == kMostWaiting;
   if (checkpoint_->given_up) return checkpoint_->sweeps.clear();
   checkpoint_->sweeps.push_back(pending);
@@ -58,7 +58,7 @@ void Odometry::RollBack() {
   blend_ = checkpoint_->blend;
   unknown_ = checkpoint_->unknown;
   held_ = checkpoint_->held;
-  rival_ = checkpoint_->rival;
+  jump_ = checkpoint_->jump;
   live_ = base_;
   pending_.insert(pending_.begin(), checkpoint_->sweeps.begin(), checkpoint_->sweeps.end());
 }

@@ -46,7 +46,7 @@ std::optional<world::Obstacle> TargetBody(const Forecast& f) {
   return body;
 }
 
-// A climb goes on only while somebody looks whether it may; not certified, as it is not.
+// The climb, with a stop that control flies when no newer plan comes. Neither is certified.
 PlanResult StoppingSoon(double t0, PlanResult climb) {
   constexpr double kOver = kBrakeTimes[2];
   const double t = t0 + kOverdue;
@@ -54,6 +54,13 @@ PlanResult StoppingSoon(double t0, PlanResult climb) {
   if (t < climb.trajectory.end())
     climb.stop = {t, kOver, BrakeCurve(climb.trajectory.At(t), kOver)};
   return climb;
+}
+
+// What plan and stop leave to sphere and tube, m.
+double ClearanceOf(const PlanResult& plan) {
+  double least = plan.certified_clearance;
+  for (const Proof& p : plan.stop_proofs) least = std::min(least, p.from > 0.0 ? 0.0 : p.room);
+  return least;
 }
 
 // What it proves does not hold.
@@ -174,8 +181,8 @@ std::optional<PlanResult> Pilot::Update(double t, const BodyEstimate& body) {
   PlanResult plan = !Chases()                                       ? Obey(t0, start, body)
                     : airborne_ && HasTarget(t) && SeesObstacles(t) ? Chase(t0, start)
                                                                     : Wait(t0, start, body);
-  if (plan.certified_clearance >= 0.0 && plan.certified_clearance < tube_.beyond)
-    plan = AsLastResort("the body strays farther than any tube", Rest(t0, start));
+  if (plan.certified_clearance >= 0.0 && ClearanceOf(plan) < tube_.beyond)
+    plan = AsLastResort("the body strays farther than a plan keeps clear", Rest(t0, start));
   else if (plan.certified_clearance >= 0.0)
     plan.certified_clearance -= tube_.beyond;
   if (!IsFinite(plan)) plan = Rest(t0, {{body.p}, {body.yaw}});
@@ -262,7 +269,8 @@ PlanResult Pilot::Wait(double t0, const Start& start, const BodyEstimate& body) 
     climb_top_ = climb.trajectory.Position(climb_end_);
     return climb;
   }
-  if (!airborne_ && t0 < climb_end_ && IsFree(t0, start, running_.trajectory))
+  const bool stops = running_.stop && t0 >= running_.stop->start;
+  if (!airborne_ && !stops && t0 < climb_end_ && IsFree(t0, start, running_.trajectory))
     return StoppingSoon(t0, running_);  // still climbing
   airborne_ = true;
   if (task_ == Task::kTakeoff) return ClimbOn(t0, start, body);
@@ -326,6 +334,11 @@ MayFly Pilot::InFence(const Eigen::Vector3d& p_WB) const {
   };
 }
 
+bool Pilot::IsInFence(const Eigen::Vector3d& p_WB, const PlanResult& plan) const {
+  const MayFly may_fly = InFence(p_WB);
+  return may_fly(plan.trajectory) && (!plan.stop || may_fly(*plan.stop));
+}
+
 PlanResult Pilot::Return(double t0, const Start& start, const BodyEstimate& body) {
   if (!home_) return Hold(t0, start, "the take-off place is not known");
   const Eigen::Vector3d above = *home_ + config_.takeoff_height * Eigen::Vector3d::UnitZ();
@@ -337,7 +350,7 @@ PlanResult Pilot::Return(double t0, const Start& start, const BodyEstimate& body
   return Along(request, start, std::move(*leg), InFence(body.p), "returning");
 }
 
-// A long leg that nobody could stop soon is not flown.
+// A long leg that nobody could stop soon is not flown among movers, but to level ground.
 PlanResult Pilot::Along(const PlanRequest& request, const Start& start, Stop leg,
                         const MayFly& may_fly, const std::string& reason) const {
   const bool leaves = LeavesObstacles(leg.proofs);
@@ -352,8 +365,10 @@ PlanResult Pilot::Along(const PlanRequest& request, const Start& start, Stop leg
     plan.stop_proofs = std::move(stop->proofs);
   }
   const double left = plan.stop ? plan.stop->start : plan.trajectory.end();
-  if (left - request.t0 > kLongestBrake)
-    return Hold(request.t0, start, reason + " would have no stop");
+  const auto moves = [](const world::Obstacle& o) { return o.moving; };
+  if (task_ != Task::kLand && left - request.t0 > kLongestBrake &&
+      std::any_of(request.obstacles.begin(), request.obstacles.end(), moves))
+    return Hold(request.t0, start, reason + " would have no stop within 3 s");
   plan.reason = reason;
   return plan;
 }
@@ -414,7 +429,8 @@ PlanResult Pilot::Search(double t0, const Start& start, const BodyEstimate& body
 PlanResult Pilot::Rest(double t0, const Start& start) const {
   const bool sees = SeesObstacles(t0 - config_.latency);
   PlanRequest request = Request(t0, start);
-  PlanResult plan = sees ? RestPlan(config_.planner, request) : RestUnseeing(std::move(request));
+  PlanResult plan =
+      sees ? RestPlan(config_.planner, request) : RestWithoutLists(std::move(request));
   plan.yaw = {start.yaw.yaw};
   if (plan.reason.empty() && IsAtRest(start.state)) plan.verdict = Verdict::kWait;
   return sees ? plan : AsLastResort("obstacles are not heard of", std::move(plan));
@@ -424,13 +440,13 @@ PlanResult Pilot::Rest(double t0, const Start& start) const {
 // braking knows any more. After it, or where nobody moved, it brakes: moving obstacles are left out
 // and what stands is where it was listed: uncertainty would grow until it covers every place, and
 // fleeing from it leads into space that nobody observes.
-PlanResult Pilot::RestUnseeing(PlanRequest request) const {
+PlanResult Pilot::RestWithoutLists(PlanRequest request) const {
   std::vector<world::Obstacle>& listed = request.obstacles;
   const auto moves = [](const world::Obstacle& o) { return o.moving; };
-  const auto moving = std::remove_if(listed.begin(), listed.end(), moves);
-  if (moving != listed.end() && running_.verdict != Verdict::kWait)
-    if (auto plan = AsCommitted(request)) return *plan;
-  listed.erase(moving, listed.end());
+  // A climb or a hover has committed itself to nothing that was certified.
+  if (running_.verdict != Verdict::kWait && std::any_of(listed.begin(), listed.end(), moves))
+    if (auto plan = AsCommitted(request); plan && IsInFence(request.start.p, *plan)) return *plan;
+  listed.erase(std::remove_if(listed.begin(), listed.end(), moves), listed.end());
   for (world::Obstacle& o : listed) o.velocity_covariance.setZero();
   request.unseen.clear();
   request.tube = 0.0;

@@ -97,12 +97,13 @@ class Pilot {
   PlanResult ClimbOn(double t0, const Start& start, const BodyEstimate& body);
   PlanResult Hover(double t0, const Start& start);
   PlanResult Rest(double t0, const Start& start) const;
-  PlanResult RestUnseeing(PlanRequest request) const;
+  PlanResult RestWithoutLists(PlanRequest request) const;
   PlanResult Obey(double t0, const Start& start, const BodyEstimate& body);
   PlanResult Hold(double t0, const Start& start, const std::string& reason) const;
   PlanResult Return(double t0, const Start& start, const BodyEstimate& body);
   PlanResult Land(double t0, const Start& start, const BodyEstimate& body);
   MayFly InFence(const Eigen::Vector3d& p_WB) const;
+  bool IsInFence(const Eigen::Vector3d& p_WB, const PlanResult& plan) const;
   PlanResult Along(const PlanRequest& request, const Start& start, Stop leg, const MayFly& may_fly,
                    const std::string& reason) const;
   bool SeesObstacles(double t) const;

@@ -13,6 +13,8 @@ namespace {
 
 using Eigen::Vector3d;
 
+constexpr double kLeast = 0.1;  // s of a way to rest that are worth to be flown
+
 // Displacements of the place of rest by distance: rings of directions, level, up and down; the
 // last leads from the ground to above its slab.
 std::vector<Vector3d> Displacements() {
@@ -76,7 +78,6 @@ std::optional<Stop> GoTo(const PlannerConfig& config, const PlanRequest& request
 
 std::optional<Stop> GoOn(const PlannerConfig& config, const PlanRequest& request,
                          const world::Trajectory& way) {
-  constexpr double kLeast = 0.1;  // s
   const double T = way.end() - request.t0;
   if (T < kLeast || request.t0 < way.start) return std::nullopt;
   Resting resting(config, request);
@@ -114,9 +115,8 @@ void NameFaster(bool certified, PlanResult* plan) {
   plan->reason += plan->reason.empty() ? "to rest, faster at first" : "; faster at first";
 }
 
-// The rest of a way to rest.
-std::optional<PlanResult> Left(const PlanRequest& request, const world::Trajectory& way) {
-  constexpr double kLeast = 0.1;  // s
+// The rest of a way to rest, not certified.
+std::optional<PlanResult> RestOfStop(const PlanRequest& request, const world::Trajectory& way) {
   const double T = way.end() - request.t0;
   if (T < kLeast) return std::nullopt;
   PlanResult result;
@@ -126,11 +126,11 @@ std::optional<PlanResult> Left(const PlanRequest& request, const world::Trajecto
   return result;
 }
 
-// What is left of the running plan until its stop, and that stop.
-std::optional<PlanResult> Left(const PlanRequest& request) {
+// What is left of the running plan until its stop, and that stop; not certified.
+std::optional<PlanResult> RestOfPlan(const PlanRequest& request) {
   if (!request.stop) return std::nullopt;
   const world::Trajectory& stop = *request.stop;
-  if (request.t0 >= stop.start) return Left(request, stop);
+  if (request.t0 >= stop.start) return RestOfStop(request, stop);
   PlanResult result;
   result.verdict = Verdict::kBrake;
   if (!request.running || stop.start > request.running->end()) return std::nullopt;
@@ -143,7 +143,7 @@ std::optional<PlanResult> Left(const PlanRequest& request) {
 
 // What was committed to, where it still holds without a margin.
 std::optional<PlanResult> Committed(const PlannerConfig& config, const PlanRequest& request) {
-  auto result = Left(request);
+  auto result = RestOfPlan(request);
   if (!result) return std::nullopt;
   const world::Trajectory& way = result->trajectory;
   Resting resting(config, request);
@@ -176,8 +176,8 @@ PlanRequest WithoutDrift(PlanRequest request) {
 
 std::optional<PlanResult> AsCommitted(const PlanRequest& request) {
   const auto& running = request.running;  // without a stop it is on its way to rest already
-  auto result = request.stop                             ? Left(request)
-                : running && world::EndsAtRest(*running) ? Left(request, *running)
+  auto result = request.stop                             ? RestOfPlan(request)
+                : running && world::EndsAtRest(*running) ? RestOfStop(request, *running)
                                                          : std::nullopt;
   if (result) NameFaster(false, &*result);
   return result;

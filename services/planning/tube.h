@@ -7,7 +7,7 @@
 
 namespace chase::planning {
 
-/// m: wider, hardly a door is passed.
+/// m: with a wider one hardly any door could be passed.
 inline constexpr double kWidestTube = 0.3;
 
 /// About a plan: the body strays from it by the tracking error, and the estimate from the body.

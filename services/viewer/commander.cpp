@@ -48,7 +48,7 @@ void Commander::Turn() {
   std::deque<Given> open;
   for (Given& given : std::exchange(given_, {})) {
     given.call.Turn();
-    if (given.call.IsDone())
+    if (given.call.answered())
       Settle(given.request, given.call.accepted() ? "" : given.call.reason(), given.call.reason());
     else if (given.call.GaveUp())
       Settle(given.request, "no answer; does chase-mission run?", "");

@@ -230,9 +230,9 @@ TEST(FcuLive, AForcedKillDisarmsInTheAir) {
   world.Run(2.0);
   bus::UdpBus station(bus::kDefaultUrl, "");
   station.SetIdentity({"command", "", station.Now()});
-  const auto kill = [&](int64_t id, std::vector<double> arguments) {
+  const auto kill = [&](int64_t id, std::vector<double> arguments, int64_t age = 0) {
     command_t m{};
-    m.utime = station.Now();
+    m.utime = station.Now() - age;
     m.id = id;
     m.kind = command_t::KILL;
     m.arguments = std::move(arguments);
@@ -242,6 +242,8 @@ TEST(FcuLive, AForcedKillDisarmsInTheAir) {
   };
   kill(1, {});
   EXPECT_TRUE(world.px4.armed()) << "not forced";
+  kill(3, {1.0}, 11'000'000);
+  EXPECT_TRUE(world.px4.armed()) << "of another flight";
   const int64_t before = station.Now();
   kill(2, {1.0});
   EXPECT_FALSE(world.px4.armed());

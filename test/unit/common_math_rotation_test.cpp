@@ -61,6 +61,27 @@ TEST(Rotation, RightJacobianIsTheDerivative) {
   }
 }
 
+TEST(Gaussian, ACovarianceHasNoNegativeEigenvalue) {
+  std::mt19937_64 g(7);
+  EXPECT_TRUE(IsCovariance(Eigen::Matrix3d::Zero()));
+  EXPECT_FALSE(IsCovariance(Eigen::Matrix3d::Constant(std::nan(""))));
+  for (int i = 0; i < 2000; ++i) {
+    const Eigen::Matrix3d axes = ExpSO3(Random3(g, 1.5)).toRotationMatrix();
+    const double scale = std::pow(10.0, 6.0 * Random3(g, 1.0).x());
+    Eigen::Vector3d values = scale * Random3(g, 1.0).cwiseAbs();
+    values.head(i % 3).setZero();  // of any rank
+    const auto turned = [&] {
+      return Eigen::Matrix3d(axes * values.asDiagonal() * axes.transpose());
+    };
+    EXPECT_TRUE(IsCovariance(turned())) << values.transpose();
+    Eigen::Matrix3d askew = turned();
+    askew(0, 1) += 1e-6 * scale;
+    EXPECT_FALSE(IsCovariance(askew));
+    values[0] = -1e-9 * values.cwiseAbs().maxCoeff();
+    EXPECT_FALSE(IsCovariance(turned())) << values.transpose();
+  }
+}
+
 TEST(Gaussian, LogDensityIntegratesToOne) {
   Gaussian3 gaussian;
   gaussian.mean = {0.3, -0.2, 0.1};

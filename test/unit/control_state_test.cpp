@@ -166,8 +166,12 @@ TEST(ControlNode, ADescentGoesOnWhileAMissionThatBeganAnewFindsOut) {
   EXPECT_EQ(following_after(flight_state_t::IDLE, {}), int{tracking_t::LAND});
   EXPECT_EQ(following_after(flight_state_t::HOLD, home), int{tracking_t::PLAN});
   EXPECT_EQ(following_after(flight_state_t::LAND, home), int{tracking_t::LAND});
+  EXPECT_EQ(int{bench.out.back().motors}, int{attitude_setpoint_t::MOTORS_ON});
   EXPECT_EQ(following_after(flight_state_t::HOLD, {}, 2'100'000), int{tracking_t::PLAN})
       << "it knows of no place, and leads all the same";
+  following_after(flight_state_t::LAND, home);
+  following_after(flight_state_t::DONE, {});
+  EXPECT_EQ(int{bench.out.back().motors}, int{attitude_setpoint_t::MOTORS_OFF}) << "killed";
 }
 
 constexpr const char* kStands =

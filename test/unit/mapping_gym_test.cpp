@@ -88,6 +88,7 @@ TEST(MappingGym, IdsOfPillarsStay) {
 
 /// The promise itself: every return in every occupied cell of the flight volume is enclosed.
 TEST(MappingGym, EveryOccupiedCellIsEnclosed) {
+  const double radius = MappingConfig().statics.radius;
   Fly(40, {0.02, 0.01}, 8,
       [&](int i, double t, const ObstacleList& list, const testing::Truth&, Mapper* mapper) {
         if (i % 13 != 12) return;
@@ -104,7 +105,7 @@ TEST(MappingGym, EveryOccupiedCellIsEnclosed) {
               // high.
               if (!voxel.occupied || voxel.extent.empty() || center.z() < 0.7 || center.z() > 2.7)
                 continue;
-              if ((center - GymFlight(t)).head<2>().norm() > 7.0) continue;
+              if ((center - GymFlight(t)).head<2>().norm() > radius - 0.2) continue;
               std::array<Eigen::Vector2d, 8> corners;
               const int n = PlanCorners(voxel.extent, center.head<2>(), grid.step(), &corners);
               for (int k = 0; k < n; ++k) {

@@ -180,16 +180,16 @@ TEST(ErrorStateFilter, AMatchThatIsOffIsNotLearntAsABias) {
     state.P.diagonal() << Eigen::Vector3d::Constant(1e-6), Eigen::Vector3d::Constant(1e-5),
         Eigen::Vector3d::Constant(2.5e-7), Eigen::Vector3d::Constant(1e-7),
         Eigen::Vector3d::Constant(4e-4), Eigen::Vector3d::Constant(1e-6);
-    std::optional<Rival> rival;
+    std::optional<JumpHypothesis> jump;
     for (int sample = 1; sample <= 100; ++sample) {
       const ImuSample imu{0.005 * sample, {0.0, 0.0, 9.81}, Eigen::Vector3d::Zero()};
       Propagate(FilterConfig{}, imu, &state);
-      if (rival) Propagate(FilterConfig{}, imu, &rival->state);
+      if (jump) Propagate(FilterConfig{}, imu, &jump->state);
       if (sample % 20 != 0 || sample <= 20 * missed) continue;
       PoseMeasurement z{Pose{}, Eigen::Matrix<double, 6, 6>::Identity(),
                         1e6 * Eigen::Matrix<double, 6, 6>::Identity(), MatchConfig{}.least_gate};
       z.X_WB.p.x() = 0.1 + 0.1 * state.t;
-      const UpdateResult result = Update(FilterConfig{}, z, state.t, &state, &rival);
+      const UpdateResult result = Update(FilterConfig{}, z, state.t, &state, &jump);
       EXPECT_FALSE(result.applied) << "at " << state.t << " s";
     }
     EXPECT_LT(state.accel_bias.norm(), 0.05) << missed << " missed";
@@ -201,7 +201,7 @@ TEST(ErrorStateFilter, AMatchThatIsOffIsNotLearntAsABias) {
 /// Hz.
 struct Settled {
   NavState state;
-  std::optional<Rival> rival;
+  std::optional<JumpHypothesis> jump;
   Noise noise{3};
 
   Settled() {
@@ -216,13 +216,13 @@ struct Settled {
       const ImuSample imu{state.t + 0.005, Eigen::Vector3d(0.0, 0.0, FilterConfig{}.gravity) + bias,
                           Eigen::Vector3d::Zero()};
       Propagate(FilterConfig{}, imu, &state);
-      if (rival) Propagate(FilterConfig{}, imu, &rival->state);
+      if (jump) Propagate(FilterConfig{}, imu, &jump->state);
     }
     PoseMeasurement z{Pose{}, Eigen::Matrix<double, 6, 6>::Identity(),
                       2e6 * Eigen::Matrix<double, 6, 6>::Identity(), MatchConfig{}.least_gate};
     z.information.bottomRightCorner<3, 3>() *= 16.0;
     z.X_WB.p = off + noise.Vector(7e-4);
-    Update(FilterConfig{}, z, 0.1, &state, &rival);
+    Update(FilterConfig{}, z, 0.1, &state, &jump);
   }
 };
 

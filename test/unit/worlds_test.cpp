@@ -298,6 +298,7 @@ TEST(Vehicle, IsDrawnFromTheSeedWhereverSensorsAreFlown) {
     for (const double share : off)
       EXPECT_TRUE(std::abs(share) >= 0.0499 && std::abs(share) <= 0.1001) << share;
     EXPECT_EQ(configs.fcu.hover_thrust, simulator::kGravity / vehicle.max_thrust) << "the nominal";
+    EXPECT_EQ(configs.planning.planner.drag, configs.control.drag.head<2>().mean());
     EXPECT_TRUE(configs.simulator.battery.sags);
   }
   EXPECT_EQ(masses.size(), 20u);
