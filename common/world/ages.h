@@ -4,11 +4,11 @@ namespace chase::world {
 
 /// How old an input may be before whoever needs it does without, s, and what is done then.
 struct MostAge {
-  double sweeps = 0.19;    ///< odometry: since the last that matched; POSE is DEGRADED, without
-                           ///< LiDAR soon LOST; mapping falls silent with them
-  double obstacles = 0.3;  ///< UNSEEN too. planning: goes on to the committed stop where movers
-                           ///< were listed, else brakes, uncertified; mission: not ready;
-                           ///< prediction: nobody else moves
+  double sweeps = 0.19;     ///< odometry: since the last that matched; POSE is DEGRADED, without
+                            ///< LiDAR soon LOST; mapping falls silent with them
+  double obstacles = 0.3;   ///< UNSEEN too. planning: goes on to the committed stop where movers
+                            ///< were listed, else brakes, uncertified; mission: not ready;
+                            ///< prediction: nobody else moves
   double prediction = 1.4;  ///< planning: there is no target, it is looked for
   double pose = 0.1;        ///< control: brakes by dead reckoning, also when poses come later than
                             ///< usual by this; silent after `velocity`; mission: not ready
