@@ -182,9 +182,12 @@ TEST(HostileBus, WhatIsNoCovarianceIsRefused) {
   };
   EXPECT_EQ(listed(0.0, 0.0, 0.0, 0.0), "");
   EXPECT_EQ(listed(0.01, 0.02, 0.04, 0.0), "") << "along one line";
-  EXPECT_EQ(listed(-1e-4, 0.0, 0.01, 0.0), "field position_covariance is not positive semidefinite");
-  EXPECT_EQ(listed(0.01, 0.0201, 0.04, 0.0), "field position_covariance is not positive semidefinite");
-  EXPECT_EQ(listed(0.01, 0.0, 0.0, -1e-9), "field velocity_covariance is not positive semidefinite");
+  EXPECT_EQ(listed(-1e-4, 0.0, 0.01, 0.0),
+            "field position_covariance is not positive semidefinite");
+  EXPECT_EQ(listed(0.01, 0.0201, 0.04, 0.0),
+            "field position_covariance is not positive semidefinite");
+  EXPECT_EQ(listed(0.01, 0.0, 0.0, -1e-9),
+            "field velocity_covariance is not positive semidefinite");
   prediction_t forecast = Sample<prediction_t>::Good();
   EXPECT_EQ(Problem(forecast), "");
   forecast.covariance[8] = -1e-3;
