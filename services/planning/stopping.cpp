@@ -105,12 +105,15 @@ namespace {
 void NameFaster(bool certified, PlanResult* plan) {
   constexpr double kFaster = 0.05;  // m/s
   constexpr int kSamples = 50;
-  const world::Trajectory& way = plan->trajectory;
-  const double limit = way.Velocity(way.start).norm() + kFaster;
-  bool faster = false;
-  for (int i = 1; i <= kSamples && !faster; ++i)
-    faster = way.Velocity(way.start + i * way.duration / kSamples).norm() > limit;
-  if (plan->verdict != Verdict::kBrake || !faster) return;
+  const double limit = plan->trajectory.Velocity(plan->trajectory.start).norm() + kFaster;
+  const auto gets_faster = [limit](const world::Trajectory& way) {
+    for (int i = 1; i <= kSamples; ++i)
+      if (way.Velocity(way.start + i * way.duration / kSamples).norm() > limit) return true;
+    return false;
+  };
+  if (plan->verdict != Verdict::kBrake ||
+      !(gets_faster(plan->trajectory) || (plan->stop && gets_faster(*plan->stop))))
+    return;
   plan->verdict = certified ? Verdict::kEscape : Verdict::kMitigate;
   plan->reason += plan->reason.empty() ? "to rest, faster at first" : "; faster at first";
 }

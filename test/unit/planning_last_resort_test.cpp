@@ -65,7 +65,13 @@ TEST(LastResort, WithoutListsItGoesOnAsCommitted) {
   while (flight.plans.back().trajectory.start < end - 0.2) {
     const PlanResult& plan = flight.plans.back();
     EXPECT_LT(plan.certified_clearance, 0.0);
-    EXPECT_TRUE(plan.verdict == Verdict::kBrake || plan.verdict == Verdict::kMitigate);
+    if (plan.verdict != Verdict::kMitigate) {
+      ASSERT_EQ(plan.verdict, Verdict::kBrake);
+      const double speed = plan.trajectory.Velocity(plan.trajectory.start).norm() + 0.06;
+      for (const world::Trajectory* way : {&plan.trajectory, plan.stop ? &*plan.stop : nullptr})
+        for (double t = way ? way->start : 1.0; way && t < way->end(); t += 0.02)
+          EXPECT_LT(way->Velocity(t).norm(), speed) << "it brakes";
+    }
     for (double t = plan.trajectory.start; t < plan.trajectory.end(); t += 0.1) {
       const world::Trajectory& way =
           t < committed.stop->start ? committed.trajectory : *committed.stop;
