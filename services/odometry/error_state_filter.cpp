@@ -11,8 +11,9 @@ namespace chase::odometry {
 
 namespace {
 
-// Logarithms of likelihood ratios. Chosen: a match is off once in a minute or two, a jump is taken
-// for one with a probability of 1e-3, and one for a match that is off with 5e-5 (Wald's bounds).
+// Logarithms of likelihood ratios, chosen: a match is off once in a minute or two of sweeps; one
+// that is off passes for a jump with a probability of 1e-3 at most, a jump for one with 5e-5
+// (Wald's bounds, which hold for errors that are independent from match to match).
 constexpr double kOff = 7.0, kAccept = 7.0, kReject = -10.0;
 constexpr double kOpen = 2.0;    // over what noise alone explains
 constexpr int kMostMatches = 4;  // until it is decided

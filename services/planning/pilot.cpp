@@ -29,6 +29,8 @@ world::Trajectory RestToRest(const Eigen::Vector3d& a, const Eigen::Vector3d& b,
   return {start, duration, c};
 }
 
+bool Moves(const world::Obstacle& o) { return o.moving; }
+
 bool IsAtRest(const world::State& s) { return s.v.norm() < 0.05 && s.a.norm() < 0.1; }
 
 // The target's upright cylinder where it is forecast to be.
@@ -365,9 +367,8 @@ PlanResult Pilot::Along(const PlanRequest& request, const Start& start, Stop leg
     plan.stop_proofs = std::move(stop->proofs);
   }
   const double left = plan.stop ? plan.stop->start : plan.trajectory.end();
-  const auto moves = [](const world::Obstacle& o) { return o.moving; };
   if (task_ != Task::kLand && left - request.t0 > kLongestBrake &&
-      std::any_of(request.obstacles.begin(), request.obstacles.end(), moves))
+      std::any_of(request.obstacles.begin(), request.obstacles.end(), Moves))
     return Hold(request.t0, start, reason + " would have no stop within 3 s");
   plan.reason = reason;
   return plan;
@@ -442,11 +443,10 @@ PlanResult Pilot::Rest(double t0, const Start& start) const {
 // fleeing from it leads into space that nobody observes.
 PlanResult Pilot::RestWithoutLists(PlanRequest request) const {
   std::vector<world::Obstacle>& listed = request.obstacles;
-  const auto moves = [](const world::Obstacle& o) { return o.moving; };
   // A climb or a hover has committed itself to nothing that was certified.
-  if (running_.verdict != Verdict::kWait && std::any_of(listed.begin(), listed.end(), moves))
+  if (running_.verdict != Verdict::kWait && std::any_of(listed.begin(), listed.end(), Moves))
     if (auto plan = AsCommitted(request); plan && IsInFence(request.start.p, *plan)) return *plan;
-  listed.erase(std::remove_if(listed.begin(), listed.end(), moves), listed.end());
+  listed.erase(std::remove_if(listed.begin(), listed.end(), Moves), listed.end());
   for (world::Obstacle& o : listed) o.velocity_covariance.setZero();
   request.unseen.clear();
   request.tube = 0.0;
