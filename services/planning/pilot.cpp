@@ -122,7 +122,7 @@ void Pilot::ChangeFrame() {
   hovers_since_.reset();
   obstacles_.clear();
   unseen_.clear();
-  unseen_time_.reset();
+  if (unseen_time_) unseen_time_ = -1e9;  // they are told of: to be heard anew
   obstacles_time_ = -1e9;
   airborne_ = airborne_ || flies_;  // a climb is not begun anew
   climb_top_.reset();

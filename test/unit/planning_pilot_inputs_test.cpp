@@ -10,13 +10,15 @@ namespace chase::planning {
 namespace {
 
 TEST(Pilot, OutdatedUnseenPlacesCountAsOutdatedObstacles) {
-  for (const bool heard : {false, true}) {
-    Flight flight{PlanningConfig()};
-    flight.Run(4.0, false);
-    if (heard) flight.pilot.SetUnseen(flight.t, {});
-    flight.Run(2.0, true);
-    EXPECT_EQ(flight.plans.back().reason.find("obstacles are not heard of") == 0, heard);
-  }
+  for (const bool heard : {false, true})
+    for (const bool frame : {false, true}) {
+      Flight flight{PlanningConfig()};
+      flight.Run(4.0, false);
+      if (heard) flight.pilot.SetUnseen(flight.t, {});
+      if (frame) flight.pilot.ChangeFrame();
+      flight.Run(frame ? 0.2 : 2.0, true);  // in another frame at once
+      EXPECT_EQ(flight.plans.back().reason.find("obstacles are not heard of") == 0, heard) << frame;
+    }
 }
 
 TEST(Pilot, WithoutObstaclesItBrakesAndCertifiesNothing) {

@@ -305,7 +305,10 @@ TEST(Trail, ThatClimbedSteeplyLeadsBackLevel) {
 /// of a second on, a target that walks faster than any before, and is lost.
 void Tell(double since, const std::vector<world::Obstacle>& obstacles, double t, Pilot* pilot) {
   pilot->SetFlying(true);
-  if (since > 0.25) pilot->SetObstacles(t, obstacles);
+  if (since > 0.25) {
+    pilot->SetObstacles(t, obstacles);
+    pilot->SetUnseen(t, {});
+  }
   if (since < 2.0 || since > 4.0) return;
   Forecast f;
   f.t = t;
