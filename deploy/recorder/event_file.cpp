@@ -51,11 +51,19 @@ bool EventFile::Flush() {
   return true;
 }
 
+bool EventFile::IsOnDisk() {
+  if (log_) Sync();
+  return !IsSyncing();
+}
+
+bool EventFile::IsSyncing() const {
+  return syncing_.valid() &&
+         syncing_.wait_for(std::chrono::seconds(0)) != std::future_status::ready;
+}
+
 /// Until then a loss of power takes what the system keeps in memory: half a minute.
 void EventFile::Sync() {
-  const bool busy =
-      syncing_.valid() && syncing_.wait_for(std::chrono::seconds(0)) != std::future_status::ready;
-  if (busy || synced_ == flushed_) return;
+  if (IsSyncing() || synced_ == flushed_) return;
   synced_ = flushed_;
   syncing_ = std::async(std::launch::async, [own = dup(fileno(log_->f))] {
     fdatasync(own);

@@ -23,6 +23,8 @@ class EventFile {
   /// Hands what was written to the system, which puts it on the disk meanwhile: a slow disk makes
   /// nobody wait, and takes the next flush with it.
   bool Flush();
+  /// Is all that was flushed on the disk? Never waits; the end does not either, once it is.
+  bool IsOnDisk();
 
   const std::string& name() const { return name_; }
   int64_t bytes() const { return written_; }
@@ -31,6 +33,7 @@ class EventFile {
 
  private:
   bool GiveUp();
+  bool IsSyncing() const;
   void Sync();
 
   struct Closer {

@@ -88,7 +88,7 @@ void Recorder::Retire(Series* series) {
   series->file->Flush();
   unrecorded_ += series->file->lost();
   const Old old{series->file->name(), series->file->bytes(), series->last_utime};
-  series->file.reset();
+  ending_.push_back(std::move(series->file));
   if (old.bytes == 0) {
     std::filesystem::remove(old.name);
     --series->count;
@@ -175,6 +175,7 @@ void Recorder::MindTheDisk() {
 }
 
 void Recorder::FlushAll(int64_t utime) {
+  ending_.remove_if([](const auto& file) { return file->IsOnDisk(); });
   if (heavy_.file && !heavy_.file->Flush()) Refused(utime, &heavy_);
   if (!light_.file) return;
   const bool any = light_.file->bytes() > 0;

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <deque>
+#include <list>
 #include <memory>
 #include <string>
 
@@ -63,7 +64,8 @@ class Recorder {
 
   RecorderConfig config_;
   Series light_, heavy_;
-  std::deque<Old> old_heavy_;  // of this recorder: dropped once they are old
+  std::list<std::unique_ptr<EventFile>> ending_;  // no more is written to; the disk takes its time
+  std::deque<Old> old_heavy_;                     // of this recorder: dropped once they are old
   std::deque<Old>
       earlier_heavy_;  // of those before it, by file time: the same, and first where room is short
   int64_t light_bytes_ = 0;

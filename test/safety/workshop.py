@@ -48,6 +48,9 @@ class Workshop:
             copy_if_changed(tree.ROOT / path, self.root / path)
         for path in set(self.sources()) - {self.root / path for path in wanted}:
             path.unlink()
+        for path in wanted:
+            if path.name == "package.json":
+                link(tree.ROOT / path.parent / "node_modules", self.root / path.parent / "node_modules")
         launcher = ["-DCMAKE_CXX_COMPILER_LAUNCHER=ccache"] if shutil.which("ccache") else []
         self.call("cmake", "-S", self.root, "-B", self.build, *OPTIONS, *launcher)
 
@@ -88,6 +91,12 @@ class Workshop:
             yield
         finally:
             path.write_text(before, encoding="utf-8")
+
+
+def link(packages, copy):
+    """To packages that are there, if they are."""
+    if packages.is_dir() and not copy.exists():
+        copy.symlink_to(packages)
 
 
 def copy_if_changed(source, target):

@@ -7,7 +7,9 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
+#include <condition_variable>
 #include <csignal>
 #include <filesystem>
 #include <fstream>
@@ -21,6 +23,8 @@
 namespace {
 
 std::mutex disk;
+std::condition_variable disk_is_back;
+bool disk_hangs = false;
 std::map<ino_t, int64_t> on_disk;  // bytes of each file
 
 }  // namespace
@@ -29,7 +33,8 @@ std::map<ino_t, int64_t> on_disk;  // bytes of each file
 extern "C" int fdatasync(int fd) {
   struct stat file {};
   if (fstat(fd, &file) != 0) return -1;
-  const std::lock_guard lock(disk);
+  std::unique_lock lock(disk);
+  disk_is_back.wait(lock, [] { return !disk_hangs; });
   on_disk[file.st_ino] = file.st_size;
   return 0;
 }
@@ -255,6 +260,38 @@ TEST_F(RecorderTest, WhatCameIsOnTheDiskSoonAndAllOfALogThatHasEnded) {
     Feed(&recorder, 20, 21);
   }
   EXPECT_TRUE(all_on_disk());
+}
+
+TEST_F(RecorderTest, ALogEndsWhileTheDiskHangs) {
+  config_.heavy_minutes = 0.0;
+  config_.rotate_mb = 0.005;
+  std::atomic<bool> fed = false;
+  {
+    Recorder recorder(config_, "a", kStart);
+    Feed(&recorder, 0, 1);
+    {
+      const std::lock_guard lock(disk);
+      disk_hangs = true;
+    }
+    std::thread repair([&] {
+      for (int i = 0; i < 500 && !fed; ++i)
+        std::this_thread::sleep_for(std::chrono::milliseconds(10));
+      EXPECT_TRUE(fed);
+      {
+        const std::lock_guard lock(disk);
+        disk_hangs = false;
+      }
+      disk_is_back.notify_all();
+    });
+    Feed(&recorder, 1, 20);
+    EXPECT_GT(recorder.files(), 3);
+    fed = true;
+    repair.join();
+  }
+  EXPECT_EQ(Stamps("POSE"), Expected(0, 20));
+  for (const std::string& name : Names())
+    EXPECT_EQ(OnDisk(name), static_cast<int64_t>(std::filesystem::file_size(folder_ / name)))
+        << name;
 }
 
 TEST_F(RecorderTest, AKilledRecorderLeavesAllButItsLastMoment) {
