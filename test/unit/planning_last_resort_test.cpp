@@ -83,6 +83,53 @@ TEST(LastResort, WithoutListsItGoesOnAsCommitted) {
   EXPECT_LT((flight.Body().p - committed.stop->Position(end)).norm(), 0.1);
 }
 
+TEST(LastResort, AClimbThatItsPlannerLeftIsNotGoneOnWithFromItsStop) {
+  Flight flight{PlanningConfig()};
+  flight.Run(0.5, false);
+  flight.t += 1.0;  // the planner hangs
+  ASSERT_GT(flight.t, flight.flown->stop->start);
+  const Eigen::Vector3d p = flight.Body().p;
+  const size_t before = flight.plans.size();
+  flight.Run(0.1, false);
+  ASSERT_GT(flight.plans.size(), before);
+  EXPECT_LT((flight.Body().p - p).norm(), 0.1) << flight.plans.back().reason;
+}
+
+/// What is planned once lists of obstacles, a walker's among them, are no longer heard, and the
+/// plan before that; with a fence at x, m, if any.
+std::pair<PlanResult, PlanResult> WithoutLists(const std::optional<double>& x) {
+  Flight flight{PlanningConfig()};
+  world::Obstacle walker = Pillar({-6.0, 4.0, 1.0});
+  walker.moving = true;
+  flight.obstacles = {walker};
+  flight.Run(4.0, false);
+  flight.Run(4.0, true);
+  flight.hears = false;
+  if (x) {
+    world::Geofence fence;
+    fence.polygon = {{-20.0, -20.0}, {*x, -20.0}, {*x, 20.0}, {-20.0, 20.0}};
+    flight.pilot.SetTask(Task::kChase, Eigen::Vector3d(0.0, 0.0, 0.0));
+    flight.pilot.SetFence(fence);
+  }
+  PlanResult before;
+  for (int i = 0; i < 200; ++i) {
+    if (flight.plans.back().reason.find("not heard of") != std::string::npos) break;
+    before = flight.plans.back();
+    flight.Run(kPeriod, true);
+  }
+  return {before, flight.plans.back()};
+}
+
+TEST(LastResort, WhatWasCommittedToIsNotFlownOutOfTheFence) {
+  const std::string committed = "the running plan until its stop";
+  const auto [before, plan] = WithoutLists({});
+  ASSERT_TRUE(before.stop);
+  ASSERT_NE(plan.reason.find(committed), std::string::npos) << plan.reason;
+  const double end = before.stop->Position(before.stop->end()).x();
+  EXPECT_EQ(WithoutLists(end - 0.1).second.reason.find(committed), std::string::npos);
+  EXPECT_NE(WithoutLists(end + 1.0).second.reason.find(committed), std::string::npos);
+}
+
 TEST(LastResort, WhatTheBodyStraysByBeyondAnyTubeIsTakenOffTheClaim) {
   const auto planned = [](double bound) {
     Pilot pilot{PlanningConfig()};

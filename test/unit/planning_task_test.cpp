@@ -177,6 +177,32 @@ TEST(Task, ReturnGoesBackAroundWhatStandsBetween) {
   EXPECT_LT(flight.Body().v.norm(), 0.01);
 }
 
+// Nothing about the drone was seen: no stop can be certified there.
+TEST(Task, AmongMoversNoLongWayBackIsFlownWithoutAStop) {
+  for (const bool movers : {false, true}) {
+    Flight flight;
+    flight.obstacles = {Pillar(1, 0.0, 12.0)};
+    flight.obstacles[0].moving = movers;
+    flight.Chase(12.0);
+    flight.pilot.SetTask(Task::kReturn, flight.home());
+    world::Obstacle about = Pillar(9, flight.Body().p.x(), 0.0);
+    about.half.head<2>().setConstant(4.0);
+    const size_t chased = flight.plans.size();
+    for (int i = 0; i < 30; ++i) {
+      flight.pilot.SetUnseen(flight.t, {about});
+      flight.Run(0.1);
+    }
+    int legs = 0, held = 0;
+    for (size_t i = chased; i < flight.plans.size(); ++i) {
+      const PlanResult& plan = flight.plans[i];
+      legs += plan.trajectory.duration > 3.0 && !plan.stop;
+      held += plan.reason.rfind("returning would have no stop", 0) == 0;
+    }
+    EXPECT_EQ(legs == 0, movers) << legs;
+    EXPECT_EQ(held > 0, movers) << held;
+  }
+}
+
 TEST(Task, ReturnWithoutAPlaceHolds) {
   Flight flight;
   flight.Chase(8.0);
