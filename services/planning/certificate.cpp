@@ -242,9 +242,8 @@ std::string SampleFaults(const Curve& plan, const Problem& problem, double sight
       return "elevation";
     if (l.view && tau >= l.view_from) {
       const double T = problem.duration;
-      const double below = SeenAt(q - p, Evaluate(plan, tau, 1) / T,
-                                  Evaluate(plan, tau, 2) / (T * T), l.view->drag, nullptr)
-                               .x();
+      const double below = SeenBelow(q - p, Evaluate(plan, tau, 1) / T,
+                                     Evaluate(plan, tau, 2) / (T * T), l.view->drag);
       if (!(below < l.view->down + 1e-9) || !(below > -l.view->up - 1e-9)) return "image";
     }
   }

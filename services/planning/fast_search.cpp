@@ -96,7 +96,7 @@ class FastSearch : public Search {
   }
   // `open`: the row that single precision leaves open, which decides most; -1: none.
   bool Passes(const Curve& plan, int open) {
-    if (!KeepsLimitsOf(plan) || (open >= 0 && !proof_->RowHolds(open, plan))) return false;
+    if ((open >= 0 && !proof_->RowHolds(open, plan)) || !KeepsLimitsOf(plan)) return false;
     if (open < 0 && !proves_all_) return true;
     const bool holds = proof_->Holds(plan);
     n_refused_ += proves_all_ && !holds;

@@ -17,7 +17,6 @@ struct Range {
   double low, high;
 };
 Range operator+(Range a, Range b) { return {a.low + b.low, a.high + b.high}; }
-Range operator-(Range a, Range b) { return {a.low - b.high, a.high - b.low}; }
 Range operator*(double s, Range a) {
   return s < 0.0 ? Range{s * a.high, s * a.low} : Range{s * a.low, s * a.high};
 }
@@ -25,20 +24,57 @@ Range operator*(Range a, Range b) {
   const double p[] = {a.low * b.low, a.low * b.high, a.high * b.low, a.high * b.high};
   return {std::min({p[0], p[1], p[2], p[3]}), std::max({p[0], p[1], p[2], p[3]})};
 }
-Range Squared(Range a) {
-  const double l = a.low * a.low, h = a.high * a.high;
-  return {a.low <= 0.0 && a.high >= 0.0 ? 0.0 : std::min(l, h), std::max(l, h)};
+
+/// What a function of s in [-1,1] is within: mid + slope s + rest. Affine arithmetic (de Figueiredo
+/// & Stolfi 2004): the rests of sums and products shrink with the square of a piece's length.
+struct Affine {
+  double mid = 0.0, slope = 0.0;
+  Range rest{0.0, 0.0};
+
+  Range line() const { return {mid - std::abs(slope), mid + std::abs(slope)}; }
+  Range range() const { return line() + rest; }
+  /// Largest distance from mid.
+  double reach() const { return std::abs(slope) + std::max(-rest.low, rest.high); }
+};
+Affine operator+(const Affine& a, const Affine& b) {
+  return {a.mid + b.mid, a.slope + b.slope, a.rest + b.rest};
 }
-Range Root(Range a) { return {std::sqrt(std::max(0.0, a.low)), std::sqrt(a.high)}; }
+Affine operator*(double f, const Affine& a) { return {f * a.mid, f * a.slope, f * a.rest}; }
+Affine operator-(const Affine& a, const Affine& b) { return a + -1.0 * b; }
+Affine operator*(const Affine& a, const Affine& b) {
+  const double square = a.slope * b.slope;
+  return {
+      a.mid * b.mid, a.mid * b.slope + a.slope * b.mid,
+      Range{std::min(0.0, square), std::max(0.0, square)} + a.rest * b.range() + a.line() * b.rest};
+}
+
+/// Of a > 0, by Taylor's theorem about its middle.
+Affine Root(const Affine& a) {
+  const double root = std::sqrt(a.mid), d = a.reach(), low = a.range().low;
+  const double bend = d * d / (8.0 * low * std::sqrt(low));
+  return {root, 0.5 / root * a.slope, 0.5 / root * a.rest + Range{-bend, 0.0}};
+}
+
+/// Cosine and sine of an angle that is `quarter` quarter turns less.
+Affine Cosine(const Affine& a, int quarters) {
+  const double phase = a.mid - 0.5 * M_PI * quarters, fall = -std::sin(phase), d = a.reach();
+  return {std::cos(phase), fall * a.slope, fall * a.rest + Range{-0.5 * d * d, 0.5 * d * d}};
+}
 
 /// Bernstein coefficients.
 struct Coefficients {
   int n = 1;
   double c[kMost] = {};
 
-  Range range() const {
-    const auto [low, high] = std::minmax_element(c, c + n);
-    return {*low, *high};
+  /// The line from the first to the last, and how far the others are off it.
+  Affine affine() const {
+    const double step = n > 1 ? (c[n - 1] - c[0]) / (n - 1) : 0.0;
+    Affine a{0.5 * (c[0] + c[n - 1]), 0.5 * (c[n - 1] - c[0])};
+    for (int i = 1; i + 1 < n; ++i) {
+      const double off = c[i] - (c[0] + step * i);
+      a.rest = {std::min(a.rest.low, off), std::max(a.rest.high, off)};
+    }
+    return a;
   }
   Coefficients End(bool last) const { return {1, {c[last ? n - 1 : 0]}}; }
 };
@@ -77,85 +113,46 @@ void Split(const Piece& whole, double at, Piece* left, Piece* right) {
   left->has_yaw = right->has_yaw = whole.has_yaw;
 }
 
-/// Directions within `half` (below pi/2) of the middle one.
-struct Fan {
-  double cosine, sine, half;
-
-  /// Level coordinates along and across the middle direction.
-  void Turn(const Coefficients* xy, Coefficients* along, Coefficients* across) const {
-    along->n = across->n = xy[0].n;
-    for (int i = 0; i < xy[0].n; ++i) {
-      along->c[i] = cosine * xy[0].c[i] + sine * xy[1].c[i];
-      across->c[i] = cosine * xy[1].c[i] - sine * xy[0].c[i];
-    }
-  }
-};
-
-std::optional<Fan> HeadingOf(const Piece& piece) {
-  if (piece.has_yaw) {
-    const Range yaw = piece.yaw.range();
-    const double middle = 0.5 * (yaw.low + yaw.high), half = 0.5 * (yaw.high - yaw.low);
-    if (!(half < 1.5)) return std::nullopt;
-    return Fan{std::cos(middle), std::sin(middle), half};
-  }
-  Fan fan{0.0, 0.0, 0.0};
-  for (int i = 0; i < piece.r[0].n; ++i) fan.cosine += piece.r[0].c[i], fan.sine += piece.r[1].c[i];
-  const double length = std::hypot(fan.cosine, fan.sine);
-  if (!(length > 0.0)) return std::nullopt;
-  fan.cosine /= length, fan.sine /= length;
-  Coefficients along, across;
-  fan.Turn(piece.r, &along, &across);
-  for (int i = 0; i < along.n; ++i) {
-    if (!(along.c[i] > 0.0)) return std::nullopt;
-    fan.half = std::max(fan.half, std::atan2(std::abs(across.c[i]), along.c[i]));
-  }
-  return fan;
-}
-
 /// The target in the body's frame, forward, left and down, each times the same positive number.
 struct Seen {
-  Range forward, left, down;
+  Affine forward, left, down;
 };
 
+/// With the heading towards the target `left` is not asked for, and left out.
 std::optional<Seen> SeenFrom(const Piece& piece) {
-  const auto heading = HeadingOf(piece);
-  if (!heading) return std::nullopt;
-  const Range cosine{std::cos(heading->half), 1.0};
-  const Range sine{-std::sin(heading->half), std::sin(heading->half)};
-  const auto turned = [&](const Coefficients* xy, Range* x, Range* y) {
-    Coefficients along, across;
-    heading->Turn(xy, &along, &across);
-    const Range a = along.range(), b = across.range();
-    *x = cosine * a + sine * b;
-    *y = cosine * b - sine * a;
-  };
-  Range x{}, y{}, ax{}, ay{};
-  turned(piece.r, &x, &y);
-  turned(piece.f, &ax, &ay);
-  if (!piece.has_yaw) {
-    x = {std::max(x.low, 0.0), x.high};
-    y = {0.0, 0.0};
+  Affine r[3], f[3];
+  for (int a = 0; a < 3; ++a) r[a] = piece.r[a].affine(), f[a] = piece.f[a].affine();
+  const Affine &z = r[2], &up = f[2];
+  if (!(up.range().low > 0.0)) return std::nullopt;
+  if (!piece.has_yaw) {  // times the level distance, which is the root of h
+    const Affine h = r[0] * r[0] + r[1] * r[1];
+    const Affine along = f[0] * r[0] + f[1] * r[1], across = f[1] * r[0] - f[0] * r[1];
+    const Affine lateral2 = up * up * h + across * across;
+    if (!(lateral2.range().low > 0.0)) return std::nullopt;
+    return Seen{lateral2 - z * up * along, {}, -1.0 * ((along + z * up) * Root(lateral2))};
   }
-  const Range z = piece.r[2].range(), up = piece.f[2].range();
-  if (!(up.low > 0.0)) return std::nullopt;
-  const Range lateral2 = Squared(up) + Squared(ay), lateral = Root(lateral2);
-  const Range thrust = Root(lateral2 + Squared(ax));
-  return Seen{x * lateral2 - y * ax * ay - z * up * ax, (y * up - z * ay) * thrust,
-              -1.0 * ((x * ax + y * ay + z * up) * lateral)};
+  const Affine yaw = piece.yaw.affine();
+  const Affine cosine = Cosine(yaw, 0), sine = Cosine(yaw, 1);
+  const Affine x = cosine * r[0] + sine * r[1], y = cosine * r[1] - sine * r[0];
+  const Affine ax = cosine * f[0] + sine * f[1], ay = cosine * f[1] - sine * f[0];
+  const Affine lateral2 = up * up + ay * ay, thrust2 = lateral2 + ax * ax;
+  if (!(lateral2.range().low > 0.0) || !(thrust2.range().low > 0.0)) return std::nullopt;
+  return Seen{x * lateral2 - y * ax * ay - z * up * ax, (y * up - z * ay) * Root(thrust2),
+              -1.0 * ((x * ax + y * ay + z * up) * Root(lateral2))};
 }
 
 bool IsInside(const Piece& piece, const View& view) {
   const auto seen = SeenFrom(piece);
   if (!seen) return false;
-  const Range forward = seen->forward, down = seen->down;
-  const double slack = kSlack * (std::abs(forward.high) + std::abs(down.low) + std::abs(down.high) +
-                                 std::abs(seen->left.high));
-  if ((down - view.down * forward).high > -slack) return false;
-  if ((down + view.up * forward).low < slack) return false;
+  const auto most = [](const Affine& a) { return std::abs(a.mid) + a.reach(); };
+  const Affine &forward = seen->forward, &down = seen->down;
+  const double slack = kSlack * (most(forward) + most(down) + most(seen->left));
+  if (!((down - view.down * forward).range().high < -slack)) return false;
+  if (!((down + view.up * forward).range().low > slack)) return false;
   if (!piece.has_yaw) return true;
   const double pitch = 0.5 * (std::atan(view.down) - std::atan(view.up));
-  const Range side = view.side * (std::cos(pitch) * forward + std::sin(pitch) * down);
-  return (seen->left - side).high < -slack && (seen->left + side).low > slack;
+  const Affine side = view.side * (std::cos(pitch) * forward + std::sin(pitch) * down);
+  return (seen->left - side).range().high < -slack && (seen->left + side).range().low > slack;
 }
 
 /// All pieces of a size before their halves: most of what leaves the view does so at an end.
@@ -220,17 +217,14 @@ bool KeepsView(const Curve& plan, const Curve& target, double duration,
   return Keeps(whole, view);
 }
 
-Eigen::Vector2d SeenAt(const Eigen::Vector3d& to_target, const Eigen::Vector3d& v,
-                       const Eigen::Vector3d& a, double drag, const double* yaw) {
+double SeenBelow(const Eigen::Vector3d& to_target, const Eigen::Vector3d& v,
+                 const Eigen::Vector3d& a, double drag) {
   Piece piece;
   const Eigen::Vector3d f = a + drag * Eigen::Vector3d(v.x(), v.y(), 0.0);
   for (int i = 0; i < 3; ++i) piece.r[i].c[0] = to_target[i], piece.f[i].c[0] = f[i];
   piece.f[2].c[0] += kGravity;
-  if (yaw) piece.yaw.c[0] = *yaw;
-  piece.has_yaw = yaw != nullptr;
   const auto seen = SeenFrom(piece);
-  if (!seen || !(seen->forward.low > 0.0)) return Eigen::Vector2d::Constant(HUGE_VAL);
-  return {seen->down.low / seen->forward.low, seen->left.low / seen->forward.low};
+  return seen && seen->forward.mid > 0.0 ? seen->down.mid / seen->forward.mid : HUGE_VAL;
 }
 
 }  // namespace chase::planning

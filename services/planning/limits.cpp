@@ -168,6 +168,24 @@ bool KeepsWithin(const Net* net, const Curve& plan, const Limits& l) {
   return sum.IsPositive();
 }
 
+// Distance and elevation.
+bool KeepsFromTarget(const Net* net, const Curve& plan, const Problem& problem) {
+  const Limits& l = problem.limits;
+  const Curve& target = problem.target;
+  if (!(l.tan_elevation > 0.0) && !(l.min_distance > 0.0)) return true;
+  if (net) {
+    Net relative = *net;
+    const Net seen = MakeNet(target);
+    relative.b -= seen.b;
+    relative.error += seen.error;
+    if (KeepsAway(relative, l.tan_elevation, l.min_distance, kHalvings)) return true;
+  }
+  const double t2 = l.tan_elevation * l.tan_elevation;
+  if (t2 > 0.0 && !KeepsRelative(plan, target, {t2, t2, -1.0}, 0.0)) return false;
+  return !(l.min_distance > 0.0) ||
+         KeepsRelative(plan, target, Eigen::Vector3d::Ones(), -l.min_distance * l.min_distance);
+}
+
 }  // namespace
 
 bool KeepsLimits(const Curve& plan, const Problem& problem) {
@@ -182,19 +200,8 @@ bool KeepsLimits(const Curve& plan, const Problem& problem) {
   if (l.acceleration > 0.0 && !KeepsNorm(quick, plan, 2, l.acceleration, problem.duration))
     return false;
   if (std::isfinite(l.listed_within) && !KeepsWithin(quick, plan, l)) return false;
-  if (l.view && !KeepsView(plan, target, problem.duration, nullptr, *l.view, l.view_from))
-    return false;
-  if (!(l.tan_elevation > 0.0) && !(l.min_distance > 0.0)) return true;
-  if (small) {
-    const Net seen = MakeNet(target);
-    net.b -= seen.b;
-    net.error += seen.error;
-    if (KeepsAway(net, l.tan_elevation, l.min_distance, kHalvings)) return true;
-  }
-  const double t2 = l.tan_elevation * l.tan_elevation;
-  if (t2 > 0.0 && !KeepsRelative(plan, target, {t2, t2, -1.0}, 0.0)) return false;
-  return !(l.min_distance > 0.0) ||
-         KeepsRelative(plan, target, Eigen::Vector3d::Ones(), -l.min_distance * l.min_distance);
+  return KeepsFromTarget(quick, plan, problem) &&
+         (!l.view || KeepsView(plan, target, problem.duration, nullptr, *l.view, l.view_from));
 }
 
 }  // namespace chase::planning

@@ -125,7 +125,7 @@ Limits MakeLimits(const PlannerConfig& c, const Stretch& over, const Eigen::Vect
       std::min(c.min_distance, std::max(0.0, (1.0 - kRounding) * r.norm() - kRounding));
   if (!over.asks_sight) return limits;
   limits.view = c.view();
-  const double below = SeenAt(r, s.v, s.a, c.drag, nullptr).x();
+  const double below = SeenBelow(r, s.v, s.a, c.drag);
   const bool seen = limits.view && below < limits.view->down && below > -limits.view->up;
   limits.view_from = seen ? 0.0 : kBackInView;
   return limits;

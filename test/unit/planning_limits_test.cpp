@@ -277,7 +277,7 @@ TEST(Limits, GiveWayToTheStartOnly) {
     // In the image from the start on, or soon.
     const double down = std::tan(c.view_down_deg * M_PI / 180.0);
     const double up = std::tan(c.view_up_deg * M_PI / 180.0);
-    const double below = SeenAt(r, s.v, s.a, c.drag, nullptr).x();
+    const double below = SeenBelow(r, s.v, s.a, c.drag);
     EXPECT_EQ(l.view_from == 0.0, below < down && below > -up);
     EXPECT_TRUE(l.view_from == 0.0 || l.view_from == 0.25);
   }

@@ -45,7 +45,7 @@ struct Extremes {
     const Vector3d r = target - s.p;
     near = std::min(near, r.norm());
     slope = std::max(slope, std::abs(r.z()) / r.head<2>().norm());
-    const double seen = SeenAt(r, s.v, s.a, PlannerConfig().drag, nullptr).x();
+    const double seen = SeenBelow(r, s.v, s.a, PlannerConfig().drag);
     below = std::max(below, seen);
     above = std::max(above, -seen);
   }
