@@ -53,7 +53,7 @@ bool EventFile::Flush() {
 
 bool EventFile::IsOnDisk() {
   if (log_) Sync();
-  return !IsSyncing();
+  return !IsSyncing() && (!log_ || synced_ == flushed_);
 }
 
 bool EventFile::IsSyncing() const {

@@ -10,7 +10,8 @@
 namespace chase::recorder {
 
 /// An LCM log that is read as far as it goes while it grows. What the disk refuses leaves no half
-/// event behind: the file is cut back to what was flushed last. The end waits for the disk.
+/// event behind: the file is cut back to what was flushed last. The end waits for the
+/// disk, unless it IsOnDisk().
 class EventFile {
  public:
   /// Throws std::runtime_error, one line, when the file cannot be made.

@@ -153,6 +153,7 @@ int64_t Recorder::DropFirst(std::deque<Old>* logs) {
   const Old old = logs->front();
   logs->pop_front();
   std::error_code ignored;
+  std::filesystem::resize_file(old.name, 0, ignored);  // free, though it may be open still
   std::filesystem::remove(old.name, ignored);
   return old.bytes;
 }

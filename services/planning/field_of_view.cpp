@@ -55,7 +55,7 @@ Affine Root(const Affine& a) {
   return {root, 0.5 / root * a.slope, 0.5 / root * a.rest + Range{-bend, 0.0}};
 }
 
-/// Cosine and sine of an angle that is `quarter` quarter turns less.
+/// Cosine of the angle less `quarters` quarter turns: of 1 its sine.
 Affine Cosine(const Affine& a, int quarters) {
   const double phase = a.mid - 0.5 * M_PI * quarters, fall = -std::sin(phase), d = a.reach();
   return {std::cos(phase), fall * a.slope, fall * a.rest + Range{-0.5 * d * d, 0.5 * d * d}};

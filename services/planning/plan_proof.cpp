@@ -167,7 +167,7 @@ bool PlanProof::RowHolds(const Row& row, const Curve& plan, const Local* p, bool
 }
 
 bool PlanProof::RowHolds(int row, const Curve& plan) {
-  if (!IsUsable()) return false;
+  if (!plan.allFinite() || !IsUsable()) return false;
   const Row& r = rows_[static_cast<size_t>(row)];
   if (last_.obstacle != r.obstacle) last_ = {r.obstacle, -1.0};
   if (!r.decides) return true;

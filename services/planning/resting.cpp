@@ -184,7 +184,7 @@ const world::Obstacle& Resting::Obstacle(size_t j) const {
 // Is what moves in curves, the target too, forecast for as long as it could come to the way? Beyond
 // its end such a curve is no forecast.
 bool Resting::IsForecast(const Curve& way, double T) const {
-  constexpr double kRounding = 1e-3, kFast = 3.0;  // s; m/s
+  constexpr double kRounding = 1e-3, kFast = 3.0;  // s; m/s, a runner
   const Box box = BoxOf(ToPoints(way, 6), 7, 0.0);
   const auto is_forecast = [&](const world::Trajectory& center, const Ellipsoid& e) {
     const double unknown = over_.t0 + T - center.end();

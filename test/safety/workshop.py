@@ -95,6 +95,8 @@ class Workshop:
 
 def link(packages, copy):
     """To packages that are there, if they are."""
+    if copy.is_symlink():
+        copy.unlink()
     if packages.is_dir() and not copy.exists():
         copy.symlink_to(packages)
 

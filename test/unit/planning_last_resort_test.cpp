@@ -2,6 +2,10 @@
 // where no tube is wide enough.
 #include <gtest/gtest.h>
 
+#include <optional>
+#include <string>
+#include <utility>
+
 #include "services/planning/stopping.h"
 #include "test/unit/planning_pilot_flight.h"
 
@@ -87,6 +91,7 @@ TEST(LastResort, AClimbThatItsPlannerLeftIsNotGoneOnWithFromItsStop) {
   Flight flight{PlanningConfig()};
   flight.Run(0.5, false);
   flight.t += 1.0;  // the planner hangs
+  ASSERT_TRUE(flight.flown && flight.flown->stop);
   ASSERT_GT(flight.t, flight.flown->stop->start);
   const Eigen::Vector3d p = flight.Body().p;
   const size_t before = flight.plans.size();

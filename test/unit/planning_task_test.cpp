@@ -345,7 +345,7 @@ void Tell(double since, const std::vector<world::Obstacle>& obstacles, double t,
 }
 
 // In a new frame a pilot does what one does that has only just been started, bit for bit: nothing
-// that was said in the old one is left.
+// that was said in the old one is left, but that unseen places are told of.
 TEST(Task, AfterAChangeOfFrameItIsAsIfItHadJustBeenStarted) {
   for (const Task task : {Task::kChase, Task::kHold, Task::kReturn, Task::kLand}) {
     Flight flight;

@@ -16,6 +16,7 @@
 #include <map>
 #include <mutex>
 #include <set>
+#include <system_error>
 #include <thread>
 
 #include "common/logs/log_reader.h"
@@ -96,6 +97,16 @@ class RecorderTest : public testing::Test {
     const std::lock_guard lock(disk);
     const auto at = on_disk.find(file.st_ino);
     return at == on_disk.end() ? 0 : at->second;
+  }
+
+  /// How often files of the folder are open.
+  int Open() const {
+    int open = 0;
+    for (const auto& entry : std::filesystem::directory_iterator("/proc/self/fd")) {
+      std::error_code closed;
+      open += std::filesystem::read_symlink(entry.path(), closed).parent_path() == folder_;
+    }
+    return open;
   }
 
   /// Light and heavy messages, 10 of each a second, over [from, to) seconds.
@@ -252,11 +263,13 @@ TEST_F(RecorderTest, WhatCameIsOnTheDiskSoonAndAllOfALogThatHasEnded) {
   {
     Recorder recorder(config_, "a", kStart);
     Feed(&recorder, 0, 20);
-    for (int i = 0; i < 500 && !all_on_disk(); ++i) {
+    constexpr int kLogs = 2;  // that are written to
+    for (int i = 0; i < 500 && !(all_on_disk() && Open() <= kLogs); ++i) {
       recorder.Tick(kStart + 20 * kSecond + i, kPlenty);
       std::this_thread::sleep_for(std::chrono::milliseconds(10));
     }
     EXPECT_TRUE(all_on_disk());
+    EXPECT_LE(Open(), kLogs);
     Feed(&recorder, 20, 21);
   }
   EXPECT_TRUE(all_on_disk());
