@@ -1,8 +1,11 @@
 // The image's edges against a pinhole camera on a body whose z axis follows the thrust.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <optional>
 #include <random>
+#include <utility>
 
 #include "common/math/rotation.h"
 #include "common/world/rig.h"
@@ -32,13 +35,13 @@ Vector3d Evaluated(const Curve& c, double tau, int order = 0) {
   return sum;
 }
 
-/// A chase over `duration` s: the drone behind a target, both on random curves.
+/// A chase over `duration` s: the drone behind a target, both on random curves or lines.
 struct Scene {
   Curve plan, target;
   std::vector<double> yaw;
   double duration = 2.5;
 
-  explicit Scene(unsigned seed) {
+  explicit Scene(unsigned seed, bool straight = false) {
     std::mt19937 random(seed);
     std::normal_distribution<double> normal;
     plan = Curve::Zero(6, 3);
@@ -51,11 +54,14 @@ struct Scene {
     for (int k = 1; k < 4; ++k)
       for (int a = 0; a < 2; ++a) target(k, a) = 0.7 * normal(random);
     yaw = {heading, 0.2 * normal(random), 0.2 * normal(random)};
+    if (!straight) return;
+    plan.bottomRows(4).setZero();
+    target.bottomRows(2).setZero();
+    yaw = {heading, 0.8 * normal(random)};
   }
 
-  /// Least distance of the target's centre from the image's edges, px; `follow`: the yaw points at
-  /// the target, and only the upper and lower edge count.
-  double Inside(const world::Rig& rig, double tau, bool follow) const {
+  /// The target's centre in the body's frame; `follow`: the yaw points at it.
+  Vector3d InBody(double tau, bool follow) const {
     const Vector3d r = Evaluated(target, tau) - Evaluated(plan, tau);
     const Vector3d v = Evaluated(plan, tau, 1) / duration;
     const Vector3d z = (Evaluated(plan, tau, 2) / (duration * duration) +
@@ -65,7 +71,12 @@ struct Scene {
     const Vector3d y = z.cross(Vector3d(std::cos(psi), std::sin(psi), 0.0)).normalized();
     Matrix3d R_WB;
     R_WB << y.cross(z), y, z;
-    const Vector3d p_C = rig.R_BC().transpose() * R_WB.transpose() * r;
+    return R_WB.transpose() * r;
+  }
+
+  /// Least distance of it from the image's edges, px; with `follow` the upper and lower edge only.
+  double Inside(const world::Rig& rig, double tau, bool follow) const {
+    const Vector3d p_C = rig.R_BC().transpose() * InBody(tau, follow);
     if (p_C.z() <= 0.0) return -1e9;
     const Eigen::Vector2d px = rig.Project(p_C);
     const double vertical = std::min(px.y(), 2.0 * rig.center_v_px - px.y());
@@ -105,6 +116,47 @@ void Compare(bool follow, double from) {
 TEST(FieldOfView, IsThatOfACameraOnATiltedBody) { Compare(false, 0.0); }
 TEST(FieldOfView, WithTheYawOnTheTarget) { Compare(true, 0.0); }
 TEST(FieldOfView, FromALaterTimeOn) { Compare(false, 0.4); }
+
+/// Tangents below, above and beside the body's level axis up to which the target is seen; none
+/// where it is not in front.
+std::optional<View> Seen(const Scene& scene, bool follow) {
+  constexpr int kSamples = 2000;
+  View seen{-HUGE_VAL, -HUGE_VAL, -HUGE_VAL, kDrag};
+  for (int i = 0; i <= kSamples; ++i) {
+    const Vector3d p = scene.InBody(static_cast<double>(i) / kSamples, follow);
+    if (p.x() < 0.1 * p.norm()) return std::nullopt;
+    seen.down = std::max(seen.down, -p.z() / p.x());
+    seen.up = std::max(seen.up, p.z() / p.x());
+    seen.side = std::max(seen.side, std::abs(p.y()) / p.x());
+  }
+  return seen;
+}
+
+// Whatever is left out of a bound shows at an edge that the target just passes.
+TEST(FieldOfView, AnEdgeThatIsJustPassedIsAndOneThatIsNotIsNot) {
+  constexpr double kJust = 1e-5, kWide = 10.0;
+  int asked = 0, kept = 0;
+  for (unsigned seed = 0; seed < 1000; ++seed)
+    for (const auto& [follow, straight] :
+         {std::pair(false, false), {true, false}, {false, true}, {true, true}}) {
+      const Scene scene(seed, straight);
+      const auto seen = Seen(scene, follow);
+      for (double View::*edge : {&View::down, &View::up, &View::side}) {
+        if (!seen || (follow && edge == &View::side)) continue;
+        View view{kWide, kWide, kWide, kDrag};
+        const auto keeps = [&](double more) {
+          view.*edge = (*seen).*edge + more;
+          return KeepsView(scene.plan, scene.target, scene.duration, follow ? nullptr : &scene.yaw,
+                           view);
+        };
+        EXPECT_FALSE(keeps(-kJust)) << seed << follow;
+        ++asked;
+        kept += keeps(100.0 * kJust);
+      }
+    }
+  EXPECT_GT(asked, 3000);
+  EXPECT_GT(kept, 0.97 * asked) << asked;
+}
 
 TEST(FieldOfView, OneInstantIsSeenAsTheCameraSeesIt) {
   const world::Rig rig;
