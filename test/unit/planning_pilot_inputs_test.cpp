@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "test/unit/planning_pilot_flight.h"
@@ -388,6 +389,22 @@ TEST(Pilot, TheForecastsUncertaintyAndBodyReachThePlan) {
                 c.sight_margin + c.sigmas * deviation(plan->trajectory.duration) - 1e-9);
     }
     EXPECT_EQ(sights, 1) << sigma;
+  }
+}
+
+TEST(Pilot, ALowTargetHasABodyToo) {
+  for (const double height : {0.0, 0.2, 2.0}) {
+    Flight flight{PlanningConfig()};
+    flight.Run(4.0, false);
+    Forecast forecast = Walking(flight.t);
+    forecast.target.coefficients << 2.5, 0.0, 1.2, -2.5, 0.0, 0.0;  // at the drone, and as high
+    forecast.height = height;
+    flight.pilot.SetForecast(forecast);
+    const auto plan = flight.pilot.Update(flight.t, flight.Body());
+    ASSERT_TRUE(plan);
+    const auto of_target = [](const Proof& p) { return p.obstacle == kTargetId && !p.of_sight; };
+    EXPECT_EQ(std::any_of(plan->proofs.begin(), plan->proofs.end(), of_target), height > 0.0)
+        << height << plan->reason;
   }
 }
 
