@@ -8,6 +8,7 @@
 
 #include "common/math/bernstein.h"
 #include "common/math/simplex.h"
+#include "common/world/forecast.h"
 
 namespace chase::world {
 
@@ -31,7 +32,8 @@ Matrix3d InverseAbove(const Matrix3d& given) {
 
 }  // namespace
 
-Body MakeBody(const Obstacle& obstacle, double start, double duration, double sigmas) {
+Body MakeBody(const Obstacle& obstacle, double start, double duration, double sigmas,
+              double flown) {
   Body body;
   body.kind = obstacle.solid;
   body.ground = obstacle.ground && body.kind == Body::Kind::kBox;
@@ -39,11 +41,12 @@ Body MakeBody(const Obstacle& obstacle, double start, double duration, double si
     body.shape = InverseAbove(obstacle.shape);
   else
     body.shape = obstacle.axes.toRotationMatrix();
-  Retime(obstacle, start, duration, sigmas, &body);
+  Retime(obstacle, start, duration, sigmas, flown, &body);
   return body;
 }
 
-void Retime(const Obstacle& obstacle, double start, double duration, double sigmas, Body* body) {
+void Retime(const Obstacle& obstacle, double start, double duration, double sigmas, double flown,
+            Body* body) {
   SetCurve(obstacle.center, start, duration, &body->center);
   body->half = obstacle.half;
   const bool known =
@@ -51,9 +54,10 @@ void Retime(const Obstacle& obstacle, double start, double duration, double sigm
   body->sigmas = known ? 0.0 : sigmas;
   // The age at tau is since + duration tau.
   const double since = start - obstacle.center.start;
-  body->covariance[0] = obstacle.position_covariance + since * since * obstacle.velocity_covariance;
-  body->covariance[1] = 2.0 * since * duration * obstacle.velocity_covariance;
-  body->covariance[2] = duration * duration * obstacle.velocity_covariance;
+  const Matrix3d V = VelocityCovariance(obstacle, since + std::min(flown, duration));
+  body->covariance[0] = obstacle.position_covariance + since * since * V;
+  body->covariance[1] = 2.0 * since * duration * V;
+  body->covariance[2] = duration * duration * V;
 }
 
 Vector3d SupportPoint(const Body& body, const Vector3d& n) {

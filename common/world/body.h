@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cmath>
 
 #include "common/math/polynomial.h"
 #include "common/world/obstacle.h"
@@ -38,11 +39,14 @@ struct Ball {
 
 /// The obstacle over [start, start + duration], its ellipsoid no smaller than the one that R
 /// describes, however the inverse of R is rounded; its covariance grows as that of a body at
-/// unknown constant velocity since center.start. NaN where R is not positive definite or its
+/// unknown constant velocity since center.start. Changes of that velocity to come count in full for
+/// the first `flown` s, then for less than they may. NaN where R is not positive definite or its
 /// inverse is no inverse.
-Body MakeBody(const Obstacle& obstacle, double start, double duration, double sigmas);
+Body MakeBody(const Obstacle& obstacle, double start, double duration, double sigmas,
+              double flown = HUGE_VAL);
 /// The same over another time, for a body that was made of an ellipsoid of the same shape.
-void Retime(const Obstacle& obstacle, double start, double duration, double sigmas, Body* body);
+void Retime(const Obstacle& obstacle, double start, double duration, double sigmas, double flown,
+            Body* body);
 
 /// A point of the solid about the origin, without its uncertainty, where n' x is greatest; n is not
 /// zero.

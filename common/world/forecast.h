@@ -1,8 +1,10 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 
 #include "common/world/manoeuvre.h"
+#include "common/world/obstacle.h"
 
 namespace chase::world {
 
@@ -15,6 +17,21 @@ inline Eigen::Matrix3d ForecastCovariance(const Eigen::Matrix3d& position,
                                           const Eigen::Matrix3d& velocity, double t,
                                           const Manoeuvre& manoeuvre = kTargetManoeuvre) {
   return position + t * t * velocity + manoeuvre.Variance(t) * Eigen::Matrix3d::Identity();
+}
+
+/// Walkers change their velocity as if their acceleration were white noise of this spectral density
+/// along each level axis, m^2/s^3: over t s it adds a third of it times t^3 to the variance of the
+/// place. Bar-Shalom, Li and Kirubarajan 2001, "Estimation with Applications to Tracking and
+/// Navigation", section 6.2.2.
+inline constexpr double kMoverNoise = 0.4;
+/// The velocity's covariance in a list of obstacles holds what that adds for so long, s.
+inline constexpr double kNoiseListed = 0.5;
+
+/// Covariance of the obstacle's velocity from which that of its place grows with the square of the
+/// time, for `ahead` s no slower than it does, m^2/s^2.
+inline Eigen::Matrix3d VelocityCovariance(const Obstacle& o, double ahead) {
+  const double more = o.moving ? kMoverNoise / 3.0 * std::max(0.0, ahead - kNoiseListed) : 0.0;
+  return o.velocity_covariance + Eigen::Vector3d(more, more, 0.0).asDiagonal().toDenseMatrix();
 }
 
 }  // namespace chase::world

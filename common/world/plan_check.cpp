@@ -1,6 +1,7 @@
 #include "common/world/plan_check.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "common/math/gaussian.h"
 
@@ -24,10 +25,12 @@ bool IsCurve(const Trajectory& x) {
 /// Proofs of one trajectory.
 class Examiner {
  public:
-  Examiner(const Claim& claim, const LeastClaim& least, const Trajectory& of,
+  /// `flown`: s of the trajectory for which movers' changes of velocity count.
+  Examiner(const Claim& claim, const LeastClaim& least, const Trajectory& of, double flown,
            const std::vector<Obstacle>& obstacles)
       : claim_(claim),
         of_(of),
+        flown_(flown),
         obstacles_(obstacles),
         is_certificate_(least.exact ? IsCertificateExact : IsCertificate),
         is_safe_(obstacles.size(), 0) {
@@ -71,7 +74,7 @@ class Examiner {
     if (!body_ && !(math::IsCovariance(obstacle.position_covariance) &&
                     math::IsCovariance(obstacle.velocity_covariance)))
       return "has a covariance that is not positive semidefinite";
-    if (!body_) body_.emplace(MakeBody(obstacle, of_.start, of_.duration, claim_.sigmas));
+    if (!body_) body_.emplace(MakeBody(obstacle, of_.start, of_.duration, claim_.sigmas, flown_));
     drone_.radius = math::Polynomial::Constant(1, proof.radius);
     if (proof.of_sight) target_.radius = proof.target_radius;
     const bool holds = is_certificate_(proof.separations, proof.from, 1.0, drone_,
@@ -86,6 +89,7 @@ class Examiner {
 
   const Claim& claim_;
   const Trajectory& of_;
+  const double flown_;
   const std::vector<Obstacle>& obstacles_;
   decltype(&IsCertificate) is_certificate_;
   std::vector<char> is_safe_;
@@ -123,9 +127,11 @@ std::string Refute(const Claim& claim, const LeastClaim& least,
   if (!claim.certified) return "";
   if (!(claim.hard_radius >= least.hard_radius)) return "its sphere is too small";
   if (!(claim.sigmas >= least.sigmas)) return "it takes obstacles for more certain than they are";
-  std::string bad = Examiner(claim, least, claim.position, obstacles).Complaint(claim.proofs);
+  const double flown = claim.stop ? kOverdue : HUGE_VAL;
+  std::string bad =
+      Examiner(claim, least, claim.position, flown, obstacles).Complaint(claim.proofs);
   if (!bad.empty() || !claim.stop) return bad;
-  bad = Examiner(claim, least, *claim.stop, obstacles).Complaint(claim.stop_proofs);
+  bad = Examiner(claim, least, *claim.stop, HUGE_VAL, obstacles).Complaint(claim.stop_proofs);
   return bad.empty() ? "" : "stop: " + bad;
 }
 

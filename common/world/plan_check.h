@@ -25,6 +25,9 @@ struct Proof {
 };
 inline constexpr int kTargetBody = -1;  ///< proofs about the target's own body: nobody lists it
 
+/// When the stop of a plan begins, s after its start: several periods of planning.
+inline constexpr double kOverdue = 0.4;
+
 /// What a plan says of itself. Frame W; times in seconds from a common origin.
 struct Claim {
   Trajectory position, target;     ///< p_WB(t), p_WT(t)

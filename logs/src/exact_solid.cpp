@@ -1,5 +1,9 @@
 #include "logs/src/exact_solid.h"
 
+#include <algorithm>
+
+#include "common/world/forecast.h"
+
 namespace chase::logs::exact {
 
 namespace {
@@ -43,7 +47,7 @@ Vector FromEllipsoid(const Matrix& R, const Vector& z) {
 
 }  // namespace
 
-Solid SolidOf(const obstacle_t& m, const polynomial_t& way) {
+Solid SolidOf(const obstacle_t& m, const polynomial_t& way, double flown) {
   Solid s;
   s.kind = m.solid;
   s.ground = m.kind == obstacle_t::GROUND && m.solid == obstacle_t::BOX;
@@ -56,6 +60,10 @@ Solid SolidOf(const obstacle_t& m, const polynomial_t& way) {
   s.center = Over(m.center, way);
   s.ageing = Exact(way.duration);
   s.age = Seconds(way.utime) - Seconds(m.center.utime);
+  const Rational known = s.age + Exact(std::min(flown, way.duration)) - Exact(world::kNoiseListed);
+  if (m.kind == obstacle_t::MOVING && known > 0)
+    for (size_t a = 0; a < 2; ++a)
+      s.velocity_covariance[a][a] += Exact(world::kMoverNoise) / 3 * known;
   return s;
 }
 Solid SolidOf(const prediction_t& m, const polynomial_t& way) {

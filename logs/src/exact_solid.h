@@ -25,7 +25,8 @@ struct Solid {
   Vector Outwards(const Vector& offset) const;
 };
 
-Solid SolidOf(const obstacle_t& m, const polynomial_t& way);
+/// Changes of a mover's velocity count in full for the first `flown` s of the way.
+Solid SolidOf(const obstacle_t& m, const polynomial_t& way, double flown);
 /// The target's own body, an upright cylinder.
 Solid SolidOf(const prediction_t& m, const polynomial_t& way);
 

@@ -1,11 +1,13 @@
 #include "logs/src/proof_check.h"
 
 #include <algorithm>
+#include <cmath>
 #include <optional>
 #include <set>
 #include <vector>
 
 #include "common/world/ages.h"
+#include "common/world/plan_check.h"
 #include "logs/src/exact_solid.h"
 #include "logs/src/rational.h"
 
@@ -219,7 +221,8 @@ void Check(const plan_t& plan, const Grounds& grounds, Examination* result) {
       }
     };
     for (const obstacle_t& o : grounds.list->obstacles)
-      keep_off(SolidOf(o, course), o.id, chases && !of_stop && o.kind != obstacle_t::GROUND);
+      keep_off(SolidOf(o, course, stops && !of_stop ? world::kOverdue : HUGE_VAL), o.id,
+               chases && !of_stop && o.kind != obstacle_t::GROUND);
     const auto about_target = [](const proof_t& p) { return p.obstacle == kTarget; };
     const bool told = std::any_of(proofs.begin(), proofs.end(), about_target);
     const bool has_body = forecast && forecast->radius > 0.0 && forecast->height > 0.0;

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "common/track/association.h"
+#include "common/world/forecast.h"
 
 namespace chase::mapping {
 
@@ -251,13 +252,7 @@ std::vector<const Track*> Tracker::Unconfirmed() const {
 
 std::vector<world::Obstacle> Tracker::Obstacles(double middle, double semi_height,
                                                 double grow) const {
-  // Changes of velocity to come, `change_rate` a second, add rate t^3 / 3 times their variance to
-  // that of the place: for kAhead s that is at most kAhead / 3 of the rate as a velocity's. With
-  // half a second walkers are beyond two deviations in 4.7 instead of 3.8 % after 1 s, and in three
-  // crowds (1011 to 1013) 164 instead of 285 plans fall back.
-  constexpr double kAhead = 1.0;  // s
-  const double to_come =
-      kAhead / 3.0 * config_.change_rate * config_.change_speed * config_.change_speed;
+  constexpr double to_come = world::kMoverNoise / 3.0 * world::kNoiseListed;
   const Eigen::Matrix3d level = Eigen::Vector3d(1.0, 1.0, 0.0).asDiagonal();
   std::vector<world::Obstacle> obstacles;
   for (const auto& track : tracks_) {

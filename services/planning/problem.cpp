@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/world/forecast.h"
 #include "services/planning/candidate_set.h"
 #include "services/planning/field_of_view.h"
 #include "services/planning/margins.h"
@@ -20,12 +21,13 @@ constexpr double kBackInView = 0.25;  // tau by which a plan sees a target that 
 struct Uncertainty {
   double now = 0.0, then = 0.0;  // at tau = 0 and 1
 
-  Uncertainty(const world::Obstacle& o, const Problem& problem) {
+  Uncertainty(const world::Obstacle& o, double flown, const Problem& problem) {
     if (o.position_covariance.isZero(0.0) && o.velocity_covariance.isZero(0.0)) return;
+    const Eigen::Matrix3d V = world::VelocityCovariance(
+        o, problem.t0 - o.center.start + std::min(flown, problem.duration));
     const auto deviations = [&](double t) {
       const double age = t - o.center.start;
-      const Eigen::Vector3d variance =
-          o.position_covariance.diagonal() + age * age * o.velocity_covariance.diagonal();
+      const Eigen::Vector3d variance = o.position_covariance.diagonal() + age * age * V.diagonal();
       return problem.sigmas * std::sqrt(std::max(0.0, variance.maxCoeff()));
     };
     now = deviations(problem.t0);
@@ -47,16 +49,16 @@ void SetBoxes(const world::Obstacle& o, const Growth& most, Ellipsoid* e) {
 }
 
 // What depends on the shape alone is kept where the obstacle is what it was.
-void SetShapes(const PlannerConfig& config, const Stretch& over, const world::Obstacle& o,
-               const Growth& growth, Ellipsoid* e) {
+void SetShapes(const PlannerConfig& config, const Stretch& over, double flown,
+               const world::Obstacle& o, const Growth& growth, Ellipsoid* e) {
   const bool same = IsSameShape(e->grown_from, o.shape);
   e->grown_from = o.shape;
   if (!config.minkowski_sums)
     e->body.reset();
   else if (same && e->body && e->body->kind == o.solid && o.solid == world::Body::Kind::kEllipsoid)
-    world::Retime(o, over.t0, over.horizon, config.sigmas, &*e->body);
+    world::Retime(o, over.t0, over.horizon, config.sigmas, flown, &*e->body);
   else
-    e->body = world::MakeBody(o, over.t0, over.horizon, config.sigmas);
+    e->body = world::MakeBody(o, over.t0, over.horizon, config.sigmas, flown);
   // Heights sort out candidates on the ground, as no ellipsoid fits a slab; without a search there
   // are none.
   if (o.ground || (!over.asks_sight && e->body)) {
@@ -160,6 +162,7 @@ Eigen::Matrix3d AlongGround(const Ground& ground) {
 void SetTargetBody(const PlanRequest& request, double flown, double hard, StartCheck* start,
                    Problem* problem, std::string* notes) {
   world::Obstacle o = *request.target_body;
+  o.moving = false;  // its manoeuvres are its own
   const double ahead = problem->t0 + std::min(flown, problem->duration) - o.center.start;
   o.velocity_covariance +=
       ManoeuvreRate(request.target_manoeuvre, ahead) * AlongGround(problem->limits.ground);
@@ -170,7 +173,7 @@ void SetTargetBody(const PlanRequest& request, double flown, double hard, StartC
   e.grown_from = o.shape;
   e.sight_from = 1.0;
   e.safety_radius = hard;
-  SetBoxes(o, {hard + Uncertainty(o, *problem).most(), 0.0}, &e);
+  SetBoxes(o, {hard + Uncertainty(o, flown, *problem).most(), 0.0}, &e);
   if (!start->IsSafe(e, hard)) {
     e.safety_from = kLeaveBy;
     Note(notes, "starts at the target");
@@ -246,6 +249,9 @@ void MakeProblem(const PlannerConfig& config, const PlanRequest& request, const 
   const double hard = HardRadius(config, request);
   // The margin holds what a wider tube takes of it.
   const double margin = std::max(0.0, config.safety_margin - (hard - config.hard_radius()));
+  // A plan that chases is flown until its stop begins, or until a newer one takes its place; ways
+  // to rest are flown to their ends.
+  const double flown = over.asks_sight ? kOverdue : over.horizon;
   const FirstSight first(*problem);
   StartCheck start(*problem);
   const Box at_start{first.p.array(), first.p.array()};
@@ -266,10 +272,10 @@ void MakeProblem(const PlannerConfig& config, const PlanRequest& request, const 
     e->sight_from = asks_sight ? 0.0 : 1.0;
     e->sight_share = 1.0;
     e->safety_radius = hard + margin;
-    const Uncertainty uncertain(o, *problem);
+    const Uncertainty uncertain(o, flown, *problem);
     const double mean = 0.5 * (uncertain.now + uncertain.then), most = uncertain.most();
     const Growth growth{hard + margin + mean, sight + mean};
-    SetShapes(config, over, o, growth, e);
+    SetShapes(config, over, flown, o, growth, e);
     if (e->body)
       e->center = e->body->center;
     else
@@ -286,9 +292,6 @@ void MakeProblem(const PlannerConfig& config, const PlanRequest& request, const 
       RelaxSight(o, growth, first, *target, *problem, &start, e, notes);
   }
   problem->target_body.reset();
-  // A plan that chases is flown until its stop begins, or until a newer one takes its place; ways
-  // to rest are flown to their ends.
-  const double flown = over.asks_sight ? kOverdue : over.horizon;
   if (request.target_body) SetTargetBody(request, flown, hard, &start, problem, notes);
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <string>
 
 #include "services/planning/candidate_set.h"
@@ -38,11 +39,11 @@ PlannerConfig WithoutMargin(PlannerConfig config) {
   return config;
 }
 
-// Does the plan keep off all that is unseen until t, and off the target's body where its own proof
-// counts on its being left before that?
+// Does the plan keep off all that is unseen until t, and off what moves, the target's body too,
+// where their own proofs count on its being left before that?
 bool KeepsOff(const PlannerConfig& config, const PlanRequest& request,
               const world::Trajectory& plan, double t) {
-  const bool late = request.target_body && t > plan.start + kOverdue;
+  const bool late = t > plan.start + kOverdue;
   if ((request.unseen.empty() && !late) || t <= plan.start) return true;
   PlanRequest part;
   static_cast<Stretch&>(part) = {plan.start, t - plan.start, plan.At(plan.start), false};
@@ -50,6 +51,8 @@ bool KeepsOff(const PlannerConfig& config, const PlanRequest& request,
   part.target = request.target;
   part.obstacles = request.unseen;
   if (late) {
+    std::copy_if(request.obstacles.begin(), request.obstacles.end(),
+                 std::back_inserter(part.obstacles), [](const auto& o) { return o.moving; });
     part.target_body = request.target_body;
     part.target_manoeuvre = request.target_manoeuvre;
   }

@@ -44,8 +44,7 @@ bool KeepsOffMovers(const PlannerConfig& config, const PlanRequest& request,
 /// contact is the latest, then the one that stays farthest off; not certified.
 Stop Evade(const PlannerConfig& config, const PlanRequest& request);
 
-/// When the stop of a plan begins, s after its start: several periods of planning.
-inline constexpr double kOverdue = 0.4;
+using world::kOverdue;
 
 /// Do the proofs hold only once an obstacle is left that the start is in? Such a plan is an ESCAPE.
 bool LeavesObstacles(const std::vector<Proof>& proofs);

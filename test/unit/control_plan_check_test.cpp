@@ -25,9 +25,9 @@ using world::Refute;
 std::string Verdict(const Case& c) { return Refute(c.claim, c.least, c.obstacles); }
 
 /// Is some plane of the proof no plane between the obstacle and the balls?
-bool IsBroken(const Proof& proof, const Claim& claim, const world::Trajectory& way,
+bool IsBroken(const Proof& proof, const Claim& claim, const world::Trajectory& way, double flown,
               const world::Obstacle& o) {
-  const world::Body body = world::MakeBody(o, way.start, way.duration, claim.sigmas);
+  const world::Body body = world::MakeBody(o, way.start, way.duration, claim.sigmas, flown);
   for (const world::Separation& s : proof.separations)
     for (int i = 0; i <= 40; ++i) {
       const double tau = s.from + (s.to - s.from) * i / 40.0, t = way.start + tau * way.duration;
@@ -51,16 +51,17 @@ const world::Obstacle* Find(const Case& c, int id) {
   return nullptr;
 }
 
-bool IsBroken(const Case& c, const std::vector<Proof>& proofs, const world::Trajectory& way) {
+bool IsBroken(const Case& c, const std::vector<Proof>& proofs, const world::Trajectory& way,
+              double flown = HUGE_VAL) {
   for (const Proof& proof : proofs)
     if (const world::Obstacle* o = Find(c, proof.obstacle))
-      if (IsBroken(proof, c.claim, way, *o)) return true;
+      if (IsBroken(proof, c.claim, way, flown, *o)) return true;
   return false;
 }
 
 /// By sampling alone.
 bool IsBroken(const Case& c) {
-  return IsBroken(c, c.claim.proofs, c.claim.position) ||
+  return IsBroken(c, c.claim.proofs, c.claim.position, c.claim.stop ? 0.4 : HUGE_VAL) ||
          IsBroken(c, c.claim.stop_proofs, *c.claim.stop);
 }
 
@@ -184,7 +185,7 @@ bool MovePlan(Case* c, Random& g) {
   const int k =
       static_cast<int>(g() % static_cast<unsigned>(c->claim.position.coefficients.rows()));
   c->claim.position.coefficients.row(k) += Uniform(g, 0.01, 3.0) * Somewhere(g).transpose();
-  return IsBroken(*c, c->claim.proofs, c->claim.position);
+  return IsBroken(*c, c->claim.proofs, c->claim.position, c->claim.stop ? 0.4 : HUGE_VAL);
 }
 
 bool MoveStop(Case* c, Random& g) {
@@ -381,6 +382,44 @@ TEST(PlanCheck, OnlyAnEscapeMayStartInside) {
   EXPECT_EQ(Verdict(c), "") << "the ground is left by a climb from rest";
   begin(0.65, left.id);
   EXPECT_EQ(Verdict(c), later);
+}
+
+// A hover beside a walker who was listed 0.3 s before: a plan that is left after 0.4 s counts on
+// less than one that is flown to its end, and so does not the stop.
+TEST(PlanCheck, AMoversChangesOfVelocityCountWhileThePlanIsFlown) {
+  constexpr double kStop = 0.4, kHover = 2.0;  // s
+  constexpr int kPieces = 32;
+  const auto verdict = [](bool stops, double proven, double proven_stop) {
+    Case c;
+    world::Obstacle walker;
+    walker.moving = true;
+    walker.position_covariance = walker.velocity_covariance = 0.01 * Eigen::Matrix3d::Identity();
+    walker.center = world::Trajectory::Constant(Vector3d::Zero(), 0.7, 1.0);
+    c.obstacles = {walker};
+    c.claim.certified = true;
+    c.claim.hard_radius = 0.3;
+    c.claim.sigmas = 2.0;
+    const auto hover = [&](double t, double flown, std::vector<Proof>* proofs) {
+      const auto way = world::Trajectory::Constant(Vector3d(0.0, 10.0, 0.0), t, kHover);
+      const world::Body body = world::MakeBody(walker, t, kHover, 2.0, flown);
+      Proof proof;
+      for (int i = 0; i < kPieces; ++i)
+        proof.separations.push_back(
+            {1.0 * i / kPieces, 1.0 * (i + 1) / kPieces, Vector3d::UnitY()});
+      const double far = 1.0 + 2.0 * world::Deviation(body, Vector3d::UnitY(), 1.0);
+      proof.radius = 10.0 - far - 1e-3;
+      proofs->push_back(proof);
+      return way;
+    };
+    c.claim.position = c.claim.target = hover(1.0, proven, &c.claim.proofs);
+    if (stops) c.claim.stop = hover(1.0 + kStop, proven_stop, &c.claim.stop_proofs);
+    return Verdict(c);
+  };
+  EXPECT_EQ(verdict(false, kHover, 0.0), "");
+  EXPECT_NE(verdict(false, kStop, 0.0), "");
+  EXPECT_EQ(verdict(true, kStop, kHover), "");
+  EXPECT_NE(verdict(true, 0.0, kHover), "");
+  EXPECT_NE(verdict(true, kStop, kStop), "");
 }
 
 TEST(PlanCheck, AnEscapeComesNoNearerToWhatItLeaves) {

@@ -123,9 +123,9 @@ world::Obstacle TargetBody(const Wire& w) {
 }
 
 /// Is some plane of the proof no plane between the solid and the balls?
-bool IsBroken(const Wire& w, const proof_t& proof, const world::Trajectory& way,
+bool IsBroken(const Wire& w, const proof_t& proof, const world::Trajectory& way, double flown,
               const world::Obstacle& o) {
-  const world::Body body = world::MakeBody(o, way.start, way.duration, w.plan.sigmas);
+  const world::Body body = world::MakeBody(o, way.start, way.duration, w.plan.sigmas, flown);
   const world::Trajectory target = bus::FromMessage(w.plan.target, w.plan.utime);
   for (const separation_t& s : proof.separations)
     for (int i = 0; i <= 40; ++i) {
@@ -147,10 +147,12 @@ bool IsBroken(const Wire& w, const proof_t& proof, const world::Trajectory& way,
 bool IsBroken(const Wire& w) {
   for (const bool stop : {false, true}) {
     const auto way = bus::FromMessage(stop ? w.plan.stop : w.plan.position, w.plan.utime);
+    const double flown = stop || w.plan.stop.coefficients.empty() ? way.duration : 0.4;
     for (const proof_t& proof : stop ? w.plan.stop_proofs : w.plan.proofs) {
-      if (proof.obstacle == kTarget && IsBroken(w, proof, way, TargetBody(w))) return true;
+      if (proof.obstacle == kTarget && IsBroken(w, proof, way, flown, TargetBody(w))) return true;
       for (const obstacle_t& o : w.list.obstacles)
-        if (o.id == proof.obstacle && IsBroken(w, proof, way, bus::FromMessage(o, w.plan.utime)))
+        if (o.id == proof.obstacle &&
+            IsBroken(w, proof, way, flown, bus::FromMessage(o, w.plan.utime)))
           return true;
     }
   }

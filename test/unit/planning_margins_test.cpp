@@ -45,13 +45,14 @@ struct Sorting {
     const bool box = o.solid == world::Obstacle::Solid::kBox;
     shape = o.shape;
     if (box) shape = R * o.half.cwiseAbs2().cwiseInverse().asDiagonal() * R.transpose();
-    const auto deviations = [&](double t) {
-      const double age = t - o.center.start;
-      const Matrix3d S = o.position_covariance + age * age * o.velocity_covariance;
+    const world::Body body = Truth(o, request.t0, request.horizon, c.sigmas, world::kOverdue);
+    const auto deviations = [&](double tau) {
+      const Matrix3d S =
+          body.covariance[0] + tau * body.covariance[1] + tau * tau * body.covariance[2];
       return c.sigmas * std::sqrt(S.diagonal().maxCoeff());
     };
-    now = deviations(request.t0);
-    mean = 0.5 * (now + deviations(request.t0 + request.horizon));
+    now = deviations(0.0);
+    mean = 0.5 * (now + deviations(1.0));
   }
   Matrix3d Grown(double by) const { return by > 0.0 ? world::Inflated(shape, by) : shape; }
   Matrix3d OfSight(const PlannerConfig& c, const Problem& problem, double share) const {
@@ -152,7 +153,8 @@ TEST(Minkowski, ProblemsAskForWhatTheBodiesAre) {
     }
     for (size_t i = 0; i < problem.obstacles.size(); ++i) {
       const Ellipsoid& e = problem.obstacles[i];
-      const world::Body body = Truth(request.obstacles[i], request.t0, request.horizon, c.sigmas);
+      const world::Body body =
+          Truth(request.obstacles[i], request.t0, request.horizon, c.sigmas, world::kOverdue);
       ExpectBoxes(c, problem, e, body);
       const Sorting sorting(c, request, request.obstacles[i]);
       ExpectRelaxed(c, problem, e, body, sorting, "; " + notes + ";");

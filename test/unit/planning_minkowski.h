@@ -93,8 +93,9 @@ inline void Surround(unsigned seed, PlanRequest* request) {
   }
 }
 
-/// The obstacle over [start, start + duration], written anew.
-inline world::Body Truth(const world::Obstacle& o, double start, double duration, double sigmas) {
+/// The obstacle over [start, start + duration], written anew; of it `flown` s are flown.
+inline world::Body Truth(const world::Obstacle& o, double start, double duration, double sigmas,
+                         double flown = HUGE_VAL) {
   world::Body body;
   body.kind = o.solid;
   body.half = o.half;
@@ -106,9 +107,13 @@ inline world::Body Truth(const world::Obstacle& o, double start, double duration
   body.center.row(1) = duration * v.transpose();
   const double age = start - o.center.start;
   body.sigmas = o.moving ? sigmas : 0.0;
-  body.covariance[0] = o.position_covariance + age * age * o.velocity_covariance;
-  body.covariance[1] = 2.0 * age * duration * o.velocity_covariance;
-  body.covariance[2] = duration * duration * o.velocity_covariance;
+  Matrix3d V = o.velocity_covariance;
+  const double unlisted = age + std::min(flown, duration) - 0.5;
+  for (int a = 0; a < 2; ++a)
+    if (o.moving && unlisted > 0.0) V(a, a) += 0.4 * unlisted / 3.0;
+  body.covariance[0] = o.position_covariance + age * age * V;
+  body.covariance[1] = 2.0 * age * duration * V;
+  body.covariance[2] = duration * duration * V;
   return body;
 }
 
@@ -127,9 +132,10 @@ inline double LeastGap(const world::Ball& drone, const world::Ball* target, cons
   return least;
 }
 inline double LeastGap(const world::Trajectory& way, double radius, double from,
-                       const world::Ball* target, const world::Obstacle& o, double sigmas) {
+                       const world::Ball* target, const world::Obstacle& o, double sigmas,
+                       double flown = HUGE_VAL) {
   return LeastGap({way.coefficients, math::Polynomial::Constant(1, radius)}, target,
-                  Truth(o, way.start, way.duration, sigmas), from);
+                  Truth(o, way.start, way.duration, sigmas, flown), from);
 }
 
 /// Least gap of a ball of `radius` on its way from the target's body, until `until`, s, with all

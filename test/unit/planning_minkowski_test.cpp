@@ -34,7 +34,8 @@ std::vector<std::string> BrokenPromises(const PlannerConfig& c, const PlanReques
     }
     const world::Obstacle& o = request.obstacles[static_cast<size_t>(p.obstacle)];
     const auto gap = [&](double radius, const world::Ball* target = nullptr) {
-      return LeastGap(way, radius, p.from, target, o, c.sigmas);
+      return LeastGap(way, radius, p.from, target, o, c.sigmas,
+                      plan.stop ? world::kOverdue : HUGE_VAL);
     };
     if (p.of_sight) {
       const world::Ball target{request.target.Reparametrised(way.start, way.duration).coefficients,
@@ -50,10 +51,12 @@ std::vector<std::string> BrokenPromises(const PlannerConfig& c, const PlanReques
     }
     safe.insert(o.id);
     check("safety from ", gap(p.radius), o.id);
-    if (p.from == 0.0)
+    const auto until = way.Reparametrised(way.start, std::max(1e-3, left - way.start));
+    if (p.from == 0.0) {
       check("clearance from ", gap(hard + plan.certified_clearance), o.id);
-    else if (plan.verdict != Verdict::kEscape)
-      broken.push_back("late, and no escape");
+      check("until it stops from ", LeastGap(until, hard, 0.0, nullptr, o, c.sigmas), o.id);
+    }
+    if (p.from > 0.0 && plan.verdict != Verdict::kEscape) broken.push_back("late, and no escape");
     if (p.radius < hard) broken.push_back("less than the hard radius");
     if (plan.reason.empty() && p.radius < soft - 1e-12)
       broken.push_back("less than the margin, unsaid");

@@ -100,16 +100,17 @@ TEST(Pilot, WithoutObstaclesItNeitherClimbsNorChases) {
 // What is not known of a walker grows until it is everywhere: nothing to flee from.
 TEST(Pilot, WithoutObstaclesItBrakesAndFleesFromNobody) {
   Flight flight{PlanningConfig()};
+  flight.Run(6.0, false);
+  const Eigen::Vector3d at = flight.Body().p;
   world::Obstacle walker;
   walker.solid = world::Obstacle::Solid::kCylinder;
   walker.half = {0.25, 0.25, 0.9};
   walker.shape = (2.0 * walker.half.cwiseAbs2()).cwiseInverse().asDiagonal();
   walker.moving = true;
   walker.velocity_covariance = 0.25 * Eigen::Matrix3d::Identity();
-  walker.center = world::Trajectory::Constant({4.0, 0.5, 0.9}, 0.0, 1.0);
+  walker.center = world::Trajectory::Constant(at + Eigen::Vector3d(4.0, 0.5, 0.0), flight.t, 1.0);
   flight.obstacles = {walker};
-  flight.Run(6.0, false);
-  const Eigen::Vector3d at = flight.Body().p;
+  flight.Run(0.3, false);
   flight.hears = false;
   flight.Run(6.0, false);
   EXPECT_LT((flight.Body().p - at).norm(), 1.5) << "braking, once the list is outdated; 5 m else";

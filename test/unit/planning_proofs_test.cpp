@@ -70,12 +70,13 @@ Curve RandomCurve(Random* random, const Vector3d& from, int rows, double spread)
 double LeastAsked(const PlanRequest& request, const Problem& problem, const Curve& plan,
                   const Ellipsoid& e, const world::Obstacle& o, double sight_from) {
   const world::Trajectory way{request.t0, request.horizon, plan};
-  double least = LeastGap(way, e.safety_radius, e.safety_from, nullptr, o, problem.sigmas);
+  double least =
+      LeastGap(way, e.safety_radius, e.safety_from, nullptr, o, problem.sigmas, world::kOverdue);
   const double from = std::max(sight_from, e.sight_from);
   if (from >= 1.0) return least;
   const world::Ball target = SeenBall(problem, e.sight_share);
-  return std::min(
-      least, LeastGap(way, e.sight_share * problem.sight_radius, from, &target, o, problem.sigmas));
+  return std::min(least, LeastGap(way, e.sight_share * problem.sight_radius, from, &target, o,
+                                  problem.sigmas, world::kOverdue));
 }
 
 /// Of any degree, from any time on, of all obstacles or of those that are near: what is called off
@@ -143,7 +144,8 @@ TEST(Minkowski, PlansStayOffWhereSamplesSaySo) {
       const world::Obstacle& o =
           (p.obstacle == kTargetId ? all.back() : all[static_cast<size_t>(p.obstacle)]).second;
       EXPECT_TRUE(p.radius >= c.hard_radius() && p.room >= 0.0);
-      EXPECT_GE(LeastGap(way, p.radius + p.room, p.from, nullptr, o, c.sigmas), -kTolerance)
+      EXPECT_GE(LeastGap(way, p.radius + p.room, p.from, nullptr, o, c.sigmas, world::kOverdue),
+                -kTolerance)
           << seed;
     }
     // Those that are far need not be asked about.

@@ -7,8 +7,8 @@
 namespace chase::planning {
 namespace {
 
-// A plan that could be left for 0.4 s on end, within 1.1 s of its start, has a stop; one that can
-// be left in time is, and early.
+// A plan that could be left for 0.4 s on end, within 1.1 s of its start and before it meets what
+// moves, has a stop; one that can be left in time is, and early.
 TEST(WayOut, IsFoundWhereThePlanCanBeLeftForAWhile) {
   const PlannerConfig config;
   PlannerConfig hard = config;
@@ -26,7 +26,9 @@ TEST(WayOut, IsFoundWhereThePlanCanBeLeftForAWhile) {
     const auto is_free = [&](double after) {
       later.t0 = request.t0 + after;
       later.start = plan.At(later.t0);
-      return Brake(hard, later).has_value();
+      PlanRequest until = request;
+      until.horizon = after;
+      return KeepsOffMovers(config, until, plan) && Brake(hard, later).has_value();
     };
     constexpr int kWindow = 8;  // of 0.05 s
     int run = 0, longest = 0;
@@ -38,6 +40,9 @@ TEST(WayOut, IsFoundWhereThePlanCanBeLeftForAWhile) {
     none += !stop;
     if (!stop) continue;
     const double after = stop->trajectory.start - plan.start;
+    PlanRequest until = request;
+    until.horizon = after;
+    EXPECT_TRUE(after <= kOverdue + 1e-9 || KeepsOffMovers(config, until, plan)) << seed;
     EXPECT_TRUE(std::abs(after - kOverdue) < 1e-9 || !is_free(kOverdue)) << seed << " " << after;
     late += after > kOverdue + 1e-9 && after < 1.2;
   }

@@ -43,6 +43,41 @@ TEST(MakeBody, IsNoSmallerThanTheObstacle) {
   }
 }
 
+// Until it has been flown a mover's variance is no less than that of a body whose acceleration is
+// white noise of 0.4 m^2/s^3, beside what the list's covariance holds beyond half a second of it.
+TEST(MakeBody, AMoversChangesOfVelocityGrowWithTheCubeOfTheTime) {
+  Obstacle o;
+  o.center = Trajectory::Constant(Vector3d::Zero(), 9.8, 1.0);
+  const Eigen::Matrix3d P = 0.01 * Eigen::Matrix3d::Identity();
+  const auto listed = [](double density) {
+    return Eigen::Matrix3d((0.04 + density / 3.0 * 0.5) *
+                           Vector3d(1.0, 1.0, 0.0).asDiagonal().toDenseMatrix());
+  };
+  const double start = 10.0, duration = 2.5;
+  for (const double flown : {0.1, 0.4, 1.3, 2.5, HUGE_VAL}) {
+    o.position_covariance = P;
+    o.velocity_covariance = listed(0.4);
+    o.moving = true;
+    const Body body = MakeBody(o, start, duration, 2.0, flown);
+    o.moving = false;
+    const Body stands = MakeBody(o, start, duration, 2.0, flown);
+    for (double tau = 0.0; tau <= 1.0; tau += 0.01) {
+      const double age = start + tau * duration - o.center.start;
+      const double true_variance = 0.01 + 0.04 * age * age + 0.4 / 3.0 * age * age * age;
+      const double is = std::pow(Deviation(body, Vector3d::UnitY(), tau), 2);
+      const double without = std::pow(Deviation(stands, Vector3d::UnitY(), tau), 2);
+      EXPECT_TRUE(is >= true_variance - 1e-12 || tau * duration > flown) << flown << " " << tau;
+      EXPECT_GE(is, without - 1e-12);
+      EXPECT_NEAR(without, 0.01 + listed(0.4)(1, 1) * age * age, 1e-12);
+      EXPECT_NEAR(Deviation(body, Vector3d::UnitZ(), tau), 0.1, 1e-12);
+    }
+    const double end = std::min(flown, duration) / duration, at_end = 0.2 + end * duration;
+    const double least = 0.01 + 0.04 * at_end * at_end + 0.4 / 3.0 * std::pow(at_end, 3);
+    EXPECT_NEAR(std::pow(Deviation(body, Vector3d::UnitX(), end), 2),
+                at_end > 0.5 ? least : 0.01 + listed(0.4)(0, 0) * at_end * at_end, 1e-12);
+  }
+}
+
 TEST(MakeBody, WhatIsNoEllipsoidIsNeverKeptOff) {
   const Matrix3d shapes[] = {Matrix3d::Zero(), -Matrix3d::Identity(), Matrix3d::Ones(),
                              Vector3d(1.0, 1.0, -1.0).asDiagonal(),
