@@ -27,11 +27,11 @@ inline constexpr double kMoverNoise = 0.4;
 /// The velocity's covariance in a list of obstacles holds what that adds for so long, s.
 inline constexpr double kNoiseListed = 0.5;
 
-/// Covariance of the obstacle's velocity from which that of its place grows with the square of the
-/// time, for `ahead` s no slower than it does, m^2/s^2.
-inline Eigen::Matrix3d VelocityCovariance(const Obstacle& o, double ahead) {
-  const double more = o.moving ? kMoverNoise / 3.0 * std::max(0.0, ahead - kNoiseListed) : 0.0;
-  return o.velocity_covariance + Eigen::Vector3d(more, more, 0.0).asDiagonal().toDenseMatrix();
+/// What is to be added to the velocity's variance of an obstacle, along each level axis, so that the
+/// variance of its place, which grows with the square of the time, holds for `ahead` s what white
+/// noise adds, m^2/s^2.
+inline double UnlistedVariance(const Obstacle& o, double ahead) {
+  return o.moving ? kMoverNoise / 3.0 * std::max(0.0, ahead - kNoiseListed) : 0.0;
 }
 
 }  // namespace chase::world

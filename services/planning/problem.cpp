@@ -21,17 +21,13 @@ constexpr double kBackInView = 0.25;  // tau by which a plan sees a target that 
 struct Uncertainty {
   double now = 0.0, then = 0.0;  // at tau = 0 and 1
 
-  Uncertainty(const world::Obstacle& o, double flown, const Problem& problem) {
-    if (o.position_covariance.isZero(0.0) && o.velocity_covariance.isZero(0.0)) return;
-    const Eigen::Matrix3d V = world::VelocityCovariance(
-        o, problem.t0 - o.center.start + std::min(flown, problem.duration));
-    const auto deviations = [&](double t) {
-      const double age = t - o.center.start;
-      const Eigen::Vector3d variance = o.position_covariance.diagonal() + age * age * V.diagonal();
-      return problem.sigmas * std::sqrt(std::max(0.0, variance.maxCoeff()));
-    };
-    now = deviations(problem.t0);
-    then = deviations(problem.t0 + problem.duration);
+  explicit Uncertainty(const world::Body& body) {
+    if (body.sigmas == 0.0) return;
+    const Eigen::Array3d at_0 = body.covariance[0].diagonal().array();
+    const Eigen::Array3d at_1 =
+        at_0 + body.covariance[1].diagonal().array() + body.covariance[2].diagonal().array();
+    now = body.sigmas * std::sqrt(std::max(0.0, at_0.maxCoeff()));
+    then = body.sigmas * std::sqrt(std::max(0.0, at_1.maxCoeff()));
   }
   double most() const { return std::max(now, then); }
 };
@@ -49,24 +45,35 @@ void SetBoxes(const world::Obstacle& o, const Growth& most, Ellipsoid* e) {
 }
 
 // What depends on the shape alone is kept where the obstacle is what it was.
-void SetShapes(const PlannerConfig& config, const Stretch& over, double flown,
-               const world::Obstacle& o, const Growth& growth, Ellipsoid* e) {
-  const bool same = IsSameShape(e->grown_from, o.shape);
-  e->grown_from = o.shape;
-  if (!config.minkowski_sums)
-    e->body.reset();
-  else if (same && e->body && e->body->kind == o.solid && o.solid == world::Body::Kind::kEllipsoid)
-    world::Retime(o, over.t0, over.horizon, config.sigmas, flown, &*e->body);
-  else
+Uncertainty SetBody(const PlannerConfig& config, const Stretch& over, double flown,
+                    const world::Obstacle& o, bool same_shape, Ellipsoid* e) {
+  const auto retimed = [&](world::Body* body) {
+    world::Retime(o, over.t0, over.horizon, config.sigmas, flown, body);
+    return Uncertainty(*body);
+  };
+  if (config.minkowski_sums) {
+    if (same_shape && e->body && e->body->kind == o.solid &&
+        o.solid == world::Body::Kind::kEllipsoid)
+      return retimed(&*e->body);
     e->body = world::MakeBody(o, over.t0, over.horizon, config.sigmas, flown);
+    return Uncertainty(*e->body);
+  }
+  e->body.reset();
+  world::Body body;
+  return retimed(&body);
+}
+void SetShapes(const Stretch& over, const world::Obstacle& o, const Growth& growth, bool same_shape,
+               Ellipsoid* e) {
+  e->grown_from = o.shape;
   // Heights sort out candidates on the ground, as no ellipsoid fits a slab; without a search there
   // are none.
   if (o.ground || (!over.asks_sight && e->body)) {
+    if (e->grown_by[0] < 0.0 && e->safety(0, 0) == kPoint && e->sight(0, 0) == kPoint) return;
     e->safety = e->sight = kPoint * Eigen::Matrix3d::Identity();
     e->grown_by[0] = -1.0;
     return;
   }
-  if (same && e->grown_by[0] == growth.safety && e->grown_by[1] == growth.sight) return;
+  if (same_shape && e->grown_by[0] == growth.safety && e->grown_by[1] == growth.sight) return;
   const Eigen::Matrix3d shape = SortingShape(o, *e);
   e->safety = e->sight = shape;
   if (growth.safety > 0.0 || growth.sight > 0.0) {
@@ -173,7 +180,7 @@ void SetTargetBody(const PlanRequest& request, double flown, double hard, StartC
   e.grown_from = o.shape;
   e.sight_from = 1.0;
   e.safety_radius = hard;
-  SetBoxes(o, {hard + Uncertainty(o, flown, *problem).most(), 0.0}, &e);
+  SetBoxes(o, {hard + Uncertainty(*e.body).most(), 0.0}, &e);
   if (!start->IsSafe(e, hard)) {
     e.safety_from = kLeaveBy;
     Note(notes, "starts at the target");
@@ -272,10 +279,11 @@ void MakeProblem(const PlannerConfig& config, const PlanRequest& request, const 
     e->sight_from = asks_sight ? 0.0 : 1.0;
     e->sight_share = 1.0;
     e->safety_radius = hard + margin;
-    const Uncertainty uncertain(o, flown, *problem);
+    const bool same_shape = IsSameShape(e->grown_from, o.shape);
+    const Uncertainty uncertain = SetBody(config, over, flown, o, same_shape, e);
     const double mean = 0.5 * (uncertain.now + uncertain.then), most = uncertain.most();
     const Growth growth{hard + margin + mean, sight + mean};
-    SetShapes(config, over, flown, o, growth, e);
+    SetShapes(over, o, growth, same_shape, e);
     if (e->body)
       e->center = e->body->center;
     else

@@ -56,22 +56,25 @@ class Prover {
   // least clearance has planes of its own.
   bool IsOff(const Ellipsoid& e, std::vector<Proof>* proofs, SeparationMemory* memory) {
     if (e.safety_from > 0.0 && !world::Leaves(drone_.center, *e.body, e.safety_from)) return false;
-    world::SeparationResult safety, sight;
     const double from = SightFrom(e);
-    if (from < 1.0 && !IsKept(sight = InSight(e, memory))) return false;
+    const bool seen = from < 1.0;
+    world::SeparationResult sight = seen ? InSight(e, memory) : world::SeparationResult{};
+    if (seen && !IsKept(sight)) return false;
     const double left = sight.room.drone - (e.safety_radius - SightRadius(e));
-    const bool shared =
-        from <= e.safety_from && left > kSlack && (!proofs || e.safety_radius + left > least_);
-    if (!shared && !IsKept(safety = Off(e, memory))) return false;
-    if (!proofs) return true;
-    if (shared) {
-      safety.certificate = sight.certificate;
-      safety.room.drone = left;
+    if (from <= e.safety_from && left > kSlack && (!proofs || e.safety_radius + left > least_)) {
+      if (!proofs) return true;
+      least_ = std::min(least_, e.safety_radius + left);
+      Add(e.id, e.safety_from, e.safety_radius, left, sight.certificate, proofs);
+    } else {
+      world::SeparationResult safety = Off(e, memory);
+      if (!IsKept(safety)) return false;
+      if (!proofs) return true;
+      least_ = std::min(least_, e.safety_radius + safety.room.drone);
+      Add(e.id, e.safety_from, e.safety_radius, safety.room.drone, std::move(safety.certificate),
+          proofs);
     }
-    least_ = std::min(least_, e.safety_radius + safety.room.drone);
-    Add(e.id, e.safety_from, e.safety_radius, std::move(safety), proofs);
-    if (from >= 1.0) return true;
-    Add(e.id, from, SightRadius(e), std::move(sight), proofs);
+    if (!seen) return true;
+    Add(e.id, from, SightRadius(e), sight.room.drone, std::move(sight.certificate), proofs);
     proofs->back().of_sight = true;
     proofs->back().target_radius = TargetRadius(problem_, e.sight_share);
     return true;
@@ -134,14 +137,14 @@ class Prover {
     return sight_.From(*e.body);
   }
 
-  static void Add(int obstacle, double from, double radius, world::SeparationResult&& result,
-                  std::vector<Proof>* proofs) {
+  static void Add(int obstacle, double from, double radius, double room,
+                  world::Certificate separations, std::vector<Proof>* proofs) {
     Proof& proof = proofs->emplace_back();
     proof.obstacle = obstacle;
     proof.from = from;
     proof.radius = radius;
-    proof.separations = std::move(result.certificate);
-    proof.room = result.room.drone;
+    proof.separations = std::move(separations);
+    proof.room = room;
   }
 
   const Problem& problem_;
