@@ -54,13 +54,12 @@ void Retime(const Obstacle& obstacle, double start, double duration, double sigm
   body->sigmas = known ? 0.0 : sigmas;
   // The age at tau is since + duration tau.
   const double since = start - obstacle.center.start;
-  const double of_velocity[] = {since * since, 2.0 * since * duration, duration * duration};
-  const double more = UnlistedVariance(obstacle, since + std::min(flown, duration));
-  for (int k = 0; k < 3; ++k) {
-    body->covariance[k] = of_velocity[k] * obstacle.velocity_covariance;
-    if (k == 0) body->covariance[k] += obstacle.position_covariance;
-    for (int a = 0; a < 2 && more > 0.0; ++a) body->covariance[k](a, a) += of_velocity[k] * more;
-  }
+  Matrix3d V = obstacle.velocity_covariance;
+  if (obstacle.moving && !known)
+    V.diagonal().head<2>().array() += UnlistedVariance(since + std::min(flown, duration));
+  body->covariance[0] = obstacle.position_covariance + since * since * V;
+  body->covariance[1] = 2.0 * since * duration * V;
+  body->covariance[2] = duration * duration * V;
 }
 
 Vector3d SupportPoint(const Body& body, const Vector3d& n) {

@@ -39,9 +39,10 @@ struct Ball {
 
 /// The obstacle over [start, start + duration], its ellipsoid no smaller than the one that R
 /// describes, however the inverse of R is rounded; its covariance grows as that of a body at
-/// unknown constant velocity since center.start. Changes of that velocity to come count in full for
-/// the first `flown` s, then for less than they may. NaN where R is not positive definite or its
-/// inverse is no inverse.
+/// unknown constant velocity since center.start. Of what moves, unless it is known for sure,
+/// changes of velocity to come count along the level axes (forecast.h): in full for the first
+/// `flown` s, then for less than they may. NaN where R is not positive definite or its inverse is
+/// no inverse.
 Body MakeBody(const Obstacle& obstacle, double start, double duration, double sigmas,
               double flown = HUGE_VAL);
 /// The same over another time, for a body that was made of an ellipsoid of the same shape.

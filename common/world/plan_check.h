@@ -25,7 +25,8 @@ struct Proof {
 };
 inline constexpr int kTargetBody = -1;  ///< proofs about the target's own body: nobody lists it
 
-/// When the stop of a plan begins, s after its start: several periods of planning.
+/// When the stop of a plan begins where it can, s after its start: several periods of planning. For
+/// so long its own proofs count on where movers may be.
 inline constexpr double kOverdue = 0.4;
 
 /// What a plan says of itself. Frame W; times in seconds from a common origin.

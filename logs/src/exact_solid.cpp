@@ -60,10 +60,12 @@ Solid SolidOf(const obstacle_t& m, const polynomial_t& way, double flown) {
   s.center = Over(m.center, way);
   s.ageing = Exact(way.duration);
   s.age = Seconds(way.utime) - Seconds(m.center.utime);
-  const Rational known = s.age + Exact(std::min(flown, way.duration)) - Exact(world::kNoiseListed);
-  if (m.kind == obstacle_t::MOVING && known > 0)
+  const Rational ahead = s.age + Exact(std::min(flown, way.duration));
+  const Rational unlisted = ahead - Exact(world::kNoiseListed);
+  const bool known = s.covariance == Matrix{} && s.velocity_covariance == Matrix{};
+  if (m.kind == obstacle_t::MOVING && !known && unlisted > 0)
     for (size_t a = 0; a < 2; ++a)
-      s.velocity_covariance[a][a] += Exact(world::kMoverNoise) / 3 * known;
+      s.velocity_covariance[a][a] += Exact(world::kMoverNoise) / 3 * unlisted;
   return s;
 }
 Solid SolidOf(const prediction_t& m, const polynomial_t& way) {

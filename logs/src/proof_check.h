@@ -21,7 +21,7 @@ struct Examination {
 };
 
 /// Checks what the message claims, in rational arithmetic without rounding, from the definitions in
-/// lcmtypes alone: it shares no code with planning or with the check that control flies by. Square
+/// lcmtypes: with planning, or the check that control flies by, it shares constants only. Square
 /// roots are rounded to the safe side. A certified plan has to keep off each listed solid by its
 /// clearance, off the target's body, and its stop off both; to see past each solid all the time
 /// where its verdict says so, by the radii that it gives; to come to rest; to be about a list of

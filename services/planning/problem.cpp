@@ -44,7 +44,8 @@ void SetBoxes(const world::Obstacle& o, const Growth& most, Ellipsoid* e) {
   e->sight_half = half + most.sight;
 }
 
-// What depends on the shape alone is kept where the obstacle is what it was.
+// Returns what is not known of its place. What depends on the shape alone is kept, here and in
+// SetShapes, where the obstacle is what it was.
 Uncertainty SetBody(const PlannerConfig& config, const Stretch& over, double flown,
                     const world::Obstacle& o, bool same_shape, Ellipsoid* e) {
   const auto retimed = [&](world::Body* body) {
@@ -68,7 +69,6 @@ void SetShapes(const Stretch& over, const world::Obstacle& o, const Growth& grow
   // Heights sort out candidates on the ground, as no ellipsoid fits a slab; without a search there
   // are none.
   if (o.ground || (!over.asks_sight && e->body)) {
-    if (e->grown_by[0] < 0.0 && e->safety(0, 0) == kPoint && e->sight(0, 0) == kPoint) return;
     e->safety = e->sight = kPoint * Eigen::Matrix3d::Identity();
     e->grown_by[0] = -1.0;
     return;
@@ -169,7 +169,7 @@ Eigen::Matrix3d AlongGround(const Ground& ground) {
 void SetTargetBody(const PlanRequest& request, double flown, double hard, StartCheck* start,
                    Problem* problem, std::string* notes) {
   world::Obstacle o = *request.target_body;
-  o.moving = false;  // its manoeuvres are its own
+  o.moving = false;  // no listed mover: its manoeuvres are added here
   const double ahead = problem->t0 + std::min(flown, problem->duration) - o.center.start;
   o.velocity_covariance +=
       ManoeuvreRate(request.target_manoeuvre, ahead) * AlongGround(problem->limits.ground);

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 #include <string>
 
 #include "services/planning/candidate_set.h"
@@ -39,24 +38,39 @@ PlannerConfig WithoutMargin(PlannerConfig config) {
   return config;
 }
 
-// Does the plan keep off all that is unseen until t, and off what moves, the target's body too,
-// where their own proofs count on its being left before that?
-bool KeepsOff(const PlannerConfig& config, const PlanRequest& request,
-              const world::Trajectory& plan, double t) {
-  const bool late = t > plan.start + kOverdue;
-  if ((request.unseen.empty() && !late) || t <= plan.start) return true;
+// Until t, of a plan: how its part keeps off `obstacles`.
+PlanRequest Part(const PlanRequest& request, const world::Trajectory& plan, double t,
+                 std::vector<world::Obstacle> obstacles) {
   PlanRequest part;
   static_cast<Stretch&>(part) = {plan.start, t - plan.start, plan.At(plan.start), false};
   part.tube = request.tube;
   part.target = request.target;
-  part.obstacles = request.unseen;
-  if (late) {
-    std::copy_if(request.obstacles.begin(), request.obstacles.end(),
-                 std::back_inserter(part.obstacles), [](const auto& o) { return o.moving; });
-    part.target_body = request.target_body;
-    part.target_manoeuvre = request.target_manoeuvre;
-  }
+  part.obstacles = std::move(obstacles);
+  return part;
+}
+
+bool KeepsOffUnseen(const PlannerConfig& config, const PlanRequest& request,
+                    const world::Trajectory& plan, double t) {
+  if (request.unseen.empty() || t <= plan.start) return true;
+  const PlanRequest part = Part(request, plan, t, request.unseen);
   return StaysOff(ToCurve(plan, part.t0, part.horizon), MakeProblem(config, part, nullptr), 1.0);
+}
+
+// The proofs of a plan count on its being left after kOverdue: until a later t, does it keep off
+// what moves, the target's body too? `leaves`: from within some it may lead out.
+bool KeepsOffUntil(const PlannerConfig& config, const PlanRequest& request,
+                   const world::Trajectory& plan, double t, bool leaves) {
+  if (t <= plan.start + kOverdue) return true;
+  std::vector<world::Obstacle> counted;  // the ground, as its slope is the target's
+  for (const world::Obstacle& o : request.obstacles)
+    if (o.moving || o.ground) counted.push_back(o);
+  PlanRequest part = Part(request, plan, t, std::move(counted));
+  part.target_body = request.target_body;
+  part.target_manoeuvre = request.target_manoeuvre;
+  Problem problem = MakeProblem(config, part, nullptr);
+  if (!leaves)
+    for (Ellipsoid& e : problem.obstacles) e.safety_from = 0.0;
+  return StaysOff(ToCurve(plan, part.t0, part.horizon), problem, 1.0);
 }
 
 }  // namespace
@@ -275,7 +289,7 @@ PlanResult RestPlan(const PlannerConfig& config, const PlanRequest& request) {
   if (!stop) stop = close.BrakeWithin();
   // Braking may be, where what was committed to turns back.
   const auto is_blind = [&](const world::Trajectory& way) {
-    return !KeepsOff(hard, request, way, way.end());
+    return !KeepsOffUnseen(hard, request, way, way.end());
   };
   const bool blind = stop && is_blind(stop->trajectory);
   const auto lasts = [&] {
@@ -331,7 +345,8 @@ std::optional<Stop> WayOut(const PlannerConfig& config, const PlanRequest& reque
       const double t = std::min(plan.start + after, plan.end());
       resting.From(plan.At(t), t);
       std::optional<Stop> stop;
-      if (KeepsOff(hard, request, plan, t)) stop = (resting.*way)();
+      if (KeepsOffUnseen(hard, request, plan, t) && KeepsOffUntil(hard, request, plan, t, leaves))
+        stop = (resting.*way)();
       if (stop) {  // whoever checks it hears of obstacles only
         auto& proofs = stop->proofs;
         proofs.erase(std::remove_if(proofs.begin(), proofs.end(), is_unseen), proofs.end());

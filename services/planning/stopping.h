@@ -44,6 +44,7 @@ bool KeepsOffMovers(const PlannerConfig& config, const PlanRequest& request,
 /// contact is the latest, then the one that stays farthest off; not certified.
 Stop Evade(const PlannerConfig& config, const PlanRequest& request);
 
+/// When the stop of a plan begins where it can, s after its start.
 using world::kOverdue;
 
 /// Do the proofs hold only once an obstacle is left that the start is in? Such a plan is an ESCAPE.
@@ -65,8 +66,9 @@ void SetProofs(const PlannerConfig& config, const PlanRequest& request, std::vec
 /// Where `plan` can be left for a certified rest: as soon as a new plan is overdue, else sooner or
 /// later; above the target or by braking, or else aside. It keeps the hard radius and gives up the
 /// margin. After FASTER, Tordesillas et al. 2019: a plan is flown only with such a way out.
-/// What is unseen is kept off until then and after. `leaves`: the plan leaves obstacles that its
-/// start is in, and the stop may begin within them. `memory`: of an earlier call, if any.
+/// What is unseen is kept off until then and after, and what moves for longer than the proofs of
+/// the plan count on it. `leaves`: the plan leaves obstacles that its start is in, and the stop may
+/// begin within them. `memory`: of an earlier call, if any.
 std::optional<Stop> WayOut(const PlannerConfig& config, const PlanRequest& request,
                            const world::Trajectory& plan, bool leaves = false,
                            Problem* memory = nullptr);

@@ -41,6 +41,8 @@ inline Case MakeCase(unsigned seed, int n_obstacles = 12) {
     }
     if (o.solid != world::Obstacle::Solid::kEllipsoid)
       o.shape = (3.0 * o.half.cwiseAbs2()).cwiseInverse().asDiagonal();
+    if (o.moving)  // listed a while before
+      o.center = o.center.Reparametrised(request.t0 - 0.25, o.center.duration);
     if (o.id % 2) o.position_covariance = 4e-4 * Eigen::Matrix3d::Identity();
     if (o.id % 4 == 1) o.velocity_covariance = 1e-3 * Eigen::Matrix3d::Identity();
   }

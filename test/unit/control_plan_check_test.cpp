@@ -385,7 +385,7 @@ TEST(PlanCheck, OnlyAnEscapeMayStartInside) {
 }
 
 // A hover beside a walker who was listed 0.3 s before: a plan that is left after 0.4 s counts on
-// less than one that is flown to its end, and so does not the stop.
+// less of what the walker may do than one that is flown to its end; the stop counts on all of it.
 TEST(PlanCheck, AMoversChangesOfVelocityCountWhileThePlanIsFlown) {
   constexpr double kStop = 0.4, kHover = 2.0;  // s
   constexpr int kPieces = 32;
