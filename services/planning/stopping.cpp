@@ -345,9 +345,9 @@ std::optional<Stop> WayOut(const PlannerConfig& config, const PlanRequest& reque
       const double t = std::min(plan.start + after, plan.end());
       resting.From(plan.At(t), t);
       std::optional<Stop> stop;
-      if (KeepsOffUnseen(hard, request, plan, t) && KeepsOffUntil(hard, request, plan, t, leaves))
-        stop = (resting.*way)();
-      if (stop) {  // whoever checks it hears of obstacles only
+      if (KeepsOffUnseen(hard, request, plan, t)) stop = (resting.*way)();
+      if (stop && KeepsOffUntil(hard, request, plan, t, leaves)) {
+        // Whoever checks it hears of obstacles only.
         auto& proofs = stop->proofs;
         proofs.erase(std::remove_if(proofs.begin(), proofs.end(), is_unseen), proofs.end());
         return stop;
