@@ -83,8 +83,8 @@ std::optional<Stop> GoTo(const PlannerConfig& config, const PlanRequest& request
                          const Vector3d& end) {
   // Rest to rest the speed peaks at 1.9 times the mean, which stays below 4 m/s of max_speed, and
   // the acceleration of the shortest way at 4 m/s^2.
-  constexpr double kPace = 1.0, kLeast = 1.5;  // m/s, s
-  const double quickest = std::max(kLeast, (end - request.start.p).norm() / kPace);
+  constexpr double kPace = 1.0, kShortest = 1.5;  // m/s, s
+  const double quickest = std::max(kShortest, (end - request.start.p).norm() / kPace);
   Resting resting(config, request);
   for (const double slower : {1.0, 1.5, 2.2}) {
     const double T = slower * quickest;
