@@ -23,7 +23,7 @@ inline Eigen::Matrix3d ForecastCovariance(const Eigen::Matrix3d& position,
 /// along each level axis, m^2/s^3: over t s it adds a third of it times t^3 to the variance of the
 /// place. Bar-Shalom, Li and Kirubarajan 2001, "Estimation with Applications to Tracking and
 /// Navigation", section 6.2.2. With it at most 4.5 % of walkers are beyond two deviations 0.5 to
-/// 2.5 s ahead (crowds 1011 to 1022); the tracker follows best what it takes to turn half as often.
+/// 2.5 s ahead (crowds 1011 to 1022, `test/flight/calibration`); the tracker's own has half of it.
 inline constexpr double kMoverNoise = 0.4;
 /// The velocity's covariance in a list of obstacles holds what that adds for so long, s: no longer
 /// than a chase flies a plan, as what is wider there hides the target.
