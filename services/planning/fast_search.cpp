@@ -17,6 +17,9 @@ using kernels::kPad;
 // Candidates that the ellipsoids let pass and the proof does not, until the search gives up. With
 // 256 the longest plan of a flight in an office took 88 ms, with 64 it took 11.
 constexpr int kMostRefused = 64;
+// Candidates at the edge of a shape that only sorts whose proof is asked and fails, until others of
+// that kind are left for when there is nothing else.
+constexpr int kMostAtEdge = 4;
 constexpr int kSorted = 4 * kBatch;  // candidates at a time
 constexpr float kSlack = 1e-4f;      // relative: costs in single precision are that good
 
@@ -40,13 +43,13 @@ class FastSearch : public Search {
     bound_ = static_cast<float>(bound - alike);
     Found found;
     found.generated = fast_.n_candidates();
-    // First the winner alone is proven. Where that fails, each candidate before it becomes the
-    // bound.
+    // First the winner alone is proven. Where that fails, or candidates were left, each before it
+    // becomes the bound.
     int winner = -1;
     for (const bool all : {false, true}) {
       proves_all_ = all;
       winner = Run();
-      if (winner < 0 || all || proof_->Holds(fast_.PlanOf(winner))) break;
+      if (all || (winner < 0 ? !left_ : proof_->Holds(fast_.PlanOf(winner)))) break;
     }
     if (fast_.IsBeyondKernels()) return fallback_->Best(problem, sight_from, bound, proof);
     found.checked = checked_;
@@ -96,10 +99,17 @@ class FastSearch : public Search {
   }
   // `open`: the row that single precision leaves open, which decides most; -1: none.
   bool Passes(const Curve& plan, int open) {
+    const bool at_edge =
+        open >= 0 && !proves_all_ && !proof_->rows()[static_cast<size_t>(open)].decides;
+    if (at_edge && n_at_edge_ == kMostAtEdge) {
+      left_ = true;
+      return false;
+    }
     if ((open >= 0 && !proof_->RowHolds(open, plan)) || !KeepsLimitsOf(plan)) return false;
     if (open < 0 && !proves_all_) return true;
     const bool holds = proof_->Holds(plan);
     n_refused_ += proves_all_ && !holds;
+    n_at_edge_ += at_edge && !holds;
     return holds;
   }
   // Of what is looked at.
@@ -117,8 +127,8 @@ class FastSearch : public Search {
   std::vector<float> values_;
   std::vector<int> states_;
   std::vector<Entry> open_, accepted_;
-  int checked_ = 0, feasible_ = 0, n_refused_ = 0;
-  bool proves_all_ = false;
+  int checked_ = 0, feasible_ = 0, n_refused_ = 0, n_at_edge_ = 0;
+  bool proves_all_ = false, left_ = false;
   float bound_ = 0.0f, best_ = 0.0f;
   Cost winner_cost_;
 };
@@ -302,7 +312,8 @@ int FastSearch::Run() {
   const kernels::Context& c = fast_.context();
   const int n = fast_.n_candidates();
   best_ = bound_;
-  checked_ = feasible_ = n_refused_ = 0;
+  checked_ = feasible_ = n_refused_ = n_at_edge_ = 0;
+  left_ = false;
   accepted_.clear();
   open_.clear();
   if (bound_ < HUGE_VALF && PruneAll()) return CheapestAccepted();
