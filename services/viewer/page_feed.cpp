@@ -181,8 +181,8 @@ void PageFeed::Forget() {
 }
 
 void PageFeed::SendHello() {
-  sink_.Retain(Part::kHello,
-               HelloText(source_, play_ ? play_->duration : 0.0, !config_.token.empty(), history_));
+  sink_.Retain(Part::kHello, HelloText(source_, play_ ? play_->duration : 0.0,
+                                       source_.empty() && !config_.token.empty(), history_));
 }
 
 std::vector<ProcessHealth> PageFeed::Processes() {

@@ -23,7 +23,7 @@ std::string ViewerConfig::Problem() const {
     return Outside("image_rate_hz", image_rate_hz, "(0, 10]");
   if (jpeg_quality < 1 || jpeg_quality > 100)
     return Outside("jpeg_quality", jpeg_quality, "1..100");
-  if (!(trail >= 1.0 && trail <= 600.0)) return Outside("trail", trail, "[1, 600]");
+  if (!(trail >= 1.0 && trail <= 60.0)) return Outside("trail", trail, "[1, 60]");
   return rig.LensProblem();
 }
 

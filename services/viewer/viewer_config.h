@@ -17,7 +17,7 @@ struct ViewerConfig {
   double cloud_rate_hz = 2.0;
   double image_rate_hz = 4.0;
   int jpeg_quality = 60;  ///< of 100, on the page
-  double trail = 60.0;    ///< s of history that a new page is told
+  double trail = 60.0;    ///< s of history that a new page is told; it shows 60
   world::Rig rig;         ///< whose calibration Foxglove is told
 
   template <class V>

@@ -1,7 +1,7 @@
 // Looks on at a live flight until its input ends: node onlooker.mjs none none MODULES PORT page|chromium|hostile.
 // Prints what it saw as one line of JSON; exits 1 where that is not enough.
 import assert from 'node:assert';
-import {connectOften, openDeaf, sendGarbage} from './attacks.mjs';
+import {connectOften, flood, openDeaf, sendGarbage} from './attacks.mjs';
 import {load, pageClient, sleep} from './viewer.mjs';
 
 const [port, kind] = [Number(process.argv[5]), process.argv[6]];
@@ -30,7 +30,10 @@ async function attack() {
     const client = await pageClient(port).catch(() => null);
     client?.socket.on('message', (data, binary) => { if (!binary && String(data).includes('"reply"')) replies.push(JSON.parse(data).refusal); });
     for (const token of ['', 'wrong', 'x'.repeat(32)]) client?.ask({command: 'land', token});
-    await sleep(3000);
+    await sleep(1500);
+    const stop = await flood(port);
+    await sleep(1500);
+    stop();
     for (const socket of [...deaf, ...(client ? [client.socket] : [])]) socket.terminate();
   }
   assert.ok(replies.length > 0 && replies.every((refusal) => refusal), JSON.stringify(replies));

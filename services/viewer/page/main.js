@@ -96,7 +96,7 @@ const handlers = {
     model.rows = message.rows;
     model.duration = message.duration;
     model.lines = true;
-    allowCommands(page, message.commands);
+    allowCommands(page, message);
   },
   state(message) {
     window.chase.counts.state++;

@@ -87,7 +87,7 @@ export function disarm(page) {
   page.arm.onchange();
 }
 
-export function allowCommands(page, allowed) {
-  page.arm.disabled = page.token.disabled = !allowed;
-  if (!allowed) page.reply.textContent = 'off: the viewer was started without --token-file';
+export function allowCommands(page, {commands, source}) {
+  page.arm.disabled = page.token.disabled = !commands;
+  if (!commands) page.reply.textContent = source ? 'off: a log is played' : 'off: the viewer was started without --token-file';
 }
