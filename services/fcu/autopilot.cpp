@@ -56,6 +56,7 @@ bool Autopilot::TakeHeartbeat(const Frame& frame, int64_t utime) {
     stranger_ = fmt::format("system {} is no PX4 (MAV_AUTOPILOT {})", frame.system, m.autopilot);
     return false;
   }
+  stranger_.clear();
   system_ = frame.system;
   heartbeat_ = m;
   if (armed()) failed_checks_.clear();
@@ -78,6 +79,7 @@ void Autopilot::TakeState(const Frame& frame, int64_t utime) {
   } else if (const auto b = As<mav::BatteryStatus>(frame)) {
     double volts = 0.0;
     for (const uint16_t cell : b->voltages) volts += Volts(cell);
+    for (const uint16_t cell : b->voltages_ext) volts += Volts(cell);
     batteries_[b->id] = {b->battery_remaining, volts, utime};
   } else if (const auto r = As<mav::RcChannels>(frame)) {
     channels_ = r->chancount;

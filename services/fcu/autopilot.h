@@ -42,7 +42,7 @@ class Autopilot {
   /// Why it cannot fly now by its own state (starting, calibrating, in a failsafe ...); empty: it
   /// can.
   std::string Unfit() const;
-  /// What else speaks on the link in an autopilot's place; empty: nobody.
+  /// What else speaks on the link in an autopilot's place, since it last did; empty: nobody.
   const std::string& stranger() const { return stranger_; }
 
   struct Attitude {

@@ -75,15 +75,27 @@ std::string Words(mav::MavResult result) {
 void Command::Begin(Ask ask, int64_t utime) {
   ask_ = ask;
   answer_ = Answer::kWaiting;
-  words_.clear();
+  result_.reset();
   next_ = utime;
   sent_ = 0;
+}
+
+void Command::BeginAgain(int64_t utime) {
+  const auto result = result_;
+  Begin(ask_, utime);
+  result_ = result;
+}
+
+std::string Command::Refusal() const {
+  if (!result_ || *result_ == mav::MavResult::ACCEPTED || *result_ == mav::MavResult::IN_PROGRESS)
+    return "";
+  return fmt::format("{} was refused ({})", Words(ask_), words());
 }
 
 void Command::OnAck(uint16_t command, uint8_t result, int64_t utime) {
   if (ask_ == Ask::kNothing || sent_ == 0 || command != Number(ask_)) return;
   const auto r = static_cast<mav::MavResult>(result);
-  words_ = Words(r);
+  result_ = r;
   next_ = utime + kTryAgain;
   if (r == mav::MavResult::ACCEPTED) answer_ = Answer::kAccepted;
   // "Not now" is PX4's answer to a check that fails; that may pass a moment later.

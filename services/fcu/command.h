@@ -22,9 +22,12 @@ class Command {
   /// Takes the place of the one before; its late answers are no longer heard where it was of
   /// another kind.
   void Begin(Ask ask, int64_t utime);
+  /// Asks once more for what was refused, at `utime`; the refusal is remembered until an answer
+  /// comes.
+  void BeginAgain(int64_t utime);
   void Drop() {
     ask_ = Ask::kNothing;
-    words_.clear();
+    result_.reset();
   }
   void OnAck(uint16_t command, uint8_t result, int64_t utime);
   /// The message where it is due to be sent; its target is the caller's to fill in.
@@ -33,14 +36,16 @@ class Command {
   Ask ask() const { return ask_; }
   Answer answer() const { return answer_; }
   /// The last answer in words; empty: none yet.
-  const std::string& words() const { return words_; }
+  std::string words() const { return result_ ? Words(*result_) : ""; }
+  /// "landing was refused (denied)", where the last answer was a refusal, "not now" as well.
+  std::string Refusal() const;
 
  private:
   Ask ask_ = Ask::kNothing;
   Answer answer_ = Answer::kWaiting;
-  std::string words_;
-  int64_t next_ = 0;  // when it is sent again
-  uint8_t sent_ = 0;  // times, for the field `confirmation`
+  std::optional<mav::MavResult> result_;  // the last
+  int64_t next_ = 0;                      // when it is sent again
+  uint8_t sent_ = 0;                      // times, for the field `confirmation`
 };
 
 }  // namespace chase::fcu

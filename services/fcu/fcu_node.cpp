@@ -155,8 +155,10 @@ bus::NodeReport FcuNode::Report() const {
   const std::string lacking = bridge_.rates().missing();
   const bool worse = state == State::kRefused || state == State::kFailsafe || !lacking.empty() ||
                      !bridge_.disagreement().empty();
+  const std::string unsent =
+      transport_->dropped() == 0 ? "" : fmt::format("; {} frames not sent", transport_->dropped());
   return {worse ? Level::kDegraded : Level::kOk,
-          bridge_.Words() + (lacking.empty() ? "" : "; slow: " + lacking),
+          bridge_.Words() + unsent + (lacking.empty() ? "" : "; slow: " + lacking),
           fmt::format("{} {} {}", Handshake::Name(state), autopilot.armed(),
                       autopilot.on_ground(now_))};
 }

@@ -201,7 +201,7 @@ void Handshake::Update(const Facts& facts) {
   // Landing and disarming have no alternative: what is refused is asked for again.
   if ((state_ == State::kLanding || state_ == State::kDisarming || state_ == State::kKilling) &&
       command_.answer() == Command::Answer::kRefused)
-    command_.Begin(command_.ask(), facts.utime + 1'000'000);
+    command_.BeginAgain(facts.utime + 1'000'000);
   WatchDoubt();
   left_ = Steers() && (left_ || (facts.armed && !facts.on_ground));
   for (const HandshakeTable::Row& row : HandshakeTable::kRows)
@@ -248,6 +248,12 @@ void Handshake::Enter(State state, const std::string& why) {
     default:
       return command_.Drop();
   }
+}
+
+std::string Handshake::reason() const {
+  const std::string refusal = command_.Refusal();
+  if (refusal.empty()) return reason_;
+  return fmt::format("{}; {}{}{}", reason_, refusal, facts_.said.empty() ? "" : ": ", facts_.said);
 }
 
 std::string Handshake::Name(State state) {

@@ -74,8 +74,8 @@ class Handshake {
   /// Is the autopilot's own word needed sooner than its next heartbeat is due? Who flies an armed
   /// vehicle may change at any moment.
   bool needs_word() const;
-  /// Why the state is what it is.
-  const std::string& reason() const { return reason_; }
+  /// Why the state is what it is, and why what is asked for in it has not come yet.
+  std::string reason() const;
   static std::string Name(State state);
 
  private:

@@ -89,8 +89,8 @@ std::string StreamRates::missing() const {
   std::string words;
   for (std::size_t i = 0; i < rows_.size(); ++i)
     if (const Row& row = rows_[i]; row.needed && IsAskedFor(i) && row.rate < kEnough * row.wanted)
-      words += fmt::format("{}{} at {:.1f} of {:.0f} Hz", words.empty() ? "" : ", ", row.name,
-                           row.rate, row.wanted);
+      words += fmt::format("{}{} at {:.1f} of {:.0f} Hz{}", words.empty() ? "" : ", ", row.name,
+                           row.rate, row.wanted, row.refusals >= kMostRefusals ? " (refused)" : "");
   return words;
 }
 

@@ -52,6 +52,7 @@ class Reading : public Transport {
     waiting_.clear();
     return taken;
   }
+  int64_t dropped() const override { return dropped_; }
   std::string Name() const override { return name_; }
   std::string Problem() const override {
     const std::lock_guard<std::mutex> lock(mutex_);
@@ -75,6 +76,7 @@ class Reading : public Transport {
   virtual int Open() = 0;
 
   mutable std::mutex mutex_;
+  int64_t dropped_ = 0;  // counted by who sends
 
  private:
   struct Waiting {
@@ -137,8 +139,9 @@ class Udp : public Reading {
     to.sin_addr.s_addr = static_cast<in_addr_t>(peer >> 16);
     to.sin_port = static_cast<in_port_t>(peer);
     const std::lock_guard<std::mutex> lock(mutex_);
-    sendto(fd(), bytes.data(), bytes.size(), MSG_DONTWAIT, reinterpret_cast<const sockaddr*>(&to),
-           sizeof to);
+    if (sendto(fd(), bytes.data(), bytes.size(), MSG_DONTWAIT,
+               reinterpret_cast<const sockaddr*>(&to), sizeof to) < 0)
+      ++dropped_;
   }
   bool whole() const override { return true; }
 
@@ -228,6 +231,7 @@ class Serial : public Reading {
       const ssize_t n = write(fd(), bytes.data() + at, bytes.size() - at);
       if (n > 0) at += static_cast<std::size_t>(n);
     }
+    if (at < bytes.size()) ++dropped_;
   }
   bool whole() const override { return false; }
 

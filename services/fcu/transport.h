@@ -23,6 +23,8 @@ class Transport {
   virtual std::vector<Arrival> Take() = 0;
   /// Sends one frame to a peer; what finds no room or no peer is dropped.
   virtual void Send(const std::vector<uint8_t>& bytes, uint64_t peer) = 0;
+  /// Frames to a peer that were not sent whole.
+  virtual int64_t dropped() const = 0;
   /// Does an arrival hold whole frames?
   virtual bool whole() const = 0;
   /// "UDP port 14540", for messages.

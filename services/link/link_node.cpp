@@ -74,9 +74,12 @@ void LinkNode::TakeIn() {
       ++n_refused_;
       continue;
     }
-    socket_.Trust();
+    // Whoever recorded a packet may send it again from elsewhere.
+    if (unpacker_.advanced()) {
+      socket_.Trust();
+      last_heard_ = bus_.Now();
+    }
     packer_.Hear(unpacker_);
-    last_heard_ = bus_.Now();
     for (Message& m : messages) {
       if (!Leaves(m.channel, !config_.is_vehicle())) {
         ++n_refused_;

@@ -164,6 +164,7 @@ struct Unpacker::Record {
 };
 
 bool Unpacker::Take(const uint8_t* data, size_t size, std::vector<Message>* messages) {
+  advanced_ = false;
   Reader reader(data, size);
   const uint8_t* magic = reader.Skip(sizeof kMagic);
   int64_t session = 0, heard = 0;
@@ -197,6 +198,7 @@ bool Unpacker::Follows(int64_t session, uint32_t number) {
     const int64_t first = std::max<int64_t>(next_, int64_t{number} - kLateWindow);
     for (int64_t n = first; n < number; ++n) missing_.insert(n);
     next_ = number + 1;
+    advanced_ = true;
   } else if (missing_.erase(number) == 0) {
     return true;  // once more
   } else {

@@ -62,6 +62,8 @@ class Unpacker {
   /// Appends the messages that this packet completes; false where it is none of ours or older than
   /// the session at hand.
   bool Take(const uint8_t* data, size_t size, std::vector<Message>* messages);
+  /// Was the last packet newer than all before? Any other may be a recording of its sender's.
+  bool advanced() const { return advanced_; }
 
   /// The newest session of the other end, and the newest of ours that it has heard; 0: none.
   int64_t session() const { return session_; }
@@ -84,6 +86,7 @@ class Unpacker {
 
   int64_t session_ = 0, heard_ = 0;
   uint32_t next_ = 0;
+  bool advanced_ = false;
   int64_t packets_ = 0, lost_ = 0;
   std::set<int64_t> missing_;  // that may still come
   std::map<uint32_t, Open> open_;

@@ -48,12 +48,13 @@ bool Normalise(std::array<float, 4>* q) {
   return true;
 }
 
-/// One of those that it flies, a pilot's with the sticks let go; none for anything else, NaN as
-/// well.
-std::optional<Mode> ModeOf(float main, float sub) {
+/// One of those that it flies, a pilot's with the sticks let go; none for anything else, NaN and a
+/// mode that is not said to be PX4's own (MAV_MODE_FLAG_CUSTOM_MODE_ENABLED) as well.
+std::optional<Mode> ModeOf(const mav::CommandLong& m) {
+  if (!(std::fmod(m.param1, 2.0f) >= 1.0f)) return std::nullopt;
   for (const Mode& mode : {mavlink::kOffboardMode, mavlink::kLandMode, mavlink::kHoldMode,
                            mavlink::kPositionMode, Mode{1, 0}, Mode{2, 0}, Mode{5, 0}, Mode{7, 0}})
-    if (main == mode.main && sub == mode.sub) return mode;
+    if (m.param2 == mode.main && m.param3 == mode.sub) return mode;
   return std::nullopt;
 }
 
@@ -245,7 +246,7 @@ void Px4::OnCommand(const mav::CommandLong& m, const mavlink::Frame& frame) {
 uint8_t Px4::Handle(const mav::CommandLong& m) {
   switch (static_cast<mav::MavCmd>(m.command)) {
     case mav::MavCmd::DO_SET_MODE:
-      return SetMode(ModeOf(m.param2, m.param3));
+      return SetMode(ModeOf(m));
     case mav::MavCmd::RUN_PREARM_CHECKS:
       said_.clear();
       return Code(mav::MavResult::ACCEPTED);
@@ -272,12 +273,14 @@ uint8_t Px4::SetMode(std::optional<Mode> mode) {
       return Code(mav::MavResult::TEMPORARILY_REJECTED);
     }
   }
+  if (*mode == mavlink::kLandMode && options_.refuses_to_land) return Code(mav::MavResult::DENIED);
   Enter(*mode);
   return Code(mav::MavResult::ACCEPTED);
 }
 
-void Px4::Enter(Mode mode) {
+void Px4::Enter(Mode mode, bool failsafe) {
   mode_ = intended_ = mode;
+  in_failsafe_ = failsafe;
   own_mode_ = OwnMode(body_);
 }
 

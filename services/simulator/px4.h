@@ -36,6 +36,7 @@ struct Px4Options {
   double drift_ppm = 30.0;          ///< of its clock
   std::string preflight;            ///< a check that fails; empty: none
   bool refuses_offboard = false, refuses_to_arm = false;  ///< with DENIED
+  bool refuses_to_land = false;                           ///< as well
   int autopilot = 12;                                     ///< MAV_AUTOPILOT of its heartbeat
 };
 
@@ -101,7 +102,7 @@ class Px4 {
   uint8_t SendOnce(float id);
   uint8_t SetMode(std::optional<mavlink::Mode> mode);
   uint8_t Arm(bool on, bool forced);
-  void Enter(mavlink::Mode mode);
+  void Enter(mavlink::Mode mode, bool failsafe = false);
   bool Streamed() const;
   bool StreamAlive() const;
   /// One that does not hear its transmitter any more is told of still, without channels, as PX4IO
@@ -149,10 +150,11 @@ class Px4 {
   mavlink::Mode mode_, intended_;
   bool armed_ = false, landed_ = true, has_flown_ = false;
   Warning battery_warning_ = Warning::kNone;
-  bool drained_ = false;   // it lands for its battery, or a pilot has taken over from that
-  bool silent_ = false;    // setpoints are, by which it is meant to fly
-  bool killed_ = false;    // by the switch: the motors stand still in any mode
-  bool unmanned_ = false;  // it flies and its transmitter is not heard any more
+  bool drained_ = false;      // it lands for its battery, or a pilot has taken over from that
+  bool in_failsafe_ = false;  // the mode is a failsafe's, where it is not OFFBOARD
+  bool silent_ = false;       // setpoints are, by which it is meant to fly
+  bool killed_ = false;       // by the switch: the motors stand still in any mode
+  bool unmanned_ = false;     // it flies and its transmitter is not heard any more
   std::optional<int64_t> transmitter_heard_;
   int64_t silent_since_ = 0;
   int64_t first_setpoint_ = 0, last_setpoint_ = 0;

@@ -38,7 +38,7 @@ void Px4::WatchStream() {
   silent_ = led && !StreamAlive();
   if (!led) return;
   if (silent_ && !was_silent) {
-    Enter(mavlink::kHoldMode);
+    Enter(mavlink::kHoldMode, true);
     intended_ = mavlink::kOffboardMode;  // it returns by itself when the stream does
     silent_since_ = now_;
     Say("No offboard signal, failsafe", 1);
@@ -56,13 +56,16 @@ void Px4::WatchTransmitter() {
   unmanned_ =
       armed_ && transmitter_heard_ && Seconds(*transmitter_heard_, now_) > options_.com_rc_loss_t;
   if (!unmanned_ || was_unmanned || drained_) return;
-  Enter(mavlink::kLandMode);
+  Enter(mavlink::kLandMode, true);
   Say("Manual control lost, failsafe", 1);
 }
 
-/// COM_RC_OVERRIDE, bit 1.
+/// COM_RC_OVERRIDE 3: from OFFBOARD, and from a landing that was asked for. With COM_FAIL_ACT_T 0 a
+/// failsafe heeds the mode switch alone (failsafe/framework.cpp, AlwaysModeSwitchOnly).
 void Px4::PilotSticks(double deflection) {
-  if (options_.transmitter && deflection > kStickOverride && mode_ == mavlink::kOffboardMode)
+  const bool lands = mode_ == mavlink::kLandMode && !in_failsafe_;
+  if (options_.transmitter && deflection > kStickOverride &&
+      (lands || mode_ == mavlink::kOffboardMode))
     Enter(mavlink::kPositionMode);
 }
 
@@ -84,7 +87,7 @@ void Px4::WatchBattery() {
   Say(words[static_cast<int>(battery_warning_)], battery_warning_ == Warning::kEmergency ? 0 : 2);
   Say("Failsafe activated", 2);  // for a warning, too
   if (battery_warning_ < Warning::kCritical || !options_.low_battery_lands) return;
-  Enter(mavlink::kLandMode);
+  Enter(mavlink::kLandMode, true);
   drained_ = true;
 }
 

@@ -136,6 +136,8 @@ void Px4::StreamState() {
   }
   if (Due(mav::BatteryStatus::kId)) {
     mav::BatteryStatus m;
+    m.voltages.fill(UINT16_MAX);  // BAT1_N_CELLS 0: the whole pack in the first cell's place
+    m.voltages[0] = static_cast<uint16_t>(1e3 * RestVolts(body_.charge));
     m.battery_remaining = percent;
     Send(m);
   }

@@ -279,6 +279,12 @@ TEST(FcuBridge, RefusalsAreSaidInWordsAndGivenUp) {
   EXPECT_EQ(a.px4.seen().setpoints, sent) << "given up: no stream any more";
   EXPECT_EQ(a.px4.seen().offboard_commands, 1);
 
+  StandInOptions stays;
+  stays.refuses_to_arm = true;
+  Flight c(stays);
+  ASSERT_TRUE(c.RunUntil(State::kRefused, 12.0));
+  EXPECT_TRUE(c.Says("refused: arming was refused (denied)"));
+
   StandInOptions preflight;
   preflight.preflight = "ekf2 missing data and a sentence of more than fifty bytes";
   FcuConfig config;
@@ -305,9 +311,30 @@ TEST(FcuBridge, ACheckThatPassesLaterIsWaitedFor) {
   options.preflight = "heading estimate not stable";
   Flight flight(options);
   ASSERT_TRUE(flight.RunUntil(State::kArming, 12.0));
-  flight.Run(10.0);
+  flight.Run(3.0);
+  EXPECT_TRUE(flight.Says("arming was refused (not now): Arming denied: "));
+  EXPECT_TRUE(flight.Says("Preflight Fail: heading estimate not stable"));
+  flight.Run(7.0);
   flight.px4.options().preflight.clear();
   EXPECT_TRUE(flight.RunUntil(State::kFlying, 5.0)) << flight.bridge.Words();
+}
+
+TEST(FcuBridge, ARefusedLandingIsSaidAndAskedForAgain) {
+  StandInOptions options;
+  options.refuses_to_land = true;
+  options.com_of_loss_t = 10.0;  // s in which it does not land by itself
+  Flight flight(options);
+  flight.TakeOff(5.0);
+  flight.setpoints = false;
+  ASSERT_TRUE(flight.RunUntil(State::kLanding, 2.0));
+  for (int i = 0; i < 20; ++i) {
+    flight.Run(0.2);
+    EXPECT_TRUE(flight.Says("the autopilot lands; landing was refused (denied)"));
+  }
+  flight.px4.options().refuses_to_land = false;
+  flight.Run(1.5);
+  EXPECT_TRUE(flight.px4.mode() == kLandMode);
+  EXPECT_FALSE(flight.Says("was refused"));
 }
 
 TEST(FcuBridge, AnotherMakesAutopilotIsLeftAlone) {

@@ -151,6 +151,29 @@ TEST(FcuHands, TheSticksTakeItAndALostTransmitterLands) {
   EXPECT_FALSE(lost.px4.armed()) << "landed, though setpoints come";
 }
 
+TEST(FcuHands, TheSticksTakeItFromALandingOfOursButNotFromAFailsafe) {
+  StandInOptions options;
+  options.transmitter = true;
+  Flight landing(options);
+  landing.TakeOff(5.0);
+  landing.setpoints = false;
+  ASSERT_TRUE(landing.RunUntil(State::kLanding, 2.0)) << landing.bridge.Words();
+  landing.Run(0.3);
+  ASSERT_TRUE(landing.px4.mode() == kLandMode);
+  landing.px4.PilotSticks(0.6);
+  EXPECT_TRUE(landing.RunUntil(State::kPilot, 0.2)) << landing.bridge.Words();
+  landing.Run(5.0);
+  EXPECT_TRUE(landing.px4.mode() == (Mode{3, 0}));
+
+  Flight drained(options);
+  drained.TakeOff(5.0);
+  drained.px4.SetCharge(0.04);
+  ASSERT_TRUE(drained.RunUntil(State::kFailsafe, 2.0));
+  drained.px4.PilotSticks(0.6);
+  drained.Run(0.3);
+  EXPECT_TRUE(drained.px4.mode() == kLandMode) << "the mode switch alone does";
+}
+
 // A heartbeat is up to a second old: AUTO.LAND would take it from him.
 TEST(FcuHands, ALandingIsNotAskedOfAPilotWhoHasJustTakenIt) {
   for (const double before : {0.02, 0.3, 0.8}) {

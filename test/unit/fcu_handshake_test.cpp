@@ -15,7 +15,9 @@ bool Latched(State s) {
 }
 
 bool IsArm(const mav::CommandLong& m) { return m.command == 400 && m.param1 > 0.5f; }
-bool IsOffboard(const mav::CommandLong& m) { return m.command == 176 && m.param2 == 6.0f; }
+bool IsOffboard(const mav::CommandLong& m) {
+  return m.command == 176 && m.param1 == 1.0f && m.param2 == 6.0f;  // 1: a mode of PX4's own
+}
 
 /// Facts that change by themselves at random: any order of inputs.
 class Chaos {
@@ -188,6 +190,34 @@ TEST(FcuHandshake, UnansweredCommandsAreSentAgainAndCounted) {
   EXPECT_EQ(command.answer(), Command::Answer::kRefused);
   EXPECT_EQ(command.words(), "denied");
   EXPECT_FALSE(command.Tick(kStart + 60'000'000));
+}
+
+TEST(FcuHandshake, WhatIsRefusedIsSaidUntilItIsAccepted) {
+  for (const auto& [what, words] :
+       {std::pair{State::kLanding, "landing"}, std::pair{State::kDisarming, "disarming"},
+        std::pair{State::kKilling, "disarming by force"}}) {
+    Engaged flight(true);
+    if (what == State::kKilling) flight.handshake.Kill();
+    flight.facts.wish = false;
+    flight.facts.motors_off = flight.facts.on_ground = what == State::kDisarming;
+    flight.Run(0.7);
+    ASSERT_EQ(flight.handshake.state(), what);
+    for (const auto& [result, answer] :
+         {std::pair{1, " was refused (not now)"}, std::pair{2, " was refused (denied)"}}) {
+      const auto command = flight.handshake.NextCommand(flight.facts.utime);
+      ASSERT_TRUE(command) << words;
+      flight.handshake.OnAck(command->command, static_cast<uint8_t>(result), flight.facts.utime);
+      flight.facts.said = "not landed";
+      flight.Run(3.0);
+      EXPECT_NE(flight.handshake.reason().find(std::string("; ") + words + answer + ": not landed"),
+                std::string::npos)
+          << flight.handshake.reason();
+    }
+    const auto command = flight.handshake.NextCommand(flight.facts.utime);
+    ASSERT_TRUE(command) << words;
+    flight.handshake.OnAck(command->command, 0, flight.facts.utime);
+    EXPECT_EQ(flight.handshake.reason().find("refused"), std::string::npos);
+  }
 }
 
 // OFFBOARD was asked for several times; answers are slow.

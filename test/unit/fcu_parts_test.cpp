@@ -127,6 +127,16 @@ TEST(FcuStreamRates, AsksForAnotherImuWhereTheBestIsRefused) {
   }
 }
 
+TEST(FcuStreamRates, TellsWhatIsRefusedFromWhatIsLost) {
+  StreamRates rates(200.0);
+  for (int64_t t = 1'000'000; t < 20'000'000; t += 5'000)
+    if (const auto request = rates.Tick(t))
+      rates.OnAnswer(static_cast<uint32_t>(request->param1) == mav::ExtendedSysState::kId ? 4 : 0);
+  EXPECT_EQ(rates.missing(),
+            "HIGHRES_IMU at 0.0 of 200 Hz, ATTITUDE_QUATERNION at 0.0 of 50 Hz, "
+            "EXTENDED_SYS_STATE at 0.0 of 5 Hz (refused)");
+}
+
 mav::Statustext Chunk(const std::string& text, uint16_t id, uint8_t seq) {
   mav::Statustext m;
   m.severity = 2, m.id = id, m.chunk_seq = seq;
@@ -194,6 +204,7 @@ TEST(FcuAutopilot, ListensToOnePx4Only) {
   m.autopilot = 12, m.base_mode = 0x81, m.custom_mode = 4u << 16 | 5u << 24, m.system_status = 5;
   EXPECT_FALSE(autopilot.Take(FrameOf(m, 2, 190), kStart)) << "a ground station's component";
   EXPECT_TRUE(autopilot.Take(FrameOf(m, 2), kStart));
+  EXPECT_EQ(autopilot.stranger(), "") << "the PX4 has spoken since";
   EXPECT_EQ(autopilot.system(), 2);
   EXPECT_TRUE(autopilot.armed());
   EXPECT_TRUE(autopilot.failsafe());
@@ -293,6 +304,10 @@ TEST(FcuAutopilot, TheBatteryIsKnownByItsOwnMessageToo) {
   battery.voltages[0] = battery.voltages[1] = 3'850;
   autopilot.Take(FrameOf(battery), kStart + 1'000'000);
   EXPECT_TRUE(Says(autopilot, 1.0, ", battery 60 % 7.7 V"));
+  battery.voltages.fill(3'850);
+  battery.voltages_ext = {3'850, 3'850, 0, UINT16_MAX};  // the last two are none
+  autopilot.Take(FrameOf(battery), kStart + 1'000'000);
+  EXPECT_TRUE(Says(autopilot, 1.0, ", battery 60 % 46.2 V")) << "twelve cells";
   battery.id = 1;
   battery.battery_remaining = 50;
   autopilot.Take(FrameOf(battery), kStart + 2'000'000);

@@ -1,6 +1,7 @@
 // The wire alone: a serial device that is pulled out, on pseudo-terminals.
 #include <fcntl.h>
 #include <gtest/gtest.h>
+#include <netinet/in.h>
 #include <unistd.h>
 
 #include <chrono>
@@ -51,6 +52,28 @@ class Plugged {
   std::filesystem::path link_;
   int fd_;
 };
+
+TEST(FcuTransport, WhatIsNotSentWholeIsCounted) {
+  char folder[] = "/tmp/chase-fcu-XXXXXX";
+  ASSERT_NE(mkdtemp(folder), nullptr);
+  const std::filesystem::path device = std::filesystem::path(folder) / "tty";
+  {
+    const Plugged plugged(device);
+    const auto line = OpenTransport(device, 0, 921600);
+    line->Send({1}, 0);
+    EXPECT_EQ(line->dropped(), 0);
+    const Bytes much(1'000'000);  // nobody reads
+    line->Send(much, 0);
+    EXPECT_EQ(line->dropped(), 1);
+  }
+  std::filesystem::remove_all(folder);
+
+  const auto udp = OpenTransport("udp", 0, 0);
+  udp->Send({1}, 0);
+  EXPECT_EQ(udp->dropped(), 0) << "there is no peer";
+  udp->Send(Bytes(100'000), uint64_t{htonl(INADDR_LOOPBACK)} << 16 | htons(9));
+  EXPECT_EQ(udp->dropped(), 1) << "more than a datagram holds";
+}
 
 TEST(FcuTransport, ADeviceThatWentAwayIsOpenedAgain) {
   char folder[] = "/tmp/chase-fcu-XXXXXX";

@@ -1,10 +1,16 @@
 #include <gtest/gtest.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <cstdio>
+#include <fstream>
 #include <map>
 #include <random>
 
 #include "common/bus/seal.h"
+#include "common/bus/udp_port.h"
 #include "services/link/link_config.h"
 #include "services/link/link_node.h"
 #include "services/link/packet.h"
@@ -218,9 +224,12 @@ TEST(Packet, ALostPacketIsCountedAlthoughItsNeighbourCameTwice) {
   };
   take(1);
   take(4);  // 2 and 3 are missing
+  EXPECT_TRUE(unpacker.advanced());
   for (int i = 0; i < 5; ++i) take(1);
+  EXPECT_FALSE(unpacker.advanced());
   EXPECT_EQ(unpacker.lost(), 2);
   take(2);
+  EXPECT_FALSE(unpacker.advanced()) << "late";
   EXPECT_EQ(unpacker.lost(), 1);
   take(2);
   EXPECT_EQ(unpacker.lost(), 1);
@@ -283,6 +292,86 @@ TEST(Link, HeavyMessagesStayAndOnlyCommandsComeBack) {
   EXPECT_FALSE(Leaves("LINK_STATUS", true)) << "the ground has a link of its own";
   EXPECT_FALSE(Leaves("COMMAND", true));
   EXPECT_TRUE(Leaves("COMMAND", false));
+}
+
+/// Carries nothing.
+class SilentBus : public bus::Bus {
+ public:
+  void SubscribeEvery(const EveryHandler& handler) override { say = handler; }
+  int64_t Now() const override { return now; }
+  EveryHandler say;
+  int64_t now = 1'000'000;
+
+ protected:
+  void SubscribeRaw(const std::string& /*channel*/, RawHandler /*handler*/) override {}
+  void PublishRaw(const std::string& /*channel*/, Bytes /*bytes*/) override {}
+};
+
+/// A socket of loopback's, on a port that is free.
+class Loopback {
+ public:
+  ~Loopback() { close(fd_); }
+  int port() const {
+    sockaddr_in at{};
+    socklen_t size = sizeof at;
+    getsockname(fd_, reinterpret_cast<sockaddr*>(&at), &size);
+    return ntohs(at.sin_port);
+  }
+  void Send(const Bytes& bytes, int port) const {
+    sockaddr_in to{};
+    to.sin_family = AF_INET;
+    to.sin_port = htons(static_cast<uint16_t>(port));
+    to.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    EXPECT_EQ(
+        sendto(fd_, bytes.data(), bytes.size(), 0, reinterpret_cast<sockaddr*>(&to), sizeof to),
+        static_cast<ssize_t>(bytes.size()));
+  }
+  int Take() const {
+    sockaddr_in from{};
+    int n = 0;
+    while (bus::NextDatagram(fd_, &from)) ++n;
+    return n;
+  }
+
+ private:
+  int fd_ = bus::OpenUdpPort(0, INADDR_LOOPBACK);
+};
+
+TEST(LinkNode, APacketThatIsSentAgainFromElsewhereMovesNoPeer) {
+  const std::string key_file = ::testing::TempDir() + "link_test_key";
+  std::ofstream(key_file) << std::string(64, '7');
+  LinkConfig config;
+  config.key_file = key_file;
+  config.port = Loopback().port();
+  SilentBus bus;
+  LinkNode vehicle(bus, config);
+  const Loopback ground, thief;
+  Packer packer(7);
+  const bus::Seal seal = bus::LoadSeal(key_file);
+  std::vector<Bytes> sent;
+  const auto speak = [&](const Loopback& from) {
+    for (Bytes& packet : packer.Take(true)) {
+      seal.Close("ground", &packet);
+      from.Send(packet, config.port);
+      sent.push_back(packet);
+    }
+  };
+  const auto tick = [&] {
+    bus.now += 1'000'000;  // it is idle and says so
+    vehicle.Tick(bus.now);
+    return std::pair(ground.Take(), thief.Take());
+  };
+  speak(ground);
+  EXPECT_EQ(tick(), std::pair(1, 0));
+  for (int i = 0; i < 5; ++i) {
+    thief.Send(sent[0], config.port);
+    EXPECT_EQ(tick(), std::pair(1, 0)) << "recorded";
+  }
+  EXPECT_NE(vehicle.Report().detail.find("is silent for 5 s"), std::string::npos)
+      << vehicle.Report().detail;
+  speak(thief);  // the ground station behind another address: it has the key
+  EXPECT_EQ(tick(), std::pair(0, 1));
+  std::remove(key_file.c_str());
 }
 
 TEST(LinkConfig, RefusalsNameTheField) {

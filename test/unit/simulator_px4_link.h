@@ -52,6 +52,7 @@ class Link {
           if (const auto m = mavlink::As<mav::Heartbeat>(f))
             status_ = static_cast<mav::MavState>(m->system_status);
           if (const auto m = mavlink::As<mav::RcChannels>(f)) channels_ = m->chancount;
+          if (const auto m = mavlink::As<mav::BatteryStatus>(f)) battery_ = *m;
           if (const auto m = mavlink::As<mav::CommandAck>(f))
             result_ = static_cast<mav::MavResult>(m->result);
         });
@@ -92,6 +93,8 @@ class Link {
   }
   /// The channels of a receiver that it told last.
   int channels() const { return channels_; }
+  /// BATTERY_STATUS that it told last.
+  const mav::BatteryStatus& battery() const { return battery_; }
 
   Px4& px4() { return px4_; }
   int64_t now() const { return now_; }
@@ -119,6 +122,7 @@ class Link {
   Px4 px4_;
   int64_t now_ = kStart;
   int channels_ = -1;
+  mav::BatteryStatus battery_;
   mav::MavState status_{};
   std::optional<mav::MavResult> result_;
 };

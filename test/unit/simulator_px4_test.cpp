@@ -27,6 +27,8 @@ TEST(Px4, StreamsAtTheIntervalThatIsAskedFor) {
   const auto unusual = static_cast<float>(mav::BatteryStatus::kId);  // its default rate is none
   EXPECT_EQ(link.Ask(unusual, 100'000.0f), mav::MavResult::ACCEPTED);
   EXPECT_NEAR(link.Second()[mav::BatteryStatus::kId], 10, 1);
+  EXPECT_EQ(link.battery().voltages[0], 16'240) << "mV, the pack at 80 %: it knows no cells";
+  EXPECT_EQ(link.battery().voltages[1], UINT16_MAX) << "no cell";
   EXPECT_EQ(link.Ask(unusual, 0.0f), mav::MavResult::ACCEPTED);
   EXPECT_EQ(link.Second()[mav::BatteryStatus::kId], 0);
 }
@@ -72,6 +74,8 @@ TEST(Px4, DeniesModesThatItDoesNotKnow) {
     EXPECT_EQ(mode(bad, 0.0f), mav::MavResult::DENIED) << bad;
   for (const float bad : {kNaN, 1e9f, -3.0f, 259.0f, 99.0f})
     EXPECT_EQ(mode(4.0f, bad), mav::MavResult::DENIED) << bad;
+  for (const float base : {kNaN, kInfinity, 0.0f, 128.0f})  // no mode of PX4's own
+    EXPECT_EQ(link.Command(mav::MavCmd::DO_SET_MODE, base, 4.0f, 6.0f), mav::MavResult::DENIED);
   EXPECT_TRUE(link.px4().mode() == mavlink::kPositionMode);
   EXPECT_EQ(mode(4.0f, 6.0f), mav::MavResult::ACCEPTED);
   EXPECT_TRUE(link.px4().mode() == mavlink::kLandMode);
