@@ -75,7 +75,7 @@ set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_PACKAGE_DEPENDS
   "python3, iproute2, procps, gnuplot-nox | gnuplot, init-system-helpers (>= 1.54), systemd | systemd-standalone-sysusers | systemd-sysusers")
 set(CPACK_DEBIAN_PACKAGE_RECOMMENDS liblcm-bin)
-set(CPACK_DEBIAN_PACKAGE_SUGGESTS "default-jre, liblcm-java, libjchart2d-java")
+set(CPACK_DEBIAN_PACKAGE_SUGGESTS "default-jre, liblcm-java, libjchart2d-java, gstreamer1.0-plugins-base, gstreamer1.0-plugins-good")
 set(CPACK_COMPONENT_VEHICLE_DESCRIPTION "drone that flies behind a moving target
 Finds a target and the obstacles with a LiDAR, a camera and an IMU, predicts
 where the target goes, and flies a multicopter with a PX4 autopilot behind it

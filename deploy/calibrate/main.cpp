@@ -52,7 +52,7 @@ void PrintView(const world::Rig& rig) {
   const world::ViewAngles view = world::ViewOf(rig);
   fmt::print(
       "for planning's --config:\n"
-      "planner: {{view_down_deg: {:.1f}, view_up_deg: {:.1f}, max_bearing_deg: {:.1f}}}\n",
+      "planner:\n  view_down_deg: {:.1f}\n  view_up_deg: {:.1f}\n  max_bearing_deg: {:.1f}\n",
       view.down, view.up, view.bearing);
 }
 

@@ -1,10 +1,11 @@
 """What the drivers of an installed vehicle are told to open: ports that nobody else may hold, devices
-that have to be plugged in and theirs to read. A check answers (verdict, how things stand)."""
+that have to be plugged in, and keys, theirs to read. A check answers (verdict, how things stand)."""
 
 import errno
 import grp
 import os
 import pathlib
+import pwd
 import re
 import socket
 import stat
@@ -13,6 +14,7 @@ import vehicle
 
 OK, WARNING, FAILURE = "ok", "warning", "FAILURE"
 GROUPS = ("video", "dialout")  # of the units, beside their user's own
+FOLDER = pathlib.Path("/var/lib/chase")  # in which they run
 
 
 def parameters(name):
@@ -54,12 +56,48 @@ def device(path):
     return OK, f"{path} is there"
 
 
+def key(path):
+    """A file of the configuration's that the units, which run as chase, have to read."""
+    path = FOLDER / path
+    try:
+        user = pwd.getpwnam("chase")
+        groups = {user.pw_gid, *(grp.getgrnam(name).gr_gid for name in GROUPS)}
+
+        def may(file, bit):
+            status = os.stat(file)
+            shift = 6 if status.st_uid == user.pw_uid else 3 if status.st_gid in groups else 0
+            return status.st_mode >> shift & bit
+
+        if may(path, stat.S_IROTH) and all(may(folder, stat.S_IXOTH) for folder in path.parents):
+            return OK, f"{path} is there"
+    except KeyError as error:
+        return FAILURE, f"{path}: {error.args[0]}; see user"
+    except PermissionError:
+        return WARNING, f"{path}: not looked at, its folder is private; cure: as root"
+    except OSError as error:
+        return FAILURE, f"{path}: {error.strerror}; cure: put the key there"
+    return FAILURE, f"{path}: the user chase cannot read it; cure: chown chase {path}, in a folder that all may enter"
+
+
+def worst(*answers):
+    bad = [answer for verdict in (FAILURE, WARNING) for answer in answers if answer[0] == verdict]
+    return bad[0] if bad else (OK, ", ".join(words for _, words in answers))
+
+
+def with_key(answer, path):
+    return worst(answer, key(path)) if path else answer
+
+
 def lidar(told):
-    return port(told["port"], "UDP", "lidar") if told["source"] == "udp" else (OK, f"plays {told['source']}")
+    if told["source"] != "udp":
+        return OK, f"plays {told['source']}"
+    ports = [told["port"], *([told["position_port"]] if told["clock"] == "gps" else [])]
+    return worst(*(port(number, "UDP", "lidar") for number in ports))
 
 
 def fcu(told):
-    return port(told["port"], "UDP", "fcu") if told["link"] == "udp" else device(told["link"])
+    wire = port(told["port"], "UDP", "fcu") if told["link"] == "udp" else device(told["link"])
+    return with_key(wire, told["signing_key_file"])
 
 
 def camera(told):
@@ -75,7 +113,7 @@ def viewer(told):
 
 
 def link(told):
-    return port(told["port"], "UDP", "link")
+    return with_key(port(told["port"], "UDP", "link"), told["key_file"])
 
 
 def checked(check):

@@ -304,8 +304,8 @@ void AddIdentify(CLI::App* app, Arguments* a) {
   sub->add_option("--config", a->config,
                   "control's file today: an axis whose drag the flight does not show is kept");
   sub->add_option("--update", a->folder,
-                  "folder of control.yaml and fcu.yaml, such as /etc/chase: sets there what the "
-                  "flight shows, all else stays");
+                  "folder of control.yaml, planning.yaml and fcu.yaml, such as /etc/chase: sets "
+                  "there what the flight shows, all else stays");
   sub->callback([a] { RunIdentify(*a); });
 }
 

@@ -60,6 +60,11 @@ std::string UpdateFiles(const Identification& i, const std::string& flown_by,
   const auto of_control = SetInControl(i, true, &follows);
   control.Set(follows, of_control);
 
+  Parameters<planning::PlanningConfig> planning(fs::path(folder) / "planning.yaml");
+  planning::PlanningConfig leans = planning.now();
+  const auto of_planning = SetInPlanning(i, &leans);
+  planning.Set(leans, of_planning);
+
   Parameters<fcu::FcuConfig> bridge(fs::path(folder) / "fcu.yaml");
   fcu::FcuConfig curve = bridge.now();
   const auto of_fcu = SetInFcu(i, &curve);
@@ -72,7 +77,7 @@ std::string UpdateFiles(const Identification& i, const std::string& flown_by,
           bridge.file(), now, flown_by));
     bridge.Set(curve, of_fcu);
   }
-  const std::string said = control.Write() + bridge.Write();
+  const std::string said = control.Write() + planning.Write() + bridge.Write();
   if (said.empty())
     throw std::runtime_error("the flight shows nothing that control or fcu has; " + folder +
                              " stays as it was");

@@ -127,6 +127,14 @@ std::vector<Change> SetInControl(const Identification& i, bool keeps,
   return changes;
 }
 
+std::vector<Change> SetInPlanning(const Identification& i, planning::PlanningConfig* config) {
+  const Parameter horizontal = LevelDrag(i);
+  if (!Shown(horizontal, kDragEnough)) return {};
+  config->planner.drag = Rounded(horizontal.value, 0.0, 5.0);
+  return {{"planner.drag", fmt::format("{}", config->planner.drag),
+           fmt::format("{}: 1/s, {}", kBy, PlusMinus(horizontal))}};
+}
+
 // With f(u) = c u^2 + (1 - c) u (fcu::ThrustShare): at the hover h f(h) gives gravity, and
 // u f'(u) / f(u) = 1 + c u / (1 - c + c u) is the relative change of thrust per relative change of
 // command. The vehicle's share adds its own curvature to 1; the new h and c give both.

@@ -7,6 +7,7 @@
 #include "logs/src/identification.h"
 #include "services/control/control_config.h"
 #include "services/fcu/fcu_config.h"
+#include "services/planning/planning_config.h"
 
 namespace chase::logs {
 
@@ -19,6 +20,11 @@ std::string Format(const Identification& identified);
 /// drag the flight does not show keeps its own; otherwise no drag is set then.
 std::vector<config::Change> SetInControl(const Identification& identified, bool keeps,
                                          control::ControlConfig* config);
+
+/// Sets the drag along the ground, which planning tilts the body by. Nothing where the flight does
+/// not show it.
+std::vector<config::Change> SetInPlanning(const Identification& identified,
+                                          planning::PlanningConfig* config);
 
 /// Sets the thrust curve of `config`, by which the flight was flown, so that chase-fcu's command
 /// gives the thrust that is asked for, and the slope at the hover. Nothing where the flight does

@@ -9,6 +9,12 @@ bool LandingWatch::Lands(const status_t& message) {
   return message.detail.rfind("landing", 0) == 0;
 }
 
+void LandingWatch::Hear(const flight_state_t& message) {
+  state_ = message.state;
+  if (state_ != flight_state_t::IDLE && state_ != flight_state_t::READY)
+    flies_ = state_ != flight_state_t::DONE;
+}
+
 void LandingWatch::Hear(const status_t& message) {
   if (message.name == "fcu") autopilot_ = Lands(message);
 }
@@ -22,9 +28,10 @@ void LandingWatch::Mark(const world::GroundSpec& ground, TruthSample* sample) {
   // Motors that are cut in the air end no flight: it falls first.
   lies_ = state_ == flight_state_t::DONE && (lies_ || (height < world::kFlightVolume.low && slow));
   sample->done = lies_;
-  sample->may_stand = ((stands_ || came_down_) && slow) || state_ == flight_state_t::IDLE ||
-                      state_ == flight_state_t::READY || state_ == flight_state_t::TAKEOFF ||
-                      state_ == flight_state_t::LAND || state_ == flight_state_t::DONE;
+  const bool waits = state_ == flight_state_t::IDLE || state_ == flight_state_t::READY;
+  sample->may_stand = ((stands_ || came_down_) && slow) || (waits && !flies_) ||
+                      state_ == flight_state_t::TAKEOFF || state_ == flight_state_t::LAND ||
+                      state_ == flight_state_t::DONE;
 }
 
 }  // namespace chase::logs

@@ -13,9 +13,10 @@
 namespace chase::camera {
 namespace {
 
-constexpr int64_t kPoll = 5'000;          // us
-constexpr int64_t kRateOver = 5'000'000;  // us over which the published rate is measured
-constexpr double kSilent = 0.3;           // s without a frame, or three of its periods
+constexpr int64_t kPoll = 5'000;               // us
+constexpr int64_t kRateOver = 5'000'000;       // us over which the published rate is measured
+constexpr std::size_t kMostBytes = 1'500'000;  // of an image: receive buffers hold 2 MiB
+constexpr double kSilent = 0.3;                // s without a frame, or three of its periods
 
 }  // namespace
 
@@ -106,9 +107,13 @@ void CameraNode::Publish(const Frame& frame, int64_t utime) {
   m.readout = config_.readout;
   if (static_cast<double>(rgb.total() * 3) > 1e6 * config_.raw_limit_mb) {
     m.pixelformat = bus::kPixelFormatMjpeg;
-    m.data = ToJpeg(rgb, config_.jpeg_quality);
+    m.data = ToJpeg(rgb, config_.jpeg_quality, kMostBytes);
   } else {
     m.data.assign(rgb.datastart, rgb.dataend);
+  }
+  if (m.data.empty()) {
+    ++unusable_;
+    return;
   }
   m.size = static_cast<int32_t>(m.data.size());
   bus_.Publish("CAMERA_IMAGE", std::move(m));

@@ -30,7 +30,7 @@ class FrameSource {
  public:
   virtual ~FrameSource() = default;
   /// The next frame, or nothing when there is none: for good (a recording) or for now, after a
-  /// second at most.
+  /// second at most; OpenCV 4.6 has no time-out for GStreamer, which may keep the caller for good.
   virtual std::optional<Frame> Next() = 0;
   /// True when it has an end; a device has none.
   virtual bool IsRecording() const = 0;

@@ -53,12 +53,15 @@ cv::Mat ToRgb(const cv::Mat& frame, int width_px, int height_px) {
   return out;
 }
 
-std::vector<uint8_t> ToJpeg(const cv::Mat& rgb, int quality) {
+std::vector<uint8_t> ToJpeg(const cv::Mat& rgb, int quality, std::size_t most_bytes) {
   cv::Mat bgr;
   cv::cvtColor(rgb, bgr, cv::COLOR_RGB2BGR);
   std::vector<uint8_t> jpeg;
-  cv::imencode(".jpg", bgr, jpeg, {cv::IMWRITE_JPEG_QUALITY, quality});
-  return jpeg;
+  for (; quality > 0; quality /= 2) {
+    cv::imencode(".jpg", bgr, jpeg, {cv::IMWRITE_JPEG_QUALITY, quality});
+    if (jpeg.size() <= most_bytes) return jpeg;
+  }
+  return {};
 }
 
 }  // namespace chase::camera

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <opencv2/core.hpp>
 #include <vector>
@@ -12,7 +13,8 @@ namespace chase::camera {
 /// image.
 cv::Mat ToRgb(const cv::Mat& frame, int width_px, int height_px);
 
-/// An RGB image as a JPEG file, with loss.
-std::vector<uint8_t> ToJpeg(const cv::Mat& rgb, int quality);
+/// An RGB image as a JPEG file of at most so many bytes, with loss: of this quality, or of the
+/// first that fits of its half, its quarter and so on. Empty: none fits.
+std::vector<uint8_t> ToJpeg(const cv::Mat& rgb, int quality, std::size_t most_bytes);
 
 }  // namespace chase::camera

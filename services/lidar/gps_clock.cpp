@@ -6,7 +6,8 @@ namespace chase::lidar {
 namespace {
 
 constexpr std::size_t kPositionBytes = 512, kPulseAt = 202;
-constexpr int64_t kHour = 3'600'000'000, kStale = 5'000'000, kApart = 500'000;  // us
+constexpr int64_t kHour = 3'600'000'000, kStale = 5'000'000;  // us
+constexpr int64_t kApart = 20'000;  // us: what IMU and camera, which the host stamps, may be off
 
 }  // namespace
 
@@ -39,7 +40,7 @@ std::string GpsClock::Problem(int64_t utc) const {
     case Pulse::kLocked:
       break;
   }
-  return "GPS time and this host's differ by more than 0.5 s: set the host's clock (chrony)";
+  return "GPS time and this host's differ by more than 20 ms: set the host's clock (chrony)";
 }
 
 }  // namespace chase::lidar

@@ -16,7 +16,7 @@ class GpsClock {
   void Hear(const uint8_t* data, std::size_t size, int64_t utc);
 
   /// UTC, microseconds since 1970, of a stamp that arrived about `utc`; none while the pulse is not
-  /// locked, its word is older than 5 s, or the two are half a second apart.
+  /// locked, its word is older than 5 s, or the two are 20 ms apart.
   std::optional<int64_t> Utc(int64_t device_us, int64_t utc) const;
 
   /// Why there is no time of it, in words.

@@ -108,14 +108,22 @@ void LidarNode::Publish(const Sweep& sweep) {
 
 void LidarNode::StopIfRefused() {
   if (assembler_.model().verdict() != ModelCheck::Verdict::kOther) return;
-  bus_.ReportError(assembler_.model().reason());
+  bus_.ReportError(Refusal());
   if (source_->IsRecording()) done_ = true;
+}
+
+/// The verdict is for good: a sensor that is exchanged is not looked at.
+std::string LidarNode::Refusal() const {
+  const std::string& reason = assembler_.model().reason();
+  if (source_->IsRecording()) return reason;
+  return reason +
+         "; connect a VLP-16, then start this process anew (systemctl restart chase-lidar)";
 }
 
 bus::NodeReport LidarNode::Report() const {
   using State = bus::NodeReport::State;
   if (assembler_.model().verdict() == ModelCheck::Verdict::kOther)
-    return {State::kFailed, assembler_.model().reason()};
+    return {State::kFailed, Refusal()};
   const bool device = !source_->IsRecording();
   if (device && Silence() > (heard_ != 0 ? kSilent : kPatience))
     return {State::kFailed,

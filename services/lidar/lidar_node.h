@@ -32,6 +32,7 @@ class LidarNode : public bus::Node {
   void Take(const RawPacket& packet);
   void Publish(const Sweep& sweep);
   void StopIfRefused();
+  std::string Refusal() const;
 
   bus::Bus& bus_;
   int port_;

@@ -697,6 +697,7 @@ class Devices(unittest.TestCase):
     """The doctor on what the drivers are told to open."""
 
     def told(self, name, **values):
+        values = {"clock": "arrival", "signing_key_file": "", "key_file": "", **values}
         with unittest.mock.patch.object(devices, "parameters", lambda _: values):
             return dict(devices.CHECKS)[name]()
 
@@ -727,6 +728,39 @@ class Devices(unittest.TestCase):
             self.assertRegex(words, "the units have video and dialout; cure: ")
         self.assertEqual(self.told("camera", source="http://camera/stream")[0], "ok")
         self.assertEqual(self.told("camera", source="no_such.mp4")[0], devices.WARNING)
+
+    def test_the_position_packets_port_counts_with_the_clock_gps(self):
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other, unittest.mock.patch.object(devices.vehicle, "runs", lambda _: False):
+            other.bind(("", 0))
+            told = {"source": "udp", "port": str(free_port()), "position_port": str(other.getsockname()[1])}
+            self.assertEqual(self.told("lidar", **told)[0], "ok")
+            verdict, words = self.told("lidar", **told, clock="gps")
+            self.assertEqual(verdict, "FAILURE")
+            self.assertIn(f"port {told['position_port']} is held by another program", words)
+
+    def test_a_key_that_the_units_cannot_read(self):
+        user = unittest.mock.Mock(pw_uid=os.getuid(), pw_gid=os.getgid())
+        other = unittest.mock.Mock(pw_uid=os.getuid() + 1, pw_gid=os.getgid() + 1)
+        with tempfile.TemporaryDirectory() as folder:
+            file = pathlib.Path(folder) / "key"
+            for name, key, port in (("fcu", "signing_key_file", {"link": "udp"}), ("link", "key_file", {})):
+                told = {**port, "port": str(free_port()), key: str(file)}
+                file.unlink(missing_ok=True)
+                with unittest.mock.patch.object(devices.pwd, "getpwnam", lambda _: user):
+                    self.assertEqual(self.told(name, **told)[0], "FAILURE", "not there")
+                    file.write_text("0" * 64, encoding="ascii")
+                    file.chmod(0o600)
+                    self.assertEqual(self.told(name, **told), ("ok", f"UDP port {told['port']} is free, {file} is there"))
+                    file.chmod(0o200)
+                    self.assertRegex(self.told(name, **told)[1], "the user chase cannot read it; cure: ")
+                with unittest.mock.patch.object(devices.pwd, "getpwnam", lambda _: other):
+                    file.chmod(0o604)
+                    self.assertEqual(self.told(name, **told)[0], "FAILURE", "its folder is private")
+                    pathlib.Path(folder).chmod(0o711)
+                    self.assertEqual(self.told(name, **told)[0], "ok")
+                    file.chmod(0o600)
+                    self.assertEqual(self.told(name, **told)[0], "FAILURE")
+                    pathlib.Path(folder).chmod(0o700)
 
     def test_parameters_are_the_files(self):
         answer = unittest.mock.Mock(stdout='link: "/dev/ttyAMA0"  # udp, or\nport: 14540  # UDP\nrig:  # a\n  x: 1  # m\n')

@@ -220,8 +220,9 @@ TEST(CalibrateProgram, FromALogOfTurnsToTheCamerasRotation) {
   ASSERT_NE(at, std::string::npos) << text;
   EXPECT_NEAR(std::stod(text.substr(at + before.size())), 40.0, 3.0) << text;
   const world::ViewAngles view = world::ViewOf(found.rig);
-  EXPECT_NE(text.find(fmt::format("planner: {{view_down_deg: {:.1f}, view_up_deg: {:.1f}, "
-                                  "max_bearing_deg: {:.1f}}}\n",
+  // A line each, as chase-log identify --update wants planning.yaml.
+  EXPECT_NE(text.find(fmt::format("planner:\n  view_down_deg: {:.1f}\n  view_up_deg: {:.1f}\n"
+                                  "  max_bearing_deg: {:.1f}\n",
                                   view.down, view.up, view.bearing)),
             std::string::npos)
       << text;

@@ -9,6 +9,7 @@
 #include "common/bus/image_format.h"
 #include "common/bus/lockstep.h"
 #include "common/bus/validation.h"
+#include "services/camera/image.h"
 
 namespace chase::camera {
 namespace {
@@ -84,6 +85,37 @@ TEST(CameraNode, ALargeImageTravelsAsJpegAndIsGood) {
     EXPECT_EQ(decoded.rows, m.height);
     EXPECT_NEAR(decoded.at<cv::Vec3b>(100, 100)[0], 200, 3);
   }
+}
+
+/// Noise is what JPEG is worst at.
+TEST(CameraNode, AJpegThatIsTooLargeForTheBusIsOfLessQuality) {
+  const fs::path folder = fs::path(::testing::TempDir()) / "camera_noise";
+  fs::remove_all(folder);
+  fs::create_directories(folder);
+  cv::Mat noise(1500, 2000, CV_8UC3);
+  cv::theRNG().state = 1;
+  cv::randu(noise, 0, 256);
+  cv::imwrite((folder / "f.png").string(), noise);
+  ASSERT_GT(ToJpeg(noise, CameraConfig().jpeg_quality, 1'000'000'000).size(), 2'097'152u);
+  EXPECT_TRUE(ToJpeg(noise, 90, 10'000).empty());
+  CameraConfig config;
+  config.source = folder.string();
+  config.width_px = config.height_px = 0;
+  int images = 0;
+  bus::Lockstep lockstep(1'000'000);
+  lockstep.Add("camera", 0,
+               [&](bus::Bus& bus) { return std::make_unique<CameraNode>(bus, config); });
+  lockstep.SetTap([&](int64_t, const std::string& channel, const bus::Bus::Bytes& bytes) {
+    camera_image_t image;
+    if (channel != "CAMERA_IMAGE" ||
+        image.decode(bytes.data(), 0, static_cast<int>(bytes.size())) <= 0)
+      return;
+    ++images;
+    EXPECT_LE(image.size, 1'500'000);
+    EXPECT_EQ(cv::imdecode(image.data, cv::IMREAD_COLOR).size(), noise.size());
+  });
+  lockstep.RunUntil(1'200'000);
+  EXPECT_EQ(images, 1);
 }
 
 }  // namespace

@@ -85,6 +85,7 @@ TEST(LidarNode, AnotherSensorIsReportedAndPublishesNothing) {
   EXPECT_TRUE(flown.done);
   EXPECT_EQ(flown.report.state, bus::NodeReport::State::kFailed);
   EXPECT_NE(flown.report.detail.find("Hi-Res"), std::string::npos);
+  EXPECT_EQ(flown.report.detail.find("anew"), std::string::npos) << "a recording has no sensor";
 }
 
 /// A sensor on UDP. The node's clock is the lockstep's.
@@ -109,11 +110,16 @@ class Live {
   }
   void Run(int64_t us) { lockstep_.RunUntil(now_ += us); }
   /// 10 ms of packets.
-  void Sweep() {
-    for (int i = 0; i < 8; ++i) Send(testing::StreamPacket(packets_++, 150.0, 777000));
+  void Sweep(uint8_t product = 0x22) {
+    for (int i = 0; i < 8; ++i) {
+      auto bytes = testing::StreamPacket(packets_++, 150.0, 777000);
+      bytes[1205] = product;
+      Send(bytes);
+    }
     Run(10'000);
   }
-  bus::NodeReport::State state() const { return node_->Report().state; }
+  bus::NodeReport report() const { return node_->Report(); }
+  bus::NodeReport::State state() const { return report().state; }
 
  private:
   int socket_;
@@ -132,6 +138,17 @@ TEST(LidarNode, ASensorThatNeverSpokeHasFailedAfterTwoSeconds) {
   EXPECT_EQ(live.state(), bus::NodeReport::State::kFailed);
   for (int i = 0; i < 40; ++i) live.Sweep();
   EXPECT_EQ(live.state(), bus::NodeReport::State::kOk) << "late";
+}
+
+TEST(LidarNode, AfterAnotherSensorTheRightOneNeedsANewStart) {
+  Live live;
+  live.Sweep(0x24);
+  for (int i = 0; i < 40; ++i) live.Sweep();
+  EXPECT_EQ(live.state(), bus::NodeReport::State::kFailed);
+  EXPECT_NE(live.report().detail.find("Hi-Res"), std::string::npos);
+  EXPECT_NE(live.report().detail.find("connect a VLP-16, then start this process anew"),
+            std::string::npos)
+      << live.report().detail;
 }
 
 TEST(LidarNode, BytesThatAreNoPacketKeepNoSensorAlive) {

@@ -58,6 +58,8 @@ TEST(IdentifiedFiles, TheServicesReadWhatTheFlightShowsAndAllElseStays) {
   const std::string folder = Temp("update");
   fs::create_directory(folder);
   const std::string control = folder + "/control.yaml", fcu = folder + "/fcu.yaml";
+  const std::string planning = folder + "/planning.yaml";
+  std::ofstream(planning) << "planner:\n  drag: 0.2  # as control's\n  max_speed: 3\n";
   std::ofstream(control) << "# Of ours.\ndrag: [0.2, 0.2, 0.3]  # the x500's\n#lead: 0\n";
   std::ofstream(fcu) << "link: /dev/ttyAMA0  # TELEM 2\n#hover_thrust: 0.5  # MPC_THR_HOVER\n";
   fcu::FcuConfig flown;
@@ -67,6 +69,7 @@ TEST(IdentifiedFiles, TheServicesReadWhatTheFlightShowsAndAllElseStays) {
   EXPECT_NE(ErrorOf([&] { UpdateFiles(found, "1", folder); }).find("put back the file that flew"),
             std::string::npos);
   EXPECT_EQ(ReadText(control).find("by chase-log"), std::string::npos) << "nothing is written then";
+  EXPECT_NE(ReadText(planning).find("  drag: 0.2  #"), std::string::npos);
 
   const std::string said = UpdateFiles(found, sum, folder);
   EXPECT_NE(said.find("fcu.yaml: hover_thrust: 0.5"), std::string::npos) << said;
@@ -74,6 +77,12 @@ TEST(IdentifiedFiles, TheServicesReadWhatTheFlightShowsAndAllElseStays) {
   config::Load(control, &follows);
   EXPECT_NEAR(follows.drag.x(), 0.6, 0.02);
   EXPECT_NEAR(follows.drag.z(), 0.6, 0.05);
+  planning::PlanningConfig leans;
+  config::Load(planning, &leans);
+  EXPECT_EQ(leans.planner.drag, follows.drag.x());
+  EXPECT_EQ(leans.planner.max_speed, 3.0);
+  EXPECT_NE(ReadText(planning).find("  # as control's\n  max_speed: 3\n"), std::string::npos);
+  EXPECT_NE(said.find("planning.yaml: planner.drag: 0."), std::string::npos) << said;
   EXPECT_EQ(ReadText(control).rfind("# Of ours.\ndrag: [", 0), 0u) << ReadText(control);
   EXPECT_NE(ReadText(control).find("]  # the x500's\n#lead: 0\nlead: "), std::string::npos);
   fcu::FcuConfig curve;
@@ -85,6 +94,65 @@ TEST(IdentifiedFiles, TheServicesReadWhatTheFlightShowsAndAllElseStays) {
       << ReadText(fcu);
   EXPECT_NE(ErrorOf([&] { UpdateFiles(found, sum, folder); }).find("has cksum"), std::string::npos)
       << "its thrust would be counted twice";
+}
+
+TEST(IdentifiedFiles, PlanningLeansAgainstTheDragThatControlFeedsForward) {
+  Body body;
+  body.drag = 0.6;
+  const Identification found = Flown(body);
+  const std::string folder = Temp("planning");
+  fs::create_directory(folder);
+  const std::string file = folder + "/planning.yaml";
+  const auto updated = [&](const std::string& text) {
+    std::ofstream(file) << text;
+    UpdateFiles(found, "", folder);
+    planning::PlanningConfig plans;
+    control::ControlConfig follows;
+    config::Load(file, &plans);
+    config::Load(folder + "/control.yaml", &follows);
+    EXPECT_EQ(plans.planner.drag, follows.drag.x()) << text;
+    EXPECT_NEAR(plans.planner.drag, 0.6, 0.02) << text;
+    return ReadText(file);
+  };
+  // What stands before the drag's line, its old one if any, and what stands behind.
+  struct Case {
+    std::string head, old, tail;
+  };
+  const Case cases[] = {
+      {"", "", ""},
+      {"horizon: 3\nplanner:\n", "", ""},
+      {"planner:\n", "", "  max_speed: 2  # m/s\n\n# Landing\nlanding_room: 0.5\n"},
+      {"planner:\n    max_speed: 2\n", "    drag: 0.3\n", "    z_max: 2\nhorizon: 3\n"},
+      {"horizon: 3\nplanner:  # of Problem 2\n  sigmas: 2\n#  drag: 0.25  # 1/s\n", "",
+       "  max_speed: 2\n"},
+  };
+  for (const auto& [head, old, tail] : cases) {
+    const std::string text = updated(head + old + tail);
+    const std::string before = head.empty() ? "planner:\n" : head;
+    EXPECT_EQ(text.rfind(before, 0), 0u) << text;
+    const std::string line =
+        text.substr(before.size(), text.find('\n', before.size()) + 1 - before.size());
+    EXPECT_NE(line.find(" drag: 0."), std::string::npos) << text;
+    EXPECT_NE(line.find("  # by chase-log identify: 1/s, +- "), std::string::npos) << text;
+    EXPECT_EQ(text.substr(before.size() + line.size()), tail);
+    EXPECT_EQ(updated(text), text) << "its own line is written anew";
+  }
+
+  // As it is installed, all commented out.
+  std::string installed, line;
+  std::istringstream lines(config::Dump(planning::PlanningConfig()));
+  while (std::getline(lines, line)) installed += "#" + line + "\n";
+  const std::string text = updated(installed);
+  EXPECT_NE(text.find("#planner:  # of Problem 2\nplanner:\n#  degree: "), std::string::npos)
+      << text;
+  EXPECT_NE(text.find("\n#  drag: 0.25  # "), std::string::npos);
+  EXPECT_NE(text.find("1/s\n  drag: 0."), std::string::npos) << text;
+
+  for (const std::string refused : {"planner: {max_speed: 2}\n", "planner:\n  'drag': 0.3\n"}) {
+    std::ofstream(file) << refused;
+    EXPECT_NE(ErrorOf([&] { UpdateFiles(found, "", folder); }), "") << refused;
+    EXPECT_EQ(ReadText(file), refused);
+  }
 }
 
 TEST(IdentifiedFiles, AFlightThatDoesNotShowTheThrustLeavesTheBridgesFile) {
