@@ -27,7 +27,8 @@ world::CommandAnswer Mission::Try(double t, const Command& command) {
   Step(t, command.kind);
   if (state_ == State::kReturn && !KnowsHome()) Step(t, Event::kHomeLost);
   uncommanded_ = false;
-  overruled_ = command.kind == Event::kStop ? Breached() : std::vector<Event>();
+  overruled_.clear();
+  if (command.kind == Event::kStop) Overrule();
   return {true, std::string(Name(state_)) + ": " + reason_};
 }
 
@@ -76,6 +77,7 @@ void Mission::TakeOff(double t) {
   taken_off_ = t;
   flown_.reset();
   refusal_.clear();
+  inputs_.way.clear();  // of another flight, with its fence about another place
   if (inputs_.pose) home_ = Home{inputs_.pose->p, inputs_.pose->epoch};
 }
 
@@ -88,10 +90,7 @@ void Mission::Update(double t) {
   missing_ = Missing(config_, inputs_, t);
   if (!flown_ && IsAirborne(state_) && Flies()) flown_ = t;
   NoteProgress(t);
-  const std::vector<Event> breached = Breached();
-  overruled_.erase(std::remove_if(overruled_.begin(), overruled_.end(),
-                                  [&](Event e) { return !Has(breached, e); }),
-                   overruled_.end());
+  DropOverruled();
   for (const Event event : Observed(t)) {
     const bool stepped = Step(t, event, Detail(event));
     if (stepped && (event == Event::kLeaving || event == Event::kNotFlown))
@@ -102,16 +101,25 @@ void Mission::Update(double t) {
   HearOfGround();
 }
 
-void Mission::Remember(double t, const Home& home, State state) {
+void Mission::Remember(double t, const Home& home, const Led& led) {
   if (home_ || !IsAirborne(state_)) return;
   home_ = home;
   if (!uncommanded_) return;
   const char* const when = "before this process started";
-  ComeDown(t, state, when);
-  if (state == State::kChase) Step(t, Event::kChase, when);
-  if (state == State::kSearch) Step(t, Event::kSearch, when);
-  if (state != State::kHold) return;
-  Step(t, Event::kHold, when);
+  // It may have come to land for want of the take-off place alone: what else it lands for, stands.
+  if (state_ == State::kLand && !inputs_.landing) Step(t, Event::kHold, when);
+  ComeDown(t, led.state, when);
+  if (led.state == State::kChase) Step(t, Event::kChase, when);
+  if (led.state == State::kSearch) Step(t, Event::kSearch, when);
+  if (led.state == State::kHold) HoldOn(t, led.reason, when);
+  if (state_ == led.state) since_ = std::min(t, led.since);
+}
+
+/// A stop goes on as one: it overrules the limits that it is found beyond.
+void Mission::HoldOn(double t, const std::string& reason, const char* when) {
+  const bool stopped = reason.rfind(Find(State::kHold, Event::kStop)->reason, 0) == 0;
+  Step(t, stopped ? Event::kStop : Event::kHold, when);
+  if (stopped) Overrule();
   uncommanded_ = false;  // whoever told it to hold leads
 }
 
@@ -168,6 +176,22 @@ std::vector<Event> Mission::Breached() const {
   if (IsLow()) breached.push_back(Event::kBatteryLow);
   if (IsCritical()) breached.push_back(Event::kBatteryCritical);
   return breached;
+}
+
+/// The limits that it is beyond, and those of which a process that has just started cannot tell.
+void Mission::Overrule() {
+  overruled_ = {Event::kOutside, Event::kBatteryLow, Event::kBatteryCritical};
+  DropOverruled();
+}
+
+/// What it is known not to be beyond counts once more.
+void Mission::DropOverruled() {
+  const std::vector<Event> breached = Breached();
+  const auto ends = [&](Event e) {
+    const bool known = e == Event::kOutside ? KnowsHome() : inputs_.battery.has_value();
+    return known && !Has(breached, e);
+  };
+  overruled_.erase(std::remove_if(overruled_.begin(), overruled_.end(), ends), overruled_.end());
 }
 
 std::string Mission::Detail(Event event) const {

@@ -20,6 +20,13 @@ struct Home {
   int32_t epoch = 0;                            ///< of that frame W
 };
 
+/// How a mission process before this one led the flight when it was heard last.
+struct Led {
+  State state = State::kHold;
+  double since = 0.0;  ///< when that state began, s
+  std::string reason;  ///< what led to it
+};
+
 /// One command of one sender.
 struct Command : world::CommandKey {
   Event kind = Event::kStop;
@@ -39,9 +46,9 @@ class Mission {
   /// answer and changes nothing.
   world::CommandAnswer Obey(double t, const Command& command);
 
-  /// Who outlived the mission process before this one says where that took off and where it was:
+  /// Who outlived the mission process before this one says where that took off and how it led:
   /// unless somebody has commanded since, it goes on so.
-  void Remember(double t, const Home& home, State state);
+  void Remember(double t, const Home& home, const Led& led);
 
   /// Moves on by what is observed at time `t` [s], which never goes back.
   void Update(double t);
@@ -61,6 +68,8 @@ class Mission {
   world::CommandAnswer Try(double t, const Command& command);
   std::string Refused(Event command) const;
   std::vector<Event> Breached() const;
+  void Overrule();
+  void DropOverruled();
   void TakeOff(double t);
   std::vector<Event> Observed(double t) const;
   bool PoseIsLost(double t) const;
@@ -80,6 +89,7 @@ class Mission {
   void LeadItself(double t);
   void HearOfGround();
   void ComeDown(double t, State before, const char* when);
+  void HoldOn(double t, const std::string& reason, const char* when);
   void NoteProgress(double t);
 
   MissionConfig config_;
@@ -90,7 +100,7 @@ class Mission {
   std::string reason_ = "switched on";
   std::string ground_;            // what planning said of it before control came down
   std::string refusal_;           // what the autopilot said of a take-off that was called off
-  std::vector<Event> overruled_;  // breaches in which `stop` was commanded
+  std::vector<Event> overruled_;  // breaches that `stop` overrules
   double since_ = 0.0;
   std::optional<double> taken_off_;  // when that was commanded, s
   std::optional<double> flown_;      // since when control has flown, s

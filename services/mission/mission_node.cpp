@@ -39,7 +39,8 @@ MissionNode::MissionNode(bus::Bus& bus, const MissionConfig& config)
   });
   bus_.Subscribe<flight_state_t>("HOME", [this](const flight_state_t& m) {
     if (!led_before_ && m.since < origin_) led_before_ = m.since;
-    mission_.Remember(Now(), {bus::ToVector(m.home), m.epoch}, static_cast<State>(m.state));
+    mission_.Remember(Now(), {bus::ToVector(m.home), m.epoch},
+                      {static_cast<State>(m.state), Seconds(m.since), m.reason});
   });
   bus_.Subscribe<selection_t>("SELECTION", [this](const selection_t& m) { selection_ = m; });
   SubscribeStatuses();

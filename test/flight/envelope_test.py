@@ -117,15 +117,21 @@ class Envelope(unittest.TestCase):
         self.assertLess(farthest, reach)
         self.assertGreater(farthest, 0.6 * reach, "it did not even go near")
 
-    def test_return_and_landing_go_on_when_mission_dies(self):
+    def test_return_and_landing_go_on_when_a_process_dies(self):
         for command, dies in (("return", 9.5), ("land", 8.2)):
-            states, metrics, _ = self.fly([("takeoff", -7), ("chase", -2), (command, 8)], 30,
-                                          faults=[{"name": "kill-mission", "at": dies}])
-            self.assert_in_order(states, "CHASE", command.upper(), "IDLE", command.upper(), "DONE")
-            # A descent is not even held up.
-            self.assertEqual("HOLD" in states[states.index(command.upper()):], command == "return", states)
-            self.assertTrue(any("before this process started" in reason for reason in self.reasons), self.reasons)
-            self.assertEqual(metrics["safe_ratio"], 1.0)
+            for name in ("mission", "planning", "control"):
+                with self.subTest(command=command, name=name):
+                    states, metrics, _ = self.fly([("takeoff", -7), ("chase", -2), (command, 8)], 30,
+                                                  faults=[{"name": f"kill-{name}", "at": dies}])
+                    anew = name == "mission"
+                    again = ["IDLE", command.upper()] if anew else []
+                    self.assertEqual(metrics["restarts"], {name: 1})
+                    self.assert_in_order(states, "CHASE", command.upper(), *again, "DONE")
+                    # A descent is not even held up.
+                    self.assertEqual("HOLD" in states[states.index(command.upper()):], anew and command == "return", states)
+                    self.assertEqual(any("before this process started" in reason for reason in self.reasons), anew)
+                    self.assertEqual(metrics["safe_ratio"], 1.0)
+                    self.assertLess(metrics["touchdown_speed_mps"], 0.75)  # as fast as control sinks without a velocity
 
     def test_lands_beside_what_has_come_below(self):
         states, metrics, log = self.fly([("takeoff", -7), ("land", 8)], 22, movers=[

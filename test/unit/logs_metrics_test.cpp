@@ -225,6 +225,27 @@ TEST(Metrics, ATouchOfTheGroundIsALandingByTheFlightsState) {
   EXPECT_FALSE(Marked(at(0.2, 0.1), &watch).may_stand) << "it has been up since";
 }
 
+TEST(Metrics, AMissionThatBeginsAnewInFlightMakesNoLandingOfATouch) {
+  for (const int8_t state : {flight_state_t::IDLE, flight_state_t::READY}) {
+    for (const int8_t before : {flight_state_t::TAKEOFF, flight_state_t::CHASE,
+                                flight_state_t::EMERGENCY, flight_state_t::DONE}) {
+      LandingWatch watch;
+      TruthSample sample{};
+      const auto stands = [&](double height) {
+        sample.p.z() = height;
+        return Marked(sample, &watch).may_stand;
+      };
+      Tell(state, false, false, &watch);
+      stands(1.5);
+      EXPECT_TRUE(stands(0.2)) << "it has not flown";
+      Tell(before, false, false, &watch);
+      stands(1.5);
+      Tell(state, false, false, &watch);
+      EXPECT_EQ(stands(0.2), before == flight_state_t::DONE) << int{before};
+    }
+  }
+}
+
 TEST(Metrics, ASegmentThroughThePillarIsBlind) {
   EXPECT_EQ(*Compute(Standing({-2, 0, 1.5}, {2, 0, 1.5})).visible_ratio, 0.0);
   EXPECT_EQ(*Compute(Standing({-2, 0.29, 1.5}, {2, 0.29, 1.5})).visible_ratio, 1.0);

@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include <algorithm>
+#include <iterator>
 #include <random>
 #include <tuple>
 #include <utility>
@@ -8,6 +8,7 @@
 
 #include "common/world/commands.h"
 #include "services/mission/progress.h"
+#include "test/unit/bad_line.h"
 #include "test/unit/mission_bench.h"
 
 namespace chase::mission {
@@ -120,66 +121,48 @@ TEST(Commands, StopAndKillThatWereGivenBeforeTheProcessStartedAreObeyed) {
   }
 }
 
-/// What is under way on a bus that loses, doubles and delays.
-template <class T>
-class BadLine {
- public:
-  explicit BadLine(std::mt19937* random) : random_(random) {}
-  void Send(double t, const T& message) {
-    std::uniform_real_distribution<double> u(0.0, 1.0);
-    const int copies = u(*random_) < 0.2 ? 0 : u(*random_) < 0.2 ? 2 : 1;
-    for (int i = 0; i < copies; ++i) in_flight_.push_back({t + 0.6 * u(*random_), message});
-  }
-  std::vector<T> Arrived(double t) {
-    const auto late = std::stable_partition(in_flight_.begin(), in_flight_.end(),
-                                            [t](const auto& m) { return m.first > t; });
-    std::vector<T> out;
-    for (auto m = late; m != in_flight_.end(); ++m) out.push_back(m->second);
-    in_flight_.erase(late, in_flight_.end());
-    return out;
-  }
-
- private:
-  std::mt19937* random_;
-  std::vector<std::pair<double, T>> in_flight_;
-};
-
-// 20 % are lost and 20 % come twice, on the way there and back; late copies of earlier commands
-// keep coming while the next ones are given. Every third is one that its state refuses.
+// Late copies of earlier commands keep coming while the next ones are given. Every third is one
+// that its state refuses.
 TEST(Commands, TakeEffectOnceOrAreRefusedOnABadLine) {
+  constexpr std::pair<Event, State> kCycle[] = {
+      {Event::kChase, State::kChase},   {Event::kHold, State::kHold},
+      {Event::kSearch, State::kSearch}, {Event::kReturn, State::kReturn},
+      {Event::kLand, State::kLand},     {Event::kHold, State::kHold}};
   for (unsigned seed = 1; seed <= 20; ++seed) {
     std::mt19937 random(seed);
     Bench bench;
-    bench.Fly();
-    BadLine<Command> there(&random);
-    BadLine<std::pair<int64_t, world::CommandAnswer>> back(&random);
+    bench.Fly({5.0, 0.0, 1.0});
+    test::BadLine<Command> there(&random);
+    test::BadLine<std::pair<int64_t, world::CommandAnswer>> back(&random);
     int given = 0, changes = 0;
-    State before = bench.mission.state();
+    State expected = State::kHold;
     for (int64_t id = 1; id <= 100; ++id) {
       const bool fits = id % 3 != 0;
-      const Event kind = !fits ? Event::kTakeoff : given % 2 == 0 ? Event::kChase : Event::kHold;
-      const Command command{{"command", 5, 10'000 + id, bench.t}, kind};
-      world::CommandClient client(static_cast<int>(kind), bench.t);
+      const auto& [kind, reached] = kCycle[given % std::size(kCycle)];
+      const Command command{{"command", 5, 10'000 + id, bench.t}, fits ? kind : Event::kTakeoff};
+      world::CommandClient client(static_cast<int>(command.kind), bench.t);
       while (!client.answered()) {
         ASSERT_FALSE(client.GaveUp(bench.t)) << "seed " << seed << ", command " << id;
         if (client.Due(bench.t)) there.Send(bench.t, command);
+        bench.tracked = bench.mission.state() == State::kChase;  // a search finds nothing
         bench.Run(kTick);
         for (const Command& c : there.Arrived(bench.t)) {
+          const State before = bench.mission.state();
           back.Send(bench.t, {c.id, bench.mission.Obey(bench.t, c)});
           changes += bench.mission.state() != before;
-          before = bench.mission.state();
         }
         for (const auto& [of, answer] : back.Arrived(bench.t))
           if (of == command.id) client.OnAnswer(answer.accepted, answer.reason);
       }
       ASSERT_EQ(client.accepted(), fits) << client.reason();
+      if (fits) expected = reached;
       if (!fits) {
         ASSERT_EQ(client.reason(),
-                  "takeoff in " + std::string(Name(before)) + ": it is in the air");
+                  std::string("takeoff in ") + Name(expected) + ": " + Refusal(expected));
       }
       given += fits;
       ASSERT_EQ(changes, given) << "seed " << seed << ": each once, none again";
-      ASSERT_EQ(before, given % 2 == 1 ? State::kChase : State::kHold);
+      ASSERT_EQ(bench.mission.state(), expected);
     }
   }
 }

@@ -260,12 +260,13 @@ TEST(Mission, StartedInFlightItHoldsOrGoesOnWithALanding) {
   EXPECT_EQ((flying.Command(Event::kReturn), flying.mission.state()), State::kLand);
 
   Bench told;
-  told.mission.Remember(told.t, {{1.0, 2.0, 0.0}, told.pose.epoch}, State::kChase);
+  const Led chase{State::kChase, told.t, "chase commanded"};
+  told.mission.Remember(told.t, {{1.0, 2.0, 0.0}, told.pose.epoch}, chase);
   told.mission.inputs().flying = true;
   told.Run(0.1);
   EXPECT_FALSE(told.mission.home().has_value()) << "of another flight, for all that is known";
-  told.mission.Remember(told.t, {{1.0, 2.0, 0.0}, told.pose.epoch}, State::kChase);
-  told.mission.Remember(told.t, {{3.0, 4.0, 0.0}, told.pose.epoch}, State::kChase);
+  told.mission.Remember(told.t, {{1.0, 2.0, 0.0}, told.pose.epoch}, chase);
+  told.mission.Remember(told.t, {{3.0, 4.0, 0.0}, told.pose.epoch}, chase);
   EXPECT_EQ(told.mission.home()->p, Eigen::Vector3d(1.0, 2.0, 0.0));
   EXPECT_EQ((told.Command(Event::kReturn), told.mission.state()), State::kReturn);
 
@@ -294,7 +295,8 @@ TEST(Mission, StartedInFlightItGoesOnAsItWasLedUnlessSomebodyHasCommanded) {
           bench.pose.p = {5.0, 0.0, 1.0};
           bench.Run(0.1);
           if (commanded) bench.Command(Event::kStop);
-          bench.mission.Remember(bench.t, {{1.0, 2.0, 0.0}, bench.pose.epoch - frames}, before);
+          bench.mission.Remember(bench.t, {{1.0, 2.0, 0.0}, bench.pose.epoch - frames},
+                                 {before, bench.t, ""});
           bench.Run(0.2);
           const State expected = commanded                                ? State::kHold
                                  : before == State::kReturn && frames > 0 ? State::kLand
@@ -307,6 +309,74 @@ TEST(Mission, StartedInFlightItGoesOnAsItWasLedUnlessSomebodyHasCommanded) {
       }
     }
   }
+}
+
+// Its first FCU_STATUS comes before HOME or up to a second after it; `led` is what HOME tells.
+TEST(Mission, StartedInFlightAStopHoldsAsBeforeWhatTheEnvelopeSays) {
+  MissionConfig config;
+  config.geofence.polygon = {{-9, -9}, {9, -9}, {9, 9}, {-9, 9}};
+  for (const double charge : {1.0, 0.2, 0.05}) {
+    for (const bool outside : {false, true}) {
+      for (const bool status_first : {false, true}) {
+        for (const bool stopped : {false, true}) {
+          Led led{State::kHold, 3.0, stopped ? "stop commanded" : "hold commanded"};
+          for (int restart = 1; restart <= 2; ++restart) {
+            Bench bench(config);
+            Inputs& inputs = bench.mission.inputs();
+            const auto hear = [&] { inputs.battery = charge; };
+            inputs.flying = true;
+            inputs.battery.reset();
+            bench.pose.p = {outside ? 9.5 : 5.0, 0.0, 1.0};
+            if (status_first) hear();
+            bench.Run(0.2);
+            bench.mission.Remember(bench.t, {{0.0, 0.0, 0.0}, bench.pose.epoch}, led);
+            bench.Run(0.5);
+            hear();
+            bench.Run(5.0);
+            const State expected = stopped                   ? State::kHold
+                                   : charge < 0.1            ? State::kLand
+                                   : outside || charge < 0.3 ? State::kReturn
+                                                             : State::kHold;
+            EXPECT_EQ(bench.mission.state(), expected)
+                << charge << (outside ? ", outside" : "") << (status_first ? ", late" : "")
+                << ", restart " << restart;
+            led = {bench.mission.state(), bench.mission.since(), bench.mission.Words()};
+            if (restart < 2 || !stopped || charge < 0.1) continue;
+            inputs.battery = 0.05;
+            bench.Run(0.2);
+            EXPECT_EQ(bench.mission.state(), State::kLand) << "one more limit";
+          }
+        }
+      }
+    }
+  }
+}
+
+TEST(Mission, AStopThatItObeysBeforeItHasHeardOfTheBatteryHolds) {
+  Bench bench;
+  bench.mission.inputs().flying = true;
+  bench.mission.inputs().battery.reset();
+  bench.Run(0.2);
+  ASSERT_TRUE(bench.Command(Event::kStop).accepted);
+  bench.mission.inputs().battery = 0.05;
+  bench.Run(5.0);
+  EXPECT_EQ(bench.mission.state(), State::kHold);
+}
+
+TEST(Mission, StartedInFlightItGivesUpTheSearchInItsTime) {
+  Bench bench;
+  bench.mission.inputs().flying = true;
+  bench.tracked = false;
+  bench.pose.p.x() = 5.0;
+  bench.t = 100.0;
+  bench.Run(0.1);
+  bench.mission.Remember(bench.t, {{1.0, 2.0, 0.0}, bench.pose.epoch},
+                         {State::kSearch, bench.t - 55.0, ""});
+  bench.Run(4.9);
+  EXPECT_EQ(bench.mission.state(), State::kSearch);
+  bench.Run(0.3);
+  EXPECT_EQ(bench.mission.state(), State::kReturn);
+  EXPECT_EQ(bench.mission.reason(), "target not found in time");
 }
 
 TEST(Mission, GivesUpTheSearchInTime) {

@@ -138,6 +138,25 @@ TEST(Envelope, AWayOutOfTheFenceIsHeldInsideWhateverTheState) {
   }
 }
 
+TEST(Envelope, AWayOfAFlightBeforeIsNotJudgedByTheFenceOfThisOne) {
+  MissionConfig config;
+  config.geofence = Box(10.0);
+  Bench bench(config);
+  bench.mission.inputs().on_ground = true;
+  bench.Run(0.2);
+  ASSERT_TRUE(bench.Command(Event::kTakeoff).accepted);
+  bench.mission.inputs().way = {{0.0, 0.0, 2.0}};
+  bench.mission.inputs().handed_over = true;
+  bench.Run(3.0);
+  ASSERT_EQ(bench.mission.state(), State::kReady) << "called off";
+  bench.mission.inputs().handed_over = false;
+  bench.pose.p.x() = 20.0;
+  bench.Run(0.2);
+  ASSERT_TRUE(bench.Command(Event::kTakeoff).accepted);
+  bench.Run(0.5);
+  EXPECT_EQ(bench.mission.state(), State::kTakeoff) << bench.mission.reason();
+}
+
 TEST(Envelope, WhoIsOutsideReturns) {
   MissionConfig config;
   config.geofence = Box(10.0);

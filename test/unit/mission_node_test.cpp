@@ -99,11 +99,16 @@ TEST(MissionNode, StartedInFlightItHearsFromControlWhereItTookOff) {
   flight_state_t home{};
   home.utime = kStart;
   home.has_home = 1;
+  home.state = flight_state_t::HOLD;
+  home.since = kStart - 5'000'000;
+  home.reason = "stop commanded";
   bus::Set(home.home, Eigen::Vector3d(1, 2, 3));
   control->Publish("HOME", home);
   bench.Run(0.5);
   EXPECT_EQ(bench.states.back().has_home, 1);
   EXPECT_EQ(bus::ToVector(bench.states.back().home), Eigen::Vector3d(1, 2, 3));
+  EXPECT_EQ(bench.states.back().since, home.since);
+  EXPECT_EQ(bench.states.back().reason, "stop commanded: before this process started");
 }
 
 TEST(MissionNode, AnswersWhatItWasGivenBeforeItsStartWithoutKnowing) {

@@ -2,9 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <memory>
 #include <opencv2/imgproc.hpp>
 #include <optional>
+#include <random>
 #include <string>
 #include <tuple>
 #include <vector>
@@ -13,9 +15,11 @@
 #include "chase/target_t.hpp"
 #include "common/bus/convert.h"
 #include "common/bus/lockstep.h"
+#include "common/world/commands.h"
 #include "perception_world.h"
 #include "services/perception/perception_node.h"
 #include "services/perception/tools/select.h"
+#include "test/unit/bad_line.h"
 
 namespace chase::perception {
 namespace {
@@ -63,18 +67,23 @@ class Bench {
     }
   }
 
-  /// The answer; `id` tells commands apart.
-  command_ack_t Select(double u, double v, int64_t id) {
+  /// `id` tells commands apart.
+  command_t Command(double u, double v, int64_t id) const {
     command_t m{};
     m.utime = Utime();
     m.id = id;
     m.kind = command_t::SELECT;
     m.n_arguments = 2;
     m.arguments = {u, v};
-    bus_->Publish("COMMAND", m);
+    return m;
+  }
+  /// The answer.
+  command_ack_t Send(const command_t& command) {
+    bus_->Publish("COMMAND", command);
     lockstep_.RunUntil(Utime());
     return acks.back();
   }
+  command_ack_t Select(double u, double v, int64_t id) { return Send(Command(u, v, id)); }
   void StartAnew() {
     lockstep_.Kill("perception");
     lockstep_.Start("perception");
@@ -82,9 +91,26 @@ class Bench {
   std::string Error() const { return lockstep_.bus("perception").last_error(); }
   void Keep(const selection_t& selection) { mission_->Publish("SELECTION_KEPT", selection); }
   cv::Point2d TargetPixel() { return Middle(renderer_.Image(t_).box); }
+  cv::Point2d PostPixel() {  // to the left of the target: y grows to the left
+    const cv::Point2d at = TargetPixel();
+    const double focal = world::Rig().focal_px;
+    return {at.x - focal * kPost.y() / kPost.x(), at.y};
+  }
   static cv::Point2d Middle(const cv::Rect2d& box) { return 0.5 * (box.tl() + box.br()); }
   double Off(const Eigen::Vector3d& p) const { return (bus::ToVector(out.back().mean) - p).norm(); }
   Eigen::Vector3d target() const { return world_.target(t_); }
+  double t() const { return t_; }
+  /// How often the blue one has been chosen after the orange one, or the other way round.
+  int Choices() const {
+    int choices = 0;
+    std::optional<bool> before;
+    for (const selection_t& m : selections) {
+      const bool blue = m.hue_min > 60.0;
+      choices += before != blue;
+      before = blue;
+    }
+    return choices;
+  }
 
   std::vector<target_t> out;
   std::vector<command_ack_t> acks;
@@ -161,11 +187,7 @@ TEST(Select, TheSameCommandAgainIsAnsweredAndNotObeyed) {
   Bench bench;
   bench.Run(0.5);
   const cv::Point2d at = bench.TargetPixel();
-  const auto post = [&] {  // to the left of the target: y grows to the left
-    const world::Rig rig;
-    const double focal = rig.focal_px;
-    return cv::Point2d(at.x - focal * kPost.y() / kPost.x(), at.y);
-  }();
+  const cv::Point2d post = bench.PostPixel();
   ASSERT_EQ(bench.Select(post.x, post.y, 1).verdict, +command_ack_t::ACCEPTED)
       << bench.acks.back().reason;
   bench.Run(0.15);
@@ -179,6 +201,35 @@ TEST(Select, TheSameCommandAgainIsAnsweredAndNotObeyed) {
   EXPECT_EQ(late.reason, first);
   bench.Run(0.5);
   EXPECT_LT(bench.Off(bench.target()), 0.1) << "where the second one led";
+}
+
+// Late copies of earlier commands keep coming while the next ones are given. Every third points
+// beside the image.
+TEST(Select, TakesEffectOnceOrIsRefusedOnABadLine) {
+  std::mt19937 random(1);
+  Bench bench;
+  bench.Run(0.5);
+  const std::array<cv::Point2d, 2> things = {bench.TargetPixel(), bench.PostPixel()};
+  test::BadLine<command_t> there(&random);
+  test::BadLine<command_ack_t> back(&random);
+  size_t given = 0, frame = 0;
+  for (int64_t id = 1; id <= 30; ++id) {
+    const bool fits = id % 3 != 0;
+    const cv::Point2d at = fits ? things[given % 2] : cv::Point2d(-1.0, 0.0);
+    const command_t command = bench.Command(at.x, at.y, id);
+    world::CommandClient client(world::kSelectCommand, bench.t());
+    while (!client.answered()) {
+      ASSERT_FALSE(client.GaveUp(bench.t())) << "command " << id;
+      if (client.Due(bench.t())) there.Send(bench.t(), command);
+      bench.Run(0.05, frame++ % 5 == 0);
+      for (const command_t& c : there.Arrived(bench.t())) back.Send(bench.t(), bench.Send(c));
+      for (const command_ack_t& ack : back.Arrived(bench.t()))
+        if (ack.id == id) client.OnAnswer(ack.verdict == command_ack_t::ACCEPTED, ack.reason);
+    }
+    ASSERT_EQ(client.accepted(), fits) << client.reason();
+    given += fits;
+    ASSERT_EQ(bench.Choices(), static_cast<int>(given)) << "each once, none again";
+  }
 }
 
 TEST(Select, OutlivesTheProcessWhereMissionKeepsIt) {
