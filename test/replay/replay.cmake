@@ -1,9 +1,11 @@
 # Golden replays: each service against what it sent when its golden was recorded.
 foreach(golden IN ITEMS odometry mapping perception prediction planning control simulator planning_lidar_gap
-                        mapping_forest)
+                        mapping_forest mission)
   set(world gym)
   if(golden MATCHES "_forest$")
     set(world forest)
+  elseif(golden STREQUAL "mission")
+    set(world mission)
   endif()
   add_test(NAME golden_replay_${golden}
     COMMAND python3 ${CMAKE_SOURCE_DIR}/test/replay/golden.py check ${CMAKE_BINARY_DIR}/bin
