@@ -7,7 +7,6 @@ namespace chase::math {
 namespace {
 constexpr double kCreepPerSecond = 1e-4;
 constexpr int64_t kJump = 1'000'000;     // us
-constexpr int64_t kLate = 20'000;        // us, as fcu's ClockSync has it: more than delays vary by
 constexpr int64_t kLateFor = 1'000'000;  // us
 }  // namespace
 
@@ -15,7 +14,7 @@ void ClockAlignment::Add(int64_t device_us, int64_t arrival_utime) {
   const int64_t offset = arrival_utime - device_us;
   if (!started_ || std::llabs(offset - offset_us_) > kJump) {
     Begin(device_us, offset);
-  } else if (offset <= offset_us_ + kLate) {
+  } else if (late_us_ == 0 || offset <= offset_us_ + late_us_) {
     late_since_.reset();
   } else {
     least_late_us_ = late_since_ ? std::min(least_late_us_, offset) : offset;

@@ -76,7 +76,7 @@ def key(path):
         return WARNING, f"{path}: not looked at, its folder is private; cure: as root"
     except OSError as error:
         return FAILURE, f"{path}: {error.strerror}; cure: put the key there"
-    return FAILURE, f"{path}: the user chase cannot read it; cure: chown chase {path}, in a folder that all may enter"
+    return FAILURE, f"{path}: the user chase cannot read it; cure: chown chase {path}; chmod 600 {path}; in a folder that all may enter"
 
 
 def worst(*answers):

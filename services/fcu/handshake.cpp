@@ -252,7 +252,7 @@ void Handshake::Enter(State state, const std::string& why) {
 
 std::string Handshake::reason() const {
   const std::string refusal = command_.Refusal();
-  if (refusal.empty()) return reason_;
+  if (refusal.empty() || lands_) return reason_;
   return fmt::format("{}; {}{}{}", reason_, refusal, facts_.said.empty() ? "" : ": ", facts_.said);
 }
 

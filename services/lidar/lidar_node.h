@@ -41,8 +41,9 @@ class LidarNode : public bus::Node {
   std::unique_ptr<PacketSource> source_;
   std::unique_ptr<PacketSource> positions_;  // with the clock gps
   GpsClock gps_;
-  std::string gps_problem_;  // why the last sweep is not stamped by it
-  math::ClockAlignment alignment_;
+  std::string gps_problem_;                 // why the last sweep is not stamped by it
+  static constexpr int64_t kLate = 20'000;  // us: more than the network's delays vary by
+  math::ClockAlignment alignment_{kLate};
   std::optional<RawPacket> next_;
   std::optional<int64_t> first_tick_, first_device_us_;
   int64_t heard_ = 0;   // when the last packet came that is one, bus's clock; 0: none yet

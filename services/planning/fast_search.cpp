@@ -18,7 +18,9 @@ using kernels::kPad;
 // 256 the longest plan of a flight in an office took 88 ms, with 64 it took 11.
 constexpr int kMostRefused = 64;
 // Candidates at the edge of a shape that only sorts whose proof is asked and fails, until others of
-// that kind are left for when there is nothing else.
+// that kind are left for when there is nothing else: of 488 plans in bench_planning's `certified`
+// one differs, by 1.7 % of its cost, and the 99th percentile falls from 139 to 124 us. With 2 it is
+// the same; with 0 eleven differ, one by 17 %.
 constexpr int kMostAtEdge = 4;
 constexpr int kSorted = 4 * kBatch;  // candidates at a time
 constexpr float kSlack = 1e-4f;      // relative: costs in single precision are that good
@@ -43,8 +45,8 @@ class FastSearch : public Search {
     bound_ = static_cast<float>(bound - alike);
     Found found;
     found.generated = fast_.n_candidates();
-    // First the winner alone is proven. Where that fails, or candidates were left, each before it
-    // becomes the bound.
+    // First the winner alone is proven. Where that fails, or there is none and some were left, each
+    // is before it becomes the bound.
     int winner = -1;
     for (const bool all : {false, true}) {
       proves_all_ = all;

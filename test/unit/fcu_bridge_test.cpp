@@ -337,6 +337,20 @@ TEST(FcuBridge, ARefusedLandingIsSaidAndAskedForAgain) {
   EXPECT_FALSE(flight.Says("was refused"));
 }
 
+TEST(FcuBridge, ARefusalIsNotSaidOnceItLandsByItself) {
+  StandInOptions options;
+  options.refuses_to_land = true;
+  options.com_of_loss_t = 3.0;
+  Flight flight(options);
+  flight.TakeOff(5.0);
+  flight.setpoints = false;
+  flight.Run(2.5);
+  EXPECT_TRUE(flight.Says("landing was refused (denied)"));
+  flight.Run(2.0);
+  ASSERT_TRUE(flight.px4.mode() == kLandMode);
+  EXPECT_FALSE(flight.Says("was refused"));
+}
+
 TEST(FcuBridge, AnotherMakesAutopilotIsLeftAlone) {
   StandInOptions options;
   options.autopilot = 3;

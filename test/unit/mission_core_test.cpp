@@ -338,7 +338,7 @@ TEST(Mission, StartedInFlightAStopHoldsAsBeforeWhatTheEnvelopeSays) {
                                    : outside || charge < 0.3 ? State::kReturn
                                                              : State::kHold;
             EXPECT_EQ(bench.mission.state(), expected)
-                << charge << (outside ? ", outside" : "") << (status_first ? ", late" : "")
+                << charge << (outside ? ", outside" : "") << (status_first ? "" : ", late")
                 << ", restart " << restart;
             led = {bench.mission.state(), bench.mission.since(), bench.mission.Words()};
             if (restart < 2 || !stopped || charge < 0.1) continue;

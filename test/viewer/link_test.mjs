@@ -5,7 +5,7 @@ import net from 'node:net';
 import {pageClient, play, sleep, until} from './viewer.mjs';
 
 const DELAY = 200;  // ms each way
-// bytes/s; s: (48 + 16 kB) / rate and a second; states that come in ten seconds
+// bytes/s; s: (48 + 16 kB) / rate and a second; states that come in ten seconds, of 100, the slow one's after 64 kB of others
 const LINKS = [{rate: 200000, most: 1, least: 60}, {rate: 15000, most: 6, least: 10}];
 
 // Passes on at that rate and that late, and holds whatever does not fit: the worst that a link can do to a sender.
