@@ -287,7 +287,9 @@ class Flight:
                               f"their logs are in {self.folder}")
 
     def complain(self, *watchers, mend=True):
-        """Restarts what may be restarted; else raises when a process has ended or hangs."""
+        """Restarts what may be restarted; else raises when a process has ended or hangs, or an interrupt was lost."""
+        if interrupt.wished:
+            raise KeyboardInterrupt
         onlookers = [self.viewer] if self.viewer and mend else []
         for child, sentence in processes.problems(self.services + [self.logger, *onlookers, *watchers]):
             if not (child.restarts and mend):
@@ -456,10 +458,17 @@ def fly(options):
     return 0 if passed else 1
 
 
+def interrupt(*_):
+    """Python only prints what is raised in a callback, as behind a fork: the wish is kept until somebody asks."""
+    interrupt.wished = True
+    raise KeyboardInterrupt
+
+
 def main():
     # A terminal's Ctrl-C, a service manager's and a closed window's wishes end the flight alike.
-    for number in (signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, signal.default_int_handler)
+    interrupt.wished = False
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, interrupt)
     try:
         return fly(parse(sys.argv[1:]))
     except FlightError as error:

@@ -568,6 +568,19 @@ class FlightTest(unittest.TestCase):
         self.assertEqual(code, 1)
         self.assertIn("stopped", err)
 
+    def test_an_interrupt_behind_a_fork_stops_everything_too(self):
+        armed = [True]
+
+        def strike():  # what is raised in here is lost
+            if armed and armed.pop():
+                os.kill(os.getpid(), signal.SIGINT)
+
+        os.register_at_fork(after_in_parent=strike)
+        self.program("chase-flight-monitor", "import time\ntime.sleep(60)")
+        code, _, err = self.fly()
+        self.assertEqual((code, armed), (1, []))
+        self.assertIn("stopped", err)
+
     def test_others_on_the_port_are_an_error(self):
         port = bus.endpoint(os.environ["LCM_DEFAULT_URL"])[1]
         talker = subprocess.Popen([sys.executable, "-c", textwrap.dedent(f"""
