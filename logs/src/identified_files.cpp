@@ -54,7 +54,8 @@ class Parameters {
 std::string UpdateFiles(const Identification& i, const std::string& flown_by,
                         const std::string& folder) {
   if (!fs::is_directory(folder))
-    throw std::runtime_error(folder + ": no folder; name that of control.yaml, planning.yaml and fcu.yaml");
+    throw std::runtime_error(folder +
+                             ": no folder; name that of control.yaml, planning.yaml and fcu.yaml");
   Parameters<control::ControlConfig> control(fs::path(folder) / "control.yaml");
   control::ControlConfig follows = control.now();
   const auto of_control = SetInControl(i, true, &follows);
@@ -79,8 +80,8 @@ std::string UpdateFiles(const Identification& i, const std::string& flown_by,
   }
   const std::string said = control.Write() + planning.Write() + bridge.Write();
   if (said.empty())
-    throw std::runtime_error("the flight shows nothing that control, planning or fcu has; " + folder +
-                             " stays as it was");
+    throw std::runtime_error("the flight shows nothing that control, planning or fcu has; " +
+                             folder + " stays as it was");
   if (flown_by.empty()) return said + bridge.file() + ": stays, chase-fcu did not fly it\n";
   if (of_fcu.empty())
     return said + bridge.file() + ": stays, the flight does not show the thrust\n";
