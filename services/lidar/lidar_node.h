@@ -41,8 +41,9 @@ class LidarNode : public bus::Node {
   std::unique_ptr<PacketSource> source_;
   std::unique_ptr<PacketSource> positions_;  // with the clock gps
   GpsClock gps_;
-  std::string gps_problem_;                 // why the last sweep is not stamped by it
-  static constexpr int64_t kLate = 20'000;  // us: more than the network's delays vary by
+  std::string gps_problem_;  // why the last sweep is not stamped by it
+  // us; chosen, not measured: above what delays on a wire vary by, as fcu's ClockSync has it.
+  static constexpr int64_t kLate = 20'000;
   math::ClockAlignment alignment_{kLate};
   std::optional<RawPacket> next_;
   std::optional<int64_t> first_tick_, first_device_us_;

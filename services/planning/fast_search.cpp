@@ -19,8 +19,8 @@ using kernels::kPad;
 constexpr int kMostRefused = 64;
 // Candidates at the edge of a shape that only sorts whose proof is asked and fails, until others of
 // that kind are left for when there is nothing else: of 488 plans in bench_planning's `certified`
-// one differs, by 1.7 % of its cost, and the 99th percentile falls from 139 to 124 us. With 2 it is
-// the same; with 0 eleven differ, one by 17 %.
+// one differs, by 1.7 % of its cost, and the 99th percentile of the least of five runs falls from
+// 139 to 124 us. With 2 it is the same; with 0 eleven differ, one by 17 %. Chosen on these.
 constexpr int kMostAtEdge = 4;
 constexpr int kSorted = 4 * kBatch;  // candidates at a time
 constexpr float kSlack = 1e-4f;      // relative: costs in single precision are that good
