@@ -19,6 +19,11 @@ constexpr double kSlack = 1e-9;  // m; more than all rounding for coordinates be
 /// body's, its radius, the same of the target's, covariance of the body.
 using Controls = Eigen::Matrix<double, 17, Eigen::Dynamic, 0, 17, 16>;
 
+Vector3d Direction(const Vector3d& way) {
+  const double length = way.norm();
+  return length > 0.0 ? Vector3d(way / length) : Vector3d::UnitX();
+}
+
 /// Into columns of power coefficients.
 void PutBall(const Ball& ball, const Curve& center, int row, Controls* power) {
   power->block(row, 0, 3, ball.center.rows()) = ball.center.transpose();
@@ -279,7 +284,7 @@ bool Prover::TouchesAt(double tau) const {
   Controls at(17, 1);
   at.col(0) = power.col(power.cols() - 1);
   for (Eigen::Index k = power.cols() - 1; k-- > 0;) at.col(0) = tau * at.col(0) + power.col(k);
-  Separation s{tau, tau};
+  Separation s{tau, tau, Direction(at.col(0).head<3>())};
   return body_.sigmas >= 0.0 && FindPlane(at, -kSlack, &s) == Answer::kOverlap;
 }
 
@@ -313,8 +318,7 @@ Vector3d Separator::Between(const Body& body) const {
   const Vector3d center = MeanOf(body.center, from_, to_);
   Vector3d n = drone_.mean - center;
   if (length_ > 0.0) n -= std::clamp(along_.dot(n) / length_, -1.0, 0.0) * along_;
-  const double distance = n.norm();
-  return distance > 0.0 ? Vector3d(n / distance) : Vector3d::UnitX();
+  return Direction(n);
 }
 
 SeparationResult Separator::From(const Body& body) {

@@ -85,12 +85,8 @@ bool StartCheck::IsInSight(const Ellipsoid& e, double share) {
 }
 
 bool StartCheck::IsOff(const Ellipsoid& e, const world::Ball* target) {
-  world::Body body = *e.body;
-  body.center = body.center.topRows(1).eval();
-  body.covariance[1].setZero();
-  body.covariance[2].setZero();
   start_.radius[0] += kRounding;
-  return world::Separate(start_, target, body).kept == world::Kept::kOff;
+  return !world::Touch(start_, target, *e.body, 0.0);
 }
 
 void Note(std::string* notes, const std::string& text) {
