@@ -5,6 +5,7 @@
 #include <time.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <stdexcept>
 
 #include "common/bus/channels.h"
@@ -34,17 +35,31 @@ UdpBus::UdpBus(const std::string& url, const std::string& prefix, const Seal& se
   if (!lcm_.good())
     throw std::runtime_error(fmt::format(
         "{}: LCM cannot open it; check the address and port, or run deploy/doctor", url));
+  if (std::getenv(kFaultsVariable) != nullptr) HearFaults();
+}
+
+/// Beside Subscribe: what a process sends names what it has heard, and this the process has not.
+void UdpBus::HearFaults() {
+  UdpBus::SubscribeRaw("FAULT", [this](const uint8_t* data, size_t size) {
+    Guarded("FAULT", [&] {
+      event_t event;
+      if (event.decode(data, 0, static_cast<int>(size)) > 0)
+        faults_.Take(event, identity().process);
+    });
+  });
 }
 
 void UdpBus::Handle(int64_t timeout_us) {
+  if (!delayed_.empty()) timeout_us = std::min(timeout_us, delayed_.begin()->first - Now());
   pollfd fd{lcm_.getFileno(), POLLIN, 0};
   timespec wait{};
   timeout_us = std::max<int64_t>(timeout_us, 0);
   wait.tv_sec = timeout_us / 1000000;
   wait.tv_nsec = timeout_us % 1000000 * 1000;
-  if (ppoll(&fd, 1, &wait, nullptr) <= 0) return;
-  for (int i = 0; i < kBurst && lcm_.handleTimeout(0) > 0; ++i) {
+  const bool come = ppoll(&fd, 1, &wait, nullptr) > 0;
+  for (int i = 0; come && i < kBurst && lcm_.handleTimeout(0) > 0; ++i) {
   }
+  HandOverDelayed();
 }
 
 int64_t UdpBus::Now() const { return SteadyMicroseconds() + clock_offset_; }
@@ -57,9 +72,26 @@ void UdpBus::SubscribeRaw(const std::string& channel, RawHandler handler) {
 
 void UdpBus::Deliver(const lcm::ReceiveBuffer* buffer, const std::string& /*channel*/,
                      Subscription* to) {
+  UdpBus* bus = to->bus;
   const auto* data = static_cast<const uint8_t*>(buffer->data);
-  const auto size = to->bus->Opened(to->channel, data, buffer->data_size, &to->heard);
-  if (size) to->handler(data, *size);
+  if (const int64_t delay = bus->faults_.DelayOf(to->channel); delay > 0)
+    bus->delayed_.insert({bus->Now() + delay, {to, Bytes(data, data + buffer->data_size)}});
+  else
+    bus->HandOver(to, data, buffer->data_size);
+}
+
+void UdpBus::HandOver(Subscription* to, const uint8_t* data, size_t size) {
+  if (to->channel != "FAULT" && faults_.Loses()) return;
+  const auto opened = Opened(to->channel, data, size, &to->heard);
+  if (opened) to->handler(data, *opened);
+}
+
+void UdpBus::HandOverDelayed() {
+  const int64_t now = Now();
+  while (!delayed_.empty() && delayed_.begin()->first <= now) {
+    const auto due = delayed_.extract(delayed_.begin());
+    HandOver(due.mapped().to, due.mapped().bytes.data(), due.mapped().bytes.size());
+  }
 }
 
 std::optional<size_t> UdpBus::Opened(const std::string& channel, const uint8_t* data, size_t size,

@@ -74,6 +74,8 @@ void DeriveDrivers(FlightConfigs* configs) {
   configs->fcu.port = simulated.hardware.fcu_port;
   configs->fcu.hover_thrust = simulator::kGravity / simulated.vehicle.max_thrust;
   configs->lidar.port = simulated.hardware.lidar_port;
+  configs->lidar.position_port = simulated.hardware.position_port;
+  if (simulated.hardware.lidar_clock == "gps") configs->lidar.clock = "gps";
   configs->camera.source = simulator::StreamUrl(simulated.hardware);
   configs->camera.rate_hz = simulated.camera.rate;
   configs->camera.width_px = simulated.rig.width_px;

@@ -85,7 +85,8 @@ int Watch(const std::string& url, const std::string& prefix, bool with_faults) {
 
 /// Prints one JSON line a second about the flight on the bus and ends with the mission.
 int main(int argc, char** argv) {
-  CLI::App app("Prints one JSON line a second about the flight on the bus; exits 0 at its end.");
+  CLI::App app("Prints one JSON line a second about the flight on the bus; exits 0 at its end.",
+               "chase-flight-monitor");
   chase::config::AddVersion(&app);
   std::string url = chase::bus::DefaultUrl(), prefix;
   bool faults = false;

@@ -28,6 +28,10 @@ Json LaunchersPart(const chase::world::FaultSpec& fault, const chase::world::Fau
   using Effect = chase::world::FaultKind::Effect;
   Json part = {{"name", fault.name}, {"at_s", fault.at}, {"for_s", fault.duration}};
   if (kind.effect == Effect::kKill || kind.effect == Effect::kFreeze) return part;
+  if (kind.effect == Effect::kDelay || kind.effect == Effect::kLoss) {
+    part["bus"] = true;  // each process does it to itself
+    return part;
+  }
   if (kind.effect == Effect::kLoad) {
     part["times"] = kind.amount;
     return part;

@@ -152,16 +152,10 @@ def build_and_check(scenario, seed, view=False, hardware=False, link=False):
 
 
 def warn_of_faults(names):
-    """Those that a live flight does not bring about by itself."""
-    if not names:
-        return
-    cures = []
-    if "disk-full" in names:  # chase-flight has no recorder
-        cures.append(f"a full disk under {ROOT / 'logs'} for disk-full")
-    if set(names) != {"disk-full"}:
-        cures.append("chase-flight, where they strike")
-    print(f"warning: faults of channels, losses and the disk are left out of a live flight: {', '.join(names)}; "
-          f"cure: {', '.join(cures)}", file=sys.stderr, flush=True)
+    """Of a disk that is full: the launcher fills none."""
+    if names:
+        print(f"warning: {', '.join(names)} is left out of a live flight; it strikes where the disk under "
+              f"{ROOT / 'logs'} is full", file=sys.stderr, flush=True)
 
 
 def warn_of_disk(seconds):
@@ -235,10 +229,12 @@ class Flight:
         self.commands = commands.Commands(told.get("commands", ()), self.start_command)
         faults = told.get("faults", ())
         self.faults = {fault["name"]: fault for fault in faults}
+        # Processes that hear of them on FAULT delay and lose what comes to them.
+        self.bus_faults = {"CHASE_BUS_FAULTS": "1"} if any(fault.get("bus") for fault in faults) else {}
         self.strikes, self.killed, self.strained = sorted(strikes_of(faults, kills)), [], {}
 
-    def child(self, name, command, **options):
-        return processes.Child(name, command, self.folder / f"{name}.log", self.env, **options)
+    def child(self, name, command, env=None, **options):
+        return processes.Child(name, command, self.folder / f"{name}.log", {**self.env, **(env or {})}, **options)
 
     def start(self, view, token_file=None, link=False):
         rows = flight_processes() + driver_processes(self.hardware)
@@ -264,7 +260,7 @@ class Flight:
                        configs[row["name"]]]
             if self.hardware and row["name"] == "simulator":
                 command.append("--hardware")
-            self.services.append(self.child(row["name"], command, notifies=True,
+            self.services.append(self.child(row["name"], command, self.bus_faults, notifies=True,
                                             restarts=row["restart"] == "always"))
         self.wait_ready()
 
@@ -320,7 +316,7 @@ class Flight:
                 self.killed.append(child)
 
     def strain(self, effect, fault):
-        """Begins or ends what strains all processes."""
+        """Begins or ends what strikes all processes."""
         self.tell("+" if effect == "begins" else "-", fault)
         if effect == "begins":
             for command in strain.commands(self.faults[fault], self.url):

@@ -128,6 +128,8 @@ class Faults(unittest.TestCase):
         answer = flight("--print-config", "planning", scenario=scenario)
         self.assertEqual((answer.returncode, answer.stderr), (0, ""))
         self.assertRegex(flight(scenario=scenario).stderr, "disk-full.*fly live")
+        answer = subprocess.run([BIN / "chase-scenario", scenario], capture_output=True, text=True, check=True, timeout=LIMIT)
+        self.assertEqual(json.loads(answer.stdout)["left_out_live"], ["disk-full"])
 
     def test_mission_flies_where_a_fault_strikes(self):
         """As live, whatever the fault; without one nobody tells a state."""
@@ -188,9 +190,11 @@ faults: [{name: lidar-gap}, {name: kill-planning, at: 5}, {name: delay-PLAN}, {n
         answer = subprocess.run([BIN / "chase-scenario", scenario], capture_output=True, text=True, check=True, timeout=LIMIT)
         told = json.loads(answer.stdout)
         self.assertEqual((told["duration_s"], told["settle_s"]), (12.0, 8.0))
-        self.assertEqual(told["left_out_live"], ["delay-PLAN", "loss-20"])
-        kill, freeze, flood, load = told["faults"]
+        self.assertEqual(told["left_out_live"], [])
+        kill, delay, loss, freeze, flood, load = told["faults"]
         self.assertEqual(kill, {"name": "kill-planning", "at_s": 5.0, "for_s": 0.5})
+        self.assertEqual([(f["name"], f["for_s"], f["bus"]) for f in (delay, loss)],
+                         [("delay-PLAN", 2.0, True), ("loss-20", 10.0, True)])
         self.assertEqual((freeze["name"], freeze["for_s"]), ("freeze-mapping", 2.0))
         self.assertEqual((flood["at_s"], flood["for_s"], flood["rate_hz"]), (-1.0, 2.0, 1000.0))
         self.assertLess({"PLAN", "LIDAR_SCAN", "COMMAND", "FAULT"}, set(flood["channels"]))

@@ -74,7 +74,9 @@ def main():
     problems += [f"{path}: listens to {argument}, and LISTENS does not know {service}" for service in services()
                  if service not in LISTENS for path, argument in subscriptions(service)]
     for path in tree.files("services/*.h", "services/*.cpp", "common/*.cpp"):
-        if path.parts[1] not in ("simulator", "bus", "logs", "viewer"):  # logs: what any message looks like
+        # logs, bus: what any message looks like; bus: where the launcher sets CHASE_BUS_FAULTS the live one hears FAULT, and
+        # then delays and loses messages itself.
+        if path.parts[1] not in ("simulator", "bus", "logs", "viewer"):
             problems += [f"{path}: knows {kind}: it stays out of the loop"
                          for kind in ("truth_t", "event_t") if kind in tree.text(path)]
     return tree.report(problems)

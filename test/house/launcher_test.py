@@ -503,18 +503,38 @@ class FlightTest(unittest.TestCase):
         code, err, _ = self.give([("hold", 0.5), ("land", 1.9)], 1)
         self.assertEqual((code, err), (1, "deploy/fly: the mission ended before the land@1.9\n"))
 
-    def test_faults_that_are_left_out_are_named(self):
-        told = json.dumps({"duration_s": 2, "settle_s": 1, "left_out_live": ["delay-PLAN", "loss-20"]})
+    def test_a_full_disk_is_left_out_and_named(self):
+        told = json.dumps({"duration_s": 2, "settle_s": 1, "left_out_live": ["disk-full"]})
         self.program("chase-scenario", f"print({told!r})")
         code, _, err = self.fly()
         self.assertEqual(code, 0, err)
-        self.assertRegex(err, r"^warning: .*left out of a live flight: delay-PLAN, loss-20; cure: chase-flight")
+        self.assertRegex(err, r"^warning: disk-full is left out of a live flight; it strikes where the disk under \S+/logs is full\n$")
 
-    def test_a_full_disk_is_no_fault_of_a_flight_in_lockstep(self):
-        err = io.StringIO()
-        with contextlib.redirect_stderr(err):
-            fly.warn_of_faults(["disk-full"])
-        self.assertRegex(err.getvalue(), r"cure: a full disk under \S+/logs for disk-full\n$")
+    def heard_of_bus_faults(self, *faults):
+        """Which programs of a flight with these faults have the variable, and which have not; the flight."""
+        told = json.dumps({"duration_s": 2, "settle_s": 1, "faults": faults})
+        self.program("chase-scenario", f"print({told!r})")
+        say = """print("bus faults:", os.environ.get("CHASE_BUS_FAULTS"), flush=True)"""
+        for row in fly.flight_processes():
+            self.program(row["binary"], SERVICE.format(behaviour=say))
+        self.program("chase-recorder", SERVICE.format(behaviour=f"{say}; {RECORD}"))
+        code, _, err = self.fly()
+        self.assertEqual(code, 0, err)
+        logs = {row["name"]: self.folder / f"{row['name']}.log" for row in fly.flight_processes()}
+        logs["recorder"] = self.folder / "recorder.log"
+        said = {name: log.read_text(encoding="utf-8").split("bus faults: ")[1].strip() for name, log in logs.items()}
+        self.assertEqual(set(said.values()) - {"1", "None"}, set())
+        return {name for name in said if said[name] == "1"}, err
+
+    def test_processes_delay_and_lose_where_the_scenario_says_so(self):
+        services = {row["name"] for row in fly.flight_processes()}
+        struck, err = self.heard_of_bus_faults({"name": "delay-POSE", "at_s": 0.2, "for_s": 0.5, "bus": True})
+        self.assertEqual(struck, services, "not the recorder")
+        self.assertRegex(err, r"t +\d\.\d s: delay-POSE begins\n\nt +\d\.\d s: delay-POSE ends\n")
+
+    def test_processes_hear_of_no_other_faults(self):
+        struck, _ = self.heard_of_bus_faults({"name": "cpu-load", "at_s": 0.2, "for_s": 0.5, "times": 1})
+        self.assertEqual(struck, set())
 
     def test_sweeps_stay_on_the_host(self):
         os.environ["LCM_DEFAULT_URL"] = f"udpm://{GROUP}:{free_port()}?ttl=1"
