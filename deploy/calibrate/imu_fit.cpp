@@ -94,18 +94,35 @@ struct Unknowns {
   }
 };
 
+/// A turn of C by the gyro; nothing where it has a gap.
+std::optional<Quaterniond> ByGyro(const Turn& turn, const Integral& integral, const Unknowns& x) {
+  const auto R_B = integral.Between(turn.from - x.delay, turn.to - x.delay);
+  if (!R_B) return std::nullopt;
+  return x.R_BC.conjugate() * *R_B * x.R_BC;
+}
+
 /// What the camera's turns differ by from the gyro's, in C; NaN where the gyro has a gap.
 std::vector<Vector3d> Residuals(const std::vector<Turn>& turns, const std::vector<Gyro>& gyro,
                                 const Unknowns& x) {
   const Integral integral(gyro, x.bias);
   std::vector<Vector3d> residuals;
   for (const Turn& turn : turns) {
-    const auto R_B = integral.Between(turn.from - x.delay, turn.to - x.delay);
-    residuals.push_back(
-        R_B ? math::LogSO3(turn.R_C.conjugate() * (x.R_BC.conjugate() * *R_B * x.R_BC))
-            : Vector3d::Constant(NAN));
+    const auto R_C = ByGyro(turn, integral, x);
+    residuals.push_back(R_C ? math::LogSO3(turn.R_C.conjugate() * *R_C) : Vector3d::Constant(NAN));
   }
   return residuals;
+}
+
+std::vector<ComparedTurn> Compare(const std::vector<Turn>& turns, const std::vector<Gyro>& gyro,
+                                  const Unknowns& x) {
+  const Integral integral(gyro, x.bias);
+  std::vector<ComparedTurn> compared;
+  for (const Turn& turn : turns) {
+    if (turn.to - turn.from > kSpans[0] + kLate) break;  // those of the next span
+    if (const auto R_C = ByGyro(turn, integral, x))
+      compared.push_back({0.5 * (turn.from + turn.to), math::LogSO3(turn.R_C), math::LogSO3(*R_C)});
+  }
+  return compared;
 }
 
 /// The delay at which both turn by angles most alike, whatever the rotation between them.
@@ -233,6 +250,7 @@ ImuFit FitImu(const std::vector<Turned>& seen, const std::vector<Gyro>& gyro) {
   fit.rotation_sigma = sigmas.head<3>();
   fit.delay_sigma = sigmas[3];
   fit.turns = static_cast<int>(sum.n);
+  fit.compared = Compare(turns, gyro, x);
   return fit;
 }
 

@@ -17,6 +17,13 @@ struct Gyro {
   Eigen::Vector3d w_WB_B = Eigen::Vector3d::Zero();  ///< as measured, rad/s
 };
 
+/// What a turn is by either, as rotation vectors in C, rad.
+struct ComparedTurn {
+  double t = 0.0;  ///< of its middle, s, by the stamps of images
+  Eigen::Vector3d camera = Eigen::Vector3d::Zero();
+  Eigen::Vector3d gyro = Eigen::Vector3d::Zero();  ///< by the fit
+};
+
 struct ImuFit {
   std::string problem;  ///< why there is none; empty: there is one
   Eigen::Quaterniond R_BC = Eigen::Quaterniond::Identity();
@@ -26,6 +33,7 @@ struct ImuFit {
   Eigen::Vector3d rotation_sigma = Eigen::Vector3d::Zero();  ///< about the axes of C, rad
   double delay_sigma = 0.0;                                  ///< standard deviations
   int turns = 0;                                             ///< that both measured
+  std::vector<ComparedTurn> compared;                        ///< the shortest, in order of time
 };
 
 /// Rotation of the camera in the body and the delay of its stamps, within 0.2 s, from turns before

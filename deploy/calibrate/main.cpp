@@ -131,21 +131,22 @@ int Imu(const Arguments& a) {
              turns.seen.size(), turns.gyro.size());
   const ImuFit fit = FitImu(turns.seen, turns.gyro);
   Require(fit.problem);
+  WritePicture(a.check, ImuPicture(fit));
   constexpr double kDegree = M_PI / 180.0, kWorst = 1.0 * kDegree;
   if (fit.rms > kWorst)
     throw std::runtime_error(fmt::format(
-        "the camera's turns are {:.1f} degrees off the IMU's: check --square, --marker and --rig, "
-        "and that the board stood still",
-        fit.rms / kDegree));
+        "the camera's turns are {:.1f} degrees off the IMU's, see {}: check --square, --marker and "
+        "--rig, and that the board stood still",
+        fit.rms / kDegree, a.check));
   rig.rig = WithCamera(rig.rig, fit.R_BC.toRotationMatrix());
   WriteRig(a.out, rig);
   fmt::print(
       "camera's roll, pitch, yaw {:.2f} {:.2f} {:.2f} +- {:.2f} degrees, by {} turns that are "
       "{:.2f} degrees off; its stamps are {:.1f} +- {:.1f} ms late: add {:.4f} to camera.yaml's "
-      "stamp_delay\n{}\n",
+      "stamp_delay\n{}\n{}\n",
       rig.rig.camera_roll_deg, rig.rig.camera_pitch_deg, rig.rig.camera_yaw_deg,
       fit.rotation_sigma.maxCoeff() / kDegree, fit.turns, fit.rms / kDegree, 1e3 * fit.delay,
-      1e3 * fit.delay_sigma, fit.delay, a.out);
+      1e3 * fit.delay_sigma, fit.delay, a.out, a.check);
   PrintView(rig.rig);
   return 0;
 }
@@ -165,15 +166,11 @@ void AddBoard(CLI::App* app, Board* board) {
       ->capture_default_str();
 }
 
-void AddRigs(CLI::App* app, Arguments* a) {
+void AddOutputs(CLI::App* app, Arguments* a) {
   app->add_option("--rig", a->rig, "YAML file with the rig so far (default: built in)");
   app->add_option("--out", a->out,
                   "YAML file to write, for --config of odometry, perception, viewer and simulator")
       ->capture_default_str();
-}
-
-void AddOutputs(CLI::App* app, Arguments* a) {
-  AddRigs(app, a);
   app->add_option("--check", a->check, "picture to look at")->capture_default_str();
 }
 
@@ -188,6 +185,7 @@ int Run(int argc, char** argv) {
   camera.check = "check-camera.png";
   check.check = "calibration.png";
   lidar.check = "check-lidar.png";
+  imu.check = "check-imu.png";
   CLI::App* b = app.add_subcommand("board", "Writes the board to print.");
   AddBoard(b, &board.board);
   b->add_option("--out", board.out, "picture to write")->capture_default_str();
@@ -206,7 +204,7 @@ int Run(int argc, char** argv) {
                 "LCM log with CAMERA_IMAGE and IMU, turned before a board that stands")
       ->required();
   AddBoard(i, &imu.board);
-  AddRigs(i, &imu);
+  AddOutputs(i, &imu);
   CLI::App* k = app.add_subcommand("check", "Draws a sweep's points into a frame of a log.");
   k->add_option("log", check.log, "LCM log with CAMERA_IMAGE, LIDAR_SCAN and POSE")->required();
   k->add_option("--rig", check.rig, "YAML file with the rig (default: built in)");

@@ -1,5 +1,7 @@
 #include "deploy/calibrate/pictures.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <opencv2/calib3d.hpp>
@@ -10,7 +12,10 @@ namespace {
 
 constexpr double kMagnified = 20.0;
 constexpr int kScale = 2, kAcross = 3;
-const cv::Scalar kGreen(60, 200, 60), kRed(60, 60, 230), kInk(40, 40, 40);
+const cv::Scalar kGreen(60, 200, 60), kRed(60, 60, 230), kInk(40, 40, 40), kGrey(180, 180, 180);
+const cv::Size kPanel(1600, 300);  // px, of the turns about an axis
+constexpr double kLull = 0.3;      // s without a turn: the board was out of view
+constexpr double kDegree = M_PI / 180.0;
 
 cv::Point Pixel(const cv::Point2d& px) {
   return {static_cast<int>(std::lround(kScale * (px.x + 0.5))),
@@ -24,6 +29,47 @@ void Draw(const Eigen::Vector3d& p_C, const world::Rig& rig, const cv::Scalar& c
   if (px.cwiseAbs().maxCoeff() < 1e4)
     cv::circle(*picture, Pixel({px.x(), px.y()}), 2, color, cv::FILLED);
 }
+
+void Write(const std::string& words, const cv::Point& at, cv::Mat* picture) {
+  cv::putText(*picture, words, at, cv::FONT_HERSHEY_SIMPLEX, 0.5, kInk, 1, cv::LINE_AA);
+}
+
+/// Turns about one axis over time; the panel's height is twice `most`.
+class Panel {
+ public:
+  Panel(const std::vector<ComparedTurn>& turns, double most, cv::Mat picture)
+      : from_(turns.front().t), to_(turns.back().t), most_(most), picture_(std::move(picture)) {}
+
+  void DrawGrid(const std::string& axis) {
+    cv::line(picture_, At(from_, 0.0), At(to_, 0.0), kGrey);
+    for (double t = from_; t <= to_; t += 1.0)
+      cv::line(picture_, At(t, 0.0) - cv::Point(0, 6), At(t, 0.0) + cv::Point(0, 6), kGrey);
+    cv::rectangle(picture_, {cv::Point(), picture_.size()}, kGrey);
+    Write(axis, {10, 20}, &picture_);
+  }
+  void DrawTurns(const std::vector<ComparedTurn>& turns, int axis) {
+    const auto error = [axis](const ComparedTurn& turn) {
+      return kMagnified * (turn.camera - turn.gyro)[axis];
+    };
+    for (std::size_t k = 1; k < turns.size(); ++k) {
+      const ComparedTurn &a = turns[k - 1], &b = turns[k];
+      if (b.t - a.t > kLull) continue;
+      cv::line(picture_, At(a.t, error(a)), At(b.t, error(b)), kRed);
+      cv::line(picture_, At(a.t, a.gyro[axis]), At(b.t, b.gyro[axis]), kGreen, 2);
+    }
+    for (const ComparedTurn& turn : turns)
+      cv::circle(picture_, At(turn.t, turn.camera[axis]), 2, kInk, cv::FILLED);
+  }
+
+ private:
+  cv::Point At(double t, double angle) const {
+    return {static_cast<int>(std::lround(picture_.cols * (t - from_) / (to_ - from_))),
+            static_cast<int>(std::lround(0.5 * picture_.rows * (1.0 - angle / most_)))};
+  }
+
+  double from_, to_, most_;  // s, s, rad
+  cv::Mat picture_;
+};
 
 }  // namespace
 
@@ -71,6 +117,27 @@ cv::Mat LidarPicture(const Sightings& sightings, const LidarFit& fit,
   }
   cv::Mat picture;
   cv::vconcat(rows, picture);
+  return picture;
+}
+
+cv::Mat ImuPicture(const ImuFit& fit) {
+  if (fit.compared.size() < 2) return {};
+  double most = 0.0;
+  for (const ComparedTurn& turn : fit.compared)
+    most = std::max(most, 1.2 * turn.gyro.cwiseAbs().maxCoeff());
+  static const char* const axes[] = {"x (right, pitch)", "y (down, yaw)", "z (forward, roll)"};
+  cv::Mat picture(3 * kPanel.height, kPanel.width, CV_8UC3, cv::Scalar::all(255));
+  for (int i = 0; i < 3; ++i) {
+    Panel panel(fit.compared, most,
+                picture(cv::Rect(0, i * kPanel.height, kPanel.width, kPanel.height)));
+    panel.DrawGrid(fmt::format("turn about {} of the camera, the height is +- {:.1f} degrees",
+                               axes[i], most / kDegree));
+    panel.DrawTurns(fit.compared, i);
+  }
+  Write(fmt::format("dots: camera; green: gyroscope by the fit; red: difference x {:g}; a mark a "
+                    "second",
+                    kMagnified),
+        {10, picture.rows - 12}, &picture);
   return picture;
 }
 

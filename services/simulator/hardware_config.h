@@ -11,7 +11,8 @@ struct HardwareConfig {
   std::string camera = "lcm";
   std::string host = "127.0.0.1";
   int fcu_port = 14540, fcu_own_port = 14580;
-  int lidar_port = 2368;
+  int lidar_port = 2368, position_port = 8308;
+  std::string lidar_clock = "own";
   int camera_port = 8090;
   int jpeg_quality = 90;
 
@@ -24,6 +25,8 @@ struct HardwareConfig {
     v("fcu_port", fcu_port, "UDP port on which the companion listens");
     v("fcu_own_port", fcu_own_port, "UDP port on which the autopilot listens");
     v("lidar_port", lidar_port, "UDP port of the data packets");
+    v("position_port", position_port, "UDP port of the position packets");
+    v("lidar_clock", lidar_clock, "own (since its power-on) or gps (UTC, by a pulse per second)");
     v("camera_port", camera_port, "TCP port on which the camera serves http://HOST:PORT/stream");
     v("jpeg_quality", jpeg_quality, "of the camera's stream, 1 to 100");
   }

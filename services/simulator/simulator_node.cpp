@@ -118,7 +118,7 @@ void SimulatorNode::PublishSensors(Output* output, int64_t utime) {
   if (!config_.hardware.mavlink()) PublishImu(output->imu, utime);
   hardware_.Tell(utime, bus_.Now(), simulator_, output->imu);
   if (!faults_.LidarSilent()) {
-    hardware_.SendPackets(std::move(output->packets), faults_.LidarClock());
+    hardware_.SendPackets(std::move(output->packets), *power_on_, bus_.Now(), faults_.LidarClock());
     if (output->sweep && !config_.hardware.packets()) PublishSweep(std::move(*output->sweep));
   }
   if (!output->image) return;

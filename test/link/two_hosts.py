@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Two vehicles and a ground station, each a host of its own, joined by a path that loses 2 %, takes 40 ms and carries
 1 MB/s for each vehicle: light messages cross, heavy ones stay, nothing is lost on board whatever becomes of the
-ground, and what a stranger sends is refused.
+ground, and what a stranger sends is refused. On one bus neither vehicle hears the other.
 
 two_hosts.py BIN FLIGHT.lcm, in a network namespace of its own"""
 
@@ -213,9 +213,9 @@ class TwoHosts(unittest.TestCase):
         self.assertEqual(child.stdout.readline(), "ready\n")
         return child
 
-    def play(self, vehicle, seconds=SECONDS):
+    def play(self, vehicle, seconds=SECONDS, host=None):
         key = self.keys[vehicle].hex() if vehicle == "falcon_" else ""
-        return self.hosts[vehicle].python("play", FLIGHT, vehicle, key, seconds)
+        return (host or self.hosts[vehicle]).python("play", FLIGHT, vehicle, key, seconds)
 
     def test_messages_and_commands(self):
         self.service(self.hosts["falcon_"], "falcon_", "mission")
@@ -253,11 +253,40 @@ class TwoHosts(unittest.TestCase):
         self.assertIn("LIDAR_SCAN", sent["falcon_"])
         self.assertIn("COMMAND", self.relay.falcon_[1].channels)
 
-    def command(self, name, vehicle):
-        child = self.ground.start(BIN / "chase-command", name, "--vehicle", vehicle, *self.sealed(vehicle),
+    def command(self, name, vehicle, host=None):
+        child = (host or self.ground).start(BIN / "chase-command", name, "--vehicle", vehicle, *self.sealed(vehicle),
                                   stderr=subprocess.PIPE, text=True)
         _, words = child.communicate(timeout=20)
         return subprocess.CompletedProcess([], child.returncode, "", words)
+
+    def test_two_vehicles_on_one_bus(self):
+        """Each process hears its own vehicle's commands, plans and setpoints, all of them and no others."""
+        host = self.hosts["falcon_"]
+        controls = []
+        for vehicle, number in VEHICLES.items():
+            controls.append(self.service(host, vehicle, "control"))
+            self.service(host, vehicle, "fcu", f"{{port: {14540 + number}}}")
+            self.service(host, vehicle, "mission")
+        time.sleep(1.5)
+        bus = self.listen(host)
+        players = {vehicle: self.play(vehicle, seconds, host) for vehicle, seconds in zip(VEHICLES, (6.0, 3.0))}
+        self.assertEqual(self.command("takeoff", "falcon_", host).returncode, 2)  # mission's own word
+        sent = {vehicle: told(player) for vehicle, player in players.items()}
+        time.sleep(2.0)  # until each process has told its counts
+        for control in controls:  # it sends setpoints as well
+            control.kill()
+        time.sleep(2.0)
+        here = told(bus)
+        for vehicle in VEHICLES:
+            for channel, process in (("PLAN", "CONTROL"), ("ATTITUDE_SETPOINT", "FCU"), ("COMMAND", "MISSION")):
+                received, foreign = here["status"][f"{vehicle}{process}_STATUS"][channel]
+                own = here.get(vehicle + channel, 0)
+                print(f"{vehicle}{process}: {channel}: {received} heard of {own} of its own, {foreign} refused")
+                self.assertEqual((received, foreign), (own, 0))
+                self.assertGreaterEqual(own, sent[vehicle].get(channel, 0))
+        self.assertGreater(sent["falcon_"]["PLAN"], sent["eagle_"]["PLAN"])
+        self.assertGreater(here["falcon_COMMAND"], 0)
+        self.assertNotIn("eagle_COMMAND", here)
 
     def test_losing_the_ground_harms_nothing(self):
         vehicle = "falcon_"
@@ -381,7 +410,7 @@ def listen():
         if not name:
             continue
         counts[name] = counts.get(name, 0) + 1
-        if name.endswith(("CONTROL_STATUS", "FCU_STATUS")) and data:
+        if name.endswith(("CONTROL_STATUS", "FCU_STATUS", "MISSION_STATUS")) and data:
             status[name] = wire.channels_of_status(data)
     print(json.dumps({**counts, "status": status}), flush=True)
 

@@ -106,6 +106,23 @@ TEST(CalibrateImu, RotationAndDelayAreFoundWithinTheirSigmas) {
   EXPECT_LT(worst, 4.5) << "sigmas";
 }
 
+/// What the checking picture draws.
+TEST(CalibrateImu, ComparedTurnsAgreeWithTheFitAndAreInOrder) {
+  const Recording r = Record(Hands(), Askew(), 0.1, 2);
+  const ImuFit fit = FitImu(r.seen, r.gyro);
+  ASSERT_GT(fit.compared.size(), 500u) << "20 a second";
+  double errors = 0.0, turns = 0.0, last = 0.0;
+  for (const ComparedTurn& turn : fit.compared) {
+    EXPECT_GT(turn.t, last);
+    last = turn.t;
+    errors += (turn.camera - turn.gyro).squaredNorm();
+    turns += turn.camera.squaredNorm();
+  }
+  const double n = 3.0 * static_cast<double>(fit.compared.size());
+  EXPECT_NEAR(std::sqrt(errors / n), fit.rms, 0.2 * fit.rms);
+  EXPECT_GT(std::sqrt(turns / n), 20.0 * fit.rms);
+}
+
 TEST(CalibrateImu, TurnsAboutOneAxisAndShortRecordingsAreRefused) {
   const Recording one = Record({{0.0, 0.0, 0.3}}, Askew(), 0.0, 1);
   EXPECT_NE(FitImu(one.seen, one.gyro).problem.find("one axis"), std::string::npos);

@@ -191,6 +191,12 @@ void WriteTurns(const std::string& file, const Board& board, const Isometry3d& X
   }
 }
 
+int Pixels(const cv::Mat& picture, const cv::Scalar& bgr) {
+  cv::Mat mask;
+  cv::inRange(picture, bgr, bgr, mask);
+  return cv::countNonZero(mask);
+}
+
 TEST(CalibrateProgram, FromALogOfTurnsToTheCamerasRotation) {
   const std::string folder = ::testing::TempDir() + "calibrate_imu/";
   std::filesystem::remove_all(folder);
@@ -207,7 +213,8 @@ TEST(CalibrateProgram, FromALogOfTurnsToTheCamerasRotation) {
   X_BC.linear() = askew.rig.R_BC();
   WriteTurns(folder + "log.lcm", board, X_BC, 0.04);
   const std::string call = "imu " + folder + "log.lcm --square 0.14 --marker 0.105 --rig " +
-                           folder + "rig.yaml --out " + folder + "found.yaml";
+                           folder + "rig.yaml --out " + folder + "found.yaml --check " + folder +
+                           "imu.png";
   ASSERT_EQ(std::system((CHASE_CALIBRATE " " + call + " > " + folder + "said").c_str()), 0);
   RigFile found;
   config::Load(folder + "found.yaml", &found);
@@ -226,6 +233,11 @@ TEST(CalibrateProgram, FromALogOfTurnsToTheCamerasRotation) {
                                   view.down, view.up, view.bearing)),
             std::string::npos)
       << text;
+  const cv::Mat picture = cv::imread(folder + "imu.png");
+  ASSERT_FALSE(picture.empty());
+  EXPECT_GT(Pixels(picture, {40, 40, 40}), 500) << "dots of the camera's turns";
+  EXPECT_GT(Pixels(picture, {60, 200, 60}), 5000) << "the gyroscope's";
+  EXPECT_GT(Pixels(picture, {60, 60, 230}), 500) << "their difference";
   WriteLog(folder + "no_imu.lcm", board, LidarInCamera(rig.rig));
   EXPECT_NE(Call("imu " + folder + "no_imu.lcm"), 0);
 }

@@ -37,5 +37,8 @@ if(TARGET chase-fcu AND TARGET chase-simulator AND TARGET chase-lidar AND TARGET
   add_test(NAME clouds_live
     COMMAND ${CMAKE_SOURCE_DIR}/test/flight/in_namespace.sh $<TARGET_FILE:clouds_live_test> 20
     WORKING_DIRECTORY ${CMAKE_SOURCE_DIR})
-  set_tests_properties(clouds_live PROPERTIES TIMEOUT 120 RUN_SERIAL TRUE)
+  add_test(NAME clouds_live_gps
+    COMMAND ${CMAKE_SOURCE_DIR}/test/flight/in_namespace.sh $<TARGET_FILE:clouds_live_test> 10 gps
+    WORKING_DIRECTORY ${CMAKE_SOURCE_DIR})
+  set_tests_properties(clouds_live clouds_live_gps PROPERTIES TIMEOUT 120 RUN_SERIAL TRUE)
 endif()

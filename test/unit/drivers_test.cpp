@@ -11,9 +11,11 @@
 #include "services/camera/capture_clock.h"
 #include "services/camera/frame_source.h"
 #include "services/camera/grabber.h"
+#include "services/lidar/gps_clock.h"
 #include "services/lidar/sweep_assembler.h"
 #include "services/simulator/estimator.h"
 #include "services/simulator/mjpeg_server.h"
+#include "services/simulator/position_packet.h"
 #include "services/simulator/simulator.h"
 
 namespace chase {
@@ -74,6 +76,22 @@ TEST(Drivers, CloudsFromPacketsAreTheSensorsOwn) {
   std::printf("worst point %.6f m, worst firing time %.2f us\n", worst, 1e6 * worst_time);
   EXPECT_LT(worst, 1e-3) << "half of the packet's 2 mm";
   EXPECT_LT(worst_time, 2e-6) << "stamps are whole microseconds";
+}
+
+/// 2016-01-21 08:18:02.34 UTC, as in a recording of a true sensor.
+TEST(Drivers, PositionPacketsAreASensorsOwn) {
+  constexpr int64_t kUtc = 1'453'364'282'340'000;
+  const auto locked = simulator::PositionPacket(kUtc, true);
+  EXPECT_EQ(locked[198] | locked[199] << 8 | locked[200] << 16 | locked[201] << 24,
+            (18 * 60 + 2) * 1'000'000 + 340'000);
+  EXPECT_STREQ(reinterpret_cast<const char*>(&locked[206]),
+               "$GPRMC,081802.00,A,0000.0000000,N,00000.0000000,E,0.0,0.0,210116,0.0,E,A*33\r\n");
+  lidar::GpsClock clock;
+  const auto own = simulator::PositionPacket(kUtc, false);
+  clock.Hear(own.data(), own.size(), kUtc);
+  EXPECT_EQ(clock.Problem(kUtc), "the sensor has no pulse per second");
+  clock.Hear(locked.data(), locked.size(), kUtc);
+  EXPECT_EQ(clock.Utc(kUtc % 3'600'000'000, kUtc + 3'000), kUtc);
 }
 
 TEST(Drivers, LasersOffTheCentreSeeWhatTheyWouldSee) {

@@ -314,6 +314,18 @@ TEST(Vehicle, IsDrawnFromTheSeedWhereverSensorsAreFlown) {
   EXPECT_FALSE(truth.battery.sags);
 }
 
+TEST(Configure, TheLidarsDriverGoesByTheClockThatItsSensorHas) {
+  world::Scenario scenario = MakeWorld("hall", 1, {});
+  scenario.services.clear();
+  flight::FlightOptions options;
+  options.scenario_file = "world.yaml";
+  EXPECT_EQ(flight::Configure(scenario, options).lidar.clock, "arrival");
+  scenario.services.push_back({"simulator", "hardware: {lidar_clock: gps, position_port: 8309}"});
+  const auto lidar = flight::Configure(scenario, options).lidar;
+  EXPECT_EQ(lidar.clock, "gps");
+  EXPECT_EQ(lidar.position_port, 8309);
+}
+
 TEST(Configure, RefusesPlansThatLeadToWhereNothingIsListed) {
   const auto problem = [](const std::string& service, const std::string& text) -> std::string {
     world::Scenario scenario = MakeWorld("hall", 1, {});
