@@ -378,8 +378,7 @@ PlanResult Pilot::Along(const PlanRequest& request, const Start& start, Stop leg
 PlanResult Pilot::Land(double t0, const Start& start, const BodyEstimate& body) {
   PlanResult here = Hold(t0, start, "landing");
   if (descending_ || !SeesObstacles(t0 - config_.latency)) return here;
-  PlanRequest request = Request(t0, start);
-  if (!HasTarget(t0 - config_.latency)) request.target_body.reset();
+  const PlanRequest request = Request(t0, start);
   const LandingNeeds needs{config_.planner.drone_radius + config_.landing_room,
                            std::tan(config_.landing_slope_deg * M_PI / 180.0),
                            config_.landing_reach};
@@ -403,6 +402,8 @@ PlanResult Pilot::Climb(double t0, const BodyEstimate& body) const {
 }
 
 PlanResult Pilot::Search(double t0, const Start& start, const BodyEstimate& body) {
+  // Where prediction is silent the target may be in sight, and mapping lists nothing of it.
+  if (forecast_->has_target) return BrakeAndLook(t0, start, start.yaw.yaw);
   const TargetSearch::Lead lead =
       search_.Advance(t0 - config_.latency, obstacles_, body, start.state.p, start.yaw.yaw);
   if (!lead.place) return BrakeAndLook(t0, start, lead.yaw);
@@ -412,7 +413,6 @@ PlanResult Pilot::Search(double t0, const Start& start, const BodyEstimate& body
   request.target = world::Trajectory::Constant(
       {start.state.p.x() + near * way.x(), start.state.p.y() + near * way.y(), lead.place->z()}, t0,
       request.horizon);
-  request.target_body.reset();
   PlanResult plan = planner_->Plan(request);
   const Eigen::Vector3d end = plan.trajectory.Position(plan.trajectory.end());
   if (plan.verdict >= Verdict::kBrake || (end - start.state.p).norm() < kGoes)
@@ -433,7 +433,8 @@ PlanResult Pilot::Rest(double t0, const Start& start) const {
   PlanResult plan =
       sees ? RestPlan(config_.planner, request) : RestWithoutLists(std::move(request));
   plan.yaw = {start.yaw.yaw};
-  if (plan.reason.empty() && IsAtRest(start.state)) plan.verdict = Verdict::kWait;
+  const bool waits = plan.reason.empty() && plan.verdict != Verdict::kEscape;
+  if (waits && IsAtRest(start.state)) plan.verdict = Verdict::kWait;
   return sees ? plan : AsLastResort("obstacles are not heard of", std::move(plan));
 }
 

@@ -106,7 +106,6 @@ bool KeepsOffMovers(const PlannerConfig& config, const PlanRequest& request,
   PlanRequest moving = request;
   moving.horizon = std::min(request.horizon, way.end() - request.t0);
   moving.asks_sight = false;
-  moving.target_body.reset();
   moving.obstacles.clear();
   for (const world::Obstacle& o : request.obstacles)
     if (o.moving) moving.obstacles.push_back(o);

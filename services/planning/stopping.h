@@ -35,7 +35,7 @@ std::optional<Stop> GoTo(const PlannerConfig& config, const PlanRequest& request
 std::optional<Stop> GoOn(const PlannerConfig& config, const PlanRequest& request,
                          const world::Trajectory& way);
 
-/// Does the way keep off what moves, but for the target, over the request's horizon?
+/// Does the way keep off what moves, the target too, over the request's horizon?
 bool KeepsOffMovers(const PlannerConfig& config, const PlanRequest& request,
                     const world::Trajectory& way);
 

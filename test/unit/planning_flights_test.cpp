@@ -85,8 +85,13 @@ class Flown {
     for (; t_ < course_.end; t_ += kPeriod) {
       if (t_ - listed > kListed - 1e-9) pilot_.SetObstacles(listed = t_, course_.obstacles);
       const bool visible = t_ < course_.lost || t_ > course_.found;
-      if (visible && t_ - seen > kSeen - 1e-9)
-        pilot_.SetForecast(forecast_ = course_.forecast(seen = t_));
+      const bool told = visible || t_ > course_.lost + world::kMostAge.target_unseen;
+      if (told && t_ - seen > kSeen - 1e-9) {
+        Forecast nobody;
+        nobody.t = seen = t_;
+        if (visible) forecast_ = course_.forecast(t_);
+        pilot_.SetForecast(visible ? forecast_ : nobody);
+      }
       pilot_.SetFlying(!plans_.empty());
       if (const auto plan = pilot_.Update(t_, Body())) Take(*plan, counts);
     }
@@ -181,7 +186,7 @@ TEST(Flights, AreTheSameElsewhere) {
   ground.half = {30.0, 30.0, 0.3};
   ground.shape = (3.0 * ground.half.cwiseAbs2()).cwiseInverse().asDiagonal();
   ground.center = world::Trajectory::Constant({0.0, 0.0, -0.3}, 0.0, 1.0);
-  Course here{GoingRound, RandomPillars(3), 10.0, 20.0, 21.0};
+  Course here{GoingRound, RandomPillars(4), 10.0, 20.0, 21.0};
   here.obstacles.push_back(ground);
   Course there = here;
   there.forecast = forecast;

@@ -24,6 +24,13 @@ inline Forecast Walking(double t) {
   return f;
 }
 
+/// As prediction says that there is nobody.
+inline Forecast Nobody(double t) {
+  Forecast f;
+  f.t = t;
+  return f;
+}
+
 /// Flies the pilot's plans perfectly.
 class Flight {
  public:
@@ -35,7 +42,8 @@ class Flight {
         pilot.SetObstacles(t, obstacles);
         if (!unseen.empty()) pilot.SetUnseen(t, unseen);
       }
-      if (with_target && std::fmod(t, 0.3) < kPeriod) pilot.SetForecast(Walking(t));
+      if (predicts && std::fmod(t, 0.3) < kPeriod)
+        pilot.SetForecast(with_target ? Walking(t) : Nobody(t));
       if (const auto plan = pilot.Update(t, Body())) {
         plans.push_back(*plan);
         waiting = *plan;
@@ -61,7 +69,8 @@ class Flight {
 
   Pilot pilot;
   double t = 0.0;
-  bool hears = true;  // of obstacles
+  bool hears = true;     // of obstacles
+  bool predicts = true;  // prediction is not silent
   std::vector<world::Obstacle> obstacles, unseen;
   double largest_step = 0.0, largest_kink = 0.0;
   std::vector<PlanResult> plans;

@@ -206,6 +206,43 @@ TEST(Pilot, AClimbWaitsForWhoeverPasses) {
   EXPECT_GT(flight.Body().p.z(), 1.0);
 }
 
+// Of somebody who was not seen to come, and goes.
+TEST(Pilot, AHoverWithinSomebodysReachIsAnEscape) {
+  Flight flight{PlanningConfig()};
+  flight.Run(6.0, false);
+  ASSERT_EQ(flight.plans.back().verdict, Verdict::kWait);
+  world::Obstacle walker = Walker(0.0, 0.0);
+  walker.center = {flight.t, 10.0, Eigen::MatrixXd::Zero(2, 3)};
+  walker.center.coefficients << 0.6, 0.0, 0.9, 15.0, 0.0, 0.0;
+  flight.obstacles = {walker};
+  const size_t before = flight.plans.size();
+  flight.Run(0.15, false);
+  ASSERT_GT(flight.plans.size(), before);
+  for (size_t i = before; i < flight.plans.size(); ++i) {
+    const PlanResult& plan = flight.plans[i];
+    const bool inside = std::any_of(plan.proofs.begin(), plan.proofs.end(),
+                                    [](const Proof& proof) { return proof.from > 0.0; });
+    EXPECT_EQ(plan.verdict == Verdict::kEscape, inside) << Name(plan.verdict) << plan.reason;
+  }
+  EXPECT_EQ(flight.plans[before].verdict, Verdict::kEscape) << flight.plans[before].reason;
+}
+
+// The target is in no list.
+TEST(Pilot, AClimbWaitsForTheTargetToPass) {
+  const auto climbs = [](double y) {
+    Flight flight{PlanningConfig()};
+    flight.predicts = false;
+    const world::Obstacle walker = Walker(2.0, y);
+    Forecast forecast = Walking(0.0);
+    forecast.target = walker.center;
+    flight.pilot.SetForecast(forecast);
+    flight.Run(1.4, false);
+    return !flight.plans.empty();
+  };
+  EXPECT_FALSE(climbs(0.0));
+  EXPECT_TRUE(climbs(6.0));
+}
+
 TEST(Pilot, AClimbThatWasBrokenOffUnderAMissionGoesOn) {
   Flight flight{PlanningConfig()};
   flight.pilot.SetFlying(false);
