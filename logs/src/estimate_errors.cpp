@@ -62,14 +62,15 @@ std::optional<TruePositions> TruthAt(const std::vector<TruthSample>& truth, doub
   const auto after = std::lower_bound(truth.begin(), truth.end(), t - kTimeTolerance,
                                       [](const TruthSample& s, double time) { return s.t < time; });
   if (after == truth.end()) return std::nullopt;
-  if (std::abs(after->t - t) <= kTimeTolerance) return TruePositions{after->p, after->target};
+  if (std::abs(after->t - t) <= kTimeTolerance)
+    return TruePositions{after->p, after->target, after->yaw};
   if (after == truth.begin()) return std::nullopt;
   const auto before = after - 1;
   const double gap = after->t - before->t;
   if (gap > kLargestGap) return std::nullopt;
   const double s = (t - before->t) / gap;
   return TruePositions{before->p + s * (after->p - before->p),
-                       before->target + s * (after->target - before->target)};
+                       before->target + s * (after->target - before->target), before->yaw};
 }
 
 TrajectoryError OdometryError(const FlightRecord& record) {

@@ -6,9 +6,11 @@
 
 namespace chase::logs {
 
-/// p_WB and p_WT of the truth at mission time t, linear between samples; nothing outside them.
+/// p_WB and p_WT of the truth at mission time t, linear between samples, and the last yaw of the
+/// body [rad]; nothing outside them.
 struct TruePositions {
   Eigen::Vector3d body, target;
+  double yaw;
 };
 std::optional<TruePositions> TruthAt(const std::vector<TruthSample>& truth, double t);
 

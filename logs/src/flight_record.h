@@ -62,6 +62,7 @@ struct AutopilotSample {
 struct PoseSample {
   double t = 0.0;
   Eigen::Vector3d p = Eigen::Vector3d::Zero();  ///< p_WB as estimated
+  double yaw = 0.0;                             ///< of the body, rad
 };
 
 struct TargetSample {

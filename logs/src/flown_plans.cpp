@@ -1,5 +1,6 @@
 #include "logs/src/flown_plans.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <iterator>
@@ -18,15 +19,21 @@ Eigen::Vector3d Wanted(const PlanSample& plan, double t) {
   return way.Position(std::min(t, way.end()));
 }
 
-/// By how much the frame W was off when the plan was heard. What the plan keeps off had been listed
-/// in that frame, and was off alike: that it drifted before, or is tilted, is no error of tracking.
-Eigen::Vector3d FrameError(const FlightRecord& record, const PlanSample& plan) {
+/// From the true frame W to the one in which the plan was heard. What the plan keeps off had been
+/// listed in that one, and was off alike: that it drifted before, is turned or tilted, is no error
+/// of tracking.
+Eigen::Isometry3d FrameOf(const FlightRecord& record, const PlanSample& plan) {
   const auto next = std::upper_bound(record.poses.begin(), record.poses.end(), plan.heard,
                                      [](double t, const PoseSample& pose) { return t < pose.t; });
-  if (next == record.poses.begin()) return Eigen::Vector3d::Zero();
+  Eigen::Isometry3d frame = Eigen::Isometry3d::Identity();
+  if (next == record.poses.begin()) return frame;
   const PoseSample& pose = *std::prev(next);
   const auto truth = TruthAt(record.truth, pose.t);
-  return truth ? Eigen::Vector3d(pose.p - truth->body) : Eigen::Vector3d::Zero();
+  if (!truth) return frame;
+  frame.linear() =
+      Eigen::AngleAxisd(pose.yaw - truth->yaw, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  frame.translation() = pose.p - frame.linear() * truth->body;
+  return frame;
 }
 
 }  // namespace
@@ -85,13 +92,13 @@ void AddCertificates(const FlightRecord& record, const std::vector<SampleScore>&
   std::vector<double> errors;
   long exceeded = 0;
   const PlanSample* before = nullptr;
-  Eigen::Vector3d frame = Eigen::Vector3d::Zero();
+  Eigen::Isometry3d frame = Eigen::Isometry3d::Identity();
   for (const TruthSample& s : record.truth) {
     const PlanSample* plan = record.InMission(s.t) ? followed.At(s.t) : nullptr;
     if (!plan) continue;
-    if (plan != before) frame = FrameError(record, *plan);
+    if (plan != before) frame = FrameOf(record, *plan);
     before = plan;
-    errors.push_back((s.p + frame - Wanted(*plan, s.t)).norm());
+    errors.push_back((frame * s.p - Wanted(*plan, s.t)).norm());
     exceeded += errors.back() > plan->hard_radius - record.scenario.chaser.radius;
   }
   if (errors.empty()) return;

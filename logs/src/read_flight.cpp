@@ -19,6 +19,7 @@
 #include "chase/tracking_t.hpp"
 #include "chase/truth_t.hpp"
 #include "common/bus/convert.h"
+#include "common/math/rotation.h"
 #include "logs/src/good_message.h"
 #include "logs/src/landing_watch.h"
 #include "logs/src/log_survey.h"
@@ -158,7 +159,8 @@ class Gatherer {
   void AddEstimates(FlightRecord* record) const {
     for (const pose_t& m : poses_)
       if (m.health != pose_t::HEALTH_STARTING)
-        record->poses.push_back({Time(m.utime), bus::ToVector(m.pos)});
+        record->poses.push_back(
+            {Time(m.utime), bus::ToVector(m.pos), math::Yaw(bus::ToQuaternion(m.orientation))});
     for (const target_t& m : targets_)
       record->targets.push_back({Time(m.utime), m.state == target_t::TRACKING,
                                  bus::ToVector(m.mean), bus::ToVector(m.velocity),

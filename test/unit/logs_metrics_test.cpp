@@ -157,6 +157,22 @@ TEST(Metrics, TheTubeIsAboutThePlanInTheFrameThatItWasMadeIn) {
   EXPECT_NEAR(*Compute(record).tracking_error_p99_m, 0.165, 0.01);
 }
 
+// Odometry that began anew knows no north.
+TEST(Metrics, TheTubeIsAboutThePlanInAFrameThatIsTurned) {
+  FlightRecord record = Standing({5, 0, 1.5}, {8, 0, 0.5});
+  record.plans = {Hover(0, -0.5, 0.0, 1.0)};
+  auto& way = record.plans[0].position.coefficients;
+  way.conservativeResize(2, 3);
+  way.row(1) << -0.2 * record.plans[0].position.duration, 0.0, 0.0;
+  record.tracking = {{-0.4, tracking_t::PLAN, 0}};
+  for (TruthSample& s : record.truth) s.p.y() = 0.2 * (s.t + 0.5);
+  for (int k = -150; k <= 1000; ++k) {
+    const double t = 0.01 * k;
+    record.poses.push_back({t, {-0.2 * (t + 0.5), 0.0, 1.5}, 0.5 * M_PI});
+  }
+  EXPECT_NEAR(*Compute(record).tracking_error_p99_m, 0.0, 1e-9);
+}
+
 TEST(Metrics, AWayDownByAPlanIsHeldAgainstIt) {
   FlightRecord record = Standing({5, 0, 1.5}, {8, 0, 0.5});
   record.plans = {Hover(0, -2.0, 5.0, 99.0)};
