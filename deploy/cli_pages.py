@@ -9,10 +9,15 @@ import re
 import subprocess
 import sys
 
+sys.path.append(str(pathlib.Path(__file__).resolve().parent / "launcher"))
+sys.dont_write_bytecode = True
+import script  # noqa: E402
+
 OPTION = re.compile(r"^\s+(-[-\w]*(?:,-[-\w]*)*)(?:\{\w+\})?( \S.*?)?(?:\s{2,}(\S.*))?$")
 ENTRY = re.compile(r"^\s{2,4}(\S+)(?: (\S.*?))?(?:\s{2,}(\S.*))?$")
 CHOICES = re.compile(r"\{([^}]*)\}")
 NUMBER = re.compile(r"(U?INT|FLOAT)\b")
+FILES = 'mapfile -t COMPREPLY < <(compgen -f -- "$now")'  # a name may hold blanks
 EMPTY = {"options": [], "positionals": [], "subcommands": []}
 
 
@@ -61,7 +66,7 @@ def values_of(page):
         elif NUMBER.match(argument):
             yield f"    {name.replace(',', '|')}) COMPREPLY=(); return ;;"
         elif argument:
-            yield f"    {name.replace(',', '|')}) COMPREPLY=($(compgen -f -- \"$now\")); return ;;"
+            yield f"    {name.replace(',', '|')}) {FILES}; return ;;"
 
 
 def completion(program, page, subpages):
@@ -76,7 +81,7 @@ def completion(program, page, subpages):
     if values:
         lines += ['  case $before in', *values, "  esac"]
     lines += ['  COMPREPLY=($(compgen -W "$words" -- "$now"))',
-              '  [ ${#COMPREPLY[@]} -gt 0 ] || COMPREPLY=($(compgen -f -- "$now"))', "}",
+              "  [ ${#COMPREPLY[@]} -gt 0 ] || " + FILES, "}",
               f"complete -o filenames -F {function} {program}"]
     return "\n".join(lines) + "\n"
 
@@ -105,11 +110,12 @@ def man(program, version, page, subpages):
 
 
 def main():
-    bin_dir, out = pathlib.Path(sys.argv[1]).resolve(), pathlib.Path(sys.argv[2])
+    words = script.arguments(__doc__, 2)
+    bin_dir, out = pathlib.Path(words[0]).resolve(), pathlib.Path(words[1])
     completions, pages = out / "share/bash-completion/completions", out / "share/man/man1"
     for folder in (completions, pages):
         folder.mkdir(parents=True, exist_ok=True)
-    programs = [bin_dir / name for name in sys.argv[3:]] or sorted(bin_dir.glob("chase-*"))
+    programs = [bin_dir / name for name in words[2:]] or sorted(bin_dir.glob("chase-*"))
     for program in programs:
         page = parsed(help_of(program))
         subpages = {row[0]: parsed(help_of(program, row[0])) for row in page["subcommands"]}

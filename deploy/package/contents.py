@@ -15,6 +15,10 @@ import sys
 import textwrap
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path.append(str(ROOT / "deploy/launcher"))
+sys.dont_write_bytecode = True
+import script  # noqa: E402
+
 MAINTAINER = "chase authors <authors@chase.example>"
 NOT_PACKAGED = "chase-compare"  # of the tests
 
@@ -49,6 +53,9 @@ def write_pages(build, out):
     for file in (build / "share/bash-completion/completions").glob("chase-*"):
         if file.name != NOT_PACKAGED:
             shutil.copy(file, completions)
+    for page in (ROOT / "deploy/package").glob("chase-*.1"):  # of scripts: the options that it names
+        options = sorted(set(re.findall(r"--[a-z][a-z-]*", page.read_text(encoding="utf-8").replace("\\-", "-"))))
+        (completions / page.stem).write_text(f"complete -o default -W '{' '.join(options)}' {page.stem}\n", encoding="utf-8")
 
 
 def date():
@@ -67,10 +74,8 @@ def changelog(version):
 
 
 def main():
-    if len(sys.argv) != 4:
-        print(__doc__, file=sys.stderr)
-        return 1
-    build, out, version = pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[2]), sys.argv[3]
+    *folders, version = script.arguments(__doc__, 3, 3)
+    build, out = map(pathlib.Path, folders)
     etc = fresh(out / "etc")
     write_configs(build, etc)
     write_pages(build, out)

@@ -11,6 +11,7 @@ sys.dont_write_bytecode = True
 
 import bus  # noqa: E402
 import processes  # noqa: E402
+import script  # noqa: E402
 
 TARGET = """# Everything that flies. `systemctl mask chase-viewer` leaves one out.
 [Unit]
@@ -80,10 +81,7 @@ def scheduling(row):
 
 
 def main():
-    if len(sys.argv) != 3:
-        print(__doc__, file=sys.stderr)
-        return 1
-    table, out = map(pathlib.Path, sys.argv[1:])
+    table, out = map(pathlib.Path, script.arguments(__doc__, 2, 2))
     rows = [row for row in processes.read_table(table.read_bytes(), table.name) if row["vehicle"]]
     shutil.rmtree(out, ignore_errors=True)  # units of rows that are gone
     out.mkdir(parents=True)

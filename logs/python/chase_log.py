@@ -37,11 +37,12 @@ def read(path, *channels, damage=None):
 
     `path`: a log, or a flight's folder, which stands for its flight.lcm. What is damaged is left out, as chase-log
     does, and a log that is cut off ends where it does; (place, bytes) of each such stretch goes into the list `damage`.
+    Raises ValueError for a file that is no log.
     """
     path = pathlib.Path(path)
     with open(path / "flight.lcm" if path.is_dir() else path, "rb") as file:
-        if file.seek(0, 2) == 0:
-            return
+        if file.read(4) != _SYNC:
+            raise ValueError(f"{file.name}: is no LCM log (it does not begin with ED A1 DA 01)")
         with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as log:
             for utime, channel, data in _events(log, {name.encode() for name in channels}, [] if damage is None else damage):
                 yield Event(utime, channel.decode(), decode(data))

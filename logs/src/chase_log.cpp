@@ -70,6 +70,16 @@ std::string TimeProblem(const std::string& text) {
   return IsNumber(text) ? "" : text + " is no time in s, 0 or above";
 }
 
+std::string RadiusProblem(const std::string& text) {
+  double value = 0.0;
+  const bool positive = IsNumber(text) && CLI::detail::lexical_cast(text, value) && value > 0.0;
+  return positive ? "" : text + " is no radius in m, above 0";
+}
+
+std::string SigmasProblem(const std::string& text) {
+  return IsNumber(text) ? "" : text + " is no number of deviations, 0 or above";
+}
+
 /// What is written is not what is read: nothing is lost by a slip.
 void RefuseSame(const std::string& in, const std::string& out) {
   std::error_code none;                                   // neither need exist
@@ -316,10 +326,10 @@ void AddVerify(CLI::App* app, Arguments* a, int* exit_code) {
       "that cannot be told.");
   AddLog(sub, "FLIGHT", &a->in);
   sub->add_option("--radius", a->radius, "least that a plan must claim: sphere and tube, m")
-      ->check(CLI::PositiveNumber)
+      ->check(RadiusProblem)
       ->capture_default_str();
   sub->add_option("--sigmas", a->sigmas, "least deviations that a plan must claim")
-      ->check(CLI::NonNegativeNumber)
+      ->check(SigmasProblem)
       ->capture_default_str();
   sub->callback([a, exit_code] {
     const Verification verification = Verify(a->in, a->radius, a->sigmas);

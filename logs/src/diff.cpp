@@ -138,7 +138,8 @@ bool Ignored(const std::vector<std::string>& ignore, const std::string& channel,
              const std::string& path) {
   const std::string name = channel + "." + path;
   return std::any_of(ignore.begin(), ignore.end(), [&](const std::string& pattern) {
-    return fnmatch(pattern.c_str(), name.c_str(), 0) == 0 || pattern == channel;
+    return fnmatch(pattern.c_str(), name.c_str(), 0) == 0 ||
+           fnmatch(pattern.c_str(), channel.c_str(), 0) == 0;
   });
 }
 
@@ -270,6 +271,10 @@ Differences Diff(const std::string& a, const std::string& b, const std::vector<s
   const auto pairings = Pair(names_a, names_b);
   if (pairings.empty())
     throw std::runtime_error(a + " and " + b + ": have no channel in common; compare others");
+  const auto ignored = [&](const auto& pairing) { return Ignored(ignore, pairing.first, ""); };
+  if (std::all_of(pairings.begin(), pairings.end(), ignored))
+    throw BadOption("--ignore: leaves nothing to compare of what " + a + " and " + b +
+                    " have in common; ignore less");
   Comparison comparison(ignore, tolerance, pairings);
   Side side_a(a), side_b(b);
   while (side_a.more || side_b.more) {

@@ -9,6 +9,10 @@ import json
 import pathlib
 import sys
 
+sys.path.append(str(pathlib.Path(__file__).resolve().parents[2] / "deploy/launcher"))
+sys.dont_write_bytecode = True
+import script  # noqa: E402
+
 
 def merit(flight):
     in_sight = (flight["safe_ratio"] + flight["visible_ratio"]) / 2
@@ -43,7 +47,7 @@ def read(arguments, home):
 
 def main():
     home = pathlib.Path(__file__).resolve().parent
-    flights = read(sys.argv[1:], home)
+    flights = read(script.arguments(__doc__, 0), home)
     for planner in sorted({f["planner"] for f in flights}):
         mine = [f for f in flights if f["planner"] == planner]
         scenarios = list(dict.fromkeys(f["scenario"] for f in mine))

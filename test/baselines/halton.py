@@ -4,6 +4,11 @@
 Halton points 1 to 20 in bases 2, 3, 5, 7, logarithmic over the ranges below."""
 
 import pathlib
+import sys
+
+sys.path.append(str(pathlib.Path(__file__).resolve().parents[2] / "deploy/launcher"))
+sys.dont_write_bytecode = True
+import script  # noqa: E402
 
 RANGES = {
     "naegeli_style": [("distance", 0.1, 10), ("sight", 0.3, 100), ("potential", 0.01, 10),
@@ -34,4 +39,5 @@ def main():
 
 
 if __name__ == "__main__":
+    script.arguments(__doc__, 0, 0)
     main()

@@ -60,9 +60,10 @@ int main(int argc, char** argv) {
   app.add_option("--out", o.campaign.out, "folder of the results (default compare)");
   app.add_flag("--quiet", o.campaign.quiet, "no progress bar");
   app.add_flag("!--no-pictures", o.campaign.pictures, "tables only");
-  app.add_flag("--list", o.list, "print one command per flight and fly nothing");
-  app.add_option("--fly", o.fly, "one flight of this scenario in this process");
-  app.add_option("--result", o.result, "file for the result of --fly");
+  auto* list = app.add_flag("--list", o.list, "print one command per flight and fly nothing");
+  auto* fly = app.add_option("--fly", o.fly, "one flight of this scenario in this process");
+  list->excludes(fly);
+  app.add_option("--result", o.result, "file for the result of --fly")->needs(fly);
   try {
     app.parse(argc, argv);
     Execute(o);

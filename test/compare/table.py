@@ -8,6 +8,10 @@ import json
 import pathlib
 import sys
 
+sys.path.append(str(pathlib.Path(__file__).resolve().parents[2] / "deploy/launcher"))
+sys.dont_write_bytecode = True
+import script  # noqa: E402
+
 
 def cell(flight):
     text = f"{flight['acceleration_cost']:.3f}, {flight['plan_cpu_ms']['mean']:.3f}"
@@ -33,7 +37,7 @@ def read(arguments):
 
 
 def main():
-    flights = read(sys.argv[1:])
+    flights = read(script.arguments(__doc__, 0))
     planners = list(dict.fromkeys(f["planner"] for f in flights))
     scenarios = list(dict.fromkeys(f["scenario"] for f in flights))
     at = {(f["scenario"], f["planner"]): f for f in flights}

@@ -16,8 +16,11 @@ import time
 
 for folder in ("replay", "house"):
     sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1] / folder))
-import channels
-import lcmlog
+sys.path.append(str(pathlib.Path(__file__).resolve().parents[2] / "deploy/launcher"))
+sys.dont_write_bytecode = True
+import channels  # noqa: E402
+import lcmlog  # noqa: E402
+import script  # noqa: E402
 
 GROUP, PORT = "239.255.76.67", 7667
 NAN = struct.pack(">d", float("nan"))
@@ -220,4 +223,4 @@ def main(bin_dir, flight, mission):
             check_carrier(bus, bin_dir, service, [a.format(folder=folder) for a in arguments], light)
 
 
-main(*sys.argv[1:])
+main(*script.arguments(__doc__, 3, 3))

@@ -3,6 +3,7 @@
 
 bad_use.py BIN_DIR SERVICE..."""
 
+import os
 import pathlib
 import re
 import socket
@@ -10,6 +11,8 @@ import subprocess
 import sys
 import tempfile
 import unittest
+
+import tree
 
 TESTS = pathlib.Path(__file__).resolve().parents[1]
 BIN = pathlib.Path(sys.argv[1])
@@ -22,10 +25,13 @@ TOOL_SERVICES = {"lidar", "camera", "odometry", "mapping", "perception", "predic
                  "control", "mission", "simulator"}
 CAMPAIGNS = ["perception_campaign", "perception_photos", "../test/mapping_campaign", "../test/mapping_walkers",
              "../test/odometry_trial"]  # each flies one service
-SCRIPTS = [".ci/run", "deploy/build", "deploy/doctor", "deploy/fly", "deploy/scenarios/twelve/generate.py", "deploy/setup",
-           "deploy/slurm/submit", "deploy/spy", "test/run", "test/flight/bars", "test/flight/calibration", "test/flight/live_kills", "test/flight/sentinels",
-           "test/fuzz/fuzz_processes.py", "test/fuzz/make_corpus", "test/fuzz/run", "test/odometry/campaign.py", "test/package/clean_root", "test/safety/run",
-           "test/sanitize/run", "test/viewer/live_flights.py"]
+# Scripts that nobody calls by hand: systemd, Slurm, other scripts or CTest do.
+INNER = ("*_test.py", "deploy/package/chase-*", "deploy/package/post*", "deploy/package/pre*", "deploy/slurm/flight.sbatch",
+         "deploy/systemd/back-off", "test/flight/stand_in_*.py", "test/link/two_hosts.py", "test/package/clean_root_check",
+         "test/unittest_run.py")
+SIZE_TEST = pathlib.Path("test/unit/mcap_size_test.py")  # by hand, too
+SCRIPTS = [path for path in tree.files() if path.parts[0] in (".ci", "deploy", "test") and tree.text(path).startswith("#!") and
+           (path == SIZE_TEST or not any(path.match(inner) for inner in INNER))]
 LIMIT = 20  # s
 
 
@@ -117,11 +123,17 @@ class BadUse(unittest.TestCase):
         self.for_each(programs(), lambda program: self.assert_refused(
             run(program, "--no-such-flag"), pathlib.Path(program).name))
 
+    @staticmethod
+    def call(script, *arguments):
+        path = TESTS.parent / script
+        command = [path] if os.access(path, os.X_OK) else [sys.executable, "-B", path]
+        return subprocess.run([*command, *arguments], check=False, capture_output=True, text=True, timeout=LIMIT)
+
     def test_scripts_name_their_commit(self):
+        self.assertGreater(len(SCRIPTS), 30)
         for script in SCRIPTS:
             with self.subTest(script=script):
-                answer = subprocess.run([TESTS.parent / script, "--version"], check=False,
-                                        capture_output=True, text=True, timeout=LIMIT)
+                answer = self.call(script, "--version")
                 self.assertEqual((answer.returncode, answer.stderr), (0, ""))
                 self.assertRegex(answer.stdout, r"^\d+\.\d+\.\d+ \(commit [0-9a-z-]+\)\n$")
 
@@ -129,8 +141,7 @@ class BadUse(unittest.TestCase):
         for script in SCRIPTS:
             for flag in ("-h", "--help"):
                 with self.subTest(script=script, flag=flag):
-                    answer = subprocess.run([TESTS.parent / script, flag], check=False,
-                                            capture_output=True, text=True, timeout=LIMIT)
+                    answer = self.call(script, flag)
                     self.assertEqual((answer.returncode, answer.stderr), (0, ""))
                     self.assertGreater(len(answer.stdout), 40)
 
@@ -209,6 +220,8 @@ class BadUse(unittest.TestCase):
         if TOOL_SERVICES <= set(SERVICES):
             self.assert_refused(run("chase-flight", "gym", "--print-config", "planning", "--log", "a.lcm"), "--print-config", "--log")
             self.assert_refused(run("chase-campaign", "--out", "no/such", "--fly", "--compare", "a"), "--fly", "--compare")
+            self.assert_refused(run("chase-compare", "--list", "--result", "a.json"), "--result", "--fly")
+            self.assert_refused(run("chase-compare", "--list", "--fly", "S1"), "--list", "--fly")
 
     def test_port_in_use(self):
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
@@ -276,12 +289,16 @@ class BadUse(unittest.TestCase):
                 ("replay/golden.py", "check", BIN, "no/such.yaml", "nobody"),
                 ("replay/golden.py", "check", "no/bin", "no/such.yaml", "planning"),
                 ("replay/golden.py", "record", BIN, "no/such.yaml", "no/such.lcm", "planning"),
-                ("replay/golden.py", "record", BIN, "no/such.yaml", "README.md", "planning")):
+                ("replay/golden.py", "record", BIN, "no/such.yaml", "README.md", "planning"),
+                ("replay/replay_check.py", BIN), ("package/scenes.py",), ("unit/mcap_size_test.py", BIN),
+                ("baselines/halton.py", "sets.csv"), ("baselines/halton.py", "--no-such"),
+                ("flight/calibration",), ("flight/calibration", "--no-such"),
+                ("flight/calibration", "no/such.lcm"), ("flight/calibration", TESTS.parent / "README.md"),
+                ("flight/in_namespace.sh",), ("flight/in_namespace.sh", "--no-such"), ("flight/lockstep.sh", BIN),
+                ("fuzz/make_corpus", "--no-such"), ("../deploy/build", "--no-such"), ("../deploy/cli_pages.py", BIN),
+                ("../deploy/systemd/units.py",), ("../deploy/package/contents.py", BIN)):
             with self.subTest(script=script, arguments=arguments):
-                command = [sys.executable, "-B", TESTS / script, *map(str, arguments)]
-                answer = subprocess.run(command, capture_output=True, text=True, timeout=LIMIT,
-                                        check=False)
-                self.assert_refused(answer, script.split("/")[1])
+                self.assert_refused(self.call(TESTS / script, *map(str, arguments)), pathlib.Path(script).name)
 
     def test_tools_bad_flag(self):
         self.for_each(self.tools(), lambda program: self.assert_refused(

@@ -9,6 +9,10 @@ import subprocess
 import sys
 import tempfile
 
+sys.path.append(str(pathlib.Path(__file__).resolve().parents[2] / "deploy/launcher"))
+sys.dont_write_bytecode = True
+import script  # noqa: E402
+
 BALL = "  - {center: [[0, 0, 0]], shape: [1, 0, 0, 0, 1, 0, 0, 0, 1]}\n"
 
 
@@ -85,7 +89,7 @@ def check_malformed(bin_dir, program, text, words):
 
 
 def main():
-    bin_dir, scenes = pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[2])
+    bin_dir, scenes = map(pathlib.Path, script.arguments(__doc__, 2, 2))
     files = sorted(scenes.glob("*.yaml"))
     bad = malformed((scenes / "pillars.yaml").read_text(),
                     (scenes / "predict_turn.yaml").read_text())

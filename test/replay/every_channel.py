@@ -9,6 +9,10 @@ import sys
 
 import lcmlog
 
+sys.path.append(str(pathlib.Path(__file__).resolve().parents[2] / "deploy/launcher"))
+sys.dont_write_bytecode = True
+import script  # noqa: E402
+
 ROW = re.compile(r'^ *\{"(\w+)", "(\w+_t)", "', re.MULTILINE)
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 TABLE, PROCESSES = ROOT / "common/bus/channels.cpp", ROOT / "deploy/processes.json"
@@ -51,4 +55,4 @@ def main(types, log, out):
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    main(*script.arguments(__doc__, 3, 3))

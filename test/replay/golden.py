@@ -20,7 +20,10 @@ import sys
 import tempfile
 
 sys.path.insert(0, str(pathlib.Path(__file__).parent))
-import lcmlog
+sys.path.append(str(pathlib.Path(__file__).resolve().parents[2] / "deploy/launcher"))
+sys.dont_write_bytecode = True
+import lcmlog  # noqa: E402
+import script  # noqa: E402
 
 GOLDEN = pathlib.Path(__file__).resolve().parents[2] / "logs" / "golden"
 TOLERANCE = "1e-6"  # relative; another processor's mathematics library may round differently
@@ -174,4 +177,4 @@ def main(arguments):
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    main(script.arguments(__doc__, 0))

@@ -10,7 +10,10 @@ import sys
 import tempfile
 
 sys.path.insert(0, str(pathlib.Path(__file__).parent))
-import lcmlog
+sys.path.append(str(pathlib.Path(__file__).resolve().parents[2] / "deploy/launcher"))
+sys.dont_write_bytecode = True
+import lcmlog  # noqa: E402
+import script  # noqa: E402
 
 
 def replay(program, config, flight, out):
@@ -52,4 +55,4 @@ def compare(service, channel, recorded, replayed):
             sys.exit(f"{service}: {channel} number {i} differs from the flight")
 
 
-main(*sys.argv[1:])
+main(*script.arguments(__doc__, 5))

@@ -183,6 +183,24 @@ class LogTools(unittest.TestCase):
             self.assert_refused(run("chase-log", "diff", self.log, self.log, "--ignore", pattern), 2, pattern, "info")
         self.good("diff", self.log, self.log, "--ignore", "*_STATUS.*", "--ignore", "POSE", "--ignore", "*.seq")
 
+    def test_diff_ignores_channels_by_a_pattern(self):
+        lost = self.without("fewer.lcm", lambda channel, k: channel.endswith("_STATUS") and k == 0)
+        self.assertEqual(run("chase-log", "diff", self.log, lost).returncode, 1)
+        self.assertEqual(self.good("diff", self.log, lost, "--ignore", "*_STATUS"), "no difference\n")
+
+    def test_diff_of_nothing_is_no_answer(self):
+        imu = self.without("only_imu.lcm", lambda channel, k: channel != "IMU")
+        for pattern in ("*", "*.*", "IMU", "IMU.*"):
+            self.assert_refused(run("chase-log", "diff", self.log, imu, "--ignore", pattern), 2, "nothing to compare")
+        self.good("diff", self.log, imu, "--ignore", "IMU.seq")
+
+    def test_verify_refuses_what_is_no_bound(self):
+        for option, values in (("--radius", ("nan", "inf", "-1", "0", "x")), ("--sigmas", ("nan", "inf", "-1", "x"))):
+            for value in values:
+                with self.subTest(option=option, value=value):
+                    answer = run("chase-log", "verify", self.log, option, value)
+                    self.assert_refused(answer, 2, option, f" {value} is no ")
+
     def test_no_answer_is_not_a_difference(self):
         for program in (("diff", self.log, "no.lcm"), ("diff", self.log), ("verify", "no.lcm"), ("verify",)):
             self.assert_refused(run("chase-log", *program), 2)

@@ -76,9 +76,17 @@ class Python(unittest.TestCase):
         damaged = self.folder / "damaged.lcm"
         middle = len(data) // 2
         for bad, least in ((data[:-3], whole - 1), (data[:middle] + bytes(100) + data[middle + 100:], whole - 3),
-                           (data[:middle] + data[middle + 1000:], whole - 40), (b"", 0), (b"no log at all" * 9, 0)):
+                           (data[:middle] + data[middle + 1000:], whole - 40)):
             damaged.write_bytes(bad)
             self.assertGreaterEqual(sum(1 for _ in chase_log.read(damaged)), least)
+
+    def test_a_file_that_is_no_log_is_refused_as_chase_log_does(self):
+        file = self.folder / "none.lcm"
+        for bad in (b"", b"no log at all" * 9):
+            file.write_bytes(bad)
+            with self.assertRaisesRegex(ValueError, "none.lcm: is no LCM log"):
+                next(chase_log.read(file))
+            self.assertEqual(subprocess.run([BIN / "chase-log", "info", file], check=False, capture_output=True).returncode, 1)
 
     def test_damage_costs_what_it_costs_chase_log(self):
         data, draw = self.log.read_bytes(), random.Random(5)

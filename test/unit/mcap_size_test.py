@@ -13,8 +13,10 @@ import tempfile
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "test/replay"))
+sys.path.append(str(ROOT / "deploy/launcher"))
 sys.dont_write_bytecode = True
 import lcmlog  # noqa: E402
+import script  # noqa: E402
 
 MOST_RATIO, MOST_SECONDS_PER_MB = 0.8, 20.0 / 1050.0
 
@@ -39,4 +41,4 @@ def main(bin_dir, log):
     return 0 if passed == len(counts) and ratio <= MOST_RATIO and seconds <= MOST_SECONDS_PER_MB * 1e-6 * size else 1
 
 
-sys.exit(main(*sys.argv[1:]))
+sys.exit(main(*script.arguments(__doc__, 2, 2)))
