@@ -20,7 +20,7 @@ add_custom_command(
   COMMAND ${Python3_EXECUTABLE} -B ${deploy}/package/contents.py ${CMAKE_BINARY_DIR} ${contents} ${PROJECT_VERSION}
   COMMAND ${CMAKE_COMMAND} -E touch ${contents}/done
   DEPENDS ${programs} ${deploy}/cli_pages.py ${deploy}/systemd/units.py ${deploy}/processes.json
-          ${deploy}/package/contents.py ${CMAKE_SOURCE_DIR}/CHANGELOG.md
+          ${deploy}/package/contents.py ${deploy}/launcher/script.py ${CMAKE_SOURCE_DIR}/CHANGELOG.md
   VERBATIM)
 set(jar ${CMAKE_BINARY_DIR}/share/chase/chase_types.jar)
 file(GLOB types CONFIGURE_DEPENDS ${CMAKE_SOURCE_DIR}/lcmtypes/*_t.lcm)

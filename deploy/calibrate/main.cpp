@@ -131,15 +131,18 @@ int Imu(const Arguments& a) {
              turns.seen.size(), turns.gyro.size());
   const ImuFit fit = FitImu(turns.seen, turns.gyro);
   Require(fit.problem);
-  WritePicture(a.check, ImuPicture(fit));
   constexpr double kDegree = M_PI / 180.0, kWorst = 1.0 * kDegree;
-  if (fit.rms > kWorst)
+  const bool holds = fit.rms <= kWorst;
+  if (holds) {
+    rig.rig = WithCamera(rig.rig, fit.R_BC.toRotationMatrix());
+    WriteRig(a.out, rig);
+  }
+  WritePicture(a.check, ImuPicture(fit));
+  if (!holds)
     throw std::runtime_error(fmt::format(
         "the camera's turns are {:.1f} degrees off the IMU's, see {}: check --square, --marker and "
         "--rig, and that the board stood still",
         fit.rms / kDegree, a.check));
-  rig.rig = WithCamera(rig.rig, fit.R_BC.toRotationMatrix());
-  WriteRig(a.out, rig);
   fmt::print(
       "camera's roll, pitch, yaw {:.2f} {:.2f} {:.2f} +- {:.2f} degrees, by {} turns that are "
       "{:.2f} degrees off; its stamps are {:.1f} +- {:.1f} ms late: add {:.4f} to camera.yaml's "

@@ -17,8 +17,8 @@ def commands(fault, url):
     this = [sys.executable, "-B", __file__]
     if "channels" in fault:
         return [[*this, "flood", url, str(fault["rate_hz"]), *fault["channels"]]]
-    if "times" not in fault:
-        return []  # each process does it to itself
+    if fault.get("bus"):
+        return []  # each process delays and loses what it hears
     # Beside so many others on its core a process takes that many times as long.
     return [[*this, "work"]] * round((fault["times"] - 1) * os.cpu_count())
 

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/math/rotation.h"
+
 namespace chase::logs {
 namespace {
 
@@ -70,7 +72,8 @@ std::optional<TruePositions> TruthAt(const std::vector<TruthSample>& truth, doub
   if (gap > kLargestGap) return std::nullopt;
   const double s = (t - before->t) / gap;
   return TruePositions{before->p + s * (after->p - before->p),
-                       before->target + s * (after->target - before->target), before->yaw};
+                       before->target + s * (after->target - before->target),
+                       before->yaw + s * math::WrapAngle(after->yaw - before->yaw)};
 }
 
 TrajectoryError OdometryError(const FlightRecord& record) {

@@ -6,8 +6,8 @@
 
 namespace chase::logs {
 
-/// p_WB and p_WT of the truth at mission time t, linear between samples, and the last yaw of the
-/// body [rad]; nothing outside them.
+/// p_WB and p_WT of the truth at mission time t and the body's yaw [rad], linear between samples;
+/// nothing outside them.
 struct TruePositions {
   Eigen::Vector3d body, target;
   double yaw;

@@ -20,8 +20,8 @@ Eigen::Vector3d Wanted(const PlanSample& plan, double t) {
 }
 
 /// From the true frame W to the one in which the plan was heard. What the plan keeps off had been
-/// listed in that one, and was off alike: that it drifted before, is turned or tilted, is no error
-/// of tracking.
+/// listed in that one, and was off alike: that it drifted before, or is turned, is no error of
+/// tracking.
 Eigen::Isometry3d FrameOf(const FlightRecord& record, const PlanSample& plan) {
   const auto next = std::upper_bound(record.poses.begin(), record.poses.end(), plan.heard,
                                      [](double t, const PoseSample& pose) { return t < pose.t; });

@@ -48,6 +48,14 @@ std::optional<world::Obstacle> TargetBody(const Forecast& f) {
   return body;
 }
 
+// One of whom prediction tells no more stays where its forecast ends at the latest: it could be
+// anywhere soon, and there is no way to rest from that.
+void LeaveAt(double t, world::Obstacle* body) {
+  const double last = std::min(t, body->center.end());
+  body->center = world::Trajectory::Constant(body->center.Position(last), t, 1.0);
+  body->velocity_covariance.setZero();
+}
+
 // The climb, with a stop that control flies when no newer plan comes. Neither is certified.
 PlanResult StoppingSoon(double t0, PlanResult climb) {
   constexpr double kOver = kBrakeTimes[2];
@@ -251,10 +259,11 @@ PlanRequest Pilot::Request(double t0, const Start& start) const {
   request.target = forecast_->target;
   request.target_sigma = math::LargestSigma(forecast_->covariance);
   request.target_speed_sigma = math::LargestSigma(forecast_->velocity_covariance);
-  // One that is lost could be anywhere soon, and there is no way to rest from that.
+  request.target_body = TargetBody(*forecast_);
   if (HasTarget(t0 - config_.latency))
     request.target_manoeuvre = {config_.target_acceleration, config_.target_memory};
-  request.target_body = TargetBody(*forecast_);
+  else if (request.target_body)
+    LeaveAt(t0, &*request.target_body);
   request.horizon = std::clamp(forecast_->target.end() - t0, kShortestHorizon, config_.horizon);
   return request;
 }
@@ -281,7 +290,8 @@ PlanResult Pilot::Wait(double t0, const Start& start, const BodyEstimate& body) 
   return search_.has_seen() ? Search(t0, start, body) : Hover(t0, start);
 }
 
-// Nothing reaches into the rest of the climb, and no mover comes to it for as long as a stop takes.
+// Nothing reaches into the rest of the climb, and no mover comes to it for as long as a stop takes,
+// nor the target as it is forecast: what it may do besides reaches everybody who stands near it.
 bool Pilot::IsFree(double t0, const Start& start, const world::Trajectory& climb) const {
   constexpr double kStopTakes = 1.5;  // s: from the climb's 0.75 m/s, and to be seen
   if (!SeesObstacles(t0 - config_.latency)) return false;
@@ -290,6 +300,8 @@ bool Pilot::IsFree(double t0, const Start& start, const world::Trajectory& climb
   if (world::IsColumnBlocked(obstacles_, p, config_.planner.hard_radius(), rest)) return false;
   PlanRequest request = Request(t0, start);
   request.horizon = kStopTakes;
+  request.target_manoeuvre = {};
+  if (request.target_body) request.target_body->velocity_covariance.setZero();
   return KeepsOffMovers(config_.planner, request, climb);
 }
 
@@ -403,7 +415,7 @@ PlanResult Pilot::Climb(double t0, const BodyEstimate& body) const {
 
 PlanResult Pilot::Search(double t0, const Start& start, const BodyEstimate& body) {
   // Where prediction is silent the target may be in sight, and mapping lists nothing of it.
-  if (forecast_->has_target) return BrakeAndLook(t0, start, start.yaw.yaw);
+  if (forecast_->has_target) return Hold(t0, start, "target lost, prediction is silent");
   const TargetSearch::Lead lead =
       search_.Advance(t0 - config_.latency, obstacles_, body, start.state.p, start.yaw.yaw);
   if (!lead.place) return BrakeAndLook(t0, start, lead.yaw);

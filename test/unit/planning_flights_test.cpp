@@ -170,7 +170,8 @@ TEST(Flights, EachPlanFollowsFromTheOneBeforeAndHolds) {
   EXPECT_GE(counts.certified, 0.95 * counts.plans);
 }
 
-// Where the frame has its origin does not matter: the same flight elsewhere.
+// Where the frame has its origin does not matter: the same flight elsewhere, a search that goes
+// somewhere among it, as not all draws of pillars ask for one.
 TEST(Flights, AreTheSameElsewhere) {
   const Vector3d away(32.0, -16.0, 8.0);
   const auto forecast = [&](double t) {

@@ -43,7 +43,7 @@ class Flight {
         if (!unseen.empty()) pilot.SetUnseen(t, unseen);
       }
       if (predicts && std::fmod(t, 0.3) < kPeriod)
-        pilot.SetForecast(with_target ? Walking(t) : Nobody(t));
+        pilot.SetForecast(with_target ? Forecasts() : Nobody(t));
       if (const auto plan = pilot.Update(t, Body())) {
         plans.push_back(*plan);
         waiting = *plan;
@@ -52,6 +52,12 @@ class Flight {
       if (flown) largest_step = std::max(largest_step, (Body().p - last).norm());
       last = Body().p;
     }
+  }
+
+  Forecast Forecasts() const {
+    Forecast f = Walking(t);
+    if (curves) f.target.coefficients.conservativeResizeLike(Eigen::MatrixXd::Zero(4, 3));
+    return f;
   }
 
   BodyEstimate Body() const {
@@ -71,6 +77,7 @@ class Flight {
   double t = 0.0;
   bool hears = true;     // of obstacles
   bool predicts = true;  // prediction is not silent
+  bool curves = false;   // forecasts are no lines, though what they say is
   std::vector<world::Obstacle> obstacles, unseen;
   double largest_step = 0.0, largest_kink = 0.0;
   std::vector<PlanResult> plans;

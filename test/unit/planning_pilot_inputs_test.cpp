@@ -227,20 +227,23 @@ TEST(Pilot, AHoverWithinSomebodysReachIsAnEscape) {
   EXPECT_EQ(flight.plans[before].verdict, Verdict::kEscape) << flight.plans[before].reason;
 }
 
-// The target is in no list.
+// The target is in no list. Where it stands two metres off, and is hardly known yet, the drone
+// climbs.
 TEST(Pilot, AClimbWaitsForTheTargetToPass) {
-  const auto climbs = [](double y) {
+  const auto climbs = [](double y, double speed) {
     Flight flight{PlanningConfig()};
     flight.predicts = false;
-    const world::Obstacle walker = Walker(2.0, y);
     Forecast forecast = Walking(0.0);
-    forecast.target = walker.center;
+    forecast.target = {0.0, 2.5, Eigen::MatrixXd::Zero(2, 3)};
+    forecast.target.coefficients << 2.0, y, 0.5, -2.5 * speed, 0.0, 0.0;
+    forecast.velocity_covariance = 0.5 * Eigen::Matrix3d::Identity();
     flight.pilot.SetForecast(forecast);
-    flight.Run(1.4, false);
+    flight.Run(1.2, false);
     return !flight.plans.empty();
   };
-  EXPECT_FALSE(climbs(0.0));
-  EXPECT_TRUE(climbs(6.0));
+  EXPECT_FALSE(climbs(0.0, 1.5));
+  EXPECT_TRUE(climbs(3.0, 1.5));
+  EXPECT_TRUE(climbs(0.0, 0.0));
 }
 
 TEST(Pilot, AClimbThatWasBrokenOffUnderAMissionGoesOn) {

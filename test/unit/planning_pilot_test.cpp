@@ -128,11 +128,34 @@ TEST(Pilot, SearchesFartherForWhoWasFast) {
   EXPECT_GT(goes(3.0), goes(0.0));
 }
 
-// It may be in sight all the time, and then it is no obstacle that is listed.
+// The target may be in sight all the time, and then it is no obstacle that is listed.
 TEST(Pilot, GoesNowhereWhilePredictionIsSilent) {
   const auto plans = AfterTheLastSight(0.0, 0.0, 3.0, 0.0, true);
   EXPECT_GT(plans.size(), 10u);
   EXPECT_EQ(std::count_if(plans.begin(), plans.end(), Goes), 0);
+}
+
+// It does not flee from a curve that goes on where no forecast does.
+TEST(Pilot, WhatItDoesWhilePredictionIsSilentIsCertified) {
+  for (const auto task : {std::optional<Task>(), std::optional(Task::kHold),
+                          std::optional(Task::kReturn), std::optional(Task::kLand)}) {
+    Flight flight{PlanningConfig()};
+    flight.curves = true;
+    flight.Run(8.0, true);
+    flight.predicts = false;
+    flight.Run(1.5, true);
+    if (task) flight.pilot.SetTask(*task, Eigen::Vector3d(0.0, 0.0, 0.1));
+    flight.Run(2.0, true);
+    const size_t before = flight.plans.size();
+    const Eigen::Vector3d place = flight.Body().p;
+    flight.Run(6.0, true);
+    ASSERT_GT(flight.plans.size(), before);
+    for (size_t i = before; i < flight.plans.size(); ++i)
+      EXPECT_GE(flight.plans[i].certified_clearance, 0.0) << flight.plans[i].reason;
+    if (task != Task::kReturn) {
+      EXPECT_LT((flight.Body().p - place).norm(), 0.1);
+    }
+  }
 }
 
 TEST(Pilot, TurnsToALostTargetTheShorterWay) {
