@@ -8,10 +8,10 @@ namespace chase::bus {
 
 namespace {
 
-uint64_t SeedOf(const std::string& name) {
-  uint64_t seed = 0;
-  for (const char letter : name) seed = 31 * seed + static_cast<unsigned char>(letter);
-  return seed;
+uint64_t StreamOf(const std::string& name) {
+  uint64_t stream = 0;
+  for (const char letter : name) stream = 31 * stream + static_cast<unsigned char>(letter);
+  return stream;
 }
 
 }  // namespace
@@ -25,7 +25,7 @@ void LiveFaults::Take(const event_t& event, const std::string& process) {
       delays_[kind.victim] = begins ? std::llround(kind.amount * 1e6) : 0;
     if (kind.effect != Effect::kLoss) continue;
     loss_ = begins ? kind.amount : 0.0;
-    draws_ = world::Random{SeedOf(event.name), SeedOf(process)};
+    draws_ = world::Random{seed_, StreamOf(event.name + " of " + process)};
   }
 }
 

@@ -35,15 +35,16 @@ UdpBus::UdpBus(const std::string& url, const std::string& prefix, const Seal& se
   if (!lcm_.good())
     throw std::runtime_error(fmt::format(
         "{}: LCM cannot open it; check the address and port, or run deploy/doctor", url));
-  if (std::getenv(kFaultsVariable) != nullptr) HearFaults();
+  if (const char* seed = std::getenv(kFaultsVariable)) HearFaults(std::strtoull(seed, nullptr, 10));
 }
 
 /// Beside Subscribe: what a process sends names what it has heard, and this the process has not.
-void UdpBus::HearFaults() {
+void UdpBus::HearFaults(uint64_t seed) {
+  faults_ = LiveFaults(seed);
   UdpBus::SubscribeRaw("FAULT", [this](const uint8_t* data, size_t size) {
     Guarded("FAULT", [&] {
       event_t event;
-      if (event.decode(data, 0, static_cast<int>(size)) > 0)
+      if (event.decode(data, 0, static_cast<int>(size)) == static_cast<int>(size))
         faults_.Take(event, identity().process);
     });
   });

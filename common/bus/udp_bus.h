@@ -14,9 +14,9 @@ namespace chase::bus {
 
 /// Messages over LCM's UDP multicast. Every channel name gets `prefix` in front. With a key light
 /// messages are sealed, and those that are not are refused as a stranger's; heavy ones, which stay
-/// on the host, have no seal. Where the environment holds kFaultsVariable it also hears FAULT, and
-/// delays and losses of a test flight strike what is subscribed to; SubscribeEvery's messages, the
-/// record of what was sent, they spare.
+/// on the host, have no seal. Where the environment holds kFaultsVariable, a seed, it also hears
+/// FAULT, and delays and losses of a test flight strike what is subscribed to; SubscribeEvery's
+/// messages, the record of what was sent, they spare.
 class UdpBus : public Bus {
  public:
   static constexpr char kFaultsVariable[] = "CHASE_BUS_FAULTS";
@@ -52,7 +52,7 @@ class UdpBus : public Bus {
   };
   static void Deliver(const lcm::ReceiveBuffer* buffer, const std::string& channel,
                       Subscription* subscription);
-  void HearFaults();
+  void HearFaults(uint64_t seed);
   void HandOver(Subscription* to, const uint8_t* data, size_t size);
   void HandOverDelayed();
   /// Size of a message without its seal; nothing, and counted, where that is not ours or has come

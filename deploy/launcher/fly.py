@@ -230,7 +230,7 @@ class Flight:
         faults = told.get("faults", ())
         self.faults = {fault["name"]: fault for fault in faults}
         # Processes that hear of them on FAULT delay and lose what comes to them.
-        self.bus_faults = {"CHASE_BUS_FAULTS": "1"} if any(fault.get("bus") for fault in faults) else {}
+        self.bus_faults = {"CHASE_BUS_FAULTS": str(seed)} if any(fault.get("bus") for fault in faults) else {}
         self.strikes, self.killed, self.strained = sorted(strikes_of(faults, kills)), [], {}
 
     def child(self, name, command, env=None, **options):

@@ -112,6 +112,8 @@ TEST_F(LiveFaultsTest, NewerMessagesOvertakeWhenADelayEnds) {
 
 TEST_F(LiveFaultsTest, EachProcessLosesItsShareByItsOwnDraw) {
   Receiver control("control"), planning("planning");
+  setenv(UdpBus::kFaultsVariable, "2", 1);
+  Receiver other("control");  // of a flight with another seed
   Sender sender;
   sender.Fault("loss-20", event_t::BEGINS);
   constexpr int kBursts = 50, kEach = 40;
@@ -119,11 +121,13 @@ TEST_F(LiveFaultsTest, EachProcessLosesItsShareByItsOwnDraw) {
     for (int i = 0; i < kEach; ++i) sender.Pose();
     control.CatchUp(&sender);
     planning.CatchUp(&sender);
+    other.CatchUp(&sender);
   }
   // The share's standard deviation is 0.9 % of 2000.
-  for (const Receiver* receiver : {&control, &planning})
+  for (const Receiver* receiver : {&control, &planning, &other})
     EXPECT_NEAR(1.0 - static_cast<double>(receiver->poses.size()) / (kBursts * kEach), 0.2, 0.04);
   EXPECT_NE(control.poses, planning.poses);
+  EXPECT_NE(control.poses, other.poses);
 }
 
 TEST_F(LiveFaultsTest, NoLossEndsUnheard) {
