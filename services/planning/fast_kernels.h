@@ -77,10 +77,9 @@ struct Context {
   // Candidate i = p choices + s: its free control points are those of prefix p plus those of the
   // first step's choice s.
   float* prefix;       ///< [n / choices][kRecord]
-  const float* first;  ///< [3 (M - 3)][row]: free points, row: choices padded
-  int choices, row;
+  const float* first;  ///< [choices][kWhitened]: free points
+  int choices;
   uint64_t inverse;  ///< 2^32 / choices, rounded up
-  const float* x;    ///< [3 (M - 3)][stride]: free points of all, or null until `spread`
   float* j1;         ///< [stride]: weighted J1
   float* work;       ///< [3 (M - 3)][stride], for `check`
   uint32_t* alive;   ///< [stride / 8], for `check`
@@ -137,10 +136,10 @@ struct CandidateInput {
   const int* choices;     ///< [steps]
   int steps;
   double base[kRecord];               ///< without skeletons
-  const float* first_whitened;        ///< [3 (M - 3)][row], of the first step
+  const float* first_whitened;        ///< [3 (M - 3)][first_row], of the first step
   double first_middle[3 * kMaxFree];  ///< of those
   const float* second_whitened;       ///< [3 (M - 3)][second_row], of the second step, if any
-  int second_row;
+  int first_row, second_row;  ///< choices, padded
   float j1_offset;  ///< J1 = j1_offset + |whitened|^2
   /// Where the prefix' whitened sum and first_middle are longer, squared, J1 may stay infinite.
   float longest2;
@@ -199,9 +198,6 @@ struct Table {
   /// Prefixes, and J1 of all candidates; where longest2 rules a prefix out, J1 is infinite and the
   /// prefix unset.
   void (*generate)(Context& c, const CandidateInput& in);
-  /// Free points of all candidates side by side, for those who will need many: fills c.x = x. No
-  /// prefix may have been ruled out.
-  void (*spread)(Context& c, float* x);
   /// Indices i with low < j1[i] <= high, ascending; `ids` needs room for stride + kPad.
   int (*select)(const Context& c, float low, float high, int* ids);
   /// Sets `nodes` by what they cost the candidates ids[0], ids[stride] ... of kPad, the most first.

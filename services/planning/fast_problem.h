@@ -29,8 +29,6 @@ class FastProblem {
     has_costs_ = true;
   }
   /// After Set without a limit, or SetAllCosts, only: so is AliveGroups.
-  /// Makes the points of candidates quicker to get at: worth it before most of them are asked for.
-  void Spread();
   /// The obstacles, once a problem; before costs of obstacles or feasibility are asked for. False
   /// when the target is inside a shape while sight is asked: nothing is feasible; or when a shape
   /// is not positive definite, which is beyond the kernels.
@@ -60,7 +58,7 @@ class FastProblem {
   void SetRecords();
   void SetRanges();
   void Generate(float limit);
-  void SetColumns(int from, int n, int nx, std::vector<float>* columns) const;
+  void SetWhitened(int from, int n, int nx, std::vector<float>* columns) const;
   double ObstacleCost(int node, const double* p) const;
 
   PlannerConfig config_;
@@ -90,7 +88,7 @@ class FastProblem {
   int near_begin_[kernels::kQuadratureNodes + 1];
   std::vector<kernels::Shadow> shadows_;
   std::vector<int> order_, states_;
-  std::vector<float> x_, j1_, work_, prefix_, first_, second_;
+  std::vector<float> j1_, work_, prefix_, first_, first_whitened_, second_whitened_;
   std::vector<uint32_t> alive_;
 };
 

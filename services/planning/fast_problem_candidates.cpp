@@ -88,22 +88,18 @@ void FastProblem::SetRanges() {
   }
 }
 
-// Free points and whitened ones of `n` records from `from` on, side by side.
-void FastProblem::SetColumns(int from, int n, int nx, std::vector<float>* columns) const {
+// The whitened part of `n` records from `from` on, side by side.
+void FastProblem::SetWhitened(int from, int n, int nx, std::vector<float>* columns) const {
   const int row = Padded(n);
-  columns->assign(static_cast<size_t>(2 * nx * row), 0.0f);
-  for (int s = 0; s < n; ++s) {
-    const double* record = &records_[static_cast<size_t>(from + s) * kRecord];
-    for (int k = 0; k < nx; ++k) {
-      (*columns)[static_cast<size_t>(k * row + s)] = static_cast<float>(record[k]);
-      (*columns)[static_cast<size_t>((nx + k) * row + s)] =
-          static_cast<float>(record[kernels::kWhitened + k]);
-    }
-  }
+  columns->assign(static_cast<size_t>(nx * row), 0.0f);
+  for (int s = 0; s < n; ++s)
+    for (int k = 0; k < nx; ++k)
+      (*columns)[static_cast<size_t>(k * row + s)] = static_cast<float>(
+          records_[static_cast<size_t>((from + s) * kRecord + kernels::kWhitened + k)]);
 }
 
 void FastProblem::Generate(float limit) {
-  const int nx = 3 * free_, first = choices_[0], row = Padded(first);
+  const int nx = 3 * free_, first = choices_[0];
   kernels::CandidateInput in{};
   std::copy(base_, base_ + nx, in.base);
   double offset = 0.0;
@@ -118,13 +114,18 @@ void FastProblem::Generate(float limit) {
     }
   }
   in.j1_offset = static_cast<float>(std::max(0.0, offset));
-  SetColumns(0, first, nx, &first_);
-  in.first_whitened = &first_[static_cast<size_t>(nx * row)];
+  SetWhitened(0, first, nx, &first_whitened_);
+  in.first_whitened = first_whitened_.data();
+  in.first_row = Padded(first);
+  first_.resize(static_cast<size_t>(first * kernels::kWhitened));
+  for (int s = 0; s < first; ++s)
+    std::copy_n(&records_[static_cast<size_t>(s * kRecord)], kernels::kWhitened,
+                &first_[static_cast<size_t>(s * kernels::kWhitened)]);
   in.longest2 = HUGE_VALF;
   if (choices_.size() > 1) {
-    SetColumns(first, choices_[1], nx, &second_);
+    SetWhitened(first, choices_[1], nx, &second_whitened_);
+    in.second_whitened = second_whitened_.data();
     in.second_row = Padded(choices_[1]);
-    in.second_whitened = &second_[static_cast<size_t>(nx * in.second_row)];
   }
   if (limit < HUGE_VALF) {
     double farthest2 = 0.0;
@@ -155,17 +156,9 @@ void FastProblem::Generate(float limit) {
   c.prefix = prefix_.data();
   c.first = first_.data();
   c.choices = first;
-  c.row = row;
   c.inverse =
       ((uint64_t{1} << 32) + static_cast<uint64_t>(first) - 1) / static_cast<uint64_t>(first);
-  c.x = nullptr;
   kernels_.generate(c, in);
-}
-
-void FastProblem::Spread() {
-  if (context_.x) return;
-  x_.resize(work_.size());
-  kernels_.spread(context_, x_.data());
 }
 
 void FastProblem::SetNodes() {

@@ -203,7 +203,6 @@ void FastSearch::SearchGroups(const float* levels, int n_levels) {
   const kernels::Context& c = fast_.context();
   const int size = fast_.first_choices();
   fast_.AliveGroups(&groups_);
-  fast_.Spread();
   const auto is_ruled_out = [&](const Entry& e) {
     return !std::binary_search(groups_.begin(), groups_.end(), e.id() / size);
   };

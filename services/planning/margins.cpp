@@ -115,7 +115,10 @@ void RelaxSafety(const world::Obstacle& o, double hard, double margin, double un
       e->safety = Grown(o, *e, e->safety_radius + uncertainty);
       e->grown_by[0] = -1.0;
     }
-    if (!start->IsSafe(*e, e->safety_radius)) continue;
+    if (!start->IsSafe(*e, e->safety_radius)) {
+      if (e->body && margin == 0.0) break;  // no share makes a difference
+      continue;
+    }
     if (share < 1.0) Note(notes, "starts within the margin of obstacle " + std::to_string(e->id));
     if (e->body && searched) ClearStart(o, e->safety_radius + uncertainty, start->curve(), e);
     return;
