@@ -139,8 +139,8 @@ struct CandidateInput {
   const float* first_whitened;        ///< [3 (M - 3)][first_row], of the first step
   double first_middle[3 * kMaxFree];  ///< of those
   const float* second_whitened;       ///< [3 (M - 3)][second_row], of the second step, if any
-  int first_row, second_row;  ///< choices, padded
-  float j1_offset;  ///< J1 = j1_offset + |whitened|^2
+  int first_row, second_row;          ///< choices, padded
+  float j1_offset;                    ///< J1 = j1_offset + |whitened|^2
   /// Where the prefix' whitened sum and first_middle are longer, squared, J1 may stay infinite.
   float longest2;
 };

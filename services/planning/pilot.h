@@ -39,6 +39,8 @@ class Pilot {
   void SetObstacles(double t, std::vector<world::Obstacle> obstacles);
   /// Places near the drone that nobody has looked into; once heard they go stale as obstacles do.
   void SetUnseen(double t, std::vector<world::Obstacle> unseen);
+  /// They will be told of: until they are, nobody knows of any space that it was seen.
+  void ExpectUnseen() { unseen_time_ = unseen_time_.value_or(-1e9); }
   /// Control says that it flies: a planner that has just been started must not take off again.
   void SetFlying(bool flying) {
     heard_control_ = true;

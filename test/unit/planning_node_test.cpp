@@ -26,7 +26,9 @@ constexpr int64_t kNever = kStart + 1000000000;  // us
 
 /// What else happens in a flight.
 struct Events {
-  double height = 0.1;  // where the body is before there is a plan, m
+  std::string sender = "company";  // of all messages
+  int64_t unseen_from = kNever;    // unseen places are told of, us
+  double height = 0.1;             // where the body is before there is a plan, m
   int64_t obeys_from =
       kStart;  // the autopilot does from then on, and stands on the ground until then
   int64_t flying_from = kNever;              // control says from then on that it flies, us
@@ -60,6 +62,7 @@ class Company : public bus::Node {
       none.utime = utime;
       none.epoch = utime >= events_.obstacles_at;
       none.n_cut = utime >= events_.cut_from;
+      if (utime >= events_.unseen_from) bus_.Publish("UNSEEN", none);
       bus_.Publish("OBSTACLES", none);
     }
     if (events_.obeys_from > kStart && (utime - kStart) % 1000000 == 0) Autopilot(utime);
@@ -146,7 +149,7 @@ std::vector<plan_t> Fly(int64_t forecast_from, int64_t forecast_until, int64_t e
                         const Events& events = {}) {
   bus::Lockstep lockstep(kStart);
   Company* company = nullptr;
-  lockstep.Add("company", 0, [&](bus::Bus& bus) {
+  lockstep.Add(events.sender, 0, [&](bus::Bus& bus) {
     auto node = std::make_unique<Company>(bus, forecast_from, forecast_until, events);
     company = node.get();
     return node;
@@ -243,6 +246,25 @@ TEST(PlanningNode, APlannerStartedInFlightDoesNotClimb) {
   for (const plan_t& plan : plans) {
     const auto way = bus::FromMessage(plan.position, kStart);
     EXPECT_NEAR(way.Position(way.end()).z(), events.height, 0.01) << plan.reason;
+  }
+}
+
+TEST(PlanningNode, StartedInFlightItCertifiesNothingUntilMappingTellsWhatNobodyHasSeen) {
+  for (const int64_t unseen_from : {kStart, kStart + 2000000}) {
+    Events events;
+    events.sender = "mapping";
+    events.unseen_from = unseen_from;
+    events.height = 1.5;
+    events.flying_from = kStart;
+    const auto plans = Fly(kStart + 500000, kNever, kStart + 4000000, events);
+    int blind = 0, chases = 0;
+    for (const plan_t& plan : plans) {
+      const bool is_certified = plan.certified_clearance >= 0.0;
+      blind += plan.utime < unseen_from && is_certified;
+      chases += plan.utime >= unseen_from && plan.verdict == plan_t::CHASE;
+    }
+    EXPECT_EQ(blind, 0);
+    EXPECT_GT(chases, 10);
   }
 }
 
