@@ -39,8 +39,9 @@ class Pilot {
   void SetObstacles(double t, std::vector<world::Obstacle> obstacles);
   /// Places near the drone that nobody has looked into; once heard they go stale as obstacles do.
   void SetUnseen(double t, std::vector<world::Obstacle> unseen);
-  /// They will be told of: until they are, nobody knows of any space that it was seen.
-  void ExpectUnseen() { unseen_time_ = unseen_time_.value_or(-1e9); }
+  /// At `t` [s] a list came from somebody who tells of them too: until the first are heard nothing
+  /// counts as seen, but for logs of mappings that told of none.
+  void ExpectUnseen(double t) { expected_since_ = expected_since_.value_or(t); }
   /// Control says that it flies: a planner that has just been started must not take off again.
   void SetFlying(bool flying) {
     heard_control_ = true;
@@ -117,8 +118,8 @@ class Pilot {
   std::unique_ptr<Planner> planner_;
   std::optional<Forecast> forecast_;
   std::vector<world::Obstacle> obstacles_, unseen_;
-  double obstacles_time_ = -1e9;       ///< s
-  std::optional<double> unseen_time_;  ///< s
+  double obstacles_time_ = -1e9;                        ///< s
+  std::optional<double> unseen_time_, expected_since_;  ///< s
   PlanResult running_;
   bool has_running_ = false;
   Tube tube_;

@@ -122,8 +122,8 @@ void PlanningNode::OnObstacles(const obstacles_t& message) {
         message.seq, message.n_cut, message.n_obstacles));
   auto list = Listed(message);
   if (!list) return;
-  if (message.sender == "mapping") pilot_.ExpectUnseen();
   const double t = bus::Seconds(message.utime, *origin_);
+  if (message.sender == "mapping") pilot_.ExpectUnseen(t);
   sweeps_.Add(t, is_usable_);
   pilot_.SetObstacles(t, *std::move(list));
 }

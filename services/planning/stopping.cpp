@@ -202,6 +202,16 @@ std::optional<PlanResult> AsCommitted(const PlanRequest& request) {
   return result;
 }
 
+PlanResult AsLastResort(const std::string& why, PlanResult plan) {
+  plan.proofs.clear();
+  plan.stop_proofs.clear();
+  plan.certified_clearance = -1.0;
+  if (plan.verdict == Verdict::kEscape) plan.verdict = Verdict::kMitigate;
+  if (plan.verdict < Verdict::kBrake) plan.verdict = Verdict::kBrake;
+  plan.reason = why + (plan.reason.empty() ? "" : "; " + plan.reason);
+  return plan;
+}
+
 constexpr double kOver[] = {0.7, 1.0, 1.6};  // s, that ways aside take
 // s from now on that a place of rest should be clear: there is a way aside until then.
 constexpr double kLasts = kOver[2] + kOverdue;

@@ -54,6 +54,9 @@ bool LeavesObstacles(const std::vector<Proof>& proofs);
 /// and the stop.
 std::optional<PlanResult> AsCommitted(const PlanRequest& request);
 
+/// The plan without its proofs, as what they prove does not hold.
+PlanResult AsLastResort(const std::string& why, PlanResult plan);
+
 /// Brake, the rest of the running plan until its stop and that stop, or else Evade, as a plan; the
 /// reason says what it is not.
 PlanResult RestPlan(const PlannerConfig& config, const PlanRequest& request);

@@ -9,8 +9,8 @@ import workshop
 
 # Sources, and the tests of planning and control that are quick, the quickest first.
 PLANNING = tuple(f"services/planning/{name}.cpp" for name in
-                 ("ladder", "pilot", "limits", "margins", "problem", "resting", "separations",
-                  "stopping", "tube"))
+                 ("ladder", "pilot", "pilot_acts", "limits", "margins", "problem", "resting",
+                  "separations", "stopping", "tube"))
 PLANNING_TESTS = ("planning_test", "planning_node_test", "planning_minkowski_test",
                   "control_plan_check_test", "planning_refinement_test", "planning_search_test")
 CONTROL = ("services/control/plan_follower.cpp", "common/world/plan_check.cpp")

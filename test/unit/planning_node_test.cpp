@@ -250,13 +250,13 @@ TEST(PlanningNode, APlannerStartedInFlightDoesNotClimb) {
 }
 
 TEST(PlanningNode, StartedInFlightItCertifiesNothingUntilMappingTellsWhatNobodyHasSeen) {
-  for (const int64_t unseen_from : {kStart, kStart + 2000000}) {
+  for (const int64_t unseen_from : {kStart, kStart + 500000}) {
     Events events;
     events.sender = "mapping";
     events.unseen_from = unseen_from;
     events.height = 1.5;
     events.flying_from = kStart;
-    const auto plans = Fly(kStart + 500000, kNever, kStart + 4000000, events);
+    const auto plans = Fly(kStart + 100000, kNever, kStart + 4000000, events);
     int blind = 0, chases = 0;
     for (const plan_t& plan : plans) {
       const bool is_certified = plan.certified_clearance >= 0.0;
