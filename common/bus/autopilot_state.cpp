@@ -22,7 +22,7 @@ void AutopilotState::Hear(const status_t& message) {
   const std::string state = words_.substr(0, words_.find(": "));
   armed_ = says(", armed, ");
   obeys_ = state == "flying" && armed_;
-  on_ground_ = says(", on ground");
+  if (tells) on_ground_ = says(", on ground");
   disarmed_ = says(", disarmed, on ground") ? std::optional(heard_) : std::nullopt;
   handed_over_ = std::find(kNotOurs.begin(), kNotOurs.end(), state) != kNotOurs.end();
 }

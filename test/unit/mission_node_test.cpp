@@ -214,6 +214,23 @@ TEST(AutopilotState, ReadsHandOversInTheBridgesOwnWords) {
   EXPECT_FALSE(autopilot.IsHandedOver());
 }
 
+TEST(AutopilotState, StandsOnTheGroundUntilItSaysOtherwise) {
+  status_t status{};
+  status.utime = kStart;
+  status.name = "fcu";
+  bus::AutopilotState autopilot;
+  const auto hear = [&](const char* detail) {
+    status.detail = detail;
+    autopilot.Hear(status);
+    return autopilot.IsOnGround();
+  };
+  EXPECT_TRUE(hear("standby: a PX4 is heard; mode POSCTL, disarmed, on ground"));
+  EXPECT_TRUE(hear("no autopilot: the autopilot's heartbeat has ceased"));
+  EXPECT_FALSE(autopilot.Obeys(kStart + 100'000'000)) << "it is on the ground still";
+  EXPECT_FALSE(hear("flying: armed; mode OFFBOARD, armed, in air"));
+  EXPECT_FALSE(hear("no autopilot: the autopilot's heartbeat has ceased"));
+}
+
 TEST(AutopilotState, TellsWhetherItStandsDisarmed) {
   struct Case {
     const char* words;
