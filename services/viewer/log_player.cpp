@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <stdexcept>
+#include <utility>
 
 #include "common/bus/channels.h"
 #include "common/bus/stamp_order.h"
@@ -24,6 +25,7 @@ LogPlayer::LogPlayer(const std::string& file) : reader_(file) {
     index_.push_back({PlayingTime(event_.utime), position, number->second});
   }
   if (index_.empty()) throw std::runtime_error(file + ": holds no event; is it an LCM log?");
+  damage_ = reader_.damage();
   handlers_.resize(channels_.size());
   heavy_.resize(channels_.size());
   now_ = begin();
@@ -40,20 +42,27 @@ int64_t LogPlayer::PlayingTime(int64_t stamp) {
 }
 
 std::string LogPlayer::Title() const {
-  const std::string name = std::filesystem::path(reader_.file()).filename().string();
-  if (jumps_ == 0) return name;
-  return name + ", without " + std::to_string(jumps_) + " jumps of its clock";
+  std::string title = std::filesystem::path(reader_.file()).filename().string();
+  for (const bus::Damage& d : damage_) title += ", " + bus::Format(d);
+  if (jumps_ > 0)
+    title += ", without " + std::to_string(jumps_) + (jumps_ == 1 ? " jump" : " jumps") +
+             " of its clock";
+  return title;
 }
 
 /// A vehicle's prefix may stand before the channel's name, as for the tools that read logs, where
 /// none has the name itself.
 void LogPlayer::SubscribeRaw(const std::string& channel, RawHandler handler) {
   const bool plain = std::find(channels_.begin(), channels_.end(), channel) != channels_.end();
+  bool found = false;
   for (size_t i = 0; i < channels_.size(); ++i) {
     const std::string& name = channels_[i];
     if (name.size() < channel.size() || (plain && name != channel) ||
         name.compare(name.size() - channel.size(), channel.size(), channel) != 0)
       continue;
+    if (std::exchange(found, true))
+      throw std::runtime_error(reader_.file() + ": holds " + channel +
+                               " of several vehicles; keep one with chase-log filter");
     handlers_[i] = handler;
     heavy_[i] = bus::IsHeavy(channel);
     if (channel == "CAMERA_IMAGE") image_ = i;

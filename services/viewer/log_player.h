@@ -22,7 +22,8 @@ class LogPlayer : public bus::Bus {
   int64_t begin() const { return index_.front().utime; }  ///< us, the log's first stamp
   int64_t end() const { return index_.back().utime; }
   int64_t Now() const override { return now_; }
-  /// The file's name for those who look on, with the count of jumps that are not played.
+  /// The file's name for those who look on, what of it is lost, and the count of jumps that are not
+  /// played.
   std::string Title() const;
 
   /// Hands over all light messages (throws std::runtime_error if nobody listens to any channel of
@@ -53,6 +54,7 @@ class LogPlayer : public bus::Bus {
 
   logs::LogReader reader_;
   logs::LogEvent event_;
+  std::vector<logs::Damage> damage_;
   std::vector<std::string> channels_;
   std::vector<RawHandler> handlers_;  // by channel; empty: nobody listens
   std::vector<bool> heavy_;

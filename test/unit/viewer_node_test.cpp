@@ -301,6 +301,21 @@ TEST_F(ViewerPlayer, JumpsOfTheClockAreNotPlayed) {
   EXPECT_EQ(ticks, 7U) << "stops when it is told to";
 }
 
+TEST_F(ViewerPlayer, TellsWhatOfTheLogIsLost) {
+  std::filesystem::resize_file(file_, std::filesystem::file_size(file_) - 5);
+  EXPECT_NE(LogPlayer(file_).Title().find("the log was cut off"), std::string::npos)
+      << LogPlayer(file_).Title();
+}
+
+TEST_F(ViewerPlayer, RefusesALogOfTwoVehicles) {
+  bus::LogWriter log(file_);
+  for (const char* channel : {"alpha/POSE", "beta/POSE"})
+    log.Write(kSecond, channel, BytesOf(PoseAt(kSecond, 0)));
+  log.Close();
+  LogPlayer player(file_);
+  EXPECT_THROW(Listen(&player), std::runtime_error);
+}
+
 TEST_F(ViewerPlayer, ALogIsRecordedForAReport) {
   const Recording recording = RecordLog(file_);
   EXPECT_EQ(recording.duration, 5.0);

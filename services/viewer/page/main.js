@@ -54,7 +54,7 @@ function showPills({drone, target, plan, obstacles, image, tracking, flight, tru
   page.scene.style.opacity = drone?.stale ? 0.5 : 1;
   page.image.style.opacity = image?.stale ? 0.4 : 1;
   if (image?.stale) setText(page.imagetext, old('image', image));
-  setText(page.figures, [drone && `height ${format(drone.p[2], 2, 'm')}`, drone && old('tracking', tracking) || `follows ${FOLLOWING[tracking?.following] ?? '–'}`,
+  setText(page.figures, [drone && `z ${format(drone.p[2], 2, 'm')}`, drone && old('tracking', tracking) || `follows ${FOLLOWING[tracking?.following] ?? '–'}`,
     old('obstacles', obstacles)].filter((text) => text).join('\n'));
 }
 
