@@ -46,7 +46,7 @@ endfunction()
 # chase_program(NAME sources...): an executable in build/bin with our options.
 function(chase_program name)
   add_executable(${name} ${ARGN})
-  target_link_libraries(${name} PRIVATE chase_options version)
+  target_link_libraries(${name} PRIVATE chase_options version output_check)
   target_precompile_headers(${name} REUSE_FROM precompiled_program)
   set_property(GLOBAL APPEND PROPERTY CHASE_PROGRAMS ${name})
 endfunction()

@@ -10,6 +10,8 @@
 #include <cstdio>
 #include <filesystem>
 #include <optional>
+#include <string>
+#include <vector>
 
 #include "common/bus/channels.h"
 #include "common/bus/live_loop.h"
@@ -35,7 +37,15 @@ struct Flags {
   bool dump_config = false;
 };
 
-void AddFlags(CLI::App* app, Flags* flags) {
+/// They are not in --help. CLI11's own errors do not name hidden options.
+void Refuse(CLI::App* app, const std::vector<std::string>& options, const std::string& why) {
+  for (const std::string& name : options)
+    app->get_option(name)->group("")->check([name, why](const std::string&) -> std::string {
+      throw std::runtime_error(name + ": " + why);
+    });
+}
+
+void AddFlags(CLI::App* app, const std::string& live_only, Flags* flags) {
   flags->url = DefaultUrl();
   app->add_option("--config", flags->config, "YAML file that overrides the defaults");
   app->add_flag("--dump-config", flags->dump_config, "print the complete configuration and exit");
@@ -43,14 +53,18 @@ void AddFlags(CLI::App* app, Flags* flags) {
       "--lcm-url", flags->url,
       "LCM provider (default: $LCM_DEFAULT_URL, else that of the installed units, else built in)");
   app->add_option("--channel-prefix", flags->prefix,
-                  "the vehicle: in front of every channel's name (default: none; of --replay: what "
-                  "the log has)");
+                  std::string("the vehicle: in front of every channel's name (default: none") +
+                      (live_only.empty() ? "; of --replay: what the log has)" : ")"));
   auto* key = app->add_option(
       "--key-file", flags->key_file,
       "64 hexadecimal digits that seal the vehicle's messages (default: not sealed)");
-  app->add_option("--replay", flags->replay, "drive the service by this LCM log, in logical time")
-      ->excludes(url, key);  // what would do nothing is refused
+  auto* replay = app->add_option("--replay", flags->replay,
+                                 "drive the service by this LCM log, in logical time");
   app->add_option("--out", flags->out, "LCM log that --replay writes");
+  if (live_only.empty())
+    replay->excludes(url, key);  // what would do nothing is refused
+  else
+    Refuse(app, {"--replay", "--out"}, live_only);
   config::AddVersion(app);
 }
 
@@ -159,7 +173,7 @@ int RunService(const ServiceSpec& spec, int argc, char** argv) {
   const std::string program = "chase-" + spec.name;
   CLI::App app(spec.description, program);
   Flags flags;
-  AddFlags(&app, &flags);
+  AddFlags(&app, spec.live_only, &flags);
   if (spec.add_flags) spec.add_flags(app);
   try {
     app.parse(argc, argv);

@@ -22,6 +22,7 @@ struct ServiceSpec {
   std::function<void(const std::string& file)> load_config;  ///< throws std::runtime_error
   std::function<std::unique_ptr<Node>(Bus&)> make_node;
   std::function<void(CLI::App&)> add_flags;  ///< its own ones; may be empty
+  std::string live_only;  ///< why it does not --replay, and what to use; empty: it does
   /// Runs in the process's own manner, until StopRequested(), and returns true; false, or empty: it
   /// runs live or replays.
   std::function<bool()> run;
@@ -35,12 +36,15 @@ bool StopRequested();
 int RunService(const ServiceSpec& spec, int argc, char** argv);
 
 /// `return RunService<PlanningNode, PlanningConfig>("planning", "Plans the chase.", argc, argv);`
+/// with the reason where it is live_only.
 template <class NodeType, class Config>
-int RunService(const std::string& name, const std::string& description, int argc, char** argv) {
+int RunService(const std::string& name, const std::string& description, int argc, char** argv,
+               const std::string& live_only = "") {
   auto config = std::make_shared<Config>();
   ServiceSpec spec;
   spec.name = name;
   spec.description = description;
+  spec.live_only = live_only;
   spec.dump_config = [config] { return config::Dump(*config); };
   spec.load_config = [config](const std::string& file) { config::Load(file, config.get()); };
   spec.make_node = [config](Bus& bus) { return std::make_unique<NodeType>(bus, *config); };

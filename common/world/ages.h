@@ -9,7 +9,7 @@ struct MostAge {
   double obstacles = 0.3;   ///< UNSEEN too. planning: goes on to the committed stop where movers
                             ///< were listed, else brakes, uncertified; mission: not ready;
                             ///< prediction: nobody else moves
-  double prediction = 1.4;  ///< planning: there is no target, it is looked for
+  double prediction = 1.4;  ///< planning: there is no target, it holds; mission: the target is lost
   double pose = 0.1;        ///< control: brakes by dead reckoning, also when poses come later than
                             ///< usual by this; silent after `velocity`; mission: not ready
   double velocity = 2.0;    ///< control: since its deviation was 0.1 m/s; brakes until then, then
@@ -22,7 +22,8 @@ struct MostAge {
                                ///< that died is back within that
   double setpoint = 0.5;       ///< fcu: leaves the vehicle to the autopilot, whose own limit is 1 s
   double attitude = 0.5;  ///< fcu: of the autopilot; no position is sent to it, nothing is armed
-  double plan = 10.0;     ///< mission: lands; chosen: a planner that died is back within 5
+  double plan = 10.0;     ///< mission: lands, as without OBSTACLES for that long; chosen: a planner
+                          ///< that died is back within 5
   double landing_plan = 2.0;  ///< control: comes down where it is without a plan made to land
   double command =
       10.0;  ///< mission: refused, and fcu, a kill; chase-command repeats for half of that

@@ -5,6 +5,7 @@ import pathlib
 import shutil
 import subprocess
 import sys
+import time
 
 import bus
 import devices
@@ -14,6 +15,7 @@ import version
 from devices import FAILURE, OK, WARNING
 
 FREE_SPACE = 5e9  # bytes: a build and a few minutes of flight
+CLOCK = pathlib.Path("/dev/shm/chase-clock")  # common/bus/host_clock.h
 
 
 def packages():
@@ -80,6 +82,20 @@ def clock_source():
     return WARNING, f"{source} is slow to read; cure: boot with clocksource=tsc"
 
 
+def host_clock():
+    text = read(CLOCK)
+    if not text:
+        return OK, f"no {CLOCK}: the first process writes it"
+    try:
+        ahead = 1e-6 * (int(text) - (time.time_ns() - time.monotonic_ns()) // 1000)
+    except ValueError:
+        return WARNING, f"{CLOCK} holds no number; cure: systemctl stop chase.target, then rm {CLOCK}"
+    if abs(ahead) > 1.0:
+        return WARNING, (f"the processes' clock is {ahead:+.1f} s off this machine's, which was set since {CLOCK} was "
+                         f"written; cure: systemctl stop chase.target, then rm {CLOCK}")
+    return OK, f"the processes' is {ahead:+.3f} s off this machine's"
+
+
 def time_service():
     if not shutil.which("timedatectl"):
         return OK, "no timedatectl: not checked (matters between machines only)"
@@ -123,15 +139,15 @@ HERE = ([(name, lambda check=check: judged(check)) for name, check in vehicle.CH
         if places.INSTALLED else [("packages", packages)])
 CHECKS = [*HERE, ("receive buffer", receive_buffer),
           ("default buffer", default_buffer), ("multicast", multicast),
-          ("cross talk", cross_talk), ("clock source", clock_source), ("time", time_service),
+          ("cross talk", cross_talk), ("clock source", clock_source), ("host clock", host_clock), ("time", time_service),
           ("governor", governor), ("cores", cores), ("disk", disk)]
 
 
 def main():
-    if sys.argv[1:] in (["-h"], ["--help"]):
+    if {"-h", "--help"} & set(sys.argv[1:]):
         print(__doc__)
         return 0
-    if sys.argv[1:] == ["--version"]:
+    if "--version" in sys.argv[1:]:
         print(version.text())
         return 0
     if len(sys.argv) > 1:

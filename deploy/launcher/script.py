@@ -9,8 +9,9 @@ import version
 def arguments(doc, least, most=None):
     """The words behind the script's name, `least` to `most` (None: as many as there are); otherwise it ends here."""
     words = sys.argv[1:]
-    if words in (["-h"], ["--help"], ["--version"]):
-        print(version.text() if words == ["--version"] else doc.strip())
+    asked = next((word for word in words if word in ("-h", "--help", "--version")), "")
+    if asked:
+        print(version.text() if asked == "--version" else doc.strip())
         sys.exit()
     name = pathlib.Path(sys.argv[0]).name
     if words and words[0].startswith("-"):

@@ -1,9 +1,14 @@
 """What --version says, in the words of the C++ programs."""
 
 import re
+import signal
 import subprocess
+import sys
 
 import places
+
+if __name__ == "__main__" or {"-h", "--help", "--version"} & set(sys.argv[1:]):
+    signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # `--help | head -1` ends silently, as the C++ programs do
 
 
 def text():

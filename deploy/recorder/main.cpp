@@ -14,6 +14,7 @@ int main(int argc, char** argv) {
   spec.name = "recorder";
   spec.description =
       "Records every message into LCM logs; sweeps, images and maps for a while only.";
+  spec.live_only = "a log is recorded already; chase-log cuts, filters and merges logs";
   // CLI11 prints a default only where there is one; these are the configuration's.
   spec.add_flags = [&](CLI::App& app) {
     app.add_option("--folder", folder, "that the logs are written into");

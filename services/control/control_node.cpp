@@ -59,6 +59,7 @@ void ControlNode::OnState(const flight_state_t& message) {
   if (state_order_.IsOvertaken(message.utime)) return;
   if (!world::IsFresh(bus::Seconds(bus_.Now(), message.utime), world::kMostAge.flight_state))
     return;
+  hears_mission_ = true;
   // One that began anew in flight knows none; the place has not moved. Until it has heard HOME,
   // what was led before holds, for 2 s; DONE is obeyed at once.
   if (message.has_home != 0) {
@@ -181,7 +182,9 @@ void ControlNode::OnPose(const pose_t& message) {
                  : message.reason.empty()  ? "uncertain"
                                            : message.reason;
   const bool asked = bus::Seconds(message.utime, asked_to_fly_) <= world::kMostAge.flight_state;
-  controller_.SetAutopilot(autopilot_.Obeys(message.utime), autopilot_.IsOnGround() && asked);
+  const bool obeys = autopilot_.Obeys(message.utime), on_ground = autopilot_.IsOnGround();
+  const bool may_begin = asked || obeys || !on_ground || !hears_mission_;
+  controller_.SetAutopilot(obeys, on_ground && asked, may_begin);
   std::optional<Setpoint> setpoint;
   {
     auto timer = bus_.Time("control");

@@ -71,6 +71,7 @@ class ControlNode : public bus::Node {
   std::optional<std::pair<int64_t, int32_t>> landing_;
   bus::AutopilotState autopilot_;
   bus::StampOrder state_order_;
+  bool hears_mission_ = false;
   int64_t asked_to_fly_ = 0;       // utime of the last FLIGHT_STATE that asks for a flight
   std::optional<int64_t> origin_;  // utime that the core's seconds count from
   int64_t last_tracking_ = 0;

@@ -14,6 +14,7 @@ constexpr double kSame = 0.01;   // m: planning takes the start from the plan th
 constexpr double kAtRest = 0.3;  // m/s: gusts about a wind of 3 m/s stir a hovering body by less
 constexpr double kAtEnd = 0.3;   // m: planning asks for as much free ground beside the body
 constexpr double kLongestWay = 45.0;  // s to above the ground that planning chose, at 2.2 s a metre
+constexpr double kBraking = 2.0;      // s to rest after that; from 3 m/s it takes half of it
 // m/s: POSE of the sentinels has 0.03, and a second without sweeps adds filter.doubt_accel's 0.1.
 constexpr double kMeasured = 0.1;
 
@@ -83,6 +84,7 @@ std::optional<Setpoint> Controller::Answer(double t, const Estimate& estimate, H
   last_yaw_ = math::Yaw(estimate.R_WB);
   if (!spot_) landing_ = Landing(config_);
   if (Waits(t)) return Idle();
+  if (!flying_ && !may_begin_) return std::nullopt;
   return Follow(t, estimate, dt);
 }
 
@@ -122,8 +124,9 @@ std::optional<Setpoint> Controller::Follow(double t, const Estimate& estimate, d
 // Planning leads to above the ground that it chooses; whoever is not led, or does not get there,
 // comes down here.
 bool Controller::MayDescend(double t, const Estimate& estimate) const {
-  if (t - asked_to_land_ > kLongestWay) return true;  // gusts may never let it rest
+  if (t - asked_to_land_ > kLongestWay + kBraking) return true;  // gusts may never let it rest
   if (estimate.v_WB.norm() > kAtRest) return false;
+  if (IsOverdue(t)) return true;
   const Plan* plan = plans_.FlownAt(t);
   if (plan == nullptr || !plan->to_land) return t - asked_to_land_ > world::kMostAge.landing_plan;
   if (plan->stop && t >= plan->stop->start)  // whoever leads it there has fallen silent
@@ -132,9 +135,12 @@ bool Controller::MayDescend(double t, const Estimate& estimate) const {
   return (way.Position(way.end()) - estimate.p_WB).head<2>().norm() < kAtEnd;
 }
 
+bool Controller::IsOverdue(double t) const { return t - asked_to_land_ > kLongestWay; }
+
 // Held above the spot by the position, down by the vertical velocity alone.
 std::optional<Setpoint> Controller::Descend(double t, const Estimate& estimate, double dt) {
-  if (!flying_ || !lands_ || (!spot_ && !MayDescend(t, estimate))) return std::nullopt;
+  if (!flying_ || !lands_) return std::nullopt;
+  if (!spot_ && !MayDescend(t, estimate)) return IsOverdue(t) ? Brake(estimate) : std::nullopt;
   if (!spot_) {
     spot_ = estimate.p_WB;
     landing_ = Landing(config_);

@@ -55,10 +55,12 @@ class Controller {
 
   /// Does the autopilot fly by what it is asked for? Nothing is learnt from what it does otherwise.
   /// `stands`: it says that it is on the ground while a flight is asked for. Until it obeys and a
-  /// plan begins the motors are to idle then; for a landing, to stop.
-  void SetAutopilot(bool obeys, bool stands) {
+  /// plan begins the motors are to idle then; for a landing, to stop. `may_begin`: no while it
+  /// stands there and no flight is asked for, when no plan starts the motors.
+  void SetAutopilot(bool obeys, bool stands, bool may_begin = true) {
     obeys_ = obeys;
     stands_ = stands;
+    may_begin_ = may_begin;
   }
 
   /// Motors off for good, at once, wherever it is: the flight is over, or somebody has ended it.
@@ -104,6 +106,7 @@ class Controller {
   double StepTo(double t);
   bool IsNear(const Plan& plan) const;
   bool MayDescend(double t, const Estimate& estimate) const;
+  bool IsOverdue(double t) const;
 
   ControlConfig config_;
   PlanFollower plans_;
@@ -118,8 +121,8 @@ class Controller {
   bool lands_ = false;          // a landing is asked for
   double asked_to_land_ = 0.0;  // when, s
   bool cut_ = false;
-  bool obeys_ = true, stands_ = false;   // the autopilot
-  std::optional<Eigen::Vector3d> spot_;  // above which it comes down, frame W, m
+  bool obeys_ = true, stands_ = false, may_begin_ = true;  // the autopilot
+  std::optional<Eigen::Vector3d> spot_;                    // above which it comes down, frame W, m
   Following following_ = Following::kNone;
   double last_yaw_ = 0.0, yaw_on_spot_ = 0.0;  // rad
   Eigen::Vector3d error_ = Eigen::Vector3d::Zero();

@@ -248,7 +248,7 @@ Facts Bridge::Gather(int64_t now) const {
   f.borne = touchdown_.IsBorne(now);
   f.blind = !pose_ || PoseAge(now) > world::kMostAge.velocity;
   f.missing = missing_;
-  f.asked = !led_ || asked_;
+  f.asked = !led_ || (anew_ && wanted_);
   f.said = autopilot_.Warning(now, kWarningAge);
   return f;
 }
@@ -268,7 +268,7 @@ void Bridge::Tick(int64_t now) {
   const bool flies = touches_down || handshake_.state() == Handshake::State::kFlying;
   disagreement_ = flies && pose_ && frame_ == pose_->epoch ? AttitudeProblem(now) : "";
   if (!flies) flown_by_.reset();
-  if (handshake_.ended()) asked_ = false;
+  if (handshake_.ended()) anew_ = false;
   if (Due(now, kHeartbeatPeriod, &next_heartbeat_)) SendHeartbeat(now);
   if (!autopilot_.known()) return;
   if (Due(now, clock_.settled() ? kTimesyncPeriod : kSoonTimesync, &next_timesync_)) AskTime(now);

@@ -36,11 +36,12 @@ class Bridge {
   void OnPose(const Pose& pose, int64_t now);
   /// `utime`: the message's own stamp. One that does not rise is a repetition and left out.
   void OnSetpoint(const Setpoint& setpoint, int64_t utime, int64_t now);
-  /// Whoever leads the flights says where they are: `may_begin` on the ground and during a
-  /// take-off.
-  void OnFlightState(bool may_begin) {
+  /// Whoever leads the flights says where they are: `anew` on the ground and during a take-off,
+  /// `wanted` where it takes off or leads about, and not where it waits, stops or comes down.
+  void OnFlightState(bool anew, bool wanted) {
     led_ = true;
-    asked_ = asked_ || may_begin;
+    anew_ = anew_ || anew;
+    wanted_ = wanted;
   }
   /// As Handshake::Kill.
   void Kill() { handshake_.Kill(); }
@@ -123,7 +124,9 @@ class Bridge {
   // Answers to its TIMESYNC: taken by it since, given between our last two requests, and after them
   int time_answers_ = 0, answered_before_ = 0, answered_ = 0;
   int64_t ticked_ = 0;
-  bool led_ = false, asked_ = false;  // is a mission heard, and Facts::asked
+  bool led_ = false;     // a mission is heard
+  bool anew_ = false;    // it was on the ground or took off since the last flight's end
+  bool wanted_ = false;  // it wants to be in the air
   std::string missing_ = "no PX4 is heard", disagreement_;
   int64_t setpoints_sent_ = 0, odometry_sent_ = 0;
   std::optional<int64_t> flown_by_;    // when the newest setpoint of this flight was sent

@@ -68,8 +68,10 @@ FcuNode::FcuNode(bus::Bus& bus, const FcuConfig& config)
   bus_.Subscribe<attitude_setpoint_t>("ATTITUDE_SETPOINT",
                                       [this](const attitude_setpoint_t& m) { OnSetpoint(m); });
   bus_.Subscribe<flight_state_t>("FLIGHT_STATE", [this](const flight_state_t& m) {
-    bridge_.OnFlightState(m.state == flight_state_t::IDLE || m.state == flight_state_t::READY ||
-                          m.state == flight_state_t::TAKEOFF);
+    const bool takes_off = m.state == flight_state_t::TAKEOFF;
+    bridge_.OnFlightState(
+        takes_off || m.state == flight_state_t::IDLE || m.state == flight_state_t::READY,
+        takes_off || m.state == flight_state_t::CHASE || m.state == flight_state_t::SEARCH);
   });
   bus_.Subscribe<command_t>("COMMAND", [this](const command_t& m) { OnCommand(m); });
 }

@@ -39,8 +39,9 @@ struct HandshakeTable {
   static bool InOffboard(H h) { return h.facts_.mode == kOffboardMode; }
   static bool Flies(H h) { return h.facts_.armed && InOffboard(h); }
   static bool Ready(H h) { return h.facts_.wish && h.facts_.missing.empty(); }
-  static bool NotReady(H h) { return !Ready(h); }
-  static bool TakenOver(H h) { return Flies(h) && Ready(h); }
+  static bool Asked(H h) { return h.facts_.asked || !h.engages_; }
+  static bool NotReady(H h) { return !Ready(h) || !Asked(h); }
+  static bool TakenOver(H h) { return Flies(h) && Ready(h) && (Asked(h) || !ArmedLate(h)); }
   /// Only who lets the pilot engage streams while somebody else flies.
   static bool Others(H h) { return h.facts_.armed && !InOffboard(h) && h.engages_; }
   /// Nobody's but the autopilot's: whoever flew it may have been the process before this one.
@@ -53,9 +54,7 @@ struct HandshakeTable {
   static bool FoundInFailsafe(H h) { return h.engages_ && InFailsafe(h); }
   /// A process that comes back after an autopilot's landing goes on where it was: that is no
   /// flight.
-  static bool Begins(H h) {
-    return Ready(h) && !(h.engages_ && (h.facts_.armed || !h.facts_.asked));
-  }
+  static bool Begins(H h) { return Ready(h) && Asked(h) && !(h.engages_ && h.facts_.armed); }
   static bool Streamed(H h) { return h.engages_ && h.InState() >= kStreamBefore; }
   static bool Refused(H h) { return h.command_.answer() == Command::Answer::kRefused; }
   static bool GivesUp(H h) { return h.InState() >= h.give_up_after_; }

@@ -24,7 +24,7 @@ struct Facts {
   bool blind = false;       ///< the estimate is older than a flight may go on with
   std::string missing;      ///< what a flight must not begin without; empty: nothing
   std::string said;         ///< the autopilot's last warning
-  bool asked = true;        ///< whoever leads the flights has begun one since the last one's end
+  bool asked = true;        ///< whoever leads the flights wants one, begun since the last one's end
 };
 
 /// From the first setpoint to the last: stream, OFFBOARD, arm, fly, land, disarm. The autopilot's

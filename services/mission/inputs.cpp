@@ -44,6 +44,15 @@ std::string BatteryProblem(const MissionConfig& config, const Inputs& inputs, do
                                                : "";
 }
 
+/// The climb ends below climb_height; control flies no plan that leads out.
+std::string CeilingProblem(const MissionConfig& config) {
+  if (!config.geofence.Exists() || config.geofence.ceiling >= config.climb_height) return "";
+  return fmt::format(
+      "the geofence's ceiling of {} m is below climb_height, {} m: raise geofence: ceiling, or "
+      "lower climb_height and with it planning's takeoff_height",
+      config.geofence.ceiling, config.climb_height);
+}
+
 std::string ProcessProblem(const std::string& name, const Inputs& inputs, double t) {
   const auto found = inputs.processes.find(name);
   const bool heard = found != inputs.processes.end();
@@ -80,6 +89,7 @@ std::vector<std::string> Missing(const MissionConfig& config, const Inputs& inpu
                      world::SweepRun::kEnough));
   note(Absence("TARGET", inputs.target, world::kMostAge.target, t));
   if (inputs.blocked) note("the way up is not free: something is above the take-off place");
+  note(CeilingProblem(config));
   if (config.battery_low > 0.0) note(BatteryProblem(config, inputs, t));
   for (const std::string& name : config.needs) note(ProcessProblem(name, inputs, t));
   for (const auto& [name, report] : inputs.processes)
@@ -89,8 +99,14 @@ std::vector<std::string> Missing(const MissionConfig& config, const Inputs& inpu
   return missing;
 }
 
+std::string ForecastProblem(const Inputs& inputs, double t) {
+  return inputs.prediction ? Absence("PREDICTION", inputs.prediction, world::kMostAge.prediction, t)
+                           : ProcessProblem("prediction", inputs, t);
+}
+
 bool SeesTarget(const Inputs& inputs, double t) {
-  return inputs.target && inputs.target_tracked && t - *inputs.target <= world::kMostAge.target;
+  return inputs.target && inputs.target_tracked && t - *inputs.target <= world::kMostAge.target &&
+         ForecastProblem(inputs, t).empty();
 }
 
 }  // namespace chase::mission

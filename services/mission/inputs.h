@@ -38,6 +38,7 @@ struct Inputs {
   std::optional<double> obstacles;  ///< when they were valid, s
   world::SweepRun sweeps;           ///< in a row, listed while odometry was OK
   std::optional<double> target;
+  std::optional<double> prediction;  ///< of the newest forecast, s
   bool target_tracked = false;
   double plan_heard = -1e9;                            ///< s
   std::string plan_reason;                             ///< of the newest plan
@@ -62,7 +63,11 @@ struct Inputs {
 /// What stands against taking off at time `t` [s], a phrase each; empty: nothing.
 std::vector<std::string> Missing(const MissionConfig& config, const Inputs& inputs, double t);
 
-/// Is the target tracked, by news that are fresh?
+/// Why planning has no forecast of the target at time `t` [s]; empty: it has. Where none has been
+/// heard yet, as after a start in flight, it is what prediction says of itself.
+std::string ForecastProblem(const Inputs& inputs, double t);
+
+/// Is the target tracked and its motion forecast, by news that are fresh?
 bool SeesTarget(const Inputs& inputs, double t);
 
 }  // namespace chase::mission

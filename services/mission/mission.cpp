@@ -22,6 +22,9 @@ world::CommandAnswer Mission::Obey(double t, const Command& command) {
 
 world::CommandAnswer Mission::Try(double t, const Command& command) {
   if (std::string refusal = Refused(command.kind); !refusal.empty()) return {false, refusal};
+  // The bridge does not cut them then, whatever is sent.
+  if (command.kind == Event::kKill && inputs_.autopilot.rfind("pilot", 0) == 0)
+    return {false, "a pilot has it: his kill switch cuts the motors"};
   if (command.kind == Event::kKill && !command.force)
     return {false, "kill cuts the motors wherever it is, and it falls: say so with --force"};
   Step(t, command.kind);
@@ -88,11 +91,13 @@ void Mission::Update(double t) {
   }
   if (inputs_.pose && inputs_.pose->usable) last_usable_ = std::max(last_usable_, inputs_.pose->t);
   missing_ = Missing(config_, inputs_, t);
+  if (!IsAirborne(state_) && inputs_.armed && !inputs_.on_ground)
+    missing_.emplace_back("the autopilot says that it is in the air");
   if (!flown_ && IsAirborne(state_) && Flies()) flown_ = t;
   NoteProgress(t);
   DropOverruled();
   for (const Event event : Observed(t)) {
-    const bool stepped = Step(t, event, Detail(event));
+    const bool stepped = Step(t, event, Detail(t, event));
     if (stepped && (event == Event::kLeaving || event == Event::kNotFlown))
       uncommanded_ = false;  // it would come to the same again
     if (stepped && event == Event::kPoseBack) ComeDown(t, before_, "before the pose was lost");
@@ -158,9 +163,10 @@ std::vector<Event> Mission::Observed(double t) const {
   add(IsNotFlown(t), Event::kNotFlown);
   add(state_ == State::kSearch && config_.give_up > 0.0 && t - since_ > config_.give_up,
       Event::kGaveUp);
-  add(IsUnplanned(t), Event::kUnplanned);
+  add(IsSilent(inputs_.plan_heard, t), Event::kUnplanned);
+  add(IsSilent(inputs_.obstacles, t), Event::kUnmapped);
   add(!Leaving().empty(), Event::kLeaving);
-  for (const Event breach : Breached()) add(!Has(overruled_, breach), breach);
+  for (const Event breach : Unruly()) events.push_back(breach);
   add(!KnowsHome(), Event::kHomeLost);
   add(IsHome(), Event::kHome);
   add(state_ == State::kReturn && config_.return_patience > 0.0 &&
@@ -175,6 +181,14 @@ std::vector<Event> Mission::Breached() const {
   if (!Outside().empty()) breached.push_back(Event::kOutside);
   if (IsLow()) breached.push_back(Event::kBatteryLow);
   if (IsCritical()) breached.push_back(Event::kBatteryCritical);
+  return breached;
+}
+
+/// Those of them that no `stop` overrules.
+std::vector<Event> Mission::Unruly() const {
+  std::vector<Event> breached = Breached();
+  const auto is_overruled = [this](Event e) { return Has(overruled_, e); };
+  breached.erase(std::remove_if(breached.begin(), breached.end(), is_overruled), breached.end());
   return breached;
 }
 
@@ -194,8 +208,11 @@ void Mission::DropOverruled() {
   overruled_.erase(std::remove_if(overruled_.begin(), overruled_.end(), ends), overruled_.end());
 }
 
-std::string Mission::Detail(Event event) const {
+std::string Mission::Detail(double t, Event event) const {
   if (event == Event::kMissing) return missing_.front();
+  if (event == Event::kLost) return ForecastProblem(inputs_, t);
+  if (event == Event::kNotFlown && !Unruly().empty())
+    return Has(Unruly(), Event::kOutside) ? Outside() : "battery low";
   if (event == Event::kDisarmed) return inputs_.autopilot;
   if (event == Event::kLeaving) return Leaving();
   return event == Event::kOutside ? Outside() : "";
@@ -259,15 +276,16 @@ bool Mission::Flies() const { return inputs_.flying && (flown_ || !taken_off_ ||
 // What the bridge has given up lasts until setpoints cease; its status may be that old.
 bool Mission::IsNotFlown(double t) const {
   if (!IsAirborne(state_) || flown_ || !inputs_.on_ground) return false;
+  if (!Unruly().empty()) return true;  // a return would land at once, and be over
   const double waited = t - taken_off_.value_or(0.0);
   if (inputs_.handed_over) return waited > world::kMostAge.status;
   return config_.takeoff_patience > 0.0 && waited > config_.takeoff_patience;
 }
 
-// Control hovers at the end of the last stop then, and comes down without a plan once it is told
-// to.
-bool Mission::IsUnplanned(double t) const {
-  return flown_ && t - std::max(inputs_.plan_heard, *flown_) > world::kMostAge.plan;
+// Without plans control hovers at the end of the last stop, and comes down without one once it is
+// told to; without obstacles planning plans no more than that.
+bool Mission::IsSilent(const std::optional<double>& heard, double t) const {
+  return flown_ && t - std::max(heard.value_or(*flown_), *flown_) > world::kMostAge.plan;
 }
 
 // DONE cuts the motors: "disarmed" must not count in a status that was sent before the flight, and

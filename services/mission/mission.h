@@ -68,6 +68,7 @@ class Mission {
   world::CommandAnswer Try(double t, const Command& command);
   std::string Refused(Event command) const;
   std::vector<Event> Breached() const;
+  std::vector<Event> Unruly() const;
   void Overrule();
   void DropOverruled();
   void TakeOff(double t);
@@ -76,7 +77,7 @@ class Mission {
   bool IsUp() const;
   bool Flies() const;
   bool IsNotFlown(double t) const;
-  bool IsUnplanned(double t) const;
+  bool IsSilent(const std::optional<double>& heard, double t) const;
   bool IsLandedByAutopilot() const;
   bool IsHome() const;
   bool KnowsHome() const;
@@ -85,7 +86,7 @@ class Mission {
   bool IsCritical() const;
   std::string Leaving() const;
   std::string Outside() const;
-  std::string Detail(Event event) const;
+  std::string Detail(double t, Event event) const;
   void LeadItself(double t);
   void HearOfGround();
   void ComeDown(double t, State before, const char* when);

@@ -32,6 +32,9 @@ MissionNode::MissionNode(bus::Bus& bus, const MissionConfig& config)
     mission_.inputs().target_tracked =
         m.state == target_t::TRACKING || m.state == target_t::OCCLUDED;
   });
+  bus_.Subscribe<prediction_t>("PREDICTION", [this](const prediction_t& m) {
+    mission_.inputs().prediction = Seconds(m.utime);
+  });
   bus_.Subscribe<plan_t>("PLAN", [this](const plan_t& m) { OnPlan(m); });
   bus_.Subscribe<tracking_t>("TRACKING", [this](const tracking_t& m) { OnTracking(m); });
   bus_.Subscribe<attitude_setpoint_t>("ATTITUDE_SETPOINT", [this](const attitude_setpoint_t& m) {

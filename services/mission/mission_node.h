@@ -9,6 +9,7 @@
 #include "chase/obstacles_t.hpp"
 #include "chase/plan_t.hpp"
 #include "chase/pose_t.hpp"
+#include "chase/prediction_t.hpp"
 #include "chase/selection_t.hpp"
 #include "chase/status_t.hpp"
 #include "chase/target_t.hpp"
@@ -20,9 +21,9 @@
 
 namespace chase::mission {
 
-/// COMMAND, POSE, OBSTACLES, TARGET, PLAN, TRACKING, ATTITUDE_SETPOINT, HOME, SELECTION and
-/// statuses in; FLIGHT_STATE, COMMAND_ACK, HEALTH, GEOFENCE and SELECTION_KEPT out. Ticks are the
-/// clock.
+/// COMMAND, POSE, OBSTACLES, TARGET, PREDICTION, PLAN, TRACKING, ATTITUDE_SETPOINT, HOME, SELECTION
+/// and statuses in; FLIGHT_STATE, COMMAND_ACK, HEALTH, GEOFENCE and SELECTION_KEPT out. Ticks are
+/// the clock.
 class MissionNode : public bus::Node {
  public:
   MissionNode(bus::Bus& bus, const MissionConfig& config);

@@ -62,6 +62,7 @@ std::vector<Row> Rows() {
       {stays_up, E::kBatteryLow, S::kReturn, "battery low"},
       {above,    E::kBatteryCritical, S::kLand, "battery critical: landing here"},
       {above,    E::kUnplanned, S::kLand, "planning is silent: landing here"},
+      {above,    E::kUnmapped,  S::kLand, "obstacles are not heard of: landing here"},
       {ground,   E::kKill, S::kDone, "killed: motors cut by command"},
       {flies,    E::kKill, S::kDone, "killed: motors cut by command"},
       {{S::kEmergency}, E::kKill, S::kDone, "killed: motors cut by command"},

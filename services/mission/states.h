@@ -49,10 +49,11 @@ enum class Event {
   kLeaving,          ///< what is planned leads out of the geofence
   kOutside,          ///< the body is outside
   kUnplanned,        ///< planning has been silent for long
+  kUnmapped,         ///< mapping has: nothing can be planned but to rest
   kBatteryLow,       ///< time to return
   kBatteryCritical,  ///< time to land
 };
-inline constexpr int kEvents = 29;
+inline constexpr int kEvents = 30;
 
 struct Transition {
   State from;

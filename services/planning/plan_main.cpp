@@ -90,8 +90,10 @@ int main(int argc, char** argv) {
     return 0;
   } catch (const CLI::Success& e) {  // --help, --version
     return app.exit(e);
+  } catch (const CLI::ParseError& e) {
+    std::fprintf(stderr, "chase-plan: %s; see chase-plan --help\n", e.what());
   } catch (const std::exception& e) {
     std::fprintf(stderr, "chase-plan: %s\n", e.what());
-    return 1;
   }
+  return 1;
 }

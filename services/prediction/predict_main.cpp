@@ -104,8 +104,10 @@ int main(int argc, char** argv) {
     return 0;
   } catch (const CLI::Success& e) {  // --help, --version
     return app.exit(e);
+  } catch (const CLI::ParseError& e) {
+    std::fprintf(stderr, "chase-predict: %s; see chase-predict --help\n", e.what());
   } catch (const std::exception& e) {
     std::fprintf(stderr, "chase-predict: %s\n", e.what());
-    return 1;
   }
+  return 1;
 }

@@ -119,15 +119,42 @@ class BadUse(unittest.TestCase):
         self.assertIn("IMAGE MASK", answer.stdout)
         self.assert_refused(run("chase-perception", "--learn-colour"), "pairs of IMAGE MASK")
 
+    def test_output_that_cannot_be_written(self):
+        commands = [(program, "--help") for program in programs()] + [(program, "--dump-config") for program in self.services()]
+        if TOOL_SERVICES <= set(SERVICES):
+            scenes = TESTS.parent / "deploy/scenarios/scenes"
+            commands += [("chase-plan", scenes / "gap.yaml"), ("chase-predict", scenes / "predict_turn.yaml"),
+                         ("chase-scenario", "gym"), ("chase-world", "grove"), ("chase-campaign", "--out", "no/such", "--list")]
+        for program, *arguments in commands:
+            with self.subTest(program=program, arguments=arguments), open("/dev/full", "w", encoding="utf-8") as full:
+                answer = subprocess.run([BIN / program, *arguments], stdout=full, stderr=subprocess.PIPE, text=True,
+                                        timeout=LIMIT, check=False)
+                self.assertEqual(answer.returncode, 1, answer.stderr)
+                self.assertIn("standard output could not be written; is the disk full?\n", answer.stderr)
+
+    def test_help_of_which_only_the_first_line_is_read(self):
+        commands = [[BIN / program] for program in programs()] + [self.command(script) for script in SCRIPTS]
+        for command in commands:
+            for flag in ("--help", "--version"):
+                with self.subTest(command=command, flag=flag):
+                    reader, writer = os.pipe()
+                    os.close(reader)
+                    answer = subprocess.run([*command, flag], stdout=writer, stderr=subprocess.PIPE, text=True, timeout=LIMIT,
+                                            check=False)
+                    os.close(writer)
+                    self.assertEqual(answer.stderr, "")
+
     def test_every_program_refuses_what_it_does_not_know(self):
         self.for_each(programs(), lambda program: self.assert_refused(
             run(program, "--no-such-flag"), pathlib.Path(program).name))
 
     @staticmethod
-    def call(script, *arguments):
+    def command(script):
         path = TESTS.parent / script
-        command = [path] if os.access(path, os.X_OK) else [sys.executable, "-B", path]
-        return subprocess.run([*command, *arguments], check=False, capture_output=True, text=True, timeout=LIMIT)
+        return [path] if os.access(path, os.X_OK) else [sys.executable, "-B", path]
+
+    def call(self, script, *arguments):
+        return subprocess.run([*self.command(script), *arguments], check=False, capture_output=True, text=True, timeout=LIMIT)
 
     def test_scripts_name_their_commit(self):
         self.assertGreater(len(SCRIPTS), 30)
@@ -144,6 +171,12 @@ class BadUse(unittest.TestCase):
                     answer = self.call(script, flag)
                     self.assertEqual((answer.returncode, answer.stderr), (0, ""))
                     self.assertGreater(len(answer.stdout), 40)
+                    self.assertEqual(self.call(script, flag, "x").stdout, answer.stdout)
+
+    def test_scripts_have_help_behind_other_words(self):
+        for script in ("deploy/build", "deploy/doctor", "test/baselines/halton.py", "test/fuzz/make_corpus", "test/run"):
+            with self.subTest(script=script):
+                self.assertEqual(self.call(script, "x", "--help").stdout, self.call(script, "--help").stdout)
 
     def test_dumped_config_loads_again(self):
         def check(program):
@@ -201,6 +234,13 @@ class BadUse(unittest.TestCase):
     def test_replay_without_out(self):
         self.for_each(self.replayable(), lambda program: self.assert_refused(
             run(program, "--replay", "no/such.lcm"), "--out"))
+
+    def test_replay_of_what_is_live_only(self):
+        cures = {"lidar": "source", "camera": "source", "fcu": "chase-log", "link": "chase-viewer --play", "recorder": "chase-log"}
+        for name in [*(name for name in LIVE if name in SERVICES), "recorder"]:
+            for more in ((), ("--out", "b.lcm")):
+                with self.subTest(name=name, more=more):
+                    self.assert_refused(run(f"chase-{name}", "--replay", "a.lcm", *more), f"chase-{name}: --replay: ", cures[name])
 
     def test_out_without_replay(self):
         self.for_each(self.replayable(), lambda program: self.assert_refused(
@@ -303,6 +343,9 @@ class BadUse(unittest.TestCase):
     def test_tools_bad_flag(self):
         self.for_each(self.tools(), lambda program: self.assert_refused(
             run(program, "no/such.file", "--no-such-flag")))
+        for program in ("chase-plan", "chase-predict", "chase-world", "chase-scenario", "chase-report"):
+            with self.subTest(program=program):
+                self.assert_refused(run(program), f"see {program} --help")
 
     def test_tools_missing_file(self):
         self.for_each(self.tools(), lambda program: self.assert_refused(

@@ -726,6 +726,28 @@ class Bus(unittest.TestCase):
             self.assertIn("taken", bus.loopback_problem(GROUP, taken.getsockname()[1]))
 
 
+class HostClock(unittest.TestCase):
+    """The doctor on the offset that the processes of a host have agreed on."""
+
+    def told(self, text):
+        with tempfile.TemporaryDirectory() as folder:
+            file = pathlib.Path(folder) / "clock"
+            if text is not None:
+                file.write_text(text, encoding="ascii")
+            with unittest.mock.patch.object(doctor, "CLOCK", file):
+                return dict(doctor.CHECKS)["host clock"]()
+
+    def test_is_this_machines_within_a_second(self):
+        offset = (time.time_ns() - time.monotonic_ns()) // 1000
+        for late, verdict in ((0, "ok"), (900_000, "ok"), (-900_000, "ok"), (1_100_000, "warning"), (-1_100_000, "warning")):
+            self.assertEqual(self.told(f"{offset + late}\n")[0].lower(), verdict, late)
+        self.assertRegex(self.told(f"{offset - 3600 * 10**6}\n")[1], r"-3600\.0 s off .*; cure: systemctl stop .*, then rm ")
+
+    def test_may_be_missing_and_ought_to_be_a_number(self):
+        self.assertEqual(self.told(None)[0], doctor.OK)
+        self.assertEqual(self.told("soon")[0], doctor.WARNING)
+
+
 class Devices(unittest.TestCase):
     """The doctor on what the drivers are told to open."""
 

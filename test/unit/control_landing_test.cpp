@@ -100,6 +100,30 @@ TEST(AskedToLand, GustsDelayItButNotForEver) {
   EXPECT_GT(flight.off_at, 0.0);
 }
 
+// It was led about for all of the time that a way to the ground may take.
+TEST(AskedToLand, BrakesBeforeItComesDownForWantOfTime) {
+  Flight flight({0, 0, 3});
+  Plan way = LinePlan({0, 0, 3}, 1.5);
+  way.position.duration = 100.0;
+  way.position.coefficients.row(1) *= 20.0;
+  way.to_land = true;
+  flight.controller.AddPlan(way);
+  flight.Fly(1.0, Health::kUsable);
+  flight.controller.SetLanding(true);
+  flight.Fly(45.9, Health::kUsable);
+  EXPECT_EQ(flight.controller.following(), Following::kPlan);
+  EXPECT_NEAR(flight.body.v.x(), 1.5, 0.1);
+  flight.Fly(46.1, Health::kUsable);
+  EXPECT_EQ(flight.controller.following(), Following::kBrake);
+  flight.Fly(48.1, Health::kUsable);
+  EXPECT_EQ(flight.controller.following(), Following::kLand);
+  EXPECT_LT(flight.body.v.head<2>().norm(), 0.4);
+  const double x = flight.body.p.x();
+  flight.Fly(60.0, Health::kUsable);
+  EXPECT_GT(flight.off_at, 0.0);
+  EXPECT_NEAR(flight.body.p.x(), x, 0.2);
+}
+
 TEST(AskedToLand, HoldsAgainWhenItIsAskedNoMore) {
   Flight flight({0, 0, 3});
   flight.controller.AddPlan(LandingPlan({0, 0, 3}));

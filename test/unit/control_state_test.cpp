@@ -208,6 +208,31 @@ TEST(ControlNode, IdlesOnTheGroundUntilTheAutopilotObeysAndAPlanBegins) {
   EXPECT_GT(bench.out.back().thrust, 10.0);
 }
 
+// Whoever plans errs, or plans for a flight that was called off or stopped.
+TEST(ControlNode, NoPlanStartsTheMotorsOnTheGroundWhileNoFlightIsAskedFor) {
+  for (const int8_t state : {flight_state_t::IDLE, flight_state_t::READY, flight_state_t::HOLD}) {
+    Bench bench;
+    int64_t t = kStart;
+    const auto run = [&](const char* words, int8_t said) {
+      const size_t before = bench.out.size();
+      for (int i = 0; i < 40; ++i) {
+        if (i % 10 == 0) bench.SendAutopilot(words), bench.SendState(said);
+        bench.SendPose(t += 5000);
+      }
+      return bench.out.size() - before;
+    };
+    bench.SendPlan(t, {0, 0, 1}, 60.0);
+    EXPECT_EQ(run(kStands, state), 0u) << int{state};
+    EXPECT_EQ(bench.tracking.back().following, +tracking_t::NONE);
+    EXPECT_EQ(run(kStands, flight_state_t::TAKEOFF), 40u);
+    EXPECT_EQ(bench.out.back().thrust, 0.0);
+    EXPECT_EQ(run(kStands, state), 0u) << "called off";
+    EXPECT_EQ(run(kFlies, state), 40u) << "in the air whoever leads, it flies";
+    EXPECT_EQ(bench.tracking.back().following, +tracking_t::PLAN);
+    EXPECT_EQ(run(kStands, state), 40u) << "and on, to its landing";
+  }
+}
+
 TEST(ControlNode, ALandingBeforeAFlightStopsTheMotors) {
   Bench bench;
   int64_t t = kStart;

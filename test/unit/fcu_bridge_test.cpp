@@ -164,18 +164,65 @@ TEST(FcuBridge, NeverSendsAStaleSetpoint) {
 
 TEST(FcuBridge, ArmsAnewOnlyWhenMissionTakesOffAnew) {
   Flight flight;
-  flight.bridge.OnFlightState(true);
+  flight.bridge.OnFlightState(true, true);
   ASSERT_TRUE(flight.RunUntil(State::kFlying, 12.0));
-  flight.bridge.OnFlightState(false);
+  flight.bridge.OnFlightState(false, true);
   flight.Run(5.0);
   flight.setpoints = false;  // control hangs
   ASSERT_TRUE(flight.RunUntil(State::kStandby, 30.0)) << flight.bridge.Words();
   flight.setpoints = true;
-  flight.bridge.OnFlightState(false);
+  flight.bridge.OnFlightState(false, true);
   flight.Run(20.0);
   EXPECT_FALSE(flight.px4.armed());
-  flight.bridge.OnFlightState(true);
+  flight.bridge.OnFlightState(true, true);
   EXPECT_TRUE(flight.RunUntil(State::kFlying, 12.0)) << flight.bridge.Words();
+}
+
+// Control's motors run on, of a flight that was called off (READY) or stopped (HOLD) on the ground.
+TEST(FcuBridge, BeginsNothingThatMissionDoesNotWantAnyMore) {
+  for (const bool called_off : {true, false}) {
+    for (const State at : {State::kStandby, State::kStreaming, State::kArming}) {
+      Flight flight;
+      flight.px4.options().preflight = "compass";
+      flight.bridge.OnFlightState(true, true);
+      ASSERT_TRUE(flight.RunUntil(at, 12.0)) << Handshake::Name(at);
+      flight.bridge.OnFlightState(called_off, false);
+      flight.Run(0.1);
+      flight.px4.options().preflight.clear();
+      flight.Run(20.0);
+      EXPECT_EQ(flight.state(), State::kStandby) << Handshake::Name(at);
+      EXPECT_FALSE(flight.px4.armed()) << Handshake::Name(at);
+      flight.bridge.OnFlightState(false, true);
+      EXPECT_TRUE(flight.RunUntil(State::kFlying, 12.0)) << flight.bridge.Words();
+    }
+  }
+}
+
+TEST(FcuBridge, TakesAnArmingBackThatComesThroughAfterTheFlightWasCalledOff) {
+  Flight flight;
+  flight.idle = true;
+  flight.px4.options().preflight = "compass";
+  flight.bridge.OnFlightState(true, true);
+  ASSERT_TRUE(flight.RunUntil(State::kArming, 12.0));
+  flight.bridge.OnFlightState(true, false);
+  flight.px4.options().preflight.clear();  // before the request has come there
+  flight.Run(0.2);
+  EXPECT_TRUE(flight.px4.armed());
+  flight.Run(2.0);
+  EXPECT_FALSE(flight.px4.armed()) << flight.bridge.Words();
+}
+
+// A process that begins anew hears of a hold, or of nothing: whom it flew it flies on.
+TEST(FcuBridge, WhatFliesGoesOnWhateverMissionWants) {
+  Flight flight;
+  flight.bridge.OnFlightState(true, true);
+  flight.TakeOff(3.0);
+  flight.bridge = Bridge(FcuConfig{});
+  flight.bridge.OnFlightState(false, false);
+  EXPECT_TRUE(flight.RunUntil(State::kFlying, 3.0)) << flight.bridge.Words();
+  flight.Run(3.0);
+  EXPECT_EQ(flight.state(), State::kFlying);
+  EXPECT_TRUE(flight.px4.armed());
 }
 
 TEST(FcuBridge, ARepeatedSetpointIsNoFreshOne) {

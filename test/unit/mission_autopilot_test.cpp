@@ -69,6 +69,48 @@ TEST(Mission, ATakeOffThatNobodyBeginsIsCalledOffAfterAPatience) {
   }
 }
 
+TEST(Mission, ATakeOffThatTheEnvelopeEndsOnTheGroundIsCalledOff) {
+  MissionConfig config;
+  config.geofence.polygon = {{-9, -9}, {9, -9}, {9, 9}, {-9, 9}};
+  for (const double charge : {0.2, 0.05, 1.0}) {  // or it is carried out of the fence
+    for (const bool stopped : {false, true}) {
+      Bench bench(config);
+      bench.mission.inputs().on_ground = true;
+      bench.Run(0.2);
+      ASSERT_TRUE(bench.Command(Event::kTakeoff).accepted);
+      bench.mission.inputs().battery = charge;
+      if (charge == 1.0) bench.pose.p.x() = 9.5;
+      bench.Run(stopped ? 0.0 : 0.1);
+      if (stopped) {
+        ASSERT_TRUE(bench.Command(Event::kStop).accepted);
+        bench.Run(0.3);
+      }
+      EXPECT_EQ(bench.mission.state(), stopped && charge < 1.0 ? State::kHold : State::kReady);
+      if (stopped) continue;
+      EXPECT_EQ(bench.mission.reason(), charge < 1.0 ? "take-off called off: battery low"
+                                                     : "take-off called off: outside the geofence");
+      EXPECT_EQ(bench.Command(Event::kLand).accepted, false);
+    }
+  }
+}
+
+TEST(Mission, AKillWhileAPilotHasItIsRefusedAndSaysWhoCan) {
+  for (const bool pilots : {true, false}) {
+    Bench bench;
+    bench.Fly();
+    bench.mission.inputs().autopilot = pilots ? "pilot: the mode was changed: the pilot has it"
+                                              : "failsafe: a failsafe of the autopilot";
+    bench.mission.inputs().handed_over = true;
+    bench.Run(0.1);
+    const world::CommandAnswer answer =
+        bench.mission.Obey(bench.t, {{"command", 1, 77, bench.t}, Event::kKill, true});
+    EXPECT_EQ(answer.accepted, !pilots);
+    EXPECT_EQ(answer.reason, pilots ? "a pilot has it: his kill switch cuts the motors"
+                                    : "DONE: killed: motors cut by command");
+    EXPECT_EQ(bench.mission.state(), pilots ? State::kHold : State::kDone);
+  }
+}
+
 TEST(Mission, ATakeOffWhosePoseIsLostOnTheGroundIsCalledOff) {
   MissionConfig config;
   config.takeoff_patience = 20.0;

@@ -51,6 +51,7 @@ class Bench {
   Mission mission;
   PoseReport pose;
   bool hears_pose = true, hears_obstacles = true, hears_target = true, tracked = true;
+  bool hears_prediction = true;
   bool hears_battery = true, hears_plans = true;  ///< the latter once it flies
   std::map<std::string, bool> failed = {
       {"prediction", false}, {"planning", false}, {"control", false}};
@@ -64,6 +65,7 @@ class Bench {
     if (hears_pose) in.pose = pose;
     if (hears_obstacles) in.obstacles = t;
     if (hears_target) in.target = t;
+    if (hears_prediction) in.prediction = t;
     in.target_tracked = tracked;
     if (hears_battery) in.battery_heard = t;
     if (hears_plans && in.flying) in.plan_heard = t;

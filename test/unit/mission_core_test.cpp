@@ -29,6 +29,8 @@ TEST(Mission, IsReadyOnlyWhenNothingIsMissing) {
       {"planning is", [](Bench* b) { b->failed.erase("planning"); }, 2.6},
       {"control has failed", [](Bench* b) { b->failed["control"] = true; }, 0.1},
       {"mapping has failed", [](Bench* b) { b->failed["mapping"] = true; }, 0.1},
+      {"the autopilot says that it is in the air",
+       [](Bench* b) { b->mission.inputs().armed = true; }, 0.1},
   };
   for (const Case& c : cases) {
     Bench one;
@@ -215,6 +217,69 @@ TEST(Mission, LandsWithoutAPlannerThatStaysAway) {
     EXPECT_EQ(bench.mission.state(), State::kLand);
     EXPECT_EQ(bench.mission.reason(), "planning is silent: landing here");
   }
+}
+
+TEST(Mission, LandsWithoutObstaclesThatStayAway) {
+  for (const Event led : {Event::kHold, Event::kChase, Event::kReturn}) {
+    Bench bench;
+    bench.Fly({3.0, 0.0, 1.0});
+    bench.mission.inputs().flying = bench.mission.inputs().armed = true;
+    bench.Run(20.0);
+    ASSERT_TRUE(bench.Command(led).accepted);
+    bench.Run(0.2);
+    const State before = bench.mission.state();
+    bench.hears_obstacles = false;
+    bench.Run(world::kMostAge.plan - 0.2);
+    EXPECT_EQ(bench.mission.state(), before) << "mapping may come back";
+    bench.Run(0.4);
+    EXPECT_EQ(bench.mission.state(), State::kLand);
+    EXPECT_EQ(bench.mission.reason(), "obstacles are not heard of: landing here");
+  }
+}
+
+// Planning hovers then, and says so with a plan each time.
+TEST(Mission, WithoutForecastsTheTargetIsLostAndItReturnsInTime) {
+  for (const bool heard : {true, false}) {  // otherwise started in flight, prediction dead by then
+    MissionConfig config;
+    config.give_up = 5.0;
+    Bench bench(config);
+    bench.hears_prediction = heard;
+    bench.Fly({3.0, 0.0, 1.0});
+    ASSERT_TRUE(bench.Command(Event::kChase).accepted);
+    bench.Run(5.0);
+    ASSERT_EQ(bench.mission.state(), State::kChase) << "prediction says that it is well";
+    bench.hears_prediction = false;
+    bench.failed.erase("prediction");
+    const double most = heard ? world::kMostAge.prediction : world::kMostAge.status;
+    bench.Run(most - 0.2);
+    EXPECT_EQ(bench.mission.state(), State::kChase);
+    bench.Run(0.4);
+    EXPECT_EQ(bench.mission.state(), State::kSearch);
+    EXPECT_EQ(bench.mission.reason().rfind(
+                  heard ? "target lost: PREDICTION is 1." : "target lost: prediction is 2.", 0),
+              0u)
+        << bench.mission.reason();
+    bench.Run(4.5);
+    EXPECT_EQ(bench.mission.state(), State::kSearch) << "though perception tracks it";
+    bench.Run(1.0);
+    EXPECT_EQ(bench.mission.state(), State::kReturn);
+    ASSERT_TRUE(bench.Command(Event::kSearch).accepted);
+    bench.hears_prediction = true;
+    bench.Run(0.2);
+    EXPECT_EQ(bench.mission.state(), State::kChase) << "it is back";
+  }
+}
+
+TEST(Mission, StartedInTheAirItIsNoTakeOffButAFlightOnceControlFlies) {
+  Bench bench;
+  bench.mission.inputs().armed = true;
+  bench.Run(1.0);
+  EXPECT_EQ(bench.mission.state(), State::kIdle);
+  EXPECT_FALSE(bench.Command(Event::kTakeoff).accepted) << "a pilot hovers it";
+  bench.mission.inputs().flying = true;
+  bench.Run(0.2);
+  EXPECT_EQ(bench.mission.state(), State::kHold);
+  EXPECT_TRUE(bench.mission.missing().empty());
 }
 
 TEST(Mission, AReturnThatGetsNoFartherLands) {

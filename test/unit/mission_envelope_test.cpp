@@ -328,6 +328,21 @@ TEST(Envelope, IsNotReadyWithALowBatteryOrABlockedWayUp) {
   EXPECT_TRUE(bench.Command(Event::kTakeoff).accepted);
 }
 
+TEST(Envelope, IsNotReadyUnderACeilingThatTheClimbWouldBreach) {
+  MissionConfig config;
+  for (const double ceiling : {1.9, 2.1}) {
+    config.geofence = Box(10.0, ceiling);
+    Bench bench(config);
+    bench.Run(0.2);
+    const world::CommandAnswer answer = bench.Command(Event::kTakeoff);
+    EXPECT_EQ(answer.accepted, ceiling > 2.0);
+    if (ceiling > 2.0) continue;
+    EXPECT_NE(answer.reason.find("ceiling of 1.9 m is below climb_height, 2 m: raise"),
+              std::string::npos)
+        << answer.reason;
+  }
+}
+
 TEST(ClimbColumn, AgreesWithPointsOfTheSolids) {
   for (unsigned seed = 1; seed <= 400; ++seed) {
     std::mt19937 random(seed);

@@ -19,8 +19,10 @@ class BridgeNode : public bus::Node {
  public:
   BridgeNode(bus::Bus& bus, fcu::testing::Flight* flight) : bus_(bus), flight_(flight) {
     bus.Subscribe<flight_state_t>("FLIGHT_STATE", [flight](const flight_state_t& m) {
-      flight->bridge.OnFlightState(m.state == flight_state_t::READY ||
-                                   m.state == flight_state_t::TAKEOFF);
+      const bool takes_off = m.state == flight_state_t::TAKEOFF;
+      flight->bridge.OnFlightState(
+          takes_off || m.state == flight_state_t::READY,
+          takes_off || m.state == flight_state_t::CHASE || m.state == flight_state_t::SEARCH);
       flight->setpoints = m.state != flight_state_t::IDLE && m.state != flight_state_t::READY;
       flight->motors = m.state != flight_state_t::DONE;  // as control cuts them
     });

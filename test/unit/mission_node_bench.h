@@ -60,6 +60,10 @@ class NodeBench {
       target.utime = t;
       target.state = target_t::TRACKING;
       sensors_->Publish("TARGET", target);
+      prediction_t prediction{};
+      prediction.utime = t;
+      prediction.target = bus::ToMessage(world::Trajectory::Constant({5, 0, 1}, 0.0, 1.0), t);
+      if (forecasts) sensors_->Publish("PREDICTION", prediction);
       lockstep.RunUntil(t);
     }
   }
@@ -76,7 +80,8 @@ class NodeBench {
 
   Eigen::Vector3d place = Eigen::Vector3d::Zero();  // where it stands, frame W
   int8_t health = pose_t::HEALTH_OK;
-  int32_t n_cut = 0;  // of every list
+  int32_t n_cut = 0;       // of every list
+  bool forecasts = false;  // prediction's process is well whether it sends any or not
   bus::Lockstep lockstep{kStart};
   std::vector<flight_state_t> states;
   std::vector<command_ack_t> acks;

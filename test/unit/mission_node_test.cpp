@@ -111,6 +111,22 @@ TEST(MissionNode, StartedInFlightItHearsFromControlWhereItTookOff) {
   EXPECT_EQ(bench.states.back().reason, "stop commanded: before this process started");
 }
 
+TEST(MissionNode, LooksForATargetThatIsForecastNoMore) {
+  NodeBench bench;
+  bench.forecasts = true;
+  bench.Run(1.5);
+  bench.Command(command_t::TAKEOFF, 1);
+  bench.Command(command_t::CHASE, 2);
+  bench.Run(2.0);
+  ASSERT_EQ(bench.states.back().state, +flight_state_t::CHASE) << bench.states.back().reason;
+  bench.forecasts = false;
+  bench.Run(1.7);
+  EXPECT_EQ(bench.states.back().state, +flight_state_t::SEARCH);
+  bench.forecasts = true;
+  bench.Run(0.2);
+  EXPECT_EQ(bench.states.back().state, +flight_state_t::CHASE);
+}
+
 TEST(MissionNode, AnswersWhatItWasGivenBeforeItsStartWithoutKnowing) {
   NodeBench bench;
   bench.Run(2.0);
@@ -271,14 +287,16 @@ TEST(AutopilotState, TellsWhetherItStandsDisarmed) {
 
 TEST(MissionNode, SaysWhoElseFlies) {
   struct Bridge : bus::Node {
-    bus::NodeReport Report() const override {
-      return {bus::NodeReport::State::kOk, "pilot: the pilot has it; mode POSCTL, armed, in air"};
-    }
+    explicit Bridge(const std::string& said) : detail(said) {}
+    bus::NodeReport Report() const override { return {bus::NodeReport::State::kOk, detail}; }
+    const std::string& detail;
   };
+  std::string words = "pilot: the pilot has it; mode POSCTL, armed, on ground";
   NodeBench bench;
-  bench.lockstep.Add("fcu", 0, [](bus::Bus&) { return std::make_unique<Bridge>(); });
+  bench.lockstep.Add("fcu", 0, [&](bus::Bus&) { return std::make_unique<Bridge>(words); });
   bench.Run(2.0);
   EXPECT_EQ(bench.states.back().reason.find("pilot"), std::string::npos) << "on the ground";
+  EXPECT_EQ(bench.states.back().n_missing, 0);
   bench.Command(command_t::TAKEOFF, 1);
   bench.Run(0.2);
   EXPECT_EQ(bench.states.back().reason, "take-off commanded; fcu: pilot: the pilot has it");

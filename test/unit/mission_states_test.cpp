@@ -101,7 +101,8 @@ class Model {
     const bool stays_up = leads || task_ == State::kHold;
     if (e == Event::kLeaving && leads) task_ = State::kHold;
     if ((e == Event::kOutside || e == Event::kBatteryLow) && stays_up) task_ = State::kReturn;
-    if (e == Event::kBatteryCritical || e == Event::kUnplanned) task_ = State::kLand;
+    if (e == Event::kBatteryCritical || e == Event::kUnplanned || e == Event::kUnmapped)
+      task_ = State::kLand;
   }
 
   bool off_ = false, aloft_ = false, complete_ = false, blind_ = false;
