@@ -28,7 +28,9 @@ const ROWS = page.rows;
 const MOST_CHANGES = 200;
 const wordsOf = (key) => ROWS.find(([name]) => name === key)?.[1] ?? key.replace('criteria.', 'criterion ');
 
-const criterionOf = ({metrics}, key) => {
+const canTell = ({judged}, name) => judged || ['recorded', 'finite_setpoints'].includes(name);   // the others are of samples of the mission
+const criterionOf = ({metrics, judged}, key) => {
+  if (!canTell({judged}, key)) return undefined;
   const name = [key, `${key}_max`].find((n) => n in (metrics.criteria ?? {}));
   return name === undefined ? undefined : (metrics.criteria[name] ? '✓' : '✗') + (NARROW ? '' : ' criterion');
 };
@@ -37,15 +39,17 @@ function showHeader() {
   const titles = [...new Set(flights.map(({title}) => title))];
   byId('title').textContent = two ? `${titles.join(' and ')}: two flights` : titles[0];
   flights.forEach((flight, i) => {
-    if ('passed' in flight.metrics)
-      byId('title').append(make('span', `${two ? `${'AB'[i]} ` : ''}${flight.metrics.passed ? 'passed' : 'failed'}`, `badge ${flight.metrics.passed ? 'good' : 'bad'}`));
+    if ('passed' in flight.metrics) {
+      const [word, kind] = !flight.judged ? [UNKNOWN, 'open'] : flight.metrics.passed ? ['passed', 'good'] : ['failed', 'bad'];
+      byId('title').append(make('span', `${two ? `${'AB'[i]} ` : ''}${word}`, `badge ${kind}`));
+    }
     const {metrics, vehicle} = flight, commits = [...new Set(Object.values(vehicle.software.versions).map((v) => v.match(/commit [\w-]+/)?.[0] ?? v))];
     const of = metrics.duration_s ? ` of ${metrics.duration_s} s` : '';
     const factor = metrics.real_time_factor ? `, real-time factor ${metrics.real_time_factor.toFixed(2)}` : '';
     const hosts = [...new Set(Object.values(vehicle.software.hosts))], named = (word, names) => (names?.length ? `, ${word} ${names.join(', ')}` : '');
     const where = `${vehicle.recorded_utc ? `, ${vehicle.recorded_utc} UTC` : ''}${named('vehicle', vehicle.vehicles)}${named('host', hosts)}`;
     byId('subtitle').append(make('div', `${two ? `${'AB'[i]}: ` : ''}${flight.log}${where}, ${metrics.flown_s.toFixed(1)} s${of} flown${factor}; ${commits.join(', ')}`));
-    for (const loss of metrics.losses) byId('losses').append(make('p', `${two ? `${'AB'[i]}: ` : ''}${loss}`, 'failed'));
+    for (const loss of [metrics.shortfall, ...metrics.losses].filter((line) => line)) byId('losses').append(make('p', `${two ? `${'AB'[i]}: ` : ''}${loss}`, 'failed'));
   });
   byId('map_text').textContent = `${flights[0].truth ? 'Paths over the mission.' : 'Paths as estimated.'} `
     + 'Thin lines: predictions and plans of every half second (switch them in the legend).';
@@ -59,7 +63,7 @@ function showFigures() {
   const known = ROWS.filter(([key]) => at(metrics, key) !== undefined && (metrics.fault || !of_fault(key)));
   const rows = known.map(([key, words, unit, scale, digits]) => ({cells: [words, shown(at(metrics, key), digits, unit, scale)], mark: criterionOf(flights[0], key)}));
   for (const [name, words] of [['complete', 'Mission complete'], ['recorded', 'Log complete']])
-    if (name in (metrics.criteria ?? {})) rows.unshift({cells: [words, metrics.criteria[name] ? 'yes' : 'no'], mark: criterionOf(flights[0], name)});
+    if (name in (metrics.criteria ?? {})) rows.unshift({cells: [words, !canTell(flights[0], name) ? UNKNOWN : metrics.criteria[name] ? 'yes' : 'no'], mark: criterionOf(flights[0], name)});
   const half = Math.ceil(rows.length / 2);
   table(byId('figures'), null, rows.slice(0, half));
   table(byId('figures'), null, rows.slice(half));

@@ -107,7 +107,7 @@ function showTimeLine(flights) {
   });
   if (marks.length) traces.push({name: 'fault begins', x: marks.map((s) => s.from), y: marks.map((s) => s.row), mode: 'markers+text', showlegend: false,
     text: marks.map((s) => s.label), textposition: 'top right', marker: {symbol: 'x', size: 10, color: COLORS.bad}, hoverinfo: 'skip'});
-  drawOverTime('timeline', traces, {height: 110 + 34 * rows.length, barmode: 'overlay', bargap: 0.25, margin: {...MARGIN, t: 20},
+  drawOverTime('timeline', traces, {height: 110 + 34 * rows.length, barmode: 'overlay', bargap: 0.25, margin: {...MARGIN, t: 20, l: Math.max(MARGIN.l, 12 + 7 * Math.max(...rows.map((row) => row.length)))},
     yaxis: {categoryorder: 'array', categoryarray: rows, fixedrange: true}});
 }
 

@@ -9,6 +9,7 @@ import pathlib
 import re
 import struct
 import sys
+import warnings
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
 import chase  # noqa: E402
@@ -37,33 +38,42 @@ def read(path, *channels, damage=None):
 
     `path`: a log, or a flight's folder, which stands for its flight.lcm. What is damaged is left out, as chase-log
     does, and a log that is cut off ends where it does; (place, bytes) of each such stretch goes into the list `damage`.
-    Raises ValueError for a file that is no log.
+    Raises ValueError for a file that is no log, and at the log's end for a channel that it does not hold.
     """
     path = pathlib.Path(path)
     with open(path / "flight.lcm" if path.is_dir() else path, "rb") as file:
-        if file.read(4) != _SYNC:
-            raise ValueError(f"{file.name}: is no LCM log (it does not begin with ED A1 DA 01)")
+        if not file.read(1):
+            raise ValueError(f"{file.name}: is empty; record the log again")
         with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as log:
-            for utime, channel, data in _events(log, {name.encode() for name in channels}, [] if damage is None else damage):
+            if not _begins(log, 0) and _find(log, 0, len(log)) == len(log):
+                raise ValueError(f"{file.name}: is no LCM log (it does not begin with ED A1 DA 01)")
+            wanted, held = {name.encode() for name in channels}, set()
+            for utime, channel, data in _events(log, wanted, held, [] if damage is None else damage):
                 yield Event(utime, channel.decode(), decode(data))
+        if not wanted <= held:
+            lacking, holds = (", ".join(sorted(name.decode() for name in names)) for names in (wanted - held, held))
+            raise ValueError(f"{file.name}: holds nothing on {lacking}; its channels: {holds}")
 
 
-def _events(log, wanted, damage):
+def _events(log, wanted, held, damage):
+    """`held` becomes the names of the log's channels."""
     at = 0
     while at < len(log):
         utime, name, end = _event(log, at)
         # What no event follows may have a wrong length, and then holds events itself.
-        following = end if _begins(log, end) else _find(log, at + 1, end or len(log))
-        if following == end and (not wanted or log[name] in wanted):
-            yield utime, log[name], log[name.stop:end]
-        elif following != end:
+        following = end if end and _begins(log, end) else _find(log, at + 1, end or len(log))
+        if following != end:
             damage.append((at, following - at))
+        else:
+            held.add(log[name])
+            if not wanted or log[name] in wanted:
+                yield utime, log[name], log[name.stop:end]
         at = following
 
 
 def _begins(log, at):
     """A sync word, or as much of one as the file still holds; its end is a beginning, too."""
-    return at > 0 and _SYNC.startswith(log[at:at + 4])
+    return _SYNC.startswith(log[at:at + 4])
 
 
 def _event(log, at):
@@ -81,7 +91,8 @@ def _event(log, at):
 def _find(log, at, to):
     """The first event from there on that another, or the end of the file, follows; `to`: there is none."""
     while (at := log.find(_SYNC, at, to)) >= 0:
-        if _begins(log, _event(log, at)[2]):
+        end = _event(log, at)[2]
+        if end and _begins(log, end):
             return at
         at += 1
     return to
@@ -104,6 +115,14 @@ def _flat(value, name):
 
 
 def table(path, channel):
-    """A dict per message of the channel: its fields by name, and `event_utime`. For pandas."""
-    return [{"event_utime": event.utime, **dict(fields(event.message))}
-            for event in read(path, channel) if not isinstance(event.message, bytes)]
+    """A dict per message of the channel: its fields by name, and `event_utime`. For pandas.
+
+    Warns of messages that cannot be read, which are left out.
+    """
+    events = list(read(path, channel))
+    rows = [{"event_utime": event.utime, **dict(fields(event.message))}
+            for event in events if not isinstance(event.message, bytes)]
+    if unread := len(events) - len(rows):
+        warnings.warn(f"{path}: {channel}: {unread} message{'s' * (unread != 1)} cannot be read (of another version, or "
+                      "damaged; see chase-log migrate)", stacklevel=2)
+    return rows

@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <stdexcept>
+#include <utility>
 
 #include "common/config/config.h"
 #include "common/config/version.h"
@@ -42,14 +43,14 @@ struct Arguments {
 /// could not be read.
 Watch Progress() {
   using Clock = std::chrono::steady_clock;
-  return [next = Clock::now() + kProgressPeriod](const LogReader& log) mutable {
+  return [next = Clock::now() + kProgressPeriod, told = false](const LogReader& log) mutable {
     const bool terminal = isatty(STDERR_FILENO) != 0;
     if (terminal && Clock::now() >= next) {
       next = Clock::now() + kProgressPeriod;
       std::fprintf(stderr, "\r%s: %3.0f %%", log.file().c_str(),
                    100.0 * static_cast<double>(log.position()) / static_cast<double>(log.size()));
     }
-    if (!log.AtEnd()) return;
+    if (!log.AtEnd() || std::exchange(told, true)) return;
     if (terminal) std::fputs("\r\033[K", stderr);
     for (const Damage& d : log.damage())
       std::fprintf(stderr, "%s: %s\n", log.file().c_str(), Format(d).c_str());
@@ -129,13 +130,13 @@ chase::world::Rig RigIn(const std::string& file, bool named) {
   return rig.rig;
 }
 
-void RunMcap(const Arguments& a) {
+void RunMcap(const Arguments& a, Notes* notes) {
   namespace fs = std::filesystem;
   const fs::path flown = fs::path(a.in).parent_path() / "perception.yaml";
   const std::string file = !a.rig.empty() ? a.rig : fs::exists(flown) ? flown.string() : "";
   const chase::world::Rig rig = file.empty() ? chase::world::Rig() : RigIn(file, !a.rig.empty());
   const long messages =
-      ExportMcap(a.in, a.out, a.channel, {a.jpeg, rig}, !a.rig.empty(), Progress());
+      ExportMcap(a.in, a.out, a.channel, {a.jpeg, rig}, !a.rig.empty(), Progress(), notes);
   std::printf("%s: %ld messages, with %s\n", a.out.c_str(), messages,
               file.empty() ? "the default rig" : ("the rig of " + file).c_str());
 }
@@ -151,14 +152,19 @@ void RunExport(const Arguments& a) {
   only_with(a.long_form, "--long", a.csv, "--csv");
   only_with(a.jpeg, "--jpeg", a.mcap, "--mcap");
   only_with(!a.rig.empty(), "--rig", a.mcap, "--mcap");
-  if (a.tum)
-    std::printf("%s: %ld poses\n", a.out.c_str(),
-                ExportTum(a.in, a.out, a.channel.empty() ? "POSE" : a.channel, Progress()));
-  else if (a.mcap)
-    RunMcap(a);
-  else
-    std::printf("%s: %d files\n", a.out.c_str(),
-                ExportCsv(a.in, a.out, a.channel, a.long_form, Progress()));
+  Notes notes;
+  if (a.tum) {
+    const std::string channel = a.channel.empty() ? "POSE" : a.channel;
+    const long poses = ExportTum(a.in, a.out, channel, Progress(), &notes);
+    std::printf("%s: %ld pose%s\n", a.out.c_str(), poses, poses == 1 ? "" : "s");
+  } else if (a.mcap) {
+    RunMcap(a, &notes);
+  } else {
+    const int files = ExportCsv(a.in, a.out, a.channel, a.long_form, Progress(), &notes);
+    std::printf("%s: %d file%s\n", a.out.c_str(), files, files == 1 ? "" : "s");
+  }
+  for (const std::string& note : notes)
+    std::fprintf(stderr, "%s: %s\n", a.in.c_str(), note.c_str());
 }
 
 void AddExport(CLI::App* app, Arguments* a) {
@@ -334,7 +340,7 @@ void AddVerify(CLI::App* app, Arguments* a, int* exit_code) {
   sub->callback([a, exit_code] {
     const Verification verification = Verify(a->in, a->radius, a->sigmas);
     std::fputs(Format(verification).c_str(), stdout);
-    *exit_code = verification.Holds() ? 0 : 1;
+    *exit_code = !verification.refuted.empty() ? 1 : verification.Told() ? 0 : 2;
   });
 }
 
@@ -370,6 +376,7 @@ int main(int argc, char** argv) {
   AddMigrate(&app, &arguments);
   try {
     app.parse(argc, argv);
+    if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0) return Trouble(app, 1);
   } catch (const CLI::ParseError& e) {
     if (e.get_exit_code() == 0) return app.exit(e);
     const auto chosen = app.get_subcommands();

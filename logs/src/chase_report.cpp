@@ -36,15 +36,19 @@ int Judge(const ReportedFlight& flight) {
   return 2;
 }
 
+void SayByVehicle(const std::string& log, const std::string& lacks) {
+  std::printf("%s holds no %s: reported is what the vehicle said of itself\n", log.c_str(),
+              lacks.c_str());
+}
+
 /// Returns the exit code.
 int Report(const std::string& log, const std::string& out) {
-  const bool truth = HoldsTruth(log);
+  const std::string lacks = LacksOfTruth(log);
   const fs::path folder = OutputFolder(log, out);
-  const ReportedFlight flight = ReportFlight(log, {truth, true, folder.string()});
+  const ReportedFlight flight = ReportFlight(log, {lacks.empty(), true, folder.string()});
   WriteFile((folder / "metrics.json").string(), flight.metrics);
   WritePage((folder / "report.html").string(), ShareFolder(), {flight});
-  if (!truth)
-    std::printf("%s holds no TRUTH: reported is what the vehicle said of itself\n", log.c_str());
+  if (!lacks.empty()) SayByVehicle(log, lacks);
   std::printf("%s%s\n", Summary(flight).c_str(), (folder / "report.html").c_str());
   return Judge(flight);
 }
@@ -62,7 +66,12 @@ void RefuseOwnFolders(const std::vector<std::string>& logs, const std::string& o
 /// Without truth in both of them: what the vehicles said.
 int Compare(const std::vector<std::string>& logs, const std::string& out) {
   RefuseOwnFolders(logs, out);
-  const bool truth = std::all_of(logs.begin(), logs.end(), HoldsTruth);
+  bool truth = true;
+  for (const std::string& log : logs) {
+    const std::string lacks = LacksOfTruth(log);
+    if (!lacks.empty()) SayByVehicle(log, lacks);
+    truth = truth && lacks.empty();
+  }
   std::vector<ReportedFlight> flights;
   int code = 0;
   for (const std::string& log : logs) {

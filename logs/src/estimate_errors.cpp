@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "common/math/rotation.h"
 
@@ -40,10 +41,35 @@ const TargetSample* NewestTarget(const std::vector<TargetSample>& targets, doubl
   return newest == targets.rend() ? nullptr : &*newest;
 }
 
+/// From the true frame W to those of odometry. The first is the true one, as far as its error goes;
+/// one that began anew in flight has its own origin and north.
+class EpochFrames {
+ public:
+  explicit EpochFrames(const FlightRecord& record) {
+    for (const PoseSample& pose : record.poses) {
+      if (frames_.empty()) frames_[pose.epoch] = Eigen::Isometry3d::Identity();
+      if (frames_.count(pose.epoch) > 0) continue;
+      if (const auto truth = TruthAt(record.truth, pose.t))
+        frames_[pose.epoch] = FrameAt(pose, *truth);
+    }
+  }
+  /// A true place in that epoch's frame; nothing where no POSE tells. Without any POSE there is one
+  /// frame.
+  std::optional<Vector3d> Place(int32_t epoch, const Vector3d& p) const {
+    if (frames_.empty()) return p;
+    const auto frame = frames_.find(epoch);
+    return frame == frames_.end() ? std::nullopt : std::optional<Vector3d>(frame->second * p);
+  }
+
+ private:
+  std::map<int32_t, Eigen::Isometry3d> frames_;
+};
+
 /// Mean distance from the true target, `horizon` s after the predictions' start, to where
 /// position(prediction, time) has it, m.
 template <class F>
 std::optional<double> MeanError(const FlightRecord& record, double horizon, F position) {
+  const EpochFrames frames(record);
   double sum = 0.0;
   long count = 0;
   for (const PredictionSample& p : record.predictions) {
@@ -52,7 +78,9 @@ std::optional<double> MeanError(const FlightRecord& record, double horizon, F po
     const auto truth = TruthAt(record.truth, t);
     const std::optional<Vector3d> expected = position(p, t);
     if (!truth || !expected) continue;
-    sum += (*expected - truth->target).norm();
+    const auto place = frames.Place(p.epoch, truth->target);
+    if (!place) continue;
+    sum += (*expected - *place).norm();
     ++count;
   }
   return count > 0 ? std::optional<double>(sum / static_cast<double>(count)) : std::nullopt;
@@ -76,11 +104,20 @@ std::optional<TruePositions> TruthAt(const std::vector<TruthSample>& truth, doub
                        before->yaw + s * math::WrapAngle(after->yaw - before->yaw)};
 }
 
+Eigen::Isometry3d FrameAt(const PoseSample& pose, const TruePositions& truth) {
+  Eigen::Isometry3d frame = Eigen::Isometry3d::Identity();
+  frame.linear() = Eigen::AngleAxisd(pose.yaw - truth.yaw, Vector3d::UnitZ()).toRotationMatrix();
+  frame.translation() = pose.p - frame.linear() * truth.body;
+  return frame;
+}
+
 TrajectoryError OdometryError(const FlightRecord& record) {
+  const EpochFrames frames(record);
   Pairs pairs;
   for (const PoseSample& pose : record.poses) {
     const auto truth = TruthAt(record.truth, pose.t);
-    if (truth && record.InMission(pose.t)) pairs.Add(pose.p, truth->body);
+    if (!truth || !record.InMission(pose.t)) continue;
+    if (const auto place = frames.Place(pose.epoch, truth->body)) pairs.Add(pose.p, *place);
   }
   if (pairs.estimate.empty()) return {};
   const auto estimate = Pairs::Columns(pairs.estimate), truth = Pairs::Columns(pairs.truth);
@@ -93,10 +130,14 @@ TrajectoryError OdometryError(const FlightRecord& record) {
 }
 
 std::optional<double> TargetRmse(const FlightRecord& record) {
+  const EpochFrames frames(record);
   Pairs pairs;
   for (const TargetSample& target : record.targets) {
     if (!target.tracking || !record.InMission(target.t)) continue;
-    if (const auto truth = TruthAt(record.truth, target.t)) pairs.Add(target.mean, truth->target);
+    const auto truth = TruthAt(record.truth, target.t);
+    if (!truth) continue;
+    if (const auto place = frames.Place(target.epoch, truth->target))
+      pairs.Add(target.mean, *place);
   }
   if (pairs.estimate.empty()) return std::nullopt;
   return Rmse(Pairs::Columns(pairs.estimate), Pairs::Columns(pairs.truth));
@@ -110,8 +151,8 @@ std::optional<double> PredictionError(const FlightRecord& record, double horizon
 std::optional<double> ConstantVelocityError(const FlightRecord& record, double horizon) {
   return MeanError(record, horizon, [&](const PredictionSample& p, double t) {
     const TargetSample* target = NewestTarget(record.targets, p.t);
-    return target ? std::optional<Vector3d>(target->mean + (t - target->t) * target->velocity)
-                  : std::nullopt;
+    if (!target || target->epoch != p.epoch) return std::optional<Vector3d>();
+    return std::optional<Vector3d>(target->mean + (t - target->t) * target->velocity);
   });
 }
 

@@ -14,8 +14,12 @@ struct TruePositions {
 };
 std::optional<TruePositions> TruthAt(const std::vector<TruthSample>& truth, double t);
 
-/// RMSE of POSE against the truth of the same time over the mission, m: as it is (both are in W)
-/// and after the best rigid alignment.
+/// From the true frame W to the one that `pose` was estimated in, by where the body truly was then.
+Eigen::Isometry3d FrameAt(const PoseSample& pose, const TruePositions& truth);
+
+/// RMSE of POSE against the truth of the same time over the mission, m: as it is (both are in W;
+/// truth is brought to a later epoch's frame by that one's first POSE, here and below) and after
+/// the best rigid alignment.
 struct TrajectoryError {
   std::optional<double> raw, aligned;
 };
@@ -29,7 +33,7 @@ std::optional<double> TargetRmse(const FlightRecord& record);
 std::optional<double> PredictionError(const FlightRecord& record, double horizon);
 
 /// The same of a straight line in place of each of them: from the newest TARGET up to the
-/// prediction's start on with that one's velocity.
+/// prediction's start on with that one's velocity; where both are of one epoch.
 std::optional<double> ConstantVelocityError(const FlightRecord& record, double horizon);
 
 }  // namespace chase::logs

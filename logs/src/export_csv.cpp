@@ -9,6 +9,7 @@
 #include "common/bus/channels.h"
 #include "common/logs/log_reader.h"
 #include "logs/src/export.h"
+#include "logs/src/good_message.h"
 #include "logs/src/message_fields.h"
 #include "logs/src/output.h"
 
@@ -105,7 +106,9 @@ class Table {
 
 }  // namespace
 
-void RefuseEmpty(const std::string& log, const std::string& channel) {
+void RefuseEmpty(const std::string& log, const std::string& channel, const Notes& unreadable) {
+  if (!unreadable.empty())
+    throw std::runtime_error(fmt::format("{}: {}", log, fmt::join(unreadable, "; ")));
   if (channel.empty())
     throw std::runtime_error(log + ": holds no message of ours; see chase-log info");
   throw BadOption("--channel " + channel + ": " + log +
@@ -113,11 +116,13 @@ void RefuseEmpty(const std::string& log, const std::string& channel) {
 }
 
 int ExportCsv(const std::string& log, const std::string& out, const std::string& channel,
-              bool long_form, const Watch& watch) {
+              bool long_form, const Watch& watch, Notes* notes) {
   LogReader reader(log, watch);
   std::map<std::string, Table> tables;
+  Unreadable unreadable;
   for (LogEvent e; reader.Next(&e);) {
     if (channel.empty() ? bus::IsHeavy(e.channel) : e.channel != channel) continue;
+    unreadable.Add(e);
     const auto fields = FieldsOf(e.bytes);
     if (!fields) continue;
     std::error_code error;
@@ -126,7 +131,8 @@ int ExportCsv(const std::string& log, const std::string& out, const std::string&
     const std::string file = (std::filesystem::path(out) / (e.channel + ".csv")).string();
     tables.try_emplace(e.channel, file, long_form).first->second.Add(e.utime, *fields);
   }
-  if (tables.empty()) RefuseEmpty(log, channel);
+  if (notes) *notes = unreadable.Lines();
+  if (tables.empty()) RefuseEmpty(log, channel, unreadable.Lines());
   for (auto& [name, table] : tables) table.Close();
   return static_cast<int>(tables.size());
 }

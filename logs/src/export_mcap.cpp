@@ -7,10 +7,11 @@
 namespace chase::logs {
 
 long ExportMcap(const std::string& log, const std::string& out, const std::string& channel,
-                ViewerOptions options, bool rig_named, const Watch& watch) {
+                ViewerOptions options, bool rig_named, const Watch& watch, Notes* notes) {
   LogReader reader(log, watch);
   McapWriter writer(out);
   OneVehicle vehicle(log);  // there is one /tf
+  Unreadable unreadable;
   long count = 0;
   bool images = false, frames = false;
   for (LogEvent e; reader.Next(&e);) {
@@ -18,6 +19,7 @@ long ExportMcap(const std::string& log, const std::string& out, const std::strin
       options.hard_radius[plan.vehicle] = plan.hard_radius;
     if (!channel.empty() && e.channel != channel) continue;
     vehicle.Hear(e.channel);
+    unreadable.Add(e);
     const auto messages = ToViewer(e, options);
     for (const ViewerMessage& m : messages) {
       images |= m.schema == "foxglove.CameraCalibration";
@@ -28,7 +30,8 @@ long ExportMcap(const std::string& log, const std::string& out, const std::strin
     }
     count += !messages.empty();
   }
-  if (count == 0) RefuseEmpty(log, channel);
+  if (notes) *notes = unreadable.Lines();
+  if (count == 0) RefuseEmpty(log, channel, unreadable.Lines());
   if (options.jpeg && !images)
     throw BadOption("--jpeg: does nothing, as no image is exported; leave it out");
   if (rig_named && !images && !frames)

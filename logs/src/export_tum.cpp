@@ -30,13 +30,38 @@ std::string LineOf(const target_t& m) {
   return usable ? Line(m.utime, m.mean, kNoRotation) : "";
 }
 
+int32_t EpochOf(const truth_t&) { return 0; }  // of one frame
 template <class T>
-std::string LineOf(const Bytes& bytes) {
-  T message;
-  return DecodeBytes(bytes, &message) ? LineOf(message) : "";
+int32_t EpochOf(const T& m) {
+  return m.epoch;
 }
 
-using Liner = std::string (*)(const Bytes&);
+/// The epoch of the frame W that they were in so far.
+class Frames {
+ public:
+  void Note(int64_t utime, int32_t epoch) {
+    if (epoch_ && *epoch_ != epoch)
+      changes_.push_back(fmt::format("frame W changed at {:.6f} s (epoch {})",
+                                     static_cast<double>(utime) * 1e-6, epoch));
+    epoch_ = epoch;
+  }
+  const Notes& changes() const { return changes_; }
+
+ private:
+  std::optional<int32_t> epoch_;
+  Notes changes_;
+};
+
+template <class T>
+std::string LineOf(const Bytes& bytes, Frames* frames) {
+  T message;
+  if (!DecodeBytes(bytes, &message)) return "";
+  const std::string line = LineOf(message);
+  if (!line.empty()) frames->Note(message.utime, EpochOf(message));
+  return line;
+}
+
+using Liner = std::string (*)(const Bytes&, Frames*);
 
 Liner LinerOf(const std::string& channel) {
   if (IsOn(channel, "POSE")) return LineOf<pose_t>;
@@ -49,18 +74,25 @@ Liner LinerOf(const std::string& channel) {
 }  // namespace
 
 long ExportTum(const std::string& log, const std::string& out, const std::string& channel,
-               const Watch& watch) {
+               const Watch& watch, Notes* notes) {
   const Liner line_of = LinerOf(channel);
   LogReader reader(log, watch);
   std::string text, found;
   long count = 0;
+  Frames frames;
+  Unreadable unreadable;
   for (LogEvent e; reader.Next(&e);) {
     if (!IsOn(e, channel)) continue;
     if (found.empty()) found = e.channel;
     if (found != e.channel) RefuseSeveralVehicles(log, channel);
-    const std::string line = line_of(e.bytes);
+    const std::string line = line_of(e.bytes, &frames);
+    unreadable.Add(e);
     text += line;
     count += !line.empty();
+  }
+  if (notes) {
+    *notes = unreadable.Lines();
+    notes->insert(notes->end(), frames.changes().begin(), frames.changes().end());
   }
   if (count == 0)
     throw std::runtime_error(log + ": holds no usable " + channel +

@@ -63,6 +63,7 @@ struct PoseSample {
   double t = 0.0;
   Eigen::Vector3d p = Eigen::Vector3d::Zero();  ///< p_WB as estimated
   double yaw = 0.0;                             ///< of the body, rad
+  int32_t epoch = 0;                            ///< of the frame W that it is in
 };
 
 struct TargetSample {
@@ -71,12 +72,14 @@ struct TargetSample {
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();      ///< p_WT as perceived
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< v_WT as perceived, m/s
   bool known = false;                                  ///< tracked or occluded
+  int32_t epoch = 0;                                   ///< of the frame W that it is in
 };
 
 struct PredictionSample {
   double t = 0.0;
   bool usable = false;       ///< false: there was nothing to predict
   world::Trajectory target;  ///< p_WT(t), in mission time
+  int32_t epoch = 0;         ///< of the frame W that it is in
 };
 
 struct PlanSample {

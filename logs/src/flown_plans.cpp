@@ -25,15 +25,11 @@ Eigen::Vector3d Wanted(const PlanSample& plan, double t) {
 Eigen::Isometry3d FrameOf(const FlightRecord& record, const PlanSample& plan) {
   const auto next = std::upper_bound(record.poses.begin(), record.poses.end(), plan.heard,
                                      [](double t, const PoseSample& pose) { return t < pose.t; });
-  Eigen::Isometry3d frame = Eigen::Isometry3d::Identity();
-  if (next == record.poses.begin()) return frame;
+  if (next == record.poses.begin()) return Eigen::Isometry3d::Identity();
   const PoseSample& pose = *std::prev(next);
   const auto truth = TruthAt(record.truth, pose.t);
-  if (!truth) return frame;
-  frame.linear() =
-      Eigen::AngleAxisd(pose.yaw - truth->yaw, Eigen::Vector3d::UnitZ()).toRotationMatrix();
-  frame.translation() = pose.p - frame.linear() * truth->body;
-  return frame;
+  if (!truth) return Eigen::Isometry3d::Identity();
+  return FrameAt(pose, *truth);
 }
 
 }  // namespace

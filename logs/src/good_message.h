@@ -1,14 +1,18 @@
 #pragma once
 
+#include <algorithm>
+#include <map>
 #include <set>
 #include <stdexcept>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "common/bus/channels.h"
 #include "common/bus/validation.h"
 #include "common/logs/log_reader.h"
 #include "common/logs/message_types.h"
+#include "logs/src/message_fields.h"
 
 namespace chase::logs {
 
@@ -18,6 +22,37 @@ inline bool IsOn(const std::string& channel, const std::string& name) {
          channel.compare(channel.size() - name.size(), name.size(), name) == 0;
 }
 inline bool IsOn(const LogEvent& e, const std::string& name) { return IsOn(e.channel, name); }
+
+/// Ours by its channel or its type, but no whole message of today's: of another version, or
+/// damaged.
+inline bool IsUnreadable(const LogEvent& e) {
+  bool reads = false;
+  WithMessage(e.bytes, [&](const auto&) { reads = true; });
+  if (reads) return false;
+  const auto& table = bus::ChannelTable();
+  return !TypeOf(e.bytes).empty() || IsOn(e, "_STATUS") ||
+         std::any_of(table.begin(), table.end(),
+                     [&](const bus::ChannelRow& row) { return IsOn(e, row.channel); });
+}
+
+/// For people; `count` of them, on that channel.
+std::string UnreadableLine(const std::string& channel, long count);
+
+/// Counts them by channel.
+class Unreadable {
+ public:
+  void Add(const LogEvent& e) {
+    if (IsUnreadable(e)) ++counts_[e.channel];
+  }
+  std::vector<std::string> Lines() const {
+    std::vector<std::string> lines;
+    for (const auto& [channel, count] : counts_) lines.push_back(UnreadableLine(channel, count));
+    return lines;
+  }
+
+ private:
+  std::map<std::string, long> counts_;
+};
 
 /// The figures of one must not be those of another.
 [[noreturn]] inline void RefuseSeveralVehicles(const std::string& log, const std::string& name) {

@@ -23,7 +23,8 @@ namespace {
 constexpr double kTolerableShare = 0.01;                     // of messages: see LogInfo::Recorded
 constexpr int64_t kGapPeriods = 10, kShortestGap = 100'000;  // us; a shorter gap is not told
 constexpr size_t kFewest = 20;                               // of a channel to have a period
-constexpr int64_t kYear2000 = 946684800LL * 1000000;         // us; before it: logical time
+constexpr int64_t kStepAhead = 2'000'000, kStepBack = 300'000;  // us, at least, of a clock
+constexpr int64_t kYear2000 = 946684800LL * 1000000;            // us; before it: logical time
 
 double Seconds(int64_t utime) { return static_cast<double>(utime) * 1e-6; }
 
@@ -40,6 +41,12 @@ std::string Line(const ChannelInfo& c) {
                      c.channel, c.type.empty() ? "-" : c.type, c.count, c.RateHz(), c.bytes,
                      Seconds(c.first_utime), Seconds(c.last_utime),
                      c.senders.empty() ? "-" : std::to_string(c.missing), Seconds(c.longest_gap));
+}
+
+int64_t Median(std::vector<int64_t> values) {
+  const auto middle = values.begin() + static_cast<long>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
 }
 
 /// Processes of the same value in one place.
@@ -123,6 +130,7 @@ void LogInfo::RequireOneVehicle() const {
 
 bool LogInfo::Recorded() const {
   const auto tolerable = [this](ChannelInfo c) {
+    if (c.unreadable > 0) return false;
     if (!HeavyUnderAnyPrefix(c.channel)) return c.missing == 0;
     c.missing -= c.missing_first;
     return c.MissingShare() <= kTolerableShare || heavy_left_out;
@@ -133,9 +141,10 @@ bool LogInfo::Recorded() const {
 std::vector<std::string> LogInfo::Losses() const {
   std::vector<std::string> lines;
   for (const ChannelInfo& c : channels) {
+    if (c.unreadable > 0) lines.push_back(UnreadableLine(c.channel, c.unreadable));
     if (c.missing > 0 && c.count == 0)
-      lines.push_back(
-          fmt::format("{}: others heard {} messages, the log holds none", c.channel, c.missing));
+      lines.push_back(fmt::format("{}: others heard {} message{}, the log holds none", c.channel,
+                                  c.missing, c.missing == 1 ? "" : "s"));
     for (const SenderInfo& s : c.senders)
       if (s.missing > 0)
         lines.push_back(fmt::format(
@@ -148,6 +157,9 @@ std::vector<std::string> LogInfo::Losses() const {
           "{}: longest gap {:.2f} s, from {:.1f} s of the log on; its period is {:.3f} s",
           c.channel, Seconds(c.longest_gap), Seconds(c.gap_begins), Seconds(c.period)));
   }
+  for (const ClockStep& step : clock_steps)
+    lines.push_back(
+        fmt::format("clock stepped by {:+.1f} s at {:.1f} s", Seconds(step.by), Seconds(step.at)));
   for (const auto& [process, count] : restarts)
     lines.push_back(fmt::format("{}: started anew, {}", process,
                                 count == 1 ? "once" : fmt::format("{} times", count)));
@@ -155,25 +167,52 @@ std::vector<std::string> LogInfo::Losses() const {
   return lines;
 }
 
+/// The stamp as if nobody had set the clock. A step it is, and no pause of the log, where a channel
+/// goes on with its next number though ten of its periods have passed, or none.
+int64_t LogSurvey::Settled(const LogEvent& e, const Channel& channel) {
+  const int64_t utime = e.utime - stepped_, by = utime - previous_.value_or(utime);
+  if (by <= kStepAhead && by >= -kStepBack) return *(previous_ = utime);
+  const auto head = bus::HeadOf(e.bytes.data(), e.bytes.size());
+  if (!head || channel.periods.size() < kFewest) return *(previous_ = utime);
+  const auto sender = channel.senders.find({head->sender, head->vehicle, head->sender_start});
+  const bool next =
+      sender != channel.senders.end() && head->seq == int64_t{sender->second.second.last()} + 1;
+  const int64_t since = utime - channel.previous;
+  if (!next || (since >= 0 && since / kGapPeriods < Median(channel.periods)))
+    return *(previous_ = utime);
+  info_.clock_steps.push_back({by, *previous_ - first_utime_});
+  stepped_ += by;
+  return *previous_;
+}
+
 void LogSurvey::Add(const LogEvent& e) {
   Channel& channel = channels_[e.channel];
   ChannelInfo& c = channel.info;
+  const int64_t utime = Settled(e, channel);
   if (c.count++ == 0) {
     c.channel = e.channel;
-    c.type = TypeOf(e.bytes);
-    c.first_utime = c.last_utime = channel.previous = e.utime;
+    c.first_utime = c.last_utime = channel.previous = utime;
   }
-  first_utime_ = std::min(first_utime_, e.utime);
-  last_utime_ = std::max(last_utime_, e.utime);
+  first_utime_ = std::min(first_utime_, utime);
+  last_utime_ = std::max(last_utime_, utime);
   c.bytes += static_cast<int64_t>(e.bytes.size());
-  c.first_utime = std::min(c.first_utime, e.utime);  // live logs may step back by a millisecond
-  c.last_utime = std::max(c.last_utime, e.utime);
-  NoteGap(e.utime, &channel);
-  if (c.count > 1) channel.periods.push_back(e.utime - channel.previous);
-  channel.previous = e.utime;
-  if (c.type.empty()) return;
+  c.first_utime = std::min(c.first_utime, utime);  // live logs may step back by a millisecond
+  c.last_utime = std::max(c.last_utime, utime);
+  NoteGap(utime, &channel);
+  if (c.count > 1) channel.periods.push_back(utime - channel.previous);
+  channel.previous = utime;
+  if (IsUnreadable(e)) return void(++c.unreadable);
+  const std::string type = TypeOf(e.bytes);
+  if (type.empty()) return;
+  if (c.type.empty()) c.type = type;
   AddHead(e, &channel);
-  AddContent(e, c.type);
+  AddContent(e, type);
+}
+
+std::string UnreadableLine(const std::string& channel, long count) {
+  return fmt::format(
+      "{}: {} message{} cannot be read (of another version, or damaged; see chase-log migrate)",
+      channel, count, count == 1 ? "" : "s");
 }
 
 void LogSurvey::NoteGap(int64_t until, Channel* channel) const {
@@ -219,10 +258,7 @@ void LogSurvey::Settle(Channel* channel) const {
   const auto heard = heard_.find(info.channel);
   const bool told = heard != heard_.end() && channel->senders.size() == 1;
   if (info.count > 1) NoteGap(last_utime_, channel);
-  if (auto& p = channel->periods; p.size() >= kFewest) {
-    std::nth_element(p.begin(), p.begin() + static_cast<long>(p.size() / 2), p.end());
-    info.period = p[p.size() / 2];
-  }
+  if (channel->periods.size() >= kFewest) info.period = Median(channel->periods);
   for (const auto& [key, value] : channel->senders) {
     const auto& [name, vehicle, start] = key;
     const auto& [count, seqs] = value;

@@ -19,6 +19,7 @@ struct SenderInfo {
 struct ChannelInfo {
   std::string channel, type;  ///< type: empty when not ours
   long count = 0;
+  long unreadable = 0;  ///< of `count`: of another version, or damaged
   int64_t bytes = 0;
   int64_t first_utime = 0, last_utime = 0;  ///< of the events, microseconds
   int64_t longest_gap = 0;                  ///< without one until the log ends, microseconds
@@ -33,6 +34,12 @@ struct ChannelInfo {
   double MissingShare() const;
 };
 
+/// Somebody set the clock that the log is stamped by: what follows is `by` later, microseconds.
+struct ClockStep {
+  int64_t by = 0;
+  int64_t at = 0;  ///< after the log's first event
+};
+
 using TextByProcess = std::map<std::string, std::string>;
 
 struct LogInfo {
@@ -44,6 +51,7 @@ struct LogInfo {
   TextByProcess versions, hosts, configurations;
   std::string scenario;                 ///< name and seed; empty: there is none
   std::map<std::string, int> restarts;  ///< of processes that were started anew, by name
+  std::vector<ClockStep> clock_steps;   ///< times above are as if there had been none
   bool heavy_left_out = false;          ///< a recorder told that its disk was nearly full
   std::vector<Damage> damage;
 
@@ -56,12 +64,12 @@ struct LogInfo {
   /// Throws std::runtime_error with one line when it holds a channel of several vehicles.
   void RequireOneVehicle() const;
   bool Whole() const { return damage.empty(); }
-  /// Whole, and nothing is missing but of sweeps, images and maps a hundredth: beyond that a 99th
-  /// percentile says nothing. A recorder drops their oldest on purpose, and leaves them out where
-  /// its disk is nearly full: neither counts.
+  /// Whole, all of it can be read, and nothing is missing but of sweeps, images and maps a
+  /// hundredth: beyond that a 99th percentile says nothing. A recorder drops their oldest on
+  /// purpose, and leaves them out where its disk is nearly full: neither counts.
   bool Recorded() const;
-  /// A line for everything that is not there, for a gap of ten of its channel's periods and a
-  /// tenth of a second where messages are missing, and for whoever was started anew.
+  /// A line for everything that is not there or cannot be read, for a gap of ten of its channel's
+  /// periods and a tenth of a second where messages are missing, and for whoever was started anew.
   std::vector<std::string> Losses() const;
 };
 

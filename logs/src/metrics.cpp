@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "chase/plan_t.hpp"
 #include "logs/src/estimate_errors.h"
 #include "logs/src/fault_figures.h"
 #include "logs/src/flown_plans.h"
@@ -90,11 +91,15 @@ std::optional<TimeFigures> Stage(const FlightRecord& record, const std::string& 
 }
 
 void AddPlans(const FlightRecord& record, Metrics* m) {
-  constexpr int kWider = 1;  // plan_t's CHASE and WIDER are what planning is for
+  const bool waits_only =
+      std::all_of(record.plans.begin(), record.plans.end(),
+                  [](const PlanSample& plan) { return plan.verdict == plan_t::WAIT; });
+  bool waits = !waits_only;  // of the climb, before the first plan of another verdict
   for (const PlanSample& plan : record.plans) {
+    waits &= plan.verdict == plan_t::WAIT;
     if (!record.InMission(plan.t)) continue;
     ++m->replans;
-    m->fallbacks += plan.verdict > kWider;
+    m->fallbacks += plan.verdict > plan_t::WIDER && !waits;
   }
   m->plan_ms = Stage(record, "planning", "plan");
   m->predict_ms = Stage(record, "prediction", "predict");

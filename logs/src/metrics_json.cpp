@@ -83,8 +83,9 @@ std::string MetricsJson(const FlightRecord& record, const Metrics& m) {
   j["plan_ms"] = Times(m.plan_ms);
   j["predict_ms"] = Times(m.predict_ms);
   j["sweep_to_setpoint_ms"] = Times(m.sweep_to_setpoint_ms);
-  j["replans"] = m.replans;
-  j["fallbacks"] = m.fallbacks;
+  const bool planned = !record.plans.empty();
+  j["replans"] = planned ? Json(m.replans) : Json();
+  j["fallbacks"] = planned ? Json(m.fallbacks) : Json();
   j["certified_clearance_m"] = Number(m.certified_clearance_m);
   j["certificate_kept_ratio"] = Number(m.certificate_kept_ratio);
   j["tube_exceeded_ratio"] = Number(m.tube_exceeded_ratio);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <nlohmann/json.hpp>
 #include <vector>
 
@@ -9,6 +10,9 @@
 namespace chase::logs {
 
 using Outline = std::vector<Eigen::Vector2d>;  ///< a closed polygon or an open path, m
+
+/// Parts an open path: nothing is drawn to it or from it.
+inline const Eigen::Vector2d kBreak = Eigen::Vector2d::Constant(std::nan(""));
 
 /// Passes the first item and then each that is at least `step` later than the last passed.
 class Thinner {
@@ -42,7 +46,8 @@ Outline Ellipse(const Eigen::Vector2d& c, const Eigen::Matrix2d& A);
 /// Shadows of ellipsoids on the ground.
 std::vector<Outline> Shadows(const std::vector<PerceivedObstacle>& obstacles);
 
-/// {x: [...], y: [...]}, to the millimetre; `closed` repeats the first point at the end.
+/// {x: [...], y: [...]}, to the millimetre, null for a break; `closed` repeats the first point at
+/// the end.
 nlohmann::ordered_json Points(const Outline& outline, bool closed);
 nlohmann::ordered_json Points(const std::vector<Outline>& outlines, bool closed);
 

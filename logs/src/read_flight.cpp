@@ -159,18 +159,19 @@ class Gatherer {
   void AddEstimates(FlightRecord* record) const {
     for (const pose_t& m : poses_)
       if (m.health != pose_t::HEALTH_STARTING)
-        record->poses.push_back(
-            {Time(m.utime), bus::ToVector(m.pos), math::Yaw(bus::ToQuaternion(m.orientation))});
+        record->poses.push_back({Time(m.utime), bus::ToVector(m.pos),
+                                 math::Yaw(bus::ToQuaternion(m.orientation)), m.epoch});
     for (const target_t& m : targets_)
       record->targets.push_back({Time(m.utime), m.state == target_t::TRACKING,
                                  bus::ToVector(m.mean), bus::ToVector(m.velocity),
-                                 m.state == target_t::TRACKING || m.state == target_t::OCCLUDED});
+                                 m.state == target_t::TRACKING || m.state == target_t::OCCLUDED,
+                                 m.epoch});
   }
 
   void AddPlans(FlightRecord* record) const {
     for (const prediction_t& m : predictions_)
       record->predictions.push_back({Time(m.utime), m.verdict != prediction_t::NO_TARGET,
-                                     bus::FromMessage(m.target, origin_)});
+                                     bus::FromMessage(m.target, origin_), m.epoch});
     for (size_t i = 0; i < plans_.size(); ++i) {
       const plan_t& m = plans_[i];
       PlanSample plan{Time(m.utime),

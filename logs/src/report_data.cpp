@@ -49,8 +49,13 @@ void AddPaths(const FlightRecord& record, ReportData* data) {
     data->chaser.push_back(s.p.head<2>());
     data->target.push_back(s.target.head<2>());
   }
-  for (const PoseSample& s : record.poses)
-    if (record.InMission(s.t) && pose.Pass(s.t)) data->estimated.push_back(s.p.head<2>());
+  std::optional<int32_t> epoch;
+  for (const PoseSample& s : record.poses) {
+    if (!record.InMission(s.t) || !pose.Pass(s.t)) continue;
+    if (epoch && *epoch != s.epoch) data->estimated.push_back(kBreak);
+    epoch = s.epoch;
+    data->estimated.push_back(s.p.head<2>());
+  }
   for (const PredictionSample& s : record.predictions)
     if (s.usable && record.InMission(s.t)) predictions.Add(s.t, s.target);
   for (const PlanSample& s : record.plans)

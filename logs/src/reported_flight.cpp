@@ -72,6 +72,12 @@ Json PageOf(const std::string& log, const std::string& title, const VehicleRepor
   return page;
 }
 
+/// With what the log lacks of the flight in the page and in its metrics.
+ReportedFlight Finished(const std::string& log, const std::string& shortfall, Json page) {
+  page["metrics"]["shortfall"] = shortfall;
+  return {log, page["metrics"].dump(2) + "\n", page, shortfall};
+}
+
 /// The vehicle's series, and those of the truth in place of or beside them.
 Json DataOf(const VehicleReport& vehicle, const ReportData& truth) {
   Json data = vehicle.series;
@@ -92,23 +98,29 @@ ReportedFlight ByTruth(const std::string& log, const ReportOptions& options) {
   const ReportData truth = PrepareReport(record, scores);
   if (!options.plots_folder.empty()) WritePlots(options.plots_folder, truth);
   const VehicleReport vehicle = ReportVehicle(log, record.origin_utime);
-  ReportedFlight flight{log, MetricsJson(record, metrics), {}, Shortfall(record, metrics)};
-  flight.page = PageOf(log, truth.title, vehicle, DataOf(vehicle, truth),
-                       MomentsOf(scores, metrics), options.images);
-  flight.page["truth"] = true;
-  flight.page["metrics"] = Json::parse(flight.metrics);
-  return flight;
+  Json page = PageOf(log, truth.title, vehicle, DataOf(vehicle, truth), MomentsOf(scores, metrics),
+                     options.images);
+  page["truth"] = true;
+  page["judged"] = !scores.empty();
+  page["metrics"] = Json::parse(MetricsJson(record, metrics));
+  return Finished(log, Shortfall(record, metrics), std::move(page));
 }
 
 ReportedFlight ByVehicle(const std::string& log, const ReportOptions& options) {
-  const VehicleReport vehicle = ReportVehicle(log);
+  VehicleReport vehicle = ReportVehicle(log);
   if (!vehicle.flew)
     throw std::runtime_error(log + ": holds neither TRUTH nor POSE nor PLAN: no flight to report");
-  ReportedFlight flight{log, vehicle.metrics.dump(2) + "\n", {}, Shortfall(vehicle)};
-  flight.page = PageOf(log, "Flight without truth", vehicle, vehicle.series, {}, options.images);
-  flight.page["truth"] = false;
-  flight.page["metrics"] = vehicle.metrics;
-  return flight;
+  vehicle.metrics["shortfall"] = Shortfall(vehicle);
+  Json page = PageOf(log, "Flight without truth", vehicle, vehicle.series, {}, options.images);
+  page["truth"] = false;
+  page["metrics"] = vehicle.metrics;
+  return Finished(log, Shortfall(vehicle), std::move(page));
+}
+
+/// Most criteria are of samples of the mission.
+bool Known(const ReportedFlight& flight, const std::string& criterion) {
+  return flight.page["judged"].get<bool>() || criterion == "recorded" ||
+         criterion == "finite_setpoints";
 }
 
 /// "planning 123, control 456", or each text once.
@@ -144,7 +156,10 @@ std::string Summary(const ReportedFlight& flight) {
   std::string text;
   if (metrics.contains("criteria"))
     for (const auto& [name, passed] : metrics["criteria"].items())
-      text += fmt::format("{:<20} {}\n", name, passed.get<bool>() ? "passed" : "FAILED");
+      text += fmt::format("{:<20} {}\n", name,
+                          !Known(flight, name) ? "not known"
+                          : passed.get<bool>() ? "passed"
+                                               : "FAILED");
   for (const Json& loss : metrics["losses"]) text += loss.get<std::string>() + "\n";
   return text;
 }

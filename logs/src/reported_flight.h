@@ -9,8 +9,8 @@ namespace chase::logs {
 struct ReportedFlight {
   std::string log;
   std::string metrics;          ///< metrics.json
-  nlohmann::ordered_json page;  ///< what report.js draws: title, truth, metrics, vehicle, data,
-                                ///< moments, playback
+  nlohmann::ordered_json page;  ///< what report.js draws: title, truth, judged (there is a sample
+                                ///< of the mission), metrics, vehicle, data, moments, playback
   std::string shortfall;        ///< what the log lacks of the flight; empty: nothing
 };
 

@@ -15,10 +15,13 @@
 #include "chase/plan_t.hpp"
 #include "chase/pose_t.hpp"
 #include "chase/prediction_t.hpp"
+#include "chase/scenario_t.hpp"
 #include "chase/status_t.hpp"
 #include "chase/target_t.hpp"
 #include "chase/tracking_t.hpp"
+#include "chase/truth_t.hpp"
 #include "common/bus/convert.h"
+#include "common/world/ages.h"
 #include "logs/src/flown_plans.h"
 #include "logs/src/good_message.h"
 #include "logs/src/landing_figures.h"
@@ -34,16 +37,23 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr double kShown = 0.1;  // s between points of the page
+constexpr double kShown = 0.1;   // s between points of the page
+constexpr double kRarest = 2.0;  // s: what is sent once a second comes within that
 constexpr const char* kHealths[] = {"ok", "degraded", "lost", "starting"};
 constexpr const char* kTargets[] = {"searching", "tracking", "occluded", "lost"};
 
 double Rounded(double v) { return std::round(v * 1e4) / 1e4; }
 
-/// Values over time, thinned to what an eye can see.
+/// Values over time, thinned to what an eye can see; null where there is none for `longest` s.
 class Series {
  public:
+  explicit Series(double longest = 0.5) : longest_(longest) {}
   void Add(double t, double value) {
+    if (!t_.empty() && t > last_ + longest_) {
+      t_.push_back(Rounded(last_));
+      value_.push_back(NAN);
+    }
+    last_ = t;
     if (t < next_ && t > next_ - kLongestGap) return;
     next_ = t + kShown;
     t_.push_back(Rounded(t));
@@ -54,7 +64,7 @@ class Series {
 
  private:
   static constexpr double kLongestGap = 10.0;  // s: farther back it is another time
-  double next_ = -1e9;
+  double longest_, next_ = -1e9, last_ = -1e9;
   std::vector<double> t_, value_;
 };
 
@@ -76,9 +86,12 @@ class Gatherer {
  public:
   explicit Gatherer(std::optional<int64_t> origin) : origin_(origin) {}
 
-  void Add(const LogEvent& e) {
-    if (first_event_ == 0) first_event_ = e.utime;
-    last_event_ = std::max(last_event_, e.utime);
+  /// `stepped`: by how much the clock was set so far, us.
+  void Add(const LogEvent& e, int64_t stepped) {
+    if (stepped != stepped_) before_ = std::exchange(stepped_, stepped);
+    heard_ = e.utime - stepped;
+    if (first_event_ == 0) first_event_ = heard_;
+    last_event_ = std::max(last_event_, heard_);
     if (follows_ || !IsOn(e, "LIDAR_SCAN")) sweeps_.Add(last_event_, e);
     Take<pose_t>(e, "POSE", [this](const pose_t& m) { OnPose(m); });
     Take<target_t>(e, "TARGET", [this](const target_t& m) { OnTarget(m); });
@@ -90,7 +103,7 @@ class Gatherer {
     Take<geofence_t>(e, "GEOFENCE", [this](const geofence_t& m) { fence_ = m.corners; });
     if (prediction_t m;
         origin_ && Good(e, "PREDICTION", &m) && m.verdict != prediction_t::NO_TARGET)
-      predictions_.Add(Time(m.utime), bus::FromMessage(m.target, *origin_));
+      predictions_.Add(Time(m.utime), bus::FromMessage(m.target, Origin(m.utime)));
     status_t status;
     if (!Good(e, "_STATUS", &status)) return;
     statuses_[status.name] = status;
@@ -128,15 +141,21 @@ class Gatherer {
     T m;
     if (!Good(e, name, &m)) return;
     if (!origin_) origin_ = m.utime;
-    if (latencies_.empty()) log_begin_ = Time(m.utime) - bus::Seconds(e.utime, first_event_);
+    if (latencies_.empty()) log_begin_ = Time(m.utime) - bus::Seconds(heard_, first_event_);
     end_ = std::max(end_, Time(m.utime));
     if (name != "PLAN") {  // stamped with its start, which is ahead
-      latencies_[name].push_back(1e3 * bus::Seconds(e.utime, m.utime));
-      latency_series_[name].Add(Time(m.utime), latencies_[name].back());
+      latencies_[name].push_back(1e3 * (bus::Seconds(heard_, *origin_) - Time(m.utime)));
+      latency_series_.try_emplace(name, kRarest)
+          .first->second.Add(Time(m.utime), latencies_[name].back());
     }
     handle(m);
   }
-  double Time(int64_t utime) const { return bus::Seconds(utime, *origin_); }
+  double Time(int64_t utime) const { return bus::Seconds(utime, Origin(utime)); }
+  /// Of stamps like that one: what was sent before the clock was set may be logged after it.
+  int64_t Origin(int64_t utime) const {
+    const auto age = [&](int64_t stepped) { return std::abs(heard_ + stepped - utime); };
+    return *origin_ + (age(stepped_) <= age(before_) ? stepped_ : before_);
+  }
 
   void OnPose(const pose_t& m) {
     const double t = Time(m.utime);
@@ -144,9 +163,14 @@ class Gatherer {
     health_.Add(t, kHealths[m.health], m.reason);
     const bool same = poses_++ > 0 && m.epoch == epoch_;
     if (same) path_ += (p - last_p_).norm();
-    if (poses_ > 1 && m.epoch != epoch_) ++frame_changes_;
+    if (poses_ > 1 && !same) {
+      ++frame_changes_;
+      chaser_.push_back(kBreak);
+      next_shown_ = t;
+    }
     epoch_ = m.epoch;
     last_p_ = p;
+    last_pose_ = t;
     const double speed = bus::ToVector(m.vel).norm();
     const double sigma =
         std::sqrt(std::max({m.covariance[0], m.covariance[10], m.covariance[20], 0.0}));
@@ -165,8 +189,11 @@ class Gatherer {
     const bool known = m.state == target_t::TRACKING || m.state == target_t::OCCLUDED;
     tracked_ += known;
     if (!known) return;
+    if (!seen_.empty() && m.epoch != seen_epoch_) seen_.push_back(kBreak);
+    seen_epoch_ = m.epoch;
     if (targets_ % 2 == 0) seen_.emplace_back(m.mean[0], m.mean[1]);  // 10 Hz
-    if (poses_ > 0) distances_.Add(Time(m.utime), (bus::ToVector(m.mean) - last_p_).norm());
+    if (poses_ > 0 && m.epoch == epoch_ && Time(m.utime) - last_pose_ <= world::kMostAge.pose)
+      distances_.Add(Time(m.utime), (bus::ToVector(m.mean) - last_p_).norm());
     const auto variances = {m.covariance[0], m.covariance[4], m.covariance[8], 0.0};
     target_sigmas_.Add(Time(m.utime), std::sqrt(std::max(variances)));
   }
@@ -179,9 +206,12 @@ class Gatherer {
 
   void OnPlan(const plan_t& m) {
     ++plans_;
-    fallbacks_ += m.verdict > plan_t::WIDER;
+    if (m.verdict == plan_t::WAIT && waits_ + 1 == plans_)
+      ++waits_;
+    else
+      fallbacks_ += m.verdict > plan_t::WIDER;
     verdict_.Add(Time(m.utime), VerdictName(m.verdict), m.reason);
-    paths_.Add(Time(m.utime), bus::FromMessage(m.position, *origin_));
+    paths_.Add(Time(m.utime), bus::FromMessage(m.position, Origin(m.utime)));
     if (m.certified_clearance < 0.0) return;
     ++certified_;
     least_clearance_ = std::min(least_clearance_.value_or(1e9), m.certified_clearance);
@@ -219,14 +249,17 @@ class Gatherer {
     j["truth"] = false;
     j["flown_s"] = end_;
     j["pose_health_s"] = health_.seconds();
-    j["frame_changes"] = frame_changes_;
-    j["path_m"] = Rounded(path_);
-    j["speed_max_mps"] = Rounded(speed_);
-    j["pose_sigma_max_m"] = Rounded(sigma_);
+    const auto if_any = [](long messages, auto value) {
+      return messages > 0 ? Json(value) : Json();
+    };
+    j["frame_changes"] = if_any(poses_, frame_changes_);
+    j["path_m"] = if_any(poses_, Rounded(path_));
+    j["speed_max_mps"] = if_any(poses_, Rounded(speed_));
+    j["pose_sigma_max_m"] = if_any(poses_, Rounded(sigma_));
     j["target_state_s"] = target_.seconds();
     j["target_known_ratio"] = Share(tracked_, targets_);
-    j["replans"] = plans_;
-    j["fallbacks"] = fallbacks_;
+    j["replans"] = if_any(plans_, plans_);
+    j["fallbacks"] = if_any(plans_, waits_ == plans_ ? waits_ : fallbacks_);
     j["verdict_s"] = verdict_.seconds();
     j["certified_ratio"] = Share(certified_, plans_);
     j["certified_clearance_m"] = least_clearance_ ? Json(*least_clearance_) : Json();
@@ -274,14 +307,17 @@ class Gatherer {
   }
 
   std::optional<int64_t> origin_;
-  int64_t first_event_ = 0, last_event_ = 0;  // by the log's stamps, us
-  SweepLatency sweeps_;                       // of those while control follows a plan or its stop
+  int64_t first_event_ = 0, last_event_ = 0, heard_ = 0;  // by the log's stamps, settled, us
+  int64_t stepped_ = 0, before_ = 0;                      // the clock, in all; by the step before
+  SweepLatency sweeps_;  // of those while control follows a plan or its stop
   bool follows_ = false;
   std::set<std::string> vehicles_;
   double log_begin_ = 0.0, end_ = 0.0, next_shown_ = -1e9;  // s
   Lane health_, target_, verdict_, flight_{true};
   long poses_ = 0, targets_ = 0, tracked_ = 0, plans_ = 0, fallbacks_ = 0, certified_ = 0;
-  int32_t epoch_ = 0;
+  long waits_ = 0;  // plans before the first of another verdict
+  int32_t epoch_ = 0, seen_epoch_ = 0;
+  double last_pose_ = 0.0;  // s
   long frame_changes_ = 0;
   Eigen::Vector3d last_p_ = Eigen::Vector3d::Zero();
   double path_ = 0.0, speed_ = 0.0, sigma_ = 0.0;
@@ -300,11 +336,16 @@ class Gatherer {
 
 }  // namespace
 
-bool HoldsTruth(const std::string& log) {
+std::string LacksOfTruth(const std::string& log) {
   LogReader reader(log);
-  for (LogEvent e; reader.Next(&e);)
-    if (IsOn(e, "TRUTH")) return true;
-  return false;
+  bool truth = false, scenario = false;
+  truth_t sample;
+  scenario_t flown;
+  for (LogEvent e; !(truth && scenario) && reader.Next(&e);) {
+    truth = truth || Good(e, "TRUTH", &sample);
+    scenario = scenario || Good(e, "SCENARIO", &flown);
+  }
+  return truth ? (scenario ? "" : "SCENARIO") : scenario ? "TRUTH" : "TRUTH and no SCENARIO";
 }
 
 VehicleReport ReportVehicle(const std::string& log, std::optional<int64_t> origin) {
@@ -312,8 +353,8 @@ VehicleReport ReportVehicle(const std::string& log, std::optional<int64_t> origi
   Gatherer gatherer(origin);
   LogSurvey survey;
   for (LogEvent e; reader.Next(&e);) {
-    gatherer.Add(e);
     survey.Add(e);
+    gatherer.Add(e, survey.stepped());
   }
   const LogInfo info = survey.Take(reader);
   info.RequireOneVehicle();

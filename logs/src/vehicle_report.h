@@ -7,8 +7,9 @@
 
 namespace chase::logs {
 
-/// Does the log hold TRUTH, as every simulated flight's does?
-bool HoldsTruth(const std::string& log);
+/// Which of TRUTH and SCENARIO the log does not hold, as every simulated flight's does; empty: it
+/// holds both.
+std::string LacksOfTruth(const std::string& log);
 
 /// What the vehicle said of itself.
 struct VehicleReport {

@@ -9,6 +9,7 @@
 #include "common/bus/plan_message.h"
 #include "common/logs/log_reader.h"
 #include "common/logs/message_types.h"
+#include "logs/src/good_message.h"
 #include "logs/src/proof_check.h"
 
 namespace chase::logs {
@@ -82,16 +83,16 @@ class Verifier {
 Verification Verify(const std::string& file, double hard_radius, double sigmas) {
   LogReader log(file);
   Verifier verifier(hard_radius, sigmas);
+  OneVehicle vehicle(file);
   LogEvent event;
   plan_t plan;
   obstacles_t obstacles;
   prediction_t forecast;
   while (log.Next(&event)) {
-    if (event.channel == "OBSTACLES" && DecodeBytes(event.bytes, &obstacles))
-      verifier.Take(obstacles);
-    if (event.channel == "PREDICTION" && DecodeBytes(event.bytes, &forecast))
-      verifier.Take(forecast);
-    if (event.channel == "PLAN" && DecodeBytes(event.bytes, &plan)) verifier.Take(plan);
+    vehicle.Hear(event.channel);
+    if (IsOn(event, "OBSTACLES") && DecodeBytes(event.bytes, &obstacles)) verifier.Take(obstacles);
+    if (IsOn(event, "PREDICTION") && DecodeBytes(event.bytes, &forecast)) verifier.Take(forecast);
+    if (IsOn(event, "PLAN") && DecodeBytes(event.bytes, &plan)) verifier.Take(plan);
   }
   if (verifier.result().plans == 0)
     throw std::runtime_error(file +

@@ -13,12 +13,12 @@ struct Verification {
   double hard_radius = 0.0, sigmas = 0.0;     ///< least of the certified plans, m and 1
   std::vector<std::string> refuted;           ///< a line per plan that does not hold
 
-  bool Holds() const { return refuted.empty() && unheard == 0; }
+  bool Told() const { return !refuted.empty() || (unheard == 0 && unverified == 0); }
 };
 
 /// Checks the proofs of every plan against the obstacles that it was made from, in exact
 /// arithmetic. Of each one it asks `hard_radius` m and `sigmas` deviations at least. Throws
-/// std::runtime_error where the file is no log or holds no PLAN.
+/// std::runtime_error where the file is no log, holds no PLAN, or what several vehicles sent.
 Verification Verify(const std::string& file, double hard_radius, double sigmas);
 
 std::string Format(const Verification& verification);

@@ -81,6 +81,18 @@ class LogTools(unittest.TestCase):
             texts[channel] = out.read_text()
             self.assertLessEqual(len(texts[channel].splitlines()), self.count(channel))
         self.assertEqual(len(set(texts.values())), 3, "two channels give one trajectory")
+        events, poses, log = [], 0, self.folder / "epochs.lcm"
+        for utime, channel, data in self.events:
+            if channel == "POSE":
+                pose, poses = chase.pose_t.decode(data), poses + 1
+                if poses == 101:
+                    changed = pose.utime
+                pose.epoch = 9 if poses > 100 else 7
+                data = pose.encode()
+            events.append((utime, channel, data))
+        lcmlog.write(log, events)
+        answer = run("chase-log", "export", "--tum", log, self.folder / "epochs.tum")
+        self.assertEqual(answer.stderr, f"{log}: frame W changed at {changed * 1e-6:.6f} s (epoch 9)\n")
         self.assertEqual(len(texts["TRUTH"].splitlines()), self.count("TRUTH"))
         self.good("export", "--tum", self.log, self.folder / "default.tum")
         self.assertEqual((self.folder / "default.tum").read_text(), texts["POSE"])
@@ -105,12 +117,14 @@ class LogTools(unittest.TestCase):
                                if channel not in lost for prefix in ("", "eagle_")])
             for program in (["chase-report"], ["chase-log", "identify"]):
                 self.assert_refused(run(*program, log), 1, "two.lcm: holds ", " of several vehicles; keep one with chase-log filter")
+            self.assert_refused(run("chase-log", "verify", log), 2, "two.lcm: holds ", " of several vehicles; keep one with chase-log filter")
             out = self.folder / "two.mcap"
             self.assert_refused(run("chase-log", "export", "--mcap", log, out), 1, "of several vehicles; keep one")
             self.assertFalse(out.exists())
         self.good("export", "--mcap", "--channel", "eagle_POSE", log, self.folder / "eagle.mcap")
         self.good("filter", log, one, "--keep", "eagle_*")
         self.assertEqual(run("chase-report", one, "--out", self.folder / "one").returncode, 0)
+        self.assertEqual(self.good("verify", one), self.good("verify", self.log))
 
     def without(self, name, lost):
         """A log that lacks the messages of which lost(channel, k) is true for the channel's k-th."""
@@ -134,6 +148,21 @@ class LogTools(unittest.TestCase):
         self.assertIn(f"TRUTH: 30 of {self.count('TRUTH')} messages of simulator are missing", text)
         imu = next(line for line in text.splitlines() if line.startswith("IMU")).split()
         self.assertEqual(imu[-2:], ["50", "0.255"])  # 51 periods of 5 ms
+
+    def test_messages_that_cannot_be_read_are_no_record(self):
+        log = self.folder / "zeroed.lcm"
+        lcmlog.write(log, [(utime, channel, bytes(len(data)) if channel == "IMU" else data) for utime, channel, data in self.events])
+        line = f"IMU: {self.count('IMU')} messages cannot be read (of another version, or damaged; see chase-log migrate)\n"
+        self.assertIn(line, self.good("info", log))
+        answer = run("chase-report", log, "--out", self.folder / "zeroed")
+        self.assertIn(line, answer.stdout)
+        self.assertRegex(answer.stdout, r"recorded +FAILED")
+        for arguments in (("--csv", log, self.folder / "zeroed_csv"), ("--mcap", log, self.folder / "zeroed.mcap")):
+            answer = run("chase-log", "export", *arguments)
+            self.assertEqual((answer.returncode, answer.stderr), (0, f"{log}: {line}"))
+        for form in ("--csv", "--mcap"):
+            answer = run("chase-log", "export", form, "--channel", "IMU", log, self.folder / "none_of_it")
+            self.assert_refused(answer, 1, line.strip())
 
     def test_what_others_heard_and_the_log_lacks_is_said(self):
         log = self.without("no_imu.lcm", lambda channel, k: channel in ("IMU", "POSE"))
@@ -193,6 +222,15 @@ class LogTools(unittest.TestCase):
         for pattern in ("*", "*.*", "IMU", "IMU.*"):
             self.assert_refused(run("chase-log", "diff", self.log, imu, "--ignore", pattern), 2, "nothing to compare")
         self.good("diff", self.log, imu, "--ignore", "IMU.seq")
+
+    def test_verify_tells_refuted_from_unknown(self):
+        lacking = {name: self.without(f"no_{name}.lcm", lambda channel, k, name=name: channel == name) for name in ("OBSTACLES", "PREDICTION")}
+        some = self.without("some_lists.lcm", lambda channel, k: channel == "OBSTACLES" and k % 2)
+        for code, arguments in ((0, (self.log,)), (1, (self.log, "--radius", "5")), (2, (lacking["OBSTACLES"],)),
+                                (2, (lacking["PREDICTION"],)), (2, (some,)), (1, (some, "--radius", "5"))):
+            with self.subTest(arguments=arguments):
+                answer = run("chase-log", "verify", *arguments)
+                self.assertEqual(answer.returncode, code, answer.stdout + answer.stderr)
 
     def test_verify_refuses_what_is_no_bound(self):
         for option, values in (("--radius", ("nan", "inf", "-1", "0", "x")), ("--sigmas", ("nan", "inf", "-1", "x"))):
@@ -270,6 +308,9 @@ class LogTools(unittest.TestCase):
         metrics = json.loads(text)
         self.assertFalse(metrics["passed"])
         self.assertFalse(metrics["criteria"]["recorded"])
+        self.assertIn("the log is cut off", metrics["shortfall"])
+        self.assertIn(metrics["shortfall"], answer.stderr)
+        self.assertIn('"shortfall":"the log is cut off', (out / "report.html").read_text())
         self.assertGreater(metrics["lost_messages"]["IMU"], 0.6 * self.count("IMU"))
         self.assertEqual(metrics["lost_messages"]["TRUTH"], 0)
         self.assertIn("are missing", (out / "report.html").read_text())
@@ -305,6 +346,24 @@ class LogTools(unittest.TestCase):
         answer = run("chase-report", late, "--out", self.folder / "late")
         self.assert_refused(answer, 2, "begins at 0.5 s and ends at 1.0 s of 60.0 s")
         self.assertRegex(answer.stdout, r"complete +FAILED")
+
+    def test_a_log_too_short_for_the_mission_is_not_judged(self):
+        short, out = self.folder / "climb.lcm", self.folder / "climb"
+        self.good("cut", self.log, short, "--to", "3")
+        answer = run("chase-report", short, "--out", out)
+        self.assertEqual(answer.returncode, 2, answer.stderr)
+        self.assertRegex(answer.stdout, r"safe_ratio +not known\n")
+        self.assertRegex(answer.stdout, r"recorded +passed\n")
+        self.assertIn('"judged":false', (out / "report.html").read_text())
+
+    def test_truth_without_its_scenario_is_told(self):
+        out = self.folder / "no_scenario"
+        for name in ("TRUTH", "SCENARIO"):
+            log = self.without("half_truth.lcm", lambda channel, k, name=name: channel == name)
+            answer = run("chase-report", log, "--out", out)
+            self.assertEqual(answer.returncode, 0, answer.stderr)
+            self.assertIn(f"half_truth.lcm holds no {name}: reported is what the vehicle said of itself\n", answer.stdout)
+            self.assertIs(json.loads((out / "metrics.json").read_text())["truth"], False)
 
     def with_states(self, name, *states):
         """A log without truth in which mission says these, evenly spread."""
@@ -400,8 +459,11 @@ class LogTools(unittest.TestCase):
         answer = run("chase-log", "repair", damaged, out)
         self.assertEqual(answer.returncode, 0, answer.stderr)
         self.assertIn("POSE: 1 messages do not decode", answer.stdout)
-        self.assertIn("damaged", answer.stderr)
-        self.assertIn("cut off", answer.stderr)
+        self.assertEqual(answer.stderr.count("log is damaged"), 1, answer.stderr)
+        self.assertEqual(answer.stderr.count("cut off"), 1, answer.stderr)
+        inside = self.folder / "inside.lcm"
+        inside.write_bytes(raw[:middle] + b"xxxx" + raw[middle + 4:])
+        self.assertEqual(run("chase-log", "repair", inside, self.folder / "again.lcm").stderr.count("log is damaged"), 1)
         self.assertEqual(sum(self.counts(out).values()), len(self.events) - 3)
         self.assertNotIn("damaged", self.good("info", out))
 
@@ -519,6 +581,23 @@ class LogTools(unittest.TestCase):
         for program in (["chase-log", "info"], ["chase-report"], ["chase-viewer", "--port", "0", "--play"]):
             self.assert_refused(run(*program, empty), 1, "empty/flight.lcm", "no such file")
         self.assert_refused(run("chase-log", "info", "/dev/null"), 1, "no regular file")
+
+    def test_output_that_cannot_be_written(self):
+        out = self.folder / "full.lcm"
+        kept = self.folder / "half.lcm"
+        self.good("cut", self.log, kept, "--to", "0.5")
+        for code, *command in ((1, "chase-log", "info", self.log), (2, "chase-log", "diff", self.log, self.log),
+                               (2, "chase-log", "verify", self.log), (1, "chase-log", "identify", self.log),
+                               (1, "chase-log", "export", "--tum", self.log, self.folder / "full.tum"),
+                               (1, "chase-log", "cut", self.log, out, "--to", "0.5"), (1, "chase-log", "repair", self.log, out),
+                               (1, "chase-log", "filter", self.log, out, "--keep", "IMU"), (1, "chase-log", "migrate", self.log, out),
+                               (1, "chase-log", "merge", self.log, kept, out),
+                               (2, "chase-report", self.log, "--out", self.folder / "full")):  # 2: a second of it was flown
+            with self.subTest(command=command), open("/dev/full", "w", encoding="utf-8") as full:
+                answer = subprocess.run([BIN / command[0], *command[1:]], stdout=full, stderr=subprocess.PIPE, text=True,
+                                        timeout=LIMIT, check=False)
+                self.assertEqual(answer.returncode, code, answer.stderr)
+                self.assertIn(f"{command[0]}: standard output could not be written; is the disk full?\n", answer.stderr)
 
     def test_refusals_point_to_the_commands_own_help(self):
         self.assert_refused(run("chase-log", "cut"), 1, "see chase-log cut --help")

@@ -173,6 +173,55 @@ TEST(LogInfo, TellsTheLongestGapAndWhenItBegan) {
             "IMU: longest gap 0.15 s, from 2.5 s of the log on; its period is 0.005 s");
 }
 
+TEST(LogInfo, MessagesThatCannotBeReadAreToldAndNotRecorded) {
+  for (const int bad : {1, 20}) {
+    const std::string file = Temp("unreadable.lcm");
+    bus::LogWriter out(file);
+    for (int k = 0; k < 20; ++k) {
+      const Bytes bytes = Encoded(testing::Imu(k));
+      out.Write(5000 * k, "IMU", k < bad ? Bytes(bytes.size()) : bytes);
+      out.Write(5000 * k, "OTHERS", {1, 2, 3});
+    }
+    out.Close();
+    const LogInfo info = Describe(file);
+    EXPECT_EQ(info.channels.at(0).unreadable, bad);
+    EXPECT_EQ(info.channels.at(0).type, bad < 20 ? "imu_t" : "");
+    EXPECT_EQ(info.channels.at(1).unreadable, 0) << "nobody here can tell";
+    EXPECT_FALSE(info.Recorded());
+    ASSERT_FALSE(info.Losses().empty());
+    EXPECT_EQ(info.Losses()[0], "IMU: " + std::to_string(bad) +
+                                    (bad == 1 ? " message" : " messages") +
+                                    " cannot be read (of another version, or damaged; see "
+                                    "chase-log migrate)");
+  }
+}
+
+/// IMU at 200 Hz, its stamps later by `by` us from the 500th on, which `lost` come before.
+LogInfo WithStep(int64_t by, int lost) {
+  const std::string file = Temp("step.lcm");
+  bus::LogWriter out(file);
+  for (int k = 0; k < 1000; ++k)
+    out.Write(7'000'000'000 + 5000 * k + (k < 500 ? 0 : by), "IMU",
+              Encoded(testing::Imu(k < 500 ? k : k + lost)));
+  out.Close();
+  return Describe(file);
+}
+
+TEST(LogInfo, AClockThatWasSetIsToldAndDoesNotCount) {
+  for (const int64_t by : std::vector<int64_t>{3'600'000'000, -3'600'000'000, -1'000'000}) {
+    const LogInfo info = WithStep(by, 0);
+    ASSERT_EQ(info.Losses().size(), 1u);
+    EXPECT_EQ(info.Losses()[0], by > 0             ? "clock stepped by +3600.0 s at 2.5 s"
+                                : by < -10'000'000 ? "clock stepped by -3600.0 s at 2.5 s"
+                                                   : "clock stepped by -1.0 s at 2.5 s");
+    EXPECT_NEAR(info.channels.at(0).RateHz(), 200.0, 0.3);
+    EXPECT_LE(info.channels.at(0).longest_gap, 5000);
+    EXPECT_NE(Format(info).find("5.0 s of logical time"), std::string::npos) << Format(info);
+  }
+  EXPECT_EQ(WithStep(3'600'000'000, 9).clock_steps.size(), 0u) << "a pause of the log";
+  EXPECT_EQ(WithStep(-2000, 0).clock_steps.size(), 0u) << "stamps go back by a little";
+}
+
 TEST(LogInfo, ALogCutOffAnywhereIsReadAsFarAsItGoes) {
   const std::string whole = ReadText(WriteLog("whole.lcm"));
   for (size_t n = 4; n < whole.size(); n += 101) {

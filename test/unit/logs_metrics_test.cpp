@@ -447,6 +447,39 @@ TEST(Metrics, EstimatesAreComparedAtTheSameTime) {
   EXPECT_NEAR(*m.target_rmse_m, 0.2, 1e-9);
 }
 
+TEST(Metrics, EstimatesOfALaterEpochAreJudgedInItsOwnFrame) {
+  FlightRecord record = Standing({0, 0, 0}, {0, 0, 0});
+  for (TruthSample& s : record.truth) {
+    s.p = {3 * std::cos(s.t), 3 * std::sin(s.t), 1.0};
+    s.target = {s.t, 0, 1};
+  }
+  const Eigen::Isometry3d later =
+      Eigen::Translation3d(4.0, 5.0, -1.0) * Eigen::AngleAxisd(0.5 * M_PI, Vector3d::UnitZ());
+  for (int k = 0; k < 990; ++k) {
+    const double t = 0.01 * k;
+    const bool anew = t > 4.995;
+    const Eigen::Isometry3d frame = anew ? later : Eigen::Isometry3d::Identity();
+    const int32_t epoch = anew ? 9 : 7;
+    record.poses.push_back({t, frame * Vector3d(3 * std::cos(t), 3 * std::sin(t), 1.0),
+                            anew ? 0.5 * M_PI : 0.0, epoch});
+    record.targets.push_back(
+        {t, true, frame * Vector3d(t, 0.2, 1), frame.linear() * Vector3d::UnitX(), true, epoch});
+    if (k % 100 != 50) continue;
+    PredictionSample p{t, true, {t, 1.0, Eigen::MatrixXd::Zero(2, 3)}, epoch};
+    p.target.coefficients.row(0) = frame * Vector3d(t, 0.3, 1);
+    p.target.coefficients.row(1) = frame.linear() * Vector3d::UnitX();
+    record.predictions.push_back(p);
+  }
+  const Metrics m = Compute(record);
+  EXPECT_NEAR(*m.odometry_ate_m, 0.0, 1e-9);
+  EXPECT_NEAR(*m.odometry_ate_aligned_m, 0.0, 1e-9);
+  EXPECT_NEAR(*m.target_rmse_m, 0.2, 1e-9);
+  EXPECT_NEAR(*m.prediction_error_m, 0.3, 1e-9);
+  EXPECT_NEAR(m.prediction_error_constant_velocity_by_horizon_m.at(1.0), 0.2, 1e-9);
+  record.targets.push_back({9.99, true, Vector3d(99, 99, 99), Vector3d::Zero(), true, 11});
+  EXPECT_NEAR(*Compute(record).target_rmse_m, 0.2, 1e-9) << "no POSE is of that epoch";
+}
+
 TEST(Metrics, PredictionsAreJudgedAtTheirHorizon) {
   FlightRecord record = Standing({0, 0, 0}, {0, 0, 0});
   for (TruthSample& s : record.truth) s.target = {0.5 * s.t * s.t, 0, 0};  // accelerates at 1
@@ -502,6 +535,20 @@ TEST(Metrics, PlansAndStagesAreCounted) {
   EXPECT_EQ(m.fallbacks, 3);
   EXPECT_EQ(m.plan_ms->p99, 3.0);
   EXPECT_FALSE(m.predict_ms);
+}
+
+TEST(Metrics, WaitsBeforeTheChaseAreNoFallbacks) {
+  FlightRecord record = Standing({3, 0, 1.5}, {5.5, 0, 1.5});
+  EXPECT_TRUE(nlohmann::json::parse(MetricsJson(record, Compute(record))).at("replans").is_null());
+  EXPECT_TRUE(
+      nlohmann::json::parse(MetricsJson(record, Compute(record))).at("fallbacks").is_null());
+  for (const auto& [t, verdict] : {std::pair(-0.5, plan_t::WAIT), {0.0, plan_t::WAIT}})
+    record.plans.push_back({t, verdict, {}, {}});
+  EXPECT_EQ(Compute(record).fallbacks, 1) << "it never chased";
+  record.plans.push_back({1.0, plan_t::CHASE, {}, {}});
+  record.plans.push_back({2.0, plan_t::WAIT, {}, {}});
+  EXPECT_EQ(Compute(record).fallbacks, 1) << "that of 2 s";
+  EXPECT_EQ(nlohmann::json::parse(MetricsJson(record, Compute(record))).at("replans"), 3);
 }
 
 TEST(Metrics, SweepsOfTheMissionAreTimedToTheirSetpoint) {

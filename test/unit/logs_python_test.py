@@ -82,11 +82,32 @@ class Python(unittest.TestCase):
 
     def test_a_file_that_is_no_log_is_refused_as_chase_log_does(self):
         file = self.folder / "none.lcm"
-        for bad in (b"", b"no log at all" * 9):
+        for bad, words in ((b"", "is empty"), (b"no log at all" * 9, "is no LCM log")):
             file.write_bytes(bad)
-            with self.assertRaisesRegex(ValueError, "none.lcm: is no LCM log"):
+            with self.assertRaisesRegex(ValueError, f"none.lcm: {words}"):
                 next(chase_log.read(file))
             self.assertEqual(subprocess.run([BIN / "chase-log", "info", file], check=False, capture_output=True).returncode, 1)
+
+    def test_a_log_whose_first_bytes_are_damaged_is_read(self):
+        bad, damage = self.folder / "first.lcm", []
+        bad.write_bytes(b"none" + self.log.read_bytes()[4:])
+        whole = sum(1 for _ in chase_log.read(self.log))
+        self.assertEqual(sum(1 for _ in chase_log.read(bad, damage=damage)), whole - 1)
+        self.assertEqual(damage[0][0], 0)
+
+    def test_a_channel_that_the_log_lacks_is_refused(self):
+        for names in (("POES",), ("POSE", "POES")):
+            with self.assertRaisesRegex(ValueError, r"holds nothing on POES; its channels: .*IMU, .*POSE"):
+                list(chase_log.read(self.log, *names))
+        self.assertRaises(ValueError, chase_log.table, self.log, "POES")
+
+    def test_messages_that_cannot_be_read_are_told(self):
+        data = self.log.read_bytes()
+        at = next(m.end() for m in re.finditer(rb"\xed\xa1\xda\x01.{24}POSE", data, re.DOTALL))
+        bad = self.folder / "unread.lcm"
+        bad.write_bytes(data[:at] + bytes(8) + data[at + 8:])
+        with self.assertWarnsRegex(UserWarning, r"POSE: 1 message cannot be read"):
+            self.assertEqual(len(chase_log.table(bad, "POSE")), len(chase_log.table(self.log, "POSE")) - 1)
 
     def test_damage_costs_what_it_costs_chase_log(self):
         data, draw = self.log.read_bytes(), random.Random(5)

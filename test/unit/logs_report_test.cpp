@@ -327,6 +327,96 @@ TEST(Report, WithoutTruthItTellsDateVehicleAndTheLatencyOfSweeps) {
   EXPECT_EQ(latency.value("max", -1.0), 45.0) << "a sweep that came before the plans counts";
 }
 
+/// Poses at x, every 5 ms from `from` ms on for a second; seq goes on.
+void PutPoses(LiveLog* live, int64_t from, double x, int32_t epoch, int32_t seq) {
+  pose_t pose{};
+  pose.orientation[0] = 1.0;
+  pose.sender = "odometry";
+  pose.epoch = epoch;
+  pose.pos[0] = x;
+  for (int k = 0; k < 200; ++k) {
+    pose.seq = seq + k;
+    live->Put(from + 5 * k, "POSE", pose);
+  }
+}
+
+TEST(Report, WithoutTruthAPathAndDistancesBreakWhereTheFrameChanges) {
+  const std::string log = Fresh("frames") + "/flight.lcm";
+  LiveLog live(log);
+  const auto put_targets = [&](int64_t from, int32_t epoch) {
+    target_t target{};
+    target.state = target_t::TRACKING;
+    target.epoch = epoch;
+    target.mean[0] = 3.0;
+    for (int k = 1; k < 20; ++k) live.Put(from + 50 * k, "TARGET", target);
+  };
+  PutPoses(&live, 0, 1.0, 7, 0);
+  put_targets(1000, 7);  // the last POSE is fresh for the first two of these
+  PutPoses(&live, 2000, 50.0, 9, 200);
+  put_targets(2000, 7);  // of the frame before
+  put_targets(3000, 9);
+  live.Close();
+  const auto page = ReportFlight(log, {false, false, ""}).page;
+  const auto breaks = [](const auto& values) {
+    return std::count_if(values.begin(), values.end(),
+                         [](const auto& v) { return std::isnan(v.template get<double>()); });
+  };
+  EXPECT_EQ(breaks(page["data"]["chaser"]["x"]), 1) << page["data"]["chaser"];
+  EXPECT_EQ(breaks(page["data"]["target"]["x"]), 1) << page["data"]["target"];
+  const auto& distance = page["data"]["distance"]["value"];
+  EXPECT_EQ(distance.dump(), "[2.0,null,47.0]");
+  EXPECT_EQ(breaks(page["data"]["speed"]["value"]), 1) << page["data"]["speed"];
+  EXPECT_EQ(page["metrics"]["frame_changes"], 1);
+  EXPECT_TRUE(page["metrics"]["replans"].is_null());
+  EXPECT_TRUE(page["metrics"]["fallbacks"].is_null());
+}
+
+TEST(Report, ThePathAsEstimatedBreaksWhereTheFrameChanges) {
+  FlightRecord record;
+  record.scenario.duration_s = 10.0;
+  for (int k = 0; k < 100; ++k) record.poses.push_back({0.1 * k, {0, 0, 1}, 0.0, k < 50 ? 7 : 9});
+  const auto x = ToJson(PrepareReport(record, {}))["estimated"]["x"];
+  EXPECT_TRUE(std::isnan(x[50].get<double>())) << x;
+  EXPECT_EQ(x.size(), 101u);
+}
+
+TEST(Report, AClockThatWasSetDoesNotCount) {
+  for (const int64_t by : {3'600'000, -3'600'000}) {
+    const std::string log = Fresh("clock") + "/flight.lcm";
+    LiveLog live(log);
+    PutPoses(&live, 0, 1.0, 7, 0);
+    PutPoses(&live, 1000 + by, 1.0, 7, 200);
+    live.Close();
+    const auto page = ReportFlight(log, {false, false, ""}).page;
+    EXPECT_NEAR(page["metrics"]["flown_s"], 2.0, 0.02);
+    EXPECT_NEAR(page["metrics"]["latency_ms"]["POSE"]["max"], 0.0, 20.0);
+    EXPECT_NEAR(page["data"]["speed"]["t"].back(), 1.9, 0.1);
+    EXPECT_EQ(page["metrics"]["losses"].size(), 1u) << page["metrics"]["losses"];
+  }
+}
+
+TEST(Report, WithoutTruthFiguresOfWhatIsNotThereAreNull) {
+  const std::string log = Fresh("lacking") + "/flight.lcm";
+  LiveLog live(log);
+  plan_t plan{};
+  plan.position.duration = plan.target.duration = 1.0;
+  plan.position.n_coefficients = plan.target.n_coefficients = 3;
+  plan.position.coefficients = plan.target.coefficients = {0.0, 0.0, 1.0};
+  plan.n_yaw = 1;
+  plan.yaw = {0.0};
+  for (const int8_t verdict : {plan_t::WAIT, plan_t::WAIT, plan_t::CHASE, plan_t::WAIT}) {
+    plan.verdict = verdict;
+    live.Put(40 * plan.seq, "PLAN", plan);
+    ++plan.seq;
+  }
+  live.Close();
+  const auto metrics = ReportFlight(log, {false, false, ""}).page["metrics"];
+  for (const char* key : {"path_m", "speed_max_mps", "pose_sigma_max_m", "frame_changes"})
+    EXPECT_TRUE(metrics.at(key).is_null()) << key;
+  EXPECT_EQ(metrics["replans"], 4);
+  EXPECT_EQ(metrics["fallbacks"], 1) << "waits before the chase are none";
+}
+
 TEST(Report, AMissingLibraryIsNamedWithTheCure) {
   const std::string folder = Fresh("missing"), share = Share(folder);
   fs::remove(share + "/plotly.min.js");

@@ -12,6 +12,26 @@
 namespace chase::planning {
 namespace {
 
+TEST(LastResort, ClaimsNothing) {
+  for (const auto& [verdict, said] : {std::pair(Verdict::kChase, Verdict::kBrake),
+                                      {Verdict::kSafeOnly, Verdict::kBrake},
+                                      {Verdict::kEscape, Verdict::kMitigate},
+                                      {Verdict::kBrake, Verdict::kBrake}}) {
+    PlanResult plan;
+    plan.verdict = verdict;
+    plan.reason = "why";
+    plan.certified_clearance = 0.1;
+    plan.proofs.resize(2);
+    plan.stop_proofs.resize(3);
+    plan = AsLastResort("because", std::move(plan));
+    EXPECT_EQ(plan.verdict, said);
+    EXPECT_EQ(plan.reason, "because; why");
+    EXPECT_LT(plan.certified_clearance, 0.0);
+    EXPECT_TRUE(plan.proofs.empty());
+    EXPECT_TRUE(plan.stop_proofs.empty());
+  }
+}
+
 TEST(LastResort, AClimbThatNobodyWatchesAnyMoreEndsWhereItIs) {
   const PlanningConfig config;
   constexpr double kSlack = 0.03;  // m, of a braking that begins where the climb slows down

@@ -108,6 +108,7 @@ const overlaid = await two.evaluate(() => ['strip_distance', 'strip_speed', 'map
 assert.deepStrictEqual(overlaid, [true, true, true, true]);
 await checkLinked(two);
 assert.ok(fs.existsSync(path.join(folder, 'two/comparison.txt')));
+assert.match(await two.evaluate(() => document.querySelector('#losses p').textContent), /^[AB]: the log ends at /);
 const unlike = await open('unlike', 1280, 900);
 assert.match(await unlike.textContent('#title'), /^gym, seed \d+ and mission, seed \d+: two flights/);
 await unlike.close();
@@ -139,9 +140,11 @@ for (const name of ['one', 'vehicle', 'two', 'struck']) {
     const meet = (a, b) => a.left < b.right && b.left < a.right && a.top < b.bottom - 1 && b.top < a.bottom - 1;
     return [...[...document.querySelectorAll('#software td:first-child')].filter((cell) => lines(cell) > 1).map((cell) => cell.innerText),
       ...[...document.querySelectorAll('.time')].filter((chart) => boxes(chart, '.xtitle').some((title) =>
-        boxes(chart, '.xtick text, .legendtext').some((text) => meet(title, text)))).map(({id}) => id)];
+        boxes(chart, '.xtick text, .legendtext').some((text) => meet(title, text)))).map(({id}) => id),
+      ...[...document.querySelectorAll('.time')].filter((chart) =>
+        boxes(chart, '.ytick text').some((text) => text.left < chart.getBoundingClientRect().left)).map(({id}) => `${id}, left`)];
   });
-  assert.deepStrictEqual(unreadable, [], `${name}: names on two lines, or an axis' title upon other words`);
+  assert.deepStrictEqual(unreadable, [], `${name}: names on two lines, an axis' title upon other words, or labels cut off`);
   await phone.close();
 }
 assert.deepStrictEqual(problems, []);
