@@ -198,8 +198,8 @@ const past = await page.evaluate(async () => {
   return {...seen, follows, again};
 });
 assert.deepStrictEqual(past, {words: ['plan 5.1 s old', 'target 5.1 s old', 'image 5.1 s old'],
-  figures: 'height 1.00 m\ntracking 5.1 s old\nobstacles 5.1 s old', bad: ['pill bad', 'pill bad'], image: '0.4',
-  hidden: [false, false, false, false, false, false], colors: ['4a525c', '4a525c'], follows: 'height 1.00 m\nfollows plan\nobstacles 5.1 s old', again: ['e8702a', 'ffffff']});
+  figures: 'z 1.00 m\ntracking 5.1 s old\nobstacles 5.1 s old', bad: ['pill bad', 'pill bad'], image: '0.4',
+  hidden: [false, false, false, false, false, false], colors: ['4a525c', '4a525c'], follows: 'z 1.00 m\nfollows plan\nobstacles 5.1 s old', again: ['e8702a', 'ffffff']});
 
 // Obstacles are grown by what plans keep free, the target has its 3 sigma, the forecast its 2, and the stop its verdict's colour.
 const told = await page.evaluate(async () => {
