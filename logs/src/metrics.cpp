@@ -91,15 +91,10 @@ std::optional<TimeFigures> Stage(const FlightRecord& record, const std::string& 
 }
 
 void AddPlans(const FlightRecord& record, Metrics* m) {
-  const bool waits_only =
-      std::all_of(record.plans.begin(), record.plans.end(),
-                  [](const PlanSample& plan) { return plan.verdict == plan_t::WAIT; });
-  bool waits = !waits_only;  // of the climb, before the first plan of another verdict
   for (const PlanSample& plan : record.plans) {
-    waits &= plan.verdict == plan_t::WAIT;
     if (!record.InMission(plan.t)) continue;
     ++m->replans;
-    m->fallbacks += plan.verdict > plan_t::WIDER && !waits;
+    m->fallbacks += plan.verdict > plan_t::WIDER;
   }
   m->plan_ms = Stage(record, "planning", "plan");
   m->predict_ms = Stage(record, "prediction", "predict");

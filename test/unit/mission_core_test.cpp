@@ -201,40 +201,29 @@ TEST(Mission, AReturnGoesOnOnceThereIsAPoseAgain) {
   EXPECT_EQ(bench.mission.state(), State::kLand) << "the take-off place is not known any more";
 }
 
-TEST(Mission, LandsWithoutAPlannerThatStaysAway) {
-  for (const Event led : {Event::kHold, Event::kChase, Event::kReturn}) {
-    Bench bench;
-    bench.Fly({3.0, 0.0, 1.0});
-    bench.mission.inputs().flying = bench.mission.inputs().armed = true;
-    bench.Run(20.0);
-    ASSERT_TRUE(bench.Command(led).accepted);
-    bench.Run(0.2);
-    const State before = bench.mission.state();
-    bench.hears_plans = false;
-    bench.Run(world::kMostAge.plan - 0.2);
-    EXPECT_EQ(bench.mission.state(), before) << "it may come back";
-    bench.Run(0.4);
-    EXPECT_EQ(bench.mission.state(), State::kLand);
-    EXPECT_EQ(bench.mission.reason(), "planning is silent: landing here");
-  }
-}
-
-TEST(Mission, LandsWithoutObstaclesThatStayAway) {
-  for (const Event led : {Event::kHold, Event::kChase, Event::kReturn}) {
-    Bench bench;
-    bench.Fly({3.0, 0.0, 1.0});
-    bench.mission.inputs().flying = bench.mission.inputs().armed = true;
-    bench.Run(20.0);
-    ASSERT_TRUE(bench.Command(led).accepted);
-    bench.Run(0.2);
-    const State before = bench.mission.state();
-    bench.hears_obstacles = false;
-    bench.Run(world::kMostAge.plan - 0.2);
-    EXPECT_EQ(bench.mission.state(), before) << "mapping may come back";
-    bench.Run(0.4);
-    EXPECT_EQ(bench.mission.state(), State::kLand);
-    EXPECT_EQ(bench.mission.reason(), "obstacles are not heard of: landing here");
-  }
+TEST(Mission, LandsWithoutPlansOrObstaclesThatStayAway) {
+  struct Silence {
+    bool Bench::*hears;
+    const char* reason;
+  };
+  for (const auto& [hears, reason] :
+       {Silence{&Bench::hears_plans, "planning is silent: landing here"},
+        Silence{&Bench::hears_obstacles, "obstacles are not heard of: landing here"}})
+    for (const Event led : {Event::kHold, Event::kChase, Event::kReturn}) {
+      Bench bench;
+      bench.Fly({3.0, 0.0, 1.0});
+      bench.mission.inputs().flying = bench.mission.inputs().armed = true;
+      bench.Run(20.0);
+      ASSERT_TRUE(bench.Command(led).accepted);
+      bench.Run(0.2);
+      const State before = bench.mission.state();
+      bench.*hears = false;
+      bench.Run(world::kMostAge.plan - 0.2);
+      EXPECT_EQ(bench.mission.state(), before) << "it may come back: " << reason;
+      bench.Run(0.4);
+      EXPECT_EQ(bench.mission.state(), State::kLand);
+      EXPECT_EQ(bench.mission.reason(), reason);
+    }
 }
 
 // Planning hovers then, and says so with a plan each time.
