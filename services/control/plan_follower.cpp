@@ -12,8 +12,8 @@ constexpr std::size_t kMostWaiting = 16;
 double YawDerivative(const Plan& plan, int order, double t) {
   const double tau = (t - plan.position.start) / plan.position.duration;
   double sum = 0.0;
-  for (int k = static_cast<int>(plan.yaw.size()) - 1; k >= order; --k)
-    sum = sum * tau + (order == 0 ? 1.0 : k) * plan.yaw[k];
+  for (Eigen::Index k = plan.yaw.size(); k-- > order;)
+    sum = sum * tau + (order == 0 ? 1.0 : static_cast<double>(k)) * plan.yaw[k];
   return order == 0 ? sum : sum / plan.position.duration;
 }
 

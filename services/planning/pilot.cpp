@@ -215,7 +215,6 @@ PlanRequest Pilot::Request(double t0, const Start& start) const {
     if (!o.moving) o.velocity_covariance += tube_.drift;
   for (world::Obstacle& o : request.unseen) o.velocity_covariance += tube_.drift;
   request.horizon = config_.horizon;
-  request.target = world::Trajectory::Constant(start.state.p, t0, config_.horizon);
   if (!forecast_ || !forecast_->has_target) return request;
   request.target = forecast_->target;
   request.target_sigma = math::LargestSigma(forecast_->covariance);

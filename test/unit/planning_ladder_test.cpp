@@ -180,6 +180,27 @@ TEST(Ladder, StartOffAWallButWithinItsEllipsoidStillChases) {
   EXPECT_GE(plan.certified_clearance, 0.0);
 }
 
+// That about a cylinder reaches over it: above its middle by more than the drone needs.
+TEST(Ladder, StartOverACylinderButWithinItsEllipsoidStillMoves) {
+  const PlannerConfig config;
+  PlanRequest request = Walk();
+  request.start.v.setZero();
+  world::Obstacle post;
+  post.id = 3;
+  post.solid = world::Obstacle::Solid::kCylinder;
+  post.half = {0.3, 0.3, 1.2};
+  post.shape = post.half.cwiseAbs2()
+                   .cwiseProduct(Eigen::Vector3d(1.5, 1.5, 3.0))
+                   .cwiseInverse()
+                   .asDiagonal();
+  const double off = config.hard_radius() + config.safety_margin + 0.02;
+  post.center = world::Trajectory::Constant({-2.5, 0.0, 1.4 - post.half.z() - off}, 0.0, 2.5);
+  request.obstacles = {post};
+  const PlanResult plan = MakePlanner("chase", config)->Plan(request);
+  EXPECT_LE(plan.verdict, Verdict::kSafeOnly) << plan.reason;
+  EXPECT_GE(plan.certified_clearance, 0.0);
+}
+
 TEST(Ladder, KeepsTheRunningPlanWhileItIsCertified) {
   PlannerConfig config = Config();
   PlanRequest request = Walk();

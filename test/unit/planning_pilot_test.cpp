@@ -158,12 +158,32 @@ TEST(Pilot, WhatItDoesWhilePredictionIsSilentIsCertified) {
   }
 }
 
-TEST(Pilot, TurnsToALostTargetTheShorterWay) {
-  for (const double side : {1.0, -1.0}) {
-    const auto plans = AfterTheLastSight(side * 3.0, side * -3.0, 0.0, 0.3);
-    ASSERT_FALSE(plans.empty());
-    EXPECT_GT(side * YawAt(plans[0].yaw, 0.0, plans[0].trajectory.duration).rate, 0.0);
+// Who was last seen to come stays, for all that is planned, where its forecast ended.
+TEST(Pilot, FleesFromNobodyWhoseForecastIsLongOver) {
+  Pilot pilot{PlanningConfig()};
+  pilot.SetFlying(true);
+  pilot.SetTask(Task::kHold, Eigen::Vector3d::Zero());
+  Forecast f = Walking(0.0);
+  f.target.coefficients << 6.0, 0.0, 0.5, -2.5, 0.0, 0.0;  // over the drone in 6 s
+  pilot.SetForecast(f);
+  const BodyEstimate body{{0.0, 0.0, 1.3}, Eigen::Vector3d::Zero(), 0.0};
+  for (double t = 0.0; t < 9.0; t += 0.1) {
+    pilot.SetObstacles(t, {});
+    const auto plan = pilot.Update(t, body);
+    if (!plan || t < 2.0) continue;
+    EXPECT_GE(plan->certified_clearance, 0.0) << t << ": " << plan->reason;
+    const world::Trajectory& way = plan->trajectory;
+    EXPECT_LT((way.Position(way.end()) - body.p).norm(), 0.01) << t << ": " << plan->reason;
   }
+}
+
+TEST(Pilot, TurnsToALostTargetTheShorterWay) {
+  for (const auto& [yaw, bearing] : {std::pair(3.0, -3.0), {2.0, -2.5}})
+    for (const double side : {1.0, -1.0}) {
+      const auto plans = AfterTheLastSight(side * yaw, side * bearing, 0.0, 0.3);
+      ASSERT_FALSE(plans.empty());
+      EXPECT_GT(side * YawAt(plans[0].yaw, 0.0, plans[0].trajectory.duration).rate, 0.0) << bearing;
+    }
 }
 
 // Places that nobody has looked into, from x = 8.5 m on.
