@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/world/yaw.h"
+
 namespace chase::control {
 
 namespace {
@@ -25,15 +27,6 @@ world::State OnWay(const world::Trajectory& way, double t) {
   return rest;
 }
 
-/// The yaw's rate falls to zero evenly over the stop.
-void StopYaw(const Plan& plan, double t, Reference* r) {
-  const world::Trajectory& stop = *plan.stop;
-  const double rate = YawDerivative(plan, 1, stop.start);
-  const double s = std::min((t - stop.start) / stop.duration, 1.0);
-  r->yaw = YawDerivative(plan, 0, stop.start) + rate * stop.duration * (s - 0.5 * s * s);
-  r->yaw_rate = rate * (1.0 - s);
-}
-
 bool IsFinite(const world::Trajectory& x) {
   return x.coefficients.allFinite() && std::isfinite(x.start) && std::isfinite(x.duration) &&
          x.duration > 0.0;
@@ -44,8 +37,12 @@ bool IsFinite(const world::Trajectory& x) {
 Reference Sample(const Plan& plan, double t) {
   Reference r;
   if (plan.stop && t >= plan.stop->start) {
-    r.state = OnWay(*plan.stop, t);
-    StopYaw(plan, t, &r);
+    const world::Trajectory& stop = *plan.stop;
+    r.state = OnWay(stop, t);
+    const world::Yaw left{YawDerivative(plan, 0, stop.start), YawDerivative(plan, 1, stop.start)};
+    const auto [yaw, rate] = world::YawOnStop(left, stop.duration, t - stop.start);
+    r.yaw = yaw;
+    r.yaw_rate = rate;
     return r;
   }
   const world::Trajectory& way = plan.position;

@@ -1,13 +1,12 @@
 #include "services/planning/ladder.h"
 
 #include <algorithm>
-#include <cassert>
 #include <cmath>
 
-#include "services/planning/certificate.h"
 #include "services/planning/cost.h"
 #include "services/planning/field_of_view.h"
 #include "services/planning/limits.h"
+#include "services/planning/margins.h"
 #include "services/planning/refinement.h"
 #include "services/planning/separations.h"
 #include "services/planning/skeletons.h"
@@ -60,7 +59,7 @@ class Ladder : public Planner {
         result.verdict = Verdict::kSafeOnly;
       if (result.verdict < Verdict::kBrake && StartsInside(*used_))
         result.verdict = Verdict::kEscape;
-      result.reason += (result.reason.empty() ? "" : "; ") + notes;
+      Note(&result.reason, notes);
     }
     result.yaw = FitYaw(result.trajectory, request.target, request.yaw, config_.max_yaw_rate);
     SetField(request, &result);
@@ -119,8 +118,7 @@ class Ladder : public Planner {
                                           plan.duration, &result->yaw, *view);
     if (result->in_field || !IsInSightVerdict(result->verdict)) return;
     result->verdict = Verdict::kSafeOnly;
-    result->reason += (result->reason.empty() ? "" : "; ");
-    result->reason += "the target leaves the field of view";
+    Note(&result->reason, "the target leaves the field of view");
   }
 
   /// A certified plan on its way through a rung.
@@ -183,7 +181,6 @@ class Ladder : public Planner {
       if (!best || choice.cost.total < best->cost.total) best = choice;
     }
     if (!best) return false;
-    assert(SampleFaults(best->plan, problem, sight_from, 200).empty());
     result->winner = best->index;
     result->cost = best->cost;
     result->trajectory.coefficients = best->plan;
@@ -218,9 +215,8 @@ class Ladder : public Planner {
         result->reason = "no candidate of the normal skeletons is feasible";
       if (t.tight) result->reason = "with half of the margins";
       if (t.share < 1.0)
-        result->reason += (result->reason.empty() ? "" : "; ") + std::string("sight over ") +
-                          std::to_string(static_cast<int>(100.0 * t.share)) +
-                          " % of the horizon only";
+        Note(&result->reason, "sight over " + std::to_string(static_cast<int>(100.0 * t.share)) +
+                                  " % of the horizon only");
       return true;
     }
     return false;

@@ -181,11 +181,7 @@ Pilot::Start Pilot::StartAt(double t, double t0, const BodyEstimate& body) const
   const double tau = std::clamp(((on_plan ? t0 : left) - plan.start) / plan.duration, 0.0, 1.0);
   Start start{flown.At(std::clamp(t0, flown.start, flown.end())),
               YawAt(running_.yaw, tau, plan.duration), on_plan};
-  if (!on_plan) {  // its rate falls evenly over the stop
-    const double s = std::min((t0 - left) / flown.duration, 1.0);
-    start.yaw.yaw += start.yaw.rate * flown.duration * (s - 0.5 * s * s);
-    start.yaw.rate *= 1.0 - s;
-  }
+  if (!on_plan) start.yaw = world::YawOnStop(start.yaw, flown.duration, t0 - left);
   if (t0 >= flown.end()) {
     start.state.v = start.state.a = start.state.j = Eigen::Vector3d::Zero();
     start.yaw.rate = 0.0;

@@ -54,7 +54,7 @@ double DistanceTo(const world::Obstacle& o, const Vector3d& d) {
 void Resting::From(const world::State& start, double t0) {
   over_ = {t0, 0.0, start, false};
   heights_ = BrakeCurve(start, kBrakeTimes[0]);
-  has_problem_ = false;
+  made_beyond_.reset();
   within_.reset();
   touched_.reset();
 }
@@ -67,7 +67,6 @@ std::optional<Stop> Resting::Brake() {
 
 std::optional<Stop> Resting::BrakeWithin(bool heights) {
   beyond_ = !heights;
-  has_problem_ = false;
   for (const double T : kBrakeTimes)
     if (auto stop = Certified(BrakeCurve(over_.start, T), T)) return stop;
   return std::nullopt;
@@ -79,7 +78,6 @@ std::optional<Stop> Resting::RiseOrBrake() {
   if (!request_.target_body) return Brake();
   const world::Obstacle& target = *request_.target_body;
   beyond_ = false;
-  has_problem_ = false;
   for (const double T : kTimes) {
     Vector3d end = ToPoints(BrakeCurve(over_.start, T), 5).row(5).transpose();
     const double top = target.center.Position(over_.t0 + T).z() + target.half.z() + kAbove;
@@ -100,7 +98,6 @@ std::optional<Stop> Resting::StepAside() {
   const Vector3d from = over_.start.p - request_.target_body->center.Position(over_.t0);
   const double away = std::atan2(from.y(), from.x());
   beyond_ = false;
-  has_problem_ = false;
   for (const double r : kDistances) {
     const double T = std::sqrt(10.0 / std::sqrt(3.0) * r / push);  // the quintic's greatest
     const Vector3d end = ToPoints(BrakeCurve(over_.start, T), 5).row(5).transpose();
@@ -118,7 +115,7 @@ std::optional<Stop> Resting::Certified(const Curve& curve, double T) {
   SetProblem(T);
   if (!KeepsLimits(curve, problem_) || !IsForecast(curve, T)) return std::nullopt;
   Refusal refusal;
-  auto proofs = ProveOff(curve, problem_, 1.0, nullptr, &refusal);
+  auto proofs = ProveOff(curve, problem_, kNoSight, nullptr, &refusal);
   if (!proofs && refusal.tau >= 0.0) {
     const Ellipsoid& e = problem_.obstacles[static_cast<size_t>(refusal.obstacle)];
     if (e.safety_from == 0.0) touched_ = {e.index, refusal.tau, e.safety_radius};
@@ -230,8 +227,8 @@ std::pair<double, double> Resting::Within() {
 }
 
 void Resting::SetProblem(double T) {
-  if (problem_.duration == T && has_problem_) return;
-  has_problem_ = true;
+  if (problem_.duration == T && made_beyond_ == beyond_) return;
+  made_beyond_ = beyond_;
   over_.horizon = T;
   MakeProblem(config_, request_, over_, nullptr, &problem_, besides_);
   for (Ellipsoid& e : problem_.obstacles)

@@ -86,8 +86,9 @@ class Resting {
   Problem own_;
   Problem& problem_;
   Curve heights_;
-  bool has_problem_ = false, leaves_ = true;
+  bool leaves_ = true;
   bool beyond_ = true, goes_beyond_ = false;  ///< the heights: may it, and would the quickest way
+  std::optional<bool> made_beyond_;           ///< as the problem was made; none: to be made anew
   std::optional<std::pair<double, double>> within_;
   struct Touched {
     int obstacle;  ///< index of Obstacle()

@@ -15,24 +15,6 @@ using Eigen::Vector3d;
 
 constexpr double kLeast = 0.1;  // s of a way to rest that are worth to be flown
 
-// Displacements of the place of rest by distance: rings of directions, level, up and down; the
-// last leads from the ground to above its slab.
-std::vector<Vector3d> Displacements() {
-  constexpr int kAround = 12;
-  std::vector<Vector3d> all;
-  for (const double r : {0.4, 0.8, 1.4, 2.2})
-    for (const double rise : {0.0, 0.5, -0.5})
-      for (int i = 0; i < kAround; ++i) {
-        const double angle = 2.0 * M_PI * i / kAround;
-        all.emplace_back(r * std::cos(angle), r * std::sin(angle), rise * r);
-      }
-  for (const double rise : {0.5, -0.5, 1.0, -1.0, 1.5}) all.emplace_back(0.0, 0.0, rise);
-  std::stable_sort(all.begin(), all.end(), [](const Vector3d& a, const Vector3d& b) {
-    return a.squaredNorm() < b.squaredNorm();
-  });
-  return all;
-}
-
 PlannerConfig WithoutMargin(PlannerConfig config) {
   config.safety_margin = 0.0;
   return config;
@@ -53,7 +35,8 @@ bool KeepsOffUnseen(const PlannerConfig& config, const PlanRequest& request,
                     const world::Trajectory& plan, double t) {
   if (request.unseen.empty() || t <= plan.start) return true;
   const PlanRequest part = Part(request, plan, t, request.unseen);
-  return StaysOff(ToCurve(plan, part.t0, part.horizon), MakeProblem(config, part, nullptr), 1.0);
+  return StaysOff(ToCurve(plan, part.t0, part.horizon), MakeProblem(config, part, nullptr),
+                  kNoSight);
 }
 
 // The proofs of a plan count on its being left after kOverdue: until a later t, does it keep off
@@ -70,7 +53,7 @@ bool KeepsOffUntil(const PlannerConfig& config, const PlanRequest& request,
   Problem problem = MakeProblem(config, part, nullptr);
   if (!leaves)
     for (Ellipsoid& e : problem.obstacles) e.safety_from = 0.0;
-  return StaysOff(ToCurve(plan, part.t0, part.horizon), problem, 1.0);
+  return StaysOff(ToCurve(plan, part.t0, part.horizon), problem, kNoSight);
 }
 
 }  // namespace
@@ -111,7 +94,7 @@ bool KeepsOffMovers(const PlannerConfig& config, const PlanRequest& request,
     if (o.moving) moving.obstacles.push_back(o);
   return !(moving.horizon > 0.0) ||
          StaysOff(ToCurve(way, moving.t0, moving.horizon),
-                  MakeProblem(WithoutMargin(config), moving, nullptr), 1.0);
+                  MakeProblem(WithoutMargin(config), moving, nullptr), kNoSight);
 }
 
 namespace {
@@ -216,8 +199,25 @@ constexpr double kOver[] = {0.7, 1.0, 1.6};  // s, that ways aside take
 // s from now on that a place of rest should be clear: there is a way aside until then.
 constexpr double kLasts = kOver[2] + kOverdue;
 
+// Rings of directions, level, up and down; the last leads from the ground to above its slab.
+std::vector<Vector3d> PlacesAside() {
+  constexpr int kAround = 12;
+  std::vector<Vector3d> all;
+  for (const double r : {0.4, 0.8, 1.4, 2.2})
+    for (const double rise : {0.0, 0.5, -0.5})
+      for (int i = 0; i < kAround; ++i) {
+        const double angle = 2.0 * M_PI * i / kAround;
+        all.emplace_back(r * std::cos(angle), r * std::sin(angle), rise * r);
+      }
+  for (const double rise : {0.5, -0.5, 1.0, -1.0, 1.5}) all.emplace_back(0.0, 0.0, rise);
+  std::stable_sort(all.begin(), all.end(), [](const Vector3d& a, const Vector3d& b) {
+    return a.squaredNorm() < b.squaredNorm();
+  });
+  return all;
+}
+
 Stop Evade(const PlannerConfig& config, const PlanRequest& request) {
-  static const std::vector<Vector3d> displacements = Displacements();
+  static const std::vector<Vector3d> places = PlacesAside();
   const std::vector<world::Obstacle>& unseen = request.unseen;
   Resting resting[] = {{config, request}, {config, request}, {config, request}};
   Resting seen[] = {
@@ -242,7 +242,7 @@ Stop Evade(const PlannerConfig& config, const PlanRequest& request) {
     const Curve curve = BrakeCurve(request.start, T);
     if (braking.CanBeFlown(curve, T)) weigh(&braking, curve, T, false);
   }
-  for (const Vector3d& d : displacements)
+  for (const Vector3d& d : places)
     for (int i = 0; i < 3; ++i) {
       const double T = kOver[i];
       const Vector3d end = ToPoints(BrakeCurve(request.start, T), 5).row(5).transpose() + d;

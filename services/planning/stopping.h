@@ -39,6 +39,9 @@ std::optional<Stop> GoOn(const PlannerConfig& config, const PlanRequest& request
 bool KeepsOffMovers(const PlannerConfig& config, const PlanRequest& request,
                     const world::Trajectory& way);
 
+/// Where Evade comes to rest, seen from where braking does, frame W, m; by distance.
+std::vector<Eigen::Vector3d> PlacesAside();
+
 /// Out of the way: comes to rest near where braking would, of all places tried the nearest that can
 /// be certified, also up and down, those first that last. Where none can: the one whose first
 /// contact is the latest, then the one that stays farthest off; not certified.

@@ -4,14 +4,11 @@
 #include <vector>
 
 #include "common/world/trajectory.h"
+#include "common/world/yaw.h"
 
 namespace chase::planning {
 
-/// Yaw at the start of a plan.
-struct YawStart {
-  double yaw = 0.0;   ///< rad
-  double rate = 0.0;  ///< rad/s
-};
+using YawStart = world::Yaw;  ///< of a plan
 
 /// Polynomial in tau of degree 6 that follows the bearing of `target` from `plan`, at most
 /// `max_rate` rad/s where it has to catch up, and continues `start` where given: least squares over

@@ -52,6 +52,29 @@ TEST(Evasion, WhatCannotBeBrakedForIsEvadedAndCertified) {
 
 // Braking is certified for as long as it takes; where somebody comes soon after that it is too late
 // for a way aside then.
+// Whatever place is clear, one near it is tried.
+TEST(Evasion, PlacesAsideAreNearToAnyPlace) {
+  const std::vector<Vector3d> places = PlacesAside();
+  const auto off = [&](const Vector3d& place) {
+    double least = HUGE_VAL;
+    for (const Vector3d& p : places) least = std::min(least, (p - place).norm());
+    return least;
+  };
+  double most = 0.0;
+  for (double r = 0.4; r <= 2.2; r += 0.05)
+    for (double angle = 0.0; angle < 2.0 * M_PI; angle += 0.05)
+      for (const double rise : {-0.5, -0.2, 0.0, 0.3, 0.5})
+        most = std::max(most, off(r * Vector3d(std::cos(angle), std::sin(angle), rise)) /
+                                  std::hypot(r, r * rise));
+  EXPECT_LT(most, 0.42);
+  for (double rise = -1.25; rise <= 1.75; rise += 0.05) {
+    EXPECT_LT(off({0.0, 0.0, rise}), std::abs(rise) < 0.26 ? 0.51 : 0.26) << rise;
+  }
+  EXPECT_TRUE(std::is_sorted(places.begin(), places.end(), [](const auto& a, const auto& b) {
+    return a.norm() < b.norm() - 1e-12;
+  }));
+}
+
 TEST(Evasion, StepsAsideWhileThereIsAWay) {
   const PlannerConfig config;
   for (const double beside : {0.0, 0.2, 3.0}) {

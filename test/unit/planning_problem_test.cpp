@@ -321,6 +321,11 @@ TEST(Problem, NothingOfAnEarlierOneStays) {
       request.start.p.y() += 20.0;
       request.target.coefficients(0, 1) += 20.0;
     }
+    for (size_t k = 0; k < request.obstacles.size(); k += 3) {
+      world::Obstacle& o = request.obstacles[k];
+      o.solid = world::Obstacle::Solid::kBox;
+      o.half = Vector3d(0.3, 0.2, 0.3) * (i % 8 < 6 ? 1.0 : 0.9);  // in the same ellipsoid
+    }
     used.reach = Box{Eigen::Array3d::Zero(), Eigen::Array3d::Zero()};
     used.skeletons = {{Vector3d::Zero()}};
     MakeProblem(c, request, request, nullptr, &used);

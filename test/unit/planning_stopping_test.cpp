@@ -148,6 +148,9 @@ TEST(Rest, GoesOnWithTheStopThatWasCommittedTo) {
         continue;
       }
       ++(t < way.start ? before : along);
+      EXPECT_TRUE(rest.verdict == Verdict::kEscape ||
+                  rest.verdict == (t < way.start ? Verdict::kSafeOnly : Verdict::kBrake))
+          << rest.reason;
       EXPECT_GE(rest.certified_clearance, 0.0);
       EXPECT_EQ(world::Refute(ClaimOf(rest, request.target, config),
                               {config.hard_radius(), config.sigmas}, request.obstacles),

@@ -65,6 +65,29 @@ TEST(Task, StartedInFlightItBrakesAndNeverClimbs) {
   }
 }
 
+// Movers count for as long as is asked, and as the way lasts.
+TEST(Climb, KeepsOffWhoComesInTime) {
+  const PlannerConfig config;
+  const world::Trajectory way{0.0, 3.0,
+                              (Eigen::MatrixXd(2, 3) << 0.0, 0.0, 0.5, 0.0, 0.0, 1.0).finished()};
+  const auto keeps_off = [&](double comes, double within) {
+    PlanRequest request;
+    request.horizon = within;
+    request.start = way.At(0.0);
+    world::Obstacle walker = Pillar(1, 0.0, 0.0);
+    walker.moving = true;
+    walker.center = {comes, 1.0, Eigen::MatrixXd::Zero(2, 3)};
+    walker.center.coefficients(1, 0) = 4.0;  // past within half a second
+    walker.center.coefficients(0, 2) = walker.half.z();
+    request.obstacles = {walker};
+    return KeepsOffMovers(config, request, way);
+  };
+  EXPECT_FALSE(keeps_off(0.8, 1.5));
+  EXPECT_TRUE(keeps_off(2.2, 1.5));
+  EXPECT_FALSE(keeps_off(2.2, 5.0));
+  EXPECT_TRUE(keeps_off(4.0, 5.0));
+}
+
 TEST(Task, AClimbGoesOnCertifiedWithAPlannerThatIsStartedInIt) {
   for (const bool blocked : {false, true}) {
     Flight flight({0.0, 0.0, 0.6});

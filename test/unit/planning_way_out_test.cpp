@@ -131,6 +131,51 @@ TEST(WayOut, StepsAsideFromATargetThatComes) {
   EXPECT_GT(found, 0.5 * needed) << "of " << needed;
 }
 
+// It knows no north: where everything is turned, so is the step.
+TEST(WayOut, StepsAsideAlikeInAllDirections) {
+  const PlannerConfig config;
+  int found = 0;
+  for (unsigned seed = 0; seed < 40; ++seed) {
+    Random random(seed, 13);
+    const double across = random.Uniform(-0.4, 0.4), speed = random.Uniform(0.0, 0.8);
+    const world::Obstacle beside =
+        RandomCylinder(&random, 1, {random.Uniform(-1.5, -1.0), random.Uniform(-1.5, 1.5), 1.0});
+    const auto step = [&](double turn) -> std::optional<Vector3d> {
+      const Eigen::Matrix3d R = Eigen::AngleAxisd(turn, Vector3d::UnitZ()).matrix();
+      PlanRequest request;
+      request.start.p = {0.0, 0.0, 1.5};
+      request.start.v = R * Vector3d(0.0, speed, 0.0);
+      request.obstacles = {beside};
+      request.target_body.emplace();
+      for (world::Obstacle* o : {&request.obstacles[0], &*request.target_body}) {
+        if (o->id != 1) {
+          o->id = kTargetId;
+          o->solid = world::Obstacle::Solid::kCylinder;
+          o->half = {0.25, 0.25, 0.85};
+          o->shape = o->half.cwiseAbs2().cwiseInverse().asDiagonal();
+          o->center = world::Trajectory::Constant({1.1, across, 0.85}, 0.0, 5.0);
+        }
+        o->moving = false;
+        o->center.coefficients = (o->center.coefficients.topRows(1) * R.transpose()).eval();
+      }
+      Resting resting(config, request);
+      resting.From(request.start, 0.0);
+      const std::optional<Stop> stop = resting.StepAside();
+      if (!stop) return std::nullopt;
+      return R.transpose() * stop->trajectory.Position(stop->trajectory.end());
+    };
+    const std::optional<Vector3d> north = step(0.0);
+    found += north.has_value();
+    for (const double turn : {0.7, 2.0, -2.4}) {
+      const std::optional<Vector3d> turned = step(turn);
+      ASSERT_EQ(turned.has_value(), north.has_value()) << seed;
+      if (!north) continue;
+      EXPECT_LT((*turned - *north).norm(), 1e-6) << seed << " " << turn;
+    }
+  }
+  EXPECT_GT(found, 20);
+}
+
 // At the edge of what is listed straight away from the target is not looked into.
 TEST(WayOut, StepsAsideNoFartherThanUnseenPlacesAreListed) {
   const PlannerConfig config;
