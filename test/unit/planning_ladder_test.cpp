@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "services/planning/certificate.h"
@@ -133,6 +134,9 @@ TEST(Ladder, TargetAlreadyHiddenGivesASafePlanThatRegainsSight) {
   request.obstacles = {Pillar(1, -1.0, 0.0, 0.3)};  // right between the two
   const PlanResult plan = MakePlanner("chase", Config())->Plan(request);
   EXPECT_EQ(plan.verdict, Verdict::kSafeOnly) << plan.reason;
+  EXPECT_TRUE(std::any_of(plan.proofs.begin(), plan.proofs.end(), [](const Proof& proof) {
+    return proof.of_sight && proof.from > 0.0 && proof.from < 1.0;
+  })) << plan.reason;
   ExpectContinues(plan, request);
   Problem problem = MakeProblem(Config(), request, nullptr);
   problem.limits.view.reset();  // not promised either

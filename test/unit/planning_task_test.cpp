@@ -273,22 +273,24 @@ world::Geofence Angle() {
 }
 
 TEST(Task, ReturnAndLandingKeepToAConcaveFence) {
+  const Vector3d home(-20.0, 7.0, 0.1), start = home + Vector3d(12.0, 4.0, 1.4);
   for (const Task task : {Task::kReturn, Task::kLand}) {
-    Flight flight({12.0, 4.0, 1.5});
+    Flight flight(start);
     flight.flying_before = true;
     // To land: on a block, in the middle of which it is; the fence has room on one side.
-    world::Obstacle block = Pillar(1, 11.0, 4.0);
+    world::Obstacle block = Pillar(1, 0.0, 0.0);
     block.half = {2.0, 2.0, 0.3};
-    block.center = world::Trajectory::Constant({11.0, 4.0, 0.3}, 0.0, 1.0);
+    block.center =
+        world::Trajectory::Constant({start.x() - 1.0, start.y(), block.half.z()}, 0.0, 1.0);
     block.shape = (2.0 * block.half.cwiseAbs2()).cwiseInverse().asDiagonal();
     if (task == Task::kLand) flight.obstacles = {block};
-    flight.pilot.SetTask(task, Vector3d(0.0, 0.0, 0.1));
+    flight.pilot.SetTask(task, home);
     flight.pilot.SetFence(Angle());
     flight.Run(25.0);
     for (const PlanResult& plan : flight.plans)
       for (const Vector3d& p : world::PlacesOn(plan.trajectory, std::nullopt))
-        ASSERT_EQ(Angle().Breach(p - Vector3d(0.0, 0.0, 0.1), 0.1), "") << p.transpose();
-    EXPECT_GT((flight.Body().p - Vector3d(12.0, 4.0, 1.5)).norm(), 0.5) << "as far as it may";
+        ASSERT_EQ(Angle().Breach(p - home, 0.1), "") << p.transpose();
+    EXPECT_GT((flight.Body().p - start).norm(), 0.5) << "as far as it may";
   }
 }
 
