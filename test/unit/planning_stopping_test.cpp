@@ -263,7 +263,13 @@ TEST(Harm, IsTheFirstContactAndTheLeastDistance) {
     const world::Obstacle body =
         RandomCylinder(&random, kTargetId, RandomVector(&random, 2.0, 2.0, 0.5) + request.start.p);
     if (Distance(body, request.start.p, request.t0) > c.hard_radius()) request.target_body = body;
-    const auto [contact, least] = Resting(c, request).Harm(BrakeCurve(request.start, T), T);
+    Resting resting(c, request);
+    world::State inside = request.start;  // where harm is something else, before
+    inside.p = request.obstacles[0].center.Position(request.t0);
+    resting.From(inside, request.t0);
+    resting.Harm(BrakeCurve(inside, T), T);
+    resting.From(request.start, request.t0);
+    const auto [contact, least] = resting.Harm(BrakeCurve(request.start, T), T);
     const world::Trajectory way = Braking(request, T);
     double first = HUGE_VAL, deep = HUGE_VAL, nearest = HUGE_VAL;
     int by = 3;
