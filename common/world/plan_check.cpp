@@ -22,23 +22,22 @@ bool IsCurve(const Trajectory& x) {
   return x.coefficients.rows() >= 1 && x.coefficients.rows() <= kMostRows && x.duration > 0.0;
 }
 
-/// Proofs of one trajectory.
+/// Proofs of a plan and of its stop among the same obstacles.
 class Examiner {
  public:
-  /// `flown`: s of the trajectory for which movers' changes of velocity count.
-  Examiner(const Claim& claim, const LeastClaim& least, const Trajectory& of, double flown,
-           const std::vector<Obstacle>& obstacles)
-      : claim_(claim),
-        of_(of),
-        flown_(flown),
-        obstacles_(obstacles),
-        is_certificate_(least.exact ? IsCertificateExact : IsCertificate),
-        is_safe_(obstacles.size(), 0) {
-    drone_.center = of.coefficients;
-    target_.center = claim.target.Reparametrised(of.start, of.duration).coefficients;
-  }
+  Examiner(const Claim& claim, const LeastClaim& least, const std::vector<Obstacle>& obstacles)
+      : claim_(claim), exact_(least.exact), obstacles_(obstacles), bodies_(obstacles.size()) {}
 
-  std::string Complaint(const std::vector<Proof>& proofs) {
+  /// `flown`: s of the trajectory for which movers' changes of velocity count.
+  std::string Complaint(const Trajectory& of, double flown, const std::vector<Proof>& proofs) {
+    of_ = &of;
+    flown_ = flown;
+    drone_.center = of.coefficients;
+    target_.center = claim_.target.Reparametrised(of.start, of.duration).coefficients;
+    swept_drone_ = SweptBall(drone_);
+    swept_target_ = SweptBall(target_);
+    is_safe_.assign(obstacles_.size(), 0);
+    body_ = nullptr;
     for (const Proof& proof : proofs) {
       if (proof.obstacle == kTargetBody || !Find(proof.obstacle)) continue;
       if (std::string bad = Complaint(proof); !bad.empty()) return About(proof.obstacle, bad);
@@ -57,7 +56,7 @@ class Examiner {
   // Proofs come in the order of the list: the search goes on where the last one ended.
   bool Find(int id) {
     if (body_ && obstacles_[at_].id == id) return true;
-    body_.reset();
+    body_ = nullptr;
     for (size_t i = 0; i < obstacles_.size(); ++i, at_ = (at_ + 1) % obstacles_.size())
       if (obstacles_[at_].id == id) return true;
     return false;
@@ -74,27 +73,49 @@ class Examiner {
     if (!body_ && !(math::IsCovariance(obstacle.position_covariance) &&
                     math::IsCovariance(obstacle.velocity_covariance)))
       return "has a covariance that is not positive semidefinite";
-    if (!body_) body_.emplace(MakeBody(obstacle, of_.start, of_.duration, claim_.sigmas, flown_));
-    drone_.radius = math::Polynomial::Constant(1, proof.radius);
-    if (proof.of_sight) target_.radius = proof.target_radius;
-    const bool holds = is_certificate_(proof.separations, proof.from, 1.0, drone_,
-                                       proof.of_sight ? &target_ : nullptr, *body_);
+    if (!body_) SetBody(obstacle);
+    const bool holds = Holds(proof);
     if (holds && (proof.of_sight || proof.from <= 0.0 ||
-                  Leaves(of_.coefficients, *body_, proof.from, kWayOut)))
+                  Leaves(of_->coefficients, *body_, proof.from, kWayOut)))
       return "";
     if (holds) return "is not left by the shortest way";
     return proof.of_sight ? "has a proof of sight that does not hold"
                           : "has a proof of safety that does not hold";
   }
 
+  void SetBody(const Obstacle& obstacle) {
+    std::optional<Body>& body = bodies_[at_];
+    if (body)
+      Retime(obstacle, of_->start, of_->duration, claim_.sigmas, flown_, &*body);
+    else
+      body = MakeBody(obstacle, of_->start, of_->duration, claim_.sigmas, flown_);
+    body_ = &*body;
+  }
+
+  bool Holds(const Proof& proof) {
+    drone_.radius = math::Polynomial::Constant(1, proof.radius);
+    swept_drone_.TakeRadius();
+    if (proof.of_sight) target_.radius = proof.target_radius;
+    if (proof.of_sight) swept_target_.TakeRadius();
+    if (exact_)
+      return IsCertificateExact(proof.separations, proof.from, 1.0, drone_,
+                                proof.of_sight ? &target_ : nullptr, *body_);
+    return IsCertificate(proof.separations, proof.from, 1.0, &swept_drone_,
+                         proof.of_sight ? &swept_target_ : nullptr, *body_);
+  }
+
   const Claim& claim_;
-  const Trajectory& of_;
-  const double flown_;
+  const bool exact_;
   const std::vector<Obstacle>& obstacles_;
-  decltype(&IsCertificate) is_certificate_;
+  std::vector<std::optional<Body>> bodies_;  // of the obstacles, as far as they were asked of
+
+  // Of the trajectory in hand.
+  const Trajectory* of_ = nullptr;
+  double flown_ = 0.0;
   std::vector<char> is_safe_;
   Ball drone_, target_;
-  std::optional<Body> body_;  // that of obstacles_[at_]
+  SweptBall swept_drone_{drone_}, swept_target_{target_};
+  const Body* body_ = nullptr;  // that of obstacles_[at_]
   size_t at_ = 0;
 };
 
@@ -128,10 +149,10 @@ std::string Refute(const Claim& claim, const LeastClaim& least,
   if (!(claim.hard_radius >= least.hard_radius)) return "its sphere is too small";
   if (!(claim.sigmas >= least.sigmas)) return "it takes obstacles for more certain than they are";
   const double flown = claim.stop ? kOverdue : HUGE_VAL;
-  std::string bad =
-      Examiner(claim, least, claim.position, flown, obstacles).Complaint(claim.proofs);
+  Examiner examiner(claim, least, obstacles);
+  std::string bad = examiner.Complaint(claim.position, flown, claim.proofs);
   if (!bad.empty() || !claim.stop) return bad;
-  bad = Examiner(claim, least, *claim.stop, HUGE_VAL, obstacles).Complaint(claim.stop_proofs);
+  bad = examiner.Complaint(*claim.stop, HUGE_VAL, claim.stop_proofs);
   return bad.empty() ? "" : "stop: " + bad;
 }
 

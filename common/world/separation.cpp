@@ -299,17 +299,12 @@ Separator::Separator(const Ball& drone, const Ball* target, double from, double 
 }
 
 Separator::Party Separator::MakeParty(const Ball& ball) const {
-  return {&ball, Sweep(ball, from_, to_, 0), MeanOf(ball.center, from_, to_)};
+  return {SweptBall(ball), MeanOf(ball.center, from_, to_)};
 }
 
 void Separator::TakeRadii() {
-  drone_.sweep.SetRadius(drone_.ball->radius);
-  if (target_) target_->sweep.SetRadius(target_->ball->radius);
-}
-
-void Separator::Raise(Party* party, const Body& body) const {
-  const int degree = DegreeOf(*party->ball, body);
-  if (party->sweep.degree != degree) party->sweep = Sweep(*party->ball, from_, to_, degree);
+  drone_.ball.TakeRadius();
+  if (target_) target_->ball.TakeRadius();
 }
 
 /// Of unit length, from the mean of the body's centre to the nearest point between the means of the
@@ -322,13 +317,12 @@ Vector3d Separator::Between(const Body& body) const {
 }
 
 SeparationResult Separator::From(const Body& body) {
-  Raise(&drone_, body);
-  if (target_) Raise(&*target_, body);
   const Separation s{from_, to_, Between(body)};
-  const Rooms room = ProvenRooms(s.normal, drone_.sweep, target_ ? &target_->sweep : nullptr, body);
+  const Sweep* target = target_ ? &target_->ball.Over(from_, to_, body) : nullptr;
+  const Rooms room = ProvenRooms(s.normal, drone_.ball.Over(from_, to_, body), target, body);
   if (room.Least() >= 0.0) return {Kept::kOff, Certificate(s), room, 0.0};
   if (!(from_ >= 0.0 && from_ < to_ && to_ <= 1.0)) return {};
-  return Prover(*drone_.ball, target_ ? target_->ball : nullptr, body).Prove(s);
+  return Prover(drone_.ball.ball(), target_ ? &target_->ball.ball() : nullptr, body).Prove(s);
 }
 
 SeparationResult Separate(const Ball& drone, const Ball* target, const Body& body, double from,

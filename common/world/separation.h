@@ -36,12 +36,10 @@ class Separator {
 
  private:
   struct Party {
-    const Ball* ball;
-    Sweep sweep;
+    SweptBall ball;
     Eigen::Vector3d mean;  ///< of the centre
   };
   Party MakeParty(const Ball& ball) const;
-  void Raise(Party* party, const Body& body) const;
   Eigen::Vector3d Between(const Body& body) const;
 
   double from_, to_;

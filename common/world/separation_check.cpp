@@ -186,6 +186,13 @@ int DegreeOf(const Ball& ball, const Body& body) {
   return std::max({DegreeOf(ball), static_cast<int>(body.center.rows()) - 1, asked});
 }
 
+const Sweep& SweptBall::Over(double from, double to, const Body& body) {
+  const int degree = DegreeOf(*ball_, body);
+  if (!sweep_ || sweep_->degree != degree || sweep_->from != from || sweep_->to != to)
+    sweep_.emplace(*ball_, from, to, degree);
+  return *sweep_;
+}
+
 Rooms ProvenRooms(const Vector3d& n, const Sweep& drone, const Sweep* target, const Body& body) {
   constexpr Rooms kNone{kNothing, kNothing};
   if (!IsNormal(n) || !(body.half.minCoeff() >= 0.0) || !(body.sigmas >= 0.0)) return kNone;
@@ -212,19 +219,20 @@ Rooms ProvenRooms(const Vector3d& n, const Sweep& drone, const Sweep* target, co
 }
 
 double ProvenRoom(const Separation& s, const Ball& drone, const Ball* target, const Body& body) {
-  const auto sweep = [&](const Ball& ball) {
-    return Sweep(ball, s.from, s.to, DegreeOf(ball, body));
-  };
+  const auto sweep = [&](const Ball& ball) { return SweptBall(ball).Over(s.from, s.to, body); };
   if (!target) return ProvenRooms(s.normal, sweep(drone), nullptr, body).Least();
   const Sweep second = sweep(*target);
   return ProvenRooms(s.normal, sweep(drone), &second, body).Least();
 }
 
-bool IsCertificate(const Certificate& certificate, double from, double to, const Ball& drone,
-                   const Ball* target, const Body& body) {
+bool IsCertificate(const Certificate& certificate, double from, double to, SweptBall* drone,
+                   SweptBall* target, const Body& body) {
   if (!IsWellFormed(certificate, from, to)) return false;
-  for (const Separation& s : certificate)
-    if (!(ProvenRoom(s, drone, target, body) >= 0.0)) return false;
+  for (const Separation& s : certificate) {
+    const Sweep* second = target ? &target->Over(s.from, s.to, body) : nullptr;
+    const Rooms rooms = ProvenRooms(s.normal, drone->Over(s.from, s.to, body), second, body);
+    if (!(rooms.Least() >= 0.0)) return false;
+  }
   return true;
 }
 

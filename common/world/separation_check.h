@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 
 #include "common/world/body.h"
 #include "common/world/certificate.h"
@@ -32,6 +33,24 @@ struct Sweep {
 /// The least degree at which a ball is asked of a body.
 int DegreeOf(const Ball& ball, const Body& body);
 
+/// A ball that is asked of one body after the other: most are asked over one interval at one
+/// degree, and its sweep is computed anew only where these change.
+class SweptBall {
+ public:
+  /// Keeps a pointer to the ball.
+  explicit SweptBall(const Ball& ball) : ball_(&ball) {}
+  /// To be called when the ball's radius has changed.
+  void TakeRadius() {
+    if (sweep_) sweep_->SetRadius(ball_->radius);
+  }
+  const Sweep& Over(double from, double to, const Body& body);
+  const Ball& ball() const { return *ball_; }
+
+ private:
+  const Ball* ball_;
+  std::optional<Sweep> sweep_;  ///< the last one
+};
+
 /// What a plane proves of each ball, m.
 struct Rooms {
   double drone, target;
@@ -52,8 +71,8 @@ double ProvenRoom(const Separation& separation, const Ball& drone, const Ball* t
 
 /// Is it well formed, with a proven room of 0 or more in each separation? True is a proof that the
 /// body is kept off over [from, to]; false says that this certificate is none.
-bool IsCertificate(const Certificate& certificate, double from, double to, const Ball& drone,
-                   const Ball* target, const Body& body);
+bool IsCertificate(const Certificate& certificate, double from, double to, SweptBall* drone,
+                   SweptBall* target, const Body& body);
 
 /// The same question in exact integer arithmetic, square roots rounded up: the reference.
 bool IsCertificateExact(const Certificate& certificate, double from, double to, const Ball& drone,

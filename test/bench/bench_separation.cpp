@@ -55,7 +55,7 @@ template <class Check>
 bool All(const Plan& plan, Check check) {
   bool all = true;
   for (size_t i = 0; i < plan.bodies.size(); ++i)
-    all = check(plan.certificates[i], 0.0, 1.0, plan.drone, &plan.target, plan.bodies[i]) && all;
+    all = check(plan.certificates[i], plan.drone, &plan.target, plan.bodies[i]) && all;
   return all;
 }
 
@@ -68,18 +68,17 @@ double Seconds(const Plan& plan, Check check, int repeats) {
 
 void CheckPlan(benchmark::State& state) {
   const Plan plan = MakePlan();
-  if (!All(plan, IsCertificate) || !All(plan, IsCertificateExact))
+  if (!All(plan, Certifies) || !All(plan, CertifiesExactly))
     state.SkipWithError("a certificate is refused");
-  for (auto _ : state) benchmark::DoNotOptimize(All(plan, IsCertificate));
+  for (auto _ : state) benchmark::DoNotOptimize(All(plan, Certifies));
   state.counters["intervals"] = plan.intervals;
-  state.counters["ratio"] =
-      Seconds(plan, IsCertificateExact, 20) / Seconds(plan, IsCertificate, 2000);
+  state.counters["ratio"] = Seconds(plan, CertifiesExactly, 20) / Seconds(plan, Certifies, 2000);
 }
 BENCHMARK(CheckPlan)->Unit(benchmark::kMicrosecond);
 
 void CheckPlanExactly(benchmark::State& state) {
   const Plan plan = MakePlan();
-  for (auto _ : state) benchmark::DoNotOptimize(All(plan, IsCertificateExact));
+  for (auto _ : state) benchmark::DoNotOptimize(All(plan, CertifiesExactly));
   state.counters["intervals"] = plan.intervals;
 }
 BENCHMARK(CheckPlanExactly)->Unit(benchmark::kMicrosecond);

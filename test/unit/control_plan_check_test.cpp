@@ -120,6 +120,13 @@ bool EnlargeRadius(Case* c, Random& g) {
   return IsBroken(*c);
 }
 
+bool EnlargeTargetRadius(Case* c, Random& g) {
+  Proof& proof = AnyProof(c, g);
+  if (!proof.of_sight) return false;
+  proof.target_radius[g() % 2] += Uniform(g, 0.01, 3.0);
+  return IsBroken(*c);
+}
+
 bool ShrinkRadius(Case* c, Random& g) {
   Proof& proof = AnyProof(c, g);
   proof.radius = c->claim.hard_radius - Uniform(g, 1e-9, 0.3);
@@ -254,6 +261,7 @@ const std::map<std::string, Forgery>& Forgeries() {
       {"normal turned", TurnNormal},
       {"interval shortened", ShortenInterval},
       {"radius enlarged", EnlargeRadius},
+      {"target's radius enlarged", EnlargeTargetRadius},
       {"radius shrunk", ShrinkRadius},
       {"hard radius shrunk", ShrinkHardRadius},
       {"sigmas lowered", LowerSigmas},
@@ -488,6 +496,11 @@ TEST(PlanCheck, TakesProofsInAnyOrder) {
       std::shuffle(proofs->begin(), proofs->end(), g);
     }
     std::shuffle(c.obstacles.begin(), c.obstacles.end(), g);
+    if (i % 2) {  // of the plan's degree the stop is the same
+      Eigen::MatrixXd same = Eigen::MatrixXd::Zero(c.claim.position.coefficients.rows(), 3);
+      same.topRows(c.claim.stop->coefficients.rows()) = c.claim.stop->coefficients;
+      c.claim.stop->coefficients = same;
+    }
     EXPECT_EQ(Verdict(c), "") << i;
     c.least.exact = i % 10 == 0;
     EXPECT_TRUE(!c.least.exact || Verdict(c).empty()) << i;

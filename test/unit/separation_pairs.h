@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/world/body.h"
 #include "common/world/random.h"
+#include "common/world/separation_check.h"
 
 namespace chase::world {
 
@@ -17,6 +17,18 @@ struct SeparationPair {
 
   const Ball* second() const { return sight ? &target : nullptr; }
 };
+
+/// Of the whole horizon.
+inline bool Certifies(const Certificate& certificate, const Ball& drone, const Ball* target,
+                      const Body& body) {
+  SweptBall first(drone), second(target ? *target : drone);
+  return IsCertificate(certificate, 0.0, 1.0, &first, target ? &second : nullptr, body);
+}
+
+inline bool CertifiesExactly(const Certificate& certificate, const Ball& drone, const Ball* target,
+                             const Body& body) {
+  return IsCertificateExact(certificate, 0.0, 1.0, drone, target, body);
+}
 
 inline Eigen::Vector3d RandomVector(Random* random, double x, double y, double z) {
   const double a = random->Uniform(-x, x), b = random->Uniform(-y, y);

@@ -16,10 +16,10 @@ using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
 bool Holds(const Certificate& c, const SeparationPair& pair) {
-  return IsCertificate(c, 0.0, 1.0, pair.drone, pair.second(), pair.body);
+  return Certifies(c, pair.drone, pair.second(), pair.body);
 }
 bool HoldsExactly(const Certificate& c, const SeparationPair& pair) {
-  return IsCertificateExact(c, 0.0, 1.0, pair.drone, pair.second(), pair.body);
+  return CertifiesExactly(c, pair.drone, pair.second(), pair.body);
 }
 
 struct Proven {
