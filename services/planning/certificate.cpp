@@ -224,8 +224,8 @@ std::string SampleFaults(const Curve& plan, const Problem& problem, double sight
       const std::string where = "obstacle " + std::to_string(e.id) + " at " + std::to_string(tau);
       if (tau >= e.safety_from && (p - c).dot(e.safety * (p - c)) < 1.0 - 1e-9)
         return "inside " + where;
-      if (tau >= std::max(sight_from, e.sight_from) && e.sight_from < 1.0 && sight_from < 1.0 &&
-          world::SegmentSquaredDistance(p, q, c, e.sight) < 1.0 - 1e-9)
+      if (tau >= std::max(sight_from, e.sight_from) && e.sight_from < kNoSight &&
+          sight_from < kNoSight && world::SegmentSquaredDistance(p, q, c, e.sight) < 1.0 - 1e-9)
         return "sight crosses " + where;
     }
     const Limits& l = problem.limits;

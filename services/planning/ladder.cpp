@@ -310,16 +310,17 @@ class Ladder : public Planner {
     };
     for (const auto& [sight_from, view] :
          {Try{0.25, true}, Try{0.5, true}, Try{0.75, true}, Try{0.25, false}, Try{0.5, false},
-          Try{0.75, false}, Try{1.0, false}}) {
+          Try{0.75, false}, Try{kNoSight, false}}) {
       problem->limits.view = view ? config_.view() : std::nullopt;
       problem->limits.view_from = sight_from;
       if (!TrySearch(*problem, sight_from, std::nullopt, result)) continue;
       Take(request, *problem, result);
       sight_from_ = sight_from;
-      result->reason = sight_from < 1.0 ? "no candidate keeps sight; this one has it from " +
-                                              std::to_string(static_cast<int>(100 * sight_from)) +
-                                              " % of the horizon on"
-                                        : "no candidate keeps or regains sight";
+      result->reason = sight_from < kNoSight
+                           ? "no candidate keeps sight; this one has it from " +
+                                 std::to_string(static_cast<int>(100 * sight_from)) +
+                                 " % of the horizon on"
+                           : "no candidate keeps or regains sight";
       if (share < 1.0) result->reason += ", over half of the horizon";
       return true;
     }

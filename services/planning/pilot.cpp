@@ -36,11 +36,9 @@ void LeaveAt(double t, world::Obstacle* body) {
   body->velocity_covariance.setZero();
 }
 
-// What plan and stop leave to sphere and tube, m.
-double ClearanceOf(const PlanResult& plan) {
-  double least = plan.certified_clearance;
-  for (const Proof& p : plan.stop_proofs) least = std::min(least, p.from > 0.0 ? 0.0 : p.room);
-  return least;
+// What plan and stop leave beyond the hard radius, m.
+double ClearanceOf(const PlanResult& plan, double hard) {
+  return std::min(plan.certified_clearance, std::max(0.0, LeastKept(plan.stop_proofs) - hard));
 }
 
 bool IsFinite(const PlanResult& plan) {
@@ -152,7 +150,8 @@ std::optional<PlanResult> Pilot::Update(double t, const BodyEstimate& body) {
   PlanResult plan = !Chases()                                       ? Obey(t0, start, body)
                     : airborne_ && HasTarget(t) && SeesObstacles(t) ? Chase(t0, start)
                                                                     : Wait(t0, start, body);
-  if (plan.certified_clearance >= 0.0 && ClearanceOf(plan) < tube_.beyond)
+  const double hard = config_.planner.drone_radius + tube_.radius;
+  if (plan.certified_clearance >= 0.0 && ClearanceOf(plan, hard) < tube_.beyond)
     plan = AsLastResort("the body strays farther than a plan keeps clear", Rest(t0, start));
   else if (plan.certified_clearance >= 0.0)
     plan.certified_clearance -= tube_.beyond;

@@ -36,7 +36,7 @@ void PlanProof::Reset(const Problem& problem, double sight_from, bool exact) {
 void PlanProof::AddRows(int obstacle) {
   const Ellipsoid& e = problem_->obstacles[static_cast<size_t>(obstacle)];
   const double from = std::max(sight_from_, e.sight_from);
-  const bool sight = from < 1.0;
+  const bool sight = from < kNoSight;
   const bool fused = sight && from == e.safety_from && e.safety == e.sight;
   const bool decides = !e.body;
   decides_ = decides_ || decides;

@@ -18,7 +18,7 @@ std::optional<Box> BoxAround(const Curve& plan) {
 class Sieve {
  public:
   Sieve(const Curve& plan, const Problem& problem, double sight_from)
-      : sight_(sight_from < 1.0), box_(BoxAround(plan)) {
+      : sight_(sight_from < kNoSight), box_(BoxAround(plan)) {
     if (!sight_ || !box_) return;
     const std::optional<Box> seen = BoxAround(problem.target);
     if (seen)
@@ -57,7 +57,7 @@ class Prover {
   bool IsOff(const Ellipsoid& e, std::vector<Proof>* proofs, SeparationMemory* memory) {
     if (e.safety_from > 0.0 && !world::Leaves(drone_.center, *e.body, e.safety_from)) return false;
     const double from = SightFrom(e);
-    const bool seen = from < 1.0;
+    const bool seen = from < kNoSight;
     world::SeparationResult sight = seen ? InSight(e, memory) : world::SeparationResult{};
     if (seen && !IsKept(sight)) return false;
     const double left = sight.room.drone - (e.safety_radius - SightRadius(e));
@@ -84,7 +84,7 @@ class Prover {
   double tau() const { return tau_; }
 
   // How many proofs: of safety, and of sight.
-  int Asks(const Ellipsoid& e) const { return SightFrom(e) < 1.0 ? 2 : 1; }
+  int Asks(const Ellipsoid& e) const { return SightFrom(e) < kNoSight ? 2 : 1; }
 
  private:
   static constexpr double kSlack = 1e-9;  // m; more than the rounding of a room

@@ -122,7 +122,6 @@ std::optional<PlanResult> RestOfStop(const PlanRequest& request, const world::Tr
   const double T = way.end() - request.t0;
   if (T < kLeast) return std::nullopt;
   PlanResult result;
-  result.verdict = Verdict::kBrake;
   result.reason = "on the stop of the plan before";
   result.trajectory = {request.t0, T, ToCurve(way, request.t0, T)};
   return result;
@@ -134,7 +133,6 @@ std::optional<PlanResult> RestOfPlan(const PlanRequest& request) {
   const world::Trajectory& stop = *request.stop;
   if (request.t0 >= stop.start) return RestOfStop(request, stop);
   PlanResult result;
-  result.verdict = Verdict::kBrake;
   if (!request.running || stop.start > request.running->end()) return std::nullopt;
   const double T = stop.start - request.t0;
   result.reason = "the running plan until its stop";
@@ -270,12 +268,17 @@ void SetProofs(const PlannerConfig& config, const PlanRequest& request, std::vec
                PlanResult* result) {
   const Ground ground = GroundOf(request.obstacles);
   const Points points = ToPoints(Curve(result->trajectory.coefficients), 6);
-  double least = HUGE_VAL;
+  double least = LeastKept(proofs);
   for (int i = 0; i <= 6; ++i) least = std::min(least, ground.Above(points.row(i).transpose()));
-  for (const Proof& p : proofs)
-    if (!p.of_sight) least = std::min(least, p.from > 0.0 ? 0.0 : p.radius + p.room);
   result->certified_clearance = std::max(0.0, least - HardRadius(config, request));
   result->proofs = std::move(proofs);
+}
+
+double LeastKept(const std::vector<Proof>& proofs) {
+  double least = HUGE_VAL;
+  for (const Proof& p : proofs)
+    if (!p.of_sight) least = std::min(least, p.from > 0.0 ? 0.0 : p.radius + p.room);
+  return least;
 }
 
 bool LeavesObstacles(const std::vector<Proof>& proofs) {
@@ -325,7 +328,6 @@ PlanResult RestPlan(const PlannerConfig& config, const PlanRequest& request) {
   }
   if (!stop) stop = wide.Brake();
   if (!stop) stop = close.Brake();
-  result.verdict = Verdict::kBrake;
   if (!stop) {
     stop = Evade(hard, request);
     if (stop->certified) result.verdict = Verdict::kEscape;

@@ -53,6 +53,10 @@ using world::kOverdue;
 /// Do the proofs hold only once an obstacle is left that the start is in? Such a plan is an ESCAPE.
 bool LeavesObstacles(const std::vector<Proof>& proofs);
 
+/// The least distance that the proofs of safety keep the drone's centre off anybody, m: 0 where one
+/// is left first, infinite where there are none.
+double LeastKept(const std::vector<Proof>& proofs);
+
 /// What was committed to with the running plan, not certified: what is left of it until its stop,
 /// and the stop.
 std::optional<PlanResult> AsCommitted(const PlanRequest& request);

@@ -358,7 +358,7 @@ TEST(Pilot, AFrameThatDriftsKeepsOffStaticObstacles) {
         const auto left = [&](const world::Trajectory& way, double until) {
           double most = 0.0;  // of the wall's way and the body's
           for (double at = way.start; at <= until; at += 0.02 * way.duration) {
-            const double drift = 2.0 * sigma * (at - plan->trajectory.start);
+            const double drift = config.planner.sigmas * sigma * (at - plan->trajectory.start);
             most = std::max(most, way.Position(at).y() + drift + bound);
           }
           return 1.9 - most - config.planner.drone_radius;
@@ -373,10 +373,14 @@ TEST(Pilot, AFrameThatDriftsKeepsOffStaticObstacles) {
       }
     return least;
   };
-  for (const double bound : {0.0, 0.06, 0.115, 0.2})
-    for (const double sigma : {0.0, 0.003, 0.01, 0.02, 0.05, 0.1, 0.2})
-      for (const bool seen : {true, false})
-        EXPECT_GE(room(bound, sigma, seen), -1e-6) << bound << " " << sigma << " " << seen;
+  for (const double sigmas : {config.planner.sigmas, 0.4}) {
+    config.planner.sigmas = sigmas;
+    for (const double bound : {0.0, 0.06, 0.115, 0.2})
+      for (const double sigma : {0.0, 0.003, 0.01, 0.02, 0.05, 0.1, 0.2})
+        for (const bool seen : {true, false})
+          EXPECT_GE(room(bound, sigma, seen), -1e-6)
+              << sigmas << " " << bound << " " << sigma << " " << seen;
+  }
 }
 
 // A way back takes longer than the tube is spared for.

@@ -175,5 +175,31 @@ TEST(LastResort, WhatTheBodyStraysByBeyondAnyTubeIsTakenOffTheClaim) {
   EXPECT_TRUE(far.proofs.empty());
 }
 
+TEST(LastResort, AStopThatTheBodyMayStrayFromIsNoWayOut) {
+  const PlanningConfig config;
+  const double hard = config.planner.drone_radius + kWidestTube;
+  int tighter = 0;
+  for (double x = 0.0; x < 3.0; x += 0.2)
+    for (double y = 0.9; y < 1.4; y += 0.1) {
+      const auto planned = [&](double bound) {
+        Pilot pilot{config};
+        pilot.SetFlying(true);
+        pilot.SetTrackingBound(0.0, bound);
+        pilot.SetObstacles(0.0, {Pillar({x, y, 1.0})});
+        pilot.SetForecast(Walking(0.0));
+        return *pilot.Update(0.0, {{0.0, 0.0, 1.3}, {1.5, 0.0, 0.0}, 0.0});
+      };
+      const PlanResult plan = planned(kWidestTube);
+      const double stops = LeastKept(plan.stop_proofs) - hard;
+      if (!(stops + 0.02 < plan.certified_clearance)) continue;
+      ++tighter;
+      EXPECT_GE(planned(kWidestTube + stops - 0.01).certified_clearance, 0.0) << x << " " << y;
+      const PlanResult beyond = planned(kWidestTube + stops + 0.01);
+      EXPECT_LT(beyond.certified_clearance, 0.0) << x << " " << y;
+      EXPECT_GE(beyond.verdict, Verdict::kBrake);
+    }
+  EXPECT_GT(tighter, 3);
+}
+
 }  // namespace
 }  // namespace chase::planning

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <random>
 
+#include "common/math/bernstein.h"
 #include "services/planning/field_of_view.h"
 #include "services/planning/limits.h"
 #include "services/planning/planner_config.h"
@@ -186,6 +187,33 @@ TEST(Limits, HoldFarFromTheOrigin) {
   }
   EXPECT_GT(kept, 100);
   EXPECT_GT(broken, 100);
+}
+
+// Where power coefficients cancel, rounding is as large as they are: a speed that is exceeded by
+// less than that, at the end, is not called kept.
+TEST(Limits, AreNotKeptByRounding) {
+  Random g(16);
+  for (int i = 0; i < 300; ++i) {
+    Vector3d along(Uniform(g, -1, 1), Uniform(g, -1, 1), Uniform(g, -1, 1));
+    along[i % 3] = 0.0;
+    math::Polynomial speed(8);  // Bernstein
+    for (int k = 0; k < 7; ++k) speed[k] = (k % 2 ? 1.0 : -1.0) * Uniform(g, 0.5, 0.9);
+    speed[7] = 1.0;
+    speed = math::BernsteinToPower(speed);
+    Curve plan = Curve::Zero(9, 3);
+    for (int k = 1; k < 9; ++k) plan.row(k) = speed[k - 1] / k * along.transpose();
+    long double squared = 0.0L;
+    for (int a = 0; a < 3; ++a) {
+      long double v = 0.0L;
+      for (int k = 1; k < 9; ++k) v += k * static_cast<long double>(plan(k, a));
+      squared += v * v;
+    }
+    Problem problem;
+    problem.limits.speed = static_cast<double>(std::sqrt(squared)) * (1.0 - 1e-14);
+    EXPECT_FALSE(KeepsLimits(plan, problem)) << i;
+    problem.limits.speed *= 1.0 + 1e-6;
+    EXPECT_TRUE(KeepsLimits(plan, problem)) << i;
+  }
 }
 
 TEST(Limits, NoneIsAskedThatIsNotSet) {
