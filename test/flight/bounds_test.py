@@ -1,8 +1,8 @@
 """Whole flights within the bounds of bounds.json, not only without a collision: bounds_test.py BIN_DIR NAME
 
 A bound is on each of its seeds, and has room over the worst when it was recorded: twice an error (1 cm at least), half of
-a distance, a hundredth of a share. The share of plans that are fallbacks is of all seeds together, and a third more is its
-bound. Nobody widens one to let a change pass."""
+a distance, a hundredth of a share. The share of plans that are fallbacks is of all seeds together, and has room for three
+deviations of such a mean over that of many flights. Nobody widens one to let a change pass."""
 
 import json
 import pathlib
