@@ -12,6 +12,15 @@ bool Has(const std::vector<Event>& events, Event event) {
   return std::find(events.begin(), events.end(), event) != events.end();
 }
 
+constexpr char kBrokeOff[] = "broke off ";
+
+/// What goes on after an emergency of that reason.
+State BrokenOff(const std::string& reason) {
+  for (const State state : {State::kLand, State::kReturn})
+    if (reason.find(kBrokeOff + std::string(Name(state))) != std::string::npos) return state;
+  return State::kHold;
+}
+
 }  // namespace
 
 world::CommandAnswer Mission::Obey(double t, const Command& command) {
@@ -85,11 +94,9 @@ void Mission::TakeOff(double t) {
 }
 
 void Mission::Update(double t) {
-  if (!began_) {
-    began_ = true;
-    since_ = last_usable_ = t;
-  }
-  if (inputs_.pose && inputs_.pose->usable) last_usable_ = std::max(last_usable_, inputs_.pose->t);
+  if (!began_) began_ = since_ = t;
+  if (inputs_.pose && inputs_.pose->usable)
+    last_usable_ = std::max(last_usable_.value_or(inputs_.pose->t), inputs_.pose->t);
   missing_ = Missing(config_, inputs_, t);
   if (!IsAirborne(state_) && inputs_.armed && !inputs_.on_ground)
     missing_.emplace_back("the autopilot says that it is in the air");
@@ -107,17 +114,33 @@ void Mission::Update(double t) {
 }
 
 void Mission::Remember(double t, const Home& home, const Led& led) {
-  if (home_ || !IsAirborne(state_)) return;
+  if (home_) return;
+  const bool emergency = led.state == State::kEmergency;
+  if (emergency && !last_usable_ && began_) GoOnWithoutPose(t, led);
+  if (!IsAirborne(state_)) return;
   home_ = home;
-  if (!uncommanded_) return;
+  if (!uncommanded_ || state_ == State::kEmergency) return;
   const char* const when = "before this process started";
-  // It may have come to land for want of the take-off place alone: what else it lands for, stands.
-  if (state_ == State::kLand && !inputs_.landing) Step(t, Event::kHold, when);
-  ComeDown(t, led.state, when);
+  // It may have come to land for want of the take-off place or the pose alone: what else it lands
+  // for, stands.
+  if (state_ == State::kLand && (emergency || !inputs_.landing)) Step(t, Event::kHold, when);
+  ComeDown(t, emergency ? BrokenOff(led.reason) : led.state, when);
   if (led.state == State::kChase) Step(t, Event::kChase, when);
   if (led.state == State::kSearch) Step(t, Event::kSearch, when);
   if (led.state == State::kHold) HoldOn(t, led.reason, when);
   if (state_ == led.state) since_ = std::min(t, led.since);
+}
+
+/// An emergency lasts until somebody hears a pose to fly by, however long nobody was there to tell
+/// of it. Control may be silent by then.
+void Mission::GoOnWithoutPose(double t, const Led& led) {
+  Step(t, Event::kFlying);
+  Step(t, Event::kPoseLost);
+  if (state_ != State::kEmergency) return;
+  if (uncommanded_) before_ = BrokenOff(led.reason);
+  began_ = -HUGE_VAL;
+  since_ = std::min(t, led.since);
+  reason_ = led.reason.substr(0, led.reason.find("; "));  // the rest is Words() of its time
 }
 
 /// A stop goes on as one: it overrules the limits that it is found beyond.
@@ -210,6 +233,7 @@ void Mission::DropOverruled() {
 
 std::string Mission::Detail(double t, Event event) const {
   if (event == Event::kMissing) return missing_.front();
+  if (event == Event::kPoseLost) return kBrokeOff + std::string(Name(state_));
   if (event == Event::kLost) return ForecastProblem(inputs_, t);
   if (event == Event::kNotFlown && !Unruly().empty())
     return Has(Unruly(), Event::kOutside) ? Outside() : "battery low";
@@ -256,7 +280,9 @@ void Mission::HearOfGround() {
 }
 
 // By then control comes down by itself.
-bool Mission::PoseIsLost(double t) const { return t - last_usable_ > world::kMostAge.velocity; }
+bool Mission::PoseIsLost(double t) const {
+  return t - last_usable_.value_or(*began_) > world::kMostAge.velocity;
+}
 
 // At rest at the end of a plan that was made since, and that far up: a plan may also end where it
 // stands.

@@ -90,6 +90,7 @@ class Mission {
   void LeadItself(double t);
   void HearOfGround();
   void ComeDown(double t, State before, const char* when);
+  void GoOnWithoutPose(double t, const Led& led);
   void HoldOn(double t, const std::string& reason, const char* when);
   void NoteProgress(double t);
 
@@ -103,11 +104,11 @@ class Mission {
   std::string refusal_;           // what the autopilot said of a take-off that was called off
   std::vector<Event> overruled_;  // breaches that `stop` overrules
   double since_ = 0.0;
-  std::optional<double> taken_off_;  // when that was commanded, s
-  std::optional<double> flown_;      // since when control has flown, s
-  bool began_ = false;
-  State before_ = State::kHold;           // the emergency
-  double last_usable_ = -1e9;             // pose, s
+  std::optional<double> taken_off_;    // when that was commanded, s
+  std::optional<double> flown_;        // since when control has flown, s
+  State before_ = State::kHold;        // the emergency
+  std::optional<double> last_usable_;  // pose, s
+  std::optional<double> began_;  // the first Update(), s: the wait for a pose counts from there
   std::vector<Eigen::Vector3d> visited_;  // in this RETURN, frame W, m
   double progressed_ = 0.0;               // when the last of them was new, s
   std::optional<Home> home_;

@@ -165,6 +165,16 @@ class Faults(unittest.TestCase):
         back = next(i for i, (a, b) in enumerate(zip(told, told[1:]), 1) if b - a > 0.4)
         self.assertEqual({states[back - 1], *states[back + 5:]}, {3}, "CHASE")
 
+    def test_an_emergency_outlives_mission(self):
+        """Control is silent by then, but tells what was led last; the pose comes back at 8 s."""
+        scenario, log = self.folder / "emergency.yaml", self.folder / "emergency.lcm"
+        scenario.write_text(pathlib.Path(SCENARIO).read_text(encoding="utf-8")
+                            + "\nfaults: [{name: freeze-odometry, at: 1, for: 7}, {name: kill-mission, at: 5}]\n", encoding="utf-8")
+        answer = flight("--until", "9", "--log", log, "--light", scenario=scenario)
+        self.assertEqual(answer.returncode, 0, answer.stderr)
+        told = list(zip((t for t, _ in stamps(log, "FLIGHT_STATE")), self.states(log)))
+        self.assertEqual({state for t, state in told if 3.2 < t < 5 or 5.7 < t < 8}, {9}, "EMERGENCY")
+
     def test_what_was_selected_outlives_perception(self):
         """The configured colour is nobody's: the target is known by what was selected alone."""
         scenario, log = self.folder / "selected.yaml", self.folder / "selected.lcm"

@@ -417,6 +417,118 @@ TEST(Mission, AStopThatItObeysBeforeItHasHeardOfTheBatteryHolds) {
   EXPECT_EQ(bench.mission.state(), State::kHold);
 }
 
+/// How the mission process before this one led; control tells it anew for each that starts.
+Led Emergency(const std::string& broke_off) {
+  return {State::kEmergency, 3.0, "no pose: broke off " + broke_off};
+}
+
+// Once POSE is silent for 2 s control falls silent, too: nothing tells of a flight but HOME.
+TEST(Mission, StartedInAnEmergencyItGoesOnUntilThereIsAPose) {
+  for (const bool silent : {true, false}) {       // control
+    for (const bool heard : {true, false}) {      // odometry, which has lost its way
+      for (const double late : {0.1, 2.3}) {      // HOME
+        for (const bool again : {false, true}) {  // a second restart
+          Bench bench;
+          bench.mission.inputs().flying = bench.mission.inputs().landing = !silent;
+          bench.pose.usable = bench.pose.healthy = false;
+          bench.hears_pose = heard;
+          bench.Run(late);
+          Led led = Emergency("CHASE");
+          if (again) led.reason += "; fcu: failsafe: a failsafe of the autopilot";
+          bench.mission.Remember(bench.t, {{1.0, 2.0, 0.0}, bench.pose.epoch}, led);
+          EXPECT_EQ(bench.mission.state(), State::kEmergency);
+          bench.Run(60.0);
+          EXPECT_EQ(bench.mission.state(), State::kEmergency);
+          EXPECT_EQ(bench.mission.since(), 3.0);
+          EXPECT_EQ(bench.mission.Words(), "no pose: broke off CHASE");
+          EXPECT_FALSE(bench.Command(Event::kHold).accepted);
+          bench.pose.usable = bench.hears_pose = true;
+          bench.mission.inputs().flying = true;
+          bench.mission.inputs().landing = false;
+          bench.Run(0.2);
+          EXPECT_EQ(bench.mission.state(), State::kHold) << "as without a restart";
+        }
+      }
+    }
+  }
+}
+
+TEST(Mission, StartedInAnEmergencyNoCommandEndsIt) {
+  for (const Event command : {Event::kHold, Event::kLand}) {
+    Bench bench;
+    bench.mission.inputs().flying = true;
+    bench.hears_pose = false;
+    bench.Run(0.1);
+    ASSERT_TRUE(bench.Command(command).accepted) << "before it hears of it";
+    bench.mission.Remember(bench.t, {{1.0, 2.0, 0.0}, bench.pose.epoch}, Emergency("RETURN"));
+    bench.Run(1.0);
+    EXPECT_EQ(bench.mission.state(), State::kEmergency);
+    bench.hears_pose = true;
+    bench.Run(0.2);
+    EXPECT_EQ(bench.mission.state(), command == Event::kLand ? State::kLand : State::kHold);
+  }
+}
+
+TEST(Mission, AnEmergencyThatIsOverIsNotGoneOnWith) {
+  for (const bool flying : {true, false}) {
+    Bench posed;
+    posed.mission.inputs().flying = posed.mission.inputs().landing = flying;
+    posed.Run(0.1);
+    posed.mission.Remember(posed.t, {{1.0, 2.0, 0.0}, posed.pose.epoch}, Emergency("CHASE"));
+    EXPECT_EQ(posed.mission.state(), flying ? State::kHold : State::kReady) << "there is a pose";
+    EXPECT_EQ(posed.mission.home().has_value(), flying);
+  }
+  Bench down;
+  down.mission.inputs().motors_off = true;
+  down.hears_pose = false;
+  down.Run(0.1);
+  down.mission.Remember(down.t, {{1.0, 2.0, 0.0}, down.pose.epoch}, Emergency("CHASE"));
+  EXPECT_EQ(down.mission.state(), State::kDone);
+
+  Bench grounded;  // the autopilot has landed it
+  grounded.mission.inputs().on_ground = grounded.mission.inputs().handed_over = true;
+  grounded.hears_pose = false;
+  grounded.Run(0.1);
+  grounded.mission.Remember(grounded.t, {{1.0, 2.0, 0.0}, 3}, Emergency("CHASE"));
+  grounded.Run(3.0);
+  EXPECT_FALSE(IsAirborne(grounded.mission.state())) << grounded.mission.reason();
+}
+
+TEST(Mission, NoEmergencyIsMadeUpOfAnotherState) {
+  for (const State before : {State::kChase, State::kLand, State::kDone, State::kReady}) {
+    Bench bench;
+    bench.hears_pose = false;
+    bench.Run(0.1);
+    bench.mission.Remember(bench.t, {{1.0, 2.0, 0.0}, bench.pose.epoch}, {before, 3.0, ""});
+    bench.Run(60.0);
+    EXPECT_EQ(bench.mission.state(), State::kIdle) << Name(before);
+  }
+}
+
+TEST(Mission, WhatAnEmergencyBrokeOffOutlivesARestart) {
+  for (const State before : {State::kLand, State::kReturn, State::kHold}) {
+    for (const bool back : {true, false}) {  // the pose, before HOME
+      Bench first, second;
+      first.Fly({5.0, 0.0, 1.0});
+      if (before == State::kLand) first.Command(Event::kLand);
+      if (before == State::kReturn) first.Command(Event::kReturn);
+      first.hears_pose = false;
+      first.Run(2.2);
+      ASSERT_EQ(first.mission.state(), State::kEmergency);
+      second.pose.p = {5.0, 0.0, 1.0};
+      second.mission.inputs().flying = second.mission.inputs().landing = true;
+      second.hears_pose = back;
+      second.Run(0.1);
+      second.mission.Remember(second.t, *first.mission.home(),
+                              {State::kEmergency, 3.0, first.mission.Words()});
+      second.hears_pose = true;
+      second.mission.inputs().landing = false;
+      second.Run(0.2);
+      EXPECT_EQ(second.mission.state(), before) << second.mission.reason();
+    }
+  }
+}
+
 TEST(Mission, StartedInFlightItGivesUpTheSearchInItsTime) {
   Bench bench;
   bench.mission.inputs().flying = true;

@@ -111,6 +111,41 @@ TEST(MissionNode, StartedInFlightItHearsFromControlWhereItTookOff) {
   EXPECT_EQ(bench.states.back().reason, "stop commanded: before this process started");
 }
 
+// Without a pose control tells nothing of itself after 2 s: HOME alone is left.
+TEST(MissionNode, AnEmergencyOutlivesItsProcess) {
+  NodeBench bench;
+  const auto control = bench.lockstep.Connect();
+  control->SetIdentity({"control", "", kStart});
+  flight_state_t led{};
+  const auto run = [&](double seconds) {
+    for (int i = 0; i < std::lround(10.0 * seconds); ++i) {
+      bench.Run(0.1);
+      if (bench.states.empty()) continue;
+      if (bench.states.back().has_home != 0) led = bench.states.back();
+      if (bench.states.back().has_home == 0 && led.has_home != 0) control->Publish("HOME", led);
+    }
+  };
+  bench.Run(1.5);
+  bench.Command(command_t::TAKEOFF, 1);
+  bench.health = pose_t::HEALTH_LOST;
+  run(2.5);
+  ASSERT_EQ(led.state, +flight_state_t::EMERGENCY);
+  const int64_t since = led.since;
+  bench.lockstep.Kill("mission");
+  run(0.5);
+  bench.lockstep.Start("mission");
+  run(0.3);
+  const size_t heard = bench.states.size();
+  run(10.0);
+  for (size_t i = heard; i < bench.states.size(); ++i) {
+    EXPECT_EQ(bench.states[i].state, +flight_state_t::EMERGENCY) << i - heard;
+    EXPECT_EQ(bench.states[i].since, since);
+  }
+  bench.health = pose_t::HEALTH_OK;
+  run(0.2);
+  EXPECT_EQ(bench.states.back().state, +flight_state_t::HOLD);
+}
+
 TEST(MissionNode, LooksForATargetThatIsForecastNoMore) {
   NodeBench bench;
   bench.forecasts = true;
