@@ -102,8 +102,8 @@ std::string Misfit(const FaultKind& kind, bool sensors) {
   if (kind.needs == Needs::kSensors && !sensors)
     return "strikes nothing where sensors is truth; fly with --sensors raw";
   if (kind.needs == Needs::kRecorder)
-    return "strikes chase-recorder, which a flight in lockstep does not have; fly live with a full "
-           "disk under the log's folder";
+    return "strikes chase-recorder, which a flight in lockstep does not have; fly live, by "
+           "deploy/fly";
   return "";
 }
 

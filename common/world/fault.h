@@ -44,7 +44,7 @@ struct FaultKind {
     kLoss,        ///< of the bus: `amount` is the share of messages lost, at each receiver
     kFlood,       ///< of the bus: `amount` malformed messages a second on every channel
     kLoad,        ///< of all processes: each takes `amount` times as long
-    kDiskFull,    ///< of the recorder
+    kDiskFull,    ///< of the recorder: its files grow no more
   };
   /// What a flight must have for the fault to strike anything.
   enum class Needs { kNothing, kSensors, kRecorder };

@@ -23,11 +23,14 @@ Json CommandOf(const chase::world::CommandSpec& command) {
   return {{"command", command.command}, {"at_s", command.at_s}, {"arguments", words}};
 }
 
-/// The launcher's part of a fault in a live flight; null: it has none.
+/// The launcher's part of a fault in a live flight; null: the simulator has it. A fault for good
+/// has null for its length.
 Json LaunchersPart(const chase::world::FaultSpec& fault, const chase::world::FaultKind& kind) {
   using Effect = chase::world::FaultKind::Effect;
   Json part = {{"name", fault.name}, {"at_s", fault.at}, {"for_s", fault.duration}};
-  if (kind.effect == Effect::kKill || kind.effect == Effect::kFreeze) return part;
+  if (kind.effect == Effect::kKill || kind.effect == Effect::kFreeze ||
+      kind.effect == Effect::kDiskFull)
+    return part;
   if (kind.effect == Effect::kDelay || kind.effect == Effect::kLoss) {
     part["bus"] = true;  // each process does it to itself
     return part;
@@ -44,16 +47,13 @@ Json LaunchersPart(const chase::world::FaultSpec& fault, const chase::world::Fau
 
 Json Told(const chase::world::Scenario& scenario, int64_t seed) {
   Json told = {{"duration_s", scenario.duration_s}, {"settle_s", scenario.settle_s}};
-  told["commands"] = told["faults"] = told["left_out_live"] = Json::array();
+  told["commands"] = told["faults"] = Json::array();
   for (const auto& command : scenario.commands) told["commands"].push_back(CommandOf(command));
   int number = 0;
   for (const auto& spec : scenario.faults) {
     const auto fault = chase::world::Settled(spec, scenario.duration_s, seed, number++);
-    const auto& kind = chase::world::KindOf(fault);
-    if (const Json part = LaunchersPart(fault, kind); !part.is_null())
-      told["faults"].push_back(part);
-    else if (kind.victim != "simulator")
-      told["left_out_live"].push_back(fault.name);
+    const Json part = LaunchersPart(fault, chase::world::KindOf(fault));
+    if (!part.is_null()) told["faults"].push_back(part);
   }
   return told;
 }
@@ -63,8 +63,8 @@ Json Told(const chase::world::Scenario& scenario, int64_t seed) {
 /// Checks a scenario file without the services, so that it is the first program that is built.
 int main(int argc, char** argv) {
   CLI::App app(
-      "Checks a scenario file; prints its length, its commands, the faults that a live flight's "
-      "launcher brings about and those that it leaves out as one line of JSON.",
+      "Checks a scenario file; prints its length, its commands and the faults that a live flight's "
+      "launcher brings about as one line of JSON.",
       "chase-scenario");
   chase::config::AddVersion(&app);
   std::string file;

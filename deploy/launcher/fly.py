@@ -3,6 +3,7 @@
 import argparse
 import datetime
 import json
+import math
 import os
 import pathlib
 import re
@@ -149,13 +150,6 @@ def build_and_check(scenario, seed, view=False, hardware=False, link=False):
           *["chase-viewer"] * view, *["chase-link"] * link)
     ask("chase-flight", scenario, "--print-config", "simulator")  # reads the services' overrides
     return told["duration_s"] + told["settle_s"], told
-
-
-def warn_of_faults(names):
-    """Of a disk that is full: the launcher fills none."""
-    if names:
-        print(f"warning: {', '.join(names)} is left out of a live flight; it strikes where the disk under "
-              f"{ROOT / 'logs'} is full", file=sys.stderr, flush=True)
 
 
 def warn_of_disk(seconds):
@@ -316,8 +310,10 @@ class Flight:
                 self.killed.append(child)
 
     def strain(self, effect, fault):
-        """Begins or ends what strikes all processes."""
+        """Begins or ends what strikes the processes' surroundings."""
         self.tell("+" if effect == "begins" else "-", fault)
+        if fault == "disk-full":
+            return strain.fill_disk(self.logger.process.pid)
         if effect == "begins":
             for command in strain.commands(self.faults[fault], self.url):
                 self.strained.setdefault(fault, []).append(self.child(fault, command))
@@ -413,7 +409,7 @@ def strikes_of(faults, kills):
     strikes = []
     for fault in [*wishes, *faults]:
         effect, _, name = fault["name"].partition("-")
-        end = fault["at_s"] + fault["for_s"]
+        end = fault["at_s"] + (fault["for_s"] or math.inf)
         if effect not in STRIKES:
             strikes += [(fault["at_s"], "begins", fault["name"]), (end, "ends", fault["name"])]
             continue
@@ -428,7 +424,6 @@ def fly(options):
     seconds, told = build_and_check(scenario, options.seed, options.view, options.hardware, options.link)
     if late := [f"{name}@{t:g}" for name, t in options.kill if t >= told["duration_s"]]:
         raise FlightError(f"--kill {', '.join(late)}: the mission ends at {told['duration_s']:g} s; give an earlier time")
-    warn_of_faults(told.get("left_out_live"))
     warn_of_disk(seconds)
     raise_receive_buffers()
     url = bus.url()

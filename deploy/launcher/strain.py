@@ -1,7 +1,8 @@
-"""What faults of a live flight's surroundings run: busy processes, and a flood of the bus."""
+"""What faults of a live flight's surroundings do: busy processes, a flood of the bus, a disk that takes nothing more."""
 
 import os
 import random
+import resource
 import socket
 import struct
 import sys
@@ -10,6 +11,7 @@ import time
 import bus
 
 LONGEST = 200  # bytes of a malformed message, as in lockstep
+FLUSHED = 0.5  # s: the recorder hands over what it has heard every 0.2 s
 
 
 def commands(fault, url):
@@ -39,6 +41,12 @@ def flood(url, rate_hz, *channels):
                 seq += 1
             due += 1.0 / float(rate_hz)
             time.sleep(max(0.0, due - time.monotonic()))
+
+
+def fill_disk(recorder):
+    """No file takes another byte of that process, as on a full disk; its log has the FAULT of it, though."""
+    time.sleep(FLUSHED)
+    resource.prlimit(recorder, resource.RLIMIT_FSIZE, (0, 0))
 
 
 def work():

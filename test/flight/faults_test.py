@@ -121,7 +121,7 @@ class Faults(unittest.TestCase):
         self.assertEqual(answer.stderr, "chase-flight: --fault gust@12: the flight ends at 12 s, before it\n")
 
     def test_a_scenario_with_a_full_disk_flies_live(self):
-        """deploy/fly asks for the configurations of its processes; it says itself what it leaves out."""
+        """deploy/fly asks for the configurations of its processes, and fills the recorder's disk itself."""
         scenario = self.folder / "full.yaml"
         scenario.write_text(pathlib.Path(SCENARIO).read_text(encoding="utf-8") + "\nfaults: [{name: disk-full}]\n",
                             encoding="utf-8")
@@ -129,7 +129,8 @@ class Faults(unittest.TestCase):
         self.assertEqual((answer.returncode, answer.stderr), (0, ""))
         self.assertRegex(flight(scenario=scenario).stderr, "disk-full.*fly live")
         answer = subprocess.run([BIN / "chase-scenario", scenario], capture_output=True, text=True, check=True, timeout=LIMIT)
-        self.assertEqual(json.loads(answer.stdout)["left_out_live"], ["disk-full"])
+        (fault,) = json.loads(answer.stdout)["faults"]
+        self.assertEqual((fault["name"], fault["for_s"]), ("disk-full", None), "to the end")
 
     def test_mission_flies_where_a_fault_strikes(self):
         """As live, whatever the fault; without one nobody tells a state."""
@@ -190,8 +191,7 @@ commands: [{command: takeoff, at_s: -6}, {command: select, at_px: [188, 115], at
             self.assertEqual({tracks for t, tracks in tracked if begin < t < end}, {seen}, (begin, end))
 
     def test_scenario_tells_what_a_live_flight_needs(self):
-        """deploy/fly's operator gives what the one in lockstep does, processes fail when they do there, and it
-        says which faults it leaves out."""
+        """deploy/fly's operator gives what the one in lockstep does, and processes fail when they do there."""
         scenario = self.folder / "told.yaml"
         scenario.write_text(pathlib.Path(SCENARIO).read_text(encoding="utf-8").replace("duration_s: 60", "duration_s: 12") + """
 commands: [{command: select, at_px: [180, 119.5], at_s: -2}, {command: hold, at_s: 3}, {command: kill, at_s: 4.5}]
@@ -200,7 +200,6 @@ faults: [{name: lidar-gap}, {name: kill-planning, at: 5}, {name: delay-PLAN}, {n
         answer = subprocess.run([BIN / "chase-scenario", scenario], capture_output=True, text=True, check=True, timeout=LIMIT)
         told = json.loads(answer.stdout)
         self.assertEqual((told["duration_s"], told["settle_s"]), (12.0, 8.0))
-        self.assertEqual(told["left_out_live"], [])
         kill, delay, loss, freeze, flood, load = told["faults"]
         self.assertEqual(kill, {"name": "kill-planning", "at_s": 5.0, "for_s": 0.5})
         self.assertEqual([(f["name"], f["for_s"], f["bus"]) for f in (delay, loss)],

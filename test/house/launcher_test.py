@@ -503,12 +503,28 @@ class FlightTest(unittest.TestCase):
         code, err, _ = self.give([("hold", 0.5), ("land", 1.9)], 1)
         self.assertEqual((code, err), (1, "deploy/fly: the mission ended before the land@1.9\n"))
 
-    def test_a_full_disk_is_left_out_and_named(self):
-        told = json.dumps({"duration_s": 2, "settle_s": 1, "left_out_live": ["disk-full"]})
+    def test_a_full_disk_is_the_recorders_alone_and_for_good(self):
+        told = json.dumps({"duration_s": 2, "settle_s": 1, "faults": [{"name": "disk-full", "at_s": 0.4, "for_s": None}]})
         self.program("chase-scenario", f"print({told!r})")
+        self.program("chase-flight-monitor", f"""
+            import json, os, pathlib, signal, sys, time
+            def say(t, done=False):
+                print(json.dumps(dict(mission_time=t, duration=2, distance=2.5, visible=1.0, rtf=1.0, done=done)), flush=True)
+            def limited():
+                siblings = pathlib.Path("/proc/%d/task/%d/children" % (os.getppid(), os.getppid())).read_text().split()
+                full = [pid for pid in siblings if "Max file size             0 " in pathlib.Path("/proc/%s/limits" % pid).read_text()]
+                return ["chase-recorder" in pathlib.Path("/proc/%s/cmdline" % pid).read_text() for pid in full]
+            say(0.4)
+            found = [sys.stdin.readline(), limited()]  # the log has it before the disk is full
+            time.sleep(1)
+            pathlib.Path({str(self.bin / "told")!r}).write_text(json.dumps([*found, limited()]))
+            say(2, done=True)
+            signal.pause()
+            """)
         code, _, err = self.fly()
         self.assertEqual(code, 0, err)
-        self.assertRegex(err, r"^warning: disk-full is left out of a live flight; it strikes where the disk under \S+/logs is full\n$")
+        self.assertEqual(json.loads((self.bin / "told").read_text(encoding="utf-8")), ["+disk-full\n", [], [True]])
+        self.assertRegex(err, r"^\nt +0\.\d s: disk-full begins\n$")
 
     def heard_of_bus_faults(self, *faults):
         """Which programs of a flight with these faults have the variable, and which have not; the flight."""
