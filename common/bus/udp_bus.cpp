@@ -133,7 +133,9 @@ void UdpBus::ForwardEvery(const lcm::ReceiveBuffer* buffer, const std::string& c
   const auto size = bus->Opened(name, data, buffer->data_size, &bus->every_heard_[name]);
   if (!size) return;
   bus->CountAny(name, data, *size);
-  bus->Guarded(channel, [&] { bus->every_(channel, bus->Now() - waited, data, *size); });
+  // Where the wall clock was set since it came it seems to have waited for as long.
+  bus->every_arrived_ = std::max(bus->every_arrived_, bus->Now() - waited);
+  bus->Guarded(channel, [&] { bus->every_(channel, bus->every_arrived_, data, *size); });
 }
 
 void UdpBus::PublishRaw(const std::string& channel, Bytes bytes) {

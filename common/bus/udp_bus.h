@@ -71,6 +71,7 @@ class UdpBus : public Bus {
   std::multimap<int64_t, Delayed> delayed_;  // by the time at which it is handed over, us
   EveryHandler every_;
   std::map<std::string, Heard> every_heard_;  // by channel
+  int64_t every_arrived_ = 0;                 // the newest of them, us
 };
 
 }  // namespace chase::bus

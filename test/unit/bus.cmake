@@ -13,6 +13,15 @@ add_test(NAME bus_live_faults
   WORKING_DIRECTORY ${CMAKE_SOURCE_DIR})
 set_tests_properties(bus_live_faults PROPERTIES TIMEOUT 120 SKIP_RETURN_CODE 77)
 
+# Steps of the host's wall clock: linked into a test, and preloaded into a live flight's processes.
+chase_program(bus_clock_step_test ${CMAKE_CURRENT_LIST_DIR}/bus_clock_step_test.cpp ${CMAKE_SOURCE_DIR}/test/flight/wall_clock.cpp)
+target_link_libraries(bus_clock_step_test PRIVATE bus test_main)
+set_target_properties(bus_clock_step_test PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/test)
+add_test(NAME bus_clock_step
+  COMMAND ${CMAKE_SOURCE_DIR}/test/flight/in_namespace.sh $<TARGET_FILE:bus_clock_step_test>
+  WORKING_DIRECTORY ${CMAKE_SOURCE_DIR})
+set_tests_properties(bus_clock_step PROPERTIES TIMEOUT 120 SKIP_RETURN_CODE 77)
+
 if(TARGET chase-prediction)
   chase_script_test(bus_loopback ${CMAKE_CURRENT_LIST_DIR}/bus_loopback_test.py ${CMAKE_BINARY_DIR}/bin
     BEFORE ${CMAKE_SOURCE_DIR}/test/flight/in_namespace.sh)
