@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <cstdlib>
+
 #include "common/bus/convert.h"
 #include "common/bus/host_clock.h"
 #include "services/lidar/convert.h"
@@ -10,9 +12,12 @@ namespace chase::lidar {
 namespace {
 
 constexpr int64_t kOldest = 1'000'000;  // us that a packet may wait in the socket
+constexpr int64_t kSet = 1000;          // us: by more than what NTP slews it within a tick
 constexpr double kSilent = 0.2;         // s without a packet: 150 are missing
 constexpr double kPatience = 2.0;       // s without one since the start
 constexpr double kFlawed = 5.0;         // s after a loss in which the sensor is called degraded
+
+int64_t WallAhead() { return bus::WallMicroseconds() - bus::SteadyMicroseconds(); }
 
 }  // namespace
 
@@ -46,6 +51,7 @@ void LidarNode::TickDevice() {
     }
     Take(*packet);
   }
+  wall_ahead_ = WallAhead();
   const long flaws = assembler_.lost() + assembler_.malformed();
   if (flaws != flaws_) flawed_ = bus_.Now();
   flaws_ = flaws;
@@ -63,10 +69,13 @@ int64_t LidarNode::SweepTime(int64_t device_us) {
   return utc ? now - (wall - *utc) : aligned;
 }
 
-/// On the bus's clock, which the wall clock may have left since.
+/// On the bus's clock, which the wall clock may have left since. Where that was set while packets
+/// waited, they may be stamped by what it was before.
 int64_t LidarNode::Arrival(const RawPacket& packet) const {
+  const bool is_set = wall_ahead_ && std::abs(WallAhead() - *wall_ahead_) > kSet;
   const int64_t age = bus::WallMicroseconds() - packet.capture_utime;
-  return bus_.Now() - (packet.capture_utime > 0 && age >= 0 && age < kOldest ? age : 0);
+  const bool is_known = packet.capture_utime > 0 && age >= 0 && age < kOldest && !is_set;
+  return bus_.Now() - (is_known ? age : 0);
 }
 
 /// s since the last packet that is one, or since the start.

@@ -45,6 +45,7 @@ class LidarNode : public bus::Node {
   // us; chosen, not measured: above what delays on a wire vary by, as fcu's ClockSync has it.
   static constexpr int64_t kLate = 20'000;
   math::ClockAlignment alignment_{kLate};
+  std::optional<int64_t> wall_ahead_;  // of the steady clock when the last tick ended, us
   std::optional<RawPacket> next_;
   std::optional<int64_t> first_tick_, first_device_us_;
   int64_t heard_ = 0;   // when the last packet came that is one, bus's clock; 0: none yet

@@ -9,8 +9,10 @@
 #include <fstream>
 
 #include "chase/lidar_scan_t.hpp"
+#include "common/bus/host_clock.h"
 #include "common/bus/lockstep.h"
 #include "lidar_packets.h"
+#include "test/flight/wall_clock.h"
 
 namespace chase::lidar {
 namespace {
@@ -102,6 +104,12 @@ class Live {
       node_ = made.get();
       return made;
     });
+    lockstep_.SetTap([&](int64_t, const std::string& channel, const bus::Bus::Bytes& bytes) {
+      lidar_scan_t scan;
+      if (channel == "LIDAR_SCAN" &&
+          scan.decode(bytes.data(), 0, static_cast<int>(bytes.size())) > 0)
+        stamps.push_back(scan.utime);
+    });
   }
   ~Live() { close(socket_); }
   template <class Bytes>
@@ -109,17 +117,19 @@ class Live {
     sendto(socket_, bytes.data(), bytes.size(), 0, reinterpret_cast<sockaddr*>(&to_), sizeof to_);
   }
   void Run(int64_t us) { lockstep_.RunUntil(now_ += us); }
-  /// 10 ms of packets.
-  void Sweep(uint8_t product = 0x22) {
+  /// 10 ms of packets. The wall clock is set by `step`, us, while they wait.
+  void Sweep(uint8_t product = 0x22, int64_t step = 0) {
     for (int i = 0; i < 8; ++i) {
       auto bytes = testing::StreamPacket(packets_++, 150.0, 777000);
       bytes[1205] = product;
       Send(bytes);
     }
+    if (step != 0) *ChaseClockSteps() = {bus::WallMicroseconds(), step};
     Run(10'000);
   }
   bus::NodeReport report() const { return node_->Report(); }
   bus::NodeReport::State state() const { return report().state; }
+  std::vector<int64_t> stamps;  ///< of all sweeps, us
 
  private:
   int socket_;
@@ -160,6 +170,17 @@ TEST(LidarNode, BytesThatAreNoPacketKeepNoSensorAlive) {
     live.Run(10'000);
   }
   EXPECT_EQ(live.state(), bus::NodeReport::State::kFailed);
+}
+
+TEST(LidarNode, SweepsGoOnAtTheirPaceWhereTheWallClockIsSet) {
+  for (const int64_t step : {400'000, -400'000, 5'000'000, -5'000'000}) {
+    Live live;
+    for (int i = 0; i < 80; ++i) live.Sweep(0x22, i == 40 ? step : 0);
+    ASSERT_GE(live.stamps.size(), 7u);
+    for (size_t i = 1; i < live.stamps.size(); ++i)
+      EXPECT_NEAR(static_cast<double>(live.stamps[i] - live.stamps[i - 1]), 1e5, 2e4) << step;
+    *ChaseClockSteps() = {};
+  }
 }
 
 }  // namespace
