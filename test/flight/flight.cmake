@@ -69,6 +69,15 @@ if(TARGET simulator_hardware)
   set_tests_properties(flight_hardware PROPERTIES TIMEOUT 300 RUN_SERIAL TRUE)
 endif()
 
+# Its host's wall clock is set, and its disk fills up.
+if(TARGET simulator_hardware)
+  add_library(wall_clock MODULE ${CMAKE_CURRENT_LIST_DIR}/wall_clock.cpp)
+  target_include_directories(wall_clock PRIVATE ${CMAKE_SOURCE_DIR})  # without sanitizers: not only our programs load it
+  chase_script_test(flight_live_host ${CMAKE_CURRENT_LIST_DIR}/live_host_test.py ${bin} $<TARGET_FILE:wall_clock>
+    BEFORE ${CMAKE_SOURCE_DIR}/test/flight/in_namespace.sh)
+  set_tests_properties(flight_live_host PROPERTIES TIMEOUT 300 RUN_SERIAL TRUE)
+endif()
+
 # One process dies in it and comes back; every one at three times: test/flight/live_kills.
 add_test(NAME flight_live_kill
   COMMAND ${CMAKE_SOURCE_DIR}/test/flight/live_kills --at 20 planning
