@@ -78,7 +78,8 @@ int Compare(const std::vector<std::string>& logs, const std::string& out) {
     flights.push_back(ReportFlight(log, {truth, !out.empty(), ""}));
     code = std::max(code, Judge(flights.back()));
   }
-  const auto figures = CompareMetrics(flights[0].metrics, flights[1].metrics, kTolerance);
+  const auto figures =
+      CompareMetrics(KnownMetrics(flights[0]), KnownMetrics(flights[1]), kTolerance);
   const std::string table =
       "A: " + Heading(flights[0]) + "B: " + Heading(flights[1]) + Format(figures);
   std::printf("%s", table.c_str());

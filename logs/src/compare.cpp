@@ -52,7 +52,9 @@ std::vector<ComparedFigure> CompareMetrics(const std::string& a, const std::stri
     if (shown.better)
       figures.push_back(Figure(shown, At(before, shown.key), At(after, shown.key), tolerance));
   std::map<std::string, std::pair<std::string, std::string>> criteria;
-  const auto word = [](const Json& passed) { return passed.get<bool>() ? "passed" : "FAILED"; };
+  const auto word = [](const Json& passed) {
+    return passed.is_null() ? "not known" : passed.get<bool>() ? "passed" : "FAILED";
+  };
   const Json held_before = At(before, "criteria"), held_after = At(after, "criteria");
   for (const auto& [name, passed] : held_before.items()) criteria[name].first = word(passed);
   for (const auto& [name, passed] : held_after.items()) criteria[name].second = word(passed);

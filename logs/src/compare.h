@@ -13,8 +13,8 @@ struct ComparedFigure {
 
 /// The figures of two flights' metrics.json that have a better side, and the criteria. A figure is
 /// worse where it has moved to its worse side by more than `tolerance` of the larger of the two and
-/// by more than half of the last digit that is shown; a criterion where it held and does not any
-/// more.
+/// by more than half of the last digit that is shown; a criterion, null where it is not known,
+/// where it held and does not any more.
 std::vector<ComparedFigure> CompareMetrics(const std::string& a, const std::string& b,
                                            double tolerance);
 

@@ -137,6 +137,14 @@ ReportedFlight ReportFlight(const std::string& log, const ReportOptions& options
   return options.truth ? ByTruth(log, options) : ByVehicle(log, options);
 }
 
+std::string KnownMetrics(const ReportedFlight& flight) {
+  Json metrics = flight.page["metrics"];
+  if (metrics.contains("criteria"))
+    for (const auto& criterion : metrics["criteria"].items())
+      if (!Known(flight, criterion.key())) criterion.value() = nullptr;
+  return metrics.dump();
+}
+
 std::string Heading(const ReportedFlight& flight) {
   const Json& metrics = flight.page["metrics"];
   const auto software = metrics["software"].get<std::map<std::string, TextByProcess>>();

@@ -23,6 +23,9 @@ struct ReportOptions {
 /// Throws std::runtime_error with one line when the log holds nothing to report.
 ReportedFlight ReportFlight(const std::string& log, const ReportOptions& options);
 
+/// Its metrics with null in place of criteria that nobody can judge, as CompareMetrics takes them.
+std::string KnownMetrics(const ReportedFlight& flight);
+
 /// Which flight it is, and of which software: log, scenario and seed, how much was flown, versions,
 /// configurations; what its log lost. Lines for people.
 std::string Heading(const ReportedFlight& flight);

@@ -447,6 +447,21 @@ TEST(Compare, FlightsWithoutTruthByWhatTheySaid) {
                                                 {"latency_ms.POSE.p99", false}}));
 }
 
+TEST(Compare, CriteriaThatNobodyCanJudgeAreNotKnown) {
+  const std::string log = Fresh("climb") + "/flight.lcm";
+  OutputLog out(log);
+  scenario_t scenario{};
+  scenario.yaml = kYaml;
+  out.Write(1, "SCENARIO", scenario);
+  WriteTruth(&out, 500000);  // before the mission
+  out.Close();
+  const std::string metrics = KnownMetrics(ReportFlight(log, {true, false, ""}));
+  std::map<std::string, std::string> told;
+  for (const auto& f : CompareMetrics(metrics, metrics, 0.01)) told[f.key] = f.a + "/" + f.b;
+  EXPECT_EQ(told.at("criteria.complete"), "not known/not known");
+  EXPECT_EQ(told.at("criteria.recorded"), "passed/passed");
+}
+
 TEST(Compare, FiguresHaveTheDigitsOfTheReportAndLessThanHalfOfOneIsNotWorse) {
   const auto compared = [](double a, double b) {
     const auto json = [](double ate) {
