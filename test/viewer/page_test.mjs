@@ -109,11 +109,13 @@ assert.ok(idle.states >= 5, `${idle.states} states`);
 assert.deepStrictEqual([idle.changes, idle.frames, idle.lines], [[], 0, 0]);
 await toggle();
 const running = await page.evaluate(async () => {
-  const {counts} = window.chase, before = counts.lines;
-  await new Promise((done) => setTimeout(done, 2000));
-  return counts.lines - before;
+  const {counts} = window.chase, before = counts.lines, places = new Set();
+  for (const end = performance.now() + 2000; performance.now() < end; await new Promise((done) => setTimeout(done, 20)))
+    places.add(document.getElementById('scrubber').value);
+  return {lines: counts.lines - before, places: places.size};
 });
-assert.ok(running >= 2 && running <= 9, `${running} times in 2 s`);
+assert.ok(running.lines >= 2 && running.lines <= 9, `${running.lines} times in 2 s`);
+assert.ok(running.places <= running.lines + 1, `the scrubber is at ${running.places} places, the lines at ${running.lines}`);
 
 // A process's row stays where it is while its figures change.
 await page.click('#health details summary');
@@ -140,6 +142,21 @@ await late.goto(viewer.url);
 await late.waitForFunction(() => window.chase?.model.state);
 await shown(() => late.evaluate(() => ({points: window.chase.scene.points, obstacles: window.chase.scene.shown.solids})), 'on a page that comes late');
 await late.close();
+// The same time is at the same place on the scrubber and on what is below it.
+const played = () => page.evaluate(() => window.chase.model.play.t);
+const {left, width} = await page.evaluate(() => { const {left, width} = document.getElementById('timeline').getBoundingClientRect(); return {left, width}; });
+for (const share of [0.1, 0.5, 0.9]) {
+  const clicked = async (id) => {
+    const box = await (await page.$(id)).boundingBox(), before = await played();
+    await page.mouse.click(left + share * width, box.y + box.height / 2);
+    await until('a seek', async () => await played() !== before);
+    return played();
+  };
+  const scrubbed = await clicked('#scrubber');
+  await seek(0);
+  const drawn = await clicked('#timeline');
+  assert.ok(Math.abs(scrubbed - drawn) < 0.05 + 2 * duration / width, `${scrubbed} s on the scrubber, ${drawn} s on the time line`);
+}
 await page.selectOption('#speed', '10');
 await seek(0);
 await toggle();

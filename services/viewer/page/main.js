@@ -62,7 +62,6 @@ function showPlayer(play) {
   page.player.hidden = false;
   setText(page.playbutton, play.playing ? '\u2759\u2759' : '\u25b6');
   if (Number(page.scrubber.max) !== play.duration) page.scrubber.max = play.duration;
-  if (!model.seeking) page.scrubber.value = play.t;
   if (document.activeElement !== page.speed) page.speed.value = String(play.speed);
 }
 
@@ -72,6 +71,7 @@ function drawLines() {
   model.lines = false;
   window.chase.counts.lines++;
   const [from, to] = span();
+  if (model.play && !model.seeking) page.scrubber.value = now();
   drawTimeline(page.timeline, model.rows, from, to, now());
   drawStrips(page.strips, model.rows, from, to, now());
 }
