@@ -22,9 +22,7 @@ namespace {
 
 constexpr double kTolerableShare = 0.01;                     // of messages: see LogInfo::Recorded
 constexpr int64_t kGapPeriods = 10, kShortestGap = 100'000;  // us; a shorter gap is not told
-constexpr size_t kFewest = 20;                               // of a channel to have a period
-constexpr int64_t kStepAhead = 2'000'000, kStepBack = 300'000;  // us, at least, of a clock
-constexpr int64_t kYear2000 = 946684800LL * 1000000;            // us; before it: logical time
+constexpr int64_t kYear2000 = 946684800LL * 1000000;         // us; before it: logical time
 
 double Seconds(int64_t utime) { return static_cast<double>(utime) * 1e-6; }
 
@@ -41,12 +39,6 @@ std::string Line(const ChannelInfo& c) {
                      c.channel, c.type.empty() ? "-" : c.type, c.count, c.RateHz(), c.bytes,
                      Seconds(c.first_utime), Seconds(c.last_utime),
                      c.senders.empty() ? "-" : std::to_string(c.missing), Seconds(c.longest_gap));
-}
-
-int64_t Median(std::vector<int64_t> values) {
-  const auto middle = values.begin() + static_cast<long>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 /// Processes of the same value in one place.
@@ -158,8 +150,8 @@ std::vector<std::string> LogInfo::Losses() const {
           c.channel, Seconds(c.longest_gap), Seconds(c.gap_begins), Seconds(c.period)));
   }
   for (const ClockStep& step : clock_steps)
-    lines.push_back(
-        fmt::format("clock stepped by {:+.1f} s at {:.1f} s", Seconds(step.by), Seconds(step.at)));
+    lines.push_back(fmt::format("clock stepped by {:+.1f} s at {:.1f} s of the log",
+                                Seconds(step.by), Seconds(step.at)));
   for (const auto& [process, count] : restarts)
     lines.push_back(fmt::format("{}: started anew, {}", process,
                                 count == 1 ? "once" : fmt::format("{} times", count)));
@@ -167,28 +159,10 @@ std::vector<std::string> LogInfo::Losses() const {
   return lines;
 }
 
-/// The stamp as if nobody had set the clock. A step it is, and no pause of the log, where a channel
-/// goes on with its next number though ten of its periods have passed, or none.
-int64_t LogSurvey::Settled(const LogEvent& e, const Channel& channel) {
-  const int64_t utime = e.utime - stepped_, by = utime - previous_.value_or(utime);
-  if (by <= kStepAhead && by >= -kStepBack) return *(previous_ = utime);
-  const auto head = bus::HeadOf(e.bytes.data(), e.bytes.size());
-  if (!head || channel.periods.size() < kFewest) return *(previous_ = utime);
-  const auto sender = channel.senders.find({head->sender, head->vehicle, head->sender_start});
-  const bool next =
-      sender != channel.senders.end() && head->seq == int64_t{sender->second.second.last()} + 1;
-  const int64_t since = utime - channel.previous;
-  if (!next || (since >= 0 && since / kGapPeriods < Median(channel.periods)))
-    return *(previous_ = utime);
-  info_.clock_steps.push_back({by, *previous_ - first_utime_});
-  stepped_ += by;
-  return *previous_;
-}
-
 void LogSurvey::Add(const LogEvent& e) {
   Channel& channel = channels_[e.channel];
   ChannelInfo& c = channel.info;
-  const int64_t utime = Settled(e, channel);
+  const int64_t utime = clock_.Add(e);
   if (c.count++ == 0) {
     c.channel = e.channel;
     c.first_utime = c.last_utime = channel.previous = utime;
@@ -199,7 +173,6 @@ void LogSurvey::Add(const LogEvent& e) {
   c.first_utime = std::min(c.first_utime, utime);  // live logs may step back by a millisecond
   c.last_utime = std::max(c.last_utime, utime);
   NoteGap(utime, &channel);
-  if (c.count > 1) channel.periods.push_back(utime - channel.previous);
   channel.previous = utime;
   if (IsUnreadable(e)) return void(++c.unreadable);
   const std::string type = TypeOf(e.bytes);
@@ -258,7 +231,7 @@ void LogSurvey::Settle(Channel* channel) const {
   const auto heard = heard_.find(info.channel);
   const bool told = heard != heard_.end() && channel->senders.size() == 1;
   if (info.count > 1) NoteGap(last_utime_, channel);
-  if (channel->periods.size() >= kFewest) info.period = Median(channel->periods);
+  info.period = clock_.Period(info.channel);
   for (const auto& [key, value] : channel->senders) {
     const auto& [name, vehicle, start] = key;
     const auto& [count, seqs] = value;
@@ -293,6 +266,7 @@ LogInfo LogSurvey::Take(const LogReader& log) {
   AddUnrecorded(&info_);
   std::sort(info_.channels.begin(), info_.channels.end(),
             [](const ChannelInfo& a, const ChannelInfo& b) { return a.channel < b.channel; });
+  info_.clock_steps = clock_.steps();
   info_.file = log.file();
   info_.bytes = log.size();
   info_.damage = log.damage();

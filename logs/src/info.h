@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "common/logs/log_clock.h"
 #include "common/logs/log_reader.h"
 
 namespace chase::logs {
@@ -32,12 +33,6 @@ struct ChannelInfo {
   /// Messages a second between the first and the last; 0 for a single one.
   double RateHz() const;
   double MissingShare() const;
-};
-
-/// Somebody set the clock that the log is stamped by: what follows is `by` later, microseconds.
-struct ClockStep {
-  int64_t by = 0;
-  int64_t at = 0;  ///< after the log's first event
 };
 
 using TextByProcess = std::map<std::string, std::string>;

@@ -2,13 +2,13 @@
 
 #include <cstdint>
 #include <map>
-#include <optional>
 #include <set>
 #include <string>
 #include <tuple>
 #include <utility>
 #include <vector>
 
+#include "common/logs/log_clock.h"
 #include "common/logs/log_reader.h"
 #include "logs/src/info.h"
 #include "logs/src/seq_count.h"
@@ -21,20 +21,17 @@ class LogSurvey {
   void Add(const LogEvent& event);
   /// `log` has been read to its end.
   LogInfo Take(const LogReader& log);
-  /// By how much the clock was set so far, microseconds.
-  int64_t stepped() const { return stepped_; }
+  const LogClock& clock() const { return clock_; }
 
  private:
   struct Channel {
     ChannelInfo info;
     int64_t previous = 0;
-    std::vector<int64_t> periods;  ///< between two events, microseconds
     std::map<std::tuple<std::string, std::string, int64_t>, std::pair<long, SeqCount>> senders;
   };
   struct Heard {
     int32_t first, last;
   };
-  int64_t Settled(const LogEvent& event, const Channel& channel);
   void AddHead(const LogEvent& event, Channel* channel);
   void AddContent(const LogEvent& event, const std::string& type);
   void NoteGap(int64_t until, Channel* channel) const;
@@ -42,8 +39,7 @@ class LogSurvey {
   void AddUnrecorded(LogInfo* info) const;
 
   int64_t first_utime_ = INT64_MAX, last_utime_ = INT64_MIN;
-  std::optional<int64_t> previous_;  ///< stamp of the event before, settled
-  int64_t stepped_ = 0;
+  LogClock clock_;
   std::map<std::string, Channel> channels_;
   std::map<std::string, Heard> heard_;               ///< lowest and highest `seq` that others heard
   std::map<std::string, std::set<int64_t>> starts_;  ///< of processes, by name

@@ -84,12 +84,11 @@ Json Quantiles(std::vector<double> values) {
 
 class Gatherer {
  public:
-  explicit Gatherer(std::optional<int64_t> origin) : origin_(origin) {}
+  /// `clock`: of the events, which it takes first.
+  Gatherer(const LogClock& clock, std::optional<int64_t> origin) : clock_(clock), origin_(origin) {}
 
-  /// `stepped`: by how much the clock was set so far, us.
-  void Add(const LogEvent& e, int64_t stepped) {
-    if (stepped != stepped_) before_ = std::exchange(stepped_, stepped);
-    heard_ = e.utime - stepped;
+  void Add(const LogEvent& e) {
+    heard_ = clock_.now();
     if (first_event_ == 0) first_event_ = heard_;
     last_event_ = std::max(last_event_, heard_);
     if (follows_ || !IsOn(e, "LIDAR_SCAN")) sweeps_.Add(last_event_, e);
@@ -151,11 +150,8 @@ class Gatherer {
     handle(m);
   }
   double Time(int64_t utime) const { return bus::Seconds(utime, Origin(utime)); }
-  /// Of stamps like that one: what was sent before the clock was set may be logged after it.
-  int64_t Origin(int64_t utime) const {
-    const auto age = [&](int64_t stepped) { return std::abs(heard_ + stepped - utime); };
-    return *origin_ + (age(stepped_) <= age(before_) ? stepped_ : before_);
-  }
+  /// Of stamps like that one.
+  int64_t Origin(int64_t utime) const { return *origin_ + clock_.SetBy(utime); }
 
   void OnPose(const pose_t& m) {
     const double t = Time(m.utime);
@@ -306,9 +302,9 @@ class Gatherer {
     health_.AddTo("pose", &j["spans"]);
   }
 
+  const LogClock& clock_;
   std::optional<int64_t> origin_;
   int64_t first_event_ = 0, last_event_ = 0, heard_ = 0;  // by the log's stamps, settled, us
-  int64_t stepped_ = 0, before_ = 0;                      // the clock, in all; by the step before
   SweepLatency sweeps_;  // of those while control follows a plan or its stop
   bool follows_ = false;
   std::set<std::string> vehicles_;
@@ -350,11 +346,11 @@ std::string LacksOfTruth(const std::string& log) {
 
 VehicleReport ReportVehicle(const std::string& log, std::optional<int64_t> origin) {
   LogReader reader(log);
-  Gatherer gatherer(origin);
   LogSurvey survey;
+  Gatherer gatherer(survey.clock(), origin);
   for (LogEvent e; reader.Next(&e);) {
     survey.Add(e);
-    gatherer.Add(e, survey.stepped());
+    gatherer.Add(e);
   }
   const LogInfo info = survey.Take(reader);
   info.RequireOneVehicle();

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <cstdlib>
 #include <map>
 #include <numeric>
 #include <optional>
@@ -211,15 +212,34 @@ TEST(LogInfo, AClockThatWasSetIsToldAndDoesNotCount) {
   for (const int64_t by : std::vector<int64_t>{3'600'000'000, -3'600'000'000, -1'000'000}) {
     const LogInfo info = WithStep(by, 0);
     ASSERT_EQ(info.Losses().size(), 1u);
-    EXPECT_EQ(info.Losses()[0], by > 0             ? "clock stepped by +3600.0 s at 2.5 s"
-                                : by < -10'000'000 ? "clock stepped by -3600.0 s at 2.5 s"
-                                                   : "clock stepped by -1.0 s at 2.5 s");
+    EXPECT_EQ(info.Losses()[0], by > 0 ? "clock stepped by +3600.0 s at 2.5 s of the log"
+                                : by < -10'000'000
+                                    ? "clock stepped by -3600.0 s at 2.5 s of the log"
+                                    : "clock stepped by -1.0 s at 2.5 s of the log");
     EXPECT_NEAR(info.channels.at(0).RateHz(), 200.0, 0.3);
     EXPECT_LE(info.channels.at(0).longest_gap, 5000);
     EXPECT_NE(Format(info).find("5.0 s of logical time"), std::string::npos) << Format(info);
   }
   EXPECT_EQ(WithStep(3'600'000'000, 9).clock_steps.size(), 0u) << "a pause of the log";
   EXPECT_EQ(WithStep(-2000, 0).clock_steps.size(), 0u) << "stamps go back by a little";
+}
+
+TEST(LogInfo, AClockThatWasSetIsToldThoughARareChannelComesFirst) {
+  for (const int64_t by : {5'000'000, -5'000'000}) {
+    const std::string file = Temp("rare.lcm");
+    bus::LogWriter out(file);
+    for (int k = 0; k < 1000; ++k) {
+      const int64_t utime = 7'000'000'000 + 5000 * k + (k < 600 ? 0 : by);
+      if (k % 200 == 0) out.Write(utime, "GYRO", Encoded(testing::Imu(k / 200 + 1)));
+      out.Write(utime, "IMU", Encoded(testing::Imu(k)));
+    }
+    out.Close();
+    const LogInfo info = Describe(file);
+    ASSERT_EQ(info.clock_steps.size(), 1u);
+    EXPECT_LE(std::abs(info.clock_steps[0].by - by), 5000);
+    EXPECT_NEAR(info.channels.at(1).RateHz(), 200.0, 0.3);
+    EXPECT_LE(info.channels.at(0).last_utime, info.channels.at(1).last_utime);
+  }
 }
 
 TEST(LogInfo, ALogCutOffAnywhereIsReadAsFarAsItGoes) {
