@@ -8,6 +8,7 @@
 #include "chase/target_t.hpp"
 #include "common/bus/convert.h"
 #include "common/logs/jpeg.h"
+#include "common/logs/log_clock.h"
 #include "logs/src/good_message.h"
 #include "logs/src/output.h"
 
@@ -44,6 +45,7 @@ class ImageFinder {
       : origin_(origin), moments_(moments) {}
 
   void Add(const LogEvent& e) {
+    clock_.Add(e);
     AddImage(e);
     AddTarget(e);
   }
@@ -54,7 +56,7 @@ class ImageFinder {
     if (next_ == moments_.size()) return;
     camera_image_t m;
     if (!Good(e, "CAMERA_IMAGE", &m)) return;
-    const double t = bus::Seconds(m.utime, origin_);
+    const double t = bus::Seconds(clock_.Settled(m.utime), origin_);
     while (next_ < moments_.size() && t > moments_[next_].t + kLongest) ++next_;
     if (next_ == moments_.size() || t < moments_[next_].t) return;
     const std::string jpeg = Jpeg(m, kQuality);
@@ -79,6 +81,7 @@ class ImageFinder {
     if (m.box_px[2] > 0.0) moment["box"] = m.box_px;
   }
 
+  LogClock clock_;
   int64_t origin_;
   const std::vector<Moment>& moments_;
   size_t next_ = 0;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <optional>
 #include <stdexcept>
+#include <type_traits>
 #include <utility>
 
 #include "chase/attitude_setpoint_t.hpp"
@@ -35,29 +36,33 @@ double Yaw(const double (&q)[4]) {
 /// Gathers messages as they are; times are settled at the end, when the mission's start is known.
 class Gatherer {
  public:
+  /// `clock`: of the events, which it takes first.
+  explicit Gatherer(const LogClock& clock) : clock_(clock) {}
+
   void Add(const LogEvent& e) {
     if (Take(e, "TRUTH", &truth_)) {
-      if (!first_event_) first_event_ = e.utime;
-      last_event_ = e.utime;
+      if (!first_event_) first_event_ = clock_.now();
+      last_event_ = clock_.now();
     }
     Hear(e, "POSE", &poses_);
     Hear(e, "TARGET", &targets_);
     Hear(e, "PREDICTION", &predictions_);
-    if (Take(e, "PLAN", &plans_)) plans_heard_.push_back(Heard(e));
+    if (Take(e, "PLAN", &plans_)) plans_heard_.push_back(Heard());
     Take(e, "FAULT", &faults_);
     Hear(e, "FLIGHT_STATE", &states_);
-    if (Take(e, "TRACKING", &tracking_)) tracking_heard_.push_back(Heard(e));
+    if (Take(e, "TRACKING", &tracking_)) tracking_heard_.push_back(Heard());
     for (const char* list : {"OBSTACLES", "UNSEEN"})
       if (obstacles_t message; Good(e, list, &message))
-        heard_[list].emplace_back(Heard(e), message.utime);
+        heard_[list].emplace_back(Heard(), clock_.Settled(message.utime));
     AddSetpoint(e);
-    sweeps_.Add(Heard(e), e);
+    sweeps_.Add(Heard(), e);
     TakeLast(e, "SCENARIO", &scenario_);
     TakeLast(e, "OBSTACLES", &obstacles_);
     status_t status;
     if (!Good(e, "_STATUS", &status)) return;
     statuses_[status.name] = status;
     if (status.rss_mb > 0.0) memory_[status.name].push_back({status.uptime, status.rss_mb});
+    Settle(&status);
     if (status.name == "fcu") autopilot_.push_back(status);
   }
 
@@ -86,21 +91,31 @@ class Gatherer {
   }
 
  private:
+  /// Its times are as if nobody had set the clock.
   template <class T>
-  static bool Take(const LogEvent& e, const std::string& name, std::vector<T>* messages) {
+  void Settle(T* m) const {
+    const int64_t by = clock_.SetBy(m->utime);
+    m->utime -= by;
+    if constexpr (std::is_same_v<T, prediction_t>) m->target.utime -= by;
+    if constexpr (std::is_same_v<T, plan_t>)
+      for (polynomial_t* p : {&m->position, &m->target, &m->stop}) p->utime -= by;
+  }
+  template <class T>
+  bool Take(const LogEvent& e, const std::string& name, std::vector<T>* messages) {
     T message;
     if (!Good(e, name, &message)) return false;
+    Settle(&message);
     messages->push_back(std::move(message));
     return true;
   }
   /// Takes what may get too old, too.
   template <class T>
   void Hear(const LogEvent& e, const std::string& name, std::vector<T>* messages) {
-    if (Take(e, name, messages)) heard_[name].emplace_back(Heard(e), messages->back().utime);
+    if (Take(e, name, messages)) heard_[name].emplace_back(Heard(), messages->back().utime);
   }
   /// By the truth's clock, which counts the flight's time however fast the log's stamps run.
-  int64_t Heard(const LogEvent& e) const {
-    return truth_.empty() ? e.utime : truth_.back().utime + e.utime - last_event_;
+  int64_t Heard() const {
+    return truth_.empty() ? clock_.now() : truth_.back().utime + clock_.now() - last_event_;
   }
   template <class T>
   static void TakeLast(const LogEvent& e, const std::string& name, std::optional<T>* message) {
@@ -113,7 +128,8 @@ class Gatherer {
     attitude_setpoint_t m;
     if (!IsOn(e, "ATTITUDE_SETPOINT") || !DecodeBytes(e.bytes, &m)) return;
     const auto finite = [](double v) { return std::isfinite(v); };
-    if (bus::Problem(m).empty()) heard_["ATTITUDE_SETPOINT"].emplace_back(Heard(e), m.utime);
+    if (bus::Problem(m).empty())
+      heard_["ATTITUDE_SETPOINT"].emplace_back(Heard(), clock_.Settled(m.utime));
     nonfinite_setpoints_ += !std::all_of(m.orientation, m.orientation + 4, finite) ||
                             !std::all_of(m.body_rate, m.body_rate + 3, finite) || !finite(m.thrust);
   }
@@ -218,6 +234,7 @@ class Gatherer {
     if (logged > 0.0) record->real_time_factor = logical / logged;
   }
 
+  const LogClock& clock_;
   int64_t origin_ = 0;
   std::optional<int64_t> first_event_;
   int64_t last_event_ = 0;
@@ -273,11 +290,11 @@ std::vector<PerceivedObstacle> PerceivedIn(const obstacles_t& m) {
 
 FlightRecord ReadFlight(const std::string& log) {
   LogReader reader(log);
-  Gatherer gatherer;
   LogSurvey survey;
+  Gatherer gatherer(survey.clock());
   for (LogEvent e; reader.Next(&e);) {
-    gatherer.Add(e);
     survey.Add(e);
+    gatherer.Add(e);
   }
   LogInfo info = survey.Take(reader);
   info.RequireOneVehicle();

@@ -7,6 +7,7 @@
 
 #include "common/bus/channels.h"
 #include "common/bus/stamp_order.h"
+#include "common/logs/log_clock.h"
 
 namespace chase::viewer {
 namespace {
@@ -18,13 +19,15 @@ constexpr int64_t kJump = 100000;       // us that a jump lasts: a tick
 
 LogPlayer::LogPlayer(const std::string& file) : reader_(file) {
   std::map<std::string, size_t> numbers;
+  logs::LogClock clock;
   for (int64_t position = reader_.position(); reader_.Next(&event_);
        position = reader_.position()) {
     const auto [number, is_new] = numbers.emplace(event_.channel, channels_.size());
     if (is_new) channels_.push_back(event_.channel);
-    index_.push_back({PlayingTime(event_.utime), position, number->second});
+    index_.push_back({PlayingTime(clock.Add(event_)), position, number->second});
   }
   if (index_.empty()) throw std::runtime_error(file + ": holds no event; is it an LCM log?");
+  jumps_ += static_cast<int>(clock.steps().size());
   damage_ = reader_.damage();
   handlers_.resize(channels_.size());
   heavy_.resize(channels_.size());

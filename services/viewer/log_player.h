@@ -12,7 +12,7 @@
 namespace chase::viewer {
 
 /// A bus that hands over what a flight log holds, from any moment on. What is published is lost.
-/// Its time is the log's, but for jumps of the log's clock: each lasts one tick.
+/// Its time is the log's as if nobody had set the clock; other jumps of it last one tick each.
 class LogPlayer : public bus::Bus {
  public:
   /// Reads the whole log once to know where its events are. Throws std::runtime_error with one

@@ -119,7 +119,7 @@ void PageFeed::Take(const camera_image_t& m) {
   std::string jpeg = logs::Jpeg(m, config_.jpeg_quality);
   if (jpeg.empty()) return;
   SendImage();  // the one before
-  image_ = Image{m.utime, m.width, m.height, std::move(jpeg)};
+  image_ = Image{m.utime, bus_.Now(), m.width, m.height, std::move(jpeg)};
   if (target_utime_ >= m.utime) SendImage();
 }
 
@@ -198,7 +198,7 @@ void PageFeed::Tick(int64_t utime, const std::string& self) {
   const bool second = ticks_++ % kTicksPerSecond == 0;
   if (!play_ && second) SendHello();
   const bool paused = play_ && !play_->playing;
-  if (image_ && (paused || bus::Seconds(bus_.Now(), image_->utime) > kMostShownAge.target))
+  if (image_ && (paused || bus::Seconds(bus_.Now(), image_->heard) > kMostShownAge.target))
     SendImage();
   if (!sink_.Wanted(Part::kState)) return;
   auto timer = bus_.Time("tick");

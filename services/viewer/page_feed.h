@@ -103,7 +103,7 @@ class PageFeed {
   std::optional<health_t> mission_health_;
   std::map<Part, int64_t> sent_;  // utime of the last one
   struct Image {
-    int64_t utime;
+    int64_t utime, heard;  // its own; by the bus's clock
     int width, height;
     std::string jpeg;
   };

@@ -91,6 +91,21 @@ TEST(KeyMoments, HaveTheNextImageWithTheBoxFoundInIt) {
   std::filesystem::remove(log);
 }
 
+TEST(KeyMoments, HaveTheirImagesBehindAClockThatWasSet) {
+  const std::string log = ::testing::TempDir() + "chase_moments_set.lcm";
+  OutputLog out(log);
+  for (int i = 0; i < 40; ++i) {
+    camera_image_t image = ImageAt(i * 100'000 + (i < 30 ? 0 : 3'600'000'000));
+    image.seq = i;
+    out.Write(image.utime, "CAMERA_IMAGE", image);
+  }
+  out.Close();
+  const Json found = ImagesAt(log, 0, {{3.5, "a"}});
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_NEAR(found[0]["t"], 3.5, 0.11);
+  std::filesystem::remove(log);
+}
+
 TEST(Lane, AStretchHasTheReasonThatItBeganWith) {
   Lane lane;
   lane.Add(0.0, "CHASE");

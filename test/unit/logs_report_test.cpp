@@ -395,6 +395,34 @@ TEST(Report, AClockThatWasSetDoesNotCount) {
   }
 }
 
+TEST(Report, WithTruthAClockThatWasSetDoesNotCountEither) {
+  const auto page = [](int64_t by) {
+    const std::string log = Fresh("clock_truth") + "/flight.lcm";
+    testing::SyntheticFlight flight;
+    flight.start_utime = 7'200'000'000;
+    flight.clock_step = by;
+    testing::WriteSyntheticLog(log, kYaml, flight);
+    return ReportFlight(log, {true, true, ""}).page;
+  };
+  const auto calm = page(0);
+  for (const int64_t by : std::vector<int64_t>{3'600'000'000, -3'600'000'000, 10'000'000}) {
+    const auto set = page(by);
+    ASSERT_EQ(set["metrics"]["losses"].size(), 1u);
+    EXPECT_NE(set["metrics"]["losses"][0].dump().find("clock stepped by"), std::string::npos);
+    for (const char* key : {"flown_s", "odometry_ate_m", "target_rmse_m", "prediction_error_m",
+                            "replans", "safe_ratio", "real_time_factor"})
+      EXPECT_NEAR(set["metrics"][key], calm["metrics"][key], 0.01) << key << " " << by;
+    for (const char* key : {"distance", "clearance", "speed"}) {
+      const std::vector<double> t = set["data"][key]["t"], same = calm["data"][key]["t"];
+      ASSERT_LT(t.size() - same.size() + 2, 5u) << key << " " << by;
+      EXPECT_NEAR(t.back(), same.back(), 0.1) << key << " " << by;
+    }
+    ASSERT_EQ(set["data"]["spans"].size(), calm["data"]["spans"].size());
+    for (const char* key : {"begin", "duration"})
+      EXPECT_NEAR(set["playback"][key], calm["playback"][key], 0.02) << key << " " << by;
+  }
+}
+
 TEST(Report, WithoutTruthFiguresOfWhatIsNotThereAreNull) {
   const std::string log = Fresh("lacking") + "/flight.lcm";
   LiveLog live(log);

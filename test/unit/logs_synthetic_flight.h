@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <fstream>
+#include <map>
 #include <sstream>
 #include <string>
 
@@ -36,6 +37,7 @@ struct SyntheticFlight {
   double target_error = 0.05;   // constant offset of TARGET along y, m
   double wall_factor = 1.0;     // seconds of the log's stamps per logical second
   int64_t start_utime = 1'000'000;
+  int64_t clock_step = 0;  // by which all clocks are set at 6 s, us
 };
 
 class SyntheticLog {
@@ -69,16 +71,20 @@ class SyntheticLog {
             flight_.height};
   }
 
+  int64_t Utime(double t) const {
+    return origin_ + std::llround(t * 1e6) + (t >= 6.0 ? flight_.clock_step : 0);
+  }
+
   template <class T>
   void Put(const std::string& channel, T m, double t) {
-    m.utime = origin_ + std::llround(t * 1e6);
+    m.utime = Utime(t);
+    m.seq = seqs_[channel]++;
     const double stamp = static_cast<double>(m.utime - flight_.start_utime) * flight_.wall_factor;
     out_.Write(flight_.start_utime + std::llround(stamp), channel, m);
   }
 
   void WriteScenario(const std::string& yaml) {
     scenario_t m{};
-    m.seq = 0;
     m.seed = 7;
     m.start_utime = origin_;
     m.name = scenario_.name;
@@ -139,7 +145,7 @@ class SyntheticLog {
 
   void WritePrediction(double t) {
     prediction_t m{};
-    const int64_t utime = origin_ + std::llround(t * 1e6);
+    const int64_t utime = Utime(t);
     const V v = (Target(t) - Target(t - 0.1)) / 0.1;
     m.target = Line(utime, Target(t), Target(t) + 2.5 * v, 2.5);
     m.radius = 0.15;
@@ -149,7 +155,7 @@ class SyntheticLog {
 
   void WritePlan(double t, bool fallback) {
     plan_t m{};
-    const int64_t utime = origin_ + std::llround(t * 1e6);
+    const int64_t utime = Utime(t);
     m.verdict = fallback ? plan_t::KEPT : plan_t::CHASE;
     m.position = Line(utime, Chaser(t), Chaser(t + 2.5), 2.5);
     m.target = Line(utime, Target(t), Target(t + 2.5), 2.5);
@@ -164,7 +170,7 @@ class SyntheticLog {
       obstacle_t o{};
       o.id = m.n_obstacles++;
       const V p(c.center.x(), c.center.y(), 1.5);
-      o.center = Line(origin_ + std::llround(t * 1e6), p, p, 1.0);
+      o.center = Line(Utime(t), p, p, 1.0);
       const double r = 1.0 / (1.3 * c.radius * 1.3 * c.radius);
       const double shape[6] = {r, 0, 0, r, 0, 0.3};
       std::copy(shape, shape + 6, o.shape);
@@ -188,6 +194,7 @@ class SyntheticLog {
   world::PathMotion motion_;
   OutputLog out_;
   int64_t origin_ = 0;
+  std::map<std::string, int32_t> seqs_;  // the next of each channel
 };
 
 inline void WriteSyntheticLog(const std::string& file, const std::string& yaml,

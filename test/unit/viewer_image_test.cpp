@@ -96,6 +96,14 @@ TEST_F(ViewerImage, DoesNotWaitForPerceptionThatIsSilent) {
   for (const json& about : sink_.told) EXPECT_FALSE(about.contains("box")) << about;
 }
 
+TEST_F(ViewerImage, WaitsForItsTargetThoughTheLogsClockWasSet) {
+  const int64_t utime = bus_.now - 50 * kSecond;  // what is played goes on by the clock before
+  feed_.Take(ImageAt(utime));
+  Wait(30);
+  feed_.Tick(bus_.now, "");
+  EXPECT_TRUE(sink_.told.empty());
+}
+
 /// Images each 50 ms, their targets 30 ms later, for two seconds; then images alone.
 TEST_F(ViewerImage, ASeekShowsABoxThatBelongsToItsImage) {
   const auto file =

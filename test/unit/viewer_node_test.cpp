@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <cmath>
+#include <cstdlib>
 #include <filesystem>
 #include <limits>
 #include <map>
@@ -299,6 +300,20 @@ TEST_F(ViewerPlayer, JumpsOfTheClockAreNotPlayed) {
   ticks = 0;
   player.Survey(kSecond / 10, [&](int64_t) { return ++ticks < 7; });
   EXPECT_EQ(ticks, 7U) << "stops when it is told to";
+}
+
+/// By 10 s, as if the log had paused, but no message is missing.
+TEST_F(ViewerPlayer, AClockThatWasSetIsNotPlayed) {
+  bus::LogWriter log(file_);
+  for (int i = 0; i <= 50; ++i) {
+    pose_t pose = PoseAt(kSecond + i * kSecond / 10 + (i > 30 ? 10 * kSecond : 0), i);
+    pose.seq = i;
+    log.Write(pose.utime, "POSE", BytesOf(pose));
+  }
+  log.Close();
+  LogPlayer player(file_);
+  EXPECT_LE(std::abs(player.end() - player.begin() - 5 * kSecond), kSecond / 9);
+  EXPECT_EQ(player.Title(), file_.filename().string() + ", without 1 jump of its clock");
 }
 
 TEST_F(ViewerPlayer, TellsWhatOfTheLogIsLost) {
