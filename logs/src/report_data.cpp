@@ -12,6 +12,7 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 using world::Solid;
+using Json = nlohmann::ordered_json;
 
 constexpr double kPathStep = 0.1;     // s
 constexpr double kSeriesStep = 0.05;  // s
@@ -104,25 +105,60 @@ void AddFaults(const FlightRecord& record, ReportData* data) {
     data->spans.push_back({"fault", s.name, s.t, std::max(s.t, s.end.value_or(last))});
 }
 
+void SlowestFirst(std::vector<StageFigures>* stages) {
+  std::stable_sort(stages->begin(), stages->end(),
+                   [](const auto& a, const auto& b) { return a.mean_ms > b.mean_ms; });
+}
+
 void AddCosts(const FlightRecord& record, ReportData* data) {
   data->stages = record.stages;
-  std::stable_sort(data->stages.begin(), data->stages.end(),
-                   [](const auto& a, const auto& b) { return a.mean_ms > b.mean_ms; });
+  SlowestFirst(&data->stages);
   if (record.truth.empty()) return;
   const double flown = record.truth.back().t - record.truth.front().t;
   for (const auto& [process, cpu] : record.cpu_s)
     if (flown > 0.0) data->cpu_share.push_back({process, 100.0 * cpu / flown});
 }
 
-nlohmann::ordered_json ToJson(const ReportData::Series& s) {
-  auto t = nlohmann::ordered_json::array(), value = t;
+ReportData::Series SeriesIn(const Json& j, const char* key) {
+  if (!j.contains(key)) return {};
+  return {j[key]["t"], j[key]["value"]};
+}
+
+Outline OutlineIn(const Json& points) {
+  Outline out;
+  for (size_t i = 0; i < points["x"].size(); ++i) out.emplace_back(points["x"][i], points["y"][i]);
+  return out;
+}
+
+std::vector<Outline> OutlinesIn(const Json& list) {
+  std::vector<Outline> out;
+  for (const Json& points : list) out.push_back(OutlineIn(points));
+  return out;
+}
+
+void AddCosts(const Json& metrics, ReportData* data) {
+  const Json stages = metrics.value("stages_ms", Json::object());
+  for (const auto& [name, ms] : stages.items()) {
+    const size_t space = name.find(' ');
+    data->stages.push_back({name.substr(0, space), name.substr(space + 1), 0, ms["mean"], ms["p50"],
+                            ms["p99"], ms["max"]});
+  }
+  const Json spent = metrics.value("cpu_s", Json::object());
+  const double flown = metrics["flown_s"];
+  for (const auto& [process, cpu] : spent.items())
+    if (flown > 0.0) data->cpu_share.push_back({process, 100.0 * cpu.get<double>() / flown});
+  SlowestFirst(&data->stages);
+}
+
+Json ToJson(const ReportData::Series& s) {
+  auto t = Json::array(), value = t;
   for (const double v : s.t) t.push_back(std::round(v * 1e3) / 1e3);
   for (const double v : s.value) value.push_back(std::round(v * 1e4) / 1e4);
   return {{"t", t}, {"value", value}};
 }
 
 /// 1 where the line of sight is blocked.
-nlohmann::ordered_json Blocked(ReportData::Series visible) {
+Json Blocked(ReportData::Series visible) {
   for (double& v : visible.value) v = 1.0 - v;
   return ToJson(visible);
 }
@@ -142,8 +178,32 @@ ReportData PrepareReport(const FlightRecord& record, const std::vector<SampleSco
   return data;
 }
 
-nlohmann::ordered_json ToJson(const ReportData& d) {
-  nlohmann::ordered_json j;
+ReportData PrepareReport(const VehicleReport& vehicle) {
+  const Json& said = vehicle.series;
+  ReportData data;
+  data.truth = false;
+  data.title = "Flight without truth";
+  data.perceived = OutlinesIn(said["perceived"]);
+  data.chaser = OutlineIn(said["chaser"]);
+  data.target = OutlineIn(said["target"]);
+  data.predictions = OutlinesIn(said["predictions"]);
+  if (said.contains("geofence")) data.geofence = OutlineIn(said["geofence"]);
+  data.distance = SeriesIn(said, "distance");
+  data.certified = SeriesIn(said, "certified");
+  data.pose_sigma = SeriesIn(said, "pose_sigma");
+  data.target_sigma = SeriesIn(said, "target_sigma");
+  data.tracking_error = SeriesIn(said, "tracking_error");
+  if (said.contains("latency"))
+    for (const auto& [channel, series] : said["latency"].items())
+      data.latency[channel] = {series["t"], series["value"]};
+  for (const Json& s : said["spans"])
+    data.spans.push_back({s["lane"], s["label"], s["from"], s["to"]});
+  AddCosts(vehicle.metrics, &data);
+  return data;
+}
+
+Json ToJson(const ReportData& d) {
+  Json j;
   j["title"] = d.title;
   j["desired_distance"] = d.desired_distance;
   j["image_px"] = {d.width_px, d.height_px};
@@ -159,21 +219,21 @@ nlohmann::ordered_json ToJson(const ReportData& d) {
   j["distance"] = ToJson(d.distance);
   j["clearance"] = ToJson(d.clearance);
   j["certified"] = ToJson(d.certified);
-  j["spans"] = nlohmann::ordered_json::array();
+  j["spans"] = Json::array();
   for (const ReportData::Span& s : d.spans)
     j["spans"].push_back({{"lane", s.lane}, {"label", s.label}, {"from", s.from}, {"to", s.to}});
   j["blocked"] = Blocked(d.visible);
   j["visible_share"] = ToJson(d.visible_share);
   j["pixel_u"] = ToJson(d.pixel_u);
   j["pixel_v"] = ToJson(d.pixel_v);
-  j["stages"] = nlohmann::ordered_json::array();
+  j["stages"] = Json::array();
   for (const StageFigures& s : d.stages)
     j["stages"].push_back({{"name", s.process + " " + s.stage},
                            {"count", s.count},
                            {"mean", s.mean_ms},
                            {"p99", s.p99_ms},
                            {"max", s.max_ms}});
-  j["cpu"] = nlohmann::ordered_json::array();
+  j["cpu"] = Json::array();
   for (const NamedValue& c : d.cpu_share)
     j["cpu"].push_back({{"name", c.name}, {"share", c.value}});
   return j;

@@ -111,7 +111,9 @@ ReportedFlight ByVehicle(const std::string& log, const ReportOptions& options) {
   if (!vehicle.flew)
     throw std::runtime_error(log + ": holds neither TRUTH nor POSE nor PLAN: no flight to report");
   vehicle.metrics["shortfall"] = Shortfall(vehicle);
-  Json page = PageOf(log, "Flight without truth", vehicle, vehicle.series, {}, options.images);
+  const ReportData said = PrepareReport(vehicle);
+  if (!options.plots_folder.empty()) WritePlots(options.plots_folder, said);
+  Json page = PageOf(log, said.title, vehicle, vehicle.series, {}, options.images);
   page["truth"] = false;
   page["metrics"] = vehicle.metrics;
   return Finished(log, Shortfall(vehicle), std::move(page));

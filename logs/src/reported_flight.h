@@ -17,7 +17,7 @@ struct ReportedFlight {
 struct ReportOptions {
   bool truth = true;         ///< by what really was, and what the vehicle said; else by that alone
   bool images = true;        ///< with key moments and playback, which take seconds
-  std::string plots_folder;  ///< for pictures (PNG) where there is truth; empty: none
+  std::string plots_folder;  ///< for pictures (PNG); empty: none
 };
 
 /// Throws std::runtime_error with one line when the log holds nothing to report.

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "chase/attitude_setpoint_t.hpp"
 #include "chase/flight_state_t.hpp"
@@ -224,6 +225,24 @@ TEST(Report, PageAndPicturesStandWithoutAnythingElse) {
     EXPECT_EQ(page.find(mark), std::string::npos) << mark;
 }
 
+/// Names without their ending.
+std::set<std::string> PicturesIn(const std::string& folder) {
+  std::set<std::string> names;
+  for (const auto& file : fs::directory_iterator(folder))
+    if (file.path().extension() == ".png" && fs::file_size(file) > 3000)
+      names.insert(file.path().stem().string());
+  return names;
+}
+
+TEST(Report, PicturesOfWhatTheVehicleSaidStandWithoutTruth) {
+  const std::string folder = Fresh("vehicle_pictures"), log = folder + "/flight.lcm";
+  testing::WriteSyntheticLog(log, kYaml);
+  ReportFlight(log, {false, false, folder});
+  EXPECT_EQ(PicturesIn(folder),
+            (std::set<std::string>{"top_view", "timeline", "distance", "certificate", "uncertainty",
+                                   "latency", "stages", "cpu"}));
+}
+
 TEST(Report, SeriesOfTruthAndVehicleShareTheMissionsTime) {
   const std::string log = Fresh("times") + "/flight.lcm";
   testing::SyntheticFlight flight;
@@ -369,6 +388,17 @@ TEST(Report, WithoutTruthAPathAndDistancesBreakWhereTheFrameChanges) {
   EXPECT_EQ(page["metrics"]["frame_changes"], 1);
   EXPECT_TRUE(page["metrics"]["replans"].is_null());
   EXPECT_TRUE(page["metrics"]["fallbacks"].is_null());
+}
+
+TEST(Report, PicturesBreakWhereTheFrameChangesAndNeedNoTarget) {
+  const std::string folder = Fresh("few_pictures"), log = folder + "/flight.lcm";
+  LiveLog live(log);
+  PutPoses(&live, 0, 1.0, 7, 0);
+  PutPoses(&live, 2000, 50.0, 9, 200);
+  live.Close();
+  ReportFlight(log, {false, false, folder});
+  EXPECT_EQ(PicturesIn(folder),
+            (std::set<std::string>{"top_view", "timeline", "uncertainty", "latency"}));
 }
 
 TEST(Report, ThePathAsEstimatedBreaksWhereTheFrameChanges) {
