@@ -45,7 +45,8 @@ struct Ball {
 /// no inverse.
 Body MakeBody(const Obstacle& obstacle, double start, double duration, double sigmas,
               double flown = HUGE_VAL);
-/// The same over another time, for a body that was made of an ellipsoid of the same shape.
+/// The same over another time, for a body that was made of an obstacle of the same solid, shape and
+/// axes, of the ground or not.
 void Retime(const Obstacle& obstacle, double start, double duration, double sigmas, double flown,
             Body* body);
 

@@ -218,13 +218,6 @@ Rooms ProvenRooms(const Vector3d& n, const Sweep& drone, const Sweep* target, co
   return {room_of(drone), target ? room_of(*target) : HUGE_VAL};
 }
 
-double ProvenRoom(const Separation& s, const Ball& drone, const Ball* target, const Body& body) {
-  const auto sweep = [&](const Ball& ball) { return SweptBall(ball).Over(s.from, s.to, body); };
-  if (!target) return ProvenRooms(s.normal, sweep(drone), nullptr, body).Least();
-  const Sweep second = sweep(*target);
-  return ProvenRooms(s.normal, sweep(drone), &second, body).Least();
-}
-
 bool IsCertificate(const Certificate& certificate, double from, double to, SweptBall* drone,
                    SweptBall* target, const Body& body) {
   if (!IsWellFormed(certificate, from, to)) return false;

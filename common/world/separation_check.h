@@ -65,9 +65,6 @@ struct Rooms {
 /// second ball. In floating point with a bound on all rounding, in about 0.1 us.
 Rooms ProvenRooms(const Eigen::Vector3d& normal, const Sweep& drone, const Sweep* target,
                   const Body& body);
-/// The least of them, for balls that are not asked of other bodies.
-double ProvenRoom(const Separation& separation, const Ball& drone, const Ball* target,
-                  const Body& body);
 
 /// Is it well formed, with a proven room of 0 or more in each separation? True is a proof that the
 /// body is kept off over [from, to]; false says that this certificate is none.

@@ -159,8 +159,8 @@ void ControlNode::OnPlan(const plan_t& message) {
 
 // For 2 s late poses only correct dead reckoning: with these gains the loop is unstable at 0.3 s of
 // delay, and an acceleration that old is not that of the thrust asked for last. Then they are flown
-// by, for want of better. Judged by the bus's clock,
-// because a queue shows in no stamp: a replay sees the times at which the recorder heard them.
+// by, for want of better. Judged by the bus's clock, because a queue shows in no
+// stamp: a replay sees the times at which the recorder heard them.
 void ControlNode::OnPose(const pose_t& message) {
   if (pose_age_.IsLate(message.utime, bus_.Now(), kMostLate)) {
     if (Silence() <= world::kMostAge.velocity) return UpdateLate(message);
@@ -248,7 +248,8 @@ std::string ControlNode::Reason() const {
       return fmt::format("no new plan since {:.1f} s: on the last one's stop",
                          controller_.overdue());
     case Following::kBrake:
-      return pose_reason_.empty() ? "no plan: braking" : "pose lost, braking: " + pose_reason_;
+      if (!pose_reason_.empty()) return "pose lost, braking: " + pose_reason_;
+      return controller_.lands() ? "landing: braking first" : "no plan: braking";
     case Following::kLand:
       if (controller_.is_down()) return "landed: motors off";
       if (controller_.is_cut()) return "the flight is over: motors off";
@@ -275,10 +276,10 @@ bus::NodeReport ControlNode::Report() const {
     case Following::kStop:
       return {State::kDegraded, Reason() + plans};
     case Following::kBrake:
+      if (!controller_.lands()) return {State::kFailed, Reason() + plans};
+      [[fallthrough]];
     case Following::kLand:
-      return {pose_reason_.empty() && controller_.following() == Following::kLand ? State::kOk
-                                                                                  : State::kFailed,
-              Reason() + plans};
+      return {pose_reason_.empty() ? State::kOk : State::kFailed, Reason() + plans};
   }
   return {};
 }

@@ -56,7 +56,7 @@ class Controller {
   /// Does the autopilot fly by what it is asked for? Nothing is learnt from what it does otherwise.
   /// `stands`: it says that it is on the ground while a flight is asked for. Until it obeys and a
   /// plan begins the motors are to idle then; for a landing, to stop. `may_begin`: no while it
-  /// stands there and no flight is asked for, when no plan starts the motors.
+  /// stands there, no flight is asked for and it does not obey, when no plan starts the motors.
   void SetAutopilot(bool obeys, bool stands, bool may_begin = true) {
     obeys_ = obeys;
     stands_ = stands;
@@ -81,6 +81,7 @@ class Controller {
   std::optional<Setpoint> Blind(double silence);
 
   Following following() const { return following_; }
+  bool lands() const { return lands_; }
   bool is_down() const { return landing_.is_down(); }
   bool is_cut() const { return cut_; }
   bool stands() const { return stands_; }

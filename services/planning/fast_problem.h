@@ -28,7 +28,6 @@ class FastProblem {
     if (!has_costs_) SetNodes();
     has_costs_ = true;
   }
-  /// After Set without a limit, or SetAllCosts, only: so is AliveGroups.
   /// The obstacles, once a problem; before costs of obstacles or feasibility are asked for. False
   /// when the target is inside a shape while sight is asked: nothing is feasible; or when a shape
   /// is not positive definite, which is beyond the kernels.
@@ -39,7 +38,8 @@ class FastProblem {
   int n_candidates() const { return n_; }
 
   /// Candidates that differ in the first step only come in groups, `first_choices` a group, in the
-  /// order of their indices: those of groups that may hold feasible ones, ascending.
+  /// order of their indices: those of groups that may hold feasible ones, ascending. After Set
+  /// without a limit, or SetAllCosts, only.
   void AliveGroups(std::vector<int>* groups);
   int first_choices() const { return choices_[0]; }
 

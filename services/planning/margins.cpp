@@ -168,7 +168,7 @@ void RelaxSight(const world::Obstacle& o, const Growth& growth, const FirstSight
     note(*kept, "the target passes within the sight margin of ");
     return take(*kept);
   }
-  e->sight_from = 1.0;
+  e->sight_from = kNoSight;
   Note(notes, "obstacle " + std::to_string(e->id) + " holds the target, its shadow is ignored");
 }
 

@@ -6,6 +6,7 @@
 #include "common/math/gaussian.h"
 #include "common/math/rotation.h"
 #include "common/world/ages.h"
+#include "services/planning/margins.h"
 #include "services/planning/stopping.h"
 
 namespace chase::planning {
@@ -87,6 +88,7 @@ void Pilot::ChangeFrame() {
   hovers_since_.reset();
   obstacles_.clear();
   unseen_.clear();
+  expected_since_.reset();
   if (unseen_time_) unseen_time_ = -1e9;  // they are told of: to be heard anew
   obstacles_time_ = -1e9;
   airborne_ = airborne_ || flies_;  // a climb is not begun anew
@@ -150,12 +152,13 @@ std::optional<PlanResult> Pilot::Update(double t, const BodyEstimate& body) {
   PlanResult plan = !Chases()                                       ? Obey(t0, start, body)
                     : airborne_ && HasTarget(t) && SeesObstacles(t) ? Chase(t0, start)
                                                                     : Wait(t0, start, body);
-  const double hard = config_.planner.drone_radius + tube_.radius;
-  if (plan.certified_clearance >= 0.0 && ClearanceOf(plan, hard) < tube_.beyond)
+  if (plan.certified_clearance >= 0.0 && ClearanceOf(plan, hard_radius()) < tube_.beyond)
     plan = AsLastResort("the body strays farther than a plan keeps clear", Rest(t0, start));
   else if (plan.certified_clearance >= 0.0)
     plan.certified_clearance -= tube_.beyond;
-  if (!IsFinite(plan)) plan = Rest(t0, {{body.p}, {body.yaw}});
+  if (!IsFinite(plan))
+    plan = AsLastResort("the plan is not finite", Rest(t0, {{body.p}, {body.yaw}}));
+  if (expected_since_ && !unseen_time_) Note(&plan.reason, "nobody tells what is unseen");
   running_ = plan;
   has_running_ = true;
   last_planned_ = t;

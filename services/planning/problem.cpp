@@ -178,7 +178,7 @@ void SetTargetBody(const PlanRequest& request, double flown, double hard, StartC
   e.body = world::MakeBody(o, problem->t0, problem->duration, problem->sigmas);
   e.center = ToCurve(o.center, problem->t0, problem->duration);
   e.grown_from = o.shape;
-  e.sight_from = 1.0;
+  e.sight_from = kNoSight;
   e.safety_radius = hard;
   SetBoxes(o, {hard + Uncertainty(*e.body).most(), 0.0}, &e);
   if (!start->IsSafe(e, hard)) {
@@ -276,7 +276,7 @@ void MakeProblem(const PlannerConfig& config, const PlanRequest& request, const 
     e->safety_from = 0.0;
     const bool asks_sight = over.asks_sight && !o.ground;
     e->ground = o.ground;
-    e->sight_from = asks_sight ? 0.0 : 1.0;
+    e->sight_from = asks_sight ? 0.0 : kNoSight;
     e->sight_share = 1.0;
     e->safety_radius = hard + margin;
     const bool same_shape = IsSameShape(e->grown_from, o.shape);

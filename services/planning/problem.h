@@ -20,6 +20,9 @@ inline constexpr double kPush = 4.0;
 
 using world::Curve;
 
+/// Sight from this tau on: it is not asked for.
+inline constexpr double kNoSight = 1.0;
+
 /// An obstacle as the planner sees it: the true ellipsoid grown for the drone's safety and, less,
 /// for the line of sight.
 struct Ellipsoid {
@@ -35,7 +38,7 @@ struct Ellipsoid {
   double grown_by[2] = {-1.0, -1.0};
   /// tau from which safety is asked; above 0 only if the start is inside
   double safety_from = 0.0;
-  double sight_from = 0.0;  ///< tau from which sight is asked; 1: never
+  double sight_from = 0.0;  ///< tau from which sight is asked; kNoSight: never
   bool ground = false;      ///< what the target stands on: hides nothing
   /// What the ellipsoids stand for; nothing: for themselves. Else they only sort out candidates,
   /// and the proof is about the body's Minkowski sums.

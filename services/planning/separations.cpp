@@ -161,7 +161,7 @@ bool IsTouched(const Curve& plan, const Problem& problem, double sight_from, con
   const Ellipsoid& e = problem.obstacles[static_cast<size_t>(last.obstacle)];
   if (!e.body || last.tau < e.safety_from) return false;
   const double from = std::max(sight_from, e.sight_from);
-  if (from >= 1.0 || last.tau < from)
+  if (from >= kNoSight || last.tau < from)
     return world::Touch(DroneBall(plan, e.safety_radius), nullptr, *e.body, last.tau);
   const world::Ball target = TargetBall(problem, e.sight_share);
   return world::Touch(DroneBall(plan, e.sight_share * problem.sight_radius), &target, *e.body,

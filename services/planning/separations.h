@@ -46,9 +46,6 @@ struct Refusal {
   double tau = -1.0;  ///< instant at which it was touched; -1: not known
 };
 
-/// Sight from then on: it is not asked for.
-inline constexpr double kNoSight = 1.0;
-
 /// Does the plan stay off the obstacles, and its line of sight from `sight_from` on? Obstacles that
 /// stand for no solid are not asked about; where the problem has a reach that holds the plan, nor
 /// are those that are not near.

@@ -52,7 +52,7 @@ class Moment {
     const Ellipsoid& e = problem_.obstacles[j];
     const Eigen::Vector3d d = u - centers_[j];
     if (d.dot(e.safety * d) < kClear) return false;
-    return e.sight_from >= 1.0 ||
+    return e.sight_from >= kNoSight ||
            world::SegmentSquaredDistance(u, target_, centers_[j], e.sight) >= kClear;
   }
 

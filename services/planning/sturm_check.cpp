@@ -27,7 +27,7 @@ SturmCheck::SturmCheck(const Curve& target, const Ellipsoid& e, double sight_fro
       one_form_(safety_ == sight_ && safety_from_ == sight_from_) {
   for (int a = 0; a < 3; ++a)
     for (int k = 0; k < e.center.rows(); ++k) center_[a][k] = e.center(k, a);
-  if (sight_from_ >= 1.0) return;
+  if (sight_from_ >= kNoSight) return;
   Columns y;
   Subtract(target, y);
   for (int a = 0; a < 3; ++a)
@@ -72,7 +72,7 @@ bool SturmCheck::IsSafe(const Curve& plan) const {
 }
 
 bool SturmCheck::IsInSight(const Curve& plan) const {
-  if (sight_from_ >= 1.0) return true;
+  if (sight_from_ >= kNoSight) return true;
   if (!target_is_outside_) return false;
   Columns x;
   Subtract(plan, x);
@@ -84,7 +84,7 @@ bool SturmCheck::IsClear(const Curve& plan) const {
   Columns x;
   Subtract(plan, x);
   if (!IsOutside(x, safety_, safety_from_)) return false;
-  if (sight_from_ >= 1.0) return true;
+  if (sight_from_ >= kNoSight) return true;
   return (one_form_ || IsOutside(x, sight_, sight_from_)) && IsBeside(x);
 }
 

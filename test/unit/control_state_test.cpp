@@ -65,6 +65,24 @@ TEST(ControlNode, ComesDownOnlyByAPlanThatWasMadeToLand) {
   EXPECT_EQ(following(), int{tracking_t::LAND});
 }
 
+TEST(ControlNode, BrakingForWantOfTimeIsPartOfALanding) {
+  Bench bench;
+  int64_t t = kStart;
+  bench.velocity = {1.5, 0, 0};  // it never rests
+  bench.SendPlan(t, {0, 0, 0}, 60.0);
+  bench.SendPose(t);
+  while (bench.tracking.empty() || bench.tracking.back().following != tracking_t::BRAKE) {
+    ASSERT_LT(t, kStart + 50'000'000);
+    if (t % 200'000 == 0) bench.SendState(flight_state_t::LAND);
+    bench.SendPose(t += 5000);
+  }
+  EXPECT_GT(t, kStart + 44'000'000);
+  EXPECT_EQ(bench.tracking.back().reason, "landing: braking first");
+  EXPECT_EQ(bench.node().Report().state, bus::NodeReport::State::kOk);
+  bench.SendPose(t += 5000, pose_t::HEALTH_LOST);
+  EXPECT_EQ(bench.node().Report().state, bus::NodeReport::State::kFailed);
+}
+
 /// Is a plan from rest to rest flown by a body `at` [m] from the take-off place, within a fence of
 /// 1 m around that and 2 m above?
 bool IsFlown(const Eigen::Vector3d& at, const Eigen::Vector3d& from, const Eigen::Vector3d& to,

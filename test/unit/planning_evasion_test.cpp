@@ -50,8 +50,6 @@ TEST(Evasion, WhatCannotBeBrakedForIsEvadedAndCertified) {
   EXPECT_EQ(aside, 4);
 }
 
-// Braking is certified for as long as it takes; where somebody comes soon after that it is too late
-// for a way aside then.
 // Whatever place is clear, one near it is tried.
 TEST(Evasion, PlacesAsideAreNearToAnyPlace) {
   const std::vector<Vector3d> places = PlacesAside();
@@ -75,6 +73,8 @@ TEST(Evasion, PlacesAsideAreNearToAnyPlace) {
   }));
 }
 
+// Braking is certified for as long as it takes; where somebody comes soon after that it is too late
+// for a way aside then.
 TEST(Evasion, StepsAsideWhileThereIsAWay) {
   const PlannerConfig config;
   for (const double beside : {0.0, 0.2, 3.0}) {

@@ -175,6 +175,18 @@ TEST(LastResort, WhatTheBodyStraysByBeyondAnyTubeIsTakenOffTheClaim) {
   EXPECT_TRUE(far.proofs.empty());
 }
 
+TEST(LastResort, RestInPlaceOfAPlanThatIsNotFiniteClaimsNothing) {
+  Pilot pilot{PlanningConfig()};
+  pilot.SetFlying(true);
+  pilot.SetObstacles(0.0, {Pillar({0.0, 1.3, 1.0})});
+  pilot.SetForecast(Walking(0.0));
+  const PlanResult rest = *pilot.Update(0.0, {{0.0, 0.0, 1.3}, {std::nan(""), 0.0, 0.0}, 0.0});
+  EXPECT_TRUE(rest.trajectory.coefficients.allFinite());
+  EXPECT_EQ(rest.reason.find("the plan is not finite"), 0u) << rest.reason;
+  EXPECT_LT(rest.certified_clearance, 0.0);
+  EXPECT_TRUE(rest.proofs.empty());
+}
+
 TEST(LastResort, AStopThatTheBodyMayStrayFromIsNoWayOut) {
   const PlanningConfig config;
   const double hard = config.planner.drone_radius + kWidestTube;

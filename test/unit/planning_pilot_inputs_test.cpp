@@ -22,6 +22,28 @@ TEST(Pilot, OutdatedUnseenPlacesCountAsOutdatedObstacles) {
     }
 }
 
+TEST(Pilot, SaysThatNobodyTellsWhatIsUnseen) {
+  Flight flight{PlanningConfig()};
+  flight.pilot.ExpectUnseen(0.0);
+  flight.Run(4.0, true);
+  EXPECT_GE(flight.plans.back().certified_clearance, 0.0);
+  flight.pilot.ChangeFrame();
+  flight.pilot.ExpectUnseen(flight.t);
+  const size_t before = flight.plans.size();
+  flight.Run(0.4, true);  // to be told anew
+  ASSERT_GT(flight.plans.size(), before);
+  for (size_t i = 0; i < flight.plans.size(); ++i) {
+    const PlanResult& plan = flight.plans[i];
+    EXPECT_NE(plan.reason.find("nobody tells what is unseen"), std::string::npos) << plan.reason;
+    if (i >= before) {
+      EXPECT_LT(plan.certified_clearance, 0.0);
+    }
+  }
+  flight.pilot.SetUnseen(flight.t, {});
+  flight.Run(0.2, true);
+  EXPECT_EQ(flight.plans.back().reason.find("unseen"), std::string::npos);
+}
+
 TEST(Pilot, WithoutObstaclesItBrakesAndCertifiesNothing) {
   Flight flight{PlanningConfig()};
   flight.Run(4.0, false);

@@ -18,6 +18,14 @@ struct SeparationPair {
   const Ball* second() const { return sight ? &target : nullptr; }
 };
 
+inline double ProvenRoom(const Separation& s, const Ball& drone, const Ball* target,
+                         const Body& body) {
+  SweptBall first(drone), second(target ? *target : drone);
+  return ProvenRooms(s.normal, first.Over(s.from, s.to, body),
+                     target ? &second.Over(s.from, s.to, body) : nullptr, body)
+      .Least();
+}
+
 /// Of the whole horizon.
 inline bool Certifies(const Certificate& certificate, const Ball& drone, const Ball* target,
                       const Body& body) {
