@@ -123,6 +123,9 @@ def problems(registered, table):
     found += [f"{EQUIVALENT.name}: {block['file']} does not hold: {block['line']}"
               for block in blocks(EQUIVALENT)
               if block["line"] not in tree.text(pathlib.Path(block["file"]))]
+    counts = collections.Counter((b["file"], b["line"], b["is"]) for b in blocks(EQUIVALENT))
+    found += [f"{EQUIVALENT.name} says more than once what {file} may hold instead of: {text}"
+              for (file, text, _), count in counts.items() if count > 1]
     return found
 
 
