@@ -10,6 +10,7 @@ namespace {
 constexpr int64_t kGapPeriods = 10;
 constexpr size_t kFewest = 20;                                  // of a channel to have a period
 constexpr int64_t kStepAhead = 2'000'000, kStepBack = 300'000;  // us, at least, of a clock
+constexpr int64_t kMostLate = 2'000'000;                        // us, of a message to be logged
 constexpr int kMostUnsure = 50;  // events after a jump until it counts as a pause
 
 }  // namespace
@@ -62,8 +63,9 @@ int64_t LogClock::Settle(int64_t utime, Jump jump) {
 int64_t LogClock::Add(const LogEvent& e) {
   const auto [found, fresh] = channels_.try_emplace(e.channel);
   Channel& channel = found->second;
-  now_ = e.utime - set_;
+  now_ = e.utime - set_ - perhaps_;
   if (const auto head = bus::HeadOf(e.bytes.data(), e.bytes.size())) {
+    now_ = e.utime - set_;
     now_ = Settle(now_, JumpOf(now_, *head, channel));
     const std::tuple sender(head->sender, head->vehicle, head->sender_start);
     int32_t& seq = channel.seqs.try_emplace(sender, head->seq).first->second;
@@ -77,7 +79,8 @@ int64_t LogClock::Add(const LogEvent& e) {
 
 int64_t LogClock::SetBy(int64_t utime) const {
   const auto age = [&](int64_t set) { return std::abs(now_ + set - utime); };
-  const int64_t set = set_ + perhaps_, before = perhaps_ ? set_ : set_before_;
+  const bool is_past = steps_.empty() || now_ - first_ - steps_.back().at > kMostLate;
+  const int64_t set = set_ + perhaps_, before = perhaps_ || is_past ? set_ : set_before_;
   return age(set) <= age(before) ? set : before;
 }
 

@@ -18,14 +18,15 @@ struct ClockStep {
   int64_t at = 0;  ///< after the log's first event
 };
 
-/// Tells times of a log as if nobody had set the clock that it is stamped by.
+/// Tells times of a log as if nobody had set the clock that it is stamped by. Steps by at most 2 s
+/// ahead or 0.3 s back are not told from pauses.
 class LogClock {
  public:
   /// Takes the log's next event and returns when it was logged, microseconds.
   int64_t Add(const LogEvent& event);
   int64_t now() const { return now_; }  ///< of the last event
   /// By how much the clock had been set when a message of the last event was stamped: it may have
-  /// been sent before the clock was set and logged after it.
+  /// been sent before the clock was set and logged after it, 2 s at most.
   int64_t SetBy(int64_t utime) const;
   int64_t Settled(int64_t utime) const { return utime - SetBy(utime); }
   const std::vector<ClockStep>& steps() const { return steps_; }

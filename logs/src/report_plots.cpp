@@ -16,7 +16,7 @@ namespace {
 constexpr const char* kChaser = "#1f5fa8";
 constexpr const char* kTarget = "#e8710a";
 constexpr const char* kGrey = "#8a8f98";
-constexpr int kColors[] = {0x1f5fa8, 0xe8710a, 0x1d7f4b, 0xb455c9, 0x8a8f98, 0xd9a33a};
+constexpr int kColors[] = {0x1f5fa8, 0xe8710a, 0x1d7f4b, 0xb455c9, 0x8a8f98, 0xd9a33a, 0x111111};
 
 /// The color of the i-th of several, as gnuplot takes it in commands and data.
 int Rgb(size_t i) { return kColors[i % std::size(kColors)]; }

@@ -249,7 +249,7 @@ std::string ControlNode::Reason() const {
                          controller_.overdue());
     case Following::kBrake:
       if (!pose_reason_.empty()) return "pose lost, braking: " + pose_reason_;
-      return controller_.lands() ? "landing: braking first" : "no plan: braking";
+      return controller_.brakes_to_land() ? "landing: braking first" : "no plan: braking";
     case Following::kLand:
       if (controller_.is_down()) return "landed: motors off";
       if (controller_.is_cut()) return "the flight is over: motors off";
@@ -276,7 +276,7 @@ bus::NodeReport ControlNode::Report() const {
     case Following::kStop:
       return {State::kDegraded, Reason() + plans};
     case Following::kBrake:
-      if (!controller_.lands()) return {State::kFailed, Reason() + plans};
+      if (!controller_.brakes_to_land()) return {State::kFailed, Reason() + plans};
       [[fallthrough]];
     case Following::kLand:
       return {pose_reason_.empty() ? State::kOk : State::kFailed, Reason() + plans};

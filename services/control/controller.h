@@ -81,7 +81,10 @@ class Controller {
   std::optional<Setpoint> Blind(double silence);
 
   Following following() const { return following_; }
-  bool lands() const { return lands_; }
+  /// Brakes to come down where it is: the time to be led to a place to land is over.
+  bool brakes_to_land() const {
+    return lands_ && following_ == Following::kBrake && last_t_ && IsOverdue(*last_t_);
+  }
   bool is_down() const { return landing_.is_down(); }
   bool is_cut() const { return cut_; }
   bool stands() const { return stands_; }

@@ -84,6 +84,13 @@ Vector3d Somewhere(Random& g) {
   return Vector3d(x, y, z).normalized();
 }
 
+/// The same stop, written with as many coefficients as the plan.
+void RaiseStop(Case* c) {
+  Eigen::MatrixXd raised = Eigen::MatrixXd::Zero(c->claim.position.coefficients.rows(), 3);
+  raised.topRows(c->claim.stop->coefficients.rows()) = c->claim.stop->coefficients;
+  c->claim.stop->coefficients = raised;
+}
+
 /// Certified plans with a stop.
 const std::vector<Case>& Cases() {
   static const std::vector<Case> cases = [] {
@@ -117,6 +124,16 @@ bool ShortenInterval(Case* c, Random& g) {
 
 bool EnlargeRadius(Case* c, Random& g) {
   AnyProof(c, g).radius += Uniform(g, 0.01, 2.0);
+  return IsBroken(*c);
+}
+
+/// Beside the proof that holds, of the same ball and body.
+bool EnlargeCopy(Case* c, Random& g) {
+  auto& proofs = g() % 2 ? c->claim.proofs : c->claim.stop_proofs;
+  const size_t at = g() % proofs.size();
+  Proof copy = proofs[at];
+  copy.radius += Uniform(g, 0.01, 2.0);
+  proofs.insert(proofs.begin() + static_cast<long>(at) + 1, copy);
   return IsBroken(*c);
 }
 
@@ -185,6 +202,12 @@ bool ExchangeProofs(Case* c, Random& g) {
   Proof &a = AnyProof(c, g), &b = AnyProof(c, g);
   if (a.of_sight != b.of_sight) return false;
   std::swap(a.separations, b.separations);
+  return IsBroken(*c);
+}
+
+bool ProveStopAsPlan(Case* c, Random&) {
+  RaiseStop(c);
+  c->claim.stop_proofs = c->claim.proofs;
   return IsBroken(*c);
 }
 
@@ -261,6 +284,7 @@ const std::map<std::string, Forgery>& Forgeries() {
       {"normal turned", TurnNormal},
       {"interval shortened", ShortenInterval},
       {"radius enlarged", EnlargeRadius},
+      {"a copy of greater radius", EnlargeCopy},
       {"target's radius enlarged", EnlargeTargetRadius},
       {"radius shrunk", ShrinkRadius},
       {"hard radius shrunk", ShrinkHardRadius},
@@ -272,6 +296,7 @@ const std::map<std::string, Forgery>& Forgeries() {
       {"variance negative", NegateVariance},
       {"obstacle added", AddObstacle},
       {"proofs exchanged", ExchangeProofs},
+      {"plan's proofs of the stop", ProveStopAsPlan},
       {"plan moved", MovePlan},
       {"stop moved", MoveStop},
       {"stop exchanged", ExchangeStop},
@@ -496,11 +521,7 @@ TEST(PlanCheck, TakesProofsInAnyOrder) {
       std::shuffle(proofs->begin(), proofs->end(), g);
     }
     std::shuffle(c.obstacles.begin(), c.obstacles.end(), g);
-    if (i % 2) {  // of the plan's degree the stop is the same
-      Eigen::MatrixXd same = Eigen::MatrixXd::Zero(c.claim.position.coefficients.rows(), 3);
-      same.topRows(c.claim.stop->coefficients.rows()) = c.claim.stop->coefficients;
-      c.claim.stop->coefficients = same;
-    }
+    if (i % 2) RaiseStop(&c);
     EXPECT_EQ(Verdict(c), "") << i;
     c.least.exact = i % 10 == 0;
     EXPECT_TRUE(!c.least.exact || Verdict(c).empty()) << i;

@@ -83,6 +83,18 @@ TEST(ControlNode, BrakingForWantOfTimeIsPartOfALanding) {
   EXPECT_EQ(bench.node().Report().state, bus::NodeReport::State::kFailed);
 }
 
+TEST(ControlNode, BrakingForWantOfAPlanIsNoPartOfALanding) {
+  Bench bench;
+  int64_t t = kStart;
+  bench.SendPlan(t, {0, 0, 0}, 60.0);
+  bench.SendPose(t);
+  bench.SendState(flight_state_t::LAND);
+  for (int i = 0; i < 20; ++i) bench.SendPose(t += 5000, pose_t::HEALTH_OK, 1);
+  EXPECT_EQ(int{bench.tracking.back().following}, int{tracking_t::BRAKE});
+  EXPECT_EQ(bench.tracking.back().reason, "no plan: braking");
+  EXPECT_EQ(bench.node().Report().state, bus::NodeReport::State::kFailed);
+}
+
 /// Is a plan from rest to rest flown by a body `at` [m] from the take-off place, within a fence of
 /// 1 m around that and 2 m above?
 bool IsFlown(const Eigen::Vector3d& at, const Eigen::Vector3d& from, const Eigen::Vector3d& to,

@@ -11,6 +11,7 @@
 #include "chase/status_t.hpp"
 #include "common/bus/bus.h"
 #include "common/bus/log_writer.h"
+#include "common/logs/log_clock.h"
 #include "logs/src/info.h"
 #include "logs/src/seq_count.h"
 #include "test/unit/logs_small_log.h"
@@ -240,6 +241,30 @@ TEST(LogInfo, AClockThatWasSetIsToldThoughARareChannelComesFirst) {
     EXPECT_NEAR(info.channels.at(1).RateHz(), 200.0, 0.3);
     EXPECT_LE(info.channels.at(0).last_utime, info.channels.at(1).last_utime);
   }
+}
+
+TEST(LogClock, StampsOfBeforeAStepAreKnownForAWhile) {
+  const int64_t by = 10'000'000;
+  LogClock clock;
+  const auto add = [&](int64_t utime, const char* channel, Bytes bytes) {
+    LogEvent e;
+    e.utime = utime, e.channel = channel, e.bytes = std::move(bytes);
+    return clock.Add(e);
+  };
+  int64_t now = 7'000'000'000;
+  for (int k = 0; k < 1000; ++k, now += 5000) {
+    const int64_t utime = now + (k < 500 ? 0 : by);
+    if (k % 250 == 0) {  // the first behind the step cannot tell, nor one that has no head
+      add(utime, "GYRO", Encoded(testing::Imu(k / 250 + 1)));
+      EXPECT_LE(std::abs(add(utime, "OTHERS", {1, 2, 3}) - now), 5000) << k;
+    }
+    add(utime, "IMU", Encoded(testing::Imu(k)));
+    if (k == 500) {
+      EXPECT_EQ(clock.SetBy(now - 100'000), 0);
+    }
+  }
+  EXPECT_NEAR(static_cast<double>(clock.SetBy(now + by - 6'000'000)), static_cast<double>(by),
+              5000.0);
 }
 
 TEST(LogInfo, ALogCutOffAnywhereIsReadAsFarAsItGoes) {
