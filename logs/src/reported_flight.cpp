@@ -36,7 +36,6 @@ std::string Shortfall(const FlightRecord& record, const Metrics& m) {
   return Shortfall(lacks, m.log_whole);
 }
 
-/// Without FLIGHT_STATE nobody can tell.
 std::string Shortfall(const VehicleReport& vehicle) {
   std::vector<std::string> lacks;
   if (!vehicle.begins_in.empty()) lacks.push_back("begins in " + vehicle.begins_in);
@@ -44,6 +43,13 @@ std::string Shortfall(const VehicleReport& vehicle) {
     lacks.push_back(fmt::format("ends in {} at {:.1f} s", vehicle.ends_in,
                                 vehicle.metrics["flown_s"].get<double>()));
   return Shortfall(lacks, vehicle.whole);
+}
+
+/// By the truth where the log holds it, whatever the report goes by.
+std::string Shortfall(const std::string& log, const VehicleReport& vehicle) {
+  if (!LacksOfTruth(log).empty()) return Shortfall(vehicle);
+  const FlightRecord record = ReadFlight(log);
+  return Shortfall(record, Compute(record, Score(record)));
 }
 
 /// What the truth knows of moments.
@@ -110,13 +116,14 @@ ReportedFlight ByVehicle(const std::string& log, const ReportOptions& options) {
   VehicleReport vehicle = ReportVehicle(log);
   if (!vehicle.flew)
     throw std::runtime_error(log + ": holds neither TRUTH nor POSE nor PLAN: no flight to report");
-  vehicle.metrics["shortfall"] = Shortfall(vehicle);
+  const std::string shortfall = Shortfall(log, vehicle);
+  vehicle.metrics["shortfall"] = shortfall;
   const ReportData said = PrepareReport(vehicle);
   if (!options.plots_folder.empty()) WritePlots(options.plots_folder, said);
   Json page = PageOf(log, said.title, vehicle, vehicle.series, {}, options.images);
   page["truth"] = false;
   page["metrics"] = vehicle.metrics;
-  return Finished(log, Shortfall(vehicle), std::move(page));
+  return Finished(log, shortfall, std::move(page));
 }
 
 /// Most criteria are of samples of the mission.

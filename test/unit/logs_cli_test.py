@@ -331,9 +331,10 @@ class LogTools(unittest.TestCase):
         own = run("chase-report", self.log, self.log, "--out", self.folder)
         self.assert_refused(own, 1, "own report", "another folder")
         bare = self.without("bare_b.lcm", lambda channel, k: channel in ("TRUTH", "SCENARIO"))
-        mixed = run("chase-report", self.log, bare)  # by what both vehicles said
-        self.assertEqual(mixed.returncode, 0, mixed.stderr)
-        self.assertRegex(mixed.stdout, r"pose_sigma_max_m +[\d.]+ m +[\d.]+ m\n")
+        for mixed in (run("chase-report", self.log, bare), run("chase-report", bare, self.log)):  # by what both vehicles said
+            self.assert_refused(mixed, 2, self.log, "the log ends at 1.0 s of 60.0 s")
+            self.assertIn("\n  the log ends at 1.0 s of 60.0 s; the figures are of that part\n", mixed.stdout)
+            self.assertRegex(mixed.stdout, r"pose_sigma_max_m +[\d.]+ m +[\d.]+ m\n")
         blind = self.without("blind.lcm", lambda channel, k: channel == "POSE")
         worse = run("chase-report", self.log, blind).stdout
         self.assertRegex(worse, r"odometry_ate_m +[\d.]+ m +not known  WORSE")
