@@ -49,7 +49,7 @@ function showHeader() {
     const hosts = [...new Set(Object.values(vehicle.software.hosts))], named = (word, names) => (names?.length ? `, ${word} ${names.join(', ')}` : '');
     const where = `${vehicle.recorded_utc ? `, ${vehicle.recorded_utc} UTC` : ''}${named('vehicle', vehicle.vehicles)}${named('host', hosts)}`;
     byId('subtitle').append(make('div', `${two ? `${'AB'[i]}: ` : ''}${flight.log}${where}, ${metrics.flown_s.toFixed(1)} s${of} flown${factor}; ${commits.join(', ')}`));
-    for (const loss of [metrics.shortfall, ...metrics.losses].filter((line) => line)) byId('losses').append(make('p', `${two ? `${'AB'[i]}: ` : ''}${loss}`, 'failed'));
+    for (const loss of [metrics.shortfall ?? `whether this is the whole flight is ${UNKNOWN}`, ...metrics.losses].filter((line) => line)) byId('losses').append(make('p', `${two ? `${'AB'[i]}: ` : ''}${loss}`, 'failed'));
   });
   byId('map_text').textContent = `${flights[0].truth ? 'Paths over the mission.' : 'Paths as estimated.'} `
     + 'Thin lines: predictions and plans of every half second (switch them in the legend).';

@@ -31,8 +31,9 @@ fs::path OutputFolder(const std::string& log, const std::string& out) {
 
 /// Says where a log ends before the flight does; returns the exit code.
 int Judge(const ReportedFlight& flight) {
-  if (flight.shortfall.empty()) return 0;
-  std::fprintf(stderr, "chase-report: %s: %s\n", flight.log.c_str(), flight.shortfall.c_str());
+  const std::string shortfall = flight.shortfall.value_or("");
+  if (shortfall.empty()) return 0;
+  std::fprintf(stderr, "chase-report: %s: %s\n", flight.log.c_str(), shortfall.c_str());
   return 2;
 }
 
@@ -93,8 +94,9 @@ int Compare(const std::vector<std::string>& logs, const std::string& out) {
 
 }  // namespace
 
-/// Exit codes: 0 reported, whatever became of the flight; 1 bad use; 2 reported as far as the log
-/// goes, which does not hold the whole flight.
+/// Exit codes: 0 reported, whatever became of the flight, also where nobody can tell whether the log
+/// holds all of it; 1 bad use; 2 reported as far as the log goes, which does not hold the whole
+/// flight.
 int main(int argc, char** argv) {
   CLI::App app{"Metrics, plots and one HTML page from a flight log."};
   app.name("chase-report");

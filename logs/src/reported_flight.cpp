@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <optional>
 #include <set>
 #include <stdexcept>
 
@@ -17,6 +18,8 @@ namespace chase::logs {
 namespace {
 
 using Json = nlohmann::ordered_json;
+
+constexpr const char* kCannotTell = "whether this is the whole flight is not known";
 
 /// `lacks`: phrases of what the log is or does, in place of holding the whole flight.
 std::string Shortfall(std::vector<std::string> lacks, bool log_whole) {
@@ -36,7 +39,8 @@ std::string Shortfall(const FlightRecord& record, const Metrics& m) {
   return Shortfall(lacks, m.log_whole);
 }
 
-std::string Shortfall(const VehicleReport& vehicle) {
+std::optional<std::string> Shortfall(const VehicleReport& vehicle) {
+  if (vehicle.whole && !vehicle.tells_states) return std::nullopt;
   std::vector<std::string> lacks;
   if (!vehicle.begins_in.empty()) lacks.push_back("begins in " + vehicle.begins_in);
   if (!vehicle.ends_in.empty())
@@ -46,7 +50,7 @@ std::string Shortfall(const VehicleReport& vehicle) {
 }
 
 /// By the truth where the log holds it, whatever the report goes by.
-std::string Shortfall(const std::string& log, const VehicleReport& vehicle) {
+std::optional<std::string> Shortfall(const std::string& log, const VehicleReport& vehicle) {
   if (!LacksOfTruth(log).empty()) return Shortfall(vehicle);
   const FlightRecord record = ReadFlight(log);
   return Shortfall(record, Compute(record, Score(record)));
@@ -79,8 +83,9 @@ Json PageOf(const std::string& log, const std::string& title, const VehicleRepor
 }
 
 /// With what the log lacks of the flight in the page and in its metrics.
-ReportedFlight Finished(const std::string& log, const std::string& shortfall, Json page) {
-  page["metrics"]["shortfall"] = shortfall;
+ReportedFlight Finished(const std::string& log, const std::optional<std::string>& shortfall,
+                        Json page) {
+  page["metrics"]["shortfall"] = shortfall ? Json(*shortfall) : Json();
   return {log, page["metrics"].dump(2) + "\n", page, shortfall};
 }
 
@@ -113,17 +118,17 @@ ReportedFlight ByTruth(const std::string& log, const ReportOptions& options) {
 }
 
 ReportedFlight ByVehicle(const std::string& log, const ReportOptions& options) {
-  VehicleReport vehicle = ReportVehicle(log);
+  const VehicleReport vehicle = ReportVehicle(log);
   if (!vehicle.flew)
     throw std::runtime_error(log + ": holds neither TRUTH nor POSE nor PLAN: no flight to report");
-  const std::string shortfall = Shortfall(log, vehicle);
-  vehicle.metrics["shortfall"] = shortfall;
   const ReportData said = PrepareReport(vehicle);
   if (!options.plots_folder.empty()) WritePlots(options.plots_folder, said);
   Json page = PageOf(log, said.title, vehicle, vehicle.series, {}, options.images);
   page["truth"] = false;
   page["metrics"] = vehicle.metrics;
-  return Finished(log, shortfall, std::move(page));
+  ReportedFlight flight = Finished(log, Shortfall(log, vehicle), std::move(page));
+  flight.page["vehicle"] = flight.page["metrics"];
+  return flight;
 }
 
 /// Most criteria are of samples of the mission.
@@ -164,7 +169,8 @@ std::string Heading(const ReportedFlight& flight) {
   if (const auto& sums = software.at("configurations"); !sums.empty())
     text += fmt::format("  configurations: {}\n", Listed(sums, true));
   for (const Json& loss : metrics["losses"]) text += fmt::format("  {}\n", loss.get<std::string>());
-  if (!flight.shortfall.empty()) text += fmt::format("  {}\n", flight.shortfall);
+  if (const std::string shortfall = flight.shortfall.value_or(kCannotTell); !shortfall.empty())
+    text += fmt::format("  {}\n", shortfall);
   return text;
 }
 
@@ -178,6 +184,7 @@ std::string Summary(const ReportedFlight& flight) {
                           : passed.get<bool>() ? "passed"
                                                : "FAILED");
   for (const Json& loss : metrics["losses"]) text += loss.get<std::string>() + "\n";
+  if (!flight.shortfall) text += fmt::format("{}\n", kCannotTell);
   return text;
 }
 

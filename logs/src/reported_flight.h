@@ -1,6 +1,7 @@
 #pragma once
 
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 
 namespace chase::logs {
@@ -11,7 +12,8 @@ struct ReportedFlight {
   std::string metrics;          ///< metrics.json
   nlohmann::ordered_json page;  ///< what report.js draws: title, truth, judged (there is a sample
                                 ///< of the mission), metrics, vehicle, data, moments, playback
-  std::string shortfall;        ///< what the log lacks of the flight; empty: nothing
+  /// What the log lacks of the flight, a sentence; empty: nothing; none: nobody can tell.
+  std::optional<std::string> shortfall;
 };
 
 struct ReportOptions {
@@ -30,7 +32,8 @@ std::string KnownMetrics(const ReportedFlight& flight);
 /// configurations; what its log lost. Lines for people.
 std::string Heading(const ReportedFlight& flight);
 
-/// The criteria and the losses, a line each, for people.
+/// The criteria, the losses, and that nobody knows whether the flight is whole, a line each, for
+/// people.
 std::string Summary(const ReportedFlight& flight);
 
 }  // namespace chase::logs

@@ -112,6 +112,7 @@ class Gatherer {
   VehicleReport Report(const LogInfo& info) const {
     VehicleReport report;
     report.flew = poses_ > 0 || plans_ > 0;
+    report.tells_states = !states_.empty();
     report.whole = info.Whole();
     report.begins_in = InAir(first_state_);
     report.ends_in = InAir(state_);

@@ -19,6 +19,7 @@ struct VehicleReport {
   int64_t origin = 0;              ///< utime of the report's time zero
   bool whole = true;               ///< the log is neither cut off nor damaged
   bool flew = false;               ///< there is a POSE or a PLAN
+  bool tells_states = false;       ///< there is a FLIGHT_STATE
   /// The states that the log begins and ends in, where they are none of standing on the ground.
   std::string begins_in, ends_in;
 };

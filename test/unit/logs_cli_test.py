@@ -364,7 +364,11 @@ class LogTools(unittest.TestCase):
             answer = run("chase-report", log, "--out", out)
             self.assertEqual(answer.returncode, 0, answer.stderr)
             self.assertIn(f"half_truth.lcm holds no {name}: reported is what the vehicle said of itself\n", answer.stdout)
-            self.assertIs(json.loads((out / "metrics.json").read_text())["truth"], False)
+            metrics = json.loads((out / "metrics.json").read_text())
+            self.assertIs(metrics["truth"], False)
+            self.assertIsNone(metrics["shortfall"], "there is no FLIGHT_STATE")
+            self.assertIn("\nwhether this is the whole flight is not known\n", answer.stdout)
+            self.assertIn("\n  whether this is the whole flight is not known\n", run("chase-report", log, self.log).stdout)
 
     def with_states(self, name, *states):
         """A log without truth in which mission says these, evenly spread."""
@@ -389,6 +393,7 @@ class LogTools(unittest.TestCase):
                     self.assert_refused(answer, 2, *words)
                 else:
                     self.assertEqual(answer.returncode, 0, answer.stderr)
+                self.assertNotIn("not known", answer.stdout)
 
     def test_report_has_a_time_line_and_what_was_certified(self):
         out = self.folder / "lines"

@@ -94,6 +94,7 @@ const vehicle = await open('vehicle', 1280, 900);
 for (const id of [...TIME, 'map']) assert.ok((await charts(vehicle)).includes(id), id);
 assert.match(await vehicle.textContent('#figures'), /Pose, largest standard deviation.*Target known.*Distance from the plan/s);
 assert.match(await vehicle.textContent('#latencies'), /POSE.*TARGET/s);
+assert.match(await vehicle.textContent('#losses'), /whether this is the whole flight is not known/);
 assert.match(await vehicle.textContent('#spent'), /target: tracking.*pose: ok/s);
 await checkLinked(vehicle);
 await checkPlayback(vehicle);
