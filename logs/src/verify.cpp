@@ -55,6 +55,8 @@ class Verifier {
     result_.unverified += found.unverified;
     if (!found.fault.empty())
       result_.refuted.push_back(fmt::format("plan {}: {}", m.seq, found.fault));
+    else if (found.unverified > 0)
+      result_.open.push_back(fmt::format("plan {}: {} proofs not verified", m.seq, found.unverified));
     else
       result_.proven += certified;
   }
@@ -104,11 +106,13 @@ std::string Format(const Verification& v) {
   std::string text = fmt::format(
       "{} plans, {} of them certified: {} proven, {} refuted, {} whose OBSTACLES are not in the "
       "log\n"
-      "{} proofs, {} of them not verified: the log lacks what they are about; radius {:.3f} m and "
-      "{:.1f} deviations at least\n",
-      v.plans, v.certified, v.proven, v.refuted.size(), v.unheard, v.proofs, v.unverified,
-      v.hard_radius, v.sigmas);
-  for (const std::string& line : v.refuted) text += line + "\n";
+      "{} proofs, {} of them not verified: the log lacks what they are about",
+      v.plans, v.certified, v.proven, v.refuted.size(), v.unheard, v.proofs, v.unverified);
+  if (v.certified > 0)
+    text += fmt::format("; radius {:.3f} m and {:.1f} deviations at least", v.hard_radius, v.sigmas);
+  text += "\n";
+  for (const auto* lines : {&v.refuted, &v.open})
+    for (const std::string& line : *lines) text += line + "\n";
   return text;
 }
 

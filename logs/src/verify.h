@@ -7,11 +7,12 @@ namespace chase::logs {
 
 /// What an exact check of every plan of a log says.
 struct Verification {
-  long plans = 0, certified = 0, proven = 0;  ///< proven: of the certified ones
+  long plans = 0, certified = 0, proven = 0;  ///< proven: certified, every proof verified
   long unheard = 0;                           ///< certified, their OBSTACLES are not in the log
   long proofs = 0, unverified = 0;            ///< the latter about what the log does not tell
   double hard_radius = 0.0, sigmas = 0.0;     ///< least of the certified plans, m and 1
   std::vector<std::string> refuted;           ///< a line per plan that does not hold
+  std::vector<std::string> open;              ///< a line per other plan with unverified proofs
 
   bool Told() const { return !refuted.empty() || (unheard == 0 && unverified == 0); }
 };

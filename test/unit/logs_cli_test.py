@@ -232,6 +232,32 @@ class LogTools(unittest.TestCase):
                 answer = run("chase-log", "verify", *arguments)
                 self.assertEqual(answer.returncode, code, answer.stdout + answer.stderr)
 
+    def test_verify_names_plans_that_it_cannot_verify(self):
+        figures = r"(\d+) of them certified: (\d+) proven, \d+ refuted"
+        certified, proven = map(int, re.search(figures, self.good("verify", self.log)).groups())
+        self.assertEqual(proven, certified)
+        blind = self.without("unforeseen.lcm", lambda channel, k: channel == "PREDICTION")
+        text = run("chase-log", "verify", blind).stdout
+        certified, proven = map(int, re.search(figures, text).groups())
+        named = re.findall(r"(?m)^plan \d+: (\d+) proofs not verified$", text)
+        self.assertGreater(len(named), 0)
+        self.assertEqual(proven, certified - len(named), text)
+        self.assertIn(f" proofs, {sum(map(int, named))} of them not verified", text)
+
+    def test_verify_without_a_certificate_tells_no_radius(self):
+        log, events = self.folder / "uncertified.lcm", []
+        for utime, channel, data in self.events:
+            if channel == "PLAN":
+                plan = chase.plan_t.decode(data)
+                plan.certified_clearance = -1.0
+                data = plan.encode()
+            events.append((utime, channel, data))
+        lcmlog.write(log, events)
+        text = run("chase-log", "verify", log).stdout
+        self.assertIn(" plans, 0 of them certified: 0 proven", text)
+        self.assertNotIn("radius", text)
+        self.assertIn("; radius 0.", self.good("verify", self.log))
+
     def test_verify_refuses_what_is_no_bound(self):
         for option, values in (("--radius", ("nan", "inf", "-1", "0", "x")), ("--sigmas", ("nan", "inf", "-1", "x"))):
             for value in values:
