@@ -346,7 +346,7 @@ class LogTools(unittest.TestCase):
         out = self.folder / "compared"
         same = run("chase-report", self.log, self.log, "--out", out)
         self.assertEqual(same.returncode, 2, "both end after a second of a minute")
-        self.assertIn("B is worse in nothing", same.stdout)
+        self.assertIn("\nB is worse in nothing\n", same.stdout)
         text = (out / "comparison.txt").read_text()
         self.assertIn(text, same.stdout)
         for side in "AB":
@@ -363,7 +363,8 @@ class LogTools(unittest.TestCase):
             self.assertRegex(mixed.stdout, r"pose_sigma_max_m +[\d.]+ m +[\d.]+ m\n")
         blind = self.without("blind.lcm", lambda channel, k: channel == "POSE")
         worse = run("chase-report", self.log, blind).stdout
-        self.assertRegex(worse, r"odometry_ate_m +[\d.]+ m +not known  WORSE")
+        self.assertRegex(worse, r"odometry_ate_m +[\d.]+ m +not known\n")
+        self.assertRegex(worse, r"\nB is worse in .+; not known of B: [1-9]\d*\n")
         better = run("chase-report", blind, self.log).stdout
         self.assertRegex(better, r"odometry_ate_m +not known +[\d.]+ m\n")
 
