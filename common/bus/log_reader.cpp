@@ -44,7 +44,9 @@ std::string LogOf(const std::string& flight) {
 std::string Format(const Damage& d) {
   if (d.at_end)
     return fmt::format("the last {} bytes are no whole event: the log was cut off", d.bytes);
-  return fmt::format("{} bytes at {} are no whole event: the log is damaged", d.bytes, d.at);
+  return fmt::format(
+      "{} bytes at {} are no whole event: the log is damaged, maybe the message before them, too",
+      d.bytes, d.at);
 }
 
 LogReader::LogReader(const std::string& file, Watch watch) : file_(file), watch_(std::move(watch)) {

@@ -189,7 +189,7 @@ class LogTools(unittest.TestCase):
             damaged = self.folder / f"{name}.lcm"
             damaged.write_bytes(data[:at] + wrong + data[at + len(wrong):])
             text = self.good("info", damaged)
-            self.assertIn("damaged", text)
+            self.assertIn("the log is damaged, maybe the message before them, too", text)
             count = sum(int(line.split()[2]) for line in text.splitlines() if " Hz " in line)
             self.assertEqual(count, len(self.events) - 1, name)
 
@@ -492,7 +492,7 @@ class LogTools(unittest.TestCase):
         answer = run("chase-log", "repair", damaged, out)
         self.assertEqual(answer.returncode, 0, answer.stderr)
         self.assertIn("POSE: 1 messages do not decode", answer.stdout)
-        self.assertEqual(answer.stderr.count("log is damaged"), 1, answer.stderr)
+        self.assertEqual(answer.stderr.count("log is damaged, maybe the message before them, too"), 1, answer.stderr)
         self.assertEqual(answer.stderr.count("cut off"), 1, answer.stderr)
         inside = self.folder / "inside.lcm"
         inside.write_bytes(raw[:middle] + b"xxxx" + raw[middle + 4:])
