@@ -78,7 +78,7 @@ long ExportTum(const std::string& log, const std::string& out, const std::string
   const Liner line_of = LinerOf(channel);
   LogReader reader(log, watch);
   std::string text, found;
-  long count = 0;
+  long heard = 0, count = 0;
   Frames frames;
   Unreadable unreadable;
   for (LogEvent e; reader.Next(&e);) {
@@ -87,6 +87,7 @@ long ExportTum(const std::string& log, const std::string& out, const std::string
     if (found != e.channel) RefuseSeveralVehicles(log, channel);
     const std::string line = line_of(e.bytes, &frames);
     unreadable.Add(e);
+    ++heard;
     text += line;
     count += !line.empty();
   }
@@ -94,6 +95,9 @@ long ExportTum(const std::string& log, const std::string& out, const std::string
     *notes = unreadable.Lines();
     notes->insert(notes->end(), frames.changes().begin(), frames.changes().end());
   }
+  if (count == 0 && heard > 0 && IsOn(channel, "TARGET") && unreadable.Lines().empty())
+    throw std::runtime_error(fmt::format(
+        "{}: none of {} messages of {} is of a target that is tracked", log, heard, channel));
   if (count == 0)
     throw std::runtime_error(log + ": holds no usable " + channel +
                              "; export a log of a flight, see chase-log info");

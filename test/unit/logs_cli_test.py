@@ -97,6 +97,18 @@ class LogTools(unittest.TestCase):
         self.good("export", "--tum", self.log, self.folder / "default.tum")
         self.assertEqual((self.folder / "default.tum").read_text(), texts["POSE"])
 
+    def test_tum_of_a_target_that_was_never_tracked_says_so(self):
+        log, events = self.folder / "untracked.lcm", []
+        for utime, channel, data in self.events:
+            if channel == "TARGET":
+                target = chase.target_t.decode(data)
+                target.state = target.SEARCHING
+                data = target.encode()
+            events.append((utime, channel, data))
+        lcmlog.write(log, events)
+        answer = run("chase-log", "export", "--tum", "--channel", "TARGET", log, self.folder / "untracked.tum")
+        self.assert_refused(answer, 1, f"{log}: none of {self.count('TARGET')} messages of TARGET is of a target that is tracked\n")
+
     def test_options_without_effect_are_refused(self):
         out = self.folder / "refused"
         for words, arguments in (
