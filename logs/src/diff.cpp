@@ -92,11 +92,19 @@ class Namer {
 /// The names of a log's messages under every rule, by channel.
 using Names = std::map<std::string, std::array<std::set<Key>, kRules>>;
 
-Names NamesIn(const std::string& file) {
+/// What is compared beside the fields of messages.
+constexpr std::array kOfEvents = {"count", "event_time", "bytes"};
+
+/// What may be ignored of each channel: the paths of its fields, and the rest that is compared.
+using Paths = std::map<std::string, std::vector<std::string>>;
+
+Names NamesIn(const std::string& file, Paths* paths) {
   LogReader log(file);
   Names names;
   std::map<std::string, Namer> namers;
   for (LogEvent e; log.Next(&e);) {
+    std::vector<std::string>& known = (*paths)[e.channel];
+    if (known.empty()) known = PathsOf(e.bytes);
     const Keys keys = namers[e.channel].Next(e);
     for (size_t rule = 0; rule < kRules; ++rule) names[e.channel][rule].insert(keys[rule]);
   }
@@ -251,23 +259,44 @@ std::optional<std::pair<LogEvent, LogEvent>> Step(const std::map<std::string, Pa
   return pair;
 }
 
+/// What all of these channels have, for people.
+std::string Listed(const Paths& held) {
+  std::vector<std::string> common = held.begin()->second;
+  for (const auto& [channel, paths] : held) {
+    const auto lacks = [&, &has = paths](const std::string& path) {
+      return std::find(has.begin(), has.end(), path) == has.end();
+    };
+    common.erase(std::remove_if(common.begin(), common.end(), lacks), common.end());
+  }
+  return fmt::format("{} has {}", held.size() == 1 ? held.begin()->first : "each channel",
+                     fmt::join(common, ", "));
+}
+
 /// `pattern`: CHANNEL or CHANNEL.field, either part a shell pattern.
-void RequireChannel(const std::string& pattern, const Names& a, const Names& b) {
-  const std::string name = pattern.substr(0, pattern.find('.'));
-  const auto fits = [&](const auto& channel) {
-    return fnmatch(name.c_str(), channel.first.c_str(), 0) == 0;
-  };
-  if (std::none_of(a.begin(), a.end(), fits) && std::none_of(b.begin(), b.end(), fits))
+void RequireHeld(const std::string& pattern, const Paths& all) {
+  const size_t point = pattern.find('.');
+  const std::string name = pattern.substr(0, point);
+  Paths held;
+  for (const auto& [channel, paths] : all)
+    if (fnmatch(name.c_str(), channel.c_str(), 0) == 0) held[channel] = paths;
+  if (held.empty())
     throw BadOption("--ignore " + pattern +
                     ": neither log holds that; chase-log info lists channels");
+  bool fits = point == std::string::npos;
+  for (const auto& [channel, paths] : held)
+    for (const std::string& path : paths) fits = fits || Ignored({pattern}, channel, path);
+  if (!fits) throw BadOption("--ignore " + pattern + ": there is no such field; " + Listed(held));
 }
 
 }  // namespace
 
 Differences Diff(const std::string& a, const std::string& b, const std::vector<std::string>& ignore,
                  double tolerance) {
-  const Names names_a = NamesIn(a), names_b = NamesIn(b);
-  for (const std::string& pattern : ignore) RequireChannel(pattern, names_a, names_b);
+  Paths paths;
+  const Names names_a = NamesIn(a, &paths), names_b = NamesIn(b, &paths);
+  for (auto& [channel, known] : paths)
+    known.insert(known.end(), kOfEvents.begin(), kOfEvents.end());
+  for (const std::string& pattern : ignore) RequireHeld(pattern, paths);
   const auto pairings = Pair(names_a, names_b);
   if (pairings.empty())
     throw std::runtime_error(a + " and " + b + ": have no channel in common; compare others");

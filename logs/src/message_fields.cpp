@@ -56,6 +56,40 @@ class Collector {
   std::map<std::string, size_t> index_;
 };
 
+/// Of a list it visits one item, though there be none.
+class PathCollector {
+ public:
+  template <class T>
+  void operator()(const char* name, const T& value) {
+    const std::string outer = path_;
+    path_ += path_.empty() ? name : std::string(".") + name;
+    Add(value);
+    path_ = outer;
+  }
+
+  std::vector<std::string> Take() { return std::move(paths_); }
+
+ private:
+  template <class T>
+  void Add(const T& value) {
+    if constexpr (std::is_arithmetic_v<T> || std::is_same_v<T, std::string>)
+      paths_.push_back(path_);
+    else
+      VisitFields(value, *this);
+  }
+  template <class T, size_t N>
+  void Add(const T (&values)[N]) {
+    Add(values[0]);
+  }
+  template <class T>
+  void Add(const std::vector<T>&) {
+    Add(T{});
+  }
+
+  std::string path_;
+  std::vector<std::string> paths_;
+};
+
 template <class... T>
 std::map<int64_t, std::string> Names(const std::tuple<T...>*) {
   return {{T::getHash(), T::getTypeName()}...};
@@ -77,6 +111,12 @@ std::optional<std::vector<Field>> FieldsOf(const Bytes& bytes) {
     fields = collector.Take();
   });
   return fields;
+}
+
+std::vector<std::string> PathsOf(const Bytes& bytes) {
+  PathCollector collector;
+  WithMessage(bytes, [&](const auto& message) { VisitFields(message, collector); });
+  return collector.Take();
 }
 
 }  // namespace chase::logs

@@ -24,4 +24,8 @@ std::string TypeOf(const Bytes& message);
 /// All fields in wire order, or nothing when the type is not ours or the bytes do not decode.
 std::optional<std::vector<Field>> FieldsOf(const Bytes& message);
 
+/// The paths of all fields that messages of this one's type may have, in wire order: its own lists
+/// may be empty. Nothing where FieldsOf has nothing.
+std::vector<std::string> PathsOf(const Bytes& message);
+
 }  // namespace chase::logs

@@ -223,6 +223,12 @@ class LogTools(unittest.TestCase):
         for pattern in ("NO_SUCH.seq", "NO_SUCH"):
             self.assert_refused(run("chase-log", "diff", self.log, self.log, "--ignore", pattern), 2, pattern, "info")
         self.good("diff", self.log, self.log, "--ignore", "*_STATUS.*", "--ignore", "POSE", "--ignore", "*.seq")
+        for pattern in ("POSE.nope", "P?SE.nope", "POSE.inputs"):
+            answer = run("chase-log", "diff", self.log, self.log, "--ignore", pattern)
+            self.assert_refused(answer, 2, f"--ignore {pattern}: there is no such field; POSE has utime, seq, ", " inputs.seq, ", "count")
+        self.assert_refused(run("chase-log", "diff", self.log, self.log, "--ignore", "*.nope"), 2, "; each channel has utime, seq, ", "count")
+        self.good("diff", self.log, self.log, *(f"--ignore=POSE.{field}" for field in ("inputs.*", "count", "event_time", "bytes")),
+                  "--ignore", "OBSTACLES.obstacles.center.coefficients")
 
     def test_diff_ignores_channels_by_a_pattern(self):
         lost = self.without("fewer.lcm", lambda channel, k: channel.endswith("_STATUS") and k == 0)

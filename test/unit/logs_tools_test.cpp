@@ -43,6 +43,16 @@ TEST(MessageFields, NestedListsAreFlattenedInOrder) {
   EXPECT_FALSE(Find(*fields, "utime")->is_list);
 }
 
+TEST(MessageFields, PathsAreOfTheTypeNotOfWhatAMessageHolds) {
+  const auto fields = FieldsOf(Encoded(Obstacles(2)));
+  const auto all = PathsOf(Encoded(Obstacles(0)));
+  EXPECT_EQ(PathsOf(Encoded(Obstacles(2))), all);
+  for (const Field& f : fields.value())
+    EXPECT_EQ(std::count(all.begin(), all.end(), f.path), 1) << f.path;
+  EXPECT_EQ(std::count(all.begin(), all.end(), "inputs.seq"), 1);
+  EXPECT_TRUE(PathsOf(Bytes(20, 7)).empty());
+}
+
 TEST(MessageFields, ForeignTruncatedAndNegativeLengthsAreRefused) {
   EXPECT_EQ(TypeOf({1, 2, 3}), "");
   EXPECT_EQ(TypeOf(Bytes(64, 7)), "");
