@@ -1,4 +1,5 @@
-# Packs the page's files and three.js into the folder that chase-viewer serves.
+# Packs the page's files and three.js into the folder that chase-viewer serves. Foxglove's layout stays as it is: who fetches it
+# may not take gzip.
 # Usage: cmake -DPAGE=page -DTHREE=node_modules/three -DTO=folder -P pack_page.cmake
 file(REMOVE_RECURSE ${TO}.new)
 file(MAKE_DIRECTORY ${TO}.new)
@@ -12,6 +13,7 @@ if(EXISTS ${THREE}/build/three.module.min.js)
 endif()
 file(COPY ${files} DESTINATION ${TO}.new)
 file(GLOB copies ${TO}.new/*)
+list(FILTER copies EXCLUDE REGEX "\\.json$")
 execute_process(COMMAND gzip -9 -n ${copies} COMMAND_ERROR_IS_FATAL ANY)
 file(REMOVE_RECURSE ${TO})
 file(RENAME ${TO}.new ${TO})

@@ -2,6 +2,7 @@
 import assert from 'node:assert';
 import {execFileSync} from 'node:child_process';
 import fs from 'node:fs';
+import http from 'node:http';
 import os from 'node:os';
 import path from 'node:path';
 import {bin, load, log, pageClient, play, sleep, until} from './viewer.mjs';
@@ -88,8 +89,11 @@ assert.deepStrictEqual(seen.first.get('/tf').transforms.map((t) => t.child_frame
 const lens = seen.first.get('CAMERA_IMAGE/calibration');
 assert.deepStrictEqual([lens.distortion_model, ...lens.D], ['plumb_bob', -0.3, 0.1, 0, 0, 0.02]);
 
-// The layout to import names nothing that is not there.
-const layout = JSON.parse(await (await fetch(`${viewer.url}foxglove-layout.json`)).text());
+// The layout to import comes as it is to who asks for no gzip, and names nothing that is not there.
+const layout = JSON.parse(await new Promise((done, fail) => http.get(`${viewer.url}foxglove-layout.json`, (answer) => {
+  let text = '';
+  answer.on('data', (data) => { text += data; }).on('end', () => done(text));
+}).on('error', fail)));
 const named = new Set(), plotted = new Set();
 for (const {topics, imageMode, paths} of Object.values(layout.configById)) {
   for (const topic of [...Object.keys(topics ?? {}), ...Object.values(imageMode ?? {})]) named.add(topic);
