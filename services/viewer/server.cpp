@@ -95,6 +95,7 @@ void Server::Hub::Recount() {
     image = image || client->Wants(Part::kImage);
   }
   pages = count;
+  sockets = static_cast<int>(clients.size());
   wants_cloud = cloud;
   wants_image = image;
   std::array<bool, kMostChannels> marked{};
@@ -177,8 +178,8 @@ void Server::SendMessage(uint32_t channel, int64_t utime, std::string payload) {
 }
 
 Server::Counters Server::counters() const {
-  return {hub_->accepted, hub_->refused,   hub_->malformed,
-          hub_->dropped,  hub_->connected, hub_->unheard};
+  return {hub_->accepted, hub_->refused, hub_->malformed,
+          hub_->dropped,  hub_->sockets, hub_->unheard};
 }
 
 }  // namespace chase::viewer

@@ -53,7 +53,7 @@ class Server : public PageSink {
 
   struct Counters {
     int64_t accepted = 0, refused = 0, malformed = 0, dropped = 0;
-    int connected = 0;
+    int connected = 0;    ///< WebSocket clients: pages and Foxglove
     int64_t unheard = 0;  ///< requests beyond kMostRequests
   };
   Counters counters() const;

@@ -57,7 +57,9 @@ struct Server::Hub {
   std::mutex inbox_mutex;
   std::vector<Request> inbox;
   std::map<uint64_t, int> asked;  ///< how many of a client's requests are in the inbox
-  std::atomic<int> connected{0}, pages{0}, pending{0};
+  std::atomic<int> connected{0};  ///< HTTP and WebSocket
+  std::atomic<int> sockets{0};    ///< of them WebSocket
+  std::atomic<int> pages{0}, pending{0};
   std::atomic<bool> wants_cloud{false}, wants_image{false};
   std::array<std::atomic<bool>, kMostChannels> subscribed{};
   std::atomic<int64_t> accepted{0}, refused{0}, malformed{0}, dropped{0}, unheard{0};

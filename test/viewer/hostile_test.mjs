@@ -24,6 +24,14 @@ const get = (path) => new Promise((done, fail) => {
     done(answer.statusCode);
   }).on('error', fail);
 });
+// Who only asks for files, and stays, is not counted as connected.
+const agent = new http.Agent({keepAlive: true});
+await Promise.all([...Array(6)].map(() => new Promise((done, fail) =>
+  http.get({port: viewer.port, host: '127.0.0.1', path: '/', agent}, (answer) => answer.resume().on('end', done)).on('error', fail))));
+const healths = good.newest.health;
+await until('a newer status', () => good.newest.health !== healths);
+assert.match(good.newest.health.self, /^1 connected, /);
+agent.destroy();
 // Paths that lead out, and methods that write.
 for (const path of ['/../../etc/passwd', '/..%2f..%2fetc/passwd', '/%2e%2e/%2e%2e/etc/passwd', '//etc/passwd', '/main.js/../../x',
   '/./main.js', '/main.js%00.html', '\\..\\etc', '/etc/passwd', '/index.html.gz', '/ws'])
