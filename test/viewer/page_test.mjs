@@ -154,6 +154,7 @@ for (const share of [0.1, 0.5, 0.9]) {
   };
   const scrubbed = await clicked('#scrubber');
   await seek(0);
+  await until('the beginning', async () => await played() < 0.05);
   const drawn = await clicked('#timeline');
   assert.ok(Math.abs(scrubbed - drawn) < 0.05 + 2 * duration / width, `${scrubbed} s on the scrubber, ${drawn} s on the time line`);
 }
@@ -268,6 +269,21 @@ const lines = await page.evaluate(async () => {
   return {ends: array.length / 3, low: Math.min(...array), high: Math.max(...array), shown, after: scene.fence.visible, seen};
 });
 assert.deepStrictEqual(lines, {ends: 18, low: -1, high: 5, shown: true, after: false, seen: [[35, 43, 54], [217, 83, 79]]});
+
+// No label hides a curve.
+const hidden = await page.evaluate(async () => {
+  const {drawStrips} = await import('./strips.js'), canvas = document.createElement('canvas');
+  Object.assign(canvas.style, {width: '370px', height: '148px', position: 'absolute'});
+  document.body.append(canvas);
+  const row = window.chase.model.rows[0].map(() => null), column = (await import('./names.js')).DISTANCE;
+  drawStrips(canvas, [...Array(81).keys()].map((i) => Object.assign([...row], {0: i / 2, [column]: 1})), 0, 40, 0);
+  const y = 4 * devicePixelRatio, context = canvas.getContext('2d');  // the curve runs through its label
+  const blue = (x) => Math.max(...[0, 1, 2].map((k) => context.getImageData(x * devicePixelRatio, y + k, 1, 1).data).map(([r, , b]) => b - r));
+  const at = [...Array(280).keys()].map((i) => 70 + i), wanted = blue(340);
+  canvas.remove();
+  return {wanted, missing: at.filter((x) => blue(x) < 0.8 * wanted)};
+});
+assert.ok(hidden.wanted > 100 && hidden.missing.length === 0, JSON.stringify(hidden));
 
 // A viewer that says nothing is told from one that is well within two seconds; then the connection is made anew until it answers.
 const linked = () => page.evaluate(() => {

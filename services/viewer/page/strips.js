@@ -66,7 +66,9 @@ export function drawStrips(canvas, rows, from, to, now) {
     const most = shown.reduce((m, row) => Math.max(m, row[column]), 1e-3) * 1.05;
     context.strokeStyle = '#2c3542';
     context.strokeRect(LEFT + 0.5, top + 2.5, width - LEFT - 9, step - 5);
-    context.strokeStyle = color;
+    context.fillStyle = '#dfe5ec';
+    context.fillText(`${name}  ${format(current?.[column], digits, unit)}`, LEFT + 8, top + 11);
+    context.strokeStyle = color;  // over the words, which hide nothing of it
     context.beginPath();
     let last = -Infinity;
     for (const row of shown) {
@@ -79,11 +81,6 @@ export function drawStrips(canvas, rows, from, to, now) {
     context.fillStyle = DIM;
     context.fillText(shown.length > 0 ? most.toPrecision(2) : '–', 8, top + 9);
     context.fillText('0', 8, top + step - 8);
-    const text = `${name}  ${format(current?.[column], digits, unit)}`;
-    context.fillStyle = '#1a2028c0';  // the line goes on below
-    context.fillRect(LEFT + 4, top + 4, context.measureText(text).width + 8, 14);
-    context.fillStyle = '#dfe5ec';
-    context.fillText(text, LEFT + 8, top + 11);
   });
   cursor(context, x(now), height);
 }
