@@ -94,8 +94,8 @@ int Compare(const std::vector<std::string>& logs, const std::string& out) {
 
 }  // namespace
 
-/// Exit codes: 0 reported, whatever became of the flight, also where nobody can tell whether the log
-/// holds all of it; 1 bad use; 2 reported as far as the log goes, which does not hold the whole
+/// Exit codes: 0 reported, whatever became of the flight, also where nobody can tell whether the
+/// log holds all of it; 1 bad use; 2 reported as far as the log goes, which does not hold the whole
 /// flight.
 int main(int argc, char** argv) {
   CLI::App app{"Metrics, plots and one HTML page from a flight log."};

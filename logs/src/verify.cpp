@@ -56,7 +56,8 @@ class Verifier {
     if (!found.fault.empty())
       result_.refuted.push_back(fmt::format("plan {}: {}", m.seq, found.fault));
     else if (found.unverified > 0)
-      result_.open.push_back(fmt::format("plan {}: {} proofs not verified", m.seq, found.unverified));
+      result_.open.push_back(
+          fmt::format("plan {}: {} proofs not verified", m.seq, found.unverified));
     else
       result_.proven += certified;
   }
@@ -109,7 +110,8 @@ std::string Format(const Verification& v) {
       "{} proofs, {} of them not verified: the log lacks what they are about",
       v.plans, v.certified, v.proven, v.refuted.size(), v.unheard, v.proofs, v.unverified);
   if (v.certified > 0)
-    text += fmt::format("; radius {:.3f} m and {:.1f} deviations at least", v.hard_radius, v.sigmas);
+    text +=
+        fmt::format("; radius {:.3f} m and {:.1f} deviations at least", v.hard_radius, v.sigmas);
   text += "\n";
   for (const auto* lines : {&v.refuted, &v.open})
     for (const std::string& line : *lines) text += line + "\n";
