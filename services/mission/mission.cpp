@@ -12,13 +12,25 @@ bool Has(const std::vector<Event>& events, Event event) {
   return std::find(events.begin(), events.end(), event) != events.end();
 }
 
-constexpr char kBrokeOff[] = "broke off ";
+const char* StopReason() { return Find(State::kHold, Event::kStop)->reason; }
+
+bool IsStop(const Led& led) {
+  return led.state == State::kHold && led.reason.rfind(StopReason(), 0) == 0;
+}
+
+/// What an emergency tells of what it breaks off, in the format of flight_state_t.lcm: HOME brings
+/// it to the next mission process.
+std::string TellBrokenOff(const Led& led) {
+  const std::string words = "broke off " + std::string(Name(led.state));
+  return IsStop(led) ? words + ": " + StopReason() : words;
+}
 
 /// What goes on after an emergency of that reason.
-State BrokenOff(const std::string& reason) {
-  for (const State state : {State::kLand, State::kReturn})
-    if (reason.find(kBrokeOff + std::string(Name(state))) != std::string::npos) return state;
-  return State::kHold;
+std::optional<Led> ReadBrokenOff(const std::string& reason) {
+  for (const Led& led : {Led{State::kLand, 0.0, ""}, Led{State::kReturn, 0.0, ""},
+                         Led{State::kHold, 0.0, StopReason()}, Led{State::kHold, 0.0, ""}})
+    if (reason.find(TellBrokenOff(led)) != std::string::npos) return led;
+  return std::nullopt;
 }
 
 }  // namespace
@@ -75,8 +87,8 @@ std::string Mission::Overridden(State to) const {
 bool Mission::Step(double t, Event event, const std::string& detail) {
   const Transition* row = Find(state_, event);
   if (row == nullptr) return false;
+  if (row->to == State::kEmergency) before_ = {state_, since_, reason_};
   if (row->to != state_) since_ = t;
-  if (row->to == State::kEmergency) before_ = state_;
   if (row->to == State::kReturn) visited_.clear();
   state_ = row->to;
   reason_ = row->reason + (detail.empty() ? "" : ": " + detail);
@@ -107,7 +119,7 @@ void Mission::Update(double t) {
     const bool stepped = Step(t, event, Detail(t, event));
     if (stepped && (event == Event::kLeaving || event == Event::kNotFlown))
       uncommanded_ = false;  // it would come to the same again
-    if (stepped && event == Event::kPoseBack) ComeDown(t, before_, "before the pose was lost");
+    if (stepped && event == Event::kPoseBack) GoOn(t, before_, "before the pose was lost");
   }
   if (uncommanded_ && config_.autostart) LeadItself(t);
   HearOfGround();
@@ -124,10 +136,13 @@ void Mission::Remember(double t, const Home& home, const Led& led) {
   // It may have come to land for want of the take-off place or the pose alone: what else it lands
   // for, stands.
   if (state_ == State::kLand && (emergency || !inputs_.landing)) Step(t, Event::kHold, when);
-  ComeDown(t, emergency ? BrokenOff(led.reason) : led.state, when);
+  if (const std::optional<Led> before = emergency ? ReadBrokenOff(led.reason) : led) {
+    if (before->state == State::kHold) Step(t, Event::kHold, when);  // autostart may have chased
+    GoOn(t, *before, when);
+    KeepHold(*before);
+  }
   if (led.state == State::kChase) Step(t, Event::kChase, when);
   if (led.state == State::kSearch) Step(t, Event::kSearch, when);
-  if (led.state == State::kHold) HoldOn(t, led.reason, when);
   if (state_ == led.state) since_ = std::min(t, led.since);
 }
 
@@ -135,26 +150,30 @@ void Mission::Remember(double t, const Home& home, const Led& led) {
 /// of it. Control may be silent by then.
 void Mission::GoOnWithoutPose(double t, const Led& led) {
   Step(t, Event::kFlying);
-  Step(t, Event::kPoseLost);
+  Step(t, Event::kPoseLost, Detail(t, Event::kPoseLost));
   if (state_ != State::kEmergency) return;
-  if (uncommanded_) before_ = BrokenOff(led.reason);
   began_ = -HUGE_VAL;
   since_ = std::min(t, led.since);
+  if (!uncommanded_) return;
+  const std::optional<Led> before = ReadBrokenOff(led.reason);
+  if (before) KeepHold(*before);
+  before_ = before.value_or(Led{});
   reason_ = led.reason.substr(0, led.reason.find("; "));  // the rest is Words() of its time
 }
 
-/// A stop goes on as one: it overrules the limits that it is found beyond.
-void Mission::HoldOn(double t, const std::string& reason, const char* when) {
-  const bool stopped = reason.rfind(Find(State::kHold, Event::kStop)->reason, 0) == 0;
-  Step(t, stopped ? Event::kStop : Event::kHold, when);
-  if (stopped) Overrule();
-  uncommanded_ = false;  // whoever told it to hold leads
+/// What was led before goes on; but for a stop, what held needs no more than HOLD.
+void Mission::GoOn(double t, const Led& before, const char* when) {
+  if (before.state == State::kLand) Step(t, Event::kLand, when);
+  if (before.state == State::kReturn) Step(t, Event::kReturn, when);
+  if (IsStop(before)) Step(t, Event::kStop, when);
 }
 
-/// What was on its way down or back goes on so.
-void Mission::ComeDown(double t, State before, const char* when) {
-  if (before == State::kLand) Step(t, Event::kLand, when);
-  if (before == State::kReturn) Step(t, Event::kReturn, when);
+/// Of a process before this one: a stop overrules the limits that it is found beyond, and whoever
+/// told it to hold leads.
+void Mission::KeepHold(const Led& before) {
+  if (before.state != State::kHold) return;
+  if (IsStop(before)) Overrule();
+  uncommanded_ = false;
 }
 
 // The way home may lead away from it first, around a corner of the geofence; to and fro, and down
@@ -233,7 +252,7 @@ void Mission::DropOverruled() {
 
 std::string Mission::Detail(double t, Event event) const {
   if (event == Event::kMissing) return missing_.front();
-  if (event == Event::kPoseLost) return kBrokeOff + std::string(Name(state_));
+  if (event == Event::kPoseLost) return TellBrokenOff({state_, since_, reason_});
   if (event == Event::kLost) return ForecastProblem(inputs_, t);
   if (event == Event::kNotFlown && !Unruly().empty())
     return Has(Unruly(), Event::kOutside) ? Outside() : "battery low";

@@ -89,9 +89,9 @@ class Mission {
   std::string Detail(double t, Event event) const;
   void LeadItself(double t);
   void HearOfGround();
-  void ComeDown(double t, State before, const char* when);
+  void GoOn(double t, const Led& before, const char* when);
+  void KeepHold(const Led& before);
   void GoOnWithoutPose(double t, const Led& led);
-  void HoldOn(double t, const std::string& reason, const char* when);
   void NoteProgress(double t);
 
   MissionConfig config_;
@@ -106,7 +106,7 @@ class Mission {
   double since_ = 0.0;
   std::optional<double> taken_off_;    // when that was commanded, s
   std::optional<double> flown_;        // since when control has flown, s
-  State before_ = State::kHold;        // the emergency
+  Led before_;                         // the emergency
   std::optional<double> last_usable_;  // pose, s
   std::optional<double> began_;  // the first Update(), s: the wait for a pose counts from there
   std::vector<Eigen::Vector3d> visited_;  // in this RETURN, frame W, m

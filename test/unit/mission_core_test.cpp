@@ -529,6 +529,114 @@ TEST(Mission, WhatAnEmergencyBrokeOffOutlivesARestart) {
   }
 }
 
+/// A mission process in whose time the pose is back, told by HOME of the emergency that `first`
+/// led.
+Led AfterARestart(const MissionConfig& config, const Bench& first, bool back, State expected) {
+  Bench second(config);
+  Inputs& inputs = second.mission.inputs();
+  second.pose.p = first.pose.p;
+  inputs.flying = inputs.landing = true;
+  inputs.battery = first.mission.inputs().battery;
+  second.hears_pose = back;  // before HOME
+  second.Run(0.1);
+  second.mission.Remember(second.t, *first.mission.home(),
+                          {State::kEmergency, 3.0, first.mission.Words()});
+  second.hears_pose = true;
+  inputs.landing = false;
+  second.Run(5.0);
+  EXPECT_EQ(second.mission.state(), expected) << second.mission.Words();
+  return {second.mission.state(), second.mission.since(), second.mission.Words()};
+}
+
+TEST(Mission, WhoWasToldToHoldHoldsAfterAnEmergencyAndARestart) {
+  MissionConfig config;
+  config.autostart = true;
+  for (const Event command : {Event::kHold, Event::kStop}) {
+    for (const bool back : {true, false}) {
+      Bench first(config);
+      first.Run(0.5);
+      ASSERT_TRUE(first.Command(command).accepted);
+      first.hears_pose = false;
+      first.Run(2.2);
+      ASSERT_EQ(first.mission.state(), State::kEmergency);
+      AfterARestart(config, first, back, State::kHold);
+      first.hears_pose = true;
+      first.Run(5.0);
+      EXPECT_EQ(first.mission.state(), State::kHold) << "as without a restart";
+    }
+  }
+}
+
+TEST(Mission, AnEmergencyInAChaseByItselfIsFollowedByAChase) {
+  MissionConfig config;
+  config.autostart = true;
+  for (const bool back : {true, false}) {
+    Bench first(config);
+    first.Run(0.5);
+    ASSERT_EQ(first.mission.state(), State::kChase);
+    first.hears_pose = false;
+    first.Run(2.2);
+    ASSERT_EQ(first.mission.state(), State::kEmergency);
+    AfterARestart(config, first, back, State::kChase);
+  }
+}
+
+TEST(Mission, AStopThatAnEmergencyBrokeOffHoldsAsBeforeWhatTheEnvelopeSays) {
+  MissionConfig config;
+  config.geofence.polygon = {{-9, -9}, {9, -9}, {9, 9}, {-9, 9}};
+  for (const double charge : {1.0, 0.2}) {
+    for (const bool outside : {false, true}) {
+      for (const Event command : {Event::kHold, Event::kStop}) {
+        for (const bool back : {true, false}) {
+          Bench first(config);
+          first.Fly({5.0, 0.0, 1.0});
+          ASSERT_TRUE(first.Command(command).accepted);
+          first.hears_pose = false;
+          first.Run(2.2);
+          first.pose.p.x() = outside ? 9.5 : 5.0;
+          first.mission.inputs().battery = charge;
+          ASSERT_EQ(first.mission.state(), State::kEmergency);
+          const bool holds = command == Event::kStop || (!outside && charge > 0.3);
+          const Led led = AfterARestart(config, first, back, holds ? State::kHold : State::kReturn);
+          if (command != Event::kStop) continue;
+          EXPECT_EQ(led.reason.rfind("stop commanded", 0), 0u)
+              << "the next restart: " << led.reason;
+        }
+      }
+    }
+  }
+}
+
+TEST(Mission, AStopThatAnEmergencyBrokeOffIsToldOnceItIsOver) {
+  MissionConfig config;
+  config.geofence.polygon = {{-9, -9}, {9, -9}, {9, 9}, {-9, 9}};
+  Bench bench(config);
+  bench.Fly({5.0, 0.0, 1.0});
+  bench.pose.p.x() = 9.5;
+  bench.Run(0.2);
+  ASSERT_EQ(bench.mission.state(), State::kReturn);
+  ASSERT_TRUE(bench.Command(Event::kStop).accepted);
+  bench.hears_pose = false;
+  bench.Run(2.2);
+  ASSERT_EQ(bench.mission.state(), State::kEmergency);
+  bench.hears_pose = true;
+  bench.Run(0.2);
+  EXPECT_EQ(bench.mission.reason(), "stop commanded: before the pose was lost");
+  bench.mission.inputs().battery = 0.2;
+  bench.Run(0.2);
+  EXPECT_EQ(bench.mission.state(), State::kReturn) << "one more limit";
+}
+
+TEST(Mission, AnEmergencyTellsWhatWasCommandedBeforeHome) {
+  Bench bench;
+  bench.mission.inputs().flying = true;
+  bench.hears_pose = false;
+  bench.Run(0.1);
+  ASSERT_TRUE(bench.Command(Event::kStop).accepted);
+  bench.mission.Remember(bench.t, {{1.0, 2.0, 0.0}, bench.pose.epoch}, Emergency("RETURN"));
+  EXPECT_EQ(bench.mission.Words(), "no pose: broke off HOLD: stop commanded");
+}
+
 TEST(Mission, StartedInFlightItGivesUpTheSearchInItsTime) {
   Bench bench;
   bench.mission.inputs().flying = true;
