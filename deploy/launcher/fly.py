@@ -225,7 +225,7 @@ class Flight:
         self.faults = {fault["name"]: fault for fault in faults}
         # Processes that hear of them on FAULT delay and lose what comes to them.
         self.bus_faults = {"CHASE_BUS_FAULTS": str(seed)} if any(fault.get("bus") for fault in faults) else {}
-        self.strikes, self.killed, self.strained = sorted(strikes_of(faults, kills)), [], {}
+        self.strikes, self.killed, self.strained, self.disk = sorted(strikes_of(faults, kills)), [], {}, strain.FullDisk()
 
     def child(self, name, command, env=None, **options):
         return processes.Child(name, command, self.folder / f"{name}.log", {**self.env, **(env or {})}, **options)
@@ -313,7 +313,7 @@ class Flight:
         """Begins or ends what strikes the processes' surroundings."""
         self.tell("+" if effect == "begins" else "-", fault)
         if fault == "disk-full":
-            return strain.fill_disk(self.logger.process.pid)
+            return self.disk.begin()
         if effect == "begins":
             for command in strain.commands(self.faults[fault], self.url):
                 self.strained.setdefault(fault, []).append(self.child(fault, command))
@@ -350,6 +350,7 @@ class Flight:
                 self.strike(now)
             watched = [self.monitor] if ended and not line else []
             self.complain(*watched)
+            self.disk.strike(self.logger.process)
             if time.monotonic() - moved > SILENCE_LIMIT:
                 raise FlightError(f"the mission's time has not moved for {SILENCE_LIMIT:.0f} s; "
                                   f"the logs are in {self.folder}")
@@ -376,8 +377,11 @@ def show(progress):
 
 
 def join_logs(folder):
-    """A recorder that was started anew went on in another log."""
+    """A recorder that was started anew went on in another log; on a full disk nothing is in it."""
     logs = sorted(folder.glob("flight*.lcm"))
+    for empty in [log for log in logs[1:] if not log.stat().st_size]:
+        logs.remove(empty)
+        empty.unlink()
     if len(logs) < 2:
         return
     whole = folder / "whole.lcm"

@@ -1,5 +1,6 @@
 """What faults of a live flight's surroundings do: busy processes, a flood of the bus, a disk that takes nothing more."""
 
+import math
 import os
 import random
 import resource
@@ -43,10 +44,20 @@ def flood(url, rate_hz, *channels):
             time.sleep(max(0.0, due - time.monotonic()))
 
 
-def fill_disk(recorder):
-    """No file takes another byte of that process, as on a full disk; its log has the FAULT of it, though."""
-    time.sleep(FLUSHED)
-    resource.prlimit(recorder, resource.RLIMIT_FSIZE, (0, 0))
+class FullDisk:
+    """From FLUSHED after its beginning on no file takes another byte of the recorder; its log has the FAULT of it, though."""
+
+    def __init__(self):
+        self._from, self._limited = math.inf, None
+
+    def begin(self):
+        self._from = time.monotonic() + FLUSHED
+
+    def strike(self, recorder):
+        """The process, once each: also one that was started anew."""
+        if time.monotonic() >= self._from and recorder is not self._limited and recorder.poll() is None:
+            resource.prlimit(recorder.pid, resource.RLIMIT_FSIZE, (0, 0))
+            self._limited = recorder
 
 
 def work():

@@ -401,11 +401,14 @@ class FlightTest(unittest.TestCase):
         self.program("chase-recorder", SERVICE.format(behaviour="""
     folder = sys.argv[sys.argv.index("--folder") + 1]
     name = "flight-001" if os.path.exists(os.path.join(folder, "flight.lcm")) else "flight"
+    open(os.path.join(folder, "flight-002.lcm"), "w").close()  # of one that found the disk full
     open(os.path.join(folder, name + ".lcm"), "w").write(name + "\\n")
     """))
         self.program("chase-log", """
             import pathlib, sys
             *logs, whole = sys.argv[2:]
+            if not all(pathlib.Path(log).stat().st_size for log in logs):
+                sys.exit("a log is empty")
             pathlib.Path(whole).write_text("".join(pathlib.Path(log).read_text() for log in logs))
             """)
         self.program("chase-flight-monitor", f"""
@@ -525,6 +528,70 @@ class FlightTest(unittest.TestCase):
         self.assertEqual(code, 0, err)
         self.assertEqual(json.loads((self.bin / "told").read_text(encoding="utf-8")), ["+disk-full\n", [], [True]])
         self.assertRegex(err, r"^\nt +0\.\d s: disk-full begins\n$")
+
+    def fill_the_disk(self, watched):
+        """Of a flight with a full disk from 0.5 s on: what this code of its monitor finds."""
+        faults = [{"name": "cpu-load", "at_s": 0.0, "for_s": None, "times": 1}, {"name": "disk-full", "at_s": 0.5, "for_s": None}]
+        told = json.dumps({"duration_s": 2, "settle_s": 1, "faults": faults})
+        self.program("chase-scenario", f"print({told!r})")
+        silent = SERVICE.replace('print("working", flush=True)', "")  # its output is a file, too
+        self.program("chase-recorder", silent.format(behaviour=RECORD))
+        self.program("chase-flight-monitor", """
+            import json, os, pathlib, signal, sys, time
+            def say(t, done=False):
+                print(json.dumps(dict(mission_time=t, duration=2, distance=2.5, visible=1.0, rtf=0.0, done=done)), flush=True)
+            def recorder(but=None):
+                while True:
+                    for pid in pathlib.Path("/proc/%d/task/%d/children" % (os.getppid(), os.getppid())).read_text().split():
+                        if pid != but and "chase-recorder" in pathlib.Path("/proc/%s/cmdline" % pid).read_text():
+                            return pid
+                    time.sleep(0.01)
+            def full(pid):
+                return "Max file size             0 " in pathlib.Path("/proc/%s/limits" % pid).read_text()
+            say(0.1)
+            sys.stdin.readline()  # it flies
+            {watched}
+            pathlib.Path({out!r}).write_text(json.dumps(found))
+            say(2, done=True)
+            signal.pause()
+            """.format(watched=watched, out=str(self.bin / "told")))
+        code, _, err = self.fly()
+        self.assertEqual(code, 0, err)
+        return json.loads((self.bin / "told").read_text(encoding="utf-8")), err
+
+    def test_the_disk_stays_full_for_a_recorder_that_is_started_anew(self):
+        found, err = self.fill_the_disk("""
+            first = recorder()
+            say(0.6)
+            time.sleep(1)
+            found = [full(first)]
+            os.kill(int(first), signal.SIGKILL)
+            second = recorder(but=first)
+            time.sleep(0.5)
+            found.append(full(second))""")
+        self.assertEqual(found, [True, True])
+        self.assertIn("recorder ended (SIGKILL): restarted", err)
+
+    def test_a_disk_may_be_full_while_there_is_no_recorder(self):
+        self.patch(processes, "BACK_OFF", (2.0,))
+        found, _ = self.fill_the_disk("""
+            first = recorder()
+            os.kill(int(first), signal.SIGKILL)
+            time.sleep(0.5)
+            say(0.6)
+            second = recorder(but=first)
+            time.sleep(0.5)
+            found = full(second)""")
+        self.assertTrue(found)
+
+    def test_a_full_disk_holds_up_no_other_fault(self):
+        self.patch(time, "sleep", unittest.mock.Mock(side_effect=time.sleep))
+        found, _ = self.fill_the_disk("""
+            say(0.6)
+            time.sleep(1)
+            found = full(recorder())""")
+        self.assertTrue(found)
+        self.assertLess(max(call.args[0] for call in time.sleep.call_args_list), strain.FLUSHED)
 
     def heard_of_bus_faults(self, *faults):
         """Which programs of a flight with these faults have the variable, and which have not; the flight."""
