@@ -82,8 +82,11 @@ int64_t CameraNode::CaptureTime(const Grabber::Grabbed& grabbed) {
     case StampClock::kMonotonic:
       return clock_.HostTime(now - (bus::SteadyMicroseconds() - frame.stamp), true, arrival) -
              delay;
-    case StampClock::kWall:
-      return clock_.HostTime(now - (bus::WallMicroseconds() - frame.stamp), true, arrival) - delay;
+    case StampClock::kWall: {
+      const int64_t stamp = now - (bus::WallMicroseconds() - frame.stamp);
+      if (wall_.WasSet(CaptureClock::kOldest)) return clock_.WithoutStamp(arrival) - delay;
+      return clock_.HostTime(stamp, true, arrival) - delay;
+    }
     case StampClock::kStream:
       break;
   }

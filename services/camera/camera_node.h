@@ -4,6 +4,7 @@
 #include <string>
 
 #include "common/bus/bus.h"
+#include "common/bus/host_clock.h"
 #include "common/bus/node.h"
 #include "services/camera/capture_clock.h"
 #include "services/camera/config.h"
@@ -39,6 +40,7 @@ class CameraNode : public bus::Node {
   std::unique_ptr<FrameSource> recording_;  // or
   std::unique_ptr<Grabber> grabber_;
   CaptureClock clock_;
+  bus::WallClockWatch wall_;
   Pace pace_;
   StampClock stamps_ = StampClock::kNone;
   int64_t last_utime_ = 0, last_picture_ = 0;  // bus's clock

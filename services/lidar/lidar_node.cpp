@@ -2,8 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <cstdlib>
-
 #include "common/bus/convert.h"
 #include "common/bus/host_clock.h"
 #include "services/lidar/convert.h"
@@ -12,12 +10,9 @@ namespace chase::lidar {
 namespace {
 
 constexpr int64_t kOldest = 1'000'000;  // us that a packet may wait in the socket
-constexpr int64_t kSet = 1000;          // us: by more than what NTP slews it within a tick
 constexpr double kSilent = 0.2;         // s without a packet: 150 are missing
 constexpr double kPatience = 2.0;       // s without one since the start
 constexpr double kFlawed = 5.0;         // s after a loss in which the sensor is called degraded
-
-int64_t WallAhead() { return bus::WallMicroseconds() - bus::SteadyMicroseconds(); }
 
 }  // namespace
 
@@ -51,7 +46,6 @@ void LidarNode::TickDevice() {
     }
     Take(*packet);
   }
-  wall_ahead_ = WallAhead();
   const long flaws = assembler_.lost() + assembler_.malformed();
   if (flaws != flaws_) flawed_ = bus_.Now();
   flaws_ = flaws;
@@ -71,10 +65,10 @@ int64_t LidarNode::SweepTime(int64_t device_us) {
 
 /// On the bus's clock, which the wall clock may have left since. Where that was set while packets
 /// waited, they may be stamped by what it was before.
-int64_t LidarNode::Arrival(const RawPacket& packet) const {
-  const bool is_set = wall_ahead_ && std::abs(WallAhead() - *wall_ahead_) > kSet;
+int64_t LidarNode::Arrival(const RawPacket& packet) {
   const int64_t age = bus::WallMicroseconds() - packet.capture_utime;
-  const bool is_known = packet.capture_utime > 0 && age >= 0 && age < kOldest && !is_set;
+  const bool is_known =
+      packet.capture_utime > 0 && age >= 0 && age < kOldest && !wall_.WasSet(kOldest);
   return bus_.Now() - (is_known ? age : 0);
 }
 

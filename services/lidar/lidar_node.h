@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "common/bus/bus.h"
+#include "common/bus/host_clock.h"
 #include "common/bus/node.h"
 #include "common/math/clock_alignment.h"
 #include "services/lidar/config.h"
@@ -26,7 +27,7 @@ class LidarNode : public bus::Node {
  private:
   void TickDevice();
   int64_t SweepTime(int64_t device_us);
-  int64_t Arrival(const RawPacket& packet) const;
+  int64_t Arrival(const RawPacket& packet);
   double Silence() const;
   void TickRecording(int64_t utime);
   void Take(const RawPacket& packet);
@@ -45,7 +46,7 @@ class LidarNode : public bus::Node {
   // us; chosen, not measured: above what delays on a wire vary by, as fcu's ClockSync has it.
   static constexpr int64_t kLate = 20'000;
   math::ClockAlignment alignment_{kLate};
-  std::optional<int64_t> wall_ahead_;  // of the steady clock when the last tick ended, us
+  bus::WallClockWatch wall_;
   std::optional<RawPacket> next_;
   std::optional<int64_t> first_tick_, first_device_us_;
   int64_t heard_ = 0;   // when the last packet came that is one, bus's clock; 0: none yet

@@ -49,6 +49,17 @@ TEST(ClockStep, TheHostsClockKnowsOfNone) {
   }
 }
 
+TEST(ClockStep, IsNoticedForAsLongAsItIsAskedAfter) {
+  WallClockWatch watch;
+  EXPECT_FALSE(watch.WasSet(kSecond));
+  for (const int64_t by : {kSecond / 50, -kSecond / 50, 3600 * kSecond}) {
+    Step(by);
+    EXPECT_TRUE(watch.WasSet(kSecond));
+    usleep(20'000);
+    EXPECT_FALSE(watch.WasSet(10'000));
+  }
+}
+
 // A message waits with the stamp of the clock that was.
 TEST(ClockStep, ARecordGoesOnInOrder) {
   for (const int64_t by : {5 * kSecond, -5 * kSecond, 3600 * kSecond, -3600 * kSecond}) {
