@@ -22,7 +22,8 @@ import lcmlog  # noqa: E402
 BIN, CLOCK = pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[2]).resolve(strict=True)
 SECONDS, FULL = 14, 11  # of the mission; from then on the recorder's disk is
 STEPS = [(1, 3600.0), (3, -7200.0), (5, 0.9), (7, -0.9), (9, 5.0)]  # (after this mission time, by), s
-LATEST = 3e6  # us from a stamp to its message, where two cores are busy with others; a step is more
+LATEST = 3e6  # us from a stamp to its message, where two cores are busy with others; steps of hours and 5 s are more
+LONGEST = 0.9e6  # us from a sensor's stamp to its next; the least step
 AHEAD = 0.1  # s of a step: it counts for all processes at once
 FAULTS = f"\nfaults: [{{name: kill-planning, at: 4}}, {{name: disk-full, at: {FULL}}}]\n"
 
@@ -83,6 +84,14 @@ class Host(unittest.TestCase):
         for utime, channel, data in self.log:
             if channel != "PLAN":  # of the time from which on it is flown
                 self.assertLess(abs(utime - struct.unpack_from(">q", data, 8)[0]), LATEST, channel)
+        last = {}
+        for _, channel, data in self.log:
+            if channel in ("CAMERA_IMAGE", "POSE", "IMU"):
+                stamp, source = struct.unpack_from(">q", data, 8)[0], (channel, lcmlog.sender(data))
+                gap = stamp - last.get(source, stamp - 1)
+                self.assertTrue(0 < gap < LONGEST, (source, gap))
+                last[source] = stamp
+        self.assertEqual({channel for channel, _ in last}, {"CAMERA_IMAGE", "POSE", "IMU"})
         sweeps = [struct.unpack_from(">q", data, 8)[0] for _, channel, data in self.log if channel == "LIDAR_SCAN"]
         self.assertEqual(sweeps, sorted(sweeps))
 

@@ -24,6 +24,12 @@ def write(path, events):
             f.write(struct.pack(">IqqII", SYNC, number, utime, len(name), len(data)) + name + data)
 
 
+def sender(data):
+    """Which every message names in its head."""
+    size, = struct.unpack_from(">i", data, 20)
+    return data[24:24 + size - 1].decode()
+
+
 def after_head(data):
     """Where the fields go on that every message begins with: stamp, number, sender, vehicle, start, inputs."""
     def skip_string(at):
