@@ -120,8 +120,12 @@ std::string Departure(const ServiceSpec& spec, const std::string& log, const std
     return (s.configuration.empty() ? "" : "configuration " + s.configuration + ", ") + s.version;
   };
   const auto file = std::filesystem::path(log).parent_path() / (spec.name + ".yaml");
+  const std::string cure =
+      std::filesystem::exists(file)
+          ? file.string()
+          : "FILE with what chase-flight SCENARIO --print-config " + spec.name + " prints";
   return fmt::format("flown with {}; this is {}{}", words(flown), words(here),
-                     configured ? "; use --config " + file.string() : "");
+                     configured ? "; use --config " + cure : "");
 }
 
 void RunReplay(const ServiceSpec& spec, const Flags& flags) {

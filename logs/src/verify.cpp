@@ -49,7 +49,7 @@ class Verifier {
     if (certified) {
       AddClaim(m);
       grounds = GroundsOf(m);
-      if (!grounds.list) return void(++result_.unheard);
+      if (!grounds.list) return Leave(m);
     }
     const Examination found = Examine(m, grounds);
     result_.unverified += found.unverified;
@@ -64,6 +64,11 @@ class Verifier {
   const Verification& result() const { return result_; }
 
  private:
+  void Leave(const plan_t& m) {
+    ++result_.unheard;
+    result_.unverified += m.n_proofs + m.n_stop_proofs;
+  }
+
   void AddClaim(const plan_t& m) {
     const bool first = result_.certified++ == 0;
     result_.hard_radius = first ? m.hard_radius : std::min(result_.hard_radius, m.hard_radius);
@@ -100,19 +105,23 @@ Verification Verify(const std::string& file, double hard_radius, double sigmas) 
   if (verifier.result().plans == 0)
     throw std::runtime_error(file +
                              ": holds no PLAN of ours; see chase-log info, chase-log migrate");
-  return verifier.result();
+  Verification result = verifier.result();
+  result.damage = log.damage();
+  return result;
 }
 
 std::string Format(const Verification& v) {
   std::string text = fmt::format(
       "{} plans, {} of them certified: {} proven, {} refuted, {} whose OBSTACLES are not in the "
       "log\n"
-      "{} proofs, {} of them not verified: the log lacks what they are about",
-      v.plans, v.certified, v.proven, v.refuted.size(), v.unheard, v.proofs, v.unverified);
+      "{} proofs, {} of them not verified{}",
+      v.plans, v.certified, v.proven, v.refuted.size(), v.unheard, v.proofs, v.unverified,
+      v.unverified > 0 ? ": the log lacks what they are about" : "");
   if (v.certified > 0)
     text +=
         fmt::format("; radius {:.3f} m and {:.1f} deviations at least", v.hard_radius, v.sigmas);
   text += "\n";
+  for (const Damage& d : v.damage) text += Format(d) + "; what is lost is not verified\n";
   for (const auto* lines : {&v.refuted, &v.open})
     for (const std::string& line : *lines) text += line + "\n";
   return text;

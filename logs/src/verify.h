@@ -3,6 +3,8 @@
 #include <string>
 #include <vector>
 
+#include "common/logs/log_reader.h"
+
 namespace chase::logs {
 
 /// What an exact check of every plan of a log says.
@@ -13,8 +15,11 @@ struct Verification {
   double hard_radius = 0.0, sigmas = 0.0;     ///< least of the certified plans, m and 1
   std::vector<std::string> refuted;           ///< a line per plan that does not hold
   std::vector<std::string> open;              ///< a line per other plan with unverified proofs
+  std::vector<Damage> damage;                 ///< of the log: plans may be lost
 
-  bool Told() const { return !refuted.empty() || (unheard == 0 && unverified == 0); }
+  bool Told() const {
+    return !refuted.empty() || (unheard == 0 && unverified == 0 && damage.empty());
+  }
 };
 
 /// Checks the proofs of every plan against the obstacles that it was made from, in exact

@@ -250,6 +250,20 @@ class LogTools(unittest.TestCase):
                 answer = run("chase-log", "verify", *arguments)
                 self.assertEqual(answer.returncode, code, answer.stdout + answer.stderr)
 
+    def test_verify_cannot_tell_what_a_cut_log_has_lost(self):
+        cut = self.folder / "verify_cut.lcm"
+        cut.write_bytes(pathlib.Path(self.log).read_bytes()[:-1000])
+        answer = run("chase-log", "verify", cut)
+        self.assertEqual(answer.returncode, 2, answer.stdout)
+        self.assertIn("the log was cut off; what is lost is not verified", answer.stdout)
+        self.assertEqual(run("chase-log", "verify", cut, "--radius", "5").returncode, 1)
+
+    def test_verify_counts_proofs_about_lists_that_are_missing(self):
+        blind = self.without("no_lists.lcm", lambda channel, k: channel == "OBSTACLES")
+        proofs, left = re.search(r"(\d+) proofs, (\d+) of them not verified: ", run("chase-log", "verify", blind).stdout).groups()
+        self.assertEqual(proofs, left)
+        self.assertIn(" proofs, 0 of them not verified;", self.good("verify", self.log))
+
     def test_verify_names_plans_that_it_cannot_verify(self):
         figures = r"(\d+) of them certified: (\d+) proven, \d+ refuted"
         certified, proven = map(int, re.search(figures, self.good("verify", self.log)).groups())
