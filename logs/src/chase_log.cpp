@@ -279,7 +279,7 @@ void AddDiff(CLI::App* app, Arguments* a, int* exit_code) {
   sub->add_option("--ignore", a->ignore,
                   "CHANNEL.field left out, shell patterns allowed; CHANNEL alone: all of it");
   sub->callback([a, exit_code] {
-    const auto differences = Diff(a->in, a->other, a->ignore, a->tolerance);
+    const auto differences = Diff(a->in, a->other, a->ignore, a->tolerance, Progress());
     std::fputs(Format(differences).c_str(), stdout);
     *exit_code = differences.channels.empty() ? 0 : 1;
   });

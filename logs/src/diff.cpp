@@ -98,8 +98,8 @@ constexpr std::array kOfEvents = {"count", "event_time", "bytes"};
 /// What may be ignored of each channel: the paths of its fields, and the rest that is compared.
 using Paths = std::map<std::string, std::vector<std::string>>;
 
-Names NamesIn(const std::string& file, Paths* paths) {
-  LogReader log(file);
+Names NamesIn(const std::string& file, const Watch& watch, Paths* paths) {
+  LogReader log(file, watch);
   Names names;
   std::map<std::string, Namer> namers;
   for (LogEvent e; log.Next(&e);) {
@@ -291,9 +291,9 @@ void RequireHeld(const std::string& pattern, const Paths& all) {
 }  // namespace
 
 Differences Diff(const std::string& a, const std::string& b, const std::vector<std::string>& ignore,
-                 double tolerance) {
+                 double tolerance, const Watch& watch) {
   Paths paths;
-  const Names names_a = NamesIn(a, &paths), names_b = NamesIn(b, &paths);
+  const Names names_a = NamesIn(a, watch, &paths), names_b = NamesIn(b, watch, &paths);
   for (auto& [channel, known] : paths)
     known.insert(known.end(), kOfEvents.begin(), kOfEvents.end());
   for (const std::string& pattern : ignore) RequireHeld(pattern, paths);

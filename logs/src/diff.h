@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "common/logs/log_reader.h"
+
 namespace chase::logs {
 
 /// How one field of a channel differs between two logs.
@@ -33,7 +35,7 @@ struct Differences {
 /// within `tolerance` of each other, absolute below 1 and relative above, are the same. Throws
 /// std::runtime_error with one line when a log cannot be read or they have no channel in common.
 Differences Diff(const std::string& a, const std::string& b, const std::vector<std::string>& ignore,
-                 double tolerance = 0.0);
+                 double tolerance = 0.0, const Watch& watch = {});
 
 /// A line for each log's own channels, one per channel and one per field that differs, for people.
 std::string Format(const Differences& differences);

@@ -250,13 +250,14 @@ class LogTools(unittest.TestCase):
                 answer = run("chase-log", "verify", *arguments)
                 self.assertEqual(answer.returncode, code, answer.stdout + answer.stderr)
 
-    def test_verify_cannot_tell_what_a_cut_log_has_lost(self):
+    def test_verify_and_diff_tell_of_a_cut_log(self):
         cut = self.folder / "verify_cut.lcm"
         cut.write_bytes(pathlib.Path(self.log).read_bytes()[:-1000])
         answer = run("chase-log", "verify", cut)
         self.assertEqual(answer.returncode, 2, answer.stdout)
         self.assertIn("the log was cut off; what is lost is not verified", answer.stdout)
         self.assertEqual(run("chase-log", "verify", cut, "--radius", "5").returncode, 1)
+        self.assertIn(f"{cut}: the last ", run("chase-log", "diff", self.log, cut).stderr)
 
     def test_verify_counts_proofs_about_lists_that_are_missing(self):
         blind = self.without("no_lists.lcm", lambda channel, k: channel == "OBSTACLES")
