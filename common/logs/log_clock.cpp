@@ -7,6 +7,7 @@
 namespace chase::logs {
 namespace {
 
+// Chosen, not measured: more than recorders and schedulers delay by, less than what somebody sets.
 constexpr int64_t kGapPeriods = 10;
 constexpr size_t kFewest = 20;                                  // of a channel to have a period
 constexpr int64_t kStepAhead = 2'000'000, kStepBack = 300'000;  // us, at least, of a clock
